@@ -1,0 +1,65 @@
+#include <fmt/format.h>
+
+#include "apps/stipple/common.h"
+#include "engine/base/hash.h"
+#include "engine/base/process.h"
+
+namespace stipple::app {
+namespace {
+
+struct Options {
+    std::vector<std::string> inputs;
+    std::string output;
+    BuildOptions build;
+    bool json = false, quiet = false;
+};
+
+Result<void> run(const Options& o) {
+    STIPPLE_ASSIGN(const lod::BuildSettings settings, o.build.settings());
+    const auto executor = makeTbbExecutor(o.build.threads);
+    Result<lod::BuildReport> built = [&] {
+        Progress progress(!o.quiet);
+        return lod::buildStore(o.inputs, o.output, settings, *executor, progress);
+    }();
+    if (!built) return tl::unexpected(built.error());
+    const lod::BuildReport& r = *built;
+    if (o.json) {
+        const nlohmann::json j = {{"points_in", r.pointsIn},
+                                  {"points_out", r.pointsOut},
+                                  {"dropped", r.dropped},
+                                  {"seconds", r.seconds},
+                                  {"stage_seconds", r.stageSeconds},
+                                  {"points_per_second", static_cast<double>(r.pointsIn) / r.seconds},
+                                  {"peak_rss_bytes", peakRssBytes()},
+                                  {"bytes_out", r.bytesOut},
+                                  {"nodes", r.nodes},
+                                  {"records", r.records},
+                                  {"notes", r.notes},
+                                  {"content_hash", hexDigits(r.contentHash)}};
+        fmt::print("{}\n", j.dump(2));
+        return {};
+    }
+    for (const std::string& note : r.notes) fmt::print(stderr, "note: {}\n", note);
+    fmt::print("{}: {} points in {} nodes, {} ({:.1f} bytes a point), {:.2f} s, {:.2f} M points/s, peak memory {}\n", o.output,
+               r.pointsOut, r.nodes, humanBytes(r.bytesOut), static_cast<double>(r.bytesOut) / static_cast<double>(r.pointsOut),
+               r.seconds, static_cast<double>(r.pointsIn) / r.seconds * 1e-6, humanBytes(peakRssBytes()));
+    for (const auto& [reason, count] : r.dropped) fmt::print("dropped {} points: {}\n", count, reason);
+    return {};
+}
+
+}  // namespace
+
+void setupBuild(CLI::App& app, int& status) {
+    auto o = std::make_shared<Options>();
+    CLI::App* sub = app.add_subcommand("build", "build the hierarchy of one or more scans (.ply, .las)");
+    sub->add_option("INPUT", o->inputs, "scans that together make the scene")->required();
+    sub->add_option("-o,--output", o->output, "the scene to write (.stipple)")->required();
+    o->build.addTo(*sub);
+    sub->add_flag("--json", o->json, "print the report as JSON");
+    sub->add_flag("--quiet", o->quiet, "no progress on standard error");
+    sub->callback([o, &status] {
+        if (const auto result = run(*o); !result) status = report(result.error());
+    });
+}
+
+}  // namespace stipple::app

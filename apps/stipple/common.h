@@ -1,0 +1,49 @@
+// What the subcommands share: options, backends, scenes from any input, errors to exit codes.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/base/executor.h"
+#include "engine/base/result.h"
+#include "engine/render/backend.h"
+#include "lod/build/build.h"
+#include "lod/store.h"
+
+namespace stipple::app {
+
+/// Thrown nowhere: a command returns its exit code; this prints the error's line and gives its code.
+int report(const Error& error);
+
+struct BuildOptions {
+    std::string memory = "2G", normals = "auto", radii = "auto", up;
+    int threads = 0;
+    void addTo(CLI::App& app);
+    Result<lod::BuildSettings> settings() const;
+};
+
+/// A .stipple file is opened; anything else is built into the cache first (and found there the next time).
+Result<std::shared_ptr<const lod::Store>> openScene(const std::vector<std::string>& inputs, const BuildOptions& build,
+                                                    Executor& executor, bool showProgress);
+
+Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, Executor& executor);
+/// Every backend and device, one per line.
+std::string listDevices();
+
+Result<glm::dvec3> parseVector(const std::string& text, const char* option);
+Result<glm::uvec2> parseSize(const std::string& text);
+/// Numbers as JSON: infinity has no number there, so it becomes the string "inf".
+nlohmann::json jsonNumber(double value);
+
+void setupBuild(CLI::App& app, int& status);
+void setupInfo(CLI::App& app, int& status);
+void setupRender(CLI::App& app, int& status);
+void setupView(CLI::App& app, int& status);
+void setupCompare(CLI::App& app, int& status);
+void setupGrow(CLI::App& app, int& status);
+
+}  // namespace stipple::app

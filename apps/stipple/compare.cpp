@@ -1,0 +1,55 @@
+#include <fmt/format.h>
+
+#include "apps/stipple/common.h"
+#include "engine/image/image_io.h"
+#include "engine/reference/reference.h"
+
+namespace stipple::app {
+namespace {
+
+struct Options {
+    std::string a, b, diff;
+    int threshold = 4;
+    bool json = false;
+};
+
+Result<void> run(const Options& o) {
+    STIPPLE_ASSIGN(const render::Image a, image::readImage(o.a));
+    STIPPLE_ASSIGN(const render::Image b, image::readImage(o.b));
+    render::Image difference;
+    auto compared = reference::compareImages(a, b, o.threshold, o.diff.empty() ? nullptr : &difference);
+    if (!compared) {
+        compared.error().where = o.a + ", " + o.b;
+        return tl::unexpected(compared.error());
+    }
+    if (!o.diff.empty()) STIPPLE_TRY(image::writeImage(o.diff, difference));
+    const auto& d = *compared;
+    if (o.json) {
+        const nlohmann::json j = {{"psnr", jsonNumber(d.psnr)}, {"foreground_psnr", jsonNumber(d.foregroundPsnr)}, {"max_diff", d.maxDiff},
+                                  {"differing_fraction", d.differingFraction}, {"threshold", o.threshold},
+                                  {"silhouette_iou", d.silhouetteIou}, {"holes", d.holes}};
+        fmt::print("{}\n", j.dump(2));
+    } else {
+        fmt::print("PSNR {:.2f} dB (foreground {:.2f} dB), largest difference {}/255, {:.4f} % of the pixels differ by more than {}/255, "
+                   "silhouette IoU {:.5f}, holes {}\n", d.psnr, d.foregroundPsnr, d.maxDiff, 100 * d.differingFraction, o.threshold,
+                   d.silhouetteIou, d.holes);
+    }
+    return {};
+}
+
+}  // namespace
+
+void setupCompare(CLI::App& app, int& status) {
+    auto o = std::make_shared<Options>();
+    CLI::App* sub = app.add_subcommand("compare", "how far picture A is from the reference B");
+    sub->add_option("A", o->a, "a picture (.png, .exr)")->required();
+    sub->add_option("B", o->b, "the reference")->required();
+    sub->add_option("--diff", o->diff, "write the differences, eight times enlarged, as a picture");
+    sub->add_option("--threshold", o->threshold, "channel difference that counts as differing")->capture_default_str();
+    sub->add_flag("--json", o->json, "as JSON");
+    sub->callback([o, &status] {
+        if (const auto result = run(*o); !result) status = report(result.error());
+    });
+}
+
+}  // namespace stipple::app

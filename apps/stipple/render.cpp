@@ -1,0 +1,246 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "apps/stipple/common.h"
+#include "engine/base/process.h"
+#include "engine/image/image_io.h"
+#include "engine/reference/reference.h"
+#include "engine/render/frame.h"
+#include "engine/scene/camera.h"
+
+namespace stipple::app {
+namespace {
+
+struct Options {
+    std::vector<std::string> inputs;
+    std::string output, size = "1280x720", eye, target, up, path, mode = "pullpush", device = "auto", shade = "auto", background = "24,26,30";
+    std::string debug = "none", resident = "1G";
+    double fov = 50, error = 1;
+    int frames = 1, samples = 4, orbit = 0;
+    uint64_t budget = 0;
+    bool noWait = false, json = false, quiet = false;
+    BuildOptions build;
+};
+
+struct Shot {
+    std::vector<lod::View> views;
+    glm::dvec3 worldUp{0, 0, 1};
+};
+
+Result<Shot> makeShot(const Options& o, const lod::StoreDescription& d, const glm::uvec2& size) {
+    Shot shot;
+    shot.worldUp = scene::axisVector(d.up);
+    const double aspect = static_cast<double>(size.x) / size.y;
+    const double nearPlane = std::max(1e-300, 1e-5 * glm::length(d.boundsMax - d.boundsMin));
+    if (!o.path.empty() || o.orbit > 0) {
+        scene::CameraPath path = scene::makeOrbit(d.boundsMin, d.boundsMax, d.up, aspect, std::max(1, o.orbit));
+        int frames = o.orbit > 0 ? o.orbit : o.frames;
+        if (!o.path.empty()) {
+            STIPPLE_ASSIGN(path, scene::readCameraPath(o.path));
+            if (o.frames <= 1) frames = std::max(1, static_cast<int>(std::lround(path.duration() * path.fps)) + 1);
+        }
+        for (int i = 0; i < frames; ++i) {
+            const double t = path.keys.front().t + (frames > 1 ? path.duration() * i / (frames - 1) : 0);
+            shot.views.push_back(scene::makeView(path.at(t), size.x, size.y, nearPlane));
+        }
+        return shot;
+    }
+    scene::Camera camera = scene::fitCamera(d.boundsMin, d.boundsMax, d.up, aspect);
+    camera.fovDegrees = o.eye.empty() ? camera.fovDegrees : o.fov;
+    if (!o.eye.empty()) {
+        STIPPLE_ASSIGN(camera.eye, parseVector(o.eye, "--eye"));
+    }
+    if (!o.target.empty()) {
+        STIPPLE_ASSIGN(camera.target, parseVector(o.target, "--target"));
+    }
+    if (!o.up.empty()) {
+        STIPPLE_ASSIGN(camera.up, parseVector(o.up, "--up"));
+    }
+    shot.views.push_back(scene::makeView(camera, size.x, size.y, nearPlane));
+    return shot;
+}
+
+Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDescription& d, const Shot& shot) {
+    render::FrameSettings s;
+    s.mode = o.mode == "points" ? render::Mode::points : render::Mode::pullpush;
+    s.budgets.errorPixels = o.error;
+    if (o.budget > 0) s.budgets.records = o.budget;
+    s.draw.lit = o.shade == "lit" || (o.shade == "auto" && !d.hasColour);
+    s.draw.worldUp = shot.worldUp;
+    STIPPLE_ASSIGN(const glm::dvec3 background, parseVector(o.background, "--background"));
+    for (int c = 0; c < 3; ++c) {
+        if (!(background[c] >= 0 && background[c] <= 255)) return fail(ErrorKind::usage, "channels are 0 to 255", "--background");
+        s.draw.background[c] = shared::linearFromSrgb(static_cast<float>(background[c]) / 255.0f);
+    }
+    static const std::array<const char*, 5> names{"none", "level", "error", "holes", "normals"};
+    s.draw.debugView = static_cast<uint32_t>(std::find(names.begin(), names.end(), o.debug) - names.begin());
+    s.wantDepthAndNormal = std::filesystem::path(o.output).extension() == ".exr";
+    return s;
+}
+
+double quantile(std::vector<double> values, double q) {
+    if (values.empty()) return 0;
+    std::sort(values.begin(), values.end());
+    return values[static_cast<size_t>(q * static_cast<double>(values.size() - 1) + 0.5)];
+}
+
+nlohmann::json countersJson(const FrameCounters& c) {
+    return {{"nodes_visited", c.nodesVisited}, {"nodes_culled", c.nodesCulled}, {"nodes_missing", c.nodesMissing},
+            {"records_tested", c.recordsTested}, {"cut_evaluations", c.cutEvaluations}, {"passes", c.passes}, {"blocks", c.blocks},
+            {"requests", c.requests}, {"uploads", c.uploads}, {"evictions", c.evictions}, {"failures", c.failures},
+            {"refused", c.refused}, {"budget_truncated", c.budgetTruncated}, {"tau_target_px", c.tauTargetPixels}, {"cut_ms", c.cutMs}};
+}
+
+/// out.png -> out_0007.png
+std::string numbered(const std::string& path, size_t index) {
+    const std::filesystem::path p(path);
+    return (p.parent_path() / fmt::format("{}_{:04}{}", p.stem().string(), index, p.extension().string())).string();
+}
+
+struct Timings {
+    std::vector<double> frames;
+    std::vector<std::string> passNames;
+    std::vector<std::vector<double>> passes;
+    double firstImageMs = 0, completeMs = 0;
+    void add(double frameMs, const std::vector<render::PassTime>& times) {
+        frames.push_back(frameMs);
+        passNames.clear();
+        passes.resize(times.size());
+        for (size_t i = 0; i < times.size(); ++i) {
+            passNames.push_back(times[i].name);
+            passes[i].push_back(times[i].ms);
+        }
+    }
+};
+
+Result<void> runFrames(const Options& o, const Shot& shot, const render::FrameSettings& settings, render::FrameState& state,
+                       Executor& executor, Timings& timings, bool& complete) {
+    // The first image: as soon as the root is there, whatever is missing.
+    const lod::View& first = shot.views.front();
+    while (!state.streamer->residency().drawable[0][0]) {
+        state.streamer->collect();
+        state.streamer->upload();
+        if (state.streamer->residency().drawable[0][0]) break;
+        if (state.streamer->counters().failures > 0) return fail(ErrorKind::input, state.streamer->lastFailure());
+        if (state.streamer->counters().refused > 0)
+            return fail(ErrorKind::budget, "the first chunk does not fit", "--resident " + o.resident, "give more memory");
+        lod::selectCut(state.hierarchies, state.instances, state.streamer->residency(), first, settings.budgets, state.scratch, state.cut);
+        state.streamer->request(state.cut);
+        std::this_thread::yield();
+    }
+    STIPPLE_TRY(render::renderFrame(state, first, settings));
+    timings.firstImageMs = millisecondsSinceProcessStart();
+    for (size_t i = 0; i < shot.views.size(); ++i) {
+        if (o.noWait) {
+            if (i > 0) STIPPLE_TRY(render::renderFrame(state, shot.views[i], settings));
+            complete = state.cut.wanted.empty();
+        } else {
+            STIPPLE_ASSIGN(complete, render::renderUntilComplete(state, shot.views[i], settings, executor));
+        }
+        if (i == 0) timings.completeMs = millisecondsSinceProcessStart();
+        timings.add(state.counters.frameMs, state.backend->passTimes());
+        if (shot.views.size() > 1) {
+            STIPPLE_TRY(image::writeImage(numbered(o.output, i), state.image));
+            if (!o.quiet && !o.json) fmt::print("{}\n", numbered(o.output, i));
+        }
+    }
+    if (shot.views.size() == 1)
+        for (int f = 1; f < o.frames; ++f) {  // one view again and again, for timing
+            STIPPLE_TRY(render::renderFrame(state, first, settings));
+            timings.add(state.counters.frameMs, state.backend->passTimes());
+        }
+    return {};
+}
+
+Result<void> run(const Options& o) {
+    STIPPLE_TRY(image::checkImagePath(o.output));
+    STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
+    if (!(o.error > 0)) return fail(ErrorKind::usage, "must be larger than 0", "--error");
+    const auto executor = makeTbbExecutor(o.build.threads);
+    STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store, openScene(o.inputs, o.build, *executor, !o.quiet));
+    STIPPLE_ASSIGN(const Shot shot, makeShot(o, store->description, size));
+    STIPPLE_ASSIGN(const render::FrameSettings settings, makeSettings(o, store->description, shot));
+    if (o.mode == "reference") {
+        const double start = nowSeconds();
+        reference::TraceSettings trace{static_cast<uint32_t>(o.samples), settings.draw};
+        for (size_t i = 0; i < shot.views.size(); ++i) {
+            STIPPLE_ASSIGN(const render::Image traced, reference::trace(*store, shot.views[i], trace, *executor));
+            STIPPLE_TRY(image::writeImage(shot.views.size() > 1 ? numbered(o.output, i) : o.output, traced));
+        }
+        if (o.json) fmt::print("{}\n", nlohmann::json{{"backend", "trace"}, {"samples_per_pixel", o.samples * o.samples}, {"seconds", nowSeconds() - start}}.dump(2));
+        return {};
+    }
+    STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
+    streaming::StreamSettings stream;
+    stream.residentBytes = parseBytes(o.resident);
+    if (stream.residentBytes == 0) return fail(ErrorKind::usage, "is not a size", "--resident " + o.resident, "e.g. 1G");
+    auto state = render::makeFrameState({store}, *backend, *executor, stream);
+    Timings timings;
+    bool complete = false;
+    STIPPLE_TRY(runFrames(o, shot, settings, *state, *executor, timings, complete));
+    if (shot.views.size() == 1) STIPPLE_TRY(image::writeImage(o.output, state->image));
+    const FrameCounters& c = state->counters;
+    if (!complete && !o.noWait && !o.quiet)
+        fmt::print(stderr, "note: {} chunks that this view wants are missing ({}); delivered error {:.2f} px\n", c.nodesMissing,
+                   c.failures ? state->streamer->lastFailure() : "the limit of --resident is reached", c.tauEffectivePixels);
+    if (o.json) {
+        nlohmann::json passes = nlohmann::json::array();
+        for (size_t i = 0; i < timings.passNames.size(); ++i)
+            passes.push_back({{"name", timings.passNames[i]}, {"ms", quantile(timings.passes[i], 0.5)}});
+        const nlohmann::json j = {{"backend", backend->name()}, {"device", backend->device()}, {"mode", o.mode}, {"width", size.x}, {"height", size.y},
+                                  {"frames", timings.frames.size()},
+                                  {"frame_ms", {{"median", quantile(timings.frames, 0.5)}, {"p95", quantile(timings.frames, 0.95)}}},
+                                  {"passes", passes}, {"records_drawn", c.recordsDrawn}, {"nodes_drawn", c.nodesDrawn},
+                                  {"tau_eff_px", c.tauEffectivePixels}, {"complete", complete}, {"bytes_streamed", c.bytesStreamed},
+                                  {"resident_bytes", c.residentBytes}, {"peak_rss_bytes", peakRssBytes()},
+                                  {"first_image_ms", timings.firstImageMs}, {"complete_ms", timings.completeMs}, {"counters", countersJson(c)}};
+        fmt::print("{}\n", j.dump(2));
+    } else if (!o.quiet && shot.views.size() == 1) {
+        fmt::print("{}: {} records, {:.2f} px error, {:.1f} ms a frame on {}\n", o.output, c.recordsDrawn, c.tauEffectivePixels,
+                   quantile(timings.frames, 0.5), backend->device());
+    }
+    return {};
+}
+
+}  // namespace
+
+void setupRender(CLI::App& app, int& status) {
+    auto o = std::make_shared<Options>();
+    CLI::App* sub = app.add_subcommand("render", "draw pictures without a window");
+    sub->add_option("SCENE", o->inputs, "a .stipple scene, or scans (built into the cache first)")->required();
+    sub->add_option("-o,--output", o->output, "the picture (.png, .exr); a path gives NAME_0000.png ...")->required();
+    sub->add_option("--size", o->size, "width x height, pixels")->capture_default_str();
+    sub->add_option("--eye", o->eye, "camera position x,y,z in file coordinates (default: fits the scene)");
+    sub->add_option("--target", o->target, "point that the camera looks at");
+    sub->add_option("--up", o->up, "up direction x,y,z");
+    sub->add_option("--fov", o->fov, "vertical field of view, degrees")->check(CLI::Range(0.1, 170.0))->capture_default_str();
+    auto* path = sub->add_option("--camera-path", o->path, "JSON file with keys; one picture per frame");
+    sub->add_option("--orbit", o->orbit, "N pictures around the scene")->check(CLI::Range(1, 100000))->excludes(path);
+    sub->add_option("--frames", o->frames, "frames of the path, or repetitions of one view for timing")->check(CLI::Range(1, 1000000))->capture_default_str();
+    sub->add_option("--mode", o->mode, "pullpush, points, or reference (traced full detail)")
+        ->check(CLI::IsMember({"pullpush", "points", "reference"}))->capture_default_str();
+    sub->add_option("--error", o->error, "tolerated screen-space error, pixels")->capture_default_str();
+    sub->add_option("--budget-points", o->budget, "records drawn at most; the error rises to meet it (0: no limit)")->capture_default_str();
+    sub->add_option("--resident", o->resident, "memory for resident chunks")->capture_default_str();
+    sub->add_option("--device", o->device, "auto, cpu, gpu, gpu:NAME or reference (fp64 restatement)")->capture_default_str();
+    sub->add_option("--shade", o->shade, "auto: unlit where the scan has colours")->check(CLI::IsMember({"auto", "lit", "unlit"}))->capture_default_str();
+    sub->add_option("--background", o->background, "R,G,B 0 to 255")->capture_default_str();
+    sub->add_option("--debug", o->debug, "debug view")->check(CLI::IsMember({"none", "level", "error", "holes", "normals"}))->capture_default_str();
+    sub->add_option("--samples", o->samples, "mode reference: rays per pixel along each axis")->check(CLI::Range(1, 64))->capture_default_str();
+    sub->add_flag("--no-wait", o->noWait, "do not wait for the complete cut");
+    sub->add_flag("--json", o->json, "print measurements as JSON");
+    sub->add_flag("--quiet", o->quiet, "no progress");
+    auto* group = sub->add_option_group("building", "for inputs that are not built yet");
+    group->add_option("--memory", o->build.memory, "memory that the build may use")->capture_default_str();
+    group->add_option("--threads", o->build.threads, "threads (0: all cores)")->check(CLI::Range(0, 1024))->capture_default_str();
+    sub->callback([o, &status] {
+        if (const auto result = run(*o); !result) status = report(result.error());
+    });
+}
+
+}  // namespace stipple::app

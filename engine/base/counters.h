@@ -1,0 +1,19 @@
+// The counters of one frame: what tests assert, the overlay prints and --json gives.
+#pragma once
+
+#include <cstdint>
+
+namespace stipple {
+
+struct FrameCounters {
+    uint64_t nodesVisited = 0, nodesDrawn = 0, nodesCulled = 0, nodesMissing = 0;
+    uint64_t recordsDrawn = 0, recordsTested = 0, cutEvaluations = 0, passes = 0, blocks = 0;
+    uint64_t bytesStreamed = 0, residentBytes = 0, requests = 0, uploads = 0, evictions = 0, failures = 0, refused = 0;
+    uint64_t requestsInFlight = 0;
+    bool budgetTruncated = false;
+    double tauTargetPixels = 0;    ///< what the budget allows once everything is resident
+    double tauEffectivePixels = 0; ///< what this frame delivers
+    double cutMs = 0, frameMs = 0;
+};
+
+}  // namespace stipple

@@ -1,0 +1,27 @@
+// Executor: where parallel work goes. Tests use the serial one, so that a run can be stepped by hand.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+
+namespace stipple {
+
+class Executor {
+  public:
+    virtual ~Executor() = default;
+    /// Calls body(begin, end) over [0, count) in pieces of at least `grain`; returns when all are done.
+    virtual void parallelFor(size_t count, size_t grain, const std::function<void(size_t, size_t)>& body) = 0;
+    /// Starts `task` and returns. It must not throw.
+    virtual void run(std::function<void()> task) = 0;
+    /// Waits for everything that run() started.
+    virtual void wait() = 0;
+    virtual int threads() const = 0;
+};
+
+/// oneTBB arena of `threads` threads (0: all cores).
+std::unique_ptr<Executor> makeTbbExecutor(int threads);
+/// Everything at once on the calling thread, in order; run() defers to wait() so that tests decide when work happens.
+std::unique_ptr<Executor> makeSerialExecutor();
+
+}  // namespace stipple

@@ -1,0 +1,59 @@
+// Files: positioned reads with checked sizes, and a writer whose file appears whole or not at all.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "engine/base/result.h"
+
+namespace stipple {
+
+/// A read-only file. readAt is safe from several threads.
+class InputFile {
+  public:
+    static Result<InputFile> open(const std::string& path);
+    InputFile(InputFile&& other) noexcept;
+    InputFile& operator=(InputFile&& other) noexcept;
+    ~InputFile();
+    uint64_t sizeBytes() const { return sizeBytes_; }
+    const std::string& path() const { return path_; }
+    /// Reads exactly `count` bytes at `offset`; an error names the place if the file ends earlier.
+    Result<void> readAt(uint64_t offset, void* destination, size_t count) const;
+
+  private:
+    InputFile(int descriptor, uint64_t sizeBytes, std::string path);
+    int descriptor_ = -1;
+    uint64_t sizeBytes_ = 0;
+    std::string path_;
+};
+
+/// Writes to "<path>.partial.<pid>", which commit() renames to `path`; without commit() it is removed again.
+class OutputFile {
+  public:
+    static Result<OutputFile> create(const std::string& path);
+    OutputFile(OutputFile&& other) noexcept;
+    OutputFile& operator=(OutputFile&&) = delete;
+    ~OutputFile();
+    Result<void> append(const void* bytes, size_t count);
+    Result<void> writeAt(uint64_t offset, const void* bytes, size_t count);
+    uint64_t position() const { return position_; }
+    const std::string& temporaryPath() const { return temporaryPath_; }
+    /// Flushes to disk; the temporary file stays where it is (so that it can be verified before commit).
+    Result<void> flush();
+    Result<void> commit();
+
+  private:
+    OutputFile(int descriptor, std::string path, std::string temporaryPath);
+    int descriptor_ = -1;
+    uint64_t position_ = 0;
+    std::string path_, temporaryPath_;
+};
+
+Result<std::string> readTextFile(const std::string& path, uint64_t sizeLimitBytes);
+/// Writes a whole file through OutputFile.
+Result<void> writeWholeFile(const std::string& path, const void* bytes, size_t count);
+
+}  // namespace stipple

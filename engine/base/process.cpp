@@ -1,0 +1,73 @@
+#include "engine/base/process.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <array>
+#include <cctype>
+#include <chrono>
+#include <cstdlib>
+#include <ctime>
+#include <fstream>
+#include <sstream>
+
+namespace stipple {
+
+uint64_t peakRssBytes() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return static_cast<uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+double millisecondsSinceProcessStart() {
+    // Field 22 of /proc/self/stat: start time after boot, in clock ticks. The name (field 2) may hold spaces.
+    static const double startMs = [] {
+        std::ifstream file("/proc/self/stat");
+        std::string text;
+        std::getline(file, text);
+        const size_t close = text.rfind(')');
+        std::istringstream rest(close == std::string::npos ? "" : text.substr(close + 2));
+        std::string field;
+        for (int i = 3; i <= 22; ++i) rest >> field;
+        return 1000.0 * std::atof(field.c_str()) / static_cast<double>(sysconf(_SC_CLK_TCK));
+    }();
+    timespec now{};
+    clock_gettime(CLOCK_BOOTTIME, &now);
+    return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6 - startMs;
+}
+
+double nowSeconds() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+std::string humanBytes(uint64_t bytes) {
+    static const std::array<const char*, 6> units{"B", "KiB", "MiB", "GiB", "TiB", "PiB"};
+    double value = static_cast<double>(bytes);
+    size_t unit = 0;
+    while (value >= 1024 && unit + 1 < units.size()) {
+        value /= 1024;
+        ++unit;
+    }
+    return unit == 0 ? fmt::format("{} B", bytes) : fmt::format("{:.1f} {}", value, units.at(unit));
+}
+
+uint64_t parseBytes(const std::string& text) {
+    char* end = nullptr;
+    const double value = std::strtod(text.c_str(), &end);
+    if (end == text.c_str() || !(value > 0) || value > 1e15) return 0;
+    double factor = 1;
+    switch (std::toupper(static_cast<unsigned char>(*end))) {
+        case 'K': factor = 1024.0; break;
+        case 'M': factor = 1048576.0; break;
+        case 'G': factor = 1073741824.0; break;
+        case 'T': factor = 1099511627776.0; break;
+        case 0: return static_cast<uint64_t>(value);
+        default: return 0;
+    }
+    const std::string tail(end + 1);
+    if (!tail.empty() && tail != "B" && tail != "iB") return 0;
+    return static_cast<uint64_t>(value * factor);
+}
+
+}  // namespace stipple

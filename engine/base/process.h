@@ -1,0 +1,20 @@
+// Facts about this process: memory, time since its start, a clock.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace stipple {
+
+uint64_t peakRssBytes();
+/// Milliseconds since the kernel started this process (10 ms resolution at worst, Linux), so that "first image" counts
+/// the loading of libraries too.
+double millisecondsSinceProcessStart();
+/// Monotonic seconds, for intervals.
+double nowSeconds();
+/// "1.5 GiB", "312 B".
+std::string humanBytes(uint64_t bytes);
+/// "2G", "512M", "1000000" -> bytes; 0 if it is not a size.
+uint64_t parseBytes(const std::string& text);
+
+}  // namespace stipple

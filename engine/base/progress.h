@@ -1,0 +1,28 @@
+// Progress of a long job: a line that rewrites itself on a terminal, one JSON line a second when piped.
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <string>
+
+namespace stipple {
+
+class Progress {
+  public:
+    /// `enabled` false: says nothing (library use, tests).
+    explicit Progress(bool enabled);
+    ~Progress();
+    Progress(const Progress&) = delete;
+    Progress& operator=(const Progress&) = delete;
+    /// Says that `done` of `total` units of `stage` are finished; prints at most ten times (JSON: once) a second.
+    /// From any thread.
+    void update(const std::string& stage, uint64_t done, uint64_t total);
+
+  private:
+    std::mutex mutex_;
+    bool enabled_, terminal_, dirty_ = false;
+    double startSeconds_, stageSeconds_ = 0, lastPrintSeconds_ = 0;
+    std::string stage_;
+};
+
+}  // namespace stipple

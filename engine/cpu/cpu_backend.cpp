@@ -1,0 +1,331 @@
+// Data flow of one frame (mode pullpush):
+//
+//   records --project--> visibility (64-bit min per pixel) --resolve+pull--> level 0, level 1 --pull--> level 2 ... top
+//   image <--shade+push-- level 0 <-- level 1 <--push-- ... top
+//
+// Work is cut into tiles of kTile columns and a band of rows; within a tile, rows are unpacked to floats that stay in
+// cache. Clearing is free: resolve resets each visibility entry it has read.
+#include "engine/cpu/cpu_backend.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <thread>
+#include <unordered_map>
+
+#include "engine/base/process.h"
+#include "shaders/shared/splat.h"
+
+namespace stipple::cpu {
+namespace {
+
+constexpr uint32_t kBandRows = 16;  ///< coarse rows per task
+
+/// One level of the pyramid in memory; five planes.
+struct Level {
+    uint32_t width = 0, height = 0;
+    std::vector<uint32_t> words;
+    void resize(uint32_t w, uint32_t h) {
+        width = w;
+        height = h;
+        words.resize(size_t{5} * w * h);
+    }
+    Planes planes() {
+        const size_t n = size_t{width} * height;
+        uint32_t* p = words.data();
+        return {reinterpret_cast<float*>(p), p + n, p + 2 * n, p + 3 * n, p + 4 * n};
+    }
+};
+
+Tables makeTables() {
+    Tables t{};
+    for (uint32_t i = 0; i < 256; ++i) {
+        t.radiusFraction.at(i) = shared::radiusFraction(i);
+        const float root = std::sqrt(shared::linearFromSrgb(static_cast<float>(i) / 255.0f));
+        t.red.at(i) = static_cast<uint32_t>(root * 2047.0f + 0.5f);
+        t.green.at(i) = t.red.at(i) << 11;
+        t.blue.at(i) = static_cast<uint32_t>(root * 1023.0f + 0.5f) << 22;
+    }
+    for (uint32_t i = 0; i < 2048; ++i) {
+        const float root = static_cast<float>(i) / 2047.0f;
+        t.srgbByte.at(i) = static_cast<uint32_t>(shared::srgbFromLinear(root * root) * 255.0f + 0.5f);
+    }
+    return t;
+}
+
+uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.instance} << 32 | key.node; }
+
+class CpuBackend final : public render::Backend {
+  public:
+    CpuBackend(Executor& executor, const Kernels& kernels) : executor_(executor), k_(kernels), tables_(makeTables()) {}
+
+    std::string name() const override { return "cpu"; }
+    std::string device() const override {
+        return std::string("cpu ") + k_.name + ", " + std::to_string(executor_.threads()) + " threads";
+    }
+    Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override {
+        chunks_[chunkId(key)] = chunk.records;
+        return {};
+    }
+    void evict(streaming::ChunkKey key) override { chunks_.erase(chunkId(key)); }
+    const std::vector<render::PassTime>& passTimes() const override { return times_; }
+
+    Result<void> render(const render::RenderRequest& request, render::Image& image) override {
+        draws_ = request.draws;
+        frame_ = draws_->frame;
+        image_ = &image;
+        wantAll_ = request.wantDepthAndNormal;
+        times_.clear();
+        resize();
+        bool hasPyramid = false;
+        for (const render::Pass pass : request.passes) hasPyramid = hasPyramid || pass == render::Pass::push;
+        for (const render::Pass pass : request.passes) {
+            const double start = nowSeconds();
+            switch (pass) {
+                case render::Pass::clear: clear(); break;
+                case render::Pass::project: project(); break;
+                case render::Pass::resolve: resolve(hasPyramid); break;
+                case render::Pass::pull: pull(); break;
+                case render::Pass::push: push(); break;
+                case render::Pass::shade: shade(hasPyramid); break;
+            }
+            times_.push_back({render::passName(pass), (nowSeconds() - start) * 1e3});
+        }
+        return {};
+    }
+
+  private:
+    void resize() {
+        const uint32_t w = frame_.width, h = frame_.height;
+        image_->width = w;
+        image_->height = h;
+        const size_t pixels = size_t{w} * h;
+        image_->rgba.resize(pixels);
+        image_->depth.resize(wantAll_ ? pixels : 0);
+        image_->normal.resize(wantAll_ ? pixels * 3 : 0);
+        image_->linear.resize(wantAll_ ? pixels * 3 : 0);
+        if (!levels_.empty() && levels_[0].width == w && levels_[0].height == h) return;
+        visibility_.assign(pixels, ~uint64_t{0});
+        levels_.clear();
+        for (uint32_t lw = w, lh = h;; lw = (lw + 1) / 2, lh = (lh + 1) / 2) {
+            levels_.emplace_back();
+            levels_.back().resize(lw, lh);
+            if (lw == 1 && lh == 1) break;
+        }
+    }
+
+    /// The visibility buffer is already clear (see resolve); what is made here is the block table.
+    void clear() {
+        blocks_.resize(draws_->blocks.size());
+        for (size_t b = 0; b < blocks_.size(); ++b) {
+            const shared::DrawBlock& block = draws_->blocks[b];
+            const auto found = chunks_.find(chunkId(draws_->keys[block.node]));
+            blocks_[b] = {found->second.data() + block.first, &draws_->nodes[block.node]};
+        }
+    }
+
+    void project() {
+        executor_.parallelFor(blocks_.size(), 32, [&](size_t begin, size_t end) {
+            alignas(64) std::array<uint32_t, shared::kRecordsPerBlock> pixel, depth;
+            for (size_t b = begin; b < end; ++b) {
+                const uint32_t count = std::min(shared::kRecordsPerBlock, blocks_[b].node->count - draws_->blocks[b].first);
+                k_.projectBlock(frame_, *blocks_[b].node, blocks_[b].records, count, pixel.data(), depth.data());
+                for (uint32_t i = 0; i < count; ++i) {
+                    if (pixel[i] == ~0u) continue;
+                    const uint64_t key = uint64_t{depth[i]} << 32 | (b * shared::kRecordsPerBlock + i);
+                    const std::atomic_ref<uint64_t> entry(visibility_[pixel[i]]);
+                    uint64_t old = entry.load(std::memory_order_relaxed);
+                    while (key < old && !entry.compare_exchange_weak(old, key, std::memory_order_relaxed)) {
+                    }
+                }
+            }
+        });
+    }
+
+    /// Calls body(x0, n, row0, row1) for tiles of `level`: columns [x0, x0 + n), rows [row0, row1), row0 even.
+    template <typename Body>
+    void forTiles(const Level& level, const Body& body) {
+        const uint32_t columns = (level.width + kTile - 1) / kTile, bands = (level.height + 2 * kBandRows - 1) / (2 * kBandRows);
+        executor_.parallelFor(size_t{columns} * bands, level.width * level.height < 65536 ? 64 : 1, [&](size_t begin, size_t end) {
+            for (size_t t = begin; t < end; ++t) {
+                const auto x0 = static_cast<uint32_t>(t % columns) * kTile, row0 = static_cast<uint32_t>(t / columns) * 2 * kBandRows;
+                body(x0, std::min(kTile, level.width - x0), row0, std::min(level.height, row0 + 2 * kBandRows));
+            }
+        });
+    }
+
+    /// Level 0 from the visibility buffer; with a pyramid, level 1 on the way.
+    void resolve(bool hasPyramid) {
+        Level& fine = levels_[0];
+        Level* coarse = hasPyramid && levels_.size() > 1 ? &levels_[1] : nullptr;
+        const Planes finePlanes = fine.planes();
+        std::atomic<float> largestRadius{0};
+        forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
+            TexelRow upper, lower, out;
+            float largest = 0;
+            for (uint32_t y = row0; y < row1; y += 2) {
+                bool any = false;
+                for (TexelRow* row : {&upper, &lower}) {
+                    const uint32_t yy = y + (row == &lower ? 1 : 0);
+                    row->depth[kPad + n] = 0;  // beyond the right edge of an odd width
+                    if (yy >= row1) {
+                        std::fill_n(row->depth.begin() + kPad, n, 0.0f);
+                        continue;
+                    }
+                    const size_t at = size_t{yy} * fine.width + x0;
+                    const bool has = k_.resolveRow(frame_, tables_, blocks_.data(), visibility_.data() + at, x0, yy, n, *row, largest);
+                    if (has) k_.packRow(*row, n, finePlanes.at(at));
+                    else std::fill_n(finePlanes.depth + at, n, 0.0f);
+                    any = any || has;
+                }
+                if (!coarse) continue;
+                const size_t at = size_t{y / 2} * coarse->width + x0 / 2;
+                pullPair(upper, lower, any, (n + 1) / 2, 1.0f, coarse->planes().at(at), out);
+            }
+            float seen = largestRadius.load(std::memory_order_relaxed);
+            while (largest > seen && !largestRadius.compare_exchange_weak(seen, largest, std::memory_order_relaxed)) {
+            }
+        });
+        // Levels whose texels are larger than the largest splat hold nothing.
+        const auto needed = static_cast<size_t>(1 + std::ceil(std::log2(std::max(2.0f, 2 * largestRadius.load()))));
+        levelCount_ = std::min(levels_.size(), needed);
+    }
+
+    void pullPair(const TexelRow& upper, const TexelRow& lower, bool any, uint32_t n, float childSize, const Planes& to, TexelRow& out) {
+        if (!any) {
+            std::fill_n(to.depth, n, 0.0f);
+            return;
+        }
+        k_.pullRow(upper, lower, n, childSize, 1.0f / frame_.focal, out);
+        k_.packRow(out, n, to);
+    }
+
+    void pull() {
+        for (size_t l = 1; l + 1 < levelCount_; ++l) {
+            Level &fine = levels_[l], &coarse = levels_[l + 1];
+            const Planes from = fine.planes(), to = coarse.planes();
+            forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
+                TexelRow upper, lower, out;
+                for (uint32_t y = row0; y < row1; y += 2) {
+                    bool any = false;
+                    for (TexelRow* row : {&upper, &lower}) {
+                        const uint32_t yy = y + (row == &lower ? 1 : 0);
+                        any = (yy < row1 && loadRow(fine, from, yy, x0, n, kPad, *row)) || any;
+                        if (yy >= row1) std::fill_n(row->depth.begin() + kPad, n, 0.0f);
+                        row->depth[kPad + n] = 0;
+                    }
+                    pullPair(upper, lower, any, (n + 1) / 2, std::exp2(static_cast<float>(l)),
+                             to.at(size_t{y / 2} * coarse.width + x0 / 2), out);
+                }
+            });
+        }
+    }
+
+    /// Unpacks n texels of a row; false (and only the depths set) if all are empty.
+    bool loadRow(const Level& level, const Planes& planes, uint32_t y, uint32_t x, uint32_t n, uint32_t first, TexelRow& row) {
+        const Planes at = planes.at(size_t{y} * level.width + x);
+        bool any = false;
+        for (uint32_t i = 0; i < n; ++i) any |= at.depth[i] > 0;
+        if (any) k_.unpackRow(at, first, n, row);
+        else std::fill_n(row.depth.begin() + first, n, 0.0f);
+        return any;
+    }
+
+    /// The expanded coarse row `y` around the fine columns [x0, x0 + n); empty outside the level.
+    bool loadCoarse(const Level& level, const Planes& planes, int y, uint32_t x0, uint32_t n, TexelRow& scratch, TexelRow& out) {
+        const uint32_t c0 = x0 / 2, count = (n + 1) / 2;
+        if (y < 0 || y >= static_cast<int>(level.height)) return false;
+        const uint32_t before = c0 > 0 ? 1 : 0, after = c0 + count < level.width ? 1 : 0;
+        scratch.depth[kPad - 1] = 0;
+        scratch.depth[kPad + count] = 0;
+        if (!loadRow(level, planes, static_cast<uint32_t>(y), c0 - before, count + before + after, kPad - before, scratch)) return false;
+        k_.expandRow(scratch, n, out);
+        return true;
+    }
+
+    /// Pushes coarse into fine over one tile, row by row: use(y, own row, pushed row, any).
+    template <typename Use>
+    void pushTile(Level& fine, Level& coarse, float fineSize, uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1, const Use& use) {
+        const Planes finePlanes = fine.planes(), coarsePlanes = coarse.planes();
+        thread_local TexelRow scratch{}, own{}, out{};
+        thread_local std::array<TexelRow, 3> ring{};
+        std::array<bool, 3> has{};
+        const int c0 = static_cast<int>(row0 / 2);
+        for (int c = c0 - 1; c <= c0; ++c)
+            has.at(static_cast<size_t>(c + 1) % 3) = loadCoarse(coarse, coarsePlanes, c, x0, n, scratch, ring.at(static_cast<size_t>(c + 1) % 3));
+        for (uint32_t y = row0; y < row1; ++y) {
+            const auto c = static_cast<size_t>(y / 2);  // ring slot of coarse row c is (c + 1) % 3
+            if (y % 2 == 0) has.at((c + 2) % 3) = loadCoarse(coarse, coarsePlanes, static_cast<int>(c) + 1, x0, n, scratch, ring.at((c + 2) % 3));
+            const size_t nearSlot = (c + 1) % 3, farSlot = y % 2 == 0 ? c % 3 : (c + 2) % 3;
+            const bool ownAny = loadRow(fine, finePlanes, y, x0, n, kPad, own);
+            if (!has.at(nearSlot) && !has.at(farSlot)) {
+                use(y, own, own, ownAny);
+                continue;
+            }
+            for (const size_t slot : {nearSlot, farSlot})
+                if (!has.at(slot)) ring.at(slot).depth.fill(0);
+            k_.pushRow(own, ring.at(nearSlot), ring.at(farSlot), y % 2 == 0 ? -1.0f : 1.0f, n, fineSize, 1.0f / frame_.focal, out);
+            use(y, own, out, true);
+        }
+    }
+
+    void push() {
+        for (size_t l = levelCount_; l-- > 1;) {
+            if (l + 1 >= levelCount_) continue;
+            Level &fine = levels_[l], &coarse = levels_[l + 1];
+            const Planes planes = fine.planes();
+            forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
+                pushTile(fine, coarse, std::exp2(static_cast<float>(l)), x0, n, row0, row1,
+                         [&](uint32_t y, const TexelRow&, const TexelRow& row, bool any) {
+                             if (any) k_.packRow(row, n, planes.at(size_t{y} * fine.width + x0));
+                         });
+            });
+        }
+    }
+
+    /// The last push (into level 0) and the shading of its result, or the shading alone.
+    void shade(bool hasPyramid) {
+        Level& fine = levels_[0];
+        const Planes planes = fine.planes();
+        const auto shadeRow = [&](uint32_t x0, uint32_t n, uint32_t y, const TexelRow& own, const TexelRow& row) {
+            const size_t at = size_t{y} * fine.width + x0;
+            k_.shadeRow(frame_, tables_, own, row, x0, y, n,
+                        {image_->rgba.data() + at, wantAll_ ? image_->depth.data() + at : nullptr,
+                         wantAll_ ? image_->normal.data() + 3 * at : nullptr, wantAll_ ? image_->linear.data() + 3 * at : nullptr});
+        };
+        forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
+            if (hasPyramid && levelCount_ > 1) {
+                pushTile(fine, levels_[1], 1.0f, x0, n, row0, row1,
+                         [&](uint32_t y, const TexelRow& own, const TexelRow& row, bool) { shadeRow(x0, n, y, own, row); });
+                return;
+            }
+            thread_local TexelRow row{};
+            for (uint32_t y = row0; y < row1; ++y) {
+                loadRow(fine, planes, y, x0, n, kPad, row);
+                shadeRow(x0, n, y, row, row);
+            }
+        });
+    }
+
+    Executor& executor_;
+    const Kernels& k_;
+    Tables tables_;
+    std::unordered_map<uint64_t, std::vector<shared::PointRecord>> chunks_;
+    std::vector<uint64_t> visibility_;
+    std::vector<Level> levels_;
+    std::vector<BlockSource> blocks_;
+    std::vector<render::PassTime> times_;
+    const render::DrawList* draws_ = nullptr;
+    shared::FrameConstants frame_{};
+    render::Image* image_ = nullptr;
+    size_t levelCount_ = 0;
+    bool wantAll_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<render::Backend> makeCpuBackend(Executor& executor, const Kernels* kernels) {
+    return std::make_unique<CpuBackend>(executor, kernels ? *kernels : bestKernels());
+}
+
+}  // namespace stipple::cpu

@@ -1,0 +1,71 @@
+// The inner loops of the cpu backend, compiled once per instruction set from kernels.inl and chosen at run time. They
+// call the scalar formulas of shaders/shared; the compiler turns the loops into SIMD, so no formula stands twice.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "shaders/shared/frame.h"
+#include "shaders/shared/record.h"
+
+namespace stipple::cpu {
+
+constexpr uint32_t kTile = 128;  ///< pixels of a row that are worked on together: all rows of a tile stay in L1 and L2
+constexpr uint32_t kPad = 16;    ///< entries in front of the first one; also room behind the last one
+
+/// A row of unpacked texels; entry x of a tile is at [kPad + x]. Entries -1 and n may be read as neighbours.
+struct TexelRow {
+    using Array = std::array<float, kTile + 2 * kPad>;
+    alignas(64) Array depth, radius, thickness, x, y, perpX, perpY, red, green, blue;
+};
+
+/// One level of the pyramid: five planes of packed texels.
+struct Planes {
+    float* depth;
+    uint32_t *size, *offset, *normal, *colour;
+    Planes at(size_t i) const { return {depth + i, size + i, offset + i, normal + i, colour + i}; }
+};
+
+struct BlockSource {
+    const shared::PointRecord* records;  ///< first record of the block
+    const shared::DrawNode* node;
+};
+
+/// Look-up tables that the kernels share.
+struct Tables {
+    std::array<float, 256> radiusFraction;
+    std::array<uint32_t, 256> red, green, blue;  ///< sRGB byte -> its bits of the packed colour
+    std::array<uint32_t, 2048> srgbByte;         ///< sqrt(linear) * 2047 -> sRGB byte
+};
+
+struct ShadeOutput {
+    uint32_t* rgba;
+    float *depth, *normal, *linear;  ///< may be null
+};
+
+struct Kernels {
+    const char* name;
+    /// Pixel index (or ~0u) and depth bits of up to 256 records.
+    void (*projectBlock)(const shared::FrameConstants& f, const shared::DrawNode& node, const shared::PointRecord* records,
+                         uint32_t count, uint32_t* pixel, uint32_t* depth);
+    /// Decodes the winners of `n` pixels of row `y` from `x0` on; clears the visibility entries. False if all are empty.
+    bool (*resolveRow)(const shared::FrameConstants& f, const Tables& tables, const BlockSource* blocks, uint64_t* visibility,
+                       uint32_t x0, uint32_t y, uint32_t n, TexelRow& row, float& largestRadius);
+    void (*packRow)(const TexelRow& row, uint32_t n, const Planes& to);
+    void (*unpackRow)(const Planes& from, uint32_t first, uint32_t n, TexelRow& row);
+    void (*pullRow)(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float inverseFocal, TexelRow& out);
+    /// `upperIsNear`: the parent's own row is `nearRow`; `farRow` is the coarse row on the other side. Both expanded.
+    void (*pushRow)(const TexelRow& fine, const TexelRow& nearRow, const TexelRow& farRow, float sy, uint32_t n, float fineSize,
+                    float inverseFocal, TexelRow& out);
+    /// Doubles the entries of a coarse row (-1 to (n + 1) / 2) along x.
+    void (*expandRow)(const TexelRow& coarse, uint32_t n, TexelRow& out);
+    void (*shadeRow)(const shared::FrameConstants& f, const Tables& tables, const TexelRow& own, const TexelRow& row, uint32_t x0,
+                     uint32_t y, uint32_t n, const ShadeOutput& out);
+};
+
+/// The best kernels that this processor runs; STIPPLE_SIMD=sse|avx2|avx512 asks for fewer.
+const Kernels& bestKernels();
+/// All that it runs, for tests.
+const Kernels* const* availableKernels(size_t& count);
+
+}  // namespace stipple::cpu

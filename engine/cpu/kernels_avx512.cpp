@@ -1,0 +1,3 @@
+#define STIPPLE_KERNELS kernels_avx512
+#define STIPPLE_KERNELS_NAME "avx512"
+#include "engine/cpu/kernels.inl"  // NOLINT(bugprone-suspicious-include)

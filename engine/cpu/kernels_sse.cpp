@@ -1,0 +1,3 @@
+#define STIPPLE_KERNELS kernels_sse
+#define STIPPLE_KERNELS_NAME "sse"
+#include "engine/cpu/kernels.inl"  // NOLINT(bugprone-suspicious-include)

@@ -1,0 +1,110 @@
+#include "engine/image/image_io.h"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+
+#include "engine/image/oiio_module.h"
+
+namespace stipple::image {
+namespace {
+
+struct Module {
+    decltype(&stippleOiioWrite) write = nullptr;
+    decltype(&stippleOiioRead) read = nullptr;
+    std::string problem;
+};
+
+const Module& module() {
+    static const Module loaded = [] {
+        Module m;
+        std::error_code ignored;
+        const auto folder = std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path();
+        // Beside the program (build tree), in lib/stipple of an installation, or where the build put it (tests).
+        for (const std::string& place : {(folder / "libstipple_oiio.so").string(), (folder / STIPPLE_INSTALLED_MODULE).string(),
+                                         std::string(STIPPLE_BUILT_MODULE)}) {
+            void* handle = ::dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL);
+            if (!handle) {
+                m.problem = ::dlerror();
+                continue;
+            }
+            m.write = reinterpret_cast<decltype(m.write)>(::dlsym(handle, "stippleOiioWrite"));
+            m.read = reinterpret_cast<decltype(m.read)>(::dlsym(handle, "stippleOiioRead"));
+            if (m.write && m.read) return m;
+        }
+        return m;
+    }();
+    return loaded;
+}
+
+bool hasExtension(const std::string& path, const char* extension) {
+    std::string e = std::filesystem::path(path).extension().string();
+    for (char& c : e) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return e == extension;
+}
+
+}  // namespace
+
+Result<void> checkImagePath(const std::string& path) {
+    if (hasExtension(path, ".png") || hasExtension(path, ".exr")) return {};
+    return fail(ErrorKind::usage, "pictures are written as .png or .exr", path, "change the extension");
+}
+
+Result<void> writeImage(const std::string& path, const render::Image& image) {
+    STIPPLE_TRY(checkImagePath(path));
+    const bool isExr = hasExtension(path, ".exr");
+    const size_t pixels = size_t{image.width} * image.height;
+    std::vector<float> wide;
+    if (isExr) {
+        wide.resize(pixels * 8);
+        for (size_t i = 0; i < pixels; ++i) {
+            float* to = wide.data() + i * 8;
+            for (size_t c = 0; c < 3; ++c) to[c] = image.linear.size() == pixels * 3 ? image.linear[i * 3 + c] : 0;
+            to[3] = static_cast<float>(image.rgba[i] >> 24) / 255.0f;
+            to[4] = image.depth.size() == pixels ? image.depth[i] : 0;
+            for (size_t c = 0; c < 3; ++c) to[5 + c] = image.normal.size() == pixels * 3 ? image.normal[i * 3 + c] : 0;
+        }
+    }
+    if (!module().write) return fail(ErrorKind::output, "the picture module cannot be loaded: " + module().problem, path);
+    static const std::array<const char*, 8> names{"R", "G", "B", "A", "Z", "N.x", "N.y", "N.z"};
+    const std::string temporary = fmt::format("{}.partial.{}{}", path, ::getpid(), isExr ? ".exr" : ".png");
+    std::array<char, 512> error{};
+    const int status = module().write(temporary.c_str(), static_cast<int>(image.width), static_cast<int>(image.height), isExr ? 8 : 4,
+                                      isExr ? 1 : 0, isExr ? static_cast<const void*>(wide.data()) : image.rgba.data(), names.data(),
+                                      error.data(), error.size());
+    // A full disk shows as a short file with some encoders, without an error.
+    struct stat info {};
+    if (status == 0 && ::stat(temporary.c_str(), &info) == 0 && info.st_size > 0 && ::rename(temporary.c_str(), path.c_str()) == 0) return {};
+    const std::string reason = status != 0 ? error.data() : std::strerror(errno);
+    ::unlink(temporary.c_str());
+    return fail(ErrorKind::output, "cannot be written: " + reason.substr(0, reason.find('\n')), path,
+                "choose a folder that exists, can be written and has room");
+}
+
+Result<render::Image> readImage(const std::string& path) {
+    if (!module().read) return fail(ErrorKind::input, "the picture module cannot be loaded: " + module().problem, path);
+    std::array<char, 512> error{};
+    int width = 0, height = 0;
+    const auto bad = [&] {
+        const std::string text = error.data();
+        return fail(ErrorKind::input, "cannot be read: " + text.substr(0, text.find('\n')), path, "PNG and EXR are read");
+    };
+    if (module().read(path.c_str(), &width, &height, nullptr, error.data(), error.size()) != 0) return bad();
+    if (width <= 0 || height <= 0 || int64_t{width} * height > int64_t{1} << 30) return fail(ErrorKind::input, "has an impossible size", path);
+    render::Image image;
+    image.width = static_cast<uint32_t>(width);
+    image.height = static_cast<uint32_t>(height);
+    image.rgba.resize(size_t{image.width} * image.height);
+    if (module().read(path.c_str(), &width, &height, reinterpret_cast<unsigned char*>(image.rgba.data()), error.data(), error.size()) != 0)
+        return bad();
+    return image;
+}
+
+}  // namespace stipple::image

@@ -1,0 +1,19 @@
+// Pictures in and out, through OpenImageIO, which is loaded at the first use: its 260 libraries cost 0.4 s.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "engine/base/result.h"
+#include "engine/render/backend.h"
+
+namespace stipple::image {
+
+/// By extension: .png (8 bit, alpha = coverage) or .exr (linear colour, coverage, depth, normal). Whole or not at all.
+Result<void> writeImage(const std::string& path, const render::Image& image);
+/// 8-bit RGBA; files without alpha are opaque.
+Result<render::Image> readImage(const std::string& path);
+/// Can this extension be written? An error that names those that can, if not.
+Result<void> checkImagePath(const std::string& path);
+
+}  // namespace stipple::image

@@ -1,0 +1,61 @@
+#include "engine/image/oiio_module.h"
+
+#include <OpenImageIO/imageio.h>
+
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace {
+int report(const std::string& text, char* error, int errorBytes) {
+    std::snprintf(error, static_cast<size_t>(errorBytes), "%s", text.c_str());
+    return -1;
+}
+}  // namespace
+
+extern "C" int stippleOiioWrite(const char* path, int width, int height, int channels, int isFloat, const void* pixels,
+                                const char* const* names, char* error, int errorBytes) {
+    try {
+        const OIIO::TypeDesc type = isFloat ? OIIO::TypeDesc::FLOAT : OIIO::TypeDesc::UINT8;
+        OIIO::ImageSpec spec(width, height, channels, type);
+        spec.channelnames.assign(names, names + channels);
+        spec.alpha_channel = channels > 3 ? 3 : -1;
+        spec.attribute("oiio:UnassociatedAlpha", 1);
+        spec.attribute("oiio:ColorSpace", isFloat ? "Linear" : "sRGB");
+        spec.attribute("png:compressionLevel", 3);
+        spec.attribute("compression", "zip");
+        const std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create(path);
+        if (!out) return report(OIIO::geterror(), error, errorBytes);
+        if (!out->open(path, spec) || !out->write_image(type, pixels) || !out->close())
+            return report(out->geterror(), error, errorBytes);
+        return 0;
+    } catch (const std::exception& e) {
+        return report(e.what(), error, errorBytes);
+    }
+}
+
+extern "C" int stippleOiioRead(const char* path, int* width, int* height, unsigned char* pixels, char* error, int errorBytes) {
+    try {
+        OIIO::ImageSpec config;
+        config.attribute("oiio:UnassociatedAlpha", 1);
+        const std::unique_ptr<OIIO::ImageInput> in = OIIO::ImageInput::open(path, &config);
+        if (!in) return report(OIIO::geterror(), error, errorBytes);
+        const OIIO::ImageSpec& spec = in->spec();
+        *width = spec.width;
+        *height = spec.height;
+        if (pixels == nullptr) return 0;
+        const int channels = spec.nchannels;
+        std::vector<unsigned char> raw(static_cast<size_t>(spec.width) * static_cast<size_t>(spec.height) * static_cast<size_t>(channels));
+        if (!in->read_image(0, 0, 0, channels, OIIO::TypeDesc::UINT8, raw.data())) return report(in->geterror(), error, errorBytes);
+        const size_t count = static_cast<size_t>(spec.width) * static_cast<size_t>(spec.height);
+        for (size_t i = 0; i < count; ++i)
+            for (int c = 0; c < 4; ++c) {
+                const int from = channels >= 3 ? c : c < 3 ? 0 : channels == 2 ? 1 : 4;
+                pixels[i * 4 + static_cast<size_t>(c)] = from < channels ? raw[i * static_cast<size_t>(channels) + static_cast<size_t>(from)] : 255;
+            }
+        return 0;
+    } catch (const std::exception& e) {
+        return report(e.what(), error, errorBytes);
+    }
+}

@@ -1,0 +1,63 @@
+// Records decoded in fp64, from the description of the format alone.
+#pragma once
+
+#include <cmath>
+#include <glm/glm.hpp>
+
+#include "lod/hierarchy.h"
+#include "shaders/shared/frame.h"
+#include "shaders/shared/record.h"
+
+namespace stipple::reference {
+
+struct Disc {
+    glm::dvec3 position{0};  ///< world
+    glm::dvec3 normal{0};    ///< world; zero: none
+    double radius = 0;       ///< world
+    glm::dvec3 colour{0};    ///< linear
+    uint32_t flags = 0, errorCode = 0, octant = 0;
+};
+
+inline double decodeSrgb(uint32_t byte) {
+    const double s = byte / 255.0;
+    return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
+}
+inline uint32_t encodeSrgb(double l) {
+    if (!(l > 0)) return 0;
+    if (l >= 1) return 255;
+    const double s = l <= 0.0031308 ? 12.92 * l : 1.055 * std::pow(l, 1 / 2.4) - 0.055;
+    return static_cast<uint32_t>(std::lround(s * 255.0));
+}
+
+inline Disc decodeDisc(const lod::Hierarchy& h, const lod::Node& node, const shared::PointRecord& r) {
+    Disc d;
+    const double cell = std::ldexp(1.0, static_cast<int>(h.rootLog2) - node.level), step = cell / 65536;
+    const glm::dvec3 q(r.positionXY % 65536, static_cast<double>(r.positionXY / 65536), r.positionZRadiusError % 65536);
+    glm::dvec3 lattice = glm::dvec3(node.cell[0], node.cell[1], node.cell[2]) * cell + q * step;
+    if (step > 1) lattice += glm::dvec3((step - 1) / 2);
+    d.position = h.origin + h.unit * lattice;
+    const uint32_t radiusCode = r.positionZRadiusError / 65536 % 256;
+    d.errorCode = r.positionZRadiusError / 16777216;
+    d.radius = h.unit * cell * std::exp2((radiusCode - 255.0) / 16.0);
+    d.octant = (q.x >= 32768 ? 1u : 0u) + (q.y >= 32768 ? 2u : 0u) + (q.z >= 32768 ? 4u : 0u);
+    d.flags = r.colour / 16777216;
+    d.colour = {decodeSrgb(r.colour % 256), decodeSrgb(r.colour / 256 % 256), decodeSrgb(r.colour / 65536 % 256)};
+    if ((d.flags & shared::kFlagNoNormal) == 0) {
+        glm::dvec3 n((r.normal % 65536) / 32767.0 - 1, (r.normal / 65536) / 32767.0 - 1, 0);
+        n.z = 1 - std::abs(n.x) - std::abs(n.y);
+        if (n.z < 0) {
+            const double x = n.x, y = n.y;
+            n.x = (1 - std::abs(y)) * (x >= 0 ? 1 : -1);
+            n.y = (1 - std::abs(x)) * (y >= 0 ? 1 : -1);
+        }
+        d.normal = glm::normalize(n);
+    }
+    return d;
+}
+
+/// Light of the scene's sun and sky on a white surface with eye-facing camera-space normal n.
+inline double lightOn(const glm::dvec3& n, const shared::FrameConstants& f) {
+    return 0.75 * std::max(0.0, glm::dot(n, glm::dvec3(f.sunDirection))) + 0.25 + 0.15 * glm::dot(n, glm::dvec3(f.skyDirection));
+}
+
+}  // namespace stipple::reference

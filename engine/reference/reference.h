@@ -1,0 +1,37 @@
+// The oracle, fp64 and scalar; it shares no formula with the backends.
+//   restate: each mode once more, plainly, on a given cut: what a backend's implementation error is measured against.
+//   trace:   discs of the full detail hit by rays: what the reconstruction error is measured against.
+//   metrics: how far two images are apart.
+#pragma once
+
+#include <memory>
+
+#include "engine/base/executor.h"
+#include "engine/render/backend.h"
+#include "lod/store.h"
+
+namespace stipple::reference {
+
+/// A backend that restates modes pullpush and points in fp64.
+std::unique_ptr<render::Backend> makeReferenceBackend(Executor& executor);
+
+struct TraceSettings {
+    uint32_t samplesPerAxis = 4;  ///< N x N rays per pixel
+    render::DrawSettings draw;
+};
+/// Rays against the discs of all leaves: at the front hit, colours and normals of the discs within the front thickness
+/// are blended with the kernel (1 - rho^2)^2; samples are averaged in linear light, alpha is coverage.
+Result<render::Image> trace(const lod::Store& store, const lod::View& view, const TraceSettings& settings, Executor& executor);
+
+struct ImageDifference {
+    double psnr = 0;            ///< dB over all pixels (colour over black where transparent); infinity if equal
+    double foregroundPsnr = 0;  ///< dB where either image has coverage
+    int maxDiff = 0;            ///< largest channel difference
+    double differingFraction = 0;  ///< pixels with a channel more than `threshold` apart
+    double silhouetteIou = 1;   ///< of the pixels with coverage >= 1/2
+    uint64_t holes = 0;         ///< pixels empty in A whose 5 x 5 neighbourhood is covered in B
+};
+/// `b` is the reference. Sizes must agree.
+Result<ImageDifference> compareImages(const render::Image& a, const render::Image& b, int threshold, render::Image* difference);
+
+}  // namespace stipple::reference

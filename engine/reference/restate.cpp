@@ -1,0 +1,263 @@
+// Modes points and pullpush once more, in fp64, one pixel at a time, written from ALGORITHMS 1.4 and not from the kernels.
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "engine/base/process.h"
+#include "engine/reference/decode.h"
+#include "engine/reference/reference.h"
+
+namespace stipple::reference {
+namespace {
+
+using glm::dvec2;
+using glm::dvec3;
+
+struct Sample {
+    bool valid = false;
+    double depth = 0, radius = 0, thickness = 0;  ///< thickness in world units
+    dvec2 centre{0};                              ///< of the splat, pixels of the full-size image
+    dvec2 perp{0};
+    dvec3 colour{0};
+};
+
+struct Level {
+    int width = 0, height = 0;
+    std::vector<Sample> samples;
+    const Sample* at(int x, int y) const {
+        return x < 0 || y < 0 || x >= width || y >= height ? nullptr : &samples[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)];
+    }
+    Sample& ref(int x, int y) { return samples[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)]; }
+};
+
+/// The rotation that takes the unit vector v to z the shortest way (Rodrigues).
+glm::dmat3 rotationToZ(const dvec3& v) {
+    const dvec3 axis(v.y, -v.x, 0);  // v x z
+    const double c = v.z;
+    const glm::dmat3 k(dvec3(0, axis.z, -axis.y), dvec3(-axis.z, 0, axis.x), dvec3(axis.y, -axis.x, 0));
+    return glm::dmat3(1) + k + k * k * (1 / (1 + c));
+}
+
+/// rho^2 of a point in the ellipse of a sample.
+double rhoSquared(const Sample& s, const dvec2& point) {
+    const dvec2 d = point - s.centre;
+    const double facing2 = std::clamp(1 - glm::dot(s.perp, s.perp), 0.25 / (s.radius * s.radius), 1.0);
+    const double along = glm::dot(s.perp, d);
+    return (facing2 * glm::dot(d, d) + along * along) / (facing2 * s.radius * s.radius);
+}
+
+struct Contribution {
+    const Sample* sample;
+    double weight;
+};
+
+/// Weighted mean of the contributions that meet the front one; `front` is set to it.
+Sample blend(std::vector<Contribution>& list, const Sample*& front) {
+    front = nullptr;
+    for (const Contribution& c : list)
+        if (!front || c.sample->depth < front->depth) front = c.sample;
+    Sample sum;
+    double weight = 0;
+    std::erase_if(list, [&](const Contribution& c) { return c.sample->depth - front->depth > c.sample->thickness + front->thickness; });
+    for (const auto& [s, w] : list) {
+        weight += w;
+        sum.depth += w * s->depth;
+        sum.radius += w * s->radius;
+        sum.thickness += w * s->thickness / s->depth;
+        sum.centre += w * s->centre;
+        sum.perp += w * s->perp;
+        sum.colour += w * s->colour;
+    }
+    sum.valid = true;
+    sum.depth /= weight;
+    sum.radius /= weight;
+    sum.thickness = sum.thickness / weight * sum.depth;
+    sum.centre /= weight;
+    sum.perp /= weight;
+    sum.colour /= weight;
+    return sum;
+}
+
+Level pullLevel(const Level& fine, double childSize) {
+    Level coarse{(fine.width + 1) / 2, (fine.height + 1) / 2, {}};
+    coarse.samples.resize(static_cast<size_t>(coarse.width) * static_cast<size_t>(coarse.height));
+    for (int y = 0; y < coarse.height; ++y)
+        for (int x = 0; x < coarse.width; ++x) {
+            const dvec2 centre = dvec2(2 * x + 1, 2 * y + 1) * childSize;
+            std::vector<Contribution> list;
+            for (int k = 0; k < 4; ++k) {
+                const Sample* s = fine.at(2 * x + k % 2, 2 * y + k / 2);
+                if (s && s->valid && rhoSquared(*s, centre) <= 1) list.push_back({s, 1.0});
+            }
+            if (list.empty()) continue;
+            const Sample* front = nullptr;
+            Sample merged = blend(list, front);
+            double deepest = 0, thickest = 0;
+            for (const Contribution& c : list) {
+                deepest = std::max(deepest, c.sample->depth);
+                thickest = std::max(thickest, c.sample->thickness);
+            }
+            merged.depth = front->depth;
+            merged.thickness = std::min(thickest + deepest - front->depth, 2 * thickest);
+            coarse.ref(x, y) = merged;
+        }
+    return coarse;
+}
+
+void pushLevel(Level& fine, const Level& coarse, double fineSize) {
+    const Level before = fine;
+    for (int y = 0; y < fine.height; ++y)
+        for (int x = 0; x < fine.width; ++x) {
+            const dvec2 centre = (dvec2(x, y) + 0.5) * fineSize;
+            const int px = x / 2, py = y / 2, sx = x % 2 ? 1 : -1, sy = y % 2 ? 1 : -1;
+            std::vector<Contribution> list;
+            for (int k = 0; k < 4; ++k) {
+                const Sample* s = coarse.at(px + (k % 2 ? sx : 0), py + (k / 2 ? sy : 0));
+                if (!s || !s->valid) continue;
+                const double rest = 1 - rhoSquared(*s, centre);
+                if (rest > 0) list.push_back({s, rest * rest});
+            }
+            if (list.empty()) continue;
+            const Sample* front = nullptr;
+            const Sample merged = blend(list, front);
+            Sample& own = fine.ref(x, y);
+            if (!own.valid || own.depth > front->depth + front->thickness) own = merged;
+        }
+}
+
+class ReferenceBackend final : public render::Backend {
+  public:
+    explicit ReferenceBackend(Executor& executor) : executor_(executor) {}
+    std::string name() const override { return "reference"; }
+    std::string device() const override { return "fp64 reference, scalar"; }
+    Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override {
+        chunks_[uint64_t{key.instance} << 32 | key.node] = chunk.records;
+        return {};
+    }
+    void evict(streaming::ChunkKey key) override { chunks_.erase(uint64_t{key.instance} << 32 | key.node); }
+    const std::vector<render::PassTime>& passTimes() const override { return times_; }
+
+    Result<void> render(const render::RenderRequest& request, render::Image& image) override {
+        const double start = nowSeconds();
+        const render::DrawList& draws = *request.draws;
+        const bool hasPyramid = std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
+        Level level0 = projectAll(draws);
+        const Level own = level0;
+        if (hasPyramid) reconstruct(level0);
+        shade(draws, own, level0, request.wantDepthAndNormal, image);
+        times_ = {{"reference", (nowSeconds() - start) * 1e3}};
+        return {};
+    }
+
+  private:
+    Level projectAll(const render::DrawList& draws) {
+        const lod::View& v = draws.view;
+        const shared::FrameConstants& f = draws.frame;
+        Level level{static_cast<int>(v.width), static_cast<int>(v.height), {}};
+        level.samples.resize(size_t{v.width} * v.height);
+        for (size_t d = 0; d < draws.cut.size(); ++d) {
+            const lod::CutDraw& cut = draws.cut[d];
+            const lod::Instance& instance = draws.instances[cut.instance];
+            const lod::Hierarchy& h = *draws.hierarchies[instance.hierarchy];
+            const lod::Node& node = h.nodes[cut.node];
+            const auto& records = chunks_.at(uint64_t{cut.instance} << 32 | cut.node);
+            for (uint32_t i = 0; i < cut.count; ++i) {
+                const Disc disc = decodeDisc(h, node, records[i]);
+                if (disc.errorCode > cut.errorCode && !(cut.octantMask >> disc.octant & 1u)) continue;
+                const dvec3 world = instance.translation + instance.rotation * (instance.scale * disc.position) - v.eye;
+                const dvec3 c(glm::dot(world, v.right), glm::dot(world, v.down), glm::dot(world, v.forward));
+                if (!(c.z > v.nearPlane)) continue;
+                const dvec2 p(v.focalPixels * c.x / c.z + 0.5 * v.width, v.focalPixels * c.y / c.z + 0.5 * v.height);
+                if (!(p.x >= 0 && p.y >= 0 && p.x < v.width && p.y < v.height)) continue;
+                const dvec3 nw = instance.rotation * disc.normal;
+                dvec3 n(glm::dot(nw, v.right), glm::dot(nw, v.down), glm::dot(nw, v.forward));
+                const bool oneSided = (disc.flags & (shared::kFlagTwoSided | shared::kFlagNoNormal)) == 0;
+                if (oneSided && glm::dot(n, c) >= 0) continue;
+                Sample& s = level.ref(static_cast<int>(p.x), static_cast<int>(p.y));
+                if (s.valid && s.depth <= c.z) continue;
+                const dvec3 toPoint = glm::normalize(c);
+                if ((disc.flags & shared::kFlagNoNormal) != 0) n = -toPoint;
+                const double facing = glm::dot(n, toPoint);
+                if (facing > 0) n = -n;
+                s.valid = true;
+                s.depth = c.z;
+                s.centre = p;
+                s.radius = std::clamp(instance.scale * disc.radius * f.supportScale * v.focalPixels / c.z, double(f.minimumRadius), 16384.0);
+                s.thickness = s.radius * c.z / v.focalPixels * (0.25 + std::sqrt(std::max(0.0, 1 - facing * facing)));
+                s.perp = dvec2(rotationToZ(toPoint) * n);
+                s.colour = disc.colour;
+                if (f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError) s.colour = debugColour(f, node, cut);
+            }
+        }
+        return level;
+    }
+
+    static dvec3 debugColour(const shared::FrameConstants& f, const lod::Node& node, const lod::CutDraw& cut) {
+        const double t = f.debugView == shared::kDebugLevel ? (node.level % 8) / 7.0
+                                                            : std::clamp((std::log2(std::max(1e-6, double(cut.errorPixels))) + 3) / 6, 0.0, 1.0);
+        const auto hat = [&](double middle) { return std::clamp(1.5 - std::abs(4 * t - middle), 0.0, 1.0); };
+        return {hat(3), hat(2), hat(1)};
+    }
+
+    static void reconstruct(Level& level0) {
+        double largest = 0;
+        for (const Sample& s : level0.samples) largest = std::max(largest, s.valid ? s.radius : 0.0);
+        const int count = 1 + static_cast<int>(std::ceil(std::log2(std::max(2.0, 2 * largest))));
+        std::vector<Level> pyramid{level0};
+        while (static_cast<int>(pyramid.size()) < count && (pyramid.back().width > 1 || pyramid.back().height > 1))
+            pyramid.push_back(pullLevel(pyramid.back(), std::ldexp(1.0, static_cast<int>(pyramid.size()) - 1)));
+        for (size_t l = pyramid.size() - 1; l-- > 0;) pushLevel(pyramid[l], pyramid[l + 1], std::ldexp(1.0, static_cast<int>(l)));
+        level0 = std::move(pyramid[0]);
+    }
+
+    void shade(const render::DrawList& draws, const Level& own, const Level& level, bool wantAll, render::Image& image) {
+        const lod::View& v = draws.view;
+        const shared::FrameConstants& f = draws.frame;
+        const size_t pixels = size_t{v.width} * v.height;
+        image.width = v.width;
+        image.height = v.height;
+        image.rgba.resize(pixels);
+        image.depth.assign(wantAll ? pixels : 0, 0.0f);
+        image.normal.assign(wantAll ? pixels * 3 : 0, 0.0f);
+        image.linear.assign(wantAll ? pixels * 3 : 0, 0.0f);
+        executor_.parallelFor(pixels, 4096, [&](size_t begin, size_t end) {
+            for (size_t i = begin; i < end; ++i) {
+                const Sample& s = level.samples[i];
+                dvec3 colour(f.background);
+                if (s.valid) {
+                    const dvec2 p(double(i % v.width) + 0.5, double(i / v.width) + 0.5);
+                    const dvec3 toPixel = glm::normalize(dvec3((p - dvec2(0.5 * v.width, 0.5 * v.height)) / v.focalPixels, 1));
+                    const dvec3 local(s.perp, -std::sqrt(std::max(0.0, 1 - glm::dot(s.perp, s.perp))));
+                    const dvec3 n = glm::transpose(rotationToZ(toPixel)) * local;
+                    colour = s.colour;
+                    if (f.debugView == shared::kDebugHoles) {
+                        const Sample& o = own.samples[i];
+                        colour = !o.valid ? dvec3(1, 0.3, 0.02) : o.depth != s.depth ? dvec3(0.02, 0.1, 0.9) : dvec3(0.2);
+                    } else if (f.debugView == shared::kDebugNormals) {
+                        colour = 0.5 + 0.5 * dvec3(n.x, -n.y, -n.z);
+                    } else if (f.shade == shared::kShadeLit && f.debugView == shared::kDebugNone) {
+                        colour *= lightOn(n, f);
+                    }
+                    if (wantAll) {
+                        image.depth[i] = static_cast<float>(s.depth);
+                        const dvec3 world = v.right * n.x + v.down * n.y + v.forward * n.z;
+                        for (int c = 0; c < 3; ++c) image.normal[i * 3 + static_cast<size_t>(c)] = static_cast<float>(world[c]);
+                    }
+                }
+                if (wantAll)
+                    for (int c = 0; c < 3; ++c) image.linear[i * 3 + static_cast<size_t>(c)] = static_cast<float>(colour[c]);
+                image.rgba[i] = encodeSrgb(colour.x) | encodeSrgb(colour.y) << 8 | encodeSrgb(colour.z) << 16 | (s.valid ? 0xff000000u : 0u);
+            }
+        });
+    }
+
+    Executor& executor_;
+    std::unordered_map<uint64_t, std::vector<shared::PointRecord>> chunks_;
+    std::vector<render::PassTime> times_;
+};
+
+}  // namespace
+
+std::unique_ptr<render::Backend> makeReferenceBackend(Executor& executor) { return std::make_unique<ReferenceBackend>(executor); }
+
+}  // namespace stipple::reference

@@ -1,0 +1,53 @@
+// Backend: what draws. The cpu and gpu backends (and the fp64 reference) take the same draw list and the same list of
+// passes, and give the same kind of image.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "engine/base/result.h"
+#include "engine/render/draw_list.h"
+#include "streaming/streamer.h"
+
+namespace stipple::render {
+
+enum class Mode : uint8_t { pullpush, points };
+
+/// Passes in the order in which they run; a pass that the frame does not call for is not in the list.
+enum class Pass : uint8_t { clear, project, resolve, pull, push, shade };
+const char* passName(Pass pass);
+/// The passes of a mode.
+std::vector<Pass> passesOf(Mode mode);
+
+struct PassTime {
+    std::string name;
+    double ms = 0;
+};
+
+/// A finished image. Row-major, top row first.
+struct Image {
+    uint32_t width = 0, height = 0;
+    std::vector<uint32_t> rgba;    ///< r | g << 8 | b << 16 | coverage << 24; sRGB
+    std::vector<float> depth;      ///< linear, world units; 0: background. Only if asked for.
+    std::vector<float> normal;     ///< x y z per pixel, world space, eye-facing. Only if asked for.
+    std::vector<float> linear;     ///< r g b per pixel, linear, background included. Only if asked for.
+};
+
+struct RenderRequest {
+    const DrawList* draws = nullptr;
+    std::vector<Pass> passes;
+    bool wantDepthAndNormal = false;
+};
+
+class Backend : public streaming::ChunkSink {
+  public:
+    virtual std::string name() const = 0;    ///< "cpu", "gpu", "reference"
+    virtual std::string device() const = 0;  ///< for a person
+    /// Draws into `image`, whose storage is reused.
+    virtual Result<void> render(const RenderRequest& request, Image& image) = 0;
+    /// Of the last render.
+    virtual const std::vector<PassTime>& passTimes() const = 0;
+};
+
+}  // namespace stipple::render

@@ -1,0 +1,71 @@
+#include "engine/render/draw_list.h"
+
+#include <cmath>
+
+namespace stipple::render {
+
+static_assert(sizeof(shared::PointRecord) == 16);
+static_assert(sizeof(shared::DrawNode) == 80);
+static_assert(sizeof(shared::DrawBlock) == 8);
+static_assert(sizeof(shared::FrameConstants) == 120);
+
+void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,
+                  std::span<const lod::Instance> instances, const lod::View& view, const DrawSettings& settings,
+                  DrawList& out) {
+    out.nodes.clear();
+    out.blocks.clear();
+    out.keys.clear();
+    out.view = view;
+    out.cut.assign(cut.draw.begin(), cut.draw.end());
+    out.hierarchies = hierarchies;
+    out.instances = instances;
+    const glm::dmat3 cameraFromWorld = glm::transpose(glm::dmat3(view.right, view.down, view.forward));
+    for (const lod::CutDraw& draw : cut.draw) {
+        const lod::Instance& instance = instances[draw.instance];
+        const lod::Hierarchy& h = *hierarchies[instance.hierarchy];
+        const lod::Node& node = h.nodes[draw.node];
+        // Composed in fp64 relative to the eye, rounded once (hard cases 1 and 2).
+        const double worldPerStep = instance.scale * h.unit * std::exp2(node.stepShift);
+        const glm::dmat3 axes = cameraFromWorld * instance.rotation;
+        const glm::dvec3 base =
+            cameraFromWorld * (instance.translation - view.eye +
+                               instance.rotation * (instance.scale * (h.origin + h.unit * h.recordOrigin(node))));
+        shared::DrawNode d{};
+        d.axisX = glm::vec3(axes[0] * worldPerStep);
+        d.axisY = glm::vec3(axes[1] * worldPerStep);
+        d.axisZ = glm::vec3(axes[2] * worldPerStep);
+        d.base = glm::vec3(base);
+        d.edge = static_cast<float>(instance.scale * h.unit * h.cellSize(node));
+        d.errorCode = draw.errorCode;
+        d.octantMask = draw.octantMask;
+        d.count = draw.count;
+        d.level = node.level;
+        d.errorPixels = draw.errorPixels;
+        const auto index = static_cast<uint32_t>(out.nodes.size());
+        for (uint32_t first = 0; first < draw.count; first += shared::kRecordsPerBlock)
+            out.blocks.push_back({index, first});
+        out.nodes.push_back(d);
+        out.keys.push_back({draw.instance, draw.node});
+    }
+    shared::FrameConstants& f = out.frame;
+    f.viewX = glm::vec3(view.right);
+    f.viewY = glm::vec3(view.down);
+    f.viewZ = glm::vec3(view.forward);
+    f.focal = static_cast<float>(view.focalPixels);
+    f.centre = {0.5f * static_cast<float>(view.width), 0.5f * static_cast<float>(view.height)};
+    f.width = view.width;
+    f.height = view.height;
+    f.nearPlane = static_cast<float>(view.nearPlane);
+    f.supportScale = settings.supportScale;
+    f.minimumRadius = settings.minimumRadius;
+    f.shade = settings.lit ? shared::kShadeLit : shared::kShadeUnlit;
+    f.debugView = settings.debugView;
+    f.levels = 0;
+    // A sun over the viewer's left shoulder: every view of a scan is lit from where one looks.
+    f.sunDirection = glm::normalize(glm::vec3(-0.45f, -0.55f, -0.7f));
+    f.skyDirection = glm::vec3(cameraFromWorld * settings.worldUp);
+    f.background = settings.background;
+    f.blockCount = static_cast<uint32_t>(out.blocks.size());
+}
+
+}  // namespace stipple::render

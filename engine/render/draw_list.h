@@ -1,0 +1,40 @@
+// From a cut to what the passes read: one DrawNode per node, one DrawBlock per 256 records, frame constants. The only
+// place where world-sized numbers (fp64) become camera-space fp32.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "lod/cut.h"
+#include "shaders/shared/frame.h"
+#include "shaders/shared/record.h"
+#include "streaming/streamer.h"
+
+namespace stipple::render {
+
+struct DrawList {
+    shared::FrameConstants frame{};
+    std::vector<shared::DrawNode> nodes;
+    std::vector<shared::DrawBlock> blocks;
+    std::vector<streaming::ChunkKey> keys;  ///< chunk of each node
+    // What the fp32 numbers above were made from: the reference starts from these.
+    lod::View view;
+    std::vector<lod::CutDraw> cut;
+    std::span<const lod::Hierarchy* const> hierarchies;
+    std::span<const lod::Instance> instances;
+};
+
+struct DrawSettings {
+    bool lit = false;
+    uint32_t debugView = shared::kDebugNone;
+    glm::vec3 background{0.02f, 0.02f, 0.025f};  ///< linear
+    glm::dvec3 worldUp{0, 0, 1};
+    float supportScale = 1.5f;                   ///< see kSupportScale
+    float minimumRadius = 1.5f;                  ///< pixels
+};
+
+void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,
+                  std::span<const lod::Instance> instances, const lod::View& view, const DrawSettings& settings,
+                  DrawList& out);
+
+}  // namespace stipple::render

@@ -1,0 +1,105 @@
+#include "engine/render/frame.h"
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "engine/base/process.h"
+
+namespace stipple::render {
+
+const char* passName(Pass pass) {
+    switch (pass) {
+        case Pass::clear: return "clear";
+        case Pass::project: return "project";
+        case Pass::resolve: return "resolve";
+        case Pass::pull: return "pull";
+        case Pass::push: return "push";
+        case Pass::shade: return "shade";
+    }
+    return "?";
+}
+
+std::vector<Pass> passesOf(Mode mode) {
+    if (mode == Mode::points) return {Pass::clear, Pass::project, Pass::resolve, Pass::shade};
+    // The last push and the shading are one pass: each pixel is touched once.
+    return {Pass::clear, Pass::project, Pass::resolve, Pass::pull, Pass::push, Pass::shade};
+}
+
+std::unique_ptr<FrameState> makeFrameState(std::vector<std::shared_ptr<const lod::Store>> stores, Backend& backend,
+                                           Executor& executor, const streaming::StreamSettings& settings) {
+    auto state = std::make_unique<FrameState>();
+    state->backend = &backend;
+    state->streamer = std::make_unique<streaming::Streamer>(executor, backend, settings);
+    for (auto& store : stores) {
+        lod::Instance instance;
+        instance.hierarchy = static_cast<uint32_t>(state->hierarchies.size());
+        state->instances.push_back(instance);
+        state->hierarchies.push_back(&store->hierarchy);
+        state->streamer->addInstance(store->hierarchy, streaming::makeFileSource(store->file), store->path);
+        state->stores.push_back(std::move(store));
+    }
+    return state;
+}
+
+Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSettings& settings) {
+    const double start = nowSeconds();
+    streaming::Streamer& streamer = *state.streamer;
+    streamer.collect();
+    streamer.upload();
+    const double cutStart = nowSeconds();
+    lod::selectCut(state.hierarchies, state.instances, streamer.residency(), view, settings.budgets, state.scratch, state.cut);
+    const double cutEnd = nowSeconds();
+    streamer.request(state.cut);
+    makeDrawList(state.cut, state.hierarchies, state.instances, view, settings.draw, state.draws);
+    RenderRequest request;
+    request.draws = &state.draws;
+    request.passes = passesOf(settings.mode);
+    request.wantDepthAndNormal = settings.wantDepthAndNormal;
+    STIPPLE_TRY(state.backend->render(request, state.image));
+
+    FrameCounters& c = state.counters;
+    const lod::CutCounters& cut = state.cut.counters;
+    const streaming::StreamCounters& stream = streamer.counters();
+    c.nodesVisited = cut.nodesVisited;
+    c.nodesDrawn = cut.nodesDrawn;
+    c.nodesCulled = cut.nodesCulled;
+    c.nodesMissing = cut.nodesMissing;
+    c.recordsDrawn = cut.recordsDrawn;
+    c.recordsTested = cut.recordsTested;
+    c.cutEvaluations = cut.evaluations;
+    c.budgetTruncated = state.cut.truncated;
+    c.tauTargetPixels = state.cut.tauTarget;
+    c.tauEffectivePixels = state.cut.tauEffective;
+    c.passes = request.passes.size();
+    c.blocks = state.draws.blocks.size();
+    c.bytesStreamed = stream.bytesStreamed;
+    c.residentBytes = stream.residentBytes;
+    c.requests = stream.requests;
+    c.uploads = stream.uploads;
+    c.evictions = stream.evictions;
+    c.failures = stream.failures;
+    c.refused = stream.refused;
+    c.requestsInFlight = stream.inFlight;
+    c.cutMs = (cutEnd - cutStart) * 1e3;
+    c.frameMs = (nowSeconds() - start) * 1e3;
+    return {};
+}
+
+Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const FrameSettings& settings,
+                                 Executor& executor) {
+    streaming::Streamer& streamer = *state.streamer;
+    for (;;) {
+        streamer.collect();
+        streamer.upload();
+        lod::selectCut(state.hierarchies, state.instances, streamer.residency(), view, settings.budgets, state.scratch, state.cut);
+        const uint64_t before = streamer.counters().requests;
+        streamer.request(state.cut);
+        if (streamer.isIdle() && streamer.counters().requests == before) break;
+        executor.wait();
+    }
+    STIPPLE_TRY(renderFrame(state, view, settings));
+    return state.cut.wanted.empty();
+}
+
+}  // namespace stipple::render

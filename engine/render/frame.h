@@ -1,0 +1,47 @@
+// One frame, as a straight line (ARCHITECTURE, "One frame").
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "engine/base/counters.h"
+#include "engine/render/backend.h"
+#include "lod/store.h"
+#include "streaming/streamer.h"
+
+namespace stipple::render {
+
+struct FrameSettings {
+    lod::Budgets budgets;
+    Mode mode = Mode::pullpush;
+    DrawSettings draw;
+    bool wantDepthAndNormal = false;
+};
+
+/// Everything a frame walks through, owned in one place.
+struct FrameState {
+    std::vector<std::shared_ptr<const lod::Store>> stores;
+    std::vector<const lod::Hierarchy*> hierarchies;
+    std::vector<lod::Instance> instances;
+    std::unique_ptr<streaming::Streamer> streamer;
+    Backend* backend = nullptr;
+    lod::CutScratch scratch;
+    lod::Cut cut;
+    DrawList draws;
+    Image image;
+    FrameCounters counters;
+};
+
+/// One instance of each store, at its own place.
+std::unique_ptr<FrameState> makeFrameState(std::vector<std::shared_ptr<const lod::Store>> stores, Backend& backend,
+                                           Executor& executor, const streaming::StreamSettings& settings);
+
+/// Draws one frame into state.image and fills state.counters.
+Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSettings& settings);
+
+/// Frames until nothing that the view wants is missing (or can come any more); true if complete.
+Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const FrameSettings& settings,
+                                 Executor& executor);
+
+}  // namespace stipple::render

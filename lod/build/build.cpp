@@ -1,0 +1,63 @@
+// A build as a straight line.
+#include "lod/build/build.h"
+
+#include <fmt/format.h>
+
+#include "engine/base/process.h"
+#include "lod/build/cloud.h"
+#include "lod/store.h"
+
+namespace stipple::lod {
+
+Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std::string& output,
+                               const BuildSettings& settings, Executor& executor, Progress& progress) {
+    BuildReport report;
+    const double start = nowSeconds();
+    double last = start;
+    const auto stage = [&](const char* name) {
+        const double now = nowSeconds();
+        report.stageSeconds[name] += now - last;
+        last = now;
+    };
+    STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output));  // an unwritable output is found first
+    STIPPLE_ASSIGN(Cloud cloud, readCloud(inputs, settings, report, progress));
+    stage("read");
+    const Partition partition = partitionCloud(cloud, settings.leafRecords, executor);
+    stage("partition");
+    estimateAttributes(cloud, partition, settings, executor, progress);
+    stage("attributes");
+    STIPPLE_ASSIGN(const Hierarchy hierarchy, simplifyAndWrite(cloud, partition, writer, executor, progress));
+    StoreDescription description;
+    description.up = cloud.up;
+    description.crs = cloud.crs;
+    description.attributes = cloud.attributes;
+    description.points = cloud.size();
+    for (const Node& node : hierarchy.nodes) description.records += node.records;
+    description.roundingUnits = cloud.roundingUnits;
+    description.hasColour = cloud.hasColour;
+    description.hasNormals = cloud.hasNormal || settings.normals == NormalsMode::automatic;
+    description.source = cloud.source;
+    glm::dvec3 lo(cloud.x[0], cloud.y[0], cloud.z[0]), hi = lo;
+    for (size_t i = 1; i < cloud.size(); ++i) {
+        const glm::dvec3 p(cloud.x[i], cloud.y[i], cloud.z[i]);
+        lo = glm::min(lo, p);
+        hi = glm::max(hi, p);
+    }
+    description.boundsMin = cloud.origin + cloud.unit * lo;
+    description.boundsMax = cloud.origin + cloud.unit * hi;
+    STIPPLE_TRY(writer.finish(hierarchy, description));
+    stage("simplify");
+    STIPPLE_ASSIGN(const Store store, openStore(writer.temporaryPath()));
+    STIPPLE_TRY(verifyStore(store, executor));
+    stage("verify");
+    report.bytesOut = writer.bytes();
+    STIPPLE_TRY(writer.commit());
+    report.pointsOut = cloud.size();
+    report.nodes = hierarchy.nodes.size();
+    report.records = description.records;
+    report.contentHash = writer.contentHash();
+    report.seconds = nowSeconds() - start;
+    return report;
+}
+
+}  // namespace stipple::lod

@@ -1,0 +1,39 @@
+// One build: from input files to a verified store.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/base/executor.h"
+#include "engine/base/progress.h"
+#include "lod/primitives.h"
+
+namespace stipple::lod {
+
+enum class NormalsMode { automatic, keep, none };
+
+struct BuildSettings {
+    uint64_t memoryBytes = uint64_t{2} << 30;  ///< never needs more; refuses if the input does
+    NormalsMode normals = NormalsMode::automatic;
+    bool estimateRadii = true;  ///< where the file has none; false: half the lattice unit is all a point gets
+    std::optional<UpAxis> up;   ///< instead of the format's own
+    uint32_t leafRecords = 8192;
+};
+
+struct BuildReport {
+    uint64_t pointsIn = 0, pointsOut = 0;
+    std::map<std::string, uint64_t> dropped;  ///< reason -> points
+    std::vector<std::string> notes;           ///< what was odd about the input
+    uint64_t nodes = 0, records = 0, bytesOut = 0, contentHash = 0;
+    double seconds = 0;
+    std::map<std::string, double> stageSeconds;
+};
+
+/// Reads `inputs`, writes `output` (whole or not at all). The same input and settings give the same bytes for any number
+/// of threads.
+Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std::string& output,
+                               const BuildSettings& settings, Executor& executor, Progress& progress);
+
+}  // namespace stipple::lod

@@ -1,0 +1,28 @@
+// Encoding of the octahedral normal of shaders/shared/record.h, to the nearest code of each coordinate.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <glm/glm.hpp>
+
+#include "shaders/shared/record.h"
+
+namespace stipple::lod {
+
+/// `n`: any length but zero.
+inline uint32_t octEncode(glm::vec3 n) {
+    const float sum = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
+    float x = n.x / sum, y = n.y / sum;
+    if (n.z < 0) {
+        const float fx = (1.0f - std::abs(y)) * (x >= 0 ? 1.0f : -1.0f);
+        y = (1.0f - std::abs(x)) * (y >= 0 ? 1.0f : -1.0f);
+        x = fx;
+    }
+    const auto code = [](float v) {
+        return static_cast<uint32_t>(std::clamp(std::floor((v + 1.0f) * 32767.0f + 0.5f), 0.0f, 65534.0f));
+    };
+    return code(x) | code(y) << 16;
+}
+
+}  // namespace stipple::lod

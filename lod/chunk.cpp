@@ -1,0 +1,87 @@
+#include "lod/chunk.h"
+
+#include <fmt/format.h>
+#include <meshoptimizer.h>
+#include <zstd.h>
+
+#include <cstring>
+#include <memory>
+
+namespace stipple::lod {
+namespace {
+
+constexpr int kZstdLevel = 1;  // 3 saves 1.5 % of the bytes and takes twice the time on scans
+
+struct ChunkHead {
+    uint32_t recordBytes, lowBitBytes;
+};
+
+std::vector<uint8_t> compress(const std::vector<uint8_t>& raw) {
+    thread_local std::unique_ptr<ZSTD_CCtx, size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(), ZSTD_freeCCtx);
+    std::vector<uint8_t> out(ZSTD_compressBound(raw.size()));
+    const size_t got = ZSTD_compressCCtx(context.get(), out.data(), out.size(), raw.data(), raw.size(), kZstdLevel);
+    out.resize(ZSTD_isError(got) ? 0 : got);
+    return out;
+}
+
+Result<std::vector<uint8_t>> decompress(const uint8_t* bytes, size_t count, size_t limit, const std::string& where) {
+    const unsigned long long size = ZSTD_getFrameContentSize(bytes, count);
+    if (size == ZSTD_CONTENTSIZE_ERROR || size == ZSTD_CONTENTSIZE_UNKNOWN || size > limit)
+        return fail(ErrorKind::input, fmt::format("a compressed block does not hold at most {} bytes", limit), where,
+                    "the file is damaged; build it again");
+    thread_local std::unique_ptr<ZSTD_DCtx, size_t (*)(ZSTD_DCtx*)> context(ZSTD_createDCtx(), ZSTD_freeDCtx);
+    std::vector<uint8_t> out(size);
+    const size_t got = ZSTD_decompressDCtx(context.get(), out.data(), out.size(), bytes, count);
+    if (ZSTD_isError(got) || got != size)
+        return fail(ErrorKind::input, "a compressed block is damaged", where, "build it again");
+    return out;
+}
+
+}  // namespace
+
+std::vector<uint8_t> encodeChunk(const Chunk& chunk) {
+    constexpr size_t stride = sizeof(shared::PointRecord);
+    std::vector<uint8_t> vertex(meshopt_encodeVertexBufferBound(chunk.records.size(), stride));
+    vertex.resize(meshopt_encodeVertexBuffer(vertex.data(), vertex.size(), chunk.records.data(), chunk.records.size(),
+                                             stride));
+    const std::vector<uint8_t> records = compress(vertex);
+    std::vector<uint8_t> low;
+    if (!chunk.lowBits.empty()) {
+        std::vector<uint8_t> raw(chunk.lowBits.size() * 4);
+        std::memcpy(raw.data(), chunk.lowBits.data(), raw.size());
+        low = compress(raw);
+    }
+    const ChunkHead head{static_cast<uint32_t>(records.size()), static_cast<uint32_t>(low.size())};
+    std::vector<uint8_t> out(sizeof(head) + records.size() + low.size());
+    std::memcpy(out.data(), &head, sizeof(head));
+    std::memcpy(out.data() + sizeof(head), records.data(), records.size());
+    if (!low.empty()) std::memcpy(out.data() + sizeof(head) + records.size(), low.data(), low.size());
+    return out;
+}
+
+Result<Chunk> decodeChunk(const uint8_t* bytes, size_t count, uint32_t records, const std::string& where,
+                          bool wantLowBits) {
+    ChunkHead head{};
+    if (count < sizeof(head)) return fail(ErrorKind::input, "the chunk is shorter than its head", where);
+    std::memcpy(&head, bytes, sizeof(head));
+    if (uint64_t{head.recordBytes} + head.lowBitBytes + sizeof(head) != count)
+        return fail(ErrorKind::input, "the chunk's parts do not add up to its size", where, "build it again");
+    constexpr size_t stride = sizeof(shared::PointRecord);
+    const size_t limit = meshopt_encodeVertexBufferBound(records, stride);
+    STIPPLE_ASSIGN(const std::vector<uint8_t> vertex, decompress(bytes + sizeof(head), head.recordBytes, limit, where));
+    Chunk chunk;
+    chunk.records.resize(records);
+    if (meshopt_decodeVertexBuffer(chunk.records.data(), records, stride, vertex.data(), vertex.size()) != 0)
+        return fail(ErrorKind::input, "the records of a chunk are damaged", where, "build it again");
+    if (wantLowBits && head.lowBitBytes > 0) {
+        STIPPLE_ASSIGN(const std::vector<uint8_t> raw, decompress(bytes + sizeof(head) + head.recordBytes,
+                                                                  head.lowBitBytes, size_t{records} * 12, where));
+        if (raw.size() != size_t{records} * 12)
+            return fail(ErrorKind::input, "the low bits of a chunk are damaged", where, "build it again");
+        chunk.lowBits.resize(size_t{records} * 3);
+        std::memcpy(chunk.lowBits.data(), raw.data(), raw.size());
+    }
+    return chunk;
+}
+
+}  // namespace stipple::lod

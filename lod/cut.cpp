@@ -1,0 +1,272 @@
+#include "lod/cut.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/base/check.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr int32_t kCulled = std::numeric_limits<int32_t>::min();
+constexpr int32_t kInside = -1'000'000;  // the eye is inside the sphere: only exact records are fine enough
+constexpr int kStepsPerOctave = 32;      // resolution of tau; error codes have 8
+constexpr int kLargestTauStep = 40 * kStepsPerOctave;
+
+/// A view in the lattice space of one instance.
+struct LocalView {
+    glm::dvec3 eye, forward;
+    std::array<glm::dvec3, 4> planes;  ///< inward normals of the frustum's sides, through the eye
+    double nearPlane = 0, focal = 0, cosineCorner = 0;
+};
+
+LocalView makeLocalView(const Hierarchy& h, const Instance& instance, const View& view) {
+    LocalView local;
+    const glm::dmat3 inverse = glm::transpose(instance.rotation);
+    const double unitsPerStep = instance.scale * h.unit;
+    local.eye = (inverse * (view.eye - instance.translation) / instance.scale - h.origin) / h.unit;
+    local.forward = inverse * view.forward;
+    const glm::dvec3 right = inverse * view.right, down = inverse * view.down;
+    const double halfW = 0.5 * view.width, halfH = 0.5 * view.height, f = view.focalPixels;
+    local.planes = {glm::normalize(right * f + local.forward * halfW), glm::normalize(-right * f + local.forward * halfW),
+                    glm::normalize(down * f + local.forward * halfH), glm::normalize(-down * f + local.forward * halfH)};
+    local.nearPlane = view.nearPlane / unitsPerStep;
+    local.focal = f;
+    local.cosineCorner = f / std::sqrt(f * f + halfW * halfW + halfH * halfH);
+    return local;
+}
+
+/// Allowed error of N at tau = 1 px as a code of 1/32 octave, rounded down; kCulled if N is out of view.
+int32_t allowedError(const Hierarchy& h, const Node& node, const LocalView& view) {
+    const glm::dvec3 d = node.centre - view.eye;
+    const double r = node.radius;
+    const double depth = glm::dot(d, view.forward);
+    if (depth + r < view.nearPlane) return kCulled;
+    for (const glm::dvec3& plane : view.planes)
+        if (glm::dot(d, plane) < -r) return kCulled;
+    const double distance = glm::length(d);
+    const double nearest = distance - r;
+    if (!(nearest > 0)) return kInside;
+    // cos(alpha + beta), alpha: axis to centre, beta: angular radius.
+    const double cosAlpha = depth / distance, sinAlpha = std::sqrt(std::max(0.0, 1 - cosAlpha * cosAlpha));
+    const double sinBeta = r / distance, cosBeta = std::sqrt(std::max(0.0, 1 - sinBeta * sinBeta));
+    const double cosine = std::max(cosAlpha * cosBeta - sinAlpha * sinBeta, view.cosineCorner);
+    const double allowed = nearest * cosine * cosine / view.focal;
+    const double code = std::floor(kStepsPerOctave * std::log2(allowed / h.errors.smallest));
+    return static_cast<int32_t>(std::clamp(code, -900'000.0, 900'000.0));
+}
+
+/// Allowed error code of a node at tau = 2^(step/32).
+uint32_t codeAt(int32_t epsilon, int step) {
+    const int32_t sum = epsilon + step;
+    if (sum < 0) return 0;
+    return std::min<uint32_t>(static_cast<uint32_t>(sum) / (kStepsPerOctave / 8), ErrorScale::kLargest);
+}
+
+class Selector {
+  public:
+    Selector(std::span<const Hierarchy* const> hierarchies, std::span<const Instance> instances,
+             const Residency& residency, const View& view, const Budgets& budgets, CutScratch& scratch, Cut& cut)
+        : hierarchies_(hierarchies), instances_(instances), residency_(residency), view_(view), budgets_(budgets),
+          scratch_(scratch), cut_(cut) {
+        ++scratch_.frame;
+        scratch_.epsilon.resize(instances.size());
+        scratch_.stamp.resize(instances.size());
+        for (size_t i = 0; i < instances.size(); ++i) {
+            const size_t count = hierarchyOf(i).nodes.size();
+            if (scratch_.stamp[i].size() == count) continue;
+            scratch_.epsilon[i].assign(count, 0);
+            scratch_.stamp[i].assign(count, 0);
+        }
+    }
+
+    void run() {
+        cut_.draw.clear();
+        cut_.wanted.clear();
+        cut_.keep.clear();
+        cut_.counters = {};
+        cut_.truncated = false;
+        const double tau = std::max(budgets_.errorPixels, 1e-6);
+        const int target = static_cast<int>(std::floor(kStepsPerOctave * std::log2(tau)));
+        int step = stepForBudget(target);
+        cut_.tauTarget = step == target ? tau : std::exp2(static_cast<double>(step) / kStepsPerOctave);
+        // Missing chunks put parents in the place of children. That draws fewer records, except where children are
+        // partly out of view, so the sum is checked and the step raised in the rare case.
+        for (;; ++step) {
+            cut_.draw.clear();
+            cut_.wanted.clear();
+            cut_.keep.clear();
+            cut_.counters.recordsDrawn = cut_.counters.recordsTested = cut_.counters.nodesVisited = 0;
+            cut_.counters.nodesCulled = cut_.counters.nodesMissing = 0;
+            cut_.tauEffective = 0;
+            for (size_t i = 0; i < instances_.size(); ++i) emit(i, step);
+            if (cut_.counters.recordsDrawn <= budgets_.records || step >= kLargestTauStep) break;
+        }
+        cut_.tauEffective = std::max(cut_.tauEffective, step == target ? tau : std::exp2(double(step) / kStepsPerOctave));
+        if (cut_.counters.recordsDrawn > budgets_.records) truncate();
+        cut_.counters.nodesDrawn = cut_.draw.size();
+    }
+
+  private:
+    const Hierarchy& hierarchyOf(size_t i) const { return *hierarchies_[instances_[i].hierarchy]; }
+
+    int32_t epsilonOf(size_t i, const LocalView& local, uint32_t index, int32_t parentEpsilon) {
+        if (scratch_.stamp[i][index] != scratch_.frame) {
+            scratch_.stamp[i][index] = scratch_.frame;
+            const Hierarchy& h = hierarchyOf(i);
+            int32_t value = allowedError(h, h.nodes[index], local);
+            // Nested spheres give eps_child >= eps_parent; this makes it so to the last rounding.
+            if (value != kCulled) value = std::max(value, parentEpsilon);
+            scratch_.epsilon[i][index] = value;
+        }
+        return scratch_.epsilon[i][index];
+    }
+
+    /// Records of the full cut (everything resident) at `step`; stops counting above the budget.
+    uint64_t cost(int step) {
+        ++cut_.counters.evaluations;
+        uint64_t total = 0;
+        for (size_t i = 0; i < instances_.size(); ++i) {
+            const Hierarchy& h = hierarchyOf(i);
+            if (h.nodes.empty()) continue;
+            const LocalView local = makeLocalView(h, instances_[i], view_);
+            auto& stack = scratch_.stack;
+            stack.assign(1, 0u);
+            while (!stack.empty()) {
+                const uint32_t index = stack.back();
+                stack.pop_back();
+                const Node& node = h.nodes[index];
+                const int32_t parentEpsilon = index == 0 ? kInside : scratch_.epsilon[i][node.parent];
+                const int32_t epsilon = epsilonOf(i, local, index, parentEpsilon);
+                if (epsilon == kCulled) continue;
+                const uint32_t parentCode = index == 0 ? ErrorScale::kLargest : codeAt(parentEpsilon, step);
+                const uint32_t code = codeAt(epsilon, step);
+                total += h.countGreater(node.parentCounts, node.records, parentCode) -
+                         h.countGreater(node.ownCounts, node.records, code);
+                if (total > budgets_.records) return total;
+                if (node.errorCode <= code) continue;
+                const auto children = static_cast<uint32_t>(__builtin_popcount(node.childMask));
+                for (uint32_t c = 0; c < children; ++c) stack.push_back(node.firstChild + c);
+            }
+        }
+        return total;
+    }
+
+    /// The smallest step >= target whose full cut fits the budget (cost falls with the step).
+    int stepForBudget(int target) {
+        if (budgets_.records == std::numeric_limits<uint64_t>::max()) return target;
+        // From the coarse side, so that no evaluation walks much more than the budget's worth of nodes.
+        int hi = std::max(target, 0) + 8 * kStepsPerOctave;
+        while (hi < kLargestTauStep && cost(hi) > budgets_.records) hi = std::min(hi + 8 * kStepsPerOctave, kLargestTauStep);
+        int lo = target;
+        if (cost(lo) <= budgets_.records) return lo;
+        while (hi - lo > 1) {
+            const int middle = lo + (hi - lo) / 2;
+            (cost(middle) <= budgets_.records ? hi : lo) = middle;
+        }
+        return hi;
+    }
+
+    /// Screen-space error, px, of error code `code` at a node with allowed error `epsilon`.
+    static double pixelsOf(uint32_t code, int32_t epsilon) {
+        if (code == 0) return 0;
+        if (epsilon == kInside) return 1e6;
+        return std::exp2(code / 8.0 - static_cast<double>(epsilon) / kStepsPerOctave);
+    }
+
+    void emit(size_t i, int step) {
+        const Hierarchy& h = hierarchyOf(i);
+        if (h.nodes.empty()) return;
+        const LocalView local = makeLocalView(h, instances_[i], view_);
+        const std::vector<uint8_t>& drawable = residency_.drawable[i];
+        const auto instance = static_cast<uint32_t>(i);
+        const size_t firstDraw = cut_.draw.size();
+        auto& stack = scratch_.stack;
+        stack.assign(1, 0u);
+        while (!stack.empty()) {
+            const uint32_t index = stack.back();
+            stack.pop_back();
+            const Node& node = h.nodes[index];
+            ++cut_.counters.nodesVisited;
+            const int32_t parentEpsilon = index == 0 ? kInside : scratch_.epsilon[i][node.parent];
+            const int32_t epsilon = epsilonOf(i, local, index, parentEpsilon);
+            if (epsilon == kCulled) {
+                ++cut_.counters.nodesCulled;
+                continue;
+            }
+            const bool isDrawable = drawable[index] != 0;
+            const uint32_t code = codeAt(epsilon, step);
+            if (isDrawable) {
+                cut_.keep.emplace_back(instance, index);
+            } else {
+                ++cut_.counters.nodesMissing;
+                const double pixels = index == 0 ? 1e9 : pixelsOf(h.nodes[node.parent].errorCode, parentEpsilon);
+                cut_.wanted.push_back({instance, index, static_cast<float>(pixels * std::exp2(8.0 - node.level))});
+            }
+            uint32_t octantMask = 0;
+            if (node.errorCode > code) {
+                uint32_t child = node.firstChild;
+                for (uint32_t octant = 0; octant < 8; ++octant) {
+                    if (!(node.childMask >> octant & 1u)) continue;
+                    stack.push_back(child);
+                    // A child out of view is not drawn and not missing either.
+                    if (!drawable[child] && epsilonOf(i, local, child, epsilon) != kCulled) octantMask |= 1u << octant;
+                    ++child;
+                }
+            }
+            // Only what hangs together with the root is drawn: a node whose parent is missing is covered above.
+            if (!isDrawable || !isReachable(drawable, h, index)) continue;
+            const uint32_t parentCode = index == 0 ? ErrorScale::kLargest : codeAt(parentEpsilon, step);
+            const uint32_t count = h.countGreater(node.parentCounts, node.records, parentCode);
+            if (count == 0) continue;
+            const uint32_t tooCoarse = octantMask ? 0 : h.countGreater(node.ownCounts, node.records, code);
+            cut_.counters.recordsDrawn += count - tooCoarse;
+            cut_.counters.recordsTested += count;
+            const double delivered = pixelsOf(octantMask ? node.errorCode : std::min<uint32_t>(node.errorCode, code), epsilon);
+            if (octantMask) cut_.tauEffective = std::max(cut_.tauEffective, delivered);
+            if (count > tooCoarse)
+                cut_.draw.push_back({instance, index, count, code, octantMask, static_cast<float>(delivered)});
+        }
+        std::sort(cut_.draw.begin() + static_cast<std::ptrdiff_t>(firstDraw), cut_.draw.end(),
+                  [](const CutDraw& a, const CutDraw& b) { return a.node < b.node; });
+    }
+
+    /// True if every ancestor is drawable (a child whose parent's chunk is missing is covered by a coarser ancestor).
+    static bool isReachable(const std::vector<uint8_t>& drawable, const Hierarchy& h, uint32_t index) {
+        while (index != 0) {
+            index = h.nodes[index].parent;
+            if (!drawable[index]) return false;
+        }
+        return true;
+    }
+
+    /// Even the coarsest cut is too large: leave out records, finest first, and say so.
+    void truncate() {
+        cut_.truncated = true;
+        uint64_t left = budgets_.records;
+        for (CutDraw& draw : cut_.draw) {
+            draw.count = static_cast<uint32_t>(std::min<uint64_t>(draw.count, left));
+            left -= draw.count;
+        }
+        std::erase_if(cut_.draw, [](const CutDraw& d) { return d.count == 0; });
+        cut_.counters.recordsDrawn = budgets_.records - left;
+    }
+
+    std::span<const Hierarchy* const> hierarchies_;
+    std::span<const Instance> instances_;
+    const Residency& residency_;
+    const View& view_;
+    const Budgets& budgets_;
+    CutScratch& scratch_;
+    Cut& cut_;
+};
+
+}  // namespace
+
+void selectCut(std::span<const Hierarchy* const> hierarchies, std::span<const Instance> instances,
+               const Residency& residency, const View& view, const Budgets& budgets, CutScratch& scratch, Cut& cut) {
+    STIPPLE_CHECK(residency.drawable.size() >= instances.size());
+    Selector(hierarchies, instances, residency, view, budgets, scratch, cut).run();
+}
+
+}  // namespace stipple::lod

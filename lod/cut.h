@@ -1,0 +1,91 @@
+// selectCut: which records to draw, which chunks to load. A pure function over plain arrays.
+//
+// The rule (ALGORITHMS 2.2). Every node N has one allowed error  eps_N = tau * D_lo(N) / (F * sigma_N),  with D_lo the
+// distance from the eye to N's sphere and sigma_N = 1/cos^2 of the largest off-axis angle inside it (capped at the image
+// corner), so that tau is a bound in pixels. Record x of N is drawn iff the error of its parent is too large for N's
+// parent (a prefix of the records) and its own is small enough for N, or its octant's child cannot be drawn. Nested
+// spheres make eps grow towards the leaves and errors shrink, so every leaf is covered exactly once.
+//
+// All comparisons are between integer codes (eps is rounded down to the error scale), which makes the cut of equal
+// views equal to the last record.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "lod/hierarchy.h"
+
+namespace stipple::lod {
+
+/// A camera in world space: z-forward, y-down.
+struct View {
+    glm::dvec3 eye{0};
+    glm::dvec3 right{1, 0, 0}, down{0, -1, 0}, forward{0, 0, -1};
+    double focalPixels = 1000;
+    uint32_t width = 1280, height = 720;
+    double nearPlane = 1e-3;  ///< world units
+};
+
+/// A placed hierarchy. world = translation + rotation * (scale * (origin + unit * lattice)).
+struct Instance {
+    uint32_t hierarchy = 0;
+    glm::dmat3 rotation{1};
+    glm::dvec3 translation{0};
+    double scale = 1;
+};
+
+/// One byte per node of each instance's hierarchy: 1 where the chunk can be drawn.
+struct Residency {
+    std::span<const std::vector<uint8_t>> drawable;
+};
+
+struct Budgets {
+    double errorPixels = 1;                          ///< tau asked for
+    uint64_t records = std::numeric_limits<uint64_t>::max();  ///< records drawn at most
+};
+
+struct CutDraw {
+    uint32_t instance = 0, node = 0;
+    uint32_t count = 0;       ///< first records of the chunk
+    uint32_t errorCode = 0;   ///< draw records with own error <= this ...
+    uint32_t octantMask = 0;  ///< ... and all records of these octants
+    float errorPixels = 0;    ///< largest screen-space error among what this node draws
+};
+
+struct CutWanted {
+    uint32_t instance = 0, node = 0;
+    float priority = 0;  ///< pixels of error that this chunk would remove, parents always above children
+};
+
+struct CutCounters {
+    uint64_t nodesVisited = 0, nodesDrawn = 0, nodesCulled = 0, nodesMissing = 0, recordsDrawn = 0, recordsTested = 0,
+             evaluations = 0;
+};
+
+struct Cut {
+    std::vector<CutDraw> draw;      ///< sorted by instance, then node
+    std::vector<CutWanted> wanted;  ///< chunks that the full cut needs and that are not drawable
+    std::vector<std::pair<uint32_t, uint32_t>> keep;  ///< (instance, node) that must not be evicted
+    double tauTarget = 0;     ///< error, px, that the budget allows once everything is resident
+    double tauEffective = 0;  ///< error, px, delivered by what is drawn now
+    bool truncated = false;   ///< even the roots exceed the record budget: some of their records are left out
+    CutCounters counters;
+};
+
+/// Reused between frames, so that a cut allocates nothing once warm.
+struct CutScratch {
+    std::vector<std::vector<int32_t>> epsilon;  ///< per instance and node: allowed error of tau = 1, 1/32 octave codes
+    std::vector<std::vector<uint32_t>> stamp;
+    std::vector<uint32_t> stack;
+    std::vector<uint64_t> order;
+    uint32_t frame = 0;
+};
+
+/// Fills `cut`. `hierarchies` are indexed by Instance::hierarchy. `recordsDrawn` is exact where nothing is missing and
+/// an upper bound otherwise; it never exceeds the budget unless `truncated`, and then the draws are cut to fit.
+void selectCut(std::span<const Hierarchy* const> hierarchies, std::span<const Instance> instances,
+               const Residency& residency, const View& view, const Budgets& budgets, CutScratch& scratch, Cut& cut);
+
+}  // namespace stipple::lod

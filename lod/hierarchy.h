@@ -1,0 +1,78 @@
+// The node table of one store, in memory: plain arrays that selectCut walks. Lengths are lattice units (world = origin
+// + unit * lattice); spheres are fp64 and nested, errors are codes of one file-wide scale.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "lod/primitives.h"
+
+namespace stipple::lod {
+
+/// Errors are coded in 1/8 octaves: code 0 is exact, code c > 0 stands for smallest * 2^(c/8). 255 stands for "no
+/// parent": larger than every error that a view may ask for.
+struct ErrorScale {
+    double smallest = 1;  ///< lattice units
+    static constexpr uint32_t kNoParent = 255, kLargest = 254;
+    double decode(uint32_t code) const { return code == 0 ? 0.0 : smallest * std::exp2(code / 8.0); }
+    /// The smallest code whose value is at least `error`; kLargest if there is none.
+    uint32_t encodeUp(double error) const {
+        if (!(error > 0)) return 0;
+        double code = std::ceil(8.0 * std::log2(error / smallest));
+        if (code < 1) code = 1;
+        if (code > kLargest) code = kLargest;
+        auto result = static_cast<uint32_t>(code);
+        while (result < kLargest && decode(result) < error) ++result;  // log2 may round the wrong way
+        return result;
+    }
+};
+
+/// Records of a node with a code greater than c, for every c: a step function over a short range of codes.
+struct CodeCounts {
+    uint32_t first = 0;      ///< into Hierarchy::greaterThan
+    uint8_t lo = 0, hi = 0;  ///< codes below lo: all records; from hi on: none
+};
+
+struct Node {
+    glm::dvec3 centre{0};  ///< bounding sphere, lattice units; encloses the discs and the spheres of the children
+    double radius = 0;
+    uint32_t parent = 0, firstChild = 0;  ///< children are contiguous, in octant order
+    uint32_t records = 0;
+    uint32_t chunkBytes = 0;              ///< compressed
+    uint64_t chunkOffset = 0, chunkHash = 0;
+    std::array<uint32_t, 3> cell{};       ///< index of the node's cell at its level
+    uint8_t level = 0, childMask = 0;
+    uint8_t errorCode = 0;                ///< largest own error among the records
+    int8_t stepShift = 0;                 ///< position step of the records: 2^stepShift lattice units = cell / 65536
+    CodeCounts parentCounts, ownCounts;
+    uint32_t normalCone = 0;              ///< axis, octahedral
+    float normalConeCosine = -1;          ///< cosine of the half-angle; -1: all directions
+    bool isLeaf() const { return childMask == 0; }
+};
+
+struct Hierarchy {
+    glm::dvec3 origin{0};  ///< world position of lattice (0,0,0)
+    double unit = 1;       ///< world units per lattice step
+    uint32_t rootLog2 = 0; ///< the root's cell has 2^rootLog2 lattice steps along each axis
+    ErrorScale errors;
+    std::vector<Node> nodes;             ///< breadth first; node 0 is the root
+    std::vector<uint32_t> greaterThan;   ///< see CodeCounts
+
+    /// Records with a code > `code`.
+    uint32_t countGreater(const CodeCounts& c, uint32_t records, uint32_t code) const {
+        if (code < c.lo) return records;
+        return code >= c.hi ? 0u : greaterThan[c.first + (code - c.lo)];
+    }
+    double cellSize(const Node& n) const { return std::exp2(static_cast<double>(rootLog2) - n.level); }
+    /// Lattice position that record coordinate (0,0,0) stands for: the centre of the lattice steps that the
+    /// first position step holds.
+    glm::dvec3 recordOrigin(const Node& n) const {
+        const double size = cellSize(n), half = n.stepShift > 0 ? 0.5 * (std::exp2(n.stepShift) - 1) : 0.0;
+        return glm::dvec3(n.cell[0], n.cell[1], n.cell[2]) * size + glm::dvec3(half);
+    }
+};
+
+}  // namespace stipple::lod

@@ -1,0 +1,71 @@
+// The .stipple file: head | chunks | node table | description | foot. Little-endian; every section has a length and a
+// hash; the head is written last. A plain web server with range requests can serve it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "engine/base/executor.h"
+#include "engine/base/file.h"
+#include "lod/chunk.h"
+#include "lod/hierarchy.h"
+
+namespace stipple::lod {
+
+struct StoreDescription {
+    double metresPerUnit = 1;
+    UpAxis up = UpAxis::z;
+    std::string crs;
+    std::vector<std::string> attributes;
+    uint64_t points = 0;           ///< leaf records: the points of the input that were kept
+    uint64_t records = 0;          ///< all records, coarse levels included
+    double roundingUnits = 0;      ///< largest rounding of a coordinate to the lattice, world units; 0: exact
+    glm::dvec3 boundsMin{0}, boundsMax{0};  ///< of the points, world units
+    bool hasColour = false;        ///< the points have colours of their own
+    bool hasNormals = false;       ///< from the file or estimated
+    std::string source;            ///< file names of the input, without folders
+};
+
+/// An opened store. Reading chunks is safe from several threads.
+struct Store {
+    Hierarchy hierarchy;
+    StoreDescription description;
+    uint64_t contentHash = 0;
+    uint64_t fileBytes = 0;
+    std::string path;
+    std::shared_ptr<const InputFile> file;
+};
+
+class StoreWriter {
+  public:
+    static Result<StoreWriter> create(const std::string& path);
+    /// Appends an encoded chunk and fills the chunk fields of `node`.
+    Result<void> appendChunk(const std::vector<uint8_t>& bytes, Node& node);
+    /// Writes node table, description, foot, then the head. The file stays under its temporary name.
+    Result<void> finish(const Hierarchy& hierarchy, const StoreDescription& description);
+    const std::string& temporaryPath() const { return file_.temporaryPath(); }
+    uint64_t contentHash() const { return contentHash_; }
+    uint64_t bytes() const { return file_.position(); }
+    Result<void> commit() { return file_.commit(); }
+
+  private:
+    explicit StoreWriter(OutputFile file) : file_(std::move(file)) {}
+    OutputFile file_;
+    uint64_t contentHash_ = 0;
+};
+
+/// Reads and checks head, foot, node table and description (not the chunks).
+Result<Store> openStore(const std::string& path);
+/// Reads one chunk, checks its hash, decodes it.
+Result<Chunk> readChunk(const Store& store, uint32_t node, bool wantLowBits = false);
+
+struct VerifyReport {
+    uint64_t nodes = 0, records = 0, leafRecords = 0;
+};
+/// Reads every chunk and checks all that the cut relies on: hashes, counts per code, order, codes monotone, spheres
+/// nested, positions inside their cells.
+Result<VerifyReport> verifyStore(const Store& store, Executor& executor);
+
+}  // namespace stipple::lod

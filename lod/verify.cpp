@@ -1,0 +1,89 @@
+// verifyStore: everything that the cut relies on, checked on the finished file, through the reader that users run.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <mutex>
+
+#include "engine/base/queue.h"
+#include "lod/store.h"
+
+namespace stipple::lod {
+namespace {
+
+std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
+    const Node& node = h.nodes[index];
+    const double step = std::exp2(node.stepShift), edge = h.cellSize(node);
+    const glm::dvec3 base = h.recordOrigin(node);
+    std::array<uint32_t, 256> own{};
+    uint32_t largest = 0;
+    for (const auto& r : chunk.records) {
+        const uint32_t code = shared::recordErrorCode(r);
+        ++own[code];
+        largest = std::max(largest, code);
+        const glm::dvec3 p = base + step * glm::dvec3(shared::recordX(r), shared::recordY(r), shared::recordZ(r));
+        const double radius = edge * static_cast<double>(shared::radiusFraction(shared::recordRadiusCode(r)));
+        if (glm::length(p - node.centre) + radius > node.radius * (1 + 1e-9) + 1e-6)
+            return "a record reaches out of the bounding sphere";
+        if (code > 0 && node.childMask != 0) {
+            // Only exact records may stand in an octant without a child.
+            const uint32_t octant = shared::recordOctant(r);
+            if (!(node.childMask >> octant & 1u)) return "a record has an error but its octant has no child";
+        }
+    }
+    if (node.isLeaf() && largest != 0) return "a leaf record has an error";
+    if (largest != node.errorCode) return "the largest error is not the one in the node table";
+    uint32_t left = node.records;
+    for (uint32_t code = 0; code < 256; ++code) {
+        left -= own[code];
+        if (h.countGreater(node.ownCounts, node.records, code) != left) return "the counts per error code are wrong";
+    }
+    if (index == 0) return {};
+    const Node& parent = h.nodes[node.parent];
+    if (glm::length(node.centre - parent.centre) + node.radius > parent.radius * (1 + 1e-9) + 1e-6)
+        return "the bounding sphere is not inside the parent's";
+    if (node.errorCode > parent.errorCode) return "the error is larger than the parent's";
+    // Monotone along every chain: sorted by the parent's code, so the own code must not exceed it.
+    uint32_t position = 0;
+    for (int code = 255; code >= 0; --code) {
+        const uint32_t atLeast = code == 0 ? node.records
+                                           : h.countGreater(node.parentCounts, node.records, static_cast<uint32_t>(code) - 1);
+        for (; position < atLeast; ++position)
+            if (shared::recordErrorCode(chunk.records[position]) > static_cast<uint32_t>(code))
+                return "a record has a larger error than its parent record";
+    }
+    return {};
+}
+
+}  // namespace
+
+Result<VerifyReport> verifyStore(const Store& store, Executor& executor) {
+    const Hierarchy& h = store.hierarchy;
+    CompletionQueue<std::pair<size_t, Error>> problems;
+    std::atomic<uint64_t> records{0}, leafRecords{0};
+    executor.parallelFor(h.nodes.size(), 1, [&](size_t begin, size_t end) {
+        for (size_t i = begin; i < end; ++i) {
+            const auto chunk = readChunk(store, static_cast<uint32_t>(i), true);
+            if (!chunk) {
+                problems.push({i, chunk.error()});
+                continue;
+            }
+            if (std::string text = checkNode(h, static_cast<uint32_t>(i), *chunk); !text.empty())
+                problems.push({i, Error{ErrorKind::input, std::move(text), fmt::format("{}: node {}", store.path, i),
+                                        "this is a fault of the build; please report it with the input"}});
+            records += chunk->records.size();
+            if (h.nodes[i].isLeaf()) leafRecords += chunk->records.size();
+        }
+    });
+    auto found = problems.takeAll();
+    if (!found.empty())
+        return tl::unexpected(std::min_element(found.begin(), found.end(), [](const auto& a, const auto& b) {
+                                  return a.first < b.first;
+                              })->second);
+    if (leafRecords != store.description.points)
+        return fail(ErrorKind::input, fmt::format("{} leaf records, but {} points", leafRecords.load(),
+                                                  store.description.points), store.path);
+    return VerifyReport{h.nodes.size(), records, leafRecords};
+}
+
+}  // namespace stipple::lod

@@ -1,0 +1,63 @@
+// What a frame and a drawn node tell the passes. Scalar layout on both sides; sizes are asserted in C++ and every field
+// is written and read back by a GPU test.
+//
+// Camera space is z-forward, y-down, in world units relative to the eye.
+#ifndef STIPPLE_SHARED_FRAME_H
+#define STIPPLE_SHARED_FRAME_H
+#include "types.h"
+SHARED_BEGIN
+
+// One node of the cut. Position of record (x, y, z) in camera space: base + axisX*x + axisY*y + axisZ*z; the
+// coefficients are composed in fp64 relative to the eye and rounded once.
+struct DrawNode {
+    vec3 axisX;
+    vec3 axisY;
+    vec3 axisZ;
+    vec3 base;
+    float edge;         // edge of the node's cell, world units: scale of the radius codes
+    uint errorCode;     // records with an own error code <= this are fine enough
+    uint octantMask;    // octants whose child is not drawn: their records are drawn whatever their error
+    uint count;         // records of the prefix
+    uint addressLow;    // device address of the first record (gpu backend)
+    uint addressHigh;
+    uint level;         // depth in the octree, for the debug view
+    float errorPixels;  // screen-space error delivered by this node, for the debug view
+};
+
+// One block of 256 draw ids.
+struct DrawBlock {
+    uint node;   // index of the DrawNode
+    uint first;  // first record of this block within the node's chunk
+};
+
+const uint kShadeUnlit = 0u;
+const uint kShadeLit = 1u;
+
+const uint kDebugNone = 0u;
+const uint kDebugLevel = 1u;
+const uint kDebugError = 2u;
+const uint kDebugHoles = 3u;
+const uint kDebugNormals = 4u;
+
+struct FrameConstants {
+    vec3 viewX;  // rows of the rotation from world to camera space, for normals
+    vec3 viewY;
+    vec3 viewZ;
+    float focal;  // pixels
+    vec2 centre;  // principal point, pixels
+    uint width;
+    uint height;
+    float nearPlane;      // world units
+    float supportScale;   // splat radius of the reconstruction / stored radius
+    float minimumRadius;  // pixels: smallest splat radius in the reconstruction
+    uint shade;
+    uint debugView;
+    uint levels;        // pyramid levels in use, the full-size one included
+    vec3 sunDirection;  // camera space, towards the sun
+    vec3 skyDirection;  // camera space, up
+    vec3 background;    // linear
+    uint blockCount;
+};
+
+SHARED_END
+#endif

@@ -1,0 +1,69 @@
+// A texel of the pyramid in five 32-bit words, one plane each:
+//   depth     fp32
+//   size      radius | thickness, each the upper half of an fp32, rounded (relative 2^-9)
+//   offset    2 x 16-bit signed fractions of [-1, 1] (texels of its level; they stay within half a texel)
+//   normal    2 x 16-bit signed fractions
+//   colour    sqrt of linear r 11 | g 11 | b 10 bit: finer than 8-bit sRGB everywhere above 1/500
+#ifndef STIPPLE_SHARED_PACK_H
+#define STIPPLE_SHARED_PACK_H
+#include "splat.h"
+SHARED_BEGIN
+
+struct PackedTexel {
+    float depth;
+    uint size;
+    uint offset;
+    uint normal;
+    uint colour;
+};
+
+SHARED_FN uint upperHalf(float v) { return (floatBitsToUint(v) + 0x8000u) >> 16; }
+SHARED_FN uint packPair(float x, float y) {
+    const uint ux = uint(int(floor(min(max(x, -1.0f), 1.0f) * 32767.0f + 32768.5f)));
+    const uint uy = uint(int(floor(min(max(y, -1.0f), 1.0f) * 32767.0f + 32768.5f)));
+    return ux | uy << 16;
+}
+SHARED_FN float unpackLow(uint p) { return (float(int(p & 0xffffu)) - 32768.0f) * (1.0f / 32767.0f); }
+SHARED_FN float unpackHigh(uint p) { return (float(int(p >> 16)) - 32768.0f) * (1.0f / 32767.0f); }
+
+SHARED_FN uint packColour(float r, float g, float b) {
+    const uint ur = uint(int(sqrt(min(max(r, 0.0f), 1.0f)) * 2047.0f + 0.5f));
+    const uint ug = uint(int(sqrt(min(max(g, 0.0f), 1.0f)) * 2047.0f + 0.5f));
+    const uint ub = uint(int(sqrt(min(max(b, 0.0f), 1.0f)) * 1023.0f + 0.5f));
+    return ur | ug << 11 | ub << 22;
+}
+SHARED_FN float unpackRed(uint c) {
+    const float s = float(int(c & 2047u)) * (1.0f / 2047.0f);
+    return s * s;
+}
+SHARED_FN float unpackGreen(uint c) {
+    const float s = float(int(c >> 11 & 2047u)) * (1.0f / 2047.0f);
+    return s * s;
+}
+SHARED_FN float unpackBlue(uint c) {
+    const float s = float(int(c >> 22)) * (1.0f / 1023.0f);
+    return s * s;
+}
+
+SHARED_FN PackedTexel packTexel(Texel t) {
+    PackedTexel p;
+    p.depth = t.depth;
+    p.size = upperHalf(t.radius) | upperHalf(t.thickness) << 16;
+    p.offset = packPair(t.offset.x, t.offset.y);
+    p.normal = packPair(t.normalPerp.x, t.normalPerp.y);
+    p.colour = packColour(t.colour.x, t.colour.y, t.colour.z);
+    return p;
+}
+SHARED_FN Texel unpackTexel(PackedTexel p) {
+    Texel t;
+    t.depth = p.depth;
+    t.radius = uintBitsToFloat(p.size << 16);
+    t.thickness = uintBitsToFloat(p.size & 0xffff0000u);
+    t.offset = vec2(unpackLow(p.offset), unpackHigh(p.offset));
+    t.normalPerp = vec2(unpackLow(p.normal), unpackHigh(p.normal));
+    t.colour = vec3(unpackRed(p.colour), unpackGreen(p.colour), unpackBlue(p.colour));
+    return t;
+}
+
+SHARED_END
+#endif

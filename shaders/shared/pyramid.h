@@ -1,0 +1,190 @@
+// Pull (fine to coarse) and push (coarse to fine): PP-A of ALGORITHMS 1.4, after Marroquim, Kraus, Cavalcanti 2008, with
+// that paper's flaws F11 to F16 corrected. Each function works on one texel; the backends only move texels.
+//
+// The weight of a splat at rho is (1 - rho^2)^2: zero with zero slope at the rim like the shifted exp(-2 rho^2) of the
+// papers, but without a transcendental function, so that all backends agree to the last bits.
+#ifndef STIPPLE_SHARED_PYRAMID_H
+#define STIPPLE_SHARED_PYRAMID_H
+#include "splat.h"
+SHARED_BEGIN
+
+// Running sums of texels that are merged.
+struct Blend {
+    float weight;
+    float depth;
+    float radius;
+    float thickness;
+    float x;
+    float y;
+    float perpX;
+    float perpY;
+    float red;
+    float green;
+    float blue;
+};
+
+SHARED_FN Blend emptyBlend() {
+    Blend b;
+    b.weight = 0.0f;
+    b.depth = 0.0f;
+    b.radius = 0.0f;
+    b.thickness = 0.0f;
+    b.x = 0.0f;
+    b.y = 0.0f;
+    b.perpX = 0.0f;
+    b.perpY = 0.0f;
+    b.red = 0.0f;
+    b.green = 0.0f;
+    b.blue = 0.0f;
+    return b;
+}
+
+// `x`, `y`: centre of the splat relative to the texel being made, pixels.
+SHARED_FN Blend addToBlend(Blend b, Texel t, float x, float y, float weight) {
+    b.weight += weight;
+    b.depth += weight * t.depth;
+    b.radius += weight * t.radius;
+    b.thickness += weight * t.thickness;
+    b.x += weight * x;
+    b.y += weight * y;
+    b.perpX += weight * t.normalPerp.x;
+    b.perpY += weight * t.normalPerp.y;
+    b.red += weight * t.colour.x;
+    b.green += weight * t.colour.y;
+    b.blue += weight * t.colour.z;
+    return b;
+}
+
+SHARED_FN Texel texelFromBlend(Blend b, float texelSize) {
+    Texel t;
+    const float s = b.weight > 0.0f ? 1.0f / b.weight : 0.0f;
+    t.depth = b.depth * s;
+    t.radius = b.radius * s;
+    t.thickness = b.thickness * s;
+    t.offset = vec2(b.x * s / texelSize, b.y * s / texelSize);
+    t.normalPerp = vec2(b.perpX * s, b.perpY * s);
+    t.colour = vec3(b.red * s, b.green * s, b.blue * s);
+    return t;
+}
+
+const float kFarAway = 3.0e38f;
+
+// Depth of the texel if its ellipse reaches the point (dx, dy) pixels from its centre, else kFarAway.
+SHARED_FN float depthIfReached(Texel t, float dx, float dy) {
+    const float m2 = facingSquared(t.normalPerp, t.radius);
+    const float along = t.normalPerp.x * dx + t.normalPerp.y * dy;
+    const float left = m2 * (dx * dx + dy * dy) + along * along;
+    const bool reached = t.depth > 0.0f && left <= m2 * t.radius * t.radius;
+    return reached ? t.depth : kFarAway;
+}
+
+// Half-thickness in world units.
+SHARED_FN float thicknessWorld(Texel t, float inverseFocal) { return t.thickness * t.depth * inverseFocal; }
+
+// Merges the four children (order: (0,0) (1,0) (0,1) (1,1)) into their parent. `childSize`: edge of a child texel in
+// pixels. Kept are the children whose ellipse contains the parent's centre and whose depth interval meets the front
+// one's; the interval of the result is anchored at the front and capped, so that layers do not chain (F12, case 42).
+SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSize, float inverseFocal) {
+    const float h = 0.5f * childSize;
+    const float x0 = c0.offset.x * childSize - h;
+    const float y0 = c0.offset.y * childSize - h;
+    const float x1 = c1.offset.x * childSize + h;
+    const float y1 = c1.offset.y * childSize - h;
+    const float x2 = c2.offset.x * childSize - h;
+    const float y2 = c2.offset.y * childSize + h;
+    const float x3 = c3.offset.x * childSize + h;
+    const float y3 = c3.offset.y * childSize + h;
+    const float d0 = depthIfReached(c0, x0, y0);
+    const float d1 = depthIfReached(c1, x1, y1);
+    const float d2 = depthIfReached(c2, x2, y2);
+    const float d3 = depthIfReached(c3, x3, y3);
+    const float front = min(min(d0, d1), min(d2, d3));
+    const float t0 = thicknessWorld(c0, inverseFocal);
+    const float t1 = thicknessWorld(c1, inverseFocal);
+    const float t2 = thicknessWorld(c2, inverseFocal);
+    const float t3 = thicknessWorld(c3, inverseFocal);
+    const float frontThickness = d0 == front ? t0 : (d1 == front ? t1 : (d2 == front ? t2 : t3));
+    const float w0 = d0 < kFarAway && d0 - front <= t0 + frontThickness ? 1.0f : 0.0f;
+    const float w1 = d1 < kFarAway && d1 - front <= t1 + frontThickness ? 1.0f : 0.0f;
+    const float w2 = d2 < kFarAway && d2 - front <= t2 + frontThickness ? 1.0f : 0.0f;
+    const float w3 = d3 < kFarAway && d3 - front <= t3 + frontThickness ? 1.0f : 0.0f;
+    Blend b = emptyBlend();
+    b = addToBlend(b, c0, x0, y0, w0);
+    b = addToBlend(b, c1, x1, y1, w1);
+    b = addToBlend(b, c2, x2, y2, w2);
+    b = addToBlend(b, c3, x3, y3, w3);
+    Texel t = texelFromBlend(b, 2.0f * childSize);
+    const float deepest = max(max(w0 * c0.depth, w1 * c1.depth), max(w2 * c2.depth, w3 * c3.depth));
+    const float thickest = max(max(w0 * t0, w1 * t1), max(w2 * t2, w3 * t3));
+    const float world = min(thickest + deepest - front, 2.0f * thickest);
+    t.depth = b.weight > 0.0f ? front : 0.0f;
+    t.thickness = b.weight > 0.0f ? world / (front * inverseFocal) : 0.0f;
+    return t;
+}
+
+// Weight of a coarse texel at (dx, dy) pixels from its splat's centre; 0 outside the ellipse or where it is empty.
+SHARED_FN float pushWeight(Texel t, float dx, float dy) {
+    const float rho2 = ellipseRho2(t.normalPerp, max(t.radius, 1.0e-3f), dx, dy);
+    const float k = max(1.0f - rho2, 0.0f);
+    return t.depth > 0.0f ? k * k : 0.0f;
+}
+
+// Refines one fine texel from the four coarse texels around it. q0 is its parent, q1 the neighbour in x, q2 in y, q3 in
+// both; (sx, sy) = -1 or +1 say on which side of the parent's centre the fine texel lies. `fineSize`: its edge, pixels.
+// The fine texel is replaced iff it is empty or lies behind what the coarse ones say is in front of it (F13). Where no
+// coarse ellipse reaches it, it stays as it is.
+SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, float sx, float sy, float fineSize,
+                          float inverseFocal) {
+    const float coarseSize = 2.0f * fineSize;
+    // Centre of each coarse texel relative to the fine texel's centre, pixels.
+    const float nearX = -0.5f * fineSize * sx;
+    const float nearY = -0.5f * fineSize * sy;
+    const float farX = nearX + coarseSize * sx;
+    const float farY = nearY + coarseSize * sy;
+    const float x0 = nearX + q0.offset.x * coarseSize;
+    const float y0 = nearY + q0.offset.y * coarseSize;
+    const float x1 = farX + q1.offset.x * coarseSize;
+    const float y1 = nearY + q1.offset.y * coarseSize;
+    const float x2 = nearX + q2.offset.x * coarseSize;
+    const float y2 = farY + q2.offset.y * coarseSize;
+    const float x3 = farX + q3.offset.x * coarseSize;
+    const float y3 = farY + q3.offset.y * coarseSize;
+    const float k0 = pushWeight(q0, x0, y0);
+    const float k1 = pushWeight(q1, x1, y1);
+    const float k2 = pushWeight(q2, x2, y2);
+    const float k3 = pushWeight(q3, x3, y3);
+    const float d0 = k0 > 0.0f ? q0.depth : kFarAway;
+    const float d1 = k1 > 0.0f ? q1.depth : kFarAway;
+    const float d2 = k2 > 0.0f ? q2.depth : kFarAway;
+    const float d3 = k3 > 0.0f ? q3.depth : kFarAway;
+    const float front = min(min(d0, d1), min(d2, d3));
+    const float t0 = thicknessWorld(q0, inverseFocal);
+    const float t1 = thicknessWorld(q1, inverseFocal);
+    const float t2 = thicknessWorld(q2, inverseFocal);
+    const float t3 = thicknessWorld(q3, inverseFocal);
+    const float frontThickness = d0 == front ? t0 : (d1 == front ? t1 : (d2 == front ? t2 : t3));
+    const float w0 = d0 < kFarAway && d0 - front <= t0 + frontThickness ? k0 : 0.0f;
+    const float w1 = d1 < kFarAway && d1 - front <= t1 + frontThickness ? k1 : 0.0f;
+    const float w2 = d2 < kFarAway && d2 - front <= t2 + frontThickness ? k2 : 0.0f;
+    const float w3 = d3 < kFarAway && d3 - front <= t3 + frontThickness ? k3 : 0.0f;
+    Blend b = emptyBlend();
+    b = addToBlend(b, q0, x0, y0, w0);
+    b = addToBlend(b, q1, x1, y1, w1);
+    b = addToBlend(b, q2, x2, y2, w2);
+    b = addToBlend(b, q3, x3, y3, w3);
+    const bool replace = b.weight > 0.0f && (fine.depth <= 0.0f || fine.depth > front + frontThickness);
+    const Texel blended = texelFromBlend(b, fineSize);
+    Texel t;
+    t.depth = replace ? blended.depth : fine.depth;
+    t.radius = replace ? blended.radius : fine.radius;
+    t.thickness = replace ? blended.thickness : fine.thickness;
+    t.offset = vec2(replace ? blended.offset.x : fine.offset.x, replace ? blended.offset.y : fine.offset.y);
+    t.normalPerp =
+        vec2(replace ? blended.normalPerp.x : fine.normalPerp.x, replace ? blended.normalPerp.y : fine.normalPerp.y);
+    t.colour = vec3(replace ? blended.colour.x : fine.colour.x, replace ? blended.colour.y : fine.colour.y,
+                    replace ? blended.colour.z : fine.colour.z);
+    return t;
+}
+
+SHARED_END
+#endif

@@ -1,0 +1,176 @@
+#include "streaming/streamer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "engine/base/check.h"
+#include "engine/base/hash.h"
+
+namespace stipple::streaming {
+namespace {
+
+class FileSource final : public ByteSource {
+  public:
+    explicit FileSource(std::shared_ptr<const InputFile> file) : file_(std::move(file)) {}
+    Result<void> read(uint64_t offset, void* destination, size_t count) const override {
+        return file_->readAt(offset, destination, count);
+    }
+
+  private:
+    std::shared_ptr<const InputFile> file_;
+};
+
+constexpr uint64_t kRetryFrames = 120;
+
+Result<lod::Chunk> fetch(const ByteSource& source, const lod::Node& node, const std::string& where) {
+    std::vector<uint8_t> bytes(node.chunkBytes);
+    STIPPLE_TRY(source.read(node.chunkOffset, bytes.data(), bytes.size()));
+    if (hashBytes(bytes.data(), bytes.size()) != node.chunkHash)
+        return fail(ErrorKind::input, "the hash of a chunk does not match", where, "the store is damaged; build it again");
+    return lod::decodeChunk(bytes.data(), bytes.size(), node.records, where, false);
+}
+
+}  // namespace
+
+std::unique_ptr<ByteSource> makeFileSource(std::shared_ptr<const InputFile> file) {
+    return std::make_unique<FileSource>(std::move(file));
+}
+
+bool isLegalTransition(ChunkState from, ChunkState to) {
+    static const std::array<std::pair<ChunkState, ChunkState>, 8> legal{
+        {{ChunkState::absent, ChunkState::requested},
+         {ChunkState::requested, ChunkState::arrived},
+         {ChunkState::requested, ChunkState::failed},
+         {ChunkState::arrived, ChunkState::resident},
+         {ChunkState::arrived, ChunkState::absent},  // no room, or nobody wants it any more
+         {ChunkState::arrived, ChunkState::failed},  // the sink could not take it
+         {ChunkState::resident, ChunkState::absent},
+         {ChunkState::failed, ChunkState::requested}}};
+    return std::find(legal.begin(), legal.end(), std::pair{from, to}) != legal.end();
+}
+
+Streamer::Streamer(Executor& executor, ChunkSink& sink, StreamSettings settings)
+    : executor_(executor), sink_(sink), settings_(settings), completed_(std::make_shared<CompletionQueue<Arrival>>()) {}
+
+Streamer::~Streamer() {
+    executor_.wait();
+    for (uint32_t i = 0; i < sources_.size(); ++i)
+        for (uint32_t n = 0; n < sources_[i].nodes.size(); ++n)
+            if (sources_[i].nodes[n].state == ChunkState::resident) sink_.evict({i, n});
+}
+
+void Streamer::addInstance(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source, std::string name) {
+    sources_.push_back({&hierarchy, std::move(source), std::move(name), std::vector<NodeState>(hierarchy.nodes.size())});
+    drawable_.emplace_back(hierarchy.nodes.size(), uint8_t{0});
+}
+
+void Streamer::setState(ChunkKey key, ChunkState to) {
+    ChunkState& state = sources_[key.instance].nodes[key.node].state;
+    STIPPLE_CHECK(isLegalTransition(state, to), "chunk state transition");
+    state = to;
+    drawable_[key.instance][key.node] = to == ChunkState::resident ? 1 : 0;
+}
+
+void Streamer::collect() {
+    for (Arrival& arrival : completed_->takeAll()) {
+        --counters_.inFlight;
+        if (!arrival.chunk) {
+            setState(arrival.key, ChunkState::failed);
+            sources_[arrival.key.instance].nodes[arrival.key.node].retryAt = frame_ + kRetryFrames;
+            ++counters_.failures;
+            lastFailure_ = arrival.chunk.error().line();
+            continue;
+        }
+        setState(arrival.key, ChunkState::arrived);
+        counters_.bytesStreamed += sources_[arrival.key.instance].hierarchy->nodes[arrival.key.node].chunkBytes;
+        arrived_.push_back(std::move(arrival));
+    }
+}
+
+void Streamer::upload() {
+    uint64_t uploaded = 0;
+    size_t taken = 0;
+    for (; taken < arrived_.size(); ++taken) {
+        const Arrival& arrival = arrived_[taken];
+        const uint64_t bytes = arrival.chunk->sizeBytes();
+        if (uploaded > 0 && uploaded + bytes > settings_.uploadBytesPerFrame) break;
+        if (!makeRoom(bytes)) {
+            setState(arrival.key, ChunkState::absent);
+            sources_[arrival.key.instance].nodes[arrival.key.node].retryAt = frame_ + kRetryFrames;
+            ++counters_.refused;
+            continue;
+        }
+        if (const auto result = sink_.upload(arrival.key, *arrival.chunk); !result) {
+            setState(arrival.key, ChunkState::failed);
+            sources_[arrival.key.instance].nodes[arrival.key.node].retryAt = frame_ + kRetryFrames;
+            ++counters_.failures;
+            lastFailure_ = result.error().line();
+            continue;
+        }
+        setState(arrival.key, ChunkState::resident);
+        Source& source = sources_[arrival.key.instance];
+        source.nodes[arrival.key.node].lastUsed = frame_;
+        if (arrival.key.node != 0) ++source.nodes[source.hierarchy->nodes[arrival.key.node].parent].residentChildren;
+        counters_.residentBytes += bytes;
+        ++counters_.uploads;
+        uploaded += bytes;
+    }
+    arrived_.erase(arrived_.begin(), arrived_.begin() + static_cast<std::ptrdiff_t>(taken));
+}
+
+void Streamer::evict(ChunkKey key) {
+    Source& source = sources_[key.instance];
+    sink_.evict(key);
+    setState(key, ChunkState::absent);
+    if (key.node != 0) --source.nodes[source.hierarchy->nodes[key.node].parent].residentChildren;
+    counters_.residentBytes -= uint64_t{source.hierarchy->nodes[key.node].records} * sizeof(shared::PointRecord);
+    ++counters_.evictions;
+}
+
+bool Streamer::makeRoom(uint64_t bytes) {
+    while (counters_.residentBytes + bytes > settings_.residentBytes) {
+        ChunkKey oldest{};
+        uint64_t oldestUse = frame_;  // what this frame keeps is never evicted
+        bool found = false;
+        for (uint32_t i = 0; i < sources_.size(); ++i)
+            for (uint32_t n = 1; n < sources_[i].nodes.size(); ++n) {
+                const NodeState& s = sources_[i].nodes[n];
+                if (s.state != ChunkState::resident || s.residentChildren != 0 || s.lastUsed >= oldestUse) continue;
+                oldestUse = s.lastUsed;
+                oldest = {i, n};
+                found = true;
+            }
+        if (!found) return false;
+        evict(oldest);
+    }
+    return true;
+}
+
+void Streamer::request(const lod::Cut& cut) {
+    ++frame_;
+    for (const auto& [instance, node] : cut.keep) sources_[instance].nodes[node].lastUsed = frame_;
+    wanted_.assign(cut.wanted.begin(), cut.wanted.end());
+    std::sort(wanted_.begin(), wanted_.end(), [](const lod::CutWanted& a, const lod::CutWanted& b) {
+        return a.priority != b.priority ? a.priority > b.priority
+                                        : std::pair{a.instance, a.node} < std::pair{b.instance, b.node};
+    });
+    for (const lod::CutWanted& w : wanted_) {
+        if (counters_.inFlight >= settings_.requestsInFlight) break;
+        Source& source = sources_[w.instance];
+        NodeState& state = source.nodes[w.node];
+        if ((state.state != ChunkState::absent && state.state != ChunkState::failed) || frame_ < state.retryAt) continue;
+        const ChunkKey key{w.instance, w.node};
+        setState(key, ChunkState::requested);
+        ++counters_.inFlight;
+        ++counters_.requests;
+        const std::string where = fmt::format("{}: chunk of node {}", source.name, w.node);
+        executor_.run([key, where, bytes = source.bytes, node = source.hierarchy->nodes[w.node], queue = completed_] {
+            queue->push({key, fetch(*bytes, node, where)});
+        });
+    }
+}
+
+}  // namespace stipple::streaming

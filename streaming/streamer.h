@@ -1,0 +1,105 @@
+// Keeps the chunks that the cut wants resident: reads and decodes them on the executor, hands them to the sink within a
+// byte budget, evicts what nobody needs. The life of a request:
+//   1. the cut wants a chunk            absent -> requested     (request)
+//   2. a worker reads and decodes it    requested               (executor)
+//   3. it arrives                       requested -> arrived    (collect, the only place where async work enters)
+//   4. it is uploaded within the budget arrived -> resident     (upload; drawable from the next frame on)
+//   5. nobody keeps it any more         resident -> absent      (evict, least recently used, children before parents)
+// A chunk that cannot be read is failed: counted, its parent stays drawn, tried again after a pause.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "engine/base/executor.h"
+#include "engine/base/queue.h"
+#include "lod/chunk.h"
+#include "lod/cut.h"
+#include "streaming/byte_source.h"
+
+namespace stipple::streaming {
+
+struct ChunkKey {
+    uint32_t instance = 0, node = 0;
+};
+
+/// Takes decoded chunks: implemented by each backend (and by the tests, which count what is alive).
+class ChunkSink {
+  public:
+    virtual ~ChunkSink() = default;
+    virtual Result<void> upload(ChunkKey key, const lod::Chunk& chunk) = 0;
+    virtual void evict(ChunkKey key) = 0;
+};
+
+enum class ChunkState : uint8_t { absent, requested, arrived, resident, failed };
+/// Is from -> to a step of a chunk's life?
+bool isLegalTransition(ChunkState from, ChunkState to);
+
+struct StreamSettings {
+    uint64_t residentBytes = uint64_t{1} << 30;  ///< hard limit of decoded chunks held by the sink
+    uint64_t uploadBytesPerFrame = uint64_t{64} << 20;
+    uint32_t requestsInFlight = 64;
+};
+
+struct StreamCounters {
+    uint64_t bytesStreamed = 0, residentBytes = 0, requests = 0, uploads = 0, evictions = 0, failures = 0, refused = 0;
+    uint32_t inFlight = 0;
+};
+
+class Streamer {
+  public:
+    Streamer(Executor& executor, ChunkSink& sink, StreamSettings settings);
+    ~Streamer();
+    Streamer(const Streamer&) = delete;
+    Streamer& operator=(const Streamer&) = delete;
+
+    /// One more instance; `hierarchy` must outlive the streamer.
+    void addInstance(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source, std::string name);
+    /// Takes in what workers finished since the last call.
+    void collect();
+    /// Uploads arrived chunks within the budgets, evicting if needed.
+    void upload();
+    /// Starts what the cut wants, up to the quota; remembers what it keeps.
+    void request(const lod::Cut& cut);
+    lod::Residency residency() const { return {drawable_}; }
+    const StreamCounters& counters() const { return counters_; }
+    /// True if nothing is on its way.
+    bool isIdle() const { return counters_.inFlight == 0 && arrived_.empty(); }
+    /// The last failure, for the overlay and the log; empty if there was none.
+    const std::string& lastFailure() const { return lastFailure_; }
+
+  private:
+    struct NodeState {
+        ChunkState state = ChunkState::absent;
+        uint8_t residentChildren = 0;
+        uint64_t lastUsed = 0, retryAt = 0;
+    };
+    struct Source {
+        const lod::Hierarchy* hierarchy;
+        std::shared_ptr<const ByteSource> bytes;
+        std::string name;
+        std::vector<NodeState> nodes;
+    };
+    struct Arrival {
+        ChunkKey key;
+        Result<lod::Chunk> chunk;
+    };
+    void setState(ChunkKey key, ChunkState to);
+    bool makeRoom(uint64_t bytes);
+    void evict(ChunkKey key);
+
+    Executor& executor_;
+    ChunkSink& sink_;
+    StreamSettings settings_;
+    std::vector<Source> sources_;
+    std::vector<std::vector<uint8_t>> drawable_;
+    std::shared_ptr<CompletionQueue<Arrival>> completed_;
+    std::vector<Arrival> arrived_;
+    std::vector<lod::CutWanted> wanted_;
+    StreamCounters counters_;
+    uint64_t frame_ = 0;
+    std::string lastFailure_;
+};
+
+}  // namespace stipple::streaming
