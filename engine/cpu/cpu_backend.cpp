@@ -169,7 +169,7 @@ class CpuBackend final : public render::Backend {
                     const uint32_t yy = y + (row == &lower ? 1 : 0);
                     row->depth[kPad + n] = 0;  // beyond the right edge of an odd width
                     if (yy >= row1) {
-                        std::fill_n(row->depth.begin() + kPad, n, 0.0f);
+                        std::fill_n(row->depth + kPad, n, 0.0f);
                         continue;
                     }
                     const size_t at = size_t{yy} * fine.width + x0;
@@ -211,7 +211,7 @@ class CpuBackend final : public render::Backend {
                     for (TexelRow* row : {&upper, &lower}) {
                         const uint32_t yy = y + (row == &lower ? 1 : 0);
                         any = (yy < row1 && loadRow(fine, from, yy, x0, n, kPad, *row)) || any;
-                        if (yy >= row1) std::fill_n(row->depth.begin() + kPad, n, 0.0f);
+                        if (yy >= row1) std::fill_n(row->depth + kPad, n, 0.0f);
                         row->depth[kPad + n] = 0;
                     }
                     pullPair(upper, lower, any, (n + 1) / 2, std::exp2(static_cast<float>(l)),
@@ -227,19 +227,19 @@ class CpuBackend final : public render::Backend {
         bool any = false;
         for (uint32_t i = 0; i < n; ++i) any |= at.depth[i] > 0;
         if (any) k_.unpackRow(at, first, n, row);
-        else std::fill_n(row.depth.begin() + first, n, 0.0f);
+        else std::fill_n(row.depth + first, n, 0.0f);
         return any;
     }
 
     /// The expanded coarse row `y` around the fine columns [x0, x0 + n); empty outside the level.
-    bool loadCoarse(const Level& level, const Planes& planes, int y, uint32_t x0, uint32_t n, TexelRow& scratch, TexelRow& out) {
+    bool loadCoarse(const Level& level, const Planes& planes, int y, uint32_t x0, uint32_t n, TexelRow& scratch, ExpandedRow& out) {
         const uint32_t c0 = x0 / 2, count = (n + 1) / 2;
         if (y < 0 || y >= static_cast<int>(level.height)) return false;
         const uint32_t before = c0 > 0 ? 1 : 0, after = c0 + count < level.width ? 1 : 0;
         scratch.depth[kPad - 1] = 0;
         scratch.depth[kPad + count] = 0;
         if (!loadRow(level, planes, static_cast<uint32_t>(y), c0 - before, count + before + after, kPad - before, scratch)) return false;
-        k_.expandRow(scratch, n, out);
+        k_.expandRow(scratch, n, out.nearest, out.beside);
         return true;
     }
 
@@ -248,7 +248,7 @@ class CpuBackend final : public render::Backend {
     void pushTile(Level& fine, Level& coarse, float fineSize, uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1, const Use& use) {
         const Planes finePlanes = fine.planes(), coarsePlanes = coarse.planes();
         thread_local TexelRow scratch{}, own{}, out{};
-        thread_local std::array<TexelRow, 3> ring{};
+        thread_local std::array<ExpandedRow, 3> ring{};
         std::array<bool, 3> has{};
         const int c0 = static_cast<int>(row0 / 2);
         for (int c = c0 - 1; c <= c0; ++c)
@@ -262,8 +262,11 @@ class CpuBackend final : public render::Backend {
                 use(y, own, own, ownAny);
                 continue;
             }
-            for (const size_t slot : {nearSlot, farSlot})
-                if (!has.at(slot)) ring.at(slot).depth.fill(0);
+            for (const size_t slot : {nearSlot, farSlot}) {
+                if (has.at(slot)) continue;
+                std::fill_n(ring.at(slot).nearest.depth, TexelRow::kSize, 0.0f);
+                std::fill_n(ring.at(slot).beside.depth, TexelRow::kSize, 0.0f);
+            }
             k_.pushRow(own, ring.at(nearSlot), ring.at(farSlot), y % 2 == 0 ? -1.0f : 1.0f, n, fineSize, 1.0f / frame_.focal, out);
             use(y, own, out, true);
         }

@@ -15,8 +15,16 @@ constexpr uint32_t kPad = 16;    ///< entries in front of the first one; also ro
 
 /// A row of unpacked texels; entry x of a tile is at [kPad + x]. Entries -1 and n may be read as neighbours.
 struct TexelRow {
-    using Array = std::array<float, kTile + 2 * kPad>;
-    alignas(64) Array depth, radius, thickness, x, y, perpX, perpY, red, green, blue;
+    static constexpr uint32_t kSize = kTile + 2 * kPad;
+    // Plain arrays: references into std::array keep GCC 12 from vectorising.
+    alignas(64) float depth[kSize], radius[kSize], thickness[kSize], x[kSize], y[kSize], perpX[kSize], perpY[kSize],
+        red[kSize], green[kSize], blue[kSize];
+};
+
+/// A coarse row at the resolution of the fine one: for each fine texel its parent, and the parent's neighbour on the side
+/// on which the fine texel lies.
+struct ExpandedRow {
+    TexelRow nearest, beside;
 };
 
 /// One level of the pyramid: five planes of packed texels.
@@ -54,11 +62,11 @@ struct Kernels {
     void (*packRow)(const TexelRow& row, uint32_t n, const Planes& to);
     void (*unpackRow)(const Planes& from, uint32_t first, uint32_t n, TexelRow& row);
     void (*pullRow)(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float inverseFocal, TexelRow& out);
-    /// `upperIsNear`: the parent's own row is `nearRow`; `farRow` is the coarse row on the other side. Both expanded.
-    void (*pushRow)(const TexelRow& fine, const TexelRow& nearRow, const TexelRow& farRow, float sy, uint32_t n, float fineSize,
+    /// `nearRow`: the coarse row of the parents; `farRow`: the one beyond, in direction sy.
+    void (*pushRow)(const TexelRow& fine, const ExpandedRow& nearRow, const ExpandedRow& farRow, float sy, uint32_t n, float fineSize,
                     float inverseFocal, TexelRow& out);
     /// Doubles the entries of a coarse row (-1 to (n + 1) / 2) along x.
-    void (*expandRow)(const TexelRow& coarse, uint32_t n, TexelRow& out);
+    void (*expandRow)(const TexelRow& coarse, uint32_t n, TexelRow& nearest, TexelRow& beside);
     void (*shadeRow)(const shared::FrameConstants& f, const Tables& tables, const TexelRow& own, const TexelRow& row, uint32_t x0,
                      uint32_t y, uint32_t n, const ShadeOutput& out);
 };

@@ -12,7 +12,7 @@ namespace {
 
 using namespace stipple::shared;
 
-inline Texel texelAt(const TexelRow& row, uint32_t i) {
+[[gnu::always_inline]] inline Texel texelAt(const TexelRow& row, size_t i) {
     Texel t;
     t.depth = row.depth[i];
     t.radius = row.radius[i];
@@ -22,7 +22,7 @@ inline Texel texelAt(const TexelRow& row, uint32_t i) {
     t.colour = vec3(row.red[i], row.green[i], row.blue[i]);
     return t;
 }
-inline void setTexel(TexelRow& row, uint32_t i, const Texel& t) {
+[[gnu::always_inline]] inline void setTexel(TexelRow& row, size_t i, const Texel& t) {
     row.depth[i] = t.depth;
     row.radius[i] = t.radius;
     row.thickness[i] = t.thickness;
@@ -35,43 +35,53 @@ inline void setTexel(TexelRow& row, uint32_t i, const Texel& t) {
     row.blue[i] = t.colour.z;
 }
 
-void projectBlock(const FrameConstants& f, const DrawNode& node, const PointRecord* records, uint32_t count, uint32_t* pixel,
-                  uint32_t* depth) {
+void projectBlock(const FrameConstants& frame, const DrawNode& drawNode, const PointRecord* __restrict records, uint32_t count,
+                  uint32_t* __restrict pixel, uint32_t* __restrict depth) {
+    const FrameConstants f = frame;
+    const DrawNode node = drawNode;
     const float width = float(f.width), height = float(f.height);
-    for (uint32_t i = 0; i < count; ++i) {
-        const PointRecord r = records[i];
+    const float focal = f.focal, nearPlane = f.nearPlane, x0 = f.centre.x, y0 = f.centre.y;
+    const float xx = f.viewX.x, xy = f.viewX.y, xz = f.viewX.z, yx = f.viewY.x, yy = f.viewY.y, yz = f.viewY.z, zx = f.viewZ.x,
+                zy = f.viewZ.y, zz = f.viewZ.z;
+    const float bx = node.base.x, by = node.base.y, bz = node.base.z, ax = node.axisX.x, ay = node.axisX.y, az = node.axisX.z,
+                bbx = node.axisY.x, bby = node.axisY.y, bbz = node.axisY.z, ccx = node.axisZ.x, ccy = node.axisZ.y, ccz = node.axisZ.z;
+    const uint* __restrict const words = &records->positionXY;  // four words a record
+    const uint stride = f.width, errorCode = node.errorCode, octantMask = node.octantMask;
+    #pragma GCC ivdep
+    for (size_t i = 0; i < count; ++i) {
+        const PointRecord r{words[4 * i], words[4 * i + 1], words[4 * i + 2], words[4 * i + 3]};
         const float qx = float(int(recordX(r))), qy = float(int(recordY(r))), qz = float(int(recordZ(r)));
-        const float cx = node.base.x + node.axisX.x * qx + node.axisY.x * qy + node.axisZ.x * qz;
-        const float cy = node.base.y + node.axisX.y * qx + node.axisY.y * qy + node.axisZ.y * qz;
-        const float cz = node.base.z + node.axisX.z * qx + node.axisY.z * qy + node.axisZ.z * qz;
-        const float scale = f.focal / cz;
-        const float px = cx * scale + f.centre.x, py = cy * scale + f.centre.y;
-        const bool inside = (cz > f.nearPlane) & (px >= 0.0f) & (px < width) & (py >= 0.0f) & (py < height);
-        const bool fine = (recordErrorCode(r) <= node.errorCode) | ((node.octantMask >> recordOctant(r) & 1u) != 0u);
+        const float cx = bx + ax * qx + bbx * qy + ccx * qz;
+        const float cy = by + ay * qx + bby * qy + ccy * qz;
+        const float cz = bz + az * qx + bbz * qy + ccz * qz;
+        const float scale = focal / cz;
+        const float px = cx * scale + x0, py = cy * scale + y0;
+        const bool inside = (cz > nearPlane) & (px >= 0.0f) & (px < width) & (py >= 0.0f) & (py < height);
+        const bool fine = (recordErrorCode(r) <= errorCode) | ((octantMask >> recordOctant(r) & 1u) != 0u);
         const vec3 n = octDirection(r.normal);
-        const float nx = f.viewX.x * n.x + f.viewX.y * n.y + f.viewX.z * n.z;
-        const float ny = f.viewY.x * n.x + f.viewY.y * n.y + f.viewY.z * n.z;
-        const float nz = f.viewZ.x * n.x + f.viewZ.y * n.y + f.viewZ.z * n.z;
+        const float nx = xx * n.x + xy * n.y + xz * n.z;
+        const float ny = yx * n.x + yy * n.y + yz * n.z;
+        const float nz = zx * n.x + zy * n.y + zz * n.z;
         const bool seen = ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) != 0u) | (nx * cx + ny * cy + nz * cz < 0.0f);
         const bool keep = inside & fine & seen;
         const int ix = int(keep ? px : 0.0f), iy = int(keep ? py : 0.0f);
-        pixel[i] = keep ? uint(iy) * f.width + uint(ix) : ~0u;
+        pixel[i] = keep ? uint(iy) * stride + uint(ix) : ~0u;
         depth[i] = floatBitsToUint(cz);
     }
 }
 
 struct Gathered {
-    using Floats = std::array<float, kTile>;
-    using Words = std::array<uint32_t, kTile>;
-    alignas(64) Floats x, y, z, radius;
-    alignas(64) Words normal, colour, flags;
+    alignas(64) float x[kTile], y[kTile], z[kTile], radius[kTile];
+    alignas(64) uint32_t normal[kTile], colour[kTile], flags[kTile];
 };
 
-bool resolveRow(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, uint64_t* visibility, uint32_t x0,
-                uint32_t y, uint32_t n, TexelRow& row, float& largestRadius) {
+bool resolveRow(const FrameConstants& frame, const Tables& tables, const BlockSource* blocks, uint64_t* visibility, uint32_t x0,
+                uint32_t y, uint32_t n, TexelRow& __restrict row, float& largestRadius) {
+    const FrameConstants f = frame;
     Gathered g;
     bool any = false;
-    for (uint32_t i = 0; i < n; ++i) {
+    #pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
         const uint64_t key = visibility[i];
         if (key == ~uint64_t{0}) {
             g.x[i] = 0;
@@ -105,127 +115,140 @@ bool resolveRow(const FrameConstants& f, const Tables& tables, const BlockSource
         g.colour[i] = tables.red[c & 255u] | tables.green[c >> 8 & 255u] | tables.blue[c >> 16 & 255u];
     }
     if (!any) {
-        for (uint32_t i = 0; i < n; ++i) row.depth[kPad + i] = 0;
+        #pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) row.depth[kPad + i] = 0;
         return false;
     }
-    float largest = 0;
-    for (uint32_t i = 0; i < n; ++i) {
+    uint largest = 0;  // as bits: positive floats sort like integers
+    const float xx = f.viewX.x, xy = f.viewX.y, xz = f.viewX.z, yx = f.viewY.x, yy = f.viewY.y, yz = f.viewY.z, zx = f.viewZ.x,
+                zy = f.viewZ.y, zz = f.viewZ.z;
+    const float focal = f.focal, support = f.supportScale, minimum = f.minimumRadius;
+    const float centreX = f.centre.x - float(int(x0)) - 0.5f, centreY = f.centre.y - float(int(y)) - 0.5f;
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
         const bool valid = g.z[i] > 0.0f;
-        const vec3 c = valid ? vec3(g.x[i], g.y[i], g.z[i]) : vec3(0.0f, 0.0f, 1.0f);
+        const vec3 c = vec3(valid ? g.x[i] : 0.0f, valid ? g.y[i] : 0.0f, valid ? g.z[i] : 1.0f);
         const vec3 d = octDecode(g.normal[i]);
         const bool hasNormal = (g.flags[i] & kFlagNoNormal) == 0u;
-        vec3 nc = vec3(f.viewX.x * d.x + f.viewX.y * d.y + f.viewX.z * d.z, f.viewY.x * d.x + f.viewY.y * d.y + f.viewY.z * d.z,
-                       f.viewZ.x * d.x + f.viewZ.y * d.y + f.viewZ.z * d.z);
+        vec3 nc = vec3(xx * d.x + xy * d.y + xz * d.z, yx * d.x + yy * d.y + yz * d.z, zx * d.x + zy * d.y + zz * d.z);
         const float inverse = 1.0f / std::sqrt(c.x * c.x + c.y * c.y + c.z * c.z);
         nc.x = hasNormal ? nc.x : -c.x * inverse;
         nc.y = hasNormal ? nc.y : -c.y * inverse;
         nc.z = hasNormal ? nc.z : -c.z * inverse;
-        Texel t = texelFromSplat(c, nc, g.radius[i] * f.supportScale, f.focal, f.minimumRadius);
-        const float scale = f.focal / c.z;
-        t.offset = vec2(c.x * scale + f.centre.x - (float(int(x0 + i)) + 0.5f), c.y * scale + f.centre.y - (float(int(y)) + 0.5f));
+        Texel t = texelFromSplat(c, nc, g.radius[i] * support, focal, minimum);
+        const float scale = focal / c.z;
+        // Nearly the pixel's own coordinate is taken off before adding, so that the offset keeps its low bits.
+        t.offset = vec2(c.x * scale + centreX - float(int(i)), c.y * scale + centreY);
         t.depth = valid ? t.depth : 0.0f;
         t.radius = valid ? t.radius : 0.0f;
         t.colour = vec3(unpackRed(g.colour[i]), unpackGreen(g.colour[i]), unpackBlue(g.colour[i]));
         setTexel(row, kPad + i, t);
-        largest = max(largest, t.radius);
+        const uint bits = floatBitsToUint(t.radius);
+        largest = bits > largest ? bits : largest;
     }
-    largestRadius = max(largestRadius, largest);
+    largestRadius = max(largestRadius, uintBitsToFloat(largest));
     return true;
 }
 
-void packRow(const TexelRow& row, uint32_t n, const Planes& to) {
-    for (uint32_t i = 0; i < n; ++i) {
+void packRow(const TexelRow& __restrict row, uint32_t n, const Planes& planes) {
+    float* __restrict const depth = planes.depth;
+    uint32_t *__restrict const size = planes.size, *__restrict const offset = planes.offset, *__restrict const normal = planes.normal,
+             *__restrict const colour = planes.colour;
+    #pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
         const PackedTexel p = packTexel(texelAt(row, kPad + i));
-        to.depth[i] = p.depth;
-        to.size[i] = p.size;
-        to.offset[i] = p.offset;
-        to.normal[i] = p.normal;
-        to.colour[i] = p.colour;
+        depth[i] = p.depth;
+        size[i] = p.size;
+        offset[i] = p.offset;
+        normal[i] = p.normal;
+        colour[i] = p.colour;
     }
 }
 
-void unpackRow(const Planes& from, uint32_t first, uint32_t n, TexelRow& row) {
-    for (uint32_t i = 0; i < n; ++i) {
+void unpackRow(const Planes& planes, uint32_t first, uint32_t n, TexelRow& __restrict row) {
+    const float* __restrict const depth = planes.depth;
+    const uint32_t *__restrict const size = planes.size, *__restrict const offset = planes.offset,
+                   *__restrict const normal = planes.normal, *__restrict const colour = planes.colour;
+    #pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
         PackedTexel p;
-        p.depth = from.depth[i];
-        p.size = from.size[i];
-        p.offset = from.offset[i];
-        p.normal = from.normal[i];
-        p.colour = from.colour[i];
+        p.depth = depth[i];
+        p.size = size[i];
+        p.offset = offset[i];
+        p.normal = normal[i];
+        p.colour = colour[i];
         setTexel(row, first + i, unpackTexel(p));
     }
 }
 
-void pullRow(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float inverseFocal, TexelRow& out) {
-    for (uint32_t i = 0; i < n; ++i) {
-        const uint32_t a = kPad + 2 * i, b = a + 1;
+void pullRow(const TexelRow& __restrict upper, const TexelRow& __restrict lower, uint32_t n, float childSize, float inverseFocal,
+             TexelRow& __restrict out) {
+    #pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const size_t a = kPad + 2 * i, b = a + 1;
         setTexel(out, kPad + i, pullTexels(texelAt(upper, a), texelAt(upper, b), texelAt(lower, a), texelAt(lower, b), childSize,
                                            inverseFocal));
     }
 }
 
-void expandRow(const TexelRow& coarse, uint32_t n, TexelRow& out) {
-    const auto expand = [n](const TexelRow::Array& from, TexelRow::Array& to) {
-        to[kPad - 1] = from[kPad - 1];
-        for (uint32_t i = 0; i < (n + 1) / 2 + 1; ++i) {
-            to[kPad + 2 * i] = from[kPad + i];
-            to[kPad + 2 * i + 1] = from[kPad + i];
+void expandRow(const TexelRow& coarse, uint32_t n, TexelRow& nearest, TexelRow& beside) {
+    const auto expand = [n](const float* __restrict from, float* __restrict to, float* __restrict side) {
+        from += kPad;
+        to += kPad;
+        side += kPad;
+#pragma GCC ivdep
+        for (size_t i = 0; i < (n + 1) / 2; ++i) {
+            to[2 * i] = from[i];
+            to[2 * i + 1] = from[i];
+        }
+#pragma GCC ivdep
+        for (size_t i = 0; i < (n + 1) / 2; ++i) {
+            side[2 * i] = (from - 1)[i];
+            side[2 * i + 1] = (from + 1)[i];
         }
     };
-    expand(coarse.depth, out.depth);
-    expand(coarse.radius, out.radius);
-    expand(coarse.thickness, out.thickness);
-    expand(coarse.x, out.x);
-    expand(coarse.y, out.y);
-    expand(coarse.perpX, out.perpX);
-    expand(coarse.perpY, out.perpY);
-    expand(coarse.red, out.red);
-    expand(coarse.green, out.green);
-    expand(coarse.blue, out.blue);
+    expand(coarse.depth, nearest.depth, beside.depth);
+    expand(coarse.radius, nearest.radius, beside.radius);
+    expand(coarse.thickness, nearest.thickness, beside.thickness);
+    expand(coarse.x, nearest.x, beside.x);
+    expand(coarse.y, nearest.y, beside.y);
+    expand(coarse.perpX, nearest.perpX, beside.perpX);
+    expand(coarse.perpY, nearest.perpY, beside.perpY);
+    expand(coarse.red, nearest.red, beside.red);
+    expand(coarse.green, nearest.green, beside.green);
+    expand(coarse.blue, nearest.blue, beside.blue);
 }
 
-inline float pick(const TexelRow::Array& a, uint32_t i, bool left) {
-    const float before = a[i - 1], after = a[i + 1];
-    return left ? before : after;
-}
-inline Texel neighbourAt(const TexelRow& row, uint32_t i, bool left) {
-    Texel t;
-    t.depth = pick(row.depth, i, left);
-    t.radius = pick(row.radius, i, left);
-    t.thickness = pick(row.thickness, i, left);
-    t.offset = vec2(pick(row.x, i, left), pick(row.y, i, left));
-    t.normalPerp = vec2(pick(row.perpX, i, left), pick(row.perpY, i, left));
-    t.colour = vec3(pick(row.red, i, left), pick(row.green, i, left), pick(row.blue, i, left));
-    return t;
-}
-
-void pushRow(const TexelRow& fine, const TexelRow& nearRow, const TexelRow& farRow, float sy, uint32_t n, float fineSize,
-             float inverseFocal, TexelRow& out) {
-    for (uint32_t i = 0; i < n; ++i) {
-        const uint32_t at = kPad + i;
-        const bool left = (i & 1u) == 0u;
-        const float sx = left ? -1.0f : 1.0f;
-        setTexel(out, at, pushTexel(texelAt(fine, at), texelAt(nearRow, at), neighbourAt(nearRow, at, left), texelAt(farRow, at),
-                                    neighbourAt(farRow, at, left), sx, sy, fineSize, inverseFocal));
+void pushRow(const TexelRow& __restrict fine, const ExpandedRow& __restrict nearRow, const ExpandedRow& __restrict farRow, float sy,
+             uint32_t n, float fineSize, float inverseFocal, TexelRow& __restrict out) {
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const size_t at = kPad + i;
+        const float sx = float(int(i & 1u) * 2 - 1);
+        setTexel(out, at, pushTexel(texelAt(fine, at), texelAt(nearRow.nearest, at), texelAt(nearRow.beside, at),
+                                    texelAt(farRow.nearest, at), texelAt(farRow.beside, at), sx, sy, fineSize, inverseFocal));
     }
 }
 
-void shadeRow(const FrameConstants& f, const Tables& tables, const TexelRow& own, const TexelRow& row, uint32_t x0, uint32_t y,
-              uint32_t n, const ShadeOutput& out) {
+void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow& __restrict own, const TexelRow& __restrict row,
+              uint32_t x0, uint32_t y, uint32_t n, const ShadeOutput& out) {
+    const FrameConstants f = frame;
     const bool lit = f.shade == kShadeLit && f.debugView == kDebugNone;
     const float inverseFocal = 1.0f / f.focal;
     const float vy = (float(int(y)) + 0.5f - f.centre.y) * inverseFocal;
-    std::array<float, kTile> red, green, blue;
-    for (uint32_t i = 0; i < n; ++i) {
-        const uint32_t at = kPad + i;
+    alignas(64) float red[kTile], green[kTile], blue[kTile];
+    #pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const size_t at = kPad + i;
         red[i] = row.red[at];
         green[i] = row.green[at];
         blue[i] = row.blue[at];
     }
     if (lit) {
-        for (uint32_t i = 0; i < n; ++i) {
-            const uint32_t at = kPad + i;
-            const float vx = (float(int(x0 + i)) + 0.5f - f.centre.x) * inverseFocal;
+        #pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            const size_t at = kPad + i;
+            const float vx = (float(int(x0) + int(i)) + 0.5f - f.centre.x) * inverseFocal;
             const float inverse = 1.0f / std::sqrt(vx * vx + vy * vy + 1.0f);
             const vec3 normal = normalFromPerp(vec2(row.perpX[at], row.perpY[at]), vec3(vx * inverse, vy * inverse, inverse));
             const float light = irradiance(normal, f.sunDirection, f.skyDirection);
@@ -235,9 +258,10 @@ void shadeRow(const FrameConstants& f, const Tables& tables, const TexelRow& own
         }
     }
     if (f.debugView == kDebugHoles || f.debugView == kDebugNormals || out.normal != nullptr) {
-        for (uint32_t i = 0; i < n; ++i) {
-            const uint32_t at = kPad + i;
-            const float vx = (float(int(x0 + i)) + 0.5f - f.centre.x) * inverseFocal;
+        #pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            const size_t at = kPad + i;
+            const float vx = (float(int(x0) + int(i)) + 0.5f - f.centre.x) * inverseFocal;
             const float inverse = 1.0f / std::sqrt(vx * vx + vy * vy + 1.0f);
             const vec3 c = normalFromPerp(vec2(row.perpX[at], row.perpY[at]), vec3(vx * inverse, vy * inverse, inverse));
             if (f.debugView == kDebugHoles) {
@@ -257,8 +281,9 @@ void shadeRow(const FrameConstants& f, const Tables& tables, const TexelRow& own
             out.normal[3 * i + 2] = valid ? f.viewX.z * c.x + f.viewY.z * c.y + f.viewZ.z * c.z : 0.0f;
         }
     }
-    alignas(64) std::array<uint32_t, kTile> ir, ig, ib;
-    for (uint32_t i = 0; i < n; ++i) {
+    alignas(64) uint32_t ir[kTile], ig[kTile], ib[kTile];
+    #pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
         const bool valid = row.depth[kPad + i] > 0.0f;
         red[i] = valid ? red[i] : f.background.x;
         green[i] = valid ? green[i] : f.background.y;
@@ -267,14 +292,19 @@ void shadeRow(const FrameConstants& f, const Tables& tables, const TexelRow& own
         ig[i] = uint(int(std::sqrt(min(max(green[i], 0.0f), 1.0f)) * 2047.0f + 0.5f));
         ib[i] = uint(int(std::sqrt(min(max(blue[i], 0.0f), 1.0f)) * 2047.0f + 0.5f));
     }
-    for (uint32_t i = 0; i < n; ++i) {
+    const uint32_t* __restrict const byteOf = tables.srgbByte.data();
+    uint32_t* __restrict const rgba = out.rgba;
+    #pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
         const uint32_t alpha = row.depth[kPad + i] > 0.0f ? 0xff000000u : 0u;
-        out.rgba[i] = tables.srgbByte[ir[i]] | tables.srgbByte[ig[i]] << 8 | tables.srgbByte[ib[i]] << 16 | alpha;
+        rgba[i] = byteOf[ir[i]] | byteOf[ig[i]] << 8 | byteOf[ib[i]] << 16 | alpha;
     }
     if (out.depth != nullptr)
-        for (uint32_t i = 0; i < n; ++i) out.depth[i] = row.depth[kPad + i];
+        #pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) out.depth[i] = row.depth[kPad + i];
     if (out.linear != nullptr)
-        for (uint32_t i = 0; i < n; ++i) {
+        #pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
             out.linear[3 * i] = red[i];
             out.linear[3 * i + 1] = green[i];
             out.linear[3 * i + 2] = blue[i];

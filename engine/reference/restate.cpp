@@ -83,11 +83,10 @@ Level pullLevel(const Level& fine, double childSize) {
     coarse.samples.resize(static_cast<size_t>(coarse.width) * static_cast<size_t>(coarse.height));
     for (int y = 0; y < coarse.height; ++y)
         for (int x = 0; x < coarse.width; ++x) {
-            const dvec2 centre = dvec2(2 * x + 1, 2 * y + 1) * childSize;
             std::vector<Contribution> list;
             for (int k = 0; k < 4; ++k) {
                 const Sample* s = fine.at(2 * x + k % 2, 2 * y + k / 2);
-                if (s && s->valid && rhoSquared(*s, centre) <= 1) list.push_back({s, 1.0});
+                if (s && s->valid && s->radius >= 0.5 * childSize) list.push_back({s, 1.0});
             }
             if (list.empty()) continue;
             const Sample* front = nullptr;
@@ -110,11 +109,24 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize) {
         for (int x = 0; x < fine.width; ++x) {
             const dvec2 centre = (dvec2(x, y) + 0.5) * fineSize;
             const int px = x / 2, py = y / 2, sx = x % 2 ? 1 : -1, sy = y % 2 ? 1 : -1;
-            std::vector<Contribution> list;
+            std::vector<std::pair<const Sample*, double>> around;  // filled coarse texels and rho^2 there
+            double least = 1e300;
+            const Sample* nearest = nullptr;
             for (int k = 0; k < 4; ++k) {
                 const Sample* s = coarse.at(px + (k % 2 ? sx : 0), py + (k / 2 ? sy : 0));
                 if (!s || !s->valid) continue;
-                const double rest = 1 - rhoSquared(*s, centre);
+                around.emplace_back(s, rhoSquared(*s, centre));
+                if (!nearest || s->depth < nearest->depth) nearest = s;
+                least = std::min(least, around.back().second);
+            }
+            // Inside one surface but just missed by all its texels: they count with twice the radius.
+            const auto together = std::count_if(around.begin(), around.end(), [&](const auto& a) {
+                return a.first->depth - nearest->depth <= a.first->thickness + nearest->thickness;
+            });
+            const bool widen = least >= 1 && together >= 3;
+            std::vector<Contribution> list;
+            for (const auto& [s, rho2] : around) {
+                const double rest = 1 - (widen ? rho2 / 4 : rho2);
                 if (rest > 0) list.push_back({s, rest * rest});
             }
             if (list.empty()) continue;

@@ -18,7 +18,7 @@ namespace stipple::lod {
 namespace {
 
 constexpr uint32_t kNeighbours = 12, kCellPoints = 8, kPointsPerNeighbourCell = 64, kLargestClimb = 6;
-constexpr float kRadiusFactor = 0.55f;
+constexpr float kRadiusFactor = 0.7f, kLargestRadii = 4.0f;
 
 struct Neighbourhood {
     std::vector<float> x, y, z;     ///< relative to the cell's first point, lattice units
@@ -159,12 +159,12 @@ class Estimator {
     Neighbourhood hood_;
 };
 
-/// Radii between one lattice step and four times the leaf's median (hard case 23).
+/// Radii between half a lattice step and twice the leaf's median (hard case 23).
 void clampRadii(Cloud& cloud, const BuildNode& leaf) {
     std::vector<float> radii(cloud.radius.begin() + leaf.begin, cloud.radius.begin() + leaf.end);
     const auto middle = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
     std::nth_element(radii.begin(), middle, radii.end());
-    const float limit = std::max(4 * *middle, 1.0f);
+    const float limit = std::max(kLargestRadii * *middle, 1.0f);
     for (uint32_t i = leaf.begin; i < leaf.end; ++i) cloud.radius[i] = std::clamp(cloud.radius[i], 0.5f, limit);
 }
 

@@ -84,7 +84,7 @@ class Simplifier {
         Box box;
         for (uint32_t i = node.begin; i < node.end; ++i) {
             const bool none = (cloud_.colour[i] >> 24 & shared::kFlagNoNormal) != 0;
-            normal_[i] = none ? glm::vec3(0) : shared::octDecode(cloud_.normal[i]);
+            normal_[i] = none ? glm::vec3(0) : glm::vec3(shared::octDecode(cloud_.normal[i]));
             const uint32_t code = radiusCodeUp(cloud_.radius[i], edge);
             cloud_.radius[i] = static_cast<float>(static_cast<double>(shared::radiusFraction(code)) * edge);
             box.add(pointAt(i));

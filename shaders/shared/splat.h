@@ -12,7 +12,7 @@ struct Texel {
     float depth;      // linear, world units; <= 0: empty
     float radius;     // pixels of the full-size image
     float thickness;  // half-thickness along the view, in pixels at this depth (world = thickness * depth / focal)
-    vec2 offset;      // centre of the splat - centre of the texel, in texels of this level
+    vec2 offset;      // centre of the splat - centre of the texel, pixels; below three radii
     vec2 normalPerp;  // the eye-facing normal's components perpendicular to the view direction
     vec3 colour;      // linear
 };

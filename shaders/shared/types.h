@@ -12,12 +12,23 @@
 #define SHARED_FN [[maybe_unused, gnu::always_inline]] static inline
 SHARED_BEGIN
 using uint = std::uint32_t;
-using glm::dot;
-using glm::floatBitsToUint;
-using glm::uintBitsToFloat;
-using glm::uvec2;
-using glm::vec2;
-using glm::vec3;
+SHARED_FN uint floatBitsToUint(float v) { return __builtin_bit_cast(uint, v); }
+SHARED_FN float uintBitsToFloat(uint v) { return __builtin_bit_cast(float, v); }
+// Plain structs: through GLM's unions compilers do not turn loops into SIMD.
+struct vec2 {
+    float x = 0, y = 0;
+    vec2() = default;
+    vec2(float vx, float vy) : x(vx), y(vy) {}
+};
+struct vec3 {
+    float x = 0, y = 0, z = 0;
+    vec3() = default;
+    vec3(float vx, float vy, float vz) : x(vx), y(vy), z(vz) {}
+    vec3(const glm::vec3& v) : x(v.x), y(v.y), z(v.z) {}
+    operator glm::vec3() const { return {x, y, z}; }
+    explicit operator glm::dvec3() const { return {x, y, z}; }
+};
+SHARED_FN float dot(vec3 a, vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 using std::abs;
 using std::exp2;
 using std::log2;
