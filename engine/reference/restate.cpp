@@ -123,7 +123,7 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize) {
             const auto together = std::count_if(around.begin(), around.end(), [&](const auto& a) {
                 return a.first->depth - nearest->depth <= a.first->thickness + nearest->thickness;
             });
-            const bool widen = least >= 1 && together >= 3;
+            const bool widen = least >= 1 && together >= 4;
             std::vector<Contribution> list;
             for (const auto& [s, rho2] : around) {
                 const double rest = 1 - (widen ? rho2 / 4 : rho2);

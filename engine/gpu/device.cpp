@@ -1,0 +1,250 @@
+#include "engine/gpu/device.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <filesystem>
+
+namespace stipple::gpu {
+namespace {
+
+VKAPI_ATTR VkBool32 VKAPI_CALL onMessage(VkDebugUtilsMessageSeverityFlagBitsEXT, VkDebugUtilsMessageTypeFlagsEXT,
+                                         const VkDebugUtilsMessengerCallbackDataEXT* data, void* user) {
+    auto* messages = static_cast<Messages*>(user);
+    const std::lock_guard lock(messages->mutex);
+    messages->texts.emplace_back(data->pMessage);
+    return VK_FALSE;
+}
+
+bool hasLayer(const char* name) {
+    uint32_t count = 0;
+    vkEnumerateInstanceLayerProperties(&count, nullptr);
+    std::vector<VkLayerProperties> layers(count);
+    vkEnumerateInstanceLayerProperties(&count, layers.data());
+    return std::any_of(layers.begin(), layers.end(), [&](const VkLayerProperties& l) { return std::strcmp(l.layerName, name) == 0; });
+}
+
+Result<VkInstance> createInstance(const DeviceSettings& settings, Messages* messages) {
+    VkApplicationInfo app{VK_STRUCTURE_TYPE_APPLICATION_INFO};
+    app.pApplicationName = "stipple";
+    app.apiVersion = VK_API_VERSION_1_3;
+    std::vector<const char*> extensions = settings.instanceExtensions;
+    VkInstanceCreateInfo info{VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO};
+    info.pApplicationInfo = &app;
+    static const char* const layer = "VK_LAYER_KHRONOS_validation";
+    const VkValidationFeatureEnableEXT sync = VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT;
+    VkValidationFeaturesEXT features{VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT};
+    VkDebugUtilsMessengerCreateInfoEXT debug{VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT};
+    if (settings.validation) {
+        if (!hasLayer(layer))
+            return fail(ErrorKind::device, "the Vulkan validation layer is not installed", "validation", "apt-get install vulkan-validationlayers");
+        extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
+        features.enabledValidationFeatureCount = 1;
+        features.pEnabledValidationFeatures = &sync;
+        debug.messageSeverity = VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
+        debug.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
+        debug.pfnUserCallback = onMessage;
+        debug.pUserData = messages;
+        features.pNext = &debug;
+        info.pNext = &features;
+        info.enabledLayerCount = 1;
+        info.ppEnabledLayerNames = &layer;
+    }
+    info.enabledExtensionCount = static_cast<uint32_t>(extensions.size());
+    info.ppEnabledExtensionNames = extensions.data();
+    VkInstance instance = VK_NULL_HANDLE;
+    if (const VkResult r = vkCreateInstance(&info, nullptr, &instance); r != VK_SUCCESS) return vulkanError(r, "no Vulkan instance");
+    return instance;
+}
+
+std::vector<VkPhysicalDevice> physicalDevices(VkInstance instance) {
+    uint32_t count = 0;
+    vkEnumeratePhysicalDevices(instance, &count, nullptr);
+    std::vector<VkPhysicalDevice> devices(count);
+    vkEnumeratePhysicalDevices(instance, &count, devices.data());
+    return devices;
+}
+
+VkPhysicalDeviceProperties propertiesOf(VkPhysicalDevice device) {
+    VkPhysicalDeviceProperties properties{};
+    vkGetPhysicalDeviceProperties(device, &properties);
+    return properties;
+}
+
+std::string lower(std::string text) {
+    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return text;
+}
+
+}  // namespace
+
+tl::unexpected<Error> vulkanError(VkResult result, const std::string& what) {
+    const ErrorKind kind = result == VK_ERROR_OUT_OF_DEVICE_MEMORY || result == VK_ERROR_OUT_OF_HOST_MEMORY ? ErrorKind::budget : ErrorKind::device;
+    return fail(kind, fmt::format("{} (VkResult {})", what, static_cast<int>(result)), "Vulkan", "try --device cpu");
+}
+
+Result<std::unique_ptr<Device>> Device::create(const DeviceSettings& settings) {
+    std::unique_ptr<Device> d(new Device);
+    d->validation_ = settings.validation;
+    STIPPLE_ASSIGN(d->instance, createInstance(settings, d->messages_.get()));
+    if (settings.validation) {
+        const auto make = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(vkGetInstanceProcAddr(d->instance, "vkCreateDebugUtilsMessengerEXT"));
+        VkDebugUtilsMessengerCreateInfoEXT debug{VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT};
+        debug.messageSeverity = VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
+        debug.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
+        debug.pfnUserCallback = onMessage;
+        debug.pUserData = d->messages_.get();
+        if (make) make(d->instance, &debug, nullptr, &d->messenger_);
+    }
+    std::vector<VkPhysicalDevice> devices = physicalDevices(d->instance);
+    std::stable_sort(devices.begin(), devices.end(), [](VkPhysicalDevice a, VkPhysicalDevice b) {
+        return (propertiesOf(a).deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU) < (propertiesOf(b).deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU);
+    });
+    std::string seen;
+    for (VkPhysicalDevice candidate : devices) {
+        const VkPhysicalDeviceProperties p = propertiesOf(candidate);
+        seen += (seen.empty() ? "" : ", ") + std::string(p.deviceName);
+        if (d->physical != VK_NULL_HANDLE || lower(p.deviceName).find(lower(settings.name)) == std::string::npos) continue;
+        if (p.apiVersion < VK_API_VERSION_1_3) continue;
+        d->physical = candidate;
+        d->deviceName = p.deviceName;
+        d->timestampPeriodNs = p.limits.timestampPeriod;
+        d->isSoftware = p.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
+    }
+    if (d->physical == VK_NULL_HANDLE)
+        return fail(ErrorKind::device, fmt::format("no Vulkan 1.3 device is called '{}'; there are: {}", settings.name, seen.empty() ? "none" : seen),
+                    "--device", "stipple --version lists them");
+
+    uint32_t families = 0;
+    vkGetPhysicalDeviceQueueFamilyProperties(d->physical, &families, nullptr);
+    std::vector<VkQueueFamilyProperties> family(families);
+    vkGetPhysicalDeviceQueueFamilyProperties(d->physical, &families, family.data());
+    const auto usable = std::find_if(family.begin(), family.end(), [](const VkQueueFamilyProperties& f) {
+        return (f.queueFlags & VK_QUEUE_COMPUTE_BIT) != 0 && (f.queueFlags & VK_QUEUE_GRAPHICS_BIT) != 0;
+    });
+    if (usable == family.end()) return fail(ErrorKind::device, "has no queue for graphics and compute", d->deviceName, "try --device cpu");
+    d->queueFamily = static_cast<uint32_t>(usable - family.begin());
+
+    const float priority = 1;
+    VkDeviceQueueCreateInfo queueInfo{VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO};
+    queueInfo.queueFamilyIndex = d->queueFamily;
+    queueInfo.queueCount = 1;
+    queueInfo.pQueuePriorities = &priority;
+    VkPhysicalDeviceVulkan13Features v13{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES};
+    v13.synchronization2 = VK_TRUE;
+    VkPhysicalDeviceVulkan12Features v12{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES};
+    v12.pNext = &v13;
+    v12.bufferDeviceAddress = VK_TRUE;
+    v12.scalarBlockLayout = VK_TRUE;
+    v12.shaderBufferInt64Atomics = VK_TRUE;
+    v12.hostQueryReset = VK_TRUE;
+    VkPhysicalDeviceFeatures2 features{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2};
+    features.pNext = &v12;
+    features.features.shaderInt64 = VK_TRUE;
+    VkDeviceCreateInfo info{VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO};
+    info.pNext = &features;
+    info.queueCreateInfoCount = 1;
+    info.pQueueCreateInfos = &queueInfo;
+    info.enabledExtensionCount = static_cast<uint32_t>(settings.deviceExtensions.size());
+    info.ppEnabledExtensionNames = settings.deviceExtensions.data();
+    if (const VkResult r = vkCreateDevice(d->physical, &info, nullptr, &d->device); r != VK_SUCCESS)
+        return vulkanError(r, d->deviceName + " lacks a feature that Stipple needs (64-bit atomics, device addresses)");
+    vkGetDeviceQueue(d->device, d->queueFamily, 0, &d->queue);
+    return d;
+}
+
+Device::~Device() {
+    if (device != VK_NULL_HANDLE) vkDestroyDevice(device, nullptr);
+    if (messenger_ != VK_NULL_HANDLE) {
+        const auto destroy = reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(vkGetInstanceProcAddr(instance, "vkDestroyDebugUtilsMessengerEXT"));
+        destroy(instance, messenger_, nullptr);
+    }
+    if (instance != VK_NULL_HANDLE) vkDestroyInstance(instance, nullptr);
+}
+
+std::vector<std::string> Device::messages() const {
+    const std::lock_guard lock(messages_->mutex);
+    return messages_->texts;
+}
+
+Result<uint32_t> Device::memoryType(uint32_t bits, VkMemoryPropertyFlags wanted, VkMemoryPropertyFlags fallback) const {
+    VkPhysicalDeviceMemoryProperties memory{};
+    vkGetPhysicalDeviceMemoryProperties(physical, &memory);
+    for (const VkMemoryPropertyFlags flags : {wanted, fallback})
+        for (uint32_t i = 0; i < memory.memoryTypeCount; ++i)
+            if ((bits >> i & 1u) != 0 && (memory.memoryTypes[i].propertyFlags & flags) == flags) return i;
+    return fail(ErrorKind::device, "has no memory of the kind that is needed", deviceName, "try --device cpu");
+}
+
+void Device::setName(VkObjectType type, uint64_t handle, const std::string& name) const {
+    if (!validation_) return;
+    static const auto set = reinterpret_cast<PFN_vkSetDebugUtilsObjectNameEXT>(vkGetInstanceProcAddr(instance, "vkSetDebugUtilsObjectNameEXT"));
+    VkDebugUtilsObjectNameInfoEXT info{VK_STRUCTURE_TYPE_DEBUG_UTILS_OBJECT_NAME_INFO_EXT};
+    info.objectType = type;
+    info.objectHandle = handle;
+    info.pObjectName = name.c_str();
+    if (set) set(device, &info);
+}
+
+Result<Buffer> Buffer::create(const Device& d, uint64_t bytes, VkBufferUsageFlags usage, bool hostVisible, const std::string& name) {
+    Buffer b;
+    b.device_ = d.device;
+    b.bytes_ = bytes;
+    VkBufferCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO};
+    info.size = bytes;
+    info.usage = usage;
+    if (const VkResult r = vkCreateBuffer(d.device, &info, nullptr, &b.buffer_); r != VK_SUCCESS) return vulkanError(r, "no buffer " + name);
+    VkMemoryRequirements needs{};
+    vkGetBufferMemoryRequirements(d.device, b.buffer_, &needs);
+    const VkMemoryPropertyFlags host = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+    STIPPLE_ASSIGN(const uint32_t type, d.memoryType(needs.memoryTypeBits, hostVisible ? host | VK_MEMORY_PROPERTY_HOST_CACHED_BIT : VkMemoryPropertyFlags{VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT},
+                                                     hostVisible ? host : VkMemoryPropertyFlags{0}));
+    VkMemoryAllocateFlagsInfo flags{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO};
+    flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
+    const bool addressed = (usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) != 0;
+    VkMemoryAllocateInfo allocate{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
+    allocate.pNext = addressed ? &flags : nullptr;
+    allocate.allocationSize = needs.size;
+    allocate.memoryTypeIndex = type;
+    if (const VkResult r = vkAllocateMemory(d.device, &allocate, nullptr, &b.memory_); r != VK_SUCCESS)
+        return vulkanError(r, fmt::format("no memory for {} ({} bytes)", name, bytes));
+    if (const VkResult r = vkBindBufferMemory(d.device, b.buffer_, b.memory_, 0); r != VK_SUCCESS) return vulkanError(r, "cannot bind " + name);
+    if (hostVisible && vkMapMemory(d.device, b.memory_, 0, VK_WHOLE_SIZE, 0, &b.mapped_) != VK_SUCCESS)
+        return fail(ErrorKind::device, "cannot map " + name, d.deviceName);
+    if (addressed) {
+        VkBufferDeviceAddressInfo address{VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO};
+        address.buffer = b.buffer_;
+        b.address_ = vkGetBufferDeviceAddress(d.device, &address);
+    }
+    d.setName(VK_OBJECT_TYPE_BUFFER, reinterpret_cast<uint64_t>(b.buffer_), name);
+    return b;
+}
+
+Buffer::~Buffer() {
+    if (buffer_ != VK_NULL_HANDLE) vkDestroyBuffer(device_, buffer_, nullptr);
+    if (memory_ != VK_NULL_HANDLE) vkFreeMemory(device_, memory_, nullptr);
+}
+
+std::vector<std::string> deviceNames() {
+    std::vector<std::string> names;
+    const auto instance = createInstance({}, nullptr);
+    if (!instance) return names;
+    for (VkPhysicalDevice d : physicalDevices(*instance)) names.emplace_back(propertiesOf(d).deviceName);
+    vkDestroyInstance(*instance, nullptr);
+    return names;
+}
+
+bool hasHardwareDevice() {
+    std::error_code ignored;
+    if (!std::filesystem::exists("/dev/dri", ignored) && !std::filesystem::exists("/dev/nvidia0", ignored)) return false;
+    const auto instance = createInstance({}, nullptr);
+    if (!instance) return false;
+    bool found = false;
+    for (VkPhysicalDevice d : physicalDevices(*instance)) found = found || propertiesOf(d).deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU;
+    vkDestroyInstance(*instance, nullptr);
+    return found;
+}
+
+}  // namespace stipple::gpu

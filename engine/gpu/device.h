@@ -1,0 +1,99 @@
+// A Vulkan 1.3 device and the objects made from it: move-only owners, each with a debug name. With validation on, every
+// message of the layers is kept, so that tests can ask for none (or, with a deliberate hazard, for one).
+#pragma once
+
+#include <vulkan/vulkan.h>
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/base/result.h"
+
+namespace stipple::gpu {
+
+/// What the validation layers said. The layer may call from any thread.
+struct Messages {
+    std::mutex mutex;
+    std::vector<std::string> texts;
+};
+
+struct DeviceSettings {
+    std::string name;                               ///< part of the device's name; empty: the first, real GPUs before software
+    bool validation = false;                        ///< core and synchronization validation
+    std::vector<const char*> instanceExtensions;    ///< for a window
+    std::vector<const char*> deviceExtensions;
+};
+
+class Device {
+  public:
+    static Result<std::unique_ptr<Device>> create(const DeviceSettings& settings);
+    ~Device();
+    Device(const Device&) = delete;
+    Device& operator=(const Device&) = delete;
+
+    VkInstance instance = VK_NULL_HANDLE;
+    VkPhysicalDevice physical = VK_NULL_HANDLE;
+    VkDevice device = VK_NULL_HANDLE;
+    VkQueue queue = VK_NULL_HANDLE;
+    uint32_t queueFamily = 0;
+    std::string deviceName;
+    float timestampPeriodNs = 1;
+    bool isSoftware = false;
+
+    std::vector<std::string> messages() const;
+    /// Index of a memory type with these properties among `bits`, or of one with `fallback`.
+    Result<uint32_t> memoryType(uint32_t bits, VkMemoryPropertyFlags wanted, VkMemoryPropertyFlags fallback) const;
+    void setName(VkObjectType type, uint64_t handle, const std::string& name) const;
+
+  private:
+    Device() = default;
+    VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
+    std::shared_ptr<Messages> messages_ = std::make_shared<Messages>();
+    bool validation_ = false;
+};
+
+/// "what: VK_ERROR_..." as a device error.
+tl::unexpected<Error> vulkanError(VkResult result, const std::string& what);
+
+class Buffer {
+  public:
+    Buffer() = default;
+    /// hostVisible: mapped for the buffer's life.
+    static Result<Buffer> create(const Device& device, uint64_t bytes, VkBufferUsageFlags usage, bool hostVisible, const std::string& name);
+    Buffer(Buffer&& o) noexcept { swap(o); }
+    Buffer& operator=(Buffer&& o) noexcept {
+        swap(o);
+        return *this;
+    }
+    ~Buffer();
+    VkBuffer handle() const { return buffer_; }
+    uint64_t bytes() const { return bytes_; }
+    void* mapped() const { return mapped_; }
+    VkDeviceAddress address() const { return address_; }
+
+  private:
+    void swap(Buffer& o) noexcept {
+        std::swap(device_, o.device_);
+        std::swap(buffer_, o.buffer_);
+        std::swap(memory_, o.memory_);
+        std::swap(bytes_, o.bytes_);
+        std::swap(mapped_, o.mapped_);
+        std::swap(address_, o.address_);
+    }
+    VkDevice device_ = VK_NULL_HANDLE;
+    VkBuffer buffer_ = VK_NULL_HANDLE;
+    VkDeviceMemory memory_ = VK_NULL_HANDLE;
+    uint64_t bytes_ = 0;
+    void* mapped_ = nullptr;
+    VkDeviceAddress address_ = 0;
+};
+
+/// Names of all Vulkan devices; empty where there is no Vulkan.
+std::vector<std::string> deviceNames();
+/// Is there a GPU that is not software? Looks at the device nodes first: where there are none, no driver is loaded.
+bool hasHardwareDevice();
+
+}  // namespace stipple::gpu

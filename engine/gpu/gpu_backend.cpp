@@ -1,0 +1,319 @@
+#include "engine/gpu/gpu_backend.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <unordered_map>
+
+#include "engine/gpu/pages.h"
+#include "engine/gpu/pass_list.h"
+#include "engine/gpu/pipelines.h"
+
+namespace stipple::gpu {
+namespace {
+
+constexpr VkBufferUsageFlags kStorage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
+constexpr uint32_t kGroup = 64, kGroupsPerDimension = 65535;
+
+uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.instance} << 32 | key.node; }
+
+struct Level {
+    uint32_t width, height, offset;  ///< offset in words
+};
+
+class GpuBackend final : public render::Backend {
+  public:
+    static Result<std::unique_ptr<render::Backend>> create(const GpuSettings& settings) {
+        STIPPLE_ASSIGN(std::unique_ptr<Device> device, Device::create({settings.deviceName, settings.validation, {}, {}}));
+        std::unique_ptr<GpuBackend> b(new GpuBackend(std::move(device), settings));
+        STIPPLE_ASSIGN(b->pipelines_, Pipelines::create(*b->device_));
+        STIPPLE_TRY(b->createCommandObjects());
+        return b;
+    }
+
+    ~GpuBackend() override {
+        vkDeviceWaitIdle(device_->device);
+        vkDestroyQueryPool(device_->device, queries_, nullptr);
+        vkDestroyFence(device_->device, fence_, nullptr);
+        vkDestroyCommandPool(device_->device, commandPool_, nullptr);
+    }
+
+    std::string name() const override { return "gpu"; }
+    std::string device() const override { return device_->deviceName; }
+    const std::vector<render::PassTime>& passTimes() const override { return times_; }
+    std::vector<std::string> messages() const { return device_->messages(); }
+
+    Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override {
+        STIPPLE_ASSIGN(const PageStore::Place place, pages_.allocate(chunk.sizeBytes()));
+        places_[chunkId(key)] = place;
+        pending_.push_back({place, chunk.records});
+        return {};
+    }
+    void evict(streaming::ChunkKey key) override {
+        const auto found = places_.find(chunkId(key));
+        std::erase_if(pending_, [&](const PendingUpload& p) { return p.place.page == found->second.page && p.place.offset == found->second.offset; });
+        pages_.release(found->second);
+        places_.erase(found);
+    }
+
+    Result<void> render(const render::RenderRequest& request, render::Image& image) override {
+        const render::DrawList& draws = *request.draws;
+        const bool hasPyramid = std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
+        STIPPLE_TRY(prepare(draws, request.wantDepthAndNormal));
+        STIPPLE_TRY(begin());
+        PassList list(*device_, commands_, queries_, omitBarriersBefore_);
+        if (!pending_.empty()) STIPPLE_TRY(recordUploads(list));
+        for (const render::Pass pass : request.passes) record(list, pass, draws, hasPyramid, request.wantDepthAndNormal);
+        recordReadback(list, request.wantDepthAndNormal);
+        STIPPLE_TRY(submit());
+        takeTimes(list);
+        takeImage(draws, request.wantDepthAndNormal, image);
+        return {};
+    }
+
+  private:
+    GpuBackend(std::unique_ptr<Device> device, const GpuSettings& settings)
+        : device_(std::move(device)), pages_(*device_), omitBarriersBefore_(settings.omitBarriersBefore) {}
+
+    Result<void> createCommandObjects() {
+        VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
+        pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
+        pool.queueFamilyIndex = device_->queueFamily;
+        if (const VkResult r = vkCreateCommandPool(device_->device, &pool, nullptr, &commandPool_); r != VK_SUCCESS) return vulkanError(r, "no command pool");
+        VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
+        allocate.commandPool = commandPool_;
+        allocate.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
+        allocate.commandBufferCount = 1;
+        if (const VkResult r = vkAllocateCommandBuffers(device_->device, &allocate, &commands_); r != VK_SUCCESS) return vulkanError(r, "no command buffer");
+        VkFenceCreateInfo fence{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
+        if (const VkResult r = vkCreateFence(device_->device, &fence, nullptr, &fence_); r != VK_SUCCESS) return vulkanError(r, "no fence");
+        VkQueryPoolCreateInfo query{VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO};
+        query.queryType = VK_QUERY_TYPE_TIMESTAMP;
+        query.queryCount = PassList::kMaxPasses * 2;
+        if (const VkResult r = vkCreateQueryPool(device_->device, &query, nullptr, &queries_); r != VK_SUCCESS) return vulkanError(r, "no query pool");
+        return {};
+    }
+
+    /// Grows `buffer` to at least `bytes`; true if it changed (descriptors must be written again).
+    Result<void> ensure(Buffer& buffer, uint64_t bytes, VkBufferUsageFlags usage, bool hostVisible, const char* name) {
+        bytes = std::max<uint64_t>(bytes, 256);
+        if (buffer.bytes() >= bytes) return {};
+        STIPPLE_ASSIGN(buffer, Buffer::create(*device_, bytes + bytes / 4, usage, hostVisible, name));
+        descriptorsChanged_ = true;
+        return {};
+    }
+
+    Result<void> prepare(const render::DrawList& draws, bool wantAll) {
+        const uint32_t w = draws.frame.width, h = draws.frame.height;
+        levels_.clear();
+        uint64_t words = 0;
+        for (uint32_t lw = w, lh = h;; lw = (lw + 1) / 2, lh = (lh + 1) / 2) {
+            levels_.push_back({lw, lh, static_cast<uint32_t>(words)});
+            words += uint64_t{5} * lw * lh;
+            if (lw == 1 && lh == 1) break;
+        }
+        const uint64_t pixels = uint64_t{w} * h;
+        STIPPLE_TRY(ensure(frameBuffer_, sizeof(shared::FrameConstants), kStorage, true, "frame constants"));
+        STIPPLE_TRY(ensure(nodeBuffer_, draws.nodes.size() * sizeof(shared::DrawNode), kStorage, true, "draw nodes"));
+        STIPPLE_TRY(ensure(blockBuffer_, draws.blocks.size() * sizeof(shared::DrawBlock), kStorage, true, "draw blocks"));
+        STIPPLE_TRY(ensure(visibility_, pixels * 8, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "visibility"));
+        STIPPLE_TRY(ensure(texels_, words * 4, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "texels"));
+        STIPPLE_TRY(ensure(stats_, 256, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "stats"));
+        STIPPLE_TRY(ensure(image_, pixels * 4, kStorage | VK_BUFFER_USAGE_TRANSFER_SRC_BIT, false, "image"));
+        STIPPLE_TRY(ensure(extra_, wantAll ? pixels * 28 : 256, kStorage | VK_BUFFER_USAGE_TRANSFER_SRC_BIT, false, "depth and normals"));
+        STIPPLE_TRY(ensure(readback_, pixels * 4 + (wantAll ? pixels * 28 : 0), VK_BUFFER_USAGE_TRANSFER_DST_BIT, true, "readback"));
+        std::memcpy(frameBuffer_.mapped(), &draws.frame, sizeof(draws.frame));
+        auto* nodes = static_cast<shared::DrawNode*>(nodeBuffer_.mapped());
+        for (size_t i = 0; i < draws.nodes.size(); ++i) {
+            shared::DrawNode node = draws.nodes[i];
+            const VkDeviceAddress address = pages_.address(places_.at(chunkId(draws.keys[i])));
+            node.addressLow = static_cast<uint32_t>(address);
+            node.addressHigh = static_cast<uint32_t>(address >> 32);
+            std::memcpy(nodes + i, &node, sizeof(node));
+        }
+        if (!draws.blocks.empty()) std::memcpy(blockBuffer_.mapped(), draws.blocks.data(), draws.blocks.size() * sizeof(shared::DrawBlock));
+        if (descriptorsChanged_) {
+            pipelines_->writeDescriptors({&frameBuffer_, &nodeBuffer_, &blockBuffer_, &visibility_, &texels_, &stats_, &image_, &extra_});
+            descriptorsChanged_ = false;
+        }
+        return {};
+    }
+
+    Result<void> begin() {
+        VkCommandBufferBeginInfo info{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
+        info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
+        if (const VkResult r = vkBeginCommandBuffer(commands_, &info); r != VK_SUCCESS) return vulkanError(r, "cannot record");
+        vkResetQueryPool(device_->device, queries_, 0, PassList::kMaxPasses * 2);
+        pipelines_->bind(commands_);
+        return {};
+    }
+
+    Result<void> recordUploads(PassList& list) {
+        uint64_t bytes = 0;
+        for (const PendingUpload& p : pending_) bytes += p.records.size() * sizeof(shared::PointRecord);
+        STIPPLE_TRY(ensure(staging_, bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, true, "staging"));
+        list.begin("upload", {}, true);
+        uint64_t at = 0;
+        for (const PendingUpload& p : pending_) {
+            const uint64_t size = p.records.size() * sizeof(shared::PointRecord);
+            std::memcpy(static_cast<char*>(staging_.mapped()) + at, p.records.data(), size);
+            const VkBufferCopy region{at, p.place.offset, size};
+            vkCmdCopyBuffer(commands_, staging_.handle(), pages_.buffer(p.place), 1, &region);
+            at += size;
+        }
+        list.end();
+        pending_.clear();
+        return {};
+    }
+
+    void dispatch(uint32_t width, uint32_t height) { vkCmdDispatch(commands_, (width + kGroup - 1) / kGroup, height, 1); }
+
+    void pushStep(size_t level, bool hasPyramid, bool wantAll) {
+        const Level& fine = levels_[level];
+        const Level& coarse = levels_[std::min(level + 1, levels_.size() - 1)];
+        const StepConstants step{fine.offset, fine.width, fine.height, coarse.offset, coarse.width, coarse.height, static_cast<uint32_t>(level), wantAll,
+                                 hasPyramid && levels_.size() > 1};
+        pipelines_->push(commands_, step);
+    }
+
+    void record(PassList& list, render::Pass pass, const render::DrawList& draws, bool hasPyramid, bool wantAll) {
+        const auto write = [](const Buffer& b) { return BufferUse{b.handle(), true}; };
+        const auto read = [](const Buffer& b) { return BufferUse{b.handle(), false}; };
+        switch (pass) {
+            case render::Pass::clear:
+                list.begin("clear", {write(visibility_), write(stats_)}, true);
+                vkCmdFillBuffer(commands_, visibility_.handle(), 0, VK_WHOLE_SIZE, 0xffffffffu);
+                vkCmdFillBuffer(commands_, stats_.handle(), 0, VK_WHOLE_SIZE, 0);
+                break;
+            case render::Pass::project: {
+                list.begin("project", {write(visibility_)}, false);
+                pipelines_->use(commands_, "project");
+                pushStep(0, hasPyramid, wantAll);
+                const auto blocks = static_cast<uint32_t>(draws.blocks.size());
+                if (blocks > 0) vkCmdDispatch(commands_, std::min(blocks, kGroupsPerDimension), (blocks + kGroupsPerDimension - 1) / kGroupsPerDimension, 1);
+                break;
+            }
+            case render::Pass::resolve:
+                list.begin("resolve", {read(visibility_), write(texels_), write(stats_)}, false);
+                pipelines_->use(commands_, "resolve");
+                pushStep(0, hasPyramid, wantAll);
+                dispatch(levels_[0].width, levels_[0].height);
+                break;
+            case render::Pass::pull:
+                for (size_t l = 0; l + 1 < levels_.size(); ++l) {
+                    list.begin("pull", {write(texels_), read(stats_)}, false);
+                    pipelines_->use(commands_, "pull");
+                    pushStep(l, hasPyramid, wantAll);
+                    dispatch(levels_[l + 1].width, levels_[l + 1].height);
+                    if (l + 2 < levels_.size()) list.end();
+                }
+                if (levels_.size() == 1) return;
+                break;
+            case render::Pass::push:
+                if (levels_.size() < 3) return;
+                for (size_t l = levels_.size() - 1; l-- > 1;) {
+                    list.begin("push", {write(texels_), read(stats_)}, false);
+                    pipelines_->use(commands_, "push");
+                    pushStep(l, hasPyramid, wantAll);
+                    dispatch(levels_[l].width, levels_[l].height);
+                    if (l > 1) list.end();
+                }
+                break;
+            case render::Pass::shade:
+                list.begin("shade", {read(texels_), write(image_), write(extra_)}, false);
+                pipelines_->use(commands_, "shade");
+                pushStep(0, hasPyramid, wantAll);
+                dispatch(levels_[0].width, levels_[0].height);
+                break;
+        }
+        list.end();
+    }
+
+    void recordReadback(PassList& list, bool wantAll) {
+        const uint64_t pixels = uint64_t{levels_[0].width} * levels_[0].height;
+        list.begin("readback", {{image_.handle(), false}, {extra_.handle(), false}, {readback_.handle(), true}}, true);
+        VkBufferCopy region{0, 0, pixels * 4};
+        vkCmdCopyBuffer(commands_, image_.handle(), readback_.handle(), 1, &region);
+        if (wantAll) {
+            region = {0, pixels * 4, pixels * 28};
+            vkCmdCopyBuffer(commands_, extra_.handle(), readback_.handle(), 1, &region);
+        }
+        list.end();
+        list.toHost(readback_.handle());
+    }
+
+    Result<void> submit() {
+        if (const VkResult r = vkEndCommandBuffer(commands_); r != VK_SUCCESS) return vulkanError(r, "cannot end recording");
+        VkCommandBufferSubmitInfo buffer{VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO};
+        buffer.commandBuffer = commands_;
+        VkSubmitInfo2 info{VK_STRUCTURE_TYPE_SUBMIT_INFO_2};
+        info.commandBufferInfoCount = 1;
+        info.pCommandBufferInfos = &buffer;
+        if (const VkResult r = vkQueueSubmit2(device_->queue, 1, &info, fence_); r != VK_SUCCESS) return vulkanError(r, "cannot submit");
+        if (const VkResult r = vkWaitForFences(device_->device, 1, &fence_, VK_TRUE, ~uint64_t{0}); r != VK_SUCCESS) return vulkanError(r, "the device was lost");
+        vkResetFences(device_->device, 1, &fence_);
+        return {};
+    }
+
+    void takeTimes(const PassList& list) {
+        std::vector<uint64_t> stamps(list.names().size() * 2);
+        times_.clear();
+        if (stamps.empty() || vkGetQueryPoolResults(device_->device, queries_, 0, static_cast<uint32_t>(stamps.size()), stamps.size() * 8, stamps.data(), 8,
+                                                    VK_QUERY_RESULT_64_BIT) != VK_SUCCESS) return;
+        for (size_t i = 0; i < list.names().size(); ++i) {
+            const double ms = static_cast<double>(stamps[2 * i + 1] - stamps[2 * i]) * static_cast<double>(device_->timestampPeriodNs) * 1e-6;
+            if (!times_.empty() && times_.back().name == list.names()[i]) times_.back().ms += ms;  // the levels of pull and push
+            else times_.push_back({list.names()[i], ms});
+        }
+    }
+
+    void takeImage(const render::DrawList& draws, bool wantAll, render::Image& image) {
+        image.width = draws.frame.width;
+        image.height = draws.frame.height;
+        const size_t pixels = size_t{image.width} * image.height;
+        image.rgba.resize(pixels);
+        std::memcpy(image.rgba.data(), readback_.mapped(), pixels * 4);
+        image.depth.resize(wantAll ? pixels : 0);
+        image.normal.resize(wantAll ? pixels * 3 : 0);
+        image.linear.resize(wantAll ? pixels * 3 : 0);
+        const auto* extra = reinterpret_cast<const float*>(static_cast<const char*>(readback_.mapped()) + pixels * 4);
+        for (size_t i = 0; wantAll && i < pixels; ++i) {
+            image.depth[i] = extra[7 * i];
+            std::copy_n(extra + 7 * i + 1, 3, image.normal.begin() + static_cast<std::ptrdiff_t>(3 * i));
+            std::copy_n(extra + 7 * i + 4, 3, image.linear.begin() + static_cast<std::ptrdiff_t>(3 * i));
+        }
+    }
+
+    struct PendingUpload {
+        PageStore::Place place;
+        std::vector<shared::PointRecord> records;
+    };
+
+    std::unique_ptr<Device> device_;  // first: everything below is destroyed before it
+    std::unique_ptr<Pipelines> pipelines_;
+    PageStore pages_;
+    std::unordered_map<uint64_t, PageStore::Place> places_;
+    std::vector<PendingUpload> pending_;
+    Buffer frameBuffer_, nodeBuffer_, blockBuffer_, visibility_, texels_, stats_, image_, extra_, readback_, staging_;
+    VkCommandPool commandPool_ = VK_NULL_HANDLE;
+    VkCommandBuffer commands_ = VK_NULL_HANDLE;
+    VkFence fence_ = VK_NULL_HANDLE;
+    VkQueryPool queries_ = VK_NULL_HANDLE;
+    std::vector<Level> levels_;
+    std::vector<render::PassTime> times_;
+    std::string omitBarriersBefore_;
+    bool descriptorsChanged_ = true;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<render::Backend>> makeGpuBackend(const GpuSettings& settings) { return GpuBackend::create(settings); }
+
+std::vector<std::string> validationMessages(const render::Backend& backend) {
+    const auto* gpu = dynamic_cast<const GpuBackend*>(&backend);
+    return gpu ? gpu->messages() : std::vector<std::string>{};
+}
+
+}  // namespace stipple::gpu

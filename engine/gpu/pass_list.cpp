@@ -1,0 +1,63 @@
+#include "engine/gpu/pass_list.h"
+
+namespace stipple::gpu {
+
+void PassList::begin(const std::string& name, const std::vector<BufferUse>& uses, bool isTransfer) {
+    const VkPipelineStageFlags2 stage = isTransfer ? VK_PIPELINE_STAGE_2_TRANSFER_BIT : VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
+    std::vector<VkBufferMemoryBarrier2> barriers;
+    for (const BufferUse& use : uses) {
+        VkAccessFlags2 access = isTransfer ? (use.writes ? VK_ACCESS_2_TRANSFER_WRITE_BIT : VK_ACCESS_2_TRANSFER_READ_BIT)
+                                           : VK_ACCESS_2_SHADER_STORAGE_READ_BIT;
+        if (!isTransfer && use.writes) access |= VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT;
+        const auto found = last_.find(use.buffer);
+        if (found != last_.end() && (found->second.wrote || use.writes)) {
+            VkBufferMemoryBarrier2 b{VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER_2};
+            b.srcStageMask = found->second.stage;
+            b.srcAccessMask = found->second.wrote ? found->second.access : VK_ACCESS_2_NONE;
+            b.dstStageMask = stage;
+            b.dstAccessMask = access;
+            b.srcQueueFamilyIndex = b.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+            b.buffer = use.buffer;
+            b.size = VK_WHOLE_SIZE;
+            barriers.push_back(b);
+        }
+        last_[use.buffer] = {stage, access, use.writes};
+    }
+    // Records are read by device address, so their uploads are ordered by one global barrier.
+    VkMemoryBarrier2 memory{VK_STRUCTURE_TYPE_MEMORY_BARRIER_2};
+    memory.srcStageMask = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
+    memory.srcAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT;
+    memory.dstStageMask = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
+    memory.dstAccessMask = VK_ACCESS_2_SHADER_STORAGE_READ_BIT;
+    VkDependencyInfo info{VK_STRUCTURE_TYPE_DEPENDENCY_INFO};
+    info.memoryBarrierCount = uploaded_ && !isTransfer ? 1 : 0;
+    info.pMemoryBarriers = &memory;
+    info.bufferMemoryBarrierCount = static_cast<uint32_t>(barriers.size());
+    info.pBufferMemoryBarriers = barriers.data();
+    if ((info.memoryBarrierCount || info.bufferMemoryBarrierCount) && name != omitBarriersBefore_) vkCmdPipelineBarrier2(commands_, &info);
+    if (info.memoryBarrierCount) uploaded_ = false;
+    if (name == "upload") uploaded_ = true;
+    vkCmdWriteTimestamp2(commands_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, queries_, static_cast<uint32_t>(names_.size()) * 2);
+    names_.push_back(name);
+}
+
+void PassList::end() {
+    vkCmdWriteTimestamp2(commands_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, queries_, static_cast<uint32_t>(names_.size()) * 2 - 1);
+}
+
+void PassList::toHost(VkBuffer buffer) {
+    VkBufferMemoryBarrier2 b{VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER_2};
+    b.srcStageMask = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
+    b.srcAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT;
+    b.dstStageMask = VK_PIPELINE_STAGE_2_HOST_BIT;
+    b.dstAccessMask = VK_ACCESS_2_HOST_READ_BIT;
+    b.srcQueueFamilyIndex = b.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    b.buffer = buffer;
+    b.size = VK_WHOLE_SIZE;
+    VkDependencyInfo info{VK_STRUCTURE_TYPE_DEPENDENCY_INFO};
+    info.bufferMemoryBarrierCount = 1;
+    info.pBufferMemoryBarriers = &b;
+    vkCmdPipelineBarrier2(commands_, &info);
+}
+
+}  // namespace stipple::gpu

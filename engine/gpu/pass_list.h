@@ -1,0 +1,45 @@
+// Records passes in order. From the buffers that each pass says it reads and writes follow the barriers, a debug label
+// and two timestamps; nothing is scheduled or reordered.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "engine/gpu/device.h"
+
+namespace stipple::gpu {
+
+struct BufferUse {
+    VkBuffer buffer;
+    bool writes;
+};
+
+class PassList {
+  public:
+    static constexpr uint32_t kMaxPasses = 64;
+    PassList(const Device& device, VkCommandBuffer commands, VkQueryPool queries, std::string omitBarriersBefore)
+        : device_(device), commands_(commands), queries_(queries), omitBarriersBefore_(std::move(omitBarriersBefore)) {}
+    /// `isTransfer`: fills and copies instead of a dispatch.
+    void begin(const std::string& name, const std::vector<BufferUse>& uses, bool isTransfer);
+    void end();
+    /// Makes a buffer's contents visible to the host after the fence.
+    void toHost(VkBuffer buffer);
+    const std::vector<std::string>& names() const { return names_; }
+
+  private:
+    struct Last {
+        VkPipelineStageFlags2 stage;
+        VkAccessFlags2 access;
+        bool wrote;
+    };
+    const Device& device_;
+    VkCommandBuffer commands_;
+    VkQueryPool queries_;
+    std::string omitBarriersBefore_;
+    std::map<VkBuffer, Last> last_;
+    std::vector<std::string> names_;
+    bool uploaded_ = false;
+};
+
+}  // namespace stipple::gpu

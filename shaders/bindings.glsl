@@ -1,0 +1,85 @@
+// What every pass sees. Whatever a pass writes is bound by descriptor (synchronization validation does not look through
+// device addresses); records are only read, by device address.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_EXT_shader_atomic_int64 : require
+#include "shared/frame.h"
+#include "shared/pack.h"
+#include "shared/pyramid.h"
+#include "shared/record.h"
+#include "shared/shade.h"
+
+layout(set = 0, binding = 0, scalar) readonly buffer FrameBlock { FrameConstants frame; };
+layout(set = 0, binding = 1, scalar) readonly buffer NodeBlock { DrawNode nodes[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer BlockBlock { DrawBlock blocks[]; };
+layout(set = 0, binding = 3, scalar) buffer VisibilityBlock { uint64_t visibility[]; };
+layout(set = 0, binding = 4, scalar) buffer TexelBlock { uint texels[]; };
+layout(set = 0, binding = 5, scalar) buffer StatsBlock { uint largestRadiusBits; };
+layout(set = 0, binding = 6, scalar) writeonly buffer ImageBlock { uint image[]; };
+layout(set = 0, binding = 7, scalar) writeonly buffer ExtraBlock { float extra[]; };  // depth, normal xyz, linear rgb
+
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Records { PointRecord records[]; };
+
+// One step of the pyramid: `fine` and `coarse` are word offsets of a level's five planes.
+layout(push_constant, scalar) uniform Step {
+    uint fine;
+    uint fineWidth;
+    uint fineHeight;
+    uint coarse;
+    uint coarseWidth;
+    uint coarseHeight;
+    uint level;      // of the fine side
+    uint wantExtra;  // write depth, normals and linear colour
+    uint hasPyramid;
+} stepInfo;
+
+// Levels whose texels are larger than the largest splat hold nothing; the resolve pass has measured it.
+uint levelCount() {
+    const float largest = uintBitsToFloat(largestRadiusBits);
+    return 1u + uint(ceil(log2(max(2.0, 2.0 * largest))));
+}
+
+Texel loadTexel(uint offset, uint width, uint height, int x, int y) {
+    PackedTexel p;
+    p.depth = 0.0;
+    p.size = 0u;
+    p.offset = 0x80008000u;
+    p.normal = 0x80008000u;
+    p.colour = 0u;
+    if (x >= 0 && y >= 0 && x < int(width) && y < int(height)) {
+        const uint plane = width * height;
+        const uint at = offset + uint(y) * width + uint(x);
+        p.depth = uintBitsToFloat(texels[at]);
+        if (p.depth > 0.0) {
+            p.size = texels[at + plane];
+            p.offset = texels[at + 2u * plane];
+            p.normal = texels[at + 3u * plane];
+            p.colour = texels[at + 4u * plane];
+        }
+    }
+    return unpackTexel(p);
+}
+
+void storeTexel(uint offset, uint width, uint height, uvec2 pixel, Texel t) {
+    const uint plane = width * height;
+    const uint at = offset + pixel.y * width + pixel.x;
+    const PackedTexel p = packTexel(t);
+    texels[at] = floatBitsToUint(p.depth);
+    texels[at + plane] = p.size;
+    texels[at + 2u * plane] = p.offset;
+    texels[at + 3u * plane] = p.normal;
+    texels[at + 4u * plane] = p.colour;
+}
+
+Texel pushedTexel(ivec2 pixel, Texel own) {
+    const ivec2 parent = pixel >> 1;
+    const ivec2 side = (pixel & 1) * 2 - 1;
+    const Texel q0 = loadTexel(stepInfo.coarse, stepInfo.coarseWidth, stepInfo.coarseHeight, parent.x, parent.y);
+    const Texel q1 = loadTexel(stepInfo.coarse, stepInfo.coarseWidth, stepInfo.coarseHeight, parent.x + side.x, parent.y);
+    const Texel q2 = loadTexel(stepInfo.coarse, stepInfo.coarseWidth, stepInfo.coarseHeight, parent.x, parent.y + side.y);
+    const Texel q3 = loadTexel(stepInfo.coarse, stepInfo.coarseWidth, stepInfo.coarseHeight, parent.x + side.x, parent.y + side.y);
+    return pushTexel(own, q0, q1, q2, q3, float(side.x), float(side.y), exp2(float(stepInfo.level)), 1.0 / frame.focal);
+}

@@ -1,0 +1,28 @@
+// One workgroup per block of 256 draw ids: each record to its pixel, by 64-bit atomic minimum of (depth, kind, id).
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "../bindings.glsl"
+layout(local_size_x = 256) in;
+
+void main() {
+    const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * 65535u;
+    if (block >= frame.blockCount) return;
+    const DrawBlock source = blocks[block];
+    const DrawNode node = nodes[source.node];
+    const uint index = source.first + gl_LocalInvocationID.x;
+    if (index >= node.count) return;
+    const PointRecord r = Records(uvec2(node.addressLow, node.addressHigh)).records[index];
+    const bool fine = recordErrorCode(r) <= node.errorCode || (node.octantMask >> recordOctant(r) & 1u) != 0u;
+    if (!fine) return;
+    const vec3 c = node.base + node.axisX * float(recordX(r)) + node.axisY * float(recordY(r)) + node.axisZ * float(recordZ(r));
+    if (!(c.z > frame.nearPlane)) return;
+    const float scale = frame.focal / c.z;
+    const vec2 p = vec2(c.x * scale + frame.centre.x, c.y * scale + frame.centre.y);
+    if (!(p.x >= 0.0 && p.y >= 0.0 && p.x < float(frame.width) && p.y < float(frame.height))) return;
+    if ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) == 0u) {
+        const vec3 n = octDirection(r.normal);
+        if (!(dot(vec3(dot(frame.viewX, n), dot(frame.viewY, n), dot(frame.viewZ, n)), c) < 0.0)) return;
+    }
+    const uint64_t key = uint64_t(floatBitsToUint(c.z)) << 32 | uint64_t(block * kRecordsPerBlock + gl_LocalInvocationID.x);
+    atomicMin(visibility[uint(p.y) * frame.width + uint(p.x)], key);
+}

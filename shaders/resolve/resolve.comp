@@ -1,0 +1,39 @@
+// The winner of each pixel to a texel of level 0; measures the largest splat.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "../bindings.glsl"
+layout(local_size_x = 64) in;
+
+void main() {
+    const uvec2 pixel = gl_GlobalInvocationID.xy;
+    if (pixel.x >= frame.width || pixel.y >= frame.height) return;
+    Texel t;
+    t.depth = 0.0;
+    t.radius = 0.0;
+    t.thickness = 0.0;
+    t.offset = vec2(0.0);
+    t.normalPerp = vec2(0.0);
+    t.colour = vec3(0.0);
+    const uint64_t key = visibility[pixel.y * frame.width + pixel.x];
+    if (key != ~uint64_t(0)) {
+        const uint id = uint(key) & 0x1fffffffu;
+        const DrawBlock source = blocks[id / kRecordsPerBlock];
+        const DrawNode node = nodes[source.node];
+        const PointRecord r = Records(uvec2(node.addressLow, node.addressHigh)).records[source.first + id % kRecordsPerBlock];
+        const vec3 c = node.base + node.axisX * float(recordX(r)) + node.axisY * float(recordY(r)) + node.axisZ * float(recordZ(r));
+        vec3 n = -normalize(c);
+        if ((recordFlags(r) & kFlagNoNormal) == 0u) {
+            const vec3 d = octDecode(r.normal);
+            n = vec3(dot(frame.viewX, d), dot(frame.viewY, d), dot(frame.viewZ, d));
+        }
+        t = texelFromSplat(c, n, node.edge * radiusFraction(recordRadiusCode(r)) * frame.supportScale, frame.focal, frame.minimumRadius);
+        const float scale = frame.focal / c.z;
+        t.offset = vec2(c.x * scale + (frame.centre.x - 0.5) - float(pixel.x), c.y * scale + (frame.centre.y - 0.5) - float(pixel.y));
+        t.colour = vec3(linearFromSrgb(float(r.colour & 255u) / 255.0), linearFromSrgb(float(r.colour >> 8 & 255u) / 255.0),
+                        linearFromSrgb(float(r.colour >> 16 & 255u) / 255.0));
+        if (frame.debugView == kDebugLevel) t.colour = debugLevelColour(node.level);
+        if (frame.debugView == kDebugError) t.colour = debugErrorColour(node.errorPixels);
+        atomicMax(largestRadiusBits, floatBitsToUint(t.radius));
+    }
+    storeTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, pixel, t);
+}
