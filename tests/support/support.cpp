@@ -1,0 +1,126 @@
+#include "tests/support/support.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include "engine/scene/camera.h"
+
+namespace stipple::test {
+namespace {
+
+[[noreturn]] void fatal(const Error& error) { throw std::runtime_error(error.line()); }
+
+}  // namespace
+
+TempFolder::TempFolder() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "stipple-test-XXXXXX").string();
+    if (!::mkdtemp(pattern.data())) throw std::runtime_error("no temporary folder");
+    path_ = pattern;
+}
+TempFolder::~TempFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+}
+
+std::vector<TestPoint> bumpySphere(size_t count, uint64_t seed, const glm::dvec3& centre) {
+    Rng rng(seed);
+    std::vector<TestPoint> points(count);
+    for (TestPoint& p : points) {
+        const glm::dvec3 n = glm::normalize(glm::dvec3(rng.normal(), rng.normal(), rng.normal()));
+        const double bump = 1 + 0.05 * std::sin(9 * n.x) * std::sin(8 * n.y) * std::sin(7 * n.z);
+        p.position = centre + bump * n;
+        p.normal = glm::vec3(n);
+        const auto byte = [](double v) { return static_cast<uint32_t>(127.5 + 100 * v); };
+        p.colour = byte(n.x) | byte(n.y) << 8 | byte(n.z) << 16;
+    }
+    return points;
+}
+
+void writePly(const std::string& path, const std::vector<TestPoint>& points, bool withNormals, bool withRadii) {
+    std::ofstream out(path, std::ios::binary);
+    out << "ply\nformat binary_little_endian 1.0\nelement vertex " << points.size() << "\nproperty double x\nproperty double y\nproperty double z\n";
+    if (withNormals) out << "property float nx\nproperty float ny\nproperty float nz\n";
+    out << "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+    if (withRadii) out << "property float radius\n";
+    out << "end_header\n";
+    for (const TestPoint& p : points) {
+        out.write(reinterpret_cast<const char*>(&p.position), 24);
+        if (withNormals) out.write(reinterpret_cast<const char*>(&p.normal), 12);
+        out.write(reinterpret_cast<const char*>(&p.colour), 3);
+        if (withRadii) out.write(reinterpret_cast<const char*>(&p.radius), 4);
+    }
+}
+
+void writeLas(const std::string& path, const std::vector<glm::ivec3>& points, double scale, const glm::dvec3& offset) {
+    std::vector<char> header(227, 0);
+    const auto put = [&](size_t at, auto value) { std::memcpy(header.data() + at, &value, sizeof(value)); };
+    std::memcpy(header.data(), "LASF", 4);
+    header[24] = 1;
+    header[25] = 2;
+    put(94, uint16_t{227});
+    put(96, uint32_t{227});
+    header[104] = 2;
+    put(105, uint16_t{26});
+    put(107, static_cast<uint32_t>(points.size()));
+    for (size_t a = 0; a < 3; ++a) {
+        put(131 + 8 * a, scale);
+        put(155 + 8 * a, offset[static_cast<int>(a)]);
+    }
+    std::ofstream out(path, std::ios::binary);
+    out.write(header.data(), static_cast<std::streamsize>(header.size()));
+    for (const glm::ivec3& p : points) {
+        std::array<char, 26> record{};
+        std::memcpy(record.data(), &p, 12);
+        const std::array<uint16_t, 3> rgb{0x8080, 0x4040, 0xc0c0};
+        std::memcpy(record.data() + 20, rgb.data(), 6);
+        out.write(record.data(), record.size());
+    }
+}
+
+lod::BuildReport build(const std::vector<std::string>& inputs, const std::string& output, Executor& executor, const lod::BuildSettings& settings) {
+    Progress silent(false);
+    auto report = lod::buildStore(inputs, output, settings, executor, silent);
+    if (!report) fatal(report.error());
+    return *report;
+}
+
+std::shared_ptr<const lod::Store> buildAndOpen(const std::string& input, const std::string& output, Executor& executor, uint32_t leafRecords) {
+    lod::BuildSettings settings;
+    settings.leafRecords = leafRecords;
+    build({input}, output, executor, settings);
+    auto store = lod::openStore(output);
+    if (!store) fatal(store.error());
+    return std::make_shared<const lod::Store>(std::move(*store));
+}
+
+render::Image renderView(std::shared_ptr<const lod::Store> store, render::Backend& backend, Executor& executor, const lod::View& view,
+                         const render::FrameSettings& settings, FrameCounters* counters) {
+    auto state = render::makeFrameState({std::move(store)}, backend, executor, {});
+    const auto complete = render::renderUntilComplete(*state, view, settings, executor);
+    if (!complete) fatal(complete.error());
+    if (counters) *counters = state->counters;
+    return std::move(state->image);
+}
+
+lod::View fitView(const lod::Store& store, uint32_t width, uint32_t height) {
+    const lod::StoreDescription& d = store.description;
+    const scene::Camera camera = scene::fitCamera(d.boundsMin, d.boundsMax, d.up, double(width) / height);
+    return scene::makeView(camera, width, height, 1e-5 * glm::length(d.boundsMax - d.boundsMin));
+}
+
+std::string dataFile(const std::string& name) {
+    const char* folder = std::getenv("STIPPLE_DATA");
+    const std::string path = std::string(folder ? folder : "") + "/" + name;
+    if (folder && std::filesystem::exists(path)) return path;
+    if (std::getenv("STIPPLE_REQUIRE_DATA")) throw std::runtime_error("the data is required, but there is no " + path);
+    fmt::print("SKIP {}: set STIPPLE_DATA to the data folder\n", name);
+    return {};
+}
+
+}  // namespace stipple::test

@@ -1,0 +1,58 @@
+// What the tests share: small clouds, builds of them, temporary folders, real data.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "engine/base/executor.h"
+#include "engine/base/rng.h"
+#include "engine/render/frame.h"
+#include "lod/build/build.h"
+#include "lod/store.h"
+
+namespace stipple::test {
+
+/// A folder that is removed with all it holds at the end of the test.
+class TempFolder {
+  public:
+    TempFolder();
+    ~TempFolder();
+    TempFolder(const TempFolder&) = delete;
+    TempFolder& operator=(const TempFolder&) = delete;
+    std::string operator/(const std::string& name) const { return path_ + "/" + name; }
+    const std::string& path() const { return path_; }
+
+  private:
+    std::string path_;
+};
+
+struct TestPoint {
+    glm::dvec3 position{0};
+    glm::vec3 normal{0};
+    uint32_t colour = 0xc0c0c0;
+    float radius = 0;
+};
+
+/// Points on a bumpy sphere of radius 1 around `centre`, with outward normals and a smooth colour.
+std::vector<TestPoint> bumpySphere(size_t count, uint64_t seed, const glm::dvec3& centre = glm::dvec3(0));
+/// Binary PLY with double coordinates, normals, colours and radii.
+void writePly(const std::string& path, const std::vector<TestPoint>& points, bool withNormals = true, bool withRadii = false);
+/// LAS 1.2, point format 2, from integer coordinates.
+void writeLas(const std::string& path, const std::vector<glm::ivec3>& points, double scale, const glm::dvec3& offset);
+
+lod::BuildReport build(const std::vector<std::string>& inputs, const std::string& output, Executor& executor,
+                       const lod::BuildSettings& settings = {});
+/// Builds and opens; leafRecords small, so that few points make a deep tree.
+std::shared_ptr<const lod::Store> buildAndOpen(const std::string& input, const std::string& output, Executor& executor,
+                                               uint32_t leafRecords = 512);
+
+/// A complete frame.
+render::Image renderView(std::shared_ptr<const lod::Store> store, render::Backend& backend, Executor& executor, const lod::View& view,
+                         const render::FrameSettings& settings, FrameCounters* counters = nullptr);
+lod::View fitView(const lod::Store& store, uint32_t width, uint32_t height);
+
+/// Path of a file of the data folder; empty (with a SKIP line, or a failure if the data is required) where it is missing.
+std::string dataFile(const std::string& name);
+
+}  // namespace stipple::test

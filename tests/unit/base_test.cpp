@@ -1,0 +1,85 @@
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <filesystem>
+
+#include "engine/base/file.h"
+#include "engine/base/process.h"
+#include "lod/hierarchy.h"
+#include "tests/support/support.h"
+
+namespace stipple {
+namespace {
+
+TEST(OutputFile, LeavesNothingBehindWithoutCommit) {
+    const test::TempFolder folder;
+    {
+        auto file = OutputFile::create(folder / "a");
+        ASSERT_TRUE(file);
+        ASSERT_TRUE(file->append("hello", 5));
+    }
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST(OutputFile, KeepsTheOldFileUntilCommit) {
+    const test::TempFolder folder;
+    ASSERT_TRUE(writeWholeFile(folder / "a", "old", 3));
+    auto file = OutputFile::create(folder / "a");
+    ASSERT_TRUE(file && file->append("newer", 5));
+    EXPECT_EQ(*readTextFile(folder / "a", 100), "old");
+    ASSERT_TRUE(file->commit());
+    EXPECT_EQ(*readTextFile(folder / "a", 100), "newer");
+}
+
+TEST(OutputFile, SaysWhereItCannotWrite) {
+    const auto file = OutputFile::create("/proc/no-such-folder/a");
+    ASSERT_FALSE(file);
+    EXPECT_EQ(file.error().kind, ErrorKind::output);
+    EXPECT_NE(file.error().line().find("/proc/no-such-folder/a"), std::string::npos);
+}
+
+TEST(InputFile, RefusesToReadPastTheEnd) {
+    const test::TempFolder folder;
+    ASSERT_TRUE(writeWholeFile(folder / "a", "abc", 3));
+    const auto file = InputFile::open(folder / "a");
+    ASSERT_TRUE(file);
+    std::array<char, 8> bytes{};
+    EXPECT_TRUE(file->readAt(1, bytes.data(), 2));
+    EXPECT_FALSE(file->readAt(2, bytes.data(), 2));
+    EXPECT_FALSE(file->readAt(~uint64_t{0}, bytes.data(), 2));
+}
+
+TEST(ParseBytes, KnowsUnitsAndRefusesTheRest) {
+    EXPECT_EQ(parseBytes("2G"), uint64_t{2} << 30);
+    EXPECT_EQ(parseBytes("512MiB"), uint64_t{512} << 20);
+    EXPECT_EQ(parseBytes("1000"), 1000u);
+    for (const char* bad : {"", "x", "-1G", "2Q", "1Gx", "nan", "1e99"}) EXPECT_EQ(parseBytes(bad), 0u) << bad;
+}
+
+TEST(ErrorScale, RoundsUpOverManyDecades) {
+    const lod::ErrorScale scale{3.7e-3};
+    EXPECT_EQ(scale.encodeUp(0), 0u);
+    Rng rng(1);
+    for (int i = 0; i < 100'000; ++i) {
+        const double e = scale.smallest * std::exp2(rng.uniform(-20, 31.7));
+        const uint32_t code = scale.encodeUp(e);
+        ASSERT_GE(scale.decode(code), e);
+        if (code > 1) ASSERT_LT(scale.decode(code - 1), e);
+    }
+    for (uint32_t code = 1; code <= lod::ErrorScale::kLargest; ++code) ASSERT_EQ(scale.encodeUp(scale.decode(code)), code);
+}
+
+TEST(Executor, RunsEverythingOnceWhateverTheThreads) {
+    for (const int threads : {1, 2, 5}) {
+        const auto executor = makeTbbExecutor(threads);
+        std::vector<std::atomic<int>> hits(10'000);
+        executor->parallelFor(hits.size(), 7, [&](size_t begin, size_t end) {
+            for (size_t i = begin; i < end; ++i) ++hits[i];
+        });
+        for (const auto& h : hits) ASSERT_EQ(h.load(), 1);
+    }
+}
+
+}  // namespace
+}  // namespace stipple

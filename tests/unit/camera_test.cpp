@@ -1,0 +1,57 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "engine/scene/camera.h"
+#include "tests/support/support.h"
+
+namespace stipple::scene {
+namespace {
+
+TEST(FitCamera, SeesEveryCornerAtAnyPlaceAndShape) {
+    Rng rng(1);
+    for (int i = 0; i < 2000; ++i) {
+        const glm::dvec3 centre = std::exp2(rng.uniform(-5, 23)) * glm::dvec3(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1));
+        const glm::dvec3 half(std::exp2(rng.uniform(-3, 10)), std::exp2(rng.uniform(-3, 10)), std::exp2(rng.uniform(-3, 10)));
+        const auto up = static_cast<lod::UpAxis>(rng.below(3));
+        const lod::View v = makeView(fitCamera(centre - half, centre + half, up, 1.6), 1600, 1000, 1e-3);
+        for (int corner = 0; corner < 8; ++corner) {
+            const glm::dvec3 p = centre + glm::dvec3(corner & 1 ? half.x : -half.x, corner & 2 ? half.y : -half.y, corner & 4 ? half.z : -half.z) - v.eye;
+            const double depth = glm::dot(p, v.forward);
+            ASSERT_GT(depth, 0);
+            ASSERT_LE(std::abs(glm::dot(p, v.right)) / depth * v.focalPixels, 800.5);
+            ASSERT_LE(std::abs(glm::dot(p, v.down)) / depth * v.focalPixels, 500.5);
+        }
+    }
+}
+
+TEST(MakeView, IsOrthonormalEvenLookingAlongUp) {
+    Camera camera;
+    camera.eye = {0, 0, 0};
+    camera.target = {0, 5, 0};
+    camera.up = {0, 1, 0};
+    const lod::View v = makeView(camera, 100, 100, 0.1);
+    EXPECT_NEAR(glm::length(v.right), 1, 1e-12);
+    EXPECT_NEAR(glm::dot(v.right, v.forward), 0, 1e-12);
+    EXPECT_NEAR(glm::length(glm::cross(v.right, v.down) - v.forward), 0, 1e-12);
+}
+
+TEST(CameraPath, GoesThroughItsKeysAndRefusesNonsense) {
+    const test::TempFolder folder;
+    const auto write = [&](const std::string& text) { std::ofstream(folder / "p.json") << text; };
+    write(R"({"fps": 10, "keys": [{"t": 0, "eye": [0,0,0], "target": [1,0,0]}, {"t": 1, "eye": [2,0,0], "target": [3,0,0]}, {"t": 3, "eye": [2,5,0], "target": [3,5,0], "fov": 30}]})");
+    const auto path = readCameraPath(folder / "p.json");
+    ASSERT_TRUE(path) << path.error().line();
+    EXPECT_EQ(path->at(1).eye, glm::dvec3(2, 0, 0));
+    EXPECT_EQ(path->at(9).eye, glm::dvec3(2, 5, 0));
+    EXPECT_EQ(path->at(3).fovDegrees, 30);
+    for (const char* bad : {"", "{}", R"({"keys": []})", R"({"keys": [{"t": 0}]})", R"({"fps": 0, "keys": [{"t": 0, "eye": [0,0,0], "target": [1,0,0]}]})",
+                            R"({"keys": [{"t": 1, "eye": [0,0,0], "target": [1,0,0]}, {"t": 1, "eye": [0,0,0], "target": [1,0,0]}]})"}) {
+        write(bad);
+        EXPECT_FALSE(readCameraPath(folder / "p.json")) << bad;
+    }
+}
+
+}  // namespace
+}  // namespace stipple::scene

@@ -1,0 +1,37 @@
+#!/usr/bin/env bash
+# Who may include whom (ARCHITECTURE, one direction). Fails with the offending lines.
+cd "$1" || exit 2
+status=0
+# allow FOLDER REGEX: includes of project headers in FOLDER must match REGEX.
+allow() {
+    local bad
+    bad=$(grep -rnE '^#include "(engine|lod|streaming|shaders|apps|tests)/' "$1" --include='*.h' --include='*.cpp' --include='*.inl' | grep -vE "#include \"($2)/")
+    if [ -n "$bad" ]; then
+        printf '%s may include only %s:\n%s\n' "$1" "$2" "$bad"
+        status=1
+    fi
+}
+allow shaders/shared 'shaders/shared'
+allow engine/base 'engine/base|shaders/shared'
+allow lod/import 'engine/base|shaders/shared|lod'
+allow lod/build 'engine/base|shaders/shared|lod'
+allow streaming 'engine/base|shaders/shared|lod|streaming'
+allow engine/scene 'engine/base|engine/scene|shaders/shared|lod'
+allow engine/render 'engine/base|engine/render|engine/scene|shaders/shared|lod|streaming'
+allow engine/cpu 'engine/base|engine/render|engine/cpu|shaders/shared|lod|streaming'
+allow engine/gpu 'engine/base|engine/render|engine/gpu|shaders/shared|lod|streaming'
+allow engine/reference 'engine/base|engine/render|engine/reference|shaders/shared|lod|streaming'
+allow engine/image 'engine/base|engine/render|engine/image'
+bad=$(grep -nE '^#include "(lod/(import|build)|streaming|engine/(scene|render|gpu|cpu|reference|image))/' lod/*.h lod/*.cpp)
+[ -z "$bad" ] || { printf 'lod itself may not include:\n%s\n' "$bad"; status=1; }
+bad=$(grep -rlE 'vulkan/vulkan|GLFW/glfw3' engine lod streaming apps --include='*.h' --include='*.cpp' | grep -v '^engine/gpu/')
+[ -z "$bad" ] || { printf 'only engine/gpu may include Vulkan or GLFW:\n%s\n' "$bad"; status=1; }
+bad=$(grep -rlE '\bstd::(mutex|condition_variable)\b' engine lod streaming apps --include='*.h' --include='*.cpp' | grep -vE '^engine/(base|gpu/device)')
+[ -z "$bad" ] || { printf 'no mutex outside base (and the message list of the validation layer):\n%s\n' "$bad"; status=1; }
+# Negative control: the check itself must be able to fail.
+control=$(mktemp -d)
+mkdir -p "$control/engine/base"
+echo '#include "lod/store.h"' >"$control/engine/base/x.h"
+(cd "$control" && grep -rnE '^#include "(engine|lod)/' engine/base --include='*.h' | grep -qvE '#include "(engine/base)/') || { echo 'the check cannot fail'; status=1; }
+rm -rf "$control"
+exit $status

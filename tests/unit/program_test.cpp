@@ -1,0 +1,128 @@
+// The program as a newcomer runs it: exit codes, one line on standard error, no half-written file.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/support.h"
+
+namespace stipple {
+namespace {
+
+struct Outcome {
+    int code = -1;
+    std::string out, err;
+};
+
+Outcome run(const test::TempFolder& folder, const std::string& arguments, const std::string& prefix = "") {
+    const std::string errPath = folder / "stderr.txt";
+    const std::string command = "cd " + folder.path() + " && " + prefix + " XDG_CACHE_HOME=" + folder.path() + "/cache " + STIPPLE_PROGRAM + " " + arguments + " 2>" + errPath;
+    Outcome r;
+    FILE* pipe = ::popen(command.c_str(), "r");
+    std::array<char, 4096> buffer{};
+    while (const size_t got = std::fread(buffer.data(), 1, buffer.size(), pipe)) r.out.append(buffer.data(), got);
+    const int status = ::pclose(pipe);
+    r.code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    std::ifstream in(errPath);
+    r.err.assign(std::istreambuf_iterator<char>(in), {});
+    return r;
+}
+
+/// One line, with the program's name, that mentions `text`.
+void expectOneLine(const Outcome& r, int code, const std::string& text) {
+    EXPECT_EQ(r.code, code) << r.err;
+    EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+    EXPECT_EQ(r.err.rfind("stipple: ", 0), 0u) << r.err;
+    EXPECT_NE(r.err.find(text), std::string::npos) << r.err;
+}
+
+TEST(Program, BuildsShowsAndComparesAScan) {
+    const test::TempFolder folder;
+    ASSERT_EQ(run(folder, "grow scan -o a.las --points 20000 --origin 500000,5400000,300").code, 0);
+    const Outcome built = run(folder, "build a.las -o a.stipple --json --quiet");
+    ASSERT_EQ(built.code, 0) << built.err;
+    const auto report = nlohmann::json::parse(built.out);
+    for (const char* key : {"points_in", "points_out", "dropped", "seconds", "points_per_second", "peak_rss_bytes", "bytes_out", "content_hash"})
+        EXPECT_TRUE(report.contains(key)) << key;
+    EXPECT_EQ(report["points_in"], 20000);
+    EXPECT_EQ(run(folder, "info a.stipple --verify").code, 0);
+    EXPECT_EQ(run(folder, "info a.las --verify --json").code, 0);
+    const Outcome rendered = run(folder, "render a.stipple -o a.png --size 320x200 --json --frames 3 --device cpu");
+    ASSERT_EQ(rendered.code, 0) << rendered.err;
+    const auto j = nlohmann::json::parse(rendered.out);
+    for (const char* key : {"backend", "device", "frame_ms", "passes", "records_drawn", "nodes_drawn", "tau_eff_px", "bytes_streamed", "resident_bytes",
+                            "peak_rss_bytes", "first_image_ms", "complete_ms", "counters"})
+        EXPECT_TRUE(j.contains(key)) << key;
+    EXPECT_EQ(run(folder, "render a.las -o b.png --size 320x200 --device cpu --quiet").code, 0) << "through the cache";
+    EXPECT_EQ(run(folder, "render a.stipple -o b.exr --size 64x48 --device reference --quiet").code, 0);
+    const Outcome compared = run(folder, "compare a.png b.png --json --diff d.png");
+    EXPECT_EQ(nlohmann::json::parse(compared.out)["max_diff"], 0) << "built beside and in the cache: the same";
+    EXPECT_EQ(run(folder, "render a.stipple -o o.png --size 64x48 --orbit 3 --quiet").code, 0);
+    EXPECT_TRUE(std::filesystem::exists(folder / "o_0002.png"));
+}
+
+TEST(Program, SaysWhatIsWrongInOneLine) {
+    const test::TempFolder folder;
+    std::ofstream(folder / "empty.ply");
+    std::filesystem::create_directory(folder / "dir");
+    std::ofstream(folder / "text.las") << "hello";
+    std::ofstream(folder / "none.ply") << "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+    std::ofstream(folder / "nan.ply") << "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\nnan 1 2\n";
+    std::ofstream(folder / "one.ply") << "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n";
+    expectOneLine(run(folder, "build missing.ply -o o.stipple"), 3, "missing.ply");
+    expectOneLine(run(folder, "build dir -o o.stipple"), 3, "directory");
+    expectOneLine(run(folder, "build empty.ply -o o.stipple"), 3, "empty");
+    expectOneLine(run(folder, "build text.las -o o.stipple"), 3, "text.las");
+    expectOneLine(run(folder, "build none.ply -o o.stipple"), 3, "no points");
+    expectOneLine(run(folder, "build nan.ply -o o.stipple"), 3, "none of its 1 points");
+    expectOneLine(run(folder, "build one.ply -o no/such/folder/o.stipple"), 4, "no/such/folder");
+    expectOneLine(run(folder, "build one.ply -o o.stipple --memory potato"), 2, "potato");
+    expectOneLine(run(folder, "build one.ply -o o.stipple --memory 1M"), 6, "--memory");
+    expectOneLine(run(folder, "render one.ply -o a.tiff"), 2, ".png");
+    expectOneLine(run(folder, "render one.ply -o a.png --size 0x4"), 2, "0x4");
+    expectOneLine(run(folder, "render one.ply -o a.png --eye 1,2"), 2, "--eye");
+    expectOneLine(run(folder, "render one.ply -o a.png --device abacus"), 2, "abacus");
+    expectOneLine(run(folder, "frobnicate"), 2, "--help");
+    expectOneLine(run(folder, "compare empty.ply one.ply"), 3, "empty.ply");
+    EXPECT_FALSE(std::filesystem::exists(folder / "o.stipple"));
+    EXPECT_EQ(run(folder, "build one.ply -o one.stipple --quiet").code, 0);
+    EXPECT_EQ(run(folder, "render one.stipple -o one.png --quiet --size 64x64").code, 0) << "a single point is a scene";
+    EXPECT_EQ(run(folder, "--help").code, 0);
+    EXPECT_EQ(run(folder, "render --help").code, 0);
+    EXPECT_EQ(run(folder, "--version").code, 0);
+}
+
+TEST(Program, AFullDiskLeavesTheOldFileAlone) {
+    const test::TempFolder folder;
+    std::filesystem::create_directory(folder / "small");
+    // A file size limit stands for the full disk: both end in a failed write.
+    ASSERT_EQ(run(folder, "grow scan -o a.las --points 50000").code, 0);
+    std::ofstream(folder / "small/a.stipple") << "old";
+    const Outcome r = run(folder, "build a.las -o small/a.stipple --quiet", "ulimit -f 64; trap '' XFSZ;");
+    EXPECT_EQ(r.code, 4) << r.err;
+    std::ifstream in(folder / "small/a.stipple");
+    std::string text;
+    in >> text;
+    EXPECT_EQ(text, "old");
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder / "small"), {}), 1);
+}
+
+TEST(Program, ATruncatedSceneIsRefused) {
+    const test::TempFolder folder;
+    ASSERT_EQ(run(folder, "grow scan -o a.ply --points 5000").code, 0);
+    ASSERT_EQ(run(folder, "build a.ply -o a.stipple --quiet").code, 0);
+    const auto size = std::filesystem::file_size(folder / "a.stipple");
+    for (const auto keep : {uintmax_t{0}, uintmax_t{100}, size / 2, size - 1}) {
+        std::filesystem::copy_file(folder / "a.stipple", folder / "b.stipple", std::filesystem::copy_options::overwrite_existing);
+        std::filesystem::resize_file(folder / "b.stipple", keep);
+        expectOneLine(run(folder, "render b.stipple -o b.png"), 3, "b.stipple");
+    }
+    EXPECT_FALSE(std::filesystem::exists(folder / "b.png"));
+}
+
+}  // namespace
+}  // namespace stipple

@@ -1,0 +1,149 @@
+// The formulas that C++ and GLSL share, attacked in fp64.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "engine/reference/decode.h"
+#include "lod/build/octahedral.h"
+#include "shaders/shared/pack.h"
+#include "shaders/shared/pyramid.h"
+#include "shaders/shared/shade.h"
+#include "tests/support/support.h"
+
+namespace stipple {
+namespace {
+
+glm::dvec3 randomDirection(Rng& rng) { return glm::normalize(glm::dvec3(rng.normal(), rng.normal(), rng.normal())); }
+
+TEST(Octahedral, StaysWithinItsBoundEverywhere) {
+    Rng rng(1);
+    double worst = 0;
+    const auto check = [&](const glm::dvec3& n) {
+        const auto decoded = glm::dvec3(shared::octDecode(lod::octEncode(glm::vec3(n))));
+        worst = std::max(worst, 2 * std::asin(0.5 * glm::length(decoded - n)));
+        ASSERT_NEAR(glm::length(decoded), 1, 4e-7);
+    };
+    for (int i = 0; i < 1 << 20; ++i) check(randomDirection(rng));
+    for (int x = -1; x <= 1; ++x)
+        for (int y = -1; y <= 1; ++y)
+            for (int z = -1; z <= 1; ++z)
+                if (x || y || z) check(glm::normalize(glm::dvec3(x, y, z)));
+    EXPECT_LE(worst * 180 / M_PI, 0.0036);
+}
+
+TEST(NormalPerp, GoesThereAndBackForAnyViewDirection) {
+    Rng rng(2);
+    for (int i = 0; i < 200'000; ++i) {
+        glm::dvec3 v = randomDirection(rng);
+        v.z = std::abs(v.z) + 1e-3;
+        v = glm::normalize(v);
+        glm::dvec3 n = randomDirection(rng);
+        if (glm::dot(n, v) > 0) n = -n;
+        const glm::vec3 vf(v), nf(n);
+        const shared::vec2 p = shared::perpFromNormal(nf, vf);
+        // The length of the components across the view is the sine of the angle to it, whatever the view.
+        ASSERT_NEAR(std::hypot(double(p.x), double(p.y)), glm::length(glm::cross(n, v)), 2e-6);
+        if (glm::dot(n, v) > -0.02) continue;  // the square root loses bits at the rim
+        const glm::dvec3 back(shared::normalFromPerp(p, vf));
+        ASSERT_LE(glm::length(back - n), 3e-5);
+    }
+}
+
+TEST(PackTexel, KeepsEveryFieldWithinItsStatedError) {
+    Rng rng(3);
+    for (int i = 0; i < 200'000; ++i) {
+        shared::Texel t;
+        t.depth = static_cast<float>(std::exp2(rng.uniform(-20, 20)));
+        t.radius = static_cast<float>(std::exp2(rng.uniform(-1, 14)));
+        t.thickness = static_cast<float>(std::exp2(rng.uniform(-3, 14)));
+        t.offset = {t.radius * static_cast<float>(rng.uniform(-3, 3)), t.radius * static_cast<float>(rng.uniform(-3, 3))};
+        t.normalPerp = {static_cast<float>(rng.uniform(-1, 1)), static_cast<float>(rng.uniform(-1, 1))};
+        t.colour = {static_cast<float>(rng.uniform()), static_cast<float>(rng.uniform()), static_cast<float>(rng.uniform())};
+        const shared::Texel u = shared::unpackTexel(shared::packTexel(t));
+        ASSERT_EQ(u.depth, t.depth);
+        ASSERT_NEAR(u.radius, t.radius, t.radius / 256);
+        ASSERT_NEAR(u.thickness, t.thickness, t.thickness / 256);
+        ASSERT_NEAR(u.offset.x, t.offset.x, t.radius * 4 / 32767);
+        ASSERT_NEAR(u.offset.y, t.offset.y, t.radius * 4 / 32767);
+        ASSERT_NEAR(u.normalPerp.x, t.normalPerp.x, 1.0 / 32767);
+        ASSERT_NEAR(std::sqrt(u.colour.x), std::sqrt(t.colour.x), 0.6 / 2047);
+        ASSERT_NEAR(std::sqrt(u.colour.z), std::sqrt(t.colour.z), 0.6 / 1023);
+    }
+}
+
+shared::Texel plainTexel(float depth, float radius) {
+    shared::Texel t;
+    t.depth = depth;
+    t.radius = radius;
+    t.thickness = radius * 0.25f;
+    t.colour = {0.5f, 0.25f, 1.0f};
+    return t;
+}
+
+TEST(Pull, ConstantInGivesConstantOut) {
+    const shared::Texel c = plainTexel(10, 3);
+    const shared::Texel t = shared::pullTexels(c, c, c, c, 1, 0.001f);
+    EXPECT_EQ(t.depth, 10);
+    EXPECT_EQ(t.radius, 3);
+    EXPECT_EQ(t.colour.x, 0.5f);
+    EXPECT_NEAR(t.offset.x, 0, 1e-6);
+}
+
+TEST(Pull, ManyThinLayersDoNotChain) {
+    // A staircase 0.9 thickness apart: only what touches the front layer may be merged (hard case 42).
+    const float inverseFocal = 0.001f;
+    shared::Texel c[4];
+    const float world = shared::thicknessWorld(plainTexel(10, 4), inverseFocal);
+    for (int i = 0; i < 4; ++i) c[i] = plainTexel(10 + 1.8f * world * static_cast<float>(i), 4);
+    const shared::Texel t = shared::pullTexels(c[3], c[1], c[2], c[0], 1, inverseFocal);
+    EXPECT_EQ(t.depth, 10);
+    EXPECT_LE(shared::thicknessWorld(t, inverseFocal), 2.01f * shared::thicknessWorld(c[1], inverseFocal));
+}
+
+TEST(Push, WhatLiesInFrontStaysAndWhatLiesBehindGoes) {
+    const shared::Texel q = plainTexel(10, 4);
+    const auto push = [&](float depth) { return shared::pushTexel(plainTexel(depth, 1), q, q, q, q, -1, -1, 1, 0.001f).depth; };
+    EXPECT_EQ(push(5), 5);        // in front: F13 of the flaw table discards it
+    EXPECT_EQ(push(10.005f), 10.005f);
+    EXPECT_NEAR(push(20), 10, 1e-5);
+    EXPECT_NEAR(push(0), 10, 1e-5);  // empty
+}
+
+TEST(Push, NothingComesFromNothing) {
+    shared::Texel none = plainTexel(0, 0);
+    none.thickness = 0;
+    const shared::Texel t = shared::pushTexel(none, none, none, none, none, 1, 1, 1, 0.001f);
+    EXPECT_EQ(t.depth, 0);
+    EXPECT_FALSE(std::isnan(t.radius + t.thickness + t.offset.x + t.normalPerp.x + t.colour.x));
+}
+
+TEST(Colour, BlackAndWhiteAverageInLinearLight) {
+    const float mean = 0.5f * (shared::linearFromSrgb(0) + shared::linearFromSrgb(1));
+    EXPECT_NEAR(shared::srgbFromLinear(mean) * 255, 188, 1);
+}
+
+TEST(Reference, DecodesRecordsAsTheBackendsDo) {
+    lod::Hierarchy h;
+    h.origin = {4.1e6, 5.2e5, 4.9e6};
+    h.unit = 0.001;
+    h.rootLog2 = 22;
+    lod::Node node;
+    node.level = 3;
+    node.cell = {5, 1, 7};
+    node.stepShift = 3;
+    Rng rng(5);
+    for (int i = 0; i < 10'000; ++i) {
+        const shared::PointRecord r{static_cast<uint32_t>(rng.next()), static_cast<uint32_t>(rng.next()), static_cast<uint32_t>(rng.next()) & 0xfffefffeu,
+                                    static_cast<uint32_t>(rng.next()) & 0x00ffffffu};
+        const reference::Disc d = reference::decodeDisc(h, node, r);
+        const glm::dvec3 p = h.origin + h.unit * (h.recordOrigin(node) + std::exp2(node.stepShift) * glm::dvec3(recordX(r), recordY(r), recordZ(r)));
+        ASSERT_LE(glm::length(p - d.position), 1e-8);
+        ASSERT_EQ(d.errorCode, shared::recordErrorCode(r));
+        ASSERT_EQ(d.octant, shared::recordOctant(r));
+        ASSERT_NEAR(d.radius, h.unit * h.cellSize(node) * double(shared::radiusFraction(shared::recordRadiusCode(r))), d.radius * 1e-6);
+        ASSERT_LE(glm::length(d.normal - glm::dvec3(shared::octDecode(r.normal))), 1e-6);
+    }
+}
+
+}  // namespace
+}  // namespace stipple

@@ -1,0 +1,148 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "streaming/streamer.h"
+#include "tests/support/support.h"
+
+namespace stipple::streaming {
+namespace {
+
+/// Counts what is alive and checks that nothing is uploaded or evicted twice.
+class CountingSink final : public ChunkSink {
+  public:
+    ~CountingSink() override { EXPECT_EQ(alive.size(), 0u) << "chunks leaked"; }
+    Result<void> upload(ChunkKey key, const lod::Chunk& chunk) override {
+        if (refuse) return fail(ErrorKind::budget, "no room in the sink");
+        EXPECT_TRUE(alive.insert({key.instance, key.node}).second);
+        bytes += chunk.sizeBytes();
+        most = std::max(most, bytes);
+        sizes[{key.instance, key.node}] = chunk.sizeBytes();
+        return {};
+    }
+    void evict(ChunkKey key) override {
+        EXPECT_EQ(alive.erase({key.instance, key.node}), 1u);
+        bytes -= sizes[{key.instance, key.node}];
+    }
+    std::set<std::pair<uint32_t, uint32_t>> alive;
+    std::map<std::pair<uint32_t, uint32_t>, uint64_t> sizes;
+    uint64_t bytes = 0, most = 0;
+    bool refuse = false;
+};
+
+class BrokenSource final : public ByteSource {
+  public:
+    Result<void> read(uint64_t, void*, size_t) const override { return fail(ErrorKind::input, "the cable is unplugged"); }
+};
+
+class StreamerTest : public testing::Test {
+  protected:
+    void SetUp() override {
+        test::writePly(folder_ / "a.ply", test::bumpySphere(20'000, 1));
+        store_ = test::buildAndOpen(folder_ / "a.ply", folder_ / "a.stipple", *executor_);
+        hierarchies_ = {&store_->hierarchy};
+    }
+    /// One frame, stepped by hand: all work that was started finishes before the next.
+    const lod::Cut& step(Streamer& streamer, const lod::View& view, double tau) {
+        streamer.collect();
+        streamer.upload();
+        lod::selectCut(hierarchies_, instances_, streamer.residency(), view, {tau, std::numeric_limits<uint64_t>::max()}, scratch_, cut_);
+        streamer.request(cut_);
+        executor_->wait();
+        return cut_;
+    }
+    test::TempFolder folder_;
+    std::unique_ptr<Executor> executor_ = makeSerialExecutor();
+    std::shared_ptr<const lod::Store> store_;
+    std::vector<const lod::Hierarchy*> hierarchies_;
+    std::vector<lod::Instance> instances_{1};
+    lod::CutScratch scratch_;
+    lod::Cut cut_;
+};
+
+TEST_F(StreamerTest, FillsUpAndThenRests) {
+    CountingSink sink;
+    {
+        Streamer streamer(*executor_, sink, {});
+        streamer.addInstance(store_->hierarchy, makeFileSource(store_->file), "a");
+        const lod::View view = test::fitView(*store_, 640, 480);
+        for (int i = 0; i < 10; ++i) step(streamer, view, 0.1);
+        EXPECT_TRUE(cut_.wanted.empty());
+        EXPECT_TRUE(streamer.isIdle());
+        EXPECT_EQ(streamer.counters().requests, sink.alive.size());
+        const uint64_t before = streamer.counters().requests;
+        for (int i = 0; i < 60; ++i) step(streamer, view, 0.1);
+        EXPECT_EQ(streamer.counters().requests, before) << "a static view must not stream";
+        EXPECT_EQ(streamer.counters().evictions, 0u);
+    }
+}
+
+TEST_F(StreamerTest, TheByteBudgetIsNeverExceededWhateverTheViews) {
+    CountingSink sink;
+    {
+        StreamSettings settings;
+        settings.residentBytes = 200'000;
+        Streamer streamer(*executor_, sink, settings);
+        streamer.addInstance(store_->hierarchy, makeFileSource(store_->file), "a");
+        Rng rng(4);
+        for (int i = 0; i < 300; ++i) {
+            lod::View view = test::fitView(*store_, 640, 480);
+            view.eye = {rng.uniform(-2, 2), rng.uniform(-2, 2), rng.uniform(-2, 2)};
+            view.forward = glm::normalize(-view.eye);
+            view.right = glm::normalize(glm::cross(view.forward, glm::dvec3(0.1, 1, 0)));
+            view.down = glm::cross(view.forward, view.right);
+            step(streamer, view, std::exp2(rng.uniform(-3, 4)));
+            ASSERT_LE(sink.bytes, settings.residentBytes);
+            ASSERT_EQ(sink.bytes, streamer.counters().residentBytes);
+            if (i > 2) ASSERT_FALSE(cut_.draw.empty()) << "once the root is resident there is always an image";
+        }
+        EXPECT_GT(streamer.counters().evictions, 0u);
+    }
+}
+
+TEST_F(StreamerTest, AFailedChunkIsCountedAndTriedAgainLater) {
+    CountingSink sink;
+    {
+        Streamer streamer(*executor_, sink, {});
+        streamer.addInstance(store_->hierarchy, std::make_shared<BrokenSource>(), "a");
+        const lod::View view = test::fitView(*store_, 640, 480);
+        for (int i = 0; i < 5; ++i) step(streamer, view, 0.1);
+        const uint64_t failures = streamer.counters().failures;
+        EXPECT_GT(failures, 0u);
+        EXPECT_NE(streamer.lastFailure().find("unplugged"), std::string::npos);
+        for (int i = 0; i < 5; ++i) step(streamer, view, 0.1);
+        EXPECT_EQ(streamer.counters().failures, failures) << "not in every frame";
+        for (int i = 0; i < 130; ++i) step(streamer, view, 0.1);
+        EXPECT_GT(streamer.counters().failures, failures);
+        EXPECT_TRUE(cut_.draw.empty());
+    }
+}
+
+TEST_F(StreamerTest, ASinkThatIsFullDoesNotStall) {
+    CountingSink sink;
+    sink.refuse = true;
+    Streamer streamer(*executor_, sink, {});
+    streamer.addInstance(store_->hierarchy, makeFileSource(store_->file), "a");
+    const lod::View view = test::fitView(*store_, 640, 480);
+    for (int i = 0; i < 5; ++i) step(streamer, view, 0.1);
+    EXPECT_GT(streamer.counters().failures, 0u);
+    sink.refuse = false;
+    for (int i = 0; i < 260; ++i) step(streamer, view, 0.1);
+    EXPECT_TRUE(cut_.wanted.empty());
+}
+
+TEST(ChunkState, TheTableOfTransitionsIsWhatTheLifeOfARequestSays) {
+    using S = ChunkState;
+    int legal = 0;
+    for (int from = 0; from < 5; ++from)
+        for (int to = 0; to < 5; ++to) legal += isLegalTransition(static_cast<S>(from), static_cast<S>(to));
+    EXPECT_EQ(legal, 8);
+    EXPECT_FALSE(isLegalTransition(S::absent, S::resident));
+    EXPECT_FALSE(isLegalTransition(S::resident, S::requested));
+    EXPECT_FALSE(isLegalTransition(S::requested, S::requested));
+}
+
+}  // namespace
+}  // namespace stipple::streaming
