@@ -42,8 +42,8 @@ Result<std::vector<uint8_t>> decompress(const uint8_t* bytes, size_t count, size
 std::vector<uint8_t> encodeChunk(const Chunk& chunk) {
     constexpr size_t stride = sizeof(shared::PointRecord);
     std::vector<uint8_t> vertex(meshopt_encodeVertexBufferBound(chunk.records.size(), stride));
-    vertex.resize(meshopt_encodeVertexBuffer(vertex.data(), vertex.size(), chunk.records.data(), chunk.records.size(),
-                                             stride));
+    vertex.resize(
+        meshopt_encodeVertexBuffer(vertex.data(), vertex.size(), chunk.records.data(), chunk.records.size(), stride));
     const std::vector<uint8_t> records = compress(vertex);
     std::vector<uint8_t> low;
     if (!chunk.lowBits.empty()) {

@@ -1,6 +1,6 @@
 // A decoded chunk (the records of one node) and its encoding on disk: meshoptimizer's vertex codec (byte-wise deltas)
-// under zstd. Where a leaf's position step is coarser than the lattice, the low bits travel in a stream of their own, so
-// that scanner integers come back exactly.
+// under zstd. Where a leaf's position step is coarser than the lattice, the low bits travel in a stream of their own,
+// so that scanner integers come back exactly.
 #pragma once
 
 #include <cstdint>

@@ -28,8 +28,9 @@ LocalView makeLocalView(const Hierarchy& h, const Instance& instance, const View
     local.forward = inverse * view.forward;
     const glm::dvec3 right = inverse * view.right, down = inverse * view.down;
     const double halfW = 0.5 * view.width, halfH = 0.5 * view.height, f = view.focalPixels;
-    local.planes = {glm::normalize(right * f + local.forward * halfW), glm::normalize(-right * f + local.forward * halfW),
-                    glm::normalize(down * f + local.forward * halfH), glm::normalize(-down * f + local.forward * halfH)};
+    local.planes = {
+        glm::normalize(right * f + local.forward * halfW), glm::normalize(-right * f + local.forward * halfW),
+        glm::normalize(down * f + local.forward * halfH), glm::normalize(-down * f + local.forward * halfH)};
     local.nearPlane = view.nearPlane / unitsPerStep;
     local.focal = f;
     local.cosineCorner = f / std::sqrt(f * f + halfW * halfW + halfH * halfH);
@@ -67,8 +68,13 @@ class Selector {
   public:
     Selector(std::span<const Hierarchy* const> hierarchies, std::span<const Instance> instances,
              const Residency& residency, const View& view, const Budgets& budgets, CutScratch& scratch, Cut& cut)
-        : hierarchies_(hierarchies), instances_(instances), residency_(residency), view_(view), budgets_(budgets),
-          scratch_(scratch), cut_(cut) {
+        : hierarchies_(hierarchies),
+          instances_(instances),
+          residency_(residency),
+          view_(view),
+          budgets_(budgets),
+          scratch_(scratch),
+          cut_(cut) {
         ++scratch_.frame;
         scratch_.epsilon.resize(instances.size());
         scratch_.stamp.resize(instances.size());
@@ -102,7 +108,8 @@ class Selector {
             for (size_t i = 0; i < instances_.size(); ++i) emit(i, step);
             if (cut_.counters.recordsDrawn <= budgets_.records || step >= kLargestTauStep) break;
         }
-        cut_.tauEffective = std::max(cut_.tauEffective, step == target ? tau : std::exp2(double(step) / kStepsPerOctave));
+        cut_.tauEffective =
+            std::max(cut_.tauEffective, step == target ? tau : std::exp2(double(step) / kStepsPerOctave));
         if (cut_.counters.recordsDrawn > budgets_.records) truncate();
         cut_.counters.nodesDrawn = cut_.draw.size();
     }
@@ -157,7 +164,8 @@ class Selector {
         if (budgets_.records == std::numeric_limits<uint64_t>::max()) return target;
         // From the coarse side, so that no evaluation walks much more than the budget's worth of nodes.
         int hi = std::max(target, 0) + 8 * kStepsPerOctave;
-        while (hi < kLargestTauStep && cost(hi) > budgets_.records) hi = std::min(hi + 8 * kStepsPerOctave, kLargestTauStep);
+        while (hi < kLargestTauStep && cost(hi) > budgets_.records)
+            hi = std::min(hi + 8 * kStepsPerOctave, kLargestTauStep);
         int lo = target;
         if (cost(lo) <= budgets_.records) return lo;
         while (hi - lo > 1) {
@@ -222,7 +230,8 @@ class Selector {
             const uint32_t tooCoarse = octantMask ? 0 : h.countGreater(node.ownCounts, node.records, code);
             cut_.counters.recordsDrawn += count - tooCoarse;
             cut_.counters.recordsTested += count;
-            const double delivered = pixelsOf(octantMask ? node.errorCode : std::min<uint32_t>(node.errorCode, code), epsilon);
+            const double delivered =
+                pixelsOf(octantMask ? node.errorCode : std::min<uint32_t>(node.errorCode, code), epsilon);
             if (octantMask) cut_.tauEffective = std::max(cut_.tauEffective, delivered);
             if (count > tooCoarse)
                 cut_.draw.push_back({instance, index, count, code, octantMask, static_cast<float>(delivered)});

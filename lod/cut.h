@@ -1,9 +1,9 @@
 // selectCut: which records to draw, which chunks to load. A pure function over plain arrays.
 //
 // The rule (ALGORITHMS 2.2). Every node N has one allowed error  eps_N = tau * D_lo(N) / (F * sigma_N),  with D_lo the
-// distance from the eye to N's sphere and sigma_N = 1/cos^2 of the largest off-axis angle inside it (capped at the image
-// corner), so that tau is a bound in pixels. Record x of N is drawn iff the error of its parent is too large for N's
-// parent (a prefix of the records) and its own is small enough for N, or its octant's child cannot be drawn. Nested
+// distance from the eye to N's sphere and sigma_N = 1/cos^2 of the largest off-axis angle inside it (capped at the
+// image corner), so that tau is a bound in pixels. Record x of N is drawn iff the error of its parent is too large for
+// N's parent (a prefix of the records) and its own is small enough for N, or its octant's child cannot be drawn. Nested
 // spheres make eps grow towards the leaves and errors shrink, so every leaf is covered exactly once.
 //
 // All comparisons are between integer codes (eps is rounded down to the error scale), which makes the cut of equal
@@ -42,7 +42,7 @@ struct Residency {
 };
 
 struct Budgets {
-    double errorPixels = 1;                          ///< tau asked for
+    double errorPixels = 1;                                   ///< tau asked for
     uint64_t records = std::numeric_limits<uint64_t>::max();  ///< records drawn at most
 };
 
@@ -65,12 +65,12 @@ struct CutCounters {
 };
 
 struct Cut {
-    std::vector<CutDraw> draw;      ///< sorted by instance, then node
-    std::vector<CutWanted> wanted;  ///< chunks that the full cut needs and that are not drawable
+    std::vector<CutDraw> draw;                        ///< sorted by instance, then node
+    std::vector<CutWanted> wanted;                    ///< chunks that the full cut needs and that are not drawable
     std::vector<std::pair<uint32_t, uint32_t>> keep;  ///< (instance, node) that must not be evicted
-    double tauTarget = 0;     ///< error, px, that the budget allows once everything is resident
-    double tauEffective = 0;  ///< error, px, delivered by what is drawn now
-    bool truncated = false;   ///< even the roots exceed the record budget: some of their records are left out
+    double tauTarget = 0;                             ///< error, px, that the budget allows once everything is resident
+    double tauEffective = 0;                          ///< error, px, delivered by what is drawn now
+    bool truncated = false;  ///< even the roots exceed the record budget: some of their records are left out
     CutCounters counters;
 };
 

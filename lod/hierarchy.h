@@ -26,6 +26,7 @@ struct ErrorScale {
         if (code > kLargest) code = kLargest;
         auto result = static_cast<uint32_t>(code);
         while (result < kLargest && decode(result) < error) ++result;  // log2 may round the wrong way
+        while (result > 1 && decode(result - 1) >= error) --result;
         return result;
     }
 };
@@ -41,25 +42,25 @@ struct Node {
     double radius = 0;
     uint32_t parent = 0, firstChild = 0;  ///< children are contiguous, in octant order
     uint32_t records = 0;
-    uint32_t chunkBytes = 0;              ///< compressed
+    uint32_t chunkBytes = 0;  ///< compressed
     uint64_t chunkOffset = 0, chunkHash = 0;
-    std::array<uint32_t, 3> cell{};       ///< index of the node's cell at its level
+    std::array<uint32_t, 3> cell{};  ///< index of the node's cell at its level
     uint8_t level = 0, childMask = 0;
-    uint8_t errorCode = 0;                ///< largest own error among the records
-    int8_t stepShift = 0;                 ///< position step of the records: 2^stepShift lattice units = cell / 65536
+    uint8_t errorCode = 0;  ///< largest own error among the records
+    int8_t stepShift = 0;   ///< position step of the records: 2^stepShift lattice units = cell / 65536
     CodeCounts parentCounts, ownCounts;
-    uint32_t normalCone = 0;              ///< axis, octahedral
-    float normalConeCosine = -1;          ///< cosine of the half-angle; -1: all directions
+    uint32_t normalCone = 0;      ///< axis, octahedral
+    float normalConeCosine = -1;  ///< cosine of the half-angle; -1: all directions
     bool isLeaf() const { return childMask == 0; }
 };
 
 struct Hierarchy {
-    glm::dvec3 origin{0};  ///< world position of lattice (0,0,0)
-    double unit = 1;       ///< world units per lattice step
-    uint32_t rootLog2 = 0; ///< the root's cell has 2^rootLog2 lattice steps along each axis
+    glm::dvec3 origin{0};   ///< world position of lattice (0,0,0)
+    double unit = 1;        ///< world units per lattice step
+    uint32_t rootLog2 = 0;  ///< the root's cell has 2^rootLog2 lattice steps along each axis
     ErrorScale errors;
-    std::vector<Node> nodes;             ///< breadth first; node 0 is the root
-    std::vector<uint32_t> greaterThan;   ///< see CodeCounts
+    std::vector<Node> nodes;            ///< breadth first; node 0 is the root
+    std::vector<uint32_t> greaterThan;  ///< see CodeCounts
 
     /// Records with a code > `code`.
     uint32_t countGreater(const CodeCounts& c, uint32_t records, uint32_t code) const {

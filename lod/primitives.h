@@ -29,8 +29,8 @@ struct SourceInfo {
     std::string path, format;
     uint64_t points = 0;  ///< declared, and possible by the size of the file
     bool hasColour = false, hasNormal = false, hasRadius = false;
-    bool isLattice = false;               ///< positions are whole steps: world = position * scale + offset
-    glm::dvec3 scale{1}, offset{0};       ///< only where isLattice
+    bool isLattice = false;          ///< positions are whole steps: world = position * scale + offset
+    glm::dvec3 scale{1}, offset{0};  ///< only where isLattice
     glm::dvec3 declaredMin{0}, declaredMax{0};
     bool hasDeclaredBounds = false;
     UpAxis up = UpAxis::y;

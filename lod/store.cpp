@@ -132,13 +132,15 @@ StoreDescription fromJson(const nlohmann::json& j) {
 Result<std::vector<uint8_t>> readSection(const InputFile& file, const Section& s, const char* name) {
     const std::string where = fmt::format("{}: {}", file.path(), name);
     if (s.offset > file.sizeBytes() || s.bytes > file.sizeBytes() - s.offset)
-        return tl::unexpected(damaged(where, fmt::format("{} bytes at offset {} lie outside the file", s.bytes, s.offset)));
+        return tl::unexpected(
+            damaged(where, fmt::format("{} bytes at offset {} lie outside the file", s.bytes, s.offset)));
     // zstd gains at most about 2^17 to 1 on the densest input; a head that claims more lies.
     if (s.rawBytes > kSizeLimit || s.rawBytes / 131072 > s.bytes)
         return tl::unexpected(damaged(where, fmt::format("{} bytes cannot come from {}", s.rawBytes, s.bytes)));
     std::vector<uint8_t> bytes(s.bytes);
     STIPPLE_TRY(file.readAt(s.offset, bytes.data(), bytes.size()));
-    if (hashBytes(bytes.data(), bytes.size()) != s.hash) return tl::unexpected(damaged(where, "the hash does not match"));
+    if (hashBytes(bytes.data(), bytes.size()) != s.hash)
+        return tl::unexpected(damaged(where, "the hash does not match"));
     std::vector<uint8_t> raw(s.rawBytes);
     const size_t got = ZSTD_decompress(raw.data(), raw.size(), bytes.data(), bytes.size());
     if (ZSTD_isError(got) || got != raw.size()) return tl::unexpected(damaged(where, "cannot be decompressed"));
@@ -154,7 +156,8 @@ Result<void> checkNodes(const Store& store, uint64_t chunksEnd) {
         const bool childrenFit = n.isLeaf() || (n.firstChild > i && n.firstChild + children <= nodes.size());
         const bool parentFits = i == 0 ? n.level == 0 : n.parent < i && nodes[n.parent].level + 1 == n.level;
         const bool chunkFits = n.chunkOffset <= chunksEnd && n.chunkBytes <= chunksEnd - n.chunkOffset;
-        const bool finite = std::isfinite(n.radius) && n.radius >= 0 && std::isfinite(n.centre.x + n.centre.y + n.centre.z);
+        const bool finite =
+            std::isfinite(n.radius) && n.radius >= 0 && std::isfinite(n.centre.x + n.centre.y + n.centre.z);
         if (!childrenFit || !parentFits || !chunkFits || !finite || n.records == 0 ||
             n.level > store.hierarchy.rootLog2 ||
             n.stepShift != static_cast<int>(store.hierarchy.rootLog2) - n.level - 16)
@@ -222,8 +225,11 @@ Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& des
     head.nodeCount = nodes.size();
     head.fileBytes = file_.position() + sizeof(Foot);
     // The node table holds the hash of every chunk, so these three stand for the whole content.
-    const std::array<uint64_t, 6> parts{head.nodes.hash, head.counts.hash, head.description.hash,
-                                        head.rootLog2, std::bit_cast<uint64_t>(head.unit),
+    const std::array<uint64_t, 6> parts{head.nodes.hash,
+                                        head.counts.hash,
+                                        head.description.hash,
+                                        head.rootLog2,
+                                        std::bit_cast<uint64_t>(head.unit),
                                         hashBytes(head.origin.data(), sizeof(head.origin))};
     head.contentHash = contentHash_ = hashBytes(parts.data(), sizeof(parts));
     head.hash = hashBytes(&head, offsetof(Head, hash));
@@ -245,16 +251,21 @@ Result<Store> openStore(const std::string& path) {
                     "build it with: stipple build INPUT -o SCENE.stipple");
     STIPPLE_TRY(file.readAt(0, &head, sizeof(head)));
     if (head.magic != kMagic)
-        return fail(ErrorKind::input, "is not a stipple store", path, "build one with: stipple build INPUT -o SCENE.stipple");
+        return fail(ErrorKind::input, "is not a stipple store", path,
+                    "build one with: stipple build INPUT -o SCENE.stipple");
     if (head.version != kVersion)
-        return fail(ErrorKind::input, fmt::format("has store version {}; this program reads version {}", head.version,
-                                                  kVersion), path, "build it again with this program");
-    if (head.hash != hashBytes(&head, offsetof(Head, hash))) return tl::unexpected(damaged(path, "the head is damaged"));
+        return fail(ErrorKind::input,
+                    fmt::format("has store version {}; this program reads version {}", head.version, kVersion), path,
+                    "build it again with this program");
+    if (head.hash != hashBytes(&head, offsetof(Head, hash)))
+        return tl::unexpected(damaged(path, "the head is damaged"));
     if (head.fileBytes != file.sizeBytes())
-        return tl::unexpected(damaged(path, fmt::format("has {} bytes instead of {}", file.sizeBytes(), head.fileBytes)));
+        return tl::unexpected(
+            damaged(path, fmt::format("has {} bytes instead of {}", file.sizeBytes(), head.fileBytes)));
     Foot foot{};
     STIPPLE_TRY(file.readAt(file.sizeBytes() - sizeof(foot), &foot, sizeof(foot)));
-    if (foot.magic != kFootMagic || foot.headHash != head.hash) return tl::unexpected(damaged(path, "the foot is damaged"));
+    if (foot.magic != kFootMagic || foot.headHash != head.hash)
+        return tl::unexpected(damaged(path, "the foot is damaged"));
     if (!(head.unit > 0) || !std::isfinite(head.unit) || !(head.smallestError > 0) || head.rootLog2 > 62 ||
         head.nodes.rawBytes != head.nodeCount * sizeof(NodeOnDisk) || head.nodeCount == 0)
         return tl::unexpected(damaged(path, "the head holds values that are not possible"));
@@ -290,7 +301,8 @@ Result<Store> openStore(const std::string& path) {
         n.childMask = d.childMask;
         n.errorCode = d.errorCode;
         n.stepShift = d.stepShift;
-        for (const auto& [codes, counts] : {std::pair{d.parentCodes, &n.parentCounts}, std::pair{d.ownCodes, &n.ownCounts}}) {
+        for (const auto& [codes, counts] :
+             {std::pair{d.parentCodes, &n.parentCounts}, std::pair{d.ownCodes, &n.ownCounts}}) {
             uint64_t sum = 0;
             bool rising = codes > 0 && codes <= 256 && used + codes <= pairs.size();
             for (uint32_t k = 0; rising && k < codes; ++k) {
@@ -308,7 +320,8 @@ Result<Store> openStore(const std::string& path) {
     } catch (const std::exception& e) {
         return tl::unexpected(damaged(path, fmt::format("the description cannot be read: {}", e.what())));
     }
-    if (static_cast<int>(store.description.up) > 2) return tl::unexpected(damaged(path, "the up axis is none of x, y, z"));
+    if (static_cast<int>(store.description.up) > 2)
+        return tl::unexpected(damaged(path, "the up axis is none of x, y, z"));
     store.contentHash = head.contentHash;
     store.fileBytes = head.fileBytes;
     STIPPLE_TRY(checkNodes(store, head.nodes.offset));

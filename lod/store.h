@@ -19,13 +19,13 @@ struct StoreDescription {
     UpAxis up = UpAxis::z;
     std::string crs;
     std::vector<std::string> attributes;
-    uint64_t points = 0;           ///< leaf records: the points of the input that were kept
-    uint64_t records = 0;          ///< all records, coarse levels included
-    double roundingUnits = 0;      ///< largest rounding of a coordinate to the lattice, world units; 0: exact
+    uint64_t points = 0;                    ///< leaf records: the points of the input that were kept
+    uint64_t records = 0;                   ///< all records, coarse levels included
+    double roundingUnits = 0;               ///< largest rounding of a coordinate to the lattice, world units; 0: exact
     glm::dvec3 boundsMin{0}, boundsMax{0};  ///< of the points, world units
-    bool hasColour = false;        ///< the points have colours of their own
-    bool hasNormals = false;       ///< from the file or estimated
-    std::string source;            ///< file names of the input, without folders
+    bool hasColour = false;                 ///< the points have colours of their own
+    bool hasNormals = false;                ///< from the file or estimated
+    std::string source;                     ///< file names of the input, without folders
 };
 
 /// An opened store. Reading chunks is safe from several threads.

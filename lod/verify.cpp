@@ -46,8 +46,8 @@ std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
     // Monotone along every chain: sorted by the parent's code, so the own code must not exceed it.
     uint32_t position = 0;
     for (int code = 255; code >= 0; --code) {
-        const uint32_t atLeast = code == 0 ? node.records
-                                           : h.countGreater(node.parentCounts, node.records, static_cast<uint32_t>(code) - 1);
+        const uint32_t atLeast =
+            code == 0 ? node.records : h.countGreater(node.parentCounts, node.records, static_cast<uint32_t>(code) - 1);
         for (; position < atLeast; ++position)
             if (shared::recordErrorCode(chunk.records[position]) > static_cast<uint32_t>(code))
                 return "a record has a larger error than its parent record";
@@ -81,8 +81,9 @@ Result<VerifyReport> verifyStore(const Store& store, Executor& executor) {
                                   return a.first < b.first;
                               })->second);
     if (leafRecords != store.description.points)
-        return fail(ErrorKind::input, fmt::format("{} leaf records, but {} points", leafRecords.load(),
-                                                  store.description.points), store.path);
+        return fail(ErrorKind::input,
+                    fmt::format("{} leaf records, but {} points", leafRecords.load(), store.description.points),
+                    store.path);
     return VerifyReport{h.nodes.size(), records, leafRecords};
 }
 

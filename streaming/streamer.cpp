@@ -29,7 +29,8 @@ Result<lod::Chunk> fetch(const ByteSource& source, const lod::Node& node, const 
     std::vector<uint8_t> bytes(node.chunkBytes);
     STIPPLE_TRY(source.read(node.chunkOffset, bytes.data(), bytes.size()));
     if (hashBytes(bytes.data(), bytes.size()) != node.chunkHash)
-        return fail(ErrorKind::input, "the hash of a chunk does not match", where, "the store is damaged; build it again");
+        return fail(ErrorKind::input, "the hash of a chunk does not match", where,
+                    "the store is damaged; build it again");
     return lod::decodeChunk(bytes.data(), bytes.size(), node.records, where, false);
 }
 
@@ -62,8 +63,10 @@ Streamer::~Streamer() {
             if (sources_[i].nodes[n].state == ChunkState::resident) sink_.evict({i, n});
 }
 
-void Streamer::addInstance(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source, std::string name) {
-    sources_.push_back({&hierarchy, std::move(source), std::move(name), std::vector<NodeState>(hierarchy.nodes.size())});
+void Streamer::addInstance(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source,
+                           std::string name) {
+    sources_.push_back(
+        {&hierarchy, std::move(source), std::move(name), std::vector<NodeState>(hierarchy.nodes.size())});
     drawable_.emplace_back(hierarchy.nodes.size(), uint8_t{0});
 }
 
@@ -161,7 +164,8 @@ void Streamer::request(const lod::Cut& cut) {
         if (counters_.inFlight >= settings_.requestsInFlight) break;
         Source& source = sources_[w.instance];
         NodeState& state = source.nodes[w.node];
-        if ((state.state != ChunkState::absent && state.state != ChunkState::failed) || frame_ < state.retryAt) continue;
+        if ((state.state != ChunkState::absent && state.state != ChunkState::failed) || frame_ < state.retryAt)
+            continue;
         const ChunkKey key{w.instance, w.node};
         setState(key, ChunkState::requested);
         ++counters_.inFlight;

@@ -19,16 +19,19 @@ constexpr double kMaximumRange = 60;
 double noise(double x, double y, uint64_t seed) {
     const double fx = std::floor(x), fy = std::floor(y);
     const auto corner = [&](double cx, double cy) {
-        Rng rng(seed ^ static_cast<uint64_t>(static_cast<int64_t>(cx)) * 0x9e3779b1u ^ static_cast<uint64_t>(static_cast<int64_t>(cy)) * 0x85ebca6bull << 20);
+        Rng rng(seed ^ static_cast<uint64_t>(static_cast<int64_t>(cx)) * 0x9e3779b1u ^
+                static_cast<uint64_t>(static_cast<int64_t>(cy)) * 0x85ebca6bull << 20);
         rng.next();
         return rng.uniform(-1, 1);
     };
     const double u = x - fx, v = y - fy, su = u * u * (3 - 2 * u), sv = v * v * (3 - 2 * v);
-    return glm::mix(glm::mix(corner(fx, fy), corner(fx + 1, fy), su), glm::mix(corner(fx, fy + 1), corner(fx + 1, fy + 1), su), sv);
+    return glm::mix(glm::mix(corner(fx, fy), corner(fx + 1, fy), su),
+                    glm::mix(corner(fx, fy + 1), corner(fx + 1, fy + 1), su), sv);
 }
 double fractal(double x, double y, uint64_t seed, int octaves) {
     double sum = 0, amplitude = 1;
-    for (int i = 0; i < octaves; ++i, amplitude *= 0.5, x *= 2.03, y *= 2.03) sum += amplitude * noise(x, y, seed + static_cast<uint64_t>(i));
+    for (int i = 0; i < octaves; ++i, amplitude *= 0.5, x *= 2.03, y *= 2.03)
+        sum += amplitude * noise(x, y, seed + static_cast<uint64_t>(i));
     return sum;
 }
 
@@ -73,11 +76,14 @@ class Scene {
         grid_.resize(kCells * kCells);
         for (uint32_t i = 0; i < spheres_.size(); ++i) insert(spheres_[i].centre, spheres_[i].radius, i, 0);
         for (uint32_t i = 0; i < cones_.size(); ++i)
-            insert(0.5 * (cones_[i].a + cones_[i].b), 0.5 * glm::length(cones_[i].b - cones_[i].a) + cones_[i].ra, i, 1);
+            insert(0.5 * (cones_[i].a + cones_[i].b), 0.5 * glm::length(cones_[i].b - cones_[i].a) + cones_[i].ra, i,
+                   1);
         for (uint32_t i = 0; i < leaves_.size(); ++i) insert(leaves_[i].centre, leaves_[i].radius, i, 2);
     }
 
-    double ground(double x, double y) const { return 1.1 * fractal(x * 0.06, y * 0.06, seed_, 4) + 0.03 * fractal(x * 1.7, y * 1.7, seed_ + 9, 2); }
+    double ground(double x, double y) const {
+        return 1.1 * fractal(x * 0.06, y * 0.06, seed_, 4) + 0.03 * fractal(x * 1.7, y * 1.7, seed_ + 9, 2);
+    }
 
     Hit trace(const dvec3& o, const dvec3& d) const {
         Hit hit;
@@ -91,12 +97,26 @@ class Scene {
         const double n = fractal(p.x * 3, p.y * 3 + p.z * 2, seed_ + 31, 3);
         dvec3 c;
         switch (hit.material) {
-            case 0: c = glm::mix(dvec3(0.25, 0.33, 0.12), dvec3(0.42, 0.34, 0.22), std::clamp(0.5 + 0.6 * fractal(p.x * 0.3, p.y * 0.3, seed_ + 5, 3), 0.0, 1.0)); break;
-            case 1: c = dvec3(0.45, 0.44, 0.42); break;
-            case 2: c = dvec3(0.33, 0.24, 0.16); break;
-            case 3: c = glm::mix(dvec3(0.16, 0.32, 0.08), dvec3(0.35, 0.45, 0.12), static_cast<double>(hit.id % 97) / 97.0); break;
-            case 4: c = windowAt(p) ? dvec3(0.12, 0.16, 0.22) : dvec3(0.78, 0.72, 0.6) * (std::fmod(std::abs(p.z) * 4, 1.0) < 0.06 ? 0.75 : 1.0); break;
-            default: c = dvec3(0.55, 0.2, 0.14) * (std::fmod(std::abs(p.x) * 3, 1.0) < 0.12 ? 0.7 : 1.0); break;
+            case 0:
+                c = glm::mix(dvec3(0.25, 0.33, 0.12), dvec3(0.42, 0.34, 0.22),
+                             std::clamp(0.5 + 0.6 * fractal(p.x * 0.3, p.y * 0.3, seed_ + 5, 3), 0.0, 1.0));
+                break;
+            case 1:
+                c = dvec3(0.45, 0.44, 0.42);
+                break;
+            case 2:
+                c = dvec3(0.33, 0.24, 0.16);
+                break;
+            case 3:
+                c = glm::mix(dvec3(0.16, 0.32, 0.08), dvec3(0.35, 0.45, 0.12), static_cast<double>(hit.id % 97) / 97.0);
+                break;
+            case 4:
+                c = windowAt(p) ? dvec3(0.12, 0.16, 0.22)
+                                : dvec3(0.78, 0.72, 0.6) * (std::fmod(std::abs(p.z) * 4, 1.0) < 0.06 ? 0.75 : 1.0);
+                break;
+            default:
+                c = dvec3(0.55, 0.2, 0.14) * (std::fmod(std::abs(p.x) * 3, 1.0) < 0.12 ? 0.7 : 1.0);
+                break;
         }
         return glm::clamp(c * (1.0 + 0.16 * n) * (0.75 + 0.25 * std::abs(hit.normal.z)), 0.0, 1.0);
     }
@@ -115,11 +135,14 @@ class Scene {
             if (s >= 2)
                 for (int b = 0; b < 4; ++b) {
                     const double azimuth = rng.uniform(0, 6.2831853), length = height * 0.26 * (1.1 - 0.1 * s);
-                    const dvec3 tip = next + dvec3(std::cos(azimuth) * length, std::sin(azimuth) * length, rng.uniform(0.1, 0.5) * length);
+                    const dvec3 tip = next + dvec3(std::cos(azimuth) * length, std::sin(azimuth) * length,
+                                                   rng.uniform(0.1, 0.5) * length);
                     cones_.push_back({next, tip, radius * 0.35, radius * 0.1});
                     for (int l = 0; l < 55; ++l) {
-                        const dvec3 c = glm::mix(next, tip, rng.uniform(0.35, 1.1)) + 0.35 * dvec3(rng.normal(), rng.normal(), rng.normal());
-                        leaves_.push_back({c, glm::normalize(dvec3(rng.normal(), rng.normal(), 0.7 + rng.normal())), rng.uniform(0.05, 0.11)});
+                        const dvec3 c = glm::mix(next, tip, rng.uniform(0.35, 1.1)) +
+                                        0.35 * dvec3(rng.normal(), rng.normal(), rng.normal());
+                        leaves_.push_back({c, glm::normalize(dvec3(rng.normal(), rng.normal(), 0.7 + rng.normal())),
+                                           rng.uniform(0.05, 0.11)});
                     }
                 }
             at = next;
@@ -130,7 +153,8 @@ class Scene {
     void insert(const dvec3& c, double r, uint32_t index, uint32_t kind) {
         const auto cell = [](double v) { return std::clamp(static_cast<int>((v + kExtent) / kCell), 0, kCells - 1); };
         for (int y = cell(c.y - r); y <= cell(c.y + r); ++y)
-            for (int x = cell(c.x - r); x <= cell(c.x + r); ++x) grid_[static_cast<size_t>(y * kCells + x)].push_back(index << 2 | kind);
+            for (int x = cell(c.x - r); x <= cell(c.x + r); ++x)
+                grid_[static_cast<size_t>(y * kCells + x)].push_back(index << 2 | kind);
     }
 
     static bool windowAt(const dvec3& p) {
@@ -157,7 +181,10 @@ class Scene {
                 if (hi >= hit.t) return;
                 const dvec3 q = o + hi * d;
                 const double e = 0.05;
-                hit = {hi, glm::normalize(dvec3(ground(q.x - e, q.y) - ground(q.x + e, q.y), ground(q.x, q.y - e) - ground(q.x, q.y + e), 2 * e)), 0, 0};
+                hit = {hi,
+                       glm::normalize(dvec3(ground(q.x - e, q.y) - ground(q.x + e, q.y),
+                                            ground(q.x, q.y - e) - ground(q.x, q.y + e), 2 * e)),
+                       0, 0};
                 return;
             }
             t = next;
@@ -179,7 +206,8 @@ class Scene {
             const dvec3 n = glm::normalize(dvec3(0, side, 1.1));
             const double t = glm::dot(dvec3(8.5, 7.5, 6.6) - o, n) / glm::dot(d, n);
             const dvec3 p = o + t * d;
-            if (t > 0 && t < hit.t && p.x > 3.6 && p.x < 13.4 && (p.y - 7.5) * side > 0 && (p.y - 7.5) * side < 3.9) hit = {t, n, 5, 0};
+            if (t > 0 && t < hit.t && p.x > 3.6 && p.x < 13.4 && (p.y - 7.5) * side > 0 && (p.y - 7.5) * side < 3.9)
+                hit = {t, n, 5, 0};
         }
         // Gables.
         for (const double x : {4.0, 13.0}) {
@@ -191,16 +219,21 @@ class Scene {
 
     void traceGrid(const dvec3& o, const dvec3& d, Hit& hit) const {
         // Walk the plan's cells (Amanatides and Woo).
-        int x = static_cast<int>(std::floor((o.x + kExtent) / kCell)), y = static_cast<int>(std::floor((o.y + kExtent) / kCell));
+        int x = static_cast<int>(std::floor((o.x + kExtent) / kCell)),
+            y = static_cast<int>(std::floor((o.y + kExtent) / kCell));
         const int stepX = d.x > 0 ? 1 : -1, stepY = d.y > 0 ? 1 : -1;
         const double deltaX = kCell / std::max(1e-12, std::abs(d.x)), deltaY = kCell / std::max(1e-12, std::abs(d.y));
-        double nextX = ((x + (stepX > 0)) * kCell - kExtent - o.x) / d.x, nextY = ((y + (stepY > 0)) * kCell - kExtent - o.y) / d.y;
+        double nextX = ((x + (stepX > 0)) * kCell - kExtent - o.x) / d.x,
+               nextY = ((y + (stepY > 0)) * kCell - kExtent - o.y) / d.y;
         double t = 0;
         while (x >= 0 && y >= 0 && x < kCells && y < kCells && t < hit.t) {
             for (const uint32_t item : grid_[static_cast<size_t>(y * kCells + x)]) {
-                if ((item & 3u) == 0) traceSphere(spheres_[item >> 2], o, d, hit);
-                else if ((item & 3u) == 1) traceCone(cones_[item >> 2], o, d, hit);
-                else traceLeaf(item >> 2, o, d, hit);
+                if ((item & 3u) == 0)
+                    traceSphere(spheres_[item >> 2], o, d, hit);
+                else if ((item & 3u) == 1)
+                    traceCone(cones_[item >> 2], o, d, hit);
+                else
+                    traceLeaf(item >> 2, o, d, hit);
             }
             if (nextX < nextY) {
                 t = nextX;
@@ -261,15 +294,20 @@ std::vector<ScanPoint> growScan(const ScanOptions& options) {
     const auto castRow = [&](int s, uint64_t row, uint64_t rows, uint64_t columns, std::vector<ScanPoint>& out) {
         const dvec3 o = scanner(s);
         Rng rng(options.seed * 1315423911u + static_cast<uint64_t>(s) * 2654435761u + row);
-        const double elevation = (-60.0 + 130.0 * (static_cast<double>(row) + 0.5) / static_cast<double>(rows)) * 0.017453292519943295;
+        const double elevation =
+            (-60.0 + 130.0 * (static_cast<double>(row) + 0.5) / static_cast<double>(rows)) * 0.017453292519943295;
         for (uint64_t c = 0; c < columns; ++c) {
-            const double azimuth = 6.283185307179586 * (static_cast<double>(c) + rng.uniform(-0.05, 0.05)) / static_cast<double>(columns);
-            const dvec3 d(std::cos(azimuth) * std::cos(elevation), std::sin(azimuth) * std::cos(elevation), std::sin(elevation));
+            const double azimuth =
+                6.283185307179586 * (static_cast<double>(c) + rng.uniform(-0.05, 0.05)) / static_cast<double>(columns);
+            const dvec3 d(std::cos(azimuth) * std::cos(elevation), std::sin(azimuth) * std::cos(elevation),
+                          std::sin(elevation));
             const Hit hit = scene.trace(o, d);
             if (hit.material < 0) continue;
             const dvec3 p = o + (hit.t + options.noiseMetres * rng.normal()) * d;
             const dvec3 colour = glm::clamp(scene.colourAt(hit, o + hit.t * d) * 255.0 + 0.5, 0.0, 255.0);
-            out.push_back({{p.x, p.y, p.z}, {static_cast<uint8_t>(colour.x), static_cast<uint8_t>(colour.y), static_cast<uint8_t>(colour.z)}});
+            out.push_back(
+                {{p.x, p.y, p.z},
+                 {static_cast<uint8_t>(colour.x), static_cast<uint8_t>(colour.y), static_cast<uint8_t>(colour.z)}});
         }
     };
     const double aspect = 360.0 / 130.0;
@@ -285,14 +323,16 @@ std::vector<ScanPoint> growScan(const ScanOptions& options) {
     std::vector<ScanPoint> points;
     const uint64_t pilotRows = 64;
     castAll(pilotRows, points);
-    const double perRay = std::max(1e-3, static_cast<double>(points.size()) / (static_cast<double>(pilotRows * pilotRows) * aspect * positions));
+    const double perRay = std::max(
+        1e-3, static_cast<double>(points.size()) / (static_cast<double>(pilotRows * pilotRows) * aspect * positions));
     points.clear();
     const double rays = static_cast<double>(options.points) / perRay / positions;
     castAll(std::max<uint64_t>(1, static_cast<uint64_t>(std::ceil(std::sqrt(rays * 1.02 / aspect)))), points);
     // To the exact number, by dropping evenly.
     if (points.size() > options.points) {
         for (uint64_t i = 0; i < options.points; ++i)
-            points[i] = points[static_cast<size_t>(static_cast<double>(i) * static_cast<double>(points.size()) / static_cast<double>(options.points))];
+            points[i] = points[static_cast<size_t>(static_cast<double>(i) * static_cast<double>(points.size()) /
+                                                   static_cast<double>(options.points))];
         points.resize(options.points);
     }
     return points;

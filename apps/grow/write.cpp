@@ -67,7 +67,8 @@ Result<void> writePly(OutputFile& file, const std::vector<ScanPoint>& points, co
     const std::string header = fmt::format(
         "ply\nformat binary_little_endian 1.0\ncomment stipple grow scan --seed {}\nelement vertex {}\n"
         "property double x\nproperty double y\nproperty double z\n"
-        "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n", options.seed, points.size());
+        "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
+        options.seed, points.size());
     STIPPLE_TRY(file.append(header.data(), header.size()));
     constexpr size_t kRecord = 27;
     std::vector<uint8_t> bytes;

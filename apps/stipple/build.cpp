@@ -40,9 +40,10 @@ Result<void> run(const Options& o) {
         return {};
     }
     for (const std::string& note : r.notes) fmt::print(stderr, "note: {}\n", note);
-    fmt::print("{}: {} points in {} nodes, {} ({:.1f} bytes a point), {:.2f} s, {:.2f} M points/s, peak memory {}\n", o.output,
-               r.pointsOut, r.nodes, humanBytes(r.bytesOut), static_cast<double>(r.bytesOut) / static_cast<double>(r.pointsOut),
-               r.seconds, static_cast<double>(r.pointsIn) / r.seconds * 1e-6, humanBytes(peakRssBytes()));
+    fmt::print("{}: {} points in {} nodes, {} ({:.1f} bytes a point), {:.2f} s, {:.2f} M points/s, peak memory {}\n",
+               o.output, r.pointsOut, r.nodes, humanBytes(r.bytesOut),
+               static_cast<double>(r.bytesOut) / static_cast<double>(r.pointsOut), r.seconds,
+               static_cast<double>(r.pointsIn) / r.seconds * 1e-6, humanBytes(peakRssBytes()));
     for (const auto& [reason, count] : r.dropped) fmt::print("dropped {} points: {}\n", count, reason);
     return {};
 }

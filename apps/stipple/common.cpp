@@ -26,18 +26,25 @@ int report(const Error& error) {
 void BuildOptions::addTo(CLI::App& app) {
     app.add_option("--memory", memory, "memory that the build may use, e.g. 512M or 4G")->capture_default_str();
     app.add_option("--threads", threads, "threads (0: all cores)")->check(CLI::Range(0, 1024))->capture_default_str();
-    app.add_option("--normals", normals, "auto: estimate missing normals; keep: only those of the file; none: no normals at all")
-        ->check(CLI::IsMember({"auto", "keep", "none"}))->capture_default_str();
+    app.add_option("--normals", normals,
+                   "auto: estimate missing normals; keep: only those of the file; none: no normals at all")
+        ->check(CLI::IsMember({"auto", "keep", "none"}))
+        ->capture_default_str();
     app.add_option("--radii", radii, "auto: estimate missing radii from the spacing; keep: only those of the file")
-        ->check(CLI::IsMember({"auto", "keep"}))->capture_default_str();
-    app.add_option("--up", up, "up axis, instead of the format's own (LAS: z, PLY: y)")->check(CLI::IsMember({"x", "y", "z"}));
+        ->check(CLI::IsMember({"auto", "keep"}))
+        ->capture_default_str();
+    app.add_option("--up", up, "up axis, instead of the format's own (LAS: z, PLY: y)")
+        ->check(CLI::IsMember({"x", "y", "z"}));
 }
 
 Result<lod::BuildSettings> BuildOptions::settings() const {
     lod::BuildSettings s;
     s.memoryBytes = parseBytes(memory);
-    if (s.memoryBytes == 0) return fail(ErrorKind::usage, fmt::format("'{}' is not a size", memory), "--memory", "e.g. 2G");
-    s.normals = normals == "none" ? lod::NormalsMode::none : normals == "keep" ? lod::NormalsMode::keep : lod::NormalsMode::automatic;
+    if (s.memoryBytes == 0)
+        return fail(ErrorKind::usage, fmt::format("'{}' is not a size", memory), "--memory", "e.g. 2G");
+    s.normals = normals == "none"   ? lod::NormalsMode::none
+                : normals == "keep" ? lod::NormalsMode::keep
+                                    : lod::NormalsMode::automatic;
     s.estimateRadii = radii != "keep";
     if (!up.empty()) s.up = static_cast<lod::UpAxis>(up[0] - 'x');
     return s;
@@ -52,14 +59,17 @@ Result<std::string> cachePath(const std::vector<std::string>& inputs, const Buil
         const fs::path absolute = fs::absolute(input, error);
         const auto size = fs::file_size(absolute, error);
         const auto time = fs::last_write_time(absolute, error);
-        key += fmt::format("|{}|{}|{}", absolute.string(), error ? 0 : size, error ? 0 : time.time_since_epoch().count());
+        key +=
+            fmt::format("|{}|{}|{}", absolute.string(), error ? 0 : size, error ? 0 : time.time_since_epoch().count());
     }
     const char* cache = std::getenv("XDG_CACHE_HOME");
     const char* home = std::getenv("HOME");
-    const fs::path folder = cache && *cache ? fs::path(cache) / "stipple" : fs::path(home ? home : ".") / ".cache" / "stipple";
+    const fs::path folder =
+        cache && *cache ? fs::path(cache) / "stipple" : fs::path(home ? home : ".") / ".cache" / "stipple";
     std::error_code error;
     fs::create_directories(folder, error);
-    if (error) return fail(ErrorKind::output, "cannot be created: " + error.message(), folder.string(), "set XDG_CACHE_HOME");
+    if (error)
+        return fail(ErrorKind::output, "cannot be created: " + error.message(), folder.string(), "set XDG_CACHE_HOME");
     return (folder / (hexDigits(hashBytes(key.data(), key.size())) + ".stipple")).string();
 }
 
@@ -71,7 +81,8 @@ Result<std::shared_ptr<const lod::Store>> openScene(const std::vector<std::strin
     if (inputs.size() != 1 || fs::path(path).extension() != ".stipple") {
         for (const std::string& input : inputs)
             if (fs::path(input).extension() == ".stipple")
-                return fail(ErrorKind::usage, "a built scene and other inputs cannot be mixed", input, "name one scene, or only raw inputs");
+                return fail(ErrorKind::usage, "a built scene and other inputs cannot be mixed", input,
+                            "name one scene, or only raw inputs");
         STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
         STIPPLE_ASSIGN(path, cachePath(inputs, build));
         if (!fs::exists(path)) {
@@ -103,9 +114,12 @@ Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, 
     }
 #else
     if (device == "auto") return cpu::makeCpuBackend(executor);
-    if (device.rfind("gpu", 0) == 0) return fail(ErrorKind::device, "this program was built without Vulkan", "--device " + device, "use --device cpu");
+    if (device.rfind("gpu", 0) == 0)
+        return fail(ErrorKind::device, "this program was built without Vulkan", "--device " + device,
+                    "use --device cpu");
 #endif
-    return fail(ErrorKind::usage, fmt::format("'{}' is not a device", device), "--device", "auto, cpu, gpu, gpu:NAME or reference");
+    return fail(ErrorKind::usage, fmt::format("'{}' is not a device", device), "--device",
+                "auto, cpu, gpu, gpu:NAME or reference");
 }
 
 std::string listDevices() {
@@ -123,7 +137,8 @@ Result<glm::dvec3> parseVector(const std::string& text, const char* option) {
     glm::dvec3 v(0);
     std::istringstream in(text);
     char comma1 = 0, comma2 = 0;
-    if (!(in >> v.x >> comma1 >> v.y >> comma2 >> v.z) || comma1 != ',' || comma2 != ',' || !(in >> std::ws).eof() || !std::isfinite(v.x + v.y + v.z))
+    if (!(in >> v.x >> comma1 >> v.y >> comma2 >> v.z) || comma1 != ',' || comma2 != ',' || !(in >> std::ws).eof() ||
+        !std::isfinite(v.x + v.y + v.z))
         return fail(ErrorKind::usage, fmt::format("'{}' is not three numbers", text), option, "e.g. 1.5,2,-3");
     return v;
 }
@@ -133,7 +148,8 @@ Result<glm::uvec2> parseSize(const std::string& text) {
     char x = 0;
     std::istringstream in(text);
     if (!(in >> w >> x >> h) || x != 'x' || !(in >> std::ws).eof() || w == 0 || h == 0 || w > 16384 || h > 16384)
-        return fail(ErrorKind::usage, fmt::format("'{}' is not a size up to 16384x16384", text), "--size", "e.g. 1920x1080");
+        return fail(ErrorKind::usage, fmt::format("'{}' is not a size up to 16384x16384", text), "--size",
+                    "e.g. 1920x1080");
     return glm::uvec2(w, h);
 }
 

@@ -25,14 +25,20 @@ Result<void> run(const Options& o) {
     if (!o.diff.empty()) STIPPLE_TRY(image::writeImage(o.diff, difference));
     const auto& d = *compared;
     if (o.json) {
-        const nlohmann::json j = {{"psnr", jsonNumber(d.psnr)}, {"foreground_psnr", jsonNumber(d.foregroundPsnr)}, {"max_diff", d.maxDiff},
-                                  {"differing_fraction", d.differingFraction}, {"threshold", o.threshold},
-                                  {"silhouette_iou", d.silhouetteIou}, {"holes", d.holes}};
+        const nlohmann::json j = {{"psnr", jsonNumber(d.psnr)},
+                                  {"foreground_psnr", jsonNumber(d.foregroundPsnr)},
+                                  {"max_diff", d.maxDiff},
+                                  {"differing_fraction", d.differingFraction},
+                                  {"threshold", o.threshold},
+                                  {"silhouette_iou", d.silhouetteIou},
+                                  {"holes", d.holes}};
         fmt::print("{}\n", j.dump(2));
     } else {
-        fmt::print("PSNR {:.2f} dB (foreground {:.2f} dB), largest difference {}/255, {:.4f} % of the pixels differ by more than {}/255, "
-                   "silhouette IoU {:.5f}, holes {}\n", d.psnr, d.foregroundPsnr, d.maxDiff, 100 * d.differingFraction, o.threshold,
-                   d.silhouetteIou, d.holes);
+        fmt::print(
+            "PSNR {:.2f} dB (foreground {:.2f} dB), largest difference {}/255, {:.4f} % of the pixels differ by more "
+            "than {}/255, "
+            "silhouette IoU {:.5f}, holes {}\n",
+            d.psnr, d.foregroundPsnr, d.maxDiff, 100 * d.differingFraction, o.threshold, d.silhouetteIou, d.holes);
     }
     return {};
 }

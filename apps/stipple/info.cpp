@@ -23,38 +23,60 @@ nlohmann::json storeInfo(const lod::Store& store) {
     const lod::StoreDescription& d = store.description;
     nlohmann::json levels = nlohmann::json::array();
     for (const lod::Node& n : h.nodes) {
-        while (levels.size() <= n.level) levels.push_back({{"nodes", 0}, {"records", 0}, {"bytes", 0}, {"largest_error", 0.0}});
+        while (levels.size() <= n.level)
+            levels.push_back({{"nodes", 0}, {"records", 0}, {"bytes", 0}, {"largest_error", 0.0}});
         nlohmann::json& l = levels[n.level];
         l["nodes"] = l["nodes"].get<uint64_t>() + 1;
         l["records"] = l["records"].get<uint64_t>() + n.records;
         l["bytes"] = l["bytes"].get<uint64_t>() + n.chunkBytes;
         l["largest_error"] = std::max(l["largest_error"].get<double>(), h.unit * h.errors.decode(n.errorCode));
     }
-    return {{"kind", "stipple store"}, {"path", store.path}, {"bytes", store.fileBytes}, {"content_hash", hexDigits(store.contentHash)},
-            {"source", d.source}, {"points", d.points}, {"records", d.records}, {"nodes", h.nodes.size()}, {"levels", levels},
-            {"min", vectorJson(d.boundsMin)}, {"max", vectorJson(d.boundsMax)}, {"origin", vectorJson(h.origin)},
-            {"lattice_unit", h.unit}, {"coordinate_rounding", d.roundingUnits}, {"metres_per_unit", d.metresPerUnit},
-            {"up", std::string(1, static_cast<char>('x' + static_cast<int>(d.up)))}, {"crs", d.crs}, {"attributes", d.attributes},
-            {"has_colour", d.hasColour}, {"has_normals", d.hasNormals}};
+    return {{"kind", "stipple store"},
+            {"path", store.path},
+            {"bytes", store.fileBytes},
+            {"content_hash", hexDigits(store.contentHash)},
+            {"source", d.source},
+            {"points", d.points},
+            {"records", d.records},
+            {"nodes", h.nodes.size()},
+            {"levels", levels},
+            {"min", vectorJson(d.boundsMin)},
+            {"max", vectorJson(d.boundsMax)},
+            {"origin", vectorJson(h.origin)},
+            {"lattice_unit", h.unit},
+            {"coordinate_rounding", d.roundingUnits},
+            {"metres_per_unit", d.metresPerUnit},
+            {"up", std::string(1, static_cast<char>('x' + static_cast<int>(d.up)))},
+            {"crs", d.crs},
+            {"attributes", d.attributes},
+            {"has_colour", d.hasColour},
+            {"has_normals", d.hasNormals}};
 }
 
 void printStore(const nlohmann::json& j) {
-    const auto vec = [](const nlohmann::json& v) { return fmt::format("{:.10g} {:.10g} {:.10g}", v[0].get<double>(), v[1].get<double>(), v[2].get<double>()); };
-    fmt::print("{}: {} points from {}, {} records in {} nodes, {}\n", j["path"].get<std::string>(), j["points"].get<uint64_t>(),
-               j["source"].get<std::string>(), j["records"].get<uint64_t>(), j["nodes"].get<uint64_t>(), humanBytes(j["bytes"].get<uint64_t>()));
+    const auto vec = [](const nlohmann::json& v) {
+        return fmt::format("{:.10g} {:.10g} {:.10g}", v[0].get<double>(), v[1].get<double>(), v[2].get<double>());
+    };
+    fmt::print("{}: {} points from {}, {} records in {} nodes, {}\n", j["path"].get<std::string>(),
+               j["points"].get<uint64_t>(), j["source"].get<std::string>(), j["records"].get<uint64_t>(),
+               j["nodes"].get<uint64_t>(), humanBytes(j["bytes"].get<uint64_t>()));
     fmt::print("  bounds        {} .. {}\n  origin        {}\n", vec(j["min"]), vec(j["max"]), vec(j["origin"]));
     fmt::print("  lattice unit  {:.6g} (coordinates {})\n", j["lattice_unit"].get<double>(),
-               j["coordinate_rounding"].get<double>() == 0 ? std::string("exact") : fmt::format("rounded by at most {:.3g}", j["coordinate_rounding"].get<double>()));
-    fmt::print("  up            {}\n  colour        {}\n  normals       {}\n", j["up"].get<std::string>(), j["has_colour"].get<bool>() ? "yes" : "no",
-               j["has_normals"].get<bool>() ? "yes" : "no");
+               j["coordinate_rounding"].get<double>() == 0
+                   ? std::string("exact")
+                   : fmt::format("rounded by at most {:.3g}", j["coordinate_rounding"].get<double>()));
+    fmt::print("  up            {}\n  colour        {}\n  normals       {}\n", j["up"].get<std::string>(),
+               j["has_colour"].get<bool>() ? "yes" : "no", j["has_normals"].get<bool>() ? "yes" : "no");
     if (!j["crs"].get<std::string>().empty()) fmt::print("  crs           {}\n", j["crs"].get<std::string>());
     std::string names;
     for (const auto& a : j["attributes"]) names += (names.empty() ? "" : ", ") + a.get<std::string>();
-    fmt::print("  attributes    {}\n  hash          {}\n  level   nodes    records      bytes  largest error\n", names, j["content_hash"].get<std::string>());
+    fmt::print("  attributes    {}\n  hash          {}\n  level   nodes    records      bytes  largest error\n", names,
+               j["content_hash"].get<std::string>());
     for (size_t l = 0; l < j["levels"].size(); ++l) {
         const auto& level = j["levels"][l];
-        fmt::print("  {:5} {:7} {:10} {:>10}  {:.4g}\n", l, level["nodes"].get<uint64_t>(), level["records"].get<uint64_t>(),
-                   humanBytes(level["bytes"].get<uint64_t>()), level["largest_error"].get<double>());
+        fmt::print("  {:5} {:7} {:10} {:>10}  {:.4g}\n", l, level["nodes"].get<uint64_t>(),
+                   level["records"].get<uint64_t>(), humanBytes(level["bytes"].get<uint64_t>()),
+                   level["largest_error"].get<double>());
     }
 }
 
@@ -77,8 +99,16 @@ Result<void> run(const Options& o) {
     }
     STIPPLE_ASSIGN(const lod::PointSource source, lod::openPointSource(o.input));
     const lod::SourceInfo& i = source.info;
-    nlohmann::json j = {{"kind", "input"}, {"path", i.path}, {"format", i.format}, {"points", i.points}, {"attributes", i.attributes},
-                        {"crs", i.crs}, {"notes", i.notes}, {"has_colour", i.hasColour}, {"has_normals", i.hasNormal}, {"has_radii", i.hasRadius}};
+    nlohmann::json j = {{"kind", "input"},
+                        {"path", i.path},
+                        {"format", i.format},
+                        {"points", i.points},
+                        {"attributes", i.attributes},
+                        {"crs", i.crs},
+                        {"notes", i.notes},
+                        {"has_colour", i.hasColour},
+                        {"has_normals", i.hasNormal},
+                        {"has_radii", i.hasRadius}};
     if (i.isLattice) {
         j["scale"] = vectorJson(i.scale);
         j["offset"] = vectorJson(i.offset);
@@ -119,7 +149,8 @@ Result<void> run(const Options& o) {
     }
     fmt::print("{}: {}, {} points\n", i.path, i.format, i.points);
     for (const auto& [key, value] : j.items())
-        if (key != "path" && key != "format" && key != "points" && key != "kind") fmt::print("  {:18} {}\n", key, value.dump());
+        if (key != "path" && key != "format" && key != "points" && key != "kind")
+            fmt::print("  {:18} {}\n", key, value.dump());
     return {};
 }
 

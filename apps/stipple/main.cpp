@@ -9,11 +9,12 @@ int main(int argc, char** argv) {
     using namespace stipple;
     CLI::App app{"Stipple streams scans that do not fit in memory and draws them at a stated accuracy."};
     app.require_subcommand(1);
-    app.footer("A newcomer's three lines:\n"
-               "  stipple build scan.las -o scan.stipple\n"
-               "  stipple render scan.stipple -o scan.png --size 1920x1080\n"
-               "  stipple view scan.stipple\n"
-               "Exit codes: 0 fine, 2 usage, 3 input, 4 output, 5 device, 6 budget.");
+    app.footer(
+        "A newcomer's three lines:\n"
+        "  stipple build scan.las -o scan.stipple\n"
+        "  stipple render scan.stipple -o scan.png --size 1920x1080\n"
+        "  stipple view scan.stipple\n"
+        "Exit codes: 0 fine, 2 usage, 3 input, 4 output, 5 device, 6 budget.");
     bool version = false;
     app.add_flag("--version", version, "print version, backends and devices");
     int status = 0;

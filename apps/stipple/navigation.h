@@ -11,15 +11,18 @@ namespace stipple::app {
 
 class Navigation {
   public:
-    Navigation(const scene::Camera& start, double diagonal) : camera_(start), up_(glm::normalize(start.up)), speed_(0.2 * diagonal) {}
+    Navigation(const scene::Camera& start, double diagonal)
+        : camera_(start), up_(glm::normalize(start.up)), speed_(0.2 * diagonal) {}
     const scene::Camera& camera() const { return camera_; }
     bool isFlying() const { return flying_; }
     void toggleFly() { flying_ = !flying_; }
 
     void move(const gpu::Input& in) {
         const double dt = std::clamp(in.seconds, 0.0, 0.1);
-        if (flying_) fly(in, dt);
-        else orbit(in);
+        if (flying_)
+            fly(in, dt);
+        else
+            orbit(in);
     }
 
   private:
@@ -28,7 +31,8 @@ class Navigation {
     /// Turns `v` about the up axis and then towards it, staying off the poles.
     glm::dvec3 turned(const glm::dvec3& v, double yaw, double pitch) const {
         const double length = glm::length(v);
-        const double height = std::clamp(std::asin(std::clamp(glm::dot(v, up_) / length, -1.0, 1.0)) + pitch, -1.55, 1.55);
+        const double height =
+            std::clamp(std::asin(std::clamp(glm::dot(v, up_) / length, -1.0, 1.0)) + pitch, -1.55, 1.55);
         glm::dvec3 flat = v - up_ * glm::dot(v, up_);
         if (!(glm::length(flat) > 1e-12)) flat = glm::cross(up_, glm::dvec3(up_.y, up_.z, up_.x));
         flat = glm::normalize(flat);
@@ -41,7 +45,8 @@ class Navigation {
         if (in.leftButton) back = turned(back, -kRadiansPerPixel * in.mouseDeltaX, kRadiansPerPixel * in.mouseDeltaY);
         back *= std::exp(-0.15 * in.scroll);
         if (in.rightButton) {
-            const glm::dvec3 right = glm::normalize(glm::cross(-back, up_)), above = glm::normalize(glm::cross(right, -back));
+            const glm::dvec3 right = glm::normalize(glm::cross(-back, up_)),
+                             above = glm::normalize(glm::cross(right, -back));
             const double perPixel = glm::length(back) / std::max(1u, in.height);
             camera_.target += perPixel * (-in.mouseDeltaX * right + in.mouseDeltaY * above);
         }
@@ -51,10 +56,12 @@ class Navigation {
     void fly(const gpu::Input& in, double dt) {
         glm::dvec3 forward = camera_.target - camera_.eye;
         const double length = glm::length(forward);
-        if (in.leftButton) forward = turned(forward, -kRadiansPerPixel * in.mouseDeltaX, -kRadiansPerPixel * in.mouseDeltaY);
+        if (in.leftButton)
+            forward = turned(forward, -kRadiansPerPixel * in.mouseDeltaX, -kRadiansPerPixel * in.mouseDeltaY);
         speed_ *= std::exp(0.15 * in.scroll);
         const glm::dvec3 ahead = glm::normalize(forward), right = glm::normalize(glm::cross(ahead, up_));
-        glm::dvec3 step = ahead * double(in.forward - in.back) + right * double(in.right - in.left) + up_ * double(in.up - in.down);
+        glm::dvec3 step =
+            ahead * double(in.forward - in.back) + right * double(in.right - in.left) + up_ * double(in.up - in.down);
         step *= dt * speed_ * (in.fast ? 5.0 : 1.0);
         camera_.eye += step;
         camera_.target = camera_.eye + ahead * length;

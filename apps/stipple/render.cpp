@@ -18,7 +18,8 @@ namespace {
 
 struct Options {
     std::vector<std::string> inputs;
-    std::string output, size = "1280x720", eye, target, up, path, mode = "pullpush", device = "auto", shade = "auto", background = "24,26,30";
+    std::string output, size = "1280x720", eye, target, up, path, mode = "pullpush", device = "auto", shade = "auto",
+                        background = "24,26,30";
     std::string debug = "none", resident = "1G";
     double fov = 50, error = 1;
     int frames = 1, samples = 4, orbit = 0;
@@ -74,7 +75,8 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     s.draw.worldUp = shot.worldUp;
     STIPPLE_ASSIGN(const glm::dvec3 background, parseVector(o.background, "--background"));
     for (int c = 0; c < 3; ++c) {
-        if (!(background[c] >= 0 && background[c] <= 255)) return fail(ErrorKind::usage, "channels are 0 to 255", "--background");
+        if (!(background[c] >= 0 && background[c] <= 255))
+            return fail(ErrorKind::usage, "channels are 0 to 255", "--background");
         s.draw.background[c] = shared::linearFromSrgb(static_cast<float>(background[c]) / 255.0f);
     }
     static const std::array<const char*, 5> names{"none", "level", "error", "holes", "normals"};
@@ -90,10 +92,21 @@ double quantile(std::vector<double> values, double q) {
 }
 
 nlohmann::json countersJson(const FrameCounters& c) {
-    return {{"nodes_visited", c.nodesVisited}, {"nodes_culled", c.nodesCulled}, {"nodes_missing", c.nodesMissing},
-            {"records_tested", c.recordsTested}, {"cut_evaluations", c.cutEvaluations}, {"passes", c.passes}, {"blocks", c.blocks},
-            {"requests", c.requests}, {"uploads", c.uploads}, {"evictions", c.evictions}, {"failures", c.failures},
-            {"refused", c.refused}, {"budget_truncated", c.budgetTruncated}, {"tau_target_px", c.tauTargetPixels}, {"cut_ms", c.cutMs}};
+    return {{"nodes_visited", c.nodesVisited},
+            {"nodes_culled", c.nodesCulled},
+            {"nodes_missing", c.nodesMissing},
+            {"records_tested", c.recordsTested},
+            {"cut_evaluations", c.cutEvaluations},
+            {"passes", c.passes},
+            {"blocks", c.blocks},
+            {"requests", c.requests},
+            {"uploads", c.uploads},
+            {"evictions", c.evictions},
+            {"failures", c.failures},
+            {"refused", c.refused},
+            {"budget_truncated", c.budgetTruncated},
+            {"tau_target_px", c.tauTargetPixels},
+            {"cut_ms", c.cutMs}};
 }
 
 /// out.png -> out_0007.png
@@ -118,8 +131,8 @@ struct Timings {
     }
 };
 
-Result<void> runFrames(const Options& o, const Shot& shot, const render::FrameSettings& settings, render::FrameState& state,
-                       Executor& executor, Timings& timings, bool& complete) {
+Result<void> runFrames(const Options& o, const Shot& shot, const render::FrameSettings& settings,
+                       render::FrameState& state, Executor& executor, Timings& timings, bool& complete) {
     // The first image: as soon as the root is there, whatever is missing.
     const lod::View& first = shot.views.front();
     while (!state.streamer->residency().drawable[0][0]) {
@@ -128,8 +141,10 @@ Result<void> runFrames(const Options& o, const Shot& shot, const render::FrameSe
         if (state.streamer->residency().drawable[0][0]) break;
         if (state.streamer->counters().failures > 0) return fail(ErrorKind::input, state.streamer->lastFailure());
         if (state.streamer->counters().refused > 0)
-            return fail(ErrorKind::budget, "the first chunk does not fit", "--resident " + o.resident, "give more memory");
-        lod::selectCut(state.hierarchies, state.instances, state.streamer->residency(), first, settings.budgets, state.scratch, state.cut);
+            return fail(ErrorKind::budget, "the first chunk does not fit", "--resident " + o.resident,
+                        "give more memory");
+        lod::selectCut(state.hierarchies, state.instances, state.streamer->residency(), first, settings.budgets,
+                       state.scratch, state.cut);
         state.streamer->request(state.cut);
         std::this_thread::yield();
     }
@@ -172,13 +187,18 @@ Result<void> run(const Options& o) {
             STIPPLE_ASSIGN(const render::Image traced, reference::trace(*store, shot.views[i], trace, *executor));
             STIPPLE_TRY(image::writeImage(shot.views.size() > 1 ? numbered(o.output, i) : o.output, traced));
         }
-        if (o.json) fmt::print("{}\n", nlohmann::json{{"backend", "trace"}, {"samples_per_pixel", o.samples * o.samples}, {"seconds", nowSeconds() - start}}.dump(2));
+        if (o.json)
+            fmt::print("{}\n", nlohmann::json{{"backend", "trace"},
+                                              {"samples_per_pixel", o.samples * o.samples},
+                                              {"seconds", nowSeconds() - start}}
+                                   .dump(2));
         return {};
     }
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
     streaming::StreamSettings stream;
     stream.residentBytes = parseBytes(o.resident);
-    if (stream.residentBytes == 0) return fail(ErrorKind::usage, "is not a size", "--resident " + o.resident, "e.g. 1G");
+    if (stream.residentBytes == 0)
+        return fail(ErrorKind::usage, "is not a size", "--resident " + o.resident, "e.g. 1G");
     auto state = render::makeFrameState({store}, *backend, *executor, stream);
     Timings timings;
     bool complete = false;
@@ -186,23 +206,36 @@ Result<void> run(const Options& o) {
     if (shot.views.size() == 1) STIPPLE_TRY(image::writeImage(o.output, state->image));
     const FrameCounters& c = state->counters;
     if (!complete && !o.noWait && !o.quiet)
-        fmt::print(stderr, "note: {} chunks that this view wants are missing ({}); delivered error {:.2f} px\n", c.nodesMissing,
-                   c.failures ? state->streamer->lastFailure() : "the limit of --resident is reached", c.tauEffectivePixels);
+        fmt::print(stderr, "note: {} chunks that this view wants are missing ({}); delivered error {:.2f} px\n",
+                   c.nodesMissing, c.failures ? state->streamer->lastFailure() : "the limit of --resident is reached",
+                   c.tauEffectivePixels);
     if (o.json) {
         nlohmann::json passes = nlohmann::json::array();
         for (size_t i = 0; i < timings.passNames.size(); ++i)
             passes.push_back({{"name", timings.passNames[i]}, {"ms", quantile(timings.passes[i], 0.5)}});
-        const nlohmann::json j = {{"backend", backend->name()}, {"device", backend->device()}, {"mode", o.mode}, {"width", size.x}, {"height", size.y},
-                                  {"frames", timings.frames.size()},
-                                  {"frame_ms", {{"median", quantile(timings.frames, 0.5)}, {"p95", quantile(timings.frames, 0.95)}}},
-                                  {"passes", passes}, {"records_drawn", c.recordsDrawn}, {"nodes_drawn", c.nodesDrawn},
-                                  {"tau_eff_px", c.tauEffectivePixels}, {"complete", complete}, {"bytes_streamed", c.bytesStreamed},
-                                  {"resident_bytes", c.residentBytes}, {"peak_rss_bytes", peakRssBytes()},
-                                  {"first_image_ms", timings.firstImageMs}, {"complete_ms", timings.completeMs}, {"counters", countersJson(c)}};
+        const nlohmann::json j = {
+            {"backend", backend->name()},
+            {"device", backend->device()},
+            {"mode", o.mode},
+            {"width", size.x},
+            {"height", size.y},
+            {"frames", timings.frames.size()},
+            {"frame_ms", {{"median", quantile(timings.frames, 0.5)}, {"p95", quantile(timings.frames, 0.95)}}},
+            {"passes", passes},
+            {"records_drawn", c.recordsDrawn},
+            {"nodes_drawn", c.nodesDrawn},
+            {"tau_eff_px", c.tauEffectivePixels},
+            {"complete", complete},
+            {"bytes_streamed", c.bytesStreamed},
+            {"resident_bytes", c.residentBytes},
+            {"peak_rss_bytes", peakRssBytes()},
+            {"first_image_ms", timings.firstImageMs},
+            {"complete_ms", timings.completeMs},
+            {"counters", countersJson(c)}};
         fmt::print("{}\n", j.dump(2));
     } else if (!o.quiet && shot.views.size() == 1) {
-        fmt::print("{}: {} records, {:.2f} px error, {:.1f} ms a frame on {}\n", o.output, c.recordsDrawn, c.tauEffectivePixels,
-                   quantile(timings.frames, 0.5), backend->device());
+        fmt::print("{}: {} records, {:.2f} px error, {:.1f} ms a frame on {}\n", o.output, c.recordsDrawn,
+                   c.tauEffectivePixels, quantile(timings.frames, 0.5), backend->device());
     }
     return {};
 }
@@ -218,26 +251,41 @@ void setupRender(CLI::App& app, int& status) {
     sub->add_option("--eye", o->eye, "camera position x,y,z in file coordinates (default: fits the scene)");
     sub->add_option("--target", o->target, "point that the camera looks at");
     sub->add_option("--up", o->up, "up direction x,y,z");
-    sub->add_option("--fov", o->fov, "vertical field of view, degrees")->check(CLI::Range(0.1, 170.0))->capture_default_str();
+    sub->add_option("--fov", o->fov, "vertical field of view, degrees")
+        ->check(CLI::Range(0.1, 170.0))
+        ->capture_default_str();
     auto* path = sub->add_option("--camera-path", o->path, "JSON file with keys; one picture per frame");
     sub->add_option("--orbit", o->orbit, "N pictures around the scene")->check(CLI::Range(1, 100000))->excludes(path);
-    sub->add_option("--frames", o->frames, "frames of the path, or repetitions of one view for timing")->check(CLI::Range(1, 1000000))->capture_default_str();
+    sub->add_option("--frames", o->frames, "frames of the path, or repetitions of one view for timing")
+        ->check(CLI::Range(1, 1000000))
+        ->capture_default_str();
     sub->add_option("--mode", o->mode, "pullpush, points, or reference (traced full detail)")
-        ->check(CLI::IsMember({"pullpush", "points", "reference"}))->capture_default_str();
+        ->check(CLI::IsMember({"pullpush", "points", "reference"}))
+        ->capture_default_str();
     sub->add_option("--error", o->error, "tolerated screen-space error, pixels")->capture_default_str();
-    sub->add_option("--budget-points", o->budget, "records drawn at most; the error rises to meet it (0: no limit)")->capture_default_str();
+    sub->add_option("--budget-points", o->budget, "records drawn at most; the error rises to meet it (0: no limit)")
+        ->capture_default_str();
     sub->add_option("--resident", o->resident, "memory for resident chunks")->capture_default_str();
-    sub->add_option("--device", o->device, "auto, cpu, gpu, gpu:NAME or reference (fp64 restatement)")->capture_default_str();
-    sub->add_option("--shade", o->shade, "auto: unlit where the scan has colours")->check(CLI::IsMember({"auto", "lit", "unlit"}))->capture_default_str();
+    sub->add_option("--device", o->device, "auto, cpu, gpu, gpu:NAME or reference (fp64 restatement)")
+        ->capture_default_str();
+    sub->add_option("--shade", o->shade, "auto: unlit where the scan has colours")
+        ->check(CLI::IsMember({"auto", "lit", "unlit"}))
+        ->capture_default_str();
     sub->add_option("--background", o->background, "R,G,B 0 to 255")->capture_default_str();
-    sub->add_option("--debug", o->debug, "debug view")->check(CLI::IsMember({"none", "level", "error", "holes", "normals"}))->capture_default_str();
-    sub->add_option("--samples", o->samples, "mode reference: rays per pixel along each axis")->check(CLI::Range(1, 64))->capture_default_str();
+    sub->add_option("--debug", o->debug, "debug view")
+        ->check(CLI::IsMember({"none", "level", "error", "holes", "normals"}))
+        ->capture_default_str();
+    sub->add_option("--samples", o->samples, "mode reference: rays per pixel along each axis")
+        ->check(CLI::Range(1, 64))
+        ->capture_default_str();
     sub->add_flag("--no-wait", o->noWait, "do not wait for the complete cut");
     sub->add_flag("--json", o->json, "print measurements as JSON");
     sub->add_flag("--quiet", o->quiet, "no progress");
     auto* group = sub->add_option_group("building", "for inputs that are not built yet");
     group->add_option("--memory", o->build.memory, "memory that the build may use")->capture_default_str();
-    group->add_option("--threads", o->build.threads, "threads (0: all cores)")->check(CLI::Range(0, 1024))->capture_default_str();
+    group->add_option("--threads", o->build.threads, "threads (0: all cores)")
+        ->check(CLI::Range(0, 1024))
+        ->capture_default_str();
     sub->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());
     });

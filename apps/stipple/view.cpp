@@ -27,12 +27,14 @@ struct Options {
 
 constexpr std::array<const char*, 5> kDebugNames{"none", "level", "screen-space error", "holes", "normals"};
 
-void drawOverlay(const render::FrameState& state, const render::FrameSettings& settings, const std::vector<render::PassTime>& passes,
-                 double frameSeconds, bool flying) {
+void drawOverlay(const render::FrameState& state, const render::FrameSettings& settings,
+                 const std::vector<render::PassTime>& passes, double frameSeconds, bool flying) {
     const FrameCounters& c = state.counters;
     ImGui::SetNextWindowPos(ImVec2(10, 10));
     ImGui::SetNextWindowBgAlpha(0.7f);
-    ImGui::Begin("stipple", nullptr, ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoNav);
+    ImGui::Begin("stipple", nullptr,
+                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove |
+                     ImGuiWindowFlags_NoNav);
     ImGui::Text("%s: %s", state.backend->name().c_str(), state.backend->device().c_str());
     ImGui::Text("%.1f ms a frame, %.1f ms with the window", c.frameMs, frameSeconds * 1e3);
     for (const render::PassTime& p : passes) ImGui::Text("  %-8s %6.2f ms", p.name.c_str(), p.ms);
@@ -40,13 +42,16 @@ void drawOverlay(const render::FrameState& state, const render::FrameSettings& s
     ImGui::Text("%llu nodes, %llu missing, %u chunks on their way", static_cast<unsigned long long>(c.nodesDrawn),
                 static_cast<unsigned long long>(c.nodesMissing), static_cast<unsigned>(c.requestsInFlight));
     const float used = static_cast<float>(c.recordsDrawn) / static_cast<float>(settings.budgets.records);
-    ImGui::ProgressBar(used, ImVec2(300, 0), fmt::format("{:.2f} of {:.2f} M records", static_cast<double>(c.recordsDrawn) * 1e-6,
-                                                         static_cast<double>(settings.budgets.records) * 1e-6).c_str());
+    ImGui::ProgressBar(used, ImVec2(300, 0),
+                       fmt::format("{:.2f} of {:.2f} M records", static_cast<double>(c.recordsDrawn) * 1e-6,
+                                   static_cast<double>(settings.budgets.records) * 1e-6)
+                           .c_str());
     ImGui::Text("resident %s", humanBytes(c.residentBytes).c_str());
     ImGui::Text("debug view: %s", kDebugNames.at(settings.draw.debugView));
     if (c.failures > 0) ImGui::TextColored(ImVec4(1, 0.4f, 0.3f, 1), "%s", state.streamer->lastFailure().c_str());
     ImGui::Separator();
-    ImGui::TextUnformatted(flying ? "fly: W A S D Q E, drag to look, wheel: speed, Shift: faster" : "orbit: drag, right drag: move, wheel: nearer");
+    ImGui::TextUnformatted(flying ? "fly: W A S D Q E, drag to look, wheel: speed, Shift: faster"
+                                  : "orbit: drag, right drag: move, wheel: nearer");
     ImGui::TextUnformatted("F fly/orbit  M mode  V debug view  L light  [1-9] error  P picture  Tab overlay  Esc quit");
     ImGui::End();
 }
@@ -56,8 +61,10 @@ bool applyKeys(const std::string& pressed, render::FrameSettings& settings, Navi
     bool picture = false;
     for (const char key : pressed) {
         if (key == 'F') navigation.toggleFly();
-        if (key == 'M') settings.mode = settings.mode == render::Mode::pullpush ? render::Mode::points : render::Mode::pullpush;
-        if (key == 'V') settings.draw.debugView = (settings.draw.debugView + 1) % static_cast<uint32_t>(kDebugNames.size());
+        if (key == 'M')
+            settings.mode = settings.mode == render::Mode::pullpush ? render::Mode::points : render::Mode::pullpush;
+        if (key == 'V')
+            settings.draw.debugView = (settings.draw.debugView + 1) % static_cast<uint32_t>(kDebugNames.size());
         if (key == 'L') settings.draw.lit = !settings.draw.lit;
         if (key == '\t') overlay = !overlay;
         if (key == 'P') picture = true;
@@ -70,12 +77,14 @@ Result<void> run(const Options& o) {
     STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
     if (!o.screenshot.empty()) STIPPLE_TRY(image::checkImagePath(o.screenshot));
     if (!gpu::hasDisplay())
-        return fail(ErrorKind::device, "there is no display", "stipple view", "use stipple render, or xvfb-run stipple view");
+        return fail(ErrorKind::device, "there is no display", "stipple view",
+                    "use stipple render, or xvfb-run stipple view");
     const auto executor = makeTbbExecutor(o.build.threads);
     STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store, openScene(o.inputs, o.build, *executor, true));
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
     STIPPLE_ASSIGN(const std::unique_ptr<gpu::Window> window,
-                   gpu::Window::create("Stipple: " + store->description.source, size.x, size.y, std::getenv("STIPPLE_VALIDATION") != nullptr));
+                   gpu::Window::create("Stipple: " + store->description.source, size.x, size.y,
+                                       std::getenv("STIPPLE_VALIDATION") != nullptr));
     streaming::StreamSettings stream;
     stream.residentBytes = std::max<uint64_t>(1, parseBytes(o.resident));
     auto state = render::makeFrameState({store}, *backend, *executor, stream);
@@ -85,7 +94,8 @@ Result<void> run(const Options& o) {
     settings.draw.lit = o.shade == "lit" || (o.shade == "auto" && !d.hasColour);
     settings.draw.worldUp = scene::axisVector(d.up);
     const double diagonal = std::max(1e-300, glm::length(d.boundsMax - d.boundsMin));
-    Navigation navigation(scene::fitCamera(d.boundsMin, d.boundsMax, d.up, static_cast<double>(size.x) / size.y), diagonal);
+    Navigation navigation(scene::fitCamera(d.boundsMin, d.boundsMax, d.up, static_cast<double>(size.x) / size.y),
+                          diagonal);
     bool overlay = true;
     int pictures = 0;
     for (int frame = 0;; ++frame) {
@@ -103,18 +113,23 @@ Result<void> run(const Options& o) {
         }
         render::Image shot;
         const bool wantShot = picture || (last && !o.screenshot.empty());
-        STIPPLE_TRY(window->present(state->image, [&] {
-            if (overlay) drawOverlay(*state, settings, backend->passTimes(), input.seconds, navigation.isFlying());
-        }, wantShot ? &shot : nullptr));
+        STIPPLE_TRY(window->present(
+            state->image,
+            [&] {
+                if (overlay) drawOverlay(*state, settings, backend->passTimes(), input.seconds, navigation.isFlying());
+            },
+            wantShot ? &shot : nullptr));
         if (wantShot && !shot.rgba.empty()) {
-            const std::string path = last && !o.screenshot.empty() ? o.screenshot : fmt::format("stipple_{:03}.png", ++pictures);
+            const std::string path =
+                last && !o.screenshot.empty() ? o.screenshot : fmt::format("stipple_{:03}.png", ++pictures);
             STIPPLE_TRY(image::writeImage(path, shot));
             fmt::print("{}\n", path);
         }
         if (last) break;
     }
     for (const std::string& message : window->validationMessages()) fmt::print(stderr, "validation: {}\n", message);
-    if (!window->validationMessages().empty()) return fail(ErrorKind::device, "the validation layers complained", "stipple view");
+    if (!window->validationMessages().empty())
+        return fail(ErrorKind::device, "the validation layers complained", "stipple view");
     return {};
 }
 
@@ -125,11 +140,17 @@ void setupView(CLI::App& app, int& status) {
     CLI::App* sub = app.add_subcommand("view", "walk through a scene in a window");
     sub->add_option("SCENE", o->inputs, "a .stipple scene, or scans (built into the cache first)")->required();
     sub->add_option("--size", o->size, "of the window, pixels")->capture_default_str();
-    sub->add_option("--error", o->error, "tolerated screen-space error, pixels")->check(CLI::PositiveNumber)->capture_default_str();
-    sub->add_option("--budget-points", o->budget, "records drawn at most")->check(CLI::PositiveNumber)->capture_default_str();
+    sub->add_option("--error", o->error, "tolerated screen-space error, pixels")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    sub->add_option("--budget-points", o->budget, "records drawn at most")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
     sub->add_option("--resident", o->resident, "memory for resident chunks")->capture_default_str();
     sub->add_option("--device", o->device, "auto, cpu, gpu or gpu:NAME")->capture_default_str();
-    sub->add_option("--shade", o->shade, "auto: unlit where the scan has colours")->check(CLI::IsMember({"auto", "lit", "unlit"}))->capture_default_str();
+    sub->add_option("--shade", o->shade, "auto: unlit where the scan has colours")
+        ->check(CLI::IsMember({"auto", "lit", "unlit"}))
+        ->capture_default_str();
     sub->add_option("--frames", o->frames, "close after N frames (0: when the user does)")->capture_default_str();
     sub->add_option("--screenshot", o->screenshot, "with --frames: write what the last frame shows");
     o->build.addTo(*sub);

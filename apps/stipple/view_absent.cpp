@@ -7,8 +7,8 @@ void setupView(CLI::App& app, int& status) {
     CLI::App* sub = app.add_subcommand("view", "walk through a scene in a window (not in this build)");
     sub->allow_extras();
     sub->callback([&status] {
-        status = report(Error{ErrorKind::device, "this program was built without Vulkan, so it has no window", "stipple view",
-                              "use stipple render"});
+        status = report(Error{ErrorKind::device, "this program was built without Vulkan, so it has no window",
+                              "stipple view", "use stipple render"});
     });
 }
 

@@ -11,8 +11,8 @@ struct FrameCounters {
     uint64_t bytesStreamed = 0, residentBytes = 0, requests = 0, uploads = 0, evictions = 0, failures = 0, refused = 0;
     uint64_t requestsInFlight = 0;
     bool budgetTruncated = false;
-    double tauTargetPixels = 0;    ///< what the budget allows once everything is resident
-    double tauEffectivePixels = 0; ///< what this frame delivers
+    double tauTargetPixels = 0;     ///< what the budget allows once everything is resident
+    double tauEffectivePixels = 0;  ///< what this frame delivers
     double cutMs = 0, frameMs = 0;
 };
 

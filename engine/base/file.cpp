@@ -39,9 +39,10 @@ Result<InputFile> InputFile::open(const std::string& path) {
 
 Result<void> InputFile::readAt(uint64_t offset, void* destination, size_t count) const {
     if (offset > sizeBytes_ || count > sizeBytes_ - offset)
-        return fail(ErrorKind::input,
-                    fmt::format("{} bytes are needed at offset {}, but the file has {} bytes", count, offset, sizeBytes_),
-                    path_, "the file is truncated");
+        return fail(
+            ErrorKind::input,
+            fmt::format("{} bytes are needed at offset {}, but the file has {} bytes", count, offset, sizeBytes_),
+            path_, "the file is truncated");
     auto* out = static_cast<char*>(destination);
     while (count > 0) {
         const ssize_t got = ::pread(descriptor_, out, count, static_cast<off_t>(offset));
@@ -118,8 +119,8 @@ Result<void> OutputFile::commit() {
 Result<std::string> readTextFile(const std::string& path, uint64_t sizeLimitBytes) {
     STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
     if (file.sizeBytes() > sizeLimitBytes)
-        return fail(ErrorKind::input, fmt::format("has {} bytes, more than the {} allowed here", file.sizeBytes(),
-                                                  sizeLimitBytes), path);
+        return fail(ErrorKind::input,
+                    fmt::format("has {} bytes, more than the {} allowed here", file.sizeBytes(), sizeLimitBytes), path);
     std::string text(file.sizeBytes(), '\0');
     STIPPLE_TRY(file.readAt(0, text.data(), text.size()));
     return text;

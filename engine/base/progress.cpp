@@ -38,10 +38,11 @@ void Progress::update(const std::string& stage, uint64_t done, uint64_t total) {
         std::fflush(stderr);
         dirty_ = true;
     } else {
-        fmt::print(stderr,
-                   "{{\"progress\": \"{}\", \"done\": {}, \"total\": {}, \"per_second\": {:.0f}, \"peak_rss_bytes\": {}, "
-                   "\"seconds\": {:.1f}, \"seconds_left\": {:.1f}}}\n",
-                   stage, done, total, rate, peakRssBytes(), now - startSeconds_, left);
+        fmt::print(
+            stderr,
+            "{{\"progress\": \"{}\", \"done\": {}, \"total\": {}, \"per_second\": {:.0f}, \"peak_rss_bytes\": {}, "
+            "\"seconds\": {:.1f}, \"seconds_left\": {:.1f}}}\n",
+            stage, done, total, rate, peakRssBytes(), now - startSeconds_, left);
     }
 }
 

@@ -35,17 +35,17 @@ inline tl::unexpected<Error> fail(ErrorKind kind, std::string what, std::string 
 }  // namespace stipple
 
 /// Return the error of `expression` to the caller, if it has one.
-#define STIPPLE_TRY(expression)                                                     \
-    do {                                                                            \
-        auto tryResult_ = (expression);                                             \
+#define STIPPLE_TRY(expression)                                                       \
+    do {                                                                              \
+        auto tryResult_ = (expression);                                               \
         if (!tryResult_) return tl::unexpected<::stipple::Error>(tryResult_.error()); \
     } while (false)
 
 #define STIPPLE_CONCAT2(a, b) a##b
 #define STIPPLE_CONCAT(a, b) STIPPLE_CONCAT2(a, b)
 /// `STIPPLE_ASSIGN(auto x, f())`: take the value out of a Result or return its error.
-#define STIPPLE_ASSIGN(target, expression)                                                          \
-    auto STIPPLE_CONCAT(assign_, __LINE__) = (expression);                                          \
-    if (!STIPPLE_CONCAT(assign_, __LINE__))                                                         \
-        return tl::unexpected<::stipple::Error>(STIPPLE_CONCAT(assign_, __LINE__).error());         \
+#define STIPPLE_ASSIGN(target, expression)                                                  \
+    auto STIPPLE_CONCAT(assign_, __LINE__) = (expression);                                  \
+    if (!STIPPLE_CONCAT(assign_, __LINE__))                                                 \
+        return tl::unexpected<::stipple::Error>(STIPPLE_CONCAT(assign_, __LINE__).error()); \
     target = std::move(*STIPPLE_CONCAT(assign_, __LINE__))

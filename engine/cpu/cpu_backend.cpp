@@ -82,12 +82,24 @@ class CpuBackend final : public render::Backend {
         for (const render::Pass pass : request.passes) {
             const double start = nowSeconds();
             switch (pass) {
-                case render::Pass::clear: clear(); break;
-                case render::Pass::project: project(); break;
-                case render::Pass::resolve: resolve(hasPyramid); break;
-                case render::Pass::pull: pull(); break;
-                case render::Pass::push: push(); break;
-                case render::Pass::shade: shade(hasPyramid); break;
+                case render::Pass::clear:
+                    clear();
+                    break;
+                case render::Pass::project:
+                    project();
+                    break;
+                case render::Pass::resolve:
+                    resolve(hasPyramid);
+                    break;
+                case render::Pass::pull:
+                    pull();
+                    break;
+                case render::Pass::push:
+                    push();
+                    break;
+                case render::Pass::shade:
+                    shade(hasPyramid);
+                    break;
             }
             times_.push_back({render::passName(pass), (nowSeconds() - start) * 1e3});
         }
@@ -128,7 +140,8 @@ class CpuBackend final : public render::Backend {
         executor_.parallelFor(blocks_.size(), 32, [&](size_t begin, size_t end) {
             alignas(64) std::array<uint32_t, shared::kRecordsPerBlock> pixel, depth;
             for (size_t b = begin; b < end; ++b) {
-                const uint32_t count = std::min(shared::kRecordsPerBlock, blocks_[b].node->count - draws_->blocks[b].first);
+                const uint32_t count =
+                    std::min(shared::kRecordsPerBlock, blocks_[b].node->count - draws_->blocks[b].first);
                 k_.projectBlock(frame_, *blocks_[b].node, blocks_[b].records, count, pixel.data(), depth.data());
                 for (uint32_t i = 0; i < count; ++i) {
                     if (pixel[i] == ~0u) continue;
@@ -145,13 +158,16 @@ class CpuBackend final : public render::Backend {
     /// Calls body(x0, n, row0, row1) for tiles of `level`: columns [x0, x0 + n), rows [row0, row1), row0 even.
     template <typename Body>
     void forTiles(const Level& level, const Body& body) {
-        const uint32_t columns = (level.width + kTile - 1) / kTile, bands = (level.height + 2 * kBandRows - 1) / (2 * kBandRows);
-        executor_.parallelFor(size_t{columns} * bands, level.width * level.height < 65536 ? 64 : 1, [&](size_t begin, size_t end) {
-            for (size_t t = begin; t < end; ++t) {
-                const auto x0 = static_cast<uint32_t>(t % columns) * kTile, row0 = static_cast<uint32_t>(t / columns) * 2 * kBandRows;
-                body(x0, std::min(kTile, level.width - x0), row0, std::min(level.height, row0 + 2 * kBandRows));
-            }
-        });
+        const uint32_t columns = (level.width + kTile - 1) / kTile,
+                       bands = (level.height + 2 * kBandRows - 1) / (2 * kBandRows);
+        executor_.parallelFor(
+            size_t{columns} * bands, level.width * level.height < 65536 ? 64 : 1, [&](size_t begin, size_t end) {
+                for (size_t t = begin; t < end; ++t) {
+                    const auto x0 = static_cast<uint32_t>(t % columns) * kTile,
+                               row0 = static_cast<uint32_t>(t / columns) * 2 * kBandRows;
+                    body(x0, std::min(kTile, level.width - x0), row0, std::min(level.height, row0 + 2 * kBandRows));
+                }
+            });
     }
 
     /// Level 0 from the visibility buffer; with a pyramid, level 1 on the way.
@@ -173,9 +189,12 @@ class CpuBackend final : public render::Backend {
                         continue;
                     }
                     const size_t at = size_t{yy} * fine.width + x0;
-                    const bool has = k_.resolveRow(frame_, tables_, blocks_.data(), visibility_.data() + at, x0, yy, n, *row, largest);
-                    if (has) k_.packRow(*row, n, finePlanes.at(at));
-                    else std::fill_n(finePlanes.depth + at, n, 0.0f);
+                    const bool has = k_.resolveRow(frame_, tables_, blocks_.data(), visibility_.data() + at, x0, yy, n,
+                                                   *row, largest);
+                    if (has)
+                        k_.packRow(*row, n, finePlanes.at(at));
+                    else
+                        std::fill_n(finePlanes.depth + at, n, 0.0f);
                     any = any || has;
                 }
                 if (!coarse) continue;
@@ -191,7 +210,8 @@ class CpuBackend final : public render::Backend {
         levelCount_ = std::min(levels_.size(), needed);
     }
 
-    void pullPair(const TexelRow& upper, const TexelRow& lower, bool any, uint32_t n, float childSize, const Planes& to, TexelRow& out) {
+    void pullPair(const TexelRow& upper, const TexelRow& lower, bool any, uint32_t n, float childSize, const Planes& to,
+                  TexelRow& out) {
         if (!any) {
             std::fill_n(to.depth, n, 0.0f);
             return;
@@ -222,40 +242,50 @@ class CpuBackend final : public render::Backend {
     }
 
     /// Unpacks n texels of a row; false (and only the depths set) if all are empty.
-    bool loadRow(const Level& level, const Planes& planes, uint32_t y, uint32_t x, uint32_t n, uint32_t first, TexelRow& row) {
+    bool loadRow(const Level& level, const Planes& planes, uint32_t y, uint32_t x, uint32_t n, uint32_t first,
+                 TexelRow& row) {
         const Planes at = planes.at(size_t{y} * level.width + x);
         bool any = false;
         for (uint32_t i = 0; i < n; ++i) any |= at.depth[i] > 0;
-        if (any) k_.unpackRow(at, first, n, row);
-        else std::fill_n(row.depth + first, n, 0.0f);
+        if (any)
+            k_.unpackRow(at, first, n, row);
+        else
+            std::fill_n(row.depth + first, n, 0.0f);
         return any;
     }
 
     /// The expanded coarse row `y` around the fine columns [x0, x0 + n); empty outside the level.
-    bool loadCoarse(const Level& level, const Planes& planes, int y, uint32_t x0, uint32_t n, TexelRow& scratch, ExpandedRow& out) {
+    bool loadCoarse(const Level& level, const Planes& planes, int y, uint32_t x0, uint32_t n, TexelRow& scratch,
+                    ExpandedRow& out) {
         const uint32_t c0 = x0 / 2, count = (n + 1) / 2;
         if (y < 0 || y >= static_cast<int>(level.height)) return false;
         const uint32_t before = c0 > 0 ? 1 : 0, after = c0 + count < level.width ? 1 : 0;
         scratch.depth[kPad - 1] = 0;
         scratch.depth[kPad + count] = 0;
-        if (!loadRow(level, planes, static_cast<uint32_t>(y), c0 - before, count + before + after, kPad - before, scratch)) return false;
+        if (!loadRow(level, planes, static_cast<uint32_t>(y), c0 - before, count + before + after, kPad - before,
+                     scratch))
+            return false;
         k_.expandRow(scratch, n, out.nearest, out.beside);
         return true;
     }
 
     /// Pushes coarse into fine over one tile, row by row: use(y, own row, pushed row, any).
     template <typename Use>
-    void pushTile(Level& fine, Level& coarse, float fineSize, uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1, const Use& use) {
+    void pushTile(Level& fine, Level& coarse, float fineSize, uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1,
+                  const Use& use) {
         const Planes finePlanes = fine.planes(), coarsePlanes = coarse.planes();
         thread_local TexelRow scratch{}, own{}, out{};
         thread_local std::array<ExpandedRow, 3> ring{};
         std::array<bool, 3> has{};
         const int c0 = static_cast<int>(row0 / 2);
         for (int c = c0 - 1; c <= c0; ++c)
-            has.at(static_cast<size_t>(c + 1) % 3) = loadCoarse(coarse, coarsePlanes, c, x0, n, scratch, ring.at(static_cast<size_t>(c + 1) % 3));
+            has.at(static_cast<size_t>(c + 1) % 3) =
+                loadCoarse(coarse, coarsePlanes, c, x0, n, scratch, ring.at(static_cast<size_t>(c + 1) % 3));
         for (uint32_t y = row0; y < row1; ++y) {
             const auto c = static_cast<size_t>(y / 2);  // ring slot of coarse row c is (c + 1) % 3
-            if (y % 2 == 0) has.at((c + 2) % 3) = loadCoarse(coarse, coarsePlanes, static_cast<int>(c) + 1, x0, n, scratch, ring.at((c + 2) % 3));
+            if (y % 2 == 0)
+                has.at((c + 2) % 3) =
+                    loadCoarse(coarse, coarsePlanes, static_cast<int>(c) + 1, x0, n, scratch, ring.at((c + 2) % 3));
             const size_t nearSlot = (c + 1) % 3, farSlot = y % 2 == 0 ? c % 3 : (c + 2) % 3;
             const bool ownAny = loadRow(fine, finePlanes, y, x0, n, kPad, own);
             if (!has.at(nearSlot) && !has.at(farSlot)) {
@@ -267,7 +297,8 @@ class CpuBackend final : public render::Backend {
                 std::fill_n(ring.at(slot).nearest.depth, TexelRow::kSize, 0.0f);
                 std::fill_n(ring.at(slot).beside.depth, TexelRow::kSize, 0.0f);
             }
-            k_.pushRow(own, ring.at(nearSlot), ring.at(farSlot), y % 2 == 0 ? -1.0f : 1.0f, n, fineSize, 1.0f / frame_.focal, out);
+            k_.pushRow(own, ring.at(nearSlot), ring.at(farSlot), y % 2 == 0 ? -1.0f : 1.0f, n, fineSize,
+                       1.0f / frame_.focal, out);
             use(y, own, out, true);
         }
     }
@@ -294,12 +325,14 @@ class CpuBackend final : public render::Backend {
             const size_t at = size_t{y} * fine.width + x0;
             k_.shadeRow(frame_, tables_, own, row, x0, y, n,
                         {image_->rgba.data() + at, wantAll_ ? image_->depth.data() + at : nullptr,
-                         wantAll_ ? image_->normal.data() + 3 * at : nullptr, wantAll_ ? image_->linear.data() + 3 * at : nullptr});
+                         wantAll_ ? image_->normal.data() + 3 * at : nullptr,
+                         wantAll_ ? image_->linear.data() + 3 * at : nullptr});
         };
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
             if (hasPyramid && levelCount_ > 1) {
-                pushTile(fine, levels_[1], 1.0f, x0, n, row0, row1,
-                         [&](uint32_t y, const TexelRow& own, const TexelRow& row, bool) { shadeRow(x0, n, y, own, row); });
+                pushTile(
+                    fine, levels_[1], 1.0f, x0, n, row0, row1,
+                    [&](uint32_t y, const TexelRow& own, const TexelRow& row, bool) { shadeRow(x0, n, y, own, row); });
                 return;
             }
             thread_local TexelRow row{};

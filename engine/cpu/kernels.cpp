@@ -19,8 +19,8 @@ const Kernels* const* availableKernels(size_t& count) {
 #if defined(__x86_64__)
             __builtin_cpu_init();
             if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) items.at(count++) = &kernels_avx2;
-            if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq") &&
-                __builtin_cpu_supports("avx512bw"))
+            if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+                __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw"))
                 items.at(count++) = &kernels_avx512;
 #endif
         }

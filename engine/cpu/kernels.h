@@ -21,8 +21,8 @@ struct TexelRow {
         red[kSize], green[kSize], blue[kSize];
 };
 
-/// A coarse row at the resolution of the fine one: for each fine texel its parent, and the parent's neighbour on the side
-/// on which the fine texel lies.
+/// A coarse row at the resolution of the fine one: for each fine texel its parent, and the parent's neighbour on the
+/// side on which the fine texel lies.
 struct ExpandedRow {
     TexelRow nearest, beside;
 };
@@ -54,21 +54,23 @@ struct ShadeOutput {
 struct Kernels {
     const char* name;
     /// Pixel index (or ~0u) and depth bits of up to 256 records.
-    void (*projectBlock)(const shared::FrameConstants& f, const shared::DrawNode& node, const shared::PointRecord* records,
-                         uint32_t count, uint32_t* pixel, uint32_t* depth);
-    /// Decodes the winners of `n` pixels of row `y` from `x0` on; clears the visibility entries. False if all are empty.
-    bool (*resolveRow)(const shared::FrameConstants& f, const Tables& tables, const BlockSource* blocks, uint64_t* visibility,
-                       uint32_t x0, uint32_t y, uint32_t n, TexelRow& row, float& largestRadius);
+    void (*projectBlock)(const shared::FrameConstants& f, const shared::DrawNode& node,
+                         const shared::PointRecord* records, uint32_t count, uint32_t* pixel, uint32_t* depth);
+    /// Decodes the winners of `n` pixels of row `y` from `x0` on; clears the visibility entries. False if all are
+    /// empty.
+    bool (*resolveRow)(const shared::FrameConstants& f, const Tables& tables, const BlockSource* blocks,
+                       uint64_t* visibility, uint32_t x0, uint32_t y, uint32_t n, TexelRow& row, float& largestRadius);
     void (*packRow)(const TexelRow& row, uint32_t n, const Planes& to);
     void (*unpackRow)(const Planes& from, uint32_t first, uint32_t n, TexelRow& row);
-    void (*pullRow)(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float inverseFocal, TexelRow& out);
+    void (*pullRow)(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float inverseFocal,
+                    TexelRow& out);
     /// `nearRow`: the coarse row of the parents; `farRow`: the one beyond, in direction sy.
-    void (*pushRow)(const TexelRow& fine, const ExpandedRow& nearRow, const ExpandedRow& farRow, float sy, uint32_t n, float fineSize,
-                    float inverseFocal, TexelRow& out);
+    void (*pushRow)(const TexelRow& fine, const ExpandedRow& nearRow, const ExpandedRow& farRow, float sy, uint32_t n,
+                    float fineSize, float inverseFocal, TexelRow& out);
     /// Doubles the entries of a coarse row (-1 to (n + 1) / 2) along x.
     void (*expandRow)(const TexelRow& coarse, uint32_t n, TexelRow& nearest, TexelRow& beside);
-    void (*shadeRow)(const shared::FrameConstants& f, const Tables& tables, const TexelRow& own, const TexelRow& row, uint32_t x0,
-                     uint32_t y, uint32_t n, const ShadeOutput& out);
+    void (*shadeRow)(const shared::FrameConstants& f, const Tables& tables, const TexelRow& own, const TexelRow& row,
+                     uint32_t x0, uint32_t y, uint32_t n, const ShadeOutput& out);
 };
 
 /// The best kernels that this processor runs; STIPPLE_SIMD=sse|avx2|avx512 asks for fewer.

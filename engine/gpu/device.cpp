@@ -23,7 +23,8 @@ bool hasLayer(const char* name) {
     vkEnumerateInstanceLayerProperties(&count, nullptr);
     std::vector<VkLayerProperties> layers(count);
     vkEnumerateInstanceLayerProperties(&count, layers.data());
-    return std::any_of(layers.begin(), layers.end(), [&](const VkLayerProperties& l) { return std::strcmp(l.layerName, name) == 0; });
+    return std::any_of(layers.begin(), layers.end(),
+                       [&](const VkLayerProperties& l) { return std::strcmp(l.layerName, name) == 0; });
 }
 
 Result<VkInstance> createInstance(const DeviceSettings& settings, Messages* messages) {
@@ -39,11 +40,13 @@ Result<VkInstance> createInstance(const DeviceSettings& settings, Messages* mess
     VkDebugUtilsMessengerCreateInfoEXT debug{VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT};
     if (settings.validation) {
         if (!hasLayer(layer))
-            return fail(ErrorKind::device, "the Vulkan validation layer is not installed", "validation", "apt-get install vulkan-validationlayers");
+            return fail(ErrorKind::device, "the Vulkan validation layer is not installed", "validation",
+                        "apt-get install vulkan-validationlayers");
         extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
         features.enabledValidationFeatureCount = 1;
         features.pEnabledValidationFeatures = &sync;
-        debug.messageSeverity = VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
+        debug.messageSeverity =
+            VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
         debug.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
         debug.pfnUserCallback = onMessage;
         debug.pUserData = messages;
@@ -55,7 +58,8 @@ Result<VkInstance> createInstance(const DeviceSettings& settings, Messages* mess
     info.enabledExtensionCount = static_cast<uint32_t>(extensions.size());
     info.ppEnabledExtensionNames = extensions.data();
     VkInstance instance = VK_NULL_HANDLE;
-    if (const VkResult r = vkCreateInstance(&info, nullptr, &instance); r != VK_SUCCESS) return vulkanError(r, "no Vulkan instance");
+    if (const VkResult r = vkCreateInstance(&info, nullptr, &instance); r != VK_SUCCESS)
+        return vulkanError(r, "no Vulkan instance");
     return instance;
 }
 
@@ -74,14 +78,17 @@ VkPhysicalDeviceProperties propertiesOf(VkPhysicalDevice device) {
 }
 
 std::string lower(std::string text) {
-    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    std::transform(text.begin(), text.end(), text.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     return text;
 }
 
 }  // namespace
 
 tl::unexpected<Error> vulkanError(VkResult result, const std::string& what) {
-    const ErrorKind kind = result == VK_ERROR_OUT_OF_DEVICE_MEMORY || result == VK_ERROR_OUT_OF_HOST_MEMORY ? ErrorKind::budget : ErrorKind::device;
+    const ErrorKind kind = result == VK_ERROR_OUT_OF_DEVICE_MEMORY || result == VK_ERROR_OUT_OF_HOST_MEMORY
+                               ? ErrorKind::budget
+                               : ErrorKind::device;
     return fail(kind, fmt::format("{} (VkResult {})", what, static_cast<int>(result)), "Vulkan", "try --device cpu");
 }
 
@@ -90,9 +97,11 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceSettings& settings) {
     d->validation_ = settings.validation;
     STIPPLE_ASSIGN(d->instance, createInstance(settings, d->messages_.get()));
     if (settings.validation) {
-        const auto make = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(vkGetInstanceProcAddr(d->instance, "vkCreateDebugUtilsMessengerEXT"));
+        const auto make = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
+            vkGetInstanceProcAddr(d->instance, "vkCreateDebugUtilsMessengerEXT"));
         VkDebugUtilsMessengerCreateInfoEXT debug{VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT};
-        debug.messageSeverity = VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
+        debug.messageSeverity =
+            VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
         debug.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
         debug.pfnUserCallback = onMessage;
         debug.pUserData = d->messages_.get();
@@ -100,13 +109,15 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceSettings& settings) {
     }
     std::vector<VkPhysicalDevice> devices = physicalDevices(d->instance);
     std::stable_sort(devices.begin(), devices.end(), [](VkPhysicalDevice a, VkPhysicalDevice b) {
-        return (propertiesOf(a).deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU) < (propertiesOf(b).deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU);
+        return (propertiesOf(a).deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU) <
+               (propertiesOf(b).deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU);
     });
     std::string seen;
     for (VkPhysicalDevice candidate : devices) {
         const VkPhysicalDeviceProperties p = propertiesOf(candidate);
         seen += (seen.empty() ? "" : ", ") + std::string(p.deviceName);
-        if (d->physical != VK_NULL_HANDLE || lower(p.deviceName).find(lower(settings.name)) == std::string::npos) continue;
+        if (d->physical != VK_NULL_HANDLE || lower(p.deviceName).find(lower(settings.name)) == std::string::npos)
+            continue;
         if (p.apiVersion < VK_API_VERSION_1_3) continue;
         d->physical = candidate;
         d->deviceName = p.deviceName;
@@ -114,7 +125,9 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceSettings& settings) {
         d->isSoftware = p.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
     }
     if (d->physical == VK_NULL_HANDLE)
-        return fail(ErrorKind::device, fmt::format("no Vulkan 1.3 device is called '{}'; there are: {}", settings.name, seen.empty() ? "none" : seen),
+        return fail(ErrorKind::device,
+                    fmt::format("no Vulkan 1.3 device is called '{}'; there are: {}", settings.name,
+                                seen.empty() ? "none" : seen),
                     "--device", "stipple --version lists them");
 
     uint32_t families = 0;
@@ -124,7 +137,8 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceSettings& settings) {
     const auto usable = std::find_if(family.begin(), family.end(), [](const VkQueueFamilyProperties& f) {
         return (f.queueFlags & VK_QUEUE_COMPUTE_BIT) != 0 && (f.queueFlags & VK_QUEUE_GRAPHICS_BIT) != 0;
     });
-    if (usable == family.end()) return fail(ErrorKind::device, "has no queue for graphics and compute", d->deviceName, "try --device cpu");
+    if (usable == family.end())
+        return fail(ErrorKind::device, "has no queue for graphics and compute", d->deviceName, "try --device cpu");
     d->queueFamily = static_cast<uint32_t>(usable - family.begin());
 
     const float priority = 1;
@@ -134,6 +148,7 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceSettings& settings) {
     queueInfo.pQueuePriorities = &priority;
     VkPhysicalDeviceVulkan13Features v13{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES};
     v13.synchronization2 = VK_TRUE;
+    v13.maintenance4 = VK_TRUE;  // glslc writes LocalSizeId
     VkPhysicalDeviceVulkan12Features v12{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES};
     v12.pNext = &v13;
     v12.bufferDeviceAddress = VK_TRUE;
@@ -158,7 +173,8 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceSettings& settings) {
 Device::~Device() {
     if (device != VK_NULL_HANDLE) vkDestroyDevice(device, nullptr);
     if (messenger_ != VK_NULL_HANDLE) {
-        const auto destroy = reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(vkGetInstanceProcAddr(instance, "vkDestroyDebugUtilsMessengerEXT"));
+        const auto destroy = reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(
+            vkGetInstanceProcAddr(instance, "vkDestroyDebugUtilsMessengerEXT"));
         destroy(instance, messenger_, nullptr);
     }
     if (instance != VK_NULL_HANDLE) vkDestroyInstance(instance, nullptr);
@@ -180,7 +196,8 @@ Result<uint32_t> Device::memoryType(uint32_t bits, VkMemoryPropertyFlags wanted,
 
 void Device::setName(VkObjectType type, uint64_t handle, const std::string& name) const {
     if (!validation_) return;
-    static const auto set = reinterpret_cast<PFN_vkSetDebugUtilsObjectNameEXT>(vkGetInstanceProcAddr(instance, "vkSetDebugUtilsObjectNameEXT"));
+    static const auto set = reinterpret_cast<PFN_vkSetDebugUtilsObjectNameEXT>(
+        vkGetInstanceProcAddr(instance, "vkSetDebugUtilsObjectNameEXT"));
     VkDebugUtilsObjectNameInfoEXT info{VK_STRUCTURE_TYPE_DEBUG_UTILS_OBJECT_NAME_INFO_EXT};
     info.objectType = type;
     info.objectHandle = handle;
@@ -188,19 +205,24 @@ void Device::setName(VkObjectType type, uint64_t handle, const std::string& name
     if (set) set(device, &info);
 }
 
-Result<Buffer> Buffer::create(const Device& d, uint64_t bytes, VkBufferUsageFlags usage, bool hostVisible, const std::string& name) {
+Result<Buffer> Buffer::create(const Device& d, uint64_t bytes, VkBufferUsageFlags usage, bool hostVisible,
+                              const std::string& name) {
     Buffer b;
     b.device_ = d.device;
     b.bytes_ = bytes;
     VkBufferCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO};
     info.size = bytes;
     info.usage = usage;
-    if (const VkResult r = vkCreateBuffer(d.device, &info, nullptr, &b.buffer_); r != VK_SUCCESS) return vulkanError(r, "no buffer " + name);
+    if (const VkResult r = vkCreateBuffer(d.device, &info, nullptr, &b.buffer_); r != VK_SUCCESS)
+        return vulkanError(r, "no buffer " + name);
     VkMemoryRequirements needs{};
     vkGetBufferMemoryRequirements(d.device, b.buffer_, &needs);
     const VkMemoryPropertyFlags host = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
-    STIPPLE_ASSIGN(const uint32_t type, d.memoryType(needs.memoryTypeBits, hostVisible ? host | VK_MEMORY_PROPERTY_HOST_CACHED_BIT : VkMemoryPropertyFlags{VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT},
-                                                     hostVisible ? host : VkMemoryPropertyFlags{0}));
+    STIPPLE_ASSIGN(const uint32_t type,
+                   d.memoryType(needs.memoryTypeBits,
+                                hostVisible ? host | VK_MEMORY_PROPERTY_HOST_CACHED_BIT
+                                            : VkMemoryPropertyFlags{VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT},
+                                hostVisible ? host : VkMemoryPropertyFlags{0}));
     VkMemoryAllocateFlagsInfo flags{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO};
     flags.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
     const bool addressed = (usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) != 0;
@@ -210,7 +232,8 @@ Result<Buffer> Buffer::create(const Device& d, uint64_t bytes, VkBufferUsageFlag
     allocate.memoryTypeIndex = type;
     if (const VkResult r = vkAllocateMemory(d.device, &allocate, nullptr, &b.memory_); r != VK_SUCCESS)
         return vulkanError(r, fmt::format("no memory for {} ({} bytes)", name, bytes));
-    if (const VkResult r = vkBindBufferMemory(d.device, b.buffer_, b.memory_, 0); r != VK_SUCCESS) return vulkanError(r, "cannot bind " + name);
+    if (const VkResult r = vkBindBufferMemory(d.device, b.buffer_, b.memory_, 0); r != VK_SUCCESS)
+        return vulkanError(r, "cannot bind " + name);
     if (hostVisible && vkMapMemory(d.device, b.memory_, 0, VK_WHOLE_SIZE, 0, &b.mapped_) != VK_SUCCESS)
         return fail(ErrorKind::device, "cannot map " + name, d.deviceName);
     if (addressed) {
@@ -238,11 +261,13 @@ std::vector<std::string> deviceNames() {
 
 bool hasHardwareDevice() {
     std::error_code ignored;
-    if (!std::filesystem::exists("/dev/dri", ignored) && !std::filesystem::exists("/dev/nvidia0", ignored)) return false;
+    if (!std::filesystem::exists("/dev/dri", ignored) && !std::filesystem::exists("/dev/nvidia0", ignored))
+        return false;
     const auto instance = createInstance({}, nullptr);
     if (!instance) return false;
     bool found = false;
-    for (VkPhysicalDevice d : physicalDevices(*instance)) found = found || propertiesOf(d).deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU;
+    for (VkPhysicalDevice d : physicalDevices(*instance))
+        found = found || propertiesOf(d).deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU;
     vkDestroyInstance(*instance, nullptr);
     return found;
 }

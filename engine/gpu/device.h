@@ -21,9 +21,9 @@ struct Messages {
 };
 
 struct DeviceSettings {
-    std::string name;                               ///< part of the device's name; empty: the first, real GPUs before software
-    bool validation = false;                        ///< core and synchronization validation
-    std::vector<const char*> instanceExtensions;    ///< for a window
+    std::string name;         ///< part of the device's name; empty: the first, real GPUs before software
+    bool validation = false;  ///< core and synchronization validation
+    std::vector<const char*> instanceExtensions;  ///< for a window
     std::vector<const char*> deviceExtensions;
 };
 
@@ -62,7 +62,8 @@ class Buffer {
   public:
     Buffer() = default;
     /// hostVisible: mapped for the buffer's life.
-    static Result<Buffer> create(const Device& device, uint64_t bytes, VkBufferUsageFlags usage, bool hostVisible, const std::string& name);
+    static Result<Buffer> create(const Device& device, uint64_t bytes, VkBufferUsageFlags usage, bool hostVisible,
+                                 const std::string& name);
     Buffer(Buffer&& o) noexcept { swap(o); }
     Buffer& operator=(Buffer&& o) noexcept {
         swap(o);

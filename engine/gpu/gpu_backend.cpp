@@ -26,7 +26,8 @@ struct Level {
 class GpuBackend final : public render::Backend {
   public:
     static Result<std::unique_ptr<render::Backend>> create(const GpuSettings& settings) {
-        STIPPLE_ASSIGN(std::unique_ptr<Device> device, Device::create({settings.deviceName, settings.validation, {}, {}}));
+        STIPPLE_ASSIGN(std::unique_ptr<Device> device,
+                       Device::create({settings.deviceName, settings.validation, {}, {}}));
         std::unique_ptr<GpuBackend> b(new GpuBackend(std::move(device), settings));
         STIPPLE_ASSIGN(b->pipelines_, Pipelines::create(*b->device_));
         STIPPLE_TRY(b->createCommandObjects());
@@ -53,19 +54,23 @@ class GpuBackend final : public render::Backend {
     }
     void evict(streaming::ChunkKey key) override {
         const auto found = places_.find(chunkId(key));
-        std::erase_if(pending_, [&](const PendingUpload& p) { return p.place.page == found->second.page && p.place.offset == found->second.offset; });
+        std::erase_if(pending_, [&](const PendingUpload& p) {
+            return p.place.page == found->second.page && p.place.offset == found->second.offset;
+        });
         pages_.release(found->second);
         places_.erase(found);
     }
 
     Result<void> render(const render::RenderRequest& request, render::Image& image) override {
         const render::DrawList& draws = *request.draws;
-        const bool hasPyramid = std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
+        const bool hasPyramid =
+            std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
         STIPPLE_TRY(prepare(draws, request.wantDepthAndNormal));
         STIPPLE_TRY(begin());
         PassList list(*device_, commands_, queries_, omitBarriersBefore_);
         if (!pending_.empty()) STIPPLE_TRY(recordUploads(list));
-        for (const render::Pass pass : request.passes) record(list, pass, draws, hasPyramid, request.wantDepthAndNormal);
+        for (const render::Pass pass : request.passes)
+            record(list, pass, draws, hasPyramid, request.wantDepthAndNormal);
         recordReadback(list, request.wantDepthAndNormal);
         STIPPLE_TRY(submit());
         takeTimes(list);
@@ -81,18 +86,22 @@ class GpuBackend final : public render::Backend {
         VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
         pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
         pool.queueFamilyIndex = device_->queueFamily;
-        if (const VkResult r = vkCreateCommandPool(device_->device, &pool, nullptr, &commandPool_); r != VK_SUCCESS) return vulkanError(r, "no command pool");
+        if (const VkResult r = vkCreateCommandPool(device_->device, &pool, nullptr, &commandPool_); r != VK_SUCCESS)
+            return vulkanError(r, "no command pool");
         VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
         allocate.commandPool = commandPool_;
         allocate.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
         allocate.commandBufferCount = 1;
-        if (const VkResult r = vkAllocateCommandBuffers(device_->device, &allocate, &commands_); r != VK_SUCCESS) return vulkanError(r, "no command buffer");
+        if (const VkResult r = vkAllocateCommandBuffers(device_->device, &allocate, &commands_); r != VK_SUCCESS)
+            return vulkanError(r, "no command buffer");
         VkFenceCreateInfo fence{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
-        if (const VkResult r = vkCreateFence(device_->device, &fence, nullptr, &fence_); r != VK_SUCCESS) return vulkanError(r, "no fence");
+        if (const VkResult r = vkCreateFence(device_->device, &fence, nullptr, &fence_); r != VK_SUCCESS)
+            return vulkanError(r, "no fence");
         VkQueryPoolCreateInfo query{VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO};
         query.queryType = VK_QUERY_TYPE_TIMESTAMP;
         query.queryCount = PassList::kMaxPasses * 2;
-        if (const VkResult r = vkCreateQueryPool(device_->device, &query, nullptr, &queries_); r != VK_SUCCESS) return vulkanError(r, "no query pool");
+        if (const VkResult r = vkCreateQueryPool(device_->device, &query, nullptr, &queries_); r != VK_SUCCESS)
+            return vulkanError(r, "no query pool");
         return {};
     }
 
@@ -117,13 +126,16 @@ class GpuBackend final : public render::Backend {
         const uint64_t pixels = uint64_t{w} * h;
         STIPPLE_TRY(ensure(frameBuffer_, sizeof(shared::FrameConstants), kStorage, true, "frame constants"));
         STIPPLE_TRY(ensure(nodeBuffer_, draws.nodes.size() * sizeof(shared::DrawNode), kStorage, true, "draw nodes"));
-        STIPPLE_TRY(ensure(blockBuffer_, draws.blocks.size() * sizeof(shared::DrawBlock), kStorage, true, "draw blocks"));
+        STIPPLE_TRY(
+            ensure(blockBuffer_, draws.blocks.size() * sizeof(shared::DrawBlock), kStorage, true, "draw blocks"));
         STIPPLE_TRY(ensure(visibility_, pixels * 8, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "visibility"));
         STIPPLE_TRY(ensure(texels_, words * 4, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "texels"));
         STIPPLE_TRY(ensure(stats_, 256, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "stats"));
         STIPPLE_TRY(ensure(image_, pixels * 4, kStorage | VK_BUFFER_USAGE_TRANSFER_SRC_BIT, false, "image"));
-        STIPPLE_TRY(ensure(extra_, wantAll ? pixels * 28 : 256, kStorage | VK_BUFFER_USAGE_TRANSFER_SRC_BIT, false, "depth and normals"));
-        STIPPLE_TRY(ensure(readback_, pixels * 4 + (wantAll ? pixels * 28 : 0), VK_BUFFER_USAGE_TRANSFER_DST_BIT, true, "readback"));
+        STIPPLE_TRY(ensure(extra_, wantAll ? pixels * 28 : 256, kStorage | VK_BUFFER_USAGE_TRANSFER_SRC_BIT, false,
+                           "depth and normals"));
+        STIPPLE_TRY(ensure(readback_, pixels * 4 + (wantAll ? pixels * 28 : 0), VK_BUFFER_USAGE_TRANSFER_DST_BIT, true,
+                           "readback"));
         std::memcpy(frameBuffer_.mapped(), &draws.frame, sizeof(draws.frame));
         auto* nodes = static_cast<shared::DrawNode*>(nodeBuffer_.mapped());
         for (size_t i = 0; i < draws.nodes.size(); ++i) {
@@ -133,9 +145,11 @@ class GpuBackend final : public render::Backend {
             node.addressHigh = static_cast<uint32_t>(address >> 32);
             std::memcpy(nodes + i, &node, sizeof(node));
         }
-        if (!draws.blocks.empty()) std::memcpy(blockBuffer_.mapped(), draws.blocks.data(), draws.blocks.size() * sizeof(shared::DrawBlock));
+        if (!draws.blocks.empty())
+            std::memcpy(blockBuffer_.mapped(), draws.blocks.data(), draws.blocks.size() * sizeof(shared::DrawBlock));
         if (descriptorsChanged_) {
-            pipelines_->writeDescriptors({&frameBuffer_, &nodeBuffer_, &blockBuffer_, &visibility_, &texels_, &stats_, &image_, &extra_});
+            pipelines_->writeDescriptors(
+                {&frameBuffer_, &nodeBuffer_, &blockBuffer_, &visibility_, &texels_, &stats_, &image_, &extra_});
             descriptorsChanged_ = false;
         }
         return {};
@@ -144,7 +158,8 @@ class GpuBackend final : public render::Backend {
     Result<void> begin() {
         VkCommandBufferBeginInfo info{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
         info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
-        if (const VkResult r = vkBeginCommandBuffer(commands_, &info); r != VK_SUCCESS) return vulkanError(r, "cannot record");
+        if (const VkResult r = vkBeginCommandBuffer(commands_, &info); r != VK_SUCCESS)
+            return vulkanError(r, "cannot record");
         vkResetQueryPool(device_->device, queries_, 0, PassList::kMaxPasses * 2);
         pipelines_->bind(commands_);
         return {};
@@ -168,12 +183,21 @@ class GpuBackend final : public render::Backend {
         return {};
     }
 
-    void dispatch(uint32_t width, uint32_t height) { vkCmdDispatch(commands_, (width + kGroup - 1) / kGroup, height, 1); }
+    void dispatch(uint32_t width, uint32_t height) {
+        vkCmdDispatch(commands_, (width + kGroup - 1) / kGroup, height, 1);
+    }
 
     void pushStep(size_t level, bool hasPyramid, bool wantAll) {
         const Level& fine = levels_[level];
         const Level& coarse = levels_[std::min(level + 1, levels_.size() - 1)];
-        const StepConstants step{fine.offset, fine.width, fine.height, coarse.offset, coarse.width, coarse.height, static_cast<uint32_t>(level), wantAll,
+        const StepConstants step{fine.offset,
+                                 fine.width,
+                                 fine.height,
+                                 coarse.offset,
+                                 coarse.width,
+                                 coarse.height,
+                                 static_cast<uint32_t>(level),
+                                 wantAll,
                                  hasPyramid && levels_.size() > 1};
         pipelines_->push(commands_, step);
     }
@@ -192,7 +216,9 @@ class GpuBackend final : public render::Backend {
                 pipelines_->use(commands_, "project");
                 pushStep(0, hasPyramid, wantAll);
                 const auto blocks = static_cast<uint32_t>(draws.blocks.size());
-                if (blocks > 0) vkCmdDispatch(commands_, std::min(blocks, kGroupsPerDimension), (blocks + kGroupsPerDimension - 1) / kGroupsPerDimension, 1);
+                if (blocks > 0)
+                    vkCmdDispatch(commands_, std::min(blocks, kGroupsPerDimension),
+                                  (blocks + kGroupsPerDimension - 1) / kGroupsPerDimension, 1);
                 break;
             }
             case render::Pass::resolve:
@@ -245,14 +271,17 @@ class GpuBackend final : public render::Backend {
     }
 
     Result<void> submit() {
-        if (const VkResult r = vkEndCommandBuffer(commands_); r != VK_SUCCESS) return vulkanError(r, "cannot end recording");
+        if (const VkResult r = vkEndCommandBuffer(commands_); r != VK_SUCCESS)
+            return vulkanError(r, "cannot end recording");
         VkCommandBufferSubmitInfo buffer{VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO};
         buffer.commandBuffer = commands_;
         VkSubmitInfo2 info{VK_STRUCTURE_TYPE_SUBMIT_INFO_2};
         info.commandBufferInfoCount = 1;
         info.pCommandBufferInfos = &buffer;
-        if (const VkResult r = vkQueueSubmit2(device_->queue, 1, &info, fence_); r != VK_SUCCESS) return vulkanError(r, "cannot submit");
-        if (const VkResult r = vkWaitForFences(device_->device, 1, &fence_, VK_TRUE, ~uint64_t{0}); r != VK_SUCCESS) return vulkanError(r, "the device was lost");
+        if (const VkResult r = vkQueueSubmit2(device_->queue, 1, &info, fence_); r != VK_SUCCESS)
+            return vulkanError(r, "cannot submit");
+        if (const VkResult r = vkWaitForFences(device_->device, 1, &fence_, VK_TRUE, ~uint64_t{0}); r != VK_SUCCESS)
+            return vulkanError(r, "the device was lost");
         vkResetFences(device_->device, 1, &fence_);
         return {};
     }
@@ -260,12 +289,17 @@ class GpuBackend final : public render::Backend {
     void takeTimes(const PassList& list) {
         std::vector<uint64_t> stamps(list.names().size() * 2);
         times_.clear();
-        if (stamps.empty() || vkGetQueryPoolResults(device_->device, queries_, 0, static_cast<uint32_t>(stamps.size()), stamps.size() * 8, stamps.data(), 8,
-                                                    VK_QUERY_RESULT_64_BIT) != VK_SUCCESS) return;
+        if (stamps.empty() ||
+            vkGetQueryPoolResults(device_->device, queries_, 0, static_cast<uint32_t>(stamps.size()), stamps.size() * 8,
+                                  stamps.data(), 8, VK_QUERY_RESULT_64_BIT) != VK_SUCCESS)
+            return;
         for (size_t i = 0; i < list.names().size(); ++i) {
-            const double ms = static_cast<double>(stamps[2 * i + 1] - stamps[2 * i]) * static_cast<double>(device_->timestampPeriodNs) * 1e-6;
-            if (!times_.empty() && times_.back().name == list.names()[i]) times_.back().ms += ms;  // the levels of pull and push
-            else times_.push_back({list.names()[i], ms});
+            const double ms = static_cast<double>(stamps[2 * i + 1] - stamps[2 * i]) *
+                              static_cast<double>(device_->timestampPeriodNs) * 1e-6;
+            if (!times_.empty() && times_.back().name == list.names()[i])
+                times_.back().ms += ms;  // the levels of pull and push
+            else
+                times_.push_back({list.names()[i], ms});
         }
     }
 
@@ -309,7 +343,9 @@ class GpuBackend final : public render::Backend {
 
 }  // namespace
 
-Result<std::unique_ptr<render::Backend>> makeGpuBackend(const GpuSettings& settings) { return GpuBackend::create(settings); }
+Result<std::unique_ptr<render::Backend>> makeGpuBackend(const GpuSettings& settings) {
+    return GpuBackend::create(settings);
+}
 
 std::vector<std::string> validationMessages(const render::Backend& backend) {
     const auto* gpu = dynamic_cast<const GpuBackend*>(&backend);

@@ -43,10 +43,13 @@ uint64_t RangeAllocator::freeBytes() const {
 Result<PageStore::Place> PageStore::allocate(uint64_t bytes) {
     bytes = (bytes + kAlignment - 1) / kAlignment * kAlignment;
     for (uint32_t p = 0; p < pages_.size(); ++p)
-        if (const uint64_t offset = pages_[p].ranges.allocate(bytes); offset != ~uint64_t{0}) return Place{p, offset, bytes};
+        if (const uint64_t offset = pages_[p].ranges.allocate(bytes); offset != ~uint64_t{0})
+            return Place{p, offset, bytes};
     const uint64_t size = std::max(bytes, kPageBytes);
-    STIPPLE_ASSIGN(Buffer buffer, Buffer::create(device_, size, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
-                                                                    VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT, false, "records page"));
+    STIPPLE_ASSIGN(Buffer buffer, Buffer::create(device_, size,
+                                                 VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
+                                                     VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT,
+                                                 false, "records page"));
     pages_.push_back({std::move(buffer), RangeAllocator(size)});
     return Place{static_cast<uint32_t>(pages_.size() - 1), pages_.back().ranges.allocate(bytes), bytes};
 }

@@ -3,11 +3,13 @@
 namespace stipple::gpu {
 
 void PassList::begin(const std::string& name, const std::vector<BufferUse>& uses, bool isTransfer) {
-    const VkPipelineStageFlags2 stage = isTransfer ? VK_PIPELINE_STAGE_2_TRANSFER_BIT : VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
+    const VkPipelineStageFlags2 stage =
+        isTransfer ? VK_PIPELINE_STAGE_2_TRANSFER_BIT : VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
     std::vector<VkBufferMemoryBarrier2> barriers;
     for (const BufferUse& use : uses) {
-        VkAccessFlags2 access = isTransfer ? (use.writes ? VK_ACCESS_2_TRANSFER_WRITE_BIT : VK_ACCESS_2_TRANSFER_READ_BIT)
-                                           : VK_ACCESS_2_SHADER_STORAGE_READ_BIT;
+        VkAccessFlags2 access = isTransfer
+                                    ? (use.writes ? VK_ACCESS_2_TRANSFER_WRITE_BIT : VK_ACCESS_2_TRANSFER_READ_BIT)
+                                    : VK_ACCESS_2_SHADER_STORAGE_READ_BIT;
         if (!isTransfer && use.writes) access |= VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT;
         const auto found = last_.find(use.buffer);
         if (found != last_.end() && (found->second.wrote || use.writes)) {
@@ -34,15 +36,18 @@ void PassList::begin(const std::string& name, const std::vector<BufferUse>& uses
     info.pMemoryBarriers = &memory;
     info.bufferMemoryBarrierCount = static_cast<uint32_t>(barriers.size());
     info.pBufferMemoryBarriers = barriers.data();
-    if ((info.memoryBarrierCount || info.bufferMemoryBarrierCount) && name != omitBarriersBefore_) vkCmdPipelineBarrier2(commands_, &info);
+    if ((info.memoryBarrierCount || info.bufferMemoryBarrierCount) && name != omitBarriersBefore_)
+        vkCmdPipelineBarrier2(commands_, &info);
     if (info.memoryBarrierCount) uploaded_ = false;
     if (name == "upload") uploaded_ = true;
-    vkCmdWriteTimestamp2(commands_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, queries_, static_cast<uint32_t>(names_.size()) * 2);
+    vkCmdWriteTimestamp2(commands_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, queries_,
+                         static_cast<uint32_t>(names_.size()) * 2);
     names_.push_back(name);
 }
 
 void PassList::end() {
-    vkCmdWriteTimestamp2(commands_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, queries_, static_cast<uint32_t>(names_.size()) * 2 - 1);
+    vkCmdWriteTimestamp2(commands_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, queries_,
+                         static_cast<uint32_t>(names_.size()) * 2 - 1);
 }
 
 void PassList::toHost(VkBuffer buffer) {

@@ -24,29 +24,35 @@ constexpr uint32_t kShade[] = {
 Result<std::unique_ptr<Pipelines>> Pipelines::create(const Device& device) {
     std::unique_ptr<Pipelines> p(new Pipelines(device));
     std::array<VkDescriptorSetLayoutBinding, kBindings> bindings{};
-    for (uint32_t i = 0; i < kBindings; ++i) bindings.at(i) = {i, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
+    for (uint32_t i = 0; i < kBindings; ++i)
+        bindings.at(i) = {i, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
     VkDescriptorSetLayoutCreateInfo setInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO};
     setInfo.bindingCount = kBindings;
     setInfo.pBindings = bindings.data();
-    if (const VkResult r = vkCreateDescriptorSetLayout(device.device, &setInfo, nullptr, &p->setLayout_); r != VK_SUCCESS) return vulkanError(r, "no descriptor layout");
+    if (const VkResult r = vkCreateDescriptorSetLayout(device.device, &setInfo, nullptr, &p->setLayout_);
+        r != VK_SUCCESS)
+        return vulkanError(r, "no descriptor layout");
     const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(StepConstants)};
     VkPipelineLayoutCreateInfo layoutInfo{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO};
     layoutInfo.setLayoutCount = 1;
     layoutInfo.pSetLayouts = &p->setLayout_;
     layoutInfo.pushConstantRangeCount = 1;
     layoutInfo.pPushConstantRanges = &range;
-    if (const VkResult r = vkCreatePipelineLayout(device.device, &layoutInfo, nullptr, &p->layout_); r != VK_SUCCESS) return vulkanError(r, "no pipeline layout");
+    if (const VkResult r = vkCreatePipelineLayout(device.device, &layoutInfo, nullptr, &p->layout_); r != VK_SUCCESS)
+        return vulkanError(r, "no pipeline layout");
     const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, kBindings};
     VkDescriptorPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
     poolInfo.maxSets = 1;
     poolInfo.poolSizeCount = 1;
     poolInfo.pPoolSizes = &size;
-    if (const VkResult r = vkCreateDescriptorPool(device.device, &poolInfo, nullptr, &p->pool_); r != VK_SUCCESS) return vulkanError(r, "no descriptor pool");
+    if (const VkResult r = vkCreateDescriptorPool(device.device, &poolInfo, nullptr, &p->pool_); r != VK_SUCCESS)
+        return vulkanError(r, "no descriptor pool");
     VkDescriptorSetAllocateInfo allocate{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO};
     allocate.descriptorPool = p->pool_;
     allocate.descriptorSetCount = 1;
     allocate.pSetLayouts = &p->setLayout_;
-    if (const VkResult r = vkAllocateDescriptorSets(device.device, &allocate, &p->set_); r != VK_SUCCESS) return vulkanError(r, "no descriptor set");
+    if (const VkResult r = vkAllocateDescriptorSets(device.device, &allocate, &p->set_); r != VK_SUCCESS)
+        return vulkanError(r, "no descriptor set");
     STIPPLE_TRY(p->add("project", kProject, std::size(kProject)));
     STIPPLE_TRY(p->add("resolve", kResolve, std::size(kResolve)));
     STIPPLE_TRY(p->add("pull", kPull, std::size(kPull)));
@@ -60,7 +66,8 @@ Result<void> Pipelines::add(const std::string& pass, const uint32_t* code, size_
     moduleInfo.codeSize = words * 4;
     moduleInfo.pCode = code;
     VkShaderModule module = VK_NULL_HANDLE;
-    if (const VkResult r = vkCreateShaderModule(device_.device, &moduleInfo, nullptr, &module); r != VK_SUCCESS) return vulkanError(r, "no shader " + pass);
+    if (const VkResult r = vkCreateShaderModule(device_.device, &moduleInfo, nullptr, &module); r != VK_SUCCESS)
+        return vulkanError(r, "no shader " + pass);
     VkComputePipelineCreateInfo info{VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO};
     info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
     info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
@@ -88,7 +95,8 @@ void Pipelines::writeDescriptors(const std::array<const Buffer*, kBindings>& buf
     std::array<VkWriteDescriptorSet, kBindings> writes{};
     for (uint32_t i = 0; i < kBindings; ++i) {
         infos.at(i) = {buffers.at(i)->handle(), 0, VK_WHOLE_SIZE};
-        writes.at(i) = {VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET, nullptr, set_, i, 0, 1, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, nullptr, &infos.at(i), nullptr};
+        writes.at(i) = {VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET, nullptr, set_,         i,      0, 1,
+                        VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,      nullptr, &infos.at(i), nullptr};
     }
     vkUpdateDescriptorSets(device_.device, kBindings, writes.data(), 0, nullptr);
 }

@@ -9,8 +9,8 @@ namespace {
 
 constexpr VkFormat kCanvasFormat = VK_FORMAT_R8G8B8A8_UNORM;
 
-VkImageMemoryBarrier2 imageBarrier(VkImage image, VkImageLayout from, VkImageLayout to, VkPipelineStageFlags2 srcStage, VkAccessFlags2 srcAccess,
-                                   VkPipelineStageFlags2 dstStage, VkAccessFlags2 dstAccess) {
+VkImageMemoryBarrier2 imageBarrier(VkImage image, VkImageLayout from, VkImageLayout to, VkPipelineStageFlags2 srcStage,
+                                   VkAccessFlags2 srcAccess, VkPipelineStageFlags2 dstStage, VkAccessFlags2 dstAccess) {
     VkImageMemoryBarrier2 b{VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2};
     b.srcStageMask = srcStage;
     b.srcAccessMask = srcAccess;
@@ -37,20 +37,25 @@ Result<std::unique_ptr<Swapchain>> Swapchain::create(const Device& device, VkSur
     std::unique_ptr<Swapchain> s(new Swapchain(device, surface));
     VkBool32 supported = VK_FALSE;
     vkGetPhysicalDeviceSurfaceSupportKHR(device.physical, device.queueFamily, surface, &supported);
-    if (!supported) return fail(ErrorKind::device, "cannot present to this display", device.deviceName, "use stipple render");
+    if (!supported)
+        return fail(ErrorKind::device, "cannot present to this display", device.deviceName, "use stipple render");
     VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
     pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
     pool.queueFamilyIndex = device.queueFamily;
-    if (const VkResult r = vkCreateCommandPool(device.device, &pool, nullptr, &s->pool_); r != VK_SUCCESS) return vulkanError(r, "no command pool");
+    if (const VkResult r = vkCreateCommandPool(device.device, &pool, nullptr, &s->pool_); r != VK_SUCCESS)
+        return vulkanError(r, "no command pool");
     VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
     allocate.commandPool = s->pool_;
     allocate.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
     allocate.commandBufferCount = 1;
-    if (const VkResult r = vkAllocateCommandBuffers(device.device, &allocate, &s->commands_); r != VK_SUCCESS) return vulkanError(r, "no command buffer");
+    if (const VkResult r = vkAllocateCommandBuffers(device.device, &allocate, &s->commands_); r != VK_SUCCESS)
+        return vulkanError(r, "no command buffer");
     VkFenceCreateInfo fence{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
-    if (const VkResult r = vkCreateFence(device.device, &fence, nullptr, &s->fence_); r != VK_SUCCESS) return vulkanError(r, "no fence");
+    if (const VkResult r = vkCreateFence(device.device, &fence, nullptr, &s->fence_); r != VK_SUCCESS)
+        return vulkanError(r, "no fence");
     VkSemaphoreCreateInfo semaphore{VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO};
-    if (const VkResult r = vkCreateSemaphore(device.device, &semaphore, nullptr, &s->acquired_); r != VK_SUCCESS) return vulkanError(r, "no semaphore");
+    if (const VkResult r = vkCreateSemaphore(device.device, &semaphore, nullptr, &s->acquired_); r != VK_SUCCESS)
+        return vulkanError(r, "no semaphore");
     STIPPLE_TRY(s->createRenderPass());
     return s;
 }
@@ -86,7 +91,8 @@ Result<void> Swapchain::createRenderPass() {
     info.pAttachments = &colour;
     info.subpassCount = 1;
     info.pSubpasses = &subpass;
-    if (const VkResult r = vkCreateRenderPass(device_.device, &info, nullptr, &renderPass_); r != VK_SUCCESS) return vulkanError(r, "no render pass");
+    if (const VkResult r = vkCreateRenderPass(device_.device, &info, nullptr, &renderPass_); r != VK_SUCCESS)
+        return vulkanError(r, "no render pass");
     return {};
 }
 
@@ -110,22 +116,28 @@ Result<void> Swapchain::createCanvas(uint32_t width, uint32_t height) {
     info.mipLevels = info.arrayLayers = 1;
     info.samples = VK_SAMPLE_COUNT_1_BIT;
     info.tiling = VK_IMAGE_TILING_OPTIMAL;
-    info.usage = VK_IMAGE_USAGE_TRANSFER_DST_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT;
-    if (const VkResult r = vkCreateImage(device_.device, &info, nullptr, &canvas_); r != VK_SUCCESS) return vulkanError(r, "no canvas");
+    info.usage =
+        VK_IMAGE_USAGE_TRANSFER_DST_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT;
+    if (const VkResult r = vkCreateImage(device_.device, &info, nullptr, &canvas_); r != VK_SUCCESS)
+        return vulkanError(r, "no canvas");
     VkMemoryRequirements needs{};
     vkGetImageMemoryRequirements(device_.device, canvas_, &needs);
-    STIPPLE_ASSIGN(const uint32_t type, device_.memoryType(needs.memoryTypeBits, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, 0));
+    STIPPLE_ASSIGN(const uint32_t type,
+                   device_.memoryType(needs.memoryTypeBits, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, 0));
     VkMemoryAllocateInfo allocate{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
     allocate.allocationSize = needs.size;
     allocate.memoryTypeIndex = type;
-    if (const VkResult r = vkAllocateMemory(device_.device, &allocate, nullptr, &canvasMemory_); r != VK_SUCCESS) return vulkanError(r, "no memory for the canvas");
-    if (const VkResult r = vkBindImageMemory(device_.device, canvas_, canvasMemory_, 0); r != VK_SUCCESS) return vulkanError(r, "cannot bind the canvas");
+    if (const VkResult r = vkAllocateMemory(device_.device, &allocate, nullptr, &canvasMemory_); r != VK_SUCCESS)
+        return vulkanError(r, "no memory for the canvas");
+    if (const VkResult r = vkBindImageMemory(device_.device, canvas_, canvasMemory_, 0); r != VK_SUCCESS)
+        return vulkanError(r, "cannot bind the canvas");
     VkImageViewCreateInfo view{VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO};
     view.image = canvas_;
     view.viewType = VK_IMAGE_VIEW_TYPE_2D;
     view.format = kCanvasFormat;
     view.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
-    if (const VkResult r = vkCreateImageView(device_.device, &view, nullptr, &canvasView_); r != VK_SUCCESS) return vulkanError(r, "no canvas view");
+    if (const VkResult r = vkCreateImageView(device_.device, &view, nullptr, &canvasView_); r != VK_SUCCESS)
+        return vulkanError(r, "no canvas view");
     VkFramebufferCreateInfo frame{VK_STRUCTURE_TYPE_FRAMEBUFFER_CREATE_INFO};
     frame.renderPass = renderPass_;
     frame.attachmentCount = 1;
@@ -133,7 +145,8 @@ Result<void> Swapchain::createCanvas(uint32_t width, uint32_t height) {
     frame.width = width;
     frame.height = height;
     frame.layers = 1;
-    if (const VkResult r = vkCreateFramebuffer(device_.device, &frame, nullptr, &framebuffer_); r != VK_SUCCESS) return vulkanError(r, "no framebuffer");
+    if (const VkResult r = vkCreateFramebuffer(device_.device, &frame, nullptr, &framebuffer_); r != VK_SUCCESS)
+        return vulkanError(r, "no framebuffer");
     const uint64_t bytes = uint64_t{width} * height * 4;
     STIPPLE_ASSIGN(staging_, Buffer::create(device_, bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, true, "window staging"));
     STIPPLE_ASSIGN(readback_, Buffer::create(device_, bytes, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true, "screenshot"));
@@ -156,22 +169,27 @@ Result<void> Swapchain::resize(uint32_t width, uint32_t height) {
     const auto chosen = std::find_if(format.begin(), format.end(), [](const VkSurfaceFormatKHR& f) {
         return f.format == VK_FORMAT_B8G8R8A8_UNORM || f.format == VK_FORMAT_R8G8B8A8_UNORM;
     });
-    if (chosen == format.end()) return fail(ErrorKind::device, "offers no 8-bit RGBA window", device_.deviceName, "use stipple render");
+    if (chosen == format.end())
+        return fail(ErrorKind::device, "offers no 8-bit RGBA window", device_.deviceName, "use stipple render");
     VkSwapchainCreateInfoKHR info{VK_STRUCTURE_TYPE_SWAPCHAIN_CREATE_INFO_KHR};
     info.surface = surface_;
-    info.minImageCount = caps.maxImageCount > 0 ? std::min(caps.minImageCount + 1, caps.maxImageCount) : caps.minImageCount + 1;
+    info.minImageCount =
+        caps.maxImageCount > 0 ? std::min(caps.minImageCount + 1, caps.maxImageCount) : caps.minImageCount + 1;
     info.imageFormat = chosen->format;
     info.imageColorSpace = chosen->colorSpace;
     info.imageExtent = extent_;
     info.imageArrayLayers = 1;
     info.imageUsage = VK_IMAGE_USAGE_TRANSFER_DST_BIT;
     info.preTransform = caps.currentTransform;
-    info.compositeAlpha = (caps.supportedCompositeAlpha & VK_COMPOSITE_ALPHA_OPAQUE_BIT_KHR) != 0 ? VK_COMPOSITE_ALPHA_OPAQUE_BIT_KHR : VK_COMPOSITE_ALPHA_INHERIT_BIT_KHR;
+    info.compositeAlpha = (caps.supportedCompositeAlpha & VK_COMPOSITE_ALPHA_OPAQUE_BIT_KHR) != 0
+                              ? VK_COMPOSITE_ALPHA_OPAQUE_BIT_KHR
+                              : VK_COMPOSITE_ALPHA_INHERIT_BIT_KHR;
     info.presentMode = VK_PRESENT_MODE_FIFO_KHR;
     info.clipped = VK_TRUE;
     info.oldSwapchain = swapchain_;
     VkSwapchainKHR made = VK_NULL_HANDLE;
-    if (const VkResult r = vkCreateSwapchainKHR(device_.device, &info, nullptr, &made); r != VK_SUCCESS) return vulkanError(r, "no swapchain");
+    if (const VkResult r = vkCreateSwapchainKHR(device_.device, &info, nullptr, &made); r != VK_SUCCESS)
+        return vulkanError(r, "no swapchain");
     if (swapchain_ != VK_NULL_HANDLE) vkDestroySwapchainKHR(device_.device, swapchain_, nullptr);
     swapchain_ = made;
     uint32_t count = 0;
@@ -181,7 +199,9 @@ Result<void> Swapchain::resize(uint32_t width, uint32_t height) {
     while (rendered_.size() < count) {
         VkSemaphoreCreateInfo semaphore{VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO};
         rendered_.push_back(VK_NULL_HANDLE);
-        if (const VkResult r = vkCreateSemaphore(device_.device, &semaphore, nullptr, &rendered_.back()); r != VK_SUCCESS) return vulkanError(r, "no semaphore");
+        if (const VkResult r = vkCreateSemaphore(device_.device, &semaphore, nullptr, &rendered_.back());
+            r != VK_SUCCESS)
+            return vulkanError(r, "no semaphore");
     }
     return {};
 }
@@ -189,7 +209,8 @@ Result<void> Swapchain::resize(uint32_t width, uint32_t height) {
 Result<void> Swapchain::begin() {
     VkCommandBufferBeginInfo info{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
     info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
-    if (const VkResult r = vkBeginCommandBuffer(commands_, &info); r != VK_SUCCESS) return vulkanError(r, "cannot record");
+    if (const VkResult r = vkBeginCommandBuffer(commands_, &info); r != VK_SUCCESS)
+        return vulkanError(r, "cannot record");
     return {};
 }
 
@@ -202,7 +223,8 @@ Result<void> Swapchain::runOnce(const std::function<void(VkCommandBuffer)>& reco
     VkSubmitInfo2 info{VK_STRUCTURE_TYPE_SUBMIT_INFO_2};
     info.commandBufferInfoCount = 1;
     info.pCommandBufferInfos = &buffer;
-    if (const VkResult r = vkQueueSubmit2(device_.queue, 1, &info, fence_); r != VK_SUCCESS) return vulkanError(r, "cannot submit");
+    if (const VkResult r = vkQueueSubmit2(device_.queue, 1, &info, fence_); r != VK_SUCCESS)
+        return vulkanError(r, "cannot submit");
     vkWaitForFences(device_.device, 1, &fence_, VK_TRUE, ~uint64_t{0});
     vkResetFences(device_.device, 1, &fence_);
     return {};
@@ -212,13 +234,15 @@ void Swapchain::recordFrame(const std::function<void(VkCommandBuffer)>& overlay,
     const auto transfer = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
     const auto output = VK_PIPELINE_STAGE_2_COLOR_ATTACHMENT_OUTPUT_BIT;
     const VkAccessFlags2 attachment = VK_ACCESS_2_COLOR_ATTACHMENT_READ_BIT | VK_ACCESS_2_COLOR_ATTACHMENT_WRITE_BIT;
-    recordBarrier(commands_, imageBarrier(canvas_, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, transfer, 0, transfer, VK_ACCESS_2_TRANSFER_WRITE_BIT));
+    recordBarrier(commands_, imageBarrier(canvas_, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+                                          transfer, 0, transfer, VK_ACCESS_2_TRANSFER_WRITE_BIT));
     VkBufferImageCopy copy{};
     copy.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
     copy.imageExtent = {canvasWidth_, canvasHeight_, 1};
     vkCmdCopyBufferToImage(commands_, staging_.handle(), canvas_, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &copy);
-    recordBarrier(commands_, imageBarrier(canvas_, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL, transfer,
-                                          VK_ACCESS_2_TRANSFER_WRITE_BIT, output, attachment));
+    recordBarrier(commands_,
+                  imageBarrier(canvas_, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL,
+                               transfer, VK_ACCESS_2_TRANSFER_WRITE_BIT, output, attachment));
     VkRenderPassBeginInfo begin{VK_STRUCTURE_TYPE_RENDER_PASS_BEGIN_INFO};
     begin.renderPass = renderPass_;
     begin.framebuffer = framebuffer_;
@@ -226,22 +250,29 @@ void Swapchain::recordFrame(const std::function<void(VkCommandBuffer)>& overlay,
     vkCmdBeginRenderPass(commands_, &begin, VK_SUBPASS_CONTENTS_INLINE);
     overlay(commands_);
     vkCmdEndRenderPass(commands_);
-    recordBarrier(commands_, imageBarrier(canvas_, VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, output, attachment, transfer,
-                                          VK_ACCESS_2_TRANSFER_READ_BIT));
-    if (capture) vkCmdCopyImageToBuffer(commands_, canvas_, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, readback_.handle(), 1, &copy);
+    recordBarrier(commands_,
+                  imageBarrier(canvas_, VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL,
+                               output, attachment, transfer, VK_ACCESS_2_TRANSFER_READ_BIT));
+    if (capture)
+        vkCmdCopyImageToBuffer(commands_, canvas_, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, readback_.handle(), 1, &copy);
     VkImage target = images_[imageIndex];
-    recordBarrier(commands_, imageBarrier(target, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, transfer, 0, transfer, VK_ACCESS_2_TRANSFER_WRITE_BIT));
+    recordBarrier(commands_, imageBarrier(target, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+                                          transfer, 0, transfer, VK_ACCESS_2_TRANSFER_WRITE_BIT));
     VkImageBlit blit{};
     blit.srcSubresource = blit.dstSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
     blit.srcOffsets[1] = {static_cast<int32_t>(canvasWidth_), static_cast<int32_t>(canvasHeight_), 1};
     blit.dstOffsets[1] = {static_cast<int32_t>(extent_.width), static_cast<int32_t>(extent_.height), 1};
-    vkCmdBlitImage(commands_, canvas_, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, target, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &blit, VK_FILTER_LINEAR);
-    recordBarrier(commands_, imageBarrier(target, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR, transfer, VK_ACCESS_2_TRANSFER_WRITE_BIT,
-                                          VK_PIPELINE_STAGE_2_BOTTOM_OF_PIPE_BIT, 0));
+    vkCmdBlitImage(commands_, canvas_, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, target,
+                   VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &blit, VK_FILTER_LINEAR);
+    recordBarrier(commands_,
+                  imageBarrier(target, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR, transfer,
+                               VK_ACCESS_2_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_2_BOTTOM_OF_PIPE_BIT, 0));
 }
 
-Result<void> Swapchain::present(const render::Image& image, const std::function<void(VkCommandBuffer)>& overlay, render::Image* capture) {
-    if (image.width != canvasWidth_ || image.height != canvasHeight_) STIPPLE_TRY(createCanvas(image.width, image.height));
+Result<void> Swapchain::present(const render::Image& image, const std::function<void(VkCommandBuffer)>& overlay,
+                                render::Image* capture) {
+    if (image.width != canvasWidth_ || image.height != canvasHeight_)
+        STIPPLE_TRY(createCanvas(image.width, image.height));
     std::memcpy(staging_.mapped(), image.rgba.data(), image.rgba.size() * 4);
     uint32_t index = 0;
     VkResult r = vkAcquireNextImageKHR(device_.device, swapchain_, ~uint64_t{0}, acquired_, VK_NULL_HANDLE, &index);
@@ -250,7 +281,8 @@ Result<void> Swapchain::present(const render::Image& image, const std::function<
     STIPPLE_TRY(begin());
     recordFrame(overlay, capture != nullptr, index);
     vkEndCommandBuffer(commands_);
-    VkSemaphoreSubmitInfo wait{VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO}, signal{VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO};
+    VkSemaphoreSubmitInfo wait{VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO},
+        signal{VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO};
     wait.semaphore = acquired_;
     wait.stageMask = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
     signal.semaphore = rendered_[index];

@@ -1,5 +1,5 @@
-// The swapchain and the picture shown on it: an image of our own that takes the backend's pixels and the overlay, and is
-// then copied to the window (so that a screenshot is exactly what was shown).
+// The swapchain and the picture shown on it: an image of our own that takes the backend's pixels and the overlay, and
+// is then copied to the window (so that a screenshot is exactly what was shown).
 #pragma once
 
 #include <functional>
@@ -19,7 +19,8 @@ class Swapchain {
     Swapchain& operator=(const Swapchain&) = delete;
     Result<void> resize(uint32_t width, uint32_t height);
     VkRenderPass renderPass() const { return renderPass_; }
-    Result<void> present(const render::Image& image, const std::function<void(VkCommandBuffer)>& overlay, render::Image* capture);
+    Result<void> present(const render::Image& image, const std::function<void(VkCommandBuffer)>& overlay,
+                         render::Image* capture);
     /// Records and runs commands at once.
     Result<void> runOnce(const std::function<void(VkCommandBuffer)>& record);
 

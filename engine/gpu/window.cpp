@@ -28,7 +28,9 @@ struct InputState {
     std::string pressed;
 };
 
-void onScroll(GLFWwindow* window, double, double y) { static_cast<InputState*>(glfwGetWindowUserPointer(window))->scroll += y; }
+void onScroll(GLFWwindow* window, double, double y) {
+    static_cast<InputState*>(glfwGetWindowUserPointer(window))->scroll += y;
+}
 void onKey(GLFWwindow* window, int key, int, int action, int) {
     if (action != GLFW_PRESS) return;
     auto* state = static_cast<InputState*>(glfwGetWindowUserPointer(window));
@@ -58,18 +60,26 @@ class WindowImpl final : public Window {
 
     Result<void> open(const std::string& title, uint32_t width, uint32_t height, bool validation) {
         if (!glfwInit())
-            return fail(ErrorKind::device, "no window can be opened: " + lastGlfwError(), "display", "use stipple render, or run under a display (xvfb-run)");
+            return fail(ErrorKind::device, "no window can be opened: " + lastGlfwError(), "display",
+                        "use stipple render, or run under a display (xvfb-run)");
         glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
         window_ = glfwCreateWindow(static_cast<int>(width), static_cast<int>(height), title.c_str(), nullptr, nullptr);
-        if (!window_) return fail(ErrorKind::device, "no window can be opened: " + lastGlfwError(), "display", "use stipple render");
+        if (!window_)
+            return fail(ErrorKind::device, "no window can be opened: " + lastGlfwError(), "display",
+                        "use stipple render");
         glfwSetWindowUserPointer(window_, &inputState_);
         glfwSetScrollCallback(window_, onScroll);
         glfwSetKeyCallback(window_, onKey);
         uint32_t count = 0;
         const char** extensions = glfwGetRequiredInstanceExtensions(&count);
-        if (!extensions) return fail(ErrorKind::device, "Vulkan cannot present here: " + lastGlfwError(), "display", "apt-get install mesa-vulkan-drivers");
-        STIPPLE_ASSIGN(device_, Device::create({"", validation, {extensions, extensions + count}, {VK_KHR_SWAPCHAIN_EXTENSION_NAME}}));
-        if (const VkResult r = glfwCreateWindowSurface(device_->instance, window_, nullptr, &surface_); r != VK_SUCCESS) return vulkanError(r, "no surface");
+        if (!extensions)
+            return fail(ErrorKind::device, "Vulkan cannot present here: " + lastGlfwError(), "display",
+                        "apt-get install mesa-vulkan-drivers");
+        STIPPLE_ASSIGN(
+            device_,
+            Device::create({"", validation, {extensions, extensions + count}, {VK_KHR_SWAPCHAIN_EXTENSION_NAME}}));
+        if (const VkResult r = glfwCreateWindowSurface(device_->instance, window_, nullptr, &surface_); r != VK_SUCCESS)
+            return vulkanError(r, "no surface");
         STIPPLE_ASSIGN(swapchain_, Swapchain::create(*device_, surface_));
         STIPPLE_TRY(swapchain_->resize(width, height));
         return setupImgui();
@@ -109,13 +119,15 @@ class WindowImpl final : public Window {
         return in;
     }
 
-    Result<void> present(const render::Image& image, const std::function<void()>& drawOverlay, render::Image* capture) override {
+    Result<void> present(const render::Image& image, const std::function<void()>& drawOverlay,
+                         render::Image* capture) override {
         ImGui_ImplVulkan_NewFrame();
         ImGui_ImplGlfw_NewFrame();
         ImGui::NewFrame();
         drawOverlay();
         ImGui::Render();
-        return swapchain_->present(image, [](VkCommandBuffer c) { ImGui_ImplVulkan_RenderDrawData(ImGui::GetDrawData(), c); }, capture);
+        return swapchain_->present(
+            image, [](VkCommandBuffer c) { ImGui_ImplVulkan_RenderDrawData(ImGui::GetDrawData(), c); }, capture);
     }
 
     std::vector<std::string> validationMessages() const override { return device_->messages(); }
@@ -128,7 +140,8 @@ class WindowImpl final : public Window {
         pool.maxSets = 4;
         pool.poolSizeCount = 1;
         pool.pPoolSizes = &size;
-        if (const VkResult r = vkCreateDescriptorPool(device_->device, &pool, nullptr, &imguiPool_); r != VK_SUCCESS) return vulkanError(r, "no descriptor pool");
+        if (const VkResult r = vkCreateDescriptorPool(device_->device, &pool, nullptr, &imguiPool_); r != VK_SUCCESS)
+            return vulkanError(r, "no descriptor pool");
         ImGui::CreateContext();
         ImGui::GetIO().IniFilename = nullptr;
         ImGui_ImplGlfw_InitForVulkan(window_, true);
@@ -161,12 +174,19 @@ class WindowImpl final : public Window {
 
 }  // namespace
 
-Result<std::unique_ptr<Window>> Window::create(const std::string& title, uint32_t width, uint32_t height, bool validation) {
+Result<std::unique_ptr<Window>> Window::create(const std::string& title, uint32_t width, uint32_t height,
+                                               bool validation) {
     auto window = std::make_unique<WindowImpl>();
     STIPPLE_TRY(window->open(title, width, height, validation));
     return window;
 }
 
-bool hasDisplay() { return std::getenv("DISPLAY") != nullptr || std::getenv("WAYLAND_DISPLAY") != nullptr; }
+bool hasDisplay() {
+    const auto isSet = [](const char* name) {
+        const char* value = std::getenv(name);
+        return value && *value;
+    };
+    return isSet("DISPLAY") || isSet("WAYLAND_DISPLAY");
+}
 
 }  // namespace stipple::gpu

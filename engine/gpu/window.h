@@ -20,16 +20,19 @@ struct Input {
     double mouseX = 0, mouseY = 0, mouseDeltaX = 0, mouseDeltaY = 0, scroll = 0;
     bool leftButton = false, rightButton = false;
     bool forward = false, back = false, left = false, right = false, up = false, down = false, fast = false;
-    std::string pressed;             ///< keys pressed once: letters and digits, '\t' for Tab, 27 for Escape
+    std::string pressed;  ///< keys pressed once: letters and digits, '\t' for Tab, 27 for Escape
 };
 
 class Window {
   public:
-    static Result<std::unique_ptr<Window>> create(const std::string& title, uint32_t width, uint32_t height, bool validation);
+    static Result<std::unique_ptr<Window>> create(const std::string& title, uint32_t width, uint32_t height,
+                                                  bool validation);
     virtual ~Window() = default;
     virtual Input poll() = 0;
-    /// Shows `image` with what `drawOverlay` draws by ImGui calls. `capture`, if not null, receives the finished picture.
-    virtual Result<void> present(const render::Image& image, const std::function<void()>& drawOverlay, render::Image* capture) = 0;
+    /// Shows `image` with what `drawOverlay` draws by ImGui calls. `capture`, if not null, receives the finished
+    /// picture.
+    virtual Result<void> present(const render::Image& image, const std::function<void()>& drawOverlay,
+                                 render::Image* capture) = 0;
     virtual std::vector<std::string> validationMessages() const = 0;
 };
 

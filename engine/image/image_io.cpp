@@ -28,8 +28,9 @@ const Module& module() {
         std::error_code ignored;
         const auto folder = std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path();
         // Beside the program (build tree), in lib/stipple of an installation, or where the build put it (tests).
-        for (const std::string& place : {(folder / "libstipple_oiio.so").string(), (folder / STIPPLE_INSTALLED_MODULE).string(),
-                                         std::string(STIPPLE_BUILT_MODULE)}) {
+        for (const std::string& place :
+             {(folder / "libstipple_oiio.so").string(), (folder / STIPPLE_INSTALLED_MODULE).string(),
+              std::string(STIPPLE_BUILT_MODULE)}) {
             void* handle = ::dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL);
             if (!handle) {
                 m.problem = ::dlerror();
@@ -72,16 +73,19 @@ Result<void> writeImage(const std::string& path, const render::Image& image) {
             for (size_t c = 0; c < 3; ++c) to[5 + c] = image.normal.size() == pixels * 3 ? image.normal[i * 3 + c] : 0;
         }
     }
-    if (!module().write) return fail(ErrorKind::output, "the picture module cannot be loaded: " + module().problem, path);
+    if (!module().write)
+        return fail(ErrorKind::output, "the picture module cannot be loaded: " + module().problem, path);
     static const std::array<const char*, 8> names{"R", "G", "B", "A", "Z", "N.x", "N.y", "N.z"};
     const std::string temporary = fmt::format("{}.partial.{}{}", path, ::getpid(), isExr ? ".exr" : ".png");
     std::array<char, 512> error{};
-    const int status = module().write(temporary.c_str(), static_cast<int>(image.width), static_cast<int>(image.height), isExr ? 8 : 4,
-                                      isExr ? 1 : 0, isExr ? static_cast<const void*>(wide.data()) : image.rgba.data(), names.data(),
-                                      error.data(), error.size());
+    const int status = module().write(
+        temporary.c_str(), static_cast<int>(image.width), static_cast<int>(image.height), isExr ? 8 : 4, isExr ? 1 : 0,
+        isExr ? static_cast<const void*>(wide.data()) : image.rgba.data(), names.data(), error.data(), error.size());
     // A full disk shows as a short file with some encoders, without an error.
     struct stat info {};
-    if (status == 0 && ::stat(temporary.c_str(), &info) == 0 && info.st_size > 0 && ::rename(temporary.c_str(), path.c_str()) == 0) return {};
+    if (status == 0 && ::stat(temporary.c_str(), &info) == 0 && info.st_size > 0 &&
+        ::rename(temporary.c_str(), path.c_str()) == 0)
+        return {};
     const std::string reason = status != 0 ? error.data() : std::strerror(errno);
     ::unlink(temporary.c_str());
     return fail(ErrorKind::output, "cannot be written: " + reason.substr(0, reason.find('\n')), path,
@@ -94,15 +98,18 @@ Result<render::Image> readImage(const std::string& path) {
     int width = 0, height = 0;
     const auto bad = [&] {
         const std::string text = error.data();
-        return fail(ErrorKind::input, "cannot be read: " + text.substr(0, text.find('\n')), path, "PNG and EXR are read");
+        return fail(ErrorKind::input, "cannot be read: " + text.substr(0, text.find('\n')), path,
+                    "PNG and EXR are read");
     };
     if (module().read(path.c_str(), &width, &height, nullptr, error.data(), error.size()) != 0) return bad();
-    if (width <= 0 || height <= 0 || int64_t{width} * height > int64_t{1} << 30) return fail(ErrorKind::input, "has an impossible size", path);
+    if (width <= 0 || height <= 0 || int64_t{width} * height > int64_t{1} << 30)
+        return fail(ErrorKind::input, "has an impossible size", path);
     render::Image image;
     image.width = static_cast<uint32_t>(width);
     image.height = static_cast<uint32_t>(height);
     image.rgba.resize(size_t{image.width} * image.height);
-    if (module().read(path.c_str(), &width, &height, reinterpret_cast<unsigned char*>(image.rgba.data()), error.data(), error.size()) != 0)
+    if (module().read(path.c_str(), &width, &height, reinterpret_cast<unsigned char*>(image.rgba.data()), error.data(),
+                      error.size()) != 0)
         return bad();
     return image;
 }

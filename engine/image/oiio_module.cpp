@@ -35,7 +35,8 @@ extern "C" int stippleOiioWrite(const char* path, int width, int height, int cha
     }
 }
 
-extern "C" int stippleOiioRead(const char* path, int* width, int* height, unsigned char* pixels, char* error, int errorBytes) {
+extern "C" int stippleOiioRead(const char* path, int* width, int* height, unsigned char* pixels, char* error,
+                               int errorBytes) {
     try {
         OIIO::ImageSpec config;
         config.attribute("oiio:UnassociatedAlpha", 1);
@@ -46,13 +47,16 @@ extern "C" int stippleOiioRead(const char* path, int* width, int* height, unsign
         *height = spec.height;
         if (pixels == nullptr) return 0;
         const int channels = spec.nchannels;
-        std::vector<unsigned char> raw(static_cast<size_t>(spec.width) * static_cast<size_t>(spec.height) * static_cast<size_t>(channels));
-        if (!in->read_image(0, 0, 0, channels, OIIO::TypeDesc::UINT8, raw.data())) return report(in->geterror(), error, errorBytes);
+        std::vector<unsigned char> raw(static_cast<size_t>(spec.width) * static_cast<size_t>(spec.height) *
+                                       static_cast<size_t>(channels));
+        if (!in->read_image(0, 0, 0, channels, OIIO::TypeDesc::UINT8, raw.data()))
+            return report(in->geterror(), error, errorBytes);
         const size_t count = static_cast<size_t>(spec.width) * static_cast<size_t>(spec.height);
         for (size_t i = 0; i < count; ++i)
             for (int c = 0; c < 4; ++c) {
                 const int from = channels >= 3 ? c : c < 3 ? 0 : channels == 2 ? 1 : 4;
-                pixels[i * 4 + static_cast<size_t>(c)] = from < channels ? raw[i * static_cast<size_t>(channels) + static_cast<size_t>(from)] : 255;
+                pixels[i * 4 + static_cast<size_t>(c)] =
+                    from < channels ? raw[i * static_cast<size_t>(channels) + static_cast<size_t>(from)] : 255;
             }
         return 0;
     } catch (const std::exception& e) {

@@ -57,7 +57,8 @@ inline Disc decodeDisc(const lod::Hierarchy& h, const lod::Node& node, const sha
 
 /// Light of the scene's sun and sky on a white surface with eye-facing camera-space normal n.
 inline double lightOn(const glm::dvec3& n, const shared::FrameConstants& f) {
-    return 0.75 * std::max(0.0, glm::dot(n, glm::dvec3(f.sunDirection))) + 0.25 + 0.15 * glm::dot(n, glm::dvec3(f.skyDirection));
+    return 0.75 * std::max(0.0, glm::dot(n, glm::dvec3(f.sunDirection))) + 0.25 +
+           0.15 * glm::dot(n, glm::dvec3(f.skyDirection));
 }
 
 }  // namespace stipple::reference

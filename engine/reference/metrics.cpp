@@ -8,9 +8,11 @@
 
 namespace stipple::reference {
 
-Result<ImageDifference> compareImages(const render::Image& a, const render::Image& b, int threshold, render::Image* difference) {
+Result<ImageDifference> compareImages(const render::Image& a, const render::Image& b, int threshold,
+                                      render::Image* difference) {
     if (a.width != b.width || a.height != b.height)
-        return fail(ErrorKind::input, fmt::format("the images have different sizes: {} x {} and {} x {}", a.width, a.height, b.width, b.height));
+        return fail(ErrorKind::input, fmt::format("the images have different sizes: {} x {} and {} x {}", a.width,
+                                                  a.height, b.width, b.height));
     ImageDifference out;
     const size_t pixels = size_t{a.width} * a.height;
     if (difference) {

@@ -21,17 +21,19 @@ struct TraceSettings {
 };
 /// Rays against the discs of all leaves: at the front hit, colours and normals of the discs within the front thickness
 /// are blended with the kernel (1 - rho^2)^2; samples are averaged in linear light, alpha is coverage.
-Result<render::Image> trace(const lod::Store& store, const lod::View& view, const TraceSettings& settings, Executor& executor);
+Result<render::Image> trace(const lod::Store& store, const lod::View& view, const TraceSettings& settings,
+                            Executor& executor);
 
 struct ImageDifference {
-    double psnr = 0;            ///< dB over all pixels (colour over black where transparent); infinity if equal
-    double foregroundPsnr = 0;  ///< dB where either image has coverage
-    int maxDiff = 0;            ///< largest channel difference
+    double psnr = 0;               ///< dB over all pixels (colour over black where transparent); infinity if equal
+    double foregroundPsnr = 0;     ///< dB where either image has coverage
+    int maxDiff = 0;               ///< largest channel difference
     double differingFraction = 0;  ///< pixels with a channel more than `threshold` apart
-    double silhouetteIou = 1;   ///< of the pixels with coverage >= 1/2
-    uint64_t holes = 0;         ///< pixels empty in A whose 5 x 5 neighbourhood is covered in B
+    double silhouetteIou = 1;      ///< of the pixels with coverage >= 1/2
+    uint64_t holes = 0;            ///< pixels empty in A whose 5 x 5 neighbourhood is covered in B
 };
 /// `b` is the reference. Sizes must agree.
-Result<ImageDifference> compareImages(const render::Image& a, const render::Image& b, int threshold, render::Image* difference);
+Result<ImageDifference> compareImages(const render::Image& a, const render::Image& b, int threshold,
+                                      render::Image* difference);
 
 }  // namespace stipple::reference

@@ -1,4 +1,5 @@
-// Modes points and pullpush once more, in fp64, one pixel at a time, written from ALGORITHMS 1.4 and not from the kernels.
+// Modes points and pullpush once more, in fp64, one pixel at a time, written from ALGORITHMS 1.4 and not from the
+// kernels.
 #include <algorithm>
 #include <cmath>
 #include <unordered_map>
@@ -25,9 +26,13 @@ struct Level {
     int width = 0, height = 0;
     std::vector<Sample> samples;
     const Sample* at(int x, int y) const {
-        return x < 0 || y < 0 || x >= width || y >= height ? nullptr : &samples[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)];
+        return x < 0 || y < 0 || x >= width || y >= height
+                   ? nullptr
+                   : &samples[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)];
     }
-    Sample& ref(int x, int y) { return samples[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)]; }
+    Sample& ref(int x, int y) {
+        return samples[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)];
+    }
 };
 
 /// The rotation that takes the unit vector v to z the shortest way (Rodrigues).
@@ -58,7 +63,9 @@ Sample blend(std::vector<Contribution>& list, const Sample*& front) {
         if (!front || c.sample->depth < front->depth) front = c.sample;
     Sample sum;
     double weight = 0;
-    std::erase_if(list, [&](const Contribution& c) { return c.sample->depth - front->depth > c.sample->thickness + front->thickness; });
+    std::erase_if(list, [&](const Contribution& c) {
+        return c.sample->depth - front->depth > c.sample->thickness + front->thickness;
+    });
     for (const auto& [s, w] : list) {
         weight += w;
         sum.depth += w * s->depth;
@@ -104,7 +111,6 @@ Level pullLevel(const Level& fine, double childSize) {
 }
 
 void pushLevel(Level& fine, const Level& coarse, double fineSize) {
-    const Level before = fine;
     for (int y = 0; y < fine.height; ++y)
         for (int x = 0; x < fine.width; ++x) {
             const dvec2 centre = (dvec2(x, y) + 0.5) * fineSize;
@@ -126,8 +132,11 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize) {
             const bool widen = least >= 1 && together >= 4;
             std::vector<Contribution> list;
             for (const auto& [s, rho2] : around) {
-                const double rest = 1 - (widen ? rho2 / 4 : rho2);
-                if (rest > 0) list.push_back({s, rest * rest});
+                const double rest = std::max(0.0, 1 - (widen ? rho2 / 4 : rho2));
+                // An empty texel between four filled ones takes whatever is nearest.
+                const bool between = least >= 1 && around.size() == 4 && !fine.ref(x, y).valid;
+                const double weight = std::max(rest * rest, between ? 0.01 / (1 + rho2 * rho2) : 0.0);
+                if (weight > 0) list.push_back({s, weight});
             }
             if (list.empty()) continue;
             const Sample* front = nullptr;
@@ -152,7 +161,8 @@ class ReferenceBackend final : public render::Backend {
     Result<void> render(const render::RenderRequest& request, render::Image& image) override {
         const double start = nowSeconds();
         const render::DrawList& draws = *request.draws;
-        const bool hasPyramid = std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
+        const bool hasPyramid =
+            std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
         Level level0 = projectAll(draws);
         const Level own = level0;
         if (hasPyramid) reconstruct(level0);
@@ -194,19 +204,22 @@ class ReferenceBackend final : public render::Backend {
                 s.valid = true;
                 s.depth = c.z;
                 s.centre = p;
-                s.radius = std::clamp(instance.scale * disc.radius * f.supportScale * v.focalPixels / c.z, double(f.minimumRadius), 16384.0);
+                s.radius = std::clamp(instance.scale * disc.radius * f.supportScale * v.focalPixels / c.z,
+                                      double(f.minimumRadius), 16384.0);
                 s.thickness = s.radius * c.z / v.focalPixels * (0.25 + std::sqrt(std::max(0.0, 1 - facing * facing)));
                 s.perp = dvec2(rotationToZ(toPoint) * n);
                 s.colour = disc.colour;
-                if (f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError) s.colour = debugColour(f, node, cut);
+                if (f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError)
+                    s.colour = debugColour(f, node, cut);
             }
         }
         return level;
     }
 
     static dvec3 debugColour(const shared::FrameConstants& f, const lod::Node& node, const lod::CutDraw& cut) {
-        const double t = f.debugView == shared::kDebugLevel ? (node.level % 8) / 7.0
-                                                            : std::clamp((std::log2(std::max(1e-6, double(cut.errorPixels))) + 3) / 6, 0.0, 1.0);
+        const double t = f.debugView == shared::kDebugLevel
+                             ? (node.level % 8) / 7.0
+                             : std::clamp((std::log2(std::max(1e-6, double(cut.errorPixels))) + 3) / 6, 0.0, 1.0);
         const auto hat = [&](double middle) { return std::clamp(1.5 - std::abs(4 * t - middle), 0.0, 1.0); };
         return {hat(3), hat(2), hat(1)};
     }
@@ -218,11 +231,13 @@ class ReferenceBackend final : public render::Backend {
         std::vector<Level> pyramid{level0};
         while (static_cast<int>(pyramid.size()) < count && (pyramid.back().width > 1 || pyramid.back().height > 1))
             pyramid.push_back(pullLevel(pyramid.back(), std::ldexp(1.0, static_cast<int>(pyramid.size()) - 1)));
-        for (size_t l = pyramid.size() - 1; l-- > 0;) pushLevel(pyramid[l], pyramid[l + 1], std::ldexp(1.0, static_cast<int>(l)));
+        for (size_t l = pyramid.size() - 1; l-- > 0;)
+            pushLevel(pyramid[l], pyramid[l + 1], std::ldexp(1.0, static_cast<int>(l)));
         level0 = std::move(pyramid[0]);
     }
 
-    void shade(const render::DrawList& draws, const Level& own, const Level& level, bool wantAll, render::Image& image) {
+    void shade(const render::DrawList& draws, const Level& own, const Level& level, bool wantAll,
+               render::Image& image) {
         const lod::View& v = draws.view;
         const shared::FrameConstants& f = draws.frame;
         const size_t pixels = size_t{v.width} * v.height;
@@ -238,13 +253,16 @@ class ReferenceBackend final : public render::Backend {
                 dvec3 colour(f.background);
                 if (s.valid) {
                     const dvec2 p(double(i % v.width) + 0.5, double(i / v.width) + 0.5);
-                    const dvec3 toPixel = glm::normalize(dvec3((p - dvec2(0.5 * v.width, 0.5 * v.height)) / v.focalPixels, 1));
+                    const dvec3 toPixel =
+                        glm::normalize(dvec3((p - dvec2(0.5 * v.width, 0.5 * v.height)) / v.focalPixels, 1));
                     const dvec3 local(s.perp, -std::sqrt(std::max(0.0, 1 - glm::dot(s.perp, s.perp))));
                     const dvec3 n = glm::transpose(rotationToZ(toPixel)) * local;
                     colour = s.colour;
                     if (f.debugView == shared::kDebugHoles) {
                         const Sample& o = own.samples[i];
-                        colour = !o.valid ? dvec3(1, 0.3, 0.02) : o.depth != s.depth ? dvec3(0.02, 0.1, 0.9) : dvec3(0.2);
+                        colour = !o.valid             ? dvec3(1, 0.3, 0.02)
+                                 : o.depth != s.depth ? dvec3(0.02, 0.1, 0.9)
+                                                      : dvec3(0.2);
                     } else if (f.debugView == shared::kDebugNormals) {
                         colour = 0.5 + 0.5 * dvec3(n.x, -n.y, -n.z);
                     } else if (f.shade == shared::kShadeLit && f.debugView == shared::kDebugNone) {
@@ -253,12 +271,15 @@ class ReferenceBackend final : public render::Backend {
                     if (wantAll) {
                         image.depth[i] = static_cast<float>(s.depth);
                         const dvec3 world = v.right * n.x + v.down * n.y + v.forward * n.z;
-                        for (int c = 0; c < 3; ++c) image.normal[i * 3 + static_cast<size_t>(c)] = static_cast<float>(world[c]);
+                        for (int c = 0; c < 3; ++c)
+                            image.normal[i * 3 + static_cast<size_t>(c)] = static_cast<float>(world[c]);
                     }
                 }
                 if (wantAll)
-                    for (int c = 0; c < 3; ++c) image.linear[i * 3 + static_cast<size_t>(c)] = static_cast<float>(colour[c]);
-                image.rgba[i] = encodeSrgb(colour.x) | encodeSrgb(colour.y) << 8 | encodeSrgb(colour.z) << 16 | (s.valid ? 0xff000000u : 0u);
+                    for (int c = 0; c < 3; ++c)
+                        image.linear[i * 3 + static_cast<size_t>(c)] = static_cast<float>(colour[c]);
+                image.rgba[i] = encodeSrgb(colour.x) | encodeSrgb(colour.y) << 8 | encodeSrgb(colour.z) << 16 |
+                                (s.valid ? 0xff000000u : 0u);
             }
         });
     }
@@ -270,6 +291,8 @@ class ReferenceBackend final : public render::Backend {
 
 }  // namespace
 
-std::unique_ptr<render::Backend> makeReferenceBackend(Executor& executor) { return std::make_unique<ReferenceBackend>(executor); }
+std::unique_ptr<render::Backend> makeReferenceBackend(Executor& executor) {
+    return std::make_unique<ReferenceBackend>(executor);
+}
 
 }  // namespace stipple::reference

@@ -47,7 +47,8 @@ class DiscTree {
         }
     }
 
-    /// Calls hit(disc, t, rho2) for each disc that origin + t direction meets with near < t < limit(); hit may lower limit.
+    /// Calls hit(disc, t, rho2) for each disc that origin + t direction meets with near < t < limit(); hit may lower
+    /// limit.
     template <typename Hit>
     void visit(const dvec3& origin, const dvec3& direction, double nearT, double& limit, const Hit& hit) const {
         const dvec3 inverse = 1.0 / direction;
@@ -62,8 +63,9 @@ class DiscTree {
             if (!(enter <= leave)) continue;
             if (node.left != 0) {
                 // Nearer child last, so that it is taken first.
-                const bool leftFirst = glm::dot(nodes_[node.left].box.lo + nodes_[node.left].box.hi - nodes_[node.left + 1].box.lo -
-                                                    nodes_[node.left + 1].box.hi, direction) < 0;
+                const bool leftFirst = glm::dot(nodes_[node.left].box.lo + nodes_[node.left].box.hi -
+                                                    nodes_[node.left + 1].box.lo - nodes_[node.left + 1].box.hi,
+                                                direction) < 0;
                 stack[depth++] = leftFirst ? node.left + 1 : node.left;
                 stack[depth++] = leftFirst ? node.left : node.left + 1;
                 continue;
@@ -96,7 +98,8 @@ class DiscTree {
 
 }  // namespace
 
-Result<render::Image> trace(const lod::Store& store, const lod::View& view, const TraceSettings& settings, Executor& executor) {
+Result<render::Image> trace(const lod::Store& store, const lod::View& view, const TraceSettings& settings,
+                            Executor& executor) {
     std::vector<Disc> discs;
     discs.reserve(store.description.points);
     for (uint32_t i = 0; i < store.hierarchy.nodes.size(); ++i) {
@@ -123,26 +126,30 @@ Result<render::Image> trace(const lod::Store& store, const lod::View& view, cons
                 dvec3 sum(0);
                 uint32_t hits = 0;
                 for (uint32_t s = 0; s < n * n; ++s) {
-                    const double px = x + (s % n + 0.5) / n - 0.5 * view.width, py = double(y) + (s / n + 0.5) / n - 0.5 * view.height;
+                    const double px = x + (s % n + 0.5) / n - 0.5 * view.width,
+                                 py = double(y) + (s / n + 0.5) / n - 0.5 * view.height;
                     // Along `forward` this direction has length 1, so t is linear depth.
-                    const dvec3 direction = view.forward + (px / view.focalPixels) * view.right + (py / view.focalPixels) * view.down;
+                    const dvec3 direction =
+                        view.forward + (px / view.focalPixels) * view.right + (py / view.focalPixels) * view.down;
                     double front = std::numeric_limits<double>::max(), thickness = 0;
                     const double length = glm::length(direction);
-                    tree.visit(dvec3(0), direction, view.nearPlane, front, [&](const Disc& d, const dvec3& normal, double t, double) {
-                        const double m = std::abs(glm::dot(normal, direction)) / length;
-                        front = t;
-                        thickness = d.radius * (0.25 + std::sqrt(std::max(0.0, 1 - m * m)));
-                    });
+                    tree.visit(dvec3(0), direction, view.nearPlane, front,
+                               [&](const Disc& d, const dvec3& normal, double t, double) {
+                                   const double m = std::abs(glm::dot(normal, direction)) / length;
+                                   front = t;
+                                   thickness = d.radius * (0.25 + std::sqrt(std::max(0.0, 1 - m * m)));
+                               });
                     if (front == std::numeric_limits<double>::max()) continue;
                     ++hits;
                     double limit = front + thickness, weights = 0;
                     dvec3 colour(0), normals(0);
-                    tree.visit(dvec3(0), direction, view.nearPlane, limit, [&](const Disc& d, const dvec3& normal, double, double rho2) {
-                        const double w = (1 - rho2) * (1 - rho2) + 1e-9;
-                        weights += w;
-                        colour += w * d.colour;
-                        normals += w * normal;
-                    });
+                    tree.visit(dvec3(0), direction, view.nearPlane, limit,
+                               [&](const Disc& d, const dvec3& normal, double, double rho2) {
+                                   const double w = (1 - rho2) * (1 - rho2) + 1e-9;
+                                   weights += w;
+                                   colour += w * d.colour;
+                                   normals += w * normal;
+                               });
                     colour /= weights;
                     if (settings.draw.lit) colour *= lightOn(glm::normalize(cameraFromWorld * normals), f);
                     sum += colour;

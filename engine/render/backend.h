@@ -28,10 +28,10 @@ struct PassTime {
 /// A finished image. Row-major, top row first.
 struct Image {
     uint32_t width = 0, height = 0;
-    std::vector<uint32_t> rgba;    ///< r | g << 8 | b << 16 | coverage << 24; sRGB
-    std::vector<float> depth;      ///< linear, world units; 0: background. Only if asked for.
-    std::vector<float> normal;     ///< x y z per pixel, world space, eye-facing. Only if asked for.
-    std::vector<float> linear;     ///< r g b per pixel, linear, background included. Only if asked for.
+    std::vector<uint32_t> rgba;  ///< r | g << 8 | b << 16 | coverage << 24; sRGB
+    std::vector<float> depth;    ///< linear, world units; 0: background. Only if asked for.
+    std::vector<float> normal;   ///< x y z per pixel, world space, eye-facing. Only if asked for.
+    std::vector<float> linear;   ///< r g b per pixel, linear, background included. Only if asked for.
 };
 
 struct RenderRequest {

@@ -29,8 +29,8 @@ struct DrawSettings {
     uint32_t debugView = shared::kDebugNone;
     glm::vec3 background{0.02f, 0.02f, 0.025f};  ///< linear
     glm::dvec3 worldUp{0, 0, 1};
-    float supportScale = 1.1f;                   ///< splat radius of the reconstruction / stored radius
-    float minimumRadius = 1.0f;                  ///< pixels
+    float supportScale = 1.0f;   ///< splat radius of the reconstruction / stored radius
+    float minimumRadius = 1.0f;  ///< pixels
 };
 
 void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,

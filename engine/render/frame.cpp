@@ -10,12 +10,18 @@ namespace stipple::render {
 
 const char* passName(Pass pass) {
     switch (pass) {
-        case Pass::clear: return "clear";
-        case Pass::project: return "project";
-        case Pass::resolve: return "resolve";
-        case Pass::pull: return "pull";
-        case Pass::push: return "push";
-        case Pass::shade: return "shade";
+        case Pass::clear:
+            return "clear";
+        case Pass::project:
+            return "project";
+        case Pass::resolve:
+            return "resolve";
+        case Pass::pull:
+            return "pull";
+        case Pass::push:
+            return "push";
+        case Pass::shade:
+            return "shade";
     }
     return "?";
 }
@@ -48,7 +54,8 @@ Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSe
     streamer.collect();
     streamer.upload();
     const double cutStart = nowSeconds();
-    lod::selectCut(state.hierarchies, state.instances, streamer.residency(), view, settings.budgets, state.scratch, state.cut);
+    lod::selectCut(state.hierarchies, state.instances, streamer.residency(), view, settings.budgets, state.scratch,
+                   state.cut);
     const double cutEnd = nowSeconds();
     streamer.request(state.cut);
     makeDrawList(state.cut, state.hierarchies, state.instances, view, settings.draw, state.draws);
@@ -92,7 +99,8 @@ Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const
     for (;;) {
         streamer.collect();
         streamer.upload();
-        lod::selectCut(state.hierarchies, state.instances, streamer.residency(), view, settings.budgets, state.scratch, state.cut);
+        lod::selectCut(state.hierarchies, state.instances, streamer.residency(), view, settings.budgets, state.scratch,
+                       state.cut);
         const uint64_t before = streamer.counters().requests;
         streamer.request(state.cut);
         if (streamer.isIdle() && streamer.counters().requests == before) break;

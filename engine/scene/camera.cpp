@@ -38,7 +38,8 @@ Camera viewFrom(const glm::dvec3& lo, const glm::dvec3& hi, lod::UpAxis up, doub
     for (int corner = 0; corner < 8; ++corner) {
         const glm::dvec3 p(corner & 1 ? half.x : -half.x, corner & 2 ? half.y : -half.y, corner & 4 ? half.z : -half.z);
         const double depth = glm::dot(p, forward);
-        distance = std::max({distance, std::abs(glm::dot(p, right)) / tanH - depth, std::abs(glm::dot(p, down)) / tanV - depth});
+        distance = std::max(
+            {distance, std::abs(glm::dot(p, right)) / tanH - depth, std::abs(glm::dot(p, down)) / tanV - depth});
     }
     if (!(distance > 0)) distance = 1;  // a single point
     camera.target = centre;
@@ -77,7 +78,8 @@ Camera fitCamera(const glm::dvec3& lo, const glm::dvec3& hi, lod::UpAxis up, dou
 
 CameraPath makeOrbit(const glm::dvec3& lo, const glm::dvec3& hi, lod::UpAxis up, double aspect, int keys) {
     CameraPath path;
-    for (int i = 0; i < keys; ++i) path.keys.push_back({double(i), viewFrom(lo, hi, up, aspect, (20.0 + 360.0 * i / keys) * kPi / 180)});
+    for (int i = 0; i < keys; ++i)
+        path.keys.push_back({double(i), viewFrom(lo, hi, up, aspect, (20.0 + 360.0 * i / keys) * kPi / 180)});
     return path;
 }
 
@@ -87,7 +89,8 @@ lod::View makeView(const Camera& camera, uint32_t width, uint32_t height, double
     glm::dvec3 forward = camera.target - camera.eye;
     forward = glm::length(forward) > 0 ? glm::normalize(forward) : glm::dvec3(0, 0, -1);
     glm::dvec3 right = glm::cross(forward, camera.up);
-    if (!(glm::length(right) > 1e-9)) right = glm::cross(forward, std::abs(forward.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0));
+    if (!(glm::length(right) > 1e-9))
+        right = glm::cross(forward, std::abs(forward.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0));
     view.forward = forward;
     view.right = glm::normalize(right);
     view.down = glm::cross(view.forward, view.right);
@@ -115,7 +118,8 @@ Result<CameraPath> readCameraPath(const std::string& path) {
             if (k.contains("up")) key.camera.up = vec(k.at("up"));
             key.camera.fovDegrees = k.value("fov", 50.0);
             if (!out.keys.empty() && !(key.t > out.keys.back().t))
-                return fail(ErrorKind::input, fmt::format("key {} is not later than the one before", out.keys.size()), path);
+                return fail(ErrorKind::input, fmt::format("key {} is not later than the one before", out.keys.size()),
+                            path);
             out.keys.push_back(key);
         }
     } catch (const std::exception& e) {

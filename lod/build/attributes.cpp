@@ -2,9 +2,9 @@
 // cells with at most kCellPoints points, and their 26 neighbours of the same size (a size up while there are too few),
 // so that it depends on the lattice alone, not on buckets, leaves or threads.
 //
-// Radius: 0.55 times the distance to the 12th neighbour: 1.07 spacings for randomly spread surface points, 0.87 to 1.1 on
-// regular grids; either closes the surface. Normal: the eigenvector of the smallest eigenvalue of the covariance of the
-// 12 nearest, recentred, fp64 (hard cases 26 to 28). Its sign is unknown without the scanner's position: two-sided.
+// Radius: 0.55 times the distance to the 12th neighbour: 1.07 spacings for randomly spread surface points, 0.87 to 1.1
+// on regular grids; either closes the surface. Normal: the eigenvector of the smallest eigenvalue of the covariance of
+// the 12 nearest, recentred, fp64 (hard cases 26 to 28). Its sign is unknown without the scanner's position: two-sided.
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <atomic>
@@ -21,7 +21,7 @@ constexpr uint32_t kNeighbours = 12, kCellPoints = 8, kPointsPerNeighbourCell = 
 constexpr float kRadiusFactor = 0.7f, kLargestRadii = 4.0f;
 
 struct Neighbourhood {
-    std::vector<float> x, y, z;     ///< relative to the cell's first point, lattice units
+    std::vector<float> x, y, z;  ///< relative to the cell's first point, lattice units
     std::vector<float> squared;
     void clear() {
         x.clear();
@@ -30,8 +30,8 @@ struct Neighbourhood {
     }
 };
 
-/// The value at `rank` (0: the least) of non-negative values: bisection on a threshold, each step one SIMD-friendly count.
-/// Four times faster than nth_element on a hundred values.
+/// The value at `rank` (0: the least) of non-negative values: bisection on a threshold, each step one SIMD-friendly
+/// count. Four times faster than nth_element on a hundred values.
 float smallestAtRank(const std::vector<float>& values, size_t rank) {
     float lo = -1, hi = 0;
     for (const float v : values) hi = hi < v ? v : hi;
@@ -41,8 +41,10 @@ float smallestAtRank(const std::vector<float>& values, size_t rank) {
         if (!(middle > lo && middle < hi)) break;
         uint32_t count = 0;
         for (const float v : values) count += v <= middle ? 1u : 0u;
-        if (count > rank) hi = middle;
-        else lo = middle;
+        if (count > rank)
+            hi = middle;
+        else
+            lo = middle;
         if (count == rank + 1) break;
     }
     float result = 0;  // the largest value <= hi
@@ -84,7 +86,9 @@ class Estimator {
             for (int64_t z = std::max<int64_t>(cz - 1, 0); z <= std::min(cz + 1, cells - 1); ++z)
                 for (int64_t y = std::max<int64_t>(cy - 1, 0); y <= std::min(cy + 1, cells - 1); ++y)
                     for (int64_t x = std::max<int64_t>(cx - 1, 0); x <= std::min(cx + 1, cells - 1); ++x)
-                        append(first, mortonCode(static_cast<uint32_t>(x), static_cast<uint32_t>(y), static_cast<uint32_t>(z)), shift);
+                        append(first,
+                               mortonCode(static_cast<uint32_t>(x), static_cast<uint32_t>(y), static_cast<uint32_t>(z)),
+                               shift);
             if (hood_.x.size() > kNeighbours || level == 0 || climb == kLargestClimb) return;
         }
     }
@@ -125,7 +129,8 @@ class Estimator {
             lo = step <= from ? from - step + 1 : 0;
         }
         return static_cast<size_t>(std::lower_bound(key.begin() + static_cast<std::ptrdiff_t>(lo),
-                                                    key.begin() + static_cast<std::ptrdiff_t>(hi), value) - key.begin());
+                                                    key.begin() + static_cast<std::ptrdiff_t>(hi), value) -
+                                   key.begin());
     }
 
     void point(uint32_t i, uint32_t first) {
@@ -168,7 +173,8 @@ class Estimator {
         if (!(values[1] > 1e-6 * values[2])) return;  // a line or a point has no normal: it stays flagged
         const Eigen::Vector3d n = solver.eigenvectors().col(0);
         cloud_.normal[i] = octEncode(glm::vec3(n[0], n[1], n[2]));
-        cloud_.colour[i] = (cloud_.colour[i] & 0xffffffu) | (shared::kFlagTwoSided | shared::kFlagEstimatedNormal) << 24;
+        cloud_.colour[i] = (cloud_.colour[i] & 0xffffffu) | (shared::kFlagTwoSided | shared::kFlagEstimatedNormal)
+                                                                << 24;
     }
 
     Cloud& cloud_;

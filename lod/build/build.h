@@ -31,8 +31,8 @@ struct BuildReport {
     std::map<std::string, double> stageSeconds;
 };
 
-/// Reads `inputs`, writes `output` (whole or not at all). The same input and settings give the same bytes for any number
-/// of threads.
+/// Reads `inputs`, writes `output` (whole or not at all). The same input and settings give the same bytes for any
+/// number of threads.
 Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std::string& output,
                                const BuildSettings& settings, Executor& executor, Progress& progress);
 

@@ -14,11 +14,11 @@ namespace stipple::lod {
 struct Cloud {
     glm::dvec3 origin{0};
     double unit = 1;
-    double roundingUnits = 0;             ///< largest rounding to the lattice, world units
+    double roundingUnits = 0;  ///< largest rounding to the lattice, world units
     std::vector<uint32_t> x, y, z;
-    std::vector<uint32_t> colour;         ///< r g b 8 | flags 8
-    std::vector<uint32_t> normal;         ///< octahedral; meaning given by the flags
-    std::vector<float> radius;            ///< lattice units; 0: to be estimated
+    std::vector<uint32_t> colour;  ///< r g b 8 | flags 8
+    std::vector<uint32_t> normal;  ///< octahedral; meaning given by the flags
+    std::vector<float> radius;     ///< lattice units; 0: to be estimated
     bool hasColour = false, hasNormal = false, hasRadius = false;
     UpAxis up = UpAxis::z;
     std::string crs, source;
@@ -43,8 +43,8 @@ struct BuildNode {
 struct Partition {
     uint32_t rootLog2 = 0, keyLevels = 0;
     std::vector<uint64_t> key;
-    std::vector<BuildNode> nodes;               ///< breadth first
-    std::vector<uint32_t> levelBegin;           ///< first node of each level, and the end
+    std::vector<BuildNode> nodes;      ///< breadth first
+    std::vector<uint32_t> levelBegin;  ///< first node of each level, and the end
     /// Key bits below level `level`.
     uint32_t shiftOf(uint32_t level) const { return 3 * (keyLevels - level); }
 };

@@ -57,14 +57,16 @@ void permute(std::vector<T>& values, const std::vector<KeyIndex>& order, Executo
 Partition partitionCloud(Cloud& cloud, uint32_t leafRecords, Executor& executor) {
     Partition p;
     uint32_t largest = 1;
-    for (const auto* axis : {&cloud.x, &cloud.y, &cloud.z}) largest = std::max(largest, *std::max_element(axis->begin(), axis->end()));
+    for (const auto* axis : {&cloud.x, &cloud.y, &cloud.z})
+        largest = std::max(largest, *std::max_element(axis->begin(), axis->end()));
     p.rootLog2 = static_cast<uint32_t>(std::bit_width(largest));
     p.keyLevels = std::min(p.rootLog2, kMortonBits);
     const uint32_t drop = p.rootLog2 - p.keyLevels;
     std::vector<KeyIndex> order(cloud.size());
     executor.parallelFor(cloud.size(), 65536, [&](size_t begin, size_t end) {
         for (size_t i = begin; i < end; ++i)
-            order[i] = {mortonCode(cloud.x[i] >> drop, cloud.y[i] >> drop, cloud.z[i] >> drop), static_cast<uint32_t>(i)};
+            order[i] = {mortonCode(cloud.x[i] >> drop, cloud.y[i] >> drop, cloud.z[i] >> drop),
+                        static_cast<uint32_t>(i)};
     });
     radixSort(order, 3 * p.keyLevels, executor);
     permute(cloud.x, order, executor);
@@ -86,14 +88,20 @@ Partition partitionCloud(Cloud& cloud, uint32_t leafRecords, Executor& executor)
             uint32_t begin = p.nodes[i].begin;
             for (uint32_t octant = 0; octant < 8; ++octant) {
                 const auto first = p.key.begin() + begin, last = p.key.begin() + p.nodes[i].end;
-                const auto split = std::partition_point(first, last, [&](uint64_t k) { return (k >> shift & 7u) <= octant; });
+                const auto split =
+                    std::partition_point(first, last, [&](uint64_t k) { return (k >> shift & 7u) <= octant; });
                 const auto end = static_cast<uint32_t>(split - p.key.begin());
                 if (end == begin) continue;
                 p.nodes[i].childMask = static_cast<uint8_t>(p.nodes[i].childMask | 1u << octant);
                 const auto& cell = p.nodes[i].cell;
-                p.nodes.push_back({begin, end, i, 0,
-                                   {cell[0] * 2 + (octant & 1u), cell[1] * 2 + (octant >> 1 & 1u), cell[2] * 2 + (octant >> 2 & 1u)},
-                                   static_cast<uint8_t>(level + 1), 0});
+                p.nodes.push_back(
+                    {begin,
+                     end,
+                     i,
+                     0,
+                     {cell[0] * 2 + (octant & 1u), cell[1] * 2 + (octant >> 1 & 1u), cell[2] * 2 + (octant >> 2 & 1u)},
+                     static_cast<uint8_t>(level + 1),
+                     0});
                 begin = end;
             }
         }

@@ -60,8 +60,10 @@ ToLattice toLattice(const SourceInfo& info, double unit, const glm::dvec3& origi
         // A ratio or shift that is whole but for its own rounding is whole.
         for (double* value : {&to.ratio[a], &to.shift[a]}) {
             const double whole = std::round(*value);
-            if (std::abs(*value - whole) <= 1e-6 * std::max(1.0, std::abs(whole) * 1e-6)) *value = whole;
-            else to.exact = false;
+            if (std::abs(*value - whole) <= 1e-6 * std::max(1.0, std::abs(whole) * 1e-6))
+                *value = whole;
+            else
+                to.exact = false;
         }
     }
     return to;
@@ -91,8 +93,8 @@ Result<Cloud> readCloud(const std::vector<std::string>& inputs, const BuildSetti
     if (needed > settings.memoryBytes)
         return fail(ErrorKind::budget,
                     fmt::format("building {} points needs about {} MiB, but --memory allows {} MiB", declared,
-                                needed >> 20, settings.memoryBytes >> 20), inputs.front(),
-                    fmt::format("give --memory {}M or fewer points", (needed >> 20) + 1));
+                                needed >> 20, settings.memoryBytes >> 20),
+                    inputs.front(), fmt::format("give --memory {}M or fewer points", (needed >> 20) + 1));
     if (declared > 0xfffffff0u) return fail(ErrorKind::budget, "more than 4,294,967,280 points", inputs.front());
     cloud.up = settings.up.value_or(sources.front().info.up);
     cloud.crs = sources.front().info.crs;
@@ -115,8 +117,10 @@ Result<Cloud> readCloud(const std::vector<std::string>& inputs, const BuildSetti
         const SourceInfo& info = source.info;
         const ToLattice to = allLattice ? toLattice(info, unit, base) : ToLattice{};
         if (!to.exact)
-            report.notes.push_back(fmt::format("{}: scale and offset do not fit the common lattice; coordinates are "
-                                               "rounded to {} units", info.path, unit));
+            report.notes.push_back(
+                fmt::format("{}: scale and offset do not fit the common lattice; coordinates are "
+                            "rounded to {} units",
+                            info.path, unit));
         colours.startFile(position.size());
         for (;;) {
             block.clear();
@@ -141,9 +145,12 @@ Result<Cloud> readCloud(const std::vector<std::string>& inputs, const BuildSetti
                 allFinite = allFinite && std::isfinite(p.x + p.y + p.z);
                 position.push_back(p);
             }
-            if (!block.colour16.empty()) colours.append(block, cloud.colour);
-            else if (!block.colour.empty()) cloud.colour.insert(cloud.colour.end(), block.colour.begin(), block.colour.end());
-            else cloud.colour.resize(position.size(), 0xc8c8c8u);
+            if (!block.colour16.empty())
+                colours.append(block, cloud.colour);
+            else if (!block.colour.empty())
+                cloud.colour.insert(cloud.colour.end(), block.colour.begin(), block.colour.end());
+            else
+                cloud.colour.resize(position.size(), 0xc8c8c8u);
             if (cloud.hasNormal) {
                 for (size_t i = 0; i < count; ++i) {
                     const glm::vec3 n = block.normal.empty() ? glm::vec3(0) : block.normal[i];
@@ -178,9 +185,15 @@ Result<Cloud> readCloud(const std::vector<std::string>& inputs, const BuildSetti
         }
     }
     if (position.empty())
-        return fail(ErrorKind::input, report.pointsIn == 0 ? "holds no points"
-                                                           : fmt::format("none of its {} points is a number", report.pointsIn),
+        return fail(ErrorKind::input,
+                    report.pointsIn == 0 ? "holds no points"
+                                         : fmt::format("none of its {} points is a number", report.pointsIn),
                     inputs.front(), "nothing was written");
+
+    // A scan whose points all have one colour has no colours of its own: it is shaded.
+    const auto rgb = [](uint32_t c) { return c & 0xffffffu; };
+    cloud.hasColour = cloud.hasColour && std::any_of(cloud.colour.begin(), cloud.colour.end(),
+                                                     [&](uint32_t c) { return rgb(c) != rgb(cloud.colour[0]); });
 
     glm::dvec3 lo = position[0], hi = lo;
     for (const glm::dvec3& p : position) {
@@ -189,12 +202,14 @@ Result<Cloud> readCloud(const std::vector<std::string>& inputs, const BuildSetti
     }
     const glm::dvec3 extents = hi - lo;
     const double extent = std::max({extents.x, extents.y, extents.z});
-    if (!std::isfinite(extent)) return fail(ErrorKind::input, "the coordinates span more than a double can hold", inputs.front());
+    if (!std::isfinite(extent))
+        return fail(ErrorKind::input, "the coordinates span more than a double can hold", inputs.front());
     double step = 1;  // of the positions, per lattice unit
     if (!allLattice) {
         step = extent > 0 ? std::exp2(std::ceil(std::log2(extent)) - 21) : std::exp2(-10);
         // Below the spacing of doubles at this place there is nothing to resolve.
-        const double farthest = std::max({std::abs(lo.x), std::abs(lo.y), std::abs(lo.z), std::abs(hi.x), std::abs(hi.y), std::abs(hi.z)});
+        const double farthest =
+            std::max({std::abs(lo.x), std::abs(lo.y), std::abs(lo.z), std::abs(hi.x), std::abs(hi.y), std::abs(hi.z)});
         if (farthest > 0) step = std::max(step, std::exp2(std::ceil(std::log2(farthest)) - 52));
         unit = 1;
     } else if (extent > kLatticeLimit) {
@@ -220,7 +235,8 @@ Result<Cloud> readCloud(const std::vector<std::string>& inputs, const BuildSetti
     const auto perUnit = static_cast<float>(1.0 / cloud.unit);
     if (cloud.hasRadius)
         for (float& r : cloud.radius) r *= perUnit;
-    else cloud.radius.assign(position.size(), 0.0f);
+    else
+        cloud.radius.assign(position.size(), 0.0f);
     if (!cloud.hasNormal) {
         cloud.normal.assign(position.size(), 0u);
         for (uint32_t& c : cloud.colour) c |= shared::kFlagNoNormal << 24;

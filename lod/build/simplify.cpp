@@ -6,7 +6,7 @@
 //   e_p  the height of any leaf disc over the record's plane: with the radius covering everything sideways this is the
 //        one-sided Hausdorff distance from the leaves to the record;
 //   e_t  by how much the record sticks out beyond its leaves: radius - least extent of the leaves over 16 directions
-//        in the plane;
+//        in the plane (between two of them they may reach less far by 2 % of the radius);
 // combined as sqrt(e_p^2 + e_t^2) (sequential point trees, Dachsbacher et al. 2003, but against the leaves instead of
 // the children), and at least the record's diameter where the colours below it differ by more than kColourSpread.
 // Codes are made monotone up the tree by maximum. Everything is measured on the values as the file will hold them.
@@ -111,9 +111,12 @@ class Simplifier {
             uint32_t step = 1;
             while (end < node.end && partition_.key[end] >> shift == cell) {  // gallop, then bisect
                 const uint32_t jump = std::min(end + step, node.end);
-                if (jump < node.end && partition_.key[jump] >> shift == cell) end = jump;
-                else if (step == 1) ++end;
-                else step = 0;
+                if (jump < node.end && partition_.key[jump] >> shift == cell)
+                    end = jump;
+                else if (step == 1)
+                    ++end;
+                else
+                    step = 0;
                 step = step ? step * 2 : 1;
             }
             records.push_back({i, end, {}, static_cast<uint8_t>(ErrorScale::kNoParent)});
@@ -131,7 +134,8 @@ class Simplifier {
     }
 
     /// Sorts by parent's code (descending), then Morton order; fills the counts; returns the encoded chunk.
-    std::vector<uint8_t> encode(uint32_t index, std::vector<uint32_t>& parentHistogram, std::vector<uint32_t>& ownHistogram) {
+    std::vector<uint8_t> encode(uint32_t index, std::vector<uint32_t>& parentHistogram,
+                                std::vector<uint32_t>& ownHistogram) {
         const BuildNode& node = partition_.nodes[index];
         Node& out = h_.nodes[index];
         parentHistogram.assign(256, 0);
@@ -294,7 +298,7 @@ class Simplifier {
         glm::vec3 normal{0};
         glm::vec3 colour{0};  ///< linear
         uint32_t flags = 0;
-        float spread = 0;     ///< largest difference of a point's channel from the mean, sRGB 0..1
+        float spread = 0;  ///< largest difference of a point's channel from the mean, sRGB 0..1
     };
 
     Means meansOf(uint32_t begin, uint32_t end) const {
@@ -321,7 +325,8 @@ class Simplifier {
         // Opposing normals cancel: the first stands for all (hard case 30).
         if (!allNone) m.normal = length > 1e-3f * static_cast<float>(end - begin) ? normal / length : reference;
         if (allNone) m.flags |= shared::kFlagNoNormal;
-        const glm::vec3 mean(shared::srgbFromLinear(m.colour.x), shared::srgbFromLinear(m.colour.y), shared::srgbFromLinear(m.colour.z));
+        const glm::vec3 mean(shared::srgbFromLinear(m.colour.x), shared::srgbFromLinear(m.colour.y),
+                             shared::srgbFromLinear(m.colour.z));
         for (uint32_t i = begin; i < end; ++i) {
             const uint32_t c = cloud_.colour[i];
             const glm::vec3 d = glm::abs(glm::vec3(c & 255u, c >> 8 & 255u, c >> 16 & 255u) / 255.0f - mean);
@@ -355,7 +360,8 @@ class Simplifier {
         const double sideways = std::max(0.0, radius - static_cast<double>(x.leastExtent));
         double error = std::hypot(static_cast<double>(x.height), sideways) * (1 + 1e-5);
         if ((m.flags & shared::kFlagNoNormal) != 0) error = std::max(error, radius);
-        if (r.end - r.begin == 1) error = glm::length(pointAt(r.begin) - decoded) + radius - static_cast<double>(cloud_.radius[r.begin]);
+        if (r.end - r.begin == 1)
+            error = glm::length(pointAt(r.begin) - decoded) + radius - static_cast<double>(cloud_.radius[r.begin]);
         if (m.spread > kColourSpread) error = std::max(error, 2 * radius);
         const uint32_t code = std::max(h_.errors.encodeUp(error), childCode);
         r.packed = {q[0] | q[1] << 16, q[2] | radiusCode << 16 | code << 24, normalCode,
@@ -402,8 +408,8 @@ class Simplifier {
     Cloud& cloud_;
     const Partition& partition_;
     Hierarchy& h_;
-    std::vector<glm::vec3> normal_;           ///< of each point, as decoded; zero: none
-    std::vector<uint8_t> parentCode_;         ///< of each leaf record
+    std::vector<glm::vec3> normal_;             ///< of each point, as decoded; zero: none
+    std::vector<uint8_t> parentCode_;           ///< of each leaf record
     std::vector<std::vector<Record>> records_;  ///< of inner nodes, until they are encoded
 };
 
@@ -447,13 +453,16 @@ Result<Hierarchy> simplifyAndWrite(Cloud& cloud, const Partition& partition, Sto
     for (int level = static_cast<int>(levels) - 1; level >= -1; --level) {
         if (level >= 0) {
             const uint32_t begin = partition.levelBegin[static_cast<size_t>(level)];
-            executor.parallelFor(partition.levelBegin[static_cast<size_t>(level) + 1] - begin, 1, [&](size_t b, size_t e) {
-                for (size_t k = b; k < e; ++k) {
-                    const auto index = static_cast<uint32_t>(begin + k);
-                    if (h.nodes[index].isLeaf()) simplifier.prepareLeaf(index);
-                    else simplifier.simplifyNode(index, executor);
-                }
-            });
+            executor.parallelFor(partition.levelBegin[static_cast<size_t>(level) + 1] - begin, 1,
+                                 [&](size_t b, size_t e) {
+                                     for (size_t k = b; k < e; ++k) {
+                                         const auto index = static_cast<uint32_t>(begin + k);
+                                         if (h.nodes[index].isLeaf())
+                                             simplifier.prepareLeaf(index);
+                                         else
+                                             simplifier.simplifyNode(index, executor);
+                                     }
+                                 });
         }
         const int below = level + 1;
         if (below >= static_cast<int>(levels)) continue;

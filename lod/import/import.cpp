@@ -20,7 +20,8 @@ Result<PointSource> openPointSource(const std::string& path) {
     if (head.substr(0, 3) == "ply") return openPly(path);
     if (head == "LASF") return openLas(path);
     std::string extension = std::filesystem::path(path).extension().string();
-    std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+    std::transform(extension.begin(), extension.end(), extension.begin(),
+                   [](unsigned char c) { return std::tolower(c); });
     if (extension == ".ply") return openPly(path);
     if (extension == ".las") return openLas(path);
     if (head.substr(0, 2) == "\x1f\x8b")

@@ -64,7 +64,8 @@ struct LasReader {
 void readVlrs(const InputFile& file, uint64_t offset, uint64_t end, uint32_t declared, SourceInfo& info) {
     for (uint32_t i = 0; i < declared; ++i) {
         if (offset + 54 > end) {
-            info.notes.push_back(fmt::format("the header declares {} variable length records, but only {} fit", declared, i));
+            info.notes.push_back(
+                fmt::format("the header declares {} variable length records, but only {} fit", declared, i));
             return;
         }
         std::vector<uint8_t> head(54);
@@ -98,26 +99,28 @@ Result<PointSource> openLas(const std::string& path) {
     const auto bad = [&](const std::string& what, const std::string& hint = "") {
         return fail(ErrorKind::input, what, path, hint);
     };
-    if (size < 227) return bad(fmt::format("has {} bytes, less than a LAS header (227)", size), "is the download complete?");
+    if (size < 227)
+        return bad(fmt::format("has {} bytes, less than a LAS header (227)", size), "is the download complete?");
     std::vector<uint8_t> header(static_cast<size_t>(std::min<uint64_t>(size, 375)));
     STIPPLE_TRY(file.readAt(0, header.data(), header.size()));
     if (std::memcmp(header.data(), "LASF", 4) != 0) return bad("does not begin with LASF", "is it really a LAS file?");
     const int major = header[24], minor = header[25];
-    if (major != 1 || minor > 4)
-        return bad(fmt::format("is LAS {}.{}", major, minor), "LAS 1.0 to 1.4 are read");
+    if (major != 1 || minor > 4) return bad(fmt::format("is LAS {}.{}", major, minor), "LAS 1.0 to 1.4 are read");
     const auto headerBytes = get<uint16_t>(header, 94);
     const uint64_t dataOffset = get<uint32_t>(header, 96);
     const auto vlrs = get<uint32_t>(header, 100);
     const uint8_t formatByte = header[104];
     const auto recordBytes = get<uint16_t>(header, 105);
     uint64_t points = get<uint32_t>(header, 107);
-    if (headerBytes < 227) return bad(fmt::format("the header says it has {} bytes, at least 227 are needed", headerBytes));
+    if (headerBytes < 227)
+        return bad(fmt::format("the header says it has {} bytes, at least 227 are needed", headerBytes));
     if (minor >= 4 && headerBytes >= 375 && header.size() >= 375)
         if (const auto wide = get<uint64_t>(header, 247); wide != 0) points = wide;
     if ((formatByte & 0xc0) != 0)
         return bad("is compressed (LAZ)", "this version reads uncompressed LAS; unpack it first");
     const unsigned format = formatByte;
-    if (format >= kRecordBytes.size()) return bad(fmt::format("has point format {}", format), "formats 0 to 10 are read");
+    if (format >= kRecordBytes.size())
+        return bad(fmt::format("has point format {}", format), "formats 0 to 10 are read");
     if (recordBytes < kRecordBytes.at(format))
         return bad(fmt::format("has records of {} bytes; point format {} needs {}", recordBytes, format,
                                kRecordBytes.at(format)));
@@ -143,7 +146,8 @@ Result<PointSource> openLas(const std::string& path) {
         info.declaredMin[a] = get<double>(header, 187 + at * 2);
         if (!(info.scale[a] > 0) || !std::isfinite(info.scale[a]) || !std::isfinite(info.offset[a]))
             return bad(fmt::format("scale {} and offset {} of axis {} are not usable", info.scale[a], info.offset[a],
-                                   "xyz"[a]), "the header is damaged");
+                                   "xyz"[a]),
+                       "the header is damaged");
     }
     info.hasDeclaredBounds = true;
     info.hasColour = kColourOffset.at(format) != 0;

@@ -69,12 +69,26 @@ bool parseType(const std::string& name, Type& type) {
 }
 
 Role parseRole(const std::string& name) {
-    static const std::array<std::pair<const char*, Role>, 20> names{
-        {{"x", Role::x}, {"y", Role::y}, {"z", Role::z}, {"nx", Role::nx}, {"ny", Role::ny}, {"nz", Role::nz},
-         {"normal_x", Role::nx}, {"normal_y", Role::ny}, {"normal_z", Role::nz}, {"red", Role::red},
-         {"green", Role::green}, {"blue", Role::blue}, {"r", Role::red}, {"g", Role::green}, {"b", Role::blue},
-         {"diffuse_red", Role::red}, {"diffuse_green", Role::green}, {"diffuse_blue", Role::blue},
-         {"radius", Role::radius}, {"value", Role::none}}};
+    static const std::array<std::pair<const char*, Role>, 20> names{{{"x", Role::x},
+                                                                     {"y", Role::y},
+                                                                     {"z", Role::z},
+                                                                     {"nx", Role::nx},
+                                                                     {"ny", Role::ny},
+                                                                     {"nz", Role::nz},
+                                                                     {"normal_x", Role::nx},
+                                                                     {"normal_y", Role::ny},
+                                                                     {"normal_z", Role::nz},
+                                                                     {"red", Role::red},
+                                                                     {"green", Role::green},
+                                                                     {"blue", Role::blue},
+                                                                     {"r", Role::red},
+                                                                     {"g", Role::green},
+                                                                     {"b", Role::blue},
+                                                                     {"diffuse_red", Role::red},
+                                                                     {"diffuse_green", Role::green},
+                                                                     {"diffuse_blue", Role::blue},
+                                                                     {"radius", Role::radius},
+                                                                     {"value", Role::none}}};
     for (const auto& [text, role] : names)
         if (name == text) return role;
     return Role::none;
@@ -108,10 +122,14 @@ Result<Header> parseHeader(const InputFile& file) {
             std::string name;
             words >> name;
             hasFormat = true;
-            if (name == "ascii") header.encoding = Encoding::ascii;
-            else if (name == "binary_little_endian") header.encoding = Encoding::little;
-            else if (name == "binary_big_endian") header.encoding = Encoding::big;
-            else return bad(fmt::format("unknown format '{}'", name), line);
+            if (name == "ascii")
+                header.encoding = Encoding::ascii;
+            else if (name == "binary_little_endian")
+                header.encoding = Encoding::little;
+            else if (name == "binary_big_endian")
+                header.encoding = Encoding::big;
+            else
+                return bad(fmt::format("unknown format '{}'", name), line);
         } else if (key == "element") {
             Element element;
             std::string count;
@@ -129,7 +147,8 @@ Result<Header> parseHeader(const InputFile& file) {
                 property.isList = true;
                 std::string countType;
                 words >> countType >> type;
-                if (!parseType(countType, property.countType)) return bad(fmt::format("unknown type '{}'", countType), line);
+                if (!parseType(countType, property.countType))
+                    return bad(fmt::format("unknown type '{}'", countType), line);
             }
             if (!parseType(type, property.type)) return bad(fmt::format("unknown type '{}'", type), line);
             words >> property.name;
@@ -176,21 +195,31 @@ class Cursor {
 double decode(const uint8_t* bytes, Type type, bool swap) {
     const size_t size = kTypeBytes.at(static_cast<size_t>(type));
     std::array<uint8_t, 8> raw{};
-    if (swap) std::reverse_copy(bytes, bytes + size, raw.begin());
-    else std::copy_n(bytes, size, raw.begin());
+    if (swap)
+        std::reverse_copy(bytes, bytes + size, raw.begin());
+    else
+        std::copy_n(bytes, size, raw.begin());
     const auto as = [&](auto value) {
         std::memcpy(&value, raw.data(), sizeof(value));
         return static_cast<double>(value);
     };
     switch (type) {
-        case Type::i8: return as(int8_t{});
-        case Type::u8: return as(uint8_t{});
-        case Type::i16: return as(int16_t{});
-        case Type::u16: return as(uint16_t{});
-        case Type::i32: return as(int32_t{});
-        case Type::u32: return as(uint32_t{});
-        case Type::f32: return as(float{});
-        case Type::f64: return as(double{});
+        case Type::i8:
+            return as(int8_t{});
+        case Type::u8:
+            return as(uint8_t{});
+        case Type::i16:
+            return as(int16_t{});
+        case Type::u16:
+            return as(uint16_t{});
+        case Type::i32:
+            return as(int32_t{});
+        case Type::u32:
+            return as(uint32_t{});
+        case Type::f32:
+            return as(float{});
+        case Type::f64:
+            return as(double{});
     }
     return 0;
 }
@@ -217,7 +246,10 @@ class PlyReader {
         for (const Property& p : vertex_->properties) {
             if (p.role == Role::none) continue;
             has.at(static_cast<size_t>(p.role)) = true;
-            if (p.role == Role::red) colourScale = p.type == Type::f32 || p.type == Type::f64 ? 255.0 : p.type == Type::u16 ? 1 / 257.0 : 1.0;
+            if (p.role == Role::red)
+                colourScale = p.type == Type::f32 || p.type == Type::f64 ? 255.0
+                              : p.type == Type::u16                      ? 1 / 257.0
+                                                                         : 1.0;
         }
         block.position.reserve(count);
         for (size_t i = 0; i < count; ++i) {
@@ -240,7 +272,8 @@ class PlyReader {
 
   private:
     tl::unexpected<Error> truncated() const {
-        return fail(ErrorKind::input, fmt::format("ends within element '{}', at vertex {}", vertex_ ? "vertex" : "before vertex", next_),
+        return fail(ErrorKind::input,
+                    fmt::format("ends within element '{}', at vertex {}", vertex_ ? "vertex" : "before vertex", next_),
                     file_->path(), "the file is truncated or its header lies");
     }
 
@@ -287,10 +320,12 @@ class PlyReader {
                 STIPPLE_ASSIGN(bytes, cursor_.peek(kBlockBytes, available));
                 found = std::memchr(bytes, '\n', available);
                 if (!found && cursor_.remaining() > available)
-                    return fail(ErrorKind::input, "a line is longer than 4 MiB", file_->path(), "is it really ascii PLY?");
+                    return fail(ErrorKind::input, "a line is longer than 4 MiB", file_->path(),
+                                "is it really ascii PLY?");
             }
             end = found ? static_cast<size_t>(static_cast<const uint8_t*>(found) - bytes) : available;
-            const bool blank = std::all_of(bytes, bytes + end, [](uint8_t c) { return c == ' ' || c == '\r' || c == '\t'; });
+            const bool blank =
+                std::all_of(bytes, bytes + end, [](uint8_t c) { return c == ' ' || c == '\r' || c == '\t'; });
             if (!blank) break;
             cursor_.skip(std::min(end + 1, available));
         }
@@ -300,8 +335,10 @@ class PlyReader {
             while (at < last && (*at == ' ' || *at == '\t' || *at == '\r')) ++at;
             if (at < last && *at == '+') ++at;
             const auto [next, error] = std::from_chars(at, last, value);
-            if (error == std::errc::result_out_of_range) value = std::numeric_limits<double>::quiet_NaN();
-            else if (error != std::errc()) return false;
+            if (error == std::errc::result_out_of_range)
+                value = std::numeric_limits<double>::quiet_NaN();
+            else if (error != std::errc())
+                return false;
             at = next;
             return true;
         };
@@ -321,9 +358,10 @@ class PlyReader {
     }
 
     tl::unexpected<Error> badNumber(const Element& element) const {
-        return fail(ErrorKind::input, fmt::format("a row of element '{}' near byte {} (vertex {}) has too few numbers or is not a number",
-                                                  element.name, cursor_.offset(), next_), file_->path(),
-                    "the file is truncated or damaged");
+        return fail(ErrorKind::input,
+                    fmt::format("a row of element '{}' near byte {} (vertex {}) has too few numbers or is not a number",
+                                element.name, cursor_.offset(), next_),
+                    file_->path(), "the file is truncated or damaged");
     }
 
     std::shared_ptr<const InputFile> file_;
@@ -359,14 +397,19 @@ Result<PointSource> openPly(const std::string& path) {
     for (const Element& e : header.elements) {
         uint64_t row = 0;
         for (const Property& p : e.properties)
-            row += header.encoding == Encoding::ascii ? 2 : kTypeBytes.at(static_cast<size_t>(p.isList ? p.countType : p.type));
+            row += header.encoding == Encoding::ascii
+                       ? 2
+                       : kTypeBytes.at(static_cast<size_t>(p.isList ? p.countType : p.type));
         row = std::max<uint64_t>(row, 1);
         const bool isVertex = e.name == "vertex";
         if (header.encoding == Encoding::ascii && row > 1) --row;  // the last row may lack its end of line
-        const bool impossible = e.count > 0 && (e.count > body || e.count > (body - std::min(body, smallest)) / row + 1);
+        const bool impossible =
+            e.count > 0 && (e.count > body || e.count > (body - std::min(body, smallest)) / row + 1);
         if (impossible)
-            return fail(ErrorKind::input, fmt::format("the header declares {} of element '{}', but {} bytes cannot hold them",
-                                                      e.count, e.name, body), path, "the file is truncated or its header lies");
+            return fail(ErrorKind::input,
+                        fmt::format("the header declares {} of element '{}', but {} bytes cannot hold them", e.count,
+                                    e.name, body),
+                        path, "the file is truncated or its header lies");
         smallest += row * e.count;
         if (isVertex) break;
     }

@@ -14,11 +14,11 @@ struct DrawNode {
     vec3 axisY;
     vec3 axisZ;
     vec3 base;
-    float edge;         // edge of the node's cell, world units: scale of the radius codes
-    uint errorCode;     // records with an own error code <= this are fine enough
-    uint octantMask;    // octants whose child is not drawn: their records are drawn whatever their error
-    uint count;         // records of the prefix
-    uint addressLow;    // device address of the first record (gpu backend)
+    float edge;       // edge of the node's cell, world units: scale of the radius codes
+    uint errorCode;   // records with an own error code <= this are fine enough
+    uint octantMask;  // octants whose child is not drawn: their records are drawn whatever their error
+    uint count;       // records of the prefix
+    uint addressLow;  // device address of the first record (gpu backend)
     uint addressHigh;
     uint level;         // depth in the octree, for the debug view
     float errorPixels;  // screen-space error delivered by this node, for the debug view

@@ -1,5 +1,5 @@
-// Pull (fine to coarse) and push (coarse to fine): PP-A of ALGORITHMS 1.4, after Marroquim, Kraus, Cavalcanti 2008, with
-// that paper's flaws F11 to F16 corrected. Each function works on one texel; the backends only move texels.
+// Pull (fine to coarse) and push (coarse to fine): PP-A of ALGORITHMS 1.4, after Marroquim, Kraus, Cavalcanti 2008,
+// with that paper's flaws F11 to F16 corrected. Each function works on one texel; the backends only move texels.
 //
 // The weight of a splat at rho is (1 - rho^2)^2: zero with zero slope at the rim like the shifted exp(-2 rho^2) of the
 // papers, but without a transcendental function, so that all backends agree to the last bits.
@@ -69,8 +69,8 @@ SHARED_FN Texel texelFromBlend(Blend b) {
 
 const float kFarAway = 3.0e38f;
 
-// Depth of a child that reaches beyond its own texel, else kFarAway. The papers ask for more, that the ellipse contain the
-// parent's centre; with splats of about the spacing of the pixels that test drops one in three and tears holes.
+// Depth of a child that reaches beyond its own texel, else kFarAway. The papers ask for more, that the ellipse contain
+// the parent's centre; with splats of about the spacing of the pixels that test drops one in three and tears holes.
 SHARED_FN float depthIfWide(Texel t, float childSize) {
     const bool wide = t.depth > 0.0f && t.radius >= 0.5f * childSize;
     return wide ? t.depth : kFarAway;
@@ -80,7 +80,8 @@ SHARED_FN float depthIfWide(Texel t, float childSize) {
 SHARED_FN float thicknessWorld(Texel t, float inverseFocal) { return t.thickness * t.depth * inverseFocal; }
 
 // Merges the four children (order: (0,0) (1,0) (0,1) (1,1)) into their parent. `childSize`: edge of a child texel in
-// pixels. Kept are the children that reach beyond their own texel and whose depth interval meets the front one's; the interval of the result is anchored at the front and capped, so that layers do not chain (F12, case 42).
+// pixels. Kept are the children that reach beyond their own texel and whose depth interval meets the front one's; the
+// interval of the result is anchored at the front and capped, so that layers do not chain (F12, case 42).
 SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSize, float inverseFocal) {
     const float h = 0.5f * childSize;
     const float x0 = c0.offset.x - h;
@@ -129,14 +130,16 @@ SHARED_FN float kernelWeight(float rho2) {
     return k * k;
 }
 
+SHARED_FN float farWeight(float rho2) { return 0.01f / (1.0f + rho2 * rho2); }
+
 const float kSurrounding = 4.0f;  // coarse texels of one surface that make a fine texel lie inside it
 
 // Refines one fine texel from the four coarse texels around it. q0 is its parent, q1 the neighbour in x, q2 in y, q3 in
 // both; (sx, sy) = -1 or +1 say on which side of the parent's centre the fine texel lies. `fineSize`: its edge, pixels.
 // The fine texel is replaced iff it is empty or lies behind what the coarse ones say is in front of it (F13). Where no
-// coarse ellipse reaches it, it stays as it is, unless three of the coarse texels are filled and of one surface: then the
-// texel lies inside that surface, and a gap there is only the averaging of the pull (a merged splat stands at the middle
-// of its parts), so the ellipses count with twice their radius.
+// coarse ellipse reaches it, it stays as it is, unless three of the coarse texels are filled and of one surface: then
+// the texel lies inside that surface, and a gap there is only the averaging of the pull (a merged splat stands at the
+// middle of its parts), so the ellipses count with twice their radius.
 SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, float sx, float sy, float fineSize,
                           float inverseFocal) {
     const float coarseSize = 2.0f * fineSize;
@@ -173,10 +176,12 @@ SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, fl
     // Conditions as numbers: branches would keep compilers from turning loops over this function into SIMD.
     const float inside = together >= kSurrounding ? 1.0f : 0.0f;
     const float scale = missed * inside > 0.5f ? 0.25f : 1.0f;
-    const float k0 = kernelWeight(r0 * scale);
-    const float k1 = kernelWeight(r1 * scale);
-    const float k2 = kernelWeight(r2 * scale);
-    const float k3 = kernelWeight(r3 * scale);
+    // An empty texel between four filled ones is never left open: whatever is nearest counts, however far its rim.
+    const float between = max(max(r0, r1), max(r2, r3)) < kFarAway && fine.depth <= 0.0f ? missed : 0.0f;
+    const float k0 = max(kernelWeight(r0 * scale), between * farWeight(r0));
+    const float k1 = max(kernelWeight(r1 * scale), between * farWeight(r1));
+    const float k2 = max(kernelWeight(r2 * scale), between * farWeight(r2));
+    const float k3 = max(kernelWeight(r3 * scale), between * farWeight(r3));
     const float d0 = k0 > 0.0f ? q0.depth : kFarAway;
     const float d1 = k1 > 0.0f ? q1.depth : kFarAway;
     const float d2 = k2 > 0.0f ? q2.depth : kFarAway;

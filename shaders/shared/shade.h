@@ -17,7 +17,9 @@ SHARED_FN vec3 debugRamp(float t) {
                 min(max(1.5f - abs(4.0f * x - 1.0f), 0.0f), 1.0f));
 }
 // Screen-space error: 1/8 px blue, 1 px green to yellow, 8 px red.
-SHARED_FN vec3 debugErrorColour(float errorPixels) { return debugRamp((log2(max(errorPixels, 1.0e-6f)) + 3.0f) / 6.0f); }
+SHARED_FN vec3 debugErrorColour(float errorPixels) {
+    return debugRamp((log2(max(errorPixels, 1.0e-6f)) + 3.0f) / 6.0f);
+}
 SHARED_FN vec3 debugLevelColour(uint level) { return debugRamp(float(level % 8u) / 7.0f); }
 
 // Where a pixel's colour comes from: grey its own point, blue a nearer surface that replaced its point, orange filled.

@@ -1,5 +1,6 @@
 // The three errors, each on its own: implementation (a backend against the fp64 restatement of the same cut), level of
-// detail (a cut against the leaves), reconstruction (against traced discs). Figures for real scans are in bench/results.
+// detail (a cut against the leaves), reconstruction (against traced discs). Figures for real scans are in
+// bench/results.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -25,8 +26,8 @@ class Errors : public testing::Test {
         executor_.reset();
         folder_.reset();
     }
-    static render::Image draw(render::Backend& backend, double tau, render::Mode mode, uint32_t w = 640, uint32_t h = 480, bool lit = true,
-                              glm::dvec3 shift = glm::dvec3(0)) {
+    static render::Image draw(render::Backend& backend, double tau, render::Mode mode, uint32_t w = 640,
+                              uint32_t h = 480, bool lit = true, glm::dvec3 shift = glm::dvec3(0)) {
         render::FrameSettings settings;
         settings.mode = mode;
         settings.budgets.errorPixels = tau;
@@ -67,8 +68,10 @@ TEST_F(Errors, ImplementationOfEveryInstructionSetIsWithinItsBound) {
 TEST_F(Errors, OddSizesAreDrawnAsWell) {
     const auto backend = cpu::makeCpuBackend(*executor_);
     const auto oracle = reference::makeReferenceBackend(*executor_);
-    for (const auto& [w, h] : {std::pair{1u, 1u}, {1u, 7u}, {7u, 1u}, {2u, 3u}, {127u, 129u}, {641u, 479u}, {257u, 33u}}) {
-        const auto d = differ(draw(*backend, 0.5, render::Mode::pullpush, w, h), draw(*oracle, 0.5, render::Mode::pullpush, w, h));
+    for (const auto& [w, h] :
+         {std::pair{1u, 1u}, {1u, 7u}, {7u, 1u}, {2u, 3u}, {127u, 129u}, {641u, 479u}, {257u, 33u}}) {
+        const auto d =
+            differ(draw(*backend, 0.5, render::Mode::pullpush, w, h), draw(*oracle, 0.5, render::Mode::pullpush, w, h));
         EXPECT_LE(d.differingFraction * w * h, 1 + 0.001 * w * h) << w << " x " << h;
     }
 }
@@ -77,7 +80,8 @@ TEST_F(Errors, EveryFrameOfTheSameViewIsTheSame) {
     const auto backend = cpu::makeCpuBackend(*executor_);
     const render::Image first = draw(*backend, 0.5, render::Mode::pullpush);
     for (int i = 0; i < 5; ++i) ASSERT_TRUE(draw(*backend, 0.5, render::Mode::pullpush).rgba == first.rgba);
-    ASSERT_FALSE(draw(*backend, 0.5, render::Mode::pullpush, 640, 480, true, {0.001, 0, 0}).rgba == first.rgba) << "the comparison must be able to fail";
+    ASSERT_FALSE(draw(*backend, 0.5, render::Mode::pullpush, 640, 480, true, {0.001, 0, 0}).rgba == first.rgba)
+        << "the comparison must be able to fail";
 }
 
 TEST_F(Errors, LevelOfDetailFallsWithTau) {

@@ -52,9 +52,12 @@ TEST_P(Golden, LooksAsItDid) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Views, Golden,
-                         testing::Values(Case{"pullpush", shared::kDebugNone, render::Mode::pullpush, 1}, Case{"points", shared::kDebugNone, render::Mode::points, 1},
-                                         Case{"level", shared::kDebugLevel, render::Mode::pullpush, 4}, Case{"error", shared::kDebugError, render::Mode::pullpush, 4},
-                                         Case{"holes", shared::kDebugHoles, render::Mode::pullpush, 1}, Case{"normals", shared::kDebugNormals, render::Mode::pullpush, 1}),
+                         testing::Values(Case{"pullpush", shared::kDebugNone, render::Mode::pullpush, 1},
+                                         Case{"points", shared::kDebugNone, render::Mode::points, 1},
+                                         Case{"level", shared::kDebugLevel, render::Mode::pullpush, 4},
+                                         Case{"error", shared::kDebugError, render::Mode::pullpush, 4},
+                                         Case{"holes", shared::kDebugHoles, render::Mode::pullpush, 1},
+                                         Case{"normals", shared::kDebugNormals, render::Mode::pullpush, 1}),
                          [](const auto& one) { return std::string(one.param.name); });
 
 TEST(ImageIo, AWrittenPictureComesBackAndExrHasDepth) {

@@ -27,7 +27,8 @@ class Gpu : public testing::Test {
         if (!backend) throw std::runtime_error(backend.error().line());
         return std::move(*backend);
     }
-    render::Image draw(render::Backend& backend, const render::FrameSettings& settings, uint32_t w = 400, uint32_t h = 300) {
+    render::Image draw(render::Backend& backend, const render::FrameSettings& settings, uint32_t w = 400,
+                       uint32_t h = 300) {
         return test::renderView(store_, backend, *executor_, test::fitView(*store_, w, h), settings);
     }
     test::TempFolder folder_;
@@ -40,7 +41,8 @@ TEST_F(Gpu, DrawsAsTheOracleDrawsAndValidationIsSilent) {
     const auto oracle = reference::makeReferenceBackend(*executor_);
     for (const render::Mode mode : {render::Mode::pullpush, render::Mode::points})
         for (const double tau : {0.25, 2.0, 32.0})
-            for (const uint32_t debug : {shared::kDebugNone, shared::kDebugLevel, shared::kDebugError, shared::kDebugHoles, shared::kDebugNormals}) {
+            for (const uint32_t debug : {shared::kDebugNone, shared::kDebugLevel, shared::kDebugError,
+                                         shared::kDebugHoles, shared::kDebugNormals}) {
                 render::FrameSettings settings;
                 settings.mode = mode;
                 settings.budgets.errorPixels = tau;
@@ -48,7 +50,8 @@ TEST_F(Gpu, DrawsAsTheOracleDrawsAndValidationIsSilent) {
                 settings.draw.debugView = debug;
                 const auto d = reference::compareImages(draw(*gpu, settings), draw(*oracle, settings), 4, nullptr);
                 ASSERT_TRUE(d);
-                EXPECT_LE(d->differingFraction, debug == shared::kDebugHoles ? 0.005 : 0.001) << "tau " << tau << " debug " << debug;
+                EXPECT_LE(d->differingFraction, debug == shared::kDebugHoles ? 0.005 : 0.001)
+                    << "tau " << tau << " debug " << debug;
                 if (debug == shared::kDebugNone) EXPECT_GE(d->psnr, 50) << "tau " << tau;
             }
     for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
@@ -64,7 +67,8 @@ TEST_F(Gpu, OddSizesAndDepthAndNormals) {
         const auto d = reference::compareImages(a, b, 4, nullptr);
         EXPECT_LE(d->differingFraction * w * h, 1 + 0.001 * w * h) << w << " x " << h;
         size_t off = 0;
-        for (size_t i = 0; i < a.depth.size(); ++i) off += std::abs(a.depth[i] - b.depth[i]) > 1e-3f * b.depth[i] + 1e-6f;
+        for (size_t i = 0; i < a.depth.size(); ++i)
+            off += std::abs(a.depth[i] - b.depth[i]) > 1e-3f * b.depth[i] + 1e-6f;
         EXPECT_LE(off, 2 + a.depth.size() / 500);
     }
     for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
@@ -72,11 +76,13 @@ TEST_F(Gpu, OddSizesAndDepthAndNormals) {
 
 TEST_F(Gpu, ADeliberateHazardIsReported) {
     // Without this, silence above would prove nothing: the layer ignores misspelt settings.
-    const auto gpu = make("resolve");
+    const auto gpu = make("shade");
     draw(*gpu, {});
     bool found = false;
-    for (const std::string& message : validationMessages(*gpu)) found = found || message.find("SYNC-HAZARD") != std::string::npos;
-    EXPECT_TRUE(found) << "a missing barrier between project and resolve went unseen: synchronization validation is off";
+    for (const std::string& message : validationMessages(*gpu))
+        found = found || message.find("SYNC-HAZARD") != std::string::npos;
+    EXPECT_TRUE(found)
+        << "a missing barrier between the last push and shade went unseen: synchronization validation is off";
 }
 
 TEST(RangeAllocator, NeverOverlapsAndMergesAll) {

@@ -46,7 +46,8 @@ Tree randomTree(Rng& rng, uint32_t levels) {
             Node child;
             child.parent = at.node;
             child.level = static_cast<uint8_t>(t.h.nodes[at.node].level + 1);
-            todo.push_back({static_cast<uint32_t>(t.h.nodes.size()), at.corner + at.size / 2 * glm::dvec3(o & 1, o >> 1 & 1, o >> 2 & 1), at.size / 2});
+            todo.push_back({static_cast<uint32_t>(t.h.nodes.size()),
+                            at.corner + at.size / 2 * glm::dvec3(o & 1, o >> 1 & 1, o >> 2 & 1), at.size / 2});
             t.h.nodes.push_back(child);
         }
     }
@@ -81,7 +82,8 @@ Tree randomTree(Rng& rng, uint32_t levels) {
         // File order; the children's parent indices follow.
         std::vector<uint32_t> order(r.size());
         for (uint32_t k = 0; k < order.size(); ++k) order[k] = k;
-        std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return r[a].parentCode > r[b].parentCode; });
+        std::stable_sort(order.begin(), order.end(),
+                         [&](uint32_t a, uint32_t b) { return r[a].parentCode > r[b].parentCode; });
         std::vector<Tree::Record> sorted;
         std::vector<uint32_t> place(r.size());
         for (const uint32_t k : order) {
@@ -90,7 +92,8 @@ Tree randomTree(Rng& rng, uint32_t levels) {
         }
         Node& n = t.h.nodes[i];
         if (!n.isLeaf())
-            for (uint32_t c = n.firstChild; c < n.firstChild + static_cast<uint32_t>(__builtin_popcount(n.childMask)); ++c)
+            for (uint32_t c = n.firstChild; c < n.firstChild + static_cast<uint32_t>(__builtin_popcount(n.childMask));
+                 ++c)
                 for (auto& child : t.records[c]) child.parent = place[child.parent];
         r = sorted;
         n.records = static_cast<uint32_t>(r.size());
@@ -100,7 +103,8 @@ Tree randomTree(Rng& rng, uint32_t levels) {
             c.lo = 0;
             c.hi = 255;
             for (uint32_t code = 0; code < 255; ++code)
-                t.h.greaterThan.push_back(static_cast<uint32_t>(std::count_if(r.begin(), r.end(), [&](const auto& x) { return (own ? x.own : x.parentCode) > code; })));
+                t.h.greaterThan.push_back(static_cast<uint32_t>(std::count_if(
+                    r.begin(), r.end(), [&](const auto& x) { return (own ? x.own : x.parentCode) > code; })));
             (own ? n.ownCounts : n.parentCounts) = c;
         }
         for (const auto& x : r) n.errorCode = std::max(n.errorCode, static_cast<uint8_t>(x.own));
@@ -135,7 +139,8 @@ std::string checkCoverage(const Tree& t, const Cut& cut, const std::vector<uint8
         // In view for certain: the centre of the leaf's sphere projects into the image.
         const glm::dvec3 c = t.h.nodes[leaf].centre - view.eye;
         const double depth = glm::dot(c, view.forward);
-        const bool inView = depth > view.nearPlane && std::abs(glm::dot(c, view.right)) / depth * view.focalPixels < view.width / 2.0 &&
+        const bool inView = depth > view.nearPlane &&
+                            std::abs(glm::dot(c, view.right)) / depth * view.focalPixels < view.width / 2.0 &&
                             std::abs(glm::dot(c, view.down)) / depth * view.focalPixels < view.height / 2.0;
         for (uint32_t k = 0; k < t.records[leaf].size(); ++k) {
             int times = 0;
@@ -202,8 +207,10 @@ TEST(Cut, TheCoverageTestFindsABrokenCut) {
         view.down = {0, 1, 0};
         Selection s = select(t.h, std::vector<uint8_t>(t.h.nodes.size(), 1), view, {4, kNoLimit});
         if (s.cut.draw.empty()) continue;
-        if (round % 2) s.cut.draw.pop_back();               // a hole
-        else s.cut.draw.back().octantMask = 0xff;           // drawn twice
+        if (round % 2)
+            s.cut.draw.pop_back();  // a hole
+        else
+            s.cut.draw.back().octantMask = 0xff;  // drawn twice
         found += !checkCoverage(t, s.cut, s.drawable[0], view).empty();
     }
     EXPECT_GT(found, 10);
@@ -293,9 +300,13 @@ TEST(Cut, MeetsItsErrorInPixelsOnABuiltStore) {
             for (uint32_t i = 0; i < d.count; i += 7) {
                 const auto& r = chunk->records[i];
                 if (shared::recordErrorCode(r) > d.errorCode) continue;
-                const glm::dvec3 p = h.origin + h.unit * (h.recordOrigin(n) + std::exp2(n.stepShift) * glm::dvec3(recordX(r), recordY(r), recordZ(r))) - view.eye;
+                const glm::dvec3 p = h.origin +
+                                     h.unit * (h.recordOrigin(n) + std::exp2(n.stepShift) *
+                                                                       glm::dvec3(recordX(r), recordY(r), recordZ(r))) -
+                                     view.eye;
                 const double depth = glm::dot(p, view.forward);
-                const double x = glm::dot(p, view.right) / depth * view.focalPixels, y = glm::dot(p, view.down) / depth * view.focalPixels;
+                const double x = glm::dot(p, view.right) / depth * view.focalPixels,
+                             y = glm::dot(p, view.down) / depth * view.focalPixels;
                 if (depth <= 0 || std::abs(x) > 400 || std::abs(y) > 300) continue;
                 const double error = h.unit * h.errors.decode(shared::recordErrorCode(r));
                 const double distance = glm::length(p), cosine = depth / distance;

@@ -44,7 +44,8 @@ std::vector<TestPoint> bumpySphere(size_t count, uint64_t seed, const glm::dvec3
 
 void writePly(const std::string& path, const std::vector<TestPoint>& points, bool withNormals, bool withRadii) {
     std::ofstream out(path, std::ios::binary);
-    out << "ply\nformat binary_little_endian 1.0\nelement vertex " << points.size() << "\nproperty double x\nproperty double y\nproperty double z\n";
+    out << "ply\nformat binary_little_endian 1.0\nelement vertex " << points.size()
+        << "\nproperty double x\nproperty double y\nproperty double z\n";
     if (withNormals) out << "property float nx\nproperty float ny\nproperty float nz\n";
     out << "property uchar red\nproperty uchar green\nproperty uchar blue\n";
     if (withRadii) out << "property float radius\n";
@@ -83,14 +84,16 @@ void writeLas(const std::string& path, const std::vector<glm::ivec3>& points, do
     }
 }
 
-lod::BuildReport build(const std::vector<std::string>& inputs, const std::string& output, Executor& executor, const lod::BuildSettings& settings) {
+lod::BuildReport build(const std::vector<std::string>& inputs, const std::string& output, Executor& executor,
+                       const lod::BuildSettings& settings) {
     Progress silent(false);
     auto report = lod::buildStore(inputs, output, settings, executor, silent);
     if (!report) fatal(report.error());
     return *report;
 }
 
-std::shared_ptr<const lod::Store> buildAndOpen(const std::string& input, const std::string& output, Executor& executor, uint32_t leafRecords) {
+std::shared_ptr<const lod::Store> buildAndOpen(const std::string& input, const std::string& output, Executor& executor,
+                                               uint32_t leafRecords) {
     lod::BuildSettings settings;
     settings.leafRecords = leafRecords;
     build({input}, output, executor, settings);
@@ -99,8 +102,8 @@ std::shared_ptr<const lod::Store> buildAndOpen(const std::string& input, const s
     return std::make_shared<const lod::Store>(std::move(*store));
 }
 
-render::Image renderView(std::shared_ptr<const lod::Store> store, render::Backend& backend, Executor& executor, const lod::View& view,
-                         const render::FrameSettings& settings, FrameCounters* counters) {
+render::Image renderView(std::shared_ptr<const lod::Store> store, render::Backend& backend, Executor& executor,
+                         const lod::View& view, const render::FrameSettings& settings, FrameCounters* counters) {
     auto state = render::makeFrameState({std::move(store)}, backend, executor, {});
     const auto complete = render::renderUntilComplete(*state, view, settings, executor);
     if (!complete) fatal(complete.error());

@@ -37,7 +37,8 @@ struct TestPoint {
 /// Points on a bumpy sphere of radius 1 around `centre`, with outward normals and a smooth colour.
 std::vector<TestPoint> bumpySphere(size_t count, uint64_t seed, const glm::dvec3& centre = glm::dvec3(0));
 /// Binary PLY with double coordinates, normals, colours and radii.
-void writePly(const std::string& path, const std::vector<TestPoint>& points, bool withNormals = true, bool withRadii = false);
+void writePly(const std::string& path, const std::vector<TestPoint>& points, bool withNormals = true,
+              bool withRadii = false);
 /// LAS 1.2, point format 2, from integer coordinates.
 void writeLas(const std::string& path, const std::vector<glm::ivec3>& points, double scale, const glm::dvec3& offset);
 
@@ -48,11 +49,13 @@ std::shared_ptr<const lod::Store> buildAndOpen(const std::string& input, const s
                                                uint32_t leafRecords = 512);
 
 /// A complete frame.
-render::Image renderView(std::shared_ptr<const lod::Store> store, render::Backend& backend, Executor& executor, const lod::View& view,
-                         const render::FrameSettings& settings, FrameCounters* counters = nullptr);
+render::Image renderView(std::shared_ptr<const lod::Store> store, render::Backend& backend, Executor& executor,
+                         const lod::View& view, const render::FrameSettings& settings,
+                         FrameCounters* counters = nullptr);
 lod::View fitView(const lod::Store& store, uint32_t width, uint32_t height);
 
-/// Path of a file of the data folder; empty (with a SKIP line, or a failure if the data is required) where it is missing.
+/// Path of a file of the data folder; empty (with a SKIP line, or a failure if the data is required) where it is
+/// missing.
 std::string dataFile(const std::string& name);
 
 }  // namespace stipple::test

@@ -67,7 +67,8 @@ TEST(ErrorScale, RoundsUpOverManyDecades) {
         ASSERT_GE(scale.decode(code), e);
         if (code > 1) ASSERT_LT(scale.decode(code - 1), e);
     }
-    for (uint32_t code = 1; code <= lod::ErrorScale::kLargest; ++code) ASSERT_EQ(scale.encodeUp(scale.decode(code)), code);
+    for (uint32_t code = 1; code <= lod::ErrorScale::kLargest; ++code)
+        ASSERT_EQ(scale.encodeUp(scale.decode(code)), code);
 }
 
 TEST(Executor, RunsEverythingOnceWhateverTheThreads) {

@@ -12,12 +12,17 @@ namespace {
 TEST(FitCamera, SeesEveryCornerAtAnyPlaceAndShape) {
     Rng rng(1);
     for (int i = 0; i < 2000; ++i) {
-        const glm::dvec3 centre = std::exp2(rng.uniform(-5, 23)) * glm::dvec3(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1));
-        const glm::dvec3 half(std::exp2(rng.uniform(-3, 10)), std::exp2(rng.uniform(-3, 10)), std::exp2(rng.uniform(-3, 10)));
+        const glm::dvec3 centre =
+            std::exp2(rng.uniform(-5, 23)) * glm::dvec3(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1));
+        const glm::dvec3 half(std::exp2(rng.uniform(-3, 10)), std::exp2(rng.uniform(-3, 10)),
+                              std::exp2(rng.uniform(-3, 10)));
         const auto up = static_cast<lod::UpAxis>(rng.below(3));
         const lod::View v = makeView(fitCamera(centre - half, centre + half, up, 1.6), 1600, 1000, 1e-3);
         for (int corner = 0; corner < 8; ++corner) {
-            const glm::dvec3 p = centre + glm::dvec3(corner & 1 ? half.x : -half.x, corner & 2 ? half.y : -half.y, corner & 4 ? half.z : -half.z) - v.eye;
+            const glm::dvec3 p = centre +
+                                 glm::dvec3(corner & 1 ? half.x : -half.x, corner & 2 ? half.y : -half.y,
+                                            corner & 4 ? half.z : -half.z) -
+                                 v.eye;
             const double depth = glm::dot(p, v.forward);
             ASSERT_GT(depth, 0);
             ASSERT_LE(std::abs(glm::dot(p, v.right)) / depth * v.focalPixels, 800.5);
@@ -40,14 +45,17 @@ TEST(MakeView, IsOrthonormalEvenLookingAlongUp) {
 TEST(CameraPath, GoesThroughItsKeysAndRefusesNonsense) {
     const test::TempFolder folder;
     const auto write = [&](const std::string& text) { std::ofstream(folder / "p.json") << text; };
-    write(R"({"fps": 10, "keys": [{"t": 0, "eye": [0,0,0], "target": [1,0,0]}, {"t": 1, "eye": [2,0,0], "target": [3,0,0]}, {"t": 3, "eye": [2,5,0], "target": [3,5,0], "fov": 30}]})");
+    write(
+        R"({"fps": 10, "keys": [{"t": 0, "eye": [0,0,0], "target": [1,0,0]}, {"t": 1, "eye": [2,0,0], "target": [3,0,0]}, {"t": 3, "eye": [2,5,0], "target": [3,5,0], "fov": 30}]})");
     const auto path = readCameraPath(folder / "p.json");
     ASSERT_TRUE(path) << path.error().line();
     EXPECT_EQ(path->at(1).eye, glm::dvec3(2, 0, 0));
     EXPECT_EQ(path->at(9).eye, glm::dvec3(2, 5, 0));
     EXPECT_EQ(path->at(3).fovDegrees, 30);
-    for (const char* bad : {"", "{}", R"({"keys": []})", R"({"keys": [{"t": 0}]})", R"({"fps": 0, "keys": [{"t": 0, "eye": [0,0,0], "target": [1,0,0]}]})",
-                            R"({"keys": [{"t": 1, "eye": [0,0,0], "target": [1,0,0]}, {"t": 1, "eye": [0,0,0], "target": [1,0,0]}]})"}) {
+    for (const char* bad :
+         {"", "{}", R"({"keys": []})", R"({"keys": [{"t": 0}]})",
+          R"({"fps": 0, "keys": [{"t": 0, "eye": [0,0,0], "target": [1,0,0]}]})",
+          R"({"keys": [{"t": 1, "eye": [0,0,0], "target": [1,0,0]}, {"t": 1, "eye": [0,0,0], "target": [1,0,0]}]})"}) {
         write(bad);
         EXPECT_FALSE(readCameraPath(folder / "p.json")) << bad;
     }

@@ -38,7 +38,8 @@ std::vector<std::array<int64_t, 3>> leafLattice(const Store& store) {
             std::array<int64_t, 3> p{};
             for (size_t a = 0; a < 3; ++a) {
                 const int64_t cell = static_cast<int64_t>(n.cell.at(a)) << (store.hierarchy.rootLog2 - n.level);
-                p.at(a) = cell + (n.stepShift >= 0 ? (int64_t{q.at(a)} << n.stepShift) + (chunk->lowBits.empty() ? 0 : chunk->lowBits[3 * k + a])
+                p.at(a) = cell + (n.stepShift >= 0 ? (int64_t{q.at(a)} << n.stepShift) +
+                                                         (chunk->lowBits.empty() ? 0 : chunk->lowBits[3 * k + a])
                                                    : int64_t{q.at(a)} >> -n.stepShift);
             }
             all.push_back(p);
@@ -60,7 +61,8 @@ TEST(Las, ScannerIntegersComeBackExactlyAtAnyExtent) {
         glm::ivec3 lo = points[0];
         for (const glm::ivec3& p : points) lo = glm::min(lo, p);
         std::vector<std::array<int64_t, 3>> expected;
-        for (const glm::ivec3& p : points) expected.push_back({int64_t{p.x} - lo.x, int64_t{p.y} - lo.y, int64_t{p.z} - lo.z});
+        for (const glm::ivec3& p : points)
+            expected.push_back({int64_t{p.x} - lo.x, int64_t{p.y} - lo.y, int64_t{p.z} - lo.z});
         std::sort(expected.begin(), expected.end());
         EXPECT_EQ(leafLattice(*store), expected) << "extent " << extent;
     }
@@ -80,7 +82,8 @@ TEST(Las, EightBitColoursInSixteenBitFieldsAreRecognised) {
     std::array<uint32_t, 2> colours{};
     size_t k = 0;
     for (const char* name : {"wide", "narrow"}) {
-        const auto store = test::buildAndOpen(folder / (std::string(name) + ".las"), folder / (std::string(name) + ".stipple"), *executor);
+        const auto store = test::buildAndOpen(folder / (std::string(name) + ".las"),
+                                              folder / (std::string(name) + ".stipple"), *executor);
         colours.at(k++) = readChunk(*store, 0)->records[0].colour & 0xffffffu;
     }
     EXPECT_EQ(colours[0], 0xc04080u);

@@ -29,9 +29,12 @@ void writeText(const std::string& path, const std::string& text) { std::ofstream
 TEST(Ply, ReadsAnyOrderAndTypeAndSkipsTheRest) {
     const test::TempFolder folder;
     writeText(folder / "a.ply",
-              "ply\r\nformat ascii 1.0\ncomment hello\nelement camera 1\nproperty float fov\nelement vertex 2\nproperty uchar red\n"
-              "property double z\nproperty list uchar int extra\nproperty short x\nproperty float y\nproperty uchar green\nproperty uchar blue\n"
-              "element face 1\nproperty list uchar int vertex_indices\nend_header\n50\n10 3.5 2 7 8 -1 2e1 20 30\n\n40 1 0 5 +6 50 60\n3 0 1 1\n");
+              "ply\r\nformat ascii 1.0\ncomment hello\nelement camera 1\nproperty float fov\nelement vertex "
+              "2\nproperty uchar red\n"
+              "property double z\nproperty list uchar int extra\nproperty short x\nproperty float y\nproperty uchar "
+              "green\nproperty uchar blue\n"
+              "element face 1\nproperty list uchar int vertex_indices\nend_header\n50\n10 3.5 2 7 8 -1 2e1 20 30\n\n40 "
+              "1 0 5 +6 50 60\n3 0 1 1\n");
     const auto blocks = readAll(folder / "a.ply");
     ASSERT_TRUE(blocks) << blocks.error().line();
     ASSERT_EQ(blocks->size(), 1u);
@@ -56,7 +59,9 @@ TEST(Ply, BigAndLittleEndianAgree) {
         put(int16_t{300});
         put(0.5f);
         writeText(folder / "a.ply", std::string("ply\nformat binary_") + (big ? "big" : "little") +
-                                        "_endian 1.0\nelement vertex 1\nproperty float x\nproperty double y\nproperty short z\nproperty float radius\nend_header\n" + body);
+                                        "_endian 1.0\nelement vertex 1\nproperty float x\nproperty double y\nproperty "
+                                        "short z\nproperty float radius\nend_header\n" +
+                                        body);
         const auto blocks = readAll(folder / "a.ply");
         ASSERT_TRUE(blocks) << blocks.error().line();
         EXPECT_EQ(blocks->front().position[0], glm::dvec3(1.25, -2.5, 300));

@@ -20,7 +20,8 @@ struct Outcome {
 
 Outcome run(const test::TempFolder& folder, const std::string& arguments, const std::string& prefix = "") {
     const std::string errPath = folder / "stderr.txt";
-    const std::string command = "cd " + folder.path() + " && " + prefix + " XDG_CACHE_HOME=" + folder.path() + "/cache " + STIPPLE_PROGRAM + " " + arguments + " 2>" + errPath;
+    const std::string command = "cd " + folder.path() + " && " + prefix + " XDG_CACHE_HOME=" + folder.path() +
+                                "/cache " + STIPPLE_PROGRAM + " " + arguments + " 2>" + errPath;
     Outcome r;
     FILE* pipe = ::popen(command.c_str(), "r");
     std::array<char, 4096> buffer{};
@@ -46,7 +47,8 @@ TEST(Program, BuildsShowsAndComparesAScan) {
     const Outcome built = run(folder, "build a.las -o a.stipple --json --quiet");
     ASSERT_EQ(built.code, 0) << built.err;
     const auto report = nlohmann::json::parse(built.out);
-    for (const char* key : {"points_in", "points_out", "dropped", "seconds", "points_per_second", "peak_rss_bytes", "bytes_out", "content_hash"})
+    for (const char* key : {"points_in", "points_out", "dropped", "seconds", "points_per_second", "peak_rss_bytes",
+                            "bytes_out", "content_hash"})
         EXPECT_TRUE(report.contains(key)) << key;
     EXPECT_EQ(report["points_in"], 20000);
     EXPECT_EQ(run(folder, "info a.stipple --verify").code, 0);
@@ -54,8 +56,9 @@ TEST(Program, BuildsShowsAndComparesAScan) {
     const Outcome rendered = run(folder, "render a.stipple -o a.png --size 320x200 --json --frames 3 --device cpu");
     ASSERT_EQ(rendered.code, 0) << rendered.err;
     const auto j = nlohmann::json::parse(rendered.out);
-    for (const char* key : {"backend", "device", "frame_ms", "passes", "records_drawn", "nodes_drawn", "tau_eff_px", "bytes_streamed", "resident_bytes",
-                            "peak_rss_bytes", "first_image_ms", "complete_ms", "counters"})
+    for (const char* key :
+         {"backend", "device", "frame_ms", "passes", "records_drawn", "nodes_drawn", "tau_eff_px", "bytes_streamed",
+          "resident_bytes", "peak_rss_bytes", "first_image_ms", "complete_ms", "counters"})
         EXPECT_TRUE(j.contains(key)) << key;
     EXPECT_EQ(run(folder, "render a.las -o b.png --size 320x200 --device cpu --quiet").code, 0) << "through the cache";
     EXPECT_EQ(run(folder, "render a.stipple -o b.exr --size 64x48 --device reference --quiet").code, 0);
@@ -70,9 +73,12 @@ TEST(Program, SaysWhatIsWrongInOneLine) {
     std::ofstream(folder / "empty.ply");
     std::filesystem::create_directory(folder / "dir");
     std::ofstream(folder / "text.las") << "hello";
-    std::ofstream(folder / "none.ply") << "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
-    std::ofstream(folder / "nan.ply") << "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\nnan 1 2\n";
-    std::ofstream(folder / "one.ply") << "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n";
+    std::ofstream(folder / "none.ply") << "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float "
+                                          "y\nproperty float z\nend_header\n";
+    std::ofstream(folder / "nan.ply") << "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
+                                         "y\nproperty float z\nend_header\nnan 1 2\n";
+    std::ofstream(folder / "one.ply") << "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
+                                         "y\nproperty float z\nend_header\n1 2 3\n";
     expectOneLine(run(folder, "build missing.ply -o o.stipple"), 3, "missing.ply");
     expectOneLine(run(folder, "build dir -o o.stipple"), 3, "directory");
     expectOneLine(run(folder, "build empty.ply -o o.stipple"), 3, "empty");
@@ -117,7 +123,8 @@ TEST(Program, ATruncatedSceneIsRefused) {
     ASSERT_EQ(run(folder, "build a.ply -o a.stipple --quiet").code, 0);
     const auto size = std::filesystem::file_size(folder / "a.stipple");
     for (const auto keep : {uintmax_t{0}, uintmax_t{100}, size / 2, size - 1}) {
-        std::filesystem::copy_file(folder / "a.stipple", folder / "b.stipple", std::filesystem::copy_options::overwrite_existing);
+        std::filesystem::copy_file(folder / "a.stipple", folder / "b.stipple",
+                                   std::filesystem::copy_options::overwrite_existing);
         std::filesystem::resize_file(folder / "b.stipple", keep);
         expectOneLine(run(folder, "render b.stipple -o b.png"), 3, "b.stipple");
     }

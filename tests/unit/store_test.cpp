@@ -83,7 +83,8 @@ TEST(Chunk, EveryTruncatedLengthIsRefused) {
     Chunk chunk;
     Rng rng(1);
     for (int i = 0; i < 200; ++i)
-        chunk.records.push_back({static_cast<uint32_t>(rng.next()), static_cast<uint32_t>(rng.next()), 7, static_cast<uint32_t>(i)});
+        chunk.records.push_back(
+            {static_cast<uint32_t>(rng.next()), static_cast<uint32_t>(rng.next()), 7, static_cast<uint32_t>(i)});
     for (int i = 0; i < 600; ++i) chunk.lowBits.push_back(static_cast<uint32_t>(rng.below(16)));
     const std::vector<uint8_t> bytes = encodeChunk(chunk);
     const auto whole = decodeChunk(bytes.data(), bytes.size(), 200, "test", true);

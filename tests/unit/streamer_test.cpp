@@ -34,7 +34,9 @@ class CountingSink final : public ChunkSink {
 
 class BrokenSource final : public ByteSource {
   public:
-    Result<void> read(uint64_t, void*, size_t) const override { return fail(ErrorKind::input, "the cable is unplugged"); }
+    Result<void> read(uint64_t, void*, size_t) const override {
+        return fail(ErrorKind::input, "the cable is unplugged");
+    }
 };
 
 class StreamerTest : public testing::Test {
@@ -48,7 +50,8 @@ class StreamerTest : public testing::Test {
     const lod::Cut& step(Streamer& streamer, const lod::View& view, double tau) {
         streamer.collect();
         streamer.upload();
-        lod::selectCut(hierarchies_, instances_, streamer.residency(), view, {tau, std::numeric_limits<uint64_t>::max()}, scratch_, cut_);
+        lod::selectCut(hierarchies_, instances_, streamer.residency(), view,
+                       {tau, std::numeric_limits<uint64_t>::max()}, scratch_, cut_);
         streamer.request(cut_);
         executor_->wait();
         return cut_;
