@@ -13,6 +13,7 @@
 #include <thread>
 #include <unordered_map>
 
+#include "engine/base/huge_buffer.h"
 #include "engine/base/process.h"
 #include "shaders/shared/splat.h"
 
@@ -24,11 +25,11 @@ constexpr uint32_t kBandRows = 16;  ///< coarse rows per task
 /// One level of the pyramid in memory; five planes.
 struct Level {
     uint32_t width = 0, height = 0;
-    std::vector<uint32_t> words;
+    HugeBuffer<uint32_t> words;
     void resize(uint32_t w, uint32_t h) {
         width = w;
         height = h;
-        words.resize(size_t{5} * w * h);
+        words.assign(size_t{5} * w * h, 0);
     }
     Planes planes() {
         const size_t n = size_t{width} * height;
@@ -143,7 +144,10 @@ class CpuBackend final : public render::Backend {
                 const uint32_t count =
                     std::min(shared::kRecordsPerBlock, blocks_[b].node->count - draws_->blocks[b].first);
                 k_.projectBlock(frame_, *blocks_[b].node, blocks_[b].records, count, pixel.data(), depth.data());
+                constexpr uint32_t kAhead = 24;  // the pixels are scattered over 16 MB: ask for them in time
                 for (uint32_t i = 0; i < count; ++i) {
+                    if (i + kAhead < count && pixel[i + kAhead] != ~0u)
+                        __builtin_prefetch(&visibility_[pixel[i + kAhead]], 1);
                     if (pixel[i] == ~0u) continue;
                     const uint64_t key = uint64_t{depth[i]} << 32 | (b * shared::kRecordsPerBlock + i);
                     const std::atomic_ref<uint64_t> entry(visibility_[pixel[i]]);
@@ -347,7 +351,7 @@ class CpuBackend final : public render::Backend {
     const Kernels& k_;
     Tables tables_;
     std::unordered_map<uint64_t, std::vector<shared::PointRecord>> chunks_;
-    std::vector<uint64_t> visibility_;
+    HugeBuffer<uint64_t> visibility_;
     std::vector<Level> levels_;
     std::vector<BlockSource> blocks_;
     std::vector<render::PassTime> times_;

@@ -57,7 +57,8 @@ void projectBlock(const FrameConstants& frame, const DrawNode& drawNode, const P
         const float scale = focal / cz;
         const float px = cx * scale + x0, py = cy * scale + y0;
         const bool inside = (cz > nearPlane) & (px >= 0.0f) & (px < width) & (py >= 0.0f) & (py < height);
-        const bool fine = (recordErrorCode(r) <= errorCode) | ((octantMask >> recordOctant(r) & 1u) != 0u);
+        const float drawnHere = float(int(octantMask >> recordOctant(r) & 1u));  // a bool would keep GCC from SIMD
+        const bool fine = (recordErrorCode(r) <= errorCode) | (drawnHere > 0.5f);
         const vec3 n = octDirection(r.normal);
         const float nx = xx * n.x + xy * n.y + xz * n.z;
         const float ny = yx * n.x + yy * n.y + yz * n.z;
@@ -78,10 +79,15 @@ struct Gathered {
 bool resolveRow(const FrameConstants& frame, const Tables& tables, const BlockSource* blocks, uint64_t* visibility, uint32_t x0,
                 uint32_t y, uint32_t n, TexelRow& __restrict row, float& largestRadius) {
     const FrameConstants f = frame;
+    constexpr size_t kPrefetch = 12;  // pixels ahead: records lie anywhere in memory
     Gathered g;
     bool any = false;
     #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
+        if (i + kPrefetch < n && visibility[i + kPrefetch] != ~uint64_t{0}) {
+            const auto ahead = static_cast<uint32_t>(visibility[i + kPrefetch]) & 0x1fffffffu;
+            __builtin_prefetch(blocks[ahead / kRecordsPerBlock].records + ahead % kRecordsPerBlock);
+        }
         const uint64_t key = visibility[i];
         if (key == ~uint64_t{0}) {
             g.x[i] = 0;
@@ -143,7 +149,9 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const BlockSo
         t.radius = valid ? t.radius : 0.0f;
         t.colour = vec3(unpackRed(g.colour[i]), unpackGreen(g.colour[i]), unpackBlue(g.colour[i]));
         setTexel(row, kPad + i, t);
-        const uint bits = floatBitsToUint(t.radius);
+    }
+    for (size_t i = 0; i < n; ++i) {
+        const uint bits = floatBitsToUint(row.radius[kPad + i]);
         largest = bits > largest ? bits : largest;
     }
     largestRadius = max(largestRadius, uintBitsToFloat(largest));

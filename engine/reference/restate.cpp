@@ -135,7 +135,7 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize) {
                 const double rest = std::max(0.0, 1 - (widen ? rho2 / 4 : rho2));
                 // An empty texel between four filled ones takes whatever is nearest.
                 const bool between = least >= 1 && around.size() == 4 && !fine.ref(x, y).valid;
-                const double weight = std::max(rest * rest, between ? 0.01 / (1 + rho2 * rho2) : 0.0);
+                const double weight = std::max(rest * rest, between && rho2 <= least ? 0.01 : 0.0);
                 if (weight > 0) list.push_back({s, weight});
             }
             if (list.empty()) continue;

@@ -130,7 +130,8 @@ SHARED_FN float kernelWeight(float rho2) {
     return k * k;
 }
 
-SHARED_FN float farWeight(float rho2) { return 0.01f / (1.0f + rho2 * rho2); }
+// Weight of the nearest of four filled texels, where none reaches the fine one between them.
+SHARED_FN float gapWeight(float rho2, float least) { return rho2 <= least ? 0.01f : 0.0f; }
 
 const float kSurrounding = 4.0f;  // coarse texels of one surface that make a fine texel lie inside it
 
@@ -164,7 +165,8 @@ SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, fl
     const float t1 = thicknessWorld(q1, inverseFocal);
     const float t2 = thicknessWorld(q2, inverseFocal);
     const float t3 = thicknessWorld(q3, inverseFocal);
-    const float missed = min(min(r0, r1), min(r2, r3)) < 1.0f ? 0.0f : 1.0f;
+    const float least = min(min(r0, r1), min(r2, r3));
+    const float missed = least < 1.0f ? 0.0f : 1.0f;
     const float n0 = q0.depth > 0.0f ? q0.depth : kFarAway;
     const float n1 = q1.depth > 0.0f ? q1.depth : kFarAway;
     const float n2 = q2.depth > 0.0f ? q2.depth : kFarAway;
@@ -178,10 +180,10 @@ SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, fl
     const float scale = missed * inside > 0.5f ? 0.25f : 1.0f;
     // An empty texel between four filled ones is never left open: whatever is nearest counts, however far its rim.
     const float between = max(max(r0, r1), max(r2, r3)) < kFarAway && fine.depth <= 0.0f ? missed : 0.0f;
-    const float k0 = max(kernelWeight(r0 * scale), between * farWeight(r0));
-    const float k1 = max(kernelWeight(r1 * scale), between * farWeight(r1));
-    const float k2 = max(kernelWeight(r2 * scale), between * farWeight(r2));
-    const float k3 = max(kernelWeight(r3 * scale), between * farWeight(r3));
+    const float k0 = max(kernelWeight(r0 * scale), between * gapWeight(r0, least));
+    const float k1 = max(kernelWeight(r1 * scale), between * gapWeight(r1, least));
+    const float k2 = max(kernelWeight(r2 * scale), between * gapWeight(r2, least));
+    const float k3 = max(kernelWeight(r3 * scale), between * gapWeight(r3, least));
     const float d0 = k0 > 0.0f ? q0.depth : kFarAway;
     const float d1 = k1 > 0.0f ? q1.depth : kFarAway;
     const float d2 = k2 > 0.0f ? q2.depth : kFarAway;

@@ -44,9 +44,14 @@ TEST(Data, EveryFileIsReadOrRefused) {
 
 TEST(Data, RealScansAreBuiltAndDrawnAsTheOracleDraws) {
     const auto executor = makeTbbExecutor(0);
-    for (const char* name : {"01_meshes/bunny/bun_zipper.ply", "01_meshes/misc/horse.ply",
-                             "02_scans/pdal_testdata/las/autzen_trim_7.las", "02_scans/las_versions/test1_4.las",
-                             "02_scans/pdal_testdata/las/epsg_4326.las", "02_scans/las_versions/simple1_4.las"}) {
+    // The last is a field of random heights and colours: where two of its points have nearly the same depth, fp32 and
+    // fp64 may disagree about which is in front.
+    for (const auto& [name, psnr] : {std::pair{"01_meshes/bunny/bun_zipper.ply", 50.0},
+                                     {"01_meshes/misc/horse.ply", 50.0},
+                                     {"02_scans/pdal_testdata/las/autzen_trim_7.las", 50.0},
+                                     {"02_scans/las_versions/test1_4.las", 50.0},
+                                     {"02_scans/pdal_testdata/las/epsg_4326.las", 50.0},
+                                     {"02_scans/las_versions/simple1_4.las", 42.0}}) {
         const std::string path = test::dataFile(name);
         if (path.empty()) continue;
         const test::TempFolder folder;
@@ -61,7 +66,7 @@ TEST(Data, RealScansAreBuiltAndDrawnAsTheOracleDraws) {
                                      test::renderView(store, *oracle, *executor, view, settings), 4, nullptr);
         ASSERT_TRUE(d);
         EXPECT_LE(d->differingFraction, 0.002) << name;
-        EXPECT_GE(d->psnr, 45) << name;
+        EXPECT_GE(d->psnr, psnr) << name;
     }
 }
 
