@@ -1,0 +1,121 @@
+// The structs that CPU and GPU share have one layout: every field is written here, read by a shader field by field, and
+// must come back in the order and with the bits of C++.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstring>
+
+#include "engine/gpu/device.h"
+#include "shaders/shared/frame.h"
+#include "shaders/shared/record.h"
+
+namespace stipple::gpu {
+namespace {
+
+constexpr uint32_t kEcho[] = {
+#include "echo.inc"
+};
+
+struct Shared {
+    shared::FrameConstants frame;
+    shared::DrawNode node;
+    shared::DrawBlock block;
+    shared::PointRecord record;
+};
+static_assert(sizeof(Shared) == sizeof(shared::FrameConstants) + sizeof(shared::DrawNode) + 8 + 16);
+
+TEST(SharedStructs, EveryFieldComesBackFromTheGpu) {
+    auto made = Device::create({"", true, {}, {}});
+    ASSERT_TRUE(made) << made.error().line();
+    const Device& device = **made;
+    const size_t words = sizeof(Shared) / 4;
+    auto in = Buffer::create(device, sizeof(Shared), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, true, "in");
+    auto out = Buffer::create(device, 4096, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, true, "out");
+    ASSERT_TRUE(in && out);
+    for (uint32_t i = 0; i < words; ++i) {
+        const uint32_t value = 0x3f000000u + 257 * i;  // a normal float, different for every field
+        std::memcpy(static_cast<char*>(in->mapped()) + 4 * i, &value, 4);
+    }
+    std::memset(out->mapped(), 0, 4096);
+
+    std::array<VkDescriptorSetLayoutBinding, 2> bindings{};
+    for (uint32_t i = 0; i < 2; ++i)
+        bindings.at(i) = {i, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
+    VkDescriptorSetLayoutCreateInfo setInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO};
+    setInfo.bindingCount = 2;
+    setInfo.pBindings = bindings.data();
+    VkDescriptorSetLayout setLayout{};
+    ASSERT_EQ(vkCreateDescriptorSetLayout(device.device, &setInfo, nullptr, &setLayout), VK_SUCCESS);
+    VkPipelineLayoutCreateInfo layoutInfo{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO};
+    layoutInfo.setLayoutCount = 1;
+    layoutInfo.pSetLayouts = &setLayout;
+    VkPipelineLayout layout{};
+    ASSERT_EQ(vkCreatePipelineLayout(device.device, &layoutInfo, nullptr, &layout), VK_SUCCESS);
+    VkShaderModuleCreateInfo moduleInfo{VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO};
+    moduleInfo.codeSize = sizeof(kEcho);
+    moduleInfo.pCode = kEcho;
+    VkShaderModule module{};
+    ASSERT_EQ(vkCreateShaderModule(device.device, &moduleInfo, nullptr, &module), VK_SUCCESS);
+    VkComputePipelineCreateInfo info{VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO};
+    info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
+    info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
+    info.stage.module = module;
+    info.stage.pName = "main";
+    info.layout = layout;
+    VkPipeline pipeline{};
+    ASSERT_EQ(vkCreateComputePipelines(device.device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline), VK_SUCCESS);
+    const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2};
+    VkDescriptorPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
+    poolInfo.maxSets = 1;
+    poolInfo.poolSizeCount = 1;
+    poolInfo.pPoolSizes = &size;
+    VkDescriptorPool pool{};
+    ASSERT_EQ(vkCreateDescriptorPool(device.device, &poolInfo, nullptr, &pool), VK_SUCCESS);
+    VkDescriptorSetAllocateInfo setAllocate{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO};
+    setAllocate.descriptorPool = pool;
+    setAllocate.descriptorSetCount = 1;
+    setAllocate.pSetLayouts = &setLayout;
+    VkDescriptorSet set{};
+    ASSERT_EQ(vkAllocateDescriptorSets(device.device, &setAllocate, &set), VK_SUCCESS);
+    for (uint32_t i = 0; i < 2; ++i) {
+        const VkDescriptorBufferInfo buffer{(i == 0 ? *in : *out).handle(), 0, VK_WHOLE_SIZE};
+        const VkWriteDescriptorSet write{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET, nullptr, set,     i,      0, 1,
+                                         VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,      nullptr, &buffer, nullptr};
+        vkUpdateDescriptorSets(device.device, 1, &write, 0, nullptr);
+    }
+    VkCommandPoolCreateInfo commandPoolInfo{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
+    commandPoolInfo.queueFamilyIndex = device.queueFamily;
+    VkCommandPool commandPool{};
+    ASSERT_EQ(vkCreateCommandPool(device.device, &commandPoolInfo, nullptr, &commandPool), VK_SUCCESS);
+    VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
+    allocate.commandPool = commandPool;
+    allocate.commandBufferCount = 1;
+    VkCommandBuffer commands{};
+    ASSERT_EQ(vkAllocateCommandBuffers(device.device, &allocate, &commands), VK_SUCCESS);
+    const VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
+    vkBeginCommandBuffer(commands, &begin);
+    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
+    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout, 0, 1, &set, 0, nullptr);
+    vkCmdDispatch(commands, 1, 1, 1);
+    vkEndCommandBuffer(commands);
+    VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO};
+    submit.commandBufferCount = 1;
+    submit.pCommandBuffers = &commands;
+    ASSERT_EQ(vkQueueSubmit(device.queue, 1, &submit, VK_NULL_HANDLE), VK_SUCCESS);
+    vkDeviceWaitIdle(device.device);
+
+    const auto* got = static_cast<const uint32_t*>(out->mapped());
+    const auto* expected = static_cast<const uint32_t*>(in->mapped());
+    for (size_t i = 0; i < words; ++i) EXPECT_EQ(got[i], expected[i]) << "word " << i;
+    EXPECT_EQ(got[words], 0u) << "the shader knows a field that C++ does not";
+    for (const std::string& message : device.messages()) ADD_FAILURE() << message;
+    vkDestroyCommandPool(device.device, commandPool, nullptr);
+    vkDestroyDescriptorPool(device.device, pool, nullptr);
+    vkDestroyPipeline(device.device, pipeline, nullptr);
+    vkDestroyShaderModule(device.device, module, nullptr);
+    vkDestroyPipelineLayout(device.device, layout, nullptr);
+    vkDestroyDescriptorSetLayout(device.device, setLayout, nullptr);
+}
+
+}  // namespace
+}  // namespace stipple::gpu
