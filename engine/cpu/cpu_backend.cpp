@@ -181,7 +181,7 @@ class CpuBackend final : public render::Backend {
         const Planes finePlanes = fine.planes();
         std::atomic<float> largestRadius{0};
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
-            TexelRow upper, lower, out;
+            TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
             float largest = 0;
             for (uint32_t y = row0; y < row1; y += 2) {
                 bool any = false;
@@ -229,7 +229,7 @@ class CpuBackend final : public render::Backend {
             Level &fine = levels_[l], &coarse = levels_[l + 1];
             const Planes from = fine.planes(), to = coarse.planes();
             forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
-                TexelRow upper, lower, out;
+                TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
                 for (uint32_t y = row0; y < row1; y += 2) {
                     bool any = false;
                     for (TexelRow* row : {&upper, &lower}) {

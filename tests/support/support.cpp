@@ -122,7 +122,9 @@ std::string dataFile(const std::string& name) {
     const std::string path = std::string(folder ? folder : "") + "/" + name;
     if (folder && std::filesystem::exists(path)) return path;
     if (std::getenv("STIPPLE_REQUIRE_DATA")) throw std::runtime_error("the data is required, but there is no " + path);
-    fmt::print("SKIP {}: set STIPPLE_DATA to the data folder\n", name);
+    const std::string line = fmt::format("SKIP {}: set STIPPLE_DATA to the data folder\n", name);
+    fmt::print("{}", line);
+    if (const char* list = std::getenv("STIPPLE_SKIP_FILE")) std::ofstream(list, std::ios::app) << line;
     return {};
 }
 
