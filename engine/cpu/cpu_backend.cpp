@@ -144,7 +144,7 @@ class CpuBackend final : public render::Backend {
                 const uint32_t count =
                     std::min(shared::kRecordsPerBlock, blocks_[b].node->count - draws_->blocks[b].first);
                 k_.projectBlock(frame_, *blocks_[b].node, blocks_[b].records, count, pixel.data(), depth.data());
-                constexpr uint32_t kAhead = 24;  // the pixels are scattered over 16 MB: ask for them in time
+                constexpr uint32_t kAhead = 48;  // the pixels are scattered over 16 MB: ask for them in time
                 for (uint32_t i = 0; i < count; ++i) {
                     if (i + kAhead < count && pixel[i + kAhead] != ~0u)
                         __builtin_prefetch(&visibility_[pixel[i + kAhead]], 1);

@@ -31,7 +31,7 @@ stipple::lod::Hierarchy flatTerrain(uint32_t levels) {
         to.errorCode = static_cast<uint8_t>(code);
         for (const auto& [counts, at] : {std::pair{&to.ownCounts, code}, std::pair{&to.parentCounts, parentCode}}) {
             counts->first = static_cast<uint32_t>(h.greaterThan.size());
-            counts->lo = static_cast<uint8_t>(at > 8 ? at - 8 : 0);
+            counts->lo = static_cast<uint8_t>(at == 255 ? 255 : at > 8 ? at - 8 : 0);  // the root's have no parent
             counts->hi = static_cast<uint8_t>(at);
             for (uint32_t c = counts->lo; c < counts->hi; ++c) h.greaterThan.push_back(4000 * (at - c) / 9);
         }
@@ -59,10 +59,10 @@ void selectCutBudget(benchmark::State& state) {
     CutScratch scratch;
     Cut cut;
     View view;
-    view.forward = glm::normalize(glm::dvec3(0.3, 1, -0.25));
+    view.forward = glm::normalize(glm::dvec3(0.1, 1, -0.3));
     view.right = glm::normalize(glm::cross(view.forward, glm::dvec3(0, 0, 1)));
     view.down = glm::cross(view.forward, view.right);
-    view.eye = {1 << 20, 1 << 18, 1 << 15};
+    view.eye = {1 << 20, -(1 << 17), 1 << 17};
     view.width = 1920;
     view.height = 1080;
     const Budgets budgets{0.5, static_cast<uint64_t>(state.range(0))};
