@@ -73,7 +73,7 @@ class Scene {
             } while (x > 2 && x < 15 && y > 2 && y < 13);  // not in the house
             plantTree(rng, {x, y, ground(x, y) - 0.1}, rng.uniform(6, 10));
         }
-        grid_.resize(kCells * kCells);
+        grid_.resize(size_t{kCells} * kCells);
         for (uint32_t i = 0; i < spheres_.size(); ++i) insert(spheres_[i].centre, spheres_[i].radius, i, 0);
         for (uint32_t i = 0; i < cones_.size(); ++i)
             insert(0.5 * (cones_[i].a + cones_[i].b), 0.5 * glm::length(cones_[i].b - cones_[i].a) + cones_[i].ra, i,
@@ -154,7 +154,7 @@ class Scene {
         const auto cell = [](double v) { return std::clamp(static_cast<int>((v + kExtent) / kCell), 0, kCells - 1); };
         for (int y = cell(c.y - r); y <= cell(c.y + r); ++y)
             for (int x = cell(c.x - r); x <= cell(c.x + r); ++x)
-                grid_[static_cast<size_t>(y * kCells + x)].push_back(index << 2 | kind);
+                grid_[static_cast<size_t>(y) * kCells + static_cast<size_t>(x)].push_back(index << 2 | kind);
     }
 
     static bool windowAt(const dvec3& p) {
@@ -227,7 +227,7 @@ class Scene {
                nextY = ((y + (stepY > 0)) * kCell - kExtent - o.y) / d.y;
         double t = 0;
         while (x >= 0 && y >= 0 && x < kCells && y < kCells && t < hit.t) {
-            for (const uint32_t item : grid_[static_cast<size_t>(y * kCells + x)]) {
+            for (const uint32_t item : grid_[static_cast<size_t>(y) * kCells + static_cast<size_t>(x)]) {
                 if ((item & 3u) == 0)
                     traceSphere(spheres_[item >> 2], o, d, hit);
                 else if ((item & 3u) == 1)

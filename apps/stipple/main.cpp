@@ -5,7 +5,9 @@
 
 #include "apps/stipple/common.h"
 
-int main(int argc, char** argv) {
+namespace {
+
+int run(int argc, char** argv) {
     using namespace stipple;
     CLI::App app{"Stipple streams scans that do not fit in memory and draws them at a stated accuracy."};
     app.require_subcommand(1);
@@ -44,4 +46,15 @@ int main(int argc, char** argv) {
     }
     if (std::fflush(stdout) != 0 && status == 0) status = static_cast<int>(ErrorKind::output);
     return status;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    try {
+        return run(argc, argv);
+    } catch (...) {  // what even printing the error could throw
+        std::fputs("stipple: out of memory\n", stderr);
+        return static_cast<int>(stipple::ErrorKind::budget);
+    }
 }

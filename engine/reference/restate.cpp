@@ -4,6 +4,7 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "engine/base/check.h"
 #include "engine/base/process.h"
 #include "engine/reference/decode.h"
 #include "engine/reference/reference.h"
@@ -61,6 +62,7 @@ Sample blend(std::vector<Contribution>& list, const Sample*& front) {
     front = nullptr;
     for (const Contribution& c : list)
         if (!front || c.sample->depth < front->depth) front = c.sample;
+    STIPPLE_CHECK(front != nullptr, "nothing to blend");
     Sample sum;
     double weight = 0;
     std::erase_if(list, [&](const Contribution& c) {

@@ -110,7 +110,7 @@ class Estimator {
 
     size_t lowerBound(size_t from, uint64_t value) const {
         const auto& key = partition_.key;
-        size_t lo = 0, hi = key.size();
+        size_t lo = 0, hi = 0;
         if (key[from] < value) {
             size_t step = 1;
             lo = from + 1;

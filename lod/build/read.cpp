@@ -84,7 +84,7 @@ Result<Cloud> readCloud(const std::vector<std::string>& inputs, const BuildSetti
         cloud.hasColour = cloud.hasColour || source.info.hasColour;
         cloud.hasNormal = cloud.hasNormal || (source.info.hasNormal && settings.normals != NormalsMode::none);
         cloud.hasRadius = cloud.hasRadius || source.info.hasRadius;
-        for (const std::string& note : source.info.notes) report.notes.push_back(path + ": " + note);
+        for (const std::string& note : source.info.notes) report.notes.push_back(fmt::format("{}: {}", path, note));
         if (!cloud.source.empty()) cloud.source += ", ";
         cloud.source += std::filesystem::path(path).filename().string();
         sources.push_back(std::move(source));

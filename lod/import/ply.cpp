@@ -346,8 +346,8 @@ class PlyReader {
             double value = 0;
             if (!number(value)) return badNumber(element);
             if (p.isList) {
-                if (!(value >= 0)) return badNumber(element);
-                for (double left = value; left >= 1; --left)
+                if (!(value >= 0 && value <= 4294967295.0)) return badNumber(element);
+                for (auto left = static_cast<uint32_t>(value); left > 0; --left)
                     if (!number(value)) return badNumber(element);
             } else if (values && p.role != Role::none) {
                 values[static_cast<size_t>(p.role)] = value;
