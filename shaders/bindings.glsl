@@ -44,7 +44,7 @@ uint levelCount() {
 
 Texel loadTexel(uint offset, uint width, uint height, int x, int y) {
     PackedTexel p;
-    p.depth = 0.0;
+    p.depth = -1.0;
     p.size = 0u;
     p.offset = 0x80008000u;
     p.normal = 0x80008000u;

@@ -20,6 +20,7 @@
 namespace stipple::cpu {
 namespace {
 
+constexpr float kOutside = -1;      ///< depth of a texel outside the image
 constexpr uint32_t kBandRows = 16;  ///< coarse rows per task
 
 /// One level of the pyramid in memory; five planes.
@@ -264,8 +265,8 @@ class CpuBackend final : public render::Backend {
         const uint32_t c0 = x0 / 2, count = (n + 1) / 2;
         if (y < 0 || y >= static_cast<int>(level.height)) return false;
         const uint32_t before = c0 > 0 ? 1 : 0, after = c0 + count < level.width ? 1 : 0;
-        scratch.depth[kPad - 1] = 0;
-        scratch.depth[kPad + count] = 0;
+        scratch.depth[kPad - 1] = kOutside;  // overwritten below where there is a neighbour
+        scratch.depth[kPad + count] = kOutside;
         if (!loadRow(level, planes, static_cast<uint32_t>(y), c0 - before, count + before + after, kPad - before,
                      scratch))
             return false;
@@ -298,8 +299,9 @@ class CpuBackend final : public render::Backend {
             }
             for (const size_t slot : {nearSlot, farSlot}) {
                 if (has.at(slot)) continue;
-                std::fill_n(ring.at(slot).nearest.depth, TexelRow::kSize, 0.0f);
-                std::fill_n(ring.at(slot).beside.depth, TexelRow::kSize, 0.0f);
+                const bool isOutside = slot == farSlot && (y % 2 == 0 ? c == 0 : c + 1 >= coarse.height);
+                std::fill_n(ring.at(slot).nearest.depth, TexelRow::kSize, isOutside ? kOutside : 0.0f);
+                std::fill_n(ring.at(slot).beside.depth, TexelRow::kSize, isOutside ? kOutside : 0.0f);
             }
             k_.pushRow(own, ring.at(nearSlot), ring.at(farSlot), y % 2 == 0 ? -1.0f : 1.0f, n, fineSize,
                        1.0f / frame_.focal, out);

@@ -119,9 +119,11 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize) {
             const int px = x / 2, py = y / 2, sx = x % 2 ? 1 : -1, sy = y % 2 ? 1 : -1;
             std::vector<std::pair<const Sample*, double>> around;  // filled coarse texels and rho^2 there
             double least = 1e300;
+            size_t outside = 0;
             const Sample* nearest = nullptr;
             for (int k = 0; k < 4; ++k) {
                 const Sample* s = coarse.at(px + (k % 2 ? sx : 0), py + (k / 2 ? sy : 0));
+                outside += s == nullptr;
                 if (!s || !s->valid) continue;
                 around.emplace_back(s, rhoSquared(*s, centre));
                 if (!nearest || s->depth < nearest->depth) nearest = s;
@@ -136,7 +138,7 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize) {
             for (const auto& [s, rho2] : around) {
                 const double rest = std::max(0.0, 1 - (widen ? rho2 / 4 : rho2));
                 // An empty texel between four filled ones takes whatever is nearest.
-                const bool between = least >= 1 && around.size() == 4 && !fine.ref(x, y).valid;
+                const bool between = least >= 1 && around.size() + outside == 4 && !fine.ref(x, y).valid;
                 const double weight = std::max(rest * rest, between && rho2 <= least ? 0.01 : 0.0);
                 if (weight > 0) list.push_back({s, weight});
             }

@@ -178,8 +178,12 @@ SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, fl
     // Conditions as numbers: branches would keep compilers from turning loops over this function into SIMD.
     const float inside = together >= kSurrounding ? 1.0f : 0.0f;
     const float scale = missed * inside > 0.5f ? 0.25f : 1.0f;
-    // An empty texel between four filled ones is never left open: whatever is nearest counts, however far its rim.
-    const float between = max(max(r0, r1), max(r2, r3)) < kFarAway && fine.depth <= 0.0f ? missed : 0.0f;
+    // An empty texel between four filled ones is never left open: whatever is nearest counts, however far its rim. What
+    // lies outside the image (depth < 0) may be filled or not and does not keep a gap open.
+    const float noneEmpty =
+        min(min(abs(q0.depth), abs(q1.depth)), min(abs(q2.depth), abs(q3.depth))) > 0.0f ? missed : 0.0f;
+    const float oneFilled = least < kFarAway ? noneEmpty : 0.0f;
+    const float between = fine.depth <= 0.0f ? oneFilled : 0.0f;
     const float k0 = max(kernelWeight(r0 * scale), between * gapWeight(r0, least));
     const float k1 = max(kernelWeight(r1 * scale), between * gapWeight(r1, least));
     const float k2 = max(kernelWeight(r2 * scale), between * gapWeight(r2, least));

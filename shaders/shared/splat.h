@@ -9,7 +9,7 @@
 SHARED_BEGIN
 
 struct Texel {
-    float depth;      // linear, world units; <= 0: empty
+    float depth;      // linear, world units; 0: empty; < 0: outside the image
     float radius;     // pixels of the full-size image
     float thickness;  // half-thickness along the view, in pixels at this depth (world = thickness * depth / focal)
     vec2 offset;      // centre of the splat - centre of the texel, pixels; below three radii
