@@ -1,23 +1,19 @@
 #include "engine/image/image_io.h"
 
 #include <dlfcn.h>
-#include <fmt/format.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <array>
-#include <cerrno>
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
 
+#include "engine/base/file.h"
 #include "engine/image/oiio_module.h"
 
 namespace stipple::image {
 namespace {
 
 struct Module {
-    decltype(&stippleOiioWrite) write = nullptr;
+    decltype(&stippleOiioEncode) encode = nullptr;
     decltype(&stippleOiioRead) read = nullptr;
     std::string problem;
 };
@@ -36,9 +32,9 @@ const Module& module() {
                 m.problem = ::dlerror();
                 continue;
             }
-            m.write = reinterpret_cast<decltype(m.write)>(::dlsym(handle, "stippleOiioWrite"));
+            m.encode = reinterpret_cast<decltype(m.encode)>(::dlsym(handle, "stippleOiioEncode"));
             m.read = reinterpret_cast<decltype(m.read)>(::dlsym(handle, "stippleOiioRead"));
-            if (m.write && m.read) return m;
+            if (m.encode && m.read) return m;
         }
         return m;
     }();
@@ -73,23 +69,24 @@ Result<void> writeImage(const std::string& path, const render::Image& image) {
             for (size_t c = 0; c < 3; ++c) to[5 + c] = image.normal.size() == pixels * 3 ? image.normal[i * 3 + c] : 0;
         }
     }
-    if (!module().write)
+    if (!module().encode)
         return fail(ErrorKind::output, "the picture module cannot be loaded: " + module().problem, path);
     static const std::array<const char*, 8> names{"R", "G", "B", "A", "Z", "N.x", "N.y", "N.z"};
-    const std::string temporary = fmt::format("{}.partial.{}{}", path, ::getpid(), isExr ? ".exr" : ".png");
     std::array<char, 512> error{};
-    const int status = module().write(
-        temporary.c_str(), static_cast<int>(image.width), static_cast<int>(image.height), isExr ? 8 : 4, isExr ? 1 : 0,
-        isExr ? static_cast<const void*>(wide.data()) : image.rgba.data(), names.data(), error.data(), error.size());
-    // A full disk shows as a short file with some encoders, without an error.
-    struct stat info {};
-    if (status == 0 && ::stat(temporary.c_str(), &info) == 0 && info.st_size > 0 &&
-        ::rename(temporary.c_str(), path.c_str()) == 0)
-        return {};
-    const std::string reason = status != 0 ? error.data() : std::strerror(errno);
-    ::unlink(temporary.c_str());
-    return fail(ErrorKind::output, "cannot be written: " + reason.substr(0, reason.find('\n')), path,
-                "choose a folder that exists, can be written and has room");
+    std::vector<char> bytes;
+    const auto sink = [](void* user, const void* data, unsigned long count) {
+        const auto* from = static_cast<const char*>(data);
+        static_cast<std::vector<char>*>(user)->assign(from, from + count);
+    };
+    const int status =
+        module().encode(path.c_str(), static_cast<int>(image.width), static_cast<int>(image.height), isExr ? 8 : 4,
+                        isExr ? 1 : 0, isExr ? static_cast<const void*>(wide.data()) : image.rgba.data(), names.data(),
+                        sink, &bytes, error.data(), error.size());
+    if (status != 0 || bytes.empty()) {
+        const std::string reason = error.data();
+        return fail(ErrorKind::output, "cannot be encoded: " + reason.substr(0, reason.find('\n')), path);
+    }
+    return writeWholeFile(path, bytes.data(), bytes.size());
 }
 
 Result<render::Image> readImage(const std::string& path) {

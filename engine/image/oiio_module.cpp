@@ -1,5 +1,6 @@
 #include "engine/image/oiio_module.h"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 #include <cstdio>
@@ -14,8 +15,9 @@ int report(const std::string& text, char* error, int errorBytes) {
 }
 }  // namespace
 
-extern "C" int stippleOiioWrite(const char* path, int width, int height, int channels, int isFloat, const void* pixels,
-                                const char* const* names, char* error, int errorBytes) {
+extern "C" int stippleOiioEncode(const char* path, int width, int height, int channels, int isFloat, const void* pixels,
+                                 const char* const* names, void (*sink)(void*, const void*, unsigned long), void* user,
+                                 char* error, int errorBytes) {
     try {
         const OIIO::TypeDesc type = isFloat ? OIIO::TypeDesc::FLOAT : OIIO::TypeDesc::UINT8;
         OIIO::ImageSpec spec(width, height, channels, type);
@@ -27,8 +29,11 @@ extern "C" int stippleOiioWrite(const char* path, int width, int height, int cha
         spec.attribute("compression", "zip");
         const std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create(path);
         if (!out) return report(OIIO::geterror(), error, errorBytes);
+        OIIO::Filesystem::IOVecOutput file;
+        if (!out->set_ioproxy(&file)) return report("this format cannot be encoded in memory", error, errorBytes);
         if (!out->open(path, spec) || !out->write_image(type, pixels) || !out->close())
             return report(out->geterror(), error, errorBytes);
+        sink(user, file.buffer().data(), file.buffer().size());
         return 0;
     } catch (const std::exception& e) {
         return report(e.what(), error, errorBytes);

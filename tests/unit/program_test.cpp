@@ -114,6 +114,10 @@ TEST(Program, AFullDiskLeavesTheOldFileAlone) {
     std::string text;
     in >> text;
     EXPECT_EQ(text, "old");
+    ASSERT_EQ(run(folder, "build a.las -o a.stipple --quiet").code, 0);
+    const Outcome picture =
+        run(folder, "render a.stipple -o small/a.png --size 1280x720 --quiet", "ulimit -f 64; trap '' XFSZ;");
+    EXPECT_EQ(picture.code, 4) << picture.err;
     EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder / "small"), {}), 1);
 }
 
