@@ -6,11 +6,45 @@
 #include <tbb/task_arena.h>
 #include <tbb/task_group.h>
 
+#include <atomic>
 #include <deque>
+#include <thread>
 #include <utility>
+#include <vector>
 
 namespace stipple {
 namespace {
+
+#ifdef __SANITIZE_THREAD__
+// ThreadSanitizer knows nothing of the synchronisation inside the (uninstrumented) TBB library and would report every
+// task that is stolen. Plain threads instead: what is then reported is a race of ours.
+class ThreadExecutor final : public Executor {
+  public:
+    explicit ThreadExecutor(int threads) : threads_(threads > 0 ? threads : 4) {}
+    ~ThreadExecutor() override { ThreadExecutor::wait(); }
+    void parallelFor(size_t count, size_t grain, const std::function<void(size_t, size_t)>& body) override {
+        const size_t step = grain ? grain : 1;
+        std::atomic<size_t> next{0};
+        const auto work = [&] {
+            for (size_t i = next.fetch_add(step); i < count; i = next.fetch_add(step))
+                body(i, i + step < count ? i + step : count);
+        };
+        std::vector<std::thread> helpers;
+        for (size_t t = 1; t < static_cast<size_t>(threads_) && t * step < count; ++t) helpers.emplace_back(work);
+        work();
+        for (std::thread& helper : helpers) helper.join();
+    }
+    void run(std::function<void()> task) override { tasks_.emplace_back(std::move(task)); }
+    void wait() override {
+        for (std::thread& task : std::exchange(tasks_, {})) task.join();
+    }
+    int threads() const override { return threads_; }
+
+  private:
+    int threads_;
+    std::vector<std::thread> tasks_;
+};
+#endif
 
 class TbbExecutor final : public Executor {
   public:
@@ -68,7 +102,13 @@ class SerialExecutor final : public Executor {
 
 }  // namespace
 
-std::unique_ptr<Executor> makeTbbExecutor(int threads) { return std::make_unique<TbbExecutor>(threads); }
+std::unique_ptr<Executor> makeTbbExecutor(int threads) {
+#ifdef __SANITIZE_THREAD__
+    return std::make_unique<ThreadExecutor>(threads);
+#else
+    return std::make_unique<TbbExecutor>(threads);
+#endif
+}
 std::unique_ptr<Executor> makeSerialExecutor() { return std::make_unique<SerialExecutor>(); }
 
 }  // namespace stipple
