@@ -7,7 +7,7 @@ namespace stipple::render {
 static_assert(sizeof(shared::PointRecord) == 16);
 static_assert(sizeof(shared::DrawNode) == 80);
 static_assert(sizeof(shared::DrawBlock) == 8);
-static_assert(sizeof(shared::FrameConstants) == 120);
+static_assert(sizeof(shared::FrameConstants) == 116);
 
 void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,
                   std::span<const lod::Instance> instances, const lod::View& view, const DrawSettings& settings,
@@ -60,7 +60,6 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     f.minimumRadius = settings.minimumRadius;
     f.shade = settings.lit ? shared::kShadeLit : shared::kShadeUnlit;
     f.debugView = settings.debugView;
-    f.levels = 0;
     // A sun over the viewer's left shoulder: every view of a scan is lit from where one looks.
     f.sunDirection = glm::normalize(glm::vec3(-0.45f, -0.55f, -0.7f));
     f.skyDirection = glm::vec3(cameraFromWorld * settings.worldUp);

@@ -39,7 +39,6 @@ void main() {
     put(frame.minimumRadius);
     put(frame.shade);
     put(frame.debugView);
-    put(frame.levels);
     put(frame.sunDirection);
     put(frame.skyDirection);
     put(frame.background);

@@ -52,7 +52,6 @@ struct FrameConstants {
     float minimumRadius;  // pixels: smallest splat radius in the reconstruction
     uint shade;
     uint debugView;
-    uint levels;        // pyramid levels in use, the full-size one included
     vec3 sunDirection;  // camera space, towards the sun
     vec3 skyDirection;  // camera space, up
     vec3 background;    // linear
