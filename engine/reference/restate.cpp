@@ -118,13 +118,14 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize) {
             const dvec2 centre = (dvec2(x, y) + 0.5) * fineSize;
             const int px = x / 2, py = y / 2, sx = x % 2 ? 1 : -1, sy = y % 2 ? 1 : -1;
             std::vector<std::pair<const Sample*, double>> around;  // filled coarse texels and rho^2 there
-            double least = 1e300;
+            double least = 1e300, hindmost = 0;
             size_t outside = 0;
             const Sample* nearest = nullptr;
             for (int k = 0; k < 4; ++k) {
                 const Sample* s = coarse.at(px + (k % 2 ? sx : 0), py + (k / 2 ? sy : 0));
                 outside += s == nullptr;
                 if (!s || !s->valid) continue;
+                hindmost = std::max(hindmost, s->depth + s->thickness);
                 around.emplace_back(s, rhoSquared(*s, centre));
                 if (!nearest || s->depth < nearest->depth) nearest = s;
                 least = std::min(least, around.back().second);
@@ -138,7 +139,10 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize) {
             for (const auto& [s, rho2] : around) {
                 const double rest = std::max(0.0, 1 - (widen ? rho2 / 4 : rho2));
                 // An empty texel between four filled ones takes whatever is nearest.
-                const bool between = least >= 1 && around.size() + outside == 4 && !fine.ref(x, y).valid;
+                const bool gap = around.size() + outside == 4 && !fine.ref(x, y).valid;
+                // So does what shines through from behind all four.
+                const bool shines = around.size() == 4 && fine.ref(x, y).valid && fine.ref(x, y).depth > hindmost;
+                const bool between = least >= 1 && (gap || shines);
                 const double weight = std::max(rest * rest, between && rho2 <= least ? 0.01 : 0.0);
                 if (weight > 0) list.push_back({s, weight});
             }
