@@ -84,6 +84,29 @@ TEST_F(Errors, EveryFrameOfTheSameViewIsTheSame) {
         << "the comparison must be able to fail";
 }
 
+TEST_F(Errors, EqualCutsGiveEqualIdsWhateverElseIsResident) {
+    const auto backend = cpu::makeCpuBackend(*executor_), other = cpu::makeCpuBackend(*executor_);
+    const lod::View view = test::fitView(*store_, 320, 240);
+    render::FrameSettings fine, coarse;
+    fine.budgets.errorPixels = 0.05;
+    coarse.budgets.errorPixels = 4;
+    auto fresh = render::makeFrameState({store_}, *backend, *executor_, {});
+    auto used = render::makeFrameState({store_}, *other, *executor_, {});
+    ASSERT_TRUE(render::renderUntilComplete(*used, view, fine, *executor_));
+    ASSERT_TRUE(render::renderUntilComplete(*used, view, coarse, *executor_));
+    ASSERT_TRUE(render::renderUntilComplete(*fresh, view, coarse, *executor_));
+    ASSERT_NE(fresh->counters.residentBytes, used->counters.residentBytes) << "the residency must differ";
+    ASSERT_EQ(fresh->draws.blocks.size(), used->draws.blocks.size());
+    for (size_t b = 0; b < fresh->draws.blocks.size(); ++b) {
+        ASSERT_EQ(fresh->draws.blocks[b].first, used->draws.blocks[b].first);
+        ASSERT_EQ(fresh->draws.keys[fresh->draws.blocks[b].node].node,
+                  used->draws.keys[used->draws.blocks[b].node].node);
+    }
+    EXPECT_TRUE(fresh->image.rgba == used->image.rgba);
+    fresh->streamer.reset();  // hands its chunks back before the backend goes
+    used->streamer.reset();
+}
+
 TEST_F(Errors, LevelOfDetailFallsWithTau) {
     const auto backend = cpu::makeCpuBackend(*executor_);
     const render::Image leaves = draw(*backend, 1e-5, render::Mode::pullpush);
