@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "engine/base/hash.h"
+#include "lod/attributes.h"
 
 namespace stipple::lod {
 namespace {
@@ -17,7 +18,6 @@ static_assert(std::endian::native == std::endian::little, "the store is little-e
 
 constexpr uint64_t kMagic = 0x31454c5050495453ull;      // "STIPPLE1"
 constexpr uint64_t kFootMagic = 0x444e45454c505053ull;  // "SPPLEEND"
-constexpr uint32_t kVersion = 1;
 constexpr uint64_t kSizeLimit = uint64_t{1} << 40;  // of an uncompressed table
 
 struct Section {
@@ -41,14 +41,14 @@ struct Foot {
 
 struct NodeOnDisk {
     std::array<double, 4> sphere;
-    uint64_t chunkOffset, chunkHash;
+    uint64_t chunkOffset, chunkHash, attributeHash;
     std::array<uint32_t, 3> cell;
-    uint32_t parent, firstChild, records, chunkBytes, parentCodes, ownCodes, normalCone;
+    uint32_t parent, firstChild, records, chunkBytes, attributeBytes, parentCodes, ownCodes, normalCone;
     float normalConeCosine;
     uint8_t level, childMask, errorCode;
     int8_t stepShift;
 };
-static_assert(sizeof(NodeOnDisk) == 32 + 16 + 12 + 28 + 4 + 4);
+static_assert(sizeof(NodeOnDisk) == 32 + 24 + 12 + 32 + 4 + 4 + 4);  // the last for alignment
 
 /// (code, count) of one code that occurs in a node.
 struct CodeCount {
@@ -96,10 +96,26 @@ void appendPairs(const Hierarchy& h, const CodeCounts& c, uint32_t records, std:
 }
 
 nlohmann::json toJson(const StoreDescription& d) {
+    nlohmann::json attributes = nlohmann::json::array();
+    for (const AttributeInfo& a : d.attributes)
+        attributes.push_back({{"name", a.name},
+                              {"type", kScalarNames.at(static_cast<size_t>(a.type))},
+                              {"aggregate", kAggregateNames.at(static_cast<size_t>(a.aggregate))},
+                              {"scale", a.scale},
+                              {"offset", a.offset},
+                              {"description", a.description},
+                              {"least", a.least},
+                              {"greatest", a.greatest},
+                              {"low", a.low},
+                              {"high", a.high},
+                              {"counts", a.counts}});
     return {{"metres_per_unit", d.metresPerUnit},
             {"up", std::string(1, static_cast<char>('x' + static_cast<int>(d.up)))},
-            {"crs", d.crs},
-            {"attributes", d.attributes},
+            {"crs",
+             {{"name", d.crs.name}, {"epsg", d.crs.epsg}, {"text", d.crs.text}, {"is_degrees", d.crs.isDegrees}}},
+            {"attributes", attributes},
+            {"low_height", d.lowHeight},
+            {"high_height", d.highHeight},
             {"points", d.points},
             {"records", d.records},
             {"rounding", d.roundingUnits},
@@ -110,12 +126,42 @@ nlohmann::json toJson(const StoreDescription& d) {
             {"source", d.source}};
 }
 
+template <size_t N>
+size_t indexOf(const std::array<const char*, N>& names, const std::string& name) {
+    for (size_t i = 0; i < N; ++i)
+        if (name == names.at(i)) return i;
+    throw std::runtime_error("unknown name '" + name + "'");
+}
+
+AttributeInfo attributeFromJson(const nlohmann::json& j) {
+    AttributeInfo a;
+    a.name = j.at("name").get<std::string>();
+    a.type = static_cast<ScalarType>(indexOf(kScalarNames, j.at("type").get<std::string>()));
+    a.aggregate = static_cast<Aggregate>(indexOf(kAggregateNames, j.at("aggregate").get<std::string>()));
+    a.scale = j.at("scale").get<double>();
+    a.offset = j.at("offset").get<double>();
+    a.description = j.at("description").get<std::string>();
+    a.least = j.at("least").get<double>();
+    a.greatest = j.at("greatest").get<double>();
+    a.low = j.at("low").get<double>();
+    a.high = j.at("high").get<double>();
+    a.counts = j.at("counts").get<std::vector<std::pair<double, uint64_t>>>();
+    return a;
+}
+
 StoreDescription fromJson(const nlohmann::json& j) {
     StoreDescription d;
     d.metresPerUnit = j.at("metres_per_unit").get<double>();
     d.up = static_cast<UpAxis>(j.at("up").get<std::string>().at(0) - 'x');
-    d.crs = j.at("crs").get<std::string>();
-    d.attributes = j.at("attributes").get<std::vector<std::string>>();
+    const nlohmann::json& crs = j.at("crs");
+    d.crs.name = crs.at("name").get<std::string>();
+    d.crs.epsg = crs.at("epsg").get<int>();
+    d.crs.text = crs.at("text").get<std::string>();
+    d.crs.isDegrees = crs.at("is_degrees").get<bool>();
+    d.crs.metresPerUnit = d.metresPerUnit;
+    for (const nlohmann::json& a : j.at("attributes")) d.attributes.push_back(attributeFromJson(a));
+    d.lowHeight = j.at("low_height").get<double>();
+    d.highHeight = j.at("high_height").get<double>();
     d.points = j.at("points").get<uint64_t>();
     d.records = j.at("records").get<uint64_t>();
     d.roundingUnits = j.at("rounding").get<double>();
@@ -155,7 +201,8 @@ Result<void> checkNodes(const Store& store, uint64_t chunksEnd) {
         const auto children = static_cast<uint64_t>(__builtin_popcount(n.childMask));
         const bool childrenFit = n.isLeaf() || (n.firstChild > i && n.firstChild + children <= nodes.size());
         const bool parentFits = i == 0 ? n.level == 0 : n.parent < i && nodes[n.parent].level + 1 == n.level;
-        const bool chunkFits = n.chunkOffset <= chunksEnd && n.chunkBytes <= chunksEnd - n.chunkOffset;
+        const bool chunkFits =
+            n.chunkOffset <= chunksEnd && uint64_t{n.chunkBytes} + n.attributeBytes <= chunksEnd - n.chunkOffset;
         const bool finite =
             std::isfinite(n.radius) && n.radius >= 0 && std::isfinite(n.centre.x + n.centre.y + n.centre.z);
         if (!childrenFit || !parentFits || !chunkFits || !finite || n.records == 0 ||
@@ -175,11 +222,15 @@ Result<StoreWriter> StoreWriter::create(const std::string& path) {
     return StoreWriter(std::move(file));
 }
 
-Result<void> StoreWriter::appendChunk(const std::vector<uint8_t>& bytes, Node& node) {
+Result<void> StoreWriter::appendChunk(const std::vector<uint8_t>& bytes, const std::vector<uint8_t>& attributes,
+                                      Node& node) {
     node.chunkOffset = file_.position();
     node.chunkBytes = static_cast<uint32_t>(bytes.size());
     node.chunkHash = hashBytes(bytes.data(), bytes.size());
-    return file_.append(bytes.data(), bytes.size());
+    node.attributeBytes = static_cast<uint32_t>(attributes.size());
+    node.attributeHash = hashBytes(attributes.data(), attributes.size());
+    STIPPLE_TRY(file_.append(bytes.data(), bytes.size()));
+    return attributes.empty() ? Result<void>() : file_.append(attributes.data(), attributes.size());
 }
 
 Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& description) {
@@ -191,6 +242,8 @@ Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& des
         d.sphere = {n.centre.x, n.centre.y, n.centre.z, n.radius};
         d.chunkOffset = n.chunkOffset;
         d.chunkHash = n.chunkHash;
+        d.attributeHash = n.attributeHash;
+        d.attributeBytes = n.attributeBytes;
         d.cell = n.cell;
         d.parent = n.parent;
         d.firstChild = n.firstChild;
@@ -217,7 +270,7 @@ Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& des
     STIPPLE_TRY(write(pairs.data(), pairs.size() * sizeof(CodeCount), head.counts));
     STIPPLE_TRY(write(text.data(), text.size(), head.description));
     head.magic = kMagic;
-    head.version = kVersion;
+    head.version = kStoreVersion;
     head.rootLog2 = h.rootLog2;
     head.origin = {h.origin.x, h.origin.y, h.origin.z};
     head.unit = h.unit;
@@ -253,9 +306,9 @@ Result<Store> openStore(const std::string& path) {
     if (head.magic != kMagic)
         return fail(ErrorKind::input, "is not a stipple store", path,
                     "build one with: stipple build INPUT -o SCENE.stipple");
-    if (head.version != kVersion)
+    if (head.version != kStoreVersion)
         return fail(ErrorKind::input,
-                    fmt::format("has store version {}; this program reads version {}", head.version, kVersion), path,
+                    fmt::format("has store version {}; this program reads version {}", head.version, kStoreVersion), path,
                     "build it again with this program");
     if (head.hash != hashBytes(&head, offsetof(Head, hash)))
         return tl::unexpected(damaged(path, "the head is damaged"));
@@ -290,6 +343,8 @@ Result<Store> openStore(const std::string& path) {
         n.radius = d.sphere[3];
         n.chunkOffset = d.chunkOffset;
         n.chunkHash = d.chunkHash;
+        n.attributeHash = d.attributeHash;
+        n.attributeBytes = d.attributeBytes;
         n.cell = d.cell;
         n.parent = d.parent;
         n.firstChild = d.firstChild;
@@ -337,6 +392,17 @@ Result<Chunk> readChunk(const Store& store, uint32_t index, bool wantLowBits) {
     if (hashBytes(bytes.data(), bytes.size()) != node.chunkHash)
         return tl::unexpected(damaged(where, "the hash does not match"));
     return decodeChunk(bytes.data(), bytes.size(), node.records, where, wantLowBits);
+}
+
+Result<std::vector<uint8_t>> readAttribute(const Store& store, uint32_t index, size_t attribute) {
+    const Node& node = store.hierarchy.nodes[index];
+    std::vector<uint8_t> bytes(node.attributeBytes);
+    const uint64_t offset = node.chunkOffset + node.chunkBytes;
+    STIPPLE_TRY(store.file->readAt(offset, bytes.data(), bytes.size()));
+    const std::string where = fmt::format("{}: attributes of node {} at offset {}", store.path, index, offset);
+    if (hashBytes(bytes.data(), bytes.size()) != node.attributeHash)
+        return tl::unexpected(damaged(where, "the hash does not match"));
+    return decodeAttribute(bytes.data(), bytes.size(), store.description.attributes, attribute, node.records, where);
 }
 
 }  // namespace stipple::lod

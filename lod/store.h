@@ -14,11 +14,15 @@
 
 namespace stipple::lod {
 
+/// Of the file format; a store of another version must be built again.
+inline constexpr uint32_t kStoreVersion = 2;
+
 struct StoreDescription {
     double metresPerUnit = 1;
     UpAxis up = UpAxis::z;
-    std::string crs;
-    std::vector<std::string> attributes;
+    Crs crs;
+    std::vector<AttributeInfo> attributes;  ///< streams that every chunk has
+    double lowHeight = 0, highHeight = 0;   ///< 2nd and 98th percentile along the up axis, world units
     uint64_t points = 0;                    ///< leaf records: the points of the input that were kept
     uint64_t records = 0;                   ///< all records, coarse levels included
     double roundingUnits = 0;               ///< largest rounding of a coordinate to the lattice, world units; 0: exact
@@ -41,8 +45,8 @@ struct Store {
 class StoreWriter {
   public:
     static Result<StoreWriter> create(const std::string& path);
-    /// Appends an encoded chunk and fills the chunk fields of `node`.
-    Result<void> appendChunk(const std::vector<uint8_t>& bytes, Node& node);
+    /// Appends an encoded chunk and its attribute streams and fills the chunk fields of `node`.
+    Result<void> appendChunk(const std::vector<uint8_t>& bytes, const std::vector<uint8_t>& attributes, Node& node);
     /// Writes node table, description, foot, then the head. The file stays under its temporary name.
     Result<void> finish(const Hierarchy& hierarchy, const StoreDescription& description);
     const std::string& temporaryPath() const { return file_.temporaryPath(); }
@@ -60,6 +64,9 @@ class StoreWriter {
 Result<Store> openStore(const std::string& path);
 /// Reads one chunk, checks its hash, decodes it.
 Result<Chunk> readChunk(const Store& store, uint32_t node, bool wantLowBits = false);
+
+/// Checks the hash of a node's attribute streams and decodes the one of attribute `index`.
+Result<std::vector<uint8_t>> readAttribute(const Store& store, uint32_t node, size_t index);
 
 struct VerifyReport {
     uint64_t nodes = 0, records = 0, leafRecords = 0;

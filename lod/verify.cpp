@@ -71,6 +71,9 @@ Result<VerifyReport> verifyStore(const Store& store, Executor& executor) {
             if (std::string text = checkNode(h, static_cast<uint32_t>(i), *chunk); !text.empty())
                 problems.push({i, Error{ErrorKind::input, std::move(text), fmt::format("{}: node {}", store.path, i),
                                         "this is a fault of the build; please report it with the input"}});
+            for (size_t a = 0; a < store.description.attributes.size(); ++a)
+                if (const auto values = readAttribute(store, static_cast<uint32_t>(i), a); !values)
+                    problems.push({i, values.error()});
             records += chunk->records.size();
             if (h.nodes[i].isLeaf()) leafRecords += chunk->records.size();
         }

@@ -25,13 +25,19 @@ class FileSource final : public ByteSource {
 
 constexpr uint64_t kRetryFrames = 120;
 
-Result<lod::Chunk> fetch(const ByteSource& source, const lod::Node& node, const std::string& where) {
-    std::vector<uint8_t> bytes(node.chunkBytes);
+Result<lod::Chunk> fetch(const ByteSource& source, const lod::Node& node, uint32_t index, const ChunkFinish& finish,
+                         const std::string& where) {
+    const size_t attributeBytes = finish.wantsAttributes ? node.attributeBytes : 0;
+    std::vector<uint8_t> bytes(node.chunkBytes + attributeBytes);
     STIPPLE_TRY(source.read(node.chunkOffset, bytes.data(), bytes.size()));
-    if (hashBytes(bytes.data(), bytes.size()) != node.chunkHash)
+    const uint8_t* const attributes = bytes.data() + node.chunkBytes;
+    if (hashBytes(bytes.data(), node.chunkBytes) != node.chunkHash ||
+        (finish.wantsAttributes && hashBytes(attributes, attributeBytes) != node.attributeHash))
         return fail(ErrorKind::input, "the hash of a chunk does not match", where,
                     "the store is damaged; build it again");
-    return lod::decodeChunk(bytes.data(), bytes.size(), node.records, where, false);
+    STIPPLE_ASSIGN(lod::Chunk chunk, lod::decodeChunk(bytes.data(), node.chunkBytes, node.records, where, false));
+    if (finish.apply) STIPPLE_TRY(finish.apply(index, chunk, attributes, attributeBytes));
+    return chunk;
 }
 
 }  // namespace
@@ -64,9 +70,10 @@ Streamer::~Streamer() {
 }
 
 void Streamer::addInstance(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source,
-                           std::string name) {
-    sources_.push_back(
-        {&hierarchy, std::move(source), std::move(name), std::vector<NodeState>(hierarchy.nodes.size())});
+                           std::string name, ChunkFinish finish) {
+    sources_.push_back({&hierarchy, std::move(source), std::move(name),
+                        std::make_shared<const ChunkFinish>(std::move(finish)),
+                        std::vector<NodeState>(hierarchy.nodes.size())});
     drawable_.emplace_back(hierarchy.nodes.size(), uint8_t{0});
 }
 
@@ -171,9 +178,8 @@ void Streamer::request(const lod::Cut& cut) {
         ++counters_.inFlight;
         ++counters_.requests;
         const std::string where = fmt::format("{}: chunk of node {}", source.name, w.node);
-        executor_.run([key, where, bytes = source.bytes, node = source.hierarchy->nodes[w.node], queue = completed_] {
-            queue->push({key, fetch(*bytes, node, where)});
-        });
+        executor_.run([key, where, bytes = source.bytes, node = source.hierarchy->nodes[w.node], finish = source.finish,
+                       queue = completed_] { queue->push({key, fetch(*bytes, node, key.node, *finish, where)}); });
     }
 }
 

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -30,6 +31,13 @@ class ChunkSink {
     virtual ~ChunkSink() = default;
     virtual Result<void> upload(ChunkKey key, const lod::Chunk& chunk) = 0;
     virtual void evict(ChunkKey key) = 0;
+};
+
+/// A last step before a chunk is handed over, e.g. colours from attributes: told the node, the chunk and, if asked for,
+/// the bytes of its attribute streams (checked against their hash).
+struct ChunkFinish {
+    bool wantsAttributes = false;
+    std::function<Result<void>(uint32_t node, lod::Chunk& chunk, const uint8_t* attributes, size_t bytes)> apply;
 };
 
 enum class ChunkState : uint8_t { absent, requested, arrived, resident, failed };
@@ -54,8 +62,10 @@ class Streamer {
     Streamer(const Streamer&) = delete;
     Streamer& operator=(const Streamer&) = delete;
 
-    /// One more instance; `hierarchy` must outlive the streamer.
-    void addInstance(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source, std::string name);
+    /// One more instance; `hierarchy` must outlive the streamer. `finish` (may be empty) is called with every decoded
+    /// chunk on the thread that decoded it.
+    void addInstance(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source, std::string name,
+                     ChunkFinish finish = {});
     /// Takes in what workers finished since the last call.
     void collect();
     /// Uploads arrived chunks within the budgets, evicting if needed.
@@ -79,6 +89,7 @@ class Streamer {
         const lod::Hierarchy* hierarchy;
         std::shared_ptr<const ByteSource> bytes;
         std::string name;
+        std::shared_ptr<const ChunkFinish> finish;
         std::vector<NodeState> nodes;
     };
     struct Arrival {

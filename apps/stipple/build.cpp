@@ -27,6 +27,7 @@ Result<void> run(const Options& o) {
         const nlohmann::json j = {{"points_in", r.pointsIn},
                                   {"points_out", r.pointsOut},
                                   {"dropped", r.dropped},
+                                  {"skipped_files", r.skippedFiles},
                                   {"seconds", r.seconds},
                                   {"stage_seconds", r.stageSeconds},
                                   {"points_per_second", static_cast<double>(r.pointsIn) / r.seconds},
@@ -52,8 +53,8 @@ Result<void> run(const Options& o) {
 
 void setupBuild(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
-    CLI::App* sub = app.add_subcommand("build", "build the hierarchy of one or more scans (.ply, .las)");
-    sub->add_option("INPUT", o->inputs, "scans that together make the scene")->required();
+    CLI::App* sub = app.add_subcommand("build", "build the hierarchy of one or more scans (.ply, .las, .laz)");
+    sub->add_option("INPUT", o->inputs, "scans that together make the scene: files, folders, patterns, ept.json, cloud.js")->required();
     sub->add_option("-o,--output", o->output, "the scene to write (.stipple)")->required();
     o->build.addTo(*sub);
     sub->add_flag("--json", o->json, "print the report as JSON");

@@ -11,6 +11,8 @@
 #include "engine/base/process.h"
 #include "engine/cpu/cpu_backend.h"
 #include "engine/reference/reference.h"
+#include "lod/colour.h"
+#include "lod/import/import.h"
 #ifdef STIPPLE_WITH_GPU
 #include "engine/gpu/gpu_backend.h"
 #endif
@@ -35,7 +37,31 @@ void BuildOptions::addTo(CLI::App& app) {
         ->capture_default_str();
     app.add_option("--up", up, "up axis, instead of the format's own (LAS: z, PLY: y)")
         ->check(CLI::IsMember({"x", "y", "z"}));
+    app.add_option("--attributes", attributes,
+                   "attributes to keep beside position, colour and normal: all, none, or names with commas")
+        ->capture_default_str();
+    app.add_flag("--skip-bad", skipBad, "go on past corrupt chunks and files, and say what was lost");
 }
+
+void ColourOptions::addTo(CLI::App& app) {
+    app.add_option("--colour,--color", what, "rgb, intensity, class, return, height, normal or the name of an attribute")
+        ->capture_default_str();
+    app.add_option("--colour-map,--color-map", map, "grey, viridis, magma or turbo");
+    app.add_option("--colour-range,--color-range", range, "LOW,HIGH (default: 2nd to 98th percentile)");
+    app.add_flag("--legend", legend, "draw what the colours stand for into the picture");
+}
+
+namespace {
+
+std::vector<std::string> namesOf(const std::string& list) {
+    std::vector<std::string> names;
+    std::istringstream in(list);
+    for (std::string name; std::getline(in, name, ',');)
+        if (!name.empty() && name != "none" && name != "all") names.push_back(lod::attributeBehind(name));
+    return names;
+}
+
+}  // namespace
 
 Result<lod::BuildSettings> BuildOptions::settings() const {
     lod::BuildSettings s;
@@ -46,6 +72,9 @@ Result<lod::BuildSettings> BuildOptions::settings() const {
                 : normals == "keep" ? lod::NormalsMode::keep
                                     : lod::NormalsMode::automatic;
     s.estimateRadii = radii != "keep";
+    s.skipBad = skipBad;
+    s.allAttributes = attributes == "all";
+    s.attributes = namesOf(attributes);
     if (!up.empty()) s.up = static_cast<lod::UpAxis>(up[0] - 'x');
     return s;
 }
@@ -53,8 +82,10 @@ Result<lod::BuildSettings> BuildOptions::settings() const {
 namespace {
 
 Result<std::string> cachePath(const std::vector<std::string>& inputs, const BuildOptions& build) {
-    std::string key = build.normals + build.radii + build.up + STIPPLE_VERSION;
-    for (const std::string& input : inputs) {
+    std::string key = build.normals + "|" + build.radii + "|" + build.up + "|" + build.attributes +
+                      (build.skipBad ? "|skip" : "|") + STIPPLE_VERSION + fmt::format("|{}", lod::kStoreVersion);
+    STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs(inputs));
+    for (const std::string& input : files) {
         std::error_code error;
         const fs::path absolute = fs::absolute(input, error);
         const auto size = fs::file_size(absolute, error);
@@ -75,19 +106,26 @@ Result<std::string> cachePath(const std::vector<std::string>& inputs, const Buil
 
 }  // namespace
 
-Result<std::shared_ptr<const lod::Store>> openScene(const std::vector<std::string>& inputs, const BuildOptions& build,
-                                                    Executor& executor, bool showProgress) {
+Result<std::shared_ptr<const lod::Store>> openScene(const std::vector<std::string>& inputs, BuildOptions build,
+                                                    const ColourOptions& colour, Executor& executor,
+                                                    bool showProgress) {
     std::string path = inputs.front();
     if (inputs.size() != 1 || fs::path(path).extension() != ".stipple") {
         for (const std::string& input : inputs)
             if (fs::path(input).extension() == ".stipple")
                 return fail(ErrorKind::usage, "a built scene and other inputs cannot be mixed", input,
                             "name one scene, or only raw inputs");
+        if (const std::string needed = lod::attributeBehind(colour.what); !needed.empty() && build.attributes != "all")
+            build.attributes = build.attributes == "none" ? needed : build.attributes + "," + needed;
         STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
         STIPPLE_ASSIGN(path, cachePath(inputs, build));
         if (!fs::exists(path)) {
+            if (showProgress) fmt::print(stderr, "building {} into the cache: {}\n", inputs.front(), path);
             Progress progress(showProgress);
-            STIPPLE_TRY(lod::buildStore(inputs, path, settings, executor, progress));
+            STIPPLE_ASSIGN(const lod::BuildReport built,
+                           lod::buildStore(inputs, path, settings, executor, progress));
+            for (const std::string& note : built.notes)
+                if (showProgress) fmt::print(stderr, "note: {}\n", note);
         }
     }
     STIPPLE_ASSIGN(lod::Store store, lod::openStore(path));

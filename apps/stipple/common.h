@@ -20,15 +20,25 @@ namespace stipple::app {
 int report(const Error& error);
 
 struct BuildOptions {
-    std::string memory = "2G", normals = "auto", radii = "auto", up;
+    std::string memory = "2G", normals = "auto", radii = "auto", up, attributes = "none";
     int threads = 0;
+    bool skipBad = false;
     void addTo(CLI::App& app);
     Result<lod::BuildSettings> settings() const;
 };
 
-/// A .stipple file is opened; anything else is built into the cache first (and found there the next time).
-Result<std::shared_ptr<const lod::Store>> openScene(const std::vector<std::string>& inputs, const BuildOptions& build,
-                                                    Executor& executor, bool showProgress);
+/// What the colours of the picture stand for.
+struct ColourOptions {
+    std::string what = "auto", map, range;
+    bool legend = false;
+    void addTo(CLI::App& app);
+};
+
+/// A .stipple file is opened; anything else is built into the cache first (and found there the next time), with
+/// the attribute that `colour` needs.
+Result<std::shared_ptr<const lod::Store>> openScene(const std::vector<std::string>& inputs, BuildOptions build,
+                                                    const ColourOptions& colour, Executor& executor,
+                                                    bool showProgress);
 
 Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, Executor& executor);
 /// Every backend and device, one per line.

@@ -4,16 +4,17 @@
 #include <filesystem>
 
 #include "apps/stipple/common.h"
+#include "apps/stipple/info_input.h"
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
-#include "lod/import/import.h"
+#include "lod/nearest.h"
 
 namespace stipple::app {
 namespace {
 
 struct Options {
-    std::string input;
-    bool verify = false, json = false;
+    std::string input, at;
+    bool verify = false, json = false, skipBad = false;
 };
 
 nlohmann::json vectorJson(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
@@ -31,6 +32,13 @@ nlohmann::json storeInfo(const lod::Store& store) {
         l["bytes"] = l["bytes"].get<uint64_t>() + n.chunkBytes;
         l["largest_error"] = std::max(l["largest_error"].get<double>(), h.unit * h.errors.decode(n.errorCode));
     }
+    nlohmann::json attributes = nlohmann::json::array();
+    for (const lod::AttributeInfo& a : d.attributes)
+        attributes.push_back({{"name", a.name},
+                              {"type", lod::kScalarNames.at(static_cast<size_t>(a.type))},
+                              {"aggregate", lod::kAggregateNames.at(static_cast<size_t>(a.aggregate))},
+                              {"least", a.least},
+                              {"greatest", a.greatest}});
     return {{"kind", "stipple store"},
             {"path", store.path},
             {"bytes", store.fileBytes},
@@ -47,8 +55,8 @@ nlohmann::json storeInfo(const lod::Store& store) {
             {"coordinate_rounding", d.roundingUnits},
             {"metres_per_unit", d.metresPerUnit},
             {"up", std::string(1, static_cast<char>('x' + static_cast<int>(d.up)))},
-            {"crs", d.crs},
-            {"attributes", d.attributes},
+            {"crs", d.crs.label()},
+            {"attributes", attributes},
             {"has_colour", d.hasColour},
             {"has_normals", d.hasNormals}};
 }
@@ -68,9 +76,11 @@ void printStore(const nlohmann::json& j) {
     fmt::print("  up            {}\n  colour        {}\n  normals       {}\n", j["up"].get<std::string>(),
                j["has_colour"].get<bool>() ? "yes" : "no", j["has_normals"].get<bool>() ? "yes" : "no");
     if (!j["crs"].get<std::string>().empty()) fmt::print("  crs           {}\n", j["crs"].get<std::string>());
-    std::string names;
-    for (const auto& a : j["attributes"]) names += (names.empty() ? "" : ", ") + a.get<std::string>();
-    fmt::print("  attributes    {}\n  hash          {}\n  level   nodes    records      bytes  largest error\n", names,
+    for (const auto& a : j["attributes"])
+        fmt::print("  attribute     {} ({}, coarse levels: {}), {:.10g} .. {:.10g}\n", a["name"].get<std::string>(),
+                   a["type"].get<std::string>(), a["aggregate"].get<std::string>(), a["least"].get<double>(),
+                   a["greatest"].get<double>());
+    fmt::print("  hash          {}\n  level   nodes    records      bytes  largest error\n",
                j["content_hash"].get<std::string>());
     for (size_t l = 0; l < j["levels"].size(); ++l) {
         const auto& level = j["levels"][l];
@@ -80,9 +90,35 @@ void printStore(const nlohmann::json& j) {
     }
 }
 
+Result<void> showNearest(const lod::Store& store, const Options& o) {
+    STIPPLE_ASSIGN(const glm::dvec3 place, parseVector(o.at, "--at"));
+    STIPPLE_ASSIGN(const lod::NearestPoint p, lod::findNearest(store, place));
+    const uint32_t c = p.packed.colour;
+    nlohmann::json j = {{"position", vectorJson(p.position)},
+                        {"distance", p.distance},
+                        {"lattice", p.lattice},
+                        {"origin", vectorJson(store.hierarchy.origin)},
+                        {"unit", store.hierarchy.unit},
+                        {"colour", {c & 255u, c >> 8 & 255u, c >> 16 & 255u}}};
+    for (size_t a = 0; a < p.attributes.size(); ++a)
+        j["attributes"][store.description.attributes[a].name] = p.attributes[a];
+    if (o.json) {
+        fmt::print("{}\n", j.dump(2));
+        return {};
+    }
+    fmt::print("{:.15g} {:.15g} {:.15g}, {:.6g} away\n", p.position.x, p.position.y, p.position.z, p.distance);
+    fmt::print("  lattice       {} {} {} steps of {:.6g} from the origin\n", p.lattice[0], p.lattice[1], p.lattice[2],
+               store.hierarchy.unit);
+    fmt::print("  colour        {} {} {}\n", c & 255u, c >> 8 & 255u, c >> 16 & 255u);
+    for (size_t a = 0; a < p.attributes.size(); ++a)
+        fmt::print("  {:13} {:.15g}\n", store.description.attributes[a].name, p.attributes[a]);
+    return {};
+}
+
 Result<void> run(const Options& o) {
     if (std::filesystem::path(o.input).extension() == ".stipple") {
         STIPPLE_ASSIGN(const lod::Store store, lod::openStore(o.input));
+        if (!o.at.empty()) return showNearest(store, o);
         nlohmann::json j = storeInfo(store);
         if (o.verify) {
             const auto executor = makeTbbExecutor(0);
@@ -97,61 +133,8 @@ Result<void> run(const Options& o) {
         if (o.verify) fmt::print("  verified: hashes, counts, order, errors and spheres are right\n");
         return {};
     }
-    STIPPLE_ASSIGN(const lod::PointSource source, lod::openPointSource(o.input));
-    const lod::SourceInfo& i = source.info;
-    nlohmann::json j = {{"kind", "input"},
-                        {"path", i.path},
-                        {"format", i.format},
-                        {"points", i.points},
-                        {"attributes", i.attributes},
-                        {"crs", i.crs},
-                        {"notes", i.notes},
-                        {"has_colour", i.hasColour},
-                        {"has_normals", i.hasNormal},
-                        {"has_radii", i.hasRadius}};
-    if (i.isLattice) {
-        j["scale"] = vectorJson(i.scale);
-        j["offset"] = vectorJson(i.offset);
-    }
-    if (i.hasDeclaredBounds) {
-        j["declared_min"] = vectorJson(i.declaredMin);
-        j["declared_max"] = vectorJson(i.declaredMax);
-    }
-    if (o.verify) {  // read everything: counts and bounds against the header
-        uint64_t points = 0, notFinite = 0;
-        glm::dvec3 lo(1e300), hi(-1e300);
-        lod::PointBlock block;
-        for (;;) {
-            block.clear();
-            STIPPLE_ASSIGN(const size_t count, source.read(block, 65536));
-            if (count == 0) break;
-            points += count;
-            for (glm::dvec3 p : block.position) {
-                if (i.isLattice) p = p * i.scale + i.offset;
-                if (!std::isfinite(p.x + p.y + p.z)) {
-                    ++notFinite;
-                    continue;
-                }
-                lo = glm::min(lo, p);
-                hi = glm::max(hi, p);
-            }
-        }
-        j["points_read"] = points;
-        j["points_not_finite"] = notFinite;
-        if (points > notFinite) {
-            j["min"] = vectorJson(lo);
-            j["max"] = vectorJson(hi);
-        }
-    }
-    if (o.json) {
-        fmt::print("{}\n", j.dump(2));
-        return {};
-    }
-    fmt::print("{}: {}, {} points\n", i.path, i.format, i.points);
-    for (const auto& [key, value] : j.items())
-        if (key != "path" && key != "format" && key != "points" && key != "kind")
-            fmt::print("  {:18} {}\n", key, value.dump());
-    return {};
+    const auto executor = makeTbbExecutor(0);
+    return showInputInfo({o.input, o.verify, o.json, o.skipBad}, *executor);
 }
 
 }  // namespace
@@ -159,8 +142,10 @@ Result<void> run(const Options& o) {
 void setupInfo(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
     CLI::App* sub = app.add_subcommand("info", "what a scene or an input file holds");
-    sub->add_option("SCENE", o->input, "a .stipple scene, or a .ply or .las file")->required();
+    sub->add_option("SCENE", o->input, "a .stipple scene, a .ply, .las or .laz file, or a folder of them")->required();
     sub->add_flag("--verify", o->verify, "read everything and check it");
+    sub->add_option("--at", o->at, "X,Y,Z in file coordinates: the input point of a scene that is nearest to it");
+    sub->add_flag("--skip-bad", o->skipBad, "go on past what is corrupt");
     sub->add_flag("--json", o->json, "as JSON");
     sub->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "apps/stipple/common.h"
+#include "apps/stipple/legend.h"
 #include "engine/base/process.h"
 #include "engine/image/image_io.h"
 #include "engine/reference/reference.h"
@@ -26,6 +27,7 @@ struct Options {
     uint64_t budget = 0;
     bool noWait = false, json = false, quiet = false;
     BuildOptions build;
+    ColourOptions colour;
 };
 
 struct Shot {
@@ -66,12 +68,13 @@ Result<Shot> makeShot(const Options& o, const lod::StoreDescription& d, const gl
     return shot;
 }
 
-Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDescription& d, const Shot& shot) {
+Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDescription& d, const Shot& shot,
+                                           const lod::ColourBy& colour) {
     render::FrameSettings s;
     s.mode = o.mode == "points" ? render::Mode::points : render::Mode::pullpush;
     s.budgets.errorPixels = o.error;
     if (o.budget > 0) s.budgets.records = o.budget;
-    s.draw.lit = o.shade == "lit" || (o.shade == "auto" && !d.hasColour);
+    s.draw.lit = o.shade == "lit" || (o.shade == "auto" && !d.hasColour && colour.mode == lod::ColourMode::own);
     s.draw.worldUp = shot.worldUp;
     STIPPLE_ASSIGN(const glm::dvec3 background, parseVector(o.background, "--background"));
     for (int c = 0; c < 3; ++c) {
@@ -177,9 +180,14 @@ Result<void> run(const Options& o) {
     STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
     if (!(o.error > 0)) return fail(ErrorKind::usage, "must be larger than 0", "--error");
     const auto executor = makeTbbExecutor(o.build.threads);
-    STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store, openScene(o.inputs, o.build, *executor, !o.quiet));
+    STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store, openScene(o.inputs, o.build, o.colour, *executor, !o.quiet));
     STIPPLE_ASSIGN(const Shot shot, makeShot(o, store->description, size));
-    STIPPLE_ASSIGN(const render::FrameSettings settings, makeSettings(o, store->description, shot));
+    STIPPLE_ASSIGN(const lod::ColourBy colour,
+                   lod::parseColourBy(o.colour.what, o.colour.map, o.colour.range, store->description));
+    STIPPLE_ASSIGN(const render::FrameSettings settings, makeSettings(o, store->description, shot, colour));
+    if (o.mode == "reference" && colour.mode != lod::ColourMode::own)
+        return fail(ErrorKind::usage, "traced pictures have the scene's own colours", "--mode reference",
+                    "leave --colour out, or use --device reference");
     if (o.mode == "reference") {
         const double start = nowSeconds();
         reference::TraceSettings trace{static_cast<uint32_t>(o.samples), settings.draw};
@@ -199,11 +207,15 @@ Result<void> run(const Options& o) {
     stream.residentBytes = parseBytes(o.resident);
     if (stream.residentBytes == 0)
         return fail(ErrorKind::usage, "is not a size", "--resident " + o.resident, "e.g. 1G");
-    auto state = render::makeFrameState({store}, *backend, *executor, stream);
+    auto state = render::makeFrameState({store}, *backend, *executor, stream, colour);
+    const Legend legend = o.colour.legend ? makeLegend(colour, store->description) : Legend{};
     Timings timings;
     bool complete = false;
     STIPPLE_TRY(runFrames(o, shot, settings, *state, *executor, timings, complete));
-    if (shot.views.size() == 1) STIPPLE_TRY(image::writeImage(o.output, state->image));
+    if (shot.views.size() == 1) {
+        drawLegend(legend, state->image);
+        STIPPLE_TRY(image::writeImage(o.output, state->image));
+    }
     const FrameCounters& c = state->counters;
     if (!complete && !o.noWait && !o.quiet)
         fmt::print(stderr, "note: {} chunks that this view wants are missing ({}); delivered error {:.2f} px\n",
@@ -281,8 +293,12 @@ void setupRender(CLI::App& app, int& status) {
     sub->add_flag("--no-wait", o->noWait, "do not wait for the complete cut");
     sub->add_flag("--json", o->json, "print measurements as JSON");
     sub->add_flag("--quiet", o->quiet, "no progress");
+    o->colour.addTo(*sub);
     auto* group = sub->add_option_group("building", "for inputs that are not built yet");
     group->add_option("--memory", o->build.memory, "memory that the build may use")->capture_default_str();
+    group->add_option("--attributes", o->build.attributes, "attributes to keep; the one of --colour always is")
+        ->capture_default_str();
+    group->add_flag("--skip-bad", o->build.skipBad, "go on past corrupt chunks and files, and say what was lost");
     group->add_option("--threads", o->build.threads, "threads (0: all cores)")
         ->check(CLI::Range(0, 1024))
         ->capture_default_str();

@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "apps/stipple/common.h"
+#include "apps/stipple/legend.h"
 #include "apps/stipple/navigation.h"
 #include "engine/base/process.h"
 #include "engine/gpu/window.h"
@@ -23,6 +24,7 @@ struct Options {
     uint64_t budget = 2'000'000;
     int frames = 0;
     BuildOptions build;
+    ColourOptions colour;
 };
 
 constexpr std::array<const char*, 5> kDebugNames{"none", "level", "screen-space error", "holes", "normals"};
@@ -52,8 +54,54 @@ void drawOverlay(const render::FrameState& state, const render::FrameSettings& s
     ImGui::Separator();
     ImGui::TextUnformatted(flying ? "fly: W A S D Q E, drag to look, wheel: speed, Shift: faster"
                                   : "orbit: drag, right drag: move, wheel: nearer");
-    ImGui::TextUnformatted("F fly/orbit  M mode  V debug view  L light  [1-9] error  P picture  Tab overlay  Esc quit");
+    ImGui::TextUnformatted("F fly/orbit  M mode  V debug view  L light  C colours  [1-9] error  P picture  Tab overlay  Esc quit");
     ImGui::End();
+}
+
+void drawLegendOverlay(const Legend& legend) {
+    if (legend.entries.empty()) return;
+    ImGui::SetNextWindowPos(ImVec2(10, ImGui::GetIO().DisplaySize.y - 10), ImGuiCond_Always, ImVec2(0, 1));
+    ImGui::SetNextWindowBgAlpha(0.7f);
+    ImGui::Begin("legend", nullptr,
+                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove |
+                     ImGuiWindowFlags_NoNav);
+    ImGui::TextUnformatted(legend.title.c_str());
+    const auto swatch = [](uint32_t rgb, float width, float height) {
+        const ImVec2 at = ImGui::GetCursorScreenPos();
+        ImGui::GetWindowDrawList()->AddRectFilled(at, ImVec2(at.x + width, at.y + height), rgb | 0xff000000u);
+    };
+    if (legend.bar.empty())
+        for (const LegendEntry& e : legend.entries) {
+            swatch(e.rgb, 13, 13);
+            ImGui::Indent(20);
+            ImGui::TextUnformatted(e.label.c_str());
+            ImGui::Unindent(20);
+        }
+    else {
+        const ImVec2 start = ImGui::GetCursorPos();
+        for (size_t j = legend.bar.size(); j-- > 0;) {
+            swatch(legend.bar[j], 13, 1);
+            ImGui::SetCursorPosY(ImGui::GetCursorPosY() + 1);
+        }
+        const float step = static_cast<float>(legend.bar.size()) / static_cast<float>(legend.entries.size() - 1);
+        for (size_t i = 0; i < legend.entries.size(); ++i) {
+            const float up = step * static_cast<float>(legend.entries.size() - 1 - i);
+            ImGui::SetCursorPos(ImVec2(start.x + 20, start.y + up - 7));
+            ImGui::TextUnformatted(legend.entries[i].label.c_str());
+        }
+    }
+    ImGui::End();
+}
+
+/// Own colours, height, normals, then every attribute, and round again.
+lod::ColourBy nextColour(const lod::ColourBy& now, const lod::StoreDescription& d) {
+    std::vector<std::string> names{"auto", "height"};
+    if (d.hasNormals) names.emplace_back("normal");
+    for (const lod::AttributeInfo& a : d.attributes) names.push_back(a.name);
+    size_t at = 0;
+    for (size_t i = 0; i < names.size(); ++i)
+        if (now.mode != lod::ColourMode::own && names[i] == now.title) at = i;
+    return lod::parseColourBy(names[(at + 1) % names.size()], "", "", d).value_or(lod::ColourBy{});
 }
 
 /// What the keys change. True if a picture is asked for.
@@ -80,18 +128,20 @@ Result<void> run(const Options& o) {
         return fail(ErrorKind::device, "there is no display", "stipple view",
                     "use stipple render, or xvfb-run stipple view");
     const auto executor = makeTbbExecutor(o.build.threads);
-    STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store, openScene(o.inputs, o.build, *executor, true));
+    STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store, openScene(o.inputs, o.build, o.colour, *executor, true));
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
     STIPPLE_ASSIGN(const std::unique_ptr<gpu::Window> window,
                    gpu::Window::create("Stipple: " + store->description.source, size.x, size.y,
                                        std::getenv("STIPPLE_VALIDATION") != nullptr));
     streaming::StreamSettings stream;
     stream.residentBytes = std::max<uint64_t>(1, parseBytes(o.resident));
-    auto state = render::makeFrameState({store}, *backend, *executor, stream);
     const lod::StoreDescription& d = store->description;
+    STIPPLE_ASSIGN(lod::ColourBy colour, lod::parseColourBy(o.colour.what, o.colour.map, o.colour.range, d));
+    auto state = render::makeFrameState({store}, *backend, *executor, stream, colour);
+    Legend legend = makeLegend(colour, d);
     render::FrameSettings settings;
     settings.budgets = {o.error, o.budget};
-    settings.draw.lit = o.shade == "lit" || (o.shade == "auto" && !d.hasColour);
+    settings.draw.lit = o.shade == "lit" || (o.shade == "auto" && !d.hasColour && colour.mode == lod::ColourMode::own);
     settings.draw.worldUp = scene::axisVector(d.up);
     const double diagonal = std::max(1e-300, glm::length(d.boundsMax - d.boundsMin));
     Navigation navigation(scene::fitCamera(d.boundsMin, d.boundsMax, d.up, static_cast<double>(size.x) / size.y),
@@ -104,6 +154,13 @@ Result<void> run(const Options& o) {
         if (input.shouldClose) break;
         if (input.width == 0 || input.height == 0) continue;
         const bool picture = applyKeys(input.pressed, settings, navigation, overlay);
+        if (input.pressed.find('C') != std::string::npos) {
+            colour = nextColour(colour, d);
+            legend = makeLegend(colour, d);
+            state.reset();  // gives back what is resident
+            state = render::makeFrameState({store}, *backend, *executor, stream, colour);
+            settings.draw.lit = o.shade == "lit" || (colour.mode == lod::ColourMode::own && !d.hasColour);
+        }
         navigation.move(input);
         const lod::View view = scene::makeView(navigation.camera(), input.width, input.height, 1e-5 * diagonal);
         if (last) {
@@ -117,6 +174,7 @@ Result<void> run(const Options& o) {
             state->image,
             [&] {
                 if (overlay) drawOverlay(*state, settings, backend->passTimes(), input.seconds, navigation.isFlying());
+                if (overlay) drawLegendOverlay(legend);
             },
             wantShot ? &shot : nullptr));
         if (wantShot && !shot.rgba.empty()) {
@@ -153,6 +211,7 @@ void setupView(CLI::App& app, int& status) {
         ->capture_default_str();
     sub->add_option("--frames", o->frames, "close after N frames (0: when the user does)")->capture_default_str();
     sub->add_option("--screenshot", o->screenshot, "with --frames: write what the last frame shows");
+    o->colour.addTo(*sub);
     o->build.addTo(*sub);
     sub->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());

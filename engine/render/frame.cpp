@@ -1,10 +1,13 @@
 #include "engine/render/frame.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <thread>
 
 #include "engine/base/process.h"
+#include "lod/attributes.h"
 
 namespace stipple::render {
 
@@ -32,8 +35,30 @@ std::vector<Pass> passesOf(Mode mode) {
     return {Pass::clear, Pass::project, Pass::resolve, Pass::pull, Pass::push, Pass::shade};
 }
 
+namespace {
+
+/// The last step of a chunk's decoding where it gets other colours than its own.
+streaming::ChunkFinish recolouring(const lod::ColourBy& by, std::shared_ptr<const lod::Store> store) {
+    if (by.mode == lod::ColourMode::own) return {};
+    const auto apply = [by, store](uint32_t node, lod::Chunk& chunk, const uint8_t* bytes, size_t count) -> Result<void> {
+        std::vector<uint8_t> values;
+        if (by.needsAttributes()) {
+            const auto& attributes = store->description.attributes;
+            const uint32_t records = store->hierarchy.nodes[node].records;
+            STIPPLE_ASSIGN(values, lod::decodeAttribute(bytes, count, attributes, by.attribute, records,
+                                                        fmt::format("{}: node {}", store->path, node)));
+        }
+        lod::recolour(by, *store, node, chunk, values);
+        return {};
+    };
+    return {by.needsAttributes(), apply};
+}
+
+}  // namespace
+
 std::unique_ptr<FrameState> makeFrameState(std::vector<std::shared_ptr<const lod::Store>> stores, Backend& backend,
-                                           Executor& executor, const streaming::StreamSettings& settings) {
+                                           Executor& executor, const streaming::StreamSettings& settings,
+                                           const lod::ColourBy& colour) {
     auto state = std::make_unique<FrameState>();
     state->backend = &backend;
     state->streamer = std::make_unique<streaming::Streamer>(executor, backend, settings);
@@ -42,7 +67,8 @@ std::unique_ptr<FrameState> makeFrameState(std::vector<std::shared_ptr<const lod
         instance.hierarchy = static_cast<uint32_t>(state->hierarchies.size());
         state->instances.push_back(instance);
         state->hierarchies.push_back(&store->hierarchy);
-        state->streamer->addInstance(store->hierarchy, streaming::makeFileSource(store->file), store->path);
+        state->streamer->addInstance(store->hierarchy, streaming::makeFileSource(store->file), store->path,
+                                     recolouring(colour, store));
         state->stores.push_back(std::move(store));
     }
     return state;

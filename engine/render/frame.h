@@ -7,6 +7,7 @@
 
 #include "engine/base/counters.h"
 #include "engine/render/backend.h"
+#include "lod/colour.h"
 #include "lod/store.h"
 #include "streaming/streamer.h"
 
@@ -33,9 +34,10 @@ struct FrameState {
     FrameCounters counters;
 };
 
-/// One instance of each store, at its own place.
+/// One instance of each store, at its own place, coloured by `colour`.
 std::unique_ptr<FrameState> makeFrameState(std::vector<std::shared_ptr<const lod::Store>> stores, Backend& backend,
-                                           Executor& executor, const streaming::StreamSettings& settings);
+                                           Executor& executor, const streaming::StreamSettings& settings,
+                                           const lod::ColourBy& colour = {});
 
 /// Draws one frame into state.image and fills state.counters.
 Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSettings& settings);

@@ -4,10 +4,42 @@
 #include <fmt/format.h>
 
 #include "engine/base/process.h"
+#include "lod/attributes.h"
+#include "lod/build/aggregate.h"
 #include "lod/build/cloud.h"
 #include "lod/store.h"
 
 namespace stipple::lod {
+
+namespace {
+
+/// What colour maps are stretched over.
+void describeRanges(const Cloud& cloud, StoreDescription& description) {
+    for (const CloudAttribute& a : cloud.attributes) {
+        AttributeInfo info = a.info;
+        const size_t width = bytesOf(info.type);
+        const ValueRange r = rangeOf(
+            cloud.size(), [&](size_t i) { return attributeValue(info, a.values.data() + i * width); });
+        info.least = r.least;
+        info.greatest = r.greatest;
+        info.low = r.low;
+        info.high = r.high;
+        if (info.aggregate == Aggregate::mode && width == 1) {
+            std::array<uint64_t, 256> counts{};
+            for (const uint8_t v : a.values) ++counts.at(v);
+            for (size_t v = 0; v < counts.size(); ++v)
+                if (counts.at(v) > 0) info.counts.emplace_back(static_cast<double>(v), counts.at(v));
+        }
+        description.attributes.push_back(info);
+    }
+    const int up = static_cast<int>(cloud.up);
+    const std::vector<uint32_t>& axis = up == 0 ? cloud.x : up == 1 ? cloud.y : cloud.z;
+    const ValueRange r = rangeOf(cloud.size(), [&](size_t i) { return cloud.origin[up] + cloud.unit * axis[i]; });
+    description.lowHeight = r.low;
+    description.highHeight = r.high;
+}
+
+}  // namespace
 
 Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std::string& output,
                                const BuildSettings& settings, Executor& executor, Progress& progress) {
@@ -20,7 +52,7 @@ Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std
         last = now;
     };
     STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output));  // an unwritable output is found first
-    STIPPLE_ASSIGN(Cloud cloud, readCloud(inputs, settings, report, progress));
+    STIPPLE_ASSIGN(Cloud cloud, readCloud(inputs, settings, report, executor, progress));
     stage("read");
     const Partition partition = partitionCloud(cloud, settings.leafRecords, executor);
     stage("partition");
@@ -30,7 +62,7 @@ Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std
     StoreDescription description;
     description.up = cloud.up;
     description.crs = cloud.crs;
-    description.attributes = cloud.attributes;
+    description.metresPerUnit = cloud.crs.metresPerUnit;
     description.points = cloud.size();
     for (const Node& node : hierarchy.nodes) description.records += node.records;
     description.roundingUnits = cloud.roundingUnits;
@@ -45,6 +77,7 @@ Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std
     }
     description.boundsMin = cloud.origin + cloud.unit * lo;
     description.boundsMax = cloud.origin + cloud.unit * hi;
+    describeRanges(cloud, description);
     STIPPLE_TRY(writer.finish(hierarchy, description));
     stage("simplify");
     STIPPLE_ASSIGN(const Store store, openStore(writer.temporaryPath()));

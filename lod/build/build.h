@@ -20,11 +20,15 @@ struct BuildSettings {
     bool estimateRadii = true;  ///< where the file has none; false: half the lattice unit is all a point gets
     std::optional<UpAxis> up;   ///< instead of the format's own
     uint32_t leafRecords = 8192;
+    std::vector<std::string> attributes;  ///< kept as named streams
+    bool allAttributes = false;           ///< every attribute of the input, beside `attributes`
+    bool skipBad = false;                 ///< go on past corrupt chunks and files, and count what is lost
 };
 
 struct BuildReport {
     uint64_t pointsIn = 0, pointsOut = 0;
     std::map<std::string, uint64_t> dropped;  ///< reason -> points
+    uint64_t skippedFiles = 0;                ///< inputs that could not be opened (only with skipBad)
     std::vector<std::string> notes;           ///< what was odd about the input
     uint64_t nodes = 0, records = 0, bytesOut = 0, contentHash = 0;
     double seconds = 0;

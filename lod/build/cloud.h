@@ -10,6 +10,12 @@
 
 namespace stipple::lod {
 
+/// One attribute of every point: stored values, bytesOf(info.type) each.
+struct CloudAttribute {
+    AttributeInfo info;
+    std::vector<uint8_t> values;
+};
+
 /// All points on one lattice: world = origin + unit * (x, y, z). Arrays are parallel.
 struct Cloud {
     glm::dvec3 origin{0};
@@ -21,8 +27,9 @@ struct Cloud {
     std::vector<float> radius;     ///< lattice units; 0: to be estimated
     bool hasColour = false, hasNormal = false, hasRadius = false;
     UpAxis up = UpAxis::z;
-    std::string crs, source;
-    std::vector<std::string> attributes;
+    Crs crs;
+    std::string source;
+    std::vector<CloudAttribute> attributes;
     size_t size() const { return x.size(); }
 };
 
@@ -30,7 +37,7 @@ struct Cloud {
 constexpr uint64_t kBuildBytesPerPoint = 96;
 
 Result<Cloud> readCloud(const std::vector<std::string>& inputs, const BuildSettings& settings, BuildReport& report,
-                        Progress& progress);
+                        Executor& executor, Progress& progress);
 
 struct BuildNode {
     uint32_t begin = 0, end = 0;  ///< points, in Morton order

@@ -2,6 +2,7 @@
 // the smallest power of two that holds the cloud, anchored at the lattice origin.
 #include <algorithm>
 #include <bit>
+#include <cstring>
 #include <numeric>
 
 #include "engine/base/check.h"
@@ -52,6 +53,16 @@ void permute(std::vector<T>& values, const std::vector<KeyIndex>& order, Executo
     values.swap(sorted);
 }
 
+void permute(CloudAttribute& attribute, const std::vector<KeyIndex>& order, Executor& executor) {
+    const size_t width = bytesOf(attribute.info.type);
+    std::vector<uint8_t> sorted(attribute.values.size());
+    executor.parallelFor(order.size(), 65536, [&](size_t begin, size_t end) {
+        for (size_t i = begin; i < end; ++i)
+            std::memcpy(sorted.data() + i * width, attribute.values.data() + order[i].index * width, width);
+    });
+    attribute.values.swap(sorted);
+}
+
 }  // namespace
 
 Partition partitionCloud(Cloud& cloud, uint32_t leafRecords, Executor& executor) {
@@ -75,6 +86,7 @@ Partition partitionCloud(Cloud& cloud, uint32_t leafRecords, Executor& executor)
     permute(cloud.colour, order, executor);
     permute(cloud.normal, order, executor);
     permute(cloud.radius, order, executor);
+    for (CloudAttribute& a : cloud.attributes) permute(a, order, executor);
     p.key.resize(order.size());
     for (size_t i = 0; i < order.size(); ++i) p.key[i] = order[i].key;
 

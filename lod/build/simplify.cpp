@@ -17,6 +17,8 @@
 #include <atomic>
 #include <cmath>
 
+#include "lod/attributes.h"
+#include "lod/build/aggregate.h"
 #include "lod/build/cloud.h"
 #include "lod/build/morton.h"
 #include "lod/build/octahedral.h"
@@ -34,6 +36,11 @@ struct Record {
     shared::PointRecord packed{};
     uint8_t parentCode = 0;
     uint32_t code() const { return shared::recordErrorCode(packed); }
+};
+
+/// What is written of one node.
+struct EncodedNode {
+    std::vector<uint8_t> chunk, attributes;
 };
 
 struct Directions {
@@ -134,7 +141,7 @@ class Simplifier {
     }
 
     /// Sorts by parent's code (descending), then Morton order; fills the counts; returns the encoded chunk.
-    std::vector<uint8_t> encode(uint32_t index, std::vector<uint32_t>& parentHistogram,
+    EncodedNode encode(uint32_t index, std::vector<uint32_t>& parentHistogram,
                                 std::vector<uint32_t>& ownHistogram) {
         const BuildNode& node = partition_.nodes[index];
         Node& out = h_.nodes[index];
@@ -156,12 +163,19 @@ class Simplifier {
         }
         chunk.records.resize(count);
         if (hasLowBits) chunk.lowBits.resize(size_t{count} * 3);
+        std::vector<std::vector<uint8_t>> streams;
+        for (const CloudAttribute& a : cloud_.attributes) streams.emplace_back(count * bytesOf(a.info.type));
         for (uint32_t k = 0; k < count; ++k) {
+            const uint32_t i = node.begin + k;
+            const uint32_t at = position[isLeaf ? parentCode_[i] : records_[index][k].parentCode]++;
+            for (size_t a = 0; a < streams.size(); ++a)
+                aggregate(cloud_.attributes[a], isLeaf ? i : records_[index][k].begin,
+                          isLeaf ? i + 1 : records_[index][k].end,
+                          streams[a].data() + at * bytesOf(cloud_.attributes[a].info.type));
             if (!isLeaf) {
-                chunk.records[position[records_[index][k].parentCode]++] = records_[index][k].packed;
+                chunk.records[at] = records_[index][k].packed;
                 continue;
             }
-            const uint32_t i = node.begin + k, at = position[parentCode_[i]]++;
             chunk.records[at] = leafRecord(i, out);
             if (!hasLowBits) continue;
             const uint32_t mask = (1u << out.stepShift) - 1;
@@ -171,7 +185,9 @@ class Simplifier {
         }
         records_[index].clear();
         records_[index].shrink_to_fit();
-        return encodeChunk(chunk);
+        std::vector<AttributeInfo> infos;
+        for (const CloudAttribute& a : cloud_.attributes) infos.push_back(a.info);
+        return {encodeChunk(chunk), encodeAttributes(infos, streams)};
     }
 
   private:
@@ -471,7 +487,7 @@ Result<Hierarchy> simplifyAndWrite(Cloud& cloud, const Partition& partition, Sto
         constexpr uint32_t kBatch = 512;  // encoded chunks held at once
         for (uint32_t batch = 0; batch < count; batch += kBatch) {
             const uint32_t batchCount = std::min(kBatch, count - batch);
-            std::vector<std::vector<uint8_t>> encoded(batchCount);
+            std::vector<EncodedNode> encoded(batchCount);
             executor.parallelFor(batchCount, 1, [&](size_t b, size_t e) {
                 for (size_t k = b; k < e; ++k) {
                     const auto index = static_cast<uint32_t>(first + batch + k);
@@ -479,7 +495,7 @@ Result<Hierarchy> simplifyAndWrite(Cloud& cloud, const Partition& partition, Sto
                 }
             });
             for (uint32_t k = 0; k < batchCount; ++k)
-                STIPPLE_TRY(writer.appendChunk(encoded[k], h.nodes[first + batch + k]));
+                STIPPLE_TRY(writer.appendChunk(encoded[k].chunk, encoded[k].attributes, h.nodes[first + batch + k]));
         }
         progress.update("simplify", levels - static_cast<uint32_t>(below), levels);
     }

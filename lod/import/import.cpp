@@ -1,5 +1,7 @@
 #include "lod/import/import.h"
 
+#include <glob.h>
+
 #include <algorithm>
 #include <array>
 #include <filesystem>
@@ -7,27 +9,119 @@
 #include "engine/base/file.h"
 
 namespace stipple::lod {
+namespace {
 
-Result<PointSource> openPointSource(const std::string& path) {
-    std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored))
-        return fail(ErrorKind::input, "is a directory", path, "name the files in it, e.g. " + path + "/*.las");
-    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
-    if (file.sizeBytes() == 0) return fail(ErrorKind::input, "is empty", path, "is the download complete?");
-    std::array<char, 4> magic{};
-    if (file.sizeBytes() >= magic.size()) STIPPLE_TRY(file.readAt(0, magic.data(), magic.size()));
-    const std::string head(magic.data(), magic.size());
-    if (head.substr(0, 3) == "ply") return openPly(path);
-    if (head == "LASF") return openLas(path);
-    std::string extension = std::filesystem::path(path).extension().string();
+namespace fs = std::filesystem;
+
+std::string lowerExtension(const fs::path& path) {
+    std::string extension = path.extension().string();
     std::transform(extension.begin(), extension.end(), extension.begin(),
                    [](unsigned char c) { return std::tolower(c); });
-    if (extension == ".ply") return openPly(path);
-    if (extension == ".las") return openLas(path);
+    return extension;
+}
+
+bool isPointFile(const fs::path& path) {
+    const std::string extension = lowerExtension(path);
+    return extension == ".las" || extension == ".laz" || extension == ".ply";
+}
+
+/// Every point file below `folder`.
+Result<std::vector<std::string>> filesBelow(const fs::path& folder) {
+    std::vector<std::string> files;
+    std::error_code error;
+    for (auto it = fs::recursive_directory_iterator(folder, fs::directory_options::skip_permission_denied, error);
+         !error && it != fs::recursive_directory_iterator(); it.increment(error))
+        if (it->is_regular_file(error) && isPointFile(it->path())) files.push_back(it->path().string());
+    if (error) return fail(ErrorKind::input, "cannot be listed: " + error.message(), folder.string());
+    if (files.empty())
+        return fail(ErrorKind::input, "holds no .las, .laz or .ply file", folder.string(),
+                    "octrees of other formats (e.g. Potree's octree.bin) are not read");
+    std::sort(files.begin(), files.end());
+    return files;
+}
+
+/// The folder that holds the node files of an octree, given its description file.
+fs::path nodeFolder(const fs::path& description) {
+    const fs::path folder = description.parent_path();
+    for (const char* name : {"ept-data", "data"})
+        if (std::error_code e; fs::is_directory(folder / name, e)) return folder / name;
+    return folder.empty() ? fs::path(".") : folder;
+}
+
+std::vector<std::string> matching(const std::string& pattern) {
+    glob_t found{};
+    std::vector<std::string> files;
+    if (glob(pattern.c_str(), 0, nullptr, &found) == 0) files.assign(found.gl_pathv, found.gl_pathv + found.gl_pathc);
+    globfree(&found);
+    return files;
+}
+
+}  // namespace
+
+Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& inputs) {
+    std::vector<std::string> files;
+    for (const std::string& input : inputs) {
+        std::error_code error;
+        const fs::path path(input);
+        std::vector<std::string> names{input};
+        if (!fs::exists(path, error) && input.find_first_of("*?[") != std::string::npos) {
+            names = matching(input);
+            if (names.empty()) return fail(ErrorKind::input, "matches no file", input, "check the pattern");
+        }
+        for (const std::string& name : names) {
+            const fs::path p(name);
+            const std::string file = p.filename().string();
+            if (fs::is_directory(p, error)) {
+                const bool isOctree = fs::exists(p / "ept.json", error) || fs::exists(p / "cloud.js", error);
+                STIPPLE_ASSIGN(const std::vector<std::string> below, filesBelow(isOctree ? nodeFolder(p / "x") : p));
+                files.insert(files.end(), below.begin(), below.end());
+            } else if ((file == "ept.json" || file == "cloud.js") && fs::exists(p, error)) {
+                STIPPLE_ASSIGN(const std::vector<std::string> below, filesBelow(nodeFolder(p)));
+                files.insert(files.end(), below.begin(), below.end());
+            } else {
+                files.push_back(name);
+            }
+        }
+    }
+    return files;
+}
+
+Result<uint64_t> readPoints(const PointSource& source, const std::function<Result<void>(const PointBlock&)>& take) {
+    constexpr size_t kBlockPoints = 65536;
+    uint64_t points = 0;
+    PointBlock block;
+    for (size_t part = 0; part < source.parts.size(); ++part) {
+        STIPPLE_ASSIGN(const PointReader read, source.openPart(part));
+        for (;;) {
+            block.clear();
+            STIPPLE_ASSIGN(const size_t count, read(block, kBlockPoints));
+            if (count == 0) break;
+            points += count;
+            if (take) STIPPLE_TRY(take(block));
+        }
+    }
+    return points;
+}
+
+Result<PointSource> openPointSource(const std::string& path, const ReadOptions& options) {
+    std::error_code ignored;
+    if (fs::is_directory(path, ignored))
+        return fail(ErrorKind::input, "is a directory", path, "name the files in it, e.g. " + path + "/*.las");
+    std::array<char, 4> magic{};
+    {
+        STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
+        if (file.sizeBytes() == 0) return fail(ErrorKind::input, "is empty", path, "is the download complete?");
+        if (file.sizeBytes() >= magic.size()) STIPPLE_TRY(file.readAt(0, magic.data(), magic.size()));
+    }
+    const std::string head(magic.data(), magic.size());
+    if (head.substr(0, 3) == "ply") return openPly(path, options);
+    if (head == "LASF") return openLas(path, options);
+    const std::string extension = lowerExtension(path);
+    if (extension == ".ply") return openPly(path, options);
+    if (extension == ".las" || extension == ".laz") return openLas(path, options);
     if (head.substr(0, 2) == "\x1f\x8b")
         return fail(ErrorKind::input, "is compressed with gzip", path, "unpack it first: gunzip -k");
-    return fail(ErrorKind::input, "is in a format that this version does not read", path,
-                "it reads .ply and uncompressed .las");
+    return fail(ErrorKind::input, "is in a format that this version does not read", path, "it reads .ply, .las and .laz");
 }
 
 }  // namespace stipple::lod

@@ -1,4 +1,4 @@
-// Readers: one file per format, each a function that opens a file and returns a PointSource.
+// Readers: one file or folder per format, each a function that reads a header and returns a PointSource.
 #pragma once
 
 #include <string>
@@ -7,14 +7,22 @@
 
 namespace stipple::lod {
 
-/// By extension, then by content: .ply, .las. Errors say which formats there are.
-Result<PointSource> openPointSource(const std::string& path);
+/// By content, then by extension: PLY, LAS, LAZ. Errors say which formats there are. The file is closed again: thousands
+/// of sources may be open at once.
+Result<PointSource> openPointSource(const std::string& path, const ReadOptions& options = {});
 
-/// PLY: ascii, binary little and big endian; any property order and type; elements before `vertex` and properties that
-/// are not known are skipped.
-Result<PointSource> openPly(const std::string& path);
+/// PLY: ascii, binary little and big endian; any property order and type; elements before `vertex` and lists are skipped.
+Result<PointSource> openPly(const std::string& path, const ReadOptions& options = {});
 
-/// LAS 1.0 to 1.4 uncompressed, point formats 0 to 10.
-Result<PointSource> openLas(const std::string& path);
+/// LAS 1.0 to 1.5 and LAZ (pointwise, chunked, layered), point formats 0 to 10.
+Result<PointSource> openLas(const std::string& path, const ReadOptions& options = {});
+
+/// Every point of a source in file order, on this thread; `take` is called with each block. Returns their number.
+Result<uint64_t> readPoints(const PointSource& source, const std::function<Result<void>(const PointBlock&)>& take = {});
+
+/// What a person names as input, as files: a file is itself; a folder is every .las, .laz and .ply below it; a pattern
+/// (*, ?, [) is what it matches; the ept.json or cloud.js of a LAZ octree is its node files, whose points together are
+/// the scan. Sorted by name, so that the order does not depend on the file system.
+Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& inputs);
 
 }  // namespace stipple::lod

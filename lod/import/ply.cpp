@@ -21,6 +21,7 @@ enum class Type : uint8_t { i8, u8, i16, u16, i32, u32, f32, f64 };
 constexpr std::array<uint8_t, 8> kTypeBytes{1, 1, 2, 2, 4, 4, 4, 8};
 enum class Role : int8_t { none = -1, x, y, z, nx, ny, nz, red, green, blue, radius };
 constexpr size_t kRoles = 10;
+constexpr size_t kMostAttributes = 64;
 constexpr uint64_t kHeaderLimit = 1 << 20;
 constexpr size_t kBlockBytes = size_t{4} << 20;
 
@@ -29,6 +30,7 @@ struct Property {
     Type type = Type::f32, countType = Type::u8;
     bool isList = false;
     Role role = Role::none;
+    int slot = -1;  ///< of the values that a row gives: by role, then the attributes asked for; -1: not wanted
 };
 struct Element {
     std::string name;
@@ -153,6 +155,7 @@ Result<Header> parseHeader(const InputFile& file) {
             if (!parseType(type, property.type)) return bad(fmt::format("unknown type '{}'", type), line);
             words >> property.name;
             if (!property.isList) property.role = parseRole(property.name);
+            property.slot = static_cast<int>(property.role);
             header.elements.back().properties.push_back(std::move(property));
         } else if (key != "comment" && key != "obj_info" && !key.empty()) {
             return bad(fmt::format("unknown keyword '{}'", key), line);
@@ -224,10 +227,19 @@ double decode(const uint8_t* bytes, Type type, bool swap) {
     return 0;
 }
 
+/// Attributes are kept as f32 where that is exact, as f64 otherwise.
+bool isWide(Type type) { return type == Type::f64 || type == Type::i32 || type == Type::u32; }
+
 class PlyReader {
   public:
-    PlyReader(std::shared_ptr<const InputFile> file, Header header)
-        : file_(file), header_(std::move(header)), cursor_(std::move(file), header_.bytes) {}
+    PlyReader(std::shared_ptr<const InputFile> file, Header header, size_t wanted)
+        : file_(file), header_(std::move(header)), cursor_(std::move(file), header_.bytes), wanted_(wanted) {
+        for (const Element& e : header_.elements)
+            if (e.name == "vertex")
+                for (const Property& p : e.properties)
+                    if (p.slot >= static_cast<int>(kRoles))
+                        attributes_.emplace_back(static_cast<size_t>(p.slot), isWide(p.type));
+    }
 
     Result<size_t> read(PointBlock& block, size_t limit) {
         if (!started_) {
@@ -252,8 +264,9 @@ class PlyReader {
                                                                          : 1.0;
         }
         block.position.reserve(count);
+        block.attributes.resize(wanted_);
         for (size_t i = 0; i < count; ++i) {
-            std::array<double, kRoles> v{};
+            std::array<double, kRoles + kMostAttributes> v{};
             STIPPLE_TRY(readRow(*vertex_, v.data()));
             block.position.emplace_back(v[0], v[1], v[2]);
             if (has[3] && has[4] && has[5])
@@ -265,6 +278,13 @@ class PlyReader {
                 block.colour.push_back(channel(v[6]) | channel(v[7]) << 8 | channel(v[8]) << 16);
             }
             if (has[9]) block.radius.push_back(static_cast<float>(v[9]));
+            for (const auto& [slot, wide] : attributes_) {
+                auto& values = block.attributes[slot - kRoles];
+                const auto narrow = static_cast<float>(v.at(slot));
+                const auto* bytes = wide ? reinterpret_cast<const uint8_t*>(&v.at(slot))
+                                         : reinterpret_cast<const uint8_t*>(&narrow);
+                values.insert(values.end(), bytes, bytes + (wide ? 8 : 4));
+            }
         }
         next_ += count;
         return count;
@@ -302,7 +322,7 @@ class PlyReader {
             }
             STIPPLE_ASSIGN(const uint8_t* bytes, cursor_.peek(size, available));
             if (available < size) return truncated();
-            if (values && p.role != Role::none) values[static_cast<size_t>(p.role)] = decode(bytes, p.type, swap);
+            if (values && p.slot >= 0) values[static_cast<size_t>(p.slot)] = decode(bytes, p.type, swap);
             cursor_.skip(size);
         }
         return {};
@@ -349,8 +369,8 @@ class PlyReader {
                 if (!(value >= 0 && value <= 4294967295.0)) return badNumber(element);
                 for (auto left = static_cast<uint32_t>(value); left > 0; --left)
                     if (!number(value)) return badNumber(element);
-            } else if (values && p.role != Role::none) {
-                values[static_cast<size_t>(p.role)] = value;
+            } else if (values && p.slot >= 0) {
+                values[static_cast<size_t>(p.slot)] = value;
             }
         }
         cursor_.skip(std::min(end + 1, available));
@@ -367,6 +387,8 @@ class PlyReader {
     std::shared_ptr<const InputFile> file_;
     Header header_;
     Cursor cursor_;
+    size_t wanted_;
+    std::vector<std::pair<size_t, bool>> attributes_;  ///< slot, stored as f64
     const Element* vertex_ = nullptr;
     uint64_t next_ = 0;
     bool started_ = false;
@@ -374,19 +396,27 @@ class PlyReader {
 
 }  // namespace
 
-Result<PointSource> openPly(const std::string& path) {
+Result<PointSource> openPly(const std::string& path, const ReadOptions& options) {
     STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
     auto file = std::make_shared<const InputFile>(std::move(opened));
     STIPPLE_ASSIGN(Header header, parseHeader(*file));
-    const auto vertex = std::find_if(header.elements.begin(), header.elements.end(),
+    auto vertex = std::find_if(header.elements.begin(), header.elements.end(),
                                      [](const Element& e) { return e.name == "vertex"; });
     if (vertex == header.elements.end())
         return fail(ErrorKind::input, "has no element 'vertex'", path, "Stipple reads the vertices of a PLY file");
     PointSource source;
     SourceInfo& info = source.info;
     unsigned roles = 0;
-    for (const Property& p : vertex->properties) {
-        info.attributes.push_back(p.name);
+    const size_t wanted = std::min(options.attributes.size(), kMostAttributes);
+    for (Property& p : vertex->properties) {
+        if (!p.isList && p.role == Role::none) {
+            AttributeInfo attribute;
+            attribute.name = p.name;
+            attribute.type = isWide(p.type) ? ScalarType::f64 : ScalarType::f32;
+            info.attributes.push_back(attribute);
+            for (size_t k = 0; k < wanted; ++k)
+                if (options.attributes[k] == p.name) p.slot = static_cast<int>(kRoles + k);
+        }
         if (p.role != Role::none) roles |= 1u << static_cast<unsigned>(p.role);
         if (p.isList) info.notes.push_back(fmt::format("list property '{}' of the vertices is skipped", p.name));
     }
@@ -421,8 +451,13 @@ Result<PointSource> openPly(const std::string& path) {
     info.hasColour = (roles >> 6 & 7u) == 7u;
     info.hasRadius = (roles >> 9 & 1u) != 0;
     info.up = UpAxis::y;
-    auto reader = std::make_shared<PlyReader>(file, std::move(header));
-    source.read = [reader](PointBlock& block, size_t limit) { return reader->read(block, limit); };
+    source.parts = {info.points};
+    source.openPart = [path, header, wanted](size_t) -> Result<PointReader> {
+        STIPPLE_ASSIGN(InputFile again, InputFile::open(path));
+        auto reader =
+            std::make_shared<PlyReader>(std::make_shared<const InputFile>(std::move(again)), header, wanted);
+        return PointReader([reader](PointBlock& block, size_t limit) { return reader->read(block, limit); });
+    };
     return source;
 }
 

@@ -94,18 +94,11 @@ TEST(Las, EveryTruncatedLengthAndEveryHeaderByteIsSurvived) {
     const test::TempFolder folder;
     test::writeLas(folder / "a.las", randomIntegers(5, 1, 100), 0.01, {0, 0, 0});
     const std::string whole = slurp(folder / "a.las");
-    const auto tryFile = [&](const std::string& bytes) -> Result<size_t> {
+    const auto tryFile = [&](const std::string& bytes) -> Result<uint64_t> {
         std::ofstream(folder / "b.las", std::ios::binary) << bytes;
         auto source = openLas(folder / "b.las");
         if (!source) return tl::unexpected(source.error());
-        size_t total = 0;
-        for (;;) {
-            PointBlock block;
-            auto count = source->read(block, 1000);
-            if (!count) return count;
-            if (*count == 0) return total;
-            total += *count;
-        }
+        return readPoints(*source);
     };
     for (size_t length = 0; length < whole.size(); ++length) ASSERT_FALSE(tryFile(whole.substr(0, length))) << length;
     ASSERT_EQ(*tryFile(whole), 5u);
@@ -128,7 +121,13 @@ TEST(Las, AnOffsetOfWholeStepsBetweenFilesStaysExact) {
     const BuildReport report = test::build({folder / "a.las", folder / "b.las"}, folder / "c.stipple", *executor);
     EXPECT_EQ(report.pointsOut, 1000u);
     EXPECT_EQ(openStore(folder / "c.stipple")->description.roundingUnits, 0.0);
-    test::writeLas(folder / "d.las", points, 0.01, {1000.374, 0, 0});
+    // Not whole steps, but whole fifths of a step: a finer lattice holds both.
+    test::writeLas(folder / "f.las", points, 0.01, {1000.374, 0, 0});
+    test::build({folder / "a.las", folder / "f.las"}, folder / "g.stipple", *executor);
+    EXPECT_EQ(openStore(folder / "g.stipple")->description.roundingUnits, 0.0);
+    EXPECT_NEAR(openStore(folder / "g.stipple")->hierarchy.unit, 0.002, 1e-15);
+    // No lattice of a thousandth of a step holds both: rounded, and it says so.
+    test::writeLas(folder / "d.las", points, 0.01, {1000.3741234567, 0, 0});
     test::build({folder / "a.las", folder / "d.las"}, folder / "e.stipple", *executor);
     const double rounding = openStore(folder / "e.stipple")->description.roundingUnits;
     EXPECT_GT(rounding, 0.003);

@@ -15,13 +15,12 @@ Result<std::vector<PointBlock>> readAll(const std::string& path) {
     auto source = openPointSource(path);
     if (!source) return tl::unexpected(source.error());
     std::vector<PointBlock> blocks;
-    for (;;) {
-        PointBlock block;
-        auto count = source->read(block, 1000);
-        if (!count) return tl::unexpected(count.error());
-        if (*count == 0) return blocks;
-        blocks.push_back(std::move(block));
-    }
+    const auto read = readPoints(*source, [&](const PointBlock& block) -> Result<void> {
+        blocks.push_back(block);
+        return {};
+    });
+    if (!read) return tl::unexpected(read.error());
+    return blocks;
 }
 
 void writeText(const std::string& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }

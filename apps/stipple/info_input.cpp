@@ -1,0 +1,265 @@
+#include "apps/stipple/info_input.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "engine/base/file.h"
+#include "lod/import/import.h"
+#include "lod/import/las/header.h"
+#include "lod/import/survey.h"
+
+namespace stipple::app {
+namespace {
+
+/// Files up to this many points are read whole without being asked to.
+constexpr uint64_t kQuickPoints = 20'000'000;
+constexpr size_t kMostProblems = 20;
+
+nlohmann::json vectorJson(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
+
+nlohmann::json attributeJson(const lod::AttributeInfo& a, bool hasRange) {
+    nlohmann::json j = {{"name", a.name},
+                        {"type", lod::kScalarNames.at(static_cast<size_t>(a.type))},
+                        {"aggregate", lod::kAggregateNames.at(static_cast<size_t>(a.aggregate))}};
+    if (a.scale != 1 || a.offset != 0) {
+        j["scale"] = a.scale;
+        j["offset"] = a.offset;
+    }
+    if (!a.description.empty()) j["description"] = a.description;
+    if (hasRange) {
+        j["least"] = a.least;
+        j["greatest"] = a.greatest;
+        for (const auto& [value, count] : a.counts) j["counts"][fmt::format("{:.0f}", value)] = count;
+    }
+    return j;
+}
+
+/// What only LAS and LAZ have.
+Result<void> addLas(const std::string& path, bool skipBad, nlohmann::json& j, std::vector<std::string>& problems,
+                    const lod::Survey* survey) {
+    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
+    const las::Bytes bytes{file.sizeBytes(),
+                           [&](uint64_t at, void* to, size_t count) { return file.readAt(at, to, count); }};
+    STIPPLE_ASSIGN(const las::LasHeader h, las::readLasHeader(bytes, path, skipBad));
+    j["version"] = fmt::format("1.{}", h.minor);
+    j["point_format"] = h.format;
+    j["record_bytes"] = h.recordBytes;
+    j["compressed"] = h.laz.has_value();
+    if (h.laz)
+        for (const las::LazItem& item : h.laz->items)
+            j["laz_items"].push_back({{"type", item.type}, {"bytes", item.bytes}, {"version", item.version}});
+    j["system"] = h.system;
+    j["software"] = h.software;
+    j["created"] = fmt::format("{:04}, day {}", h.year, h.day);
+    j["points_by_return"] = h.pointsByReturn;
+    for (const las::Vlr& v : h.vlrs)
+        j["records"].push_back({{"user", v.user},
+                                {"id", v.id},
+                                {"bytes", v.bytes},
+                                {"extended", v.isExtended},
+                                {"description", v.description}});
+    if (!survey) return {};
+    const auto returns = std::find_if(survey->attributes.begin(), survey->attributes.end(),
+                                      [](const lod::AttributeInfo& a) { return a.name == "return_number"; });
+    std::array<uint64_t, 15> found{};
+    for (const auto& [value, count] : returns->counts)
+        if (value >= 1 && value <= 15) found.at(static_cast<size_t>(value) - 1) = count;
+    for (size_t r = 0; r < found.size(); ++r)
+        if (found.at(r) != h.pointsByReturn.at(r))
+            problems.push_back(fmt::format("the header counts {} points of return {}, the file holds {}",
+                                           h.pointsByReturn.at(r), r + 1, found.at(r)));
+    return {};
+}
+
+void compareBounds(const lod::SourceInfo& i, const lod::Survey& s, std::vector<std::string>& problems) {
+    for (int a = 0; a < 3; ++a) {
+        // Headers are rounded; beyond a step it is a difference.
+        const double slack = 1.001 * i.scale[a];
+        for (const auto& [name, declared, found] : {std::tuple{"least", i.declaredMin[a], s.least[a]},
+                                                    std::tuple{"greatest", i.declaredMax[a], s.greatest[a]}})
+            if (!(std::abs(declared - found) <= slack))
+                problems.push_back(fmt::format("the header gives {} as {} {}, the points {}", declared, name, "xyz"[a], found));
+    }
+}
+
+Result<nlohmann::json> fileInfo(const InputInfoOptions& o, const std::string& path, Executor& executor) {
+    STIPPLE_ASSIGN(lod::PointSource source, lod::openPointSource(path, {{}, o.skipBad}));
+    lod::ReadOptions all{{}, o.skipBad};
+    for (const lod::AttributeInfo& a : source.info.attributes) all.attributes.push_back(a.name);
+    STIPPLE_ASSIGN(source, lod::openPointSource(path, all));
+    const lod::SourceInfo& i = source.info;
+    std::vector<std::string> problems;
+    nlohmann::json j = {{"kind", "input"},
+                        {"path", i.path},
+                        {"format", i.format},
+                        {"points", i.points},
+                        {"crs", i.crs.label()},
+                        {"metres_per_unit", i.crs.metresPerUnit},
+                        {"notes", i.notes},
+                        {"parts", source.parts.size()},
+                        {"has_colour", i.hasColour},
+                        {"has_normals", i.hasNormal},
+                        {"has_radii", i.hasRadius}};
+    if (i.isLattice) {
+        j["scale"] = vectorJson(i.scale);
+        j["offset"] = vectorJson(i.offset);
+    }
+    if (i.hasDeclaredBounds) {
+        j["declared_min"] = vectorJson(i.declaredMin);
+        j["declared_max"] = vectorJson(i.declaredMax);
+    }
+    std::optional<lod::Survey> survey;
+    if (o.verify || i.points <= kQuickPoints) {
+        Progress progress(!o.json);
+        survey = lod::surveySource(source, executor, progress);
+        j["points_read"] = survey->points;
+        j["points_not_finite"] = survey->notFinite;
+        if (survey->points != i.points)
+            problems.push_back(fmt::format("the header declares {} points, {} could be read", i.points, survey->points));
+        for (const std::string& p : survey->problems) problems.push_back(p);
+        if (survey->points > survey->notFinite) {
+            j["min"] = vectorJson(survey->least);
+            j["max"] = vectorJson(survey->greatest);
+            if (i.isLattice) {
+                j["min_integers"] = {survey->leastStep.x, survey->leastStep.y, survey->leastStep.z};
+                j["max_integers"] = {survey->greatestStep.x, survey->greatestStep.y, survey->greatestStep.z};
+            }
+            if (i.hasDeclaredBounds) compareBounds(i, *survey, problems);
+        }
+        if (survey->colourMax > 0) j["colour_bits"] = survey->colourMax > 255 ? 16 : 8;
+    }
+    j["attributes"] = nlohmann::json::array();
+    for (const lod::AttributeInfo& a : survey ? survey->attributes : i.attributes)
+        j["attributes"].push_back(attributeJson(a, survey.has_value()));
+    if (i.format.find("1.") != std::string::npos)
+        STIPPLE_TRY(addLas(path, o.skipBad, j, problems, survey && survey->problems.empty() ? &*survey : nullptr));
+    j["problems"] = problems;
+    return j;
+}
+
+void printVector(const nlohmann::json& j, const char* key, const char* label) {
+    if (!j.contains(key)) return;
+    const auto& v = j[key];
+    fmt::print("  {:15} {:.10g} {:.10g} {:.10g}\n", label, v[0].get<double>(), v[1].get<double>(), v[2].get<double>());
+}
+
+void printAttributes(const nlohmann::json& attributes) {
+    if (attributes.empty()) return;
+    fmt::print("  attributes\n");
+    for (const auto& a : attributes) {
+        std::string range;
+        if (a.contains("least"))
+            range = fmt::format("{:.10g} .. {:.10g}", a["least"].get<double>(), a["greatest"].get<double>());
+        if (a.contains("counts") && a["counts"].size() <= 12) {
+            range.clear();
+            std::vector<std::pair<int, uint64_t>> counts;
+            for (const auto& [value, count] : a["counts"].items()) counts.emplace_back(std::stoi(value), count);
+            std::sort(counts.begin(), counts.end());
+            for (const auto& [value, count] : counts) range += fmt::format("{}{}: {}", range.empty() ? "" : ", ", value, count);
+        }
+        fmt::print("    {:22} {:4} {:5} {}{}\n", a["name"].get<std::string>(), a["type"].get<std::string>(),
+                   a["aggregate"].get<std::string>(), range,
+                   a.contains("description") ? "  (" + a["description"].get<std::string>() + ")" : "");
+    }
+}
+
+void printFile(const nlohmann::json& j) {
+    fmt::print("{}: {}, {} points\n", j["path"].get<std::string>(), j["format"].get<std::string>(),
+               j["points"].get<uint64_t>());
+    printVector(j, "min", "least");
+    printVector(j, "max", "greatest");
+    if (!j.contains("min")) {
+        printVector(j, "declared_min", "least (header)");
+        printVector(j, "declared_max", "greatest (header)");
+    }
+    printVector(j, "scale", "scale");
+    printVector(j, "offset", "offset");
+    const std::string crs = j["crs"].get<std::string>();
+    fmt::print("  {:15} {}\n  {:15} {}\n", "crs", crs.empty() ? "not named" : crs, "metres a unit",
+               j["metres_per_unit"].get<double>());
+    fmt::print("  {:15} {}{}\n", "colour", j["has_colour"].get<bool>() ? "yes" : "no",
+               j.contains("colour_bits") ? fmt::format(", {} bits", j["colour_bits"].get<int>()) : "");
+    if (j.contains("software"))
+        fmt::print("  {:15} {} (system: {}; created {})\n", "software", j["software"].get<std::string>(),
+                   j["system"].get<std::string>(), j["created"].get<std::string>());
+    if (j.value("compressed", false)) fmt::print("  {:15} {}\n", "chunks", j["parts"].get<size_t>());
+    if (j.contains("records"))
+        for (const auto& r : j["records"])
+            fmt::print("  {:15} {} {}, {} bytes {}\n", r["extended"].get<bool>() ? "evlr" : "vlr",
+                       r["user"].get<std::string>(), r["id"].get<int>(), r["bytes"].get<uint64_t>(),
+                       r["description"].get<std::string>());
+    printAttributes(j["attributes"]);
+    for (const auto& n : j["notes"]) fmt::print("  note: {}\n", n.get<std::string>());
+    for (const auto& p : j["problems"]) fmt::print("  problem: {}\n", p.get<std::string>());
+    if (!j.contains("points_read"))
+        fmt::print("  the points themselves were not read: --verify does\n");
+    else if (j["problems"].empty())
+        fmt::print("  all {} points were read; counts and bounds agree with the header\n", j["points_read"].get<uint64_t>());
+}
+
+/// Many files: sums, and the files that differ or fail.
+Result<void> showFolder(const InputInfoOptions& o, const std::vector<std::string>& files, Executor& executor) {
+    nlohmann::json all = {{"kind", "input files"}, {"path", o.input}, {"files", files.size()}};
+    uint64_t points = 0, bad = 0;
+    glm::dvec3 least(1e300), greatest(-1e300);
+    std::map<std::string, uint64_t> formats, systems;
+    std::vector<std::string> problems;
+    InputInfoOptions each = o;
+    each.json = true;
+    for (const std::string& path : files) {
+        const auto j = fileInfo(each, path, executor);
+        if (!j) {
+            ++bad;
+            problems.push_back(j.error().line());
+            continue;
+        }
+        points += (*j)["points"].get<uint64_t>();
+        ++formats[(*j)["format"].get<std::string>()];
+        ++systems[(*j)["crs"].get<std::string>()];
+        for (const auto& p : (*j)["problems"]) problems.push_back(path + ": " + p.get<std::string>());
+        if (!j->contains("min")) continue;
+        for (int a = 0; a < 3; ++a) {
+            least[a] = std::min(least[a], (*j)["min"][static_cast<size_t>(a)].get<double>());
+            greatest[a] = std::max(greatest[a], (*j)["max"][static_cast<size_t>(a)].get<double>());
+        }
+    }
+    all["points"] = points;
+    all["unreadable_files"] = bad;
+    all["formats"] = formats;
+    all["crs"] = systems;
+    all["min"] = vectorJson(least);
+    all["max"] = vectorJson(greatest);
+    all["problems"] = problems;
+    if (o.json) {
+        fmt::print("{}\n", all.dump(2));
+        return {};
+    }
+    fmt::print("{}: {} files, {} points\n", o.input, files.size(), points);
+    printVector(all, "min", "least");
+    printVector(all, "max", "greatest");
+    for (const auto& [format, count] : formats) fmt::print("  {:15} {} files\n", format, count);
+    for (const auto& [crs, count] : systems)
+        fmt::print("  {:15} {} ({} files)\n", "crs", crs.empty() ? "not named" : crs, count);
+    for (size_t i = 0; i < std::min(problems.size(), kMostProblems); ++i) fmt::print("  problem: {}\n", problems[i]);
+    if (problems.size() > kMostProblems) fmt::print("  and {} more (--json lists all)\n", problems.size() - kMostProblems);
+    return {};
+}
+
+}  // namespace
+
+Result<void> showInputInfo(const InputInfoOptions& o, Executor& executor) {
+    STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs({o.input}));
+    if (files.size() != 1) return showFolder(o, files, executor);
+    STIPPLE_ASSIGN(const nlohmann::json j, fileInfo(o, files.front(), executor));
+    if (o.json)
+        fmt::print("{}\n", j.dump(2));
+    else
+        printFile(j);
+    return {};
+}
+
+}  // namespace stipple::app
