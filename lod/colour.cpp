@@ -171,11 +171,12 @@ void recolour(const ColourBy& by, const Store& store, uint32_t index, Chunk& chu
     if (by.mode == ColourMode::normal) {
         for (shared::PointRecord& r : chunk.records) set(r, normalColour(r));
     } else if (by.mode == ColourMode::height) {
-        const int up = static_cast<int>(store.description.up);
-        const double base = h.origin[up] + h.unit * h.recordOrigin(node)[up], step = h.unit * std::exp2(node.stepShift);
+        const glm::dvec3& up = store.description.up;
+        const double base = glm::dot(up, h.origin + h.unit * h.recordOrigin(node));
+        const glm::dvec3 step = up * (h.unit * std::exp2(node.stepShift));
         for (shared::PointRecord& r : chunk.records) {
-            const uint32_t q = up == 0 ? shared::recordX(r) : up == 1 ? shared::recordY(r) : shared::recordZ(r);
-            set(r, colourOf(by, base + step * q));
+            const glm::dvec3 q(shared::recordX(r), shared::recordY(r), shared::recordZ(r));
+            set(r, colourOf(by, base + glm::dot(step, q)));
         }
     } else if (by.mode == ColourMode::attribute) {
         const AttributeInfo& info = store.description.attributes.at(by.attribute);

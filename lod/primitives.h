@@ -13,6 +13,7 @@
 namespace stipple::lod {
 
 enum class UpAxis : uint8_t { x = 0, y = 1, z = 2 };
+inline glm::dvec3 axisVector(UpAxis up) { return {up == UpAxis::x, up == UpAxis::y, up == UpAxis::z}; }
 
 /// How the values of one attribute are stored.
 enum class ScalarType : uint8_t { u8, i8, u16, i16, u32, i32, u64, i64, f32, f64 };
@@ -69,7 +70,7 @@ struct Crs {
     int epsg = 0;      ///< 0: not given
     std::string text;  ///< WKT, or the GeoTIFF citation
     double metresPerUnit = 1;
-    bool isDegrees = false;
+    bool isDegrees = false, isGeocentric = false;
     /// "EPSG:26910 (NAD83 / UTM zone 10N)".
     std::string label() const;
     /// False only if both are named and differ.

@@ -110,7 +110,7 @@ nlohmann::json toJson(const StoreDescription& d) {
                               {"high", a.high},
                               {"counts", a.counts}});
     return {{"metres_per_unit", d.metresPerUnit},
-            {"up", std::string(1, static_cast<char>('x' + static_cast<int>(d.up)))},
+            {"up", {d.up.x, d.up.y, d.up.z}},
             {"crs",
              {{"name", d.crs.name}, {"epsg", d.crs.epsg}, {"text", d.crs.text}, {"is_degrees", d.crs.isDegrees}}},
             {"attributes", attributes},
@@ -121,6 +121,8 @@ nlohmann::json toJson(const StoreDescription& d) {
             {"rounding", d.roundingUnits},
             {"min", {d.boundsMin.x, d.boundsMin.y, d.boundsMin.z}},
             {"max", {d.boundsMax.x, d.boundsMax.y, d.boundsMax.z}},
+            {"focus_min", {d.focusMin.x, d.focusMin.y, d.focusMin.z}},
+            {"focus_max", {d.focusMax.x, d.focusMax.y, d.focusMax.z}},
             {"has_colour", d.hasColour},
             {"has_normals", d.hasNormals},
             {"source", d.source}};
@@ -152,7 +154,6 @@ AttributeInfo attributeFromJson(const nlohmann::json& j) {
 StoreDescription fromJson(const nlohmann::json& j) {
     StoreDescription d;
     d.metresPerUnit = j.at("metres_per_unit").get<double>();
-    d.up = static_cast<UpAxis>(j.at("up").get<std::string>().at(0) - 'x');
     const nlohmann::json& crs = j.at("crs");
     d.crs.name = crs.at("name").get<std::string>();
     d.crs.epsg = crs.at("epsg").get<int>();
@@ -167,6 +168,9 @@ StoreDescription fromJson(const nlohmann::json& j) {
     d.roundingUnits = j.at("rounding").get<double>();
     for (int i = 0; i < 3; ++i) {
         d.boundsMin[i] = j.at("min").at(static_cast<size_t>(i)).get<double>();
+        d.focusMin[i] = j.at("focus_min").at(static_cast<size_t>(i)).get<double>();
+        d.focusMax[i] = j.at("focus_max").at(static_cast<size_t>(i)).get<double>();
+        d.up[i] = j.at("up").at(static_cast<size_t>(i)).get<double>();
         d.boundsMax[i] = j.at("max").at(static_cast<size_t>(i)).get<double>();
     }
     d.hasColour = j.at("has_colour").get<bool>();
@@ -375,8 +379,8 @@ Result<Store> openStore(const std::string& path) {
     } catch (const std::exception& e) {
         return tl::unexpected(damaged(path, fmt::format("the description cannot be read: {}", e.what())));
     }
-    if (static_cast<int>(store.description.up) > 2)
-        return tl::unexpected(damaged(path, "the up axis is none of x, y, z"));
+    if (!(std::abs(glm::length(store.description.up) - 1) < 1e-6))
+        return tl::unexpected(damaged(path, "the up direction has not the length 1"));
     store.contentHash = head.contentHash;
     store.fileBytes = head.fileBytes;
     STIPPLE_TRY(checkNodes(store, head.nodes.offset));

@@ -19,14 +19,15 @@ inline constexpr uint32_t kStoreVersion = 2;
 
 struct StoreDescription {
     double metresPerUnit = 1;
-    UpAxis up = UpAxis::z;
+    glm::dvec3 up{0, 0, 1};  ///< unit length
     Crs crs;
     std::vector<AttributeInfo> attributes;  ///< streams that every chunk has
-    double lowHeight = 0, highHeight = 0;   ///< 2nd and 98th percentile along the up axis, world units
+    double lowHeight = 0, highHeight = 0;   ///< 2nd and 98th percentile of dot(up, position), world units
     uint64_t points = 0;                    ///< leaf records: the points of the input that were kept
     uint64_t records = 0;                   ///< all records, coarse levels included
     double roundingUnits = 0;               ///< largest rounding of a coordinate to the lattice, world units; 0: exact
     glm::dvec3 boundsMin{0}, boundsMax{0};  ///< of the points, world units
+    glm::dvec3 focusMin{0}, focusMax{0};    ///< the same without stray points: what a camera looks at first
     bool hasColour = false;                 ///< the points have colours of their own
     bool hasNormals = false;                ///< from the file or estimated
     std::string source;                     ///< file names of the input, without folders

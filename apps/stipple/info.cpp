@@ -54,7 +54,7 @@ nlohmann::json storeInfo(const lod::Store& store) {
             {"lattice_unit", h.unit},
             {"coordinate_rounding", d.roundingUnits},
             {"metres_per_unit", d.metresPerUnit},
-            {"up", std::string(1, static_cast<char>('x' + static_cast<int>(d.up)))},
+            {"up", vectorJson(d.up)},
             {"crs", d.crs.label()},
             {"attributes", attributes},
             {"has_colour", d.hasColour},
@@ -73,7 +73,7 @@ void printStore(const nlohmann::json& j) {
                j["coordinate_rounding"].get<double>() == 0
                    ? std::string("exact")
                    : fmt::format("rounded by at most {:.3g}", j["coordinate_rounding"].get<double>()));
-    fmt::print("  up            {}\n  colour        {}\n  normals       {}\n", j["up"].get<std::string>(),
+    fmt::print("  up            {}\n  colour        {}\n  normals       {}\n", vec(j["up"]),
                j["has_colour"].get<bool>() ? "yes" : "no", j["has_normals"].get<bool>() ? "yes" : "no");
     if (!j["crs"].get<std::string>().empty()) fmt::print("  crs           {}\n", j["crs"].get<std::string>());
     for (const auto& a : j["attributes"])

@@ -37,11 +37,11 @@ struct Shot {
 
 Result<Shot> makeShot(const Options& o, const lod::StoreDescription& d, const glm::uvec2& size) {
     Shot shot;
-    shot.worldUp = scene::axisVector(d.up);
+    shot.worldUp = d.up;
     const double aspect = static_cast<double>(size.x) / size.y;
     const double nearPlane = std::max(1e-300, 1e-5 * glm::length(d.boundsMax - d.boundsMin));
     if (!o.path.empty() || o.orbit > 0) {
-        scene::CameraPath path = scene::makeOrbit(d.boundsMin, d.boundsMax, d.up, aspect, std::max(1, o.orbit));
+        scene::CameraPath path = scene::makeOrbit(d.focusMin, d.focusMax, d.up, aspect, std::max(1, o.orbit));
         int frames = o.orbit > 0 ? o.orbit : o.frames;
         if (!o.path.empty()) {
             STIPPLE_ASSIGN(path, scene::readCameraPath(o.path));
@@ -53,7 +53,7 @@ Result<Shot> makeShot(const Options& o, const lod::StoreDescription& d, const gl
         }
         return shot;
     }
-    scene::Camera camera = scene::fitCamera(d.boundsMin, d.boundsMax, d.up, aspect);
+    scene::Camera camera = scene::fitCamera(d.focusMin, d.focusMax, d.up, aspect);
     camera.fovDegrees = o.eye.empty() ? camera.fovDegrees : o.fov;
     if (!o.eye.empty()) {
         STIPPLE_ASSIGN(camera.eye, parseVector(o.eye, "--eye"));
@@ -178,8 +178,11 @@ Result<void> runFrames(const Options& o, const Shot& shot, const render::FrameSe
 Result<void> run(const Options& o) {
     STIPPLE_TRY(image::checkImagePath(o.output));
     STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
+    for (const auto& [text, option] : {std::pair{o.eye, "--eye"}, std::pair{o.target, "--target"}, std::pair{o.up, "--up"}})
+        if (!text.empty()) STIPPLE_TRY(parseVector(text, option));
     if (!(o.error > 0)) return fail(ErrorKind::usage, "must be larger than 0", "--error");
     const auto executor = makeTbbExecutor(o.build.threads);
+    STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
     STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store, openScene(o.inputs, o.build, o.colour, *executor, !o.quiet));
     STIPPLE_ASSIGN(const Shot shot, makeShot(o, store->description, size));
     STIPPLE_ASSIGN(const lod::ColourBy colour,
@@ -202,7 +205,6 @@ Result<void> run(const Options& o) {
                                    .dump(2));
         return {};
     }
-    STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
     streaming::StreamSettings stream;
     stream.residentBytes = parseBytes(o.resident);
     if (stream.residentBytes == 0)

@@ -142,9 +142,9 @@ Result<void> run(const Options& o) {
     render::FrameSettings settings;
     settings.budgets = {o.error, o.budget};
     settings.draw.lit = o.shade == "lit" || (o.shade == "auto" && !d.hasColour && colour.mode == lod::ColourMode::own);
-    settings.draw.worldUp = scene::axisVector(d.up);
+    settings.draw.worldUp = d.up;
     const double diagonal = std::max(1e-300, glm::length(d.boundsMax - d.boundsMin));
-    Navigation navigation(scene::fitCamera(d.boundsMin, d.boundsMax, d.up, static_cast<double>(size.x) / size.y),
+    Navigation navigation(scene::fitCamera(d.focusMin, d.focusMax, d.up, static_cast<double>(size.x) / size.y),
                           diagonal);
     bool overlay = true;
     int pictures = 0;

@@ -19,17 +19,21 @@ T catmullRom(const T& a, const T& b, const T& c, const T& d, double s) {
                   (3.0 * b - a - 3.0 * c + d) * (s * s * s));
 }
 
-Camera viewFrom(const glm::dvec3& lo, const glm::dvec3& hi, lod::UpAxis up, double aspect, double azimuth) {
+Camera viewFrom(const glm::dvec3& lo, const glm::dvec3& hi, const glm::dvec3& up, double aspect, double azimuth) {
     Camera camera;
     const glm::dvec3 centre = 0.5 * (lo + hi), half = 0.5 * (hi - lo);
-    camera.up = axisVector(up);
-    // A frame in which `up` is the third axis.
-    const int u = static_cast<int>(up), a = (u + 1) % 3, b = (u + 2) % 3;
-    glm::dvec3 direction(0);
+    camera.up = glm::normalize(up);
+    // A frame in which `up` is the third axis; for an axis, the other two axes.
+    int largest = 2;
+    for (int i = 0; i < 2; ++i)
+        if (std::abs(camera.up[i]) > std::abs(camera.up[largest])) largest = i;
+    glm::dvec3 first(0);
+    first[(largest + 1) % 3] = 1;
+    first = glm::normalize(first - glm::dot(first, camera.up) * camera.up);
+    const glm::dvec3 second = glm::cross(camera.up, first);
     const double elevation = 25 * kPi / 180;
-    direction[a] = std::cos(azimuth) * std::cos(elevation);
-    direction[b] = std::sin(azimuth) * std::cos(elevation);
-    direction[u] = std::sin(elevation);
+    const glm::dvec3 direction = std::cos(elevation) * (std::cos(azimuth) * first + std::sin(azimuth) * second) +
+                                 std::sin(elevation) * camera.up;
     // Far enough that all eight corners are inside the picture.
     const double tanV = std::tan(0.5 * camera.fovDegrees * kPi / 180) * 0.92, tanH = tanV * aspect;
     const glm::dvec3 forward = -direction, right = glm::normalize(glm::cross(forward, camera.up)),
@@ -49,12 +53,6 @@ Camera viewFrom(const glm::dvec3& lo, const glm::dvec3& hi, lod::UpAxis up, doub
 
 }  // namespace
 
-glm::dvec3 axisVector(lod::UpAxis up) {
-    glm::dvec3 v(0);
-    v[static_cast<int>(up)] = 1;
-    return v;
-}
-
 Camera CameraPath::at(double t) const {
     if (keys.size() == 1 || t <= keys.front().t) return keys.front().camera;
     if (t >= keys.back().t) return keys.back().camera;
@@ -71,12 +69,12 @@ Camera CameraPath::at(double t) const {
     return out;
 }
 
-Camera fitCamera(const glm::dvec3& lo, const glm::dvec3& hi, lod::UpAxis up, double aspect) {
+Camera fitCamera(const glm::dvec3& lo, const glm::dvec3& hi, const glm::dvec3& up, double aspect) {
     // y-up files face +z, which is a = z, b = x: 20 degrees off the front. z-up: from the south-west.
-    return viewFrom(lo, hi, up, aspect, up == lod::UpAxis::y ? 20 * kPi / 180 : 235 * kPi / 180);
+    return viewFrom(lo, hi, up, aspect, up.y > 0.9 ? 20 * kPi / 180 : 235 * kPi / 180);
 }
 
-CameraPath makeOrbit(const glm::dvec3& lo, const glm::dvec3& hi, lod::UpAxis up, double aspect, int keys) {
+CameraPath makeOrbit(const glm::dvec3& lo, const glm::dvec3& hi, const glm::dvec3& up, double aspect, int keys) {
     CameraPath path;
     for (int i = 0; i < keys; ++i)
         path.keys.push_back({double(i), viewFrom(lo, hi, up, aspect, (20.0 + 360.0 * i / keys) * kPi / 180)});

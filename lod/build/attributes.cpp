@@ -18,7 +18,7 @@ namespace stipple::lod {
 namespace {
 
 constexpr uint32_t kNeighbours = 12, kCellPoints = 8, kPointsPerNeighbourCell = 24, kLargestClimb = 6;
-constexpr float kRadiusFactor = 0.7f, kLargestRadii = 4.0f;
+constexpr float kRadiusFactor = 0.7f, kLargestRadii = 4.0f, kStrayRadii = 2.0f;
 
 struct Neighbourhood {
     std::vector<float> x, y, z;  ///< relative to the cell's first point, lattice units
@@ -192,6 +192,18 @@ void clampRadii(Cloud& cloud, const BuildNode& leaf) {
     for (uint32_t i = leaf.begin; i < leaf.end; ++i) cloud.radius[i] = std::clamp(cloud.radius[i], 0.5f, limit);
 }
 
+/// Stray points of a scan have their neighbours far away, whole leaves of them: no leaf knows. Against the whole cloud
+/// they show: nothing gets a radius beyond kStrayRadii times what 95 of 100 points stay below.
+void clampStrays(Cloud& cloud) {
+    std::vector<float> sample;
+    const size_t stride = cloud.size() / 65536 + 1;
+    for (size_t i = 0; i < cloud.size(); i += stride) sample.push_back(cloud.radius[i]);
+    const auto at = sample.begin() + static_cast<std::ptrdiff_t>((sample.size() - 1) * 95 / 100);
+    std::nth_element(sample.begin(), at, sample.end());
+    const float limit = std::max(kStrayRadii * *at, 0.5f);
+    for (float& r : cloud.radius) r = std::min(r, limit);
+}
+
 }  // namespace
 
 void estimateAttributes(Cloud& cloud, const Partition& partition, const BuildSettings& settings, Executor& executor,
@@ -209,6 +221,7 @@ void estimateAttributes(Cloud& cloud, const Partition& partition, const BuildSet
         }
         progress.update("attributes", done.load(), cloud.size());
     });
+    if (radii && !cloud.hasRadius) clampStrays(cloud);
 }
 
 }  // namespace stipple::lod

@@ -32,11 +32,33 @@ void describeRanges(const Cloud& cloud, StoreDescription& description) {
         }
         description.attributes.push_back(info);
     }
-    const int up = static_cast<int>(cloud.up);
-    const std::vector<uint32_t>& axis = up == 0 ? cloud.x : up == 1 ? cloud.y : cloud.z;
-    const ValueRange r = rangeOf(cloud.size(), [&](size_t i) { return cloud.origin[up] + cloud.unit * axis[i]; });
+    const glm::dvec3 up = description.up;
+    const ValueRange r = rangeOf(cloud.size(), [&](size_t i) {
+        return glm::dot(up, cloud.origin + cloud.unit * glm::dvec3(cloud.x[i], cloud.y[i], cloud.z[i]));
+    });
     description.lowHeight = r.low;
     description.highHeight = r.high;
+    // Between the 2nd and the 98th percentile lie at least 0.9 of an evenly spread extent; what a tenth more on each side
+    // does not reach is stray.
+    for (int a = 0; a < 3; ++a) {
+        const std::vector<uint32_t>& axis = a == 0 ? cloud.x : a == 1 ? cloud.y : cloud.z;
+        const ValueRange along = rangeOf(cloud.size(), [&](size_t i) { return static_cast<double>(axis[i]); });
+        const double margin = 0.1 * (along.high - along.low);
+        description.focusMin[a] = cloud.origin[a] + cloud.unit * std::max(along.least, along.low - margin);
+        description.focusMax[a] = cloud.origin[a] + cloud.unit * std::min(along.greatest, along.high + margin);
+    }
+}
+
+/// The axis of the format or of the settings; away from the Earth's centre for coordinates that are relative to it.
+glm::dvec3 upOf(const Cloud& cloud, const BuildSettings& settings, const StoreDescription& description) {
+    constexpr double kLeastRadius = 6.33e6, kGreatestRadius = 6.40e6;  // metres, sea floor to mountain tops
+    const glm::dvec3 centre = 0.5 * (description.boundsMin + description.boundsMax);
+    const double radius = glm::length(centre) * description.metresPerUnit;
+    const double extent = glm::length(description.boundsMax - description.boundsMin) * description.metresPerUnit;
+    const bool isGeocentric = radius > kLeastRadius && radius < kGreatestRadius && extent < 1e5 && std::abs(centre.z) > 1e5;
+    if (!settings.up && isGeocentric && !cloud.crs.isDegrees && (cloud.crs.isGeocentric || cloud.crs.label().empty()))
+        return glm::normalize(centre);
+    return axisVector(cloud.up);
 }
 
 }  // namespace
@@ -60,7 +82,6 @@ Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std
     stage("attributes");
     STIPPLE_ASSIGN(const Hierarchy hierarchy, simplifyAndWrite(cloud, partition, writer, executor, progress));
     StoreDescription description;
-    description.up = cloud.up;
     description.crs = cloud.crs;
     description.metresPerUnit = cloud.crs.metresPerUnit;
     description.points = cloud.size();
@@ -77,6 +98,7 @@ Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std
     }
     description.boundsMin = cloud.origin + cloud.unit * lo;
     description.boundsMax = cloud.origin + cloud.unit * hi;
+    description.up = upOf(cloud, settings, description);
     describeRanges(cloud, description);
     STIPPLE_TRY(writer.finish(hierarchy, description));
     stage("simplify");

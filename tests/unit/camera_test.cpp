@@ -16,7 +16,7 @@ TEST(FitCamera, SeesEveryCornerAtAnyPlaceAndShape) {
             std::exp2(rng.uniform(-5, 23)) * glm::dvec3(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1));
         const glm::dvec3 half(std::exp2(rng.uniform(-3, 10)), std::exp2(rng.uniform(-3, 10)),
                               std::exp2(rng.uniform(-3, 10)));
-        const auto up = static_cast<lod::UpAxis>(rng.below(3));
+        const glm::dvec3 up = lod::axisVector(static_cast<lod::UpAxis>(rng.below(3)));
         const lod::View v = makeView(fitCamera(centre - half, centre + half, up, 1.6), 1600, 1000, 1e-3);
         for (int corner = 0; corner < 8; ++corner) {
             const glm::dvec3 p = centre +

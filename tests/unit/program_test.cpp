@@ -80,7 +80,7 @@ TEST(Program, SaysWhatIsWrongInOneLine) {
     std::ofstream(folder / "one.ply") << "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
                                          "y\nproperty float z\nend_header\n1 2 3\n";
     expectOneLine(run(folder, "build missing.ply -o o.stipple"), 3, "missing.ply");
-    expectOneLine(run(folder, "build dir -o o.stipple"), 3, "directory");
+    expectOneLine(run(folder, "build dir -o o.stipple"), 3, "no .las");
     expectOneLine(run(folder, "build empty.ply -o o.stipple"), 3, "empty");
     expectOneLine(run(folder, "build text.las -o o.stipple"), 3, "text.las");
     expectOneLine(run(folder, "build none.ply -o o.stipple"), 3, "no points");

@@ -98,6 +98,7 @@ lod::Crs fromWkt(const std::string& wkt) {
         if (metres > 0 && std::isfinite(metres)) crs.metresPerUnit = metres;
     }
     crs.isDegrees = !isCartesian;
+    crs.isGeocentric = isCartesian && wkt.compare(node, 3, "GEO") == 0;
     return crs;
 }
 
@@ -135,6 +136,7 @@ lod::Crs fromGeoKeys(const std::vector<uint8_t>& keys, const std::string& ascii)
     }
     constexpr int kUserDefined = 32767;
     crs.isDegrees = model == 2;
+    crs.isGeocentric = model == 3;
     crs.epsg = model == 1 || projected != 0 ? projected : geographic;
     if (crs.epsg == kUserDefined) crs.epsg = 0;
     crs.name = !citation.empty() && model != 2 ? citation : !geographicCitation.empty() ? geographicCitation : citation;
