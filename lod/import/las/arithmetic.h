@@ -20,7 +20,9 @@ class SymbolModel {
     bool made() const { return symbols_ != 0; }
     void make(uint32_t symbols) {
         symbols_ = symbols;
-        cells_ = std::bit_ceil(symbols);
+        // A share may reach 2^15 + 63 (what a division by the rounded unit leaves over), which must fall into the one cell
+        // beyond the last.
+        cells_ = std::min(std::bit_ceil(symbols), 512u);
         cellShift_ = 15u - static_cast<uint32_t>(std::countr_zero(cells_));
         memory_.resize(2 * size_t{symbols} + 1 + cells_ + 1);
         reset();

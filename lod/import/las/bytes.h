@@ -20,7 +20,7 @@ struct Bytes {
     /// A view of memory, which must outlive it.
     static Bytes ofMemory(const uint8_t* data, size_t count) {
         return {count, [data](uint64_t offset, void* to, size_t n) -> Result<void> {
-                    std::memcpy(to, data + offset, n);
+                    if (n > 0) std::memcpy(to, data + offset, n);
                     return {};
                 }};
     }
