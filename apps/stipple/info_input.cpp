@@ -1,6 +1,7 @@
 #include "apps/stipple/info_input.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -68,21 +69,19 @@ Result<void> addLas(const std::string& path, bool skipBad, nlohmann::json& j, st
     std::array<uint64_t, 15> found{};
     for (const auto& [value, count] : returns->counts)
         if (value >= 1 && value <= 15) found.at(static_cast<size_t>(value) - 1) = count;
-    for (size_t r = 0; r < found.size(); ++r)
-        if (found.at(r) != h.pointsByReturn.at(r))
-            problems.push_back(fmt::format("the header counts {} points of return {}, the file holds {}",
-                                           h.pointsByReturn.at(r), r + 1, found.at(r)));
+    if (found != h.pointsByReturn)
+        problems.push_back(fmt::format("points by return: the header says {}, the file holds {}",
+                                       fmt::join(h.pointsByReturn, " "), fmt::join(found, " ")));
     return {};
 }
 
+/// A box that is larger than the points is allowed (octrees give each node its cell); points outside it are not.
 void compareBounds(const lod::SourceInfo& i, const lod::Survey& s, std::vector<std::string>& problems) {
     for (int a = 0; a < 3; ++a) {
-        // Headers are rounded; beyond a step it is a difference.
-        const double slack = 1.001 * i.scale[a];
-        for (const auto& [name, declared, found] : {std::tuple{"least", i.declaredMin[a], s.least[a]},
-                                                    std::tuple{"greatest", i.declaredMax[a], s.greatest[a]}})
-            if (!(std::abs(declared - found) <= slack))
-                problems.push_back(fmt::format("the header gives {} as {} {}, the points {}", declared, name, "xyz"[a], found));
+        const double slack = 1.001 * i.scale[a];  // headers are rounded
+        if (!(s.least[a] >= i.declaredMin[a] - slack) || !(s.greatest[a] <= i.declaredMax[a] + slack))
+            problems.push_back(fmt::format("the header's box is {:.10g} .. {:.10g} along {}, the points reach {:.10g} .. {:.10g}",
+                                           i.declaredMin[a], i.declaredMax[a], "xyz"[a], s.least[a], s.greatest[a]));
     }
 }
 

@@ -39,7 +39,7 @@ Result<Shot> makeShot(const Options& o, const lod::StoreDescription& d, const gl
     Shot shot;
     shot.worldUp = d.up;
     const double aspect = static_cast<double>(size.x) / size.y;
-    const double nearPlane = std::max(1e-300, 1e-5 * glm::length(d.boundsMax - d.boundsMin));
+    const double nearPlane = std::max(1e-300, 1e-6 * glm::length(d.boundsMax - d.boundsMin));
     if (!o.path.empty() || o.orbit > 0) {
         scene::CameraPath path = scene::makeOrbit(d.focusMin, d.focusMax, d.up, aspect, std::max(1, o.orbit));
         int frames = o.orbit > 0 ? o.orbit : o.frames;

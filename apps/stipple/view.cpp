@@ -162,7 +162,7 @@ Result<void> run(const Options& o) {
             settings.draw.lit = o.shade == "lit" || (colour.mode == lod::ColourMode::own && !d.hasColour);
         }
         navigation.move(input);
-        const lod::View view = scene::makeView(navigation.camera(), input.width, input.height, 1e-5 * diagonal);
+        const lod::View view = scene::makeView(navigation.camera(), input.width, input.height, 1e-6 * diagonal);
         if (last) {
             STIPPLE_TRY(render::renderUntilComplete(*state, view, settings, *executor));
         } else {

@@ -111,6 +111,30 @@ render::Image renderView(std::shared_ptr<const lod::Store> store, render::Backen
     return std::move(state->image);
 }
 
+std::vector<std::array<int64_t, 3>> leafLattice(const lod::Store& store) {
+    std::vector<std::array<int64_t, 3>> all;
+    for (uint32_t i = 0; i < store.hierarchy.nodes.size(); ++i) {
+        const lod::Node& n = store.hierarchy.nodes[i];
+        if (!n.isLeaf()) continue;
+        const auto chunk = lod::readChunk(store, i, true);
+        if (!chunk) fatal(chunk.error());
+        for (size_t k = 0; k < chunk->records.size(); ++k) {
+            const auto& r = chunk->records[k];
+            const std::array<uint32_t, 3> q{shared::recordX(r), shared::recordY(r), shared::recordZ(r)};
+            std::array<int64_t, 3> p{};
+            for (size_t a = 0; a < 3; ++a) {
+                const int64_t cell = static_cast<int64_t>(n.cell.at(a)) << (store.hierarchy.rootLog2 - n.level);
+                p.at(a) = cell + (n.stepShift >= 0 ? (int64_t{q.at(a)} << n.stepShift) +
+                                                         (chunk->lowBits.empty() ? 0 : chunk->lowBits[3 * k + a])
+                                                   : int64_t{q.at(a)} >> -n.stepShift);
+            }
+            all.push_back(p);
+        }
+    }
+    std::sort(all.begin(), all.end());
+    return all;
+}
+
 lod::View fitView(const lod::Store& store, uint32_t width, uint32_t height) {
     const lod::StoreDescription& d = store.description;
     const scene::Camera camera = scene::fitCamera(d.boundsMin, d.boundsMax, d.up, double(width) / height);

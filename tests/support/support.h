@@ -1,6 +1,7 @@
 // What the tests share: small clouds, builds of them, temporary folders, real data.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
@@ -47,6 +48,9 @@ lod::BuildReport build(const std::vector<std::string>& inputs, const std::string
 /// Builds and opens; leafRecords small, so that few points make a deep tree.
 std::shared_ptr<const lod::Store> buildAndOpen(const std::string& input, const std::string& output, Executor& executor,
                                                uint32_t leafRecords = 512);
+
+/// Lattice coordinates of all leaf records of a store, low bits included, sorted.
+std::vector<std::array<int64_t, 3>> leafLattice(const lod::Store& store);
 
 /// A complete frame.
 render::Image renderView(std::shared_ptr<const lod::Store> store, render::Backend& backend, Executor& executor,

@@ -24,31 +24,6 @@ std::vector<glm::ivec3> randomIntegers(size_t count, uint64_t seed, int extent) 
     return points;
 }
 
-/// Lattice coordinates of all leaf records of a store, low bits included, sorted.
-std::vector<std::array<int64_t, 3>> leafLattice(const Store& store) {
-    std::vector<std::array<int64_t, 3>> all;
-    for (uint32_t i = 0; i < store.hierarchy.nodes.size(); ++i) {
-        const Node& n = store.hierarchy.nodes[i];
-        if (!n.isLeaf()) continue;
-        const auto chunk = readChunk(store, i, true);
-        if (!chunk) ADD_FAILURE() << chunk.error().line();
-        for (size_t k = 0; k < chunk->records.size(); ++k) {
-            const auto& r = chunk->records[k];
-            const std::array<uint32_t, 3> q{shared::recordX(r), shared::recordY(r), shared::recordZ(r)};
-            std::array<int64_t, 3> p{};
-            for (size_t a = 0; a < 3; ++a) {
-                const int64_t cell = static_cast<int64_t>(n.cell.at(a)) << (store.hierarchy.rootLog2 - n.level);
-                p.at(a) = cell + (n.stepShift >= 0 ? (int64_t{q.at(a)} << n.stepShift) +
-                                                         (chunk->lowBits.empty() ? 0 : chunk->lowBits[3 * k + a])
-                                                   : int64_t{q.at(a)} >> -n.stepShift);
-            }
-            all.push_back(p);
-        }
-    }
-    std::sort(all.begin(), all.end());
-    return all;
-}
-
 TEST(Las, ScannerIntegersComeBackExactlyAtAnyExtent) {
     const auto executor = makeSerialExecutor();
     for (const int extent : {7, 1000, 200'000, 2'000'000'000}) {
@@ -64,7 +39,7 @@ TEST(Las, ScannerIntegersComeBackExactlyAtAnyExtent) {
         for (const glm::ivec3& p : points)
             expected.push_back({int64_t{p.x} - lo.x, int64_t{p.y} - lo.y, int64_t{p.z} - lo.z});
         std::sort(expected.begin(), expected.end());
-        EXPECT_EQ(leafLattice(*store), expected) << "extent " << extent;
+        EXPECT_EQ(test::leafLattice(*store), expected) << "extent " << extent;
     }
 }
 

@@ -151,9 +151,7 @@ Result<bool> findParts(const las::Bytes& bytes, LasFile& file, bool tolerant) {
             return tl::unexpected(table.error());
         }
         h.notes.push_back(table.error().what);
-        table->clear();
-    }
-    if (!table->empty()) {
+    } else if (!table->empty()) {
         file.chunks = std::move(*table);
         return true;
     }

@@ -1,0 +1,122 @@
+// Files that lie: never a crash, and never more memory than the file justifies. This program counts what is allocated.
+#include <gtest/gtest.h>
+#include <malloc.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <new>
+
+#include "lod/import/import.h"
+#include "tests/support/laz_encoder.h"
+#include "tests/support/support.h"
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kCounts = false;  // the sanitizer has its own allocator
+#else
+constexpr bool kCounts = true;
+std::atomic<size_t> live{0}, peak{0};
+
+void* operator new(size_t bytes) {
+    void* p = std::malloc(bytes);
+    if (!p) throw std::bad_alloc();
+    const size_t now = live += malloc_usable_size(p);
+    size_t before = peak;
+    while (now > before && !peak.compare_exchange_weak(before, now)) {
+    }
+    return p;
+}
+void operator delete(void* p) noexcept {
+    if (p) live -= malloc_usable_size(p);
+    std::free(p);
+}
+void operator delete(void* p, size_t) noexcept { operator delete(p); }
+#endif
+
+namespace stipple::lod {
+namespace {
+
+/// What opening and reading a file allocates at its peak.
+size_t memoryToRead(const std::string& path, bool skipBad) {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    peak = live.load();
+    const size_t before = live;
+#endif
+    ReadOptions options;
+    options.attributes = {"intensity", "gps_time", "classification"};
+    options.skipBad = skipBad;
+    if (const auto source = openPointSource(path, options)) {
+        const auto read = readPoints(*source);
+        if (!read) EXPECT_EQ(read.error().line().find('\n'), std::string::npos) << path;
+    } else {
+        EXPECT_EQ(source.error().line().find('\n'), std::string::npos) << path;
+    }
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    return peak - before;
+#else
+    return 0;
+#endif
+}
+
+void expectModest(const std::string& path) {
+    const size_t allowed = std::max<size_t>(size_t{16} << 20, 2 * std::filesystem::file_size(path));
+    for (const bool skipBad : {false, true}) EXPECT_LE(memoryToRead(path, skipBad), allowed) << path;
+}
+
+TEST(Hostile, EveryBrokenFileOfTheDataFolderIsSurvivedWithModestMemory) {
+    const std::string root = test::dataFile("09_hostile");
+    if (root.empty()) return;
+    size_t files = 0;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(root)) {
+        const std::string extension = entry.path().extension();
+        if (extension != ".las" && extension != ".laz" && extension != ".ply") continue;
+        expectModest(entry.path());
+        ++files;
+    }
+    EXPECT_GT(files, 50u);
+}
+
+TEST(Hostile, ChangedHeadersOfEveryFormatAreSurvivedWithModestMemory) {
+    const test::TempFolder folder;
+    Rng rng(11);
+    for (unsigned format = 0; format <= 10; ++format)
+        for (const bool compressed : {false, true}) {
+            test::LazSpec spec;
+            spec.format = format;
+            spec.version = format > 5 ? 3 : 2;
+            spec.extraBytes = 2;
+            spec.chunkPoints = 20;
+            const auto file = test::encodeLas(spec, test::makeRecords(spec, 60, rng), compressed, rng);
+            for (int k = 0; k < 150; ++k) {
+                auto changed = file;
+                for (uint64_t n = 1 + rng.below(3); n > 0; --n) {
+                    // The fields that sizes hang on, and anything.
+                    static constexpr std::array<size_t, 12> fields{94, 96, 100, 104, 105, 107, 235, 243, 247, 131, 155, 375};
+                    const size_t at = rng.below(2) == 0 ? fields.at(rng.below(fields.size())) + rng.below(8)
+                                                        : rng.below(changed.size());
+                    if (at < changed.size())
+                        changed[at] = rng.below(3) == 0 ? uint8_t{0xff} : static_cast<uint8_t>(rng.next());
+                }
+                if (k % 5 == 0) changed.resize(rng.below(changed.size()));
+                std::ofstream(folder / "a.laz", std::ios::binary)
+                    .write(reinterpret_cast<const char*>(changed.data()), static_cast<std::streamsize>(changed.size()));
+                expectModest(folder / "a.laz");
+            }
+        }
+}
+
+TEST(Hostile, TheCountingWorks) {
+    if (!kCounts) return;
+    const test::TempFolder folder;
+    Rng rng(1);
+    test::LazSpec spec;
+    spec.chunkPoints = 60'000;
+    const auto file = test::encodeLas(spec, test::makeRecords(spec, 60'000, rng), true, rng);
+    std::ofstream(folder / "a.laz", std::ios::binary)
+        .write(reinterpret_cast<const char*>(file.data()), static_cast<std::streamsize>(file.size()));
+    EXPECT_GT(memoryToRead(folder / "a.laz", false), 60'000u * 26) << "the records of one block at least";
+}
+
+}  // namespace
+}  // namespace stipple::lod
