@@ -5,16 +5,19 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 say() { printf '%s\n' "$*" >&2; }
 
+# install_packages [full]: without `full`, what follows the mark "only ./test --full" is left out.
 install_packages() {
     local wanted missing=()
-    wanted=$(grep -v '^#' .ci/packages.txt)
+    wanted=$(if [ "${1:-}" = full ]; then cat .ci/packages.txt; else sed '/^# only .\/test --full/,$d' .ci/packages.txt; fi |
+        grep -v '^#')
     if ! command -v dpkg-query >/dev/null; then
         say "This is not a Debian system. Stipple needs these packages (names as in Debian 12):"
         say "$(printf '%s ' $wanted)"
         return 0
     fi
     for package in $wanted; do
-        dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing+=("$package")
+        dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' && continue
+        command -v "$package" >/dev/null || missing+=("$package")  # a tool that came some other way will do
     done
     [ ${#missing[@]} -eq 0 ] && return 0
     local as_root=()

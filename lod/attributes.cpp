@@ -14,16 +14,26 @@ namespace {
 template <typename F>
 auto withType(ScalarType type, F f) {
     switch (type) {
-        case ScalarType::u8: return f(uint8_t{});
-        case ScalarType::i8: return f(int8_t{});
-        case ScalarType::u16: return f(uint16_t{});
-        case ScalarType::i16: return f(int16_t{});
-        case ScalarType::u32: return f(uint32_t{});
-        case ScalarType::i32: return f(int32_t{});
-        case ScalarType::u64: return f(uint64_t{});
-        case ScalarType::i64: return f(int64_t{});
-        case ScalarType::f32: return f(float{});
-        case ScalarType::f64: break;
+        case ScalarType::u8:
+            return f(uint8_t{});
+        case ScalarType::i8:
+            return f(int8_t{});
+        case ScalarType::u16:
+            return f(uint16_t{});
+        case ScalarType::i16:
+            return f(int16_t{});
+        case ScalarType::u32:
+            return f(uint32_t{});
+        case ScalarType::i32:
+            return f(int32_t{});
+        case ScalarType::u64:
+            return f(uint64_t{});
+        case ScalarType::i64:
+            return f(int64_t{});
+        case ScalarType::f32:
+            return f(float{});
+        case ScalarType::f64:
+            break;
     }
     return f(double{});
 }
@@ -71,11 +81,12 @@ std::vector<uint8_t> encodeAttributes(const std::vector<AttributeInfo>& infos,
     return out;
 }
 
-Result<std::vector<uint8_t>> decodeAttribute(const uint8_t* bytes, size_t count, const std::vector<AttributeInfo>& infos,
-                                             size_t index, uint32_t records, const std::string& where) {
+Result<std::vector<uint8_t>> decodeAttribute(const uint8_t* bytes, size_t count,
+                                             const std::vector<AttributeInfo>& infos, size_t index, uint32_t records,
+                                             const std::string& where) {
     const auto damaged = [&] {
-        return fail(ErrorKind::input, fmt::format("the stream of attribute '{}' is damaged", infos.at(index).name), where,
-                    "build the store again");
+        return fail(ErrorKind::input, fmt::format("the stream of attribute '{}' is damaged", infos.at(index).name),
+                    where, "build the store again");
     };
     size_t at = infos.size() * 4;
     if (count < at) return damaged();

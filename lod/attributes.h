@@ -20,7 +20,8 @@ std::vector<uint8_t> encodeAttributes(const std::vector<AttributeInfo>& infos,
                                       const std::vector<std::vector<uint8_t>>& streams);
 
 /// The stream of attribute `index`. `where` names the place in errors.
-Result<std::vector<uint8_t>> decodeAttribute(const uint8_t* bytes, size_t count, const std::vector<AttributeInfo>& infos,
-                                             size_t index, uint32_t records, const std::string& where);
+Result<std::vector<uint8_t>> decodeAttribute(const uint8_t* bytes, size_t count,
+                                             const std::vector<AttributeInfo>& infos, size_t index, uint32_t records,
+                                             const std::string& where);
 
 }  // namespace stipple::lod

@@ -11,15 +11,16 @@
 namespace stipple::lod {
 namespace {
 
-/// Colour maps as evenly spaced colours, 0xRRGGBB, between which sRGB values are interpolated. Viridis and magma: van der
-/// Walt and Smith 2015; turbo: Mikhailov 2019.
+/// Colour maps as evenly spaced colours, 0xRRGGBB, between which sRGB values are interpolated. Viridis and magma: van
+/// der Walt and Smith 2015; turbo: Mikhailov 2019.
 constexpr std::array<uint32_t, 2> kGrey{0x101010, 0xf0f0f0};
 constexpr std::array<uint32_t, 10> kViridis{0x440154, 0x482878, 0x3e4989, 0x31688e, 0x26828e,
                                             0x1f9e89, 0x35b779, 0x6ece58, 0xb5de2b, 0xfde725};
 constexpr std::array<uint32_t, 10> kMagma{0x000004, 0x180f3d, 0x440f76, 0x721f81, 0x9e2f7f,
                                           0xcd4071, 0xf1605d, 0xfd9668, 0xfeca8d, 0xfcfdbf};
-constexpr std::array<uint32_t, 15> kTurbo{0x30123b, 0x4145ab, 0x4675ed, 0x39a2fc, 0x1bcfd4, 0x24eca6, 0x61fc6c, 0xa4fc3b,
-                                          0xd1e834, 0xf3c63a, 0xfe9b2d, 0xf36315, 0xd93806, 0xb11901, 0x7a0403};
+constexpr std::array<uint32_t, 15> kTurbo{0x30123b, 0x4145ab, 0x4675ed, 0x39a2fc, 0x1bcfd4,
+                                          0x24eca6, 0x61fc6c, 0xa4fc3b, 0xd1e834, 0xf3c63a,
+                                          0xfe9b2d, 0xf36315, 0xd93806, 0xb11901, 0x7a0403};
 
 struct AsprsClass {
     const char* name;
@@ -106,8 +107,8 @@ Result<ColourBy> parseColourBy(const std::string& what, const std::string& map, 
     } else {
         const std::string name = attributeBehind(what);
         const auto& attributes = description.attributes;
-        const auto found = std::find_if(attributes.begin(), attributes.end(),
-                                        [&](const AttributeInfo& a) { return a.name == name; });
+        const auto found =
+            std::find_if(attributes.begin(), attributes.end(), [&](const AttributeInfo& a) { return a.name == name; });
         if (found == attributes.end()) {
             std::string known = "rgb, height, normal";
             for (const AttributeInfo& a : attributes) known += ", " + a.name;
@@ -150,10 +151,14 @@ uint32_t colourOf(const ColourBy& by, double value) {
     }
     const double t = (value - by.low) / (by.high - by.low);
     switch (by.map) {
-        case ColourMap::grey: return interpolate(kGrey, t);
-        case ColourMap::magma: return interpolate(kMagma, t);
-        case ColourMap::turbo: return interpolate(kTurbo, t);
-        case ColourMap::viridis: break;
+        case ColourMap::grey:
+            return interpolate(kGrey, t);
+        case ColourMap::magma:
+            return interpolate(kMagma, t);
+        case ColourMap::turbo:
+            return interpolate(kTurbo, t);
+        case ColourMap::viridis:
+            break;
     }
     return interpolate(kViridis, t);
 }
@@ -164,7 +169,8 @@ std::string categoryName(const ColourBy& by, double value) {
     return fmt::format("{:.0f}", value);
 }
 
-void recolour(const ColourBy& by, const Store& store, uint32_t index, Chunk& chunk, const std::vector<uint8_t>& values) {
+void recolour(const ColourBy& by, const Store& store, uint32_t index, Chunk& chunk,
+              const std::vector<uint8_t>& values) {
     const Hierarchy& h = store.hierarchy;
     const Node& node = h.nodes[index];
     const auto set = [](shared::PointRecord& r, uint32_t rgb) { r.colour = (r.colour & 0xff000000u) | rgb; };

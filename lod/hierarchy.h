@@ -45,7 +45,7 @@ struct Node {
     uint32_t chunkBytes = 0;  ///< compressed
     uint64_t chunkOffset = 0, chunkHash = 0;
     uint64_t attributeHash = 0;
-    uint32_t attributeBytes = 0;  ///< the attribute streams follow the chunk
+    uint32_t attributeBytes = 0;     ///< the attribute streams follow the chunk
     std::array<uint32_t, 3> cell{};  ///< index of the node's cell at its level
     uint8_t level = 0, childMask = 0;
     uint8_t errorCode = 0;  ///< largest own error among the records

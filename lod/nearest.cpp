@@ -47,7 +47,8 @@ Result<NearestPoint> findNearest(const Store& store, const glm::dvec3& place) {
             glm::dvec3 p(0);
             for (size_t a = 0; a < 3; ++a) {
                 const uint64_t low = chunk.lowBits.empty() ? 0 : chunk.lowBits[size_t{i} * 3 + a];
-                const uint64_t local = node.stepShift >= 0 ? q.at(a) << node.stepShift | low : q.at(a) >> -node.stepShift;
+                const uint64_t local =
+                    node.stepShift >= 0 ? q.at(a) << node.stepShift | low : q.at(a) >> -node.stepShift;
                 lattice.at(a) = node.cell.at(a) * size + local;
                 p[static_cast<int>(a)] = static_cast<double>(lattice.at(a));
             }

@@ -94,7 +94,7 @@ struct SourceInfo {
 
 struct ReadOptions {
     std::vector<std::string> attributes;  ///< names of what is wanted beside position, colour and normal
-    bool skipBad = false;  ///< go on past what is corrupt; the caller counts what is lost
+    bool skipBad = false;                 ///< go on past what is corrupt; the caller counts what is lost
 };
 
 /// Appends up to `limit` points to a cleared block and returns how many; 0 is the end.

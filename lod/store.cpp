@@ -18,7 +18,7 @@ static_assert(std::endian::native == std::endian::little, "the store is little-e
 
 constexpr uint64_t kMagic = 0x31454c5050495453ull;      // "STIPPLE1"
 constexpr uint64_t kFootMagic = 0x444e45454c505053ull;  // "SPPLEEND"
-constexpr uint64_t kSizeLimit = uint64_t{1} << 40;  // of an uncompressed table
+constexpr uint64_t kSizeLimit = uint64_t{1} << 40;      // of an uncompressed table
 
 struct Section {
     uint64_t offset, bytes, rawBytes, hash;
@@ -109,23 +109,23 @@ nlohmann::json toJson(const StoreDescription& d) {
                               {"low", a.low},
                               {"high", a.high},
                               {"counts", a.counts}});
-    return {{"metres_per_unit", d.metresPerUnit},
-            {"up", {d.up.x, d.up.y, d.up.z}},
-            {"crs",
-             {{"name", d.crs.name}, {"epsg", d.crs.epsg}, {"text", d.crs.text}, {"is_degrees", d.crs.isDegrees}}},
-            {"attributes", attributes},
-            {"low_height", d.lowHeight},
-            {"high_height", d.highHeight},
-            {"points", d.points},
-            {"records", d.records},
-            {"rounding", d.roundingUnits},
-            {"min", {d.boundsMin.x, d.boundsMin.y, d.boundsMin.z}},
-            {"max", {d.boundsMax.x, d.boundsMax.y, d.boundsMax.z}},
-            {"focus_min", {d.focusMin.x, d.focusMin.y, d.focusMin.z}},
-            {"focus_max", {d.focusMax.x, d.focusMax.y, d.focusMax.z}},
-            {"has_colour", d.hasColour},
-            {"has_normals", d.hasNormals},
-            {"source", d.source}};
+    return {
+        {"metres_per_unit", d.metresPerUnit},
+        {"up", {d.up.x, d.up.y, d.up.z}},
+        {"crs", {{"name", d.crs.name}, {"epsg", d.crs.epsg}, {"text", d.crs.text}, {"is_degrees", d.crs.isDegrees}}},
+        {"attributes", attributes},
+        {"low_height", d.lowHeight},
+        {"high_height", d.highHeight},
+        {"points", d.points},
+        {"records", d.records},
+        {"rounding", d.roundingUnits},
+        {"min", {d.boundsMin.x, d.boundsMin.y, d.boundsMin.z}},
+        {"max", {d.boundsMax.x, d.boundsMax.y, d.boundsMax.z}},
+        {"focus_min", {d.focusMin.x, d.focusMin.y, d.focusMin.z}},
+        {"focus_max", {d.focusMax.x, d.focusMax.y, d.focusMax.z}},
+        {"has_colour", d.hasColour},
+        {"has_normals", d.hasNormals},
+        {"source", d.source}};
 }
 
 template <size_t N>
@@ -312,8 +312,8 @@ Result<Store> openStore(const std::string& path) {
                     "build one with: stipple build INPUT -o SCENE.stipple");
     if (head.version != kStoreVersion)
         return fail(ErrorKind::input,
-                    fmt::format("has store version {}; this program reads version {}", head.version, kStoreVersion), path,
-                    "build it again with this program");
+                    fmt::format("has store version {}; this program reads version {}", head.version, kStoreVersion),
+                    path, "build it again with this program");
     if (head.hash != hashBytes(&head, offsetof(Head, hash)))
         return tl::unexpected(damaged(path, "the head is damaged"));
     if (head.fileBytes != file.sizeBytes())

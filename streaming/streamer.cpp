@@ -69,8 +69,8 @@ Streamer::~Streamer() {
             if (sources_[i].nodes[n].state == ChunkState::resident) sink_.evict({i, n});
 }
 
-void Streamer::addInstance(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source,
-                           std::string name, ChunkFinish finish) {
+void Streamer::addInstance(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source, std::string name,
+                           ChunkFinish finish) {
     sources_.push_back({&hierarchy, std::move(source), std::move(name),
                         std::make_shared<const ChunkFinish>(std::move(finish)),
                         std::vector<NodeState>(hierarchy.nodes.size())});
@@ -179,7 +179,9 @@ void Streamer::request(const lod::Cut& cut) {
         ++counters_.requests;
         const std::string where = fmt::format("{}: chunk of node {}", source.name, w.node);
         executor_.run([key, where, bytes = source.bytes, node = source.hierarchy->nodes[w.node], finish = source.finish,
-                       queue = completed_] { queue->push({key, fetch(*bytes, node, key.node, *finish, where)}); });
+                       queue = completed_] {
+            queue->push({key, fetch(*bytes, node, key.node, *finish, where)});
+        });
     }
 }
 

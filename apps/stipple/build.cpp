@@ -54,7 +54,9 @@ Result<void> run(const Options& o) {
 void setupBuild(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
     CLI::App* sub = app.add_subcommand("build", "build the hierarchy of one or more scans (.ply, .las, .laz)");
-    sub->add_option("INPUT", o->inputs, "scans that together make the scene: files, folders, patterns, ept.json, cloud.js")->required();
+    sub->add_option("INPUT", o->inputs,
+                    "scans that together make the scene: files, folders, patterns, ept.json, cloud.js")
+        ->required();
     sub->add_option("-o,--output", o->output, "the scene to write (.stipple)")->required();
     o->build.addTo(*sub);
     sub->add_flag("--json", o->json, "print the report as JSON");

@@ -44,7 +44,8 @@ void BuildOptions::addTo(CLI::App& app) {
 }
 
 void ColourOptions::addTo(CLI::App& app) {
-    app.add_option("--colour,--color", what, "rgb, intensity, class, return, height, normal or the name of an attribute")
+    app.add_option("--colour,--color", what,
+                   "rgb, intensity, class, return, height, normal or the name of an attribute")
         ->capture_default_str();
     app.add_option("--colour-map,--color-map", map, "grey, viridis, magma or turbo");
     app.add_option("--colour-range,--color-range", range, "LOW,HIGH (default: 2nd to 98th percentile)");
@@ -122,8 +123,7 @@ Result<std::shared_ptr<const lod::Store>> openScene(const std::vector<std::strin
         if (!fs::exists(path)) {
             if (showProgress) fmt::print(stderr, "building {} into the cache: {}\n", inputs.front(), path);
             Progress progress(showProgress);
-            STIPPLE_ASSIGN(const lod::BuildReport built,
-                           lod::buildStore(inputs, path, settings, executor, progress));
+            STIPPLE_ASSIGN(const lod::BuildReport built, lod::buildStore(inputs, path, settings, executor, progress));
             for (const std::string& note : built.notes)
                 if (showProgress) fmt::print(stderr, "note: {}\n", note);
         }

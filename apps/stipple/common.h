@@ -37,8 +37,7 @@ struct ColourOptions {
 /// A .stipple file is opened; anything else is built into the cache first (and found there the next time), with
 /// the attribute that `colour` needs.
 Result<std::shared_ptr<const lod::Store>> openScene(const std::vector<std::string>& inputs, BuildOptions build,
-                                                    const ColourOptions& colour, Executor& executor,
-                                                    bool showProgress);
+                                                    const ColourOptions& colour, Executor& executor, bool showProgress);
 
 Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, Executor& executor);
 /// Every backend and device, one per line.

@@ -80,8 +80,9 @@ void compareBounds(const lod::SourceInfo& i, const lod::Survey& s, std::vector<s
     for (int a = 0; a < 3; ++a) {
         const double slack = 1.001 * i.scale[a];  // headers are rounded
         if (!(s.least[a] >= i.declaredMin[a] - slack) || !(s.greatest[a] <= i.declaredMax[a] + slack))
-            problems.push_back(fmt::format("the header's box is {:.10g} .. {:.10g} along {}, the points reach {:.10g} .. {:.10g}",
-                                           i.declaredMin[a], i.declaredMax[a], "xyz"[a], s.least[a], s.greatest[a]));
+            problems.push_back(
+                fmt::format("the header's box is {:.10g} .. {:.10g} along {}, the points reach {:.10g} .. {:.10g}",
+                            i.declaredMin[a], i.declaredMax[a], "xyz"[a], s.least[a], s.greatest[a]));
     }
 }
 
@@ -92,16 +93,11 @@ Result<nlohmann::json> fileInfo(const InputInfoOptions& o, const std::string& pa
     STIPPLE_ASSIGN(source, lod::openPointSource(path, all));
     const lod::SourceInfo& i = source.info;
     std::vector<std::string> problems;
-    nlohmann::json j = {{"kind", "input"},
-                        {"path", i.path},
-                        {"format", i.format},
-                        {"points", i.points},
-                        {"crs", i.crs.label()},
-                        {"metres_per_unit", i.crs.metresPerUnit},
-                        {"notes", i.notes},
-                        {"parts", source.parts.size()},
-                        {"has_colour", i.hasColour},
-                        {"has_normals", i.hasNormal},
+    nlohmann::json j = {{"kind", "input"},           {"path", i.path},
+                        {"format", i.format},        {"points", i.points},
+                        {"crs", i.crs.label()},      {"metres_per_unit", i.crs.metresPerUnit},
+                        {"notes", i.notes},          {"parts", source.parts.size()},
+                        {"has_colour", i.hasColour}, {"has_normals", i.hasNormal},
                         {"has_radii", i.hasRadius}};
     if (i.isLattice) {
         j["scale"] = vectorJson(i.scale);
@@ -118,7 +114,8 @@ Result<nlohmann::json> fileInfo(const InputInfoOptions& o, const std::string& pa
         j["points_read"] = survey->points;
         j["points_not_finite"] = survey->notFinite;
         if (survey->points != i.points)
-            problems.push_back(fmt::format("the header declares {} points, {} could be read", i.points, survey->points));
+            problems.push_back(
+                fmt::format("the header declares {} points, {} could be read", i.points, survey->points));
         for (const std::string& p : survey->problems) problems.push_back(p);
         if (survey->points > survey->notFinite) {
             j["min"] = vectorJson(survey->least);
@@ -158,7 +155,8 @@ void printAttributes(const nlohmann::json& attributes) {
             std::vector<std::pair<int, uint64_t>> counts;
             for (const auto& [value, count] : a["counts"].items()) counts.emplace_back(std::stoi(value), count);
             std::sort(counts.begin(), counts.end());
-            for (const auto& [value, count] : counts) range += fmt::format("{}{}: {}", range.empty() ? "" : ", ", value, count);
+            for (const auto& [value, count] : counts)
+                range += fmt::format("{}{}: {}", range.empty() ? "" : ", ", value, count);
         }
         fmt::print("    {:22} {:4} {:5} {}{}\n", a["name"].get<std::string>(), a["type"].get<std::string>(),
                    a["aggregate"].get<std::string>(), range,
@@ -197,7 +195,8 @@ void printFile(const nlohmann::json& j) {
     if (!j.contains("points_read"))
         fmt::print("  the points themselves were not read: --verify does\n");
     else if (j["problems"].empty())
-        fmt::print("  all {} points were read; counts and bounds agree with the header\n", j["points_read"].get<uint64_t>());
+        fmt::print("  all {} points were read; counts and bounds agree with the header\n",
+                   j["points_read"].get<uint64_t>());
 }
 
 /// Many files: sums, and the files that differ or fail.
@@ -244,7 +243,8 @@ Result<void> showFolder(const InputInfoOptions& o, const std::vector<std::string
     for (const auto& [crs, count] : systems)
         fmt::print("  {:15} {} ({} files)\n", "crs", crs.empty() ? "not named" : crs, count);
     for (size_t i = 0; i < std::min(problems.size(), kMostProblems); ++i) fmt::print("  problem: {}\n", problems[i]);
-    if (problems.size() > kMostProblems) fmt::print("  and {} more (--json lists all)\n", problems.size() - kMostProblems);
+    if (problems.size() > kMostProblems)
+        fmt::print("  and {} more (--json lists all)\n", problems.size() - kMostProblems);
     return {};
 }
 

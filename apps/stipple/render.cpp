@@ -178,12 +178,14 @@ Result<void> runFrames(const Options& o, const Shot& shot, const render::FrameSe
 Result<void> run(const Options& o) {
     STIPPLE_TRY(image::checkImagePath(o.output));
     STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
-    for (const auto& [text, option] : {std::pair{o.eye, "--eye"}, std::pair{o.target, "--target"}, std::pair{o.up, "--up"}})
+    for (const auto& [text, option] :
+         {std::pair{o.eye, "--eye"}, std::pair{o.target, "--target"}, std::pair{o.up, "--up"}})
         if (!text.empty()) STIPPLE_TRY(parseVector(text, option));
     if (!(o.error > 0)) return fail(ErrorKind::usage, "must be larger than 0", "--error");
     const auto executor = makeTbbExecutor(o.build.threads);
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
-    STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store, openScene(o.inputs, o.build, o.colour, *executor, !o.quiet));
+    STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store,
+                   openScene(o.inputs, o.build, o.colour, *executor, !o.quiet));
     STIPPLE_ASSIGN(const Shot shot, makeShot(o, store->description, size));
     STIPPLE_ASSIGN(const lod::ColourBy colour,
                    lod::parseColourBy(o.colour.what, o.colour.map, o.colour.range, store->description));

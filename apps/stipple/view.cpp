@@ -54,7 +54,8 @@ void drawOverlay(const render::FrameState& state, const render::FrameSettings& s
     ImGui::Separator();
     ImGui::TextUnformatted(flying ? "fly: W A S D Q E, drag to look, wheel: speed, Shift: faster"
                                   : "orbit: drag, right drag: move, wheel: nearer");
-    ImGui::TextUnformatted("F fly/orbit  M mode  V debug view  L light  C colours  [1-9] error  P picture  Tab overlay  Esc quit");
+    ImGui::TextUnformatted(
+        "F fly/orbit  M mode  V debug view  L light  C colours  [1-9] error  P picture  Tab overlay  Esc quit");
     ImGui::End();
 }
 
@@ -128,7 +129,8 @@ Result<void> run(const Options& o) {
         return fail(ErrorKind::device, "there is no display", "stipple view",
                     "use stipple render, or xvfb-run stipple view");
     const auto executor = makeTbbExecutor(o.build.threads);
-    STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store, openScene(o.inputs, o.build, o.colour, *executor, true));
+    STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store,
+                   openScene(o.inputs, o.build, o.colour, *executor, true));
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
     STIPPLE_ASSIGN(const std::unique_ptr<gpu::Window> window,
                    gpu::Window::create("Stipple: " + store->description.source, size.x, size.y,

@@ -35,19 +35,20 @@ using namespace stipple::shared;
     row.blue[i] = t.colour.z;
 }
 
-void projectBlock(const FrameConstants& frame, const DrawNode& drawNode, const PointRecord* __restrict records, uint32_t count,
-                  uint32_t* __restrict pixel, uint32_t* __restrict depth) {
+void projectBlock(const FrameConstants& frame, const DrawNode& drawNode, const PointRecord* __restrict records,
+                  uint32_t count, uint32_t* __restrict pixel, uint32_t* __restrict depth) {
     const FrameConstants f = frame;
     const DrawNode node = drawNode;
     const float width = float(f.width), height = float(f.height);
     const float focal = f.focal, nearPlane = f.nearPlane, x0 = f.centre.x, y0 = f.centre.y;
-    const float xx = f.viewX.x, xy = f.viewX.y, xz = f.viewX.z, yx = f.viewY.x, yy = f.viewY.y, yz = f.viewY.z, zx = f.viewZ.x,
-                zy = f.viewZ.y, zz = f.viewZ.z;
-    const float bx = node.base.x, by = node.base.y, bz = node.base.z, ax = node.axisX.x, ay = node.axisX.y, az = node.axisX.z,
-                bbx = node.axisY.x, bby = node.axisY.y, bbz = node.axisY.z, ccx = node.axisZ.x, ccy = node.axisZ.y, ccz = node.axisZ.z;
+    const float xx = f.viewX.x, xy = f.viewX.y, xz = f.viewX.z, yx = f.viewY.x, yy = f.viewY.y, yz = f.viewY.z,
+                zx = f.viewZ.x, zy = f.viewZ.y, zz = f.viewZ.z;
+    const float bx = node.base.x, by = node.base.y, bz = node.base.z, ax = node.axisX.x, ay = node.axisX.y,
+                az = node.axisX.z, bbx = node.axisY.x, bby = node.axisY.y, bbz = node.axisY.z, ccx = node.axisZ.x,
+                ccy = node.axisZ.y, ccz = node.axisZ.z;
     const uint* __restrict const words = &records->positionXY;  // four words a record
     const uint stride = f.width, errorCode = node.errorCode, octantMask = node.octantMask;
-    #pragma GCC ivdep
+#pragma GCC ivdep
     for (size_t i = 0; i < count; ++i) {
         const PointRecord r{words[4 * i], words[4 * i + 1], words[4 * i + 2], words[4 * i + 3]};
         const float qx = float(int(recordX(r))), qy = float(int(recordY(r))), qz = float(int(recordZ(r)));
@@ -63,7 +64,8 @@ void projectBlock(const FrameConstants& frame, const DrawNode& drawNode, const P
         const float nx = xx * n.x + xy * n.y + xz * n.z;
         const float ny = yx * n.x + yy * n.y + yz * n.z;
         const float nz = zx * n.x + zy * n.y + zz * n.z;
-        const bool seen = ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) != 0u) | (nx * cx + ny * cy + nz * cz < 0.0f);
+        const bool seen =
+            ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) != 0u) | (nx * cx + ny * cy + nz * cz < 0.0f);
         const bool keep = inside & fine & seen;
         const int ix = int(keep ? px : 0.0f), iy = int(keep ? py : 0.0f);
         pixel[i] = keep ? uint(iy) * stride + uint(ix) : ~0u;
@@ -76,13 +78,13 @@ struct Gathered {
     alignas(64) uint32_t normal[kTile], colour[kTile], flags[kTile];
 };
 
-bool resolveRow(const FrameConstants& frame, const Tables& tables, const BlockSource* blocks, uint64_t* visibility, uint32_t x0,
-                uint32_t y, uint32_t n, TexelRow& __restrict row, float& largestRadius) {
+bool resolveRow(const FrameConstants& frame, const Tables& tables, const BlockSource* blocks, uint64_t* visibility,
+                uint32_t x0, uint32_t y, uint32_t n, TexelRow& __restrict row, float& largestRadius) {
     const FrameConstants f = frame;
     constexpr size_t kPrefetch = 12;  // pixels ahead: records lie anywhere in memory
     Gathered g;
     bool any = false;
-    #pragma GCC ivdep
+#pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         if (i + kPrefetch < n && visibility[i + kPrefetch] != ~uint64_t{0}) {
             const auto ahead = static_cast<uint32_t>(visibility[i + kPrefetch]) & 0x1fffffffu;
@@ -114,20 +116,21 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const BlockSo
         g.flags[i] = recordFlags(r);
         uint32_t c = r.colour;
         if (f.debugView == kDebugLevel || f.debugView == kDebugError) {
-            const vec3 d = f.debugView == kDebugLevel ? debugLevelColour(node.level) : debugErrorColour(node.errorPixels);
+            const vec3 d =
+                f.debugView == kDebugLevel ? debugLevelColour(node.level) : debugErrorColour(node.errorPixels);
             g.colour[i] = packColour(d.x, d.y, d.z);
             continue;
         }
         g.colour[i] = tables.red[c & 255u] | tables.green[c >> 8 & 255u] | tables.blue[c >> 16 & 255u];
     }
     if (!any) {
-        #pragma GCC ivdep
+#pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) row.depth[kPad + i] = 0;
         return false;
     }
     uint largest = 0;  // as bits: positive floats sort like integers
-    const float xx = f.viewX.x, xy = f.viewX.y, xz = f.viewX.z, yx = f.viewY.x, yy = f.viewY.y, yz = f.viewY.z, zx = f.viewZ.x,
-                zy = f.viewZ.y, zz = f.viewZ.z;
+    const float xx = f.viewX.x, xy = f.viewX.y, xz = f.viewX.z, yx = f.viewY.x, yy = f.viewY.y, yz = f.viewY.z,
+                zx = f.viewZ.x, zy = f.viewZ.y, zz = f.viewZ.z;
     const float focal = f.focal, support = f.supportScale, minimum = f.minimumRadius;
     const float centreX = f.centre.x - float(int(x0)) - 0.5f, centreY = f.centre.y - float(int(y)) - 0.5f;
 #pragma GCC ivdep
@@ -162,7 +165,7 @@ void packRow(const TexelRow& __restrict row, uint32_t n, const Planes& planes) {
     float* __restrict const depth = planes.depth;
     uint32_t *__restrict const size = planes.size, *__restrict const offset = planes.offset, *__restrict const normal = planes.normal,
              *__restrict const colour = planes.colour;
-    #pragma GCC ivdep
+#pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const PackedTexel p = packTexel(texelAt(row, kPad + i));
         depth[i] = p.depth;
@@ -177,7 +180,7 @@ void unpackRow(const Planes& planes, uint32_t first, uint32_t n, TexelRow& __res
     const float* __restrict const depth = planes.depth;
     const uint32_t *__restrict const size = planes.size, *__restrict const offset = planes.offset,
                    *__restrict const normal = planes.normal, *__restrict const colour = planes.colour;
-    #pragma GCC ivdep
+#pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         PackedTexel p;
         p.depth = depth[i];
@@ -189,13 +192,14 @@ void unpackRow(const Planes& planes, uint32_t first, uint32_t n, TexelRow& __res
     }
 }
 
-void pullRow(const TexelRow& __restrict upper, const TexelRow& __restrict lower, uint32_t n, float childSize, float inverseFocal,
-             TexelRow& __restrict out) {
-    #pragma GCC ivdep
+void pullRow(const TexelRow& __restrict upper, const TexelRow& __restrict lower, uint32_t n, float childSize,
+             float inverseFocal, TexelRow& __restrict out) {
+#pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const size_t a = kPad + 2 * i, b = a + 1;
-        setTexel(out, kPad + i, pullTexels(texelAt(upper, a), texelAt(upper, b), texelAt(lower, a), texelAt(lower, b), childSize,
-                                           inverseFocal));
+        setTexel(out, kPad + i,
+                 pullTexels(texelAt(upper, a), texelAt(upper, b), texelAt(lower, a), texelAt(lower, b), childSize,
+                            inverseFocal));
     }
 }
 
@@ -227,25 +231,27 @@ void expandRow(const TexelRow& coarse, uint32_t n, TexelRow& nearest, TexelRow& 
     expand(coarse.blue, nearest.blue, beside.blue);
 }
 
-void pushRow(const TexelRow& __restrict fine, const ExpandedRow& __restrict nearRow, const ExpandedRow& __restrict farRow, float sy,
-             uint32_t n, float fineSize, float inverseFocal, TexelRow& __restrict out) {
+void pushRow(const TexelRow& __restrict fine, const ExpandedRow& __restrict nearRow,
+             const ExpandedRow& __restrict farRow, float sy, uint32_t n, float fineSize, float inverseFocal,
+             TexelRow& __restrict out) {
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const size_t at = kPad + i;
         const float sx = float(int(i & 1u) * 2 - 1);
-        setTexel(out, at, pushTexel(texelAt(fine, at), texelAt(nearRow.nearest, at), texelAt(nearRow.beside, at),
-                                    texelAt(farRow.nearest, at), texelAt(farRow.beside, at), sx, sy, fineSize, inverseFocal));
+        setTexel(out, at,
+                 pushTexel(texelAt(fine, at), texelAt(nearRow.nearest, at), texelAt(nearRow.beside, at),
+                           texelAt(farRow.nearest, at), texelAt(farRow.beside, at), sx, sy, fineSize, inverseFocal));
     }
 }
 
-void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow& __restrict own, const TexelRow& __restrict row,
-              uint32_t x0, uint32_t y, uint32_t n, const ShadeOutput& out) {
+void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow& __restrict own,
+              const TexelRow& __restrict row, uint32_t x0, uint32_t y, uint32_t n, const ShadeOutput& out) {
     const FrameConstants f = frame;
     const bool lit = f.shade == kShadeLit && f.debugView == kDebugNone;
     const float inverseFocal = 1.0f / f.focal;
     const float vy = (float(int(y)) + 0.5f - f.centre.y) * inverseFocal;
     alignas(64) float red[kTile], green[kTile], blue[kTile];
-    #pragma GCC ivdep
+#pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const size_t at = kPad + i;
         red[i] = row.red[at];
@@ -253,12 +259,13 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
         blue[i] = row.blue[at];
     }
     if (lit) {
-        #pragma GCC ivdep
+#pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
             const size_t at = kPad + i;
             const float vx = (float(int(x0) + int(i)) + 0.5f - f.centre.x) * inverseFocal;
             const float inverse = 1.0f / std::sqrt(vx * vx + vy * vy + 1.0f);
-            const vec3 normal = normalFromPerp(vec2(row.perpX[at], row.perpY[at]), vec3(vx * inverse, vy * inverse, inverse));
+            const vec3 normal =
+                normalFromPerp(vec2(row.perpX[at], row.perpY[at]), vec3(vx * inverse, vy * inverse, inverse));
             const float light = irradiance(normal, f.sunDirection, f.skyDirection);
             red[i] *= light;
             green[i] *= light;
@@ -266,12 +273,13 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
         }
     }
     if (f.debugView == kDebugHoles || f.debugView == kDebugNormals || out.normal != nullptr) {
-        #pragma GCC ivdep
+#pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
             const size_t at = kPad + i;
             const float vx = (float(int(x0) + int(i)) + 0.5f - f.centre.x) * inverseFocal;
             const float inverse = 1.0f / std::sqrt(vx * vx + vy * vy + 1.0f);
-            const vec3 c = normalFromPerp(vec2(row.perpX[at], row.perpY[at]), vec3(vx * inverse, vy * inverse, inverse));
+            const vec3 c =
+                normalFromPerp(vec2(row.perpX[at], row.perpY[at]), vec3(vx * inverse, vy * inverse, inverse));
             if (f.debugView == kDebugHoles) {
                 const vec3 colour = debugHoleColour(own.depth[at], row.depth[at]);
                 red[i] = colour.x;
@@ -290,7 +298,7 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
         }
     }
     alignas(64) uint32_t ir[kTile], ig[kTile], ib[kTile];
-    #pragma GCC ivdep
+#pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const bool valid = row.depth[kPad + i] > 0.0f;
         red[i] = valid ? red[i] : f.background.x;
@@ -302,16 +310,16 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
     }
     const uint32_t* __restrict const byteOf = tables.srgbByte.data();
     uint32_t* __restrict const rgba = out.rgba;
-    #pragma GCC ivdep
+#pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const uint32_t alpha = row.depth[kPad + i] > 0.0f ? 0xff000000u : 0u;
         rgba[i] = byteOf[ir[i]] | byteOf[ig[i]] << 8 | byteOf[ib[i]] << 16 | alpha;
     }
     if (out.depth != nullptr)
-        #pragma GCC ivdep
+#pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) out.depth[i] = row.depth[kPad + i];
     if (out.linear != nullptr)
-        #pragma GCC ivdep
+#pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
             out.linear[3 * i] = red[i];
             out.linear[3 * i + 1] = green[i];
@@ -322,7 +330,7 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
 }  // namespace
 
 extern const Kernels STIPPLE_KERNELS;
-const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME, projectBlock, resolveRow, packRow, unpackRow,
-                              pullRow,              pushRow,      expandRow,  shadeRow};
+const Kernels STIPPLE_KERNELS{
+    STIPPLE_KERNELS_NAME, projectBlock, resolveRow, packRow, unpackRow, pullRow, pushRow, expandRow, shadeRow};
 
 }  // namespace stipple::cpu

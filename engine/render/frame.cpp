@@ -40,7 +40,8 @@ namespace {
 /// The last step of a chunk's decoding where it gets other colours than its own.
 streaming::ChunkFinish recolouring(const lod::ColourBy& by, std::shared_ptr<const lod::Store> store) {
     if (by.mode == lod::ColourMode::own) return {};
-    const auto apply = [by, store](uint32_t node, lod::Chunk& chunk, const uint8_t* bytes, size_t count) -> Result<void> {
+    const auto apply = [by, store](uint32_t node, lod::Chunk& chunk, const uint8_t* bytes,
+                                   size_t count) -> Result<void> {
         std::vector<uint8_t> values;
         if (by.needsAttributes()) {
             const auto& attributes = store->description.attributes;

@@ -28,8 +28,6 @@ struct CameraPath {
     double duration() const { return keys.empty() ? 0 : keys.back().t - keys.front().t; }
 };
 
-
-
 /// A camera that sees the whole box from a three-quarter view.
 Camera fitCamera(const glm::dvec3& boundsMin, const glm::dvec3& boundsMax, const glm::dvec3& up, double aspect);
 
@@ -39,7 +37,7 @@ lod::View makeView(const Camera& camera, uint32_t width, uint32_t height, double
 /// Reads {"fps": 30, "keys": [{"t": 0, "eye": [x,y,z], "target": [...], "up": [...], "fov": 50}]}.
 Result<CameraPath> readCameraPath(const std::string& path);
 /// An orbit around the box: what a headless ./run renders.
-CameraPath makeOrbit(const glm::dvec3& boundsMin, const glm::dvec3& boundsMax, const glm::dvec3& up,
-                     double aspect, int keys);
+CameraPath makeOrbit(const glm::dvec3& boundsMin, const glm::dvec3& boundsMax, const glm::dvec3& up, double aspect,
+                     int keys);
 
 }  // namespace stipple::scene

@@ -8,9 +8,10 @@ namespace stipple::lod {
 /// Writes the value that stands for points [begin, end), as the attribute's Aggregate says.
 void aggregate(const CloudAttribute& attribute, uint32_t begin, uint32_t end, uint8_t* to);
 
-/// Least and greatest value, and 2nd and 98th percentile (from at most 65,536 evenly spaced points).
+/// Least and greatest value; from at most 65,536 evenly spaced points: 2nd and 98th percentile, and what one point in
+/// 200 lies below and above of.
 struct ValueRange {
-    double least = 0, greatest = 0, low = 0, high = 0;
+    double least = 0, greatest = 0, low = 0, high = 0, edgeLow = 0, edgeHigh = 0;
 };
 template <typename ValueAt>
 ValueRange rangeOf(size_t count, ValueAt valueAt) {
@@ -28,8 +29,11 @@ ValueRange rangeOf(size_t count, ValueAt valueAt) {
     }
     std::sort(sample.begin(), sample.end());
     if (!sample.empty()) {
-        r.low = sample[(sample.size() - 1) / 50];
-        r.high = sample[(sample.size() - 1) - (sample.size() - 1) / 50];
+        const size_t last = sample.size() - 1;
+        r.low = sample[last / 50];
+        r.high = sample[last - last / 50];
+        r.edgeLow = sample[last / 200];
+        r.edgeHigh = sample[last - last / 200];
     }
     return r;
 }

@@ -18,8 +18,8 @@ void describeRanges(const Cloud& cloud, StoreDescription& description) {
     for (const CloudAttribute& a : cloud.attributes) {
         AttributeInfo info = a.info;
         const size_t width = bytesOf(info.type);
-        const ValueRange r = rangeOf(
-            cloud.size(), [&](size_t i) { return attributeValue(info, a.values.data() + i * width); });
+        const ValueRange r =
+            rangeOf(cloud.size(), [&](size_t i) { return attributeValue(info, a.values.data() + i * width); });
         info.least = r.least;
         info.greatest = r.greatest;
         info.low = r.low;
@@ -38,14 +38,13 @@ void describeRanges(const Cloud& cloud, StoreDescription& description) {
     });
     description.lowHeight = r.low;
     description.highHeight = r.high;
-    // Between the 2nd and the 98th percentile lie at least 0.9 of an evenly spread extent; what a tenth more on each side
-    // does not reach is stray.
+    // One point in 200 lies beyond each edge; what a tenth of the extent more does not reach is stray.
     for (int a = 0; a < 3; ++a) {
         const std::vector<uint32_t>& axis = a == 0 ? cloud.x : a == 1 ? cloud.y : cloud.z;
         const ValueRange along = rangeOf(cloud.size(), [&](size_t i) { return static_cast<double>(axis[i]); });
-        const double margin = 0.1 * (along.high - along.low);
-        description.focusMin[a] = cloud.origin[a] + cloud.unit * std::max(along.least, along.low - margin);
-        description.focusMax[a] = cloud.origin[a] + cloud.unit * std::min(along.greatest, along.high + margin);
+        const double margin = 0.1 * (along.edgeHigh - along.edgeLow);
+        description.focusMin[a] = cloud.origin[a] + cloud.unit * std::max(along.least, along.edgeLow - margin);
+        description.focusMax[a] = cloud.origin[a] + cloud.unit * std::min(along.greatest, along.edgeHigh + margin);
     }
 }
 
@@ -55,7 +54,8 @@ glm::dvec3 upOf(const Cloud& cloud, const BuildSettings& settings, const StoreDe
     const glm::dvec3 centre = 0.5 * (description.boundsMin + description.boundsMax);
     const double radius = glm::length(centre) * description.metresPerUnit;
     const double extent = glm::length(description.boundsMax - description.boundsMin) * description.metresPerUnit;
-    const bool isGeocentric = radius > kLeastRadius && radius < kGreatestRadius && extent < 1e5 && std::abs(centre.z) > 1e5;
+    const bool isGeocentric =
+        radius > kLeastRadius && radius < kGreatestRadius && extent < 1e5 && std::abs(centre.z) > 1e5;
     if (!settings.up && isGeocentric && !cloud.crs.isDegrees && (cloud.crs.isGeocentric || cloud.crs.label().empty()))
         return glm::normalize(centre);
     return axisVector(cloud.up);

@@ -20,8 +20,8 @@ struct CommonLattice {
     std::vector<ToLattice> of;
 };
 
-/// The coarsest lattice on which the steps of every source lie exactly: the finest scale there is, or a whole fraction of
-/// it (to 1/1000). Where there is none, the finest scale, and the sources that do not fit are marked.
+/// The coarsest lattice on which the steps of every source lie exactly: the finest scale there is, or a whole fraction
+/// of it (to 1/1000). Where there is none, the finest scale, and the sources that do not fit are marked.
 CommonLattice findLattice(const std::vector<SourceInfo>& sources);
 
 }  // namespace stipple::lod

@@ -61,9 +61,8 @@ class Reading {
         compact();
         if (cloud_.size() == 0 && position_.empty())
             return fail(ErrorKind::input,
-                        report_.pointsIn == 0
-                            ? "holds no points"
-                            : fmt::format("none of its {} points can be used", report_.pointsIn),
+                        report_.pointsIn == 0 ? "holds no points"
+                                              : fmt::format("none of its {} points can be used", report_.pointsIn),
                         inputs_.front(), "nothing was written");
         if (allLattice_)
             STIPPLE_TRY(placeIntegers(executor));
@@ -96,7 +95,8 @@ class Reading {
         for (size_t k = 0; k < found.size(); ++k)
             if (!found[k]) {
                 std::string known;
-                for (const AttributeInfo& a : sources_.front().info.attributes) known += (known.empty() ? "" : ", ") + a.name;
+                for (const AttributeInfo& a : sources_.front().info.attributes)
+                    known += (known.empty() ? "" : ", ") + a.name;
                 return fail(ErrorKind::usage, fmt::format("has no attribute '{}'", options.attributes[k]),
                             sources_.front().info.path, known.empty() ? "it has none" : "it has " + known);
             }
@@ -132,8 +132,8 @@ class Reading {
                 AttributeInfo& mine = cloud_.attributes[k].info;
                 if (found[k] && (mine.type != a.type || mine.scale != a.scale || mine.offset != a.offset))
                     return fail(ErrorKind::input,
-                                fmt::format("stores attribute '{}' as {} x {} + {}, other files as {} x {} + {}", a.name,
-                                            kScalarNames.at(static_cast<size_t>(a.type)), a.scale, a.offset,
+                                fmt::format("stores attribute '{}' as {} x {} + {}, other files as {} x {} + {}",
+                                            a.name, kScalarNames.at(static_cast<size_t>(a.type)), a.scale, a.offset,
                                             kScalarNames.at(static_cast<size_t>(mine.type)), mine.scale, mine.offset),
                                 info.path, "leave this attribute out");
                 mine = a;
@@ -192,8 +192,8 @@ class Reading {
             STIPPLE_ASSIGN(const size_t count, read(block, kBlockPoints));
             if (count == 0) {
                 if (at == part.first + part.count) return {};
-                return fail(ErrorKind::input,
-                            fmt::format("has {} points instead of {}", at - part.first, part.count), source.info.path);
+                return fail(ErrorKind::input, fmt::format("has {} points instead of {}", at - part.first, part.count),
+                            source.info.path);
             }
             if (count > part.first + part.count - at)
                 return fail(ErrorKind::input, "has more points than it declares", source.info.path);
@@ -339,12 +339,14 @@ class Reading {
         cloud_.origin = lattice.base + lattice.unit * lo;
         for (size_t s = 0; s < infos.size(); ++s)
             if (!lattice.of[s].exact)
-                report_.notes.push_back(fmt::format("{}: scale and offset do not fit a common lattice; coordinates are "
-                                                    "rounded to {} units",
-                                                    infos[s].path, lattice.unit));
+                report_.notes.push_back(
+                    fmt::format("{}: scale and offset do not fit a common lattice; coordinates are "
+                                "rounded to {} units",
+                                infos[s].path, lattice.unit));
         std::vector<double> rounding(parts_.size(), 0.0);
         executor.parallelFor(parts_.size(), 1, [&](size_t begin, size_t end) {
-            for (size_t i = begin; i < end; ++i) rounding[i] = placePart(parts_[i], lattice.of[parts_[i].source], lo, step);
+            for (size_t i = begin; i < end; ++i)
+                rounding[i] = placePart(parts_[i], lattice.of[parts_[i].source], lo, step);
         });
         cloud_.roundingUnits = *std::max_element(rounding.begin(), rounding.end()) * lattice.unit;
         return {};
@@ -415,9 +417,8 @@ class Reading {
     void finishAttributes() {
         // A scan whose points all have one colour has no colours of its own: it is shaded.
         const auto rgb = [](uint32_t c) { return c & 0xffffffu; };
-        cloud_.hasColour = cloud_.hasColour && std::any_of(cloud_.colour.begin(), cloud_.colour.end(), [&](uint32_t c) {
-                               return rgb(c) != rgb(cloud_.colour[0]);
-                           });
+        cloud_.hasColour = cloud_.hasColour && std::any_of(cloud_.colour.begin(), cloud_.colour.end(),
+                                                           [&](uint32_t c) { return rgb(c) != rgb(cloud_.colour[0]); });
         const auto perUnit = static_cast<float>(1.0 / cloud_.unit);
         if (cloud_.hasRadius)
             for (float& r : cloud_.radius) r *= perUnit;

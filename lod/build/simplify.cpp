@@ -141,8 +141,7 @@ class Simplifier {
     }
 
     /// Sorts by parent's code (descending), then Morton order; fills the counts; returns the encoded chunk.
-    EncodedNode encode(uint32_t index, std::vector<uint32_t>& parentHistogram,
-                                std::vector<uint32_t>& ownHistogram) {
+    EncodedNode encode(uint32_t index, std::vector<uint32_t>& parentHistogram, std::vector<uint32_t>& ownHistogram) {
         const BuildNode& node = partition_.nodes[index];
         Node& out = h_.nodes[index];
         parentHistogram.assign(256, 0);

@@ -121,7 +121,8 @@ Result<PointSource> openPointSource(const std::string& path, const ReadOptions& 
     if (extension == ".las" || extension == ".laz") return openLas(path, options);
     if (head.substr(0, 2) == "\x1f\x8b")
         return fail(ErrorKind::input, "is compressed with gzip", path, "unpack it first: gunzip -k");
-    return fail(ErrorKind::input, "is in a format that this version does not read", path, "it reads .ply, .las and .laz");
+    return fail(ErrorKind::input, "is in a format that this version does not read", path,
+                "it reads .ply, .las and .laz");
 }
 
 }  // namespace stipple::lod

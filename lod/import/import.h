@@ -7,11 +7,12 @@
 
 namespace stipple::lod {
 
-/// By content, then by extension: PLY, LAS, LAZ. Errors say which formats there are. The file is closed again: thousands
-/// of sources may be open at once.
+/// By content, then by extension: PLY, LAS, LAZ. Errors say which formats there are. The file is closed again:
+/// thousands of sources may be open at once.
 Result<PointSource> openPointSource(const std::string& path, const ReadOptions& options = {});
 
-/// PLY: ascii, binary little and big endian; any property order and type; elements before `vertex` and lists are skipped.
+/// PLY: ascii, binary little and big endian; any property order and type; elements before `vertex` and lists are
+/// skipped.
 Result<PointSource> openPly(const std::string& path, const ReadOptions& options = {});
 
 /// LAS 1.0 to 1.5 and LAZ (pointwise, chunked, layered), point formats 0 to 10.

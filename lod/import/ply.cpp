@@ -281,8 +281,8 @@ class PlyReader {
             for (const auto& [slot, wide] : attributes_) {
                 auto& values = block.attributes[slot - kRoles];
                 const auto narrow = static_cast<float>(v.at(slot));
-                const auto* bytes = wide ? reinterpret_cast<const uint8_t*>(&v.at(slot))
-                                         : reinterpret_cast<const uint8_t*>(&narrow);
+                const auto* bytes =
+                    wide ? reinterpret_cast<const uint8_t*>(&v.at(slot)) : reinterpret_cast<const uint8_t*>(&narrow);
                 values.insert(values.end(), bytes, bytes + (wide ? 8 : 4));
             }
         }
@@ -401,7 +401,7 @@ Result<PointSource> openPly(const std::string& path, const ReadOptions& options)
     auto file = std::make_shared<const InputFile>(std::move(opened));
     STIPPLE_ASSIGN(Header header, parseHeader(*file));
     auto vertex = std::find_if(header.elements.begin(), header.elements.end(),
-                                     [](const Element& e) { return e.name == "vertex"; });
+                               [](const Element& e) { return e.name == "vertex"; });
     if (vertex == header.elements.end())
         return fail(ErrorKind::input, "has no element 'vertex'", path, "Stipple reads the vertices of a PLY file");
     PointSource source;
@@ -454,8 +454,7 @@ Result<PointSource> openPly(const std::string& path, const ReadOptions& options)
     source.parts = {info.points};
     source.openPart = [path, header, wanted](size_t) -> Result<PointReader> {
         STIPPLE_ASSIGN(InputFile again, InputFile::open(path));
-        auto reader =
-            std::make_shared<PlyReader>(std::make_shared<const InputFile>(std::move(again)), header, wanted);
+        auto reader = std::make_shared<PlyReader>(std::make_shared<const InputFile>(std::move(again)), header, wanted);
         return PointReader([reader](PointBlock& block, size_t limit) { return reader->read(block, limit); });
     };
     return source;

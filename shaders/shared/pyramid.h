@@ -135,7 +135,7 @@ SHARED_FN float gapWeight(float rho2, float least) { return rho2 <= least ? 0.01
 
 // rho^2 up to which an empty texel between filled coarse ones is closed: four, or fewer at the image's border.
 const float kGapReach2 = 64.0f;
-const float kBorderReach2 = 4.0f;
+const float kBorderReach2 = 1.5f;
 const float kSurrounding = 4.0f;  // coarse texels of one surface that make a fine texel lie inside it
 
 // Refines one fine texel from the four coarse texels around it. q0 is its parent, q1 the neighbour in x, q2 in y, q3 in

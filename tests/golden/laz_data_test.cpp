@@ -27,7 +27,8 @@ Result<lod::PointBlock> wholeFile(const std::string& path) {
         whole.lattice.insert(whole.lattice.end(), block.lattice.begin(), block.lattice.end());
         whole.colour16.insert(whole.colour16.end(), block.colour16.begin(), block.colour16.end());
         for (size_t k = 0; k < block.attributes.size(); ++k)
-            whole.attributes[k].insert(whole.attributes[k].end(), block.attributes[k].begin(), block.attributes[k].end());
+            whole.attributes[k].insert(whole.attributes[k].end(), block.attributes[k].begin(),
+                                       block.attributes[k].end());
         return {};
     }));
     return whole;
@@ -60,7 +61,8 @@ TEST(LazData, EveryRealFileHoldsWhatItsHeaderSays) {
     const auto executor = makeTbbExecutor(0);
     Progress silent(false);
     // Headers that are known to lie: more points than there are, and bounds without the scale.
-    const std::vector<std::string> tooShort{"1.2-with-color-clipped.las", "garbage_nVariableLength.las", "1.2-no-points.las"};
+    const std::vector<std::string> tooShort{"1.2-with-color-clipped.las", "garbage_nVariableLength.las",
+                                            "1.2-no-points.las"};
     const std::vector<std::string> wrongBox{"simple1_3.las", "spurious.las"};
     const auto isOne = [](const std::vector<std::string>& names, const std::filesystem::path& path) {
         return std::find(names.begin(), names.end(), path.filename().string()) != names.end();
@@ -68,7 +70,8 @@ TEST(LazData, EveryRealFileHoldsWhatItsHeaderSays) {
     size_t files = 0;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(root)) {
         const std::string extension = entry.path().extension();
-        if ((extension != ".las" && extension != ".laz") || entry.path().string().find("ecef") != std::string::npos) continue;
+        if ((extension != ".las" && extension != ".laz") || entry.path().string().find("ecef") != std::string::npos)
+            continue;
         const auto source = lod::openPointSource(entry.path());
         ASSERT_EQ(source.has_value(), !isOne(tooShort, entry.path())) << entry.path();
         if (!source) continue;
@@ -112,8 +115,8 @@ TEST(LazData, TheEarthCentredScanKeepsItsIntegersAndDoesNotShake) {
     EXPECT_EQ(store->hierarchy.unit, scale.x);
     EXPECT_EQ(test::leafLattice(*store), expected);
 
-    // A camera 1 cm above a point, 6,366 km from the origin, moved by tenths of a millimetre: every picture is that of the
-    // fp64 oracle, and single points land on the oracle's pixels.
+    // A camera 1 cm above a point, 6,366 km from the origin, moved by tenths of a millimetre: every picture is that of
+    // the fp64 oracle, and single points land on the oracle's pixels.
     const glm::dvec3 centre = 0.5 * (store->description.focusMin + store->description.focusMax);
     const auto target = lod::findNearest(*store, centre);
     ASSERT_TRUE(target);

@@ -91,10 +91,11 @@ Result<void> bench(const std::string& path, int repeats) {
             STIPPLE_TRY(file.readAt(at, buffer.data(), std::min<uint64_t>(buffer.size(), file.sizeBytes() - at)));
         bytes += static_cast<double>(file.sizeBytes());
     }
-    fmt::print(R"({{"points": {}, "bytes": {}, "colour_one_core_s": {}, "colour_two_cores_s": {}, "all_one_core_s": {}, )"
-               R"("read_only_s": {}, "peak_rss_bytes": {}}})"
-               "\n",
-               points, bytes, colourOne, colourTwo, allOne, nowSeconds() - start, peakRssBytes());
+    fmt::print(
+        R"({{"points": {}, "bytes": {}, "colour_one_core_s": {}, "colour_two_cores_s": {}, "all_one_core_s": {}, )"
+        R"("read_only_s": {}, "peak_rss_bytes": {}}})"
+        "\n",
+        points, bytes, colourOne, colourTwo, allOne, nowSeconds() - start, peakRssBytes());
     return {};
 }
 
@@ -114,8 +115,8 @@ Result<void> write(const std::string& path, unsigned format, size_t points) {
 
 int main(int argc, char** argv) {
     const std::string what = argc > 1 ? argv[1] : "";
-    stipple::Result<void> result =
-        stipple::fail(stipple::ErrorKind::usage, "usage: laz_records records FILE OUT | bench PATH N | write FILE FORMAT N");
+    stipple::Result<void> result = stipple::fail(
+        stipple::ErrorKind::usage, "usage: laz_records records FILE OUT | bench PATH N | write FILE FORMAT N");
     if (what == "records" && argc == 4) result = stipple::writeRecords(argv[2], argv[3]);
     if (what == "bench" && argc == 4) result = stipple::bench(argv[2], std::stoi(argv[3]));
     if (what == "write" && argc == 5)

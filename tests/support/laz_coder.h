@@ -189,6 +189,8 @@ template <typename T>
 void store(uint8_t* p, T v) {
     std::memcpy(p, &v, sizeof(T));
 }
-inline int32_t minus(int32_t a, int32_t b) { return static_cast<int32_t>(static_cast<uint32_t>(a) - static_cast<uint32_t>(b)); }
+inline int32_t minus(int32_t a, int32_t b) {
+    return static_cast<int32_t>(static_cast<uint32_t>(a) - static_cast<uint32_t>(b));
+}
 
 }  // namespace stipple::test::laz

@@ -71,7 +71,8 @@ std::vector<uint8_t> makeRecords(const LazSpec& spec, size_t count, Rng& rng) {
 }
 
 std::vector<uint8_t> encodeLazChunk(const LazSpec& spec, const uint8_t* records, size_t count, Rng& rng) {
-    return spec.format >= 6 ? laz::encodeLayered(spec, records, count, rng) : laz::encodeSequential(spec, records, count, rng);
+    return spec.format >= 6 ? laz::encodeLayered(spec, records, count, rng)
+                            : laz::encodeSequential(spec, records, count, rng);
 }
 
 std::vector<uint8_t> lazPayload(const LazSpec& spec) {

@@ -1,6 +1,6 @@
-// A LAZ encoder for the tests: written from the format, sharing no code with the decoder that it tests. Where the format
-// leaves a choice (by which multiple of the last step a time is coded, which remembered sequence it belongs to), it
-// chooses at random, so that every branch of a decoder is taken.
+// A LAZ encoder for the tests: written from the format, sharing no code with the decoder that it tests. Where the
+// format leaves a choice (by which multiple of the last step a time is coded, which remembered sequence it belongs to),
+// it chooses at random, so that every branch of a decoder is taken.
 #pragma once
 
 #include <cstdint>

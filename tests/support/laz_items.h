@@ -16,7 +16,11 @@ struct Time {
     std::array<int32_t, 4> step{}, extremes{};
     std::array<int64_t, 4> time{};
     Time(bool layered, int64_t t)
-        : first(layered ? 0 : 1), full(layered ? 511 : 512), multiple(full + 4), fresh(layered ? 5 : 6), time{t, 0, 0, 0} {}
+        : first(layered ? 0 : 1),
+          full(layered ? 511 : 512),
+          multiple(full + 4),
+          fresh(layered ? 5 : 6),
+          time{t, 0, 0, 0} {}
 
     void encode(Encoder& out, int64_t t, Rng& rng) {
         const auto jump = static_cast<uint32_t>(rng.below(6));
@@ -130,10 +134,10 @@ struct Wave {
         out.symbol(index, is[0]);
         const auto o = load<uint64_t>(is + 1), before = load<uint64_t>(was + 1);
         const auto step = static_cast<int64_t>(o - before);
-        const uint32_t code = o == before                               ? 0
-                              : o == before + load<uint32_t>(was + 9)   ? 1
-                              : step == static_cast<int32_t>(step)      ? 2
-                                                                        : 3;
+        const uint32_t code = o == before                             ? 0
+                              : o == before + load<uint32_t>(was + 9) ? 1
+                              : step == static_cast<int32_t>(step)    ? 2
+                                                                      : 3;
         out.symbol(kind[lastKind], code);
         lastKind = code;
         if (code == 2) {

@@ -8,8 +8,9 @@ namespace {
 
 /// Six contexts by number of returns (row, as digits) and return number.
 constexpr const char* kNewContext[16] = {
-    "0123453445555555", "1013333333333333", "2124444444433333", "3345444444444444", "4344544444444444", "5344454444444444",
-    "3344445444444444", "4344444544444444", "4344444454444444", "5344444445444444", "5344444444544444", "5334444444455444",
+    "0123453445555555", "1013333333333333", "2124444444433333", "3345444444444444",
+    "4344544444444444", "5344454444444444", "3344445444444444", "4344444544444444",
+    "4344444454444444", "5344444445444444", "5344444444544444", "5334444444455444",
     "5334444444455544", "5334444444445554", "5334444444444555", "5334444444444455",
 };
 
@@ -102,15 +103,15 @@ std::vector<uint8_t> encodeLayered(const LazSpec& spec, const uint8_t* records, 
         if (hasColour) moved[k] = moved[k] || differs(30, 6), ++k;
         if (hasInfrared) moved[k] = moved[k] || differs(36, 2), ++k;
         if (hasWave) moved[k] = moved[k] || differs(waveAt, 29), ++k;
-        for (uint32_t b = 0; b < spec.extraBytes; ++b) moved[k + b] = moved[k + b] || is[extraAt + b] != records[extraAt + b];
+        for (uint32_t b = 0; b < spec.extraBytes; ++b)
+            moved[k + b] = moved[k + b] || is[extraAt + b] != records[extraAt + b];
     }
     for (size_t i = 1; i < count; ++i) {
         const uint8_t* is = records + i * bytes;
         const uint32_t target = is[15] >> 4 & 3u;
         NewPoint* p = channels[channel].get();
         const uint32_t beforeN = p->last[14] >> 4, beforeR = p->last[14] & 15u;
-        const uint32_t context =
-            (beforeR == 1 ? 1u : 0u) | (beforeR >= beforeN ? 2u : 0u) | (p->timeChanged ? 4u : 0u);
+        const uint32_t context = (beforeR == 1 ? 1u : 0u) | (beforeR >= beforeN ? 2u : 0u) | (p->timeChanged ? 4u : 0u);
         NewPoint* previous = p;
         const bool channelChanged = target != channel;
         if (channelChanged) {
@@ -157,7 +158,8 @@ std::vector<uint8_t> encodeLayered(const LazSpec& spec, const uint8_t* records, 
             p->intensity.encode(layer[4], was, load<uint16_t>(is + 12), ends);
             was = load<uint16_t>(is + 12);
         }
-        if (moved[5] && angleChanged) p->angle.encode(layer[5], load<int16_t>(p->last.data() + 18), load<int16_t>(is + 18), t);
+        if (moved[5] && angleChanged)
+            p->angle.encode(layer[5], load<int16_t>(p->last.data() + 18), load<int16_t>(is + 18), t);
         if (moved[6]) layer[6].symbol(p->user[p->last[17] / 4u], is[17]);
         if (moved[7] && sourceChanged)
             p->source.encode(layer[7], load<uint16_t>(p->last.data() + 20), load<uint16_t>(is + 20), 0);
@@ -176,7 +178,8 @@ std::vector<uint8_t> encodeLayered(const LazSpec& spec, const uint8_t* records, 
                 const uint32_t changed = (was[0] != now[0] ? 1u : 0u) | (was[1] != now[1] ? 2u : 0u);
                 layer[k].symbol(models->used, changed);
                 for (uint32_t b = 0; b < 2; ++b)
-                    if ((changed >> b & 1u) != 0) layer[k].symbol(models->byte[b], static_cast<uint8_t>(now[b] - was[b]));
+                    if ((changed >> b & 1u) != 0)
+                        layer[k].symbol(models->byte[b], static_cast<uint8_t>(now[b] - was[b]));
             }
             if (hasInfrared) ++k;
             last->assign(is + 30, is + 30 + colourBytes);

@@ -5,9 +5,9 @@ namespace stipple::test::laz {
 namespace {
 
 constexpr uint8_t kOldContext[8][8] = {
-    {15, 14, 13, 12, 11, 10, 9, 8},    {14, 0, 1, 3, 6, 10, 10, 9},       {13, 1, 2, 4, 7, 11, 11, 10},
-    {12, 3, 4, 5, 8, 12, 12, 11},      {11, 6, 7, 8, 9, 13, 13, 12},      {10, 10, 11, 12, 13, 14, 14, 13},
-    {9, 10, 11, 12, 13, 14, 15, 14},   {8, 9, 10, 11, 12, 13, 14, 15},
+    {15, 14, 13, 12, 11, 10, 9, 8},  {14, 0, 1, 3, 6, 10, 10, 9},    {13, 1, 2, 4, 7, 11, 11, 10},
+    {12, 3, 4, 5, 8, 12, 12, 11},    {11, 6, 7, 8, 9, 13, 13, 12},   {10, 10, 11, 12, 13, 14, 14, 13},
+    {9, 10, 11, 12, 13, 14, 15, 14}, {8, 9, 10, 11, 12, 13, 14, 15},
 };
 
 }  // namespace
@@ -70,8 +70,7 @@ std::vector<uint8_t> encodeSequential(const LazSpec& spec, const uint8_t* record
             wave.encode(e, was + at, is + at);
             at += 29;
         }
-        for (size_t k = 0; k < extra.size(); ++k)
-            e.symbol(extra[k], static_cast<uint8_t>(is[at + k] - was[at + k]));
+        for (size_t k = 0; k < extra.size(); ++k) e.symbol(extra[k], static_cast<uint8_t>(is[at + k] - was[at + k]));
     }
     const std::vector<uint8_t> coded = e.finish();
     out.insert(out.end(), coded.begin(), coded.end());

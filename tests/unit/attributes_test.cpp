@@ -34,7 +34,8 @@ std::vector<uint8_t> planeRecords(size_t count, int32_t firstX = 0) {
     std::vector<uint8_t> records(count * bytes);
     for (size_t i = 0; i < count; ++i) {
         uint8_t* p = records.data() + i * bytes;
-        const std::array<int32_t, 3> xyz{firstX + static_cast<int32_t>(i % 100) * 10, static_cast<int32_t>(i / 100) * 10, 0};
+        const std::array<int32_t, 3> xyz{firstX + static_cast<int32_t>(i % 100) * 10,
+                                         static_cast<int32_t>(i / 100) * 10, 0};
         std::memcpy(p, xyz.data(), 12);
         const auto intensity = static_cast<uint16_t>(i);
         std::memcpy(p + 12, &intensity, 2);
@@ -82,7 +83,8 @@ TEST(Attributes, LeavesKeepEveryValueAndSayItToWhoAsks) {
     EXPECT_EQ(attributes[at["classification"]].counts,
               (std::vector<std::pair<double, uint64_t>>{{2, 2500}, {6, 2500}}));
     for (const size_t i : {size_t{0}, size_t{1234}, size_t{4999}}) {
-        const auto p = findNearest(*store, {0.1 * static_cast<double>(i % 100) + 0.02, 0.1 * static_cast<double>(i / 100), 0});
+        const auto p =
+            findNearest(*store, {0.1 * static_cast<double>(i % 100) + 0.02, 0.1 * static_cast<double>(i / 100), 0});
         ASSERT_TRUE(p) << p.error().line();
         EXPECT_EQ(p->lattice, (std::array<uint64_t, 3>{i % 100 * 10, i / 100 * 10, 0}));
         EXPECT_EQ(p->attributes[at["intensity"]], static_cast<double>(i));
@@ -125,8 +127,9 @@ TEST(Attributes, StoredFormsRoundToTheNearestAndStayInRange) {
     for (const auto& [type, value, expected] :
          {std::tuple{ScalarType::u8, 300.0, 255.0}, std::tuple{ScalarType::u8, -3.0, 0.0},
           std::tuple{ScalarType::i8, -128.4, -128.0}, std::tuple{ScalarType::u16, 65535.4, 65535.0},
-          std::tuple{ScalarType::i32, -2147483648.0, -2147483648.0}, std::tuple{ScalarType::i64, 1e30, 9.223372036854775e18},
-          std::tuple{ScalarType::f64, 0.1, 0.1}, std::tuple{ScalarType::f32, 0.5, 0.5}}) {
+          std::tuple{ScalarType::i32, -2147483648.0, -2147483648.0},
+          std::tuple{ScalarType::i64, 1e30, 9.223372036854775e18}, std::tuple{ScalarType::f64, 0.1, 0.1},
+          std::tuple{ScalarType::f32, 0.5, 0.5}}) {
         info.type = type;
         std::array<uint8_t, 8> bytes{};
         storeAttribute(info, value, bytes.data());
@@ -181,7 +184,8 @@ TEST(Tiles, FoldersPatternsAndOctreesAreOneScan) {
     std::filesystem::create_directories(folder / "octree/ept-data");
     std::filesystem::create_directories(folder / "tiles/deep");
     writeBytes(folder / "octree/ept-data/0-0-0-0.laz", test::encodeLas(planeSpec(), planeRecords(1000), true, rng));
-    writeBytes(folder / "octree/ept-data/1-0-0-0.laz", test::encodeLas(planeSpec(), planeRecords(700, 5000), true, rng));
+    writeBytes(folder / "octree/ept-data/1-0-0-0.laz",
+               test::encodeLas(planeSpec(), planeRecords(700, 5000), true, rng));
     std::ofstream(folder / "octree/ept.json") << "{}";
     writeBytes(folder / "tiles/a.laz", test::encodeLas(planeSpec(), planeRecords(300), true, rng));
     test::LazSpec fine = planeSpec();
@@ -195,7 +199,8 @@ TEST(Tiles, FoldersPatternsAndOctreesAreOneScan) {
         EXPECT_EQ(openStore(folder / "o.stipple")->description.roundingUnits, 0.0) << "0.01 and 0.001 share a lattice";
     }
     EXPECT_FALSE(expandInputs({folder / "tiles/*.xyz"}));
-    EXPECT_FALSE(expandInputs({folder / "octree/ept-data/../../tiles/none"}).value_or(std::vector<std::string>{}).empty());
+    EXPECT_FALSE(
+        expandInputs({folder / "octree/ept-data/../../tiles/none"}).value_or(std::vector<std::string>{}).empty());
 }
 
 TEST(Tiles, DifferentCoordinateSystemsAreRefusedByName) {
@@ -244,7 +249,8 @@ TEST(Tiles, SkipBadLosesTheChunkAndCountsIt) {
     EXPECT_NE(refused.error().line().find("--skip-bad"), std::string::npos);
     EXPECT_FALSE(std::filesystem::exists(folder / "o.stipple"));
     settings.skipBad = true;
-    const auto kept = buildStore({folder / "a.laz", folder / "b.laz"}, folder / "o.stipple", settings, *executor, silent);
+    const auto kept =
+        buildStore({folder / "a.laz", folder / "b.laz"}, folder / "o.stipple", settings, *executor, silent);
     ASSERT_TRUE(kept) << kept.error().line();
     EXPECT_EQ(kept->pointsIn, 5000u);
     EXPECT_GE(kept->dropped.at("corrupt"), 500u);

@@ -92,7 +92,8 @@ TEST(Hostile, ChangedHeadersOfEveryFormatAreSurvivedWithModestMemory) {
                 auto changed = file;
                 for (uint64_t n = 1 + rng.below(3); n > 0; --n) {
                     // The fields that sizes hang on, and anything.
-                    static constexpr std::array<size_t, 12> fields{94, 96, 100, 104, 105, 107, 235, 243, 247, 131, 155, 375};
+                    static constexpr std::array<size_t, 12> fields{94,  96,  100, 104, 105, 107,
+                                                                   235, 243, 247, 131, 155, 375};
                     const size_t at = rng.below(2) == 0 ? fields.at(rng.below(fields.size())) + rng.below(8)
                                                         : rng.below(changed.size());
                     if (at < changed.size())

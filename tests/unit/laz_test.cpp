@@ -102,7 +102,8 @@ TEST(Laz, LayersThatAreNotWantedChangeNothingElse) {
             ASSERT_EQ(std::memcmp(positions->data() + i * bytes, records.data() + i * bytes, 12), 0) << i;
             ASSERT_EQ(std::memcmp(flat->data() + i * bytes, records.data() + i * bytes, 8), 0) << i;
             ASSERT_EQ(std::memcmp(flat->data() + i * bytes + 12, records.data() + i * bytes + 12, 2), 0) << i;
-            if (hasColour) ASSERT_EQ(std::memcmp(flat->data() + i * bytes + 30, records.data() + i * bytes + 30, 6), 0) << i;
+            if (hasColour)
+                ASSERT_EQ(std::memcmp(flat->data() + i * bytes + 30, records.data() + i * bytes + 30, 6), 0) << i;
         }
     }
 }
@@ -147,7 +148,8 @@ TEST(Laz, ChangedBytesNeverBreakTheDecoder) {
             const size_t at = plan.recordBytes + rng.below(changed.size() - plan.recordBytes);
             changed[at] = static_cast<uint8_t>(changed[at] + 1 + rng.below(255));
             if (k % 4 == 0)
-                for (size_t i = at; i < changed.size(); ++i) changed[i] = k % 8 == 0 ? 0xff : static_cast<uint8_t>(rng.next());
+                for (size_t i = at; i < changed.size(); ++i)
+                    changed[i] = k % 8 == 0 ? 0xff : static_cast<uint8_t>(rng.next());
             const Bytes in = Bytes::ofMemory(changed.data(), changed.size());
             bool good = decoder.begin(in, 0, changed.size(), kPoints).has_value();
             if (good) good = decoder.decode(out.data(), kPoints).has_value();

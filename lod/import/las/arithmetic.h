@@ -1,5 +1,6 @@
 // The adaptive arithmetic decoder of LAZ (A. Said's FastAC, HP Labs 2004, as used by M. Isenburg, "LASzip: lossless
-// compression of LiDAR data", 2013) and the integer coder on top of it. Bit-exact: every constant is part of the format.
+// compression of LiDAR data", 2013) and the integer coder on top of it. Bit-exact: every constant is part of the
+// format.
 #pragma once
 
 #include <algorithm>
@@ -20,8 +21,8 @@ class SymbolModel {
     bool made() const { return symbols_ != 0; }
     void make(uint32_t symbols) {
         symbols_ = symbols;
-        // A share may reach 2^15 + 63 (what a division by the rounded unit leaves over), which must fall into the one cell
-        // beyond the last.
+        // A share may reach 2^15 + 63 (what a division by the rounded unit leaves over), which must fall into the one
+        // cell beyond the last.
         cells_ = std::min(std::bit_ceil(symbols), 512u);
         cellShift_ = 15u - static_cast<uint32_t>(std::countr_zero(cells_));
         memory_.resize(2 * size_t{symbols} + 1 + cells_ + 1);

@@ -1,5 +1,5 @@
-// Where compressed bytes come from: a file, a buffer, or anything that can read at an offset. CodeStream hands them to an
-// arithmetic decoder through a small window, so that a chunk of any size needs little memory.
+// Where compressed bytes come from: a file, a buffer, or anything that can read at an offset. CodeStream hands them to
+// an arithmetic decoder through a small window, so that a chunk of any size needs little memory.
 #pragma once
 
 #include <algorithm>

@@ -146,8 +146,8 @@ class WaveModel {
     uint32_t lastKind_ = 0;
 };
 
-/// GPS time, item versions 2 (in formats 1 to 5) and later (6 to 10): four remembered sequences, each with its last time
-/// and step; a time is coded as a multiple of the step. The later form knows that the time changed.
+/// GPS time, item versions 2 (in formats 1 to 5) and later (6 to 10): four remembered sequences, each with its last
+/// time and step; a time is coded as a multiple of the step. The later form knows that the time changed.
 class TimeModel {
   public:
     static constexpr int32_t kMost = 500, kLeast = -10;
@@ -178,8 +178,7 @@ class TimeModel {
         time_[last_] = static_cast<int64_t>(static_cast<uint64_t>(time_[last_]) + static_cast<uint64_t>(int64_t{d}));
     }
     void startSequence(Decoder& in) {
-        const int32_t high =
-            difference_.decode(in, static_cast<int32_t>(static_cast<uint64_t>(time_[last_]) >> 32), 8);
+        const int32_t high = difference_.decode(in, static_cast<int32_t>(static_cast<uint64_t>(time_[last_]) >> 32), 8);
         next_ = (next_ + 1) & 3;
         time_[next_] = static_cast<int64_t>(uint64_t{static_cast<uint32_t>(high)} << 32 | in.word());
         last_ = next_;

@@ -35,8 +35,8 @@ std::string quoted(const std::string& s, size_t from) {
     return close == std::string::npos ? "" : s.substr(open + 1, close - open - 1);
 }
 
-/// The bracketed node that begins with `keyword` at depth 1 of the node at `at`; npos: none. The last one wins: WKT puts
-/// the unit and the authority of a node after those of its parts.
+/// The bracketed node that begins with `keyword` at depth 1 of the node at `at`; npos: none. The last one wins: WKT
+/// puts the unit and the authority of a node after those of its parts.
 size_t childOf(const std::string& s, size_t at, const std::string& keyword) {
     size_t found = std::string::npos;
     int depth = 0;
@@ -64,8 +64,8 @@ double numberAfterName(const std::string& s, size_t node) {
 
 /// A compound system stands for its horizontal part.
 size_t horizontalNode(const std::string& s) {
-    for (const char* keyword : {"PROJCS[", "PROJCRS[", "PROJECTEDCRS[", "GEOCCS[", "GEODCRS[", "GEODETICCRS[", "GEOGCRS[",
-                                "GEOGRAPHICCRS[", "GEOGCS[", "LOCAL_CS[", "ENGCRS["})
+    for (const char* keyword : {"PROJCS[", "PROJCRS[", "PROJECTEDCRS[", "GEOCCS[", "GEODCRS[", "GEODETICCRS[",
+                                "GEOGCRS[", "GEOGRAPHICCRS[", "GEOGCS[", "LOCAL_CS[", "ENGCRS["})
         if (const size_t at = s.find(keyword); at != std::string::npos) return at;
     return std::string::npos;
 }
@@ -124,14 +124,29 @@ lod::Crs fromGeoKeys(const std::vector<uint8_t>& keys, const std::string& ascii)
         const size_t entry = 4 * i;
         const bool isShort = word(entry + 1) == 0;
         switch (word(entry)) {
-            case 1024: model = isShort ? word(entry + 3) : 0; break;
-            case 1026: citation = textOf(entry); break;
-            case 2048: geographic = isShort ? word(entry + 3) : 0; break;
-            case 2049: geographicCitation = textOf(entry); break;
-            case 3072: projected = isShort ? word(entry + 3) : 0; break;
-            case 3073: citation = textOf(entry).empty() ? citation : textOf(entry); break;
-            case 3076: unit = isShort ? word(entry + 3) : 0; break;
-            default: break;
+            case 1024:
+                model = isShort ? word(entry + 3) : 0;
+                break;
+            case 1026:
+                citation = textOf(entry);
+                break;
+            case 2048:
+                geographic = isShort ? word(entry + 3) : 0;
+                break;
+            case 2049:
+                geographicCitation = textOf(entry);
+                break;
+            case 3072:
+                projected = isShort ? word(entry + 3) : 0;
+                break;
+            case 3073:
+                citation = textOf(entry).empty() ? citation : textOf(entry);
+                break;
+            case 3076:
+                unit = isShort ? word(entry + 3) : 0;
+                break;
+            default:
+                break;
         }
     }
     constexpr int kUserDefined = 32767;

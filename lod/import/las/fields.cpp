@@ -41,17 +41,17 @@ void addWave(std::vector<Field>& fields, uint32_t at) {
 }
 
 std::vector<Field> oldFields(unsigned format) {
-    std::vector<Field> f{whole(12, kLazIntensity, "intensity", ScalarType::u16, Aggregate::mean),
-                         bits(14, kLazPosition, 0x07, "return_number"),
-                         bits(14, kLazPosition, 0x38, "number_of_returns"),
-                         bits(14, kLazFlags, 0x40, "scan_direction"),
-                         bits(14, kLazFlags, 0x80, "edge_of_flight_line"),
-                         bits(15, kLazClassification, 0x1f, "classification"),
-                         bits(15, kLazClassification, 0xe0, "classification_flags",
-                              "1 synthetic, 2 key point, 4 withheld"),
-                         whole(16, kLazScanAngle, "scan_angle", ScalarType::i8, Aggregate::mean, "degrees"),
-                         whole(17, kLazUserData, "user_data", ScalarType::u8, Aggregate::mode),
-                         whole(18, kLazSource, "source_id", ScalarType::u16, Aggregate::mode)};
+    std::vector<Field> f{
+        whole(12, kLazIntensity, "intensity", ScalarType::u16, Aggregate::mean),
+        bits(14, kLazPosition, 0x07, "return_number"),
+        bits(14, kLazPosition, 0x38, "number_of_returns"),
+        bits(14, kLazFlags, 0x40, "scan_direction"),
+        bits(14, kLazFlags, 0x80, "edge_of_flight_line"),
+        bits(15, kLazClassification, 0x1f, "classification"),
+        bits(15, kLazClassification, 0xe0, "classification_flags", "1 synthetic, 2 key point, 4 withheld"),
+        whole(16, kLazScanAngle, "scan_angle", ScalarType::i8, Aggregate::mean, "degrees"),
+        whole(17, kLazUserData, "user_data", ScalarType::u8, Aggregate::mode),
+        whole(18, kLazSource, "source_id", ScalarType::u16, Aggregate::mode)};
     if (format == 1 || format >= 3)
         f.push_back(whole(20, kLazTime, "gps_time", ScalarType::f64, Aggregate::none, "seconds"));
     if (format == 4) addWave(f, 28);
@@ -60,19 +60,19 @@ std::vector<Field> oldFields(unsigned format) {
 }
 
 std::vector<Field> newFields(unsigned format) {
-    std::vector<Field> f{whole(12, kLazIntensity, "intensity", ScalarType::u16, Aggregate::mean),
-                         bits(14, kLazPosition, 0x0f, "return_number"),
-                         bits(14, kLazPosition, 0xf0, "number_of_returns"),
-                         bits(15, kLazFlags, 0x0f, "classification_flags",
-                              "1 synthetic, 2 key point, 4 withheld, 8 overlap"),
-                         bits(15, kLazPosition, 0x30, "scanner_channel"),
-                         bits(15, kLazFlags, 0x40, "scan_direction"),
-                         bits(15, kLazFlags, 0x80, "edge_of_flight_line"),
-                         whole(16, kLazClassification, "classification", ScalarType::u8, Aggregate::mode),
-                         whole(17, kLazUserData, "user_data", ScalarType::u8, Aggregate::mode),
-                         whole(18, kLazScanAngle, "scan_angle", ScalarType::i16, Aggregate::mean, "degrees"),
-                         whole(20, kLazSource, "source_id", ScalarType::u16, Aggregate::mode),
-                         whole(22, kLazTime, "gps_time", ScalarType::f64, Aggregate::none, "seconds")};
+    std::vector<Field> f{
+        whole(12, kLazIntensity, "intensity", ScalarType::u16, Aggregate::mean),
+        bits(14, kLazPosition, 0x0f, "return_number"),
+        bits(14, kLazPosition, 0xf0, "number_of_returns"),
+        bits(15, kLazFlags, 0x0f, "classification_flags", "1 synthetic, 2 key point, 4 withheld, 8 overlap"),
+        bits(15, kLazPosition, 0x30, "scanner_channel"),
+        bits(15, kLazFlags, 0x40, "scan_direction"),
+        bits(15, kLazFlags, 0x80, "edge_of_flight_line"),
+        whole(16, kLazClassification, "classification", ScalarType::u8, Aggregate::mode),
+        whole(17, kLazUserData, "user_data", ScalarType::u8, Aggregate::mode),
+        whole(18, kLazScanAngle, "scan_angle", ScalarType::i16, Aggregate::mean, "degrees"),
+        whole(20, kLazSource, "source_id", ScalarType::u16, Aggregate::mode),
+        whole(22, kLazTime, "gps_time", ScalarType::f64, Aggregate::none, "seconds")};
     f[9].info.scale = 0.006;
     if (format == 8 || format == 10)
         f.push_back(whole(36, kLazInfrared, "near_infrared", ScalarType::u16, Aggregate::mean));

@@ -99,7 +99,11 @@ Result<void> useVlrs(const Bytes& in, LasHeader& h, bool compressed) {
 }  // namespace
 
 std::string LasHeader::describe() const {
-    std::string s = fmt::format("{} 1.{}, point format {}", !laz ? "LAS" : isCopc ? "COPC (LAZ)" : "LAZ", minor, format);
+    std::string s = fmt::format("{} 1.{}, point format {}",
+                                !laz     ? "LAS"
+                                : isCopc ? "COPC (LAZ)"
+                                         : "LAZ",
+                                minor, format);
     if (!laz) return s;
     if (laz->form == LazForm::pointwise) return s + ", one chunk";
     if (laz->chunkPoints == LazPlan::kVariableChunks) return s + ", chunks of different sizes";
@@ -142,8 +146,8 @@ Result<LasHeader> readLasHeader(const Bytes& in, const std::string& path, bool t
     if (isWide) {
         if (const auto wide = get<uint64_t>(b, 247); wide != 0) {
             if (h.points != 0 && h.points != wide)
-                h.notes.push_back(fmt::format("the header counts {} points at offset 107 and {} at 247; the latter is used",
-                                              h.points, wide));
+                h.notes.push_back(fmt::format(
+                    "the header counts {} points at offset 107 and {} at 247; the latter is used", h.points, wide));
             h.points = wide;
             for (size_t i = 0; i < 15; ++i) h.pointsByReturn.at(i) = get<uint64_t>(b, 255 + 8 * i);
         }
@@ -151,8 +155,8 @@ Result<LasHeader> readLasHeader(const Bytes& in, const std::string& path, bool t
     if (h.format >= kRecordBytes.size())
         return bad(fmt::format("has point format {} (offset 104)", h.format), "formats 0 to 10 are read");
     if (h.recordBytes < kRecordBytes.at(h.format))
-        return bad(fmt::format("has records of {} bytes (offset 105); point format {} needs {}", h.recordBytes, h.format,
-                               kRecordBytes.at(h.format)));
+        return bad(fmt::format("has records of {} bytes (offset 105); point format {} needs {}", h.recordBytes,
+                               h.format, kRecordBytes.at(h.format)));
     if (h.dataOffset < h.headerBytes || h.dataOffset > in.size)
         return bad(fmt::format("the points begin at offset {}, but the file has {} bytes", h.dataOffset, in.size),
                    "the file is truncated");
@@ -186,7 +190,8 @@ Result<LasHeader> readLasHeader(const Bytes& in, const std::string& path, bool t
             return bad(fmt::format("the header declares {} points, but only {} fit into the file", h.points, fits),
                        "the file is truncated or its header lies; --skip-bad reads what is there");
         if (h.points > fits)
-            h.notes.push_back(fmt::format("the header declares {} points, but only {} fit into the file", h.points, fits));
+            h.notes.push_back(
+                fmt::format("the header declares {} points, but only {} fit into the file", h.points, fits));
     }
     return h;
 }

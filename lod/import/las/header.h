@@ -50,8 +50,8 @@ struct LasHeader {
     std::string describe() const;
 };
 
-/// `path` is for messages. `tolerant`: a header that promises more than the file holds is cut down to what is there (and
-/// noted) instead of refused.
+/// `path` is for messages. `tolerant`: a header that promises more than the file holds is cut down to what is there
+/// (and noted) instead of refused.
 Result<LasHeader> readLasHeader(const Bytes& in, const std::string& path, bool tolerant);
 
 /// Fields of a point format, and of the extra bytes that `extraBytes` (payload of record 4, may be empty) describes.

@@ -58,8 +58,8 @@ class LayeredItem {
 class Point14Item final : public LayeredItem {
   public:
     Point14Item(uint32_t parts, uint16_t version) : LayeredItem(9), slip_(version == 3) {
-        const std::array<uint32_t, 9> part{kLazAll,       kLazPosition,  kLazClassification, kLazFlags, kLazIntensity,
-                                           kLazScanAngle, kLazUserData,  kLazSource,         kLazTime};
+        const std::array<uint32_t, 9> part{kLazAll,       kLazPosition, kLazClassification, kLazFlags, kLazIntensity,
+                                           kLazScanAngle, kLazUserData, kLazSource,         kLazTime};
         for (size_t i = 0; i < part.size(); ++i) layers[i].wanted = (part.at(i) & parts) != 0;
     }
     void begin(const uint8_t* raw, uint32_t channel) override {
@@ -104,7 +104,7 @@ class Point14Item final : public LayeredItem {
         else if ((changed & 3) == 3)
             r = timeChanged != 0 ? in.symbol(m.returnNumber[lastR]) : (lastR + in.symbol(m.returnSame) + 2) & 15u;
         p.returns = static_cast<uint8_t>(n << 4 | r);
-        const uint32_t context = kReturnContext[n][r] << 1 | timeChanged;
+        const uint32_t context = uint32_t{kReturnContext[n][r]} << 1 | timeChanged;
         const uint32_t level = std::min(n > r ? n - r : r - n, 7u);
         const uint32_t ends = (r == 1 ? 2u : 0u) + (r >= n ? 1u : 0u);
         const uint32_t single = n == 1 ? 1 : 0;
@@ -126,7 +126,7 @@ class Point14Item final : public LayeredItem {
             p.classification = static_cast<uint8_t>(layers[kClass].in.symbol(m.classification[k]));
         }
         if (layers[kFlags].used) {
-            const uint32_t was = (p.flags & 15u) | (p.flags >> 6 & 1u) << 4 | (p.flags >> 7) << 5;
+            const uint32_t was = (p.flags & 15u) | (p.flags >> 6 & 1u) << 4 | (p.flags >> 7 & 1u) << 5;
             const uint32_t f = layers[kFlags].in.symbol(m.flags[was]);
             p.flags = static_cast<uint8_t>((f & 15u) | (p.flags & 0x30u) | (f >> 4 & 1u) << 6 | (f >> 5 & 1u) << 7);
         }
@@ -136,8 +136,7 @@ class Point14Item final : public LayeredItem {
         }
         if (layers[kAngle].used && angleChanged)
             p.scanAngle = static_cast<int16_t>(m.scanAngle.decode(layers[kAngle].in, p.scanAngle, timeChanged));
-        if (layers[kUser].used)
-            p.userData = static_cast<uint8_t>(layers[kUser].in.symbol(m.userData[p.userData / 4u]));
+        if (layers[kUser].used) p.userData = static_cast<uint8_t>(layers[kUser].in.symbol(m.userData[p.userData / 4u]));
         if (layers[kSource].used && sourceChanged)
             p.source = static_cast<uint16_t>(m.source.decode(layers[kSource].in, p.source, 0));
         bool good = true;
@@ -209,7 +208,8 @@ class Point14Item final : public LayeredItem {
 };
 
 /// The items beside the point: their models and last value for each channel. Item version 3 has
-/// a second slip that is part of the format: at a change to a channel that was met before, the last value is still that of the channel left.
+/// a second slip that is part of the format: at a change to a channel that was met before, the last value is still that
+/// of the channel left.
 template <typename Models>
 class ChannelItem : public LayeredItem {
   public:
@@ -326,11 +326,15 @@ class BytesItem final : public ChannelItem<ByteModels> {
 
 std::unique_ptr<LayeredItem> makeItem(const LazItem& item, uint32_t parts) {
     switch (static_cast<LazItemType>(item.type)) {
-        case LazItemType::point14: return std::make_unique<Point14Item>(parts, item.version);
+        case LazItemType::point14:
+            return std::make_unique<Point14Item>(parts, item.version);
         case LazItemType::rgb14:
-        case LazItemType::rgbNir14: return std::make_unique<ColourItem>(item, parts);
-        case LazItemType::wavePacket14: return std::make_unique<WaveItem>(item, parts);
-        default: return std::make_unique<BytesItem>(item, parts);
+        case LazItemType::rgbNir14:
+            return std::make_unique<ColourItem>(item, parts);
+        case LazItemType::wavePacket14:
+            return std::make_unique<WaveItem>(item, parts);
+        default:
+            return std::make_unique<BytesItem>(item, parts);
     }
 }
 
@@ -360,7 +364,8 @@ class LayeredReader final : public LazChunkReader {
         uint32_t declared = 0;
         std::memcpy(&declared, first_.data() + recordBytes_, 4);
         if (declared != points)
-            return fail(ErrorKind::input, fmt::format("the chunk says it has {} points, its file {}", declared, points));
+            return fail(ErrorKind::input,
+                        fmt::format("the chunk says it has {} points, its file {}", declared, points));
         const uint8_t* size = first_.data() + recordBytes_ + 4;
         uint64_t at = begin + headBytes;
         for (Part& part : items_) {
@@ -369,8 +374,9 @@ class LayeredReader final : public LazChunkReader {
                 size += 4;
                 layer.used = layer.wanted && layer.bytes > 0;
                 if (layer.bytes > end - at)
-                    return fail(ErrorKind::input, fmt::format("a layer of {} bytes at offset {} reaches beyond its chunk",
-                                                              layer.bytes, at));
+                    return fail(
+                        ErrorKind::input,
+                        fmt::format("a layer of {} bytes at offset {} reaches beyond its chunk", layer.bytes, at));
                 layer.end = at + layer.bytes;
                 if (layer.used) {
                     STIPPLE_TRY(layer.in.stream.open(in, at, layer.end, reach_));
@@ -426,8 +432,9 @@ class LayeredReader final : public LazChunkReader {
         for (const Part& part : items_)
             for (const Layer& layer : part.item->layers)
                 if (layer.used && layer.in.stream.position() != layer.end)
-                    return fail(ErrorKind::input, fmt::format("a layer's points end {} bytes before its bytes do",
-                                                              static_cast<int64_t>(layer.end - layer.in.stream.position())));
+                    return fail(ErrorKind::input,
+                                fmt::format("a layer's points end {} bytes before its bytes do",
+                                            static_cast<int64_t>(layer.end - layer.in.stream.position())));
         if (endKnown && end_ != chunkEnd_)
             return fail(ErrorKind::input, fmt::format("the chunk's layers end {} bytes before the chunk",
                                                       static_cast<int64_t>(chunkEnd_ - end_)));

@@ -84,11 +84,13 @@ Result<LazPlan> parseLazPlan(const uint8_t* payload, size_t count, unsigned poin
         const LazItem item{get<uint16_t>(at), get<uint16_t>(at + 2), get<uint16_t>(at + 4)};
         const ItemKind* kind = kindOf(item.type);
         const bool layered = plan.form == LazForm::layered;
-        if (kind == nullptr) return bad(fmt::format("item {} of the laszip record has the unknown type {}", i, item.type));
+        if (kind == nullptr)
+            return bad(fmt::format("item {} of the laszip record has the unknown type {}", i, item.type));
         if (kind->layered != layered || item.version < kind->least || item.version > kind->most)
-            return bad(fmt::format("item {} of the laszip record (type {}) has version {}; with compressor {} {} to {} are "
-                                   "read",
-                                   i, item.type, item.version, compressor, kind->least, kind->most));
+            return bad(
+                fmt::format("item {} of the laszip record (type {}) has version {}; with compressor {} {} to {} are "
+                            "read",
+                            i, item.type, item.version, compressor, kind->least, kind->most));
         if (kind->bytes != 0 && kind->bytes != item.bytes)
             return bad(fmt::format("item {} of the laszip record (type {}) has {} bytes, expected {}", i, item.type,
                                    item.bytes, kind->bytes));
@@ -134,13 +136,15 @@ Result<size_t> LazDecoder::decode(uint8_t* records, size_t limit) {
 Result<void> LazDecoder::finish(bool endKnown) const { return reader_->finish(endKnown); }
 uint64_t LazDecoder::endOfChunk() const { return reader_->endOfChunk(); }
 
-Result<std::vector<LazChunk>> readChunkTable(const Bytes& in, const LazPlan& plan, uint64_t dataBegin, uint64_t points) {
+Result<std::vector<LazChunk>> readChunkTable(const Bytes& in, const LazPlan& plan, uint64_t dataBegin,
+                                             uint64_t points) {
     std::vector<LazChunk> chunks;
     if (plan.form == LazForm::pointwise || points == 0) return chunks;
     const bool variable = plan.chunkPoints == LazPlan::kVariableChunks;
     const uint64_t chunksBegin = dataBegin + 8;
     int64_t at = 0;
-    if (chunksBegin > in.size) return bad(fmt::format("the points begin at {}, but the file has {} bytes", dataBegin, in.size));
+    if (chunksBegin > in.size)
+        return bad(fmt::format("the points begin at {}, but the file has {} bytes", dataBegin, in.size));
     STIPPLE_TRY(in.readAt(dataBegin, &at, 8));
     if (at == -1 && in.size >= chunksBegin + 8) STIPPLE_TRY(in.readAt(in.size - 8, &at, 8));
     if (at <= 0 || static_cast<uint64_t>(at) == dataBegin) {
@@ -151,13 +155,15 @@ Result<std::vector<LazChunk>> readChunkTable(const Bytes& in, const LazPlan& pla
     }
     const auto table = static_cast<uint64_t>(at);
     if (table < chunksBegin || table + 8 > in.size)
-        return bad(fmt::format("the chunk table is said to lie at offset {}, but the file has {} bytes", table, in.size),
-                   "the file is truncated");
+        return bad(
+            fmt::format("the chunk table is said to lie at offset {}, but the file has {} bytes", table, in.size),
+            "the file is truncated");
     std::array<uint32_t, 2> head{};
     STIPPLE_TRY(in.readAt(table, head.data(), 8));
     const uint32_t count = head[1];
     const uint64_t most = (table - chunksBegin) / plan.recordBytes;
-    if (head[0] != 0) return bad(fmt::format("the chunk table at offset {} has version {}, expected 0", table, head[0]));
+    if (head[0] != 0)
+        return bad(fmt::format("the chunk table at offset {} has version {}, expected 0", table, head[0]));
     if (count > most)
         return bad(fmt::format("the chunk table at offset {} declares {} chunks, but {} bytes hold at most {}", table,
                                count, table - chunksBegin, most));
@@ -176,8 +182,8 @@ Result<std::vector<LazChunk>> readChunkTable(const Bytes& in, const LazPlan& pla
         if (variable) lastCount = numbers.decode(decoder, lastCount, 0);
         lastBytes = numbers.decode(decoder, lastBytes, 1);
         const auto bytes = static_cast<uint32_t>(lastBytes);
-        const uint64_t pointsHere = variable ? static_cast<uint32_t>(lastCount)
-                                             : std::min<uint64_t>(plan.chunkPoints, points - point);
+        const uint64_t pointsHere =
+            variable ? static_cast<uint32_t>(lastCount) : std::min<uint64_t>(plan.chunkPoints, points - point);
         if (bytes > table - byte || pointsHere > points - point || pointsHere > bytes * kMostPointsPerByte)
             return bad(fmt::format("chunk {} of {} ({} points, {} bytes) reaches beyond the {} points or the {} bytes "
                                    "that there are",

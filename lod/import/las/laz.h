@@ -7,8 +7,8 @@
 //   while (*decoder.decode(records, n) > 0) ...             // records: n * plan.recordBytes bytes
 //   decoder.finish();                                       // says whether the chunk ended where it should
 //
-// Memory: the models (below 1 MB without extra bytes; some 700 B per extra byte and scanner channel) and 64 KB a stream,
-// whatever the size of a chunk.
+// Memory: the models (below 1 MB without extra bytes; some 700 B per extra byte and scanner channel) and 64 KB a
+// stream, whatever the size of a chunk.
 #pragma once
 
 #include <array>
@@ -103,7 +103,7 @@ constexpr uint64_t kMostPointsPerByte = 4096;
 
 /// One chunk of a file.
 struct LazChunk {
-    uint64_t begin = 0, end = 0;   ///< bytes
+    uint64_t begin = 0, end = 0;    ///< bytes
     uint64_t first = 0, count = 0;  ///< points
 };
 

@@ -9,9 +9,9 @@ namespace {
 
 /// Return number and number of returns to one of 16 contexts, which separate single, first, middle and last returns.
 constexpr uint8_t kReturnContext[8][8] = {
-    {15, 14, 13, 12, 11, 10, 9, 8},    {14, 0, 1, 3, 6, 10, 10, 9},       {13, 1, 2, 4, 7, 11, 11, 10},
-    {12, 3, 4, 5, 8, 12, 12, 11},      {11, 6, 7, 8, 9, 13, 13, 12},      {10, 10, 11, 12, 13, 14, 14, 13},
-    {9, 10, 11, 12, 13, 14, 15, 14},   {8, 9, 10, 11, 12, 13, 14, 15},
+    {15, 14, 13, 12, 11, 10, 9, 8},  {14, 0, 1, 3, 6, 10, 10, 9},    {13, 1, 2, 4, 7, 11, 11, 10},
+    {12, 3, 4, 5, 8, 12, 12, 11},    {11, 6, 7, 8, 9, 13, 13, 12},   {10, 10, 11, 12, 13, 14, 14, 13},
+    {9, 10, 11, 12, 13, 14, 15, 14}, {8, 9, 10, 11, 12, 13, 14, 15},
 };
 
 struct Point10 {
@@ -120,8 +120,8 @@ class Point10Version2 final : public Item {
         const uint32_t context = kReturnContext[n][r], level = n > r ? n - r : r - n;
         if (changed != 0) {
             if ((changed & 16) != 0)
-                intensityOf_[context] = static_cast<uint16_t>(
-                    intensity_.decode(in, intensityOf_[context], std::min(context, 3u)));
+                intensityOf_[context] =
+                    static_cast<uint16_t>(intensity_.decode(in, intensityOf_[context], std::min(context, 3u)));
             last_.intensity = intensityOf_[context];
             if ((changed & 8) != 0)
                 last_.classification = static_cast<uint8_t>(in.symbol(classification_[last_.classification]));
@@ -352,7 +352,8 @@ std::unique_ptr<Item> makeItem(const LazItem& item) {
         case LazItemType::rgb12:
             if (first) return std::make_unique<Rgb12Version1>();
             return std::make_unique<Rgb12Version2>();
-        case LazItemType::wavePacket13: return std::make_unique<Wave13>();
+        case LazItemType::wavePacket13:
+            return std::make_unique<Wave13>();
         default:
             if (first) return std::make_unique<Bytes1>(item.bytes);
             return std::make_unique<Bytes2>(item.bytes);
@@ -401,7 +402,8 @@ class SequentialReader final : public LazChunkReader {
             }
         }
         if (in_.stream.overrun()) return fail(ErrorKind::input, "the compressed bytes end before the points do");
-        if (!good || in_.corrupt()) return fail(ErrorKind::input, "the compressed bytes are not what an encoder writes");
+        if (!good || in_.corrupt())
+            return fail(ErrorKind::input, "the compressed bytes are not what an encoder writes");
         return {};
     }
     Result<void> finish(bool endKnown) const override {

@@ -10,7 +10,7 @@
 namespace stipple::lod {
 namespace {
 
-constexpr size_t kBlockBytes = size_t{4} << 20;      ///< of records held at once by one reader
+constexpr size_t kBlockBytes = size_t{4} << 20;         ///< of records held at once by one reader
 constexpr uint64_t kLasPartPoints = uint64_t{1} << 20;  ///< uncompressed files: what one reader takes
 
 las::Bytes bytesOf(const InputFile& file) {
@@ -68,8 +68,12 @@ void extract(const LasFile& file, const uint8_t* records, size_t count, PointBlo
 class PartReader {
   public:
     PartReader(std::shared_ptr<const LasFile> file, InputFile input, const las::LazChunk& part, bool endKnown)
-        : file_(std::move(file)), input_(std::make_unique<InputFile>(std::move(input))), bytes_(bytesOf(*input_)),
-          part_(part), endKnown_(endKnown), next_(part.begin) {
+        : file_(std::move(file)),
+          input_(std::make_unique<InputFile>(std::move(input))),
+          bytes_(bytesOf(*input_)),
+          part_(part),
+          endKnown_(endKnown),
+          next_(part.begin) {
         if (file_->header.laz) decoder_.emplace(*file_->header.laz, file_->parts);
     }
 
@@ -94,9 +98,9 @@ class PartReader {
     template <typename T>
     Result<T> named(Result<T> result) const {
         if (!result && result.error().where.empty()) {
-            result.error().where = fmt::format("{}: chunk at offset {} (points {} to {}, point format {})", input_->path(),
-                                               chunkBegin_, part_.first + done_, part_.first + chunkEnd_ - 1,
-                                               file_->header.format);
+            result.error().where =
+                fmt::format("{}: chunk at offset {} (points {} to {}, point format {})", input_->path(), chunkBegin_,
+                            part_.first + done_, part_.first + chunkEnd_ - 1, file_->header.format);
             result.error().hint = "the file is damaged; --skip-bad goes on with the next chunk";
         }
         return result;
