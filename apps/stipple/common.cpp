@@ -121,9 +121,10 @@ Result<std::shared_ptr<const lod::Store>> openScene(const std::vector<std::strin
         STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
         STIPPLE_ASSIGN(path, cachePath(inputs, build));
         if (!fs::exists(path)) {
-            if (showProgress) fmt::print(stderr, "building {} into the cache: {}\n", inputs.front(), path);
             Progress progress(showProgress);
             STIPPLE_ASSIGN(const lod::BuildReport built, lod::buildStore(inputs, path, settings, executor, progress));
+            if (showProgress)
+                fmt::print(stderr, "{}: built into the cache in {:.1f} s ({})\n", inputs.front(), built.seconds, path);
             for (const std::string& note : built.notes)
                 if (showProgress) fmt::print(stderr, "note: {}\n", note);
         }

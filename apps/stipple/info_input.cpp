@@ -226,6 +226,8 @@ Result<void> showFolder(const InputInfoOptions& o, const std::vector<std::string
         }
     }
     all["points"] = points;
+    if (const auto octree = lod::declaredByOctree(o.input); octree && *octree != points)
+        problems.push_back(fmt::format("the octree declares {} points, its node files hold {}", *octree, points));
     all["unreadable_files"] = bad;
     all["formats"] = formats;
     all["crs"] = systems;

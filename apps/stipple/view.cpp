@@ -79,6 +79,7 @@ void drawLegendOverlay(const Legend& legend) {
             ImGui::Unindent(20);
         }
     else {
+        ImGui::Dummy(ImVec2(1, 6));
         const ImVec2 start = ImGui::GetCursorPos();
         for (size_t j = legend.bar.size(); j-- > 0;) {
             swatch(legend.bar[j], 13, 1);

@@ -92,6 +92,10 @@ class Reading {
             STIPPLE_TRY(adopt(std::move(*source), options, found));
         }
         if (sources_.empty()) return fail(ErrorKind::input, "no input could be read", inputs_.front());
+        for (const std::string& input : inputs_)
+            if (const auto octree = declaredByOctree(input); octree && inputs_.size() == 1 && *octree != declared_)
+                report_.notes.push_back(
+                    fmt::format("{}: declares {} points, its node files hold {}", input, *octree, declared_));
         for (size_t k = 0; k < found.size(); ++k)
             if (!found[k]) {
                 std::string known;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "engine/base/file.h"
 
@@ -84,6 +85,23 @@ Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& in
         }
     }
     return files;
+}
+
+std::optional<uint64_t> declaredByOctree(const std::string& input) {
+    std::error_code error;
+    fs::path description(input);
+    if (fs::is_directory(description, error)) {
+        for (const char* name : {"ept.json", "cloud.js"})
+            if (fs::exists(fs::path(input) / name, error)) description = fs::path(input) / name;
+    }
+    const std::string name = description.filename().string();
+    if (name != "ept.json" && name != "cloud.js") return {};
+    constexpr uint64_t kSizeLimit = 1 << 20;
+    const auto text = readTextFile(description.string(), kSizeLimit);
+    if (!text) return {};
+    const auto json = nlohmann::json::parse(*text, nullptr, false);
+    if (!json.is_object() || !json.contains("points") || !json["points"].is_number_unsigned()) return {};
+    return json["points"].get<uint64_t>();
 }
 
 Result<uint64_t> readPoints(const PointSource& source, const std::function<Result<void>(const PointBlock&)>& take) {

@@ -1,7 +1,9 @@
 // Readers: one file or folder per format, each a function that reads a header and returns a PointSource.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "lod/primitives.h"
 
@@ -25,5 +27,9 @@ Result<uint64_t> readPoints(const PointSource& source, const std::function<Resul
 /// (*, ?, [) is what it matches; the ept.json or cloud.js of a LAZ octree is its node files, whose points together are
 /// the scan. Sorted by name, so that the order does not depend on the file system.
 Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& inputs);
+
+/// The number of points that the description of an octree (ept.json, cloud.js, or their folder) declares; nothing if
+/// `input` is no octree or declares none.
+std::optional<uint64_t> declaredByOctree(const std::string& input);
 
 }  // namespace stipple::lod

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdio>
 #include <fstream>
 #include <string>
@@ -40,6 +41,8 @@ Result<void> writeRecords(const std::string& path, const std::string& out) {
 Result<double> timeOnce(const std::vector<std::string>& files, bool everything, Executor& executor, uint64_t& points) {
     const double start = nowSeconds();
     points = 0;
+    std::vector<lod::PointSource> sources;
+    std::vector<std::pair<size_t, size_t>> parts;
     for (const std::string& path : files) {
         STIPPLE_ASSIGN(lod::PointSource source, lod::openPointSource(path));
         if (everything) {
@@ -48,20 +51,23 @@ Result<double> timeOnce(const std::vector<std::string>& files, bool everything, 
             STIPPLE_ASSIGN(source, lod::openPointSource(path, all));
         }
         points += source.info.points;
-        bool good = true;
-        executor.parallelFor(source.parts.size(), 1, [&](size_t begin, size_t end) {
-            lod::PointBlock block;
-            for (size_t p = begin; p < end; ++p) {
-                const auto read = source.openPart(p);
-                for (size_t count = read ? 1 : 0; count > 0;) {
-                    block.clear();
-                    count = (*read)(block, 65536).value_or(0);
-                }
-                if (!read) good = false;
-            }
-        });
-        if (!good) return fail(ErrorKind::input, "could not be read", path);
+        for (size_t p = 0; p < source.parts.size(); ++p) parts.emplace_back(sources.size(), p);
+        sources.push_back(std::move(source));
     }
+    std::atomic<uint64_t> got{0};
+    executor.parallelFor(parts.size(), 1, [&](size_t begin, size_t end) {
+        lod::PointBlock block;
+        for (size_t i = begin; i < end; ++i) {
+            const auto read = sources[parts[i].first].openPart(parts[i].second);
+            for (size_t count = read ? 1 : 0; count > 0;) {
+                block.clear();
+                count = (*read)(block, 65536).value_or(0);
+                got += count;
+            }
+        }
+    });
+    if (got != points)
+        return fail(ErrorKind::input, fmt::format("{} of {} points were read", got.load(), points), files[0]);
     return nowSeconds() - start;
 }
 

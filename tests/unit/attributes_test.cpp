@@ -186,7 +186,7 @@ TEST(Tiles, FoldersPatternsAndOctreesAreOneScan) {
     writeBytes(folder / "octree/ept-data/0-0-0-0.laz", test::encodeLas(planeSpec(), planeRecords(1000), true, rng));
     writeBytes(folder / "octree/ept-data/1-0-0-0.laz",
                test::encodeLas(planeSpec(), planeRecords(700, 5000), true, rng));
-    std::ofstream(folder / "octree/ept.json") << "{}";
+    std::ofstream(folder / "octree/ept.json") << R"({"points": 1699})";
     writeBytes(folder / "tiles/a.laz", test::encodeLas(planeSpec(), planeRecords(300), true, rng));
     test::LazSpec fine = planeSpec();
     fine.scale = 0.001;
@@ -198,6 +198,8 @@ TEST(Tiles, FoldersPatternsAndOctreesAreOneScan) {
         EXPECT_EQ(r.pointsOut, points) << input;
         EXPECT_EQ(openStore(folder / "o.stipple")->description.roundingUnits, 0.0) << "0.01 and 0.001 share a lattice";
     }
+    EXPECT_EQ(declaredByOctree(folder / "octree"), 1699u);
+    EXPECT_FALSE(declaredByOctree(folder / "tiles"));
     EXPECT_FALSE(expandInputs({folder / "tiles/*.xyz"}));
     EXPECT_FALSE(
         expandInputs({folder / "octree/ept-data/../../tiles/none"}).value_or(std::vector<std::string>{}).empty());
@@ -229,6 +231,66 @@ TEST(Tiles, DifferentCoordinateSystemsAreRefusedByName) {
     const Crs g = las::crsOf("", bytes, "");
     EXPECT_EQ(g.epsg, 26910);
     EXPECT_NEAR(g.metresPerUnit, 1200.0 / 3937, 1e-12);
+}
+
+/// A LAS file whose coordinate system is `wkt`.
+std::vector<uint8_t> withWkt(std::vector<uint8_t> las, const std::string& wkt) {
+    uint32_t dataOffset = 0, records = 0;
+    std::memcpy(&dataOffset, las.data() + 96, 4);
+    std::memcpy(&records, las.data() + 100, 4);
+    std::string record(54, '\0');
+    record.replace(2, 15, "LASF_Projection");
+    const uint16_t id = 2112;
+    std::memcpy(&record[18], &id, 2);
+    const auto length = static_cast<uint16_t>(wkt.size());
+    std::memcpy(&record[20], &length, 2);
+    record += wkt;
+    las.insert(las.begin() + dataOffset, record.begin(), record.end());
+    dataOffset += static_cast<uint32_t>(record.size());
+    ++records;
+    std::memcpy(las.data() + 96, &dataOffset, 4);
+    std::memcpy(las.data() + 100, &records, 4);
+    return las;
+}
+
+TEST(Tiles, TheCoordinateSystemIsKeptAndAForeignTileNamed) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    Rng rng(1);
+    const auto las = test::encodeLas(planeSpec(), planeRecords(300), false, rng);
+    writeBytes(folder / "a.las", withWkt(las, R"(PROJCS["Here",UNIT["US survey foot",0.304800609601219]])"));
+    writeBytes(folder / "b.las", withWkt(las, R"(PROJCS["There",UNIT["metre",1]])"));
+    test::build({folder / "a.las"}, folder / "a.stipple", *executor);
+    const auto store = openStore(folder / "a.stipple");
+    ASSERT_TRUE(store);
+    EXPECT_EQ(store->description.crs.name, "Here");
+    EXPECT_NEAR(store->description.metresPerUnit, 0.3048006096, 1e-10);
+    Progress silent(false);
+    const auto mixed = buildStore({folder / "a.las", folder / "b.las"}, folder / "c.stipple", {}, *executor, silent);
+    ASSERT_FALSE(mixed);
+    for (const char* text : {"b.las", "There", "a.las", "Here"})
+        EXPECT_NE(mixed.error().line().find(text), std::string::npos) << mixed.error().line();
+}
+
+TEST(Tiles, HeadersThatCannotBeAreRefusedWithTheirOffset) {
+    const test::TempFolder folder;
+    Rng rng(1);
+    const auto las = test::encodeLas(planeSpec(), planeRecords(300), false, rng);
+    const auto refusal = [&](size_t at, auto value) {
+        auto changed = las;
+        std::memcpy(changed.data() + at, &value, sizeof(value));
+        writeBytes(folder / "a.las", changed);
+        const auto source = openLas(folder / "a.las");
+        return source ? std::string("none") : source.error().line();
+    };
+    for (const auto& [line, text] :
+         {std::pair{refusal(131, 0.0), "scale 0"}, std::pair{refusal(139, -1.0), "scale -1"},
+          std::pair{refusal(147, std::nan("")), "scale nan"}, std::pair{refusal(155, HUGE_VAL), "offset inf"},
+          std::pair{refusal(105, uint16_t{35}), "needs 36"}, std::pair{refusal(104, uint8_t{11}), "point format 11"},
+          std::pair{refusal(25, uint8_t{6}), "LAS 1.6"}, std::pair{refusal(94, uint16_t{200}), "offset 94"},
+          std::pair{refusal(96, uint32_t{0x7fffffff}), "truncated"}, std::pair{refusal(104, uint8_t{0x87}), "laszip"},
+          std::pair{refusal(247, uint64_t{1} << 62), "only 300 fit"}})
+        EXPECT_NE(line.find(text), std::string::npos) << line;
 }
 
 TEST(Tiles, SkipBadLosesTheChunkAndCountsIt) {

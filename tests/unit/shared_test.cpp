@@ -114,6 +114,19 @@ TEST(Push, WhatLiesInFrontStaysAndWhatLiesBehindGoes) {
     EXPECT_NEAR(push(0), 10, 1e-5);  // empty
 }
 
+TEST(Push, DiscsThatOnlyShareACoarseTexelGrowNoLine) {
+    // At the border of the image: two filled neighbours, two outside, and no ellipse anywhere near.
+    shared::Texel none = plainTexel(0, 0), outside = plainTexel(-1, 0);
+    none.thickness = outside.thickness = 0;
+    shared::Texel left = plainTexel(10, 3), right = plainTexel(10, 3);
+    left.offset = {-20, 0};
+    right.offset = {20, 0};
+    EXPECT_EQ(shared::pushTexel(none, left, right, outside, outside, 1, -1, 8, 0.001f).depth, 0);
+    // Between four of one surface a gap is closed, also where no rim quite reaches.
+    shared::Texel near = plainTexel(10, 5);
+    EXPECT_NEAR(shared::pushTexel(none, near, near, near, near, 1, -1, 8, 0.001f).depth, 10, 1e-5);
+}
+
 TEST(Push, NothingComesFromNothing) {
     shared::Texel none = plainTexel(0, 0);
     none.thickness = 0;
