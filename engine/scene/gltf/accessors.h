@@ -1,0 +1,43 @@
+// The numbers of a glTF file: buffers from data URIs, files and the binary chunk; compressed buffer views; accessors
+// with strides, sparse replacements and normalised integers.
+#pragma once
+
+#include <map>
+#include <span>
+
+#include "engine/scene/gltf/container.h"
+#include "engine/scene/gltf/schema.h"
+
+namespace stipple::scene::gltf {
+
+class Buffers {
+  public:
+    /// `container` must outlive it; its structure and extents must have been checked.
+    explicit Buffers(const Container& container) : container_(container) {}
+    /// Loads every buffer; an error names the one that is missing or too short.
+    Result<void> load();
+    /// The bytes of a buffer view, decompressed if it is compressed.
+    Result<std::span<const uint8_t>> view(size_t index);
+    /// All values of an accessor, count * components, normalised where it says so.
+    Result<std::vector<double>> values(size_t accessor);
+    Result<std::vector<uint32_t>> indices(size_t accessor);
+    /// False for a buffer that the file leaves out (a placeholder).
+    bool hasData(const nlohmann::json& accessor) const;
+    /// The bytes of an image (still encoded).
+    Result<std::vector<uint8_t>> image(size_t index);
+
+  private:
+    Result<void> decompress(size_t index);
+    Result<void> addSparse(const nlohmann::json& accessor, size_t components, std::vector<double>& values);
+
+    const Container& container_;
+    std::vector<std::vector<uint8_t>> buffers_;
+    std::map<size_t, std::vector<uint8_t>> decompressed_;
+};
+
+/// Values against what the accessors promise: bounds, finite numbers, indices in range. Reads everything.
+Result<void> checkValues(const Container& container, Buffers& buffers, Problems& problems);
+/// Images that are missing, or are no images.
+Result<void> checkImageBytes(const Container& container, Buffers& buffers, Problems& problems);
+
+}  // namespace stipple::scene::gltf

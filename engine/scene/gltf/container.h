@@ -1,0 +1,23 @@
+// A glTF 2.0 file taken apart: its JSON text and, for .glb, its binary chunk. Nothing is understood here.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "engine/base/result.h"
+
+namespace stipple::scene::gltf {
+
+struct Container {
+    nlohmann::json json;
+    std::vector<uint8_t> binary;  ///< chunk 1 of a .glb
+    bool isBinary = false, hasBinaryChunk = false;
+    std::string path, folder;
+    uint64_t fileBytes = 0;
+};
+
+/// `.gltf` or `.glb`, told by content. Errors name the offset.
+Result<Container> readContainer(const std::string& path);
+
+}  // namespace stipple::scene::gltf

@@ -1,0 +1,34 @@
+// What the checks of glTF share.
+#pragma once
+
+#include <algorithm>
+
+#include "engine/scene/gltf/schema.h"
+
+namespace stipple::scene::gltf {
+
+constexpr size_t kMostProblems = 100;
+
+inline void say(Problems& problems, const std::string& path, const std::string& what) {
+    if (problems.size() < kMostProblems) problems.push_back((path.empty() ? "/" : path) + ": " + what);
+}
+
+/// An array of the root; empty where there is none.
+inline const nlohmann::json& arrayOf(const nlohmann::json& root, const char* name) {
+    static const nlohmann::json none = nlohmann::json::array();
+    const auto found = root.find(name);
+    return found == root.end() ? none : *found;
+}
+
+/// Is `name` in the root's list (extensionsUsed, extensionsRequired)?
+inline bool listed(const nlohmann::json& root, const char* list, const std::string& name) {
+    const nlohmann::json& names = arrayOf(root, list);
+    return std::find(names.begin(), names.end(), nlohmann::json(name)) != names.end();
+}
+
+inline bool hasStride(const nlohmann::json& root, const nlohmann::json& accessor) {
+    return accessor.contains("bufferView") &&
+           root["bufferViews"][accessor["bufferView"].get<size_t>()].contains("byteStride");
+}
+
+}  // namespace stipple::scene::gltf
