@@ -86,6 +86,7 @@ struct SourceInfo {
     glm::dvec3 scale{1}, offset{0};  ///< only where isLattice
     glm::dvec3 declaredMin{0}, declaredMax{0};
     bool hasDeclaredBounds = false;
+    bool isReflectance = false;  ///< colours are of the material, to be lit; otherwise as a scanner's camera saw them
     UpAxis up = UpAxis::y;
     Crs crs;
     std::vector<AttributeInfo> attributes;  ///< that can be asked for

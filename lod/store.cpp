@@ -124,6 +124,7 @@ nlohmann::json toJson(const StoreDescription& d) {
         {"focus_min", {d.focusMin.x, d.focusMin.y, d.focusMin.z}},
         {"focus_max", {d.focusMax.x, d.focusMax.y, d.focusMax.z}},
         {"has_colour", d.hasColour},
+        {"is_reflectance", d.isReflectance},
         {"has_normals", d.hasNormals},
         {"source", d.source}};
 }
@@ -174,6 +175,7 @@ StoreDescription fromJson(const nlohmann::json& j) {
         d.boundsMax[i] = j.at("max").at(static_cast<size_t>(i)).get<double>();
     }
     d.hasColour = j.at("has_colour").get<bool>();
+    d.isReflectance = j.at("is_reflectance").get<bool>();
     d.hasNormals = j.at("has_normals").get<bool>();
     d.source = j.at("source").get<std::string>();
     return d;

@@ -29,6 +29,7 @@ struct StoreDescription {
     glm::dvec3 boundsMin{0}, boundsMax{0};  ///< of the points, world units
     glm::dvec3 focusMin{0}, focusMax{0};    ///< the same without stray points: what a camera looks at first
     bool hasColour = false;                 ///< the points have colours of their own
+    bool isReflectance = false;             ///< those are of the material, to be lit
     bool hasNormals = false;                ///< from the file or estimated
     std::string source;                     ///< file names of the input, without folders
 };

@@ -10,6 +10,7 @@
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
 #include "engine/cpu/cpu_backend.h"
+#include "engine/image/image_io.h"
 #include "engine/reference/reference.h"
 #include "lod/colour.h"
 #include "lod/import/import.h"
@@ -40,6 +41,9 @@ void BuildOptions::addTo(CLI::App& app) {
     app.add_option("--attributes", attributes,
                    "attributes to keep beside position, colour and normal: all, none, or names with commas")
         ->capture_default_str();
+    app.add_option("--surfels", surfels, "samples that a scene with meshes (.gltf, .glb) is turned into")
+        ->check(CLI::Range(uint64_t{1}, uint64_t{200'000'000}))
+        ->capture_default_str();
     app.add_flag("--skip-bad", skipBad, "go on past corrupt chunks and files, and say what was lost");
 }
 
@@ -64,6 +68,32 @@ std::vector<std::string> namesOf(const std::string& list) {
 
 }  // namespace
 
+bool isSceneFile(const std::string& path) {
+    const std::string extension = fs::path(path).extension().string();
+    return extension == ".gltf" || extension == ".glb";
+}
+
+Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene) {
+    std::vector<scene::DecodedImage> images;
+    for (const scene::EncodedImage& encoded : scene.images) {
+        STIPPLE_ASSIGN(render::Image image, image::decodeImage(encoded.bytes, scene.path + ": " + encoded.name));
+        images.push_back({image.width, image.height, std::move(image.rgba)});
+    }
+    return images;
+}
+
+namespace {
+
+/// Scans by the readers of lod; meshes as surfels.
+Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptions& options, uint64_t surfels) {
+    if (!isSceneFile(path)) return lod::openPointSource(path, options);
+    STIPPLE_ASSIGN(const scene::Scene scene, scene::readGltf(path));
+    STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene));
+    return scene::sampleSurfels(scene, images, {surfels});
+}
+
+}  // namespace
+
 Result<lod::BuildSettings> BuildOptions::settings() const {
     lod::BuildSettings s;
     s.memoryBytes = parseBytes(memory);
@@ -74,6 +104,9 @@ Result<lod::BuildSettings> BuildOptions::settings() const {
                                     : lod::NormalsMode::automatic;
     s.estimateRadii = radii != "keep";
     s.skipBad = skipBad;
+    s.open = [count = surfels](const std::string& path, const lod::ReadOptions& o) {
+        return openInput(path, o, count);
+    };
     s.allAttributes = attributes == "all";
     s.attributes = namesOf(attributes);
     if (!up.empty()) s.up = static_cast<lod::UpAxis>(up[0] - 'x');
@@ -84,7 +117,8 @@ namespace {
 
 Result<std::string> cachePath(const std::vector<std::string>& inputs, const BuildOptions& build) {
     std::string key = build.normals + "|" + build.radii + "|" + build.up + "|" + build.attributes +
-                      (build.skipBad ? "|skip" : "|") + STIPPLE_VERSION + fmt::format("|{}", lod::kStoreVersion);
+                      (build.skipBad ? "|skip" : "|") + std::to_string(build.surfels) + STIPPLE_VERSION +
+                      fmt::format("|{}", lod::kStoreVersion);
     STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs(inputs));
     for (const std::string& input : files) {
         std::error_code error;

@@ -11,6 +11,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/result.h"
 #include "engine/render/backend.h"
+#include "engine/scene/surfels.h"
 #include "lod/build/build.h"
 #include "lod/store.h"
 
@@ -23,6 +24,7 @@ struct BuildOptions {
     std::string memory = "2G", normals = "auto", radii = "auto", up, attributes = "none";
     int threads = 0;
     bool skipBad = false;
+    uint64_t surfels = 2'000'000;
     void addTo(CLI::App& app);
     Result<lod::BuildSettings> settings() const;
 };
@@ -33,6 +35,13 @@ struct ColourOptions {
     bool legend = false;
     void addTo(CLI::App& app);
 };
+
+/// What `--shade auto` does: lit, unless a scan has its own colours.
+inline bool isShaded(const lod::StoreDescription& d) { return !d.hasColour || d.isReflectance; }
+
+/// .gltf or .glb.
+bool isSceneFile(const std::string& path);
+Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene);
 
 /// A .stipple file is opened; anything else is built into the cache first (and found there the next time), with
 /// the attribute that `colour` needs.

@@ -8,7 +8,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "apps/stipple/common.h"
 #include "engine/base/file.h"
+#include "engine/scene/scene.h"
 #include "lod/import/import.h"
 #include "lod/import/las/header.h"
 #include "lod/import/survey.h"
@@ -252,7 +254,64 @@ Result<void> showFolder(const InputInfoOptions& o, const std::vector<std::string
 
 }  // namespace
 
+namespace {
+
+nlohmann::json sceneJson(const scene::Scene& s) {
+    uint64_t triangles = 0, lines = 0, points = 0, stores = 0, instances = 0;
+    for (const scene::Mesh& m : s.meshes)
+        for (const scene::Primitive& p : m.primitives) {
+            if (p.kind == scene::PrimitiveKind::triangles) triangles += p.indices.size() / 3;
+            if (p.kind == scene::PrimitiveKind::lines) lines += p.indices.size() / 2;
+            if (p.kind == scene::PrimitiveKind::points) points += p.indices.size();
+        }
+    for (const scene::Node& n : s.nodes) {
+        if (!n.store.empty()) ++stores;
+        instances += n.instances.size();
+    }
+    nlohmann::json j = {{"kind", "scene"},
+                        {"path", s.path},
+                        {"nodes", s.nodes.size()},
+                        {"instances", instances},
+                        {"stores", stores},
+                        {"meshes", s.meshes.size()},
+                        {"triangles", triangles},
+                        {"lines", lines},
+                        {"points", points},
+                        {"materials", s.materials.size()},
+                        {"textures", s.textures.size()},
+                        {"images", s.images.size()},
+                        {"lights", s.lights.size()},
+                        {"cameras", s.cameras.size()},
+                        {"notes", s.notes}};
+    const scene::Box box = scene::meshBounds(s);
+    if (!box.isEmpty()) {
+        j["min"] = vectorJson(box.least);
+        j["max"] = vectorJson(box.greatest);
+    }
+    return j;
+}
+
+Result<void> showScene(const InputInfoOptions& o) {
+    STIPPLE_ASSIGN(const scene::Scene s, scene::readGltf(o.input));
+    const nlohmann::json j = sceneJson(s);
+    if (o.json) {
+        fmt::print("{}\n", j.dump(2));
+        return {};
+    }
+    fmt::print("{}: glTF 2.0 scene\n", o.input);
+    printVector(j, "min", "least");
+    printVector(j, "max", "greatest");
+    for (const char* key : {"nodes", "instances", "stores", "meshes", "triangles", "lines", "points", "materials",
+                            "textures", "images", "lights", "cameras"})
+        if (j[key] != 0) fmt::print("  {:15} {}\n", key, j[key].get<uint64_t>());
+    for (const std::string& note : s.notes) fmt::print("  note: {}\n", note);
+    return {};
+}
+
+}  // namespace
+
 Result<void> showInputInfo(const InputInfoOptions& o, Executor& executor) {
+    if (isSceneFile(o.input)) return showScene(o);
     STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs({o.input}));
     if (files.size() != 1) return showFolder(o, files, executor);
     STIPPLE_ASSIGN(const nlohmann::json j, fileInfo(o, files.front(), executor));

@@ -74,7 +74,7 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     s.mode = o.mode == "points" ? render::Mode::points : render::Mode::pullpush;
     s.budgets.errorPixels = o.error;
     if (o.budget > 0) s.budgets.records = o.budget;
-    s.draw.lit = o.shade == "lit" || (o.shade == "auto" && !d.hasColour && colour.mode == lod::ColourMode::own);
+    s.draw.lit = o.shade == "lit" || (o.shade == "auto" && isShaded(d) && colour.mode == lod::ColourMode::own);
     s.draw.worldUp = shot.worldUp;
     STIPPLE_ASSIGN(const glm::dvec3 background, parseVector(o.background, "--background"));
     for (int c = 0; c < 3; ++c) {
@@ -301,6 +301,9 @@ void setupRender(CLI::App& app, int& status) {
     auto* group = sub->add_option_group("building", "for inputs that are not built yet");
     group->add_option("--memory", o->build.memory, "memory that the build may use")->capture_default_str();
     group->add_option("--attributes", o->build.attributes, "attributes to keep; the one of --colour always is")
+        ->capture_default_str();
+    group->add_option("--surfels", o->build.surfels, "samples that a scene with meshes is turned into")
+        ->check(CLI::Range(uint64_t{1}, uint64_t{200'000'000}))
         ->capture_default_str();
     group->add_flag("--skip-bad", o->build.skipBad, "go on past corrupt chunks and files, and say what was lost");
     group->add_option("--threads", o->build.threads, "threads (0: all cores)")

@@ -144,7 +144,7 @@ Result<void> run(const Options& o) {
     Legend legend = makeLegend(colour, d);
     render::FrameSettings settings;
     settings.budgets = {o.error, o.budget};
-    settings.draw.lit = o.shade == "lit" || (o.shade == "auto" && !d.hasColour && colour.mode == lod::ColourMode::own);
+    settings.draw.lit = o.shade == "lit" || (o.shade == "auto" && isShaded(d) && colour.mode == lod::ColourMode::own);
     settings.draw.worldUp = d.up;
     const double diagonal = std::max(1e-300, glm::length(d.boundsMax - d.boundsMin));
     Navigation navigation(scene::fitCamera(d.focusMin, d.focusMax, d.up, static_cast<double>(size.x) / size.y),
@@ -162,7 +162,7 @@ Result<void> run(const Options& o) {
             legend = makeLegend(colour, d);
             state.reset();  // gives back what is resident
             state = render::makeFrameState({store}, *backend, *executor, stream, colour);
-            settings.draw.lit = o.shade == "lit" || (colour.mode == lod::ColourMode::own && !d.hasColour);
+            settings.draw.lit = o.shade == "lit" || (colour.mode == lod::ColourMode::own && isShaded(d));
         }
         navigation.move(input);
         const lod::View view = scene::makeView(navigation.camera(), input.width, input.height, 1e-6 * diagonal);

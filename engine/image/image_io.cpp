@@ -15,6 +15,7 @@ namespace {
 struct Module {
     decltype(&stippleOiioEncode) encode = nullptr;
     decltype(&stippleOiioRead) read = nullptr;
+    decltype(&stippleOiioDecode) decode = nullptr;
     std::string problem;
 };
 
@@ -34,7 +35,8 @@ const Module& module() {
             }
             m.encode = reinterpret_cast<decltype(m.encode)>(::dlsym(handle, "stippleOiioEncode"));
             m.read = reinterpret_cast<decltype(m.read)>(::dlsym(handle, "stippleOiioRead"));
-            if (m.encode && m.read) return m;
+            m.decode = reinterpret_cast<decltype(m.decode)>(::dlsym(handle, "stippleOiioDecode"));
+            if (m.encode && m.read && m.decode) return m;
         }
         return m;
     }();
@@ -89,26 +91,46 @@ Result<void> writeImage(const std::string& path, const render::Image& image) {
     return writeWholeFile(path, bytes.data(), bytes.size());
 }
 
-Result<render::Image> readImage(const std::string& path) {
-    if (!module().read) return fail(ErrorKind::input, "the picture module cannot be loaded: " + module().problem, path);
+namespace {
+
+/// Size first, then pixels: `call` is either way to read.
+template <typename Call>
+Result<render::Image> readWith(const std::string& name, Call call) {
+    if (!module().read) return fail(ErrorKind::input, "the picture module cannot be loaded: " + module().problem, name);
     std::array<char, 512> error{};
     int width = 0, height = 0;
     const auto bad = [&] {
         const std::string text = error.data();
-        return fail(ErrorKind::input, "cannot be read: " + text.substr(0, text.find('\n')), path,
-                    "PNG and EXR are read");
+        return fail(ErrorKind::input, "cannot be read: " + text.substr(0, text.find('\n')), name,
+                    "is it a whole picture?");
     };
-    if (module().read(path.c_str(), &width, &height, nullptr, error.data(), error.size()) != 0) return bad();
+    if (call(&width, &height, nullptr, error.data(), static_cast<int>(error.size())) != 0) return bad();
     if (width <= 0 || height <= 0 || int64_t{width} * height > int64_t{1} << 30)
-        return fail(ErrorKind::input, "has an impossible size", path);
+        return fail(ErrorKind::input, "has an impossible size", name);
     render::Image image;
     image.width = static_cast<uint32_t>(width);
     image.height = static_cast<uint32_t>(height);
     image.rgba.resize(size_t{image.width} * image.height);
-    if (module().read(path.c_str(), &width, &height, reinterpret_cast<unsigned char*>(image.rgba.data()), error.data(),
-                      error.size()) != 0)
-        return bad();
+    auto* pixels = reinterpret_cast<unsigned char*>(image.rgba.data());
+    if (call(&width, &height, pixels, error.data(), static_cast<int>(error.size())) != 0) return bad();
     return image;
+}
+
+}  // namespace
+
+Result<render::Image> readImage(const std::string& path) {
+    return readWith(path, [&](int* w, int* h, unsigned char* pixels, char* error, int bytes) {
+        return module().read(path.c_str(), w, h, pixels, error, bytes);
+    });
+}
+
+Result<render::Image> decodeImage(const std::vector<uint8_t>& bytes, const std::string& name) {
+    const bool isJpeg = bytes.size() > 2 && bytes[0] == 0xff && bytes[1] == 0xd8;
+    const bool isWebp = bytes.size() > 11 && std::memcmp(bytes.data() + 8, "WEBP", 4) == 0;
+    const char* const format = isJpeg ? "jpeg" : isWebp ? "webp" : "png";
+    return readWith(name, [&](int* w, int* h, unsigned char* pixels, char* error, int count) {
+        return module().decode(format, bytes.data(), bytes.size(), w, h, pixels, error, count);
+    });
 }
 
 }  // namespace stipple::image

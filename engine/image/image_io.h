@@ -13,6 +13,8 @@ namespace stipple::image {
 Result<void> writeImage(const std::string& path, const render::Image& image);
 /// 8-bit RGBA; files without alpha are opaque.
 Result<render::Image> readImage(const std::string& path);
+/// Decodes an image that stands in memory (PNG, JPEG, ...); `name` is for messages.
+Result<render::Image> decodeImage(const std::vector<uint8_t>& bytes, const std::string& name);
 /// Can this extension be written? An error that names those that can, if not.
 Result<void> checkImagePath(const std::string& path);
 

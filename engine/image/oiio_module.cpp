@@ -40,30 +40,55 @@ extern "C" int stippleOiioEncode(const char* path, int width, int height, int ch
     }
 }
 
+namespace {
+
+/// The rest of both ways to read: size, then RGBA bytes.
+int readRgba(OIIO::ImageInput* in, int* width, int* height, unsigned char* pixels, char* error, int errorBytes) {
+    if (!in) return report(OIIO::geterror(), error, errorBytes);
+    const OIIO::ImageSpec& spec = in->spec();
+    *width = spec.width;
+    *height = spec.height;
+    if (pixels == nullptr) return 0;
+    const int channels = spec.nchannels;
+    const size_t count = static_cast<size_t>(spec.width) * static_cast<size_t>(spec.height);
+    std::vector<unsigned char> raw(count * static_cast<size_t>(channels));
+    if (!in->read_image(0, 0, 0, channels, OIIO::TypeDesc::UINT8, raw.data()))
+        return report(in->geterror(), error, errorBytes);
+    for (size_t i = 0; i < count; ++i)
+        for (int c = 0; c < 4; ++c) {
+            const int from = channels >= 3 ? c : c < 3 ? 0 : channels == 2 ? 1 : 4;
+            pixels[i * 4 + static_cast<size_t>(c)] =
+                from < channels ? raw[i * static_cast<size_t>(channels) + static_cast<size_t>(from)] : 255;
+        }
+    return 0;
+}
+
+}  // namespace
+
 extern "C" int stippleOiioRead(const char* path, int* width, int* height, unsigned char* pixels, char* error,
                                int errorBytes) {
     try {
         OIIO::ImageSpec config;
         config.attribute("oiio:UnassociatedAlpha", 1);
         const std::unique_ptr<OIIO::ImageInput> in = OIIO::ImageInput::open(path, &config);
+        return readRgba(in.get(), width, height, pixels, error, errorBytes);
+    } catch (const std::exception& e) {
+        return report(e.what(), error, errorBytes);
+    }
+}
+
+extern "C" int stippleOiioDecode(const char* format, const void* bytes, unsigned long count, int* width, int* height,
+                                 unsigned char* pixels, char* error, int errorBytes) {
+    try {
+        OIIO::ImageSpec config;
+        config.attribute("oiio:UnassociatedAlpha", 1);
+        OIIO::Filesystem::IOMemReader memory(const_cast<void*>(bytes), count);
+        const std::unique_ptr<OIIO::ImageInput> in = OIIO::ImageInput::create(format);
         if (!in) return report(OIIO::geterror(), error, errorBytes);
-        const OIIO::ImageSpec& spec = in->spec();
-        *width = spec.width;
-        *height = spec.height;
-        if (pixels == nullptr) return 0;
-        const int channels = spec.nchannels;
-        std::vector<unsigned char> raw(static_cast<size_t>(spec.width) * static_cast<size_t>(spec.height) *
-                                       static_cast<size_t>(channels));
-        if (!in->read_image(0, 0, 0, channels, OIIO::TypeDesc::UINT8, raw.data()))
-            return report(in->geterror(), error, errorBytes);
-        const size_t count = static_cast<size_t>(spec.width) * static_cast<size_t>(spec.height);
-        for (size_t i = 0; i < count; ++i)
-            for (int c = 0; c < 4; ++c) {
-                const int from = channels >= 3 ? c : c < 3 ? 0 : channels == 2 ? 1 : 4;
-                pixels[i * 4 + static_cast<size_t>(c)] =
-                    from < channels ? raw[i * static_cast<size_t>(channels) + static_cast<size_t>(from)] : 255;
-            }
-        return 0;
+        OIIO::ImageSpec spec;
+        if (!in->set_ioproxy(&memory)) return report("this format cannot be decoded in memory", error, errorBytes);
+        if (!in->open(format, spec, config)) return report(in->geterror(), error, errorBytes);
+        return readRgba(in.get(), width, height, pixels, error, errorBytes);
     } catch (const std::exception& e) {
         return report(e.what(), error, errorBytes);
     }

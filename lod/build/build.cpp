@@ -88,6 +88,7 @@ Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std
     for (const Node& node : hierarchy.nodes) description.records += node.records;
     description.roundingUnits = cloud.roundingUnits;
     description.hasColour = cloud.hasColour;
+    description.isReflectance = cloud.isReflectance;
     description.hasNormals = cloud.hasNormal || settings.normals == NormalsMode::automatic;
     description.source = cloud.source;
     glm::dvec3 lo(cloud.x[0], cloud.y[0], cloud.z[0]), hi = lo;

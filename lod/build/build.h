@@ -1,6 +1,7 @@
 // One build: from input files to a verified store.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -22,7 +23,9 @@ struct BuildSettings {
     uint32_t leafRecords = 8192;
     std::vector<std::string> attributes;  ///< kept as named streams
     bool allAttributes = false;           ///< every attribute of the input, beside `attributes`
-    bool skipBad = false;                 ///< go on past corrupt chunks and files, and count what is lost
+    /// Opens one input; empty: openPointSource. For inputs that this library does not know (scenes with meshes).
+    std::function<Result<PointSource>(const std::string& path, const ReadOptions& options)> open;
+    bool skipBad = false;  ///< go on past corrupt chunks and files, and count what is lost
 };
 
 struct BuildReport {

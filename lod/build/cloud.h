@@ -25,7 +25,7 @@ struct Cloud {
     std::vector<uint32_t> colour;  ///< r g b 8 | flags 8
     std::vector<uint32_t> normal;  ///< octahedral; meaning given by the flags
     std::vector<float> radius;     ///< lattice units; 0: to be estimated
-    bool hasColour = false, hasNormal = false, hasRadius = false;
+    bool hasColour = false, hasNormal = false, hasRadius = false, isReflectance = false;
     UpAxis up = UpAxis::z;
     Crs crs;
     std::string source;

@@ -82,7 +82,7 @@ class Reading {
         cloud_.attributes.resize(options.attributes.size());
         std::vector<bool> found(options.attributes.size(), false);
         for (const std::string& path : files) {
-            auto source = openPointSource(path, options);
+            auto source = openInput(path, options);
             if (!source) {
                 if (!settings_.skipBad) return tl::unexpected(source.error());
                 report_.notes.push_back("skipped: " + source.error().line());
@@ -108,10 +108,14 @@ class Reading {
         return {};
     }
 
+    Result<PointSource> openInput(const std::string& path, const ReadOptions& options) const {
+        return settings_.open ? settings_.open(path, options) : openPointSource(path, options);
+    }
+
     /// Every attribute of every file, in order of first appearance.
     Result<void> collectNames(const std::vector<std::string>& files, ReadOptions& options) const {
         for (const std::string& path : files) {
-            const auto source = openPointSource(path, {{}, settings_.skipBad});
+            const auto source = openInput(path, {{}, settings_.skipBad});
             if (!source) continue;  // said when it is opened for reading
             for (const AttributeInfo& a : source->info.attributes)
                 if (std::find(options.attributes.begin(), options.attributes.end(), a.name) == options.attributes.end())
@@ -156,6 +160,7 @@ class Reading {
         cloud_.hasColour = cloud_.hasColour || info.hasColour;
         cloud_.hasNormal = cloud_.hasNormal || (info.hasNormal && settings_.normals != NormalsMode::none);
         cloud_.hasRadius = cloud_.hasRadius || info.hasRadius;
+        cloud_.isReflectance = cloud_.isReflectance || info.isReflectance;
         for (const std::string& note : info.notes) report_.notes.push_back(fmt::format("{}: {}", info.path, note));
         sources_.push_back(std::move(source));
         return {};

@@ -395,6 +395,8 @@ void checkExtents(const json& root, bool isBinary, bool hasBinaryChunk, uint64_t
     for (const json& mesh : arrayOf(root, "meshes"))
         for (const json& primitive : mesh["primitives"]) {
             const auto use = [&](const json& accessor, int as) {
+                // Those of morph targets are checked later.
+                if (!accessor.is_number_unsigned() || accessor.get<size_t>() >= accessors.size()) return;
                 const json& a = accessors[accessor.get<size_t>()];
                 if (!a.contains("bufferView")) return;
                 int& is = target[a["bufferView"].get<size_t>()];

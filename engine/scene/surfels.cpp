@@ -1,0 +1,266 @@
+#include "engine/scene/surfels.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "shaders/shared/record.h"
+
+namespace stipple::scene {
+namespace {
+
+constexpr uint64_t kMostSurfels = 200'000'000;
+constexpr int kMostTaps = 8;  ///< along each axis of a prefiltered texture lookup
+
+float linearOf(uint32_t byte) {
+    static const std::array<float, 256> table = [] {
+        std::array<float, 256> t{};
+        for (uint32_t i = 0; i < 256; ++i) t.at(i) = shared::linearFromSrgb(static_cast<float>(i) / 255.0f);
+        return t;
+    }();
+    return table.at(byte);
+}
+
+uint32_t byteOf(float linear) {
+    return static_cast<uint32_t>(shared::srgbFromLinear(std::clamp(linear, 0.0f, 1.0f)) * 255.0f + 0.5f);
+}
+
+int64_t wrapped(int64_t i, int64_t size, Wrap wrap) {
+    if (wrap == Wrap::clamp) return std::clamp<int64_t>(i, 0, size - 1);
+    const int64_t period = wrap == Wrap::mirror ? 2 * size : size;
+    const int64_t m = (i % period + period) % period;
+    return m < size ? m : period - 1 - m;
+}
+
+/// Linear colour and alpha at uv; bilinear, averaged over `footprint` texels.
+glm::vec4 lookup(const DecodedImage& image, const Texture& texture, glm::vec2 uv, float footprint) {
+    if (image.rgba.empty() || !std::isfinite(uv.x + uv.y)) return glm::vec4(1);
+    const int taps = std::clamp(static_cast<int>(std::ceil(footprint)), 1, kMostTaps);
+    const auto w = static_cast<int64_t>(image.width), h = static_cast<int64_t>(image.height);
+    glm::vec4 sum(0);
+    for (int ty = 0; ty < taps; ++ty)
+        for (int tx = 0; tx < taps; ++tx) {
+            const float dx = ((static_cast<float>(tx) + 0.5f) / static_cast<float>(taps) - 0.5f) * footprint;
+            const float dy = ((static_cast<float>(ty) + 0.5f) / static_cast<float>(taps) - 0.5f) * footprint;
+            const float x = uv.x * static_cast<float>(w) + dx - 0.5f, y = uv.y * static_cast<float>(h) + dy - 0.5f;
+            const float fx = x - std::floor(x), fy = y - std::floor(y);
+            for (int k = 0; k < 4; ++k) {
+                const int64_t px = wrapped(static_cast<int64_t>(std::floor(x)) + (k & 1), w, texture.wrapU);
+                const int64_t py = wrapped(static_cast<int64_t>(std::floor(y)) + (k >> 1), h, texture.wrapV);
+                const uint32_t c = image.rgba[static_cast<size_t>(py * w + px)];
+                const float weight = ((k & 1) != 0 ? fx : 1 - fx) * (k > 1 ? fy : 1 - fy);
+                sum += weight * glm::vec4(linearOf(c & 255u), linearOf(c >> 8 & 255u), linearOf(c >> 16 & 255u),
+                                          static_cast<float>(c >> 24) / 255.0f);
+            }
+        }
+    return sum / static_cast<float>(taps * taps);
+}
+
+uint32_t hashOf(uint32_t v) {
+    v ^= v >> 16;
+    v *= 0x7feb352du;
+    v ^= v >> 15;
+    v *= 0x846ca68bu;
+    return v ^ v >> 16;
+}
+
+struct Surfels {
+    std::vector<glm::dvec3> position;
+    std::vector<glm::vec3> normal;
+    std::vector<uint32_t> colour;
+    uint64_t cutOut = 0;  ///< samples that an alpha mask leaves out
+};
+
+class Sampler {
+  public:
+    Sampler(const Scene& scene, const std::vector<DecodedImage>& images, const SurfelSettings& settings)
+        : scene_(scene), images_(images), settings_(settings) {}
+
+    Result<Surfels> run() {
+        const std::vector<glm::dmat4> world = scene_.worldTransforms();
+        const std::vector<bool> visible = scene_.visibility();
+        double area = 0;
+        uint64_t points = 0;
+        const auto each = [&](const auto& f) {
+            for (size_t n = 0; n < scene_.nodes.size(); ++n) {
+                const Node& node = scene_.nodes[n];
+                if (node.mesh < 0 || !visible[n]) continue;
+                std::vector<glm::dmat4> places = node.instances;
+                if (places.empty()) places.emplace_back(1);
+                for (const glm::dmat4& place : places)
+                    for (const Primitive& p : scene_.meshes[static_cast<size_t>(node.mesh)].primitives)
+                        f(p, world[n] * place);
+            }
+        };
+        each([&](const Primitive& p, const glm::dmat4& m) {
+            if (p.kind == PrimitiveKind::points) points += p.indices.size();
+            if (p.kind == PrimitiveKind::triangles)
+                for (size_t i = 0; i + 3 <= p.indices.size(); i += 3) area += areaOf(corners(p, m, i));
+        });
+        if (!(area > 0) && points == 0) return fail(ErrorKind::input, "holds no triangles and no points", scene_.path);
+        if (!std::isfinite(area)) return fail(ErrorKind::input, "its triangles have no finite area", scene_.path);
+        if (settings_.count > kMostSurfels || points > kMostSurfels)
+            return fail(ErrorKind::budget, fmt::format("more than {} surfels", kMostSurfels), scene_.path);
+        perArea_ = area > 0 ? static_cast<double>(settings_.count) / area : 0;
+        spacing_ = perArea_ > 0 ? 1 / std::sqrt(perArea_) : 0;
+        each([&](const Primitive& p, const glm::dmat4& m) {
+            if (p.kind == PrimitiveKind::points) takePoints(p, m);
+            if (p.kind == PrimitiveKind::triangles) sampleTriangles(p, m);
+        });
+        return std::move(out_);
+    }
+
+  private:
+    using Corners = std::array<glm::dvec3, 3>;
+    static Corners corners(const Primitive& p, const glm::dmat4& m, size_t i) {
+        Corners c;
+        for (size_t k = 0; k < 3; ++k)
+            c.at(k) = glm::dvec3(m * glm::dvec4(glm::dvec3(p.position[p.indices[i + k]]), 1));
+        return c;
+    }
+    static double areaOf(const Corners& c) {
+        const double a = 0.5 * glm::length(glm::cross(c[1] - c[0], c[2] - c[0]));
+        return std::isfinite(a) ? a : 0;
+    }
+
+    void sampleTriangles(const Primitive& p, const glm::dmat4& m) {
+        const glm::dmat3 forNormals = glm::transpose(glm::inverse(glm::dmat3(m)));
+        const bool isMirrored = glm::determinant(glm::dmat3(m)) < 0;
+        for (size_t i = 0; i + 3 <= p.indices.size(); i += 3) {
+            const Corners c = corners(p, m, i);
+            const double area = areaOf(c);
+            // What is left over goes to the next triangle: small ones get a sample every so often.
+            carry_ += area * perArea_;
+            const auto count = static_cast<uint64_t>(carry_);
+            carry_ -= static_cast<double>(count);
+            if (count == 0) continue;
+            glm::dvec3 flat = glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
+            if (isMirrored) flat = -flat;
+            const float footprint = textureFootprint(p, i, area);
+            const uint32_t seed = hashOf(triangle_++);
+            for (uint64_t s = 0; s < count; ++s) {
+                // R2 sequence (M. Roberts 2018), shifted by the triangle's hash, folded into the triangle.
+                double u = std::fmod(0.7548776662466927 * static_cast<double>(s + 1) + seed * 0x1p-32, 1.0);
+                double v = std::fmod(0.5698402909980532 * static_cast<double>(s + 1) + hashOf(seed) * 0x1p-32, 1.0);
+                if (u + v > 1) {
+                    u = 1 - u;
+                    v = 1 - v;
+                }
+                const glm::dvec3 b(1 - u - v, u, v);
+                glm::vec3 colour(1);
+                if (!colourAt(p, i, glm::vec3(b), footprint, colour)) {
+                    ++out_.cutOut;
+                    continue;
+                }
+                glm::dvec3 n = flat;
+                if (!p.normal.empty()) {
+                    glm::dvec3 mixed(0);
+                    for (size_t k = 0; k < 3; ++k)
+                        mixed += b[static_cast<int>(k)] * glm::dvec3(p.normal[p.indices[i + k]]);
+                    mixed = forNormals * mixed;
+                    if (glm::length(mixed) > 1e-12 && std::isfinite(glm::length(mixed))) n = glm::normalize(mixed);
+                }
+                out_.position.push_back(b.x * c[0] + b.y * c[1] + b.z * c[2]);
+                out_.normal.emplace_back(n);
+                out_.colour.push_back(byteOf(colour.r) | byteOf(colour.g) << 8 | byteOf(colour.b) << 16);
+            }
+        }
+    }
+
+    void takePoints(const Primitive& p, const glm::dmat4& m) {
+        for (const uint32_t i : p.indices) {
+            out_.position.emplace_back(m * glm::dvec4(glm::dvec3(p.position[i]), 1));
+            out_.normal.push_back(p.normal.empty() ? glm::vec3(0) : glm::vec3(glm::dmat3(m) * glm::dvec3(p.normal[i])));
+            const glm::vec4 c = p.colour.empty() ? glm::vec4(1) : p.colour[i];
+            out_.colour.push_back(byteOf(c.r) | byteOf(c.g) << 8 | byteOf(c.b) << 16);
+        }
+    }
+
+    const Material& materialOf(const Primitive& p) const {
+        static const Material plain;
+        return p.material < 0 ? plain : scene_.materials[static_cast<size_t>(p.material)];
+    }
+    const DecodedImage* imageOf(const TextureUse& use) const {
+        if (use.texture < 0) return nullptr;
+        const int image = scene_.textures[static_cast<size_t>(use.texture)].image;
+        return image < 0 ? nullptr : &images_[static_cast<size_t>(image)];
+    }
+    static glm::vec2 uvAt(const Primitive& p, const TextureUse& use, size_t i, const glm::vec3& b) {
+        const auto& uv = p.uv[static_cast<size_t>(use.uvSet)];
+        const glm::vec2 at = b.x * uv[p.indices[i]] + b.y * uv[p.indices[i + 1]] + b.z * uv[p.indices[i + 2]];
+        return glm::vec2(use.transform * glm::vec3(at, 1));
+    }
+
+    /// Texels that one surfel covers along each axis.
+    float textureFootprint(const Primitive& p, size_t i, double area) const {
+        const TextureUse& use = materialOf(p).baseColourTexture;
+        const DecodedImage* image = imageOf(use);
+        if (!image || image->rgba.empty() || static_cast<size_t>(use.uvSet) >= p.uv.size()) return 1;
+        const glm::vec2 a = uvAt(p, use, i, {1, 0, 0}), d = uvAt(p, use, i, {0, 1, 0}) - a,
+                        e = uvAt(p, use, i, {0, 0, 1}) - a;
+        const double texels = 0.5 * std::abs(static_cast<double>(d.x) * e.y - static_cast<double>(d.y) * e.x) *
+                              image->width * image->height;
+        return static_cast<float>(std::clamp(std::sqrt(texels / std::max(area, 1e-300)) * spacing_, 1.0, 1024.0));
+    }
+
+    /// False where an alpha mask (or blending below one half) leaves nothing.
+    bool colourAt(const Primitive& p, size_t i, const glm::vec3& b, float footprint, glm::vec3& colour) const {
+        const Material& m = materialOf(p);
+        glm::vec4 c = m.baseColour;
+        if (!p.colour.empty())
+            c *= b.x * p.colour[p.indices[i]] + b.y * p.colour[p.indices[i + 1]] + b.z * p.colour[p.indices[i + 2]];
+        const auto texel = [&](const TextureUse& use) {
+            const DecodedImage* image = imageOf(use);
+            if (!image || static_cast<size_t>(use.uvSet) >= p.uv.size()) return glm::vec4(1);
+            return lookup(*image, scene_.textures[static_cast<size_t>(use.texture)], uvAt(p, use, i, b), footprint);
+        };
+        c *= texel(m.baseColourTexture);
+        if (m.alphaMode != AlphaMode::opaque && c.a < (m.alphaMode == AlphaMode::mask ? m.alphaCutoff : 0.5f))
+            return false;
+        colour = glm::vec3(c);
+        if (m.emissive != glm::vec3(0)) colour += m.emissive * glm::vec3(texel(m.emissiveTexture));
+        return true;
+    }
+
+    const Scene& scene_;
+    const std::vector<DecodedImage>& images_;
+    SurfelSettings settings_;
+    double perArea_ = 0, spacing_ = 0, carry_ = 0.5;
+    uint32_t triangle_ = 0;
+    Surfels out_;
+};
+
+}  // namespace
+
+Result<lod::PointSource> sampleSurfels(const Scene& scene, const std::vector<DecodedImage>& images,
+                                       const SurfelSettings& settings) {
+    STIPPLE_ASSIGN(Surfels sampled, Sampler(scene, images, settings).run());
+    if (sampled.position.empty()) return fail(ErrorKind::input, "is transparent everywhere", scene.path);
+    const auto surfels = std::make_shared<const Surfels>(std::move(sampled));
+    lod::PointSource source;
+    source.info.path = scene.path;
+    source.info.format = "glTF 2.0, sampled";
+    source.info.points = surfels->position.size();
+    source.info.hasColour = source.info.hasNormal = source.info.isReflectance = true;
+    source.info.up = lod::UpAxis::y;
+    source.info.notes = scene.notes;
+    if (surfels->cutOut > 0)
+        source.info.notes.push_back(fmt::format("{} samples lie where the material is transparent", surfels->cutOut));
+    source.parts = {source.info.points};
+    source.openPart = [surfels](size_t) -> Result<lod::PointReader> {
+        return lod::PointReader(
+            [surfels, next = size_t{0}](lod::PointBlock& block, size_t limit) mutable -> Result<size_t> {
+                const size_t count = std::min(limit, surfels->position.size() - next);
+                const auto from = static_cast<ptrdiff_t>(next), to = static_cast<ptrdiff_t>(next + count);
+                block.position.assign(surfels->position.begin() + from, surfels->position.begin() + to);
+                block.normal.assign(surfels->normal.begin() + from, surfels->normal.begin() + to);
+                block.colour.assign(surfels->colour.begin() + from, surfels->colour.begin() + to);
+                next += count;
+                return count;
+            });
+    };
+    return source;
+}
+
+}  // namespace stipple::scene

@@ -1,0 +1,28 @@
+// Meshes as surfels: evenly spread samples of the triangles, with interpolated normals and prefiltered colours. This is
+// how a mesh is drawn until triangles have a hierarchy of their own, and how its coarsest levels will look.
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "engine/scene/scene.h"
+#include "lod/primitives.h"
+
+namespace stipple::scene {
+
+/// 8-bit RGBA, sRGB.
+struct DecodedImage {
+    uint32_t width = 0, height = 0;
+    std::vector<uint32_t> rgba;
+};
+
+struct SurfelSettings {
+    uint64_t count = 2'000'000;  ///< aimed at, over all visible meshes
+};
+
+/// Samples all visible meshes of a scene, instances included; points of point primitives are taken as they are.
+/// `images` are those of the scene, decoded; an empty one counts as white. Errors if there is nothing to sample.
+Result<lod::PointSource> sampleSurfels(const Scene& scene, const std::vector<DecodedImage>& images,
+                                       const SurfelSettings& settings);
+
+}  // namespace stipple::scene
