@@ -4,6 +4,7 @@
 
 #include <cstring>
 #include <filesystem>
+#include <set>
 
 #include "engine/base/file.h"
 
@@ -20,31 +21,63 @@ uint32_t wordAt(const std::vector<uint8_t>& bytes, size_t at) {
     return v;
 }
 
-/// Parses, and notes what the standard parser lets pass: keys that stand twice.
+/// Looks for what the parser lets pass: keys that stand twice, and depth (it would recurse when freeing).
+class Watcher final : public nlohmann::json_sax<nlohmann::json> {
+  public:
+    std::string duplicate;
+    bool tooDeep = false;
+
+    bool null() override { return true; }
+    bool boolean(bool /*value*/) override { return true; }
+    bool number_integer(number_integer_t /*value*/) override { return true; }
+    bool number_unsigned(number_unsigned_t /*value*/) override { return true; }
+    bool number_float(number_float_t /*value*/, const string_t& /*text*/) override { return true; }
+    bool string(string_t& /*value*/) override { return true; }
+    bool binary(binary_t& /*value*/) override { return true; }
+    bool start_object(std::size_t /*elements*/) override {
+        keys_.emplace_back();
+        return deeper();
+    }
+    bool end_object() override {
+        keys_.pop_back();
+        --depth_;
+        return true;
+    }
+    bool start_array(std::size_t /*elements*/) override { return deeper(); }
+    bool end_array() override {
+        --depth_;
+        return true;
+    }
+    bool key(string_t& name) override {
+        if (!keys_.back().insert(name).second) duplicate = name;
+        return duplicate.empty();
+    }
+    bool parse_error(std::size_t /*at*/, const std::string& /*token*/,
+                     const nlohmann::json::exception& /*e*/) override {
+        return false;  // said by the parser that follows
+    }
+
+  private:
+    bool deeper() {
+        tooDeep = ++depth_ > kDeepestJson;
+        return !tooDeep;
+    }
+    std::vector<std::set<std::string>> keys_;
+    int depth_ = 0;
+};
+
 Result<nlohmann::json> parseJson(const char* begin, const char* end, const std::string& path) {
     if (end - begin >= 3 && std::memcmp(begin, "\xef\xbb\xbf", 3) == 0)
         return fail(ErrorKind::input, "the JSON begins with a byte order mark", path,
                     "glTF forbids it; save it as UTF-8 without");
-    std::vector<std::vector<std::string>> keys;
-    std::string duplicate;
-    int deepest = 0;
-    const auto watch = [&](int depth, nlohmann::json::parse_event_t event, nlohmann::json& value) {
-        deepest = std::max(deepest, depth);
-        if (event == nlohmann::json::parse_event_t::object_start) keys.emplace_back();
-        if (event == nlohmann::json::parse_event_t::object_end) keys.pop_back();
-        if (event == nlohmann::json::parse_event_t::key && !keys.empty()) {
-            const auto key = value.get<std::string>();
-            if (std::find(keys.back().begin(), keys.back().end(), key) != keys.back().end()) duplicate = key;
-            if (keys.back().size() < 64) keys.back().push_back(key);
-        }
-        return depth <= kDeepestJson;
-    };
+    Watcher watcher;
+    nlohmann::json::sax_parse(begin, end, &watcher);
+    if (watcher.tooDeep)
+        return fail(ErrorKind::input, fmt::format("the JSON is nested deeper than {} levels", kDeepestJson), path);
+    if (!watcher.duplicate.empty())
+        return fail(ErrorKind::input, fmt::format("the key '{}' stands twice", watcher.duplicate), path);
     try {
-        nlohmann::json json = nlohmann::json::parse(begin, end, watch);
-        if (deepest > kDeepestJson)
-            return fail(ErrorKind::input, fmt::format("the JSON is nested deeper than {} levels", kDeepestJson), path);
-        if (!duplicate.empty())
-            return fail(ErrorKind::input, fmt::format("the key '{}' stands twice", duplicate), path);
+        nlohmann::json json = nlohmann::json::parse(begin, end);
         if (!json.is_object()) return fail(ErrorKind::input, "the JSON is not an object", path);
         return json;
     } catch (const std::exception& e) {

@@ -26,6 +26,15 @@ inline bool listed(const nlohmann::json& root, const char* list, const std::stri
     return std::find(names.begin(), names.end(), nlohmann::json(name)) != names.end();
 }
 
+/// The object of an extension; null where there is none.
+inline const nlohmann::json& extensionOf(const nlohmann::json& value, const char* name) {
+    static const nlohmann::json none;
+    const auto all = value.find("extensions");
+    if (all == value.end() || !all->is_object()) return none;
+    const auto found = all->find(name);
+    return found == all->end() ? none : *found;
+}
+
 inline bool hasStride(const nlohmann::json& root, const nlohmann::json& accessor) {
     return accessor.contains("bufferView") &&
            root["bufferViews"][accessor["bufferView"].get<size_t>()].contains("byteStride");

@@ -70,8 +70,8 @@ void checkUnique(const json& root, Problems& p) {
     const json variants = root.value("/extensions/KHR_materials_variants/variants"_json_pointer, json::array());
     for (size_t m = 0; m < arrayOf(root, "meshes").size(); ++m)
         for (const json& primitive : root["meshes"][m]["primitives"]) {
-            const json mappings =
-                primitive.value("/extensions/KHR_materials_variants/mappings"_json_pointer, json::array());
+            const json& has = extensionOf(primitive, "KHR_materials_variants");
+            const json mappings = has.is_object() ? has.value("mappings", json::array()) : json::array();
             std::set<std::string> seen;
             for (const json& mapping : mappings)
                 for (const json& variant : mapping.value("variants", json::array())) {
@@ -169,8 +169,7 @@ void checkMaterialsAndExtensions(const json& root, Problems& p) {
             say(p, path, "its inner cone is not inside its outer cone");
     }
     for (size_t n = 0; n < arrayOf(root, "nodes").size(); ++n) {
-        const json none;
-        const json at = root["nodes"][n].value("/extensions/KHR_lights_punctual"_json_pointer, none);
+        const json& at = extensionOf(root["nodes"][n], "KHR_lights_punctual");
         if (at.is_null()) continue;
         if (!at.contains("light") || !at["light"].is_number_unsigned() || at["light"].get<size_t>() >= lights.size())
             say(p, fmt::format("/nodes/{}", n), "refers to a light that is not there");

@@ -13,6 +13,7 @@ namespace stipple::scene {
 namespace {
 
 using gltf::arrayOf;
+using gltf::extensionOf;
 using nlohmann::json;
 
 template <typename V>
@@ -20,14 +21,6 @@ V vectorOf(const json& array) {
     V v;
     for (size_t i = 0; i < array.size(); ++i) v[static_cast<int>(i)] = array[i].get<typename V::value_type>();
     return v;
-}
-
-const json& extensionOf(const json& value, const char* name) {
-    static const json none;
-    const auto all = value.find("extensions");
-    if (all == value.end()) return none;
-    const auto found = all->find(name);
-    return found == all->end() ? none : *found;
 }
 
 class Reader {
