@@ -15,7 +15,7 @@
 namespace stipple::lod {
 
 /// Of the file format; a store of another version must be built again.
-inline constexpr uint32_t kStoreVersion = 2;
+inline constexpr uint32_t kStoreVersion = 3;
 
 struct StoreDescription {
     double metresPerUnit = 1;

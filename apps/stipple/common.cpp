@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <sstream>
 
 #include "engine/base/hash.h"
@@ -141,30 +142,155 @@ Result<std::string> cachePath(const std::vector<std::string>& inputs, const Buil
 
 }  // namespace
 
-Result<std::shared_ptr<const lod::Store>> openScene(const std::vector<std::string>& inputs, BuildOptions build,
-                                                    const ColourOptions& colour, Executor& executor,
-                                                    bool showProgress) {
-    std::string path = inputs.front();
-    if (inputs.size() != 1 || fs::path(path).extension() != ".stipple") {
-        for (const std::string& input : inputs)
-            if (fs::path(input).extension() == ".stipple")
-                return fail(ErrorKind::usage, "a built scene and other inputs cannot be mixed", input,
-                            "name one scene, or only raw inputs");
-        if (const std::string needed = lod::attributeBehind(colour.what); !needed.empty() && build.attributes != "all")
-            build.attributes = build.attributes == "none" ? needed : build.attributes + "," + needed;
-        STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
-        STIPPLE_ASSIGN(path, cachePath(inputs, build));
-        if (!fs::exists(path)) {
-            Progress progress(showProgress);
-            STIPPLE_ASSIGN(const lod::BuildReport built, lod::buildStore(inputs, path, settings, executor, progress));
-            if (showProgress)
-                fmt::print(stderr, "{}: built into the cache in {:.1f} s ({})\n", inputs.front(), built.seconds, path);
-            for (const std::string& note : built.notes)
-                if (showProgress) fmt::print(stderr, "note: {}\n", note);
-        }
-    }
+namespace {
+
+Result<std::shared_ptr<const lod::Store>> openStoreFile(const std::string& path) {
     STIPPLE_ASSIGN(lod::Store store, lod::openStore(path));
     return std::make_shared<const lod::Store>(std::move(store));
+}
+
+/// Raw inputs: through the cache.
+Result<std::shared_ptr<const lod::Store>> openBuilt(const std::vector<std::string>& inputs, BuildOptions build,
+                                                    const ColourOptions& colour, Executor& executor,
+                                                    bool showProgress) {
+    const std::string needed = isSceneFile(inputs.front()) ? "" : lod::attributeBehind(colour.what);
+    if (!needed.empty() && build.attributes != "all")
+        build.attributes = build.attributes == "none" ? needed : build.attributes + "," + needed;
+    STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
+    STIPPLE_ASSIGN(const std::string path, cachePath(inputs, build));
+    if (!fs::exists(path)) {
+        Progress progress(showProgress);
+        STIPPLE_ASSIGN(const lod::BuildReport built, lod::buildStore(inputs, path, settings, executor, progress));
+        if (showProgress)
+            fmt::print(stderr, "{}: built into the cache in {:.1f} s ({})\n", inputs.front(), built.seconds, path);
+        for (const std::string& note : built.notes)
+            if (showProgress) fmt::print(stderr, "note: {}\n", note);
+    }
+    return openStoreFile(path);
+}
+
+/// A transform as rotation, even scale and translation.
+Result<lod::Instance> placeOf(const glm::dmat4& m, const std::string& where) {
+    lod::Instance place;
+    const glm::dmat3 linear(m);
+    place.scale = std::cbrt(std::abs(glm::determinant(linear)));
+    place.translation = glm::dvec3(m[3]);
+    const glm::dmat3 rotation = linear / std::max(place.scale, 1e-300);
+    const glm::dmat3 product = glm::transpose(rotation) * rotation;
+    double deviation = 0;
+    for (int c = 0; c < 3; ++c)
+        for (int r = 0; r < 3; ++r) deviation = std::max(deviation, std::abs(product[c][r] - (c == r ? 1 : 0)));
+    if (!(place.scale > 0) || !(deviation < 1e-6) || glm::determinant(linear) < 0)
+        return fail(ErrorKind::input, "places a store with uneven scale, shear or a mirror", where,
+                    "stores can be moved, turned and scaled evenly");
+    // What is no rotation but for rounding is none: records then stay as they are.
+    double fromIdentity = 0;
+    for (int c = 0; c < 3; ++c)
+        for (int r = 0; r < 3; ++r) fromIdentity = std::max(fromIdentity, std::abs(rotation[c][r] - (c == r ? 1 : 0)));
+    if (fromIdentity > 1e-12) place.rotation = rotation;
+    return place;
+}
+
+/// The stores that a scene's nodes refer to, and its meshes as one more.
+Result<std::vector<render::PlacedStore>> openSceneFile(const std::string& path, const BuildOptions& build,
+                                                       const ColourOptions& colour, Executor& executor,
+                                                       bool showProgress) {
+    STIPPLE_ASSIGN(const scene::Scene scene, scene::readGltf(path));
+    std::vector<render::PlacedStore> placed;
+    std::map<std::string, std::shared_ptr<const lod::Store>> open;
+    const std::vector<glm::dmat4> world = scene.worldTransforms();
+    const std::vector<bool> visible = scene.visibility();
+    bool hasMeshes = false;
+    for (size_t n = 0; n < scene.nodes.size(); ++n) {
+        const scene::Node& node = scene.nodes[n];
+        hasMeshes = hasMeshes || (visible[n] && node.mesh >= 0);
+        if (node.store.empty() || !visible[n]) continue;
+        if (open.count(node.store) == 0) {
+            STIPPLE_ASSIGN(open[node.store], openStoreFile(node.store));
+        }
+        std::vector<glm::dmat4> places = node.instances;
+        if (places.empty()) places.emplace_back(1);
+        for (const glm::dmat4& place : places) {
+            STIPPLE_ASSIGN(const lod::Instance instance,
+                           placeOf(world[n] * place, path + ": node '" + node.name + "'"));
+            placed.push_back({open[node.store], instance, {}});
+        }
+    }
+    if (hasMeshes || placed.empty()) {
+        STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> meshes,
+                       openBuilt({path}, build, colour, executor, showProgress));
+        placed.push_back({std::move(meshes), {}, {}});
+    }
+    return placed;
+}
+
+/// One description for all: the only store's own, or the union with y up, as glTF has it.
+lod::StoreDescription describe(const std::vector<render::PlacedStore>& placed) {
+    lod::StoreDescription all = placed.front().store->description;
+    if (placed.size() == 1 && placed[0].place.rotation == glm::dmat3(1) && placed[0].place.scale == 1 &&
+        placed[0].place.translation == glm::dvec3(0))
+        return all;
+    all.up = {0, 1, 0};
+    all.boundsMin = all.focusMin = glm::dvec3(1e300);
+    all.boundsMax = all.focusMax = glm::dvec3(-1e300);
+    all.points = 0;
+    for (const render::PlacedStore& p : placed) {
+        const lod::StoreDescription& d = p.store->description;
+        for (int corner = 0; corner < 8; ++corner) {
+            const auto pick = [&](const glm::dvec3& lo, const glm::dvec3& hi) {
+                const glm::dvec3 at((corner & 1) != 0 ? hi.x : lo.x, (corner & 2) != 0 ? hi.y : lo.y,
+                                    (corner & 4) != 0 ? hi.z : lo.z);
+                return p.place.translation + p.place.rotation * (p.place.scale * at);
+            };
+            all.boundsMin = glm::min(all.boundsMin, pick(d.boundsMin, d.boundsMax));
+            all.boundsMax = glm::max(all.boundsMax, pick(d.boundsMin, d.boundsMax));
+            all.focusMin = glm::min(all.focusMin, pick(d.focusMin, d.focusMax));
+            all.focusMax = glm::max(all.focusMax, pick(d.focusMin, d.focusMax));
+        }
+        all.points += d.points;
+        all.hasColour = all.hasColour || d.hasColour;
+        all.hasNormals = all.hasNormals || d.hasNormals;
+        // Lit if any part needs it: meshes and scans without colours look flat otherwise.
+        all.isReflectance = all.isReflectance || isShaded(d);
+        if (all.attributes.empty()) all.attributes = d.attributes;
+    }
+    return all;
+}
+
+}  // namespace
+
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build,
+                              const ColourOptions& colour, Executor& executor, bool showProgress) {
+    OpenedScene scene;
+    const bool isStore = fs::path(inputs.front()).extension() == ".stipple";
+    for (const std::string& input : inputs)
+        if (inputs.size() > 1 && (fs::path(input).extension() == ".stipple" || isSceneFile(input)))
+            return fail(ErrorKind::usage, "a built scene and other inputs cannot be mixed", input,
+                        "name one scene, or only raw inputs; a .gltf scene can place several stores");
+    if (isSceneFile(inputs.front())) {
+        STIPPLE_ASSIGN(scene.placed, openSceneFile(inputs.front(), build, colour, executor, showProgress));
+    } else {
+        STIPPLE_ASSIGN(
+            std::shared_ptr<const lod::Store> store,
+            isStore ? openStoreFile(inputs.front()) : openBuilt(inputs, build, colour, executor, showProgress));
+        scene.placed.push_back({std::move(store), {}, {}});
+    }
+    scene.description = describe(scene.placed);
+    return scene;
+}
+
+Result<lod::ColourBy> applyColours(OpenedScene& scene, const std::string& what, const std::string& map,
+                                   const std::string& range) {
+    std::optional<lod::ColourBy> first;
+    std::optional<Error> problem;
+    for (render::PlacedStore& p : scene.placed) {
+        const auto by = lod::parseColourBy(what, map, range, p.store->description);
+        if (!by) problem = problem ? problem : by.error();
+        p.colour = by.value_or(lod::ColourBy{});
+        if (by && !first) first = *by;
+    }
+    if (!first) return tl::unexpected(*problem);
+    return *first;
 }
 
 Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, Executor& executor) {

@@ -11,6 +11,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/result.h"
 #include "engine/render/backend.h"
+#include "engine/render/frame.h"
 #include "engine/scene/surfels.h"
 #include "lod/build/build.h"
 #include "lod/store.h"
@@ -43,10 +44,22 @@ inline bool isShaded(const lod::StoreDescription& d) { return !d.hasColour || d.
 bool isSceneFile(const std::string& path);
 Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene);
 
-/// A .stipple file is opened; anything else is built into the cache first (and found there the next time), with
-/// the attribute that `colour` needs.
-Result<std::shared_ptr<const lod::Store>> openScene(const std::vector<std::string>& inputs, BuildOptions build,
-                                                    const ColourOptions& colour, Executor& executor, bool showProgress);
+/// What a command draws: stores and where they stand.
+struct OpenedScene {
+    std::vector<render::PlacedStore> placed;
+    lod::StoreDescription description;  ///< of all together: bounds, up, what colours can be asked for
+};
+
+/// A .stipple file is opened; a .gltf or .glb scene is opened with the stores that its nodes refer to; anything else,
+/// and the meshes of a scene, are built into the cache first (and found there the next time), with the attribute that
+/// `colour` needs.
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build,
+                              const ColourOptions& colour, Executor& executor, bool showProgress);
+
+/// Gives every store its colours; one that does not have what is asked for keeps its own. An error if none has it. The
+/// result is for the legend.
+Result<lod::ColourBy> applyColours(OpenedScene& scene, const std::string& what, const std::string& map,
+                                   const std::string& range);
 
 Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, Executor& executor);
 /// Every backend and device, one per line.

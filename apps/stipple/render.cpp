@@ -184,12 +184,13 @@ Result<void> run(const Options& o) {
     if (!(o.error > 0)) return fail(ErrorKind::usage, "must be larger than 0", "--error");
     const auto executor = makeTbbExecutor(o.build.threads);
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
-    STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store,
-                   openScene(o.inputs, o.build, o.colour, *executor, !o.quiet));
-    STIPPLE_ASSIGN(const Shot shot, makeShot(o, store->description, size));
-    STIPPLE_ASSIGN(const lod::ColourBy colour,
-                   lod::parseColourBy(o.colour.what, o.colour.map, o.colour.range, store->description));
-    STIPPLE_ASSIGN(const render::FrameSettings settings, makeSettings(o, store->description, shot, colour));
+    STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, o.colour, *executor, !o.quiet));
+    const lod::StoreDescription& description = scene.description;
+    STIPPLE_ASSIGN(const Shot shot, makeShot(o, description, size));
+    STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
+    STIPPLE_ASSIGN(const render::FrameSettings settings, makeSettings(o, description, shot, colour));
+    if (o.mode == "reference" && scene.placed.size() > 1)
+        return fail(ErrorKind::usage, "only one store can be traced", "--mode reference", "use --device reference");
     if (o.mode == "reference" && colour.mode != lod::ColourMode::own)
         return fail(ErrorKind::usage, "traced pictures have the scene's own colours", "--mode reference",
                     "leave --colour out, or use --device reference");
@@ -197,7 +198,8 @@ Result<void> run(const Options& o) {
         const double start = nowSeconds();
         reference::TraceSettings trace{static_cast<uint32_t>(o.samples), settings.draw};
         for (size_t i = 0; i < shot.views.size(); ++i) {
-            STIPPLE_ASSIGN(const render::Image traced, reference::trace(*store, shot.views[i], trace, *executor));
+            STIPPLE_ASSIGN(const render::Image traced,
+                           reference::trace(*scene.placed[0].store, shot.views[i], trace, *executor));
             STIPPLE_TRY(image::writeImage(shot.views.size() > 1 ? numbered(o.output, i) : o.output, traced));
         }
         if (o.json)
@@ -211,8 +213,8 @@ Result<void> run(const Options& o) {
     stream.residentBytes = parseBytes(o.resident);
     if (stream.residentBytes == 0)
         return fail(ErrorKind::usage, "is not a size", "--resident " + o.resident, "e.g. 1G");
-    auto state = render::makeFrameState({store}, *backend, *executor, stream, colour);
-    const Legend legend = o.colour.legend ? makeLegend(colour, store->description) : Legend{};
+    auto state = render::makeFrameState(scene.placed, *backend, *executor, stream);
+    const Legend legend = o.colour.legend ? makeLegend(colour, description) : Legend{};
     Timings timings;
     bool complete = false;
     STIPPLE_TRY(runFrames(o, shot, settings, *state, *executor, timings, complete));

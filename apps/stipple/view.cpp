@@ -96,14 +96,14 @@ void drawLegendOverlay(const Legend& legend) {
 }
 
 /// Own colours, height, normals, then every attribute, and round again.
-lod::ColourBy nextColour(const lod::ColourBy& now, const lod::StoreDescription& d) {
+std::string nextColour(const lod::ColourBy& now, const lod::StoreDescription& d) {
     std::vector<std::string> names{"auto", "height"};
     if (d.hasNormals) names.emplace_back("normal");
     for (const lod::AttributeInfo& a : d.attributes) names.push_back(a.name);
     size_t at = 0;
     for (size_t i = 0; i < names.size(); ++i)
         if (now.mode != lod::ColourMode::own && names[i] == now.title) at = i;
-    return lod::parseColourBy(names[(at + 1) % names.size()], "", "", d).value_or(lod::ColourBy{});
+    return names[(at + 1) % names.size()];
 }
 
 /// What the keys change. True if a picture is asked for.
@@ -130,17 +130,16 @@ Result<void> run(const Options& o) {
         return fail(ErrorKind::device, "there is no display", "stipple view",
                     "use stipple render, or xvfb-run stipple view");
     const auto executor = makeTbbExecutor(o.build.threads);
-    STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store,
-                   openScene(o.inputs, o.build, o.colour, *executor, true));
+    STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, o.colour, *executor, true));
+    const lod::StoreDescription& d = scene.description;
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
-    STIPPLE_ASSIGN(const std::unique_ptr<gpu::Window> window,
-                   gpu::Window::create("Stipple: " + store->description.source, size.x, size.y,
-                                       std::getenv("STIPPLE_VALIDATION") != nullptr));
+    STIPPLE_ASSIGN(
+        const std::unique_ptr<gpu::Window> window,
+        gpu::Window::create("Stipple: " + d.source, size.x, size.y, std::getenv("STIPPLE_VALIDATION") != nullptr));
     streaming::StreamSettings stream;
     stream.residentBytes = std::max<uint64_t>(1, parseBytes(o.resident));
-    const lod::StoreDescription& d = store->description;
-    STIPPLE_ASSIGN(lod::ColourBy colour, lod::parseColourBy(o.colour.what, o.colour.map, o.colour.range, d));
-    auto state = render::makeFrameState({store}, *backend, *executor, stream, colour);
+    STIPPLE_ASSIGN(lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
+    auto state = render::makeFrameState(scene.placed, *backend, *executor, stream);
     Legend legend = makeLegend(colour, d);
     render::FrameSettings settings;
     settings.budgets = {o.error, o.budget};
@@ -158,10 +157,10 @@ Result<void> run(const Options& o) {
         if (input.width == 0 || input.height == 0) continue;
         const bool picture = applyKeys(input.pressed, settings, navigation, overlay);
         if (input.pressed.find('C') != std::string::npos) {
-            colour = nextColour(colour, d);
+            STIPPLE_ASSIGN(colour, applyColours(scene, nextColour(colour, d), "", ""));
             legend = makeLegend(colour, d);
             state.reset();  // gives back what is resident
-            state = render::makeFrameState({store}, *backend, *executor, stream, colour);
+            state = render::makeFrameState(scene.placed, *backend, *executor, stream);
             settings.draw.lit = o.shade == "lit" || (colour.mode == lod::ColourMode::own && isShaded(d));
         }
         navigation.move(input);

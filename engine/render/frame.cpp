@@ -8,6 +8,7 @@
 
 #include "engine/base/process.h"
 #include "lod/attributes.h"
+#include "lod/octahedral.h"
 
 namespace stipple::render {
 
@@ -37,11 +38,24 @@ std::vector<Pass> passesOf(Mode mode) {
 
 namespace {
 
-/// The last step of a chunk's decoding where it gets other colours than its own.
-streaming::ChunkFinish recolouring(const lod::ColourBy& by, std::shared_ptr<const lod::Store> store) {
-    if (by.mode == lod::ColourMode::own) return {};
-    const auto apply = [by, store](uint32_t node, lod::Chunk& chunk, const uint8_t* bytes,
-                                   size_t count) -> Result<void> {
+/// Normals are stored along the store's own axes, and shaders know one rotation for all: a turned instance gets turned
+/// records.
+void turnNormals(const glm::dmat3& rotation, lod::Chunk& chunk) {
+    for (shared::PointRecord& r : chunk.records) {
+        if ((shared::recordFlags(r) & shared::kFlagNoNormal) != 0) continue;
+        const shared::vec3 n = shared::octDecode(r.normal);
+        r.normal = lod::octEncode(glm::vec3(rotation * glm::dvec3(n.x, n.y, n.z)));
+    }
+}
+
+/// The last steps of a chunk's decoding: other colours than its own, other directions.
+streaming::ChunkFinish finishOf(const PlacedStore& placed) {
+    const lod::ColourBy by = placed.colour;
+    const glm::dmat3 rotation = placed.place.rotation;
+    const bool isTurned = rotation != glm::dmat3(1);
+    if (by.mode == lod::ColourMode::own && !isTurned) return {};
+    const auto apply = [by, rotation, isTurned, store = placed.store](
+                           uint32_t node, lod::Chunk& chunk, const uint8_t* bytes, size_t count) -> Result<void> {
         std::vector<uint8_t> values;
         if (by.needsAttributes()) {
             const auto& attributes = store->description.attributes;
@@ -49,7 +63,8 @@ streaming::ChunkFinish recolouring(const lod::ColourBy& by, std::shared_ptr<cons
             STIPPLE_ASSIGN(values, lod::decodeAttribute(bytes, count, attributes, by.attribute, records,
                                                         fmt::format("{}: node {}", store->path, node)));
         }
-        lod::recolour(by, *store, node, chunk, values);
+        if (by.mode != lod::ColourMode::own) lod::recolour(by, *store, node, chunk, values);
+        if (isTurned) turnNormals(rotation, chunk);
         return {};
     };
     return {by.needsAttributes(), apply};
@@ -57,22 +72,32 @@ streaming::ChunkFinish recolouring(const lod::ColourBy& by, std::shared_ptr<cons
 
 }  // namespace
 
-std::unique_ptr<FrameState> makeFrameState(std::vector<std::shared_ptr<const lod::Store>> stores, Backend& backend,
-                                           Executor& executor, const streaming::StreamSettings& settings,
-                                           const lod::ColourBy& colour) {
+std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& placed, Backend& backend, Executor& executor,
+                                           const streaming::StreamSettings& settings) {
     auto state = std::make_unique<FrameState>();
     state->backend = &backend;
     state->streamer = std::make_unique<streaming::Streamer>(executor, backend, settings);
-    for (auto& store : stores) {
-        lod::Instance instance;
-        instance.hierarchy = static_cast<uint32_t>(state->hierarchies.size());
+    for (const PlacedStore& p : placed) {
+        lod::Instance instance = p.place;
+        const auto known = std::find(state->stores.begin(), state->stores.end(), p.store);
+        instance.hierarchy = static_cast<uint32_t>(known - state->stores.begin());
+        if (known == state->stores.end()) {
+            state->stores.push_back(p.store);
+            state->hierarchies.push_back(&p.store->hierarchy);
+        }
         state->instances.push_back(instance);
-        state->hierarchies.push_back(&store->hierarchy);
-        state->streamer->addInstance(store->hierarchy, streaming::makeFileSource(store->file), store->path,
-                                     recolouring(colour, store));
-        state->stores.push_back(std::move(store));
+        state->streamer->addInstance(p.store->hierarchy, streaming::makeFileSource(p.store->file), p.store->path,
+                                     finishOf(p));
     }
     return state;
+}
+
+std::unique_ptr<FrameState> makeFrameState(std::vector<std::shared_ptr<const lod::Store>> stores, Backend& backend,
+                                           Executor& executor, const streaming::StreamSettings& settings,
+                                           const lod::ColourBy& colour) {
+    std::vector<PlacedStore> placed;
+    for (auto& store : stores) placed.push_back({std::move(store), {}, colour});
+    return makeFrameState(placed, backend, executor, settings);
 }
 
 Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSettings& settings) {

@@ -34,6 +34,15 @@ struct FrameState {
     FrameCounters counters;
 };
 
+/// A store somewhere in the scene, coloured in some way.
+struct PlacedStore {
+    std::shared_ptr<const lod::Store> store;
+    lod::Instance place;  ///< its `hierarchy` is set by makeFrameState
+    lod::ColourBy colour;
+};
+/// The same store may be placed many times.
+std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& placed, Backend& backend, Executor& executor,
+                                           const streaming::StreamSettings& settings);
 /// One instance of each store, at its own place, coloured by `colour`.
 std::unique_ptr<FrameState> makeFrameState(std::vector<std::shared_ptr<const lod::Store>> stores, Backend& backend,
                                            Executor& executor, const streaming::StreamSettings& settings,

@@ -12,7 +12,7 @@
 
 #include "lod/build/cloud.h"
 #include "lod/build/morton.h"
-#include "lod/build/octahedral.h"
+#include "lod/octahedral.h"
 
 namespace stipple::lod {
 namespace {

@@ -11,8 +11,8 @@
 
 #include "lod/build/cloud.h"
 #include "lod/build/lattice.h"
-#include "lod/build/octahedral.h"
 #include "lod/import/import.h"
+#include "lod/octahedral.h"
 
 namespace stipple::lod {
 namespace {

@@ -21,7 +21,7 @@
 #include "lod/build/aggregate.h"
 #include "lod/build/cloud.h"
 #include "lod/build/morton.h"
-#include "lod/build/octahedral.h"
+#include "lod/octahedral.h"
 #include "lod/store.h"
 
 namespace stipple::lod {

@@ -133,9 +133,10 @@ SHARED_FN float kernelWeight(float rho2) {
 // Weight of the nearest of four filled texels, where none reaches the fine one between them.
 SHARED_FN float gapWeight(float rho2, float least) { return rho2 <= least ? 0.01f : 0.0f; }
 
-// rho^2 up to which an empty texel between filled coarse ones is closed: four, or fewer at the image's border.
+// rho^2 up to which an empty texel between four filled coarse ones is closed. At the border of the image fewer than
+// four are inside: there, only texels of at most kBorderTexel pixels are closed, as gaps between small splats are.
 const float kGapReach2 = 64.0f;
-const float kBorderReach2 = 1.5f;
+const float kBorderTexel = 8.0f;
 const float kSurrounding = 4.0f;  // coarse texels of one surface that make a fine texel lie inside it
 
 // Refines one fine texel from the four coarse texels around it. q0 is its parent, q1 the neighbour in x, q2 in y, q3 in
@@ -186,7 +187,9 @@ SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, fl
     // and does not keep a gap open.
     const float noneEmpty =
         min(min(abs(q0.depth), abs(q1.depth)), min(abs(q2.depth), abs(q3.depth))) > 0.0f ? missed : 0.0f;
-    const float farthest = min(min(q0.depth, q1.depth), min(q2.depth, q3.depth)) < 0.0f ? kBorderReach2 : kGapReach2;
+    const float isBorder = min(min(q0.depth, q1.depth), min(q2.depth, q3.depth)) < 0.0f ? 1.0f : 0.0f;
+    const float isLarge = fineSize > kBorderTexel ? 1.0f : 0.0f;
+    const float farthest = isBorder * isLarge > 0.5f ? 0.0f : kGapReach2;
     const float oneFilled = least < farthest ? noneEmpty : 0.0f;
     // So does what lies behind all four: a point of the far side that shines through between the near ones.
     const float hindmost = max(max(n0 + t0, n1 + t1), max(n2 + t2, n3 + t3));

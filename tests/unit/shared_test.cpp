@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "engine/reference/decode.h"
-#include "lod/build/octahedral.h"
+#include "lod/octahedral.h"
 #include "shaders/shared/pack.h"
 #include "shaders/shared/pyramid.h"
 #include "shaders/shared/shade.h"
@@ -121,7 +121,7 @@ TEST(Push, DiscsThatOnlyShareACoarseTexelGrowNoLine) {
     shared::Texel left = plainTexel(10, 3), right = plainTexel(10, 3);
     left.offset = {-20, 0};
     right.offset = {20, 0};
-    EXPECT_EQ(shared::pushTexel(none, left, right, outside, outside, 1, -1, 8, 0.001f).depth, 0);
+    EXPECT_EQ(shared::pushTexel(none, left, right, outside, outside, 1, -1, 16, 0.001f).depth, 0);
     // Between four of one surface a gap is closed, also where no rim quite reaches.
     shared::Texel near = plainTexel(10, 5);
     EXPECT_NEAR(shared::pushTexel(none, near, near, near, near, 1, -1, 8, 0.001f).depth, 10, 1e-5);
