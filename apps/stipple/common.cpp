@@ -71,7 +71,7 @@ std::vector<std::string> namesOf(const std::string& list) {
 
 bool isSceneFile(const std::string& path) {
     const std::string extension = fs::path(path).extension().string();
-    return extension == ".gltf" || extension == ".glb";
+    return extension == ".gltf" || extension == ".glb" || extension == ".obj";
 }
 
 Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene) {
@@ -88,7 +88,7 @@ namespace {
 /// Scans by the readers of lod; meshes as surfels.
 Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptions& options, uint64_t surfels) {
     if (!isSceneFile(path)) return lod::openPointSource(path, options);
-    STIPPLE_ASSIGN(const scene::Scene scene, scene::readGltf(path));
+    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path));
     STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene));
     return scene::sampleSurfels(scene, images, {surfels});
 }
@@ -195,7 +195,7 @@ Result<lod::Instance> placeOf(const glm::dmat4& m, const std::string& where) {
 Result<std::vector<render::PlacedStore>> openSceneFile(const std::string& path, const BuildOptions& build,
                                                        const ColourOptions& colour, Executor& executor,
                                                        bool showProgress) {
-    STIPPLE_ASSIGN(const scene::Scene scene, scene::readGltf(path));
+    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path));
     std::vector<render::PlacedStore> placed;
     std::map<std::string, std::shared_ptr<const lod::Store>> open;
     const std::vector<glm::dmat4> world = scene.worldTransforms();

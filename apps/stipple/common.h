@@ -40,7 +40,7 @@ struct ColourOptions {
 /// What `--shade auto` does: lit, unless a scan has its own colours.
 inline bool isShaded(const lod::StoreDescription& d) { return !d.hasColour || d.isReflectance; }
 
-/// .gltf or .glb.
+/// .gltf, .glb or .obj.
 bool isSceneFile(const std::string& path);
 Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene);
 

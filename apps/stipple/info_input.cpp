@@ -292,13 +292,13 @@ nlohmann::json sceneJson(const scene::Scene& s) {
 }
 
 Result<void> showScene(const InputInfoOptions& o) {
-    STIPPLE_ASSIGN(const scene::Scene s, scene::readGltf(o.input));
+    STIPPLE_ASSIGN(const scene::Scene s, scene::readScene(o.input));
     const nlohmann::json j = sceneJson(s);
     if (o.json) {
         fmt::print("{}\n", j.dump(2));
         return {};
     }
-    fmt::print("{}: glTF 2.0 scene\n", o.input);
+    fmt::print("{}: scene\n", o.input);
     printVector(j, "min", "least");
     printVector(j, "max", "greatest");
     for (const char* key : {"nodes", "instances", "stores", "meshes", "triangles", "lines", "points", "materials",

@@ -1,6 +1,12 @@
 #include "engine/scene/scene.h"
 
+#include <filesystem>
+
 namespace stipple::scene {
+
+Result<Scene> readScene(const std::string& path) {
+    return std::filesystem::path(path).extension() == ".obj" ? readObj(path) : readGltf(path);
+}
 
 std::vector<glm::dmat4> Scene::worldTransforms() const {
     std::vector<glm::dmat4> world(nodes.size());

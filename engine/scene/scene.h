@@ -118,4 +118,10 @@ Box meshBounds(const Scene& scene);
 /// refused with the place.
 Result<Scene> readGltf(const std::string& path);
 
+/// Wavefront OBJ with its MTL files; one node. Missing textures and broken faces are noted.
+Result<Scene> readObj(const std::string& path);
+
+/// readGltf or readObj, by extension.
+Result<Scene> readScene(const std::string& path);
+
 }  // namespace stipple::scene

@@ -240,7 +240,7 @@ Result<lod::PointSource> sampleSurfels(const Scene& scene, const std::vector<Dec
     const auto surfels = std::make_shared<const Surfels>(std::move(sampled));
     lod::PointSource source;
     source.info.path = scene.path;
-    source.info.format = "glTF 2.0, sampled";
+    source.info.format = "meshes, sampled";
     source.info.points = surfels->position.size();
     source.info.hasColour = source.info.hasNormal = source.info.isReflectance = true;
     source.info.up = lod::UpAxis::y;

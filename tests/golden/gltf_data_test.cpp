@@ -6,6 +6,7 @@
 #include <set>
 
 #include "engine/scene/gltf/check.h"
+#include "engine/scene/scene.h"
 #include "tests/support/support.h"
 
 namespace stipple::scene::gltf {
@@ -51,6 +52,23 @@ TEST(GltfData, TheValidatorsErrorFilesAreRefusedAndNoOthers) {
     EXPECT_EQ(errors, 243u);
     EXPECT_GT(fine, 110u);
     EXPECT_LT(unknown, 10u);
+}
+
+TEST(GltfData, BrokenObjFilesAreSurvived) {
+    const std::string root = test::dataFile("09_hostile");
+    if (root.empty()) return;
+    size_t files = 0;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(root)) {
+        if (entry.path().extension() != ".obj") continue;
+        ++files;
+        if (const auto scene = readObj(entry.path())) {
+            for (const Primitive& p : scene->meshes[0].primitives)
+                for (const uint32_t i : p.indices) ASSERT_LT(i, p.position.size()) << entry.path();
+        } else {
+            EXPECT_EQ(scene.error().line().find('\n'), std::string::npos) << entry.path();
+        }
+    }
+    EXPECT_GT(files, 20u);
 }
 
 TEST(GltfData, RealFilesAreValid) {

@@ -242,6 +242,28 @@ TEST(Gltf, BrokenFilesSayWhere) {
     expect(refusal([](Draft& d) { d.root["bufferViews"][0]["byteLength"] = uint64_t{1} << 60; }), "/bufferViews/0");
 }
 
+TEST(Obj, PolygonsMaterialsAndBrokenFacesAreRead) {
+    const test::TempFolder folder;
+    std::ofstream(folder / "a.mtl") << "newmtl red\nKd 1 0 0\nnewmtl leaf\nKd 1 1 1\nmap_Kd none.png\n";
+    std::ofstream(folder / "a.obj")
+        << "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 1 1\n"
+           "usemtl red\nf 1 2 3 4\nusemtl leaf\nf -5/1 -4/2 -1/3\nf 1 2 99\n";
+    const auto scene = readObj(folder / "a.obj");
+    ASSERT_TRUE(scene) << scene.error().line();
+    size_t triangles = 0;
+    for (const Primitive& p : scene->meshes[0].primitives) {
+        triangles += p.indices.size() / 3;
+        ASSERT_GE(p.material, 0);
+        if (scene->materials[static_cast<size_t>(p.material)].name == "red") EXPECT_EQ(p.indices.size(), 6u);
+    }
+    EXPECT_EQ(triangles, 3u) << "a quadrangle and a triangle; the face with vertex 99 is dropped";
+    EXPECT_EQ(scene->materials[0].baseColour, glm::vec4(1, 0, 0, 1));
+    EXPECT_GE(scene->notes.size(), 2u) << "the texture that is missing, the face that is broken";
+    std::ofstream(folder / "empty.obj") << "v 0 0 0\n";
+    EXPECT_FALSE(readObj(folder / "empty.obj"));
+    EXPECT_FALSE(readObj(folder / "none.obj"));
+}
+
 /// A square of side 2 in the plane z = 0, split in two triangles, placed twice.
 Scene squares() {
     Scene s;
