@@ -53,6 +53,13 @@ TEST(LazData, TwinsOfTheRealFilesAreEqualBitByBit) {
         ++twins;
     }
     EXPECT_GE(twins, 18u);
+    // The same points by LASzip 1.2, whose items all have version 1 (one chunk), under another name.
+    const auto old = wholeFile(test::dataFile("02_scans/pdal_testdata/laz/simple-laszip-compressor-version-1.2r0.laz"));
+    const auto las = wholeFile(test::dataFile("02_scans/las_versions/simple.las"));
+    ASSERT_TRUE(old && las);
+    EXPECT_EQ(old->lattice, las->lattice);
+    EXPECT_EQ(old->colour16, las->colour16);
+    EXPECT_EQ(old->attributes, las->attributes);
 }
 
 TEST(LazData, EveryRealFileHoldsWhatItsHeaderSays) {
