@@ -96,6 +96,7 @@ std::unique_ptr<FrameState> makeFrameState(std::vector<std::shared_ptr<const lod
                                            Executor& executor, const streaming::StreamSettings& settings,
                                            const lod::ColourBy& colour) {
     std::vector<PlacedStore> placed;
+    placed.reserve(stores.size());
     for (auto& store : stores) placed.push_back({std::move(store), {}, colour});
     return makeFrameState(placed, backend, executor, settings);
 }

@@ -87,7 +87,7 @@ Result<Scene> readObj(const std::string& path) {
             for (size_t k = 0; k < 3; ++k) {
                 const int v = shape.mesh.indices[f * 3 + k].vertex_index;
                 good = good && v >= 0 && v < positions;
-                for (int c = 0; good && c < 3; ++c) good = std::isfinite(a.vertices[static_cast<size_t>(3 * v + c)]);
+                for (size_t c = 0; good && c < 3; ++c) good = std::isfinite(a.vertices[3 * static_cast<size_t>(v) + c]);
             }
             if (!good) {
                 ++dropped;

@@ -9,7 +9,7 @@
 
 namespace stipple::scene::gltf {
 
-struct Container {
+struct Container {  // NOLINT(bugprone-exception-escape): moving JSON checks its own invariants
     nlohmann::json json;
     std::vector<uint8_t> binary;  ///< chunk 1 of a .glb
     bool isBinary = false, hasBinaryChunk = false;

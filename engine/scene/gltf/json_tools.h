@@ -13,6 +13,13 @@ inline void say(Problems& problems, const std::string& path, const std::string& 
     if (problems.size() < kMostProblems) problems.push_back((path.empty() ? "/" : path) + ": " + what);
 }
 
+/// "/meshes/0" and "name" -> "/meshes/0/name".
+inline std::string below(const std::string& path, const std::string& name) {
+    std::string out;
+    out.reserve(path.size() + 1 + name.size());
+    return out.append(path).append("/").append(name);
+}
+
 /// An array of the root; empty where there is none.
 inline const nlohmann::json& arrayOf(const nlohmann::json& root, const char* name) {
     static const nlohmann::json none = nlohmann::json::array();

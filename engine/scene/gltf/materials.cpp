@@ -57,12 +57,12 @@ void walk(const json& value, const std::string& kind, const std::string& path, c
                 const auto place = places().find(name);
                 if (place != places().end() && place->second.count(kind) == 0)
                     say(p, path + "/extensions", fmt::format("{} does not belong here", name));
-                walk(object, name, path + "/extensions/" + name, root, p);
+                walk(object, name, below(path + "/extensions", name), root, p);
             }
             continue;
         }
         const bool isTexture = member.is_object() && member.contains("index");
-        walk(member, isTexture ? "textureInfo" : key, path + "/" + key, root, p);
+        walk(member, isTexture ? "textureInfo" : key, below(path, key), root, p);
     }
 }
 

@@ -247,7 +247,7 @@ class Checker {
         for (const std::string& name : found->second.required)
             if (!value.contains(name)) say(path, fmt::format("lacks '{}'", name));
         for (const auto& [key, member] : value.items()) {
-            const std::string at = path + "/" + key;
+            const std::string at = below(path, key);
             if (key == "extensions") {
                 extensions(member, at);
             } else if (const auto rule = found->second.rules.find(key); rule != found->second.rules.end()) {
@@ -262,7 +262,7 @@ class Checker {
     void extensions(const json& value, const std::string& path) {
         if (!value.is_object()) return say(path, "must be an object");
         for (const auto& [name, member] : value.items()) {
-            const std::string at = path + "/" + name;
+            const std::string at = below(path, name);
             if (!member.is_object()) {
                 say(at, "must be an object");
                 continue;
@@ -305,7 +305,7 @@ class Checker {
         if (what == "map") {
             if (!v.is_object()) return say(path, "must be an object");
             if (v.empty()) return say(path, "is empty");
-            for (const auto& [key, member] : v.items()) check(member, arguments[0], {}, path + "/" + key);
+            for (const auto& [key, member] : v.items()) check(member, arguments[0], {}, below(path, key));
             return;
         }
         object(v, what, path);

@@ -174,7 +174,7 @@ void checkPrimitive(const json& root, const json& primitive, const std::string& 
     std::map<size_t, size_t> uses;  // of a buffer view
     for (const auto& [name, index] : attributes.items()) {
         const json& a = accessors[index.get<size_t>()];
-        checkAttributeFormat(root, name, a, path + "/attributes/" + name, p);
+        checkAttributeFormat(root, name, a, below(path + "/attributes", name), p);
         const auto n = a["count"].get<size_t>();
         if (count != 0 && n != count)
             say(p, path, fmt::format("'{}' has {} elements, other attributes {}", name, n, count));
@@ -205,8 +205,8 @@ void checkPrimitive(const json& root, const json& primitive, const std::string& 
 
 bool isDecomposable(const json& matrix) {
     glm::dmat3 m(0);
-    for (int c = 0; c < 3; ++c)
-        for (int r = 0; r < 3; ++r) m[c][r] = matrix[static_cast<size_t>(4 * c + r)].get<double>();
+    for (size_t i = 0; i < 12; ++i)
+        if (i % 4 < 3) m[static_cast<int>(i / 4)][static_cast<int>(i % 4)] = matrix[i].get<double>();
     const auto last = [&](size_t i) { return matrix[i].get<double>(); };
     if (last(3) != 0 || last(7) != 0 || last(11) != 0 || last(15) != 1) return false;
     for (int c = 0; c < 3; ++c) {

@@ -114,12 +114,12 @@ class ValueChecker {
             if (name.rfind("COLOR_", 0) == 0)
                 for (const double c : v)
                     if (c < 0 || c > 1) {
-                        say(p_, where + "/" + name, fmt::format("{} is not between 0 and 1", c));
+                        say(p_, below(where, name), fmt::format("{} is not between 0 and 1", c));
                         break;
                     }
-            if (name.rfind("WEIGHTS_", 0) == 0) checkWeights(v, isFloat, where + "/" + name);
+            if (name.rfind("WEIGHTS_", 0) == 0) checkWeights(v, isFloat, below(where, name));
             if (name.rfind("JOINTS_", 0) == 0) joints = std::min(joints, fewestJoints(primitive));
-            if (name.rfind("JOINTS_", 0) == 0) STIPPLE_TRY(checkJoints(v, primitive, name, where + "/" + name, joints));
+            if (name.rfind("JOINTS_", 0) == 0) STIPPLE_TRY(checkJoints(v, primitive, name, below(where, name), joints));
         }
         if (!primitive.contains("indices")) return {};
         const auto index = primitive["indices"].get<size_t>();
