@@ -42,7 +42,10 @@ bool decodeBase64(std::string_view text, std::vector<uint8_t>& out) {
 std::string decodePercent(const std::string& uri) {
     std::string out;
     for (size_t i = 0; i < uri.size(); ++i) {
-        if (uri[i] == '%' && i + 2 < uri.size()) {
+        const auto isDigit = [&](size_t k) {
+            return k < uri.size() && std::isxdigit(static_cast<unsigned char>(uri[k])) != 0;
+        };
+        if (uri[i] == '%' && isDigit(i + 1) && isDigit(i + 2)) {
             out += static_cast<char>(std::stoi(uri.substr(i + 1, 2), nullptr, 16));
             i += 2;
         } else {

@@ -315,8 +315,13 @@ class Reader {
 Result<Scene> readGltf(const std::string& path) {
     STIPPLE_ASSIGN(const gltf::Container c, gltf::readContainer(path));
     gltf::Buffers buffers(c);
-    STIPPLE_TRY(gltf::requireGood(c, buffers));
-    return Reader(c, buffers).read();
+    try {  // a property of a type that no check expected ends here
+        STIPPLE_TRY(gltf::requireGood(c, buffers));
+        return Reader(c, buffers).read();
+    } catch (const std::exception& e) {
+        return fail(ErrorKind::input, fmt::format("is not what glTF expects: {}", e.what()), path,
+                    "the file is not valid glTF 2.0");
+    }
 }
 
 }  // namespace stipple::scene

@@ -316,7 +316,7 @@ class Checker {
         const auto& s = v.get_ref<const std::string&>();
         if (what == "version") {
             const size_t dot = s.find('.');
-            const bool good = dot != std::string::npos && dot > 0 && dot + 1 < s.size() &&
+            const bool good = s.size() <= 16 && dot != std::string::npos && dot > 0 && dot + 1 < s.size() &&
                               s.find_first_not_of("0123456789.") == std::string::npos &&
                               s.find('.', dot + 1) == std::string::npos;
             if (!good) say(path, fmt::format("'{}' is not a version such as 2.0", s));

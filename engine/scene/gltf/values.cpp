@@ -246,7 +246,7 @@ Result<void> checkImageBytes(const Container& container, Buffers& buffers, Probl
         const std::string head(bytes.begin(),
                                bytes.begin() + static_cast<ptrdiff_t>(std::min<size_t>(bytes.size(), 12)));
         const bool isPng = head.rfind("\x89PNG\r\n\x1a\n", 0) == 0, isJpeg = head.rfind("\xff\xd8\xff", 0) == 0;
-        const bool isWebp = head.rfind("RIFF", 0) == 0 && head.substr(8) == "WEBP",
+        const bool isWebp = head.size() == 12 && head.rfind("RIFF", 0) == 0 && head.substr(8) == "WEBP",
                    isKtx = head.rfind("\xabKTX 20", 0) == 0;
         if (!isPng && !isJpeg && !isWebp && !isKtx)
             say(problems, fmt::format("/images/{}", i), "is neither PNG nor JPEG, WebP or KTX2");
