@@ -24,6 +24,10 @@ inline size_t reachOf(const LazPlan& plan) { return 1024 + 4 * size_t{plan.recor
 /// Jumps between the four remembered time sequences in a row; an encoder makes at most one.
 constexpr int kMostTimeJumps = 8;
 
+/// Sums wrap around, as the format's do.
+inline int32_t plus(int32_t a, int32_t b) {
+    return static_cast<int32_t>(static_cast<uint32_t>(a) + static_cast<uint32_t>(b));
+}
 inline uint8_t foldByte(uint32_t v) { return static_cast<uint8_t>(v); }
 inline int32_t clampByte(int32_t v) { return v < 0 ? 0 : v > 255 ? 255 : v; }
 

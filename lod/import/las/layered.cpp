@@ -34,8 +34,6 @@ struct Point14 {
     static constexpr size_t kBytes = 22;  ///< then the time
 };
 
-int32_t plus(int32_t a, int32_t b) { return static_cast<int32_t>(static_cast<uint32_t>(a) + static_cast<uint32_t>(b)); }
-
 /// One layer: its bytes in the chunk and its decoder. `used`: wanted and not empty.
 struct Layer {
     uint32_t bytes = 0;

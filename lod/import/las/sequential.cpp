@@ -24,8 +24,6 @@ struct Point10 {
 };
 static_assert(sizeof(Point10) == 20);
 
-int32_t plus(int32_t a, int32_t b) { return static_cast<int32_t>(static_cast<uint32_t>(a) + static_cast<uint32_t>(b)); }
-
 /// One item of a record: begins at its raw value in the chunk's first point, then decodes in place.
 class Item {
   public:
