@@ -18,7 +18,7 @@ namespace stipple::lod {
 namespace {
 
 constexpr uint32_t kNeighbours = 12, kCellPoints = 8, kPointsPerNeighbourCell = 24, kLargestClimb = 6;
-constexpr float kRadiusFactor = 0.7f, kLargestRadii = 4.0f, kStrayRadii = 2.0f;
+constexpr float kRadiusFactor = 0.7f, kLargestRadii = 4.0f, kStrayRadii = 4.0f;
 
 struct Neighbourhood {
     std::vector<float> x, y, z;  ///< relative to the cell's first point, lattice units
