@@ -42,6 +42,7 @@ class Reading {
     Result<Cloud> run(Executor& executor, Progress& progress) {
         STIPPLE_TRY(openAll());
         STIPPLE_TRY(checkBudget());
+        STIPPLE_TRY(verifyCounts());
         allocate();
         std::atomic<bool> stop{false};
         std::atomic<uint64_t> done{0};
@@ -176,6 +177,19 @@ class Reading {
                         fmt::format("building {} points needs about {} MiB, but --memory allows {} MiB", declared_,
                                     needed >> 20, settings_.memoryBytes >> 20),
                         inputs_.front(), fmt::format("give --memory {}M or fewer points", (needed >> 20) + 1));
+        return {};
+    }
+
+    /// A small file may promise many points and still be right (a flat grid compresses to almost nothing): it is read
+    /// once before anything is allocated for what it promises.
+    Result<void> verifyCounts() {
+        constexpr uint64_t kPlausiblePointsPerByte = 16;
+        for (const PointSource& source : sources_) {
+            std::error_code error;
+            const uint64_t bytes = std::filesystem::file_size(source.info.path, error);
+            if (error || source.info.points / kPlausiblePointsPerByte <= bytes) continue;
+            STIPPLE_TRY(readPoints(source));
+        }
         return {};
     }
 

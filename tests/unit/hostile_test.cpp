@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <new>
@@ -105,6 +106,32 @@ TEST(Hostile, ChangedHeadersOfEveryFormatAreSurvivedWithModestMemory) {
                 expectModest(folder / "a.laz");
             }
         }
+}
+
+TEST(Hostile, ABuildAllocatesNothingForPointsThatAreOnlyPromised) {
+    const test::TempFolder folder;
+    Rng rng(7);
+    test::LazSpec spec;
+    spec.hasTable = false;
+    auto file = test::encodeLas(spec, test::makeRecords(spec, 40, rng), true, rng);
+    const uint64_t promised = 8'000'000;  // 200 MB of cloud from some kilobytes
+    std::memcpy(file.data() + 107, &promised, 4);
+    std::memcpy(file.data() + 247, &promised, 8);
+    file.resize(12'000);
+    std::ofstream(folder / "a.laz", std::ios::binary)
+        .write(reinterpret_cast<const char*>(file.data()), static_cast<std::streamsize>(file.size()));
+    const auto executor = makeSerialExecutor();
+    Progress silent(false);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    peak = live.load();
+    const size_t before = live;
+#endif
+    const auto built = buildStore({folder / "a.laz"}, folder / "a.stipple", {}, *executor, silent);
+    ASSERT_FALSE(built);
+    EXPECT_NE(built.error().line().find("a.laz"), std::string::npos) << built.error().line();
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    EXPECT_LE(peak - before, size_t{16} << 20);
+#endif
 }
 
 TEST(Hostile, TheCountingWorks) {

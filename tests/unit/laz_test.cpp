@@ -133,6 +133,20 @@ TEST(Laz, EveryTruncatedLengthOfAChunkIsAnError) {
     }
 }
 
+TEST(Laz, EveryTruncatedLengthOfAFileIsAnError) {
+    Rng rng(8);
+    for (LazSpec spec : allSpecs()) {
+        if (spec.extraBytes != 0) continue;
+        SCOPED_TRACE(nameOf(spec));
+        spec.chunkPoints = 10;
+        const auto file = test::encodeLas(spec, test::makeRecords(spec, 25, rng), true, rng);
+        for (size_t length = 0; length < file.size(); ++length) {
+            const std::vector<uint8_t> exact(file.begin(), file.begin() + static_cast<ptrdiff_t>(length));
+            ASSERT_FALSE(decodeFile(exact)) << "length " << length << " of " << file.size();
+        }
+    }
+}
+
 TEST(Laz, ChangedBytesNeverBreakTheDecoder) {
     Rng rng(5);
     size_t noticed = 0, tried = 0;
