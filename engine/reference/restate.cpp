@@ -57,17 +57,14 @@ struct Contribution {
     double weight;
 };
 
-/// Weighted mean of the contributions that meet the front one; `front` is set to it.
-Sample blend(std::vector<Contribution>& list, const Sample*& front) {
-    front = nullptr;
-    for (const Contribution& c : list)
-        if (!front || c.sample->depth < front->depth) front = c.sample;
-    STIPPLE_CHECK(front != nullptr, "nothing to blend");
+/// Weighted mean of the contributions whose depth interval begins before the first one ends, at `back`.
+Sample blend(std::vector<Contribution>& list, double& back) {
+    STIPPLE_CHECK(!list.empty(), "nothing to blend");
+    back = 1e300;
+    for (const Contribution& c : list) back = std::min(back, c.sample->depth + c.sample->thickness);
     Sample sum;
     double weight = 0;
-    std::erase_if(list, [&](const Contribution& c) {
-        return c.sample->depth - front->depth > c.sample->thickness + front->thickness;
-    });
+    std::erase_if(list, [&](const Contribution& c) { return c.sample->depth - c.sample->thickness > back; });
     for (const auto& [s, w] : list) {
         weight += w;
         sum.depth += w * s->depth;
@@ -98,15 +95,15 @@ Level pullLevel(const Level& fine, double childSize) {
                 if (s && s->valid && s->radius >= 0.5 * childSize) list.push_back({s, 1.0});
             }
             if (list.empty()) continue;
-            const Sample* front = nullptr;
-            Sample merged = blend(list, front);
-            double deepest = 0, thickest = 0;
+            double back = 0, front = 1e300, deepest = 0, thickest = 0;
+            Sample merged = blend(list, back);
             for (const Contribution& c : list) {
+                front = std::min(front, c.sample->depth);
                 deepest = std::max(deepest, c.sample->depth);
                 thickest = std::max(thickest, c.sample->thickness);
             }
-            merged.depth = front->depth;
-            merged.thickness = std::min(thickest + deepest - front->depth, 2 * thickest);
+            merged.depth = front;
+            merged.thickness = std::min(thickest + deepest - front, 2 * thickest);
             coarse.ref(x, y) = merged;
         }
     return coarse;
@@ -118,28 +115,29 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize) {
             const dvec2 centre = (dvec2(x, y) + 0.5) * fineSize;
             const int px = x / 2, py = y / 2, sx = x % 2 ? 1 : -1, sy = y % 2 ? 1 : -1;
             std::vector<std::pair<const Sample*, double>> around;  // filled coarse texels and rho^2 there
-            double least = 1e300, hindmost = 0;
+            double least = 1e300, hindmost = 0, nearBack = 1e300;
             size_t outside = 0;
-            const Sample* nearest = nullptr;
             for (int k = 0; k < 4; ++k) {
                 const Sample* s = coarse.at(px + (k % 2 ? sx : 0), py + (k / 2 ? sy : 0));
                 outside += s == nullptr;
                 if (!s || !s->valid) continue;
                 hindmost = std::max(hindmost, s->depth + s->thickness);
                 around.emplace_back(s, rhoSquared(*s, centre));
-                if (!nearest || s->depth < nearest->depth) nearest = s;
+                nearBack = std::min(nearBack, s->depth + s->thickness);
                 least = std::min(least, around.back().second);
             }
             // Inside one surface but just missed by all its texels: they count with twice the radius.
             const auto together = std::count_if(around.begin(), around.end(), [&](const auto& a) {
-                return a.first->depth - nearest->depth <= a.first->thickness + nearest->thickness;
+                return a.first->depth - a.first->thickness <= nearBack;
             });
             const bool widen = least >= 1 && together >= 4;
             std::vector<Contribution> list;
             for (const auto& [s, rho2] : around) {
                 const double rest = std::max(0.0, 1 - (widen ? rho2 / 4 : rho2));
-                // An empty texel between four filled ones takes whatever is nearest.
-                const bool gap = around.size() + outside == 4 && !fine.ref(x, y).valid;
+                // An empty texel between four filled ones takes whatever is nearest, within eight radii; at the border
+                // of the image only small texels do.
+                const double farthest = outside > 0 && fineSize > 8 ? 0 : 64;
+                const bool gap = around.size() + outside == 4 && !fine.ref(x, y).valid && least < farthest;
                 // So does what shines through from behind all four.
                 const bool shines = around.size() == 4 && fine.ref(x, y).valid && fine.ref(x, y).depth > hindmost;
                 const bool between = least >= 1 && (gap || shines);
@@ -147,10 +145,10 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize) {
                 if (weight > 0) list.push_back({s, weight});
             }
             if (list.empty()) continue;
-            const Sample* front = nullptr;
-            const Sample merged = blend(list, front);
+            double back = 0;
+            const Sample merged = blend(list, back);
             Sample& own = fine.ref(x, y);
-            if (!own.valid || own.depth > front->depth + front->thickness) own = merged;
+            if (!own.valid || own.depth > back) own = merged;
         }
 }
 

@@ -80,8 +80,10 @@ SHARED_FN float depthIfWide(Texel t, float childSize) {
 SHARED_FN float thicknessWorld(Texel t, float inverseFocal) { return t.thickness * t.depth * inverseFocal; }
 
 // Merges the four children (order: (0,0) (1,0) (0,1) (1,1)) into their parent. `childSize`: edge of a child texel in
-// pixels. Kept are the children that reach beyond their own texel and whose depth interval meets the front one's; the
-// interval of the result is anchored at the front and capped, so that layers do not chain (F12, case 42).
+// pixels. Kept are the children that reach beyond their own texel and whose depth interval [depth - t, depth + t] meets
+// all the others': it begins before the first of them ends. (Not "meets the front one's": copies of one splat have the
+// same depth to the last bit or not, and which of them is in front must not matter.) The interval of the result is
+// anchored at the front and capped, so that layers do not chain (F12, case 42).
 SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSize, float inverseFocal) {
     const float h = 0.5f * childSize;
     const float x0 = c0.offset.x - h;
@@ -101,11 +103,11 @@ SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSi
     const float t1 = thicknessWorld(c1, inverseFocal);
     const float t2 = thicknessWorld(c2, inverseFocal);
     const float t3 = thicknessWorld(c3, inverseFocal);
-    const float frontThickness = d0 == front ? t0 : (d1 == front ? t1 : (d2 == front ? t2 : t3));
-    const float w0 = d0 < kFarAway && d0 - front <= t0 + frontThickness ? 1.0f : 0.0f;
-    const float w1 = d1 < kFarAway && d1 - front <= t1 + frontThickness ? 1.0f : 0.0f;
-    const float w2 = d2 < kFarAway && d2 - front <= t2 + frontThickness ? 1.0f : 0.0f;
-    const float w3 = d3 < kFarAway && d3 - front <= t3 + frontThickness ? 1.0f : 0.0f;
+    const float back = min(min(d0 + t0, d1 + t1), min(d2 + t2, d3 + t3));
+    const float w0 = d0 < kFarAway && d0 - t0 <= back ? 1.0f : 0.0f;
+    const float w1 = d1 < kFarAway && d1 - t1 <= back ? 1.0f : 0.0f;
+    const float w2 = d2 < kFarAway && d2 - t2 <= back ? 1.0f : 0.0f;
+    const float w3 = d3 < kFarAway && d3 - t3 <= back ? 1.0f : 0.0f;
     Blend b = emptyBlend();
     b = addToBlend(b, c0, x0, y0, w0);
     b = addToBlend(b, c1, x1, y1, w1);
@@ -175,10 +177,9 @@ SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, fl
     const float n1 = q1.depth > 0.0f ? q1.depth : kFarAway;
     const float n2 = q2.depth > 0.0f ? q2.depth : kFarAway;
     const float n3 = q3.depth > 0.0f ? q3.depth : kFarAway;
-    const float nearest = min(min(n0, n1), min(n2, n3));
-    const float thick = n0 == nearest ? t0 : (n1 == nearest ? t1 : (n2 == nearest ? t2 : t3));
-    const float together = (n0 - nearest <= t0 + thick ? 1.0f : 0.0f) + (n1 - nearest <= t1 + thick ? 1.0f : 0.0f) +
-                           (n2 - nearest <= t2 + thick ? 1.0f : 0.0f) + (n3 - nearest <= t3 + thick ? 1.0f : 0.0f);
+    const float nearBack = min(min(n0 + t0, n1 + t1), min(n2 + t2, n3 + t3));
+    const float together = (n0 - t0 <= nearBack ? 1.0f : 0.0f) + (n1 - t1 <= nearBack ? 1.0f : 0.0f) +
+                           (n2 - t2 <= nearBack ? 1.0f : 0.0f) + (n3 - t3 <= nearBack ? 1.0f : 0.0f);
     // Conditions as numbers: branches would keep compilers from turning loops over this function into SIMD.
     const float inside = together >= kSurrounding ? 1.0f : 0.0f;
     const float scale = missed * inside > 0.5f ? 0.25f : 1.0f;
@@ -203,19 +204,18 @@ SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, fl
     const float d1 = k1 > 0.0f ? q1.depth : kFarAway;
     const float d2 = k2 > 0.0f ? q2.depth : kFarAway;
     const float d3 = k3 > 0.0f ? q3.depth : kFarAway;
-    const float front = min(min(d0, d1), min(d2, d3));
-    const float frontThickness = d0 == front ? t0 : (d1 == front ? t1 : (d2 == front ? t2 : t3));
-    const float w0 = d0 < kFarAway && d0 - front <= t0 + frontThickness ? k0 : 0.0f;
-    const float w1 = d1 < kFarAway && d1 - front <= t1 + frontThickness ? k1 : 0.0f;
-    const float w2 = d2 < kFarAway && d2 - front <= t2 + frontThickness ? k2 : 0.0f;
-    const float w3 = d3 < kFarAway && d3 - front <= t3 + frontThickness ? k3 : 0.0f;
+    const float back = min(min(d0 + t0, d1 + t1), min(d2 + t2, d3 + t3));
+    const float w0 = d0 < kFarAway && d0 - t0 <= back ? k0 : 0.0f;
+    const float w1 = d1 < kFarAway && d1 - t1 <= back ? k1 : 0.0f;
+    const float w2 = d2 < kFarAway && d2 - t2 <= back ? k2 : 0.0f;
+    const float w3 = d3 < kFarAway && d3 - t3 <= back ? k3 : 0.0f;
     Blend b = emptyBlend();
     b = addToBlend(b, q0, x0, y0, w0);
     b = addToBlend(b, q1, x1, y1, w1);
     b = addToBlend(b, q2, x2, y2, w2);
     b = addToBlend(b, q3, x3, y3, w3);
     const float hasBlend = b.weight > 0.0f ? 1.0f : 0.0f;
-    const float isBehind = fine.depth > front + frontThickness ? 1.0f : 0.0f;
+    const float isBehind = fine.depth > back ? 1.0f : 0.0f;
     const float isEmpty = fine.depth <= 0.0f ? 1.0f : 0.0f;
     const bool replace = hasBlend * (isBehind + isEmpty) > 0.5f;
     const Texel blended = texelFromBlend(b);

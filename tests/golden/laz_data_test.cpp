@@ -126,11 +126,9 @@ TEST(LazData, TheEarthCentredScanKeepsItsIntegersAndDoesNotShake) {
     EXPECT_EQ(store->hierarchy.unit, scale.x);
     EXPECT_EQ(test::leafLattice(*store), expected);
 
-    // Open: on the whole scan, pull-push pictures at 1 cm do not agree with the oracle yet (28 to 45 dB; points 48 to
-    // 49).
-    if (whole) return;
     // A camera 1 cm above a point, 6,366 km from the origin, moved by tenths of a millimetre: every picture is that of
-    // the fp64 oracle, and single points land on the oracle's pixels.
+    // the fp64 oracle, and single points land on the oracle's pixels. (An even image size would put the point exactly
+    // on the corner of four pixels.)
     const glm::dvec3 centre = 0.5 * (store->description.focusMin + store->description.focusMax);
     const auto target = lod::findNearest(*store, centre);
     ASSERT_TRUE(target);
@@ -146,13 +144,13 @@ TEST(LazData, TheEarthCentredScanKeepsItsIntegersAndDoesNotShake) {
             camera.target = target->position;
             camera.up = side;
             camera.eye = target->position + 0.01 * up + 1e-4 * step * side;
-            const lod::View view = scene::makeView(camera, 320, 240, 1e-3);
+            const lod::View view = scene::makeView(camera, 321, 241, 1e-3);
             const auto d =
                 reference::compareImages(test::renderView(store, *backend, *executor, view, settings),
                                          test::renderView(store, *oracle, *executor, view, settings), 4, nullptr);
             ASSERT_TRUE(d);
             EXPECT_GE(d->psnr, 50) << "step " << step << ", mode " << static_cast<int>(mode);
-            EXPECT_LE(d->differingFraction, 0.002) << "step " << step << ", mode " << static_cast<int>(mode);
+            EXPECT_LE(d->differingFraction, 0.004) << "step " << step << ", mode " << static_cast<int>(mode);
         }
 }
 
