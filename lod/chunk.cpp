@@ -84,4 +84,81 @@ Result<Chunk> decodeChunk(const uint8_t* bytes, size_t count, uint32_t records, 
     return chunk;
 }
 
+namespace {
+
+struct MeshChunkHead {
+    uint32_t vertexBytes, triangleBytes, clusterBytes;
+};
+
+template <typename T>
+Result<std::vector<T>> decompressArray(const uint8_t* bytes, size_t count, size_t items, const std::string& where) {
+    STIPPLE_ASSIGN(const std::vector<uint8_t> raw, decompress(bytes, count, items * sizeof(T), where));
+    if (raw.size() != items * sizeof(T))
+        return fail(ErrorKind::input, "a part of a chunk has not its size", where, "build it again");
+    std::vector<T> out(items);
+    if (items > 0) std::memcpy(out.data(), raw.data(), raw.size());
+    return out;
+}
+
+}  // namespace
+
+std::vector<uint8_t> encodeMeshChunk(const Chunk& chunk) {
+    constexpr size_t stride = sizeof(shared::MeshVertex);
+    std::vector<uint8_t> vertex(meshopt_encodeVertexBufferBound(chunk.vertices.size(), stride));
+    vertex.resize(
+        meshopt_encodeVertexBuffer(vertex.data(), vertex.size(), chunk.vertices.data(), chunk.vertices.size(), stride));
+    // Planes of bytes compress better than words: each corner's index follows that of the triangle before.
+    std::vector<uint8_t> corners(chunk.triangles.size() * 4);
+    for (size_t i = 0; i < chunk.triangles.size(); ++i)
+        for (size_t k = 0; k < 4; ++k)
+            corners[k * chunk.triangles.size() + i] = static_cast<uint8_t>(chunk.triangles[i] >> (8 * k));
+    std::vector<uint8_t> clusters(chunk.clusters.size() * sizeof(shared::MeshCluster));
+    if (!clusters.empty()) std::memcpy(clusters.data(), chunk.clusters.data(), clusters.size());
+    const std::vector<uint8_t> a = compress(vertex), b = compress(corners), c = compress(clusters);
+    const MeshChunkHead head{static_cast<uint32_t>(a.size()), static_cast<uint32_t>(b.size()),
+                             static_cast<uint32_t>(c.size())};
+    std::vector<uint8_t> out(sizeof(head));
+    std::memcpy(out.data(), &head, sizeof(head));
+    for (const auto* part : {&a, &b, &c}) out.insert(out.end(), part->begin(), part->end());
+    return out;
+}
+
+Result<Chunk> decodeMeshChunk(const uint8_t* bytes, size_t count, uint32_t triangles, const MeshGroup& group,
+                              const std::string& where) {
+    MeshChunkHead head{};
+    if (count < sizeof(head)) return fail(ErrorKind::input, "the chunk is shorter than its head", where);
+    std::memcpy(&head, bytes, sizeof(head));
+    if (uint64_t{head.vertexBytes} + head.triangleBytes + head.clusterBytes + sizeof(head) != count)
+        return fail(ErrorKind::input, "the chunk's parts do not add up to its size", where, "build it again");
+    const uint8_t* at = bytes + sizeof(head);
+    constexpr size_t stride = sizeof(shared::MeshVertex);
+    STIPPLE_ASSIGN(const std::vector<uint8_t> vertex,
+                   decompress(at, head.vertexBytes, meshopt_encodeVertexBufferBound(group.vertices, stride), where));
+    Chunk chunk;
+    chunk.vertices.resize(group.vertices);
+    if (meshopt_decodeVertexBuffer(chunk.vertices.data(), group.vertices, stride, vertex.data(), vertex.size()) != 0)
+        return fail(ErrorKind::input, "the vertices of a chunk are damaged", where, "build it again");
+    at += head.vertexBytes;
+    STIPPLE_ASSIGN(const std::vector<uint8_t> corners,
+                   decompressArray<uint8_t>(at, head.triangleBytes, size_t{triangles} * 4, where));
+    chunk.triangles.resize(triangles);
+    for (size_t i = 0; i < triangles; ++i)
+        chunk.triangles[i] = static_cast<uint32_t>(corners[i]) | static_cast<uint32_t>(corners[triangles + i]) << 8 |
+                             static_cast<uint32_t>(corners[size_t{2} * triangles + i]) << 16;
+    at += head.triangleBytes;
+    STIPPLE_ASSIGN(chunk.clusters, decompressArray<shared::MeshCluster>(at, head.clusterBytes, group.clusters, where));
+    // The renderers index with these: every cluster within the chunk, every corner within its cluster.
+    for (const shared::MeshCluster& c : chunk.clusters) {
+        const uint64_t vertices = c.counts & 0xffffu, count3 = c.counts >> 16;
+        bool fits = vertices <= shared::kClusterVertices && count3 <= shared::kClusterTriangles &&
+                    c.firstVertex + vertices <= group.vertices && c.firstTriangle + count3 <= triangles;
+        for (uint64_t t = 0; fits && t < count3; ++t) {
+            const uint32_t corner = chunk.triangles[c.firstTriangle + t];
+            fits = (corner & 255u) < vertices && (corner >> 8 & 255u) < vertices && (corner >> 16 & 255u) < vertices;
+        }
+        if (!fits) return fail(ErrorKind::input, "a cluster points outside its chunk", where, "build it again");
+    }
+    return chunk;
+}
+
 }  // namespace stipple::lod

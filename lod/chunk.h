@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/base/result.h"
+#include "lod/mesh.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::lod {
@@ -15,7 +16,14 @@ struct Chunk {
     std::vector<shared::PointRecord> records;
     /// 3 per record (x, y, z), each below 2^stepShift; empty where the step is one lattice unit or the node is no leaf.
     std::vector<uint32_t> lowBits;
-    uint64_t sizeBytes() const { return records.size() * sizeof(shared::PointRecord); }
+    // Of a mesh store instead of records:
+    std::vector<shared::MeshVertex> vertices;
+    std::vector<uint32_t> triangles;
+    std::vector<shared::MeshCluster> clusters;
+    uint64_t sizeBytes() const {
+        return records.size() * sizeof(shared::PointRecord) + vertices.size() * sizeof(shared::MeshVertex) +
+               triangles.size() * sizeof(uint32_t) + clusters.size() * sizeof(shared::MeshCluster);
+    }
 };
 
 std::vector<uint8_t> encodeChunk(const Chunk& chunk);
@@ -23,5 +31,10 @@ std::vector<uint8_t> encodeChunk(const Chunk& chunk);
 /// Decodes a chunk of `records` records. `where` names the place in errors. Allocates no more than `records` justifies.
 Result<Chunk> decodeChunk(const uint8_t* bytes, size_t count, uint32_t records, const std::string& where,
                           bool wantLowBits);
+
+/// The same for a chunk of a mesh store.
+std::vector<uint8_t> encodeMeshChunk(const Chunk& chunk);
+Result<Chunk> decodeMeshChunk(const uint8_t* bytes, size_t count, uint32_t triangles, const MeshGroup& group,
+                              const std::string& where);
 
 }  // namespace stipple::lod

@@ -88,6 +88,7 @@ class Selector {
 
     void run() {
         cut_.draw.clear();
+        cut_.meshDraw.clear();
         cut_.wanted.clear();
         cut_.keep.clear();
         cut_.counters = {};
@@ -102,16 +103,18 @@ class Selector {
             cut_.draw.clear();
             cut_.wanted.clear();
             cut_.keep.clear();
+            cut_.meshDraw.clear();
             cut_.counters.recordsDrawn = cut_.counters.recordsTested = cut_.counters.nodesVisited = 0;
-            cut_.counters.nodesCulled = cut_.counters.nodesMissing = 0;
+            cut_.counters.trianglesDrawn = 0;
+            cut_.counters.nodesCulled = cut_.counters.nodesMissing = cut_.counters.nodesDrawn = 0;
             cut_.tauEffective = 0;
             for (size_t i = 0; i < instances_.size(); ++i) emit(i, step);
-            if (cut_.counters.recordsDrawn <= budgets_.records || step >= kLargestTauStep) break;
+            if (cut_.counters.recordsDrawn + cut_.counters.trianglesDrawn <= budgets_.records || step >= kLargestTauStep) break;
         }
         cut_.tauEffective =
             std::max(cut_.tauEffective, step == target ? tau : std::exp2(double(step) / kStepsPerOctave));
-        if (cut_.counters.recordsDrawn > budgets_.records) truncate();
-        cut_.counters.nodesDrawn = cut_.draw.size();
+        if (cut_.counters.recordsDrawn + cut_.counters.trianglesDrawn > budgets_.records) truncate();
+        cut_.counters.nodesDrawn += cut_.draw.size();
     }
 
   private:
@@ -137,6 +140,11 @@ class Selector {
             const Hierarchy& h = hierarchyOf(i);
             if (h.nodes.empty()) continue;
             const LocalView local = makeLocalView(h, instances_[i], view_);
+            if (h.isMesh()) {
+                total += meshCost(i, local, step);
+                if (total > budgets_.records) return total;
+                continue;
+            }
             auto& stack = scratch_.stack;
             stack.assign(1, 0u);
             while (!stack.empty()) {
@@ -186,8 +194,13 @@ class Selector {
         const Hierarchy& h = hierarchyOf(i);
         if (h.nodes.empty()) return;
         const LocalView local = makeLocalView(h, instances_[i], view_);
-        const std::vector<uint8_t>& drawable = residency_.drawable[i];
+        const uint32_t source = instances_[i].source;
+        const std::vector<uint8_t>& drawable = residency_.drawable[source];
         const auto instance = static_cast<uint32_t>(i);
+        if (h.isMesh()) {
+            emitMesh(instance, local, step);
+            return;
+        }
         const size_t firstDraw = cut_.draw.size();
         auto& stack = scratch_.stack;
         stack.assign(1, 0u);
@@ -205,11 +218,11 @@ class Selector {
             const bool isDrawable = drawable[index] != 0;
             const uint32_t code = codeAt(epsilon, step);
             if (isDrawable) {
-                cut_.keep.emplace_back(instance, index);
+                cut_.keep.emplace_back(source, index);
             } else {
                 ++cut_.counters.nodesMissing;
                 const double pixels = index == 0 ? 1e9 : pixelsOf(h.nodes[node.parent].errorCode, parentEpsilon);
-                cut_.wanted.push_back({instance, index, static_cast<float>(pixels * std::exp2(8.0 - node.level))});
+                cut_.wanted.push_back({source, index, static_cast<float>(pixels * std::exp2(8.0 - node.level))});
             }
             uint32_t octantMask = 0;
             if (node.errorCode > code) {
@@ -240,6 +253,85 @@ class Selector {
                   [](const CutDraw& a, const CutDraw& b) { return a.node < b.node; });
     }
 
+    // ---- meshes: groups are refined or not, all of a group's clusters at once (lod/mesh.h) ----
+
+    enum GroupState : uint8_t { kCoarse = 0, kRefined = 1, kUnseen = 2 };
+
+    /// Decides for every group whether its clusters stand in for its simplification; calls onRefined(index, epsilon)
+    /// for those in view that should, which says whether they can.
+    template <typename OnRefined>
+    void refineGroups(size_t i, const LocalView& local, int step, const OnRefined& onRefined) {
+        const Hierarchy& h = hierarchyOf(i);
+        std::vector<uint8_t>& state = scratch_.groupState;
+        state.assign(h.nodes.size(), kCoarse);
+        for (uint32_t index = 0; index < h.nodes.size(); ++index) {
+            const MeshGroup& group = h.groups[index];
+            bool isReached = true;
+            for (uint32_t k = 0; k < group.parents; ++k) isReached = isReached && state[h.parents[group.firstParent + k]];
+            if (!isReached) continue;
+            ++cut_.counters.nodesVisited;
+            const int32_t epsilon = epsilonOf(i, local, index, kInside);
+            if (epsilon == kCulled) {
+                ++cut_.counters.nodesCulled;
+                state[index] = kUnseen;
+            } else if (h.nodes[index].errorCode > codeAt(epsilon, step) && onRefined(index, epsilon)) {
+                state[index] = kRefined;
+            }
+        }
+    }
+
+    /// Calls use(index, run) for all runs that are drawn.
+    template <typename Use>
+    void drawnRuns(const Hierarchy& h, const Use& use) const {
+        const std::vector<uint8_t>& state = scratch_.groupState;
+        for (uint32_t index = 0; index < h.nodes.size(); ++index) {
+            if (state[index] != kRefined) continue;
+            const MeshGroup& group = h.groups[index];
+            for (uint32_t r = 0; r < group.runs; ++r) {
+                const MeshRun& run = h.runs[group.firstRun + r];
+                if (run.producer == MeshRun::kOriginal || state[run.producer] == kCoarse) use(index, run);
+            }
+        }
+    }
+
+    uint64_t meshCost(size_t i, const LocalView& local, int step) {
+        refineGroups(i, local, step, [](uint32_t, int32_t) { return true; });
+        uint64_t total = 0;
+        drawnRuns(hierarchyOf(i), [&](uint32_t, const MeshRun& run) { total += run.triangles; });
+        return total;
+    }
+
+    void emitMesh(uint32_t instance, const LocalView& local, int step) {
+        const Hierarchy& h = hierarchyOf(instance);
+        const uint32_t source = instances_[instance].source;
+        const std::vector<uint8_t>& drawable = residency_.drawable[source];
+        refineGroups(instance, local, step, [&](uint32_t index, int32_t epsilon) {
+            if (drawable[index]) {
+                cut_.keep.emplace_back(source, index);
+                return true;
+            }
+            ++cut_.counters.nodesMissing;
+            const Node& node = h.nodes[index];
+            const bool isRoot = h.groups[index].parents == 0;
+            const double pixels = isRoot ? 1e9 : pixelsOf(node.errorCode, epsilon);
+            cut_.wanted.push_back({source, index, static_cast<float>(pixels * std::exp2(8.0 - node.level))});
+            if (!isRoot) cut_.tauEffective = std::max(cut_.tauEffective, pixels);
+            return false;
+        });
+        uint32_t last = MeshRun::kOriginal;
+        drawnRuns(h, [&](uint32_t index, const MeshRun& run) {
+            const bool isExact = run.producer == MeshRun::kOriginal;
+            // A producer that no view asked about was not looked at: its own error is smaller still.
+            const double pixels =
+                isExact ? 0 : pixelsOf(h.nodes[run.producer].errorCode, epsilonOf(instance, local, run.producer, kInside));
+            cut_.meshDraw.push_back(
+                {instance, index, run.firstCluster, run.clusters, run.triangles, static_cast<float>(pixels)});
+            cut_.counters.trianglesDrawn += run.triangles;
+            cut_.counters.nodesDrawn += index != last ? 1 : 0;
+            last = index;
+        });
+    }
+
     /// True if every ancestor is drawable (a child whose parent's chunk is missing is covered by a coarser ancestor).
     static bool isReachable(const std::vector<uint8_t>& drawable, const Hierarchy& h, uint32_t index) {
         while (index != 0) {
@@ -259,6 +351,13 @@ class Selector {
         }
         std::erase_if(cut_.draw, [](const CutDraw& d) { return d.count == 0; });
         cut_.counters.recordsDrawn = budgets_.records - left;
+        uint64_t triangles = 0;
+        std::erase_if(cut_.meshDraw, [&](const CutMeshDraw& d) {
+            const bool isLeftOut = triangles + d.triangles > left;
+            if (!isLeftOut) triangles += d.triangles;
+            return isLeftOut;
+        });
+        cut_.counters.trianglesDrawn = triangles;
     }
 
     std::span<const Hierarchy* const> hierarchies_;
@@ -274,7 +373,7 @@ class Selector {
 
 void selectCut(std::span<const Hierarchy* const> hierarchies, std::span<const Instance> instances,
                const Residency& residency, const View& view, const Budgets& budgets, CutScratch& scratch, Cut& cut) {
-    STIPPLE_CHECK(residency.drawable.size() >= instances.size());
+    for (const Instance& i : instances) STIPPLE_CHECK(i.source < residency.drawable.size(), "residency of a source");
     Selector(hierarchies, instances, residency, view, budgets, scratch, cut).run();
 }
 

@@ -31,19 +31,20 @@ struct View {
 /// A placed hierarchy. world = translation + rotation * (scale * (origin + unit * lattice)).
 struct Instance {
     uint32_t hierarchy = 0;
+    uint32_t source = 0;  ///< whose chunks it is drawn from: instances of one store that look alike share them
     glm::dmat3 rotation{1};
     glm::dvec3 translation{0};
     double scale = 1;
 };
 
-/// One byte per node of each instance's hierarchy: 1 where the chunk can be drawn.
+/// One byte per node of each source's hierarchy: 1 where the chunk can be drawn.
 struct Residency {
     std::span<const std::vector<uint8_t>> drawable;
 };
 
 struct Budgets {
     double errorPixels = 1;                                   ///< tau asked for
-    uint64_t records = std::numeric_limits<uint64_t>::max();  ///< records drawn at most
+    uint64_t records = std::numeric_limits<uint64_t>::max();  ///< records and triangles drawn at most
 };
 
 struct CutDraw {
@@ -54,20 +55,28 @@ struct CutDraw {
     float errorPixels = 0;    ///< largest screen-space error among what this node draws
 };
 
-struct CutWanted {
+/// Clusters of a mesh store: one run of one group.
+struct CutMeshDraw {
     uint32_t instance = 0, node = 0;
+    uint32_t firstCluster = 0, clusters = 0, triangles = 0;
+    float errorPixels = 0;
+};
+
+struct CutWanted {
+    uint32_t source = 0, node = 0;
     float priority = 0;  ///< pixels of error that this chunk would remove, parents always above children
 };
 
 struct CutCounters {
     uint64_t nodesVisited = 0, nodesDrawn = 0, nodesCulled = 0, nodesMissing = 0, recordsDrawn = 0, recordsTested = 0,
-             evaluations = 0;
+             trianglesDrawn = 0, evaluations = 0;
 };
 
 struct Cut {
     std::vector<CutDraw> draw;                        ///< sorted by instance, then node
+    std::vector<CutMeshDraw> meshDraw;                ///< sorted by instance, then node
     std::vector<CutWanted> wanted;                    ///< chunks that the full cut needs and that are not drawable
-    std::vector<std::pair<uint32_t, uint32_t>> keep;  ///< (instance, node) that must not be evicted
+    std::vector<std::pair<uint32_t, uint32_t>> keep;  ///< (source, node) that must not be evicted
     double tauTarget = 0;                             ///< error, px, that the budget allows once everything is resident
     double tauEffective = 0;                          ///< error, px, delivered by what is drawn now
     bool truncated = false;  ///< even the roots exceed the record budget: some of their records are left out
@@ -79,7 +88,7 @@ struct CutScratch {
     std::vector<std::vector<int32_t>> epsilon;  ///< per instance and node: allowed error of tau = 1, 1/32 octave codes
     std::vector<std::vector<uint32_t>> stamp;
     std::vector<uint32_t> stack;
-    std::vector<uint64_t> order;
+    std::vector<uint8_t> groupState;
     uint32_t frame = 0;
 };
 

@@ -8,6 +8,7 @@
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "lod/mesh.h"
 #include "lod/primitives.h"
 
 namespace stipple::lod {
@@ -63,6 +64,19 @@ struct Hierarchy {
     ErrorScale errors;
     std::vector<Node> nodes;            ///< breadth first; node 0 is the root
     std::vector<uint32_t> greaterThan;  ///< see CodeCounts
+    // Only of a mesh store: nodes are groups (lod/mesh.h), parents before children; `records` counts triangles and
+    // `errorCode` is what a view that does not refine the group would see; cells, children and counts are not used.
+    std::vector<MeshGroup> groups;  ///< one a node
+    std::vector<MeshRun> runs;
+    std::vector<uint32_t> parents;
+    bool isMesh() const { return !groups.empty(); }
+    /// Bytes of a decoded chunk.
+    uint64_t decodedBytes(uint32_t node) const {
+        if (!isMesh()) return uint64_t{nodes[node].records} * 16;
+        const MeshGroup& g = groups[node];
+        return uint64_t{g.vertices} * sizeof(shared::MeshVertex) + uint64_t{nodes[node].records} * 4 +
+               uint64_t{g.clusters} * sizeof(shared::MeshCluster);
+    }
 
     /// Records with a code > `code`.
     uint32_t countGreater(const CodeCounts& c, uint32_t records, uint32_t code) const {

@@ -5,11 +5,11 @@
 
 #include <bit>
 #include <cstring>
-#include <nlohmann/json.hpp>
 #include <type_traits>
 
 #include "engine/base/hash.h"
 #include "lod/attributes.h"
+#include "lod/description.h"
 
 namespace stipple::lod {
 namespace {
@@ -30,10 +30,10 @@ struct Head {
     std::array<double, 3> origin;
     double unit, smallestError;
     uint64_t nodeCount, fileBytes, contentHash;
-    Section nodes, counts, description;
+    Section nodes, counts, description, mesh;
     uint64_t hash;  // of everything before
 };
-static_assert(sizeof(Head) == 16 + 24 + 16 + 24 + 96 + 8 && std::is_trivially_copyable_v<Head>);
+static_assert(sizeof(Head) == 16 + 24 + 16 + 24 + 128 + 8 && std::is_trivially_copyable_v<Head>);
 
 struct Foot {
     uint64_t headHash, magic;
@@ -95,92 +95,6 @@ void appendPairs(const Hierarchy& h, const CodeCounts& c, uint32_t records, std:
     }
 }
 
-nlohmann::json toJson(const StoreDescription& d) {
-    nlohmann::json attributes = nlohmann::json::array();
-    for (const AttributeInfo& a : d.attributes)
-        attributes.push_back({{"name", a.name},
-                              {"type", kScalarNames.at(static_cast<size_t>(a.type))},
-                              {"aggregate", kAggregateNames.at(static_cast<size_t>(a.aggregate))},
-                              {"scale", a.scale},
-                              {"offset", a.offset},
-                              {"description", a.description},
-                              {"least", a.least},
-                              {"greatest", a.greatest},
-                              {"low", a.low},
-                              {"high", a.high},
-                              {"counts", a.counts}});
-    return {
-        {"metres_per_unit", d.metresPerUnit},
-        {"up", {d.up.x, d.up.y, d.up.z}},
-        {"crs", {{"name", d.crs.name}, {"epsg", d.crs.epsg}, {"text", d.crs.text}, {"is_degrees", d.crs.isDegrees}}},
-        {"attributes", attributes},
-        {"low_height", d.lowHeight},
-        {"high_height", d.highHeight},
-        {"points", d.points},
-        {"records", d.records},
-        {"rounding", d.roundingUnits},
-        {"min", {d.boundsMin.x, d.boundsMin.y, d.boundsMin.z}},
-        {"max", {d.boundsMax.x, d.boundsMax.y, d.boundsMax.z}},
-        {"focus_min", {d.focusMin.x, d.focusMin.y, d.focusMin.z}},
-        {"focus_max", {d.focusMax.x, d.focusMax.y, d.focusMax.z}},
-        {"has_colour", d.hasColour},
-        {"is_reflectance", d.isReflectance},
-        {"has_normals", d.hasNormals},
-        {"source", d.source}};
-}
-
-template <size_t N>
-size_t indexOf(const std::array<const char*, N>& names, const std::string& name) {
-    for (size_t i = 0; i < N; ++i)
-        if (name == names.at(i)) return i;
-    throw std::runtime_error("unknown name '" + name + "'");
-}
-
-AttributeInfo attributeFromJson(const nlohmann::json& j) {
-    AttributeInfo a;
-    a.name = j.at("name").get<std::string>();
-    a.type = static_cast<ScalarType>(indexOf(kScalarNames, j.at("type").get<std::string>()));
-    a.aggregate = static_cast<Aggregate>(indexOf(kAggregateNames, j.at("aggregate").get<std::string>()));
-    a.scale = j.at("scale").get<double>();
-    a.offset = j.at("offset").get<double>();
-    a.description = j.at("description").get<std::string>();
-    a.least = j.at("least").get<double>();
-    a.greatest = j.at("greatest").get<double>();
-    a.low = j.at("low").get<double>();
-    a.high = j.at("high").get<double>();
-    a.counts = j.at("counts").get<std::vector<std::pair<double, uint64_t>>>();
-    return a;
-}
-
-StoreDescription fromJson(const nlohmann::json& j) {
-    StoreDescription d;
-    d.metresPerUnit = j.at("metres_per_unit").get<double>();
-    const nlohmann::json& crs = j.at("crs");
-    d.crs.name = crs.at("name").get<std::string>();
-    d.crs.epsg = crs.at("epsg").get<int>();
-    d.crs.text = crs.at("text").get<std::string>();
-    d.crs.isDegrees = crs.at("is_degrees").get<bool>();
-    d.crs.metresPerUnit = d.metresPerUnit;
-    for (const nlohmann::json& a : j.at("attributes")) d.attributes.push_back(attributeFromJson(a));
-    d.lowHeight = j.at("low_height").get<double>();
-    d.highHeight = j.at("high_height").get<double>();
-    d.points = j.at("points").get<uint64_t>();
-    d.records = j.at("records").get<uint64_t>();
-    d.roundingUnits = j.at("rounding").get<double>();
-    for (int i = 0; i < 3; ++i) {
-        d.boundsMin[i] = j.at("min").at(static_cast<size_t>(i)).get<double>();
-        d.focusMin[i] = j.at("focus_min").at(static_cast<size_t>(i)).get<double>();
-        d.focusMax[i] = j.at("focus_max").at(static_cast<size_t>(i)).get<double>();
-        d.up[i] = j.at("up").at(static_cast<size_t>(i)).get<double>();
-        d.boundsMax[i] = j.at("max").at(static_cast<size_t>(i)).get<double>();
-    }
-    d.hasColour = j.at("has_colour").get<bool>();
-    d.isReflectance = j.at("is_reflectance").get<bool>();
-    d.hasNormals = j.at("has_normals").get<bool>();
-    d.source = j.at("source").get<std::string>();
-    return d;
-}
-
 Result<std::vector<uint8_t>> readSection(const InputFile& file, const Section& s, const char* name) {
     const std::string where = fmt::format("{}: {}", file.path(), name);
     if (s.offset > file.sizeBytes() || s.bytes > file.sizeBytes() - s.offset)
@@ -197,6 +111,76 @@ Result<std::vector<uint8_t>> readSection(const InputFile& file, const Section& s
     const size_t got = ZSTD_decompress(raw.data(), raw.size(), bytes.data(), bytes.size());
     if (ZSTD_isError(got) || got != raw.size()) return tl::unexpected(damaged(where, "cannot be decompressed"));
     return raw;
+}
+
+/// Of the mesh section: the counts, then groups, runs and parents.
+struct MeshHead {
+    uint64_t groups, runs, parents;
+};
+
+std::vector<uint8_t> meshBytes(const Hierarchy& h) {
+    const MeshHead head{h.groups.size(), h.runs.size(), h.parents.size()};
+    std::vector<uint8_t> out;
+    const auto append = [&](const void* from, size_t count) {
+        const auto* bytes = static_cast<const uint8_t*>(from);
+        out.insert(out.end(), bytes, bytes + count);
+    };
+    append(&head, sizeof(head));
+    append(h.groups.data(), h.groups.size() * sizeof(MeshGroup));
+    append(h.runs.data(), h.runs.size() * sizeof(MeshRun));
+    append(h.parents.data(), h.parents.size() * sizeof(uint32_t));
+    return out;
+}
+
+Result<void> readMesh(const std::vector<uint8_t>& bytes, const std::string& path, Hierarchy& h) {
+    MeshHead head{};
+    const auto bad = [&] { return tl::unexpected(damaged(path, "the groups of the mesh are not possible")); };
+    if (bytes.size() < sizeof(head)) return bad();
+    std::memcpy(&head, bytes.data(), sizeof(head));
+    const uint64_t most = bytes.size();  // of each, so that the sums below cannot overflow
+    if (head.groups > most || head.runs > most || head.parents > most ||
+        sizeof(head) + head.groups * sizeof(MeshGroup) + head.runs * sizeof(MeshRun) + head.parents * 4 != bytes.size())
+        return bad();
+    if (head.groups != 0 && head.groups != h.nodes.size()) return bad();
+    const uint8_t* at = bytes.data() + sizeof(head);
+    const auto take = [&](auto& to, uint64_t count) {
+        to.resize(count);
+        if (count > 0) std::memcpy(to.data(), at, count * sizeof(to[0]));
+        at += count * sizeof(to[0]);
+    };
+    take(h.groups, head.groups);
+    take(h.runs, head.runs);
+    take(h.parents, head.parents);
+    return {};
+}
+
+/// The same for groups: parents before children, producers after the groups that hold what they gave.
+Result<void> checkGroups(const Store& store, uint64_t chunksEnd) {
+    const Hierarchy& h = store.hierarchy;
+    for (size_t i = 0; i < h.nodes.size(); ++i) {
+        const Node& n = h.nodes[i];
+        const MeshGroup& g = h.groups[i];
+        bool fits = n.chunkOffset <= chunksEnd && n.chunkBytes <= chunksEnd - n.chunkOffset && n.attributeBytes == 0 &&
+                    std::isfinite(n.radius) && n.radius >= 0 && std::isfinite(n.centre.x + n.centre.y + n.centre.z) &&
+                    uint64_t{g.firstRun} + g.runs <= h.runs.size() && g.runs > 0 &&
+                    uint64_t{g.firstParent} + g.parents <= h.parents.size() &&
+                    (g.parents > 0) == (n.errorCode != 255) && (i > 0 || g.parents == 0);
+        // Each vertex of a cluster is used and each cluster has a triangle, so sizes that agree with a chunk of these
+        // bytes are bounded; zstd gains at most about 2^17 to 1.
+        fits = fits && (uint64_t{g.vertices} * 32 + uint64_t{n.records} * 4) / 131072 <= n.chunkBytes;
+        uint64_t triangles = 0, clusters = 0;
+        for (uint32_t r = 0; fits && r < g.runs; ++r) {
+            const MeshRun& run = h.runs[g.firstRun + r];
+            fits = run.firstCluster == clusters &&
+                   (run.producer == MeshRun::kOriginal || (run.producer > i && run.producer < h.nodes.size()));
+            clusters += run.clusters;
+            triangles += run.triangles;
+        }
+        for (uint32_t k = 0; fits && k < g.parents; ++k) fits = h.parents[g.firstParent + k] < i;
+        if (!fits || triangles != n.records || clusters != g.clusters || n.records == 0)
+            return tl::unexpected(damaged(store.path, fmt::format("group {} of the mesh is not possible", i)));
+    }
+    return {};
 }
 
 /// What selectCut and the streamer index with must be in range before anyone uses it.
@@ -261,11 +245,13 @@ Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& des
         d.childMask = n.childMask;
         d.errorCode = n.errorCode;
         d.stepShift = n.stepShift;
-        appendPairs(h, n.parentCounts, n.records, pairs, d.parentCodes);
-        appendPairs(h, n.ownCounts, n.records, pairs, d.ownCodes);
+        if (!h.isMesh()) {
+            appendPairs(h, n.parentCounts, n.records, pairs, d.parentCodes);
+            appendPairs(h, n.ownCounts, n.records, pairs, d.ownCodes);
+        }
         nodes.push_back(d);
     }
-    const std::string text = toJson(description).dump();
+    const std::string text = describeAsText(description);
     Head head{};
     auto write = [&](const void* raw, size_t count, Section& section) -> Result<void> {
         const std::vector<uint8_t> bytes = packed(raw, count);
@@ -275,6 +261,8 @@ Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& des
     STIPPLE_TRY(write(nodes.data(), nodes.size() * sizeof(NodeOnDisk), head.nodes));
     STIPPLE_TRY(write(pairs.data(), pairs.size() * sizeof(CodeCount), head.counts));
     STIPPLE_TRY(write(text.data(), text.size(), head.description));
+    const std::vector<uint8_t> mesh = meshBytes(h);
+    STIPPLE_TRY(write(mesh.data(), mesh.size(), head.mesh));
     head.magic = kMagic;
     head.version = kStoreVersion;
     head.rootLog2 = h.rootLog2;
@@ -283,10 +271,11 @@ Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& des
     head.smallestError = h.errors.smallest;
     head.nodeCount = nodes.size();
     head.fileBytes = file_.position() + sizeof(Foot);
-    // The node table holds the hash of every chunk, so these three stand for the whole content.
-    const std::array<uint64_t, 6> parts{head.nodes.hash,
+    // The node table holds the hash of every chunk, so these stand for the whole content.
+    const std::array<uint64_t, 7> parts{head.nodes.hash,
                                         head.counts.hash,
                                         head.description.hash,
+                                        head.mesh.hash,
                                         head.rootLog2,
                                         std::bit_cast<uint64_t>(head.unit),
                                         hashBytes(head.origin.data(), sizeof(head.origin))};
@@ -332,6 +321,7 @@ Result<Store> openStore(const std::string& path) {
     STIPPLE_ASSIGN(const std::vector<uint8_t> nodeBytes, readSection(file, head.nodes, "node table"));
     STIPPLE_ASSIGN(const std::vector<uint8_t> countBytes, readSection(file, head.counts, "code counts"));
     STIPPLE_ASSIGN(const std::vector<uint8_t> text, readSection(file, head.description, "description"));
+    STIPPLE_ASSIGN(const std::vector<uint8_t> mesh, readSection(file, head.mesh, "mesh groups"));
     Hierarchy& h = store.hierarchy;
     h.origin = {head.origin[0], head.origin[1], head.origin[2]};
     h.unit = head.unit;
@@ -362,6 +352,7 @@ Result<Store> openStore(const std::string& path) {
         n.childMask = d.childMask;
         n.errorCode = d.errorCode;
         n.stepShift = d.stepShift;
+        if (d.parentCodes == 0 && d.ownCodes == 0 && mesh.size() > sizeof(MeshHead)) continue;
         for (const auto& [codes, counts] :
              {std::pair{d.parentCodes, &n.parentCounts}, std::pair{d.ownCodes, &n.ownCounts}}) {
             uint64_t sum = 0;
@@ -377,7 +368,7 @@ Result<Store> openStore(const std::string& path) {
         }
     }
     try {
-        store.description = fromJson(nlohmann::json::parse(text.begin(), text.end()));
+        store.description = descriptionFromText({text.begin(), text.end()});
     } catch (const std::exception& e) {
         return tl::unexpected(damaged(path, fmt::format("the description cannot be read: {}", e.what())));
     }
@@ -385,7 +376,8 @@ Result<Store> openStore(const std::string& path) {
         return tl::unexpected(damaged(path, "the up direction has not the length 1"));
     store.contentHash = head.contentHash;
     store.fileBytes = head.fileBytes;
-    STIPPLE_TRY(checkNodes(store, head.nodes.offset));
+    STIPPLE_TRY(readMesh(mesh, path, h));
+    STIPPLE_TRY(h.isMesh() ? checkGroups(store, head.nodes.offset) : checkNodes(store, head.nodes.offset));
     return store;
 }
 
@@ -397,7 +389,14 @@ Result<Chunk> readChunk(const Store& store, uint32_t index, bool wantLowBits) {
     const std::string where = fmt::format("{}: chunk of node {} at offset {}", store.path, index, node.chunkOffset);
     if (hashBytes(bytes.data(), bytes.size()) != node.chunkHash)
         return tl::unexpected(damaged(where, "the hash does not match"));
-    return decodeChunk(bytes.data(), bytes.size(), node.records, where, wantLowBits);
+    return decodeNode(store.hierarchy, index, bytes.data(), bytes.size(), where, wantLowBits);
+}
+
+Result<Chunk> decodeNode(const Hierarchy& h, uint32_t node, const uint8_t* bytes, size_t count,
+                         const std::string& where, bool wantLowBits) {
+    const uint32_t records = h.nodes[node].records;
+    return h.isMesh() ? decodeMeshChunk(bytes, count, records, h.groups[node], where)
+                      : decodeChunk(bytes, count, records, where, wantLowBits);
 }
 
 Result<std::vector<uint8_t>> readAttribute(const Store& store, uint32_t index, size_t attribute) {

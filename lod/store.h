@@ -10,29 +10,13 @@
 #include "engine/base/executor.h"
 #include "engine/base/file.h"
 #include "lod/chunk.h"
+#include "lod/description.h"
 #include "lod/hierarchy.h"
 
 namespace stipple::lod {
 
 /// Of the file format; a store of another version must be built again.
-inline constexpr uint32_t kStoreVersion = 3;
-
-struct StoreDescription {
-    double metresPerUnit = 1;
-    glm::dvec3 up{0, 0, 1};  ///< unit length
-    Crs crs;
-    std::vector<AttributeInfo> attributes;  ///< streams that every chunk has
-    double lowHeight = 0, highHeight = 0;   ///< 2nd and 98th percentile of dot(up, position), world units
-    uint64_t points = 0;                    ///< leaf records: the points of the input that were kept
-    uint64_t records = 0;                   ///< all records, coarse levels included
-    double roundingUnits = 0;               ///< largest rounding of a coordinate to the lattice, world units; 0: exact
-    glm::dvec3 boundsMin{0}, boundsMax{0};  ///< of the points, world units
-    glm::dvec3 focusMin{0}, focusMax{0};    ///< the same without stray points: what a camera looks at first
-    bool hasColour = false;                 ///< the points have colours of their own
-    bool isReflectance = false;             ///< those are of the material, to be lit
-    bool hasNormals = false;                ///< from the file or estimated
-    std::string source;                     ///< file names of the input, without folders
-};
+inline constexpr uint32_t kStoreVersion = 4;
 
 /// An opened store. Reading chunks is safe from several threads.
 struct Store {
@@ -64,6 +48,9 @@ class StoreWriter {
 
 /// Reads and checks head, foot, node table and description (not the chunks).
 Result<Store> openStore(const std::string& path);
+/// Decodes the chunk of a node, whatever it holds.
+Result<Chunk> decodeNode(const Hierarchy& h, uint32_t node, const uint8_t* bytes, size_t count,
+                         const std::string& where, bool wantLowBits);
 /// Reads one chunk, checks its hash, decodes it.
 Result<Chunk> readChunk(const Store& store, uint32_t node, bool wantLowBits = false);
 

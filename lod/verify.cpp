@@ -57,6 +57,32 @@ std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
 
 }  // namespace
 
+namespace {
+
+std::string checkGroup(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
+    const Node& node = h.nodes[index];
+    const MeshGroup& group = h.groups[index];
+    for (const shared::MeshVertex& v : chunk.vertices)
+        if (glm::length(glm::dvec3(v.x, v.y, v.z) - node.centre) > node.radius * (1 + 1e-9))
+            return "a vertex reaches out of the bounding sphere";
+    uint32_t cluster = 0;
+    for (uint32_t r = 0; r < group.runs; ++r) {
+        const MeshRun& run = h.runs[group.firstRun + r];
+        uint32_t triangles = 0;
+        for (uint32_t c = 0; c < run.clusters; ++c, ++cluster) triangles += chunk.clusters.at(cluster).counts >> 16;
+        if (triangles != run.triangles) return "a run has not its number of triangles";
+    }
+    for (uint32_t k = 0; k < group.parents; ++k) {
+        const Node& parent = h.nodes[h.parents[group.firstParent + k]];
+        if (glm::length(node.centre - parent.centre) + node.radius > parent.radius * (1 + 1e-9))
+            return "the bounding sphere is not inside a parent's";
+        if (node.errorCode > parent.errorCode) return "the error is larger than a parent's";
+    }
+    return {};
+}
+
+}  // namespace
+
 Result<VerifyReport> verifyStore(const Store& store, Executor& executor) {
     const Hierarchy& h = store.hierarchy;
     CompletionQueue<std::pair<size_t, Error>> problems;
@@ -68,14 +94,19 @@ Result<VerifyReport> verifyStore(const Store& store, Executor& executor) {
                 problems.push({i, chunk.error()});
                 continue;
             }
-            if (std::string text = checkNode(h, static_cast<uint32_t>(i), *chunk); !text.empty())
+            const auto index = static_cast<uint32_t>(i);
+            if (std::string text = h.isMesh() ? checkGroup(h, index, *chunk) : checkNode(h, index, *chunk);
+                !text.empty())
                 problems.push({i, Error{ErrorKind::input, std::move(text), fmt::format("{}: node {}", store.path, i),
                                         "this is a fault of the build; please report it with the input"}});
             for (size_t a = 0; a < store.description.attributes.size(); ++a)
                 if (const auto values = readAttribute(store, static_cast<uint32_t>(i), a); !values)
                     problems.push({i, values.error()});
-            records += chunk->records.size();
-            if (h.nodes[i].isLeaf()) leafRecords += chunk->records.size();
+            records += h.nodes[i].records;
+            if (!h.isMesh() && h.nodes[i].isLeaf()) leafRecords += h.nodes[i].records;
+            for (uint32_t r = 0; h.isMesh() && r < h.groups[i].runs; ++r)
+                if (const MeshRun& run = h.runs[h.groups[i].firstRun + r]; run.producer == MeshRun::kOriginal)
+                    leafRecords += run.triangles;
         }
     });
     auto found = problems.takeAll();

@@ -8,6 +8,7 @@
 
 #include "engine/base/check.h"
 #include "engine/base/hash.h"
+#include "lod/store.h"
 
 namespace stipple::streaming {
 namespace {
@@ -25,8 +26,9 @@ class FileSource final : public ByteSource {
 
 constexpr uint64_t kRetryFrames = 120;
 
-Result<lod::Chunk> fetch(const ByteSource& source, const lod::Node& node, uint32_t index, const ChunkFinish& finish,
+Result<lod::Chunk> fetch(const ByteSource& source, const lod::Hierarchy& h, uint32_t index, const ChunkFinish& finish,
                          const std::string& where) {
+    const lod::Node& node = h.nodes[index];
     const size_t attributeBytes = finish.wantsAttributes ? node.attributeBytes : 0;
     std::vector<uint8_t> bytes(node.chunkBytes + attributeBytes);
     STIPPLE_TRY(source.read(node.chunkOffset, bytes.data(), bytes.size()));
@@ -35,7 +37,7 @@ Result<lod::Chunk> fetch(const ByteSource& source, const lod::Node& node, uint32
         (finish.wantsAttributes && hashBytes(attributes, attributeBytes) != node.attributeHash))
         return fail(ErrorKind::input, "the hash of a chunk does not match", where,
                     "the store is damaged; build it again");
-    STIPPLE_ASSIGN(lod::Chunk chunk, lod::decodeChunk(bytes.data(), node.chunkBytes, node.records, where, false));
+    STIPPLE_ASSIGN(lod::Chunk chunk, lod::decodeNode(h, index, bytes.data(), node.chunkBytes, where, false));
     if (finish.apply) STIPPLE_TRY(finish.apply(index, chunk, attributes, attributeBytes));
     return chunk;
 }
@@ -69,7 +71,7 @@ Streamer::~Streamer() {
             if (sources_[i].nodes[n].state == ChunkState::resident) sink_.evict({i, n});
 }
 
-void Streamer::addInstance(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source, std::string name,
+void Streamer::addSource(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source, std::string name,
                            ChunkFinish finish) {
     sources_.push_back({&hierarchy, std::move(source), std::move(name),
                         std::make_shared<const ChunkFinish>(std::move(finish)),
@@ -78,10 +80,10 @@ void Streamer::addInstance(const lod::Hierarchy& hierarchy, std::shared_ptr<cons
 }
 
 void Streamer::setState(ChunkKey key, ChunkState to) {
-    ChunkState& state = sources_[key.instance].nodes[key.node].state;
+    ChunkState& state = sources_[key.source].nodes[key.node].state;
     STIPPLE_CHECK(isLegalTransition(state, to), "chunk state transition");
     state = to;
-    drawable_[key.instance][key.node] = to == ChunkState::resident ? 1 : 0;
+    drawable_[key.source][key.node] = to == ChunkState::resident ? 1 : 0;
 }
 
 void Streamer::collect() {
@@ -89,13 +91,13 @@ void Streamer::collect() {
         --counters_.inFlight;
         if (!arrival.chunk) {
             setState(arrival.key, ChunkState::failed);
-            sources_[arrival.key.instance].nodes[arrival.key.node].retryAt = frame_ + kRetryFrames;
+            sources_[arrival.key.source].nodes[arrival.key.node].retryAt = frame_ + kRetryFrames;
             ++counters_.failures;
             lastFailure_ = arrival.chunk.error().line();
             continue;
         }
         setState(arrival.key, ChunkState::arrived);
-        counters_.bytesStreamed += sources_[arrival.key.instance].hierarchy->nodes[arrival.key.node].chunkBytes;
+        counters_.bytesStreamed += sources_[arrival.key.source].hierarchy->nodes[arrival.key.node].chunkBytes;
         arrived_.push_back(std::move(arrival));
     }
 }
@@ -109,21 +111,21 @@ void Streamer::upload() {
         if (uploaded > 0 && uploaded + bytes > settings_.uploadBytesPerFrame) break;
         if (!makeRoom(bytes)) {
             setState(arrival.key, ChunkState::absent);
-            sources_[arrival.key.instance].nodes[arrival.key.node].retryAt = frame_ + kRetryFrames;
+            sources_[arrival.key.source].nodes[arrival.key.node].retryAt = frame_ + kRetryFrames;
             ++counters_.refused;
             continue;
         }
         if (const auto result = sink_.upload(arrival.key, *arrival.chunk); !result) {
             setState(arrival.key, ChunkState::failed);
-            sources_[arrival.key.instance].nodes[arrival.key.node].retryAt = frame_ + kRetryFrames;
+            sources_[arrival.key.source].nodes[arrival.key.node].retryAt = frame_ + kRetryFrames;
             ++counters_.failures;
             lastFailure_ = result.error().line();
             continue;
         }
         setState(arrival.key, ChunkState::resident);
-        Source& source = sources_[arrival.key.instance];
+        Source& source = sources_[arrival.key.source];
         source.nodes[arrival.key.node].lastUsed = frame_;
-        if (arrival.key.node != 0) ++source.nodes[source.hierarchy->nodes[arrival.key.node].parent].residentChildren;
+        countInParents(arrival.key, 1);
         counters_.residentBytes += bytes;
         ++counters_.uploads;
         uploaded += bytes;
@@ -131,12 +133,28 @@ void Streamer::upload() {
     arrived_.erase(arrived_.begin(), arrived_.begin() + static_cast<std::ptrdiff_t>(taken));
 }
 
+/// A chunk is not evicted before those that build on it.
+void Streamer::countInParents(ChunkKey key, int change) {
+    Source& source = sources_[key.source];
+    const lod::Hierarchy& h = *source.hierarchy;
+    const auto count = [&](uint32_t parent) {
+        uint16_t& children = source.nodes[parent].residentChildren;
+        children = static_cast<uint16_t>(children + change);
+    };
+    if (h.isMesh()) {
+        const lod::MeshGroup& group = h.groups[key.node];
+        for (uint32_t k = 0; k < group.parents; ++k) count(h.parents[group.firstParent + k]);
+    } else if (key.node != 0) {
+        count(h.nodes[key.node].parent);
+    }
+}
+
 void Streamer::evict(ChunkKey key) {
-    Source& source = sources_[key.instance];
+    Source& source = sources_[key.source];
     sink_.evict(key);
     setState(key, ChunkState::absent);
-    if (key.node != 0) --source.nodes[source.hierarchy->nodes[key.node].parent].residentChildren;
-    counters_.residentBytes -= uint64_t{source.hierarchy->nodes[key.node].records} * sizeof(shared::PointRecord);
+    countInParents(key, -1);
+    counters_.residentBytes -= source.hierarchy->decodedBytes(key.node);
     ++counters_.evictions;
 }
 
@@ -148,6 +166,7 @@ bool Streamer::makeRoom(uint64_t bytes) {
         for (uint32_t i = 0; i < sources_.size(); ++i)
             for (uint32_t n = 1; n < sources_[i].nodes.size(); ++n) {
                 const NodeState& s = sources_[i].nodes[n];
+                if (sources_[i].hierarchy->isMesh() && sources_[i].hierarchy->groups[n].parents == 0) continue;
                 if (s.state != ChunkState::resident || s.residentChildren != 0 || s.lastUsed >= oldestUse) continue;
                 oldestUse = s.lastUsed;
                 oldest = {i, n};
@@ -161,26 +180,26 @@ bool Streamer::makeRoom(uint64_t bytes) {
 
 void Streamer::request(const lod::Cut& cut) {
     ++frame_;
-    for (const auto& [instance, node] : cut.keep) sources_[instance].nodes[node].lastUsed = frame_;
+    for (const auto& [source, node] : cut.keep) sources_[source].nodes[node].lastUsed = frame_;
     wanted_.assign(cut.wanted.begin(), cut.wanted.end());
     std::sort(wanted_.begin(), wanted_.end(), [](const lod::CutWanted& a, const lod::CutWanted& b) {
         return a.priority != b.priority ? a.priority > b.priority
-                                        : std::pair{a.instance, a.node} < std::pair{b.instance, b.node};
+                                        : std::pair{a.source, a.node} < std::pair{b.source, b.node};
     });
     for (const lod::CutWanted& w : wanted_) {
         if (counters_.inFlight >= settings_.requestsInFlight) break;
-        Source& source = sources_[w.instance];
+        Source& source = sources_[w.source];
         NodeState& state = source.nodes[w.node];
         if ((state.state != ChunkState::absent && state.state != ChunkState::failed) || frame_ < state.retryAt)
             continue;
-        const ChunkKey key{w.instance, w.node};
+        const ChunkKey key{w.source, w.node};
         setState(key, ChunkState::requested);
         ++counters_.inFlight;
         ++counters_.requests;
         const std::string where = fmt::format("{}: chunk of node {}", source.name, w.node);
-        executor_.run([key, where, bytes = source.bytes, node = source.hierarchy->nodes[w.node], finish = source.finish,
+        executor_.run([key, where, bytes = source.bytes, h = source.hierarchy, finish = source.finish,
                        queue = completed_] {
-            queue->push({key, fetch(*bytes, node, key.node, *finish, where)});
+            queue->push({key, fetch(*bytes, *h, key.node, *finish, where)});
         });
     }
 }

@@ -21,8 +21,9 @@
 
 namespace stipple::streaming {
 
+/// `source`: in the order of addSource.
 struct ChunkKey {
-    uint32_t instance = 0, node = 0;
+    uint32_t source = 0, node = 0;
 };
 
 /// Takes decoded chunks: implemented by each backend (and by the tests, which count what is alive).
@@ -62,9 +63,9 @@ class Streamer {
     Streamer(const Streamer&) = delete;
     Streamer& operator=(const Streamer&) = delete;
 
-    /// One more instance; `hierarchy` must outlive the streamer. `finish` (may be empty) is called with every decoded
-    /// chunk on the thread that decoded it.
-    void addInstance(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source, std::string name,
+    /// One more store to stream from; `hierarchy` must outlive the streamer. `finish` (may be empty) is called with
+    /// every decoded chunk on the thread that decoded it.
+    void addSource(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source, std::string name,
                      ChunkFinish finish = {});
     /// Takes in what workers finished since the last call.
     void collect();
@@ -82,7 +83,7 @@ class Streamer {
   private:
     struct NodeState {
         ChunkState state = ChunkState::absent;
-        uint8_t residentChildren = 0;
+        uint16_t residentChildren = 0;
         uint64_t lastUsed = 0, retryAt = 0;
     };
     struct Source {
@@ -99,6 +100,7 @@ class Streamer {
     void setState(ChunkKey key, ChunkState to);
     bool makeRoom(uint64_t bytes);
     void evict(ChunkKey key);
+    void countInParents(ChunkKey key, int change);
 
     Executor& executor_;
     ChunkSink& sink_;

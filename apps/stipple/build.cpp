@@ -15,11 +15,10 @@ struct Options {
 };
 
 Result<void> run(const Options& o) {
-    STIPPLE_ASSIGN(const lod::BuildSettings settings, o.build.settings());
     const auto executor = makeTbbExecutor(o.build.threads);
     Result<lod::BuildReport> built = [&] {
         Progress progress(!o.quiet);
-        return lod::buildStore(o.inputs, o.output, settings, *executor, progress);
+        return buildAny(o.inputs, o.output, o.build, *executor, progress);
     }();
     if (!built) return tl::unexpected(built.error());
     const lod::BuildReport& r = *built;
@@ -53,7 +52,7 @@ Result<void> run(const Options& o) {
 
 void setupBuild(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
-    CLI::App* sub = app.add_subcommand("build", "build the hierarchy of one or more scans (.ply, .las, .laz)");
+    CLI::App* sub = app.add_subcommand("build", "build the hierarchy of scans (.ply, .las, .laz) or of a mesh (.gltf, .glb, .obj)");
     sub->add_option("INPUT", o->inputs,
                     "scans that together make the scene: files, folders, patterns, ept.json, cloud.js")
         ->required();

@@ -25,7 +25,7 @@ struct BuildOptions {
     std::string memory = "2G", normals = "auto", radii = "auto", up, attributes = "none";
     int threads = 0;
     bool skipBad = false;
-    uint64_t surfels = 2'000'000;
+    uint64_t surfels = 0;
     void addTo(CLI::App& app);
     Result<lod::BuildSettings> settings() const;
 };
@@ -42,7 +42,11 @@ inline bool isShaded(const lod::StoreDescription& d) { return !d.hasColour || d.
 
 /// .gltf, .glb or .obj.
 bool isSceneFile(const std::string& path);
-Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene);
+/// Scans by the readers of lod; meshes as `surfels` samples (0: only the points that they hold).
+Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptions& options, uint64_t surfels);
+/// Scans, or the triangles of one scene, to a store.
+Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const std::string& output,
+                                  const BuildOptions& build, Executor& executor, Progress& progress);
 
 /// What a command draws: stores and where they stand.
 struct OpenedScene {

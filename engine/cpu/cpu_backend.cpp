@@ -15,6 +15,7 @@
 
 #include "engine/base/huge_buffer.h"
 #include "engine/base/process.h"
+#include "engine/base/queue.h"
 #include "shaders/shared/splat.h"
 
 namespace stipple::cpu {
@@ -43,6 +44,7 @@ Tables makeTables() {
     Tables t{};
     for (uint32_t i = 0; i < 256; ++i) {
         t.radiusFraction.at(i) = shared::radiusFraction(i);
+        t.linear.at(i) = shared::linearFromSrgb(static_cast<float>(i) / 255.0f);
         const float root = std::sqrt(shared::linearFromSrgb(static_cast<float>(i) / 255.0f));
         t.red.at(i) = static_cast<uint32_t>(root * 2047.0f + 0.5f);
         t.green.at(i) = t.red.at(i) << 11;
@@ -55,7 +57,7 @@ Tables makeTables() {
     return t;
 }
 
-uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.instance} << 32 | key.node; }
+uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | key.node; }
 
 class CpuBackend final : public render::Backend {
   public:
@@ -66,7 +68,7 @@ class CpuBackend final : public render::Backend {
         return std::string("cpu ") + k_.name + ", " + std::to_string(executor_.threads()) + " threads";
     }
     Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override {
-        chunks_[chunkId(key)] = chunk.records;
+        chunks_[chunkId(key)] = chunk;
         return {};
     }
     void evict(streaming::ChunkKey key) override { chunks_.erase(chunkId(key)); }
@@ -89,6 +91,9 @@ class CpuBackend final : public render::Backend {
                     break;
                 case render::Pass::project:
                     project();
+                    break;
+                case render::Pass::rasterise:
+                    rasterise();
                     break;
                 case render::Pass::resolve:
                     resolve(hasPyramid);
@@ -134,7 +139,7 @@ class CpuBackend final : public render::Backend {
         for (size_t b = 0; b < blocks_.size(); ++b) {
             const shared::DrawBlock& block = draws_->blocks[b];
             const auto found = chunks_.find(chunkId(draws_->keys[block.node]));
-            blocks_[b] = {found->second.data() + block.first, &draws_->nodes[block.node]};
+            blocks_[b] = {found->second.records.data() + block.first, &draws_->nodes[block.node]};
         }
     }
 
@@ -160,6 +165,40 @@ class CpuBackend final : public render::Backend {
         });
     }
 
+    void rasterise() {
+        meshBlocks_.clear();
+        for (const render::MeshDraw& draw : draws_->meshDraws) {
+            const lod::Chunk& chunk = chunks_.at(chunkId(draw.key));
+            for (uint32_t c = 0; c < draw.clusters; ++c) {
+                const shared::MeshCluster& cluster = chunk.clusters[draw.firstCluster + c];
+                meshBlocks_.push_back({chunk.vertices.data() + cluster.firstVertex,
+                                       chunk.triangles.data() + cluster.firstTriangle, &draws_->meshes[draw.mesh],
+                                       cluster.counts, draw.level, draw.errorPixels});
+            }
+        }
+        large_.clear();
+        executor_.parallelFor(meshBlocks_.size(), 8, [&](size_t begin, size_t end) {
+            std::vector<LargeTriangle> mine;
+            const LargeSink sink{&mine, [](void* to, const LargeTriangle& t) {
+                                     static_cast<std::vector<LargeTriangle>*>(to)->push_back(t);
+                                 }};
+            for (size_t b = begin; b < end; ++b)
+                k_.rasterCluster(frame_, *meshBlocks_[b].mesh, meshBlocks_[b].vertices, meshBlocks_[b].counts & 0xffffu,
+                                 meshBlocks_[b].triangles, meshBlocks_[b].counts >> 16, static_cast<uint32_t>(b * 256),
+                                 sink, visibility_.data());
+            if (!mine.empty()) found_.push(std::move(mine));
+        });
+        for (const auto& some : found_.takeAll()) large_.insert(large_.end(), some.begin(), some.end());
+        if (large_.empty()) return;
+        // A triangle over the whole image is work for all threads.
+        constexpr uint32_t kRows = 16;
+        executor_.parallelFor((frame_.height + kRows - 1) / kRows, 1, [&](size_t begin, size_t end) {
+            const auto first = static_cast<uint32_t>(begin) * kRows, last = static_cast<uint32_t>(end) * kRows - 1;
+            k_.rasterLarge(frame_, large_.data(), large_.size(), first, std::min(last, frame_.height - 1),
+                           visibility_.data());
+        });
+    }
+
     /// Calls body(x0, n, row0, row1) for tiles of `level`: columns [x0, x0 + n), rows [row0, row1), row0 even.
     template <typename Body>
     void forTiles(const Level& level, const Body& body) {
@@ -180,6 +219,12 @@ class CpuBackend final : public render::Backend {
         Level& fine = levels_[0];
         Level* coarse = hasPyramid && levels_.size() > 1 ? &levels_[1] : nullptr;
         const Planes finePlanes = fine.planes();
+        hasTriangles_ = !draws_->meshDraws.empty();
+        if (hasTriangles_ && surfacePixels_ != size_t{fine.width} * fine.height) {
+            surfacePixels_ = size_t{fine.width} * fine.height;
+            surface_.assign(surfacePixels_, 0);
+        }
+        const ResolveInput input{blocks_.data(), meshBlocks_.data(), draws_->materials.data()};
         std::atomic<float> largestRadius{0};
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
             TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
@@ -194,8 +239,8 @@ class CpuBackend final : public render::Backend {
                         continue;
                     }
                     const size_t at = size_t{yy} * fine.width + x0;
-                    const bool has = k_.resolveRow(frame_, tables_, blocks_.data(), visibility_.data() + at, x0, yy, n,
-                                                   *row, largest);
+                    const bool has = k_.resolveRow(frame_, tables_, input, visibility_.data() + at, x0, yy, n, *row,
+                                                   largest, hasTriangles_ ? surface_.data() + at : nullptr);
                     if (has)
                         k_.packRow(*row, n, finePlanes.at(at));
                     else
@@ -329,7 +374,7 @@ class CpuBackend final : public render::Backend {
         const Planes planes = fine.planes();
         const auto shadeRow = [&](uint32_t x0, uint32_t n, uint32_t y, const TexelRow& own, const TexelRow& row) {
             const size_t at = size_t{y} * fine.width + x0;
-            k_.shadeRow(frame_, tables_, own, row, x0, y, n,
+            k_.shadeRow(frame_, tables_, own, row, hasTriangles_ ? surface_.data() + at : nullptr, x0, y, n,
                         {image_->rgba.data() + at, wantAll_ ? image_->depth.data() + at : nullptr,
                          wantAll_ ? image_->normal.data() + 3 * at : nullptr,
                          wantAll_ ? image_->linear.data() + 3 * at : nullptr});
@@ -352,9 +397,15 @@ class CpuBackend final : public render::Backend {
     Executor& executor_;
     const Kernels& k_;
     Tables tables_;
-    std::unordered_map<uint64_t, std::vector<shared::PointRecord>> chunks_;
+    std::unordered_map<uint64_t, lod::Chunk> chunks_;
     HugeBuffer<uint64_t> visibility_;
     std::vector<Level> levels_;
+    std::vector<MeshBlock> meshBlocks_;
+    std::vector<LargeTriangle> large_;
+    CompletionQueue<std::vector<LargeTriangle>> found_;
+    HugeBuffer<uint32_t> surface_;  ///< what a triangle's pixel is made of; only where triangles are drawn
+    size_t surfacePixels_ = 0;
+    bool hasTriangles_ = false;
     std::vector<BlockSource> blocks_;
     std::vector<render::PassTime> times_;
     const render::DrawList* draws_ = nullptr;

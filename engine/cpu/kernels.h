@@ -6,6 +6,8 @@
 #include <cstdint>
 
 #include "shaders/shared/frame.h"
+#include "shaders/shared/material.h"
+#include "shaders/shared/mesh.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::cpu {
@@ -39,11 +41,43 @@ struct BlockSource {
     const shared::DrawNode* node;
 };
 
+/// One cluster of a mesh: one block of draw ids.
+struct MeshBlock {
+    const shared::MeshVertex* vertices;
+    const uint32_t* triangles;
+    const shared::DrawMesh* mesh;
+    uint32_t counts;  ///< vertices | triangles << 16
+    uint32_t level;
+    float errorPixels;
+};
+
+/// A triangle that covers so many pixels that its rows are shared out among threads.
+struct LargeTriangle {
+    int32_t x[3], y[3];
+    float inverseDepth[3];
+    uint32_t id;
+};
+struct LargeSink {
+    void* context;
+    void (*keep)(void* context, const LargeTriangle& triangle);
+};
+
+/// Flags of a pixel's surface word: kSurfaceUnlit of mesh.h, and
+constexpr uint32_t kSurfaceIsTriangle = 0x80000000u;
+
 /// Look-up tables that the kernels share.
 struct Tables {
     std::array<float, 256> radiusFraction;
     std::array<uint32_t, 256> red, green, blue;  ///< sRGB byte -> its bits of the packed colour
     std::array<uint32_t, 2048> srgbByte;         ///< sqrt(linear) * 2047 -> sRGB byte
+    std::array<float, 256> linear;               ///< sRGB byte -> linear
+};
+
+/// What the passes after coverage read of the frame beside records.
+struct ResolveInput {
+    const BlockSource* blocks;
+    const MeshBlock* meshBlocks;
+    const shared::SurfaceMaterial* materials;
 };
 
 struct ShadeOutput {
@@ -58,8 +92,10 @@ struct Kernels {
                          const shared::PointRecord* records, uint32_t count, uint32_t* pixel, uint32_t* depth);
     /// Decodes the winners of `n` pixels of row `y` from `x0` on; clears the visibility entries. False if all are
     /// empty.
-    bool (*resolveRow)(const shared::FrameConstants& f, const Tables& tables, const BlockSource* blocks,
-                       uint64_t* visibility, uint32_t x0, uint32_t y, uint32_t n, TexelRow& row, float& largestRadius);
+    /// `surface` (null without triangles): one word a pixel, 0 where no triangle is seen.
+    bool (*resolveRow)(const shared::FrameConstants& f, const Tables& tables, const ResolveInput& in,
+                       uint64_t* visibility, uint32_t x0, uint32_t y, uint32_t n, TexelRow& row, float& largestRadius,
+                       uint32_t* surface);
     void (*packRow)(const TexelRow& row, uint32_t n, const Planes& to);
     void (*unpackRow)(const Planes& from, uint32_t first, uint32_t n, TexelRow& row);
     void (*pullRow)(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float inverseFocal,
@@ -70,7 +106,14 @@ struct Kernels {
     /// Doubles the entries of a coarse row (-1 to (n + 1) / 2) along x.
     void (*expandRow)(const TexelRow& coarse, uint32_t n, TexelRow& nearest, TexelRow& beside);
     void (*shadeRow)(const shared::FrameConstants& f, const Tables& tables, const TexelRow& own, const TexelRow& row,
-                     uint32_t x0, uint32_t y, uint32_t n, const ShadeOutput& out);
+                     const uint32_t* surface, uint32_t x0, uint32_t y, uint32_t n, const ShadeOutput& out);
+    /// Offers the triangles of one cluster (ids from firstId on) to the visibility buffer.
+    void (*rasterCluster)(const shared::FrameConstants& f, const shared::DrawMesh& mesh,
+                          const shared::MeshVertex* vertices, uint32_t vertexCount, const uint32_t* triangles,
+                          uint32_t triangleCount, uint32_t firstId, const LargeSink& large, uint64_t* visibility);
+    /// Rows [firstRow, lastRow] of the triangles that were kept.
+    void (*rasterLarge)(const shared::FrameConstants& f, const LargeTriangle* large, size_t count, uint32_t firstRow,
+                        uint32_t lastRow, uint64_t* visibility);
 };
 
 /// The best kernels that this processor runs; STIPPLE_SIMD=sse|avx2|avx512 asks for fewer.

@@ -73,25 +73,39 @@ void projectBlock(const FrameConstants& frame, const DrawNode& drawNode, const P
     }
 }
 
+#include "engine/cpu/raster.inl"
+
 struct Gathered {
     alignas(64) float x[kTile], y[kTile], z[kTile], radius[kTile];
     alignas(64) uint32_t normal[kTile], colour[kTile], flags[kTile];
 };
 
-bool resolveRow(const FrameConstants& frame, const Tables& tables, const BlockSource* blocks, uint64_t* visibility,
-                uint32_t x0, uint32_t y, uint32_t n, TexelRow& __restrict row, float& largestRadius) {
+#include "engine/cpu/resolve_triangles.inl"
+
+bool resolveRow(const FrameConstants& frame, const Tables& tables, const ResolveInput& in, uint64_t* visibility,
+                uint32_t x0, uint32_t y, uint32_t n, TexelRow& __restrict row, float& largestRadius,
+                uint32_t* surface) {
+    const BlockSource* const blocks = in.blocks;
     const FrameConstants f = frame;
     constexpr size_t kPrefetch = 12;  // pixels ahead: records lie anywhere in memory
     Gathered g;
+    TrianglePixels triangles;
+    triangles.count = 0;
     bool any = false;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
-        if (i + kPrefetch < n && visibility[i + kPrefetch] != ~uint64_t{0}) {
+        if (i + kPrefetch < n && (visibility[i + kPrefetch] & kKindMask) == 0) {
             const auto ahead = static_cast<uint32_t>(visibility[i + kPrefetch]) & 0x1fffffffu;
             __builtin_prefetch(blocks[ahead / kRecordsPerBlock].records + ahead % kRecordsPerBlock);
         }
         const uint64_t key = visibility[i];
-        if (key == ~uint64_t{0}) {
+        if ((key & kKindMask) != 0) {  // nothing (all bits), or a triangle
+            if (key != ~uint64_t{0}) {
+                triangles.pixel[triangles.count] = static_cast<uint32_t>(i);
+                triangles.id[triangles.count] = static_cast<uint32_t>(key) & ~kKindMask;
+                triangles.depth[triangles.count++] = uintBitsToFloat(static_cast<uint32_t>(key >> 32));
+                visibility[i] = ~uint64_t{0};
+            }
             g.x[i] = 0;
             g.y[i] = 0;
             g.z[i] = -1;
@@ -123,10 +137,15 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const BlockSo
         }
         g.colour[i] = tables.red[c & 255u] | tables.green[c >> 8 & 255u] | tables.blue[c >> 16 & 255u];
     }
+    if (surface != nullptr)
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) surface[i] = 0;
     if (!any) {
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) row.depth[kPad + i] = 0;
-        return false;
+        if (triangles.count == 0) return false;
+        resolveTriangles(f, tables, in, triangles, x0, y, row, surface);
+        return true;
     }
     uint largest = 0;  // as bits: positive floats sort like integers
     const float xx = f.viewX.x, xy = f.viewX.y, xz = f.viewX.z, yx = f.viewY.x, yy = f.viewY.y, yz = f.viewY.z,
@@ -158,6 +177,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const BlockSo
         largest = bits > largest ? bits : largest;
     }
     largestRadius = max(largestRadius, uintBitsToFloat(largest));
+    if (triangles.count > 0) resolveTriangles(f, tables, in, triangles, x0, y, row, surface);
     return true;
 }
 
@@ -245,9 +265,18 @@ void pushRow(const TexelRow& __restrict fine, const ExpandedRow& __restrict near
 }
 
 void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow& __restrict own,
-              const TexelRow& __restrict row, uint32_t x0, uint32_t y, uint32_t n, const ShadeOutput& out) {
+              const TexelRow& __restrict row, const uint32_t* __restrict surface, uint32_t x0, uint32_t y, uint32_t n,
+              const ShadeOutput& out) {
     const FrameConstants f = frame;
-    const bool lit = f.shade == kShadeLit && f.debugView == kDebugNone;
+    const bool lit = (surface != nullptr || (f.shade & kShadeLit) != 0) && f.debugView == kDebugNone;
+    alignas(64) float share[kTile];  // of the light: 0 where a pixel keeps its colour
+    const float points = (f.shade & kShadeLit) != 0 ? 1.0f : 0.0f,
+                triangles = (f.shade & kShadeTriangles) != 0 ? 1.0f : 0.0f;
+    for (size_t i = 0; lit && i < n; ++i) {
+        // A triangle's pixel that no splat stands in front of.
+        const bool isTriangle = surface != nullptr && surface[i] != 0 && row.depth[kPad + i] == own.depth[kPad + i];
+        share[i] = !isTriangle ? points : (surface[i] & kSurfaceUnlit) != 0 ? 0.0f : triangles;
+    }
     const float inverseFocal = 1.0f / f.focal;
     const float vy = (float(int(y)) + 0.5f - f.centre.y) * inverseFocal;
     alignas(64) float red[kTile], green[kTile], blue[kTile];
@@ -266,7 +295,7 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
             const float inverse = 1.0f / std::sqrt(vx * vx + vy * vy + 1.0f);
             const vec3 normal =
                 normalFromPerp(vec2(row.perpX[at], row.perpY[at]), vec3(vx * inverse, vy * inverse, inverse));
-            const float light = irradiance(normal, f.sunDirection, f.skyDirection);
+            const float light = 1.0f + share[i] * (irradiance(normal, f.sunDirection, f.skyDirection) - 1.0f);
             red[i] *= light;
             green[i] *= light;
             blue[i] *= light;
@@ -331,6 +360,7 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
 
 extern const Kernels STIPPLE_KERNELS;
 const Kernels STIPPLE_KERNELS{
-    STIPPLE_KERNELS_NAME, projectBlock, resolveRow, packRow, unpackRow, pullRow, pushRow, expandRow, shadeRow};
+    STIPPLE_KERNELS_NAME, projectBlock, resolveRow, packRow, unpackRow, pullRow, pushRow, expandRow, shadeRow,
+    rasterCluster,        rasterLarge};
 
 }  // namespace stipple::cpu

@@ -17,7 +17,7 @@ namespace {
 constexpr VkBufferUsageFlags kStorage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
 constexpr uint32_t kGroup = 64, kGroupsPerDimension = 65535;
 
-uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.instance} << 32 | key.node; }
+uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | key.node; }
 
 struct Level {
     uint32_t width, height, offset;  ///< offset in words
@@ -221,6 +221,8 @@ class GpuBackend final : public render::Backend {
                                   (blocks + kGroupsPerDimension - 1) / kGroupsPerDimension, 1);
                 break;
             }
+            case render::Pass::rasterise:
+                return;
             case render::Pass::resolve:
                 list.begin("resolve", {read(visibility_), write(texels_), write(stats_)}, false);
                 pipelines_->use(commands_, "resolve");

@@ -56,7 +56,7 @@ Result<void> checkImagePath(const std::string& path) {
     return fail(ErrorKind::usage, "pictures are written as .png or .exr", path, "change the extension");
 }
 
-Result<void> writeImage(const std::string& path, const render::Image& image) {
+Result<std::vector<char>> encodeImage(const std::string& path, const render::Image& image) {
     STIPPLE_TRY(checkImagePath(path));
     const bool isExr = hasExtension(path, ".exr");
     const size_t pixels = size_t{image.width} * image.height;
@@ -88,6 +88,11 @@ Result<void> writeImage(const std::string& path, const render::Image& image) {
         const std::string reason = error.data();
         return fail(ErrorKind::output, "cannot be encoded: " + reason.substr(0, reason.find('\n')), path);
     }
+    return bytes;
+}
+
+Result<void> writeImage(const std::string& path, const render::Image& image) {
+    STIPPLE_ASSIGN(const std::vector<char> bytes, encodeImage(path, image));
     return writeWholeFile(path, bytes.data(), bytes.size());
 }
 

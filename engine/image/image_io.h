@@ -11,6 +11,8 @@ namespace stipple::image {
 
 /// By extension: .png (8 bit, alpha = coverage) or .exr (linear colour, coverage, depth, normal). Whole or not at all.
 Result<void> writeImage(const std::string& path, const render::Image& image);
+/// The bytes that writeImage would write to `path`.
+Result<std::vector<char>> encodeImage(const std::string& path, const render::Image& image);
 /// 8-bit RGBA; files without alpha are opaque.
 Result<render::Image> readImage(const std::string& path);
 /// Decodes an image that stands in memory (PNG, JPEG, ...); `name` is for messages.

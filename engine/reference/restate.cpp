@@ -158,10 +158,10 @@ class ReferenceBackend final : public render::Backend {
     std::string name() const override { return "reference"; }
     std::string device() const override { return "fp64 reference, scalar"; }
     Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override {
-        chunks_[uint64_t{key.instance} << 32 | key.node] = chunk.records;
+        chunks_[uint64_t{key.source} << 32 | key.node] = chunk.records;
         return {};
     }
-    void evict(streaming::ChunkKey key) override { chunks_.erase(uint64_t{key.instance} << 32 | key.node); }
+    void evict(streaming::ChunkKey key) override { chunks_.erase(uint64_t{key.source} << 32 | key.node); }
     const std::vector<render::PassTime>& passTimes() const override { return times_; }
 
     Result<void> render(const render::RenderRequest& request, render::Image& image) override {
@@ -188,7 +188,7 @@ class ReferenceBackend final : public render::Backend {
             const lod::Instance& instance = draws.instances[cut.instance];
             const lod::Hierarchy& h = *draws.hierarchies[instance.hierarchy];
             const lod::Node& node = h.nodes[cut.node];
-            const auto& records = chunks_.at(uint64_t{cut.instance} << 32 | cut.node);
+            const auto& records = chunks_.at(uint64_t{instance.source} << 32 | cut.node);
             for (uint32_t i = 0; i < cut.count; ++i) {
                 const Disc disc = decodeDisc(h, node, records[i]);
                 if (disc.errorCode > cut.errorCode && !(cut.octantMask >> disc.octant & 1u)) continue;

@@ -8,6 +8,59 @@ static_assert(sizeof(shared::PointRecord) == 16);
 static_assert(sizeof(shared::DrawNode) == 80);
 static_assert(sizeof(shared::DrawBlock) == 8);
 static_assert(sizeof(shared::FrameConstants) == 116);
+static_assert(sizeof(shared::MeshVertex) == 32);
+static_assert(sizeof(shared::MeshCluster) == 12);
+static_assert(sizeof(shared::DrawMesh) == 104);
+static_assert(sizeof(shared::SurfaceMaterial) == 188);
+
+namespace {
+
+/// One instance of a mesh in camera space, composed in fp64.
+shared::DrawMesh makeDrawMesh(const lod::Hierarchy& h, const lod::Instance& instance, const lod::View& view,
+                              const glm::dmat3& cameraFromWorld) {
+    shared::DrawMesh m{};
+    const glm::dmat3 axes = cameraFromWorld * instance.rotation;
+    const double worldPerStep = instance.scale * h.unit;
+    const glm::dvec3 eye = (glm::transpose(instance.rotation) * (view.eye - instance.translation) / instance.scale -
+                            h.origin) / h.unit;
+    const glm::dvec3 nearest = glm::floor(glm::clamp(eye, glm::dvec3(0), glm::dvec3(0x1p24)));
+    m.axisX = glm::vec3(axes[0] * worldPerStep);
+    m.axisY = glm::vec3(axes[1] * worldPerStep);
+    m.axisZ = glm::vec3(axes[2] * worldPerStep);
+    m.base = glm::vec3(cameraFromWorld *
+                       (instance.translation - view.eye +
+                        instance.rotation * (instance.scale * (h.origin + h.unit * nearest))));
+    m.normalX = glm::vec3(axes[0]);
+    m.normalY = glm::vec3(axes[1]);
+    m.normalZ = glm::vec3(axes[2]);
+    m.eyeX = static_cast<int>(nearest.x);
+    m.eyeY = static_cast<int>(nearest.y);
+    m.eyeZ = static_cast<int>(nearest.z);
+    m.mirror = 1;
+    return m;
+}
+
+void addMeshes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, DrawList& out) {
+    uint32_t last = ~0u;
+    for (const lod::CutMeshDraw& draw : cut.meshDraw) {
+        const lod::Instance& instance = out.instances[draw.instance];
+        const lod::Hierarchy& h = *out.hierarchies[instance.hierarchy];
+        if (draw.instance != last) {
+            out.meshes.push_back(makeDrawMesh(h, instance, out.view, cameraFromWorld));
+            out.meshes.back().firstMaterial = out.firstMaterial[instance.hierarchy];
+            last = draw.instance;
+        }
+        out.meshDraws.push_back({static_cast<uint32_t>(out.meshes.size() - 1),
+                                 {instance.source, draw.node},
+                                 draw.firstCluster,
+                                 draw.clusters,
+                                 h.nodes[draw.node].level,
+                                 draw.errorPixels});
+        out.clusters += draw.clusters;
+    }
+}
+
+}  // namespace
 
 void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,
                   std::span<const lod::Instance> instances, const lod::View& view, const DrawSettings& settings,
@@ -15,8 +68,12 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     out.nodes.clear();
     out.blocks.clear();
     out.keys.clear();
+    out.meshes.clear();
+    out.meshDraws.clear();
+    out.clusters = 0;
     out.view = view;
     out.cut.assign(cut.draw.begin(), cut.draw.end());
+    out.meshCut.assign(cut.meshDraw.begin(), cut.meshDraw.end());
     out.hierarchies = hierarchies;
     out.instances = instances;
     const glm::dmat3 cameraFromWorld = glm::transpose(glm::dmat3(view.right, view.down, view.forward));
@@ -45,8 +102,9 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
         for (uint32_t first = 0; first < draw.count; first += shared::kRecordsPerBlock)
             out.blocks.push_back({index, first});
         out.nodes.push_back(d);
-        out.keys.push_back({draw.instance, draw.node});
+        out.keys.push_back({instance.source, draw.node});
     }
+    addMeshes(cut, cameraFromWorld, out);
     shared::FrameConstants& f = out.frame;
     f.viewX = glm::vec3(view.right);
     f.viewY = glm::vec3(view.down);
@@ -58,7 +116,8 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     f.nearPlane = static_cast<float>(view.nearPlane);
     f.supportScale = settings.supportScale;
     f.minimumRadius = settings.minimumRadius;
-    f.shade = settings.lit ? shared::kShadeLit : shared::kShadeUnlit;
+    f.shade = (settings.lit ? shared::kShadeLit : shared::kShadeUnlit) |
+              (settings.unlitTriangles ? 0u : shared::kShadeTriangles);
     f.debugView = settings.debugView;
     // A sun over the viewer's left shoulder: every view of a scan is lit from where one looks.
     f.sunDirection = glm::normalize(glm::vec3(-0.45f, -0.55f, -0.7f));

@@ -7,25 +7,43 @@
 
 #include "lod/cut.h"
 #include "shaders/shared/frame.h"
+#include "shaders/shared/material.h"
+#include "shaders/shared/mesh.h"
 #include "shaders/shared/record.h"
 #include "streaming/streamer.h"
 
 namespace stipple::render {
+
+/// Clusters of one chunk of a mesh; each is one block of 256 draw ids.
+struct MeshDraw {
+    uint32_t mesh = 0;  ///< of DrawList::meshes
+    streaming::ChunkKey key;
+    uint32_t firstCluster = 0, clusters = 0;
+    uint32_t level = 0;
+    float errorPixels = 0;
+};
 
 struct DrawList {
     shared::FrameConstants frame{};
     std::vector<shared::DrawNode> nodes;
     std::vector<shared::DrawBlock> blocks;
     std::vector<streaming::ChunkKey> keys;  ///< chunk of each node
+    std::vector<shared::DrawMesh> meshes;   ///< instances of mesh stores that are in view
+    std::vector<MeshDraw> meshDraws;
+    uint32_t clusters = 0;  ///< of all mesh draws
+    std::span<const shared::SurfaceMaterial> materials;
     // What the fp32 numbers above were made from: the reference starts from these.
     lod::View view;
     std::vector<lod::CutDraw> cut;
+    std::vector<lod::CutMeshDraw> meshCut;
+    std::vector<uint32_t> firstMaterial;  ///< of each hierarchy
     std::span<const lod::Hierarchy* const> hierarchies;
     std::span<const lod::Instance> instances;
 };
 
 struct DrawSettings {
-    bool lit = false;
+    bool lit = false;             ///< points; triangles are, unless their material says otherwise
+    bool unlitTriangles = false;
     uint32_t debugView = shared::kDebugNone;
     glm::vec3 background{0.02f, 0.02f, 0.025f};  ///< linear
     glm::dvec3 worldUp{0, 0, 1};

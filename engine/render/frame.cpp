@@ -18,6 +18,8 @@ const char* passName(Pass pass) {
             return "clear";
         case Pass::project:
             return "project";
+        case Pass::rasterise:
+            return "rasterise";
         case Pass::resolve:
             return "resolve";
         case Pass::pull:
@@ -30,10 +32,19 @@ const char* passName(Pass pass) {
     return "?";
 }
 
-std::vector<Pass> passesOf(Mode mode) {
-    if (mode == Mode::points) return {Pass::clear, Pass::project, Pass::resolve, Pass::shade};
-    // The last push and the shading are one pass: each pixel is touched once.
-    return {Pass::clear, Pass::project, Pass::resolve, Pass::pull, Pass::push, Pass::shade};
+std::vector<Pass> passesOf(Mode mode, const FrameContent& content) {
+    std::vector<Pass> passes{Pass::clear};
+    if (content.hasPoints) passes.push_back(Pass::project);
+    if (content.hasTriangles) passes.push_back(Pass::rasterise);
+    passes.push_back(Pass::resolve);
+    // Triangles keep their exact pixels: only splats are reconstructed. The last push and the shading are one pass:
+    // each pixel is touched once.
+    if (mode == Mode::pullpush && content.hasPoints) {
+        passes.push_back(Pass::pull);
+        passes.push_back(Pass::push);
+    }
+    passes.push_back(Pass::shade);
+    return passes;
 }
 
 namespace {
@@ -70,6 +81,12 @@ streaming::ChunkFinish finishOf(const PlacedStore& placed) {
     return {by.needsAttributes(), apply};
 }
 
+/// Do both get the same records?
+bool looksLike(const PlacedStore& a, const PlacedStore& b) {
+    return a.place.rotation == b.place.rotation && a.colour.mode == b.colour.mode &&
+           (a.colour.mode == lod::ColourMode::own || &a == &b);
+}
+
 }  // namespace
 
 std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& placed, Backend& backend, Executor& executor,
@@ -77,6 +94,7 @@ std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& place
     auto state = std::make_unique<FrameState>();
     state->backend = &backend;
     state->streamer = std::make_unique<streaming::Streamer>(executor, backend, settings);
+    std::vector<const PlacedStore*> sources;
     for (const PlacedStore& p : placed) {
         lod::Instance instance = p.place;
         const auto known = std::find(state->stores.begin(), state->stores.end(), p.store);
@@ -84,11 +102,22 @@ std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& place
         if (known == state->stores.end()) {
             state->stores.push_back(p.store);
             state->hierarchies.push_back(&p.store->hierarchy);
+            state->draws.firstMaterial.push_back(static_cast<uint32_t>(state->materials.size()));
+            state->materials.insert(state->materials.end(), p.store->description.materials.begin(),
+                                    p.store->description.materials.end());
+        }
+        const auto like = std::find_if(sources.begin(), sources.end(), [&](const PlacedStore* q) {
+            return q->store == p.store && (p.store->hierarchy.isMesh() || looksLike(*q, p));
+        });
+        instance.source = static_cast<uint32_t>(like - sources.begin());
+        if (like == sources.end()) {
+            sources.push_back(&p);
+            state->streamer->addSource(p.store->hierarchy, streaming::makeFileSource(p.store->file), p.store->path,
+                                       p.store->hierarchy.isMesh() ? streaming::ChunkFinish{} : finishOf(p));
         }
         state->instances.push_back(instance);
-        state->streamer->addInstance(p.store->hierarchy, streaming::makeFileSource(p.store->file), p.store->path,
-                                     finishOf(p));
     }
+    state->draws.materials = state->materials;
     return state;
 }
 
@@ -114,7 +143,7 @@ Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSe
     makeDrawList(state.cut, state.hierarchies, state.instances, view, settings.draw, state.draws);
     RenderRequest request;
     request.draws = &state.draws;
-    request.passes = passesOf(settings.mode);
+    request.passes = passesOf(settings.mode, {!state.draws.nodes.empty(), !state.draws.meshDraws.empty()});
     request.wantDepthAndNormal = settings.wantDepthAndNormal;
     STIPPLE_TRY(state.backend->render(request, state.image));
 
@@ -127,6 +156,7 @@ Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSe
     c.nodesMissing = cut.nodesMissing;
     c.recordsDrawn = cut.recordsDrawn;
     c.recordsTested = cut.recordsTested;
+    c.trianglesDrawn = cut.trianglesDrawn;
     c.cutEvaluations = cut.evaluations;
     c.budgetTruncated = state.cut.truncated;
     c.tauTargetPixels = state.cut.tauTarget;

@@ -25,6 +25,7 @@ struct FrameState {
     std::vector<std::shared_ptr<const lod::Store>> stores;
     std::vector<const lod::Hierarchy*> hierarchies;
     std::vector<lod::Instance> instances;
+    std::vector<shared::SurfaceMaterial> materials;  ///< of all stores, one after another
     std::unique_ptr<streaming::Streamer> streamer;
     Backend* backend = nullptr;
     lod::CutScratch scratch;

@@ -118,6 +118,9 @@ Box meshBounds(const Scene& scene);
 /// refused with the place.
 Result<Scene> readGltf(const std::string& path);
 
+/// Writes .glb or .gltf (buffers inside). Shear of instances is lost; everything else comes back as it was.
+Result<void> writeGltf(const Scene& scene, const std::string& path);
+
 /// Wavefront OBJ with its MTL files; one node. Missing textures and broken faces are noted.
 Result<Scene> readObj(const std::string& path);
 

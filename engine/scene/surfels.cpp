@@ -95,7 +95,7 @@ class Sampler {
         };
         each([&](const Primitive& p, const glm::dmat4& m) {
             if (p.kind == PrimitiveKind::points) points += p.indices.size();
-            if (p.kind == PrimitiveKind::triangles)
+            if (p.kind == PrimitiveKind::triangles && settings_.count > 0)
                 for (size_t i = 0; i + 3 <= p.indices.size(); i += 3) area += areaOf(corners(p, m, i));
         });
         if (!(area > 0) && points == 0) return fail(ErrorKind::input, "holds no triangles and no points", scene_.path);
@@ -106,7 +106,7 @@ class Sampler {
         spacing_ = perArea_ > 0 ? 1 / std::sqrt(perArea_) : 0;
         each([&](const Primitive& p, const glm::dmat4& m) {
             if (p.kind == PrimitiveKind::points) takePoints(p, m);
-            if (p.kind == PrimitiveKind::triangles) sampleTriangles(p, m);
+            if (p.kind == PrimitiveKind::triangles && settings_.count > 0) sampleTriangles(p, m);
         });
         return std::move(out_);
     }

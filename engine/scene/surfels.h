@@ -1,5 +1,4 @@
-// Meshes as surfels: evenly spread samples of the triangles, with interpolated normals and prefiltered colours. This is
-// how a mesh is drawn until triangles have a hierarchy of their own, and how its coarsest levels will look.
+// Meshes as surfels: evenly spread samples of the triangles, with interpolated normals and prefiltered colours.
 #pragma once
 
 #include <functional>
@@ -17,7 +16,7 @@ struct DecodedImage {
 };
 
 struct SurfelSettings {
-    uint64_t count = 2'000'000;  ///< aimed at, over all visible meshes
+    uint64_t count = 2'000'000;  ///< aimed at, over all visible meshes; 0: only points that are there
 };
 
 /// Samples all visible meshes of a scene, instances included; points of point primitives are taken as they are.

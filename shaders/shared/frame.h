@@ -31,7 +31,8 @@ struct DrawBlock {
 };
 
 const uint kShadeUnlit = 0u;
-const uint kShadeLit = 1u;
+const uint kShadeLit = 1u;        // points
+const uint kShadeTriangles = 2u;  // a bit of its own
 
 const uint kDebugNone = 0u;
 const uint kDebugLevel = 1u;

@@ -16,15 +16,15 @@ class CountingSink final : public ChunkSink {
     ~CountingSink() override { EXPECT_EQ(alive.size(), 0u) << "chunks leaked"; }
     Result<void> upload(ChunkKey key, const lod::Chunk& chunk) override {
         if (refuse) return fail(ErrorKind::budget, "no room in the sink");
-        EXPECT_TRUE(alive.insert({key.instance, key.node}).second);
+        EXPECT_TRUE(alive.insert({key.source, key.node}).second);
         bytes += chunk.sizeBytes();
         most = std::max(most, bytes);
-        sizes[{key.instance, key.node}] = chunk.sizeBytes();
+        sizes[{key.source, key.node}] = chunk.sizeBytes();
         return {};
     }
     void evict(ChunkKey key) override {
-        EXPECT_EQ(alive.erase({key.instance, key.node}), 1u);
-        bytes -= sizes[{key.instance, key.node}];
+        EXPECT_EQ(alive.erase({key.source, key.node}), 1u);
+        bytes -= sizes[{key.source, key.node}];
     }
     std::set<std::pair<uint32_t, uint32_t>> alive;
     std::map<std::pair<uint32_t, uint32_t>, uint64_t> sizes;
@@ -69,7 +69,7 @@ TEST_F(StreamerTest, FillsUpAndThenRests) {
     CountingSink sink;
     {
         Streamer streamer(*executor_, sink, {});
-        streamer.addInstance(store_->hierarchy, makeFileSource(store_->file), "a");
+        streamer.addSource(store_->hierarchy, makeFileSource(store_->file), "a");
         const lod::View view = test::fitView(*store_, 640, 480);
         for (int i = 0; i < 10; ++i) step(streamer, view, 0.1);
         EXPECT_TRUE(cut_.wanted.empty());
@@ -88,7 +88,7 @@ TEST_F(StreamerTest, TheByteBudgetIsNeverExceededWhateverTheViews) {
         StreamSettings settings;
         settings.residentBytes = 200'000;
         Streamer streamer(*executor_, sink, settings);
-        streamer.addInstance(store_->hierarchy, makeFileSource(store_->file), "a");
+        streamer.addSource(store_->hierarchy, makeFileSource(store_->file), "a");
         Rng rng(4);
         for (int i = 0; i < 300; ++i) {
             lod::View view = test::fitView(*store_, 640, 480);
@@ -109,7 +109,7 @@ TEST_F(StreamerTest, AFailedChunkIsCountedAndTriedAgainLater) {
     CountingSink sink;
     {
         Streamer streamer(*executor_, sink, {});
-        streamer.addInstance(store_->hierarchy, std::make_shared<BrokenSource>(), "a");
+        streamer.addSource(store_->hierarchy, std::make_shared<BrokenSource>(), "a");
         const lod::View view = test::fitView(*store_, 640, 480);
         for (int i = 0; i < 5; ++i) step(streamer, view, 0.1);
         const uint64_t failures = streamer.counters().failures;
@@ -127,7 +127,7 @@ TEST_F(StreamerTest, ASinkThatIsFullDoesNotStall) {
     CountingSink sink;
     sink.refuse = true;
     Streamer streamer(*executor_, sink, {});
-    streamer.addInstance(store_->hierarchy, makeFileSource(store_->file), "a");
+    streamer.addSource(store_->hierarchy, makeFileSource(store_->file), "a");
     const lod::View view = test::fitView(*store_, 640, 480);
     for (int i = 0; i < 5; ++i) step(streamer, view, 0.1);
     EXPECT_GT(streamer.counters().failures, 0u);

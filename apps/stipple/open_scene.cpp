@@ -1,0 +1,284 @@
+// Any input to stores that can be drawn: built scenes, scenes of placed stores and meshes, raw files through the cache.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <map>
+
+#include "apps/stipple/common.h"
+#include "engine/base/hash.h"
+#include "engine/image/image_io.h"
+#include "engine/scene/triangles.h"
+#include "lod/build/mesh/mesh_build.h"
+#include "lod/colour.h"
+#include "lod/import/import.h"
+
+namespace stipple::app {
+namespace fs = std::filesystem;
+
+namespace {
+
+Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene) {
+    std::vector<scene::DecodedImage> images;
+    for (const scene::EncodedImage& encoded : scene.images) {
+        STIPPLE_ASSIGN(render::Image image, image::decodeImage(encoded.bytes, scene.path + ": " + encoded.name));
+        images.push_back({image.width, image.height, std::move(image.rgba)});
+    }
+    return images;
+}
+
+}  // namespace
+
+Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptions& options, uint64_t surfels) {
+    if (!isSceneFile(path)) return lod::openPointSource(path, options);
+    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path));
+    STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene));
+    return scene::sampleSurfels(scene, images, {surfels});
+}
+
+namespace {
+
+/// `part`: which of the stores that these inputs give.
+Result<std::string> cachePath(const std::vector<std::string>& inputs, const BuildOptions& build,
+                              const std::string& part) {
+    std::string key = part + "|" + build.normals + "|" + build.radii + "|" + build.up + "|" + build.attributes +
+                      (build.skipBad ? "|skip" : "|") + std::to_string(build.surfels) + STIPPLE_VERSION +
+                      fmt::format("|{}", lod::kStoreVersion);
+    STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs(inputs));
+    for (const std::string& input : files) {
+        std::error_code error;
+        const fs::path absolute = fs::absolute(input, error);
+        const auto size = fs::file_size(absolute, error);
+        const auto time = fs::last_write_time(absolute, error);
+        key +=
+            fmt::format("|{}|{}|{}", absolute.string(), error ? 0 : size, error ? 0 : time.time_since_epoch().count());
+    }
+    const char* cache = std::getenv("XDG_CACHE_HOME");
+    const char* home = std::getenv("HOME");
+    const fs::path folder =
+        cache && *cache ? fs::path(cache) / "stipple" : fs::path(home ? home : ".") / ".cache" / "stipple";
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (error)
+        return fail(ErrorKind::output, "cannot be created: " + error.message(), folder.string(), "set XDG_CACHE_HOME");
+    return (folder / (hexDigits(hashBytes(key.data(), key.size())) + ".stipple")).string();
+}
+
+Result<std::shared_ptr<const lod::Store>> openStoreFile(const std::string& path) {
+    STIPPLE_ASSIGN(lod::Store store, lod::openStore(path));
+    return std::make_shared<const lod::Store>(std::move(store));
+}
+
+/// Through the cache: `make` builds into a path.
+Result<std::shared_ptr<const lod::Store>> openCached(
+    const std::vector<std::string>& inputs, const BuildOptions& build, const std::string& part, bool showProgress,
+    const std::function<Result<lod::BuildReport>(const std::string& path, Progress& progress)>& make) {
+    STIPPLE_ASSIGN(const std::string path, cachePath(inputs, build, part));
+    if (!fs::exists(path)) {
+        Progress progress(showProgress);
+        STIPPLE_ASSIGN(const lod::BuildReport built, make(path, progress));
+        if (showProgress)
+            fmt::print(stderr, "{}: built into the cache in {:.1f} s ({})\n", inputs.front(), built.seconds, path);
+        for (const std::string& note : built.notes)
+            if (showProgress) fmt::print(stderr, "note: {}\n", note);
+        for (const auto& [reason, count] : built.dropped)
+            if (showProgress) fmt::print(stderr, "dropped {}: {}\n", count, reason);
+    }
+    return openStoreFile(path);
+}
+
+Result<std::shared_ptr<const lod::Store>> openBuilt(const std::vector<std::string>& inputs, BuildOptions build,
+                                                    const ColourOptions& colour, Executor& executor,
+                                                    bool showProgress) {
+    const std::string needed = isSceneFile(inputs.front()) ? "" : lod::attributeBehind(colour.what);
+    if (!needed.empty() && build.attributes != "all")
+        build.attributes = build.attributes == "none" ? needed : build.attributes + "," + needed;
+    STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
+    return openCached(inputs, build, "points", showProgress, [&](const std::string& path, Progress& progress) {
+        return lod::buildStore(inputs, path, settings, executor, progress);
+    });
+}
+
+/// A transform as rotation, even scale and translation.
+Result<lod::Instance> placeOf(const glm::dmat4& m, const std::string& where) {
+    lod::Instance place;
+    const glm::dmat3 linear(m);
+    place.scale = std::cbrt(std::abs(glm::determinant(linear)));
+    place.translation = glm::dvec3(m[3]);
+    const glm::dmat3 rotation = linear / std::max(place.scale, 1e-300);
+    const glm::dmat3 product = glm::transpose(rotation) * rotation;
+    double deviation = 0;
+    for (int c = 0; c < 3; ++c)
+        for (int r = 0; r < 3; ++r) deviation = std::max(deviation, std::abs(product[c][r] - (c == r ? 1 : 0)));
+    if (!(place.scale > 0) || !(deviation < 1e-6) || glm::determinant(linear) < 0)
+        return fail(ErrorKind::input, "places a store with uneven scale, shear or a mirror", where,
+                    "stores can be moved, turned and scaled evenly");
+    // What is no rotation but for rounding is none: records then stay as they are.
+    double fromIdentity = 0;
+    for (int c = 0; c < 3; ++c)
+        for (int r = 0; r < 3; ++r) fromIdentity = std::max(fromIdentity, std::abs(rotation[c][r] - (c == r ? 1 : 0)));
+    if (fromIdentity > 1e-12) place.rotation = rotation;
+    return place;
+}
+
+lod::MeshBuildSettings meshSettings(const scene::Scene& scene) {
+    lod::MeshBuildSettings settings;
+    settings.description.source = fs::path(scene.path).filename().string();
+    settings.description.up = {0, 1, 0};
+    settings.description.materials = scene::surfaceMaterials(scene);
+    return settings;
+}
+
+bool holds(const scene::Scene& scene, const scene::Placement& placed, scene::PrimitiveKind kind) {
+    const auto& primitives = scene.meshes[static_cast<size_t>(placed.mesh)].primitives;
+    return std::any_of(primitives.begin(), primitives.end(), [&](const auto& p) { return p.kind == kind; });
+}
+
+/// Triangles of a scene: a mesh that stands in several places is built once and placed, all others are built as one.
+Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build, Executor& executor, bool showProgress,
+                            std::vector<render::PlacedStore>& placed) {
+    std::map<int, std::vector<scene::Placement>> byMesh;
+    for (const scene::Placement& p : scene::placements(scene))
+        if (holds(scene, p, scene::PrimitiveKind::triangles)) byMesh[p.mesh].push_back(p);
+    std::vector<scene::Placement> once;
+    const auto make = [&](const std::vector<scene::Placement>& of) {
+        return [&](const std::string& path, Progress& progress) {
+            return lod::buildMeshStore(scene::flattenTriangles(scene, of), path, meshSettings(scene), executor,
+                                       progress);
+        };
+    };
+    for (const auto& [mesh, places] : byMesh) {
+        std::vector<lod::Instance> instances;
+        for (const scene::Placement& p : places)
+            if (const auto instance = placeOf(p.world, scene.path)) instances.push_back(*instance);
+        if (places.size() == 1 || instances.size() < places.size()) {  // one of a kind, or skewed or mirrored
+            once.insert(once.end(), places.begin(), places.end());
+            continue;
+        }
+        const std::vector<scene::Placement> own{{mesh, glm::dmat4(1)}};
+        STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store,
+                       openCached({scene.path}, build, fmt::format("mesh {}", mesh), showProgress, make(own)));
+        for (const lod::Instance& instance : instances) placed.push_back({store, instance, {}});
+    }
+    if (once.empty()) return {};
+    STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store,
+                   openCached({scene.path}, build, "triangles", showProgress, make(once)));
+    placed.push_back({std::move(store), {}, {}});
+    return {};
+}
+
+/// The stores that a scene's nodes refer to, and its meshes.
+Result<std::vector<render::PlacedStore>> openSceneFile(const std::string& path, const BuildOptions& build,
+                                                       const ColourOptions& colour, Executor& executor,
+                                                       bool showProgress) {
+    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path));
+    std::vector<render::PlacedStore> placed;
+    std::map<std::string, std::shared_ptr<const lod::Store>> open;
+    const std::vector<glm::dmat4> world = scene.worldTransforms();
+    const std::vector<bool> visible = scene.visibility();
+    for (size_t n = 0; n < scene.nodes.size(); ++n) {
+        const scene::Node& node = scene.nodes[n];
+        if (node.store.empty() || !visible[n]) continue;
+        if (open.count(node.store) == 0) {
+            STIPPLE_ASSIGN(open[node.store], openStoreFile(node.store));
+        }
+        std::vector<glm::dmat4> places = node.instances;
+        if (places.empty()) places.emplace_back(1);
+        for (const glm::dmat4& place : places) {
+            STIPPLE_ASSIGN(const lod::Instance instance,
+                           placeOf(world[n] * place, path + ": node '" + node.name + "'"));
+            placed.push_back({open[node.store], instance, {}});
+        }
+    }
+    const std::vector<scene::Placement> meshes = scene::placements(scene);
+    const auto anyHolds = [&](scene::PrimitiveKind kind) {
+        return std::any_of(meshes.begin(), meshes.end(), [&](const auto& p) { return holds(scene, p, kind); });
+    };
+    if (build.surfels == 0) STIPPLE_TRY(placeTriangles(scene, build, executor, showProgress, placed));
+    if (build.surfels > 0 || anyHolds(scene::PrimitiveKind::points) || placed.empty()) {
+        STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> points,
+                       openBuilt({path}, build, colour, executor, showProgress));
+        placed.push_back({std::move(points), {}, {}});
+    }
+    for (const std::string& note : scene.notes)
+        if (showProgress) fmt::print(stderr, "note: {}\n", note);
+    return placed;
+}
+
+/// One description for all: the only store's own, or the union with y up, as glTF has it.
+lod::StoreDescription describe(const std::vector<render::PlacedStore>& placed) {
+    lod::StoreDescription all = placed.front().store->description;
+    if (placed.size() == 1 && placed[0].place.rotation == glm::dmat3(1) && placed[0].place.scale == 1 &&
+        placed[0].place.translation == glm::dvec3(0))
+        return all;
+    all.up = {0, 1, 0};
+    all.boundsMin = all.focusMin = glm::dvec3(1e300);
+    all.boundsMax = all.focusMax = glm::dvec3(-1e300);
+    all.points = 0;
+    for (const render::PlacedStore& p : placed) {
+        const lod::StoreDescription& d = p.store->description;
+        for (int corner = 0; corner < 8; ++corner) {
+            const auto pick = [&](const glm::dvec3& lo, const glm::dvec3& hi) {
+                const glm::dvec3 at((corner & 1) != 0 ? hi.x : lo.x, (corner & 2) != 0 ? hi.y : lo.y,
+                                    (corner & 4) != 0 ? hi.z : lo.z);
+                return p.place.translation + p.place.rotation * (p.place.scale * at);
+            };
+            all.boundsMin = glm::min(all.boundsMin, pick(d.boundsMin, d.boundsMax));
+            all.boundsMax = glm::max(all.boundsMax, pick(d.boundsMin, d.boundsMax));
+            all.focusMin = glm::min(all.focusMin, pick(d.focusMin, d.focusMax));
+            all.focusMax = glm::max(all.focusMax, pick(d.focusMin, d.focusMax));
+        }
+        all.points += d.points;
+        all.hasColour = all.hasColour || d.hasColour;
+        all.hasNormals = all.hasNormals || d.hasNormals;
+        // Lit if any part needs it: meshes and scans without colours look flat otherwise.
+        all.isReflectance = all.isReflectance || isShaded(d);
+        if (all.attributes.empty()) all.attributes = d.attributes;
+    }
+    return all;
+}
+
+}  // namespace
+
+Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const std::string& output,
+                                  const BuildOptions& build, Executor& executor, Progress& progress) {
+    STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
+    if (!isSceneFile(inputs.front()) || build.surfels > 0)
+        return lod::buildStore(inputs, output, settings, executor, progress);
+    if (inputs.size() > 1)
+        return fail(ErrorKind::usage, "only one scene with meshes can be built at a time", inputs[1]);
+    STIPPLE_ASSIGN(scene::Scene scene, scene::readScene(inputs.front()));
+    lod::TriangleMesh triangles = scene::flattenTriangles(scene, scene::placements(scene));
+    if (triangles.indices.empty()) return lod::buildStore(inputs, output, settings, executor, progress);
+    const lod::MeshBuildSettings mesh = meshSettings(scene);
+    const std::vector<std::string> notes = scene.notes;
+    scene = {};  // its memory is needed
+    STIPPLE_ASSIGN(lod::BuildReport report, lod::buildMeshStore(std::move(triangles), output, mesh, executor, progress));
+    report.notes.insert(report.notes.begin(), notes.begin(), notes.end());
+    return report;
+}
+
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build,
+                              const ColourOptions& colour, Executor& executor, bool showProgress) {
+    OpenedScene scene;
+    const bool isStore = fs::path(inputs.front()).extension() == ".stipple";
+    for (const std::string& input : inputs)
+        if (inputs.size() > 1 && (fs::path(input).extension() == ".stipple" || isSceneFile(input)))
+            return fail(ErrorKind::usage, "a built scene and other inputs cannot be mixed", input,
+                        "name one scene, or only raw inputs; a .gltf scene can place several stores");
+    if (isSceneFile(inputs.front())) {
+        STIPPLE_ASSIGN(scene.placed, openSceneFile(inputs.front(), build, colour, executor, showProgress));
+    } else {
+        STIPPLE_ASSIGN(
+            std::shared_ptr<const lod::Store> store,
+            isStore ? openStoreFile(inputs.front()) : openBuilt(inputs, build, colour, executor, showProgress));
+        scene.placed.push_back({std::move(store), {}, {}});
+    }
+    scene.description = describe(scene.placed);
+    return scene;
+}
+
+}  // namespace stipple::app

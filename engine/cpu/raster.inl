@@ -1,0 +1,221 @@
+// Triangles of the cpu backend: coverage into the visibility buffer, and corners back out of it. Included by
+// kernels.inl, once per instruction set.
+
+template <typename T>
+[[gnu::always_inline]] inline void exchange(T& a, T& b) {
+    const T c = a;
+    a = b;
+    b = c;
+}
+
+/// A triangle in fixed point, oriented so that its inside is positive.
+struct Fixed {
+    int64_t x[3], y[3];
+    float inverseDepth[3];
+    uint32_t id;
+};
+
+[[gnu::always_inline]] inline void offer(uint64_t* visibility, size_t pixel, float inverseDepth, uint32_t id) {
+    const uint64_t key = uint64_t{floatBitsToUint(1.0f / inverseDepth)} << 32 | id;
+    // Builtins: std::atomic_ref would be a function of its own, see kernels.inl.
+    uint64_t old = __atomic_load_n(&visibility[pixel], __ATOMIC_RELAXED);
+    while (key < old && !__atomic_compare_exchange_n(&visibility[pixel], &old, key, true, __ATOMIC_RELAXED,
+                                                     __ATOMIC_RELAXED)) {
+    }
+}
+
+/// Pixels [fromX, toX] x [fromY, toY] of a triangle. `Int`: holds twice the area of the triangle and the box.
+template <typename Int>
+[[gnu::always_inline]] inline void fill(const Fixed& t, int fromX, int toX, int fromY, int toY, uint32_t stride,
+                                        uint64_t* visibility) {
+    constexpr int kOne = 256, kHalf = 128;  // kSubpixel
+    const int64_t cx = int64_t{fromX} * kOne + kHalf, cy = int64_t{fromY} * kOne + kHalf;
+    Int dx[3], dy[3], row[3];
+    for (int e = 0; e < 3; ++e) {  // edge e lies opposite corner e
+        const int a = (e + 1) % 3, b = (e + 2) % 3;
+        const int64_t ex = t.x[b] - t.x[a], ey = t.y[b] - t.y[a];
+        dx[e] = static_cast<Int>(-ey * kOne);
+        dy[e] = static_cast<Int>(ex * kOne);
+        const int64_t at = ex * (cy - t.y[a]) - ey * (cx - t.x[a]);
+        row[e] = static_cast<Int>(at - (isTopLeft(static_cast<int>(ex), static_cast<int>(ey)) ? 0 : 1));
+    }
+    const int64_t area = (t.x[1] - t.x[0]) * (t.y[2] - t.y[0]) - (t.y[1] - t.y[0]) * (t.x[2] - t.x[0]);
+    const float inverseArea = 1.0f / static_cast<float>(area);
+    const float z0 = t.inverseDepth[0] * inverseArea, z1 = t.inverseDepth[1] * inverseArea,
+                z2 = t.inverseDepth[2] * inverseArea;
+    for (int y = fromY; y <= toY; ++y) {
+        Int w0 = row[0], w1 = row[1], w2 = row[2];
+        for (int x = fromX; x <= toX; ++x) {
+            if ((w0 | w1 | w2) >= 0)
+                offer(visibility, static_cast<size_t>(y) * stride + static_cast<size_t>(x),
+                      static_cast<float>(w0) * z0 + static_cast<float>(w1) * z1 + static_cast<float>(w2) * z2, t.id);
+            w0 += dx[0];
+            w1 += dx[1];
+            w2 += dx[2];
+        }
+        row[0] += dy[0];
+        row[1] += dy[1];
+        row[2] += dy[2];
+    }
+}
+
+constexpr int64_t kSmallSteps = 40 * 256;        ///< triangles up to this wide are filled in 32 bits
+constexpr int64_t kLargePixels = int64_t{1} << 14;  ///< from this many pixels on a triangle is shared out by rows
+
+/// Rows [firstRow, lastRow] of a triangle.
+void fillRows(const FrameConstants& f, const Fixed& t, int firstRow, int lastRow, uint64_t* visibility) {
+    const auto least = [](const int64_t* v) { return v[0] < v[1] ? (v[0] < v[2] ? v[0] : v[2]) : (v[1] < v[2] ? v[1] : v[2]); };
+    const auto most = [](const int64_t* v) { return v[0] > v[1] ? (v[0] > v[2] ? v[0] : v[2]) : (v[1] > v[2] ? v[1] : v[2]); };
+    const int64_t minX = least(t.x), maxX = most(t.x), minY = least(t.y), maxY = most(t.y);
+    // First and last pixel whose centre lies in the box.
+    const int fromX = static_cast<int>((minX + 127) >> 8 < 0 ? 0 : (minX + 127) >> 8);
+    const int toX = static_cast<int>((maxX - 128) >> 8 >= f.width ? f.width - 1 : (maxX - 128) >> 8);
+    int fromY = static_cast<int>((minY + 127) >> 8), toY = static_cast<int>((maxY - 128) >> 8);
+    fromY = fromY < firstRow ? firstRow : fromY;
+    toY = toY > lastRow ? lastRow : toY;
+    if (fromX > toX || fromY > toY) return;
+    if (maxX - minX < kSmallSteps && maxY - minY < kSmallSteps)
+        fill<int32_t>(t, fromX, toX, fromY, toY, f.width, visibility);
+    else
+        fill<int64_t>(t, fromX, toX, fromY, toY, f.width, visibility);
+}
+
+/// Fills a triangle or, where it is large, keeps it for later.
+void takeTriangle(const FrameConstants& f, Fixed& t, bool isTwoSided, const LargeSink& large, uint64_t* visibility) {
+    const int64_t area = (t.x[1] - t.x[0]) * (t.y[2] - t.y[0]) - (t.y[1] - t.y[0]) * (t.x[2] - t.x[0]);
+    // Counter-clockwise in the scene is clockwise on a screen whose y points down: negative.
+    if (area == 0 || (area > 0 && !isTwoSided)) return;
+    if (area < 0) {
+        exchange(t.x[1], t.x[2]);
+        exchange(t.y[1], t.y[2]);
+        exchange(t.inverseDepth[1], t.inverseDepth[2]);
+    }
+    if ((area < 0 ? -area : area) > kLargePixels * 65536 * 2) {
+        LargeTriangle l{};
+        for (int k = 0; k < 3; ++k) {
+            l.x[k] = static_cast<int32_t>(t.x[k]);
+            l.y[k] = static_cast<int32_t>(t.y[k]);
+            l.inverseDepth[k] = t.inverseDepth[k];
+        }
+        l.id = t.id;
+        large.keep(large.context, l);
+        return;
+    }
+    fillRows(f, t, 0, static_cast<int>(f.height) - 1, visibility);
+}
+
+/// One vertex between a and b where the plane's distance is 0. The ends are put in one order first, so that both
+/// triangles at an edge cut it at the same bits.
+vec3 cutEdge(vec3 a, float da, vec3 b, float db) {
+    if (a.x > b.x || (a.x == b.x && (a.y > b.y || (a.y == b.y && a.z > b.z)))) {
+        exchange(a, b);
+        exchange(da, db);
+    }
+    const float s = da / (da - db);
+    return vec3(a.x + (b.x - a.x) * s, a.y + (b.y - a.y) * s, a.z + (b.z - a.z) * s);
+}
+
+/// Clips against the near plane and four planes far outside the image, then takes the fan.
+void clipTriangle(const FrameConstants& f, const vec3* corner, uint32_t id, bool isTwoSided, const LargeSink& large,
+                  uint64_t* visibility) {
+    vec3 polygon[12] = {corner[0], corner[1], corner[2]}, other[12];
+    int count = 3;
+    const float slope = (kGuardPixels - 16384.0f) / f.focal;
+    for (int plane = 0; plane < 5 && count >= 3; ++plane) {
+        const auto distance = [&](const vec3& p) {
+            return plane == 0   ? p.z - f.nearPlane
+                   : plane == 1 ? p.z * slope - p.x
+                   : plane == 2 ? p.z * slope + p.x
+                   : plane == 3 ? p.z * slope - p.y
+                                : p.z * slope + p.y;
+        };
+        int kept = 0;
+        for (int i = 0; i < count; ++i) {
+            const vec3 &a = polygon[i], &b = polygon[(i + 1) % count];
+            const float da = distance(a), db = distance(b);
+            if (da >= 0) other[kept++] = a;
+            if ((da >= 0) != (db >= 0)) {
+                other[kept] = cutEdge(a, da, b, db);
+                if (plane == 0) other[kept].z = f.nearPlane;  // exactly on it
+                ++kept;
+            }
+        }
+        for (int i = 0; i < kept; ++i) polygon[i] = other[i];
+        count = kept;
+    }
+    if (count < 3) return;
+    int64_t x[12], y[12];
+    float inverse[12];
+    for (int i = 0; i < count; ++i) {
+        const float scale = f.focal / polygon[i].z;
+        x[i] = snapPixel(polygon[i].x * scale + f.centre.x);
+        y[i] = snapPixel(polygon[i].y * scale + f.centre.y);
+        inverse[i] = 1.0f / polygon[i].z;
+    }
+    for (int i = 1; i + 1 < count; ++i) {
+        Fixed t{{x[0], x[i], x[i + 1]}, {y[0], y[i], y[i + 1]}, {inverse[0], inverse[i], inverse[i + 1]}, id};
+        takeTriangle(f, t, isTwoSided, large, visibility);
+    }
+}
+
+/// `clip` of a vertex: in front of the near plane or far outside the image.
+void rasterCluster(const FrameConstants& frame, const DrawMesh& drawMesh, const MeshVertex* vertices,
+                   uint32_t vertexCount, const uint32_t* triangles, uint32_t triangleCount, uint32_t firstId,
+                   const LargeSink& large, uint64_t* visibility) {
+    const FrameConstants f = frame;
+    const DrawMesh m = drawMesh;
+    alignas(64) float x[256], y[256], z[256], inverse[256];
+    alignas(64) int32_t px[256], py[256], clip[256];
+    const int* __restrict const words = &vertices->x;
+#pragma GCC ivdep
+    for (size_t i = 0; i < vertexCount; ++i) {
+        const vec3 c = meshPosition(words[8 * i], words[8 * i + 1], words[8 * i + 2], m);
+        const float scale = f.focal / c.z;
+        const float sx = c.x * scale + f.centre.x, sy = c.y * scale + f.centre.y;
+        const bool isIn = (c.z >= f.nearPlane) & (abs(sx) < kGuardPixels) & (abs(sy) < kGuardPixels);
+        x[i] = c.x;
+        y[i] = c.y;
+        z[i] = c.z;
+        inverse[i] = 1.0f / c.z;
+        px[i] = isIn ? int(floor(sx * kSubpixel + 0.5f)) : 0;
+        py[i] = isIn ? int(floor(sy * kSubpixel + 0.5f)) : 0;
+        clip[i] = isIn ? 0 : 1;
+    }
+    const int right = static_cast<int>(f.width) * 256, bottom = static_cast<int>(f.height) * 256;
+    for (uint32_t k = 0; k < triangleCount; ++k) {
+        const uint32_t t = triangles[k];
+        const uint32_t a = t & 255u, b = t >> 8 & 255u, c = t >> 16 & 255u;
+        const bool isTwoSided = (vertices[a].surface & kSurfaceTwoSided) != 0;
+        const uint32_t id = kKindTriangle | (firstId + k);
+        if ((clip[a] | clip[b] | clip[c]) != 0) {
+            const vec3 corners[3] = {{x[a], y[a], z[a]}, {x[b], y[b], z[b]}, {x[c], y[c], z[c]}};
+            clipTriangle(f, corners, id, isTwoSided, large, visibility);
+            continue;
+        }
+        // Most triangles of a dense mesh contain no pixel's centre, or lie outside.
+        const int x0 = px[a], x1 = px[b], x2 = px[c], y0 = py[a], y1 = py[b], y2 = py[c];
+        const int minX = x0 < x1 ? (x0 < x2 ? x0 : x2) : (x1 < x2 ? x1 : x2);
+        const int maxX = x0 > x1 ? (x0 > x2 ? x0 : x2) : (x1 > x2 ? x1 : x2);
+        const int minY = y0 < y1 ? (y0 < y2 ? y0 : y2) : (y1 < y2 ? y1 : y2);
+        const int maxY = y0 > y1 ? (y0 > y2 ? y0 : y2) : (y1 > y2 ? y1 : y2);
+        if (((minX + 127) >> 8) > ((maxX - 128) >> 8) || ((minY + 127) >> 8) > ((maxY - 128) >> 8)) continue;
+        if (maxX < 0 || maxY < 0 || minX >= right || minY >= bottom) continue;
+        Fixed fixed{{x0, x1, x2}, {y0, y1, y2}, {inverse[a], inverse[b], inverse[c]}, id};
+        takeTriangle(f, fixed, isTwoSided, large, visibility);
+    }
+}
+
+void rasterLarge(const FrameConstants& frame, const LargeTriangle* large, size_t count, uint32_t firstRow,
+                 uint32_t lastRow, uint64_t* visibility) {
+    const FrameConstants f = frame;
+    for (size_t i = 0; i < count; ++i) {
+        Fixed t{};
+        for (int k = 0; k < 3; ++k) {
+            t.x[k] = large[i].x[k];
+            t.y[k] = large[i].y[k];
+            t.inverseDepth[k] = large[i].inverseDepth[k];
+        }
+        t.id = large[i].id;
+        fillRows(f, t, static_cast<int>(firstRow), static_cast<int>(lastRow), visibility);
+    }
+}

@@ -1,0 +1,136 @@
+#include "engine/scene/triangles.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "shaders/shared/record.h"
+
+namespace stipple::scene {
+namespace {
+
+/// The last material stands for "none": white, not metallic.
+uint32_t materialIndex(const Scene& scene, const Primitive& p) {
+    return p.material < 0 ? static_cast<uint32_t>(scene.materials.size()) : static_cast<uint32_t>(p.material);
+}
+
+uint32_t surfaceOf(const Scene& scene, const Primitive& p) {
+    uint32_t surface = materialIndex(scene, p);
+    if (p.normal.empty()) surface |= shared::kSurfaceFlat;
+    if (p.material < 0) return surface;
+    const Material& m = scene.materials[static_cast<size_t>(p.material)];
+    if (m.isDoubleSided) surface |= shared::kSurfaceTwoSided;
+    if (m.alphaMode != AlphaMode::opaque) surface |= shared::kSurfaceMasked;
+    if (m.isUnlit) surface |= shared::kSurfaceUnlit;
+    for (const TextureUse* use : {&m.baseColourTexture, &m.metallicRoughnessTexture, &m.normalTexture,
+                                  &m.occlusionTexture, &m.emissiveTexture})
+        if (use->texture >= 0) surface |= shared::kSurfaceTextured;
+    return surface;
+}
+
+uint32_t packedColour(const glm::vec4& c) {
+    const auto byte = [](float linear) {
+        return static_cast<uint32_t>(shared::srgbFromLinear(std::clamp(linear, 0.0f, 1.0f)) * 255.0f + 0.5f);
+    };
+    return byte(c.r) | byte(c.g) << 8 | byte(c.b) << 16 |
+           static_cast<uint32_t>(std::clamp(c.a, 0.0f, 1.0f) * 255.0f + 0.5f) << 24;
+}
+
+shared::TextureSlot slotOf(const Scene& scene, const TextureUse& use, bool isDrawn) {
+    shared::TextureSlot slot{};
+    slot.rowU = {1, 0, 0};
+    slot.rowV = {0, 1, 0};
+    if (use.texture < 0 || !isDrawn || scene.textures[static_cast<size_t>(use.texture)].image < 0) return slot;
+    slot.texture = static_cast<uint32_t>(use.texture) + 1;
+    const glm::mat3& t = use.transform;
+    slot.rowU = {t[0][0], t[1][0], t[2][0]};
+    slot.rowV = {t[0][1], t[1][1], t[2][1]};
+    return slot;
+}
+
+/// Vertices have one set of coordinates: that of the first texture in this order.
+int uvSetOf(const Material& m) {
+    for (const TextureUse* use : {&m.baseColourTexture, &m.normalTexture, &m.metallicRoughnessTexture,
+                                  &m.emissiveTexture, &m.occlusionTexture})
+        if (use->texture >= 0) return use->uvSet;
+    return 0;
+}
+
+}  // namespace
+
+std::vector<Placement> placements(const Scene& scene) {
+    std::vector<Placement> out;
+    const std::vector<glm::dmat4> world = scene.worldTransforms();
+    const std::vector<bool> visible = scene.visibility();
+    for (size_t n = 0; n < scene.nodes.size(); ++n) {
+        const Node& node = scene.nodes[n];
+        if (node.mesh < 0 || !visible[n]) continue;
+        if (node.instances.empty()) out.push_back({node.mesh, world[n]});
+        for (const glm::dmat4& place : node.instances) out.push_back({node.mesh, world[n] * place});
+    }
+    return out;
+}
+
+lod::TriangleMesh flattenTriangles(const Scene& scene, const std::vector<Placement>& placed) {
+    lod::TriangleMesh out;
+    for (const Placement& at : placed)
+        for (const Primitive& p : scene.meshes[static_cast<size_t>(at.mesh)].primitives) {
+            if (p.kind != PrimitiveKind::triangles) continue;
+            const glm::dmat3 linear(at.world);
+            // Cofactors turn normals under any scale, flat ones included, and carry the sign of a mirror.
+            const glm::dmat3 forNormals(glm::cross(linear[1], linear[2]), glm::cross(linear[2], linear[0]),
+                                        glm::cross(linear[0], linear[1]));
+            const bool isMirrored = glm::determinant(linear) < 0;
+            const auto base = static_cast<uint32_t>(out.position.size());
+            const uint32_t surface = surfaceOf(scene, p);
+            const int set = p.material < 0 ? 0 : uvSetOf(scene.materials[static_cast<size_t>(p.material)]);
+            const bool hasUv = set >= 0 && static_cast<size_t>(set) < p.uv.size();
+            for (size_t i = 0; i < p.position.size(); ++i) {
+                out.position.emplace_back(at.world * glm::dvec4(glm::dvec3(p.position[i]), 1));
+                const glm::dvec3 n = p.normal.empty() ? glm::dvec3(0) : forNormals * glm::dvec3(p.normal[i]);
+                const double length = glm::length(n);
+                const double sign = isMirrored ? -1 : 1;
+                out.normal.emplace_back(length > 0 && std::isfinite(length) ? n * (sign / length) : glm::dvec3(0));
+                out.uv.push_back(hasUv ? p.uv[static_cast<size_t>(set)][i] : glm::vec2(0));
+                out.colour.push_back(p.colour.empty() ? ~0u : packedColour(p.colour[i]));
+                out.surface.push_back(surface);
+            }
+            for (size_t i = 0; i + 3 <= p.indices.size(); i += 3) {
+                out.indices.push_back(base + p.indices[i]);
+                out.indices.push_back(base + p.indices[i + (isMirrored ? 2 : 1)]);
+                out.indices.push_back(base + p.indices[i + (isMirrored ? 1 : 2)]);
+            }
+        }
+    return out;
+}
+
+std::vector<shared::SurfaceMaterial> surfaceMaterials(const Scene& scene) {
+    std::vector<shared::SurfaceMaterial> out;
+    for (const Material& m : scene.materials) {
+        shared::SurfaceMaterial s{};
+        const int set = uvSetOf(m);
+        const auto slot = [&](const TextureUse& use) { return slotOf(scene, use, use.uvSet == set); };
+        s.baseColour = glm::vec3(m.baseColour);
+        s.alpha = m.baseColour.a;
+        s.alphaCutoff = m.alphaMode == AlphaMode::opaque ? 0.0f : m.alphaMode == AlphaMode::mask ? m.alphaCutoff : 0.5f;
+        s.emissive = m.emissive;
+        s.metallic = m.metallic;
+        s.roughness = m.roughness;
+        s.normalScale = m.normalScale;
+        s.occlusionStrength = m.occlusionStrength;
+        s.baseTexture = slot(m.baseColourTexture);
+        s.surfaceTexture = slot(m.metallicRoughnessTexture);
+        s.normalTexture = slot(m.normalTexture);
+        s.occlusionTexture = slot(m.occlusionTexture);
+        s.emissiveTexture = slot(m.emissiveTexture);
+        out.push_back(s);
+    }
+    shared::SurfaceMaterial plain{};
+    plain.baseColour = {1, 1, 1};
+    plain.alpha = plain.roughness = plain.normalScale = 1;
+    plain.baseTexture = plain.surfaceTexture = plain.normalTexture = plain.occlusionTexture = plain.emissiveTexture =
+        slotOf(scene, {}, false);
+    out.push_back(plain);
+    return out;
+}
+
+}  // namespace stipple::scene

@@ -1,0 +1,23 @@
+// The triangles of a scene's meshes in one list, with the materials that their vertices name.
+#pragma once
+
+#include "engine/scene/scene.h"
+#include "lod/mesh.h"
+
+namespace stipple::scene {
+
+/// A mesh somewhere.
+struct Placement {
+    int mesh = -1;
+    glm::dmat4 world{1};
+};
+/// Of all visible nodes, instances included.
+std::vector<Placement> placements(const Scene& scene);
+
+/// Triangles of `placed`, in world space; vertices of mirrored placements change their winding. Points and lines are
+/// left out.
+lod::TriangleMesh flattenTriangles(const Scene& scene, const std::vector<Placement>& placed);
+
+std::vector<shared::SurfaceMaterial> surfaceMaterials(const Scene& scene);
+
+}  // namespace stipple::scene

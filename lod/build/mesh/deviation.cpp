@@ -1,0 +1,281 @@
+// A bound on the distance between two triangle surfaces, both ways.
+//
+// The distance from a point to a convex set is a convex function of the point. So, for any triangle s of the target,
+// the distance of a whole triangle T to s is largest at a corner of T, and  min over s of max over corners  bounds the
+// distance of every point of T to the target. T is cut in four where that is not close to the distances of its corners,
+// which bound it from below.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "lod/build/mesh/mesh_work.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr int kMostSplits = 5;
+constexpr int kColourStep = 48;  ///< sRGB steps from which colours count as different, as for points
+
+struct Nearest {
+    float distance = 3e38f;
+    uint32_t triangle = 0;
+};
+
+/// Closest point of a triangle (Ericson, Real-Time Collision Detection, 5.1.5) as weights of b and c.
+glm::vec2 closestWeights(const glm::vec3& p, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
+    const glm::vec3 ab = b - a, ac = c - a, ap = p - a;
+    const float d1 = glm::dot(ab, ap), d2 = glm::dot(ac, ap);
+    if (d1 <= 0 && d2 <= 0) return {0, 0};
+    const glm::vec3 bp = p - b;
+    const float d3 = glm::dot(ab, bp), d4 = glm::dot(ac, bp);
+    if (d3 >= 0 && d4 <= d3) return {1, 0};
+    const float vc = d1 * d4 - d3 * d2;
+    if (vc <= 0 && d1 >= 0 && d3 <= 0) return {d1 / (d1 - d3), 0};
+    const glm::vec3 cp = p - c;
+    const float d5 = glm::dot(ab, cp), d6 = glm::dot(ac, cp);
+    if (d6 >= 0 && d5 <= d6) return {0, 1};
+    const float vb = d5 * d2 - d1 * d6;
+    if (vb <= 0 && d2 >= 0 && d6 <= 0) return {0, d2 / (d2 - d6)};
+    const float va = d3 * d6 - d5 * d4;
+    if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+        const float w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return {1 - w, w};
+    }
+    const float denominator = 1 / (va + vb + vc);
+    return {vb * denominator, vc * denominator};
+}
+
+/// Triangles in the cells of an even grid, for nearest-triangle queries.
+class Target {
+  public:
+    Target(const std::vector<glm::vec3>& position, const std::vector<uint32_t>& indices)
+        : position_(position), indices_(indices) {
+        glm::vec3 lo(3e38f), hi(-3e38f);
+        double area = 0;
+        for (size_t i = 0; i < indices.size(); i += 3) {
+            for (size_t k = 0; k < 3; ++k) {
+                lo = glm::min(lo, position[indices[i + k]]);
+                hi = glm::max(hi, position[indices[i + k]]);
+            }
+            area += 0.5 * static_cast<double>(glm::length(glm::cross(position[indices[i + 1]] - position[indices[i]],
+                                                                     position[indices[i + 2]] - position[indices[i]])));
+        }
+        const double triangles = static_cast<double>(indices.size()) / 3;
+        lo_ = lo;
+        cell_ = std::max(static_cast<float>(std::sqrt(area / std::max(1.0, triangles)) * 1.5),
+                         std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z}) / 48);
+        cell_ = std::max(cell_, 1e-3f);
+        for (int a = 0; a < 3; ++a) size_[a] = 1 + static_cast<int>((hi[a] - lo[a]) / cell_);
+        start_.assign(static_cast<size_t>(size_.x) * static_cast<size_t>(size_.y) * static_cast<size_t>(size_.z) + 1,
+                      0);
+        for (const bool isCounting : {true, false}) {
+            for (uint32_t t = 0; t < indices.size() / 3; ++t) {
+                const glm::vec3 &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
+                const glm::ivec3 from = cellOf(glm::min(a, glm::min(b, c))), to = cellOf(glm::max(a, glm::max(b, c)));
+                for (int z = from.z; z <= to.z; ++z)
+                    for (int y = from.y; y <= to.y; ++y)
+                        for (int x = from.x; x <= to.x; ++x) {
+                            uint32_t& at = start_[number(x, y, z)];
+                            if (isCounting)
+                                ++at;
+                            else
+                                items_[--at] = t;
+                        }
+            }
+            if (!isCounting) break;
+            uint32_t sum = 0;
+            for (uint32_t& s : start_) s = sum += s;
+            items_.resize(sum);
+        }
+    }
+
+    const glm::vec3& corner(uint32_t t, size_t k) const { return position_[indices_[3 * size_t{t} + k]]; }
+    float distance(const glm::vec3& p, uint32_t t) const {
+        const glm::vec3 &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
+        const glm::vec2 w = closestWeights(p, a, b, c);
+        return glm::length(p - (a + w.x * (b - a) + w.y * (c - a)));
+    }
+
+    /// Calls visit(triangle) for all that may be nearer than limit(), in rings of cells around p.
+    template <typename Visit, typename Limit>
+    void around(const glm::vec3& p, const Visit& visit, const Limit& limit) const {
+        const glm::ivec3 centre = cellOf(p);
+        const int rings = std::max({size_.x, size_.y, size_.z});
+        for (int r = 0; r <= rings; ++r) {
+            // Everything beyond ring r - 1 is at least r - 1 whole cells away (p itself may lie outside the grid).
+            if (r > 0 && static_cast<float>(r - 1) * cell_ > limit()) break;
+            for (int z = std::max(0, centre.z - r); z <= std::min(size_.z - 1, centre.z + r); ++z)
+                for (int y = std::max(0, centre.y - r); y <= std::min(size_.y - 1, centre.y + r); ++y) {
+                    const bool isFace = std::abs(z - centre.z) == r || std::abs(y - centre.y) == r;
+                    const int step = isFace || r == 0 ? 1 : 2 * r;
+                    for (int x = centre.x - r; x <= centre.x + r; x += step) {
+                        if (x < 0 || x >= size_.x) continue;
+                        const size_t n = number(x, y, z);
+                        for (uint32_t i = start_[n]; i < start_[n + 1]; ++i) visit(items_[i]);
+                    }
+                }
+        }
+    }
+
+    Nearest nearest(const glm::vec3& p) const {
+        Nearest best;
+        around(
+            p,
+            [&](uint32_t t) {
+                const float d = distance(p, t);
+                if (d < best.distance) best = {d, t};
+            },
+            [&] { return best.distance; });
+        return best;
+    }
+
+  private:
+    glm::ivec3 cellOf(const glm::vec3& p) const {
+        return glm::clamp(glm::ivec3((p - lo_) / cell_), glm::ivec3(0), size_ - 1);
+    }
+    size_t number(int x, int y, int z) const {
+        return (static_cast<size_t>(z) * static_cast<size_t>(size_.y) + static_cast<size_t>(y)) *
+                   static_cast<size_t>(size_.x) +
+               static_cast<size_t>(x);
+    }
+    const std::vector<glm::vec3>& position_;
+    const std::vector<uint32_t>& indices_;
+    glm::vec3 lo_{0};
+    float cell_ = 1;
+    glm::ivec3 size_{1};
+    std::vector<uint32_t> start_, items_;
+};
+
+struct Corner {
+    glm::vec3 position;
+    Nearest nearest;
+};
+
+/// Bound on the distance of a triangle to the target; anything up to `floor` is as good as `floor`.
+float boundTriangle(const Target& target, const Corner& a, const Corner& b, const Corner& c, float floor, int depth) {
+    const float below = std::max({a.nearest.distance, b.nearest.distance, c.nearest.distance});
+    float above = 3e38f;
+    for (const Corner* hint : {&a, &b, &c}) {
+        const uint32_t s = hint->nearest.triangle;
+        float most = 0;
+        for (const Corner* v : {&a, &b, &c})
+            most = std::max(most, v == hint ? v->nearest.distance : target.distance(v->position, s));
+        above = std::min(above, most);
+        if (above <= floor || above <= 1.1f * below) return above;
+    }
+    if (depth == 0) return above;
+    const auto middle = [&](const Corner& p, const Corner& q) {
+        const glm::vec3 at = 0.5f * (p.position + q.position);
+        return Corner{at, target.nearest(at)};
+    };
+    const Corner ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
+    float result = floor;
+    result = std::max(result, boundTriangle(target, a, ab, ca, result, depth - 1));
+    result = std::max(result, boundTriangle(target, ab, b, bc, result, depth - 1));
+    result = std::max(result, boundTriangle(target, ca, bc, c, result, depth - 1));
+    result = std::max(result, boundTriangle(target, ab, bc, ca, result, depth - 1));
+    return std::min(result, above);
+}
+
+using Triple = std::array<uint32_t, 3>;
+
+/// Triangles in an order and form that lets equal ones be found.
+std::vector<Triple> sorted(const std::vector<uint32_t>& indices) {
+    std::vector<Triple> out(indices.size() / 3);
+    for (size_t i = 0; i < out.size(); ++i) {
+        out[i] = {indices[3 * i], indices[3 * i + 1], indices[3 * i + 2]};
+        std::sort(out[i].begin(), out[i].end());
+    }
+    std::sort(out.begin(), out.end());
+    return out;
+}
+
+/// `others`: triangles of the target; what stands in both needs no look.
+float boundSurface(const Target& target, const std::vector<glm::vec3>& position, const std::vector<Triple>& triangles,
+                   const std::vector<Triple>& others, const std::vector<Nearest>& nearest, float floor) {
+    for (const Triple& t : triangles) {
+        if (std::binary_search(others.begin(), others.end(), t)) continue;
+        const auto at = [&](size_t k) { return Corner{position[t.at(k)], nearest[t.at(k)]}; };
+        floor = std::max(floor, boundTriangle(target, at(0), at(1), at(2), floor, kMostSplits));
+    }
+    return floor;
+}
+
+/// How far the look of vertex `v` moves along the surface if triangle `t` of the target stands in its place.
+float shiftOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& coarse, uint32_t v,
+              const Target& target, uint32_t t, float& distance) {
+    const glm::vec3 &p = local.position[v], &a = target.corner(t, 0), &b = target.corner(t, 1),
+                    &c = target.corner(t, 2);
+    const glm::vec2 w = closestWeights(p, a, b, c);
+    distance = glm::length(p - (a + w.x * (b - a) + w.y * (c - a)));
+    const std::array<float, 3> weights{1 - w.x - w.y, w.x, w.y};
+    const shared::MeshVertex& own = mesh.vertices[local.global[v]];
+    std::array<const shared::MeshVertex*, 3> corners{};
+    for (size_t k = 0; k < 3; ++k) corners.at(k) = &mesh.vertices[local.global[coarse[3 * size_t{t} + k]]];
+    const glm::vec3 e1 = b - a, e2 = c - a;
+    const float longest = std::max({glm::length(e1), glm::length(e2), glm::length(c - b)});
+    float shift = (own.surface & shared::kSurfaceMaterialMask) == (corners[0]->surface & shared::kSurfaceMaterialMask)
+                      ? 0
+                      : longest;
+    for (uint32_t bits = 0; bits < 24; bits += 8) {
+        float mean = 0;
+        for (size_t k = 0; k < 3; ++k) mean += weights.at(k) * static_cast<float>(corners.at(k)->colour >> bits & 255u);
+        if (std::abs(mean - static_cast<float>(own.colour >> bits & 255u)) > kColourStep) shift = longest;
+    }
+    if ((own.surface & shared::kSurfaceTextured) == 0) return shift;
+    glm::vec2 uv(0);
+    for (size_t k = 0; k < 3; ++k) uv += weights.at(k) * glm::vec2(corners.at(k)->u, corners.at(k)->v);
+    const glm::vec2 f1(corners[1]->u - corners[0]->u, corners[1]->v - corners[0]->v),
+        f2(corners[2]->u - corners[0]->u, corners[2]->v - corners[0]->v);
+    const float inTexture = std::abs(f1.x * f2.y - f1.y * f2.x), inSpace = glm::length(glm::cross(e1, e2));
+    const float moved = glm::length(uv - glm::vec2(own.u, own.v));
+    if (moved == 0) return shift;
+    return shift + std::min(inTexture > 0 ? moved * std::sqrt(inSpace / inTexture) : longest, 4 * longest);
+}
+
+}  // namespace
+
+double boundDeviation(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& coarse) {
+    // Near zero, so that fp32 keeps its precision: the group is small.
+    const glm::vec3 shift = local.position[0];
+    std::vector<glm::vec3> position(local.position.size());
+    float extent = 0;
+    for (size_t i = 0; i < position.size(); ++i) {
+        position[i] = local.position[i] - shift;
+        extent = std::max({extent, std::abs(position[i].x), std::abs(position[i].y), std::abs(position[i].z)});
+    }
+    LocalMesh near = local;
+    near.position = position;
+    const Target toCoarse(position, coarse);
+    std::vector<Nearest> nearest(position.size());
+    std::vector<uint8_t> isKept(position.size());
+    for (uint32_t i = 0; i < coarse.size(); ++i) {
+        nearest[coarse[i]] = {0, i / 3};
+        isKept[coarse[i]] = 1;
+    }
+    float worst = 0;
+    for (uint32_t v = 0; v < position.size(); ++v) {
+        if (isKept[v]) continue;
+        Nearest best;
+        float look = 3e38f;  // least of distance + shift
+        toCoarse.around(
+            position[v],
+            [&](uint32_t t) {
+                float d = 0;
+                const float moved = shiftOf(mesh, near, coarse, v, toCoarse, t, d);
+                if (d < best.distance) best = {d, t};
+                look = std::min(look, d + moved);
+            },
+            [&] { return best.distance; });
+        nearest[v] = best;
+        worst = std::max(worst, look);
+    }
+    const std::vector<Triple> fine = sorted(near.indices), left = sorted(coarse);
+    worst = boundSurface(toCoarse, position, fine, left, nearest, worst);
+    const Target toFine(position, near.indices);
+    for (uint32_t i = 0; i < near.indices.size(); ++i) nearest[near.indices[i]] = {0, i / 3};
+    worst = boundSurface(toFine, position, left, fine, nearest, worst);
+    return static_cast<double>(worst) * (1 + 1e-5) + static_cast<double>(extent) * 1e-6;  // fp32's share
+}
+
+}  // namespace stipple::lod

@@ -1,0 +1,151 @@
+#include "lod/description.h"
+
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+namespace stipple::lod {
+namespace {
+
+using nlohmann::json;
+
+json toJson(const glm::vec3& v) { return {v.x, v.y, v.z}; }
+shared::vec3 vectorFromJson(const json& j) {
+    return {j.at(0).get<float>(), j.at(1).get<float>(), j.at(2).get<float>()};
+}
+json toJson(const shared::TextureSlot& s) {
+    return {{"texture", s.texture}, {"u", toJson(s.rowU)}, {"v", toJson(s.rowV)}};
+}
+shared::TextureSlot slotFromJson(const json& j) {
+    return {j.at("texture").get<uint32_t>(), vectorFromJson(j.at("u")), vectorFromJson(j.at("v"))};
+}
+
+json materialToJson(const shared::SurfaceMaterial& m) {
+    return {{"base_colour", toJson(m.baseColour)},
+            {"alpha", m.alpha},
+            {"alpha_cutoff", m.alphaCutoff},
+            {"emissive", toJson(m.emissive)},
+            {"metallic", m.metallic},
+            {"roughness", m.roughness},
+            {"normal_scale", m.normalScale},
+            {"occlusion_strength", m.occlusionStrength},
+            {"base_texture", toJson(m.baseTexture)},
+            {"surface_texture", toJson(m.surfaceTexture)},
+            {"normal_texture", toJson(m.normalTexture)},
+            {"occlusion_texture", toJson(m.occlusionTexture)},
+            {"emissive_texture", toJson(m.emissiveTexture)}};
+}
+
+shared::SurfaceMaterial materialFromJson(const json& j) {
+    shared::SurfaceMaterial m{};
+    m.baseColour = vectorFromJson(j.at("base_colour"));
+    m.alpha = j.at("alpha").get<float>();
+    m.alphaCutoff = j.at("alpha_cutoff").get<float>();
+    m.emissive = vectorFromJson(j.at("emissive"));
+    m.metallic = j.at("metallic").get<float>();
+    m.roughness = j.at("roughness").get<float>();
+    m.normalScale = j.at("normal_scale").get<float>();
+    m.occlusionStrength = j.at("occlusion_strength").get<float>();
+    m.baseTexture = slotFromJson(j.at("base_texture"));
+    m.surfaceTexture = slotFromJson(j.at("surface_texture"));
+    m.normalTexture = slotFromJson(j.at("normal_texture"));
+    m.occlusionTexture = slotFromJson(j.at("occlusion_texture"));
+    m.emissiveTexture = slotFromJson(j.at("emissive_texture"));
+    return m;
+}
+
+json toJson(const StoreDescription& d) {
+    json attributes = json::array();
+    for (const AttributeInfo& a : d.attributes)
+        attributes.push_back({{"name", a.name},
+                              {"type", kScalarNames.at(static_cast<size_t>(a.type))},
+                              {"aggregate", kAggregateNames.at(static_cast<size_t>(a.aggregate))},
+                              {"scale", a.scale},
+                              {"offset", a.offset},
+                              {"description", a.description},
+                              {"least", a.least},
+                              {"greatest", a.greatest},
+                              {"low", a.low},
+                              {"high", a.high},
+                              {"counts", a.counts}});
+    json materials = json::array();
+    for (const shared::SurfaceMaterial& m : d.materials) materials.push_back(materialToJson(m));
+    return {
+        {"metres_per_unit", d.metresPerUnit},
+        {"up", {d.up.x, d.up.y, d.up.z}},
+        {"crs", {{"name", d.crs.name}, {"epsg", d.crs.epsg}, {"text", d.crs.text}, {"is_degrees", d.crs.isDegrees}}},
+        {"attributes", attributes},
+        {"low_height", d.lowHeight},
+        {"high_height", d.highHeight},
+        {"points", d.points},
+        {"records", d.records},
+        {"rounding", d.roundingUnits},
+        {"min", {d.boundsMin.x, d.boundsMin.y, d.boundsMin.z}},
+        {"max", {d.boundsMax.x, d.boundsMax.y, d.boundsMax.z}},
+        {"focus_min", {d.focusMin.x, d.focusMin.y, d.focusMin.z}},
+        {"focus_max", {d.focusMax.x, d.focusMax.y, d.focusMax.z}},
+        {"has_colour", d.hasColour},
+        {"is_reflectance", d.isReflectance},
+        {"has_normals", d.hasNormals},
+        {"materials", materials},
+        {"source", d.source}};
+}
+
+template <size_t N>
+size_t indexOf(const std::array<const char*, N>& names, const std::string& name) {
+    for (size_t i = 0; i < N; ++i)
+        if (name == names.at(i)) return i;
+    throw std::runtime_error("unknown name '" + name + "'");
+}
+
+AttributeInfo attributeFromJson(const json& j) {
+    AttributeInfo a;
+    a.name = j.at("name").get<std::string>();
+    a.type = static_cast<ScalarType>(indexOf(kScalarNames, j.at("type").get<std::string>()));
+    a.aggregate = static_cast<Aggregate>(indexOf(kAggregateNames, j.at("aggregate").get<std::string>()));
+    a.scale = j.at("scale").get<double>();
+    a.offset = j.at("offset").get<double>();
+    a.description = j.at("description").get<std::string>();
+    a.least = j.at("least").get<double>();
+    a.greatest = j.at("greatest").get<double>();
+    a.low = j.at("low").get<double>();
+    a.high = j.at("high").get<double>();
+    a.counts = j.at("counts").get<std::vector<std::pair<double, uint64_t>>>();
+    return a;
+}
+
+StoreDescription fromJson(const json& j) {
+    StoreDescription d;
+    d.metresPerUnit = j.at("metres_per_unit").get<double>();
+    const json& crs = j.at("crs");
+    d.crs.name = crs.at("name").get<std::string>();
+    d.crs.epsg = crs.at("epsg").get<int>();
+    d.crs.text = crs.at("text").get<std::string>();
+    d.crs.isDegrees = crs.at("is_degrees").get<bool>();
+    d.crs.metresPerUnit = d.metresPerUnit;
+    for (const json& a : j.at("attributes")) d.attributes.push_back(attributeFromJson(a));
+    d.lowHeight = j.at("low_height").get<double>();
+    d.highHeight = j.at("high_height").get<double>();
+    d.points = j.at("points").get<uint64_t>();
+    d.records = j.at("records").get<uint64_t>();
+    d.roundingUnits = j.at("rounding").get<double>();
+    for (int i = 0; i < 3; ++i) {
+        d.boundsMin[i] = j.at("min").at(static_cast<size_t>(i)).get<double>();
+        d.focusMin[i] = j.at("focus_min").at(static_cast<size_t>(i)).get<double>();
+        d.focusMax[i] = j.at("focus_max").at(static_cast<size_t>(i)).get<double>();
+        d.up[i] = j.at("up").at(static_cast<size_t>(i)).get<double>();
+        d.boundsMax[i] = j.at("max").at(static_cast<size_t>(i)).get<double>();
+    }
+    d.hasColour = j.at("has_colour").get<bool>();
+    d.isReflectance = j.at("is_reflectance").get<bool>();
+    d.hasNormals = j.at("has_normals").get<bool>();
+    d.source = j.at("source").get<std::string>();
+    for (const json& m : j.at("materials")) d.materials.push_back(materialFromJson(m));
+    return d;
+}
+
+}  // namespace
+
+std::string describeAsText(const StoreDescription& description) { return toJson(description).dump(); }
+StoreDescription descriptionFromText(const std::string& text) { return fromJson(json::parse(text)); }
+
+}  // namespace stipple::lod

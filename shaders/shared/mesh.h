@@ -1,0 +1,107 @@
+// Triangles of a mesh: vertices on one lattice, clusters of at most 256 triangles, their projection and coverage.
+//
+// Every vertex of an instance goes through the same integers and the same fp32 operations whatever cluster it stands
+// in, so that copies of a vertex land on the same subpixel: clusters, groups and levels of detail join without cracks.
+// Coverage is decided in integers (1/256 pixel, top-left rule), so that neighbours share out the pixels between them
+// exactly.
+#ifndef STIPPLE_SHARED_MESH_H
+#define STIPPLE_SHARED_MESH_H
+#include "types.h"
+SHARED_BEGIN
+
+struct MeshVertex {
+    int x;  // lattice steps
+    int y;
+    int z;
+    uint normal;  // octahedral 16 + 16
+    uint colour;  // sRGB 8 + 8 + 8, alpha 8
+    float u;
+    float v;
+    uint surface;  // material 16 | flags
+};
+
+const uint kSurfaceMaterialMask = 0xffffu;
+const uint kSurfaceTwoSided = 0x10000u;
+const uint kSurfaceFlat = 0x20000u;    // no normals of its own: the triangle's
+const uint kSurfaceMasked = 0x40000u;  // alpha below the cutoff is cut out
+const uint kSurfaceUnlit = 0x80000u;
+const uint kSurfaceTextured = 0x100000u;
+
+// A triangle is one word: three indices into the vertices of its cluster, 8 bits each.
+struct MeshCluster {
+    uint firstVertex;
+    uint firstTriangle;
+    uint counts;  // vertices | triangles << 16
+};
+
+const uint kClusterVertices = 255u;
+const uint kClusterTriangles = 256u;
+
+// One instance of a mesh. Position of a vertex q in camera space: base + axes * (q - eye), `eye` being the lattice
+// point of the mesh nearest to the camera: near it the integers are small and exact, far away their rounding is.
+struct DrawMesh {
+    vec3 axisX;
+    vec3 axisY;
+    vec3 axisZ;
+    vec3 base;
+    vec3 normalX;  // columns: camera-space normal = normalX * n.x + normalY * n.y + normalZ * n.z, not normalised
+    vec3 normalY;
+    vec3 normalZ;
+    int eyeX;
+    int eyeY;
+    int eyeZ;
+    uint firstMaterial;
+    float mirror;  // -1 where the instance mirrors, else 1
+};
+
+const uint kKindTriangle = 0x20000000u;  // bits 29 to 31 of a visibility id
+const uint kKindMask = 0xe0000000u;
+
+SHARED_FN vec3 meshPosition(int x, int y, int z, DrawMesh m) {
+    const float qx = float(x - m.eyeX);
+    const float qy = float(y - m.eyeY);
+    const float qz = float(z - m.eyeZ);
+    return vec3(m.base.x + (m.axisX.x * qx + (m.axisY.x * qy + m.axisZ.x * qz)),
+                m.base.y + (m.axisX.y * qx + (m.axisY.y * qy + m.axisZ.y * qz)),
+                m.base.z + (m.axisX.z * qx + (m.axisY.z * qy + m.axisZ.z * qz)));
+}
+
+const float kSubpixel = 256.0f;
+// Beyond this many pixels from the image's corner a triangle is clipped, so that 64-bit integers hold every product.
+const float kGuardPixels = 65536.0f;
+// Support of a triangle's pixel, pixels: it reaches nowhere beyond the pixel that it covers.
+const float kTriangleRadius = 0.25f;
+
+SHARED_FN int snapPixel(float p) { return int(floor(p * kSubpixel + 0.5f)); }
+
+// Edge from a to b (y down, triangle on the positive side): left edges go up, top edges are horizontal and go right.
+SHARED_FN bool isTopLeft(int dx, int dy) { return dy < 0 || (dy == 0 && dx > 0); }
+
+// Where the ray through a pixel meets a triangle: weights of the second and third corner, in [0, 1]. `ray`: direction
+// in camera space; a, b, c: corners (Moeller and Trumbore 1997, solved for the weights alone).
+SHARED_FN vec2 triangleWeights(vec3 ray, vec3 a, vec3 b, vec3 c) {
+    const vec3 e1 = vec3(b.x - a.x, b.y - a.y, b.z - a.z);
+    const vec3 e2 = vec3(c.x - a.x, c.y - a.y, c.z - a.z);
+    const vec3 p = vec3(ray.y * e2.z - ray.z * e2.y, ray.z * e2.x - ray.x * e2.z, ray.x * e2.y - ray.y * e2.x);
+    const float det = e1.x * p.x + e1.y * p.y + e1.z * p.z;
+    const vec3 q = vec3(e1.y * a.z - e1.z * a.y, e1.z * a.x - e1.x * a.z, e1.x * a.y - e1.y * a.x);
+    const float inverse = abs(det) > 0.0f ? 1.0f / det : 0.0f;
+    const float u = min(max(-(a.x * p.x + a.y * p.y + a.z * p.z) * inverse, 0.0f), 1.0f);
+    const float v = min(max((ray.x * q.x + ray.y * q.y + ray.z * q.z) * inverse, 0.0f), 1.0f - u);
+    return vec2(u, v);
+}
+
+// Unit normal to shade with, turned towards the eye. `n`: interpolated, `face`: the triangle's own, any lengths; `ray`:
+// from the eye. Interpolated normals that just turn away at a silhouette are bent back to it instead of flipped.
+SHARED_FN vec3 surfaceNormal(vec3 n, vec3 face, vec3 ray) {
+    const float side = face.x * ray.x + face.y * ray.y + face.z * ray.z > 0.0f ? -1.0f : 1.0f;
+    const float towards = max(side * (n.x * ray.x + n.y * ray.y + n.z * ray.z), 0.0f) /
+                          (ray.x * ray.x + ray.y * ray.y + ray.z * ray.z);
+    const vec3 bent = vec3(side * n.x - towards * ray.x, side * n.y - towards * ray.y, side * n.z - towards * ray.z);
+    const float length2 = bent.x * bent.x + bent.y * bent.y + bent.z * bent.z;
+    const float inverse = length2 > 0.0f ? 1.0f / sqrt(length2) : 0.0f;
+    return vec3(bent.x * inverse, bent.y * inverse, bent.z * inverse);
+}
+
+SHARED_END
+#endif
