@@ -14,7 +14,8 @@ namespace stipple::lod {
 namespace {
 
 constexpr int kMostSplits = 5;
-constexpr int kColourStep = 48;  ///< sRGB steps from which colours count as different, as for points
+constexpr float kTolerance = 1.3f;  ///< a bound a third above what is true is good enough
+constexpr int kColourStep = 48;     ///< sRGB steps from which colours count as different, as for points
 
 struct Nearest {
     float distance = 3e38f;
@@ -68,6 +69,13 @@ class Target {
         for (int a = 0; a < 3; ++a) size_[a] = 1 + static_cast<int>((hi[a] - lo[a]) / cell_);
         start_.assign(static_cast<size_t>(size_.x) * static_cast<size_t>(size_.y) * static_cast<size_t>(size_.z) + 1,
                       0);
+        spheres_.resize(indices.size() / 3);
+        for (uint32_t t = 0; t < spheres_.size(); ++t) {
+            const glm::vec3 &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
+            const glm::vec3 m = (a + b + c) * (1.0f / 3);
+            const float r = std::max({glm::length(a - m), glm::length(b - m), glm::length(c - m)});
+            spheres_[t] = glm::vec4(m, r * 1.00001f + 1e-6f);
+        }
         for (const bool isCounting : {true, false}) {
             for (uint32_t t = 0; t < indices.size() / 3; ++t) {
                 const glm::vec3 &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
@@ -90,6 +98,12 @@ class Target {
     }
 
     const glm::vec3& corner(uint32_t t, size_t k) const { return position_[indices_[3 * size_t{t} + k]]; }
+    /// No point of triangle t is nearer to p than this.
+    float atLeast(const glm::vec3& p, uint32_t t) const {
+        const glm::vec4& s = spheres_[t];
+        const glm::vec3 d = p - glm::vec3(s);
+        return std::sqrt(glm::dot(d, d)) - s.w;
+    }
     float distance(const glm::vec3& p, uint32_t t) const {
         const glm::vec3 &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
         const glm::vec2 w = closestWeights(p, a, b, c);
@@ -117,15 +131,24 @@ class Target {
         }
     }
 
-    Nearest nearest(const glm::vec3& p) const {
-        Nearest best;
-        around(
-            p,
-            [&](uint32_t t) {
-                const float d = distance(p, t);
-                if (d < best.distance) best = {d, t};
-            },
-            [&] { return best.distance; });
+    /// The nearest triangle; `best`: one that is known to be near, so that only the cells around p up to its distance
+    /// need a look.
+    Nearest nearest(const glm::vec3& p, Nearest best) const {
+        const glm::ivec3 from = cellOf(p - best.distance), to = cellOf(p + best.distance);
+        for (int z = from.z; z <= to.z; ++z)
+            for (int y = from.y; y <= to.y; ++y) {
+                const size_t row = number(0, y, z);
+                for (uint32_t i = start_[row + static_cast<size_t>(from.x)];
+                     i < start_[row + static_cast<size_t>(to.x) + 1]; ++i) {
+                    const uint32_t t = items_[i];
+                    const glm::vec4& s = spheres_[t];
+                    const glm::vec3 d = p - glm::vec3(s);
+                    const float reach = best.distance + s.w;
+                    if (glm::dot(d, d) >= reach * reach) continue;
+                    const float distance2 = distance(p, t);
+                    if (distance2 < best.distance) best = {distance2, t};
+                }
+            }
         return best;
     }
 
@@ -144,6 +167,7 @@ class Target {
     float cell_ = 1;
     glm::ivec3 size_{1};
     std::vector<uint32_t> start_, items_;
+    std::vector<glm::vec4> spheres_;  ///< of each triangle: centre, radius
 };
 
 struct Corner {
@@ -151,9 +175,15 @@ struct Corner {
     Nearest nearest;
 };
 
-/// Bound on the distance of a triangle to the target; anything up to `floor` is as good as `floor`.
-float boundTriangle(const Target& target, const Corner& a, const Corner& b, const Corner& c, float floor, int depth) {
-    const float below = std::max({a.nearest.distance, b.nearest.distance, c.nearest.distance});
+/// What is known of the largest distance of a surface: it is at least `lower` (or lower does not matter), at most
+/// `upper`.
+struct Bounds {
+    float lower = 0, upper = 0;
+};
+
+/// Takes one triangle into account; done where it is not above kTolerance times what is there already.
+void boundTriangle(const Target& target, const Corner& a, const Corner& b, const Corner& c, Bounds& bounds, int depth) {
+    bounds.lower = std::max({bounds.lower, a.nearest.distance, b.nearest.distance, c.nearest.distance});
     float above = 3e38f;
     for (const Corner* hint : {&a, &b, &c}) {
         const uint32_t s = hint->nearest.triangle;
@@ -161,20 +191,22 @@ float boundTriangle(const Target& target, const Corner& a, const Corner& b, cons
         for (const Corner* v : {&a, &b, &c})
             most = std::max(most, v == hint ? v->nearest.distance : target.distance(v->position, s));
         above = std::min(above, most);
-        if (above <= floor || above <= 1.1f * below) return above;
+        if (above <= kTolerance * bounds.lower) break;
     }
-    if (depth == 0) return above;
+    if (depth == 0 || above <= kTolerance * bounds.lower) {
+        bounds.upper = std::max(bounds.upper, above);
+        return;
+    }
     const auto middle = [&](const Corner& p, const Corner& q) {
         const glm::vec3 at = 0.5f * (p.position + q.position);
-        return Corner{at, target.nearest(at)};
+        const uint32_t hint = p.nearest.triangle;
+        return Corner{at, target.nearest(at, {target.distance(at, hint), hint})};
     };
     const Corner ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
-    float result = floor;
-    result = std::max(result, boundTriangle(target, a, ab, ca, result, depth - 1));
-    result = std::max(result, boundTriangle(target, ab, b, bc, result, depth - 1));
-    result = std::max(result, boundTriangle(target, ca, bc, c, result, depth - 1));
-    result = std::max(result, boundTriangle(target, ab, bc, ca, result, depth - 1));
-    return std::min(result, above);
+    boundTriangle(target, a, ab, ca, bounds, depth - 1);
+    boundTriangle(target, ab, b, bc, bounds, depth - 1);
+    boundTriangle(target, ca, bc, c, bounds, depth - 1);
+    boundTriangle(target, ab, bc, ca, bounds, depth - 1);
 }
 
 using Triple = std::array<uint32_t, 3>;
@@ -191,14 +223,13 @@ std::vector<Triple> sorted(const std::vector<uint32_t>& indices) {
 }
 
 /// `others`: triangles of the target; what stands in both needs no look.
-float boundSurface(const Target& target, const std::vector<glm::vec3>& position, const std::vector<Triple>& triangles,
-                   const std::vector<Triple>& others, const std::vector<Nearest>& nearest, float floor) {
+void boundSurface(const Target& target, const std::vector<glm::vec3>& position, const std::vector<Triple>& triangles,
+                  const std::vector<Triple>& others, const std::vector<Nearest>& nearest, Bounds& bounds) {
     for (const Triple& t : triangles) {
         if (std::binary_search(others.begin(), others.end(), t)) continue;
         const auto at = [&](size_t k) { return Corner{position[t.at(k)], nearest[t.at(k)]}; };
-        floor = std::max(floor, boundTriangle(target, at(0), at(1), at(2), floor, kMostSplits));
+        boundTriangle(target, at(0), at(1), at(2), bounds, kMostSplits);
     }
-    return floor;
 }
 
 /// How far the look of vertex `v` moves along the surface if triangle `t` of the target stands in its place.
@@ -235,7 +266,8 @@ float shiftOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<
 
 }  // namespace
 
-double boundDeviation(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& coarse) {
+double boundDeviation(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& coarse,
+                      double unimportant) {
     // Near zero, so that fp32 keeps its precision: the group is small.
     const glm::vec3 shift = local.position[0];
     std::vector<glm::vec3> position(local.position.size());
@@ -253,7 +285,7 @@ double boundDeviation(const WeldedMesh& mesh, const LocalMesh& local, const std:
         nearest[coarse[i]] = {0, i / 3};
         isKept[coarse[i]] = 1;
     }
-    float worst = 0;
+    auto worst = static_cast<float>(unimportant);  // so far a true distance, or not worth a closer look
     for (uint32_t v = 0; v < position.size(); ++v) {
         if (isKept[v]) continue;
         Nearest best;
@@ -261,21 +293,23 @@ double boundDeviation(const WeldedMesh& mesh, const LocalMesh& local, const std:
         toCoarse.around(
             position[v],
             [&](uint32_t t) {
+                if (toCoarse.atLeast(position[v], t) >= look) return;
                 float d = 0;
                 const float moved = shiftOf(mesh, near, coarse, v, toCoarse, t, d);
                 if (d < best.distance) best = {d, t};
                 look = std::min(look, d + moved);
             },
-            [&] { return best.distance; });
+            [&] { return look; });  // never below the distance: beside a seam the nearest triangle may be the wrong one
         nearest[v] = best;
         worst = std::max(worst, look);
     }
+    Bounds bounds{worst, worst};
     const std::vector<Triple> fine = sorted(near.indices), left = sorted(coarse);
-    worst = boundSurface(toCoarse, position, fine, left, nearest, worst);
+    boundSurface(toCoarse, position, fine, left, nearest, bounds);
     const Target toFine(position, near.indices);
     for (uint32_t i = 0; i < near.indices.size(); ++i) nearest[near.indices[i]] = {0, i / 3};
-    worst = boundSurface(toFine, position, left, fine, nearest, worst);
-    return static_cast<double>(worst) * (1 + 1e-5) + static_cast<double>(extent) * 1e-6;  // fp32's share
+    boundSurface(toFine, position, left, fine, nearest, bounds);
+    return static_cast<double>(bounds.upper) * (1 + 1e-5) + static_cast<double>(extent) * 1e-6;  // fp32's share
 }
 
 }  // namespace stipple::lod

@@ -14,6 +14,7 @@ namespace stipple::lod {
 namespace {
 
 constexpr double kWorthwhile = 0.85;     ///< a simplification that keeps more triangles than this is not used
+constexpr double kUnimportant = 0.25;    ///< share of the error below that one level may add unseen
 constexpr size_t kFewestTriangles = 16;  ///< below that nothing is simplified any more
 constexpr float kAnyError = 1e9f;        ///< the target is a number of triangles
 
@@ -177,19 +178,6 @@ class MeshBuilder {
         std::stable_sort(members.begin(), members.end(),
                          [](const Cluster* a, const Cluster* b) { return a->producer < b->producer; });
         const LocalMesh local = makeLocal(mesh_, members);
-        if (!isRoot) {
-            const size_t target = local.indices.size() / 6 * 3;
-            std::vector<uint32_t> coarse(local.indices.size());
-            coarse.resize(meshopt_simplify(coarse.data(), local.indices.data(), local.indices.size(),
-                                           &local.position[0].x, local.position.size(), sizeof(glm::vec3), target,
-                                           kAnyError, meshopt_SimplifyLockBorder, nullptr));
-            if (coarse.empty() ||
-                static_cast<double>(coarse.size()) > kWorthwhile * static_cast<double>(local.indices.size()))
-                return made;
-            made.group.error = boundDeviation(mesh_, local, coarse);
-            appendClusters(local, coarse, kNoProducer, made.products);
-        }
-        made.isSimplified = true;
         // Monotone, and a bound against the input: what is already wrong plus what is added.
         double below = 0;
         std::vector<Sphere> inside;
@@ -199,6 +187,19 @@ class MeshBuilder {
             below = std::max(below, groups_[p].error);
             inside.push_back({groups_[p].node.centre, groups_[p].node.radius});
         }
+        if (!isRoot) {
+            const size_t target = local.indices.size() / 6 * 3;
+            std::vector<uint32_t> coarse(local.indices.size());
+            coarse.resize(meshopt_simplify(coarse.data(), local.indices.data(), local.indices.size(),
+                                           &local.position[0].x, local.position.size(), sizeof(glm::vec3), target,
+                                           kAnyError, meshopt_SimplifyLockBorder, nullptr));
+            if (coarse.empty() ||
+                static_cast<double>(coarse.size()) > kWorthwhile * static_cast<double>(local.indices.size()))
+                return made;
+            made.group.error = boundDeviation(mesh_, local, coarse, kUnimportant * below);
+            appendClusters(local, coarse, kNoProducer, made.products);
+        }
+        made.isSimplified = true;
         made.group.error = isRoot ? kRootError : made.group.error + below;
         const Sphere sphere = sphereOf(local, inside);
         made.group.node.centre = sphere.centre;

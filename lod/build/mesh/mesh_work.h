@@ -53,8 +53,9 @@ std::vector<std::vector<uint32_t>> groupClusters(const WeldedMesh& mesh, const s
                                                  uint32_t size, Executor& executor);
 
 /// A bound, lattice units, on the distance between two surfaces over the same vertices, both ways; and on how far a
-/// texture is shifted along the surface where `mesh` is textured. Not above what is true by more than about a tenth,
-/// save on slivers.
-double boundDeviation(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& coarse);
+/// texture is shifted along the surface where `mesh` is textured. Not above what is true by more than a fifth, save on
+/// slivers; not below `unimportant`, which saves looking closer.
+double boundDeviation(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& coarse,
+                      double unimportant);
 
 }  // namespace stipple::lod
