@@ -16,6 +16,7 @@ namespace {
 constexpr double kWorthwhile = 0.85;     ///< a simplification that keeps more triangles than this is not used
 constexpr double kUnimportant = 0.25;    ///< share of the error below that one level may add unseen
 constexpr size_t kFewestTriangles = 16;  ///< below that nothing is simplified any more
+constexpr uint64_t kManyRoots = 20'000;  ///< triangles of the coarsest level that are worth a note
 constexpr float kAnyError = 1e9f;        ///< the target is a number of triangles
 
 struct Sphere {
@@ -109,7 +110,6 @@ class MeshBuilder {
             h.parents.insert(h.parents.end(), parents[i].begin(), parents[i].end());
         }
     }
-    uint64_t stuck() const { return stuck_; }
 
   private:
     static constexpr double kRootError = 1e300;
@@ -138,7 +138,6 @@ class MeshBuilder {
             for (size_t i = 0; i < count; ++i) {
                 if (!made[i].isSimplified) {  // with other neighbours it may shrink
                     for (const uint32_t c : members[first + i]) next.push_back(std::move(clusters[c]));
-                    ++stuck_;
                     continue;
                 }
                 const auto number = static_cast<uint32_t>(groups_.size());
@@ -196,7 +195,7 @@ class MeshBuilder {
             if (coarse.empty() ||
                 static_cast<double>(coarse.size()) > kWorthwhile * static_cast<double>(local.indices.size()))
                 return made;
-            made.group.error = boundDeviation(mesh_, local, coarse, kUnimportant * below);
+            made.group.error = measureDeviation(mesh_, local, coarse, kUnimportant * below);
             appendClusters(local, coarse, kNoProducer, made.products);
         }
         made.isSimplified = true;
@@ -252,7 +251,7 @@ class MeshBuilder {
     Executor& executor_;
     Progress& progress_;
     std::vector<Group> groups_;
-    uint64_t written_ = 0, stuck_ = 0;
+    uint64_t written_ = 0;
 };
 
 }  // namespace
@@ -303,9 +302,14 @@ Result<BuildReport> buildMeshStore(TriangleMesh input, const std::string& output
     report.nodes = hierarchy.nodes.size();
     report.records = description.records;
     report.contentHash = writer.contentHash();
-    if (builder.stuck() > 0)
+    uint64_t coarsest = 0;
+    for (size_t i = 0; i < hierarchy.nodes.size(); ++i)
+        coarsest += hierarchy.groups[i].parents == 0 ? hierarchy.nodes[i].records : 0;
+    if (coarsest > kManyRoots)
         report.notes.push_back(
-            fmt::format("{} groups of clusters could not be simplified where they stood", builder.stuck()));
+            fmt::format("{} triangles cannot be simplified (many small separate parts): they are "
+                        "drawn whatever the distance",
+                        coarsest));
     report.seconds = nowSeconds() - start;
     return report;
 }

@@ -52,10 +52,9 @@ std::vector<Cluster> makeClusters(const WeldedMesh& mesh, Executor& executor);
 std::vector<std::vector<uint32_t>> groupClusters(const WeldedMesh& mesh, const std::vector<Cluster>& clusters,
                                                  uint32_t size, Executor& executor);
 
-/// A bound, lattice units, on the distance between two surfaces over the same vertices, both ways; and on how far a
-/// texture is shifted along the surface where `mesh` is textured. Not above what is true by more than a fifth, save on
-/// slivers; not below `unimportant`, which saves looking closer.
-double boundDeviation(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& coarse,
-                      double unimportant);
+/// Lattice units: the distance between the surface of `local` and its simplification, both ways, and how far a texture
+/// is shifted along it where `mesh` is textured. Not below `unimportant`, which saves looking closer.
+double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& coarse,
+                        double unimportant);
 
 }  // namespace stipple::lod
