@@ -109,7 +109,9 @@ class Selector {
             cut_.counters.nodesCulled = cut_.counters.nodesMissing = cut_.counters.nodesDrawn = 0;
             cut_.tauEffective = 0;
             for (size_t i = 0; i < instances_.size(); ++i) emit(i, step);
-            if (cut_.counters.recordsDrawn + cut_.counters.trianglesDrawn <= budgets_.records || step >= kLargestTauStep) break;
+            if (cut_.counters.recordsDrawn + cut_.counters.trianglesDrawn <= budgets_.records ||
+                step >= kLargestTauStep)
+                break;
         }
         cut_.tauEffective =
             std::max(cut_.tauEffective, step == target ? tau : std::exp2(double(step) / kStepsPerOctave));
@@ -267,7 +269,8 @@ class Selector {
         for (uint32_t index = 0; index < h.nodes.size(); ++index) {
             const MeshGroup& group = h.groups[index];
             bool isReached = true;
-            for (uint32_t k = 0; k < group.parents; ++k) isReached = isReached && state[h.parents[group.firstParent + k]];
+            for (uint32_t k = 0; k < group.parents; ++k)
+                isReached = isReached && state[h.parents[group.firstParent + k]];
             if (!isReached) continue;
             ++cut_.counters.nodesVisited;
             const int32_t epsilon = epsilonOf(i, local, index, kInside);
@@ -323,7 +326,8 @@ class Selector {
             const bool isExact = run.producer == MeshRun::kOriginal;
             // A producer that no view asked about was not looked at: its own error is smaller still.
             const double pixels =
-                isExact ? 0 : pixelsOf(h.nodes[run.producer].errorCode, epsilonOf(instance, local, run.producer, kInside));
+                isExact ? 0
+                        : pixelsOf(h.nodes[run.producer].errorCode, epsilonOf(instance, local, run.producer, kInside));
             cut_.meshDraw.push_back(
                 {instance, index, run.firstCluster, run.clusters, run.triangles, static_cast<float>(pixels)});
             cut_.counters.trianglesDrawn += run.triangles;

@@ -26,7 +26,7 @@ struct StoreDescription {
     bool isReflectance = false;             ///< those are of the material, to be lit
     bool hasNormals = false;                ///< from the file or estimated
     std::vector<shared::SurfaceMaterial> materials;  ///< of a mesh store
-    std::string source;                     ///< file names of the input, without folders
+    std::string source;                              ///< file names of the input, without folders
 };
 
 std::string describeAsText(const StoreDescription& description);

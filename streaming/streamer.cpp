@@ -72,7 +72,7 @@ Streamer::~Streamer() {
 }
 
 void Streamer::addSource(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source, std::string name,
-                           ChunkFinish finish) {
+                         ChunkFinish finish) {
     sources_.push_back({&hierarchy, std::move(source), std::move(name),
                         std::make_shared<const ChunkFinish>(std::move(finish)),
                         std::vector<NodeState>(hierarchy.nodes.size())});
@@ -197,10 +197,10 @@ void Streamer::request(const lod::Cut& cut) {
         ++counters_.inFlight;
         ++counters_.requests;
         const std::string where = fmt::format("{}: chunk of node {}", source.name, w.node);
-        executor_.run([key, where, bytes = source.bytes, h = source.hierarchy, finish = source.finish,
-                       queue = completed_] {
-            queue->push({key, fetch(*bytes, *h, key.node, *finish, where)});
-        });
+        executor_.run(
+            [key, where, bytes = source.bytes, h = source.hierarchy, finish = source.finish, queue = completed_] {
+                queue->push({key, fetch(*bytes, *h, key.node, *finish, where)});
+            });
     }
 }
 

@@ -66,7 +66,7 @@ class Streamer {
     /// One more store to stream from; `hierarchy` must outlive the streamer. `finish` (may be empty) is called with
     /// every decoded chunk on the thread that decoded it.
     void addSource(const lod::Hierarchy& hierarchy, std::shared_ptr<const ByteSource> source, std::string name,
-                     ChunkFinish finish = {});
+                   ChunkFinish finish = {});
     /// Takes in what workers finished since the last call.
     void collect();
     /// Uploads arrived chunks within the budgets, evicting if needed.

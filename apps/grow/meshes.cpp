@@ -114,7 +114,8 @@ std::array<scene::Primitive, 2> building(const MeshOptions& o) {
     constexpr int kFloors = 8, kBays = 10, kSides = 4;
     constexpr double kBay = 3, kFloor = 3.2, kDepth = 0.25;
     constexpr double kPanels = double(kFloors) * kBays * kSides * 9 + 2;
-    const auto n = std::max<uint32_t>(1, static_cast<uint32_t>(std::lround(std::sqrt(double(o.triangles) / (2 * kPanels)))));
+    const auto n =
+        std::max<uint32_t>(1, static_cast<uint32_t>(std::lround(std::sqrt(double(o.triangles) / (2 * kPanels)))));
     const double width = kBays * kBay, height = kFloors * kFloor;
     for (int s = 0; s < kSides; ++s) {
         const std::array<glm::dvec3, 4> along{glm::dvec3(1, 0, 0), glm::dvec3(0, 0, -1), glm::dvec3(-1, 0, 0),
@@ -130,7 +131,7 @@ std::array<scene::Primitive, 2> building(const MeshOptions& o) {
                 addPanel(walls, at(x1, 0, 0), a * (kBay - x1), up * kFloor, n);
                 addPanel(walls, at(x0, 0, 0), a * (x1 - x0), up * y0, n);
                 addPanel(walls, at(x0, y1, 0), a * (x1 - x0), up * (kFloor - y1), n);
-                addPanel(walls, at(x0, y0, 0), -out * kDepth, up * (y1 - y0), n);             // reveals
+                addPanel(walls, at(x0, y0, 0), -out * kDepth, up * (y1 - y0), n);  // reveals
                 addPanel(walls, at(x1, y0, kDepth), out * kDepth, up * (y1 - y0), n);
                 addPanel(walls, at(x0, y0, 0), a * (x1 - x0), -out * kDepth, n);
                 addPanel(walls, at(x0, y1, kDepth), a * (x1 - x0), out * kDepth, n);
@@ -164,9 +165,9 @@ Textures growTextures(const MeshOptions& o) {
             const double fine = noise.fbm(u * 40, v * 40, 1.5, 5), coarse = noise.fbm(u * 6, v * 6, 4.5, 4);
             if (o.kind == "terrain") {
                 const double e = 1.0 / n, height = terrainHeight(ground, u, v);
-                const double slope = std::hypot(terrainHeight(ground, u + e, v) - height,
-                                                terrainHeight(ground, u, v + e) - height) /
-                                     (e * kTerrainSize);
+                const double slope =
+                    std::hypot(terrainHeight(ground, u + e, v) - height, terrainHeight(ground, u, v + e) - height) /
+                    (e * kTerrainSize);
                 const double grass = std::clamp(1.6 - 2.2 * slope + 0.8 * (coarse - 0.5), 0.0, 1.0);
                 const double snow = std::clamp((height / kTerrainHeight - 0.66) * 9 + coarse - 0.5, 0.0, 1.0);
                 const double k = 0.7 + 0.6 * (fine - 0.5);
@@ -184,7 +185,8 @@ Textures growTextures(const MeshOptions& o) {
                 t.colour.rgba[i] = isJoint ? rgb(0.66, 0.64, 0.6) : rgb(0.62 * k, 0.33 * k, 0.25 * k);
                 relief[i] = (isJoint ? 0 : 0.6) + 0.2 * fine;
             } else {
-                const double k = 0.45 + 0.35 * coarse + 0.35 * (fine - 0.5), moss = std::clamp(4 * coarse - 2.2, 0.0, 1.0);
+                const double k = 0.45 + 0.35 * coarse + 0.35 * (fine - 0.5),
+                             moss = std::clamp(4 * coarse - 2.2, 0.0, 1.0);
                 t.colour.rgba[i] = rgb(k * (1 - 0.35 * moss), k * (0.97 - 0.05 * moss), k * (0.9 - 0.55 * moss));
                 relief[i] = fine;
             }

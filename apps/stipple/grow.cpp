@@ -40,10 +40,10 @@ uint64_t parseCount(const std::string& text) {
     double value = 0;
     char unit = 0, rest = 0;
     const int got = std::sscanf(text.c_str(), "%lf%c%c", &value, &unit, &rest);
-    const double factor = got == 1                             ? 1
+    const double factor = got == 1                                   ? 1
                           : got == 2 && (unit == 'k' || unit == 'K') ? 1e3
-                          : got == 2 && unit == 'M'            ? 1e6
-                                                               : 0;
+                          : got == 2 && unit == 'M'                  ? 1e6
+                                                                     : 0;
     return value * factor >= 1 && value * factor <= 1e9 ? static_cast<uint64_t>(value * factor) : 0;
 }
 

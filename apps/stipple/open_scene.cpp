@@ -256,7 +256,8 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
     const lod::MeshBuildSettings mesh = meshSettings(scene);
     const std::vector<std::string> notes = scene.notes;
     scene = {};  // its memory is needed
-    STIPPLE_ASSIGN(lod::BuildReport report, lod::buildMeshStore(std::move(triangles), output, mesh, executor, progress));
+    STIPPLE_ASSIGN(lod::BuildReport report,
+                   lod::buildMeshStore(std::move(triangles), output, mesh, executor, progress));
     report.notes.insert(report.notes.begin(), notes.begin(), notes.end());
     return report;
 }

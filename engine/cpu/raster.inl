@@ -19,8 +19,8 @@ struct Fixed {
     const uint64_t key = uint64_t{floatBitsToUint(1.0f / inverseDepth)} << 32 | id;
     // Builtins: std::atomic_ref would be a function of its own, see kernels.inl.
     uint64_t old = __atomic_load_n(&visibility[pixel], __ATOMIC_RELAXED);
-    while (key < old && !__atomic_compare_exchange_n(&visibility[pixel], &old, key, true, __ATOMIC_RELAXED,
-                                                     __ATOMIC_RELAXED)) {
+    while (key < old &&
+           !__atomic_compare_exchange_n(&visibility[pixel], &old, key, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
     }
 }
 
@@ -59,13 +59,17 @@ template <typename Int>
     }
 }
 
-constexpr int64_t kSmallSteps = 40 * 256;        ///< triangles up to this wide are filled in 32 bits
+constexpr int64_t kSmallSteps = 40 * 256;           ///< triangles up to this wide are filled in 32 bits
 constexpr int64_t kLargePixels = int64_t{1} << 14;  ///< from this many pixels on a triangle is shared out by rows
 
 /// Rows [firstRow, lastRow] of a triangle.
 void fillRows(const FrameConstants& f, const Fixed& t, int firstRow, int lastRow, uint64_t* visibility) {
-    const auto least = [](const int64_t* v) { return v[0] < v[1] ? (v[0] < v[2] ? v[0] : v[2]) : (v[1] < v[2] ? v[1] : v[2]); };
-    const auto most = [](const int64_t* v) { return v[0] > v[1] ? (v[0] > v[2] ? v[0] : v[2]) : (v[1] > v[2] ? v[1] : v[2]); };
+    const auto least = [](const int64_t* v) {
+        return v[0] < v[1] ? (v[0] < v[2] ? v[0] : v[2]) : (v[1] < v[2] ? v[1] : v[2]);
+    };
+    const auto most = [](const int64_t* v) {
+        return v[0] > v[1] ? (v[0] > v[2] ? v[0] : v[2]) : (v[1] > v[2] ? v[1] : v[2]);
+    };
     const int64_t minX = least(t.x), maxX = most(t.x), minY = least(t.y), maxY = most(t.y);
     // First and last pixel whose centre lies in the box.
     const int fromX = static_cast<int>((minX + 127) >> 8 < 0 ? 0 : (minX + 127) >> 8);

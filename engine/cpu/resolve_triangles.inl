@@ -35,8 +35,8 @@ void resolveTriangles(const FrameConstants& f, const Tables& tables, const Resol
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const vec3 ray = vec3((float(int(p.pixel[i])) - centreX) * inverseFocal, rayY, 1.0f);
-        const vec2 w = triangleWeights(ray, vec3(c.x[0][i], c.y[0][i], c.z[0][i]), vec3(c.x[1][i], c.y[1][i], c.z[1][i]),
-                                       vec3(c.x[2][i], c.y[2][i], c.z[2][i]));
+        const vec2 w = triangleWeights(ray, vec3(c.x[0][i], c.y[0][i], c.z[0][i]),
+                                       vec3(c.x[1][i], c.y[1][i], c.z[1][i]), vec3(c.x[2][i], c.y[2][i], c.z[2][i]));
         const vec3 n0 = octDecode(c.normal[0][i]), n1 = octDecode(c.normal[1][i]), n2 = octDecode(c.normal[2][i]);
         const float a = 1.0f - w.x - w.y;
         wb[i] = w.x;

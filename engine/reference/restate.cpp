@@ -271,7 +271,7 @@ class ReferenceBackend final : public render::Backend {
                                                       : dvec3(0.2);
                     } else if (f.debugView == shared::kDebugNormals) {
                         colour = 0.5 + 0.5 * dvec3(n.x, -n.y, -n.z);
-                    } else if (f.shade == shared::kShadeLit && f.debugView == shared::kDebugNone) {
+                    } else if ((f.shade & shared::kShadeLit) != 0 && f.debugView == shared::kDebugNone) {
                         colour *= lightOn(n, f);
                     }
                     if (wantAll) {

@@ -21,15 +21,14 @@ shared::DrawMesh makeDrawMesh(const lod::Hierarchy& h, const lod::Instance& inst
     shared::DrawMesh m{};
     const glm::dmat3 axes = cameraFromWorld * instance.rotation;
     const double worldPerStep = instance.scale * h.unit;
-    const glm::dvec3 eye = (glm::transpose(instance.rotation) * (view.eye - instance.translation) / instance.scale -
-                            h.origin) / h.unit;
+    const glm::dvec3 eye =
+        (glm::transpose(instance.rotation) * (view.eye - instance.translation) / instance.scale - h.origin) / h.unit;
     const glm::dvec3 nearest = glm::floor(glm::clamp(eye, glm::dvec3(0), glm::dvec3(0x1p24)));
     m.axisX = glm::vec3(axes[0] * worldPerStep);
     m.axisY = glm::vec3(axes[1] * worldPerStep);
     m.axisZ = glm::vec3(axes[2] * worldPerStep);
-    m.base = glm::vec3(cameraFromWorld *
-                       (instance.translation - view.eye +
-                        instance.rotation * (instance.scale * (h.origin + h.unit * nearest))));
+    m.base = glm::vec3(cameraFromWorld * (instance.translation - view.eye +
+                                          instance.rotation * (instance.scale * (h.origin + h.unit * nearest))));
     m.normalX = glm::vec3(axes[0]);
     m.normalY = glm::vec3(axes[1]);
     m.normalZ = glm::vec3(axes[2]);

@@ -42,7 +42,7 @@ struct DrawList {
 };
 
 struct DrawSettings {
-    bool lit = false;             ///< points; triangles are, unless their material says otherwise
+    bool lit = false;  ///< points; triangles are, unless their material says otherwise
     bool unlitTriangles = false;
     uint32_t debugView = shared::kDebugNone;
     glm::vec3 background{0.02f, 0.02f, 0.025f};  ///< linear

@@ -21,8 +21,8 @@ uint32_t surfaceOf(const Scene& scene, const Primitive& p) {
     if (m.isDoubleSided) surface |= shared::kSurfaceTwoSided;
     if (m.alphaMode != AlphaMode::opaque) surface |= shared::kSurfaceMasked;
     if (m.isUnlit) surface |= shared::kSurfaceUnlit;
-    for (const TextureUse* use : {&m.baseColourTexture, &m.metallicRoughnessTexture, &m.normalTexture,
-                                  &m.occlusionTexture, &m.emissiveTexture})
+    for (const TextureUse* use :
+         {&m.baseColourTexture, &m.metallicRoughnessTexture, &m.normalTexture, &m.occlusionTexture, &m.emissiveTexture})
         if (use->texture >= 0) surface |= shared::kSurfaceTextured;
     return surface;
 }
@@ -49,8 +49,8 @@ shared::TextureSlot slotOf(const Scene& scene, const TextureUse& use, bool isDra
 
 /// Vertices have one set of coordinates: that of the first texture in this order.
 int uvSetOf(const Material& m) {
-    for (const TextureUse* use : {&m.baseColourTexture, &m.normalTexture, &m.metallicRoughnessTexture,
-                                  &m.emissiveTexture, &m.occlusionTexture})
+    for (const TextureUse* use :
+         {&m.baseColourTexture, &m.normalTexture, &m.metallicRoughnessTexture, &m.emissiveTexture, &m.occlusionTexture})
         if (use->texture >= 0) return use->uvSet;
     return 0;
 }

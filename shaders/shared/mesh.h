@@ -95,8 +95,8 @@ SHARED_FN vec2 triangleWeights(vec3 ray, vec3 a, vec3 b, vec3 c) {
 // from the eye. Interpolated normals that just turn away at a silhouette are bent back to it instead of flipped.
 SHARED_FN vec3 surfaceNormal(vec3 n, vec3 face, vec3 ray) {
     const float side = face.x * ray.x + face.y * ray.y + face.z * ray.z > 0.0f ? -1.0f : 1.0f;
-    const float towards = max(side * (n.x * ray.x + n.y * ray.y + n.z * ray.z), 0.0f) /
-                          (ray.x * ray.x + ray.y * ray.y + ray.z * ray.z);
+    const float towards =
+        max(side * (n.x * ray.x + n.y * ray.y + n.z * ray.z), 0.0f) / (ray.x * ray.x + ray.y * ray.y + ray.z * ray.z);
     const vec3 bent = vec3(side * n.x - towards * ray.x, side * n.y - towards * ray.y, side * n.z - towards * ray.z);
     const float length2 = bent.x * bent.x + bent.y * bent.y + bent.z * bent.z;
     const float inverse = length2 > 0.0f ? 1.0f / sqrt(length2) : 0.0f;
