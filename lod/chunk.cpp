@@ -102,6 +102,23 @@ Result<std::vector<T>> decompressArray(const uint8_t* bytes, size_t count, size_
 
 }  // namespace
 
+std::vector<uint8_t> encodeTile(const std::vector<uint32_t>& texels) {
+    std::vector<uint8_t> vertex(meshopt_encodeVertexBufferBound(texels.size(), 4));
+    vertex.resize(meshopt_encodeVertexBuffer(vertex.data(), vertex.size(), texels.data(), texels.size(), 4));
+    return compress(vertex);
+}
+
+Result<Chunk> decodeTile(const uint8_t* bytes, size_t count, const std::string& where) {
+    constexpr size_t kTexels = size_t{shared::kTileEdge} * shared::kTileEdge;
+    STIPPLE_ASSIGN(const std::vector<uint8_t> vertex,
+                   decompress(bytes, count, meshopt_encodeVertexBufferBound(kTexels, 4), where));
+    Chunk chunk;
+    chunk.texels.resize(kTexels);
+    if (meshopt_decodeVertexBuffer(chunk.texels.data(), kTexels, 4, vertex.data(), vertex.size()) != 0)
+        return fail(ErrorKind::input, "a texture tile is damaged", where, "build it again");
+    return chunk;
+}
+
 std::vector<uint8_t> encodeMeshChunk(const Chunk& chunk) {
     constexpr size_t stride = sizeof(shared::MeshVertex);
     std::vector<uint8_t> vertex(meshopt_encodeVertexBufferBound(chunk.vertices.size(), stride));

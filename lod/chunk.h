@@ -20,9 +20,10 @@ struct Chunk {
     std::vector<shared::MeshVertex> vertices;
     std::vector<uint32_t> triangles;
     std::vector<shared::MeshCluster> clusters;
+    std::vector<uint32_t> texels;  ///< of a texture's tile, kTileEdge x kTileEdge
     uint64_t sizeBytes() const {
         return records.size() * sizeof(shared::PointRecord) + vertices.size() * sizeof(shared::MeshVertex) +
-               triangles.size() * sizeof(uint32_t) + clusters.size() * sizeof(shared::MeshCluster);
+               (triangles.size() + texels.size()) * sizeof(uint32_t) + clusters.size() * sizeof(shared::MeshCluster);
     }
 };
 
@@ -31,6 +32,10 @@ std::vector<uint8_t> encodeChunk(const Chunk& chunk);
 /// Decodes a chunk of `records` records. `where` names the place in errors. Allocates no more than `records` justifies.
 Result<Chunk> decodeChunk(const uint8_t* bytes, size_t count, uint32_t records, const std::string& where,
                           bool wantLowBits);
+
+/// A texture tile, kTileEdge x kTileEdge texels.
+std::vector<uint8_t> encodeTile(const std::vector<uint32_t>& texels);
+Result<Chunk> decodeTile(const uint8_t* bytes, size_t count, const std::string& where);
 
 /// The same for a chunk of a mesh store.
 std::vector<uint8_t> encodeMeshChunk(const Chunk& chunk);

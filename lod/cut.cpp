@@ -321,6 +321,7 @@ class Selector {
             if (!isRoot) cut_.tauEffective = std::max(cut_.tauEffective, pixels);
             return false;
         });
+        if (!h.textures.empty()) wantTiles(instance, local);
         uint32_t last = MeshRun::kOriginal;
         drawnRuns(h, [&](uint32_t index, const MeshRun& run) {
             const bool isExact = run.producer == MeshRun::kOriginal;
@@ -334,6 +335,55 @@ class Selector {
             cut_.counters.nodesDrawn += index != last ? 1 : 0;
             last = index;
         });
+    }
+
+    /// Texture tiles that the groups in view can show: of the level whose texels are about a pixel where the group is
+    /// nearest, the part that its texture coordinates cover; and the coarsest level, which stands in for the others.
+    void wantTiles(uint32_t instance, const LocalView& local) {
+        const Hierarchy& h = hierarchyOf(instance);
+        const uint32_t source = instances_[instance].source;
+        std::vector<uint8_t>& seen = scratch_.tileSeen;
+        seen.assign(h.tiles.size(), 0);
+        const auto want = [&](uint32_t tile, float priority) {
+            if (seen[tile]) return;
+            seen[tile] = 1;
+            const auto chunk = static_cast<uint32_t>(h.nodes.size() + tile);
+            if (residency_.drawable[source][chunk])
+                cut_.keep.emplace_back(source, chunk);
+            else
+                cut_.wanted.push_back({source, chunk, priority});
+        };
+        for (uint32_t index = 0; index < h.nodes.size(); ++index) {
+            const MeshGroup& g = h.groups[index];
+            if (scratch_.groupState[index] != kRefined || g.textures == 0) continue;
+            const double nearest =
+                std::max(glm::length(h.nodes[index].centre - local.eye) - h.nodes[index].radius, local.nearPlane);
+            const double uvPerPixel = 0.5 * g.uvPerStep * nearest / local.focal;
+            for (uint32_t k = 0; k < g.textures; ++k) {
+                const shared::TextureInfo& t = h.textures[h.groupTextures[g.firstTexture + k]];
+                const double texels = uvPerPixel * std::max(t.width, t.height);
+                const auto level = static_cast<uint32_t>(
+                    std::clamp(std::floor(std::log2(std::max(texels, 1.0))), 0.0, double(t.levels - 1)));
+                const uint32_t across = shared::tilesAcross(t.width, level),
+                               down = shared::tilesAcross(t.height, level);
+                const auto range = [](float lo, float hi, uint32_t wrap, uint32_t size, uint32_t tiles) {
+                    // Coordinates that wrap around, or may, take the whole row.
+                    const float a = std::floor(lo), texel = 1.0f / static_cast<float>(size);
+                    if (wrap == shared::kWrapMirror || hi - a >= 1 - texel || lo - a <= texel || !(hi - lo < 1))
+                        return std::pair{0u, tiles - 1};
+                    const auto tile = [&](float u) {
+                        const float at = std::clamp(u - a, 0.0f, 1.0f) * static_cast<float>(size);
+                        return std::min(static_cast<uint32_t>(at / shared::kTileTexels), tiles - 1);
+                    };
+                    return std::pair{tile(lo - texel), tile(hi + texel)};
+                };
+                const auto [x0, x1] = range(g.lowU, g.highU, t.wrapU, shared::levelSize(t.width, level), across);
+                const auto [y0, y1] = range(g.lowV, g.highV, t.wrapV, shared::levelSize(t.height, level), down);
+                want(t.firstTile[t.levels - 1], 1e8f);
+                for (uint32_t y = y0; y <= y1; ++y)
+                    for (uint32_t x = x0; x <= x1; ++x) want(t.firstTile[level] + y * across + x, 1.0f);
+            }
+        }
     }
 
     /// True if every ancestor is drawable (a child whose parent's chunk is missing is covered by a coarser ancestor).

@@ -88,7 +88,7 @@ struct CutScratch {
     std::vector<std::vector<int32_t>> epsilon;  ///< per instance and node: allowed error of tau = 1, 1/32 octave codes
     std::vector<std::vector<uint32_t>> stamp;
     std::vector<uint32_t> stack;
-    std::vector<uint8_t> groupState;
+    std::vector<uint8_t> groupState, tileSeen;
     uint32_t frame = 0;
 };
 

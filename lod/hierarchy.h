@@ -69,9 +69,14 @@ struct Hierarchy {
     std::vector<MeshGroup> groups;  ///< one a node
     std::vector<MeshRun> runs;
     std::vector<uint32_t> parents;
+    std::vector<uint32_t> groupTextures;  ///< see MeshGroup
+    std::vector<shared::TextureInfo> textures;
+    std::vector<TextureTile> tiles;  ///< streamed like chunks: tile t is chunk nodes.size() + t
     bool isMesh() const { return !groups.empty(); }
+    size_t chunks() const { return nodes.size() + tiles.size(); }
     /// Bytes of a decoded chunk.
     uint64_t decodedBytes(uint32_t node) const {
+        if (node >= nodes.size()) return uint64_t{shared::kTileEdge} * shared::kTileEdge * 4;
         if (!isMesh()) return uint64_t{nodes[node].records} * 16;
         const MeshGroup& g = groups[node];
         return uint64_t{g.vertices} * sizeof(shared::MeshVertex) + uint64_t{nodes[node].records} * 4 +

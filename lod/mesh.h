@@ -14,6 +14,7 @@
 
 #include "shaders/shared/material.h"
 #include "shaders/shared/mesh.h"
+#include "shaders/shared/texture.h"
 
 namespace stipple::lod {
 
@@ -35,9 +36,27 @@ struct MeshRun {
 };
 
 struct MeshGroup {
-    uint32_t firstRun = 0, runs = 0;        ///< into Hierarchy::runs
-    uint32_t firstParent = 0, parents = 0;  ///< into Hierarchy::parents; none: a root, always refined
-    uint32_t vertices = 0, clusters = 0;    ///< in the chunk
+    uint32_t firstRun = 0, runs = 0;          ///< into Hierarchy::runs
+    uint32_t firstParent = 0, parents = 0;    ///< into Hierarchy::parents; none: a root, always refined
+    uint32_t vertices = 0, clusters = 0;      ///< in the chunk
+    uint32_t firstTexture = 0, textures = 0;  ///< into Hierarchy::groupTextures
+    // What part of them, and how densely: texture coordinates per lattice step where they lie closest together.
+    float lowU = 0, lowV = 0, highU = 0, highV = 0, uvPerStep = 0;
+};
+
+/// One tile of a texture level, in the file.
+struct TextureTile {
+    uint64_t offset = 0, hash = 0;
+    uint32_t bytes = 0, reserved = 0;
+};
+
+enum class TextureKind : uint8_t { colour, normal, data };
+/// A decoded texture on its way into a store; empty: white, or for normals straight up.
+struct TextureImage {
+    TextureKind kind = TextureKind::colour;
+    uint32_t width = 0, height = 0;
+    uint32_t wrapU = shared::kWrapRepeat, wrapV = shared::kWrapRepeat;
+    std::vector<uint32_t> rgba;  ///< 8 bits each; sRGB if a colour
 };
 
 }  // namespace stipple::lod

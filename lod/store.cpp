@@ -115,11 +115,12 @@ Result<std::vector<uint8_t>> readSection(const InputFile& file, const Section& s
 
 /// Of the mesh section: the counts, then groups, runs and parents.
 struct MeshHead {
-    uint64_t groups, runs, parents;
+    uint64_t groups, runs, parents, groupTextures, textures, tiles;
 };
 
 std::vector<uint8_t> meshBytes(const Hierarchy& h) {
-    const MeshHead head{h.groups.size(), h.runs.size(), h.parents.size()};
+    const MeshHead head{h.groups.size(),        h.runs.size(),     h.parents.size(),
+                        h.groupTextures.size(), h.textures.size(), h.tiles.size()};
     std::vector<uint8_t> out;
     const auto append = [&](const void* from, size_t count) {
         const auto* bytes = static_cast<const uint8_t*>(from);
@@ -129,6 +130,9 @@ std::vector<uint8_t> meshBytes(const Hierarchy& h) {
     append(h.groups.data(), h.groups.size() * sizeof(MeshGroup));
     append(h.runs.data(), h.runs.size() * sizeof(MeshRun));
     append(h.parents.data(), h.parents.size() * sizeof(uint32_t));
+    append(h.groupTextures.data(), h.groupTextures.size() * sizeof(uint32_t));
+    append(h.textures.data(), h.textures.size() * sizeof(shared::TextureInfo));
+    append(h.tiles.data(), h.tiles.size() * sizeof(TextureTile));
     return out;
 }
 
@@ -138,8 +142,11 @@ Result<void> readMesh(const std::vector<uint8_t>& bytes, const std::string& path
     if (bytes.size() < sizeof(head)) return bad();
     std::memcpy(&head, bytes.data(), sizeof(head));
     const uint64_t most = bytes.size();  // of each, so that the sums below cannot overflow
-    if (head.groups > most || head.runs > most || head.parents > most ||
-        sizeof(head) + head.groups * sizeof(MeshGroup) + head.runs * sizeof(MeshRun) + head.parents * 4 != bytes.size())
+    if (std::max({head.groups, head.runs, head.parents, head.groupTextures, head.textures, head.tiles}) > most ||
+        sizeof(head) + head.groups * sizeof(MeshGroup) + head.runs * sizeof(MeshRun) +
+                (head.parents + head.groupTextures) * 4 + head.textures * sizeof(shared::TextureInfo) +
+                head.tiles * sizeof(TextureTile) !=
+            bytes.size())
         return bad();
     if (head.groups != 0 && head.groups != h.nodes.size()) return bad();
     const uint8_t* at = bytes.data() + sizeof(head);
@@ -151,6 +158,36 @@ Result<void> readMesh(const std::vector<uint8_t>& bytes, const std::string& path
     take(h.groups, head.groups);
     take(h.runs, head.runs);
     take(h.parents, head.parents);
+    take(h.groupTextures, head.groupTextures);
+    take(h.textures, head.textures);
+    take(h.tiles, head.tiles);
+    return {};
+}
+
+/// Every level of a texture has its tiles, and they lie in the file.
+Result<void> checkTextures(const Store& store, uint64_t chunksEnd) {
+    const Hierarchy& h = store.hierarchy;
+    uint64_t tiles = 0;
+    bool fits = true;
+    for (const shared::TextureInfo& t : h.textures) {
+        fits = fits && t.width > 0 && t.height > 0 && t.width <= 65536 && t.height <= 65536 && t.levels > 0 &&
+               t.levels <= shared::kTextureLevels && t.wrapU <= 2 && t.wrapV <= 2;
+        for (uint32_t l = 0; fits && l < t.levels; ++l) {
+            fits = t.firstTile[l] == tiles;
+            tiles += uint64_t{shared::tilesAcross(t.width, l)} * shared::tilesAcross(t.height, l);
+        }
+    }
+    fits = fits && tiles == h.tiles.size();
+    for (const TextureTile& t : h.tiles) fits = fits && t.offset <= chunksEnd && t.bytes <= chunksEnd - t.offset;
+    for (const uint32_t t : h.groupTextures) fits = fits && t < h.textures.size();
+    for (const MeshGroup& g : h.groups)
+        fits = fits && uint64_t{g.firstTexture} + g.textures <= h.groupTextures.size() &&
+               std::isfinite(g.lowU + g.lowV + g.highU + g.highV + g.uvPerStep);
+    for (const shared::SurfaceMaterial& m : store.description.materials)
+        for (const shared::TextureSlot* slot :
+             {&m.baseTexture, &m.surfaceTexture, &m.normalTexture, &m.occlusionTexture, &m.emissiveTexture})
+            fits = fits && slot->texture <= h.textures.size();
+    if (!fits) return tl::unexpected(damaged(store.path, "the textures of the mesh are not possible"));
     return {};
 }
 
@@ -377,25 +414,36 @@ Result<Store> openStore(const std::string& path) {
     store.contentHash = head.contentHash;
     store.fileBytes = head.fileBytes;
     STIPPLE_TRY(readMesh(mesh, path, h));
+    STIPPLE_TRY(checkTextures(store, head.nodes.offset));
     STIPPLE_TRY(h.isMesh() ? checkGroups(store, head.nodes.offset) : checkNodes(store, head.nodes.offset));
     return store;
 }
 
 Result<Chunk> readChunk(const Store& store, uint32_t index, bool wantLowBits) {
-    const Node& node = store.hierarchy.nodes[index];
+    const ChunkPlace place = chunkPlace(store.hierarchy, index);
     thread_local std::vector<uint8_t> bytes;
-    bytes.resize(node.chunkBytes);
-    STIPPLE_TRY(store.file->readAt(node.chunkOffset, bytes.data(), bytes.size()));
-    const std::string where = fmt::format("{}: chunk of node {} at offset {}", store.path, index, node.chunkOffset);
-    if (hashBytes(bytes.data(), bytes.size()) != node.chunkHash)
+    bytes.resize(place.bytes);
+    STIPPLE_TRY(store.file->readAt(place.offset, bytes.data(), bytes.size()));
+    const std::string where = fmt::format("{}: chunk {} at offset {}", store.path, index, place.offset);
+    if (hashBytes(bytes.data(), bytes.size()) != place.hash)
         return tl::unexpected(damaged(where, "the hash does not match"));
     return decodeNode(store.hierarchy, index, bytes.data(), bytes.size(), where, wantLowBits);
 }
 
-Result<Chunk> decodeNode(const Hierarchy& h, uint32_t node, const uint8_t* bytes, size_t count,
+ChunkPlace chunkPlace(const Hierarchy& h, uint32_t index) {
+    if (index < h.nodes.size()) {
+        const Node& n = h.nodes[index];
+        return {n.chunkOffset, n.chunkHash, n.chunkBytes};
+    }
+    const TextureTile& t = h.tiles[index - h.nodes.size()];
+    return {t.offset, t.hash, t.bytes};
+}
+
+Result<Chunk> decodeNode(const Hierarchy& h, uint32_t index, const uint8_t* bytes, size_t count,
                          const std::string& where, bool wantLowBits) {
-    const uint32_t records = h.nodes[node].records;
-    return h.isMesh() ? decodeMeshChunk(bytes, count, records, h.groups[node], where)
+    if (index >= h.nodes.size()) return decodeTile(bytes, count, where);
+    const uint32_t records = h.nodes[index].records;
+    return h.isMesh() ? decodeMeshChunk(bytes, count, records, h.groups[index], where)
                       : decodeChunk(bytes, count, records, where, wantLowBits);
 }
 

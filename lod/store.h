@@ -48,7 +48,13 @@ class StoreWriter {
 
 /// Reads and checks head, foot, node table and description (not the chunks).
 Result<Store> openStore(const std::string& path);
-/// Decodes the chunk of a node, whatever it holds.
+/// Where a chunk (of a node, or from nodes.size() on of a texture tile) lies in the file.
+struct ChunkPlace {
+    uint64_t offset, hash;
+    uint32_t bytes;
+};
+ChunkPlace chunkPlace(const Hierarchy& h, uint32_t index);
+/// Decodes a chunk, whatever it holds.
 Result<Chunk> decodeNode(const Hierarchy& h, uint32_t node, const uint8_t* bytes, size_t count,
                          const std::string& where, bool wantLowBits);
 /// Reads one chunk, checks its hash, decodes it.

@@ -109,6 +109,11 @@ Result<VerifyReport> verifyStore(const Store& store, Executor& executor) {
                     leafRecords += run.triangles;
         }
     });
+    executor.parallelFor(h.tiles.size(), 1, [&](size_t begin, size_t end) {
+        for (size_t t = begin; t < end; ++t)
+            if (const auto tile = readChunk(store, static_cast<uint32_t>(h.nodes.size() + t)); !tile)
+                problems.push({h.nodes.size() + t, tile.error()});
+    });
     auto found = problems.takeAll();
     if (!found.empty())
         return tl::unexpected(std::min_element(found.begin(), found.end(), [](const auto& a, const auto& b) {

@@ -28,16 +28,17 @@ constexpr uint64_t kRetryFrames = 120;
 
 Result<lod::Chunk> fetch(const ByteSource& source, const lod::Hierarchy& h, uint32_t index, const ChunkFinish& finish,
                          const std::string& where) {
-    const lod::Node& node = h.nodes[index];
-    const size_t attributeBytes = finish.wantsAttributes ? node.attributeBytes : 0;
-    std::vector<uint8_t> bytes(node.chunkBytes + attributeBytes);
-    STIPPLE_TRY(source.read(node.chunkOffset, bytes.data(), bytes.size()));
-    const uint8_t* const attributes = bytes.data() + node.chunkBytes;
-    if (hashBytes(bytes.data(), node.chunkBytes) != node.chunkHash ||
-        (finish.wantsAttributes && hashBytes(attributes, attributeBytes) != node.attributeHash))
+    const lod::ChunkPlace place = lod::chunkPlace(h, index);
+    const bool wantsAttributes = finish.wantsAttributes && index < h.nodes.size();
+    const size_t attributeBytes = wantsAttributes ? h.nodes[index].attributeBytes : 0;
+    std::vector<uint8_t> bytes(place.bytes + attributeBytes);
+    STIPPLE_TRY(source.read(place.offset, bytes.data(), bytes.size()));
+    const uint8_t* const attributes = bytes.data() + place.bytes;
+    if (hashBytes(bytes.data(), place.bytes) != place.hash ||
+        (wantsAttributes && hashBytes(attributes, attributeBytes) != h.nodes[index].attributeHash))
         return fail(ErrorKind::input, "the hash of a chunk does not match", where,
                     "the store is damaged; build it again");
-    STIPPLE_ASSIGN(lod::Chunk chunk, lod::decodeNode(h, index, bytes.data(), node.chunkBytes, where, false));
+    STIPPLE_ASSIGN(lod::Chunk chunk, lod::decodeNode(h, index, bytes.data(), place.bytes, where, false));
     if (finish.apply) STIPPLE_TRY(finish.apply(index, chunk, attributes, attributeBytes));
     return chunk;
 }
@@ -75,8 +76,8 @@ void Streamer::addSource(const lod::Hierarchy& hierarchy, std::shared_ptr<const 
                          ChunkFinish finish) {
     sources_.push_back({&hierarchy, std::move(source), std::move(name),
                         std::make_shared<const ChunkFinish>(std::move(finish)),
-                        std::vector<NodeState>(hierarchy.nodes.size())});
-    drawable_.emplace_back(hierarchy.nodes.size(), uint8_t{0});
+                        std::vector<NodeState>(hierarchy.chunks())});
+    drawable_.emplace_back(hierarchy.chunks(), uint8_t{0});
 }
 
 void Streamer::setState(ChunkKey key, ChunkState to) {
@@ -97,7 +98,7 @@ void Streamer::collect() {
             continue;
         }
         setState(arrival.key, ChunkState::arrived);
-        counters_.bytesStreamed += sources_[arrival.key.source].hierarchy->nodes[arrival.key.node].chunkBytes;
+        counters_.bytesStreamed += lod::chunkPlace(*sources_[arrival.key.source].hierarchy, arrival.key.node).bytes;
         arrived_.push_back(std::move(arrival));
     }
 }
@@ -137,6 +138,7 @@ void Streamer::upload() {
 void Streamer::countInParents(ChunkKey key, int change) {
     Source& source = sources_[key.source];
     const lod::Hierarchy& h = *source.hierarchy;
+    if (key.node >= h.nodes.size()) return;  // a texture tile
     const auto count = [&](uint32_t parent) {
         uint16_t& children = source.nodes[parent].residentChildren;
         children = static_cast<uint16_t>(children + change);
@@ -166,7 +168,8 @@ bool Streamer::makeRoom(uint64_t bytes) {
         for (uint32_t i = 0; i < sources_.size(); ++i)
             for (uint32_t n = 1; n < sources_[i].nodes.size(); ++n) {
                 const NodeState& s = sources_[i].nodes[n];
-                if (sources_[i].hierarchy->isMesh() && sources_[i].hierarchy->groups[n].parents == 0) continue;
+                const lod::Hierarchy& h = *sources_[i].hierarchy;
+                if (h.isMesh() && n < h.nodes.size() && h.groups[n].parents == 0) continue;
                 if (s.state != ChunkState::resident || s.residentChildren != 0 || s.lastUsed >= oldestUse) continue;
                 oldestUse = s.lastUsed;
                 oldest = {i, n};
@@ -196,7 +199,7 @@ void Streamer::request(const lod::Cut& cut) {
         setState(key, ChunkState::requested);
         ++counters_.inFlight;
         ++counters_.requests;
-        const std::string where = fmt::format("{}: chunk of node {}", source.name, w.node);
+        const std::string where = fmt::format("{}: chunk {}", source.name, w.node);
         executor_.run(
             [key, where, bytes = source.bytes, h = source.hierarchy, finish = source.finish, queue = completed_] {
                 queue->push({key, fetch(*bytes, *h, key.node, *finish, where)});

@@ -124,11 +124,20 @@ Result<lod::Instance> placeOf(const glm::dmat4& m, const std::string& where) {
     return place;
 }
 
-lod::MeshBuildSettings meshSettings(const scene::Scene& scene) {
+Result<lod::MeshBuildSettings> meshSettings(const scene::Scene& scene) {
     lod::MeshBuildSettings settings;
     settings.description.source = fs::path(scene.path).filename().string();
     settings.description.up = {0, 1, 0};
     settings.description.materials = scene::surfaceMaterials(scene);
+    settings.textures = scene::textureImages(scene);
+    STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene));
+    for (size_t t = 0; t < settings.textures.size(); ++t) {
+        const int image = scene.textures[t].image;
+        if (image < 0) continue;
+        settings.textures[t].width = images[static_cast<size_t>(image)].width;
+        settings.textures[t].height = images[static_cast<size_t>(image)].height;
+        settings.textures[t].rgba = images[static_cast<size_t>(image)].rgba;
+    }
     return settings;
 }
 
@@ -145,9 +154,9 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
         if (holds(scene, p, scene::PrimitiveKind::triangles)) byMesh[p.mesh].push_back(p);
     std::vector<scene::Placement> once;
     const auto make = [&](const std::vector<scene::Placement>& of) {
-        return [&](const std::string& path, Progress& progress) {
-            return lod::buildMeshStore(scene::flattenTriangles(scene, of), path, meshSettings(scene), executor,
-                                       progress);
+        return [&](const std::string& path, Progress& progress) -> Result<lod::BuildReport> {
+            STIPPLE_ASSIGN(const lod::MeshBuildSettings settings, meshSettings(scene));
+            return lod::buildMeshStore(scene::flattenTriangles(scene, of), path, settings, executor, progress);
         };
     };
     for (const auto& [mesh, places] : byMesh) {
@@ -253,7 +262,7 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
     STIPPLE_ASSIGN(scene::Scene scene, scene::readScene(inputs.front()));
     lod::TriangleMesh triangles = scene::flattenTriangles(scene, scene::placements(scene));
     if (triangles.indices.empty()) return lod::buildStore(inputs, output, settings, executor, progress);
-    const lod::MeshBuildSettings mesh = meshSettings(scene);
+    STIPPLE_ASSIGN(const lod::MeshBuildSettings mesh, meshSettings(scene));
     const std::vector<std::string> notes = scene.notes;
     scene = {};  // its memory is needed
     STIPPLE_ASSIGN(lod::BuildReport report,

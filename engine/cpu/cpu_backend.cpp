@@ -44,6 +44,7 @@ Tables makeTables() {
     Tables t{};
     for (uint32_t i = 0; i < 256; ++i) {
         t.radiusFraction.at(i) = shared::radiusFraction(i);
+        t.unit.at(i) = static_cast<float>(i) / 255.0f;
         t.linear.at(i) = shared::linearFromSrgb(static_cast<float>(i) / 255.0f);
         const float root = std::sqrt(shared::linearFromSrgb(static_cast<float>(i) / 255.0f));
         t.red.at(i) = static_cast<uint32_t>(root * 2047.0f + 0.5f);
@@ -68,10 +69,18 @@ class CpuBackend final : public render::Backend {
         return std::string("cpu ") + k_.name + ", " + std::to_string(executor_.threads()) + " threads";
     }
     Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override {
-        chunks_[chunkId(key)] = chunk;
+        const lod::Chunk& kept = chunks_[chunkId(key)] = chunk;
+        if (!kept.texels.empty()) {
+            if (tiles_.size() <= key.source) tiles_.resize(key.source + 1);
+            if (tiles_[key.source].size() <= key.node) tiles_[key.source].resize(key.node + 1);
+            tiles_[key.source][key.node] = kept.texels.data();
+        }
         return {};
     }
-    void evict(streaming::ChunkKey key) override { chunks_.erase(chunkId(key)); }
+    void evict(streaming::ChunkKey key) override {
+        if (key.source < tiles_.size() && key.node < tiles_[key.source].size()) tiles_[key.source][key.node] = nullptr;
+        chunks_.erase(chunkId(key));
+    }
     const std::vector<render::PassTime>& passTimes() const override { return times_; }
 
     Result<void> render(const render::RenderRequest& request, render::Image& image) override {
@@ -167,13 +176,21 @@ class CpuBackend final : public render::Backend {
 
     void rasterise() {
         meshBlocks_.clear();
+        textureSets_.clear();
+        for (const render::MeshTextures& t : draws_->meshTextures) {
+            if (t.tiles > 0) {  // tiles that never came are null
+                if (tiles_.size() <= t.source) tiles_.resize(t.source + 1);
+                if (tiles_[t.source].size() < t.firstChunk + t.tiles) tiles_[t.source].resize(t.firstChunk + t.tiles);
+            }
+            textureSets_.push_back({t.infos.data(), t.tiles > 0 ? tiles_[t.source].data() + t.firstChunk : nullptr});
+        }
         for (const render::MeshDraw& draw : draws_->meshDraws) {
             const lod::Chunk& chunk = chunks_.at(chunkId(draw.key));
             for (uint32_t c = 0; c < draw.clusters; ++c) {
                 const shared::MeshCluster& cluster = chunk.clusters[draw.firstCluster + c];
                 meshBlocks_.push_back({chunk.vertices.data() + cluster.firstVertex,
                                        chunk.triangles.data() + cluster.firstTriangle, &draws_->meshes[draw.mesh],
-                                       cluster.counts, draw.level, draw.errorPixels});
+                                       &textureSets_[draw.mesh], cluster.counts, draw.level, draw.errorPixels});
             }
         }
         large_.clear();
@@ -214,16 +231,31 @@ class CpuBackend final : public render::Backend {
             });
     }
 
+    /// Planes that only triangles need, and only those with a shining material.
+    void preparePlanes(size_t pixels) {
+        const auto fit = [&](HugeBuffer<uint32_t>& plane, size_t& size, bool isNeeded) {
+            if (isNeeded && size != pixels) {
+                plane.assign(pixels, 0);
+                size = pixels;
+            }
+        };
+        hasTriangles_ = !draws_->meshDraws.empty();
+        hasEmissive_ = false;
+        for (const shared::SurfaceMaterial& m : draws_->materials)
+            hasEmissive_ = hasEmissive_ || (hasTriangles_ && m.emissive.x + m.emissive.y + m.emissive.z > 0);
+        fit(surface_, surfacePixels_, hasTriangles_);
+        fit(emissive_, emissivePixels_, hasEmissive_);
+    }
+    SurfacePlanes planesAt(size_t pixel) {
+        return {hasTriangles_ ? surface_.data() + pixel : nullptr, hasEmissive_ ? emissive_.data() + pixel : nullptr};
+    }
+
     /// Level 0 from the visibility buffer; with a pyramid, level 1 on the way.
     void resolve(bool hasPyramid) {
         Level& fine = levels_[0];
         Level* coarse = hasPyramid && levels_.size() > 1 ? &levels_[1] : nullptr;
         const Planes finePlanes = fine.planes();
-        hasTriangles_ = !draws_->meshDraws.empty();
-        if (hasTriangles_ && surfacePixels_ != size_t{fine.width} * fine.height) {
-            surfacePixels_ = size_t{fine.width} * fine.height;
-            surface_.assign(surfacePixels_, 0);
-        }
+        preparePlanes(size_t{fine.width} * fine.height);
         const ResolveInput input{blocks_.data(), meshBlocks_.data(), draws_->materials.data()};
         std::atomic<float> largestRadius{0};
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
@@ -240,7 +272,7 @@ class CpuBackend final : public render::Backend {
                     }
                     const size_t at = size_t{yy} * fine.width + x0;
                     const bool has = k_.resolveRow(frame_, tables_, input, visibility_.data() + at, x0, yy, n, *row,
-                                                   largest, hasTriangles_ ? surface_.data() + at : nullptr);
+                                                   largest, planesAt(at));
                     if (has)
                         k_.packRow(*row, n, finePlanes.at(at));
                     else
@@ -374,7 +406,7 @@ class CpuBackend final : public render::Backend {
         const Planes planes = fine.planes();
         const auto shadeRow = [&](uint32_t x0, uint32_t n, uint32_t y, const TexelRow& own, const TexelRow& row) {
             const size_t at = size_t{y} * fine.width + x0;
-            k_.shadeRow(frame_, tables_, own, row, hasTriangles_ ? surface_.data() + at : nullptr, x0, y, n,
+            k_.shadeRow(frame_, tables_, own, row, planesAt(at), draws_->lights.data(), x0, y, n,
                         {image_->rgba.data() + at, wantAll_ ? image_->depth.data() + at : nullptr,
                          wantAll_ ? image_->normal.data() + 3 * at : nullptr,
                          wantAll_ ? image_->linear.data() + 3 * at : nullptr});
@@ -403,9 +435,11 @@ class CpuBackend final : public render::Backend {
     std::vector<MeshBlock> meshBlocks_;
     std::vector<LargeTriangle> large_;
     CompletionQueue<std::vector<LargeTriangle>> found_;
-    HugeBuffer<uint32_t> surface_;  ///< what a triangle's pixel is made of; only where triangles are drawn
-    size_t surfacePixels_ = 0;
-    bool hasTriangles_ = false;
+    std::vector<TextureSet> textureSets_;
+    std::vector<std::vector<const uint32_t*>> tiles_;  ///< by source and chunk; null: not resident
+    HugeBuffer<uint32_t> surface_, emissive_;
+    size_t surfacePixels_ = 0, emissivePixels_ = 0;
+    bool hasTriangles_ = false, hasEmissive_ = false;
     std::vector<BlockSource> blocks_;
     std::vector<render::PassTime> times_;
     const render::DrawList* draws_ = nullptr;

@@ -9,6 +9,7 @@
 #include "shaders/shared/material.h"
 #include "shaders/shared/mesh.h"
 #include "shaders/shared/record.h"
+#include "shaders/shared/texture.h"
 
 namespace stipple::cpu {
 
@@ -41,11 +42,18 @@ struct BlockSource {
     const shared::DrawNode* node;
 };
 
+/// Textures of one store; a tile that is not resident is null.
+struct TextureSet {
+    const shared::TextureInfo* infos;
+    const uint32_t* const* tiles;
+};
+
 /// One cluster of a mesh: one block of draw ids.
 struct MeshBlock {
     const shared::MeshVertex* vertices;
     const uint32_t* triangles;
     const shared::DrawMesh* mesh;
+    const TextureSet* textures;
     uint32_t counts;  ///< vertices | triangles << 16
     uint32_t level;
     float errorPixels;
@@ -62,8 +70,13 @@ struct LargeSink {
     void (*keep)(void* context, const LargeTriangle& triangle);
 };
 
-/// Flags of a pixel's surface word: kSurfaceUnlit of mesh.h, and
-constexpr uint32_t kSurfaceIsTriangle = 0x80000000u;
+/// What a triangle's pixel is made of beside colour and normal: metallic 8 | roughness 8 | occlusion 8 | flags.
+constexpr uint32_t kPixelTriangle = 0x80000000u, kPixelUnlit = 0x40000000u;
+/// Planes over the whole image, only where triangles are drawn; `emissive` only where a material shines.
+struct SurfacePlanes {
+    uint32_t* surface;
+    uint32_t* emissive;  ///< packColour
+};
 
 /// Look-up tables that the kernels share.
 struct Tables {
@@ -71,6 +84,7 @@ struct Tables {
     std::array<uint32_t, 256> red, green, blue;  ///< sRGB byte -> its bits of the packed colour
     std::array<uint32_t, 2048> srgbByte;         ///< sqrt(linear) * 2047 -> sRGB byte
     std::array<float, 256> linear;               ///< sRGB byte -> linear
+    std::array<float, 256> unit;                 ///< byte / 255
 };
 
 /// What the passes after coverage read of the frame beside records.
@@ -92,10 +106,10 @@ struct Kernels {
                          const shared::PointRecord* records, uint32_t count, uint32_t* pixel, uint32_t* depth);
     /// Decodes the winners of `n` pixels of row `y` from `x0` on; clears the visibility entries. False if all are
     /// empty.
-    /// `surface` (null without triangles): one word a pixel, 0 where no triangle is seen.
+    /// `planes`: from the row's first pixel on; null without triangles, 0 where none is seen.
     bool (*resolveRow)(const shared::FrameConstants& f, const Tables& tables, const ResolveInput& in,
                        uint64_t* visibility, uint32_t x0, uint32_t y, uint32_t n, TexelRow& row, float& largestRadius,
-                       uint32_t* surface);
+                       const SurfacePlanes& planes);
     void (*packRow)(const TexelRow& row, uint32_t n, const Planes& to);
     void (*unpackRow)(const Planes& from, uint32_t first, uint32_t n, TexelRow& row);
     void (*pullRow)(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float inverseFocal,
@@ -106,7 +120,8 @@ struct Kernels {
     /// Doubles the entries of a coarse row (-1 to (n + 1) / 2) along x.
     void (*expandRow)(const TexelRow& coarse, uint32_t n, TexelRow& nearest, TexelRow& beside);
     void (*shadeRow)(const shared::FrameConstants& f, const Tables& tables, const TexelRow& own, const TexelRow& row,
-                     const uint32_t* surface, uint32_t x0, uint32_t y, uint32_t n, const ShadeOutput& out);
+                     const SurfacePlanes& planes, const shared::LightSource* lights, uint32_t x0, uint32_t y,
+                     uint32_t n, const ShadeOutput& out);
     /// Offers the triangles of one cluster (ids from firstId on) to the visibility buffer.
     void (*rasterCluster)(const shared::FrameConstants& f, const shared::DrawMesh& mesh,
                           const shared::MeshVertex* vertices, uint32_t vertexCount, const uint32_t* triangles,

@@ -80,12 +80,15 @@ struct Gathered {
     alignas(64) uint32_t normal[kTile], colour[kTile], flags[kTile];
 };
 
+#include "engine/cpu/sample.inl"
+
 #include "engine/cpu/resolve_triangles.inl"
 
 bool resolveRow(const FrameConstants& frame, const Tables& tables, const ResolveInput& in, uint64_t* visibility,
                 uint32_t x0, uint32_t y, uint32_t n, TexelRow& __restrict row, float& largestRadius,
-                uint32_t* surface) {
+                const SurfacePlanes& planes) {
     const BlockSource* const blocks = in.blocks;
+    uint32_t* const surface = planes.surface;
     const FrameConstants f = frame;
     constexpr size_t kPrefetch = 12;  // pixels ahead: records lie anywhere in memory
     Gathered g;
@@ -144,7 +147,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) row.depth[kPad + i] = 0;
         if (triangles.count == 0) return false;
-        resolveTriangles(f, tables, in, triangles, x0, y, row, surface);
+        resolveTriangles(f, tables, in, triangles, x0, y, row, planes);
         return true;
     }
     uint largest = 0;  // as bits: positive floats sort like integers
@@ -177,7 +180,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         largest = bits > largest ? bits : largest;
     }
     largestRadius = max(largestRadius, uintBitsToFloat(largest));
-    if (triangles.count > 0) resolveTriangles(f, tables, in, triangles, x0, y, row, surface);
+    if (triangles.count > 0) resolveTriangles(f, tables, in, triangles, x0, y, row, planes);
     return true;
 }
 
@@ -264,18 +267,26 @@ void pushRow(const TexelRow& __restrict fine, const ExpandedRow& __restrict near
     }
 }
 
+#include "engine/cpu/shade_triangles.inl"
+
 void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow& __restrict own,
-              const TexelRow& __restrict row, const uint32_t* __restrict surface, uint32_t x0, uint32_t y, uint32_t n,
+              const TexelRow& __restrict row, const SurfacePlanes& planes, const LightSource* lights, uint32_t x0, uint32_t y, uint32_t n,
               const ShadeOutput& out) {
     const FrameConstants f = frame;
+    const uint32_t* const surface = planes.surface;
     const bool lit = (surface != nullptr || (f.shade & kShadeLit) != 0) && f.debugView == kDebugNone;
     alignas(64) float share[kTile];  // of the light: 0 where a pixel keeps its colour
+    alignas(64) uint32_t mask[kTile];  // pixels of triangles to be lit
+    bool anyLit = false;
     const float points = (f.shade & kShadeLit) != 0 ? 1.0f : 0.0f,
                 triangles = (f.shade & kShadeTriangles) != 0 ? 1.0f : 0.0f;
     for (size_t i = 0; lit && i < n; ++i) {
         // A triangle's pixel that no splat stands in front of.
         const bool isTriangle = surface != nullptr && surface[i] != 0 && row.depth[kPad + i] == own.depth[kPad + i];
-        share[i] = !isTriangle ? points : (surface[i] & kSurfaceUnlit) != 0 ? 0.0f : triangles;
+        const bool isLit = isTriangle && (surface[i] & kPixelUnlit) == 0 && triangles > 0;
+        share[i] = isTriangle ? 0.0f : points;
+        mask[i] = isLit ? 1 : 0;
+        anyLit = anyLit || isLit;
     }
     const float inverseFocal = 1.0f / f.focal;
     const float vy = (float(int(y)) + 0.5f - f.centre.y) * inverseFocal;
@@ -287,7 +298,7 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
         green[i] = row.green[at];
         blue[i] = row.blue[at];
     }
-    if (lit) {
+    if (lit && points > 0) {
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
             const size_t at = kPad + i;
@@ -301,6 +312,7 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
             blue[i] *= light;
         }
     }
+    if (anyLit) shadeTriangles(f, row, planes, lights, mask, x0, vy, n, red, green, blue);
     if (f.debugView == kDebugHoles || f.debugView == kDebugNormals || out.normal != nullptr) {
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {

@@ -13,7 +13,7 @@ struct Corners {
 };
 
 void resolveTriangles(const FrameConstants& f, const Tables& tables, const ResolveInput& in, const TrianglePixels& p,
-                      uint32_t x0, uint32_t y, TexelRow& __restrict row, uint32_t* surface) {
+                      uint32_t x0, uint32_t y, TexelRow& __restrict row, const SurfacePlanes& planes) {
     Corners c;
     alignas(64) float nx[kTile], ny[kTile], nz[kTile], wb[kTile], wc[kTile];
     const size_t n = p.count;
@@ -59,7 +59,37 @@ void resolveTriangles(const FrameConstants& f, const Tables& tables, const Resol
         const vec3 e1 = vec3(c.x[1][i] - c.x[0][i], c.y[1][i] - c.y[0][i], c.z[1][i] - c.z[0][i]);
         const vec3 e2 = vec3(c.x[2][i] - c.x[0][i], c.y[2][i] - c.y[0][i], c.z[2][i] - c.z[0][i]);
         const vec3 face = vec3(e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x);
+        const float a = 1.0f - wb[i] - wc[i], b = wb[i], g = wc[i];
         normal = (va.surface & kSurfaceFlat) != 0 ? face : normal;
+        vec3 colour = material.baseColour, emissive = material.emissive;
+        float metallic = material.metallic, roughness = material.roughness, occlusion = 1.0f;
+        if ((va.surface & kSurfaceTextured) != 0) {
+            const float u = a * va.u + b * vb.u + g * vc.u, v = a * va.v + b * vb.v + g * vc.v;
+            const float u1 = vb.u - va.u, v1 = vb.v - va.v, u2 = vc.u - va.u, v2 = vc.v - va.v;
+            const float footprint = uvFootprint(ray, inverseFocal, vec3(c.x[0][i], c.y[0][i], c.z[0][i]), e1, e2,
+                                                vec2(u1, v1), vec2(u2, v2));
+            const TextureSet& set = *block.textures;
+            Sampled s{};
+            if (material.baseTexture.texture != 0 &&
+                sampleTexture(tables, set, material.baseTexture, u, v, footprint, s))
+                colour = vec3(colour.x * s.r, colour.y * s.g, colour.z * s.b);
+            if (material.surfaceTexture.texture != 0 &&
+                sampleTexture(tables, set, material.surfaceTexture, u, v, footprint, s)) {
+                roughness *= s.g;
+                metallic *= s.b;
+            }
+            if (material.occlusionTexture.texture != 0 &&
+                sampleTexture(tables, set, material.occlusionTexture, u, v, footprint, s))
+                occlusion = 1.0f + material.occlusionStrength * (s.r - 1.0f);
+            if (material.emissiveTexture.texture != 0 &&
+                sampleTexture(tables, set, material.emissiveTexture, u, v, footprint, s))
+                emissive = vec3(emissive.x * s.r, emissive.y * s.g, emissive.z * s.b);
+            if (material.normalTexture.texture != 0 &&
+                sampleTexture(tables, set, material.normalTexture, u, v, footprint, s))
+                normal = bumpedNormal(normal, e1, e2, vec2(u1, v1), vec2(u2, v2),
+                                      vec3((2.0f * s.r - 1.0f) * material.normalScale,
+                                           (2.0f * s.g - 1.0f) * material.normalScale, 2.0f * s.b - 1.0f));
+        }
         normal = surfaceNormal(normal, face, ray);
         Texel texel;
         texel.depth = p.depth[i];
@@ -68,8 +98,7 @@ void resolveTriangles(const FrameConstants& f, const Tables& tables, const Resol
         texel.offset = vec2(0.0f, 0.0f);
         const float inverseRay = 1.0f / std::sqrt(ray.x * ray.x + ray.y * ray.y + 1.0f);
         texel.normalPerp = perpFromNormal(normal, vec3(ray.x * inverseRay, ray.y * inverseRay, inverseRay));
-        const float a = 1.0f - wb[i] - wc[i], b = wb[i], g = wc[i];
-        texel.colour = material.baseColour;
+        texel.colour = colour;
         if ((va.colour & vb.colour & vc.colour & 0xffffffu) != 0xffffffu) {
             const auto mix = [&](uint32_t shift) {
                 return a * tables.linear[va.colour >> shift & 255u] + b * tables.linear[vb.colour >> shift & 255u] +
@@ -80,6 +109,9 @@ void resolveTriangles(const FrameConstants& f, const Tables& tables, const Resol
         if (f.debugView == kDebugLevel) texel.colour = debugLevelColour(block.level);
         if (f.debugView == kDebugError) texel.colour = debugErrorColour(block.errorPixels);
         setTexel(row, kPad + p.pixel[i], texel);
-        surface[p.pixel[i]] = kSurfaceIsTriangle | (va.surface & kSurfaceUnlit);
+        const auto byte = [](float value) { return uint32_t(int(min(max(value, 0.0f), 1.0f) * 255.0f + 0.5f)); };
+        planes.surface[p.pixel[i]] = kPixelTriangle | ((va.surface & kSurfaceUnlit) != 0 ? kPixelUnlit : 0u) |
+                                     byte(metallic) | byte(roughness) << 8 | byte(occlusion) << 16;
+        if (planes.emissive != nullptr) planes.emissive[p.pixel[i]] = packColour(emissive.x, emissive.y, emissive.z);
     }
 }

@@ -7,7 +7,7 @@ namespace stipple::render {
 static_assert(sizeof(shared::PointRecord) == 16);
 static_assert(sizeof(shared::DrawNode) == 80);
 static_assert(sizeof(shared::DrawBlock) == 8);
-static_assert(sizeof(shared::FrameConstants) == 116);
+static_assert(sizeof(shared::FrameConstants) == 124);
 static_assert(sizeof(shared::MeshVertex) == 32);
 static_assert(sizeof(shared::MeshCluster) == 12);
 static_assert(sizeof(shared::DrawMesh) == 104);
@@ -47,6 +47,8 @@ void addMeshes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, DrawList&
         if (draw.instance != last) {
             out.meshes.push_back(makeDrawMesh(h, instance, out.view, cameraFromWorld));
             out.meshes.back().firstMaterial = out.firstMaterial[instance.hierarchy];
+            out.meshTextures.push_back({h.textures, instance.source, static_cast<uint32_t>(h.nodes.size()),
+                                        static_cast<uint32_t>(h.tiles.size())});
             last = draw.instance;
         }
         out.meshDraws.push_back({static_cast<uint32_t>(out.meshes.size() - 1),
@@ -68,7 +70,9 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     out.blocks.clear();
     out.keys.clear();
     out.meshes.clear();
+    out.meshTextures.clear();
     out.meshDraws.clear();
+    out.lights.clear();
     out.clusters = 0;
     out.view = view;
     out.cut.assign(cut.draw.begin(), cut.draw.end());
@@ -121,6 +125,23 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     // A sun over the viewer's left shoulder: every view of a scan is lit from where one looks.
     f.sunDirection = glm::normalize(glm::vec3(-0.45f, -0.55f, -0.7f));
     f.skyDirection = glm::vec3(cameraFromWorld * settings.worldUp);
+    constexpr double kPi = 3.14159265358979323846;
+    constexpr float kAmbientBesideLights = 0.2f;
+    for (const WorldLight& light : settings.lights) {
+        shared::LightSource l{};
+        const glm::dvec3 axis = cameraFromWorld * light.direction;
+        const bool isFar = light.kind == shared::kLightDirectional;
+        l.position = glm::vec3(isFar ? -axis : cameraFromWorld * (light.position - view.eye));
+        l.kind = light.kind;
+        l.colour = light.colour * static_cast<float>(1 / kPi);
+        l.range = light.range;
+        l.axis = glm::vec3(axis);
+        l.cosInner = std::cos(light.innerCone);
+        l.cosOuter = std::cos(light.outerCone);
+        out.lights.push_back(l);
+    }
+    f.lightCount = static_cast<uint32_t>(out.lights.size());
+    f.ambient = out.lights.empty() ? 1.0f : kAmbientBesideLights;
     f.background = settings.background;
     f.blockCount = static_cast<uint32_t>(out.blocks.size());
 }

@@ -14,6 +14,14 @@
 
 namespace stipple::render {
 
+/// A light in world space, as KHR_lights_punctual has it.
+struct WorldLight {
+    uint32_t kind = shared::kLightPoint;
+    glm::dvec3 position{0}, direction{0, 0, -1};  ///< direction: where it shines
+    glm::vec3 colour{1};                          ///< linear, times candela or lux
+    float range = 0, innerCone = 0, outerCone = 0.785f;
+};
+
 /// Clusters of one chunk of a mesh; each is one block of 256 draw ids.
 struct MeshDraw {
     uint32_t mesh = 0;  ///< of DrawList::meshes
@@ -23,13 +31,21 @@ struct MeshDraw {
     float errorPixels = 0;
 };
 
+/// Textures of one mesh: tile t is chunk firstChunk + t of its source.
+struct MeshTextures {
+    std::span<const shared::TextureInfo> infos;
+    uint32_t source = 0, firstChunk = 0, tiles = 0;
+};
+
 struct DrawList {
     shared::FrameConstants frame{};
     std::vector<shared::DrawNode> nodes;
     std::vector<shared::DrawBlock> blocks;
-    std::vector<streaming::ChunkKey> keys;  ///< chunk of each node
-    std::vector<shared::DrawMesh> meshes;   ///< instances of mesh stores that are in view
+    std::vector<streaming::ChunkKey> keys;   ///< chunk of each node
+    std::vector<shared::DrawMesh> meshes;    ///< instances of mesh stores that are in view
+    std::vector<MeshTextures> meshTextures;  ///< of each of `meshes`
     std::vector<MeshDraw> meshDraws;
+    std::vector<shared::LightSource> lights;
     uint32_t clusters = 0;  ///< of all mesh draws
     std::span<const shared::SurfaceMaterial> materials;
     // What the fp32 numbers above were made from: the reference starts from these.
@@ -47,8 +63,9 @@ struct DrawSettings {
     uint32_t debugView = shared::kDebugNone;
     glm::vec3 background{0.02f, 0.02f, 0.025f};  ///< linear
     glm::dvec3 worldUp{0, 0, 1};
-    float supportScale = 1.0f;   ///< splat radius of the reconstruction / stored radius
-    float minimumRadius = 1.0f;  ///< pixels
+    std::vector<WorldLight> lights;  ///< none: a sun over the viewer's shoulder
+    float supportScale = 1.0f;       ///< splat radius of the reconstruction / stored radius
+    float minimumRadius = 1.0f;      ///< pixels
 };
 
 void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,

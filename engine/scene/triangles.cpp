@@ -1,6 +1,7 @@
 #include "engine/scene/triangles.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "shaders/shared/record.h"
@@ -12,6 +13,8 @@ namespace {
 uint32_t materialIndex(const Scene& scene, const Primitive& p) {
     return p.material < 0 ? static_cast<uint32_t>(scene.materials.size()) : static_cast<uint32_t>(p.material);
 }
+
+TextureUse leadingUse(const Material& m);
 
 uint32_t surfaceOf(const Scene& scene, const Primitive& p) {
     uint32_t surface = materialIndex(scene, p);
@@ -35,24 +38,29 @@ uint32_t packedColour(const glm::vec4& c) {
            static_cast<uint32_t>(std::clamp(c.a, 0.0f, 1.0f) * 255.0f + 0.5f) << 24;
 }
 
-shared::TextureSlot slotOf(const Scene& scene, const TextureUse& use, bool isDrawn) {
+const std::array<TextureUse Material::*, 5> kUses{&Material::baseColourTexture, &Material::normalTexture,
+                                                  &Material::metallicRoughnessTexture, &Material::emissiveTexture,
+                                                  &Material::occlusionTexture};
+
+/// Vertices have one set of coordinates: that of the first texture in the order above, with its transform applied.
+TextureUse leadingUse(const Material& m) {
+    for (const auto use : kUses)
+        if ((m.*use).texture >= 0) return m.*use;
+    return {};
+}
+
+shared::TextureSlot slotOf(const Scene& scene, const TextureUse& use, const TextureUse& leading) {
     shared::TextureSlot slot{};
     slot.rowU = {1, 0, 0};
     slot.rowV = {0, 1, 0};
-    if (use.texture < 0 || !isDrawn || scene.textures[static_cast<size_t>(use.texture)].image < 0) return slot;
+    if (use.texture < 0 || use.uvSet != leading.uvSet || scene.textures[static_cast<size_t>(use.texture)].image < 0)
+        return slot;
     slot.texture = static_cast<uint32_t>(use.texture) + 1;
-    const glm::mat3& t = use.transform;
+    if (use.transform == leading.transform || glm::determinant(leading.transform) == 0) return slot;
+    const glm::mat3 t = use.transform * glm::inverse(leading.transform);
     slot.rowU = {t[0][0], t[1][0], t[2][0]};
     slot.rowV = {t[0][1], t[1][1], t[2][1]};
     return slot;
-}
-
-/// Vertices have one set of coordinates: that of the first texture in this order.
-int uvSetOf(const Material& m) {
-    for (const TextureUse* use :
-         {&m.baseColourTexture, &m.normalTexture, &m.metallicRoughnessTexture, &m.emissiveTexture, &m.occlusionTexture})
-        if (use->texture >= 0) return use->uvSet;
-    return 0;
 }
 
 }  // namespace
@@ -82,15 +90,17 @@ lod::TriangleMesh flattenTriangles(const Scene& scene, const std::vector<Placeme
             const bool isMirrored = glm::determinant(linear) < 0;
             const auto base = static_cast<uint32_t>(out.position.size());
             const uint32_t surface = surfaceOf(scene, p);
-            const int set = p.material < 0 ? 0 : uvSetOf(scene.materials[static_cast<size_t>(p.material)]);
-            const bool hasUv = set >= 0 && static_cast<size_t>(set) < p.uv.size();
+            const TextureUse use =
+                p.material < 0 ? TextureUse{} : leadingUse(scene.materials[static_cast<size_t>(p.material)]);
+            const auto set = static_cast<size_t>(use.uvSet);
+            const bool hasUv = use.uvSet >= 0 && set < p.uv.size() && !p.uv[set].empty();
             for (size_t i = 0; i < p.position.size(); ++i) {
                 out.position.emplace_back(at.world * glm::dvec4(glm::dvec3(p.position[i]), 1));
                 const glm::dvec3 n = p.normal.empty() ? glm::dvec3(0) : forNormals * glm::dvec3(p.normal[i]);
                 const double length = glm::length(n);
                 const double sign = isMirrored ? -1 : 1;
                 out.normal.emplace_back(length > 0 && std::isfinite(length) ? n * (sign / length) : glm::dvec3(0));
-                out.uv.push_back(hasUv ? p.uv[static_cast<size_t>(set)][i] : glm::vec2(0));
+                out.uv.push_back(hasUv ? glm::vec2(use.transform * glm::vec3(p.uv[set][i], 1)) : glm::vec2(0));
                 out.colour.push_back(p.colour.empty() ? ~0u : packedColour(p.colour[i]));
                 out.surface.push_back(surface);
             }
@@ -107,8 +117,8 @@ std::vector<shared::SurfaceMaterial> surfaceMaterials(const Scene& scene) {
     std::vector<shared::SurfaceMaterial> out;
     for (const Material& m : scene.materials) {
         shared::SurfaceMaterial s{};
-        const int set = uvSetOf(m);
-        const auto slot = [&](const TextureUse& use) { return slotOf(scene, use, use.uvSet == set); };
+        const TextureUse leading = leadingUse(m);
+        const auto slot = [&](const TextureUse& use) { return slotOf(scene, use, leading); };
         s.baseColour = glm::vec3(m.baseColour);
         s.alpha = m.baseColour.a;
         s.alphaCutoff = m.alphaMode == AlphaMode::opaque ? 0.0f : m.alphaMode == AlphaMode::mask ? m.alphaCutoff : 0.5f;
@@ -128,8 +138,31 @@ std::vector<shared::SurfaceMaterial> surfaceMaterials(const Scene& scene) {
     plain.baseColour = {1, 1, 1};
     plain.alpha = plain.roughness = plain.normalScale = 1;
     plain.baseTexture = plain.surfaceTexture = plain.normalTexture = plain.occlusionTexture = plain.emissiveTexture =
-        slotOf(scene, {}, false);
+        slotOf(scene, {}, {});
     out.push_back(plain);
+    return out;
+}
+
+std::vector<lod::TextureImage> textureImages(const Scene& scene) {
+    std::vector<lod::TextureImage> out(scene.textures.size());
+    for (size_t t = 0; t < out.size(); ++t) {
+        const auto wrap = [](Wrap w) {
+            return w == Wrap::repeat   ? shared::kWrapRepeat
+                   : w == Wrap::mirror ? shared::kWrapMirror
+                                       : shared::kWrapClamp;
+        };
+        out[t].wrapU = wrap(scene.textures[t].wrapU);
+        out[t].wrapV = wrap(scene.textures[t].wrapV);
+        out[t].kind = lod::TextureKind::data;
+    }
+    const auto set = [&](const TextureUse& use, lod::TextureKind kind) {
+        if (use.texture >= 0) out[static_cast<size_t>(use.texture)].kind = kind;
+    };
+    for (const Material& m : scene.materials) {
+        set(m.normalTexture, lod::TextureKind::normal);
+        set(m.baseColourTexture, lod::TextureKind::colour);
+        set(m.emissiveTexture, lod::TextureKind::colour);
+    }
     return out;
 }
 

@@ -20,4 +20,7 @@ lod::TriangleMesh flattenTriangles(const Scene& scene, const std::vector<Placeme
 
 std::vector<shared::SurfaceMaterial> surfaceMaterials(const Scene& scene);
 
+/// What each texture of the scene is used for, with its wrap modes; pixels are not set.
+std::vector<lod::TextureImage> textureImages(const Scene& scene);
+
 }  // namespace stipple::scene

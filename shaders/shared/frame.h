@@ -57,7 +57,24 @@ struct FrameConstants {
     vec3 skyDirection;  // camera space, up
     vec3 background;    // linear
     uint blockCount;
+    uint lightCount;  // 0: the sun above, else these instead
+    float ambient;    // share of the sky's light
 };
+
+// A light in camera space. `colour`: what a white diffuse surface that faces it sends back at distance 1 (directional:
+// at any).
+struct LightSource {
+    vec3 position;  // directional: towards the light
+    uint kind;
+    vec3 colour;
+    float range;  // 0: no limit
+    vec3 axis;    // spot: where it points
+    float cosInner;
+    float cosOuter;
+};
+const uint kLightDirectional = 0u;
+const uint kLightPoint = 1u;
+const uint kLightSpot = 2u;
 
 SHARED_END
 #endif

@@ -91,6 +91,53 @@ SHARED_FN vec2 triangleWeights(vec3 ray, vec3 a, vec3 b, vec3 c) {
     return vec2(u, v);
 }
 
+// Texture coordinates that a pixel covers: the longer of its two edges, on the triangle's plane. `ray`: through the
+// pixel, z = 1; a: first corner; e1, e2: edges to the others; d1, d2: texture coordinates along them.
+SHARED_FN float uvFootprint(vec3 ray, float inverseFocal, vec3 a, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
+    const vec3 n = vec3(e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x);
+    const float na = n.x * a.x + n.y * a.y + n.z * a.z;
+    const float nr = n.x * ray.x + n.y * ray.y + n.z * ray.z;
+    const float nn = n.x * n.x + n.y * n.y + n.z * n.z;
+    // Point on the plane P = ray * na / nr; its change with the ray's x and y.
+    const float t = na / nr;
+    const float k = -t / nr;
+    const vec3 px = vec3((t + k * n.x * ray.x) * inverseFocal, k * n.x * ray.y * inverseFocal, k * n.x * inverseFocal);
+    const vec3 py = vec3(k * n.y * ray.x * inverseFocal, (t + k * n.y * ray.y) * inverseFocal, k * n.y * inverseFocal);
+    // Weights of a displacement within the plane: u = (p x e2) . n / nn, v = (e1 x p) . n / nn.
+    const vec3 ue = vec3(e2.y * n.z - e2.z * n.y, e2.z * n.x - e2.x * n.z, e2.x * n.y - e2.y * n.x);
+    const vec3 ve = vec3(n.y * e1.z - n.z * e1.y, n.z * e1.x - n.x * e1.z, n.x * e1.y - n.y * e1.x);
+    const float ux = (px.x * ue.x + px.y * ue.y + px.z * ue.z) / nn;
+    const float vx = (px.x * ve.x + px.y * ve.y + px.z * ve.z) / nn;
+    const float uy = (py.x * ue.x + py.y * ue.y + py.z * ue.z) / nn;
+    const float vy = (py.x * ve.x + py.y * ve.y + py.z * ve.z) / nn;
+    const float xu = ux * d1.x + vx * d2.x;
+    const float xv = ux * d1.y + vx * d2.y;
+    const float yu = uy * d1.x + vy * d2.x;
+    const float yv = uy * d1.y + vy * d2.y;
+    const float longest = max(xu * xu + xv * xv, yu * yu + yv * yv);
+    return longest < 1.0e12f ? sqrt(longest) : 1.0e6f;
+}
+
+// Normal `n` (any length) bent by a tangent-space normal `m` (x along u, y against v). Tangents are the triangle's own:
+// they differ from those that a tool may have stored by what the texture turns within a triangle.
+SHARED_FN vec3 bumpedNormal(vec3 n, vec3 e1, vec3 e2, vec2 d1, vec2 d2, vec3 m) {
+    const float det = d1.x * d2.y - d1.y * d2.x;
+    const float side = det < 0.0f ? -1.0f : 1.0f;
+    vec3 t = vec3(side * (e1.x * d2.y - e2.x * d1.y), side * (e1.y * d2.y - e2.y * d1.y),
+                  side * (e1.z * d2.y - e2.z * d1.y));
+    vec3 b = vec3(side * (e1.x * d2.x - e2.x * d1.x), side * (e1.y * d2.x - e2.y * d1.x),
+                  side * (e1.z * d2.x - e2.z * d1.x));
+    const float nn = max(n.x * n.x + n.y * n.y + n.z * n.z, 1.0e-30f);
+    const float tn = (t.x * n.x + t.y * n.y + t.z * n.z) / nn;
+    const float bn = (b.x * n.x + b.y * n.y + b.z * n.z) / nn;
+    t = vec3(t.x - tn * n.x, t.y - tn * n.y, t.z - tn * n.z);
+    b = vec3(b.x - bn * n.x, b.y - bn * n.y, b.z - bn * n.z);
+    const float it = m.x / sqrt(max(t.x * t.x + t.y * t.y + t.z * t.z, 1.0e-30f));
+    const float ib = m.y / sqrt(max(b.x * b.x + b.y * b.y + b.z * b.z, 1.0e-30f));
+    const float in_ = m.z / sqrt(nn);
+    return vec3(t.x * it + b.x * ib + n.x * in_, t.y * it + b.y * ib + n.y * in_, t.z * it + b.z * ib + n.z * in_);
+}
+
 // Unit normal to shade with, turned towards the eye. `n`: interpolated, `face`: the triangle's own, any lengths; `ray`:
 // from the eye. Interpolated normals that just turn away at a silhouette are bent back to it instead of flipped.
 SHARED_FN vec3 surfaceNormal(vec3 n, vec3 face, vec3 ray) {

@@ -10,6 +10,77 @@ SHARED_FN float irradiance(vec3 n, vec3 sunDirection, vec3 skyDirection) {
     return 0.75f * max(dot(n, sunDirection), 0.0f) + 0.25f + 0.15f * dot(n, skyDirection);
 }
 
+// Metallic-roughness surface (glTF 2.0, appendix B): GGX with Smith's shadowing (Heitz 2014) and Schlick's Fresnel.
+struct Surface {
+    vec3 colour;  // base colour, linear
+    vec3 normal;  // camera space, towards the eye
+    vec3 toEye;
+    float metallic;
+    float roughness;
+    float occlusion;
+};
+
+// Light that comes back from one direction `l`, times what a white diffuse surface would send there.
+SHARED_FN vec3 reflectLight(Surface s, vec3 l, vec3 light) {
+    const float nl = max(dot(s.normal, l), 0.0f);
+    const float nv = max(dot(s.normal, s.toEye), 1.0e-3f);
+    vec3 h = vec3(l.x + s.toEye.x, l.y + s.toEye.y, l.z + s.toEye.z);
+    const float inverse = 1.0f / sqrt(max(dot(h, h), 1.0e-12f));
+    h = vec3(h.x * inverse, h.y * inverse, h.z * inverse);
+    const float nh = max(dot(s.normal, h), 0.0f);
+    const float vh = max(dot(s.toEye, h), 0.0f);
+    const float a = max(s.roughness * s.roughness, 2.0e-3f);
+    const float a2 = a * a;
+    const float d = nh * nh * (a2 - 1.0f) + 1.0f;
+    const float shadow = nl * sqrt(nv * nv * (1.0f - a2) + a2) + nv * sqrt(nl * nl * (1.0f - a2) + a2);
+    // D * V * pi: the light's colour has the 1 / pi of the diffuse term in it.
+    const float specular = a2 / (d * d) * (0.5f / max(shadow, 1.0e-6f));
+    const float k = 1.0f - vh;
+    const float k5 = k * k * k * k * k;
+    const float diffuse = 1.0f - s.metallic;
+    const vec3 f0 = vec3(0.04f + (s.colour.x - 0.04f) * s.metallic, 0.04f + (s.colour.y - 0.04f) * s.metallic,
+                         0.04f + (s.colour.z - 0.04f) * s.metallic);
+    const vec3 f = vec3(f0.x + (1.0f - f0.x) * k5, f0.y + (1.0f - f0.y) * k5, f0.z + (1.0f - f0.z) * k5);
+    return vec3(light.x * nl * (s.colour.x * diffuse * (1.0f - f.x) + f.x * specular),
+                light.y * nl * (s.colour.y * diffuse * (1.0f - f.y) + f.y * specular),
+                light.z * nl * (s.colour.z * diffuse * (1.0f - f.z) + f.z * specular));
+}
+
+// The sky's light: 0.25 of white from the side, more from above.
+SHARED_FN float skyLight(vec3 d, vec3 up) { return 0.25f + 0.15f * dot(d, up); }
+
+// What the sky sends back: diffuse, and a mirror blurred by the roughness (Karis 2013, fitted by Lazarov's terms).
+SHARED_FN vec3 reflectSky(Surface s, vec3 up) {
+    const float nv = max(dot(s.normal, s.toEye), 1.0e-3f);
+    const vec3 r = vec3(2.0f * nv * s.normal.x - s.toEye.x, 2.0f * nv * s.normal.y - s.toEye.y,
+                        2.0f * nv * s.normal.z - s.toEye.z);
+    const float rx = 1.0f - s.roughness;
+    const float ry = 0.0425f - 0.0275f * s.roughness;
+    const float a004 = min(rx * rx, exp2(-9.28f * nv)) * rx + ry;
+    const float scale = -1.04f * a004 + 1.04f - 0.572f * s.roughness;
+    const float bias = 1.04f * a004 - 0.04f + 0.022f * s.roughness;
+    const float blurred = 0.25f + 0.15f * (1.0f - s.roughness) * dot(r, up) + 0.15f * s.roughness * dot(s.normal, up);
+    const float around = skyLight(s.normal, up) * (1.0f - s.metallic);
+    const vec3 f0 = vec3(0.04f + (s.colour.x - 0.04f) * s.metallic, 0.04f + (s.colour.y - 0.04f) * s.metallic,
+                         0.04f + (s.colour.z - 0.04f) * s.metallic);
+    return vec3(s.occlusion * (s.colour.x * around + (f0.x * scale + bias) * blurred),
+                s.occlusion * (s.colour.y * around + (f0.y * scale + bias) * blurred),
+                s.occlusion * (s.colour.z * around + (f0.z * scale + bias) * blurred));
+}
+
+// Direction to a light from a point, and its share of what the light sends at distance 1.
+SHARED_FN float lightAt(LightSource light, vec3 point, float depth) {
+    const vec3 d = vec3(light.position.x - point.x, light.position.y - point.y, light.position.z - point.z);
+    const float d2 = max(dot(d, d), 1.0e-12f);
+    const float inverse = 1.0f / sqrt(d2);
+    const float reach = light.range > 0.0f ? d2 / (light.range * light.range) : 0.0f;
+    const float edge = max(1.0f - reach * reach, 0.0f);
+    const float along = -dot(d, light.axis) * inverse;
+    const float cone = min(max((along - light.cosOuter) / max(light.cosInner - light.cosOuter, 1.0e-4f), 0.0f), 1.0f);
+    const float spread = light.kind == kLightSpot ? cone * cone : 1.0f;
+    return light.kind == kLightDirectional || depth <= 0.0f ? 1.0f : spread * edge * edge / d2;
+}
+
 // Colours of the debug views, linear.
 SHARED_FN vec3 debugRamp(float t) {
     const float x = min(max(t, 0.0f), 1.0f);

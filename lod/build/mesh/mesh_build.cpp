@@ -29,7 +29,8 @@ struct Group {
     Node node;
     MeshGroup counts;
     std::vector<MeshRun> runs;  ///< producers are numbers of the build's order
-    double error = 0;           ///< lattice units
+    std::vector<uint32_t> textures;
+    double error = 0;  ///< lattice units
 };
 
 Sphere sphereOf(const LocalMesh& local, const std::vector<Sphere>& inside) {
@@ -92,6 +93,9 @@ class MeshBuilder {
                 static_cast<uint8_t>(g.error >= kRootError ? ErrorScale::kNoParent : h.errors.encodeUp(g.error));
             h.groups[i].firstRun = static_cast<uint32_t>(h.runs.size());
             h.groups[i].runs = static_cast<uint32_t>(g.runs.size());
+            h.groups[i].firstTexture = static_cast<uint32_t>(h.groupTextures.size());
+            h.groups[i].textures = static_cast<uint32_t>(g.textures.size());
+            h.groupTextures.insert(h.groupTextures.end(), g.textures.begin(), g.textures.end());
             for (MeshRun run : g.runs) {
                 if (run.producer != MeshRun::kOriginal) {
                     run.producer = count - 1 - run.producer;
@@ -207,6 +211,53 @@ class MeshBuilder {
         return made;
     }
 
+    /// Which textures the group shows, what part of them, and how densely.
+    void describeTextures(const Chunk& chunk, Group& group) const {
+        constexpr float kAll = 1e6f;
+        std::vector<uint8_t> isUsed(settings_.textures.size());
+        glm::vec2 lo(kAll), hi(-kAll);
+        const auto& materials = settings_.description.materials;
+        for (const shared::MeshVertex& v : chunk.vertices) {
+            if ((v.surface & shared::kSurfaceTextured) == 0) continue;
+            lo = glm::min(lo, glm::vec2(v.u, v.v));
+            hi = glm::max(hi, glm::vec2(v.u, v.v));
+            const uint32_t m = v.surface & shared::kSurfaceMaterialMask;
+            if (m >= materials.size()) continue;
+            for (const shared::TextureSlot* s :
+                 {&materials[m].baseTexture, &materials[m].surfaceTexture, &materials[m].normalTexture,
+                  &materials[m].occlusionTexture, &materials[m].emissiveTexture}) {
+                if (s->texture == 0) continue;
+                isUsed[s->texture - 1] = 1;
+                const bool isPlain = s->rowU.x == 1 && s->rowU.y == 0 && s->rowU.z == 0 && s->rowV.x == 0 &&
+                                     s->rowV.y == 1 && s->rowV.z == 0;
+                if (!isPlain) {
+                    lo = glm::vec2(-kAll);
+                    hi = glm::vec2(kAll);
+                }
+            }
+        }
+        double inSpace = 0, inTexture = 0;
+        for (const shared::MeshCluster& c : chunk.clusters)
+            for (uint32_t t = c.firstTriangle; t < c.firstTriangle + (c.counts >> 16); ++t) {
+                const auto vertex = [&](uint32_t k) -> const shared::MeshVertex& {
+                    return chunk.vertices[c.firstVertex + (chunk.triangles[t] >> (8 * k) & 255u)];
+                };
+                const auto &a = vertex(0), &b = vertex(1), &d = vertex(2);
+                if ((a.surface & shared::kSurfaceTextured) == 0) continue;
+                inSpace += glm::length(glm::cross(glm::dvec3(b.x - a.x, b.y - a.y, b.z - a.z),
+                                                  glm::dvec3(d.x - a.x, d.y - a.y, d.z - a.z)));
+                inTexture += std::abs(double(b.u - a.u) * (d.v - a.v) - double(b.v - a.v) * (d.u - a.u));
+            }
+        for (uint32_t t = 0; t < isUsed.size(); ++t)
+            if (isUsed[t]) group.textures.push_back(t);
+        if (group.textures.empty()) return;
+        group.counts.lowU = lo.x;
+        group.counts.lowV = lo.y;
+        group.counts.highU = hi.x;
+        group.counts.highV = hi.y;
+        group.counts.uvPerStep = inSpace > 0 ? static_cast<float>(std::sqrt(inTexture / inSpace)) : 0.0f;
+    }
+
     std::vector<uint8_t> encode(const std::vector<const Cluster*>& members, Group& group) const {
         Chunk chunk;
         std::vector<uint32_t> order;  // vertices of one cluster, by first use
@@ -239,6 +290,7 @@ class MeshBuilder {
             group.runs.back().triangles += triangles;
             chunk.clusters.push_back(cluster);
         }
+        describeTextures(chunk, group);
         group.node.records = static_cast<uint32_t>(chunk.triangles.size());
         group.counts.vertices = static_cast<uint32_t>(chunk.vertices.size());
         group.counts.clusters = static_cast<uint32_t>(chunk.clusters.size());
@@ -278,8 +330,11 @@ Result<BuildReport> buildMeshStore(TriangleMesh input, const std::string& output
         return fail(ErrorKind::input, "holds no triangle with an area", settings.description.source);
     MeshBuilder builder(mesh, settings, writer, executor, progress);
     STIPPLE_TRY(builder.run());
+    stage("simplify");
     Hierarchy hierarchy;
     builder.tables(hierarchy);
+    STIPPLE_TRY(writeTextures(settings.textures, writer, hierarchy, executor));
+    stage("textures");
     StoreDescription description = settings.description;
     description.points = report.pointsOut = mesh.indices.size() / 3;
     for (const Node& node : hierarchy.nodes) description.records += node.records;
@@ -293,7 +348,7 @@ Result<BuildReport> buildMeshStore(TriangleMesh input, const std::string& output
     description.boundsMax = description.focusMax = mesh.origin + mesh.unit * hi;
     description.hasColour = description.hasNormals = description.isReflectance = true;
     STIPPLE_TRY(writer.finish(hierarchy, description));
-    stage("simplify");
+    stage("finish");
     STIPPLE_ASSIGN(const Store store, openStore(writer.temporaryPath()));
     STIPPLE_TRY(verifyStore(store, executor));
     stage("verify");

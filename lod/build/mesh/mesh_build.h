@@ -11,7 +11,8 @@ namespace stipple::lod {
 
 struct MeshBuildSettings {
     uint32_t groupClusters = 8;
-    StoreDescription description;  ///< what the input says; bounds and counts are filled in
+    StoreDescription description;        ///< what the input says; bounds and counts are filled in
+    std::vector<TextureImage> textures;  ///< that the description's materials name
 };
 
 /// Writes `output` (whole or not at all). Degenerate, duplicate and not finite triangles are dropped and counted. The

@@ -7,6 +7,7 @@
 
 #include "engine/base/executor.h"
 #include "lod/mesh.h"
+#include "lod/store.h"
 
 namespace stipple::lod {
 
@@ -56,5 +57,9 @@ std::vector<std::vector<uint32_t>> groupClusters(const WeldedMesh& mesh, const s
 /// is shifted along it where `mesh` is textured. Not below `unimportant`, which saves looking closer.
 double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& coarse,
                         double unimportant);
+
+/// Writes all levels of all textures and fills the tables of `h`.
+Result<void> writeTextures(const std::vector<TextureImage>& images, StoreWriter& writer, Hierarchy& h,
+                           Executor& executor);
 
 }  // namespace stipple::lod

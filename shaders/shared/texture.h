@@ -1,0 +1,76 @@
+// Textures as mip pyramids of square tiles with a border, so that a tile can be sampled bilinearly on its own.
+#ifndef STIPPLE_SHARED_TEXTURE_H
+#define STIPPLE_SHARED_TEXTURE_H
+#include "types.h"
+SHARED_BEGIN
+
+const uint kTileTexels = 128u;
+const uint kTileEdge = 130u;  // with a border of one texel on every side
+const uint kTextureLevels = 16u;
+
+const uint kWrapRepeat = 0u;
+const uint kWrapMirror = 1u;
+const uint kWrapClamp = 2u;
+
+// Level l has ceil(width / 2^l) x ceil(height / 2^l) texels; its tiles stand row by row from firstTile[l] on.
+struct TextureInfo {
+    uint width;
+    uint height;
+    uint levels;
+    uint wrapU;
+    uint wrapV;
+    uint isColour;  // sRGB; otherwise numbers
+    uint firstTile[kTextureLevels];
+};
+
+SHARED_FN uint levelSize(uint size, uint level) {
+    const uint s = (size + (1u << level) - 1u) >> level;
+    return s > 0u ? s : 1u;
+}
+SHARED_FN uint tilesAcross(uint size, uint level) { return (levelSize(size, level) + kTileTexels - 1u) / kTileTexels; }
+
+// A coordinate into [0, 1).
+SHARED_FN float wrapCoordinate(float u, uint wrap) {
+    const float whole = floor(u);
+    float f = u - whole;
+    if (wrap == kWrapMirror) {
+        const float half2 = 0.5f * whole;
+        f = half2 - floor(half2) > 0.25f ? 1.0f - f : f;
+    }
+    if (wrap == kWrapClamp) f = min(max(u, 0.0f), 1.0f);
+    return min(f, 0.99999994f);
+}
+
+// Where a bilinear sample lies: tile, the texel (x, y) of the upper left of its four (border included), and fractions.
+struct TextureTap {
+    uint tile;
+    uint x;
+    uint y;
+    float fx;
+    float fy;
+};
+SHARED_FN TextureTap textureTap(TextureInfo t, uint level, float u, float v) {
+    const uint w = levelSize(t.width, level);
+    const uint h = levelSize(t.height, level);
+    const float x = wrapCoordinate(u, t.wrapU) * float(w) - 0.5f;
+    const float y = wrapCoordinate(v, t.wrapV) * float(h) - 0.5f;
+    const float x0 = floor(x);
+    const float y0 = floor(y);
+    const uint px = uint(int(max(x0, 0.0f)));
+    const uint py = uint(int(max(y0, 0.0f)));
+    const uint tx = px / kTileTexels;
+    const uint ty = py / kTileTexels;
+    TextureTap tap;
+    tap.tile = t.firstTile[level] + ty * tilesAcross(t.width, level) + tx;
+    tap.x = uint(int(x0) + 1 - int(tx * kTileTexels));
+    tap.y = uint(int(y0) + 1 - int(ty * kTileTexels));
+    tap.fx = x - x0;
+    tap.fy = y - y0;
+    return tap;
+}
+
+// Level of detail of a footprint of `area` texels across (the longer of its two edges), finest level 0.
+SHARED_FN float textureLod(float texels) { return log2(max(texels, 1.0f)); }
+
+SHARED_END
+#endif
