@@ -337,8 +337,8 @@ class Selector {
         });
     }
 
-    /// Texture tiles that the groups in view can show: of the level whose texels are about a pixel where the group is
-    /// nearest, the part that its texture coordinates cover; and the coarsest level, which stands in for the others.
+    /// Texture tiles that the groups in view can show: from the level whose texels are about a pixel where the group is
+    /// nearest to the coarsest, the part that its texture coordinates cover.
     void wantTiles(uint32_t instance, const LocalView& local) {
         const Hierarchy& h = hierarchyOf(instance);
         const uint32_t source = instances_[instance].source;
@@ -362,10 +362,8 @@ class Selector {
             for (uint32_t k = 0; k < g.textures; ++k) {
                 const shared::TextureInfo& t = h.textures[h.groupTextures[g.firstTexture + k]];
                 const double texels = uvPerPixel * std::max(t.width, t.height);
-                const auto level = static_cast<uint32_t>(
+                const auto finest = static_cast<uint32_t>(
                     std::clamp(std::floor(std::log2(std::max(texels, 1.0))), 0.0, double(t.levels - 1)));
-                const uint32_t across = shared::tilesAcross(t.width, level),
-                               down = shared::tilesAcross(t.height, level);
                 const auto range = [](float lo, float hi, uint32_t wrap, uint32_t size, uint32_t tiles) {
                     // Coordinates that wrap around, or may, take the whole row.
                     const float a = std::floor(lo), texel = 1.0f / static_cast<float>(size);
@@ -377,11 +375,16 @@ class Selector {
                     };
                     return std::pair{tile(lo - texel), tile(hi + texel)};
                 };
-                const auto [x0, x1] = range(g.lowU, g.highU, t.wrapU, shared::levelSize(t.width, level), across);
-                const auto [y0, y1] = range(g.lowV, g.highV, t.wrapV, shared::levelSize(t.height, level), down);
-                want(t.firstTile[t.levels - 1], 1e8f);
-                for (uint32_t y = y0; y <= y1; ++y)
-                    for (uint32_t x = x0; x <= x1; ++x) want(t.firstTile[level] + y * across + x, 1.0f);
+                // Parts that are seen at a slant, or farther away, take the coarser levels.
+                for (uint32_t level = t.levels; level-- > finest;) {
+                    const uint32_t across = shared::tilesAcross(t.width, level),
+                                   down = shared::tilesAcross(t.height, level);
+                    const auto [x0, x1] = range(g.lowU, g.highU, t.wrapU, shared::levelSize(t.width, level), across);
+                    const auto [y0, y1] = range(g.lowV, g.highV, t.wrapV, shared::levelSize(t.height, level), down);
+                    for (uint32_t y = y0; y <= y1; ++y)
+                        for (uint32_t x = x0; x <= x1; ++x)
+                            want(t.firstTile[level] + y * across + x, static_cast<float>(1 + level));
+                }
             }
         }
     }
