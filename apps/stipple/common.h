@@ -52,6 +52,7 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
 struct OpenedScene {
     std::vector<render::PlacedStore> placed;
     lod::StoreDescription description;  ///< of all together: bounds, up, what colours can be asked for
+    std::vector<render::WorldLight> lights;
 };
 
 /// A .stipple file is opened; a .gltf or .glb scene is opened with the stores that its nodes refer to; anything else,

@@ -81,7 +81,8 @@ Result<std::shared_ptr<const lod::Store>> openCached(
         Progress progress(showProgress);
         STIPPLE_ASSIGN(const lod::BuildReport built, make(path, progress));
         if (showProgress)
-            fmt::print(stderr, "{}: built into the cache in {:.1f} s ({})\n", inputs.front(), built.seconds, path);
+            fmt::print(stderr, "{} ({}): built into the cache in {:.1f} s ({})\n", inputs.front(), part, built.seconds,
+                       path);
         for (const std::string& note : built.notes)
             if (showProgress) fmt::print(stderr, "note: {}\n", note);
         for (const auto& [reason, count] : built.dropped)
@@ -179,11 +180,35 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
     return {};
 }
 
+std::vector<render::WorldLight> lightsOf(const scene::Scene& scene) {
+    std::vector<render::WorldLight> lights;
+    const std::vector<glm::dmat4> world = scene.worldTransforms();
+    const std::vector<bool> visible = scene.visibility();
+    for (size_t n = 0; n < scene.nodes.size(); ++n) {
+        if (scene.nodes[n].light < 0 || !visible[n]) continue;
+        const scene::Light& light = scene.lights[static_cast<size_t>(scene.nodes[n].light)];
+        render::WorldLight out;
+        out.kind = light.kind == scene::LightKind::directional ? shared::kLightDirectional
+                   : light.kind == scene::LightKind::point     ? shared::kLightPoint
+                                                               : shared::kLightSpot;
+        out.position = glm::dvec3(world[n][3]);
+        const glm::dvec3 axis = -glm::dvec3(world[n][2]);
+        out.direction = glm::length(axis) > 0 ? glm::normalize(axis) : glm::dvec3(0, -1, 0);
+        out.colour = light.colour * light.intensity;
+        out.range = light.range;
+        out.innerCone = light.innerCone;
+        out.outerCone = light.outerCone;
+        lights.push_back(out);
+    }
+    return lights;
+}
+
 /// The stores that a scene's nodes refer to, and its meshes.
 Result<std::vector<render::PlacedStore>> openSceneFile(const std::string& path, const BuildOptions& build,
                                                        const ColourOptions& colour, Executor& executor,
-                                                       bool showProgress) {
+                                                       bool showProgress, std::vector<render::WorldLight>& lights) {
     STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path));
+    lights = lightsOf(scene);
     std::vector<render::PlacedStore> placed;
     std::map<std::string, std::shared_ptr<const lod::Store>> open;
     const std::vector<glm::dmat4> world = scene.worldTransforms();
@@ -227,6 +252,7 @@ lod::StoreDescription describe(const std::vector<render::PlacedStore>& placed) {
     all.boundsMin = all.focusMin = glm::dvec3(1e300);
     all.boundsMax = all.focusMax = glm::dvec3(-1e300);
     all.points = 0;
+    all.isReflectance = false;
     for (const render::PlacedStore& p : placed) {
         const lod::StoreDescription& d = p.store->description;
         for (int corner = 0; corner < 8; ++corner) {
@@ -241,10 +267,10 @@ lod::StoreDescription describe(const std::vector<render::PlacedStore>& placed) {
             all.focusMax = glm::max(all.focusMax, pick(d.focusMin, d.focusMax));
         }
         all.points += d.points;
-        all.hasColour = all.hasColour || d.hasColour;
+        all.hasColour = true;  // what is not, is in isReflectance
         all.hasNormals = all.hasNormals || d.hasNormals;
-        // Lit if any part needs it: meshes and scans without colours look flat otherwise.
-        all.isReflectance = all.isReflectance || isShaded(d);
+        // Points are lit if any of them need it; triangles always are.
+        if (!p.store->hierarchy.isMesh()) all.isReflectance = all.isReflectance || isShaded(d);
         if (all.attributes.empty()) all.attributes = d.attributes;
     }
     return all;
@@ -280,7 +306,8 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
             return fail(ErrorKind::usage, "a built scene and other inputs cannot be mixed", input,
                         "name one scene, or only raw inputs; a .gltf scene can place several stores");
     if (isSceneFile(inputs.front())) {
-        STIPPLE_ASSIGN(scene.placed, openSceneFile(inputs.front(), build, colour, executor, showProgress));
+        STIPPLE_ASSIGN(scene.placed,
+                       openSceneFile(inputs.front(), build, colour, executor, showProgress, scene.lights));
     } else {
         STIPPLE_ASSIGN(
             std::shared_ptr<const lod::Store> store,

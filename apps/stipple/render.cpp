@@ -69,11 +69,13 @@ Result<Shot> makeShot(const Options& o, const lod::StoreDescription& d, const gl
 }
 
 Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDescription& d, const Shot& shot,
-                                           const lod::ColourBy& colour) {
+                                           const lod::ColourBy& colour, const std::vector<render::WorldLight>& lights) {
     render::FrameSettings s;
+    s.draw.lights = lights;
     s.mode = o.mode == "points" ? render::Mode::points : render::Mode::pullpush;
     s.budgets.errorPixels = o.error;
     if (o.budget > 0) s.budgets.records = o.budget;
+    s.draw.unlitTriangles = o.shade == "unlit";
     s.draw.lit = o.shade == "lit" || (o.shade == "auto" && isShaded(d) && colour.mode == lod::ColourMode::own);
     s.draw.worldUp = shot.worldUp;
     STIPPLE_ASSIGN(const glm::dvec3 background, parseVector(o.background, "--background"));
@@ -188,7 +190,7 @@ Result<void> run(const Options& o) {
     const lod::StoreDescription& description = scene.description;
     STIPPLE_ASSIGN(const Shot shot, makeShot(o, description, size));
     STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
-    STIPPLE_ASSIGN(const render::FrameSettings settings, makeSettings(o, description, shot, colour));
+    STIPPLE_ASSIGN(const render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
     if (o.mode == "reference" && scene.placed.size() > 1)
         return fail(ErrorKind::usage, "only one store can be traced", "--mode reference", "use --device reference");
     if (o.mode == "reference" && colour.mode != lod::ColourMode::own)
@@ -241,6 +243,7 @@ Result<void> run(const Options& o) {
             {"frame_ms", {{"median", quantile(timings.frames, 0.5)}, {"p95", quantile(timings.frames, 0.95)}}},
             {"passes", passes},
             {"records_drawn", c.recordsDrawn},
+            {"triangles_drawn", c.trianglesDrawn},
             {"nodes_drawn", c.nodesDrawn},
             {"tau_eff_px", c.tauEffectivePixels},
             {"complete", complete},
@@ -252,8 +255,12 @@ Result<void> run(const Options& o) {
             {"counters", countersJson(c)}};
         fmt::print("{}\n", j.dump(2));
     } else if (!o.quiet && shot.views.size() == 1) {
-        fmt::print("{}: {} records, {:.2f} px error, {:.1f} ms a frame on {}\n", o.output, c.recordsDrawn,
-                   c.tauEffectivePixels, quantile(timings.frames, 0.5), backend->device());
+        const std::string drawn = c.trianglesDrawn == 0 ? fmt::format("{} records", c.recordsDrawn)
+                                  : c.recordsDrawn == 0
+                                      ? fmt::format("{} triangles", c.trianglesDrawn)
+                                      : fmt::format("{} records, {} triangles", c.recordsDrawn, c.trianglesDrawn);
+        fmt::print("{}: {}, {:.2f} px error, {:.1f} ms a frame on {}\n", o.output, drawn, c.tauEffectivePixels,
+                   quantile(timings.frames, 0.5), backend->device());
     }
     return {};
 }

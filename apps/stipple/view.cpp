@@ -115,7 +115,10 @@ bool applyKeys(const std::string& pressed, render::FrameSettings& settings, Navi
             settings.mode = settings.mode == render::Mode::pullpush ? render::Mode::points : render::Mode::pullpush;
         if (key == 'V')
             settings.draw.debugView = (settings.draw.debugView + 1) % static_cast<uint32_t>(kDebugNames.size());
-        if (key == 'L') settings.draw.lit = !settings.draw.lit;
+        if (key == 'L') {
+            settings.draw.lit = !settings.draw.lit;
+            settings.draw.unlitTriangles = !settings.draw.lit;
+        }
         if (key == '\t') overlay = !overlay;
         if (key == 'P') picture = true;
         if (key >= '1' && key <= '9') settings.budgets.errorPixels = 0.25 * std::exp2(key - '1');
@@ -143,6 +146,8 @@ Result<void> run(const Options& o) {
     Legend legend = makeLegend(colour, d);
     render::FrameSettings settings;
     settings.budgets = {o.error, o.budget};
+    settings.draw.unlitTriangles = o.shade == "unlit";
+    settings.draw.lights = scene.lights;
     settings.draw.lit = o.shade == "lit" || (o.shade == "auto" && isShaded(d) && colour.mode == lod::ColourMode::own);
     settings.draw.worldUp = d.up;
     const double diagonal = std::max(1e-300, glm::length(d.boundsMax - d.boundsMin));

@@ -200,9 +200,8 @@ class CpuBackend final : public render::Backend {
                                      static_cast<std::vector<LargeTriangle>*>(to)->push_back(t);
                                  }};
             for (size_t b = begin; b < end; ++b)
-                k_.rasterCluster(frame_, *meshBlocks_[b].mesh, meshBlocks_[b].vertices, meshBlocks_[b].counts & 0xffffu,
-                                 meshBlocks_[b].triangles, meshBlocks_[b].counts >> 16, static_cast<uint32_t>(b * 256),
-                                 sink, visibility_.data());
+                k_.rasterCluster(frame_, tables_, draws_->materials.data(), meshBlocks_[b],
+                                 static_cast<uint32_t>(b * 256), sink, visibility_.data());
             if (!mine.empty()) found_.push(std::move(mine));
         });
         for (const auto& some : found_.takeAll()) large_.insert(large_.end(), some.begin(), some.end());

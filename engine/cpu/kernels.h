@@ -123,9 +123,9 @@ struct Kernels {
                      const SurfacePlanes& planes, const shared::LightSource* lights, uint32_t x0, uint32_t y,
                      uint32_t n, const ShadeOutput& out);
     /// Offers the triangles of one cluster (ids from firstId on) to the visibility buffer.
-    void (*rasterCluster)(const shared::FrameConstants& f, const shared::DrawMesh& mesh,
-                          const shared::MeshVertex* vertices, uint32_t vertexCount, const uint32_t* triangles,
-                          uint32_t triangleCount, uint32_t firstId, const LargeSink& large, uint64_t* visibility);
+    void (*rasterCluster)(const shared::FrameConstants& f, const Tables& tables,
+                          const shared::SurfaceMaterial* materials, const MeshBlock& block, uint32_t firstId,
+                          const LargeSink& large, uint64_t* visibility);
     /// Rows [firstRow, lastRow] of the triangles that were kept.
     void (*rasterLarge)(const shared::FrameConstants& f, const LargeTriangle* large, size_t count, uint32_t firstRow,
                         uint32_t lastRow, uint64_t* visibility);

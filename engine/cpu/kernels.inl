@@ -73,14 +73,14 @@ void projectBlock(const FrameConstants& frame, const DrawNode& drawNode, const P
     }
 }
 
+#include "engine/cpu/sample.inl"
+
 #include "engine/cpu/raster.inl"
 
 struct Gathered {
     alignas(64) float x[kTile], y[kTile], z[kTile], radius[kTile];
     alignas(64) uint32_t normal[kTile], colour[kTile], flags[kTile];
 };
-
-#include "engine/cpu/sample.inl"
 
 #include "engine/cpu/resolve_triangles.inl"
 

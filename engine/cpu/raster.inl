@@ -25,9 +25,10 @@ struct Fixed {
 }
 
 /// Pixels [fromX, toX] x [fromY, toY] of a triangle. `Int`: holds twice the area of the triangle and the box.
-template <typename Int>
+/// `keep(x, y)`: false where an alpha mask cuts the triangle out.
+template <typename Int, typename Keep>
 [[gnu::always_inline]] inline void fill(const Fixed& t, int fromX, int toX, int fromY, int toY, uint32_t stride,
-                                        uint64_t* visibility) {
+                                        uint64_t* visibility, const Keep& keep) {
     constexpr int kOne = 256, kHalf = 128;  // kSubpixel
     const int64_t cx = int64_t{fromX} * kOne + kHalf, cy = int64_t{fromY} * kOne + kHalf;
     Int dx[3], dy[3], row[3];
@@ -46,7 +47,7 @@ template <typename Int>
     for (int y = fromY; y <= toY; ++y) {
         Int w0 = row[0], w1 = row[1], w2 = row[2];
         for (int x = fromX; x <= toX; ++x) {
-            if ((w0 | w1 | w2) >= 0)
+            if ((w0 | w1 | w2) >= 0 && keep(x, y))
                 offer(visibility, static_cast<size_t>(y) * stride + static_cast<size_t>(x),
                       static_cast<float>(w0) * z0 + static_cast<float>(w1) * z1 + static_cast<float>(w2) * z2, t.id);
             w0 += dx[0];
@@ -59,11 +60,48 @@ template <typename Int>
     }
 }
 
+/// A triangle whose material has an alpha mask.
+struct MaskInput {
+    const Tables* tables;
+    const TextureSet* textures;
+    const SurfaceMaterial* material;
+    const MeshVertex* vertices[3];
+    vec3 corners[3];
+};
+
+bool isKept(const FrameConstants& f, const MaskInput& m, int x, int y) {
+    const float inverseFocal = 1.0f / f.focal;
+    const vec3 ray = vec3((float(x) + 0.5f - f.centre.x) * inverseFocal, (float(y) + 0.5f - f.centre.y) * inverseFocal,
+                          1.0f);
+    const vec3 &a = m.corners[0], &b = m.corners[1], &c = m.corners[2];
+    const MeshVertex &va = *m.vertices[0], &vb = *m.vertices[1], &vc = *m.vertices[2];
+    const vec2 w = triangleWeights(ray, a, b, c);
+    const float wa = 1.0f - w.x - w.y;
+    const auto alphaOf = [](const MeshVertex& v) { return float(int(v.colour >> 24)) * (1.0f / 255.0f); };
+    float alpha = m.material->alpha * (wa * alphaOf(va) + w.x * alphaOf(vb) + w.y * alphaOf(vc));
+    if (m.material->baseTexture.texture != 0) {
+        const float footprint = uvFootprint(ray, inverseFocal, a, vec3(b.x - a.x, b.y - a.y, b.z - a.z),
+                                            vec3(c.x - a.x, c.y - a.y, c.z - a.z), vec2(vb.u - va.u, vb.v - va.v),
+                                            vec2(vc.u - va.u, vc.v - va.v));
+        Sampled s{};
+        if (sampleTexture(*m.tables, *m.textures, m.material->baseTexture, wa * va.u + w.x * vb.u + w.y * vc.u,
+                          wa * va.v + w.x * vb.v + w.y * vc.v, footprint, s))
+            alpha *= s.a;
+    }
+    return alpha >= m.material->alphaCutoff;
+}
+
 constexpr int64_t kSmallSteps = 40 * 256;           ///< triangles up to this wide are filled in 32 bits
 constexpr int64_t kLargePixels = int64_t{1} << 14;  ///< from this many pixels on a triangle is shared out by rows
 
+struct KeepAll {
+    bool operator()(int, int) const { return true; }
+};
+
 /// Rows [firstRow, lastRow] of a triangle.
-void fillRows(const FrameConstants& f, const Fixed& t, int firstRow, int lastRow, uint64_t* visibility) {
+template <typename Keep = KeepAll>
+void fillRows(const FrameConstants& f, const Fixed& t, int firstRow, int lastRow, uint64_t* visibility,
+              const Keep& keep = {}) {
     const auto least = [](const int64_t* v) {
         return v[0] < v[1] ? (v[0] < v[2] ? v[0] : v[2]) : (v[1] < v[2] ? v[1] : v[2]);
     };
@@ -79,22 +117,33 @@ void fillRows(const FrameConstants& f, const Fixed& t, int firstRow, int lastRow
     toY = toY > lastRow ? lastRow : toY;
     if (fromX > toX || fromY > toY) return;
     if (maxX - minX < kSmallSteps && maxY - minY < kSmallSteps)
-        fill<int32_t>(t, fromX, toX, fromY, toY, f.width, visibility);
+        fill<int32_t>(t, fromX, toX, fromY, toY, f.width, visibility, keep);
     else
-        fill<int64_t>(t, fromX, toX, fromY, toY, f.width, visibility);
+        fill<int64_t>(t, fromX, toX, fromY, toY, f.width, visibility, keep);
 }
 
+/// What one triangle needs beside its corners.
+struct Candidate {
+    uint32_t id;
+    bool isTwoSided;
+    const MaskInput* mask;  ///< null: all of it counts
+};
+
 /// Fills a triangle or, where it is large, keeps it for later.
-void takeTriangle(const FrameConstants& f, Fixed& t, bool isTwoSided, const LargeSink& large, uint64_t* visibility) {
+void takeTriangle(const FrameConstants& f, Fixed& t, const Candidate& of, const LargeSink& large,
+                  uint64_t* visibility) {
     const int64_t area = (t.x[1] - t.x[0]) * (t.y[2] - t.y[0]) - (t.y[1] - t.y[0]) * (t.x[2] - t.x[0]);
     // Counter-clockwise in the scene is clockwise on a screen whose y points down: negative.
-    if (area == 0 || (area > 0 && !isTwoSided)) return;
+    if (area == 0 || (area > 0 && !of.isTwoSided)) return;
     if (area < 0) {
         exchange(t.x[1], t.x[2]);
         exchange(t.y[1], t.y[2]);
         exchange(t.inverseDepth[1], t.inverseDepth[2]);
     }
-    if ((area < 0 ? -area : area) > kLargePixels * 65536 * 2) {
+    const int last = static_cast<int>(f.height) - 1;
+    if (of.mask != nullptr) {
+        fillRows(f, t, 0, last, visibility, [&](int x, int y) { return isKept(f, *of.mask, x, y); });
+    } else if ((area < 0 ? -area : area) > kLargePixels * 65536 * 2) {
         LargeTriangle l{};
         for (int k = 0; k < 3; ++k) {
             l.x[k] = static_cast<int32_t>(t.x[k]);
@@ -103,9 +152,9 @@ void takeTriangle(const FrameConstants& f, Fixed& t, bool isTwoSided, const Larg
         }
         l.id = t.id;
         large.keep(large.context, l);
-        return;
+    } else {
+        fillRows(f, t, 0, last, visibility);
     }
-    fillRows(f, t, 0, static_cast<int>(f.height) - 1, visibility);
 }
 
 /// One vertex between a and b where the plane's distance is 0. The ends are put in one order first, so that both
@@ -120,7 +169,7 @@ vec3 cutEdge(vec3 a, float da, vec3 b, float db) {
 }
 
 /// Clips against the near plane and four planes far outside the image, then takes the fan.
-void clipTriangle(const FrameConstants& f, const vec3* corner, uint32_t id, bool isTwoSided, const LargeSink& large,
+void clipTriangle(const FrameConstants& f, const vec3* corner, const Candidate& of, const LargeSink& large,
                   uint64_t* visibility) {
     vec3 polygon[12] = {corner[0], corner[1], corner[2]}, other[12];
     int count = 3;
@@ -157,17 +206,18 @@ void clipTriangle(const FrameConstants& f, const vec3* corner, uint32_t id, bool
         inverse[i] = 1.0f / polygon[i].z;
     }
     for (int i = 1; i + 1 < count; ++i) {
-        Fixed t{{x[0], x[i], x[i + 1]}, {y[0], y[i], y[i + 1]}, {inverse[0], inverse[i], inverse[i + 1]}, id};
-        takeTriangle(f, t, isTwoSided, large, visibility);
+        Fixed t{{x[0], x[i], x[i + 1]}, {y[0], y[i], y[i + 1]}, {inverse[0], inverse[i], inverse[i + 1]}, of.id};
+        takeTriangle(f, t, of, large, visibility);
     }
 }
 
-/// `clip` of a vertex: in front of the near plane or far outside the image.
-void rasterCluster(const FrameConstants& frame, const DrawMesh& drawMesh, const MeshVertex* vertices,
-                   uint32_t vertexCount, const uint32_t* triangles, uint32_t triangleCount, uint32_t firstId,
-                   const LargeSink& large, uint64_t* visibility) {
+void rasterCluster(const FrameConstants& frame, const Tables& tables, const SurfaceMaterial* materials,
+                   const MeshBlock& block, uint32_t firstId, const LargeSink& large, uint64_t* visibility) {
+    const MeshVertex* const vertices = block.vertices;
+    const uint32_t* const triangles = block.triangles;
+    const uint32_t vertexCount = block.counts & 0xffffu, triangleCount = block.counts >> 16;
     const FrameConstants f = frame;
-    const DrawMesh m = drawMesh;
+    const DrawMesh m = *block.mesh;
     alignas(64) float x[256], y[256], z[256], inverse[256];
     alignas(64) int32_t px[256], py[256], clip[256];
     const int* __restrict const words = &vertices->x;
@@ -189,11 +239,18 @@ void rasterCluster(const FrameConstants& frame, const DrawMesh& drawMesh, const 
     for (uint32_t k = 0; k < triangleCount; ++k) {
         const uint32_t t = triangles[k];
         const uint32_t a = t & 255u, b = t >> 8 & 255u, c = t >> 16 & 255u;
-        const bool isTwoSided = (vertices[a].surface & kSurfaceTwoSided) != 0;
-        const uint32_t id = kKindTriangle | (firstId + k);
+        const uint32_t surface = vertices[a].surface;
+        MaskInput mask;
+        Candidate of{kKindTriangle | (firstId + k), (surface & kSurfaceTwoSided) != 0, nullptr};
+        if ((surface & kSurfaceMasked) != 0) {
+            mask = {&tables, block.textures, &materials[m.firstMaterial + (surface & kSurfaceMaterialMask)],
+                    {&vertices[a], &vertices[b], &vertices[c]},
+                    {{x[a], y[a], z[a]}, {x[b], y[b], z[b]}, {x[c], y[c], z[c]}}};
+            of.mask = &mask;
+        }
         if ((clip[a] | clip[b] | clip[c]) != 0) {
             const vec3 corners[3] = {{x[a], y[a], z[a]}, {x[b], y[b], z[b]}, {x[c], y[c], z[c]}};
-            clipTriangle(f, corners, id, isTwoSided, large, visibility);
+            clipTriangle(f, corners, of, large, visibility);
             continue;
         }
         // Most triangles of a dense mesh contain no pixel's centre, or lie outside.
@@ -204,8 +261,8 @@ void rasterCluster(const FrameConstants& frame, const DrawMesh& drawMesh, const 
         const int maxY = y0 > y1 ? (y0 > y2 ? y0 : y2) : (y1 > y2 ? y1 : y2);
         if (((minX + 127) >> 8) > ((maxX - 128) >> 8) || ((minY + 127) >> 8) > ((maxY - 128) >> 8)) continue;
         if (maxX < 0 || maxY < 0 || minX >= right || minY >= bottom) continue;
-        Fixed fixed{{x0, x1, x2}, {y0, y1, y2}, {inverse[a], inverse[b], inverse[c]}, id};
-        takeTriangle(f, fixed, isTwoSided, large, visibility);
+        Fixed fixed{{x0, x1, x2}, {y0, y1, y2}, {inverse[a], inverse[b], inverse[c]}, of.id};
+        takeTriangle(f, fixed, of, large, visibility);
     }
 }
 

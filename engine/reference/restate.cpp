@@ -8,41 +8,13 @@
 #include "engine/base/process.h"
 #include "engine/reference/decode.h"
 #include "engine/reference/reference.h"
+#include "engine/reference/restate.h"
 
 namespace stipple::reference {
 namespace {
 
 using glm::dvec2;
 using glm::dvec3;
-
-struct Sample {
-    bool valid = false;
-    double depth = 0, radius = 0, thickness = 0;  ///< thickness in world units
-    dvec2 centre{0};                              ///< of the splat, pixels of the full-size image
-    dvec2 perp{0};
-    dvec3 colour{0};
-};
-
-struct Level {
-    int width = 0, height = 0;
-    std::vector<Sample> samples;
-    const Sample* at(int x, int y) const {
-        return x < 0 || y < 0 || x >= width || y >= height
-                   ? nullptr
-                   : &samples[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)];
-    }
-    Sample& ref(int x, int y) {
-        return samples[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)];
-    }
-};
-
-/// The rotation that takes the unit vector v to z the shortest way (Rodrigues).
-glm::dmat3 rotationToZ(const dvec3& v) {
-    const dvec3 axis(v.y, -v.x, 0);  // v x z
-    const double c = v.z;
-    const glm::dmat3 k(dvec3(0, axis.z, -axis.y), dvec3(-axis.z, 0, axis.x), dvec3(axis.y, -axis.x, 0));
-    return glm::dmat3(1) + k + k * k * (1 / (1 + c));
-}
 
 /// rho^2 of a point in the ellipse of a sample.
 double rhoSquared(const Sample& s, const dvec2& point) {
@@ -158,7 +130,7 @@ class ReferenceBackend final : public render::Backend {
     std::string name() const override { return "reference"; }
     std::string device() const override { return "fp64 reference, scalar"; }
     Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override {
-        chunks_[uint64_t{key.source} << 32 | key.node] = chunk.records;
+        chunks_[uint64_t{key.source} << 32 | key.node] = chunk;
         return {};
     }
     void evict(streaming::ChunkKey key) override { chunks_.erase(uint64_t{key.source} << 32 | key.node); }
@@ -170,6 +142,7 @@ class ReferenceBackend final : public render::Backend {
         const bool hasPyramid =
             std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
         Level level0 = projectAll(draws);
+        projectMeshes(draws, chunks_, level0);
         const Level own = level0;
         if (hasPyramid) reconstruct(level0);
         shade(draws, own, level0, request.wantDepthAndNormal, image);
@@ -188,7 +161,7 @@ class ReferenceBackend final : public render::Backend {
             const lod::Instance& instance = draws.instances[cut.instance];
             const lod::Hierarchy& h = *draws.hierarchies[instance.hierarchy];
             const lod::Node& node = h.nodes[cut.node];
-            const auto& records = chunks_.at(uint64_t{instance.source} << 32 | cut.node);
+            const auto& records = chunks_.at(uint64_t{instance.source} << 32 | cut.node).records;
             for (uint32_t i = 0; i < cut.count; ++i) {
                 const Disc disc = decodeDisc(h, node, records[i]);
                 if (disc.errorCode > cut.errorCode && !(cut.octantMask >> disc.octant & 1u)) continue;
@@ -271,6 +244,8 @@ class ReferenceBackend final : public render::Backend {
                                                       : dvec3(0.2);
                     } else if (f.debugView == shared::kDebugNormals) {
                         colour = 0.5 + 0.5 * dvec3(n.x, -n.y, -n.z);
+                    } else if (s.isTriangle && f.debugView == shared::kDebugNone) {
+                        colour = shadeTriangle(s, n, toPixel * (s.depth / toPixel.z), draws);
                     } else if ((f.shade & shared::kShadeLit) != 0 && f.debugView == shared::kDebugNone) {
                         colour *= lightOn(n, f);
                     }
@@ -291,11 +266,18 @@ class ReferenceBackend final : public render::Backend {
     }
 
     Executor& executor_;
-    std::unordered_map<uint64_t, std::vector<shared::PointRecord>> chunks_;
+    Chunks chunks_;
     std::vector<render::PassTime> times_;
 };
 
 }  // namespace
+
+glm::dmat3 rotationToZ(const dvec3& v) {
+    const dvec3 axis(v.y, -v.x, 0);  // v x z
+    const double c = v.z;
+    const glm::dmat3 k(dvec3(0, axis.z, -axis.y), dvec3(-axis.z, 0, axis.x), dvec3(axis.y, -axis.x, 0));
+    return glm::dmat3(1) + k + k * k * (1 / (1 + c));
+}
 
 std::unique_ptr<render::Backend> makeReferenceBackend(Executor& executor) {
     return std::make_unique<ReferenceBackend>(executor);

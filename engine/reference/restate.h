@@ -1,0 +1,49 @@
+// What the parts of the restating backend share: one sample a pixel, before and after reconstruction.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <unordered_map>
+#include <vector>
+
+#include "engine/render/draw_list.h"
+#include "lod/chunk.h"
+
+namespace stipple::reference {
+
+struct Sample {
+    bool valid = false;
+    double depth = 0, radius = 0, thickness = 0;  ///< thickness in world units
+    glm::dvec2 centre{0};                         ///< of the splat, pixels of the full-size image
+    glm::dvec2 perp{0};
+    glm::dvec3 colour{0};
+    // Of a triangle's pixel:
+    bool isTriangle = false, isUnlit = false;
+    double metallic = 0, roughness = 1, occlusion = 1;
+    glm::dvec3 emissive{0};
+};
+
+struct Level {
+    int width = 0, height = 0;
+    std::vector<Sample> samples;
+    const Sample* at(int x, int y) const {
+        return x < 0 || y < 0 || x >= width || y >= height
+                   ? nullptr
+                   : &samples[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)];
+    }
+    Sample& ref(int x, int y) {
+        return samples[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)];
+    }
+};
+
+using Chunks = std::unordered_map<uint64_t, lod::Chunk>;  ///< by source << 32 | chunk
+
+/// The rotation that takes the unit vector v to z the shortest way (Rodrigues).
+glm::dmat3 rotationToZ(const glm::dvec3& v);
+
+/// Triangles of the cut into the level: nearest surface at each pixel's centre.
+void projectMeshes(const render::DrawList& draws, const Chunks& chunks, Level& level);
+
+/// Light from a triangle's pixel to the eye. `n`: towards the eye; `point`: camera space.
+glm::dvec3 shadeTriangle(const Sample& s, const glm::dvec3& n, const glm::dvec3& point, const render::DrawList& draws);
+
+}  // namespace stipple::reference
