@@ -7,6 +7,7 @@
 #include <cstring>
 #include <unordered_map>
 
+#include "engine/gpu/mesh_frame.h"
 #include "engine/gpu/pages.h"
 #include "engine/gpu/pass_list.h"
 #include "engine/gpu/pipelines.h"
@@ -15,6 +16,7 @@ namespace stipple::gpu {
 namespace {
 
 constexpr VkBufferUsageFlags kStorage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
+constexpr uint32_t kLargeCapacity = 65536, kLargeGroups = 64, kLargeRows = 16;  // see shaders/rasterise
 constexpr uint32_t kGroup = 64, kGroupsPerDimension = 65535;
 
 uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | key.node; }
@@ -49,7 +51,12 @@ class GpuBackend final : public render::Backend {
     Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override {
         STIPPLE_ASSIGN(const PageStore::Place place, pages_.allocate(chunk.sizeBytes()));
         places_[chunkId(key)] = place;
-        pending_.push_back({place, chunk.records});
+        pending_.push_back({place, bytesOf(chunk)});
+        if (!chunk.clusters.empty()) {
+            const VkDeviceAddress address = pages_.address(place);
+            meshChunks_[chunkId(key)] = {address, address + chunk.vertices.size() * sizeof(shared::MeshVertex),
+                                         chunk.clusters};
+        }
         return {};
     }
     void evict(streaming::ChunkKey key) override {
@@ -59,6 +66,7 @@ class GpuBackend final : public render::Backend {
         });
         pages_.release(found->second);
         places_.erase(found);
+        meshChunks_.erase(chunkId(key));
     }
 
     Result<void> render(const render::RenderRequest& request, render::Image& image) override {
@@ -79,6 +87,19 @@ class GpuBackend final : public render::Backend {
     }
 
   private:
+    static std::vector<uint8_t> bytesOf(const lod::Chunk& chunk) {
+        std::vector<uint8_t> bytes;
+        const auto append = [&](const auto& values) {
+            const auto* from = reinterpret_cast<const uint8_t*>(values.data());
+            bytes.insert(bytes.end(), from, from + values.size() * sizeof(values[0]));
+        };
+        append(chunk.records);
+        append(chunk.vertices);
+        append(chunk.triangles);
+        append(chunk.texels);
+        return bytes;
+    }
+
     GpuBackend(std::unique_ptr<Device> device, const GpuSettings& settings)
         : device_(std::move(device)), pages_(*device_), omitBarriersBefore_(settings.omitBarriersBefore) {}
 
@@ -147,12 +168,41 @@ class GpuBackend final : public render::Backend {
         }
         if (!draws.blocks.empty())
             std::memcpy(blockBuffer_.mapped(), draws.blocks.data(), draws.blocks.size() * sizeof(shared::DrawBlock));
+        if (!draws.meshDraws.empty()) STIPPLE_TRY(prepareMeshes(draws, pixels));
         if (descriptorsChanged_) {
-            pipelines_->writeDescriptors(
-                {&frameBuffer_, &nodeBuffer_, &blockBuffer_, &visibility_, &texels_, &stats_, &image_, &extra_});
+            const auto bound = [&](const Buffer& b) { return b.bytes() > 0 ? &b : &stats_; };  // unused: anything
+            pipelines_->writeDescriptors({&frameBuffer_, &nodeBuffer_, &blockBuffer_, &visibility_, &texels_, &stats_,
+                                          &image_, &extra_, bound(meshes_), bound(clusters_), bound(materials_),
+                                          bound(textures_), bound(tiles_), bound(lights_), bound(surfaces_),
+                                          bound(large_)});
             descriptorsChanged_ = false;
         }
         return {};
+    }
+
+    /// Buffers and pipelines that only triangles need.
+    Result<void> prepareMeshes(const render::DrawList& draws, uint64_t pixels) {
+        STIPPLE_TRY(pipelines_->addMeshPasses());
+        meshFrame_.fill(
+            draws, [&](streaming::ChunkKey key) -> const MeshChunk& { return meshChunks_.at(chunkId(key)); },
+            [&](uint32_t source, uint32_t chunk) -> VkDeviceAddress {
+                const auto found = places_.find(chunkId({source, chunk}));
+                return found == places_.end() ? 0 : pages_.address(found->second);
+            });
+        const auto fill = [&](Buffer& buffer, const auto* data, size_t count, const char* name) -> Result<void> {
+            STIPPLE_TRY(ensure(buffer, count * sizeof(*data), kStorage, true, name));
+            if (count > 0) std::memcpy(buffer.mapped(), data, count * sizeof(*data));
+            return {};
+        };
+        STIPPLE_TRY(fill(meshes_, draws.meshes.data(), draws.meshes.size(), "draw meshes"));
+        STIPPLE_TRY(fill(clusters_, meshFrame_.clusters.data(), meshFrame_.clusters.size(), "draw clusters"));
+        STIPPLE_TRY(fill(materials_, draws.materials.data(), draws.materials.size(), "materials"));
+        STIPPLE_TRY(fill(textures_, meshFrame_.textures.data(), meshFrame_.textures.size(), "textures"));
+        STIPPLE_TRY(fill(tiles_, meshFrame_.tiles.data(), meshFrame_.tiles.size(), "texture tiles"));
+        STIPPLE_TRY(fill(lights_, draws.lights.data(), draws.lights.size(), "lights"));
+        STIPPLE_TRY(ensure(surfaces_, pixels * 8, kStorage, false, "surfaces"));
+        return ensure(large_, 4 + uint64_t{kLargeCapacity} * 40, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false,
+                      "large triangles");
     }
 
     Result<void> begin() {
@@ -167,13 +217,13 @@ class GpuBackend final : public render::Backend {
 
     Result<void> recordUploads(PassList& list) {
         uint64_t bytes = 0;
-        for (const PendingUpload& p : pending_) bytes += p.records.size() * sizeof(shared::PointRecord);
+        for (const PendingUpload& p : pending_) bytes += p.bytes.size();
         STIPPLE_TRY(ensure(staging_, bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, true, "staging"));
         list.begin("upload", {}, true);
         uint64_t at = 0;
         for (const PendingUpload& p : pending_) {
-            const uint64_t size = p.records.size() * sizeof(shared::PointRecord);
-            std::memcpy(static_cast<char*>(staging_.mapped()) + at, p.records.data(), size);
+            const uint64_t size = p.bytes.size();
+            std::memcpy(static_cast<char*>(staging_.mapped()) + at, p.bytes.data(), size);
             const VkBufferCopy region{at, p.place.offset, size};
             vkCmdCopyBuffer(commands_, staging_.handle(), pages_.buffer(p.place), 1, &region);
             at += size;
@@ -187,10 +237,11 @@ class GpuBackend final : public render::Backend {
         vkCmdDispatch(commands_, (width + kGroup - 1) / kGroup, height, 1);
     }
 
-    void pushStep(size_t level, bool hasPyramid, bool wantAll) {
+    /// `clusters`: instead of the fine level's offset, for the pass that needs no level.
+    void pushStep(size_t level, bool hasPyramid, bool wantAll, uint32_t clusters = 0) {
         const Level& fine = levels_[level];
         const Level& coarse = levels_[std::min(level + 1, levels_.size() - 1)];
-        const StepConstants step{fine.offset,
+        const StepConstants step{clusters > 0 ? clusters : fine.offset,
                                  fine.width,
                                  fine.height,
                                  coarse.offset,
@@ -221,11 +272,32 @@ class GpuBackend final : public render::Backend {
                                   (blocks + kGroupsPerDimension - 1) / kGroupsPerDimension, 1);
                 break;
             }
-            case render::Pass::rasterise:
-                return;
+            case render::Pass::rasterise: {
+                list.begin("large list", {write(large_)}, true);
+                vkCmdFillBuffer(commands_, large_.handle(), 0, 4, 0);
+                list.end();
+                const auto clusters = static_cast<uint32_t>(meshFrame_.clusters.size());
+                list.begin("rasterise", {write(visibility_), write(large_)}, false);
+                pipelines_->use(commands_, "rasterise");
+                pushStep(0, hasPyramid, wantAll, clusters);
+                vkCmdDispatch(commands_, std::min(clusters, kGroupsPerDimension),
+                              (clusters + kGroupsPerDimension - 1) / kGroupsPerDimension, 1);
+                list.end();
+                list.begin("rasterise large", {write(visibility_), read(large_)}, false);
+                pipelines_->use(commands_, "rasterise_large");
+                pushStep(0, hasPyramid, wantAll);
+                vkCmdDispatch(commands_, kLargeGroups, (levels_[0].height + kLargeRows - 1) / kLargeRows, 1);
+                break;
+            }
             case render::Pass::resolve:
                 list.begin("resolve", {read(visibility_), write(texels_), write(stats_)}, false);
                 pipelines_->use(commands_, "resolve");
+                pushStep(0, hasPyramid, wantAll);
+                dispatch(levels_[0].width, levels_[0].height);
+                if (draws.meshDraws.empty()) break;
+                list.end();
+                list.begin("surface", {read(visibility_), write(texels_), write(surfaces_)}, false);
+                pipelines_->use(commands_, "surface");
                 pushStep(0, hasPyramid, wantAll);
                 dispatch(levels_[0].width, levels_[0].height);
                 break;
@@ -252,6 +324,12 @@ class GpuBackend final : public render::Backend {
             case render::Pass::shade:
                 list.begin("shade", {read(texels_), write(image_), write(extra_)}, false);
                 pipelines_->use(commands_, "shade");
+                pushStep(0, hasPyramid, wantAll);
+                dispatch(levels_[0].width, levels_[0].height);
+                if (draws.meshDraws.empty()) break;
+                list.end();
+                list.begin("light", {read(texels_), read(surfaces_), write(image_), write(extra_)}, false);
+                pipelines_->use(commands_, "light");
                 pushStep(0, hasPyramid, wantAll);
                 dispatch(levels_[0].width, levels_[0].height);
                 break;
@@ -324,7 +402,7 @@ class GpuBackend final : public render::Backend {
 
     struct PendingUpload {
         PageStore::Place place;
-        std::vector<shared::PointRecord> records;
+        std::vector<uint8_t> bytes;
     };
 
     std::unique_ptr<Device> device_;  // first: everything below is destroyed before it
@@ -333,6 +411,9 @@ class GpuBackend final : public render::Backend {
     std::unordered_map<uint64_t, PageStore::Place> places_;
     std::vector<PendingUpload> pending_;
     Buffer frameBuffer_, nodeBuffer_, blockBuffer_, visibility_, texels_, stats_, image_, extra_, readback_, staging_;
+    Buffer meshes_, clusters_, materials_, textures_, tiles_, lights_, surfaces_, large_;  // only with triangles
+    std::unordered_map<uint64_t, MeshChunk> meshChunks_;
+    MeshFrame meshFrame_;
     VkCommandPool commandPool_ = VK_NULL_HANDLE;
     VkCommandBuffer commands_ = VK_NULL_HANDLE;
     VkFence fence_ = VK_NULL_HANDLE;

@@ -19,6 +19,19 @@ constexpr uint32_t kShade[] = {
 #include "shade.inc"
 };
 
+constexpr uint32_t kRasterise[] = {
+#include "rasterise.inc"
+};
+constexpr uint32_t kRasteriseLarge[] = {
+#include "rasterise_large.inc"
+};
+constexpr uint32_t kSurface[] = {
+#include "surface.inc"
+};
+constexpr uint32_t kLight[] = {
+#include "light.inc"
+};
+
 }  // namespace
 
 Result<std::unique_ptr<Pipelines>> Pipelines::create(const Device& device) {
@@ -59,6 +72,14 @@ Result<std::unique_ptr<Pipelines>> Pipelines::create(const Device& device) {
     STIPPLE_TRY(p->add("push", kPush, std::size(kPush)));
     STIPPLE_TRY(p->add("shade", kShade, std::size(kShade)));
     return p;
+}
+
+Result<void> Pipelines::addMeshPasses() {
+    if (pipelines_.count("light") > 0) return {};
+    STIPPLE_TRY(add("rasterise", kRasterise, std::size(kRasterise)));
+    STIPPLE_TRY(add("rasterise_large", kRasteriseLarge, std::size(kRasteriseLarge)));
+    STIPPLE_TRY(add("surface", kSurface, std::size(kSurface)));
+    return add("light", kLight, std::size(kLight));
 }
 
 Result<void> Pipelines::add(const std::string& pass, const uint32_t* code, size_t words) {

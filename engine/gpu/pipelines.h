@@ -18,7 +18,7 @@ static_assert(sizeof(StepConstants) == 36);
 
 class Pipelines {
   public:
-    static constexpr size_t kBindings = 8;
+    static constexpr size_t kBindings = 16;
     static Result<std::unique_ptr<Pipelines>> create(const Device& device);
     ~Pipelines();
     Pipelines(const Pipelines&) = delete;
@@ -26,6 +26,9 @@ class Pipelines {
     /// In the order of the bindings.
     void writeDescriptors(const std::array<const Buffer*, kBindings>& buffers);
     void bind(VkCommandBuffer commands) const;
+    /// The passes that only triangles need; created at the first call.
+    Result<void> addMeshPasses();
+    size_t count() const { return pipelines_.size(); }
     void use(VkCommandBuffer commands, const std::string& pass) const;
     void push(VkCommandBuffer commands, const StepConstants& step) const;
 

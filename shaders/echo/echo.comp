@@ -43,6 +43,8 @@ void main() {
     put(frame.skyDirection);
     put(frame.background);
     put(frame.blockCount);
+    put(frame.lightCount);
+    put(frame.ambient);
     put(node.axisX);
     put(node.axisY);
     put(node.axisZ);

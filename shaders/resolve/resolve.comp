@@ -15,7 +15,7 @@ void main() {
     t.normalPerp = vec2(0.0);
     t.colour = vec3(0.0);
     const uint64_t key = visibility[pixel.y * frame.width + pixel.x];
-    if (key != ~uint64_t(0)) {
+    if ((uint(key) & 0xe0000000u) == 0u) {  // a point; triangles come later, and nothing has all bits set
         const uint id = uint(key) & 0x1fffffffu;
         const DrawBlock source = blocks[id / kRecordsPerBlock];
         const DrawNode node = nodes[source.node];

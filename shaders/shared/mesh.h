@@ -54,6 +54,20 @@ struct DrawMesh {
     float mirror;  // -1 where the instance mirrors, else 1
 };
 
+// One cluster of the frame as the gpu backend sees it: one block of 256 draw ids.
+struct DrawCluster {
+    uint mesh;         // index of its DrawMesh
+    uint counts;       // vertices | triangles << 16
+    uint verticesLow;  // device address of its first vertex
+    uint verticesHigh;
+    uint trianglesLow;  // and of its first triangle
+    uint trianglesHigh;
+    uint firstTexture;  // of its store's textures
+    uint firstTile;     // of its store's tiles
+    uint level;
+    float errorPixels;
+};
+
 const uint kKindTriangle = 0x20000000u;  // bits 29 to 31 of a visibility id
 const uint kKindMask = 0xe0000000u;
 

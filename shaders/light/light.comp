@@ -1,0 +1,45 @@
+// Pixels that show triangles, after shade: their light instead of what shade made of them.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "../mesh.glsl"
+layout(local_size_x = 64) in;
+
+void main() {
+    const uvec2 pixel = gl_GlobalInvocationID.xy;
+    if (pixel.x >= frame.width || pixel.y >= frame.height || frame.debugView != kDebugNone) return;
+    const uint place = pixel.y * frame.width + pixel.x;
+    const uint word = surfaces[2u * place];
+    if (word == 0u) return;
+    const Texel own = loadTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, int(pixel.x), int(pixel.y));
+    // A splat may stand in front of it.
+    if (stepInfo.hasPyramid != 0u && pushedTexel(ivec2(pixel), own).depth != own.depth) return;
+    vec3 colour = own.colour;
+    if ((word & kPixelUnlit) == 0u && (frame.shade & kShadeTriangles) != 0u) {
+        const vec3 ray = rayThrough(pixel);
+        const vec3 v = normalize(ray);
+        const vec3 point = ray * own.depth;
+        Surface s;
+        s.colour = own.colour;
+        s.normal = normalFromPerp(own.normalPerp, v);
+        s.toEye = -v;
+        s.metallic = float(word & 255u) / 255.0;
+        s.roughness = float(word >> 8 & 255u) / 255.0;
+        s.occlusion = float(word >> 16 & 255u) / 255.0;
+        colour = frame.ambient * reflectSky(s, frame.skyDirection);
+        if (frame.lightCount == 0u) colour += reflectLight(s, frame.sunDirection, vec3(0.75));
+        for (uint k = 0u; k < frame.lightCount; ++k) {
+            const LightSource light = lights[k];
+            const vec3 l = light.kind == kLightDirectional ? light.position : light.position - point;
+            colour += reflectLight(s, normalize(l), light.colour * lightAt(light, point, own.depth));
+        }
+        const uint e = surfaces[2u * place + 1u];
+        colour += vec3(unpackRed(e), unpackGreen(e), unpackBlue(e));
+    }
+    const vec3 c = clamp(colour, 0.0, 1.0);
+    const uvec3 bytes = uvec3(vec3(srgbFromLinear(c.x), srgbFromLinear(c.y), srgbFromLinear(c.z)) * 255.0 + 0.5);
+    image[place] = bytes.x | bytes.y << 8 | bytes.z << 16 | 0xff000000u;
+    if (stepInfo.wantExtra == 0u) return;
+    extra[7u * place + 4u] = colour.x;
+    extra[7u * place + 5u] = colour.y;
+    extra[7u * place + 6u] = colour.z;
+}

@@ -1,0 +1,121 @@
+// What the passes that know triangles see beyond bindings.glsl.
+#include "bindings.glsl"
+#include "shared/material.h"
+#include "shared/mesh.h"
+#include "shared/texture.h"
+
+// A triangle that many threads fill together: corners in 1/256 pixel, oriented so that the inside is positive.
+struct LargeTriangle {
+    int x0;
+    int y0;
+    int x1;
+    int y1;
+    int x2;
+    int y2;
+    float inverseDepth0;
+    float inverseDepth1;
+    float inverseDepth2;
+    uint id;
+};
+
+layout(set = 0, binding = 8, scalar) readonly buffer MeshBlock { DrawMesh meshes[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer ClusterBlock { DrawCluster clusters[]; };
+layout(set = 0, binding = 10, scalar) readonly buffer MaterialBlock { SurfaceMaterial materials[]; };
+layout(set = 0, binding = 11, scalar) readonly buffer TextureBlock { TextureInfo textures[]; };
+layout(set = 0, binding = 12, scalar) readonly buffer TileBlock { uvec2 tiles[]; };  // addresses; 0: not resident
+layout(set = 0, binding = 13, scalar) readonly buffer LightBlock { LightSource lights[]; };
+layout(set = 0, binding = 14, scalar) buffer SurfaceBlock { uint surfaces[]; };  // two words a pixel
+layout(set = 0, binding = 15, scalar) buffer LargeBlock {
+    uint largeCount;
+    LargeTriangle large[];
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Vertices { MeshVertex vertices[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Words { uint words[]; };
+
+// Of a pixel's first surface word: metallic 8 | roughness 8 | occlusion 8 | these.
+const uint kPixelTriangle = 0x80000000u;
+const uint kPixelUnlit = 0x40000000u;
+const uint kLargeCapacity = 65536u;
+
+vec4 decodeTexel(uint c, bool isColour) {
+    vec4 v = vec4(float(c & 255u), float(c >> 8 & 255u), float(c >> 16 & 255u), float(c >> 24)) / 255.0;
+    if (isColour) v.xyz = vec3(linearFromSrgb(v.x), linearFromSrgb(v.y), linearFromSrgb(v.z));
+    return v;
+}
+
+bool sampleLevel(TextureInfo info, uint firstTile, uint level, float u, float v, out vec4 result) {
+    const TextureTap tap = textureTap(info, level, u, v);
+    const uvec2 address = tiles[firstTile + tap.tile];
+    result = vec4(0.0);
+    if (address == uvec2(0u)) return false;
+    Words tile = Words(address);
+    const uint at = tap.y * kTileEdge + tap.x;
+    const bool isColour = info.isColour != 0u;
+    result = mix(mix(decodeTexel(tile.words[at], isColour), decodeTexel(tile.words[at + 1u], isColour), tap.fx),
+                 mix(decodeTexel(tile.words[at + kTileEdge], isColour), decodeTexel(tile.words[at + kTileEdge + 1u], isColour), tap.fx), tap.fy);
+    return true;
+}
+
+// Trilinear, from the finest tiles that are there; false if none is.
+bool sampleTexture(DrawCluster c, TextureSlot slot, vec2 uv, float footprint, out vec4 result) {
+    result = vec4(1.0);
+    if (slot.texture == 0u) return false;
+    const TextureInfo info = textures[c.firstTexture + slot.texture - 1u];
+    const float su = slot.rowU.x * uv.x + slot.rowU.y * uv.y + slot.rowU.z;
+    const float sv = slot.rowV.x * uv.x + slot.rowV.y * uv.y + slot.rowV.z;
+    const float lod = min(textureLod(footprint * float(max(info.width, info.height))), float(info.levels - 1u));
+    uint level = uint(lod);
+    const float between = lod - float(level);
+    bool isThere = sampleLevel(info, c.firstTile, level, su, sv, result);
+    if (isThere) {
+        vec4 coarse;
+        if (between > 0.0 && level + 1u < info.levels && sampleLevel(info, c.firstTile, level + 1u, su, sv, coarse))
+            result = mix(result, coarse, between);
+        return true;
+    }
+    while (!isThere && level + 1u < info.levels) isThere = sampleLevel(info, c.firstTile, ++level, su, sv, result);
+    return isThere;
+}
+
+vec3 rayThrough(uvec2 pixel) {
+    return vec3((float(pixel.x) + 0.5 - frame.centre.x) / frame.focal, (float(pixel.y) + 0.5 - frame.centre.y) / frame.focal, 1.0);
+}
+
+// Does an alpha mask leave the triangle at this pixel?
+bool isKept(DrawCluster c, MeshVertex va, MeshVertex vb, MeshVertex vc, uvec2 pixel) {
+    const DrawMesh m = meshes[c.mesh];
+    const SurfaceMaterial material = materials[m.firstMaterial + (va.surface & kSurfaceMaterialMask)];
+    const vec3 ray = rayThrough(pixel);
+    const vec3 a = meshPosition(va.x, va.y, va.z, m);
+    const vec3 e1 = meshPosition(vb.x, vb.y, vb.z, m) - a;
+    const vec3 e2 = meshPosition(vc.x, vc.y, vc.z, m) - a;
+    const vec2 w = triangleWeights(ray, a, a + e1, a + e2);
+    const float wa = 1.0 - w.x - w.y;
+    float alpha = material.alpha * (wa * float(va.colour >> 24) + w.x * float(vb.colour >> 24) + w.y * float(vc.colour >> 24)) / 255.0;
+    const float footprint = uvFootprint(ray, 1.0 / frame.focal, a, e1, e2, vec2(vb.u - va.u, vb.v - va.v), vec2(vc.u - va.u, vc.v - va.v));
+    vec4 s;
+    if (sampleTexture(c, material.baseTexture, vec2(wa * va.u + w.x * vb.u + w.y * vc.u, wa * va.v + w.x * vb.v + w.y * vc.v), footprint, s))
+        alpha *= s.w;
+    return alpha >= material.alphaCutoff;
+}
+
+// Edge functions of an oriented triangle at a pixel's centre, in 64 bits: exact for every corner within the guard band.
+bool isCovered(LargeTriangle t, int x, int y, out float inverseDepth) {
+    const int64_t px = int64_t(x) * 256l + 128l;
+    const int64_t py = int64_t(y) * 256l + 128l;
+    const int64_t x0 = int64_t(t.x0), y0 = int64_t(t.y0), x1 = int64_t(t.x1), y1 = int64_t(t.y1), x2 = int64_t(t.x2), y2 = int64_t(t.y2);
+    const int64_t w0 = (x2 - x1) * (py - y1) - (y2 - y1) * (px - x1);
+    const int64_t w1 = (x0 - x2) * (py - y2) - (y0 - y2) * (px - x2);
+    const int64_t w2 = (x1 - x0) * (py - y0) - (y1 - y0) * (px - x0);
+    const int64_t b0 = isTopLeft(t.x2 - t.x1, t.y2 - t.y1) ? 0l : 1l;
+    const int64_t b1 = isTopLeft(t.x0 - t.x2, t.y0 - t.y2) ? 0l : 1l;
+    const int64_t b2 = isTopLeft(t.x1 - t.x0, t.y1 - t.y0) ? 0l : 1l;
+    const int64_t area = (x1 - x0) * (y2 - y0) - (y1 - y0) * (x2 - x0);
+    inverseDepth = (float(w0) * t.inverseDepth0 + float(w1) * t.inverseDepth1 + float(w2) * t.inverseDepth2) / float(area);
+    return w0 >= b0 && w1 >= b1 && w2 >= b2;
+}
+
+void offer(int x, int y, float inverseDepth, uint id) {
+    atomicMin(visibility[uint(y) * frame.width + uint(x)], uint64_t(floatBitsToUint(1.0 / inverseDepth)) << 32 | uint64_t(id));
+}
