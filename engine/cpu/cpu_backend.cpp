@@ -83,6 +83,16 @@ class CpuBackend final : public render::Backend {
     }
     const std::vector<render::PassTime>& passTimes() const override { return times_; }
 
+    render::BackendResources resources() const override {
+        render::BackendResources r;
+        r.meshBytes = surfacePixels_ * 4 + meshBlocks_.size() * sizeof(MeshBlock);
+        r.emissiveBytes = emissivePixels_ * 4;
+        for (const auto& tiles : tiles_)
+            r.textureTiles += static_cast<uint64_t>(
+                std::count_if(tiles.begin(), tiles.end(), [](const uint32_t* t) { return t != nullptr; }));
+        return r;
+    }
+
     Result<void> render(const render::RenderRequest& request, render::Image& image) override {
         draws_ = request.draws;
         frame_ = draws_->frame;

@@ -48,6 +48,15 @@ class GpuBackend final : public render::Backend {
     const std::vector<render::PassTime>& passTimes() const override { return times_; }
     std::vector<std::string> messages() const { return device_->messages(); }
 
+    render::BackendResources resources() const override {
+        render::BackendResources r;
+        r.meshPipelines = pipelines_->count() - Pipelines::kPointPasses;
+        for (const Buffer* b : {&meshes_, &clusters_, &materials_, &textures_, &tiles_, &lights_, &surfaces_, &large_})
+            r.meshBytes += b->bytes();
+        for (const auto& t : meshFrame_.tiles) r.textureTiles += t.low != 0 || t.high != 0;
+        return r;
+    }
+
     Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override {
         STIPPLE_ASSIGN(const PageStore::Place place, pages_.allocate(chunk.sizeBytes()));
         places_[chunkId(key)] = place;

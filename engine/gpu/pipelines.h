@@ -18,7 +18,7 @@ static_assert(sizeof(StepConstants) == 36);
 
 class Pipelines {
   public:
-    static constexpr size_t kBindings = 16;
+    static constexpr size_t kBindings = 16, kPointPasses = 5;
     static Result<std::unique_ptr<Pipelines>> create(const Device& device);
     ~Pipelines();
     Pipelines(const Pipelines&) = delete;

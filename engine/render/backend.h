@@ -44,12 +44,21 @@ struct RenderRequest {
     bool wantDepthAndNormal = false;
 };
 
+/// What a backend holds beyond what every frame needs: 0 for what no scene has called for yet.
+struct BackendResources {
+    uint64_t meshPipelines = 0;  ///< compiled for triangles
+    uint64_t meshBytes = 0;      ///< per-pixel and per-frame buffers for triangles
+    uint64_t emissiveBytes = 0;  ///< per-pixel buffer for shining materials
+    uint64_t textureTiles = 0;   ///< resident
+};
+
 class Backend : public streaming::ChunkSink {
   public:
     virtual std::string name() const = 0;    ///< "cpu", "gpu", "reference"
     virtual std::string device() const = 0;  ///< for a person
     /// Draws into `image`, whose storage is reused.
     virtual Result<void> render(const RenderRequest& request, Image& image) = 0;
+    virtual BackendResources resources() const { return {}; }
     /// Of the last render.
     virtual const std::vector<PassTime>& passTimes() const = 0;
 };

@@ -8,6 +8,7 @@
 #include "engine/gpu/gpu_backend.h"
 #include "engine/gpu/pages.h"
 #include "engine/reference/reference.h"
+#include "tests/support/meshes.h"
 #include "tests/support/support.h"
 
 namespace stipple::gpu {
@@ -54,6 +55,45 @@ TEST_F(Gpu, DrawsAsTheOracleDrawsAndValidationIsSilent) {
                     << "tau " << tau << " debug " << debug;
                 if (debug == shared::kDebugNone) EXPECT_GE(d->psnr, 50) << "tau " << tau;
             }
+    for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
+}
+
+TEST_F(Gpu, DrawsMeshesAndHybridScenesAsTheOracleDoesAndOnlyThenHasWhatTheyNeed) {
+    const auto gpu = make();
+    const auto oracle = reference::makeReferenceBackend(*executor_);
+    render::FrameSettings settings;
+    draw(*gpu, settings);  // points alone
+    EXPECT_EQ(gpu->resources().meshPipelines, 0u);
+    EXPECT_EQ(gpu->resources().meshBytes, 0u);
+    for (const char* kind : {"rock", "building", "terrain"}) {
+        test::MeshRecipe recipe;
+        recipe.grow.kind = kind;
+        recipe.grow.triangles = 30'000;
+        recipe.grow.textureSize = 512;
+        const auto mesh = test::growMeshStore(recipe, folder_ / "b.stipple", *executor_);
+        const double size = glm::length(mesh->description.boundsMax - mesh->description.boundsMin);
+        lod::Instance place;
+        place.scale = 3 / size;  // about as large as the points, which it intersects
+        const std::vector<render::PlacedStore> placed{{store_, {}, {}}, {mesh, place, {}}};
+        lod::View view = test::fitView(*store_, 400, 300);
+        for (const double closer : {0.0, 2.2}) {  // the second has parts in front of the near plane
+            view.eye += closer * view.forward;
+            for (const bool hasLights : {false, true}) {
+                settings.draw.lights.clear();
+                if (hasLights) settings.draw.lights = {{shared::kLightPoint, {2, 2, 2}, {0, -1, 0}, glm::vec3(20)}};
+                const auto image = [&](render::Backend& backend) {
+                    auto state = render::makeFrameState(placed, backend, *executor_, {});
+                    EXPECT_TRUE(render::renderUntilComplete(*state, view, settings, *executor_));
+                    return state->image;
+                };
+                const auto d = reference::compareImages(image(*gpu), image(*oracle), 4, nullptr);
+                ASSERT_TRUE(d);
+                EXPECT_GE(d->psnr, 50) << kind << ", closer " << closer;
+                EXPECT_LE(d->differingFraction, 0.002) << kind << ", closer " << closer;
+            }
+        }
+    }
+    EXPECT_EQ(gpu->resources().meshPipelines, 4u);
     for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
 }
 

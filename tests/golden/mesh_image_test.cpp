@@ -1,0 +1,207 @@
+// Triangles in pictures: as the fp64 oracle draws them, with points in one reconstruction, and at no cost where there
+// are none.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "engine/cpu/cpu_backend.h"
+#include "engine/cpu/kernels.h"
+#include "engine/image/image_io.h"
+#include "engine/reference/reference.h"
+#include "engine/scene/camera.h"
+#include "tests/support/meshes.h"
+
+namespace stipple {
+namespace {
+
+render::Image draw(const std::vector<render::PlacedStore>& placed, render::Backend& backend, Executor& executor,
+                   const lod::View& view, const render::FrameSettings& settings, FrameCounters* counters = nullptr) {
+    auto state = render::makeFrameState(placed, backend, executor, {});
+    const auto complete = render::renderUntilComplete(*state, view, settings, executor);
+    EXPECT_TRUE(complete && *complete);
+    if (counters) *counters = state->counters;
+    return state->image;
+}
+
+std::vector<render::WorldLight> threeLights(const glm::dvec3& at, double size) {
+    std::vector<render::WorldLight> lights(3);
+    lights[0].kind = shared::kLightDirectional;
+    lights[0].direction = glm::normalize(glm::dvec3(0.3, -1, -0.2));
+    lights[0].colour = {1.5f, 1.4f, 1.2f};
+    lights[1].position = at + glm::dvec3(size, size, size);
+    lights[1].colour = glm::vec3(0.5f, 0.8f, 2.0f) * static_cast<float>(size * size);
+    lights[1].range = static_cast<float>(4 * size);
+    lights[2].kind = shared::kLightSpot;
+    lights[2].position = at + glm::dvec3(-size, 0.5 * size, size);
+    lights[2].direction = glm::normalize(glm::dvec3(1, -0.5, -1));
+    lights[2].colour = glm::vec3(4, 1, 1) * static_cast<float>(size * size);
+    lights[2].innerCone = 0.2f;
+    lights[2].outerCone = 0.4f;
+    return lights;
+}
+
+TEST(MeshImages, AreThoseOfTheOracleOnEveryInstructionSet) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    const auto oracle = reference::makeReferenceBackend(*executor);
+    for (const char* kind : {"rock", "building", "terrain"}) {
+        test::MeshRecipe recipe;
+        recipe.grow.kind = kind;
+        recipe.grow.triangles = 50'000;
+        recipe.grow.textureSize = 512;
+        const auto store = test::growMeshStore(recipe, folder / "a.stipple", *executor);
+        const glm::dvec3 centre = 0.5 * (store->description.boundsMin + store->description.boundsMax);
+        const double size = glm::length(store->description.boundsMax - store->description.boundsMin);
+        lod::View fit = test::fitView(*store, 401, 303), close = fit;
+        close.eye = centre + 0.35 * (fit.eye - centre);  // parts behind the eye, parts in front of the near plane
+        for (const lod::View& view : {fit, close})
+            for (const double tau : {0.25, 8.0})
+                for (const bool hasLights : {false, true}) {
+                    render::FrameSettings settings;
+                    settings.budgets.errorPixels = tau;
+                    if (hasLights) settings.draw.lights = threeLights(centre, 0.5 * size);
+                    const render::Image expected = draw({{store, {}, {}}}, *oracle, *executor, view, settings);
+                    size_t count = 0;
+                    const cpu::Kernels* const* all = cpu::availableKernels(count);
+                    for (size_t k = 0; k < count; ++k) {
+                        const auto backend = cpu::makeCpuBackend(*executor, all[k]);
+                        const auto d = reference::compareImages(
+                            draw({{store, {}, {}}}, *backend, *executor, view, settings), expected, 4, nullptr);
+                        ASSERT_TRUE(d);
+                        EXPECT_GE(d->psnr, 55) << kind << ", " << all[k]->name << ", tau " << tau;
+                        EXPECT_LE(d->differingFraction, 0.001) << kind << ", " << all[k]->name << ", tau " << tau;
+                        EXPECT_GE(d->silhouetteIou, 0.9999);
+                    }
+                }
+    }
+}
+
+/// A scan with a boulder in it, as one hybrid scene.
+class Hybrid : public testing::Test {
+  protected:
+    void SetUp() override {
+        test::writePly(folder_ / "a.ply", test::bumpySphere(60'000, 1));
+        points_ = test::buildAndOpen(folder_ / "a.ply", folder_ / "a.stipple", *executor_, 1024);
+        test::MeshRecipe recipe;
+        recipe.grow.triangles = 40'000;
+        recipe.grow.textureSize = 256;
+        mesh_ = test::growMeshStore(recipe, folder_ / "b.stipple", *executor_);
+        lod::Instance place;
+        place.scale = 0.6;
+        place.translation = {0.75, -0.2, 0.5};
+        placed_ = {{points_, {}, {}}, {mesh_, place, {}}};
+        view_ = test::fitView(*points_, 480, 360);
+        view_.eye += 1.0 * view_.forward;
+        settings_.draw.lit = true;
+        settings_.draw.worldUp = {0, 1, 0};
+    }
+    test::TempFolder folder_;
+    std::unique_ptr<Executor> executor_ = makeTbbExecutor(0);
+    std::shared_ptr<const lod::Store> points_, mesh_;
+    std::vector<render::PlacedStore> placed_;
+    lod::View view_;
+    render::FrameSettings settings_;
+};
+
+TEST_F(Hybrid, PointsAndTrianglesOccludeEachOtherAsTheOracleSays) {
+    const auto backend = cpu::makeCpuBackend(*executor_);
+    const auto oracle = reference::makeReferenceBackend(*executor_);
+    for (const render::Mode mode : {render::Mode::pullpush, render::Mode::points}) {
+        settings_.mode = mode;
+        const auto d = reference::compareImages(draw(placed_, *backend, *executor_, view_, settings_),
+                                                draw(placed_, *oracle, *executor_, view_, settings_), 4, nullptr);
+        ASSERT_TRUE(d);
+        EXPECT_GE(d->psnr, 50);
+        EXPECT_LE(d->differingFraction, 0.001);
+    }
+    // A triangle's pixel in front of the points is the pixel of the mesh alone, to the last bit.
+    settings_.mode = render::Mode::pullpush;
+    settings_.wantDepthAndNormal = true;
+    const render::Image both = draw(placed_, *backend, *executor_, view_, settings_);
+    const render::Image mesh = draw({placed_[1]}, *backend, *executor_, view_, settings_);
+    const render::Image points = draw({placed_[0]}, *backend, *executor_, view_, settings_);
+    size_t inFront = 0, behind = 0;
+    for (size_t i = 0; i < both.rgba.size(); ++i) {
+        if (mesh.depth[i] > 0 && (points.depth[i] <= 0 || mesh.depth[i] < 0.9f * points.depth[i])) {
+            ++inFront;
+            EXPECT_EQ(both.rgba[i], mesh.rgba[i]);
+        } else if (mesh.depth[i] > 0 && points.depth[i] < 0.9f * mesh.depth[i]) {
+            ++behind;
+            EXPECT_NE(both.depth[i], mesh.depth[i]);
+        }
+    }
+    EXPECT_GT(inFront, 1000u);
+    EXPECT_GT(behind, 1000u);
+}
+
+TEST_F(Hybrid, GoldenLooksAsItDid) {
+    const auto backend = cpu::makeCpuBackend(*executor_);
+    const render::Image image = draw(placed_, *backend, *executor_, view_, settings_);
+    const std::string path = std::string(STIPPLE_SOURCE_DIR) + "/tests/golden/hybrid.png";
+    if (std::getenv("STIPPLE_RENEW_GOLDENS")) {
+        ASSERT_TRUE(image::writeImage(path, image));
+        FAIL() << path << " was written: look at it, then commit it";
+    }
+    const auto golden = image::readImage(path);
+    ASSERT_TRUE(golden) << golden.error().line();
+    const auto d = reference::compareImages(image, *golden, 8, nullptr);
+    ASSERT_TRUE(d);
+    EXPECT_LE(d->differingFraction, 0.002);
+    EXPECT_GT(d->psnr, 40);
+}
+
+TEST_F(Hybrid, WhatASceneDoesNotCallForDoesNotExist) {
+    const auto backend = cpu::makeCpuBackend(*executor_);
+    FrameCounters counters;
+    draw({placed_[0]}, *backend, *executor_, view_, settings_, &counters);  // points alone
+    EXPECT_EQ(counters.passes, 6u);
+    EXPECT_EQ(counters.trianglesDrawn, 0u);
+    EXPECT_EQ(backend->resources().meshBytes, 0u);
+    EXPECT_EQ(backend->resources().emissiveBytes, 0u);
+    EXPECT_EQ(backend->resources().textureTiles, 0u);
+    test::MeshRecipe plain;
+    plain.grow.triangles = 20'000;
+    plain.isTextured = false;
+    const auto untextured = test::growMeshStore(plain, folder_ / "c.stipple", *executor_);
+    EXPECT_EQ(untextured->hierarchy.tiles.size(), 0u);
+    draw({{untextured, {}, {}}}, *backend, *executor_, view_, settings_, &counters);  // no textures, no points
+    EXPECT_EQ(counters.passes, 4u);
+    EXPECT_EQ(counters.recordsDrawn, 0u);
+    EXPECT_GT(backend->resources().meshBytes, 0u);
+    EXPECT_EQ(backend->resources().emissiveBytes, 0u);
+    EXPECT_EQ(backend->resources().textureTiles, 0u);
+    draw({placed_[1]}, *backend, *executor_, view_, settings_, &counters);
+    EXPECT_EQ(counters.passes, 4u);
+    EXPECT_EQ(backend->resources().textureTiles, 0u) << "tiles outlive their frame state";
+    draw(placed_, *backend, *executor_, view_, settings_, &counters);
+    EXPECT_EQ(counters.passes, 7u);
+}
+
+TEST(MeshImages, TexturesAndChunksStayWithinTheResidentBudget) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    test::MeshRecipe recipe;
+    recipe.grow.kind = "terrain";
+    recipe.grow.triangles = 60'000;
+    recipe.grow.textureSize = 1024;
+    const auto store = test::growMeshStore(recipe, folder / "a.stipple", *executor);
+    const auto backend = cpu::makeCpuBackend(*executor);
+    streaming::StreamSettings stream;
+    stream.residentBytes = 1'200'000;
+    auto state = render::makeFrameState({render::PlacedStore{store, {}, {}}}, *backend, *executor, stream);
+    lod::View view = test::fitView(*store, 320, 240);
+    render::FrameSettings settings;
+    settings.budgets.errorPixels = 2;
+    uint64_t most = 0;
+    for (int k = 0; k < 40; ++k) {  // flies across
+        view.eye += 0.02 * glm::length(store->description.boundsMax - store->description.boundsMin) * view.forward;
+        ASSERT_TRUE(render::renderUntilComplete(*state, view, settings, *executor));
+        most = std::max(most, state->counters.residentBytes);
+    }
+    EXPECT_LE(most, stream.residentBytes);
+    EXPECT_GT(state->counters.evictions, 0u);
+    EXPECT_GT(backend->resources().textureTiles, 0u);
+}
+
+}  // namespace
+}  // namespace stipple
