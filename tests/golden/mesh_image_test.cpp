@@ -187,14 +187,19 @@ TEST(MeshImages, TexturesAndChunksStayWithinTheResidentBudget) {
     const auto store = test::growMeshStore(recipe, folder / "a.stipple", *executor);
     const auto backend = cpu::makeCpuBackend(*executor);
     streaming::StreamSettings stream;
-    stream.residentBytes = 1'200'000;
+    stream.residentBytes = 4'000'000;
     auto state = render::makeFrameState({render::PlacedStore{store, {}, {}}}, *backend, *executor, stream);
-    lod::View view = test::fitView(*store, 320, 240);
+    const glm::dvec3 lo = store->description.boundsMin, hi = store->description.boundsMax;
+    scene::Camera camera;
+    camera.eye = glm::dvec3(0.5 * (lo.x + hi.x), hi.y, 0.5 * (lo.z + hi.z));
+    camera.up = {0, 1, 0};
+    camera.fovDegrees = 25;
     render::FrameSettings settings;
     settings.budgets.errorPixels = 2;
     uint64_t most = 0;
-    for (int k = 0; k < 40; ++k) {  // flies across
-        view.eye += 0.02 * glm::length(store->description.boundsMax - store->description.boundsMin) * view.forward;
+    for (int k = 0; k < 60; ++k) {  // looks around, obliquely down
+        camera.target = camera.eye + glm::dvec3(std::cos(0.2 * k), -0.6, std::sin(0.2 * k));
+        const lod::View view = scene::makeView(camera, 320, 240, 0.1);
         ASSERT_TRUE(render::renderUntilComplete(*state, view, settings, *executor));
         most = std::max(most, state->counters.residentBytes);
     }
