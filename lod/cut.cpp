@@ -297,6 +297,15 @@ class Selector {
         }
     }
 
+    /// Is any of a refined group's runs drawn, not all replaced by finer ones?
+    bool drawsAny(const Hierarchy& h, uint32_t index) const {
+        for (uint32_t r = 0; r < h.groups[index].runs; ++r) {
+            const uint32_t producer = h.runs[h.groups[index].firstRun + r].producer;
+            if (producer == MeshRun::kOriginal || scratch_.groupState[producer] == kCoarse) return true;
+        }
+        return false;
+    }
+
     uint64_t meshCost(size_t i, const LocalView& local, int step) {
         refineGroups(i, local, step, [](uint32_t, int32_t) { return true; });
         uint64_t total = 0;
@@ -308,6 +317,7 @@ class Selector {
         const Hierarchy& h = hierarchyOf(instance);
         const uint32_t source = instances_[instance].source;
         const std::vector<uint8_t>& drawable = residency_.drawable[source];
+        const uint64_t missingBefore = cut_.counters.nodesMissing;
         refineGroups(instance, local, step, [&](uint32_t index, int32_t epsilon) {
             if (drawable[index]) {
                 cut_.keep.emplace_back(source, index);
@@ -321,7 +331,7 @@ class Selector {
             if (!isRoot) cut_.tauEffective = std::max(cut_.tauEffective, pixels);
             return false;
         });
-        if (!h.textures.empty()) wantTiles(instance, local);
+        if (!h.textures.empty()) wantTiles(instance, local, cut_.counters.nodesMissing == missingBefore);
         uint32_t last = MeshRun::kOriginal;
         drawnRuns(h, [&](uint32_t index, const MeshRun& run) {
             const bool isExact = run.producer == MeshRun::kOriginal;
@@ -339,7 +349,9 @@ class Selector {
 
     /// Texture tiles that the groups in view can show: from the level whose texels are about a pixel where the group is
     /// nearest to the coarsest, the part that its texture coordinates cover.
-    void wantTiles(uint32_t instance, const LocalView& local) {
+    /// Geometry comes first: while some of it is missing, only the coarsest level is asked for and nothing finer is
+    /// held on to, or the textures of coarse groups would fill the memory that fine groups need.
+    void wantTiles(uint32_t instance, const LocalView& local, bool isWhole) {
         const Hierarchy& h = hierarchyOf(instance);
         const uint32_t source = instances_[instance].source;
         std::vector<uint8_t>& seen = scratch_.tileSeen;
@@ -355,7 +367,7 @@ class Selector {
         };
         for (uint32_t index = 0; index < h.nodes.size(); ++index) {
             const MeshGroup& g = h.groups[index];
-            if (scratch_.groupState[index] != kRefined || g.textures == 0) continue;
+            if (scratch_.groupState[index] != kRefined || g.textures == 0 || !drawsAny(h, index)) continue;
             const double nearest =
                 std::max(glm::length(h.nodes[index].centre - local.eye) - h.nodes[index].radius, local.nearPlane);
             const double uvPerPixel = 0.5 * g.uvPerStep * nearest / local.focal;
@@ -376,7 +388,7 @@ class Selector {
                     return std::pair{tile(lo - texel), tile(hi + texel)};
                 };
                 // Parts that are seen at a slant, or farther away, take the coarser levels.
-                for (uint32_t level = t.levels; level-- > finest;) {
+                for (uint32_t level = t.levels; level-- > (isWhole ? finest : t.levels - 1);) {
                     const uint32_t across = shared::tilesAcross(t.width, level),
                                    down = shared::tilesAcross(t.height, level);
                     const auto [x0, x1] = range(g.lowU, g.highU, t.wrapU, shared::levelSize(t.width, level), across);
