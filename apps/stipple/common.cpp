@@ -45,6 +45,7 @@ void BuildOptions::addTo(CLI::App& app) {
     app.add_option("--surfels", surfels, "turn meshes (.gltf, .glb, .obj) into that many samples; 0: keep triangles")
         ->check(CLI::Range(uint64_t{0}, uint64_t{200'000'000}))
         ->capture_default_str();
+    app.add_flag("--only-points", onlyPoints, "of a PLY mesh take the vertices, as points");
     app.add_flag("--skip-bad", skipBad, "go on past corrupt chunks and files, and say what was lost");
 }
 

@@ -24,7 +24,7 @@ int report(const Error& error);
 struct BuildOptions {
     std::string memory = "2G", normals = "auto", radii = "auto", up, attributes = "none";
     int threads = 0;
-    bool skipBad = false;
+    bool skipBad = false, onlyPoints = false;
     uint64_t surfels = 0;
     void addTo(CLI::App& app);
     Result<lod::BuildSettings> settings() const;

@@ -15,6 +15,7 @@
 #include "lod/build/mesh/mesh_build.h"
 #include "lod/colour.h"
 #include "lod/import/import.h"
+#include "lod/import/ply_mesh.h"
 
 namespace stipple::app {
 namespace fs = std::filesystem;
@@ -44,9 +45,9 @@ namespace {
 /// `part`: which of the stores that these inputs give.
 Result<std::string> cachePath(const std::vector<std::string>& inputs, const BuildOptions& build,
                               const std::string& part) {
-    std::string key = part + "|" + build.normals + "|" + build.radii + "|" + build.up + "|" + build.attributes +
-                      (build.skipBad ? "|skip" : "|") + std::to_string(build.surfels) + STIPPLE_VERSION +
-                      fmt::format("|{}", lod::kStoreVersion);
+    std::string key = part + (build.onlyPoints ? "|points|" : "|") + build.normals + "|" + build.radii + "|" +
+                      build.up + "|" + build.attributes + (build.skipBad ? "|skip" : "|") +
+                      std::to_string(build.surfels) + STIPPLE_VERSION + fmt::format("|{}", lod::kStoreVersion);
     STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs(inputs));
     for (const std::string& input : files) {
         std::error_code error;
@@ -145,6 +146,19 @@ Result<lod::MeshBuildSettings> meshSettings(const scene::Scene& scene) {
 bool holds(const scene::Scene& scene, const scene::Placement& placed, scene::PrimitiveKind kind) {
     const auto& primitives = scene.meshes[static_cast<size_t>(placed.mesh)].primitives;
     return std::any_of(primitives.begin(), primitives.end(), [&](const auto& p) { return p.kind == kind; });
+}
+
+/// The triangles of a PLY file.
+Result<lod::BuildReport> buildPlyMesh(const std::string& input, const std::string& output, Executor& executor,
+                                      Progress& progress) {
+    lod::PlyMeshNotes notes;
+    STIPPLE_ASSIGN(lod::TriangleMesh mesh, lod::readPlyMesh(input, notes));
+    scene::Scene plain;
+    plain.path = input;
+    STIPPLE_ASSIGN(const lod::MeshBuildSettings settings, meshSettings(plain));
+    STIPPLE_ASSIGN(lod::BuildReport report, lod::buildMeshStore(std::move(mesh), output, settings, executor, progress));
+    if (notes.badFaces > 0) report.dropped["triangles with a corner that is no vertex"] = notes.badFaces;
+    return report;
 }
 
 /// Triangles of a scene: a mesh that stands in several places is built once and placed, all others are built as one.
@@ -278,9 +292,21 @@ lod::StoreDescription describe(const std::vector<render::PlacedStore>& placed) {
 
 }  // namespace
 
+namespace {
+
+/// One PLY file with faces, of which not only the vertices are wanted.
+Result<bool> isMeshPly(const std::vector<std::string>& inputs, const BuildOptions& build) {
+    if (inputs.size() != 1 || build.onlyPoints || fs::path(inputs[0]).extension() != ".ply") return false;
+    return lod::hasPlyFaces(inputs[0]);
+}
+
+}  // namespace
+
 Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const std::string& output,
                                   const BuildOptions& build, Executor& executor, Progress& progress) {
     STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
+    STIPPLE_ASSIGN(const bool isPlyMesh, isMeshPly(inputs, build));
+    if (isPlyMesh) return buildPlyMesh(inputs.front(), output, executor, progress);
     if (!isSceneFile(inputs.front()) || build.surfels > 0)
         return lod::buildStore(inputs, output, settings, executor, progress);
     if (inputs.size() > 1)
@@ -305,7 +331,15 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
         if (inputs.size() > 1 && (fs::path(input).extension() == ".stipple" || isSceneFile(input)))
             return fail(ErrorKind::usage, "a built scene and other inputs cannot be mixed", input,
                         "name one scene, or only raw inputs; a .gltf scene can place several stores");
-    if (isSceneFile(inputs.front())) {
+    STIPPLE_ASSIGN(const bool isPlyMesh, isMeshPly(inputs, build));
+    if (isPlyMesh) {
+        STIPPLE_ASSIGN(
+            std::shared_ptr<const lod::Store> store,
+            openCached(inputs, build, "triangles", showProgress, [&](const std::string& path, Progress& progress) {
+                return buildPlyMesh(inputs[0], path, executor, progress);
+            }));
+        scene.placed.push_back({std::move(store), {}, {}});
+    } else if (isSceneFile(inputs.front())) {
         STIPPLE_ASSIGN(scene.placed,
                        openSceneFile(inputs.front(), build, colour, executor, showProgress, scene.lights));
     } else {

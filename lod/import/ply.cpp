@@ -13,6 +13,7 @@
 
 #include "engine/base/file.h"
 #include "lod/import/import.h"
+#include "lod/import/ply_mesh.h"
 
 namespace stipple::lod {
 namespace {
@@ -290,6 +291,29 @@ class PlyReader {
         return count;
     }
 
+    /// Calls face(corners) for each row of the elements after the vertices that have a list of that name.
+    template <typename Face>
+    Result<void> readLists(const Face& face) {
+        bool isAfter = false;
+        for (const Element& element : header_.elements) {
+            if (isAfter) {
+                const auto list = std::find_if(element.properties.begin(), element.properties.end(), isCornerList);
+                wantedList_ = list == element.properties.end() ? nullptr : &*list;
+                for (uint64_t row = 0; row < element.count; ++row) {
+                    list_.clear();
+                    STIPPLE_TRY(readRow(element, nullptr));
+                    if (wantedList_) STIPPLE_TRY(face(element.name == "tristrips", list_));
+                }
+            }
+            isAfter = isAfter || &element == vertex_;
+        }
+        wantedList_ = nullptr;
+        return {};
+    }
+    static bool isCornerList(const Property& p) {
+        return p.isList && (p.name == "vertex_indices" || p.name == "vertex_index");
+    }
+
   private:
     tl::unexpected<Error> truncated() const {
         return fail(ErrorKind::input,
@@ -312,6 +336,15 @@ class PlyReader {
                 cursor_.skip(countSize);
                 if (!(count >= 0) || count * static_cast<double>(size) > static_cast<double>(cursor_.remaining()))
                     return truncated();
+                if (&p == wantedList_) {
+                    const size_t bytesWanted = static_cast<size_t>(count) * size;
+                    STIPPLE_ASSIGN(bytes, cursor_.peek(bytesWanted, available));
+                    if (available < bytesWanted) return truncated();
+                    for (size_t i = 0; i < static_cast<size_t>(count); ++i)
+                        list_.push_back(decode(bytes + i * size, p.type, swap));
+                    cursor_.skip(bytesWanted);
+                    continue;
+                }
                 for (auto left = static_cast<size_t>(count) * size; left > 0;) {
                     STIPPLE_ASSIGN(bytes, cursor_.peek(std::min(left, kBlockBytes), available));
                     if (available == 0) return truncated();
@@ -367,8 +400,10 @@ class PlyReader {
             if (!number(value)) return badNumber(element);
             if (p.isList) {
                 if (!(value >= 0 && value <= 4294967295.0)) return badNumber(element);
-                for (auto left = static_cast<uint32_t>(value); left > 0; --left)
+                for (auto left = static_cast<uint32_t>(value); left > 0; --left) {
                     if (!number(value)) return badNumber(element);
+                    if (&p == wantedList_) list_.push_back(value);
+                }
             } else if (values && p.slot >= 0) {
                 values[static_cast<size_t>(p.slot)] = value;
             }
@@ -390,11 +425,89 @@ class PlyReader {
     size_t wanted_;
     std::vector<std::pair<size_t, bool>> attributes_;  ///< slot, stored as f64
     const Element* vertex_ = nullptr;
+    const Property* wantedList_ = nullptr;
+    std::vector<double> list_;
     uint64_t next_ = 0;
     bool started_ = false;
 };
 
+/// Faces as fans, strips unrolled; corners that are no vertex are counted and left out.
+class FaceTaker {
+  public:
+    FaceTaker(TriangleMesh& mesh, PlyMeshNotes& notes) : mesh_(mesh), notes_(notes) {}
+    void take(bool isStrip, const std::vector<double>& list) {
+        if (isStrip) return strip(list);
+        for (size_t i = 2; i < list.size(); ++i) triangle(list[0], list[i - 1], list[i]);
+    }
+
+  private:
+    void strip(const std::vector<double>& list) {
+        size_t first = 0;
+        for (size_t i = 0; i < list.size(); ++i) {
+            if (list[i] < 0) {  // -1 starts a new one
+                first = i + 1;
+                continue;
+            }
+            if (i < first + 2) continue;
+            const bool isOdd = (i - first) % 2 == 1;
+            triangle(list[i - 2], list[isOdd ? i : i - 1], list[isOdd ? i - 1 : i]);
+        }
+    }
+    void triangle(double a, double b, double c) {
+        const auto count = static_cast<double>(mesh_.position.size());
+        for (const double v : {a, b, c})
+            if (!(v >= 0 && v < count)) {
+                ++notes_.badFaces;
+                return;
+            }
+        for (const double v : {a, b, c}) mesh_.indices.push_back(static_cast<uint32_t>(v));
+    }
+    TriangleMesh& mesh_;
+    PlyMeshNotes& notes_;
+};
+
 }  // namespace
+
+Result<bool> hasPlyFaces(const std::string& path) {
+    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
+    std::array<char, 3> magic{};
+    if (file.sizeBytes() < 4) return false;
+    STIPPLE_TRY(file.readAt(0, magic.data(), magic.size()));
+    if (magic != std::array<char, 3>{'p', 'l', 'y'}) return false;
+    STIPPLE_ASSIGN(const Header header, parseHeader(file));
+    return std::any_of(header.elements.begin(), header.elements.end(), [](const Element& e) {
+        return e.name != "vertex" && e.count > 0 &&
+               std::any_of(e.properties.begin(), e.properties.end(), PlyReader::isCornerList);
+    });
+}
+
+Result<TriangleMesh> readPlyMesh(const std::string& path, PlyMeshNotes& notes) {
+    // The same checks as for points; then once more from the start, faces included.
+    STIPPLE_ASSIGN(const PointSource source, openPly(path, {}));
+    STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
+    auto file = std::make_shared<const InputFile>(std::move(opened));
+    STIPPLE_ASSIGN(Header header, parseHeader(*file));
+    PlyReader reader(file, std::move(header), 0);
+    TriangleMesh mesh;
+    PointBlock block;
+    for (;;) {
+        block.clear();
+        STIPPLE_ASSIGN(const size_t got, reader.read(block, 65536));
+        if (got == 0) break;
+        mesh.position.insert(mesh.position.end(), block.position.begin(), block.position.end());
+        mesh.normal.insert(mesh.normal.end(), block.normal.begin(), block.normal.end());
+        for (const uint32_t c : block.colour) mesh.colour.push_back(c | 0xff000000u);
+    }
+    FaceTaker faces(mesh, notes);
+    STIPPLE_TRY(reader.readLists([&](bool isStrip, const std::vector<double>& list) -> Result<void> {
+        faces.take(isStrip, list);
+        return {};
+    }));
+    // Which side is out is not known to many programs that write PLY.
+    mesh.surface.assign(mesh.position.size(), shared::kSurfaceTwoSided);
+    if (mesh.normal.empty() && !mesh.indices.empty()) smoothNormals(mesh);
+    return mesh;
+}
 
 Result<PointSource> openPly(const std::string& path, const ReadOptions& options) {
     STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
