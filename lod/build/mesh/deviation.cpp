@@ -22,6 +22,9 @@ struct Nearest {
     uint32_t triangle = 0;
 };
 
+/// Share of a part; 0 of nothing: simplification leaves triangles without an area.
+float shareOf(float part, float whole) { return whole > 0 ? part / whole : 0.0f; }
+
 /// Closest point of a triangle (Ericson, Real-Time Collision Detection, 5.1.5) as weights of b and c.
 glm::vec2 closestWeights(const glm::vec3& p, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
     const glm::vec3 ab = b - a, ac = c - a, ap = p - a;
@@ -31,19 +34,18 @@ glm::vec2 closestWeights(const glm::vec3& p, const glm::vec3& a, const glm::vec3
     const float d3 = glm::dot(ab, bp), d4 = glm::dot(ac, bp);
     if (d3 >= 0 && d4 <= d3) return {1, 0};
     const float vc = d1 * d4 - d3 * d2;
-    if (vc <= 0 && d1 >= 0 && d3 <= 0) return {d1 / (d1 - d3), 0};
+    if (vc <= 0 && d1 >= 0 && d3 <= 0) return {shareOf(d1, d1 - d3), 0};
     const glm::vec3 cp = p - c;
     const float d5 = glm::dot(ab, cp), d6 = glm::dot(ac, cp);
     if (d6 >= 0 && d5 <= d6) return {0, 1};
     const float vb = d5 * d2 - d1 * d6;
-    if (vb <= 0 && d2 >= 0 && d6 <= 0) return {0, d2 / (d2 - d6)};
+    if (vb <= 0 && d2 >= 0 && d6 <= 0) return {0, shareOf(d2, d2 - d6)};
     const float va = d3 * d6 - d5 * d4;
     if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-        const float w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        const float w = shareOf(d4 - d3, (d4 - d3) + (d5 - d6));
         return {1 - w, w};
     }
-    const float denominator = 1 / (va + vb + vc);
-    return {vb * denominator, vc * denominator};
+    return {shareOf(vb, va + vb + vc), shareOf(vc, va + vb + vc)};
 }
 
 /// Triangles in the cells of an even grid, for nearest-triangle queries.

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/base/check.h"
 #include "engine/base/process.h"
 #include "lod/build/mesh/mesh_work.h"
 
@@ -200,6 +201,7 @@ class MeshBuilder {
                 static_cast<double>(coarse.size()) > kWorthwhile * static_cast<double>(local.indices.size()))
                 return made;
             made.group.error = measureDeviation(mesh_, local, coarse, kUnimportant * below);
+            STIPPLE_CHECK(made.group.error >= 0 && made.group.error < kRootError, "deviation of a group");
             appendClusters(local, coarse, kNoProducer, made.products);
         }
         made.isSimplified = true;
