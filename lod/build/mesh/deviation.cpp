@@ -65,7 +65,7 @@ class Target {
         }
         const double triangles = static_cast<double>(indices.size()) / 3;
         lo_ = lo;
-        cell_ = std::max(static_cast<float>(std::sqrt(area / std::max(1.0, triangles)) * 1.5),
+        cell_ = std::max(static_cast<float>(std::sqrt(area / std::max(1.0, triangles)) * 2.0),
                          std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z}) / 48);
         cell_ = std::max(cell_, 1e-3f);
         for (int a = 0; a < 3; ++a) size_[a] = 1 + static_cast<int>((hi[a] - lo[a]) / cell_);
@@ -106,21 +106,21 @@ class Target {
         return glm::length(p - (a + w.x * (b - a) + w.y * (c - a)));
     }
 
-    /// Calls visit(triangle) for all that may be nearer to p than `limit`, which visit may lower.
+    /// Calls visit(triangle) for all that may be nearer to p than `limit`, which visit lowers; some are visited twice.
     template <typename Visit>
     void inBall(const glm::vec3& p, const float& limit, const Visit& visit) const {
+        const auto row = [&](int x0, int x1, int y, int z) {
+            const uint32_t last = start_[number(x1, y, z) + 1];
+            for (uint32_t i = start_[number(x0, y, z)]; i < last; ++i)
+                if (isNear(p, items_[i], limit)) visit(items_[i]);
+        };
+        // What lies in the same cell first: the ball is much smaller afterwards.
+        const glm::ivec3 own = cellOf(p);
+        row(own.x, own.x, own.y, own.z);
         const glm::ivec3 from = cellOf(p - limit), to = cellOf(p + limit);
+        if (from == to) return;
         for (int z = from.z; z <= to.z; ++z)
-            for (int y = from.y; y <= to.y; ++y) {
-                const size_t row = number(0, y, z);
-                const uint32_t last = start_[row + static_cast<size_t>(to.x) + 1];
-                for (uint32_t i = start_[row + static_cast<size_t>(from.x)]; i < last; ++i) {
-                    const glm::vec4& s = spheres_[items_[i]];
-                    const glm::vec3 d = p - glm::vec3(s);
-                    const float reach = limit + s.w;
-                    if (glm::dot(d, d) < reach * reach) visit(items_[i]);
-                }
-            }
+            for (int y = from.y; y <= to.y; ++y) row(from.x, to.x, y, z);
     }
 
     /// The nearest triangle; `best`: one that is known to be near.
@@ -133,6 +133,13 @@ class Target {
     }
 
   private:
+    /// Can any point of triangle t be nearer than `limit`?
+    bool isNear(const glm::vec3& p, uint32_t t, float limit) const {
+        const glm::vec4& s = spheres_[t];
+        const glm::vec3 d = p - glm::vec3(s);
+        const float reach = limit + s.w;
+        return glm::dot(d, d) < reach * reach;
+    }
     glm::ivec3 cellOf(const glm::vec3& p) const {
         return glm::clamp(glm::ivec3((p - lo_) / cell_), glm::ivec3(0), size_ - 1);
     }
