@@ -34,6 +34,7 @@ layout(push_constant, scalar) uniform Step {
     uint level;      // of the fine side
     uint wantExtra;  // write depth, normals and linear colour
     uint hasPyramid;
+    uint count;  // clusters (rasterise); whether there are triangles (light)
 } stepInfo;
 
 // Levels whose texels are larger than the largest splat hold nothing; the resolve pass has measured it.

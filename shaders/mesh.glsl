@@ -30,12 +30,16 @@ layout(set = 0, binding = 15, scalar) buffer LargeBlock {
     LargeTriangle large[];
 };
 
+layout(set = 0, binding = 16, scalar) readonly buffer EnvironmentBlock { float environment[]; };
+#include "shared/environment.h"
+
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Vertices { MeshVertex vertices[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Words { uint words[]; };
 
 // Of a pixel's first surface word: metallic 8 | roughness 8 | occlusion 8 | these.
 const uint kPixelTriangle = 0x80000000u;
 const uint kPixelUnlit = 0x40000000u;
+const uint kPlainSurface = 0x00ffff00u;  // what points are: not metallic, rough, not occluded
 const uint kLargeCapacity = 65536u;
 
 vec4 decodeTexel(uint c, bool isColour) {

@@ -108,6 +108,21 @@ Result<lod::ColourBy> applyColours(OpenedScene& scene, const std::string& what, 
     return *first;
 }
 
+void EnvironmentOptions::addTo(CLI::App& app) {
+    app.add_option("--environment", path, "HDR picture all around (.hdr, .exr; equirectangular) that lights the scene");
+    app.add_option("--environment-scale", scale, "multiplies its light")
+        ->check(CLI::Range(0.0, 1e6))
+        ->capture_default_str();
+}
+
+Result<std::shared_ptr<const render::Environment>> openEnvironment(const std::string& path, double scale,
+                                                                   Executor& executor) {
+    if (path.empty()) return std::shared_ptr<const render::Environment>();
+    STIPPLE_ASSIGN(const render::HdrImage image, image::readHdr(path));
+    return std::make_shared<const render::Environment>(
+        render::makeEnvironment(image, static_cast<float>(scale), executor));
+}
+
 Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, Executor& executor) {
     if (device == "cpu") return cpu::makeCpuBackend(executor);
     if (device == "reference") return reference::makeReferenceBackend(executor);

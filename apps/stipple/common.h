@@ -37,6 +37,13 @@ struct ColourOptions {
     void addTo(CLI::App& app);
 };
 
+/// Light from a picture.
+struct EnvironmentOptions {
+    std::string path;
+    double scale = 1;
+    void addTo(CLI::App& app);
+};
+
 /// What `--shade auto` does: lit, unless a scan has its own colours.
 inline bool isShaded(const lod::StoreDescription& d) { return !d.hasColour || d.isReflectance; }
 
@@ -65,6 +72,10 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
 /// result is for the legend.
 Result<lod::ColourBy> applyColours(OpenedScene& scene, const std::string& what, const std::string& map,
                                    const std::string& range);
+
+/// An HDR picture as light; null for an empty path.
+Result<std::shared_ptr<const render::Environment>> openEnvironment(const std::string& path, double scale,
+                                                                   Executor& executor);
 
 Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, Executor& executor);
 /// Every backend and device, one per line.

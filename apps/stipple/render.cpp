@@ -28,6 +28,7 @@ struct Options {
     bool noWait = false, json = false, quiet = false;
     BuildOptions build;
     ColourOptions colour;
+    EnvironmentOptions environment;
 };
 
 struct Shot {
@@ -190,7 +191,8 @@ Result<void> run(const Options& o) {
     const lod::StoreDescription& description = scene.description;
     STIPPLE_ASSIGN(const Shot shot, makeShot(o, description, size));
     STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
-    STIPPLE_ASSIGN(const render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
+    STIPPLE_ASSIGN(render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
+    STIPPLE_ASSIGN(settings.draw.environment, openEnvironment(o.environment.path, o.environment.scale, *executor));
     if (o.mode == "reference" && scene.placed.size() > 1)
         return fail(ErrorKind::usage, "only one store can be traced", "--mode reference", "use --device reference");
     if (o.mode == "reference" && colour.mode != lod::ColourMode::own)
@@ -307,6 +309,7 @@ void setupRender(CLI::App& app, int& status) {
     sub->add_flag("--json", o->json, "print measurements as JSON");
     sub->add_flag("--quiet", o->quiet, "no progress");
     o->colour.addTo(*sub);
+    o->environment.addTo(*sub);
     auto* group = sub->add_option_group("building", "for inputs that are not built yet");
     group->add_option("--memory", o->build.memory, "memory that the build may use")->capture_default_str();
     group->add_option("--attributes", o->build.attributes, "attributes to keep; the one of --colour always is")

@@ -25,6 +25,7 @@ struct Options {
     int frames = 0;
     BuildOptions build;
     ColourOptions colour;
+    EnvironmentOptions environment;
 };
 
 constexpr std::array<const char*, 5> kDebugNames{"none", "level", "screen-space error", "holes", "normals"};
@@ -148,6 +149,7 @@ Result<void> run(const Options& o) {
     settings.budgets = {o.error, o.budget};
     settings.draw.unlitTriangles = o.shade == "unlit";
     settings.draw.lights = scene.lights;
+    STIPPLE_ASSIGN(settings.draw.environment, openEnvironment(o.environment.path, o.environment.scale, *executor));
     settings.draw.lit = o.shade == "lit" || (o.shade == "auto" && isShaded(d) && colour.mode == lod::ColourMode::own);
     settings.draw.worldUp = d.up;
     const double diagonal = std::max(1e-300, glm::length(d.boundsMax - d.boundsMin));
@@ -219,6 +221,7 @@ void setupView(CLI::App& app, int& status) {
     sub->add_option("--frames", o->frames, "close after N frames (0: when the user does)")->capture_default_str();
     sub->add_option("--screenshot", o->screenshot, "with --frames: write what the last frame shows");
     o->colour.addTo(*sub);
+    o->environment.addTo(*sub);
     o->build.addTo(*sub);
     sub->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());

@@ -413,9 +413,11 @@ class CpuBackend final : public render::Backend {
     void shade(bool hasPyramid) {
         Level& fine = levels_[0];
         const Planes planes = fine.planes();
+        const LightInput light{draws_->lights.data(),
+                               draws_->environment ? draws_->environment->table.data() : nullptr};
         const auto shadeRow = [&](uint32_t x0, uint32_t n, uint32_t y, const TexelRow& own, const TexelRow& row) {
             const size_t at = size_t{y} * fine.width + x0;
-            k_.shadeRow(frame_, tables_, own, row, planesAt(at), draws_->lights.data(), x0, y, n,
+            k_.shadeRow(frame_, tables_, own, row, planesAt(at), light, x0, y, n,
                         {image_->rgba.data() + at, wantAll_ ? image_->depth.data() + at : nullptr,
                          wantAll_ ? image_->normal.data() + 3 * at : nullptr,
                          wantAll_ ? image_->linear.data() + 3 * at : nullptr});

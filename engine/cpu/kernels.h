@@ -94,6 +94,11 @@ struct ResolveInput {
     const shared::SurfaceMaterial* materials;
 };
 
+struct LightInput {
+    const shared::LightSource* lights;
+    const float* environment;  ///< table of shaders/shared/environment.h; null: none
+};
+
 struct ShadeOutput {
     uint32_t* rgba;
     float *depth, *normal, *linear;  ///< may be null
@@ -120,8 +125,8 @@ struct Kernels {
     /// Doubles the entries of a coarse row (-1 to (n + 1) / 2) along x.
     void (*expandRow)(const TexelRow& coarse, uint32_t n, TexelRow& nearest, TexelRow& beside);
     void (*shadeRow)(const shared::FrameConstants& f, const Tables& tables, const TexelRow& own, const TexelRow& row,
-                     const SurfacePlanes& planes, const shared::LightSource* lights, uint32_t x0, uint32_t y,
-                     uint32_t n, const ShadeOutput& out);
+                     const SurfacePlanes& planes, const LightInput& light, uint32_t x0, uint32_t y, uint32_t n,
+                     const ShadeOutput& out);
     /// Offers the triangles of one cluster (ids from firstId on) to the visibility buffer.
     void (*rasterCluster)(const shared::FrameConstants& f, const Tables& tables,
                           const shared::SurfaceMaterial* materials, const MeshBlock& block, uint32_t firstId,

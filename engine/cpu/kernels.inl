@@ -5,6 +5,7 @@
 #include "engine/cpu/kernels.h"
 #include "shaders/shared/pack.h"
 #include "shaders/shared/pyramid.h"
+#include "shaders/shared/environment.h"
 #include "shaders/shared/shade.h"
 
 namespace stipple::cpu {
@@ -267,25 +268,30 @@ void pushRow(const TexelRow& __restrict fine, const ExpandedRow& __restrict near
     }
 }
 
-#include "engine/cpu/shade_triangles.inl"
+#include "engine/cpu/shade_surfaces.inl"
 
 void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow& __restrict own,
-              const TexelRow& __restrict row, const SurfacePlanes& planes, const LightSource* lights, uint32_t x0, uint32_t y, uint32_t n,
+              const TexelRow& __restrict row, const SurfacePlanes& planes, const LightInput& light, uint32_t x0, uint32_t y, uint32_t n,
               const ShadeOutput& out) {
     const FrameConstants f = frame;
     const uint32_t* const surface = planes.surface;
     const bool lit = (surface != nullptr || (f.shade & kShadeLit) != 0) && f.debugView == kDebugNone;
     alignas(64) float share[kTile];  // of the light: 0 where a pixel keeps its colour
     alignas(64) uint32_t mask[kTile];  // pixels of triangles to be lit
+    alignas(64) uint32_t word[kTile], shines[kTile];
+    // Points under lights of the scene's own are surfaces like any other.
+    const bool hasLights = f.lightCount > 0 || f.hasEnvironment != 0;
     bool anyLit = false;
     const float points = (f.shade & kShadeLit) != 0 ? 1.0f : 0.0f,
                 triangles = (f.shade & kShadeTriangles) != 0 ? 1.0f : 0.0f;
     for (size_t i = 0; lit && i < n; ++i) {
         // A triangle's pixel that no splat stands in front of.
         const bool isTriangle = surface != nullptr && surface[i] != 0 && row.depth[kPad + i] == own.depth[kPad + i];
-        const bool isLit = isTriangle && (surface[i] & kPixelUnlit) == 0 && triangles > 0;
-        share[i] = isTriangle ? 0.0f : points;
+        const bool isLit = isTriangle ? (surface[i] & kPixelUnlit) == 0 && triangles > 0 : points > 0 && hasLights;
+        share[i] = isTriangle || hasLights ? 0.0f : points;
         mask[i] = isLit ? 1 : 0;
+        word[i] = isTriangle ? surface[i] : kPlainSurface;
+        shines[i] = isTriangle && planes.emissive != nullptr ? planes.emissive[i] : 0u;
         anyLit = anyLit || isLit;
     }
     const float inverseFocal = 1.0f / f.focal;
@@ -306,13 +312,13 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
             const float inverse = 1.0f / std::sqrt(vx * vx + vy * vy + 1.0f);
             const vec3 normal =
                 normalFromPerp(vec2(row.perpX[at], row.perpY[at]), vec3(vx * inverse, vy * inverse, inverse));
-            const float light = 1.0f + share[i] * (irradiance(normal, f.sunDirection, f.skyDirection) - 1.0f);
-            red[i] *= light;
-            green[i] *= light;
-            blue[i] *= light;
+            const float brightness = 1.0f + share[i] * (irradiance(normal, f.sunDirection, f.skyDirection) - 1.0f);
+            red[i] *= brightness;
+            green[i] *= brightness;
+            blue[i] *= brightness;
         }
     }
-    if (anyLit) shadeTriangles(f, row, planes, lights, mask, x0, vy, n, red, green, blue);
+    if (anyLit) shadeSurfaces(f, row, word, shines, light, mask, x0, vy, n, red, green, blue);
     if (f.debugView == kDebugHoles || f.debugView == kDebugNormals || out.normal != nullptr) {
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {

@@ -51,7 +51,7 @@ class GpuBackend final : public render::Backend {
     render::BackendResources resources() const override {
         render::BackendResources r;
         r.meshPipelines = pipelines_->count() - Pipelines::kPointPasses;
-        for (const Buffer* b : {&meshes_, &clusters_, &materials_, &textures_, &tiles_, &lights_, &surfaces_, &large_})
+        for (const Buffer* b : {&meshes_, &clusters_, &materials_, &textures_, &tiles_, &surfaces_, &large_})
             r.meshBytes += b->bytes();
         for (const auto& t : meshFrame_.tiles) r.textureTiles += t.low != 0 || t.high != 0;
         return r;
@@ -178,15 +178,35 @@ class GpuBackend final : public render::Backend {
         if (!draws.blocks.empty())
             std::memcpy(blockBuffer_.mapped(), draws.blocks.data(), draws.blocks.size() * sizeof(shared::DrawBlock));
         if (!draws.meshDraws.empty()) STIPPLE_TRY(prepareMeshes(draws, pixels));
+        if (needsLightPass(draws)) STIPPLE_TRY(prepareLights(draws));
         if (descriptorsChanged_) {
             const auto bound = [&](const Buffer& b) { return b.bytes() > 0 ? &b : &stats_; };  // unused: anything
             pipelines_->writeDescriptors({&frameBuffer_, &nodeBuffer_, &blockBuffer_, &visibility_, &texels_, &stats_,
                                           &image_, &extra_, bound(meshes_), bound(clusters_), bound(materials_),
                                           bound(textures_), bound(tiles_), bound(lights_), bound(surfaces_),
-                                          bound(large_)});
+                                          bound(large_), bound(environment_)});
             descriptorsChanged_ = false;
         }
         return {};
+    }
+
+    template <typename T>
+    Result<void> fillBuffer(Buffer& buffer, const T* data, size_t count, const char* name) {
+        STIPPLE_TRY(ensure(buffer, count * sizeof(T), kStorage, true, name));
+        if (count > 0) std::memcpy(buffer.mapped(), data, count * sizeof(T));
+        return {};
+    }
+
+    static bool needsLightPass(const render::DrawList& draws) {
+        return !draws.meshDraws.empty() ||
+               ((draws.frame.shade & shared::kShadeLit) != 0 && (!draws.lights.empty() || draws.environment));
+    }
+    Result<void> prepareLights(const render::DrawList& draws) {
+        STIPPLE_TRY(pipelines_->addLightPass());
+        STIPPLE_TRY(fillBuffer(lights_, draws.lights.data(), draws.lights.size(), "lights"));
+        if (!draws.environment) return {};
+        return fillBuffer(environment_, draws.environment->table.data(), draws.environment->table.size(),
+                          "environment");
     }
 
     /// Buffers and pipelines that only triangles need.
@@ -198,17 +218,11 @@ class GpuBackend final : public render::Backend {
                 const auto found = places_.find(chunkId({source, chunk}));
                 return found == places_.end() ? 0 : pages_.address(found->second);
             });
-        const auto fill = [&](Buffer& buffer, const auto* data, size_t count, const char* name) -> Result<void> {
-            STIPPLE_TRY(ensure(buffer, count * sizeof(*data), kStorage, true, name));
-            if (count > 0) std::memcpy(buffer.mapped(), data, count * sizeof(*data));
-            return {};
-        };
-        STIPPLE_TRY(fill(meshes_, draws.meshes.data(), draws.meshes.size(), "draw meshes"));
-        STIPPLE_TRY(fill(clusters_, meshFrame_.clusters.data(), meshFrame_.clusters.size(), "draw clusters"));
-        STIPPLE_TRY(fill(materials_, draws.materials.data(), draws.materials.size(), "materials"));
-        STIPPLE_TRY(fill(textures_, meshFrame_.textures.data(), meshFrame_.textures.size(), "textures"));
-        STIPPLE_TRY(fill(tiles_, meshFrame_.tiles.data(), meshFrame_.tiles.size(), "texture tiles"));
-        STIPPLE_TRY(fill(lights_, draws.lights.data(), draws.lights.size(), "lights"));
+        STIPPLE_TRY(fillBuffer(meshes_, draws.meshes.data(), draws.meshes.size(), "draw meshes"));
+        STIPPLE_TRY(fillBuffer(clusters_, meshFrame_.clusters.data(), meshFrame_.clusters.size(), "draw clusters"));
+        STIPPLE_TRY(fillBuffer(materials_, draws.materials.data(), draws.materials.size(), "materials"));
+        STIPPLE_TRY(fillBuffer(textures_, meshFrame_.textures.data(), meshFrame_.textures.size(), "textures"));
+        STIPPLE_TRY(fillBuffer(tiles_, meshFrame_.tiles.data(), meshFrame_.tiles.size(), "texture tiles"));
         STIPPLE_TRY(ensure(surfaces_, pixels * 8, kStorage, false, "surfaces"));
         return ensure(large_, 4 + uint64_t{kLargeCapacity} * 40, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false,
                       "large triangles");
@@ -246,11 +260,11 @@ class GpuBackend final : public render::Backend {
         vkCmdDispatch(commands_, (width + kGroup - 1) / kGroup, height, 1);
     }
 
-    /// `clusters`: instead of the fine level's offset, for the pass that needs no level.
-    void pushStep(size_t level, bool hasPyramid, bool wantAll, uint32_t clusters = 0) {
+    /// `count`: what else a pass needs to know (clusters; whether there are triangles).
+    void pushStep(size_t level, bool hasPyramid, bool wantAll, uint32_t count = 0) {
         const Level& fine = levels_[level];
         const Level& coarse = levels_[std::min(level + 1, levels_.size() - 1)];
-        const StepConstants step{clusters > 0 ? clusters : fine.offset,
+        const StepConstants step{fine.offset,
                                  fine.width,
                                  fine.height,
                                  coarse.offset,
@@ -258,7 +272,8 @@ class GpuBackend final : public render::Backend {
                                  coarse.height,
                                  static_cast<uint32_t>(level),
                                  wantAll,
-                                 hasPyramid && levels_.size() > 1};
+                                 hasPyramid && levels_.size() > 1,
+                                 count};
         pipelines_->push(commands_, step);
     }
 
@@ -335,11 +350,14 @@ class GpuBackend final : public render::Backend {
                 pipelines_->use(commands_, "shade");
                 pushStep(0, hasPyramid, wantAll);
                 dispatch(levels_[0].width, levels_[0].height);
-                if (draws.meshDraws.empty()) break;
+                if (!needsLightPass(draws)) break;
                 list.end();
-                list.begin("light", {read(texels_), read(surfaces_), write(image_), write(extra_)}, false);
+                if (draws.meshDraws.empty())
+                    list.begin("light", {read(texels_), write(image_), write(extra_)}, false);
+                else
+                    list.begin("light", {read(texels_), read(surfaces_), write(image_), write(extra_)}, false);
                 pipelines_->use(commands_, "light");
-                pushStep(0, hasPyramid, wantAll);
+                pushStep(0, hasPyramid, wantAll, draws.meshDraws.empty() ? 0 : 1);
                 dispatch(levels_[0].width, levels_[0].height);
                 break;
         }
@@ -420,7 +438,8 @@ class GpuBackend final : public render::Backend {
     std::unordered_map<uint64_t, PageStore::Place> places_;
     std::vector<PendingUpload> pending_;
     Buffer frameBuffer_, nodeBuffer_, blockBuffer_, visibility_, texels_, stats_, image_, extra_, readback_, staging_;
-    Buffer meshes_, clusters_, materials_, textures_, tiles_, lights_, surfaces_, large_;  // only with triangles
+    Buffer meshes_, clusters_, materials_, textures_, tiles_, surfaces_, large_;  // only with triangles
+    Buffer lights_, environment_;                                                 // only with lights
     std::unordered_map<uint64_t, MeshChunk> meshChunks_;
     MeshFrame meshFrame_;
     VkCommandPool commandPool_ = VK_NULL_HANDLE;

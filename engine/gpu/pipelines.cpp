@@ -75,11 +75,14 @@ Result<std::unique_ptr<Pipelines>> Pipelines::create(const Device& device) {
 }
 
 Result<void> Pipelines::addMeshPasses() {
-    if (pipelines_.count("light") > 0) return {};
+    if (pipelines_.count("surface") > 0) return {};
     STIPPLE_TRY(add("rasterise", kRasterise, std::size(kRasterise)));
     STIPPLE_TRY(add("rasterise_large", kRasteriseLarge, std::size(kRasteriseLarge)));
-    STIPPLE_TRY(add("surface", kSurface, std::size(kSurface)));
-    return add("light", kLight, std::size(kLight));
+    return add("surface", kSurface, std::size(kSurface));
+}
+
+Result<void> Pipelines::addLightPass() {
+    return pipelines_.count("light") > 0 ? Result<void>() : add("light", kLight, std::size(kLight));
 }
 
 Result<void> Pipelines::add(const std::string& pass, const uint32_t* code, size_t words) {

@@ -12,13 +12,13 @@ namespace stipple::gpu {
 
 /// Mirrors `Step` of shaders/bindings.glsl.
 struct StepConstants {
-    uint32_t fine, fineWidth, fineHeight, coarse, coarseWidth, coarseHeight, level, wantExtra, hasPyramid;
+    uint32_t fine, fineWidth, fineHeight, coarse, coarseWidth, coarseHeight, level, wantExtra, hasPyramid, count;
 };
-static_assert(sizeof(StepConstants) == 36);
+static_assert(sizeof(StepConstants) == 40);
 
 class Pipelines {
   public:
-    static constexpr size_t kBindings = 16, kPointPasses = 5;
+    static constexpr size_t kBindings = 17, kPointPasses = 5;
     static Result<std::unique_ptr<Pipelines>> create(const Device& device);
     ~Pipelines();
     Pipelines(const Pipelines&) = delete;
@@ -28,6 +28,8 @@ class Pipelines {
     void bind(VkCommandBuffer commands) const;
     /// The passes that only triangles need; created at the first call.
     Result<void> addMeshPasses();
+    /// The pass that lights need, of triangles and of points under lights of the scene's own.
+    Result<void> addLightPass();
     size_t count() const { return pipelines_.size(); }
     void use(VkCommandBuffer commands, const std::string& pass) const;
     void push(VkCommandBuffer commands, const StepConstants& step) const;

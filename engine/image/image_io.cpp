@@ -16,6 +16,7 @@ struct Module {
     decltype(&stippleOiioEncode) encode = nullptr;
     decltype(&stippleOiioRead) read = nullptr;
     decltype(&stippleOiioDecode) decode = nullptr;
+    decltype(&stippleOiioReadFloat) readFloat = nullptr;
     std::string problem;
 };
 
@@ -36,7 +37,8 @@ const Module& module() {
             m.encode = reinterpret_cast<decltype(m.encode)>(::dlsym(handle, "stippleOiioEncode"));
             m.read = reinterpret_cast<decltype(m.read)>(::dlsym(handle, "stippleOiioRead"));
             m.decode = reinterpret_cast<decltype(m.decode)>(::dlsym(handle, "stippleOiioDecode"));
-            if (m.encode && m.read && m.decode) return m;
+            m.readFloat = reinterpret_cast<decltype(m.readFloat)>(::dlsym(handle, "stippleOiioReadFloat"));
+            if (m.encode && m.read && m.decode && m.readFloat) return m;
         }
         return m;
     }();
@@ -136,6 +138,28 @@ Result<render::Image> decodeImage(const std::vector<uint8_t>& bytes, const std::
     return readWith(name, [&](int* w, int* h, unsigned char* pixels, char* error, int count) {
         return module().decode(format, bytes.data(), bytes.size(), w, h, pixels, error, count);
     });
+}
+
+Result<render::HdrImage> readHdr(const std::string& path) {
+    if (!module().readFloat)
+        return fail(ErrorKind::input, "the picture module cannot be loaded: " + module().problem, path);
+    std::array<char, 512> error{};
+    int width = 0, height = 0;
+    const auto bad = [&] {
+        const std::string text = error.data();
+        return fail(ErrorKind::input, "cannot be read: " + text.substr(0, text.find('\n')), path,
+                    "is it a whole picture?");
+    };
+    const auto bytes = static_cast<int>(error.size());
+    if (module().readFloat(path.c_str(), &width, &height, nullptr, error.data(), bytes) != 0) return bad();
+    if (width <= 0 || height <= 0 || int64_t{width} * height > int64_t{1} << 28)
+        return fail(ErrorKind::input, "has an impossible size", path);
+    render::HdrImage image;
+    image.width = static_cast<uint32_t>(width);
+    image.height = static_cast<uint32_t>(height);
+    image.rgb.resize(size_t{image.width} * image.height * 3);
+    if (module().readFloat(path.c_str(), &width, &height, image.rgb.data(), error.data(), bytes) != 0) return bad();
+    return image;
 }
 
 }  // namespace stipple::image

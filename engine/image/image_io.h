@@ -17,6 +17,8 @@ Result<std::vector<char>> encodeImage(const std::string& path, const render::Ima
 Result<render::Image> readImage(const std::string& path);
 /// Decodes an image that stands in memory (PNG, JPEG, ...); `name` is for messages.
 Result<render::Image> decodeImage(const std::vector<uint8_t>& bytes, const std::string& name);
+/// Linear floats, e.g. of .hdr and .exr.
+Result<render::HdrImage> readHdr(const std::string& path);
 /// Can this extension be written? An error that names those that can, if not.
 Result<void> checkImagePath(const std::string& path);
 

@@ -93,3 +93,24 @@ extern "C" int stippleOiioDecode(const char* format, const void* bytes, unsigned
         return report(e.what(), error, errorBytes);
     }
 }
+
+extern "C" int stippleOiioReadFloat(const char* path, int* width, int* height, float* pixels, char* error,
+                                    int errorBytes) {
+    try {
+        const std::unique_ptr<OIIO::ImageInput> in = OIIO::ImageInput::open(path);
+        if (!in) return report(OIIO::geterror(), error, errorBytes);
+        const OIIO::ImageSpec& spec = in->spec();
+        *width = spec.width;
+        *height = spec.height;
+        if (!pixels) return 0;
+        std::vector<float> all(static_cast<size_t>(spec.width) * spec.height * spec.nchannels);
+        if (!in->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, all.data()))
+            return report(in->geterror(), error, errorBytes);
+        const size_t channels = static_cast<size_t>(spec.nchannels);
+        for (size_t i = 0; i < static_cast<size_t>(spec.width) * spec.height; ++i)
+            for (size_t c = 0; c < 3; ++c) pixels[3 * i + c] = all[i * channels + (channels >= 3 ? c : 0)];
+        return 0;
+    } catch (const std::exception& e) {
+        return report(e.what(), error, errorBytes);
+    }
+}

@@ -11,6 +11,8 @@ int stippleOiioEncode(const char* path, int width, int height, int channels, int
 /// Decodes an encoded image in memory as RGBA bytes; `format` is "png", "jpeg" or "webp". Calls as stippleOiioRead.
 int stippleOiioDecode(const char* format, const void* bytes, unsigned long count, int* width, int* height,
                       unsigned char* pixels, char* error, int errorBytes);
+/// Reads as RGB floats, linear as the file has them. As stippleOiioRead.
+int stippleOiioReadFloat(const char* path, int* width, int* height, float* pixels, char* error, int errorBytes);
 /// Reads as RGBA bytes. First call with pixels == nullptr for the size. 0, or -1 with a text in `error`.
 int stippleOiioRead(const char* path, int* width, int* height, unsigned char* pixels, char* error, int errorBytes);
 }

@@ -244,7 +244,9 @@ class ReferenceBackend final : public render::Backend {
                                                       : dvec3(0.2);
                     } else if (f.debugView == shared::kDebugNormals) {
                         colour = 0.5 + 0.5 * dvec3(n.x, -n.y, -n.z);
-                    } else if (s.isTriangle && f.debugView == shared::kDebugNone) {
+                    } else if (f.debugView == shared::kDebugNone &&
+                               (s.isTriangle ||
+                                ((f.shade & shared::kShadeLit) != 0 && (!draws.lights.empty() || draws.environment)))) {
                         colour = shadeTriangle(s, n, toPixel * (s.depth / toPixel.z), draws);
                     } else if ((f.shade & shared::kShadeLit) != 0 && f.debugView == shared::kDebugNone) {
                         colour *= lightOn(n, f);

@@ -294,6 +294,36 @@ dvec3 reflected(const Sample& s, const dvec3& n, const dvec3& v, const dvec3& l,
     return light * nl * kPi * (diffuse * (1.0 - fresnel) + fresnel * ggx * visible);
 }
 
+/// Second-order harmonics as the table has them: constants and cosine folded in.
+dvec3 irradianceAround(const std::vector<float>& t, const dvec3& n) {
+    const std::array<double, 9> basis{
+        1, n.y, n.z, n.x, n.x * n.y, n.y * n.z, 3 * n.z * n.z - 1, n.x * n.z, n.x * n.x - n.y * n.y};
+    dvec3 sum(0);
+    for (size_t k = 0; k < 9; ++k) sum += basis.at(k) * dvec3(t[3 * k], t[3 * k + 1], t[3 * k + 2]);
+    return glm::max(sum, dvec3(0));
+}
+
+/// The octahedral maps, between two of the five roughnesses.
+dvec3 mirrored(const std::vector<float>& t, const dvec3& direction, double roughness) {
+    const dvec3 d = direction / (std::abs(direction.x) + std::abs(direction.y) + std::abs(direction.z));
+    dvec2 p(d.x, d.z);
+    if (d.y < 0) p = {(1 - std::abs(d.z)) * (d.x >= 0 ? 1 : -1), (1 - std::abs(d.x)) * (d.z >= 0 ? 1 : -1)};
+    p = glm::clamp((p * 0.5 + 0.5) * 128.0 - 0.5, dvec2(0), dvec2(126.999));
+    const auto at = [&](size_t level, size_t x, size_t y) {
+        const size_t i = 27 + ((level * 128 + y) * 128 + x) * 3;
+        return dvec3(t[i], t[i + 1], t[i + 2]);
+    };
+    const auto look = [&](size_t level) {
+        const auto x = static_cast<size_t>(p.x), y = static_cast<size_t>(p.y);
+        const dvec2 part = p - glm::floor(p);
+        return glm::mix(glm::mix(at(level, x, y), at(level, x + 1, y), part.x),
+                        glm::mix(at(level, x, y + 1), at(level, x + 1, y + 1), part.x), part.y);
+    };
+    const double l = std::clamp(roughness, 0.0, 1.0) * 4;
+    const auto level = static_cast<size_t>(std::min(l, 3.999));
+    return glm::mix(look(level), look(level + 1), l - static_cast<double>(level));
+}
+
 }  // namespace
 
 void projectMeshes(const render::DrawList& draws, const Chunks& chunks, Level& level) {
@@ -302,7 +332,7 @@ void projectMeshes(const render::DrawList& draws, const Chunks& chunks, Level& l
 
 dvec3 shadeTriangle(const Sample& s, const dvec3& n, const dvec3& point, const render::DrawList& draws) {
     const shared::FrameConstants& f = draws.frame;
-    if (s.isUnlit || (f.shade & shared::kShadeTriangles) == 0) return s.colour;
+    if (s.isTriangle && (s.isUnlit || (f.shade & shared::kShadeTriangles) == 0)) return s.colour;
     const dvec3 v = -glm::normalize(point), up(f.skyDirection);
     const double nv = std::max(glm::dot(n, v), 1e-3);
     const dvec3 mirror = 2 * nv * n - v;
@@ -311,10 +341,15 @@ dvec3 shadeTriangle(const Sample& s, const dvec3& n, const dvec3& point, const r
     const double a004 = std::min(r.x * r.x, std::exp2(-9.28 * nv)) * r.x + r.y;
     const dvec2 ab = dvec2(-1.04, 1.04) * a004 + dvec2(r.z, r.w);
     const dvec3 f0 = glm::mix(dvec3(0.04), s.colour, s.metallic);
-    const double blurred = 0.25 + 0.15 * glm::dot(glm::mix(mirror, n, s.roughness), up);
-    const double around = 0.25 + 0.15 * glm::dot(n, up);
+    dvec3 blurred(0.25 + 0.15 * glm::dot(glm::mix(mirror, n, s.roughness), up)), around(0.25 + 0.15 * glm::dot(n, up));
+    if (draws.environment) {
+        const glm::dmat3 toMap =
+            glm::transpose(glm::dmat3(dvec3(f.environmentX), dvec3(f.environmentY), dvec3(f.environmentZ)));
+        around = irradianceAround(draws.environment->table, toMap * n);
+        blurred = mirrored(draws.environment->table, toMap * mirror, s.roughness);
+    }
     dvec3 sum = double(f.ambient) * s.occlusion * (s.colour * (1 - s.metallic) * around + (f0 * ab.x + ab.y) * blurred);
-    if (draws.lights.empty()) sum += reflected(s, n, v, dvec3(f.sunDirection), dvec3(0.75));
+    if (draws.lights.empty() && !draws.environment) sum += reflected(s, n, v, dvec3(f.sunDirection), dvec3(0.75));
     for (const shared::LightSource& light : draws.lights) {
         const dvec3 colour(light.colour);
         if (light.kind == shared::kLightDirectional) {

@@ -7,7 +7,7 @@ namespace stipple::render {
 static_assert(sizeof(shared::PointRecord) == 16);
 static_assert(sizeof(shared::DrawNode) == 80);
 static_assert(sizeof(shared::DrawBlock) == 8);
-static_assert(sizeof(shared::FrameConstants) == 124);
+static_assert(sizeof(shared::FrameConstants) == 164);
 static_assert(sizeof(shared::MeshVertex) == 32);
 static_assert(sizeof(shared::MeshCluster) == 12);
 static_assert(sizeof(shared::DrawMesh) == 104);
@@ -140,8 +140,17 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
         l.cosOuter = std::cos(light.outerCone);
         out.lights.push_back(l);
     }
+    out.environment = settings.environment;
+    f.hasEnvironment = settings.environment ? 1 : 0;
+    // The environment's y is the scene's up, its -z as near to the scene's as that allows.
+    const glm::dvec3 up = glm::normalize(settings.worldUp);
+    const glm::dvec3 aside = std::abs(up.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1);
+    const glm::dvec3 back = glm::normalize(glm::cross(aside, up)), right = glm::cross(up, back);
+    f.environmentX = glm::vec3(cameraFromWorld * right);
+    f.environmentY = glm::vec3(cameraFromWorld * up);
+    f.environmentZ = glm::vec3(cameraFromWorld * back);
     f.lightCount = static_cast<uint32_t>(out.lights.size());
-    f.ambient = out.lights.empty() ? 1.0f : kAmbientBesideLights;
+    f.ambient = out.lights.empty() || settings.environment ? 1.0f : kAmbientBesideLights;
     f.background = settings.background;
     f.blockCount = static_cast<uint32_t>(out.blocks.size());
 }

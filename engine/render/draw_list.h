@@ -2,9 +2,11 @@
 // place where world-sized numbers (fp64) become camera-space fp32.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <vector>
 
+#include "engine/render/environment.h"
 #include "lod/cut.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
@@ -46,7 +48,8 @@ struct DrawList {
     std::vector<MeshTextures> meshTextures;  ///< of each of `meshes`
     std::vector<MeshDraw> meshDraws;
     std::vector<shared::LightSource> lights;
-    uint32_t clusters = 0;  ///< of all mesh draws
+    std::shared_ptr<const Environment> environment;  ///< null: a sky without features
+    uint32_t clusters = 0;                           ///< of all mesh draws
     std::span<const shared::SurfaceMaterial> materials;
     // What the fp32 numbers above were made from: the reference starts from these.
     lod::View view;
@@ -63,6 +66,7 @@ struct DrawSettings {
     uint32_t debugView = shared::kDebugNone;
     glm::vec3 background{0.02f, 0.02f, 0.025f};  ///< linear
     glm::dvec3 worldUp{0, 0, 1};
+    std::shared_ptr<const Environment> environment;
     std::vector<WorldLight> lights;  ///< none: a sun over the viewer's shoulder
     float supportScale = 1.0f;       ///< splat radius of the reconstruction / stored radius
     float minimumRadius = 1.0f;      ///< pixels

@@ -45,6 +45,10 @@ void main() {
     put(frame.blockCount);
     put(frame.lightCount);
     put(frame.ambient);
+    put(frame.hasEnvironment);
+    put(frame.environmentX);
+    put(frame.environmentY);
+    put(frame.environmentZ);
     put(node.axisX);
     put(node.axisY);
     put(node.axisZ);

@@ -1,4 +1,5 @@
-// Pixels that show triangles, after shade: their light instead of what shade made of them.
+// Pixels that show triangles, and lit points where the scene has lights of its own: their light instead of what shade
+// made of them.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../mesh.glsl"
@@ -8,13 +9,22 @@ void main() {
     const uvec2 pixel = gl_GlobalInvocationID.xy;
     if (pixel.x >= frame.width || pixel.y >= frame.height || frame.debugView != kDebugNone) return;
     const uint place = pixel.y * frame.width + pixel.x;
-    const uint word = surfaces[2u * place];
-    if (word == 0u) return;
-    const Texel own = loadTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, int(pixel.x), int(pixel.y));
-    // A splat may stand in front of it.
-    if (stepInfo.hasPyramid != 0u && pushedTexel(ivec2(pixel), own).depth != own.depth) return;
+    uint word = stepInfo.count != 0u ? surfaces[2u * place] : 0u;
+    Texel own = loadTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, int(pixel.x), int(pixel.y));
+    uint e = word != 0u ? surfaces[2u * place + 1u] : 0u;
+    if (stepInfo.hasPyramid != 0u) {
+        const Texel pushed = pushedTexel(ivec2(pixel), own);
+        if (pushed.depth != own.depth) word = 0u;  // a splat stands in front
+        own = pushed;
+    }
+    if (word == 0u) {
+        const bool hasLights = frame.lightCount > 0u || frame.hasEnvironment != 0u;
+        if (own.depth <= 0.0 || !hasLights || (frame.shade & kShadeLit) == 0u) return;
+        word = kPlainSurface;
+        e = 0u;
+    }
     vec3 colour = own.colour;
-    if ((word & kPixelUnlit) == 0u && (frame.shade & kShadeTriangles) != 0u) {
+    if ((word & kPixelUnlit) == 0u && (word == kPlainSurface || (frame.shade & kShadeTriangles) != 0u)) {
         const vec3 ray = rayThrough(pixel);
         const vec3 v = normalize(ray);
         const vec3 point = ray * own.depth;
@@ -25,14 +35,16 @@ void main() {
         s.metallic = float(word & 255u) / 255.0;
         s.roughness = float(word >> 8 & 255u) / 255.0;
         s.occlusion = float(word >> 16 & 255u) / 255.0;
-        colour = frame.ambient * reflectSky(s, frame.skyDirection);
-        if (frame.lightCount == 0u) colour += reflectLight(s, frame.sunDirection, vec3(0.75));
+        if (frame.hasEnvironment != 0u)
+            colour = frame.ambient * reflectEnvironment(s, frame.environmentX, frame.environmentY, frame.environmentZ);
+        else
+            colour = frame.ambient * reflectSky(s, frame.skyDirection);
+        if (frame.lightCount == 0u && frame.hasEnvironment == 0u) colour += reflectLight(s, frame.sunDirection, vec3(0.75));
         for (uint k = 0u; k < frame.lightCount; ++k) {
             const LightSource light = lights[k];
             const vec3 l = light.kind == kLightDirectional ? light.position : light.position - point;
             colour += reflectLight(s, normalize(l), light.colour * lightAt(light, point, own.depth));
         }
-        const uint e = surfaces[2u * place + 1u];
         colour += vec3(unpackRed(e), unpackGreen(e), unpackBlue(e));
     }
     const vec3 c = clamp(colour, 0.0, 1.0);

@@ -56,7 +56,7 @@ void takeTriangle(LargeTriangle t, DrawCluster c, MeshVertex va, MeshVertex vb, 
 
 void main() {
     const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * 65535u;
-    if (block >= stepInfo.fine) return;  // number of clusters
+    if (block >= stepInfo.count) return;
     const DrawCluster c = clusters[block];
     const DrawMesh m = meshes[c.mesh];
     Vertices vertices = Vertices(uvec2(c.verticesLow, c.verticesHigh));

@@ -59,6 +59,10 @@ struct FrameConstants {
     uint blockCount;
     uint lightCount;  // 0: the sun above, else these instead
     float ambient;    // share of the sky's light
+    uint hasEnvironment;
+    vec3 environmentX;  // rows of the rotation from camera space to the environment's (y up)
+    vec3 environmentY;
+    vec3 environmentZ;
 };
 
 // A light in camera space. `colour`: what a white diffuse surface that faces it sends back at distance 1 (directional:

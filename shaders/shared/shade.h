@@ -49,23 +49,29 @@ SHARED_FN vec3 reflectLight(Surface s, vec3 l, vec3 light) {
 // The sky's light: 0.25 of white from the side, more from above.
 SHARED_FN float skyLight(vec3 d, vec3 up) { return 0.25f + 0.15f * dot(d, up); }
 
-// What the sky sends back: diffuse, and a mirror blurred by the roughness (Karis 2013, fitted by Lazarov's terms).
-SHARED_FN vec3 reflectSky(Surface s, vec3 up) {
-    const float nv = max(dot(s.normal, s.toEye), 1.0e-3f);
-    const vec3 r = vec3(2.0f * nv * s.normal.x - s.toEye.x, 2.0f * nv * s.normal.y - s.toEye.y,
-                        2.0f * nv * s.normal.z - s.toEye.z);
+// What light from all around sends back: `around` falls on the surface, `mirror` is what a mirror of its roughness sees
+// (Karis 2013, with Lazarov's fit).
+SHARED_FN vec3 reflectAround(Surface s, float nv, vec3 around, vec3 mirror) {
     const float rx = 1.0f - s.roughness;
     const float ry = 0.0425f - 0.0275f * s.roughness;
     const float a004 = min(rx * rx, exp2(-9.28f * nv)) * rx + ry;
     const float scale = -1.04f * a004 + 1.04f - 0.572f * s.roughness;
     const float bias = 1.04f * a004 - 0.04f + 0.022f * s.roughness;
-    const float blurred = 0.25f + 0.15f * (1.0f - s.roughness) * dot(r, up) + 0.15f * s.roughness * dot(s.normal, up);
-    const float around = skyLight(s.normal, up) * (1.0f - s.metallic);
+    const float diffuse = 1.0f - s.metallic;
     const vec3 f0 = vec3(0.04f + (s.colour.x - 0.04f) * s.metallic, 0.04f + (s.colour.y - 0.04f) * s.metallic,
                          0.04f + (s.colour.z - 0.04f) * s.metallic);
-    return vec3(s.occlusion * (s.colour.x * around + (f0.x * scale + bias) * blurred),
-                s.occlusion * (s.colour.y * around + (f0.y * scale + bias) * blurred),
-                s.occlusion * (s.colour.z * around + (f0.z * scale + bias) * blurred));
+    return vec3(s.occlusion * (s.colour.x * diffuse * around.x + (f0.x * scale + bias) * mirror.x),
+                s.occlusion * (s.colour.y * diffuse * around.y + (f0.y * scale + bias) * mirror.y),
+                s.occlusion * (s.colour.z * diffuse * around.z + (f0.z * scale + bias) * mirror.z));
+}
+
+SHARED_FN vec3 reflectSky(Surface s, vec3 up) {
+    const float nv = max(dot(s.normal, s.toEye), 1.0e-3f);
+    const vec3 r = vec3(2.0f * nv * s.normal.x - s.toEye.x, 2.0f * nv * s.normal.y - s.toEye.y,
+                        2.0f * nv * s.normal.z - s.toEye.z);
+    const float mirror = 0.25f + 0.15f * (1.0f - s.roughness) * dot(r, up) + 0.15f * s.roughness * dot(s.normal, up);
+    const float around = skyLight(s.normal, up);
+    return reflectAround(s, nv, vec3(around, around, around), vec3(mirror, mirror, mirror));
 }
 
 // Direction to a light from a point, and its share of what the light sends at distance 1.

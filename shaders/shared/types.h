@@ -38,7 +38,12 @@ SHARED_FN float min(float a, float b) { return b < a ? b : a; }
 SHARED_FN float max(float a, float b) { return a < b ? b : a; }
 SHARED_FN float floor(float a) { return std::floor(a); }
 SHARED_END
+// A table of floats that GLSL reads from a buffer and C++ from its first argument.
+#define SHARED_TABLE const float *environment,
+#define SHARED_TABLE_USE environment,
 #else
+#define SHARED_TABLE
+#define SHARED_TABLE_USE
 #define SHARED_BEGIN
 #define SHARED_END
 #define SHARED_FN

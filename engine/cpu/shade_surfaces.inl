@@ -1,10 +1,12 @@
-// Light on the pixels of a row that show triangles. Included by kernels.inl.
+// Light on the pixels of a row: triangles, and points under lights of the scene's own. Included by kernels.inl.
 
-void shadeTriangles(const FrameConstants& f, const TexelRow& __restrict row, const SurfacePlanes& planes,
-                    const LightSource* lights, const uint32_t* __restrict mask, uint32_t x0, float vy, uint32_t n,
-                    float* __restrict red, float* __restrict green, float* __restrict blue) {
+constexpr uint32_t kPlainSurface = 0x00ffff00u;  ///< not metallic, rough, not occluded: what points are
+
+void shadeSurfaces(const FrameConstants& f, const TexelRow& __restrict row, const uint32_t* __restrict words,
+                   const uint32_t* __restrict shines, const LightInput& input, const uint32_t* __restrict mask,
+                   uint32_t x0, float vy, uint32_t n, float* __restrict red, float* __restrict green,
+                   float* __restrict blue) {
     const float inverseFocal = 1.0f / f.focal;
-    const uint32_t* __restrict const words = planes.surface;
     alignas(64) float r[kTile], g[kTile], b[kTile];
     const auto surfaceAt = [&](size_t i) {
         const float vx = (float(int(x0) + int(i)) + 0.5f - f.centre.x) * inverseFocal;
@@ -21,14 +23,25 @@ void shadeTriangles(const FrameConstants& f, const TexelRow& __restrict row, con
     };
     const float ambient = f.ambient;
     const vec3 up = f.skyDirection;
+    if (input.environment != nullptr) {
+        for (size_t i = 0; i < n; ++i) {
+            if (mask[i] == 0) continue;
+            const vec3 c = reflectEnvironment(input.environment, surfaceAt(i), f.environmentX, f.environmentY,
+                                              f.environmentZ);
+            r[i] = ambient * c.x;
+            g[i] = ambient * c.y;
+            b[i] = ambient * c.z;
+        }
+    } else {
 #pragma GCC ivdep
-    for (size_t i = 0; i < n; ++i) {
-        const vec3 c = reflectSky(surfaceAt(i), up);
-        r[i] = ambient * c.x;
-        g[i] = ambient * c.y;
-        b[i] = ambient * c.z;
+        for (size_t i = 0; i < n; ++i) {
+            const vec3 c = reflectSky(surfaceAt(i), up);
+            r[i] = ambient * c.x;
+            g[i] = ambient * c.y;
+            b[i] = ambient * c.z;
+        }
     }
-    if (f.lightCount == 0) {
+    if (f.lightCount == 0 && input.environment == nullptr) {
         const vec3 sun = f.sunDirection;
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
@@ -39,7 +52,7 @@ void shadeTriangles(const FrameConstants& f, const TexelRow& __restrict row, con
         }
     }
     for (uint32_t k = 0; k < f.lightCount; ++k) {
-        const LightSource light = lights[k];
+        const LightSource light = input.lights[k];
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
             const float z = row.depth[kPad + i];
@@ -60,12 +73,8 @@ void shadeTriangles(const FrameConstants& f, const TexelRow& __restrict row, con
     }
     for (size_t i = 0; i < n; ++i) {
         if (mask[i] == 0) continue;
-        red[i] = r[i];
-        green[i] = g[i];
-        blue[i] = b[i];
-        if (planes.emissive == nullptr) continue;
-        red[i] += unpackRed(planes.emissive[i]);
-        green[i] += unpackGreen(planes.emissive[i]);
-        blue[i] += unpackBlue(planes.emissive[i]);
+        red[i] = r[i] + unpackRed(shines[i]);
+        green[i] = g[i] + unpackGreen(shines[i]);
+        blue[i] = b[i] + unpackBlue(shines[i]);
     }
 }

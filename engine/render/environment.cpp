@@ -1,0 +1,124 @@
+#include "engine/render/environment.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/glm.hpp>
+
+#include "shaders/shared/environment.h"
+
+namespace stipple::render {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+struct Sample {
+    glm::vec3 direction, light;  ///< light times solid angle
+    float solidAngle;
+};
+
+glm::dvec3 directionOf(double u, double v) {
+    const double azimuth = (u - 0.5) * 2 * kPi, elevation = (0.5 - v) * kPi;
+    return {std::sin(azimuth) * std::cos(elevation), std::sin(elevation), -std::cos(azimuth) * std::cos(elevation)};
+}
+
+/// The picture in width x height cells, each the mean of what lies in it.
+std::vector<Sample> reduce(const HdrImage& image, float scale, uint32_t width, uint32_t height) {
+    std::vector<Sample> out;
+    for (uint32_t y = 0; y < height; ++y)
+        for (uint32_t x = 0; x < width; ++x) {
+            const uint32_t x0 = x * image.width / width, x1 = std::max((x + 1) * image.width / width, x0 + 1),
+                           y0 = y * image.height / height, y1 = std::max((y + 1) * image.height / height, y0 + 1);
+            glm::dvec3 sum(0);
+            for (uint32_t j = y0; j < y1; ++j)
+                for (uint32_t i = x0; i < x1; ++i) {
+                    const float* c = &image.rgb[(size_t{j} * image.width + i) * 3];
+                    for (int k = 0; k < 3; ++k) sum[k] += std::isfinite(c[k]) ? std::clamp(c[k], 0.0f, 6e4f) : 0;
+                }
+            const double top = std::sin((0.5 - double(y) / height) * kPi),
+                         bottom = std::sin((0.5 - double(y + 1) / height) * kPi);
+            const double angle = (top - bottom) * 2 * kPi / width;
+            const glm::dvec3 light = sum * (scale * angle / (double(x1 - x0) * (y1 - y0)));
+            out.push_back({glm::vec3(directionOf((x + 0.5) / width, (y + 0.5) / height)), glm::vec3(light),
+                           static_cast<float>(angle)});
+        }
+    return out;
+}
+
+void addHarmonics(const std::vector<Sample>& samples, std::vector<float>& table) {
+    // Basis constants squared, times the cosine's factors over pi: 1, 2/3, 1/4.
+    const double c0 = 1 / (4 * kPi), c1 = 3 / (4 * kPi) * (2.0 / 3), c2 = 15 / (4 * kPi) * 0.25,
+                 c20 = 5 / (16 * kPi) * 0.25, c22 = 15 / (16 * kPi) * 0.25;
+    std::array<glm::dvec3, 9> sum{};
+    for (const Sample& s : samples) {
+        const glm::dvec3 l(s.light), d(s.direction);
+        const std::array<double, 9> basis{c0,
+                                          c1 * d.y,
+                                          c1 * d.z,
+                                          c1 * d.x,
+                                          c2 * d.x * d.y,
+                                          c2 * d.y * d.z,
+                                          c20 * (3 * d.z * d.z - 1),
+                                          c2 * d.x * d.z,
+                                          c22 * (d.x * d.x - d.y * d.y)};
+        for (size_t k = 0; k < 9; ++k) sum.at(k) += l * basis.at(k);
+    }
+    for (const glm::dvec3& v : sum)
+        for (int k = 0; k < 3; ++k) table.push_back(static_cast<float>(v[k]));
+}
+
+glm::vec3 directionOfTexel(uint32_t x, uint32_t y) {
+    const float edge = shared::kEnvironmentEdge;
+    glm::vec3 d(2 * (static_cast<float>(x) + 0.5f) / edge - 1, 0, 2 * (static_cast<float>(y) + 0.5f) / edge - 1);
+    d.y = 1 - std::abs(d.x) - std::abs(d.z);
+    if (d.y < 0) {
+        const float px = d.x, pz = d.z;
+        d.x = (1 - std::abs(pz)) * (px >= 0 ? 1.0f : -1.0f);
+        d.z = (1 - std::abs(px)) * (pz >= 0 ? 1.0f : -1.0f);
+    }
+    return glm::normalize(d);
+}
+
+}  // namespace
+
+Environment makeEnvironment(const HdrImage& image, float scale, Executor& executor) {
+    Environment out;
+    const std::vector<Sample> fine = reduce(image, scale, 256, 128), coarse = reduce(image, scale, 64, 32);
+    addHarmonics(coarse, out.table);
+    out.table.resize(shared::kEnvironmentFloats);
+    constexpr uint32_t kEdge = shared::kEnvironmentEdge;
+    // Doublings of the cosine: exponents 512, 32, 4, 1 for roughness 1/4 to 1.
+    constexpr std::array<int, shared::kEnvironmentLevels> kDoublings{-1, 9, 5, 2, 0};
+    executor.parallelFor(kEdge, 2, [&](size_t begin, size_t end) {
+        for (auto y = static_cast<uint32_t>(begin); y < end; ++y)
+            for (uint32_t x = 0; x < kEdge; ++x) {
+                const glm::vec3 d = directionOfTexel(x, y);
+                for (uint32_t l = 0; l < shared::kEnvironmentLevels; ++l) {
+                    glm::vec3 sum(0);
+                    float weights = 0;
+                    if (kDoublings.at(l) < 0) {  // a plain look
+                        const double u = 0.5 + std::atan2(double(d.x), -double(d.z)) / (2 * kPi),
+                                     v = 0.5 - std::asin(std::clamp(double(d.y), -1.0, 1.0)) / kPi;
+                        const auto px = std::min(static_cast<uint32_t>(u * 256), 255u),
+                                   py = std::min(static_cast<uint32_t>(v * 128), 127u);
+                        const Sample& s = fine[size_t{py} * 256 + px];
+                        sum = s.light;
+                        weights = s.solidAngle;
+                    } else {
+                        for (const Sample& s : coarse) {
+                            float w = glm::dot(d, s.direction);
+                            if (w <= 0) continue;
+                            for (int k = 0; k < kDoublings.at(l); ++k) w *= w;
+                            sum += w * s.light;
+                            weights += w * s.solidAngle;
+                        }
+                    }
+                    float* to = &out.table[shared::kEnvironmentHarmonics + ((size_t{l} * kEdge + y) * kEdge + x) * 3];
+                    for (int k = 0; k < 3; ++k) to[k] = weights > 0 ? sum[k] / weights : 0;
+                }
+            }
+    });
+    return out;
+}
+
+}  // namespace stipple::render
