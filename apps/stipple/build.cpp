@@ -23,7 +23,8 @@ Result<void> run(const Options& o) {
     if (!built) return tl::unexpected(built.error());
     const lod::BuildReport& r = *built;
     if (o.json) {
-        const nlohmann::json j = {{"points_in", r.pointsIn},
+        const nlohmann::json j = {{"primitive", r.isMesh ? "triangles" : "points"},
+                                  {"points_in", r.pointsIn},
                                   {"points_out", r.pointsOut},
                                   {"dropped", r.dropped},
                                   {"skipped_files", r.skippedFiles},
@@ -40,11 +41,13 @@ Result<void> run(const Options& o) {
         return {};
     }
     for (const std::string& note : r.notes) fmt::print(stderr, "note: {}\n", note);
-    fmt::print("{}: {} points in {} nodes, {} ({:.1f} bytes a point), {:.2f} s, {:.2f} M points/s, peak memory {}\n",
-               o.output, r.pointsOut, r.nodes, humanBytes(r.bytesOut),
-               static_cast<double>(r.bytesOut) / static_cast<double>(r.pointsOut), r.seconds,
-               static_cast<double>(r.pointsIn) / r.seconds * 1e-6, humanBytes(peakRssBytes()));
-    for (const auto& [reason, count] : r.dropped) fmt::print("dropped {} points: {}\n", count, reason);
+    const char* const what = r.isMesh ? "triangle" : "point";
+    fmt::print("{}: {} {}s in {} {}, {} ({:.1f} bytes a {}), {:.2f} s, {:.2f} M {}s/s, peak memory {}\n", o.output,
+               r.pointsOut, what, r.nodes, r.isMesh ? "groups" : "nodes", humanBytes(r.bytesOut),
+               static_cast<double>(r.bytesOut) / static_cast<double>(r.pointsOut), what, r.seconds,
+               static_cast<double>(r.pointsIn) / r.seconds * 1e-6, what, humanBytes(peakRssBytes()));
+    for (const auto& [reason, count] : r.dropped)
+        fmt::print("dropped {}{}: {}\n", count, r.isMesh ? "" : " points", reason);
     return {};
 }
 

@@ -30,7 +30,9 @@ nlohmann::json storeInfo(const lod::Store& store) {
         l["nodes"] = l["nodes"].get<uint64_t>() + 1;
         l["records"] = l["records"].get<uint64_t>() + n.records;
         l["bytes"] = l["bytes"].get<uint64_t>() + n.chunkBytes;
-        l["largest_error"] = std::max(l["largest_error"].get<double>(), h.unit * h.errors.decode(n.errorCode));
+        // The coarsest groups of a mesh are never replaced: they have no error to speak of.
+        const double error = n.errorCode == lod::ErrorScale::kNoParent ? 0 : h.unit * h.errors.decode(n.errorCode);
+        l["largest_error"] = std::max(l["largest_error"].get<double>(), error);
     }
     nlohmann::json attributes = nlohmann::json::array();
     for (const lod::AttributeInfo& a : d.attributes)
@@ -39,7 +41,17 @@ nlohmann::json storeInfo(const lod::Store& store) {
                               {"aggregate", lod::kAggregateNames.at(static_cast<size_t>(a.aggregate))},
                               {"least", a.least},
                               {"greatest", a.greatest}});
+    nlohmann::json textures = nlohmann::json::array();
+    for (const shared::TextureInfo& t : h.textures)
+        textures.push_back({{"width", t.width}, {"height", t.height}, {"levels", t.levels}});
+    uint64_t tileBytes = 0;
+    for (const lod::TextureTile& t : h.tiles) tileBytes += t.bytes;
     return {{"kind", "stipple store"},
+            {"primitive", h.isMesh() ? "triangles" : "points"},
+            {"materials", d.materials.size()},
+            {"textures", textures},
+            {"texture_tiles", h.tiles.size()},
+            {"texture_bytes", tileBytes},
             {"path", store.path},
             {"bytes", store.fileBytes},
             {"content_hash", hexDigits(store.contentHash)},
@@ -65,9 +77,15 @@ void printStore(const nlohmann::json& j) {
     const auto vec = [](const nlohmann::json& v) {
         return fmt::format("{:.10g} {:.10g} {:.10g}", v[0].get<double>(), v[1].get<double>(), v[2].get<double>());
     };
-    fmt::print("{}: {} points from {}, {} records in {} nodes, {}\n", j["path"].get<std::string>(),
-               j["points"].get<uint64_t>(), j["source"].get<std::string>(), j["records"].get<uint64_t>(),
-               j["nodes"].get<uint64_t>(), humanBytes(j["bytes"].get<uint64_t>()));
+    const bool isMesh = j["primitive"] == "triangles";
+    fmt::print("{}: {} {} from {}, {} with all levels in {} {}, {}\n", j["path"].get<std::string>(),
+               j["points"].get<uint64_t>(), isMesh ? "triangles" : "points", j["source"].get<std::string>(),
+               j["records"].get<uint64_t>(), j["nodes"].get<uint64_t>(), isMesh ? "groups" : "nodes",
+               humanBytes(j["bytes"].get<uint64_t>()));
+    if (isMesh)
+        fmt::print("  materials     {}\n  textures      {} in {} tiles, {}\n", j["materials"].get<uint64_t>(),
+                   j["textures"].size(), j["texture_tiles"].get<uint64_t>(),
+                   humanBytes(j["texture_bytes"].get<uint64_t>()));
     fmt::print("  bounds        {} .. {}\n  origin        {}\n", vec(j["min"]), vec(j["max"]), vec(j["origin"]));
     fmt::print("  lattice unit  {:.6g} (coordinates {})\n", j["lattice_unit"].get<double>(),
                j["coordinate_rounding"].get<double>() == 0
@@ -91,6 +109,8 @@ void printStore(const nlohmann::json& j) {
 }
 
 Result<void> showNearest(const lod::Store& store, const Options& o) {
+    if (store.hierarchy.isMesh())
+        return fail(ErrorKind::usage, "holds triangles: --at finds points", store.path, "leave --at out");
     STIPPLE_ASSIGN(const glm::dvec3 place, parseVector(o.at, "--at"));
     STIPPLE_ASSIGN(const lod::NearestPoint p, lod::findNearest(store, place));
     const uint32_t c = p.packed.colour;

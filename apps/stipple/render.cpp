@@ -198,6 +198,9 @@ Result<void> run(const Options& o) {
     if (o.mode == "reference" && colour.mode != lod::ColourMode::own)
         return fail(ErrorKind::usage, "traced pictures have the scene's own colours", "--mode reference",
                     "leave --colour out, or use --device reference");
+    if (o.mode == "reference" && scene.placed[0].store->hierarchy.isMesh())
+        return fail(ErrorKind::usage, "traced pictures are of points so far, not of triangles", "--mode reference",
+                    "use --device reference --error 0.001: the oracle on the full mesh");
     if (o.mode == "reference") {
         const double start = nowSeconds();
         reference::TraceSettings trace{static_cast<uint32_t>(o.samples), settings.draw};

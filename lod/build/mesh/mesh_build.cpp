@@ -321,6 +321,7 @@ Result<BuildReport> buildMeshStore(TriangleMesh input, const std::string& output
         last = now;
     };
     STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output));
+    report.isMesh = true;
     report.pointsIn = input.indices.size() / 3;
     const WeldedMesh mesh = weldMesh(std::move(input), executor);
     stage("weld");
