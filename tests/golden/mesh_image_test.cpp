@@ -9,6 +9,7 @@
 #include "engine/image/image_io.h"
 #include "engine/reference/reference.h"
 #include "engine/scene/camera.h"
+#include "shaders/shared/environment.h"
 #include "tests/support/meshes.h"
 
 namespace stipple {
@@ -175,6 +176,46 @@ TEST_F(Hybrid, WhatASceneDoesNotCallForDoesNotExist) {
     EXPECT_EQ(backend->resources().textureTiles, 0u) << "tiles outlive their frame state";
     draw(placed_, *backend, *executor_, view_, settings_, &counters);
     EXPECT_EQ(counters.passes, 7u);
+}
+
+TEST_F(Hybrid, LightsAndAnEnvironmentShineOnPointsAndTrianglesAsTheOracleSays) {
+    render::HdrImage sky;  // a gradient with a sun
+    sky.width = 64;
+    sky.height = 32;
+    for (uint32_t y = 0; y < sky.height; ++y)
+        for (uint32_t x = 0; x < sky.width; ++x) {
+            const bool isSun = x / 4 == 5 && y / 4 == 2;
+            const auto up = static_cast<float>(y) / 32;
+            for (const float c : {0.3f + 0.5f * up, 0.6f - 0.2f * up, 1.0f - 0.8f * up})
+                sky.rgb.push_back(isSun ? 20.0f : c);
+        }
+    const auto environment =
+        std::make_shared<const render::Environment>(render::makeEnvironment(sky, 1.0f, *executor_));
+    const auto backend = cpu::makeCpuBackend(*executor_);
+    const auto oracle = reference::makeReferenceBackend(*executor_);
+    render::Image before;
+    for (const int which : {0, 1, 2, 3}) {
+        settings_.draw.environment = (which & 1) != 0 ? environment : nullptr;
+        settings_.draw.lights.clear();
+        if ((which & 2) != 0) settings_.draw.lights = threeLights({0, 0, 0}, 2);
+        const render::Image a = draw(placed_, *backend, *executor_, view_, settings_);
+        const auto d = reference::compareImages(a, draw(placed_, *oracle, *executor_, view_, settings_), 4, nullptr);
+        ASSERT_TRUE(d);
+        EXPECT_GE(d->psnr, 50) << which;
+        EXPECT_LE(d->differingFraction, 0.002) << which;
+        if (!before.rgba.empty()) {
+            const auto changed = reference::compareImages(a, before, 4, nullptr);
+            EXPECT_GT(changed->differingFraction, 0.2) << which;  // negative control: light matters
+        }
+        before = a;
+    }
+    // A white furnace: under even light a white, rough, not metallic surface sends back about what falls on it.
+    std::fill(sky.rgb.begin(), sky.rgb.end(), 0.5f);
+    const render::Environment even = render::makeEnvironment(sky, 1.0f, *executor_);
+    const auto e = shared::environmentDiffuse(even.table.data(), shared::vec3(0.6f, 0.0f, 0.8f));
+    const auto m = shared::environmentMirror(even.table.data(), shared::vec3(0, -1, 0), 0.4f);
+    EXPECT_NEAR(e.x, 0.5, 0.005);
+    EXPECT_NEAR(m.y, 0.5, 0.005);
 }
 
 TEST(MeshImages, TexturesAndChunksStayWithinTheResidentBudget) {

@@ -1,0 +1,294 @@
+// Meshes file by file and part by part: PLY faces and strips, what weld drops, damaged chunks and stores, scenes that
+// are written and read again.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <limits>
+
+#include "engine/scene/triangles.h"
+#include "lod/build/mesh/mesh_work.h"
+#include "lod/import/ply_mesh.h"
+#include "tests/support/meshes.h"
+
+namespace stipple {
+namespace {
+
+std::string slurp(const std::string& path) {
+    std::ifstream in(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+void spit(const std::string& path, const std::string& bytes) {
+    std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+}
+
+TEST(PlyMesh, PolygonsAndStripsBecomeTriangles) {
+    const test::TempFolder folder;
+    spit(folder / "a.ply",
+         "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
+         "element face 3\nproperty uchar flag\nproperty list uchar int vertex_indices\nend_header\n"
+         "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n7 4 0 1 2 3\n7 3 0 1 4\n7 3 0 1 9\n");
+    ASSERT_TRUE(*lod::hasPlyFaces(folder / "a.ply"));
+    lod::PlyMeshNotes notes;
+    const auto mesh = lod::readPlyMesh(folder / "a.ply", notes);
+    ASSERT_TRUE(mesh) << mesh.error().line();
+    EXPECT_EQ(mesh->indices, (std::vector<uint32_t>{0, 1, 2, 0, 2, 3, 0, 1, 4}));
+    EXPECT_EQ(notes.badFaces, 1u);
+    EXPECT_EQ(mesh->normal.size(), 5u);
+    EXPECT_NEAR(mesh->normal[2].z, 1, 1e-6);
+    // A strip turns every second triangle round; -1 starts a new one.
+    std::string strip =
+        "ply\nformat binary_little_endian 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n"
+        "element tristrips 1\nproperty list int int vertex_indices\nend_header\n";
+    const std::array<float, 18> positions{0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 2, 0, 1, 2, 0};
+    const std::array<int32_t, 9> corners{8, 0, 1, 2, 3, -1, 3, 4, 5};
+    strip.append(reinterpret_cast<const char*>(positions.data()), sizeof(positions));
+    strip.append(reinterpret_cast<const char*>(corners.data()), sizeof(corners));
+    spit(folder / "b.ply", strip);
+    const auto strips = lod::readPlyMesh(folder / "b.ply", notes);
+    ASSERT_TRUE(strips) << strips.error().line();
+    EXPECT_EQ(strips->indices, (std::vector<uint32_t>{0, 1, 2, 1, 3, 2, 3, 4, 5}));
+    // Every truncation is refused, never read as something else.
+    for (size_t length = strip.size() - 90; length < strip.size(); ++length) {
+        spit(folder / "c.ply", strip.substr(0, length));
+        EXPECT_FALSE(lod::readPlyMesh(folder / "c.ply", notes)) << length;
+    }
+}
+
+TEST(PlyMesh, TheRealMeshesHaveTheirTriangles) {
+    for (const auto& [name, triangles] : {std::pair{"01_meshes/bunny/bun_zipper.ply", size_t{69451}},
+                                          {"01_meshes/misc/horse.ply", size_t{96966}},
+                                          {"01_meshes/misc/lucy.ply", size_t{99970}}}) {
+        const std::string path = test::dataFile(name);
+        if (path.empty()) return;
+        lod::PlyMeshNotes notes;
+        const auto mesh = lod::readPlyMesh(path, notes);
+        ASSERT_TRUE(mesh) << mesh.error().line();
+        EXPECT_EQ(mesh->indices.size() / 3, triangles) << name;
+        EXPECT_EQ(notes.badFaces, 0u);
+    }
+    const auto igea = [] {
+        lod::PlyMeshNotes notes;
+        return lod::readPlyMesh(test::dataFile("01_meshes/misc/igea.ply"), notes);
+    }();
+    ASSERT_TRUE(igea);
+    EXPECT_GT(igea->indices.size() / 3, 260'000u);  // a closed surface has about twice as many as vertices
+}
+
+TEST(Weld, CountsWhatItDropsAndKeepsTheRest) {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    lod::TriangleMesh in;
+    in.position = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {nan, 0, 0}, {0, 0, 0}, {2, 0, 0}};
+    in.indices = {0, 1, 2,  // kept
+                  1, 2, 5,  // the same with an equal vertex, turned: a duplicate
+                  2, 1, 0,  // the other side: kept
+                  1, 3, 2,  // kept
+                  0, 1, 6,  // no area
+                  0, 0, 1,  // no area
+                  0, 1, 4};
+    const auto executor = makeSerialExecutor();
+    const lod::WeldedMesh mesh = lod::weldMesh(in, *executor);
+    EXPECT_EQ(mesh.indices.size() / 3, 3u);
+    EXPECT_EQ(mesh.duplicate, 1u);
+    EXPECT_EQ(mesh.degenerate, 2u);
+    EXPECT_EQ(mesh.notFinite, 1u);
+    EXPECT_EQ(mesh.vertices.size(), 4u);
+    EXPECT_EQ(mesh.rounding, 0);  // small whole numbers lie on the lattice
+}
+
+TEST(MeshStore, DamagedChunksAndTablesAreRefused) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    test::MeshRecipe recipe;
+    recipe.grow.triangles = 6'000;
+    recipe.grow.textureSize = 64;
+    const auto store = test::growMeshStore(recipe, folder / "a.stipple", *executor);
+    ASSERT_TRUE(lod::verifyStore(*store, *executor));
+    const lod::Hierarchy& h = store->hierarchy;
+    // A chunk in a buffer of exactly its size, cut at every length: an error, and no read beyond (AddressSanitizer).
+    const lod::Node& node = h.nodes[h.nodes.size() - 1];
+    std::vector<uint8_t> bytes(node.chunkBytes);
+    ASSERT_TRUE(store->file->readAt(node.chunkOffset, bytes.data(), bytes.size()));
+    const auto decode = [&](const std::vector<uint8_t>& b) {
+        return lod::decodeMeshChunk(b.data(), b.size(), node.records, h.groups.back(), "test");
+    };
+    ASSERT_TRUE(decode(bytes));
+    for (size_t length = 0; length < bytes.size(); length += length < 200 ? 1 : 37)
+        EXPECT_FALSE(decode({bytes.begin(), bytes.begin() + static_cast<ptrdiff_t>(length)})) << length;
+    Rng rng(5);
+    for (int k = 0; k < 2000; ++k) {  // changed bytes: an error or a chunk whose indices are within it
+        std::vector<uint8_t> changed = bytes;
+        for (int c = 0; c < 3; ++c) changed[rng.below(changed.size())] = static_cast<uint8_t>(rng.next());
+        const auto chunk = decode(changed);
+        if (!chunk) continue;
+        for (const shared::MeshCluster& c : chunk->clusters)
+            ASSERT_LE(c.firstVertex + (c.counts & 0xffffu), chunk->vertices.size());
+    }
+    // A store with changed bytes anywhere: opening and verifying says so.
+    const std::string whole = slurp(folder / "a.stipple");
+    for (int k = 0; k < 300; ++k) {
+        std::string changed = whole;
+        const size_t at = rng.below(changed.size());
+        changed[at] = static_cast<char>(changed[at] ^ static_cast<char>(1 + rng.below(255)));
+        spit(folder / "b.stipple", changed);
+        const auto opened = lod::openStore(folder / "b.stipple");
+        if (!opened) continue;
+        EXPECT_FALSE(lod::verifyStore(*opened, *executor)) << "byte " << at << " of " << whole.size();
+    }
+}
+
+TEST(MeshStore, TablesThatLieAreRefused) {
+    // Through the front door: hierarchies with one impossible value, written with proper hashes.
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    test::MeshRecipe recipe;
+    recipe.grow.triangles = 20'000;
+    recipe.grow.textureSize = 32;
+    const auto store = test::growMeshStore(recipe, folder / "a.stipple", *executor);
+    const auto opens = [&](const std::function<void(lod::Hierarchy&)>& change) {
+        lod::Hierarchy h = store->hierarchy;
+        change(h);
+        auto writer = lod::StoreWriter::create(folder / "b.stipple");
+        EXPECT_TRUE(writer);
+        // The same chunks at the same places.
+        std::vector<lod::ChunkPlace> places;
+        for (uint32_t c = 0; c < store->hierarchy.chunks(); ++c) places.push_back(lod::chunkPlace(store->hierarchy, c));
+        std::sort(places.begin(), places.end(), [](const auto& a, const auto& b) { return a.offset < b.offset; });
+        for (const lod::ChunkPlace& place : places) {
+            std::vector<uint8_t> bytes(place.bytes);
+            EXPECT_TRUE(store->file->readAt(place.offset, bytes.data(), bytes.size()));
+            lod::Node node;
+            EXPECT_TRUE(writer->appendChunk(bytes, {}, node));
+            EXPECT_EQ(node.chunkOffset, place.offset);
+        }
+        EXPECT_TRUE(writer->finish(h, store->description));
+        return lod::openStore(writer->temporaryPath()).has_value();
+    };
+    EXPECT_TRUE(opens([](lod::Hierarchy&) {}));  // negative control
+    const auto reject = [&](const char* what, const std::function<void(lod::Hierarchy&)>& change) {
+        EXPECT_FALSE(opens(change)) << what;
+    };
+    reject("a chunk outside the file", [](lod::Hierarchy& h) { h.nodes[1].chunkOffset = 1ull << 40; });
+    reject("a tile outside the file", [](lod::Hierarchy& h) { h.tiles[0].bytes = 1u << 31; });
+    reject("a texture of a group that is none", [](lod::Hierarchy& h) { h.groupTextures.back() = 99; });
+    reject("a sphere that is not finite", [](lod::Hierarchy& h) { h.nodes[2].radius = std::nan(""); });
+    reject("a producer before its product", [](lod::Hierarchy& h) { h.runs.back().producer = 0; });
+    reject("a parent after its child",
+           [](lod::Hierarchy& h) { h.parents.back() = static_cast<uint32_t>(h.nodes.size()); });
+    reject("runs beyond the table", [](lod::Hierarchy& h) { h.groups[0].runs = 1u << 30; });
+    reject("a texture without tiles", [](lod::Hierarchy& h) { h.textures[0].levels = 16; });
+    reject("more vertices than the bytes can hold", [](lod::Hierarchy& h) { h.groups[0].vertices = 0xffffffff; });
+}
+
+TEST(GltfWriter, WhatIsWrittenIsReadAgain) {
+    const test::TempFolder folder;
+    scene::Scene scene = grow::growMesh({"building", 12'000, 3, 16});
+    scene.textures.clear();
+    for (scene::Material& m : scene.materials) m.baseColourTexture = m.normalTexture = {};
+    scene.materials[0].alphaMode = scene::AlphaMode::mask;
+    scene.materials[0].alphaCutoff = 0.25f;
+    scene.materials[1].isUnlit = true;
+    scene.materials[1].isDoubleSided = true;
+    scene::Node lamp;
+    lamp.name = "lamp";
+    lamp.parent = 0;
+    lamp.light = 0;
+    lamp.local[3] = glm::dvec4(1, 2, 3, 1);
+    scene.nodes.push_back(lamp);
+    scene::Light light;
+    light.kind = scene::LightKind::spot;
+    light.colour = {1, 0.5f, 0.25f};
+    light.intensity = 7;
+    light.innerCone = 0.1f;
+    light.outerCone = 0.3f;
+    scene.lights.push_back(light);
+    scene::Node crowd;
+    crowd.name = "crowd";
+    crowd.mesh = 0;
+    for (int k = 0; k < 5; ++k) {
+        glm::dmat4 m(1);
+        const double c = std::cos(k * 1.3), s = std::sin(k * 1.3), scale = 1 + 0.5 * k;
+        m[0] = glm::dvec4(c * scale, 0, -s * scale, 0);
+        m[1] = glm::dvec4(0, scale, 0, 0);
+        m[2] = glm::dvec4(s * scale, 0, c * scale, 0);
+        m[3] = glm::dvec4(10.0 * k, -k, 3, 1);
+        crowd.instances.push_back(m);
+    }
+    scene.nodes.push_back(crowd);
+    scene::Node scan;
+    scan.name = "scan";
+    scan.store = "grove.stipple";
+    scan.isVisible = false;
+    scene.nodes.push_back(scan);
+    for (const char* name : {"a.glb", "a.gltf"}) {
+        const auto written = scene::writeGltf(scene, folder / name);
+        ASSERT_TRUE(written) << written.error().line();
+        const auto back = scene::readGltf(folder / name);
+        ASSERT_TRUE(back) << back.error().line();
+        ASSERT_EQ(back->nodes.size(), scene.nodes.size());
+        for (size_t n = 0; n < scene.nodes.size(); ++n) {
+            const scene::Node& before = scene.nodes[n];
+            const auto found = std::find_if(back->nodes.begin(), back->nodes.end(),
+                                            [&](const scene::Node& m) { return m.name == before.name; });
+            ASSERT_NE(found, back->nodes.end()) << before.name;  // the order may change
+            const auto parentName = [](const scene::Scene& s, const scene::Node& m) {
+                return m.parent < 0 ? std::string() : s.nodes[static_cast<size_t>(m.parent)].name;
+            };
+            EXPECT_EQ(parentName(*back, *found), parentName(scene, before));
+            EXPECT_EQ(found->isVisible, before.isVisible);
+            EXPECT_EQ(found->store.empty(), before.store.empty());
+            EXPECT_EQ(found->store.find("grove.stipple") != std::string::npos, !before.store.empty());
+            for (int c = 0; c < 4; ++c) EXPECT_EQ(found->local[c], before.local[c]);
+            ASSERT_EQ(found->instances.size(), before.instances.size());
+            for (size_t i = 0; i < before.instances.size(); ++i)
+                for (int c = 0; c < 4; ++c)
+                    EXPECT_LT(glm::length(found->instances[i][c] - before.instances[i][c]), 1e-5);
+        }
+        for (size_t p = 0; p < 2; ++p) {
+            const auto &a = back->meshes[0].primitives[p], &b = scene.meshes[0].primitives[p];
+            EXPECT_EQ(a.position, b.position);
+            EXPECT_EQ(a.normal, b.normal);
+            EXPECT_EQ(a.indices, b.indices);
+            EXPECT_EQ(a.material, b.material);
+        }
+        EXPECT_EQ(back->materials[0].alphaMode, scene::AlphaMode::mask);
+        EXPECT_EQ(back->materials[0].alphaCutoff, 0.25f);
+        EXPECT_TRUE(back->materials[1].isUnlit && back->materials[1].isDoubleSided);
+        EXPECT_FLOAT_EQ(back->materials[1].roughness, scene.materials[1].roughness);
+        ASSERT_EQ(back->lights.size(), 1u);
+        EXPECT_EQ(back->lights[0].kind, scene::LightKind::spot);
+        EXPECT_FLOAT_EQ(back->lights[0].intensity, 7);
+        EXPECT_FLOAT_EQ(back->lights[0].outerCone, 0.3f);
+    }
+    EXPECT_FALSE(scene::writeGltf(scene, folder / "a.obj"));
+    EXPECT_FALSE(scene::writeGltf(scene, "/proc/no/a.glb"));
+}
+
+TEST(Flatten, MirroredAndFlatPlacementsKeepTheirSides) {
+    scene::Scene scene = grow::growMesh({"rock", 2'000, 1, 16});
+    const scene::Placement plain{0, glm::dmat4(1)};
+    scene::Placement mirrored = plain;
+    mirrored.world[0].x = -1;
+    const lod::TriangleMesh a = scene::flattenTriangles(scene, {plain}), b = scene::flattenTriangles(scene, {mirrored});
+    const auto outward = [](const lod::TriangleMesh& m) {
+        size_t good = 0;
+        for (size_t i = 0; i < m.indices.size(); i += 3) {
+            const glm::dvec3 &p = m.position[m.indices[i]], &q = m.position[m.indices[i + 1]],
+                             &r = m.position[m.indices[i + 2]];
+            const glm::dvec3 face = glm::cross(q - p, r - p);
+            good += glm::dot(face, p) > 0 && glm::dot(face, glm::dvec3(m.normal[m.indices[i]])) > 0;
+        }
+        return static_cast<double>(good) / (static_cast<double>(m.indices.size()) / 3);
+    };
+    EXPECT_GT(outward(a), 0.98);
+    EXPECT_NEAR(outward(b), outward(a), 1e-9);
+    scene::Placement flat = plain;  // scale 0 along one axis: normals are still those of the plane
+    flat.world[1] = glm::dvec4(0);
+    for (const glm::vec3& n : scene::flattenTriangles(scene, {flat}).normal)
+        ASSERT_TRUE(n == glm::vec3(0) || std::abs(std::abs(n.y) - 1) < 1e-6f);
+}
+
+}  // namespace
+}  // namespace stipple
