@@ -105,10 +105,18 @@ class Selector {
             cut_.keep.clear();
             cut_.meshDraw.clear();
             cut_.counters.recordsDrawn = cut_.counters.recordsTested = cut_.counters.nodesVisited = 0;
-            cut_.counters.trianglesDrawn = 0;
+            cut_.counters.trianglesDrawn = cut_.counters.standIns = 0;
             cut_.counters.nodesCulled = cut_.counters.nodesMissing = cut_.counters.nodesDrawn = 0;
             cut_.tauEffective = 0;
-            for (size_t i = 0; i < instances_.size(); ++i) emit(i, step);
+            for (size_t i = 0; i < instances_.size(); ++i) {
+                if (instances_[i].isStandIn || hierarchyOf(i).nodes.empty()) continue;
+                if (usesStandIn(i, step) && hasRoot(instances_[i].standIn)) {
+                    ++cut_.counters.standIns;
+                    emit(instances_[i].standIn, step - kStepsPerOctave);
+                } else {
+                    emit(i, step);
+                }
+            }
             if (cut_.counters.recordsDrawn + cut_.counters.trianglesDrawn <= budgets_.records ||
                 step >= kLargestTauStep)
                 break;
@@ -134,39 +142,61 @@ class Selector {
         return scratch_.epsilon[i][index];
     }
 
-    /// Records of the full cut (everything resident) at `step`; stops counting above the budget.
+    /// Records and triangles of the full cut (everything resident) at `step`; stops counting above the budget.
     uint64_t cost(int step) {
         ++cut_.counters.evaluations;
         uint64_t total = 0;
-        for (size_t i = 0; i < instances_.size(); ++i) {
-            const Hierarchy& h = hierarchyOf(i);
-            if (h.nodes.empty()) continue;
-            const LocalView local = makeLocalView(h, instances_[i], view_);
-            if (h.isMesh()) {
-                total += meshCost(i, local, step);
-                if (total > budgets_.records) return total;
-                continue;
-            }
-            auto& stack = scratch_.stack;
-            stack.assign(1, 0u);
-            while (!stack.empty()) {
-                const uint32_t index = stack.back();
-                stack.pop_back();
-                const Node& node = h.nodes[index];
-                const int32_t parentEpsilon = index == 0 ? kInside : scratch_.epsilon[i][node.parent];
-                const int32_t epsilon = epsilonOf(i, local, index, parentEpsilon);
-                if (epsilon == kCulled) continue;
-                const uint32_t parentCode = index == 0 ? ErrorScale::kLargest : codeAt(parentEpsilon, step);
-                const uint32_t code = codeAt(epsilon, step);
-                total += h.countGreater(node.parentCounts, node.records, parentCode) -
-                         h.countGreater(node.ownCounts, node.records, code);
-                if (total > budgets_.records) return total;
-                if (node.errorCode <= code) continue;
-                const auto children = static_cast<uint32_t>(__builtin_popcount(node.childMask));
-                for (uint32_t c = 0; c < children; ++c) stack.push_back(node.firstChild + c);
-            }
+        for (size_t i = 0; i < instances_.size() && total <= budgets_.records; ++i) {
+            if (hierarchyOf(i).nodes.empty() || instances_[i].isStandIn) continue;
+            if (usesStandIn(i, step))
+                total += pointCost(instances_[i].standIn, step - kStepsPerOctave, budgets_.records - total);
+            else if (hierarchyOf(i).isMesh())
+                total += meshCost(i, makeLocalView(hierarchyOf(i), instances_[i], view_), step);
+            else
+                total += pointCost(i, step, budgets_.records - total);
         }
         return total;
+    }
+
+    uint64_t pointCost(size_t i, int step, uint64_t most) {
+        const Hierarchy& h = hierarchyOf(i);
+        const LocalView local = makeLocalView(h, instances_[i], view_);
+        uint64_t total = 0;
+        auto& stack = scratch_.stack;
+        stack.assign(1, 0u);
+        while (!stack.empty()) {
+            const uint32_t index = stack.back();
+            stack.pop_back();
+            const Node& node = h.nodes[index];
+            const int32_t parentEpsilon = index == 0 ? kInside : scratch_.epsilon[i][node.parent];
+            const int32_t epsilon = epsilonOf(i, local, index, parentEpsilon);
+            if (epsilon == kCulled) continue;
+            const uint32_t parentCode = index == 0 ? ErrorScale::kLargest : codeAt(parentEpsilon, step);
+            const uint32_t code = codeAt(epsilon, step);
+            total += h.countGreater(node.parentCounts, node.records, parentCode) -
+                     h.countGreater(node.ownCounts, node.records, code);
+            if (total > most) return total;
+            if (node.errorCode <= code) continue;
+            const auto children = static_cast<uint32_t>(__builtin_popcount(node.childMask));
+            for (uint32_t c = 0; c < children; ++c) stack.push_back(node.firstChild + c);
+        }
+        return total;
+    }
+
+    /// Are the points that may stand in for mesh `i` good enough at `step`, half of the error being theirs and half
+    /// left for their own levels of detail, and fewer than its triangles?
+    bool usesStandIn(size_t i, int step) {
+        const Instance& mesh = instances_[i];
+        if (mesh.standIn == Instance::kNone) return false;
+        const Hierarchy& points = hierarchyOf(mesh.standIn);
+        const LocalView local = makeLocalView(points, instances_[mesh.standIn], view_);
+        const int32_t epsilon = epsilonOf(mesh.standIn, local, 0, kInside);
+        if (epsilon == kCulled || epsilon == kInside) return false;
+        const double allowed = points.errors.smallest * points.unit * instances_[mesh.standIn].scale *
+                               std::exp2(static_cast<double>(epsilon + step) / kStepsPerOctave);
+        if (!(2 * mesh.standInError <= allowed)) return false;
+        const uint64_t triangles = meshCost(i, makeLocalView(hierarchyOf(i), mesh, view_), step);
+        return pointCost(mesh.standIn, step - kStepsPerOctave, triangles) < triangles;
     }
 
     /// The smallest step >= target whose full cut fits the budget (cost falls with the step).
@@ -183,6 +213,14 @@ class Selector {
             (cost(middle) <= budgets_.records ? hi : lo) = middle;
         }
         return hi;
+    }
+
+    /// Can the points that stand in be drawn? Asks for them if not: meanwhile the mesh is drawn.
+    bool hasRoot(uint32_t i) {
+        const uint32_t source = instances_[i].source;
+        if (residency_.drawable[source][0]) return true;
+        cut_.wanted.push_back({source, 0, 1e9f});
+        return false;
     }
 
     /// Screen-space error, px, of error code `code` at a node with allowed error `epsilon`.

@@ -35,6 +35,12 @@ struct Instance {
     glm::dmat3 rotation{1};
     glm::dvec3 translation{0};
     double scale = 1;
+    /// Of a mesh: another instance, of points, that is drawn instead where that is cheaper at equal error (the classic
+    /// hybrid); and how far those points in full detail are from the mesh, world units. Of such points: isStandIn.
+    static constexpr uint32_t kNone = ~0u;
+    uint32_t standIn = kNone;
+    double standInError = 0;
+    bool isStandIn = false;
 };
 
 /// One byte per node of each source's hierarchy: 1 where the chunk can be drawn.
@@ -69,7 +75,7 @@ struct CutWanted {
 
 struct CutCounters {
     uint64_t nodesVisited = 0, nodesDrawn = 0, nodesCulled = 0, nodesMissing = 0, recordsDrawn = 0, recordsTested = 0,
-             trianglesDrawn = 0, evaluations = 0;
+             trianglesDrawn = 0, standIns = 0, evaluations = 0;
 };
 
 struct Cut {

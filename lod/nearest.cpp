@@ -66,4 +66,18 @@ Result<NearestPoint> findNearest(const Store& store, const glm::dvec3& place) {
     return best;
 }
 
+Result<double> largestLeafRadius(const Store& store) {
+    double largest = 0;
+    const Hierarchy& h = store.hierarchy;
+    for (uint32_t n = 0; n < h.nodes.size(); ++n) {
+        if (!h.nodes[n].isLeaf()) continue;
+        STIPPLE_ASSIGN(const Chunk chunk, readChunk(store, n));
+        uint32_t code = 0;
+        for (const auto& r : chunk.records) code = std::max(code, shared::recordRadiusCode(r));
+        largest =
+            std::max(largest, h.unit * h.cellSize(h.nodes[n]) * static_cast<double>(shared::radiusFraction(code)));
+    }
+    return largest;
+}
+
 }  // namespace stipple::lod

@@ -17,6 +17,10 @@ struct NearestPoint {
 };
 
 /// The leaf point nearest to `place` (world units); of equally near ones the first in storage order.
+/// Largest radius among the leaf records of a store, world units: how far the discs of samples reach from their
+/// surface.
+Result<double> largestLeafRadius(const Store& store);
+
 Result<NearestPoint> findNearest(const Store& store, const glm::dvec3& place);
 
 }  // namespace stipple::lod

@@ -16,6 +16,7 @@
 #include "lod/colour.h"
 #include "lod/import/import.h"
 #include "lod/import/ply_mesh.h"
+#include "lod/nearest.h"
 
 namespace stipple::app {
 namespace fs = std::filesystem;
@@ -161,6 +162,39 @@ Result<lod::BuildReport> buildPlyMesh(const std::string& input, const std::strin
     return report;
 }
 
+/// Points that stand in for a mesh from afar, where its coarsest level still has many triangles: what is made of many
+/// small separate parts cannot be simplified as a surface.
+Result<void> addStandIn(const scene::Scene& scene, const std::vector<scene::Placement>& of, const std::string& part,
+                        const BuildOptions& build, Executor& executor, bool showProgress, render::PlacedStore& mesh) {
+    constexpr uint64_t kManyTriangles = 2000, kSurfels = 200'000;
+    const lod::Hierarchy& h = mesh.store->hierarchy;
+    uint64_t coarsest = 0;
+    for (size_t i = 0; i < h.nodes.size(); ++i) coarsest += h.groups[i].parents == 0 ? h.nodes[i].records : 0;
+    if (coarsest < kManyTriangles) return {};
+    const auto make = [&](const std::string& path, Progress& progress) -> Result<lod::BuildReport> {
+        scene::Scene only = scene;
+        only.nodes.clear();
+        for (const scene::Placement& p : of) {
+            scene::Node node;
+            node.mesh = p.mesh;
+            node.local = p.world;
+            only.nodes.push_back(node);
+        }
+        for (scene::Mesh& m : only.meshes)
+            std::erase_if(m.primitives, [](const auto& p) { return p.kind != scene::PrimitiveKind::triangles; });
+        STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene));
+        STIPPLE_ASSIGN(lod::PointSource samples, scene::sampleSurfels(only, images, {kSurfels}));
+        STIPPLE_ASSIGN(lod::BuildSettings settings, build.settings());
+        settings.open = [&](const std::string&, const lod::ReadOptions&) -> Result<lod::PointSource> {
+            return samples;
+        };
+        return lod::buildStore({scene.path}, path, settings, executor, progress);
+    };
+    STIPPLE_ASSIGN(mesh.standIn, openCached({scene.path}, build, part + ", from afar", showProgress, make));
+    STIPPLE_ASSIGN(mesh.standInError, lod::largestLeafRadius(*mesh.standIn));
+    return {};
+}
+
 /// Triangles of a scene: a mesh that stands in several places is built once and placed, all others are built as one.
 Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build, Executor& executor, bool showProgress,
                             std::vector<render::PlacedStore>& placed) {
@@ -185,13 +219,18 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
         const std::vector<scene::Placement> own{{mesh, glm::dmat4(1)}};
         STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store,
                        openCached({scene.path}, build, fmt::format("mesh {}", mesh), showProgress, make(own)));
-        for (const lod::Instance& instance : instances) placed.push_back({store, instance, {}});
+        render::PlacedStore one{store, {}, {}};
+        STIPPLE_TRY(addStandIn(scene, own, fmt::format("mesh {}", mesh), build, executor, showProgress, one));
+        for (const lod::Instance& instance : instances) {
+            one.place = instance;
+            placed.push_back(one);
+        }
     }
     if (once.empty()) return {};
     STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store,
                    openCached({scene.path}, build, "triangles", showProgress, make(once)));
     placed.push_back({std::move(store), {}, {}});
-    return {};
+    return addStandIn(scene, once, "triangles", build, executor, showProgress, placed.back());
 }
 
 std::vector<render::WorldLight> lightsOf(const scene::Scene& scene) {
@@ -266,7 +305,7 @@ lod::StoreDescription describe(const std::vector<render::PlacedStore>& placed) {
     all.boundsMin = all.focusMin = glm::dvec3(1e300);
     all.boundsMax = all.focusMax = glm::dvec3(-1e300);
     all.points = 0;
-    all.isReflectance = false;
+    all.isReflectance = std::any_of(placed.begin(), placed.end(), [](const auto& p) { return p.standIn != nullptr; });
     for (const render::PlacedStore& p : placed) {
         const lod::StoreDescription& d = p.store->description;
         for (int corner = 0; corner < 8; ++corner) {
@@ -348,6 +387,11 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
             isStore ? openStoreFile(inputs.front()) : openBuilt(inputs, build, colour, executor, showProgress));
         scene.placed.push_back({std::move(store), {}, {}});
     }
+    // Points that stand in for meshes are lit; beside scans that keep their photographed colours they would not be.
+    if (std::any_of(scene.placed.begin(), scene.placed.end(), [](const render::PlacedStore& p) {
+            return !p.store->hierarchy.isMesh() && !isShaded(p.store->description);
+        }))
+        for (render::PlacedStore& p : scene.placed) p.standIn = nullptr;
     scene.description = describe(scene.placed);
     return scene;
 }

@@ -95,7 +95,7 @@ std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& place
     state->backend = &backend;
     state->streamer = std::make_unique<streaming::Streamer>(executor, backend, settings);
     std::vector<const PlacedStore*> sources;
-    for (const PlacedStore& p : placed) {
+    const auto add = [&](const PlacedStore& p) {
         lod::Instance instance = p.place;
         const auto known = std::find(state->stores.begin(), state->stores.end(), p.store);
         instance.hierarchy = static_cast<uint32_t>(known - state->stores.begin());
@@ -116,6 +116,18 @@ std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& place
                                        p.store->hierarchy.isMesh() ? streaming::ChunkFinish{} : finishOf(p));
         }
         state->instances.push_back(instance);
+    };
+    std::vector<PlacedStore> standIns;
+    standIns.reserve(placed.size());  // addresses are kept
+    for (const PlacedStore& p : placed) {
+        add(p);
+        if (!p.standIn) continue;
+        lod::Instance& mesh = state->instances.back();
+        mesh.standIn = static_cast<uint32_t>(state->instances.size());
+        mesh.standInError = p.standInError * p.place.scale;
+        standIns.push_back({p.standIn, p.place, {}});
+        add(standIns.back());
+        state->instances.back().isStandIn = true;
     }
     state->draws.materials = state->materials;
     return state;
@@ -157,6 +169,7 @@ Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSe
     c.recordsDrawn = cut.recordsDrawn;
     c.recordsTested = cut.recordsTested;
     c.trianglesDrawn = cut.trianglesDrawn;
+    c.standIns = cut.standIns;
     c.cutEvaluations = cut.evaluations;
     c.budgetTruncated = state.cut.truncated;
     c.tauTargetPixels = state.cut.tauTarget;

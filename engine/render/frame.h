@@ -40,6 +40,9 @@ struct PlacedStore {
     std::shared_ptr<const lod::Store> store;
     lod::Instance place;  ///< its `hierarchy` is set by makeFrameState
     lod::ColourBy colour;
+    /// Of a mesh: points that may be drawn in its stead, and how far they are from it at most (store units).
+    std::shared_ptr<const lod::Store> standIn = nullptr;
+    double standInError = 0;
 };
 /// The same store may be placed many times.
 std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& placed, Backend& backend, Executor& executor,

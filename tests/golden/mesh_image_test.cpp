@@ -3,12 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <fstream>
 
 #include "engine/cpu/cpu_backend.h"
 #include "engine/cpu/kernels.h"
 #include "engine/image/image_io.h"
 #include "engine/reference/reference.h"
 #include "engine/scene/camera.h"
+#include "engine/scene/surfels.h"
+#include "engine/scene/triangles.h"
+#include "lod/nearest.h"
 #include "shaders/shared/environment.h"
 #include "tests/support/meshes.h"
 
@@ -22,6 +26,10 @@ render::Image draw(const std::vector<render::PlacedStore>& placed, render::Backe
     EXPECT_TRUE(complete && *complete);
     if (counters) *counters = state->counters;
     return state->image;
+}
+
+void spit(const std::string& path, const std::string& bytes) {
+    std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
 std::vector<render::WorldLight> threeLights(const glm::dvec3& at, double size) {
@@ -216,6 +224,70 @@ TEST_F(Hybrid, LightsAndAnEnvironmentShineOnPointsAndTrianglesAsTheOracleSays) {
     const auto m = shared::environmentMirror(even.table.data(), shared::vec3(0, -1, 0), 0.4f);
     EXPECT_NEAR(e.x, 0.5, 0.005);
     EXPECT_NEAR(m.y, 0.5, 0.005);
+}
+
+TEST(MeshImages, WhatCannotBeSimplifiedIsPointsFromAfar) {
+    // Many small separate leaves: as a surface they cannot be simplified.
+    scene::Scene scene;
+    scene.meshes.resize(1);
+    scene::Primitive leaves;
+    Rng rng(2);
+    for (uint32_t k = 0; k < 20'000; ++k) {
+        glm::vec3 c(1);
+        while (glm::length(c) > 1) c = glm::vec3(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1));
+        const glm::vec3 n = glm::normalize(glm::vec3(rng.normal(), rng.normal(), rng.normal()));
+        const glm::vec3 a = glm::normalize(glm::cross(n, glm::vec3(n.y, n.z, -n.x))) * 0.02f, b = glm::cross(n, a);
+        for (const glm::vec3& corner : {c - a - b, c + a - b, c + a + b, c - a + b}) {
+            leaves.position.push_back(corner);
+            leaves.normal.push_back(n);
+        }
+        for (const uint32_t i : {0u, 1u, 2u, 0u, 2u, 3u}) leaves.indices.push_back(4 * k + i);
+    }
+    scene.meshes[0].primitives.push_back(leaves);
+    scene.nodes.resize(1);
+    scene.nodes[0].mesh = 0;
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    Progress progress(false);
+    lod::MeshBuildSettings settings;
+    settings.description.materials = scene::surfaceMaterials(scene);
+    settings.description.up = {0, 1, 0};
+    ASSERT_TRUE(lod::buildMeshStore(scene::flattenTriangles(scene, scene::placements(scene)), folder / "a.stipple",
+                                    settings, *executor, progress));
+    lod::BuildSettings points;
+    points.open = [&](const std::string&, const lod::ReadOptions&) {
+        return scene::sampleSurfels(scene, {}, {100'000});
+    };
+    spit(folder / "scene", "x");
+    ASSERT_TRUE(lod::buildStore({folder / "scene"}, folder / "b.stipple", points, *executor, progress));
+    const auto mesh = std::make_shared<const lod::Store>(*lod::openStore(folder / "a.stipple")),
+               afar = std::make_shared<const lod::Store>(*lod::openStore(folder / "b.stipple"));
+    const auto error = lod::largestLeafRadius(*afar);
+    ASSERT_TRUE(error);
+    EXPECT_GT(*error, 0.005);
+    EXPECT_LT(*error, 0.2);
+    const auto backend = cpu::makeCpuBackend(*executor);
+    scene::Camera camera;
+    camera.up = {0, 1, 0};
+    for (const double distance : {3.0, 600.0}) {
+        camera.eye = {0, 0, distance};
+        const lod::View view = scene::makeView(camera, 320, 240, 0.01);
+        FrameCounters with, without;
+        render::FrameSettings frame;
+        frame.draw.lit = true;
+        const render::Image a = draw({{mesh, {}, {}, afar, *error}}, *backend, *executor, view, frame, &with);
+        const render::Image b = draw({{mesh, {}, {}}}, *backend, *executor, view, frame, &without);
+        EXPECT_EQ(without.trianglesDrawn, 40'000u);
+        if (distance < 10) {
+            EXPECT_EQ(with.standIns, 0u);
+            EXPECT_EQ(a.rgba, b.rgba);
+        } else {
+            EXPECT_EQ(with.standIns, 1u);
+            EXPECT_EQ(with.trianglesDrawn, 0u);
+            EXPECT_GT(with.recordsDrawn, 0u);
+            EXPECT_LT(with.recordsDrawn, 40'000u);
+        }
+    }
 }
 
 TEST(MeshImages, TexturesAndChunksStayWithinTheResidentBudget) {
