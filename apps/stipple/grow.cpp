@@ -54,8 +54,13 @@ Result<void> runMesh(MeshRun& o) {
                     "e.g. 250k or 10M");
     const double start = nowSeconds();
     scene::Scene scene = grow::growMesh(o.mesh);
+    if (o.mesh.textureSize == 0) {
+        scene.textures.clear();
+        for (scene::Material& m : scene.materials) m.baseColourTexture = m.normalTexture = {};
+    }
     const grow::Textures textures = grow::growTextures(o.mesh);
     for (const auto& [name, pixels] : {std::pair{"colour.png", &textures.colour}, {"normal.png", &textures.normal}}) {
+        if (pixels->size == 0) continue;
         render::Image image;
         image.width = image.height = pixels->size;
         image.rgba = pixels->rgba;
@@ -79,8 +84,8 @@ void addMesh(CLI::App& parent, const char* kind, const char* what, int& status) 
     sub->add_option("-o,--output", o->output, "the file to write (.glb, .gltf)")->required();
     sub->add_option("--triangles", o->triangles, "about that many, e.g. 250k or 10M")->capture_default_str();
     sub->add_option("--seed", o->mesh.seed, "another seed, another shape")->capture_default_str();
-    sub->add_option("--texture", o->mesh.textureSize, "edge of the textures, pixels")
-        ->check(CLI::Range(16, 8192))
+    sub->add_option("--texture", o->mesh.textureSize, "edge of the textures, pixels; 0: none")
+        ->check(CLI::Range(0, 8192))
         ->capture_default_str();
     sub->add_flag("--json", o->json, "as JSON");
     sub->callback([o, &status] {

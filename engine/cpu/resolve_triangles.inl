@@ -9,6 +9,7 @@ struct TrianglePixels {
 /// What the weights mix, corner by corner.
 struct Corners {
     alignas(64) float x[3][kTile], y[3][kTile], z[3][kTile];
+    alignas(64) float u[3][kTile], v[3][kTile];
     alignas(64) uint32_t normal[3][kTile];
 };
 
@@ -16,6 +17,8 @@ void resolveTriangles(const FrameConstants& f, const Tables& tables, const Resol
                       uint32_t x0, uint32_t y, TexelRow& __restrict row, const SurfacePlanes& planes) {
     Corners c;
     alignas(64) float nx[kTile], ny[kTile], nz[kTile], wb[kTile], wc[kTile];
+    alignas(64) float mixedU[kTile], mixedV[kTile], footprint[kTile];
+    uint32_t anyTextured = 0;
     const size_t n = p.count;
     for (size_t i = 0; i < n; ++i) {
         const MeshBlock& block = in.meshBlocks[p.id[i] / 256u];
@@ -28,6 +31,9 @@ void resolveTriangles(const FrameConstants& f, const Tables& tables, const Resol
             c.y[k][i] = at.y;
             c.z[k][i] = at.z;
             c.normal[k][i] = v.normal;
+            c.u[k][i] = v.u;
+            c.v[k][i] = v.v;
+            anyTextured |= v.surface & kSurfaceTextured;
         }
     }
     const float inverseFocal = 1.0f / f.focal;
@@ -44,6 +50,20 @@ void resolveTriangles(const FrameConstants& f, const Tables& tables, const Resol
         nx[i] = a * n0.x + w.x * n1.x + w.y * n2.x;
         ny[i] = a * n0.y + w.x * n1.y + w.y * n2.y;
         nz[i] = a * n0.z + w.x * n1.z + w.y * n2.z;
+        mixedU[i] = a * c.u[0][i] + w.x * c.u[1][i] + w.y * c.u[2][i];
+        mixedV[i] = a * c.v[0][i] + w.x * c.v[1][i] + w.y * c.v[2][i];
+    }
+    if (anyTextured != 0) {
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            const vec3 ray = vec3((float(int(p.pixel[i])) - centreX) * inverseFocal, rayY, 1.0f);
+            const vec3 corner = vec3(c.x[0][i], c.y[0][i], c.z[0][i]);
+            const vec3 e1 = vec3(c.x[1][i] - corner.x, c.y[1][i] - corner.y, c.z[1][i] - corner.z);
+            const vec3 e2 = vec3(c.x[2][i] - corner.x, c.y[2][i] - corner.y, c.z[2][i] - corner.z);
+            footprint[i] = uvFootprint(ray, inverseFocal, corner, e1, e2,
+                                       vec2(c.u[1][i] - c.u[0][i], c.v[1][i] - c.v[0][i]),
+                                       vec2(c.u[2][i] - c.u[0][i], c.v[2][i] - c.v[0][i]));
+        }
     }
     for (size_t i = 0; i < n; ++i) {
         const MeshBlock& block = in.meshBlocks[p.id[i] / 256u];
@@ -64,28 +84,26 @@ void resolveTriangles(const FrameConstants& f, const Tables& tables, const Resol
         vec3 colour = material.baseColour, emissive = material.emissive;
         float metallic = material.metallic, roughness = material.roughness, occlusion = 1.0f;
         if ((va.surface & kSurfaceTextured) != 0) {
-            const float u = a * va.u + b * vb.u + g * vc.u, v = a * va.v + b * vb.v + g * vc.v;
+            const float u = mixedU[i], v = mixedV[i], texels = footprint[i];
             const float u1 = vb.u - va.u, v1 = vb.v - va.v, u2 = vc.u - va.u, v2 = vc.v - va.v;
-            const float footprint = uvFootprint(ray, inverseFocal, vec3(c.x[0][i], c.y[0][i], c.z[0][i]), e1, e2,
-                                                vec2(u1, v1), vec2(u2, v2));
             const TextureSet& set = *block.textures;
             Sampled s{};
             if (material.baseTexture.texture != 0 &&
-                sampleTexture(tables, set, material.baseTexture, u, v, footprint, s))
+                sampleTexture(tables, set, material.baseTexture, u, v, texels, s))
                 colour = vec3(colour.x * s.r, colour.y * s.g, colour.z * s.b);
             if (material.surfaceTexture.texture != 0 &&
-                sampleTexture(tables, set, material.surfaceTexture, u, v, footprint, s)) {
+                sampleTexture(tables, set, material.surfaceTexture, u, v, texels, s)) {
                 roughness *= s.g;
                 metallic *= s.b;
             }
             if (material.occlusionTexture.texture != 0 &&
-                sampleTexture(tables, set, material.occlusionTexture, u, v, footprint, s))
+                sampleTexture(tables, set, material.occlusionTexture, u, v, texels, s))
                 occlusion = 1.0f + material.occlusionStrength * (s.r - 1.0f);
             if (material.emissiveTexture.texture != 0 &&
-                sampleTexture(tables, set, material.emissiveTexture, u, v, footprint, s))
+                sampleTexture(tables, set, material.emissiveTexture, u, v, texels, s))
                 emissive = vec3(emissive.x * s.r, emissive.y * s.g, emissive.z * s.b);
             if (material.normalTexture.texture != 0 &&
-                sampleTexture(tables, set, material.normalTexture, u, v, footprint, s))
+                sampleTexture(tables, set, material.normalTexture, u, v, texels, s))
                 normal = bumpedNormal(normal, e1, e2, vec2(u1, v1), vec2(u2, v2),
                                       vec3((2.0f * s.r - 1.0f) * material.normalScale,
                                            (2.0f * s.g - 1.0f) * material.normalScale, 2.0f * s.b - 1.0f));
