@@ -6,9 +6,21 @@ struct Sampled {
 
 typedef float Four __attribute__((vector_size(16)));
 
-/// Channels of a texel: the tables hold the same for all four, so that one load and one product do for all.
-[[gnu::always_inline]] inline Four decodeTexel(const float* decode, const float* unit, uint32_t c) {
-    return Four{decode[c & 255u], decode[c >> 8 & 255u], decode[c >> 16 & 255u], unit[c >> 24]};
+typedef uint8_t FourBytes __attribute__((vector_size(4)));
+
+/// Channels of a texel: colours through a table, numbers as bytes / 255.
+[[gnu::always_inline]] inline Four decodeColour(const Tables& tables, uint32_t c) {
+    const float *const linear = tables.linear.data(), *const unit = tables.unit.data();
+    return Four{linear[c & 255u], linear[c >> 8 & 255u], linear[c >> 16 & 255u], unit[c >> 24]};
+}
+[[gnu::always_inline]] inline Four decodeNumbers(uint32_t c) {
+    return __builtin_convertvector(__builtin_bit_cast(FourBytes, c), Four) * (1.0f / 255.0f);
+}
+template <typename Decode>
+[[gnu::always_inline]] inline Four bilinear(const uint32_t* at, const TextureTap& tap, const Decode& decode) {
+    const Four a = decode(at[0]), b = decode(at[1]), c = decode(at[kTileEdge]), d = decode(at[kTileEdge + 1]);
+    const Four upper = a + (b - a) * tap.fx, lower = c + (d - c) * tap.fx;
+    return upper + (lower - upper) * tap.fy;
 }
 
 [[gnu::always_inline]] inline bool sampleLevel(const Tables& tables, const TextureSet& set, const TextureInfo& info,
@@ -17,12 +29,8 @@ typedef float Four __attribute__((vector_size(16)));
     const uint32_t* texels = set.tiles[tap.tile];
     if (texels == nullptr) return false;
     const uint32_t* at = texels + tap.y * kTileEdge + tap.x;
-    const float* const unit = tables.unit.data();
-    const float* const decode = info.isColour != 0 ? tables.linear.data() : unit;
-    const Four a = decodeTexel(decode, unit, at[0]), b = decodeTexel(decode, unit, at[1]),
-               c = decodeTexel(decode, unit, at[kTileEdge]), d = decodeTexel(decode, unit, at[kTileEdge + 1]);
-    const Four upper = a + (b - a) * tap.fx, lower = c + (d - c) * tap.fx;
-    out = upper + (lower - upper) * tap.fy;
+    out = info.isColour != 0 ? bilinear(at, tap, [&](uint32_t c) { return decodeColour(tables, c); })
+                             : bilinear(at, tap, [](uint32_t c) { return decodeNumbers(c); });
     return true;
 }
 
