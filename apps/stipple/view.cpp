@@ -44,11 +44,13 @@ void drawOverlay(const render::FrameState& state, const render::FrameSettings& s
     ImGui::Text("delivered error %.2f px (asked for %.2f)", c.tauEffectivePixels, settings.budgets.errorPixels);
     ImGui::Text("%llu nodes, %llu missing, %u chunks on their way", static_cast<unsigned long long>(c.nodesDrawn),
                 static_cast<unsigned long long>(c.nodesMissing), static_cast<unsigned>(c.requestsInFlight));
-    const float used = static_cast<float>(c.recordsDrawn) / static_cast<float>(settings.budgets.records);
-    ImGui::ProgressBar(used, ImVec2(300, 0),
-                       fmt::format("{:.2f} of {:.2f} M records", static_cast<double>(c.recordsDrawn) * 1e-6,
-                                   static_cast<double>(settings.budgets.records) * 1e-6)
-                           .c_str());
+    const float used =
+        static_cast<float>(c.recordsDrawn + c.trianglesDrawn) / static_cast<float>(settings.budgets.records);
+    ImGui::ProgressBar(
+        used, ImVec2(300, 0),
+        fmt::format("{:.2f} M points, {:.2f} M triangles of {:.2f} M", static_cast<double>(c.recordsDrawn) * 1e-6,
+                    static_cast<double>(c.trianglesDrawn) * 1e-6, static_cast<double>(settings.budgets.records) * 1e-6)
+            .c_str());
     ImGui::Text("resident %s", humanBytes(c.residentBytes).c_str());
     ImGui::Text("debug view: %s", kDebugNames.at(settings.draw.debugView));
     if (c.failures > 0) ImGui::TextColored(ImVec4(1, 0.4f, 0.3f, 1), "%s", state.streamer->lastFailure().c_str());
