@@ -45,6 +45,8 @@ void BuildOptions::addTo(CLI::App& app) {
     app.add_option("--surfels", surfels, "turn meshes (.gltf, .glb, .obj) into that many samples; 0: keep triangles")
         ->check(CLI::Range(uint64_t{0}, uint64_t{200'000'000}))
         ->capture_default_str();
+    app.add_flag("--repair", repair,
+                 "pass over faults of a glTF file that change nothing that is drawn, and count them");
     app.add_flag("--only-points", onlyPoints, "of a PLY mesh take the vertices, as points");
     app.add_flag("--skip-bad", skipBad, "go on past corrupt chunks and files, and say what was lost");
 }
@@ -85,8 +87,8 @@ Result<lod::BuildSettings> BuildOptions::settings() const {
                                     : lod::NormalsMode::automatic;
     s.estimateRadii = radii != "keep";
     s.skipBad = skipBad;
-    s.open = [count = surfels](const std::string& path, const lod::ReadOptions& o) {
-        return openInput(path, o, count);
+    s.open = [count = surfels, repairs = repair](const std::string& path, const lod::ReadOptions& o) {
+        return openInput(path, o, count, repairs);
     };
     s.allAttributes = attributes == "all";
     s.attributes = namesOf(attributes);

@@ -24,7 +24,7 @@ int report(const Error& error);
 struct BuildOptions {
     std::string memory = "2G", normals = "auto", radii = "auto", up, attributes = "none";
     int threads = 0;
-    bool skipBad = false, onlyPoints = false;
+    bool skipBad = false, onlyPoints = false, repair = false;
     uint64_t surfels = 0;
     void addTo(CLI::App& app);
     Result<lod::BuildSettings> settings() const;
@@ -50,7 +50,8 @@ inline bool isShaded(const lod::StoreDescription& d) { return !d.hasColour || d.
 /// .gltf, .glb or .obj.
 bool isSceneFile(const std::string& path);
 /// Scans by the readers of lod; meshes as `surfels` samples (0: only the points that they hold).
-Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptions& options, uint64_t surfels);
+Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptions& options, uint64_t surfels,
+                                   bool repair);
 /// Scans, or the triangles of one scene, to a store.
 Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const std::string& output,
                                   const BuildOptions& build, Executor& executor, Progress& progress);

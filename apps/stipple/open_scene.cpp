@@ -34,9 +34,10 @@ Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene)
 
 }  // namespace
 
-Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptions& options, uint64_t surfels) {
+Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptions& options, uint64_t surfels,
+                                   bool repair) {
     if (!isSceneFile(path)) return lod::openPointSource(path, options);
-    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path));
+    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path, repair));
     STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene));
     return scene::sampleSurfels(scene, images, {surfels});
 }
@@ -260,7 +261,7 @@ std::vector<render::WorldLight> lightsOf(const scene::Scene& scene) {
 Result<std::vector<render::PlacedStore>> openSceneFile(const std::string& path, const BuildOptions& build,
                                                        const ColourOptions& colour, Executor& executor,
                                                        bool showProgress, std::vector<render::WorldLight>& lights) {
-    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path));
+    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path, build.repair));
     lights = lightsOf(scene);
     std::vector<render::PlacedStore> placed;
     std::map<std::string, std::shared_ptr<const lod::Store>> open;
@@ -350,7 +351,7 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
         return lod::buildStore(inputs, output, settings, executor, progress);
     if (inputs.size() > 1)
         return fail(ErrorKind::usage, "only one scene with meshes can be built at a time", inputs[1]);
-    STIPPLE_ASSIGN(scene::Scene scene, scene::readScene(inputs.front()));
+    STIPPLE_ASSIGN(scene::Scene scene, scene::readScene(inputs.front(), build.repair));
     lod::TriangleMesh triangles = scene::flattenTriangles(scene, scene::placements(scene));
     if (triangles.indices.empty()) return lod::buildStore(inputs, output, settings, executor, progress);
     STIPPLE_ASSIGN(const lod::MeshBuildSettings mesh, meshSettings(scene));

@@ -317,9 +317,12 @@ void setupRender(CLI::App& app, int& status) {
     group->add_option("--memory", o->build.memory, "memory that the build may use")->capture_default_str();
     group->add_option("--attributes", o->build.attributes, "attributes to keep; the one of --colour always is")
         ->capture_default_str();
-    group->add_option("--surfels", o->build.surfels, "samples that a scene with meshes is turned into")
-        ->check(CLI::Range(uint64_t{1}, uint64_t{200'000'000}))
+    group->add_option("--surfels", o->build.surfels, "turn meshes into that many samples; 0: keep triangles")
+        ->check(CLI::Range(uint64_t{0}, uint64_t{200'000'000}))
         ->capture_default_str();
+    group->add_flag("--only-points", o->build.onlyPoints, "of a PLY mesh take the vertices, as points");
+    group->add_flag("--repair", o->build.repair,
+                    "pass over faults of a glTF file that change nothing that is drawn, and count them");
     group->add_flag("--skip-bad", o->build.skipBad, "go on past corrupt chunks and files, and say what was lost");
     group->add_option("--threads", o->build.threads, "threads (0: all cores)")
         ->check(CLI::Range(0, 1024))

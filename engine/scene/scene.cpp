@@ -4,8 +4,8 @@
 
 namespace stipple::scene {
 
-Result<Scene> readScene(const std::string& path) {
-    return std::filesystem::path(path).extension() == ".obj" ? readObj(path) : readGltf(path);
+Result<Scene> readScene(const std::string& path, bool repair) {
+    return std::filesystem::path(path).extension() == ".obj" ? readObj(path) : readGltf(path, repair);
 }
 
 std::vector<glm::dmat4> Scene::worldTransforms() const {

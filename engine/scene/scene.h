@@ -116,7 +116,9 @@ Box meshBounds(const Scene& scene);
 /// glTF 2.0 (.gltf, .glb) with KHR_lights_punctual, KHR_texture_transform, EXT_mesh_gpu_instancing,
 /// KHR_mesh_quantization, EXT_meshopt_compression, KHR_materials_unlit, and STIPPLE_store (README). Invalid files are
 /// refused with the place.
-Result<Scene> readGltf(const std::string& path);
+/// `repair`: pass over faults that change nothing that is drawn (wrong accessor bounds, extensions that are used but
+/// not listed, strides of animations), and count them in the notes.
+Result<Scene> readGltf(const std::string& path, bool repair = false);
 
 /// Writes .glb or .gltf (buffers inside). Shear of instances is lost; everything else comes back as it was.
 Result<void> writeGltf(const Scene& scene, const std::string& path);
@@ -125,6 +127,6 @@ Result<void> writeGltf(const Scene& scene, const std::string& path);
 Result<Scene> readObj(const std::string& path);
 
 /// readGltf or readObj, by extension.
-Result<Scene> readScene(const std::string& path);
+Result<Scene> readScene(const std::string& path, bool repair = false);
 
 }  // namespace stipple::scene

@@ -11,6 +11,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     static const int descriptor = memfd_create("fuzz", 0);
     static const std::string path = "/proc/self/fd/" + std::to_string(descriptor);
     if (ftruncate(descriptor, 0) != 0 || pwrite(descriptor, data, size, 0) != static_cast<ssize_t>(size)) return 0;
-    if (const auto scene = stipple::scene::readGltf(path)) (void)stipple::scene::meshBounds(*scene);
+    for (const bool repair : {false, true})
+        if (const auto scene = stipple::scene::readGltf(path, repair)) (void)stipple::scene::meshBounds(*scene);
     return 0;
 }

@@ -72,7 +72,7 @@ void checkAnimationsAndSkins(const json& root, Problems& p) {
                 say(p, path, "times must be scalar floats");
             if (!input.contains("min") || !input.contains("max")) say(p, path, "times need 'min' and 'max'");
             if (hasStride(root, input) || hasStride(root, accessors[sampler["output"].get<size_t>()]))
-                say(p, path, "buffer views of animations have no 'byteStride'");
+                sayHarmless(p, path, "buffer views of animations have no 'byteStride'");
         }
     }
     const json& skins = arrayOf(root, "skins");
@@ -90,7 +90,7 @@ void checkAnimationsAndSkins(const json& root, Problems& p) {
         const json& joints = skins[s]["joints"];
         for (const json& joint : joints)
             if (rootOf(joint.get<size_t>()) != rootOf(joints[0].get<size_t>())) {
-                say(p, path, "its joints have no common root");
+                sayHarmless(p, path, "its joints have no common root");
                 break;
             }
         if (skins[s].contains("skeleton")) {
@@ -110,7 +110,7 @@ void checkAnimationsAndSkins(const json& root, Problems& p) {
         if (a["type"] != "MAT4" || a["componentType"] != 5126)
             say(p, path, "inverse bind matrices must be MAT4 of floats");
         if (a["count"].get<size_t>() < joints.size()) say(p, path, "fewer inverse bind matrices than joints");
-        if (hasStride(root, a)) say(p, path, "the buffer view of inverse bind matrices has no 'byteStride'");
+        if (hasStride(root, a)) sayHarmless(p, path, "the buffer view of inverse bind matrices has no 'byteStride'");
     }
     for (size_t n = 0; n < parent.size(); ++n) {
         if (!root["nodes"][n].contains("skin")) continue;

@@ -9,7 +9,7 @@ namespace stipple::scene::gltf {
 Result<Problems> checkAll(const Container& container, Buffers& buffers);
 
 /// checkAll as one error: the first problem, and how many more there are. A required extension that is not understood
-/// is refused by name.
-Result<void> requireGood(const Container& container, Buffers& buffers);
+/// is refused by name. With `repair`, harmless ones are no error but the result.
+Result<std::vector<std::string>> requireGood(const Container& container, Buffers& buffers, bool repair);
 
 }  // namespace stipple::scene::gltf

@@ -13,6 +13,18 @@ inline void say(Problems& problems, const std::string& path, const std::string& 
     if (problems.size() < kMostProblems) problems.push_back((path.empty() ? "/" : path) + ": " + what);
 }
 
+/// The same for what is against the rules but changes nothing that is drawn: can be passed over on request.
+constexpr char kHarmless = '\x01';
+inline void sayHarmless(Problems& problems, const std::string& path, const std::string& what) {
+    // Room is left for those that matter: a file is only passed over if all that is wrong with it was said.
+    if (problems.size() < kMostProblems / 2) problems.push_back(kHarmless + (path.empty() ? "/" : path) + ": " + what);
+}
+
+inline bool isHarmless(const std::string& problem) { return !problem.empty() && problem[0] == kHarmless; }
+inline bool mattersAny(const Problems& problems) {
+    return std::any_of(problems.begin(), problems.end(), [](const std::string& p) { return !isHarmless(p); });
+}
+
 /// "/meshes/0" and "name" -> "/meshes/0/name".
 inline std::string below(const std::string& path, const std::string& name) {
     std::string out;

@@ -312,12 +312,16 @@ class Reader {
 
 }  // namespace
 
-Result<Scene> readGltf(const std::string& path) {
+Result<Scene> readGltf(const std::string& path, bool repair) {
     STIPPLE_ASSIGN(const gltf::Container c, gltf::readContainer(path));
     gltf::Buffers buffers(c);
     try {  // a property of a type that no check expected ends here
-        STIPPLE_TRY(gltf::requireGood(c, buffers));
-        return Reader(c, buffers).read();
+        STIPPLE_ASSIGN(const std::vector<std::string> passedOver, gltf::requireGood(c, buffers, repair));
+        STIPPLE_ASSIGN(Scene scene, Reader(c, buffers).read());
+        if (!passedOver.empty())
+            scene.notes.push_back(
+                fmt::format("{} faults passed over (50: or more), the first at {}", passedOver.size(), passedOver[0]));
+        return scene;
     } catch (const std::exception& e) {
         return fail(ErrorKind::input, fmt::format("is not what glTF expects: {}", e.what()), path,
                     "the file is not valid glTF 2.0");

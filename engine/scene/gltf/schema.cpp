@@ -270,7 +270,7 @@ class Checker {
             const bool declared = root_.contains("extensionsUsed") && root_["extensionsUsed"].is_array() &&
                                   std::find(root_["extensionsUsed"].begin(), root_["extensionsUsed"].end(),
                                             json(name)) != root_["extensionsUsed"].end();
-            if (!declared) say(at, "the extension is not listed in 'extensionsUsed'");
+            if (!declared) gltf::sayHarmless(problems_, at, "the extension is not listed in 'extensionsUsed'");
             // At a node or primitive these two have other properties, which are checked with those.
             const bool isDefinition = path == "/extensions";
             if (isDefinition && name == "KHR_lights_punctual" && !member.contains("lights")) say(at, "lacks 'lights'");

@@ -28,10 +28,12 @@ void checkBounds(const json& a, const std::vector<double>& stored, size_t compon
     };
     for (size_t k = 0; k < components; ++k) {
         if (a.contains("min") && !same(a["min"][k].get<double>(), least[k]))
-            say(p, path,
+            sayHarmless(
+                p, path,
                 fmt::format("'min' {} of component {}, but the values begin at {}", a["min"][k].dump(), k, least[k]));
         if (a.contains("max") && !same(a["max"][k].get<double>(), greatest[k]))
-            say(p, path,
+            sayHarmless(
+                p, path,
                 fmt::format("'max' {} of component {}, but the values end at {}", a["max"][k].dump(), k, greatest[k]));
     }
 }
@@ -223,7 +225,8 @@ class ValueChecker {
             STIPPLE_ASSIGN(const std::vector<double> v, buffers_.values(skins[s]["inverseBindMatrices"].get<size_t>()));
             for (size_t i = 0; i + 16 <= v.size(); i += 16)
                 if (v[i + 3] != 0 || v[i + 7] != 0 || v[i + 11] != 0 || v[i + 15] != 1) {
-                    say(p_, path("skins", s), fmt::format("inverse bind matrix {} does not end in 0 0 0 1", i / 16));
+                    sayHarmless(p_, path("skins", s),
+                                fmt::format("inverse bind matrix {} does not end in 0 0 0 1", i / 16));
                     break;
                 }
         }
