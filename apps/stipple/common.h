@@ -12,6 +12,7 @@
 #include "engine/base/result.h"
 #include "engine/render/backend.h"
 #include "engine/render/frame.h"
+#include "engine/scene/camera.h"
 #include "engine/scene/surfels.h"
 #include "lod/build/build.h"
 #include "lod/store.h"
@@ -61,6 +62,7 @@ struct OpenedScene {
     std::vector<render::PlacedStore> placed;
     lod::StoreDescription description;  ///< of all together: bounds, up, what colours can be asked for
     std::vector<render::WorldLight> lights;
+    std::vector<scene::Camera> cameras;  ///< of the scene's visible nodes, in their order
 };
 
 /// A .stipple file is opened; a .gltf or .glb scene is opened with the stores that its nodes refer to; anything else,

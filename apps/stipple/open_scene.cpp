@@ -257,12 +257,31 @@ std::vector<render::WorldLight> lightsOf(const scene::Scene& scene) {
     return lights;
 }
 
+/// Perspective cameras; a camera looks along -z of its node, y up.
+std::vector<scene::Camera> camerasOf(const scene::Scene& scene) {
+    std::vector<scene::Camera> cameras;
+    const std::vector<glm::dmat4> world = scene.worldTransforms();
+    for (size_t n = 0; n < scene.nodes.size(); ++n) {
+        if (scene.nodes[n].camera < 0) continue;
+        const scene::SceneCamera& from = scene.cameras[static_cast<size_t>(scene.nodes[n].camera)];
+        if (from.isOrthographic || !(glm::length(glm::dvec3(world[n][2])) > 0)) continue;
+        scene::Camera camera;
+        camera.eye = glm::dvec3(world[n][3]);
+        camera.target = camera.eye - glm::normalize(glm::dvec3(world[n][2]));
+        camera.up = glm::dvec3(world[n][1]);
+        camera.fovDegrees = from.fovDegrees;
+        cameras.push_back(camera);
+    }
+    return cameras;
+}
+
 /// The stores that a scene's nodes refer to, and its meshes.
 Result<std::vector<render::PlacedStore>> openSceneFile(const std::string& path, const BuildOptions& build,
                                                        const ColourOptions& colour, Executor& executor,
-                                                       bool showProgress, std::vector<render::WorldLight>& lights) {
+                                                       bool showProgress, OpenedScene& opened) {
     STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path, build.repair));
-    lights = lightsOf(scene);
+    opened.lights = lightsOf(scene);
+    opened.cameras = camerasOf(scene);
     std::vector<render::PlacedStore> placed;
     std::map<std::string, std::shared_ptr<const lod::Store>> open;
     const std::vector<glm::dmat4> world = scene.worldTransforms();
@@ -380,8 +399,7 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
             }));
         scene.placed.push_back({std::move(store), {}, {}});
     } else if (isSceneFile(inputs.front())) {
-        STIPPLE_ASSIGN(scene.placed,
-                       openSceneFile(inputs.front(), build, colour, executor, showProgress, scene.lights));
+        STIPPLE_ASSIGN(scene.placed, openSceneFile(inputs.front(), build, colour, executor, showProgress, scene));
     } else {
         STIPPLE_ASSIGN(
             std::shared_ptr<const lod::Store> store,

@@ -23,7 +23,7 @@ struct Options {
                         background = "24,26,30";
     std::string debug = "none", resident = "1G";
     double fov = 50, error = 1;
-    int frames = 1, samples = 4, orbit = 0;
+    int frames = 1, samples = 4, orbit = 0, sceneCamera = 0;
     uint64_t budget = 0;
     bool noWait = false, json = false, quiet = false;
     BuildOptions build;
@@ -36,7 +36,8 @@ struct Shot {
     glm::dvec3 worldUp{0, 0, 1};
 };
 
-Result<Shot> makeShot(const Options& o, const lod::StoreDescription& d, const glm::uvec2& size) {
+Result<Shot> makeShot(const Options& o, const OpenedScene& opened, const glm::uvec2& size) {
+    const lod::StoreDescription& d = opened.description;
     Shot shot;
     shot.worldUp = d.up;
     const double aspect = static_cast<double>(size.x) / size.y;
@@ -55,6 +56,16 @@ Result<Shot> makeShot(const Options& o, const lod::StoreDescription& d, const gl
         return shot;
     }
     scene::Camera camera = scene::fitCamera(d.focusMin, d.focusMax, d.up, aspect);
+    if (o.sceneCamera > 0) {
+        const auto index = static_cast<size_t>(o.sceneCamera);
+        if (index > opened.cameras.size())
+            return fail(ErrorKind::usage,
+                        fmt::format("the scene has that many perspective cameras: {}", opened.cameras.size()),
+                        fmt::format("--scene-camera {}", o.sceneCamera));
+        camera = opened.cameras[index - 1];
+        shot.views.push_back(scene::makeView(camera, size.x, size.y, nearPlane));
+        return shot;
+    }
     camera.fovDegrees = o.eye.empty() ? camera.fovDegrees : o.fov;
     if (!o.eye.empty()) {
         STIPPLE_ASSIGN(camera.eye, parseVector(o.eye, "--eye"));
@@ -189,7 +200,7 @@ Result<void> run(const Options& o) {
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
     STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, o.colour, *executor, !o.quiet));
     const lod::StoreDescription& description = scene.description;
-    STIPPLE_ASSIGN(const Shot shot, makeShot(o, description, size));
+    STIPPLE_ASSIGN(const Shot shot, makeShot(o, scene, size));
     STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
     STIPPLE_ASSIGN(render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
     STIPPLE_ASSIGN(settings.draw.environment, openEnvironment(o.environment.path, o.environment.scale, *executor));
@@ -284,6 +295,8 @@ void setupRender(CLI::App& app, int& status) {
     sub->add_option("--fov", o->fov, "vertical field of view, degrees")
         ->check(CLI::Range(0.1, 170.0))
         ->capture_default_str();
+    sub->add_option("--scene-camera", o->sceneCamera, "the N-th camera of a .gltf scene (0: a view of the whole)")
+        ->check(CLI::Range(0, 100000));
     auto* path = sub->add_option("--camera-path", o->path, "JSON file with keys; one picture per frame");
     sub->add_option("--orbit", o->orbit, "N pictures around the scene")->check(CLI::Range(1, 100000))->excludes(path);
     sub->add_option("--frames", o->frames, "frames of the path, or repetitions of one view for timing")
