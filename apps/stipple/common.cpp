@@ -101,6 +101,12 @@ Result<lod::ColourBy> applyColours(OpenedScene& scene, const std::string& what, 
     std::optional<lod::ColourBy> first;
     std::optional<Error> problem;
     for (render::PlacedStore& p : scene.placed) {
+        if (p.store->hierarchy.isMesh() && what != "auto" && what != "rgb") {
+            if (!problem)
+                problem = Error{ErrorKind::usage, fmt::format("triangles cannot be coloured by '{}'", what), "--colour",
+                                "--surfels N makes points of them"};
+            continue;
+        }
         const auto by = lod::parseColourBy(what, map, range, p.store->description);
         if (!by) problem = problem ? problem : by.error();
         p.colour = by.value_or(lod::ColourBy{});
