@@ -26,7 +26,8 @@ struct Nearest {
 float shareOf(float part, float whole) { return whole > 0 ? part / whole : 0.0f; }
 
 /// Closest point of a triangle (Ericson, Real-Time Collision Detection, 5.1.5) as weights of b and c.
-glm::vec2 closestWeights(const glm::vec3& p, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
+[[gnu::always_inline]] inline glm::vec2 closestWeights(const glm::vec3& p, const glm::vec3& a, const glm::vec3& b,
+                                                       const glm::vec3& c) {
     const glm::vec3 ab = b - a, ac = c - a, ap = p - a;
     const float d1 = glm::dot(ab, ap), d2 = glm::dot(ac, ap);
     if (d1 <= 0 && d2 <= 0) return {0, 0};
