@@ -2,25 +2,14 @@
 # tests/bench/mesh_figures.sh [PROGRAM]: the figures of meshes as Markdown, with the command of each. Needs an idle
 # machine and about five minutes; STIPPLE_DATA for the statue.
 set -euo pipefail
-program=$(realpath "${1:-build/stipple}")
-data=${STIPPLE_DATA:-}
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
+source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 cd "$work"
 export XDG_CACHE_HOME=$work/cache
-
-value() { python3 -c "import json,sys; d=json.load(open('$1')); print($2)"; }
-row() { printf '| %s | %s | `%s` |\n' "$1" "$2" "$3"; }
-json() { # json NAME COMMAND...: runs stipple and keeps its JSON
-    local name=$1
-    shift
-    "$program" "$@" --json >"$name.json" 2>/dev/null
-}
 difference() { "$program" compare "$1" "$2" | tr '\n' ' ' | sed 's/, largest[^,]*//; s/ $//'; }
 
 echo "# Figures of meshes, $(date +%F)"
 echo
-echo "Machine: $(grep -m1 'model name' /proc/cpuinfo | sed 's/.*: //'), $(nproc) cores, no GPU. Medians. 1920x1080, cpu backend unless said."
+echo "Machine: $(machine). Medians. 1920x1080, cpu backend unless said."
 echo
 echo '| what | figure | command |'
 echo '|---|---|---|'
