@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include "engine/base/process.h"
 #include "lod/attributes.h"
 #include "lod/build/aggregate.h"
 #include "lod/build/cloud.h"
@@ -66,20 +65,14 @@ glm::dvec3 upOf(const Cloud& cloud, const BuildSettings& settings, const StoreDe
 Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std::string& output,
                                const BuildSettings& settings, Executor& executor, Progress& progress) {
     BuildReport report;
-    const double start = nowSeconds();
-    double last = start;
-    const auto stage = [&](const char* name) {
-        const double now = nowSeconds();
-        report.stageSeconds[name] += now - last;
-        last = now;
-    };
+    StageClock clock(report);
     STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output));  // an unwritable output is found first
     STIPPLE_ASSIGN(Cloud cloud, readCloud(inputs, settings, report, executor, progress));
-    stage("read");
+    clock.ends("read");
     const Partition partition = partitionCloud(cloud, settings.leafRecords, executor);
-    stage("partition");
+    clock.ends("partition");
     estimateAttributes(cloud, partition, settings, executor, progress);
-    stage("attributes");
+    clock.ends("attributes");
     STIPPLE_ASSIGN(const Hierarchy hierarchy, simplifyAndWrite(cloud, partition, writer, executor, progress));
     StoreDescription description;
     description.crs = cloud.crs;
@@ -102,17 +95,17 @@ Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std
     description.up = upOf(cloud, settings, description);
     describeRanges(cloud, description);
     STIPPLE_TRY(writer.finish(hierarchy, description));
-    stage("simplify");
+    clock.ends("simplify");
     STIPPLE_ASSIGN(const Store store, openStore(writer.temporaryPath()));
     STIPPLE_TRY(verifyStore(store, executor));
-    stage("verify");
+    clock.ends("verify");
     report.bytesOut = writer.bytes();
     STIPPLE_TRY(writer.commit());
     report.pointsOut = cloud.size();
     report.nodes = hierarchy.nodes.size();
     report.records = description.records;
     report.contentHash = writer.contentHash();
-    report.seconds = nowSeconds() - start;
+    report.seconds = clock.seconds();
     return report;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/base/executor.h"
+#include "engine/base/process.h"
 #include "engine/base/progress.h"
 #include "lod/primitives.h"
 
@@ -37,6 +38,22 @@ struct BuildReport {
     uint64_t nodes = 0, records = 0, bytesOut = 0, contentHash = 0;
     double seconds = 0;
     std::map<std::string, double> stageSeconds;
+};
+
+/// Seconds of each stage of a build, into its report.
+class StageClock {
+  public:
+    explicit StageClock(BuildReport& report) : report_(report), start_(nowSeconds()), last_(start_) {}
+    void ends(const char* stage) {
+        const double now = nowSeconds();
+        report_.stageSeconds[stage] += now - last_;
+        last_ = now;
+    }
+    double seconds() const { return nowSeconds() - start_; }
+
+  private:
+    BuildReport& report_;
+    double start_, last_;
 };
 
 /// Reads `inputs`, writes `output` (whole or not at all). The same input and settings give the same bytes for any

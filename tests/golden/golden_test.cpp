@@ -37,18 +37,7 @@ TEST_P(Golden, LooksAsItDid) {
     lod::View view = test::fitView(*store, 320, 240);
     view.eye += 1.2 * view.forward;  // near enough for several levels in one picture
     const render::Image image = test::renderView(store, *backend, *executor, view, settings);
-    const std::string path = std::string(STIPPLE_SOURCE_DIR) + "/tests/golden/" + c.name + ".png";
-    if (std::getenv("STIPPLE_RENEW_GOLDENS")) {
-        ASSERT_TRUE(image::writeImage(path, image));
-        FAIL() << path << " was written: look at it, then commit it";
-    }
-    const auto golden = image::readImage(path);
-    ASSERT_TRUE(golden) << golden.error().line();
-    const auto d = reference::compareImages(image, *golden, 8, nullptr);
-    ASSERT_TRUE(d);
-    EXPECT_LE(d->differingFraction, 0.002);
-    EXPECT_GE(d->silhouetteIou, 0.999);
-    EXPECT_GT(d->psnr, 40);
+    test::expectGolden(image, c.name);
 }
 
 INSTANTIATE_TEST_SUITE_P(Views, Golden,

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <fstream>
 
 #include "engine/cpu/cpu_backend.h"
 #include "engine/cpu/kernels.h"
@@ -26,10 +25,6 @@ render::Image draw(const std::vector<render::PlacedStore>& placed, render::Backe
     EXPECT_TRUE(complete && *complete);
     if (counters) *counters = state->counters;
     return state->image;
-}
-
-void spit(const std::string& path, const std::string& bytes) {
-    std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
 std::vector<render::WorldLight> threeLights(const glm::dvec3& at, double size) {
@@ -146,17 +141,7 @@ TEST_F(Hybrid, PointsAndTrianglesOccludeEachOtherAsTheOracleSays) {
 TEST_F(Hybrid, GoldenLooksAsItDid) {
     const auto backend = cpu::makeCpuBackend(*executor_);
     const render::Image image = draw(placed_, *backend, *executor_, view_, settings_);
-    const std::string path = std::string(STIPPLE_SOURCE_DIR) + "/tests/golden/hybrid.png";
-    if (std::getenv("STIPPLE_RENEW_GOLDENS")) {
-        ASSERT_TRUE(image::writeImage(path, image));
-        FAIL() << path << " was written: look at it, then commit it";
-    }
-    const auto golden = image::readImage(path);
-    ASSERT_TRUE(golden) << golden.error().line();
-    const auto d = reference::compareImages(image, *golden, 8, nullptr);
-    ASSERT_TRUE(d);
-    EXPECT_LE(d->differingFraction, 0.002);
-    EXPECT_GT(d->psnr, 40);
+    test::expectGolden(image, "hybrid");
 }
 
 TEST_F(Hybrid, WhatASceneDoesNotCallForDoesNotExist) {
@@ -258,7 +243,7 @@ TEST(MeshImages, WhatCannotBeSimplifiedIsPointsFromAfar) {
     points.open = [&](const std::string&, const lod::ReadOptions&) {
         return scene::sampleSurfels(scene, {}, {100'000});
     };
-    spit(folder / "scene", "x");
+    test::spit(folder / "scene", "x");
     ASSERT_TRUE(lod::buildStore({folder / "scene"}, folder / "b.stipple", points, *executor, progress));
     const auto mesh = std::make_shared<const lod::Store>(*lod::openStore(folder / "a.stipple")),
                afar = std::make_shared<const lod::Store>(*lod::openStore(folder / "b.stipple"));

@@ -1,8 +1,6 @@
 // The mesh hierarchy attacked: cuts without cracks, errors that bound, the same bytes for any number of threads.
 #include <gtest/gtest.h>
 
-#include <fstream>
-
 #include "engine/cpu/cpu_backend.h"
 #include "engine/scene/camera.h"
 #include "tests/support/meshes.h"
@@ -198,12 +196,8 @@ TEST(MeshBuild, GivesTheSameBytesForAnyNumberOfThreads) {
         files.push_back(folder / std::to_string(threads));
         test::growMeshStore(recipe, files.back(), *executor);
     }
-    const auto read = [](const std::string& path) {
-        std::ifstream in(path, std::ios::binary);
-        return std::string(std::istreambuf_iterator<char>(in), {});
-    };
-    EXPECT_EQ(read(files[0]), read(files[1]));
-    EXPECT_EQ(read(files[0]), read(files[2]));
+    EXPECT_EQ(test::slurp(files[0]), test::slurp(files[1]));
+    EXPECT_EQ(test::slurp(files[0]), test::slurp(files[2]));
 }
 
 }  // namespace

@@ -1,4 +1,8 @@
 #include "tests/support/support.h"
+#include <gtest/gtest.h>
+#include <iterator>
+#include "engine/image/image_io.h"
+#include "engine/reference/reference.h"
 
 #include <fmt/format.h>
 
@@ -150,6 +154,30 @@ std::string dataFile(const std::string& name) {
     fmt::print("{}", line);
     if (const char* list = std::getenv("STIPPLE_SKIP_FILE")) std::ofstream(list, std::ios::app) << line;
     return {};
+}
+
+std::string slurp(const std::string& path) {
+    std::ifstream in(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+void spit(const std::string& path, const std::string& bytes) {
+    std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+}
+
+void expectGolden(const render::Image& image, const std::string& name) {
+    const std::string path = std::string(STIPPLE_SOURCE_DIR) + "/tests/golden/" + name + ".png";
+    if (std::getenv("STIPPLE_RENEW_GOLDENS")) {
+        ASSERT_TRUE(image::writeImage(path, image));
+        FAIL() << path << " was written: look at it, then commit it";
+    }
+    const auto golden = image::readImage(path);
+    ASSERT_TRUE(golden) << golden.error().line();
+    const auto d = reference::compareImages(image, *golden, 8, nullptr);
+    ASSERT_TRUE(d);
+    EXPECT_LE(d->differingFraction, 0.002);
+    EXPECT_GE(d->silhouetteIou, 0.999);
+    EXPECT_GT(d->psnr, 40);
 }
 
 }  // namespace stipple::test

@@ -62,4 +62,12 @@ lod::View fitView(const lod::Store& store, uint32_t width, uint32_t height);
 /// missing.
 std::string dataFile(const std::string& name);
 
+/// Whole files.
+std::string slurp(const std::string& path);
+void spit(const std::string& path, const std::string& bytes);
+
+/// Compares with tests/golden/NAME.png, a picture that somebody has looked at. With STIPPLE_RENEW_GOLDENS it writes the
+/// picture instead, and fails: look at it, then commit it.
+void expectGolden(const render::Image& image, const std::string& name);
+
 }  // namespace stipple::test

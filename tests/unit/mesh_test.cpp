@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <limits>
 
 #include "engine/scene/triangles.h"
@@ -16,20 +15,12 @@
 namespace stipple {
 namespace {
 
-std::string slurp(const std::string& path) {
-    std::ifstream in(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-}
-void spit(const std::string& path, const std::string& bytes) {
-    std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-}
-
 TEST(PlyMesh, PolygonsAndStripsBecomeTriangles) {
     const test::TempFolder folder;
-    spit(folder / "a.ply",
-         "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
-         "element face 3\nproperty uchar flag\nproperty list uchar int vertex_indices\nend_header\n"
-         "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n7 4 0 1 2 3\n7 3 0 1 4\n7 3 0 1 9\n");
+    test::spit(folder / "a.ply",
+               "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
+               "element face 3\nproperty uchar flag\nproperty list uchar int vertex_indices\nend_header\n"
+               "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n7 4 0 1 2 3\n7 3 0 1 4\n7 3 0 1 9\n");
     ASSERT_TRUE(*lod::hasPlyFaces(folder / "a.ply"));
     lod::PlyMeshNotes notes;
     const auto mesh = lod::readPlyMesh(folder / "a.ply", notes);
@@ -46,13 +37,13 @@ TEST(PlyMesh, PolygonsAndStripsBecomeTriangles) {
     const std::array<int32_t, 9> corners{8, 0, 1, 2, 3, -1, 3, 4, 5};
     strip.append(reinterpret_cast<const char*>(positions.data()), sizeof(positions));
     strip.append(reinterpret_cast<const char*>(corners.data()), sizeof(corners));
-    spit(folder / "b.ply", strip);
+    test::spit(folder / "b.ply", strip);
     const auto strips = lod::readPlyMesh(folder / "b.ply", notes);
     ASSERT_TRUE(strips) << strips.error().line();
     EXPECT_EQ(strips->indices, (std::vector<uint32_t>{0, 1, 2, 1, 3, 2, 3, 4, 5}));
     // Every truncation is refused, never read as something else.
     for (size_t length = strip.size() - 90; length < strip.size(); ++length) {
-        spit(folder / "c.ply", strip.substr(0, length));
+        test::spit(folder / "c.ply", strip.substr(0, length));
         EXPECT_FALSE(lod::readPlyMesh(folder / "c.ply", notes)) << length;
     }
 }
@@ -127,12 +118,12 @@ TEST(MeshStore, DamagedChunksAndTablesAreRefused) {
             ASSERT_LE(c.firstVertex + (c.counts & 0xffffu), chunk->vertices.size());
     }
     // A store with changed bytes anywhere: opening and verifying says so.
-    const std::string whole = slurp(folder / "a.stipple");
+    const std::string whole = test::slurp(folder / "a.stipple");
     for (int k = 0; k < 300; ++k) {
         std::string changed = whole;
         const size_t at = rng.below(changed.size());
         changed[at] = static_cast<char>(changed[at] ^ static_cast<char>(1 + rng.below(255)));
-        spit(folder / "b.stipple", changed);
+        test::spit(folder / "b.stipple", changed);
         const auto opened = lod::openStore(folder / "b.stipple");
         if (!opened) continue;
         EXPECT_FALSE(lod::verifyStore(*opened, *executor)) << "byte " << at << " of " << whole.size();

@@ -8,7 +8,6 @@
 #include <cmath>
 
 #include "engine/base/check.h"
-#include "engine/base/process.h"
 #include "lod/build/mesh/mesh_work.h"
 
 namespace stipple::lod {
@@ -313,18 +312,12 @@ class MeshBuilder {
 Result<BuildReport> buildMeshStore(TriangleMesh input, const std::string& output, const MeshBuildSettings& settings,
                                    Executor& executor, Progress& progress) {
     BuildReport report;
-    const double start = nowSeconds();
-    double last = start;
-    const auto stage = [&](const char* name) {
-        const double now = nowSeconds();
-        report.stageSeconds[name] += now - last;
-        last = now;
-    };
+    StageClock clock(report);
     STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output));
     report.isMesh = true;
     report.pointsIn = input.indices.size() / 3;
     const WeldedMesh mesh = weldMesh(std::move(input), executor);
-    stage("weld");
+    clock.ends("weld");
     for (const auto& [reason, count] :
          {std::pair{"degenerate triangles", mesh.degenerate}, std::pair{"duplicate triangles", mesh.duplicate},
           std::pair{"triangles that are not finite", mesh.notFinite}})
@@ -333,11 +326,11 @@ Result<BuildReport> buildMeshStore(TriangleMesh input, const std::string& output
         return fail(ErrorKind::input, "holds no triangle with an area", settings.description.source);
     MeshBuilder builder(mesh, settings, writer, executor, progress);
     STIPPLE_TRY(builder.run());
-    stage("simplify");
+    clock.ends("simplify");
     Hierarchy hierarchy;
     builder.tables(hierarchy);
     STIPPLE_TRY(writeTextures(settings.textures, writer, hierarchy, executor));
-    stage("textures");
+    clock.ends("textures");
     StoreDescription description = settings.description;
     description.points = report.pointsOut = mesh.indices.size() / 3;
     for (const Node& node : hierarchy.nodes) description.records += node.records;
@@ -351,10 +344,10 @@ Result<BuildReport> buildMeshStore(TriangleMesh input, const std::string& output
     description.boundsMax = description.focusMax = mesh.origin + mesh.unit * hi;
     description.hasColour = description.hasNormals = description.isReflectance = true;
     STIPPLE_TRY(writer.finish(hierarchy, description));
-    stage("finish");
+    clock.ends("finish");
     STIPPLE_ASSIGN(const Store store, openStore(writer.temporaryPath()));
     STIPPLE_TRY(verifyStore(store, executor));
-    stage("verify");
+    clock.ends("verify");
     report.bytesOut = writer.bytes();
     STIPPLE_TRY(writer.commit());
     report.nodes = hierarchy.nodes.size();
@@ -368,7 +361,7 @@ Result<BuildReport> buildMeshStore(TriangleMesh input, const std::string& output
             fmt::format("{} triangles cannot be simplified (many small separate parts): they are "
                         "drawn whatever the distance",
                         coarsest));
-    report.seconds = nowSeconds() - start;
+    report.seconds = clock.seconds();
     return report;
 }
 
