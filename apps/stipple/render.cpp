@@ -204,20 +204,14 @@ Result<void> run(const Options& o) {
     STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
     STIPPLE_ASSIGN(render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
     STIPPLE_ASSIGN(settings.draw.environment, openEnvironment(o.environment.path, o.environment.scale, *executor));
-    if (o.mode == "reference" && scene.placed.size() > 1)
-        return fail(ErrorKind::usage, "only one store can be traced", "--mode reference", "use --device reference");
     if (o.mode == "reference" && colour.mode != lod::ColourMode::own)
         return fail(ErrorKind::usage, "traced pictures have the scene's own colours", "--mode reference",
                     "leave --colour out, or use --device reference");
-    if (o.mode == "reference" && scene.placed[0].store->hierarchy.isMesh())
-        return fail(ErrorKind::usage, "traced pictures are of points so far, not of triangles", "--mode reference",
-                    "use --device reference --error 0.001: the oracle on the full mesh");
     if (o.mode == "reference") {
         const double start = nowSeconds();
         reference::TraceSettings trace{static_cast<uint32_t>(o.samples), settings.draw};
         for (size_t i = 0; i < shot.views.size(); ++i) {
-            STIPPLE_ASSIGN(const render::Image traced,
-                           reference::trace(*scene.placed[0].store, shot.views[i], trace, *executor));
+            STIPPLE_ASSIGN(const render::Image traced, reference::trace(scene.placed, shot.views[i], trace, *executor));
             STIPPLE_TRY(image::writeImage(shot.views.size() > 1 ? numbered(o.output, i) : o.output, traced));
         }
         if (o.json)

@@ -1,13 +1,13 @@
 // The oracle, fp64 and scalar; it shares no formula with the backends.
 //   restate: each mode once more, plainly, on a given cut: what a backend's implementation error is measured against.
-//   trace:   discs of the full detail hit by rays: what the reconstruction error is measured against.
+//   trace:   discs and triangles of the full detail hit by rays: what the reconstruction error is measured against.
 //   metrics: how far two images are apart.
 #pragma once
 
 #include <memory>
 
 #include "engine/base/executor.h"
-#include "engine/render/backend.h"
+#include "engine/render/frame.h"
 #include "lod/store.h"
 
 namespace stipple::reference {
@@ -19,10 +19,12 @@ struct TraceSettings {
     uint32_t samplesPerAxis = 4;  ///< N x N rays per pixel
     render::DrawSettings draw;
 };
-/// Rays against the discs of all leaves: at the front hit, colours and normals of the discs within the front thickness
-/// are blended with the kernel (1 - rho^2)^2; samples are averaged in linear light, alpha is coverage.
-Result<render::Image> trace(const lod::Store& store, const lod::View& view, const TraceSettings& settings,
-                            Executor& executor);
+/// Rays against the full detail of a scene. A triangle shows its own surface, textured at the width of a ray; at a
+/// front disc, colours and normals of the discs within the front thickness are blended with the kernel (1 - rho^2)^2.
+/// Samples are averaged in linear light, alpha is coverage, depth the mean of
+/// what was hit. Stand-ins and colours by value are not looked at.
+Result<render::Image> trace(const std::vector<render::PlacedStore>& placed, const lod::View& view,
+                            const TraceSettings& settings, Executor& executor);
 
 struct ImageDifference {
     double psnr = 0;               ///< dB over all pixels (colour over black where transparent); infinity if equal

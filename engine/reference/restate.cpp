@@ -8,7 +8,7 @@
 #include "engine/base/process.h"
 #include "engine/reference/decode.h"
 #include "engine/reference/reference.h"
-#include "engine/reference/restate.h"
+#include "engine/reference/surface.h"
 
 namespace stipple::reference {
 namespace {

@@ -43,7 +43,4 @@ glm::dmat3 rotationToZ(const glm::dvec3& v);
 /// Triangles of the cut into the level: nearest surface at each pixel's centre.
 void projectMeshes(const render::DrawList& draws, const Chunks& chunks, Level& level);
 
-/// Light from a triangle's pixel to the eye. `n`: towards the eye; `point`: camera space.
-glm::dvec3 shadeTriangle(const Sample& s, const glm::dvec3& n, const glm::dvec3& point, const render::DrawList& draws);
-
 }  // namespace stipple::reference

@@ -1,163 +1,322 @@
-// Rays against the discs of all leaves, through a bounding volume hierarchy (median split of the longest axis).
-#include <algorithm>
-#include <array>
+// Rays against the full detail of a scene: discs and triangles of all leaves, in one hierarchy of boxes per store and
+// one over the places where the stores stand.
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "engine/base/queue.h"
+#include "engine/reference/box_tree.h"
 #include "engine/reference/decode.h"
 #include "engine/reference/reference.h"
+#include "engine/reference/surface.h"
 
 namespace stipple::reference {
 namespace {
 
+using glm::dvec2;
 using glm::dvec3;
 
-struct Box {
-    dvec3 lo{std::numeric_limits<double>::max()}, hi{std::numeric_limits<double>::lowest()};
-    void add(const Box& o) {
-        lo = glm::min(lo, o.lo);
-        hi = glm::max(hi, o.hi);
+constexpr double kNever = std::numeric_limits<double>::max();
+
+/// Everything that a store draws in full detail, in its own coordinates.
+struct TracedStore {
+    const lod::Store* store = nullptr;
+    std::vector<Disc> discs;
+    std::vector<shared::MeshVertex> vertices;
+    std::vector<std::array<uint32_t, 3>> triangles;
+    Chunks tiles;  ///< all levels of all textures
+    render::MeshTextures textures;
+    BoxTree tree;  ///< items: discs, then triangles
+
+    dvec3 positionOf(uint32_t vertex) const {
+        const shared::MeshVertex& v = vertices[vertex];
+        return store->hierarchy.origin + store->hierarchy.unit * dvec3(v.x, v.y, v.z);
     }
 };
 
-struct TreeNode {
-    Box box;
-    uint32_t begin = 0, end = 0, left = 0;  ///< left != 0: children left, left + 1
+Box boxOf(const Disc& d) {
+    dvec3 half(d.radius);
+    if (d.normal != dvec3(0))
+        half = d.radius * glm::sqrt(glm::max(dvec3(0), 1.0 - d.normal * d.normal)) + dvec3(1e-9 * d.radius);
+    return {d.position - half, d.position + half};
+}
+
+Result<void> readPoints(TracedStore& t) {
+    const lod::Hierarchy& h = t.store->hierarchy;
+    t.discs.reserve(t.store->description.points);
+    for (uint32_t i = 0; i < h.nodes.size(); ++i) {
+        if (!h.nodes[i].isLeaf()) continue;
+        STIPPLE_ASSIGN(const lod::Chunk chunk, lod::readChunk(*t.store, i));
+        for (const shared::PointRecord& r : chunk.records) t.discs.push_back(decodeDisc(h, h.nodes[i], r));
+    }
+    return {};
+}
+
+Result<void> readMesh(TracedStore& t) {
+    const lod::Hierarchy& h = t.store->hierarchy;
+    t.textures = {h.textures, 0, static_cast<uint32_t>(h.nodes.size()), static_cast<uint32_t>(h.tiles.size())};
+    for (uint32_t i = 0; i < h.nodes.size(); ++i) {
+        const lod::MeshGroup& group = h.groups[i];
+        lod::Chunk chunk;
+        uint32_t base = 0;
+        for (uint32_t r = group.firstRun; r < group.firstRun + group.runs; ++r) {
+            const lod::MeshRun& run = h.runs[r];
+            if (run.producer != lod::MeshRun::kOriginal) continue;
+            if (chunk.clusters.empty()) {
+                STIPPLE_ASSIGN(chunk, lod::readChunk(*t.store, i));
+                base = static_cast<uint32_t>(t.vertices.size());
+                t.vertices.insert(t.vertices.end(), chunk.vertices.begin(), chunk.vertices.end());
+            }
+            for (uint32_t c = run.firstCluster; c < run.firstCluster + run.clusters; ++c) {
+                const shared::MeshCluster& cluster = chunk.clusters[c];
+                for (uint32_t k = 0; k < cluster.counts >> 16; ++k) {
+                    const uint32_t word = chunk.triangles[cluster.firstTriangle + k],
+                                   first = base + cluster.firstVertex;
+                    t.triangles.push_back({first + word % 256, first + (word >> 8) % 256, first + (word >> 16) % 256});
+                }
+            }
+        }
+    }
+    for (uint32_t i = t.textures.firstChunk; i < h.chunks(); ++i) {
+        STIPPLE_ASSIGN(t.tiles[i], lod::readChunk(*t.store, i));
+    }
+    return {};
+}
+
+Result<void> readStore(const lod::Store& store, TracedStore& t) {
+    t.store = &store;
+    STIPPLE_TRY(store.hierarchy.isMesh() ? readMesh(t) : readPoints(t));
+    std::vector<Box> boxes;
+    boxes.reserve(t.discs.size() + t.triangles.size());
+    for (const Disc& d : t.discs) boxes.push_back(boxOf(d));
+    for (const auto& corners : t.triangles) {
+        boxes.emplace_back();
+        for (const uint32_t v : corners) boxes.back().add(t.positionOf(v));
+    }
+    t.tree = BoxTree(boxes);
+    return {};
+}
+
+/// A ray in the coordinates of a store; t is the same as in the world.
+struct LocalRay {
+    dvec3 origin, direction;
 };
 
-class DiscTree {
+/// Where the ray meets the disc within its radius; its side towards the eye.
+bool meetsDisc(const Disc& d, const LocalRay& ray, double& t, double& rho2, dvec3& normal) {
+    const dvec3 n = d.normal == dvec3(0) ? -glm::normalize(d.position - ray.origin) : d.normal;
+    const double facing = glm::dot(n, ray.direction);
+    if (facing == 0) return false;
+    if (facing > 0 && (d.flags & (shared::kFlagTwoSided | shared::kFlagNoNormal)) == 0) return false;
+    t = glm::dot(n, d.position - ray.origin) / facing;
+    const dvec3 off = ray.origin + t * ray.direction - d.position;
+    rho2 = glm::dot(off, off) / (d.radius * d.radius);
+    normal = facing > 0 ? -n : n;
+    return rho2 <= 1;
+}
+
+/// Moeller and Trumbore 1997; edges belong to both of their triangles.
+bool meetsTriangle(const dvec3& a, const dvec3& b, const dvec3& c, bool isTwoSided, const LocalRay& ray, double& t) {
+    const dvec3 e1 = b - a, e2 = c - a, p = glm::cross(ray.direction, e2);
+    const double det = glm::dot(e1, p);
+    if (det == 0 || (det < 0 && !isTwoSided)) return false;
+    const dvec3 off = ray.origin - a, q = glm::cross(off, e1);
+    const double u = glm::dot(off, p) / det, v = glm::dot(ray.direction, q) / det;
+    constexpr double kSlack = 1e-12;
+    if (u < -kSlack || v < -kSlack || u + v > 1 + kSlack) return false;
+    t = glm::dot(e2, q) / det;
+    return true;
+}
+
+class Tracer {
   public:
-    explicit DiscTree(std::vector<Disc> discs) : discs_(std::move(discs)) {
-        nodes_.push_back({{}, 0, static_cast<uint32_t>(discs_.size()), 0});
-        for (size_t i = 0; i < nodes_.size(); ++i) {
-            TreeNode node = nodes_[i];
-            for (uint32_t d = node.begin; d < node.end; ++d) node.box.add(boxOf(discs_[d]));
-            if (node.end - node.begin > 4) {
-                const dvec3 size = node.box.hi - node.box.lo;
-                const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-                const uint32_t middle = (node.begin + node.end) / 2;
-                std::nth_element(discs_.begin() + node.begin, discs_.begin() + middle, discs_.begin() + node.end,
-                                 [axis](const Disc& a, const Disc& b) { return a.position[axis] < b.position[axis]; });
-                node.left = static_cast<uint32_t>(nodes_.size());
-                nodes_.push_back({{}, node.begin, middle, 0});
-                nodes_.push_back({{}, middle, node.end, 0});
+    Tracer(const std::vector<render::PlacedStore>& placed, const lod::View& view, const TraceSettings& settings)
+        : placed_(placed), view_(view), settings_(settings) {}
+
+    Result<void> prepare() {
+        std::vector<Box> boxes;
+        for (const render::PlacedStore& p : placed_) {
+            auto [at, isNew] = stores_.try_emplace(p.store.get());
+            if (isNew) STIPPLE_TRY(readStore(*p.store, at->second));
+            at->second.textures.source = 0;
+            places_.push_back(&at->second);
+            const Box own = at->second.tree.bounds();
+            boxes.emplace_back();
+            for (int k = 0; k < 8; ++k) {
+                const dvec3 corner((k & 1) != 0 ? own.hi.x : own.lo.x, (k & 2) != 0 ? own.hi.y : own.lo.y,
+                                   (k & 4) != 0 ? own.hi.z : own.lo.z);
+                boxes.back().add(p.place.translation + p.place.rotation * (p.place.scale * corner) - view_.eye);
             }
-            nodes_[i] = node;
         }
+        tree_ = BoxTree(boxes);
+        render::makeDrawList({}, {}, {}, view_, settings_.draw, draws_);
+        return {};
     }
 
-    /// Calls hit(disc, t, rho2) for each disc that origin + t direction meets with near < t < limit(); hit may lower
-    /// limit.
-    template <typename Hit>
-    void visit(const dvec3& origin, const dvec3& direction, double nearT, double& limit, const Hit& hit) const {
-        const dvec3 inverse = 1.0 / direction;
-        std::array<uint32_t, 64> stack{};
-        size_t depth = 0;
-        stack[depth++] = 0;
-        while (depth > 0) {
-            const TreeNode& node = nodes_[stack[--depth]];
-            const dvec3 a = (node.box.lo - origin) * inverse, b = (node.box.hi - origin) * inverse;
-            const dvec3 lo = glm::min(a, b), hi = glm::max(a, b);
-            const double enter = std::max({lo.x, lo.y, lo.z, nearT}), leave = std::min({hi.x, hi.y, hi.z, limit});
-            if (!(enter <= leave)) continue;
-            if (node.left != 0) {
-                // Nearer child last, so that it is taken first.
-                const bool leftFirst = glm::dot(nodes_[node.left].box.lo + nodes_[node.left].box.hi -
-                                                    nodes_[node.left + 1].box.lo - nodes_[node.left + 1].box.hi,
-                                                direction) < 0;
-                stack[depth++] = leftFirst ? node.left + 1 : node.left;
-                stack[depth++] = leftFirst ? node.left : node.left + 1;
-                continue;
-            }
-            for (uint32_t i = node.begin; i < node.end; ++i) {
-                const Disc& d = discs_[i];
-                const dvec3 n = d.normal == dvec3(0) ? -glm::normalize(d.position - origin) : d.normal;
-                const double facing = glm::dot(n, direction);
-                if (facing == 0) continue;
-                if (facing > 0 && (d.flags & (shared::kFlagTwoSided | shared::kFlagNoNormal)) == 0) continue;
-                const double t = glm::dot(n, d.position - origin) / facing;
-                if (!(t > nearT && t < limit)) continue;
-                const dvec3 off = origin + t * direction - d.position;
-                const double rho2 = glm::dot(off, off) / (d.radius * d.radius);
-                if (rho2 <= 1) hit(d, facing > 0 ? -n : n, t, rho2);
-            }
+    /// Linear colour that one ray brings, and from what depth; false if it meets nothing. `ray`: camera space, z = 1.
+    bool look(const dvec3& ray, double step, dvec3& colour, double& depth) const {
+        Hit hit = nearestHit(ray, step);
+        if (hit.place == kNone) return false;
+        const dvec3 point = ray * hit.t;
+        depth = hit.t;
+        if (hit.isTriangle) {
+            colour = shadeTriangle(hit.sample, hit.normal, point, draws_);
+            return true;
         }
+        Sample s;
+        const dvec3 n = blendDiscs(ray, hit, s.colour);
+        const shared::FrameConstants& f = draws_.frame;
+        colour = s.colour;
+        if ((f.shade & shared::kShadeLit) == 0) return true;
+        if (draws_.lights.empty() && !draws_.environment)
+            colour *= lightOn(n, f);
+        else
+            colour = shadeTriangle(s, n, point, draws_);
+        return true;
     }
 
   private:
-    static Box boxOf(const Disc& d) {
-        dvec3 half(d.radius);
-        if (d.normal != dvec3(0))
-            half = d.radius * glm::sqrt(glm::max(dvec3(0), 1.0 - d.normal * d.normal)) + dvec3(1e-9 * d.radius);
-        return {d.position - half, d.position + half};
+    static constexpr uint32_t kNone = ~0u;
+    struct Hit {
+        uint32_t place = kNone;
+        double t = kNever, thickness = 0;
+        bool isTriangle = false;
+        Sample sample;
+        dvec3 normal{0};  ///< camera space, towards the eye
+    };
+
+    dvec3 toWorld(const dvec3& c) const { return view_.right * c.x + view_.down * c.y + view_.forward * c.z; }
+    dvec3 toCamera(const dvec3& w) const {
+        return {glm::dot(w, view_.right), glm::dot(w, view_.down), glm::dot(w, view_.forward)};
     }
-    std::vector<Disc> discs_;
-    std::vector<TreeNode> nodes_;
+    LocalRay localRay(const lod::Instance& place, const dvec3& ray) const {
+        const glm::dmat3 back = glm::transpose(place.rotation);
+        return {back * (view_.eye - place.translation) / place.scale, back * toWorld(ray) / place.scale};
+    }
+
+    Hit nearestHit(const dvec3& ray, double step) const {
+        Hit best;
+        const double length = glm::length(ray);
+        tree_.visit(dvec3(0), toWorld(ray), view_.nearPlane, best.t, [&](uint32_t p) {
+            const TracedStore& store = *places_[p];
+            const lod::Instance& place = placed_[p].place;
+            const LocalRay local = localRay(place, ray);
+            store.tree.visit(local.origin, local.direction, view_.nearPlane, best.t, [&](uint32_t item) {
+                double t = 0, rho2 = 0;
+                dvec3 normal;
+                if (item >= store.discs.size()) {
+                    hitTriangle(store, place, store.triangles[item - store.discs.size()], local, ray, step, p, best);
+                } else if (meetsDisc(store.discs[item], local, t, rho2, normal) && t > view_.nearPlane && t < best.t) {
+                    const double m = std::abs(glm::dot(place.rotation * normal, toWorld(ray))) / length;
+                    best.place = p;
+                    best.t = t;
+                    best.isTriangle = false;
+                    best.thickness =
+                        place.scale * store.discs[item].radius * (0.25 + std::sqrt(std::max(0.0, 1 - m * m)));
+                }
+            });
+        });
+        return best;
+    }
+
+    void hitTriangle(const TracedStore& store, const lod::Instance& place, const std::array<uint32_t, 3>& corners,
+                     const LocalRay& local, const dvec3& ray, double step, uint32_t p, Hit& best) const {
+        const uint32_t surface = store.vertices[corners[0]].surface;
+        double t = 0;
+        if (!meetsTriangle(store.positionOf(corners[0]), store.positionOf(corners[1]), store.positionOf(corners[2]),
+                           (surface & shared::kSurfaceTwoSided) != 0, local, t) ||
+            t <= view_.nearPlane || t >= best.t)
+            return;
+        Corners c;
+        for (size_t k = 0; k < 3; ++k)
+            c.at(k) = cornerOf(store.store->hierarchy, place, store.vertices[corners.at(k)], view_);
+        const dvec3 face = glm::cross(c[1].at - c[0].at, c[2].at - c[0].at);
+        const dvec2 w = glm::clamp(weightsOn(ray, c, face), dvec2(0), dvec2(1));
+        Sample sample;
+        dvec3 n;
+        if (!surfaceOn(ray, w, footprintOn(ray, step, c, face), c, face, surface,
+                       store.store->description.materials.at(surface & shared::kSurfaceMaterialMask),
+                       {store.textures, store.tiles}, sample, n))
+            return;
+        best.place = p;
+        best.t = t;
+        best.isTriangle = true;
+        best.sample = sample;
+        best.normal = n;
+    }
+
+    /// Mean colour of the discs within the front thickness, weighted by (1 - rho^2)^2; returns their normal.
+    dvec3 blendDiscs(const dvec3& ray, const Hit& front, dvec3& colour) const {
+        const double limit = front.t + front.thickness;
+        double weights = 0;
+        dvec3 normals(0);
+        colour = dvec3(0);
+        tree_.visit(dvec3(0), toWorld(ray), view_.nearPlane, limit, [&](uint32_t p) {
+            const TracedStore& store = *places_[p];
+            const LocalRay local = localRay(placed_[p].place, ray);
+            store.tree.visit(local.origin, local.direction, view_.nearPlane, limit, [&](uint32_t item) {
+                double t = 0, rho2 = 0;
+                dvec3 normal;
+                if (item >= store.discs.size() || !meetsDisc(store.discs[item], local, t, rho2, normal) ||
+                    t <= view_.nearPlane || t >= limit)
+                    return;
+                const double w = (1 - rho2) * (1 - rho2) + 1e-9;
+                weights += w;
+                colour += w * store.discs[item].colour;
+                normals += w * (placed_[p].place.rotation * normal);
+            });
+        });
+        colour /= weights;
+        return glm::normalize(toCamera(normals));
+    }
+
+    const std::vector<render::PlacedStore>& placed_;
+    const lod::View& view_;
+    const TraceSettings& settings_;
+    std::map<const lod::Store*, TracedStore> stores_;
+    std::vector<const TracedStore*> places_;
+    BoxTree tree_;  ///< of the places, relative to the eye
+    render::DrawList draws_;
 };
 
 }  // namespace
 
-Result<render::Image> trace(const lod::Store& store, const lod::View& view, const TraceSettings& settings,
-                            Executor& executor) {
-    std::vector<Disc> discs;
-    discs.reserve(store.description.points);
-    for (uint32_t i = 0; i < store.hierarchy.nodes.size(); ++i) {
-        if (!store.hierarchy.nodes[i].isLeaf()) continue;
-        STIPPLE_ASSIGN(const lod::Chunk chunk, lod::readChunk(store, i));
-        for (const shared::PointRecord& r : chunk.records) {
-            discs.push_back(decodeDisc(store.hierarchy, store.hierarchy.nodes[i], r));
-            discs.back().position -= view.eye;
-        }
-    }
-    const DiscTree tree(std::move(discs));
-    shared::FrameConstants f{};
-    const glm::dmat3 cameraFromWorld = glm::transpose(glm::dmat3(view.right, view.down, view.forward));
-    f.sunDirection = glm::normalize(glm::vec3(-0.45f, -0.55f, -0.7f));
-    f.skyDirection = glm::vec3(cameraFromWorld * settings.draw.worldUp);
+Result<render::Image> trace(const std::vector<render::PlacedStore>& placed, const lod::View& view,
+                            const TraceSettings& settings, Executor& executor) {
+    Tracer tracer(placed, view, settings);
+    STIPPLE_TRY(tracer.prepare());
     render::Image image;
     image.width = view.width;
     image.height = view.height;
     image.rgba.resize(size_t{view.width} * view.height);
+    image.depth.resize(image.rgba.size());
+    image.linear.resize(image.rgba.size() * 3);
     const uint32_t n = std::max(1u, settings.samplesPerAxis);
     executor.parallelFor(view.height, 4, [&](size_t row0, size_t row1) {
         for (size_t y = row0; y < row1; ++y)
             for (uint32_t x = 0; x < view.width; ++x) {
                 dvec3 sum(0);
                 uint32_t hits = 0;
+                double depths = 0;
                 for (uint32_t s = 0; s < n * n; ++s) {
                     const double px = x + (s % n + 0.5) / n - 0.5 * view.width,
                                  py = double(y) + (s / n + 0.5) / n - 0.5 * view.height;
                     // Along `forward` this direction has length 1, so t is linear depth.
-                    const dvec3 direction =
-                        view.forward + (px / view.focalPixels) * view.right + (py / view.focalPixels) * view.down;
-                    double front = std::numeric_limits<double>::max(), thickness = 0;
-                    const double length = glm::length(direction);
-                    tree.visit(dvec3(0), direction, view.nearPlane, front,
-                               [&](const Disc& d, const dvec3& normal, double t, double) {
-                                   const double m = std::abs(glm::dot(normal, direction)) / length;
-                                   front = t;
-                                   thickness = d.radius * (0.25 + std::sqrt(std::max(0.0, 1 - m * m)));
-                               });
-                    if (front == std::numeric_limits<double>::max()) continue;
+                    const dvec3 ray(px / view.focalPixels, py / view.focalPixels, 1);
+                    dvec3 colour(0);
+                    double depth = 0;
+                    if (!tracer.look(ray, 1 / (view.focalPixels * n), colour, depth)) continue;
                     ++hits;
-                    double limit = front + thickness, weights = 0;
-                    dvec3 colour(0), normals(0);
-                    tree.visit(dvec3(0), direction, view.nearPlane, limit,
-                               [&](const Disc& d, const dvec3& normal, double, double rho2) {
-                                   const double w = (1 - rho2) * (1 - rho2) + 1e-9;
-                                   weights += w;
-                                   colour += w * d.colour;
-                                   normals += w * normal;
-                               });
-                    colour /= weights;
-                    if (settings.draw.lit) colour *= lightOn(glm::normalize(cameraFromWorld * normals), f);
+                    depths += depth;
                     sum += colour;
                 }
                 const double coverage = double(hits) / (n * n);
                 const dvec3 c = sum / double(n * n) + (1 - coverage) * dvec3(settings.draw.background);
-                image.rgba[y * view.width + x] = encodeSrgb(c.x) | encodeSrgb(c.y) << 8 | encodeSrgb(c.z) << 16 |
-                                                 static_cast<uint32_t>(std::lround(coverage * 255)) << 24;
+                const size_t pixel = y * view.width + x;
+                image.depth[pixel] = hits > 0 ? static_cast<float>(depths / hits) : 0.0f;
+                for (int k = 0; k < 3; ++k) image.linear[3 * pixel + static_cast<size_t>(k)] = static_cast<float>(c[k]);
+                image.rgba[pixel] = encodeSrgb(c.x) | encodeSrgb(c.y) << 8 | encodeSrgb(c.z) << 16 |
+                                    static_cast<uint32_t>(std::lround(coverage * 255)) << 24;
             }
     });
     return image;

@@ -126,7 +126,7 @@ TEST_F(Errors, ReconstructionIsClosedAndKeepsTheSilhouette) {
     const render::Image image = draw(*backend, 1e-5, render::Mode::pullpush, 512, 512);
     reference::TraceSettings settings;
     settings.draw.lit = true;
-    const auto traced = reference::trace(*store_, test::fitView(*store_, 512, 512), settings, *executor_);
+    const auto traced = reference::trace({{store_, {}, {}}}, test::fitView(*store_, 512, 512), settings, *executor_);
     ASSERT_TRUE(traced);
     const auto d = differ(image, *traced);
     EXPECT_EQ(d.holes, 0u);

@@ -138,6 +138,72 @@ TEST_F(Hybrid, PointsAndTrianglesOccludeEachOtherAsTheOracleSays) {
     EXPECT_GT(behind, 1000u);
 }
 
+TEST_F(Hybrid, StandsInDepthAsTracedRaysSay) {
+    const auto backend = cpu::makeCpuBackend(*executor_);
+    settings_.wantDepthAndNormal = true;
+    settings_.budgets.errorPixels = 1e-4;
+    const render::Image drawn = draw(placed_, *backend, *executor_, view_, settings_);
+    reference::TraceSettings trace;
+    trace.draw = settings_.draw;
+    const auto smooth = reference::trace(placed_, view_, trace, *executor_);
+    ASSERT_TRUE(smooth);
+    EXPECT_EQ(reference::compareImages(drawn, *smooth, 4, nullptr)->holes, 0u);
+    trace.samplesPerAxis = 1;
+    const auto traced = reference::trace(placed_, view_, trace, *executor_);
+    ASSERT_TRUE(traced);
+    const auto d = reference::compareImages(drawn, *traced, 4, nullptr);
+    ASSERT_TRUE(d);
+    EXPECT_GE(d->silhouetteIou, 0.99);
+    EXPECT_GE(d->foregroundPsnr, 30);
+    const double size = glm::length(points_->description.boundsMax - points_->description.boundsMin);
+    const auto apart = [&](const render::Image& a) {
+        size_t both = 0, differ = 0;
+        for (size_t i = 0; i < a.depth.size(); ++i) {
+            if (a.depth[i] <= 0 || traced->depth[i] <= 0) continue;
+            ++both;
+            differ += std::abs(a.depth[i] - traced->depth[i]) > 0.02 * size ? 1 : 0;
+        }
+        return static_cast<double>(differ) / static_cast<double>(both);
+    };
+    // What differs lies along silhouettes, where one ray meets the nearer surface and the splat does not, or the
+    // reverse.
+    EXPECT_LE(apart(drawn), 0.005);
+    // Negative control: without the mesh in front the depths are others.
+    EXPECT_GE(apart(draw({placed_[0]}, *backend, *executor_, view_, settings_)), 0.05);
+}
+
+TEST(MeshImages, AreThoseThatRaysTrace) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    const auto backend = cpu::makeCpuBackend(*executor);
+    for (const char* kind : {"rock", "building", "terrain"}) {
+        test::MeshRecipe recipe;
+        recipe.grow.kind = kind;
+        recipe.grow.triangles = 20'000;
+        recipe.grow.textureSize = 512;
+        const auto store = test::growMeshStore(recipe, folder / "a.stipple", *executor);
+        const lod::View view = test::fitView(*store, 401, 303);
+        render::FrameSettings settings;
+        settings.budgets.errorPixels = 1e-4;
+        settings.draw.lights = threeLights(0.5 * (store->description.boundsMin + store->description.boundsMax), 1);
+        reference::TraceSettings trace;
+        trace.samplesPerAxis = 1;
+        trace.draw = settings.draw;
+        // A turned and scaled place, so that rays go through one.
+        lod::Instance place;
+        place.scale = 1.25;
+        place.rotation = glm::dmat3(glm::dvec3(0, 0, -1), glm::dvec3(0, 1, 0), glm::dvec3(1, 0, 0));
+        const auto traced = reference::trace({{store, place, {}}}, view, trace, *executor);
+        ASSERT_TRUE(traced);
+        const auto d = reference::compareImages(draw({{store, place, {}}}, *backend, *executor, view, settings),
+                                                *traced, 8, nullptr);
+        ASSERT_TRUE(d);
+        EXPECT_GE(d->foregroundPsnr, 40) << kind;
+        EXPECT_LE(d->differingFraction, 0.002) << kind;
+        EXPECT_GE(d->silhouetteIou, 0.999) << kind;
+    }
+}
+
 TEST_F(Hybrid, GoldenLooksAsItDid) {
     const auto backend = cpu::makeCpuBackend(*executor_);
     const render::Image image = draw(placed_, *backend, *executor_, view_, settings_);

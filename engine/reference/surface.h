@@ -1,0 +1,50 @@
+// What a ray sees where it meets a triangle, in fp64: textures, material, light. For the restated frame and for traced
+// rays alike.
+#pragma once
+
+#include <array>
+#include <glm/glm.hpp>
+
+#include "engine/reference/restate.h"
+
+namespace stipple::reference {
+
+struct Corner {
+    glm::dvec3 at{0}, normal{0};  ///< camera space
+    glm::dvec4 colour{1};         ///< linear
+    glm::dvec2 uv{0};
+};
+using Corners = std::array<Corner, 3>;
+
+/// Camera-space corner of a vertex.
+Corner cornerOf(const lod::Hierarchy& h, const lod::Instance& instance, const shared::MeshVertex& v,
+                const lod::View& view);
+
+/// Weights of the second and third corner where the ray meets the triangle's plane. `face`: (b - a) x (c - a).
+glm::dvec2 weightsOn(const glm::dvec3& ray, const Corners& c, const glm::dvec3& face);
+
+/// Texture coordinates per `step` of the ray's x and y (the longer of both), on the triangle's plane.
+double footprintOn(const glm::dvec3& ray, double step, const Corners& c, const glm::dvec3& face);
+
+/// Textures of one mesh.
+struct TextureReader {
+    const render::MeshTextures& textures;
+    const Chunks& chunks;
+
+    /// Trilinear, from the finest level that is there; `out` stays where none is, and the answer is false.
+    bool sample(const shared::TextureSlot& slot, glm::dvec2 at, double footprint, glm::dvec4& out) const;
+
+  private:
+    bool level(const shared::TextureInfo& info, uint32_t l, glm::dvec2 uv, glm::dvec4& out) const;
+};
+
+/// The surface where the ray (z = 1) meets the triangle: colour, material, and the unit normal `n`, turned to the eye.
+/// False where an alpha mask cuts it out.
+bool surfaceOn(const glm::dvec3& ray, const glm::dvec2& weights, double footprint, const Corners& c,
+               const glm::dvec3& face, uint32_t surface, const shared::SurfaceMaterial& m,
+               const TextureReader& textures, Sample& s, glm::dvec3& n);
+
+/// Light from a triangle's pixel to the eye. `n`: towards the eye; `point`: camera space.
+glm::dvec3 shadeTriangle(const Sample& s, const glm::dvec3& n, const glm::dvec3& point, const render::DrawList& draws);
+
+}  // namespace stipple::reference
