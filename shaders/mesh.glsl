@@ -44,12 +44,12 @@ const uint kLargeCapacity = 65536u;
 
 vec4 decodeTexel(uint c, bool isColour) {
     vec4 v = vec4(float(c & 255u), float(c >> 8 & 255u), float(c >> 16 & 255u), float(c >> 24)) / 255.0;
-    if (isColour) v.xyz = vec3(linearFromSrgb(v.x), linearFromSrgb(v.y), linearFromSrgb(v.z));
+    if (isColour) v.xyz = vec3(linearFromByte(v.x), linearFromByte(v.y), linearFromByte(v.z));
     return v;
 }
 
 bool sampleLevel(TextureInfo info, uint firstTile, uint level, float u, float v, out vec4 result) {
-    const TextureTap tap = textureTap(info, level, u, v);
+    const TextureTap tap = textureTap(info, info.firstTile[level], level, u, v);
     const uvec2 address = tiles[firstTile + tap.tile];
     result = vec4(0.0);
     if (address == uvec2(0u)) return false;

@@ -44,8 +44,6 @@ Tables makeTables() {
     Tables t{};
     for (uint32_t i = 0; i < 256; ++i) {
         t.radiusFraction.at(i) = shared::radiusFraction(i);
-        t.unit.at(i) = static_cast<float>(i) / 255.0f;
-        t.linear.at(i) = shared::linearFromSrgb(static_cast<float>(i) / 255.0f);
         const float root = std::sqrt(shared::linearFromSrgb(static_cast<float>(i) / 255.0f));
         t.red.at(i) = static_cast<uint32_t>(root * 2047.0f + 0.5f);
         t.green.at(i) = t.red.at(i) << 11;
@@ -210,8 +208,8 @@ class CpuBackend final : public render::Backend {
                                      static_cast<std::vector<LargeTriangle>*>(to)->push_back(t);
                                  }};
             for (size_t b = begin; b < end; ++b)
-                k_.rasterCluster(frame_, tables_, draws_->materials.data(), meshBlocks_[b],
-                                 static_cast<uint32_t>(b * 256), sink, visibility_.data());
+                k_.rasterCluster(frame_, draws_->materials.data(), meshBlocks_[b], static_cast<uint32_t>(b * 256), sink,
+                                 visibility_.data());
             if (!mine.empty()) found_.push(std::move(mine));
         });
         for (const auto& some : found_.takeAll()) large_.insert(large_.end(), some.begin(), some.end());

@@ -83,8 +83,6 @@ struct Tables {
     std::array<float, 256> radiusFraction;
     std::array<uint32_t, 256> red, green, blue;  ///< sRGB byte -> its bits of the packed colour
     std::array<uint32_t, 2048> srgbByte;         ///< sqrt(linear) * 2047 -> sRGB byte
-    std::array<float, 256> linear;               ///< sRGB byte -> linear
-    std::array<float, 256> unit;                 ///< byte / 255
 };
 
 /// What the passes after coverage read of the frame beside records.
@@ -128,9 +126,8 @@ struct Kernels {
                      const SurfacePlanes& planes, const LightInput& light, uint32_t x0, uint32_t y, uint32_t n,
                      const ShadeOutput& out);
     /// Offers the triangles of one cluster (ids from firstId on) to the visibility buffer.
-    void (*rasterCluster)(const shared::FrameConstants& f, const Tables& tables,
-                          const shared::SurfaceMaterial* materials, const MeshBlock& block, uint32_t firstId,
-                          const LargeSink& large, uint64_t* visibility);
+    void (*rasterCluster)(const shared::FrameConstants& f, const shared::SurfaceMaterial* materials,
+                          const MeshBlock& block, uint32_t firstId, const LargeSink& large, uint64_t* visibility);
     /// Rows [firstRow, lastRow] of the triangles that were kept.
     void (*rasterLarge)(const shared::FrameConstants& f, const LargeTriangle* large, size_t count, uint32_t firstRow,
                         uint32_t lastRow, uint64_t* visibility);

@@ -148,7 +148,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) row.depth[kPad + i] = 0;
         if (triangles.count == 0) return false;
-        resolveTriangles(f, tables, in, triangles, x0, y, row, planes);
+        resolveTriangles(f, in, triangles, x0, y, row, planes);
         return true;
     }
     uint largest = 0;  // as bits: positive floats sort like integers
@@ -181,7 +181,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         largest = bits > largest ? bits : largest;
     }
     largestRadius = max(largestRadius, uintBitsToFloat(largest));
-    if (triangles.count > 0) resolveTriangles(f, tables, in, triangles, x0, y, row, planes);
+    if (triangles.count > 0) resolveTriangles(f, in, triangles, x0, y, row, planes);
     return true;
 }
 

@@ -62,7 +62,6 @@ template <typename Int, typename Keep>
 
 /// A triangle whose material has an alpha mask.
 struct MaskInput {
-    const Tables* tables;
     const TextureSet* textures;
     const SurfaceMaterial* material;
     const MeshVertex* vertices[3];
@@ -83,10 +82,10 @@ bool isKept(const FrameConstants& f, const MaskInput& m, int x, int y) {
         const float footprint = uvFootprint(ray, inverseFocal, a, vec3(b.x - a.x, b.y - a.y, b.z - a.z),
                                             vec3(c.x - a.x, c.y - a.y, c.z - a.z), vec2(vb.u - va.u, vb.v - va.v),
                                             vec2(vc.u - va.u, vc.v - va.v));
-        Sampled s{};
-        if (sampleTexture(*m.tables, *m.textures, m.material->baseTexture, wa * va.u + w.x * vb.u + w.y * vc.u,
-                          wa * va.v + w.x * vb.v + w.y * vc.v, footprint, s))
-            alpha *= s.a;
+        float texel = 1;
+        if (sampleAlpha(*m.textures, m.material->baseTexture, wa * va.u + w.x * vb.u + w.y * vc.u,
+                        wa * va.v + w.x * vb.v + w.y * vc.v, footprint, texel))
+            alpha *= texel;
     }
     return alpha >= m.material->alphaCutoff;
 }
@@ -211,7 +210,7 @@ void clipTriangle(const FrameConstants& f, const vec3* corner, const Candidate& 
     }
 }
 
-void rasterCluster(const FrameConstants& frame, const Tables& tables, const SurfaceMaterial* materials,
+void rasterCluster(const FrameConstants& frame, const SurfaceMaterial* materials,
                    const MeshBlock& block, uint32_t firstId, const LargeSink& large, uint64_t* visibility) {
     const MeshVertex* const vertices = block.vertices;
     const uint32_t* const triangles = block.triangles;
@@ -243,7 +242,7 @@ void rasterCluster(const FrameConstants& frame, const Tables& tables, const Surf
         MaskInput mask;
         Candidate of{kKindTriangle | (firstId + k), (surface & kSurfaceTwoSided) != 0, nullptr};
         if ((surface & kSurfaceMasked) != 0) {
-            mask = {&tables, block.textures, &materials[m.firstMaterial + (surface & kSurfaceMaterialMask)],
+            mask = {block.textures, &materials[m.firstMaterial + (surface & kSurfaceMaterialMask)],
                     {&vertices[a], &vertices[b], &vertices[c]},
                     {{x[a], y[a], z[a]}, {x[b], y[b], z[b]}, {x[c], y[c], z[c]}}};
             of.mask = &mask;

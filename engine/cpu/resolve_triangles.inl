@@ -1,4 +1,7 @@
 // The pixels of a tile's row that show triangles: corners, weights, normal and colour. Included by kernels.inl.
+//
+// Everything but following pointers is a loop over the row's pixels that becomes SIMD; materials and textures are looked
+// at once for every run of pixels that share them.
 
 struct TrianglePixels {
     uint32_t count;
@@ -10,14 +13,114 @@ struct TrianglePixels {
 struct Corners {
     alignas(64) float x[3][kTile], y[3][kTile], z[3][kTile];
     alignas(64) float u[3][kTile], v[3][kTile];
-    alignas(64) uint32_t normal[3][kTile];
+    alignas(64) uint32_t normal[3][kTile], colour[3][kTile];
 };
 
-void resolveTriangles(const FrameConstants& f, const Tables& tables, const ResolveInput& in, const TrianglePixels& p,
-                      uint32_t x0, uint32_t y, TexelRow& __restrict row, const SurfacePlanes& planes) {
+/// A material's properties at the pixels, and what the shading needs of the surface.
+struct SurfaceRow {
+    alignas(64) float nx[kTile], ny[kTile], nz[kTile], faceX[kTile], faceY[kTile], faceZ[kTile];
+    alignas(64) float red[kTile], green[kTile], blue[kTile];
+    alignas(64) float metallic[kTile], roughness[kTile], occlusion[kTile];
+    alignas(64) float shineR[kTile], shineG[kTile], shineB[kTile];
+    alignas(64) uint32_t flags[kTile];
+};
+
+/// Pixels [first, first + n) have one mesh, one material and these surface flags.
+struct MaterialRun {
+    const DrawMesh* mesh;
+    const SurfaceMaterial* material;
+    const TextureSet* textures;
+    uint32_t surface;
+    size_t first, n;
+};
+
+void applyMaterial(const MaterialRun& run, const Corners& c, const UvRow& uv, bool hasEmission,
+                   SurfaceRow& __restrict s) {
+    const DrawMesh m = *run.mesh;
+    const SurfaceMaterial& material = *run.material;
+    const size_t end = run.first + run.n;
+    const bool isFlat = (run.surface & kSurfaceFlat) != 0;
+    const vec3 base = material.baseColour, shine = material.emissive;
+    const float metallic = material.metallic, roughness = material.roughness;
+    const uint32_t flags = kPixelTriangle | ((run.surface & kSurfaceUnlit) != 0 ? kPixelUnlit : 0u);
+#pragma GCC ivdep
+    for (size_t i = run.first; i < end; ++i) {
+        const float x = s.nx[i], y = s.ny[i], z = s.nz[i];
+        const float wx = m.normalX.x * x + m.normalY.x * y + m.normalZ.x * z,
+                    wy = m.normalX.y * x + m.normalY.y * y + m.normalZ.y * z,
+                    wz = m.normalX.z * x + m.normalY.z * y + m.normalZ.z * z;
+        s.nx[i] = isFlat ? s.faceX[i] : wx;
+        s.ny[i] = isFlat ? s.faceY[i] : wy;
+        s.nz[i] = isFlat ? s.faceZ[i] : wz;
+        s.red[i] = base.x;
+        s.green[i] = base.y;
+        s.blue[i] = base.z;
+        s.metallic[i] = metallic;
+        s.roughness[i] = roughness;
+        s.occlusion[i] = 1.0f;
+        s.flags[i] = flags;
+    }
+    if (hasEmission)
+#pragma GCC ivdep
+        for (size_t i = run.first; i < end; ++i) {
+            s.shineR[i] = shine.x;
+            s.shineG[i] = shine.y;
+            s.shineB[i] = shine.z;
+        }
+    if ((run.surface & kSurfaceTextured) == 0) return;
+    SampledRow t;
+    const auto sample = [&](const TextureSlot& slot) {
+        if (slot.texture != 0) sampleRow(*run.textures, slot, uv, run.first, run.n, t);
+        return slot.texture != 0;
+    };
+    if (sample(material.baseTexture))
+#pragma GCC ivdep
+        for (size_t i = run.first; i < end; ++i) {
+            s.red[i] *= t.isThere[i] != 0 ? t.r[i] : 1.0f;
+            s.green[i] *= t.isThere[i] != 0 ? t.g[i] : 1.0f;
+            s.blue[i] *= t.isThere[i] != 0 ? t.b[i] : 1.0f;
+        }
+    if (sample(material.surfaceTexture))
+#pragma GCC ivdep
+        for (size_t i = run.first; i < end; ++i) {
+            s.roughness[i] *= t.isThere[i] != 0 ? t.g[i] : 1.0f;
+            s.metallic[i] *= t.isThere[i] != 0 ? t.b[i] : 1.0f;
+        }
+    const float strength = material.occlusionStrength;
+    if (sample(material.occlusionTexture))
+#pragma GCC ivdep
+        for (size_t i = run.first; i < end; ++i)
+            s.occlusion[i] = 1.0f + strength * ((t.isThere[i] != 0 ? t.r[i] : 1.0f) - 1.0f);
+    if (hasEmission && sample(material.emissiveTexture))
+#pragma GCC ivdep
+        for (size_t i = run.first; i < end; ++i) {
+            s.shineR[i] *= t.isThere[i] != 0 ? t.r[i] : 1.0f;
+            s.shineG[i] *= t.isThere[i] != 0 ? t.g[i] : 1.0f;
+            s.shineB[i] *= t.isThere[i] != 0 ? t.b[i] : 1.0f;
+        }
+    const float bend = material.normalScale;
+    if (sample(material.normalTexture))
+#pragma GCC ivdep
+        for (size_t i = run.first; i < end; ++i) {
+            const vec3 n = bumpedNormal(
+                vec3(s.nx[i], s.ny[i], s.nz[i]),
+                vec3(c.x[1][i] - c.x[0][i], c.y[1][i] - c.y[0][i], c.z[1][i] - c.z[0][i]),
+                vec3(c.x[2][i] - c.x[0][i], c.y[2][i] - c.y[0][i], c.z[2][i] - c.z[0][i]),
+                vec2(c.u[1][i] - c.u[0][i], c.v[1][i] - c.v[0][i]), vec2(c.u[2][i] - c.u[0][i], c.v[2][i] - c.v[0][i]),
+                vec3((2.0f * t.r[i] - 1.0f) * bend, (2.0f * t.g[i] - 1.0f) * bend, 2.0f * t.b[i] - 1.0f));
+            s.nx[i] = t.isThere[i] != 0 ? n.x : s.nx[i];
+            s.ny[i] = t.isThere[i] != 0 ? n.y : s.ny[i];
+            s.nz[i] = t.isThere[i] != 0 ? n.z : s.nz[i];
+        }
+}
+
+void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const TrianglePixels& p, uint32_t x0, uint32_t y,
+                      TexelRow& __restrict row, const SurfacePlanes& planes) {
     Corners c;
-    alignas(64) float nx[kTile], ny[kTile], nz[kTile], wb[kTile], wc[kTile];
-    alignas(64) float mixedU[kTile], mixedV[kTile], footprint[kTile];
+    SurfaceRow s;
+    UvRow uv;
+    alignas(64) float wb[kTile], wc[kTile];
+    alignas(64) uint32_t surface[kTile];
     uint32_t anyTextured = 0;
     const size_t n = p.count;
     for (size_t i = 0; i < n; ++i) {
@@ -31,27 +134,35 @@ void resolveTriangles(const FrameConstants& f, const Tables& tables, const Resol
             c.y[k][i] = at.y;
             c.z[k][i] = at.z;
             c.normal[k][i] = v.normal;
+            c.colour[k][i] = v.colour;
             c.u[k][i] = v.u;
             c.v[k][i] = v.v;
-            anyTextured |= v.surface & kSurfaceTextured;
         }
+        surface[i] = block.vertices[t & 255u].surface;
+        anyTextured |= surface[i] & kSurfaceTextured;
     }
     const float inverseFocal = 1.0f / f.focal;
     const float centreX = f.centre.x - float(int(x0)) - 0.5f, rayY = (float(int(y)) + 0.5f - f.centre.y) * inverseFocal;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const vec3 ray = vec3((float(int(p.pixel[i])) - centreX) * inverseFocal, rayY, 1.0f);
-        const vec2 w = triangleWeights(ray, vec3(c.x[0][i], c.y[0][i], c.z[0][i]),
-                                       vec3(c.x[1][i], c.y[1][i], c.z[1][i]), vec3(c.x[2][i], c.y[2][i], c.z[2][i]));
+        const vec3 a = vec3(c.x[0][i], c.y[0][i], c.z[0][i]);
+        const vec2 w = triangleWeights(ray, a, vec3(c.x[1][i], c.y[1][i], c.z[1][i]),
+                                       vec3(c.x[2][i], c.y[2][i], c.z[2][i]));
         const vec3 n0 = octDecode(c.normal[0][i]), n1 = octDecode(c.normal[1][i]), n2 = octDecode(c.normal[2][i]);
-        const float a = 1.0f - w.x - w.y;
+        const float first = 1.0f - w.x - w.y;
         wb[i] = w.x;
         wc[i] = w.y;
-        nx[i] = a * n0.x + w.x * n1.x + w.y * n2.x;
-        ny[i] = a * n0.y + w.x * n1.y + w.y * n2.y;
-        nz[i] = a * n0.z + w.x * n1.z + w.y * n2.z;
-        mixedU[i] = a * c.u[0][i] + w.x * c.u[1][i] + w.y * c.u[2][i];
-        mixedV[i] = a * c.v[0][i] + w.x * c.v[1][i] + w.y * c.v[2][i];
+        s.nx[i] = first * n0.x + w.x * n1.x + w.y * n2.x;
+        s.ny[i] = first * n0.y + w.x * n1.y + w.y * n2.y;
+        s.nz[i] = first * n0.z + w.x * n1.z + w.y * n2.z;
+        uv.u[i] = first * c.u[0][i] + w.x * c.u[1][i] + w.y * c.u[2][i];
+        uv.v[i] = first * c.v[0][i] + w.x * c.v[1][i] + w.y * c.v[2][i];
+        const vec3 e1 = vec3(c.x[1][i] - a.x, c.y[1][i] - a.y, c.z[1][i] - a.z);
+        const vec3 e2 = vec3(c.x[2][i] - a.x, c.y[2][i] - a.y, c.z[2][i] - a.z);
+        s.faceX[i] = e1.y * e2.z - e1.z * e2.y;
+        s.faceY[i] = e1.z * e2.x - e1.x * e2.z;
+        s.faceZ[i] = e1.x * e2.y - e1.y * e2.x;
     }
     if (anyTextured != 0) {
 #pragma GCC ivdep
@@ -60,76 +171,69 @@ void resolveTriangles(const FrameConstants& f, const Tables& tables, const Resol
             const vec3 corner = vec3(c.x[0][i], c.y[0][i], c.z[0][i]);
             const vec3 e1 = vec3(c.x[1][i] - corner.x, c.y[1][i] - corner.y, c.z[1][i] - corner.z);
             const vec3 e2 = vec3(c.x[2][i] - corner.x, c.y[2][i] - corner.y, c.z[2][i] - corner.z);
-            footprint[i] = uvFootprint(ray, inverseFocal, corner, e1, e2,
-                                       vec2(c.u[1][i] - c.u[0][i], c.v[1][i] - c.v[0][i]),
-                                       vec2(c.u[2][i] - c.u[0][i], c.v[2][i] - c.v[0][i]));
+            uv.footprint[i] = uvFootprint(ray, inverseFocal, corner, e1, e2,
+                                          vec2(c.u[1][i] - c.u[0][i], c.v[1][i] - c.v[0][i]),
+                                          vec2(c.u[2][i] - c.u[0][i], c.v[2][i] - c.v[0][i]));
         }
     }
+    for (size_t first = 0; first < n;) {
+        const MeshBlock& block = in.meshBlocks[p.id[first] / 256u];
+        size_t end = first + 1;
+        while (end < n && surface[end] == surface[first] && in.meshBlocks[p.id[end] / 256u].mesh == block.mesh) ++end;
+        applyMaterial({block.mesh, &in.materials[block.mesh->firstMaterial + (surface[first] & kSurfaceMaterialMask)],
+                       block.textures, surface[first], first, end - first},
+                      c, uv, planes.emissive != nullptr, s);
+        first = end;
+    }
+    alignas(64) float perpX[kTile], perpY[kTile];
+    alignas(64) uint32_t word[kTile], shine[kTile];
+#pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
-        const MeshBlock& block = in.meshBlocks[p.id[i] / 256u];
-        const uint32_t t = block.triangles[p.id[i] & 255u];
-        const DrawMesh& m = *block.mesh;
-        const MeshVertex &va = block.vertices[t & 255u], &vb = block.vertices[t >> 8 & 255u],
-                         &vc = block.vertices[t >> 16 & 255u];
-        const SurfaceMaterial& material = in.materials[m.firstMaterial + (va.surface & kSurfaceMaterialMask)];
         const vec3 ray = vec3((float(int(p.pixel[i])) - centreX) * inverseFocal, rayY, 1.0f);
-        vec3 normal = vec3(m.normalX.x * nx[i] + m.normalY.x * ny[i] + m.normalZ.x * nz[i],
-                           m.normalX.y * nx[i] + m.normalY.y * ny[i] + m.normalZ.y * nz[i],
-                           m.normalX.z * nx[i] + m.normalY.z * ny[i] + m.normalZ.z * nz[i]);
-        const vec3 e1 = vec3(c.x[1][i] - c.x[0][i], c.y[1][i] - c.y[0][i], c.z[1][i] - c.z[0][i]);
-        const vec3 e2 = vec3(c.x[2][i] - c.x[0][i], c.y[2][i] - c.y[0][i], c.z[2][i] - c.z[0][i]);
-        const vec3 face = vec3(e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x);
-        const float a = 1.0f - wb[i] - wc[i], b = wb[i], g = wc[i];
-        normal = (va.surface & kSurfaceFlat) != 0 ? face : normal;
-        vec3 colour = material.baseColour, emissive = material.emissive;
-        float metallic = material.metallic, roughness = material.roughness, occlusion = 1.0f;
-        if ((va.surface & kSurfaceTextured) != 0) {
-            const float u = mixedU[i], v = mixedV[i], texels = footprint[i];
-            const float u1 = vb.u - va.u, v1 = vb.v - va.v, u2 = vc.u - va.u, v2 = vc.v - va.v;
-            const TextureSet& set = *block.textures;
-            Sampled s{};
-            if (material.baseTexture.texture != 0 &&
-                sampleTexture(tables, set, material.baseTexture, u, v, texels, s))
-                colour = vec3(colour.x * s.r, colour.y * s.g, colour.z * s.b);
-            if (material.surfaceTexture.texture != 0 &&
-                sampleTexture(tables, set, material.surfaceTexture, u, v, texels, s)) {
-                roughness *= s.g;
-                metallic *= s.b;
-            }
-            if (material.occlusionTexture.texture != 0 &&
-                sampleTexture(tables, set, material.occlusionTexture, u, v, texels, s))
-                occlusion = 1.0f + material.occlusionStrength * (s.r - 1.0f);
-            if (material.emissiveTexture.texture != 0 &&
-                sampleTexture(tables, set, material.emissiveTexture, u, v, texels, s))
-                emissive = vec3(emissive.x * s.r, emissive.y * s.g, emissive.z * s.b);
-            if (material.normalTexture.texture != 0 &&
-                sampleTexture(tables, set, material.normalTexture, u, v, texels, s))
-                normal = bumpedNormal(normal, e1, e2, vec2(u1, v1), vec2(u2, v2),
-                                      vec3((2.0f * s.r - 1.0f) * material.normalScale,
-                                           (2.0f * s.g - 1.0f) * material.normalScale, 2.0f * s.b - 1.0f));
-        }
-        normal = surfaceNormal(normal, face, ray);
-        Texel texel;
-        texel.depth = p.depth[i];
-        texel.radius = kTriangleRadius;
-        texel.thickness = kTriangleRadius;
-        texel.offset = vec2(0.0f, 0.0f);
+        const vec3 normal = surfaceNormal(vec3(s.nx[i], s.ny[i], s.nz[i]), vec3(s.faceX[i], s.faceY[i], s.faceZ[i]), ray);
         const float inverseRay = 1.0f / std::sqrt(ray.x * ray.x + ray.y * ray.y + 1.0f);
-        texel.normalPerp = perpFromNormal(normal, vec3(ray.x * inverseRay, ray.y * inverseRay, inverseRay));
-        texel.colour = colour;
-        if ((va.colour & vb.colour & vc.colour & 0xffffffu) != 0xffffffu) {
-            const auto mix = [&](uint32_t shift) {
-                return a * tables.linear[va.colour >> shift & 255u] + b * tables.linear[vb.colour >> shift & 255u] +
-                       g * tables.linear[vc.colour >> shift & 255u];
-            };
-            texel.colour = vec3(texel.colour.x * mix(0), texel.colour.y * mix(8), texel.colour.z * mix(16));
-        }
-        if (f.debugView == kDebugLevel) texel.colour = debugLevelColour(block.level);
-        if (f.debugView == kDebugError) texel.colour = debugErrorColour(block.errorPixels);
-        setTexel(row, kPad + p.pixel[i], texel);
+        const vec2 perp = perpFromNormal(normal, vec3(ray.x * inverseRay, ray.y * inverseRay, inverseRay));
+        perpX[i] = perp.x;
+        perpY[i] = perp.y;
         const auto byte = [](float value) { return uint32_t(int(min(max(value, 0.0f), 1.0f) * 255.0f + 0.5f)); };
-        planes.surface[p.pixel[i]] = kPixelTriangle | ((va.surface & kSurfaceUnlit) != 0 ? kPixelUnlit : 0u) |
-                                     byte(metallic) | byte(roughness) << 8 | byte(occlusion) << 16;
-        if (planes.emissive != nullptr) planes.emissive[p.pixel[i]] = packColour(emissive.x, emissive.y, emissive.z);
+        word[i] = s.flags[i] | byte(s.metallic[i]) | byte(s.roughness[i]) << 8 | byte(s.occlusion[i]) << 16;
     }
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const auto mix = [&](uint32_t shift) {
+            const auto of = [&](size_t k) {
+                return linearFromByte(float(int(c.colour[k][i] >> shift & 255u)) * (1.0f / 255.0f));
+            };
+            return (1.0f - wb[i] - wc[i]) * of(0) + wb[i] * of(1) + wc[i] * of(2);
+        };
+        s.red[i] *= mix(0);
+        s.green[i] *= mix(8);
+        s.blue[i] *= mix(16);
+    }
+    if (f.debugView == kDebugLevel || f.debugView == kDebugError)
+        for (size_t i = 0; i < n; ++i) {
+            const MeshBlock& block = in.meshBlocks[p.id[i] / 256u];
+            const vec3 d = f.debugView == kDebugLevel ? debugLevelColour(block.level) : debugErrorColour(block.errorPixels);
+            s.red[i] = d.x;
+            s.green[i] = d.y;
+            s.blue[i] = d.z;
+        }
+    for (size_t i = 0; i < n; ++i) {
+        const size_t at = kPad + p.pixel[i];
+        row.depth[at] = p.depth[i];
+        row.radius[at] = kTriangleRadius;
+        row.thickness[at] = kTriangleRadius;
+        row.x[at] = 0;
+        row.y[at] = 0;
+        row.perpX[at] = perpX[i];
+        row.perpY[at] = perpY[i];
+        row.red[at] = s.red[i];
+        row.green[at] = s.green[i];
+        row.blue[at] = s.blue[i];
+        planes.surface[p.pixel[i]] = word[i];
+    }
+    if (planes.emissive == nullptr) return;
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) shine[i] = packColour(s.shineR[i], s.shineG[i], s.shineB[i]);
+    for (size_t i = 0; i < n; ++i) planes.emissive[p.pixel[i]] = shine[i];
 }

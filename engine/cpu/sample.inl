@@ -1,54 +1,159 @@
 // Texture sampling of the cpu backend: trilinear, from the finest tiles that are there. Included by kernels.inl.
 
-struct Sampled {
-    float r, g, b, a;
+/// Texture coordinates of a row's pixels, and how many of them a pixel covers.
+struct UvRow {
+    alignas(64) float u[kTile], v[kTile], footprint[kTile];
+};
+/// What a texture has there; only where isThere.
+struct SampledRow {
+    alignas(64) float r[kTile], g[kTile], b[kTile];
+    alignas(64) uint32_t isThere[kTile];
+};
+/// Bilinear taps of one level and their four texels.
+struct TapRow {
+    alignas(64) uint32_t tile[kTile], at[kTile];
+    alignas(64) float fx[kTile], fy[kTile];
+    alignas(64) uint32_t texel[4][kTile];
 };
 
-typedef float Four __attribute__((vector_size(16)));
-
-typedef uint8_t FourBytes __attribute__((vector_size(4)));
-
-/// Channels of a texel: colours through a table, numbers as bytes / 255.
-[[gnu::always_inline]] inline Four decodeColour(const Tables& tables, uint32_t c) {
-    const float *const linear = tables.linear.data(), *const unit = tables.unit.data();
-    return Four{linear[c & 255u], linear[c >> 8 & 255u], linear[c >> 16 & 255u], unit[c >> 24]};
+[[gnu::always_inline]] inline void findTaps(const TextureInfo& info, const uint32_t* __restrict level,
+                                            const float* __restrict u, const float* __restrict v, size_t n,
+                                            TapRow& __restrict taps) {
+    uint32_t firstTile[kTextureLevels];
+    for (size_t l = 0; l < kTextureLevels; ++l) firstTile[l] = info.firstTile[l];
+    TextureInfo t{};
+    t.width = info.width;
+    t.height = info.height;
+    t.wrapU = info.wrapU;
+    t.wrapV = info.wrapV;
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const TextureTap tap = textureTap(t, firstTile[level[i]], level[i], u[i], v[i]);
+        taps.tile[i] = tap.tile;
+        taps.at[i] = tap.y * kTileEdge + tap.x;
+        taps.fx[i] = tap.fx;
+        taps.fy[i] = tap.fy;
+    }
 }
-[[gnu::always_inline]] inline Four decodeNumbers(uint32_t c) {
-    return __builtin_convertvector(__builtin_bit_cast(FourBytes, c), Four) * (1.0f / 255.0f);
+[[gnu::always_inline]] inline void fetch(const uint32_t* tile, size_t i, TapRow& taps) {
+    const uint32_t* at = tile + taps.at[i];
+    taps.texel[0][i] = at[0];
+    taps.texel[1][i] = at[1];
+    taps.texel[2][i] = at[kTileEdge];
+    taps.texel[3][i] = at[kTileEdge + 1];
 }
-template <typename Decode>
-[[gnu::always_inline]] inline Four bilinear(const uint32_t* at, const TextureTap& tap, const Decode& decode) {
-    const Four a = decode(at[0]), b = decode(at[1]), c = decode(at[kTileEdge]), d = decode(at[kTileEdge + 1]);
-    const Four upper = a + (b - a) * tap.fx, lower = c + (d - c) * tap.fx;
-    return upper + (lower - upper) * tap.fy;
+/// One channel, `shift` bits up, between the four texels.
+template <bool isColour>
+[[gnu::always_inline]] inline float bilinear(const TapRow& taps, size_t i, uint32_t shift) {
+    const auto value = [&](size_t k) {
+        const float s = float(int(taps.texel[k][i] >> shift & 255u)) * (1.0f / 255.0f);
+        return isColour ? linearFromByte(s) : s;
+    };
+    const float a = value(0), b = value(1), c = value(2), d = value(3);
+    const float upper = a + (b - a) * taps.fx[i], lower = c + (d - c) * taps.fx[i];
+    return upper + (lower - upper) * taps.fy[i];
+}
+template <bool isColour>
+void mixLevels(const TapRow& __restrict fine, const TapRow& __restrict coarse, const float* __restrict between,
+               size_t n, SampledRow& __restrict out) {
+    for (uint32_t k = 0; k < 3; ++k) {
+        float* __restrict const to = k == 0 ? out.r : k == 1 ? out.g : out.b;
+        const uint32_t shift = 8 * k;
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            const float near = bilinear<isColour>(fine, i, shift), far = bilinear<isColour>(coarse, i, shift);
+            to[i] = near + (far - near) * between[i];
+        }
+    }
 }
 
-[[gnu::always_inline]] inline bool sampleLevel(const Tables& tables, const TextureSet& set, const TextureInfo& info,
-                                               uint32_t level, float u, float v, Four& out) {
-    const TextureTap tap = textureTap(info, level, u, v);
-    const uint32_t* texels = set.tiles[tap.tile];
-    if (texels == nullptr) return false;
-    const uint32_t* at = texels + tap.y * kTileEdge + tap.x;
-    out = info.isColour != 0 ? bilinear(at, tap, [&](uint32_t c) { return decodeColour(tables, c); })
-                             : bilinear(at, tap, [](uint32_t c) { return decodeNumbers(c); });
-    return true;
+/// `slot` names a texture; n coordinates from `first` on, results from there on as well.
+void sampleRow(const TextureSet& set, const TextureSlot& slot, const UvRow& uv, size_t first, size_t n,
+               SampledRow& out) {
+    const TextureInfo& info = set.infos[slot.texture - 1];
+    alignas(64) float u[kTile], v[kTile], between[kTile];
+    alignas(64) uint32_t level[kTile], coarser[kTile];
+    const uint32_t last = info.levels - 1;
+    const float size = float(int(info.width > info.height ? info.width : info.height)), highest = float(int(last));
+    const vec3 rowU = slot.rowU, rowV = slot.rowV;
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        u[i] = rowU.x * uv.u[first + i] + rowU.y * uv.v[first + i] + rowU.z;
+        v[i] = rowV.x * uv.u[first + i] + rowV.y * uv.v[first + i] + rowV.z;
+        const float lod = min(textureLod(uv.footprint[first + i] * size), highest);
+        level[i] = uint32_t(int(lod));
+        between[i] = lod - float(int(level[i]));
+        coarser[i] = level[i] < last ? level[i] + 1 : last;
+    }
+    TapRow fine, coarse;
+    findTaps(info, level, u, v, n, fine);
+    findTaps(info, coarser, u, v, n, coarse);
+    alignas(64) uint32_t isThere[kTile];
+    for (size_t i = 0; i < n; ++i) {
+        const uint32_t* tile = set.tiles[fine.tile[i]];
+        isThere[i] = 1;
+        if (tile == nullptr) {  // the finest level that is there
+            between[i] = 0;
+            for (uint32_t l = level[i] + 1; tile == nullptr && l <= last; ++l) {
+                const TextureTap tap = textureTap(info, info.firstTile[l], l, u[i], v[i]);
+                tile = set.tiles[tap.tile];
+                fine.at[i] = tap.y * kTileEdge + tap.x;
+                fine.fx[i] = tap.fx;
+                fine.fy[i] = tap.fy;
+            }
+        }
+        if (tile == nullptr) {
+            isThere[i] = 0;
+            for (size_t k = 0; k < 4; ++k) fine.texel[k][i] = coarse.texel[k][i] = 0;
+            continue;
+        }
+        fetch(tile, i, fine);
+        const uint32_t* next = between[i] > 0 ? set.tiles[coarse.tile[i]] : nullptr;
+        if (next == nullptr) {
+            between[i] = 0;
+            for (size_t k = 0; k < 4; ++k) coarse.texel[k][i] = 0;
+        } else {
+            fetch(next, i, coarse);
+        }
+    }
+    SampledRow compact;
+    if (info.isColour != 0)
+        mixLevels<true>(fine, coarse, between, n, compact);
+    else
+        mixLevels<false>(fine, coarse, between, n, compact);
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        out.r[first + i] = compact.r[i];
+        out.g[first + i] = compact.g[i];
+        out.b[first + i] = compact.b[i];
+        out.isThere[first + i] = isThere[i];
+    }
 }
 
-/// `slot` names a texture; `footprint`: texture coordinates per pixel (the longer edge). False if nothing is there yet.
-inline bool sampleTexture(const Tables& tables, const TextureSet& set, const TextureSlot& slot, float u, float v,
-                          float footprint, Sampled& out) {
+/// Alpha alone, of one place; false if nothing is there yet.
+inline bool sampleAlpha(const TextureSet& set, const TextureSlot& slot, float u, float v, float footprint,
+                        float& alpha) {
     const TextureInfo& info = set.infos[slot.texture - 1];
     const float su = slot.rowU.x * u + slot.rowU.y * v + slot.rowU.z, sv = slot.rowV.x * u + slot.rowV.y * v + slot.rowV.z;
     const uint32_t size = info.width > info.height ? info.width : info.height;
     const float lod = min(textureLod(footprint * static_cast<float>(size)), static_cast<float>(info.levels - 1));
+    const auto at = [&](uint32_t level, float& value) {
+        const TextureTap tap = textureTap(info, info.firstTile[level], level, su, sv);
+        const uint32_t* texel = set.tiles[tap.tile];
+        if (texel == nullptr) return false;
+        texel += tap.y * kTileEdge + tap.x;
+        const auto of = [&](size_t k) { return float(int(texel[k] >> 24)) * (1.0f / 255.0f); };
+        const float upper = of(0) + (of(1) - of(0)) * tap.fx,
+                    lower = of(kTileEdge) + (of(kTileEdge + 1) - of(kTileEdge)) * tap.fx;
+        value = upper + (lower - upper) * tap.fy;
+        return true;
+    };
     uint32_t level = static_cast<uint32_t>(lod);
     const float between = lod - static_cast<float>(level);
-    Four fine{}, coarse{};
-    const bool isExact = sampleLevel(tables, set, info, level, su, sv, fine);
+    const bool isExact = at(level, alpha);
     bool isThere = isExact;
-    while (!isThere && level + 1 < info.levels) isThere = sampleLevel(tables, set, info, ++level, su, sv, fine);
-    if (isExact && between > 0 && level + 1 < info.levels && sampleLevel(tables, set, info, level + 1, su, sv, coarse))
-        fine += (coarse - fine) * between;
-    out = {fine[0], fine[1], fine[2], fine[3]};
+    while (!isThere && level + 1 < info.levels) isThere = at(++level, alpha);
+    float coarse = 0;
+    if (isExact && between > 0 && level + 1 < info.levels && at(level + 1, coarse)) alpha += (coarse - alpha) * between;
     return isThere;
 }

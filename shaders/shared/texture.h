@@ -41,7 +41,8 @@ SHARED_FN float wrapCoordinate(float u, uint wrap) {
     return min(f, 0.99999994f);
 }
 
-// Where a bilinear sample lies: tile, the texel (x, y) of the upper left of its four (border included), and fractions.
+// Where a bilinear sample lies (`firstTile`: of the level): tile, the texel (x, y) of the upper left of its four
+// (border included), and fractions.
 struct TextureTap {
     uint tile;
     uint x;
@@ -49,11 +50,11 @@ struct TextureTap {
     float fx;
     float fy;
 };
-SHARED_FN TextureTap textureTap(TextureInfo t, uint level, float u, float v) {
+SHARED_FN TextureTap textureTap(TextureInfo t, uint firstTile, uint level, float u, float v) {
     const uint w = levelSize(t.width, level);
     const uint h = levelSize(t.height, level);
-    const float x = wrapCoordinate(u, t.wrapU) * float(w) - 0.5f;
-    const float y = wrapCoordinate(v, t.wrapV) * float(h) - 0.5f;
+    const float x = wrapCoordinate(u, t.wrapU) * float(int(w)) - 0.5f;
+    const float y = wrapCoordinate(v, t.wrapV) * float(int(h)) - 0.5f;
     const float x0 = floor(x);
     const float y0 = floor(y);
     const uint px = uint(int(max(x0, 0.0f)));
@@ -61,7 +62,7 @@ SHARED_FN TextureTap textureTap(TextureInfo t, uint level, float u, float v) {
     const uint tx = px / kTileTexels;
     const uint ty = py / kTileTexels;
     TextureTap tap;
-    tap.tile = t.firstTile[level] + ty * tilesAcross(t.width, level) + tx;
+    tap.tile = firstTile + ty * tilesAcross(t.width, level) + tx;
     tap.x = uint(int(x0) + 1 - int(tx * kTileTexels));
     tap.y = uint(int(y0) + 1 - int(ty * kTileTexels));
     tap.fx = x - x0;
@@ -69,8 +70,25 @@ SHARED_FN TextureTap textureTap(TextureInfo t, uint level, float u, float v) {
     return tap;
 }
 
+// log2 of v >= 1, within 8e-6: exact at powers of two, a polynomial between them.
+SHARED_FN float log2Above1(float v) {
+    const uint bits = floatBitsToUint(v);
+    const float m = uintBitsToFloat((bits & 0x7fffffu) | 0x3f800000u);
+    const float p = -1.03158278f + m * (1.05426976f + m * (-0.64552583f + m * (0.20704189f + m * -0.026867003f)));
+    return float(int(bits >> 23) - 127) + (m - 1.0f) * (1.0f + (m - 2.0f) * p);
+}
+
 // Level of detail of a footprint of `area` texels across (the longer of its two edges), finest level 0.
-SHARED_FN float textureLod(float texels) { return log2(max(texels, 1.0f)); }
+SHARED_FN float textureLod(float texels) { return log2Above1(min(max(texels, 1.0f), 1.0e9f)); }
+
+// Linear value of an sRGB byte s / 255, within 6e-6 (the formula itself needs a power for each channel of each texel).
+SHARED_FN float linearFromByte(float s) {
+    const float high =
+        0.000909604631f +
+        s * (0.033245567f +
+             s * (0.510684951f + s * (0.719497524f + s * (-0.438605326f + s * (0.229881938f + s * -0.055619892f)))));
+    return s <= 0.04045f ? s * (1.0f / 12.92f) : high;
+}
 
 SHARED_END
 #endif

@@ -8,6 +8,7 @@
 #include "shaders/shared/pack.h"
 #include "shaders/shared/pyramid.h"
 #include "shaders/shared/shade.h"
+#include "shaders/shared/texture.h"
 #include "tests/support/support.h"
 
 namespace stipple {
@@ -165,6 +166,19 @@ TEST(Reference, DecodesRecordsAsTheBackendsDo) {
                     d.radius * 1e-6);
         ASSERT_LE(glm::length(d.normal - glm::dvec3(shared::octDecode(r.normal))), 1e-6);
     }
+}
+
+TEST(Shared, PolynomialsOfTexturesKeepTheirBounds) {
+    for (int byte = 0; byte < 256; ++byte) {
+        const float s = static_cast<float>(byte) / 255.0f;
+        EXPECT_NEAR(shared::linearFromByte(s), shared::linearFromSrgb(s), 6e-6) << byte;
+    }
+    Rng rng(8);
+    for (int i = 0; i < 100'000; ++i) {
+        const auto v = static_cast<float>(std::exp2(rng.uniform(0, 29)));
+        ASSERT_NEAR(shared::log2Above1(v), std::log2(static_cast<double>(v)), 1e-5) << v;
+    }
+    for (int e = 0; e < 30; ++e) EXPECT_EQ(shared::log2Above1(std::ldexp(1.0f, e)), static_cast<float>(e));
 }
 
 }  // namespace
