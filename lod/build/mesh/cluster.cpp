@@ -41,16 +41,20 @@ LocalMesh makeLocal(const WeldedMesh& mesh, const std::vector<const Cluster*>& c
     return out;
 }
 
-void appendClusters(const LocalMesh& local, const std::vector<uint32_t>& indices, uint32_t producer,
+void appendClusters(const LocalMesh& local, const std::vector<uint32_t>& indices, uint32_t producer, bool isAlongCurve,
                     std::vector<Cluster>& out) {
     constexpr size_t kVertices = shared::kClusterVertices, kTriangles = shared::kClusterTriangles;
     const size_t bound = meshopt_buildMeshletsBound(indices.size(), kVertices, kTriangles);
     std::vector<meshopt_Meshlet> meshlets(bound);
     std::vector<uint32_t> vertices(bound * kVertices);
     std::vector<uint8_t> corners(bound * kTriangles * 3);
-    meshlets.resize(meshopt_buildMeshlets(meshlets.data(), vertices.data(), corners.data(), indices.data(),
-                                          indices.size(), &local.position[0].x, local.position.size(),
-                                          sizeof(glm::vec3), kVertices, kTriangles, 0.0f));
+    const size_t count =
+        isAlongCurve ? meshopt_buildMeshletsScan(meshlets.data(), vertices.data(), corners.data(), indices.data(),
+                                                 indices.size(), local.position.size(), kVertices, kTriangles)
+                     : meshopt_buildMeshlets(meshlets.data(), vertices.data(), corners.data(), indices.data(),
+                                             indices.size(), &local.position[0].x, local.position.size(),
+                                             sizeof(glm::vec3), kVertices, kTriangles, 0.0f);
+    meshlets.resize(count);
     for (const meshopt_Meshlet& m : meshlets) {
         Cluster c;
         c.producer = producer;
@@ -71,7 +75,7 @@ std::vector<Cluster> makeClusters(const WeldedMesh& mesh, Executor& executor) {
                        last = static_cast<ptrdiff_t>(3 * std::min(triangles, (b + 1) * kBlockTriangles));
             block.indices.assign(mesh.indices.begin() + first, mesh.indices.begin() + last);
             const LocalMesh local = makeLocal(mesh, {&block});
-            appendClusters(local, local.indices, kNoProducer, parts[b]);
+            appendClusters(local, local.indices, kNoProducer, true, parts[b]);
         }
     });
     std::vector<Cluster> all;
@@ -95,22 +99,28 @@ std::vector<std::vector<uint32_t>> groupClusters(const WeldedMesh& mesh, const s
     };
     std::vector<std::vector<BorderEdge>> borders(count);
     executor.parallelFor(count, 64, [&](size_t begin, size_t end) {
-        std::vector<uint64_t> edges;
+        // How often the cluster has each edge: open addressing, at least two places for each there can be.
+        constexpr uint32_t kSlots = 2048;
+        static_assert(kSlots >= 2 * 3 * shared::kClusterTriangles);
+        struct Slot {
+            uint64_t key = ~uint64_t{0};
+            uint32_t uses = 0;
+        };
+        std::vector<Slot> slots(kSlots);
         for (size_t c = begin; c < end; ++c) {
-            edges.clear();
+            std::fill(slots.begin(), slots.end(), Slot{});
             const auto& t = clusters[c].indices;
             for (size_t i = 0; i < t.size(); i += 3)
                 for (size_t k = 0; k < 3; ++k) {
                     const uint64_t a = mesh.position[t[i + k]], b = mesh.position[t[i + (k + 1) % 3]];
-                    edges.push_back(std::min(a, b) << 32 | std::max(a, b));
+                    const uint64_t key = std::min(a, b) << 32 | std::max(a, b);
+                    uint64_t at = (key ^ key >> 32) * 0x9e3779b97f4a7c15ull >> 53;
+                    while (slots[at].uses > 0 && slots[at].key != key) at = (at + 1) % kSlots;
+                    slots[at].key = key;
+                    ++slots[at].uses;
                 }
-            std::sort(edges.begin(), edges.end());
-            for (size_t i = 0; i < edges.size();) {
-                size_t j = i + 1;
-                while (j < edges.size() && edges[j] == edges[i]) ++j;
-                if (j == i + 1) borders[c].push_back({edges[i], static_cast<uint32_t>(c)});
-                i = j;
-            }
+            for (const Slot& s : slots)
+                if (s.uses == 1) borders[c].push_back({s.key, static_cast<uint32_t>(c)});
         }
     });
     std::vector<BorderEdge> edges;

@@ -107,28 +107,32 @@ class Target {
         return glm::length(p - (a + w.x * (b - a) + w.y * (c - a)));
     }
 
-    /// Calls visit(triangle) for all that may be nearer to p than `limit`, which visit lowers; some are visited twice.
+    /// Calls visit(triangle) for all that may be nearer to p than `limit`, which visit lowers, until it says that it
+    /// has seen enough; some are visited twice.
     template <typename Visit>
-    void inBall(const glm::vec3& p, const float& limit, const Visit& visit) const {
+    void inBall(const glm::vec3& p, const float& limit, const Visit& isEnough) const {
         const auto row = [&](int x0, int x1, int y, int z) {
             const uint32_t last = start_[number(x1, y, z) + 1];
             for (uint32_t i = start_[number(x0, y, z)]; i < last; ++i)
-                if (isNear(p, items_[i], limit)) visit(items_[i]);
+                if (isNear(p, items_[i], limit) && isEnough(items_[i])) return true;
+            return false;
         };
         // What lies in the same cell first: the ball is much smaller afterwards.
         const glm::ivec3 own = cellOf(p);
-        row(own.x, own.x, own.y, own.z);
+        if (row(own.x, own.x, own.y, own.z)) return;
         const glm::ivec3 from = cellOf(p - limit), to = cellOf(p + limit);
         if (from == to) return;
         for (int z = from.z; z <= to.z; ++z)
-            for (int y = from.y; y <= to.y; ++y) row(from.x, to.x, y, z);
+            for (int y = from.y; y <= to.y; ++y)
+                if (row(from.x, to.x, y, z)) return;
     }
 
-    /// The nearest triangle; `best`: one that is known to be near.
-    Nearest nearest(const glm::vec3& p, Nearest best) const {
+    /// The nearest triangle, or one not farther than `enough`; `best`: one that is known to be near.
+    Nearest nearest(const glm::vec3& p, Nearest best, float enough) const {
         inBall(p, best.distance, [&](uint32_t t) {
             const float d = distance(p, t);
             if (d < best.distance) best = {d, t};
+            return best.distance <= enough;
         });
         return best;
     }
@@ -160,37 +164,72 @@ class Target {
 
 using Triple = std::array<uint32_t, 3>;
 
-/// Triangles in an order and form that lets equal ones be found.
+/// Triangles in an order and form that lets equal ones be found: the smallest corner first, turned as before.
 std::vector<Triple> sorted(const std::vector<uint32_t>& indices) {
     std::vector<Triple> out(indices.size() / 3);
     for (size_t i = 0; i < out.size(); ++i) {
         out[i] = {indices[3 * i], indices[3 * i + 1], indices[3 * i + 2]};
-        std::sort(out[i].begin(), out[i].end());
+        std::rotate(out[i].begin(), std::min_element(out[i].begin(), out[i].end()), out[i].end());
     }
     std::sort(out.begin(), out.end());
     return out;
+}
+
+/// A place whose distance is wanted: `most` is what the result would be if the nearest triangle were no nearer than the
+/// hint.
+struct Probe {
+    glm::vec3 p;
+    uint32_t hint;
+    float above, corners, most;
+};
+
+/// Of the two triangles at an edge, which turn round it in opposite directions, one measures its middle. By position:
+/// at a seam they have vertices of their own. An edge with one triangle is a border, which simplification keeps.
+bool isMeasuredHere(const glm::vec3& a, const glm::vec3& b) {
+    return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
 }
 
 /// Largest distance of `triangles` from the target, whose own are `others`; what stands in both needs no look.
 /// `nearest`: of the vertices. Not below `worst`.
 float measureSurface(const Target& target, const std::vector<glm::vec3>& position, const std::vector<Triple>& triangles,
                      const std::vector<Triple>& others, const std::vector<Nearest>& nearest, float worst) {
+    // First only what the corners' nearest triangles say; then the worst are looked at closely, and what cannot exceed
+    // them needs no search.
+    std::vector<Probe> probes;
+    const auto resultOf = [](float corners, float distance) {
+        return corners + 2 * std::max(0.0f, distance - corners);
+    };
+    auto other = others.begin();
     for (const Triple& t : triangles) {
-        if (std::binary_search(others.begin(), others.end(), t)) continue;
-        const float corners = std::max({nearest[t[0]].distance, nearest[t[1]].distance, nearest[t[2]].distance});
-        const auto take = [&](const glm::vec3& p, uint32_t hint) {
-            // What cannot exceed the worst so far needs no search.
-            const float most = corners + 0.5f * std::max(0.0f, worst - corners);
-            const float above = target.distance(p, hint);
-            if (above <= most) return;
-            const float inside = target.nearest(p, {above, hint}).distance;
-            worst = std::max(worst, corners + 2 * std::max(0.0f, inside - corners));
+        while (other != others.end() && *other < t) ++other;
+        if (other != others.end() && *other == t) continue;
+        const auto take = [&](const glm::vec3& p, float corners) {
+            Probe probe{p, 0, 3e38f, corners, 0};
+            for (const uint32_t v : t) {
+                const float d = target.distance(p, nearest[v].triangle);
+                if (d < probe.above) probe = {p, nearest[v].triangle, d, corners, 0};
+                probe.most = resultOf(corners, probe.above);
+                if (probe.most <= worst) return;
+            }
+            probes.push_back(probe);
         };
+        float all = 0;
         for (size_t k = 0; k < 3; ++k) {
             const uint32_t v = t.at(k), w = t.at((k + 1) % 3);
-            take(0.5f * (position[v] + position[w]), nearest[v].triangle);
+            all = std::max(all, nearest[v].distance);
+            if (isMeasuredHere(position[v], position[w]))
+                take(0.5f * (position[v] + position[w]), std::max(nearest[v].distance, nearest[w].distance));
         }
-        take((position[t[0]] + position[t[1]] + position[t[2]]) * (1.0f / 3), nearest[t[0]].triangle);
+        take((position[t[0]] + position[t[1]] + position[t[2]]) * (1.0f / 3), all);
+    }
+    const auto byMost = [](const Probe& a, const Probe& b) { return a.most > b.most; };
+    const size_t first = std::min<size_t>(probes.size(), 64);
+    std::partial_sort(probes.begin(), probes.begin() + static_cast<ptrdiff_t>(first), probes.end(), byMost);
+    for (const Probe& probe : probes) {
+        if (probe.most <= worst) continue;
+        const float harmless = 0.5f * (worst + probe.corners);
+        worst = std::max(
+            worst, resultOf(probe.corners, target.nearest(probe.p, {probe.above, probe.hint}, harmless).distance));
     }
     return worst;
 }
@@ -261,6 +300,7 @@ double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const st
             const float moved = shiftOf(mesh, near, coarse, v, toCoarse, t, d);
             if (d < best.distance) best = {d, t};
             look = std::min(look, d + moved);
+            return false;
         };
         visit(hint);
         toCoarse.inBall(position[v], look, visit);

@@ -201,7 +201,7 @@ class MeshBuilder {
                 return made;
             made.group.error = measureDeviation(mesh_, local, coarse, kUnimportant * below);
             STIPPLE_CHECK(made.group.error >= 0 && made.group.error < kRootError, "deviation of a group");
-            appendClusters(local, coarse, kNoProducer, made.products);
+            appendClusters(local, coarse, kNoProducer, false, made.products);
         }
         made.isSimplified = true;
         made.group.error = isRoot ? kRootError : made.group.error + below;
@@ -262,24 +262,32 @@ class MeshBuilder {
     std::vector<uint8_t> encode(const std::vector<const Cluster*>& members, Group& group) const {
         Chunk chunk;
         std::vector<uint32_t> order;  // vertices of one cluster, by first use
+        // Vertex -> its number in the cluster: open addressing, four places for each vertex that there can be.
+        struct Slot {
+            uint32_t vertex = ~0u, number = 0;
+        };
+        constexpr uint32_t kSlots = 1024;
+        std::vector<Slot> slots(kSlots);
+        const auto numberOf = [&](uint32_t v) {
+            uint32_t at = v * 0x9e3779b1u >> 22;
+            while (slots[at].vertex != v) {
+                if (slots[at].vertex == ~0u) {
+                    slots[at] = {v, static_cast<uint32_t>(order.size())};
+                    order.push_back(v);
+                    break;
+                }
+                at = (at + 1) % kSlots;
+            }
+            return slots[at].number;
+        };
         for (const Cluster* c : members) {
             order.clear();
+            std::fill(slots.begin(), slots.end(), Slot{});
             shared::MeshCluster cluster{static_cast<uint32_t>(chunk.vertices.size()),
                                         static_cast<uint32_t>(chunk.triangles.size()), 0};
-            std::vector<std::pair<uint32_t, uint32_t>> place;  // vertex -> its number, sorted
-            for (const uint32_t v : c->indices) place.emplace_back(v, 0);
-            std::sort(place.begin(), place.end());
-            place.erase(std::unique(place.begin(), place.end()), place.end());
-            for (auto& p : place) p.second = ~0u;
-            std::array<uint32_t, 3> corner{};
-            for (size_t i = 0; i < c->indices.size(); ++i) {
-                const auto at = std::lower_bound(place.begin(), place.end(), std::pair{c->indices[i], 0u});
-                if (at->second == ~0u) {
-                    at->second = static_cast<uint32_t>(order.size());
-                    order.push_back(c->indices[i]);
-                }
-                corner.at(i % 3) = at->second;
-                if (i % 3 == 2) chunk.triangles.push_back(corner[0] | corner[1] << 8 | corner[2] << 16);
+            for (size_t i = 0; i < c->indices.size(); i += 3) {
+                const uint32_t a = numberOf(c->indices[i]), b = numberOf(c->indices[i + 1]);
+                chunk.triangles.push_back(a | b << 8 | numberOf(c->indices[i + 2]) << 16);
             }
             const auto triangles = static_cast<uint32_t>(c->indices.size() / 3);
             cluster.counts = static_cast<uint32_t>(order.size()) | triangles << 16;

@@ -44,8 +44,9 @@ struct LocalMesh {
 };
 LocalMesh makeLocal(const WeldedMesh& mesh, const std::vector<const Cluster*>& clusters);
 
-/// Cuts triangles into clusters of at most kClusterTriangles and kClusterVertices.
-void appendClusters(const LocalMesh& local, const std::vector<uint32_t>& indices, uint32_t producer,
+/// Cuts triangles into clusters of at most kClusterTriangles and kClusterVertices. Where they stand along a curve that
+/// fills space, runs of them are compact as they are, at a fraction of the time.
+void appendClusters(const LocalMesh& local, const std::vector<uint32_t>& indices, uint32_t producer, bool isAlongCurve,
                     std::vector<Cluster>& out);
 std::vector<Cluster> makeClusters(const WeldedMesh& mesh, Executor& executor);
 

@@ -16,28 +16,53 @@ constexpr int kLatticeBits = 24;
 
 bool isFinite(const glm::dvec3& p) { return std::isfinite(p.x + p.y + p.z); }
 
-/// The first of equal items stands for all; `hashOf` and `equal` take indices.
+/// The first of equal items stands for all; `hashOf` and `equal` take indices. Each part of the hashes has a table of
+/// its own.
 template <typename Hash, typename Equal>
-std::vector<uint32_t> firstOfEqual(size_t count, const Hash& hashOf, const Equal& equal) {
+std::vector<uint32_t> firstOfEqual(size_t count, const Hash& hashOf, const Equal& equal, Executor& executor) {
+    constexpr size_t kParts = 4;
     size_t slots = 16;
-    while (slots < 2 * count) slots *= 2;
-    std::vector<uint32_t> table(slots, ~0u), first(count);
-    for (uint32_t i = 0; i < count; ++i) {
-        size_t slot = hashOf(i) & (slots - 1);
-        while (table[slot] != ~0u && !equal(table[slot], i)) slot = (slot + 1) & (slots - 1);
-        if (table[slot] == ~0u) table[slot] = i;
-        first[i] = table[slot];
-    }
+    while (slots < 2 * count / kParts) slots *= 2;
+    std::vector<uint32_t> first(count);
+    executor.parallelFor(kParts, 1, [&](size_t begin, size_t end) {
+        for (size_t part = begin; part < end; ++part) {
+            std::vector<uint32_t> table(slots, ~0u);
+            size_t mask = slots - 1, used = 0;
+            const auto find = [&](uint64_t hash, uint32_t i) -> uint32_t& {
+                size_t slot = hash & mask;
+                while (table[slot] != ~0u && !equal(table[slot], i)) slot = (slot + 1) & mask;
+                return table[slot];
+            };
+            for (uint32_t i = 0; i < count; ++i) {
+                const uint64_t hash = hashOf(i);
+                if (hash >> 62 != part) continue;
+                uint32_t& entry = find(hash, i);
+                if (entry == ~0u) {
+                    entry = i;
+                    ++used;
+                }
+                first[i] = entry;
+                if (2 * used <= mask) continue;
+                const std::vector<uint32_t> old = std::move(table);  // more than its share: twice the room
+                table.assign(2 * old.size(), ~0u);
+                mask = table.size() - 1;
+                for (const uint32_t k : old)
+                    if (k != ~0u) find(hashOf(k), k) = k;
+            }
+        }
+    });
     return first;
 }
 
 uint64_t mix(uint64_t h) {
     h ^= h >> 33;
     h *= 0xff51afd7ed558ccdull;
-    return h ^ h >> 29;
+    h ^= h >> 29;
+    h *= 0x9e3779b97f4a7c15ull;
+    return h ^ h >> 32;
 }
 
-void placeOnLattice(const TriangleMesh& in, WeldedMesh& out) {
+void placeOnLattice(const TriangleMesh& in, WeldedMesh& out, Executor& executor) {
     glm::dvec3 lo(1e300), hi(-1e300);
     for (const glm::dvec3& p : in.position) {
         if (!isFinite(p)) continue;
@@ -50,7 +75,7 @@ void placeOnLattice(const TriangleMesh& in, WeldedMesh& out) {
     // Whole steps from zero, so that coordinates that lie on the lattice stay exact.
     out.origin = glm::floor(lo / out.unit) * out.unit;
     out.vertices.resize(in.position.size());
-    for (size_t i = 0; i < in.position.size(); ++i) {
+    const auto place = [&](size_t i, double& rounding) {
         shared::MeshVertex& v = out.vertices[i];
         const glm::dvec3 p = isFinite(in.position[i]) ? in.position[i] : lo;
         const glm::dvec3 q = glm::floor((p - out.origin) / out.unit + 0.5);
@@ -58,7 +83,7 @@ void placeOnLattice(const TriangleMesh& in, WeldedMesh& out) {
         v.y = static_cast<int>(q.y);
         v.z = static_cast<int>(q.z);
         const glm::dvec3 off = glm::abs(out.origin + q * out.unit - p);
-        out.rounding = std::max({out.rounding, off.x, off.y, off.z});
+        rounding = std::max({rounding, off.x, off.y, off.z});
         const glm::vec3 n = in.normal.empty() ? glm::vec3(0) : in.normal[i];
         const float length = glm::length(n);
         const bool isFlat = !(length > 1e-20f) || !std::isfinite(length);
@@ -69,14 +94,22 @@ void placeOnLattice(const TriangleMesh& in, WeldedMesh& out) {
         v.u = hasUv ? uv.x : 0.0f;
         v.v = hasUv ? uv.y : 0.0f;
         v.surface = (in.surface.empty() ? 0u : in.surface[i]) | (isFlat ? shared::kSurfaceFlat : 0u);
-    }
+    };
+    constexpr size_t kParts = 64;
+    std::array<double, kParts> rounding{};
+    executor.parallelFor(kParts, 1, [&](size_t begin, size_t end) {
+        for (size_t p = begin; p < end; ++p)
+            for (size_t i = p * in.position.size() / kParts; i < (p + 1) * in.position.size() / kParts; ++i)
+                place(i, rounding[p]);
+    });
+    out.rounding = *std::max_element(rounding.begin(), rounding.end());
 }
 
 }  // namespace
 
 WeldedMesh weldMesh(TriangleMesh in, Executor& executor) {
     WeldedMesh out;
-    placeOnLattice(in, out);
+    placeOnLattice(in, out, executor);
     std::vector<uint8_t> isBad(in.position.size());
     for (size_t i = 0; i < isBad.size(); ++i) isBad[i] = isFinite(in.position[i]) ? 0 : 1;
     std::vector<uint32_t> indices = std::move(in.indices);
@@ -86,7 +119,7 @@ WeldedMesh weldMesh(TriangleMesh in, Executor& executor) {
     auto& v = out.vertices;
     const std::vector<uint32_t> same = firstOfEqual(
         v.size(), [&](uint32_t i) { return hashBytes(&v[i], sizeof(v[i])); },
-        [&](uint32_t a, uint32_t b) { return std::memcmp(&v[a], &v[b], sizeof(v[a])) == 0; });
+        [&](uint32_t a, uint32_t b) { return std::memcmp(&v[a], &v[b], sizeof(v[a])) == 0; }, executor);
     // Dropped here: what has no area on the lattice.
     const auto cornersDiffer = [&](const uint32_t* t) {
         const glm::dvec3 a(v[t[0]].x, v[t[0]].y, v[t[0]].z), b(v[t[1]].x, v[t[1]].y, v[t[1]].z),
@@ -111,37 +144,30 @@ WeldedMesh weldMesh(TriangleMesh in, Executor& executor) {
     }
     indices.resize(kept);
     const size_t triangles = kept / 3;
-    const std::vector<uint32_t> first = firstOfEqual(
-        triangles,
-        [&](uint32_t i) {
-            return mix(indices[3 * size_t{i}] * 0x9e3779b97f4a7c15ull + mix(indices[3 * size_t{i} + 1]) +
-                       indices[3 * size_t{i} + 2]);
-        },
-        [&](uint32_t a, uint32_t b) {
-            return std::equal(&indices[3 * size_t{a}], &indices[3 * size_t{a}] + 3, &indices[3 * size_t{b}]);
-        });
-
-    // Along a Morton curve of the centres.
+    // Along a Morton curve of the centres, where equal ones stand side by side.
     struct Key {
         uint64_t code;
         uint32_t triangle;
     };
-    std::vector<Key> order;
-    order.reserve(triangles);
-    for (uint32_t i = 0; i < triangles; ++i) {
-        if (first[i] != i) {
-            ++out.duplicate;
-            continue;
+    std::vector<Key> order(triangles);
+    executor.parallelFor(triangles, 65536, [&](size_t begin, size_t end) {
+        for (size_t i = begin; i < end; ++i) {
+            const auto &a = v[indices[3 * i]], &b = v[indices[3 * i + 1]], &c = v[indices[3 * i + 2]];
+            const auto middle = [](int x, int y, int z) {
+                return static_cast<uint32_t>((int64_t{x} + y + z) / 3) >> (kLatticeBits - kMortonBits);
+            };
+            order[i] = {mortonCode(middle(a.x, b.x, c.x), middle(a.y, b.y, c.y), middle(a.z, b.z, c.z)),
+                        static_cast<uint32_t>(i)};
         }
-        const auto &a = v[indices[3 * size_t{i}]], &b = v[indices[3 * size_t{i} + 1]],
-                   &c = v[indices[3 * size_t{i} + 2]];
-        const auto middle = [](int x, int y, int z) {
-            return static_cast<uint32_t>((int64_t{x} + y + z) / 3) >> (kLatticeBits - kMortonBits);
-        };
-        order.push_back({mortonCode(middle(a.x, b.x, c.x), middle(a.y, b.y, c.y), middle(a.z, b.z, c.z)), i});
-    }
-    const auto isBefore = [](const Key& a, const Key& b) {
-        return a.code != b.code ? a.code < b.code : a.triangle < b.triangle;
+    });
+    const auto cornersOf = [&](const Key& k) {
+        const uint32_t* t = &indices[3 * size_t{k.triangle}];
+        return std::array<uint32_t, 3>{t[0], t[1], t[2]};
+    };
+    const auto isBefore = [&](const Key& a, const Key& b) {
+        if (a.code != b.code) return a.code < b.code;
+        const auto ca = cornersOf(a), cb = cornersOf(b);
+        return ca != cb ? ca < cb : a.triangle < b.triangle;
     };
     constexpr size_t kPieces = 4;
     const auto edge = [&](size_t p) { return order.begin() + static_cast<ptrdiff_t>(p * order.size() / kPieces); };
@@ -153,6 +179,9 @@ WeldedMesh weldMesh(TriangleMesh in, Executor& executor) {
             std::inplace_merge(edge(2 * p), edge(2 * p + 1), edge(2 * p + 2), isBefore);
     });
     std::inplace_merge(edge(0), edge(2), edge(4), isBefore);
+    const auto isSame = [&](const Key& a, const Key& b) { return a.code == b.code && cornersOf(a) == cornersOf(b); };
+    order.erase(std::unique(order.begin(), order.end(), isSame), order.end());
+    out.duplicate = triangles - order.size();
 
     // Vertices in the order of their first use, unused ones left out.
     std::vector<uint32_t> place(v.size(), ~0u);
@@ -174,7 +203,7 @@ WeldedMesh weldMesh(TriangleMesh in, Executor& executor) {
             return mix(static_cast<uint64_t>(v[i].x) +
                        mix(static_cast<uint64_t>(v[i].y) + mix(static_cast<uint64_t>(v[i].z) + 0x9e3779b97f4a7c15ull)));
         },
-        [&](uint32_t a, uint32_t b) { return v[a].x == v[b].x && v[a].y == v[b].y && v[a].z == v[b].z; });
+        [&](uint32_t a, uint32_t b) { return v[a].x == v[b].x && v[a].y == v[b].y && v[a].z == v[b].z; }, executor);
     return out;
 }
 
