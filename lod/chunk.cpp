@@ -84,6 +84,25 @@ Result<Chunk> decodeChunk(const uint8_t* bytes, size_t count, uint32_t records, 
     return chunk;
 }
 
+std::vector<uint8_t> encodeStrandChunk(const Chunk& chunk) {
+    constexpr size_t stride = sizeof(shared::StrandSegment);
+    std::vector<uint8_t> vertex(meshopt_encodeVertexBufferBound(chunk.segments.size(), stride));
+    vertex.resize(
+        meshopt_encodeVertexBuffer(vertex.data(), vertex.size(), chunk.segments.data(), chunk.segments.size(), stride));
+    return compress(vertex);
+}
+
+Result<Chunk> decodeStrandChunk(const uint8_t* bytes, size_t count, uint32_t segments, const std::string& where) {
+    constexpr size_t stride = sizeof(shared::StrandSegment);
+    const size_t limit = meshopt_encodeVertexBufferBound(segments, stride);
+    STIPPLE_ASSIGN(const std::vector<uint8_t> vertex, decompress(bytes, count, limit, where));
+    Chunk chunk;
+    chunk.segments.resize(segments);
+    if (meshopt_decodeVertexBuffer(chunk.segments.data(), segments, stride, vertex.data(), vertex.size()) != 0)
+        return fail(ErrorKind::input, "the segments of a chunk are damaged", where, "build it again");
+    return chunk;
+}
+
 namespace {
 
 struct MeshChunkHead {

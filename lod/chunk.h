@@ -9,6 +9,7 @@
 #include "engine/base/result.h"
 #include "lod/mesh.h"
 #include "shaders/shared/record.h"
+#include "shaders/shared/strand.h"
 
 namespace stipple::lod {
 
@@ -20,10 +21,12 @@ struct Chunk {
     std::vector<shared::MeshVertex> vertices;
     std::vector<uint32_t> triangles;
     std::vector<shared::MeshCluster> clusters;
-    std::vector<uint32_t> texels;  ///< of a texture's tile, kTileEdge x kTileEdge
+    std::vector<shared::StrandSegment> segments;  ///< of a strand store
+    std::vector<uint32_t> texels;                 ///< of a texture's tile, kTileEdge x kTileEdge
     uint64_t sizeBytes() const {
-        return records.size() * sizeof(shared::PointRecord) + vertices.size() * sizeof(shared::MeshVertex) +
-               (triangles.size() + texels.size()) * sizeof(uint32_t) + clusters.size() * sizeof(shared::MeshCluster);
+        return records.size() * sizeof(shared::PointRecord) + segments.size() * sizeof(shared::StrandSegment) +
+               vertices.size() * sizeof(shared::MeshVertex) + (triangles.size() + texels.size()) * sizeof(uint32_t) +
+               clusters.size() * sizeof(shared::MeshCluster);
     }
 };
 
@@ -32,6 +35,10 @@ std::vector<uint8_t> encodeChunk(const Chunk& chunk);
 /// Decodes a chunk of `records` records. `where` names the place in errors. Allocates no more than `records` justifies.
 Result<Chunk> decodeChunk(const uint8_t* bytes, size_t count, uint32_t records, const std::string& where,
                           bool wantLowBits);
+
+/// The same for a chunk of a strand store.
+std::vector<uint8_t> encodeStrandChunk(const Chunk& chunk);
+Result<Chunk> decodeStrandChunk(const uint8_t* bytes, size_t count, uint32_t segments, const std::string& where);
 
 /// A texture tile, kTileEdge x kTileEdge texels.
 std::vector<uint8_t> encodeTile(const std::vector<uint32_t>& texels);

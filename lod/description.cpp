@@ -85,6 +85,7 @@ json toJson(const StoreDescription& d) {
         {"focus_max", {d.focusMax.x, d.focusMax.y, d.focusMax.z}},
         {"has_colour", d.hasColour},
         {"is_reflectance", d.isReflectance},
+        {"is_strands", d.isStrands},
         {"has_normals", d.hasNormals},
         {"materials", materials},
         {"source", d.source}};
@@ -137,6 +138,7 @@ StoreDescription fromJson(const json& j) {
     }
     d.hasColour = j.at("has_colour").get<bool>();
     d.isReflectance = j.at("is_reflectance").get<bool>();
+    d.isStrands = j.at("is_strands").get<bool>();
     d.hasNormals = j.at("has_normals").get<bool>();
     d.source = j.at("source").get<std::string>();
     for (const json& m : j.at("materials")) d.materials.push_back(materialFromJson(m));

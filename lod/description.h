@@ -24,6 +24,7 @@ struct StoreDescription {
     glm::dvec3 focusMin{0}, focusMax{0};    ///< the same without stray points: what a camera looks at first
     bool hasColour = false;                 ///< the points have colours of their own
     bool isReflectance = false;             ///< those are of the material, to be lit
+    bool isStrands = false;                 ///< ribbons and tubes: points count segments
     bool hasNormals = false;                ///< from the file or estimated
     std::vector<shared::SurfaceMaterial> materials;  ///< of a mesh store
     std::string source;                              ///< file names of the input, without folders

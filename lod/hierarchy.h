@@ -10,6 +10,7 @@
 
 #include "lod/mesh.h"
 #include "lod/primitives.h"
+#include "shaders/shared/strand.h"
 
 namespace stipple::lod {
 
@@ -72,12 +73,13 @@ struct Hierarchy {
     std::vector<uint32_t> groupTextures;  ///< see MeshGroup
     std::vector<shared::TextureInfo> textures;
     std::vector<TextureTile> tiles;  ///< streamed like chunks: tile t is chunk nodes.size() + t
+    bool isStrands = false;          ///< records are segments of ribbons and tubes
     bool isMesh() const { return !groups.empty(); }
     size_t chunks() const { return nodes.size() + tiles.size(); }
     /// Bytes of a decoded chunk.
     uint64_t decodedBytes(uint32_t node) const {
         if (node >= nodes.size()) return uint64_t{shared::kTileEdge} * shared::kTileEdge * 4;
-        if (!isMesh()) return uint64_t{nodes[node].records} * 16;
+        if (!isMesh()) return uint64_t{nodes[node].records} * (isStrands ? 32 : 16);
         const MeshGroup& g = groups[node];
         return uint64_t{g.vertices} * sizeof(shared::MeshVertex) + uint64_t{nodes[node].records} * 4 +
                uint64_t{g.clusters} * sizeof(shared::MeshCluster);
@@ -92,6 +94,8 @@ struct Hierarchy {
     /// Lattice position that record coordinate (0,0,0) stands for: the centre of the lattice steps that the
     /// first position step holds.
     glm::dvec3 recordOrigin(const Node& n) const {
+        if (isStrands)
+            return (glm::dvec3(n.cell[0], n.cell[1], n.cell[2]) - double{shared::kStrandMargin}) * cellSize(n);
         const double size = cellSize(n), half = n.stepShift > 0 ? 0.5 * (std::exp2(n.stepShift) - 1) : 0.0;
         return glm::dvec3(n.cell[0], n.cell[1], n.cell[2]) * size + glm::dvec3(half);
     }

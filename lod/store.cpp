@@ -234,7 +234,7 @@ Result<void> checkNodes(const Store& store, uint64_t chunksEnd) {
             std::isfinite(n.radius) && n.radius >= 0 && std::isfinite(n.centre.x + n.centre.y + n.centre.z);
         if (!childrenFit || !parentFits || !chunkFits || !finite || n.records == 0 ||
             n.level > store.hierarchy.rootLog2 ||
-            n.stepShift != static_cast<int>(store.hierarchy.rootLog2) - n.level - 16)
+            n.stepShift != static_cast<int>(store.hierarchy.rootLog2) - n.level - (store.hierarchy.isStrands ? 15 : 16))
             return tl::unexpected(damaged(store.path, fmt::format("node {} of the node table is not possible", i)));
     }
     return {};
@@ -409,11 +409,13 @@ Result<Store> openStore(const std::string& path) {
     } catch (const std::exception& e) {
         return tl::unexpected(damaged(path, fmt::format("the description cannot be read: {}", e.what())));
     }
+    h.isStrands = store.description.isStrands;
     if (!(std::abs(glm::length(store.description.up) - 1) < 1e-6))
         return tl::unexpected(damaged(path, "the up direction has not the length 1"));
     store.contentHash = head.contentHash;
     store.fileBytes = head.fileBytes;
     STIPPLE_TRY(readMesh(mesh, path, h));
+    if (h.isStrands && h.isMesh()) return tl::unexpected(damaged(path, "holds strands and groups of triangles"));
     STIPPLE_TRY(checkTextures(store, head.nodes.offset));
     STIPPLE_TRY(h.isMesh() ? checkGroups(store, head.nodes.offset) : checkNodes(store, head.nodes.offset));
     return store;
@@ -443,6 +445,7 @@ Result<Chunk> decodeNode(const Hierarchy& h, uint32_t index, const uint8_t* byte
                          const std::string& where, bool wantLowBits) {
     if (index >= h.nodes.size()) return decodeTile(bytes, count, where);
     const uint32_t records = h.nodes[index].records;
+    if (h.isStrands) return decodeStrandChunk(bytes, count, records, where);
     return h.isMesh() ? decodeMeshChunk(bytes, count, records, h.groups[index], where)
                       : decodeChunk(bytes, count, records, where, wantLowBits);
 }

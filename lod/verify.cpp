@@ -11,25 +11,47 @@
 namespace stipple::lod {
 namespace {
 
-std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
-    const Node& node = h.nodes[index];
+/// What the cut relies on, of a point or of a segment.
+struct RecordFacts {
+    uint32_t code, octants;            ///< own error; octants whose children it stands for
+    std::array<glm::dvec3, 2> places;  ///< ends, lattice units
+    std::array<double, 2> radii;
+};
+
+RecordFacts factsOf(const Hierarchy& h, const Node& node, const Chunk& chunk, size_t i) {
     const double step = std::exp2(node.stepShift), edge = h.cellSize(node);
     const glm::dvec3 base = h.recordOrigin(node);
-    std::array<uint32_t, 256> own{};
-    uint32_t largest = 0;
-    for (const auto& r : chunk.records) {
-        const uint32_t code = shared::recordErrorCode(r);
-        ++own[code];
-        largest = std::max(largest, code);
+    if (!h.isStrands) {
+        const shared::PointRecord& r = chunk.records[i];
         const glm::dvec3 p = base + step * glm::dvec3(shared::recordX(r), shared::recordY(r), shared::recordZ(r));
         const double radius = edge * static_cast<double>(shared::radiusFraction(shared::recordRadiusCode(r)));
-        if (glm::length(p - node.centre) + radius > node.radius * (1 + 1e-9) + 1e-6)
-            return "a record reaches out of the bounding sphere";
-        if (code > 0 && node.childMask != 0) {
-            // Only exact records may stand in an octant without a child.
-            const uint32_t octant = shared::recordOctant(r);
-            if (!(node.childMask >> octant & 1u)) return "a record has an error but its octant has no child";
-        }
+        return {shared::recordErrorCode(r), 1u << shared::recordOctant(r), {p, p}, {radius, radius}};
+    }
+    const shared::StrandSegment& s = chunk.segments[i];
+    RecordFacts facts{shared::segmentErrorCode(s), shared::segmentOctants(s), {}, {}};
+    for (size_t k = 0; k < 2; ++k) {
+        const shared::StrandVertex& v = k == 0 ? s.a : s.b;
+        facts.places.at(k) =
+            base + step * glm::dvec3(v.positionXY & 0xffffu, v.positionXY >> 16, v.positionZ & 0xffffu);
+        facts.radii.at(k) = edge * static_cast<double>(shared::strandRadius(v, 1.0f));
+    }
+    return facts;
+}
+
+std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
+    const Node& node = h.nodes[index];
+    std::array<uint32_t, 256> own{};
+    uint32_t largest = 0;
+    for (size_t i = 0; i < node.records; ++i) {
+        const RecordFacts r = factsOf(h, node, chunk, i);
+        ++own.at(r.code);
+        largest = std::max(largest, r.code);
+        for (size_t k = 0; k < 2; ++k)
+            if (!(glm::length(r.places.at(k) - node.centre) + r.radii.at(k) <= node.radius * (1 + 1e-9) + 1e-6))
+                return "a record reaches out of the bounding sphere";
+        // Only exact records may stand in an octant without a child.
+        if (r.code > 0 && node.childMask != 0 && (r.octants & ~uint32_t{node.childMask}) != 0)
+            return "a record has an error but its octant has no child";
     }
     if (node.isLeaf() && largest != 0) return "a leaf record has an error";
     if (largest != node.errorCode) return "the largest error is not the one in the node table";
@@ -49,7 +71,7 @@ std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
         const uint32_t atLeast =
             code == 0 ? node.records : h.countGreater(node.parentCounts, node.records, static_cast<uint32_t>(code) - 1);
         for (; position < atLeast; ++position)
-            if (shared::recordErrorCode(chunk.records[position]) > static_cast<uint32_t>(code))
+            if (factsOf(h, node, chunk, position).code > static_cast<uint32_t>(code))
                 return "a record has a larger error than its parent record";
     }
     return {};

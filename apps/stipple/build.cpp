@@ -23,7 +23,7 @@ Result<void> run(const Options& o) {
     if (!built) return tl::unexpected(built.error());
     const lod::BuildReport& r = *built;
     if (o.json) {
-        const nlohmann::json j = {{"primitive", r.isMesh ? "triangles" : "points"},
+        const nlohmann::json j = {{"primitive", r.primitive + "s"},
                                   {"points_in", r.pointsIn},
                                   {"points_out", r.pointsOut},
                                   {"dropped", r.dropped},
@@ -41,13 +41,14 @@ Result<void> run(const Options& o) {
         return {};
     }
     for (const std::string& note : r.notes) fmt::print(stderr, "note: {}\n", note);
-    const char* const what = r.isMesh ? "triangle" : "point";
+    const std::string& what = r.primitive;
+    const bool isMesh = what == "triangle";
     fmt::print("{}: {} {}s in {} {}, {} ({:.1f} bytes a {}), {:.2f} s, {:.2f} M {}s/s, peak memory {}\n", o.output,
-               r.pointsOut, what, r.nodes, r.isMesh ? "groups" : "nodes", humanBytes(r.bytesOut),
+               r.pointsOut, what, r.nodes, isMesh ? "groups" : "nodes", humanBytes(r.bytesOut),
                static_cast<double>(r.bytesOut) / static_cast<double>(r.pointsOut), what, r.seconds,
                static_cast<double>(r.pointsIn) / r.seconds * 1e-6, what, humanBytes(peakRssBytes()));
     for (const auto& [reason, count] : r.dropped)
-        fmt::print("dropped {}{}: {}\n", count, r.isMesh ? "" : " points", reason);
+        fmt::print("dropped {}{}: {}\n", count, what == "point" ? " points" : "", reason);
     return {};
 }
 

@@ -47,6 +47,9 @@ void BuildOptions::addTo(CLI::App& app) {
         ->capture_default_str();
     app.add_flag("--repair", repair,
                  "pass over faults of a glTF file that change nothing that is drawn, and count them");
+    app.add_option("--strand-radius", strandRadius,
+                   "radius of strands that have none, file units (0: a 4000th of the extent)")
+        ->check(CLI::Range(0.0, 1e300));
     app.add_flag("--only-points", onlyPoints, "of a PLY mesh take the vertices, as points");
     app.add_flag("--skip-bad", skipBad, "go on past corrupt chunks and files, and say what was lost");
 }

@@ -26,6 +26,7 @@ struct BuildOptions {
     std::string memory = "2G", normals = "auto", radii = "auto", up, attributes = "none";
     int threads = 0;
     bool skipBad = false, onlyPoints = false, repair = false;
+    double strandRadius = 0;
     uint64_t surfels = 0;
     void addTo(CLI::App& app);
     Result<lod::BuildSettings> settings() const;

@@ -47,7 +47,9 @@ nlohmann::json storeInfo(const lod::Store& store) {
     uint64_t tileBytes = 0;
     for (const lod::TextureTile& t : h.tiles) tileBytes += t.bytes;
     return {{"kind", "stipple store"},
-            {"primitive", h.isMesh() ? "triangles" : "points"},
+            {"primitive", h.isMesh()    ? "triangles"
+                          : h.isStrands ? "segments"
+                                        : "points"},
             {"materials", d.materials.size()},
             {"textures", textures},
             {"texture_tiles", h.tiles.size()},
@@ -79,7 +81,7 @@ void printStore(const nlohmann::json& j) {
     };
     const bool isMesh = j["primitive"] == "triangles";
     fmt::print("{}: {} {} from {}, {} with all levels in {} {}, {}\n", j["path"].get<std::string>(),
-               j["points"].get<uint64_t>(), isMesh ? "triangles" : "points", j["source"].get<std::string>(),
+               j["points"].get<uint64_t>(), j["primitive"].get<std::string>(), j["source"].get<std::string>(),
                j["records"].get<uint64_t>(), j["nodes"].get<uint64_t>(), isMesh ? "groups" : "nodes",
                humanBytes(j["bytes"].get<uint64_t>()));
     if (isMesh)
@@ -109,8 +111,8 @@ void printStore(const nlohmann::json& j) {
 }
 
 Result<void> showNearest(const lod::Store& store, const Options& o) {
-    if (store.hierarchy.isMesh())
-        return fail(ErrorKind::usage, "holds triangles: --at finds points", store.path, "leave --at out");
+    if (store.hierarchy.isMesh() || store.hierarchy.isStrands)
+        return fail(ErrorKind::usage, "holds no points: --at finds points", store.path, "leave --at out");
     STIPPLE_ASSIGN(const glm::dvec3 place, parseVector(o.at, "--at"));
     STIPPLE_ASSIGN(const lod::NearestPoint p, lod::findNearest(store, place));
     const uint32_t c = p.packed.colour;

@@ -13,9 +13,11 @@
 #include "engine/image/image_io.h"
 #include "engine/scene/triangles.h"
 #include "lod/build/mesh/mesh_build.h"
+#include "lod/build/strands/strand_build.h"
 #include "lod/colour.h"
 #include "lod/import/import.h"
 #include "lod/import/ply_mesh.h"
+#include "lod/import/strands/strand_readers.h"
 #include "lod/nearest.h"
 
 namespace stipple::app {
@@ -49,7 +51,8 @@ Result<std::string> cachePath(const std::vector<std::string>& inputs, const Buil
                               const std::string& part) {
     std::string key = part + (build.onlyPoints ? "|points|" : "|") + build.normals + "|" + build.radii + "|" +
                       build.up + "|" + build.attributes + (build.skipBad ? "|skip" : "|") +
-                      std::to_string(build.surfels) + STIPPLE_VERSION + fmt::format("|{}", lod::kStoreVersion);
+                      std::to_string(build.surfels) + fmt::format("|{}|", build.strandRadius) + STIPPLE_VERSION +
+                      fmt::format("|{}", lod::kStoreVersion);
     STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs(inputs));
     for (const std::string& input : files) {
         std::error_code error;
@@ -161,6 +164,16 @@ Result<lod::BuildReport> buildPlyMesh(const std::string& input, const std::strin
     STIPPLE_ASSIGN(lod::BuildReport report, lod::buildMeshStore(std::move(mesh), output, settings, executor, progress));
     if (notes.badFaces > 0) report.dropped["triangles with a corner that is no vertex"] = notes.badFaces;
     return report;
+}
+
+/// Ribbons and tubes.
+Result<lod::BuildReport> buildStrands(const std::string& input, const std::string& output, const BuildOptions& build,
+                                      Executor& executor, Progress& progress) {
+    STIPPLE_ASSIGN(lod::StrandSet strands, lod::readStrands(input));
+    lod::StrandBuildSettings settings;
+    settings.description.source = fs::path(input).filename().string();
+    const lod::StrandSet clean = lod::cleanStrands(std::move(strands), build.strandRadius);
+    return lod::buildStrandStore(clean, output, settings, executor, progress);
 }
 
 /// Points that stand in for a mesh from afar, where its coarsest level still has many triangles: what is made of many
@@ -366,6 +379,8 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
     STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
     STIPPLE_ASSIGN(const bool isPlyMesh, isMeshPly(inputs, build));
     if (isPlyMesh) return buildPlyMesh(inputs.front(), output, executor, progress);
+    if (inputs.size() == 1 && lod::isStrandFile(inputs[0]))
+        return buildStrands(inputs[0], output, build, executor, progress);
     if (!isSceneFile(inputs.front()) || build.surfels > 0)
         return lod::buildStore(inputs, output, settings, executor, progress);
     if (inputs.size() > 1)
@@ -396,6 +411,13 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
             std::shared_ptr<const lod::Store> store,
             openCached(inputs, build, "triangles", showProgress, [&](const std::string& path, Progress& progress) {
                 return buildPlyMesh(inputs[0], path, executor, progress);
+            }));
+        scene.placed.push_back({std::move(store), {}, {}});
+    } else if (inputs.size() == 1 && lod::isStrandFile(inputs[0])) {
+        STIPPLE_ASSIGN(
+            std::shared_ptr<const lod::Store> store,
+            openCached(inputs, build, "strands", showProgress, [&](const std::string& path, Progress& progress) {
+                return buildStrands(inputs[0], path, build, executor, progress);
             }));
         scene.placed.push_back({std::move(store), {}, {}});
     } else if (isSceneFile(inputs.front())) {

@@ -327,6 +327,10 @@ void setupRender(CLI::App& app, int& status) {
     group->add_option("--surfels", o->build.surfels, "turn meshes into that many samples; 0: keep triangles")
         ->check(CLI::Range(uint64_t{0}, uint64_t{200'000'000}))
         ->capture_default_str();
+    group
+        ->add_option("--strand-radius", o->build.strandRadius,
+                     "radius of strands that have none, file units (0: a 4000th of the extent)")
+        ->check(CLI::Range(0.0, 1e300));
     group->add_flag("--only-points", o->build.onlyPoints, "of a PLY mesh take the vertices, as points");
     group->add_flag("--repair", o->build.repair,
                     "pass over faults of a glTF file that change nothing that is drawn, and count them");

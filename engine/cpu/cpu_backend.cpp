@@ -109,6 +109,9 @@ class CpuBackend final : public render::Backend {
                 case render::Pass::project:
                     project();
                     break;
+                case render::Pass::strands:
+                    drawStrands();
+                    break;
                 case render::Pass::rasterise:
                     rasterise();
                     break;
@@ -158,6 +161,21 @@ class CpuBackend final : public render::Backend {
             const auto found = chunks_.find(chunkId(draws_->keys[block.node]));
             blocks_[b] = {found->second.records.data() + block.first, &draws_->nodes[block.node]};
         }
+        strandBlocks_.clear();
+        for (const shared::DrawBlock& block : draws_->strandBlocks)
+            strandBlocks_.push_back({chunks_.at(chunkId(draws_->strandKeys[block.node])).segments.data() + block.first,
+                                     &draws_->strandNodes[block.node]});
+        hasStrands_ = !strandBlocks_.empty();
+    }
+
+    void drawStrands() {
+        executor_.parallelFor(strandBlocks_.size(), 4, [&](size_t begin, size_t end) {
+            for (size_t b = begin; b < end; ++b) {
+                const uint32_t left = strandBlocks_[b].node->count - draws_->strandBlocks[b].first;
+                k_.drawSegments(frame_, strandBlocks_[b], std::min(left, shared::kSegmentsPerBlock),
+                                static_cast<uint32_t>(b * shared::kSegmentsPerBlock), visibility_.data());
+            }
+        });
     }
 
     void project() {
@@ -263,10 +281,11 @@ class CpuBackend final : public render::Backend {
         Level* coarse = hasPyramid && levels_.size() > 1 ? &levels_[1] : nullptr;
         const Planes finePlanes = fine.planes();
         preparePlanes(size_t{fine.width} * fine.height);
-        const ResolveInput input{blocks_.data(), meshBlocks_.data(), draws_->materials.data()};
+        const ResolveInput input{blocks_.data(), meshBlocks_.data(), draws_->materials.data(), strandBlocks_.data()};
         std::atomic<float> largestRadius{0};
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
             TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
+            upper.hasTubes = lower.hasTubes = out.hasTubes = hasStrands_;
             float largest = 0;
             for (uint32_t y = row0; y < row1; y += 2) {
                 bool any = false;
@@ -315,6 +334,7 @@ class CpuBackend final : public render::Backend {
             const Planes from = fine.planes(), to = coarse.planes();
             forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
                 TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
+                upper.hasTubes = lower.hasTubes = out.hasTubes = hasStrands_;
                 for (uint32_t y = row0; y < row1; y += 2) {
                     bool any = false;
                     for (TexelRow* row : {&upper, &lower}) {
@@ -365,6 +385,7 @@ class CpuBackend final : public render::Backend {
         const Planes finePlanes = fine.planes(), coarsePlanes = coarse.planes();
         thread_local TexelRow scratch{}, own{}, out{};
         thread_local std::array<ExpandedRow, 3> ring{};
+        scratch.hasTubes = own.hasTubes = out.hasTubes = hasStrands_;
         std::array<bool, 3> has{};
         const int c0 = static_cast<int>(row0 / 2);
         for (int c = c0 - 1; c <= c0; ++c)
@@ -413,7 +434,11 @@ class CpuBackend final : public render::Backend {
         const Planes planes = fine.planes();
         const LightInput light{draws_->lights.data(),
                                draws_->environment ? draws_->environment->table.data() : nullptr};
-        const auto shadeRow = [&](uint32_t x0, uint32_t n, uint32_t y, const TexelRow& own, const TexelRow& row) {
+        const auto shadeRow = [&](uint32_t x0, uint32_t n, uint32_t y, TexelRow& own, TexelRow& row) {
+            if (hasStrands_) {
+                k_.finishRow(1.0f / frame_.focal, n, row);
+                if (&own != &row) k_.finishRow(1.0f / frame_.focal, n, own);
+            }
             const size_t at = size_t{y} * fine.width + x0;
             k_.shadeRow(frame_, tables_, own, row, planesAt(at), light, x0, y, n,
                         {image_->rgba.data() + at, wantAll_ ? image_->depth.data() + at : nullptr,
@@ -422,12 +447,12 @@ class CpuBackend final : public render::Backend {
         };
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
             if (hasPyramid && levelCount_ > 1) {
-                pushTile(
-                    fine, levels_[1], 1.0f, x0, n, row0, row1,
-                    [&](uint32_t y, const TexelRow& own, const TexelRow& row, bool) { shadeRow(x0, n, y, own, row); });
+                pushTile(fine, levels_[1], 1.0f, x0, n, row0, row1,
+                         [&](uint32_t y, TexelRow& own, TexelRow& row, bool) { shadeRow(x0, n, y, own, row); });
                 return;
             }
             thread_local TexelRow row{};
+            row.hasTubes = hasStrands_;
             for (uint32_t y = row0; y < row1; ++y) {
                 loadRow(fine, planes, y, x0, n, kPad, row);
                 shadeRow(x0, n, y, row, row);
@@ -448,7 +473,8 @@ class CpuBackend final : public render::Backend {
     std::vector<std::vector<const uint32_t*>> tiles_;  ///< by source and chunk; null: not resident
     HugeBuffer<uint32_t> surface_, emissive_;
     size_t surfacePixels_ = 0, emissivePixels_ = 0;
-    bool hasTriangles_ = false, hasEmissive_ = false;
+    bool hasTriangles_ = false, hasEmissive_ = false, hasStrands_ = false;
+    std::vector<StrandBlock> strandBlocks_;
     std::vector<BlockSource> blocks_;
     std::vector<render::PassTime> times_;
     const render::DrawList* draws_ = nullptr;

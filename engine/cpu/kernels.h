@@ -9,6 +9,7 @@
 #include "shaders/shared/material.h"
 #include "shaders/shared/mesh.h"
 #include "shaders/shared/record.h"
+#include "shaders/shared/strand.h"
 #include "shaders/shared/texture.h"
 
 namespace stipple::cpu {
@@ -22,6 +23,9 @@ struct TexelRow {
     // Plain arrays: references into std::array keep GCC 12 from vectorising.
     alignas(64) float depth[kSize], radius[kSize], thickness[kSize], x[kSize], y[kSize], perpX[kSize], perpY[kSize],
         red[kSize], green[kSize], blue[kSize];
+    // Only of frames with tubes:
+    alignas(64) float isRound[kSize], axisX[kSize], axisY[kSize];
+    bool hasTubes;
 };
 
 /// A coarse row at the resolution of the fine one: for each fine texel its parent, and the parent's neighbour on the
@@ -39,6 +43,12 @@ struct Planes {
 
 struct BlockSource {
     const shared::PointRecord* records;  ///< first record of the block
+    const shared::DrawNode* node;
+};
+
+/// One block of segments of strands.
+struct StrandBlock {
+    const shared::StrandSegment* segments;  ///< first of the block
     const shared::DrawNode* node;
 };
 
@@ -90,6 +100,7 @@ struct ResolveInput {
     const BlockSource* blocks;
     const MeshBlock* meshBlocks;
     const shared::SurfaceMaterial* materials;
+    const StrandBlock* strandBlocks;
 };
 
 struct LightInput {
@@ -122,6 +133,8 @@ struct Kernels {
                     float fineSize, float inverseFocal, TexelRow& out);
     /// Doubles the entries of a coarse row (-1 to (n + 1) / 2) along x.
     void (*expandRow)(const TexelRow& coarse, uint32_t n, TexelRow& nearest, TexelRow& beside);
+    /// Normals and depths of tubes, pixel by pixel, once a row is reconstructed.
+    void (*finishRow)(float inverseFocal, uint32_t n, TexelRow& row);
     void (*shadeRow)(const shared::FrameConstants& f, const Tables& tables, const TexelRow& own, const TexelRow& row,
                      const SurfacePlanes& planes, const LightInput& light, uint32_t x0, uint32_t y, uint32_t n,
                      const ShadeOutput& out);
@@ -131,6 +144,9 @@ struct Kernels {
     /// Rows [firstRow, lastRow] of the triangles that were kept.
     void (*rasterLarge)(const shared::FrameConstants& f, const LargeTriangle* large, size_t count, uint32_t firstRow,
                         uint32_t lastRow, uint64_t* visibility);
+    /// Offers up to 256 segments of strands (ids from firstId on) to the visibility buffer.
+    void (*drawSegments)(const shared::FrameConstants& f, const StrandBlock& block, uint32_t count, uint32_t firstId,
+                         uint64_t* visibility);
 };
 
 /// The best kernels that this processor runs; STIPPLE_SIMD=sse|avx2|avx512 asks for fewer.

@@ -7,12 +7,15 @@
 #include "shaders/shared/pyramid.h"
 #include "shaders/shared/environment.h"
 #include "shaders/shared/shade.h"
+#include "shaders/shared/strand.h"
 
 namespace stipple::cpu {
 namespace {
 
 using namespace stipple::shared;
 
+/// `hasTubes`: of frames that may hold tubes; others do not pay for them.
+template <bool hasTubes>
 [[gnu::always_inline]] inline Texel texelAt(const TexelRow& row, size_t i) {
     Texel t;
     t.depth = row.depth[i];
@@ -21,8 +24,11 @@ using namespace stipple::shared;
     t.offset = vec2(row.x[i], row.y[i]);
     t.normalPerp = vec2(row.perpX[i], row.perpY[i]);
     t.colour = vec3(row.red[i], row.green[i], row.blue[i]);
+    t.isRound = hasTubes ? row.isRound[i] : 0.0f;
+    t.axis = hasTubes ? vec2(row.axisX[i], row.axisY[i]) : vec2(0.0f, 0.0f);
     return t;
 }
+template <bool hasTubes>
 [[gnu::always_inline]] inline void setTexel(TexelRow& row, size_t i, const Texel& t) {
     row.depth[i] = t.depth;
     row.radius[i] = t.radius;
@@ -34,6 +40,10 @@ using namespace stipple::shared;
     row.red[i] = t.colour.x;
     row.green[i] = t.colour.y;
     row.blue[i] = t.colour.z;
+    if (!hasTubes) return;
+    row.isRound[i] = t.isRound;
+    row.axisX[i] = t.axis.x;
+    row.axisY[i] = t.axis.y;
 }
 
 void projectBlock(const FrameConstants& frame, const DrawNode& drawNode, const PointRecord* __restrict records,
@@ -85,6 +95,8 @@ struct Gathered {
 
 #include "engine/cpu/resolve_triangles.inl"
 
+#include "engine/cpu/strands.inl"
+
 bool resolveRow(const FrameConstants& frame, const Tables& tables, const ResolveInput& in, uint64_t* visibility,
                 uint32_t x0, uint32_t y, uint32_t n, TexelRow& __restrict row, float& largestRadius,
                 const SurfacePlanes& planes) {
@@ -93,8 +105,8 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
     const FrameConstants f = frame;
     constexpr size_t kPrefetch = 12;  // pixels ahead: records lie anywhere in memory
     Gathered g;
-    TrianglePixels triangles;
-    triangles.count = 0;
+    WinningPixels triangles, strands;
+    triangles.count = strands.count = 0;
     bool any = false;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
@@ -105,9 +117,10 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         const uint64_t key = visibility[i];
         if ((key & kKindMask) != 0) {  // nothing (all bits), or a triangle
             if (key != ~uint64_t{0}) {
-                triangles.pixel[triangles.count] = static_cast<uint32_t>(i);
-                triangles.id[triangles.count] = static_cast<uint32_t>(key) & ~kKindMask;
-                triangles.depth[triangles.count++] = uintBitsToFloat(static_cast<uint32_t>(key >> 32));
+                WinningPixels& to = (key & kKindMask) == kKindTriangle ? triangles : strands;
+                to.pixel[to.count] = static_cast<uint32_t>(i);
+                to.id[to.count] = static_cast<uint32_t>(key) & ~kKindMask;
+                to.depth[to.count++] = uintBitsToFloat(static_cast<uint32_t>(key >> 32));
                 visibility[i] = ~uint64_t{0};
             }
             g.x[i] = 0;
@@ -147,9 +160,12 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
     if (!any) {
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) row.depth[kPad + i] = 0;
-        if (triangles.count == 0) return false;
-        resolveTriangles(f, in, triangles, x0, y, row, planes);
-        return true;
+        if (row.hasTubes)
+#pragma GCC ivdep
+            for (size_t i = 0; i < n; ++i) row.isRound[kPad + i] = 0;
+        if (triangles.count > 0) resolveTriangles(f, in, triangles, x0, y, row, planes);
+        if (strands.count > 0) resolveStrands(f, in, strands, x0, y, row, largestRadius);
+        return triangles.count + strands.count > 0;
     }
     uint largest = 0;  // as bits: positive floats sort like integers
     const float xx = f.viewX.x, xy = f.viewX.y, xz = f.viewX.z, yx = f.viewY.x, yy = f.viewY.y, yz = f.viewY.z,
@@ -174,24 +190,30 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         t.depth = valid ? t.depth : 0.0f;
         t.radius = valid ? t.radius : 0.0f;
         t.colour = vec3(unpackRed(g.colour[i]), unpackGreen(g.colour[i]), unpackBlue(g.colour[i]));
-        setTexel(row, kPad + i, t);
+        setTexel<false>(row, kPad + i, t);
     }
     for (size_t i = 0; i < n; ++i) {
         const uint bits = floatBitsToUint(row.radius[kPad + i]);
         largest = bits > largest ? bits : largest;
     }
     largestRadius = max(largestRadius, uintBitsToFloat(largest));
+    if (row.hasTubes)
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) row.isRound[kPad + i] = 0;
     if (triangles.count > 0) resolveTriangles(f, in, triangles, x0, y, row, planes);
+    if (strands.count > 0) resolveStrands(f, in, strands, x0, y, row, largestRadius);
     return true;
 }
 
-void packRow(const TexelRow& __restrict row, uint32_t n, const Planes& planes) {
+template <bool hasTubes>
+[[gnu::always_inline]] inline void packTexels(const TexelRow& __restrict row, uint32_t n, const Planes& planes) {
     float* __restrict const depth = planes.depth;
     uint32_t *__restrict const size = planes.size, *__restrict const offset = planes.offset, *__restrict const normal = planes.normal,
              *__restrict const colour = planes.colour;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
-        const PackedTexel p = packTexel(texelAt(row, kPad + i));
+        const Texel t = texelAt<hasTubes>(row, kPad + i);
+        const PackedTexel p = hasTubes ? packAnyTexel(t) : packTexel(t);
         depth[i] = p.depth;
         size[i] = p.size;
         offset[i] = p.offset;
@@ -199,8 +221,16 @@ void packRow(const TexelRow& __restrict row, uint32_t n, const Planes& planes) {
         colour[i] = p.colour;
     }
 }
+void packRow(const TexelRow& row, uint32_t n, const Planes& planes) {
+    if (row.hasTubes)
+        packTexels<true>(row, n, planes);
+    else
+        packTexels<false>(row, n, planes);
+}
 
-void unpackRow(const Planes& planes, uint32_t first, uint32_t n, TexelRow& __restrict row) {
+template <bool hasTubes>
+[[gnu::always_inline]] inline void unpackTexels(const Planes& planes, uint32_t first, uint32_t n,
+                                                TexelRow& __restrict row) {
     const float* __restrict const depth = planes.depth;
     const uint32_t *__restrict const size = planes.size, *__restrict const offset = planes.offset,
                    *__restrict const normal = planes.normal, *__restrict const colour = planes.colour;
@@ -212,19 +242,35 @@ void unpackRow(const Planes& planes, uint32_t first, uint32_t n, TexelRow& __res
         p.offset = offset[i];
         p.normal = normal[i];
         p.colour = colour[i];
-        setTexel(row, first + i, unpackTexel(p));
+        setTexel<hasTubes>(row, first + i, hasTubes ? unpackAnyTexel(p) : unpackTexel(p));
     }
 }
+void unpackRow(const Planes& planes, uint32_t first, uint32_t n, TexelRow& row) {
+    if (row.hasTubes)
+        unpackTexels<true>(planes, first, n, row);
+    else
+        unpackTexels<false>(planes, first, n, row);
+}
 
-void pullRow(const TexelRow& __restrict upper, const TexelRow& __restrict lower, uint32_t n, float childSize,
-             float inverseFocal, TexelRow& __restrict out) {
+template <bool hasTubes>
+[[gnu::always_inline]] inline void pullTexelRow(const TexelRow& __restrict upper, const TexelRow& __restrict lower,
+                                                uint32_t n, float childSize, float inverseFocal,
+                                                TexelRow& __restrict out) {
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const size_t a = kPad + 2 * i, b = a + 1;
-        setTexel(out, kPad + i,
-                 pullTexels(texelAt(upper, a), texelAt(upper, b), texelAt(lower, a), texelAt(lower, b), childSize,
-                            inverseFocal));
+        setTexel<hasTubes>(out, kPad + i,
+                           pullTexels(texelAt<hasTubes>(upper, a), texelAt<hasTubes>(upper, b),
+                                      texelAt<hasTubes>(lower, a), texelAt<hasTubes>(lower, b), childSize,
+                                      inverseFocal));
     }
+}
+void pullRow(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float inverseFocal,
+             TexelRow& out) {
+    if (out.hasTubes)
+        pullTexelRow<true>(upper, lower, n, childSize, inverseFocal, out);
+    else
+        pullTexelRow<false>(upper, lower, n, childSize, inverseFocal, out);
 }
 
 void expandRow(const TexelRow& coarse, uint32_t n, TexelRow& nearest, TexelRow& beside) {
@@ -253,18 +299,45 @@ void expandRow(const TexelRow& coarse, uint32_t n, TexelRow& nearest, TexelRow& 
     expand(coarse.red, nearest.red, beside.red);
     expand(coarse.green, nearest.green, beside.green);
     expand(coarse.blue, nearest.blue, beside.blue);
+    if (!coarse.hasTubes) return;
+    expand(coarse.isRound, nearest.isRound, beside.isRound);
+    expand(coarse.axisX, nearest.axisX, beside.axisX);
+    expand(coarse.axisY, nearest.axisY, beside.axisY);
 }
 
-void pushRow(const TexelRow& __restrict fine, const ExpandedRow& __restrict nearRow,
-             const ExpandedRow& __restrict farRow, float sy, uint32_t n, float fineSize, float inverseFocal,
-             TexelRow& __restrict out) {
+template <bool hasTubes>
+[[gnu::always_inline]] inline void pushTexelRow(const TexelRow& __restrict fine, const ExpandedRow& __restrict nearRow,
+                                                const ExpandedRow& __restrict farRow, float sy, uint32_t n,
+                                                float fineSize, float inverseFocal, TexelRow& __restrict out) {
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const size_t at = kPad + i;
         const float sx = float(int(i & 1u) * 2 - 1);
-        setTexel(out, at,
-                 pushTexel(texelAt(fine, at), texelAt(nearRow.nearest, at), texelAt(nearRow.beside, at),
-                           texelAt(farRow.nearest, at), texelAt(farRow.beside, at), sx, sy, fineSize, inverseFocal));
+        setTexel<hasTubes>(out, at,
+                           pushTexel(texelAt<hasTubes>(fine, at), texelAt<hasTubes>(nearRow.nearest, at),
+                                     texelAt<hasTubes>(nearRow.beside, at), texelAt<hasTubes>(farRow.nearest, at),
+                                     texelAt<hasTubes>(farRow.beside, at), sx, sy, fineSize, inverseFocal));
+    }
+}
+void pushRow(const TexelRow& fine, const ExpandedRow& nearRow, const ExpandedRow& farRow, float sy, uint32_t n,
+             float fineSize, float inverseFocal, TexelRow& out) {
+    if (out.hasTubes)
+        pushTexelRow<true>(fine, nearRow, farRow, sy, n, fineSize, inverseFocal, out);
+    else
+        pushTexelRow<false>(fine, nearRow, farRow, sy, n, fineSize, inverseFocal, out);
+}
+
+/// What tubes look like at each pixel: normals round their axes.
+void finishRow(float inverseFocal, uint32_t n, TexelRow& __restrict row) {
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const size_t at = kPad + i;
+        const Texel t = texelAt<true>(row, at);
+        const TubeSurface s = tubeSurface(t, inverseFocal);
+        const bool isTubeHere = t.isRound > 0.5f;
+        row.perpX[at] = isTubeHere ? s.normalPerp.x : t.normalPerp.x;
+        row.perpY[at] = isTubeHere ? s.normalPerp.y : t.normalPerp.y;
+        row.depth[at] = isTubeHere ? s.depth : t.depth;
     }
 }
 
@@ -378,7 +451,7 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
 
 extern const Kernels STIPPLE_KERNELS;
 const Kernels STIPPLE_KERNELS{
-    STIPPLE_KERNELS_NAME, projectBlock, resolveRow, packRow, unpackRow, pullRow, pushRow, expandRow, shadeRow,
-    rasterCluster,        rasterLarge};
+    STIPPLE_KERNELS_NAME, projectBlock, resolveRow, packRow, unpackRow, pullRow, pushRow, expandRow, finishRow, shadeRow,
+    rasterCluster,        rasterLarge, drawSegments};
 
 }  // namespace stipple::cpu

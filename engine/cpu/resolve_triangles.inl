@@ -3,7 +3,8 @@
 // Everything but following pointers is a loop over the row's pixels that becomes SIMD; materials and textures are looked
 // at once for every run of pixels that share them.
 
-struct TrianglePixels {
+/// The pixels of a row that show one kind of primitive.
+struct WinningPixels {
     uint32_t count;
     alignas(64) uint32_t pixel[kTile], id[kTile];
     alignas(64) float depth[kTile];
@@ -114,7 +115,7 @@ void applyMaterial(const MaterialRun& run, const Corners& c, const UvRow& uv, bo
         }
 }
 
-void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const TrianglePixels& p, uint32_t x0, uint32_t y,
+void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, uint32_t x0, uint32_t y,
                       TexelRow& __restrict row, const SurfacePlanes& planes) {
     Corners c;
     SurfaceRow s;

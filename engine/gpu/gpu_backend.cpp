@@ -296,6 +296,8 @@ class GpuBackend final : public render::Backend {
                                   (blocks + kGroupsPerDimension - 1) / kGroupsPerDimension, 1);
                 break;
             }
+            case render::Pass::strands:
+                break;
             case render::Pass::rasterise: {
                 list.begin("large list", {write(large_)}, true);
                 vkCmdFillBuffer(commands_, large_.handle(), 0, 4, 0);

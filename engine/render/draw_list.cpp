@@ -7,7 +7,8 @@ namespace stipple::render {
 static_assert(sizeof(shared::PointRecord) == 16);
 static_assert(sizeof(shared::DrawNode) == 80);
 static_assert(sizeof(shared::DrawBlock) == 8);
-static_assert(sizeof(shared::FrameConstants) == 164);
+static_assert(sizeof(shared::StrandSegment) == 32);
+static_assert(sizeof(shared::FrameConstants) == 168);
 static_assert(sizeof(shared::MeshVertex) == 32);
 static_assert(sizeof(shared::MeshCluster) == 12);
 static_assert(sizeof(shared::DrawMesh) == 104);
@@ -72,6 +73,9 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     out.meshes.clear();
     out.meshTextures.clear();
     out.meshDraws.clear();
+    out.strandNodes.clear();
+    out.strandBlocks.clear();
+    out.strandKeys.clear();
     out.lights.clear();
     out.clusters = 0;
     out.view = view;
@@ -101,11 +105,14 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
         d.count = draw.count;
         d.level = node.level;
         d.errorPixels = draw.errorPixels;
-        const auto index = static_cast<uint32_t>(out.nodes.size());
+        auto& nodes = h.isStrands ? out.strandNodes : out.nodes;
+        auto& blocks = h.isStrands ? out.strandBlocks : out.blocks;
+        static_assert(shared::kSegmentsPerBlock == shared::kRecordsPerBlock);
+        const auto index = static_cast<uint32_t>(nodes.size());
         for (uint32_t first = 0; first < draw.count; first += shared::kRecordsPerBlock)
-            out.blocks.push_back({index, first});
-        out.nodes.push_back(d);
-        out.keys.push_back({instance.source, draw.node});
+            blocks.push_back({index, first});
+        nodes.push_back(d);
+        (h.isStrands ? out.strandKeys : out.keys).push_back({instance.source, draw.node});
     }
     addMeshes(cut, cameraFromWorld, out);
     shared::FrameConstants& f = out.frame;
@@ -119,6 +126,7 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     f.nearPlane = static_cast<float>(view.nearPlane);
     f.supportScale = settings.supportScale;
     f.minimumRadius = settings.minimumRadius;
+    f.coverageSeed = settings.coverageSeed;
     f.shade = (settings.lit ? shared::kShadeLit : shared::kShadeUnlit) |
               (settings.unlitTriangles ? 0u : shared::kShadeTriangles);
     f.debugView = settings.debugView;

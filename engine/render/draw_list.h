@@ -12,6 +12,7 @@
 #include "shaders/shared/material.h"
 #include "shaders/shared/mesh.h"
 #include "shaders/shared/record.h"
+#include "shaders/shared/strand.h"
 #include "streaming/streamer.h"
 
 namespace stipple::render {
@@ -46,6 +47,9 @@ struct DrawList {
     std::vector<streaming::ChunkKey> keys;   ///< chunk of each node
     std::vector<shared::DrawMesh> meshes;    ///< instances of mesh stores that are in view
     std::vector<MeshTextures> meshTextures;  ///< of each of `meshes`
+    std::vector<shared::DrawNode> strandNodes;
+    std::vector<shared::DrawBlock> strandBlocks;  ///< kSegmentsPerBlock segments each
+    std::vector<streaming::ChunkKey> strandKeys;  ///< chunk of each of strandNodes
     std::vector<MeshDraw> meshDraws;
     std::vector<shared::LightSource> lights;
     std::shared_ptr<const Environment> environment;  ///< null: a sky without features
@@ -70,6 +74,7 @@ struct DrawSettings {
     std::vector<WorldLight> lights;  ///< none: a sun over the viewer's shoulder
     float supportScale = 1.0f;       ///< splat radius of the reconstruction / stored radius
     float minimumRadius = 1.0f;      ///< pixels
+    uint32_t coverageSeed = 0;       ///< of strands narrower than a pixel
 };
 
 void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,

@@ -18,6 +18,8 @@ const char* passName(Pass pass) {
             return "clear";
         case Pass::project:
             return "project";
+        case Pass::strands:
+            return "strands";
         case Pass::rasterise:
             return "rasterise";
         case Pass::resolve:
@@ -35,11 +37,12 @@ const char* passName(Pass pass) {
 std::vector<Pass> passesOf(Mode mode, const FrameContent& content) {
     std::vector<Pass> passes{Pass::clear};
     if (content.hasPoints) passes.push_back(Pass::project);
+    if (content.hasStrands) passes.push_back(Pass::strands);
     if (content.hasTriangles) passes.push_back(Pass::rasterise);
     passes.push_back(Pass::resolve);
     // Triangles keep their exact pixels: only splats are reconstructed. The last push and the shading are one pass:
     // each pixel is touched once.
-    if (mode == Mode::pullpush && content.hasPoints) {
+    if (mode == Mode::pullpush && (content.hasPoints || content.hasStrands)) {
         passes.push_back(Pass::pull);
         passes.push_back(Pass::push);
     }
@@ -52,10 +55,17 @@ namespace {
 /// Normals are stored along the store's own axes, and shaders know one rotation for all: a turned instance gets turned
 /// records.
 void turnNormals(const glm::dmat3& rotation, lod::Chunk& chunk) {
+    const auto turned = [&](uint32_t code) {
+        const shared::vec3 n = shared::octDecode(code);
+        return lod::octEncode(glm::vec3(rotation * glm::dvec3(n.x, n.y, n.z)));
+    };
+    for (shared::StrandSegment& s : chunk.segments) {
+        s.a.direction = turned(s.a.direction);
+        s.b.direction = turned(s.b.direction);
+    }
     for (shared::PointRecord& r : chunk.records) {
         if ((shared::recordFlags(r) & shared::kFlagNoNormal) != 0) continue;
-        const shared::vec3 n = shared::octDecode(r.normal);
-        r.normal = lod::octEncode(glm::vec3(rotation * glm::dvec3(n.x, n.y, n.z)));
+        r.normal = turned(r.normal);
     }
 }
 
@@ -155,7 +165,8 @@ Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSe
     makeDrawList(state.cut, state.hierarchies, state.instances, view, settings.draw, state.draws);
     RenderRequest request;
     request.draws = &state.draws;
-    request.passes = passesOf(settings.mode, {!state.draws.nodes.empty(), !state.draws.meshDraws.empty()});
+    request.passes = passesOf(
+        settings.mode, {!state.draws.nodes.empty(), !state.draws.meshDraws.empty(), !state.draws.strandNodes.empty()});
     request.wantDepthAndNormal = settings.wantDepthAndNormal;
     STIPPLE_TRY(state.backend->render(request, state.image));
 

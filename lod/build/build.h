@@ -30,7 +30,7 @@ struct BuildSettings {
 };
 
 struct BuildReport {
-    bool isMesh = false;  ///< the numbers below count triangles
+    std::string primitive = "point";  ///< what the numbers below count: point, triangle or segment
     uint64_t pointsIn = 0, pointsOut = 0;
     std::map<std::string, uint64_t> dropped;  ///< reason -> points
     uint64_t skippedFiles = 0;                ///< inputs that could not be opened (only with skipBad)

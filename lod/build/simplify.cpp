@@ -20,6 +20,7 @@
 #include "lod/attributes.h"
 #include "lod/build/aggregate.h"
 #include "lod/build/cloud.h"
+#include "lod/build/counts.h"
 #include "lod/build/morton.h"
 #include "lod/octahedral.h"
 #include "lod/store.h"
@@ -428,19 +429,6 @@ class Simplifier {
     std::vector<std::vector<Record>> records_;  ///< of inner nodes, until they are encoded
 };
 
-CodeCounts makeCounts(const std::vector<uint32_t>& histogram, uint32_t records, std::vector<uint32_t>& greaterThan) {
-    CodeCounts c;
-    c.first = static_cast<uint32_t>(greaterThan.size());
-    uint32_t lo = 0, hi = 255;
-    while (histogram[lo] == 0) ++lo;
-    while (histogram[hi] == 0) --hi;
-    c.lo = static_cast<uint8_t>(lo);
-    c.hi = static_cast<uint8_t>(hi);
-    uint32_t left = records;
-    for (uint32_t code = lo; code < hi; ++code) greaterThan.push_back(left -= histogram[code]);
-    return c;
-}
-
 }  // namespace
 
 Result<Hierarchy> simplifyAndWrite(Cloud& cloud, const Partition& partition, StoreWriter& writer, Executor& executor,
@@ -499,8 +487,8 @@ Result<Hierarchy> simplifyAndWrite(Cloud& cloud, const Partition& partition, Sto
         progress.update("simplify", levels - static_cast<uint32_t>(below), levels);
     }
     for (size_t i = 0; i < h.nodes.size(); ++i) {
-        h.nodes[i].parentCounts = makeCounts(parentHistograms[i], h.nodes[i].records, h.greaterThan);
-        h.nodes[i].ownCounts = makeCounts(ownHistograms[i], h.nodes[i].records, h.greaterThan);
+        h.nodes[i].parentCounts = makeCodeCounts(parentHistograms[i], h.nodes[i].records, h.greaterThan);
+        h.nodes[i].ownCounts = makeCodeCounts(ownHistograms[i], h.nodes[i].records, h.greaterThan);
     }
     return h;
 }

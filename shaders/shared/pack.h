@@ -63,6 +63,37 @@ SHARED_FN Texel unpackTexel(PackedTexel p) {
     t.offset = vec2(unpackLow(p.offset) * 4.0f * t.radius, unpackHigh(p.offset) * 4.0f * t.radius);
     t.normalPerp = vec2(unpackLow(p.normal), unpackHigh(p.normal));
     t.colour = vec3(unpackRed(p.colour), unpackGreen(p.colour), unpackBlue(p.colour));
+    t.isRound = 0.0f;
+    t.axis = vec2(0.0f, 0.0f);
+    return t;
+}
+
+// Of frames that may hold tubes. A thickness is never negative: its sign marks a texel of a tube, whose other 15 bits
+// and the normal word hold axis 12 + 12 and lean 12 + 11 (the thickness is the radius).
+SHARED_FN uint fixedBits(float v, float scale) {
+    return uint(int(floor((min(max(v, -1.0f), 1.0f) + 1.0f) * scale + 0.5f)));
+}
+SHARED_FN float fixedValue(uint bits, float scale) { return float(int(bits)) / scale - 1.0f; }
+SHARED_FN PackedTexel packAnyTexel(Texel t) {
+    PackedTexel p = packTexel(t);
+    const uint leanX = fixedBits(t.normalPerp.x, 2047.0f);
+    const uint leanY = fixedBits(t.normalPerp.y, 1023.0f);
+    const uint size = (p.size & 0xffffu) | 0x80000000u | (leanX >> 8) << 27 | leanY << 16;
+    const uint normal = fixedBits(t.axis.x, 2047.0f) | fixedBits(t.axis.y, 2047.0f) << 12 | (leanX & 255u) << 24;
+    p.size = t.isRound > 0.5f ? size : p.size;
+    p.normal = t.isRound > 0.5f ? normal : p.normal;
+    return p;
+}
+SHARED_FN Texel unpackAnyTexel(PackedTexel p) {
+    Texel t = unpackTexel(p);
+    const bool isRound = (p.size & 0x80000000u) != 0u;
+    const float leanX = fixedValue((p.size >> 27 & 15u) << 8 | p.normal >> 24, 2047.0f);
+    const float leanY = fixedValue(p.size >> 16 & 2047u, 1023.0f);
+    t.isRound = isRound ? 1.0f : 0.0f;
+    t.thickness = isRound ? t.radius : t.thickness;
+    t.normalPerp = vec2(isRound ? leanX : t.normalPerp.x, isRound ? leanY : t.normalPerp.y);
+    t.axis = vec2(isRound ? fixedValue(p.normal & 4095u, 2047.0f) : 0.0f,
+                  isRound ? fixedValue(p.normal >> 12 & 4095u, 2047.0f) : 0.0f);
     return t;
 }
 

@@ -21,6 +21,8 @@ struct Blend {
     float red;
     float green;
     float blue;
+    float axisX;
+    float axisY;
 };
 
 SHARED_FN Blend emptyBlend() {
@@ -36,6 +38,8 @@ SHARED_FN Blend emptyBlend() {
     b.red = 0.0f;
     b.green = 0.0f;
     b.blue = 0.0f;
+    b.axisX = 0.0f;
+    b.axisY = 0.0f;
     return b;
 }
 
@@ -52,10 +56,12 @@ SHARED_FN Blend addToBlend(Blend b, Texel t, float x, float y, float weight) {
     b.red += weight * t.colour.x;
     b.green += weight * t.colour.y;
     b.blue += weight * t.colour.z;
+    b.axisX += weight * t.axis.x;
+    b.axisY += weight * t.axis.y;
     return b;
 }
 
-SHARED_FN Texel texelFromBlend(Blend b) {
+SHARED_FN Texel texelFromBlend(Blend b, float isRound) {
     Texel t;
     const float s = b.weight > 0.0f ? 1.0f / b.weight : 0.0f;
     t.depth = b.depth * s;
@@ -64,8 +70,13 @@ SHARED_FN Texel texelFromBlend(Blend b) {
     t.offset = vec2(b.x * s, b.y * s);
     t.normalPerp = vec2(b.perpX * s, b.perpY * s);
     t.colour = vec3(b.red * s, b.green * s, b.blue * s);
+    t.isRound = isRound;
+    t.axis = vec2(b.axisX * s, b.axisY * s);
     return t;
 }
+
+// 1 for what may be merged: tubes with tubes, all else with all else, as the one says whose interval ends first.
+SHARED_FN float isLike(Texel t, float isRound) { return abs(t.isRound - isRound) < 0.5f ? 1.0f : 0.0f; }
 
 const float kFarAway = 3.0e38f;
 
@@ -104,16 +115,20 @@ SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSi
     const float t2 = thicknessWorld(c2, inverseFocal);
     const float t3 = thicknessWorld(c3, inverseFocal);
     const float back = min(min(d0 + t0, d1 + t1), min(d2 + t2, d3 + t3));
-    const float w0 = d0 < kFarAway && d0 - t0 <= back ? 1.0f : 0.0f;
-    const float w1 = d1 < kFarAway && d1 - t1 <= back ? 1.0f : 0.0f;
-    const float w2 = d2 < kFarAway && d2 - t2 <= back ? 1.0f : 0.0f;
-    const float w3 = d3 < kFarAway && d3 - t3 <= back ? 1.0f : 0.0f;
+    const float isRound = d0 + t0 <= back   ? c0.isRound
+                          : d1 + t1 <= back ? c1.isRound
+                          : d2 + t2 <= back ? c2.isRound
+                                            : c3.isRound;
+    const float w0 = d0 < kFarAway && d0 - t0 <= back ? isLike(c0, isRound) : 0.0f;
+    const float w1 = d1 < kFarAway && d1 - t1 <= back ? isLike(c1, isRound) : 0.0f;
+    const float w2 = d2 < kFarAway && d2 - t2 <= back ? isLike(c2, isRound) : 0.0f;
+    const float w3 = d3 < kFarAway && d3 - t3 <= back ? isLike(c3, isRound) : 0.0f;
     Blend b = emptyBlend();
     b = addToBlend(b, c0, x0, y0, w0);
     b = addToBlend(b, c1, x1, y1, w1);
     b = addToBlend(b, c2, x2, y2, w2);
     b = addToBlend(b, c3, x3, y3, w3);
-    Texel t = texelFromBlend(b);
+    Texel t = texelFromBlend(b, isRound);
     const float deepest = max(max(w0 * c0.depth, w1 * c1.depth), max(w2 * c2.depth, w3 * c3.depth));
     const float thickest = max(max(w0 * t0, w1 * t1), max(w2 * t2, w3 * t3));
     const float world = min(thickest + deepest - front, 2.0f * thickest);
@@ -124,7 +139,7 @@ SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSi
 
 // rho^2 of a coarse texel at (dx, dy) pixels from its splat's centre; kFarAway where it is empty.
 SHARED_FN float pushRho2(Texel t, float dx, float dy) {
-    const float rho2 = ellipseRho2(t.normalPerp, max(t.radius, 1.0e-3f), dx, dy);
+    const float rho2 = ellipseRho2(ellipseNormal(t), max(t.radius, 1.0e-3f), dx, dy);
     return t.depth > 0.0f ? rho2 : kFarAway;
 }
 SHARED_FN float kernelWeight(float rho2) {
@@ -205,10 +220,14 @@ SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, fl
     const float d2 = k2 > 0.0f ? q2.depth : kFarAway;
     const float d3 = k3 > 0.0f ? q3.depth : kFarAway;
     const float back = min(min(d0 + t0, d1 + t1), min(d2 + t2, d3 + t3));
-    const float w0 = d0 < kFarAway && d0 - t0 <= back ? k0 : 0.0f;
-    const float w1 = d1 < kFarAway && d1 - t1 <= back ? k1 : 0.0f;
-    const float w2 = d2 < kFarAway && d2 - t2 <= back ? k2 : 0.0f;
-    const float w3 = d3 < kFarAway && d3 - t3 <= back ? k3 : 0.0f;
+    const float isRound = d0 + t0 <= back   ? q0.isRound
+                          : d1 + t1 <= back ? q1.isRound
+                          : d2 + t2 <= back ? q2.isRound
+                                            : q3.isRound;
+    const float w0 = d0 < kFarAway && d0 - t0 <= back ? k0 * isLike(q0, isRound) : 0.0f;
+    const float w1 = d1 < kFarAway && d1 - t1 <= back ? k1 * isLike(q1, isRound) : 0.0f;
+    const float w2 = d2 < kFarAway && d2 - t2 <= back ? k2 * isLike(q2, isRound) : 0.0f;
+    const float w3 = d3 < kFarAway && d3 - t3 <= back ? k3 * isLike(q3, isRound) : 0.0f;
     Blend b = emptyBlend();
     b = addToBlend(b, q0, x0, y0, w0);
     b = addToBlend(b, q1, x1, y1, w1);
@@ -218,7 +237,7 @@ SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, fl
     const float isBehind = fine.depth > back ? 1.0f : 0.0f;
     const float isEmpty = fine.depth <= 0.0f ? 1.0f : 0.0f;
     const bool replace = hasBlend * (isBehind + isEmpty) > 0.5f;
-    const Texel blended = texelFromBlend(b);
+    const Texel blended = texelFromBlend(b, isRound);
     Texel t;
     t.depth = replace ? blended.depth : fine.depth;
     t.radius = replace ? blended.radius : fine.radius;
@@ -228,6 +247,8 @@ SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, fl
         vec2(replace ? blended.normalPerp.x : fine.normalPerp.x, replace ? blended.normalPerp.y : fine.normalPerp.y);
     t.colour = vec3(replace ? blended.colour.x : fine.colour.x, replace ? blended.colour.y : fine.colour.y,
                     replace ? blended.colour.z : fine.colour.z);
+    t.isRound = replace ? blended.isRound : fine.isRound;
+    t.axis = vec2(replace ? blended.axis.x : fine.axis.x, replace ? blended.axis.y : fine.axis.y);
     return t;
 }
 

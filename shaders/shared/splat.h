@@ -15,6 +15,11 @@ struct Texel {
     vec2 offset;      // centre of the splat - centre of the texel, pixels; below three radii
     vec2 normalPerp;  // the eye-facing normal's components perpendicular to the view direction
     vec3 colour;      // linear
+    // Of a tube (ALGORITHMS 1.4, lines): its disc faces the eye, `normalPerp` says how the tube leans instead: t_v
+    // t_perp, with t the unit tangent, t_v along the view and t_perp across; `axis` is (tx^2 - ty^2, 2 tx ty), which
+    // does not care which way the tangent points. Thickness equals the radius.
+    float isRound;  // 1 or 0
+    vec2 axis;
 };
 
 const float kThicknessRadii = 0.25f;  // kappa of ALGORITHMS 1.4
@@ -36,6 +41,12 @@ SHARED_FN float facingSquared(vec2 normalPerp, float radius) {
     const float m2 = 1.0f - normalPerp.x * normalPerp.x - normalPerp.y * normalPerp.y;
     const float floor2 = 0.25f / (radius * radius);
     return min(max(m2, floor2), 1.0f);
+}
+
+// The normal that the ellipse test takes: that of a tube faces the eye.
+SHARED_FN vec2 ellipseNormal(Texel t) {
+    const float flat_ = 1.0f - t.isRound;
+    return vec2(t.normalPerp.x * flat_, t.normalPerp.y * flat_);
 }
 
 // rho^2 of a point at (dx, dy) pixels from the centre: inside the ellipse iff <= 1.
@@ -61,6 +72,8 @@ SHARED_FN Texel texelFromSplat(vec3 c, vec3 n, float radiusWorld, float focal, f
     t.thickness = t.radius * (kThicknessRadii + sqrt(max(1.0f - facing * facing, 0.0f)));
     t.offset = vec2(0.0f, 0.0f);
     t.colour = vec3(0.0f, 0.0f, 0.0f);
+    t.isRound = 0.0f;
+    t.axis = vec2(0.0f, 0.0f);
     return t;
 }
 

@@ -322,7 +322,7 @@ Result<BuildReport> buildMeshStore(TriangleMesh input, const std::string& output
     BuildReport report;
     StageClock clock(report);
     STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output));
-    report.isMesh = true;
+    report.primitive = "triangle";
     report.pointsIn = input.indices.size() / 3;
     const WeldedMesh mesh = weldMesh(std::move(input), executor);
     clock.ends("weld");

@@ -1,0 +1,246 @@
+// Ribbons and tubes of the cpu backend: segments as lines into the visibility buffer, and texels back out of it.
+// Included by kernels.inl.
+
+[[gnu::always_inline]] inline CameraSegment cameraSegment(const FrameConstants& f, const DrawNode& node,
+                                                          const StrandSegment& s) {
+    const auto place = [&](const StrandVertex& v) {
+        const float x = float(int(v.positionXY & 0xffffu)), y = float(int(v.positionXY >> 16)),
+                    z = float(int(v.positionZ & 0xffffu));
+        return vec3(node.base.x + node.axisX.x * x + node.axisY.x * y + node.axisZ.x * z,
+                    node.base.y + node.axisX.y * x + node.axisY.y * y + node.axisZ.y * z,
+                    node.base.z + node.axisX.z * x + node.axisY.z * y + node.axisZ.z * z);
+    };
+    const auto direct = [&](const StrandVertex& v) {
+        const vec3 d = octDecode(v.direction);
+        return vec3(f.viewX.x * d.x + f.viewX.y * d.y + f.viewX.z * d.z,
+                    f.viewY.x * d.x + f.viewY.y * d.y + f.viewY.z * d.z,
+                    f.viewZ.x * d.x + f.viewZ.y * d.y + f.viewZ.z * d.z);
+    };
+    CameraSegment c;
+    c.a = place(s.a);
+    c.b = place(s.b);
+    c.radiusA = strandRadius(s.a, node.edge);
+    c.radiusB = strandRadius(s.b, node.edge);
+    c.directionA = direct(s.a);
+    c.directionB = direct(s.b);
+    c.isRound = float(int(s.a.positionZ >> 31));
+    return c;
+}
+
+/// The eight words of one segment out of a plain array of them.
+[[gnu::always_inline]] inline StrandSegment segmentAt(const uint32_t* __restrict words, size_t i) {
+    StrandSegment s;
+    s.a.positionXY = words[8 * i];
+    s.a.positionZ = words[8 * i + 1];
+    s.a.direction = words[8 * i + 2];
+    s.a.colour = words[8 * i + 3];
+    s.b.positionXY = words[8 * i + 4];
+    s.b.positionZ = words[8 * i + 5];
+    s.b.direction = words[8 * i + 6];
+    s.b.colour = words[8 * i + 7];
+    return s;
+}
+
+/// Projected segments of a block, as what its lines need.
+struct Lines {
+    alignas(64) float xa[kSegmentsPerBlock], ya[kSegmentsPerBlock], xb[kSegmentsPerBlock], yb[kSegmentsPerBlock];
+    alignas(64) float inverseA[kSegmentsPerBlock], inverseB[kSegmentsPerBlock];
+    alignas(64) float halfA[kSegmentsPerBlock], halfB[kSegmentsPerBlock];  ///< seen half-widths, px
+    alignas(64) float nearerA[kSegmentsPerBlock], nearerB[kSegmentsPerBlock];  ///< depth of the surface / of the axis
+    alignas(64) uint32_t keep[kSegmentsPerBlock];
+};
+
+/// Pixels of one line. x: the axis along which it is longer; `at(column, row)` is the pixel's index or ~0.
+struct LineEnds {
+    float xa, ya, xb, yb;
+    uint32_t columns;
+    uint32_t stepX, stepY, rows;  ///< index of a pixel: column * stepX + row * stepY
+};
+
+void drawLine(const FrameConstants& f, const Lines& lines, size_t i, LineEnds e, uint32_t id, uint64_t* visibility) {
+    float ia = lines.inverseA[i], ib = lines.inverseB[i], wa = lines.halfA[i], wb = lines.halfB[i],
+          fa = lines.nearerA[i], fb = lines.nearerB[i];
+    if (e.xb < e.xa) {
+        exchange(e.xa, e.xb);
+        exchange(e.ya, e.yb);
+        exchange(ia, ib);
+        exchange(wa, wb);
+        exchange(fa, fb);
+    }
+    const float length = e.xb - e.xa;
+    const float first = max(std::ceil(e.xa - 0.5f), 0.0f);
+    const float last = min(std::ceil(e.xb - 0.5f) - 1.0f, float(int(e.columns)) - 1.0f);
+    if (!(first <= last) || !(length > 0)) return;
+    const float slope = (e.yb - e.ya) / length, longer = std::sqrt(1.0f + slope * slope);
+    const int end = int(last);
+    for (int x = int(first); x <= end; ++x) {
+        const float u = (float(x) + 0.5f - e.xa) / length;
+        const float y = e.ya + u * (e.yb - e.ya);
+        if (!(y >= 0 && y < float(int(e.rows)))) continue;
+        const uint32_t pixel = uint32_t(x) * e.stepX + uint32_t(int(y)) * e.stepY;
+        const float half = wa + u * (wb - wa);
+        if (half < kNarrow && coverageThreshold(pixel, id, f.coverageSeed) >= 2.0f * half * longer) continue;
+        offer(visibility, pixel, (ia + u * (ib - ia)) / (fa + u * (fb - fa)), id);
+    }
+}
+
+void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_t count, uint32_t firstId,
+                  uint64_t* visibility) {
+    const FrameConstants f = frame;
+    const DrawNode node = *block.node;
+    const uint32_t* __restrict const words = &block.segments->a.positionXY;
+    Lines lines;
+#pragma GCC ivdep
+    for (size_t i = 0; i < count; ++i) {
+        const StrandSegment s = segmentAt(words, i);
+        const CameraSegment c = cameraSegment(f, node, s);
+        const ScreenSegment p = projectSegment(c.a, c.b, f.focal, f.centre.x, f.centre.y, f.nearPlane);
+        const vec3 t = segmentTangent(c);
+        const auto at = [&](float place) {
+            return vec3(c.a.x + place * (c.b.x - c.a.x), c.a.y + place * (c.b.y - c.a.y),
+                        max(c.a.z + place * (c.b.z - c.a.z), f.nearPlane));
+        };
+        const vec3 a = at(p.from), b = at(p.to);
+        const float ra = c.radiusA + p.from * (c.radiusB - c.radiusA), rb = c.radiusA + p.to * (c.radiusB - c.radiusA);
+        // The same depth that the texel gets: that of the surface over the axis.
+        const auto nearer = [&](const vec3& end, float radius) {
+            const float distance = std::sqrt(max(dot(end, end), 1.0e-30f));
+            const float tv = dot(t, end) / distance;
+            const float front = min(min(radius / std::sqrt(max(1.0f - tv * tv, 1.0e-6f)), 4.0f * radius), 0.9f * distance);
+            return c.isRound > 0.5f ? 1.0f - front / distance : 1.0f;
+        };
+        lines.xa[i] = p.xa;
+        lines.ya[i] = p.ya;
+        lines.xb[i] = p.xb;
+        lines.yb[i] = p.yb;
+        lines.inverseA[i] = 1.0f / p.za;
+        lines.inverseB[i] = 1.0f / p.zb;
+        lines.halfA[i] = seenHalfWidth(a, ra, t, c.directionA, c.isRound, f.focal);
+        lines.halfB[i] = seenHalfWidth(b, rb, t, c.directionB, c.isRound, f.focal);
+        lines.nearerA[i] = nearer(a, ra);
+        lines.nearerB[i] = nearer(b, rb);
+        const bool isFine = (segmentErrorCode(s) <= node.errorCode) | ((segmentOctants(s) & node.octantMask) != 0u);
+        lines.keep[i] = (isFine & (p.isThere > 0.5f)) ? 1u : 0u;
+    }
+    const float width = float(f.width), height = float(f.height);
+    for (size_t i = 0; i < count; ++i) {
+        if (lines.keep[i] == 0) continue;
+        const float xa = lines.xa[i], ya = lines.ya[i], xb = lines.xb[i], yb = lines.yb[i];
+        if (max(xa, xb) < 0 || max(ya, yb) < 0 || min(xa, xb) >= width || min(ya, yb) >= height) continue;
+        const uint32_t id = kKindStrand | (firstId + uint32_t(i));
+        const float dx = std::fabs(xb - xa), dy = std::fabs(yb - ya);
+        if (dx >= dy)
+            drawLine(f, lines, i, {xa, ya, xb, yb, f.width, 1, f.width, f.height}, id, visibility);
+        else
+            drawLine(f, lines, i, {ya, xa, yb, xb, f.height, f.width, 1, f.width}, id, visibility);
+        // Every vertex as a point: a segment that is seen along its axis has no line.
+        const auto point = [&](float x, float y, float inverse, float half, float nearer) {
+            if (!(x >= 0 && y >= 0 && x < width && y < height)) return;
+            const uint32_t pixel = uint32_t(int(y)) * f.width + uint32_t(int(x));
+            const float dot_ = 3.14159265f * half * half * (1.0f - max(dx, dy) / max(2.0f * half, 1.0e-6f));
+            if (half < kNarrow && coverageThreshold(pixel, ~id, f.coverageSeed) >= dot_) return;
+            offer(visibility, pixel, inverse / nearer, id);
+        };
+        point(xa, ya, lines.inverseA[i], lines.halfA[i], lines.nearerA[i]);
+        point(xb, yb, lines.inverseB[i], lines.halfB[i], lines.nearerB[i]);
+    }
+}
+
+/// Texels of the pixels that show strands.
+void resolveStrands(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, uint32_t x0, uint32_t y,
+                    TexelRow& __restrict row, float& largestRadius) {
+    struct Ends {
+        alignas(64) float ax[kTile], ay[kTile], az[kTile], bx[kTile], by[kTile], bz[kTile];
+        alignas(64) float dax[kTile], day[kTile], daz[kTile], dbx[kTile], dby[kTile], dbz[kTile];
+        alignas(64) float ra[kTile], rb[kTile], isRound[kTile];
+        alignas(64) uint32_t colourA[kTile], colourB[kTile];
+    } e;
+    const size_t n = p.count;
+    for (size_t i = 0; i < n; ++i) {
+        const StrandBlock& block = in.strandBlocks[p.id[i] / kSegmentsPerBlock];
+        const StrandSegment& s = block.segments[p.id[i] % kSegmentsPerBlock];
+        const CameraSegment c = cameraSegment(f, *block.node, s);
+        e.ax[i] = c.a.x;
+        e.ay[i] = c.a.y;
+        e.az[i] = c.a.z;
+        e.bx[i] = c.b.x;
+        e.by[i] = c.b.y;
+        e.bz[i] = c.b.z;
+        e.dax[i] = c.directionA.x;
+        e.day[i] = c.directionA.y;
+        e.daz[i] = c.directionA.z;
+        e.dbx[i] = c.directionB.x;
+        e.dby[i] = c.directionB.y;
+        e.dbz[i] = c.directionB.z;
+        e.ra[i] = c.radiusA;
+        e.rb[i] = c.radiusB;
+        e.isRound[i] = c.isRound;
+        e.colourA[i] = s.a.colour;
+        e.colourB[i] = s.b.colour;
+        if (f.debugView == kDebugLevel || f.debugView == kDebugError) {
+            const vec3 d = f.debugView == kDebugLevel ? debugLevelColour(block.node->level)
+                                                      : debugErrorColour(block.node->errorPixels);
+            const auto byte = [](float l) { return uint32_t(int(srgbFromLinear(l) * 255.0f + 0.5f)); };
+            e.colourA[i] = e.colourB[i] = byte(d.x) | byte(d.y) << 8 | byte(d.z) << 16;
+        }
+    }
+    struct Out {
+        alignas(64) float depth[kTile], radius[kTile], thickness[kTile], x[kTile], y[kTile], perpX[kTile], perpY[kTile],
+            red[kTile], green[kTile], blue[kTile], isRound[kTile], axisX[kTile], axisY[kTile];
+    } o;
+    const float focal = f.focal, cx = f.centre.x - float(int(x0)) - 0.5f, cy = f.centre.y - float(int(y)) - 0.5f;
+    const float nearPlane = f.nearPlane, support = f.supportScale;
+    const vec3 sun = f.sunDirection;
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        CameraSegment s;
+        s.a = vec3(e.ax[i], e.ay[i], e.az[i]);
+        s.b = vec3(e.bx[i], e.by[i], e.bz[i]);
+        s.radiusA = e.ra[i];
+        s.radiusB = e.rb[i];
+        s.directionA = vec3(e.dax[i], e.day[i], e.daz[i]);
+        s.directionB = vec3(e.dbx[i], e.dby[i], e.dbz[i]);
+        s.isRound = e.isRound[i];
+        const float px = float(int(p.pixel[i]));
+        // Image coordinates from this pixel's centre on, so that the low bits are kept.
+        const ScreenSegment on = projectSegment(s.a, s.b, focal, cx - px, cy, nearPlane);
+        const float place = segmentParameter(on, 0.0f, 0.0f);
+        const Texel t = texelFromStrand(s, place, support, focal, nearPlane, sun);
+        const float z = max(s.a.z + place * (s.b.z - s.a.z), nearPlane), scale = focal / z;
+        o.depth[i] = t.depth;
+        o.radius[i] = t.radius;
+        o.thickness[i] = t.thickness;
+        o.x[i] = (s.a.x + place * (s.b.x - s.a.x)) * scale + (cx - px);
+        o.y[i] = (s.a.y + place * (s.b.y - s.a.y)) * scale + cy;
+        o.perpX[i] = t.normalPerp.x;
+        o.perpY[i] = t.normalPerp.y;
+        o.isRound[i] = t.isRound;
+        o.axisX[i] = t.axis.x;
+        o.axisY[i] = t.axis.y;
+        const auto mix = [&](uint32_t shift) {
+            const float a = linearFromByte(float(int(e.colourA[i] >> shift & 255u)) * (1.0f / 255.0f));
+            const float b = linearFromByte(float(int(e.colourB[i] >> shift & 255u)) * (1.0f / 255.0f));
+            return a + place * (b - a);
+        };
+        o.red[i] = mix(0);
+        o.green[i] = mix(8);
+        o.blue[i] = mix(16);
+    }
+    for (size_t i = 0; i < n; ++i) {
+        const size_t at = kPad + p.pixel[i];
+        row.depth[at] = o.depth[i];
+        row.radius[at] = o.radius[i];
+        row.thickness[at] = o.thickness[i];
+        row.x[at] = o.x[i];
+        row.y[at] = o.y[i];
+        row.perpX[at] = o.perpX[i];
+        row.perpY[at] = o.perpY[i];
+        row.red[at] = o.red[i];
+        row.green[at] = o.green[i];
+        row.blue[at] = o.blue[i];
+        row.isRound[at] = o.isRound[i];
+        row.axisX[at] = o.axisX[i];
+        row.axisY[at] = o.axisY[i];
+        largestRadius = max(largestRadius, o.radius[i]);
+    }
+}

@@ -1,0 +1,178 @@
+// From the strands of the children to those of their parent: fewer vertices, then fewer strands.
+//
+// Merging: a run of parts becomes one, as long as every point left out is near the chord. Matched by arc length both
+// are piecewise linear, so the largest distance lies at a point: |p - q| + |r - rho| bounds the Hausdorff distance of
+// the swept balls, and what a ribbon's edge moves by turning is added. Errors add up level by level.
+//
+// Drawing by lot (Cook et al. 2007): where strands are thinner than the error and still too many, those with the
+// smallest hash survive, wider by what went (so that the area stays) and with less contrast (a mean of n colours varies
+// by 1/sqrt(n)). What wider strands are too wide by is part of the bound; where the lost ones were is a matter of
+// chance.
+#include <algorithm>
+#include <cmath>
+
+#include "lod/build/strands/strand_work.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr size_t kLongestRun = 64;    ///< parts that are merged into one
+constexpr double kFewestKept = 0.25;  ///< of one level
+constexpr int kColourStep = 48;       ///< sRGB steps from which colours count as different, as for points
+
+class Merger {
+  public:
+    Merger(const std::vector<StrandPoint>& points, const std::vector<uint8_t>& isRibbon,
+           const std::vector<StrandPart>& children, const StrandLevel& level)
+        : points_(points), isRibbon_(isRibbon), children_(children), level_(level) {}
+
+    StrandMerge run() {
+        StrandMerge out;
+        out.standsFor.resize(children_.size());
+        for (size_t first = 0; first < children_.size();) {
+            size_t end = first + 1;
+            while (end < children_.size() && children_[end - 1].b == children_[end].a &&
+                   children_[end - 1].scale == children_[end].scale)
+                ++end;
+            mergeChain(first, end, out);
+            first = end;
+        }
+        return out;
+    }
+
+  private:
+    void mergeChain(size_t first, size_t end, StrandMerge& out) const {
+        for (size_t i = first; i < end;) {
+            size_t k = i + 1;
+            double deviation = 0;
+            while (k < end && k - i < kLongestRun) {
+                const double d = deviationOf(i, k + 1);
+                if (d > level_.tolerance) break;
+                deviation = d;
+                ++k;
+            }
+            StrandPart part = children_[i];
+            part.b = children_[k - 1].b;
+            part.colourB = children_[k - 1].colourB;
+            double below = 0;
+            part.octants = 0;
+            for (size_t c = i; c < k; ++c) {
+                below = std::max(below, children_[c].error);
+                part.octants |= children_[c].octants;
+                out.standsFor[c] = static_cast<uint32_t>(out.parts.size());
+            }
+            part.error = below + deviation + level_.rounding;
+            out.parts.push_back(part);
+            i = k;
+        }
+    }
+
+    /// Of the chord over children [i, k).
+    double deviationOf(size_t i, size_t k) const {
+        const StrandPoint &a = points_[children_[i].a], &b = points_[children_[k - 1].b];
+        const float scale = children_[i].scale;
+        double whole = 0;
+        for (size_t c = i; c < k; ++c) whole += lengthOf(children_[c]);
+        const bool isRibbon = isRibbon_[a.strand] != 0;
+        double at = 0, worst = 0;
+        for (size_t c = i; c + 1 < k; ++c) {
+            at += lengthOf(children_[c]);
+            const double u = whole > 0 ? at / whole : 0;
+            const StrandPoint& p = points_[children_[c].b];
+            double d = glm::length(p.p - glm::mix(a.p, b.p, u)) +
+                       scale * std::abs(p.radius - ((1 - u) * a.radius + u * b.radius));
+            if (isRibbon) {
+                const glm::dvec3 n = glm::mix(glm::dvec3(a.direction), glm::dvec3(b.direction), u);
+                const double length = glm::length(n);
+                d += scale * static_cast<double>(p.radius) *
+                     (length > 0.1 ? glm::length(glm::dvec3(p.direction) - n / length) : 2.0);
+            }
+            for (uint32_t shift = 0; shift < 24; shift += 8) {
+                const double mixed =
+                    (1 - u) * (children_[i].colourA >> shift & 255u) + u * (children_[k - 1].colourB >> shift & 255u);
+                if (std::abs(mixed - (children_[c].colourB >> shift & 255u)) > kColourStep) d += 0.5 * whole;
+            }
+            worst = std::max(worst, d);
+        }
+        return worst;
+    }
+    double lengthOf(const StrandPart& p) const { return glm::length(points_[p.b].p - points_[p.a].p); }
+
+    const std::vector<StrandPoint>& points_;
+    const std::vector<uint8_t>& isRibbon_;
+    const std::vector<StrandPart>& children_;
+    const StrandLevel& level_;
+};
+
+/// Number of a strand in the order in which strands are left out; has nothing to do with where they are.
+uint32_t lotOf(uint32_t strand) {
+    uint32_t h = strand * 0x9e3779b1u;
+    h ^= h >> 16;
+    h *= 0x7feb352du;
+    h ^= h >> 15;
+    h *= 0x846ca68bu;
+    return h ^ h >> 16;
+}
+
+void drawLots(const std::vector<StrandPoint>& points, const StrandLevel& level, StrandMerge& merge) {
+    std::vector<StrandPart>& parts = merge.parts;
+    std::vector<uint32_t> lots;
+    for (const StrandPart& p : parts) lots.push_back(lotOf(points[p.a].strand));
+    std::vector<uint32_t> order = lots;
+    const auto wanted = static_cast<size_t>(
+        std::max(kFewestKept * static_cast<double>(parts.size()), static_cast<double>(level.mostParts)));
+    std::nth_element(order.begin(), order.begin() + static_cast<ptrdiff_t>(wanted), order.end());
+    const uint32_t limit = order[wanted];
+    double areaBefore = 0, areaAfter = 0;
+    glm::dvec3 sum(0);
+    const auto areaOf = [&](const StrandPart& p) {
+        return glm::length(points[p.b].p - points[p.a].p) *
+               (static_cast<double>(points[p.a].radius) + points[p.b].radius) * p.scale;
+    };
+    for (size_t i = 0; i < parts.size(); ++i) {
+        const double area = areaOf(parts[i]);
+        areaBefore += area;
+        areaAfter += lots[i] < limit ? area : 0;
+        for (int c = 0; c < 3; ++c) sum[c] += area * (parts[i].colourA >> (8 * c) & 255u);
+    }
+    if (!(areaAfter > 0)) return;
+    const auto wider = static_cast<float>(areaBefore / areaAfter);
+    const double contrast = 1 / std::sqrt(static_cast<double>(wider));
+    const auto softer = [&](uint32_t colour) {
+        uint32_t out = 0;
+        for (int c = 0; c < 3; ++c) {
+            const double mean = sum[c] / areaBefore;
+            out |= static_cast<uint32_t>(std::lround(mean + contrast * ((colour >> (8 * c) & 255u) - mean))) << (8 * c);
+        }
+        return out;
+    };
+    std::vector<StrandPart> kept;
+    std::vector<uint32_t> place(parts.size(), kDrawnByLot);
+    for (size_t i = 0; i < parts.size(); ++i) {
+        if (lots[i] >= limit) continue;
+        StrandPart p = parts[i];
+        const double grown = std::max(points[p.a].radius, points[p.b].radius) * (double{wider} - 1) * p.scale;
+        p.scale *= wider;
+        p.colourA = softer(p.colourA);
+        p.colourB = softer(p.colourB);
+        merge.commonError = std::max(merge.commonError, p.error + grown);
+        place[i] = static_cast<uint32_t>(kept.size());
+        kept.push_back(p);
+    }
+    for (const StrandPart& p : parts) merge.commonError = std::max(merge.commonError, p.error);
+    for (StrandPart& p : kept) p.error = merge.commonError;
+    for (uint32_t& s : merge.standsFor) s = place[s];
+    merge.kept = areaAfter / areaBefore;
+    parts = std::move(kept);
+}
+
+}  // namespace
+
+StrandMerge mergeParts(const std::vector<StrandPoint>& points, const std::vector<uint8_t>& isRibbon,
+                       const std::vector<StrandPart>& children, const StrandLevel& level) {
+    StrandMerge merge = Merger(points, isRibbon, children, level).run();
+    if (merge.parts.size() > level.mostParts) drawLots(points, level, merge);
+    return merge;
+}
+
+}  // namespace stipple::lod

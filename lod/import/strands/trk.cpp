@@ -1,0 +1,72 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <cstring>
+
+#include "lod/import/strands/strand_readers.h"
+
+namespace stipple::lod {
+namespace {
+
+template <typename T>
+T valueAt(const std::vector<uint8_t>& bytes, size_t at) {
+    T v;
+    std::memcpy(&v, bytes.data() + at, sizeof(v));
+    return v;
+}
+
+}  // namespace
+
+// Header of 1000 bytes (TrackVis, version 2), then for each track its number of points, the points with their scalars,
+// and its properties.
+Result<StrandSet> readTrk(const std::vector<uint8_t>& bytes, const std::string& path) {
+    constexpr size_t kHeader = 1000;
+    if (bytes.size() < kHeader || std::memcmp(bytes.data(), "TRACK", 5) != 0)
+        return fail(ErrorKind::input, "is no TrackVis file: the header of 1000 bytes that begins with TRACK is missing",
+                    path, "a .gz file has to be unpacked first");
+    if (valueAt<int32_t>(bytes, 996) != static_cast<int32_t>(kHeader))
+        return fail(ErrorKind::input, "has another byte order than this machine", path);
+    const int scalars = valueAt<int16_t>(bytes, 36), properties = valueAt<int16_t>(bytes, 238);
+    if (scalars < 0 || properties < 0)
+        return fail(ErrorKind::input, fmt::format("claims {} scalars and {} properties", scalars, properties), path);
+    glm::dvec3 voxel(0);
+    glm::dmat4 toWorld(1);
+    for (int a = 0; a < 3; ++a) voxel[a] = double{valueAt<float>(bytes, 12 + 4 * static_cast<size_t>(a))};
+    const bool hasMatrix = valueAt<float>(bytes, 440 + 60) != 0 && voxel.x > 0 && voxel.y > 0 && voxel.z > 0;
+    for (int r = 0; hasMatrix && r < 4; ++r)
+        for (int c = 0; c < 4; ++c)
+            toWorld[c][r] = double{valueAt<float>(bytes, 440 + 4 * static_cast<size_t>(4 * r + c))};
+    StrandSet out;
+    out.hasColour = true;
+    const size_t pointBytes = 4 * (3 + static_cast<size_t>(scalars));
+    for (size_t at = kHeader; at < bytes.size();) {
+        const std::string where = fmt::format("track {}, at byte {}", out.strands() + 1, at);
+        if (bytes.size() - at < 4) return fail(ErrorKind::input, where + ": the file ends within it", path);
+        const auto count = valueAt<int32_t>(bytes, at);
+        at += 4;
+        const size_t left = bytes.size() - at, rest = 4 * static_cast<size_t>(properties);
+        if (count < 0 || left < rest || static_cast<size_t>(count) > (left - rest) / pointBytes)
+            return fail(ErrorKind::input, fmt::format("{}: {} points do not fit into the file", where, count), path,
+                        "it is not whole");
+        const size_t first = out.position.size();
+        for (int32_t k = 0; k < count; ++k, at += pointBytes) {
+            glm::dvec3 p(valueAt<float>(bytes, at), valueAt<float>(bytes, at + 4), valueAt<float>(bytes, at + 8));
+            if (hasMatrix) p = glm::dvec3(toWorld * glm::dvec4(p / voxel - 0.5, 1));
+            out.addVertex(p, 0, glm::vec3(0), 0);
+        }
+        at += rest;
+        // Red, green and blue say how much a streamline runs along x, y and z.
+        for (size_t i = first; i < out.position.size(); ++i) {
+            const glm::dvec3 d =
+                out.position[std::min(i + 1, out.position.size() - 1)] - out.position[i > first ? i - 1 : first];
+            const glm::dvec3 c = glm::length(d) > 0 ? glm::abs(glm::normalize(d)) : glm::dvec3(0.5);
+            for (int a = 0; a < 3; ++a)
+                out.colour[i] |= static_cast<uint32_t>(std::isfinite(c[a]) ? 40 + 215 * c[a] : 128) << (8 * a);
+        }
+        out.endStrand(false);
+    }
+    return out;
+}
+
+}  // namespace stipple::lod

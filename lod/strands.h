@@ -1,0 +1,43 @@
+// Ribbons and tubes: polylines with a radius at each vertex. What readers give and the build takes.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace stipple::lod {
+
+/// Many polylines; arrays of vertices are as long as `position`, arrays of strands one shorter than `first`.
+struct StrandSet {
+    std::vector<glm::dvec3> position;
+    std::vector<float> radius;       ///< world units; a ribbon's half-width
+    std::vector<glm::vec3> normal;   ///< of ribbons, any length; zero: not known
+    std::vector<uint32_t> colour;    ///< sRGB
+    std::vector<uint32_t> first{0};  ///< first vertex of each strand, and the end
+    std::vector<uint8_t> isRibbon;
+    bool hasColour = false;  ///< colours of the file's own
+    glm::dvec3 up{0, 0, 1};
+    std::map<std::string, uint64_t> dropped;  ///< reason -> what was left out or mended
+    std::vector<std::string> notes;
+    size_t strands() const { return isRibbon.size(); }
+    void addVertex(const glm::dvec3& p, float r, const glm::vec3& n, uint32_t c) {
+        position.push_back(p);
+        radius.push_back(r);
+        normal.push_back(n);
+        colour.push_back(c);
+    }
+    /// Ends the strand whose vertices were added since the last call.
+    void endStrand(bool ribbon) {
+        first.push_back(static_cast<uint32_t>(position.size()));
+        isRibbon.push_back(ribbon ? 1 : 0);
+    }
+};
+
+/// Drops what cannot be drawn (single vertices, no length, not finite), repeats, and fills what is missing: radii of
+/// `defaultRadius` (0: a 4000th of the extent) where there is none, normals of ribbons by the least turning along the
+/// strand. Twists of more than a sixth of a turn between two vertices get vertices of their own.
+StrandSet cleanStrands(StrandSet in, double defaultRadius);
+
+}  // namespace stipple::lod

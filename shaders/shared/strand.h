@@ -1,0 +1,219 @@
+// Ribbons and tubes (Marroquim, Kraus, Cavalcanti 2008, section 4; ALGORITHMS 1.4, lines): a segment of a polyline is
+// drawn as a line one pixel wide, and each of its pixels becomes a texel of the reconstruction: a disc as wide as the
+// strand there, along the surface (ribbon) or facing the eye (tube).
+#ifndef STIPPLE_SHARED_STRAND_H
+#define STIPPLE_SHARED_STRAND_H
+#include "splat.h"
+SHARED_BEGIN
+
+// Positions are steps of 1/32768 of the node's cell, counted from half a cell before it: a segment belongs to the cell
+// of its middle and may reach beyond.
+struct StrandVertex {
+    uint positionXY;
+    uint positionZ;  // z 16 | radius 15, the upper bits of an fp32 in cells | of the first vertex: is a tube
+    uint direction;  // octahedral: normal of a ribbon, tangent of a tube
+    uint colour;     // sRGB | of the first vertex: own error code, of the second: octants whose children it stands for
+};
+struct StrandSegment {
+    StrandVertex a;
+    StrandVertex b;
+};
+
+const float kStrandMargin = 0.5f;  // cells
+const float kStrandCells = 2.0f;   // across all positions
+const uint kKindStrand = 0x40000000u;
+const uint kSegmentsPerBlock = 256u;
+const float kNarrow = 0.5f;  // px: a strand of a smaller half-width keeps its own pixels, with some probability
+
+SHARED_FN float strandRadius(StrandVertex v, float edge) {
+    return uintBitsToFloat((v.positionZ >> 16 & 0x7fffu) << 16) * edge;
+}
+SHARED_FN uint strandRadiusCode(float radiusInCells) {
+    const uint code = (floatBitsToUint(max(radiusInCells, 0.0f)) + 0x8000u) >> 16;
+    return code < 0x7f00u ? code : 0x7f00u;
+}
+SHARED_FN bool isTube(StrandSegment s) { return s.a.positionZ >> 31 != 0u; }
+SHARED_FN uint segmentErrorCode(StrandSegment s) { return s.a.colour >> 24; }
+SHARED_FN uint segmentOctants(StrandSegment s) { return s.b.colour >> 24; }
+
+// A segment in camera space.
+struct CameraSegment {
+    vec3 a;
+    vec3 b;
+    float radiusA;  // world units
+    float radiusB;
+    vec3 directionA;  // camera space
+    vec3 directionB;
+    float isRound;
+};
+
+// Projected: image positions, and where on the segment what lies before the near plane begins and ends.
+struct ScreenSegment {
+    float xa;
+    float ya;
+    float xb;
+    float yb;
+    float za;
+    float zb;
+    float from;  // 0 to 1, along the segment
+    float to;
+    float isThere;  // 0: all behind the near plane
+};
+SHARED_FN ScreenSegment projectSegment(vec3 a, vec3 b, float focal, float cx, float cy, float nearPlane) {
+    ScreenSegment s;
+    const float dz = b.z - a.z;
+    const float crossing = abs(dz) > 0.0f ? (nearPlane - a.z) / dz : 0.0f;
+    s.from = a.z < nearPlane ? crossing : 0.0f;
+    s.to = b.z < nearPlane ? crossing : 1.0f;
+    s.isThere = a.z < nearPlane && b.z < nearPlane ? 0.0f : 1.0f;
+    s.za = a.z < nearPlane ? nearPlane : a.z;
+    s.zb = b.z < nearPlane ? nearPlane : b.z;
+    const float ka = focal / s.za;
+    const float kb = focal / s.zb;
+    s.xa = (a.x + s.from * (b.x - a.x)) * ka + cx;
+    s.ya = (a.y + s.from * (b.y - a.y)) * ka + cy;
+    s.xb = (a.x + s.to * (b.x - a.x)) * kb + cx;
+    s.yb = (a.y + s.to * (b.y - a.y)) * kb + cy;
+    return s;
+}
+
+// The place on the segment that is seen nearest to an image point, 0 to 1 along the whole of it.
+SHARED_FN float segmentParameter(ScreenSegment s, float x, float y) {
+    const float dx = s.xb - s.xa;
+    const float dy = s.yb - s.ya;
+    const float length2 = dx * dx + dy * dy;
+    const float across = ((x - s.xa) * dx + (y - s.ya) * dy) / max(length2, 1.0e-8f);
+    const float u = min(max(across, 0.0f), 1.0f);
+    const float t = u * s.za / max((1.0f - u) * s.zb + u * s.za, 1.0e-30f);
+    return s.from + t * (s.to - s.from);
+}
+
+// Half-width across the line of sight, px: what is seen of a ribbon depends on how it faces the eye. `c`: a place on
+// the segment, `t`: unit tangent, `n`: the ribbon's normal.
+SHARED_FN float seenHalfWidth(vec3 c, float radius, vec3 t, vec3 n, float isRound, float focal) {
+    const float inverse = 1.0f / sqrt(max(dot(c, c), 1.0e-30f));
+    const vec3 v = vec3(c.x * inverse, c.y * inverse, c.z * inverse);
+    const float tv = dot(t, v);
+    const float sine = sqrt(max(1.0f - tv * tv, 1.0e-6f));
+    const float along = dot(n, t);
+    const vec3 m = vec3(n.x - along * t.x, n.y - along * t.y, n.z - along * t.z);
+    const float facing = abs(dot(m, v)) / sqrt(max(dot(m, m), 1.0e-12f));
+    const float share = isRound > 0.5f ? 1.0f : min(facing / sine, 1.0f);
+    return radius * share * focal / c.z;
+}
+
+SHARED_FN vec3 segmentTangent(CameraSegment s) {
+    const vec3 d = vec3(s.b.x - s.a.x, s.b.y - s.a.y, s.b.z - s.a.z);
+    const float length2 = dot(d, d);
+    const float inverse = length2 > 0.0f ? 1.0f / sqrt(length2) : 0.0f;
+    return vec3(d.x * inverse, d.y * inverse, d.z * inverse);
+}
+
+// Normal of a tube too narrow to show its roundness: the one whose light is that of the whole, sqrt(1 - (l t)^2), bent
+// to the eye where it turns away. `t`: tangent, `v`: view direction, `l`: towards the light; unit.
+SHARED_FN vec3 narrowTubeNormal(vec3 t, vec3 v, vec3 l) {
+    const float along = dot(l, t);
+    vec3 n = vec3(l.x - along * t.x, l.y - along * t.y, l.z - along * t.z);
+    const float away = max(dot(n, v), 0.0f);
+    n = vec3(n.x - away * v.x, n.y - away * v.y, n.z - away * v.z);
+    const float length2 = dot(n, n);
+    const float inverse = 1.0f / sqrt(max(length2, 1.0e-12f));
+    const bool isThere = length2 > 1.0e-6f;  // else the light comes along the tube
+    return vec3(isThere ? n.x * inverse : -v.x, isThere ? n.y * inverse : -v.y, isThere ? n.z * inverse : -v.z);
+}
+
+// Everything of the texel at a place on the segment but its offset from the pixel and its colour. `support`: radius of
+// the reconstruction / own radius; `light`: direction of the sun, for what is narrower than a pixel.
+SHARED_FN Texel texelFromStrand(CameraSegment s, float place, float support, float focal, float nearPlane, vec3 light) {
+    const vec3 c =
+        vec3(s.a.x + place * (s.b.x - s.a.x), s.a.y + place * (s.b.y - s.a.y), s.a.z + place * (s.b.z - s.a.z));
+    const float z = max(c.z, nearPlane);
+    const float radius = s.radiusA + place * (s.radiusB - s.radiusA);
+    const float distance = sqrt(max(dot(c, c), 1.0e-30f));
+    const vec3 v = vec3(c.x / distance, c.y / distance, c.z / distance);
+    const vec3 own = segmentTangent(s);
+    const vec3 d = vec3(s.directionA.x + place * (s.directionB.x - s.directionA.x),
+                        s.directionA.y + place * (s.directionB.y - s.directionA.y),
+                        s.directionA.z + place * (s.directionB.z - s.directionA.z));
+    const float halfWidth = seenHalfWidth(vec3(c.x, c.y, z), radius, own, d, s.isRound, focal);
+    // Tube: tangents of the vertices, so that bends are round.
+    const float inverse = 1.0f / sqrt(max(dot(d, d), 1.0e-12f));
+    const vec3 t = vec3(d.x * inverse, d.y * inverse, d.z * inverse);
+    const float tv = dot(t, v);
+    const vec2 across = perpFromNormal(t, v);
+    const float sine2 = max(1.0f - tv * tv, 0.0f);
+    const float reach = min(radius / distance, 0.9f);
+    const float front = min(min(radius / sqrt(max(sine2, 1.0e-6f)), 4.0f * radius), 0.9f * distance);
+    const float roundRadius = radius * focal / (z * sqrt(1.0f - reach * reach));
+    // Ribbon: the normal at right angles to the strand.
+    const float along = dot(d, own);
+    const vec3 m = vec3(d.x - along * own.x, d.y - along * own.y, d.z - along * own.z);
+    const float inverseM = 1.0f / sqrt(max(dot(m, m), 1.0e-12f));
+    const Texel flat_ =
+        texelFromSplat(vec3(c.x, c.y, z), vec3(m.x * inverseM, m.y * inverseM, m.z * inverseM), radius, focal, kNarrow);
+    const bool isTube_ = s.isRound > 0.5f;
+    const float wide = min((isTube_ ? roundRadius : flat_.radius) * support, 16384.0f);
+    Texel r = flat_;
+    r.depth = isTube_ ? max(z * (1.0f - front / distance), nearPlane) : z;
+    r.radius = halfWidth < kNarrow ? 0.25f : wide;
+    r.thickness = isTube_ ? r.radius : flat_.thickness;
+    const vec2 narrow = perpFromNormal(narrowTubeNormal(t, v, light), v);
+    const bool isRound = isTube_ && halfWidth >= kNarrow;
+    const vec2 plain = vec2(isTube_ ? narrow.x : flat_.normalPerp.x, isTube_ ? narrow.y : flat_.normalPerp.y);
+    r.normalPerp = vec2(isRound ? tv * across.x : plain.x, isRound ? tv * across.y : plain.y);
+    r.isRound = isRound ? 1.0f : 0.0f;
+    r.axis =
+        vec2(isRound ? across.x * across.x - across.y * across.y : 0.0f, isRound ? 2.0f * across.x * across.y : 0.0f);
+    return r;
+}
+
+// Does a strand narrower than a pixel take this one? A number in [0, 1) for each pixel, strand and frame of a series.
+SHARED_FN float coverageThreshold(uint pixel, uint id, uint seed) {
+    uint h = pixel * 0x9e3779b1u ^ id * 0x85ebca6bu ^ seed * 0xc2b2ae35u;
+    h ^= h >> 16;
+    h *= 0x7feb352du;
+    h ^= h >> 15;
+    h *= 0x846ca68bu;
+    h ^= h >> 16;
+    return float(int(h >> 8)) * (1.0f / 16777216.0f);
+}
+
+// Normal across the view and depth of a tube's surface at a pixel, from the reconstructed texel: `offset` leads from
+// the pixel to the axis. Near the end of a tube that is seen along its axis it is a sphere.
+struct TubeSurface {
+    vec2 normalPerp;
+    float depth;
+};
+SHARED_FN TubeSurface tubeSurface(Texel t, float inverseFocal) {
+    const float inverseRadius = 1.0f / max(t.radius, kNarrow);
+    const bool isWide = t.radius > kNarrow;
+    float x = isWide ? -t.offset.x * inverseRadius : 0.0f;
+    float y = isWide ? -t.offset.y * inverseRadius : 0.0f;
+    const float sine2 = sqrt(t.axis.x * t.axis.x + t.axis.y * t.axis.y);
+    const float inverse = 1.0f / max(sine2, 1.0e-6f);
+    const float cos2 = t.axis.x * inverse;
+    const float sin2 = t.axis.y * inverse;
+    const bool isFlat = cos2 > 0.0f;
+    const float first = sqrt(max(0.5f * (1.0f + abs(cos2)), 0.25f));
+    const float second = 0.5f * sin2 / first;
+    const float ax = isFlat ? first : second;
+    const float ay = isFlat ? second : first;
+    // What the centre is off along the axis says nothing.
+    const float along = (x * ax + y * ay) * min(4.0f * sine2, 1.0f);
+    x -= ax * along;
+    y -= ay * along;
+    const float q = x * x + y * y;
+    const float shrink = q > 1.0f ? 1.0f / sqrt(q) : 1.0f;
+    x *= shrink;
+    y *= shrink;
+    const float rise = sqrt(max(1.0f - x * x - y * y, 0.0f));
+    const float sine = sqrt(sine2);
+    const float lean = rise / max(sine, 0.1f);
+    TubeSurface s;
+    s.normalPerp = vec2(x + lean * t.normalPerp.x, y + lean * t.normalPerp.y);
+    s.depth = t.depth * (1.0f + min(1.0f - rise, 1.0f) * t.radius * inverseFocal / max(sine, 0.25f));
+    return s;
+}
+
+SHARED_END
+#endif
