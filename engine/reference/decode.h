@@ -1,6 +1,7 @@
 // Records decoded in fp64, from the description of the format alone.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <glm/glm.hpp>
 
@@ -29,6 +30,13 @@ inline uint32_t encodeSrgb(double l) {
     return static_cast<uint32_t>(std::lround(s * 255.0));
 }
 
+inline glm::dvec3 decodeDirection(uint32_t code) {
+    glm::dvec3 n((code % 65536) / 32767.0 - 1, (code / 65536) / 32767.0 - 1, 0);
+    n.z = 1 - std::abs(n.x) - std::abs(n.y);
+    if (n.z < 0) n = {(1 - std::abs(n.y)) * (n.x >= 0 ? 1 : -1), (1 - std::abs(n.x)) * (n.y >= 0 ? 1 : -1), n.z};
+    return glm::normalize(n);
+}
+
 inline Disc decodeDisc(const lod::Hierarchy& h, const lod::Node& node, const shared::PointRecord& r) {
     Disc d;
     const double cell = std::ldexp(1.0, static_cast<int>(h.rootLog2) - node.level), step = cell / 65536;
@@ -43,16 +51,48 @@ inline Disc decodeDisc(const lod::Hierarchy& h, const lod::Node& node, const sha
     d.flags = r.colour / 16777216;
     d.colour = {decodeSrgb(r.colour % 256), decodeSrgb(r.colour / 256 % 256), decodeSrgb(r.colour / 65536 % 256)};
     if ((d.flags & shared::kFlagNoNormal) == 0) {
-        glm::dvec3 n((r.normal % 65536) / 32767.0 - 1, (r.normal / 65536) / 32767.0 - 1, 0);
-        n.z = 1 - std::abs(n.x) - std::abs(n.y);
-        if (n.z < 0) {
-            const double x = n.x, y = n.y;
-            n.x = (1 - std::abs(y)) * (x >= 0 ? 1 : -1);
-            n.y = (1 - std::abs(x)) * (y >= 0 ? 1 : -1);
-        }
-        d.normal = glm::normalize(n);
+        d.normal = decodeDirection(r.normal);
     }
     return d;
+}
+
+/// A segment of a ribbon or tube.
+struct Segment {
+    glm::dvec3 a{0}, b{0};  ///< world
+    double radiusA = 0, radiusB = 0;
+    glm::dvec3 directionA{0}, directionB{0};  ///< normal of a ribbon, tangent of a tube
+    glm::dvec3 colourA{0}, colourB{0};        ///< linear
+    bool isTube = false;
+    uint32_t errorCode = 0, octants = 0;
+};
+
+inline Segment decodeSegment(const lod::Hierarchy& h, const lod::Node& node, const shared::StrandSegment& from) {
+    const double cell = std::ldexp(1.0, static_cast<int>(h.rootLog2) - node.level), step = cell / 32768;
+    const auto place = [&](const shared::StrandVertex& v) {
+        const glm::dvec3 q(v.positionXY % 65536, static_cast<double>(v.positionXY / 65536), v.positionZ % 65536);
+        return h.origin + h.unit * ((glm::dvec3(node.cell[0], node.cell[1], node.cell[2]) - 0.5) * cell + q * step);
+    };
+    const auto radius = [&](const shared::StrandVertex& v) {  // the upper 15 bits of an fp32 without sign
+        const uint32_t code = v.positionZ / 65536 % 32768;
+        const auto exponent = static_cast<int>(code / 128);
+        const double mantissa = exponent == 0 ? code % 128 / 128.0 : 1 + code % 128 / 128.0;
+        return h.unit * cell * std::ldexp(mantissa, std::max(exponent, 1) - 127);
+    };
+    const auto colour = [](const shared::StrandVertex& v) {
+        return glm::dvec3(decodeSrgb(v.colour % 256), decodeSrgb(v.colour / 256 % 256),
+                          decodeSrgb(v.colour / 65536 % 256));
+    };
+    return {place(from.a),
+            place(from.b),
+            radius(from.a),
+            radius(from.b),
+            decodeDirection(from.a.direction),
+            decodeDirection(from.b.direction),
+            colour(from.a),
+            colour(from.b),
+            from.a.positionZ / 65536 / 32768 != 0,
+            from.a.colour / 16777216,
+            from.b.colour / 16777216};
 }
 
 /// Light of the scene's sun and sky on a white surface with eye-facing camera-space normal n.

@@ -15,13 +15,6 @@ using glm::dvec4;
 
 constexpr double kPi = 3.14159265358979323846;
 
-dvec3 octahedral(uint32_t code) {
-    dvec3 n((code % 65536) / 32767.0 - 1, (code / 65536) / 32767.0 - 1, 0);
-    n.z = 1 - std::abs(n.x) - std::abs(n.y);
-    if (n.z < 0) n = {(1 - std::abs(n.y)) * (n.x >= 0 ? 1 : -1), (1 - std::abs(n.x)) * (n.y >= 0 ? 1 : -1), n.z};
-    return glm::normalize(n);
-}
-
 /// A tangent-space normal: x along growing u, y against growing v.
 dvec3 bump(const dvec3& normal, const Corners& c, const dvec3& texel, double scale) {
     const dvec3 n = glm::normalize(normal), e1 = c[1].at - c[0].at, e2 = c[2].at - c[0].at;
@@ -92,7 +85,7 @@ Corner cornerOf(const lod::Hierarchy& h, const lod::Instance& instance, const sh
     Corner c;
     c.at = toCamera(instance.translation +
                     instance.rotation * (instance.scale * (h.origin + h.unit * dvec3(v.x, v.y, v.z))) - view.eye);
-    c.normal = toCamera(instance.rotation * octahedral(v.normal));
+    c.normal = toCamera(instance.rotation * decodeDirection(v.normal));
     c.colour = {decodeSrgb(v.colour & 255u), decodeSrgb(v.colour >> 8 & 255u), decodeSrgb(v.colour >> 16 & 255u),
                 (v.colour >> 24) / 255.0};
     c.uv = {v.u, v.v};

@@ -1,5 +1,5 @@
-// Rays against the full detail of a scene: discs and triangles of all leaves, in one hierarchy of boxes per store and
-// one over the places where the stores stand.
+// Rays against the full detail of a scene: discs, triangles and strands of all leaves, in one hierarchy of boxes per
+// store and one over the places where the stores stand.
 #include <cmath>
 #include <limits>
 #include <map>
@@ -8,6 +8,7 @@
 #include "engine/reference/box_tree.h"
 #include "engine/reference/decode.h"
 #include "engine/reference/reference.h"
+#include "engine/reference/strand_rays.h"
 #include "engine/reference/surface.h"
 
 namespace stipple::reference {
@@ -22,11 +23,12 @@ constexpr double kNever = std::numeric_limits<double>::max();
 struct TracedStore {
     const lod::Store* store = nullptr;
     std::vector<Disc> discs;
+    std::vector<Segment> segments;
     std::vector<shared::MeshVertex> vertices;
     std::vector<std::array<uint32_t, 3>> triangles;
     Chunks tiles;  ///< all levels of all textures
     render::MeshTextures textures;
-    BoxTree tree;  ///< items: discs, then triangles
+    BoxTree tree;  ///< items: discs, then triangles, then segments (a store has one kind)
 
     dvec3 positionOf(uint32_t vertex) const {
         const shared::MeshVertex& v = vertices[vertex];
@@ -47,6 +49,7 @@ Result<void> readPoints(TracedStore& t) {
     for (uint32_t i = 0; i < h.nodes.size(); ++i) {
         if (!h.nodes[i].isLeaf()) continue;
         STIPPLE_ASSIGN(const lod::Chunk chunk, lod::readChunk(*t.store, i));
+        for (const shared::StrandSegment& s : chunk.segments) t.segments.push_back(decodeSegment(h, h.nodes[i], s));
         for (const shared::PointRecord& r : chunk.records) t.discs.push_back(decodeDisc(h, h.nodes[i], r));
     }
     return {};
@@ -93,14 +96,13 @@ Result<void> readStore(const lod::Store& store, TracedStore& t) {
         boxes.emplace_back();
         for (const uint32_t v : corners) boxes.back().add(t.positionOf(v));
     }
+    for (const Segment& s : t.segments) {
+        boxes.push_back({s.a - s.radiusA, s.a + s.radiusA});
+        boxes.back().add({s.b - s.radiusB, s.b + s.radiusB});
+    }
     t.tree = BoxTree(boxes);
     return {};
 }
-
-/// A ray in the coordinates of a store; t is the same as in the world.
-struct LocalRay {
-    dvec3 origin, direction;
-};
 
 /// Where the ray meets the disc within its radius; its side towards the eye.
 bool meetsDisc(const Disc& d, const LocalRay& ray, double& t, double& rho2, dvec3& normal) {
@@ -163,8 +165,8 @@ class Tracer {
             colour = shadeTriangle(hit.sample, hit.normal, point, draws_);
             return true;
         }
-        Sample s;
-        const dvec3 n = blendDiscs(ray, hit, s.colour);
+        Sample s = hit.sample;
+        const dvec3 n = hit.isStrand ? hit.normal : blendDiscs(ray, hit, s.colour);
         const shared::FrameConstants& f = draws_.frame;
         colour = s.colour;
         if ((f.shade & shared::kShadeLit) == 0) return true;
@@ -180,7 +182,7 @@ class Tracer {
     struct Hit {
         uint32_t place = kNone;
         double t = kNever, thickness = 0;
-        bool isTriangle = false;
+        bool isTriangle = false, isStrand = false;
         Sample sample;
         dvec3 normal{0};  ///< camera space, towards the eye
     };
@@ -204,19 +206,32 @@ class Tracer {
             store.tree.visit(local.origin, local.direction, view_.nearPlane, best.t, [&](uint32_t item) {
                 double t = 0, rho2 = 0;
                 dvec3 normal;
-                if (item >= store.discs.size()) {
+                if (!store.segments.empty()) {
+                    hitSegment(store.segments[item], place, local, p, best);
+                } else if (item >= store.discs.size()) {
                     hitTriangle(store, place, store.triangles[item - store.discs.size()], local, ray, step, p, best);
                 } else if (meetsDisc(store.discs[item], local, t, rho2, normal) && t > view_.nearPlane && t < best.t) {
                     const double m = std::abs(glm::dot(place.rotation * normal, toWorld(ray))) / length;
                     best.place = p;
                     best.t = t;
-                    best.isTriangle = false;
+                    best.isTriangle = best.isStrand = false;
                     best.thickness =
                         place.scale * store.discs[item].radius * (0.25 + std::sqrt(std::max(0.0, 1 - m * m)));
                 }
             });
         });
         return best;
+    }
+
+    void hitSegment(const Segment& s, const lod::Instance& place, const LocalRay& local, uint32_t p, Hit& best) const {
+        StrandHit hit;
+        if (!meetsSegment(s, local, view_.nearPlane, hit) || hit.t >= best.t) return;
+        best = {};
+        best.place = p;
+        best.t = hit.t;
+        best.isStrand = true;
+        best.sample.colour = glm::mix(s.colourA, s.colourB, hit.place);
+        best.normal = toCamera(place.rotation * hit.normal);
     }
 
     void hitTriangle(const TracedStore& store, const lod::Instance& place, const std::array<uint32_t, 3>& corners,
@@ -241,6 +256,7 @@ class Tracer {
         best.place = p;
         best.t = t;
         best.isTriangle = true;
+        best.isStrand = false;
         best.sample = sample;
         best.normal = n;
     }
