@@ -169,13 +169,23 @@ class CpuBackend final : public render::Backend {
     }
 
     void drawStrands() {
+        wide_.clear();
         executor_.parallelFor(strandBlocks_.size(), 4, [&](size_t begin, size_t end) {
+            std::vector<WideStrand> mine;
+            const WideSink sink{
+                &mine, [](void* to, const WideStrand& s) { static_cast<std::vector<WideStrand>*>(to)->push_back(s); }};
             for (size_t b = begin; b < end; ++b) {
                 const uint32_t left = strandBlocks_[b].node->count - draws_->strandBlocks[b].first;
                 k_.drawSegments(frame_, strandBlocks_[b], std::min(left, shared::kSegmentsPerBlock),
-                                static_cast<uint32_t>(b * shared::kSegmentsPerBlock), visibility_.data());
+                                static_cast<uint32_t>(b * shared::kSegmentsPerBlock), sink, visibility_.data());
             }
+            if (!mine.empty()) foundWide_.push(std::move(mine));
         });
+        for (const auto& some : foundWide_.takeAll()) wide_.insert(wide_.end(), some.begin(), some.end());
+        if (!wide_.empty())
+            forBands([&](uint32_t first, uint32_t last) {
+                k_.fillWide(frame_, wide_.data(), wide_.size(), first, last, visibility_.data());
+            });
     }
 
     void project() {
@@ -232,12 +242,18 @@ class CpuBackend final : public render::Backend {
         });
         for (const auto& some : found_.takeAll()) large_.insert(large_.end(), some.begin(), some.end());
         if (large_.empty()) return;
-        // A triangle over the whole image is work for all threads.
+        forBands([&](uint32_t first, uint32_t last) {
+            k_.rasterLarge(frame_, large_.data(), large_.size(), first, last, visibility_.data());
+        });
+    }
+
+    /// Rows of the image for all threads: what covers much of it must not be the work of one.
+    template <typename Use>
+    void forBands(const Use& use) {
         constexpr uint32_t kRows = 16;
         executor_.parallelFor((frame_.height + kRows - 1) / kRows, 1, [&](size_t begin, size_t end) {
             const auto first = static_cast<uint32_t>(begin) * kRows, last = static_cast<uint32_t>(end) * kRows - 1;
-            k_.rasterLarge(frame_, large_.data(), large_.size(), first, std::min(last, frame_.height - 1),
-                           visibility_.data());
+            use(first, std::min(last, frame_.height - 1));
         });
     }
 
@@ -475,6 +491,8 @@ class CpuBackend final : public render::Backend {
     size_t surfacePixels_ = 0, emissivePixels_ = 0;
     bool hasTriangles_ = false, hasEmissive_ = false, hasStrands_ = false;
     std::vector<StrandBlock> strandBlocks_;
+    std::vector<WideStrand> wide_;
+    CompletionQueue<std::vector<WideStrand>> foundWide_;
     std::vector<BlockSource> blocks_;
     std::vector<render::PassTime> times_;
     const render::DrawList* draws_ = nullptr;

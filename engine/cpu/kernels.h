@@ -75,6 +75,21 @@ struct LargeTriangle {
     float inverseDepth[3];
     uint32_t id;
 };
+/// A strand so wide that its pixels are filled, and so large that its rows are shared out among threads.
+struct WideStrand {
+    float xa, ya, xb, yb;  ///< ends, px
+    float inverseA, inverseB;
+    float halfA, halfB;      ///< half-widths, px
+    float nearerA, nearerB;  ///< tube: depth of the surface / of the axis
+    float slopeA, slopeB;    ///< ribbon: see ribbonSlope
+    bool isRound;
+    uint32_t id;
+};
+struct WideSink {
+    void* context;
+    void (*keep)(void* context, const WideStrand& strand);
+};
+
 struct LargeSink {
     void* context;
     void (*keep)(void* context, const LargeTriangle& triangle);
@@ -146,7 +161,10 @@ struct Kernels {
                         uint32_t lastRow, uint64_t* visibility);
     /// Offers up to 256 segments of strands (ids from firstId on) to the visibility buffer.
     void (*drawSegments)(const shared::FrameConstants& f, const StrandBlock& block, uint32_t count, uint32_t firstId,
-                         uint64_t* visibility);
+                         const WideSink& wide, uint64_t* visibility);
+    /// Rows [firstRow, lastRow] of the strands that were kept.
+    void (*fillWide)(const shared::FrameConstants& f, const WideStrand* strands, size_t count, uint32_t firstRow,
+                     uint32_t lastRow, uint64_t* visibility);
 };
 
 /// The best kernels that this processor runs; STIPPLE_SIMD=sse|avx2|avx512 asks for fewer.

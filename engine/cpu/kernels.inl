@@ -452,6 +452,6 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
 extern const Kernels STIPPLE_KERNELS;
 const Kernels STIPPLE_KERNELS{
     STIPPLE_KERNELS_NAME, projectBlock, resolveRow, packRow, unpackRow, pullRow, pushRow, expandRow, finishRow, shadeRow,
-    rasterCluster,        rasterLarge, drawSegments};
+    rasterCluster,        rasterLarge, drawSegments, fillWide};
 
 }  // namespace stipple::cpu

@@ -47,6 +47,8 @@ struct Lines {
     alignas(64) float inverseA[kSegmentsPerBlock], inverseB[kSegmentsPerBlock];
     alignas(64) float halfA[kSegmentsPerBlock], halfB[kSegmentsPerBlock];  ///< seen half-widths, px
     alignas(64) float nearerA[kSegmentsPerBlock], nearerB[kSegmentsPerBlock];  ///< depth of the surface / of the axis
+    alignas(64) float slopeA[kSegmentsPerBlock], slopeB[kSegmentsPerBlock];    ///< of ribbons, see ribbonSlope
+    alignas(64) float isRound[kSegmentsPerBlock];
     alignas(64) uint32_t keep[kSegmentsPerBlock];
 };
 
@@ -84,8 +86,42 @@ void drawLine(const FrameConstants& f, const Lines& lines, size_t i, LineEnds e,
     }
 }
 
+/// Rows [firstRow, lastRow] of a wide strand: every pixel whose centre is within its half-width.
+void fillStrand(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, uint64_t* visibility) {
+    const float dx = s.xb - s.xa, dy = s.yb - s.ya, length2 = dx * dx + dy * dy;
+    const float inverse2 = length2 > 1.0e-8f ? 1.0f / length2 : 0.0f, inverse = std::sqrt(inverse2);
+    const float bx = -dy * inverse, by = dx * inverse, widest = max(s.halfA, s.halfB);
+    const int top = int(max(min(s.ya, s.yb) - widest, float(firstRow))),
+              bottom = int(min(max(s.ya, s.yb) + widest, float(lastRow)));
+    for (int y = top; y <= bottom; ++y) {
+        const float cy = float(y) + 0.5f;
+        // Where the axis is within reach of this row.
+        float from = min(s.xa, s.xb), to = max(s.xa, s.xb);
+        if (std::fabs(dy) > 1.0e-6f) {
+            const float u0 = (cy - widest - s.ya) / dy, u1 = (cy + widest - s.ya) / dy;
+            const float lo = min(max(min(u0, u1), 0.0f), 1.0f), hi = min(max(max(u0, u1), 0.0f), 1.0f);
+            const float x0 = s.xa + lo * dx, x1 = s.xa + hi * dx;
+            from = min(x0, x1);
+            to = max(x0, x1);
+        }
+        const int left = int(max(from - widest, 0.0f)), right = int(min(to + widest, float(int(f.width)) - 1.0f));
+        for (int x = left; x <= right; ++x) {
+            const float px = float(x) + 0.5f - s.xa, py = cy - s.ya;
+            const float u = min(max((px * dx + py * dy) * inverse2, 0.0f), 1.0f);
+            const float ex = px - u * dx, ey = py - u * dy, half = s.halfA + u * (s.halfB - s.halfA);
+            const float q = ex * ex + ey * ey;
+            if (q > half * half) continue;
+            const float axis = 1.0f / (s.inverseA + u * (s.inverseB - s.inverseA));
+            const float rise = std::sqrt(1.0f - min(q / (half * half), 1.0f));
+            const float nearer = s.isRound ? 1.0f - rise * (1.0f - (s.nearerA + u * (s.nearerB - s.nearerA)))
+                                           : 1.0f + (ex * bx + ey * by) * (s.slopeA + u * (s.slopeB - s.slopeA));
+            offer(visibility, size_t(y) * f.width + size_t(x), 1.0f / max(axis * nearer, f.nearPlane), s.id);
+        }
+    }
+}
+
 void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_t count, uint32_t firstId,
-                  uint64_t* visibility) {
+                  const WideSink& wide, uint64_t* visibility) {
     const FrameConstants f = frame;
     const DrawNode node = *block.node;
     const uint32_t* __restrict const words = &block.segments->a.positionXY;
@@ -115,10 +151,15 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
         lines.yb[i] = p.yb;
         lines.inverseA[i] = 1.0f / p.za;
         lines.inverseB[i] = 1.0f / p.zb;
-        lines.halfA[i] = seenHalfWidth(a, ra, t, c.directionA, c.isRound, f.focal);
-        lines.halfB[i] = seenHalfWidth(b, rb, t, c.directionB, c.isRound, f.focal);
+        lines.halfA[i] = endHalfWidth(c, p.from, c.directionA, f.focal, f.nearPlane);
+        lines.halfB[i] = endHalfWidth(c, p.to, c.directionB, f.focal, f.nearPlane);
         lines.nearerA[i] = nearer(a, ra);
         lines.nearerB[i] = nearer(b, rb);
+        const float dx = p.xb - p.xa, dy = p.yb - p.ya;
+        const float inverse = 1.0f / std::sqrt(max(dx * dx + dy * dy, 1.0e-8f));
+        lines.slopeA[i] = ribbonSlope(a, t, c.directionA, f.focal, -dy * inverse, dx * inverse);
+        lines.slopeB[i] = ribbonSlope(b, t, c.directionB, f.focal, -dy * inverse, dx * inverse);
+        lines.isRound[i] = c.isRound;
         const bool isFine = (segmentErrorCode(s) <= node.errorCode) | ((segmentOctants(s) & node.octantMask) != 0u);
         lines.keep[i] = (isFine & (p.isThere > 0.5f)) ? 1u : 0u;
     }
@@ -126,8 +167,23 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
     for (size_t i = 0; i < count; ++i) {
         if (lines.keep[i] == 0) continue;
         const float xa = lines.xa[i], ya = lines.ya[i], xb = lines.xb[i], yb = lines.yb[i];
-        if (max(xa, xb) < 0 || max(ya, yb) < 0 || min(xa, xb) >= width || min(ya, yb) >= height) continue;
+        const float widest = max(lines.halfA[i], lines.halfB[i]);
+        if (max(xa, xb) < -widest || max(ya, yb) < -widest || min(xa, xb) >= width + widest ||
+            min(ya, yb) >= height + widest)
+            continue;
         const uint32_t id = kKindStrand | (firstId + uint32_t(i));
+        if (widest >= f.exactStrands) {
+            const WideStrand s{xa, ya, xb, yb, lines.inverseA[i], lines.inverseB[i], lines.halfA[i], lines.halfB[i],
+                               lines.nearerA[i], lines.nearerB[i], lines.slopeA[i], lines.slopeB[i],
+                               lines.isRound[i] > 0.5f, id};
+            // One that covers much of the image is work for all threads.
+            const float rows = std::fabs(yb - ya) + 2 * widest, columns = std::fabs(xb - xa) + 2 * widest;
+            if (min(rows, height) * min(columns, width) > float(kLargePixels))
+                wide.keep(wide.context, s);
+            else
+                fillStrand(f, s, 0, int(f.height) - 1, visibility);
+            continue;
+        }
         const float dx = std::fabs(xb - xa), dy = std::fabs(yb - ya);
         if (dx >= dy)
             drawLine(f, lines, i, {xa, ya, xb, yb, f.width, 1, f.width, f.height}, id, visibility);
@@ -144,6 +200,12 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
         point(xa, ya, lines.inverseA[i], lines.halfA[i], lines.nearerA[i]);
         point(xb, yb, lines.inverseB[i], lines.halfB[i], lines.nearerB[i]);
     }
+}
+
+void fillWide(const FrameConstants& frame, const WideStrand* strands, size_t count, uint32_t firstRow, uint32_t lastRow,
+              uint64_t* visibility) {
+    const FrameConstants f = frame;
+    for (size_t i = 0; i < count; ++i) fillStrand(f, strands[i], int(firstRow), int(lastRow), visibility);
 }
 
 /// Texels of the pixels that show strands.
@@ -191,6 +253,7 @@ void resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
     const float focal = f.focal, cx = f.centre.x - float(int(x0)) - 0.5f, cy = f.centre.y - float(int(y)) - 0.5f;
     const float nearPlane = f.nearPlane, support = f.supportScale;
     const vec3 sun = f.sunDirection;
+    const float exactStrands = f.exactStrands;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         CameraSegment s;
@@ -205,13 +268,31 @@ void resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
         // Image coordinates from this pixel's centre on, so that the low bits are kept.
         const ScreenSegment on = projectSegment(s.a, s.b, focal, cx - px, cy, nearPlane);
         const float place = segmentParameter(on, 0.0f, 0.0f);
-        const Texel t = texelFromStrand(s, place, support, focal, nearPlane, sun);
-        const float z = max(s.a.z + place * (s.b.z - s.a.z), nearPlane), scale = focal / z;
+        const Texel disc = texelFromStrand(s, place, support, focal, nearPlane, sun);
+        const vec3 c = vec3(s.a.x + place * (s.b.x - s.a.x), s.a.y + place * (s.b.y - s.a.y),
+                            max(s.a.z + place * (s.b.z - s.a.z), nearPlane));
+        const float offX = c.x * focal / c.z + (cx - px), offY = c.y * focal / c.z + cy;
+        const float lx = on.xb - on.xa, ly = on.yb - on.ya;
+        const float inverse = 1.0f / std::sqrt(max(lx * lx + ly * ly, 1.0e-8f));
+        const vec3 tangent = segmentTangent(s);
+        const vec3 direction = vec3(s.directionA.x + place * (s.directionB.x - s.directionA.x),
+                                    s.directionA.y + place * (s.directionB.y - s.directionA.y),
+                                    s.directionA.z + place * (s.directionB.z - s.directionA.z));
+        const float slope = ribbonSlope(c, tangent, direction, focal, -ly * inverse, lx * inverse);
+        const Texel filled = exactTexel(disc, -offX, -offY, -ly * inverse, lx * inverse, slope, 1.0f / focal);
+        const bool isWide = widestHalfWidth(s, on, focal, nearPlane) >= exactStrands;
+        Texel t;
+        t.depth = isWide ? filled.depth : disc.depth;
+        t.radius = isWide ? filled.radius : disc.radius;
+        t.thickness = isWide ? filled.thickness : disc.thickness;
+        t.normalPerp = vec2(isWide ? filled.normalPerp.x : disc.normalPerp.x, isWide ? filled.normalPerp.y : disc.normalPerp.y);
+        t.isRound = isWide ? 0.0f : disc.isRound;
+        t.axis = vec2(isWide ? 0.0f : disc.axis.x, isWide ? 0.0f : disc.axis.y);
         o.depth[i] = t.depth;
         o.radius[i] = t.radius;
         o.thickness[i] = t.thickness;
-        o.x[i] = (s.a.x + place * (s.b.x - s.a.x)) * scale + (cx - px);
-        o.y[i] = (s.a.y + place * (s.b.y - s.a.y)) * scale + cy;
+        o.x[i] = isWide ? 0.0f : offX;
+        o.y[i] = isWide ? 0.0f : offY;
         o.perpX[i] = t.normalPerp.x;
         o.perpY[i] = t.normalPerp.y;
         o.isRound[i] = t.isRound;

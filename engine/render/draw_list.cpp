@@ -8,7 +8,7 @@ static_assert(sizeof(shared::PointRecord) == 16);
 static_assert(sizeof(shared::DrawNode) == 80);
 static_assert(sizeof(shared::DrawBlock) == 8);
 static_assert(sizeof(shared::StrandSegment) == 32);
-static_assert(sizeof(shared::FrameConstants) == 168);
+static_assert(sizeof(shared::FrameConstants) == 172);
 static_assert(sizeof(shared::MeshVertex) == 32);
 static_assert(sizeof(shared::MeshCluster) == 12);
 static_assert(sizeof(shared::DrawMesh) == 104);
@@ -126,6 +126,7 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     f.nearPlane = static_cast<float>(view.nearPlane);
     f.supportScale = settings.supportScale;
     f.minimumRadius = settings.minimumRadius;
+    f.exactStrands = settings.exactStrands;
     f.coverageSeed = settings.coverageSeed;
     f.shade = (settings.lit ? shared::kShadeLit : shared::kShadeUnlit) |
               (settings.unlitTriangles ? 0u : shared::kShadeTriangles);

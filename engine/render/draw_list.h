@@ -74,6 +74,7 @@ struct DrawSettings {
     std::vector<WorldLight> lights;  ///< none: a sun over the viewer's shoulder
     float supportScale = 1.0f;       ///< splat radius of the reconstruction / stored radius
     float minimumRadius = 1.0f;      ///< pixels
+    float exactStrands = 2.0f;       ///< pixels of half-width from which strands are filled, not reconstructed
     uint32_t coverageSeed = 0;       ///< of strands narrower than a pixel
 };
 

@@ -109,6 +109,18 @@ SHARED_FN vec3 segmentTangent(CameraSegment s) {
     return vec3(d.x * inverse, d.y * inverse, d.z * inverse);
 }
 
+// The larger half-width of a segment's ends, px: decides whether it is filled or reconstructed.
+SHARED_FN float endHalfWidth(CameraSegment s, float place, vec3 direction, float focal, float nearPlane) {
+    const vec3 c = vec3(s.a.x + place * (s.b.x - s.a.x), s.a.y + place * (s.b.y - s.a.y),
+                        max(s.a.z + place * (s.b.z - s.a.z), nearPlane));
+    return seenHalfWidth(c, s.radiusA + place * (s.radiusB - s.radiusA), segmentTangent(s), direction, s.isRound,
+                         focal);
+}
+SHARED_FN float widestHalfWidth(CameraSegment s, ScreenSegment on, float focal, float nearPlane) {
+    return max(endHalfWidth(s, on.from, s.directionA, focal, nearPlane),
+               endHalfWidth(s, on.to, s.directionB, focal, nearPlane));
+}
+
 // Normal of a tube too narrow to show its roundness: the one whose light is that of the whole, sqrt(1 - (l t)^2), bent
 // to the eye where it turns away. `t`: tangent, `v`: view direction, `l`: towards the light; unit.
 SHARED_FN vec3 narrowTubeNormal(vec3 t, vec3 v, vec3 l) {
@@ -167,6 +179,16 @@ SHARED_FN Texel texelFromStrand(CameraSegment s, float place, float support, flo
     return r;
 }
 
+// A ribbon's surface beside its axis: change of depth per pixel of distance from the axis on the image, in direction
+// (bx, by), as a share of the depth. `c`: a place on the axis, `t`: unit tangent, `n`: normal.
+SHARED_FN float ribbonSlope(vec3 c, vec3 t, vec3 n, float focal, float bx, float by) {
+    const vec3 w = vec3(n.y * t.z - n.z * t.y, n.z * t.x - n.x * t.z, n.x * t.y - n.y * t.x);
+    const float k = ((w.x - c.x / c.z * w.z) * bx + (w.y - c.y / c.z * w.z) * by) * focal;
+    const float length2 = dot(w, w);
+    const float slope = abs(k) > 1.0e-4f * focal * sqrt(length2) ? w.z / k : 0.0f;
+    return min(max(slope, -1.0f), 1.0f);
+}
+
 // Does a strand narrower than a pixel take this one? A number in [0, 1) for each pixel, strand and frame of a series.
 SHARED_FN float coverageThreshold(uint pixel, uint id, uint seed) {
     uint h = pixel * 0x9e3779b1u ^ id * 0x85ebca6bu ^ seed * 0xc2b2ae35u;
@@ -213,6 +235,24 @@ SHARED_FN TubeSurface tubeSurface(Texel t, float inverseFocal) {
     s.normalPerp = vec2(x + lean * t.normalPerp.x, y + lean * t.normalPerp.y);
     s.depth = t.depth * (1.0f + min(1.0f - rise, 1.0f) * t.radius * inverseFocal / max(sine, 0.25f));
     return s;
+}
+
+// What a wide strand shows at the pixel whose centre is `dx`, `dy` from the place on its axis (px): a texel that stands
+// for nothing but its own pixel. `t`: texelFromStrand at that place, `slope`: of a ribbon.
+SHARED_FN Texel exactTexel(Texel t, float dx, float dy, float bx, float by, float slope, float inverseFocal) {
+    Texel round_ = t;
+    round_.offset = vec2(-dx, -dy);
+    const TubeSurface s = tubeSurface(round_, inverseFocal);
+    const bool isRound = t.isRound > 0.5f;
+    Texel r = t;
+    r.depth = isRound ? s.depth : t.depth * (1.0f + (dx * bx + dy * by) * slope);
+    r.normalPerp = vec2(isRound ? s.normalPerp.x : t.normalPerp.x, isRound ? s.normalPerp.y : t.normalPerp.y);
+    r.radius = 0.25f;
+    r.thickness = 0.25f;
+    r.offset = vec2(0.0f, 0.0f);
+    r.isRound = 0.0f;
+    r.axis = vec2(0.0f, 0.0f);
+    return r;
 }
 
 SHARED_END
