@@ -19,8 +19,9 @@ using glm::dvec3;
 /// rho^2 of a point in the ellipse of a sample.
 double rhoSquared(const Sample& s, const dvec2& point) {
     const dvec2 d = point - s.centre;
-    const double facing2 = std::clamp(1 - glm::dot(s.perp, s.perp), 0.25 / (s.radius * s.radius), 1.0);
-    const double along = glm::dot(s.perp, d);
+    const dvec2 perp = s.isRound ? dvec2(0) : s.perp;  // a tube's disc faces the eye
+    const double facing2 = std::clamp(1 - glm::dot(perp, perp), 0.25 / (s.radius * s.radius), 1.0);
+    const double along = glm::dot(perp, d);
     return (facing2 * glm::dot(d, d) + along * along) / (facing2 * s.radius * s.radius);
 }
 
@@ -29,14 +30,22 @@ struct Contribution {
     double weight;
 };
 
-/// Weighted mean of the contributions whose depth interval begins before the first one ends, at `back`.
-Sample blend(std::vector<Contribution>& list, double& back) {
+/// Weighted mean of the contributions whose depth interval begins before the first one ends, at `back`, and that are
+/// round if that one is. A tube is as thick as it is wide.
+Sample blend(std::vector<Contribution>& list, double& back, double inverseFocal) {
     STIPPLE_CHECK(!list.empty(), "nothing to blend");
     back = 1e300;
     for (const Contribution& c : list) back = std::min(back, c.sample->depth + c.sample->thickness);
     Sample sum;
     double weight = 0;
-    std::erase_if(list, [&](const Contribution& c) { return c.sample->depth - c.sample->thickness > back; });
+    for (const Contribution& c : list)
+        if (c.sample->depth + c.sample->thickness <= back) {
+            sum.isRound = c.sample->isRound;
+            break;
+        }
+    std::erase_if(list, [&](const Contribution& c) {
+        return c.sample->depth - c.sample->thickness > back || c.sample->isRound != sum.isRound;
+    });
     for (const auto& [s, w] : list) {
         weight += w;
         sum.depth += w * s->depth;
@@ -44,6 +53,7 @@ Sample blend(std::vector<Contribution>& list, double& back) {
         sum.thickness += w * s->thickness / s->depth;
         sum.centre += w * s->centre;
         sum.perp += w * s->perp;
+        sum.axis += w * s->axis;
         sum.colour += w * s->colour;
     }
     sum.valid = true;
@@ -52,11 +62,13 @@ Sample blend(std::vector<Contribution>& list, double& back) {
     sum.thickness = sum.thickness / weight * sum.depth;
     sum.centre /= weight;
     sum.perp /= weight;
+    sum.axis /= weight;
     sum.colour /= weight;
+    if (sum.isRound) sum.thickness = sum.radius * sum.depth * inverseFocal;
     return sum;
 }
 
-Level pullLevel(const Level& fine, double childSize) {
+Level pullLevel(const Level& fine, double childSize, double inverseFocal) {
     Level coarse{(fine.width + 1) / 2, (fine.height + 1) / 2, {}};
     coarse.samples.resize(static_cast<size_t>(coarse.width) * static_cast<size_t>(coarse.height));
     for (int y = 0; y < coarse.height; ++y)
@@ -68,20 +80,21 @@ Level pullLevel(const Level& fine, double childSize) {
             }
             if (list.empty()) continue;
             double back = 0, front = 1e300, deepest = 0, thickest = 0;
-            Sample merged = blend(list, back);
+            Sample merged = blend(list, back, inverseFocal);
             for (const Contribution& c : list) {
                 front = std::min(front, c.sample->depth);
                 deepest = std::max(deepest, c.sample->depth);
                 thickest = std::max(thickest, c.sample->thickness);
             }
             merged.depth = front;
-            merged.thickness = std::min(thickest + deepest - front, 2 * thickest);
+            merged.thickness = merged.isRound ? merged.radius * front * inverseFocal
+                                              : std::min(thickest + deepest - front, 2 * thickest);
             coarse.ref(x, y) = merged;
         }
     return coarse;
 }
 
-void pushLevel(Level& fine, const Level& coarse, double fineSize) {
+void pushLevel(Level& fine, const Level& coarse, double fineSize, double inverseFocal) {
     for (int y = 0; y < fine.height; ++y)
         for (int x = 0; x < fine.width; ++x) {
             const dvec2 centre = (dvec2(x, y) + 0.5) * fineSize;
@@ -118,7 +131,7 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize) {
             }
             if (list.empty()) continue;
             double back = 0;
-            const Sample merged = blend(list, back);
+            const Sample merged = blend(list, back, inverseFocal);
             Sample& own = fine.ref(x, y);
             if (!own.valid || own.depth > back) own = merged;
         }
@@ -142,9 +155,11 @@ class ReferenceBackend final : public render::Backend {
         const bool hasPyramid =
             std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
         Level level0 = projectAll(draws);
+        projectStrands(draws, chunks_, level0);
         projectMeshes(draws, chunks_, level0);
         const Level own = level0;
-        if (hasPyramid) reconstruct(level0);
+        if (hasPyramid) reconstruct(level0, 1 / draws.view.focalPixels);
+        finishTubes(draws.view.focalPixels, level0);
         shade(draws, own, level0, request.wantDepthAndNormal, image);
         times_ = {{"reference", (nowSeconds() - start) * 1e3}};
         return {};
@@ -161,6 +176,7 @@ class ReferenceBackend final : public render::Backend {
             const lod::Instance& instance = draws.instances[cut.instance];
             const lod::Hierarchy& h = *draws.hierarchies[instance.hierarchy];
             const lod::Node& node = h.nodes[cut.node];
+            if (h.isStrands) continue;
             const auto& records = chunks_.at(uint64_t{instance.source} << 32 | cut.node).records;
             for (uint32_t i = 0; i < cut.count; ++i) {
                 const Disc disc = decodeDisc(h, node, records[i]);
@@ -195,23 +211,16 @@ class ReferenceBackend final : public render::Backend {
         return level;
     }
 
-    static dvec3 debugColour(const shared::FrameConstants& f, const lod::Node& node, const lod::CutDraw& cut) {
-        const double t = f.debugView == shared::kDebugLevel
-                             ? (node.level % 8) / 7.0
-                             : std::clamp((std::log2(std::max(1e-6, double(cut.errorPixels))) + 3) / 6, 0.0, 1.0);
-        const auto hat = [&](double middle) { return std::clamp(1.5 - std::abs(4 * t - middle), 0.0, 1.0); };
-        return {hat(3), hat(2), hat(1)};
-    }
-
-    static void reconstruct(Level& level0) {
+    static void reconstruct(Level& level0, double inverseFocal) {
         double largest = 0;
         for (const Sample& s : level0.samples) largest = std::max(largest, s.valid ? s.radius : 0.0);
         const int count = 1 + static_cast<int>(std::ceil(std::log2(std::max(2.0, 2 * largest))));
         std::vector<Level> pyramid{level0};
         while (static_cast<int>(pyramid.size()) < count && (pyramid.back().width > 1 || pyramid.back().height > 1))
-            pyramid.push_back(pullLevel(pyramid.back(), std::ldexp(1.0, static_cast<int>(pyramid.size()) - 1)));
+            pyramid.push_back(
+                pullLevel(pyramid.back(), std::ldexp(1.0, static_cast<int>(pyramid.size()) - 1), inverseFocal));
         for (size_t l = pyramid.size() - 1; l-- > 0;)
-            pushLevel(pyramid[l], pyramid[l + 1], std::ldexp(1.0, static_cast<int>(l)));
+            pushLevel(pyramid[l], pyramid[l + 1], std::ldexp(1.0, static_cast<int>(l)), inverseFocal);
         level0 = std::move(pyramid[0]);
     }
 
@@ -279,6 +288,14 @@ glm::dmat3 rotationToZ(const dvec3& v) {
     const double c = v.z;
     const glm::dmat3 k(dvec3(0, axis.z, -axis.y), dvec3(-axis.z, 0, axis.x), dvec3(axis.y, -axis.x, 0));
     return glm::dmat3(1) + k + k * k * (1 / (1 + c));
+}
+
+dvec3 debugColour(const shared::FrameConstants& f, const lod::Node& node, const lod::CutDraw& cut) {
+    const double t = f.debugView == shared::kDebugLevel
+                         ? (node.level % 8) / 7.0
+                         : std::clamp((std::log2(std::max(1e-6, double(cut.errorPixels))) + 3) / 6, 0.0, 1.0);
+    const auto hat = [&](double middle) { return std::clamp(1.5 - std::abs(4 * t - middle), 0.0, 1.0); };
+    return {hat(3), hat(2), hat(1)};
 }
 
 std::unique_ptr<render::Backend> makeReferenceBackend(Executor& executor) {

@@ -12,10 +12,14 @@ namespace stipple::reference {
 
 struct Sample {
     bool valid = false;
+    double key = 0;                               ///< depth by which strands are ordered
     double depth = 0, radius = 0, thickness = 0;  ///< thickness in world units
     glm::dvec2 centre{0};                         ///< of the splat, pixels of the full-size image
     glm::dvec2 perp{0};
     glm::dvec3 colour{0};
+    // Of a tube: `perp` is t_v t_perp, with t its unit tangent, `axis` (tx^2 - ty^2, 2 tx ty).
+    bool isRound = false;
+    glm::dvec2 axis{0};
     // Of a triangle's pixel:
     bool isTriangle = false, isUnlit = false;
     double metallic = 0, roughness = 1, occlusion = 1;
@@ -39,6 +43,16 @@ using Chunks = std::unordered_map<uint64_t, lod::Chunk>;  ///< by source << 32 |
 
 /// The rotation that takes the unit vector v to z the shortest way (Rodrigues).
 glm::dmat3 rotationToZ(const glm::dvec3& v);
+
+/// Colours of the debug views level and error.
+glm::dvec3 debugColour(const shared::FrameConstants& f, const lod::Node& node, const lod::CutDraw& cut);
+
+/// Ribbons and tubes of the cut into the level.
+void projectStrands(const render::DrawList& draws, const Chunks& chunks, Level& level);
+
+/// What tubes look like pixel by pixel, once the level is reconstructed: normals round their axes, depths of the
+/// surface.
+void finishTubes(double focal, Level& level);
 
 /// Triangles of the cut into the level: nearest surface at each pixel's centre.
 void projectMeshes(const render::DrawList& draws, const Chunks& chunks, Level& level);

@@ -1,0 +1,310 @@
+// Ribbons and tubes once more, in fp64, from the definitions: a segment narrower than the limit is a line of pixels (by
+// columns or rows, whichever it crosses more of) and its two ends, a wide one all pixels within its half-width.
+#include <algorithm>
+#include <cmath>
+
+#include "engine/reference/decode.h"
+#include "engine/reference/restate.h"
+
+namespace stipple::reference {
+namespace {
+
+using glm::dvec2;
+using glm::dvec3;
+
+constexpr double kNarrow = 0.5;
+
+/// A place on a segment, in camera space.
+struct Place {
+    dvec3 c{0};
+    double radius = 0;
+    dvec3 direction{0};  ///< as stored, between the ends
+    dvec3 colour{0};
+};
+
+struct TubeView {
+    dvec2 perp;
+    double depth;
+};
+
+/// Normal across the view and depth of a tube's surface at `off` px from its axis.
+TubeView tubeAt(const Sample& s, dvec2 off, double focal) {
+    off = s.radius > kNarrow ? off / s.radius : dvec2(0);
+    const double sine2 = glm::length(s.axis);
+    const double angle = 0.5 * std::atan2(s.axis.y, s.axis.x);
+    const dvec2 axis(std::cos(angle), std::sin(angle));
+    off -= axis * glm::dot(off, axis) * std::min(4 * sine2, 1.0);
+    if (glm::length(off) > 1) off = glm::normalize(off);
+    const double rise = std::sqrt(std::max(0.0, 1 - glm::dot(off, off))), sine = std::sqrt(sine2);
+    return {off + s.perp * (rise / std::max(sine, 0.1)),
+            s.depth * (1 + (1 - rise) * std::max(s.radius, 0.0) / focal / std::max(sine, 0.25))};
+}
+
+class StrandProjector {
+  public:
+    StrandProjector(const render::DrawList& draws, Level& level)
+        : draws_(draws), level_(level), view_(draws.view), f_(draws.frame) {}
+
+    void segment(const Segment& world, const lod::Instance& instance, uint32_t id, const dvec3* debugColour) {
+        id_ = id;
+        s_ = world;
+        debugColour_ = debugColour;
+        const auto toCamera = [&](const dvec3& w) {
+            return dvec3(glm::dot(w, view_.right), glm::dot(w, view_.down), glm::dot(w, view_.forward));
+        };
+        const auto place = [&](const dvec3& p) {
+            return toCamera(instance.translation + instance.rotation * (instance.scale * p) - view_.eye);
+        };
+        a_ = place(world.a);
+        b_ = place(world.b);
+        s_.radiusA *= instance.scale;
+        s_.radiusB *= instance.scale;
+        s_.directionA = toCamera(instance.rotation * world.directionA);
+        s_.directionB = toCamera(instance.rotation * world.directionB);
+        tangent_ = glm::length(b_ - a_) > 0 ? glm::normalize(b_ - a_) : dvec3(0);
+        const double near = view_.nearPlane;
+        if (a_.z < near && b_.z < near) return;
+        from_ = a_.z < near ? (near - a_.z) / (b_.z - a_.z) : 0;
+        to_ = b_.z < near ? (near - a_.z) / (b_.z - a_.z) : 1;
+        pa_ = imageOf(at(from_).c);
+        pb_ = imageOf(at(to_).c);
+        halfA_ = halfWidth(from_, s_.directionA);
+        halfB_ = halfWidth(to_, s_.directionB);
+        isWide_ = std::max(halfA_, halfB_) >= double{f_.exactStrands};
+        if (isWide_)
+            fill();
+        else
+            line();
+    }
+
+  private:
+    Place at(double t) const {
+        Place p;
+        p.c = a_ + t * (b_ - a_);
+        p.c.z = std::max(p.c.z, view_.nearPlane);
+        p.radius = s_.radiusA + t * (s_.radiusB - s_.radiusA);
+        p.direction = s_.directionA + t * (s_.directionB - s_.directionA);
+        p.colour = debugColour_ ? *debugColour_ : s_.colourA + t * (s_.colourB - s_.colourA);
+        return p;
+    }
+    dvec2 imageOf(const dvec3& c) const {
+        return view_.focalPixels * dvec2(c) / c.z + 0.5 * dvec2(view_.width, view_.height);
+    }
+    double halfWidth(double t, const dvec3& n) const {
+        const Place p = at(t);
+        const dvec3 v = glm::normalize(p.c);
+        const double sine = std::sqrt(std::max(1 - std::pow(glm::dot(tangent_, v), 2), 1e-6));
+        const dvec3 across = n - glm::dot(n, tangent_) * tangent_;
+        const double share =
+            s_.isTube ? 1 : std::min(std::abs(glm::dot(across, v)) / std::max(glm::length(across), 1e-6) / sine, 1.0);
+        return p.radius * share * view_.focalPixels / p.c.z;
+    }
+    /// Depth of a tube's surface over its axis / depth of the axis, for the order of what is drawn.
+    double nearerAt(double t) const {
+        if (!s_.isTube) return 1;
+        const Place p = at(t);
+        const double d = glm::length(p.c), along = glm::dot(tangent_, p.c) / d;
+        return 1 - std::min({p.radius / std::sqrt(std::max(1 - along * along, 1e-6)), 4 * p.radius, 0.9 * d}) / d;
+    }
+    double slopeAt(double t, const dvec3& n) const {
+        const dvec3 c = at(t).c, w = glm::cross(n, tangent_);
+        const dvec2 along = glm::length(pb_ - pa_) > 1e-4 ? glm::normalize(pb_ - pa_) : dvec2(0);
+        const dvec2 b(-along.y, along.x);
+        const double k = glm::dot(dvec2(w) - dvec2(c) / c.z * w.z, b) * view_.focalPixels;
+        return std::abs(k) > 1e-4 * view_.focalPixels * glm::length(w) ? std::clamp(w.z / k, -1.0, 1.0) : 0;
+    }
+
+    bool isTaken(uint32_t pixel, uint32_t id, double share) const {
+        uint32_t h = (pixel * 0x9e3779b1u) ^ (id * 0x85ebca6bu) ^ (f_.coverageSeed * 0xc2b2ae35u);
+        h = (h ^ h >> 16) * 0x7feb352du;
+        h = (h ^ h >> 15) * 0x846ca68bu;
+        h ^= h >> 16;
+        return (h >> 8) / 16777216.0 < share;
+    }
+
+    void line() {
+        const dvec2 d = pb_ - pa_;
+        const int major = std::abs(d.x) >= std::abs(d.y) ? 0 : 1, minor = 1 - major;
+        const double lo = std::min(pa_[major], pb_[major]), hi = std::max(pa_[major], pb_[major]);
+        const int size = static_cast<int>(major == 0 ? view_.width : view_.height);
+        const double slope = std::abs(d[major]) > 0 ? d[minor] / d[major] : 0, longer = std::sqrt(1 + slope * slope);
+        for (int m = std::max(0, static_cast<int>(std::ceil(lo - 0.5))); m < size && m + 0.5 < hi; ++m) {
+            const double u = (m + 0.5 - pa_[major]) / d[major], other = pa_[minor] + u * d[minor];
+            const double half = halfA_ + u * (halfB_ - halfA_);
+            const int x = major == 0 ? m : static_cast<int>(std::floor(other)),
+                      y = major == 0 ? static_cast<int>(std::floor(other)) : m;
+            offer(x, y, u, half, id_, 2 * half * longer);
+        }
+        const double length = std::max(std::abs(d.x), std::abs(d.y));
+        for (const auto& [p, u, half] : {std::tuple{pa_, 0.0, halfA_}, std::tuple{pb_, 1.0, halfB_}})
+            offer(static_cast<int>(std::floor(p.x)), static_cast<int>(std::floor(p.y)), u, half, ~id_,
+                  3.14159265 * half * half * (1 - length / std::max(2 * half, 1e-6)));
+    }
+
+    void offer(int x, int y, double u, double half, uint32_t id, double share) {
+        if (x < 0 || y < 0 || x >= level_.width || y >= level_.height) return;
+        const auto pixel = static_cast<uint32_t>(y) * view_.width + static_cast<uint32_t>(x);
+        if (half < kNarrow && !isTaken(pixel, id, share)) return;
+        const double nearer = nearerAt(from_) + u * (nearerAt(to_) - nearerAt(from_));
+        keep(x, y, axisDepth(u) * nearer);
+    }
+    double axisDepth(double u) const {
+        const double za = at(from_).c.z, zb = at(to_).c.z;
+        return 1 / (1 / za + u * (1 / zb - 1 / za));
+    }
+
+    void fill() {
+        const double widest = std::max(halfA_, halfB_);
+        const dvec2 lo = glm::min(pa_, pb_) - widest, hi = glm::max(pa_, pb_) + widest, d = pb_ - pa_;
+        const double length2 = glm::dot(d, d);
+        const dvec2 along = length2 > 1e-8 ? d / std::sqrt(length2) : dvec2(0), b(-along.y, along.x);
+        const double nearA = nearerAt(from_), nearB = nearerAt(to_), slopeA = slopeAt(from_, s_.directionA),
+                     slopeB = slopeAt(to_, s_.directionB);
+        for (int y = static_cast<int>(std::max(0.0, lo.y)); y < level_.height && y <= hi.y; ++y)
+            for (int x = static_cast<int>(std::max(0.0, lo.x)); x < level_.width && x <= hi.x; ++x) {
+                const dvec2 p(x + 0.5, y + 0.5);
+                const double u = length2 > 1e-8 ? std::clamp(glm::dot(p - pa_, d) / length2, 0.0, 1.0) : 0;
+                const dvec2 off = p - (pa_ + u * d);
+                const double half = halfA_ + u * (halfB_ - halfA_), q = glm::dot(off, off) / (half * half);
+                if (q > 1) continue;
+                const double nearer = s_.isTube ? 1 - std::sqrt(1 - q) * (1 - (nearA + u * (nearB - nearA)))
+                                                : 1 + glm::dot(off, b) * (slopeA + u * (slopeB - slopeA));
+                keep(x, y, std::max(axisDepth(u) * nearer, view_.nearPlane));
+            }
+    }
+
+    /// The sample at a pixel, if it is nearer than what is there by the depth `key`.
+    void keep(int x, int y, double key) {
+        Sample& s = level_.ref(x, y);
+        if (s.valid && s.key <= key) return;
+        const dvec2 pixel(x + 0.5, y + 0.5), d = pb_ - pa_;
+        const double u = std::clamp(glm::dot(pixel - pa_, d) / std::max(glm::dot(d, d), 1e-8), 0.0, 1.0);
+        const double za = at(from_).c.z, zb = at(to_).c.z;
+        const Place p = at(from_ + u * za / ((1 - u) * zb + u * za) * (to_ - from_));
+        const double distance = glm::length(p.c);
+        const dvec3 v = p.c / distance;
+        const double half = halfWidthAt(p);
+        s = {};
+        s.valid = true;
+        s.key = key;
+        s.colour = p.colour;
+        s.centre = imageOf(p.c);
+        const double support = f_.supportScale;
+        if (s_.isTube) {
+            const dvec3 t = glm::normalize(p.direction);
+            const double along = glm::dot(t, v);
+            const dvec2 across = dvec2(rotationToZ(v) * t);
+            const double sine = std::sqrt(std::max(1 - along * along, 1e-6)),
+                         reach = std::min(p.radius / distance, 0.9);
+            s.depth = std::max(p.c.z * (1 - std::min({p.radius / sine, 4 * p.radius, 0.9 * distance}) / distance),
+                               view_.nearPlane);
+            s.radius = p.radius * view_.focalPixels / p.c.z / std::sqrt(1 - reach * reach) * support;
+            s.isRound = half >= kNarrow;
+            s.perp = s.isRound ? along * across : dvec2(rotationToZ(v) * narrowNormal(t, v));
+            if (s.isRound) s.axis = {across.x * across.x - across.y * across.y, 2 * across.x * across.y};
+        } else {
+            dvec3 n = p.direction - glm::dot(p.direction, tangent_) * tangent_;
+            n = glm::normalize(n);
+            if (glm::dot(n, v) > 0) n = -n;
+            s.depth = p.c.z;
+            s.radius = std::max(p.radius * view_.focalPixels / p.c.z, kNarrow) * support;
+            s.perp = dvec2(rotationToZ(v) * n);
+        }
+        s.radius = half < kNarrow ? 0.25 : std::min(s.radius, 16384.0);
+        const double facing = 1 - glm::dot(s.perp, s.perp);
+        s.thickness = s.radius * s.depth / view_.focalPixels;
+        if (!s_.isTube)
+            s.thickness = std::max(p.radius * view_.focalPixels / p.c.z, kNarrow) *
+                          (0.25 + std::sqrt(std::max(0.0, 1 - facing))) * s.depth / view_.focalPixels;
+        if (!isWide_) return;
+        const dvec2 off = pixel - s.centre;
+        if (s.isRound) {
+            const TubeView seen = tubeAt(s, off, view_.focalPixels);
+            s.perp = seen.perp;
+            s.depth = seen.depth;
+        } else {
+            const dvec2 along = glm::dot(d, d) > 1e-8 ? glm::normalize(d) : dvec2(0);
+            s.depth *= 1 + glm::dot(off, dvec2(-along.y, along.x)) * slopeOf(p);
+        }
+        s.radius = 0.25;
+        s.thickness = 0.25 * s.depth / view_.focalPixels;
+        s.centre = pixel;
+        s.isRound = false;
+        s.axis = dvec2(0);
+    }
+    double halfWidthAt(const Place& p) const {
+        const dvec3 v = glm::normalize(p.c);
+        const double sine = std::sqrt(std::max(1 - std::pow(glm::dot(tangent_, v), 2), 1e-6));
+        const dvec3 across = p.direction - glm::dot(p.direction, tangent_) * tangent_;
+        const double share =
+            s_.isTube ? 1 : std::min(std::abs(glm::dot(across, v)) / std::max(glm::length(across), 1e-6) / sine, 1.0);
+        return p.radius * share * view_.focalPixels / p.c.z;
+    }
+    double slopeOf(const Place& p) const {
+        const dvec3 w = glm::cross(p.direction, tangent_);
+        const dvec2 along = glm::length(pb_ - pa_) > 1e-4 ? glm::normalize(pb_ - pa_) : dvec2(0);
+        const dvec2 b(-along.y, along.x);
+        const double k = glm::dot(dvec2(w) - dvec2(p.c) / p.c.z * w.z, b) * view_.focalPixels;
+        return std::abs(k) > 1e-4 * view_.focalPixels * glm::length(w) ? std::clamp(w.z / k, -1.0, 1.0) : 0;
+    }
+    dvec3 narrowNormal(const dvec3& t, const dvec3& v) const {
+        const dvec3 sun(f_.sunDirection);
+        dvec3 n = sun - glm::dot(sun, t) * t;
+        n -= std::max(glm::dot(n, v), 0.0) * v;
+        return glm::dot(n, n) > 1e-6 ? glm::normalize(n) : -v;
+    }
+
+    const render::DrawList& draws_;
+    Level& level_;
+    const lod::View& view_;
+    const shared::FrameConstants& f_;
+    Segment s_;
+    uint32_t id_ = 0;
+    const dvec3* debugColour_ = nullptr;
+    dvec3 a_{0}, b_{0}, tangent_{0};
+    double from_ = 0, to_ = 1, halfA_ = 0, halfB_ = 0;
+    dvec2 pa_{0}, pb_{0};
+    bool isWide_ = false;
+};
+
+}  // namespace
+
+void projectStrands(const render::DrawList& draws, const Chunks& chunks, Level& level) {
+    StrandProjector projector(draws, level);
+    for (Sample& s : level.samples) s.key = s.valid ? s.depth : 0;
+    uint32_t block = 0;
+    for (const lod::CutDraw& cut : draws.cut) {
+        const lod::Instance& instance = draws.instances[cut.instance];
+        const lod::Hierarchy& h = *draws.hierarchies[instance.hierarchy];
+        if (!h.isStrands) continue;
+        const lod::Node& node = h.nodes[cut.node];
+        const lod::Chunk& chunk = chunks.at(uint64_t{instance.source} << 32 | cut.node);
+        const shared::FrameConstants& f = draws.frame;
+        const bool isDebug = f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError;
+        const dvec3 colour = isDebug ? debugColour(f, node, cut) : dvec3(0);
+        for (uint32_t i = 0; i < cut.count; ++i) {
+            Segment s = decodeSegment(h, node, chunk.segments[i]);
+            if (s.errorCode > cut.errorCode && (s.octants & cut.octantMask) == 0) continue;
+            // Directions of a turned instance are turned in its records already.
+            lod::Instance place = instance;
+            const glm::dmat3 back = glm::transpose(instance.rotation);
+            s.directionA = back * s.directionA;
+            s.directionB = back * s.directionB;
+            projector.segment(s, place, 0x40000000u | (block * 256 + i), isDebug ? &colour : nullptr);
+        }
+        block += (cut.count + 255) / 256;
+    }
+}
+
+void finishTubes(double focal, Level& level) {
+    for (int y = 0; y < level.height; ++y)
+        for (int x = 0; x < level.width; ++x) {
+            Sample& s = level.ref(x, y);
+            if (!s.valid || !s.isRound) continue;
+            const TubeView seen = tubeAt(s, dvec2(x + 0.5, y + 0.5) - s.centre, focal);
+            s.perp = seen.perp;
+            s.depth = seen.depth;
+        }
+}
+
+}  // namespace stipple::reference
