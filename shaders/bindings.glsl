@@ -11,6 +11,7 @@
 #include "shared/pyramid.h"
 #include "shared/record.h"
 #include "shared/shade.h"
+#include "shared/strand.h"
 
 layout(set = 0, binding = 0, scalar) readonly buffer FrameBlock { FrameConstants frame; };
 layout(set = 0, binding = 1, scalar) readonly buffer NodeBlock { DrawNode nodes[]; };
@@ -22,6 +23,7 @@ layout(set = 0, binding = 6, scalar) writeonly buffer ImageBlock { uint image[];
 layout(set = 0, binding = 7, scalar) writeonly buffer ExtraBlock { float extra[]; };  // depth, normal xyz, linear rgb
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Records { PointRecord records[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Segments { StrandSegment segments[]; };
 
 // One step of the pyramid: `fine` and `coarse` are word offsets of a level's five planes.
 layout(push_constant, scalar) uniform Step {
@@ -34,6 +36,7 @@ layout(push_constant, scalar) uniform Step {
     uint level;      // of the fine side
     uint wantExtra;  // write depth, normals and linear colour
     uint hasPyramid;
+    uint hasTubes;  // texels may be of tubes
     uint count;  // clusters (rasterise); whether there are triangles (light)
 } stepInfo;
 
@@ -61,13 +64,24 @@ Texel loadTexel(uint offset, uint width, uint height, int x, int y) {
             p.colour = texels[at + 4u * plane];
         }
     }
+    if (stepInfo.hasTubes != 0u) return unpackAnyTexel(p);
     return unpackTexel(p);
+}
+
+// What a reconstructed texel shows at its pixel: tubes have normals round their axes.
+Texel finished(Texel t) {
+    if (t.isRound < 0.5) return t;
+    const TubeSurface s = tubeSurface(t, 1.0 / frame.focal);
+    t.normalPerp = s.normalPerp;
+    t.depth = s.depth;
+    return t;
 }
 
 void storeTexel(uint offset, uint width, uint height, uvec2 pixel, Texel t) {
     const uint plane = width * height;
     const uint at = offset + pixel.y * width + pixel.x;
-    const PackedTexel p = packTexel(t);
+    PackedTexel p = packTexel(t);
+    if (stepInfo.hasTubes != 0u) p = packAnyTexel(t);
     texels[at] = floatBitsToUint(p.depth);
     texels[at + plane] = p.size;
     texels[at + 2u * plane] = p.offset;

@@ -17,6 +17,7 @@ namespace {
 
 constexpr VkBufferUsageFlags kStorage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
 constexpr uint32_t kLargeCapacity = 65536, kLargeGroups = 64, kLargeRows = 16;  // see shaders/rasterise
+constexpr uint32_t kWideCapacity = 65536;                                       // see shaders/strands
 constexpr uint32_t kGroup = 64, kGroupsPerDimension = 65535;
 
 uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | key.node; }
@@ -103,6 +104,7 @@ class GpuBackend final : public render::Backend {
             bytes.insert(bytes.end(), from, from + values.size() * sizeof(values[0]));
         };
         append(chunk.records);
+        append(chunk.segments);
         append(chunk.vertices);
         append(chunk.triangles);
         append(chunk.texels);
@@ -155,9 +157,11 @@ class GpuBackend final : public render::Backend {
         }
         const uint64_t pixels = uint64_t{w} * h;
         STIPPLE_TRY(ensure(frameBuffer_, sizeof(shared::FrameConstants), kStorage, true, "frame constants"));
-        STIPPLE_TRY(ensure(nodeBuffer_, draws.nodes.size() * sizeof(shared::DrawNode), kStorage, true, "draw nodes"));
-        STIPPLE_TRY(
-            ensure(blockBuffer_, draws.blocks.size() * sizeof(shared::DrawBlock), kStorage, true, "draw blocks"));
+        // Nodes and blocks of points, then those of strands.
+        STIPPLE_TRY(ensure(nodeBuffer_, (draws.nodes.size() + draws.strandNodes.size()) * sizeof(shared::DrawNode),
+                           kStorage, true, "draw nodes"));
+        STIPPLE_TRY(ensure(blockBuffer_, (draws.blocks.size() + draws.strandBlocks.size()) * sizeof(shared::DrawBlock),
+                           kStorage, true, "draw blocks"));
         STIPPLE_TRY(ensure(visibility_, pixels * 8, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "visibility"));
         STIPPLE_TRY(ensure(texels_, words * 4, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "texels"));
         STIPPLE_TRY(ensure(stats_, 256, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "stats"));
@@ -168,15 +172,28 @@ class GpuBackend final : public render::Backend {
                            "readback"));
         std::memcpy(frameBuffer_.mapped(), &draws.frame, sizeof(draws.frame));
         auto* nodes = static_cast<shared::DrawNode*>(nodeBuffer_.mapped());
-        for (size_t i = 0; i < draws.nodes.size(); ++i) {
-            shared::DrawNode node = draws.nodes[i];
-            const VkDeviceAddress address = pages_.address(places_.at(chunkId(draws.keys[i])));
+        const auto placeNode = [&](shared::DrawNode node, streaming::ChunkKey key) {
+            const VkDeviceAddress address = pages_.address(places_.at(chunkId(key)));
             node.addressLow = static_cast<uint32_t>(address);
             node.addressHigh = static_cast<uint32_t>(address >> 32);
-            std::memcpy(nodes + i, &node, sizeof(node));
-        }
+            std::memcpy(nodes++, &node, sizeof(node));
+        };
+        for (size_t i = 0; i < draws.nodes.size(); ++i) placeNode(draws.nodes[i], draws.keys[i]);
+        for (size_t i = 0; i < draws.strandNodes.size(); ++i) placeNode(draws.strandNodes[i], draws.strandKeys[i]);
+        auto* blocks = static_cast<shared::DrawBlock*>(blockBuffer_.mapped());
         if (!draws.blocks.empty())
-            std::memcpy(blockBuffer_.mapped(), draws.blocks.data(), draws.blocks.size() * sizeof(shared::DrawBlock));
+            std::memcpy(blocks, draws.blocks.data(), draws.blocks.size() * sizeof(shared::DrawBlock));
+        for (size_t i = 0; i < draws.strandBlocks.size(); ++i) {
+            shared::DrawBlock block = draws.strandBlocks[i];
+            block.node += static_cast<uint32_t>(draws.nodes.size());
+            std::memcpy(blocks + draws.blocks.size() + i, &block, sizeof(block));
+        }
+        hasStrands_ = !draws.strandNodes.empty();
+        if (hasStrands_) {
+            STIPPLE_TRY(pipelines_->addStrandPasses());
+            STIPPLE_TRY(ensure(wide_, 4 + uint64_t{kWideCapacity} * 56, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                               false, "wide strands"));
+        }
         if (!draws.meshDraws.empty()) STIPPLE_TRY(prepareMeshes(draws, pixels));
         if (needsLightPass(draws)) STIPPLE_TRY(prepareLights(draws));
         if (descriptorsChanged_) {
@@ -184,7 +201,7 @@ class GpuBackend final : public render::Backend {
             pipelines_->writeDescriptors({&frameBuffer_, &nodeBuffer_, &blockBuffer_, &visibility_, &texels_, &stats_,
                                           &image_, &extra_, bound(meshes_), bound(clusters_), bound(materials_),
                                           bound(textures_), bound(tiles_), bound(lights_), bound(surfaces_),
-                                          bound(large_), bound(environment_)});
+                                          bound(large_), bound(environment_), bound(wide_)});
             descriptorsChanged_ = false;
         }
         return {};
@@ -273,6 +290,7 @@ class GpuBackend final : public render::Backend {
                                  static_cast<uint32_t>(level),
                                  wantAll,
                                  hasPyramid && levels_.size() > 1,
+                                 hasStrands_,
                                  count};
         pipelines_->push(commands_, step);
     }
@@ -296,8 +314,23 @@ class GpuBackend final : public render::Backend {
                                   (blocks + kGroupsPerDimension - 1) / kGroupsPerDimension, 1);
                 break;
             }
-            case render::Pass::strands:
+            case render::Pass::strands: {
+                list.begin("wide list", {write(wide_)}, true);
+                vkCmdFillBuffer(commands_, wide_.handle(), 0, 4, 0);
+                list.end();
+                const auto blocks = static_cast<uint32_t>(draws.strandBlocks.size());
+                list.begin("strands", {write(visibility_), write(wide_)}, false);
+                pipelines_->use(commands_, "strands");
+                pushStep(0, hasPyramid, wantAll, blocks);
+                vkCmdDispatch(commands_, std::min(blocks, kGroupsPerDimension),
+                              (blocks + kGroupsPerDimension - 1) / kGroupsPerDimension, 1);
+                list.end();
+                list.begin("wide strands", {write(visibility_), read(wide_)}, false);
+                pipelines_->use(commands_, "strands_wide");
+                pushStep(0, hasPyramid, wantAll);
+                vkCmdDispatch(commands_, kLargeGroups, (levels_[0].height + kLargeRows - 1) / kLargeRows, 1);
                 break;
+            }
             case render::Pass::rasterise: {
                 list.begin("large list", {write(large_)}, true);
                 vkCmdFillBuffer(commands_, large_.handle(), 0, 4, 0);
@@ -320,6 +353,13 @@ class GpuBackend final : public render::Backend {
                 pipelines_->use(commands_, "resolve");
                 pushStep(0, hasPyramid, wantAll);
                 dispatch(levels_[0].width, levels_[0].height);
+                if (hasStrands_) {
+                    list.end();
+                    list.begin("strand texels", {read(visibility_), write(texels_), write(stats_)}, false);
+                    pipelines_->use(commands_, "strand_texels");
+                    pushStep(0, hasPyramid, wantAll);
+                    dispatch(levels_[0].width, levels_[0].height);
+                }
                 if (draws.meshDraws.empty()) break;
                 list.end();
                 list.begin("surface", {read(visibility_), write(texels_), write(surfaces_)}, false);
@@ -441,6 +481,7 @@ class GpuBackend final : public render::Backend {
     std::vector<PendingUpload> pending_;
     Buffer frameBuffer_, nodeBuffer_, blockBuffer_, visibility_, texels_, stats_, image_, extra_, readback_, staging_;
     Buffer meshes_, clusters_, materials_, textures_, tiles_, surfaces_, large_;  // only with triangles
+    Buffer wide_;                                                                 // only with strands
     Buffer lights_, environment_;                                                 // only with lights
     std::unordered_map<uint64_t, MeshChunk> meshChunks_;
     MeshFrame meshFrame_;
@@ -451,7 +492,7 @@ class GpuBackend final : public render::Backend {
     std::vector<Level> levels_;
     std::vector<render::PassTime> times_;
     std::string omitBarriersBefore_;
-    bool descriptorsChanged_ = true;
+    bool descriptorsChanged_ = true, hasStrands_ = false;
 };
 
 }  // namespace

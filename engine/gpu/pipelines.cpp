@@ -28,6 +28,15 @@ constexpr uint32_t kRasteriseLarge[] = {
 constexpr uint32_t kSurface[] = {
 #include "surface.inc"
 };
+constexpr uint32_t kStrands[] = {
+#include "strands.inc"
+};
+constexpr uint32_t kStrandsWide[] = {
+#include "strands_wide.inc"
+};
+constexpr uint32_t kStrandTexels[] = {
+#include "strand_texels.inc"
+};
 constexpr uint32_t kLight[] = {
 #include "light.inc"
 };
@@ -79,6 +88,13 @@ Result<void> Pipelines::addMeshPasses() {
     STIPPLE_TRY(add("rasterise", kRasterise, std::size(kRasterise)));
     STIPPLE_TRY(add("rasterise_large", kRasteriseLarge, std::size(kRasteriseLarge)));
     return add("surface", kSurface, std::size(kSurface));
+}
+
+Result<void> Pipelines::addStrandPasses() {
+    if (pipelines_.count("strand_texels") > 0) return {};
+    STIPPLE_TRY(add("strands", kStrands, std::size(kStrands)));
+    STIPPLE_TRY(add("strands_wide", kStrandsWide, std::size(kStrandsWide)));
+    return add("strand_texels", kStrandTexels, std::size(kStrandTexels));
 }
 
 Result<void> Pipelines::addLightPass() {

@@ -12,13 +12,14 @@ namespace stipple::gpu {
 
 /// Mirrors `Step` of shaders/bindings.glsl.
 struct StepConstants {
-    uint32_t fine, fineWidth, fineHeight, coarse, coarseWidth, coarseHeight, level, wantExtra, hasPyramid, count;
+    uint32_t fine, fineWidth, fineHeight, coarse, coarseWidth, coarseHeight, level, wantExtra, hasPyramid, hasTubes,
+        count;
 };
-static_assert(sizeof(StepConstants) == 40);
+static_assert(sizeof(StepConstants) == 44);
 
 class Pipelines {
   public:
-    static constexpr size_t kBindings = 17, kPointPasses = 5;
+    static constexpr size_t kBindings = 18, kPointPasses = 5;
     static Result<std::unique_ptr<Pipelines>> create(const Device& device);
     ~Pipelines();
     Pipelines(const Pipelines&) = delete;
@@ -28,6 +29,8 @@ class Pipelines {
     void bind(VkCommandBuffer commands) const;
     /// The passes that only triangles need; created at the first call.
     Result<void> addMeshPasses();
+    /// The passes that only ribbons and tubes need.
+    Result<void> addStrandPasses();
     /// The pass that lights need, of triangles and of points under lights of the scene's own.
     Result<void> addLightPass();
     size_t count() const { return pipelines_.size(); }

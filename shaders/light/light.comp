@@ -17,6 +17,7 @@ void main() {
         if (pushed.depth != own.depth) word = 0u;  // a splat stands in front
         own = pushed;
     }
+    own = finished(own);
     if (word == 0u) {
         const bool hasLights = frame.lightCount > 0u || frame.hasEnvironment != 0u;
         if (own.depth <= 0.0 || !hasLights || (frame.shade & kShadeLit) == 0u) return;

@@ -14,6 +14,8 @@ void main() {
     t.offset = vec2(0.0);
     t.normalPerp = vec2(0.0);
     t.colour = vec3(0.0);
+    t.isRound = 0.0;
+    t.axis = vec2(0.0);
     const uint64_t key = visibility[pixel.y * frame.width + pixel.x];
     if ((uint(key) & 0xe0000000u) == 0u) {  // a point; triangles come later, and nothing has all bits set
         const uint id = uint(key) & 0x1fffffffu;

@@ -10,6 +10,7 @@ void main() {
     const Texel own = loadTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, int(pixel.x), int(pixel.y));
     Texel t = own;
     if (stepInfo.hasPyramid != 0u) t = pushedTexel(ivec2(pixel), own);
+    t = finished(t);
     vec3 colour = frame.background;
     vec3 n = vec3(0.0);
     const bool valid = t.depth > 0.0;
@@ -18,7 +19,7 @@ void main() {
                                       (float(pixel.y) + 0.5 - frame.centre.y) / frame.focal, 1.0));
         n = normalFromPerp(t.normalPerp, v);
         colour = t.colour;
-        if (frame.debugView == kDebugHoles) colour = debugHoleColour(own.depth, t.depth);
+        if (frame.debugView == kDebugHoles) colour = debugHoleColour(finished(own).depth, t.depth);
         else if (frame.debugView == kDebugNormals) colour = vec3(0.5 + 0.5 * n.x, 0.5 - 0.5 * n.y, 0.5 - 0.5 * n.z);
         else if (frame.debugView == kDebugNone && (frame.shade & kShadeLit) != 0u) colour *= irradiance(n, frame.sunDirection, frame.skyDirection);
     }

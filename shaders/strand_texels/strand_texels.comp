@@ -1,0 +1,41 @@
+// Pixels that show strands, after resolve, to texels of level 0; measures the widest that is reconstructed.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "../strands.glsl"
+layout(local_size_x = 64) in;
+
+void main() {
+    const uvec2 pixel = gl_GlobalInvocationID.xy;
+    if (pixel.x >= frame.width || pixel.y >= frame.height) return;
+    const uint64_t key = visibility[pixel.y * frame.width + pixel.x];
+    if (key == ~uint64_t(0) || (uint(key) & kKindMask) != kKindStrand) return;
+    const uint id = uint(key) & ~kKindMask;
+    const DrawBlock source = blocks[frame.blockCount + id / kSegmentsPerBlock];
+    const DrawNode node = nodes[source.node];
+    const StrandSegment segment =
+        Segments(uvec2(node.addressLow, node.addressHigh)).segments[source.first + id % kSegmentsPerBlock];
+    const CameraSegment s = cameraSegment(node, segment);
+    const float cx = frame.centre.x - 0.5 - float(pixel.x);
+    const float cy = frame.centre.y - 0.5 - float(pixel.y);
+    const ScreenSegment on = projectSegment(s.a, s.b, frame.focal, cx, cy, frame.nearPlane);
+    const float place = segmentParameter(on, 0.0, 0.0);
+    Texel t = texelFromStrand(s, place, frame.supportScale, frame.focal, frame.nearPlane, frame.sunDirection);
+    vec3 c = s.a + place * (s.b - s.a);
+    c.z = max(c.z, frame.nearPlane);
+    const vec2 off = c.xy * frame.focal / c.z + vec2(cx, cy);
+    t.offset = off;
+    if (widestHalfWidth(s, on, frame.focal, frame.nearPlane) >= frame.exactStrands) {
+        const vec2 d = vec2(on.xb - on.xa, on.yb - on.ya);
+        const float inverse = 1.0 / sqrt(max(dot(d, d), 1.0e-8));
+        const vec3 direction = s.directionA + place * (s.directionB - s.directionA);
+        const float slope = ribbonSlope(c, segmentTangent(s), direction, frame.focal, -d.y * inverse, d.x * inverse);
+        t = exactTexel(t, -off.x, -off.y, -d.y * inverse, d.x * inverse, slope, 1.0 / frame.focal);
+    }
+    const vec4 a = decodeTexel(segment.a.colour, true);
+    const vec4 b = decodeTexel(segment.b.colour, true);
+    t.colour = a.xyz + place * (b.xyz - a.xyz);
+    if (frame.debugView == kDebugLevel) t.colour = debugLevelColour(node.level);
+    if (frame.debugView == kDebugError) t.colour = debugErrorColour(node.errorPixels);
+    atomicMax(largestRadiusBits, floatBitsToUint(t.radius));
+    storeTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, pixel, t);
+}

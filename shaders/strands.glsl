@@ -1,0 +1,54 @@
+// What both passes of strands share: segments in camera space, and wide ones in a list.
+#extension GL_GOOGLE_include_directive : require
+#include "mesh.glsl"
+
+// A strand so wide that its pixels are filled, as the cpu backend has it.
+struct WideStrand {
+    float xa, ya, xb, yb;
+    float inverseA, inverseB;
+    float halfA, halfB;
+    float nearerA, nearerB;
+    float slopeA, slopeB;
+    uint isRound;
+    uint id;
+};
+layout(set = 0, binding = 17, scalar) buffer WideBlock {
+    uint wideCount;
+    WideStrand wide[];
+};
+const uint kWideCapacity = 65536u;
+
+CameraSegment cameraSegment(DrawNode node, StrandSegment s) {
+    CameraSegment c;
+    c.a = node.base + node.axisX * float(s.a.positionXY & 0xffffu) + node.axisY * float(s.a.positionXY >> 16) +
+          node.axisZ * float(s.a.positionZ & 0xffffu);
+    c.b = node.base + node.axisX * float(s.b.positionXY & 0xffffu) + node.axisY * float(s.b.positionXY >> 16) +
+          node.axisZ * float(s.b.positionZ & 0xffffu);
+    c.radiusA = strandRadius(s.a, node.edge);
+    c.radiusB = strandRadius(s.b, node.edge);
+    const vec3 da = octDecode(s.a.direction);
+    const vec3 db = octDecode(s.b.direction);
+    c.directionA = vec3(dot(frame.viewX, da), dot(frame.viewY, da), dot(frame.viewZ, da));
+    c.directionB = vec3(dot(frame.viewX, db), dot(frame.viewY, db), dot(frame.viewZ, db));
+    c.isRound = float(s.a.positionZ >> 31);
+    return c;
+}
+
+// Offers one pixel of a wide strand, if its centre is within the half-width.
+void offerWide(WideStrand s, int x, int y) {
+    const float dx = s.xb - s.xa, dy = s.yb - s.ya;
+    const float length2 = dx * dx + dy * dy;
+    const float inverse2 = length2 > 1.0e-8 ? 1.0 / length2 : 0.0;
+    const float inverse = sqrt(inverse2);
+    const float px = float(x) + 0.5 - s.xa, py = float(y) + 0.5 - s.ya;
+    const float u = clamp((px * dx + py * dy) * inverse2, 0.0, 1.0);
+    const float ex = px - u * dx, ey = py - u * dy;
+    const float halfWidth = s.halfA + u * (s.halfB - s.halfA);
+    const float q = ex * ex + ey * ey;
+    if (q > halfWidth * halfWidth) return;
+    const float axis = 1.0 / (s.inverseA + u * (s.inverseB - s.inverseA));
+    const float rise = sqrt(1.0 - min(q / (halfWidth * halfWidth), 1.0));
+    const float nearer = s.isRound != 0u ? 1.0 - rise * (1.0 - (s.nearerA + u * (s.nearerB - s.nearerA)))
+                                         : 1.0 + (ey * dx - ex * dy) * inverse * (s.slopeA + u * (s.slopeB - s.slopeA));
+    offer(x, y, 1.0 / max(axis * nearer, frame.nearPlane), s.id);
+}

@@ -1,0 +1,115 @@
+// One workgroup per block of 256 segments.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "../strands.glsl"
+layout(local_size_x = 256) in;
+
+const int kMostPixels = 4096;
+
+void drawLine(WideStrand s) {
+    const bool isSteep = abs(s.xb - s.xa) < abs(s.yb - s.ya);
+    vec2 a = isSteep ? vec2(s.ya, s.xa) : vec2(s.xa, s.ya);
+    vec2 b = isSteep ? vec2(s.yb, s.xb) : vec2(s.xb, s.yb);
+    vec4 atA = vec4(s.inverseA, s.halfA, s.nearerA, 0.0);
+    vec4 atB = vec4(s.inverseB, s.halfB, s.nearerB, 0.0);
+    if (b.x < a.x) {
+        const vec2 c = a;
+        a = b;
+        b = c;
+        const vec4 d = atA;
+        atA = atB;
+        atB = d;
+    }
+    const float columns = float(isSteep ? frame.height : frame.width);
+    const float rows = float(isSteep ? frame.width : frame.height);
+    const float across = b.x - a.x;
+    const float first = max(ceil(a.x - 0.5), 0.0);
+    const float last = min(ceil(b.x - 0.5), columns) - 1.0;
+    if (!(first <= last) || !(across > 0.0)) return;
+    const float slope = (b.y - a.y) / across;
+    const float longer = sqrt(1.0 + slope * slope);
+    for (int m = int(first); m <= int(last); ++m) {
+        const float u = (float(m) + 0.5 - a.x) / across;
+        const float other = a.y + u * (b.y - a.y);
+        if (!(other >= 0.0 && other < rows)) continue;
+        const int x = isSteep ? int(other) : m;
+        const int y = isSteep ? m : int(other);
+        const vec4 here = atA + u * (atB - atA);
+        if (here.y < kNarrow && coverageThreshold(uint(y) * frame.width + uint(x), s.id, frame.coverageSeed) >= 2.0 * here.y * longer)
+            continue;
+        offer(x, y, here.x / here.z, s.id);
+    }
+}
+
+void drawEnd(float x, float y, float inverseDepth, float halfWidth, float nearer, float across, uint id) {
+    if (!(x >= 0.0 && y >= 0.0 && x < float(frame.width) && y < float(frame.height))) return;
+    const uint pixel = uint(y) * frame.width + uint(x);
+    const float share = 3.14159265 * halfWidth * halfWidth * (1.0 - across / max(2.0 * halfWidth, 1.0e-6));
+    if (halfWidth < kNarrow && coverageThreshold(pixel, ~id, frame.coverageSeed) >= share) return;
+    offer(int(x), int(y), inverseDepth / nearer, id);
+}
+
+float nearerAt(vec3 end, vec3 t, float radius, float isRound) {
+    const float distance = sqrt(max(dot(end, end), 1.0e-30));
+    const float tv = dot(t, end) / distance;
+    const float front = min(min(radius / sqrt(max(1.0 - tv * tv, 1.0e-6)), 4.0 * radius), 0.9 * distance);
+    return isRound > 0.5 ? 1.0 - front / distance : 1.0;
+}
+
+void main() {
+    const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * 65535u;
+    if (block >= stepInfo.count) return;
+    const DrawBlock source = blocks[frame.blockCount + block];
+    const DrawNode node = nodes[source.node];
+    const uint index = source.first + gl_LocalInvocationID.x;
+    if (index >= node.count) return;
+    const StrandSegment segment = Segments(uvec2(node.addressLow, node.addressHigh)).segments[index];
+    if (segmentErrorCode(segment) > node.errorCode && (segmentOctants(segment) & node.octantMask) == 0u) return;
+    const CameraSegment c = cameraSegment(node, segment);
+    const ScreenSegment p = projectSegment(c.a, c.b, frame.focal, frame.centre.x, frame.centre.y, frame.nearPlane);
+    if (p.isThere < 0.5) return;
+    const vec3 t = segmentTangent(c);
+    vec3 a = c.a + p.from * (c.b - c.a);
+    vec3 b = c.a + p.to * (c.b - c.a);
+    a.z = max(a.z, frame.nearPlane);
+    b.z = max(b.z, frame.nearPlane);
+    WideStrand s;
+    s.xa = p.xa;
+    s.ya = p.ya;
+    s.xb = p.xb;
+    s.yb = p.yb;
+    s.inverseA = 1.0 / p.za;
+    s.inverseB = 1.0 / p.zb;
+    s.halfA = endHalfWidth(c, p.from, c.directionA, frame.focal, frame.nearPlane);
+    s.halfB = endHalfWidth(c, p.to, c.directionB, frame.focal, frame.nearPlane);
+    const float widest = max(s.halfA, s.halfB);
+    const vec2 lo = min(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) - widest;
+    const vec2 hi = max(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) + widest;
+    if (hi.x < 0.0 || hi.y < 0.0 || lo.x >= float(frame.width) || lo.y >= float(frame.height)) return;
+    s.nearerA = nearerAt(a, t, c.radiusA + p.from * (c.radiusB - c.radiusA), c.isRound);
+    s.nearerB = nearerAt(b, t, c.radiusA + p.to * (c.radiusB - c.radiusA), c.isRound);
+    const vec2 d = vec2(p.xb - p.xa, p.yb - p.ya);
+    const float inverse = 1.0 / sqrt(max(dot(d, d), 1.0e-8));
+    s.slopeA = ribbonSlope(a, t, c.directionA, frame.focal, -d.y * inverse, d.x * inverse);
+    s.slopeB = ribbonSlope(b, t, c.directionB, frame.focal, -d.y * inverse, d.x * inverse);
+    s.isRound = c.isRound > 0.5 ? 1u : 0u;
+    s.id = kKindStrand | (block * kSegmentsPerBlock + gl_LocalInvocationID.x);
+    if (widest < frame.exactStrands) {
+        drawLine(s);
+        const float across = max(abs(d.x), abs(d.y));
+        drawEnd(s.xa, s.ya, s.inverseA, s.halfA, s.nearerA, across, s.id);
+        drawEnd(s.xb, s.yb, s.inverseB, s.halfB, s.nearerB, across, s.id);
+        return;
+    }
+    const ivec2 from = ivec2(max(lo, vec2(0.0)));
+    const ivec2 to = ivec2(min(hi, vec2(frame.width, frame.height) - 1.0));
+    if ((to.x - from.x + 1) * (to.y - from.y + 1) > kMostPixels) {
+        const uint place = atomicAdd(wideCount, 1u);
+        if (place < kWideCapacity) {
+            wide[place] = s;
+            return;
+        }
+    }
+    for (int y = from.y; y <= to.y; ++y)
+        for (int x = from.x; x <= to.x; ++x) offerWide(s, x, y);
+}

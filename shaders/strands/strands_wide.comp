@@ -1,0 +1,24 @@
+// Workgroup (x, y) fills the rows of band y of every 64th wide strand: one over the whole image is work for all.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "../strands.glsl"
+layout(local_size_x = 256) in;
+
+const int kRows = 16;
+
+void main() {
+    const uint count = min(wideCount, kWideCapacity);
+    const int firstRow = int(gl_WorkGroupID.y) * kRows;
+    for (uint i = gl_WorkGroupID.x; i < count; i += gl_NumWorkGroups.x) {
+        const WideStrand s = wide[i];
+        const float widest = max(s.halfA, s.halfB);
+        const int x0 = int(max(min(s.xa, s.xb) - widest, 0.0));
+        const int x1 = int(min(max(s.xa, s.xb) + widest, float(frame.width) - 1.0));
+        const int y0 = int(max(min(s.ya, s.yb) - widest, float(firstRow)));
+        const int y1 = int(min(max(s.ya, s.yb) + widest, min(float(firstRow + kRows), float(frame.height)) - 1.0));
+        const int width = x1 - x0 + 1;
+        if (width <= 0 || y1 < y0) continue;
+        const int pixels = width * (y1 - y0 + 1);
+        for (int p = int(gl_LocalInvocationID.x); p < pixels; p += 256) offerWide(s, x0 + p % width, y0 + p / width);
+    }
+}
