@@ -11,6 +11,7 @@ namespace {
 
 using glm::dvec2;
 using glm::dvec3;
+using glm::dvec4;
 
 constexpr double kNarrow = 0.5;
 
@@ -62,10 +63,18 @@ class StrandProjector {
         s_.directionA = toCamera(instance.rotation * world.directionA);
         s_.directionB = toCamera(instance.rotation * world.directionB);
         tangent_ = glm::length(b_ - a_) > 0 ? glm::normalize(b_ - a_) : dvec3(0);
-        const double near = view_.nearPlane;
-        if (a_.z < near && b_.z < near) return;
-        from_ = a_.z < near ? (near - a_.z) / (b_.z - a_.z) : 0;
-        to_ = b_.z < near ? (near - a_.z) / (b_.z - a_.z) : 1;
+        // Before the near plane, and no more than 16,384 px from the middle of the image.
+        from_ = 0;
+        to_ = 1;
+        const double slope = 16384 / view_.focalPixels;
+        for (const dvec4& plane : {dvec4(0, 0, 1, -view_.nearPlane), dvec4(1, 0, slope, 0), dvec4(-1, 0, slope, 0),
+                                   dvec4(0, 1, slope, 0), dvec4(0, -1, slope, 0)}) {
+            const double da = glm::dot(plane, dvec4(a_, 1)), db = glm::dot(plane, dvec4(b_, 1));
+            if (da < 0 && db < 0) return;
+            if (da < 0) from_ = std::max(from_, da / (da - db));
+            if (db < 0) to_ = std::min(to_, da / (da - db));
+        }
+        if (!(from_ < to_)) return;
         pa_ = imageOf(at(from_).c);
         pb_ = imageOf(at(to_).c);
         halfA_ = halfWidth(from_, s_.directionA);

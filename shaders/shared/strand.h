@@ -47,7 +47,8 @@ struct CameraSegment {
     float isRound;
 };
 
-// Projected: image positions, and where on the segment what lies before the near plane begins and ends.
+// Projected: image positions, and where on the segment that part begins and ends that lies before the near plane and
+// within kStrandGuard pixels of the image's centre. (Beyond, fp32 would lose what a place on the image is.)
 struct ScreenSegment {
     float xa;
     float ya;
@@ -57,17 +58,30 @@ struct ScreenSegment {
     float zb;
     float from;  // 0 to 1, along the segment
     float to;
-    float isThere;  // 0: all behind the near plane
+    float isThere;  // 0: nothing is left
 };
+const float kStrandGuard = 16384.0f;
+
+// Narrows [from, to] to where a quantity that is `da` at one end and `db` at the other is positive.
+SHARED_FN vec2 cutRange(vec2 range, float da, float db) {
+    const float at = abs(da - db) > 0.0f ? da / (da - db) : 0.0f;
+    const float first = da < 0.0f ? (db < 0.0f ? 2.0f : at) : 0.0f;
+    const float last = db < 0.0f ? at : 1.0f;
+    return vec2(max(range.x, first), min(range.y, last));
+}
 SHARED_FN ScreenSegment projectSegment(vec3 a, vec3 b, float focal, float cx, float cy, float nearPlane) {
+    const float slope = kStrandGuard / focal;
+    vec2 range = cutRange(vec2(0.0f, 1.0f), a.z - nearPlane, b.z - nearPlane);
+    range = cutRange(range, slope * a.z - a.x, slope * b.z - b.x);
+    range = cutRange(range, slope * a.z + a.x, slope * b.z + b.x);
+    range = cutRange(range, slope * a.z - a.y, slope * b.z - b.y);
+    range = cutRange(range, slope * a.z + a.y, slope * b.z + b.y);
     ScreenSegment s;
-    const float dz = b.z - a.z;
-    const float crossing = abs(dz) > 0.0f ? (nearPlane - a.z) / dz : 0.0f;
-    s.from = a.z < nearPlane ? crossing : 0.0f;
-    s.to = b.z < nearPlane ? crossing : 1.0f;
-    s.isThere = a.z < nearPlane && b.z < nearPlane ? 0.0f : 1.0f;
-    s.za = a.z < nearPlane ? nearPlane : a.z;
-    s.zb = b.z < nearPlane ? nearPlane : b.z;
+    s.isThere = range.x < range.y ? 1.0f : 0.0f;
+    s.from = min(range.x, 1.0f);
+    s.to = max(range.y, 0.0f);
+    s.za = max(a.z + s.from * (b.z - a.z), nearPlane);
+    s.zb = max(a.z + s.to * (b.z - a.z), nearPlane);
     const float ka = focal / s.za;
     const float kb = focal / s.zb;
     s.xa = (a.x + s.from * (b.x - a.x)) * ka + cx;
