@@ -8,7 +8,8 @@ struct WideStrand {
     float inverseA, inverseB;
     float halfA, halfB;
     float nearerA, nearerB;
-    float slopeA, slopeB;
+    RibbonEdge edgeA, edgeB;
+    float widest;
     uint isRound;
     uint id;
 };
@@ -38,17 +39,22 @@ CameraSegment cameraSegment(DrawNode node, StrandSegment s) {
 void offerWide(WideStrand s, int x, int y) {
     const float dx = s.xb - s.xa, dy = s.yb - s.ya;
     const float length2 = dx * dx + dy * dy;
-    const float inverse2 = length2 > 1.0e-8 ? 1.0 / length2 : 0.0;
-    const float inverse = sqrt(inverse2);
     const float px = float(x) + 0.5 - s.xa, py = float(y) + 0.5 - s.ya;
-    const float u = clamp((px * dx + py * dy) * inverse2, 0.0, 1.0);
-    const float ex = px - u * dx, ey = py - u * dy;
-    const float halfWidth = s.halfA + u * (s.halfB - s.halfA);
-    const float q = ex * ex + ey * ey;
-    if (q > halfWidth * halfWidth) return;
+    float u, nearer;
+    if (s.isRound != 0u) {
+        u = clamp((px * dx + py * dy) * (length2 > 1.0e-8 ? 1.0 / length2 : 0.0), 0.0, 1.0);
+        const float ex = px - u * dx, ey = py - u * dy;
+        const float halfWidth = s.halfA + u * (s.halfB - s.halfA);
+        const float q = ex * ex + ey * ey;
+        if (q > halfWidth * halfWidth) return;
+        const float rise = sqrt(1.0 - min(q / (halfWidth * halfWidth), 1.0));
+        nearer = 1.0 - rise * (1.0 - (s.nearerA + u * (s.nearerB - s.nearerA)));
+    } else {
+        const RibbonPlace p = ribbonPlace(px, py, dx, dy, s.edgeA, s.edgeB);
+        if (!(abs(p.across) <= 1.0)) return;
+        u = p.along;
+        nearer = 1.0 + p.across * (s.edgeA.slope + u * (s.edgeB.slope - s.edgeA.slope));
+    }
     const float axis = 1.0 / (s.inverseA + u * (s.inverseB - s.inverseA));
-    const float rise = sqrt(1.0 - min(q / (halfWidth * halfWidth), 1.0));
-    const float nearer = s.isRound != 0u ? 1.0 - rise * (1.0 - (s.nearerA + u * (s.nearerB - s.nearerA)))
-                                         : 1.0 + (ey * dx - ex * dy) * inverse * (s.slopeA + u * (s.slopeB - s.slopeA));
     offer(x, y, 1.0 / max(axis * nearer, frame.nearPlane), s.id);
 }

@@ -11,6 +11,7 @@
 #include "apps/stipple/common.h"
 #include "engine/base/hash.h"
 #include "engine/image/image_io.h"
+#include "engine/scene/strands.h"
 #include "engine/scene/triangles.h"
 #include "lod/build/mesh/mesh_build.h"
 #include "lod/build/strands/strand_build.h"
@@ -169,7 +170,13 @@ Result<lod::BuildReport> buildPlyMesh(const std::string& input, const std::strin
 /// Ribbons and tubes.
 Result<lod::BuildReport> buildStrands(const std::string& input, const std::string& output, const BuildOptions& build,
                                       Executor& executor, Progress& progress) {
-    STIPPLE_ASSIGN(lod::StrandSet strands, lod::readStrands(input));
+    lod::StrandSet strands;
+    if (isSceneFile(input)) {
+        STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(input, build.repair));
+        strands = scene::flattenStrands(scene, scene::placements(scene));
+    } else {
+        STIPPLE_ASSIGN(strands, lod::readStrands(input));
+    }
     lod::StrandBuildSettings settings;
     settings.description.source = fs::path(input).filename().string();
     const lod::StrandSet clean = lod::cleanStrands(std::move(strands), build.strandRadius);
@@ -318,6 +325,14 @@ Result<std::vector<render::PlacedStore>> openSceneFile(const std::string& path, 
         return std::any_of(meshes.begin(), meshes.end(), [&](const auto& p) { return holds(scene, p, kind); });
     };
     if (build.surfels == 0) STIPPLE_TRY(placeTriangles(scene, build, executor, showProgress, placed));
+    if (anyHolds(scene::PrimitiveKind::lines)) {
+        STIPPLE_ASSIGN(
+            std::shared_ptr<const lod::Store> strands,
+            openCached({path}, build, "strands", showProgress, [&](const std::string& to, Progress& progress) {
+                return buildStrands(path, to, build, executor, progress);
+            }));
+        placed.push_back({std::move(strands), {}, {}});
+    }
     if (build.surfels > 0 || anyHolds(scene::PrimitiveKind::points) || placed.empty()) {
         STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> points,
                        openBuilt({path}, build, colour, executor, showProgress));
@@ -387,7 +402,21 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
         return fail(ErrorKind::usage, "only one scene with meshes can be built at a time", inputs[1]);
     STIPPLE_ASSIGN(scene::Scene scene, scene::readScene(inputs.front(), build.repair));
     lod::TriangleMesh triangles = scene::flattenTriangles(scene, scene::placements(scene));
+    const auto counted = [&](scene::PrimitiveKind kind) {
+        uint64_t sum = 0;
+        for (const scene::Placement& p : scene::placements(scene))
+            for (const auto& q : scene.meshes[static_cast<size_t>(p.mesh)].primitives)
+                sum += q.kind == kind ? q.indices.size() : 0;
+        return sum;
+    };
+    const uint64_t lines = counted(scene::PrimitiveKind::lines) / 2, points = counted(scene::PrimitiveKind::points);
+    if (triangles.indices.empty() && points == 0 && lines > 0)
+        return buildStrands(inputs.front(), output, build, executor, progress);
     if (triangles.indices.empty()) return lod::buildStore(inputs, output, settings, executor, progress);
+    if (lines + points > 0)
+        scene.notes.push_back(fmt::format(
+            "a store holds one kind of primitive: {} lines and {} points are left out; view the scene file to see all",
+            lines, points));
     STIPPLE_ASSIGN(const lod::MeshBuildSettings mesh, meshSettings(scene));
     const std::vector<std::string> notes = scene.notes;
     scene = {};  // its memory is needed

@@ -79,9 +79,10 @@ struct LargeTriangle {
 struct WideStrand {
     float xa, ya, xb, yb;  ///< ends, px
     float inverseA, inverseB;
-    float halfA, halfB;      ///< half-widths, px
-    float nearerA, nearerB;  ///< tube: depth of the surface / of the axis
-    float slopeA, slopeB;    ///< ribbon: see ribbonSlope
+    float halfA, halfB;               ///< half-widths, px
+    float nearerA, nearerB;           ///< tube: depth of the surface / of the axis
+    shared::RibbonEdge edgeA, edgeB;  ///< ribbon: from the axis to its edge
+    float widest;                     ///< pixels farther from the axis are not covered
     bool isRound;
     uint32_t id;
 };

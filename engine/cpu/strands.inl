@@ -47,8 +47,10 @@ struct Lines {
     alignas(64) float inverseA[kSegmentsPerBlock], inverseB[kSegmentsPerBlock];
     alignas(64) float halfA[kSegmentsPerBlock], halfB[kSegmentsPerBlock];  ///< seen half-widths, px
     alignas(64) float nearerA[kSegmentsPerBlock], nearerB[kSegmentsPerBlock];  ///< depth of the surface / of the axis
-    alignas(64) float slopeA[kSegmentsPerBlock], slopeB[kSegmentsPerBlock];    ///< of ribbons, see ribbonSlope
-    alignas(64) float isRound[kSegmentsPerBlock];
+    // From a ribbon's axis to its edge, see ribbonEdge.
+    alignas(64) float edgeAx[kSegmentsPerBlock], edgeAy[kSegmentsPerBlock], slopeA[kSegmentsPerBlock];
+    alignas(64) float edgeBx[kSegmentsPerBlock], edgeBy[kSegmentsPerBlock], slopeB[kSegmentsPerBlock];
+    alignas(64) float isRound[kSegmentsPerBlock], radius[kSegmentsPerBlock];  ///< radius: the larger one, px
     alignas(64) uint32_t keep[kSegmentsPerBlock];
 };
 
@@ -89,32 +91,40 @@ void drawLine(const FrameConstants& f, const Lines& lines, size_t i, LineEnds e,
 /// Rows [firstRow, lastRow] of a wide strand: every pixel whose centre is within its half-width.
 void fillStrand(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, uint64_t* visibility) {
     const float dx = s.xb - s.xa, dy = s.yb - s.ya, length2 = dx * dx + dy * dy;
-    const float inverse2 = length2 > 1.0e-8f ? 1.0f / length2 : 0.0f, inverse = std::sqrt(inverse2);
-    const float bx = -dy * inverse, by = dx * inverse, widest = max(s.halfA, s.halfB);
-    const int top = int(max(min(s.ya, s.yb) - widest, float(firstRow))),
-              bottom = int(min(max(s.ya, s.yb) + widest, float(lastRow)));
+    const float inverse2 = length2 > 1.0e-8f ? 1.0f / length2 : 0.0f;
+    const int top = int(max(min(s.ya, s.yb) - s.widest, float(firstRow))),
+              bottom = int(min(max(s.ya, s.yb) + s.widest, float(lastRow)));
+    const RibbonEdge a = s.edgeA, b = s.edgeB;
     for (int y = top; y <= bottom; ++y) {
         const float cy = float(y) + 0.5f;
         // Where the axis is within reach of this row.
         float from = min(s.xa, s.xb), to = max(s.xa, s.xb);
         if (std::fabs(dy) > 1.0e-6f) {
-            const float u0 = (cy - widest - s.ya) / dy, u1 = (cy + widest - s.ya) / dy;
+            const float u0 = (cy - s.widest - s.ya) / dy, u1 = (cy + s.widest - s.ya) / dy;
             const float lo = min(max(min(u0, u1), 0.0f), 1.0f), hi = min(max(max(u0, u1), 0.0f), 1.0f);
             const float x0 = s.xa + lo * dx, x1 = s.xa + hi * dx;
             from = min(x0, x1);
             to = max(x0, x1);
         }
-        const int left = int(max(from - widest, 0.0f)), right = int(min(to + widest, float(int(f.width)) - 1.0f));
+        const int left = int(max(from - s.widest, 0.0f)), right = int(min(to + s.widest, float(int(f.width)) - 1.0f));
+        const float py = cy - s.ya;
         for (int x = left; x <= right; ++x) {
-            const float px = float(x) + 0.5f - s.xa, py = cy - s.ya;
-            const float u = min(max((px * dx + py * dy) * inverse2, 0.0f), 1.0f);
-            const float ex = px - u * dx, ey = py - u * dy, half = s.halfA + u * (s.halfB - s.halfA);
-            const float q = ex * ex + ey * ey;
-            if (q > half * half) continue;
+            const float px = float(x) + 0.5f - s.xa;
+            float u = 0, nearer = 1;
+            if (s.isRound) {
+                u = min(max((px * dx + py * dy) * inverse2, 0.0f), 1.0f);
+                const float ex = px - u * dx, ey = py - u * dy, half = s.halfA + u * (s.halfB - s.halfA);
+                const float q = ex * ex + ey * ey;
+                if (q > half * half) continue;
+                const float rise = std::sqrt(1.0f - min(q / (half * half), 1.0f));
+                nearer = 1.0f - rise * (1.0f - (s.nearerA + u * (s.nearerB - s.nearerA)));
+            } else {
+                const RibbonPlace p = ribbonPlace(px, py, dx, dy, a, b);
+                if (!(std::fabs(p.across) <= 1.0f)) continue;
+                u = p.along;
+                nearer = 1.0f + p.across * (a.slope + u * (b.slope - a.slope));
+            }
             const float axis = 1.0f / (s.inverseA + u * (s.inverseB - s.inverseA));
-            const float rise = std::sqrt(1.0f - min(q / (half * half), 1.0f));
-            const float nearer = s.isRound ? 1.0f - rise * (1.0f - (s.nearerA + u * (s.nearerB - s.nearerA)))
-                                           : 1.0f + (ex * bx + ey * by) * (s.slopeA + u * (s.slopeB - s.slopeA));
             offer(visibility, size_t(y) * f.width + size_t(x), 1.0f / max(axis * nearer, f.nearPlane), s.id);
         }
     }
@@ -155,11 +165,16 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
         lines.halfB[i] = endHalfWidth(c, p.to, c.directionB, f.focal, f.nearPlane);
         lines.nearerA[i] = nearer(a, ra);
         lines.nearerB[i] = nearer(b, rb);
-        const float dx = p.xb - p.xa, dy = p.yb - p.ya;
-        const float inverse = 1.0f / std::sqrt(max(dx * dx + dy * dy, 1.0e-8f));
-        lines.slopeA[i] = ribbonSlope(a, t, c.directionA, f.focal, -dy * inverse, dx * inverse);
-        lines.slopeB[i] = ribbonSlope(b, t, c.directionB, f.focal, -dy * inverse, dx * inverse);
+        const RibbonEdge edgeA = ribbonEdge(a, c.directionA, ra, f.focal),
+                         edgeB = ribbonEdge(b, c.directionB, rb, f.focal);
+        lines.edgeAx[i] = edgeA.x;
+        lines.edgeAy[i] = edgeA.y;
+        lines.slopeA[i] = edgeA.slope;
+        lines.edgeBx[i] = edgeB.x;
+        lines.edgeBy[i] = edgeB.y;
+        lines.slopeB[i] = edgeB.slope;
         lines.isRound[i] = c.isRound;
+        lines.radius[i] = widestRadius(c, p, f.focal);
         const bool isFine = (segmentErrorCode(s) <= node.errorCode) | ((segmentOctants(s) & node.octantMask) != 0u);
         lines.keep[i] = (isFine & (p.isThere > 0.5f)) ? 1u : 0u;
     }
@@ -167,15 +182,18 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
     for (size_t i = 0; i < count; ++i) {
         if (lines.keep[i] == 0) continue;
         const float xa = lines.xa[i], ya = lines.ya[i], xb = lines.xb[i], yb = lines.yb[i];
-        const float widest = max(lines.halfA[i], lines.halfB[i]);
+        const RibbonEdge a{lines.edgeAx[i], lines.edgeAy[i], lines.slopeA[i]},
+            b{lines.edgeBx[i], lines.edgeBy[i], lines.slopeB[i]};
+        const bool isTubeHere = lines.isRound[i] > 0.5f;
+        const float widest =
+            isTubeHere ? lines.radius[i] : std::sqrt(max(a.x * a.x + a.y * a.y, b.x * b.x + b.y * b.y));
         if (max(xa, xb) < -widest || max(ya, yb) < -widest || min(xa, xb) >= width + widest ||
             min(ya, yb) >= height + widest)
             continue;
         const uint32_t id = kKindStrand | (firstId + uint32_t(i));
-        if (widest >= f.exactStrands) {
+        if (lines.radius[i] >= f.exactStrands) {
             const WideStrand s{xa, ya, xb, yb, lines.inverseA[i], lines.inverseB[i], lines.halfA[i], lines.halfB[i],
-                               lines.nearerA[i], lines.nearerB[i], lines.slopeA[i], lines.slopeB[i],
-                               lines.isRound[i] > 0.5f, id};
+                               lines.nearerA[i], lines.nearerB[i], a, b, widest, isTubeHere, id};
             // One that covers much of the image is work for all threads.
             const float rows = std::fabs(yb - ya) + 2 * widest, columns = std::fabs(xb - xa) + 2 * widest;
             if (min(rows, height) * min(columns, width) > float(kLargePixels))
@@ -267,32 +285,14 @@ void resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
         const float px = float(int(p.pixel[i]));
         // Image coordinates from this pixel's centre on, so that the low bits are kept.
         const ScreenSegment on = projectSegment(s.a, s.b, focal, cx - px, cy, nearPlane);
-        const float place = segmentParameter(on, 0.0f, 0.0f);
-        const Texel disc = texelFromStrand(s, place, support, focal, nearPlane, sun);
-        const vec3 c = vec3(s.a.x + place * (s.b.x - s.a.x), s.a.y + place * (s.b.y - s.a.y),
-                            max(s.a.z + place * (s.b.z - s.a.z), nearPlane));
-        const float offX = c.x * focal / c.z + (cx - px), offY = c.y * focal / c.z + cy;
-        const float lx = on.xb - on.xa, ly = on.yb - on.ya;
-        const float inverse = 1.0f / std::sqrt(max(lx * lx + ly * ly, 1.0e-8f));
-        const vec3 tangent = segmentTangent(s);
-        const vec3 direction = vec3(s.directionA.x + place * (s.directionB.x - s.directionA.x),
-                                    s.directionA.y + place * (s.directionB.y - s.directionA.y),
-                                    s.directionA.z + place * (s.directionB.z - s.directionA.z));
-        const float slope = ribbonSlope(c, tangent, direction, focal, -ly * inverse, lx * inverse);
-        const Texel filled = exactTexel(disc, -offX, -offY, -ly * inverse, lx * inverse, slope, 1.0f / focal);
-        const bool isWide = widestHalfWidth(s, on, focal, nearPlane) >= exactStrands;
-        Texel t;
-        t.depth = isWide ? filled.depth : disc.depth;
-        t.radius = isWide ? filled.radius : disc.radius;
-        t.thickness = isWide ? filled.thickness : disc.thickness;
-        t.normalPerp = vec2(isWide ? filled.normalPerp.x : disc.normalPerp.x, isWide ? filled.normalPerp.y : disc.normalPerp.y);
-        t.isRound = isWide ? 0.0f : disc.isRound;
-        t.axis = vec2(isWide ? 0.0f : disc.axis.x, isWide ? 0.0f : disc.axis.y);
+        const StrandPixel seen = strandPixel(s, on, support, focal, cx - px, cy, nearPlane, exactStrands, sun);
+        const Texel t = seen.texel;
+        const float place = seen.place;
         o.depth[i] = t.depth;
         o.radius[i] = t.radius;
         o.thickness[i] = t.thickness;
-        o.x[i] = isWide ? 0.0f : offX;
-        o.y[i] = isWide ? 0.0f : offY;
+        o.x[i] = t.offset.x;
+        o.y[i] = t.offset.y;
         o.perpX[i] = t.normalPerp.x;
         o.perpY[i] = t.normalPerp.y;
         o.isRound[i] = t.isRound;

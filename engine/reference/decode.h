@@ -60,7 +60,7 @@ inline Disc decodeDisc(const lod::Hierarchy& h, const lod::Node& node, const sha
 struct Segment {
     glm::dvec3 a{0}, b{0};  ///< world
     double radiusA = 0, radiusB = 0;
-    glm::dvec3 directionA{0}, directionB{0};  ///< normal of a ribbon, tangent of a tube
+    glm::dvec3 directionA{0}, directionB{0};  ///< across a ribbon, along a tube
     glm::dvec3 colourA{0}, colourB{0};        ///< linear
     bool isTube = false;
     uint32_t errorCode = 0, octants = 0;

@@ -79,7 +79,8 @@ class StrandProjector {
         pb_ = imageOf(at(to_).c);
         halfA_ = halfWidth(from_, s_.directionA);
         halfB_ = halfWidth(to_, s_.directionB);
-        isWide_ = std::max(halfA_, halfB_) >= double{f_.exactStrands};
+        isWide_ = view_.focalPixels * std::max(at(from_).radius / at(from_).c.z, at(to_).radius / at(to_).c.z) >=
+                  double{f_.exactStrands};
         if (isWide_)
             fill();
         else
@@ -103,9 +104,9 @@ class StrandProjector {
         const Place p = at(t);
         const dvec3 v = glm::normalize(p.c);
         const double sine = std::sqrt(std::max(1 - std::pow(glm::dot(tangent_, v), 2), 1e-6));
-        const dvec3 across = n - glm::dot(n, tangent_) * tangent_;
+        const dvec3 normal = glm::cross(tangent_, n);
         const double share =
-            s_.isTube ? 1 : std::min(std::abs(glm::dot(across, v)) / std::max(glm::length(across), 1e-6) / sine, 1.0);
+            s_.isTube ? 1 : std::min(std::abs(glm::dot(normal, v)) / std::max(glm::length(normal), 1e-6) / sine, 1.0);
         return p.radius * share * view_.focalPixels / p.c.z;
     }
     /// Depth of a tube's surface over its axis / depth of the axis, for the order of what is drawn.
@@ -115,12 +116,35 @@ class StrandProjector {
         const double d = glm::length(p.c), along = glm::dot(tangent_, p.c) / d;
         return 1 - std::min({p.radius / std::sqrt(std::max(1 - along * along, 1e-6)), 4 * p.radius, 0.9 * d}) / d;
     }
-    double slopeAt(double t, const dvec3& n) const {
-        const dvec3 c = at(t).c, w = glm::cross(n, tangent_);
-        const dvec2 along = glm::length(pb_ - pa_) > 1e-4 ? glm::normalize(pb_ - pa_) : dvec2(0);
-        const dvec2 b(-along.y, along.x);
-        const double k = glm::dot(dvec2(w) - dvec2(c) / c.z * w.z, b) * view_.focalPixels;
-        return std::abs(k) > 1e-4 * view_.focalPixels * glm::length(w) ? std::clamp(w.z / k, -1.0, 1.0) : 0;
+    /// From a ribbon's axis to its edge, px and share of the depth.
+    dvec3 edgeAt(double t, const dvec3& w) const {
+        const Place p = at(t);
+        const dvec3 half = p.radius * glm::normalize(w);
+        return {view_.focalPixels / p.c.z * (dvec2(half) - dvec2(p.c) / p.c.z * half.z),
+                std::clamp(half.z / p.c.z, -0.9, 0.9)};
+    }
+    /// Where a pixel lies on a wide ribbon: along the axis (0 to 1) and across (-1 to 1); across is 10^6 beyond its
+    /// ends.
+    dvec2 onRibbon(const dvec2& pixel) const {
+        const auto cross = [](const dvec2& a, const dvec2& b) { return a.x * b.y - a.y * b.x; };
+        const dvec2 e = pixel - pa_, d = pb_ - pa_, a(edgeAt(from_, s_.directionA)), b(edgeAt(to_, s_.directionB));
+        // (e - u d) x (a + u (b - a)) = 0
+        const double k2 = -cross(d, b - a), k1 = cross(e, b - a) - cross(d, a), k0 = cross(e, a);
+        std::vector<double> roots;
+        const double disc = k1 * k1 - 4 * k2 * k0;
+        if (disc < 0) return {0, 1e6};
+        if (std::abs(k2) > 1e-6 * std::abs(k1)) {
+            roots = {(-k1 - std::sqrt(disc)) / (2 * k2), (-k1 + std::sqrt(disc)) / (2 * k2)};
+        } else if (k1 != 0) {
+            roots = {-k0 / k1};
+        }
+        dvec2 best(0, 1e6);
+        for (const double u : roots) {
+            const dvec2 w = a + u * (b - a);
+            const double across = glm::dot(e - u * d, w) / std::max(glm::dot(w, w), 1e-12);
+            if (u >= 0 && u <= 1 && std::abs(across) < std::abs(best.y)) best = {u, across};
+        }
+        return best;
     }
 
     bool isTaken(uint32_t pixel, uint32_t id, double share) const {
@@ -163,21 +187,27 @@ class StrandProjector {
     }
 
     void fill() {
-        const double widest = std::max(halfA_, halfB_);
+        const dvec3 edgeA = edgeAt(from_, s_.directionA), edgeB = edgeAt(to_, s_.directionB);
+        const double widest =
+            s_.isTube ? std::max(halfA_, halfB_) : std::max(glm::length(dvec2(edgeA)), glm::length(dvec2(edgeB)));
         const dvec2 lo = glm::min(pa_, pb_) - widest, hi = glm::max(pa_, pb_) + widest, d = pb_ - pa_;
         const double length2 = glm::dot(d, d);
-        const dvec2 along = length2 > 1e-8 ? d / std::sqrt(length2) : dvec2(0), b(-along.y, along.x);
-        const double nearA = nearerAt(from_), nearB = nearerAt(to_), slopeA = slopeAt(from_, s_.directionA),
-                     slopeB = slopeAt(to_, s_.directionB);
+        const double nearA = nearerAt(from_), nearB = nearerAt(to_);
         for (int y = static_cast<int>(std::max(0.0, lo.y)); y < level_.height && y <= hi.y; ++y)
             for (int x = static_cast<int>(std::max(0.0, lo.x)); x < level_.width && x <= hi.x; ++x) {
                 const dvec2 p(x + 0.5, y + 0.5);
-                const double u = length2 > 1e-8 ? std::clamp(glm::dot(p - pa_, d) / length2, 0.0, 1.0) : 0;
-                const dvec2 off = p - (pa_ + u * d);
-                const double half = halfA_ + u * (halfB_ - halfA_), q = glm::dot(off, off) / (half * half);
-                if (q > 1) continue;
-                const double nearer = s_.isTube ? 1 - std::sqrt(1 - q) * (1 - (nearA + u * (nearB - nearA)))
-                                                : 1 + glm::dot(off, b) * (slopeA + u * (slopeB - slopeA));
+                double u = length2 > 1e-8 ? std::clamp(glm::dot(p - pa_, d) / length2, 0.0, 1.0) : 0, nearer = 1;
+                if (s_.isTube) {
+                    const dvec2 off = p - (pa_ + u * d);
+                    const double half = halfA_ + u * (halfB_ - halfA_), q = glm::dot(off, off) / (half * half);
+                    if (q > 1) continue;
+                    nearer = 1 - std::sqrt(1 - q) * (1 - (nearA + u * (nearB - nearA)));
+                } else {
+                    const dvec2 on = onRibbon(p);
+                    if (std::abs(on.y) > 1) continue;
+                    u = on.x;
+                    nearer = 1 + on.y * glm::mix(edgeA.z, edgeB.z, u);
+                }
                 keep(x, y, std::max(axisDepth(u) * nearer, view_.nearPlane));
             }
     }
@@ -187,7 +217,12 @@ class StrandProjector {
         Sample& s = level_.ref(x, y);
         if (s.valid && s.key <= key) return;
         const dvec2 pixel(x + 0.5, y + 0.5), d = pb_ - pa_;
-        const double u = std::clamp(glm::dot(pixel - pa_, d) / std::max(glm::dot(d, d), 1e-8), 0.0, 1.0);
+        double u = std::clamp(glm::dot(pixel - pa_, d) / std::max(glm::dot(d, d), 1e-8), 0.0, 1.0), farther = 0;
+        if (isWide_ && !s_.isTube) {
+            const dvec2 on = onRibbon(pixel);
+            u = on.x;
+            farther = on.y * glm::mix(edgeAt(from_, s_.directionA).z, edgeAt(to_, s_.directionB).z, u);
+        }
         const double za = at(from_).c.z, zb = at(to_).c.z;
         const Place p = at(from_ + u * za / ((1 - u) * zb + u * za) * (to_ - from_));
         const double distance = glm::length(p.c);
@@ -212,8 +247,7 @@ class StrandProjector {
             s.perp = s.isRound ? along * across : dvec2(rotationToZ(v) * narrowNormal(t, v));
             if (s.isRound) s.axis = {across.x * across.x - across.y * across.y, 2 * across.x * across.y};
         } else {
-            dvec3 n = p.direction - glm::dot(p.direction, tangent_) * tangent_;
-            n = glm::normalize(n);
+            dvec3 n = glm::normalize(glm::cross(tangent_, p.direction));
             if (glm::dot(n, v) > 0) n = -n;
             s.depth = p.c.z;
             s.radius = std::max(p.radius * view_.focalPixels / p.c.z, kNarrow) * support;
@@ -232,8 +266,7 @@ class StrandProjector {
             s.perp = seen.perp;
             s.depth = seen.depth;
         } else {
-            const dvec2 along = glm::dot(d, d) > 1e-8 ? glm::normalize(d) : dvec2(0);
-            s.depth *= 1 + glm::dot(off, dvec2(-along.y, along.x)) * slopeOf(p);
+            s.depth *= 1 + farther;
         }
         s.radius = 0.25;
         s.thickness = 0.25 * s.depth / view_.focalPixels;
@@ -244,17 +277,10 @@ class StrandProjector {
     double halfWidthAt(const Place& p) const {
         const dvec3 v = glm::normalize(p.c);
         const double sine = std::sqrt(std::max(1 - std::pow(glm::dot(tangent_, v), 2), 1e-6));
-        const dvec3 across = p.direction - glm::dot(p.direction, tangent_) * tangent_;
+        const dvec3 normal = glm::cross(tangent_, p.direction);
         const double share =
-            s_.isTube ? 1 : std::min(std::abs(glm::dot(across, v)) / std::max(glm::length(across), 1e-6) / sine, 1.0);
+            s_.isTube ? 1 : std::min(std::abs(glm::dot(normal, v)) / std::max(glm::length(normal), 1e-6) / sine, 1.0);
         return p.radius * share * view_.focalPixels / p.c.z;
-    }
-    double slopeOf(const Place& p) const {
-        const dvec3 w = glm::cross(p.direction, tangent_);
-        const dvec2 along = glm::length(pb_ - pa_) > 1e-4 ? glm::normalize(pb_ - pa_) : dvec2(0);
-        const dvec2 b(-along.y, along.x);
-        const double k = glm::dot(dvec2(w) - dvec2(p.c) / p.c.z * w.z, b) * view_.focalPixels;
-        return std::abs(k) > 1e-4 * view_.focalPixels * glm::length(w) ? std::clamp(w.z / k, -1.0, 1.0) : 0;
     }
     dvec3 narrowNormal(const dvec3& t, const dvec3& v) const {
         const dvec3 sun(f_.sunDirection);

@@ -68,12 +68,7 @@ bool meetsTube(const Segment& s, const LocalRay& ray, double nearT, StrandHit& h
 /// Bilinear patch p(u, v) = (1-u)(1-v) q00 + u (1-v) q10 + (1-u) v q01 + u v q11: u from one edge to the other, v along
 /// the strand. The ray's two planes give a quadratic in v.
 bool meetsRibbon(const Segment& s, const LocalRay& ray, double nearT, StrandHit& hit) {
-    const dvec3 t = glm::normalize(s.b - s.a);
-    const auto across = [&](const dvec3& n) {
-        const dvec3 m = n - glm::dot(n, t) * t;
-        return glm::length(m) > 1e-9 ? glm::normalize(glm::cross(m, t)) : dvec3(0);
-    };
-    const dvec3 wa = s.radiusA * across(s.directionA), wb = s.radiusB * across(s.directionB);
+    const dvec3 wa = s.radiusA * s.directionA, wb = s.radiusB * s.directionB;
     const dvec3 q00 = s.a - wa, q10 = s.a + wa, q01 = s.b - wb, q11 = s.b + wb;
     // Points of the patch minus the ray's origin, seen along the ray: two equations in (u, v).
     const dvec3 d = glm::normalize(ray.direction);

@@ -51,6 +51,7 @@ struct Primitive {
     std::vector<glm::vec3> position, normal;
     std::vector<glm::vec4> tangent, colour;  ///< colour linear
     std::vector<std::vector<glm::vec2>> uv;  ///< by set
+    std::vector<float> radius;               ///< of lines: attribute _RADIUS
     std::vector<uint32_t> indices;           ///< 1, 2 or 3 an element; every one below position.size()
     int material = -1;
 };

@@ -46,6 +46,8 @@ void main() {
     put(frame.lightCount);
     put(frame.ambient);
     put(frame.hasEnvironment);
+    put(frame.exactStrands);
+    put(frame.coverageSeed);
     put(frame.environmentX);
     put(frame.environmentY);
     put(frame.environmentZ);

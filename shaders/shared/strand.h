@@ -11,7 +11,7 @@ SHARED_BEGIN
 struct StrandVertex {
     uint positionXY;
     uint positionZ;  // z 16 | radius 15, the upper bits of an fp32 in cells | of the first vertex: is a tube
-    uint direction;  // octahedral: normal of a ribbon, tangent of a tube
+    uint direction;  // octahedral: across a ribbon, along a tube
     uint colour;     // sRGB | of the first vertex: own error code, of the second: octants whose children it stands for
 };
 struct StrandSegment {
@@ -102,15 +102,19 @@ SHARED_FN float segmentParameter(ScreenSegment s, float x, float y) {
     return s.from + t * (s.to - s.from);
 }
 
+// Normal of a ribbon, not of unit length. `t`: tangent, `w`: across.
+SHARED_FN vec3 ribbonNormal(vec3 t, vec3 w) {
+    return vec3(t.y * w.z - t.z * w.y, t.z * w.x - t.x * w.z, t.x * w.y - t.y * w.x);
+}
+
 // Half-width across the line of sight, px: what is seen of a ribbon depends on how it faces the eye. `c`: a place on
-// the segment, `t`: unit tangent, `n`: the ribbon's normal.
-SHARED_FN float seenHalfWidth(vec3 c, float radius, vec3 t, vec3 n, float isRound, float focal) {
+// the segment, `t`: unit tangent, `w`: across the ribbon.
+SHARED_FN float seenHalfWidth(vec3 c, float radius, vec3 t, vec3 w, float isRound, float focal) {
     const float inverse = 1.0f / sqrt(max(dot(c, c), 1.0e-30f));
     const vec3 v = vec3(c.x * inverse, c.y * inverse, c.z * inverse);
     const float tv = dot(t, v);
     const float sine = sqrt(max(1.0f - tv * tv, 1.0e-6f));
-    const float along = dot(n, t);
-    const vec3 m = vec3(n.x - along * t.x, n.y - along * t.y, n.z - along * t.z);
+    const vec3 m = ribbonNormal(t, w);
     const float facing = abs(dot(m, v)) / sqrt(max(dot(m, m), 1.0e-12f));
     const float share = isRound > 0.5f ? 1.0f : min(facing / sine, 1.0f);
     return radius * share * focal / c.z;
@@ -123,16 +127,18 @@ SHARED_FN vec3 segmentTangent(CameraSegment s) {
     return vec3(d.x * inverse, d.y * inverse, d.z * inverse);
 }
 
-// The larger half-width of a segment's ends, px: decides whether it is filled or reconstructed.
+// Seen half-width at one end of what is left of a segment, px.
 SHARED_FN float endHalfWidth(CameraSegment s, float place, vec3 direction, float focal, float nearPlane) {
     const vec3 c = vec3(s.a.x + place * (s.b.x - s.a.x), s.a.y + place * (s.b.y - s.a.y),
                         max(s.a.z + place * (s.b.z - s.a.z), nearPlane));
     return seenHalfWidth(c, s.radiusA + place * (s.radiusB - s.radiusA), segmentTangent(s), direction, s.isRound,
                          focal);
 }
-SHARED_FN float widestHalfWidth(CameraSegment s, ScreenSegment on, float focal, float nearPlane) {
-    return max(endHalfWidth(s, on.from, s.directionA, focal, nearPlane),
-               endHalfWidth(s, on.to, s.directionB, focal, nearPlane));
+// The larger radius of the ends, px: decides whether a strand is filled or reconstructed, however it faces the eye.
+SHARED_FN float widestRadius(CameraSegment s, ScreenSegment on, float focal) {
+    const float a = (s.radiusA + on.from * (s.radiusB - s.radiusA)) / on.za;
+    const float b = (s.radiusA + on.to * (s.radiusB - s.radiusA)) / on.zb;
+    return max(a, b) * focal;
 }
 
 // Normal of a tube too narrow to show its roundness: the one whose light is that of the whole, sqrt(1 - (l t)^2), bent
@@ -171,9 +177,7 @@ SHARED_FN Texel texelFromStrand(CameraSegment s, float place, float support, flo
     const float reach = min(radius / distance, 0.9f);
     const float front = min(min(radius / sqrt(max(sine2, 1.0e-6f)), 4.0f * radius), 0.9f * distance);
     const float roundRadius = radius * focal / (z * sqrt(1.0f - reach * reach));
-    // Ribbon: the normal at right angles to the strand.
-    const float along = dot(d, own);
-    const vec3 m = vec3(d.x - along * own.x, d.y - along * own.y, d.z - along * own.z);
+    const vec3 m = ribbonNormal(own, d);
     const float inverseM = 1.0f / sqrt(max(dot(m, m), 1.0e-12f));
     const Texel flat_ =
         texelFromSplat(vec3(c.x, c.y, z), vec3(m.x * inverseM, m.y * inverseM, m.z * inverseM), radius, focal, kNarrow);
@@ -193,14 +197,54 @@ SHARED_FN Texel texelFromStrand(CameraSegment s, float place, float support, flo
     return r;
 }
 
-// A ribbon's surface beside its axis: change of depth per pixel of distance from the axis on the image, in direction
-// (bx, by), as a share of the depth. `c`: a place on the axis, `t`: unit tangent, `n`: normal.
-SHARED_FN float ribbonSlope(vec3 c, vec3 t, vec3 n, float focal, float bx, float by) {
-    const vec3 w = vec3(n.y * t.z - n.z * t.y, n.z * t.x - n.x * t.z, n.x * t.y - n.y * t.x);
-    const float k = ((w.x - c.x / c.z * w.z) * bx + (w.y - c.y / c.z * w.z) * by) * focal;
-    const float length2 = dot(w, w);
-    const float slope = abs(k) > 1.0e-4f * focal * sqrt(length2) ? w.z / k : 0.0f;
-    return min(max(slope, -1.0f), 1.0f);
+// From a ribbon's axis to its edge on the image, px, and by what share of the depth the edge is farther. `c`: a place
+// on the axis, `w`: across. (To first order: the two edges lie opposite.)
+struct RibbonEdge {
+    float x;
+    float y;
+    float slope;
+};
+SHARED_FN RibbonEdge ribbonEdge(vec3 c, vec3 w, float radius, float focal) {
+    const float size = radius / (c.z * sqrt(max(dot(w, w), 1.0e-12f)));
+    RibbonEdge e;
+    e.x = (w.x - c.x / c.z * w.z) * size * focal;
+    e.y = (w.y - c.y / c.z * w.z) * size * focal;
+    e.slope = min(max(w.z * size, -0.9f), 0.9f);
+    return e;
+}
+
+// Where an image point lies on a ribbon whose axis leads along (dx, dy) and whose edges are `a` and `b` at its ends:
+// (ex, ey) = along d + across (a + along (b - a)), a quadratic in `along` (an inverse bilinear map). Of two solutions
+// the one nearer to the axis.
+struct RibbonPlace {
+    float along;   // 0 to 1 inside
+    float across;  // -1 to 1 inside
+};
+SHARED_FN float ribbonAcross(float along, float ex, float ey, float dx, float dy, RibbonEdge a, RibbonEdge b) {
+    const float wx = a.x + along * (b.x - a.x);
+    const float wy = a.y + along * (b.y - a.y);
+    const float inside = min(along, 1.0f - along);
+    const float across = ((ex - along * dx) * wx + (ey - along * dy) * wy) / max(wx * wx + wy * wy, 1.0e-12f);
+    return inside >= 0.0f ? across : 1.0e6f;
+}
+SHARED_FN RibbonPlace ribbonPlace(float ex, float ey, float dx, float dy, RibbonEdge a, RibbonEdge b) {
+    const float gx = b.x - a.x;
+    const float gy = b.y - a.y;
+    const float k2 = dy * gx - dx * gy;
+    const float k1 = ex * gy - ey * gx - (dx * a.y - dy * a.x);
+    const float k0 = ex * a.y - ey * a.x;
+    const float inner = k1 * k1 - 4.0f * k2 * k0;
+    const float root = sqrt(max(inner, 0.0f));
+    const float q = -0.5f * (k1 + (k1 < 0.0f ? -root : root));
+    const float u0 = abs(q) > 0.0f ? k0 / q : -1.0f;
+    const float u1 = abs(k2) > 1.0e-6f * abs(k1) ? q / k2 : u0;
+    const float v0 = ribbonAcross(u0, ex, ey, dx, dy, a, b);
+    const float v1 = ribbonAcross(u1, ex, ey, dx, dy, a, b);
+    const bool isFirst = abs(v0) <= abs(v1);
+    RibbonPlace p;
+    p.along = isFirst ? u0 : u1;
+    p.across = inner < 0.0f ? 1.0e6f : isFirst ? v0 : v1;
+    return p;
 }
 
 // Does a strand narrower than a pixel take this one? A number in [0, 1) for each pixel, strand and frame of a series.
@@ -252,20 +296,59 @@ SHARED_FN TubeSurface tubeSurface(Texel t, float inverseFocal) {
 }
 
 // What a wide strand shows at the pixel whose centre is `dx`, `dy` from the place on its axis (px): a texel that stands
-// for nothing but its own pixel. `t`: texelFromStrand at that place, `slope`: of a ribbon.
-SHARED_FN Texel exactTexel(Texel t, float dx, float dy, float bx, float by, float slope, float inverseFocal) {
+// for nothing but its own pixel. `t`: texelFromStrand at that place, `farther`: of a ribbon's place, share of the
+// depth.
+SHARED_FN Texel exactTexel(Texel t, float dx, float dy, float farther, float inverseFocal) {
     Texel round_ = t;
     round_.offset = vec2(-dx, -dy);
     const TubeSurface s = tubeSurface(round_, inverseFocal);
     const bool isRound = t.isRound > 0.5f;
     Texel r = t;
-    r.depth = isRound ? s.depth : t.depth * (1.0f + (dx * bx + dy * by) * slope);
+    r.depth = isRound ? s.depth : t.depth * (1.0f + farther);
     r.normalPerp = vec2(isRound ? s.normalPerp.x : t.normalPerp.x, isRound ? s.normalPerp.y : t.normalPerp.y);
     r.radius = 0.25f;
     r.thickness = 0.25f;
     r.offset = vec2(0.0f, 0.0f);
     r.isRound = 0.0f;
     r.axis = vec2(0.0f, 0.0f);
+    return r;
+}
+
+// What a pixel of a strand shows. `on`: the segment projected with the pixel's centre as the origin.
+struct StrandPixel {
+    Texel texel;
+    float place;  // along the segment, 0 to 1
+};
+SHARED_FN StrandPixel strandPixel(CameraSegment s, ScreenSegment on, float support, float focal, float cx, float cy,
+                                  float nearPlane, float exactStrands, vec3 light) {
+    const vec3 a = vec3(s.a.x + on.from * (s.b.x - s.a.x), s.a.y + on.from * (s.b.y - s.a.y), on.za);
+    const vec3 b = vec3(s.a.x + on.to * (s.b.x - s.a.x), s.a.y + on.to * (s.b.y - s.a.y), on.zb);
+    const RibbonEdge ea = ribbonEdge(a, s.directionA, s.radiusA + on.from * (s.radiusB - s.radiusA), focal);
+    const RibbonEdge eb = ribbonEdge(b, s.directionB, s.radiusA + on.to * (s.radiusB - s.radiusA), focal);
+    const RibbonPlace p = ribbonPlace(-on.xa, -on.ya, on.xb - on.xa, on.yb - on.ya, ea, eb);
+    const bool isWide = widestRadius(s, on, focal) >= exactStrands;
+    const bool isOnRibbon = isWide && s.isRound < 0.5f && abs(p.across) < 2.0f;
+    const float u = min(max(p.along, 0.0f), 1.0f);
+    const float t = u * on.za / max((1.0f - u) * on.zb + u * on.za, 1.0e-30f);
+    const float nearest = segmentParameter(on, 0.0f, 0.0f);
+    StrandPixel r;
+    r.place = isOnRibbon ? on.from + t * (on.to - on.from) : nearest;
+    const Texel disc = texelFromStrand(s, r.place, support, focal, nearPlane, light);
+    const vec3 c = vec3(s.a.x + r.place * (s.b.x - s.a.x), s.a.y + r.place * (s.b.y - s.a.y),
+                        max(s.a.z + r.place * (s.b.z - s.a.z), nearPlane));
+    const float x = c.x * focal / c.z + cx;
+    const float y = c.y * focal / c.z + cy;
+    const float farther = isOnRibbon ? p.across * (ea.slope + u * (eb.slope - ea.slope)) : 0.0f;
+    const Texel filled = exactTexel(disc, -x, -y, farther, 1.0f / focal);
+    r.texel.depth = isWide ? filled.depth : disc.depth;
+    r.texel.radius = isWide ? filled.radius : disc.radius;
+    r.texel.thickness = isWide ? filled.thickness : disc.thickness;
+    r.texel.offset = vec2(isWide ? 0.0f : x, isWide ? 0.0f : y);
+    r.texel.normalPerp =
+        vec2(isWide ? filled.normalPerp.x : disc.normalPerp.x, isWide ? filled.normalPerp.y : disc.normalPerp.y);
+    r.texel.colour = vec3(0.0f, 0.0f, 0.0f);
+    r.texel.isRound = isWide ? 0.0f : disc.isRound;
+    r.texel.axis = vec2(isWide ? 0.0f : disc.axis.x, isWide ? 0.0f : disc.axis.y);
     return r;
 }
 

@@ -18,19 +18,9 @@ void main() {
     const float cx = frame.centre.x - 0.5 - float(pixel.x);
     const float cy = frame.centre.y - 0.5 - float(pixel.y);
     const ScreenSegment on = projectSegment(s.a, s.b, frame.focal, cx, cy, frame.nearPlane);
-    const float place = segmentParameter(on, 0.0, 0.0);
-    Texel t = texelFromStrand(s, place, frame.supportScale, frame.focal, frame.nearPlane, frame.sunDirection);
-    vec3 c = s.a + place * (s.b - s.a);
-    c.z = max(c.z, frame.nearPlane);
-    const vec2 off = c.xy * frame.focal / c.z + vec2(cx, cy);
-    t.offset = off;
-    if (widestHalfWidth(s, on, frame.focal, frame.nearPlane) >= frame.exactStrands) {
-        const vec2 d = vec2(on.xb - on.xa, on.yb - on.ya);
-        const float inverse = 1.0 / sqrt(max(dot(d, d), 1.0e-8));
-        const vec3 direction = s.directionA + place * (s.directionB - s.directionA);
-        const float slope = ribbonSlope(c, segmentTangent(s), direction, frame.focal, -d.y * inverse, d.x * inverse);
-        t = exactTexel(t, -off.x, -off.y, -d.y * inverse, d.x * inverse, slope, 1.0 / frame.focal);
-    }
+    const StrandPixel seen = strandPixel(s, on, frame.supportScale, frame.focal, cx, cy, frame.nearPlane, frame.exactStrands, frame.sunDirection);
+    Texel t = seen.texel;
+    const float place = seen.place;
     const vec4 a = decodeTexel(segment.a.colour, true);
     const vec4 b = decodeTexel(segment.b.colour, true);
     t.colour = a.xyz + place * (b.xyz - a.xyz);

@@ -82,19 +82,24 @@ void main() {
     s.inverseB = 1.0 / p.zb;
     s.halfA = endHalfWidth(c, p.from, c.directionA, frame.focal, frame.nearPlane);
     s.halfB = endHalfWidth(c, p.to, c.directionB, frame.focal, frame.nearPlane);
-    const float widest = max(s.halfA, s.halfB);
+    const float ra = c.radiusA + p.from * (c.radiusB - c.radiusA);
+    const float rb = c.radiusA + p.to * (c.radiusB - c.radiusA);
+    s.edgeA = ribbonEdge(a, c.directionA, ra, frame.focal);
+    s.edgeB = ribbonEdge(b, c.directionB, rb, frame.focal);
+    s.isRound = c.isRound > 0.5 ? 1u : 0u;
+    const float radius = widestRadius(c, p, frame.focal);
+    const float widest = s.isRound != 0u ? radius
+                                         : sqrt(max(s.edgeA.x * s.edgeA.x + s.edgeA.y * s.edgeA.y,
+                                                    s.edgeB.x * s.edgeB.x + s.edgeB.y * s.edgeB.y));
+    s.widest = widest;
     const vec2 lo = min(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) - widest;
     const vec2 hi = max(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) + widest;
     if (hi.x < 0.0 || hi.y < 0.0 || lo.x >= float(frame.width) || lo.y >= float(frame.height)) return;
-    s.nearerA = nearerAt(a, t, c.radiusA + p.from * (c.radiusB - c.radiusA), c.isRound);
-    s.nearerB = nearerAt(b, t, c.radiusA + p.to * (c.radiusB - c.radiusA), c.isRound);
+    s.nearerA = nearerAt(a, t, ra, c.isRound);
+    s.nearerB = nearerAt(b, t, rb, c.isRound);
     const vec2 d = vec2(p.xb - p.xa, p.yb - p.ya);
-    const float inverse = 1.0 / sqrt(max(dot(d, d), 1.0e-8));
-    s.slopeA = ribbonSlope(a, t, c.directionA, frame.focal, -d.y * inverse, d.x * inverse);
-    s.slopeB = ribbonSlope(b, t, c.directionB, frame.focal, -d.y * inverse, d.x * inverse);
-    s.isRound = c.isRound > 0.5 ? 1u : 0u;
     s.id = kKindStrand | (block * kSegmentsPerBlock + gl_LocalInvocationID.x);
-    if (widest < frame.exactStrands) {
+    if (radius < frame.exactStrands) {
         drawLine(s);
         const float across = max(abs(d.x), abs(d.y));
         drawEnd(s.xa, s.ya, s.inverseA, s.halfA, s.nearerA, across, s.id);

@@ -11,7 +11,7 @@ void main() {
     const int firstRow = int(gl_WorkGroupID.y) * kRows;
     for (uint i = gl_WorkGroupID.x; i < count; i += gl_NumWorkGroups.x) {
         const WideStrand s = wide[i];
-        const float widest = max(s.halfA, s.halfB);
+        const float widest = s.widest;
         const int x0 = int(max(min(s.xa, s.xb) - widest, 0.0));
         const int x1 = int(min(max(s.xa, s.xb) + widest, float(frame.width) - 1.0));
         const int y0 = int(max(min(s.ya, s.yb) - widest, float(firstRow)));

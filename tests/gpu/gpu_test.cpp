@@ -9,6 +9,7 @@
 #include "engine/gpu/pages.h"
 #include "engine/reference/reference.h"
 #include "tests/support/meshes.h"
+#include "tests/support/strands.h"
 #include "tests/support/support.h"
 
 namespace stipple::gpu {
@@ -94,6 +95,39 @@ TEST_F(Gpu, DrawsMeshesAndHybridScenesAsTheOracleDoesAndOnlyThenHasWhatTheyNeed)
         }
     }
     EXPECT_EQ(gpu->resources().meshPipelines, 4u);
+    for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
+}
+
+TEST_F(Gpu, DrawsRibbonsAndTubesAmongPointsAsTheOracleDoes) {
+    const auto gpu = make();
+    const auto oracle = reference::makeReferenceBackend(*executor_);
+    render::FrameSettings settings;
+    settings.draw.lit = true;
+    for (const float radius : {0.002f, 0.01f, 0.05f}) {
+        test::CurlRecipe recipe;
+        recipe.radius = radius;
+        const auto strands = test::buildStrands(test::curls(recipe), folder_ / "c.stipple", *executor_);
+        lod::Instance turned;
+        turned.rotation = glm::dmat3(glm::dvec3(0, 0, -1), glm::dvec3(0, 1, 0), glm::dvec3(1, 0, 0));
+        const std::vector<render::PlacedStore> placed{{store_, {}, {}}, {strands, turned, {}}};
+        lod::View view = test::fitView(*store_, 400, 300);
+        for (const double closer : {0.0, 2.2})
+            for (const float exact : {2.0f, 1e9f}) {
+                view.eye += closer * view.forward;
+                settings.draw.exactStrands = exact;
+                settings.wantDepthAndNormal = exact > 3;
+                const auto image = [&](render::Backend& backend) {
+                    auto state = render::makeFrameState(placed, backend, *executor_, {});
+                    EXPECT_TRUE(render::renderUntilComplete(*state, view, settings, *executor_));
+                    return state->image;
+                };
+                const auto d = reference::compareImages(image(*gpu), image(*oracle), 4, nullptr);
+                ASSERT_TRUE(d);
+                EXPECT_GE(d->psnr, exact > 3 ? 33 : 42) << radius << ", closer " << closer << ", exact " << exact;
+                EXPECT_LE(d->differingFraction, 0.008) << radius << ", closer " << closer << ", exact " << exact;
+                view.eye -= closer * view.forward;
+            }
+    }
     for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
 }
 

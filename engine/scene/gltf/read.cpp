@@ -176,6 +176,8 @@ class Reader {
         STIPPLE_ASSIGN(p.normal, vectors<glm::vec3>(attributes, "NORMAL", 3, 0));
         STIPPLE_ASSIGN(p.tangent, vectors<glm::vec4>(attributes, "TANGENT", 4, 1));
         STIPPLE_ASSIGN(p.colour, vectors<glm::vec4>(attributes, "COLOR_0", 4, 1));
+        STIPPLE_ASSIGN(const auto radii, vectors<glm::vec1>(attributes, "_RADIUS", 1, 0));
+        for (const glm::vec1& r : radii) p.radius.push_back(r.x);
         for (int set = 0; attributes.contains(fmt::format("TEXCOORD_{}", set)); ++set) {
             STIPPLE_ASSIGN(std::vector<glm::vec2> uv,
                            vectors<glm::vec2>(attributes, fmt::format("TEXCOORD_{}", set), 2, 0));

@@ -164,6 +164,9 @@ class Writer {
             if (!p.normal.empty()) q.attributes["NORMAL"] = addFloats(p.normal, TINYGLTF_TYPE_VEC3);
             if (!p.tangent.empty()) q.attributes["TANGENT"] = addFloats(p.tangent, TINYGLTF_TYPE_VEC4);
             if (!p.colour.empty()) q.attributes["COLOR_0"] = addFloats(p.colour, TINYGLTF_TYPE_VEC4);
+            if (!p.radius.empty())
+                q.attributes["_RADIUS"] =
+                    addFloats(std::vector<glm::vec1>(p.radius.begin(), p.radius.end()), TINYGLTF_TYPE_SCALAR);
             for (size_t s = 0; s < p.uv.size(); ++s)
                 if (!p.uv[s].empty())
                     q.attributes[fmt::format("TEXCOORD_{}", s)] = addFloats(p.uv[s], TINYGLTF_TYPE_VEC2);

@@ -195,12 +195,15 @@ class StrandBuilder {
     }
 
     StrandPoint pointOf(size_t s, uint32_t i, const glm::dvec3& p, float radius) const {
-        glm::vec3 d = strands_.normal[i];
-        if (strands_.isRibbon[s] == 0) {
-            const uint32_t a = std::max(i, strands_.first[s] + 1) - 1, b = std::min(i + 1, strands_.first[s + 1] - 1);
-            const glm::dvec3 chord = strands_.position[b] - strands_.position[a];
-            const glm::dvec3 own = strands_.position[std::max(i, a + 1)] - strands_.position[a];
-            d = glm::vec3(glm::normalize(glm::length(chord) > 1e-6 * glm::length(own) ? chord : own));
+        const uint32_t a = std::max(i, strands_.first[s] + 1) - 1, b = std::min(i + 1, strands_.first[s + 1] - 1);
+        const glm::dvec3 chord = strands_.position[b] - strands_.position[a];
+        const glm::dvec3 own = strands_.position[std::max(i, a + 1)] - strands_.position[a];
+        glm::vec3 d(glm::normalize(glm::length(chord) > 1e-6 * glm::length(own) ? chord : own));
+        if (strands_.isRibbon[s] != 0) {
+            const glm::vec3 across = glm::cross(strands_.normal[i], d);
+            d = glm::length(across) > 1e-3f
+                    ? glm::normalize(across)
+                    : glm::normalize(std::abs(d.x) < 0.7f ? glm::vec3(0, -d.z, d.y) : glm::vec3(-d.z, 0, d.x));
         }
         return {p, radius, d, static_cast<uint32_t>(s), static_cast<double>(i - strands_.first[s])};
     }

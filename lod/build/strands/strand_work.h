@@ -11,7 +11,7 @@ namespace stipple::lod {
 struct StrandPoint {
     glm::dvec3 p{0};
     float radius = 0;
-    glm::vec3 direction{0};  ///< unit: normal of a ribbon, tangent of a tube
+    glm::vec3 direction{0};  ///< unit: across a ribbon, along a tube
     uint32_t strand = 0;
     double along = 0;  ///< number in the strand; between two vertices where a segment was divided
 };

@@ -1,0 +1,45 @@
+#include "engine/scene/strands.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "shaders/shared/record.h"
+
+namespace stipple::scene {
+
+lod::StrandSet flattenStrands(const Scene& scene, const std::vector<Placement>& placed) {
+    lod::StrandSet out;
+    out.up = {0, 1, 0};
+    out.hasColour = true;
+    const auto byte = [](float linear) {
+        return static_cast<uint32_t>(shared::srgbFromLinear(std::clamp(linear, 0.0f, 1.0f)) * 255.0f + 0.5f);
+    };
+    for (const Placement& at : placed)
+        for (const Primitive& p : scene.meshes[static_cast<size_t>(at.mesh)].primitives) {
+            if (p.kind != PrimitiveKind::lines) continue;
+            const glm::dmat3 linear(at.world);
+            const glm::dmat3 forNormals(glm::cross(linear[1], linear[2]), glm::cross(linear[2], linear[0]),
+                                        glm::cross(linear[0], linear[1]));
+            const auto scale = static_cast<float>(std::cbrt(std::abs(glm::determinant(linear))));
+            const glm::vec4 base =
+                p.material < 0 ? glm::vec4(1) : scene.materials[static_cast<size_t>(p.material)].baseColour;
+            const auto add = [&](uint32_t v) {
+                const glm::vec4 c = p.colour.empty() ? base : base * p.colour[v];
+                out.addVertex(glm::dvec3(at.world * glm::dvec4(glm::dvec3(p.position[v]), 1)),
+                              p.radius.empty() ? 0.0f : p.radius[v] * scale,
+                              p.normal.empty() ? glm::vec3(0) : glm::vec3(forNormals * glm::dvec3(p.normal[v])),
+                              byte(c.r) | byte(c.g) << 8 | byte(c.b) << 16);
+            };
+            for (size_t i = 0; i + 2 <= p.indices.size(); i += 2) {
+                if (i == 0 || p.indices[i] != p.indices[i - 1]) {
+                    if (i > 0) out.endStrand(!p.normal.empty());
+                    add(p.indices[i]);
+                }
+                add(p.indices[i + 1]);
+            }
+            if (p.indices.size() >= 2) out.endStrand(!p.normal.empty());
+        }
+    return out;
+}
+
+}  // namespace stipple::scene

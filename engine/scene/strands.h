@@ -1,0 +1,13 @@
+// The lines of a scene's meshes as strands: ribbons where they have normals, else tubes.
+#pragma once
+
+#include "engine/scene/triangles.h"
+#include "lod/strands.h"
+
+namespace stipple::scene {
+
+/// Lines of `placed`, in world space; segments that follow each other in the index list are one strand. Radii are those
+/// of the attribute _RADIUS, or 0: not known. Not clean (see lod::cleanStrands).
+lod::StrandSet flattenStrands(const Scene& scene, const std::vector<Placement>& placed);
+
+}  // namespace stipple::scene
