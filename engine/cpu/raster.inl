@@ -15,13 +15,16 @@ struct Fixed {
     uint32_t id;
 };
 
-[[gnu::always_inline]] inline void offer(uint64_t* visibility, size_t pixel, float inverseDepth, uint32_t id) {
-    const uint64_t key = uint64_t{floatBitsToUint(1.0f / inverseDepth)} << 32 | id;
+[[gnu::always_inline]] inline void offerKey(uint64_t* visibility, size_t pixel, uint64_t key) {
     // Builtins: std::atomic_ref would be a function of its own, see kernels.inl.
     uint64_t old = __atomic_load_n(&visibility[pixel], __ATOMIC_RELAXED);
     while (key < old &&
            !__atomic_compare_exchange_n(&visibility[pixel], &old, key, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
     }
+}
+
+[[gnu::always_inline]] inline void offer(uint64_t* visibility, size_t pixel, float inverseDepth, uint32_t id) {
+    offerKey(visibility, pixel, uint64_t{floatBitsToUint(1.0f / inverseDepth)} << 32 | id);
 }
 
 /// Pixels [fromX, toX] x [fromY, toY] of a triangle. `Int`: holds twice the area of the triangle and the box.

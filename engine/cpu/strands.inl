@@ -75,16 +75,30 @@ void drawLine(const FrameConstants& f, const Lines& lines, size_t i, LineEnds e,
     const float first = max(std::ceil(e.xa - 0.5f), 0.0f);
     const float last = min(std::ceil(e.xb - 0.5f) - 1.0f, float(int(e.columns)) - 1.0f);
     if (!(first <= last) || !(length > 0)) return;
-    const float slope = (e.yb - e.ya) / length, longer = std::sqrt(1.0f + slope * slope);
+    const float slope = (e.yb - e.ya) / length, longer = std::sqrt(1.0f + slope * slope), inverse = 1.0f / length;
+    const float rows = float(int(e.rows)), dy = e.yb - e.ya, di = ib - ia, dw = wb - wa, df = fb - fa;
+    // Some pixels at a time: first where they are and how deep, then, with their cache lines on the way, the minimum.
+    constexpr int kStretch = 16;
+    alignas(64) uint32_t pixel[kStretch], depth[kStretch], keep[kStretch];
     const int end = int(last);
-    for (int x = int(first); x <= end; ++x) {
-        const float u = (float(x) + 0.5f - e.xa) / length;
-        const float y = e.ya + u * (e.yb - e.ya);
-        if (!(y >= 0 && y < float(int(e.rows)))) continue;
-        const uint32_t pixel = uint32_t(x) * e.stepX + uint32_t(int(y)) * e.stepY;
-        const float half = wa + u * (wb - wa);
-        if (half < kNarrow && coverageThreshold(pixel, id, f.coverageSeed) >= 2.0f * half * longer) continue;
-        offer(visibility, pixel, (ia + u * (ib - ia)) / (fa + u * (fb - fa)), id);
+    for (int x0 = int(first); x0 <= end; x0 += kStretch) {
+#pragma GCC ivdep
+        for (size_t k = 0; k < kStretch; ++k) {
+            const int x = x0 + int(k);
+            const float u = (float(x) + 0.5f - e.xa) * inverse, y = e.ya + u * dy, half = wa + u * dw;
+            const float inside = (y >= 0 ? 1.0f : 0.0f) * (y < rows ? 1.0f : 0.0f) * (x <= end ? 1.0f : 0.0f);
+            const int row = int(inside > 0.5f ? y : 0.0f);
+            pixel[k] = uint32_t(inside > 0.5f ? x : x0) * e.stepX + uint32_t(row) * e.stepY;
+            const float share = half < kNarrow ? 2.0f * half * longer : 2.0f;
+            const float taken = coverageThreshold(pixel[k], id, f.coverageSeed) < share ? inside : 0.0f;
+            depth[k] = floatBitsToUint((fa + u * df) / (ia + u * di));
+            keep[k] = taken > 0.5f ? 1u : 0u;
+        }
+        const int count = end - x0 + 1 < kStretch ? end - x0 + 1 : kStretch;
+        for (int k = 0; k < count; ++k)
+            if (keep[k] != 0) __builtin_prefetch(&visibility[pixel[k]], 1);
+        for (int k = 0; k < count; ++k)
+            if (keep[k] != 0) offerKey(visibility, pixel[k], uint64_t{depth[k]} << 32 | id);
     }
 }
 
@@ -226,15 +240,23 @@ void fillWide(const FrameConstants& frame, const WideStrand* strands, size_t cou
     for (size_t i = 0; i < count; ++i) fillStrand(f, strands[i], int(firstRow), int(lastRow), visibility);
 }
 
+/// Segments of the pixels of a row, in camera space.
+struct StrandEnds {
+    alignas(64) float ax[kTile], ay[kTile], az[kTile], bx[kTile], by[kTile], bz[kTile];
+    alignas(64) float dax[kTile], day[kTile], daz[kTile], dbx[kTile], dby[kTile], dbz[kTile];
+    alignas(64) float ra[kTile], rb[kTile], isRound[kTile];
+    alignas(64) uint32_t colourA[kTile], colourB[kTile];
+};
+struct StrandTexels {
+    alignas(64) float depth[kTile], radius[kTile], thickness[kTile], x[kTile], y[kTile], perpX[kTile], perpY[kTile],
+        red[kTile], green[kTile], blue[kTile], isRound[kTile], axisX[kTile], axisY[kTile];
+};
+
 /// Texels of the pixels that show strands.
 void resolveStrands(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, uint32_t x0, uint32_t y,
                     TexelRow& __restrict row, float& largestRadius) {
-    struct Ends {
-        alignas(64) float ax[kTile], ay[kTile], az[kTile], bx[kTile], by[kTile], bz[kTile];
-        alignas(64) float dax[kTile], day[kTile], daz[kTile], dbx[kTile], dby[kTile], dbz[kTile];
-        alignas(64) float ra[kTile], rb[kTile], isRound[kTile];
-        alignas(64) uint32_t colourA[kTile], colourB[kTile];
-    } e;
+    StrandEnds e;
+    StrandTexels o;
     const size_t n = p.count;
     for (size_t i = 0; i < n; ++i) {
         const StrandBlock& block = in.strandBlocks[p.id[i] / kSegmentsPerBlock];
@@ -264,10 +286,6 @@ void resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
             e.colourA[i] = e.colourB[i] = byte(d.x) | byte(d.y) << 8 | byte(d.z) << 16;
         }
     }
-    struct Out {
-        alignas(64) float depth[kTile], radius[kTile], thickness[kTile], x[kTile], y[kTile], perpX[kTile], perpY[kTile],
-            red[kTile], green[kTile], blue[kTile], isRound[kTile], axisX[kTile], axisY[kTile];
-    } o;
     const float focal = f.focal, cx = f.centre.x - float(int(x0)) - 0.5f, cy = f.centre.y - float(int(y)) - 0.5f;
     const float nearPlane = f.nearPlane, support = f.supportScale;
     const vec3 sun = f.sunDirection;

@@ -188,7 +188,8 @@ SHARED_FN Texel texelFromStrand(CameraSegment s, float place, float support, flo
     r.radius = halfWidth < kNarrow ? 0.25f : wide;
     r.thickness = isTube_ ? r.radius : flat_.thickness;
     const vec2 narrow = perpFromNormal(narrowTubeNormal(t, v, light), v);
-    const bool isRound = isTube_ && halfWidth >= kNarrow;
+    // Conditions as numbers: see pushTexel.
+    const bool isRound = s.isRound * (halfWidth >= kNarrow ? 1.0f : 0.0f) > 0.5f;
     const vec2 plain = vec2(isTube_ ? narrow.x : flat_.normalPerp.x, isTube_ ? narrow.y : flat_.normalPerp.y);
     r.normalPerp = vec2(isRound ? tv * across.x : plain.x, isRound ? tv * across.y : plain.y);
     r.isRound = isRound ? 1.0f : 0.0f;
@@ -327,7 +328,8 @@ SHARED_FN StrandPixel strandPixel(CameraSegment s, ScreenSegment on, float suppo
     const RibbonEdge eb = ribbonEdge(b, s.directionB, s.radiusA + on.to * (s.radiusB - s.radiusA), focal);
     const RibbonPlace p = ribbonPlace(-on.xa, -on.ya, on.xb - on.xa, on.yb - on.ya, ea, eb);
     const bool isWide = widestRadius(s, on, focal) >= exactStrands;
-    const bool isOnRibbon = isWide && s.isRound < 0.5f && abs(p.across) < 2.0f;
+    const float onRibbon = (isWide ? 1.0f : 0.0f) * (1.0f - s.isRound) * max(2.0f - abs(p.across), 0.0f);
+    const bool isOnRibbon = onRibbon > 0.0f;
     const float u = min(max(p.along, 0.0f), 1.0f);
     const float t = u * on.za / max((1.0f - u) * on.zb + u * on.za, 1.0e-30f);
     const float nearest = segmentParameter(on, 0.0f, 0.0f);
