@@ -22,7 +22,7 @@ struct Options {
     std::string output, size = "1280x720", eye, target, up, path, mode = "pullpush", device = "auto", shade = "auto",
                         background = "24,26,30";
     std::string debug = "none", resident = "1G";
-    double fov = 50, error = 1;
+    double fov = 50, error = 1, strandExact = 2;
     int frames = 1, samples = 4, orbit = 0, sceneCamera = 0;
     uint64_t budget = 0;
     bool noWait = false, json = false, quiet = false;
@@ -90,6 +90,7 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     s.draw.unlitTriangles = o.shade == "unlit";
     s.draw.lit = o.shade == "lit" || (o.shade == "auto" && isShaded(d) && colour.mode == lod::ColourMode::own);
     s.draw.worldUp = shot.worldUp;
+    s.draw.exactStrands = static_cast<float>(o.strandExact);
     STIPPLE_ASSIGN(const glm::dvec3 background, parseVector(o.background, "--background"));
     for (int c = 0; c < 3; ++c) {
         if (!(background[c] >= 0 && background[c] <= 255))
@@ -311,6 +312,10 @@ void setupRender(CLI::App& app, int& status) {
     sub->add_option("--background", o->background, "R,G,B 0 to 255")->capture_default_str();
     sub->add_option("--debug", o->debug, "debug view")
         ->check(CLI::IsMember({"none", "level", "error", "holes", "normals"}))
+        ->capture_default_str();
+    sub->add_option("--strand-exact", o->strandExact,
+                    "half-width in pixels from which ribbons and tubes are filled exactly instead of reconstructed")
+        ->check(CLI::Range(0.5, 1e9))
         ->capture_default_str();
     sub->add_option("--samples", o->samples, "mode reference: rays per pixel along each axis")
         ->check(CLI::Range(1, 64))

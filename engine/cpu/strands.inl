@@ -54,6 +54,8 @@ struct Lines {
     alignas(64) uint32_t keep[kSegmentsPerBlock];
 };
 
+constexpr int kStretch = 16;  ///< pixels that are worked on together
+
 /// Pixels of one line. x: the axis along which it is longer; `at(column, row)` is the pixel's index or ~0.
 struct LineEnds {
     float xa, ya, xb, yb;
@@ -77,8 +79,7 @@ void drawLine(const FrameConstants& f, const Lines& lines, size_t i, LineEnds e,
     if (!(first <= last) || !(length > 0)) return;
     const float slope = (e.yb - e.ya) / length, longer = std::sqrt(1.0f + slope * slope), inverse = 1.0f / length;
     const float rows = float(int(e.rows)), dy = e.yb - e.ya, di = ib - ia, dw = wb - wa, df = fb - fa;
-    // Some pixels at a time: first where they are and how deep, then, with their cache lines on the way, the minimum.
-    constexpr int kStretch = 16;
+    // First where the pixels are and how deep, then, with their cache lines on the way, the minimum.
     alignas(64) uint32_t pixel[kStretch], depth[kStretch], keep[kStretch];
     const int end = int(last);
     for (int x0 = int(first); x0 <= end; x0 += kStretch) {
@@ -109,6 +110,7 @@ void fillStrand(const FrameConstants& f, const WideStrand& s, int firstRow, int 
     const int top = int(max(min(s.ya, s.yb) - s.widest, float(firstRow))),
               bottom = int(min(max(s.ya, s.yb) + s.widest, float(lastRow)));
     const RibbonEdge a = s.edgeA, b = s.edgeB;
+    const float nearPlane = f.nearPlane;
     for (int y = top; y <= bottom; ++y) {
         const float cy = float(y) + 0.5f;
         // Where the axis is within reach of this row.
@@ -122,24 +124,34 @@ void fillStrand(const FrameConstants& f, const WideStrand& s, int firstRow, int 
         }
         const int left = int(max(from - s.widest, 0.0f)), right = int(min(to + s.widest, float(int(f.width)) - 1.0f));
         const float py = cy - s.ya;
-        for (int x = left; x <= right; ++x) {
-            const float px = float(x) + 0.5f - s.xa;
-            float u = 0, nearer = 1;
+        for (int x0 = left; x0 <= right; x0 += kStretch) {
+            alignas(64) uint32_t depth[kStretch], keep[kStretch];
+            const int count = right - x0 + 1 < kStretch ? right - x0 + 1 : kStretch;
+            const float px0 = float(x0) + 0.5f - s.xa;
             if (s.isRound) {
-                u = min(max((px * dx + py * dy) * inverse2, 0.0f), 1.0f);
-                const float ex = px - u * dx, ey = py - u * dy, half = s.halfA + u * (s.halfB - s.halfA);
-                const float q = ex * ex + ey * ey;
-                if (q > half * half) continue;
-                const float rise = std::sqrt(1.0f - min(q / (half * half), 1.0f));
-                nearer = 1.0f - rise * (1.0f - (s.nearerA + u * (s.nearerB - s.nearerA)));
+#pragma GCC ivdep
+                for (size_t k = 0; k < kStretch; ++k) {
+                    const float px = px0 + float(int(k));
+                    const float u = min(max((px * dx + py * dy) * inverse2, 0.0f), 1.0f);
+                    const float ex = px - u * dx, ey = py - u * dy, half = s.halfA + u * (s.halfB - s.halfA);
+                    const float q = (ex * ex + ey * ey) / (half * half);
+                    const float rise = std::sqrt(max(1.0f - q, 0.0f));
+                    const float nearer = 1.0f - rise * (1.0f - (s.nearerA + u * (s.nearerB - s.nearerA)));
+                    depth[k] = floatBitsToUint(max(nearer / (s.inverseA + u * (s.inverseB - s.inverseA)), nearPlane));
+                    keep[k] = q <= 1.0f ? 1u : 0u;
+                }
             } else {
-                const RibbonPlace p = ribbonPlace(px, py, dx, dy, a, b);
-                if (!(std::fabs(p.across) <= 1.0f)) continue;
-                u = p.along;
-                nearer = 1.0f + p.across * (a.slope + u * (b.slope - a.slope));
+#pragma GCC ivdep
+                for (size_t k = 0; k < kStretch; ++k) {
+                    const RibbonPlace p = ribbonPlace(px0 + float(int(k)), py, dx, dy, a, b);
+                    const float u = p.along, nearer = 1.0f + p.across * (a.slope + u * (b.slope - a.slope));
+                    depth[k] = floatBitsToUint(max(nearer / (s.inverseA + u * (s.inverseB - s.inverseA)), nearPlane));
+                    keep[k] = std::fabs(p.across) <= 1.0f ? 1u : 0u;
+                }
             }
-            const float axis = 1.0f / (s.inverseA + u * (s.inverseB - s.inverseA));
-            offer(visibility, size_t(y) * f.width + size_t(x), 1.0f / max(axis * nearer, f.nearPlane), s.id);
+            uint64_t* const row = visibility + size_t(y) * f.width + size_t(x0);
+            for (int k = 0; k < count; ++k)
+                if (keep[k] != 0) offerKey(row, size_t(k), uint64_t{depth[k]} << 32 | s.id);
         }
     }
 }
