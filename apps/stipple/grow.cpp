@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "apps/grow/meshes.h"
+#include "apps/grow/plants.h"
 #include "apps/stipple/common.h"
 #include "engine/base/process.h"
 #include "engine/image/image_io.h"
@@ -93,6 +94,60 @@ void addMesh(CLI::App& parent, const char* kind, const char* what, int& status) 
     });
 }
 
+struct PlantRun {
+    std::string output, leaves = "50k", as = "strands";
+    grow::PlantOptions plant;
+    bool json = false;
+};
+
+Result<void> runPlant(PlantRun& o) {
+    o.plant.leaves = parseCount(o.leaves);
+    o.plant.asTriangles = o.as == "triangles";
+    if (o.plant.leaves == 0)
+        return fail(ErrorKind::usage, fmt::format("'{}' is not a number up to 1000M", o.leaves), "--leaves",
+                    "e.g. 200k");
+    const double start = nowSeconds();
+    const scene::Scene scene = grow::growPlant(o.plant);
+    uint64_t segments = 0, triangles = 0;
+    for (const auto& p : scene.meshes[0].primitives)
+        (o.plant.asTriangles ? triangles : segments) += p.indices.size() / (o.plant.asTriangles ? 3 : 2);
+    const uint64_t trees = std::max<size_t>(1, scene.nodes[0].instances.size());
+    STIPPLE_TRY(scene::writeGltf(scene, o.output));
+    if (o.json)
+        fmt::print(
+            "{}\n",
+            nlohmann::json{
+                {"segments", segments}, {"triangles", triangles}, {"trees", trees}, {"seconds", nowSeconds() - start}}
+                .dump(2));
+    else
+        fmt::print("{}: {} {} a tree, {} trees, {:.1f} s\n", o.output, segments + triangles,
+                   o.plant.asTriangles ? "triangles" : "segments", trees, nowSeconds() - start);
+    return {};
+}
+
+void addPlant(CLI::App& parent, const char* name, const char* what, uint32_t rows, int& status) {
+    auto o = std::make_shared<PlantRun>();
+    o->plant.rows = rows;
+    CLI::App* sub = parent.add_subcommand(name, what);
+    sub->add_option("-o,--output", o->output, "the file to write (.glb, .gltf)")->required();
+    sub->add_option("--species", o->plant.species, "oak, birch or spruce")
+        ->check(CLI::IsMember({"oak", "birch", "spruce"}))
+        ->capture_default_str();
+    sub->add_option("--leaves", o->leaves, "about that many a tree, e.g. 200k")->capture_default_str();
+    sub->add_option("--as", o->as, "strands: tubes and ribbons; triangles: the same shape")
+        ->check(CLI::IsMember({"strands", "triangles"}))
+        ->capture_default_str();
+    if (rows > 1)
+        sub->add_option("--rows", o->plant.rows, "rows x rows trees")
+            ->check(CLI::Range(1, 1000))
+            ->capture_default_str();
+    sub->add_option("--seed", o->plant.seed, "another seed, another tree")->capture_default_str();
+    sub->add_flag("--json", o->json, "as JSON");
+    sub->callback([o, &status] {
+        if (const auto result = runPlant(*o); !result) status = report(result.error());
+    });
+}
+
 }  // namespace
 
 void setupGrow(CLI::App& app, int& status) {
@@ -116,6 +171,8 @@ void setupGrow(CLI::App& app, int& status) {
     addMesh(*sub, "rock", "a textured boulder", status);
     addMesh(*sub, "building", "a textured block of flats with windows", status);
     addMesh(*sub, "terrain", "two kilometres of textured hills", status);
+    addPlant(*sub, "tree", "a tree of tubes and ribbons", 1, status);
+    addPlant(*sub, "orchard", "one tree in rows, each turned and scaled", 4, status);
     scan->add_flag("--json", o->json, "as JSON");
     scan->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());

@@ -168,19 +168,18 @@ Result<lod::BuildReport> buildPlyMesh(const std::string& input, const std::strin
 }
 
 /// Ribbons and tubes.
-Result<lod::BuildReport> buildStrands(const std::string& input, const std::string& output, const BuildOptions& build,
-                                      Executor& executor, Progress& progress) {
-    lod::StrandSet strands;
-    if (isSceneFile(input)) {
-        STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(input, build.repair));
-        strands = scene::flattenStrands(scene, scene::placements(scene));
-    } else {
-        STIPPLE_ASSIGN(strands, lod::readStrands(input));
-    }
+Result<lod::BuildReport> buildStrands(lod::StrandSet strands, const std::string& input, const std::string& output,
+                                      const BuildOptions& build, Executor& executor, Progress& progress) {
     lod::StrandBuildSettings settings;
     settings.description.source = fs::path(input).filename().string();
     const lod::StrandSet clean = lod::cleanStrands(std::move(strands), build.strandRadius);
     return lod::buildStrandStore(clean, output, settings, executor, progress);
+}
+
+Result<lod::BuildReport> buildStrandFile(const std::string& input, const std::string& output, const BuildOptions& build,
+                                         Executor& executor, Progress& progress) {
+    STIPPLE_ASSIGN(lod::StrandSet strands, lod::readStrands(input));
+    return buildStrands(std::move(strands), input, output, build, executor, progress);
 }
 
 /// Points that stand in for a mesh from afar, where its coarsest level still has many triangles: what is made of many
@@ -216,27 +215,44 @@ Result<void> addStandIn(const scene::Scene& scene, const std::vector<scene::Plac
     return {};
 }
 
-/// Triangles of a scene: a mesh that stands in several places is built once and placed, all others are built as one.
-Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build, Executor& executor, bool showProgress,
-                            std::vector<render::PlacedStore>& placed) {
+/// Meshes with primitives of a kind: one that stands in several places is to be built once and placed, all others as
+/// one.
+struct SharedPlaces {
+    struct Shared {
+        int mesh;
+        std::vector<lod::Instance> instances;
+    };
+    std::vector<Shared> shared;
+    std::vector<scene::Placement> once;
+};
+SharedPlaces sharePlaces(const scene::Scene& scene, scene::PrimitiveKind kind) {
     std::map<int, std::vector<scene::Placement>> byMesh;
     for (const scene::Placement& p : scene::placements(scene))
-        if (holds(scene, p, scene::PrimitiveKind::triangles)) byMesh[p.mesh].push_back(p);
-    std::vector<scene::Placement> once;
+        if (holds(scene, p, kind)) byMesh[p.mesh].push_back(p);
+    SharedPlaces out;
+    for (const auto& [mesh, places] : byMesh) {
+        std::vector<lod::Instance> instances;
+        for (const scene::Placement& p : places)
+            if (const auto instance = placeOf(p.world, scene.path)) instances.push_back(*instance);
+        if (places.size() == 1 || instances.size() < places.size())  // one of a kind, or skewed or mirrored
+            out.once.insert(out.once.end(), places.begin(), places.end());
+        else
+            out.shared.push_back({mesh, std::move(instances)});
+    }
+    return out;
+}
+
+/// The triangles of a scene.
+Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build, Executor& executor, bool showProgress,
+                            std::vector<render::PlacedStore>& placed) {
     const auto make = [&](const std::vector<scene::Placement>& of) {
         return [&](const std::string& path, Progress& progress) -> Result<lod::BuildReport> {
             STIPPLE_ASSIGN(const lod::MeshBuildSettings settings, meshSettings(scene));
             return lod::buildMeshStore(scene::flattenTriangles(scene, of), path, settings, executor, progress);
         };
     };
-    for (const auto& [mesh, places] : byMesh) {
-        std::vector<lod::Instance> instances;
-        for (const scene::Placement& p : places)
-            if (const auto instance = placeOf(p.world, scene.path)) instances.push_back(*instance);
-        if (places.size() == 1 || instances.size() < places.size()) {  // one of a kind, or skewed or mirrored
-            once.insert(once.end(), places.begin(), places.end());
-            continue;
-        }
+    const SharedPlaces places = sharePlaces(scene, scene::PrimitiveKind::triangles);
+    for (const auto& [mesh, instances] : places.shared) {
         const std::vector<scene::Placement> own{{mesh, glm::dmat4(1)}};
         STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store,
                        openCached({scene.path}, build, fmt::format("mesh {}", mesh), showProgress, make(own)));
@@ -247,11 +263,31 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
             placed.push_back(one);
         }
     }
-    if (once.empty()) return {};
+    if (places.once.empty()) return {};
     STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store,
-                   openCached({scene.path}, build, "triangles", showProgress, make(once)));
+                   openCached({scene.path}, build, "triangles", showProgress, make(places.once)));
     placed.push_back({std::move(store), {}, {}});
-    return addStandIn(scene, once, "triangles", build, executor, showProgress, placed.back());
+    return addStandIn(scene, places.once, "triangles", build, executor, showProgress, placed.back());
+}
+
+/// The ribbons and tubes of a scene.
+Result<void> placeStrands(const scene::Scene& scene, const BuildOptions& build, Executor& executor, bool showProgress,
+                          std::vector<render::PlacedStore>& placed) {
+    const auto open = [&](const std::vector<scene::Placement>& of, const std::string& part) {
+        return openCached({scene.path}, build, part, showProgress, [&](const std::string& to, Progress& progress) {
+            return buildStrands(scene::flattenStrands(scene, of), scene.path, to, build, executor, progress);
+        });
+    };
+    const SharedPlaces places = sharePlaces(scene, scene::PrimitiveKind::lines);
+    for (const auto& [mesh, instances] : places.shared) {
+        STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store,
+                       open({{mesh, glm::dmat4(1)}}, fmt::format("strands of mesh {}", mesh)));
+        for (const lod::Instance& instance : instances) placed.push_back({store, instance, {}});
+    }
+    if (places.once.empty()) return {};
+    STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store, open(places.once, "strands"));
+    placed.push_back({std::move(store), {}, {}});
+    return {};
 }
 
 std::vector<render::WorldLight> lightsOf(const scene::Scene& scene) {
@@ -325,14 +361,7 @@ Result<std::vector<render::PlacedStore>> openSceneFile(const std::string& path, 
         return std::any_of(meshes.begin(), meshes.end(), [&](const auto& p) { return holds(scene, p, kind); });
     };
     if (build.surfels == 0) STIPPLE_TRY(placeTriangles(scene, build, executor, showProgress, placed));
-    if (anyHolds(scene::PrimitiveKind::lines)) {
-        STIPPLE_ASSIGN(
-            std::shared_ptr<const lod::Store> strands,
-            openCached({path}, build, "strands", showProgress, [&](const std::string& to, Progress& progress) {
-                return buildStrands(path, to, build, executor, progress);
-            }));
-        placed.push_back({std::move(strands), {}, {}});
-    }
+    STIPPLE_TRY(placeStrands(scene, build, executor, showProgress, placed));
     if (build.surfels > 0 || anyHolds(scene::PrimitiveKind::points) || placed.empty()) {
         STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> points,
                        openBuilt({path}, build, colour, executor, showProgress));
@@ -395,7 +424,7 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
     STIPPLE_ASSIGN(const bool isPlyMesh, isMeshPly(inputs, build));
     if (isPlyMesh) return buildPlyMesh(inputs.front(), output, executor, progress);
     if (inputs.size() == 1 && lod::isStrandFile(inputs[0]))
-        return buildStrands(inputs[0], output, build, executor, progress);
+        return buildStrandFile(inputs[0], output, build, executor, progress);
     if (!isSceneFile(inputs.front()) || build.surfels > 0)
         return lod::buildStore(inputs, output, settings, executor, progress);
     if (inputs.size() > 1)
@@ -411,7 +440,8 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
     };
     const uint64_t lines = counted(scene::PrimitiveKind::lines) / 2, points = counted(scene::PrimitiveKind::points);
     if (triangles.indices.empty() && points == 0 && lines > 0)
-        return buildStrands(inputs.front(), output, build, executor, progress);
+        return buildStrands(scene::flattenStrands(scene, scene::placements(scene)), inputs.front(), output, build,
+                            executor, progress);
     if (triangles.indices.empty()) return lod::buildStore(inputs, output, settings, executor, progress);
     if (lines + points > 0)
         scene.notes.push_back(fmt::format(
@@ -446,7 +476,7 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
         STIPPLE_ASSIGN(
             std::shared_ptr<const lod::Store> store,
             openCached(inputs, build, "strands", showProgress, [&](const std::string& path, Progress& progress) {
-                return buildStrands(inputs[0], path, build, executor, progress);
+                return buildStrandFile(inputs[0], path, build, executor, progress);
             }));
         scene.placed.push_back({std::move(store), {}, {}});
     } else if (isSceneFile(inputs.front())) {

@@ -23,7 +23,7 @@ struct Options {
                         background = "24,26,30";
     std::string debug = "none", resident = "1G";
     double fov = 50, error = 1, strandExact = 2;
-    int frames = 1, samples = 4, orbit = 0, sceneCamera = 0;
+    int frames = 1, samples = 4, orbit = 0, sceneCamera = 0, accumulate = 1;
     uint64_t budget = 0;
     bool noWait = false, json = false, quiet = false;
     BuildOptions build;
@@ -190,6 +190,28 @@ Result<void> runFrames(const Options& o, const Shot& shot, const render::FrameSe
     return {};
 }
 
+/// The mean of `count` frames whose strands narrower than a pixel take other pixels each time.
+Result<void> accumulate(int count, const lod::View& view, render::FrameSettings settings, render::FrameState& state) {
+    if (count <= 1) return {};
+    std::vector<float> sum(state.image.linear.size()), coverage(state.image.rgba.size());
+    for (int f = 0; f < count; ++f) {
+        settings.draw.coverageSeed = static_cast<uint32_t>(f);
+        STIPPLE_TRY(render::renderFrame(state, view, settings));
+        for (size_t i = 0; i < sum.size(); ++i) sum[i] += std::clamp(state.image.linear[i], 0.0f, 1.0f);
+        for (size_t i = 0; i < coverage.size(); ++i) coverage[i] += state.image.rgba[i] >> 24 != 0 ? 1.0f : 0.0f;
+    }
+    const float share = 1.0f / static_cast<float>(count);
+    for (size_t i = 0; i < coverage.size(); ++i) {
+        state.image.rgba[i] = static_cast<uint32_t>(coverage[i] * share * 255.0f + 0.5f) << 24;
+        for (size_t c = 0; c < 3; ++c) {
+            state.image.linear[3 * i + c] = sum[3 * i + c] * share;
+            state.image.rgba[i] |= static_cast<uint32_t>(shared::srgbFromLinear(sum[3 * i + c] * share) * 255.0f + 0.5f)
+                                   << (8 * c);
+        }
+    }
+    return {};
+}
+
 Result<void> run(const Options& o) {
     STIPPLE_TRY(image::checkImagePath(o.output));
     STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
@@ -226,12 +248,14 @@ Result<void> run(const Options& o) {
     stream.residentBytes = parseBytes(o.resident);
     if (stream.residentBytes == 0)
         return fail(ErrorKind::usage, "is not a size", "--resident " + o.resident, "e.g. 1G");
+    settings.wantDepthAndNormal = settings.wantDepthAndNormal || o.accumulate > 1;
     auto state = render::makeFrameState(scene.placed, *backend, *executor, stream);
     const Legend legend = o.colour.legend ? makeLegend(colour, description) : Legend{};
     Timings timings;
     bool complete = false;
     STIPPLE_TRY(runFrames(o, shot, settings, *state, *executor, timings, complete));
     if (shot.views.size() == 1) {
+        STIPPLE_TRY(accumulate(o.accumulate, shot.views.front(), settings, *state));
         drawLegend(legend, state->image);
         STIPPLE_TRY(image::writeImage(o.output, state->image));
     }
@@ -316,6 +340,10 @@ void setupRender(CLI::App& app, int& status) {
     sub->add_option("--strand-exact", o->strandExact,
                     "half-width in pixels from which ribbons and tubes are filled exactly instead of reconstructed")
         ->check(CLI::Range(0.5, 1e9))
+        ->capture_default_str();
+    sub->add_option("--accumulate", o->accumulate,
+                    "the mean of N frames: smooth coverage of strands narrower than a pixel")
+        ->check(CLI::Range(1, 4096))
         ->capture_default_str();
     sub->add_option("--samples", o->samples, "mode reference: rays per pixel along each axis")
         ->check(CLI::Range(1, 64))

@@ -16,8 +16,8 @@ namespace {
 
 constexpr uint32_t kRootLog2 = 24;
 constexpr uint32_t kDeepest = 20;
-constexpr double kStepsPerTolerance = 256;  ///< a node's tolerance is its cell / this
-constexpr size_t kMostFactor = 4;           ///< parts of a node before lots are drawn / those of a leaf
+constexpr double kStepsPerTolerance = 64;  ///< a node's tolerance is its cell / this
+constexpr size_t kMostFactor = 4;          ///< parts of a node before lots are drawn / those of a leaf
 
 struct StrandNode {
     std::array<uint32_t, 3> cell{};

@@ -18,6 +18,7 @@ namespace {
 
 constexpr size_t kLongestRun = 64;    ///< parts that are merged into one
 constexpr double kFewestKept = 0.25;  ///< of one level
+constexpr double kThin = 2;           ///< tolerances: parts with a smaller radius may be drawn by lot
 constexpr int kColourStep = 48;       ///< sRGB steps from which colours count as different, as for points
 
 class Merger {
@@ -116,24 +117,33 @@ uint32_t lotOf(uint32_t strand) {
 
 void drawLots(const std::vector<StrandPoint>& points, const StrandLevel& level, StrandMerge& merge) {
     std::vector<StrandPart>& parts = merge.parts;
-    std::vector<uint32_t> lots;
-    for (const StrandPart& p : parts) lots.push_back(lotOf(points[p.a].strand));
-    std::vector<uint32_t> order = lots;
-    const auto wanted = static_cast<size_t>(
-        std::max(kFewestKept * static_cast<double>(parts.size()), static_cast<double>(level.mostParts)));
+    const auto radiusOf = [&](const StrandPart& p) {
+        return double{std::max(points[p.a].radius, points[p.b].radius)} * p.scale;
+    };
+    std::vector<uint8_t> isThin(parts.size());
+    std::vector<uint32_t> lots(parts.size()), order;
+    for (size_t i = 0; i < parts.size(); ++i) {
+        isThin[i] = radiusOf(parts[i]) <= kThin * level.tolerance ? 1 : 0;
+        lots[i] = lotOf(points[parts[i].a].strand);
+        if (isThin[i] != 0) order.push_back(lots[i]);
+    }
+    const size_t thick = parts.size() - order.size();
+    const auto wanted =
+        static_cast<size_t>(std::max(kFewestKept * static_cast<double>(order.size()),
+                                     static_cast<double>(level.mostParts) - static_cast<double>(thick)));
+    if (wanted >= order.size()) return;
     std::nth_element(order.begin(), order.begin() + static_cast<ptrdiff_t>(wanted), order.end());
     const uint32_t limit = order[wanted];
     double areaBefore = 0, areaAfter = 0;
     glm::dvec3 sum(0);
-    const auto areaOf = [&](const StrandPart& p) {
-        return glm::length(points[p.b].p - points[p.a].p) *
-               (static_cast<double>(points[p.a].radius) + points[p.b].radius) * p.scale;
-    };
     for (size_t i = 0; i < parts.size(); ++i) {
-        const double area = areaOf(parts[i]);
+        if (isThin[i] == 0) continue;
+        const StrandPart& p = parts[i];
+        const double area = glm::length(points[p.b].p - points[p.a].p) *
+                            (double{points[p.a].radius} + double{points[p.b].radius}) * p.scale;
         areaBefore += area;
         areaAfter += lots[i] < limit ? area : 0;
-        for (int c = 0; c < 3; ++c) sum[c] += area * (parts[i].colourA >> (8 * c) & 255u);
+        for (int c = 0; c < 3; ++c) sum[c] += area * (p.colourA >> (8 * c) & 255u);
     }
     if (!(areaAfter > 0)) return;
     const auto wider = static_cast<float>(areaBefore / areaAfter);
@@ -146,21 +156,24 @@ void drawLots(const std::vector<StrandPoint>& points, const StrandLevel& level, 
         }
         return out;
     };
+    // All thin parts change at once: the survivors grow when the others go.
     std::vector<StrandPart> kept;
     std::vector<uint32_t> place(parts.size(), kDrawnByLot);
     for (size_t i = 0; i < parts.size(); ++i) {
-        if (lots[i] >= limit) continue;
         StrandPart p = parts[i];
-        const double grown = std::max(points[p.a].radius, points[p.b].radius) * (double{wider} - 1) * p.scale;
-        p.scale *= wider;
-        p.colourA = softer(p.colourA);
-        p.colourB = softer(p.colourB);
-        merge.commonError = std::max(merge.commonError, p.error + grown);
+        if (isThin[i] != 0) merge.commonError = std::max(merge.commonError, p.error);
+        if (isThin[i] != 0 && lots[i] >= limit) continue;
+        if (isThin[i] != 0) {
+            merge.commonError = std::max(merge.commonError, p.error + radiusOf(p) * (double{wider} - 1));
+            p.scale *= wider;
+            p.colourA = softer(p.colourA);
+            p.colourB = softer(p.colourB);
+        }
         place[i] = static_cast<uint32_t>(kept.size());
         kept.push_back(p);
     }
-    for (const StrandPart& p : parts) merge.commonError = std::max(merge.commonError, p.error);
-    for (StrandPart& p : kept) p.error = merge.commonError;
+    for (size_t i = 0; i < parts.size(); ++i)
+        if (isThin[i] != 0 && place[i] != kDrawnByLot) kept[place[i]].error = merge.commonError;
     for (uint32_t& s : merge.standsFor) s = place[s];
     merge.kept = areaAfter / areaBefore;
     parts = std::move(kept);

@@ -38,8 +38,8 @@ inline constexpr uint32_t kDrawnByLot = ~0u;
 struct StrandMerge {
     std::vector<StrandPart> parts;
     std::vector<uint32_t> standsFor;
-    double kept = 1;         ///< share of the strands' length that was not drawn by lot
-    double commonError = 0;  ///< of all parts, where some were
+    double kept = 1;         ///< share of the thin strands' area that was drawn
+    double commonError = 0;  ///< of all thin parts, where some were
 };
 StrandMerge mergeParts(const std::vector<StrandPoint>& points, const std::vector<uint8_t>& isRibbon,
                        const std::vector<StrandPart>& children, const StrandLevel& level);
