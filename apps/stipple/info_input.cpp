@@ -13,6 +13,7 @@
 #include "engine/scene/scene.h"
 #include "lod/import/import.h"
 #include "lod/import/las/header.h"
+#include "lod/import/strands/strand_readers.h"
 #include "lod/import/survey.h"
 
 namespace stipple::app {
@@ -308,10 +309,43 @@ Result<void> showScene(const InputInfoOptions& o) {
     return {};
 }
 
+Result<void> showStrands(const InputInfoOptions& o) {
+    STIPPLE_ASSIGN(lod::StrandSet set, lod::readStrands(o.input));
+    const bool hasRadii = std::any_of(set.radius.begin(), set.radius.end(), [](float r) { return r > 0; });
+    const uint64_t vertices = set.position.size(), strands = set.strands();
+    const lod::StrandSet clean = lod::cleanStrands(std::move(set), 0);
+    scene::Box box;
+    for (const glm::dvec3& p : clean.position) box.add(p);
+    nlohmann::json j = {{"kind", "strands"},
+                        {"path", o.input},
+                        {"strands", strands},
+                        {"vertices", vertices},
+                        {"drawn", clean.strands()},
+                        {"has_radii", hasRadii},
+                        {"has_colour", clean.hasColour},
+                        {"mended", clean.dropped}};
+    if (!box.isEmpty()) {
+        j["min"] = vectorJson(box.least);
+        j["max"] = vectorJson(box.greatest);
+    }
+    if (o.json) {
+        fmt::print("{}\n", j.dump(2));
+        return {};
+    }
+    fmt::print("{}: {} strands of {} vertices\n", o.input, strands, vertices);
+    printVector(j, "min", "least");
+    printVector(j, "max", "greatest");
+    fmt::print("  {:15} {}\n  {:15} {}\n", "radii", hasRadii ? "yes" : "no: see --strand-radius", "colours",
+               clean.hasColour ? "yes" : "no");
+    for (const auto& [what, count] : clean.dropped) fmt::print("  {:15} {}: {}\n", "mended", count, what);
+    return {};
+}
+
 }  // namespace
 
 Result<void> showInputInfo(const InputInfoOptions& o, Executor& executor) {
     if (isSceneFile(o.input)) return showScene(o);
+    if (lod::isStrandFile(o.input)) return showStrands(o);
     STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs({o.input}));
     if (files.size() != 1) return showFolder(o, files, executor);
     STIPPLE_ASSIGN(const nlohmann::json j, fileInfo(o, files.front(), executor));
