@@ -17,6 +17,9 @@ inline glm::dvec3 axisVector(UpAxis up) { return {up == UpAxis::x, up == UpAxis:
 
 /// How the values of one attribute are stored.
 enum class ScalarType : uint8_t { u8, i8, u16, i16, u32, i32, u64, i64, f32, f64 };
+/// sRGB colour of points and PLY meshes that have none: light enough to show shading, the same for both.
+inline constexpr uint32_t kPlainColour = 0xc8c8c8u;
+
 inline constexpr std::array<uint8_t, 10> kScalarBytes{1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
 inline constexpr std::array<const char*, 10> kScalarNames{"u8",  "i8",  "u16", "i16", "u32",
                                                           "i32", "u64", "i64", "f32", "f64"};

@@ -57,7 +57,9 @@ Result<void> run(const Options& o) {
 void setupBuild(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
     CLI::App* sub =
-        app.add_subcommand("build", "build the hierarchy of scans (.ply, .las, .laz) or of a mesh (.gltf, .glb, .obj)");
+        app.add_subcommand("build",
+                           "build the hierarchy of scans (.ply, .las, .laz), of a mesh (.gltf, .glb, .obj) or of "
+                           "strands (.swc, .trk, .hair, cylinder models)");
     sub->add_option("INPUT", o->inputs,
                     "scans that together make the scene: files, folders, patterns, ept.json, cloud.js")
         ->required();

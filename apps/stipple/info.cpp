@@ -164,7 +164,8 @@ Result<void> run(const Options& o) {
 void setupInfo(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
     CLI::App* sub = app.add_subcommand("info", "what a scene or an input file holds");
-    sub->add_option("SCENE", o->input, "a .stipple scene, a .ply, .las or .laz file, or a folder of them")->required();
+    sub->add_option("SCENE", o->input, "a .stipple scene, a scan, mesh, scene or strand file, or a folder of scans")
+        ->required();
     sub->add_flag("--verify", o->verify, "read everything and check it");
     sub->add_option("--at", o->at, "X,Y,Z in file coordinates: the input point of a scene that is nearest to it");
     sub->add_flag("--skip-bad", o->skipBad, "go on past what is corrupt");

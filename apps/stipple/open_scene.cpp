@@ -159,6 +159,7 @@ Result<lod::BuildReport> buildPlyMesh(const std::string& input, const std::strin
                                       Progress& progress) {
     lod::PlyMeshNotes notes;
     STIPPLE_ASSIGN(lod::TriangleMesh mesh, lod::readPlyMesh(input, notes));
+    if (mesh.colour.empty()) mesh.colour.assign(mesh.position.size(), 0xff000000u | lod::kPlainColour);
     scene::Scene plain;
     plain.path = input;
     STIPPLE_ASSIGN(const lod::MeshBuildSettings settings, meshSettings(plain));

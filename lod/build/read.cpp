@@ -19,7 +19,6 @@ namespace {
 
 constexpr double kLatticeLimit = 4294967295.0;
 constexpr size_t kBlockPoints = 65536;
-constexpr uint32_t kGrey = 0xc8c8c8u;
 
 struct Part {
     size_t source = 0, index = 0;
@@ -199,7 +198,7 @@ class Reading {
             for (auto* axis : {&cloud_.x, &cloud_.y, &cloud_.z}) axis->resize(n);
         else
             position_.resize(n);
-        cloud_.colour.assign(n, kGrey);
+        cloud_.colour.assign(n, kPlainColour);
         if (cloud_.hasNormal) cloud_.normal.resize(n);
         cloud_.radius.resize(n);
         for (CloudAttribute& a : cloud_.attributes) a.values.resize(n * bytesOf(a.info.type));

@@ -140,7 +140,7 @@ Result<PointSource> openPointSource(const std::string& path, const ReadOptions& 
     if (head.substr(0, 2) == "\x1f\x8b")
         return fail(ErrorKind::input, "is compressed with gzip", path, "unpack it first: gunzip -k");
     return fail(ErrorKind::input, "is in a format that this version does not read", path,
-                "it reads .las, .laz, .ply, .gltf, .glb and .obj");
+                "it reads .las, .laz, .ply, .gltf, .glb, .obj, .swc, .trk, .hair and cylinder models");
 }
 
 }  // namespace stipple::lod
