@@ -18,14 +18,7 @@
 namespace stipple {
 namespace {
 
-render::Image draw(const std::vector<render::PlacedStore>& placed, render::Backend& backend, Executor& executor,
-                   const lod::View& view, const render::FrameSettings& settings, FrameCounters* counters = nullptr) {
-    auto state = render::makeFrameState(placed, backend, executor, {});
-    const auto complete = render::renderUntilComplete(*state, view, settings, executor);
-    EXPECT_TRUE(complete && *complete);
-    if (counters) *counters = state->counters;
-    return state->image;
-}
+using test::draw;
 
 std::vector<render::WorldLight> threeLights(const glm::dvec3& at, double size) {
     std::vector<render::WorldLight> lights(3);

@@ -13,14 +13,7 @@
 namespace stipple {
 namespace {
 
-render::Image draw(const std::vector<render::PlacedStore>& placed, render::Backend& backend, Executor& executor,
-                   const lod::View& view, const render::FrameSettings& settings, FrameCounters* counters = nullptr) {
-    auto state = render::makeFrameState(placed, backend, executor, {});
-    const auto complete = render::renderUntilComplete(*state, view, settings, executor);
-    EXPECT_TRUE(complete && *complete);
-    if (counters) *counters = state->counters;
-    return state->image;
-}
+using test::draw;
 
 class Strands : public testing::Test {
   protected:

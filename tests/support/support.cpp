@@ -106,13 +106,19 @@ std::shared_ptr<const lod::Store> buildAndOpen(const std::string& input, const s
     return std::make_shared<const lod::Store>(std::move(*store));
 }
 
-render::Image renderView(std::shared_ptr<const lod::Store> store, render::Backend& backend, Executor& executor,
-                         const lod::View& view, const render::FrameSettings& settings, FrameCounters* counters) {
-    auto state = render::makeFrameState({std::move(store)}, backend, executor, {});
+render::Image draw(const std::vector<render::PlacedStore>& placed, render::Backend& backend, Executor& executor,
+                   const lod::View& view, const render::FrameSettings& settings, FrameCounters* counters) {
+    auto state = render::makeFrameState(placed, backend, executor, {});
     const auto complete = render::renderUntilComplete(*state, view, settings, executor);
     if (!complete) fatal(complete.error());
+    EXPECT_TRUE(*complete);
     if (counters) *counters = state->counters;
     return std::move(state->image);
+}
+
+render::Image renderView(std::shared_ptr<const lod::Store> store, render::Backend& backend, Executor& executor,
+                         const lod::View& view, const render::FrameSettings& settings, FrameCounters* counters) {
+    return draw({{std::move(store), {}, {}}}, backend, executor, view, settings, counters);
 }
 
 std::vector<std::array<int64_t, 3>> leafLattice(const lod::Store& store) {

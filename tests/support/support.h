@@ -52,6 +52,9 @@ std::shared_ptr<const lod::Store> buildAndOpen(const std::string& input, const s
 /// Lattice coordinates of all leaf records of a store, low bits included, sorted.
 std::vector<std::array<int64_t, 3>> leafLattice(const lod::Store& store);
 
+/// A complete frame of placed stores.
+render::Image draw(const std::vector<render::PlacedStore>& placed, render::Backend& backend, Executor& executor,
+                   const lod::View& view, const render::FrameSettings& settings, FrameCounters* counters = nullptr);
 /// A complete frame.
 render::Image renderView(std::shared_ptr<const lod::Store> store, render::Backend& backend, Executor& executor,
                          const lod::View& view, const render::FrameSettings& settings,
