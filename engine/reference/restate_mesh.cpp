@@ -61,6 +61,7 @@ class MeshProjector {
         }
         if (polygon.size() < 3) return;
         std::vector<dvec2> snapped;  // in 1/256 pixel, whole
+        snapped.reserve(polygon.size());
         for (const dvec3& p : polygon)
             snapped.push_back(glm::floor(
                 (view_.focalPixels * dvec2(p) / p.z + 0.5 * dvec2(view_.width, view_.height)) * 256.0 + 0.5));

@@ -162,6 +162,7 @@ class MeshBuilder {
         auto members = groupClusters(mesh_, clusters, settings_.groupClusters, executor_);
         for (const auto& group : members) {
             std::vector<const Cluster*> of;
+            of.reserve(group.size());
             for (const uint32_t c : group) of.push_back(&clusters[c]);
             Made made = simplify(of, true);
             STIPPLE_TRY(append(std::move(made)));

@@ -1,7 +1,7 @@
 // Triangles as they come, to a welded mesh: one lattice, every vertex once, nothing degenerate, twice or not finite.
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <cstring>
 #include <numeric>
 
 #include "engine/base/hash.h"
@@ -53,6 +53,9 @@ std::vector<uint32_t> firstOfEqual(size_t count, const Hash& hashOf, const Equal
     });
     return first;
 }
+
+/// Bit by bit: two zeros of different sign are two values.
+std::array<uint32_t, 8> wordsOf(const shared::MeshVertex& v) { return std::bit_cast<std::array<uint32_t, 8>>(v); }
 
 uint64_t mix(uint64_t h) {
     h ^= h >> 33;
@@ -119,7 +122,7 @@ WeldedMesh weldMesh(TriangleMesh in, Executor& executor) {
     auto& v = out.vertices;
     const std::vector<uint32_t> same = firstOfEqual(
         v.size(), [&](uint32_t i) { return hashBytes(&v[i], sizeof(v[i])); },
-        [&](uint32_t a, uint32_t b) { return std::memcmp(&v[a], &v[b], sizeof(v[a])) == 0; }, executor);
+        [&](uint32_t a, uint32_t b) { return wordsOf(v[a]) == wordsOf(v[b]); }, executor);
     // Dropped here: what has no area on the lattice.
     const auto cornersDiffer = [&](const uint32_t* t) {
         const glm::dvec3 a(v[t[0]].x, v[t[0]].y, v[t[0]].z), b(v[t[1]].x, v[t[1]].y, v[t[1]].z),
