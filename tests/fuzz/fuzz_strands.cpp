@@ -1,0 +1,23 @@
+// libFuzzer: any bytes as SWC, cylinder model, TrackVis or hair end in clean strands or in an error.
+#include <cstdint>
+#include <cstdlib>
+#include <string_view>
+#include <vector>
+
+#include "lod/import/strands/strand_readers.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+    const std::vector<uint8_t> bytes(data, data + size);
+    const std::string_view text(reinterpret_cast<const char*>(data), size);
+    const auto take = [](stipple::Result<stipple::lod::StrandSet> set) {
+        if (!set) return;
+        const stipple::lod::StrandSet clean = stipple::lod::cleanStrands(std::move(*set), 0);
+        for (size_t s = 0; s < clean.strands(); ++s)
+            if (clean.first[s + 1] < clean.first[s] + 2 || clean.first[s + 1] > clean.position.size()) std::abort();
+    };
+    take(stipple::lod::readSwc(text, "fuzz"));
+    take(stipple::lod::readQsm(text, "fuzz"));
+    take(stipple::lod::readTrk(bytes, "fuzz"));
+    take(stipple::lod::readHair(bytes, "fuzz"));
+    return 0;
+}
