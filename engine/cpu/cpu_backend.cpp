@@ -85,6 +85,7 @@ class CpuBackend final : public render::Backend {
         render::BackendResources r;
         r.meshBytes = surfacePixels_ * 4 + meshBlocks_.size() * sizeof(MeshBlock);
         r.emissiveBytes = emissivePixels_ * 4;
+        r.strandBytes = strandBlocks_.capacity() * sizeof(StrandBlock) + wide_.capacity() * sizeof(WideStrand);
         for (const auto& tiles : tiles_)
             r.textureTiles += static_cast<uint64_t>(
                 std::count_if(tiles.begin(), tiles.end(), [](const uint32_t* t) { return t != nullptr; }));

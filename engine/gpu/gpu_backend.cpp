@@ -51,7 +51,9 @@ class GpuBackend final : public render::Backend {
 
     render::BackendResources resources() const override {
         render::BackendResources r;
-        r.meshPipelines = pipelines_->count() - Pipelines::kPointPasses;
+        r.strandPipelines = pipelines_->strandCount();
+        r.strandBytes = wide_.bytes();
+        r.meshPipelines = pipelines_->count() - Pipelines::kPointPasses - r.strandPipelines;
         for (const Buffer* b : {&meshes_, &clusters_, &materials_, &textures_, &tiles_, &surfaces_, &large_})
             r.meshBytes += b->bytes();
         for (const auto& t : meshFrame_.tiles) r.textureTiles += t.low != 0 || t.high != 0;

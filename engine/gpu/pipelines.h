@@ -34,6 +34,7 @@ class Pipelines {
     /// The pass that lights need, of triangles and of points under lights of the scene's own.
     Result<void> addLightPass();
     size_t count() const { return pipelines_.size(); }
+    size_t strandCount() const { return pipelines_.count("strand_texels") > 0 ? 3 : 0; }
     void use(VkCommandBuffer commands, const std::string& pass) const;
     void push(VkCommandBuffer commands, const StepConstants& step) const;
 

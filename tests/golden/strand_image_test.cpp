@@ -231,8 +231,10 @@ TEST_F(FourKinds, WhatASceneDoesNotCallForDoesNotExist) {
     FrameCounters counters;
     draw({placed_[0]}, *backend, *executor_, view_, lit(1), &counters);
     EXPECT_EQ(counters.passes, 6u);  // no pass of strands
+    EXPECT_EQ(backend->resources().strandBytes, 0u);
     draw({placed_[2]}, *backend, *executor_, view_, lit(1), &counters);
     EXPECT_EQ(counters.passes, 6u);  // no projection of points
+    EXPECT_GT(backend->resources().strandBytes, 0u);
     EXPECT_EQ(backend->resources().meshBytes, 0u);
 }
 

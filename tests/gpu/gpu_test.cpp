@@ -103,6 +103,9 @@ TEST_F(Gpu, DrawsRibbonsAndTubesAmongPointsAsTheOracleDoes) {
     const auto oracle = reference::makeReferenceBackend(*executor_);
     render::FrameSettings settings;
     settings.draw.lit = true;
+    draw(*gpu, settings);  // points alone
+    EXPECT_EQ(gpu->resources().strandPipelines, 0u);
+    EXPECT_EQ(gpu->resources().strandBytes, 0u);
     for (const float radius : {0.002f, 0.01f, 0.05f}) {
         test::CurlRecipe recipe;
         recipe.radius = radius;
@@ -128,6 +131,9 @@ TEST_F(Gpu, DrawsRibbonsAndTubesAmongPointsAsTheOracleDoes) {
                 view.eye -= closer * view.forward;
             }
     }
+    EXPECT_EQ(gpu->resources().strandPipelines, 3u);
+    EXPECT_GT(gpu->resources().strandBytes, 0u);
+    EXPECT_EQ(gpu->resources().meshPipelines, 0u) << "strands call for no pipeline of triangles";
     for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
 }
 
