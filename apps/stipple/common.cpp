@@ -104,10 +104,12 @@ Result<lod::ColourBy> applyColours(OpenedScene& scene, const std::string& what, 
     std::optional<lod::ColourBy> first;
     std::optional<Error> problem;
     for (render::PlacedStore& p : scene.placed) {
-        if (p.store->hierarchy.isMesh() && what != "auto" && what != "rgb") {
+        const lod::Hierarchy& h = p.store->hierarchy;
+        if ((h.isMesh() || h.isStrands) && what != "auto" && what != "rgb") {
+            const char* const kind = h.isMesh() ? "triangles" : "ribbons and tubes";
             if (!problem)
-                problem = Error{ErrorKind::usage, fmt::format("triangles cannot be coloured by '{}'", what), "--colour",
-                                "--surfels N makes points of them"};
+                problem = Error{ErrorKind::usage, fmt::format("{} cannot be coloured by '{}'", kind, what), "--colour",
+                                h.isMesh() ? "--surfels N makes points of them" : "leave --colour out"};
             continue;
         }
         const auto by = lod::parseColourBy(what, map, range, p.store->description);

@@ -135,5 +135,21 @@ TEST(Program, ATruncatedSceneIsRefused) {
     EXPECT_FALSE(std::filesystem::exists(folder / "b.png"));
 }
 
+TEST(Program, StrandsAreDrawnAndWhatTheyCannotDoIsSaid) {
+    const test::TempFolder folder;
+    ASSERT_EQ(run(folder, "grow tree -o a.glb --leaves 500 --species birch").code, 0);
+    ASSERT_EQ(run(folder, "build a.glb -o a.stipple --quiet").code, 0);
+    const Outcome info = run(folder, "info a.stipple --verify");
+    EXPECT_NE(info.out.find("segments"), std::string::npos) << info.out;
+    EXPECT_EQ(run(folder, "render a.stipple -o a.png --size 64x64 --accumulate 2 --quiet").code, 0);
+    expectOneLine(run(folder, "render a.stipple -o b.png --colour height"), 2, "ribbons and tubes");
+    expectOneLine(run(folder, "info a.stipple --at 0,0,0"), 2, "no points");
+    expectOneLine(run(folder, "grow tree -o b.glb --leaves none"), 2, "--leaves");
+    test::spit(folder / "a.swc", "1 1 0 0\n");
+    expectOneLine(run(folder, "build a.swc -o b.stipple --quiet"), 3, "line 1");
+    EXPECT_FALSE(std::filesystem::exists(folder / "b.stipple"));
+    EXPECT_FALSE(std::filesystem::exists(folder / "b.png"));
+}
+
 }  // namespace
 }  // namespace stipple
