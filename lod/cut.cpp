@@ -4,86 +4,32 @@
 #include <cmath>
 
 #include "engine/base/check.h"
+#include "lod/cut_view.h"
 
 namespace stipple::lod {
 namespace {
 
-constexpr int32_t kCulled = std::numeric_limits<int32_t>::min();
-constexpr int32_t kInside = -1'000'000;  // the eye is inside the sphere: only exact records are fine enough
-constexpr int kStepsPerOctave = 32;      // resolution of tau; error codes have 8
-constexpr int kLargestTauStep = 40 * kStepsPerOctave;
-
-/// A view in the lattice space of one instance.
-struct LocalView {
-    glm::dvec3 eye, forward;
-    std::array<glm::dvec3, 4> planes;  ///< inward normals of the frustum's sides, through the eye
-    double nearPlane = 0, focal = 0, cosineCorner = 0;
-};
-
-LocalView makeLocalView(const Hierarchy& h, const Instance& instance, const View& view) {
-    LocalView local;
-    const glm::dmat3 inverse = glm::transpose(instance.rotation);
-    const double unitsPerStep = instance.scale * h.unit;
-    local.eye = (inverse * (view.eye - instance.translation) / instance.scale - h.origin) / h.unit;
-    local.forward = inverse * view.forward;
-    const glm::dvec3 right = inverse * view.right, down = inverse * view.down;
-    const double halfW = 0.5 * view.width, halfH = 0.5 * view.height, f = view.focalPixels;
-    local.planes = {
-        glm::normalize(right * f + local.forward * halfW), glm::normalize(-right * f + local.forward * halfW),
-        glm::normalize(down * f + local.forward * halfH), glm::normalize(-down * f + local.forward * halfH)};
-    local.nearPlane = view.nearPlane / unitsPerStep;
-    local.focal = f;
-    local.cosineCorner = f / std::sqrt(f * f + halfW * halfW + halfH * halfH);
-    return local;
-}
-
-/// Allowed error of N at tau = 1 px as a code of 1/32 octave, rounded down; kCulled if N is out of view.
-int32_t allowedError(const Hierarchy& h, const Node& node, const LocalView& view) {
-    const glm::dvec3 d = node.centre - view.eye;
-    const double r = node.radius;
-    const double depth = glm::dot(d, view.forward);
-    if (depth + r < view.nearPlane) return kCulled;
-    for (const glm::dvec3& plane : view.planes)
-        if (glm::dot(d, plane) < -r) return kCulled;
-    const double distance = glm::length(d);
-    const double nearest = distance - r;
-    if (!(nearest > 0)) return kInside;
-    // cos(alpha + beta), alpha: axis to centre, beta: angular radius.
-    const double cosAlpha = depth / distance, sinAlpha = std::sqrt(std::max(0.0, 1 - cosAlpha * cosAlpha));
-    const double sinBeta = r / distance, cosBeta = std::sqrt(std::max(0.0, 1 - sinBeta * sinBeta));
-    const double cosine = std::max(cosAlpha * cosBeta - sinAlpha * sinBeta, view.cosineCorner);
-    const double allowed = nearest * cosine * cosine / view.focal;
-    const double code = std::floor(kStepsPerOctave * std::log2(allowed / h.errors.smallest));
-    return static_cast<int32_t>(std::clamp(code, -900'000.0, 900'000.0));
-}
-
-/// Allowed error code of a node at tau = 2^(step/32).
-uint32_t codeAt(int32_t epsilon, int step) {
-    const int32_t sum = epsilon + step;
-    if (sum < 0) return 0;
-    return std::min<uint32_t>(static_cast<uint32_t>(sum) / (kStepsPerOctave / 8), ErrorScale::kLargest);
-}
-
 class Selector {
   public:
-    Selector(std::span<const Hierarchy* const> hierarchies, std::span<const Instance> instances,
-             const Residency& residency, const View& view, const Budgets& budgets, CutScratch& scratch, Cut& cut)
-        : hierarchies_(hierarchies),
-          instances_(instances),
+    Selector(const CutScene& scene, const Residency& residency, const View& view, const Budgets& budgets,
+             CutScratch& scratch, Cut& cut)
+        : hierarchies_(scene.hierarchies),
+          instances_(scene.instances),
+          crowds_(scene.crowds),
           residency_(residency),
           view_(view),
           budgets_(budgets),
           scratch_(scratch),
           cut_(cut) {
         ++scratch_.frame;
-        scratch_.epsilon.resize(instances.size());
-        scratch_.stamp.resize(instances.size());
-        for (size_t i = 0; i < instances.size(); ++i) {
-            const size_t count = hierarchyOf(i).nodes.size();
-            if (scratch_.stamp[i].size() == count) continue;
-            scratch_.epsilon[i].assign(count, 0);
-            scratch_.stamp[i].assign(count, 0);
-        }
+        scratch_.slotsUsed = 0;
+        scratch_.slotOf.resize(instances_.size(), {0, 0});
+        scratch_.activeStamp.resize(instances_.size(), 0);
+        scratch_.drivers.clear();
+        for (size_t i = 0; i < instances_.size(); ++i)
+            if (!instances_[i].isDriven && !hierarchyOf(i).nodes.empty())
+                scratch_.drivers.push_back(static_cast<uint32_t>(i));
+        for (const Crowd& crowd : crowds_) isReady_.push_back(isReady(crowd));
     }
 
     void run() {
@@ -105,18 +51,15 @@ class Selector {
             cut_.keep.clear();
             cut_.meshDraw.clear();
             cut_.counters.recordsDrawn = cut_.counters.recordsTested = cut_.counters.nodesVisited = 0;
-            cut_.counters.trianglesDrawn = cut_.counters.standIns = 0;
+            cut_.counters.trianglesDrawn = cut_.counters.standIns = cut_.counters.crowdMembers = 0;
             cut_.counters.nodesCulled = cut_.counters.nodesMissing = cut_.counters.nodesDrawn = 0;
             cut_.tauEffective = 0;
-            for (size_t i = 0; i < instances_.size(); ++i) {
-                if (instances_[i].isStandIn || hierarchyOf(i).nodes.empty()) continue;
-                if (usesStandIn(i, step) && hasRoot(instances_[i].standIn)) {
-                    ++cut_.counters.standIns;
-                    emit(instances_[i].standIn, step - kStepsPerOctave);
-                } else {
-                    emit(i, step);
-                }
-            }
+            wantRoots();
+            beginEvaluation();
+            for (const uint32_t i : scratch_.drivers) emitBest(i, step);
+            cut_.counters.crowdMembers = scratch_.active.size();
+            std::sort(scratch_.active.begin(), scratch_.active.end());
+            for (const uint32_t i : scratch_.active) emitBest(i, step);
             if (cut_.counters.recordsDrawn + cut_.counters.trianglesDrawn <= budgets_.records ||
                 step >= kLargestTauStep)
                 break;
@@ -130,37 +73,108 @@ class Selector {
   private:
     const Hierarchy& hierarchyOf(size_t i) const { return *hierarchies_[instances_[i].hierarchy]; }
 
-    int32_t epsilonOf(size_t i, const LocalView& local, uint32_t index, int32_t parentEpsilon) {
-        if (scratch_.stamp[i][index] != scratch_.frame) {
-            scratch_.stamp[i][index] = scratch_.frame;
+    /// What this frame remembers of instance i.
+    CutScratch::Slot& slotOf(size_t i) {
+        auto& [frame, number] = scratch_.slotOf[i];
+        if (frame == scratch_.frame) return scratch_.slots[number];
+        frame = scratch_.frame;
+        number = scratch_.slotsUsed++;
+        if (number == scratch_.slots.size()) scratch_.slots.emplace_back();
+        CutScratch::Slot& slot = scratch_.slots[number];
+        const Hierarchy& h = hierarchyOf(i);
+        slot.view = makeLocalView(h, instances_[i], view_);
+        slot.inputError = instances_[i].inputError / (instances_[i].scale * h.unit * h.errors.smallest);
+        if (slot.stamp.size() < h.nodes.size()) {
+            slot.stamp.resize(h.nodes.size(), 0);
+            slot.epsilon.resize(h.nodes.size(), 0);
+        }
+        return slot;
+    }
+
+    int32_t epsilonOf(size_t i, CutScratch::Slot& slot, uint32_t index, int32_t parentEpsilon) {
+        if (slot.stamp[index] != scratch_.frame) {
+            slot.stamp[index] = scratch_.frame;
             const Hierarchy& h = hierarchyOf(i);
-            int32_t value = allowedError(h, h.nodes[index], local);
+            int32_t value = allowedError(h, h.nodes[index], slot.view);
             // Nested spheres give eps_child >= eps_parent; this makes it so to the last rounding.
             if (value != kCulled) value = std::max(value, parentEpsilon);
-            scratch_.epsilon[i][index] = value;
+            slot.epsilon[index] = value;
         }
-        return scratch_.epsilon[i][index];
+        return slot.epsilon[index];
+    }
+
+    /// Allowed error in steps of the smallest code at tau = 2^(step/32).
+    static double allowedAt(int32_t epsilon, int step) {
+        return epsilon == kInside ? 0.0 : std::exp2(static_cast<double>(epsilon + step) / kStepsPerOctave);
+    }
+    /// Allowed own error of records: what the input's error leaves of the whole.
+    static uint32_t codeOf(const CutScratch::Slot& slot, int32_t epsilon, int step) {
+        if (slot.inputError == 0) return codeAt(epsilon, step);
+        const double left = allowedAt(epsilon, step) - slot.inputError;
+        if (!(left >= 1)) return 0;
+        return static_cast<uint32_t>(std::min(8 * std::log2(left), double{ErrorScale::kLargest}));
+    }
+
+    // ---- crowds ----
+
+    bool isReady(const Crowd& crowd) const {
+        return std::all_of(crowd.sources.begin(), crowd.sources.end(),
+                           [&](uint32_t source) { return residency_.drawable[source][0] != 0; });
+    }
+    void wantRoots() {
+        for (size_t c = 0; c < crowds_.size(); ++c)
+            for (const uint32_t source : crowds_[c].sources)
+                if (residency_.drawable[source][0])
+                    cut_.keep.emplace_back(source, 0u);
+                else
+                    cut_.wanted.push_back({source, 0, 1e8f});
+    }
+    void beginEvaluation() {
+        ++scratch_.evaluation;
+        scratch_.active.clear();
+    }
+    /// Does this leaf of a crowd's points have to give way to the crowd's members?
+    bool givesWay(size_t i, const CutScratch::Slot& slot, const Node& node, int32_t epsilon, int step) const {
+        return instances_[i].crowd != Instance::kNone && node.isLeaf() && allowedAt(epsilon, step) < slot.inputError;
+    }
+    void activate(const Crowd& crowd, uint32_t index) {
+        for (uint32_t k = crowd.first[index]; k < crowd.first[index + 1]; ++k) {
+            const uint32_t member = crowd.members[k];
+            if (scratch_.activeStamp[member] == scratch_.evaluation) continue;
+            scratch_.activeStamp[member] = scratch_.evaluation;
+            scratch_.active.push_back(member);
+        }
+    }
+
+    void emitBest(uint32_t i, int step) {
+        if (usesStandIn(i, step) && hasRoot(instances_[i].standIn)) {
+            ++cut_.counters.standIns;
+            emit(instances_[i].standIn, step);
+        } else {
+            emit(i, step);
+        }
+    }
+    uint64_t bestCost(uint32_t i, int step, uint64_t most) {
+        if (usesStandIn(i, step)) return pointCost(instances_[i].standIn, step, most);
+        return hierarchyOf(i).isMesh() ? meshCost(i, step) : pointCost(i, step, most);
     }
 
     /// Records and triangles of the full cut (everything resident) at `step`; stops counting above the budget.
     uint64_t cost(int step) {
         ++cut_.counters.evaluations;
+        beginEvaluation();
         uint64_t total = 0;
-        for (size_t i = 0; i < instances_.size() && total <= budgets_.records; ++i) {
-            if (hierarchyOf(i).nodes.empty() || instances_[i].isStandIn) continue;
-            if (usesStandIn(i, step))
-                total += pointCost(instances_[i].standIn, step - kStepsPerOctave, budgets_.records - total);
-            else if (hierarchyOf(i).isMesh())
-                total += meshCost(i, makeLocalView(hierarchyOf(i), instances_[i], view_), step);
-            else
-                total += pointCost(i, step, budgets_.records - total);
-        }
+        const auto add = [&](uint32_t i) {
+            if (total <= budgets_.records) total += bestCost(i, step, budgets_.records - total);
+        };
+        for (const uint32_t i : scratch_.drivers) add(i);
+        for (size_t k = 0; k < scratch_.active.size() && total <= budgets_.records; ++k) add(scratch_.active[k]);
         return total;
     }
 
     uint64_t pointCost(size_t i, int step, uint64_t most) {
         const Hierarchy& h = hierarchyOf(i);
-        const LocalView local = makeLocalView(h, instances_[i], view_);
+        CutScratch::Slot& slot = slotOf(i);
         uint64_t total = 0;
         auto& stack = scratch_.stack;
         stack.assign(1, 0u);
@@ -168,11 +182,15 @@ class Selector {
             const uint32_t index = stack.back();
             stack.pop_back();
             const Node& node = h.nodes[index];
-            const int32_t parentEpsilon = index == 0 ? kInside : scratch_.epsilon[i][node.parent];
-            const int32_t epsilon = epsilonOf(i, local, index, parentEpsilon);
+            const int32_t parentEpsilon = index == 0 ? kInside : slot.epsilon[node.parent];
+            const int32_t epsilon = epsilonOf(i, slot, index, parentEpsilon);
             if (epsilon == kCulled) continue;
-            const uint32_t parentCode = index == 0 ? ErrorScale::kLargest : codeAt(parentEpsilon, step);
-            const uint32_t code = codeAt(epsilon, step);
+            if (givesWay(i, slot, node, epsilon, step)) {
+                activate(crowds_[instances_[i].crowd], index);
+                continue;
+            }
+            const uint32_t parentCode = index == 0 ? ErrorScale::kLargest : codeOf(slot, parentEpsilon, step);
+            const uint32_t code = codeOf(slot, epsilon, step);
             total += h.countGreater(node.parentCounts, node.records, parentCode) -
                      h.countGreater(node.ownCounts, node.records, code);
             if (total > most) return total;
@@ -183,20 +201,21 @@ class Selector {
         return total;
     }
 
-    /// Are the points that may stand in for mesh `i` good enough at `step`, half of the error being theirs and half
-    /// left for their own levels of detail, and fewer than its triangles?
+    /// Are the points that may stand in for instance i good enough at `step`, and fewer than what it would draw?
     bool usesStandIn(size_t i, int step) {
-        const Instance& mesh = instances_[i];
-        if (mesh.standIn == Instance::kNone) return false;
-        const Hierarchy& points = hierarchyOf(mesh.standIn);
-        const LocalView local = makeLocalView(points, instances_[mesh.standIn], view_);
-        const int32_t epsilon = epsilonOf(mesh.standIn, local, 0, kInside);
-        if (epsilon == kCulled || epsilon == kInside) return false;
-        const double allowed = points.errors.smallest * points.unit * instances_[mesh.standIn].scale *
-                               std::exp2(static_cast<double>(epsilon + step) / kStepsPerOctave);
-        if (!(2 * mesh.standInError <= allowed)) return false;
-        const uint64_t triangles = meshCost(i, makeLocalView(hierarchyOf(i), mesh, view_), step);
-        return pointCost(mesh.standIn, step - kStepsPerOctave, triangles) < triangles;
+        const uint32_t standIn = instances_[i].standIn;
+        if (standIn == Instance::kNone) return false;
+        CutScratch::Slot& slot = slotOf(standIn);
+        const int32_t epsilon = epsilonOf(standIn, slot, 0, kInside);
+        const double inputError = slot.inputError;
+        if (epsilon == kCulled || epsilon == kInside || allowedAt(epsilon, step) < inputError) return false;
+        constexpr uint64_t kAll = std::numeric_limits<uint64_t>::max();
+        if (hierarchyOf(i).isMesh()) {
+            const uint64_t triangles = meshCost(i, step);
+            return pointCost(standIn, step, triangles) < triangles;
+        }
+        const uint64_t points = pointCost(standIn, step, kAll);
+        return points <= pointCost(i, step, points);
     }
 
     /// The smallest step >= target whose full cut fits the budget (cost falls with the step).
@@ -215,6 +234,13 @@ class Selector {
         return hi;
     }
 
+    /// Is a child in view, and its records needed (or else the parent's in their place)?
+    bool isCovering(size_t i, CutScratch::Slot& slot, uint32_t child, int32_t parentEpsilon, int step) {
+        const int32_t epsilon = epsilonOf(i, slot, child, parentEpsilon);
+        if (epsilon == kCulled) return false;
+        return !(givesWay(i, slot, hierarchyOf(i).nodes[child], epsilon, step) && isReady_[instances_[i].crowd]);
+    }
+
     /// Can the points that stand in be drawn? Asks for them if not: meanwhile the mesh is drawn.
     bool hasRoot(uint32_t i) {
         const uint32_t source = instances_[i].source;
@@ -224,23 +250,23 @@ class Selector {
     }
 
     /// Screen-space error, px, of error code `code` at a node with allowed error `epsilon`.
-    static double pixelsOf(uint32_t code, int32_t epsilon) {
-        if (code == 0) return 0;
-        if (epsilon == kInside) return 1e6;
-        return std::exp2(code / 8.0 - static_cast<double>(epsilon) / kStepsPerOctave);
+    static double pixelsOf(const CutScratch::Slot& slot, uint32_t code, int32_t epsilon) {
+        const double error = (code == 0 ? 0 : std::exp2(code / 8.0)) + slot.inputError;
+        if (error == 0) return 0;
+        return epsilon == kInside ? 1e6 : error * std::exp2(-static_cast<double>(epsilon) / kStepsPerOctave);
     }
 
     void emit(size_t i, int step) {
         const Hierarchy& h = hierarchyOf(i);
         if (h.nodes.empty()) return;
-        const LocalView local = makeLocalView(h, instances_[i], view_);
         const uint32_t source = instances_[i].source;
         const std::vector<uint8_t>& drawable = residency_.drawable[source];
         const auto instance = static_cast<uint32_t>(i);
         if (h.isMesh()) {
-            emitMesh(instance, local, step);
+            emitMesh(instance, step);
             return;
         }
+        CutScratch::Slot& slot = slotOf(i);
         const size_t firstDraw = cut_.draw.size();
         auto& stack = scratch_.stack;
         stack.assign(1, 0u);
@@ -249,19 +275,24 @@ class Selector {
             stack.pop_back();
             const Node& node = h.nodes[index];
             ++cut_.counters.nodesVisited;
-            const int32_t parentEpsilon = index == 0 ? kInside : scratch_.epsilon[i][node.parent];
-            const int32_t epsilon = epsilonOf(i, local, index, parentEpsilon);
+            const int32_t parentEpsilon = index == 0 ? kInside : slot.epsilon[node.parent];
+            const int32_t epsilon = epsilonOf(i, slot, index, parentEpsilon);
             if (epsilon == kCulled) {
                 ++cut_.counters.nodesCulled;
                 continue;
             }
+            const bool isTooCoarse = givesWay(i, slot, node, epsilon, step);
+            if (isTooCoarse && isReady_[instances_[i].crowd]) {
+                activate(crowds_[instances_[i].crowd], index);
+                continue;
+            }
             const bool isDrawable = drawable[index] != 0;
-            const uint32_t code = codeAt(epsilon, step);
+            const uint32_t code = codeOf(slot, epsilon, step);
             if (isDrawable) {
                 cut_.keep.emplace_back(source, index);
             } else {
                 ++cut_.counters.nodesMissing;
-                const double pixels = index == 0 ? 1e9 : pixelsOf(h.nodes[node.parent].errorCode, parentEpsilon);
+                const double pixels = index == 0 ? 1e9 : pixelsOf(slot, h.nodes[node.parent].errorCode, parentEpsilon);
                 cut_.wanted.push_back({source, index, static_cast<float>(pixels * std::exp2(8.0 - node.level))});
             }
             uint32_t octantMask = 0;
@@ -271,21 +302,21 @@ class Selector {
                     if (!(node.childMask >> octant & 1u)) continue;
                     stack.push_back(child);
                     // A child out of view is not drawn and not missing either.
-                    if (!drawable[child] && epsilonOf(i, local, child, epsilon) != kCulled) octantMask |= 1u << octant;
+                    if (!drawable[child] && isCovering(i, slot, child, epsilon, step)) octantMask |= 1u << octant;
                     ++child;
                 }
             }
             // Only what hangs together with the root is drawn: a node whose parent is missing is covered above.
             if (!isDrawable || !isReachable(drawable, h, index)) continue;
-            const uint32_t parentCode = index == 0 ? ErrorScale::kLargest : codeAt(parentEpsilon, step);
+            const uint32_t parentCode = index == 0 ? ErrorScale::kLargest : codeOf(slot, parentEpsilon, step);
             const uint32_t count = h.countGreater(node.parentCounts, node.records, parentCode);
             if (count == 0) continue;
             const uint32_t tooCoarse = octantMask ? 0 : h.countGreater(node.ownCounts, node.records, code);
             cut_.counters.recordsDrawn += count - tooCoarse;
             cut_.counters.recordsTested += count;
             const double delivered =
-                pixelsOf(octantMask ? node.errorCode : std::min<uint32_t>(node.errorCode, code), epsilon);
-            if (octantMask) cut_.tauEffective = std::max(cut_.tauEffective, delivered);
+                pixelsOf(slot, octantMask ? node.errorCode : std::min<uint32_t>(node.errorCode, code), epsilon);
+            if (octantMask || isTooCoarse) cut_.tauEffective = std::max(cut_.tauEffective, delivered);
             if (count > tooCoarse)
                 cut_.draw.push_back({instance, index, count, code, octantMask, static_cast<float>(delivered)});
         }
@@ -300,8 +331,9 @@ class Selector {
     /// Decides for every group whether its clusters stand in for its simplification; calls onRefined(index, epsilon)
     /// for those in view that should, which says whether they can.
     template <typename OnRefined>
-    void refineGroups(size_t i, const LocalView& local, int step, const OnRefined& onRefined) {
+    void refineGroups(size_t i, int step, const OnRefined& onRefined) {
         const Hierarchy& h = hierarchyOf(i);
+        CutScratch::Slot& slot = slotOf(i);
         std::vector<uint8_t>& state = scratch_.groupState;
         state.assign(h.nodes.size(), kCoarse);
         for (uint32_t index = 0; index < h.nodes.size(); ++index) {
@@ -311,7 +343,7 @@ class Selector {
                 isReached = isReached && state[h.parents[group.firstParent + k]];
             if (!isReached) continue;
             ++cut_.counters.nodesVisited;
-            const int32_t epsilon = epsilonOf(i, local, index, kInside);
+            const int32_t epsilon = epsilonOf(i, slot, index, kInside);
             if (epsilon == kCulled) {
                 ++cut_.counters.nodesCulled;
                 state[index] = kUnseen;
@@ -344,19 +376,20 @@ class Selector {
         return false;
     }
 
-    uint64_t meshCost(size_t i, const LocalView& local, int step) {
-        refineGroups(i, local, step, [](uint32_t, int32_t) { return true; });
+    uint64_t meshCost(size_t i, int step) {
+        refineGroups(i, step, [](uint32_t, int32_t) { return true; });
         uint64_t total = 0;
         drawnRuns(hierarchyOf(i), [&](uint32_t, const MeshRun& run) { total += run.triangles; });
         return total;
     }
 
-    void emitMesh(uint32_t instance, const LocalView& local, int step) {
+    void emitMesh(uint32_t instance, int step) {
         const Hierarchy& h = hierarchyOf(instance);
+        CutScratch::Slot& slot = slotOf(instance);
         const uint32_t source = instances_[instance].source;
         const std::vector<uint8_t>& drawable = residency_.drawable[source];
         const uint64_t missingBefore = cut_.counters.nodesMissing;
-        refineGroups(instance, local, step, [&](uint32_t index, int32_t epsilon) {
+        refineGroups(instance, step, [&](uint32_t index, int32_t epsilon) {
             if (drawable[index]) {
                 cut_.keep.emplace_back(source, index);
                 return true;
@@ -364,19 +397,19 @@ class Selector {
             ++cut_.counters.nodesMissing;
             const Node& node = h.nodes[index];
             const bool isRoot = h.groups[index].parents == 0;
-            const double pixels = isRoot ? 1e9 : pixelsOf(node.errorCode, epsilon);
+            const double pixels = isRoot ? 1e9 : pixelsOf(slot, node.errorCode, epsilon);
             cut_.wanted.push_back({source, index, static_cast<float>(pixels * std::exp2(8.0 - node.level))});
             if (!isRoot) cut_.tauEffective = std::max(cut_.tauEffective, pixels);
             return false;
         });
-        if (!h.textures.empty()) wantTiles(instance, local, cut_.counters.nodesMissing == missingBefore);
+        if (!h.textures.empty()) wantTiles(instance, slot.view, cut_.counters.nodesMissing == missingBefore);
         uint32_t last = MeshRun::kOriginal;
         drawnRuns(h, [&](uint32_t index, const MeshRun& run) {
             const bool isExact = run.producer == MeshRun::kOriginal;
             // A producer that no view asked about was not looked at: its own error is smaller still.
-            const double pixels =
-                isExact ? 0
-                        : pixelsOf(h.nodes[run.producer].errorCode, epsilonOf(instance, local, run.producer, kInside));
+            const double pixels = isExact ? 0
+                                          : pixelsOf(slot, h.nodes[run.producer].errorCode,
+                                                     epsilonOf(instance, slot, run.producer, kInside));
             cut_.meshDraw.push_back(
                 {instance, index, run.firstCluster, run.clusters, run.triangles, static_cast<float>(pixels)});
             cut_.counters.trianglesDrawn += run.triangles;
@@ -469,6 +502,8 @@ class Selector {
 
     std::span<const Hierarchy* const> hierarchies_;
     std::span<const Instance> instances_;
+    std::span<const Crowd> crowds_;
+    std::vector<bool> isReady_;  ///< of each crowd: can its members be drawn?
     const Residency& residency_;
     const View& view_;
     const Budgets& budgets_;
@@ -478,10 +513,11 @@ class Selector {
 
 }  // namespace
 
-void selectCut(std::span<const Hierarchy* const> hierarchies, std::span<const Instance> instances,
-               const Residency& residency, const View& view, const Budgets& budgets, CutScratch& scratch, Cut& cut) {
-    for (const Instance& i : instances) STIPPLE_CHECK(i.source < residency.drawable.size(), "residency of a source");
-    Selector(hierarchies, instances, residency, view, budgets, scratch, cut).run();
+void selectCut(const CutScene& scene, const Residency& residency, const View& view, const Budgets& budgets,
+               CutScratch& scratch, Cut& cut) {
+    for (const Instance& i : scene.instances)
+        STIPPLE_CHECK(i.source < residency.drawable.size(), "residency of a source");
+    Selector(scene, residency, view, budgets, scratch, cut).run();
 }
 
 }  // namespace stipple::lod

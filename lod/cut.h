@@ -10,7 +10,9 @@
 // views equal to the last record.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <deque>
 #include <glm/glm.hpp>
 #include <span>
 #include <vector>
@@ -35,12 +37,31 @@ struct Instance {
     glm::dmat3 rotation{1};
     glm::dvec3 translation{0};
     double scale = 1;
-    /// Of a mesh: another instance, of points, that is drawn instead where that is cheaper at equal error (the classic
-    /// hybrid); and how far those points in full detail are from the mesh, world units. Of such points: isStandIn.
+    /// How far what the store holds in full detail may be from what it stands for, world units: a part of every error.
+    double inputError = 0;
+    /// Another instance, of points, that is drawn instead where that is good enough and cheaper (the classic hybrid).
     static constexpr uint32_t kNone = ~0u;
     uint32_t standIn = kNone;
-    double standInError = 0;
-    bool isStandIn = false;
+    bool isDriven = false;   ///< drawn only in another's stead, or as a member of a crowd
+    uint32_t crowd = kNone;  ///< whose points these are
+};
+
+/// Instances that share coarse nodes: from afar one store of points (instance `points`, with an inputError) shows all
+/// of them, and a leaf of it that is not good enough gives way to the instances that reach into its cell. Where some
+/// leaves do and others do not, an instance at the border is drawn beside its points, which are no farther from it than
+/// the error allows.
+struct Crowd {
+    uint32_t points = 0;
+    std::vector<uint32_t> first;    ///< of each node of the points, and the end: where its members begin
+    std::vector<uint32_t> members;  ///< instances
+    std::vector<uint32_t> sources;  ///< of all members and their stand-ins, each once
+};
+
+/// All that is placed in a scene.
+struct CutScene {
+    std::span<const Hierarchy* const> hierarchies;  ///< by Instance::hierarchy
+    std::span<const Instance> instances;
+    std::span<const Crowd> crowds;  ///< by Instance::crowd
 };
 
 /// One byte per node of each source's hierarchy: 1 where the chunk can be drawn.
@@ -75,7 +96,7 @@ struct CutWanted {
 
 struct CutCounters {
     uint64_t nodesVisited = 0, nodesDrawn = 0, nodesCulled = 0, nodesMissing = 0, recordsDrawn = 0, recordsTested = 0,
-             trianglesDrawn = 0, standIns = 0, evaluations = 0;
+             trianglesDrawn = 0, standIns = 0, crowdMembers = 0, evaluations = 0;
 };
 
 struct Cut {
@@ -89,18 +110,36 @@ struct Cut {
     CutCounters counters;
 };
 
+/// A view in the lattice space of one instance.
+struct LocalView {
+    glm::dvec3 eye{0}, forward{0};
+    std::array<glm::dvec3, 4> planes{};  ///< inward normals of the frustum's sides, through the eye
+    double nearPlane = 0, focal = 0, cosineCorner = 0;
+};
+
 /// Reused between frames, so that a cut allocates nothing once warm.
 struct CutScratch {
-    std::vector<std::vector<int32_t>> epsilon;  ///< per instance and node: allowed error of tau = 1, 1/32 octave codes
-    std::vector<std::vector<uint32_t>> stamp;
+    /// What a frame remembers of an instance that it looks at.
+    struct Slot {
+        LocalView view;
+        double inputError = 0;         ///< in steps of the smallest error code
+        std::vector<int32_t> epsilon;  ///< by node: allowed error of tau = 1, 1/32 octave codes
+        std::vector<uint32_t> stamp;   ///< frame in which epsilon was set
+    };
+    std::deque<Slot> slots;
+    uint32_t slotsUsed = 0;
+    std::vector<std::pair<uint32_t, uint32_t>> slotOf;  ///< by instance: frame and slot
+    std::vector<uint32_t> drivers;                      ///< instances that are not driven by others
+    std::vector<uint32_t> activeStamp, active;          ///< members of crowds that are drawn themselves
+    uint32_t evaluation = 0;
     std::vector<uint32_t> stack;
     std::vector<uint8_t> groupState, tileSeen;
     uint32_t frame = 0;
 };
 
-/// Fills `cut`. `hierarchies` are indexed by Instance::hierarchy. `recordsDrawn` is exact where nothing is missing and
+/// Fills `cut`. `recordsDrawn` is exact where nothing is missing and
 /// an upper bound otherwise; it never exceeds the budget unless `truncated`, and then the draws are cut to fit.
-void selectCut(std::span<const Hierarchy* const> hierarchies, std::span<const Instance> instances,
-               const Residency& residency, const View& view, const Budgets& budgets, CutScratch& scratch, Cut& cut);
+void selectCut(const CutScene& scene, const Residency& residency, const View& view, const Budgets& budgets,
+               CutScratch& scratch, Cut& cut);
 
 }  // namespace stipple::lod

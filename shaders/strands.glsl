@@ -27,10 +27,8 @@ CameraSegment cameraSegment(DrawNode node, StrandSegment s) {
           node.axisZ * float(s.b.positionZ & 0xffffu);
     c.radiusA = strandRadius(s.a, node.edge);
     c.radiusB = strandRadius(s.b, node.edge);
-    const vec3 da = octDecode(s.a.direction);
-    const vec3 db = octDecode(s.b.direction);
-    c.directionA = vec3(dot(frame.viewX, da), dot(frame.viewY, da), dot(frame.viewZ, da));
-    c.directionB = vec3(dot(frame.viewX, db), dot(frame.viewY, db), dot(frame.viewZ, db));
+    c.directionA = nodeDirection(node, octDecode(s.a.direction));
+    c.directionB = nodeDirection(node, octDecode(s.b.direction));
     c.isRound = float(s.a.positionZ >> 31);
     return c;
 }

@@ -161,7 +161,7 @@ Result<void> runFrames(const Options& o, const Shot& shot, const render::FrameSe
         if (state.streamer->counters().refused > 0)
             return fail(ErrorKind::budget, "the first chunk does not fit", "--resident " + o.resident,
                         "give more memory");
-        lod::selectCut(state.hierarchies, state.instances, state.streamer->residency(), first, settings.budgets,
+        lod::selectCut(state.scene(), state.streamer->residency(), first, settings.budgets,
                        state.scratch, state.cut);
         state.streamer->request(state.cut);
         std::this_thread::yield();

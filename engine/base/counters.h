@@ -7,8 +7,10 @@ namespace stipple {
 
 struct FrameCounters {
     uint64_t nodesVisited = 0, nodesDrawn = 0, nodesCulled = 0, nodesMissing = 0;
-    uint64_t recordsDrawn = 0, recordsTested = 0, trianglesDrawn = 0, standIns = 0, cutEvaluations = 0, passes = 0,
-             blocks = 0;
+    uint64_t recordsDrawn = 0, recordsTested = 0, trianglesDrawn = 0;
+    uint64_t standIns = 0;      ///< instances of which points were drawn
+    uint64_t crowdMembers = 0;  ///< instances of crowds that were looked at one by one
+    uint64_t cutEvaluations = 0, passes = 0, blocks = 0;
     uint64_t bytesStreamed = 0, residentBytes = 0, requests = 0, uploads = 0, evictions = 0, failures = 0, refused = 0;
     uint64_t requestsInFlight = 0;
     bool budgetTruncated = false;

@@ -3,9 +3,9 @@
 #include <cmath>
 
 #include "engine/cpu/kernels.h"
+#include "shaders/shared/environment.h"
 #include "shaders/shared/pack.h"
 #include "shaders/shared/pyramid.h"
-#include "shaders/shared/environment.h"
 #include "shaders/shared/shade.h"
 #include "shaders/shared/strand.h"
 
@@ -52,8 +52,6 @@ void projectBlock(const FrameConstants& frame, const DrawNode& drawNode, const P
     const DrawNode node = drawNode;
     const float width = float(f.width), height = float(f.height);
     const float focal = f.focal, nearPlane = f.nearPlane, x0 = f.centre.x, y0 = f.centre.y;
-    const float xx = f.viewX.x, xy = f.viewX.y, xz = f.viewX.z, yx = f.viewY.x, yy = f.viewY.y, yz = f.viewY.z,
-                zx = f.viewZ.x, zy = f.viewZ.y, zz = f.viewZ.z;
     const float bx = node.base.x, by = node.base.y, bz = node.base.z, ax = node.axisX.x, ay = node.axisX.y,
                 az = node.axisX.z, bbx = node.axisY.x, bby = node.axisY.y, bbz = node.axisY.z, ccx = node.axisZ.x,
                 ccy = node.axisZ.y, ccz = node.axisZ.z;
@@ -72,9 +70,9 @@ void projectBlock(const FrameConstants& frame, const DrawNode& drawNode, const P
         const float drawnHere = float(int(octantMask >> recordOctant(r) & 1u));  // a bool would keep GCC from SIMD
         const bool fine = (recordErrorCode(r) <= errorCode) | (drawnHere > 0.5f);
         const vec3 n = octDirection(r.normal);
-        const float nx = xx * n.x + xy * n.y + xz * n.z;
-        const float ny = yx * n.x + yy * n.y + yz * n.z;
-        const float nz = zx * n.x + zy * n.y + zz * n.z;
+        const float nx = ax * n.x + bbx * n.y + ccx * n.z;  // any length will do
+        const float ny = ay * n.x + bby * n.y + ccy * n.z;
+        const float nz = az * n.x + bbz * n.y + ccz * n.z;
         const bool seen =
             ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) != 0u) | (nx * cx + ny * cy + nz * cz < 0.0f);
         const bool keep = inside & fine & seen;
@@ -91,11 +89,50 @@ void projectBlock(const FrameConstants& frame, const DrawNode& drawNode, const P
 struct Gathered {
     alignas(64) float x[kTile], y[kTile], z[kTile], radius[kTile];
     alignas(64) uint32_t normal[kTile], colour[kTile], flags[kTile];
+    // Of turned instances: normals in camera space.
+    alignas(64) float turned[kTile], nx[kTile], ny[kTile], nz[kTile];
 };
 
 #include "engine/cpu/resolve_triangles.inl"
 
 #include "engine/cpu/strands.inl"
+
+/// Texels of the points that were gathered. `anyTurned`: of instances that are not turned the frame's own rotation is
+/// all that normals need.
+template <bool anyTurned>
+[[gnu::always_inline]] inline void resolveSplats(const FrameConstants& f, const Gathered& g, uint32_t x0, uint32_t y,
+                                                 uint32_t n, TexelRow& __restrict row) {
+    const float xx = f.viewX.x, xy = f.viewX.y, xz = f.viewX.z, yx = f.viewY.x, yy = f.viewY.y, yz = f.viewY.z,
+                zx = f.viewZ.x, zy = f.viewZ.y, zz = f.viewZ.z;
+    const float focal = f.focal, support = f.supportScale, minimum = f.minimumRadius;
+    const float centreX = f.centre.x - float(int(x0)) - 0.5f, centreY = f.centre.y - float(int(y)) - 0.5f;
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const bool valid = g.z[i] > 0.0f;
+        const vec3 c = vec3(valid ? g.x[i] : 0.0f, valid ? g.y[i] : 0.0f, valid ? g.z[i] : 1.0f);
+        const vec3 d = octDecode(g.normal[i]);
+        const bool hasNormal = (g.flags[i] & kFlagNoNormal) == 0u;
+        vec3 nc = vec3(xx * d.x + xy * d.y + xz * d.z, yx * d.x + yy * d.y + yz * d.z, zx * d.x + zy * d.y + zz * d.z);
+        if (anyTurned) {
+            const bool isTurned = g.turned[i] > 0.5f;
+            nc.x = isTurned ? g.nx[i] : nc.x;
+            nc.y = isTurned ? g.ny[i] : nc.y;
+            nc.z = isTurned ? g.nz[i] : nc.z;
+        }
+        const float inverse = 1.0f / std::sqrt(c.x * c.x + c.y * c.y + c.z * c.z);
+        nc.x = hasNormal ? nc.x : -c.x * inverse;
+        nc.y = hasNormal ? nc.y : -c.y * inverse;
+        nc.z = hasNormal ? nc.z : -c.z * inverse;
+        Texel t = texelFromSplat(c, nc, g.radius[i] * support, focal, minimum);
+        const float scale = focal / c.z;
+        // Nearly the pixel's own coordinate is taken off before adding, so that the offset keeps its low bits.
+        t.offset = vec2(c.x * scale + centreX - float(int(i)), c.y * scale + centreY);
+        t.depth = valid ? t.depth : 0.0f;
+        t.radius = valid ? t.radius : 0.0f;
+        t.colour = vec3(unpackRed(g.colour[i]), unpackGreen(g.colour[i]), unpackBlue(g.colour[i]));
+        setTexel<false>(row, kPad + i, t);
+    }
+}
 
 bool resolveRow(const FrameConstants& frame, const Tables& tables, const ResolveInput& in, uint64_t* visibility,
                 uint32_t x0, uint32_t y, uint32_t n, TexelRow& __restrict row, float& largestRadius,
@@ -107,7 +144,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
     Gathered g;
     WinningPixels triangles, strands;
     triangles.count = strands.count = 0;
-    bool any = false;
+    bool any = false, anyTurned = false;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         if (i + kPrefetch < n && (visibility[i + kPrefetch] & kKindMask) == 0) {
@@ -130,6 +167,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
             g.normal[i] = 0;
             g.colour[i] = 0;
             g.flags[i] = kFlagNoNormal;
+            g.turned[i] = 0;
             continue;
         }
         any = true;
@@ -145,6 +183,15 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         g.radius[i] = node.edge * tables.radiusFraction[recordRadiusCode(r)];
         g.normal[i] = r.normal;
         g.flags[i] = recordFlags(r);
+        g.turned[i] = 0;
+        if ((node.octantMask & kNodeTurned) != 0) {
+            anyTurned = true;
+            const vec3 d = nodeDirection(node, octDecode(r.normal));
+            g.turned[i] = 1;
+            g.nx[i] = d.x;
+            g.ny[i] = d.y;
+            g.nz[i] = d.z;
+        }
         uint32_t c = r.colour;
         if (f.debugView == kDebugLevel || f.debugView == kDebugError) {
             const vec3 d =
@@ -167,31 +214,11 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         if (strands.count > 0) resolveStrands(f, in, strands, x0, y, row, largestRadius);
         return triangles.count + strands.count > 0;
     }
+    if (anyTurned)
+        resolveSplats<true>(f, g, x0, y, n, row);
+    else
+        resolveSplats<false>(f, g, x0, y, n, row);
     uint largest = 0;  // as bits: positive floats sort like integers
-    const float xx = f.viewX.x, xy = f.viewX.y, xz = f.viewX.z, yx = f.viewY.x, yy = f.viewY.y, yz = f.viewY.z,
-                zx = f.viewZ.x, zy = f.viewZ.y, zz = f.viewZ.z;
-    const float focal = f.focal, support = f.supportScale, minimum = f.minimumRadius;
-    const float centreX = f.centre.x - float(int(x0)) - 0.5f, centreY = f.centre.y - float(int(y)) - 0.5f;
-#pragma GCC ivdep
-    for (size_t i = 0; i < n; ++i) {
-        const bool valid = g.z[i] > 0.0f;
-        const vec3 c = vec3(valid ? g.x[i] : 0.0f, valid ? g.y[i] : 0.0f, valid ? g.z[i] : 1.0f);
-        const vec3 d = octDecode(g.normal[i]);
-        const bool hasNormal = (g.flags[i] & kFlagNoNormal) == 0u;
-        vec3 nc = vec3(xx * d.x + xy * d.y + xz * d.z, yx * d.x + yy * d.y + yz * d.z, zx * d.x + zy * d.y + zz * d.z);
-        const float inverse = 1.0f / std::sqrt(c.x * c.x + c.y * c.y + c.z * c.z);
-        nc.x = hasNormal ? nc.x : -c.x * inverse;
-        nc.y = hasNormal ? nc.y : -c.y * inverse;
-        nc.z = hasNormal ? nc.z : -c.z * inverse;
-        Texel t = texelFromSplat(c, nc, g.radius[i] * support, focal, minimum);
-        const float scale = focal / c.z;
-        // Nearly the pixel's own coordinate is taken off before adding, so that the offset keeps its low bits.
-        t.offset = vec2(c.x * scale + centreX - float(int(i)), c.y * scale + centreY);
-        t.depth = valid ? t.depth : 0.0f;
-        t.radius = valid ? t.radius : 0.0f;
-        t.colour = vec3(unpackRed(g.colour[i]), unpackGreen(g.colour[i]), unpackBlue(g.colour[i]));
-        setTexel<false>(row, kPad + i, t);
-    }
     for (size_t i = 0; i < n; ++i) {
         const uint bits = floatBitsToUint(row.radius[kPad + i]);
         largest = bits > largest ? bits : largest;
@@ -259,10 +286,10 @@ template <bool hasTubes>
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const size_t a = kPad + 2 * i, b = a + 1;
-        setTexel<hasTubes>(out, kPad + i,
-                           pullTexels(texelAt<hasTubes>(upper, a), texelAt<hasTubes>(upper, b),
-                                      texelAt<hasTubes>(lower, a), texelAt<hasTubes>(lower, b), childSize,
-                                      inverseFocal));
+        setTexel<hasTubes>(
+            out, kPad + i,
+            pullTexels(texelAt<hasTubes>(upper, a), texelAt<hasTubes>(upper, b), texelAt<hasTubes>(lower, a),
+                       texelAt<hasTubes>(lower, b), childSize, inverseFocal));
     }
 }
 void pullRow(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float inverseFocal,
@@ -344,12 +371,12 @@ void finishRow(float inverseFocal, uint32_t n, TexelRow& __restrict row) {
 #include "engine/cpu/shade_surfaces.inl"
 
 void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow& __restrict own,
-              const TexelRow& __restrict row, const SurfacePlanes& planes, const LightInput& light, uint32_t x0, uint32_t y, uint32_t n,
-              const ShadeOutput& out) {
+              const TexelRow& __restrict row, const SurfacePlanes& planes, const LightInput& light, uint32_t x0,
+              uint32_t y, uint32_t n, const ShadeOutput& out) {
     const FrameConstants f = frame;
     const uint32_t* const surface = planes.surface;
     const bool lit = (surface != nullptr || (f.shade & kShadeLit) != 0) && f.debugView == kDebugNone;
-    alignas(64) float share[kTile];  // of the light: 0 where a pixel keeps its colour
+    alignas(64) float share[kTile];    // of the light: 0 where a pixel keeps its colour
     alignas(64) uint32_t mask[kTile];  // pixels of triangles to be lit
     alignas(64) uint32_t word[kTile], shines[kTile];
     // Points under lights of the scene's own are surfaces like any other.
@@ -450,8 +477,19 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
 }  // namespace
 
 extern const Kernels STIPPLE_KERNELS;
-const Kernels STIPPLE_KERNELS{
-    STIPPLE_KERNELS_NAME, projectBlock, resolveRow, packRow, unpackRow, pullRow, pushRow, expandRow, finishRow, shadeRow,
-    rasterCluster,        rasterLarge, drawSegments, fillWide};
+const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
+                              projectBlock,
+                              resolveRow,
+                              packRow,
+                              unpackRow,
+                              pullRow,
+                              pushRow,
+                              expandRow,
+                              finishRow,
+                              shadeRow,
+                              rasterCluster,
+                              rasterLarge,
+                              drawSegments,
+                              fillWide};
 
 }  // namespace stipple::cpu

@@ -73,8 +73,8 @@ struct MaskInput {
 
 bool isKept(const FrameConstants& f, const MaskInput& m, int x, int y) {
     const float inverseFocal = 1.0f / f.focal;
-    const vec3 ray = vec3((float(x) + 0.5f - f.centre.x) * inverseFocal, (float(y) + 0.5f - f.centre.y) * inverseFocal,
-                          1.0f);
+    const vec3 ray =
+        vec3((float(x) + 0.5f - f.centre.x) * inverseFocal, (float(y) + 0.5f - f.centre.y) * inverseFocal, 1.0f);
     const vec3 &a = m.corners[0], &b = m.corners[1], &c = m.corners[2];
     const MeshVertex &va = *m.vertices[0], &vb = *m.vertices[1], &vc = *m.vertices[2];
     const vec2 w = triangleWeights(ray, a, b, c);
@@ -213,8 +213,8 @@ void clipTriangle(const FrameConstants& f, const vec3* corner, const Candidate& 
     }
 }
 
-void rasterCluster(const FrameConstants& frame, const SurfaceMaterial* materials,
-                   const MeshBlock& block, uint32_t firstId, const LargeSink& large, uint64_t* visibility) {
+void rasterCluster(const FrameConstants& frame, const SurfaceMaterial* materials, const MeshBlock& block,
+                   uint32_t firstId, const LargeSink& large, uint64_t* visibility) {
     const MeshVertex* const vertices = block.vertices;
     const uint32_t* const triangles = block.triangles;
     const uint32_t vertexCount = block.counts & 0xffffu, triangleCount = block.counts >> 16;
@@ -245,7 +245,8 @@ void rasterCluster(const FrameConstants& frame, const SurfaceMaterial* materials
         MaskInput mask;
         Candidate of{kKindTriangle | (firstId + k), (surface & kSurfaceTwoSided) != 0, nullptr};
         if ((surface & kSurfaceMasked) != 0) {
-            mask = {block.textures, &materials[m.firstMaterial + (surface & kSurfaceMaterialMask)],
+            mask = {block.textures,
+                    &materials[m.firstMaterial + (surface & kSurfaceMaterialMask)],
                     {&vertices[a], &vertices[b], &vertices[c]},
                     {{x[a], y[a], z[a]}, {x[b], y[b], z[b]}, {x[c], y[c], z[c]}}};
             of.mask = &mask;

@@ -1,7 +1,7 @@
 // The pixels of a tile's row that show triangles: corners, weights, normal and colour. Included by kernels.inl.
 //
-// Everything but following pointers is a loop over the row's pixels that becomes SIMD; materials and textures are looked
-// at once for every run of pixels that share them.
+// Everything but following pointers is a loop over the row's pixels that becomes SIMD; materials and textures are
+// looked at once for every run of pixels that share them.
 
 /// The pixels of a row that show one kind of primitive.
 struct WinningPixels {
@@ -148,8 +148,8 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
     for (size_t i = 0; i < n; ++i) {
         const vec3 ray = vec3((float(int(p.pixel[i])) - centreX) * inverseFocal, rayY, 1.0f);
         const vec3 a = vec3(c.x[0][i], c.y[0][i], c.z[0][i]);
-        const vec2 w = triangleWeights(ray, a, vec3(c.x[1][i], c.y[1][i], c.z[1][i]),
-                                       vec3(c.x[2][i], c.y[2][i], c.z[2][i]));
+        const vec2 w =
+            triangleWeights(ray, a, vec3(c.x[1][i], c.y[1][i], c.z[1][i]), vec3(c.x[2][i], c.y[2][i], c.z[2][i]));
         const vec3 n0 = octDecode(c.normal[0][i]), n1 = octDecode(c.normal[1][i]), n2 = octDecode(c.normal[2][i]);
         const float first = 1.0f - w.x - w.y;
         wb[i] = w.x;
@@ -172,9 +172,9 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
             const vec3 corner = vec3(c.x[0][i], c.y[0][i], c.z[0][i]);
             const vec3 e1 = vec3(c.x[1][i] - corner.x, c.y[1][i] - corner.y, c.z[1][i] - corner.z);
             const vec3 e2 = vec3(c.x[2][i] - corner.x, c.y[2][i] - corner.y, c.z[2][i] - corner.z);
-            uv.footprint[i] = uvFootprint(ray, inverseFocal, corner, e1, e2,
-                                          vec2(c.u[1][i] - c.u[0][i], c.v[1][i] - c.v[0][i]),
-                                          vec2(c.u[2][i] - c.u[0][i], c.v[2][i] - c.v[0][i]));
+            uv.footprint[i] =
+                uvFootprint(ray, inverseFocal, corner, e1, e2, vec2(c.u[1][i] - c.u[0][i], c.v[1][i] - c.v[0][i]),
+                            vec2(c.u[2][i] - c.u[0][i], c.v[2][i] - c.v[0][i]));
         }
     }
     for (size_t first = 0; first < n;) {
@@ -191,7 +191,8 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const vec3 ray = vec3((float(int(p.pixel[i])) - centreX) * inverseFocal, rayY, 1.0f);
-        const vec3 normal = surfaceNormal(vec3(s.nx[i], s.ny[i], s.nz[i]), vec3(s.faceX[i], s.faceY[i], s.faceZ[i]), ray);
+        const vec3 normal =
+            surfaceNormal(vec3(s.nx[i], s.ny[i], s.nz[i]), vec3(s.faceX[i], s.faceY[i], s.faceZ[i]), ray);
         const float inverseRay = 1.0f / std::sqrt(ray.x * ray.x + ray.y * ray.y + 1.0f);
         const vec2 perp = perpFromNormal(normal, vec3(ray.x * inverseRay, ray.y * inverseRay, inverseRay));
         perpX[i] = perp.x;
@@ -214,7 +215,8 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
     if (f.debugView == kDebugLevel || f.debugView == kDebugError)
         for (size_t i = 0; i < n; ++i) {
             const MeshBlock& block = in.meshBlocks[p.id[i] / 256u];
-            const vec3 d = f.debugView == kDebugLevel ? debugLevelColour(block.level) : debugErrorColour(block.errorPixels);
+            const vec3 d =
+                f.debugView == kDebugLevel ? debugLevelColour(block.level) : debugErrorColour(block.errorPixels);
             s.red[i] = d.x;
             s.green[i] = d.y;
             s.blue[i] = d.z;

@@ -134,7 +134,8 @@ void sampleRow(const TextureSet& set, const TextureSlot& slot, const UvRow& uv, 
 inline bool sampleAlpha(const TextureSet& set, const TextureSlot& slot, float u, float v, float footprint,
                         float& alpha) {
     const TextureInfo& info = set.infos[slot.texture - 1];
-    const float su = slot.rowU.x * u + slot.rowU.y * v + slot.rowU.z, sv = slot.rowV.x * u + slot.rowV.y * v + slot.rowV.z;
+    const float su = slot.rowU.x * u + slot.rowU.y * v + slot.rowU.z,
+                sv = slot.rowV.x * u + slot.rowV.y * v + slot.rowV.z;
     const uint32_t size = info.width > info.height ? info.width : info.height;
     const float lod = min(textureLod(footprint * static_cast<float>(size)), static_cast<float>(info.levels - 1));
     const auto at = [&](uint32_t level, float& value) {

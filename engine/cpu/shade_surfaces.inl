@@ -26,8 +26,8 @@ void shadeSurfaces(const FrameConstants& f, const TexelRow& __restrict row, cons
     if (input.environment != nullptr) {
         for (size_t i = 0; i < n; ++i) {
             if (mask[i] == 0) continue;
-            const vec3 c = reflectEnvironment(input.environment, surfaceAt(i), f.environmentX, f.environmentY,
-                                              f.environmentZ);
+            const vec3 c =
+                reflectEnvironment(input.environment, surfaceAt(i), f.environmentX, f.environmentY, f.environmentZ);
             r[i] = ambient * c.x;
             g[i] = ambient * c.y;
             b[i] = ambient * c.z;

@@ -1,8 +1,7 @@
 // Ribbons and tubes of the cpu backend: segments as lines into the visibility buffer, and texels back out of it.
 // Included by kernels.inl.
 
-[[gnu::always_inline]] inline CameraSegment cameraSegment(const FrameConstants& f, const DrawNode& node,
-                                                          const StrandSegment& s) {
+[[gnu::always_inline]] inline CameraSegment cameraSegment(const DrawNode& node, const StrandSegment& s) {
     const auto place = [&](const StrandVertex& v) {
         const float x = float(int(v.positionXY & 0xffffu)), y = float(int(v.positionXY >> 16)),
                     z = float(int(v.positionZ & 0xffffu));
@@ -10,19 +9,13 @@
                     node.base.y + node.axisX.y * x + node.axisY.y * y + node.axisZ.y * z,
                     node.base.z + node.axisX.z * x + node.axisY.z * y + node.axisZ.z * z);
     };
-    const auto direct = [&](const StrandVertex& v) {
-        const vec3 d = octDecode(v.direction);
-        return vec3(f.viewX.x * d.x + f.viewX.y * d.y + f.viewX.z * d.z,
-                    f.viewY.x * d.x + f.viewY.y * d.y + f.viewY.z * d.z,
-                    f.viewZ.x * d.x + f.viewZ.y * d.y + f.viewZ.z * d.z);
-    };
     CameraSegment c;
     c.a = place(s.a);
     c.b = place(s.b);
     c.radiusA = strandRadius(s.a, node.edge);
     c.radiusB = strandRadius(s.b, node.edge);
-    c.directionA = direct(s.a);
-    c.directionB = direct(s.b);
+    c.directionA = nodeDirection(node, octDecode(s.a.direction));
+    c.directionB = nodeDirection(node, octDecode(s.b.direction));
     c.isRound = float(int(s.a.positionZ >> 31));
     return c;
 }
@@ -45,7 +38,7 @@
 struct Lines {
     alignas(64) float xa[kSegmentsPerBlock], ya[kSegmentsPerBlock], xb[kSegmentsPerBlock], yb[kSegmentsPerBlock];
     alignas(64) float inverseA[kSegmentsPerBlock], inverseB[kSegmentsPerBlock];
-    alignas(64) float halfA[kSegmentsPerBlock], halfB[kSegmentsPerBlock];  ///< seen half-widths, px
+    alignas(64) float halfA[kSegmentsPerBlock], halfB[kSegmentsPerBlock];      ///< seen half-widths, px
     alignas(64) float nearerA[kSegmentsPerBlock], nearerB[kSegmentsPerBlock];  ///< depth of the surface / of the axis
     // From a ribbon's axis to its edge, see ribbonEdge.
     alignas(64) float edgeAx[kSegmentsPerBlock], edgeAy[kSegmentsPerBlock], slopeA[kSegmentsPerBlock];
@@ -165,7 +158,7 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
 #pragma GCC ivdep
     for (size_t i = 0; i < count; ++i) {
         const StrandSegment s = segmentAt(words, i);
-        const CameraSegment c = cameraSegment(f, node, s);
+        const CameraSegment c = cameraSegment(node, s);
         const ScreenSegment p = projectSegment(c.a, c.b, f.focal, f.centre.x, f.centre.y, f.nearPlane);
         const vec3 t = segmentTangent(c);
         const auto at = [&](float place) {
@@ -178,7 +171,8 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
         const auto nearer = [&](const vec3& end, float radius) {
             const float distance = std::sqrt(max(dot(end, end), 1.0e-30f));
             const float tv = dot(t, end) / distance;
-            const float front = min(min(radius / std::sqrt(max(1.0f - tv * tv, 1.0e-6f)), 4.0f * radius), 0.9f * distance);
+            const float front =
+                min(min(radius / std::sqrt(max(1.0f - tv * tv, 1.0e-6f)), 4.0f * radius), 0.9f * distance);
             return c.isRound > 0.5f ? 1.0f - front / distance : 1.0f;
         };
         lines.xa[i] = p.xa;
@@ -218,8 +212,21 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
             continue;
         const uint32_t id = kKindStrand | (firstId + uint32_t(i));
         if (lines.radius[i] >= f.exactStrands) {
-            const WideStrand s{xa, ya, xb, yb, lines.inverseA[i], lines.inverseB[i], lines.halfA[i], lines.halfB[i],
-                               lines.nearerA[i], lines.nearerB[i], a, b, widest, isTubeHere, id};
+            const WideStrand s{xa,
+                               ya,
+                               xb,
+                               yb,
+                               lines.inverseA[i],
+                               lines.inverseB[i],
+                               lines.halfA[i],
+                               lines.halfB[i],
+                               lines.nearerA[i],
+                               lines.nearerB[i],
+                               a,
+                               b,
+                               widest,
+                               isTubeHere,
+                               id};
             // One that covers much of the image is work for all threads.
             const float rows = std::fabs(yb - ya) + 2 * widest, columns = std::fabs(xb - xa) + 2 * widest;
             if (min(rows, height) * min(columns, width) > float(kLargePixels))
@@ -273,7 +280,7 @@ void resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
     for (size_t i = 0; i < n; ++i) {
         const StrandBlock& block = in.strandBlocks[p.id[i] / kSegmentsPerBlock];
         const StrandSegment& s = block.segments[p.id[i] % kSegmentsPerBlock];
-        const CameraSegment c = cameraSegment(f, *block.node, s);
+        const CameraSegment c = cameraSegment(*block.node, s);
         e.ax[i] = c.a.x;
         e.ay[i] = c.a.y;
         e.az[i] = c.a.z;

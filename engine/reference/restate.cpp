@@ -186,7 +186,7 @@ class ReferenceBackend final : public render::Backend {
                 if (!(c.z > v.nearPlane)) continue;
                 const dvec2 p(v.focalPixels * c.x / c.z + 0.5 * v.width, v.focalPixels * c.y / c.z + 0.5 * v.height);
                 if (!(p.x >= 0 && p.y >= 0 && p.x < v.width && p.y < v.height)) continue;
-                const dvec3 nw = disc.normal;  // the records of a turned instance are turned already
+                const dvec3 nw = instance.rotation * disc.normal;
                 dvec3 n(glm::dot(nw, v.right), glm::dot(nw, v.down), glm::dot(nw, v.forward));
                 const bool oneSided = (disc.flags & (shared::kFlagTwoSided | shared::kFlagNoNormal)) == 0;
                 if (oneSided && glm::dot(n, c) >= 0) continue;

@@ -318,14 +318,9 @@ void projectStrands(const render::DrawList& draws, const Chunks& chunks, Level& 
         const bool isDebug = f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError;
         const dvec3 colour = isDebug ? debugColour(f, node, cut) : dvec3(0);
         for (uint32_t i = 0; i < cut.count; ++i) {
-            Segment s = decodeSegment(h, node, chunk.segments[i]);
+            const Segment s = decodeSegment(h, node, chunk.segments[i]);
             if (s.errorCode > cut.errorCode && (s.octants & cut.octantMask) == 0) continue;
-            // Directions of a turned instance are turned in its records already.
-            lod::Instance place = instance;
-            const glm::dmat3 back = glm::transpose(instance.rotation);
-            s.directionA = back * s.directionA;
-            s.directionB = back * s.directionB;
-            projector.segment(s, place, 0x40000000u | (block * 256 + i), isDebug ? &colour : nullptr);
+            projector.segment(s, instance, 0x40000000u | (block * 256 + i), isDebug ? &colour : nullptr);
         }
         block += (cut.count + 255) / 256;
     }

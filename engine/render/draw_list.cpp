@@ -101,7 +101,7 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
         d.base = glm::vec3(base);
         d.edge = static_cast<float>(instance.scale * h.unit * h.cellSize(node));
         d.errorCode = draw.errorCode;
-        d.octantMask = draw.octantMask;
+        d.octantMask = draw.octantMask | (instance.rotation != glm::dmat3(1) ? shared::kNodeTurned : 0u);
         d.count = draw.count;
         d.level = node.level;
         d.errorPixels = draw.errorPixels;

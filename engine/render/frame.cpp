@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <set>
 #include <thread>
+#include <unordered_map>
 
 #include "engine/base/process.h"
 #include "lod/attributes.h"
@@ -52,31 +54,12 @@ std::vector<Pass> passesOf(Mode mode, const FrameContent& content) {
 
 namespace {
 
-/// Normals are stored along the store's own axes, and shaders know one rotation for all: a turned instance gets turned
-/// records.
-void turnNormals(const glm::dmat3& rotation, lod::Chunk& chunk) {
-    const auto turned = [&](uint32_t code) {
-        const shared::vec3 n = shared::octDecode(code);
-        return lod::octEncode(glm::vec3(rotation * glm::dvec3(n.x, n.y, n.z)));
-    };
-    for (shared::StrandSegment& s : chunk.segments) {
-        s.a.direction = turned(s.a.direction);
-        s.b.direction = turned(s.b.direction);
-    }
-    for (shared::PointRecord& r : chunk.records) {
-        if ((shared::recordFlags(r) & shared::kFlagNoNormal) != 0) continue;
-        r.normal = turned(r.normal);
-    }
-}
-
-/// The last steps of a chunk's decoding: other colours than its own, other directions.
+/// The last steps of a chunk's decoding: other colours than its own.
 streaming::ChunkFinish finishOf(const PlacedStore& placed) {
     const lod::ColourBy by = placed.colour;
-    const glm::dmat3 rotation = placed.place.rotation;
-    const bool isTurned = rotation != glm::dmat3(1);
-    if (by.mode == lod::ColourMode::own && !isTurned) return {};
-    const auto apply = [by, rotation, isTurned, store = placed.store](
-                           uint32_t node, lod::Chunk& chunk, const uint8_t* bytes, size_t count) -> Result<void> {
+    if (by.mode == lod::ColourMode::own) return {};
+    const auto apply = [by, store = placed.store](uint32_t node, lod::Chunk& chunk, const uint8_t* bytes,
+                                                  size_t count) -> Result<void> {
         std::vector<uint8_t> values;
         if (by.needsAttributes()) {
             const auto& attributes = store->description.attributes;
@@ -84,61 +67,100 @@ streaming::ChunkFinish finishOf(const PlacedStore& placed) {
             STIPPLE_ASSIGN(values, lod::decodeAttribute(bytes, count, attributes, by.attribute, records,
                                                         fmt::format("{}: node {}", store->path, node)));
         }
-        if (by.mode != lod::ColourMode::own) lod::recolour(by, *store, node, chunk, values);
-        if (isTurned) turnNormals(rotation, chunk);
+        lod::recolour(by, *store, node, chunk, values);
         return {};
     };
     return {by.needsAttributes(), apply};
 }
 
-/// Do both get the same records?
-bool looksLike(const PlacedStore& a, const PlacedStore& b) {
-    return a.place.rotation == b.place.rotation && a.colour.mode == b.colour.mode &&
-           (a.colour.mode == lod::ColourMode::own || &a == &b);
-}
+/// Adds placed stores to a state: each store once, and one source of chunks for all that look alike.
+class Placer {
+  public:
+    explicit Placer(FrameState& state) : state_(state) {}
+
+    /// Number of the new instance.
+    uint32_t add(const PlacedStore& p) {
+        lod::Instance instance = p.place;
+        instance.hierarchy = hierarchyOf(p.store);
+        instance.source = sourceOf(p);
+        instance.isDriven = p.isMember;
+        state_.instances.push_back(instance);
+        return static_cast<uint32_t>(state_.instances.size() - 1);
+    }
+
+    /// Number of the instance itself.
+    uint32_t addWithStandIn(const PlacedStore& p) {
+        const uint32_t own = add(p);
+        if (!p.standIn) return own;
+        const uint32_t points = add({p.standIn, p.place, {}});
+        state_.instances[own].standIn = points;
+        state_.instances[points].inputError = p.standInError * p.place.scale;
+        state_.instances[points].isDriven = true;
+        return own;
+    }
+
+    /// `numbers`: instances of the placed stores.
+    void addCrowd(const PlacedCrowd& from, const std::vector<uint32_t>& numbers) {
+        lod::Crowd crowd;
+        crowd.points = add({from.points, {}, {}});
+        lod::Instance& points = state_.instances[crowd.points];
+        points.inputError = from.error;
+        points.crowd = static_cast<uint32_t>(state_.crowds.size());
+        crowd.first = from.first;
+        crowd.members.reserve(from.members.size());
+        std::set<uint32_t> sources;
+        for (const uint32_t m : from.members) {
+            crowd.members.push_back(numbers[m]);
+            const lod::Instance& member = state_.instances[numbers[m]];
+            sources.insert(member.source);
+            if (member.standIn != lod::Instance::kNone) sources.insert(state_.instances[member.standIn].source);
+        }
+        crowd.sources.assign(sources.begin(), sources.end());
+        state_.crowds.push_back(std::move(crowd));
+    }
+
+  private:
+    uint32_t hierarchyOf(const std::shared_ptr<const lod::Store>& store) {
+        const auto [known, isNew] = numbers_.try_emplace(store.get(), static_cast<uint32_t>(state_.stores.size()));
+        if (!isNew) return known->second;
+        state_.stores.push_back(store);
+        state_.hierarchies.push_back(&store->hierarchy);
+        state_.draws.firstMaterial.push_back(static_cast<uint32_t>(state_.materials.size()));
+        state_.materials.insert(state_.materials.end(), store->description.materials.begin(),
+                                store->description.materials.end());
+        return known->second;
+    }
+    /// Two stores that are the same get the same records, unless coloured by something else than themselves.
+    uint32_t sourceOf(const PlacedStore& p) {
+        const bool isPlain = p.store->hierarchy.isMesh() || p.colour.mode == lod::ColourMode::own;
+        if (isPlain)
+            if (const auto known = plainSources_.find(p.store.get()); known != plainSources_.end())
+                return known->second;
+        const uint32_t number = sources_++;
+        if (isPlain) plainSources_[p.store.get()] = number;
+        state_.streamer->addSource(p.store->hierarchy, streaming::makeFileSource(p.store->file), p.store->path,
+                                   isPlain ? streaming::ChunkFinish{} : finishOf(p));
+        return number;
+    }
+
+    FrameState& state_;
+    std::unordered_map<const lod::Store*, uint32_t> numbers_, plainSources_;
+    uint32_t sources_ = 0;
+};
 
 }  // namespace
 
 std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& placed, Backend& backend, Executor& executor,
-                                           const streaming::StreamSettings& settings) {
+                                           const streaming::StreamSettings& settings,
+                                           const std::vector<PlacedCrowd>& crowds) {
     auto state = std::make_unique<FrameState>();
     state->backend = &backend;
     state->streamer = std::make_unique<streaming::Streamer>(executor, backend, settings);
-    std::vector<const PlacedStore*> sources;
-    const auto add = [&](const PlacedStore& p) {
-        lod::Instance instance = p.place;
-        const auto known = std::find(state->stores.begin(), state->stores.end(), p.store);
-        instance.hierarchy = static_cast<uint32_t>(known - state->stores.begin());
-        if (known == state->stores.end()) {
-            state->stores.push_back(p.store);
-            state->hierarchies.push_back(&p.store->hierarchy);
-            state->draws.firstMaterial.push_back(static_cast<uint32_t>(state->materials.size()));
-            state->materials.insert(state->materials.end(), p.store->description.materials.begin(),
-                                    p.store->description.materials.end());
-        }
-        const auto like = std::find_if(sources.begin(), sources.end(), [&](const PlacedStore* q) {
-            return q->store == p.store && (p.store->hierarchy.isMesh() || looksLike(*q, p));
-        });
-        instance.source = static_cast<uint32_t>(like - sources.begin());
-        if (like == sources.end()) {
-            sources.push_back(&p);
-            state->streamer->addSource(p.store->hierarchy, streaming::makeFileSource(p.store->file), p.store->path,
-                                       p.store->hierarchy.isMesh() ? streaming::ChunkFinish{} : finishOf(p));
-        }
-        state->instances.push_back(instance);
-    };
-    std::vector<PlacedStore> standIns;
-    standIns.reserve(placed.size());  // addresses are kept
-    for (const PlacedStore& p : placed) {
-        add(p);
-        if (!p.standIn) continue;
-        lod::Instance& mesh = state->instances.back();
-        mesh.standIn = static_cast<uint32_t>(state->instances.size());
-        mesh.standInError = p.standInError * p.place.scale;
-        standIns.push_back({p.standIn, p.place, {}});
-        add(standIns.back());
-        state->instances.back().isStandIn = true;
-    }
+    Placer placer(*state);
+    std::vector<uint32_t> numbers;
+    numbers.reserve(placed.size());
+    for (const PlacedStore& p : placed) numbers.push_back(placer.addWithStandIn(p));
+    for (const PlacedCrowd& crowd : crowds) placer.addCrowd(crowd, numbers);
     state->draws.materials = state->materials;
     return state;
 }
@@ -158,8 +180,7 @@ Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSe
     streamer.collect();
     streamer.upload();
     const double cutStart = nowSeconds();
-    lod::selectCut(state.hierarchies, state.instances, streamer.residency(), view, settings.budgets, state.scratch,
-                   state.cut);
+    lod::selectCut(state.scene(), streamer.residency(), view, settings.budgets, state.scratch, state.cut);
     const double cutEnd = nowSeconds();
     streamer.request(state.cut);
     makeDrawList(state.cut, state.hierarchies, state.instances, view, settings.draw, state.draws);
@@ -181,6 +202,7 @@ Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSe
     c.recordsTested = cut.recordsTested;
     c.trianglesDrawn = cut.trianglesDrawn;
     c.standIns = cut.standIns;
+    c.crowdMembers = cut.crowdMembers;
     c.cutEvaluations = cut.evaluations;
     c.budgetTruncated = state.cut.truncated;
     c.tauTargetPixels = state.cut.tauTarget;
@@ -206,8 +228,7 @@ Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const
     for (;;) {
         streamer.collect();
         streamer.upload();
-        lod::selectCut(state.hierarchies, state.instances, streamer.residency(), view, settings.budgets, state.scratch,
-                       state.cut);
+        lod::selectCut(state.scene(), streamer.residency(), view, settings.budgets, state.scratch, state.cut);
         const uint64_t before = streamer.counters().requests;
         streamer.request(state.cut);
         if (streamer.isIdle() && streamer.counters().requests == before) break;

@@ -25,6 +25,7 @@ struct FrameState {
     std::vector<std::shared_ptr<const lod::Store>> stores;
     std::vector<const lod::Hierarchy*> hierarchies;
     std::vector<lod::Instance> instances;
+    std::vector<lod::Crowd> crowds;
     std::vector<shared::SurfaceMaterial> materials;  ///< of all stores, one after another
     std::unique_ptr<streaming::Streamer> streamer;
     Backend* backend = nullptr;
@@ -33,6 +34,8 @@ struct FrameState {
     DrawList draws;
     Image image;
     FrameCounters counters;
+
+    lod::CutScene scene() const { return {hierarchies, instances, crowds}; }
 };
 
 /// A store somewhere in the scene, coloured in some way.
@@ -40,13 +43,21 @@ struct PlacedStore {
     std::shared_ptr<const lod::Store> store;
     lod::Instance place;  ///< its `hierarchy` is set by makeFrameState
     lod::ColourBy colour;
-    /// Of a mesh: points that may be drawn in its stead, and how far they are from it at most (store units).
+    /// Points that may be drawn in its stead, and how far they are from it at most (store units).
     std::shared_ptr<const lod::Store> standIn = nullptr;
     double standInError = 0;
+    bool isMember = false;  ///< of a crowd
+};
+/// Many placed stores that are seen as one from afar, see lod::Crowd.
+struct PlacedCrowd {
+    std::shared_ptr<const lod::Store> points;  ///< world coordinates
+    double error = 0;                          ///< how far they are from the members at most, world units
+    std::vector<uint32_t> first, members;      ///< of the nodes of `points`; members count the placed stores
 };
 /// The same store may be placed many times.
 std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& placed, Backend& backend, Executor& executor,
-                                           const streaming::StreamSettings& settings);
+                                           const streaming::StreamSettings& settings,
+                                           const std::vector<PlacedCrowd>& crowds = {});
 /// One instance of each store, at its own place, coloured by `colour`.
 std::unique_ptr<FrameState> makeFrameState(std::vector<std::shared_ptr<const lod::Store>> stores, Backend& backend,
                                            Executor& executor, const streaming::StreamSettings& settings,

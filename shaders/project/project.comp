@@ -20,8 +20,7 @@ void main() {
     const vec2 p = vec2(c.x * scale + frame.centre.x, c.y * scale + frame.centre.y);
     if (!(p.x >= 0.0 && p.y >= 0.0 && p.x < float(frame.width) && p.y < float(frame.height))) return;
     if ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) == 0u) {
-        const vec3 n = octDirection(r.normal);
-        if (!(dot(vec3(dot(frame.viewX, n), dot(frame.viewY, n), dot(frame.viewZ, n)), c) < 0.0)) return;
+        if (!(dot(nodeDirection(node, octDirection(r.normal)), c) < 0.0)) return;
     }
     const uint64_t key = uint64_t(floatBitsToUint(c.z)) << 32 | uint64_t(block * kRecordsPerBlock + gl_LocalInvocationID.x);
     atomicMin(visibility[uint(p.y) * frame.width + uint(p.x)], key);

@@ -24,10 +24,7 @@ void main() {
         const PointRecord r = Records(uvec2(node.addressLow, node.addressHigh)).records[source.first + id % kRecordsPerBlock];
         const vec3 c = node.base + node.axisX * float(recordX(r)) + node.axisY * float(recordY(r)) + node.axisZ * float(recordZ(r));
         vec3 n = -normalize(c);
-        if ((recordFlags(r) & kFlagNoNormal) == 0u) {
-            const vec3 d = octDecode(r.normal);
-            n = vec3(dot(frame.viewX, d), dot(frame.viewY, d), dot(frame.viewZ, d));
-        }
+        if ((recordFlags(r) & kFlagNoNormal) == 0u) n = nodeDirection(node, octDecode(r.normal));
         t = texelFromSplat(c, n, node.edge * radiusFraction(recordRadiusCode(r)) * frame.supportScale, frame.focal, frame.minimumRadius);
         const float scale = frame.focal / c.z;
         t.offset = vec2(c.x * scale + (frame.centre.x - 0.5) - float(pixel.x), c.y * scale + (frame.centre.y - 0.5) - float(pixel.y));

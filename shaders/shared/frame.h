@@ -16,13 +16,24 @@ struct DrawNode {
     vec3 base;
     float edge;       // edge of the node's cell, world units: scale of the radius codes
     uint errorCode;   // records with an own error code <= this are fine enough
-    uint octantMask;  // octants whose child is not drawn: their records are drawn whatever their error
+    uint octantMask;  // octants whose child is not drawn: their records are drawn whatever their error; kNodeTurned
     uint count;       // records of the prefix
     uint addressLow;  // device address of the first record (gpu backend)
     uint addressHigh;
     uint level;         // depth in the octree, for the debug view
     float errorPixels;  // screen-space error delivered by this node, for the debug view
 };
+
+const uint kNodeTurned = 256u;  // the store's own axes are not those of the world
+
+// A direction of the store (a normal, a tangent) in camera space; as long as it was. Instances are scaled evenly.
+SHARED_FN vec3 nodeDirection(DrawNode node, vec3 n) {
+    const vec3 x = node.axisX;
+    const float inverse = 1.0f / sqrt(x.x * x.x + x.y * x.y + x.z * x.z);
+    return vec3((x.x * n.x + node.axisY.x * n.y + node.axisZ.x * n.z) * inverse,
+                (x.y * n.x + node.axisY.y * n.y + node.axisZ.y * n.z) * inverse,
+                (x.z * n.x + node.axisY.z * n.y + node.axisZ.z * n.z) * inverse);
+}
 
 // One block of 256 draw ids.
 struct DrawBlock {

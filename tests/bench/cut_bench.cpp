@@ -66,9 +66,9 @@ void selectCutBudget(benchmark::State& state) {
     view.width = 1920;
     view.height = 1080;
     const Budgets budgets{0.5, static_cast<uint64_t>(state.range(0))};
-    selectCut(hierarchies, instances, {drawable}, view, budgets, scratch, cut);
+    selectCut({hierarchies, instances, {}}, {drawable}, view, budgets, scratch, cut);
     allocations = 0;
-    for (auto _ : state) selectCut(hierarchies, instances, {drawable}, view, budgets, scratch, cut);
+    for (auto _ : state) selectCut({hierarchies, instances, {}}, {drawable}, view, budgets, scratch, cut);
     state.counters["allocations"] = static_cast<double>(allocations);
     state.counters["nodes"] = static_cast<double>(h.nodes.size());
     state.counters["drawn"] = static_cast<double>(cut.counters.nodesDrawn);

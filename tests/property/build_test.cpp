@@ -143,7 +143,7 @@ TEST(Build, DuplicatesEndAndDrawAsOne) {
     Cut cut;
     View view;
     view.eye = store->description.boundsMin + glm::dvec3(0, 0, 10);
-    selectCut(hierarchies, instances, {drawable}, view, {1, std::numeric_limits<uint64_t>::max()}, scratch, cut);
+    selectCut({hierarchies, instances, {}}, {drawable}, view, {1, std::numeric_limits<uint64_t>::max()}, scratch, cut);
     EXPECT_EQ(cut.counters.recordsDrawn, 1u);
 }
 

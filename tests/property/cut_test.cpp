@@ -169,7 +169,7 @@ Selection select(const Hierarchy& h, std::vector<uint8_t> drawable, const View& 
     const std::vector<const Hierarchy*> hierarchies{&h};
     const std::vector<Instance> instances(1);
     CutScratch scratch;
-    selectCut(hierarchies, instances, {s.drawable}, view, budgets, scratch, s.cut);
+    selectCut({hierarchies, instances, {}}, {s.drawable}, view, budgets, scratch, s.cut);
     return s;
 }
 
@@ -257,8 +257,8 @@ TEST(Cut, EqualInputsGiveEqualCutsWhateverTheScratchHasSeen) {
         const Budgets budgets{std::exp2(rng.uniform(-4, 4)), 500};
         CutScratch fresh;
         Cut a, b;
-        selectCut(hierarchies, instances, {drawable}, view, budgets, used, a);
-        selectCut(hierarchies, instances, {drawable}, view, budgets, fresh, b);
+        selectCut({hierarchies, instances, {}}, {drawable}, view, budgets, used, a);
+        selectCut({hierarchies, instances, {}}, {drawable}, view, budgets, fresh, b);
         ASSERT_EQ(a.draw.size(), b.draw.size());
         for (size_t i = 0; i < a.draw.size(); ++i) {
             ASSERT_EQ(a.draw[i].node, b.draw[i].node);

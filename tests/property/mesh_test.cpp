@@ -44,7 +44,7 @@ lod::Cut cutOf(const lod::Store& store, const lod::View& view, double tau, const
     lod::Cut cut;
     lod::Budgets budgets;
     budgets.errorPixels = tau;
-    selectCut({&h, 1}, {&instance, 1}, {residency}, view, budgets, scratch, cut);
+    selectCut({{&h, 1}, {&instance, 1}, {}}, {residency}, view, budgets, scratch, cut);
     return cut;
 }
 
@@ -130,7 +130,7 @@ TEST(MeshCut, DrawsEveryTriangleOfTheInputOnceWhereNothingIsTolerated) {
     lod::Budgets budgets;
     budgets.errorPixels = 0.01;
     budgets.records = 5'000;
-    selectCut({&h, 1}, {&instance, 1}, {residency}, test::fitView(*store, 640, 480), budgets, scratch, budgeted);
+    selectCut({{&h, 1}, {&instance, 1}, {}}, {residency}, test::fitView(*store, 640, 480), budgets, scratch, budgeted);
     EXPECT_LE(budgeted.counters.trianglesDrawn, 5'000u);
     EXPECT_GT(budgeted.counters.trianglesDrawn, 2'000u);
     EXPECT_GT(budgeted.tauEffective, 0.01);

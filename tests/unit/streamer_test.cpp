@@ -50,7 +50,7 @@ class StreamerTest : public testing::Test {
     const lod::Cut& step(Streamer& streamer, const lod::View& view, double tau) {
         streamer.collect();
         streamer.upload();
-        lod::selectCut(hierarchies_, instances_, streamer.residency(), view,
+        lod::selectCut({hierarchies_, instances_, {}}, streamer.residency(), view,
                        {tau, std::numeric_limits<uint64_t>::max()}, scratch_, cut_);
         streamer.request(cut_);
         executor_->wait();
