@@ -23,12 +23,7 @@ class Selector {
           cut_(cut) {
         ++scratch_.frame;
         scratch_.slotsUsed = 0;
-        scratch_.slotOf.resize(instances_.size(), {0, 0});
-        scratch_.activeStamp.resize(instances_.size(), 0);
-        scratch_.drivers.clear();
-        for (size_t i = 0; i < instances_.size(); ++i)
-            if (!instances_[i].isDriven && !hierarchyOf(i).nodes.empty())
-                scratch_.drivers.push_back(static_cast<uint32_t>(i));
+        if (scratch_.slotOf.size() != instances_.size()) findDrivers();
         for (const Crowd& crowd : crowds_) isReady_.push_back(isReady(crowd));
     }
 
@@ -72,6 +67,18 @@ class Selector {
 
   private:
     const Hierarchy& hierarchyOf(size_t i) const { return *hierarchies_[instances_[i].hierarchy]; }
+
+    /// Once for a scene: there may be so many instances that only to look at them takes milliseconds.
+    void findDrivers() {
+        scratch_.slotOf.assign(instances_.size(), {0, 0});
+        scratch_.activeStamp.assign(instances_.size(), 0);
+        scratch_.drivers.clear();
+        for (size_t i = 0; i < instances_.size(); ++i) {
+            STIPPLE_CHECK(instances_[i].source < residency_.drawable.size(), "residency of a source");
+            if (!instances_[i].isDriven && !hierarchyOf(i).nodes.empty())
+                scratch_.drivers.push_back(static_cast<uint32_t>(i));
+        }
+    }
 
     /// What this frame remembers of instance i.
     CutScratch::Slot& slotOf(size_t i) {
@@ -147,16 +154,17 @@ class Selector {
     }
 
     void emitBest(uint32_t i, int step) {
-        if (usesStandIn(i, step) && hasRoot(instances_[i].standIn)) {
+        const uint32_t best = bestOf(i, step);
+        if (best != i && hasRoot(best)) {
             ++cut_.counters.standIns;
-            emit(instances_[i].standIn, step);
+            emit(best, step);
         } else {
             emit(i, step);
         }
     }
     uint64_t bestCost(uint32_t i, int step, uint64_t most) {
-        if (usesStandIn(i, step)) return pointCost(instances_[i].standIn, step, most);
-        return hierarchyOf(i).isMesh() ? meshCost(i, step) : pointCost(i, step, most);
+        const uint32_t best = bestOf(i, step);
+        return hierarchyOf(best).isMesh() ? meshCost(best, step) : pointCost(best, step, most);
     }
 
     /// Records and triangles of the full cut (everything resident) at `step`; stops counting above the budget.
@@ -201,21 +209,27 @@ class Selector {
         return total;
     }
 
-    /// Are the points that may stand in for instance i good enough at `step`, and fewer than what it would draw?
-    bool usesStandIn(size_t i, int step) {
-        const uint32_t standIn = instances_[i].standIn;
-        if (standIn == Instance::kNone) return false;
+    /// Are all records of a stand-in within the error that `step` allows?
+    bool isGoodEnough(uint32_t standIn, int step) {
         CutScratch::Slot& slot = slotOf(standIn);
         const int32_t epsilon = epsilonOf(standIn, slot, 0, kInside);
-        const double inputError = slot.inputError;
-        if (epsilon == kCulled || epsilon == kInside || allowedAt(epsilon, step) < inputError) return false;
-        constexpr uint64_t kAll = std::numeric_limits<uint64_t>::max();
+        return epsilon != kCulled && epsilon != kInside && allowedAt(epsilon, step) >= slot.inputError;
+    }
+
+    /// What to draw for instance i: the coarsest of its stand-ins that is good enough, if it has fewer records than i
+    /// itself; else i.
+    uint32_t bestOf(uint32_t i, int step) {
+        uint32_t best = i;
+        for (uint32_t next = instances_[i].standIn; next != Instance::kNone && isGoodEnough(next, step);
+             next = instances_[next].standIn)
+            best = next;
+        if (best == i) return i;
         if (hierarchyOf(i).isMesh()) {
             const uint64_t triangles = meshCost(i, step);
-            return pointCost(standIn, step, triangles) < triangles;
+            return pointCost(best, step, triangles) < triangles ? best : i;
         }
-        const uint64_t points = pointCost(standIn, step, kAll);
-        return points <= pointCost(i, step, points);
+        const uint64_t points = pointCost(best, step, std::numeric_limits<uint64_t>::max());
+        return points <= pointCost(i, step, points) ? best : i;
     }
 
     /// The smallest step >= target whose full cut fits the budget (cost falls with the step).
@@ -515,8 +529,6 @@ class Selector {
 
 void selectCut(const CutScene& scene, const Residency& residency, const View& view, const Budgets& budgets,
                CutScratch& scratch, Cut& cut) {
-    for (const Instance& i : scene.instances)
-        STIPPLE_CHECK(i.source < residency.drawable.size(), "residency of a source");
     Selector(scene, residency, view, budgets, scratch, cut).run();
 }
 

@@ -117,7 +117,7 @@ struct LocalView {
     double nearPlane = 0, focal = 0, cosineCorner = 0;
 };
 
-/// Reused between frames, so that a cut allocates nothing once warm.
+/// Reused between frames of one scene, so that a cut allocates nothing once warm.
 struct CutScratch {
     /// What a frame remembers of an instance that it looks at.
     struct Slot {

@@ -90,6 +90,7 @@ struct SourceInfo {
     glm::dvec3 declaredMin{0}, declaredMax{0};
     bool hasDeclaredBounds = false;
     bool isReflectance = false;  ///< colours are of the material, to be lit; otherwise as a scanner's camera saw them
+    bool isTwoSided = false;     ///< surfaces are seen from both sides
     UpAxis up = UpAxis::y;
     Crs crs;
     std::vector<AttributeInfo> attributes;  ///< that can be asked for

@@ -223,25 +223,35 @@ scene::Primitive asTriangles(const std::vector<Strip>& strips, bool isLeaf) {
 
 }  // namespace
 
-scene::Scene growPlant(const PlantOptions& o) {
-    Grower grower(o);
-    grower.run();
-    scene::Scene s;
+std::vector<scene::Material> plantMaterials() {
+    std::vector<scene::Material> out;
     for (const char* name : {"bark", "leaf"}) {
         scene::Material m;
         m.name = name;
         m.metallic = 0;
         m.roughness = 0.9f;
         m.isDoubleSided = m.name == "leaf";
-        s.materials.push_back(m);
+        out.push_back(m);
     }
+    return out;
+}
+
+scene::Mesh growPlantMesh(const PlantOptions& o) {
+    Grower grower(o);
+    grower.run();
     scene::Mesh mesh;
     mesh.name = o.species;
     mesh.primitives = {o.asTriangles ? asTriangles(grower.wood, false) : asLines(grower.wood, false),
                        o.asTriangles ? asTriangles(grower.foliage, true) : asLines(grower.foliage, true)};
     mesh.primitives[0].material = 0;
     mesh.primitives[1].material = 1;
-    s.meshes.push_back(std::move(mesh));
+    return mesh;
+}
+
+scene::Scene growPlant(const PlantOptions& o) {
+    scene::Scene s;
+    s.materials = plantMaterials();
+    s.meshes.push_back(growPlantMesh(o));
     scene::Node node;
     node.name = o.species;
     node.mesh = 0;

@@ -16,7 +16,11 @@ struct PlantOptions {
     uint32_t rows = 1;         ///< rows x rows instances of the tree, in a square
 };
 
-/// One mesh of two primitives (wood, leaves) and a node that places it. Units are metres, y is up.
+/// Two primitives: wood (material 0 of plantMaterials) and leaves (1). Units are metres, y is up.
+scene::Mesh growPlantMesh(const PlantOptions& options);
+std::vector<scene::Material> plantMaterials();
+
+/// One such mesh and a node that places it.
 scene::Scene growPlant(const PlantOptions& options);
 
 }  // namespace stipple::grow

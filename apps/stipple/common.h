@@ -54,6 +54,7 @@ bool isSceneFile(const std::string& path);
 /// Scans by the readers of lod; meshes as `surfels` samples (0: only the points that they hold).
 Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptions& options, uint64_t surfels,
                                    bool repair);
+Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene);
 /// Scans, or the triangles of one scene, to a store.
 Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const std::string& output,
                                   const BuildOptions& build, Executor& executor, Progress& progress);
@@ -61,6 +62,7 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
 /// What a command draws: stores and where they stand.
 struct OpenedScene {
     std::vector<render::PlacedStore> placed;
+    std::vector<render::PlacedCrowd> crowds;
     lod::StoreDescription description;  ///< of all together: bounds, up, what colours can be asked for
     std::vector<render::WorldLight> lights;
     std::vector<scene::Camera> cameras;  ///< of the scene's visible nodes, in their order

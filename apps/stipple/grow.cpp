@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+
+#include "apps/grow/landscapes.h"
 #include "apps/grow/meshes.h"
 #include "apps/grow/plants.h"
 #include "apps/stipple/common.h"
@@ -48,6 +51,20 @@ uint64_t parseCount(const std::string& text) {
     return value * factor >= 1 && value * factor <= 1e9 ? static_cast<uint64_t>(value * factor) : 0;
 }
 
+/// The pictures that a grown mesh's textures refer to.
+Result<void> addTextures(const grow::MeshOptions& mesh, scene::Scene& scene) {
+    const grow::Textures textures = grow::growTextures(mesh);
+    for (const auto& [name, pixels] : {std::pair{"colour.png", &textures.colour}, {"normal.png", &textures.normal}}) {
+        if (pixels->size == 0) continue;
+        render::Image image;
+        image.width = image.height = pixels->size;
+        image.rgba = pixels->rgba;
+        STIPPLE_ASSIGN(const std::vector<char> bytes, image::encodeImage(name, image));
+        scene.images.push_back({name, {bytes.begin(), bytes.end()}});
+    }
+    return {};
+}
+
 Result<void> runMesh(MeshRun& o) {
     o.mesh.triangles = parseCount(o.triangles);
     if (o.mesh.triangles == 0)
@@ -59,15 +76,7 @@ Result<void> runMesh(MeshRun& o) {
         scene.textures.clear();
         for (scene::Material& m : scene.materials) m.baseColourTexture = m.normalTexture = {};
     }
-    const grow::Textures textures = grow::growTextures(o.mesh);
-    for (const auto& [name, pixels] : {std::pair{"colour.png", &textures.colour}, {"normal.png", &textures.normal}}) {
-        if (pixels->size == 0) continue;
-        render::Image image;
-        image.width = image.height = pixels->size;
-        image.rgba = pixels->rgba;
-        STIPPLE_ASSIGN(const std::vector<char> bytes, image::encodeImage(name, image));
-        scene.images.push_back({name, {bytes.begin(), bytes.end()}});
-    }
+    STIPPLE_TRY(addTextures(o.mesh, scene));
     uint64_t triangles = 0;
     for (const auto& p : scene.meshes[0].primitives) triangles += p.indices.size() / 3;
     STIPPLE_TRY(scene::writeGltf(scene, o.output));
@@ -148,6 +157,107 @@ void addPlant(CLI::App& parent, const char* name, const char* what, uint32_t row
     });
 }
 
+struct LandscapeRun {
+    std::string kind, output, trees = "10k", leaves = "200k", as = "strands";
+    grow::LandscapeOptions landscape;
+    uint64_t scanPoints = 2'000'000;
+    bool json = false;
+};
+
+/// The folder of a demo: a scan, built, and the scene that places it.
+Result<std::string> growDemoFolder(const LandscapeRun& o, scene::Scene& scene) {
+    namespace fs = std::filesystem;
+    std::error_code error;
+    fs::create_directories(o.output, error);
+    if (error)
+        return fail(ErrorKind::output, "cannot be created: " + error.message(), o.output, "name a folder to write");
+    const std::string scan = (fs::path(o.output) / "scan.las").string(),
+                      store = (fs::path(o.output) / "scan.stipple").string();
+    grow::ScanOptions options;
+    options.points = o.scanPoints;
+    STIPPLE_TRY(grow::writeScan(scan, grow::growScan(options), options));
+    const auto executor = makeTbbExecutor(0);
+    Progress progress(!o.json);
+    STIPPLE_TRY(lod::buildStore({scan}, store, {}, *executor, progress));
+    scene = grow::growDemo(o.landscape, "scan.stipple");
+    STIPPLE_TRY(addTextures({}, scene));
+    return (fs::path(o.output) / "demo.glb").string();
+}
+
+Result<void> runLandscape(LandscapeRun& o) {
+    o.landscape.trees = parseCount(o.trees);
+    o.landscape.leaves = parseCount(o.leaves);
+    o.landscape.asTriangles = o.as == "triangles";
+    for (const auto& [count, text, option] :
+         {std::tuple{o.landscape.trees, &o.trees, "--trees"}, std::tuple{o.landscape.leaves, &o.leaves, "--leaves"}})
+        if (count == 0 || count > 10'000'000)
+            return fail(ErrorKind::usage, fmt::format("'{}' is not a number up to 10M", *text), option, "e.g. 100k");
+    const double start = nowSeconds();
+    scene::Scene scene;
+    std::string output = o.output;
+    if (o.kind == "demo") {
+        STIPPLE_ASSIGN(output, growDemoFolder(o, scene));
+    } else {
+        scene = o.kind == "forest" ? grow::growForest(o.landscape) : grow::growMeadow(o.landscape);
+    }
+    uint64_t instances = 0, placed = 0;
+    for (const scene::Node& node : scene.nodes) {
+        instances += node.instances.size();
+        if (node.mesh < 0) continue;
+        for (const auto& p : scene.meshes[static_cast<size_t>(node.mesh)].primitives)
+            placed += p.indices.size() / (p.kind == scene::PrimitiveKind::lines ? 2 : 3) *
+                      std::max<size_t>(1, node.instances.size());
+    }
+    STIPPLE_TRY(scene::writeGltf(scene, output));
+    if (o.json)
+        fmt::print("{}\n", nlohmann::json{{"output", output},
+                                          {"instances", instances},
+                                          {"primitives_placed", placed},
+                                          {"seconds", nowSeconds() - start}}
+                               .dump(2));
+    else
+        fmt::print("{}: {} plants and stones, {:.4g} segments and triangles, {:.1f} s\n", output, instances,
+                   static_cast<double>(placed), nowSeconds() - start);
+    return {};
+}
+
+void addLandscape(CLI::App& parent, const char* kind, const char* what, int& status) {
+    auto o = std::make_shared<LandscapeRun>();
+    o->kind = kind;
+    const bool isForest = o->kind == "forest", isMeadow = o->kind == "meadow", isDemo = o->kind == "demo";
+    CLI::App* sub = parent.add_subcommand(kind, what);
+    sub->add_option("-o,--output", o->output, isDemo ? "the folder to write" : "the file to write (.glb, .gltf)")
+        ->required();
+    if (isForest) {
+        sub->add_option("--trees", o->trees, "how many, e.g. 100k")->capture_default_str();
+        sub->add_option("--spacing", o->landscape.spacing, "metres between trees, about")
+            ->check(CLI::Range(2.0, 100.0))
+            ->capture_default_str();
+        sub->add_option("--variants", o->landscape.variants, "trees that are grown of each of the three species")
+            ->check(CLI::Range(1, 16))
+            ->capture_default_str();
+        sub->add_option("--as", o->as, "strands: tubes and ribbons; triangles: the same shapes")
+            ->check(CLI::IsMember({"strands", "triangles"}))
+            ->capture_default_str();
+    }
+    if (isDemo) {
+        o->leaves = "60k";
+        sub->add_option("--points", o->scanPoints, "of the scan")
+            ->check(CLI::Range(uint64_t{1000}, uint64_t{100'000'000}))
+            ->capture_default_str();
+    }
+    if (!isMeadow) sub->add_option("--leaves", o->leaves, "of a tree, about, e.g. 200k")->capture_default_str();
+    if (isMeadow)
+        sub->add_option("--size", o->landscape.meadow, "edge, metres")
+            ->check(CLI::Range(2.0, 2000.0))
+            ->capture_default_str();
+    sub->add_option("--seed", o->landscape.seed, "another seed, another landscape")->capture_default_str();
+    sub->add_flag("--json", o->json, "as JSON");
+    sub->callback([o, &status] {
+        if (const auto result = runLandscape(*o); !result) status = report(result.error());
+    });
+}
+
 }  // namespace
 
 void setupGrow(CLI::App& app, int& status) {
@@ -173,6 +283,9 @@ void setupGrow(CLI::App& app, int& status) {
     addMesh(*sub, "terrain", "two kilometres of textured hills", status);
     addPlant(*sub, "tree", "a tree of tubes and ribbons", 1, status);
     addPlant(*sub, "orchard", "one tree in rows, each turned and scaled", 4, status);
+    addLandscape(*sub, "forest", "trees of three species on hills, each instanced many times", status);
+    addLandscape(*sub, "meadow", "grass and flowers", status);
+    addLandscape(*sub, "demo", "a scan, an orchard, a meadow and a boulder on one ground", status);
     scan->add_flag("--json", o->json, "as JSON");
     scan->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());

@@ -8,8 +8,9 @@
 #include <functional>
 #include <map>
 
+#include "apps/stipple/cache.h"
 #include "apps/stipple/common.h"
-#include "engine/base/hash.h"
+#include "apps/stipple/from_afar.h"
 #include "engine/image/image_io.h"
 #include "engine/scene/strands.h"
 #include "engine/scene/triangles.h"
@@ -24,8 +25,6 @@
 namespace stipple::app {
 namespace fs = std::filesystem;
 
-namespace {
-
 Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene) {
     std::vector<scene::DecodedImage> images;
     for (const scene::EncodedImage& encoded : scene.images) {
@@ -34,8 +33,6 @@ Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene)
     }
     return images;
 }
-
-}  // namespace
 
 Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptions& options, uint64_t surfels,
                                    bool repair) {
@@ -46,57 +43,6 @@ Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptio
 }
 
 namespace {
-
-/// `part`: which of the stores that these inputs give.
-Result<std::string> cachePath(const std::vector<std::string>& inputs, const BuildOptions& build,
-                              const std::string& part) {
-    std::string key = part + (build.onlyPoints ? "|points|" : "|") + build.normals + "|" + build.radii + "|" +
-                      build.up + "|" + build.attributes + (build.skipBad ? "|skip" : "|") +
-                      std::to_string(build.surfels) + fmt::format("|{}|", build.strandRadius) + STIPPLE_VERSION +
-                      fmt::format("|{}", lod::kStoreVersion);
-    STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs(inputs));
-    for (const std::string& input : files) {
-        std::error_code error;
-        const fs::path absolute = fs::absolute(input, error);
-        const auto size = fs::file_size(absolute, error);
-        const auto time = fs::last_write_time(absolute, error);
-        key +=
-            fmt::format("|{}|{}|{}", absolute.string(), error ? 0 : size, error ? 0 : time.time_since_epoch().count());
-    }
-    const char* cache = std::getenv("XDG_CACHE_HOME");
-    const char* home = std::getenv("HOME");
-    const fs::path folder =
-        cache && *cache ? fs::path(cache) / "stipple" : fs::path(home ? home : ".") / ".cache" / "stipple";
-    std::error_code error;
-    fs::create_directories(folder, error);
-    if (error)
-        return fail(ErrorKind::output, "cannot be created: " + error.message(), folder.string(), "set XDG_CACHE_HOME");
-    return (folder / (hexDigits(hashBytes(key.data(), key.size())) + ".stipple")).string();
-}
-
-Result<std::shared_ptr<const lod::Store>> openStoreFile(const std::string& path) {
-    STIPPLE_ASSIGN(lod::Store store, lod::openStore(path));
-    return std::make_shared<const lod::Store>(std::move(store));
-}
-
-/// Through the cache: `make` builds into a path.
-Result<std::shared_ptr<const lod::Store>> openCached(
-    const std::vector<std::string>& inputs, const BuildOptions& build, const std::string& part, bool showProgress,
-    const std::function<Result<lod::BuildReport>(const std::string& path, Progress& progress)>& make) {
-    STIPPLE_ASSIGN(const std::string path, cachePath(inputs, build, part));
-    if (!fs::exists(path)) {
-        Progress progress(showProgress);
-        STIPPLE_ASSIGN(const lod::BuildReport built, make(path, progress));
-        if (showProgress)
-            fmt::print(stderr, "{} ({}): built into the cache in {:.1f} s ({})\n", inputs.front(), part, built.seconds,
-                       path);
-        for (const std::string& note : built.notes)
-            if (showProgress) fmt::print(stderr, "note: {}\n", note);
-        for (const auto& [reason, count] : built.dropped)
-            if (showProgress) fmt::print(stderr, "dropped {}: {}\n", count, reason);
-    }
-    return openStoreFile(path);
-}
 
 Result<std::shared_ptr<const lod::Store>> openBuilt(const std::vector<std::string>& inputs, BuildOptions build,
                                                     const ColourOptions& colour, Executor& executor,
@@ -168,52 +114,23 @@ Result<lod::BuildReport> buildPlyMesh(const std::string& input, const std::strin
     return report;
 }
 
+lod::StrandBuildSettings strandSettings(const std::string& input) {
+    lod::StrandBuildSettings settings;
+    settings.description.source = fs::path(input).filename().string();
+    return settings;
+}
+
 /// Ribbons and tubes.
 Result<lod::BuildReport> buildStrands(lod::StrandSet strands, const std::string& input, const std::string& output,
                                       const BuildOptions& build, Executor& executor, Progress& progress) {
-    lod::StrandBuildSettings settings;
-    settings.description.source = fs::path(input).filename().string();
     const lod::StrandSet clean = lod::cleanStrands(std::move(strands), build.strandRadius);
-    return lod::buildStrandStore(clean, output, settings, executor, progress);
+    return lod::buildStrandStore(clean, output, strandSettings(input), executor, progress);
 }
 
 Result<lod::BuildReport> buildStrandFile(const std::string& input, const std::string& output, const BuildOptions& build,
                                          Executor& executor, Progress& progress) {
     STIPPLE_ASSIGN(lod::StrandSet strands, lod::readStrands(input));
     return buildStrands(std::move(strands), input, output, build, executor, progress);
-}
-
-/// Points that stand in for a mesh from afar, where its coarsest level still has many triangles: what is made of many
-/// small separate parts cannot be simplified as a surface.
-Result<void> addStandIn(const scene::Scene& scene, const std::vector<scene::Placement>& of, const std::string& part,
-                        const BuildOptions& build, Executor& executor, bool showProgress, render::PlacedStore& mesh) {
-    constexpr uint64_t kManyTriangles = 2000, kSurfels = 200'000;
-    const lod::Hierarchy& h = mesh.store->hierarchy;
-    uint64_t coarsest = 0;
-    for (size_t i = 0; i < h.nodes.size(); ++i) coarsest += h.groups[i].parents == 0 ? h.nodes[i].records : 0;
-    if (coarsest < kManyTriangles) return {};
-    const auto make = [&](const std::string& path, Progress& progress) -> Result<lod::BuildReport> {
-        scene::Scene only = scene;
-        only.nodes.clear();
-        for (const scene::Placement& p : of) {
-            scene::Node node;
-            node.mesh = p.mesh;
-            node.local = p.world;
-            only.nodes.push_back(node);
-        }
-        for (scene::Mesh& m : only.meshes)
-            std::erase_if(m.primitives, [](const auto& p) { return p.kind != scene::PrimitiveKind::triangles; });
-        STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene));
-        STIPPLE_ASSIGN(lod::PointSource samples, scene::sampleSurfels(only, images, {kSurfels}));
-        STIPPLE_ASSIGN(lod::BuildSettings settings, build.settings());
-        settings.open = [&](const std::string&, const lod::ReadOptions&) -> Result<lod::PointSource> {
-            return samples;
-        };
-        return lod::buildStore({scene.path}, path, settings, executor, progress);
-    };
-    STIPPLE_ASSIGN(mesh.standIn, openCached({scene.path}, build, part + ", from afar", showProgress, make));
-    STIPPLE_ASSIGN(mesh.standInError, lod::largestLeafRadius(*mesh.standIn));
-    return {};
 }
 
 /// Meshes with primitives of a kind: one that stands in several places is to be built once and placed, all others as
@@ -258,7 +175,8 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
         STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store,
                        openCached({scene.path}, build, fmt::format("mesh {}", mesh), showProgress, make(own)));
         render::PlacedStore one{store, {}, {}};
-        STIPPLE_TRY(addStandIn(scene, own, fmt::format("mesh {}", mesh), build, executor, showProgress, one));
+        STIPPLE_ASSIGN(one.standIns,
+                       meshFromAfar(scene, own, *store, fmt::format("mesh {}", mesh), build, executor, showProgress));
         for (const lod::Instance& instance : instances) {
             one.place = instance;
             placed.push_back(one);
@@ -267,27 +185,43 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
     if (places.once.empty()) return {};
     STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store,
                    openCached({scene.path}, build, "triangles", showProgress, make(places.once)));
-    placed.push_back({std::move(store), {}, {}});
-    return addStandIn(scene, places.once, "triangles", build, executor, showProgress, placed.back());
+    render::PlacedStore one{store, {}, {}};
+    STIPPLE_ASSIGN(one.standIns, meshFromAfar(scene, places.once, *store, "triangles", build, executor, showProgress));
+    placed.push_back(std::move(one));
+    return {};
 }
 
-/// The ribbons and tubes of a scene.
+/// The ribbons and tubes of a scene. What stands in many places also gets what is seen of it from afar, and all those
+/// together a crowd.
 Result<void> placeStrands(const scene::Scene& scene, const BuildOptions& build, Executor& executor, bool showProgress,
-                          std::vector<render::PlacedStore>& placed) {
-    const auto open = [&](const std::vector<scene::Placement>& of, const std::string& part) {
+                          OpenedScene& opened) {
+    const auto open = [&](const lod::StrandSet& clean, const std::string& part) {
         return openCached({scene.path}, build, part, showProgress, [&](const std::string& to, Progress& progress) {
-            return buildStrands(scene::flattenStrands(scene, of), scene.path, to, build, executor, progress);
+            return lod::buildStrandStore(clean, to, strandSettings(scene.path), executor, progress);
         });
     };
+    const auto cleaned = [&](const std::vector<scene::Placement>& of) {
+        return lod::cleanStrands(scene::flattenStrands(scene, of), build.strandRadius);
+    };
     const SharedPlaces places = sharePlaces(scene, scene::PrimitiveKind::lines);
+    CrowdBuilder crowd;
     for (const auto& [mesh, instances] : places.shared) {
-        STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store,
-                       open({{mesh, glm::dmat4(1)}}, fmt::format("strands of mesh {}", mesh)));
-        for (const lod::Instance& instance : instances) placed.push_back({store, instance, {}});
+        const lod::StrandSet clean = cleaned({{mesh, glm::dmat4(1)}});
+        const std::string part = fmt::format("strands of mesh {}", mesh);
+        STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store, open(clean, part));
+        render::PlacedStore one{store, {}, {}};
+        STIPPLE_ASSIGN(one.standIns, strandsFromAfar(clean, scene.path, part, build, executor, showProgress));
+        const auto first = static_cast<uint32_t>(opened.placed.size());
+        for (const lod::Instance& instance : instances) {
+            one.place = instance;
+            opened.placed.push_back(one);
+        }
+        crowd.add(clean, first, static_cast<uint32_t>(instances.size()));
     }
+    STIPPLE_TRY(crowd.finish(scene.path, build, executor, showProgress, opened));
     if (places.once.empty()) return {};
-    STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store, open(places.once, "strands"));
-    placed.push_back({std::move(store), {}, {}});
+    STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store, open(cleaned(places.once), "strands"));
+    opened.placed.push_back({std::move(store), {}, {}});
     return {};
 }
 
@@ -333,13 +267,12 @@ std::vector<scene::Camera> camerasOf(const scene::Scene& scene) {
 }
 
 /// The stores that a scene's nodes refer to, and its meshes.
-Result<std::vector<render::PlacedStore>> openSceneFile(const std::string& path, const BuildOptions& build,
-                                                       const ColourOptions& colour, Executor& executor,
-                                                       bool showProgress, OpenedScene& opened) {
+Result<void> openSceneFile(const std::string& path, const BuildOptions& build, const ColourOptions& colour,
+                           Executor& executor, bool showProgress, OpenedScene& opened) {
     STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path, build.repair));
     opened.lights = lightsOf(scene);
     opened.cameras = camerasOf(scene);
-    std::vector<render::PlacedStore> placed;
+    std::vector<render::PlacedStore>& placed = opened.placed;
     std::map<std::string, std::shared_ptr<const lod::Store>> open;
     const std::vector<glm::dmat4> world = scene.worldTransforms();
     const std::vector<bool> visible = scene.visibility();
@@ -362,7 +295,7 @@ Result<std::vector<render::PlacedStore>> openSceneFile(const std::string& path, 
         return std::any_of(meshes.begin(), meshes.end(), [&](const auto& p) { return holds(scene, p, kind); });
     };
     if (build.surfels == 0) STIPPLE_TRY(placeTriangles(scene, build, executor, showProgress, placed));
-    STIPPLE_TRY(placeStrands(scene, build, executor, showProgress, placed));
+    STIPPLE_TRY(placeStrands(scene, build, executor, showProgress, opened));
     if (build.surfels > 0 || anyHolds(scene::PrimitiveKind::points) || placed.empty()) {
         STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> points,
                        openBuilt({path}, build, colour, executor, showProgress));
@@ -370,7 +303,7 @@ Result<std::vector<render::PlacedStore>> openSceneFile(const std::string& path, 
     }
     for (const std::string& note : scene.notes)
         if (showProgress) fmt::print(stderr, "note: {}\n", note);
-    return placed;
+    return {};
 }
 
 /// One description for all: the only store's own, or the union with y up, as glTF has it.
@@ -383,7 +316,7 @@ lod::StoreDescription describe(const std::vector<render::PlacedStore>& placed) {
     all.boundsMin = all.focusMin = glm::dvec3(1e300);
     all.boundsMax = all.focusMax = glm::dvec3(-1e300);
     all.points = 0;
-    all.isReflectance = std::any_of(placed.begin(), placed.end(), [](const auto& p) { return p.standIn != nullptr; });
+    all.isReflectance = std::any_of(placed.begin(), placed.end(), [](const auto& p) { return p.standIns != nullptr; });
     for (const render::PlacedStore& p : placed) {
         const lod::StoreDescription& d = p.store->description;
         for (int corner = 0; corner < 8; ++corner) {
@@ -481,7 +414,7 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
             }));
         scene.placed.push_back({std::move(store), {}, {}});
     } else if (isSceneFile(inputs.front())) {
-        STIPPLE_ASSIGN(scene.placed, openSceneFile(inputs.front(), build, colour, executor, showProgress, scene));
+        STIPPLE_TRY(openSceneFile(inputs.front(), build, colour, executor, showProgress, scene));
     } else {
         STIPPLE_ASSIGN(
             std::shared_ptr<const lod::Store> store,
@@ -492,7 +425,7 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     if (std::any_of(scene.placed.begin(), scene.placed.end(), [](const render::PlacedStore& p) {
             return !p.store->hierarchy.isMesh() && !isShaded(p.store->description);
         }))
-        for (render::PlacedStore& p : scene.placed) p.standIn = nullptr;
+        for (render::PlacedStore& p : scene.placed) p.standIns = nullptr;
     scene.description = describe(scene.placed);
     return scene;
 }

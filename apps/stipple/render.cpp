@@ -161,8 +161,7 @@ Result<void> runFrames(const Options& o, const Shot& shot, const render::FrameSe
         if (state.streamer->counters().refused > 0)
             return fail(ErrorKind::budget, "the first chunk does not fit", "--resident " + o.resident,
                         "give more memory");
-        lod::selectCut(state.scene(), state.streamer->residency(), first, settings.budgets,
-                       state.scratch, state.cut);
+        lod::selectCut(state.scene(), state.streamer->residency(), first, settings.budgets, state.scratch, state.cut);
         state.streamer->request(state.cut);
         std::this_thread::yield();
     }
@@ -249,7 +248,7 @@ Result<void> run(const Options& o) {
     if (stream.residentBytes == 0)
         return fail(ErrorKind::usage, "is not a size", "--resident " + o.resident, "e.g. 1G");
     settings.wantDepthAndNormal = settings.wantDepthAndNormal || o.accumulate > 1;
-    auto state = render::makeFrameState(scene.placed, *backend, *executor, stream);
+    auto state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.crowds);
     const Legend legend = o.colour.legend ? makeLegend(colour, description) : Legend{};
     Timings timings;
     bool complete = false;

@@ -145,7 +145,7 @@ Result<void> run(const Options& o) {
     streaming::StreamSettings stream;
     stream.residentBytes = std::max<uint64_t>(1, parseBytes(o.resident));
     STIPPLE_ASSIGN(lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
-    auto state = render::makeFrameState(scene.placed, *backend, *executor, stream);
+    auto state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.crowds);
     Legend legend = makeLegend(colour, d);
     render::FrameSettings settings;
     settings.budgets = {o.error, o.budget};
@@ -169,7 +169,7 @@ Result<void> run(const Options& o) {
             STIPPLE_ASSIGN(colour, applyColours(scene, nextColour(colour, d), "", ""));
             legend = makeLegend(colour, d);
             state.reset();  // gives back what is resident
-            state = render::makeFrameState(scene.placed, *backend, *executor, stream);
+            state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.crowds);
             settings.draw.lit = o.shade == "lit" || (colour.mode == lod::ColourMode::own && isShaded(d));
         }
         navigation.move(input);

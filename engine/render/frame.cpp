@@ -88,14 +88,18 @@ class Placer {
         return static_cast<uint32_t>(state_.instances.size() - 1);
     }
 
-    /// Number of the instance itself.
-    uint32_t addWithStandIn(const PlacedStore& p) {
+    /// Number of the instance itself; those of its stand-ins follow.
+    uint32_t addWithStandIns(const PlacedStore& p) {
         const uint32_t own = add(p);
-        if (!p.standIn) return own;
-        const uint32_t points = add({p.standIn, p.place, {}});
-        state_.instances[own].standIn = points;
-        state_.instances[points].inputError = p.standInError * p.place.scale;
-        state_.instances[points].isDriven = true;
+        uint32_t last = own;
+        for (size_t k = 0; p.standIns && k < p.standIns->size(); ++k) {
+            const StandIn& standIn = (*p.standIns)[k];
+            const uint32_t points = add({standIn.store, p.place, {}});
+            state_.instances[last].standIn = points;
+            state_.instances[points].inputError = standIn.error * p.place.scale;
+            state_.instances[points].isDriven = true;
+            last = points;
+        }
         return own;
     }
 
@@ -111,9 +115,8 @@ class Placer {
         std::set<uint32_t> sources;
         for (const uint32_t m : from.members) {
             crowd.members.push_back(numbers[m]);
-            const lod::Instance& member = state_.instances[numbers[m]];
-            sources.insert(member.source);
-            if (member.standIn != lod::Instance::kNone) sources.insert(state_.instances[member.standIn].source);
+            for (uint32_t i = numbers[m]; i != lod::Instance::kNone; i = state_.instances[i].standIn)
+                sources.insert(state_.instances[i].source);
         }
         crowd.sources.assign(sources.begin(), sources.end());
         state_.crowds.push_back(std::move(crowd));
@@ -159,7 +162,7 @@ std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& place
     Placer placer(*state);
     std::vector<uint32_t> numbers;
     numbers.reserve(placed.size());
-    for (const PlacedStore& p : placed) numbers.push_back(placer.addWithStandIn(p));
+    for (const PlacedStore& p : placed) numbers.push_back(placer.addWithStandIns(p));
     for (const PlacedCrowd& crowd : crowds) placer.addCrowd(crowd, numbers);
     state->draws.materials = state->materials;
     return state;

@@ -38,15 +38,18 @@ struct FrameState {
     lod::CutScene scene() const { return {hierarchies, instances, crowds}; }
 };
 
+/// Points that may be drawn in another store's stead, and how far they are from it (store units).
+struct StandIn {
+    std::shared_ptr<const lod::Store> store;
+    double error = 0;
+};
 /// A store somewhere in the scene, coloured in some way.
 struct PlacedStore {
     std::shared_ptr<const lod::Store> store;
     lod::Instance place;  ///< its `hierarchy` is set by makeFrameState
     lod::ColourBy colour;
-    /// Points that may be drawn in its stead, and how far they are from it at most (store units).
-    std::shared_ptr<const lod::Store> standIn = nullptr;
-    double standInError = 0;
-    bool isMember = false;  ///< of a crowd
+    std::shared_ptr<const std::vector<StandIn>> standIns = nullptr;  ///< finer ones first
+    bool isMember = false;                                           ///< of a crowd
 };
 /// Many placed stores that are seen as one from afar, see lod::Crowd.
 struct PlacedCrowd {

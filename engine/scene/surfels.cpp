@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lod/in_memory.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::scene {
@@ -237,30 +238,19 @@ Result<lod::PointSource> sampleSurfels(const Scene& scene, const std::vector<Dec
                                        const SurfelSettings& settings) {
     STIPPLE_ASSIGN(Surfels sampled, Sampler(scene, images, settings).run());
     if (sampled.position.empty()) return fail(ErrorKind::input, "is transparent everywhere", scene.path);
-    const auto surfels = std::make_shared<const Surfels>(std::move(sampled));
-    lod::PointSource source;
-    source.info.path = scene.path;
-    source.info.format = "meshes, sampled";
-    source.info.points = surfels->position.size();
-    source.info.hasColour = source.info.hasNormal = source.info.isReflectance = true;
-    source.info.up = lod::UpAxis::y;
-    source.info.notes = scene.notes;
-    if (surfels->cutOut > 0)
-        source.info.notes.push_back(fmt::format("{} samples lie where the material is transparent", surfels->cutOut));
-    source.parts = {source.info.points};
-    source.openPart = [surfels](size_t) -> Result<lod::PointReader> {
-        return lod::PointReader(
-            [surfels, next = size_t{0}](lod::PointBlock& block, size_t limit) mutable -> Result<size_t> {
-                const size_t count = std::min(limit, surfels->position.size() - next);
-                const auto from = static_cast<ptrdiff_t>(next), to = static_cast<ptrdiff_t>(next + count);
-                block.position.assign(surfels->position.begin() + from, surfels->position.begin() + to);
-                block.normal.assign(surfels->normal.begin() + from, surfels->normal.begin() + to);
-                block.colour.assign(surfels->colour.begin() + from, surfels->colour.begin() + to);
-                next += count;
-                return count;
-            });
-    };
-    return source;
+    lod::SourceInfo info;
+    info.path = scene.path;
+    info.format = "meshes, sampled";
+    info.isReflectance = true;
+    info.up = lod::UpAxis::y;
+    info.notes = scene.notes;
+    if (sampled.cutOut > 0)
+        info.notes.push_back(fmt::format("{} samples lie where the material is transparent", sampled.cutOut));
+    lod::PointBlock points;
+    points.position = std::move(sampled.position);
+    points.normal = std::move(sampled.normal);
+    points.colour = std::move(sampled.colour);
+    return lod::pointsInMemory(std::move(info), std::move(points));
 }
 
 }  // namespace stipple::scene

@@ -250,6 +250,7 @@ class Reading {
             const bool usable = scale > 0 && std::isfinite(scale) && std::isfinite(n.x + n.y + n.z);
             cloud_.normal[at + i] = usable ? octEncode(n / scale) : 0u;
             if (!usable) cloud_.colour[at + i] |= shared::kFlagNoNormal << 24;
+            if (usable && info.isTwoSided) cloud_.colour[at + i] |= shared::kFlagTwoSided << 24;
         }
         for (size_t i = 0; i < block.radius.size(); ++i)
             cloud_.radius[at + i] = std::isfinite(block.radius[i]) && block.radius[i] > 0 ? block.radius[i] : 0.0f;

@@ -394,6 +394,8 @@ TEST(MeshImages, WhatCannotBeSimplifiedIsPointsFromAfar) {
     ASSERT_TRUE(error);
     EXPECT_GT(*error, 0.005);
     EXPECT_LT(*error, 0.2);
+    const auto standIns =
+        std::make_shared<const std::vector<render::StandIn>>(std::vector{render::StandIn{afar, *error}});
     const auto backend = cpu::makeCpuBackend(*executor);
     scene::Camera camera;
     camera.up = {0, 1, 0};
@@ -403,7 +405,7 @@ TEST(MeshImages, WhatCannotBeSimplifiedIsPointsFromAfar) {
         FrameCounters with, without;
         render::FrameSettings frame;
         frame.draw.lit = true;
-        const render::Image a = draw({{mesh, {}, {}, afar, *error}}, *backend, *executor, view, frame, &with);
+        const render::Image a = draw({{mesh, {}, {}, standIns}}, *backend, *executor, view, frame, &with);
         const render::Image b = draw({{mesh, {}, {}}}, *backend, *executor, view, frame, &without);
         EXPECT_EQ(without.trianglesDrawn, 40'000u);
         if (distance < 10) {

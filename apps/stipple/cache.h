@@ -1,0 +1,23 @@
+// Stores that were built from raw inputs, kept for the next time.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "apps/stipple/common.h"
+
+namespace stipple::app {
+
+Result<std::shared_ptr<const lod::Store>> openStoreFile(const std::string& path);
+
+/// Builds a store into a path.
+using StoreMaker = std::function<Result<lod::BuildReport>(const std::string& path, Progress& progress)>;
+
+/// The store that `inputs` and `build` give, made if it is not in the cache. `part`: which of their stores.
+Result<std::shared_ptr<const lod::Store>> openCached(const std::vector<std::string>& inputs, const BuildOptions& build,
+                                                     const std::string& part, bool showProgress,
+                                                     const StoreMaker& make);
+
+}  // namespace stipple::app

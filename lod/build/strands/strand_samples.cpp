@@ -1,0 +1,81 @@
+#include "lod/build/strands/strand_samples.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/base/rng.h"
+#include "shaders/shared/record.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+/// What a segment shows from one side, averaged over all directions round it.
+double areaOf(const StrandSet& s, size_t strand, uint32_t i) {
+    const double band =
+        glm::length(s.position[i + 1] - s.position[i]) * (double{s.radius[i]} + double{s.radius[i + 1]});
+    return s.isRibbon[strand] != 0 ? band : 0.5 * kPi * band;
+}
+
+glm::dvec3 linearOf(uint32_t colour) {
+    const auto channel = [&](uint32_t shift) {
+        return double{shared::linearFromSrgb(static_cast<float>(colour >> shift & 255u) / 255.0f)};
+    };
+    return {channel(0), channel(8), channel(16)};
+}
+uint32_t byteOf(double linear) {
+    return static_cast<uint32_t>(
+        std::lround(shared::srgbFromLinear(static_cast<float>(std::clamp(linear, 0.0, 1.0))) * 255.0f));
+}
+
+}  // namespace
+
+StrandSamples sampleStrands(const StrandSet& strands, uint64_t count) {
+    double whole = 0;
+    const auto forSegments = [&](const auto& use) {
+        for (size_t s = 0; s < strands.strands(); ++s)
+            for (uint32_t i = strands.first[s]; i + 1 < strands.first[s + 1]; ++i) use(s, i, areaOf(strands, s, i));
+    };
+    forSegments([&](size_t, uint32_t, double area) { whole += area; });
+    StrandSamples out;
+    if (!(whole > 0) || count == 0) return out;
+    const double each = whole / static_cast<double>(count);
+    out.radius = std::sqrt(each / kPi);
+    Rng rng(0x5eed);
+    std::vector<glm::dvec3> colour(count, glm::dvec3(0));
+    double from = 0, wanted = rng.uniform();  // both in runs
+    forSegments([&](size_t s, uint32_t i, double area) {
+        const double to = from + area / each;
+        const glm::dvec3 mean = 0.5 * (linearOf(strands.colour[i]) + linearOf(strands.colour[i + 1]));
+        for (auto run = static_cast<uint64_t>(from); run < count && static_cast<double>(run) < to; ++run) {
+            const double begin = std::max(from, static_cast<double>(run)),
+                         end = std::min(to, static_cast<double>(run) + 1);
+            colour[run] += (end - begin) * mean;
+        }
+        while (out.points.position.size() < count && wanted < to) {
+            const double u = std::clamp((wanted - from) / std::max(to - from, 1e-300), 0.0, 1.0);
+            const glm::dvec3 a = strands.position[i], b = strands.position[i + 1], t = glm::normalize(b - a);
+            const double radius = (1 - u) * strands.radius[i] + u * strands.radius[i + 1];
+            const glm::dvec3 n(glm::mix(glm::dvec3(strands.normal[i]), glm::dvec3(strands.normal[i + 1]), u));
+            const glm::dvec3 aside = std::abs(t.y) < 0.9 ? glm::dvec3(0, 1, 0) : glm::dvec3(1, 0, 0);
+            const glm::dvec3 x = glm::normalize(glm::cross(t, aside)), y = glm::cross(t, x);
+            const double turn = 2 * kPi * rng.uniform(), side = 2 * rng.uniform() - 1;
+            const glm::dvec3 out_ = std::cos(turn) * x + std::sin(turn) * y;
+            const bool isRibbon = strands.isRibbon[s] != 0;
+            const glm::dvec3 across = isRibbon ? glm::cross(n, t) : out_;
+            out.points.position.push_back(glm::mix(a, b, u) + radius * (isRibbon ? side : 1.0) * across);
+            out.points.normal.emplace_back(isRibbon ? n : out_);
+            ++wanted;
+            wanted = std::floor(wanted) + rng.uniform();
+        }
+        from = to;
+    });
+    const size_t made = out.points.position.size();  // the last run may end early by rounding
+    for (size_t k = 0; k < made; ++k)
+        out.points.colour.push_back(byteOf(colour[k].r) | byteOf(colour[k].g) << 8 | byteOf(colour[k].b) << 16);
+    out.points.radius.assign(made, static_cast<float>(out.radius));
+    return out;
+}
+
+}  // namespace stipple::lod

@@ -1,0 +1,21 @@
+// Strands as few points, for views from so far that no strand is seen alone (Cook et al. 2007: what is thinner than the
+// error may be a matter of chance, as long as area and mean colour stay).
+#pragma once
+
+#include "lod/primitives.h"
+#include "lod/strands.h"
+
+namespace stipple::lod {
+
+struct StrandSamples {
+    PointBlock points;  ///< position, normal, colour, radius
+    double radius = 0;  ///< of all of them: what a sample stands for is about that far from it
+};
+
+/// `count` discs, seen from both sides: one at a random place in each of `count` runs of strands of equal area, with
+/// the run's mean colour. Their areas add up to what the strands show: a ribbon's own area, and of a tube half its
+/// surface (a disc that turns with a tube's surface shows 2/pi of its area on average, a tube its whole width). Where
+/// each disc lies is chance; the same input gives the same discs. `strands` are clean.
+StrandSamples sampleStrands(const StrandSet& strands, uint64_t count);
+
+}  // namespace stipple::lod
