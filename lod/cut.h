@@ -46,10 +46,8 @@ struct Instance {
     uint32_t crowd = kNone;  ///< whose points these are
 };
 
-/// Instances that share coarse nodes: from afar one store of points (instance `points`, with an inputError) shows all
-/// of them, and a leaf of it that is not good enough gives way to the instances that reach into its cell. Where some
-/// leaves do and others do not, an instance at the border is drawn beside its points, which are no farther from it than
-/// the error allows.
+/// Instances that share coarse nodes: from afar one progressive store (instance `points`) shows all of them, and a leaf
+/// of it that is not good enough gives way to the instances that it stands for.
 struct Crowd {
     uint32_t points = 0;
     std::vector<uint32_t> first;    ///< of each node of the points, and the end: where its members begin
@@ -80,6 +78,7 @@ struct CutDraw {
     uint32_t errorCode = 0;   ///< draw records with own error <= this ...
     uint32_t octantMask = 0;  ///< ... and all records of these octants
     float errorPixels = 0;    ///< largest screen-space error among what this node draws
+    float radiusScale = 1;    ///< of a progressive store: discs drawn are larger than stored
 };
 
 /// Clusters of a mesh store: one run of one group.

@@ -86,6 +86,9 @@ json toJson(const StoreDescription& d) {
         {"has_colour", d.hasColour},
         {"is_reflectance", d.isReflectance},
         {"is_strands", d.isStrands},
+        {"is_progressive", d.isProgressive},
+        {"disc_factors", d.discFactors},
+        {"smallest_disc", d.smallestDisc},
         {"has_normals", d.hasNormals},
         {"materials", materials},
         {"source", d.source}};
@@ -139,6 +142,9 @@ StoreDescription fromJson(const json& j) {
     d.hasColour = j.at("has_colour").get<bool>();
     d.isReflectance = j.at("is_reflectance").get<bool>();
     d.isStrands = j.at("is_strands").get<bool>();
+    d.isProgressive = j.at("is_progressive").get<bool>();
+    d.discFactors = j.at("disc_factors").get<std::vector<float>>();
+    d.smallestDisc = j.at("smallest_disc").get<double>();
     d.hasNormals = j.at("has_normals").get<bool>();
     d.source = j.at("source").get<std::string>();
     for (const json& m : j.at("materials")) d.materials.push_back(materialFromJson(m));

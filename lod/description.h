@@ -25,6 +25,9 @@ struct StoreDescription {
     bool hasColour = false;                 ///< the points have colours of their own
     bool isReflectance = false;             ///< those are of the material, to be lit
     bool isStrands = false;                 ///< ribbons and tubes: points count segments
+    bool isProgressive = false;             ///< see Hierarchy::isProgressive
+    std::vector<float> discFactors;         ///< of a progressive store, see Hierarchy
+    double smallestDisc = 0;                ///< world units
     bool hasNormals = false;                ///< from the file or estimated
     std::vector<shared::SurfaceMaterial> materials;  ///< of a mesh store
     std::string source;                              ///< file names of the input, without folders

@@ -2,6 +2,7 @@
 // + unit * lattice); spheres are fp64 and nested, errors are codes of one file-wide scale.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -74,6 +75,23 @@ struct Hierarchy {
     std::vector<shared::TextureInfo> textures;
     std::vector<TextureTile> tiles;  ///< streamed like chunks: tile t is chunk nodes.size() + t
     bool isStrands = false;          ///< records are segments of ribbons and tubes
+    /// Records of a node are discs of one size, in an order in which any beginning shows the whole: n of them stand for
+    /// all, sqrt(records / n) times as large. Error codes are those of the radius.
+    bool isProgressive = false;
+    /// Of such a store: discs of nominal radius smallestDisc * 2^(k/2) are drawn discFactors[k] times as large (so that
+    /// they cover as much as what they stand for); between and beyond, the nearest do.
+    std::vector<float> discFactors;
+    double smallestDisc = 1;  ///< lattice units
+    float discFactor(double radius) const {
+        if (discFactors.empty()) return 1;
+        const double last = static_cast<double>(discFactors.size() - 1);
+        const double at = std::clamp(2 * std::log2(radius / smallestDisc), 0.0, last);
+        const auto k = static_cast<size_t>(std::min(at, std::max(last - 1, 0.0)));
+        const auto u = static_cast<float>(at - static_cast<double>(k));
+        return discFactors[k] + u * (discFactors[std::min(k + 1, discFactors.size() - 1)] - discFactors[k]);
+    }
+    /// Cells of records reach beyond those of nodes: by half a cell on each side.
+    bool isLoose() const { return isStrands || isProgressive; }
     bool isMesh() const { return !groups.empty(); }
     size_t chunks() const { return nodes.size() + tiles.size(); }
     /// Bytes of a decoded chunk.
@@ -94,7 +112,7 @@ struct Hierarchy {
     /// Lattice position that record coordinate (0,0,0) stands for: the centre of the lattice steps that the
     /// first position step holds.
     glm::dvec3 recordOrigin(const Node& n) const {
-        if (isStrands)
+        if (isLoose())
             return (glm::dvec3(n.cell[0], n.cell[1], n.cell[2]) - double{shared::kStrandMargin}) * cellSize(n);
         const double size = cellSize(n), half = n.stepShift > 0 ? 0.5 * (std::exp2(n.stepShift) - 1) : 0.0;
         return glm::dvec3(n.cell[0], n.cell[1], n.cell[2]) * size + glm::dvec3(half);

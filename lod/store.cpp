@@ -234,7 +234,7 @@ Result<void> checkNodes(const Store& store, uint64_t chunksEnd) {
             std::isfinite(n.radius) && n.radius >= 0 && std::isfinite(n.centre.x + n.centre.y + n.centre.z);
         if (!childrenFit || !parentFits || !chunkFits || !finite || n.records == 0 ||
             n.level > store.hierarchy.rootLog2 ||
-            n.stepShift != static_cast<int>(store.hierarchy.rootLog2) - n.level - (store.hierarchy.isStrands ? 15 : 16))
+            n.stepShift != static_cast<int>(store.hierarchy.rootLog2) - n.level - (store.hierarchy.isLoose() ? 15 : 16))
             return tl::unexpected(damaged(store.path, fmt::format("node {} of the node table is not possible", i)));
     }
     return {};
@@ -410,11 +410,18 @@ Result<Store> openStore(const std::string& path) {
         return tl::unexpected(damaged(path, fmt::format("the description cannot be read: {}", e.what())));
     }
     h.isStrands = store.description.isStrands;
+    h.isProgressive = store.description.isProgressive;
+    h.discFactors = store.description.discFactors;
+    h.smallestDisc = store.description.smallestDisc / h.unit;
+    if (!h.discFactors.empty() && !(h.smallestDisc > 0 && std::isfinite(h.smallestDisc)))
+        return tl::unexpected(damaged(path, "the size of its discs is not possible"));
     if (!(std::abs(glm::length(store.description.up) - 1) < 1e-6))
         return tl::unexpected(damaged(path, "the up direction has not the length 1"));
     store.contentHash = head.contentHash;
     store.fileBytes = head.fileBytes;
     STIPPLE_TRY(readMesh(mesh, path, h));
+    if (h.isProgressive && (h.isStrands || h.isMesh()))
+        return tl::unexpected(damaged(path, "holds progressive points and something else"));
     if (h.isStrands && h.isMesh()) return tl::unexpected(damaged(path, "holds strands and groups of triangles"));
     STIPPLE_TRY(checkTextures(store, head.nodes.offset));
     STIPPLE_TRY(h.isMesh() ? checkGroups(store, head.nodes.offset) : checkNodes(store, head.nodes.offset));

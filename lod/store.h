@@ -16,7 +16,7 @@
 namespace stipple::lod {
 
 /// Of the file format; a store of another version must be built again.
-inline constexpr uint32_t kStoreVersion = 5;
+inline constexpr uint32_t kStoreVersion = 6;
 
 /// An opened store. Reading chunks is safe from several threads.
 struct Store {

@@ -1,10 +1,13 @@
 // What is seen of things from afar: points in place of meshes and strands, and crowds of them.
 #pragma once
 
+#include <functional>
+#include <optional>
 #include <string>
 
 #include "apps/stipple/common.h"
 #include "engine/scene/triangles.h"
+#include "lod/build/progressive/progressive_build.h"
 #include "lod/strands.h"
 
 namespace stipple::app {
@@ -17,23 +20,42 @@ Result<StandIns> meshFromAfar(const scene::Scene& scene, const std::vector<scene
                               const lod::Store& mesh, const std::string& part, const BuildOptions& build,
                               Executor& executor, bool showProgress);
 
-/// Of strands: fewer and fewer discs (lod/build/strands/strand_samples.h), each time a quarter. Null where there are
-/// few strands.
-Result<StandIns> strandsFromAfar(const lod::StrandSet& clean, const std::string& input, const std::string& part,
-                                 const BuildOptions& build, Executor& executor, bool showProgress);
+/// Clean strands and their samples, made when they are needed: what is in the cache does not need them.
+class StrandModel {
+  public:
+    StrandModel(std::function<lod::StrandSet()> make, Executor& executor)
+        : make_(std::move(make)), executor_(executor) {}
+    const lod::StrandSet& strands();
+    const lod::StrandSamples& samples();
+    const lod::DiscFactors& factors();
 
-/// Collects what stands in many places, and makes one store of points of all of them.
+  private:
+    std::function<lod::StrandSet()> make_;
+    Executor& executor_;
+    std::optional<lod::StrandSet> strands_;
+    std::optional<lod::StrandSamples> samples_;
+    std::optional<lod::DiscFactors> factors_;
+};
+using SharedModel = std::shared_ptr<StrandModel>;
+
+/// Of strands, which `of` holds: discs, as few as the view allows (lod/build/progressive). Null where there are few
+/// strands.
+Result<StandIns> strandsFromAfar(const SharedModel& model, const lod::Store& of, const std::string& input,
+                                 const std::string& part, const BuildOptions& build, Executor& executor,
+                                 bool showProgress);
+
+/// Collects what stands in many places, and makes one progressive store of all of it.
 class CrowdBuilder {
   public:
-    /// Placed stores [first, first + count) show `clean`.
-    void add(const lod::StrandSet& clean, uint32_t first, uint32_t count);
+    /// Placed stores [first, first + count) show `model`.
+    void add(const SharedModel& model, uint32_t first, uint32_t count);
     /// Adds a crowd to the scene, if there is enough of one.
     Result<void> finish(const std::string& input, const BuildOptions& build, Executor& executor, bool showProgress,
                         OpenedScene& scene);
 
   private:
     struct Model {
-        lod::StrandSet strands;
+        SharedModel model;
         uint32_t first, count;
     };
     std::vector<Model> models_;

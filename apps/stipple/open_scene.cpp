@@ -195,32 +195,36 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
 /// together a crowd.
 Result<void> placeStrands(const scene::Scene& scene, const BuildOptions& build, Executor& executor, bool showProgress,
                           OpenedScene& opened) {
-    const auto open = [&](const lod::StrandSet& clean, const std::string& part) {
+    const auto open = [&](const SharedModel& model, const std::string& part) {
         return openCached({scene.path}, build, part, showProgress, [&](const std::string& to, Progress& progress) {
-            return lod::buildStrandStore(clean, to, strandSettings(scene.path), executor, progress);
+            return lod::buildStrandStore(model->strands(), to, strandSettings(scene.path), executor, progress);
         });
     };
-    const auto cleaned = [&](const std::vector<scene::Placement>& of) {
-        return lod::cleanStrands(scene::flattenStrands(scene, of), build.strandRadius);
+    const auto modelOf = [&](const std::vector<scene::Placement>& of) {
+        return std::make_shared<StrandModel>(
+            [of, &scene, radius = build.strandRadius] {
+                return lod::cleanStrands(scene::flattenStrands(scene, of), radius);
+            },
+            executor);
     };
     const SharedPlaces places = sharePlaces(scene, scene::PrimitiveKind::lines);
     CrowdBuilder crowd;
     for (const auto& [mesh, instances] : places.shared) {
-        const lod::StrandSet clean = cleaned({{mesh, glm::dmat4(1)}});
+        const SharedModel model = modelOf({{mesh, glm::dmat4(1)}});
         const std::string part = fmt::format("strands of mesh {}", mesh);
-        STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store, open(clean, part));
+        STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store, open(model, part));
         render::PlacedStore one{store, {}, {}};
-        STIPPLE_ASSIGN(one.standIns, strandsFromAfar(clean, scene.path, part, build, executor, showProgress));
+        STIPPLE_ASSIGN(one.standIns, strandsFromAfar(model, *store, scene.path, part, build, executor, showProgress));
         const auto first = static_cast<uint32_t>(opened.placed.size());
         for (const lod::Instance& instance : instances) {
             one.place = instance;
             opened.placed.push_back(one);
         }
-        crowd.add(clean, first, static_cast<uint32_t>(instances.size()));
+        crowd.add(model, first, static_cast<uint32_t>(instances.size()));
     }
     STIPPLE_TRY(crowd.finish(scene.path, build, executor, showProgress, opened));
     if (places.once.empty()) return {};
-    STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store, open(cleaned(places.once), "strands"));
+    STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store, open(modelOf(places.once), "strands"));
     opened.placed.push_back({std::move(store), {}, {}});
     return {};
 }

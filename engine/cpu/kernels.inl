@@ -129,6 +129,7 @@ template <bool anyTurned>
         t.offset = vec2(c.x * scale + centreX - float(int(i)), c.y * scale + centreY);
         t.depth = valid ? t.depth : 0.0f;
         t.radius = valid ? t.radius : 0.0f;
+        t.thickness = (g.flags[i] & kFlagLoose) != 0u ? 0.0f : t.thickness;
         t.colour = vec3(unpackRed(g.colour[i]), unpackGreen(g.colour[i]), unpackBlue(g.colour[i]));
         setTexel<false>(row, kPad + i, t);
     }

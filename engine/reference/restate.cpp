@@ -125,7 +125,10 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize, double inverse
                 const bool gap = around.size() + outside == 4 && !fine.ref(x, y).valid && least < farthest;
                 // So does what shines through from behind all four.
                 const bool shines = around.size() == 4 && fine.ref(x, y).valid && fine.ref(x, y).depth > hindmost;
-                const bool between = least >= 1 && (gap || shines);
+                // Leaves are no surface: between them it stays open.
+                const bool isSolid =
+                    std::all_of(around.begin(), around.end(), [](const auto& a) { return a.first->thickness > 0; });
+                const bool between = least >= 1 && isSolid && (gap || shines);
                 const double weight = std::max(rest * rest, between && rho2 <= least ? 0.01 : 0.0);
                 if (weight > 0) list.push_back({s, weight});
             }
@@ -179,7 +182,8 @@ class ReferenceBackend final : public render::Backend {
             if (h.isStrands) continue;
             const auto& records = chunks_.at(uint64_t{instance.source} << 32 | cut.node).records;
             for (uint32_t i = 0; i < cut.count; ++i) {
-                const Disc disc = decodeDisc(h, node, records[i]);
+                Disc disc = decodeDisc(h, node, records[i]);
+                disc.radius *= cut.radiusScale;
                 if (disc.errorCode > cut.errorCode && !(cut.octantMask >> disc.octant & 1u)) continue;
                 const dvec3 world = instance.translation + instance.rotation * (instance.scale * disc.position) - v.eye;
                 const dvec3 c(glm::dot(world, v.right), glm::dot(world, v.down), glm::dot(world, v.forward));
@@ -202,6 +206,7 @@ class ReferenceBackend final : public render::Backend {
                 s.radius = std::clamp(instance.scale * disc.radius * f.supportScale * v.focalPixels / c.z,
                                       double(f.minimumRadius), 16384.0);
                 s.thickness = s.radius * c.z / v.focalPixels * (0.25 + std::sqrt(std::max(0.0, 1 - facing * facing)));
+                if ((disc.flags & shared::kFlagLoose) != 0) s.thickness = 0;
                 s.perp = dvec2(rotationToZ(toPoint) * n);
                 s.colour = disc.colour;
                 if (f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError)

@@ -99,7 +99,7 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
         d.axisY = glm::vec3(axes[1] * worldPerStep);
         d.axisZ = glm::vec3(axes[2] * worldPerStep);
         d.base = glm::vec3(base);
-        d.edge = static_cast<float>(instance.scale * h.unit * h.cellSize(node));
+        d.edge = static_cast<float>(instance.scale * h.unit * h.cellSize(node)) * draw.radiusScale;
         d.errorCode = draw.errorCode;
         d.octantMask = draw.octantMask | (instance.rotation != glm::dmat3(1) ? shared::kNodeTurned : 0u);
         d.count = draw.count;

@@ -108,7 +108,6 @@ class Placer {
         lod::Crowd crowd;
         crowd.points = add({from.points, {}, {}});
         lod::Instance& points = state_.instances[crowd.points];
-        points.inputError = from.error;
         points.crowd = static_cast<uint32_t>(state_.crowds.size());
         crowd.first = from.first;
         crowd.members.reserve(from.members.size());

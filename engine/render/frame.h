@@ -38,7 +38,8 @@ struct FrameState {
     lod::CutScene scene() const { return {hierarchies, instances, crowds}; }
 };
 
-/// Points that may be drawn in another store's stead, and how far they are from it (store units).
+/// Points that may be drawn in another store's stead, and how far they are from it (store units; of a progressive
+/// store: 0, it says so itself).
 struct StandIn {
     std::shared_ptr<const lod::Store> store;
     double error = 0;
@@ -53,8 +54,7 @@ struct PlacedStore {
 };
 /// Many placed stores that are seen as one from afar, see lod::Crowd.
 struct PlacedCrowd {
-    std::shared_ptr<const lod::Store> points;  ///< world coordinates
-    double error = 0;                          ///< how far they are from the members at most, world units
+    std::shared_ptr<const lod::Store> points;  ///< progressive, world coordinates
     std::vector<uint32_t> first, members;      ///< of the nodes of `points`; members count the placed stores
 };
 /// The same store may be placed many times.

@@ -69,7 +69,7 @@ Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std
     STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output));  // an unwritable output is found first
     STIPPLE_ASSIGN(Cloud cloud, readCloud(inputs, settings, report, executor, progress));
     clock.ends("read");
-    const Partition partition = partitionCloud(cloud, settings.leafRecords, settings.coarserLevels, executor);
+    const Partition partition = partitionCloud(cloud, settings.leafRecords, executor);
     clock.ends("partition");
     estimateAttributes(cloud, partition, settings, executor, progress);
     clock.ends("attributes");

@@ -22,7 +22,6 @@ struct BuildSettings {
     bool estimateRadii = true;  ///< where the file has none; false: half the lattice unit is all a point gets
     std::optional<UpAxis> up;   ///< instead of the format's own
     uint32_t leafRecords = 8192;
-    uint32_t coarserLevels = 0;  ///< levels above the usual root, each half as fine: for what is seen from far away
     std::vector<std::string> attributes;  ///< kept as named streams
     bool allAttributes = false;           ///< every attribute of the input, beside `attributes`
     /// Opens one input; empty: openPointSource. For inputs that this library does not know (scenes with meshes).

@@ -56,7 +56,7 @@ struct Partition {
     uint32_t shiftOf(uint32_t level) const { return 3 * (keyLevels - level); }
 };
 
-Partition partitionCloud(Cloud& cloud, uint32_t leafRecords, uint32_t coarserLevels, Executor& executor);
+Partition partitionCloud(Cloud& cloud, uint32_t leafRecords, Executor& executor);
 
 /// Fills in missing radii and normals from the neighbourhood; clamps radii.
 void estimateAttributes(Cloud& cloud, const Partition& partition, const BuildSettings& settings, Executor& executor,

@@ -65,12 +65,12 @@ void permute(CloudAttribute& attribute, const std::vector<KeyIndex>& order, Exec
 
 }  // namespace
 
-Partition partitionCloud(Cloud& cloud, uint32_t leafRecords, uint32_t coarserLevels, Executor& executor) {
+Partition partitionCloud(Cloud& cloud, uint32_t leafRecords, Executor& executor) {
     Partition p;
     uint32_t largest = 1;
     for (const auto* axis : {&cloud.x, &cloud.y, &cloud.z})
         largest = std::max(largest, *std::max_element(axis->begin(), axis->end()));
-    p.rootLog2 = static_cast<uint32_t>(std::bit_width(largest)) + coarserLevels;
+    p.rootLog2 = static_cast<uint32_t>(std::bit_width(largest));
     p.keyLevels = std::min(p.rootLog2, kMortonBits);
     const uint32_t drop = p.rootLog2 - p.keyLevels;
     std::vector<KeyIndex> order(cloud.size());
@@ -94,8 +94,7 @@ Partition partitionCloud(Cloud& cloud, uint32_t leafRecords, uint32_t coarserLev
     p.levelBegin = {0, 1};
     for (uint32_t level = 0; p.levelBegin[level] < p.levelBegin[level + 1]; ++level) {
         for (uint32_t i = p.levelBegin[level]; i < p.levelBegin[level + 1]; ++i) {
-            if ((p.nodes[i].end - p.nodes[i].begin <= leafRecords && level >= coarserLevels) || level >= p.keyLevels)
-                continue;
+            if (p.nodes[i].end - p.nodes[i].begin <= leafRecords || level >= p.keyLevels) continue;
             p.nodes[i].firstChild = static_cast<uint32_t>(p.nodes.size());
             const uint32_t shift = p.shiftOf(level + 1);
             uint32_t begin = p.nodes[i].begin;

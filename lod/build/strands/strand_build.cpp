@@ -87,6 +87,8 @@ class StrandBuilder {
                     StrandPart part;
                     part.a = static_cast<uint32_t>(points_.size() - 1);
                     part.b = part.a + 1;
+                    part.radiusA = points_.back().radius;
+                    part.radiusB = q.radius;
                     const uint32_t ca = strands_.colour[i - 1] & 0xffffffu, cb = strands_.colour[i] & 0xffffffu;
                     part.colourA = mixed(ca, cb, (k - 1.0) / pieces);
                     part.colourB = mixed(ca, cb, u);
@@ -261,8 +263,10 @@ class StrandBuilder {
             hi = glm::max(hi, h.nodes[c].centre + h.nodes[c].radius);
         }
         const auto forEnds = [&](const auto& use) {
-            for (const StrandPart& p : node.parts)
-                for (const uint32_t i : {p.a, p.b}) use(points_[i].p, double{points_[i].radius} * p.scale);
+            for (const StrandPart& p : node.parts) {
+                use(points_[p.a].p, double{p.radiusA});
+                use(points_[p.b].p, double{p.radiusB});
+            }
         };
         forEnds([&](const glm::dvec3& p, double r) {
             lo = glm::min(lo, p - r);
@@ -295,18 +299,18 @@ class StrandBuilder {
         const double step = std::exp2(out.stepShift), cell = h.cellSize(out);
         const glm::dvec3 base = h.recordOrigin(out);
         Chunk chunk;
-        const auto vertex = [&](uint32_t i, float scale, uint32_t colour) {
+        const auto vertex = [&](uint32_t i, float wide, uint32_t colour) {
             const StrandPoint& p = points_[i];
             const glm::dvec3 exact = glm::floor((p.p - base) / step + 0.5);
             const glm::dvec3 q = glm::clamp(exact, glm::dvec3(0), glm::dvec3(65535));
             STIPPLE_CHECK(glm::length(q - exact) < 4, "an end outside of its node");
-            const uint32_t radius = shared::strandRadiusCode(static_cast<float>(double{p.radius} * scale / cell));
+            const uint32_t radius = shared::strandRadiusCode(static_cast<float>(wide / cell));
             return shared::StrandVertex{static_cast<uint32_t>(q.x) | static_cast<uint32_t>(q.y) << 16,
                                         static_cast<uint32_t>(q.z) | radius << 16, octEncode(p.direction),
                                         colour & 0xffffffu};
         };
         for (const StrandPart* p : order) {
-            shared::StrandSegment s{vertex(p->a, p->scale, p->colourA), vertex(p->b, p->scale, p->colourB)};
+            shared::StrandSegment s{vertex(p->a, p->radiusA, p->colourA), vertex(p->b, p->radiusB, p->colourB)};
             if (strands_.isRibbon[points_[p->a].strand] == 0) s.a.positionZ |= 0x80000000u;
             s.a.colour |= uint32_t{p->ownCode} << 24;
             s.b.colour |= uint32_t{p->octants} << 24;

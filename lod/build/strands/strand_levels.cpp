@@ -2,7 +2,8 @@
 //
 // Merging: a run of parts becomes one, as long as every point left out is near the chord. Matched by arc length both
 // are piecewise linear, so the largest distance lies at a point: |p - q| + |r - rho| bounds the Hausdorff distance of
-// the swept balls, and what a ribbon's edge moves by turning is added. Errors add up level by level.
+// the swept balls, and what a ribbon's edge moves by turning is added. Both radii are changed by as much as keeps the
+// area (a leaf is thin at both ends). Errors add up level by level.
 //
 // Drawing by lot (Cook et al. 2007): where strands are thinner than the error and still too many, those with the
 // smallest hash survive, wider by what went (so that the area stays) and with less contrast (a mean of n colours varies
@@ -32,9 +33,7 @@ class Merger {
         out.standsFor.resize(children_.size());
         for (size_t first = 0; first < children_.size();) {
             size_t end = first + 1;
-            while (end < children_.size() && children_[end - 1].b == children_[end].a &&
-                   children_[end - 1].scale == children_[end].scale)
-                ++end;
+            while (end < children_.size() && children_[end - 1].b == children_[end].a) ++end;
             mergeChain(first, end, out);
             first = end;
         }
@@ -45,15 +44,19 @@ class Merger {
     void mergeChain(size_t first, size_t end, StrandMerge& out) const {
         for (size_t i = first; i < end;) {
             size_t k = i + 1;
-            double deviation = 0;
+            Chord chord;
+            chord.radiusA = children_[i].radiusA;
+            chord.radiusB = children_[i].radiusB;
             while (k < end && k - i < kLongestRun) {
-                const double d = deviationOf(i, k + 1);
-                if (d > level_.tolerance) break;
-                deviation = d;
+                const Chord longer = chordOver(i, k + 1);
+                if (longer.deviation > level_.tolerance) break;
+                chord = longer;
                 ++k;
             }
             StrandPart part = children_[i];
             part.b = children_[k - 1].b;
+            part.radiusA = chord.radiusA;
+            part.radiusB = chord.radiusB;
             part.colourB = children_[k - 1].colourB;
             double below = 0;
             part.octants = 0;
@@ -62,40 +65,58 @@ class Merger {
                 part.octants |= children_[c].octants;
                 out.standsFor[c] = static_cast<uint32_t>(out.parts.size());
             }
-            part.error = below + deviation + level_.rounding;
+            part.error = below + chord.deviation + level_.rounding;
             out.parts.push_back(part);
             i = k;
         }
     }
 
-    /// Of the chord over children [i, k).
-    double deviationOf(size_t i, size_t k) const {
-        const StrandPoint &a = points_[children_[i].a], &b = points_[children_[k - 1].b];
-        const float scale = children_[i].scale;
-        double whole = 0;
-        for (size_t c = i; c < k; ++c) whole += lengthOf(children_[c]);
+    struct Chord {
+        double deviation = 0;
+        float radiusA = 0, radiusB = 0;
+    };
+
+    /// Over children [i, k).
+    Chord chordOver(size_t i, size_t k) const {
+        const StrandPart &first = children_[i], &last = children_[k - 1];
+        const StrandPoint &a = points_[first.a], &b = points_[last.b];
+        double whole = 0, area = 0;
+        for (size_t c = i; c < k; ++c) {
+            const double length = lengthOf(children_[c]);
+            whole += length;
+            area += 0.5 * length * (double{children_[c].radiusA} + double{children_[c].radiusB});
+        }
+        const double straight = glm::length(b.p - a.p), mean = 0.5 * (double{first.radiusA} + double{last.radiusB});
+        double wider = straight > 0 ? area / straight - mean : 0;
+        wider = std::clamp(wider, -std::min(0.5 * level_.tolerance, 0.9 * std::min(first.radiusA, last.radiusB)),
+                           0.5 * level_.tolerance);
+        Chord chord;
+        chord.radiusA = static_cast<float>(first.radiusA + wider);
+        chord.radiusB = static_cast<float>(last.radiusB + wider);
+        chord.deviation = std::abs(wider);
         const bool isRibbon = isRibbon_[a.strand] != 0;
-        double at = 0, worst = 0;
+        double at = 0;
         for (size_t c = i; c + 1 < k; ++c) {
             at += lengthOf(children_[c]);
             const double u = whole > 0 ? at / whole : 0;
             const StrandPoint& p = points_[children_[c].b];
+            const double radius = (1 - u) * chord.radiusA + u * chord.radiusB;
+            // Parts that were merged before may end in different radii where they meet.
             double d = glm::length(p.p - glm::mix(a.p, b.p, u)) +
-                       scale * std::abs(p.radius - ((1 - u) * a.radius + u * b.radius));
+                       std::max(std::abs(children_[c].radiusB - radius), std::abs(children_[c + 1].radiusA - radius));
             if (isRibbon) {
                 const glm::dvec3 n = glm::mix(glm::dvec3(a.direction), glm::dvec3(b.direction), u);
                 const double length = glm::length(n);
-                d += scale * static_cast<double>(p.radius) *
+                d += double{std::max(children_[c].radiusB, children_[c + 1].radiusA)} *
                      (length > 0.1 ? glm::length(glm::dvec3(p.direction) - n / length) : 2.0);
             }
             for (uint32_t shift = 0; shift < 24; shift += 8) {
-                const double mixed =
-                    (1 - u) * (children_[i].colourA >> shift & 255u) + u * (children_[k - 1].colourB >> shift & 255u);
+                const double mixed = (1 - u) * (first.colourA >> shift & 255u) + u * (last.colourB >> shift & 255u);
                 if (std::abs(mixed - (children_[c].colourB >> shift & 255u)) > kColourStep) d += 0.5 * whole;
             }
-            worst = std::max(worst, d);
+            chord.deviation = std::max(chord.deviation, d);
         }
-        return worst;
+        return chord;
     }
     double lengthOf(const StrandPart& p) const { return glm::length(points_[p.b].p - points_[p.a].p); }
 
@@ -117,9 +138,7 @@ uint32_t lotOf(uint32_t strand) {
 
 void drawLots(const std::vector<StrandPoint>& points, const StrandLevel& level, StrandMerge& merge) {
     std::vector<StrandPart>& parts = merge.parts;
-    const auto radiusOf = [&](const StrandPart& p) {
-        return double{std::max(points[p.a].radius, points[p.b].radius)} * p.scale;
-    };
+    const auto radiusOf = [](const StrandPart& p) { return double{std::max(p.radiusA, p.radiusB)}; };
     std::vector<uint8_t> isThin(parts.size());
     std::vector<uint32_t> lots(parts.size()), order;
     for (size_t i = 0; i < parts.size(); ++i) {
@@ -139,8 +158,7 @@ void drawLots(const std::vector<StrandPoint>& points, const StrandLevel& level, 
     for (size_t i = 0; i < parts.size(); ++i) {
         if (isThin[i] == 0) continue;
         const StrandPart& p = parts[i];
-        const double area = glm::length(points[p.b].p - points[p.a].p) *
-                            (double{points[p.a].radius} + double{points[p.b].radius}) * p.scale;
+        const double area = glm::length(points[p.b].p - points[p.a].p) * (double{p.radiusA} + double{p.radiusB});
         areaBefore += area;
         areaAfter += lots[i] < limit ? area : 0;
         for (int c = 0; c < 3; ++c) sum[c] += area * (p.colourA >> (8 * c) & 255u);
@@ -165,7 +183,8 @@ void drawLots(const std::vector<StrandPoint>& points, const StrandLevel& level, 
         if (isThin[i] != 0 && lots[i] >= limit) continue;
         if (isThin[i] != 0) {
             merge.commonError = std::max(merge.commonError, p.error + radiusOf(p) * (double{wider} - 1));
-            p.scale *= wider;
+            p.radiusA *= wider;
+            p.radiusB *= wider;
             p.colourA = softer(p.colourA);
             p.colourB = softer(p.colourB);
         }

@@ -1,6 +1,7 @@
 #include "lod/build/strands/strand_samples.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "engine/base/rng.h"
@@ -11,11 +12,16 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
+/// Tubes wider than the discs are surfaces, and closed: they get twice the discs, and those are merged like any
+/// surface's.
+constexpr double kSolid = 2;
+
 /// What a segment shows from one side, averaged over all directions round it.
-double areaOf(const StrandSet& s, size_t strand, uint32_t i) {
+double areaOf(const StrandSet& s, size_t strand, uint32_t i, double solidRadius) {
     const double band =
         glm::length(s.position[i + 1] - s.position[i]) * (double{s.radius[i]} + double{s.radius[i + 1]});
-    return s.isRibbon[strand] != 0 ? band : 0.5 * kPi * band;
+    if (s.isRibbon[strand] != 0) return band;
+    return 0.5 * kPi * band * (std::min(s.radius[i], s.radius[i + 1]) > solidRadius ? 2 : 1);
 }
 
 glm::dvec3 linearOf(uint32_t colour) {
@@ -29,18 +35,50 @@ uint32_t byteOf(double linear) {
         std::lround(shared::srgbFromLinear(static_cast<float>(std::clamp(linear, 0.0, 1.0))) * 255.0f));
 }
 
+/// From the order of the runs to one in which the first n are spread evenly (the bits of the number reversed), with
+/// colours as wide as they are then apart.
+StrandSamples inOrder(StrandSamples in, const std::vector<glm::dvec3>& colour) {
+    const size_t made = in.points.position.size();  // the last run may end early by rounding
+    std::vector<glm::dvec3> sum(made + 1, glm::dvec3(0));
+    for (size_t k = 0; k < made; ++k) sum[k + 1] = sum[k] + colour[k];
+    StrandSamples out;
+    out.radius = in.radius;
+    const auto bits = static_cast<int>(std::bit_width(made));
+    for (uint64_t i = 0; i < uint64_t{1} << bits; ++i) {
+        uint64_t k = 0;
+        for (int b = 0; b < bits; ++b) k |= (i >> b & 1u) << (bits - 1 - b);
+        if (k >= made) continue;
+        const size_t rank = out.points.position.size();
+        out.points.position.push_back(in.points.position[k]);
+        out.points.normal.push_back(in.points.normal[k]);
+        const double half = 0.5 * static_cast<double>(made) / static_cast<double>(std::bit_ceil(rank + 1));
+        const auto from = static_cast<size_t>(std::max(0.0, std::round(static_cast<double>(k) + 0.5 - half)));
+        const size_t to = std::min(std::max(from + 1, k + static_cast<size_t>(std::round(half + 0.5))), made);
+        const glm::dvec3 mean = (sum[to] - sum[from]) / static_cast<double>(to - from);
+        out.points.colour.push_back(byteOf(mean.r) | byteOf(mean.g) << 8 | byteOf(mean.b) << 16 | in.points.colour[k]);
+    }
+    return out;
+}
+
 }  // namespace
 
 StrandSamples sampleStrands(const StrandSet& strands, uint64_t count) {
-    double whole = 0;
+    double solidRadius = 1e300;
     const auto forSegments = [&](const auto& use) {
         for (size_t s = 0; s < strands.strands(); ++s)
-            for (uint32_t i = strands.first[s]; i + 1 < strands.first[s + 1]; ++i) use(s, i, areaOf(strands, s, i));
+            for (uint32_t i = strands.first[s]; i + 1 < strands.first[s + 1]; ++i)
+                use(s, i, areaOf(strands, s, i, solidRadius));
     };
-    forSegments([&](size_t, uint32_t, double area) { whole += area; });
+    const auto wholeArea = [&] {
+        double whole = 0;
+        forSegments([&](size_t, uint32_t, double area) { whole += area; });
+        return whole;
+    };
+    const double shown = wholeArea();
     StrandSamples out;
-    if (!(whole > 0) || count == 0) return out;
-    const double each = whole / static_cast<double>(count);
+    if (!(shown > 0) || count == 0) return out;
+    solidRadius = kSolid * std::sqrt(shown / static_cast<double>(count) / kPi);
+    const double each = wholeArea() / static_cast<double>(count);
     out.radius = std::sqrt(each / kPi);
     Rng rng(0x5eed);
     std::vector<glm::dvec3> colour(count, glm::dvec3(0));
@@ -66,16 +104,15 @@ StrandSamples sampleStrands(const StrandSet& strands, uint64_t count) {
             const glm::dvec3 across = isRibbon ? glm::cross(n, t) : out_;
             out.points.position.push_back(glm::mix(a, b, u) + radius * (isRibbon ? side : 1.0) * across);
             out.points.normal.emplace_back(isRibbon ? n : out_);
+            const bool isSolid = !isRibbon && std::min(strands.radius[i], strands.radius[i + 1]) > solidRadius;
+            // Kept where the colour comes later.
+            out.points.colour.push_back((shared::kFlagTwoSided | (isSolid ? 0u : shared::kFlagLoose)) << 24);
             ++wanted;
             wanted = std::floor(wanted) + rng.uniform();
         }
         from = to;
     });
-    const size_t made = out.points.position.size();  // the last run may end early by rounding
-    for (size_t k = 0; k < made; ++k)
-        out.points.colour.push_back(byteOf(colour[k].r) | byteOf(colour[k].g) << 8 | byteOf(colour[k].b) << 16);
-    out.points.radius.assign(made, static_cast<float>(out.radius));
-    return out;
+    return inOrder(std::move(out), colour);
 }
 
 }  // namespace stipple::lod

@@ -8,14 +8,16 @@
 namespace stipple::lod {
 
 struct StrandSamples {
-    PointBlock points;  ///< position, normal, colour, radius
+    PointBlock points;  ///< position, normal, colour
     double radius = 0;  ///< of all of them: what a sample stands for is about that far from it
 };
 
-/// `count` discs, seen from both sides: one at a random place in each of `count` runs of strands of equal area, with
-/// the run's mean colour. Their areas add up to what the strands show: a ribbon's own area, and of a tube half its
-/// surface (a disc that turns with a tube's surface shows 2/pi of its area on average, a tube its whole width). Where
-/// each disc lies is chance; the same input gives the same discs. `strands` are clean.
+/// `count` discs, seen from both sides: one at a random place in each of `count` runs of strands of equal area. Their
+/// areas add up to what the strands show: a ribbon's own area, and of a tube half its surface (a disc that turns with a
+/// tube's surface shows 2/pi of its area on average, a tube its whole width).
+/// They come in an order in which any beginning is spread over all runs; the first n, sqrt(count / n) times as large,
+/// stand for all. Each has the mean colour of what it stands for where it comes last. Where each disc lies is chance;
+/// the same input gives the same discs. `strands` are clean.
 StrandSamples sampleStrands(const StrandSet& strands, uint64_t count);
 
 }  // namespace stipple::lod

@@ -20,8 +20,8 @@ struct StrandPoint {
 struct StrandPart {
     uint32_t a = 0, b = 0;  ///< points
     uint32_t colourA = 0, colourB = 0;
-    float scale = 1;   ///< of the radii: survivors stand for more than themselves
-    double error = 0;  ///< bound of the distance from what it stands for
+    float radiusA = 0, radiusB = 0;  ///< of its own: what it stands for has the same area
+    double error = 0;                ///< bound of the distance from what it stands for
     uint8_t ownCode = 0, parentCode = 255;
     uint8_t octants = 0;
 };
