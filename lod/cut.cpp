@@ -191,7 +191,7 @@ bool Selector::isGoodEnough(uint32_t standIn, int step) {
     const Hierarchy& h = hierarchyOf(standIn);
     const int32_t epsilon = epsilonOf(standIn, slot, 0, kInside);
     if (epsilon == kCulled || epsilon == kInside) return false;
-    return allowedAt(epsilon, step) >= (h.isProgressive ? std::exp2(h.nodes[0].errorCode / 8.0) : slot.inputError);
+    return allowedAt(epsilon, step) >= (h.isProgressive ? std::exp2(h.finestCode / 8.0) : slot.inputError);
 }
 
 /// What to draw for instance i: the coarsest of its stand-ins that is good enough, if it has fewer records than i
@@ -207,7 +207,9 @@ uint32_t Selector::bestOf(uint32_t i, int step) {
     const uint64_t most = isMesh ? meshCost(i, step) : kAll;
     const uint64_t points =
         hierarchyOf(best).isProgressive ? progressiveCost(best, step, most) : pointCost(best, step, most);
-    return points < (isMesh ? most : pointCost(i, step, points)) ? best : i;
+    if (isMesh) return points < most ? best : i;
+    // Its root alone has more: no need to look further.
+    return points <= hierarchyOf(i).nodes[0].records || points <= pointCost(i, step, points) ? best : i;
 }
 
 /// The smallest step >= target whose full cut fits the budget (cost falls with the step).

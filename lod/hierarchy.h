@@ -78,6 +78,7 @@ struct Hierarchy {
     /// Records of a node are discs of one size, in an order in which any beginning shows the whole: n of them stand for
     /// all, sqrt(records / n) times as large. Error codes are those of the radius.
     bool isProgressive = false;
+    uint8_t finestCode = 0;  ///< largest error code of a leaf of such a store
     /// Of such a store: discs of nominal radius smallestDisc * 2^(k/2) are drawn discFactors[k] times as large (so that
     /// they cover as much as what they stand for); between and beyond, the nearest do.
     std::vector<float> discFactors;

@@ -411,6 +411,8 @@ Result<Store> openStore(const std::string& path) {
     }
     h.isStrands = store.description.isStrands;
     h.isProgressive = store.description.isProgressive;
+    for (const Node& n : h.nodes)
+        if (n.isLeaf()) h.finestCode = std::max(h.finestCode, n.errorCode);
     h.discFactors = store.description.discFactors;
     h.smallestDisc = store.description.smallestDisc / h.unit;
     if (!h.discFactors.empty() && !(h.smallestDisc > 0 && std::isfinite(h.smallestDisc)))

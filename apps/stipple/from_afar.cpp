@@ -67,6 +67,21 @@ lod::ProgressiveItem itemOf(const lod::StrandSamples& samples, const lod::Store&
     return item;
 }
 
+/// The same, with a sphere of its own.
+lod::ProgressiveItem itemAlone(const lod::StrandSamples& samples) {
+    lod::ProgressiveItem item;
+    item.samples = &samples;
+    item.count = static_cast<uint32_t>(samples.points.position.size());
+    glm::dvec3 lo(1e300), hi(-1e300);
+    for (const glm::dvec3& p : samples.points.position) {
+        lo = glm::min(lo, p);
+        hi = glm::max(hi, p);
+    }
+    item.centre = 0.5 * (lo + hi);
+    for (const glm::dvec3& p : samples.points.position) item.reach = std::max(item.reach, glm::length(p - item.centre));
+    return item;
+}
+
 }  // namespace
 
 const lod::StrandSet& StrandModel::strands() {
@@ -94,7 +109,11 @@ Result<StandIns> strandsFromAfar(const SharedModel& model, const lod::Store& of,
     const auto make = [&](const std::string& path, Progress& progress) -> Result<lod::BuildReport> {
         lod::ProgressiveSettings settings = progressiveSettings(input);
         lod::describeDiscs({model->factors()}, settings.description);
-        return lod::buildProgressiveStore({itemOf(model->samples(), of)}, path, settings, executor, progress);
+        constexpr uint32_t kMostInNode = 8192;
+        const std::vector<lod::StrandSamples> parts = lod::splitSamples(model->samples(), kMostInNode);
+        std::vector<lod::ProgressiveItem> items;
+        for (const lod::StrandSamples& cube : parts) items.push_back(itemAlone(cube));
+        return lod::buildProgressiveStore(items, path, settings, executor, progress);
     };
     render::StandIn standIn;
     STIPPLE_ASSIGN(standIn.store, openCached({input}, build, part + ", from afar", showProgress, make));

@@ -34,65 +34,126 @@
     return s;
 }
 
-/// Projected segments of a block, as what its lines need.
-struct Lines {
-    alignas(64) float xa[kSegmentsPerBlock], ya[kSegmentsPerBlock], xb[kSegmentsPerBlock], yb[kSegmentsPerBlock];
-    alignas(64) float inverseA[kSegmentsPerBlock], inverseB[kSegmentsPerBlock];
-    alignas(64) float halfA[kSegmentsPerBlock], halfB[kSegmentsPerBlock];      ///< seen half-widths, px
-    alignas(64) float nearerA[kSegmentsPerBlock], nearerB[kSegmentsPerBlock];  ///< depth of the surface / of the axis
+/// Projected segments of a block, as what their pixels need. (Aligned as a whole: elements of arrays that are aligned
+/// themselves cannot be gathered.)
+struct alignas(64) Lines {
+    float xa[kSegmentsPerBlock], ya[kSegmentsPerBlock], xb[kSegmentsPerBlock], yb[kSegmentsPerBlock];
+    float inverseA[kSegmentsPerBlock], inverseB[kSegmentsPerBlock];
+    float halfA[kSegmentsPerBlock], halfB[kSegmentsPerBlock];      ///< seen half-widths, px
+    float nearerA[kSegmentsPerBlock], nearerB[kSegmentsPerBlock];  ///< depth of the surface / of the axis
     // From a ribbon's axis to its edge, see ribbonEdge.
-    alignas(64) float edgeAx[kSegmentsPerBlock], edgeAy[kSegmentsPerBlock], slopeA[kSegmentsPerBlock];
-    alignas(64) float edgeBx[kSegmentsPerBlock], edgeBy[kSegmentsPerBlock], slopeB[kSegmentsPerBlock];
-    alignas(64) float isRound[kSegmentsPerBlock], radius[kSegmentsPerBlock];  ///< radius: the larger one, px
-    alignas(64) uint32_t keep[kSegmentsPerBlock];
+    float edgeAx[kSegmentsPerBlock], edgeAy[kSegmentsPerBlock], slopeA[kSegmentsPerBlock];
+    float edgeBx[kSegmentsPerBlock], edgeBy[kSegmentsPerBlock], slopeB[kSegmentsPerBlock];
+    float isRound[kSegmentsPerBlock], radius[kSegmentsPerBlock];  ///< radius: the larger one, px
+    uint32_t keep[kSegmentsPerBlock];
+    // As one-pixel lines: along u, the axis along which they are longer, from `first` on; values at u = start, and
+    // their slopes.
+    float start[kSegmentsPerBlock], v[kSegmentsPerBlock], dv[kSegmentsPerBlock];
+    float inverse[kSegmentsPerBlock], dInverse[kSegmentsPerBlock];
+    float nearer[kSegmentsPerBlock], dNearer[kSegmentsPerBlock];
+    float half[kSegmentsPerBlock], dHalf[kSegmentsPerBlock];  ///< half-widths, px
+    float longer[kSegmentsPerBlock];                          ///< length / that along u
+    float isSteep[kSegmentsPerBlock];
+    int first[kSegmentsPerBlock], count[kSegmentsPerBlock];
+    // Ends as points.
+    uint32_t pixelA[kSegmentsPerBlock], pixelB[kSegmentsPerBlock];  ///< ~0: none
 };
 
 constexpr int kStretch = 16;  ///< pixels that are worked on together
 
-/// Pixels of one line. x: the axis along which it is longer; `at(column, row)` is the pixel's index or ~0.
-struct LineEnds {
-    float xa, ya, xb, yb;
-    uint32_t columns;
-    uint32_t stepX, stepY, rows;  ///< index of a pixel: column * stepX + row * stepY
+/// Pixels of many short lines, to be worked on together.
+struct LinePixels {
+    static constexpr size_t kMost = 1024;
+    alignas(64) uint32_t segment[kMost];
+    alignas(64) int at[kMost];
+    alignas(64) uint32_t pixel[kMost], depth[kMost];  ///< pixel ~0: not covered
 };
 
-void drawLine(const FrameConstants& f, const Lines& lines, size_t i, LineEnds e, uint32_t id, uint64_t* visibility) {
-    float ia = lines.inverseA[i], ib = lines.inverseB[i], wa = lines.halfA[i], wb = lines.halfB[i],
-          fa = lines.nearerA[i], fb = lines.nearerB[i];
-    if (e.xb < e.xa) {
-        exchange(e.xa, e.xb);
-        exchange(e.ya, e.yb);
-        exchange(ia, ib);
-        exchange(wa, wb);
-        exchange(fa, fb);
-    }
-    const float length = e.xb - e.xa;
-    const float first = max(std::ceil(e.xa - 0.5f), 0.0f);
-    const float last = min(std::ceil(e.xb - 0.5f) - 1.0f, float(int(e.columns)) - 1.0f);
-    if (!(first <= last) || !(length > 0)) return;
-    const float slope = (e.yb - e.ya) / length, longer = std::sqrt(1.0f + slope * slope), inverse = 1.0f / length;
-    const float rows = float(int(e.rows)), dy = e.yb - e.ya, di = ib - ia, dw = wb - wa, df = fb - fa;
-    // First where the pixels are and how deep, then, with their cache lines on the way, the minimum.
-    alignas(64) uint32_t pixel[kStretch], depth[kStretch], keep[kStretch];
-    const int end = int(last);
-    for (int x0 = int(first); x0 <= end; x0 += kStretch) {
+/// How the segments of a block lie on the image as lines of one pixel's width, and which pixels their ends are.
+void layLines(const FrameConstants& frame, Lines& lines, size_t count, uint32_t firstId) {
+    const FrameConstants f = frame;
+    const float width = float(int(f.width)), height = float(int(f.height));
 #pragma GCC ivdep
-        for (size_t k = 0; k < kStretch; ++k) {
-            const int x = x0 + int(k);
-            const float u = (float(x) + 0.5f - e.xa) * inverse, y = e.ya + u * dy, half = wa + u * dw;
-            const float inside = (y >= 0 ? 1.0f : 0.0f) * (y < rows ? 1.0f : 0.0f) * (x <= end ? 1.0f : 0.0f);
-            const int row = int(inside > 0.5f ? y : 0.0f);
-            pixel[k] = uint32_t(inside > 0.5f ? x : x0) * e.stepX + uint32_t(row) * e.stepY;
-            const float share = half < kNarrow ? 2.0f * half * longer : 2.0f;
-            const float taken = coverageThreshold(pixel[k], id, f.coverageSeed) < share ? inside : 0.0f;
-            depth[k] = floatBitsToUint((fa + u * df) / (ia + u * di));
-            keep[k] = taken > 0.5f ? 1u : 0u;
-        }
-        const int count = end - x0 + 1 < kStretch ? end - x0 + 1 : kStretch;
-        for (int k = 0; k < count; ++k)
-            if (keep[k] != 0) __builtin_prefetch(&visibility[pixel[k]], 1);
-        for (int k = 0; k < count; ++k)
-            if (keep[k] != 0) offerKey(visibility, pixel[k], uint64_t{depth[k]} << 32 | id);
+    for (size_t i = 0; i < count; ++i) {
+        const float xa = lines.xa[i], ya = lines.ya[i], xb = lines.xb[i], yb = lines.yb[i];
+        const float dx = std::fabs(xb - xa), dy = std::fabs(yb - ya);
+        const bool isSteep = dy > dx;
+        const float ua = isSteep ? ya : xa, ub = isSteep ? yb : xb, va = isSteep ? xa : ya, vb = isSteep ? xb : yb;
+        const bool isBack = ub < ua;
+        const float u0 = isBack ? ub : ua, u1 = isBack ? ua : ub, v0 = isBack ? vb : va, v1 = isBack ? va : vb;
+        const float i0 = isBack ? lines.inverseB[i] : lines.inverseA[i],
+                    i1 = isBack ? lines.inverseA[i] : lines.inverseB[i];
+        const float n0 = isBack ? lines.nearerB[i] : lines.nearerA[i],
+                    n1 = isBack ? lines.nearerA[i] : lines.nearerB[i];
+        const float w0 = isBack ? lines.halfB[i] : lines.halfA[i], w1 = isBack ? lines.halfA[i] : lines.halfB[i];
+        const float length = u1 - u0, slope = 1.0f / max(length, 1.0e-6f);
+        const float first = max(std::ceil(u0 - 0.5f), 0.0f);
+        const float last = min(std::ceil(u1 - 0.5f) - 1.0f, (isSteep ? height : width) - 1.0f);
+        const float tilt = (v1 - v0) * slope, longer = std::sqrt(1.0f + tilt * tilt);
+        lines.start[i] = u0;
+        lines.v[i] = v0;
+        lines.dv[i] = tilt;
+        lines.inverse[i] = i0;
+        lines.dInverse[i] = (i1 - i0) * slope;
+        lines.nearer[i] = n0;
+        lines.dNearer[i] = (n1 - n0) * slope;
+        lines.half[i] = w0;
+        lines.dHalf[i] = (w1 - w0) * slope;
+        lines.isSteep[i] = isSteep ? 1.0f : 0.0f;
+        lines.first[i] = int(min(first, 32767.0f));
+        const float pixels = length > 0.0f ? max(last - first + 1.0f, 0.0f) : 0.0f;
+        lines.count[i] = int(min(pixels, 32767.0f));
+        lines.longer[i] = longer;
+        // Every vertex as a point: a segment that is seen along its axis has no line.
+        const auto point = [&](float x, float y, float half) {
+            const float inside = (x >= 0.0f ? 1.0f : 0.0f) * (x < width ? 1.0f : 0.0f) * (y >= 0.0f ? 1.0f : 0.0f) *
+                                 (y < height ? 1.0f : 0.0f);
+            const uint32_t pixel =
+                uint32_t(int(inside > 0.5f ? y : 0.0f)) * f.width + uint32_t(int(inside > 0.5f ? x : 0.0f));
+            const float dot_ = 3.14159265f * half * half * (1.0f - max(dx, dy) / max(2.0f * half, 1.0e-6f));
+            const float share = half < kNarrow ? dot_ : 2.0f;
+            const uint32_t id = kKindStrand | (firstId + uint32_t(i));
+            const float isSeen = coverageThreshold(pixel, ~id, f.coverageSeed) < share ? inside : 0.0f;
+            return isSeen > 0.5f ? pixel : ~0u;
+        };
+        lines.pixelA[i] = point(xa, ya, lines.halfA[i]);
+        lines.pixelB[i] = point(xb, yb, lines.halfB[i]);
+    }
+}
+
+/// Offers the pixels that were collected.
+void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pixels, size_t count, uint32_t firstId,
+                uint64_t* visibility) {
+    const FrameConstants f = frame;
+    const float width = float(int(f.width)), height = float(int(f.height));
+    const uint32_t* __restrict const segment = pixels.segment;
+    const int* __restrict const at = pixels.at;
+    const float *const start = lines.start, *const v0 = lines.v, *const dv = lines.dv, *const half0 = lines.half,
+                       *const dHalf = lines.dHalf, *const longer = lines.longer, *const nearer = lines.nearer,
+                       *const dNearer = lines.dNearer, *const inverse = lines.inverse, *const dInverse = lines.dInverse,
+                       *const steep = lines.isSteep;
+    uint32_t* __restrict const depth = pixels.depth, * __restrict const pixel = pixels.pixel;
+#pragma GCC ivdep
+    for (size_t k = 0; k < count; ++k) {
+        const uint32_t i = segment[k];
+        const float u = float(at[k]) + 0.5f - start[i];
+        const float v = v0[i] + u * dv[i], half = half0[i] + u * dHalf[i];
+        const bool isSteep = steep[i] > 0.5f;
+        const float inside = (v >= 0.0f ? 1.0f : 0.0f) * (v < (isSteep ? width : height) ? 1.0f : 0.0f);
+        const uint32_t row = uint32_t(int(inside > 0.5f ? v : 0.0f)), column = uint32_t(at[k]);
+        const uint32_t where = isSteep ? column * f.width + row : row * f.width + column;
+        const float covered = 2.0f * half * longer[i], share = half < kNarrow ? covered : 2.0f;
+        const uint32_t id = kKindStrand | (firstId + i);
+        const float taken = coverageThreshold(where, id, f.coverageSeed) < share ? inside : 0.0f;
+        depth[k] = floatBitsToUint((nearer[i] + u * dNearer[i]) / (inverse[i] + u * dInverse[i]));
+        pixel[k] = taken > 0.5f ? where : ~0u;
+    }
+    constexpr size_t kAhead = 24;  // their cache lines come meanwhile
+    for (size_t k = 0; k < count; ++k) {
+        if (k + kAhead < count && pixels.pixel[k + kAhead] != ~0u)
+            __builtin_prefetch(&visibility[pixels.pixel[k + kAhead]], 1);
+        if (pixels.pixel[k] == ~0u) continue;
+        offerKey(visibility, pixels.pixel[k], uint64_t{pixels.depth[k]} << 32 | kKindStrand | (firstId + segment[k]));
     }
 }
 
@@ -198,20 +259,23 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
         const bool isFine = (segmentErrorCode(s) <= node.errorCode) | ((segmentOctants(s) & node.octantMask) != 0u);
         lines.keep[i] = (isFine & (p.isThere > 0.5f)) ? 1u : 0u;
     }
+    layLines(f, lines, count, firstId);
     const float width = float(f.width), height = float(f.height);
+    LinePixels pixels;
+    size_t collected = 0;
     for (size_t i = 0; i < count; ++i) {
         if (lines.keep[i] == 0) continue;
-        const float xa = lines.xa[i], ya = lines.ya[i], xb = lines.xb[i], yb = lines.yb[i];
-        const RibbonEdge a{lines.edgeAx[i], lines.edgeAy[i], lines.slopeA[i]},
-            b{lines.edgeBx[i], lines.edgeBy[i], lines.slopeB[i]};
-        const bool isTubeHere = lines.isRound[i] > 0.5f;
-        const float widest =
-            isTubeHere ? lines.radius[i] : std::sqrt(max(a.x * a.x + a.y * a.y, b.x * b.x + b.y * b.y));
-        if (max(xa, xb) < -widest || max(ya, yb) < -widest || min(xa, xb) >= width + widest ||
-            min(ya, yb) >= height + widest)
-            continue;
         const uint32_t id = kKindStrand | (firstId + uint32_t(i));
         if (lines.radius[i] >= f.exactStrands) {
+            const float xa = lines.xa[i], ya = lines.ya[i], xb = lines.xb[i], yb = lines.yb[i];
+            const RibbonEdge a{lines.edgeAx[i], lines.edgeAy[i], lines.slopeA[i]},
+                b{lines.edgeBx[i], lines.edgeBy[i], lines.slopeB[i]};
+            const bool isTubeHere = lines.isRound[i] > 0.5f;
+            const float widest =
+                isTubeHere ? lines.radius[i] : std::sqrt(max(a.x * a.x + a.y * a.y, b.x * b.x + b.y * b.y));
+            if (max(xa, xb) < -widest || max(ya, yb) < -widest || min(xa, xb) >= width + widest ||
+                min(ya, yb) >= height + widest)
+                continue;
             const WideStrand s{xa,
                                ya,
                                xb,
@@ -235,22 +299,17 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
                 fillStrand(f, s, 0, int(f.height) - 1, visibility);
             continue;
         }
-        const float dx = std::fabs(xb - xa), dy = std::fabs(yb - ya);
-        if (dx >= dy)
-            drawLine(f, lines, i, {xa, ya, xb, yb, f.width, 1, f.width, f.height}, id, visibility);
-        else
-            drawLine(f, lines, i, {ya, xa, yb, xb, f.height, f.width, 1, f.width}, id, visibility);
-        // Every vertex as a point: a segment that is seen along its axis has no line.
-        const auto point = [&](float x, float y, float inverse, float half, float nearer) {
-            if (!(x >= 0 && y >= 0 && x < width && y < height)) return;
-            const uint32_t pixel = uint32_t(int(y)) * f.width + uint32_t(int(x));
-            const float dot_ = 3.14159265f * half * half * (1.0f - max(dx, dy) / max(2.0f * half, 1.0e-6f));
-            if (half < kNarrow && coverageThreshold(pixel, ~id, f.coverageSeed) >= dot_) return;
-            offer(visibility, pixel, inverse / nearer, id);
-        };
-        point(xa, ya, lines.inverseA[i], lines.halfA[i], lines.nearerA[i]);
-        point(xb, yb, lines.inverseB[i], lines.halfB[i], lines.nearerB[i]);
+        for (int k = 0; k < lines.count[i]; ++k) {
+            pixels.segment[collected] = uint32_t(i);
+            pixels.at[collected] = lines.first[i] + k;
+            if (++collected < LinePixels::kMost) continue;
+            drawPixels(f, lines, pixels, collected, firstId, visibility);
+            collected = 0;
+        }
+        if (lines.pixelA[i] != ~0u) offer(visibility, lines.pixelA[i], lines.inverseA[i] / lines.nearerA[i], id);
+        if (lines.pixelB[i] != ~0u) offer(visibility, lines.pixelB[i], lines.inverseB[i] / lines.nearerB[i], id);
     }
+    drawPixels(f, lines, pixels, collected, firstId, visibility);
 }
 
 void fillWide(const FrameConstants& frame, const WideStrand* strands, size_t count, uint32_t firstRow, uint32_t lastRow,
@@ -259,12 +318,10 @@ void fillWide(const FrameConstants& frame, const WideStrand* strands, size_t cou
     for (size_t i = 0; i < count; ++i) fillStrand(f, strands[i], int(firstRow), int(lastRow), visibility);
 }
 
-/// Segments of the pixels of a row, in camera space.
-struct StrandEnds {
-    alignas(64) float ax[kTile], ay[kTile], az[kTile], bx[kTile], by[kTile], bz[kTile];
-    alignas(64) float dax[kTile], day[kTile], daz[kTile], dbx[kTile], dby[kTile], dbz[kTile];
-    alignas(64) float ra[kTile], rb[kTile], isRound[kTile];
-    alignas(64) uint32_t colourA[kTile], colourB[kTile];
+/// Segments of the pixels of a row, as stored, and their nodes.
+struct StrandPixels {
+    alignas(64) uint32_t words[8][kTile];
+    alignas(64) float base[3][kTile], axes[9][kTile], edge[kTile];
 };
 struct StrandTexels {
     alignas(64) float depth[kTile], radius[kTile], thickness[kTile], x[kTile], y[kTile], perpX[kTile], perpY[kTile],
@@ -274,35 +331,30 @@ struct StrandTexels {
 /// Texels of the pixels that show strands.
 void resolveStrands(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, uint32_t x0, uint32_t y,
                     TexelRow& __restrict row, float& largestRadius) {
-    StrandEnds e;
+    StrandPixels e;
     StrandTexels o;
     const size_t n = p.count;
+    constexpr size_t kAhead = 10;  // pixels: segments lie anywhere in memory
     for (size_t i = 0; i < n; ++i) {
+        if (i + kAhead < n) {
+            const uint32_t ahead = p.id[i + kAhead];
+            __builtin_prefetch(in.strandBlocks[ahead / kSegmentsPerBlock].segments + ahead % kSegmentsPerBlock);
+        }
         const StrandBlock& block = in.strandBlocks[p.id[i] / kSegmentsPerBlock];
-        const StrandSegment& s = block.segments[p.id[i] % kSegmentsPerBlock];
-        const CameraSegment c = cameraSegment(*block.node, s);
-        e.ax[i] = c.a.x;
-        e.ay[i] = c.a.y;
-        e.az[i] = c.a.z;
-        e.bx[i] = c.b.x;
-        e.by[i] = c.b.y;
-        e.bz[i] = c.b.z;
-        e.dax[i] = c.directionA.x;
-        e.day[i] = c.directionA.y;
-        e.daz[i] = c.directionA.z;
-        e.dbx[i] = c.directionB.x;
-        e.dby[i] = c.directionB.y;
-        e.dbz[i] = c.directionB.z;
-        e.ra[i] = c.radiusA;
-        e.rb[i] = c.radiusB;
-        e.isRound[i] = c.isRound;
-        e.colourA[i] = s.a.colour;
-        e.colourB[i] = s.b.colour;
+        const uint32_t* const words = &block.segments[p.id[i] % kSegmentsPerBlock].a.positionXY;
+        const DrawNode& node = *block.node;
+        for (size_t k = 0; k < 8; ++k) e.words[k][i] = words[k];
+        e.base[0][i] = node.base.x;
+        e.base[1][i] = node.base.y;
+        e.base[2][i] = node.base.z;
+        const float* const axes = &node.axisX.x;
+        for (size_t k = 0; k < 9; ++k) e.axes[k][i] = axes[k];
+        e.edge[i] = node.edge;
         if (f.debugView == kDebugLevel || f.debugView == kDebugError) {
-            const vec3 d = f.debugView == kDebugLevel ? debugLevelColour(block.node->level)
-                                                      : debugErrorColour(block.node->errorPixels);
+            const vec3 d =
+                f.debugView == kDebugLevel ? debugLevelColour(node.level) : debugErrorColour(node.errorPixels);
             const auto byte = [](float l) { return uint32_t(int(srgbFromLinear(l) * 255.0f + 0.5f)); };
-            e.colourA[i] = e.colourB[i] = byte(d.x) | byte(d.y) << 8 | byte(d.z) << 16;
+            e.words[3][i] = e.words[7][i] = byte(d.x) | byte(d.y) << 8 | byte(d.z) << 16;
         }
     }
     const float focal = f.focal, cx = f.centre.x - float(int(x0)) - 0.5f, cy = f.centre.y - float(int(y)) - 0.5f;
@@ -311,14 +363,15 @@ void resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
     const float exactStrands = f.exactStrands;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
-        CameraSegment s;
-        s.a = vec3(e.ax[i], e.ay[i], e.az[i]);
-        s.b = vec3(e.bx[i], e.by[i], e.bz[i]);
-        s.radiusA = e.ra[i];
-        s.radiusB = e.rb[i];
-        s.directionA = vec3(e.dax[i], e.day[i], e.daz[i]);
-        s.directionB = vec3(e.dbx[i], e.dby[i], e.dbz[i]);
-        s.isRound = e.isRound[i];
+        const StrandSegment packed{{e.words[0][i], e.words[1][i], e.words[2][i], e.words[3][i]},
+                                   {e.words[4][i], e.words[5][i], e.words[6][i], e.words[7][i]}};
+        DrawNode node{};
+        node.base = vec3(e.base[0][i], e.base[1][i], e.base[2][i]);
+        node.axisX = vec3(e.axes[0][i], e.axes[1][i], e.axes[2][i]);
+        node.axisY = vec3(e.axes[3][i], e.axes[4][i], e.axes[5][i]);
+        node.axisZ = vec3(e.axes[6][i], e.axes[7][i], e.axes[8][i]);
+        node.edge = e.edge[i];
+        const CameraSegment s = cameraSegment(node, packed);
         const float px = float(int(p.pixel[i]));
         // Image coordinates from this pixel's centre on, so that the low bits are kept.
         const ScreenSegment on = projectSegment(s.a, s.b, focal, cx - px, cy, nearPlane);
@@ -336,8 +389,8 @@ void resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
         o.axisX[i] = t.axis.x;
         o.axisY[i] = t.axis.y;
         const auto mix = [&](uint32_t shift) {
-            const float a = linearFromByte(float(int(e.colourA[i] >> shift & 255u)) * (1.0f / 255.0f));
-            const float b = linearFromByte(float(int(e.colourB[i] >> shift & 255u)) * (1.0f / 255.0f));
+            const float a = linearFromByte(float(int(packed.a.colour >> shift & 255u)) * (1.0f / 255.0f));
+            const float b = linearFromByte(float(int(packed.b.colour >> shift & 255u)) * (1.0f / 255.0f));
             return a + place * (b - a);
         };
         o.red[i] = mix(0);

@@ -202,8 +202,11 @@ SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, fl
     // that only share a coarse texel are not one surface). What lies outside the image (depth < 0) may be filled or not
     // and does not keep a gap open.
     // Leaves are no surface (their thickness is 0): between them it stays open.
-    const float isSolid = (n0 < kFarAway && t0 <= 0.0f ? 0.0f : 1.0f) * (n1 < kFarAway && t1 <= 0.0f ? 0.0f : 1.0f) *
-                          (n2 < kFarAway && t2 <= 0.0f ? 0.0f : 1.0f) * (n3 < kFarAway && t3 <= 0.0f ? 0.0f : 1.0f);
+    const float thin0 = n0 < kFarAway ? t0 : 1.0f;
+    const float thin1 = n1 < kFarAway ? t1 : 1.0f;
+    const float thin2 = n2 < kFarAway ? t2 : 1.0f;
+    const float thin3 = n3 < kFarAway ? t3 : 1.0f;
+    const float isSolid = min(min(thin0, thin1), min(thin2, thin3)) > 0.0f ? 1.0f : 0.0f;
     const float noneEmpty =
         min(min(abs(q0.depth), abs(q1.depth)), min(abs(q2.depth), abs(q3.depth))) > 0.0f ? missed * isSolid : 0.0f;
     const float isBorder = min(min(q0.depth, q1.depth), min(q2.depth, q3.depth)) < 0.0f ? 1.0f : 0.0f;

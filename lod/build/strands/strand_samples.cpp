@@ -1,6 +1,7 @@
 #include "lod/build/strands/strand_samples.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 
@@ -113,6 +114,51 @@ StrandSamples sampleStrands(const StrandSet& strands, uint64_t count) {
         from = to;
     });
     return inOrder(std::move(out), colour);
+}
+
+std::vector<StrandSamples> splitSamples(const StrandSamples& samples, uint32_t most) {
+    struct Cube {
+        glm::dvec3 least;
+        double edge;
+        std::vector<uint32_t> of;
+    };
+    glm::dvec3 lo(1e300), hi(-1e300);
+    Cube all;
+    for (uint32_t k = 0; k < samples.points.position.size(); ++k) {
+        lo = glm::min(lo, samples.points.position[k]);
+        hi = glm::max(hi, samples.points.position[k]);
+        all.of.push_back(k);
+    }
+    all.least = lo;
+    all.edge = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
+    std::vector<Cube> open{std::move(all)};
+    std::vector<StrandSamples> out;
+    while (!open.empty()) {
+        const Cube cube = std::move(open.back());
+        open.pop_back();
+        if (cube.of.empty()) continue;
+        if (cube.of.size() <= most || !(cube.edge > samples.radius)) {
+            StrandSamples part;
+            part.radius = samples.radius;
+            for (const uint32_t k : cube.of) {
+                part.points.position.push_back(samples.points.position[k]);
+                part.points.normal.push_back(samples.points.normal[k]);
+                part.points.colour.push_back(samples.points.colour[k]);
+            }
+            out.push_back(std::move(part));
+            continue;
+        }
+        std::array<Cube, 8> octants;
+        const double half = 0.5 * cube.edge;
+        for (size_t o = 0; o < 8; ++o)
+            octants.at(o) = {cube.least + half * glm::dvec3(o & 1u, o >> 1 & 1u, o >> 2), half, {}};
+        for (const uint32_t k : cube.of) {
+            const glm::dvec3 p = samples.points.position[k] - cube.least;
+            octants.at((p.x >= half ? 1u : 0u) | (p.y >= half ? 2u : 0u) | (p.z >= half ? 4u : 0u)).of.push_back(k);
+        }
+        for (Cube& o : octants) open.push_back(std::move(o));
+    }
+    return out;
 }
 
 }  // namespace stipple::lod

@@ -20,4 +20,8 @@ struct StrandSamples {
 /// the same input gives the same discs. `strands` are clean.
 StrandSamples sampleStrands(const StrandSet& strands, uint64_t count);
 
+/// The same samples by where they are, in cubes of at most about `most`: what is near is to be shown finer than what is
+/// far, within one plant too. The order stays.
+std::vector<StrandSamples> splitSamples(const StrandSamples& samples, uint32_t most);
+
 }  // namespace stipple::lod
