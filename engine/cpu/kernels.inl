@@ -129,7 +129,7 @@ template <bool anyTurned>
         t.offset = vec2(c.x * scale + centreX - float(int(i)), c.y * scale + centreY);
         t.depth = valid ? t.depth : 0.0f;
         t.radius = valid ? t.radius : 0.0f;
-        t.thickness = (g.flags[i] & kFlagLoose) != 0u ? 0.0f : t.thickness;
+        t.thickness = (g.flags[i] & kFlagLoose) != 0u ? kLeafThickness * t.radius : t.thickness;
         t.colour = vec3(unpackRed(g.colour[i]), unpackGreen(g.colour[i]), unpackBlue(g.colour[i]));
         setTexel<false>(row, kPad + i, t);
     }
@@ -413,7 +413,9 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
             const float inverse = 1.0f / std::sqrt(vx * vx + vy * vy + 1.0f);
             const vec3 normal =
                 normalFromPerp(vec2(row.perpX[at], row.perpY[at]), vec3(vx * inverse, vy * inverse, inverse));
-            const float brightness = 1.0f + share[i] * (irradiance(normal, f.sunDirection, f.skyDirection) - 1.0f);
+            const float sunlight =
+                irradiance(normal, f.sunDirection, f.skyDirection, isLeaf(row.thickness[at], row.radius[at]));
+            const float brightness = 1.0f + share[i] * (sunlight - 1.0f);
             red[i] *= brightness;
             green[i] *= brightness;
             blue[i] *= brightness;

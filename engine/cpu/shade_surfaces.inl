@@ -19,6 +19,7 @@ void shadeSurfaces(const FrameConstants& f, const TexelRow& __restrict row, cons
         s.metallic = float(int(words[i] & 255u)) * (1.0f / 255.0f);
         s.roughness = float(int(words[i] >> 8 & 255u)) * (1.0f / 255.0f);
         s.occlusion = float(int(words[i] >> 16 & 255u)) * (1.0f / 255.0f);
+        s.leaf = isLeaf(row.thickness[kPad + i], row.radius[kPad + i]);
         return s;
     };
     const float ambient = f.ambient;

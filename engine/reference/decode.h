@@ -96,10 +96,16 @@ inline Segment decodeSegment(const lod::Hierarchy& h, const lod::Node& node, con
             from.b.colour / 16777216};
 }
 
+/// Share of the light on its far side that a leaf sends through.
+constexpr double kThroughLeaf = 0.6;
+
 /// Light of the scene's sun and sky on a white surface with eye-facing camera-space normal n.
-inline double lightOn(const glm::dvec3& n, const shared::FrameConstants& f) {
-    return 0.75 * std::max(0.0, glm::dot(n, glm::dvec3(f.sunDirection))) + 0.25 +
-           0.15 * glm::dot(n, glm::dvec3(f.skyDirection));
+inline double lightOn(const glm::dvec3& n, const shared::FrameConstants& f, bool isLeaf) {
+    const double towards = glm::dot(n, glm::dvec3(f.sunDirection));
+    return 0.75 * (towards > 0 ? towards
+                   : isLeaf    ? -kThroughLeaf * towards
+                               : 0.0) +
+           0.25 + 0.15 * glm::dot(n, glm::dvec3(f.skyDirection));
 }
 
 }  // namespace stipple::reference

@@ -80,15 +80,17 @@ Level pullLevel(const Level& fine, double childSize, double inverseFocal) {
             }
             if (list.empty()) continue;
             double back = 0, front = 1e300, deepest = 0, thickest = 0;
+            bool anyLeaf = false;
             Sample merged = blend(list, back, inverseFocal);
             for (const Contribution& c : list) {
                 front = std::min(front, c.sample->depth);
                 deepest = std::max(deepest, c.sample->depth);
                 thickest = std::max(thickest, c.sample->thickness);
+                anyLeaf = anyLeaf || c.sample->isLeaf(1 / inverseFocal);
             }
             merged.depth = front;
             merged.thickness = merged.isRound ? merged.radius * front * inverseFocal
-                                              : std::min(thickest + deepest - front, 2 * thickest);
+                                              : std::min(thickest + deepest - front, (anyLeaf ? 1 : 2) * thickest);
             coarse.ref(x, y) = merged;
         }
     return coarse;
@@ -126,8 +128,8 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize, double inverse
                 // So does what shines through from behind all four.
                 const bool shines = around.size() == 4 && fine.ref(x, y).valid && fine.ref(x, y).depth > hindmost;
                 // Leaves are no surface: between them it stays open.
-                const bool isSolid =
-                    std::all_of(around.begin(), around.end(), [](const auto& a) { return a.first->thickness > 0; });
+                const bool isSolid = std::all_of(around.begin(), around.end(),
+                                                 [&](const auto& a) { return !a.first->isLeaf(1 / inverseFocal); });
                 const bool between = least >= 1 && isSolid && (gap || shines);
                 const double weight = std::max(rest * rest, between && rho2 <= least ? 0.01 : 0.0);
                 if (weight > 0) list.push_back({s, weight});
@@ -206,7 +208,8 @@ class ReferenceBackend final : public render::Backend {
                 s.radius = std::clamp(instance.scale * disc.radius * f.supportScale * v.focalPixels / c.z,
                                       double(f.minimumRadius), 16384.0);
                 s.thickness = s.radius * c.z / v.focalPixels * (0.25 + std::sqrt(std::max(0.0, 1 - facing * facing)));
-                if ((disc.flags & shared::kFlagLoose) != 0) s.thickness = 0;
+                if ((disc.flags & shared::kFlagLoose) != 0)
+                    s.thickness = kLeafThickness * s.radius * c.z / v.focalPixels;
                 s.perp = dvec2(rotationToZ(toPoint) * n);
                 s.colour = disc.colour;
                 if (f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError)
@@ -263,7 +266,7 @@ class ReferenceBackend final : public render::Backend {
                                 ((f.shade & shared::kShadeLit) != 0 && (!draws.lights.empty() || draws.environment)))) {
                         colour = shadeTriangle(s, n, toPixel * (s.depth / toPixel.z), draws);
                     } else if ((f.shade & shared::kShadeLit) != 0 && f.debugView == shared::kDebugNone) {
-                        colour *= lightOn(n, f);
+                        colour *= lightOn(n, f, s.isLeaf(v.focalPixels));
                     }
                     if (wantAll) {
                         image.depth[i] = static_cast<float>(s.depth);

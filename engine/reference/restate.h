@@ -24,7 +24,11 @@ struct Sample {
     bool isTriangle = false, isUnlit = false;
     double metallic = 0, roughness = 1, occlusion = 1;
     glm::dvec3 emissive{0};
+    /// No surface, and lets light through: hardly any thickness.
+    bool isLeaf(double focal) const { return thickness * focal < 0.125 * radius * depth; }
 };
+/// Thickness of leaves, over their radius.
+constexpr double kLeafThickness = 1.0 / 16;
 
 struct Level {
     int width = 0, height = 0;

@@ -269,7 +269,7 @@ class StrandProjector {
             s.depth *= 1 + farther;
         }
         s.radius = 0.25;
-        s.thickness = 0.25 * s.depth / view_.focalPixels;
+        s.thickness = (s_.isTube ? 1 : kLeafThickness) * 0.25 * s.depth / view_.focalPixels;
         s.centre = pixel;
         s.isRound = false;
         s.axis = dvec2(0);

@@ -30,9 +30,9 @@ dvec3 bump(const dvec3& normal, const Corners& c, const dvec3& texel, double sca
 }
 
 /// Times pi, as a light's colour is what a white diffuse surface sends back.
-dvec3 reflected(const Sample& s, const dvec3& n, const dvec3& v, const dvec3& l, const dvec3& light) {
+dvec3 reflected(const Sample& s, const dvec3& n, const dvec3& v, const dvec3& l, const dvec3& light, double focal) {
     const double nl = glm::dot(n, l), nv = std::max(glm::dot(n, v), 1e-3);
-    if (!(nl > 0)) return dvec3(0);
+    if (!(nl > 0)) return !s.isLeaf(focal) ? dvec3(0) : light * s.colour * (1 - s.metallic) * (kThroughLeaf * -nl);
     const dvec3 h = glm::normalize(l + v);
     const double nh = std::max(0.0, glm::dot(n, h)), vh = std::max(0.0, glm::dot(v, h));
     const double alpha2 = std::pow(std::max(s.roughness * s.roughness, 2e-3), 2);
@@ -212,11 +212,12 @@ dvec3 shadeTriangle(const Sample& s, const dvec3& n, const dvec3& point, const r
         blurred = mirrored(draws.environment->table, toMap * mirror, s.roughness);
     }
     dvec3 sum = double(f.ambient) * s.occlusion * (s.colour * (1 - s.metallic) * around + (f0 * ab.x + ab.y) * blurred);
-    if (draws.lights.empty() && !draws.environment) sum += reflected(s, n, v, dvec3(f.sunDirection), dvec3(0.75));
+    if (draws.lights.empty() && !draws.environment)
+        sum += reflected(s, n, v, dvec3(f.sunDirection), dvec3(0.75), draws.view.focalPixels);
     for (const shared::LightSource& light : draws.lights) {
         const dvec3 colour(light.colour);
         if (light.kind == shared::kLightDirectional) {
-            sum += reflected(s, n, v, dvec3(light.position), colour);
+            sum += reflected(s, n, v, dvec3(light.position), colour, draws.view.focalPixels);
             continue;
         }
         const dvec3 to = dvec3(light.position) - point;
@@ -228,7 +229,7 @@ dvec3 shadeTriangle(const Sample& s, const dvec3& n, const dvec3& point, const r
             share *= std::pow(
                 std::clamp((along - light.cosOuter) / std::max(1e-4f, light.cosInner - light.cosOuter), 0.0, 1.0), 2);
         }
-        sum += reflected(s, n, v, to / distance, colour * share);
+        sum += reflected(s, n, v, to / distance, colour * share, draws.view.focalPixels);
     }
     return sum + s.emissive;
 }

@@ -171,7 +171,7 @@ class Tracer {
         colour = s.colour;
         if ((f.shade & shared::kShadeLit) == 0) return true;
         if (draws_.lights.empty() && !draws_.environment)
-            colour *= lightOn(n, f);
+            colour *= lightOn(n, f, s.isLeaf(view_.focalPixels));
         else
             colour = shadeTriangle(s, n, point, draws_);
         return true;
@@ -215,6 +215,7 @@ class Tracer {
                     best.place = p;
                     best.t = t;
                     best.isTriangle = best.isStrand = false;
+                    best.sample.thickness = 1;
                     best.thickness =
                         place.scale * store.discs[item].radius * (0.25 + std::sqrt(std::max(0.0, 1 - m * m)));
                 }
@@ -231,6 +232,8 @@ class Tracer {
         best.t = hit.t;
         best.isStrand = true;
         best.sample.colour = glm::mix(s.colourA, s.colourB, hit.place);
+        best.sample.thickness = s.isTube ? 1 : 0;  // a ribbon is a leaf
+        best.sample.radius = best.sample.depth = 1;
         best.normal = toCamera(place.rotation * hit.normal);
     }
 
@@ -258,6 +261,7 @@ class Tracer {
         best.isTriangle = true;
         best.isStrand = false;
         best.sample = sample;
+        best.sample.thickness = 1;
         best.normal = n;
     }
 

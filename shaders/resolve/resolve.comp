@@ -26,7 +26,7 @@ void main() {
         vec3 n = -normalize(c);
         if ((recordFlags(r) & kFlagNoNormal) == 0u) n = nodeDirection(node, octDecode(r.normal));
         t = texelFromSplat(c, n, node.edge * radiusFraction(recordRadiusCode(r)) * frame.supportScale, frame.focal, frame.minimumRadius);
-        if ((recordFlags(r) & kFlagLoose) != 0u) t.thickness = 0.0;
+        if ((recordFlags(r) & kFlagLoose) != 0u) t.thickness = kLeafThickness * t.radius;
         const float scale = frame.focal / c.z;
         t.offset = vec2(c.x * scale + (frame.centre.x - 0.5) - float(pixel.x), c.y * scale + (frame.centre.y - 0.5) - float(pixel.y));
         t.colour = vec3(linearFromSrgb(float(r.colour & 255u) / 255.0), linearFromSrgb(float(r.colour >> 8 & 255u) / 255.0),

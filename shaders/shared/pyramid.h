@@ -131,7 +131,11 @@ SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSi
     Texel t = texelFromBlend(b, isRound);
     const float deepest = max(max(w0 * c0.depth, w1 * c1.depth), max(w2 * c2.depth, w3 * c3.depth));
     const float thickest = max(max(w0 * t0, w1 * t1), max(w2 * t2, w3 * t3));
-    const float world = min(thickest + deepest - front, 2.0f * thickest);
+    // Leaves stay leaves.
+    const float thinnest =
+        min(min(w0 > 0.0f ? c0.thickness / c0.radius : 1.0f, w1 > 0.0f ? c1.thickness / c1.radius : 1.0f),
+            min(w2 > 0.0f ? c2.thickness / c2.radius : 1.0f, w3 > 0.0f ? c3.thickness / c3.radius : 1.0f));
+    const float world = min(thickest + deepest - front, (thinnest < kLeafLimit ? 1.0f : 2.0f) * thickest);
     t.depth = b.weight > 0.0f ? front : 0.0f;
     t.thickness = b.weight > 0.0f ? world / (front * inverseFocal) : 0.0f;
     return t;
@@ -201,12 +205,12 @@ SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, fl
     // An empty texel between four filled ones is not left open: whatever is nearest counts, within reason (large discs
     // that only share a coarse texel are not one surface). What lies outside the image (depth < 0) may be filled or not
     // and does not keep a gap open.
-    // Leaves are no surface (their thickness is 0): between them it stays open.
-    const float thin0 = n0 < kFarAway ? t0 : 1.0f;
-    const float thin1 = n1 < kFarAway ? t1 : 1.0f;
-    const float thin2 = n2 < kFarAway ? t2 : 1.0f;
-    const float thin3 = n3 < kFarAway ? t3 : 1.0f;
-    const float isSolid = min(min(thin0, thin1), min(thin2, thin3)) > 0.0f ? 1.0f : 0.0f;
+    // Between leaves it stays open.
+    const float leaves = max(max(n0 < kFarAway ? isLeaf(q0.thickness, q0.radius) : 0.0f,
+                                 n1 < kFarAway ? isLeaf(q1.thickness, q1.radius) : 0.0f),
+                             max(n2 < kFarAway ? isLeaf(q2.thickness, q2.radius) : 0.0f,
+                                 n3 < kFarAway ? isLeaf(q3.thickness, q3.radius) : 0.0f));
+    const float isSolid = 1.0f - leaves;
     const float noneEmpty =
         min(min(abs(q0.depth), abs(q1.depth)), min(abs(q2.depth), abs(q3.depth))) > 0.0f ? missed * isSolid : 0.0f;
     const float isBorder = min(min(q0.depth, q1.depth), min(q2.depth, q3.depth)) < 0.0f ? 1.0f : 0.0f;

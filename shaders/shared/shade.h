@@ -5,9 +5,14 @@
 #include "splat.h"
 SHARED_BEGIN
 
+// Leaves let light through: what falls on the far side comes out on this one, less this share that stays inside. (In
+// the visible, leaves send about as much through as back.)
+const float kLeafGlow = 0.6f;
+
 // Light that a white surface with the eye-facing normal n sends to the eye.
-SHARED_FN float irradiance(vec3 n, vec3 sunDirection, vec3 skyDirection) {
-    return 0.75f * max(dot(n, sunDirection), 0.0f) + 0.25f + 0.15f * dot(n, skyDirection);
+SHARED_FN float irradiance(vec3 n, vec3 sunDirection, vec3 skyDirection, float leaf) {
+    const float towards = dot(n, sunDirection);
+    return 0.75f * (max(towards, 0.0f) + leaf * kLeafGlow * max(-towards, 0.0f)) + 0.25f + 0.15f * dot(n, skyDirection);
 }
 
 // Metallic-roughness surface (glTF 2.0, appendix B): GGX with Smith's shadowing (Heitz 2014) and Schlick's Fresnel.
@@ -18,11 +23,13 @@ struct Surface {
     float metallic;
     float roughness;
     float occlusion;
+    float leaf;  // 1: lets light through
 };
 
 // Light that comes back from one direction `l`, times what a white diffuse surface would send there.
 SHARED_FN vec3 reflectLight(Surface s, vec3 l, vec3 light) {
-    const float nl = max(dot(s.normal, l), 0.0f);
+    const float towards = dot(s.normal, l);
+    const float nl = max(towards, 0.0f);
     const float nv = max(dot(s.normal, s.toEye), 1.0e-3f);
     vec3 h = vec3(l.x + s.toEye.x, l.y + s.toEye.y, l.z + s.toEye.z);
     const float inverse = 1.0f / sqrt(max(dot(h, h), 1.0e-12f));
@@ -41,9 +48,10 @@ SHARED_FN vec3 reflectLight(Surface s, vec3 l, vec3 light) {
     const vec3 f0 = vec3(0.04f + (s.colour.x - 0.04f) * s.metallic, 0.04f + (s.colour.y - 0.04f) * s.metallic,
                          0.04f + (s.colour.z - 0.04f) * s.metallic);
     const vec3 f = vec3(f0.x + (1.0f - f0.x) * k5, f0.y + (1.0f - f0.y) * k5, f0.z + (1.0f - f0.z) * k5);
-    return vec3(light.x * nl * (s.colour.x * diffuse * (1.0f - f.x) + f.x * specular),
-                light.y * nl * (s.colour.y * diffuse * (1.0f - f.y) + f.y * specular),
-                light.z * nl * (s.colour.z * diffuse * (1.0f - f.z) + f.z * specular));
+    const float through = s.leaf * kLeafGlow * diffuse * max(-towards, 0.0f);
+    return vec3(light.x * (nl * (s.colour.x * diffuse * (1.0f - f.x) + f.x * specular) + through * s.colour.x),
+                light.y * (nl * (s.colour.y * diffuse * (1.0f - f.y) + f.y * specular) + through * s.colour.y),
+                light.z * (nl * (s.colour.z * diffuse * (1.0f - f.z) + f.z * specular) + through * s.colour.z));
 }
 
 // The sky's light: 0.25 of white from the side, more from above.

@@ -56,6 +56,13 @@ SHARED_FN float ellipseRho2(vec2 normalPerp, float radius, float dx, float dy) {
     return (m2 * (dx * dx + dy * dy) + along * along) / (m2 * radius * radius);
 }
 
+// Leaves are no surface: they have hardly any thickness (half of it, over the radius), so that they are not merged with
+// what is behind them, and nothing closes the gaps between them. Not none: of copies of one leaf none is in front.
+const float kLeafThickness = 0.0625f;
+const float kLeafLimit = 0.125f;
+// 1 for leaves.
+SHARED_FN float isLeaf(float thickness, float radius) { return thickness < kLeafLimit * radius ? 1.0f : 0.0f; }
+
 // Everything of a full-size texel but its place and colour. `c`: centre in camera space, `n`: unit normal (any side),
 // `radiusWorld`: support radius, world units.
 SHARED_FN Texel texelFromSplat(vec3 c, vec3 n, float radiusWorld, float focal, float minimumRadius) {

@@ -308,7 +308,7 @@ SHARED_FN Texel exactTexel(Texel t, float dx, float dy, float farther, float inv
     r.depth = isRound ? s.depth : t.depth * (1.0f + farther);
     r.normalPerp = vec2(isRound ? s.normalPerp.x : t.normalPerp.x, isRound ? s.normalPerp.y : t.normalPerp.y);
     r.radius = 0.25f;
-    r.thickness = 0.25f;
+    r.thickness = (isRound ? 1.0f : kLeafThickness) * 0.25f;  // a filled ribbon is a leaf
     r.offset = vec2(0.0f, 0.0f);
     r.isRound = 0.0f;
     r.axis = vec2(0.0f, 0.0f);
