@@ -98,5 +98,6 @@ void setupRender(CLI::App& app, int& status);
 void setupView(CLI::App& app, int& status);
 void setupCompare(CLI::App& app, int& status);
 void setupGrow(CLI::App& app, int& status);
+void setupConvert(CLI::App& app, int& status);
 
 }  // namespace stipple::app

@@ -1,0 +1,147 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "apps/stipple/common.h"
+#include "engine/base/process.h"
+#include "engine/scene/strand_fit.h"
+#include "engine/scene/triangles.h"
+#include "lod/build/mesh/mesh_build.h"
+#include "lod/build/strands/strand_build.h"
+
+namespace stipple::app {
+namespace {
+namespace fs = std::filesystem;
+
+struct Options {
+    std::string input, output;
+    bool strands = false, json = false, repair = false;
+    scene::StrandFitSettings fit;
+};
+
+/// The strands as lines with radii (and normals: ribbons), beside what is left of the scene.
+void addLines(const lod::StrandSet& strands, scene::Scene& scene) {
+    scene::Mesh mesh;
+    mesh.name = "strands";
+    mesh.primitives.resize(2);  // tubes, ribbons
+    for (scene::Primitive& p : mesh.primitives) {
+        p.kind = scene::PrimitiveKind::lines;
+        p.material = -1;
+    }
+    for (size_t s = 0; s < strands.strands(); ++s) {
+        const bool isRibbon = strands.isRibbon[s] != 0;
+        scene::Primitive& p = mesh.primitives[isRibbon ? 1 : 0];
+        for (uint32_t i = strands.first[s]; i < strands.first[s + 1]; ++i) {
+            const auto at = static_cast<uint32_t>(p.position.size());
+            p.position.emplace_back(strands.position[i]);
+            p.radius.push_back(strands.radius[i]);
+            if (isRibbon) p.normal.push_back(glm::normalize(strands.normal[i]));
+            const auto channel = [&](uint32_t shift) {
+                return shared::linearFromSrgb(static_cast<float>(strands.colour[i] >> shift & 255u) / 255.0f);
+            };
+            p.colour.emplace_back(channel(0), channel(8), channel(16), 1);
+            if (i > strands.first[s]) p.indices.insert(p.indices.end(), {at - 1, at});
+        }
+    }
+    std::erase_if(mesh.primitives, [](const scene::Primitive& p) { return p.indices.empty(); });
+    if (mesh.primitives.empty()) return;
+    scene.meshes.push_back(std::move(mesh));
+    scene::Node node;
+    node.name = "strands";
+    node.mesh = static_cast<int>(scene.meshes.size()) - 1;
+    scene.nodes.push_back(std::move(node));
+}
+
+Result<void> run(const Options& o) {
+    if (!o.strands)
+        return fail(ErrorKind::usage, "says nothing of what to convert to", "stipple convert",
+                    "give --strands: polygon plants become ribbons and tubes");
+    if (!isSceneFile(o.input))
+        return fail(ErrorKind::usage, "is not a mesh", o.input, "give a .gltf, .glb or .obj file");
+    const std::string extension = fs::path(o.output).extension().string();
+    if (extension != ".stipple" && extension != ".glb" && extension != ".gltf")
+        return fail(ErrorKind::usage, "is neither a store nor a scene", o.output, "write to .stipple, .glb or .gltf");
+    const double start = nowSeconds();
+    const auto executor = makeTbbExecutor(0);
+    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(o.input, o.repair));
+    STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene));
+    scene::StrandFit fit = scene::fitStrands(scene, images, o.fit, *executor);
+    if (fit.trianglesIn == 0) return fail(ErrorKind::input, "holds no triangles", o.input);
+    for (scene::Mesh& mesh : fit.rest.meshes)
+        std::erase_if(mesh.primitives, [](const scene::Primitive& p) { return p.indices.empty(); });
+    const bool hasStrands = fit.strands.strands() > 0;
+    std::vector<std::string> written;
+    if (extension != ".stipple") {
+        addLines(fit.strands, fit.rest);
+        STIPPLE_TRY(scene::writeGltf(fit.rest, o.output));
+        written.push_back(o.output);
+    } else {
+        if (!hasStrands) return fail(ErrorKind::input, "has no part that looks like a ribbon or a tube", o.input);
+        Progress progress(!o.json);
+        lod::StrandBuildSettings settings;
+        settings.description.source = fs::path(o.input).filename().string();
+        STIPPLE_TRY(lod::buildStrandStore(lod::cleanStrands(fit.strands, 0), o.output, settings, *executor, progress));
+        written.push_back(o.output);
+        if (fit.trianglesLeft > 0) {
+            // A store holds one kind: the rest stands beside it, and a scene that has both.
+            const fs::path base = fs::path(o.output).replace_extension();
+            const std::string rest = base.string() + ".rest.glb", both = base.string() + ".glb";
+            STIPPLE_TRY(scene::writeGltf(fit.rest, rest));
+            scene::Scene all = fit.rest;
+            scene::Node node;
+            node.name = "strands";
+            node.store = fs::path(o.output).filename().string();
+            all.nodes.push_back(node);
+            STIPPLE_TRY(scene::writeGltf(all, both));
+            written.push_back(rest);
+            written.push_back(both);
+        }
+    }
+    if (o.json) {
+        fmt::print("{}\n",
+                   nlohmann::json{
+                       {"triangles", fit.trianglesIn},
+                       {"triangles_left", fit.trianglesLeft},
+                       {"ribbons", fit.ribbons},
+                       {"tubes", fit.tubes},
+                       {"segments", fit.strands.position.size() - fit.strands.strands()},
+                       {"deviation",
+                        {{"mean", fit.meanDeviation}, {"p95", fit.p95Deviation}, {"largest", fit.largestDeviation}}},
+                       {"written", written},
+                       {"seconds", nowSeconds() - start}}
+                       .dump(2));
+        return {};
+    }
+    fmt::print("{}: {} triangles became {} ribbons and {} tubes ({} segments); {} triangles are left\n", o.input,
+               fit.trianglesIn, fit.ribbons, fit.tubes, fit.strands.position.size() - fit.strands.strands(),
+               fit.trianglesLeft);
+    fmt::print(
+        "  from the mesh to its strands: {:.3g} on average, {:.3g} for 95 %, {:.3g} at most (units of the file)\n",
+        fit.meanDeviation, fit.p95Deviation, fit.largestDeviation);
+    for (const std::string& path : written) fmt::print("  {}\n", path);
+    return {};
+}
+
+}  // namespace
+
+void setupConvert(CLI::App& app, int& status) {
+    auto o = std::make_shared<Options>();
+    CLI::App* sub = app.add_subcommand("convert", "polygon plants to ribbons and tubes");
+    sub->add_option("input", o->input, "the plant (.gltf, .glb, .obj)")->required();
+    sub->add_option("-o,--output", o->output, "the file to write (.stipple; .glb or .gltf: lines with radii)")
+        ->required();
+    sub->add_flag("--strands", o->strands, "leaves and blades become ribbons, branches tubes; what is neither is kept");
+    sub->add_option("--tolerance", o->fit.tolerance, "how far a part may be from its strand, share of its own width")
+        ->check(CLI::Range(0.01, 2.0))
+        ->capture_default_str();
+    sub->add_option("--joints", o->fit.joints, "segments of a strand at most")
+        ->check(CLI::Range(2, 1000))
+        ->capture_default_str();
+    sub->add_flag("--repair", o->repair, "pass over faults of a glTF file that change nothing that is drawn");
+    sub->add_flag("--json", o->json, "as JSON");
+    sub->callback([o, &status] {
+        if (const auto result = run(*o); !result) status = report(result.error());
+    });
+}
+
+}  // namespace stipple::app

@@ -1,0 +1,31 @@
+// Polygon plants as ribbons and tubes: each connected part of a mesh (a leaf, a blade, a branch) is fitted by one
+// strand, if it looks like one.
+#pragma once
+
+#include "engine/base/executor.h"
+#include "engine/scene/surfels.h"
+#include "lod/strands.h"
+
+namespace stipple::scene {
+
+struct StrandFitSettings {
+    /// A part is replaced where the strand is no farther from it than this share of its own width (tubes: diameter).
+    double tolerance = 0.35;
+    int joints = 12;  ///< of a strand at most
+};
+
+struct StrandFit {
+    lod::StrandSet strands;  ///< of all visible meshes, instances included, world space
+    Scene rest;              ///< the same scene with the triangles that are left
+    uint64_t trianglesIn = 0, trianglesLeft = 0, ribbons = 0, tubes = 0;
+    // Distance from the replaced surface to its strand, world units, weighted by area.
+    double meanDeviation = 0, p95Deviation = 0, largestDeviation = 0;
+};
+
+/// A ribbon where the part is open and flat across, a tube where its surface lies round an axis; everything else stays.
+/// Colours are means over each part: vertex colours, materials, textures (`images` are those of the scene, decoded).
+/// What a material's alpha cuts away is not there. Instanced meshes are fitted once a place.
+StrandFit fitStrands(const Scene& scene, const std::vector<DecodedImage>& images, const StrandFitSettings& settings,
+                     Executor& executor);
+
+}  // namespace stipple::scene
