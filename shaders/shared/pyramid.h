@@ -219,7 +219,7 @@ SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, fl
     const float oneFilled = least < farthest ? noneEmpty : 0.0f;
     // So does what lies behind all four: a point of the far side that shines through between the near ones.
     const float hindmost = max(max(n0 + t0, n1 + t1), max(n2 + t2, n3 + t3));
-    const float shines = fine.depth > hindmost ? missed : 0.0f;
+    const float shines = fine.depth > hindmost ? missed * isSolid : 0.0f;
     const float between = fine.depth <= 0.0f ? oneFilled : shines;
     const float k0 = max(kernelWeight(r0 * scale), between * gapWeight(r0, least));
     const float k1 = max(kernelWeight(r1 * scale), between * gapWeight(r1, least));

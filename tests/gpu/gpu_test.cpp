@@ -8,6 +8,8 @@
 #include "engine/gpu/gpu_backend.h"
 #include "engine/gpu/pages.h"
 #include "engine/reference/reference.h"
+#include "engine/scene/camera.h"
+#include "tests/support/forests.h"
 #include "tests/support/meshes.h"
 #include "tests/support/strands.h"
 #include "tests/support/support.h"
@@ -130,6 +132,26 @@ TEST_F(Gpu, DrawsRibbonsAndTubesAmongPointsAsTheOracleDoes) {
                 EXPECT_LE(d->differingFraction, 0.008) << radius << ", closer " << closer << ", exact " << exact;
                 view.eye -= closer * view.forward;
             }
+    }
+    // Trees from near and far: discs of leaves beside strands.
+    const test::Forest forest = test::plantForest(folder_.path(), 6, *executor_);
+    for (const glm::dvec3& eye : {glm::dvec3(20, 4, 60), glm::dvec3(20, 60, 400)}) {
+        scene::Camera camera;
+        camera.eye = eye;
+        camera.target = {20, 6, 20};
+        camera.up = {0, 1, 0};
+        const lod::View view = scene::makeView(camera, 400, 300, 0.05);
+        settings.draw.exactStrands = 2;
+        settings.budgets.errorPixels = 2;
+        const auto image = [&](render::Backend& backend) {
+            auto state = render::makeFrameState(forest.placed, backend, *executor_, {}, forest.crowds);
+            EXPECT_TRUE(render::renderUntilComplete(*state, view, settings, *executor_));
+            return state->image;
+        };
+        const auto d = reference::compareImages(image(*gpu), image(*oracle), 4, nullptr);
+        ASSERT_TRUE(d);
+        EXPECT_GE(d->psnr, 38) << eye.y;
+        EXPECT_LE(d->differingFraction, 0.01) << eye.y;
     }
     EXPECT_EQ(gpu->resources().strandPipelines, 3u);
     EXPECT_GT(gpu->resources().strandBytes, 0u);

@@ -1,0 +1,211 @@
+// Forests as pictures: every backend against the oracle, discs against the strands that they stand for, a path from a
+// kilometre to a leaf.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "apps/grow/plants.h"
+#include "engine/cpu/cpu_backend.h"
+#include "engine/cpu/kernels.h"
+#include "engine/reference/reference.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/strand_fit.h"
+#include "engine/scene/triangles.h"
+#include "lod/build/mesh/mesh_build.h"
+#include "tests/support/forests.h"
+
+namespace stipple {
+namespace {
+
+class Forests : public testing::Test {
+  protected:
+    static lod::View viewFrom(const glm::dvec3& eye, const glm::dvec3& target, uint32_t width, uint32_t height) {
+        scene::Camera camera;
+        camera.eye = eye;
+        camera.target = target;
+        camera.up = {0, 1, 0};
+        return scene::makeView(camera, width, height, 0.02);
+    }
+    static render::FrameSettings lit(double tau) {
+        render::FrameSettings s;
+        s.draw.lit = true;
+        s.draw.worldUp = {0, 1, 0};
+        s.budgets.errorPixels = tau;
+        return s;
+    }
+    /// Share of the image that is covered, and mean linear green of that.
+    static std::pair<double, double> coverOf(const render::Image& image) {
+        double covered = 0, green = 0;
+        for (const uint32_t c : image.rgba) {
+            if (c >> 24 == 0) continue;
+            ++covered;
+            green += shared::linearFromSrgb(static_cast<float>(c >> 8 & 255u) / 255.0f);
+        }
+        return {covered / static_cast<double>(image.rgba.size()), green / std::max(covered, 1.0)};
+    }
+    test::TempFolder folder_;
+    std::unique_ptr<Executor> executor_ = makeTbbExecutor(0);
+};
+
+TEST_F(Forests, AreThoseOfTheOracleOnEveryInstructionSet) {
+    const test::Forest forest = test::plantForest(folder_.path(), 8, *executor_);
+    const auto oracle = reference::makeReferenceBackend(*executor_);
+    const auto image = [&](render::Backend& backend, const lod::View& view, double tau) {
+        auto state = render::makeFrameState(forest.placed, backend, *executor_, {}, forest.crowds);
+        EXPECT_TRUE(render::renderUntilComplete(*state, view, lit(tau), *executor_));
+        return state->image;
+    };
+    // Among the trees, over them, and from so far that only their points are seen.
+    for (const auto& [eye, tau] : {std::pair{glm::dvec3(28, 4, 75), 2.0}, std::pair{glm::dvec3(28, 40, 120), 2.0},
+                                   std::pair{glm::dvec3(400, 200, 700), 1.0}}) {
+        const lod::View view = viewFrom(eye, {28, 6, 28}, 401, 303);
+        const render::Image expected = image(*oracle, view, tau);
+        size_t count = 0;
+        const cpu::Kernels* const* all = cpu::availableKernels(count);
+        for (size_t k = 0; k < count; ++k) {
+            const auto backend = cpu::makeCpuBackend(*executor_, all[k]);
+            const auto d = reference::compareImages(image(*backend, view, tau), expected, 4, nullptr);
+            ASSERT_TRUE(d);
+            EXPECT_GE(d->psnr, 38) << all[k]->name << ", tau " << tau;
+            EXPECT_LE(d->differingFraction, 0.01) << all[k]->name << ", tau " << tau;
+        }
+    }
+}
+
+TEST_F(Forests, DiscsCoverAsMuchAsTheStrandsThatTheyStandFor) {
+    const test::Forest forest = test::plantForest(folder_.path(), 8, *executor_);
+    const auto backend = cpu::makeCpuBackend(*executor_);
+    const lod::View view = viewFrom({28, 20, 230}, {28, 8, 28}, 960, 540);
+    std::vector<render::PlacedStore> plain = forest.placed;
+    for (render::PlacedStore& p : plain) {
+        p.standIns = nullptr;
+        p.isMember = false;
+    }
+    // Strands narrower than a pixel are covered by chance: the mean of many frames.
+    double covered = 0;
+    auto state = render::makeFrameState(plain, *backend, *executor_, {});
+    constexpr uint32_t kFrames = 16;
+    for (uint32_t k = 0; k < kFrames; ++k) {
+        render::FrameSettings exact = lit(0.05);
+        exact.draw.coverageSeed = k;
+        EXPECT_TRUE(render::renderUntilComplete(*state, view, exact, *executor_));
+        covered += coverOf(state->image).first / kFrames;
+    }
+    auto far = render::makeFrameState(forest.placed, *backend, *executor_, {}, forest.crowds);
+    EXPECT_TRUE(render::renderUntilComplete(*far, view, lit(1), *executor_));
+    EXPECT_GT(far->counters.standIns + far->counters.crowdMembers, 0u);
+    EXPECT_NEAR(coverOf(far->image).first / covered, 1, 0.08);
+    EXPECT_TRUE(render::renderUntilComplete(*far, view, lit(2), *executor_));
+    EXPECT_NEAR(coverOf(far->image).first / covered, 1, 0.15);
+}
+
+TEST_F(Forests, LeavesLetLightThrough) {
+    // One leaf, the sun in front of it and behind it.
+    lod::StrandSet leaf = test::oneStrand({{-0.5, 0, 0}, {0.5, 0, 0}}, 0.4f, {{0, 0, 1}, {0, 0, 1}});
+    const auto store = test::buildStrands(leaf, folder_ / "leaf.stipple", *executor_);
+    const auto backend = cpu::makeCpuBackend(*executor_);
+    const lod::View view = viewFrom({0, 0, 2}, {0, 0, 0}, 200, 150);
+    const auto greenUnder = [&](const glm::dvec3& shinesTo) {
+        render::FrameSettings settings = lit(0.1);
+        settings.draw.lights = {{shared::kLightDirectional, {}, shinesTo, glm::vec3(2)}};
+        return coverOf(test::draw({{store, {}, {}}}, *backend, *executor_, view, settings)).second;
+    };
+    const double front = greenUnder({0, 0, -1}), through = greenUnder({0, 0, 1}), beside = greenUnder({1, 0, 0});
+    EXPECT_GT(front, through);
+    EXPECT_GT(through, 1.5 * beside);
+}
+
+/// The triangles of a grown tree become strands that look like them.
+TEST_F(Forests, AConvertedPlantCoversWhatItsTrianglesCover) {
+    grow::PlantOptions plant;
+    plant.leaves = 6000;
+    plant.asTriangles = true;
+    const scene::Scene scene = grow::growPlant(plant);
+    scene::StrandFit fit = scene::fitStrands(scene, {}, {}, *executor_);
+    EXPECT_NEAR(static_cast<double>(fit.ribbons), 6000, 60);
+    EXPECT_GT(fit.tubes, 5000u);
+    EXPECT_LT(static_cast<double>(fit.trianglesLeft), 0.05 * static_cast<double>(fit.trianglesIn));
+    EXPECT_LT(fit.meanDeviation, 0.01);
+    const auto strands = test::buildStrands(lod::cleanStrands(fit.strands, 0), folder_ / "strands.stipple", *executor_);
+    lod::MeshBuildSettings settings;
+    settings.description.materials = scene::surfaceMaterials(scene);
+    settings.description.up = {0, 1, 0};
+    Progress progress(false);
+    const auto mesh = [&](const scene::Scene& of, const std::string& name) {
+        EXPECT_TRUE(lod::buildMeshStore(scene::flattenTriangles(of, scene::placements(of)), folder_ / name, settings,
+                                        *executor_, progress));
+        return std::make_shared<const lod::Store>(*lod::openStore(folder_ / name));
+    };
+    const auto whole = mesh(scene, "whole.stipple"), rest = mesh(fit.rest, "rest.stipple");
+    const auto backend = cpu::makeCpuBackend(*executor_);
+    for (const double distance : {9.0, 30.0}) {
+        const lod::View view = viewFrom({0, 5, distance}, {0, 5, 0}, 960, 720);
+        // The conversion alone: both traced.
+        reference::TraceSettings trace;
+        trace.samplesPerAxis = 1;
+        trace.draw = lit(0.2).draw;
+        const auto traced = [&](const std::vector<render::PlacedStore>& placed) {
+            const auto image = reference::trace(placed, view, trace, *executor_);
+            EXPECT_TRUE(image);
+            return image ? coverOf(*image).first : 0;
+        };
+        const double truth = traced({{whole, {}, {}}});
+        EXPECT_NEAR(traced({{strands, {}, {}}, {rest, {}, {}}}) / truth, 1, 0.03) << distance;
+        double drawn = 0;
+        constexpr uint32_t kFrames = 8;
+        for (uint32_t k = 0; k < kFrames; ++k) {
+            render::FrameSettings frame = lit(0.2);
+            frame.draw.coverageSeed = k;
+            drawn += coverOf(test::draw({{strands, {}, {}}, {rest, {}, {}}}, *backend, *executor_, view, frame)).first /
+                     kFrames;
+        }
+        // Drawn, lines of one to four pixels cover a little less than they should.
+        EXPECT_NEAR(drawn / truth, 1, 0.06) << distance;
+    }
+}
+
+/// From afar onto one leaf: nothing pops. Between two neighbouring frames the picture must not change by more than it
+/// does for the finest cut, which shows what the motion itself does.
+TEST_F(Forests, APathFromFarAwayOntoALeafDoesNotPop) {
+    const test::Forest forest = test::plantForest(folder_.path(), 10, *executor_);
+    const auto backend = cpu::makeCpuBackend(*executor_);
+    auto coarse = render::makeFrameState(forest.placed, *backend, *executor_, {}, forest.crowds);
+    const glm::dvec3 leaf(36, 9, 36), from(36 + 300, 120, 36 + 900);
+    const auto frameAt = [&](double distance, double tau) {
+        const glm::dvec3 eye = leaf + distance * glm::normalize(from - leaf);
+        EXPECT_TRUE(render::renderUntilComplete(*coarse, viewFrom(eye, leaf, 320, 240), lit(tau), *executor_));
+        return coarse->image;
+    };
+    const auto change = [](const render::Image& a, const render::Image& b) {
+        double sum = 0;
+        for (size_t i = 0; i < a.rgba.size(); ++i)
+            for (uint32_t shift = 0; shift < 24; shift += 8)
+                sum += std::abs(double(a.rgba[i] >> shift & 255u) - double(b.rgba[i] >> shift & 255u));
+        return sum / (3.0 * static_cast<double>(a.rgba.size()));
+    };
+    double worst = 0, at = 0;
+    size_t steps = 0, hadPoints = 0, hadStrands = 0;
+    for (double distance = 1000; distance > 0.1; distance *= 0.6, ++steps) {
+        const double next = distance * 0.9995;  // so little that only decisions can change much
+        const render::Image a = frameAt(distance, 1), b = frameAt(next, 1);
+        hadPoints += coarse->counters.standIns > 0 || coarse->counters.crowdMembers == 0 ? 1 : 0;
+        hadStrands += coarse->counters.crowdMembers > coarse->counters.standIns ? 1 : 0;
+        const render::Image c = frameAt(distance, 0.1), d = frameAt(next, 0.1);
+        // In levels of 255: what is drawn coarsely may move more, by as many pixels as it is allowed to be off.
+        const double excess = change(a, b) - change(c, d);
+        if (excess > worst) {
+            worst = excess;
+            at = distance;
+        }
+        // No hole: what the finest cut covers, this one covers too. (A tree of three pixels is three discs.)
+        EXPECT_GT(coverOf(a).first, (distance < 300 ? 0.8 : 0.6) * coverOf(c).first) << distance;
+    }
+    EXPECT_GT(steps, 15u);
+    EXPECT_GT(hadPoints, 3u);
+    EXPECT_GT(hadStrands, 3u);
+    EXPECT_LT(worst, 6) << "at " << at << " m";
+}
+
+}  // namespace
+}  // namespace stipple

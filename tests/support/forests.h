@@ -1,0 +1,22 @@
+// A small forest for the tests: one tree that stands in many places, with what is seen of it from afar.
+#pragma once
+
+#include "lod/build/progressive/progressive_build.h"
+#include "tests/support/strands.h"
+
+namespace stipple::test {
+
+/// An oak of tubes and ribbons.
+lod::StrandSet oak(uint64_t leaves, uint64_t seed = 1);
+
+struct Forest {
+    lod::StrandSet tree;
+    lod::StrandSamples samples;
+    std::vector<render::PlacedStore> placed;  ///< all of them members of the crowd
+    std::vector<render::PlacedCrowd> crowds;
+    std::shared_ptr<const lod::Store> strands, afar;
+};
+/// `side` x `side` trees, turned and scaled, 8 m apart, on a slope.
+Forest plantForest(const std::string& folder, uint32_t side, Executor& executor);
+
+}  // namespace stipple::test
