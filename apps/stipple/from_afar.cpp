@@ -47,7 +47,7 @@ Result<StandIns> meshFromAfar(const scene::Scene& scene, const std::vector<scene
 
 namespace {
 
-constexpr uint64_t kMostSamples = 262144;
+constexpr uint64_t kMostSamples = 1048576;
 
 lod::ProgressiveSettings progressiveSettings(const std::string& input) {
     lod::ProgressiveSettings settings;
@@ -91,7 +91,7 @@ const lod::StrandSet& StrandModel::strands() {
 const lod::StrandSamples& StrandModel::samples() {
     if (!samples_) {
         const uint64_t segments = strands().position.size() - strands().strands();
-        samples_ = lod::sampleStrands(strands(), std::min(kMostSamples, std::max<uint64_t>(segments / 2, 64)));
+        samples_ = lod::sampleStrands(strands(), std::min(kMostSamples, std::max<uint64_t>(2 * segments, 64)));
     }
     return *samples_;
 }

@@ -314,6 +314,7 @@ class CpuBackend final : public render::Backend {
                         continue;
                     }
                     const size_t at = size_t{yy} * fine.width + x0;
+                    row->hasTubes = hasStrands_;  // may have; the kernel says whether it does
                     const bool has = k_.resolveRow(frame_, tables_, input, visibility_.data() + at, x0, yy, n, *row,
                                                    largest, planesAt(at));
                     if (has)
@@ -341,6 +342,7 @@ class CpuBackend final : public render::Backend {
             std::fill_n(to.depth, n, 0.0f);
             return;
         }
+        out.hasTubes = upper.hasTubes || lower.hasTubes;
         k_.pullRow(upper, lower, n, childSize, 1.0f / frame_.focal, out);
         k_.packRow(out, n, to);
     }
@@ -372,11 +374,17 @@ class CpuBackend final : public render::Backend {
                  TexelRow& row) {
         const Planes at = planes.at(size_t{y} * level.width + x);
         bool any = false;
-        for (uint32_t i = 0; i < n; ++i) any |= at.depth[i] > 0;
+        uint32_t signs = 0;
+        for (uint32_t i = 0; i < n; ++i) {
+            any |= at.depth[i] > 0;
+            signs |= at.depth[i] > 0 ? at.size[i] : 0u;
+        }
+        row.hasTubes = hasStrands_ && signs >> 31 != 0;
         if (any)
             k_.unpackRow(at, first, n, row);
         else
             std::fill_n(row.depth + first, n, 0.0f);
+        if (hasStrands_ && !row.hasTubes) std::fill_n(row.isRound + first, n, 0.0f);  // others beside it may have some
         return any;
     }
 
@@ -392,6 +400,11 @@ class CpuBackend final : public render::Backend {
                      scratch))
             return false;
         k_.expandRow(scratch, n, out.nearest, out.beside);
+        out.nearest.hasTubes = scratch.hasTubes;
+        if (hasStrands_ && !scratch.hasTubes) {
+            std::fill_n(out.nearest.isRound, TexelRow::kSize, 0.0f);
+            std::fill_n(out.beside.isRound, TexelRow::kSize, 0.0f);
+        }
         return true;
     }
 
@@ -425,6 +438,8 @@ class CpuBackend final : public render::Backend {
                 std::fill_n(ring.at(slot).nearest.depth, TexelRow::kSize, isOutside ? kOutside : 0.0f);
                 std::fill_n(ring.at(slot).beside.depth, TexelRow::kSize, isOutside ? kOutside : 0.0f);
             }
+            out.hasTubes = own.hasTubes || (has.at(nearSlot) && ring.at(nearSlot).nearest.hasTubes) ||
+                           (has.at(farSlot) && ring.at(farSlot).nearest.hasTubes);
             k_.pushRow(own, ring.at(nearSlot), ring.at(farSlot), y % 2 == 0 ? -1.0f : 1.0f, n, fineSize,
                        1.0f / frame_.focal, out);
             use(y, own, out, true);
@@ -452,10 +467,8 @@ class CpuBackend final : public render::Backend {
         const LightInput light{draws_->lights.data(),
                                draws_->environment ? draws_->environment->table.data() : nullptr};
         const auto shadeRow = [&](uint32_t x0, uint32_t n, uint32_t y, TexelRow& own, TexelRow& row) {
-            if (hasStrands_) {
-                k_.finishRow(1.0f / frame_.focal, n, row);
-                if (&own != &row) k_.finishRow(1.0f / frame_.focal, n, own);
-            }
+            if (row.hasTubes) k_.finishRow(1.0f / frame_.focal, n, row);
+            if (own.hasTubes && &own != &row) k_.finishRow(1.0f / frame_.focal, n, own);
             const size_t at = size_t{y} * fine.width + x0;
             k_.shadeRow(frame_, tables_, own, row, planesAt(at), light, x0, y, n,
                         {image_->rgba.data() + at, wantAll_ ? image_->depth.data() + at : nullptr,

@@ -212,7 +212,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
 #pragma GCC ivdep
             for (size_t i = 0; i < n; ++i) row.isRound[kPad + i] = 0;
         if (triangles.count > 0) resolveTriangles(f, in, triangles, x0, y, row, planes);
-        if (strands.count > 0) resolveStrands(f, in, strands, x0, y, row, largestRadius);
+        row.hasTubes = strands.count > 0 && resolveStrands(f, in, strands, x0, y, row, largestRadius);
         return triangles.count + strands.count > 0;
     }
     if (anyTurned)
@@ -229,7 +229,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) row.isRound[kPad + i] = 0;
     if (triangles.count > 0) resolveTriangles(f, in, triangles, x0, y, row, planes);
-    if (strands.count > 0) resolveStrands(f, in, strands, x0, y, row, largestRadius);
+    row.hasTubes = strands.count > 0 && resolveStrands(f, in, strands, x0, y, row, largestRadius);
     return true;
 }
 

@@ -328,8 +328,8 @@ struct StrandTexels {
         red[kTile], green[kTile], blue[kTile], isRound[kTile], axisX[kTile], axisY[kTile];
 };
 
-/// Texels of the pixels that show strands.
-void resolveStrands(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, uint32_t x0, uint32_t y,
+/// Texels of the pixels that show strands; is any of them a tube to be reconstructed?
+bool resolveStrands(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, uint32_t x0, uint32_t y,
                     TexelRow& __restrict row, float& largestRadius) {
     StrandPixels e;
     StrandTexels o;
@@ -397,6 +397,7 @@ void resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
         o.green[i] = mix(8);
         o.blue[i] = mix(16);
     }
+    float round_ = 0;
     for (size_t i = 0; i < n; ++i) {
         const size_t at = kPad + p.pixel[i];
         row.depth[at] = o.depth[i];
@@ -413,5 +414,7 @@ void resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
         row.axisX[at] = o.axisX[i];
         row.axisY[at] = o.axisY[i];
         largestRadius = max(largestRadius, o.radius[i]);
+        round_ = max(round_, o.isRound[i]);
     }
+    return round_ > 0.0f;
 }

@@ -132,7 +132,7 @@ class Coverage {
 }  // namespace
 
 std::vector<float> coverageFactors(const StrandSet& strands, const StrandSamples& samples, Executor& executor) {
-    constexpr size_t kFewest = 48;
+    constexpr size_t kFewest = 48, kMostDiscs = 131072;
     constexpr int kSteps = 4;
     constexpr double kLeast = 0.3, kMost = 1.15;
     const std::array<Direction, 4> from = directions();
@@ -149,6 +149,10 @@ std::vector<float> coverageFactors(const StrandSet& strands, const StrandSamples
     std::vector<float> factors;
     const size_t all = samples.points.position.size();
     for (size_t count = all; count >= kFewest || factors.empty(); count /= 2) {
+        if (count > kMostDiscs) {  // several on one leaf: they cover what it covers
+            factors.push_back(1);
+            continue;
+        }
         const double radius = samples.radius * std::sqrt(static_cast<double>(all) / static_cast<double>(count));
         double low = kLeast, high = kMost, factor = factors.empty() ? 1.0 : double{factors.back()};
         for (int step = 0; step < kSteps; ++step) {  // the area grows a little slower than the square of the radius
