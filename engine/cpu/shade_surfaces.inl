@@ -2,31 +2,58 @@
 
 constexpr uint32_t kPlainSurface = 0x00ffff00u;  ///< not metallic, rough, not occluded: what points are
 
+/// The pixels of a row that are lit, closed up: of a forest's ground there may be few in each row.
+struct alignas(64) LitPixels {
+    uint32_t at[kTile];
+    float x[kTile], depth[kTile], perpX[kTile], perpY[kTile], leaf[kTile];
+    float red[kTile], green[kTile], blue[kTile];
+    uint32_t words[kTile];
+};
+
 void shadeSurfaces(const FrameConstants& f, const TexelRow& __restrict row, const uint32_t* __restrict words,
                    const uint32_t* __restrict shines, const LightInput& input, const uint32_t* __restrict mask,
-                   uint32_t x0, float vy, uint32_t n, float* __restrict red, float* __restrict green,
+                   uint32_t x0, float vy, uint32_t pixels, float* __restrict red, float* __restrict green,
                    float* __restrict blue) {
     const float inverseFocal = 1.0f / f.focal;
+    LitPixels p;
+    size_t n = 0;
+    for (uint32_t i = 0; i < pixels; ++i) {
+        if (mask[i] == 0) continue;
+        const size_t from = kPad + i;
+        p.at[n] = i;
+        p.x[n] = float(int(x0) + int(i)) + 0.5f;
+        p.depth[n] = row.depth[from];
+        p.perpX[n] = row.perpX[from];
+        p.perpY[n] = row.perpY[from];
+        p.leaf[n] = isLeaf(row.thickness[from], row.radius[from]);
+        p.red[n] = red[i];
+        p.green[n] = green[i];
+        p.blue[n] = blue[i];
+        p.words[n++] = words[i];
+    }
     alignas(64) float r[kTile], g[kTile], b[kTile];
-    const auto surfaceAt = [&](size_t i) {
-        const float vx = (float(int(x0) + int(i)) + 0.5f - f.centre.x) * inverseFocal;
+    const float *const px = p.x, *const perpX = p.perpX, *const perpY = p.perpY, *const leaf = p.leaf,
+                       *const pr = p.red, *const pg = p.green, *const pb = p.blue;
+    const uint32_t* const word = p.words;
+    const float centreX = f.centre.x;
+    const auto surfaceAt = [=](size_t i) {
+        const float vx = (px[i] - centreX) * inverseFocal;
         const float inverse = 1.0f / std::sqrt(vx * vx + vy * vy + 1.0f);
         const vec3 ray = vec3(vx * inverse, vy * inverse, inverse);
         Surface s;
-        s.colour = vec3(red[i], green[i], blue[i]);
-        s.normal = normalFromPerp(vec2(row.perpX[kPad + i], row.perpY[kPad + i]), ray);
+        s.colour = vec3(pr[i], pg[i], pb[i]);
+        s.normal = normalFromPerp(vec2(perpX[i], perpY[i]), ray);
         s.toEye = vec3(-ray.x, -ray.y, -ray.z);
-        s.metallic = float(int(words[i] & 255u)) * (1.0f / 255.0f);
-        s.roughness = float(int(words[i] >> 8 & 255u)) * (1.0f / 255.0f);
-        s.occlusion = float(int(words[i] >> 16 & 255u)) * (1.0f / 255.0f);
-        s.leaf = isLeaf(row.thickness[kPad + i], row.radius[kPad + i]);
+        s.metallic = float(int(word[i] & 255u)) * (1.0f / 255.0f);
+        s.roughness = float(int(word[i] >> 8 & 255u)) * (1.0f / 255.0f);
+        s.occlusion = float(int(word[i] >> 16 & 255u)) * (1.0f / 255.0f);
+        s.leaf = leaf[i];
         return s;
     };
     const float ambient = f.ambient;
     const vec3 up = f.skyDirection;
     if (input.environment != nullptr) {
         for (size_t i = 0; i < n; ++i) {
-            if (mask[i] == 0) continue;
             const vec3 c =
                 reflectEnvironment(input.environment, surfaceAt(i), f.environmentX, f.environmentY, f.environmentZ);
             r[i] = ambient * c.x;
@@ -56,8 +83,8 @@ void shadeSurfaces(const FrameConstants& f, const TexelRow& __restrict row, cons
         const LightSource light = input.lights[k];
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
-            const float z = row.depth[kPad + i];
-            const float vx = (float(int(x0) + int(i)) + 0.5f - f.centre.x) * inverseFocal;
+            const float z = p.depth[i];
+            const float vx = (p.x[i] - f.centre.x) * inverseFocal;
             const vec3 point = vec3(vx * z, vy * z, z);
             const bool isFar = light.kind == kLightDirectional;
             vec3 l = vec3(light.position.x - (isFar ? 0.0f : point.x), light.position.y - (isFar ? 0.0f : point.y),
@@ -73,9 +100,9 @@ void shadeSurfaces(const FrameConstants& f, const TexelRow& __restrict row, cons
         }
     }
     for (size_t i = 0; i < n; ++i) {
-        if (mask[i] == 0) continue;
-        red[i] = r[i] + unpackRed(shines[i]);
-        green[i] = g[i] + unpackGreen(shines[i]);
-        blue[i] = b[i] + unpackBlue(shines[i]);
+        const uint32_t at = p.at[i];
+        red[at] = r[i] + unpackRed(shines[at]);
+        green[at] = g[i] + unpackGreen(shines[at]);
+        blue[at] = b[i] + unpackBlue(shines[at]);
     }
 }
