@@ -95,6 +95,7 @@ CutScratch::Slot& Selector::slotOf(size_t i) {
     CutScratch::Slot& slot = scratch_.slots[number];
     const Hierarchy& h = hierarchyOf(i);
     slot.view = makeLocalView(h, instances_[i], view_);
+    slot.sway = instances_[i].sway / (instances_[i].scale * h.unit);
     slot.inputError = instances_[i].inputError / (instances_[i].scale * h.unit * h.errors.smallest);
     if (slot.stamp.size() < h.nodes.size()) {
         slot.stamp.resize(h.nodes.size(), 0);
@@ -107,7 +108,7 @@ int32_t Selector::epsilonOf(size_t i, CutScratch::Slot& slot, uint32_t index, in
     if (slot.stamp[index] != scratch_.frame) {
         slot.stamp[index] = scratch_.frame;
         const Hierarchy& h = hierarchyOf(i);
-        int32_t value = allowedError(h, h.nodes[index], slot.view);
+        int32_t value = allowedError(h, h.nodes[index], slot.view, slot.sway);
         // Nested spheres give eps_child >= eps_parent; this makes it so to the last rounding.
         if (value != kCulled) value = std::max(value, parentEpsilon);
         slot.epsilon[index] = value;

@@ -39,6 +39,7 @@ struct Instance {
     double scale = 1;
     /// How far what the store holds in full detail may be from what it stands for, world units: a part of every error.
     double inputError = 0;
+    double sway = 0;  ///< how far wind moves it at most, world units: its spheres are larger by that
     /// Another instance, of points, that is drawn instead where that is good enough and cheaper (the classic hybrid).
     static constexpr uint32_t kNone = ~0u;
     uint32_t standIn = kNone;
@@ -121,6 +122,7 @@ struct CutScratch {
     /// What a frame remembers of an instance that it looks at.
     struct Slot {
         LocalView view;
+        double sway = 0;               ///< lattice units
         double inputError = 0;         ///< in steps of the smallest error code
         std::vector<int32_t> epsilon;  ///< by node: allowed error of tau = 1, 1/32 octave codes
         std::vector<uint32_t> stamp;   ///< frame in which epsilon was set

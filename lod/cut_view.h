@@ -32,9 +32,9 @@ inline LocalView makeLocalView(const Hierarchy& h, const Instance& instance, con
 }
 
 /// Allowed error of N at tau = 1 px as a code of 1/32 octave, rounded down; kCulled if N is out of view.
-inline int32_t allowedError(const Hierarchy& h, const Node& node, const LocalView& view) {
+inline int32_t allowedError(const Hierarchy& h, const Node& node, const LocalView& view, double sway) {
     const glm::dvec3 d = node.centre - view.eye;
-    const double r = node.radius;
+    const double r = node.radius + sway;
     const double depth = glm::dot(d, view.forward);
     if (depth + r < view.nearPlane) return kCulled;
     for (const glm::dvec3& plane : view.planes)

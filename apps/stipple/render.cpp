@@ -22,7 +22,7 @@ struct Options {
     std::string output, size = "1280x720", eye, target, up, path, mode = "pullpush", device = "auto", shade = "auto",
                         background = "24,26,30";
     std::string debug = "none", resident = "1G";
-    double fov = 50, error = 1, strandExact = 2;
+    double fov = 50, error = 1, strandExact = 2, wind = 0, seconds = 0;
     int frames = 1, samples = 4, orbit = 0, sceneCamera = 0, accumulate = 1;
     uint64_t budget = 0;
     bool noWait = false, json = false, quiet = false;
@@ -33,6 +33,7 @@ struct Options {
 
 struct Shot {
     std::vector<lod::View> views;
+    std::vector<double> seconds;  ///< of each view, from the first on; empty: one moment
     glm::dvec3 worldUp{0, 0, 1};
 };
 
@@ -52,6 +53,7 @@ Result<Shot> makeShot(const Options& o, const OpenedScene& opened, const glm::uv
         for (int i = 0; i < frames; ++i) {
             const double t = path.keys.front().t + (frames > 1 ? path.duration() * i / (frames - 1) : 0);
             shot.views.push_back(scene::makeView(path.at(t), size.x, size.y, nearPlane));
+            shot.seconds.push_back(t - path.keys.front().t);
         }
         return shot;
     }
@@ -91,6 +93,7 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     s.draw.lit = o.shade == "lit" || (o.shade == "auto" && isShaded(d) && colour.mode == lod::ColourMode::own);
     s.draw.worldUp = shot.worldUp;
     s.draw.exactStrands = static_cast<float>(o.strandExact);
+    s.draw.wind = {o.wind, o.seconds, render::windAcross(shot.worldUp)};
     STIPPLE_ASSIGN(const glm::dvec3 background, parseVector(o.background, "--background"));
     for (int c = 0; c < 3; ++c) {
         if (!(background[c] >= 0 && background[c] <= 255))
@@ -114,6 +117,9 @@ nlohmann::json countersJson(const FrameCounters& c) {
             {"nodes_culled", c.nodesCulled},
             {"nodes_missing", c.nodesMissing},
             {"records_tested", c.recordsTested},
+            {"stand_ins", c.standIns},
+            {"crowd_members", c.crowdMembers},
+            {"nodes_swaying", c.nodesSwaying},
             {"cut_evaluations", c.cutEvaluations},
             {"passes", c.passes},
             {"blocks", c.blocks},
@@ -163,16 +169,19 @@ Result<void> runFrames(const Options& o, const Shot& shot, const render::FrameSe
                         "give more memory");
         lod::selectCut(state.scene(), state.streamer->residency(), first, settings.budgets, state.scratch, state.cut);
         state.streamer->request(state.cut);
+        if (state.cut.wanted.empty() && state.streamer->isIdle()) break;  // it is not in view
         std::this_thread::yield();
     }
     STIPPLE_TRY(render::renderFrame(state, first, settings));
     timings.firstImageMs = millisecondsSinceProcessStart();
     for (size_t i = 0; i < shot.views.size(); ++i) {
+        render::FrameSettings frame = settings;
+        if (!shot.seconds.empty()) frame.draw.wind.seconds += shot.seconds[i];
         if (o.noWait) {
-            if (i > 0) STIPPLE_TRY(render::renderFrame(state, shot.views[i], settings));
+            if (i > 0) STIPPLE_TRY(render::renderFrame(state, shot.views[i], frame));
             complete = state.cut.wanted.empty();
         } else {
-            STIPPLE_ASSIGN(complete, render::renderUntilComplete(state, shot.views[i], settings, executor));
+            STIPPLE_ASSIGN(complete, render::renderUntilComplete(state, shot.views[i], frame, executor));
         }
         if (i == 0) timings.completeMs = millisecondsSinceProcessStart();
         timings.add(state.counters.frameMs, state.backend->passTimes());
@@ -249,6 +258,7 @@ Result<void> run(const Options& o) {
         return fail(ErrorKind::usage, "is not a size", "--resident " + o.resident, "e.g. 1G");
     settings.wantDepthAndNormal = settings.wantDepthAndNormal || o.accumulate > 1;
     auto state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.crowds);
+    render::setSway(settings.draw.wind, state->hierarchies, state->instances);
     const Legend legend = o.colour.legend ? makeLegend(colour, description) : Legend{};
     Timings timings;
     bool complete = false;
@@ -336,6 +346,10 @@ void setupRender(CLI::App& app, int& status) {
     sub->add_option("--debug", o->debug, "debug view")
         ->check(CLI::IsMember({"none", "level", "error", "holes", "normals"}))
         ->capture_default_str();
+    sub->add_option("--wind", o->wind, "how far tops of plants move at most, share of their height (e.g. 0.03)")
+        ->check(CLI::Range(0.0, 0.5))
+        ->capture_default_str();
+    sub->add_option("--time", o->seconds, "of the wind, seconds; a path adds its own")->capture_default_str();
     sub->add_option("--strand-exact", o->strandExact,
                     "half-width in pixels from which ribbons and tubes are filled exactly instead of reconstructed")
         ->check(CLI::Range(0.5, 1e9))

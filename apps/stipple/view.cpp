@@ -20,7 +20,7 @@ namespace {
 struct Options {
     std::vector<std::string> inputs;
     std::string size = "1280x720", device = "auto", screenshot, resident = "1G", shade = "auto";
-    double error = 1;
+    double error = 1, wind = 0;
     uint64_t budget = 2'000'000;
     int frames = 0;
     BuildOptions build;
@@ -154,6 +154,8 @@ Result<void> run(const Options& o) {
     STIPPLE_ASSIGN(settings.draw.environment, openEnvironment(o.environment.path, o.environment.scale, *executor));
     settings.draw.lit = o.shade == "lit" || (o.shade == "auto" && isShaded(d) && colour.mode == lod::ColourMode::own);
     settings.draw.worldUp = d.up;
+    settings.draw.wind = {o.wind, 0, render::windAcross(d.up)};
+    render::setSway(settings.draw.wind, state->hierarchies, state->instances);
     const double diagonal = std::max(1e-300, glm::length(d.boundsMax - d.boundsMin));
     Navigation navigation(scene::fitCamera(d.focusMin, d.focusMax, d.up, static_cast<double>(size.x) / size.y),
                           diagonal);
@@ -170,9 +172,11 @@ Result<void> run(const Options& o) {
             legend = makeLegend(colour, d);
             state.reset();  // gives back what is resident
             state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.crowds);
+            render::setSway(settings.draw.wind, state->hierarchies, state->instances);
             settings.draw.lit = o.shade == "lit" || (colour.mode == lod::ColourMode::own && isShaded(d));
         }
         navigation.move(input);
+        settings.draw.wind.seconds += input.seconds;
         const lod::View view = scene::makeView(navigation.camera(), input.width, input.height, 1e-6 * diagonal);
         if (last) {
             STIPPLE_TRY(render::renderUntilComplete(*state, view, settings, *executor));
@@ -211,6 +215,9 @@ void setupView(CLI::App& app, int& status) {
     sub->add_option("--size", o->size, "of the window, pixels")->capture_default_str();
     sub->add_option("--error", o->error, "tolerated screen-space error, pixels")
         ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    sub->add_option("--wind", o->wind, "how far tops of plants move at most, share of their height (e.g. 0.03)")
+        ->check(CLI::Range(0.0, 0.5))
         ->capture_default_str();
     sub->add_option("--budget-points", o->budget, "records drawn at most")
         ->check(CLI::PositiveNumber)

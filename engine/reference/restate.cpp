@@ -187,7 +187,9 @@ class ReferenceBackend final : public render::Backend {
                 Disc disc = decodeDisc(h, node, records[i]);
                 disc.radius *= cut.radiusScale;
                 if (disc.errorCode > cut.errorCode && !(cut.octantMask >> disc.octant & 1u)) continue;
-                const dvec3 world = instance.translation + instance.rotation * (instance.scale * disc.position) - v.eye;
+                dvec3 world = instance.translation + instance.rotation * (instance.scale * disc.position);
+                if (!draws.bends.empty()) world = draws.bends[d].moved(world);
+                world -= v.eye;
                 const dvec3 c(glm::dot(world, v.right), glm::dot(world, v.down), glm::dot(world, v.forward));
                 if (!(c.z > v.nearPlane)) continue;
                 const dvec2 p(v.focalPixels * c.x / c.z + 0.5 * v.width, v.focalPixels * c.y / c.z + 0.5 * v.height);

@@ -46,7 +46,8 @@ class StrandProjector {
     StrandProjector(const render::DrawList& draws, Level& level)
         : draws_(draws), level_(level), view_(draws.view), f_(draws.frame) {}
 
-    void segment(const Segment& world, const lod::Instance& instance, uint32_t id, const dvec3* debugColour) {
+    void segment(const Segment& world, const lod::Instance& instance, const render::Bend& bend, uint32_t id,
+                 const dvec3* debugColour) {
         id_ = id;
         s_ = world;
         debugColour_ = debugColour;
@@ -54,7 +55,7 @@ class StrandProjector {
             return dvec3(glm::dot(w, view_.right), glm::dot(w, view_.down), glm::dot(w, view_.forward));
         };
         const auto place = [&](const dvec3& p) {
-            return toCamera(instance.translation + instance.rotation * (instance.scale * p) - view_.eye);
+            return toCamera(bend.moved(instance.translation + instance.rotation * (instance.scale * p)) - view_.eye);
         };
         a_ = place(world.a);
         b_ = place(world.b);
@@ -308,10 +309,12 @@ void projectStrands(const render::DrawList& draws, const Chunks& chunks, Level& 
     StrandProjector projector(draws, level);
     for (Sample& s : level.samples) s.key = s.valid ? s.depth : 0;
     uint32_t block = 0;
-    for (const lod::CutDraw& cut : draws.cut) {
+    for (size_t d = 0; d < draws.cut.size(); ++d) {
+        const lod::CutDraw& cut = draws.cut[d];
         const lod::Instance& instance = draws.instances[cut.instance];
         const lod::Hierarchy& h = *draws.hierarchies[instance.hierarchy];
         if (!h.isStrands) continue;
+        const render::Bend bend = draws.bends.empty() ? render::Bend{} : draws.bends[d];
         const lod::Node& node = h.nodes[cut.node];
         const lod::Chunk& chunk = chunks.at(uint64_t{instance.source} << 32 | cut.node);
         const shared::FrameConstants& f = draws.frame;
@@ -320,7 +323,7 @@ void projectStrands(const render::DrawList& draws, const Chunks& chunks, Level& 
         for (uint32_t i = 0; i < cut.count; ++i) {
             const Segment s = decodeSegment(h, node, chunk.segments[i]);
             if (s.errorCode > cut.errorCode && (s.octants & cut.octantMask) == 0) continue;
-            projector.segment(s, instance, 0x40000000u | (block * 256 + i), isDebug ? &colour : nullptr);
+            projector.segment(s, instance, bend, 0x40000000u | (block * 256 + i), isDebug ? &colour : nullptr);
         }
         block += (cut.count + 255) / 256;
     }

@@ -77,6 +77,8 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     out.strandBlocks.clear();
     out.strandKeys.clear();
     out.lights.clear();
+    out.bends.clear();
+    out.swaying = 0;
     out.clusters = 0;
     out.view = view;
     out.cut.assign(cut.draw.begin(), cut.draw.end());
@@ -95,13 +97,23 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
             cameraFromWorld * (instance.translation - view.eye +
                                instance.rotation * (instance.scale * (h.origin + h.unit * h.recordOrigin(node))));
         shared::DrawNode d{};
-        d.axisX = glm::vec3(axes[0] * worldPerStep);
-        d.axisY = glm::vec3(axes[1] * worldPerStep);
-        d.axisZ = glm::vec3(axes[2] * worldPerStep);
-        d.base = glm::vec3(base);
+        const Bend bend = settings.wind.strength > 0
+                              ? bendOf(settings.wind, h, instance, draw.node, view, glm::normalize(settings.worldUp))
+                              : Bend{};
+        if (settings.wind.strength > 0) out.bends.push_back(bend);
+        out.swaying += bend.isStill() ? 0 : 1;
+        // Moved with the wind: one more linear map, in camera space.
+        const glm::dvec3 along = cameraFromWorld * bend.along, up = cameraFromWorld * bend.up;
+        const auto bent = [&](const glm::dvec3& axis) { return axis + along * (bend.slope * glm::dot(up, axis)); };
+        const double atEye = bend.slope * glm::dot(bend.up, view.eye) + bend.offset;
+        d.axisX = glm::vec3(bent(axes[0] * worldPerStep));
+        d.axisY = glm::vec3(bent(axes[1] * worldPerStep));
+        d.axisZ = glm::vec3(bent(axes[2] * worldPerStep));
+        d.base = glm::vec3(bent(base) + along * atEye);
         d.edge = static_cast<float>(instance.scale * h.unit * h.cellSize(node)) * draw.radiusScale;
         d.errorCode = draw.errorCode;
-        d.octantMask = draw.octantMask | (instance.rotation != glm::dmat3(1) ? shared::kNodeTurned : 0u);
+        d.octantMask =
+            draw.octantMask | (instance.rotation != glm::dmat3(1) || !bend.isStill() ? shared::kNodeTurned : 0u);
         d.count = draw.count;
         d.level = node.level;
         d.errorPixels = draw.errorPixels;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/render/environment.h"
+#include "engine/render/wind.h"
 #include "lod/cut.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
@@ -54,10 +55,12 @@ struct DrawList {
     std::vector<shared::LightSource> lights;
     std::shared_ptr<const Environment> environment;  ///< null: a sky without features
     uint32_t clusters = 0;                           ///< of all mesh draws
+    uint64_t swaying = 0;                            ///< nodes that wind moves
     std::span<const shared::SurfaceMaterial> materials;
     // What the fp32 numbers above were made from: the reference starts from these.
     lod::View view;
     std::vector<lod::CutDraw> cut;
+    std::vector<Bend> bends;  ///< of each of `cut`; empty without wind
     std::vector<lod::CutMeshDraw> meshCut;
     std::vector<uint32_t> firstMaterial;  ///< of each hierarchy
     std::span<const lod::Hierarchy* const> hierarchies;
@@ -75,6 +78,7 @@ struct DrawSettings {
     float supportScale = 1.0f;       ///< splat radius of the reconstruction / stored radius
     float minimumRadius = 1.0f;      ///< pixels
     float exactStrands = 2.0f;       ///< pixels of half-width from which strands are filled, not reconstructed
+    Wind wind;                       ///< moves what setSway was told of
     uint32_t coverageSeed = 0;       ///< of strands narrower than a pixel
 };
 

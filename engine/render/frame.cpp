@@ -205,6 +205,7 @@ Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSe
     c.trianglesDrawn = cut.trianglesDrawn;
     c.standIns = cut.standIns;
     c.crowdMembers = cut.crowdMembers;
+    c.nodesSwaying = state.draws.swaying;
     c.cutEvaluations = cut.evaluations;
     c.budgetTruncated = state.cut.truncated;
     c.tauTargetPixels = state.cut.tauTarget;

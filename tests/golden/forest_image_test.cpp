@@ -116,6 +116,61 @@ TEST_F(Forests, LeavesLetLightThrough) {
     EXPECT_GT(through, 1.5 * beside);
 }
 
+/// Wind bends trees within their bound, the same picture for the same time, and only where it can be seen.
+TEST_F(Forests, SwayInTheWind) {
+    const test::Forest forest = test::plantForest(folder_.path(), 6, *executor_);
+    const auto cpu = cpu::makeCpuBackend(*executor_);
+    const auto oracle = reference::makeReferenceBackend(*executor_);
+    const lod::View near = viewFrom({20, 8, 62}, {20, 6, 20}, 400, 300);
+    render::FrameSettings still = lit(2), windy = still;
+    windy.draw.wind = {0.03, 0, {1, 0, 0}};
+    const auto image = [&](render::Backend& backend, const lod::View& view, const render::FrameSettings& settings,
+                           FrameCounters* counters = nullptr) {
+        auto state = render::makeFrameState(forest.placed, backend, *executor_, {}, forest.crowds);
+        render::setSway(settings.draw.wind, state->hierarchies, state->instances);
+        EXPECT_TRUE(render::renderUntilComplete(*state, view, settings, *executor_));
+        if (counters) *counters = state->counters;
+        return state->image;
+    };
+    FrameCounters counters;
+    const render::Image calm = image(*cpu, near, still, &counters);
+    EXPECT_EQ(counters.nodesSwaying, 0u);
+    // Of a day's time and a moment's the motion is as smooth.
+    for (const double seconds : {1.3, 86'400.7}) {
+        windy.draw.wind.seconds = seconds;
+        const render::Image moved = image(*cpu, near, windy, &counters);
+        EXPECT_GT(counters.nodesSwaying, 10u);
+        EXPECT_NE(moved.rgba, calm.rgba);
+        EXPECT_EQ(moved.rgba, image(*cpu, near, windy).rgba);
+        const auto d = reference::compareImages(moved, image(*oracle, near, windy), 4, nullptr);
+        ASSERT_TRUE(d);
+        EXPECT_GE(d->psnr, 38) << seconds;
+    }
+    // No vertex moves farther than the spheres grew, at any time.
+    auto state = render::makeFrameState(forest.placed, *cpu, *executor_, {}, forest.crowds);
+    render::setSway(windy.draw.wind, state->hierarchies, state->instances);
+    Rng rng(2);
+    double farthest = 0;
+    for (int k = 0; k < 20'000; ++k) {
+        const lod::Instance& i = state->instances[rng.below(state->instances.size())];
+        const lod::Hierarchy& h = *state->hierarchies[i.hierarchy];
+        const auto node = static_cast<uint32_t>(rng.below(h.nodes.size()));
+        windy.draw.wind.seconds = rng.uniform(0, 1e6);
+        const render::Bend bend = render::bendOf(windy.draw.wind, h, i, node, near, {0, 1, 0});
+        const glm::dvec3 inside =
+            h.nodes[node].centre +
+            h.nodes[node].radius * glm::normalize(glm::dvec3(rng.normal(), rng.normal(), rng.normal()));
+        const glm::dvec3 p = i.translation + i.rotation * (i.scale * (h.origin + h.unit * inside));
+        const double moved = glm::length(bend.moved(p) - p);
+        ASSERT_LE(moved, i.sway * (1 + 1e-9));
+        if (i.sway > 0) farthest = std::max(farthest, moved / i.sway);
+    }
+    EXPECT_GT(farthest, 0.6) << "the bound is not far above";
+    // From so far that nothing moves by a tenth of a pixel nothing is moved.
+    image(*cpu, viewFrom({20, 800, 6000}, {20, 6, 20}, 400, 300), windy, &counters);
+    EXPECT_EQ(counters.nodesSwaying, 0u);
+}
+
 /// The triangles of a grown tree become strands that look like them.
 TEST_F(Forests, AConvertedPlantCoversWhatItsTrianglesCover) {
     grow::PlantOptions plant;
