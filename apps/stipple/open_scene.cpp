@@ -425,10 +425,15 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
             isStore ? openStoreFile(inputs.front()) : openBuilt(inputs, build, colour, executor, showProgress));
         scene.placed.push_back({std::move(store), {}, {}});
     }
-    // Points that stand in for meshes are lit; beside scans that keep their photographed colours they would not be.
-    if (std::any_of(scene.placed.begin(), scene.placed.end(), [](const render::PlacedStore& p) {
-            return !p.store->hierarchy.isMesh() && !isShaded(p.store->description);
-        }))
+    // Points that stand in for meshes are lit. Beside scans that keep their photographed colours they would not be,
+    // unless strands have all of them lit.
+    const auto isOf = [](bool shaded) {
+        return [shaded](const render::PlacedStore& p) {
+            return !p.store->hierarchy.isMesh() && isShaded(p.store->description) == shaded;
+        };
+    };
+    const auto any = [&](const auto& is) { return std::any_of(scene.placed.begin(), scene.placed.end(), is); };
+    if (any(isOf(false)) && !any(isOf(true)))
         for (render::PlacedStore& p : scene.placed) p.standIns = nullptr;
     scene.description = describe(scene.placed);
     return scene;
