@@ -11,6 +11,7 @@
 #include "apps/stipple/cache.h"
 #include "apps/stipple/common.h"
 #include "apps/stipple/from_afar.h"
+#include "engine/base/process.h"
 #include "engine/image/image_io.h"
 #include "engine/scene/strands.h"
 #include "engine/scene/triangles.h"
@@ -436,6 +437,7 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     if (any(isOf(false)) && !any(isOf(true)))
         for (render::PlacedStore& p : scene.placed) p.standIns = nullptr;
     scene.description = describe(scene.placed);
+    releaseFreeMemory();
     return scene;
 }
 

@@ -7,6 +7,8 @@
 namespace stipple {
 
 uint64_t peakRssBytes();
+/// Gives freed memory back to the system, where the allocator would keep it (after a scene was read, it is much).
+void releaseFreeMemory();
 /// Milliseconds since the kernel started this process (10 ms resolution at worst, Linux), so that "first image" counts
 /// the loading of libraries too.
 double millisecondsSinceProcessStart();

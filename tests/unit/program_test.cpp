@@ -151,5 +151,39 @@ TEST(Program, StrandsAreDrawnAndWhatTheyCannotDoIsSaid) {
     EXPECT_FALSE(std::filesystem::exists(folder / "b.png"));
 }
 
+TEST(Program, GrowsForestsMeadowsAndConvertsPlants) {
+    const test::TempFolder folder;
+    const Outcome forest = run(folder, "grow forest -o f.glb --trees 100 --leaves 2k --variants 1 --json");
+    ASSERT_EQ(forest.code, 0) << forest.err;
+    EXPECT_EQ(nlohmann::json::parse(forest.out)["instances"], 100);
+    const Outcome far = run(folder, "render f.glb -o f.png --size 320x200 --error 2 --json --device cpu");
+    ASSERT_EQ(far.code, 0) << far.err;
+    const auto j = nlohmann::json::parse(far.out);
+    EXPECT_LE(j["tau_eff_px"].get<double>(), 2.0001);
+    EXPECT_GT(j["records_drawn"].get<uint64_t>(), 100u);
+    EXPECT_LT(j["records_drawn"].get<uint64_t>(), 200'000u) << "100 trees of thousands of segments each";
+    EXPECT_EQ(j["counters"]["nodes_swaying"], 0);
+    const Outcome windy =
+        run(folder, "render f.glb -o w.png --size 320x200 --eye 0,4,30 --target 0,4,0 --wind 0.05 --time 3 --json");
+    ASSERT_EQ(windy.code, 0) << windy.err;
+    EXPECT_GT(nlohmann::json::parse(windy.out)["counters"]["nodes_swaying"].get<uint64_t>(), 0u);
+    EXPECT_EQ(run(folder, "grow meadow -o m.glb --size 6").code, 0);
+    EXPECT_EQ(run(folder, "render m.glb -o m.png --size 160x120 --device cpu").code, 0);
+    ASSERT_EQ(run(folder, "grow tree -o t.glb --leaves 500 --as triangles").code, 0);
+    const Outcome converted = run(folder, "convert t.glb --strands -o t.stipple --json");
+    ASSERT_EQ(converted.code, 0) << converted.err;
+    const auto c = nlohmann::json::parse(converted.out);
+    EXPECT_NEAR(c["ribbons"].get<double>(), 500, 10);
+    EXPECT_GT(c["triangles_left"].get<uint64_t>(), 0u);
+    EXPECT_EQ(c["written"].size(), 3u);
+    EXPECT_EQ(run(folder, "info t.stipple --verify").code, 0);
+    EXPECT_EQ(run(folder, "render t.glb -o t.png --size 160x120 --device cpu").code, 0);
+    expectOneLine(run(folder, "convert t.glb -o x.stipple"), 2, "--strands");
+    expectOneLine(run(folder, "convert missing.glb --strands -o x.stipple"), 3, "missing.glb");
+    expectOneLine(run(folder, "convert t.glb --strands -o x.txt"), 2, "x.txt");
+    expectOneLine(run(folder, "grow forest -o f.glb --trees none"), 2, "--trees");
+    expectOneLine(run(folder, "grow forest -o no/such/f.glb --trees 1 --leaves 100 --variants 1"), 4, "no/such");
+}
+
 }  // namespace
 }  // namespace stipple
