@@ -52,6 +52,25 @@ void addLines(const lod::StrandSet& strands, scene::Scene& scene) {
     scene.nodes.push_back(std::move(node));
 }
 
+/// What a glTF file may hold: no empty primitives and meshes, normals of length 1 (OBJ files have others).
+void tidy(scene::Scene& scene) {
+    std::vector<int> number;
+    std::vector<scene::Mesh> kept;
+    for (scene::Mesh& mesh : scene.meshes) {
+        std::erase_if(mesh.primitives, [](const scene::Primitive& p) { return p.indices.empty(); });
+        for (scene::Primitive& p : mesh.primitives)
+            for (glm::vec3& n : p.normal) n = glm::length(n) > 1e-6f ? glm::normalize(n) : glm::vec3(0, 1, 0);
+        number.push_back(mesh.primitives.empty() ? -1 : static_cast<int>(kept.size()));
+        if (!mesh.primitives.empty()) kept.push_back(std::move(mesh));
+    }
+    scene.meshes = std::move(kept);
+    for (scene::Node& node : scene.nodes)
+        if (node.mesh >= 0) {
+            node.mesh = number[static_cast<size_t>(node.mesh)];
+            if (node.mesh < 0 && node.store.empty()) node.instances.clear();
+        }
+}
+
 Result<void> run(const Options& o) {
     if (!o.strands)
         return fail(ErrorKind::usage, "says nothing of what to convert to", "stipple convert",
@@ -67,8 +86,7 @@ Result<void> run(const Options& o) {
     STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene));
     scene::StrandFit fit = scene::fitStrands(scene, images, o.fit, *executor);
     if (fit.trianglesIn == 0) return fail(ErrorKind::input, "holds no triangles", o.input);
-    for (scene::Mesh& mesh : fit.rest.meshes)
-        std::erase_if(mesh.primitives, [](const scene::Primitive& p) { return p.indices.empty(); });
+    tidy(fit.rest);
     const bool hasStrands = fit.strands.strands() > 0;
     std::vector<std::string> written;
     if (extension != ".stipple") {

@@ -57,12 +57,13 @@ class PartFitter {
         if (!order()) return false;
         sample();
         // No more joints than it takes: what is well within the tolerance is good enough.
-        constexpr double kWell = 0.4;
+        constexpr double kWell = 0.4, kFlat = 0.7, kSlender = 3;
         for (const bool isRibbon : {true, false}) {
             for (int segments = 2; segments <= settings_.joints; segments += (segments + 1) / 2) {
                 Candidate c = attempt(isRibbon, segments);
-                const double limit = settings_.tolerance * c.width;
-                if (c.joints.size() < 2 || !(c.usual() <= limit) || !(c.worst() <= c.width)) continue;
+                const double limit = settings_.tolerance * c.width, most = isRibbon ? kFlat * limit : limit;
+                if (c.joints.size() < 2 || !(c.usual() <= most) || !(c.worst() <= c.width)) continue;
+                if (!isRibbon && lengthOf(c) < kSlender * c.width) continue;  // a ball or a box
                 const bool isWell = c.usual() <= kWell * limit;
                 if (out.joints.empty() || c.usual() < out.usual()) out = std::move(c);
                 if (isWell) break;
@@ -197,6 +198,12 @@ class PartFitter {
         return c;
     }
 
+    static double lengthOf(const Candidate& c) {
+        double sum = 0;
+        for (size_t k = 0; k + 1 < c.joints.size(); ++k)
+            sum += glm::length(c.joints[k + 1].centre - c.joints[k].centre);
+        return sum;
+    }
     static size_t nearIndex(const std::vector<std::vector<const Sample*>>& near, size_t joint) {
         for (size_t k = 0, seen = 0; k < near.size(); ++k)
             if (!near[k].empty() && seen++ == joint) return k;
@@ -334,9 +341,10 @@ class SceneFitter {
         std::vector<std::vector<uint32_t>> trianglesOf(parts.count);
         for (uint32_t t = 0; t < parts.partOf.size(); ++t) trianglesOf[parts.partOf[t]].push_back(t);
         std::vector<Fitted> fitted(parts.count);
-        executor_.parallelFor(parts.count, 64, [&](size_t begin, size_t end) {
-            for (size_t k = begin; k < end; ++k) fitPart(p, trianglesOf[k], fitted[k]);
-        });
+        if (isWhole(p))
+            executor_.parallelFor(parts.count, 64, [&](size_t begin, size_t end) {
+                for (size_t k = begin; k < end; ++k) fitPart(p, trianglesOf[k], fitted[k]);
+            });
         uint64_t places = 0;
         for (const Placement& at : placed) {
             if (at.mesh != static_cast<int>(mesh)) continue;
@@ -351,6 +359,22 @@ class SceneFitter {
             if (fitted[parts.partOf[t]].strand.joints.empty())
                 left.indices.insert(left.indices.end(), p.indices.begin() + 3 * t, p.indices.begin() + 3 * t + 3);
         out_.trianglesLeft += left.indices.size() / 3 * places;
+    }
+
+    /// Pictures of leaves with holes in them are no ribbons.
+    bool isWhole(const Primitive& p) const {
+        constexpr double kMostCut = 0.1;
+        if (p.material < 0) return true;
+        const Material& m = scene_.materials[static_cast<size_t>(p.material)];
+        const int texture = m.baseColourTexture.texture;
+        if (m.alphaMode == AlphaMode::opaque || texture < 0) return true;
+        const int image = scene_.textures[static_cast<size_t>(texture)].image;
+        if (image < 0) return true;
+        const std::vector<uint32_t>& rgba = images_[static_cast<size_t>(image)].rgba;
+        const auto cut = std::count_if(rgba.begin(), rgba.end(), [&](uint32_t c) {
+            return static_cast<float>(c >> 24) / 255.0f * m.baseColour.a < m.alphaCutoff;
+        });
+        return static_cast<double>(cut) <= kMostCut * static_cast<double>(rgba.size());
     }
 
     void fitPart(const Primitive& p, const std::vector<uint32_t>& triangles, Fitted& out) const {

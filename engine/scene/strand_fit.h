@@ -9,7 +9,8 @@
 namespace stipple::scene {
 
 struct StrandFitSettings {
-    /// A part is replaced where the strand is no farther from it than this share of its own width (tubes: diameter).
+    /// A part is replaced where the strand is no farther from it than this share of its own width (of ribbons:
+    /// half-width).
     double tolerance = 0.35;
     int joints = 12;  ///< of a strand at most
 };
@@ -24,7 +25,8 @@ struct StrandFit {
 
 /// A ribbon where the part is open and flat across, a tube where its surface lies round an axis; everything else stays.
 /// Colours are means over each part: vertex colours, materials, textures (`images` are those of the scene, decoded).
-/// What a material's alpha cuts away is not there. Instanced meshes are fitted once a place.
+/// Where a material's alpha cuts much away (pictures of twigs on cards) the triangles stay. Instanced meshes are fitted
+/// once a place.
 StrandFit fitStrands(const Scene& scene, const std::vector<DecodedImage>& images, const StrandFitSettings& settings,
                      Executor& executor);
 
