@@ -127,6 +127,7 @@ void CrowdBuilder::add(const SharedModel& model, uint32_t first, uint32_t count)
 Result<void> CrowdBuilder::finish(const std::string& input, const BuildOptions& build, Executor& executor,
                                   bool showProgress, OpenedScene& scene) {
     constexpr uint64_t kFew = 64, kMostPoints = 12'000'000;
+    constexpr uint32_t kCrowdNode = 2048;  // small nodes: all of one is drawn as finely as its nearest part asks for
     uint64_t count = 0;
     for (const Model& m : models_) count += m.count;
     if (count < kFew) return {};
@@ -153,6 +154,7 @@ Result<void> CrowdBuilder::finish(const std::string& input, const BuildOptions& 
             }
         }
         lod::ProgressiveSettings settings = progressiveSettings(input);
+        settings.nodeRecords = kCrowdNode;
         lod::describeDiscs(factors, settings.description);
         return lod::buildProgressiveStore(items, path, settings, executor, progress);
     };
