@@ -112,6 +112,7 @@ Result<StandIns> strandsFromAfar(const SharedModel& model, const lod::Store& of,
         constexpr uint32_t kMostInNode = 8192;
         const std::vector<lod::StrandSamples> parts = lod::splitSamples(model->samples(), kMostInNode);
         std::vector<lod::ProgressiveItem> items;
+        items.reserve(parts.size());
         for (const lod::StrandSamples& cube : parts) items.push_back(itemAlone(cube));
         return lod::buildProgressiveStore(items, path, settings, executor, progress);
     };

@@ -248,7 +248,9 @@ void describeDiscs(const std::vector<DiscFactors>& models, StoreDescription& des
     }
     description.smallestDisc = least;
     description.discFactors.clear();
-    for (double radius = least; radius < 1.01 * greatest; radius *= std::sqrt(2.0)) {
+    const auto steps = static_cast<size_t>(std::lround(2 * std::log2(greatest / least)));
+    for (size_t k = 0; k <= steps; ++k) {
+        const double radius = least * std::exp2(0.5 * static_cast<double>(k));
         double sum = 0, weights = 0;
         for (const DiscFactors& m : models) {
             Hierarchy own;

@@ -137,6 +137,7 @@ std::vector<float> coverageFactors(const StrandSet& strands, const StrandSamples
     constexpr double kLeast = 0.3, kMost = 1.15;
     const std::array<Direction, 4> from = directions();
     std::vector<Coverage> views;
+    views.reserve(from.size());
     for (const Direction& d : from) views.emplace_back(strands, d);
     const auto sum = [&](const auto& areaOf) {
         std::array<double, 4> areas{};
