@@ -45,6 +45,7 @@ struct alignas(64) Lines {
     float edgeAx[kSegmentsPerBlock], edgeAy[kSegmentsPerBlock], slopeA[kSegmentsPerBlock];
     float edgeBx[kSegmentsPerBlock], edgeBy[kSegmentsPerBlock], slopeB[kSegmentsPerBlock];
     float isRound[kSegmentsPerBlock], radius[kSegmentsPerBlock];  ///< radius: the larger one, px
+    uint32_t lot[kSegmentsPerBlock];                              ///< strandLot
     uint32_t keep[kSegmentsPerBlock];
     // As one-pixel lines: along u, the axis along which they are longer, from `first` on; values at u = start, and
     // their slopes.
@@ -70,7 +71,7 @@ struct LinePixels {
 };
 
 /// How the segments of a block lie on the image as lines of one pixel's width, and which pixels their ends are.
-void layLines(const FrameConstants& frame, Lines& lines, size_t count, uint32_t firstId) {
+void layLines(const FrameConstants& frame, Lines& lines, size_t count) {
     const FrameConstants f = frame;
     const float width = float(int(f.width)), height = float(int(f.height));
 #pragma GCC ivdep
@@ -112,8 +113,7 @@ void layLines(const FrameConstants& frame, Lines& lines, size_t count, uint32_t 
                 uint32_t(int(inside > 0.5f ? y : 0.0f)) * f.width + uint32_t(int(inside > 0.5f ? x : 0.0f));
             const float dot_ = 3.14159265f * half * half * (1.0f - max(dx, dy) / max(2.0f * half, 1.0e-6f));
             const float share = half < kNarrow ? dot_ : 2.0f;
-            const uint32_t id = kKindStrand | (firstId + uint32_t(i));
-            const float isSeen = coverageThreshold(pixel, ~id, f.coverageSeed) < share ? inside : 0.0f;
+            const float isSeen = coverageThreshold(pixel, ~lines.lot[i], f.coverageSeed) < share ? inside : 0.0f;
             return isSeen > 0.5f ? pixel : ~0u;
         };
         lines.pixelA[i] = point(xa, ya, lines.halfA[i]);
@@ -132,6 +132,7 @@ void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pix
                        *const dHalf = lines.dHalf, *const longer = lines.longer, *const nearer = lines.nearer,
                        *const dNearer = lines.dNearer, *const inverse = lines.inverse, *const dInverse = lines.dInverse,
                        *const steep = lines.isSteep;
+    const uint32_t* const lot = lines.lot;
     uint32_t* __restrict const depth = pixels.depth, * __restrict const pixel = pixels.pixel;
 #pragma GCC ivdep
     for (size_t k = 0; k < count; ++k) {
@@ -143,8 +144,7 @@ void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pix
         const uint32_t row = uint32_t(int(inside > 0.5f ? v : 0.0f)), column = uint32_t(at[k]);
         const uint32_t where = isSteep ? column * f.width + row : row * f.width + column;
         const float covered = 2.0f * half * longer[i], share = half < kNarrow ? covered : 2.0f;
-        const uint32_t id = kKindStrand | (firstId + i);
-        const float taken = coverageThreshold(where, id, f.coverageSeed) < share ? inside : 0.0f;
+        const float taken = coverageThreshold(where, lot[i], f.coverageSeed) < share ? inside : 0.0f;
         depth[k] = floatBitsToUint((nearer[i] + u * dNearer[i]) / (inverse[i] + u * dInverse[i]));
         pixel[k] = taken > 0.5f ? where : ~0u;
     }
@@ -255,11 +255,12 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
         lines.edgeBy[i] = edgeB.y;
         lines.slopeB[i] = edgeB.slope;
         lines.isRound[i] = c.isRound;
+        lines.lot[i] = strandLot(s);
         lines.radius[i] = widestRadius(c, p, f.focal);
         const bool isFine = (segmentErrorCode(s) <= node.errorCode) | ((segmentOctants(s) & node.octantMask) != 0u);
         lines.keep[i] = (isFine & (p.isThere > 0.5f)) ? 1u : 0u;
     }
-    layLines(f, lines, count, firstId);
+    layLines(f, lines, count);
     const float width = float(f.width), height = float(f.height);
     LinePixels pixels;
     size_t collected = 0;

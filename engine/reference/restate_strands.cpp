@@ -47,8 +47,9 @@ class StrandProjector {
         : draws_(draws), level_(level), view_(draws.view), f_(draws.frame) {}
 
     void segment(const Segment& world, const lod::Instance& instance, const render::Bend& bend, uint32_t id,
-                 const dvec3* debugColour) {
+                 uint32_t lot, const dvec3* debugColour) {
         id_ = id;
+        lot_ = lot;
         s_ = world;
         debugColour_ = debugColour;
         const auto toCamera = [&](const dvec3& w) {
@@ -167,11 +168,11 @@ class StrandProjector {
             const double half = halfA_ + u * (halfB_ - halfA_);
             const int x = major == 0 ? m : static_cast<int>(std::floor(other)),
                       y = major == 0 ? static_cast<int>(std::floor(other)) : m;
-            offer(x, y, u, half, id_, 2 * half * longer);
+            offer(x, y, u, half, lot_, 2 * half * longer);
         }
         const double length = std::max(std::abs(d.x), std::abs(d.y));
         for (const auto& [p, u, half] : {std::tuple{pa_, 0.0, halfA_}, std::tuple{pb_, 1.0, halfB_}})
-            offer(static_cast<int>(std::floor(p.x)), static_cast<int>(std::floor(p.y)), u, half, ~id_,
+            offer(static_cast<int>(std::floor(p.x)), static_cast<int>(std::floor(p.y)), u, half, ~lot_,
                   3.14159265 * half * half * (1 - length / std::max(2 * half, 1e-6)));
     }
 
@@ -295,7 +296,7 @@ class StrandProjector {
     const lod::View& view_;
     const shared::FrameConstants& f_;
     Segment s_;
-    uint32_t id_ = 0;
+    uint32_t id_ = 0, lot_ = 0;
     const dvec3* debugColour_ = nullptr;
     dvec3 a_{0}, b_{0}, tangent_{0};
     double from_ = 0, to_ = 1, halfA_ = 0, halfB_ = 0;
@@ -323,7 +324,11 @@ void projectStrands(const render::DrawList& draws, const Chunks& chunks, Level& 
         for (uint32_t i = 0; i < cut.count; ++i) {
             const Segment s = decodeSegment(h, node, chunk.segments[i]);
             if (s.errorCode > cut.errorCode && (s.octants & cut.octantMask) == 0) continue;
-            projector.segment(s, instance, bend, 0x40000000u | (block * 256 + i), isDebug ? &colour : nullptr);
+            // The same in every cut.
+            const shared::StrandVertex &va = chunk.segments[i].a, &vb = chunk.segments[i].b;
+            const uint32_t lot = va.positionXY * 0x9e3779b1u ^ vb.positionXY * 0x85ebca6bu ^
+                                 va.positionZ % 65536 * 0xc2b2ae35u ^ vb.positionZ % 65536 * 0x27d4eb2fu;
+            projector.segment(s, instance, bend, 0x40000000u | (block * 256 + i), lot, isDebug ? &colour : nullptr);
         }
         block += (cut.count + 255) / 256;
     }
