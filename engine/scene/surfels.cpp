@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/scene/borders.h"
 #include "lod/in_memory.h"
 #include "shaders/shared/record.h"
 
@@ -109,6 +110,7 @@ class Sampler {
             if (p.kind == PrimitiveKind::points) takePoints(p, m);
             if (p.kind == PrimitiveKind::triangles && settings_.count > 0) sampleTriangles(p, m);
         });
+        if (settings_.count == 0) takeBorders(each);
         return std::move(out_);
     }
 
@@ -126,8 +128,6 @@ class Sampler {
     }
 
     void sampleTriangles(const Primitive& p, const glm::dmat4& m) {
-        const glm::dmat3 forNormals = glm::transpose(glm::inverse(glm::dmat3(m)));
-        const bool isMirrored = glm::determinant(glm::dmat3(m)) < 0;
         for (size_t i = 0; i + 3 <= p.indices.size(); i += 3) {
             const Corners c = corners(p, m, i);
             const double area = areaOf(c);
@@ -136,8 +136,6 @@ class Sampler {
             const auto count = static_cast<uint64_t>(carry_);
             carry_ -= static_cast<double>(count);
             if (count == 0) continue;
-            glm::dvec3 flat = glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
-            if (isMirrored) flat = -flat;
             const float footprint = textureFootprint(p, i, area);
             const uint32_t seed = hashOf(triangle_++);
             for (uint64_t s = 0; s < count; ++s) {
@@ -148,24 +146,55 @@ class Sampler {
                     u = 1 - u;
                     v = 1 - v;
                 }
-                const glm::dvec3 b(1 - u - v, u, v);
-                glm::vec3 colour(1);
-                if (!colourAt(p, i, glm::vec3(b), footprint, colour)) {
-                    ++out_.cutOut;
-                    continue;
-                }
-                glm::dvec3 n = flat;
-                if (!p.normal.empty()) {
-                    glm::dvec3 mixed(0);
-                    for (size_t k = 0; k < 3; ++k)
-                        mixed += b[static_cast<int>(k)] * glm::dvec3(p.normal[p.indices[i + k]]);
-                    mixed = forNormals * mixed;
-                    if (glm::length(mixed) > 1e-12 && std::isfinite(glm::length(mixed))) n = glm::normalize(mixed);
-                }
-                out_.position.push_back(b.x * c[0] + b.y * c[1] + b.z * c[2]);
-                out_.normal.emplace_back(n);
-                out_.colour.push_back(byteOf(colour.r) | byteOf(colour.g) << 8 | byteOf(colour.b) << 16);
+                takeSample(p, m, i, {1 - u - v, u, v}, footprint);
             }
+        }
+    }
+
+    /// The place `b` (barycentric) of the triangle whose indices begin at `i`.
+    void takeSample(const Primitive& p, const glm::dmat4& m, size_t i, const glm::dvec3& b, float footprint) {
+        const Corners c = corners(p, m, i);
+        glm::vec3 colour(1);
+        if (!colourAt(p, i, glm::vec3(b), footprint, colour)) {
+            ++out_.cutOut;
+            return;
+        }
+        const glm::dmat3 linear(m);
+        glm::dvec3 n = glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
+        if (glm::determinant(linear) < 0) n = -n;
+        if (!p.normal.empty()) {
+            glm::dvec3 mixed(0);
+            for (size_t k = 0; k < 3; ++k) mixed += b[static_cast<int>(k)] * glm::dvec3(p.normal[p.indices[i + k]]);
+            mixed = glm::transpose(glm::inverse(linear)) * mixed;
+            if (glm::length(mixed) > 1e-12 && std::isfinite(glm::length(mixed))) n = glm::normalize(mixed);
+        }
+        out_.position.push_back(b.x * c[0] + b.y * c[1] + b.z * c[2]);
+        out_.normal.emplace_back(n);
+        out_.colour.push_back(byteOf(colour.r) | byteOf(colour.g) << 8 | byteOf(colour.b) << 16);
+    }
+
+    /// Where triangles end beside points, points that join both.
+    template <typename Each>
+    void takeBorders(const Each& each) {
+        struct Triangle {
+            const Primitive* primitive;
+            glm::dmat4 world;
+            size_t first;
+        };
+        std::vector<Triangle> triangles;
+        std::vector<Corners> all;
+        each([&](const Primitive& p, const glm::dmat4& m) {
+            if (p.kind != PrimitiveKind::triangles) return;
+            for (size_t i = 0; i + 3 <= p.indices.size(); i += 3) {
+                const Corners c = corners(p, m, i);
+                if (!(areaOf(c) > 0)) continue;
+                triangles.push_back({&p, m, i});
+                all.push_back(c);
+            }
+        });
+        for (const BorderSample& s : borderSamples(all, out_.position)) {
+            const Triangle& t = triangles[s.triangle];
+            takeSample(*t.primitive, t.world, t.first, s.weight, 1);
         }
     }
 

@@ -20,6 +20,7 @@ struct SurfelSettings {
 };
 
 /// Samples all visible meshes of a scene, instances included; points of point primitives are taken as they are.
+/// Without surfels, open borders of triangles beside those points give points too, so that both join (borders.h).
 /// `images` are those of the scene, decoded; an empty one counts as white. Errors if there is nothing to sample.
 Result<lod::PointSource> sampleSurfels(const Scene& scene, const std::vector<DecodedImage>& images,
                                        const SurfelSettings& settings);

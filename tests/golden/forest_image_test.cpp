@@ -260,7 +260,7 @@ TEST_F(Forests, APathFromFarAwayOntoALeafDoesNotPop) {
         hadStrands += c.crowdMembers > c.standIns ? 1 : 0;
         const Pop pop = popOf(a, frameAt(distance, std::exp2(1.5 / 32)));
         const Pop control = popOf(a, frameAt(distance, 8));
-        EXPECT_LT(pop.mean, distance > 70 ? 0.4 : 9) << distance;  // stated tolerance
+        EXPECT_LT(pop.mean, distance > 70 ? 0.4 : 1.5) << distance;  // stated tolerance; found 0.3 and 1.1
         worstControl = std::max(worstControl, control.mean);
         // No hole: what the finest cut covers, this one covers too. (A tree of three pixels is three discs.)
         EXPECT_GT(coverOf(a).first, (distance < 100 ? 0.8 : 0.6) * coverOf(frameAt(distance, 0.1)).first) << distance;
