@@ -379,12 +379,15 @@ class CpuBackend final : public render::Backend {
             any |= at.depth[i] > 0;
             signs |= at.depth[i] > 0 ? at.size[i] : 0u;
         }
-        row.hasTubes = hasStrands_ && signs >> 31 != 0;
+        row.hasTubes = hasStrands_ && (signs & 0x80008000u) != 0;
         if (any)
             k_.unpackRow(at, first, n, row);
         else
             std::fill_n(row.depth + first, n, 0.0f);
-        if (hasStrands_ && !row.hasTubes) std::fill_n(row.isRound + first, n, 0.0f);  // others beside it may have some
+        if (hasStrands_ && !row.hasTubes) {  // others beside it may have some
+            std::fill_n(row.isRound + first, n, 0.0f);
+            std::fill_n(row.axisX + first, n, 0.0f);
+        }
         return any;
     }
 
@@ -401,10 +404,11 @@ class CpuBackend final : public render::Backend {
             return false;
         k_.expandRow(scratch, n, out.nearest, out.beside);
         out.nearest.hasTubes = scratch.hasTubes;
-        if (hasStrands_ && !scratch.hasTubes) {
-            std::fill_n(out.nearest.isRound, TexelRow::kSize, 0.0f);
-            std::fill_n(out.beside.isRound, TexelRow::kSize, 0.0f);
-        }
+        if (hasStrands_ && !scratch.hasTubes)
+            for (TexelRow* row : {&out.nearest, &out.beside}) {
+                std::fill_n(row->isRound, TexelRow::kSize, 0.0f);
+                std::fill_n(row->axisX, TexelRow::kSize, 0.0f);
+            }
         return true;
     }
 

@@ -25,7 +25,7 @@ struct TexelRow {
         red[kSize], green[kSize], blue[kSize];
     // Only of frames with tubes:
     alignas(64) float isRound[kSize], axisX[kSize], axisY[kSize];
-    bool hasTubes;
+    bool hasTubes;  ///< or narrow ribbons
 };
 
 /// A coarse row at the resolution of the fine one: for each fine texel its parent, and the parent's neighbour on the

@@ -210,7 +210,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         for (size_t i = 0; i < n; ++i) row.depth[kPad + i] = 0;
         if (row.hasTubes)
 #pragma GCC ivdep
-            for (size_t i = 0; i < n; ++i) row.isRound[kPad + i] = 0;
+            for (size_t i = 0; i < n; ++i) row.isRound[kPad + i] = row.axisX[kPad + i] = 0;
         if (triangles.count > 0) resolveTriangles(f, in, triangles, x0, y, row, planes);
         row.hasTubes = strands.count > 0 && resolveStrands(f, in, strands, x0, y, row, largestRadius);
         return triangles.count + strands.count > 0;
@@ -227,7 +227,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
     largestRadius = max(largestRadius, uintBitsToFloat(largest));
     if (row.hasTubes)
 #pragma GCC ivdep
-        for (size_t i = 0; i < n; ++i) row.isRound[kPad + i] = 0;
+        for (size_t i = 0; i < n; ++i) row.isRound[kPad + i] = row.axisX[kPad + i] = 0;
     if (triangles.count > 0) resolveTriangles(f, in, triangles, x0, y, row, planes);
     row.hasTubes = strands.count > 0 && resolveStrands(f, in, strands, x0, y, row, largestRadius);
     return true;
@@ -406,6 +406,7 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
         blue[i] = row.blue[at];
     }
     if (lit && points > 0) {
+        const float mayBeRibbon = row.hasTubes ? 1.0f : 0.0f;
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
             const size_t at = kPad + i;
@@ -413,8 +414,9 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
             const float inverse = 1.0f / std::sqrt(vx * vx + vy * vy + 1.0f);
             const vec3 normal =
                 normalFromPerp(vec2(row.perpX[at], row.perpY[at]), vec3(vx * inverse, vy * inverse, inverse));
-            const float sunlight =
-                irradiance(normal, f.sunDirection, f.skyDirection, isLeaf(row.thickness[at], row.radius[at]));
+            const float leaf =
+                letsLightThrough(row.thickness[at], row.radius[at], row.isRound[at], mayBeRibbon * row.axisX[at]);
+            const float sunlight = irradiance(normal, f.sunDirection, f.skyDirection, leaf);
             const float brightness = 1.0f + share[i] * (sunlight - 1.0f);
             red[i] *= brightness;
             green[i] *= brightness;

@@ -25,7 +25,8 @@ void shadeSurfaces(const FrameConstants& f, const TexelRow& __restrict row, cons
         p.depth[n] = row.depth[from];
         p.perpX[n] = row.perpX[from];
         p.perpY[n] = row.perpY[from];
-        p.leaf[n] = isLeaf(row.thickness[from], row.radius[from]);
+        p.leaf[n] = letsLightThrough(row.thickness[from], row.radius[from], row.isRound[from],
+                                     row.hasTubes ? row.axisX[from] : 0.0f);
         p.red[n] = red[i];
         p.green[n] = green[i];
         p.blue[n] = blue[i];

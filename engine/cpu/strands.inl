@@ -415,7 +415,7 @@ bool resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
         row.axisX[at] = o.axisX[i];
         row.axisY[at] = o.axisY[i];
         largestRadius = max(largestRadius, o.radius[i]);
-        round_ = max(round_, o.isRound[i]);
+        round_ = max(round_, max(o.isRound[i], o.axisX[i] > kAllRibbon ? 1.0f : 0.0f));
     }
     return round_ > 0.0f;
 }

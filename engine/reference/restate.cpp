@@ -268,7 +268,7 @@ class ReferenceBackend final : public render::Backend {
                                 ((f.shade & shared::kShadeLit) != 0 && (!draws.lights.empty() || draws.environment)))) {
                         colour = shadeTriangle(s, n, toPixel * (s.depth / toPixel.z), draws);
                     } else if ((f.shade & shared::kShadeLit) != 0 && f.debugView == shared::kDebugNone) {
-                        colour *= lightOn(n, f, s.isLeaf(v.focalPixels));
+                        colour *= lightOn(n, f, s.letsLightThrough(v.focalPixels));
                     }
                     if (wantAll) {
                         image.depth[i] = static_cast<float>(s.depth);

@@ -26,6 +26,8 @@ struct Sample {
     glm::dvec3 emissive{0};
     /// No surface, and lets light through: hardly any thickness.
     bool isLeaf(double focal) const { return thickness * focal < 0.125 * radius * depth; }
+    /// So do narrow ribbons, which are merged as a surface is: of what is not round `axis.x` is 1 where all parts are.
+    bool letsLightThrough(double focal) const { return isLeaf(focal) || (!isRound && axis.x > 0.999); }
 };
 /// Thickness of leaves, over their radius.
 constexpr double kLeafThickness = 1.0 / 16;

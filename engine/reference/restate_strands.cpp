@@ -254,6 +254,7 @@ class StrandProjector {
             s.depth = p.c.z;
             s.radius = std::max(p.radius * view_.focalPixels / p.c.z, kNarrow) * support;
             s.perp = dvec2(rotationToZ(v) * n);
+            s.axis = {1, 0};
         }
         s.radius = half < kNarrow ? 0.25 : std::min(s.radius, 16384.0);
         const double facing = 1 - glm::dot(s.perp, s.perp);

@@ -32,7 +32,8 @@ dvec3 bump(const dvec3& normal, const Corners& c, const dvec3& texel, double sca
 /// Times pi, as a light's colour is what a white diffuse surface sends back.
 dvec3 reflected(const Sample& s, const dvec3& n, const dvec3& v, const dvec3& l, const dvec3& light, double focal) {
     const double nl = glm::dot(n, l), nv = std::max(glm::dot(n, v), 1e-3);
-    if (!(nl > 0)) return !s.isLeaf(focal) ? dvec3(0) : light * s.colour * (1 - s.metallic) * (kThroughLeaf * -nl);
+    if (!(nl > 0))
+        return !s.letsLightThrough(focal) ? dvec3(0) : light * s.colour * (1 - s.metallic) * (kThroughLeaf * -nl);
     const dvec3 h = glm::normalize(l + v);
     const double nh = std::max(0.0, glm::dot(n, h)), vh = std::max(0.0, glm::dot(v, h));
     const double alpha2 = std::pow(std::max(s.roughness * s.roughness, 2e-3), 2);

@@ -36,7 +36,7 @@ void main() {
         s.metallic = float(word & 255u) / 255.0;
         s.roughness = float(word >> 8 & 255u) / 255.0;
         s.occlusion = float(word >> 16 & 255u) / 255.0;
-        s.leaf = isLeaf(own.thickness, own.radius);
+        s.leaf = letsLightThrough(own.thickness, own.radius, own.isRound, own.axis.x);
         if (frame.hasEnvironment != 0u)
             colour = frame.ambient * reflectEnvironment(s, frame.environmentX, frame.environmentY, frame.environmentZ);
         else

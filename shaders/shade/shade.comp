@@ -21,7 +21,7 @@ void main() {
         colour = t.colour;
         if (frame.debugView == kDebugHoles) colour = debugHoleColour(finished(own).depth, t.depth);
         else if (frame.debugView == kDebugNormals) colour = vec3(0.5 + 0.5 * n.x, 0.5 - 0.5 * n.y, 0.5 - 0.5 * n.z);
-        else if (frame.debugView == kDebugNone && (frame.shade & kShadeLit) != 0u) colour *= irradiance(n, frame.sunDirection, frame.skyDirection, isLeaf(t.thickness, t.radius));
+        else if (frame.debugView == kDebugNone && (frame.shade & kShadeLit) != 0u) colour *= irradiance(n, frame.sunDirection, frame.skyDirection, letsLightThrough(t.thickness, t.radius, t.isRound, t.axis.x));
     }
     const uint at = pixel.y * frame.width + pixel.x;
     const vec3 c = clamp(colour, 0.0, 1.0);

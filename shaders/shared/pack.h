@@ -69,7 +69,8 @@ SHARED_FN Texel unpackTexel(PackedTexel p) {
 }
 
 // Of frames that may hold tubes. A thickness is never negative: its sign marks a texel of a tube, whose other 15 bits
-// and the normal word hold axis 12 + 12 and lean 12 + 11 (the thickness is the radius).
+// and the normal word hold axis 12 + 12 and lean 12 + 11 (the thickness is the radius). Nor is a radius: its sign marks
+// what lets light through though it is no leaf.
 SHARED_FN uint fixedBits(float v, float scale) {
     return uint(int(floor((min(max(v, -1.0f), 1.0f) + 1.0f) * scale + 0.5f)));
 }
@@ -80,11 +81,14 @@ SHARED_FN PackedTexel packAnyTexel(Texel t) {
     const uint leanY = fixedBits(t.normalPerp.y, 1023.0f);
     const uint size = (p.size & 0xffffu) | 0x80000000u | (leanX >> 8) << 27 | leanY << 16;
     const uint normal = fixedBits(t.axis.x, 2047.0f) | fixedBits(t.axis.y, 2047.0f) << 12 | (leanX & 255u) << 24;
-    p.size = t.isRound > 0.5f ? size : p.size;
+    const uint ribbon = t.axis.x > kAllRibbon ? 0x8000u : 0u;
+    p.size = t.isRound > 0.5f ? size : p.size | ribbon;
     p.normal = t.isRound > 0.5f ? normal : p.normal;
     return p;
 }
-SHARED_FN Texel unpackAnyTexel(PackedTexel p) {
+SHARED_FN Texel unpackAnyTexel(PackedTexel packed) {
+    PackedTexel p = packed;
+    p.size = packed.size & 0xffff7fffu;
     Texel t = unpackTexel(p);
     const bool isRound = (p.size & 0x80000000u) != 0u;
     const float leanX = fixedValue((p.size >> 27 & 15u) << 8 | p.normal >> 24, 2047.0f);
@@ -92,7 +96,8 @@ SHARED_FN Texel unpackAnyTexel(PackedTexel p) {
     t.isRound = isRound ? 1.0f : 0.0f;
     t.thickness = isRound ? t.radius : t.thickness;
     t.normalPerp = vec2(isRound ? leanX : t.normalPerp.x, isRound ? leanY : t.normalPerp.y);
-    t.axis = vec2(isRound ? fixedValue(p.normal & 4095u, 2047.0f) : 0.0f,
+    const float ribbon = (packed.size & 0x8000u) != 0u ? 1.0f : 0.0f;
+    t.axis = vec2(isRound ? fixedValue(p.normal & 4095u, 2047.0f) : ribbon,
                   isRound ? fixedValue(p.normal >> 12 & 4095u, 2047.0f) : 0.0f);
     return t;
 }

@@ -19,7 +19,7 @@ struct Texel {
     // t_perp, with t the unit tangent, t_v along the view and t_perp across; `axis` is (tx^2 - ty^2, 2 tx ty), which
     // does not care which way the tangent points. Thickness equals the radius.
     float isRound;  // 1 or 0
-    vec2 axis;
+    vec2 axis;      // of all else axis.x is 1 where only parts of narrow ribbons were merged
 };
 
 const float kThicknessRadii = 0.25f;  // kappa of ALGORITHMS 1.4
@@ -62,6 +62,11 @@ const float kLeafThickness = 0.0625f;
 const float kLeafLimit = 0.125f;
 // 1 for leaves.
 SHARED_FN float isLeaf(float thickness, float radius) { return thickness < kLeafLimit * radius ? 1.0f : 0.0f; }
+// Leaves do, and ribbons too narrow to be filled: those are merged along the ribbon as a surface is.
+const float kAllRibbon = 0.999f;
+SHARED_FN float letsLightThrough(float thickness, float radius, float isRound, float axisX) {
+    return max(isLeaf(thickness, radius), (1.0f - isRound) * axisX > kAllRibbon ? 1.0f : 0.0f);
+}
 
 // Everything of a full-size texel but its place and colour. `c`: centre in camera space, `n`: unit normal (any side),
 // `radiusWorld`: support radius, world units.

@@ -193,8 +193,9 @@ SHARED_FN Texel texelFromStrand(CameraSegment s, float place, float support, flo
     const vec2 plain = vec2(isTube_ ? narrow.x : flat_.normalPerp.x, isTube_ ? narrow.y : flat_.normalPerp.y);
     r.normalPerp = vec2(isRound ? tv * across.x : plain.x, isRound ? tv * across.y : plain.y);
     r.isRound = isRound ? 1.0f : 0.0f;
+    const float ribbon = 1.0f - s.isRound;
     r.axis =
-        vec2(isRound ? across.x * across.x - across.y * across.y : 0.0f, isRound ? 2.0f * across.x * across.y : 0.0f);
+        vec2(isRound ? across.x * across.x - across.y * across.y : ribbon, isRound ? 2.0f * across.x * across.y : 0.0f);
     return r;
 }
 

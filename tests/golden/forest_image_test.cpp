@@ -101,19 +101,45 @@ TEST_F(Forests, DiscsCoverAsMuchAsTheStrandsThatTheyStandFor) {
 }
 
 TEST_F(Forests, LeavesLetLightThrough) {
-    // One leaf, the sun in front of it and behind it.
-    lod::StrandSet leaf = test::oneStrand({{-0.5, 0, 0}, {0.5, 0, 0}}, 0.4f, {{0, 0, 1}, {0, 0, 1}});
-    const auto store = test::buildStrands(leaf, folder_ / "leaf.stipple", *executor_);
+    // The sun in front of leaves and behind them: filled, reconstructed along the ribbon, and narrower than a pixel.
     const auto backend = cpu::makeCpuBackend(*executor_);
+    const auto oracle = reference::makeReferenceBackend(*executor_);
     const lod::View view = viewFrom({0, 0, 2}, {0, 0, 0}, 200, 150);
-    const auto greenUnder = [&](const glm::dvec3& shinesTo) {
-        render::FrameSettings settings = lit(0.1);
-        settings.draw.lights = {{shared::kLightDirectional, {}, shinesTo, glm::vec3(2)}};
-        return coverOf(test::draw({{store, {}, {}}}, *backend, *executor_, view, settings)).second;
-    };
-    const double front = greenUnder({0, 0, -1}), through = greenUnder({0, 0, 1}), beside = greenUnder({1, 0, 0});
-    EXPECT_GT(front, through);
-    EXPECT_GT(through, 1.5 * beside);
+    for (const double pixels : {40.0, 1.4, 0.4}) {  // half-width
+        const double radius = pixels * 2 / view.focalPixels;
+        lod::StrandSet leaves;
+        for (int k = 0; k < (pixels > 10 ? 1 : 12); ++k) {
+            const double y = pixels > 10 ? 0 : 0.06 * (k - 6);
+            for (const double x : {-0.5, 0.5})
+                leaves.addVertex({x, y + 0.01 * x, 0}, static_cast<float>(radius), {0, 0, 1}, 0xffc8c8c8u);
+            leaves.endStrand(true);
+        }
+        const auto store = test::buildStrands(leaves, folder_ / "leaf.stipple", *executor_);
+        const auto greenUnder = [&](const glm::dvec3& shinesTo) {
+            render::FrameSettings settings = lit(0.1);
+            settings.draw.lights = {{shared::kLightDirectional, {}, shinesTo, glm::vec3(2)}};
+            const render::Image image = test::draw({{store, {}, {}}}, *backend, *executor_, view, settings);
+            const auto d = reference::compareImages(
+                image, test::draw({{store, {}, {}}}, *oracle, *executor_, view, settings), 4, nullptr);
+            EXPECT_GE(d ? d->psnr : 0, 45) << pixels;  // a pixel or two at the ends
+            return coverOf(image).second;
+        };
+        const double front = greenUnder({0, 0, -1}), through = greenUnder({0, 0, 1}), beside = greenUnder({1, 0, 0});
+        EXPECT_GT(front, through) << pixels;
+        EXPECT_GT(through, 1.5 * beside) << pixels;
+    }
+    // A tube is no leaf, however narrow.
+    for (const double pixels : {1.4, 0.4}) {
+        const auto tube = test::buildStrands(
+            test::oneStrand({{-0.5, 0, 0}, {0.5, 0.01, 0}}, static_cast<float>(pixels * 2 / view.focalPixels)),
+            folder_ / "tube.stipple", *executor_);
+        const auto greenUnder = [&](const glm::dvec3& shinesTo) {
+            render::FrameSettings settings = lit(0.1);
+            settings.draw.lights = {{shared::kLightDirectional, {}, shinesTo, glm::vec3(2)}};
+            return coverOf(test::draw({{tube, {}, {}}}, *backend, *executor_, view, settings)).second;
+        };
+        EXPECT_LT(greenUnder({0, 0, 1}), 0.6 * greenUnder({0, 0, -1})) << pixels;
+    }
 }
 
 /// Wind bends trees within their bound, the same picture for the same time, and only where it can be seen.
