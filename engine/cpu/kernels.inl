@@ -385,15 +385,30 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
     bool anyLit = false;
     const float points = (f.shade & kShadeLit) != 0 ? 1.0f : 0.0f,
                 triangles = (f.shade & kShadeTriangles) != 0 ? 1.0f : 0.0f;
+    const uint32_t litPoints = points > 0 && hasLights ? 1 : 0, litTriangles = triangles > 0 ? 1 : 0;
     for (size_t i = 0; lit && i < n; ++i) {
-        // A triangle's pixel that no splat stands in front of.
-        const bool isTriangle = surface != nullptr && surface[i] != 0 && row.depth[kPad + i] == own.depth[kPad + i];
-        const bool isLit = isTriangle ? (surface[i] & kPixelUnlit) == 0 && triangles > 0 : points > 0 && hasLights;
-        share[i] = isTriangle || hasLights ? 0.0f : points;
-        mask[i] = isLit ? 1 : 0;
-        word[i] = isTriangle ? surface[i] : kPlainSurface;
-        shines[i] = isTriangle && planes.emissive != nullptr ? planes.emissive[i] : 0u;
-        anyLit = anyLit || isLit;
+        share[i] = hasLights ? 0.0f : points;
+        mask[i] = litPoints;
+        word[i] = kPlainSurface;
+        shines[i] = 0;
+    }
+    anyLit = lit && litPoints != 0;
+    if (lit && surface != nullptr) {
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            // A triangle's pixel that no splat stands in front of.
+            const uint32_t drawn = surface[i];
+            const uint32_t inFront = row.depth[kPad + i] == own.depth[kPad + i] ? drawn : 0u;
+            const uint32_t isLit = (inFront & kPixelUnlit) == 0 ? litTriangles : 0u;
+            share[i] = inFront != 0 ? 0.0f : share[i];
+            mask[i] = inFront != 0 ? isLit : litPoints;
+            word[i] = inFront != 0 ? inFront : kPlainSurface;
+        }
+        uint32_t any = 0;
+        for (size_t i = 0; i < n; ++i) any |= mask[i];
+        anyLit = any != 0;
+        for (size_t i = 0; planes.emissive != nullptr && i < n; ++i)
+            shines[i] = word[i] != kPlainSurface ? planes.emissive[i] : 0u;
     }
     const float inverseFocal = 1.0f / f.focal;
     const float vy = (float(int(y)) + 0.5f - f.centre.y) * inverseFocal;

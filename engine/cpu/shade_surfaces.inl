@@ -33,8 +33,8 @@ void shadeSurfaces(const FrameConstants& f, const TexelRow& __restrict row, cons
         p.words[n++] = words[i];
     }
     alignas(64) float r[kTile], g[kTile], b[kTile];
-    const float *const px = p.x, *const perpX = p.perpX, *const perpY = p.perpY, *const leaf = p.leaf,
-                       *const pr = p.red, *const pg = p.green, *const pb = p.blue;
+    const float *const px = p.x, *const depth = p.depth, *const perpX = p.perpX, *const perpY = p.perpY,
+                       *const leaf = p.leaf, *const pr = p.red, *const pg = p.green, *const pb = p.blue;
     const uint32_t* const word = p.words;
     const float centreX = f.centre.x;
     const auto surfaceAt = [=](size_t i) {
@@ -82,12 +82,12 @@ void shadeSurfaces(const FrameConstants& f, const TexelRow& __restrict row, cons
     }
     for (uint32_t k = 0; k < f.lightCount; ++k) {
         const LightSource light = input.lights[k];
+        const bool isFar = light.kind == kLightDirectional;
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
-            const float z = p.depth[i];
-            const float vx = (p.x[i] - f.centre.x) * inverseFocal;
+            const float z = depth[i];
+            const float vx = (px[i] - centreX) * inverseFocal;
             const vec3 point = vec3(vx * z, vy * z, z);
-            const bool isFar = light.kind == kLightDirectional;
             vec3 l = vec3(light.position.x - (isFar ? 0.0f : point.x), light.position.y - (isFar ? 0.0f : point.y),
                           light.position.z - (isFar ? 0.0f : point.z));
             const float inverse = 1.0f / std::sqrt(max(l.x * l.x + l.y * l.y + l.z * l.z, 1.0e-12f));
