@@ -249,6 +249,19 @@ Result<StoreWriter> StoreWriter::create(const std::string& path) {
     return StoreWriter(std::move(file));
 }
 
+Result<StoreWriter> StoreWriter::resume(const std::string& path, const std::string& temporaryPath, uint64_t bytes) {
+    STIPPLE_ASSIGN(OutputFile file, OutputFile::resume(path, temporaryPath, bytes));
+    const Head empty{};
+    if (bytes == 0) STIPPLE_TRY(file.append(&empty, sizeof(empty)));
+    return StoreWriter(std::move(file));
+}
+
+Result<uint64_t> StoreWriter::appendEncoded(const std::vector<uint8_t>& bytes) {
+    const uint64_t at = file_.position();
+    STIPPLE_TRY(file_.append(bytes.data(), bytes.size()));
+    return at;
+}
+
 Result<void> StoreWriter::appendChunk(const std::vector<uint8_t>& bytes, const std::vector<uint8_t>& attributes,
                                       Node& node) {
     node.chunkOffset = file_.position();

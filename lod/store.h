@@ -31,8 +31,12 @@ struct Store {
 class StoreWriter {
   public:
     static Result<StoreWriter> create(const std::string& path);
+    /// Goes on with a file that was left at `temporaryPath` (OutputFile::resume); `bytes` 0: begins.
+    static Result<StoreWriter> resume(const std::string& path, const std::string& temporaryPath, uint64_t bytes);
     /// Appends an encoded chunk and its attribute streams and fills the chunk fields of `node`.
     Result<void> appendChunk(const std::vector<uint8_t>& bytes, const std::vector<uint8_t>& attributes, Node& node);
+    /// Appends chunks that are encoded and described already; returns where they begin.
+    Result<uint64_t> appendEncoded(const std::vector<uint8_t>& bytes);
     /// Writes node table, description, foot, then the head. The file stays under its temporary name.
     Result<void> finish(const Hierarchy& hierarchy, const StoreDescription& description);
     const std::string& temporaryPath() const { return file_.temporaryPath(); }

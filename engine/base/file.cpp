@@ -63,11 +63,12 @@ OutputFile::OutputFile(OutputFile&& other) noexcept
     : descriptor_(std::exchange(other.descriptor_, -1)),
       position_(other.position_),
       path_(std::move(other.path_)),
-      temporaryPath_(std::move(other.temporaryPath_)) {}
+      temporaryPath_(std::move(other.temporaryPath_)),
+      isKept_(other.isKept_) {}
 OutputFile::~OutputFile() {
     if (descriptor_ < 0) return;
     ::close(descriptor_);
-    ::unlink(temporaryPath_.c_str());
+    if (!isKept_) ::unlink(temporaryPath_.c_str());
 }
 
 Result<OutputFile> OutputFile::create(const std::string& path) {
@@ -82,19 +83,54 @@ Result<OutputFile> OutputFile::create(const std::string& path) {
     return OutputFile(descriptor, path, std::move(temporary));
 }
 
-Result<void> OutputFile::writeAt(uint64_t offset, const void* bytes, size_t count) {
+Result<OutputFile> OutputFile::resume(const std::string& path, const std::string& temporaryPath, uint64_t bytes) {
+    const int descriptor = ::open(temporaryPath.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    if (descriptor < 0 || ::ftruncate(descriptor, static_cast<off_t>(bytes)) != 0) {
+        const std::string why = std::strerror(errno);
+        if (descriptor >= 0) ::close(descriptor);
+        return fail(ErrorKind::output, "cannot be written: " + why, path,
+                    "choose a folder that exists and can be written");
+    }
+    OutputFile file(descriptor, path, temporaryPath);
+    file.position_ = bytes;
+    file.isKept_ = true;
+    return file;
+}
+
+namespace {
+
+/// 0 or an error number.
+int writeAll(int descriptor, uint64_t offset, const void* bytes, size_t count) {
     const auto* in = static_cast<const char*>(bytes);
     while (count > 0) {
-        const ssize_t put = ::pwrite(descriptor_, in, count, static_cast<off_t>(offset));
+        const ssize_t put = ::pwrite(descriptor, in, count, static_cast<off_t>(offset));
         if (put < 0 && errno == EINTR) continue;
-        if (put <= 0)
-            return fail(ErrorKind::output, fmt::format("cannot be written: {}", std::strerror(errno)), path_,
-                        errno == ENOSPC ? "the disk is full; nothing was left behind" : "nothing was left behind");
+        if (put <= 0) return put < 0 ? errno : ENOSPC;
         in += put;
         offset += static_cast<uint64_t>(put);
         count -= static_cast<size_t>(put);
     }
-    return {};
+    return 0;
+}
+
+}  // namespace
+
+Result<void> OutputFile::writeAt(uint64_t offset, const void* bytes, size_t count) {
+    const int error = writeAll(descriptor_, offset, bytes, count);
+    if (error == 0) return {};
+    const char* const left = isKept_ ? "what is done stays: run the same command to go on" : "nothing was left behind";
+    return fail(ErrorKind::output, fmt::format("cannot be written: {}", std::strerror(error)), path_,
+                error == ENOSPC ? fmt::format("the disk is full; {}", left) : left);
+}
+
+Result<void> writeFileAt(const std::string& path, uint64_t offset, const void* bytes, size_t count) {
+    const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
+    const int error = descriptor < 0 ? errno : writeAll(descriptor, offset, bytes, count);
+    if (descriptor >= 0) ::close(descriptor);
+    if (error == 0) return {};
+    return fail(ErrorKind::output, fmt::format("cannot be written: {}", std::strerror(error)), path,
+                error == ENOSPC ? "the disk is full; make room or name another folder with --temp"
+                                : "choose a folder that can be written");
 }
 
 Result<void> OutputFile::append(const void* bytes, size_t count) {

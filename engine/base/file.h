@@ -34,6 +34,9 @@ class InputFile {
 class OutputFile {
   public:
     static Result<OutputFile> create(const std::string& path);
+    /// The first `bytes` bytes of the file at `temporaryPath`, which is made if it is not there and stays without
+    /// commit(), so that work can go on later.
+    static Result<OutputFile> resume(const std::string& path, const std::string& temporaryPath, uint64_t bytes);
     OutputFile(OutputFile&& other) noexcept;
     OutputFile& operator=(OutputFile&&) = delete;
     ~OutputFile();
@@ -50,8 +53,11 @@ class OutputFile {
     int descriptor_ = -1;
     uint64_t position_ = 0;
     std::string path_, temporaryPath_;
+    bool isKept_ = false;
 };
 
+/// Writes into a file at `offset`; makes the file if it is not there.
+Result<void> writeFileAt(const std::string& path, uint64_t offset, const void* bytes, size_t count);
 Result<std::string> readTextFile(const std::string& path, uint64_t sizeLimitBytes);
 /// Writes a whole file through OutputFile.
 Result<void> writeWholeFile(const std::string& path, const void* bytes, size_t count);

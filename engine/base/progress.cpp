@@ -18,6 +18,14 @@ Progress::~Progress() {
     if (dirty_ && terminal_) std::fputs("\r\033[K", stderr);
 }
 
+void Progress::say(const std::string& line) {
+    if (!enabled_) return;
+    const std::lock_guard lock(mutex_);
+    if (dirty_ && terminal_) std::fputs("\r\033[K", stderr);
+    fmt::print(stderr, "{}\n", line);
+    dirty_ = false;
+}
+
 void Progress::update(const std::string& stage, uint64_t done, uint64_t total) {
     if (!enabled_) return;
     const std::lock_guard lock(mutex_);

@@ -18,6 +18,9 @@ class Progress {
     /// From any thread.
     void update(const std::string& stage, uint64_t done, uint64_t total);
 
+    /// A line that stays.
+    void say(const std::string& line);
+
   private:
     std::mutex mutex_;
     bool enabled_, terminal_, dirty_ = false;

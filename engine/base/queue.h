@@ -1,4 +1,4 @@
-// A queue between threads: the only place with a mutex. Values move through it.
+// A queue between threads. Values move through it. (Mutexes live in this folder only.)
 #pragma once
 
 #include <mutex>

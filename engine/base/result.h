@@ -9,7 +9,7 @@
 namespace stipple {
 
 /// Values are the exit codes (0 is "fine").
-enum class ErrorKind : int { usage = 2, input = 3, output = 4, device = 5, budget = 6 };
+enum class ErrorKind : int { usage = 2, input = 3, output = 4, device = 5, budget = 6, interrupted = 7 };
 
 struct Error {
     ErrorKind kind = ErrorKind::input;

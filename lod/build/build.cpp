@@ -1,112 +1,490 @@
-// A build as a straight line.
+// A build of points as a straight line: survey, count, distribute, then bucket by bucket estimate, build, write;
+// verify.
 #include "lod/build/build.h"
 
 #include <fmt/format.h>
+#include <sys/statvfs.h>
 
-#include "lod/attributes.h"
-#include "lod/build/aggregate.h"
-#include "lod/build/cloud.h"
+#include <filesystem>
+
+#include "engine/base/hash.h"
+#include "engine/base/ordered.h"
+#include "lod/build/points/assemble.h"
+#include "lod/build/points/estimate.h"
+#include "lod/build/points/input.h"
+#include "lod/build/points/journal.h"
+#include "lod/build/points/ranges.h"
+#include "lod/build/points/upper.h"
 #include "lod/store.h"
 
 namespace stipple::lod {
-
 namespace {
 
-/// What colour maps are stretched over.
-void describeRanges(const Cloud& cloud, StoreDescription& description) {
-    for (const CloudAttribute& a : cloud.attributes) {
-        AttributeInfo info = a.info;
-        const size_t width = bytesOf(info.type);
-        const ValueRange r =
-            rangeOf(cloud.size(), [&](size_t i) { return attributeValue(info, a.values.data() + i * width); });
-        info.least = r.least;
-        info.greatest = r.greatest;
-        info.low = r.low;
-        info.high = r.high;
-        if (info.aggregate == Aggregate::mode && width == 1) {
-            std::array<uint64_t, 256> counts{};
-            for (const uint8_t v : a.values) ++counts.at(v);
-            for (size_t v = 0; v < counts.size(); ++v)
-                if (counts.at(v) > 0) info.counts.emplace_back(static_cast<double>(v), counts.at(v));
-        }
-        description.attributes.push_back(info);
-    }
-    const glm::dvec3 up = description.up;
-    const ValueRange r = rangeOf(cloud.size(), [&](size_t i) {
-        return glm::dot(up, cloud.origin + cloud.unit * glm::dvec3(cloud.x[i], cloud.y[i], cloud.z[i]));
-    });
-    description.lowHeight = r.low;
-    description.highHeight = r.high;
-    // One point in 200 lies beyond each edge; what a tenth of the extent more does not reach is stray.
-    for (int a = 0; a < 3; ++a) {
-        const std::vector<uint32_t>& axis = a == 0 ? cloud.x : a == 1 ? cloud.y : cloud.z;
-        const ValueRange along = rangeOf(cloud.size(), [&](size_t i) { return static_cast<double>(axis[i]); });
-        const double margin = 0.1 * (along.edgeHigh - along.edgeLow);
-        description.focusMin[a] = cloud.origin[a] + cloud.unit * std::max(along.least, along.edgeLow - margin);
-        description.focusMax[a] = cloud.origin[a] + cloud.unit * std::min(along.greatest, along.edgeHigh + margin);
-    }
-}
+constexpr uint64_t kBuildVersion = 1;  ///< of what the same input gives: an interrupted build of another is refused
 
 /// The axis of the format or of the settings; away from the Earth's centre for coordinates that are relative to it.
-glm::dvec3 upOf(const Cloud& cloud, const BuildSettings& settings, const StoreDescription& description) {
+glm::dvec3 upOf(const PointInput& input, const BuildSettings& settings, const StoreDescription& description) {
     constexpr double kLeastRadius = 6.33e6, kGreatestRadius = 6.40e6;  // metres, sea floor to mountain tops
     const glm::dvec3 centre = 0.5 * (description.boundsMin + description.boundsMax);
     const double radius = glm::length(centre) * description.metresPerUnit;
     const double extent = glm::length(description.boundsMax - description.boundsMin) * description.metresPerUnit;
     const bool isGeocentric =
         radius > kLeastRadius && radius < kGreatestRadius && extent < 1e5 && std::abs(centre.z) > 1e5;
-    if (!settings.up && isGeocentric && !cloud.crs.isDegrees && (cloud.crs.isGeocentric || cloud.crs.label().empty()))
+    if (!settings.up && isGeocentric && !input.crs.isDegrees && (input.crs.isGeocentric || input.crs.label().empty()))
         return glm::normalize(centre);
-    return axisVector(cloud.up);
+    return axisVector(input.up);
 }
+
+/// How the memory is shared out.
+struct MemoryPlan {
+    uint64_t bucketPoints = 0, bufferBytes = 0;
+    bool isOnDisk = false;
+};
+
+class PointBuild {
+  public:
+    PointBuild(const std::vector<std::string>& inputs, std::string output, const BuildSettings& settings,
+               Executor& executor, Progress& progress, PointInput input, BuildReport report)
+        : inputs_(inputs),
+          output_(std::move(output)),
+          settings_(settings),
+          executor_(executor),
+          progress_(progress),
+          input_(std::move(input)),
+          report_(std::move(report)),
+          clock_(report_),
+          workers_(std::max(executor.threads(), 1)),
+          layout_(input_.hasNormal, input_.hasRadius, input_.attributes()) {}
+
+    Result<BuildReport> run() {
+        STIPPLE_TRY(planMemory());
+        if (memory_.isOnDisk) {
+            STIPPLE_ASSIGN(Journal journal, Journal::open(workFolder(), output_, identity()));
+            journal_.emplace(std::move(journal));
+        }
+        report_.isResumed = journal_ && !journal_->entries().empty();
+        if (report_.isResumed) {
+            STIPPLE_TRY(restoreDistribution());
+        } else {
+            STIPPLE_TRY(distribute());
+        }
+        STIPPLE_TRY(openWriter());
+        STIPPLE_TRY(buildBuckets());
+        STIPPLE_TRY(finish());
+        report_.seconds = clock_.seconds();
+        return std::move(report_);
+    }
+
+  private:
+    uint64_t pointBytes() const {  // that a worker needs for each point of its bucket
+        uint64_t bytes = 128;
+        for (const AttributeInfo& a : input_.attributes()) bytes += 4 * bytesOf(a.type);
+        return bytes;
+    }
+
+    Result<void> planMemory() {
+        constexpr uint64_t kFixed = uint64_t{72} << 20, kReader = uint64_t{12} << 20;
+        const auto workers = static_cast<uint64_t>(workers_);
+        const uint64_t fixed = kFixed + workers * kReader;
+        const uint64_t least = fixed + (workers + 1) * kAtomPoints * pointBytes();
+        const uint64_t n = input_.declared(), all = n * layout_.bytes();
+        // What is small needs no more than its own points.
+        const uint64_t small = fixed + all + 2 * n * pointBytes();
+        if (settings_.memoryBytes < std::min(least, small))
+            return fail(ErrorKind::budget,
+                        fmt::format("building {} points needs {} MiB, but --memory allows {} MiB", n,
+                                    (std::min(least, small) >> 20) + 1, settings_.memoryBytes >> 20),
+                        input_.firstPath(), fmt::format("give --memory {}M", (std::min(least, small) >> 20) + 1));
+        const uint64_t room = settings_.memoryBytes - fixed;
+        const auto bucketOf = [&](uint64_t bytes) {
+            return std::min<uint64_t>(bytes / ((workers + 1) * pointBytes()), uint64_t{1} << 20);
+        };
+        memory_.isOnDisk = all + all / 8 + (workers + 1) * kAtomPoints * pointBytes() > room && small > room + fixed;
+        memory_.bufferBytes = memory_.isOnDisk ? room / 4 : room / 8;
+        memory_.bucketPoints = bucketOf(memory_.isOnDisk ? room * 3 / 4 : room - std::min(room, all + all / 8));
+        // Enough of them for all threads, but none smaller than an atom.
+        memory_.bucketPoints =
+            std::max<uint64_t>(std::min<uint64_t>(memory_.bucketPoints, n / (6 * workers)), kAtomPoints);
+        return {};
+    }
+
+    std::string workFolder() const {
+        namespace fs = std::filesystem;
+        const fs::path out = fs::absolute(output_);
+        const fs::path folder = settings_.tempFolder.empty() ? out.parent_path() : fs::path(settings_.tempFolder);
+        return (folder / (out.filename().string() + ".build")).string();
+    }
+    uint64_t identity() const {
+        std::string text = fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}", kStoreVersion, kBuildVersion, input_.identity(),
+                                       static_cast<int>(settings_.normals), settings_.estimateRadii,
+                                       settings_.up ? static_cast<int>(*settings_.up) : -1, settings_.leafRecords,
+                                       settings_.skipBad, settings_.fineNormals, settings_.mergeDuplicates);
+        for (const AttributeInfo& a : input_.attributes()) text += "|" + a.name;
+        return hashBytes(text.data(), text.size());
+    }
+    Result<void> checkStopped() const {
+        if (!settings_.isStopped || !settings_.isStopped()) return {};
+        return fail(ErrorKind::interrupted, "interrupted", output_,
+                    journal_ ? "run the same command again to go on" : "nothing was written");
+    }
+
+    // ---- survey, count, distribute ----
+
+    Result<void> distribute() {
+        STIPPLE_TRY(input_.survey(report_, executor_, progress_));
+        clock_.ends("survey");
+        const auto& g = input_.greatest;
+        frame_ = makeFrame(input_.origin, input_.unit, std::max({g[0], g[1], g[2]}), settings_.leafRecords);
+        frame_.attributes = input_.attributes();
+        tree_.emplace(frame_, input_.points);
+        double rounding = 0;
+        do {
+            STIPPLE_ASSIGN(rounding, input_.read(executor_, workers_, progress_, "count",
+                                                 [&](int, const Points& block) -> Result<void> {
+                                                     tree_->count(block);
+                                                     return checkStopped();
+                                                 }));
+        } while (tree_->split());
+        tree_->finish();
+        rounding_ = rounding;
+        clock_.ends("count");
+        plan_ = planBuckets(frame_, *tree_, memory_.bucketPoints);
+        STIPPLE_TRY(announceDisk());
+        buckets_ = makeBuckets(plan_.buckets.size(), journal_ ? journal_->folder() : "");
+        for (size_t b = 0; b < buckets_.size(); ++b)
+            buckets_[b]->points.reserve(plan_.buckets[b].points * layout_.bytes());
+        Distributor distributor(frame_, *tree_, plan_, layout_, buckets_, workers_, memory_.bufferBytes,
+                                wantsEstimates());
+        STIPPLE_ASSIGN(rounding_, input_.read(executor_, workers_, progress_, "distribute",
+                                              [&](int worker, const Points& block) -> Result<void> {
+                                                  STIPPLE_TRY(distributor.add(worker, block));
+                                                  return checkStopped();
+                                              }));
+        STIPPLE_TRY(distributor.flush());
+        for (const auto& bucket : buckets_) report_.temporaryBytes += journal_ ? bucket->bytes() : 0;
+        clock_.ends("distribute");
+        return journal_ ? saveDistribution() : Result<void>();
+    }
+
+    bool wantsEstimates() const { return settings_.estimateRadii || settings_.normals == NormalsMode::automatic; }
+
+    /// Before anything is written: is there room?
+    Result<void> announceDisk() {
+        if (!journal_) return {};
+        const uint64_t needed = input_.points * layout_.bytes() * 6 / 5;
+        progress_.say(fmt::format("temporary disk space: up to {} in {}", humanBytes(needed), journal_->folder()));
+        struct statvfs disk {};
+        if (::statvfs(journal_->folder().c_str(), &disk) != 0) return {};
+        const uint64_t room = uint64_t{disk.f_bavail} * disk.f_frsize;
+        if (needed <= room) return {};
+        return fail(ErrorKind::budget,
+                    fmt::format("{} of temporary files are needed, but there is room for {}", humanBytes(needed),
+                                humanBytes(room)),
+                    journal_->folder(), "name another folder with --temp, or give more --memory");
+    }
+
+    Result<void> saveDistribution() {
+        ByteWriter to;
+        to.put(frame_.origin);
+        to.put(frame_.unit);
+        to.put(frame_.rootLog2);
+        to.put(frame_.keyLevels);
+        to.put(rounding_);
+        to.put(input_.greatest);
+        to.put(input_.points);
+        to.put(input_.hasColour);
+        to.put(memory_.bucketPoints);
+        to.put(report_.pointsIn);
+        to.put(report_.temporaryBytes);
+        to.put(uint64_t{report_.notes.size()});
+        for (const std::string& note : report_.notes) to.put(note);
+        to.put(uint64_t{report_.dropped.size()});
+        for (const auto& [reason, count] : report_.dropped) {
+            to.put(reason);
+            to.put(count);
+        }
+        tree_->save(to);
+        for (const auto& bucket : buckets_)
+            for (Spill* spill : {&bucket->points, &bucket->ghosts}) {
+                STIPPLE_TRY(spill->seal());
+                to.put(spill->bytes());
+                to.put(spill->hash());
+            }
+        return journal_->append(to.bytes());
+    }
+
+    Result<void> restoreDistribution() {
+        ByteReader from(journal_->entries().front());
+        glm::dvec3 origin(0);
+        double unit = 1;
+        from.get(origin);
+        from.get(unit);
+        frame_ = makeFrame(origin, unit, 1, settings_.leafRecords);
+        from.get(frame_.rootLog2);
+        from.get(frame_.keyLevels);
+        frame_.errors = errorsOf(frame_.rootLog2);
+        frame_.attributes = input_.attributes();
+        input_.origin = origin;
+        input_.unit = unit;
+        from.get(rounding_);
+        from.get(input_.greatest);
+        from.get(input_.points);
+        from.get(input_.hasColour);
+        from.get(memory_.bucketPoints);
+        from.get(report_.pointsIn);
+        from.get(report_.temporaryBytes);
+        uint64_t count = 0;
+        from.get(count);
+        report_.notes.resize(std::min<uint64_t>(count, 100'000));
+        for (std::string& note : report_.notes) from.get(note);
+        from.get(count);
+        for (uint64_t k = 0; k < count && k < 100; ++k) {
+            std::string reason;
+            uint64_t points = 0;
+            from.get(reason);
+            from.get(points);
+            report_.dropped[reason] = points;
+        }
+        tree_.emplace(frame_, input_.points);
+        tree_->load(from);
+        plan_ = planBuckets(frame_, *tree_, memory_.bucketPoints);
+        buckets_ = makeBuckets(plan_.buckets.size(), journal_->folder());
+        for (const auto& bucket : buckets_)
+            for (Spill* spill : {&bucket->points, &bucket->ghosts}) {
+                uint64_t bytes = 0, hash = 0;
+                from.get(bytes);
+                from.get(hash);
+                spill->restore(bytes, hash);
+            }
+        if (!from.isWhole())
+            return fail(ErrorKind::input, "holds a damaged journal", journal_->folder(), "delete the folder");
+        progress_.say(fmt::format("going on with the interrupted build: {} of {} buckets are done",
+                                  journal_->entries().size() - 1, plan_.buckets.size()));
+        return {};
+    }
+
+    // ---- buckets ----
+
+    /// What one bucket gives, until it is its turn to be written.
+    struct BuiltBucket {
+        std::vector<BuiltAtom> atoms;
+        ValueRanges ranges;
+        uint64_t merged = 0, tooMany = 0;
+    };
+
+    Result<void> openWriter() {
+        description_ = describe();
+        ranges_ = ValueRanges(frame_, input_.points, description_.up);
+        upper_.emplace(frame_);
+        if (!journal_) {
+            STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output_));
+            writer_.emplace(std::move(writer));
+            return {};
+        }
+        uint64_t written = 0;
+        for (size_t e = 1; e < journal_->entries().size(); ++e, ++firstBucket_) {
+            ByteReader from(journal_->entries()[e]);
+            NodeBatch batch;
+            uint64_t merged = 0, tooMany = 0;
+            from.get(written);
+            from.get(merged);
+            from.get(tooMany);
+            from.get(batch.nodes);
+            from.get(batch.counts);
+            from.get(batch.written);
+            ValueRanges ranges(frame_, input_.points, description_.up);
+            ranges.load(from);
+            upper_->loadChanges(from);
+            if (!from.isWhole())
+                return fail(ErrorKind::input, "holds a damaged journal", journal_->folder(), "delete the folder");
+            merged_ += merged;
+            tooMany_ += tooMany;
+            ranges_.add(ranges);
+            batches_.push_back(std::move(batch));
+        }
+        journal_->forgetEntries();
+        STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::resume(output_, journal_->partialPath(), written));
+        writer_.emplace(std::move(writer));
+        return {};
+    }
+
+    Result<BuiltBucket> buildBucket(size_t index) {
+        const BucketPlan::Bucket& bucket = plan_.buckets[index];
+        BuiltBucket out;
+        if (buckets_[index]->points.bytes() != bucket.points * layout_.bytes())
+            return fail(ErrorKind::input, "changed while it was read", input_.firstPath(),
+                        "build again when it is complete");
+        STIPPLE_ASSIGN(SortResult sorted, sortBucket(frame_, layout_, buckets_[index]->points,
+                                                     settings_.mergeDuplicates, 2 * memory_.bucketPoints));
+        out.merged = sorted.merged;
+        out.tooMany = sorted.tooMany;
+        {
+            STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, buckets_[index]->ghosts.take());
+            const Places ghosts = sortGhosts(frame_, bytes, settings_.mergeDuplicates);
+            EstimateSettings wanted;
+            wanted.radii = settings_.estimateRadii;
+            wanted.normals = settings_.normals == NormalsMode::automatic;
+            wanted.isFine = settings_.fineNormals;
+            wanted.limitStrays = settings_.estimateRadii && !input_.hasRadius;
+            estimate(frame_, *tree_, bucket.firstCell, bucket.cells, wanted, ghosts, sorted.sorted);
+        }
+        out.ranges = ValueRanges(frame_, input_.points, description_.up);
+        uint64_t number = bucket.firstPoint;
+        const std::vector<uint64_t>& keys = sorted.sorted.key;
+        size_t begin = 0;
+        for (const Atom& atom : bucket.atoms) {
+            const uint32_t shift = frame_.shiftOf(atom.level);
+            size_t end = begin;
+            while (end < keys.size() && keys[end] >> shift == atom.key >> shift) ++end;
+            out.ranges.add(frame_, sorted.sorted.points, begin, end, number);
+            BuiltAtom built;
+            built.root = makeSubtree(frame_, sorted.sorted, begin, end, atom.level, built.batch);
+            out.atoms.push_back(std::move(built));
+            number += atom.count;
+            begin = end;
+        }
+        return out;
+    }
+
+    Result<void> append(NodeBatch& batch, NodeBatch& all) {
+        STIPPLE_ASSIGN(const uint64_t at, writer_->appendEncoded(batch.bytes));
+        const auto counts = static_cast<uint32_t>(all.counts.size());
+        for (NodeBatch::Written& w : batch.nodes) {
+            w.node.chunkOffset += at;
+            w.firstCount += counts;
+            all.nodes.push_back(w);
+        }
+        all.counts.insert(all.counts.end(), batch.counts.begin(), batch.counts.end());
+        all.written += batch.written;
+        batch = {};
+        return {};
+    }
+
+    /// In the order of the buckets.
+    Result<void> commit(size_t index, BuiltBucket built) {
+        NodeBatch all, between;
+        for (BuiltAtom& atom : built.atoms) {
+            upper_->closeBefore(atom.root.key, between);
+            STIPPLE_TRY(append(between, all));
+            STIPPLE_TRY(append(atom.batch, all));
+            upper_->add(std::move(atom.root));
+        }
+        merged_ += built.merged;
+        tooMany_ += built.tooMany;
+        ranges_.add(built.ranges);
+        if (journal_) {
+            ByteWriter to;
+            to.put(writer_->bytes());
+            to.put(built.merged);
+            to.put(built.tooMany);
+            to.put(all.nodes);
+            to.put(all.counts);
+            to.put(all.written);
+            built.ranges.save(to);
+            upper_->saveChanges(to);
+            STIPPLE_TRY(journal_->append(to.bytes()));
+            buckets_[index]->points.remove();
+            buckets_[index]->ghosts.remove();
+        }
+        batches_.push_back(std::move(all));
+        done_ += plan_.buckets[index].points;
+        progress_.update("build", done_, input_.points);
+        return {};
+    }
+
+    Result<void> buildBuckets() {
+        for (size_t b = 0; b < firstBucket_; ++b) done_ += plan_.buckets[b].points;
+        const Result<void> result = inOrder<BuiltBucket>(
+            executor_, workers_, firstBucket_, plan_.buckets.size(),
+            [&](size_t index) -> Result<BuiltBucket> {
+                STIPPLE_TRY(checkStopped());
+                return buildBucket(index);
+            },
+            [&](size_t index, BuiltBucket built) { return commit(index, std::move(built)); });
+        if (!result) return result;
+        clock_.ends("build");
+        return {};
+    }
+
+    // ---- the end ----
+
+    StoreDescription describe() const {
+        StoreDescription d;
+        d.crs = input_.crs;
+        d.metresPerUnit = input_.crs.metresPerUnit;
+        d.roundingUnits = rounding_;
+        d.hasColour = input_.hasColour;
+        d.isReflectance = input_.isReflectance;
+        d.hasNormals = input_.hasNormal || settings_.normals == NormalsMode::automatic;
+        d.source = input_.source;
+        const auto& g = input_.greatest;
+        d.boundsMin = input_.origin;
+        d.boundsMax = input_.origin + input_.unit * glm::dvec3(g[0], g[1], g[2]);
+        d.up = upOf(input_, settings_, d);
+        return d;
+    }
+
+    Result<void> finish() {
+        NodeBatch last, all;
+        upper_->finish(last);
+        STIPPLE_TRY(append(last, all));
+        batches_.push_back(std::move(all));
+        const Hierarchy hierarchy = assemble(frame_, batches_);
+        batches_ = {};
+        if (merged_ > 0) report_.dropped["duplicate"] += merged_;
+        if (tooMany_ > 0) report_.dropped[fmt::format("beyond {} at one place", kMostAtOnePlace)] += tooMany_;
+        description_.points = input_.points - merged_ - tooMany_;
+        for (const Node& node : hierarchy.nodes) description_.records += node.records;
+        ranges_.describe(frame_, description_);
+        STIPPLE_TRY(writer_->finish(hierarchy, description_));
+        clock_.ends("write");
+        STIPPLE_ASSIGN(const Store store, openStore(writer_->temporaryPath()));
+        STIPPLE_TRY(verifyStore(store, executor_));
+        clock_.ends("verify");
+        report_.bytesOut = writer_->bytes();
+        STIPPLE_TRY(writer_->commit());
+        if (journal_) journal_->remove();
+        report_.pointsOut = description_.points;
+        report_.nodes = hierarchy.nodes.size();
+        report_.records = description_.records;
+        report_.contentHash = writer_->contentHash();
+        return {};
+    }
+
+    const std::vector<std::string>& inputs_;
+    const std::string output_;
+    const BuildSettings& settings_;
+    Executor& executor_;
+    Progress& progress_;
+    PointInput input_;
+    BuildReport report_;
+    StageClock clock_;
+    const int workers_;
+    const RecordLayout layout_;
+    MemoryPlan memory_;
+    std::optional<Journal> journal_;
+    Frame frame_;
+    double rounding_ = 0;
+    std::optional<CellTree> tree_;
+    BucketPlan plan_;
+    Buckets buckets_;
+    StoreDescription description_;
+    ValueRanges ranges_;
+    std::optional<UpperTree> upper_;
+    std::optional<StoreWriter> writer_;
+    std::vector<NodeBatch> batches_;  ///< of each bucket; bytes are written
+    size_t firstBucket_ = 0;          ///< those before are done
+    uint64_t done_ = 0, merged_ = 0, tooMany_ = 0;
+};
 
 }  // namespace
 
 Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std::string& output,
                                const BuildSettings& settings, Executor& executor, Progress& progress) {
     BuildReport report;
-    StageClock clock(report);
-    STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output));  // an unwritable output is found first
-    STIPPLE_ASSIGN(Cloud cloud, readCloud(inputs, settings, report, executor, progress));
-    clock.ends("read");
-    const Partition partition = partitionCloud(cloud, settings.leafRecords, executor);
-    clock.ends("partition");
-    estimateAttributes(cloud, partition, settings, executor, progress);
-    clock.ends("attributes");
-    STIPPLE_ASSIGN(const Hierarchy hierarchy, simplifyAndWrite(cloud, partition, writer, executor, progress));
-    StoreDescription description;
-    description.crs = cloud.crs;
-    description.metresPerUnit = cloud.crs.metresPerUnit;
-    description.points = cloud.size();
-    for (const Node& node : hierarchy.nodes) description.records += node.records;
-    description.roundingUnits = cloud.roundingUnits;
-    description.hasColour = cloud.hasColour;
-    description.isReflectance = cloud.isReflectance;
-    description.hasNormals = cloud.hasNormal || settings.normals == NormalsMode::automatic;
-    description.source = cloud.source;
-    glm::dvec3 lo(cloud.x[0], cloud.y[0], cloud.z[0]), hi = lo;
-    for (size_t i = 1; i < cloud.size(); ++i) {
-        const glm::dvec3 p(cloud.x[i], cloud.y[i], cloud.z[i]);
-        lo = glm::min(lo, p);
-        hi = glm::max(hi, p);
-    }
-    description.boundsMin = cloud.origin + cloud.unit * lo;
-    description.boundsMax = cloud.origin + cloud.unit * hi;
-    description.up = upOf(cloud, settings, description);
-    describeRanges(cloud, description);
-    STIPPLE_TRY(writer.finish(hierarchy, description));
-    clock.ends("simplify");
-    STIPPLE_ASSIGN(const Store store, openStore(writer.temporaryPath()));
-    STIPPLE_TRY(verifyStore(store, executor));
-    clock.ends("verify");
-    report.bytesOut = writer.bytes();
-    STIPPLE_TRY(writer.commit());
-    report.pointsOut = cloud.size();
-    report.nodes = hierarchy.nodes.size();
-    report.records = description.records;
-    report.contentHash = writer.contentHash();
-    report.seconds = clock.seconds();
-    return report;
+    { STIPPLE_ASSIGN(const StoreWriter writer, StoreWriter::create(output)); }  // an unwritable output is found first
+    STIPPLE_ASSIGN(PointInput input, PointInput::open(inputs, settings, report));
+    return PointBuild(inputs, output, settings, executor, progress, std::move(input), std::move(report)).run();
 }
 
 }  // namespace stipple::lod

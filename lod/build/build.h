@@ -26,7 +26,11 @@ struct BuildSettings {
     bool allAttributes = false;           ///< every attribute of the input, beside `attributes`
     /// Opens one input; empty: openPointSource. For inputs that this library does not know (scenes with meshes).
     std::function<Result<PointSource>(const std::string& path, const ReadOptions& options)> open;
-    bool skipBad = false;  ///< go on past corrupt chunks and files, and count what is lost
+    bool skipBad = false;             ///< go on past corrupt chunks and files, and count what is lost
+    bool fineNormals = false;         ///< of points: each from its own twelve nearest, at three times the time
+    bool mergeDuplicates = false;     ///< of points at one place keep one
+    std::function<bool()> isStopped;  ///< asked now and then; true: stop cleanly with ErrorKind::interrupted
+    std::string tempFolder;           ///< for what does not fit in memory; empty: beside the output
 };
 
 struct BuildReport {
@@ -38,6 +42,8 @@ struct BuildReport {
     uint64_t nodes = 0, records = 0, bytesOut = 0, contentHash = 0;
     double seconds = 0;
     std::map<std::string, double> stageSeconds;
+    uint64_t temporaryBytes = 0;  ///< on disk, at most
+    bool isResumed = false;
 };
 
 /// Seconds of each stage of a build, into its report.

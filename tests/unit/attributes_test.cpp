@@ -10,7 +10,7 @@
 #include "engine/cpu/cpu_backend.h"
 #include "engine/scene/camera.h"
 #include "lod/attributes.h"
-#include "lod/build/aggregate.h"
+#include "lod/build/points/rising_values.h"
 #include "lod/colour.h"
 #include "lod/import/import.h"
 #include "lod/import/las/header.h"
@@ -101,20 +101,36 @@ TEST(Attributes, LeavesKeepEveryValueAndSayItToWhoAsks) {
 }
 
 TEST(Attributes, MeanModeAndNoneAreWhatTheySay) {
-    CloudAttribute a;
-    a.info.type = ScalarType::i16;
-    a.info.scale = 0.006;
+    AttributeInfo info;
+    info.type = ScalarType::i16;
+    info.scale = 0.006;
     const std::array<int16_t, 5> values{-30000, 5, 5, 30000, 7};
-    a.values.resize(10);
-    std::memcpy(a.values.data(), values.data(), 10);
-    const auto of = [&](Aggregate how, uint32_t begin, uint32_t end) {
-        a.info.aggregate = how;
-        std::array<uint8_t, 2> out{};
-        aggregate(a, begin, end, out.data());
+    // In one step, and in two: coarse records are made from finer ones.
+    const auto of = [&](Aggregate how, size_t begin, size_t end, size_t split = 0) {
+        info.aggregate = how;
+        std::vector<RisingValue> parts;
+        std::vector<Rising> records;
+        const auto merged = [&](size_t from, size_t to) {
+            std::vector<RisingValue> leaves;
+            for (size_t i = from; i < to; ++i)
+                leaves.push_back(leafValue(info, reinterpret_cast<const uint8_t*>(&values.at(i))));
+            Rising one;
+            one.count = 1;
+            return mergeValues(info, leaves, std::vector<Rising>(leaves.size(), one));
+        };
+        for (const auto& [from, to] : {std::pair{begin, begin + split}, {begin + split, end}}) {
+            if (from == to) continue;
+            parts.push_back(merged(from, to));
+            records.emplace_back().count = static_cast<uint32_t>(to - from);
+        }
         int16_t v = 0;
-        std::memcpy(&v, out.data(), 2);
+        storeValue(info, mergeValues(info, parts, records), static_cast<uint32_t>(end - begin),
+                   reinterpret_cast<uint8_t*>(&v));
         return v;
     };
+    EXPECT_EQ(of(Aggregate::mean, 0, 5, 2), 3);
+    EXPECT_EQ(of(Aggregate::mode, 0, 5, 3), 5) << "two votes of {-30000, 5, 5} against one";
+    EXPECT_EQ(of(Aggregate::mode, 2, 5, 1), 5) << "one vote each: the smallest as stored";
     EXPECT_EQ(of(Aggregate::mean, 0, 5), 3);  // -13 / 5 + ... = 17 / 5
     EXPECT_EQ(of(Aggregate::mean, 3, 4), 30000);
     EXPECT_EQ(of(Aggregate::mode, 0, 5), 5);

@@ -1,0 +1,51 @@
+// Work that is done in any order and handed on in the given one.
+#pragma once
+
+#include <condition_variable>
+#include <map>
+#include <mutex>
+#include <optional>
+
+#include "engine/base/executor.h"
+#include "engine/base/result.h"
+
+namespace stipple {
+
+/// Calls make(i) for i in [first, end) on up to `workers` threads, and use(i, what it gave) one after the other in
+/// order. What is made waits in memory: a thread begins nothing more than `workers` items ahead of the last used one.
+/// Stops at the first error.
+template <typename T, typename Make, typename Use>
+Result<void> inOrder(Executor& executor, int workers, size_t first, size_t end, const Make& make, const Use& use) {
+    std::mutex mutex;
+    std::condition_variable changed;
+    std::map<size_t, T> waiting;
+    std::optional<Error> error;
+    size_t next = first, used = first;
+    executor.parallelFor(static_cast<size_t>(workers), 1, [&](size_t from, size_t to) {
+        for (size_t worker = from; worker < to; ++worker)
+            for (;;) {
+                std::unique_lock lock(mutex);
+                changed.wait(lock, [&] { return error || next >= end || next <= used + static_cast<size_t>(workers); });
+                if (error || next >= end) break;
+                const size_t index = next++;
+                lock.unlock();
+                Result<T> made = make(index);
+                lock.lock();
+                if (made)
+                    waiting.emplace(index, std::move(*made));
+                else if (!error)
+                    error = made.error();
+                while (!error && !waiting.empty() && waiting.begin()->first == used) {
+                    auto item = waiting.extract(waiting.begin());
+                    if (const Result<void> result = use(used, std::move(item.mapped())); !result)
+                        error = result.error();
+                    ++used;
+                }
+                changed.notify_all();
+            }
+    });
+    if (error) return tl::unexpected(*error);
+    return {};
+}
+
+}  // namespace stipple

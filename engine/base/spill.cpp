@@ -1,0 +1,59 @@
+#include "engine/base/spill.h"
+
+#include <unistd.h>
+
+#include <utility>
+
+#include "engine/base/file.h"
+#include "engine/base/hash.h"
+
+namespace stipple {
+
+Result<void> Spill::append(const std::vector<uint8_t>& bytes) {
+    const std::lock_guard lock(mutex_);
+    if (path_.empty()) {
+        memory_.insert(memory_.end(), bytes.begin(), bytes.end());
+    } else {
+        STIPPLE_TRY(writeFileAt(path_, bytes_, bytes.data(), bytes.size()));
+    }
+    bytes_ += bytes.size();
+    return {};
+}
+
+Result<std::vector<uint8_t>> Spill::part(uint64_t offset, uint64_t count) const {
+    if (path_.empty())
+        return std::vector<uint8_t>(memory_.begin() + static_cast<ptrdiff_t>(offset),
+                                    memory_.begin() + static_cast<ptrdiff_t>(offset + count));
+    std::vector<uint8_t> bytes(count);
+    if (count == 0) return bytes;
+    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path_));
+    STIPPLE_TRY(file.readAt(offset, bytes.data(), bytes.size()));
+    return bytes;
+}
+
+Result<std::vector<uint8_t>> Spill::take() {
+    if (path_.empty()) return std::exchange(memory_, {});
+    STIPPLE_ASSIGN(std::vector<uint8_t> bytes, part(0, bytes_));
+    if (isSealed_ && hashBytes(bytes.data(), bytes.size()) != hash_)
+        return fail(ErrorKind::input, "is not what was written", path_, "delete its folder and build again");
+    return bytes;
+}
+
+Result<void> Spill::seal() {
+    STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, part(0, bytes_));
+    hash_ = hashBytes(bytes.data(), bytes.size());
+    isSealed_ = true;
+    return {};
+}
+
+void Spill::restore(uint64_t bytes, uint64_t hash) {
+    bytes_ = bytes;
+    hash_ = hash;
+    isSealed_ = true;
+}
+
+void Spill::remove() {
+    if (!path_.empty()) ::unlink(path_.c_str());
+}
+
+}  // namespace stipple

@@ -1,0 +1,46 @@
+// Bytes that several threads append to, in memory or in a file.
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "engine/base/result.h"
+
+namespace stipple {
+
+class Spill {
+  public:
+    /// `path` empty: in memory. A file that is there already stays what it is (see restore).
+    explicit Spill(std::string path) : path_(std::move(path)) {}
+    /// In memory: room for that many bytes.
+    void reserve(uint64_t bytes) {
+        if (path_.empty()) memory_.reserve(bytes);
+    }
+    /// From several threads; what one call brings stays together.
+    Result<void> append(const std::vector<uint8_t>& bytes);
+
+    // When no thread appends any more:
+    uint64_t bytes() const { return bytes_; }
+    /// Everything. In memory it is gone afterwards.
+    Result<std::vector<uint8_t>> take();
+    /// A part of it; nothing goes.
+    Result<std::vector<uint8_t>> part(uint64_t offset, uint64_t count) const;
+    uint64_t hash() const { return hash_; }
+    /// Hashes a file for take() to check.
+    Result<void> seal();
+    /// A file that an earlier process filled and sealed.
+    void restore(uint64_t bytes, uint64_t hash);
+    /// Deletes the file.
+    void remove();
+
+  private:
+    std::string path_;
+    std::mutex mutex_;
+    std::vector<uint8_t> memory_;
+    uint64_t bytes_ = 0, hash_ = 0;
+    bool isSealed_ = false;
+};
+
+}  // namespace stipple

@@ -1,0 +1,239 @@
+#include "lod/build/points/bucket.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+
+namespace stipple::lod {
+namespace {
+
+/// Nodes of the octree over counted cells [begin, end) that hold at most kAtomPoints.
+void findAtoms(const Frame& frame, const std::vector<Cell>& cells, size_t begin, size_t end, uint32_t level,
+               std::vector<std::pair<Atom, size_t>>& atoms) {
+    uint64_t count = 0;
+    for (size_t i = begin; i < end && count <= kAtomPoints; ++i) count += cells[i].count;
+    if (count <= kAtomPoints || cells[begin].level == level) {
+        if (count > kAtomPoints) count = cells[begin].count;
+        const uint32_t shift = frame.shiftOf(level);
+        atoms.push_back({{cells[begin].key >> shift << shift, count, static_cast<uint8_t>(level)}, end});
+        return;
+    }
+    const uint32_t shift = frame.shiftOf(level + 1);
+    while (begin < end) {
+        const uint64_t child = cells[begin].key >> shift;
+        size_t next = begin;
+        while (next < end && cells[next].key >> shift == child) ++next;
+        findAtoms(frame, cells, begin, next, level + 1, atoms);
+        begin = next;
+    }
+}
+
+std::array<int64_t, 3> cornerOf(const Frame& frame, uint64_t key) {
+    const uint32_t drop = frame.rootLog2 - frame.keyLevels;
+    return {int64_t{compactBits(key)} << drop, int64_t{compactBits(key >> 1)} << drop,
+            int64_t{compactBits(key >> 2)} << drop};
+}
+
+/// The cell that holds a lattice position, if it is inside the root.
+uint32_t cellAt(const Frame& frame, const CellTree& tree, const std::array<int64_t, 3>& p) {
+    const int64_t size = int64_t{1} << frame.rootLog2;
+    for (const int64_t v : p)
+        if (v < 0 || v >= size) return CellTree::kNone;
+    return tree.cellOf(
+        frame.keyOf(static_cast<uint32_t>(p[0]), static_cast<uint32_t>(p[1]), static_cast<uint32_t>(p[2])));
+}
+
+}  // namespace
+
+BucketPlan planBuckets(const Frame& frame, const CellTree& tree, uint64_t most) {
+    BucketPlan plan;
+    const std::vector<Cell>& cells = tree.cells();
+    std::vector<std::pair<Atom, size_t>> atoms;
+    findAtoms(frame, cells, 0, cells.size(), 0, atoms);
+    plan.ofCell.resize(cells.size());
+    uint64_t points = 0;
+    size_t cell = 0;
+    for (const auto& [atom, end] : atoms) {
+        if (plan.buckets.empty() || plan.buckets.back().points + atom.count > most) {
+            plan.buckets.emplace_back();
+            plan.buckets.back().firstPoint = points;
+            plan.buckets.back().firstCell = static_cast<uint32_t>(cell);
+        }
+        BucketPlan::Bucket& bucket = plan.buckets.back();
+        bucket.atoms.push_back(atom);
+        bucket.points += atom.count;
+        points += atom.count;
+        for (; cell < end; ++cell, ++bucket.cells) plan.ofCell[cell] = static_cast<uint32_t>(plan.buckets.size() - 1);
+    }
+    // Beside which cells does another bucket begin? Asked of places round the cell as close together as the finest
+    // cells, on its surface: but not more than 16 along an edge, which finds every neighbour of a 16th of its size;
+    // a finer neighbour marks both.
+    plan.isBorder.assign(cells.size(), 0);
+    for (size_t i = 0; i < cells.size(); ++i) {
+        const auto corner = cornerOf(frame, cells[i].key);
+        const auto edge = static_cast<int64_t>(frame.cellSize(cells[i].level));
+        for (int64_t k = 0; k < 27; ++k) {
+            const std::array<int64_t, 3> step{k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1};
+            std::array<int64_t, 3> p{};
+            for (size_t a = 0; a < 3; ++a) p[a] = corner[a] + (step[a] < 0 ? -1 : step[a] > 0 ? edge : edge / 2);
+            const uint32_t other = cellAt(frame, tree, p);
+            if (other == CellTree::kNone || plan.ofCell[other] == plan.ofCell[i]) continue;
+            plan.isBorder[i] = plan.isBorder[other] = 1;
+        }
+    }
+    if (tree.deepestLevel() > tree.firstLevel()) plan.isBorder.assign(cells.size(), 1);  // sizes differ: any may be
+    return plan;
+}
+
+// ---- records ----
+
+RecordLayout::RecordLayout(bool hasNormal, bool hasRadius, const std::vector<AttributeInfo>& attributes)
+    : hasNormal_(hasNormal), hasRadius_(hasRadius), bytes_(16 + (hasNormal ? 4u : 0u) + (hasRadius ? 4u : 0u)) {
+    for (const AttributeInfo& a : attributes) {
+        widths_.push_back(bytesOf(a.type));
+        bytes_ += widths_.back();
+    }
+}
+
+void RecordLayout::write(const Points& from, size_t i, uint8_t* to) const {
+    const std::array<uint32_t, 4> first{from.x[i], from.y[i], from.z[i], from.colour[i]};
+    std::memcpy(to, first.data(), 16);
+    to += 16;
+    if (hasNormal_) {
+        std::memcpy(to, &from.normal[i], 4);
+        to += 4;
+    }
+    if (hasRadius_) {
+        std::memcpy(to, &from.radius[i], 4);
+        to += 4;
+    }
+    for (size_t a = 0; a < widths_.size(); ++a) {
+        std::memcpy(to, from.attributes[a].data() + i * widths_[a], widths_[a]);
+        to += widths_[a];
+    }
+}
+
+void RecordLayout::read(const uint8_t* from, size_t count, Points& to) const {
+    const size_t before = to.size();
+    for (auto* column : {&to.x, &to.y, &to.z, &to.colour, &to.normal}) column->resize(before + count);
+    to.radius.resize(before + count);
+    to.attributes.resize(widths_.size());
+    for (size_t a = 0; a < widths_.size(); ++a) to.attributes[a].resize((before + count) * widths_[a]);
+    for (size_t i = before; i < before + count; ++i) {
+        std::array<uint32_t, 4> first{};
+        std::memcpy(first.data(), from, 16);
+        to.x[i] = first[0];
+        to.y[i] = first[1];
+        to.z[i] = first[2];
+        to.colour[i] = first[3];
+        from += 16;
+        if (hasNormal_) {
+            std::memcpy(&to.normal[i], from, 4);
+            from += 4;
+        }
+        if (hasRadius_) {
+            std::memcpy(&to.radius[i], from, 4);
+            from += 4;
+        }
+        for (size_t a = 0; a < widths_.size(); ++a) {
+            std::memcpy(to.attributes[a].data() + i * widths_[a], from, widths_[a]);
+            from += widths_[a];
+        }
+    }
+}
+
+// ---- where they lie ----
+
+BucketBytes::BucketBytes(const std::string& folder, size_t index)
+    : points(folder.empty() ? "" : fmt::format("{}/points-{}", folder, index)),
+      ghosts(folder.empty() ? "" : fmt::format("{}/ghosts-{}", folder, index)) {}
+
+Buckets makeBuckets(size_t count, const std::string& folder) {
+    Buckets buckets;
+    for (size_t i = 0; i < count; ++i) buckets.push_back(std::make_unique<BucketBytes>(folder, i));
+    return buckets;
+}
+
+// ---- the way there ----
+
+Distributor::Distributor(const Frame& frame, const CellTree& tree, const BucketPlan& plan, const RecordLayout& layout,
+                         Buckets& buckets, int workers, uint64_t bufferBytes, bool wantGhosts)
+    : frame_(frame), tree_(tree), plan_(plan), layout_(layout), buckets_(buckets), wantGhosts_(wantGhosts) {
+    const size_t slots = 2 * plan.buckets.size();
+    bufferBytes_ = std::clamp<size_t>(bufferBytes / (static_cast<size_t>(workers) * slots), 4096, 1 << 18);
+    buffers_.assign(static_cast<size_t>(workers), std::vector<std::vector<uint8_t>>(slots));
+    std::array<bool, 32> has{};
+    for (const Cell& c : tree.cells()) has.at(c.level) = true;
+    for (uint32_t level = 0; level < 32; ++level)
+        if (has.at(level)) levels_.push_back(level);
+}
+
+Result<void> Distributor::put(int worker, uint32_t bucket, int kind, const uint8_t* bytes, size_t count) {
+    std::vector<uint8_t>& buffer = buffers_[static_cast<size_t>(worker)][2 * bucket + static_cast<size_t>(kind)];
+    if (buffer.capacity() == 0) buffer.reserve(bufferBytes_);
+    buffer.insert(buffer.end(), bytes, bytes + count);
+    if (buffer.size() + 256 < bufferBytes_) return {};
+    STIPPLE_TRY((kind == 0 ? buckets_[bucket]->points : buckets_[bucket]->ghosts).append(buffer));
+    buffer.clear();
+    return {};
+}
+
+Result<void> Distributor::flush() {
+    for (auto& worker : buffers_)
+        for (size_t slot = 0; slot < worker.size(); ++slot) {
+            if (!worker[slot].empty()) {
+                BucketBytes& bucket = *buckets_[slot / 2];
+                STIPPLE_TRY((slot % 2 == 0 ? bucket.points : bucket.ghosts).append(worker[slot]));
+            }
+            worker[slot] = {};
+        }
+    return {};
+}
+
+Result<void> Distributor::add(int worker, const Points& block) {
+    std::vector<uint8_t> record(layout_.bytes());
+    std::vector<uint32_t> seenFrom;
+    for (size_t i = 0; i < block.size(); ++i) {
+        const uint32_t cell = tree_.cellOf(frame_.keyOf(block.x[i], block.y[i], block.z[i]));
+        layout_.write(block, i, record.data());
+        STIPPLE_TRY(put(worker, plan_.ofCell[cell], 0, record.data(), record.size()));
+        if (!wantGhosts_ || plan_.isBorder[cell] == 0) continue;
+        ghosts(cell, block.x[i], block.y[i], block.z[i], seenFrom);
+        for (const uint32_t bucket : seenFrom)
+            STIPPLE_TRY(put(worker, bucket, 1, record.data(), RecordLayout::kGhostBytes));
+    }
+    return {};
+}
+
+/// Other buckets whose cells see a point of `cell`.
+void Distributor::ghosts(uint32_t cell, uint32_t x, uint32_t y, uint32_t z, std::vector<uint32_t>& to) const {
+    to.clear();
+    const uint32_t own = tree_.cells()[cell].level;
+    for (const uint32_t level : levels_) {
+        if (level < own) continue;
+        // A cell of this size (or, at the point's own, a larger one) within a quarter of it holds one of these places.
+        const int64_t reach = (int64_t{1} << (frame_.rootLog2 - level)) / 4;
+        const int64_t inside = (int64_t{1} << (frame_.rootLog2 - level)) - 1;
+        std::array<std::array<bool, 3>, 3> leaves{};  // per axis: does a step of -reach, 0, +reach change the cell?
+        const std::array<int64_t, 3> p{x, y, z};
+        for (size_t a = 0; a < 3; ++a) {
+            const int64_t local = p[a] & inside;
+            leaves[a] = {local<reach, true, local + reach> inside};
+        }
+        for (size_t k = 0; k < 27; ++k) {
+            const std::array<size_t, 3> step{k % 3, k / 3 % 3, k / 9};
+            if (k == 13 || !leaves[0][step[0]] || !leaves[1][step[1]] || !leaves[2][step[2]]) continue;
+            std::array<int64_t, 3> q{};
+            for (size_t a = 0; a < 3; ++a) q[a] = p[a] + (static_cast<int64_t>(step[a]) - 1) * reach;
+            const uint32_t other = cellAt(frame_, tree_, q);
+            if (other == CellTree::kNone) continue;
+            const uint32_t otherLevel = tree_.cells()[other].level, bucket = plan_.ofCell[other];
+            if (level == own ? otherLevel > own : otherLevel != level) continue;
+            if (bucket != plan_.ofCell[cell] && std::find(to.begin(), to.end(), bucket) == to.end())
+                to.push_back(bucket);
+        }
+    }
+}
+
+}  // namespace stipple::lod

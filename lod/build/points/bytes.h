@@ -1,0 +1,80 @@
+// Plain values as bytes and back, for what an interrupted build leaves to the next run of the same program.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+namespace stipple::lod {
+
+class ByteWriter {
+  public:
+    template <typename T>
+    void put(const T& value) {
+        static_assert(std::is_trivially_copyable_v<T>);
+        const auto* const from = reinterpret_cast<const uint8_t*>(&value);
+        bytes_.insert(bytes_.end(), from, from + sizeof(T));
+    }
+    template <typename T>
+    void put(const std::vector<T>& values) {
+        put(uint64_t{values.size()});
+        if constexpr (std::is_trivially_copyable_v<T>) {
+            const auto* const from = reinterpret_cast<const uint8_t*>(values.data());
+            bytes_.insert(bytes_.end(), from, from + values.size() * sizeof(T));
+        } else {
+            for (const T& v : values) put(v);
+        }
+    }
+    void put(const std::string& text) { put(std::vector<char>(text.begin(), text.end())); }
+    const std::vector<uint8_t>& bytes() const { return bytes_; }
+
+  private:
+    std::vector<uint8_t> bytes_;
+};
+
+/// Of bytes whose hash was checked. What lies beyond the end reads as zeros, and isWhole() tells.
+class ByteReader {
+  public:
+    explicit ByteReader(const std::vector<uint8_t>& bytes) : bytes_(bytes) {}
+    template <typename T>
+    void get(T& value) {
+        static_assert(std::is_trivially_copyable_v<T>);
+        if (!has(sizeof(T))) return;
+        std::memcpy(static_cast<void*>(&value), bytes_.data() + at_, sizeof(T));
+        at_ += sizeof(T);
+    }
+    template <typename T>
+    void get(std::vector<T>& values) {
+        uint64_t count = 0;
+        get(count);
+        if constexpr (std::is_trivially_copyable_v<T>) {
+            if (count > bytes_.size() || !has(count * sizeof(T))) return;
+            values.resize(count);
+            if (count > 0) std::memcpy(static_cast<void*>(values.data()), bytes_.data() + at_, count * sizeof(T));
+            at_ += count * sizeof(T);
+        } else {
+            if (!has(count)) return;
+            values.resize(count);
+            for (T& v : values) get(v);
+        }
+    }
+    void get(std::string& text) {
+        std::vector<char> letters;
+        get(letters);
+        text.assign(letters.begin(), letters.end());
+    }
+    bool isWhole() const { return isWhole_ && at_ == bytes_.size(); }
+
+  private:
+    bool has(uint64_t count) {
+        isWhole_ = isWhole_ && count <= bytes_.size() - at_;
+        return isWhole_;
+    }
+    const std::vector<uint8_t>& bytes_;
+    size_t at_ = 0;
+    bool isWhole_ = true;
+};
+
+}  // namespace stipple::lod

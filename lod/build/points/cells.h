@@ -1,0 +1,69 @@
+// How the points are spread, found by counting: octree cells of at most kAtomPoints points, whatever the density.
+#pragma once
+
+#include <functional>
+
+#include "lod/build/points/bytes.h"
+#include "lod/build/points/points.h"
+
+namespace stipple::lod {
+
+/// Subtrees of at most that many points are built as one. (A constant: what the file holds must not depend on memory.)
+constexpr uint64_t kAtomPoints = 131072;
+
+/// A counted cell.
+struct Cell {
+    uint64_t key = 0;  ///< of its corner
+    uint64_t count = 0;
+    uint8_t level = 0;
+};
+
+/// The root's cell split evenly into cells of a first level; where those hold more than kAtomPoints, they are split
+/// again. Counted again after each split, until nothing is left to split.
+class CellTree {
+  public:
+    /// `points`: about how many there will be.
+    CellTree(const Frame& frame, uint64_t points);
+
+    /// From several threads.
+    void count(const Points& block);
+    /// Splits what is too full; true if so: count everything once more. Cells of the deepest level stay.
+    bool split();
+    /// Nothing more to count: numbers the cells that hold points along the Morton curve.
+    void finish();
+
+    const std::vector<Cell>& cells() const { return cells_; }
+    /// Number of the cell that holds `key`; kNone where there are no points.
+    static constexpr uint32_t kNone = 0x7fffffffu;
+    uint32_t cellOf(uint64_t key) const { return entries_[placeOf(key)]; }
+    uint32_t deepestLevel() const { return deepest_; }
+    uint32_t firstLevel() const { return firstLevel_; }
+    /// What 95 of 100 points have as spacing at most, if they lie on surfaces; lattice units.
+    double largeSpacing() const { return largeSpacing_; }
+    void save(ByteWriter& to) const;
+    void load(ByteReader& from);
+    uint64_t bytes() const { return entries_.size() * sizeof(uint32_t) + cells_.size() * sizeof(Cell); }
+
+  private:
+    static constexpr uint32_t kBlock = 0x80000000u, kSplitLevels = 3;
+    size_t placeOf(uint64_t key) const {
+        size_t place = key >> firstShift_;
+        for (uint32_t shift = firstShift_; (entries_[place] & kBlock) != 0;) {
+            const uint32_t steps = 3 * std::min(kSplitLevels, shift / 3);
+            shift -= steps;
+            place = (entries_[place] & ~kBlock) + (key >> shift & ((1u << steps) - 1));
+        }
+        return place;
+    }
+    /// The entries of one block in order: splits (`isSplit`) or numbers them. `level`: of the entries.
+    void walk(size_t first, uint32_t entries, uint64_t key, uint32_t level, bool isSplit);
+
+    const Frame frame_;
+    uint32_t firstLevel_ = 0, firstShift_ = 0, deepest_ = 0;
+    std::vector<uint32_t> entries_;  ///< a count (later a cell's number), or kBlock and where its block begins
+    std::vector<Cell> cells_;
+    bool wasSplit_ = false;
+    double largeSpacing_ = 0;
+};
+
+}  // namespace stipple::lod

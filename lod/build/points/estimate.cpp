@@ -1,0 +1,393 @@
+// A block is an octree cell of at most kBlockPoints points, a quarter of its counted cell at most. It is split evenly
+// into window cells of two to six points (if they lie on a surface). What is estimated at the points of a window cell
+// comes from it and its 26 neighbours:
+//   radius  1.37 spacings, from the distance d of a point's 12th neighbour there: pi d^2 holds 12 of them
+//   normal  the direction of least variance (Hoppe et al. 1992), sign unknown: two-sided. Of all points of the window,
+//           the same for all points of the cell; or, fine, of each point's own twelve nearest.
+// With fewer points in the window it grows, up to the quarter of a counted cell that buckets know of their neighbours
+// (Distributor); then what is there must do. All of this hangs on the lattice and on counts alone.
+#include "lod/build/points/estimate.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "lod/octahedral.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr size_t kBlockPoints = 2048, kNeighbours = 12;
+constexpr uint32_t kMostSplits = 5;
+constexpr float kSpacings = 1.368f;
+constexpr double kLargestSpacings = 4;
+constexpr double kFlat = 1e-6;  ///< a line or a point has no normal: second variance over the first
+
+/// Count, sums and sums of products.
+struct Moments {
+    float n, x, y, z, xx, xy, xz, yy, yz, zz;
+    void add(float px, float py, float pz) {
+        n += 1;
+        x += px;
+        y += py;
+        z += pz;
+        xx += px * px;
+        xy += px * py;
+        xz += px * pz;
+        yy += py * py;
+        yz += py * pz;
+        zz += pz * pz;
+    }
+};
+
+/// The direction of least variance; zero where there is none.
+glm::vec3 normalFrom(const Moments& m) {
+    if (m.n < 3) return glm::vec3(0);
+    const double scale = 1.0 / static_cast<double>(m.n), x = m.x * scale, y = m.y * scale, z = m.z * scale;
+    Eigen::Matrix3d c;
+    c(0, 0) = m.xx * scale - x * x;
+    c(1, 0) = m.xy * scale - x * y;
+    c(2, 0) = m.xz * scale - x * z;
+    c(1, 1) = m.yy * scale - y * y;
+    c(2, 1) = m.yz * scale - y * z;
+    c(2, 2) = m.zz * scale - z * z;
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+    solver.computeDirect(c);
+    const Eigen::Vector3d& v = solver.eigenvalues();
+    if (!(v[1] > kFlat * v[2])) return glm::vec3(0);
+    const Eigen::Vector3d n = solver.eigenvectors().col(0);
+    const glm::vec3 normal(n[0], n[1], n[2]);
+    return std::isfinite(normal.x + normal.y + normal.z) ? normal : glm::vec3(0);
+}
+
+/// The value at `rank` (0: the least) of non-negative values, by bisection on a threshold: each step is one count.
+float smallestAtRank(const std::vector<float>& values, size_t rank) {
+    float lo = -1, hi = 0;
+    for (const float v : values) hi = hi < v ? v : hi;
+    for (int step = 0; step < 40; ++step) {  // at most `rank` values are <= lo, more than `rank` are <= hi
+        const float middle = 0.5f * (lo + hi);
+        if (!(middle > lo && middle < hi)) break;
+        uint32_t count = 0;
+        for (const float v : values) count += v <= middle ? 1u : 0u;
+        if (count > rank)
+            hi = middle;
+        else
+            lo = middle;
+        if (count == rank + 1) break;
+    }
+    float result = 0;
+    for (const float v : values) result = v <= hi && v > result ? v : result;
+    return result;
+}
+
+/// Lattice box, both ends inside.
+struct LatticeBox {
+    std::array<int64_t, 3> lo{}, hi{};
+    bool holds(int64_t x, int64_t y, int64_t z) const {
+        return x >= lo[0] && x <= hi[0] && y >= lo[1] && y <= hi[1] && z >= lo[2] && z <= hi[2];
+    }
+    LatticeBox grown(int64_t by) const {
+        LatticeBox b = *this;
+        for (size_t a = 0; a < 3; ++a) {
+            b.lo[a] -= by;
+            b.hi[a] += by;
+        }
+        return b;
+    }
+};
+
+class Estimator {
+  public:
+    Estimator(const Frame& frame, const CellTree& tree, const EstimateSettings& settings, const Places& ghosts,
+              SortedPoints& own)
+        : frame_(frame), tree_(tree), settings_(settings), ghosts_(ghosts), own_(own) {}
+
+    void cell(uint32_t index) {
+        const Cell& c = tree_.cells()[index];
+        cell_ = c;
+        cellShift_ = frame_.shiftOf(c.level);
+        cellBox_ = boxOf(c.key, c.level);
+        reach_ = static_cast<int64_t>(frame_.cellSize(c.level)) / 4;
+        const auto [begin, end] = rangeOf(own_.key, c.key, cellShift_);
+        if (begin == end) return;
+        blocks(begin, end, c.level, std::min<uint32_t>(c.level + 2u, frame_.keyLevels));
+    }
+
+  private:
+    /// Of the cell of `level` that holds `place`.
+    LatticeBox boxOf(uint64_t place, uint32_t level) const {
+        const uint32_t drop = frame_.rootLog2 - frame_.keyLevels, shift = frame_.shiftOf(level);
+        const uint64_t key = place >> shift << shift;
+        const auto size = static_cast<int64_t>(frame_.cellSize(level));
+        LatticeBox b;
+        b.lo = {int64_t{compactBits(key)} << drop, int64_t{compactBits(key >> 1)} << drop,
+                int64_t{compactBits(key >> 2)} << drop};
+        for (size_t a = 0; a < 3; ++a) b.hi[a] = b.lo[a] + size - 1;
+        return b;
+    }
+    static std::pair<size_t, size_t> rangeOf(const std::vector<uint64_t>& keys, uint64_t key, uint32_t shift) {
+        const uint64_t lo = key >> shift << shift, last = lo | ((uint64_t{1} << shift) - 1);
+        const auto first = std::lower_bound(keys.begin(), keys.end(), lo);
+        const auto end = std::upper_bound(first, keys.end(), last);
+        return {static_cast<size_t>(first - keys.begin()), static_cast<size_t>(end - keys.begin())};
+    }
+
+    /// Splits [begin, end), a cell of `level`, into blocks of `least` and finer.
+    void blocks(size_t begin, size_t end, uint32_t level, uint32_t least) {
+        if (begin == end) return;
+        if (level >= frame_.keyLevels || (level >= least && end - begin <= kBlockPoints)) {
+            block(begin, end, level);
+            return;
+        }
+        const uint32_t shift = frame_.shiftOf(level + 1);
+        while (begin < end) {
+            const uint64_t child = own_.key[begin] >> shift;
+            const auto next = std::partition_point(own_.key.begin() + static_cast<ptrdiff_t>(begin),
+                                                   own_.key.begin() + static_cast<ptrdiff_t>(end),
+                                                   [&](uint64_t k) { return k >> shift == child; }) -
+                              own_.key.begin();
+            blocks(begin, static_cast<size_t>(next), level + 1, least);
+            begin = static_cast<size_t>(next);
+        }
+    }
+
+    /// Calls f(x, y, z) for every point inside `box` that the counted cell sees, in the order of the keys: own first,
+    /// then ghosts.
+    template <typename F>
+    void forPoints(const LatticeBox& box, uint64_t key, uint32_t level, const F& f) const {
+        const uint32_t shift = frame_.shiftOf(level);
+        const auto [begin, end] = rangeOf(own_.key, key, shift);
+        descend(own_.key, own_.points.x, own_.points.y, own_.points.z, begin, end, level, box, f);
+        const auto [first, last] = rangeOf(ghosts_.key, key, shift);
+        descend(ghosts_.key, ghosts_.x, ghosts_.y, ghosts_.z, first, last, level, box, f);
+    }
+    template <typename F>
+    void descend(const std::vector<uint64_t>& keys, const std::vector<uint32_t>& x, const std::vector<uint32_t>& y,
+                 const std::vector<uint32_t>& z, size_t begin, size_t end, uint32_t level, const LatticeBox& box,
+                 const F& f) const {
+        constexpr size_t kFew = 128;
+        if (begin == end) return;
+        if (end - begin <= kFew || level >= frame_.keyLevels) {
+            for (size_t i = begin; i < end; ++i)
+                if (box.holds(x[i], y[i], z[i]) && isSeen(keys[i], x[i], y[i], z[i])) f(x[i], y[i], z[i]);
+            return;
+        }
+        const uint32_t shift = frame_.shiftOf(level + 1);
+        while (begin < end) {
+            const uint64_t child = keys[begin] >> shift;
+            const auto next =
+                static_cast<size_t>(std::partition_point(keys.begin() + static_cast<ptrdiff_t>(begin),
+                                                         keys.begin() + static_cast<ptrdiff_t>(end),
+                                                         [&](uint64_t k) { return k >> shift == child; }) -
+                                    keys.begin());
+            const LatticeBox at = boxOf(child << shift, level + 1);
+            bool meets = true;
+            for (size_t a = 0; a < 3; ++a) meets = meets && at.lo[a] <= box.hi[a] && at.hi[a] >= box.lo[a];
+            if (meets) descend(keys, x, y, z, begin, next, level + 1, box, f);
+            begin = next;
+        }
+    }
+    /// The rule of Distributor.
+    bool isSeen(uint64_t key, int64_t x, int64_t y, int64_t z) const {
+        if (key >> cellShift_ == cell_.key >> cellShift_) return true;
+        int64_t reach = reach_;
+        if (tree_.deepestLevel() > tree_.firstLevel()) {
+            const Cell& other = tree_.cells()[tree_.cellOf(key)];
+            reach = std::min(reach, static_cast<int64_t>(frame_.cellSize(other.level)) / 4);
+        }
+        return cellBox_.grown(reach).holds(x, y, z);
+    }
+
+    /// Everything within `margin` of the box of a cell of `level`, from that cell and its neighbours.
+    template <typename F>
+    void forNeighbourhood(uint64_t key, uint32_t level, int64_t margin, bool withOwn, const F& f) const {
+        const LatticeBox own = boxOf(key, level), box = own.grown(margin);
+        const auto size = static_cast<int64_t>(frame_.cellSize(level)), root = int64_t{1} << frame_.rootLog2;
+        for (int64_t dz = -1; dz <= 1; ++dz)
+            for (int64_t dy = -1; dy <= 1; ++dy)
+                for (int64_t dx = -1; dx <= 1; ++dx) {
+                    if (!withOwn && dx == 0 && dy == 0 && dz == 0) continue;
+                    const int64_t x = own.lo[0] + dx * size, y = own.lo[1] + dy * size, z = own.lo[2] + dz * size;
+                    if (x < 0 || y < 0 || z < 0 || x >= root || y >= root || z >= root) continue;
+                    forPoints(
+                        box, frame_.keyOf(static_cast<uint32_t>(x), static_cast<uint32_t>(y), static_cast<uint32_t>(z)),
+                        level, f);
+                }
+    }
+
+    void block(size_t begin, size_t end, uint32_t level) {
+        const size_t n = end - begin;
+        uint32_t splits = 0;
+        while (splits < kMostSplits && level + splits < frame_.keyLevels && n > (size_t{6} << (2 * splits))) ++splits;
+        const uint32_t window = level + splits;
+        const uint32_t across = (1u << splits) + 2;
+        const auto edge = static_cast<int64_t>(frame_.cellSize(window));
+        const LatticeBox box = boxOf(own_.key[begin], level);
+        const float inverse = 1.0f / static_cast<float>(edge), half = 0.5f * static_cast<float>(1u << splits);
+        const auto cellOf = [&](int64_t x, int64_t y, int64_t z) {
+            const auto cx = static_cast<size_t>((x - box.lo[0] + edge) / edge),
+                       cy = static_cast<size_t>((y - box.lo[1] + edge) / edge),
+                       cz = static_cast<size_t>((z - box.lo[2] + edge) / edge);
+            return (cz * across + cy) * across + cx;
+        };
+        const auto localOf = [&](int64_t x, int64_t y, int64_t z) {
+            return glm::vec3(static_cast<float>(x - box.lo[0]) * inverse - half,
+                             static_cast<float>(y - box.lo[1]) * inverse - half,
+                             static_cast<float>(z - box.lo[2]) * inverse - half);
+        };
+        seen_.clear();
+        const auto add = [&](int64_t x, int64_t y, int64_t z) {
+            seen_.push_back({static_cast<uint32_t>(cellOf(x, y, z)), localOf(x, y, z)});
+        };
+        for (size_t i = begin; i < end; ++i) add(own_.points.x[i], own_.points.y[i], own_.points.z[i]);
+        forNeighbourhood(own_.key[begin], level, edge, false, add);
+        indexSeen(size_t{across} * across * across);
+        const uint32_t windowShift = frame_.shiftOf(window);
+        for (size_t i = begin; i < end;) {
+            size_t next = i + 1;
+            while (next < end && own_.key[next] >> windowShift == own_.key[i] >> windowShift) ++next;
+            gather(seen_[i - begin].cell, across);
+            if (hoodX_.size() <= kNeighbours && window > coarsestWindow()) {
+                largerWindow(i, next, window);
+            } else {
+                places_.clear();
+                for (size_t k = i; k < next; ++k) places_.push_back(seen_[k - begin].place);
+                give(i, next, static_cast<float>(edge));
+            }
+            i = next;
+        }
+    }
+    uint32_t coarsestWindow() const { return std::min(cell_.level + 2u, frame_.keyLevels); }
+
+    /// Sorts what a block sees by window cell.
+    void indexSeen(size_t cells) {
+        firstSeen_.assign(cells + 1, 0);
+        for (const Seen& s : seen_) ++firstSeen_[s.cell + 1];
+        for (size_t i = 1; i < firstSeen_.size(); ++i) firstSeen_[i] += firstSeen_[i - 1];
+        nextSeen_.assign(firstSeen_.begin(), firstSeen_.end());
+        byCell_.resize(seen_.size());
+        for (const Seen& s : seen_) byCell_[nextSeen_[s.cell]++] = s.place;
+    }
+
+    void clearHood() {
+        hoodX_.clear();
+        hoodY_.clear();
+        hoodZ_.clear();
+    }
+    void addToHood(const glm::vec3& p) {
+        hoodX_.push_back(p.x);
+        hoodY_.push_back(p.y);
+        hoodZ_.push_back(p.z);
+    }
+    /// The points of a window cell and its neighbours.
+    void gather(size_t at, uint32_t across) {
+        clearHood();
+        for (size_t z = 0; z < 3; ++z)
+            for (size_t y = 0; y < 3; ++y) {  // three cells in x lie side by side
+                const size_t first = at + (z * across + y) * across - (across + 1) * across - 1;
+                for (uint32_t k = firstSeen_[first]; k < firstSeen_[first + 3]; ++k) addToHood(byCell_[k]);
+            }
+    }
+
+    /// The points [begin, end) of one window cell that has too few around it.
+    void largerWindow(size_t begin, size_t end, uint32_t window) {
+        int64_t size = 1;
+        LatticeBox box;
+        const auto localOf = [&](int64_t x, int64_t y, int64_t z) {
+            const auto inverse = 1.0f / static_cast<float>(size);
+            return glm::vec3(static_cast<float>(x - box.lo[0]) * inverse - 0.5f,
+                             static_cast<float>(y - box.lo[1]) * inverse - 0.5f,
+                             static_cast<float>(z - box.lo[2]) * inverse - 0.5f);
+        };
+        for (uint32_t level = window; level > coarsestWindow() && (level == window || hoodX_.size() <= kNeighbours);) {
+            --level;
+            size = static_cast<int64_t>(frame_.cellSize(level));
+            box = boxOf(own_.key[begin], level);
+            clearHood();
+            forNeighbourhood(own_.key[begin], level, size, true,
+                             [&](int64_t x, int64_t y, int64_t z) { addToHood(localOf(x, y, z)); });
+        }
+        places_.clear();
+        for (size_t i = begin; i < end; ++i)
+            places_.push_back(localOf(own_.points.x[i], own_.points.y[i], own_.points.z[i]));
+        give(begin, end, static_cast<float>(size));
+    }
+
+    /// Points [begin, end), whose places are in places_, from the hood; both in units of `edge` lattice units.
+    void give(size_t begin, size_t end, float edge) {
+        const size_t n = hoodX_.size();
+        glm::vec3 normal(0);
+        if (settings_.normals && !settings_.isFine) {
+            Moments all{};
+            for (size_t k = 0; k < n; ++k) all.add(hoodX_[k], hoodY_[k], hoodZ_[k]);
+            normal = normalFrom(all);
+        }
+        squared_.resize(n);
+        for (size_t i = begin; i < end; ++i) {
+            const glm::vec3 p = places_[i - begin];
+            for (size_t k = 0; k < n; ++k) {
+                const float dx = hoodX_[k] - p.x, dy = hoodY_[k] - p.y, dz = hoodZ_[k] - p.z;
+                squared_[k] = dx * dx + dy * dy + dz * dz;
+            }
+            const size_t rank = std::min(kNeighbours, n - 1);  // the point itself comes first
+            const float reach = rank > 0 ? smallestAtRank(squared_, rank) : 0.0f;
+            if (settings_.radii && !(own_.points.radius[i] > 0)) own_.points.radius[i] = radiusFrom(reach, rank, edge);
+            if (!settings_.normals) continue;
+            if (settings_.isFine) {
+                Moments near{};
+                for (size_t k = 0; k < n; ++k)
+                    if (squared_[k] <= reach) near.add(hoodX_[k] - p.x, hoodY_[k] - p.y, hoodZ_[k] - p.z);
+                normal = normalFrom(near);
+            }
+            uint32_t& colour = own_.points.colour[i];
+            if (normal == glm::vec3(0) || (colour >> 24 & shared::kFlagNoNormal) == 0) continue;
+            own_.points.normal[i] = roundedNormal(normal);
+            colour = (colour & 0xffffffu) | (shared::kFlagTwoSided | shared::kFlagEstimatedNormal) << 24;
+        }
+    }
+    float radiusFrom(float squaredReach, size_t neighbours, float edge) const {
+        if (neighbours > 0)
+            return kSpacings * std::sqrt(3.14159265f * squaredReach / static_cast<float>(neighbours)) * edge;
+        const double alone = frame_.cellSize(cell_.level) / std::sqrt(static_cast<double>(cell_.count));
+        return kSpacings * static_cast<float>(alone);
+    }
+
+    struct Seen {
+        uint32_t cell;
+        glm::vec3 place;
+    };
+
+    const Frame& frame_;
+    const CellTree& tree_;
+    const EstimateSettings settings_;
+    const Places& ghosts_;
+    SortedPoints& own_;
+    Cell cell_;
+    uint32_t cellShift_ = 0;
+    LatticeBox cellBox_;
+    int64_t reach_ = 0;
+    std::vector<Seen> seen_;         ///< by the block: its own points first, in window cells from its centre
+    std::vector<glm::vec3> byCell_;  ///< the same by window cell
+    std::vector<uint32_t> firstSeen_, nextSeen_;
+    std::vector<float> hoodX_, hoodY_, hoodZ_, squared_;
+    std::vector<glm::vec3> places_;
+};
+
+}  // namespace
+
+void estimate(const Frame& frame, const CellTree& tree, uint32_t firstCell, uint32_t cells,
+              const EstimateSettings& settings, const Places& ghosts, SortedPoints& own) {
+    Points& p = own.points;
+    p.normal.resize(p.size());
+    p.radius.resize(p.size());
+    if (settings.radii || settings.normals) {
+        Estimator estimator(frame, tree, settings, ghosts, own);
+        for (uint32_t k = 0; k < cells; ++k) estimator.cell(firstCell + k);
+    }
+    // Stray points have their neighbours far away.
+    const float limit =
+        settings.limitStrays ? static_cast<float>(kLargestSpacings * kSpacings * tree.largeSpacing()) : 3.4e38f;
+    for (float& r : p.radius) r = std::max(std::min(r, limit), 0.5f);
+}
+
+}  // namespace stipple::lod

@@ -1,0 +1,90 @@
+// The input of a build, read as often as it takes: first surveyed, then delivered as points on one lattice. Scanner
+// integers stay what they are: the lattice unit is the files' scale. For floating-point input the unit is a power of
+// two, 2^-21 of the extent.
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "lod/build/lattice.h"
+#include "lod/build/points/points.h"
+
+namespace stipple::lod {
+
+class PointInput {
+  public:
+    static Result<PointInput> open(const std::vector<std::string>& inputs, const BuildSettings& settings,
+                                   BuildReport& report);
+
+    /// What is known before a point is read.
+    uint64_t declared() const { return declared_; }
+    const std::vector<AttributeInfo>& attributes() const { return attributes_; }
+    const std::string& firstPath() const { return sources_.front().info.path; }
+    uint64_t inputBytes() const;
+    /// Of names, sizes and times of the files: does a build that was interrupted go on with the same input?
+    uint64_t identity() const;
+
+    /// Reads everything once: bounds, which parts are corrupt, what the colours mean. Fills `report`.
+    Result<void> survey(BuildReport& report, Executor& executor, Progress& progress);
+
+    // After that:
+    glm::dvec3 origin{0};
+    double unit = 1;
+    std::array<uint32_t, 3> greatest{};  ///< of the coordinates; the least are 0
+    uint64_t points = 0;                 ///< that can be used
+    bool hasColour = false, hasNormal = false, hasRadius = false, isReflectance = false;
+    UpAxis up = UpAxis::z;
+    Crs crs;
+    std::string source;
+
+    /// Calls sink(points) for all points, in blocks, from several threads at once; a thread has one `worker` number
+    /// below `workers`. Fails if the input is not what was surveyed. Returns the largest rounding of a coordinate,
+    /// world units.
+    using Sink = std::function<Result<void>(int worker, const Points& block)>;
+    Result<double> read(Executor& executor, int workers, Progress& progress, const std::string& stage,
+                        const Sink& sink) const;
+
+  private:
+    struct Part {
+        size_t source = 0, index = 0;
+        uint64_t count = 0;  ///< declared
+        // Found by the survey.
+        std::optional<Error> error;
+        uint64_t usable = 0, notFinite = 0;
+        glm::ivec3 lo{INT32_MAX}, hi{INT32_MIN};
+        glm::dvec3 least{1e300}, greatest{-1e300};
+        uint32_t colourMax = 0;
+        uint64_t firstColour = 0;
+        bool hasColour = false, isVaried = false;
+        double rounding = 0;
+    };
+
+    Result<void> openAll(const std::vector<std::string>& inputs, const BuildSettings& settings, BuildReport& report);
+    Result<PointSource> openInput(const std::string& path, const ReadOptions& options) const;
+    Result<void> collectNames(const std::vector<std::string>& files, ReadOptions& options) const;
+    Result<void> adopt(PointSource source, const ReadOptions& options, std::vector<bool>& found, BuildReport& report);
+    Result<void> surveyPart(Part& part, PointBlock& block) const;
+    void surveyColours(const PointBlock& block, size_t count, Part& part) const;
+    Result<void> placeIntegers(BuildReport& report);
+    Result<void> placeFloats();
+    void findColours();
+    Result<void> readPart(const Part& part, PointBlock& block, Points& points, double& rounding,
+                          const std::function<Result<void>(const Points&)>& sink) const;
+    void place(const Part& part, const PointBlock& block, size_t count, Points& out, double& rounding) const;
+    void fill(const Part& part, const PointBlock& block, Points& out) const;
+
+    BuildSettings settings_;
+    std::vector<PointSource> sources_;
+    std::vector<Part> parts_;
+    std::vector<AttributeInfo> attributes_;
+    std::vector<ToLattice> toLattice_;  ///< of each source, where all are lattices
+    std::vector<bool> isWide_;          ///< colours of a source have 16 bits
+    std::vector<uint32_t> sourceColourMax_;
+    glm::dvec3 least_{0};  ///< steps of the common lattice
+    double step_ = 1;      ///< of the common lattice, for what 32 bits cannot hold
+    uint64_t declared_ = 0;
+    bool allLattice_ = true;
+    std::string crsPath_;
+};
+
+}  // namespace stipple::lod

@@ -1,0 +1,105 @@
+#include "lod/build/points/journal.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "engine/base/hash.h"
+
+namespace stipple::lod {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr uint64_t kMagic = 0x31444c4942505453ull;  // "STPBILD1"
+
+struct EntryHead {
+    uint64_t bytes, hash;
+};
+
+}  // namespace
+
+Journal::Journal(Journal&& other) noexcept
+    : folder_(std::move(other.folder_)),
+      output_(std::move(other.output_)),
+      identity_(other.identity_),
+      end_(other.end_),
+      lock_(std::exchange(other.lock_, -1)),
+      entries_(std::move(other.entries_)) {}
+Journal::~Journal() {
+    if (lock_ >= 0) ::close(lock_);
+}
+
+Result<Journal> Journal::open(const std::string& folder, const std::string& output, uint64_t identity) {
+    Journal j;
+    j.folder_ = folder;
+    j.output_ = output;
+    j.identity_ = identity;
+    std::error_code error;
+    fs::create_directories(folder, error);
+    const std::string path = folder + "/journal";
+    j.lock_ = error ? -1 : ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    if (j.lock_ < 0)
+        return fail(ErrorKind::output,
+                    fmt::format("cannot be written: {}", error ? error.message() : std::strerror(errno)), folder,
+                    "name a folder for temporary files with --temp");
+    if (::flock(j.lock_, LOCK_EX | LOCK_NB) != 0)
+        return fail(ErrorKind::output, "is in use by another build", folder, "wait for it, or build to another file");
+    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
+    std::array<uint64_t, 2> head{};
+    if (file.sizeBytes() < sizeof(head)) {
+        STIPPLE_TRY(j.restart());
+        return j;
+    }
+    STIPPLE_TRY(file.readAt(0, head.data(), sizeof(head)));
+    if (head[0] != kMagic || head[1] != identity)
+        return fail(ErrorKind::input, "holds an interrupted build of other input or with other settings", folder,
+                    "finish it with the same command as before, or delete the folder");
+    j.end_ = sizeof(head);
+    for (EntryHead entry{}; j.end_ + sizeof(entry) <= file.sizeBytes();) {
+        STIPPLE_TRY(file.readAt(j.end_, &entry, sizeof(entry)));
+        if (entry.bytes > file.sizeBytes() - j.end_ - sizeof(entry)) break;
+        std::vector<uint8_t> payload(entry.bytes);
+        STIPPLE_TRY(file.readAt(j.end_ + sizeof(entry), payload.data(), payload.size()));
+        if (hashBytes(payload.data(), payload.size()) != entry.hash) break;
+        j.entries_.push_back(std::move(payload));
+        j.end_ += sizeof(entry) + entry.bytes;
+    }
+    if (j.entries_.empty()) STIPPLE_TRY(j.restart());
+    return j;
+}
+
+Result<void> Journal::append(const std::vector<uint8_t>& payload) {
+    const std::string path = folder_ + "/journal";
+    const EntryHead head{payload.size(), hashBytes(payload.data(), payload.size())};
+    STIPPLE_TRY(writeFileAt(path, end_ + sizeof(head), payload.data(), payload.size()));
+    STIPPLE_TRY(writeFileAt(path, end_, &head, sizeof(head)));
+    end_ += sizeof(head) + payload.size();
+    return {};
+}
+
+Result<void> Journal::restart() {
+    std::error_code error;
+    for (const fs::directory_entry& e : fs::directory_iterator(folder_, error))
+        if (e.path().filename() != "journal") fs::remove(e.path(), error);
+    fs::remove(partialPath(), error);
+    entries_.clear();
+    const std::array<uint64_t, 2> head{kMagic, identity_};
+    if (::ftruncate(lock_, 0) != 0)
+        return fail(ErrorKind::output, fmt::format("cannot be written: {}", std::strerror(errno)), folder_);
+    STIPPLE_TRY(writeFileAt(folder_ + "/journal", 0, head.data(), sizeof(head)));
+    end_ = sizeof(head);
+    return {};
+}
+
+void Journal::remove() {
+    std::error_code error;
+    fs::remove_all(folder_, error);
+}
+
+}  // namespace stipple::lod

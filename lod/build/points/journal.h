@@ -1,0 +1,41 @@
+// What a build has finished, on disk, so that the same command goes on where it was killed. A folder holds the buckets
+// and a log of entries; an entry counts only if it is whole.
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "engine/base/file.h"
+#include "lod/build/build.h"
+
+namespace stipple::lod {
+
+class Journal {
+  public:
+    /// Of the build of `output`; makes the folder if it is not there. `identity`: of input and settings; a folder of
+    /// another is refused. Only one process at a time.
+    static Result<Journal> open(const std::string& folder, const std::string& output, uint64_t identity);
+    Journal(Journal&& other) noexcept;
+    Journal& operator=(Journal&&) = delete;
+    ~Journal();
+
+    const std::string& folder() const { return folder_; }
+    std::string partialPath() const { return output_ + ".partial"; }
+    /// Of an earlier run, in order.
+    const std::vector<std::vector<uint8_t>>& entries() const { return entries_; }
+    void forgetEntries() { entries_ = {}; }
+    Result<void> append(const std::vector<uint8_t>& payload);
+    /// Nothing was kept: whatever lies in the folder is of no use.
+    Result<void> restart();
+    /// The build is complete.
+    void remove();
+
+  private:
+    Journal() = default;
+    std::string folder_, output_;
+    uint64_t identity_ = 0, end_ = 0;
+    int lock_ = -1;
+    std::vector<std::vector<uint8_t>> entries_;
+};
+
+}  // namespace stipple::lod

@@ -1,0 +1,344 @@
+#include "lod/build/points/levels.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+#include "engine/base/check.h"
+#include "engine/base/hash.h"
+#include "lod/attributes.h"
+#include "lod/build/points/rising.h"
+#include "lod/build/points/rising_values.h"
+#include "lod/chunk.h"
+#include "lod/octahedral.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr uint32_t kClusterLevels = 6;
+
+struct Box {
+    glm::dvec3 lo{1e300}, hi{-1e300};
+    void add(const glm::dvec3& p, double margin = 0) {
+        lo = glm::min(lo, p - margin);
+        hi = glm::max(hi, p + margin);
+    }
+    glm::dvec3 centre() const { return 0.5 * (lo + hi); }
+};
+
+Node emptyNode(const Frame& frame, uint32_t level, uint64_t key) {
+    Node node;
+    node.level = static_cast<uint8_t>(level);
+    const uint64_t cell = key >> frame.shiftOf(level);
+    node.cell = {compactBits(cell), compactBits(cell >> 1), compactBits(cell >> 2)};
+    node.stepShift = static_cast<int8_t>(static_cast<int>(frame.rootLog2) - static_cast<int>(level) - 16);
+    return node;
+}
+
+/// Lattice position of record coordinate 0: see Hierarchy::recordOrigin.
+glm::dvec3 recordBase(const Frame& frame, const Node& node) {
+    const double half = node.stepShift > 0 ? 0.5 * (std::exp2(node.stepShift) - 1) : 0.0;
+    return glm::dvec3(node.cell[0], node.cell[1], node.cell[2]) * frame.cellSize(node.level) + half;
+}
+
+// ---- normal cones ----
+
+void leafCone(const Points& points, Node& node) {
+    glm::dvec3 sum(0);
+    for (size_t i = 0; i < points.size(); ++i) {
+        if ((points.colour[i] >> 24 & (shared::kFlagTwoSided | shared::kFlagNoNormal)) != 0) return;
+        sum += glm::dvec3(shared::octDecode(points.normal[i]));
+    }
+    if (!(glm::length(sum) > 1e-3 * static_cast<double>(points.size()))) return;
+    node.normalCone = octEncode(glm::vec3(glm::normalize(sum)));
+    const glm::vec3 axis = shared::octDecode(node.normalCone);
+    node.normalConeCosine = 1;
+    for (const uint32_t n : points.normal)
+        node.normalConeCosine =
+            std::min(node.normalConeCosine, glm::dot(axis, glm::vec3(shared::octDecode(n))) - 1e-6f);
+}
+
+void innerCone(std::span<const PendingNode> children, Node& node) {
+    glm::dvec3 sum(0);
+    for (const PendingNode& c : children) {
+        if (c.node.normalConeCosine <= -1) return;
+        sum += glm::dvec3(shared::octDecode(c.node.normalCone));
+    }
+    if (!(glm::length(sum) > 1e-3)) return;
+    const uint32_t cone = octEncode(glm::vec3(glm::normalize(sum)));
+    const glm::dvec3 axis(shared::octDecode(cone));
+    double widest = 0;
+    for (const PendingNode& c : children) {
+        const glm::dvec3 child(shared::octDecode(c.node.normalCone));
+        const double between = 2 * std::asin(std::min(1.0, 0.5 * glm::length(child - axis)));
+        const double half = std::acos(std::clamp(static_cast<double>(c.node.normalConeCosine), -1.0, 1.0));
+        widest = std::max(widest, between + half);
+    }
+    if (widest >= 3.14) return;
+    node.normalCone = cone;
+    node.normalConeCosine = static_cast<float>(std::cos(widest)) - 1e-6f;
+}
+
+// ---- chunks ----
+
+uint32_t coordinate(uint32_t v, uint64_t size, int stepShift) {
+    const uint64_t local = v & (size - 1);
+    return static_cast<uint32_t>(stepShift >= 0 ? local >> stepShift : local << -stepShift);
+}
+
+/// Where each record goes: by its parent's code, largest first, then in order.
+struct Order {
+    std::array<uint32_t, 256> parents{}, own{}, next{};
+    template <typename ParentCodeOf, typename CodeOf>
+    Order(size_t count, const ParentCodeOf& parentCodeOf, const CodeOf& codeOf) {
+        for (size_t k = 0; k < count; ++k) {
+            ++parents[parentCodeOf(k)];
+            ++own[codeOf(k)];
+        }
+        uint32_t sum = 0;
+        for (size_t code = 256; code-- > 0;) {
+            next[code] = sum;
+            sum += parents[code];
+        }
+    }
+};
+
+void appendCounts(const std::array<uint32_t, 256>& histogram, NodeBatch& batch, uint16_t& codes) {
+    codes = 0;
+    for (uint32_t code = 0; code < 256; ++code) {
+        if (histogram[code] == 0) continue;
+        batch.counts.push_back({code, histogram[code]});
+        ++codes;
+    }
+}
+
+/// Writes a node whose records know their parents' codes.
+void encodeNode(const Frame& frame, PendingNode& pending, NodeBatch& batch) {
+    Node& node = pending.node;
+    const bool isLeaf = node.isLeaf();
+    const size_t count = node.records, kinds = frame.attributes.size();
+    Order order(
+        count, [&](size_t k) { return isLeaf ? pending.leafParentCode[k] : pending.records[k].parentCode; },
+        [&](size_t k) { return isLeaf ? uint8_t{0} : pending.records[k].code; });
+    thread_local Chunk chunk;
+    chunk.records.resize(count);
+    const bool hasLowBits = isLeaf && node.stepShift > 0;
+    chunk.lowBits.resize(hasLowBits ? count * 3 : 0);
+    std::vector<std::vector<uint8_t>> streams;
+    for (const AttributeInfo& a : frame.attributes) streams.emplace_back(count * bytesOf(a.type));
+    const uint64_t size = uint64_t{1} << (frame.rootLog2 - node.level);
+    const double edge = frame.cellSize(node.level);
+    for (size_t k = 0; k < count; ++k) {
+        const size_t at = order.next[isLeaf ? pending.leafParentCode[k] : pending.records[k].parentCode]++;
+        for (size_t a = 0; a < kinds; ++a) {
+            const size_t width = bytesOf(frame.attributes[a].type);
+            uint8_t* const to = streams[a].data() + at * width;
+            if (isLeaf)
+                std::memcpy(to, pending.leaf.attributes[a].data() + k * width, width);
+            else
+                storeValue(frame.attributes[a], pending.values[k * kinds + a], pending.records[k].count, to);
+        }
+        if (!isLeaf) {
+            chunk.records[at] = pending.records[k].packed;
+            continue;
+        }
+        const Points& p = pending.leaf;
+        const uint32_t radius = radiusCodeUp(static_cast<double>(p.radius[k]), edge);
+        const auto steps = [&](uint32_t v) { return coordinate(v, size, node.stepShift); };
+        chunk.records[at] = {steps(p.x[k]) | steps(p.y[k]) << 16, steps(p.z[k]) | radius << 16, p.normal[k],
+                             p.colour[k]};
+        if (!hasLowBits) continue;
+        const uint32_t mask = (1u << node.stepShift) - 1;
+        chunk.lowBits[at * 3] = p.x[k] & mask;
+        chunk.lowBits[at * 3 + 1] = p.y[k] & mask;
+        chunk.lowBits[at * 3 + 2] = p.z[k] & mask;
+    }
+    const std::vector<uint8_t> bytes = encodeChunk(chunk), attributes = encodeAttributes(frame.attributes, streams);
+    node.chunkOffset = batch.bytes.size();
+    node.chunkBytes = static_cast<uint32_t>(bytes.size());
+    node.chunkHash = hashBytes(bytes.data(), bytes.size());
+    node.attributeBytes = static_cast<uint32_t>(attributes.size());
+    node.attributeHash = hashBytes(attributes.data(), attributes.size());
+    batch.bytes.insert(batch.bytes.end(), bytes.begin(), bytes.end());
+    batch.bytes.insert(batch.bytes.end(), attributes.begin(), attributes.end());
+    NodeBatch::Written written{node, pending.key, static_cast<uint32_t>(batch.counts.size()), 0, 0};
+    appendCounts(order.parents, batch, written.parentCodes);
+    appendCounts(order.own, batch, written.ownCodes);
+    batch.nodes.push_back(written);
+    batch.written += count;
+    pending = {};
+}
+
+/// Encloses the own discs and the children's spheres.
+void innerSphere(const Frame& frame, std::span<const PendingNode> children, PendingNode& parent) {
+    Node& node = parent.node;
+    Box box;
+    for (const PendingNode& c : children) box.add(c.node.centre, c.node.radius);
+    node.centre = box.centre();
+    for (const PendingNode& c : children)
+        node.radius = std::max(node.radius, glm::length(c.node.centre - node.centre) + c.node.radius);
+    for (const Rising& r : parent.records) {
+        const double reach =
+            frame.cellSize(node.level) * static_cast<double>(shared::radiusFraction(recordRadiusCode(r.packed)));
+        node.radius = std::max(node.radius, glm::length(r.place - node.centre) + reach);
+    }
+    node.radius *= 1 + 1e-6;
+}
+
+}  // namespace
+
+Frame makeFrame(const glm::dvec3& origin, double unit, uint32_t largest, uint32_t leafRecords) {
+    Frame f;
+    f.origin = origin;
+    f.unit = unit;
+    f.rootLog2 = static_cast<uint32_t>(std::bit_width(std::max(largest, 1u)));
+    f.keyLevels = std::min(f.rootLog2, kMortonBits);
+    f.leafRecords = leafRecords;
+    f.errors = errorsOf(f.rootLog2);
+    return f;
+}
+
+namespace {
+
+PendingNode makeLeaf(const Frame& frame, SortedPoints& from, size_t begin, size_t end, uint32_t level) {
+    PendingNode out;
+    const double edge = frame.cellSize(level);
+    for (size_t i = begin; i < end; ++i) {
+        const uint32_t code = radiusCodeUp(static_cast<double>(from.points.radius[i]), edge);
+        from.points.radius[i] = static_cast<float>(static_cast<double>(shared::radiusFraction(code)) * edge);
+    }
+    out.firstPoint = static_cast<uint32_t>(begin);
+    const auto copy = [&](auto& to, const auto& values) {
+        to.assign(values.begin() + static_cast<ptrdiff_t>(begin), values.begin() + static_cast<ptrdiff_t>(end));
+    };
+    copy(out.leaf.x, from.points.x);
+    copy(out.leaf.y, from.points.y);
+    copy(out.leaf.z, from.points.z);
+    copy(out.leaf.colour, from.points.colour);
+    copy(out.leaf.normal, from.points.normal);
+    copy(out.leaf.radius, from.points.radius);
+    copy(out.leafKey, from.key);
+    for (size_t a = 0; a < frame.attributes.size(); ++a) {
+        const size_t width = bytesOf(frame.attributes[a].type);
+        const uint8_t* const values = from.points.attributes[a].data();
+        out.leaf.attributes.emplace_back(values + begin * width, values + end * width);
+    }
+    out.leafParentCode.assign(end - begin, static_cast<uint8_t>(ErrorScale::kNoParent));
+    const uint32_t shift = frame.shiftOf(level);
+    out.key = from.key[begin] >> shift << shift;
+    out.node = emptyNode(frame, level, out.key);
+    Box box;
+    for (size_t i = 0; i < out.leaf.size(); ++i) box.add(out.leaf.at(i));
+    Node& node = out.node;
+    node.centre = box.centre();
+    double radius = 0;
+    for (size_t i = 0; i < out.leaf.size(); ++i)
+        radius = std::max(radius, glm::length(out.leaf.at(i) - node.centre) + static_cast<double>(out.leaf.radius[i]));
+    // Positions may be held in steps coarser than the lattice.
+    node.radius = radius * (1 + 1e-6) + (node.stepShift > 0 ? std::exp2(node.stepShift) : 0.0);
+    node.records = static_cast<uint32_t>(end - begin);
+    leafCone(out.leaf, node);
+    return out;
+}
+
+}  // namespace
+
+PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, NodeBatch& batch, const Leaves* leaves) {
+    STIPPLE_CHECK(!children.empty(), "a parent has children");
+    PendingNode out;
+    const uint32_t level = children[0].node.level - 1u, shift = frame.shiftOf(level);
+    out.key = children[0].key >> shift << shift;
+    out.node = emptyNode(frame, level, out.key);
+    const uint32_t clusterLevel = std::min(level + kClusterLevels, frame.keyLevels);
+    RecordGrid grid;
+    grid.base = recordBase(frame, out.node);
+    grid.step = std::exp2(out.node.stepShift);
+    grid.edge = frame.cellSize(level);
+    grid.clusterShift = frame.shiftOf(clusterLevel);
+    grid.cellsAcross = 1u << (clusterLevel - level);
+    grid.cellSteps = 65536u / grid.cellsAcross;
+    grid.errors = frame.errors;
+    const size_t kinds = frame.attributes.size();
+    thread_local std::vector<Rising> points;
+    thread_local std::vector<RisingValue> leafValues, column;
+    for (PendingNode& child : children) {
+        const bool isLeaf = child.node.isLeaf();
+        out.node.childMask =
+            static_cast<uint8_t>(out.node.childMask | 1u << (child.key >> frame.shiftOf(level + 1) & 7u));
+        const size_t count = child.node.records;
+        const auto keyAt = [&](size_t k) { return isLeaf ? child.leafKey[k] : child.records[k].key; };
+        for (size_t begin = 0, end = 0; begin < count; begin = end) {
+            const uint64_t cell = keyAt(begin) >> grid.clusterShift;
+            for (end = begin + 1; end < count && keyAt(end) >> grid.clusterShift == cell;) ++end;
+            std::span<const Rising> parts;
+            std::span<const RisingValue> values;
+            if (isLeaf) {
+                points.clear();
+                leafValues.clear();
+                for (size_t k = begin; k < end; ++k) {
+                    points.push_back(risingLeaf(child.leaf, k, child.leafKey[k]));
+                    points.back().first += child.firstPoint;
+                    for (size_t a = 0; a < kinds; ++a)
+                        leafValues.push_back(leafValue(frame.attributes[a], child.leaf.attributes[a].data() +
+                                                                                k * bytesOf(frame.attributes[a].type)));
+                }
+                parts = points;
+                values = leafValues;
+            } else {
+                parts = std::span(child.records).subspan(begin, end - begin);
+                values = std::span(child.values).subspan(begin * kinds, (end - begin) * kinds);
+            }
+            out.records.push_back(mergeRising(grid, parts, leaves));
+            for (size_t a = 0; a < kinds; ++a) {
+                column.clear();
+                for (size_t k = 0; k < parts.size(); ++k) column.push_back(values[k * kinds + a]);
+                out.values.push_back(mergeValues(frame.attributes[a], column, parts));
+            }
+            const uint8_t code = out.records.back().code;
+            for (size_t k = begin; k < end; ++k)
+                (isLeaf ? child.leafParentCode[k] : child.records[k].parentCode) = code;
+        }
+    }
+    out.node.records = static_cast<uint32_t>(out.records.size());
+    for (const Rising& r : out.records) out.node.errorCode = std::max(out.node.errorCode, r.code);
+    innerSphere(frame, children, out);
+    innerCone(children, out.node);
+    for (PendingNode& child : children) encodeNode(frame, child, batch);
+    return out;
+}
+
+void finishRoot(const Frame& frame, PendingNode& root, NodeBatch& batch) { encodeNode(frame, root, batch); }
+
+namespace {
+
+PendingNode subtreeOf(const Frame& frame, SortedPoints& from, size_t begin, size_t end, uint32_t level,
+                      NodeBatch& batch, const Leaves& leaves) {
+    if (end - begin <= frame.leafRecords || level >= frame.keyLevels) return makeLeaf(frame, from, begin, end, level);
+    std::vector<PendingNode> children;
+    children.reserve(8);
+    const uint32_t shift = frame.shiftOf(level + 1);
+    for (uint64_t octant = 0; octant < 8 && begin < end; ++octant) {
+        const auto first = from.key.begin() + static_cast<ptrdiff_t>(begin),
+                   last = from.key.begin() + static_cast<ptrdiff_t>(end);
+        const auto split = std::partition_point(first, last, [&](uint64_t k) { return (k >> shift & 7u) <= octant; });
+        const auto next = static_cast<size_t>(split - from.key.begin());
+        if (next == begin) continue;
+        children.push_back(subtreeOf(frame, from, begin, next, level + 1, batch, leaves));
+        begin = next;
+    }
+    return makeParent(frame, children, batch, &leaves);
+}
+
+}  // namespace
+
+PendingNode makeSubtree(const Frame& frame, SortedPoints& from, size_t begin, size_t end, uint32_t level,
+                        NodeBatch& batch) {
+    Leaves leaves{from.points, std::vector<glm::vec3>(from.points.size(), glm::vec3(0))};
+    for (size_t i = begin; i < end; ++i)
+        if ((from.points.colour[i] >> 24 & shared::kFlagNoNormal) == 0)
+            leaves.normal[i] = shared::octDecode(from.points.normal[i]);
+    return subtreeOf(frame, from, begin, end, level, batch, leaves);
+}
+
+}  // namespace stipple::lod

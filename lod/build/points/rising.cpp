@@ -1,0 +1,249 @@
+// One coarse record from the finer ones in its cell.
+#include "lod/build/points/rising.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "lod/octahedral.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr uint32_t kDirections = 16;
+constexpr float kColourSpread = 48.0f / 255.0f;  ///< largest tolerated difference from the mean, per channel, sRGB
+
+struct Directions {
+    std::array<float, kDirections> c, s;
+    Directions() {
+        for (uint32_t k = 0; k < kDirections; ++k) {
+            const double a = 6.283185307179586 * k / kDirections;
+            c.at(k) = static_cast<float>(std::cos(a));
+            s.at(k) = static_cast<float>(std::sin(a));
+        }
+    }
+};
+const Directions kPlane;
+
+struct LinearTable {
+    std::array<float, 256> of;
+    LinearTable() {
+        for (uint32_t i = 0; i < 256; ++i) of.at(i) = shared::linearFromSrgb(static_cast<float>(i) / 255.0f);
+    }
+};
+const LinearTable kLinear;
+
+uint32_t byteOf(float linear) {
+    return static_cast<uint32_t>(std::clamp(shared::srgbFromLinear(linear) * 255.0f + 0.5f, 0.0f, 255.0f));
+}
+
+bool hasNormal(const Rising& r) { return (r.flags & shared::kFlagNoNormal) == 0; }
+
+/// Means, ranges and flags of the parts.
+void addUp(std::span<const Rising> parts, Rising& out) {
+    double count = 0;
+    glm::dvec3 sum(0);
+    glm::vec3 colour(0), normal(0), reference(0);
+    bool allNone = true;
+    out.least = parts[0].least;
+    out.greatest = parts[0].greatest;
+    for (const Rising& p : parts) {
+        const double weight = p.count;
+        const auto w = static_cast<float>(p.count);
+        count += weight;
+        sum += weight * (p.mean - parts[0].mean);
+        colour += w * p.meanColour;
+        for (size_t k = 0; k < 3; ++k) {
+            out.least[k] = std::min(out.least[k], p.least[k]);
+            out.greatest[k] = std::max(out.greatest[k], p.greatest[k]);
+        }
+        out.flags =
+            static_cast<uint8_t>(out.flags | (p.flags & (shared::kFlagTwoSided | shared::kFlagEstimatedNormal)));
+        out.code = std::max(out.code, p.code);
+        out.count += p.count;
+        if (!hasNormal(p)) continue;
+        if (allNone) reference = p.normal;
+        allNone = false;
+        // A two-sided normal has no sign of its own: take the one that agrees with the first.
+        const bool flip = (p.flags & shared::kFlagTwoSided) != 0 && glm::dot(p.normal, reference) < 0;
+        normal += flip ? -w * p.meanNormal : w * p.meanNormal;
+    }
+    out.key = parts[0].key;
+    out.first = parts[0].first;
+    out.mean = parts[0].mean + sum / count;
+    out.meanColour = colour / static_cast<float>(count);
+    out.meanNormal = normal / static_cast<float>(count);
+    const float length = glm::length(out.meanNormal);
+    // Opposing normals cancel: the first stands for all (hard case 30).
+    if (!allNone) out.normal = length > 1e-3f ? out.meanNormal / length : reference;
+    if (!allNone && !(length > 1e-3f)) out.meanNormal = 1e-3f * reference;
+    if (allNone) out.flags = static_cast<uint8_t>(out.flags | shared::kFlagNoNormal);
+}
+
+/// Largest difference of a leaf's channel from the mean, sRGB.
+float colourSpread(const Rising& r) {
+    float spread = 0;
+    for (int k = 0; k < 3; ++k) {
+        const auto at = static_cast<size_t>(k);
+        const float mean = shared::srgbFromLinear(r.meanColour[k]);
+        spread = std::max({spread, static_cast<float>(r.greatest.at(at)) / 255.0f - mean,
+                           mean - static_cast<float>(r.least.at(at)) / 255.0f});
+    }
+    return spread;
+}
+
+struct Extent {
+    float reach = 0, inner = 0, above = 0, below = 0;
+};
+
+/// Axes of a disc's plane.
+struct Plane {
+    glm::vec3 n, t1, t2;
+    bool none;
+    explicit Plane(const Rising& out) : none(!hasNormal(out)) {
+        n = none ? glm::vec3(0, 0, 1) : out.normal;
+        t1 = glm::normalize(std::abs(n.x) < 0.7f ? glm::vec3(0, -n.z, n.y) : glm::vec3(-n.z, 0, n.x));
+        t2 = glm::cross(n, t1);
+    }
+};
+
+/// Of the leaves themselves.
+Extent extentOfLeaves(const Leaves& leaves, size_t begin, size_t end, const Rising& out) {
+    const Plane plane(out);
+    const glm::vec3 n = plane.n, t1 = plane.t1, t2 = plane.t2;
+    const bool none = plane.none;
+    constexpr size_t kBlock = 64;
+    alignas(64) float us[kBlock], vs[kBlock], insides[kBlock];
+    alignas(64) std::array<float, kDirections> extent{};
+    extent.fill(-1e30f);
+    Extent e;
+    e.above = e.below = -1e30f;
+    for (size_t first = begin; first < end; first += kBlock) {
+        const size_t count = std::min(kBlock, end - first);
+        for (size_t k = 0; k < count; ++k) {
+            const size_t i = first + k;
+            const glm::vec3 d(leaves.points.at(i) - out.place);
+            const float radius = leaves.points.radius[i];
+            const float u = glm::dot(d, t1), v = glm::dot(d, t2), w = none ? 0.0f : glm::dot(d, n);
+            const float along = glm::dot(n, leaves.normal[i]);
+            const float rise = radius * std::sqrt(std::max(0.0f, 1.0f - along * along));
+            e.above = std::max(e.above, w + rise);
+            e.below = std::max(e.below, rise - w);
+            const float distance = none ? glm::length(d) : std::sqrt(u * u + v * v);
+            e.reach = std::max(e.reach, distance + radius);
+            us[k] = u;
+            vs[k] = v;
+            insides[k] = radius * std::abs(along);
+        }
+        for (size_t k = 0; k < count; ++k)
+            for (uint32_t direction = 0; direction < kDirections; ++direction)
+                extent[direction] =
+                    std::max(extent[direction], us[k] * kPlane.c[direction] + vs[k] * kPlane.s[direction] + insides[k]);
+    }
+    e.inner = *std::min_element(extent.begin(), extent.end());
+    return e;
+}
+
+/// Of the leaves of all parts, against the disc's plane through out.place.
+Extent extentOf(std::span<const Rising> parts, const Rising& out) {
+    const Plane plane(out);
+    const glm::vec3 n = plane.n, t1 = plane.t1, t2 = plane.t2;
+    const bool none = plane.none;
+    alignas(64) std::array<float, kDirections> extent{};
+    extent.fill(-1e30f);
+    Extent e;
+    e.above = e.below = -1e30f;
+    for (const Rising& p : parts) {
+        const glm::vec3 d(p.place - out.place);
+        const float u = glm::dot(d, t1), v = glm::dot(d, t2), w = none ? 0.0f : glm::dot(d, n);
+        const float along = hasNormal(p) ? glm::dot(n, p.normal) : 0.0f;
+        // A record without a normal is a ball: its rim rises by its whole radius.
+        const float sine = std::sqrt(std::max(0.0f, 1.0f - along * along));
+        const float slab = std::max(p.above, p.below);
+        const float rise = p.radius * sine;
+        e.above = std::max(e.above, w + rise + std::max(p.above * along, -p.below * along));
+        e.below = std::max(e.below, -w + rise + std::max(p.below * along, -p.above * along));
+        const float distance = none ? glm::length(d) + slab : std::sqrt(u * u + v * v) + slab * sine;
+        e.reach = std::max(e.reach, distance + p.radius);
+        // In any direction of the plane the leaves reach at least that far from the part's centre.
+        const float moved = p.count == 1 ? static_cast<float>(glm::length(p.mean - p.place)) : 0.0f;
+        const float inside = std::max(p.inner * std::abs(along) - slab * sine - moved, -p.radius);
+        for (uint32_t k = 0; k < kDirections; ++k)
+            extent[k] = std::max(extent[k], u * kPlane.c[k] + v * kPlane.s[k] + inside);
+    }
+    e.inner = *std::min_element(extent.begin(), extent.end());
+    return e;
+}
+
+}  // namespace
+
+uint32_t radiusCodeUp(double radius, double edge) {
+    radius *= 1 - 2e-7;
+    const double code = std::ceil(255.0 + 16.0 * std::log2(std::max(radius, 1e-300) / edge));
+    auto c = static_cast<uint32_t>(std::clamp(code, 0.0, 255.0));
+    while (c < 255 && static_cast<double>(shared::radiusFraction(c)) * edge < radius) ++c;
+    return c;
+}
+
+Rising risingLeaf(const Points& points, size_t i, uint64_t key) {
+    Rising r;
+    r.first = static_cast<uint32_t>(i);
+    r.key = key;
+    r.count = 1;
+    r.mean = r.place = points.at(i);
+    const uint32_t c = points.colour[i];
+    r.flags = static_cast<uint8_t>(c >> 24);
+    if (hasNormal(r)) r.normal = r.meanNormal = shared::octDecode(points.normal[i]);
+    for (size_t k = 0; k < 3; ++k) {
+        r.least[k] = r.greatest[k] = static_cast<uint8_t>(c >> (8 * k));
+        r.meanColour[static_cast<int>(k)] = kLinear.of[r.least[k]];
+    }
+    r.radius = points.radius[i];
+    r.inner = hasNormal(r) ? r.radius : 0.0f;
+    return r;
+}
+
+Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const Leaves* leaves) {
+    Rising out;
+    addUp(parts, out);
+    const uint32_t normalCode = hasNormal(out) ? roundedNormal(out.normal) : 0;
+    if (hasNormal(out)) out.normal = shared::octDecode(normalCode);
+    // Position: to the nearest step, inside the cluster's own cell.
+    std::array<uint32_t, 3> q{};
+    const uint64_t cell = out.key >> grid.clusterShift;
+    const std::array<uint32_t, 3> index{compactBits(cell), compactBits(cell >> 1), compactBits(cell >> 2)};
+    for (int a = 0; a < 3; ++a) {
+        const auto at = static_cast<size_t>(a);
+        const uint32_t first = (index[at] & (grid.cellsAcross - 1)) * grid.cellSteps;
+        const double wanted = std::floor((out.mean[a] - grid.base[a]) / grid.step + 0.5);
+        q[at] = static_cast<uint32_t>(std::clamp(wanted, double(first), double(first + grid.cellSteps - 1)));
+        out.place[a] = grid.base[a] + grid.step * q[at];
+    }
+    const Extent x = leaves != nullptr ? extentOfLeaves(*leaves, out.first, size_t{out.first} + out.count, out)
+                                       : extentOf(parts, out);
+    const uint32_t radiusCode = radiusCodeUp(std::max(static_cast<double>(x.reach) * (1 + 1e-6), 0.5), grid.edge);
+    const double radius = static_cast<double>(shared::radiusFraction(radiusCode)) * grid.edge;
+    out.radius = static_cast<float>(radius);
+    out.inner = x.inner;
+    double error = 0;
+    if (hasNormal(out)) {
+        out.above = x.above * (1 + 1e-5f);
+        out.below = x.below * (1 + 1e-5f);
+        const double sideways = std::max(0.0, radius - static_cast<double>(x.inner));
+        error = std::hypot(static_cast<double>(std::max(out.above, out.below)), sideways) * (1 + 1e-5);
+    } else {
+        out.inner = 0;
+        error = radius;
+    }
+    if (out.count == 1) {  // the same disc, moved and rounded up
+        out.inner = parts[0].inner;
+        error = glm::length(out.mean - out.place) + radius - static_cast<double>(out.inner);
+    }
+    if (colourSpread(out) > kColourSpread) error = std::max(error, 2 * radius);
+    out.code = std::max(static_cast<uint8_t>(grid.errors.encodeUp(error)), out.code);
+    out.packed = {q[0] | q[1] << 16, q[2] | radiusCode << 16 | uint32_t{out.code} << 24, normalCode,
+                  byteOf(out.meanColour.x) | byteOf(out.meanColour.y) << 8 | byteOf(out.meanColour.z) << 16 |
+                      uint32_t{out.flags} << 24};
+    return out;
+}
+
+}  // namespace stipple::lod

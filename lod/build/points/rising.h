@@ -1,0 +1,27 @@
+// One coarse record from the finer ones in its cell.
+#pragma once
+
+#include "lod/build/points/levels.h"
+
+namespace stipple::lod {
+
+/// Where the records of one inner node may lie.
+struct RecordGrid {
+    glm::dvec3 base{0};         ///< lattice position of coordinate 0
+    double step = 1, edge = 1;  ///< lattice units a step, and of the node's cell
+    uint32_t clusterShift = 0;  ///< key bits below a cluster's cell
+    uint32_t cellsAcross = 1;   ///< clusters along the node's edge
+    uint32_t cellSteps = 1;     ///< steps of one cluster's cell
+    ErrorScale errors;
+};
+
+/// Code of the smallest radius >= `radius` at a node of this edge; but for 2e-7 relative, so that a decoded radius that
+/// was rounded to fp32 gets its own code again.
+uint32_t radiusCodeUp(double radius, double edge);
+
+/// Point i as a record that stands for itself.
+Rising risingLeaf(const Points& points, size_t i, uint64_t key);
+/// `parts`: all records in one cluster's cell, in order. `leaves`: the points below them, where they are at hand.
+Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const Leaves* leaves);
+
+}  // namespace stipple::lod
