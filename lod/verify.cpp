@@ -7,6 +7,7 @@
 
 #include "engine/base/queue.h"
 #include "lod/store.h"
+#include "lod/verify_errors.h"
 
 namespace stipple::lod {
 namespace {
@@ -105,12 +106,16 @@ std::string checkGroup(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
 
 }  // namespace
 
-Result<VerifyReport> verifyStore(const Store& store, Executor& executor) {
+Result<VerifyReport> verifyStore(const Store& store, Executor& executor, uint64_t nodes) {
     const Hierarchy& h = store.hierarchy;
+    const size_t stride = nodes == 0 ? 1 : h.nodes.size() / nodes + 1;
+    const bool isPoints = !h.isMesh() && !h.isLoose();
+    std::atomic<uint64_t> checked{0}, measured{0};
     CompletionQueue<std::pair<size_t, Error>> problems;
     std::atomic<uint64_t> records{0}, leafRecords{0};
-    executor.parallelFor(h.nodes.size(), 1, [&](size_t begin, size_t end) {
-        for (size_t i = begin; i < end; ++i) {
+    executor.parallelFor((h.nodes.size() + stride - 1) / stride, 1, [&](size_t begin, size_t end) {
+        for (size_t i = begin * stride; i < end * stride && i < h.nodes.size(); i += stride) {
+            ++checked;
             const auto chunk = readChunk(store, static_cast<uint32_t>(i), true);
             if (!chunk) {
                 problems.push({i, chunk.error()});
@@ -121,6 +126,13 @@ Result<VerifyReport> verifyStore(const Store& store, Executor& executor) {
                 !text.empty())
                 problems.push({i, Error{ErrorKind::input, std::move(text), fmt::format("{}: node {}", store.path, i),
                                         "this is a fault of the build; please report it with the input"}});
+            if (isPoints && chunk) {
+                const auto worst = measureErrors(store, index, *chunk);
+                if (!worst)
+                    problems.push({i, worst.error()});
+                else
+                    measured += *worst;
+            }
             for (size_t a = 0; a < store.description.attributes.size(); ++a)
                 if (const auto values = readAttribute(store, static_cast<uint32_t>(i), a); !values)
                     problems.push({i, values.error()});
@@ -141,11 +153,11 @@ Result<VerifyReport> verifyStore(const Store& store, Executor& executor) {
         return tl::unexpected(std::min_element(found.begin(), found.end(), [](const auto& a, const auto& b) {
                                   return a.first < b.first;
                               })->second);
-    if (leafRecords != store.description.points)
+    if (stride == 1 && leafRecords != store.description.points)
         return fail(ErrorKind::input,
                     fmt::format("{} leaf records, but {} points", leafRecords.load(), store.description.points),
                     store.path);
-    return VerifyReport{h.nodes.size(), records, leafRecords};
+    return VerifyReport{checked, records, leafRecords, measured};
 }
 
 }  // namespace stipple::lod

@@ -15,9 +15,10 @@ struct Options {
 };
 
 Result<void> run(const Options& o) {
+    catchStopSignals();
     const auto executor = makeTbbExecutor(o.build.threads);
     Result<lod::BuildReport> built = [&] {
-        Progress progress(!o.quiet);
+        Progress progress(!o.quiet, o.json);
         return buildAny(o.inputs, o.output, o.build, *executor, progress);
     }();
     if (!built) return tl::unexpected(built.error());
@@ -36,6 +37,8 @@ Result<void> run(const Options& o) {
                                   {"nodes", r.nodes},
                                   {"records", r.records},
                                   {"notes", r.notes},
+                                  {"temporary_bytes", r.temporaryBytes},
+                                  {"resumed", r.isResumed},
                                   {"content_hash", hexDigits(r.contentHash)}};
         fmt::print("{}\n", j.dump(2));
         return {};

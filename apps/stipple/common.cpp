@@ -29,10 +29,16 @@ int report(const Error& error) {
 
 void BuildOptions::addTo(CLI::App& app) {
     app.add_option("--memory", memory, "memory that the build may use, e.g. 512M or 4G")->capture_default_str();
+    app.add_option("--temp", temp,
+                   "folder for temporary files of a build that does not fit in memory (default: the output's)");
+    app.add_option("--duplicates", duplicates, "points at one place: keep all, or merge them into one")
+        ->check(CLI::IsMember({"keep", "merge"}))
+        ->capture_default_str();
     app.add_option("--threads", threads, "threads (0: all cores)")->check(CLI::Range(0, 1024))->capture_default_str();
     app.add_option("--normals", normals,
-                   "auto: estimate missing normals; keep: only those of the file; none: no normals at all")
-        ->check(CLI::IsMember({"auto", "keep", "none"}))
+                   "auto: estimate missing normals; fine: the same, each point from its own twelve nearest; keep: only "
+                   "those of the file; none: no normals at all")
+        ->check(CLI::IsMember({"auto", "fine", "keep", "none"}))
         ->capture_default_str();
     app.add_option("--radii", radii, "auto: estimate missing radii from the spacing; keep: only those of the file")
         ->check(CLI::IsMember({"auto", "keep"}))
@@ -88,6 +94,10 @@ Result<lod::BuildSettings> BuildOptions::settings() const {
     s.normals = normals == "none"   ? lod::NormalsMode::none
                 : normals == "keep" ? lod::NormalsMode::keep
                                     : lod::NormalsMode::automatic;
+    s.fineNormals = normals == "fine";
+    s.mergeDuplicates = duplicates == "merge";
+    s.tempFolder = temp;
+    s.isStopped = isStopRequested;
     s.estimateRadii = radii != "keep";
     s.skipBad = skipBad;
     s.open = [count = surfels, repairs = repair](const std::string& path, const lod::ReadOptions& o) {

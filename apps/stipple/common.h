@@ -23,7 +23,7 @@ namespace stipple::app {
 int report(const Error& error);
 
 struct BuildOptions {
-    std::string memory = "2G", normals = "auto", radii = "auto", up, attributes = "none";
+    std::string memory = "2G", normals = "auto", radii = "auto", up, attributes = "none", temp, duplicates = "keep";
     int threads = 0;
     bool skipBad = false, onlyPoints = false, repair = false;
     double strandRadius = 0;

@@ -16,7 +16,7 @@ int run(int argc, char** argv) {
         "  stipple build scan.las -o scan.stipple\n"
         "  stipple render scan.stipple -o scan.png --size 1920x1080\n"
         "  stipple view scan.stipple\n"
-        "Exit codes: 0 fine, 2 usage, 3 input, 4 output, 5 device, 6 budget.");
+        "Exit codes: 0 fine, 2 usage, 3 input, 4 output, 5 device, 6 budget, 7 interrupted.");
     bool version = false;
     app.add_flag("--version", version, "print version, backends and devices");
     int status = 0;

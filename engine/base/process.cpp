@@ -6,8 +6,10 @@
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
 #include <cctype>
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <ctime>
 #include <fstream>
@@ -26,6 +28,24 @@ void releaseFreeMemory() {
     malloc_trim(0);
 #endif
 }
+
+namespace {
+
+std::atomic<bool> stopRequested{false};
+static_assert(std::atomic<bool>::is_always_lock_free);  // a signal handler may touch it
+
+extern "C" void requestStop(int signal) {
+    stopRequested = true;
+    std::signal(signal, SIG_DFL);
+}
+
+}  // namespace
+
+void catchStopSignals() {
+    std::signal(SIGINT, requestStop);
+    std::signal(SIGTERM, requestStop);
+}
+bool isStopRequested() { return stopRequested; }
 
 double millisecondsSinceProcessStart() {
     // Field 22 of /proc/self/stat: start time after boot, in clock ticks. The name (field 2) may hold spaces.

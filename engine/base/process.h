@@ -12,6 +12,9 @@ void releaseFreeMemory();
 /// Milliseconds since the kernel started this process (10 ms resolution at worst, Linux), so that "first image" counts
 /// the loading of libraries too.
 double millisecondsSinceProcessStart();
+/// From now on Ctrl-C and SIGTERM ask a long job to stop cleanly; a second one ends the program at once.
+void catchStopSignals();
+bool isStopRequested();
 /// Monotonic seconds, for intervals.
 double nowSeconds();
 /// "1.5 GiB", "312 B".

@@ -9,8 +9,8 @@
 
 namespace stipple {
 
-Progress::Progress(bool enabled)
-    : enabled_(enabled), terminal_(::isatty(STDERR_FILENO) != 0), startSeconds_(nowSeconds()) {
+Progress::Progress(bool enabled, bool json)
+    : enabled_(enabled), terminal_(!json && ::isatty(STDERR_FILENO) != 0), startSeconds_(nowSeconds()) {
     lastPrintSeconds_ = startSeconds_;
 }
 
@@ -41,16 +41,19 @@ void Progress::update(const std::string& stage, uint64_t done, uint64_t total) {
     const double rate = elapsed > 0 ? static_cast<double>(done) / elapsed : 0;
     const double left = fraction > 0 ? elapsed * (1 - fraction) / fraction : 0;
     if (terminal_) {
-        fmt::print(stderr, "\r\033[K{} {:3.0f} %  {:.2f} M/s  {}  {:.0f} s left", stage, 100 * fraction, rate * 1e-6,
-                   humanBytes(peakRssBytes()), left);
+        constexpr int kBar = 24;
+        const int full = static_cast<int>(fraction * kBar + 0.5);
+        fmt::print(stderr, "\r\033[K{:<10} [{:#<{}}{:<{}}] {:3.0f} %  {:.2f} M/s  {}{}  {:.0f} s left", stage, "", full,
+                   "", kBar - full, 100 * fraction, rate * 1e-6, humanBytes(peakRssBytes()),
+                   temporaryBytes_ > 0 ? fmt::format(" + {} on disk", humanBytes(temporaryBytes_)) : "", left);
         std::fflush(stderr);
         dirty_ = true;
     } else {
         fmt::print(
             stderr,
             "{{\"progress\": \"{}\", \"done\": {}, \"total\": {}, \"per_second\": {:.0f}, \"peak_rss_bytes\": {}, "
-            "\"seconds\": {:.1f}, \"seconds_left\": {:.1f}}}\n",
-            stage, done, total, rate, peakRssBytes(), now - startSeconds_, left);
+            "\"temporary_bytes\": {}, \"seconds\": {:.1f}, \"seconds_left\": {:.1f}}}\n",
+            stage, done, total, rate, peakRssBytes(), temporaryBytes_.load(), now - startSeconds_, left);
     }
 }
 

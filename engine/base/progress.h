@@ -1,6 +1,7 @@
 // Progress of a long job: a line that rewrites itself on a terminal, one JSON line a second when piped.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <mutex>
 #include <string>
@@ -10,7 +11,8 @@ namespace stipple {
 class Progress {
   public:
     /// `enabled` false: says nothing (library use, tests).
-    explicit Progress(bool enabled);
+    /// `json`: JSON lines on a terminal too.
+    explicit Progress(bool enabled, bool json = false);
     ~Progress();
     Progress(const Progress&) = delete;
     Progress& operator=(const Progress&) = delete;
@@ -20,9 +22,12 @@ class Progress {
 
     /// A line that stays.
     void say(const std::string& line);
+    /// Bytes of temporary files, to be shown with the rest.
+    void setTemporaryBytes(uint64_t bytes) { temporaryBytes_ = bytes; }
 
   private:
     std::mutex mutex_;
+    std::atomic<uint64_t> temporaryBytes_{0};
     bool enabled_, terminal_, dirty_ = false;
     double startSeconds_, stageSeconds_ = 0, lastPrintSeconds_ = 0;
     std::string stage_;

@@ -1,6 +1,7 @@
 // Bytes that several threads append to, in memory or in a file.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <mutex>
 #include <string>
@@ -21,8 +22,10 @@ class Spill {
     /// From several threads; what one call brings stays together.
     Result<void> append(const std::vector<uint8_t>& bytes);
 
-    // When no thread appends any more:
+    /// So far.
     uint64_t bytes() const { return bytes_; }
+
+    // When no thread appends any more:
     /// Everything. In memory it is gone afterwards.
     Result<std::vector<uint8_t>> take();
     /// A part of it; nothing goes.
@@ -39,7 +42,8 @@ class Spill {
     std::string path_;
     std::mutex mutex_;
     std::vector<uint8_t> memory_;
-    uint64_t bytes_ = 0, hash_ = 0;
+    std::atomic<uint64_t> bytes_{0};
+    uint64_t hash_ = 0;
     bool isSealed_ = false;
 };
 

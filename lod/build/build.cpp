@@ -20,7 +20,8 @@
 namespace stipple::lod {
 namespace {
 
-constexpr uint64_t kBuildVersion = 1;  ///< of what the same input gives: an interrupted build of another is refused
+constexpr uint64_t kVerifiedNodes = 512;  ///< at the end of a build; `info --verify` checks all
+constexpr uint64_t kBuildVersion = 1;     ///< of what the same input gives: an interrupted build of another is refused
 
 /// The axis of the format or of the settings; away from the Earth's centre for coordinates that are relative to it.
 glm::dvec3 upOf(const PointInput& input, const BuildSettings& settings, const StoreDescription& description) {
@@ -99,9 +100,10 @@ class PointBuild {
         const auto bucketOf = [&](uint64_t bytes) {
             return std::min<uint64_t>(bytes / ((workers + 1) * pointBytes()), uint64_t{1} << 20);
         };
-        memory_.isOnDisk = all + all / 8 + (workers + 1) * kAtomPoints * pointBytes() > room && small > room + fixed;
-        memory_.bufferBytes = memory_.isOnDisk ? room / 4 : room / 8;
-        memory_.bucketPoints = bucketOf(memory_.isOnDisk ? room * 3 / 4 : room - std::min(room, all + all / 8));
+        // (Half of the memory at most: what neighbours see, buffers and the allocator's own losses come on top.)
+        memory_.isOnDisk = 2 * all + (workers + 1) * kAtomPoints * pointBytes() > room && small > room + fixed;
+        memory_.bufferBytes = std::min<uint64_t>(room / 8, uint64_t{64} << 20);
+        memory_.bucketPoints = bucketOf(memory_.isOnDisk ? room / 2 : room / 4);
         // Enough of them for all threads, but none smaller than an atom.
         memory_.bucketPoints =
             std::max<uint64_t>(std::min<uint64_t>(memory_.bucketPoints, n / (6 * workers)), kAtomPoints);
@@ -158,14 +160,20 @@ class PointBuild {
         STIPPLE_ASSIGN(rounding_, input_.read(executor_, workers_, progress_, "distribute",
                                               [&](int worker, const Points& block) -> Result<void> {
                                                   STIPPLE_TRY(distributor.add(worker, block));
+                                                  if (journal_) progress_.setTemporaryBytes(temporaryBytes());
                                                   return checkStopped();
                                               }));
         STIPPLE_TRY(distributor.flush());
-        for (const auto& bucket : buckets_) report_.temporaryBytes += journal_ ? bucket->bytes() : 0;
+        report_.temporaryBytes = journal_ ? temporaryBytes() : 0;
         clock_.ends("distribute");
         return journal_ ? saveDistribution() : Result<void>();
     }
 
+    uint64_t temporaryBytes() const {
+        uint64_t sum = 0;
+        for (const auto& bucket : buckets_) sum += bucket->bytes();
+        return sum;
+    }
     bool wantsEstimates() const { return settings_.estimateRadii || settings_.normals == NormalsMode::automatic; }
 
     /// Before anything is written: is there room?
@@ -439,7 +447,7 @@ class PointBuild {
         STIPPLE_TRY(writer_->finish(hierarchy, description_));
         clock_.ends("write");
         STIPPLE_ASSIGN(const Store store, openStore(writer_->temporaryPath()));
-        STIPPLE_TRY(verifyStore(store, executor_));
+        STIPPLE_TRY(verifyStore(store, executor_, kVerifiedNodes));
         clock_.ends("verify");
         report_.bytesOut = writer_->bytes();
         STIPPLE_TRY(writer_->commit());

@@ -66,23 +66,33 @@ BucketPlan planBuckets(const Frame& frame, const CellTree& tree, uint64_t most) 
         points += atom.count;
         for (; cell < end; ++cell, ++bucket.cells) plan.ofCell[cell] = static_cast<uint32_t>(plan.buckets.size() - 1);
     }
-    // Beside which cells does another bucket begin? Asked of places round the cell as close together as the finest
-    // cells, on its surface: but not more than 16 along an edge, which finds every neighbour of a 16th of its size;
-    // a finer neighbour marks both.
+    // Beside which cells does another bucket begin? Buckets are runs of cells, so the first and the last cell of a
+    // neighbouring place of the same size tell.
     plan.isBorder.assign(cells.size(), 0);
     for (size_t i = 0; i < cells.size(); ++i) {
         const auto corner = cornerOf(frame, cells[i].key);
-        const auto edge = static_cast<int64_t>(frame.cellSize(cells[i].level));
+        const auto edge = static_cast<int64_t>(frame.cellSize(cells[i].level)), root = int64_t{1} << frame.rootLog2;
+        const uint32_t shift = frame.shiftOf(cells[i].level);
         for (int64_t k = 0; k < 27; ++k) {
-            const std::array<int64_t, 3> step{k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1};
-            std::array<int64_t, 3> p{};
-            for (size_t a = 0; a < 3; ++a) p[a] = corner[a] + (step[a] < 0 ? -1 : step[a] > 0 ? edge : edge / 2);
-            const uint32_t other = cellAt(frame, tree, p);
-            if (other == CellTree::kNone || plan.ofCell[other] == plan.ofCell[i]) continue;
-            plan.isBorder[i] = plan.isBorder[other] = 1;
+            const std::array<int64_t, 3> p{corner[0] + (k % 3 - 1) * edge, corner[1] + (k / 3 % 3 - 1) * edge,
+                                           corner[2] + (k / 9 - 1) * edge};
+            if (std::any_of(p.begin(), p.end(), [&](int64_t v) { return v < 0 || v >= root; })) continue;
+            const uint64_t key =
+                frame.keyOf(static_cast<uint32_t>(p[0]), static_cast<uint32_t>(p[1]), static_cast<uint32_t>(p[2]));
+            const auto first = std::partition_point(cells.begin(), cells.end(),
+                                                    [&](const Cell& c) { return c.key >> shift < key >> shift; });
+            const auto end =
+                std::partition_point(first, cells.end(), [&](const Cell& c) { return c.key >> shift == key >> shift; });
+            const auto isOther = [&](size_t other) { return plan.ofCell[other] != plan.ofCell[i]; };
+            if (first != end) {
+                if (isOther(static_cast<size_t>(first - cells.begin())) ||
+                    isOther(static_cast<size_t>(end - cells.begin()) - 1))
+                    plan.isBorder[i] = 1;
+            } else if (const uint32_t larger = tree.cellOf(key); larger != CellTree::kNone && isOther(larger)) {
+                plan.isBorder[i] = 1;
+            }
         }
     }
-    if (tree.deepestLevel() > tree.firstLevel()) plan.isBorder.assign(cells.size(), 1);  // sizes differ: any may be
     return plan;
 }
 
@@ -172,8 +182,10 @@ Distributor::Distributor(const Frame& frame, const CellTree& tree, const BucketP
 Result<void> Distributor::put(int worker, uint32_t bucket, int kind, const uint8_t* bytes, size_t count) {
     std::vector<uint8_t>& buffer = buffers_[static_cast<size_t>(worker)][2 * bucket + static_cast<size_t>(kind)];
     if (buffer.capacity() == 0) buffer.reserve(bufferBytes_);
-    buffer.insert(buffer.end(), bytes, bytes + count);
-    if (buffer.size() + 256 < bufferBytes_) return {};
+    const size_t at = buffer.size();
+    buffer.resize(at + count);
+    std::memcpy(buffer.data() + at, bytes, count);
+    if (at + 2 * count <= bufferBytes_) return {};
     STIPPLE_TRY((kind == 0 ? buckets_[bucket]->points : buckets_[bucket]->ghosts).append(buffer));
     buffer.clear();
     return {};
@@ -213,14 +225,18 @@ void Distributor::ghosts(uint32_t cell, uint32_t x, uint32_t y, uint32_t z, std:
     for (const uint32_t level : levels_) {
         if (level < own) continue;
         // A cell of this size (or, at the point's own, a larger one) within a quarter of it holds one of these places.
-        const int64_t reach = (int64_t{1} << (frame_.rootLog2 - level)) / 4;
-        const int64_t inside = (int64_t{1} << (frame_.rootLog2 - level)) - 1;
-        std::array<std::array<bool, 3>, 3> leaves{};  // per axis: does a step of -reach, 0, +reach change the cell?
+        const int64_t size = int64_t{1} << (frame_.rootLog2 - level), reach = size / 4,
+                      ownSize = int64_t{1} << (frame_.rootLog2 - own);
         const std::array<int64_t, 3> p{x, y, z};
+        std::array<std::array<bool, 3>, 3>
+            leaves{};  // per axis: does -reach, 0, +reach lead out of a cell of this size?
+        bool isNear = false;
         for (size_t a = 0; a < 3; ++a) {
-            const int64_t local = p[a] & inside;
-            leaves[a] = {local<reach, true, local + reach> inside};
+            const int64_t local = p[a] & (size - 1), inOwn = p[a] & (ownSize - 1);
+            leaves[a] = {local < reach, true, local + reach >= size};
+            isNear = isNear || inOwn < reach || inOwn + reach >= ownSize;
         }
+        if (!isNear) return;  // nor is it within less
         for (size_t k = 0; k < 27; ++k) {
             const std::array<size_t, 3> step{k % 3, k / 3 % 3, k / 9};
             if (k == 13 || !leaves[0][step[0]] || !leaves[1][step[1]] || !leaves[2][step[2]]) continue;

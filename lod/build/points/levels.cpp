@@ -179,8 +179,7 @@ void innerSphere(const Frame& frame, std::span<const PendingNode> children, Pend
     for (const PendingNode& c : children)
         node.radius = std::max(node.radius, glm::length(c.node.centre - node.centre) + c.node.radius);
     for (const Rising& r : parent.records) {
-        const double reach =
-            frame.cellSize(node.level) * static_cast<double>(shared::radiusFraction(recordRadiusCode(r.packed)));
+        const double reach = radiusOf(recordRadiusCode(r.packed), frame.cellSize(node.level));
         node.radius = std::max(node.radius, glm::length(r.place - node.centre) + reach);
     }
     node.radius *= 1 + 1e-6;
@@ -206,7 +205,7 @@ PendingNode makeLeaf(const Frame& frame, SortedPoints& from, size_t begin, size_
     const double edge = frame.cellSize(level);
     for (size_t i = begin; i < end; ++i) {
         const uint32_t code = radiusCodeUp(static_cast<double>(from.points.radius[i]), edge);
-        from.points.radius[i] = static_cast<float>(static_cast<double>(shared::radiusFraction(code)) * edge);
+        from.points.radius[i] = static_cast<float>(radiusOf(code, edge));
     }
     out.firstPoint = static_cast<uint32_t>(begin);
     const auto copy = [&](auto& to, const auto& values) {

@@ -32,6 +32,14 @@ struct LinearTable {
 };
 const LinearTable kLinear;
 
+struct RadiusTable {
+    std::array<double, 256> of;
+    RadiusTable() {
+        for (uint32_t c = 0; c < 256; ++c) of.at(c) = static_cast<double>(shared::radiusFraction(c));
+    }
+};
+const RadiusTable kRadii;
+
 uint32_t byteOf(float linear) {
     return static_cast<uint32_t>(std::clamp(shared::srgbFromLinear(linear) * 255.0f + 0.5f, 0.0f, 255.0f));
 }
@@ -177,12 +185,17 @@ Extent extentOf(std::span<const Rising> parts, const Rising& out) {
 }  // namespace
 
 uint32_t radiusCodeUp(double radius, double edge) {
-    radius *= 1 - 2e-7;
-    const double code = std::ceil(255.0 + 16.0 * std::log2(std::max(radius, 1e-300) / edge));
-    auto c = static_cast<uint32_t>(std::clamp(code, 0.0, 255.0));
-    while (c < 255 && static_cast<double>(shared::radiusFraction(c)) * edge < radius) ++c;
+    const double share = radius * (1 - 2e-7) / edge;
+    // 16 codes an octave; the table has the last word.
+    int exponent = 0;
+    const double mantissa = std::frexp(std::max(share, 1e-300), &exponent);  // 1/2 to 1
+    const double guess = 255.0 + 16.0 * (exponent - 1) + 16.0 * (2 * mantissa - 1);
+    auto c = static_cast<uint32_t>(std::clamp(guess, 0.0, 255.0));
+    while (c > 0 && kRadii.of[c - 1] >= share) --c;
+    while (c < 255 && kRadii.of[c] < share) ++c;
     return c;
 }
+double radiusOf(uint32_t code, double edge) { return kRadii.of.at(code) * edge; }
 
 Rising risingLeaf(const Points& points, size_t i, uint64_t key) {
     Rising r;
@@ -221,7 +234,7 @@ Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const 
     const Extent x = leaves != nullptr ? extentOfLeaves(*leaves, out.first, size_t{out.first} + out.count, out)
                                        : extentOf(parts, out);
     const uint32_t radiusCode = radiusCodeUp(std::max(static_cast<double>(x.reach) * (1 + 1e-6), 0.5), grid.edge);
-    const double radius = static_cast<double>(shared::radiusFraction(radiusCode)) * grid.edge;
+    const double radius = radiusOf(radiusCode, grid.edge);
     out.radius = static_cast<float>(radius);
     out.inner = x.inner;
     double error = 0;

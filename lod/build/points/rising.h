@@ -18,6 +18,7 @@ struct RecordGrid {
 /// Code of the smallest radius >= `radius` at a node of this edge; but for 2e-7 relative, so that a decoded radius that
 /// was rounded to fp32 gets its own code again.
 uint32_t radiusCodeUp(double radius, double edge);
+double radiusOf(uint32_t code, double edge);
 
 /// Point i as a record that stands for itself.
 Rising risingLeaf(const Points& points, size_t i, uint64_t key);

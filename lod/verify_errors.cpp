@@ -1,0 +1,87 @@
+#include "lod/verify_errors.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace stipple::lod {
+namespace {
+
+constexpr uint32_t kClusterLevels = 6;  ///< a record stands for a cell that many levels below its node's
+
+struct Disc {
+    std::array<uint64_t, 3> cell;  ///< of the clusters
+    glm::dvec3 place, normal;
+    double radius;
+    uint32_t code;
+    bool hasNormal;
+};
+
+std::vector<Disc> discsOf(const Hierarchy& h, const Node& node, const Chunk& chunk, double clusterSize) {
+    std::vector<Disc> discs;
+    const double step = std::exp2(node.stepShift), edge = h.cellSize(node);
+    const glm::dvec3 base = h.recordOrigin(node);
+    for (size_t i = 0; i < chunk.records.size(); ++i) {
+        const shared::PointRecord& r = chunk.records[i];
+        Disc d{};
+        d.place = base + step * glm::dvec3(shared::recordX(r), shared::recordY(r), shared::recordZ(r));
+        if (!chunk.lowBits.empty())  // the exact place instead of the middle of its step
+            d.place +=
+                glm::dvec3(chunk.lowBits[3 * i], chunk.lowBits[3 * i + 1], chunk.lowBits[3 * i + 2]) - 0.5 * (step - 1);
+        d.normal = glm::dvec3(glm::vec3(shared::octDecode(r.normal)));
+        d.hasNormal = (shared::recordFlags(r) & shared::kFlagNoNormal) == 0;
+        d.radius = edge * static_cast<double>(shared::radiusFraction(shared::recordRadiusCode(r)));
+        d.code = shared::recordErrorCode(r);
+        for (int a = 0; a < 3; ++a)
+            d.cell.at(static_cast<size_t>(a)) = static_cast<uint64_t>(std::max(d.place[a], 0.0) / clusterSize);
+        discs.push_back(d);
+    }
+    return discs;
+}
+
+/// Largest distance of a place of `leaf` from the disc `record`: heights over its plane are exact, sideways at most.
+double distanceOf(const Disc& record, const Disc& leaf) {
+    const glm::dvec3 d = leaf.place - record.place;
+    if (!record.hasNormal) return std::max(0.0, glm::length(d) + leaf.radius - record.radius);
+    const double along = leaf.hasNormal ? std::abs(glm::dot(record.normal, leaf.normal)) : 0.0;
+    const double height = glm::dot(d, record.normal);
+    const double rise = leaf.radius * std::sqrt(std::max(0.0, 1 - along * along));
+    const double sideways = std::max(0.0, glm::length(d - height * record.normal) - record.radius);
+    return std::hypot(std::abs(height) + rise, sideways);
+}
+
+}  // namespace
+
+Result<uint64_t> measureErrors(const Store& store, uint32_t index, const Chunk& chunk) {
+    const Hierarchy& h = store.hierarchy;
+    const Node& node = h.nodes[index];
+    const auto children = static_cast<uint32_t>(__builtin_popcount(node.childMask));
+    if (node.isLeaf()) return 0;
+    for (uint32_t c = node.firstChild; c < node.firstChild + children; ++c)
+        if (!h.nodes[c].isLeaf()) return 0;
+    const uint32_t deepest = std::min(h.rootLog2, 21u), level = std::min(node.level + kClusterLevels, deepest);
+    const double clusterSize = std::exp2(static_cast<double>(h.rootLog2) - level);
+    std::vector<Disc> records = discsOf(h, node, chunk, clusterSize);
+    const auto isLess = [](const Disc& a, const Disc& b) { return a.cell < b.cell; };
+    std::sort(records.begin(), records.end(), isLess);
+    for (uint32_t c = node.firstChild; c < node.firstChild + children; ++c) {
+        STIPPLE_ASSIGN(const Chunk leaves, readChunk(store, c, true));
+        for (const Disc& leaf : discsOf(h, h.nodes[c], leaves, clusterSize)) {
+            const auto at = std::lower_bound(records.begin(), records.end(), leaf, isLess);
+            const bool isThere = at != records.end() && at->cell == leaf.cell;
+            const double error = isThere ? h.errors.decode(at->code) : 0;
+            // Discs are rounded to fp32 in between.
+            if (isThere && distanceOf(*at, leaf) <= error * (1 + 1e-5) + 1e-6 * h.cellSize(node)) continue;
+            return fail(ErrorKind::input,
+                        isThere ? fmt::format("a record is {:.6g} lattice units off a leaf, its error says {:.6g}",
+                                              distanceOf(*at, leaf), error)
+                                : "a leaf has no record above it",
+                        fmt::format("{}: node {}", store.path, index),
+                        "this is a fault of the build; please report it with the input");
+        }
+    }
+    return records.size();
+}
+
+}  // namespace stipple::lod

@@ -1,0 +1,13 @@
+// The errors of a store of points, measured again from what the file holds.
+#pragma once
+
+#include "lod/store.h"
+
+namespace stipple::lod {
+
+/// Measures records of an inner node, all whose children are leaves, against the leaf records in their cells: every
+/// place of a leaf's disc has to lie within the record's error of its disc. An error if one does not; else how many
+/// records were measured (0 for other nodes: below those the leaves are many).
+Result<uint64_t> measureErrors(const Store& store, uint32_t node, const Chunk& chunk);
+
+}  // namespace stipple::lod
