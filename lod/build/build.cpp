@@ -133,6 +133,7 @@ class PointBuild {
     // ---- survey, count, distribute ----
 
     Result<void> distribute() {
+        inputIdentity_ = input_.identity();
         STIPPLE_TRY(input_.survey(report_, executor_, progress_));
         clock_.ends("survey");
         const auto& g = input_.greatest;
@@ -164,6 +165,9 @@ class PointBuild {
                                                   return checkStopped();
                                               }));
         STIPPLE_TRY(distributor.flush());
+        if (input_.identity() != inputIdentity_)
+            return fail(ErrorKind::input, "changed while it was read", input_.firstPath(),
+                        "build again when it is complete");
         report_.temporaryBytes = journal_ ? temporaryBytes() : 0;
         clock_.ends("distribute");
         return journal_ ? saveDistribution() : Result<void>();
@@ -473,6 +477,7 @@ class PointBuild {
     std::optional<Journal> journal_;
     Frame frame_;
     double rounding_ = 0;
+    uint64_t inputIdentity_ = 0;
     std::optional<CellTree> tree_;
     BucketPlan plan_;
     Buckets buckets_;

@@ -19,7 +19,7 @@ namespace stipple::lod {
 namespace {
 
 constexpr size_t kBlockPoints = 2048, kNeighbours = 12;
-constexpr uint32_t kMostSplits = 5;
+constexpr uint32_t kMostSplits = 5, kMostInThree = 128;
 constexpr float kSpacings = 1.368f;
 constexpr double kLargestSpacings = 4;
 /// Of loops worth twice the SIMD where the machine has it; the values are the same.
@@ -315,7 +315,9 @@ class Estimator {
         for (size_t z = 0; z < 3; ++z)
             for (size_t y = 0; y < 3; ++y) {  // three cells in x lie side by side
                 const size_t first = at + (z * across + y) * across - (across + 1) * across - 1;
-                for (uint32_t k = firstSeen_[first]; k < firstSeen_[first + 3]; ++k) addToHood(byCell_[k]);
+                const uint32_t begin = firstSeen_[first], end = firstSeen_[first + 3];
+                const uint32_t stride = (end - begin) / kMostInThree + 1;  // many lie at one place
+                for (uint32_t k = begin; k < end; k += stride) addToHood(byCell_[k]);
             }
     }
 
