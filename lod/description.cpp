@@ -91,6 +91,8 @@ json toJson(const StoreDescription& d) {
         {"smallest_disc", d.smallestDisc},
         {"has_normals", d.hasNormals},
         {"materials", materials},
+        {"points_in", d.pointsIn},
+        {"dropped", d.dropped},
         {"source", d.source}};
 }
 
@@ -147,6 +149,8 @@ StoreDescription fromJson(const json& j) {
     d.smallestDisc = j.at("smallest_disc").get<double>();
     d.hasNormals = j.at("has_normals").get<bool>();
     d.source = j.at("source").get<std::string>();
+    d.pointsIn = j.value("points_in", uint64_t{0});
+    d.dropped = j.value("dropped", std::map<std::string, uint64_t>());
     for (const json& m : j.at("materials")) d.materials.push_back(materialFromJson(m));
     return d;
 }

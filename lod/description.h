@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,8 @@ struct StoreDescription {
     double smallestDisc = 0;                ///< world units
     bool hasNormals = false;                ///< from the file or estimated
     std::vector<shared::SurfaceMaterial> materials;  ///< of a mesh store
+    uint64_t pointsIn = 0;                           ///< that the input declares; 0: not told
+    std::map<std::string, uint64_t> dropped;         ///< reason -> points: pointsIn = points + all of these
     std::string source;                              ///< file names of the input, without folders
 };
 

@@ -59,6 +59,8 @@ nlohmann::json storeInfo(const lod::Store& store) {
             {"content_hash", hexDigits(store.contentHash)},
             {"source", d.source},
             {"points", d.points},
+            {"points_in", d.pointsIn},
+            {"dropped", d.dropped},
             {"records", d.records},
             {"nodes", h.nodes.size()},
             {"levels", levels},
@@ -88,13 +90,22 @@ void printStore(const nlohmann::json& j) {
         fmt::print("  materials     {}\n  textures      {} in {} tiles, {}\n", j["materials"].get<uint64_t>(),
                    j["textures"].size(), j["texture_tiles"].get<uint64_t>(),
                    humanBytes(j["texture_bytes"].get<uint64_t>()));
+    if (j["points_in"].get<uint64_t>() > 0) {
+        fmt::print("  points in     {}", j["points_in"].get<uint64_t>());
+        for (const auto& [reason, count] : j["dropped"].items())
+            fmt::print(", dropped {}: {}", count.get<uint64_t>(), reason);
+        fmt::print("\n");
+    }
     fmt::print("  bounds        {} .. {}\n  origin        {}\n", vec(j["min"]), vec(j["max"]), vec(j["origin"]));
     fmt::print("  lattice unit  {:.6g} (coordinates {})\n", j["lattice_unit"].get<double>(),
                j["coordinate_rounding"].get<double>() == 0
                    ? std::string("exact")
                    : fmt::format("rounded by at most {:.3g}", j["coordinate_rounding"].get<double>()));
     fmt::print("  up            {}\n  colour        {}\n  normals       {}\n", vec(j["up"]),
-               j["has_colour"].get<bool>() ? "yes" : "no", j["has_normals"].get<bool>() ? "yes" : "no");
+               j["has_colour"].get<bool>() ? "yes" : "no",
+               j["has_normals"].get<bool>()
+                   ? isMesh || j["primitive"] == "segments" ? "yes" : "yes, stored to 0.12 degrees"
+                   : "no");
     if (!j["crs"].get<std::string>().empty()) fmt::print("  crs           {}\n", j["crs"].get<std::string>());
     for (const auto& a : j["attributes"])
         fmt::print("  attribute     {} ({}, coarse levels: {}), {:.10g} .. {:.10g}\n", a["name"].get<std::string>(),

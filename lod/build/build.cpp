@@ -282,6 +282,7 @@ class PointBuild {
         std::vector<BuiltAtom> atoms;
         ValueRanges ranges;
         uint64_t merged = 0, tooMany = 0;
+        std::map<std::string, double> seconds;  ///< of the thread
     };
 
     Result<void> openWriter() {
@@ -323,11 +324,16 @@ class PointBuild {
     Result<BuiltBucket> buildBucket(size_t index) {
         const BucketPlan::Bucket& bucket = plan_.buckets[index];
         BuiltBucket out;
+        double last = nowSeconds();
+        const auto ends = [&](const char* what) {
+            out.seconds[what] += nowSeconds() - std::exchange(last, nowSeconds());
+        };
         if (buckets_[index]->points.bytes() != bucket.points * layout_.bytes())
             return fail(ErrorKind::input, "changed while it was read", input_.firstPath(),
                         "build again when it is complete");
         STIPPLE_ASSIGN(SortResult sorted, sortBucket(frame_, layout_, buckets_[index]->points,
                                                      settings_.mergeDuplicates, 2 * memory_.bucketPoints));
+        ends("threads: load, sort");
         out.merged = sorted.merged;
         out.tooMany = sorted.tooMany;
         {
@@ -340,6 +346,7 @@ class PointBuild {
             wanted.limitStrays = settings_.estimateRadii && !input_.hasRadius;
             estimate(frame_, *tree_, bucket.firstCell, bucket.cells, wanted, ghosts, sorted.sorted);
         }
+        ends("threads: estimate");
         out.ranges = ValueRanges(frame_, input_.points, description_.up);
         uint64_t number = bucket.firstPoint;
         const std::vector<uint64_t>& keys = sorted.sorted.key;
@@ -355,6 +362,7 @@ class PointBuild {
             number += atom.count;
             begin = end;
         }
+        ends("threads: levels, encode");
         return out;
     }
 
@@ -374,6 +382,8 @@ class PointBuild {
 
     /// In the order of the buckets.
     Result<void> commit(size_t index, BuiltBucket built) {
+        const double begun = nowSeconds();
+        for (const auto& [what, seconds] : built.seconds) report_.stageSeconds[what] += seconds;
         NodeBatch all, between;
         for (BuiltAtom& atom : built.atoms) {
             upper_->closeBefore(atom.root.key, between);
@@ -400,6 +410,7 @@ class PointBuild {
         }
         batches_.push_back(std::move(all));
         done_ += plan_.buckets[index].points;
+        report_.stageSeconds["threads: append"] += nowSeconds() - begun;
         progress_.update("build", done_, input_.points);
         return {};
     }
@@ -446,6 +457,8 @@ class PointBuild {
         if (merged_ > 0) report_.dropped["duplicate"] += merged_;
         if (tooMany_ > 0) report_.dropped[fmt::format("beyond {} at one place", kMostAtOnePlace)] += tooMany_;
         description_.points = input_.points - merged_ - tooMany_;
+        description_.pointsIn = report_.pointsIn;
+        description_.dropped = report_.dropped;
         for (const Node& node : hierarchy.nodes) description_.records += node.records;
         ranges_.describe(frame_, description_);
         STIPPLE_TRY(writer_->finish(hierarchy, description_));
@@ -470,7 +483,7 @@ class PointBuild {
     Progress& progress_;
     PointInput input_;
     BuildReport report_;
-    StageClock clock_;
+    StageClock clock_;  ///< what is not "threads: ..." adds up to the whole
     const int workers_;
     const RecordLayout layout_;
     MemoryPlan memory_;

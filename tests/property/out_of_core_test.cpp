@@ -324,6 +324,8 @@ TEST(OutOfCore, OddCloudsAreBuiltInFull) {
             uint64_t dropped = 0;
             for (const auto& [reason, count] : little.dropped) dropped += count;
             EXPECT_EQ(little.pointsOut + dropped, points.size()) << name;
+            EXPECT_EQ(openStore(folder / "b.stipple")->description.dropped, little.dropped);
+            EXPECT_EQ(openStore(folder / "b.stipple")->description.pointsIn, points.size());
             const auto store = openStore(folder / "b.stipple");
             ASSERT_TRUE(store);
             const auto verified = verifyStore(*store, *executor);
