@@ -9,6 +9,7 @@
 
 #include "engine/base/hash.h"
 #include "engine/base/ordered.h"
+#include "engine/base/queue.h"
 #include "lod/build/points/assemble.h"
 #include "lod/build/points/estimate.h"
 #include "lod/build/points/input.h"
@@ -216,9 +217,15 @@ class PointBuild {
             to.put(count);
         }
         tree_->save(to);
+        CompletionQueue<Error> errors;
+        executor_.parallelFor(buckets_.size(), 1, [&](size_t begin, size_t end) {
+            for (size_t b = begin; b < end; ++b)
+                for (Spill* spill : {&buckets_[b]->points, &buckets_[b]->ghosts})
+                    if (const auto sealed = spill->seal(); !sealed) errors.push(sealed.error());
+        });
+        if (const auto found = errors.takeAll(); !found.empty()) return tl::unexpected(found.front());
         for (const auto& bucket : buckets_)
             for (Spill* spill : {&bucket->points, &bucket->ghosts}) {
-                STIPPLE_TRY(spill->seal());
                 to.put(spill->bytes());
                 to.put(spill->hash());
             }
@@ -316,8 +323,33 @@ class PointBuild {
             batches_.push_back(std::move(batch));
         }
         journal_->forgetEntries();
+        STIPPLE_TRY(checkWritten());
         STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::resume(output_, journal_->partialPath(), written));
         writer_.emplace(std::move(writer));
+        return {};
+    }
+
+    /// Are the chunks that an earlier run wrote still what they were?
+    Result<void> checkWritten() {
+        if (batches_.empty()) return {};
+        STIPPLE_ASSIGN(const InputFile file, InputFile::open(journal_->partialPath()));
+        CompletionQueue<Error> errors;
+        executor_.parallelFor(batches_.size(), 1, [&](size_t begin, size_t end) {
+            std::vector<uint8_t> bytes;
+            for (size_t b = begin; b < end; ++b)
+                for (const NodeBatch::Written& w : batches_[b].nodes) {
+                    bytes.resize(size_t{w.node.chunkBytes} + w.node.attributeBytes);
+                    const auto read = file.readAt(w.node.chunkOffset, bytes.data(), bytes.size());
+                    const bool isSame =
+                        read && hashBytes(bytes.data(), w.node.chunkBytes) == w.node.chunkHash &&
+                        hashBytes(bytes.data() + w.node.chunkBytes, w.node.attributeBytes) == w.node.attributeHash;
+                    if (isSame) continue;
+                    errors.push({ErrorKind::input, "is not what was written", journal_->partialPath(),
+                                 "delete it and the folder " + journal_->folder()});
+                    return;
+                }
+        });
+        if (const auto found = errors.takeAll(); !found.empty()) return tl::unexpected(found.front());
         return {};
     }
 

@@ -178,6 +178,20 @@ TEST(OutOfCore, CarriesOnFromTheJournalAndNotFromTheStart) {
     EXPECT_TRUE(report.isResumed);
     EXPECT_EQ(report.pointsOut, 600'000u);
     EXPECT_TRUE(test::slurp(folder / "a.stipple").substr(4096) == test::slurp(folder / "whole.stipple").substr(4096));
+    // Nor are chunks kept that somebody changed.
+    fs::remove(folder / "a.stipple");
+    int buckets = 0;
+    settings.isStopped = [&] { return fs::exists(folder / "a.stipple.partial") && ++buckets == 3; };
+    ASSERT_FALSE(buildStore({folder / "a.las"}, folder / "a.stipple", settings, *executor, silent));
+    std::string partial = test::slurp(folder / "a.stipple.partial");
+    ASSERT_GT(partial.size(), 10'000u);
+    partial[5000] = static_cast<char>(partial[5000] ^ 1);
+    test::spit(folder / "a.stipple.partial", partial);
+    const auto spoilt = buildStore({folder / "a.las"}, folder / "a.stipple", settings, *executor, silent);
+    ASSERT_FALSE(spoilt);
+    EXPECT_NE(spoilt.error().line().find("is not what was written"), std::string::npos) << spoilt.error().line();
+    fs::remove(folder / "a.stipple.partial");
+    fs::remove_all(folder / "a.stipple.build");
     // A bucket that somebody changed is not built from.
     bool isSpoilt = false;
     settings.isStopped = [&] {

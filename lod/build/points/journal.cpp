@@ -7,8 +7,10 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
+#include <thread>
 
 #include "engine/base/hash.h"
 
@@ -48,7 +50,12 @@ Result<Journal> Journal::open(const std::string& folder, const std::string& outp
         return fail(ErrorKind::output,
                     fmt::format("cannot be written: {}", error ? error.message() : std::strerror(errno)), folder,
                     "name a folder for temporary files with --temp");
-    if (::flock(j.lock_, LOCK_EX | LOCK_NB) != 0)
+    bool isOurs = false;  // a build that was just killed may take a moment to be gone
+    for (int attempt = 0; attempt < 30 && !isOurs; ++attempt) {
+        if (attempt > 0) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        isOurs = ::flock(j.lock_, LOCK_EX | LOCK_NB) == 0;
+    }
+    if (!isOurs)
         return fail(ErrorKind::output, "is in use by another build", folder, "wait for it, or build to another file");
     STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
     std::array<uint64_t, 2> head{};
