@@ -22,7 +22,13 @@ void Progress::say(const std::string& line) {
     if (!enabled_) return;
     const std::lock_guard lock(mutex_);
     if (dirty_ && terminal_) std::fputs("\r\033[K", stderr);
-    fmt::print(stderr, "{}\n", line);
+    if (terminal_) {
+        fmt::print(stderr, "{}\n", line);
+    } else {
+        std::string text;
+        for (const char c : line) text += c == '"' || c == '\\' ? std::string{'\\', c} : std::string{c};
+        fmt::print(stderr, "{{\"note\": \"{}\"}}\n", text);
+    }
     dirty_ = false;
 }
 

@@ -20,7 +20,7 @@ class Progress {
     /// From any thread.
     void update(const std::string& stage, uint64_t done, uint64_t total);
 
-    /// A line that stays.
+    /// A line that stays (a JSON object where the progress is one).
     void say(const std::string& line);
     /// Bytes of temporary files, to be shown with the rest.
     void setTemporaryBytes(uint64_t bytes) { temporaryBytes_ = bytes; }

@@ -56,7 +56,7 @@ class PointBuild {
           report_(std::move(report)),
           clock_(report_),
           workers_(std::max(executor.threads(), 1)),
-          layout_(input_.hasNormal, input_.hasRadius, input_.attributes()) {}
+          layout_(input_.hasColour, input_.hasNormal, input_.hasRadius, input_.attributes()) {}
 
     Result<BuildReport> run() {
         STIPPLE_TRY(planMemory());
@@ -86,9 +86,14 @@ class PointBuild {
 
     Result<void> planMemory() {
         constexpr uint64_t kFixed = uint64_t{72} << 20, kReader = uint64_t{12} << 20;
+        const auto fixedFor = [&](uint64_t threads) { return kFixed + threads * kReader; };
+        const auto leastFor = [&](uint64_t threads) {
+            return fixedFor(threads) + (threads + 1) * kAtomPoints * pointBytes();
+        };
+        // Fewer threads rather than more memory.
+        while (workers_ > 1 && leastFor(static_cast<uint64_t>(workers_)) > settings_.memoryBytes) --workers_;
         const auto workers = static_cast<uint64_t>(workers_);
-        const uint64_t fixed = kFixed + workers * kReader;
-        const uint64_t least = fixed + (workers + 1) * kAtomPoints * pointBytes();
+        const uint64_t fixed = fixedFor(workers), least = leastFor(workers);
         const uint64_t n = input_.declared(), all = n * layout_.bytes();
         // What is small needs no more than its own points.
         const uint64_t small = fixed + all + 2 * n * pointBytes();
@@ -123,6 +128,7 @@ class PointBuild {
                                        settings_.up ? static_cast<int>(*settings_.up) : -1, settings_.leafRecords,
                                        settings_.skipBad, settings_.fineNormals, settings_.mergeDuplicates);
         for (const AttributeInfo& a : input_.attributes()) text += "|" + a.name;
+        text += "|" + std::filesystem::absolute(output_).lexically_normal().string();
         return hashBytes(text.data(), text.size());
     }
     Result<void> checkStopped() const {
@@ -184,7 +190,11 @@ class PointBuild {
     /// Before anything is written: is there room?
     Result<void> announceDisk() {
         if (!journal_) return {};
-        const uint64_t needed = input_.points * layout_.bytes() * 6 / 5;
+        // Points near borders go to neighbours too: rarely all, now and then to more than one.
+        uint64_t atBorders = 0;
+        for (size_t c = 0; c < tree_->cells().size(); ++c)
+            atBorders += wantsEstimates() && plan_.isBorder[c] != 0 ? tree_->cells()[c].count : 0;
+        const uint64_t needed = input_.points * layout_.bytes() + atBorders * RecordLayout::kGhostBytes;
         progress_.say(fmt::format("temporary disk space: up to {} in {}", humanBytes(needed), journal_->folder()));
         struct statvfs disk {};
         if (::statvfs(journal_->folder().c_str(), &disk) != 0) return {};
@@ -516,7 +526,7 @@ class PointBuild {
     PointInput input_;
     BuildReport report_;
     StageClock clock_;  ///< what is not "threads: ..." adds up to the whole
-    const int workers_;
+    int workers_;
     const RecordLayout layout_;
     MemoryPlan memory_;
     std::optional<Journal> journal_;

@@ -59,6 +59,7 @@ TEST(OutOfCore, NeitherMemoryNorThreadsNorTheOrderOfTheInputShow) {
         EXPECT_EQ(buildWith(folder / "a.las", folder / "a.stipple", 2, uint64_t{2} << 30, settings).temporaryBytes, 0u);
         const std::string whole = test::slurp(folder / "a.stipple");
         for (const auto& [threads, memory, name] : {std::tuple{2, littleFor(2), "a"},
+                                                    {16, littleFor(2), "a"},
                                                     {1, littleFor(1), "a"},
                                                     {2, littleFor(2), "b"},
                                                     {5, uint64_t{4} << 30, "b"}}) {
@@ -243,6 +244,25 @@ TEST(OutOfCore, StaysWithinItsMemory) {
         << test::slurp(folder / "err");
     EXPECT_TRUE(test::slurp(folder / "a.stipple") == test::slurp(folder / "b.stipple"));
 #endif
+}
+
+TEST(OutOfCore, PointsWithoutColoursAreTheSameToo) {
+    const test::TempFolder folder;
+    std::string ply =
+        "ply\nformat binary_little_endian 1.0\nelement vertex 700000\nproperty float x\nproperty float "
+        "y\nproperty float z\nend_header\n";
+    Rng rng(3);
+    for (int i = 0; i < 700'000; ++i) {
+        const glm::dvec3 d = glm::normalize(glm::dvec3(rng.normal(), rng.normal(), rng.normal()));
+        const std::array<float, 3> p{float(d.x), float(d.y), float(d.z)};
+        ply.append(reinterpret_cast<const char*>(p.data()), sizeof(p));
+    }
+    test::spit(folder / "a.ply", ply);
+    buildWith(folder / "a.ply", folder / "a.stipple", 2, uint64_t{2} << 30);
+    const BuildReport little = buildWith(folder / "a.ply", folder / "b.stipple", 2, littleFor(2));
+    EXPECT_GT(little.temporaryBytes, 0u);
+    EXPECT_TRUE(test::slurp(folder / "a.stipple") == test::slurp(folder / "b.stipple"));
+    EXPECT_FALSE(openStore(folder / "b.stipple")->description.hasColour);
 }
 
 TEST(OutOfCore, AFullDiskLosesNothing) {

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "shaders/shared/record.h"
+
 namespace stipple::lod {
 namespace {
 
@@ -98,8 +100,11 @@ BucketPlan planBuckets(const Frame& frame, const CellTree& tree, uint64_t most) 
 
 // ---- records ----
 
-RecordLayout::RecordLayout(bool hasNormal, bool hasRadius, const std::vector<AttributeInfo>& attributes)
-    : hasNormal_(hasNormal), hasRadius_(hasRadius), bytes_(16 + (hasNormal ? 4u : 0u) + (hasRadius ? 4u : 0u)) {
+RecordLayout::RecordLayout(bool hasColour, bool hasNormal, bool hasRadius, const std::vector<AttributeInfo>& attributes)
+    : hasWord_(hasColour || hasNormal),
+      hasNormal_(hasNormal),
+      hasRadius_(hasRadius),
+      bytes_(12 + (hasWord_ ? 4u : 0u) + (hasNormal ? 4u : 0u) + (hasRadius ? 4u : 0u)) {
     for (const AttributeInfo& a : attributes) {
         widths_.push_back(bytesOf(a.type));
         bytes_ += widths_.back();
@@ -108,8 +113,9 @@ RecordLayout::RecordLayout(bool hasNormal, bool hasRadius, const std::vector<Att
 
 void RecordLayout::write(const Points& from, size_t i, uint8_t* to) const {
     const std::array<uint32_t, 4> first{from.x[i], from.y[i], from.z[i], from.colour[i]};
-    std::memcpy(to, first.data(), 16);
-    to += 16;
+    const size_t width = hasWord_ ? 16 : 12;
+    std::memcpy(to, first.data(), width);
+    to += width;
     if (hasNormal_) {
         std::memcpy(to, &from.normal[i], 4);
         to += 4;
@@ -131,13 +137,13 @@ void RecordLayout::read(const uint8_t* from, size_t count, Points& to) const {
     to.attributes.resize(widths_.size());
     for (size_t a = 0; a < widths_.size(); ++a) to.attributes[a].resize((before + count) * widths_[a]);
     for (size_t i = before; i < before + count; ++i) {
-        std::array<uint32_t, 4> first{};
-        std::memcpy(first.data(), from, 16);
+        std::array<uint32_t, 4> first{0, 0, 0, kPlainColour | shared::kFlagNoNormal << 24};
+        std::memcpy(first.data(), from, hasWord_ ? 16 : 12);
         to.x[i] = first[0];
         to.y[i] = first[1];
         to.z[i] = first[2];
         to.colour[i] = first[3];
-        from += 16;
+        from += hasWord_ ? 16 : 12;
         if (hasNormal_) {
             std::memcpy(&to.normal[i], from, 4);
             from += 4;

@@ -31,7 +31,8 @@ BucketPlan planBuckets(const Frame& frame, const CellTree& tree, uint64_t most);
 /// How a point travels: bytes of one record.
 class RecordLayout {
   public:
-    RecordLayout(bool hasNormal, bool hasRadius, const std::vector<AttributeInfo>& attributes);
+    /// Without colours and normals all points have one colour word: it does not travel.
+    RecordLayout(bool hasColour, bool hasNormal, bool hasRadius, const std::vector<AttributeInfo>& attributes);
     size_t bytes() const { return bytes_; }
     static constexpr size_t kGhostBytes = 12;
     void write(const Points& from, size_t i, uint8_t* to) const;
@@ -40,7 +41,7 @@ class RecordLayout {
     bool hasNormal() const { return hasNormal_; }
 
   private:
-    bool hasNormal_, hasRadius_;
+    bool hasWord_, hasNormal_, hasRadius_;
     std::vector<size_t> widths_;
     size_t bytes_;
 };
