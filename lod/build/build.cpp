@@ -147,6 +147,8 @@ class PointBuild {
         frame_ = makeFrame(input_.origin, input_.unit, std::max({g[0], g[1], g[2]}), settings_.leafRecords);
         frame_.attributes = input_.attributes();
         tree_.emplace(frame_, input_.points);
+        tree_->expect(input_.sample, input_.sampleShare);
+        input_.sample = {};
         double rounding = 0;
         do {
             STIPPLE_ASSIGN(rounding, input_.read(executor_, workers_, progress_, "count",

@@ -57,7 +57,7 @@ void CellTree::walk(size_t first, uint32_t entries, uint64_t key, uint32_t level
             continue;
         }
         entries_[place] = 0;
-        if (count <= kAtomPoints || steps == 0) continue;
+        if (count <= most_ || steps == 0) continue;
         STIPPLE_CHECK(entries_.size() + (size_t{1} << (3 * steps)) < kBlock, "cells to count");
         entries_[place] = static_cast<uint32_t>(entries_.size()) | kBlock;
         entries_.resize(entries_.size() + (size_t{1} << (3 * steps)), 0);
@@ -66,19 +66,46 @@ void CellTree::walk(size_t first, uint32_t entries, uint64_t key, uint32_t level
     }
 }
 
-bool CellTree::split() {
+bool CellTree::split(uint64_t most) {
     const bool isNeeded =
-        std::any_of(entries_.begin(), entries_.end(), [&](uint32_t e) { return (e & kBlock) == 0 && e > kAtomPoints; });
+        std::any_of(entries_.begin(), entries_.end(), [&](uint32_t e) { return (e & kBlock) == 0 && e > most; });
     if (!isNeeded) return false;
     const std::vector<uint32_t> before = entries_;
     wasSplit_ = false;
+    most_ = most;
     walk(0, 1u << (3 * firstLevel_), 0, firstLevel_, true);
     if (!wasSplit_) entries_ = before;  // only cells of the deepest level are too full
     return wasSplit_;
 }
 
+void CellTree::expect(const Points& sample, uint64_t share) {
+    do count(sample);
+    while (split(kAtomPoints / share));
+    for (uint32_t& e : entries_)
+        if ((e & kBlock) == 0) e = 0;
+}
+
+/// Blocks that hold no more than a cell may become one again; returns what all the entries hold.
+uint64_t CellTree::collapse(size_t first, uint32_t entries, uint32_t level) {
+    uint64_t sum = 0;
+    const uint32_t steps = std::min(kSplitLevels, frame_.shiftOf(level) / 3);
+    for (size_t place = first; place < first + entries; ++place) {
+        if ((entries_[place] & kBlock) == 0) {
+            sum += entries_[place];
+            continue;
+        }
+        const uint64_t below = collapse(entries_[place] & ~kBlock, 1u << (3 * steps), level + steps);
+        if (below <= kAtomPoints) entries_[place] = static_cast<uint32_t>(below);
+        sum += below;
+    }
+    return sum;
+}
+
 void CellTree::finish() {
+    collapse(0, 1u << (3 * firstLevel_), firstLevel_);
     walk(0, 1u << (3 * firstLevel_), 0, firstLevel_, false);
+    deepest_ = firstLevel_;
+    for (const Cell& c : cells_) deepest_ = std::max<uint32_t>(deepest_, c.level);
     std::vector<std::pair<double, uint64_t>> spacings;
     uint64_t all = 0, below = 0;
     for (const Cell& c : cells_) {

@@ -25,10 +25,13 @@ class CellTree {
     /// `points`: about how many there will be.
     CellTree(const Frame& frame, uint64_t points);
 
+    /// Splits where a sample (every `share`-th point) says that it will be needed, which saves counting again. What was
+    /// not needed is taken back in finish(): the sample does not show.
+    void expect(const Points& sample, uint64_t share);
     /// From several threads.
     void count(const Points& block);
     /// Splits what is too full; true if so: count everything once more. Cells of the deepest level stay.
-    bool split();
+    bool split() { return split(kAtomPoints); }
     /// Nothing more to count: numbers the cells that hold points along the Morton curve.
     void finish();
 
@@ -46,6 +49,8 @@ class CellTree {
 
   private:
     static constexpr uint32_t kBlock = 0x80000000u, kSplitLevels = 3;
+    bool split(uint64_t most);
+    uint64_t collapse(size_t first, uint32_t entries, uint32_t level);
     size_t placeOf(uint64_t key) const {
         size_t place = key >> firstShift_;
         for (uint32_t shift = firstShift_; (entries_[place] & kBlock) != 0;) {
@@ -63,6 +68,7 @@ class CellTree {
     std::vector<uint32_t> entries_;  ///< a count (later a cell's number), or kBlock and where its block begins
     std::vector<Cell> cells_;
     bool wasSplit_ = false;
+    uint64_t most_ = kAtomPoints;  ///< of a cell, while splitting
     double largeSpacing_ = 0;
 };
 

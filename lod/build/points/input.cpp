@@ -156,6 +156,8 @@ uint64_t PointInput::identity() const {
 // ---- the survey ----
 
 Result<void> PointInput::survey(BuildReport& report, Executor& executor, Progress& progress) {
+    constexpr uint64_t kSample = 65536;
+    sampleShare = declared_ / kSample + 1;
     std::atomic<bool> stop{false};
     std::atomic<uint64_t> done{0};
     executor.parallelFor(parts_.size(), 1, [&](size_t begin, size_t end) {
@@ -185,7 +187,29 @@ Result<void> PointInput::survey(BuildReport& report, Executor& executor, Progres
                     declared_ == 0 ? "holds no points" : fmt::format("none of its {} points can be used", declared_),
                     firstPath(), "nothing was written");
     findColours();
-    return allLattice_ ? placeIntegers(report) : placeFloats();
+    STIPPLE_TRY(allLattice_ ? placeIntegers(report) : placeFloats());
+    placeSample();
+    return {};
+}
+
+void PointInput::placeSample() {
+    for (Part& part : parts_) {
+        const SourceInfo& info = sources_[part.source].info;
+        for (const glm::dvec3& p : std::exchange(part.sample, {})) {
+            if (part.error || !isFinite(p)) continue;
+            glm::dvec3 q(0);
+            if (allLattice_) {
+                const ToLattice& to = toLattice_[part.source];
+                q = (p * to.ratio + to.shift - least_) / step_;
+            } else {
+                q = ((info.isLattice ? p * info.scale + info.offset : p) - origin) / unit;
+            }
+            q = glm::clamp(glm::round(q), glm::dvec3(0), glm::dvec3(greatest[0], greatest[1], greatest[2]));
+            sample.x.push_back(static_cast<uint32_t>(q.x));
+            sample.y.push_back(static_cast<uint32_t>(q.y));
+            sample.z.push_back(static_cast<uint32_t>(q.z));
+        }
+    }
 }
 
 Result<void> PointInput::surveyPart(Part& part, PointBlock& block) const {
@@ -219,6 +243,8 @@ Result<void> PointInput::surveyPart(Part& part, PointBlock& block) const {
                 part.greatest = glm::max(part.greatest, p);
             }
         surveyColours(block, count, part);
+        for (uint64_t i = (sampleShare - at % sampleShare) % sampleShare; i < count; i += sampleShare)
+            part.sample.push_back(from.info.isLattice ? glm::dvec3(block.lattice[i]) : block.position[i]);
         at += count;
         part.usable = at - part.notFinite;
     }

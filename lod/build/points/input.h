@@ -32,6 +32,8 @@ class PointInput {
     double unit = 1;
     std::array<uint32_t, 3> greatest{};  ///< of the coordinates; the least are 0
     uint64_t points = 0;                 ///< that can be used
+    Points sample;                       ///< places of every sampleShare-th point, about
+    uint64_t sampleShare = 1;
     bool hasColour = false, hasNormal = false, hasRadius = false, isReflectance = false;
     UpAxis up = UpAxis::z;
     Crs crs;
@@ -56,7 +58,7 @@ class PointInput {
         uint32_t colourMax = 0;
         uint64_t firstColour = 0;
         bool hasColour = false, isVaried = false;
-        double rounding = 0;
+        std::vector<glm::dvec3> sample;  ///< as in the file: steps or world units
     };
 
     Result<void> openAll(const std::vector<std::string>& inputs, const BuildSettings& settings, BuildReport& report);
@@ -68,6 +70,7 @@ class PointInput {
     Result<void> placeIntegers(BuildReport& report);
     Result<void> placeFloats();
     void findColours();
+    void placeSample();
     Result<void> readPart(const Part& part, PointBlock& block, Points& points, double& rounding,
                           const std::function<Result<void>(const Points&)>& sink) const;
     void place(const Part& part, const PointBlock& block, size_t count, Points& out, double& rounding) const;
