@@ -45,10 +45,9 @@ struct MemoryPlan {
 
 class PointBuild {
   public:
-    PointBuild(const std::vector<std::string>& inputs, std::string output, const BuildSettings& settings,
-               Executor& executor, Progress& progress, PointInput input, BuildReport report)
-        : inputs_(inputs),
-          output_(std::move(output)),
+    PointBuild(std::string output, const BuildSettings& settings, Executor& executor, Progress& progress,
+               PointInput input, BuildReport report)
+        : output_(std::move(output)),
           settings_(settings),
           executor_(executor),
           progress_(progress),
@@ -323,7 +322,6 @@ class PointBuild {
             from.get(tooMany);
             from.get(batch.nodes);
             from.get(batch.counts);
-            from.get(batch.written);
             ValueRanges ranges(frame_, input_.points, description_.up);
             ranges.load(from);
             upper_->loadChanges(from);
@@ -419,7 +417,6 @@ class PointBuild {
             all.nodes.push_back(w);
         }
         all.counts.insert(all.counts.end(), batch.counts.begin(), batch.counts.end());
-        all.written += batch.written;
         batch = {};
         return {};
     }
@@ -445,7 +442,6 @@ class PointBuild {
             to.put(built.tooMany);
             to.put(all.nodes);
             to.put(all.counts);
-            to.put(all.written);
             built.ranges.save(to);
             upper_->saveChanges(to);
             STIPPLE_TRY(journal_->append(to.bytes()));
@@ -520,7 +516,6 @@ class PointBuild {
         return {};
     }
 
-    const std::vector<std::string>& inputs_;
     const std::string output_;
     const BuildSettings& settings_;
     Executor& executor_;
@@ -554,7 +549,7 @@ Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std
     BuildReport report;
     { STIPPLE_ASSIGN(const StoreWriter writer, StoreWriter::create(output)); }  // an unwritable output is found first
     STIPPLE_ASSIGN(PointInput input, PointInput::open(inputs, settings, report));
-    return PointBuild(inputs, output, settings, executor, progress, std::move(input), std::move(report)).run();
+    return PointBuild(output, settings, executor, progress, std::move(input), std::move(report)).run();
 }
 
 }  // namespace stipple::lod

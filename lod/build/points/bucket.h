@@ -38,7 +38,6 @@ class RecordLayout {
     void write(const Points& from, size_t i, uint8_t* to) const;
     /// Appends records to `to`.
     void read(const uint8_t* from, size_t count, Points& to) const;
-    bool hasNormal() const { return hasNormal_; }
 
   private:
     bool hasWord_, hasNormal_, hasRadius_;

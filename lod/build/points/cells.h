@@ -45,7 +45,6 @@ class CellTree {
     double largeSpacing() const { return largeSpacing_; }
     void save(ByteWriter& to) const;
     void load(ByteReader& from);
-    uint64_t bytes() const { return entries_.size() * sizeof(uint32_t) + cells_.size() * sizeof(Cell); }
 
   private:
     static constexpr uint32_t kBlock = 0x80000000u, kSplitLevels = 3;

@@ -132,16 +132,6 @@ Result<void> PointInput::adopt(PointSource from, const ReadOptions& options, std
     return {};
 }
 
-uint64_t PointInput::inputBytes() const {
-    uint64_t sum = 0;
-    for (const PointSource& s : sources_) {
-        std::error_code error;
-        const uint64_t bytes = std::filesystem::file_size(s.info.path, error);
-        sum += error ? 0 : bytes;
-    }
-    return sum;
-}
-
 uint64_t PointInput::identity() const {
     std::string text;
     for (const PointSource& s : sources_) {

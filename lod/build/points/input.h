@@ -20,7 +20,7 @@ class PointInput {
     uint64_t declared() const { return declared_; }
     const std::vector<AttributeInfo>& attributes() const { return attributes_; }
     const std::string& firstPath() const { return sources_.front().info.path; }
-    uint64_t inputBytes() const;
+
     /// Of names, sizes and times of the files: does a build that was interrupted go on with the same input?
     uint64_t identity() const;
 

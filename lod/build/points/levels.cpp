@@ -166,7 +166,6 @@ void encodeNode(const Frame& frame, PendingNode& pending, NodeBatch& batch) {
     appendCounts(order.parents, batch, written.parentCodes);
     appendCounts(order.own, batch, written.ownCodes);
     batch.nodes.push_back(written);
-    batch.written += count;
     pending = {};
 }
 

@@ -65,7 +65,6 @@ struct NodeBatch {
     std::vector<Written> nodes;
     std::vector<std::array<uint32_t, 2>> counts;  ///< code, records
     std::vector<uint8_t> bytes;                   ///< chunks, each followed by its attribute streams
-    uint64_t written = 0;                         ///< records
 };
 
 /// Points with their normals decoded (zero: none), to measure against.
