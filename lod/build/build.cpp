@@ -207,21 +207,26 @@ class PointBuild {
                     journal_->folder(), "name another folder with --temp, or give more --memory");
     }
 
+    /// What the survey and the count found, in the order in which it lies in the journal.
+    template <typename Visit>
+    void visitFacts(const Visit& visit) {
+        visit(frame_.origin);
+        visit(frame_.unit);
+        visit(frame_.rootLog2);
+        visit(frame_.keyLevels);
+        visit(rounding_);
+        visit(input_.greatest);
+        visit(input_.points);
+        visit(input_.hasColour);
+        visit(memory_.bucketPoints);
+        visit(report_.pointsIn);
+        visit(report_.temporaryBytes);
+        visit(report_.notes);
+    }
+
     Result<void> saveDistribution() {
         ByteWriter to;
-        to.put(frame_.origin);
-        to.put(frame_.unit);
-        to.put(frame_.rootLog2);
-        to.put(frame_.keyLevels);
-        to.put(rounding_);
-        to.put(input_.greatest);
-        to.put(input_.points);
-        to.put(input_.hasColour);
-        to.put(memory_.bucketPoints);
-        to.put(report_.pointsIn);
-        to.put(report_.temporaryBytes);
-        to.put(uint64_t{report_.notes.size()});
-        for (const std::string& note : report_.notes) to.put(note);
+        visitFacts([&](const auto& value) { to.put(value); });
         to.put(uint64_t{report_.dropped.size()});
         for (const auto& [reason, count] : report_.dropped) {
             to.put(reason);
@@ -245,28 +250,13 @@ class PointBuild {
 
     Result<void> restoreDistribution() {
         ByteReader from(journal_->entries().front());
-        glm::dvec3 origin(0);
-        double unit = 1;
-        from.get(origin);
-        from.get(unit);
-        frame_ = makeFrame(origin, unit, 1, settings_.leafRecords);
-        from.get(frame_.rootLog2);
-        from.get(frame_.keyLevels);
+        visitFacts([&](auto& value) { from.get(value); });
+        frame_.leafRecords = settings_.leafRecords;
         frame_.errors = errorsOf(frame_.rootLog2);
         frame_.attributes = input_.attributes();
-        input_.origin = origin;
-        input_.unit = unit;
-        from.get(rounding_);
-        from.get(input_.greatest);
-        from.get(input_.points);
-        from.get(input_.hasColour);
-        from.get(memory_.bucketPoints);
-        from.get(report_.pointsIn);
-        from.get(report_.temporaryBytes);
+        input_.origin = frame_.origin;
+        input_.unit = frame_.unit;
         uint64_t count = 0;
-        from.get(count);
-        report_.notes.resize(std::min<uint64_t>(count, 100'000));
-        for (std::string& note : report_.notes) from.get(note);
         from.get(count);
         for (uint64_t k = 0; k < count && k < 100; ++k) {
             std::string reason;
