@@ -19,7 +19,7 @@
 #include "lod/build/strands/strand_build.h"
 #include "lod/colour.h"
 #include "lod/import/import.h"
-#include "lod/import/ply_mesh.h"
+#include "lod/import/ply/mesh.h"
 #include "lod/import/strands/strand_readers.h"
 #include "lod/nearest.h"
 
@@ -102,16 +102,20 @@ bool holds(const scene::Scene& scene, const scene::Placement& placed, scene::Pri
 }
 
 /// The triangles of a PLY file.
-Result<lod::BuildReport> buildPlyMesh(const std::string& input, const std::string& output, Executor& executor,
-                                      Progress& progress) {
-    lod::PlyMeshNotes notes;
-    STIPPLE_ASSIGN(lod::TriangleMesh mesh, lod::readPlyMesh(input, notes));
-    if (mesh.colour.empty()) mesh.colour.assign(mesh.position.size(), 0xff000000u | lod::kPlainColour);
+Result<lod::BuildReport> buildPlyMesh(const std::string& input, const std::string& output, const BuildOptions& build,
+                                      Executor& executor, Progress& progress) {
+    STIPPLE_ASSIGN(const lod::BuildSettings wanted, build.settings());
+    const auto notes = std::make_shared<lod::PlyMeshNotes>();
+    const std::string folder =
+        wanted.tempFolder.empty() ? fs::absolute(output).parent_path().string() : wanted.tempFolder;
+    STIPPLE_ASSIGN(const lod::MeshSource source, lod::openPlyMesh(input, wanted.memoryBytes / 4, folder, notes));
     scene::Scene plain;
     plain.path = input;
-    STIPPLE_ASSIGN(const lod::MeshBuildSettings settings, meshSettings(plain));
-    STIPPLE_ASSIGN(lod::BuildReport report, lod::buildMeshStore(std::move(mesh), output, settings, executor, progress));
-    if (notes.badFaces > 0) report.dropped["triangles with a corner that is no vertex"] = notes.badFaces;
+    STIPPLE_ASSIGN(lod::MeshBuildSettings settings, meshSettings(plain));
+    settings.limits = wanted;
+    settings.limits.memoryBytes -= wanted.memoryBytes / 4;
+    STIPPLE_ASSIGN(lod::BuildReport report, lod::buildMeshStore(source, output, settings, executor, progress));
+    if (notes->badFaces > 0) report.dropped["triangles with a corner that is no vertex"] = notes->badFaces;
     return report;
 }
 
@@ -166,8 +170,9 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
                             std::vector<render::PlacedStore>& placed) {
     const auto make = [&](const std::vector<scene::Placement>& of) {
         return [&](const std::string& path, Progress& progress) -> Result<lod::BuildReport> {
-            STIPPLE_ASSIGN(const lod::MeshBuildSettings settings, meshSettings(scene));
-            return lod::buildMeshStore(scene::flattenTriangles(scene, of), path, settings, executor, progress);
+            STIPPLE_ASSIGN(lod::MeshBuildSettings settings, meshSettings(scene));
+            STIPPLE_ASSIGN(settings.limits, build.settings());
+            return lod::buildMeshStore(scene::triangleSource(scene, of), path, settings, executor, progress);
         };
     };
     const SharedPlaces places = sharePlaces(scene, scene::PrimitiveKind::triangles);
@@ -361,7 +366,7 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
                                   const BuildOptions& build, Executor& executor, Progress& progress) {
     STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
     STIPPLE_ASSIGN(const bool isPlyMesh, isMeshPly(inputs, build));
-    if (isPlyMesh) return buildPlyMesh(inputs.front(), output, executor, progress);
+    if (isPlyMesh) return buildPlyMesh(inputs.front(), output, build, executor, progress);
     if (inputs.size() == 1 && lod::isStrandFile(inputs[0]))
         return buildStrandFile(inputs[0], output, build, executor, progress);
     if (!isSceneFile(inputs.front()) || build.surfels > 0)
@@ -369,7 +374,7 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
     if (inputs.size() > 1)
         return fail(ErrorKind::usage, "only one scene with meshes can be built at a time", inputs[1]);
     STIPPLE_ASSIGN(scene::Scene scene, scene::readScene(inputs.front(), build.repair));
-    lod::TriangleMesh triangles = scene::flattenTriangles(scene, scene::placements(scene));
+    const lod::MeshSource triangles = scene::triangleSource(scene, scene::placements(scene));
     const auto counted = [&](scene::PrimitiveKind kind) {
         uint64_t sum = 0;
         for (const scene::Placement& p : scene::placements(scene))
@@ -378,20 +383,18 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
         return sum;
     };
     const uint64_t lines = counted(scene::PrimitiveKind::lines) / 2, points = counted(scene::PrimitiveKind::points);
-    if (triangles.indices.empty() && points == 0 && lines > 0)
+    if (triangles.triangles == 0 && points == 0 && lines > 0)
         return buildStrands(scene::flattenStrands(scene, scene::placements(scene)), inputs.front(), output, build,
                             executor, progress);
-    if (triangles.indices.empty()) return lod::buildStore(inputs, output, settings, executor, progress);
+    if (triangles.triangles == 0) return lod::buildStore(inputs, output, settings, executor, progress);
     if (lines + points > 0)
         scene.notes.push_back(fmt::format(
             "a store holds one kind of primitive: {} lines and {} points are left out; view the scene file to see all",
             lines, points));
-    STIPPLE_ASSIGN(const lod::MeshBuildSettings mesh, meshSettings(scene));
-    const std::vector<std::string> notes = scene.notes;
-    scene = {};  // its memory is needed
-    STIPPLE_ASSIGN(lod::BuildReport report,
-                   lod::buildMeshStore(std::move(triangles), output, mesh, executor, progress));
-    report.notes.insert(report.notes.begin(), notes.begin(), notes.end());
+    STIPPLE_ASSIGN(lod::MeshBuildSettings mesh, meshSettings(scene));
+    mesh.limits = settings;
+    STIPPLE_ASSIGN(lod::BuildReport report, lod::buildMeshStore(triangles, output, mesh, executor, progress));
+    report.notes.insert(report.notes.begin(), scene.notes.begin(), scene.notes.end());
     return report;
 }
 
@@ -408,7 +411,7 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
         STIPPLE_ASSIGN(
             std::shared_ptr<const lod::Store> store,
             openCached(inputs, build, "triangles", showProgress, [&](const std::string& path, Progress& progress) {
-                return buildPlyMesh(inputs[0], path, executor, progress);
+                return buildPlyMesh(inputs[0], path, build, executor, progress);
             }));
         scene.placed.push_back({std::move(store), {}, {}});
     } else if (inputs.size() == 1 && lod::isStrandFile(inputs[0])) {

@@ -9,6 +9,8 @@
 #include <cstdio>
 #include <cstring>
 
+#include "engine/base/hash.h"
+
 namespace stipple {
 
 InputFile::InputFile(int descriptor, uint64_t sizeBytes, std::string path)
@@ -166,6 +168,13 @@ Result<void> writeWholeFile(const std::string& path, const void* bytes, size_t c
     STIPPLE_ASSIGN(OutputFile file, OutputFile::create(path));
     STIPPLE_TRY(file.append(bytes, count));
     return file.commit();
+}
+
+uint64_t fileIdentity(const std::string& path) {
+    struct stat info {};
+    if (::stat(path.c_str(), &info) != 0) return 0;
+    const std::string text = fmt::format("{}|{}|{}|{}", path, info.st_size, info.st_mtim.tv_sec, info.st_mtim.tv_nsec);
+    return hashBytes(text.data(), text.size());
 }
 
 }  // namespace stipple

@@ -30,6 +30,9 @@ class InputFile {
     std::string path_;
 };
 
+/// Changes when the file does: of its path, size and time.
+uint64_t fileIdentity(const std::string& path);
+
 /// Writes to "<path>.partial.<pid>", which commit() renames to `path`; without commit() it is removed again.
 class OutputFile {
   public:

@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <optional>
 
+#include "engine/base/hash.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::scene {
@@ -78,39 +81,94 @@ std::vector<Placement> placements(const Scene& scene) {
     return out;
 }
 
-lod::TriangleMesh flattenTriangles(const Scene& scene, const std::vector<Placement>& placed) {
-    lod::TriangleMesh out;
-    for (const Placement& at : placed)
-        for (const Primitive& p : scene.meshes[static_cast<size_t>(at.mesh)].primitives) {
-            if (p.kind != PrimitiveKind::triangles) continue;
-            const glm::dmat3 linear(at.world);
-            // Cofactors turn normals under any scale, flat ones included, and carry the sign of a mirror.
-            const glm::dmat3 forNormals(glm::cross(linear[1], linear[2]), glm::cross(linear[2], linear[0]),
-                                        glm::cross(linear[0], linear[1]));
-            const bool isMirrored = glm::determinant(linear) < 0;
-            const auto base = static_cast<uint32_t>(out.position.size());
-            const uint32_t surface = surfaceOf(scene, p);
-            const TextureUse use =
-                p.material < 0 ? TextureUse{} : leadingUse(scene.materials[static_cast<size_t>(p.material)]);
-            const auto set = static_cast<size_t>(use.uvSet);
-            const bool hasUv = use.uvSet >= 0 && set < p.uv.size() && !p.uv[set].empty();
-            for (size_t i = 0; i < p.position.size(); ++i) {
-                out.position.emplace_back(at.world * glm::dvec4(glm::dvec3(p.position[i]), 1));
-                const glm::dvec3 n = p.normal.empty() ? glm::dvec3(0) : forNormals * glm::dvec3(p.normal[i]);
-                const double length = glm::length(n);
-                const double sign = isMirrored ? -1 : 1;
-                out.normal.emplace_back(length > 0 && std::isfinite(length) ? n * (sign / length) : glm::dvec3(0));
-                out.uv.push_back(hasUv ? glm::vec2(use.transform * glm::vec3(p.uv[set][i], 1)) : glm::vec2(0));
-                out.colour.push_back(p.colour.empty() ? ~0u : packedColour(p.colour[i]));
-                out.surface.push_back(surface);
-            }
-            for (size_t i = 0; i + 3 <= p.indices.size(); i += 3) {
-                out.indices.push_back(base + p.indices[i]);
-                out.indices.push_back(base + p.indices[i + (isMirrored ? 2 : 1)]);
-                out.indices.push_back(base + p.indices[i + (isMirrored ? 1 : 2)]);
-            }
-        }
-    return out;
+namespace {
+
+/// Vertices of one primitive at one place.
+struct PlacedPrimitive {
+    PlacedPrimitive(const Scene& scene, const Placement& at, const Primitive& primitive)
+        : p(primitive),
+          world(at.world),
+          surface(surfaceOf(scene, primitive)),
+          use(primitive.material < 0 ? TextureUse{}
+                                     : leadingUse(scene.materials[static_cast<size_t>(primitive.material)])),
+          set(static_cast<size_t>(use.uvSet)),
+          hasUv(use.uvSet >= 0 && set < p.uv.size() && !p.uv[set].empty()) {
+        const glm::dmat3 linear(at.world);
+        // Cofactors turn normals under any scale, flat ones included, and carry the sign of a mirror.
+        forNormals = glm::dmat3(glm::cross(linear[1], linear[2]), glm::cross(linear[2], linear[0]),
+                                glm::cross(linear[0], linear[1]));
+        isMirrored = glm::determinant(linear) < 0;
+    }
+    void copy(size_t i, lod::TriangleMesh& to) const {
+        to.position.emplace_back(world * glm::dvec4(glm::dvec3(p.position[i]), 1));
+        const glm::dvec3 n = p.normal.empty() ? glm::dvec3(0) : forNormals * glm::dvec3(p.normal[i]);
+        const double length = glm::length(n);
+        const double sign = isMirrored ? -1 : 1;
+        to.normal.emplace_back(length > 0 && std::isfinite(length) ? n * (sign / length) : glm::dvec3(0));
+        to.uv.push_back(hasUv ? glm::vec2(use.transform * glm::vec3(p.uv[set][i], 1)) : glm::vec2(0));
+        to.colour.push_back(p.colour.empty() ? ~0u : packedColour(p.colour[i]));
+        to.surface.push_back(surface);
+    }
+
+    const Primitive& p;
+    glm::dmat4 world;
+    uint32_t surface;
+    TextureUse use;
+    size_t set;
+    bool hasUv, isMirrored = false;
+    glm::dmat3 forNormals{1};
+};
+
+}  // namespace
+
+lod::MeshSource triangleSource(const Scene& scene, std::vector<Placement> placed) {
+    using Use = std::function<Result<void>(const Placement&, const Primitive&)>;
+    const auto forAll = [&scene, placed = std::move(placed)](const Use& use) -> Result<void> {
+        for (const Placement& at : placed)
+            for (const Primitive& p : scene.meshes[static_cast<size_t>(at.mesh)].primitives)
+                if (p.kind == PrimitiveKind::triangles && p.indices.size() >= 3) STIPPLE_TRY(use(at, p));
+        return {};
+    };
+    lod::MeshSource source;
+    static_cast<void>(forAll([&](const Placement&, const Primitive& p) -> Result<void> {
+        source.triangles += p.indices.size() / 3;
+        return {};
+    }));
+    source.identity = [forAll] {
+        uint64_t hash = 0;
+        static_cast<void>(forAll([&](const Placement& at, const Primitive& p) -> Result<void> {
+            hash = hashBytes(&at.world, sizeof(at.world), hash);
+            hash = hashBytes(p.position.data(), p.position.size() * sizeof(p.position[0]), hash);
+            hash = hashBytes(p.indices.data(), p.indices.size() * sizeof(p.indices[0]), hash);
+            return {};
+        }));
+        return hash;
+    };
+    source.survey = [forAll]() -> Result<lod::MeshSource::Bounds> {
+        lod::MeshSource::Bounds bounds;
+        STIPPLE_TRY(forAll([&](const Placement& at, const Primitive& p) -> Result<void> {
+            for (const auto& q : p.position) bounds.add(glm::dvec3(at.world * glm::dvec4(glm::dvec3(q), 1)));
+            return {};
+        }));
+        return bounds;
+    };
+    source.read = [&scene, forAll](const lod::MeshSource::Take& take) -> Result<void> {
+        std::optional<PlacedPrimitive> now;
+        uint64_t first = 0;
+        lod::BlockMaker blocks([&](uint64_t v, lod::TriangleMesh& to) { now->copy(v - first, to); }, take);
+        const Result<void> read = forAll([&](const Placement& at, const Primitive& p) -> Result<void> {
+            now.emplace(scene, at, p);
+            const size_t second = now->isMirrored ? 2 : 1, third = now->isMirrored ? 1 : 2;
+            for (size_t i = 0; i + 3 <= p.indices.size(); i += 3)
+                STIPPLE_TRY(
+                    blocks.triangle(first + p.indices[i], first + p.indices[i + second], first + p.indices[i + third]));
+            first += p.position.size();
+            return {};
+        });
+        if (!read) return read;
+        return blocks.finish();
+    };
+    return source;
 }
 
 std::vector<shared::SurfaceMaterial> surfaceMaterials(const Scene& scene) {

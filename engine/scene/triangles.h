@@ -1,8 +1,8 @@
-// The triangles of a scene's meshes in one list, with the materials that their vertices name.
+// The triangles of a scene's meshes as they are built from, with the materials that their vertices name.
 #pragma once
 
 #include "engine/scene/scene.h"
-#include "lod/mesh.h"
+#include "lod/mesh_source.h"
 
 namespace stipple::scene {
 
@@ -14,9 +14,9 @@ struct Placement {
 /// Of all visible nodes, instances included.
 std::vector<Placement> placements(const Scene& scene);
 
-/// Triangles of `placed`, in world space; vertices of mirrored placements change their winding. Points and lines are
-/// left out.
-lod::TriangleMesh flattenTriangles(const Scene& scene, const std::vector<Placement>& placed);
+/// Triangles of `placed`, in world space; mirrored placements change the winding. Points and lines are left out. The
+/// source reads `scene`, which must stay.
+lod::MeshSource triangleSource(const Scene& scene, std::vector<Placement> placed);
 
 std::vector<shared::SurfaceMaterial> surfaceMaterials(const Scene& scene);
 

@@ -3,17 +3,16 @@
 #include "lod/build/build.h"
 
 #include <fmt/format.h>
-#include <sys/statvfs.h>
 
 #include <filesystem>
 
 #include "engine/base/hash.h"
 #include "engine/base/ordered.h"
 #include "engine/base/queue.h"
+#include "lod/build/octree/journal.h"
 #include "lod/build/points/assemble.h"
 #include "lod/build/points/estimate.h"
 #include "lod/build/points/input.h"
-#include "lod/build/points/journal.h"
 #include "lod/build/points/ranges.h"
 #include "lod/build/points/upper.h"
 #include "lod/store.h"
@@ -60,7 +59,8 @@ class PointBuild {
     Result<BuildReport> run() {
         STIPPLE_TRY(planMemory());
         if (memory_.isOnDisk) {
-            STIPPLE_ASSIGN(Journal journal, Journal::open(workFolder(), output_, identity()));
+            STIPPLE_ASSIGN(Journal journal,
+                           Journal::open(Journal::folderOf(output_, settings_.tempFolder), output_, identity()));
             journal_.emplace(std::move(journal));
         }
         report_.isResumed = journal_ && !journal_->entries().empty();
@@ -115,12 +115,6 @@ class PointBuild {
         return {};
     }
 
-    std::string workFolder() const {
-        namespace fs = std::filesystem;
-        const fs::path out = fs::absolute(output_);
-        const fs::path folder = settings_.tempFolder.empty() ? out.parent_path() : fs::path(settings_.tempFolder);
-        return (folder / (out.filename().string() + ".build")).string();
-    }
     uint64_t identity() const {
         std::string text = fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}", kStoreVersion, kBuildVersion, input_.identity(),
                                        static_cast<int>(settings_.normals), settings_.estimateRadii,
@@ -146,13 +140,13 @@ class PointBuild {
         frame_ = makeFrame(input_.origin, input_.unit, std::max({g[0], g[1], g[2]}), settings_.leafRecords);
         frame_.attributes = input_.attributes();
         tree_.emplace(frame_, input_.points);
-        tree_->expect(input_.sample, input_.sampleShare);
+        tree_->expect(input_.sample.coordinates(), input_.sampleShare);
         input_.sample = {};
         double rounding = 0;
         do {
             STIPPLE_ASSIGN(rounding, input_.read(executor_, workers_, progress_, "count",
                                                  [&](int, const Points& block) -> Result<void> {
-                                                     tree_->count(block);
+                                                     tree_->count(block.coordinates());
                                                      return checkStopped();
                                                  }));
         } while (tree_->split());
@@ -196,15 +190,7 @@ class PointBuild {
         for (size_t c = 0; c < tree_->cells().size(); ++c)
             atBorders += wantsEstimates() && plan_.isBorder[c] != 0 ? tree_->cells()[c].count : 0;
         const uint64_t needed = input_.points * layout_.bytes() + atBorders * RecordLayout::kGhostBytes;
-        progress_.say(fmt::format("temporary disk space: up to {} in {}", humanBytes(needed), journal_->folder()));
-        struct statvfs disk {};
-        if (::statvfs(journal_->folder().c_str(), &disk) != 0) return {};
-        const uint64_t room = uint64_t{disk.f_bavail} * disk.f_frsize;
-        if (needed <= room) return {};
-        return fail(ErrorKind::budget,
-                    fmt::format("{} of temporary files are needed, but there is room for {}", humanBytes(needed),
-                                humanBytes(room)),
-                    journal_->folder(), "name another folder with --temp, or give more --memory");
+        return journal_->announce(needed, progress_);
     }
 
     /// What the survey and the count found, in the order in which it lies in the journal.

@@ -16,8 +16,14 @@ namespace stipple::lod {
 
 enum class NormalsMode { automatic, keep, none };
 
-struct BuildSettings {
-    uint64_t memoryBytes = uint64_t{2} << 30;  ///< never needs more; refuses if the input does
+/// What any build may use.
+struct BuildLimits {
+    uint64_t memoryBytes = uint64_t{2} << 30;  ///< never needs more; refuses if it would have to
+    std::string tempFolder;                    ///< for what does not fit in memory; empty: beside the output
+    std::function<bool()> isStopped;           ///< asked now and then; true: stop with ErrorKind::interrupted
+};
+
+struct BuildSettings : BuildLimits {
     NormalsMode normals = NormalsMode::automatic;
     bool estimateRadii = true;  ///< where the file has none; false: half the lattice unit is all a point gets
     std::optional<UpAxis> up;   ///< instead of the format's own
@@ -26,11 +32,9 @@ struct BuildSettings {
     bool allAttributes = false;           ///< every attribute of the input, beside `attributes`
     /// Opens one input; empty: openPointSource. For inputs that this library does not know (scenes with meshes).
     std::function<Result<PointSource>(const std::string& path, const ReadOptions& options)> open;
-    bool skipBad = false;             ///< go on past corrupt chunks and files, and count what is lost
-    bool fineNormals = false;         ///< of points: each from its own twelve nearest, at three times the time
-    bool mergeDuplicates = false;     ///< of points at one place keep one
-    std::function<bool()> isStopped;  ///< asked now and then; true: stop cleanly with ErrorKind::interrupted
-    std::string tempFolder;           ///< for what does not fit in memory; empty: beside the output
+    bool skipBad = false;          ///< go on past corrupt chunks and files, and count what is lost
+    bool fineNormals = false;      ///< of points: each from its own twelve nearest, at three times the time
+    bool mergeDuplicates = false;  ///< of points at one place keep one
 };
 
 struct BuildReport {

@@ -214,7 +214,7 @@ TEST_F(Forests, AConvertedPlantCoversWhatItsTrianglesCover) {
     settings.description.up = {0, 1, 0};
     Progress progress(false);
     const auto mesh = [&](const scene::Scene& of, const std::string& name) {
-        EXPECT_TRUE(lod::buildMeshStore(scene::flattenTriangles(of, scene::placements(of)), folder_ / name, settings,
+        EXPECT_TRUE(lod::buildMeshStore(scene::triangleSource(of, scene::placements(of)), folder_ / name, settings,
                                         *executor_, progress));
         return std::make_shared<const lod::Store>(*lod::openStore(folder_ / name));
     };

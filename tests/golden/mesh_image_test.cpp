@@ -326,7 +326,7 @@ Seam seamOf(const scene::Scene& mesh, const scene::Scene& points, const std::str
     lod::BuildSettings settings;
     settings.leafRecords = 1024;
     settings.open = [&](const std::string&, const lod::ReadOptions&) { return scene::sampleSurfels(points, {}, {0}); };
-    if (!lod::buildMeshStore(scene::flattenTriangles(mesh, scene::placements(mesh)), folder + "/mesh.stipple", build,
+    if (!lod::buildMeshStore(scene::triangleSource(mesh, scene::placements(mesh)), folder + "/mesh.stipple", build,
                              executor, progress) ||
         !lod::buildStore({"points"}, folder + "/points.stipple", settings, executor, progress) ||
         !place(folder + "/points.stipple") || !place(folder + "/mesh.stipple"))
@@ -418,7 +418,7 @@ TEST(MeshImages, WhatCannotBeSimplifiedIsPointsFromAfar) {
     lod::MeshBuildSettings settings;
     settings.description.materials = scene::surfaceMaterials(scene);
     settings.description.up = {0, 1, 0};
-    ASSERT_TRUE(lod::buildMeshStore(scene::flattenTriangles(scene, scene::placements(scene)), folder / "a.stipple",
+    ASSERT_TRUE(lod::buildMeshStore(scene::triangleSource(scene, scene::placements(scene)), folder / "a.stipple",
                                     settings, *executor, progress));
     lod::BuildSettings points;
     points.open = [&](const std::string&, const lod::ReadOptions&) {

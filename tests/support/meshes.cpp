@@ -10,6 +10,23 @@
 
 namespace stipple::test {
 
+lod::TriangleMesh collect(const lod::MeshSource& source) {
+    EXPECT_TRUE(source.survey());
+    lod::TriangleMesh out;
+    EXPECT_TRUE(source.read([&](const lod::TriangleMesh& block) -> Result<void> {
+        const auto base = static_cast<uint32_t>(out.position.size());
+        const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+        append(out.position, block.position);
+        append(out.normal, block.normal);
+        append(out.uv, block.uv);
+        append(out.colour, block.colour);
+        append(out.surface, block.surface);
+        for (const uint32_t i : block.indices) out.indices.push_back(base + i);
+        return {};
+    }));
+    return out;
+}
+
 lod::TriangleMesh growTriangles(const MeshRecipe& recipe, lod::MeshBuildSettings& settings) {
     scene::Scene scene = grow::growMesh(recipe.grow);
     if (!recipe.isTextured)
@@ -29,14 +46,14 @@ lod::TriangleMesh growTriangles(const MeshRecipe& recipe, lod::MeshBuildSettings
             settings.textures[index].rgba = pixels->rgba;
         }
     }
-    return scene::flattenTriangles(scene, scene::placements(scene));
+    return collect(scene::triangleSource(scene, scene::placements(scene)));
 }
 
 std::shared_ptr<const lod::Store> growMeshStore(const MeshRecipe& recipe, const std::string& path, Executor& executor) {
     lod::MeshBuildSettings settings;
     lod::TriangleMesh mesh = growTriangles(recipe, settings);
     Progress progress(false);
-    const auto built = lod::buildMeshStore(std::move(mesh), path, settings, executor, progress);
+    const auto built = lod::buildMeshStore(lod::sourceOf(std::move(mesh)), path, settings, executor, progress);
     if (!built) throw std::runtime_error(built.error().line());
     auto store = lod::openStore(path);
     if (!store) throw std::runtime_error(store.error().line());

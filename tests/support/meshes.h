@@ -14,6 +14,8 @@ struct MeshRecipe {
     glm::dmat4 place{1};
 };
 
+/// All that a source gives, as one.
+lod::TriangleMesh collect(const lod::MeshSource& source);
 lod::TriangleMesh growTriangles(const MeshRecipe& recipe, lod::MeshBuildSettings& settings);
 std::shared_ptr<const lod::Store> growMeshStore(const MeshRecipe& recipe, const std::string& path, Executor& executor);
 

@@ -5,15 +5,37 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <limits>
 
 #include "engine/scene/triangles.h"
 #include "lod/build/mesh/mesh_work.h"
-#include "lod/import/ply_mesh.h"
+#include "lod/import/ply/mesh.h"
 #include "tests/support/meshes.h"
 
 namespace stipple {
 namespace {
+
+/// A PLY mesh through the front door; `memoryBytes`: of its vertices.
+Result<lod::TriangleMesh> readPlyMesh(const std::string& path, lod::PlyMeshNotes& notes,
+                                      uint64_t memoryBytes = 1 << 24) {
+    const auto shared = std::make_shared<lod::PlyMeshNotes>();
+    STIPPLE_ASSIGN(const lod::MeshSource source,
+                   lod::openPlyMesh(path, memoryBytes, std::filesystem::temp_directory_path().string(), shared));
+    STIPPLE_ASSIGN(const auto bounds, source.survey());
+    static_cast<void>(bounds);
+    const Result<void> read = source.read([](const lod::TriangleMesh&) -> Result<void> { return {}; });
+    if (!read) return tl::unexpected(read.error());
+    notes = *shared;
+    return test::collect(source);
+}
+
+/// Corners by position, three a triangle.
+std::vector<glm::dvec3> cornersOf(const lod::TriangleMesh& mesh) {
+    std::vector<glm::dvec3> out;
+    for (const uint32_t i : mesh.indices) out.push_back(mesh.position[i]);
+    return out;
+}
 
 TEST(PlyMesh, PolygonsAndStripsBecomeTriangles) {
     const test::TempFolder folder;
@@ -23,9 +45,15 @@ TEST(PlyMesh, PolygonsAndStripsBecomeTriangles) {
                "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n7 4 0 1 2 3\n7 3 0 1 4\n7 3 0 1 9\n");
     ASSERT_TRUE(*lod::hasPlyFaces(folder / "a.ply"));
     lod::PlyMeshNotes notes;
-    const auto mesh = lod::readPlyMesh(folder / "a.ply", notes);
+    const auto mesh = readPlyMesh(folder / "a.ply", notes);
     ASSERT_TRUE(mesh) << mesh.error().line();
-    EXPECT_EQ(mesh->indices, (std::vector<uint32_t>{0, 1, 2, 0, 2, 3, 0, 1, 4}));
+    const std::array<glm::dvec3, 5> v{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}}};
+    const auto of = [](const auto& places, std::initializer_list<size_t> indices) {
+        std::vector<glm::dvec3> out;
+        for (const size_t i : indices) out.push_back(places[i]);
+        return out;
+    };
+    EXPECT_EQ(cornersOf(*mesh), of(v, {0, 1, 2, 0, 2, 3, 0, 1, 4}));
     EXPECT_EQ(notes.badFaces, 1u);
     EXPECT_EQ(mesh->normal.size(), 5u);
     EXPECT_NEAR(mesh->normal[2].z, 1, 1e-6);
@@ -38,14 +66,47 @@ TEST(PlyMesh, PolygonsAndStripsBecomeTriangles) {
     strip.append(reinterpret_cast<const char*>(positions.data()), sizeof(positions));
     strip.append(reinterpret_cast<const char*>(corners.data()), sizeof(corners));
     test::spit(folder / "b.ply", strip);
-    const auto strips = lod::readPlyMesh(folder / "b.ply", notes);
+    const auto strips = readPlyMesh(folder / "b.ply", notes);
     ASSERT_TRUE(strips) << strips.error().line();
-    EXPECT_EQ(strips->indices, (std::vector<uint32_t>{0, 1, 2, 1, 3, 2, 3, 4, 5}));
+    const std::array<glm::dvec3, 6> s{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 2, 0}, {1, 2, 0}}};
+    EXPECT_EQ(cornersOf(*strips), of(s, {0, 1, 2, 1, 3, 2, 3, 4, 5}));
     // Every truncation is refused, never read as something else.
     for (size_t length = strip.size() - 90; length < strip.size(); ++length) {
         test::spit(folder / "c.ply", strip.substr(0, length));
-        EXPECT_FALSE(lod::readPlyMesh(folder / "c.ply", notes)) << length;
+        EXPECT_FALSE(readPlyMesh(folder / "c.ply", notes)) << length;
     }
+}
+
+TEST(PlyMesh, RowsLongerThanABlockAndVerticesBeyondTheMemoryAreTheSame) {
+    // A strip of 150,000 corners in one row (read in parts of 65,536), with a break, over a zigzag of vertices; once
+    // with all its vertices in memory, once with 512 KiB of 4 MiB.
+    const test::TempFolder folder;
+    constexpr int kCorners = 150'000;
+    std::string text =
+        "ply\nformat binary_little_endian 1.0\nelement vertex 150000\nproperty double x\nproperty double y\n"
+        "property double z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n";
+    const auto put = [&](const auto& value) { text.append(reinterpret_cast<const char*>(&value), sizeof(value)); };
+    for (int i = 0; i < kCorners; ++i) {
+        put(0.5 * i);
+        put(i % 2 == 0 ? 0.0 : 1.0);
+        put(0.001 * (i % 7));
+    }
+    put(kCorners + 1);
+    for (int i = 0; i < kCorners; ++i) {
+        if (i == 70'000) put(-1);
+        put(i);
+    }
+    test::spit(folder / "long.ply", text);
+    lod::PlyMeshNotes notes;
+    const auto all = readPlyMesh(folder / "long.ply", notes, 1 << 24),
+               some = readPlyMesh(folder / "long.ply", notes, 1 << 19);
+    ASSERT_TRUE(all && some);
+    ASSERT_EQ(all->indices.size() / 3, size_t{kCorners - 4});
+    EXPECT_EQ(cornersOf(*all), cornersOf(*some));
+    EXPECT_EQ(all->normal, some->normal);
+    size_t up = 0;  // the winding alternates as it should: all normals point the same way
+    for (const glm::vec3& n : all->normal) up += n.z < -0.9f ? 1 : 0;
+    EXPECT_EQ(up, all->normal.size());
 }
 
 TEST(PlyMesh, TheRealMeshesHaveTheirTriangles) {
@@ -55,14 +116,14 @@ TEST(PlyMesh, TheRealMeshesHaveTheirTriangles) {
         const std::string path = test::dataFile(name);
         if (path.empty()) return;
         lod::PlyMeshNotes notes;
-        const auto mesh = lod::readPlyMesh(path, notes);
+        const auto mesh = readPlyMesh(path, notes);
         ASSERT_TRUE(mesh) << mesh.error().line();
         EXPECT_EQ(mesh->indices.size() / 3, triangles) << name;
         EXPECT_EQ(notes.badFaces, 0u);
     }
     const auto igea = [] {
         lod::PlyMeshNotes notes;
-        return lod::readPlyMesh(test::dataFile("01_meshes/misc/igea.ply"), notes);
+        return readPlyMesh(test::dataFile("01_meshes/misc/igea.ply"), notes);
     }();
     ASSERT_TRUE(igea);
     EXPECT_GT(igea->indices.size() / 3, 260'000u);  // a closed surface has about twice as many as vertices
@@ -80,13 +141,14 @@ TEST(Weld, CountsWhatItDropsAndKeepsTheRest) {
                   0, 0, 1,  // no area
                   0, 1, 4};
     const auto executor = makeSerialExecutor();
-    const lod::WeldedMesh mesh = lod::weldMesh(in, *executor);
-    EXPECT_EQ(mesh.indices.size() / 3, 3u);
-    EXPECT_EQ(mesh.duplicate, 1u);
-    EXPECT_EQ(mesh.degenerate, 2u);
-    EXPECT_EQ(mesh.notFinite, 1u);
+    lod::PlacedBlock placed = lod::placeBlock(in, lod::latticeOf(*lod::sourceOf(in).survey()), *executor);
+    EXPECT_EQ(placed.degenerate, 2u);
+    EXPECT_EQ(placed.notFinite, 1u);
+    EXPECT_EQ(placed.rounding, 0);  // small whole numbers lie on the lattice
+    lod::WeldedMesh mesh = lod::weld(placed.soup);
+    EXPECT_EQ(lod::sortTriangles(mesh, placed.soup.indices), 1u);
+    EXPECT_EQ(placed.soup.indices.size() / 3, 3u);
     EXPECT_EQ(mesh.vertices.size(), 4u);
-    EXPECT_EQ(mesh.rounding, 0);  // small whole numbers lie on the lattice
 }
 
 TEST(MeshStore, DamagedChunksAndTablesAreRefused) {
@@ -262,7 +324,8 @@ TEST(Flatten, MirroredAndFlatPlacementsKeepTheirSides) {
     const scene::Placement plain{0, glm::dmat4(1)};
     scene::Placement mirrored = plain;
     mirrored.world[0].x = -1;
-    const lod::TriangleMesh a = scene::flattenTriangles(scene, {plain}), b = scene::flattenTriangles(scene, {mirrored});
+    const lod::TriangleMesh a = test::collect(scene::triangleSource(scene, {plain})),
+                            b = test::collect(scene::triangleSource(scene, {mirrored}));
     const auto outward = [](const lod::TriangleMesh& m) {
         size_t good = 0;
         for (size_t i = 0; i < m.indices.size(); i += 3) {
@@ -277,7 +340,7 @@ TEST(Flatten, MirroredAndFlatPlacementsKeepTheirSides) {
     EXPECT_NEAR(outward(b), outward(a), 1e-9);
     scene::Placement flat = plain;  // scale 0 along one axis: normals are still those of the plane
     flat.world[1] = glm::dvec4(0);
-    for (const glm::vec3& n : scene::flattenTriangles(scene, {flat}).normal)
+    for (const glm::vec3& n : test::collect(scene::triangleSource(scene, {flat})).normal)
         ASSERT_TRUE(n == glm::vec3(0) || std::abs(std::abs(n.y) - 1) < 1e-6f);
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "engine/base/check.h"
+#include "engine/base/one_at_a_time.h"
 #include "lod/build/mesh/mesh_work.h"
 
 namespace stipple::lod {
@@ -65,15 +66,15 @@ void appendClusters(const LocalMesh& local, const std::vector<uint32_t>& indices
     }
 }
 
-std::vector<Cluster> makeClusters(const WeldedMesh& mesh, Executor& executor) {
-    const size_t triangles = mesh.indices.size() / 3, blocks = (triangles + kBlockTriangles - 1) / kBlockTriangles;
+std::vector<Cluster> makeClusters(const WeldedMesh& mesh, const std::vector<uint32_t>& indices, Executor& executor) {
+    const size_t triangles = indices.size() / 3, blocks = (triangles + kBlockTriangles - 1) / kBlockTriangles;
     std::vector<std::vector<Cluster>> parts(blocks);
     executor.parallelFor(blocks, 1, [&](size_t begin, size_t end) {
         for (size_t b = begin; b < end; ++b) {
             Cluster block;
             const auto first = static_cast<ptrdiff_t>(3 * b * kBlockTriangles),
                        last = static_cast<ptrdiff_t>(3 * std::min(triangles, (b + 1) * kBlockTriangles));
-            block.indices.assign(mesh.indices.begin() + first, mesh.indices.begin() + last);
+            block.indices.assign(indices.begin() + first, indices.begin() + last);
             const LocalMesh local = makeLocal(mesh, {&block});
             appendClusters(local, local.indices, kNoProducer, true, parts[b]);
         }
@@ -164,8 +165,11 @@ std::vector<std::vector<uint32_t>> groupClusters(const WeldedMesh& mesh, const s
     options[METIS_OPTION_SEED] = 1;
     options[METIS_OPTION_UFACTOR] = 200;
     std::vector<idx_t> part(count);
-    const int status = METIS_PartGraphKway(&vertices, &constraints, start.data(), neighbour.data(), nullptr, nullptr,
-                                           weight.data(), &parts, nullptr, nullptr, options.data(), &cut, part.data());
+    static OneAtATime partitioner;  // its random numbers are the process's: two at once would share one sequence
+    const int status = partitioner([&] {
+        return METIS_PartGraphKway(&vertices, &constraints, start.data(), neighbour.data(), nullptr, nullptr,
+                                   weight.data(), &parts, nullptr, nullptr, options.data(), &cut, part.data());
+    });
     STIPPLE_CHECK(status == METIS_OK, "METIS");
     groups.resize(static_cast<size_t>(parts));
     for (uint32_t c = 0; c < count; ++c) groups[static_cast<size_t>(part[c])].push_back(c);

@@ -1,377 +1,348 @@
-// A mesh build as a straight line.
+// A build of triangles as a straight line: survey, count, distribute to octree cells, then cell by cell from the
+// deepest up weld, cluster, simplify, write; verify.
 #include "lod/build/mesh/mesh_build.h"
 
 #include <fmt/format.h>
-#include <meshoptimizer.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "engine/base/check.h"
-#include "lod/build/mesh/mesh_work.h"
+#include "engine/base/hash.h"
+#include "engine/base/queue.h"
+#include "lod/build/mesh/cell.h"
 
 namespace stipple::lod {
 namespace {
 
-constexpr double kWorthwhile = 0.85;     ///< a simplification that keeps more triangles than this is not used
-constexpr double kUnimportant = 0.25;    ///< share of the error below that one level may add unseen
-constexpr size_t kFewestTriangles = 16;  ///< below that nothing is simplified any more
-constexpr uint64_t kManyRoots = 20'000;  ///< triangles of the coarsest level that are worth a note
-constexpr float kAnyError = 1e9f;        ///< the target is a number of triangles
+constexpr uint64_t kManyRoots = 20'000;              ///< triangles of the coarsest level that are worth a note
+constexpr uint64_t kVerifiedNodes = 2048;            ///< at the end of a build; `info --verify` checks all
+constexpr uint64_t kBuildVersion = 1;                ///< of what the same input gives
+constexpr uint64_t kCellBytes = uint64_t{80} << 20;  ///< that one cell of the work needs at most
 
-struct Sphere {
-    glm::dvec3 centre{0};
-    double radius = 0;
-};
-
-/// A group in the order of the build: fine before coarse.
-struct Group {
-    Node node;
-    MeshGroup counts;
-    std::vector<MeshRun> runs;  ///< producers are numbers of the build's order
-    std::vector<uint32_t> textures;
-    double error = 0;  ///< lattice units
-};
-
-Sphere sphereOf(const LocalMesh& local, const std::vector<Sphere>& inside) {
-    glm::dvec3 lo(1e300), hi(-1e300);
-    for (const glm::vec3& p : local.position) {
-        lo = glm::min(lo, glm::dvec3(p));
-        hi = glm::max(hi, glm::dvec3(p));
+/// The tables in the order of the file: coarse before fine.
+void writeTables(const std::vector<Group>& groups, const Lattice& lattice, Hierarchy& h) {
+    const auto count = static_cast<uint32_t>(groups.size());
+    h.origin = lattice.origin;
+    h.unit = lattice.unit;
+    h.rootLog2 = 24;
+    double smallest = 1e300;
+    for (const Group& g : groups)
+        if (g.error > 0 && g.error < Group::kRootError) smallest = std::min(smallest, g.error);
+    h.errors.smallest = smallest < 1e300 ? smallest * 0.9 : 1;
+    std::vector<std::vector<uint32_t>> parents(count);
+    h.nodes.resize(count);
+    h.groups.resize(count);
+    for (uint32_t i = 0; i < count; ++i) {
+        const Group& g = groups[count - 1 - i];
+        h.nodes[i] = g.node;
+        h.groups[i] = g.counts;
+        h.nodes[i].errorCode =
+            static_cast<uint8_t>(g.error >= Group::kRootError ? ErrorScale::kNoParent : h.errors.encodeUp(g.error));
+        h.groups[i].firstRun = static_cast<uint32_t>(h.runs.size());
+        h.groups[i].runs = static_cast<uint32_t>(g.runs.size());
+        h.groups[i].firstTexture = static_cast<uint32_t>(h.groupTextures.size());
+        h.groups[i].textures = static_cast<uint32_t>(g.textures.size());
+        h.groupTextures.insert(h.groupTextures.end(), g.textures.begin(), g.textures.end());
+        for (MeshRun run : g.runs) {
+            if (run.producer != MeshRun::kOriginal) {
+                run.producer = count - 1 - run.producer;
+                parents[run.producer].push_back(i);
+            }
+            h.runs.push_back(run);
+        }
     }
-    for (const Sphere& s : inside) {
-        lo = glm::min(lo, s.centre - s.radius);
-        hi = glm::max(hi, s.centre + s.radius);
+    for (uint32_t i = 0; i < count; ++i) {
+        h.groups[i].firstParent = static_cast<uint32_t>(h.parents.size());
+        h.groups[i].parents = static_cast<uint32_t>(parents[i].size());
+        uint32_t level = 0;
+        for (const uint32_t p : parents[i]) level = std::max(level, h.nodes[p].level + 1u);
+        h.nodes[i].level = static_cast<uint8_t>(std::min(level, 255u));
+        h.nodes[i].parent = parents[i].empty() ? 0 : parents[i][0];
+        h.parents.insert(h.parents.end(), parents[i].begin(), parents[i].end());
     }
-    Sphere out{0.5 * (lo + hi), 0};
-    for (const glm::vec3& p : local.position)
-        out.radius = std::max(out.radius, glm::length(glm::dvec3(p) - out.centre));
-    for (const Sphere& s : inside) out.radius = std::max(out.radius, glm::length(s.centre - out.centre) + s.radius);
-    out.radius *= 1 + 1e-12;
-    return out;
 }
 
-class MeshBuilder {
+class MeshBuild {
   public:
-    MeshBuilder(const WeldedMesh& mesh, const MeshBuildSettings& settings, StoreWriter& writer, Executor& executor,
-                Progress& progress)
-        : mesh_(mesh), settings_(settings), writer_(writer), executor_(executor), progress_(progress) {}
+    MeshBuild(const MeshSource& source, std::string output, const MeshBuildSettings& settings, Executor& executor,
+              Progress& progress)
+        : source_(source),
+          output_(std::move(output)),
+          settings_(settings),
+          executor_(executor),
+          progress_(progress),
+          clock_(report_),
+          workers_(std::max(executor.threads(), 1)) {}
 
-    Result<void> run() {
-        std::vector<Cluster> clusters = makeClusters(mesh_, executor_);
-        const uint64_t expected = 2 * uint64_t{mesh_.indices.size()} / 3;
-        uint64_t before = ~uint64_t{0};
-        for (;;) {
-            uint64_t triangles = 0;
-            for (const Cluster& c : clusters) triangles += c.indices.size() / 3;
-            if (triangles <= kFewestTriangles || static_cast<double>(triangles) > 0.97 * static_cast<double>(before))
-                break;
-            before = triangles;
-            STIPPLE_ASSIGN(clusters, nextLevel(std::move(clusters), expected));
+    Result<BuildReport> run() {
+        report_.primitive = "triangle";
+        { STIPPLE_ASSIGN(const StoreWriter writer, StoreWriter::create(output_)); }  // can it be written at all?
+        STIPPLE_TRY(planMemory());
+        const uint64_t identity = source_.identity();
+        STIPPLE_ASSIGN(Reduction work, Reduction::open(output_, settings_.limits, identityOf(identity), isOnDisk_));
+        work_.emplace(std::move(work));
+        report_.isResumed = work_->isResumed();
+        if (report_.isResumed) {
+            STIPPLE_TRY(restore());
+        } else {
+            STIPPLE_TRY(distribute());
+            if (source_.identity() != identity)
+                return fail(ErrorKind::input, "changed while it was read", settings_.description.source,
+                            "build again when it is complete");
+            STIPPLE_TRY(work_->seal(factsAsBytes(), executor_));
+            clock_.ends("distribute");
         }
-        return writeRoots(clusters);
-    }
-
-    /// The tables in the order of the file: coarse before fine.
-    void tables(Hierarchy& h) const {
-        const auto count = static_cast<uint32_t>(groups_.size());
-        h.origin = mesh_.origin;
-        h.unit = mesh_.unit;
-        h.rootLog2 = 24;
-        double smallest = 1e300;
-        for (const Group& g : groups_)
-            if (g.error > 0 && g.error < kRootError) smallest = std::min(smallest, g.error);
-        h.errors.smallest = smallest < 1e300 ? smallest * 0.9 : 1;
-        std::vector<std::vector<uint32_t>> parents(count);
-        h.nodes.resize(count);
-        h.groups.resize(count);
-        for (uint32_t i = 0; i < count; ++i) {
-            const Group& g = groups_[count - 1 - i];
-            h.nodes[i] = g.node;
-            h.groups[i] = g.counts;
-            h.nodes[i].errorCode =
-                static_cast<uint8_t>(g.error >= kRootError ? ErrorScale::kNoParent : h.errors.encodeUp(g.error));
-            h.groups[i].firstRun = static_cast<uint32_t>(h.runs.size());
-            h.groups[i].runs = static_cast<uint32_t>(g.runs.size());
-            h.groups[i].firstTexture = static_cast<uint32_t>(h.groupTextures.size());
-            h.groups[i].textures = static_cast<uint32_t>(g.textures.size());
-            h.groupTextures.insert(h.groupTextures.end(), g.textures.begin(), g.textures.end());
-            for (MeshRun run : g.runs) {
-                if (run.producer != MeshRun::kOriginal) {
-                    run.producer = count - 1 - run.producer;
-                    parents[run.producer].push_back(i);
-                }
-                h.runs.push_back(run);
-            }
-        }
-        for (uint32_t i = 0; i < count; ++i) {
-            h.groups[i].firstParent = static_cast<uint32_t>(h.parents.size());
-            h.groups[i].parents = static_cast<uint32_t>(parents[i].size());
-            uint32_t level = 0;
-            for (const uint32_t p : parents[i]) level = std::max(level, h.nodes[p].level + 1u);
-            h.nodes[i].level = static_cast<uint8_t>(std::min(level, 255u));
-            h.nodes[i].parent = parents[i].empty() ? 0 : parents[i][0];
-            h.parents.insert(h.parents.end(), parents[i].begin(), parents[i].end());
-        }
+        const Frame frame = frameOf(facts_.lattice);
+        STIPPLE_TRY(work_->run(
+            executor_, workers_,
+            [&](const WorkCell& cell, const std::vector<uint8_t>& input, const std::vector<FromBelow>& below) {
+                return reduceMeshCell(cell, input, below, frame, settings_, executor_);
+            },
+            [&](uint64_t at, const std::vector<uint8_t>& table) { return take(at, table); }, progress_));
+        clock_.ends("build");
+        STIPPLE_TRY(finish());
+        report_.seconds = clock_.seconds();
+        return std::move(report_);
     }
 
   private:
-    static constexpr double kRootError = 1e300;
+    Result<void> planMemory() {
+        constexpr uint64_t kFixed = uint64_t{96} << 20;
+        uint64_t textures = 0;
+        for (const TextureImage& t : settings_.textures) textures += 4 * uint64_t{t.rgba.size()} * 2;
+        const auto leastFor = [&](int workers) {
+            return kFixed + textures + static_cast<uint64_t>(workers) * kCellBytes;
+        };
+        const uint64_t memory = settings_.limits.memoryBytes, small = source_.triangles * 700 + kFixed + textures;
+        while (workers_ > 1 && leastFor(workers_) > memory) --workers_;
+        const uint64_t least = std::min(leastFor(workers_), small);
+        if (least > memory)
+            return fail(
+                ErrorKind::budget,
+                fmt::format("building {} triangles{} needs {} MiB, but --memory allows {} MiB", source_.triangles,
+                            textures > 0 ? " with their textures" : "", (least >> 20) + 1, memory >> 20),
+                settings_.description.source, fmt::format("give --memory {}M", (least >> 20) + 1));
+        const uint64_t room = memory > leastFor(workers_) ? memory - leastFor(workers_) : 0;
+        isOnDisk_ = small > memory && source_.triangles * kSpillBytes > room / 2;
+        bufferBytes_ = std::clamp<uint64_t>(room / 4, uint64_t{4} << 20, uint64_t{64} << 20);
+        return {};
+    }
+    uint64_t identityOf(uint64_t input) const {
+        const auto& d = settings_.description;
+        std::string text = fmt::format("{}|{}|{}|{}|{}|{}", kStoreVersion, kBuildVersion, input,
+                                       settings_.groupClusters, d.materials.size(), describeAsText(d));
+        for (const TextureImage& t : settings_.textures)
+            text += fmt::format("|{} {} {}", t.width, t.height, hashBytes(t.rgba.data(), t.rgba.size() * 4));
+        return hashBytes(text.data(), text.size());
+    }
 
-    struct Made {
-        Group group;
-        std::vector<uint8_t> bytes;
-        std::vector<Cluster> products;
-        bool isSimplified = false;
-    };
+    // ---- survey, count, distribute ----
 
-    Result<std::vector<Cluster>> nextLevel(std::vector<Cluster> clusters, uint64_t expected) {
-        const auto members = groupClusters(mesh_, clusters, settings_.groupClusters, executor_);
-        std::vector<Cluster> next;
-        constexpr size_t kBatch = 64;  // bounds what waits to be written
-        for (size_t first = 0; first < members.size(); first += kBatch) {
-            const size_t count = std::min(kBatch, members.size() - first);
-            std::vector<Made> made(count);
-            executor_.parallelFor(count, 1, [&](size_t begin, size_t end) {
-                for (size_t i = begin; i < end; ++i) {
-                    std::vector<const Cluster*> of;
-                    for (const uint32_t c : members[first + i]) of.push_back(&clusters[c]);
-                    made[i] = simplify(of, false);
+    Result<void> distribute() {
+        STIPPLE_ASSIGN(const MeshSource::Bounds bounds, source_.survey());
+        facts_.lattice = latticeOf(bounds);
+        clock_.ends("survey");
+        const Frame frame = frameOf(facts_.lattice);
+        CellTree tree(frame, source_.triangles);
+        do {
+            uint64_t done = 0;
+            STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
+                tree.count(placeBlock(block, facts_.lattice, executor_).centres());
+                done += block.indices.size() / 3;
+                progress_.update("count", std::min(done, source_.triangles), source_.triangles);
+                return work_->checkStopped();
+            }));
+        } while (tree.split());
+        tree.finish();
+        clock_.ends("count");
+        const std::vector<Atom> atoms = tree.atoms();
+        if (atoms.empty())
+            return fail(ErrorKind::input, "holds no triangle with an area", settings_.description.source);
+        for (const Atom& atom : atoms)
+            if (atom.count > 2 * kAtomPoints)
+                return fail(ErrorKind::budget, fmt::format("{} triangles have their centre at one place", atom.count),
+                            settings_.description.source, "is the mesh what it should be?");
+        if (const Journal* const journal = work_->journal())
+            STIPPLE_TRY(journal->announce(source_.triangles * kSpillBytes, progress_));
+        work_->plan(atoms);
+        return send(frame, tree, atoms);
+    }
+
+    static Frame frameOf(const Lattice& lattice) { return makeFrame(lattice.origin, lattice.unit, lattice.largest, 0); }
+
+    /// Each triangle to the atom that holds its centre.
+    Result<void> send(const Frame& frame, const CellTree& tree, const std::vector<Atom>& atoms) {
+        std::vector<uint32_t> atomOfCell(tree.cells().size());
+        for (uint32_t a = 0; a < atoms.size(); ++a)
+            for (uint32_t c = 0; c < atoms[a].cells; ++c) atomOfCell[atoms[a].firstCell + c] = a;
+        std::vector<Soup> buffers(atoms.size());
+        const uint64_t most = std::max<uint64_t>(bufferBytes_ / atoms.size(), 8192);
+        const auto flush = [&](size_t a) {
+            ByteWriter to;
+            putSoup(buffers[a], to);
+            buffers[a] = {};
+            return work_->input(a).append(to.bytes());
+        };
+        uint64_t done = 0;
+        STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
+            const PlacedBlock placed = placeBlock(block, facts_.lattice, executor_);
+            facts_.triangles += block.indices.size() / 3;
+            facts_.degenerate += placed.degenerate;
+            facts_.notFinite += placed.notFinite;
+            facts_.rounding = std::max(facts_.rounding, placed.rounding);
+            std::vector<uint64_t> order(placed.x.size());  // atom, triangle
+            executor_.parallelFor(order.size(), 4096, [&](size_t begin, size_t end) {
+                for (size_t t = begin; t < end; ++t)
+                    order[t] =
+                        uint64_t{atomOfCell[tree.cellOf(frame.keyOf(placed.x[t], placed.y[t], placed.z[t]))]} << 32 | t;
+            });
+            std::sort(order.begin(), order.end());
+            std::vector<size_t> starts;
+            for (size_t i = 0; i < order.size(); ++i)
+                if (i == 0 || order[i] >> 32 != order[i - 1] >> 32) starts.push_back(i);
+            starts.push_back(order.size());
+            CompletionQueue<Error> errors;
+            executor_.parallelFor(starts.size() - 1, 1, [&](size_t begin, size_t end) {
+                std::vector<uint32_t> place(placed.soup.vertices.size(), ~0u);
+                for (size_t s = begin; s < end; ++s) {
+                    Soup& to = buffers[order[starts[s]] >> 32];
+                    std::vector<uint32_t> used;
+                    for (size_t i = starts[s]; i < starts[s + 1]; ++i)
+                        for (size_t k = 0; k < 3; ++k) {
+                            const uint32_t v = placed.soup.indices[3 * (order[i] & 0xffffffffu) + k];
+                            if (place[v] == ~0u) {
+                                place[v] = static_cast<uint32_t>(to.vertices.size());
+                                to.vertices.push_back(placed.soup.vertices[v]);
+                                used.push_back(v);
+                            }
+                            to.indices.push_back(place[v]);
+                        }
+                    for (const uint32_t v : used) place[v] = ~0u;
+                    if (to.vertices.size() * sizeof(shared::MeshVertex) + to.indices.size() * 4 < most) continue;
+                    if (const auto flushed = flush(order[starts[s]] >> 32); !flushed) errors.push(flushed.error());
                 }
             });
-            for (size_t i = 0; i < count; ++i) {
-                if (!made[i].isSimplified) {  // with other neighbours it may shrink
-                    for (const uint32_t c : members[first + i]) next.push_back(std::move(clusters[c]));
-                    continue;
-                }
-                const auto number = static_cast<uint32_t>(groups_.size());
-                written_ += made[i].group.node.records;
-                for (Cluster& c : made[i].products) {
-                    c.producer = number;
-                    next.push_back(std::move(c));
-                }
-                STIPPLE_TRY(append(std::move(made[i])));
-                for (const uint32_t c : members[first + i]) clusters[c].indices = {};
-            }
-            progress_.update("simplify", std::min(written_, expected), expected);
-        }
-        return next;
-    }
-
-    Result<void> writeRoots(const std::vector<Cluster>& clusters) {
-        auto members = groupClusters(mesh_, clusters, settings_.groupClusters, executor_);
-        for (const auto& group : members) {
-            std::vector<const Cluster*> of;
-            of.reserve(group.size());
-            for (const uint32_t c : group) of.push_back(&clusters[c]);
-            Made made = simplify(of, true);
-            STIPPLE_TRY(append(std::move(made)));
-        }
+            if (const auto found = errors.takeAll(); !found.empty()) return tl::unexpected(found.front());
+            done += block.indices.size() / 3;
+            progress_.update("distribute", std::min(done, source_.triangles), source_.triangles);
+            return work_->checkStopped();
+        }));
+        for (size_t a = 0; a < buffers.size(); ++a)
+            if (!buffers[a].indices.empty()) STIPPLE_TRY(flush(a));
         return {};
     }
 
-    Result<void> append(Made made) {
-        STIPPLE_TRY(writer_.appendChunk(made.bytes, {}, made.group.node));
-        groups_.push_back(std::move(made.group));
+    /// What a resumed build has to know.
+    struct Facts {
+        Lattice lattice;
+        uint64_t triangles = 0, degenerate = 0, notFinite = 0;
+        double rounding = 0;
+    };
+    std::vector<uint8_t> factsAsBytes() const {
+        ByteWriter to;
+        to.put(facts_);
+        return to.bytes();
+    }
+    Result<void> restore() {
+        ByteReader from(work_->facts());
+        from.get(facts_);
+        if (!from.isWhole())
+            return fail(ErrorKind::input, "holds a damaged journal", work_->journal()->folder(), "delete the folder");
+        return work_->restore(progress_);
+    }
+
+    // ---- the end ----
+
+    uint64_t take(uint64_t at, const std::vector<uint8_t>& bytes) {
+        const uint64_t label = groups_.size();
+        CellTable table;
+        ByteReader from(bytes);
+        STIPPLE_CHECK(table.get(from), "the table of a cell");
+        for (Group& g : table.groups) {
+            g.node.chunkOffset += at;
+            for (MeshRun& run : g.runs)
+                if (run.producer != MeshRun::kOriginal && (run.producer & Group::kOwn) != 0)
+                    run.producer = static_cast<uint32_t>(label) + (run.producer & ~Group::kOwn);
+            groups_.push_back(std::move(g));
+        }
+        kept_ += table.triangles;
+        duplicate_ += table.duplicate;
+        if (table.triangles > 0) {
+            lo_ = glm::min(lo_, table.lo);
+            hi_ = glm::max(hi_, table.hi);
+        }
+        return label;
+    }
+
+    Result<void> finish() {
+        Hierarchy hierarchy;
+        writeTables(groups_, facts_.lattice, hierarchy);
+        groups_ = {};
+        STIPPLE_TRY(writeTextures(settings_.textures, work_->writer(), hierarchy, executor_));
+        clock_.ends("textures");
+        for (const auto& [reason, count] :
+             {std::pair{"degenerate triangles", facts_.degenerate}, std::pair{"duplicate triangles", duplicate_},
+              std::pair{"triangles that are not finite", facts_.notFinite}})
+            if (count > 0) report_.dropped[reason] = count;
+        report_.pointsIn = facts_.triangles;
+        StoreDescription description = settings_.description;
+        description.points = report_.pointsOut = kept_;
+        description.pointsIn = report_.pointsIn;
+        description.dropped = report_.dropped;
+        for (const Node& node : hierarchy.nodes) description.records += node.records;
+        description.roundingUnits = facts_.rounding;
+        description.boundsMin = description.focusMin = facts_.lattice.origin + facts_.lattice.unit * glm::dvec3(lo_);
+        description.boundsMax = description.focusMax = facts_.lattice.origin + facts_.lattice.unit * glm::dvec3(hi_);
+        description.hasColour = description.hasNormals = description.isReflectance = true;
+        StoreWriter& writer = work_->writer();
+        STIPPLE_TRY(writer.finish(hierarchy, description));
+        clock_.ends("finish");
+        STIPPLE_ASSIGN(const Store store, openStore(writer.temporaryPath()));
+        STIPPLE_TRY(verifyStore(store, executor_, hierarchy.nodes.size() > kVerifiedNodes ? kVerifiedNodes : 0));
+        clock_.ends("verify");
+        report_.bytesOut = writer.bytes();
+        STIPPLE_TRY(writer.commit());
+        work_->finish();
+        report_.temporaryBytes = work_->temporaryBytes();
+        report_.nodes = hierarchy.nodes.size();
+        report_.records = description.records;
+        report_.contentHash = writer.contentHash();
+        uint64_t coarsest = 0;
+        for (size_t i = 0; i < hierarchy.nodes.size(); ++i)
+            coarsest += hierarchy.groups[i].parents == 0 ? hierarchy.nodes[i].records : 0;
+        if (coarsest > kManyRoots)
+            report_.notes.push_back(fmt::format(
+                "{} triangles cannot be simplified (small separate parts, or edges of open borders): they are "
+                "drawn whatever the distance",
+                coarsest));
         return {};
     }
 
-    /// One group: what it is simplified to and how far that is from the input, and its own chunk.
-    Made simplify(std::vector<const Cluster*> members, bool isRoot) const {
-        Made made;
-        std::stable_sort(members.begin(), members.end(),
-                         [](const Cluster* a, const Cluster* b) { return a->producer < b->producer; });
-        const LocalMesh local = makeLocal(mesh_, members);
-        // Monotone, and a bound against the input: what is already wrong plus what is added.
-        double below = 0;
-        std::vector<Sphere> inside;
-        for (size_t i = 0; i < members.size(); ++i) {
-            const uint32_t p = members[i]->producer;
-            if (p == kNoProducer || (i > 0 && p == members[i - 1]->producer)) continue;
-            below = std::max(below, groups_[p].error);
-            inside.push_back({groups_[p].node.centre, groups_[p].node.radius});
-        }
-        if (!isRoot) {
-            const size_t target = local.indices.size() / 6 * 3;
-            std::vector<uint32_t> coarse(local.indices.size());
-            coarse.resize(meshopt_simplify(coarse.data(), local.indices.data(), local.indices.size(),
-                                           &local.position[0].x, local.position.size(), sizeof(glm::vec3), target,
-                                           kAnyError, meshopt_SimplifyLockBorder, nullptr));
-            if (coarse.empty() ||
-                static_cast<double>(coarse.size()) > kWorthwhile * static_cast<double>(local.indices.size()))
-                return made;
-            made.group.error = measureDeviation(mesh_, local, coarse, kUnimportant * below);
-            STIPPLE_CHECK(made.group.error >= 0 && made.group.error < kRootError, "deviation of a group");
-            appendClusters(local, coarse, kNoProducer, false, made.products);
-        }
-        made.isSimplified = true;
-        made.group.error = isRoot ? kRootError : made.group.error + below;
-        const Sphere sphere = sphereOf(local, inside);
-        made.group.node.centre = sphere.centre;
-        made.group.node.radius = sphere.radius;
-        made.bytes = encode(members, made.group);
-        return made;
-    }
+    static constexpr uint64_t kSpillBytes = 24;  ///< of a triangle, between the steps
 
-    /// Which textures the group shows, what part of them, and how densely.
-    void describeTextures(const Chunk& chunk, Group& group) const {
-        constexpr float kAll = 1e6f;
-        std::vector<uint8_t> isUsed(settings_.textures.size());
-        glm::vec2 lo(kAll), hi(-kAll);
-        const auto& materials = settings_.description.materials;
-        for (const shared::MeshVertex& v : chunk.vertices) {
-            if ((v.surface & shared::kSurfaceTextured) == 0) continue;
-            lo = glm::min(lo, glm::vec2(v.u, v.v));
-            hi = glm::max(hi, glm::vec2(v.u, v.v));
-            const uint32_t m = v.surface & shared::kSurfaceMaterialMask;
-            if (m >= materials.size()) continue;
-            for (const shared::TextureSlot* s :
-                 {&materials[m].baseTexture, &materials[m].surfaceTexture, &materials[m].normalTexture,
-                  &materials[m].occlusionTexture, &materials[m].emissiveTexture}) {
-                if (s->texture == 0) continue;
-                isUsed[s->texture - 1] = 1;
-                const bool isPlain = s->rowU.x == 1 && s->rowU.y == 0 && s->rowU.z == 0 && s->rowV.x == 0 &&
-                                     s->rowV.y == 1 && s->rowV.z == 0;
-                if (!isPlain) {
-                    lo = glm::vec2(-kAll);
-                    hi = glm::vec2(kAll);
-                }
-            }
-        }
-        double inSpace = 0, inTexture = 0;
-        for (const shared::MeshCluster& c : chunk.clusters)
-            for (uint32_t t = c.firstTriangle; t < c.firstTriangle + (c.counts >> 16); ++t) {
-                const auto vertex = [&](uint32_t k) -> const shared::MeshVertex& {
-                    return chunk.vertices[c.firstVertex + (chunk.triangles[t] >> (8 * k) & 255u)];
-                };
-                const auto &a = vertex(0), &b = vertex(1), &d = vertex(2);
-                if ((a.surface & shared::kSurfaceTextured) == 0) continue;
-                inSpace += glm::length(glm::cross(glm::dvec3(b.x - a.x, b.y - a.y, b.z - a.z),
-                                                  glm::dvec3(d.x - a.x, d.y - a.y, d.z - a.z)));
-                inTexture += std::abs(double(b.u - a.u) * (d.v - a.v) - double(b.v - a.v) * (d.u - a.u));
-            }
-        for (uint32_t t = 0; t < isUsed.size(); ++t)
-            if (isUsed[t]) group.textures.push_back(t);
-        if (group.textures.empty()) return;
-        group.counts.lowU = lo.x;
-        group.counts.lowV = lo.y;
-        group.counts.highU = hi.x;
-        group.counts.highV = hi.y;
-        group.counts.uvPerStep = inSpace > 0 ? static_cast<float>(std::sqrt(inTexture / inSpace)) : 0.0f;
-    }
-
-    std::vector<uint8_t> encode(const std::vector<const Cluster*>& members, Group& group) const {
-        Chunk chunk;
-        std::vector<uint32_t> order;  // vertices of one cluster, by first use
-        // Vertex -> its number in the cluster: open addressing, four places for each vertex that there can be.
-        struct Slot {
-            uint32_t vertex = ~0u, number = 0;
-        };
-        constexpr uint32_t kSlots = 1024;
-        std::vector<Slot> slots(kSlots);
-        const auto numberOf = [&](uint32_t v) {
-            uint32_t at = v * 0x9e3779b1u >> 22;
-            while (slots[at].vertex != v) {
-                if (slots[at].vertex == ~0u) {
-                    slots[at] = {v, static_cast<uint32_t>(order.size())};
-                    order.push_back(v);
-                    break;
-                }
-                at = (at + 1) % kSlots;
-            }
-            return slots[at].number;
-        };
-        for (const Cluster* c : members) {
-            order.clear();
-            std::fill(slots.begin(), slots.end(), Slot{});
-            shared::MeshCluster cluster{static_cast<uint32_t>(chunk.vertices.size()),
-                                        static_cast<uint32_t>(chunk.triangles.size()), 0};
-            for (size_t i = 0; i < c->indices.size(); i += 3) {
-                const uint32_t a = numberOf(c->indices[i]), b = numberOf(c->indices[i + 1]);
-                chunk.triangles.push_back(a | b << 8 | numberOf(c->indices[i + 2]) << 16);
-            }
-            const auto triangles = static_cast<uint32_t>(c->indices.size() / 3);
-            cluster.counts = static_cast<uint32_t>(order.size()) | triangles << 16;
-            for (const uint32_t v : order) chunk.vertices.push_back(mesh_.vertices[v]);
-            const uint32_t producer = c->producer == kNoProducer ? MeshRun::kOriginal : c->producer;
-            if (group.runs.empty() || group.runs.back().producer != producer)
-                group.runs.push_back({producer, static_cast<uint32_t>(chunk.clusters.size()), 0, 0});
-            ++group.runs.back().clusters;
-            group.runs.back().triangles += triangles;
-            chunk.clusters.push_back(cluster);
-        }
-        describeTextures(chunk, group);
-        group.node.records = static_cast<uint32_t>(chunk.triangles.size());
-        group.counts.vertices = static_cast<uint32_t>(chunk.vertices.size());
-        group.counts.clusters = static_cast<uint32_t>(chunk.clusters.size());
-        return encodeMeshChunk(chunk);
-    }
-
-    const WeldedMesh& mesh_;
+    const MeshSource& source_;
+    const std::string output_;
     const MeshBuildSettings& settings_;
-    StoreWriter& writer_;
     Executor& executor_;
     Progress& progress_;
+    BuildReport report_;
+    StageClock clock_;
+    int workers_;
+    bool isOnDisk_ = false;
+    uint64_t bufferBytes_ = 0;
+    std::optional<Reduction> work_;
+    Facts facts_;
     std::vector<Group> groups_;
-    uint64_t written_ = 0;
+    uint64_t kept_ = 0, duplicate_ = 0;
+    glm::ivec3 lo_{1 << 30}, hi_{-1};
 };
 
 }  // namespace
 
-Result<BuildReport> buildMeshStore(TriangleMesh input, const std::string& output, const MeshBuildSettings& settings,
-                                   Executor& executor, Progress& progress) {
-    BuildReport report;
-    StageClock clock(report);
-    STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output));
-    report.primitive = "triangle";
-    report.pointsIn = input.indices.size() / 3;
-    const WeldedMesh mesh = weldMesh(std::move(input), executor);
-    clock.ends("weld");
-    for (const auto& [reason, count] :
-         {std::pair{"degenerate triangles", mesh.degenerate}, std::pair{"duplicate triangles", mesh.duplicate},
-          std::pair{"triangles that are not finite", mesh.notFinite}})
-        if (count > 0) report.dropped[reason] = count;
-    if (mesh.indices.empty())
-        return fail(ErrorKind::input, "holds no triangle with an area", settings.description.source);
-    MeshBuilder builder(mesh, settings, writer, executor, progress);
-    STIPPLE_TRY(builder.run());
-    clock.ends("simplify");
-    Hierarchy hierarchy;
-    builder.tables(hierarchy);
-    STIPPLE_TRY(writeTextures(settings.textures, writer, hierarchy, executor));
-    clock.ends("textures");
-    StoreDescription description = settings.description;
-    description.points = report.pointsOut = mesh.indices.size() / 3;
-    for (const Node& node : hierarchy.nodes) description.records += node.records;
-    description.roundingUnits = mesh.rounding;
-    glm::dvec3 lo(1e300), hi(-1e300);
-    for (const shared::MeshVertex& v : mesh.vertices) {
-        lo = glm::min(lo, glm::dvec3(v.x, v.y, v.z));
-        hi = glm::max(hi, glm::dvec3(v.x, v.y, v.z));
-    }
-    description.boundsMin = description.focusMin = mesh.origin + mesh.unit * lo;
-    description.boundsMax = description.focusMax = mesh.origin + mesh.unit * hi;
-    description.hasColour = description.hasNormals = description.isReflectance = true;
-    STIPPLE_TRY(writer.finish(hierarchy, description));
-    clock.ends("finish");
-    STIPPLE_ASSIGN(const Store store, openStore(writer.temporaryPath()));
-    STIPPLE_TRY(verifyStore(store, executor));
-    clock.ends("verify");
-    report.bytesOut = writer.bytes();
-    STIPPLE_TRY(writer.commit());
-    report.nodes = hierarchy.nodes.size();
-    report.records = description.records;
-    report.contentHash = writer.contentHash();
-    uint64_t coarsest = 0;
-    for (size_t i = 0; i < hierarchy.nodes.size(); ++i)
-        coarsest += hierarchy.groups[i].parents == 0 ? hierarchy.nodes[i].records : 0;
-    if (coarsest > kManyRoots)
-        report.notes.push_back(
-            fmt::format("{} triangles cannot be simplified (many small separate parts): they are "
-                        "drawn whatever the distance",
-                        coarsest));
-    report.seconds = clock.seconds();
-    return report;
+Result<BuildReport> buildMeshStore(const MeshSource& source, const std::string& output,
+                                   const MeshBuildSettings& settings, Executor& executor, Progress& progress) {
+    return MeshBuild(source, output, settings, executor, progress).run();
 }
 
 }  // namespace stipple::lod

@@ -6,29 +6,61 @@
 #include <vector>
 
 #include "engine/base/executor.h"
-#include "lod/mesh.h"
+#include "lod/build/octree/bytes.h"
+#include "lod/build/octree/cells.h"
+#include "lod/mesh_source.h"
 #include "lod/store.h"
 
 namespace stipple::lod {
 
-/// Welded input on its lattice. Level-of-detail triangles index the same vertices.
+/// World = origin + unit * (x, y, z).
+struct Lattice {
+    glm::dvec3 origin{0};
+    double unit = 1;
+    uint32_t largest = 0;  ///< coordinate; at most 2^24, so that fp32 holds them exactly
+};
+Lattice latticeOf(const MeshSource::Bounds& bounds);
+
+/// Triangles on the lattice.
+struct Soup {
+    std::vector<shared::MeshVertex> vertices;
+    std::vector<uint32_t> indices;  ///< 3 a triangle
+};
+void putSoup(const Soup& soup, ByteWriter& to);
+/// Appends; false if the bytes are not what putSoup wrote.
+bool getSoup(ByteReader& from, Soup& to);
+
+/// A block of a source on the lattice, without triangles that have no area there or are not finite.
+struct PlacedBlock {
+    Soup soup;
+    std::vector<uint32_t> x, y, z;  ///< of the triangles' centres
+    uint64_t degenerate = 0, notFinite = 0;
+    double rounding = 0;  ///< largest of a coordinate, world units
+    Coordinates centres() const { return {x, y, z}; }
+};
+PlacedBlock placeBlock(const TriangleMesh& block, const Lattice& lattice, Executor& executor);
+
+/// Vertices of one cell, each once; triangles of every level of detail index the same ones.
 struct WeldedMesh {
-    glm::dvec3 origin{0};  ///< world position of lattice (0,0,0)
-    double unit = 1;       ///< world units per step; coordinates are below 2^24, so that fp32 holds them exactly
     std::vector<shared::MeshVertex> vertices;
     std::vector<uint32_t> position;  ///< vertex -> number of its position: seams of attributes do not part a surface
-    std::vector<uint32_t> indices;   ///< 3 a triangle, along a Morton curve
-    uint64_t degenerate = 0, duplicate = 0, notFinite = 0;
-    double rounding = 0;  ///< largest rounding of a coordinate, world units
-
     glm::vec3 at(uint32_t vertex) const {
         const shared::MeshVertex& v = vertices[vertex];
         return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
     }
 };
+/// Makes equal vertices of `soup` one. The order of the result hangs on the vertices alone; so does that of the
+/// triangles if they are sorted: then they stand along a Morton curve, equal ones once, and `duplicate` counts those.
+WeldedMesh weld(Soup& soup);
+uint64_t sortTriangles(WeldedMesh& mesh, std::vector<uint32_t>& indices);
 
-WeldedMesh weldMesh(TriangleMesh mesh, Executor& executor);
-
+/// What a simplification that gave triangles of a cell is known by.
+struct Producer {
+    uint32_t number = 0;  ///< of its group; of this cell's own kind: see GroupTable::kOwn
+    double error = 0;     ///< lattice units
+    glm::dvec3 centre{0};
+    double radius = 0;
+};
 constexpr uint32_t kNoProducer = ~0u;
 
 struct Cluster {
@@ -48,7 +80,7 @@ LocalMesh makeLocal(const WeldedMesh& mesh, const std::vector<const Cluster*>& c
 /// fills space, runs of them are compact as they are, at a fraction of the time.
 void appendClusters(const LocalMesh& local, const std::vector<uint32_t>& indices, uint32_t producer, bool isAlongCurve,
                     std::vector<Cluster>& out);
-std::vector<Cluster> makeClusters(const WeldedMesh& mesh, Executor& executor);
+std::vector<Cluster> makeClusters(const WeldedMesh& mesh, const std::vector<uint32_t>& indices, Executor& executor);
 
 /// Groups of about `size` clusters with few edges between groups; deterministic.
 std::vector<std::vector<uint32_t>> groupClusters(const WeldedMesh& mesh, const std::vector<Cluster>& clusters,

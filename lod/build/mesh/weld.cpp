@@ -2,9 +2,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <numeric>
 
-#include "engine/base/hash.h"
 #include "lod/build/mesh/mesh_work.h"
 #include "lod/build/morton.h"
 #include "lod/octahedral.h"
@@ -13,79 +11,52 @@ namespace stipple::lod {
 namespace {
 
 constexpr int kLatticeBits = 24;
+constexpr size_t kGrain = 16384;
 
 bool isFinite(const glm::dvec3& p) { return std::isfinite(p.x + p.y + p.z); }
 
-/// The first of equal items stands for all; `hashOf` and `equal` take indices. Each part of the hashes has a table of
-/// its own.
-template <typename Hash, typename Equal>
-std::vector<uint32_t> firstOfEqual(size_t count, const Hash& hashOf, const Equal& equal, Executor& executor) {
-    constexpr size_t kParts = 4;
-    size_t slots = 16;
-    while (slots < 2 * count / kParts) slots *= 2;
-    std::vector<uint32_t> first(count);
-    executor.parallelFor(kParts, 1, [&](size_t begin, size_t end) {
-        for (size_t part = begin; part < end; ++part) {
-            std::vector<uint32_t> table(slots, ~0u);
-            size_t mask = slots - 1, used = 0;
-            const auto find = [&](uint64_t hash, uint32_t i) -> uint32_t& {
-                size_t slot = hash & mask;
-                while (table[slot] != ~0u && !equal(table[slot], i)) slot = (slot + 1) & mask;
-                return table[slot];
-            };
-            for (uint32_t i = 0; i < count; ++i) {
-                const uint64_t hash = hashOf(i);
-                if (hash >> 62 != part) continue;
-                uint32_t& entry = find(hash, i);
-                if (entry == ~0u) {
-                    entry = i;
-                    ++used;
-                }
-                first[i] = entry;
-                if (2 * used <= mask) continue;
-                const std::vector<uint32_t> old = std::move(table);  // more than its share: twice the room
-                table.assign(2 * old.size(), ~0u);
-                mask = table.size() - 1;
-                for (const uint32_t k : old)
-                    if (k != ~0u) find(hashOf(k), k) = k;
-            }
-        }
-    });
-    return first;
-}
-
-/// Bit by bit: two zeros of different sign are two values.
+/// Bit by bit: two zeros of different sign are two values. Equal positions stand side by side.
 std::array<uint32_t, 8> wordsOf(const shared::MeshVertex& v) { return std::bit_cast<std::array<uint32_t, 8>>(v); }
 
-uint64_t mix(uint64_t h) {
-    h ^= h >> 33;
-    h *= 0xff51afd7ed558ccdull;
-    h ^= h >> 29;
-    h *= 0x9e3779b97f4a7c15ull;
-    return h ^ h >> 32;
+uint64_t keyOf(int64_t x, int64_t y, int64_t z) {
+    constexpr int kDrop = kLatticeBits - static_cast<int>(kMortonBits);
+    return mortonCode(static_cast<uint32_t>(x >> kDrop), static_cast<uint32_t>(y >> kDrop),
+                      static_cast<uint32_t>(z >> kDrop));
 }
 
-void placeOnLattice(const TriangleMesh& in, WeldedMesh& out, Executor& executor) {
-    glm::dvec3 lo(1e300), hi(-1e300);
-    for (const glm::dvec3& p : in.position) {
-        if (!isFinite(p)) continue;
-        lo = glm::min(lo, p);
-        hi = glm::max(hi, p);
-    }
-    if (lo.x > hi.x) lo = hi = glm::dvec3(0);
-    const double extent = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z, 1e-30});
-    out.unit = std::exp2(std::floor(std::log2(extent)) + 1 - kLatticeBits);
+bool hasArea(const shared::MeshVertex& a, const shared::MeshVertex& b, const shared::MeshVertex& c) {
+    const auto at = [](const shared::MeshVertex& v) { return glm::dvec3(v.x, v.y, v.z); };
+    return glm::cross(at(b) - at(a), at(c) - at(a)) != glm::dvec3(0);
+}
+
+}  // namespace
+
+Lattice latticeOf(const MeshSource::Bounds& bounds) {
+    Lattice lattice;
+    if (bounds.lo.x > bounds.hi.x) return lattice;
+    const glm::dvec3 size = bounds.hi - bounds.lo;
+    lattice.unit = std::exp2(std::floor(std::log2(std::max({size.x, size.y, size.z, 1e-30}))) + 1 - kLatticeBits);
     // Whole steps from zero, so that coordinates that lie on the lattice stay exact.
-    out.origin = glm::floor(lo / out.unit) * out.unit;
-    out.vertices.resize(in.position.size());
+    lattice.origin = glm::floor(bounds.lo / lattice.unit) * lattice.unit;
+    const glm::dvec3 last = glm::floor((bounds.hi - lattice.origin) / lattice.unit + 0.5);
+    lattice.largest = static_cast<uint32_t>(std::max({last.x, last.y, last.z}));
+    return lattice;
+}
+
+PlacedBlock placeBlock(const TriangleMesh& in, const Lattice& lattice, Executor& executor) {
+    PlacedBlock out;
+    auto& vertices = out.soup.vertices;
+    vertices.resize(in.position.size());
+    std::vector<uint8_t> isBad(vertices.size());
     const auto place = [&](size_t i, double& rounding) {
-        shared::MeshVertex& v = out.vertices[i];
-        const glm::dvec3 p = isFinite(in.position[i]) ? in.position[i] : lo;
-        const glm::dvec3 q = glm::floor((p - out.origin) / out.unit + 0.5);
+        shared::MeshVertex& v = vertices[i];
+        isBad[i] = isFinite(in.position[i]) ? 0 : 1;
+        const glm::dvec3 p = isBad[i] ? lattice.origin : in.position[i];
+        const glm::dvec3 q = glm::floor((p - lattice.origin) / lattice.unit + 0.5);
         v.x = static_cast<int>(q.x);
         v.y = static_cast<int>(q.y);
         v.z = static_cast<int>(q.z);
-        const glm::dvec3 off = glm::abs(out.origin + q * out.unit - p);
+        const glm::dvec3 off = glm::abs(lattice.origin + q * lattice.unit - p);
         rounding = std::max({rounding, off.x, off.y, off.z});
         const glm::vec3 n = in.normal.empty() ? glm::vec3(0) : in.normal[i];
         const float length = glm::length(n);
@@ -98,116 +69,100 @@ void placeOnLattice(const TriangleMesh& in, WeldedMesh& out, Executor& executor)
         v.v = hasUv ? uv.y : 0.0f;
         v.surface = (in.surface.empty() ? 0u : in.surface[i]) | (isFlat ? shared::kSurfaceFlat : 0u);
     };
-    constexpr size_t kParts = 64;
-    std::array<double, kParts> rounding{};
-    executor.parallelFor(kParts, 1, [&](size_t begin, size_t end) {
+    const size_t parts = vertices.size() / kGrain + 1;
+    std::vector<double> rounding(parts);
+    executor.parallelFor(parts, 1, [&](size_t begin, size_t end) {
         for (size_t p = begin; p < end; ++p)
-            for (size_t i = p * in.position.size() / kParts; i < (p + 1) * in.position.size() / kParts; ++i)
+            for (size_t i = p * vertices.size() / parts; i < (p + 1) * vertices.size() / parts; ++i)
                 place(i, rounding[p]);
     });
     out.rounding = *std::max_element(rounding.begin(), rounding.end());
-}
-
-}  // namespace
-
-WeldedMesh weldMesh(TriangleMesh in, Executor& executor) {
-    WeldedMesh out;
-    placeOnLattice(in, out, executor);
-    std::vector<uint8_t> isBad(in.position.size());
-    for (size_t i = 0; i < isBad.size(); ++i) isBad[i] = isFinite(in.position[i]) ? 0 : 1;
-    std::vector<uint32_t> indices = std::move(in.indices);
-    in = {};
-
-    // Equal vertices are one.
-    auto& v = out.vertices;
-    const std::vector<uint32_t> same = firstOfEqual(
-        v.size(), [&](uint32_t i) { return hashBytes(&v[i], sizeof(v[i])); },
-        [&](uint32_t a, uint32_t b) { return wordsOf(v[a]) == wordsOf(v[b]); }, executor);
-    // Dropped here: what has no area on the lattice.
-    const auto cornersDiffer = [&](const uint32_t* t) {
-        const glm::dvec3 a(v[t[0]].x, v[t[0]].y, v[t[0]].z), b(v[t[1]].x, v[t[1]].y, v[t[1]].z),
-            c(v[t[2]].x, v[t[2]].y, v[t[2]].z);
-        return glm::cross(b - a, c - a) != glm::dvec3(0);
-    };
-    size_t kept = 0;
-    for (size_t i = 0; i + 3 <= indices.size(); i += 3) {
-        if (isBad[indices[i]] || isBad[indices[i + 1]] || isBad[indices[i + 2]]) {
+    out.soup.indices.reserve(in.indices.size());
+    for (size_t i = 0; i + 3 <= in.indices.size(); i += 3) {
+        const uint32_t* const t = &in.indices[i];
+        if ((isBad[t[0]] | isBad[t[1]] | isBad[t[2]]) != 0) {
             ++out.notFinite;
             continue;
         }
-        std::array<uint32_t, 3> t{same[indices[i]], same[indices[i + 1]], same[indices[i + 2]]};
-        if (!cornersDiffer(t.data())) {
+        const auto &a = vertices[t[0]], &b = vertices[t[1]], &c = vertices[t[2]];
+        if (!hasArea(a, b, c)) {
             ++out.degenerate;
             continue;
         }
+        out.soup.indices.insert(out.soup.indices.end(), t, t + 3);
+        const auto middle = [](int p, int q, int r) { return static_cast<uint32_t>((int64_t{p} + q + r) / 3); };
+        out.x.push_back(middle(a.x, b.x, c.x));
+        out.y.push_back(middle(a.y, b.y, c.y));
+        out.z.push_back(middle(a.z, b.z, c.z));
+    }
+    return out;
+}
+
+WeldedMesh weld(Soup& soup) {
+    struct Item {
+        uint64_t key;
+        uint32_t vertex;
+    };
+    const auto& v = soup.vertices;
+    std::vector<Item> order(v.size());
+    for (uint32_t i = 0; i < v.size(); ++i) order[i] = {keyOf(v[i].x, v[i].y, v[i].z), i};
+    std::sort(order.begin(), order.end(), [&](const Item& a, const Item& b) {
+        return a.key != b.key ? a.key < b.key : wordsOf(v[a.vertex]) < wordsOf(v[b.vertex]);
+    });
+    WeldedMesh out;
+    std::vector<uint32_t> place(v.size());
+    uint32_t positions = 0;
+    for (size_t i = 0; i < order.size(); ++i) {
+        const shared::MeshVertex& vertex = v[order[i].vertex];
+        const bool isFirst = out.vertices.empty();
+        if (isFirst || wordsOf(out.vertices.back()) != wordsOf(vertex)) {
+            const bool isSamePlace = !isFirst && out.vertices.back().x == vertex.x &&
+                                     out.vertices.back().y == vertex.y && out.vertices.back().z == vertex.z;
+            positions += isFirst || isSamePlace ? 0 : 1;
+            out.vertices.push_back(vertex);
+            out.position.push_back(positions);
+        }
+        place[order[i].vertex] = static_cast<uint32_t>(out.vertices.size() - 1);
+    }
+    for (uint32_t& i : soup.indices) i = place[i];
+    soup.vertices = {};
+    return out;
+}
+
+uint64_t sortTriangles(WeldedMesh& mesh, std::vector<uint32_t>& indices) {
+    struct Item {
+        uint64_t key;
+        std::array<uint32_t, 3> corners;
+        auto operator<=>(const Item&) const = default;
+    };
+    std::vector<Item> order(indices.size() / 3);
+    for (size_t i = 0; i < order.size(); ++i) {
+        auto& t = order[i].corners;
+        std::copy_n(indices.begin() + static_cast<ptrdiff_t>(3 * i), 3, t.begin());
         // The smallest index first: equal triangles are then equal words, and the winding stays.
         std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
-        std::copy(t.begin(), t.end(), indices.begin() + static_cast<ptrdiff_t>(kept));
-        kept += 3;
+        const auto &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+        order[i].key =
+            keyOf((int64_t{a.x} + b.x + c.x) / 3, (int64_t{a.y} + b.y + c.y) / 3, (int64_t{a.z} + b.z + c.z) / 3);
     }
-    indices.resize(kept);
-    const size_t triangles = kept / 3;
-    // Along a Morton curve of the centres, where equal ones stand side by side.
-    struct Key {
-        uint64_t code;
-        uint32_t triangle;
-    };
-    std::vector<Key> order(triangles);
-    executor.parallelFor(triangles, 65536, [&](size_t begin, size_t end) {
-        for (size_t i = begin; i < end; ++i) {
-            const auto &a = v[indices[3 * i]], &b = v[indices[3 * i + 1]], &c = v[indices[3 * i + 2]];
-            const auto middle = [](int x, int y, int z) {
-                return static_cast<uint32_t>((int64_t{x} + y + z) / 3) >> (kLatticeBits - kMortonBits);
-            };
-            order[i] = {mortonCode(middle(a.x, b.x, c.x), middle(a.y, b.y, c.y), middle(a.z, b.z, c.z)),
-                        static_cast<uint32_t>(i)};
-        }
-    });
-    const auto cornersOf = [&](const Key& k) {
-        const uint32_t* t = &indices[3 * size_t{k.triangle}];
-        return std::array<uint32_t, 3>{t[0], t[1], t[2]};
-    };
-    const auto isBefore = [&](const Key& a, const Key& b) {
-        if (a.code != b.code) return a.code < b.code;
-        const auto ca = cornersOf(a), cb = cornersOf(b);
-        return ca != cb ? ca < cb : a.triangle < b.triangle;
-    };
-    constexpr size_t kPieces = 4;
-    const auto edge = [&](size_t p) { return order.begin() + static_cast<ptrdiff_t>(p * order.size() / kPieces); };
-    executor.parallelFor(kPieces, 1, [&](size_t begin, size_t end) {
-        for (size_t p = begin; p < end; ++p) std::sort(edge(p), edge(p + 1), isBefore);
-    });
-    executor.parallelFor(2, 1, [&](size_t begin, size_t end) {
-        for (size_t p = begin; p < end; ++p)
-            std::inplace_merge(edge(2 * p), edge(2 * p + 1), edge(2 * p + 2), isBefore);
-    });
-    std::inplace_merge(edge(0), edge(2), edge(4), isBefore);
-    const auto isSame = [&](const Key& a, const Key& b) { return a.code == b.code && cornersOf(a) == cornersOf(b); };
-    order.erase(std::unique(order.begin(), order.end(), isSame), order.end());
-    out.duplicate = triangles - order.size();
-
-    // Vertices in the order of their first use, unused ones left out.
-    std::vector<uint32_t> place(v.size(), ~0u);
-    std::vector<shared::MeshVertex> used;
-    out.indices.reserve(order.size() * 3);
-    for (const Key& k : order)
-        for (size_t c = 0; c < 3; ++c) {
-            const uint32_t vertex = indices[3 * size_t{k.triangle} + c];
+    std::sort(order.begin(), order.end());
+    const size_t before = order.size();
+    order.erase(std::unique(order.begin(), order.end()), order.end());
+    // Vertices in the order of their first use: what is used together lies together.
+    std::vector<uint32_t> place(mesh.vertices.size(), ~0u);
+    WeldedMesh used;
+    indices.clear();
+    for (const Item& item : order)
+        for (const uint32_t vertex : item.corners) {
             if (place[vertex] == ~0u) {
-                place[vertex] = static_cast<uint32_t>(used.size());
-                used.push_back(v[vertex]);
+                place[vertex] = static_cast<uint32_t>(used.vertices.size());
+                used.vertices.push_back(mesh.vertices[vertex]);
+                used.position.push_back(mesh.position[vertex]);
             }
-            out.indices.push_back(place[vertex]);
+            indices.push_back(place[vertex]);
         }
-    v = std::move(used);
-    out.position = firstOfEqual(
-        v.size(),
-        [&](uint32_t i) {
-            return mix(static_cast<uint64_t>(v[i].x) +
-                       mix(static_cast<uint64_t>(v[i].y) + mix(static_cast<uint64_t>(v[i].z) + 0x9e3779b97f4a7c15ull)));
-        },
-        [&](uint32_t a, uint32_t b) { return v[a].x == v[b].x && v[a].y == v[b].y && v[a].z == v[b].z; }, executor);
-    return out;
+    mesh = std::move(used);
+    return before - order.size();
 }
 
 }  // namespace stipple::lod

@@ -10,27 +10,6 @@
 namespace stipple::lod {
 namespace {
 
-/// Nodes of the octree over counted cells [begin, end) that hold at most kAtomPoints.
-void findAtoms(const Frame& frame, const std::vector<Cell>& cells, size_t begin, size_t end, uint32_t level,
-               std::vector<std::pair<Atom, size_t>>& atoms) {
-    uint64_t count = 0;
-    for (size_t i = begin; i < end && count <= kAtomPoints; ++i) count += cells[i].count;
-    if (count <= kAtomPoints || cells[begin].level == level) {
-        if (count > kAtomPoints) count = cells[begin].count;
-        const uint32_t shift = frame.shiftOf(level);
-        atoms.push_back({{cells[begin].key >> shift << shift, count, static_cast<uint8_t>(level)}, end});
-        return;
-    }
-    const uint32_t shift = frame.shiftOf(level + 1);
-    while (begin < end) {
-        const uint64_t child = cells[begin].key >> shift;
-        size_t next = begin;
-        while (next < end && cells[next].key >> shift == child) ++next;
-        findAtoms(frame, cells, begin, next, level + 1, atoms);
-        begin = next;
-    }
-}
-
 std::array<int64_t, 3> cornerOf(const Frame& frame, uint64_t key) {
     const uint32_t drop = frame.rootLog2 - frame.keyLevels;
     return {int64_t{compactBits(key)} << drop, int64_t{compactBits(key >> 1)} << drop,
@@ -51,22 +30,21 @@ uint32_t cellAt(const Frame& frame, const CellTree& tree, const std::array<int64
 BucketPlan planBuckets(const Frame& frame, const CellTree& tree, uint64_t most) {
     BucketPlan plan;
     const std::vector<Cell>& cells = tree.cells();
-    std::vector<std::pair<Atom, size_t>> atoms;
-    findAtoms(frame, cells, 0, cells.size(), 0, atoms);
     plan.ofCell.resize(cells.size());
     uint64_t points = 0;
-    size_t cell = 0;
-    for (const auto& [atom, end] : atoms) {
+    for (const Atom& atom : tree.atoms()) {
         if (plan.buckets.empty() || plan.buckets.back().points + atom.count > most) {
             plan.buckets.emplace_back();
             plan.buckets.back().firstPoint = points;
-            plan.buckets.back().firstCell = static_cast<uint32_t>(cell);
+            plan.buckets.back().firstCell = atom.firstCell;
         }
         BucketPlan::Bucket& bucket = plan.buckets.back();
         bucket.atoms.push_back(atom);
         bucket.points += atom.count;
         points += atom.count;
-        for (; cell < end; ++cell, ++bucket.cells) plan.ofCell[cell] = static_cast<uint32_t>(plan.buckets.size() - 1);
+        bucket.cells += atom.cells;
+        for (uint32_t c = 0; c < atom.cells; ++c)
+            plan.ofCell[atom.firstCell + c] = static_cast<uint32_t>(plan.buckets.size() - 1);
     }
     // Beside which cells does another bucket begin? Buckets are runs of cells, so the first and the last cell of a
     // neighbouring place of the same size tell.

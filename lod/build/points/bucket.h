@@ -4,15 +4,10 @@
 #include <memory>
 
 #include "engine/base/spill.h"
-#include "lod/build/points/cells.h"
+#include "lod/build/octree/cells.h"
+#include "lod/build/points/points.h"
 
 namespace stipple::lod {
-
-/// The largest octree node that is built as one.
-struct Atom {
-    uint64_t key = 0, count = 0;
-    uint8_t level = 0;
-};
 
 /// Atoms along the Morton curve, and which bucket each counted cell belongs to.
 struct BucketPlan {

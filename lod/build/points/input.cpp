@@ -1,13 +1,13 @@
 #include "lod/build/points/input.h"
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <filesystem>
 
+#include "engine/base/file.h"
 #include "engine/base/hash.h"
 #include "engine/base/queue.h"
 #include "lod/import/import.h"
@@ -133,14 +133,9 @@ Result<void> PointInput::adopt(PointSource from, const ReadOptions& options, std
 }
 
 uint64_t PointInput::identity() const {
-    std::string text;
-    for (const PointSource& s : sources_) {
-        struct stat info {};
-        if (::stat(s.info.path.c_str(), &info) != 0) continue;
-        text += fmt::format("{}|{}|{}|{}|{}\n", s.info.path, info.st_size, info.st_mtim.tv_sec, info.st_mtim.tv_nsec,
-                            s.info.points);
-    }
-    return hashBytes(text.data(), text.size());
+    std::vector<uint64_t> of;
+    for (const PointSource& s : sources_) of.insert(of.end(), {fileIdentity(s.info.path), s.info.points});
+    return hashBytes(of.data(), of.size() * sizeof(uint64_t));
 }
 
 // ---- the survey ----

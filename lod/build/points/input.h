@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 
+#include "lod/build/build.h"
 #include "lod/build/lattice.h"
 #include "lod/build/points/points.h"
 

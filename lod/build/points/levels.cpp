@@ -184,21 +184,6 @@ void innerSphere(const Frame& frame, std::span<const PendingNode> children, Pend
     node.radius *= 1 + 1e-6;
 }
 
-}  // namespace
-
-Frame makeFrame(const glm::dvec3& origin, double unit, uint32_t largest, uint32_t leafRecords) {
-    Frame f;
-    f.origin = origin;
-    f.unit = unit;
-    f.rootLog2 = static_cast<uint32_t>(std::bit_width(std::max(largest, 1u)));
-    f.keyLevels = std::min(f.rootLog2, kMortonBits);
-    f.leafRecords = leafRecords;
-    f.errors = errorsOf(f.rootLog2);
-    return f;
-}
-
-namespace {
-
 PendingNode makeLeaf(const Frame& frame, SortedPoints& from, size_t begin, size_t end, uint32_t level) {
     PendingNode out;
     const double edge = frame.cellSize(level);

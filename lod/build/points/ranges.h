@@ -3,7 +3,7 @@
 
 #include <map>
 
-#include "lod/build/points/bytes.h"
+#include "lod/build/octree/bytes.h"
 #include "lod/build/points/points.h"
 #include "lod/description.h"
 

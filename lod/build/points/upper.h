@@ -1,7 +1,7 @@
 // The tree above the atoms: their subtrees come in Morton order, and a node is made as soon as its last child is there.
 #pragma once
 
-#include "lod/build/points/bytes.h"
+#include "lod/build/octree/bytes.h"
 #include "lod/build/points/levels.h"
 
 namespace stipple::lod {

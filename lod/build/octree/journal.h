@@ -12,6 +12,8 @@ namespace stipple::lod {
 
 class Journal {
   public:
+    /// Where the build of `output` keeps what does not fit in memory; `tempFolder` empty: beside the output.
+    static std::string folderOf(const std::string& output, const std::string& tempFolder);
     /// Of the build of `output`; makes the folder if it is not there. `identity`: of input and settings; a folder of
     /// another is refused. Only one process at a time.
     static Result<Journal> open(const std::string& folder, const std::string& output, uint64_t identity);
@@ -29,6 +31,8 @@ class Journal {
     Result<void> restart();
     /// The build is complete.
     void remove();
+    /// Says how much temporary space is going to be needed, and fails if there is no room for it.
+    Result<void> announce(uint64_t bytes, Progress& progress) const;
 
   private:
     Journal() = default;

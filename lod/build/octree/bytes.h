@@ -14,15 +14,13 @@ class ByteWriter {
     template <typename T>
     void put(const T& value) {
         static_assert(std::is_trivially_copyable_v<T>);
-        const auto* const from = reinterpret_cast<const uint8_t*>(&value);
-        bytes_.insert(bytes_.end(), from, from + sizeof(T));
+        append(&value, sizeof(T));
     }
     template <typename T>
     void put(const std::vector<T>& values) {
         put(uint64_t{values.size()});
         if constexpr (std::is_trivially_copyable_v<T>) {
-            const auto* const from = reinterpret_cast<const uint8_t*>(values.data());
-            bytes_.insert(bytes_.end(), from, from + values.size() * sizeof(T));
+            append(values.data(), values.size() * sizeof(T));
         } else {
             for (const T& v : values) put(v);
         }
@@ -31,6 +29,11 @@ class ByteWriter {
     const std::vector<uint8_t>& bytes() const { return bytes_; }
 
   private:
+    void append(const void* from, size_t count) {
+        const size_t at = bytes_.size();
+        bytes_.resize(at + count);
+        if (count > 0) std::memcpy(bytes_.data() + at, from, count);
+    }
     std::vector<uint8_t> bytes_;
 };
 

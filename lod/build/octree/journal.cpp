@@ -1,8 +1,9 @@
-#include "lod/build/points/journal.h"
+#include "lod/build/octree/journal.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <array>
@@ -35,6 +36,12 @@ Journal::Journal(Journal&& other) noexcept
       entries_(std::move(other.entries_)) {}
 Journal::~Journal() {
     if (lock_ >= 0) ::close(lock_);
+}
+
+std::string Journal::folderOf(const std::string& output, const std::string& tempFolder) {
+    const fs::path out = fs::absolute(output);
+    const fs::path folder = tempFolder.empty() ? out.parent_path() : fs::path(tempFolder);
+    return (folder / (out.filename().string() + ".build")).string();
 }
 
 Result<Journal> Journal::open(const std::string& folder, const std::string& output, uint64_t identity) {
@@ -102,6 +109,18 @@ Result<void> Journal::restart() {
     STIPPLE_TRY(writeFileAt(folder_ + "/journal", 0, head.data(), sizeof(head)));
     end_ = sizeof(head);
     return {};
+}
+
+Result<void> Journal::announce(uint64_t bytes, Progress& progress) const {
+    progress.say(fmt::format("temporary disk space: up to {} in {}", humanBytes(bytes), folder_));
+    struct statvfs disk {};
+    if (::statvfs(folder_.c_str(), &disk) != 0) return {};
+    const uint64_t room = uint64_t{disk.f_bavail} * disk.f_frsize;
+    if (bytes <= room) return {};
+    return fail(
+        ErrorKind::budget,
+        fmt::format("{} of temporary files are needed, but there is room for {}", humanBytes(bytes), humanBytes(room)),
+        folder_, "name another folder with --temp, or give more --memory");
 }
 
 void Journal::remove() {

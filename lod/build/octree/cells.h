@@ -1,10 +1,10 @@
 // How the points are spread, found by counting: octree cells of at most kAtomPoints points, whatever the density.
 #pragma once
 
-#include <functional>
+#include <span>
 
-#include "lod/build/points/bytes.h"
-#include "lod/build/points/points.h"
+#include "lod/build/octree/bytes.h"
+#include "lod/build/octree/frame.h"
 
 namespace stipple::lod {
 
@@ -18,6 +18,19 @@ struct Cell {
     uint8_t level = 0;
 };
 
+/// Of the largest octree node that is built as one.
+struct Atom {
+    uint64_t key = 0, count = 0;
+    uint8_t level = 0;
+    uint32_t firstCell = 0, cells = 0;  ///< counted cells that it holds
+};
+
+/// Lattice coordinates of points; parallel.
+struct Coordinates {
+    std::span<const uint32_t> x, y, z;
+    size_t size() const { return x.size(); }
+};
+
 /// The root's cell split evenly into cells of a first level; where those hold more than kAtomPoints, they are split
 /// again. Counted again after each split, until nothing is left to split.
 class CellTree {
@@ -27,15 +40,18 @@ class CellTree {
 
     /// Splits where a sample (every `share`-th point) says that it will be needed, which saves counting again. What was
     /// not needed is taken back in finish(): the sample does not show.
-    void expect(const Points& sample, uint64_t share);
+    void expect(const Coordinates& sample, uint64_t share);
     /// From several threads.
-    void count(const Points& block);
+    void count(const Coordinates& block);
     /// Splits what is too full; true if so: count everything once more. Cells of the deepest level stay.
     bool split() { return split(kAtomPoints); }
     /// Nothing more to count: numbers the cells that hold points along the Morton curve.
     void finish();
 
     const std::vector<Cell>& cells() const { return cells_; }
+    /// Along the curve: octree nodes of at most kAtomPoints points whose parents hold more (and cells of the deepest
+    /// level, whatever they hold).
+    std::vector<Atom> atoms() const;
     /// Number of the cell that holds `key`; kNone where there are no points.
     static constexpr uint32_t kNone = 0x7fffffffu;
     uint32_t cellOf(uint64_t key) const { return entries_[placeOf(key)]; }
@@ -50,6 +66,7 @@ class CellTree {
     static constexpr uint32_t kBlock = 0x80000000u, kSplitLevels = 3;
     bool split(uint64_t most);
     uint64_t collapse(size_t first, uint32_t entries, uint32_t level);
+    void findAtoms(size_t begin, size_t end, uint32_t level, std::vector<Atom>& atoms) const;
     size_t placeOf(uint64_t key) const {
         size_t place = key >> firstShift_;
         for (uint32_t shift = firstShift_; (entries_[place] & kBlock) != 0;) {

@@ -1,4 +1,4 @@
-#include "lod/build/points/cells.h"
+#include "lod/build/octree/cells.h"
 
 #include <algorithm>
 #include <atomic>
@@ -22,7 +22,7 @@ CellTree::CellTree(const Frame& frame, uint64_t points) : frame_(frame) {
     entries_.assign(size_t{1} << (3 * firstLevel_), 0);
 }
 
-void CellTree::count(const Points& block) {
+void CellTree::count(const Coordinates& block) {
     size_t last = 0;
     uint32_t run = 0;
     const auto flush = [&] {
@@ -78,7 +78,7 @@ bool CellTree::split(uint64_t most) {
     return wasSplit_;
 }
 
-void CellTree::expect(const Points& sample, uint64_t share) {
+void CellTree::expect(const Coordinates& sample, uint64_t share) {
     do count(sample);
     while (split(kAtomPoints / share));
     for (uint32_t& e : entries_)
@@ -117,6 +117,32 @@ void CellTree::finish() {
         largeSpacing_ = spacing;
         if ((below += count) * 100 >= all * 95) break;
     }
+}
+
+void CellTree::findAtoms(size_t begin, size_t end, uint32_t level, std::vector<Atom>& atoms) const {
+    uint64_t count = 0;
+    for (size_t i = begin; i < end && count <= kAtomPoints; ++i) count += cells_[i].count;
+    if (count <= kAtomPoints || cells_[begin].level == level) {
+        if (count > kAtomPoints) count = cells_[begin].count;
+        const uint32_t shift = frame_.shiftOf(level);
+        atoms.push_back({cells_[begin].key >> shift << shift, count, static_cast<uint8_t>(level),
+                         static_cast<uint32_t>(begin), static_cast<uint32_t>(end - begin)});
+        return;
+    }
+    const uint32_t shift = frame_.shiftOf(level + 1);
+    while (begin < end) {
+        const uint64_t child = cells_[begin].key >> shift;
+        size_t next = begin;
+        while (next < end && cells_[next].key >> shift == child) ++next;
+        findAtoms(begin, next, level + 1, atoms);
+        begin = next;
+    }
+}
+
+std::vector<Atom> CellTree::atoms() const {
+    std::vector<Atom> atoms;
+    if (!cells_.empty()) findAtoms(0, cells_.size(), 0, atoms);
+    return atoms;
 }
 
 void CellTree::save(ByteWriter& to) const {

@@ -1,0 +1,66 @@
+#include "engine/base/paged_array.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <utility>
+
+namespace stipple {
+
+PageCache::PageCache(std::string folder, uint64_t memoryBytes)
+    : folder_(std::move(folder)), slots_(std::max<uint64_t>(memoryBytes / kPageBytes, 8)) {}
+PageCache::PageCache(PageCache&& other) noexcept
+    : folder_(std::move(other.folder_)),
+      slots_(std::move(other.slots_)),
+      file_(std::exchange(other.file_, -1)),
+      fileBytes_(other.fileBytes_),
+      isInFile_(std::move(other.isInFile_)),
+      error_(std::move(other.error_)) {}
+PageCache::~PageCache() {
+    if (file_ >= 0) ::close(file_);
+}
+
+Result<void> PageCache::status() const {
+    if (error_) return tl::unexpected(*error_);
+    return {};
+}
+
+void PageCache::failed(const char* what) {
+    if (!error_)
+        error_ = Error{ErrorKind::output, fmt::format("{}: {}", what, std::strerror(errno)), folder_,
+                       "name a folder for temporary files with --temp"};
+}
+
+void PageCache::change(Slot& slot, uint64_t number) {
+    if (slot.isDirty && !error_) {
+        if (file_ < 0) {
+            std::string name = folder_ + "/stipple-pages-XXXXXX";
+            file_ = ::mkostemp(name.data(), O_CLOEXEC);
+            if (file_ >= 0) ::unlink(name.c_str());
+        }
+        const auto at = static_cast<off_t>(slot.page * kPageBytes);
+        if (file_ < 0 || ::pwrite(file_, slot.bytes.data(), kPageBytes, at) != static_cast<ssize_t>(kPageBytes)) {
+            failed("a temporary file cannot be written");
+        } else {
+            fileBytes_ = std::max(fileBytes_, (slot.page + 1) * kPageBytes);
+            if (isInFile_.size() <= slot.page) isInFile_.resize(slot.page + 1);
+            isInFile_[slot.page] = true;
+        }
+    }
+    slot.page = number;
+    slot.isDirty = false;
+    if (number >= isInFile_.size() || !isInFile_[number] || error_) {
+        slot.bytes.assign(kPageBytes, 0);
+        return;
+    }
+    slot.bytes.resize(kPageBytes);
+    if (::pread(file_, slot.bytes.data(), kPageBytes, static_cast<off_t>(number * kPageBytes)) !=
+        static_cast<ssize_t>(kPageBytes)) {
+        failed("a temporary file cannot be read");
+        slot.bytes.assign(kPageBytes, 0);
+    }
+}
+
+}  // namespace stipple

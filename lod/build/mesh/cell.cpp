@@ -1,0 +1,351 @@
+#include "lod/build/mesh/cell.h"
+
+#include <meshoptimizer.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "engine/base/check.h"
+#include "engine/base/hash.h"
+#include "lod/build/mesh/encode.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr double kWorthwhile = 0.85;     ///< a simplification that keeps more triangles than this is not used
+constexpr double kUnimportant = 0.25;    ///< share of the error below that one level may add unseen
+constexpr double kStalled = 0.97;        ///< a level that keeps more than this of all triangles is the last one
+constexpr size_t kFewestTriangles = 16;  ///< below that nothing is simplified any more
+constexpr size_t kGoingUp = 16384;       ///< triangles of a cell that its parent goes on with
+constexpr size_t kMostGoingUp = 32768;   ///< of what cannot be simplified
+constexpr float kAnyError = 1e9f;        ///< the target is a number of triangles
+
+struct Sphere {
+    glm::dvec3 centre{0};
+    double radius = 0;
+};
+
+Sphere sphereOf(const LocalMesh& local, const std::vector<Sphere>& inside) {
+    glm::dvec3 lo(1e300), hi(-1e300);
+    for (const glm::vec3& p : local.position) {
+        lo = glm::min(lo, glm::dvec3(p));
+        hi = glm::max(hi, glm::dvec3(p));
+    }
+    for (const Sphere& s : inside) {
+        lo = glm::min(lo, s.centre - s.radius);
+        hi = glm::max(hi, s.centre + s.radius);
+    }
+    Sphere out{0.5 * (lo + hi), 0};
+    for (const glm::vec3& p : local.position)
+        out.radius = std::max(out.radius, glm::length(glm::dvec3(p) - out.centre));
+    for (const Sphere& s : inside) out.radius = std::max(out.radius, glm::length(s.centre - out.centre) + s.radius);
+    out.radius *= 1 + 1e-12;
+    return out;
+}
+
+class CellReducer {
+  public:
+    CellReducer(const Frame& frame, const MeshBuildSettings& settings, Executor& executor)
+        : frame_(frame), settings_(settings), executor_(executor) {}
+
+    Result<void> takeInput(const std::vector<uint8_t>& bytes) {
+        Soup soup;
+        ByteReader from(bytes);
+        while (!from.isWhole())
+            if (!getSoup(from, soup)) return damaged();
+        mesh_ = weld(soup);
+        table_.duplicate = sortTriangles(mesh_, soup.indices);
+        table_.triangles = soup.indices.size() / 3;
+        table_.lo = glm::ivec3(1 << 30);
+        table_.hi = glm::ivec3(-1);
+        for (const shared::MeshVertex& v : mesh_.vertices) {
+            table_.lo = glm::min(table_.lo, glm::ivec3(v.x, v.y, v.z));
+            table_.hi = glm::max(table_.hi, glm::ivec3(v.x, v.y, v.z));
+        }
+        clusters_ = makeClusters(mesh_, soup.indices, executor_);
+        return {};
+    }
+
+    Result<void> takeBelow(const std::vector<FromBelow>& below) {
+        Soup soup;
+        for (const FromBelow& child : below) {
+            ByteReader from(child.bytes);
+            std::vector<Producer> producers;
+            std::vector<ClusterHead> heads;
+            from.get(producers);
+            from.get(heads);
+            const auto firstProducer = static_cast<uint32_t>(producers_.size());
+            for (Producer& p : producers) {
+                if ((p.number & Group::kOwn) != 0)
+                    p.number = static_cast<uint32_t>(child.label) + (p.number & ~Group::kOwn);
+                producers_.push_back(p);
+            }
+            size_t at = soup.indices.size();
+            if (!getSoup(from, soup) || !from.isWhole()) return damaged();
+            for (const ClusterHead& head : heads) {
+                Cluster c;
+                if (head.indices > soup.indices.size() - at) return damaged();
+                const auto first = soup.indices.begin() + static_cast<ptrdiff_t>(at);
+                c.indices.assign(first, first + head.indices);
+                if (head.producer != kNoProducer) c.producer = firstProducer + head.producer;
+                at += head.indices;
+                clusters_.push_back(std::move(c));
+            }
+        }
+        mesh_ = weld(soup);
+        size_t at = 0;
+        for (Cluster& c : clusters_)
+            for (uint32_t& i : c.indices) i = soup.indices[at++];
+        return {};
+    }
+
+    CellProduct run(const WorkCell& cell) {
+        const bool isLast = cell.isLast;
+        uint64_t before = ~uint64_t{0}, triangles = trianglesNow();
+        bool isStalled = false;
+        while (triangles > (isLast ? kFewestTriangles : kGoingUp) && !isStalled) {
+            before = triangles;
+            clusters_ = nextLevel(std::move(clusters_));
+            triangles = trianglesNow();
+            isStalled = static_cast<double>(triangles) > kStalled * static_cast<double>(before);
+        }
+        if (isLast || triangles > kMostGoingUp) {
+            writeRoots();
+            clusters_ = {};
+        }
+        CellProduct out;
+        out.chunks = std::move(chunks_);
+        ByteWriter table;
+        table_.put(table);
+        out.table = table.bytes();
+        if (!isLast) out.up = goingUp(cell.level - 1);
+        return out;
+    }
+
+  private:
+    struct ClusterHead {
+        uint32_t indices, producer;
+    };
+    struct Made {
+        Group group;
+        std::vector<uint8_t> bytes;
+        std::vector<Cluster> products;
+        bool isSimplified = false;
+    };
+
+    static tl::unexpected<Error> damaged() {
+        return fail(ErrorKind::input, "a temporary file is not what was written", "", "build again");
+    }
+
+    uint64_t trianglesNow() const {
+        uint64_t sum = 0;
+        for (const Cluster& c : clusters_) sum += c.indices.size() / 3;
+        return sum;
+    }
+
+    /// Cells one level up are shifted by a third of their edge, so that a border between two cells, along which
+    /// nothing can be simplified, lies inside a cell of the next level. (Those of the plain octree would keep every
+    /// edge along a cell's border until the cell that holds both sides.)
+    uint64_t keyAbove(const Cluster& c, int level) const {
+        if (level < 0) return 0;
+        glm::ivec3 lo(1 << 30), hi(-1);
+        for (const uint32_t i : c.indices) {
+            const shared::MeshVertex& v = mesh_.vertices[i];
+            lo = glm::min(lo, glm::ivec3(v.x, v.y, v.z));
+            hi = glm::max(hi, glm::ivec3(v.x, v.y, v.z));
+        }
+        const auto edge = static_cast<int64_t>(frame_.cellSize(static_cast<uint32_t>(level)));
+        const auto along = [&](int a, int b) {
+            return static_cast<uint32_t>((3 * ((int64_t{a} + b) / 2) + 2 * edge) / (3 * edge));
+        };
+        return mortonCode(along(lo.x, hi.x), along(lo.y, hi.y), along(lo.z, hi.z));
+    }
+
+    std::vector<GoingUp> goingUp(int level) const {
+        std::map<uint64_t, std::vector<const Cluster*>> byCell;
+        for (const Cluster& c : clusters_) byCell[keyAbove(c, level)].push_back(&c);
+        std::vector<GoingUp> out;
+        for (const auto& [key, clusters] : byCell) out.push_back({key, bytesOf(clusters)});
+        return out;
+    }
+
+    std::vector<uint8_t> bytesOf(const std::vector<const Cluster*>& clusters) const {
+        std::vector<uint32_t> place(mesh_.vertices.size(), ~0u), number(producers_.size(), ~0u);
+        std::vector<Producer> producers;
+        std::vector<ClusterHead> heads;
+        Soup soup;
+        for (const Cluster* c : clusters) {
+            ClusterHead head{static_cast<uint32_t>(c->indices.size()), kNoProducer};
+            if (c->producer != kNoProducer) {
+                uint32_t& n = number[c->producer];
+                if (n == ~0u) {
+                    n = static_cast<uint32_t>(producers.size());
+                    producers.push_back(producers_[c->producer]);
+                }
+                head.producer = n;
+            }
+            heads.push_back(head);
+            for (const uint32_t v : c->indices) {
+                if (place[v] == ~0u) {
+                    place[v] = static_cast<uint32_t>(soup.vertices.size());
+                    soup.vertices.push_back(mesh_.vertices[v]);
+                }
+                soup.indices.push_back(place[v]);
+            }
+        }
+        ByteWriter to;
+        to.put(producers);
+        to.put(heads);
+        putSoup(soup, to);
+        return to.bytes();
+    }
+
+    std::vector<Cluster> nextLevel(std::vector<Cluster> clusters) {
+        const auto members = groupClusters(mesh_, clusters, settings_.groupClusters, executor_);
+        std::vector<Cluster> next;
+        constexpr size_t kBatch = 64;  // bounds what waits to be written
+        for (size_t first = 0; first < members.size(); first += kBatch) {
+            const size_t count = std::min(kBatch, members.size() - first);
+            std::vector<Made> made(count);
+            executor_.parallelFor(count, 1, [&](size_t begin, size_t end) {
+                for (size_t i = begin; i < end; ++i) {
+                    std::vector<const Cluster*> of;
+                    for (const uint32_t c : members[first + i]) of.push_back(&clusters[c]);
+                    made[i] = simplify(of, false);
+                }
+            });
+            for (size_t i = 0; i < count; ++i) {
+                if (!made[i].isSimplified) {  // with other neighbours it may shrink
+                    for (const uint32_t c : members[first + i]) next.push_back(std::move(clusters[c]));
+                    continue;
+                }
+                const auto number = static_cast<uint32_t>(producers_.size());
+                for (Cluster& c : made[i].products) {
+                    c.producer = number;
+                    next.push_back(std::move(c));
+                }
+                append(std::move(made[i]));
+                for (const uint32_t c : members[first + i]) clusters[c].indices = {};
+            }
+        }
+        return next;
+    }
+
+    void writeRoots() {
+        for (const auto& group : groupClusters(mesh_, clusters_, settings_.groupClusters, executor_)) {
+            std::vector<const Cluster*> of;
+            of.reserve(group.size());
+            for (const uint32_t c : group) of.push_back(&clusters_[c]);
+            append(simplify(of, true));
+        }
+    }
+
+    void append(Made made) {
+        Group& g = made.group;
+        producers_.push_back(
+            {static_cast<uint32_t>(table_.groups.size()) | Group::kOwn, g.error, g.node.centre, g.node.radius});
+        g.node.chunkOffset = chunks_.size();
+        g.node.chunkBytes = static_cast<uint32_t>(made.bytes.size());
+        g.node.chunkHash = hashBytes(made.bytes.data(), made.bytes.size());
+        g.node.attributeHash = hashBytes(nullptr, 0);
+        chunks_.insert(chunks_.end(), made.bytes.begin(), made.bytes.end());
+        table_.groups.push_back(std::move(g));
+    }
+
+    /// One group: what it is simplified to and how far that is from the input, and its own chunk.
+    Made simplify(std::vector<const Cluster*> members, bool isRoot) const {
+        Made made;
+        std::stable_sort(members.begin(), members.end(),
+                         [](const Cluster* a, const Cluster* b) { return a->producer < b->producer; });
+        const LocalMesh local = makeLocal(mesh_, members);
+        // Monotone, and a bound against the input: what is already wrong plus what is added.
+        double below = 0;
+        std::vector<Sphere> inside;
+        for (size_t i = 0; i < members.size(); ++i) {
+            const uint32_t p = members[i]->producer;
+            if (p == kNoProducer || (i > 0 && p == members[i - 1]->producer)) continue;
+            below = std::max(below, producers_[p].error);
+            inside.push_back({producers_[p].centre, producers_[p].radius});
+        }
+        if (!isRoot) {
+            const size_t target = local.indices.size() / 6 * 3;
+            std::vector<uint32_t> coarse(local.indices.size());
+            coarse.resize(meshopt_simplify(coarse.data(), local.indices.data(), local.indices.size(),
+                                           &local.position[0].x, local.position.size(), sizeof(glm::vec3), target,
+                                           kAnyError, meshopt_SimplifyLockBorder, nullptr));
+            if (coarse.empty() ||
+                static_cast<double>(coarse.size()) > kWorthwhile * static_cast<double>(local.indices.size()))
+                return made;
+            made.group.error = measureDeviation(mesh_, local, coarse, kUnimportant * below);
+            STIPPLE_CHECK(made.group.error >= 0 && made.group.error < Group::kRootError, "deviation of a group");
+            appendClusters(local, coarse, kNoProducer, false, made.products);
+        }
+        made.isSimplified = true;
+        made.group.error = isRoot ? Group::kRootError : made.group.error + below;
+        const Sphere sphere = sphereOf(local, inside);
+        made.group.node.centre = sphere.centre;
+        made.group.node.radius = sphere.radius;
+        made.bytes = encodeGroup(mesh_, members, producers_, settings_, made.group);
+        return made;
+    }
+
+    const Frame& frame_;
+    const MeshBuildSettings& settings_;
+    Executor& executor_;
+    WeldedMesh mesh_;
+    std::vector<Cluster> clusters_;
+    std::vector<Producer> producers_;  ///< those that came up and those of the cell
+    std::vector<uint8_t> chunks_;
+    CellTable table_;
+};
+
+}  // namespace
+
+Result<CellProduct> reduceMeshCell(const WorkCell& cell, const std::vector<uint8_t>& input,
+                                   const std::vector<FromBelow>& below, const Frame& frame,
+                                   const MeshBuildSettings& settings, Executor& executor) {
+    CellReducer reducer(frame, settings, executor);
+    if (cell.atom != WorkCell::kNone) {
+        STIPPLE_TRY(reducer.takeInput(input));
+    } else {
+        STIPPLE_TRY(reducer.takeBelow(below));
+    }
+    return reducer.run(cell);
+}
+
+void CellTable::put(ByteWriter& to) const {
+    to.put(triangles);
+    to.put(duplicate);
+    to.put(lo);
+    to.put(hi);
+    to.put(uint64_t{groups.size()});
+    for (const Group& g : groups) {
+        to.put(g.node);
+        to.put(g.counts);
+        to.put(g.runs);
+        to.put(g.textures);
+        to.put(g.error);
+    }
+}
+
+bool CellTable::get(ByteReader& from) {
+    uint64_t count = 0;
+    from.get(triangles);
+    from.get(duplicate);
+    from.get(lo);
+    from.get(hi);
+    from.get(count);
+    for (uint64_t i = 0; i < count && !from.isWhole(); ++i) {
+        Group g;
+        from.get(g.node);
+        from.get(g.counts);
+        from.get(g.runs);
+        from.get(g.textures);
+        from.get(g.error);
+        groups.push_back(std::move(g));
+    }
+    return from.isWhole() && groups.size() == count;
+}
+
+}  // namespace stipple::lod

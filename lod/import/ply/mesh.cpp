@@ -1,0 +1,198 @@
+#include "lod/import/ply/mesh.h"
+
+#include "engine/base/hash.h"
+#include "engine/base/paged_array.h"
+#include "lod/import/import.h"
+#include "lod/import/ply/rows.h"
+
+namespace stipple::lod {
+namespace {
+
+/// Faces as fans, strips unrolled, whatever parts their rows come in.
+template <typename Triangle>
+class FaceTaker {
+  public:
+    explicit FaceTaker(const Triangle& triangle) : triangle_(triangle) {}
+    Result<void> take(const PlyReader::Corners& corners) {
+        if (corners.isFirst) count_ = 0;
+        for (const double v : corners.list) {
+            if (corners.isStrip && v < 0) {  // -1 starts a new one
+                count_ = 0;
+                continue;
+            }
+            if (count_ >= 2) {
+                const bool isTurned = corners.isStrip && count_ % 2 == 1;
+                STIPPLE_TRY(triangle_(a_, isTurned ? v : b_, isTurned ? b_ : v));
+            }
+            if (count_ == 0 || (count_ >= 2 && corners.isStrip)) a_ = count_ == 0 ? v : b_;
+            if (count_ >= 1) b_ = v;
+            ++count_;
+        }
+        return {};
+    }
+
+  private:
+    const Triangle& triangle_;
+    uint64_t count_ = 0;
+    double a_ = 0, b_ = 0;
+};
+
+struct Vertex {
+    glm::dvec3 position{0};
+    glm::vec3 normal{0};
+    uint32_t colour = 0;
+};
+/// The same, where the file has no more bits than that.
+struct ShortVertex {
+    glm::vec3 position{0}, normal{0};
+    uint32_t colour = 0;
+};
+
+class PlyMesh {
+  public:
+    PlyMesh(std::shared_ptr<const InputFile> file, PlyHeader header, uint64_t memoryBytes, const std::string& folder,
+            std::shared_ptr<PlyMeshNotes> notes)
+        : file_(std::move(file)),
+          header_(std::move(header)),
+          notes_(std::move(notes)),
+          wide_(folder, memoryBytes),
+          narrow_(folder, memoryBytes) {
+        for (const PlyElement& e : header_.elements)
+            if (e.name == "vertex") {
+                count_ = e.count;
+                for (const PlyProperty& p : e.properties)
+                    isWide_ = isWide_ || (p.role != PlyRole::none && p.role <= PlyRole::z && isWide(p.type));
+            }
+    }
+
+    Result<MeshSource::Bounds> survey() {
+        MeshSource::Bounds bounds;
+        PlyReader reader(file_, header_, 0);
+        PointBlock block;
+        uint64_t next = 0;
+        for (;;) {
+            block.clear();
+            STIPPLE_ASSIGN(const size_t got, reader.read(block, 65536));
+            if (got == 0) break;
+            hasNormals_ = !block.normal.empty();
+            for (size_t i = 0; i < got; ++i, ++next) {
+                Vertex v{block.position[i], {}, 0xff000000u | kPlainColour};
+                if (hasNormals_) v.normal = block.normal[i];
+                if (!block.colour.empty()) v.colour = block.colour[i] | 0xff000000u;
+                bounds.add(v.position);
+                put(next, v);
+            }
+        }
+        facesAt_ = reader.offset();
+        if (!hasNormals_) STIPPLE_TRY(sumNormals());
+        STIPPLE_TRY(status());
+        return bounds;
+    }
+
+    Result<void> read(const MeshSource::Take& take) {
+        BlockMaker blocks(
+            [&](uint64_t i, TriangleMesh& to) {
+                const Vertex v = vertex(i);
+                const float length = glm::length(v.normal);
+                to.position.push_back(v.position);
+                to.normal.push_back(hasNormals_ || !(length > 0) ? v.normal : v.normal / length);
+                to.colour.push_back(v.colour);
+                // Which side is out is not known to many programs that write PLY.
+                to.surface.push_back(shared::kSurfaceTwoSided);
+            },
+            take);
+        notes_->badFaces = 0;
+        const auto add = [&](double a, double b, double c) -> Result<void> {
+            for (const double v : {a, b, c})
+                if (!(v >= 0 && v < static_cast<double>(count_))) {
+                    ++notes_->badFaces;
+                    return {};
+                }
+            return blocks.triangle(static_cast<uint64_t>(a), static_cast<uint64_t>(b), static_cast<uint64_t>(c));
+        };
+        STIPPLE_TRY(forTriangles(add));
+        STIPPLE_TRY(blocks.finish());
+        return status();
+    }
+
+  private:
+    template <typename Triangle>
+    Result<void> forTriangles(const Triangle& triangle) {
+        PlyReader reader(file_, header_, 0);
+        FaceTaker<Triangle> faces(triangle);
+        return reader.readCorners(facesAt_, [&](const PlyReader::Corners& corners) { return faces.take(corners); });
+    }
+    Result<void> sumNormals() {
+        return forTriangles([&](double a, double b, double c) -> Result<void> {
+            const auto n = static_cast<double>(count_);
+            if (!(a >= 0 && a < n && b >= 0 && b < n && c >= 0 && c < n)) return {};
+            const std::array<uint64_t, 3> corner{static_cast<uint64_t>(a), static_cast<uint64_t>(b),
+                                                 static_cast<uint64_t>(c)};
+            std::array<Vertex, 3> v{vertex(corner[0]), vertex(corner[1]), vertex(corner[2])};
+            const glm::vec3 sum(glm::cross(v[1].position - v[0].position, v[2].position - v[0].position));
+            if (!std::isfinite(sum.x + sum.y + sum.z)) return {};
+            for (size_t k = 0; k < 3; ++k) {
+                v.at(k) = vertex(corner.at(k));  // (one vertex may be two corners)
+                v.at(k).normal += sum;
+                put(corner.at(k), v.at(k));
+            }
+            return {};
+        });
+    }
+    Vertex vertex(uint64_t i) {
+        if (isWide_) return wide_.get(i);
+        const ShortVertex v = narrow_.get(i);
+        return {v.position, v.normal, v.colour};
+    }
+    void put(uint64_t i, const Vertex& v) {
+        if (isWide_)
+            wide_.set(i, v);
+        else
+            narrow_.set(i, {glm::vec3(v.position), v.normal, v.colour});
+    }
+    Result<void> status() const { return isWide_ ? wide_.status() : narrow_.status(); }
+
+    std::shared_ptr<const InputFile> file_;
+    PlyHeader header_;
+    std::shared_ptr<PlyMeshNotes> notes_;
+    PagedArray<Vertex> wide_;
+    PagedArray<ShortVertex> narrow_;
+    bool isWide_ = false, hasNormals_ = false;
+    uint64_t count_ = 0, facesAt_ = 0;
+};
+
+}  // namespace
+
+Result<bool> hasPlyFaces(const std::string& path) {
+    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
+    std::array<char, 3> magic{};
+    if (file.sizeBytes() < 4) return false;
+    STIPPLE_TRY(file.readAt(0, magic.data(), magic.size()));
+    if (magic != std::array<char, 3>{'p', 'l', 'y'}) return false;
+    STIPPLE_ASSIGN(const PlyHeader header, parsePlyHeader(file));
+    return std::any_of(header.elements.begin(), header.elements.end(), [](const PlyElement& e) {
+        return e.name != "vertex" && e.count > 0 && std::any_of(e.properties.begin(), e.properties.end(), isCornerList);
+    });
+}
+
+Result<MeshSource> openPlyMesh(const std::string& path, uint64_t memoryBytes, const std::string& tempFolder,
+                               const std::shared_ptr<PlyMeshNotes>& notes) {
+    STIPPLE_ASSIGN(const PointSource checked, openPly(path, {}));  // the same checks as for points
+    STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
+    auto file = std::make_shared<const InputFile>(std::move(opened));
+    STIPPLE_ASSIGN(PlyHeader header, parsePlyHeader(*file));
+    MeshSource source;
+    for (const PlyElement& e : header.elements)
+        if (std::any_of(e.properties.begin(), e.properties.end(), isCornerList)) {
+            // A strip's row may hold any number of triangles: as many corners as there is room for.
+            const bool isStrip = e.name == "tristrips";
+            source.triangles += isStrip ? file->sizeBytes() / 4 : 2 * e.count;
+        }
+    auto mesh = std::make_shared<PlyMesh>(file, std::move(header), memoryBytes, tempFolder, notes);
+    source.identity = [path] { return fileIdentity(path); };
+    source.survey = [mesh] { return mesh->survey(); };
+    source.read = [mesh](const MeshSource::Take& take) { return mesh->read(take); };
+    return source;
+}
+
+}  // namespace stipple::lod

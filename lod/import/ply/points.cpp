@@ -1,0 +1,73 @@
+// PLY as points. Read in blocks; a header that promises more than the file can hold is refused.
+#include <fmt/format.h>
+
+#include "lod/import/import.h"
+#include "lod/import/ply/rows.h"
+
+namespace stipple::lod {
+
+Result<PointSource> openPly(const std::string& path, const ReadOptions& options) {
+    STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
+    auto file = std::make_shared<const InputFile>(std::move(opened));
+    STIPPLE_ASSIGN(PlyHeader header, parsePlyHeader(*file));
+    auto vertex = std::find_if(header.elements.begin(), header.elements.end(),
+                               [](const PlyElement& e) { return e.name == "vertex"; });
+    if (vertex == header.elements.end())
+        return fail(ErrorKind::input, "has no element 'vertex'", path, "Stipple reads the vertices of a PLY file");
+    PointSource source;
+    SourceInfo& info = source.info;
+    unsigned roles = 0;
+    const size_t wanted = std::min(options.attributes.size(), kMostAttributes);
+    for (PlyProperty& p : vertex->properties) {
+        if (!p.isList && p.role == PlyRole::none) {
+            AttributeInfo attribute;
+            attribute.name = p.name;
+            attribute.type = isWide(p.type) ? ScalarType::f64 : ScalarType::f32;
+            info.attributes.push_back(attribute);
+            for (size_t k = 0; k < wanted; ++k)
+                if (options.attributes[k] == p.name) p.slot = static_cast<int>(kPlyRoles + k);
+        }
+        if (p.role != PlyRole::none) roles |= 1u << static_cast<unsigned>(p.role);
+        if (p.isList) info.notes.push_back(fmt::format("list property '{}' of the vertices is skipped", p.name));
+    }
+    if ((roles & 7u) != 7u) return fail(ErrorKind::input, "the vertices have no x, y and z", path);
+    // The smallest that the declared rows can be: a promise of more is a lie, found before anything is allocated.
+    const uint64_t body = file->sizeBytes() - header.bytes;
+    uint64_t smallest = 0;
+    for (const PlyElement& e : header.elements) {
+        uint64_t row = 0;
+        for (const PlyProperty& p : e.properties)
+            row += header.encoding == PlyEncoding::ascii
+                       ? 2
+                       : kPlyTypeBytes.at(static_cast<size_t>(p.isList ? p.countType : p.type));
+        row = std::max<uint64_t>(row, 1);
+        const bool isVertex = e.name == "vertex";
+        if (header.encoding == PlyEncoding::ascii && row > 1) --row;  // the last row may lack its end of line
+        const bool impossible =
+            e.count > 0 && (e.count > body || e.count > (body - std::min(body, smallest)) / row + 1);
+        if (impossible)
+            return fail(ErrorKind::input,
+                        fmt::format("the header declares {} of element '{}', but {} bytes cannot hold them", e.count,
+                                    e.name, body),
+                        path, "the file is truncated or its header lies");
+        smallest += row * e.count;
+        if (isVertex) break;
+    }
+    info.path = path;
+    static const std::array<const char*, 3> names{"ascii", "binary little endian", "binary big endian"};
+    info.format = fmt::format("PLY {}", names.at(static_cast<size_t>(header.encoding)));
+    info.points = vertex->count;
+    info.hasNormal = (roles >> 3 & 7u) == 7u;
+    info.hasColour = (roles >> 6 & 7u) == 7u;
+    info.hasRadius = (roles >> 9 & 1u) != 0;
+    info.up = UpAxis::y;
+    source.parts = {info.points};
+    source.openPart = [path, header, wanted](size_t) -> Result<PointReader> {
+        STIPPLE_ASSIGN(InputFile again, InputFile::open(path));
+        auto reader = std::make_shared<PlyReader>(std::make_shared<const InputFile>(std::move(again)), header, wanted);
+        return PointReader([reader](PointBlock& block, size_t limit) { return reader->read(block, limit); });
+    };
+    return source;
+}
+
+}  // namespace stipple::lod

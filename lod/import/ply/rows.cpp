@@ -1,0 +1,240 @@
+#include "lod/import/ply/rows.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+namespace stipple::lod {
+namespace {
+
+constexpr size_t kMostCorners = 65536;  ///< of a list at once
+
+double decode(const uint8_t* bytes, PlyType type, bool swap) {
+    const size_t size = kPlyTypeBytes.at(static_cast<size_t>(type));
+    std::array<uint8_t, 8> raw{};
+    if (swap)
+        std::reverse_copy(bytes, bytes + size, raw.begin());
+    else
+        std::copy_n(bytes, size, raw.begin());
+    const auto as = [&](auto value) {
+        std::memcpy(&value, raw.data(), sizeof(value));
+        return static_cast<double>(value);
+    };
+    switch (type) {
+        case PlyType::i8:
+            return as(int8_t{});
+        case PlyType::u8:
+            return as(uint8_t{});
+        case PlyType::i16:
+            return as(int16_t{});
+        case PlyType::u16:
+            return as(uint16_t{});
+        case PlyType::i32:
+            return as(int32_t{});
+        case PlyType::u32:
+            return as(uint32_t{});
+        case PlyType::f32:
+            return as(float{});
+        case PlyType::f64:
+            return as(double{});
+    }
+    return 0;
+}
+
+}  // namespace
+
+PlyReader::PlyReader(std::shared_ptr<const InputFile> file, PlyHeader header, size_t wanted)
+    : file_(file), header_(std::move(header)), cursor_(std::move(file), header_.bytes), wanted_(wanted) {
+    for (const PlyElement& e : header_.elements)
+        if (e.name == "vertex")
+            for (const PlyProperty& p : e.properties)
+                if (p.slot >= static_cast<int>(kPlyRoles))
+                    attributes_.emplace_back(static_cast<size_t>(p.slot), isWide(p.type));
+}
+
+Result<size_t> PlyReader::read(PointBlock& block, size_t limit) {
+    if (!started_) {
+        started_ = true;
+        for (const PlyElement& element : header_.elements) {
+            if (element.name == "vertex") {
+                vertex_ = &element;
+                break;
+            }
+            for (uint64_t row = 0; row < element.count; ++row) STIPPLE_TRY(readRow(element, nullptr));
+        }
+    }
+    const auto count = static_cast<size_t>(std::min<uint64_t>({limit, vertex_->count - next_, 65536}));
+    std::array<bool, kPlyRoles> has{};
+    double colourScale = 1;
+    for (const PlyProperty& p : vertex_->properties) {
+        if (p.role == PlyRole::none) continue;
+        has.at(static_cast<size_t>(p.role)) = true;
+        if (p.role == PlyRole::red)
+            colourScale = p.type == PlyType::f32 || p.type == PlyType::f64 ? 255.0
+                          : p.type == PlyType::u16                         ? 1 / 257.0
+                                                                           : 1.0;
+    }
+    block.position.reserve(count);
+    block.attributes.resize(wanted_);
+    for (size_t i = 0; i < count; ++i) {
+        std::array<double, kPlyRoles + kMostAttributes> v{};
+        STIPPLE_TRY(readRow(*vertex_, v.data()));
+        block.position.emplace_back(v[0], v[1], v[2]);
+        if (has[3] && has[4] && has[5])
+            block.normal.emplace_back(static_cast<float>(v[3]), static_cast<float>(v[4]), static_cast<float>(v[5]));
+        if (has[6] && has[7] && has[8]) {
+            const auto channel = [&](double c) {
+                return static_cast<uint32_t>(std::clamp(c * colourScale + 0.5, 0.0, 255.0));
+            };
+            block.colour.push_back(channel(v[6]) | channel(v[7]) << 8 | channel(v[8]) << 16);
+        }
+        if (has[9]) block.radius.push_back(static_cast<float>(v[9]));
+        for (const auto& [slot, wide] : attributes_) {
+            auto& values = block.attributes[slot - kPlyRoles];
+            const auto narrow = static_cast<float>(v.at(slot));
+            const auto* bytes =
+                wide ? reinterpret_cast<const uint8_t*>(&v.at(slot)) : reinterpret_cast<const uint8_t*>(&narrow);
+            values.insert(values.end(), bytes, bytes + (wide ? 8 : 4));
+        }
+    }
+    next_ += count;
+    return count;
+}
+
+Result<void> PlyReader::flushCorners() {
+    STIPPLE_TRY((*take_)({isStrip_, isFirst_, list_}));
+    isFirst_ = false;
+    list_.clear();
+    return {};
+}
+
+Result<void> PlyReader::readCorners(uint64_t offset, const std::function<Result<void>(const Corners&)>& take) {
+    cursor_ = PlyCursor(file_, offset);
+    take_ = &take;
+    const auto vertex = std::find_if(header_.elements.begin(), header_.elements.end(),
+                                     [](const PlyElement& e) { return e.name == "vertex"; });
+    for (auto element = vertex; element != header_.elements.end(); ++element) {
+        if (element == vertex) continue;
+        const auto list = std::find_if(element->properties.begin(), element->properties.end(), isCornerList);
+        cornerList_ = list == element->properties.end() ? nullptr : &*list;
+        isStrip_ = element->name == "tristrips";
+        for (uint64_t r = 0; r < element->count; ++r) {
+            list_.clear();
+            isFirst_ = true;
+            STIPPLE_TRY(readRow(*element, nullptr));
+            if (cornerList_) STIPPLE_TRY(flushCorners());
+        }
+    }
+    cornerList_ = nullptr;
+    return {};
+}
+
+tl::unexpected<Error> PlyReader::truncated() const {
+    return fail(ErrorKind::input,
+                fmt::format("ends within element '{}', at vertex {}", vertex_ ? "vertex" : "before vertex", next_),
+                file_->path(), "the file is truncated or its header lies");
+}
+
+Result<void> PlyReader::readRow(const PlyElement& element, double* values) {
+    if (header_.encoding == PlyEncoding::ascii) return readAsciiRow(element, values);
+    const bool swap = header_.encoding == PlyEncoding::big;
+    for (const PlyProperty& p : element.properties) {
+        const size_t size = kPlyTypeBytes.at(static_cast<size_t>(p.type));
+        size_t available = 0;
+        if (p.isList) {
+            const size_t countSize = kPlyTypeBytes.at(static_cast<size_t>(p.countType));
+            STIPPLE_ASSIGN(const uint8_t* bytes, cursor_.peek(countSize, available));
+            if (available < countSize) return truncated();
+            const double count = decode(bytes, p.countType, swap);
+            cursor_.skip(countSize);
+            if (!(count >= 0) || count * static_cast<double>(size) > static_cast<double>(cursor_.remaining()))
+                return truncated();
+            if (&p == cornerList_) {
+                for (auto left = static_cast<size_t>(count); left > 0;) {
+                    const size_t now = std::min(left, kMostCorners);
+                    STIPPLE_ASSIGN(bytes, cursor_.peek(now * size, available));
+                    if (available < now * size) return truncated();
+                    for (size_t i = 0; i < now; ++i) list_.push_back(decode(bytes + i * size, p.type, swap));
+                    cursor_.skip(now * size);
+                    left -= now;
+                    if (left > 0) STIPPLE_TRY(flushCorners());
+                }
+                continue;
+            }
+            for (auto left = static_cast<size_t>(count) * size; left > 0;) {
+                STIPPLE_ASSIGN(bytes, cursor_.peek(std::min(left, kPlyBlockBytes), available));
+                if (available == 0) return truncated();
+                cursor_.skip(std::min(left, available));
+                left -= std::min(left, available);
+            }
+            continue;
+        }
+        STIPPLE_ASSIGN(const uint8_t* bytes, cursor_.peek(size, available));
+        if (available < size) return truncated();
+        if (values && p.slot >= 0) values[static_cast<size_t>(p.slot)] = decode(bytes, p.type, swap);
+        cursor_.skip(size);
+    }
+    return {};
+}
+
+Result<void> PlyReader::readAsciiRow(const PlyElement& element, double* values) {
+    size_t available = 0;
+    const uint8_t* bytes = nullptr;
+    size_t end = 0;
+    for (;;) {  // a line, blank ones skipped
+        STIPPLE_ASSIGN(bytes, cursor_.peek(4096, available));
+        const void* found = std::memchr(bytes, '\n', available);
+        if (!found && available == 0) return truncated();
+        if (!found && cursor_.remaining() > available) {
+            STIPPLE_ASSIGN(bytes, cursor_.peek(kPlyBlockBytes, available));
+            found = std::memchr(bytes, '\n', available);
+            if (!found && cursor_.remaining() > available)
+                return fail(ErrorKind::input, "a line is longer than 4 MiB", file_->path(), "is it really ascii PLY?");
+        }
+        end = found ? static_cast<size_t>(static_cast<const uint8_t*>(found) - bytes) : available;
+        const bool blank =
+            std::all_of(bytes, bytes + end, [](uint8_t c) { return c == ' ' || c == '\r' || c == '\t'; });
+        if (!blank) break;
+        cursor_.skip(std::min(end + 1, available));
+    }
+    const char* at = reinterpret_cast<const char*>(bytes);
+    const char* last = at + end;
+    const auto number = [&](double& value) {
+        while (at < last && (*at == ' ' || *at == '\t' || *at == '\r')) ++at;
+        if (at < last && *at == '+') ++at;
+        const auto [next, error] = std::from_chars(at, last, value);
+        if (error == std::errc::result_out_of_range)
+            value = std::numeric_limits<double>::quiet_NaN();
+        else if (error != std::errc())
+            return false;
+        at = next;
+        return true;
+    };
+    for (const PlyProperty& p : element.properties) {
+        double value = 0;
+        if (!number(value)) return badNumber(element);
+        if (p.isList) {
+            if (!(value >= 0 && value <= 4294967295.0)) return badNumber(element);
+            for (auto left = static_cast<uint32_t>(value); left > 0; --left) {
+                if (!number(value)) return badNumber(element);
+                if (&p == cornerList_) list_.push_back(value);
+            }
+        } else if (values && p.slot >= 0) {
+            values[static_cast<size_t>(p.slot)] = value;
+        }
+    }
+    cursor_.skip(std::min(end + 1, available));
+    return {};
+}
+
+tl::unexpected<Error> PlyReader::badNumber(const PlyElement& element) const {
+    return fail(ErrorKind::input,
+                fmt::format("a row of element '{}' near byte {} (vertex {}) has too few numbers or is not a number",
+                            element.name, cursor_.offset(), next_),
+                file_->path(), "the file is truncated or damaged");
+}
+
+}  // namespace stipple::lod

@@ -1,0 +1,85 @@
+// Rows of a PLY file, all three encodings: a property of any type may feed x y z nx ny nz red green blue radius; what
+// is not known is stepped over, lists included.
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "lod/import/ply/header.h"
+#include "lod/primitives.h"
+
+namespace stipple::lod {
+
+constexpr size_t kPlyBlockBytes = size_t{4} << 20;
+/// Kept as f64, as f32 would not be exact.
+inline bool isWide(PlyType type) { return type == PlyType::f64 || type == PlyType::i32 || type == PlyType::u32; }
+
+/// A forward reader over the file in blocks.
+class PlyCursor {
+  public:
+    PlyCursor(std::shared_ptr<const InputFile> file, uint64_t offset) : file_(std::move(file)), offset_(offset) {}
+    uint64_t remaining() const { return file_->sizeBytes() - offset_ + (buffer_.size() - used_); }
+    uint64_t offset() const { return offset_ - (buffer_.size() - used_); }
+    /// Makes at least `count` bytes (or all that are left) available; returns a pointer to them.
+    Result<const uint8_t*> peek(size_t count, size_t& available) {
+        if (buffer_.size() - used_ < count) {
+            buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(used_));
+            used_ = 0;
+            const size_t want = std::max(count, kPlyBlockBytes) - buffer_.size();
+            const auto get = static_cast<size_t>(std::min<uint64_t>(want, file_->sizeBytes() - offset_));
+            const size_t old = buffer_.size();
+            buffer_.resize(old + get);
+            STIPPLE_TRY(file_->readAt(offset_, buffer_.data() + old, get));
+            offset_ += get;
+        }
+        available = buffer_.size() - used_;
+        return buffer_.data() + used_;
+    }
+    void skip(size_t count) { used_ += count; }
+
+  private:
+    std::shared_ptr<const InputFile> file_;
+    uint64_t offset_;
+    size_t used_ = 0;
+    std::vector<uint8_t> buffer_;
+};
+
+class PlyReader {
+  public:
+    /// `wanted`: how many attributes the properties' slots ask for.
+    PlyReader(std::shared_ptr<const InputFile> file, PlyHeader header, size_t wanted);
+    /// The next rows of the element 'vertex', at most `limit`; 0 at the end.
+    Result<size_t> read(PointBlock& block, size_t limit);
+    /// After the last vertex: where the elements behind it begin.
+    uint64_t offset() const { return cursor_.offset(); }
+
+    /// Corners of one row of an element behind the vertices, or a part of them, the first part of a row first.
+    struct Corners {
+        bool isStrip = false, isFirst = false;
+        const std::vector<double>& list;
+    };
+    /// Rows of the elements behind the vertices that have corners; `offset`: where they begin.
+    Result<void> readCorners(uint64_t offset, const std::function<Result<void>(const Corners&)>& take);
+
+  private:
+    tl::unexpected<Error> truncated() const;
+    Result<void> readRow(const PlyElement& element, double* values);
+    Result<void> readAsciiRow(const PlyElement& element, double* values);
+    tl::unexpected<Error> badNumber(const PlyElement& element) const;
+    Result<void> flushCorners();
+
+    std::shared_ptr<const InputFile> file_;
+    PlyHeader header_;
+    PlyCursor cursor_;
+    size_t wanted_;
+    std::vector<std::pair<size_t, bool>> attributes_;  ///< slot, stored as f64
+    const PlyElement* vertex_ = nullptr;
+    uint64_t next_ = 0;
+    bool started_ = false;
+    const PlyProperty* cornerList_ = nullptr;  ///< of the element that is read
+    const std::function<Result<void>(const Corners&)>* take_ = nullptr;
+    std::vector<double> list_;
+    bool isStrip_ = false, isFirst_ = false;
+};
+
+}  // namespace stipple::lod

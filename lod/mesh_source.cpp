@@ -1,0 +1,76 @@
+#include "lod/mesh_source.h"
+
+#include <algorithm>
+#include <memory>
+
+#include "engine/base/hash.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr size_t kBlockTriangles = 65536;
+constexpr size_t kSlots = size_t{1} << 19;  ///< more than twice the corners of a block
+
+}  // namespace
+
+Result<void> BlockMaker::triangle(uint64_t a, uint64_t b, uint64_t c) {
+    if (table_.empty()) table_.assign(kSlots, 0);
+    for (const uint64_t vertex : {a, b, c}) {
+        size_t at = vertex * 0x9e3779b97f4a7c15ull >> 45;
+        static_assert(kSlots == size_t{1} << (64 - 45));
+        while (table_[at] != 0 && table_[at] >> 24 != vertex + 1) at = (at + 1) % kSlots;
+        if (table_[at] == 0) {
+            table_[at] = (vertex + 1) << 24 | block_.position.size();
+            copy_(vertex, block_);
+        }
+        block_.indices.push_back(static_cast<uint32_t>(table_[at] & 0xffffffu));
+    }
+    if (block_.indices.size() < 3 * kBlockTriangles) return {};
+    return finish();
+}
+
+Result<void> BlockMaker::finish() {
+    if (block_.indices.empty()) return {};
+    STIPPLE_TRY(take_(block_));
+    std::fill(table_.begin(), table_.end(), 0);
+    block_.position.clear();
+    block_.normal.clear();
+    block_.uv.clear();
+    block_.colour.clear();
+    block_.surface.clear();
+    block_.indices.clear();
+    return {};
+}
+
+MeshSource sourceOf(TriangleMesh given) {
+    const auto mesh = std::make_shared<const TriangleMesh>(std::move(given));
+    MeshSource source;
+    source.triangles = mesh->indices.size() / 3;
+    source.identity = [mesh] {
+        return hashBytes(mesh->indices.data(), mesh->indices.size() * 4) ^
+               hashBytes(mesh->position.data(), mesh->position.size() * sizeof(glm::dvec3));
+    };
+    source.survey = [mesh]() -> Result<MeshSource::Bounds> {
+        MeshSource::Bounds bounds;
+        for (const glm::dvec3& p : mesh->position) bounds.add(p);
+        return bounds;
+    };
+    source.read = [mesh](const MeshSource::Take& take) -> Result<void> {
+        if (mesh->indices.size() <= 3 * kBlockTriangles) return mesh->indices.empty() ? Result<void>() : take(*mesh);
+        BlockMaker blocks(
+            [&](uint64_t v, TriangleMesh& to) {
+                to.position.push_back(mesh->position[v]);
+                if (!mesh->normal.empty()) to.normal.push_back(mesh->normal[v]);
+                if (!mesh->uv.empty()) to.uv.push_back(mesh->uv[v]);
+                if (!mesh->colour.empty()) to.colour.push_back(mesh->colour[v]);
+                if (!mesh->surface.empty()) to.surface.push_back(mesh->surface[v]);
+            },
+            take);
+        for (size_t i = 0; i + 3 <= mesh->indices.size(); i += 3)
+            STIPPLE_TRY(blocks.triangle(mesh->indices[i], mesh->indices[i + 1], mesh->indices[i + 2]));
+        return blocks.finish();
+    };
+    return source;
+}
+
+}  // namespace stipple::lod

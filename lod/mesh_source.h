@@ -1,0 +1,49 @@
+// Where the triangles of a build come from.
+#pragma once
+
+#include <functional>
+
+#include "engine/base/result.h"
+#include "lod/mesh.h"
+
+namespace stipple::lod {
+
+/// Triangles that are read block by block, as often as it takes: they need not fit in memory.
+struct MeshSource {
+    struct Bounds {
+        glm::dvec3 lo{1e300}, hi{-1e300};  ///< of finite vertices; lo > hi: there are none
+        void add(const glm::dvec3& p) {
+            if (!std::isfinite(p.x + p.y + p.z)) return;
+            lo = glm::min(lo, p);
+            hi = glm::max(hi, p);
+        }
+    };
+    using Take = std::function<Result<void>(const TriangleMesh& block)>;
+
+    uint64_t triangles = 0;                  ///< as far as is known before reading
+    std::function<uint64_t()> identity;      ///< another number: the source has changed
+    std::function<Result<Bounds>()> survey;  ///< once, before read
+    /// Gives every triangle once; blocks have vertices of their own. Always the same.
+    std::function<Result<void>(const Take& take)> read;
+};
+
+/// Of triangles in memory.
+MeshSource sourceOf(TriangleMesh mesh);
+
+/// Some triangles of a larger mesh as a mesh of their own: vertices come as they are used.
+class BlockMaker {
+  public:
+    /// `copy(vertex, block)` appends a vertex to the block's arrays.
+    using Copy = std::function<void(uint64_t vertex, TriangleMesh& block)>;
+    BlockMaker(Copy copy, MeshSource::Take take) : copy_(std::move(copy)), take_(std::move(take)) {}
+    Result<void> triangle(uint64_t a, uint64_t b, uint64_t c);
+    Result<void> finish();
+
+  private:
+    Copy copy_;
+    MeshSource::Take take_;
+    TriangleMesh block_;
+    std::vector<uint64_t> table_;  ///< open addressing: vertex + 1 << 24 | its number in the block
+};
+
+}  // namespace stipple::lod
