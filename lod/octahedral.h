@@ -25,10 +25,11 @@ inline uint32_t octEncode(glm::vec3 n) {
     return code(x) | code(y) << 16;
 }
 
-/// The same with 11 of 16 bits of each coordinate: at most 0.12 degrees off, and five bits less to store. The axes stay
-/// exact.
-inline uint32_t roundedNormal(glm::vec3 n) {
-    constexpr int kStep = 32, kMiddle = 32767;
+/// The same with fewer of the 16 bits of each coordinate (32: five less, at most 0.12 degrees off), which are that much
+/// less to store. The axes stay exact.
+template <int kStep = 32>
+uint32_t roundedNormal(glm::vec3 n) {
+    constexpr int kMiddle = 32767;
     const uint32_t exact = octEncode(n);
     const auto code = [](uint32_t c) {
         const int off = static_cast<int>(c) - kMiddle;

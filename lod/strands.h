@@ -1,6 +1,8 @@
 // Ribbons and tubes: polylines with a radius at each vertex. What readers give and the build takes.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <map>
@@ -35,9 +37,21 @@ struct StrandSet {
     }
 };
 
+struct StrandBounds {
+    glm::dvec3 lo{1e300}, hi{-1e300};  ///< of finite vertices; lo > hi: there are none
+    void add(const glm::dvec3& p) {
+        if (!std::isfinite(p.x + p.y + p.z)) return;
+        lo = glm::min(lo, p);
+        hi = glm::max(hi, p);
+    }
+    /// The diagonal; 1 of nothing.
+    double extent() const { return lo.x <= hi.x ? std::max(glm::length(hi - lo), 1e-300) : 1; }
+};
+
 /// Drops what cannot be drawn (single vertices, no length, not finite), repeats, and fills what is missing: radii of
 /// `defaultRadius` (0: a 4000th of the extent) where there is none, normals of ribbons by the least turning along the
-/// strand. Twists of more than a sixth of a turn between two vertices get vertices of their own.
-StrandSet cleanStrands(StrandSet in, double defaultRadius);
+/// strand. Twists of more than a sixth of a turn between two vertices get vertices of their own. `extent`: of all
+/// strands that `in` is a part of; 0: it is all.
+StrandSet cleanStrands(StrandSet in, double defaultRadius, double extent = 0);
 
 }  // namespace stipple::lod

@@ -98,7 +98,8 @@ Result<void> run(const Options& o) {
         Progress progress(!o.json);
         lod::StrandBuildSettings settings;
         settings.description.source = fs::path(o.input).filename().string();
-        STIPPLE_TRY(lod::buildStrandStore(lod::cleanStrands(fit.strands, 0), o.output, settings, *executor, progress));
+        STIPPLE_TRY(lod::buildStrandStore(lod::sourceOf(lod::cleanStrands(fit.strands, 0)), o.output, settings,
+                                          *executor, progress));
         written.push_back(o.output);
         if (fit.trianglesLeft > 0) {
             // A store holds one kind: the rest stands beside it, and a scene that has both.

@@ -310,7 +310,8 @@ Result<void> showScene(const InputInfoOptions& o) {
 }
 
 Result<void> showStrands(const InputInfoOptions& o) {
-    STIPPLE_ASSIGN(lod::StrandSet set, lod::readStrands(o.input));
+    STIPPLE_ASSIGN(const lod::StrandSource source, lod::openStrands(o.input));
+    STIPPLE_ASSIGN(lod::StrandSet set, lod::collect(source));
     const bool hasRadii = std::any_of(set.radius.begin(), set.radius.end(), [](float r) { return r > 0; });
     const uint64_t vertices = set.position.size(), strands = set.strands();
     const lod::StrandSet clean = lod::cleanStrands(std::move(set), 0);

@@ -126,16 +126,17 @@ lod::StrandBuildSettings strandSettings(const std::string& input) {
 }
 
 /// Ribbons and tubes.
-Result<lod::BuildReport> buildStrands(lod::StrandSet strands, const std::string& input, const std::string& output,
+Result<lod::BuildReport> buildStrands(const lod::StrandSource& raw, const std::string& input, const std::string& output,
                                       const BuildOptions& build, Executor& executor, Progress& progress) {
-    const lod::StrandSet clean = lod::cleanStrands(std::move(strands), build.strandRadius);
-    return lod::buildStrandStore(clean, output, strandSettings(input), executor, progress);
+    lod::StrandBuildSettings settings = strandSettings(input);
+    STIPPLE_ASSIGN(settings.limits, build.settings());
+    return lod::buildStrandStore(lod::cleanSource(raw, build.strandRadius), output, settings, executor, progress);
 }
 
 Result<lod::BuildReport> buildStrandFile(const std::string& input, const std::string& output, const BuildOptions& build,
                                          Executor& executor, Progress& progress) {
-    STIPPLE_ASSIGN(lod::StrandSet strands, lod::readStrands(input));
-    return buildStrands(std::move(strands), input, output, build, executor, progress);
+    STIPPLE_ASSIGN(const lod::StrandSource strands, lod::openStrands(input));
+    return buildStrands(strands, input, output, build, executor, progress);
 }
 
 /// Meshes with primitives of a kind: one that stands in several places is to be built once and placed, all others as
@@ -202,9 +203,13 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
 Result<void> placeStrands(const scene::Scene& scene, const BuildOptions& build, Executor& executor, bool showProgress,
                           OpenedScene& opened) {
     const auto open = [&](const SharedModel& model, const std::string& part) {
-        return openCached({scene.path}, build, part, showProgress, [&](const std::string& to, Progress& progress) {
-            return lod::buildStrandStore(model->strands(), to, strandSettings(scene.path), executor, progress);
-        });
+        return openCached({scene.path}, build, part, showProgress,
+                          [&](const std::string& to, Progress& progress) -> Result<lod::BuildReport> {
+                              lod::StrandBuildSettings settings = strandSettings(scene.path);
+                              STIPPLE_ASSIGN(settings.limits, build.settings());
+                              return lod::buildStrandStore(lod::sourceOf(model->strands()), to, settings, executor,
+                                                           progress);
+                          });
     };
     const auto modelOf = [&](const std::vector<scene::Placement>& of) {
         return std::make_shared<StrandModel>(
@@ -384,7 +389,7 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
     };
     const uint64_t lines = counted(scene::PrimitiveKind::lines) / 2, points = counted(scene::PrimitiveKind::points);
     if (triangles.triangles == 0 && points == 0 && lines > 0)
-        return buildStrands(scene::flattenStrands(scene, scene::placements(scene)), inputs.front(), output, build,
+        return buildStrands(scene::strandSource(scene, scene::placements(scene)), inputs.front(), output, build,
                             executor, progress);
     if (triangles.triangles == 0) return lod::buildStore(inputs, output, settings, executor, progress);
     if (lines + points > 0)

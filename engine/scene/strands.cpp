@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/base/hash.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::scene {
@@ -40,6 +41,28 @@ lod::StrandSet flattenStrands(const Scene& scene, const std::vector<Placement>& 
             if (p.indices.size() >= 2) out.endStrand(!p.normal.empty());
         }
     return out;
+}
+
+lod::StrandSource strandSource(const Scene& scene, std::vector<Placement> placed) {
+    lod::StrandSource source;
+    for (const Placement& at : placed)
+        for (const Primitive& p : scene.meshes[static_cast<size_t>(at.mesh)].primitives)
+            source.vertices += p.kind == PrimitiveKind::lines ? p.indices.size() / 2 : 0;
+    source.identity = [&scene, placed] {
+        uint64_t hash = 0;
+        for (const Placement& at : placed)
+            for (const Primitive& p : scene.meshes[static_cast<size_t>(at.mesh)].primitives) {
+                hash = hashBytes(&at.world, sizeof(at.world), hash);
+                hash = hashBytes(p.position.data(), p.position.size() * sizeof(p.position[0]), hash);
+                hash = hashBytes(p.indices.data(), p.indices.size() * sizeof(p.indices[0]), hash);
+            }
+        return hash;
+    };
+    source.read = [&scene, placed](const lod::StrandSource::Take& take) -> Result<void> {
+        for (const Placement& at : placed) STIPPLE_TRY(take(flattenStrands(scene, {at})));
+        return placed.empty() ? take(flattenStrands(scene, {})) : Result<void>();
+    };
+    return source;
 }
 
 }  // namespace stipple::scene

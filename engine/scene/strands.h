@@ -2,12 +2,14 @@
 #pragma once
 
 #include "engine/scene/triangles.h"
-#include "lod/strands.h"
+#include "lod/strand_source.h"
 
 namespace stipple::scene {
 
 /// Lines of `placed`, in world space; segments that follow each other in the index list are one strand. Radii are those
 /// of the attribute _RADIUS, or 0: not known. Not clean (see lod::cleanStrands).
 lod::StrandSet flattenStrands(const Scene& scene, const std::vector<Placement>& placed);
+/// The same, one placement a block. Reads `scene`, which must stay.
+lod::StrandSource strandSource(const Scene& scene, std::vector<Placement> placed);
 
 }  // namespace stipple::scene

@@ -1,4 +1,5 @@
 // libFuzzer: any bytes as SWC, cylinder model, TrackVis or hair end in clean strands or in an error.
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <string_view>
@@ -17,7 +18,17 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     };
     take(stipple::lod::readSwc(text, "fuzz"));
     take(stipple::lod::readQsm(text, "fuzz"));
-    take(stipple::lod::readTrk(bytes, "fuzz"));
-    take(stipple::lod::readHair(bytes, "fuzz"));
+    stipple::lod::StrandSource source;
+    source.read = [&](const stipple::lod::StrandSource::Take& to) {
+        return stipple::lod::readTrk(stipple::Cursor(bytes), "fuzz", to);
+    };
+    take(stipple::lod::collect(source));
+    source.read = [&](const stipple::lod::StrandSource::Take& to) {
+        const auto open = [&](uint64_t at) {
+            return stipple::Cursor(std::vector<uint8_t>(data + std::min<uint64_t>(at, size), data + size));
+        };
+        return stipple::lod::readHair(open, "fuzz", to);
+    };
+    take(stipple::lod::collect(source));
     return 0;
 }

@@ -46,7 +46,7 @@ std::shared_ptr<const lod::Store> buildStrands(const lod::StrandSet& strands, co
     lod::StrandBuildSettings settings;
     settings.leafSegments = leafSegments;
     Progress progress(false);
-    const auto built = lod::buildStrandStore(strands, path, settings, executor, progress);
+    const auto built = lod::buildStrandStore(lod::sourceOf(strands), path, settings, executor, progress);
     EXPECT_TRUE(built) << (built ? "" : built.error().line());
     auto store = lod::openStore(path);
     EXPECT_TRUE(store) << (store ? "" : store.error().line());

@@ -14,6 +14,22 @@
 namespace stipple {
 namespace {
 
+Result<lod::StrandSet> readTrk(const std::vector<uint8_t>& bytes, const std::string& path) {
+    lod::StrandSource source;
+    source.read = [&](const lod::StrandSource::Take& take) { return lod::readTrk(Cursor(bytes), path, take); };
+    return lod::collect(source);
+}
+Result<lod::StrandSet> readHair(const std::vector<uint8_t>& bytes, const std::string& path) {
+    lod::StrandSource source;
+    source.read = [&](const lod::StrandSource::Take& take) {
+        const auto open = [&](uint64_t at) {
+            return Cursor({bytes.begin() + static_cast<ptrdiff_t>(std::min<uint64_t>(at, bytes.size())), bytes.end()});
+        };
+        return lod::readHair(open, path, take);
+    };
+    return lod::collect(source);
+}
+
 std::vector<uint8_t> bytesOf(const std::string& s) { return {s.begin(), s.end()}; }
 
 TEST(Swc, SectionsAreTubes) {
@@ -65,15 +81,15 @@ TEST(Trk, TruncatedAndLyingFilesAreRefused) {
     const auto number = [](auto v) { return std::string(reinterpret_cast<const char*>(&v), 4); };
     const std::string track =
         number(int32_t{2}) + number(0.0f) + number(0.0f) + number(0.0f) + number(1.0f) + number(2.0f) + number(3.0f);
-    const auto whole = lod::readTrk(bytesOf(head + track), "a.trk");
+    const auto whole = readTrk(bytesOf(head + track), "a.trk");
     ASSERT_TRUE(whole) << whole.error().line();
     EXPECT_EQ(whole->strands(), 1u);
     EXPECT_EQ(whole->position[1], glm::dvec3(1, 2, 3));
-    EXPECT_FALSE(lod::readTrk(bytesOf(head.substr(0, 999)), "a.trk"));
-    EXPECT_FALSE(lod::readTrk(bytesOf(head + track.substr(0, 20)), "a.trk"));
-    EXPECT_FALSE(lod::readTrk(bytesOf(head + number(int32_t{-1})), "a.trk"));
-    EXPECT_FALSE(lod::readTrk(bytesOf(head + number(int32_t{0x7fffffff})), "a.trk"));
-    EXPECT_FALSE(lod::readTrk(bytesOf("GZIP"), "a.trk"));
+    EXPECT_FALSE(readTrk(bytesOf(head.substr(0, 999)), "a.trk"));
+    EXPECT_FALSE(readTrk(bytesOf(head + track.substr(0, 20)), "a.trk"));
+    EXPECT_FALSE(readTrk(bytesOf(head + number(int32_t{-1})), "a.trk"));
+    EXPECT_FALSE(readTrk(bytesOf(head + number(int32_t{0x7fffffff})), "a.trk"));
+    EXPECT_FALSE(readTrk(bytesOf("GZIP"), "a.trk"));
 }
 
 TEST(Hair, HeadersThatClaimTooMuchAreRefused) {
@@ -88,17 +104,17 @@ TEST(Hair, HeadersThatClaimTooMuchAreRefused) {
         std::string s(reinterpret_cast<const char*>(&head), sizeof(head));
         return bytesOf(s + std::string(12 * points, '\0'));
     };
-    const auto set = lod::readHair(file(4), "a.hair");
+    const auto set = readHair(file(4), "a.hair");
     ASSERT_TRUE(set) << set.error().line();
     EXPECT_EQ(set->strands(), 2u);
     EXPECT_FLOAT_EQ(set->radius[0], 0.1f);
-    EXPECT_FALSE(lod::readHair(file(3), "a.hair"));
+    EXPECT_FALSE(readHair(file(3), "a.hair"));
     head.segments = 3;
-    EXPECT_FALSE(lod::readHair(file(4), "a.hair"));
+    EXPECT_FALSE(readHair(file(4), "a.hair"));
     head.points = 0xffffffffu;
-    EXPECT_FALSE(lod::readHair(file(4), "a.hair"));
+    EXPECT_FALSE(readHair(file(4), "a.hair"));
     head.arrays = 0;
-    EXPECT_FALSE(lod::readHair(file(4), "a.hair"));
+    EXPECT_FALSE(readHair(file(4), "a.hair"));
 }
 
 TEST(CleanStrands, MendsAndCounts) {
@@ -176,7 +192,10 @@ TEST(StrandData, EveryRealFileLoadsOrIsRefusedWithAReason) {
     size_t loaded = 0, refused = 0;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
         if (!entry.is_regular_file() || !lod::isStrandFile(entry.path().string())) continue;
-        const auto set = lod::readStrands(entry.path().string());
+        const auto set = [&] {
+            const auto source = lod::openStrands(entry.path().string());
+            return source ? lod::collect(*source) : tl::unexpected(source.error());
+        }();
         if (!set) {
             ++refused;
             EXPECT_GT(set.error().line().size(), 20u) << entry.path();

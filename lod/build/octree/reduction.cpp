@@ -263,9 +263,9 @@ Result<void> Reduction::run(Executor& executor, int workers, const Make& make, c
     for (const Atom& a : atoms_) deepest = std::max<int>(deepest, a.level);
     for (int at = deepest; at > -2; --at) {
         LevelCells level = takeLevel(at);
-        const bool isLast = level.cells.size() == 1 && level.cells[0].isLast;
         STIPPLE_TRY(runLevel(level, executor, workers, make, take, progress));
-        if (isLast) break;
+        const bool isMore = std::any_of(atoms_.begin(), atoms_.end(), [&](const Atom& a) { return a.level < at; });
+        if (above_.empty() && !isMore) break;
     }
     return {};
 }

@@ -13,6 +13,7 @@
 // kColourSpread, and never less than that of a record below.
 #pragma once
 
+#include "lod/build/octree/assemble.h"
 #include "lod/build/points/points.h"
 #include "shaders/shared/record.h"
 
@@ -52,19 +53,6 @@ struct PendingNode {
     uint32_t firstPoint = 0;          ///< of a leaf, where its points are at hand
     std::vector<uint64_t> leafKey;
     std::vector<uint8_t> leafParentCode;
-};
-
-/// Nodes whose chunks are encoded, in the order in which they go to the file.
-struct NodeBatch {
-    struct Written {
-        Node node;
-        uint64_t key = 0;
-        uint32_t firstCount = 0;  ///< into `counts`: records of each code that occurs, of parents and own
-        uint16_t parentCodes = 0, ownCodes = 0;
-    };
-    std::vector<Written> nodes;
-    std::vector<std::array<uint32_t, 2>> counts;  ///< code, records
-    std::vector<uint8_t> bytes;                   ///< chunks, each followed by its attribute streams
 };
 
 /// Points with their normals decoded (zero: none), to measure against.

@@ -1,7 +1,8 @@
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
-#include "lod/strands.h"
+#include "lod/strand_source.h"
 
 namespace stipple::lod {
 namespace {
@@ -72,19 +73,17 @@ void addTwist(const Vertex& a, const Vertex& b, std::vector<Vertex>& out) {
 
 }  // namespace
 
-StrandSet cleanStrands(StrandSet in, double defaultRadius) {
+StrandSet cleanStrands(StrandSet in, double defaultRadius, double extent) {
     StrandSet out;
     out.hasColour = in.hasColour;
     out.up = in.up;
     out.dropped = std::move(in.dropped);
     out.notes = std::move(in.notes);
-    glm::dvec3 lo(1e300), hi(-1e300);
-    for (const glm::dvec3& p : in.position)
-        if (isFinite(p)) {
-            lo = glm::min(lo, p);
-            hi = glm::max(hi, p);
-        }
-    const double extent = lo.x <= hi.x ? glm::length(hi - lo) : 1;
+    if (!(extent > 0)) {
+        StrandBounds bounds;
+        for (const glm::dvec3& p : in.position) bounds.add(p);
+        extent = bounds.extent();
+    }
     const auto fallback = static_cast<float>(defaultRadius > 0 ? defaultRadius : extent / 4000);
     const auto count = [&](const char* what, uint64_t n = 1) {
         if (n > 0) out.dropped[what] += n;
@@ -128,6 +127,25 @@ StrandSet cleanStrands(StrandSet in, double defaultRadius) {
         out.endStrand(isRibbon);
     }
     return out;
+}
+
+StrandSource cleanSource(StrandSource raw, double defaultRadius) {
+    StrandSource source = raw;
+    // The extent of all of them, found when it is first needed.
+    const auto extent = std::make_shared<double>(0.0);
+    source.read = [raw, defaultRadius, extent](const StrandSource::Take& take) -> Result<void> {
+        if (!(*extent > 0)) {
+            StrandBounds bounds;
+            const Result<void> read = raw.read([&](const StrandSet& block) -> Result<void> {
+                for (const glm::dvec3& p : block.position) bounds.add(p);
+                return {};
+            });
+            if (!read) return read;
+            *extent = bounds.extent();
+        }
+        return raw.read([&](const StrandSet& block) { return take(cleanStrands(block, defaultRadius, *extent)); });
+    };
+    return source;
 }
 
 }  // namespace stipple::lod

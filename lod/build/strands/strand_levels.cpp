@@ -24,9 +24,8 @@ constexpr int kColourStep = 48;       ///< sRGB steps from which colours count a
 
 class Merger {
   public:
-    Merger(const std::vector<StrandPoint>& points, const std::vector<uint8_t>& isRibbon,
-           const std::vector<StrandPart>& children, const StrandLevel& level)
-        : points_(points), isRibbon_(isRibbon), children_(children), level_(level) {}
+    Merger(const std::vector<StrandPoint>& points, const std::vector<StrandPart>& children, const StrandLevel& level)
+        : points_(points), children_(children), level_(level) {}
 
     StrandMerge run() {
         StrandMerge out;
@@ -94,7 +93,7 @@ class Merger {
         chord.radiusA = static_cast<float>(first.radiusA + wider);
         chord.radiusB = static_cast<float>(last.radiusB + wider);
         chord.deviation = std::abs(wider);
-        const bool isRibbon = isRibbon_[a.strand] != 0;
+        const bool isRibbon = a.isRibbon != 0;
         double at = 0;
         for (size_t c = i; c + 1 < k; ++c) {
             at += lengthOf(children_[c]);
@@ -121,7 +120,6 @@ class Merger {
     double lengthOf(const StrandPart& p) const { return glm::length(points_[p.b].p - points_[p.a].p); }
 
     const std::vector<StrandPoint>& points_;
-    const std::vector<uint8_t>& isRibbon_;
     const std::vector<StrandPart>& children_;
     const StrandLevel& level_;
 };
@@ -200,9 +198,9 @@ void drawLots(const std::vector<StrandPoint>& points, const StrandLevel& level, 
 
 }  // namespace
 
-StrandMerge mergeParts(const std::vector<StrandPoint>& points, const std::vector<uint8_t>& isRibbon,
-                       const std::vector<StrandPart>& children, const StrandLevel& level) {
-    StrandMerge merge = Merger(points, isRibbon, children, level).run();
+StrandMerge mergeParts(const std::vector<StrandPoint>& points, const std::vector<StrandPart>& children,
+                       const StrandLevel& level) {
+    StrandMerge merge = Merger(points, children, level).run();
     if (merge.parts.size() > level.mostParts) drawLots(points, level, merge);
     return merge;
 }

@@ -1,19 +1,23 @@
 // What the stages of a strand build hand to each other. Lengths are lattice units.
 #pragma once
 
+#include <cmath>
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "lod/build/octree/bytes.h"
 #include "lod/strands.h"
 
 namespace stipple::lod {
 
+/// A vertex of a strand, long segments divided; the same in every cell that it belongs to.
 struct StrandPoint {
     glm::dvec3 p{0};
     float radius = 0;
-    glm::vec3 direction{0};  ///< unit: across a ribbon, along a tube
-    uint32_t strand = 0;
-    double along = 0;  ///< number in the strand; between two vertices where a segment was divided
+    glm::vec3 direction{0};           ///< unit: across a ribbon, along a tube
+    uint32_t strand = 0, number = 0;  ///< number: along the strand
+    uint32_t colour = 0;              ///< sRGB
+    uint32_t isRibbon = 0;
 };
 
 /// Part of a strand between two points, at some level of detail.
@@ -41,7 +45,37 @@ struct StrandMerge {
     double kept = 1;         ///< share of the thin strands' area that was drawn
     double commonError = 0;  ///< of all thin parts, where some were
 };
-StrandMerge mergeParts(const std::vector<StrandPoint>& points, const std::vector<uint8_t>& isRibbon,
-                       const std::vector<StrandPart>& children, const StrandLevel& level);
+StrandMerge mergeParts(const std::vector<StrandPoint>& points, const std::vector<StrandPart>& children,
+                       const StrandLevel& level);
+
+/// A point as it travels, with no more bits than matter: places to a quarter of a lattice unit (2^-26 of the extent),
+/// directions to 0.03 degrees, radii to 2^-17 of themselves.
+struct TravellingPoint {
+    static constexpr uint32_t kStepBits = 2;
+    uint32_t x = 0, y = 0, z = 0;
+    float radius = 0;
+    uint32_t direction = 0, colour = 0;
+    TravellingPoint() = default;
+    explicit TravellingPoint(const StrandPoint& p);
+    StrandPoint point() const;
+    /// Lattice coordinate of the middle of a segment.
+    static uint32_t middle(uint32_t a, uint32_t b) {
+        return static_cast<uint32_t>((uint64_t{a} + b) >> (kStepBits + 1));
+    }
+    /// Largest distance from where the point was, lattice units.
+    static double rounding() { return std::exp2(-1.0 - kStepBits) * std::sqrt(3.0); }
+};
+/// Successive points of one strand.
+struct StrandRun {
+    uint32_t strand = 0, firstNumber = 0, points = 0, isRibbon = 0;
+};
+/// Runs of leaf segments as bytes.
+struct StrandRuns {
+    std::vector<StrandRun> runs;
+    std::vector<TravellingPoint> points;  ///< of all runs
+    void put(ByteWriter& to) const;
+    /// Appends; false if the bytes are not what put wrote.
+    bool get(ByteReader& from);
+};
 
 }  // namespace stipple::lod

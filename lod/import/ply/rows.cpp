@@ -112,7 +112,7 @@ Result<void> PlyReader::flushCorners() {
 }
 
 Result<void> PlyReader::readCorners(uint64_t offset, const std::function<Result<void>(const Corners&)>& take) {
-    cursor_ = PlyCursor(file_, offset);
+    cursor_ = Cursor(file_, offset);
     take_ = &take;
     const auto vertex = std::find_if(header_.elements.begin(), header_.elements.end(),
                                      [](const PlyElement& e) { return e.name == "vertex"; });

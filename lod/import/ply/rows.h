@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 
+#include "engine/base/cursor.h"
 #include "lod/import/ply/header.h"
 #include "lod/primitives.h"
 
@@ -13,36 +14,6 @@ namespace stipple::lod {
 constexpr size_t kPlyBlockBytes = size_t{4} << 20;
 /// Kept as f64, as f32 would not be exact.
 inline bool isWide(PlyType type) { return type == PlyType::f64 || type == PlyType::i32 || type == PlyType::u32; }
-
-/// A forward reader over the file in blocks.
-class PlyCursor {
-  public:
-    PlyCursor(std::shared_ptr<const InputFile> file, uint64_t offset) : file_(std::move(file)), offset_(offset) {}
-    uint64_t remaining() const { return file_->sizeBytes() - offset_ + (buffer_.size() - used_); }
-    uint64_t offset() const { return offset_ - (buffer_.size() - used_); }
-    /// Makes at least `count` bytes (or all that are left) available; returns a pointer to them.
-    Result<const uint8_t*> peek(size_t count, size_t& available) {
-        if (buffer_.size() - used_ < count) {
-            buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(used_));
-            used_ = 0;
-            const size_t want = std::max(count, kPlyBlockBytes) - buffer_.size();
-            const auto get = static_cast<size_t>(std::min<uint64_t>(want, file_->sizeBytes() - offset_));
-            const size_t old = buffer_.size();
-            buffer_.resize(old + get);
-            STIPPLE_TRY(file_->readAt(offset_, buffer_.data() + old, get));
-            offset_ += get;
-        }
-        available = buffer_.size() - used_;
-        return buffer_.data() + used_;
-    }
-    void skip(size_t count) { used_ += count; }
-
-  private:
-    std::shared_ptr<const InputFile> file_;
-    uint64_t offset_;
-    size_t used_ = 0;
-    std::vector<uint8_t> buffer_;
-};
 
 class PlyReader {
   public:
@@ -70,7 +41,7 @@ class PlyReader {
 
     std::shared_ptr<const InputFile> file_;
     PlyHeader header_;
-    PlyCursor cursor_;
+    Cursor cursor_;
     size_t wanted_;
     std::vector<std::pair<size_t, bool>> attributes_;  ///< slot, stored as f64
     const PlyElement* vertex_ = nullptr;

@@ -21,19 +21,34 @@ bool isStrandFile(const std::string& path) {
     return e == ".swc" || e == ".trk" || e == ".hair" || e == ".txt" || e == ".csv";
 }
 
-Result<StrandSet> readStrands(const std::string& path) {
-    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
-    constexpr uint64_t kLargest = uint64_t{8} << 30;
-    if (file.sizeBytes() > kLargest)
-        return fail(ErrorKind::input, "has more than 8 GiB: strands are read as a whole", path);
-    std::vector<uint8_t> bytes(file.sizeBytes());
-    STIPPLE_TRY(file.readAt(0, bytes.data(), bytes.size()));
-    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+Result<StrandSource> openStrands(const std::string& path) {
+    STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
+    const auto file = std::make_shared<const InputFile>(std::move(opened));
+    StrandSource source;
+    source.vertices = file->sizeBytes() / 12;
+    source.identity = [path] { return fileIdentity(path); };
     const std::string e = extensionOf(path);
-    if (e == ".swc") return readSwc(text, path);
-    if (e == ".trk") return readTrk(bytes, path);
-    if (e == ".hair") return readHair(bytes, path);
-    return readQsm(text, path);
+    if (e == ".trk") {
+        source.read = [file, path](const StrandSource::Take& take) { return readTrk(Cursor(file, 0), path, take); };
+        return source;
+    }
+    if (e == ".hair") {
+        source.read = [file, path](const StrandSource::Take& take) {
+            constexpr size_t kBlock = size_t{1} << 20;
+            return readHair([&](uint64_t offset) { return Cursor(file, offset, kBlock); }, path, take);
+        };
+        return source;
+    }
+    constexpr uint64_t kLargest = uint64_t{256} << 20;
+    if (file->sizeBytes() > kLargest)
+        return fail(ErrorKind::input, "has more than 256 MiB of text, which is read as a whole", path,
+                    "convert it to TrackVis or hair, which are read in blocks");
+    std::string text(file->sizeBytes(), '\0');
+    STIPPLE_TRY(file->readAt(0, text.data(), text.size()));
+    STIPPLE_ASSIGN(StrandSet set, e == ".swc" ? readSwc(text, path) : readQsm(text, path));
+    StrandSource whole = sourceOf(std::move(set));
+    whole.identity = source.identity;
+    return whole;
 }
 
 }  // namespace stipple::lod

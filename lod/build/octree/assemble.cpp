@@ -1,4 +1,4 @@
-#include "lod/build/points/assemble.h"
+#include "lod/build/octree/assemble.h"
 
 #include <algorithm>
 #include <tuple>

@@ -1,0 +1,25 @@
+// One cell of a strand build: nodes of the octree in it, their parts, and their chunks.
+#pragma once
+
+#include "lod/build/octree/assemble.h"
+#include "lod/build/octree/reduction.h"
+#include "lod/build/strands/strand_work.h"
+
+namespace stipple::lod {
+
+/// Builds the subtree of an atom, or joins those that came up from the octants of a cell. All nodes but the topmost are
+/// encoded: that waits for its parent, as its order needs the parent's codes. `leafSegments`: cells with more are
+/// divided, down to `frame.keyLevels`.
+Result<CellProduct> buildStrandCell(const WorkCell& cell, const std::vector<uint8_t>& input,
+                                    const std::vector<FromBelow>& below, const Frame& frame, uint32_t leafSegments);
+
+/// What a product's table holds.
+struct StrandTable {
+    NodeBatch batch;
+    double rounding = 0;    ///< largest of a leaf's positions, lattice units
+    double fewestKept = 1;  ///< of the root: share of the strands that it draws
+    void put(ByteWriter& to) const;
+    bool get(ByteReader& from);
+};
+
+}  // namespace stipple::lod
