@@ -1,4 +1,4 @@
-// An array of plain values of which a bounded number of pages is in memory, the rest in a file without a name.
+// An array of records of which a bounded number of pages is in memory, the rest in a file without a name.
 #pragma once
 
 #include <algorithm>
@@ -6,7 +6,6 @@
 #include <cstring>
 #include <optional>
 #include <string>
-#include <type_traits>
 #include <vector>
 
 #include "engine/base/result.h"
@@ -51,27 +50,25 @@ class PageCache {
     std::optional<Error> error_;
 };
 
-template <typename T>
+/// Records of `bytes` bytes each.
 class PagedArray {
-    static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= PageCache::kPageBytes);
-
   public:
-    PagedArray(std::string folder, uint64_t memoryBytes) : pages_(std::move(folder), memoryBytes) {}
+    PagedArray(std::string folder, uint64_t memoryBytes, size_t bytes)
+        : pages_(std::move(folder), memoryBytes), bytes_(bytes), perPage_(PageCache::kPageBytes / bytes) {}
     /// Of what was never written: zeros.
-    T get(uint64_t i) {
-        T value;
-        std::memcpy(&value, pages_.page(i / kPerPage, false) + i % kPerPage * sizeof(T), sizeof(T));
-        return value;
+    void get(uint64_t i, void* to) {
+        std::memcpy(to, pages_.page(i / perPage_, false) + i % perPage_ * bytes_, bytes_);
     }
-    void set(uint64_t i, const T& value) {
-        std::memcpy(pages_.page(i / kPerPage, true) + i % kPerPage * sizeof(T), &value, sizeof(T));
+    void set(uint64_t i, const void* from) {
+        std::memcpy(pages_.page(i / perPage_, true) + i % perPage_ * bytes_, from, bytes_);
     }
     Result<void> status() const { return pages_.status(); }
     uint64_t fileBytes() const { return pages_.fileBytes(); }
 
   private:
-    static constexpr uint64_t kPerPage = PageCache::kPageBytes / sizeof(T);
     PageCache pages_;
+    size_t bytes_;
+    uint64_t perPage_;
 };
 
 }  // namespace stipple

@@ -55,6 +55,7 @@ class CellReducer {
         while (!from.isWhole())
             if (!getSoup(from, soup)) return damaged();
         mesh_ = weld(soup);
+        soup.vertices = {};
         table_.duplicate = sortTriangles(mesh_, soup.indices);
         table_.triangles = soup.indices.size() / 3;
         table_.lo = glm::ivec3(1 << 30);

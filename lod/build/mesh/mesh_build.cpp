@@ -147,7 +147,9 @@ class MeshBuild {
         CellTree tree(frame, source_.triangles);
         do {
             uint64_t done = 0;
+            facts_.triangles = 0;
             STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
+                facts_.triangles += block.indices.size() / 3;
                 tree.count(placeBlock(block, facts_.lattice, executor_).centres());
                 done += block.indices.size() / 3;
                 progress_.update("count", std::min(done, source_.triangles), source_.triangles);
@@ -164,7 +166,7 @@ class MeshBuild {
                 return fail(ErrorKind::budget, fmt::format("{} triangles have their centre at one place", atom.count),
                             settings_.description.source, "is the mesh what it should be?");
         if (const Journal* const journal = work_->journal())
-            STIPPLE_TRY(journal->announce(source_.triangles * kSpillBytes, progress_));
+            STIPPLE_TRY(journal->announce(facts_.triangles * kSpillBytes + source_.mostTemporaryBytes, progress_));
         work_->plan(atoms);
         return send(frame, tree, atoms);
     }
@@ -179,6 +181,8 @@ class MeshBuild {
         std::vector<Soup> buffers(atoms.size());
         const uint64_t most = std::max<uint64_t>(bufferBytes_ / atoms.size(), 8192);
         const auto flush = [&](size_t a) {
+            // Triangles in any order share few vertices with those beside them.
+            if (buffers[a].vertices.size() * 3 > 4 * (buffers[a].indices.size() / 3)) gather(buffers[a]);
             ByteWriter to;
             putSoup(buffers[a], to);
             buffers[a] = {};
@@ -187,7 +191,6 @@ class MeshBuild {
         uint64_t done = 0;
         STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
             const PlacedBlock placed = placeBlock(block, facts_.lattice, executor_);
-            facts_.triangles += block.indices.size() / 3;
             facts_.degenerate += placed.degenerate;
             facts_.notFinite += placed.notFinite;
             facts_.rounding = std::max(facts_.rounding, placed.rounding);
@@ -304,7 +307,7 @@ class MeshBuild {
         report_.bytesOut = writer.bytes();
         STIPPLE_TRY(writer.commit());
         work_->finish();
-        report_.temporaryBytes = work_->temporaryBytes();
+        report_.temporaryBytes = work_->temporaryBytes() + source_.mostTemporaryBytes;
         report_.nodes = hierarchy.nodes.size();
         report_.records = description.records;
         report_.contentHash = writer.contentHash();

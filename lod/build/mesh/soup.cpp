@@ -1,34 +1,27 @@
 // Triangles as bytes, between the steps of a build: meshoptimizer's codecs, which are fast and undo what is redundant.
 #include <meshoptimizer.h>
 
+#include <algorithm>
+
 #include "lod/build/mesh/mesh_work.h"
+#include "lod/build/octree/packed.h"
 
 namespace stipple::lod {
 
 void putSoup(const Soup& soup, ByteWriter& to) {
-    constexpr size_t kStride = sizeof(shared::MeshVertex);
-    std::vector<uint8_t> bytes(meshopt_encodeVertexBufferBound(soup.vertices.size(), kStride));
-    bytes.resize(
-        meshopt_encodeVertexBuffer(bytes.data(), bytes.size(), soup.vertices.data(), soup.vertices.size(), kStride));
-    to.put(uint64_t{soup.vertices.size()});
-    to.put(bytes);
-    bytes.resize(meshopt_encodeIndexSequenceBound(soup.indices.size(), soup.vertices.size()));
+    putPacked(soup.vertices, to);
+    std::vector<uint8_t> bytes(meshopt_encodeIndexSequenceBound(soup.indices.size(), soup.vertices.size()));
     bytes.resize(meshopt_encodeIndexSequence(bytes.data(), bytes.size(), soup.indices.data(), soup.indices.size()));
     to.put(uint64_t{soup.indices.size()});
     to.put(bytes);
 }
 
 bool getSoup(ByteReader& from, Soup& to) {
-    uint64_t vertices = 0, indices = 0;
-    std::vector<uint8_t> bytes;
-    from.get(vertices);
-    from.get(bytes);
     const size_t oldVertices = to.vertices.size(), oldIndices = to.indices.size();
-    if (vertices > bytes.size() * 256) return false;
-    to.vertices.resize(oldVertices + vertices);
-    if (meshopt_decodeVertexBuffer(to.vertices.data() + oldVertices, vertices, sizeof(shared::MeshVertex), bytes.data(),
-                                   bytes.size()) != 0)
-        return false;
+    if (!getPacked(from, to.vertices)) return false;
+    const size_t vertices = to.vertices.size() - oldVertices;
+    uint64_t indices = 0;
+    std::vector<uint8_t> bytes;
     from.get(indices);
     from.get(bytes);
     if (indices > bytes.size()) return false;
@@ -41,6 +34,20 @@ bool getSoup(ByteReader& from, Soup& to) {
         to.indices[i] += static_cast<uint32_t>(oldVertices);
     }
     return true;
+}
+
+void gather(Soup& soup) {
+    weld(soup);
+    const auto count = static_cast<ptrdiff_t>(soup.indices.size() / 3);
+    std::vector<std::array<uint32_t, 3>> order(soup.indices.size() / 3);
+    for (ptrdiff_t t = 0; t < count; ++t) {
+        auto& corners = order[static_cast<size_t>(t)];
+        std::copy_n(soup.indices.begin() + 3 * t, 3, corners.begin());
+        std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end()), corners.end());
+    }
+    std::sort(order.begin(), order.end());
+    for (ptrdiff_t t = 0; t < count; ++t)
+        std::copy_n(order[static_cast<size_t>(t)].begin(), 3, soup.indices.begin() + 3 * t);
 }
 
 }  // namespace stipple::lod

@@ -125,7 +125,7 @@ WeldedMesh weld(Soup& soup) {
         place[order[i].vertex] = static_cast<uint32_t>(out.vertices.size() - 1);
     }
     for (uint32_t& i : soup.indices) i = place[i];
-    soup.vertices = {};
+    soup.vertices = out.vertices;
     return out;
 }
 

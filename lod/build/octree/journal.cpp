@@ -84,7 +84,9 @@ Result<Journal> Journal::open(const std::string& folder, const std::string& outp
         j.entries_.push_back(std::move(payload));
         j.end_ += sizeof(entry) + entry.bytes;
     }
-    if (j.entries_.empty()) STIPPLE_TRY(j.restart());
+    // Killed after the store was complete and before this folder was gone: there is nothing to go on with.
+    const bool isOver = j.entries_.size() > 1 && !fs::exists(j.partialPath(), error);
+    if (j.entries_.empty() || isOver) STIPPLE_TRY(j.restart());
     return j;
 }
 

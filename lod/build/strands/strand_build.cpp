@@ -74,7 +74,7 @@ class StrandBuild {
     }
 
   private:
-    static constexpr uint64_t kSpillBytes = 20;  ///< of a segment, between the steps
+    static constexpr uint64_t kSpillBytes = 16;  ///< of a segment, between the steps
 
     Result<void> planMemory() {
         constexpr uint64_t kFixed = uint64_t{96} << 20;

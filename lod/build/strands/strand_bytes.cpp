@@ -1,9 +1,8 @@
-#include <meshoptimizer.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
 
+#include "lod/build/octree/packed.h"
 #include "lod/build/strands/strand_work.h"
 #include "lod/octahedral.h"
 #include "shaders/shared/record.h"
@@ -31,29 +30,44 @@ StrandPoint TravellingPoint::point() const {
     return p;
 }
 
+namespace {
+
+/// Places as steps along the strand, and back: the codec stores how a value differs
+/// from the one before, and along a strand steps differ less than places.
+void toSteps(const std::vector<StrandRun>& runs, size_t firstRun, std::vector<TravellingPoint>& points, size_t at,
+             bool isBack) {
+    std::array<uint32_t, 3> start{};
+    for (size_t r = firstRun; r < runs.size(); ++r) {
+        std::array<uint32_t, 3> last = start;
+        for (uint32_t k = 0; k < runs[r].points; ++k, ++at) {
+            const std::array<uint32_t*, 3> now{&points[at].x, &points[at].y, &points[at].z};
+            for (size_t a = 0; a < 3; ++a) {
+                const uint32_t place = isBack ? *now.at(a) + last.at(a) : *now.at(a);
+                *now.at(a) = isBack ? place : place - last.at(a);
+                last.at(a) = place;
+            }
+            if (k == 0) start = last;
+        }
+    }
+}
+
+}  // namespace
+
 void StrandRuns::put(ByteWriter& to) const {
-    constexpr size_t kStride = sizeof(TravellingPoint);
-    std::vector<uint8_t> bytes(meshopt_encodeVertexBufferBound(points.size(), kStride));
-    bytes.resize(meshopt_encodeVertexBuffer(bytes.data(), bytes.size(), points.data(), points.size(), kStride));
-    to.put(runs);
-    to.put(uint64_t{points.size()});
-    to.put(bytes);
+    putPacked(runs, to);
+    std::vector<TravellingPoint> steps = points;
+    toSteps(runs, 0, steps, 0, false);
+    putPacked(steps, to);
 }
 
 bool StrandRuns::get(ByteReader& from) {
-    std::vector<StrandRun> more;
-    uint64_t count = 0, sum = 0;
-    std::vector<uint8_t> bytes;
-    from.get(more);
-    from.get(count);
-    from.get(bytes);
-    for (const StrandRun& run : more) sum += run.points;
-    if (sum != count || count > bytes.size() * 256) return false;
-    const size_t old = points.size();
-    points.resize(old + count);
-    runs.insert(runs.end(), more.begin(), more.end());
-    return meshopt_decodeVertexBuffer(points.data() + old, count, sizeof(TravellingPoint), bytes.data(),
-                                      bytes.size()) == 0;
+    const size_t oldRuns = runs.size(), oldPoints = points.size();
+    if (!getPacked(from, runs) || !getPacked(from, points)) return false;
+    uint64_t sum = 0;
+    for (size_t r = oldRuns; r < runs.size(); ++r) sum += runs[r].points;
+    if (sum != points.size() - oldPoints) return false;
+    toSteps(runs, oldRuns, points, oldPoints, true);
+    return true;
 }
 
 }  // namespace stipple::lod

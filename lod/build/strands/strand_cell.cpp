@@ -6,6 +6,7 @@
 
 #include "engine/base/check.h"
 #include "engine/base/hash.h"
+#include "lod/build/octree/packed.h"
 #include "lod/chunk.h"
 #include "lod/octahedral.h"
 
@@ -83,9 +84,16 @@ class StrandCell {
             from.get(node.node);
             from.get(node.key);
             from.get(node.kept);
-            from.get(node.parts);
-            from.get(points);
-            if (!from.isWhole()) return damaged();
+            StrandRuns ends;  // (every end of a part is a point that travelled before)
+            if (!getPacked(from, node.parts) || !ends.get(from) || !from.isWhole()) return damaged();
+            size_t next = 0;
+            for (const StrandRun& run : ends.runs)
+                for (uint32_t k = 0; k < run.points; ++k) {
+                    points.push_back(ends.points[next++].point());
+                    points.back().strand = run.strand;
+                    points.back().number = run.firstNumber;
+                    points.back().isRibbon = run.isRibbon;
+                }
             const auto base = static_cast<uint32_t>(points_.size());
             for (StrandPart& p : node.parts) {
                 p.a += base;
@@ -190,12 +198,14 @@ class StrandCell {
     std::vector<uint8_t> goingUp() const {
         StrandNode node = nodes_[0];
         std::vector<uint32_t> place(points_.size(), ~0u);
-        std::vector<StrandPoint> points;
+        StrandRuns ends;
         for (StrandPart& p : node.parts)
             for (uint32_t* end : {&p.a, &p.b}) {
                 if (place[*end] == ~0u) {
-                    place[*end] = static_cast<uint32_t>(points.size());
-                    points.push_back(points_[*end]);
+                    const StrandPoint& point = points_[*end];
+                    place[*end] = static_cast<uint32_t>(ends.points.size());
+                    ends.points.emplace_back(point);
+                    ends.runs.push_back({point.strand, point.number, 1, point.isRibbon});
                 }
                 *end = place[*end];
             }
@@ -203,8 +213,8 @@ class StrandCell {
         to.put(node.node);
         to.put(node.key);
         to.put(node.kept);
-        to.put(node.parts);
-        to.put(points);
+        putPacked(node.parts, to);
+        ends.put(to);
         return to.bytes();
     }
 

@@ -1,6 +1,7 @@
 // What the stages of a strand build hand to each other. Lengths are lattice units.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <glm/glm.hpp>
 #include <vector>
@@ -28,6 +29,7 @@ struct StrandPart {
     double error = 0;                ///< bound of the distance from what it stands for
     uint8_t ownCode = 0, parentCode = 255;
     uint8_t octants = 0;
+    std::array<uint8_t, 5> unused{};
 };
 
 struct StrandLevel {

@@ -1,9 +1,13 @@
 #include "lod/import/ply/mesh.h"
 
-#include "engine/base/hash.h"
+#include <cmath>
+#include <optional>
+
 #include "engine/base/paged_array.h"
 #include "lod/import/import.h"
 #include "lod/import/ply/rows.h"
+#include "lod/octahedral.h"
+#include "shaders/shared/record.h"
 
 namespace stipple::lod {
 namespace {
@@ -42,10 +46,70 @@ struct Vertex {
     glm::vec3 normal{0};
     uint32_t colour = 0;
 };
-/// The same, where the file has no more bits than that.
-struct ShortVertex {
-    glm::vec3 position{0}, normal{0};
-    uint32_t colour = 0;
+/// Vertices, no wider than what the file says of them.
+class VertexStore {
+  public:
+    VertexStore(const PlyElement& vertex, uint64_t memoryBytes, const std::string& folder) {
+        std::array<bool, kPlyRoles> has{};
+        for (const PlyProperty& p : vertex.properties) {
+            if (p.role == PlyRole::none) continue;
+            has.at(static_cast<size_t>(p.role)) = true;
+            isWide_ = isWide_ || (p.role <= PlyRole::z && isWide(p.type));
+        }
+        hasNormals_ = has[3] && has[4] && has[5];
+        hasColours_ = has[6] && has[7] && has[8];
+        bytes_ = (isWide_ ? 24u : 12u) + (hasNormals_ ? 4u : 12u) + (hasColours_ ? 4u : 0u);
+        values_.emplace(folder, memoryBytes, bytes_);
+    }
+    bool hasNormals() const { return hasNormals_; }
+    size_t bytes() const { return bytes_; }
+    Result<void> status() const { return values_->status(); }
+
+    void set(uint64_t i, const Vertex& v) {
+        std::array<uint8_t, 40> record{};
+        uint8_t* to = record.data();
+        const auto put = [&](const auto& value) {
+            std::memcpy(to, &value, sizeof(value));
+            to += sizeof(value);
+        };
+        if (isWide_)
+            put(v.position);
+        else
+            put(glm::vec3(v.position));
+        const float length = glm::length(v.normal);
+        const bool isNone = !(length > 1e-20f) || !std::isfinite(length);
+        if (hasNormals_)
+            put(isNone ? ~0u : octEncode(v.normal));
+        else
+            put(v.normal);
+        if (hasColours_) put(v.colour);
+        values_->set(i, record.data());
+    }
+    Vertex get(uint64_t i) {
+        std::array<uint8_t, 40> record{};
+        values_->get(i, record.data());
+        const uint8_t* from = record.data();
+        const auto take = [&](auto value) {
+            std::memcpy(&value, from, sizeof(value));
+            from += sizeof(value);
+            return value;
+        };
+        Vertex v;
+        v.position = isWide_ ? take(glm::dvec3(0)) : glm::dvec3(take(glm::vec3(0)));
+        if (hasNormals_) {
+            const uint32_t code = take(0u);
+            if (code != ~0u) v.normal = shared::octDecode(code);
+        } else {
+            v.normal = take(glm::vec3(0));
+        }
+        v.colour = hasColours_ ? take(0u) : 0xff000000u | kPlainColour;
+        return v;
+    }
+
+  private:
+    bool isWide_ = false, hasNormals_ = false, hasColours_ = false;
+    size_t bytes_ = 0;
+    std::optional<PagedArray> values_;
 };
 
 class PlyMesh {
@@ -55,16 +119,10 @@ class PlyMesh {
         : file_(std::move(file)),
           header_(std::move(header)),
           notes_(std::move(notes)),
-          wide_(folder, memoryBytes),
-          narrow_(folder, memoryBytes) {
-        for (const PlyElement& e : header_.elements)
-            if (e.name == "vertex") {
-                count_ = e.count;
-                for (const PlyProperty& p : e.properties)
-                    isWide_ = isWide_ || (p.role != PlyRole::none && p.role <= PlyRole::z && isWide(p.type));
-            }
-    }
+          vertices_(vertexOf(header_), memoryBytes, folder),
+          count_(vertexOf(header_).count) {}
 
+    uint64_t vertexBytes() const { return count_ * vertices_.bytes(); }
     Result<MeshSource::Bounds> survey() {
         MeshSource::Bounds bounds;
         PlyReader reader(file_, header_, 0);
@@ -74,28 +132,27 @@ class PlyMesh {
             block.clear();
             STIPPLE_ASSIGN(const size_t got, reader.read(block, 65536));
             if (got == 0) break;
-            hasNormals_ = !block.normal.empty();
             for (size_t i = 0; i < got; ++i, ++next) {
                 Vertex v{block.position[i], {}, 0xff000000u | kPlainColour};
-                if (hasNormals_) v.normal = block.normal[i];
+                if (!block.normal.empty()) v.normal = block.normal[i];
                 if (!block.colour.empty()) v.colour = block.colour[i] | 0xff000000u;
                 bounds.add(v.position);
-                put(next, v);
+                vertices_.set(next, v);
             }
         }
         facesAt_ = reader.offset();
-        if (!hasNormals_) STIPPLE_TRY(sumNormals());
-        STIPPLE_TRY(status());
+        if (!vertices_.hasNormals()) STIPPLE_TRY(sumNormals());
+        STIPPLE_TRY(vertices_.status());
         return bounds;
     }
 
     Result<void> read(const MeshSource::Take& take) {
         BlockMaker blocks(
             [&](uint64_t i, TriangleMesh& to) {
-                const Vertex v = vertex(i);
+                const Vertex v = vertices_.get(i);
                 const float length = glm::length(v.normal);
                 to.position.push_back(v.position);
-                to.normal.push_back(hasNormals_ || !(length > 0) ? v.normal : v.normal / length);
+                to.normal.push_back(vertices_.hasNormals() || !(length > 0) ? v.normal : v.normal / length);
                 to.colour.push_back(v.colour);
                 // Which side is out is not known to many programs that write PLY.
                 to.surface.push_back(shared::kSurfaceTwoSided);
@@ -112,7 +169,7 @@ class PlyMesh {
         };
         STIPPLE_TRY(forTriangles(add));
         STIPPLE_TRY(blocks.finish());
-        return status();
+        return vertices_.status();
     }
 
   private:
@@ -128,36 +185,26 @@ class PlyMesh {
             if (!(a >= 0 && a < n && b >= 0 && b < n && c >= 0 && c < n)) return {};
             const std::array<uint64_t, 3> corner{static_cast<uint64_t>(a), static_cast<uint64_t>(b),
                                                  static_cast<uint64_t>(c)};
-            std::array<Vertex, 3> v{vertex(corner[0]), vertex(corner[1]), vertex(corner[2])};
+            std::array<Vertex, 3> v{vertices_.get(corner[0]), vertices_.get(corner[1]), vertices_.get(corner[2])};
             const glm::vec3 sum(glm::cross(v[1].position - v[0].position, v[2].position - v[0].position));
             if (!std::isfinite(sum.x + sum.y + sum.z)) return {};
             for (size_t k = 0; k < 3; ++k) {
-                v.at(k) = vertex(corner.at(k));  // (one vertex may be two corners)
+                v.at(k) = vertices_.get(corner.at(k));  // (one vertex may be two corners)
                 v.at(k).normal += sum;
-                put(corner.at(k), v.at(k));
+                vertices_.set(corner.at(k), v.at(k));
             }
             return {};
         });
     }
-    Vertex vertex(uint64_t i) {
-        if (isWide_) return wide_.get(i);
-        const ShortVertex v = narrow_.get(i);
-        return {v.position, v.normal, v.colour};
+    static const PlyElement& vertexOf(const PlyHeader& header) {
+        return *std::find_if(header.elements.begin(), header.elements.end(),
+                             [](const PlyElement& e) { return e.name == "vertex"; });
     }
-    void put(uint64_t i, const Vertex& v) {
-        if (isWide_)
-            wide_.set(i, v);
-        else
-            narrow_.set(i, {glm::vec3(v.position), v.normal, v.colour});
-    }
-    Result<void> status() const { return isWide_ ? wide_.status() : narrow_.status(); }
 
     std::shared_ptr<const InputFile> file_;
     PlyHeader header_;
     std::shared_ptr<PlyMeshNotes> notes_;
-    PagedArray<Vertex> wide_;
-    PagedArray<ShortVertex> narrow_;
-    bool isWide_ = false, hasNormals_ = false;
+    VertexStore vertices_;
     uint64_t count_ = 0, facesAt_ = 0;
 };
 
@@ -189,6 +236,7 @@ Result<MeshSource> openPlyMesh(const std::string& path, uint64_t memoryBytes, co
             source.triangles += isStrip ? file->sizeBytes() / 4 : 2 * e.count;
         }
     auto mesh = std::make_shared<PlyMesh>(file, std::move(header), memoryBytes, tempFolder, notes);
+    source.mostTemporaryBytes = mesh->vertexBytes() > memoryBytes ? mesh->vertexBytes() : 0;
     source.identity = [path] { return fileIdentity(path); };
     source.survey = [mesh] { return mesh->survey(); };
     source.read = [mesh](const MeshSource::Take& take) { return mesh->read(take); };

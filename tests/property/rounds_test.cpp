@@ -1,0 +1,300 @@
+// Meshes and strands out of core: little memory, kills and odd orders of the input do not show in the file.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "lod/build/mesh/mesh_build.h"
+#include "lod/build/strands/strand_build.h"
+#include "lod/import/ply/mesh.h"
+#include "lod/import/strands/strand_readers.h"
+#include "tests/support/runs.h"
+#include "tests/support/support.h"
+
+namespace stipple::lod {
+namespace {
+
+namespace fs = std::filesystem;
+
+template <typename T>
+void put(std::string& to, const T& value) {
+    to.append(reinterpret_cast<const char*>(&value), sizeof(value));
+}
+
+/// A wavy ground with a normal at each vertex, finer by far in one corner; `seed` not 0: faces in random order.
+void writeGround(const std::string& path, int edge, unsigned seed) {
+    std::string text = fmt::format(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float "
+        "z\n"
+        "property float nx\nproperty float ny\nproperty float nz\nelement face {}\n"
+        "property list uchar int vertex_indices\nend_header\n",
+        edge * edge, 2 * (edge - 1) * (edge - 1));
+    const auto along = [&](int i) { return 100 * std::pow(i / (edge - 1.0), 3); };
+    for (int j = 0; j < edge; ++j)
+        for (int i = 0; i < edge; ++i) {
+            const double x = along(i), z = along(j);
+            put(text, std::array<float, 6>{float(x), float(std::sin(x) * std::cos(0.7 * z) + 0.05 * std::sin(40 * x)),
+                                           float(z), float(-std::cos(x)), 1, float(0.3 * std::sin(z))});
+        }
+    std::vector<std::array<int32_t, 3>> faces;
+    for (int j = 0; j + 1 < edge; ++j)
+        for (int i = 0; i + 1 < edge; ++i) {
+            const int a = j * edge + i;
+            faces.push_back({a, a + edge, a + 1});
+            faces.push_back({a + 1, a + edge, a + edge + 1});
+        }
+    if (seed != 0) std::shuffle(faces.begin(), faces.end(), std::mt19937(seed));
+    for (const auto& f : faces) {
+        text.push_back(3);
+        put(text, f);
+    }
+    test::spit(path, text);
+}
+
+/// A lawn of `strands` blades of 20 segments, half of them around one place.
+void writeLawn(const std::string& path, uint32_t strands) {
+    constexpr uint32_t kSegments = 20;
+    std::string text = "HAIR";
+    put(text, strands);
+    put(text, strands * (kSegments + 1));
+    put(text, uint32_t{2});
+    put(text, kSegments);
+    put(text, std::array<float, 5>{0.004f, 0, 0.3f, 0.5f, 0.2f});
+    text.resize(128);
+    Rng rng(11);
+    for (uint32_t s = 0; s < strands; ++s) {
+        const double size = s % 2 == 0 ? 50 : 2, x = size * rng.uniform(), z = size * rng.uniform();
+        const double turn = rng.uniform(0, 6.28), length = rng.uniform(0.3, 1);
+        for (uint32_t k = 0; k <= kSegments; ++k) {
+            const double t = k / double(kSegments);
+            put(text, std::array<float, 3>{float(x + length * t * t * std::sin(turn)), float(2 * length * t),
+                                           float(z + length * t * t * std::cos(turn) + 0.03 * std::sin(9 * t))});
+        }
+    }
+    test::spit(path, text);
+}
+
+struct Kind {
+    std::string name, input;
+    /// Of one thread, with which the input goes through the disk; and what each further thread needs.
+    uint64_t little, aThread;
+};
+std::vector<Kind> kinds(const test::TempFolder& folder) {
+    writeGround(folder / "ground.ply", 500, 0);  // 498,002 triangles
+    writeLawn(folder / "lawn.hair", 25'000);     // 500,000 segments
+    return {{"mesh", folder / "ground.ply", uint64_t{190} << 20, uint64_t{80} << 20},
+            {"strands", folder / "lawn.hair", uint64_t{170} << 20, uint64_t{64} << 20}};
+}
+
+Result<BuildReport> build(const std::string& input, const std::string& output, Executor& executor,
+                          const BuildLimits& limits, uint64_t vertexBytes = 1 << 20) {
+    Progress silent(false);
+    if (fs::path(input).extension() == ".ply") {
+        MeshBuildSettings settings;
+        settings.limits = limits;
+        settings.description.materials.resize(1);
+        STIPPLE_ASSIGN(const MeshSource source, openPlyMesh(input, vertexBytes, fs::path(output).parent_path().string(),
+                                                            std::make_shared<PlyMeshNotes>()));
+        return buildMeshStore(source, output, settings, executor, silent);
+    }
+    StrandBuildSettings settings;
+    settings.limits = limits;
+    STIPPLE_ASSIGN(const StrandSource source, openStrands(input));
+    return buildStrandStore(cleanSource(source, 0), output, settings, executor, silent);
+}
+
+TEST(Rounds, NeitherMemoryNorThreadsNorTheOrderOfFacesShow) {
+    const test::TempFolder folder;
+    std::vector<Kind> all = kinds(folder);
+    for (const Kind& kind : all) {
+        const auto two = makeTbbExecutor(2);
+        const auto whole = build(kind.input, folder / "whole.stipple", *two, {}, 1 << 26);
+        ASSERT_TRUE(whole) << whole.error().line();
+        EXPECT_EQ(whole->temporaryBytes, 0u);
+        EXPECT_GE(whole->pointsOut, 490'000u);
+        const std::string bytes = test::slurp(folder / "whole.stipple");
+        const Store store = *openStore(folder / "whole.stipple");
+        ASSERT_TRUE(verifyStore(store, *two));
+        if (kind.name == "mesh") {
+            uint64_t dropped = 0;  // (in the finest corner some triangles have no area on the lattice)
+            for (const auto& [what, count] : whole->dropped) dropped += count;
+            EXPECT_EQ(whole->pointsIn, whole->pointsOut + dropped);
+            writeGround(kind.input, 500, 5);
+        }
+        for (const int threads : {1, 2, 5}) {
+            const auto executor = makeTbbExecutor(threads);
+            BuildLimits limits;
+            limits.memoryBytes = kind.little + kind.aThread * static_cast<uint64_t>(threads - 1);
+            const auto built = build(kind.input, folder / "other.stipple", *executor, limits);
+            ASSERT_TRUE(built) << built.error().line();
+            EXPECT_GT(built->temporaryBytes, 0u) << kind.name;
+            EXPECT_LE(double(built->temporaryBytes), 1.2 * double(fs::file_size(kind.input))) << kind.name;
+            EXPECT_TRUE(test::slurp(folder / "other.stipple") == bytes) << kind.name << ", " << threads << " threads";
+            EXPECT_FALSE(fs::exists(folder / "other.stipple.build"));
+        }
+    }
+}
+
+TEST(Rounds, KilledAtAnyMomentTheyGoOnAndEndWithTheSameBytes) {
+    const test::TempFolder folder;
+    for (const Kind& kind : kinds(folder)) {
+        // (A PLY file gets a quarter of the memory for its vertices.)
+        const std::vector<std::string> command{STIPPLE_PROGRAM,
+                                               "build",
+                                               kind.input,
+                                               "-o",
+                                               folder / "a.stipple",
+                                               "--memory",
+                                               kind.name == "mesh" ? "350M" : "230M",
+                                               "--threads",
+                                               "2",
+                                               "--quiet"};
+        ASSERT_TRUE(test::runAndKill(command, 600'000, SIGKILL)) << kind.name;
+        const std::string whole = test::slurp(folder / "a.stipple");
+        fs::remove(folder / "a.stipple");
+        Rng rng(5);
+        int kills = 0, resumable = 0, finished = 0;
+        while (kills < 20) {
+            kills += test::runAndKill(command, static_cast<int>(rng.uniform(30, 900)), SIGKILL) ? 0 : 1;
+            resumable += fs::exists(folder / "a.stipple.partial") ? 1 : 0;
+            if (!fs::exists(folder / "a.stipple")) continue;
+            ++finished;
+            ASSERT_TRUE(test::slurp(folder / "a.stipple") == whole) << kind.name;
+            fs::remove(folder / "a.stipple");
+        }
+        EXPECT_GT(resumable, 3) << kind.name;
+        ASSERT_TRUE(test::runAndKill(command, 600'000, SIGKILL));
+        EXPECT_TRUE(test::slurp(folder / "a.stipple") == whole) << kind.name;
+        EXPECT_FALSE(fs::exists(folder / "a.stipple.build"));
+        std::printf("%s: %d kills, %d of them while cells were built, %d builds finished in between\n",
+                    kind.name.c_str(), kills, resumable, finished);
+        fs::remove(folder / "a.stipple");
+    }
+}
+
+TEST(Rounds, CarryOnFromTheJournalAndNotFromTheStart) {
+    const test::TempFolder folder;
+    const auto executor = makeSerialExecutor();
+    for (const Kind& kind : kinds(folder)) {
+        BuildLimits limits;
+        limits.memoryBytes = kind.little;
+        ASSERT_TRUE(build(kind.input, folder / "whole.stipple", *executor, limits));
+        const std::string partial = folder / "a.stipple.partial";
+        int asked = 0, cells = 0, stopAt = 2;
+        limits.isStopped = [&] {
+            ++asked;
+            return fs::exists(partial) && ++cells == stopAt;
+        };
+        int run = 0;
+        for (;; ++run) {
+            ASSERT_LT(run, 200);
+            asked = cells = 0;
+            const auto built = build(kind.input, folder / "a.stipple", *executor, limits);
+            if (built) {
+                EXPECT_TRUE(built->isResumed);
+                break;
+            }
+            EXPECT_EQ(built.error().kind, ErrorKind::interrupted) << built.error().line();
+            if (run > 0) EXPECT_LT(asked, 4) << "input was read again";
+        }
+        EXPECT_GT(run, 4) << kind.name;
+        EXPECT_TRUE(test::slurp(folder / "a.stipple") == test::slurp(folder / "whole.stipple")) << kind.name;
+        // What somebody changed is not built from: chunks, what waits for a cell, the input of an atom.
+        const auto interrupt = [&](int at) {
+            fs::remove(folder / "a.stipple");
+            fs::remove(partial);
+            fs::remove_all(folder / "a.stipple.build");
+            cells = 0;
+            stopAt = at;
+            EXPECT_FALSE(build(kind.input, folder / "a.stipple", *executor, limits));
+            stopAt = 1 << 30;
+        };
+        const auto spoil = [&](const std::string& beginning) {
+            for (const auto& entry : fs::directory_iterator(folder / "a.stipple.build")) {
+                if (!entry.path().filename().string().starts_with(beginning)) continue;
+                std::string bytes = test::slurp(entry.path());
+                bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
+                test::spit(entry.path(), bytes);
+            }
+        };
+        const auto isRefused = [&](const char* what) {
+            const auto built = build(kind.input, folder / "a.stipple", *executor, limits);
+            ASSERT_FALSE(built) << kind.name << ", " << what;
+            EXPECT_NE(built.error().line().find("is not what was written"), std::string::npos) << built.error().line();
+            EXPECT_FALSE(fs::exists(folder / "a.stipple"));
+        };
+        interrupt(4);
+        std::string bytes = test::slurp(partial);
+        ASSERT_GT(bytes.size(), 10'000u);
+        bytes[5000] = static_cast<char>(bytes[5000] ^ 1);
+        test::spit(partial, bytes);
+        isRefused("chunks");
+        interrupt(4);
+        spoil("up-");
+        isRefused("what goes up");
+        interrupt(2);
+        spoil("in-");
+        isRefused("input");
+        // Killed when the store was whole and the folder not yet gone: there is nothing to go on with.
+        interrupt(4);
+        fs::remove(partial);
+        const auto again = build(kind.input, folder / "a.stipple", *executor, limits);
+        ASSERT_TRUE(again) << again.error().line();
+        EXPECT_TRUE(test::slurp(folder / "a.stipple") == test::slurp(folder / "whole.stipple")) << kind.name;
+        // Another input is refused as long as an interrupted build lies there.
+        interrupt(4);
+        fs::last_write_time(kind.input, fs::last_write_time(kind.input) + std::chrono::seconds(5));
+        const auto other = build(kind.input, folder / "a.stipple", *executor, limits);
+        ASSERT_FALSE(other);
+        EXPECT_NE(other.error().line().find("interrupted build of other input"), std::string::npos);
+        fs::remove_all(folder / "a.stipple.build");
+        fs::remove(partial);
+        fs::remove(folder / "a.stipple");
+    }
+}
+
+TEST(Rounds, StayWithinTheirMemoryAndLoseNothingOnAFullDisk) {
+    const test::TempFolder folder;
+    writeGround(folder / "ground.ply", 1000, 3);  // 2 million triangles
+    writeLawn(folder / "lawn.hair", 100'000);
+    for (const auto& [input, memory] : {std::pair{"ground.ply", 400}, std::pair{"lawn.hair", 250}}) {
+        const std::string command = fmt::format("build {} -o {} --memory {}M --threads 2 --quiet --json",
+                                                folder / input, folder / "a.stipple", memory);
+        ASSERT_EQ(test::shell("true", command, folder.path()), 0) << test::slurp(folder / "err");
+        const auto report = nlohmann::json::parse(test::slurp(folder / "out"));
+        EXPECT_LT(report["peak_rss_bytes"].get<double>(), memory * 1048576.0) << input;
+        EXPECT_GT(report["temporary_bytes"].get<double>(), 0) << input;
+        EXPECT_LE(report["temporary_bytes"].get<double>(), 1.2 * double(fs::file_size(folder / input))) << input;
+        const std::string whole = test::slurp(folder / "a.stipple");
+        fs::remove(folder / "a.stipple");
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+        EXPECT_EQ(test::shell("ulimit -v 524288", command, folder.path()), 0) << test::slurp(folder / "err");
+        EXPECT_TRUE(test::slurp(folder / "a.stipple") == whole);
+        fs::remove(folder / "a.stipple");
+#endif
+        // A limit on the size of files acts as a disk that is full: of what goes between first, then of the store.
+        for (const int kibibytes : {100, 6000}) {
+            EXPECT_EQ(test::shell(fmt::format("trap \"\" XFSZ; ulimit -f {}", kibibytes), command, folder.path()), 4);
+            const std::string line = test::slurp(folder / "err");
+            EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1) << line;
+            EXPECT_NE(line.find("cannot be written"), std::string::npos) << line;
+            EXPECT_FALSE(fs::exists(folder / "a.stipple"));
+        }
+        ASSERT_EQ(test::shell("true", command, folder.path()), 0) << test::slurp(folder / "err");
+        EXPECT_TRUE(test::slurp(folder / "a.stipple") == whole);
+        // Too little is said before anything is done.
+        EXPECT_EQ(test::shell("true", fmt::format("build {} -o {} --memory 64M", folder / input, folder / "b.stipple"),
+                              folder.path()),
+                  static_cast<int>(ErrorKind::budget));
+        EXPECT_NE(test::slurp(folder / "err").find("give --memory"), std::string::npos);
+        fs::remove(folder / "a.stipple");
+    }
+}
+
+}  // namespace
+}  // namespace stipple::lod

@@ -1,0 +1,14 @@
+// The program as a process of its own.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace stipple::test {
+
+/// Runs the program and kills it after a while; true if it ended well before.
+bool runAndKill(const std::vector<std::string>& arguments, int milliseconds, int signal);
+/// Runs it in a shell under `limits`; its exit code. What it says is in `folder`/out and /err.
+int shell(const std::string& limits, const std::string& arguments, const std::string& folder);
+
+}  // namespace stipple::test
