@@ -46,7 +46,7 @@ struct Below {
 std::vector<Below> recordsWithLeaves(const Store& store, uint32_t level) {
     const Hierarchy& h = store.hierarchy;
     std::vector<Below> all;
-    std::map<std::array<uint32_t, 3>, size_t> byCell;
+    std::multimap<std::array<uint32_t, 3>, size_t> byCell;
     const auto cellOf = [&](const glm::dvec3& p) {
         const glm::dvec3 lattice = (p - h.origin) / h.unit;
         const double size = std::exp2(double(h.rootLog2) - level - 6);
@@ -58,7 +58,7 @@ std::vector<Below> recordsWithLeaves(const Store& store, uint32_t level) {
         if (h.nodes[i].level == level && !h.nodes[i].isLeaf()) {
             const auto chunk = readChunk(store, i);
             for (const auto& r : chunk->records) {
-                byCell[cellOf(reference::decodeDisc(h, h.nodes[i], r).position)] = all.size();
+                byCell.emplace(cellOf(reference::decodeDisc(h, h.nodes[i], r).position), all.size());
                 all.push_back({reference::decodeDisc(h, h.nodes[i], r),
                                h.unit * h.errors.decode(shared::recordErrorCode(r)),
                                {}});
@@ -69,8 +69,18 @@ std::vector<Below> recordsWithLeaves(const Store& store, uint32_t level) {
         const auto chunk = readChunk(store, i);
         for (const auto& r : chunk->records) {
             const reference::Disc d = reference::decodeDisc(h, h.nodes[i], r);
-            const auto found = byCell.find(cellOf(d.position));
-            if (found != byCell.end()) all[found->second].leaves.push_back(d);
+            // Of several records of a cell the one whose normal agrees best.
+            const auto [first, last] = byCell.equal_range(cellOf(d.position));
+            size_t best = all.size();
+            double agrees = -2;
+            for (auto at = first; at != last; ++at) {
+                const double dot = glm::dot(all[at->second].record.normal, d.normal);
+                const double agreement = (shared::recordFlags(r) & shared::kFlagTwoSided) != 0 ? std::abs(dot) : dot;
+                if (agreement <= agrees) continue;
+                agrees = agreement;
+                best = at->second;
+            }
+            if (best < all.size()) all[best].leaves.push_back(d);
         }
     }
     return all;

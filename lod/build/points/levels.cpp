@@ -225,6 +225,64 @@ PendingNode makeLeaf(const Frame& frame, SortedPoints& from, size_t begin, size_
     return out;
 }
 
+/// One record for the records of a cell; two, where those lie in two cones of normals and one disc would be a poor
+/// stand-in for both (an edge between two walls), so that flat parts get large discs and edges keep small errors.
+class ConeMerger {
+  public:
+    template <typename CodeOf>
+    void merge(const RecordGrid& grid, const Frame& frame, std::span<const Rising> parts,
+               std::span<const RisingValue> values, const Leaves* leaves, const CodeOf& codeOf, PendingNode& out) {
+        const Rising one = mergeRising(grid, parts, leaves);
+        if (!isSplit(grid, parts, one)) {
+            out.records.push_back(one);
+            for (size_t k = 0; k < parts.size(); ++k) codeOf(k) = one.code;
+            mergeAttributes(frame, parts, values, out);
+            return;
+        }
+        for (size_t k = 0; k < parts.size(); ++k) codeOf(k) = of_.at(side_[k]).code;
+        for (uint8_t g = 0; g < 2; ++g) {
+            out.records.push_back(of_.at(g));
+            values_.clear();
+            const size_t kinds = frame.attributes.size();
+            for (size_t k = 0; k < parts.size(); ++k)
+                if (side_[k] == g)
+                    values_.insert(values_.end(), values.begin() + static_cast<ptrdiff_t>(k * kinds),
+                                   values.begin() + static_cast<ptrdiff_t>((k + 1) * kinds));
+            mergeAttributes(frame, members_.at(g), values_, out);
+        }
+    }
+
+  private:
+    static constexpr int kWorthwhile = 8;        ///< codes of error (1/8 octaves) that two records must gain
+    static constexpr double kGoodAsItIs = 0.25;  ///< radii: a disc with a smaller error is not split
+
+    bool isSplit(const RecordGrid& grid, std::span<const Rising> parts, const Rising& one) {
+        if (grid.errors.decode(one.code) < kGoodAsItIs * static_cast<double>(one.radius)) return false;
+        if (!splitByNormals(parts, side_)) return false;
+        for (auto& m : members_) m.clear();
+        for (size_t k = 0; k < parts.size(); ++k) members_.at(side_[k]).push_back(parts[k]);
+        for (size_t g = 0; g < 2; ++g) {
+            of_.at(g) = mergeRising(grid, members_.at(g), nullptr);
+            if (of_.at(g).code + kWorthwhile > one.code) return false;
+        }
+        return true;
+    }
+    void mergeAttributes(const Frame& frame, std::span<const Rising> parts, std::span<const RisingValue> values,
+                         PendingNode& out) {
+        const size_t kinds = frame.attributes.size();
+        for (size_t a = 0; a < kinds; ++a) {
+            column_.clear();
+            for (size_t k = 0; k < parts.size(); ++k) column_.push_back(values[k * kinds + a]);
+            out.values.push_back(mergeValues(frame.attributes[a], column_, parts));
+        }
+    }
+
+    std::vector<uint8_t> side_;
+    std::array<std::vector<Rising>, 2> members_;
+    std::array<Rising, 2> of_;
+    std::vector<RisingValue> values_, column_;
+};
+
 }  // namespace
 
 PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, NodeBatch& batch, const Leaves* leaves) {
@@ -244,7 +302,8 @@ PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, Node
     grid.errors = frame.errors;
     const size_t kinds = frame.attributes.size();
     thread_local std::vector<Rising> points;
-    thread_local std::vector<RisingValue> leafValues, column;
+    thread_local std::vector<RisingValue> leafValues;
+    thread_local ConeMerger cones;
     for (PendingNode& child : children) {
         const bool isLeaf = child.node.isLeaf();
         out.node.childMask =
@@ -272,15 +331,10 @@ PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, Node
                 parts = std::span(child.records).subspan(begin, end - begin);
                 values = std::span(child.values).subspan(begin * kinds, (end - begin) * kinds);
             }
-            out.records.push_back(mergeRising(grid, parts, leaves));
-            for (size_t a = 0; a < kinds; ++a) {
-                column.clear();
-                for (size_t k = 0; k < parts.size(); ++k) column.push_back(values[k * kinds + a]);
-                out.values.push_back(mergeValues(frame.attributes[a], column, parts));
-            }
-            const uint8_t code = out.records.back().code;
-            for (size_t k = begin; k < end; ++k)
-                (isLeaf ? child.leafParentCode[k] : child.records[k].parentCode) = code;
+            const auto codeOf = [&](size_t k) -> uint8_t& {
+                return isLeaf ? child.leafParentCode[begin + k] : child.records[begin + k].parentCode;
+            };
+            cones.merge(grid, frame, parts, values, leaves, codeOf, out);
         }
     }
     out.node.records = static_cast<uint32_t>(out.records.size());

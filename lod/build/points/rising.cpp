@@ -52,6 +52,7 @@ void addUp(std::span<const Rising> parts, Rising& out) {
     glm::dvec3 sum(0);
     glm::vec3 colour(0), normal(0), reference(0);
     bool allNone = true;
+    out.first = parts[0].first;
     out.least = parts[0].least;
     out.greatest = parts[0].greatest;
     for (const Rising& p : parts) {
@@ -67,6 +68,7 @@ void addUp(std::span<const Rising> parts, Rising& out) {
         out.flags =
             static_cast<uint8_t>(out.flags | (p.flags & (shared::kFlagTwoSided | shared::kFlagEstimatedNormal)));
         out.code = std::max(out.code, p.code);
+        out.first = std::min(out.first, p.first);
         out.count += p.count;
         if (!hasNormal(p)) continue;
         if (allNone) reference = p.normal;
@@ -76,7 +78,6 @@ void addUp(std::span<const Rising> parts, Rising& out) {
         normal += flip ? -w * p.meanNormal : w * p.meanNormal;
     }
     out.key = parts[0].key;
-    out.first = parts[0].first;
     out.mean = parts[0].mean + sum / count;
     out.meanColour = colour / static_cast<float>(count);
     out.meanNormal = normal / static_cast<float>(count);
@@ -257,6 +258,50 @@ Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const 
                   byteOf(out.meanColour.x) | byteOf(out.meanColour.y) << 8 | byteOf(out.meanColour.z) << 16 |
                       uint32_t{out.flags} << 24};
     return out;
+}
+
+bool splitByNormals(std::span<const Rising> parts, std::vector<uint8_t>& side) {
+    constexpr float kOneCone = 0.82f;  // cosine of 35 degrees
+    constexpr int kRounds = 2;
+    if (parts.size() < 2) return false;
+    // How well a normal agrees with an axis; a two-sided one has no sign.
+    const auto agrees = [](const Rising& p, const glm::vec3& axis) {
+        const float d = glm::dot(p.normal, axis);
+        return (p.flags & shared::kFlagTwoSided) != 0 ? std::abs(d) : d;
+    };
+    const auto farthestFrom = [&](const glm::vec3& axis) {
+        size_t worst = 0;
+        float least = 2;
+        for (size_t k = 0; k < parts.size(); ++k) {
+            if (!hasNormal(parts[k])) return parts.size();
+            const float d = agrees(parts[k], axis);
+            if (d < least) {
+                least = d;
+                worst = k;
+            }
+        }
+        return worst;
+    };
+    const size_t a = farthestFrom(parts[0].normal);
+    if (a == parts.size()) return false;
+    const size_t b = farthestFrom(parts[a].normal);
+    std::array<glm::vec3, 2> axis{parts[a].normal, parts[b].normal};
+    if (agrees(parts[b], axis[0]) > kOneCone) return false;
+    side.resize(parts.size());
+    std::array<size_t, 2> members{};
+    for (int round = 0; round < kRounds; ++round) {
+        std::array<glm::vec3, 2> sum{glm::vec3(0), glm::vec3(0)};
+        members = {};
+        for (size_t k = 0; k < parts.size(); ++k) {
+            side[k] = agrees(parts[k], axis[1]) > agrees(parts[k], axis[0]) ? 1 : 0;
+            const bool flip = glm::dot(parts[k].normal, axis.at(side[k])) < 0;
+            sum.at(side[k]) += static_cast<float>(parts[k].count) * (flip ? -parts[k].normal : parts[k].normal);
+            ++members.at(side[k]);
+        }
+        for (size_t g = 0; g < 2; ++g)
+            if (glm::length(sum.at(g)) > 0) axis.at(g) = glm::normalize(sum.at(g));
+    }
+    return members[0] > 0 && members[1] > 0;
 }
 
 }  // namespace stipple::lod

@@ -22,13 +22,6 @@ constexpr uint64_t kBuildVersion = 1;                ///< of what the same input
 constexpr uint64_t kCellBytes = uint64_t{64} << 20;  ///< that one cell of the work needs at most
 constexpr uint64_t kRunSegments = 64;                ///< of one atom that are kept until they are sent
 
-uint32_t mixed(uint32_t a, uint32_t b, double u) {
-    uint32_t out = 0;
-    for (uint32_t shift = 0; shift < 24; shift += 8)
-        out |= static_cast<uint32_t>(std::lround((1 - u) * (a >> shift & 255u) + u * (b >> shift & 255u))) << shift;
-    return out;
-}
-
 class StrandBuild {
   public:
     StrandBuild(const StrandSource& source, std::string output, const StrandBuildSettings& settings, Executor& executor,
@@ -182,37 +175,19 @@ class StrandBuild {
         return p;
     }
 
-    /// The points of one strand, long segments divided.
+    /// The points of one strand as they travel.
     std::vector<TravellingPoint> pointsOf(const StrandSet& set, size_t s) const {
-        const double longest = std::exp2(double{kRootLog2} - facts_.keyLevels);
         std::vector<TravellingPoint> out;
-        StrandPoint before;
-        for (uint32_t i = set.first[s]; i < set.first[s + 1]; ++i) {
-            const StrandPoint after = pointOf(set, s, i);
-            const auto pieces =
-                i == set.first[s]
-                    ? 1u
-                    : static_cast<uint32_t>(std::max(1.0, std::ceil(glm::length(after.p - before.p) / longest)));
-            for (uint32_t k = 1; k < pieces; ++k) {
-                const double u = static_cast<double>(k) / pieces;
-                StrandPoint q = after;
-                q.p = glm::mix(before.p, after.p, u);
-                q.radius = static_cast<float>((1 - u) * before.radius + u * after.radius);
-                const glm::vec3 d = glm::mix(before.direction, after.direction, static_cast<float>(u));
-                q.direction = glm::length(d) > 1e-3f ? glm::normalize(d) : before.direction;
-                q.colour = mixed(before.colour, after.colour, u);
-                out.emplace_back(q);
-            }
-            out.emplace_back(after);
-            before = after;
-        }
+        for (uint32_t i = set.first[s]; i < set.first[s + 1]; ++i) out.emplace_back(pointOf(set, s, i));
         return out;
     }
+    double longest() const { return std::exp2(double{kRootLog2} - facts_.keyLevels); }
 
     Result<void> distribute() {
         const Frame frame = frameOf();
         CellTree tree(frame, facts_.segments);
         std::vector<uint32_t> x, y, z;
+        std::vector<TravellingPoint> ends;
         do {
             facts_.parts = 0;
             uint64_t done = 0;
@@ -222,10 +197,15 @@ class StrandBuild {
                 z.clear();
                 for (size_t s = 0; s < block.strands(); ++s) {
                     const std::vector<TravellingPoint> points = pointsOf(block, s);
-                    for (size_t k = 1; k < points.size(); ++k) {
-                        x.push_back(TravellingPoint::middle(points[k - 1].x, points[k].x));
-                        y.push_back(TravellingPoint::middle(points[k - 1].y, points[k].y));
-                        z.push_back(TravellingPoint::middle(points[k - 1].z, points[k].z));
+                    for (size_t i = 1; i < points.size(); ++i) {
+                        divide(points[i - 1], points[i], longest(), ends);
+                        const TravellingPoint* before = &points[i - 1];
+                        for (const TravellingPoint& end : ends) {
+                            x.push_back(TravellingPoint::middle(before->x, end.x));
+                            y.push_back(TravellingPoint::middle(before->y, end.y));
+                            z.push_back(TravellingPoint::middle(before->z, end.z));
+                            before = &end;
+                        }
                     }
                 }
                 tree.count({x, y, z});
@@ -242,7 +222,7 @@ class StrandBuild {
                 return fail(ErrorKind::budget, fmt::format("{} segments lie within the length of one", atom.count),
                             settings_.description.source, "are the strands what they should be?");
         if (const Journal* const journal = work_->journal())
-            STIPPLE_TRY(journal->announce(facts_.parts * kSpillBytes, progress_));
+            STIPPLE_TRY(journal->announce(facts_.segments * kSpillBytes, progress_));
         std::vector<uint32_t> atomOfCell(tree.cells().size());
         for (uint32_t a = 0; a < atoms.size(); ++a)
             for (uint32_t c = 0; c < atoms[a].cells; ++c) atomOfCell[atoms[a].firstCell + c] = a;
@@ -251,7 +231,8 @@ class StrandBuild {
         return send(frame, tree, atomOfCell, buffers);
     }
 
-    /// Each segment to the atom that holds its middle; those of a strand that stay together travel as one run.
+    /// Each segment to the atoms that hold the middles of its pieces; those of a strand that stay together travel as
+    /// one run.
     Result<void> send(const Frame& frame, const CellTree& tree, const std::vector<uint32_t>& atomOfCell,
                       std::vector<StrandRuns>& buffers) {
         const uint64_t most = std::max<uint64_t>(
@@ -264,25 +245,38 @@ class StrandBuild {
         };
         uint64_t done = 0;
         uint32_t strand = 0;
+        std::vector<TravellingPoint> ends;
+        std::vector<uint32_t> to;
+        std::vector<std::pair<uint32_t, uint32_t>> nextOf(buffers.size(),
+                                                          {~0u, 0});  // strand and vertex of a run's end
         const Result<void> read = source_.read([&](const StrandSet& block) -> Result<void> {
             for (size_t s = 0; s < block.strands(); ++s, ++strand) {
                 const std::vector<TravellingPoint> points = pointsOf(block, s);
-                uint32_t atom = ~0u;
-                for (size_t k = 1; k < points.size(); ++k, ++done) {
-                    const TravellingPoint &a = points[k - 1], &b = points[k];
-                    const uint32_t to = atomOfCell[tree.cellOf(frame.keyOf(TravellingPoint::middle(a.x, b.x),
-                                                                           TravellingPoint::middle(a.y, b.y),
-                                                                           TravellingPoint::middle(a.z, b.z)))];
-                    StrandRuns& runs = buffers[to];
-                    if (to != atom || runs.runs.empty()) {
-                        runs.runs.push_back(
-                            {strand, static_cast<uint32_t>(k - 1), 1, block.isRibbon[s] != 0 ? 1u : 0u});
-                        runs.points.push_back(a);
+                uint32_t number = 0;
+                for (size_t i = 1; i < points.size(); ++i) {
+                    divide(points[i - 1], points[i], longest(), ends);
+                    to.clear();
+                    const TravellingPoint* before = &points[i - 1];
+                    for (const TravellingPoint& end : ends) {
+                        const uint32_t atom = atomOfCell[tree.cellOf(frame.keyOf(
+                            TravellingPoint::middle(before->x, end.x), TravellingPoint::middle(before->y, end.y),
+                            TravellingPoint::middle(before->z, end.z)))];
+                        if (std::find(to.begin(), to.end(), atom) == to.end()) to.push_back(atom);
+                        before = &end;
                     }
-                    atom = to;
-                    runs.points.push_back(b);
-                    ++runs.runs.back().points;
-                    if (runs.points.size() >= most) STIPPLE_TRY(flush(to));
+                    for (const uint32_t atom : to) {
+                        StrandRuns& runs = buffers[atom];
+                        if (runs.runs.empty() || nextOf[atom] != std::pair(strand, static_cast<uint32_t>(i - 1))) {
+                            runs.runs.push_back({strand, number, 1, block.isRibbon[s] != 0 ? 1u : 0u});
+                            runs.points.push_back(points[i - 1]);
+                        }
+                        nextOf[atom] = {strand, static_cast<uint32_t>(i)};
+                        runs.points.push_back(points[i]);
+                        ++runs.runs.back().points;
+                        if (runs.points.size() >= most) STIPPLE_TRY(flush(atom));
+                    }
+                    number += static_cast<uint32_t>(ends.size());
+                    done += ends.size();
                 }
             }
             progress_.update("distribute", std::min(done, facts_.parts), facts_.parts);

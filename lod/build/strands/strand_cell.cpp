@@ -48,30 +48,7 @@ class StrandCell {
         std::sort(order.begin(), order.end(), [](const Place& a, const Place& b) {
             return std::tie(a.run.strand, a.run.firstNumber) < std::tie(b.run.strand, b.run.firstNumber);
         });
-        std::vector<StrandPart>& parts = nodes_[0].parts;
-        for (const auto& [run, begin] : order)
-            for (uint32_t k = 0; k < run.points; ++k) {
-                // A run may begin where the one before ended.
-                const bool isShared = k == 0 && !points_.empty() && points_.back().strand == run.strand &&
-                                      points_.back().number == run.firstNumber;
-                if (!isShared) {
-                    StrandPoint p = in.points[begin + k].point();
-                    p.strand = run.strand;
-                    p.number = run.firstNumber + k;
-                    p.isRibbon = run.isRibbon;
-                    points_.push_back(p);
-                    places_.push_back({in.points[begin + k].x, in.points[begin + k].y, in.points[begin + k].z});
-                }
-                if (k == 0) continue;
-                StrandPart part;
-                part.b = static_cast<uint32_t>(points_.size() - 1);
-                part.a = part.b - 1;
-                part.radiusA = points_[part.a].radius;
-                part.radiusB = points_[part.b].radius;
-                part.colourA = points_[part.a].colour;
-                part.colourB = points_[part.b].colour;
-                parts.push_back(part);
-            }
+        for (const auto& [run, begin] : order) takeRun(run, &in.points[begin]);
         partition();
         return {};
     }
@@ -133,6 +110,47 @@ class StrandCell {
     }
     static uint8_t octantOf(const Node& n) {
         return static_cast<uint8_t>(1u << ((n.cell[0] & 1u) | (n.cell[1] & 1u) << 1 | (n.cell[2] & 1u) << 2));
+    }
+
+    /// The pieces of a run that lie in the cell.
+    void takeRun(const StrandRun& run, const TravellingPoint* points) {
+        const double longest = frame_.cellSize(frame_.keyLevels);
+        const StrandNode& own = nodes_[0];
+        const uint32_t shift = frame_.shiftOf(own.node.level);
+        uint32_t number = run.firstNumber;
+        for (uint32_t i = 1; i < run.points; ++i) {
+            divide(points[i - 1], points[i], longest, ends_);
+            TravellingPoint before = points[i - 1];
+            for (const TravellingPoint& end : ends_) {
+                const uint64_t key =
+                    frame_.keyOf(TravellingPoint::middle(before.x, end.x), TravellingPoint::middle(before.y, end.y),
+                                 TravellingPoint::middle(before.z, end.z));
+                if (key >> shift == own.key >> shift) {
+                    StrandPart part;
+                    part.a = addPoint(before, run, number);
+                    part.b = addPoint(end, run, number + 1);
+                    part.radiusA = points_[part.a].radius;
+                    part.radiusB = points_[part.b].radius;
+                    part.colourA = points_[part.a].colour;
+                    part.colourB = points_[part.b].colour;
+                    nodes_[0].parts.push_back(part);
+                }
+                before = end;
+                ++number;
+            }
+        }
+    }
+    uint32_t addPoint(const TravellingPoint& from, const StrandRun& run, uint32_t number) {
+        const bool isThere = !points_.empty() && points_.back().strand == run.strand && points_.back().number == number;
+        if (!isThere) {
+            StrandPoint p = from.point();
+            p.strand = run.strand;
+            p.number = number;
+            p.isRibbon = run.isRibbon;
+            points_.push_back(p);
+            places_.push_back({from.x, from.y, from.z});
+        }
+        return static_cast<uint32_t>(points_.size() - 1);
     }
 
     StrandNode nodeAt(uint32_t level, uint64_t key) const {
@@ -357,7 +375,8 @@ class StrandCell {
     std::vector<StrandPoint> points_;
     std::vector<std::array<uint32_t, 3>> places_;  ///< of an atom's points, as they travelled
     std::vector<StrandNode> nodes_;                ///< the first one is the cell's own
-    size_t firstOwn_ = 0;                          ///< 0: all nodes are to be made
+    std::vector<TravellingPoint> ends_;
+    size_t firstOwn_ = 0;  ///< 0: all nodes are to be made
 };
 
 }  // namespace

@@ -51,7 +51,7 @@ StrandMerge mergeParts(const std::vector<StrandPoint>& points, const std::vector
                        const StrandLevel& level);
 
 /// A point as it travels, with no more bits than matter: places to a quarter of a lattice unit (2^-26 of the extent),
-/// directions to 0.03 degrees, radii to 2^-17 of themselves.
+/// directions to 0.06 degrees, radii to 2^-17 of themselves.
 struct TravellingPoint {
     static constexpr uint32_t kStepBits = 2;
     uint32_t x = 0, y = 0, z = 0;
@@ -67,7 +67,11 @@ struct TravellingPoint {
     /// Largest distance from where the point was, lattice units.
     static double rounding() { return std::exp2(-1.0 - kStepBits) * std::sqrt(3.0); }
 };
-/// Successive points of one strand.
+/// A segment from `a` to `b` in even pieces no longer than `longest` lattice units: their ends, `b` the last. Part of
+/// the segments of a strand can be divided anywhere with the same result.
+void divide(const TravellingPoint& a, const TravellingPoint& b, double longest, std::vector<TravellingPoint>& ends);
+
+/// Successive points of one strand as its source has them; numbers count the ends of divided segments.
 struct StrandRun {
     uint32_t strand = 0, firstNumber = 0, points = 0, isRibbon = 0;
 };
