@@ -1,6 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <thread>
+
 #include "apps/stipple/common.h"
+#include "apps/stipple/mpi_ranks.h"
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
 
@@ -11,17 +15,28 @@ struct Options {
     std::vector<std::string> inputs;
     std::string output;
     BuildOptions build;
-    bool json = false, quiet = false;
+    bool json = false, quiet = false, mpi = false;
 };
 
-Result<void> run(const Options& o) {
+/// `isSilent`: another rank says what there is to say.
+Result<void> run(const Options& o, bool& isSilent) {
     catchStopSignals();
-    const auto executor = makeTbbExecutor(o.build.threads);
+    MpiJob job;
+    BuildOptions build = o.build;
+    if (o.mpi) {
+        STIPPLE_ASSIGN(job, joinMpi());
+        build.ranks = job.ranks.get();
+        isSilent = job.ranks->rank() > 0;
+        const auto cores = static_cast<int>(std::thread::hardware_concurrency());
+        if (build.threads == 0) build.threads = std::max(cores / job.onThisMachine, 1);
+    }
+    const auto executor = makeTbbExecutor(build.threads);
     Result<lod::BuildReport> built = [&] {
-        Progress progress(!o.quiet, o.json);
-        return buildAny(o.inputs, o.output, o.build, *executor, progress);
+        Progress progress(!o.quiet && !isSilent, o.json);
+        return buildAny(o.inputs, o.output, build, *executor, progress);
     }();
     if (!built) return tl::unexpected(built.error());
+    if (isSilent) return {};
     const lod::BuildReport& r = *built;
     if (o.json) {
         const nlohmann::json j = {{"primitive", r.primitive + "s"},
@@ -70,8 +85,13 @@ void setupBuild(CLI::App& app, int& status) {
     o->build.addTo(*sub);
     sub->add_flag("--json", o->json, "print the report as JSON");
     sub->add_flag("--quiet", o->quiet, "no progress on standard error");
+    sub->add_flag("--mpi", o->mpi,
+                  "build points as a rank of an MPI job (mpirun -n N stipple build --mpi ...); all ranks must see the "
+                  "inputs and the folder for temporary files; --memory and --threads are of each rank");
     sub->callback([o, &status] {
-        if (const auto result = run(*o); !result) status = report(result.error());
+        bool isSilent = false;
+        if (const auto result = run(*o, isSilent); !result)
+            status = isSilent ? static_cast<int>(result.error().kind) : report(result.error());
     });
 }
 

@@ -98,6 +98,7 @@ Result<lod::BuildSettings> BuildOptions::settings() const {
     s.mergeDuplicates = duplicates == "merge";
     s.tempFolder = temp;
     s.isStopped = isStopRequested;
+    s.ranks = ranks;
     s.estimateRadii = radii != "keep";
     s.skipBad = skipBad;
     s.open = [count = surfels, repairs = repair](const std::string& path, const lod::ReadOptions& o) {

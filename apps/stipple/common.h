@@ -28,6 +28,7 @@ struct BuildOptions {
     bool skipBad = false, onlyPoints = false, repair = false;
     double strandRadius = 0;
     uint64_t surfels = 0;
+    Ranks* ranks = nullptr;  ///< of an MPI job
     void addTo(CLI::App& app);
     Result<lod::BuildSettings> settings() const;
 };

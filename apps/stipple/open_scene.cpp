@@ -371,9 +371,12 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
                                   const BuildOptions& build, Executor& executor, Progress& progress) {
     STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
     STIPPLE_ASSIGN(const bool isPlyMesh, isMeshPly(inputs, build));
+    const bool isStrands = inputs.size() == 1 && lod::isStrandFile(inputs[0]);
+    if (build.ranks != nullptr && (isPlyMesh || isStrands || (isSceneFile(inputs.front()) && build.surfels == 0)))
+        return fail(ErrorKind::usage, "only points are built by several ranks", inputs.front(),
+                    "build it without --mpi: it needs no more than --memory");
     if (isPlyMesh) return buildPlyMesh(inputs.front(), output, build, executor, progress);
-    if (inputs.size() == 1 && lod::isStrandFile(inputs[0]))
-        return buildStrandFile(inputs[0], output, build, executor, progress);
+    if (isStrands) return buildStrandFile(inputs[0], output, build, executor, progress);
     if (!isSceneFile(inputs.front()) || build.surfels > 0)
         return lod::buildStore(inputs, output, settings, executor, progress);
     if (inputs.size() > 1)

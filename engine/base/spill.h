@@ -22,6 +22,7 @@ class Spill {
     /// From several threads; what one call brings stays together.
     Result<void> append(const std::vector<uint8_t>& bytes);
 
+    const std::string& path() const { return path_; }
     /// So far.
     uint64_t bytes() const { return bytes_; }
 

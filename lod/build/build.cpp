@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "engine/base/hash.h"
@@ -12,9 +13,8 @@
 #include "lod/build/octree/assemble.h"
 #include "lod/build/octree/journal.h"
 #include "lod/build/points/estimate.h"
+#include "lod/build/points/exchange.h"
 #include "lod/build/points/input.h"
-#include "lod/build/points/ranges.h"
-#include "lod/build/points/upper.h"
 #include "lod/store.h"
 
 namespace stipple::lod {
@@ -58,6 +58,7 @@ class PointBuild {
 
     Result<BuildReport> run() {
         STIPPLE_TRY(planMemory());
+        if (settings_.ranks != nullptr) return runTogether();
         if (memory_.isOnDisk) {
             STIPPLE_ASSIGN(Journal journal,
                            Journal::open(Journal::folderOf(output_, settings_.tempFolder), output_, identity()));
@@ -77,6 +78,54 @@ class PointBuild {
     }
 
   private:
+    /// The same with others: each builds its share of the buckets, the first one puts them together.
+    Result<BuildReport> runTogether() {
+        Ranks& ranks = *settings_.ranks;
+        const std::string folder = Journal::folderOf(output_, settings_.tempFolder);
+        STIPPLE_TRY(makeSharedFolder(ranks, folder));
+        bucketFolder_ = ownFolder(ranks, folder);
+        // Enough buckets for all, and the same ones whatever each machine has.
+        const auto workers = static_cast<uint64_t>(workers_) * static_cast<uint64_t>(ranks.count());
+        const uint64_t share = std::max(input_.declared() / (6 * workers), kAtomPoints);
+        memory_.bucketPoints = leastOf(std::min(memory_.bucketPoints, share));
+        STIPPLE_TRY(agree(&ranks, distribute()));
+        STIPPLE_TRY(agree(&ranks, collectBuckets(ranks, folder, buckets_)));
+        clock_.ends("distribute");
+        description_ = describe();
+        std::vector<size_t> own;
+        for (size_t b = 0; b < plan_.buckets.size(); ++b)
+            if (isOwn(&ranks, b)) own.push_back(b);
+        const Result<void> made = inOrder<BuiltBucket>(
+            executor_, workers_, 0, own.size(),
+            [&](size_t k) -> Result<BuiltBucket> {
+                STIPPLE_TRY(checkStopped());
+                return buildBucket(own[k]);
+            },
+            [&](size_t k, const BuiltBucket& built) {
+                progress_.update("build", done_ += plan_.buckets[own[k]].points, input_.points);
+                buckets_[own[k]]->points.remove();
+                buckets_[own[k]]->ghosts.remove();
+                return saveBuilt(folder, own[k], built);
+            });
+        STIPPLE_TRY(agree(&ranks, made));
+        clock_.ends("build");
+        STIPPLE_TRY(agree(&ranks, ranks.rank() == 0 ? putTogether(folder) : Result<void>()));
+        std::error_code error;
+        if (ranks.rank() == 0) std::filesystem::remove_all(folder, error);
+        report_.seconds = clock_.seconds();
+        return std::move(report_);
+    }
+    Result<void> putTogether(const std::string& folder) {
+        STIPPLE_TRY(openWriter());
+        const ValueRanges empty = ranges_;
+        for (size_t b = 0; b < plan_.buckets.size(); ++b) {
+            STIPPLE_ASSIGN(BuiltBucket built, loadBuilt(folder, b, empty));
+            STIPPLE_TRY(commit(b, std::move(built)));
+        }
+        clock_.ends("put together");
+        return finish();
+    }
+
     uint64_t pointBytes() const {  // that a worker needs for each point of its bucket
         uint64_t bytes = 128;
         for (const AttributeInfo& a : input_.attributes()) bytes += 4 * bytesOf(a.type);
@@ -133,6 +182,7 @@ class PointBuild {
     // ---- survey, count, distribute ----
 
     Result<void> distribute() {
+        Ranks* const ranks = settings_.ranks;
         inputIdentity_ = input_.identity();
         STIPPLE_TRY(input_.survey(report_, executor_, progress_));
         clock_.ends("survey");
@@ -144,18 +194,22 @@ class PointBuild {
         input_.sample = {};
         double rounding = 0;
         do {
-            STIPPLE_ASSIGN(rounding, input_.read(executor_, workers_, progress_, "count",
-                                                 [&](int, const Points& block) -> Result<void> {
-                                                     tree_->count(block.coordinates());
-                                                     return checkStopped();
-                                                 }));
+            const Result<double> counted =
+                input_.read(executor_, workers_, progress_, "count", [&](int, const Points& block) -> Result<void> {
+                    tree_->count(block.coordinates());
+                    return checkStopped();
+                });
+            STIPPLE_TRY(agree(ranks, counted ? Result<void>() : Result<void>(tl::unexpected(counted.error()))));
+            rounding = *counted;
+            if (ranks != nullptr) tree_->addUp([&](std::vector<uint32_t>& counts) { ranks->addUp(counts); });
         } while (tree_->split());
         tree_->finish();
-        rounding_ = rounding;
+        rounding_ = largestOf(rounding);
         clock_.ends("count");
         plan_ = planBuckets(frame_, *tree_, memory_.bucketPoints);
         STIPPLE_TRY(announceDisk());
-        buckets_ = makeBuckets(plan_.buckets.size(), journal_ ? journal_->folder() : "");
+        if (journal_) bucketFolder_ = journal_->folder();
+        buckets_ = makeBuckets(plan_.buckets.size(), bucketFolder_);
         for (size_t b = 0; b < buckets_.size(); ++b)
             buckets_[b]->points.reserve(plan_.buckets[b].points * layout_.bytes());
         Distributor distributor(frame_, *tree_, plan_, layout_, buckets_, workers_, memory_.bufferBytes,
@@ -174,6 +228,20 @@ class PointBuild {
         clock_.ends("distribute");
         return journal_ ? saveDistribution() : Result<void>();
     }
+
+    /// Values of all ranks.
+    template <typename T>
+    std::vector<T> ofAll(T value) const {
+        if (settings_.ranks == nullptr) return {value};
+        ByteWriter to;
+        to.put(value);
+        std::vector<T> all;
+        for (const std::vector<uint8_t>& bytes : settings_.ranks->gather(to.bytes()))
+            ByteReader(bytes).get(all.emplace_back());
+        return all;
+    }
+    double largestOf(double value) const { return std::ranges::max(ofAll(value)); }
+    uint64_t leastOf(uint64_t value) const { return std::ranges::min(ofAll(value)); }
 
     uint64_t temporaryBytes() const {
         uint64_t sum = 0;
@@ -270,14 +338,6 @@ class PointBuild {
     }
 
     // ---- buckets ----
-
-    /// What one bucket gives, until it is its turn to be written.
-    struct BuiltBucket {
-        std::vector<BuiltAtom> atoms;
-        ValueRanges ranges;
-        uint64_t merged = 0, tooMany = 0;
-        std::map<std::string, double> seconds;  ///< of the thread
-    };
 
     Result<void> openWriter() {
         description_ = describe();
@@ -503,6 +563,7 @@ class PointBuild {
     const RecordLayout layout_;
     MemoryPlan memory_;
     std::optional<Journal> journal_;
+    std::string bucketFolder_;  ///< empty: in memory
     Frame frame_;
     double rounding_ = 0;
     uint64_t inputIdentity_ = 0;
@@ -523,8 +584,15 @@ class PointBuild {
 Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std::string& output,
                                const BuildSettings& settings, Executor& executor, Progress& progress) {
     BuildReport report;
-    { STIPPLE_ASSIGN(const StoreWriter writer, StoreWriter::create(output)); }  // an unwritable output is found first
-    STIPPLE_ASSIGN(PointInput input, PointInput::open(inputs, settings, report));
+    const auto tryOutput = [&]() -> Result<void> {  // an unwritable output is found first
+        if (settings.ranks != nullptr && settings.ranks->rank() > 0) return {};
+        STIPPLE_ASSIGN(const StoreWriter writer, StoreWriter::create(output));
+        return {};
+    };
+    STIPPLE_TRY(agree(settings.ranks, tryOutput()));
+    Result<PointInput> opened = PointInput::open(inputs, settings, report);
+    STIPPLE_TRY(agree(settings.ranks, opened ? Result<void>() : Result<void>(tl::unexpected(opened.error()))));
+    PointInput input = std::move(*opened);
     return PointBuild(output, settings, executor, progress, std::move(input), std::move(report)).run();
 }
 

@@ -10,6 +10,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/process.h"
 #include "engine/base/progress.h"
+#include "engine/base/ranks.h"
 #include "lod/primitives.h"
 
 namespace stipple::lod {
@@ -32,6 +33,9 @@ struct BuildSettings : BuildLimits {
     bool allAttributes = false;           ///< every attribute of the input, beside `attributes`
     /// Opens one input; empty: openPointSource. For inputs that this library does not know (scenes with meshes).
     std::function<Result<PointSource>(const std::string& path, const ReadOptions& options)> open;
+    /// Others that build the same points with the same settings; each reads and builds its share, the first one writes.
+    /// What does not concern one bucket goes through `tempFolder`, which all must see.
+    Ranks* ranks = nullptr;
     bool skipBad = false;          ///< go on past corrupt chunks and files, and count what is lost
     bool fineNormals = false;      ///< of points: each from its own twelve nearest, at three times the time
     bool mergeDuplicates = false;  ///< of points at one place keep one

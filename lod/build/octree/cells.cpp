@@ -78,6 +78,15 @@ bool CellTree::split(uint64_t most) {
     return wasSplit_;
 }
 
+void CellTree::addUp(const std::function<void(std::vector<uint32_t>&)>& sum) {
+    std::vector<uint32_t> counts = entries_;
+    for (uint32_t& c : counts)
+        if ((c & kBlock) != 0) c = 0;  // the same everywhere
+    sum(counts);
+    for (size_t i = 0; i < counts.size(); ++i)
+        if ((entries_[i] & kBlock) == 0) entries_[i] = counts[i];
+}
+
 void CellTree::expect(const Coordinates& sample, uint64_t share) {
     do count(sample);
     while (split(kAtomPoints / share));

@@ -1,6 +1,7 @@
 // How the points are spread, found by counting: octree cells of at most kAtomPoints points, whatever the density.
 #pragma once
 
+#include <functional>
 #include <span>
 
 #include "lod/build/octree/bytes.h"
@@ -43,6 +44,8 @@ class CellTree {
     void expect(const Coordinates& sample, uint64_t share);
     /// From several threads.
     void count(const Coordinates& block);
+    /// Of several processes that counted apart: `sum` adds up what all of them have.
+    void addUp(const std::function<void(std::vector<uint32_t>&)>& sum);
     /// Splits what is too full; true if so: count everything once more. Cells of the deepest level stay.
     bool split() { return split(kAtomPoints); }
     /// Nothing more to count: numbers the cells that hold points along the Morton curve.

@@ -148,6 +148,7 @@ Result<void> PointInput::survey(BuildReport& report, Executor& executor, Progres
     executor.parallelFor(parts_.size(), 1, [&](size_t begin, size_t end) {
         PointBlock block;
         for (size_t i = begin; i < end && !stop; ++i) {
+            if (!isOwnPart(i)) continue;
             if (const auto read = surveyPart(parts_[i], block); !read) {
                 parts_[i].error = read.error();
                 if (!settings_.skipBad) stop = true;
@@ -155,6 +156,7 @@ Result<void> PointInput::survey(BuildReport& report, Executor& executor, Progres
             progress.update("survey", done += parts_[i].count, declared_);
         }
     });
+    if (settings_.ranks != nullptr) exchangeParts();
     report.pointsIn = declared_;
     points = 0;
     for (const Part& p : parts_) {
@@ -175,6 +177,56 @@ Result<void> PointInput::survey(BuildReport& report, Executor& executor, Progres
     STIPPLE_TRY(allLattice_ ? placeIntegers(report) : placeFloats());
     placeSample();
     return {};
+}
+
+bool PointInput::isOwnPart(size_t part) const {
+    const Ranks* const ranks = settings_.ranks;
+    return ranks == nullptr || part % static_cast<size_t>(ranks->count()) == static_cast<size_t>(ranks->rank());
+}
+
+/// What each rank found out about its parts, all ranks know afterwards.
+void PointInput::exchangeParts() {
+    const auto visit = [](auto& archive, auto& part) {
+        const auto with = [&](auto&& value) {
+            if constexpr (std::is_same_v<std::decay_t<decltype(archive)>, ByteWriter>)
+                archive.put(value);
+            else
+                archive.get(value);
+        };
+        with(part.usable);
+        with(part.notFinite);
+        with(part.lo);
+        with(part.hi);
+        with(part.least);
+        with(part.greatest);
+        with(part.colourMax);
+        with(part.firstColour);
+        with(part.hasColour);
+        with(part.isVaried);
+        with(part.sample);
+    };
+    ByteWriter mine;
+    for (size_t i = 0; i < parts_.size(); ++i) {
+        if (!isOwnPart(i)) continue;
+        visit(mine, parts_[i]);
+        const Error none{};
+        const Error& e = parts_[i].error ? *parts_[i].error : none;
+        mine.put(static_cast<int>(parts_[i].error ? e.kind : ErrorKind{}));
+        for (const std::string* text : {&e.what, &e.where, &e.hint}) mine.put(*text);
+    }
+    const std::vector<std::vector<uint8_t>> all = settings_.ranks->gather(mine.bytes());
+    for (size_t r = 0; r < all.size(); ++r) {
+        ByteReader from(all[r]);
+        for (size_t i = r; i < parts_.size(); i += all.size()) {
+            visit(from, parts_[i]);
+            int kind = 0;
+            Error e;
+            from.get(kind);
+            for (std::string* text : {&e.what, &e.where, &e.hint}) from.get(*text);
+            e.kind = static_cast<ErrorKind>(kind);
+            parts_[i].error = kind != 0 ? std::optional(e) : std::nullopt;
+        }
+    }
 }
 
 void PointInput::placeSample() {
@@ -341,7 +393,7 @@ Result<double> PointInput::read(Executor& executor, int workers, Progress& progr
             double& rounding = roundings[worker];
             for (size_t i = next++; i < parts_.size() && !stop; i = next++) {
                 const Part& part = parts_[i];
-                if (part.error) continue;
+                if (part.error || !isOwnPart(i)) continue;
                 const auto result = readPart(part, block, out, rounding, [&](const Points& b) -> Result<void> {
                     STIPPLE_TRY(sink(static_cast<int>(worker), b));
                     progress.update(stage, done += b.size(), points);

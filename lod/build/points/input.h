@@ -66,6 +66,8 @@ class PointInput {
     Result<PointSource> openInput(const std::string& path, const ReadOptions& options) const;
     Result<void> collectNames(const std::vector<std::string>& files, ReadOptions& options) const;
     Result<void> adopt(PointSource source, const ReadOptions& options, std::vector<bool>& found, BuildReport& report);
+    bool isOwnPart(size_t part) const;
+    void exchangeParts();
     Result<void> surveyPart(Part& part, PointBlock& block) const;
     void surveyColours(const PointBlock& block, size_t count, Part& part) const;
     Result<void> placeIntegers(BuildReport& report);

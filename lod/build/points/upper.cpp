@@ -38,7 +38,7 @@ namespace {
 
 template <typename Archive, typename Pending>
 void visit(Archive& archive, Pending& p) {
-    const auto with = [&](auto& value) {
+    const auto with = [&](auto&& value) {
         if constexpr (std::is_same_v<Archive, ByteWriter>)
             archive.put(value);
         else
@@ -56,6 +56,9 @@ void visit(Archive& archive, Pending& p) {
 }
 
 }  // namespace
+
+void putPending(const PendingNode& node, ByteWriter& to) { visit(to, node); }
+void getPending(ByteReader& from, PendingNode& node) { visit(from, node); }
 
 void UpperTree::saveChanges(ByteWriter& to) {
     to.put(uint64_t{unchanged_});

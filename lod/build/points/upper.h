@@ -12,6 +12,9 @@ struct BuiltAtom {
     NodeBatch batch;
 };
 
+void putPending(const PendingNode& node, ByteWriter& to);
+void getPending(ByteReader& from, PendingNode& node);
+
 class UpperTree {
   public:
     explicit UpperTree(const Frame& frame) : frame_(frame) {}
