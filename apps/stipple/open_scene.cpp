@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "apps/stipple/cache.h"
 #include "apps/stipple/common.h"
@@ -367,6 +369,32 @@ Result<bool> isMeshPly(const std::vector<std::string>& inputs, const BuildOption
 
 }  // namespace
 
+namespace {
+
+/// Scene files are read as a whole: is there memory for that?
+Result<void> checkSceneMemory(const std::string& path, uint64_t memoryBytes) {
+    constexpr uint64_t kTimes = 4;  // the file, its arrays, and a copy of either on the way (measured: 3.9)
+    std::error_code error;
+    uint64_t bytes = fs::file_size(path, error);
+    if (error) return {};  // whoever opens it says why
+    if (fs::path(path).extension() == ".gltf") {
+        std::ifstream file(path);
+        const auto text = nlohmann::json::parse(file, nullptr, false);
+        if (text.is_object() && text.contains("buffers") && text["buffers"].is_array())
+            for (const auto& buffer : text["buffers"])
+                if (buffer.is_object() && buffer.contains("byteLength") && buffer["byteLength"].is_number_unsigned())
+                    bytes += std::min(buffer["byteLength"].get<uint64_t>(), uint64_t{1} << 40);
+    }
+    if (kTimes * bytes <= memoryBytes) return {};
+    return fail(ErrorKind::budget,
+                fmt::format("a scene file is read as a whole, which takes about {}, but --memory allows {}",
+                            humanBytes(kTimes * bytes), humanBytes(memoryBytes)),
+                path,
+                fmt::format("give --memory {}M, or triangles as PLY, which need not fit", (kTimes * bytes >> 20) + 1));
+}
+
+}  // namespace
+
 Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const std::string& output,
                                   const BuildOptions& build, Executor& executor, Progress& progress) {
     STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
@@ -381,6 +409,7 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
         return lod::buildStore(inputs, output, settings, executor, progress);
     if (inputs.size() > 1)
         return fail(ErrorKind::usage, "only one scene with meshes can be built at a time", inputs[1]);
+    STIPPLE_TRY(checkSceneMemory(inputs.front(), settings.memoryBytes));
     STIPPLE_ASSIGN(scene::Scene scene, scene::readScene(inputs.front(), build.repair));
     const lod::MeshSource triangles = scene::triangleSource(scene, scene::placements(scene));
     const auto counted = [&](scene::PrimitiveKind kind) {
