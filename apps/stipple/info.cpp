@@ -91,7 +91,7 @@ void printStore(const nlohmann::json& j) {
                    j["textures"].size(), j["texture_tiles"].get<uint64_t>(),
                    humanBytes(j["texture_bytes"].get<uint64_t>()));
     if (j["points_in"].get<uint64_t>() > 0) {
-        fmt::print("  points in     {}", j["points_in"].get<uint64_t>());
+        fmt::print("  {:<14}{}", isMesh ? "triangles in" : "points in", j["points_in"].get<uint64_t>());
         for (const auto& [reason, count] : j["dropped"].items())
             fmt::print(", dropped {}: {}", count.get<uint64_t>(), reason);
         fmt::print("\n");

@@ -136,7 +136,7 @@ class PointBuild {
         constexpr uint64_t kFixed = uint64_t{72} << 20, kReader = uint64_t{12} << 20;
         const auto fixedFor = [&](uint64_t threads) { return kFixed + threads * kReader; };
         const auto leastFor = [&](uint64_t threads) {
-            return fixedFor(threads) + (threads + 1) * kAtomPoints * pointBytes();
+            return fixedFor(threads) + (threads + 1) * kAtomPoints * pointBytes() + input_.declared() / 2;
         };
         // Fewer threads rather than more memory.
         while (workers_ > 1 && leastFor(static_cast<uint64_t>(workers_)) > settings_.memoryBytes) --workers_;
@@ -528,7 +528,7 @@ class PointBuild {
         upper_->finish(last);
         STIPPLE_TRY(append(last, all));
         batches_.push_back(std::move(all));
-        const Hierarchy hierarchy = assemble(frame_, batches_);
+        Hierarchy hierarchy = assemble(frame_, batches_);
         batches_ = {};
         if (merged_ > 0) report_.dropped["duplicate"] += merged_;
         if (tooMany_ > 0) report_.dropped[fmt::format("beyond {} at one place", kMostAtOnePlace)] += tooMany_;
@@ -539,6 +539,8 @@ class PointBuild {
         ranges_.describe(frame_, description_);
         STIPPLE_TRY(writer_->finish(hierarchy, description_));
         clock_.ends("write");
+        report_.nodes = hierarchy.nodes.size();
+        hierarchy = {};  // its memory is needed
         STIPPLE_ASSIGN(const Store store, openStore(writer_->temporaryPath()));
         STIPPLE_TRY(verifyStore(store, executor_, kVerifiedNodes));
         clock_.ends("verify");
@@ -546,7 +548,6 @@ class PointBuild {
         STIPPLE_TRY(writer_->commit());
         if (journal_) journal_->remove();
         report_.pointsOut = description_.points;
-        report_.nodes = hierarchy.nodes.size();
         report_.records = description_.records;
         report_.contentHash = writer_->contentHash();
         return {};

@@ -40,11 +40,11 @@ echo "Machine: $(machine). Warm page cache, output not synced."
 echo
 echo '| what | figure | command |'
 echo '|---|---|---|'
-for edge in 2237 5001; do
+for edge in 2238 5001; do
     python3 make.py ground $edge ground.ply
     size=$(($(stat -c %s ground.ply) / 1000000))
     for memory in 512M 1G 4G; do
-        [ $edge = 2237 ] || [ $memory = 512M ] || continue
+        [ $edge = 2238 ] || [ $memory = 512M ] || continue
         json build build ground.ply -o s.stipple --memory $memory --quiet
         row "$((2 * (edge - 1) * (edge - 1) / 1000000))M triangles (PLY, $size MB, smooth normals estimated) at $memory" "$(value build.json "$report")" "tests/bench/rounds_figures.sh; stipple build ground.ply -o s.stipple --memory $memory --json"
     done

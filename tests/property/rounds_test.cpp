@@ -296,5 +296,60 @@ TEST(Rounds, StayWithinTheirMemoryAndLoseNothingOnAFullDisk) {
     }
 }
 
+TEST(Rounds, OddMeshesAreBuiltInFull) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    const auto buildOf = [&](TriangleMesh mesh) {
+        MeshBuildSettings settings;
+        settings.description.materials.resize(1);
+        Progress silent(false);
+        return buildMeshStore(sourceOf(std::move(mesh)), folder / "odd.stipple", settings, *executor, silent);
+    };
+    const auto add = [](TriangleMesh& mesh, const glm::dvec3& at, double size) {
+        const auto first = static_cast<uint32_t>(mesh.position.size());
+        for (const glm::dvec3& corner : {glm::dvec3(0), glm::dvec3(size, 0, 0), glm::dvec3(0, size, 0.3 * size)})
+            mesh.position.push_back(at + corner);
+        mesh.indices.insert(mesh.indices.end(), {first, first + 1, first + 2});
+    };
+    // One triangle half a million times, and another far away: what is twice is dropped and counted.
+    TriangleMesh same;
+    for (int i = 0; i < 500'000; ++i) add(same, {3, 4, 5}, 0.01);
+    add(same, {900, 1, 1}, 0.01);
+    const auto once = buildOf(same);
+    ASSERT_TRUE(once) << once.error().line();
+    EXPECT_EQ(once->pointsOut, 2u);
+    EXPECT_EQ(once->dropped.at("duplicate triangles"), 499'999u);
+    // A corridor, and leaves that nothing can simplify: everything is there, and drawn whatever the distance.
+    TriangleMesh leaves;
+    Rng rng(2);
+    for (int i = 0; i < 300'000; ++i)
+        add(leaves, {1000 * rng.uniform(), rng.uniform(), rng.uniform()}, 0.002 + 0.01 * rng.uniform());
+    const auto built = buildOf(leaves);
+    ASSERT_TRUE(built) << built.error().line();
+    EXPECT_EQ(built->pointsOut, 300'000u);
+    ASSERT_EQ(built->notes.size(), 1u);
+    EXPECT_NE(built->notes[0].find("cannot be simplified"), std::string::npos);
+    const Store store = *openStore(folder / "odd.stipple");
+    ASSERT_TRUE(verifyStore(store, *executor));
+    // Half a million different triangles with one centre are more than a cell can hold: said, nothing written.
+    TriangleMesh star;
+    for (int i = 0; i < 500'000; ++i) {
+        const glm::dvec3 d(1 + 0.5 * rng.uniform(), rng.normal(), rng.normal()), e(rng.normal(), 1, rng.normal());
+        const auto first = static_cast<uint32_t>(star.position.size());
+        for (const glm::dvec3& p : {d, e, -d - e}) star.position.push_back(p);
+        star.indices.insert(star.indices.end(), {first, first + 1, first + 2});
+    }
+    fs::remove(folder / "odd.stipple");
+    const auto refused = buildOf(star);
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().line().find("centre at one place"), std::string::npos) << refused.error().line();
+    EXPECT_FALSE(fs::exists(folder / "odd.stipple"));
+    // Nothing at all, and nothing with an area.
+    EXPECT_FALSE(buildOf({}));
+    TriangleMesh flat;
+    for (int i = 0; i < 10; ++i) add(flat, {1, 2, 3}, 0);
+    EXPECT_FALSE(buildOf(flat));
+}
+
 }  // namespace
 }  // namespace stipple::lod

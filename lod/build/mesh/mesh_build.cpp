@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "engine/base/check.h"
@@ -112,7 +113,7 @@ class MeshBuild {
         uint64_t textures = 0;
         for (const TextureImage& t : settings_.textures) textures += 4 * uint64_t{t.rgba.size()} * 2;
         const auto leastFor = [&](int workers) {
-            return kFixed + textures + static_cast<uint64_t>(workers) * kCellBytes;
+            return kFixed + textures + static_cast<uint64_t>(workers) * kCellBytes + source_.triangles * kTableBytes;
         };
         const uint64_t memory = settings_.limits.memoryBytes, small = source_.triangles * 700 + kFixed + textures;
         while (workers_ > 1 && leastFor(workers_) > memory) --workers_;
@@ -161,10 +162,6 @@ class MeshBuild {
         const std::vector<Atom> atoms = tree.atoms();
         if (atoms.empty())
             return fail(ErrorKind::input, "holds no triangle with an area", settings_.description.source);
-        for (const Atom& atom : atoms)
-            if (atom.count > 2 * kAtomPoints)
-                return fail(ErrorKind::budget, fmt::format("{} triangles have their centre at one place", atom.count),
-                            settings_.description.source, "is the mesh what it should be?");
         if (const Journal* const journal = work_->journal())
             STIPPLE_TRY(journal->announce(facts_.triangles * kSpillBytes + source_.mostTemporaryBytes, progress_));
         work_->plan(atoms);
@@ -179,13 +176,20 @@ class MeshBuild {
         for (uint32_t a = 0; a < atoms.size(); ++a)
             for (uint32_t c = 0; c < atoms[a].cells; ++c) atomOfCell[atoms[a].firstCell + c] = a;
         std::vector<Soup> buffers(atoms.size());
-        const uint64_t most = std::max<uint64_t>(bufferBytes_ / atoms.size(), 8192);
+        const uint64_t wanted = std::max<uint64_t>(bufferBytes_ / atoms.size(), 8192);
+        // What no cell can divide may be one triangle many times: those are dropped before they fill the disk.
+        const auto isCrowded = [&](size_t a) { return atoms[a].count > kAtomPoints; };
+        std::vector<uint64_t> sent(atoms.size());
+        std::atomic<uint64_t> duplicate{0};
         const auto flush = [&](size_t a) {
+            Soup& soup = buffers[a];
             // Triangles in any order share few vertices with those beside them.
-            if (buffers[a].vertices.size() * 3 > 4 * (buffers[a].indices.size() / 3)) gather(buffers[a]);
+            if (isCrowded(a) || soup.vertices.size() * 3 > 4 * (soup.indices.size() / 3))
+                duplicate += gather(soup, isCrowded(a));
+            sent[a] += soup.indices.size() / 3;
             ByteWriter to;
-            putSoup(buffers[a], to);
-            buffers[a] = {};
+            putSoup(soup, to);
+            soup = {};
             return work_->input(a).append(to.bytes());
         };
         uint64_t done = 0;
@@ -222,7 +226,7 @@ class MeshBuild {
                             to.indices.push_back(place[v]);
                         }
                     for (const uint32_t v : used) place[v] = ~0u;
-                    if (to.vertices.size() * sizeof(shared::MeshVertex) + to.indices.size() * 4 < most) continue;
+                    if (to.vertices.size() * sizeof(shared::MeshVertex) + to.indices.size() * 4 < wanted) continue;
                     if (const auto flushed = flush(order[starts[s]] >> 32); !flushed) errors.push(flushed.error());
                 }
             });
@@ -233,13 +237,17 @@ class MeshBuild {
         }));
         for (size_t a = 0; a < buffers.size(); ++a)
             if (!buffers[a].indices.empty()) STIPPLE_TRY(flush(a));
+        facts_.duplicate = duplicate;
+        if (const uint64_t most = *std::max_element(sent.begin(), sent.end()); most > 2 * kAtomPoints)
+            return fail(ErrorKind::budget, fmt::format("{} different triangles have their centre at one place", most),
+                        settings_.description.source, "is the mesh what it should be?");
         return {};
     }
 
     /// What a resumed build has to know.
     struct Facts {
         Lattice lattice;
-        uint64_t triangles = 0, degenerate = 0, notFinite = 0;
+        uint64_t triangles = 0, degenerate = 0, notFinite = 0, duplicate = 0;
         double rounding = 0;
     };
     std::vector<uint8_t> factsAsBytes() const {
@@ -284,9 +292,9 @@ class MeshBuild {
         groups_ = {};
         STIPPLE_TRY(writeTextures(settings_.textures, work_->writer(), hierarchy, executor_));
         clock_.ends("textures");
-        for (const auto& [reason, count] :
-             {std::pair{"degenerate triangles", facts_.degenerate}, std::pair{"duplicate triangles", duplicate_},
-              std::pair{"triangles that are not finite", facts_.notFinite}})
+        for (const auto& [reason, count] : {std::pair{"degenerate triangles", facts_.degenerate},
+                                            std::pair{"duplicate triangles", facts_.duplicate + duplicate_},
+                                            std::pair{"triangles that are not finite", facts_.notFinite}})
             if (count > 0) report_.dropped[reason] = count;
         report_.pointsIn = facts_.triangles;
         StoreDescription description = settings_.description;
@@ -301,19 +309,20 @@ class MeshBuild {
         StoreWriter& writer = work_->writer();
         STIPPLE_TRY(writer.finish(hierarchy, description));
         clock_.ends("finish");
+        uint64_t coarsest = 0;
+        for (size_t i = 0; i < hierarchy.nodes.size(); ++i)
+            coarsest += hierarchy.groups[i].parents == 0 ? hierarchy.nodes[i].records : 0;
+        report_.nodes = hierarchy.nodes.size();
+        hierarchy = {};  // its memory is needed
         STIPPLE_ASSIGN(const Store store, openStore(writer.temporaryPath()));
-        STIPPLE_TRY(verifyStore(store, executor_, hierarchy.nodes.size() > kVerifiedNodes ? kVerifiedNodes : 0));
+        STIPPLE_TRY(verifyStore(store, executor_, report_.nodes > kVerifiedNodes ? kVerifiedNodes : 0));
         clock_.ends("verify");
         report_.bytesOut = writer.bytes();
         STIPPLE_TRY(writer.commit());
         work_->finish();
         report_.temporaryBytes = work_->temporaryBytes() + source_.mostTemporaryBytes;
-        report_.nodes = hierarchy.nodes.size();
         report_.records = description.records;
         report_.contentHash = writer.contentHash();
-        uint64_t coarsest = 0;
-        for (size_t i = 0; i < hierarchy.nodes.size(); ++i)
-            coarsest += hierarchy.groups[i].parents == 0 ? hierarchy.nodes[i].records : 0;
         if (coarsest > kManyRoots)
             report_.notes.push_back(fmt::format(
                 "{} triangles cannot be simplified (small separate parts, or edges of open borders): they are "
@@ -323,6 +332,7 @@ class MeshBuild {
     }
 
     static constexpr uint64_t kSpillBytes = 24;  ///< of a triangle, between the steps
+    static constexpr uint64_t kTableBytes = 2;   ///< of a triangle, of the table of groups, which stays in memory
 
     const MeshSource& source_;
     const std::string output_;

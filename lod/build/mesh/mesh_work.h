@@ -27,8 +27,9 @@ struct Soup {
     std::vector<uint32_t> indices;  ///< 3 a triangle
 };
 void putSoup(const Soup& soup, ByteWriter& to);
-/// The same triangles, equal vertices one, all in an order in which they take few bytes.
-void gather(Soup& soup);
+/// The same triangles, equal vertices one, all in an order in which they take few bytes. `dropEqual`: equal triangles
+/// once; returns how many went.
+uint64_t gather(Soup& soup, bool dropEqual);
 /// Appends; false if the bytes are not what putSoup wrote.
 bool getSoup(ByteReader& from, Soup& to);
 

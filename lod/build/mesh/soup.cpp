@@ -36,18 +36,20 @@ bool getSoup(ByteReader& from, Soup& to) {
     return true;
 }
 
-void gather(Soup& soup) {
+uint64_t gather(Soup& soup, bool dropEqual) {
     weld(soup);
-    const auto count = static_cast<ptrdiff_t>(soup.indices.size() / 3);
-    std::vector<std::array<uint32_t, 3>> order(soup.indices.size() / 3);
-    for (ptrdiff_t t = 0; t < count; ++t) {
-        auto& corners = order[static_cast<size_t>(t)];
-        std::copy_n(soup.indices.begin() + 3 * t, 3, corners.begin());
+    const size_t count = soup.indices.size() / 3;
+    std::vector<std::array<uint32_t, 3>> order(count);
+    for (size_t t = 0; t < count; ++t) {
+        auto& corners = order[t];
+        std::copy_n(soup.indices.begin() + static_cast<ptrdiff_t>(3 * t), 3, corners.begin());
         std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end()), corners.end());
     }
     std::sort(order.begin(), order.end());
-    for (ptrdiff_t t = 0; t < count; ++t)
-        std::copy_n(order[static_cast<size_t>(t)].begin(), 3, soup.indices.begin() + 3 * t);
+    if (dropEqual) order.erase(std::unique(order.begin(), order.end()), order.end());
+    soup.indices.clear();
+    for (const auto& corners : order) soup.indices.insert(soup.indices.end(), corners.begin(), corners.end());
+    return count - order.size();
 }
 
 }  // namespace stipple::lod

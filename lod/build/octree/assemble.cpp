@@ -41,7 +41,7 @@ Hierarchy assemble(const Frame& frame, const std::vector<NodeBatch>& batches) {
         for (const auto& [codes, counts] :
              {std::pair{w.parentCodes, &node.parentCounts}, std::pair{w.ownCodes, &node.ownCounts}}) {
             std::fill(histogram.begin(), histogram.end(), 0);
-            for (uint32_t k = 0; k < codes; ++k, ++at) histogram[batch.counts[at][0]] = batch.counts[at][1];
+            for (uint32_t k = 0; k < codes; ++k, ++at) histogram[batch.counts[at] >> 24] = batch.counts[at] & 0xffffffu;
             *counts = makeCodeCounts(histogram, node.records, h.greaterThan);
         }
     }

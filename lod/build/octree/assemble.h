@@ -16,8 +16,9 @@ struct NodeBatch {
         uint16_t parentCodes = 0, ownCodes = 0;
     };
     std::vector<Written> nodes;
-    std::vector<std::array<uint32_t, 2>> counts;  ///< code, records
-    std::vector<uint8_t> bytes;                   ///< chunks, each followed by its attribute streams
+    std::vector<uint32_t> counts;  ///< code << 24 | records
+    void addCount(uint32_t code, uint32_t records) { counts.push_back(code << 24 | records); }
+    std::vector<uint8_t> bytes;  ///< chunks, each followed by its attribute streams
 };
 
 /// `batches` hold every node of one octree once; their chunk offsets are those in the file.

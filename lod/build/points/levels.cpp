@@ -108,7 +108,7 @@ void appendCounts(const std::array<uint32_t, 256>& histogram, NodeBatch& batch, 
     codes = 0;
     for (uint32_t code = 0; code < 256; ++code) {
         if (histogram[code] == 0) continue;
-        batch.counts.push_back({code, histogram[code]});
+        batch.addCount(code, histogram[code]);
         ++codes;
     }
 }

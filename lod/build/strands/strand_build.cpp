@@ -68,10 +68,13 @@ class StrandBuild {
 
   private:
     static constexpr uint64_t kSpillBytes = 16;  ///< of a segment, between the steps
+    static constexpr uint64_t kTableBytes = 5;   ///< of a segment, of the node table, which stays in memory
 
     Result<void> planMemory() {
         constexpr uint64_t kFixed = uint64_t{96} << 20;
-        const auto leastFor = [&](int workers) { return kFixed + static_cast<uint64_t>(workers) * kCellBytes; };
+        const auto leastFor = [&](int workers) {
+            return kFixed + static_cast<uint64_t>(workers) * kCellBytes + source_.vertices * kTableBytes;
+        };
         const uint64_t memory = settings_.limits.memoryBytes, small = kFixed + source_.vertices * 800;
         while (workers_ > 1 && leastFor(workers_) > memory) --workers_;
         const uint64_t least = std::min(leastFor(workers_), small);
@@ -347,8 +350,10 @@ class StrandBuild {
         StoreWriter& writer = work_->writer();
         STIPPLE_TRY(writer.finish(hierarchy, description));
         clock_.ends("finish");
+        report_.nodes = hierarchy.nodes.size();
+        hierarchy = {};  // its memory is needed
         STIPPLE_ASSIGN(const Store store, openStore(writer.temporaryPath()));
-        STIPPLE_TRY(verifyStore(store, executor_, hierarchy.nodes.size() > kVerifiedNodes ? kVerifiedNodes : 0));
+        STIPPLE_TRY(verifyStore(store, executor_, report_.nodes > kVerifiedNodes ? kVerifiedNodes : 0));
         clock_.ends("verify");
         report_.pointsIn = facts_.segments;
         report_.pointsOut = facts_.parts;
@@ -356,7 +361,6 @@ class StrandBuild {
         STIPPLE_TRY(writer.commit());
         work_->finish();
         report_.temporaryBytes = work_->temporaryBytes();
-        report_.nodes = hierarchy.nodes.size();
         report_.records = description.records;
         report_.contentHash = writer.contentHash();
         if (fewestKept_ < 1)

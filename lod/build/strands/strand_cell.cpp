@@ -250,7 +250,7 @@ class StrandCell {
         for (const auto& [codes, count] : {std::pair{&parentCodes, &w.parentCodes}, std::pair{&ownCodes, &w.ownCodes}})
             for (uint32_t c = 0; c < 256; ++c)
                 if ((*codes)[c] > 0) {
-                    table.batch.counts.push_back({c, (*codes)[c]});
+                    table.batch.addCount(c, (*codes)[c]);
                     ++*count;
                 }
         table.batch.bytes.insert(table.batch.bytes.end(), bytes.begin(), bytes.end());
