@@ -126,8 +126,8 @@ Result<VerifyReport> verifyStore(const Store& store, Executor& executor, uint64_
                 !text.empty())
                 problems.push({i, Error{ErrorKind::input, std::move(text), fmt::format("{}: node {}", store.path, i),
                                         "this is a fault of the build; please report it with the input"}});
-            if (isPoints && chunk) {
-                const auto worst = measureErrors(store, index, *chunk);
+            if ((isPoints || h.isMesh()) && chunk) {
+                const auto worst = isPoints ? measureErrors(store, index, *chunk) : measureGroup(store, index, *chunk);
                 if (!worst)
                     problems.push({i, worst.error()});
                 else

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lod/triangle.h"
+
 namespace stipple::lod {
 namespace {
 
@@ -88,6 +90,66 @@ Result<uint64_t> measureErrors(const Store& store, uint32_t index, const Chunk& 
         }
     }
     return records.size();
+}
+
+namespace {
+
+using Corners = std::array<glm::dvec3, 3>;
+
+void appendTriangles(const Chunk& chunk, uint32_t firstCluster, uint32_t clusters, std::vector<Corners>& to) {
+    for (uint32_t c = firstCluster; c < firstCluster + clusters; ++c) {
+        const shared::MeshCluster& cluster = chunk.clusters[c];
+        for (uint32_t t = 0; t < cluster.counts >> 16; ++t) {
+            const uint32_t packed = chunk.triangles[cluster.firstTriangle + t];
+            Corners corners;
+            for (uint32_t k = 0; k < 3; ++k) {
+                const shared::MeshVertex& v = chunk.vertices[cluster.firstVertex + (packed >> (8 * k) & 255u)];
+                corners.at(k) = {v.x, v.y, v.z};
+            }
+            to.push_back(corners);
+        }
+    }
+}
+
+/// Largest distance of a few corners of `from` from the triangles `to`.
+double farthestCorner(const std::vector<Corners>& from, const std::vector<Corners>& to) {
+    constexpr size_t kCorners = 24;
+    double worst = 0;
+    for (size_t k = 0; k < kCorners; ++k) {
+        const glm::dvec3& p = from[k * from.size() / kCorners].at(k % 3);
+        double nearest = 1e300;
+        for (const auto& [a, b, c] : to) {
+            const glm::dvec2 w = closestWeights(p, a, b, c);
+            nearest = std::min(nearest, glm::length(p - (a + w.x * (b - a) + w.y * (c - a))));
+        }
+        worst = std::max(worst, nearest);
+    }
+    return worst;
+}
+
+}  // namespace
+
+Result<uint64_t> measureGroup(const Store& store, uint32_t index, const Chunk& chunk) {
+    const Hierarchy& h = store.hierarchy;
+    const MeshGroup& group = h.groups[index];
+    std::vector<Corners> fine, coarse;
+    appendTriangles(chunk, 0, group.clusters, fine);
+    for (uint32_t p = group.firstParent; p < group.firstParent + group.parents; ++p) {
+        const MeshGroup& parent = h.groups[h.parents[p]];
+        STIPPLE_ASSIGN(const Chunk above, readChunk(store, h.parents[p]));
+        for (uint32_t r = parent.firstRun; r < parent.firstRun + parent.runs; ++r)
+            if (h.runs[r].producer == index) appendTriangles(above, h.runs[r].firstCluster, h.runs[r].clusters, coarse);
+    }
+    if (coarse.empty() || fine.empty()) return 0;
+    const double error = h.errors.decode(h.nodes[index].errorCode);
+    const double off = std::max(farthestCorner(fine, coarse), farthestCorner(coarse, fine));
+    // Distances are measured in fp32 when it is built.
+    if (off <= error * (1 + 1e-5) + 1e-6 * h.nodes[index].radius) return fine.size() + coarse.size();
+    return fail(
+        ErrorKind::input,
+        fmt::format("a simplification is {:.6g} lattice units off its triangles, its error says {:.6g}", off, error),
+        fmt::format("{}: group {}", store.path, index),
+        "this is a fault of the build; please report it with the input");
 }
 
 }  // namespace stipple::lod

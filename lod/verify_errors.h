@@ -1,4 +1,4 @@
-// The errors of a store of points, measured again from what the file holds.
+// The errors of a store, measured again from what the file holds.
 #pragma once
 
 #include "lod/store.h"
@@ -9,5 +9,10 @@ namespace stipple::lod {
 /// place of a leaf's disc has to lie within the record's error of its disc. An error if one does not; else how many
 /// records were measured (0 for other nodes: below those the leaves are many).
 Result<uint64_t> measureErrors(const Store& store, uint32_t node, const Chunk& chunk);
+
+/// Measures the simplification of a group against its triangles, both ways, at a few dozen corners of each: none may be
+/// farther away than the group's error says. An error if one is; else how many triangles were compared (0 for a group
+/// that is not simplified).
+Result<uint64_t> measureGroup(const Store& store, uint32_t group, const Chunk& chunk);
 
 }  // namespace stipple::lod

@@ -217,9 +217,25 @@ TEST(MeshStore, TablesThatLieAreRefused) {
             EXPECT_EQ(node.chunkOffset, place.offset);
         }
         EXPECT_TRUE(writer->finish(h, store->description));
-        return lod::openStore(writer->temporaryPath()).has_value();
+        EXPECT_TRUE(writer->commit());
+        return lod::openStore(folder / "b.stipple").has_value();
     };
     EXPECT_TRUE(opens([](lod::Hierarchy&) {}));  // negative control
+    const auto same = lod::verifyStore(*lod::openStore(folder / "b.stipple"), *executor);
+    ASSERT_TRUE(same) << same.error().line();
+    EXPECT_GT(same->errorsMeasured, 10'000u);
+    // Errors that are stated smaller than they are: that is seen only where they are measured again.
+    EXPECT_TRUE(opens([](lod::Hierarchy& h) {
+        for (uint32_t g = 0; g < h.nodes.size(); ++g) {
+            bool isFinest = true;
+            for (uint32_t r = h.groups[g].firstRun; r < h.groups[g].firstRun + h.groups[g].runs; ++r)
+                isFinest = isFinest && h.runs[r].producer == lod::MeshRun::kOriginal;
+            if (isFinest && h.groups[g].parents > 0) h.nodes[g].errorCode = 0;
+        }
+    }));
+    const auto lying = lod::verifyStore(*lod::openStore(folder / "b.stipple"), *executor);
+    ASSERT_FALSE(lying);
+    EXPECT_NE(lying.error().line().find("off its triangles"), std::string::npos) << lying.error().line();
     const auto reject = [&](const char* what, const std::function<void(lod::Hierarchy&)>& change) {
         EXPECT_FALSE(opens(change)) << what;
     };

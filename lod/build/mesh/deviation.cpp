@@ -11,6 +11,7 @@
 #include <cstring>
 
 #include "lod/build/mesh/mesh_work.h"
+#include "lod/triangle.h"
 
 namespace stipple::lod {
 namespace {
@@ -21,33 +22,6 @@ struct Nearest {
     float distance = 3e38f;
     uint32_t triangle = 0;
 };
-
-/// Share of a part; 0 of nothing: simplification leaves triangles without an area.
-float shareOf(float part, float whole) { return whole > 0 ? part / whole : 0.0f; }
-
-/// Closest point of a triangle (Ericson, Real-Time Collision Detection, 5.1.5) as weights of b and c.
-[[gnu::always_inline]] inline glm::vec2 closestWeights(const glm::vec3& p, const glm::vec3& a, const glm::vec3& b,
-                                                       const glm::vec3& c) {
-    const glm::vec3 ab = b - a, ac = c - a, ap = p - a;
-    const float d1 = glm::dot(ab, ap), d2 = glm::dot(ac, ap);
-    if (d1 <= 0 && d2 <= 0) return {0, 0};
-    const glm::vec3 bp = p - b;
-    const float d3 = glm::dot(ab, bp), d4 = glm::dot(ac, bp);
-    if (d3 >= 0 && d4 <= d3) return {1, 0};
-    const float vc = d1 * d4 - d3 * d2;
-    if (vc <= 0 && d1 >= 0 && d3 <= 0) return {shareOf(d1, d1 - d3), 0};
-    const glm::vec3 cp = p - c;
-    const float d5 = glm::dot(ab, cp), d6 = glm::dot(ac, cp);
-    if (d6 >= 0 && d5 <= d6) return {0, 1};
-    const float vb = d5 * d2 - d1 * d6;
-    if (vb <= 0 && d2 >= 0 && d6 <= 0) return {0, shareOf(d2, d2 - d6)};
-    const float va = d3 * d6 - d5 * d4;
-    if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-        const float w = shareOf(d4 - d3, (d4 - d3) + (d5 - d6));
-        return {1 - w, w};
-    }
-    return {shareOf(vb, va + vb + vc), shareOf(vc, va + vb + vc)};
-}
 
 /// Triangles in the cells of an even grid, for nearest-triangle queries.
 class Target {
