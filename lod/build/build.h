@@ -21,7 +21,7 @@ enum class NormalsMode { automatic, keep, none };
 struct BuildLimits {
     uint64_t memoryBytes = uint64_t{2} << 30;  ///< never needs more; refuses if it would have to
     std::string tempFolder;                    ///< for what does not fit in memory; empty: beside the output
-    std::function<bool()> isStopped;           ///< asked now and then; true: stop with ErrorKind::interrupted
+    std::function<bool()> isStopped;  ///< asked now and then, by any thread; true: stop with ErrorKind::interrupted
 };
 
 struct BuildSettings : BuildLimits {

@@ -253,8 +253,8 @@ class ConeMerger {
     }
 
   private:
-    static constexpr int kWorthwhile = 8;        ///< codes of error (1/8 octaves) that two records must gain
-    static constexpr double kGoodAsItIs = 0.25;  ///< radii: a disc with a smaller error is not split
+    static constexpr int kWorthwhile = 8;       ///< codes of error (1/8 octaves) that two records must gain
+    static constexpr double kGoodAsItIs = 0.5;  ///< radii: a disc with a smaller error is not split
 
     bool isSplit(const RecordGrid& grid, std::span<const Rising> parts, const Rising& one) {
         if (grid.errors.decode(one.code) < kGoodAsItIs * static_cast<double>(one.radius)) return false;
