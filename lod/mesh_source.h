@@ -23,7 +23,7 @@ struct MeshSource {
     uint64_t triangles = 0;                  ///< as far as is known before reading
     std::function<uint64_t()> identity;      ///< another number: the source has changed
     std::function<Result<Bounds>()> survey;  ///< once, before read
-    uint64_t mostTemporaryBytes = 0;         ///< on disk, of its own
+    uint64_t surveyBytes = 0, readBytes = 0;  ///< on disk at most, of its own: during the survey and after that
     /// Gives every triangle once; blocks have vertices of their own. Always the same.
     std::function<Result<void>(const Take& take)> read;
 };

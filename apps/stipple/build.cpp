@@ -86,12 +86,12 @@ void setupBuild(CLI::App& app, int& status) {
     sub->add_flag("--json", o->json, "print the report as JSON");
     sub->add_flag("--quiet", o->quiet, "no progress on standard error");
     sub->add_flag("--mpi", o->mpi,
-                  "build points as a rank of an MPI job (mpirun -n N stipple build --mpi ...); all ranks must see the "
+                  "build as a rank of an MPI job (mpirun -n N stipple build --mpi ...); all ranks must see the "
                   "inputs and the folder for temporary files; --memory and --threads are of each rank");
     sub->callback([o, &status] {
         bool isSilent = false;
         if (const auto result = run(*o, isSilent); !result)
-            status = isSilent ? static_cast<int>(result.error().kind) : report(result.error());
+            status = isSilent ? 0 : report(result.error());  // (a rank that fails first would silence the others)
     });
 }
 

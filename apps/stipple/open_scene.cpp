@@ -393,16 +393,21 @@ Result<void> checkSceneMemory(const std::string& path, uint64_t memoryBytes) {
                 fmt::format("give --memory {}M, or triangles as PLY, which need not fit", (kTimes * bytes >> 20) + 1));
 }
 
+/// By this rank: what is wrong with them otherwise, all ranks find alike.
+Result<void> areSeen(const std::vector<std::string>& inputs) {
+    for (const std::string& input : inputs)
+        if (std::error_code error; fs::is_regular_file(input, error)) STIPPLE_TRY(InputFile::open(input));
+    return {};
+}
+
 }  // namespace
 
 Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const std::string& output,
                                   const BuildOptions& build, Executor& executor, Progress& progress) {
     STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
+    STIPPLE_TRY(agree(build.ranks, areSeen(inputs)));
     STIPPLE_ASSIGN(const bool isPlyMesh, isMeshPly(inputs, build));
     const bool isStrands = inputs.size() == 1 && lod::isStrandFile(inputs[0]);
-    if (build.ranks != nullptr && (isPlyMesh || isStrands || (isSceneFile(inputs.front()) && build.surfels == 0)))
-        return fail(ErrorKind::usage, "only points are built by several ranks", inputs.front(),
-                    "build it without --mpi: it needs no more than --memory");
     if (isPlyMesh) return buildPlyMesh(inputs.front(), output, build, executor, progress);
     if (isStrands) return buildStrandFile(inputs[0], output, build, executor, progress);
     if (!isSceneFile(inputs.front()) || build.surfels > 0)

@@ -170,6 +170,13 @@ Result<void> writeWholeFile(const std::string& path, const void* bytes, size_t c
     return file.commit();
 }
 
+Result<std::vector<uint8_t>> readWhole(const std::string& path) {
+    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
+    std::vector<uint8_t> bytes(file.sizeBytes());
+    if (!bytes.empty()) STIPPLE_TRY(file.readAt(0, bytes.data(), bytes.size()));
+    return bytes;
+}
+
 uint64_t fileIdentity(const std::string& path) {
     struct stat info {};
     if (::stat(path.c_str(), &info) != 0) return 0;

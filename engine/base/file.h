@@ -30,6 +30,8 @@ class InputFile {
     std::string path_;
 };
 
+Result<std::vector<uint8_t>> readWhole(const std::string& path);
+
 /// Changes when the file does: of its path, size and time.
 uint64_t fileIdentity(const std::string& path);
 

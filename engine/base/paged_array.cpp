@@ -33,6 +33,15 @@ void PageCache::failed(const char* what) {
                        "name a folder for temporary files with --temp"};
 }
 
+void PageCache::truncate(uint64_t pages) {
+    for (Slot& slot : slots_)
+        if (slot.page != ~uint64_t{0} && slot.page >= pages) slot = {};
+    if (isInFile_.size() > pages) isInFile_.resize(pages);
+    if (file_ < 0 || fileBytes_ <= pages * kPageBytes) return;
+    fileBytes_ = pages * kPageBytes;
+    if (::ftruncate(file_, static_cast<off_t>(fileBytes_)) != 0) failed("a temporary file cannot be cut");
+}
+
 void PageCache::change(Slot& slot, uint64_t number) {
     if (slot.isDirty && !error_) {
         if (file_ < 0) {

@@ -32,6 +32,8 @@ class PageCache {
     /// The first thing that went wrong (a full disk); pages are zeros from then on.
     Result<void> status() const;
     uint64_t fileBytes() const { return fileBytes_; }
+    /// Pages from there on are not needed any more.
+    void truncate(uint64_t pages);
 
   private:
     struct Slot {
@@ -61,6 +63,21 @@ class PagedArray {
     }
     void set(uint64_t i, const void* from) {
         std::memcpy(pages_.page(i / perPage_, true) + i % perPage_ * bytes_, from, bytes_);
+    }
+    /// Makes the first `count` records `bytes` bytes long, no more than before, and forgets the rest.
+    template <typename Convert>
+    void narrow(uint64_t count, size_t bytes, const Convert& convert) {
+        // In place: where a record goes lies before where the next one is.
+        std::vector<uint8_t> before(bytes_), after(bytes);
+        const uint64_t perPage = PageCache::kPageBytes / bytes;
+        for (uint64_t i = 0; i < count; ++i) {
+            get(i, before.data());
+            convert(before.data(), after.data());
+            std::memcpy(pages_.page(i / perPage, true) + i % perPage * bytes, after.data(), bytes);
+        }
+        bytes_ = bytes;
+        perPage_ = perPage;
+        pages_.truncate((count + perPage - 1) / perPage);
     }
     Result<void> status() const { return pages_.status(); }
     uint64_t fileBytes() const { return pages_.fileBytes(); }

@@ -20,6 +20,10 @@ class Ranks {
     virtual void addUp(std::vector<uint32_t>& values) = 0;
 };
 
+/// Is number `i` of something this rank's to do? Without ranks everything is.
+inline bool isOwnOf(const Ranks* ranks, size_t i) {
+    return ranks == nullptr || i % static_cast<size_t>(ranks->count()) == static_cast<size_t>(ranks->rank());
+}
 /// Waits for all ranks; the first error of any of them is everybody's. Without ranks: `mine`.
 Result<void> agree(Ranks* ranks, const Result<void>& mine);
 

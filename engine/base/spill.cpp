@@ -34,22 +34,29 @@ Result<std::vector<uint8_t>> Spill::part(uint64_t offset, uint64_t count) const 
 Result<std::vector<uint8_t>> Spill::take() {
     if (path_.empty()) return std::exchange(memory_, {});
     STIPPLE_ASSIGN(std::vector<uint8_t> bytes, part(0, bytes_));
-    if (isSealed_ && hashBytes(bytes.data(), bytes.size()) != hash_)
-        return fail(ErrorKind::input, "is not what was written", path_, "delete its folder and build again");
+    uint64_t at = 0;
+    for (const Segment& s : segments_) {
+        if (hashBytes(bytes.data() + at, s.bytes) != s.hash)
+            return fail(ErrorKind::input, "is not what was written", path_, "delete its folder and build again");
+        at += s.bytes;
+    }
     return bytes;
 }
 
 Result<void> Spill::seal() {
-    STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, part(0, bytes_));
-    hash_ = hashBytes(bytes.data(), bytes.size());
-    isSealed_ = true;
+    const uint64_t fresh = bytes_ - sealedBytes_;
+    if (path_.empty() || fresh == 0) return {};
+    STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, part(sealedBytes_, fresh));
+    segments_.push_back({fresh, hashBytes(bytes.data(), fresh)});
+    sealedBytes_ = bytes_;
     return {};
 }
 
-void Spill::restore(uint64_t bytes, uint64_t hash) {
-    bytes_ = bytes;
-    hash_ = hash;
-    isSealed_ = true;
+void Spill::restore(std::vector<Segment> segments) {
+    segments_ = std::move(segments);
+    sealedBytes_ = 0;
+    for (const Segment& s : segments_) sealedBytes_ += s.bytes;
+    bytes_ = sealedBytes_;
 }
 
 void Spill::remove() {

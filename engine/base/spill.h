@@ -31,11 +31,14 @@ class Spill {
     Result<std::vector<uint8_t>> take();
     /// A part of it; nothing goes.
     Result<std::vector<uint8_t>> part(uint64_t offset, uint64_t count) const;
-    uint64_t hash() const { return hash_; }
-    /// Hashes a file for take() to check.
+    /// Hashes what came since the last time, for take() to check, if it is a file. More may be appended.
     Result<void> seal();
-    /// A file that an earlier process filled and sealed.
-    void restore(uint64_t bytes, uint64_t hash);
+    struct Segment {
+        uint64_t bytes = 0, hash = 0;
+    };
+    const std::vector<Segment>& segments() const { return segments_; }
+    /// A file that an earlier process filled and sealed; what lies behind that does not count.
+    void restore(std::vector<Segment> segments);
     /// Deletes the file.
     void remove();
 
@@ -44,8 +47,8 @@ class Spill {
     std::mutex mutex_;
     std::vector<uint8_t> memory_;
     std::atomic<uint64_t> bytes_{0};
-    uint64_t hash_ = 0;
-    bool isSealed_ = false;
+    std::vector<Segment> segments_;
+    uint64_t sealedBytes_ = 0;
 };
 
 }  // namespace stipple

@@ -11,10 +11,9 @@
 #include "engine/base/ordered.h"
 #include "engine/base/queue.h"
 #include "lod/build/octree/assemble.h"
-#include "lod/build/octree/journal.h"
+#include "lod/build/points/distribution.h"
 #include "lod/build/points/estimate.h"
 #include "lod/build/points/exchange.h"
-#include "lod/build/points/input.h"
 #include "lod/store.h"
 
 namespace stipple::lod {
@@ -57,73 +56,85 @@ class PointBuild {
           layout_(input_.hasColour, input_.hasNormal, input_.hasRadius, input_.attributes()) {}
 
     Result<BuildReport> run() {
-        STIPPLE_TRY(planMemory());
-        if (settings_.ranks != nullptr) return runTogether();
-        if (memory_.isOnDisk) {
-            STIPPLE_ASSIGN(Journal journal,
-                           Journal::open(Journal::folderOf(output_, settings_.tempFolder), output_, identity()));
-            journal_.emplace(std::move(journal));
-        }
-        report_.isResumed = journal_ && !journal_->entries().empty();
-        if (report_.isResumed) {
-            STIPPLE_TRY(restoreDistribution());
-        } else {
-            STIPPLE_TRY(distribute());
-        }
-        STIPPLE_TRY(openWriter());
-        STIPPLE_TRY(buildBuckets());
-        STIPPLE_TRY(finish());
+        STIPPLE_TRY(agree(settings_.ranks, planMemory()));
+        // Enough buckets for all, and the same ones whatever each machine has.
+        memory_.bucketPoints = leastOf(memory_.bucketPoints);
+        STIPPLE_ASSIGN(Workspace opened, Workspace::open(output_, settings_, identity(), memory_.isOnDisk));
+        workspace_.emplace(std::move(opened));
+        std::vector<Journal::Entry> entries = workspace_->takeEntries();
+        report_.isResumed = !entries.empty();
+        spread_.emplace(input_, settings_, layout_,
+                        Distribution::Plan{workers_, memory_.bufferBytes, memory_.bucketPoints, wantsEstimates()},
+                        *workspace_, executor_, progress_);
+        STIPPLE_TRY(agree(settings_.ranks, spread_->run(entries, report_, clock_)));
+        std::erase_if(entries, [](const Journal::Entry& e) { return e.what != Journal::What::done; });
+        description_ = describe();
+        ranges_ = ValueRanges(frame(), input_.points, description_.up);
+        upper_.emplace(frame());
+        STIPPLE_TRY(settings_.ranks != nullptr ? buildTogether() : buildAlone(entries));
         report_.seconds = clock_.seconds();
         return std::move(report_);
     }
 
   private:
-    /// The same with others: each builds its share of the buckets, the first one puts them together.
-    Result<BuildReport> runTogether() {
+    Result<void> buildAlone(std::vector<Journal::Entry>& entries) {
+        STIPPLE_TRY(openWriter(entries));
+        entries = {};
+        const size_t first = batches_.size();
+        for (size_t b = 0; b < first; ++b) done_ += plan().buckets[b].points;
+        const Result<void> built = inOrder<BuiltBucket>(
+            executor_, workers_, first, plan().buckets.size(),
+            [&](size_t index) -> Result<BuiltBucket> {
+                STIPPLE_TRY(workspace_->checkStopped());
+                return buildBucket(index);
+            },
+            [&](size_t index, BuiltBucket bucket) {
+                progress_.update("build", done_ += plan().buckets[index].points, input_.points);
+                return commit(index, std::move(bucket));
+            });
+        if (!built) return built;
+        clock_.ends("build");
+        return finish();
+    }
+
+    /// With others: each builds its share of the buckets, the first one puts them together. What was built stays until
+    /// the end, and an interrupted build goes on after that.
+    Result<void> buildTogether() {
         Ranks& ranks = *settings_.ranks;
-        const std::string folder = Journal::folderOf(output_, settings_.tempFolder);
-        STIPPLE_TRY(makeSharedFolder(ranks, folder));
-        bucketFolder_ = ownFolder(ranks, folder);
-        // Enough buckets for all, and the same ones whatever each machine has.
-        const auto workers = static_cast<uint64_t>(workers_) * static_cast<uint64_t>(ranks.count());
-        const uint64_t share = std::max(input_.declared() / (6 * workers), kAtomPoints);
-        memory_.bucketPoints = leastOf(std::min(memory_.bucketPoints, share));
-        STIPPLE_TRY(agree(&ranks, distribute()));
-        STIPPLE_TRY(agree(&ranks, collectBuckets(ranks, folder, buckets_)));
-        clock_.ends("distribute");
-        description_ = describe();
         std::vector<size_t> own;
-        for (size_t b = 0; b < plan_.buckets.size(); ++b)
-            if (isOwn(&ranks, b)) own.push_back(b);
+        for (size_t b = 0; b < plan().buckets.size(); ++b)
+            if (workspace_->isOwn(b) && !isBuilt(workspace_->folder(), b)) own.push_back(b);
         const Result<void> made = inOrder<BuiltBucket>(
             executor_, workers_, 0, own.size(),
             [&](size_t k) -> Result<BuiltBucket> {
-                STIPPLE_TRY(checkStopped());
+                STIPPLE_TRY(workspace_->checkStopped());
                 return buildBucket(own[k]);
             },
-            [&](size_t k, const BuiltBucket& built) {
-                progress_.update("build", done_ += plan_.buckets[own[k]].points, input_.points);
-                buckets_[own[k]]->points.remove();
-                buckets_[own[k]]->ghosts.remove();
-                return saveBuilt(folder, own[k], built);
+            [&](size_t k, const BuiltBucket& built) -> Result<void> {
+                progress_.update("build", done_ += plan().buckets[own[k]].points, input_.points);
+                STIPPLE_TRY(saveBuilt(workspace_->folder(), own[k], built));
+                removeBucket(own[k]);
+                return {};
             });
         STIPPLE_TRY(agree(&ranks, made));
         clock_.ends("build");
-        STIPPLE_TRY(agree(&ranks, ranks.rank() == 0 ? putTogether(folder) : Result<void>()));
-        std::error_code error;
-        if (ranks.rank() == 0) std::filesystem::remove_all(folder, error);
-        report_.seconds = clock_.seconds();
-        return std::move(report_);
+        return agree(&ranks, workspace_->isFirst() ? putTogether() : Result<void>());
     }
-    Result<void> putTogether(const std::string& folder) {
-        STIPPLE_TRY(openWriter());
+    Result<void> putTogether() {
+        STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output_));
+        writer_.emplace(std::move(writer));
         const ValueRanges empty = ranges_;
-        for (size_t b = 0; b < plan_.buckets.size(); ++b) {
-            STIPPLE_ASSIGN(BuiltBucket built, loadBuilt(folder, b, empty));
+        for (size_t b = 0; b < plan().buckets.size(); ++b) {
+            STIPPLE_TRY(workspace_->checkStopped());
+            STIPPLE_ASSIGN(BuiltBucket built, loadBuilt(workspace_->folder(), b, empty));
             STIPPLE_TRY(commit(b, std::move(built)));
         }
         clock_.ends("put together");
         return finish();
+    }
+    void removeBucket(size_t index) {
+        spread_->buckets()[index]->points.remove();
+        spread_->buckets()[index]->ghosts.remove();
     }
 
     uint64_t pointBytes() const {  // that a worker needs for each point of its bucket
@@ -159,8 +170,10 @@ class PointBuild {
         memory_.bufferBytes = std::min<uint64_t>(room / 8, uint64_t{64} << 20);
         memory_.bucketPoints = bucketOf(memory_.isOnDisk ? room / 2 : room / 4);
         // Enough of them for all threads, but none smaller than an atom.
+        const uint64_t ranks = settings_.ranks == nullptr ? 1 : static_cast<uint64_t>(settings_.ranks->count());
         memory_.bucketPoints =
-            std::max<uint64_t>(std::min<uint64_t>(memory_.bucketPoints, n / (6 * workers)), kAtomPoints);
+            std::max<uint64_t>(std::min<uint64_t>(memory_.bucketPoints, n / (6 * workers * ranks)), kAtomPoints);
+        memory_.isOnDisk = memory_.isOnDisk || settings_.ranks != nullptr;
         return {};
     }
 
@@ -169,188 +182,36 @@ class PointBuild {
                                        static_cast<int>(settings_.normals), settings_.estimateRadii,
                                        settings_.up ? static_cast<int>(*settings_.up) : -1, settings_.leafRecords,
                                        settings_.skipBad, settings_.fineNormals, settings_.mergeDuplicates);
-        for (const AttributeInfo& a : input_.attributes()) text += "|" + a.name;
-        text += "|" + std::filesystem::absolute(output_).lexically_normal().string();
+        for (const AttributeInfo& a : input_.attributes()) text.append("|").append(a.name);
+        text.append("|").append(std::filesystem::absolute(output_).lexically_normal().string());
         return hashBytes(text.data(), text.size());
     }
-    Result<void> checkStopped() const {
-        if (!settings_.isStopped || !settings_.isStopped()) return {};
-        return fail(ErrorKind::interrupted, "interrupted", output_,
-                    journal_ ? "run the same command again to go on" : "nothing was written");
-    }
-
-    // ---- survey, count, distribute ----
-
-    Result<void> distribute() {
-        Ranks* const ranks = settings_.ranks;
-        inputIdentity_ = input_.identity();
-        STIPPLE_TRY(input_.survey(report_, executor_, progress_));
-        clock_.ends("survey");
-        const auto& g = input_.greatest;
-        frame_ = makeFrame(input_.origin, input_.unit, std::max({g[0], g[1], g[2]}), settings_.leafRecords);
-        frame_.attributes = input_.attributes();
-        tree_.emplace(frame_, input_.points);
-        tree_->expect(input_.sample.coordinates(), input_.sampleShare);
-        input_.sample = {};
-        double rounding = 0;
-        do {
-            const Result<double> counted =
-                input_.read(executor_, workers_, progress_, "count", [&](int, const Points& block) -> Result<void> {
-                    tree_->count(block.coordinates());
-                    return checkStopped();
-                });
-            STIPPLE_TRY(agree(ranks, counted ? Result<void>() : Result<void>(tl::unexpected(counted.error()))));
-            rounding = *counted;
-            if (ranks != nullptr) tree_->addUp([&](std::vector<uint32_t>& counts) { ranks->addUp(counts); });
-        } while (tree_->split());
-        tree_->finish();
-        rounding_ = largestOf(rounding);
-        clock_.ends("count");
-        plan_ = planBuckets(frame_, *tree_, memory_.bucketPoints);
-        STIPPLE_TRY(announceDisk());
-        if (journal_) bucketFolder_ = journal_->folder();
-        buckets_ = makeBuckets(plan_.buckets.size(), bucketFolder_);
-        for (size_t b = 0; b < buckets_.size(); ++b)
-            buckets_[b]->points.reserve(plan_.buckets[b].points * layout_.bytes());
-        Distributor distributor(frame_, *tree_, plan_, layout_, buckets_, workers_, memory_.bufferBytes,
-                                wantsEstimates());
-        STIPPLE_ASSIGN(rounding_, input_.read(executor_, workers_, progress_, "distribute",
-                                              [&](int worker, const Points& block) -> Result<void> {
-                                                  STIPPLE_TRY(distributor.add(worker, block));
-                                                  if (journal_) progress_.setTemporaryBytes(temporaryBytes());
-                                                  return checkStopped();
-                                              }));
-        STIPPLE_TRY(distributor.flush());
-        if (input_.identity() != inputIdentity_)
-            return fail(ErrorKind::input, "changed while it was read", input_.firstPath(),
-                        "build again when it is complete");
-        report_.temporaryBytes = journal_ ? temporaryBytes() : 0;
-        clock_.ends("distribute");
-        return journal_ ? saveDistribution() : Result<void>();
-    }
-
-    /// Values of all ranks.
-    template <typename T>
-    std::vector<T> ofAll(T value) const {
-        if (settings_.ranks == nullptr) return {value};
+    bool wantsEstimates() const { return settings_.estimateRadii || settings_.normals == NormalsMode::automatic; }
+    uint64_t leastOf(uint64_t value) const {
+        if (settings_.ranks == nullptr) return value;
         ByteWriter to;
         to.put(value);
-        std::vector<T> all;
-        for (const std::vector<uint8_t>& bytes : settings_.ranks->gather(to.bytes()))
-            ByteReader(bytes).get(all.emplace_back());
-        return all;
-    }
-    double largestOf(double value) const { return std::ranges::max(ofAll(value)); }
-    uint64_t leastOf(uint64_t value) const { return std::ranges::min(ofAll(value)); }
-
-    uint64_t temporaryBytes() const {
-        uint64_t sum = 0;
-        for (const auto& bucket : buckets_) sum += bucket->bytes();
-        return sum;
-    }
-    bool wantsEstimates() const { return settings_.estimateRadii || settings_.normals == NormalsMode::automatic; }
-
-    /// Before anything is written: is there room?
-    Result<void> announceDisk() {
-        if (!journal_) return {};
-        // Points near borders go to neighbours too: rarely all, now and then to more than one.
-        uint64_t atBorders = 0;
-        for (size_t c = 0; c < tree_->cells().size(); ++c)
-            atBorders += wantsEstimates() && plan_.isBorder[c] != 0 ? tree_->cells()[c].count : 0;
-        const uint64_t needed = input_.points * layout_.bytes() + atBorders * RecordLayout::kGhostBytes;
-        return journal_->announce(needed, progress_);
-    }
-
-    /// What the survey and the count found, in the order in which it lies in the journal.
-    template <typename Visit>
-    void visitFacts(const Visit& visit) {
-        visit(frame_.origin);
-        visit(frame_.unit);
-        visit(frame_.rootLog2);
-        visit(frame_.keyLevels);
-        visit(rounding_);
-        visit(input_.greatest);
-        visit(input_.points);
-        visit(input_.hasColour);
-        visit(memory_.bucketPoints);
-        visit(report_.pointsIn);
-        visit(report_.temporaryBytes);
-        visit(report_.notes);
-    }
-
-    Result<void> saveDistribution() {
-        ByteWriter to;
-        visitFacts([&](const auto& value) { to.put(value); });
-        to.put(uint64_t{report_.dropped.size()});
-        for (const auto& [reason, count] : report_.dropped) {
-            to.put(reason);
-            to.put(count);
+        for (const std::vector<uint8_t>& bytes : settings_.ranks->gather(to.bytes())) {
+            uint64_t theirs = value;
+            ByteReader(bytes).get(theirs);
+            value = std::min(value, theirs);
         }
-        tree_->save(to);
-        CompletionQueue<Error> errors;
-        executor_.parallelFor(buckets_.size(), 1, [&](size_t begin, size_t end) {
-            for (size_t b = begin; b < end; ++b)
-                for (Spill* spill : {&buckets_[b]->points, &buckets_[b]->ghosts})
-                    if (const auto sealed = spill->seal(); !sealed) errors.push(sealed.error());
-        });
-        if (const auto found = errors.takeAll(); !found.empty()) return tl::unexpected(found.front());
-        for (const auto& bucket : buckets_)
-            for (Spill* spill : {&bucket->points, &bucket->ghosts}) {
-                to.put(spill->bytes());
-                to.put(spill->hash());
-            }
-        return journal_->append(to.bytes());
+        return value;
     }
-
-    Result<void> restoreDistribution() {
-        ByteReader from(journal_->entries().front());
-        visitFacts([&](auto& value) { from.get(value); });
-        frame_.leafRecords = settings_.leafRecords;
-        frame_.errors = errorsOf(frame_.rootLog2);
-        frame_.attributes = input_.attributes();
-        input_.origin = frame_.origin;
-        input_.unit = frame_.unit;
-        uint64_t count = 0;
-        from.get(count);
-        for (uint64_t k = 0; k < count && k < 100; ++k) {
-            std::string reason;
-            uint64_t points = 0;
-            from.get(reason);
-            from.get(points);
-            report_.dropped[reason] = points;
-        }
-        tree_.emplace(frame_, input_.points);
-        tree_->load(from);
-        plan_ = planBuckets(frame_, *tree_, memory_.bucketPoints);
-        buckets_ = makeBuckets(plan_.buckets.size(), journal_->folder());
-        for (const auto& bucket : buckets_)
-            for (Spill* spill : {&bucket->points, &bucket->ghosts}) {
-                uint64_t bytes = 0, hash = 0;
-                from.get(bytes);
-                from.get(hash);
-                spill->restore(bytes, hash);
-            }
-        if (!from.isWhole())
-            return fail(ErrorKind::input, "holds a damaged journal", journal_->folder(), "delete the folder");
-        progress_.say(fmt::format("going on with the interrupted build: {} of {} buckets are done",
-                                  journal_->entries().size() - 1, plan_.buckets.size()));
-        return {};
-    }
+    const Frame& frame() const { return spread_->frame(); }
+    const BucketPlan& plan() const { return spread_->plan(); }
 
     // ---- buckets ----
 
-    Result<void> openWriter() {
-        description_ = describe();
-        ranges_ = ValueRanges(frame_, input_.points, description_.up);
-        upper_.emplace(frame_);
-        if (!journal_) {
+    Result<void> openWriter(const std::vector<Journal::Entry>& entries) {
+        if (!workspace_->isOnDisk()) {
             STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output_));
             writer_.emplace(std::move(writer));
             return {};
         }
         uint64_t written = 0;
-        for (size_t e = 1; e < journal_->entries().size(); ++e, ++firstBucket_) {
-            ByteReader from(journal_->entries()[e]);
+        for (const Journal::Entry& entry : entries) {
+            ByteReader from(entry.payload);
             NodeBatch batch;
             uint64_t merged = 0, tooMany = 0;
             from.get(written);
@@ -358,19 +219,20 @@ class PointBuild {
             from.get(tooMany);
             from.get(batch.nodes);
             from.get(batch.counts);
-            ValueRanges ranges(frame_, input_.points, description_.up);
+            ValueRanges ranges(frame(), input_.points, description_.up);
             ranges.load(from);
             upper_->loadChanges(from);
-            if (!from.isWhole())
-                return fail(ErrorKind::input, "holds a damaged journal", journal_->folder(), "delete the folder");
+            if (!from.isWhole()) return tl::unexpected(workspace_->damaged());
             merged_ += merged;
             tooMany_ += tooMany;
             ranges_.add(ranges);
             batches_.push_back(std::move(batch));
         }
-        journal_->forgetEntries();
+        if (!entries.empty())
+            progress_.say(fmt::format("going on with the interrupted build: {} of {} buckets are done", entries.size(),
+                                      plan().buckets.size()));
         STIPPLE_TRY(checkWritten());
-        STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::resume(output_, journal_->partialPath(), written));
+        STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::resume(output_, workspace_->partialPath(), written));
         writer_.emplace(std::move(writer));
         return {};
     }
@@ -378,7 +240,7 @@ class PointBuild {
     /// Are the chunks that an earlier run wrote still what they were?
     Result<void> checkWritten() {
         if (batches_.empty()) return {};
-        STIPPLE_ASSIGN(const InputFile file, InputFile::open(journal_->partialPath()));
+        STIPPLE_ASSIGN(const InputFile file, InputFile::open(workspace_->partialPath()));
         CompletionQueue<Error> errors;
         executor_.parallelFor(batches_.size(), 1, [&](size_t begin, size_t end) {
             std::vector<uint8_t> bytes;
@@ -390,8 +252,8 @@ class PointBuild {
                         read && hashBytes(bytes.data(), w.node.chunkBytes) == w.node.chunkHash &&
                         hashBytes(bytes.data() + w.node.chunkBytes, w.node.attributeBytes) == w.node.attributeHash;
                     if (isSame) continue;
-                    errors.push({ErrorKind::input, "is not what was written", journal_->partialPath(),
-                                 "delete it and the folder " + journal_->folder()});
+                    errors.push({ErrorKind::input, "is not what was written", workspace_->partialPath(),
+                                 "delete it and the folder " + workspace_->folder()});
                     return;
                 }
         });
@@ -400,42 +262,42 @@ class PointBuild {
     }
 
     Result<BuiltBucket> buildBucket(size_t index) {
-        const BucketPlan::Bucket& bucket = plan_.buckets[index];
+        const BucketPlan::Bucket& bucket = plan().buckets[index];
         BuiltBucket out;
         double last = nowSeconds();
         const auto ends = [&](const char* what) {
             out.seconds[what] += nowSeconds() - std::exchange(last, nowSeconds());
         };
-        if (buckets_[index]->points.bytes() != bucket.points * layout_.bytes())
+        if (spread_->buckets()[index]->points.bytes() != bucket.points * layout_.bytes())
             return fail(ErrorKind::input, "changed while it was read", input_.firstPath(),
                         "build again when it is complete");
-        STIPPLE_ASSIGN(SortResult sorted, sortBucket(frame_, layout_, buckets_[index]->points,
-                                                     settings_.mergeDuplicates, 2 * memory_.bucketPoints));
+        STIPPLE_ASSIGN(SortResult sorted, sortBucket(frame(), layout_, spread_->buckets()[index]->points,
+                                                     settings_.mergeDuplicates, 2 * spread_->bucketPoints()));
         ends("threads: load, sort");
         out.merged = sorted.merged;
         out.tooMany = sorted.tooMany;
         {
-            STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, buckets_[index]->ghosts.take());
-            const Places ghosts = sortGhosts(frame_, bytes, settings_.mergeDuplicates);
+            STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, spread_->buckets()[index]->ghosts.take());
+            const Places ghosts = sortGhosts(frame(), bytes, settings_.mergeDuplicates);
             EstimateSettings wanted;
             wanted.radii = settings_.estimateRadii;
             wanted.normals = settings_.normals == NormalsMode::automatic;
             wanted.isFine = settings_.fineNormals;
             wanted.limitStrays = settings_.estimateRadii && !input_.hasRadius;
-            estimate(frame_, *tree_, bucket.firstCell, bucket.cells, wanted, ghosts, sorted.sorted);
+            estimate(frame(), spread_->tree(), bucket.firstCell, bucket.cells, wanted, ghosts, sorted.sorted);
         }
         ends("threads: estimate");
-        out.ranges = ValueRanges(frame_, input_.points, description_.up);
+        out.ranges = ValueRanges(frame(), input_.points, description_.up);
         uint64_t number = bucket.firstPoint;
         const std::vector<uint64_t>& keys = sorted.sorted.key;
         size_t begin = 0;
         for (const Atom& atom : bucket.atoms) {
-            const uint32_t shift = frame_.shiftOf(atom.level);
+            const uint32_t shift = frame().shiftOf(atom.level);
             size_t end = begin;
             while (end < keys.size() && keys[end] >> shift == atom.key >> shift) ++end;
-            out.ranges.add(frame_, sorted.sorted.points, begin, end, number);
+            out.ranges.add(frame(), sorted.sorted.points, begin, end, number);
             BuiltAtom built;
-            built.root = makeSubtree(frame_, sorted.sorted, begin, end, atom.level, built.batch);
+            built.root = makeSubtree(frame(), sorted.sorted, begin, end, atom.level, built.batch);
             out.atoms.push_back(std::move(built));
             number += atom.count;
             begin = end;
@@ -471,7 +333,7 @@ class PointBuild {
         merged_ += built.merged;
         tooMany_ += built.tooMany;
         ranges_.add(built.ranges);
-        if (journal_) {
+        if (workspace_->isOnDisk() && settings_.ranks == nullptr) {
             ByteWriter to;
             to.put(writer_->bytes());
             to.put(built.merged);
@@ -480,28 +342,11 @@ class PointBuild {
             to.put(all.counts);
             built.ranges.save(to);
             upper_->saveChanges(to);
-            STIPPLE_TRY(journal_->append(to.bytes()));
-            buckets_[index]->points.remove();
-            buckets_[index]->ghosts.remove();
+            STIPPLE_TRY(workspace_->note(Journal::What::done, to.bytes()));
+            removeBucket(index);
         }
         batches_.push_back(std::move(all));
-        done_ += plan_.buckets[index].points;
         report_.stageSeconds["threads: append"] += nowSeconds() - begun;
-        progress_.update("build", done_, input_.points);
-        return {};
-    }
-
-    Result<void> buildBuckets() {
-        for (size_t b = 0; b < firstBucket_; ++b) done_ += plan_.buckets[b].points;
-        const Result<void> result = inOrder<BuiltBucket>(
-            executor_, workers_, firstBucket_, plan_.buckets.size(),
-            [&](size_t index) -> Result<BuiltBucket> {
-                STIPPLE_TRY(checkStopped());
-                return buildBucket(index);
-            },
-            [&](size_t index, BuiltBucket built) { return commit(index, std::move(built)); });
-        if (!result) return result;
-        clock_.ends("build");
         return {};
     }
 
@@ -511,7 +356,7 @@ class PointBuild {
         StoreDescription d;
         d.crs = input_.crs;
         d.metresPerUnit = input_.crs.metresPerUnit;
-        d.roundingUnits = rounding_;
+        d.roundingUnits = spread_->rounding();
         d.hasColour = input_.hasColour;
         d.isReflectance = input_.isReflectance;
         d.hasNormals = input_.hasNormal || settings_.normals == NormalsMode::automatic;
@@ -528,7 +373,7 @@ class PointBuild {
         upper_->finish(last);
         STIPPLE_TRY(append(last, all));
         batches_.push_back(std::move(all));
-        Hierarchy hierarchy = assemble(frame_, batches_);
+        Hierarchy hierarchy = assemble(frame(), batches_);
         batches_ = {};
         if (merged_ > 0) report_.dropped["duplicate"] += merged_;
         if (tooMany_ > 0) report_.dropped[fmt::format("beyond {} at one place", kMostAtOnePlace)] += tooMany_;
@@ -536,7 +381,7 @@ class PointBuild {
         description_.pointsIn = report_.pointsIn;
         description_.dropped = report_.dropped;
         for (const Node& node : hierarchy.nodes) description_.records += node.records;
-        ranges_.describe(frame_, description_);
+        ranges_.describe(frame(), description_);
         STIPPLE_TRY(writer_->finish(hierarchy, description_));
         clock_.ends("write");
         report_.nodes = hierarchy.nodes.size();
@@ -546,7 +391,7 @@ class PointBuild {
         clock_.ends("verify");
         report_.bytesOut = writer_->bytes();
         STIPPLE_TRY(writer_->commit());
-        if (journal_) journal_->remove();
+        workspace_->remove();
         report_.pointsOut = description_.points;
         report_.records = description_.records;
         report_.contentHash = writer_->contentHash();
@@ -563,20 +408,13 @@ class PointBuild {
     int workers_;
     const RecordLayout layout_;
     MemoryPlan memory_;
-    std::optional<Journal> journal_;
-    std::string bucketFolder_;  ///< empty: in memory
-    Frame frame_;
-    double rounding_ = 0;
-    uint64_t inputIdentity_ = 0;
-    std::optional<CellTree> tree_;
-    BucketPlan plan_;
-    Buckets buckets_;
+    std::optional<Workspace> workspace_;
+    std::optional<Distribution> spread_;
     StoreDescription description_;
     ValueRanges ranges_;
     std::optional<UpperTree> upper_;
     std::optional<StoreWriter> writer_;
     std::vector<NodeBatch> batches_;  ///< of each bucket; bytes are written
-    size_t firstBucket_ = 0;          ///< those before are done
     uint64_t done_ = 0, merged_ = 0, tooMany_ = 0;
 };
 

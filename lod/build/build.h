@@ -22,6 +22,9 @@ struct BuildLimits {
     uint64_t memoryBytes = uint64_t{2} << 30;  ///< never needs more; refuses if it would have to
     std::string tempFolder;                    ///< for what does not fit in memory; empty: beside the output
     std::function<bool()> isStopped;  ///< asked now and then, by any thread; true: stop with ErrorKind::interrupted
+    /// Others that build the same with the same settings; each builds its share, the first one writes. What they have
+    /// for each other lies in `tempFolder`, which all must see.
+    Ranks* ranks = nullptr;
 };
 
 struct BuildSettings : BuildLimits {
@@ -33,9 +36,6 @@ struct BuildSettings : BuildLimits {
     bool allAttributes = false;           ///< every attribute of the input, beside `attributes`
     /// Opens one input; empty: openPointSource. For inputs that this library does not know (scenes with meshes).
     std::function<Result<PointSource>(const std::string& path, const ReadOptions& options)> open;
-    /// Others that build the same points with the same settings; each reads and builds its share, the first one writes.
-    /// What does not concern one bucket goes through `tempFolder`, which all must see.
-    Ranks* ranks = nullptr;
     bool skipBad = false;          ///< go on past corrupt chunks and files, and count what is lost
     bool fineNormals = false;      ///< of points: each from its own twelve nearest, at three times the time
     bool mergeDuplicates = false;  ///< of points at one place keep one

@@ -1,12 +1,15 @@
-// Points built by several processes together: the file is the one that a single process writes.
+// Built by several processes together: the file is the one that a single process writes.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <signal.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 
+#include "tests/support/big_inputs.h"
+#include "tests/support/runs.h"
 #include "tests/support/support.h"
 
 namespace stipple::lod {
@@ -89,12 +92,83 @@ TEST_F(Mpi, AnErrorOfOneRankEndsAllOfThemWithOneLine) {
     EXPECT_EQ(mpirun(4, command + " --skip-bad --json", folder), 0) << test::slurp(folder / "err");
     EXPECT_NE(test::slurp(folder / "out").find("\"points_out\": 15000"), std::string::npos)
         << test::slurp(folder / "out");
-    // What is no cloud of points is not for several ranks.
-    test::spit(folder / "a.swc", "1 1 0 0 0 1 -1\n2 3 1 0 0 1 1\n");
-    EXPECT_EQ(mpirun(2, "build " + (folder / "a.swc") + " --mpi -o " + out, folder), 2);
-    EXPECT_NE(test::slurp(folder / "err").find("only points"), std::string::npos);
+    EXPECT_FALSE(fs::exists(out + ".build"));
     // A folder that cannot be made.
     EXPECT_EQ(mpirun(2, command + " --skip-bad --temp /proc/nowhere", folder), 4);
+}
+
+/// What one process writes, of all kinds of content.
+struct Kind {
+    std::string name, arguments;
+};
+std::vector<Kind> kinds(const test::TempFolder& folder) {
+    Rng rng(3);
+    std::vector<glm::ivec3> points;
+    for (int i = 0; i < 900'000; ++i) {
+        const double x = rng.uniform(0, 5e5), y = rng.uniform(0, 1e5) * rng.uniform();
+        points.emplace_back(x, y, 2e3 * std::sin(x * 1e-4) + 20 * rng.normal());
+    }
+    test::writeLas(folder / "points.las", points, 0.001, {1e5, 2e6, 0});
+    test::writeGround(folder / "ground.ply", 350, 5, false);
+    test::writeLawn(folder / "lawn.hair", 12'000);
+    test::spit(folder / "a.swc", "1 1 0 0 0 1 -1\n2 3 1 0 0 1 1\n");
+    std::vector<Kind> out;
+    for (const std::string name : {"points.las", "ground.ply", "lawn.hair", "a.swc"})
+        out.push_back({name, "build " + (folder / name) + " --quiet --threads 1 -o "});
+    return out;
+}
+
+TEST_F(Mpi, TrianglesAndStrandsAreThoseOfOneProcessToo) {
+    const test::TempFolder folder;
+    const std::string one = folder / "one.stipple", many = folder / "many.stipple";
+    for (const Kind& kind : kinds(folder)) {
+        ASSERT_EQ(std::system((STIPPLE_PROGRAM + (" " + kind.arguments + one) + " >/dev/null").c_str()), 0);
+        for (const int ranks : {2, 4}) {
+            ASSERT_EQ(mpirun(ranks, kind.arguments + many + " --mpi --memory 400M", folder), 0)
+                << kind.name << test::slurp(folder / "err");
+            EXPECT_TRUE(test::slurp(one) == test::slurp(many)) << ranks << " ranks, " << kind.name;
+            EXPECT_FALSE(fs::exists(many + ".build"));
+            fs::remove(many);
+        }
+        fs::remove(one);
+    }
+}
+
+TEST_F(Mpi, KilledAtAnyMomentTheyGoOnWithAnyNumberOfRanks) {
+    const test::TempFolder folder;
+    const std::string one = folder / "one.stipple", many = folder / "many.stipple";
+    Rng rng(8);
+    ::setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 1);
+    ::setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 1);
+    for (const Kind& kind : kinds(folder)) {
+        if (kind.name == "a.swc") continue;
+        ASSERT_EQ(std::system((STIPPLE_PROGRAM + (" " + kind.arguments + one) + " >/dev/null").c_str()), 0);
+        const std::string input = folder / kind.name;
+        int kills = 0, kept = 0;
+        for (int run = 0; kills < 6 && run < 30; ++run) {
+            const std::string ranks = run % 3 == 2 ? "3" : "2";
+            const bool isDone =
+                test::runAndKill({kMpirun, "--oversubscribe", "--bind-to", "none", "-n", ranks, STIPPLE_PROGRAM,
+                                  "build", input, "--quiet", "--threads", "1", "-o", many, "--mpi", "--memory", "400M"},
+                                 static_cast<int>(rng.uniform(400, 2500)), SIGKILL);
+            test::killAllWith(many);
+            kept += fs::exists(many + ".build") ? 1 : 0;
+            if (!isDone && !fs::exists(many)) {
+                ++kills;
+                continue;
+            }
+            EXPECT_TRUE(test::slurp(one) == test::slurp(many)) << kind.name;
+            fs::remove(many);
+        }
+        ASSERT_EQ(mpirun(3, kind.arguments + many + " --mpi --memory 400M", folder), 0) << test::slurp(folder / "err");
+        EXPECT_TRUE(test::slurp(one) == test::slurp(many)) << kind.name;
+        EXPECT_FALSE(fs::exists(many + ".build"));
+        EXPECT_GE(kills, 6) << kind.name;
+        EXPECT_GE(kept, 1) << kind.name;
+        std::printf("%s: %d kills, after %d of them something was kept\n", kind.name.c_str(), kills, kept);
+        fs::remove(many);
+        fs::remove(one);
+    }
 }
 
 }  // namespace

@@ -7,12 +7,12 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <random>
 
 #include "lod/build/mesh/mesh_build.h"
 #include "lod/build/strands/strand_build.h"
 #include "lod/import/ply/mesh.h"
 #include "lod/import/strands/strand_readers.h"
+#include "tests/support/big_inputs.h"
 #include "tests/support/runs.h"
 #include "tests/support/support.h"
 
@@ -21,72 +21,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-template <typename T>
-void put(std::string& to, const T& value) {
-    to.append(reinterpret_cast<const char*>(&value), sizeof(value));
-}
-
-/// A wavy ground with a normal at each vertex, finer by far in one corner; `seed` not 0: faces in random order.
-void writeGround(const std::string& path, int edge, unsigned seed) {
-    std::string text = fmt::format(
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float "
-        "z\n"
-        "property float nx\nproperty float ny\nproperty float nz\nelement face {}\n"
-        "property list uchar int vertex_indices\nend_header\n",
-        edge * edge, 2 * (edge - 1) * (edge - 1));
-    const auto along = [&](int i) { return 100 * std::pow(i / (edge - 1.0), 3); };
-    for (int j = 0; j < edge; ++j)
-        for (int i = 0; i < edge; ++i) {
-            const double x = along(i), z = along(j);
-            put(text, std::array<float, 6>{float(x), float(std::sin(x) * std::cos(0.7 * z) + 0.05 * std::sin(40 * x)),
-                                           float(z), float(-std::cos(x)), 1, float(0.3 * std::sin(z))});
-        }
-    std::vector<std::array<int32_t, 3>> faces;
-    for (int j = 0; j + 1 < edge; ++j)
-        for (int i = 0; i + 1 < edge; ++i) {
-            const int a = j * edge + i;
-            faces.push_back({a, a + edge, a + 1});
-            faces.push_back({a + 1, a + edge, a + edge + 1});
-        }
-    if (seed != 0) std::shuffle(faces.begin(), faces.end(), std::mt19937(seed));
-    for (const auto& f : faces) {
-        text.push_back(3);
-        put(text, f);
-    }
-    test::spit(path, text);
-}
-
-/// A lawn of `strands` blades of 20 segments, half of them around one place.
-void writeLawn(const std::string& path, uint32_t strands) {
-    constexpr uint32_t kSegments = 20;
-    std::string text = "HAIR";
-    put(text, strands);
-    put(text, strands * (kSegments + 1));
-    put(text, uint32_t{2});
-    put(text, kSegments);
-    put(text, std::array<float, 5>{0.004f, 0, 0.3f, 0.5f, 0.2f});
-    text.resize(128);
-    Rng rng(11);
-    for (uint32_t s = 0; s < strands; ++s) {
-        const double size = s % 2 == 0 ? 50 : 2, x = size * rng.uniform(), z = size * rng.uniform();
-        const double turn = rng.uniform(0, 6.28), length = rng.uniform(0.3, 1);
-        for (uint32_t k = 0; k <= kSegments; ++k) {
-            const double t = k / double(kSegments);
-            put(text, std::array<float, 3>{float(x + length * t * t * std::sin(turn)), float(2 * length * t),
-                                           float(z + length * t * t * std::cos(turn) + 0.03 * std::sin(9 * t))});
-        }
-    }
-    test::spit(path, text);
-}
-
 struct Kind {
     std::string name, input;
     /// Of one thread, with which the input goes through the disk; and what each further thread needs.
     uint64_t little, aThread;
 };
 std::vector<Kind> kinds(const test::TempFolder& folder) {
-    writeGround(folder / "ground.ply", 500, 0);  // 498,002 triangles
-    writeLawn(folder / "lawn.hair", 25'000);     // 500,000 segments
+    test::writeGround(folder / "ground.ply", 500, 0);  // 498,002 triangles
+    test::writeLawn(folder / "lawn.hair", 25'000);     // 500,000 segments
     return {{"mesh", folder / "ground.ply", uint64_t{190} << 20, uint64_t{80} << 20},
             {"strands", folder / "lawn.hair", uint64_t{170} << 20, uint64_t{64} << 20}};
 }
@@ -124,7 +66,7 @@ TEST(Rounds, NeitherMemoryNorThreadsNorTheOrderOfFacesShow) {
             uint64_t dropped = 0;  // (in the finest corner some triangles have no area on the lattice)
             for (const auto& [what, count] : whole->dropped) dropped += count;
             EXPECT_EQ(whole->pointsIn, whole->pointsOut + dropped);
-            writeGround(kind.input, 500, 5);
+            test::writeGround(kind.input, 500, 5);
         }
         for (const int threads : {1, 2, 5}) {
             const auto executor = makeTbbExecutor(threads);
@@ -138,6 +80,34 @@ TEST(Rounds, NeitherMemoryNorThreadsNorTheOrderOfFacesShow) {
             EXPECT_FALSE(fs::exists(folder / "other.stipple.build"));
         }
     }
+}
+
+TEST(Rounds, FacesInRandomOrderTakeNoMoreRoomOnTheDisk) {
+    const test::TempFolder folder;
+    // Without normals nothing is as large as what has to travel: vertices that do not fit in memory, on disk, and
+    // triangles that share hardly any.
+    test::writeGround(folder / "ground.ply", 500, 7, false);
+    const auto whole = makeTbbExecutor(2), serial = makeSerialExecutor();
+    ASSERT_TRUE(build(folder / "ground.ply", folder / "whole.stipple", *whole, {}, 1 << 26));
+    BuildLimits limits;
+    limits.memoryBytes = uint64_t{190} << 20;
+    uint64_t most = 0;
+    limits.isStopped = [&] {  // what really lies there
+        uint64_t bytes = 0;
+        std::error_code gone;
+        for (const auto& entry : fs::directory_iterator(folder / "a.stipple.build", gone))
+            bytes += entry.file_size(gone);
+        most = std::max(most, bytes);
+        return false;
+    };
+    const auto built = build(folder / "ground.ply", folder / "a.stipple", *serial, limits, 1 << 20);
+    ASSERT_TRUE(built) << built.error().line();
+    EXPECT_TRUE(test::slurp(folder / "whole.stipple") == test::slurp(folder / "a.stipple"));
+    const auto input = double(fs::file_size(folder / "ground.ply"));
+    EXPECT_LE(double(built->temporaryBytes), 1.2 * input);
+    EXPECT_GT(double(built->temporaryBytes), 0.8 * input) << "not the worst case any more";
+    const uint64_t vertices = 500 * 500 * 16;
+    EXPECT_LE(most + vertices, built->temporaryBytes + built->temporaryBytes / 20) << "said less than there was";
 }
 
 TEST(Rounds, KilledAtAnyMomentTheyGoOnAndEndWithTheSameBytes) {
@@ -260,8 +230,8 @@ TEST(Rounds, CarryOnFromTheJournalAndNotFromTheStart) {
 
 TEST(Rounds, StayWithinTheirMemoryAndLoseNothingOnAFullDisk) {
     const test::TempFolder folder;
-    writeGround(folder / "ground.ply", 1000, 3);  // 2 million triangles
-    writeLawn(folder / "lawn.hair", 100'000);
+    test::writeGround(folder / "ground.ply", 1000, 3);  // 2 million triangles
+    test::writeLawn(folder / "lawn.hair", 100'000);
     for (const auto& [input, memory] : {std::pair{"ground.ply", 400}, std::pair{"lawn.hair", 250}}) {
         const std::string command = fmt::format("build {} -o {} --memory {}M --threads 2 --quiet --json",
                                                 folder / input, folder / "a.stipple", memory);

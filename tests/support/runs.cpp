@@ -7,6 +7,8 @@
 
 #include <chrono>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <thread>
 
 namespace stipple::test {
@@ -32,6 +34,24 @@ bool runAndKill(const std::vector<std::string>& arguments, int milliseconds, int
     ::kill(child, signal);
     ::waitpid(child, &status, 0);
     return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+void killAllWith(const std::string& argument) {
+    for (int found = 1; found > 0;) {
+        found = 0;
+        for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+            const int pid = std::atoi(entry.path().filename().c_str());
+            if (pid <= 0 || pid == ::getpid()) continue;
+            std::ifstream file(entry.path() / "cmdline", std::ios::binary);
+            bool isIt = false;
+            for (std::string a; std::getline(file, a, '\0');) isIt = isIt || a == argument;
+            if (!isIt) continue;
+            ++found;
+            ::kill(pid, SIGKILL);
+            ::waitpid(pid, nullptr, WNOHANG);
+        }
+        if (found > 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
 }
 
 int shell(const std::string& limits, const std::string& arguments, const std::string& folder) {

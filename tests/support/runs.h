@@ -8,6 +8,8 @@ namespace stipple::test {
 
 /// Runs the program and kills it after a while; true if it ended well before.
 bool runAndKill(const std::vector<std::string>& arguments, int milliseconds, int signal);
+/// Kills every process that has this among its arguments, and waits until they are gone.
+void killAllWith(const std::string& argument);
 /// Runs it in a shell under `limits`; its exit code. What it says is in `folder`/out and /err.
 int shell(const std::string& limits, const std::string& arguments, const std::string& folder);
 

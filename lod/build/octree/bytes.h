@@ -68,16 +68,18 @@ class ByteReader {
         get(letters);
         text.assign(letters.begin(), letters.end());
     }
-    bool isWhole() const { return isWhole_ && at_ == bytes_.size(); }
+    /// Everything was read, and it was all there.
+    bool isWhole() const { return !isBroken_ && at_ == bytes_.size(); }
+    bool isBroken() const { return isBroken_; }
 
   private:
     bool has(uint64_t count) {
-        isWhole_ = isWhole_ && count <= bytes_.size() - at_;
-        return isWhole_;
+        isBroken_ = isBroken_ || count > bytes_.size() - at_;
+        return !isBroken_;
     }
     const std::vector<uint8_t>& bytes_;
     size_t at_ = 0;
-    bool isWhole_ = true;
+    bool isBroken_ = false;
 };
 
 }  // namespace stipple::lod

@@ -19,10 +19,13 @@ namespace stipple::lod {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr uint64_t kMagic = 0x31444c4942505453ull;  // "STPBILD1"
+constexpr uint64_t kHeadBytes = 16;
+constexpr uint64_t kMagic = 0x32444c4942505453ull;  // "STPBILD2"
 
 struct EntryHead {
-    uint64_t bytes, hash;
+    uint64_t bytes = 0, hash = 0;
+    Journal::What what{};
+    uint32_t unused = 0;
 };
 
 }  // namespace
@@ -35,7 +38,9 @@ Journal::Journal(Journal&& other) noexcept
       lock_(std::exchange(other.lock_, -1)),
       entries_(std::move(other.entries_)) {}
 Journal::~Journal() {
-    if (lock_ >= 0) ::close(lock_);
+    if (lock_ < 0) return;
+    if (end_ <= kHeadBytes) remove();  // nothing to go on with
+    ::close(lock_);
 }
 
 std::string Journal::folderOf(const std::string& output, const std::string& tempFolder) {
@@ -71,9 +76,6 @@ Result<Journal> Journal::open(const std::string& folder, const std::string& outp
         return j;
     }
     STIPPLE_TRY(file.readAt(0, head.data(), sizeof(head)));
-    if (head[0] != kMagic || head[1] != identity)
-        return fail(ErrorKind::input, "holds an interrupted build of other input or with other settings", folder,
-                    "finish it with the same command as before, or delete the folder");
     j.end_ = sizeof(head);
     for (EntryHead entry{}; j.end_ + sizeof(entry) <= file.sizeBytes();) {
         STIPPLE_TRY(file.readAt(j.end_, &entry, sizeof(entry)));
@@ -81,18 +83,23 @@ Result<Journal> Journal::open(const std::string& folder, const std::string& outp
         std::vector<uint8_t> payload(entry.bytes);
         STIPPLE_TRY(file.readAt(j.end_ + sizeof(entry), payload.data(), payload.size()));
         if (hashBytes(payload.data(), payload.size()) != entry.hash) break;
-        j.entries_.push_back(std::move(payload));
+        j.entries_.push_back({entry.what, std::move(payload)});
         j.end_ += sizeof(entry) + entry.bytes;
     }
+    const bool isOfOtherProgram = head[0] != kMagic && file.sizeBytes() > sizeof(head);
+    if (isOfOtherProgram || (head[1] != identity && !j.entries_.empty()))
+        return fail(ErrorKind::input, "holds an interrupted build of other input or with other settings", folder,
+                    "finish it with the same command as before, or delete the folder");
     // Killed after the store was complete and before this folder was gone: there is nothing to go on with.
-    const bool isOver = j.entries_.size() > 1 && !fs::exists(j.partialPath(), error);
+    const bool isOver =
+        !j.entries_.empty() && j.entries_.back().what == What::done && !fs::exists(j.partialPath(), error);
     if (j.entries_.empty() || isOver) STIPPLE_TRY(j.restart());
     return j;
 }
 
-Result<void> Journal::append(const std::vector<uint8_t>& payload) {
+Result<void> Journal::append(What what, const std::vector<uint8_t>& payload) {
     const std::string path = folder_ + "/journal";
-    const EntryHead head{payload.size(), hashBytes(payload.data(), payload.size())};
+    const EntryHead head{payload.size(), hashBytes(payload.data(), payload.size()), what, 0};
     STIPPLE_TRY(writeFileAt(path, end_ + sizeof(head), payload.data(), payload.size()));
     STIPPLE_TRY(writeFileAt(path, end_, &head, sizeof(head)));
     end_ += sizeof(head) + payload.size();
@@ -102,7 +109,7 @@ Result<void> Journal::append(const std::vector<uint8_t>& payload) {
 Result<void> Journal::restart() {
     std::error_code error;
     for (const fs::directory_entry& e : fs::directory_iterator(folder_, error))
-        if (e.path().filename() != "journal") fs::remove(e.path(), error);
+        if (e.path().filename() != "journal") fs::remove_all(e.path(), error);
     fs::remove(partialPath(), error);
     entries_.clear();
     const std::array<uint64_t, 2> head{kMagic, identity_};

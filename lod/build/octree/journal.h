@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <optional>
+#include <utility>
 
 #include "engine/base/file.h"
 #include "lod/build/build.h"
@@ -12,6 +13,16 @@ namespace stipple::lod {
 
 class Journal {
   public:
+    enum class What : uint32_t {
+        counted,  ///< what lies where is known
+        sent,     ///< part of the input is in its places
+        ready,    ///< all of it is
+        done,     ///< a step of the work: its chunks are in the file
+    };
+    struct Entry {
+        What what{};
+        std::vector<uint8_t> payload;
+    };
     /// Where the build of `output` keeps what does not fit in memory; `tempFolder` empty: beside the output.
     static std::string folderOf(const std::string& output, const std::string& tempFolder);
     /// Of the build of `output`; makes the folder if it is not there. `identity`: of input and settings; a folder of
@@ -24,9 +35,8 @@ class Journal {
     const std::string& folder() const { return folder_; }
     std::string partialPath() const { return output_ + ".partial"; }
     /// Of an earlier run, in order.
-    const std::vector<std::vector<uint8_t>>& entries() const { return entries_; }
-    void forgetEntries() { entries_ = {}; }
-    Result<void> append(const std::vector<uint8_t>& payload);
+    std::vector<Entry> takeEntries() { return std::exchange(entries_, {}); }
+    Result<void> append(What what, const std::vector<uint8_t>& payload);
     /// Nothing was kept: whatever lies in the folder is of no use.
     Result<void> restart();
     /// The build is complete.
@@ -39,7 +49,7 @@ class Journal {
     std::string folder_, output_;
     uint64_t identity_ = 0, end_ = 0;
     int lock_ = -1;
-    std::vector<std::vector<uint8_t>> entries_;
+    std::vector<Entry> entries_;
 };
 
 }  // namespace stipple::lod

@@ -1,83 +1,17 @@
 #include "lod/build/octree/reduction.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 
+#include "engine/base/file.h"
 #include "engine/base/hash.h"
 #include "engine/base/ordered.h"
 #include "engine/base/queue.h"
-#include "lod/build/octree/bytes.h"
 
 namespace stipple::lod {
-
-Result<Reduction> Reduction::open(const std::string& output, const BuildLimits& limits, uint64_t identity,
-                                  bool isOnDisk) {
-    Reduction r(output, limits);
-    if (!isOnDisk) return r;
-    STIPPLE_ASSIGN(Journal journal, Journal::open(Journal::folderOf(output, limits.tempFolder), output, identity));
-    r.journal_.emplace(std::move(journal));
-    r.isResumed_ = !r.journal_->entries().empty();
-    if (!r.isResumed_) return r;
-    ByteReader from(r.journal_->entries().front());
-    from.get(r.facts_);
-    return r;
-}
-
-std::unique_ptr<Spill> Reduction::spill(const std::string& name) const {
-    return std::make_unique<Spill>(journal_ ? fmt::format("{}/{}", journal_->folder(), name) : "");
-}
-
-void Reduction::plan(std::vector<Atom> atoms) {
-    atoms_ = std::move(atoms);
-    for (size_t a = 0; a < atoms_.size(); ++a) {
-        inputs_.push_back(spill(fmt::format("in-{}", a)));
-        allInput_ += atoms_[a].count;
-    }
-}
-
-Result<void> Reduction::seal(const std::vector<uint8_t>& facts, Executor& executor) {
-    for (const auto& input : inputs_) temporary_ += input->bytes();
-    mostTemporary_ = temporary_;
-    if (!journal_) return {};
-    CompletionQueue<Error> errors;
-    executor.parallelFor(inputs_.size(), 1, [&](size_t begin, size_t end) {
-        for (size_t a = begin; a < end; ++a)
-            if (const auto sealed = inputs_[a]->seal(); !sealed) errors.push(sealed.error());
-    });
-    if (const auto found = errors.takeAll(); !found.empty()) return tl::unexpected(found.front());
-    ByteWriter to;
-    to.put(facts);
-    to.put(atoms_);
-    for (const auto& input : inputs_) {
-        to.put(input->bytes());
-        to.put(input->hash());
-    }
-    return journal_->append(to.bytes());
-}
-
-Result<void> Reduction::restore(Progress& progress) {
-    ByteReader from(journal_->entries().front());
-    std::vector<Atom> atoms;
-    from.get(facts_);
-    from.get(atoms);
-    plan(std::move(atoms));
-    for (const auto& input : inputs_) {
-        uint64_t bytes = 0, hash = 0;
-        from.get(bytes);
-        from.get(hash);
-        input->restore(bytes, hash);
-        temporary_ += bytes;
-    }
-    mostTemporary_ = temporary_;
-    if (!from.isWhole())
-        return fail(ErrorKind::input, "holds a damaged journal", journal_->folder(), "delete the folder");
-    progress.say(fmt::format("going on with the interrupted build: {} cells are done, {} have their input",
-                             journal_->entries().size() - 1, atoms_.size()));
-    return {};
-}
-
 namespace {
 
 /// What the journal says of a cell.
@@ -105,24 +39,54 @@ struct Entry {
     }
 };
 
+// A product on its way from one rank to the first.
+Result<void> saveProduct(const std::string& path, const CellProduct& product) {
+    ByteWriter to;
+    to.put(product.chunks);
+    to.put(product.table);
+    to.put(uint64_t{product.up.size()});
+    for (const GoingUp& up : product.up) {
+        to.put(up.key);
+        to.put(up.bytes);
+    }
+    ::unlink(path.c_str());  // what a killed run may have left
+    return writeFileAt(path, 0, to.bytes().data(), to.bytes().size());
+}
+Result<CellProduct> loadProduct(const std::string& path) {
+    STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, readWhole(path));
+    ByteReader from(bytes);
+    CellProduct product;
+    uint64_t ups = 0;
+    from.get(product.chunks);
+    from.get(product.table);
+    from.get(ups);
+    for (uint64_t u = 0; u < ups && !from.isBroken(); ++u) {
+        GoingUp& up = product.up.emplace_back();
+        from.get(up.key);
+        from.get(up.bytes);
+    }
+    if (!from.isWhole()) return fail(ErrorKind::input, "is not what a rank wrote", path, "run the same command again");
+    ::unlink(path.c_str());
+    return product;
+}
+
 }  // namespace
 
 Result<void> Reduction::openWriter(Executor& executor) {
-    if (!journal_) {
-        STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output_));
+    if (!workspace_.isFirst()) return {};
+    if (!workspace_.isOnDisk()) {
+        STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(workspace_.output()));
         writer_.emplace(std::move(writer));
         return {};
     }
-    const auto& entries = journal_->entries();
-    std::vector<Entry> written(entries.empty() ? 0 : entries.size() - 1);
+    std::vector<Entry> written(done_.size());
     uint64_t end = 0;
     for (size_t e = 0; e < written.size(); ++e) {
-        if (!written[e].read(entries[e + 1]))
-            return fail(ErrorKind::input, "holds a damaged journal", journal_->folder(), "delete the folder");
+        if (!written[e].read(done_[e].payload)) return tl::unexpected(workspace_.damaged());
         end = written[e].at + written[e].bytes;
     }
     if (!written.empty()) {  // are the chunks still what was written?
-        STIPPLE_ASSIGN(const InputFile file, InputFile::open(journal_->partialPath()));
+        STIPPLE_ASSIGN(const InputFile file, InputFile::open(workspace_.partialPath()));
         CompletionQueue<Error> errors;
         executor.parallelFor(written.size(), 1, [&](size_t begin, size_t last) {
             std::vector<uint8_t> bytes;
@@ -130,23 +94,28 @@ Result<void> Reduction::openWriter(Executor& executor) {
                 bytes.resize(written[i].bytes);
                 const auto read = file.readAt(written[i].at, bytes.data(), bytes.size());
                 if (read && hashBytes(bytes.data(), bytes.size()) == written[i].hash) continue;
-                errors.push({ErrorKind::input, "is not what was written", journal_->partialPath(),
-                             "delete it and the folder " + journal_->folder()});
+                errors.push({ErrorKind::input, "is not what was written", workspace_.partialPath(),
+                             "delete it and the folder " + workspace_.folder()});
                 return;
             }
         });
         if (const auto found = errors.takeAll(); !found.empty()) return tl::unexpected(found.front());
     }
-    STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::resume(output_, journal_->partialPath(), end));
+    STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::resume(workspace_.output(), workspace_.partialPath(), end));
     writer_.emplace(std::move(writer));
     return {};
 }
 
+std::unique_ptr<Spill> Reduction::upSpill(int level, uint64_t key) const {
+    return workspace_.spill(fmt::format("up-{}-{:x}", level, key));
+}
+
 Reduction::LevelCells Reduction::takeLevel(int level) {
     LevelCells out;
-    for (uint32_t a = 0; a < atoms_.size(); ++a)
-        if (atoms_[a].level == level) {
-            out.cells.push_back({level, atoms_[a].key, a, false});
+    const std::vector<Atom>& atoms = inputs_.atoms();
+    for (uint32_t a = 0; a < atoms.size(); ++a)
+        if (atoms[a].level == level) {
+            out.cells.push_back({level, atoms[a].key, a, false});
             out.waiting.emplace_back();
         }
     for (auto& [key, waiting] : above_) {
@@ -154,7 +123,7 @@ Reduction::LevelCells Reduction::takeLevel(int level) {
         out.waiting.push_back(std::move(waiting));
     }
     above_.clear();
-    const bool isMore = std::any_of(atoms_.begin(), atoms_.end(), [&](const Atom& a) { return a.level < level; });
+    const bool isMore = std::any_of(atoms.begin(), atoms.end(), [&](const Atom& a) { return a.level < level; });
     if (out.cells.size() == 1) out.cells[0].isLast = !isMore;
     return out;
 }
@@ -166,14 +135,28 @@ Result<std::vector<FromBelow>> Reduction::readBelow(const Waiting& waiting) cons
         STIPPLE_ASSIGN(std::vector<uint8_t> bytes, waiting.spill->part(at, piece.bytes));
         if (hashBytes(bytes.data(), bytes.size()) != piece.hash)
             return fail(ErrorKind::input, "holds a file that is not what was written",
-                        journal_ ? journal_->folder() : output_, "delete the folder and build again");
+                        workspace_.isOnDisk() ? workspace_.folder() : workspace_.output(),
+                        "delete the folder and build again");
         at += piece.bytes;
         out.push_back({piece.label, std::move(bytes)});
     }
     return out;
 }
 
-Result<void> Reduction::hand(const WorkCell& cell, Waiting& waiting, CellProduct product, const Take& take) {
+Result<CellProduct> Reduction::makeCell(const LevelCells& level, size_t i, const Make& make) const {
+    STIPPLE_TRY(workspace_.checkStopped());
+    std::vector<uint8_t> input;
+    std::vector<FromBelow> below;
+    if (level.cells[i].atom != WorkCell::kNone) {
+        STIPPLE_ASSIGN(input, inputs_.take(level.cells[i].atom));
+    } else {
+        STIPPLE_ASSIGN(below, readBelow(level.waiting[i]));
+    }
+    return make(level.cells[i], input, below);
+}
+
+Result<void> Reduction::hand(LevelCells& level, size_t i, CellProduct product, const Take& take, Progress& progress) {
+    const WorkCell& cell = level.cells[i];
     Entry entry;
     STIPPLE_ASSIGN(entry.at, writer_->appendEncoded(product.chunks));
     entry.bytes = product.chunks.size();
@@ -181,97 +164,139 @@ Result<void> Reduction::hand(const WorkCell& cell, Waiting& waiting, CellProduct
     const uint64_t label = take(entry.at, product.table);
     for (const GoingUp& up : product.up) {
         Waiting& to = above_[up.key];
-        if (!to.spill) to.spill = spill(fmt::format("up-{}-{:x}", cell.level - 1, up.key));
+        if (!to.spill) to.spill = upSpill(cell.level - 1, up.key);
         STIPPLE_TRY(to.spill->append(up.bytes));
         to.pieces.push_back({label, up.bytes.size(), hashBytes(up.bytes.data(), up.bytes.size())});
         entry.up.push_back({up.key, to.pieces.back().bytes, to.pieces.back().hash});
         temporary_ += up.bytes.size();
     }
     mostTemporary_ = std::max(mostTemporary_, temporary_);
-    if (journal_) {
+    if (workspace_.isOnDisk()) {
         entry.table = std::move(product.table);
-        STIPPLE_TRY(journal_->append(entry.write()));
+        STIPPLE_TRY(workspace_.note(Journal::What::done, entry.write()));
     }
-    finishCell(cell, waiting);
+    finishCell(cell, level.waiting[i]);
+    progress.update("build", doneInput_, allInput_);
+    progress.setTemporaryBytes(workspace_.isOnDisk() ? temporary_ : 0);
     return {};
 }
 
 void Reduction::finishCell(const WorkCell& cell, Waiting& waiting) {
-    Spill* const used = cell.atom != WorkCell::kNone ? inputs_[cell.atom].get() : waiting.spill.get();
-    temporary_ -= used->bytes();
-    used->remove();
     if (cell.atom == WorkCell::kNone) {
+        temporary_ -= waiting.spill->bytes();
+        waiting.spill->remove();
         waiting = {};
         return;
     }
-    doneInput_ += atoms_[cell.atom].count;
-    inputs_[cell.atom].reset();
+    doneInput_ += inputs_.atoms()[cell.atom].count;
+    temporary_ -= inputs_.remove(cell.atom);
 }
 
-/// What an earlier run finished of a level.
-Result<void> Reduction::replay(LevelCells& level, const Take& take) {
-    for (size_t i = 0; i < level.cells.size() && replayed_ + 1 < journal_->entries().size(); ++i, ++replayed_) {
+/// What an earlier run finished of a level; returns how many of its cells.
+size_t Reduction::replay(LevelCells& level, const Take& take) {
+    size_t i = 0;
+    for (; i < level.cells.size() && replayed_ < done_.size(); ++i, ++replayed_) {
         Entry entry;
-        entry.read(journal_->entries()[replayed_ + 1]);
+        entry.read(done_[replayed_].payload);
         const uint64_t label = take(entry.at, entry.table);
         for (const auto& [key, bytes, hash] : entry.up) {
             Waiting& to = above_[key];
-            if (!to.spill) to.spill = spill(fmt::format("up-{}-{:x}", level.cells[i].level - 1, key));
+            if (!to.spill) to.spill = upSpill(level.cells[i].level - 1, key);
             to.pieces.push_back({label, bytes, hash});
-            to.spill->restore(to.spill->bytes() + bytes, 0);
+            to.spill->restore({{to.spill->bytes() + bytes, 0}});
             temporary_ += bytes;
         }
         finishCell(level.cells[i], level.waiting[i]);
     }
-    return {};
-}
-
-Result<void> Reduction::checkStopped() const {
-    if (!limits_.isStopped || !limits_.isStopped()) return {};
-    return fail(ErrorKind::interrupted, "interrupted", output_,
-                journal_ ? "run the same command again to go on" : "nothing was written");
+    return i;
 }
 
 Result<void> Reduction::runLevel(LevelCells& level, Executor& executor, int workers, const Make& make, const Take& take,
                                  Progress& progress) {
-    const size_t before = replayed_;
-    if (journal_) STIPPLE_TRY(replay(level, take));
+    const size_t first = replay(level, take);
+    if (workspace_.ranks() != nullptr) return runTogether(level, first, executor, workers, make, take, progress);
     return inOrder<CellProduct>(
-        executor, workers, replayed_ - before, level.cells.size(),
-        [&](size_t i) -> Result<CellProduct> {
-            STIPPLE_TRY(checkStopped());
-            std::vector<uint8_t> input;
-            std::vector<FromBelow> below;
-            if (level.cells[i].atom != WorkCell::kNone) {
-                STIPPLE_ASSIGN(input, inputs_[level.cells[i].atom]->take());
-            } else {
-                STIPPLE_ASSIGN(below, readBelow(level.waiting[i]));
-            }
-            return make(level.cells[i], input, below);
-        },
-        [&](size_t i, CellProduct product) -> Result<void> {
-            STIPPLE_TRY(hand(level.cells[i], level.waiting[i], std::move(product), take));
-            progress.update("build", doneInput_, allInput_);
-            progress.setTemporaryBytes(journal_ ? temporary_ : 0);
-            return {};
-        });
+        executor, workers, first, level.cells.size(), [&](size_t i) { return makeCell(level, i, make); },
+        [&](size_t i, CellProduct product) { return hand(level, i, std::move(product), take, progress); });
 }
 
-Result<void> Reduction::run(Executor& executor, int workers, const Make& make, const Take& take, Progress& progress) {
-    STIPPLE_TRY(openWriter(executor));
-    int deepest = 0;
-    for (const Atom& a : atoms_) deepest = std::max<int>(deepest, a.level);
-    for (int at = deepest; at > -2; --at) {
-        LevelCells level = takeLevel(at);
-        STIPPLE_TRY(runLevel(level, executor, workers, make, take, progress));
-        const bool isMore = std::any_of(atoms_.begin(), atoms_.end(), [&](const Atom& a) { return a.level < at; });
-        if (above_.empty() && !isMore) break;
+std::string Reduction::productPath(const LevelCells& level, size_t i) const {
+    return fmt::format("{}/made-{}-{}", workspace_.folder(), level.cells[i].level, i);
+}
+
+/// The ranks make cells in turn; while the first one hands those of a window on, the others are at the next. (Windows
+/// bound what lies in the folder between making and handing on.)
+Result<void> Reduction::runTogether(LevelCells& level, size_t first, Executor& executor, int workers, const Make& make,
+                                    const Take& take, Progress& progress) {
+    Ranks& ranks = *workspace_.ranks();
+    const auto kWindow = size_t{32} * static_cast<size_t>(ranks.count());
+    ByteWriter done;
+    done.put(uint64_t{first});
+    const std::vector<uint8_t> told = workspace_.ofFirst(done.bytes());
+    uint64_t begin = 0;
+    ByteReader(told).get(begin);
+    Result<void> handed;
+    for (; begin < level.cells.size(); begin += kWindow) {
+        const size_t end = std::min<size_t>(begin + kWindow, level.cells.size());
+        std::vector<size_t> own;
+        for (size_t i = begin; i < end; ++i)
+            if (workspace_.isOwn(i)) own.push_back(i);
+        const Result<void> made = inOrder<CellProduct>(
+            executor, workers, 0, own.size(), [&](size_t k) { return makeCell(level, own[k], make); },
+            [&](size_t k, const CellProduct& product) { return saveProduct(productPath(level, own[k]), product); });
+        STIPPLE_TRY(agree(&ranks, handed ? made : handed));
+        if (!workspace_.isFirst()) continue;
+        const auto handAll = [&]() -> Result<void> {
+            for (size_t i = begin; i < end; ++i) {
+                STIPPLE_ASSIGN(CellProduct product, loadProduct(productPath(level, i)));
+                STIPPLE_TRY(hand(level, i, std::move(product), take, progress));
+            }
+            return {};
+        };
+        handed = handAll();
     }
+    STIPPLE_TRY(agree(&ranks, handed));
+    tellAbove(level.cells.empty() ? 0 : level.cells.front().level);
     return {};
 }
 
-void Reduction::finish() {
-    if (journal_) journal_->remove();
+/// The first rank knows what waits for the next level; then all do.
+void Reduction::tellAbove(int level) {
+    ByteWriter mine;
+    for (const auto& [key, waiting] : above_) {
+        mine.put(key);
+        mine.put(waiting.pieces);
+    }
+    const std::vector<uint8_t> bytes = workspace_.ofFirst(mine.bytes());
+    for (ByteReader from(bytes); !workspace_.isFirst() && !from.isWhole();) {
+        uint64_t key = 0;
+        from.get(key);
+        Waiting& to = above_[key];
+        from.get(to.pieces);
+        if (from.isBroken()) return;
+        to.spill = upSpill(level - 1, key);
+        uint64_t sum = 0;
+        for (const Piece& piece : to.pieces) sum += piece.bytes;
+        to.spill->restore({{sum, 0}});
+    }
+}
+
+Result<void> Reduction::run(Executor& executor, int workers, const Make& make, const Take& take, Progress& progress) {
+    STIPPLE_TRY(agree(workspace_.ranks(), openWriter(executor)));
+    temporary_ = mostTemporary_ = inputs_.bytes();
+    const std::vector<Atom>& atoms = inputs_.atoms();
+    int deepest = 0;
+    for (const Atom& a : atoms) {
+        deepest = std::max<int>(deepest, a.level);
+        allInput_ += a.count;
+    }
+    for (int at = deepest; at > -2; --at) {
+        LevelCells level = takeLevel(at);
+        STIPPLE_TRY(runLevel(level, executor, workers, make, take, progress));
+        const bool isMore = std::any_of(atoms.begin(), atoms.end(), [&](const Atom& a) { return a.level < at; });
+        if (above_.empty() && !isMore) break;
+    }
+    return {};
 }
 
 }  // namespace stipple::lod

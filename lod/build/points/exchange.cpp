@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cstring>
 #include <filesystem>
 
 #include "engine/base/file.h"
@@ -12,60 +13,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Result<std::vector<uint8_t>> readAll(const std::string& path) {
-    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
-    std::vector<uint8_t> bytes(file.sizeBytes());
-    STIPPLE_TRY(file.readAt(0, bytes.data(), bytes.size()));
-    return bytes;
-}
-
 std::string builtPath(const std::string& folder, size_t bucket) { return fmt::format("{}/built-{}", folder, bucket); }
 
 }  // namespace
 
-std::string ownFolder(const Ranks& ranks, const std::string& folder) {
-    return fmt::format("{}/rank-{}", folder, ranks.rank());
-}
-
-Result<void> makeSharedFolder(Ranks& ranks, const std::string& folder) {
-    std::error_code error;
-    if (ranks.rank() == 0) {
-        fs::remove_all(folder, error);
-        fs::create_directories(folder, error);
-    }
-    const auto failed = [&] {
-        return fail(ErrorKind::output, fmt::format("cannot be written: {}", error.message()), folder,
-                    "--temp must name a folder that all ranks see");
-    };
-    STIPPLE_TRY(agree(&ranks, error ? Result<void>(failed()) : Result<void>()));
-    fs::create_directory(ownFolder(ranks, folder), error);
-    STIPPLE_TRY(agree(&ranks, error ? Result<void>(failed()) : Result<void>()));
-    // Do all see it?
-    for (int r = 0; r < ranks.count() && !error; ++r)
-        if (!fs::exists(fmt::format("{}/rank-{}", folder, r)))
-            error = std::make_error_code(std::errc::no_such_file_or_directory);
-    return agree(&ranks, error ? Result<void>(failed()) : Result<void>());
-}
-
-Result<void> collectBuckets(Ranks& ranks, const std::string& folder, Buckets& buckets) {
-    const std::string own = ownFolder(ranks, folder);
-    for (size_t b = 0; b < buckets.size(); ++b) {
-        if (!isOwn(&ranks, b)) continue;
-        for (int r = 0; r < ranks.count(); ++r) {
-            if (r == ranks.rank()) continue;
-            const BucketBytes theirs(fmt::format("{}/rank-{}", folder, r), b);
-            for (const auto& [from, to] : {std::pair{theirs.points.path(), &buckets[b]->points},
-                                           std::pair{theirs.ghosts.path(), &buckets[b]->ghosts}}) {
-                std::error_code error;
-                if (!fs::exists(from, error)) continue;
-                STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, readAll(from));
-                STIPPLE_TRY(to->append(bytes));
-                fs::remove(from, error);
-            }
-        }
-    }
-    return {};
-}
+bool isBuilt(const std::string& folder, size_t bucket) { return fs::exists(builtPath(folder, bucket)); }
 
 Result<void> saveBuilt(const std::string& folder, size_t bucket, const BuiltBucket& built) {
     ByteWriter to;
@@ -84,13 +36,31 @@ Result<void> saveBuilt(const std::string& folder, size_t bucket, const BuiltBuck
         to.put(what);
         to.put(seconds);
     }
-    return writeFileAt(builtPath(folder, bucket), 0, to.bytes().data(), to.bytes().size());
+    // (It appears whole or not at all.)
+    const std::string path = builtPath(folder, bucket), unfinished = path + ".unfinished";
+    std::error_code error;
+    fs::remove(unfinished, error);
+    const uint64_t hash = hashBytes(to.bytes().data(), to.bytes().size());
+    STIPPLE_TRY(writeFileAt(unfinished, 0, &hash, sizeof(hash)));
+    STIPPLE_TRY(writeFileAt(unfinished, sizeof(hash), to.bytes().data(), to.bytes().size()));
+    fs::rename(unfinished, path, error);
+    if (error) return fail(ErrorKind::output, fmt::format("cannot be written: {}", error.message()), path);
+    return {};
 }
 
 Result<BuiltBucket> loadBuilt(const std::string& folder, size_t bucket, const ValueRanges& empty) {
     const std::string path = builtPath(folder, bucket);
-    STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, readAll(path));
+    STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, readWhole(path));
+    const auto isIntact = [&] {
+        uint64_t hash = 0;
+        if (bytes.size() < sizeof(hash)) return false;
+        std::memcpy(&hash, bytes.data(), sizeof(hash));
+        return hash == hashBytes(bytes.data() + sizeof(hash), bytes.size() - sizeof(hash));
+    };
+    if (!isIntact()) return fail(ErrorKind::input, "is not what a rank wrote", path, "delete it and build again");
     ByteReader from(bytes);
+    uint64_t hash = 0;
+    from.get(hash);
     BuiltBucket out;
     uint64_t atoms = 0, stages = 0;
     from.get(atoms);
@@ -112,8 +82,6 @@ Result<BuiltBucket> loadBuilt(const std::string& folder, size_t bucket, const Va
         from.get(out.seconds[what]);
     }
     if (!from.isWhole()) return fail(ErrorKind::input, "is not what a rank wrote", path, "build again");
-    std::error_code error;
-    fs::remove(path, error);
     return out;
 }
 

@@ -157,6 +157,13 @@ Result<void> PointInput::survey(BuildReport& report, Executor& executor, Progres
         }
     });
     if (settings_.ranks != nullptr) exchangeParts();
+    STIPPLE_TRY(conclude(report));
+    placeSample();
+    return {};
+}
+
+/// From what is known of the parts.
+Result<void> PointInput::conclude(BuildReport& report) {
     report.pointsIn = declared_;
     points = 0;
     for (const Part& p : parts_) {
@@ -174,58 +181,67 @@ Result<void> PointInput::survey(BuildReport& report, Executor& executor, Progres
                     declared_ == 0 ? "holds no points" : fmt::format("none of its {} points can be used", declared_),
                     firstPath(), "nothing was written");
     findColours();
-    STIPPLE_TRY(allLattice_ ? placeIntegers(report) : placeFloats());
-    placeSample();
-    return {};
+    return allLattice_ ? placeIntegers(report) : placeFloats();
 }
 
-bool PointInput::isOwnPart(size_t part) const {
-    const Ranks* const ranks = settings_.ranks;
-    return ranks == nullptr || part % static_cast<size_t>(ranks->count()) == static_cast<size_t>(ranks->rank());
+bool PointInput::isOwnPart(size_t part) const { return isOwnOf(settings_.ranks, part); }
+
+namespace {
+
+/// What the survey finds out about a part.
+template <typename Archive, typename Part>
+void visitPart(const Archive& with, Part& part) {
+    with(part.usable);
+    with(part.notFinite);
+    with(part.lo);
+    with(part.hi);
+    with(part.least);
+    with(part.greatest);
+    with(part.colourMax);
+    with(part.firstColour);
+    with(part.hasColour);
+    with(part.isVaried);
+    with(part.sample);
+}
+
+}  // namespace
+
+void PointInput::putPart(size_t i, ByteWriter& to) {
+    visitPart([&](const auto& value) { to.put(value); }, parts_[i]);
+    const Error none{};
+    const Error& e = parts_[i].error ? *parts_[i].error : none;
+    to.put(static_cast<int>(parts_[i].error ? e.kind : ErrorKind{}));
+    for (const std::string* text : {&e.what, &e.where, &e.hint}) to.put(*text);
+}
+
+void PointInput::getPart(size_t i, ByteReader& from) {
+    visitPart([&](auto& value) { from.get(value); }, parts_[i]);
+    int kind = 0;
+    Error e;
+    from.get(kind);
+    for (std::string* text : {&e.what, &e.where, &e.hint}) from.get(*text);
+    e.kind = static_cast<ErrorKind>(kind);
+    parts_[i].error = kind != 0 ? std::optional(e) : std::nullopt;
+}
+
+void PointInput::save(ByteWriter& to) {
+    for (size_t i = 0; i < parts_.size(); ++i) putPart(i, to);
+}
+
+Result<void> PointInput::load(ByteReader& from, BuildReport& report) {
+    for (size_t i = 0; i < parts_.size(); ++i) getPart(i, from);
+    return conclude(report);
 }
 
 /// What each rank found out about its parts, all ranks know afterwards.
 void PointInput::exchangeParts() {
-    const auto visit = [](auto& archive, auto& part) {
-        const auto with = [&](auto&& value) {
-            if constexpr (std::is_same_v<std::decay_t<decltype(archive)>, ByteWriter>)
-                archive.put(value);
-            else
-                archive.get(value);
-        };
-        with(part.usable);
-        with(part.notFinite);
-        with(part.lo);
-        with(part.hi);
-        with(part.least);
-        with(part.greatest);
-        with(part.colourMax);
-        with(part.firstColour);
-        with(part.hasColour);
-        with(part.isVaried);
-        with(part.sample);
-    };
     ByteWriter mine;
-    for (size_t i = 0; i < parts_.size(); ++i) {
-        if (!isOwnPart(i)) continue;
-        visit(mine, parts_[i]);
-        const Error none{};
-        const Error& e = parts_[i].error ? *parts_[i].error : none;
-        mine.put(static_cast<int>(parts_[i].error ? e.kind : ErrorKind{}));
-        for (const std::string* text : {&e.what, &e.where, &e.hint}) mine.put(*text);
-    }
+    for (size_t i = 0; i < parts_.size(); ++i)
+        if (isOwnPart(i)) putPart(i, mine);
     const std::vector<std::vector<uint8_t>> all = settings_.ranks->gather(mine.bytes());
     for (size_t r = 0; r < all.size(); ++r) {
         ByteReader from(all[r]);
-        for (size_t i = r; i < parts_.size(); i += all.size()) {
-            visit(from, parts_[i]);
-            int kind = 0;
-            Error e;
-            from.get(kind);
-            for (std::string* text : {&e.what, &e.where, &e.hint}) from.get(*text);
-            e.kind = static_cast<ErrorKind>(kind);
-            parts_[i].error = kind != 0 ? std::optional(e) : std::nullopt;
-        }
+        for (size_t i = r; i < parts_.size(); i += all.size()) getPart(i, from);
     }
 }
 
@@ -379,19 +395,28 @@ Result<void> PointInput::placeFloats() {
 
 // ---- delivery ----
 
+PointInput::Range PointInput::nextRange(const Range& range, uint64_t wanted) const {
+    Range next{range.end, range.end, range.before};
+    for (size_t i = range.begin; i < range.end; ++i) next.before += parts_[i].usable;
+    uint64_t held = 0;
+    while (next.end < parts_.size() && held < wanted) held += parts_[next.end++].usable;
+    return next;
+}
+
 Result<double> PointInput::read(Executor& executor, int workers, Progress& progress, const std::string& stage,
-                                const Sink& sink) const {
+                                const Range& range, const Sink& sink) const {
     std::atomic<bool> stop{false};
-    std::atomic<uint64_t> done{0};
-    std::atomic<size_t> next{0};
+    std::atomic<uint64_t> done{range.before};
+    std::atomic<size_t> next{range.begin};
+    const size_t end = std::min(range.end, parts_.size());
     CompletionQueue<Error> errors;
     std::vector<double> roundings(static_cast<size_t>(workers), 0);
-    executor.parallelFor(static_cast<size_t>(workers), 1, [&](size_t begin, size_t end) {
-        for (size_t worker = begin; worker < end; ++worker) {
+    executor.parallelFor(static_cast<size_t>(workers), 1, [&](size_t first, size_t last) {
+        for (size_t worker = first; worker < last; ++worker) {
             PointBlock block;
             Points out;
             double& rounding = roundings[worker];
-            for (size_t i = next++; i < parts_.size() && !stop; i = next++) {
+            for (size_t i = next++; i < end && !stop; i = next++) {
                 const Part& part = parts_[i];
                 if (part.error || !isOwnPart(i)) continue;
                 const auto result = readPart(part, block, out, rounding, [&](const Points& b) -> Result<void> {

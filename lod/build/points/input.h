@@ -8,6 +8,7 @@
 
 #include "lod/build/build.h"
 #include "lod/build/lattice.h"
+#include "lod/build/octree/bytes.h"
 #include "lod/build/points/points.h"
 
 namespace stipple::lod {
@@ -27,6 +28,9 @@ class PointInput {
 
     /// Reads everything once: bounds, which parts are corrupt, what the colours mean. Fills `report`.
     Result<void> survey(BuildReport& report, Executor& executor, Progress& progress);
+    /// What the survey found, for a build that was interrupted: load instead of survey.
+    void save(ByteWriter& to);
+    Result<void> load(ByteReader& from, BuildReport& report);
 
     // After that:
     glm::dvec3 origin{0};
@@ -44,8 +48,16 @@ class PointInput {
     /// below `workers`. Fails if the input is not what was surveyed. Returns the largest rounding of a coordinate,
     /// world units.
     using Sink = std::function<Result<void>(int worker, const Points& block)>;
+    /// Parts [begin, end), before which lie that many points.
+    struct Range {
+        size_t begin = 0, end = ~size_t{0};
+        uint64_t before = 0;
+    };
+    size_t parts() const { return parts_.size(); }
+    /// The parts after `range` that hold `points` points or a little more.
+    Range nextRange(const Range& range, uint64_t points) const;
     Result<double> read(Executor& executor, int workers, Progress& progress, const std::string& stage,
-                        const Sink& sink) const;
+                        const Range& range, const Sink& sink) const;
 
   private:
     struct Part {
@@ -68,6 +80,9 @@ class PointInput {
     Result<void> adopt(PointSource source, const ReadOptions& options, std::vector<bool>& found, BuildReport& report);
     bool isOwnPart(size_t part) const;
     void exchangeParts();
+    void putPart(size_t i, ByteWriter& to);
+    void getPart(size_t i, ByteReader& from);
+    Result<void> conclude(BuildReport& report);
     Result<void> surveyPart(Part& part, PointBlock& block) const;
     void surveyColours(const PointBlock& block, size_t count, Part& part) const;
     Result<void> placeIntegers(BuildReport& report);

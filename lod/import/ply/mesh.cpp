@@ -58,11 +58,30 @@ class VertexStore {
         }
         hasNormals_ = has[3] && has[4] && has[5];
         hasColours_ = has[6] && has[7] && has[8];
-        bytes_ = (isWide_ ? 24u : 12u) + (hasNormals_ ? 4u : 12u) + (hasColours_ ? 4u : 0u);
-        values_.emplace(folder, memoryBytes, bytes_);
+        memoryBytes_ = memoryBytes;
+        folder_ = folder;
+        begin();
+    }
+    /// Empty again.
+    void begin() {
+        isSumming_ = !hasNormals_;
+        values_.emplace(folder_, memoryBytes_, bytes());
     }
     bool hasNormals() const { return hasNormals_; }
-    size_t bytes() const { return bytes_; }
+    size_t bytes() const { return (isWide_ ? 24u : 12u) + (isSumming_ ? 12u : 4u) + (hasColours_ ? 4u : 0u); }
+    /// Normals are complete: their lengths do not matter any more.
+    void endSums(uint64_t count) {
+        isSumming_ = false;
+        const size_t place = isWide_ ? 24 : 12, colour = hasColours_ ? 4 : 0;
+        values_->narrow(count, bytes(), [&](const uint8_t* from, uint8_t* to) {
+            glm::vec3 sum(0);
+            std::memcpy(&sum, from + place, sizeof(sum));
+            const uint32_t code = codeOf(sum);
+            std::memcpy(to, from, place);
+            std::memcpy(to + place, &code, sizeof(code));
+            std::memcpy(to + place + sizeof(code), from + place + sizeof(sum), colour);
+        });
+    }
     Result<void> status() const { return values_->status(); }
 
     void set(uint64_t i, const Vertex& v) {
@@ -76,12 +95,10 @@ class VertexStore {
             put(v.position);
         else
             put(glm::vec3(v.position));
-        const float length = glm::length(v.normal);
-        const bool isNone = !(length > 1e-20f) || !std::isfinite(length);
-        if (hasNormals_)
-            put(isNone ? ~0u : octEncode(v.normal));
-        else
+        if (isSumming_)
             put(v.normal);
+        else
+            put(codeOf(v.normal));
         if (hasColours_) put(v.colour);
         values_->set(i, record.data());
     }
@@ -96,7 +113,7 @@ class VertexStore {
         };
         Vertex v;
         v.position = isWide_ ? take(glm::dvec3(0)) : glm::dvec3(take(glm::vec3(0)));
-        if (hasNormals_) {
+        if (!isSumming_) {
             const uint32_t code = take(0u);
             if (code != ~0u) v.normal = shared::octDecode(code);
         } else {
@@ -107,8 +124,13 @@ class VertexStore {
     }
 
   private:
-    bool isWide_ = false, hasNormals_ = false, hasColours_ = false;
-    size_t bytes_ = 0;
+    static uint32_t codeOf(const glm::vec3& normal) {
+        const float length = glm::length(normal);
+        return length > 1e-20f && std::isfinite(length) ? octEncode(normal) : ~0u;
+    }
+    bool isWide_ = false, hasNormals_ = false, hasColours_ = false, isSumming_ = false;
+    uint64_t memoryBytes_ = 0;
+    std::string folder_;
     std::optional<PagedArray> values_;
 };
 
@@ -122,9 +144,12 @@ class PlyMesh {
           vertices_(vertexOf(header_), memoryBytes, folder),
           count_(vertexOf(header_).count) {}
 
-    uint64_t vertexBytes() const { return count_ * vertices_.bytes(); }
+    /// Of all vertices: while normals are summed, and after that.
+    uint64_t surveyBytes() const { return count_ * vertices_.bytes(); }
+    uint64_t readBytes() const { return surveyBytes() - (vertices_.hasNormals() ? 0 : 8 * count_); }
     Result<MeshSource::Bounds> survey() {
         MeshSource::Bounds bounds;
+        vertices_.begin();
         PlyReader reader(file_, header_, 0);
         PointBlock block;
         uint64_t next = 0;
@@ -141,7 +166,10 @@ class PlyMesh {
             }
         }
         facesAt_ = reader.offset();
-        if (!vertices_.hasNormals()) STIPPLE_TRY(sumNormals());
+        if (!vertices_.hasNormals()) {
+            STIPPLE_TRY(sumNormals());
+            vertices_.endSums(count_);
+        }
         STIPPLE_TRY(vertices_.status());
         return bounds;
     }
@@ -150,9 +178,8 @@ class PlyMesh {
         BlockMaker blocks(
             [&](uint64_t i, TriangleMesh& to) {
                 const Vertex v = vertices_.get(i);
-                const float length = glm::length(v.normal);
                 to.position.push_back(v.position);
-                to.normal.push_back(vertices_.hasNormals() || !(length > 0) ? v.normal : v.normal / length);
+                to.normal.push_back(v.normal);
                 to.colour.push_back(v.colour);
                 // Which side is out is not known to many programs that write PLY.
                 to.surface.push_back(shared::kSurfaceTwoSided);
@@ -236,7 +263,8 @@ Result<MeshSource> openPlyMesh(const std::string& path, uint64_t memoryBytes, co
             source.triangles += isStrip ? file->sizeBytes() / 4 : 2 * e.count;
         }
     auto mesh = std::make_shared<PlyMesh>(file, std::move(header), memoryBytes, tempFolder, notes);
-    source.mostTemporaryBytes = mesh->vertexBytes() > memoryBytes ? mesh->vertexBytes() : 0;
+    source.surveyBytes = mesh->surveyBytes() > memoryBytes ? mesh->surveyBytes() : 0;
+    source.readBytes = source.surveyBytes > 0 ? mesh->readBytes() : 0;
     source.identity = [path] { return fileIdentity(path); };
     source.survey = [mesh] { return mesh->survey(); };
     source.read = [mesh](const MeshSource::Take& take) { return mesh->read(take); };
