@@ -93,6 +93,7 @@ json toJson(const StoreDescription& d) {
         {"materials", materials},
         {"points_in", d.pointsIn},
         {"dropped", d.dropped},
+        {"added", d.added},
         {"source", d.source}};
 }
 
@@ -151,6 +152,7 @@ StoreDescription fromJson(const json& j) {
     d.source = j.at("source").get<std::string>();
     d.pointsIn = j.value("points_in", uint64_t{0});
     d.dropped = j.value("dropped", std::map<std::string, uint64_t>());
+    d.added = j.value("added", std::map<std::string, uint64_t>());
     for (const json& m : j.at("materials")) d.materials.push_back(materialFromJson(m));
     return d;
 }

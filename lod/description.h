@@ -32,7 +32,7 @@ struct StoreDescription {
     bool hasNormals = false;                ///< from the file or estimated
     std::vector<shared::SurfaceMaterial> materials;  ///< of a mesh store
     uint64_t pointsIn = 0;                           ///< that the input declares; 0: not told
-    std::map<std::string, uint64_t> dropped;         ///< reason -> points: pointsIn = points + all of these
+    std::map<std::string, uint64_t> dropped, added;  ///< reason -> points: pointsIn + added = points + dropped
     std::string source;                              ///< file names of the input, without folders
 };
 

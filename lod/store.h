@@ -69,12 +69,11 @@ Result<std::vector<uint8_t>> readAttribute(const Store& store, uint32_t node, si
 
 struct VerifyReport {
     uint64_t nodes = 0, records = 0, leafRecords = 0;
-    uint64_t errorsMeasured = 0;  ///< records (or triangles) whose error was measured again
+    uint64_t errorsMeasured = 0;  ///< records (segments, triangles) whose error was measured again
 };
 /// Reads every chunk and checks all that the cut relies on: hashes, counts per code, order, codes monotone, spheres
-/// nested, positions inside their cells; of points also the errors, measured again against the leaves, and of triangles
-/// those of simplifications. `nodes`: of
-/// about that many nodes only, evenly spread (0: all).
+/// nested, positions inside their cells; the errors of points and strands are measured again against the leaves, those
+/// of simplifications against their triangles. `nodes`: of about that many nodes only, evenly spread (0: all).
 Result<VerifyReport> verifyStore(const Store& store, Executor& executor, uint64_t nodes = 0);
 
 }  // namespace stipple::lod

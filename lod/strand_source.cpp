@@ -37,6 +37,9 @@ Result<StrandSet> collect(const StrandSource& source) {
         append(out.notes, block.notes);
         for (size_t s = 1; s < block.first.size(); ++s) out.first.push_back(base + block.first[s]);
         for (const auto& [what, count] : block.dropped) out.dropped[what] += count;
+        for (const auto& [what, count] : block.mended) out.mended[what] += count;
+        out.segmentsIn += block.segmentsIn;
+        out.segmentsAdded += block.segmentsAdded;
         return {};
     }));
     return out;

@@ -10,7 +10,7 @@ namespace stipple::lod {
 
 /// Strands that are read block by block, as often as it takes: they need not fit in memory.
 struct StrandSource {
-    /// Blocks hold whole strands; what a block's `dropped` and `notes` say is of that block.
+    /// Blocks hold whole strands; what a block's `dropped`, `mended` and `notes` say is of that block.
     using Take = std::function<Result<void>(const StrandSet& block)>;
 
     uint64_t vertices = 0;               ///< about

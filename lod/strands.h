@@ -21,7 +21,9 @@ struct StrandSet {
     std::vector<uint8_t> isRibbon;
     bool hasColour = false;  ///< colours of the file's own
     glm::dvec3 up{0, 0, 1};
-    std::map<std::string, uint64_t> dropped;  ///< reason -> what was left out or mended
+    std::map<std::string, uint64_t> dropped;     ///< reason -> segments that cleanStrands left out
+    std::map<std::string, uint64_t> mended;      ///< what else was odd, and how often
+    uint64_t segmentsIn = 0, segmentsAdded = 0;  ///< before cleanStrands, and by it
     std::vector<std::string> notes;
     size_t strands() const { return isRibbon.size(); }
     void addVertex(const glm::dvec3& p, float r, const glm::vec3& n, uint32_t c) {

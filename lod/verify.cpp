@@ -109,7 +109,6 @@ std::string checkGroup(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
 Result<VerifyReport> verifyStore(const Store& store, Executor& executor, uint64_t nodes) {
     const Hierarchy& h = store.hierarchy;
     const size_t stride = nodes == 0 ? 1 : h.nodes.size() / nodes + 1;
-    const bool isPoints = !h.isMesh() && !h.isLoose();
     std::atomic<uint64_t> checked{0}, measured{0};
     CompletionQueue<std::pair<size_t, Error>> problems;
     std::atomic<uint64_t> records{0}, leafRecords{0};
@@ -126,8 +125,10 @@ Result<VerifyReport> verifyStore(const Store& store, Executor& executor, uint64_
                 !text.empty())
                 problems.push({i, Error{ErrorKind::input, std::move(text), fmt::format("{}: node {}", store.path, i),
                                         "this is a fault of the build; please report it with the input"}});
-            if ((isPoints || h.isMesh()) && chunk) {
-                const auto worst = isPoints ? measureErrors(store, index, *chunk) : measureGroup(store, index, *chunk);
+            if (!h.isProgressive) {
+                const auto worst = h.isStrands  ? measureStrands(store, index, *chunk)
+                                   : h.isMesh() ? measureGroup(store, index, *chunk)
+                                                : measureErrors(store, index, *chunk);
                 if (!worst)
                     problems.push({i, worst.error()});
                 else

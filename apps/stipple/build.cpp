@@ -43,6 +43,7 @@ Result<void> run(const Options& o, bool& isSilent) {
                                   {"points_in", r.pointsIn},
                                   {"points_out", r.pointsOut},
                                   {"dropped", r.dropped},
+                                  {"added", r.added},
                                   {"skipped_files", r.skippedFiles},
                                   {"seconds", r.seconds},
                                   {"stage_seconds", r.stageSeconds},
@@ -65,6 +66,7 @@ Result<void> run(const Options& o, bool& isSilent) {
                r.pointsOut, what, r.nodes, isMesh ? "groups" : "nodes", humanBytes(r.bytesOut),
                static_cast<double>(r.bytesOut) / static_cast<double>(r.pointsOut), what, r.seconds,
                static_cast<double>(r.pointsIn) / r.seconds * 1e-6, what, humanBytes(peakRssBytes()));
+    for (const auto& [reason, count] : r.added) fmt::print("added {}s: {} {}\n", what, count, reason);
     for (const auto& [reason, count] : r.dropped)
         fmt::print("dropped {}{}: {}\n", count, what == "point" ? " points" : "", reason);
     return {};

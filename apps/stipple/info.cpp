@@ -61,6 +61,7 @@ nlohmann::json storeInfo(const lod::Store& store) {
             {"points", d.points},
             {"points_in", d.pointsIn},
             {"dropped", d.dropped},
+            {"added", d.added},
             {"records", d.records},
             {"nodes", h.nodes.size()},
             {"levels", levels},
@@ -91,9 +92,11 @@ void printStore(const nlohmann::json& j) {
                    j["textures"].size(), j["texture_tiles"].get<uint64_t>(),
                    humanBytes(j["texture_bytes"].get<uint64_t>()));
     if (j["points_in"].get<uint64_t>() > 0) {
-        fmt::print("  {:<14}{}", isMesh ? "triangles in" : "points in", j["points_in"].get<uint64_t>());
+        fmt::print("  {:<14}{}", j["primitive"].get<std::string>() + " in", j["points_in"].get<uint64_t>());
         for (const auto& [reason, count] : j["dropped"].items())
             fmt::print(", dropped {}: {}", count.get<uint64_t>(), reason);
+        for (const auto& [reason, count] : j["added"].items())
+            fmt::print(", added {}: {}", count.get<uint64_t>(), reason);
         fmt::print("\n");
     }
     fmt::print("  bounds        {} .. {}\n  origin        {}\n", vec(j["min"]), vec(j["max"]), vec(j["origin"]));

@@ -324,7 +324,8 @@ Result<void> showStrands(const InputInfoOptions& o) {
                         {"drawn", clean.strands()},
                         {"has_radii", hasRadii},
                         {"has_colour", clean.hasColour},
-                        {"mended", clean.dropped}};
+                        {"dropped", clean.dropped},
+                        {"mended", clean.mended}};
     if (!box.isEmpty()) {
         j["min"] = vectorJson(box.least);
         j["max"] = vectorJson(box.greatest);
@@ -338,7 +339,8 @@ Result<void> showStrands(const InputInfoOptions& o) {
     printVector(j, "max", "greatest");
     fmt::print("  {:15} {}\n  {:15} {}\n", "radii", hasRadii ? "yes" : "no: see --strand-radius", "colours",
                clean.hasColour ? "yes" : "no");
-    for (const auto& [what, count] : clean.dropped) fmt::print("  {:15} {}: {}\n", "mended", count, what);
+    for (const auto& [what, count] : clean.dropped) fmt::print("  {:15} {} segments {}\n", "left out", count, what);
+    for (const auto& [what, count] : clean.mended) fmt::print("  {:15} {} {}\n", "mended", count, what);
     return {};
 }
 

@@ -107,18 +107,15 @@ bool holds(const scene::Scene& scene, const scene::Placement& placed, scene::Pri
 Result<lod::BuildReport> buildPlyMesh(const std::string& input, const std::string& output, const BuildOptions& build,
                                       Executor& executor, Progress& progress) {
     STIPPLE_ASSIGN(const lod::BuildSettings wanted, build.settings());
-    const auto notes = std::make_shared<lod::PlyMeshNotes>();
     const std::string folder =
         wanted.tempFolder.empty() ? fs::absolute(output).parent_path().string() : wanted.tempFolder;
-    STIPPLE_ASSIGN(const lod::MeshSource source, lod::openPlyMesh(input, wanted.memoryBytes / 4, folder, notes));
+    STIPPLE_ASSIGN(const lod::MeshSource source, lod::openPlyMesh(input, wanted.memoryBytes / 4, folder));
     scene::Scene plain;
     plain.path = input;
     STIPPLE_ASSIGN(lod::MeshBuildSettings settings, meshSettings(plain));
     settings.limits = wanted;
     settings.limits.memoryBytes -= wanted.memoryBytes / 4;
-    STIPPLE_ASSIGN(lod::BuildReport report, lod::buildMeshStore(source, output, settings, executor, progress));
-    if (notes->badFaces > 0) report.dropped["triangles with a corner that is no vertex"] = notes->badFaces;
-    return report;
+    return lod::buildMeshStore(source, output, settings, executor, progress);
 }
 
 lod::StrandBuildSettings strandSettings(const std::string& input) {

@@ -45,6 +45,7 @@ struct BuildReport {
     std::string primitive = "point";  ///< what the numbers below count: point, triangle or segment
     uint64_t pointsIn = 0, pointsOut = 0;
     std::map<std::string, uint64_t> dropped;  ///< reason -> points
+    std::map<std::string, uint64_t> added;    ///< likewise: pointsIn + added = pointsOut + dropped
     uint64_t skippedFiles = 0;                ///< inputs that could not be opened (only with skipBad)
     std::vector<std::string> notes;           ///< what was odd about the input
     uint64_t nodes = 0, records = 0, bytesOut = 0, contentHash = 0;

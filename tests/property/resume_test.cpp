@@ -51,8 +51,7 @@ Result<BuildReport> build(const std::string& input, const std::string& output, c
         MeshBuildSettings settings;
         settings.limits = limits;
         settings.description.materials.resize(1);
-        STIPPLE_ASSIGN(const MeshSource source, openPlyMesh(input, 1 << 20, fs::path(output).parent_path().string(),
-                                                            std::make_shared<PlyMeshNotes>()));
+        STIPPLE_ASSIGN(const MeshSource source, openPlyMesh(input, 1 << 20, fs::path(output).parent_path().string()));
         return buildMeshStore(source, output, settings, *executor, silent);
     }
     StrandBuildSettings settings;

@@ -74,6 +74,24 @@ TEST(StrandHierarchy, StatedErrorsBoundTheDistanceBothWays) {
     EXPECT_LT(coarser, leaves.size() / 4);
 }
 
+TEST(StrandHierarchy, VerificationMeasuresTheErrorsAgain) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    test::CurlRecipe recipe;
+    recipe.count = 60;
+    recipe.vertices = 80;
+    const auto store = test::buildStrands(test::curls(recipe), folder / "a.stipple", *executor, 128);
+    const auto good = lod::verifyStore(*store, *executor);
+    ASSERT_TRUE(good) << good.error().line();
+    EXPECT_GT(good->errorsMeasured, 100u);
+    // Errors that are said to be a 30th of what they are do not pass.
+    lod::Store wrong = *store;
+    wrong.hierarchy.errors.smallest /= 30;
+    const auto found = lod::verifyStore(wrong, *executor);
+    ASSERT_FALSE(found);
+    EXPECT_NE(found.error().line().find("off the leaves, its error says"), std::string::npos) << found.error().line();
+}
+
 TEST(StrandHierarchy, EverythingIsDrawnOnceAtAnyError) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);

@@ -50,11 +50,11 @@ TEST(Swc, WhatIsWrongIsCountedOrRefused) {
     EXPECT_FALSE(lod::readSwc("# nothing\n", "a.swc"));
     const auto circle = lod::readSwc("1 3 0 0 0 1 -1\n2 3 1 0 0 1 1\n7 3 5 0 0 1 8\n8 3 6 0 0 1 7\n", "a.swc");
     ASSERT_TRUE(circle);
-    EXPECT_EQ(circle->dropped.at("samples whose parents lead round in a circle"), 2u);
+    EXPECT_EQ(circle->mended.at("samples whose parents lead round in a circle"), 2u);
     const auto orphan = lod::readSwc("1 3 0 0 0 1 99\n2 3 1 0 0 1 1\n2 3 1 0 0 1 1\n", "a.swc");
     ASSERT_TRUE(orphan);
-    EXPECT_EQ(orphan->dropped.at("parents that do not exist (made roots)"), 1u);
-    EXPECT_EQ(orphan->dropped.at("samples whose id is taken"), 1u);
+    EXPECT_EQ(orphan->mended.at("parents that do not exist (made roots)"), 1u);
+    EXPECT_EQ(orphan->mended.at("samples whose id is taken"), 1u);
 }
 
 TEST(Qsm, BranchesAreTubesAndCirclesAreCut) {
@@ -67,7 +67,7 @@ TEST(Qsm, BranchesAreTubesAndCirclesAreCut) {
     EXPECT_EQ(set->position.back(), glm::dvec3(0, 0, 2));
     const auto circle = lod::readQsm(row + "2\n" + row + "1\n", "a.txt");
     ASSERT_TRUE(circle);
-    EXPECT_EQ(circle->dropped.at("extensions that lead round in a circle (cut)"), 1u);
+    EXPECT_EQ(circle->mended.at("extensions that lead round in a circle (cut)"), 1u);
     EXPECT_FALSE(lod::readQsm("1 2 3\n", "a.txt"));
     EXPECT_FALSE(lod::readQsm(row + "0.5\n", "a.txt"));
     EXPECT_FALSE(lod::readQsm(row + "0\n" + row + "0 7\n", "a.txt"));  // another number of columns
@@ -132,10 +132,10 @@ TEST(CleanStrands, MendsAndCounts) {
     strand({{0, 0, 0, double(nan)}, {0, 1, 0, -1}});
     const lod::StrandSet out = lod::cleanStrands(in, 0.25);
     EXPECT_EQ(out.strands(), 4u);
-    EXPECT_EQ(out.dropped.at("strands of one vertex"), 1u);
-    EXPECT_EQ(out.dropped.at("strands without length"), 1u);
-    EXPECT_EQ(out.dropped.at("vertices that are not finite"), 1u);
-    EXPECT_EQ(out.dropped.at("radii that are negative or not finite (replaced)"), 2u);
+    EXPECT_EQ(out.mended.at("strands of one vertex (left out)"), 1u);
+    EXPECT_EQ(out.mended.at("strands without length (left out)"), 1u);
+    EXPECT_EQ(out.dropped.at("at vertices that are not finite"), 1u);
+    EXPECT_EQ(out.mended.at("radii that are negative or not finite (replaced)"), 2u);
     EXPECT_FLOAT_EQ(out.radius[out.first[1]], 0.25f);
     EXPECT_FLOAT_EQ(out.radius[out.first[2] + 1], 0.0f);
     EXPECT_FLOAT_EQ(out.radius[out.first[3]], 0.25f);

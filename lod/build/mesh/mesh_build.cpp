@@ -103,10 +103,12 @@ class MeshBuild : public CellContent {
     Frame frame() const override { return frameOf(facts_.lattice); }
     Result<void> places(const Places& take) override {
         facts_.triangles = 0;
-        return source_.read([&](const TriangleMesh& block) -> Result<void> {
+        STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
             facts_.triangles += block.indices.size() / 3;
             return take(placeBlock(block, facts_.lattice, executor_).centres(), source_.triangles);
-        });
+        }));
+        facts_.bad = source_.badTriangles ? source_.badTriangles() : 0;
+        return {};
     }
     Result<void> check(const std::vector<Atom>& atoms) const override {
         if (!atoms.empty()) return {};
@@ -253,9 +255,10 @@ class MeshBuild : public CellContent {
         STIPPLE_TRY(writeTextures(settings_.textures, writer, hierarchy, executor_));
         for (const auto& [reason, count] : {std::pair{"degenerate triangles", facts_.degenerate},
                                             std::pair{"duplicate triangles", facts_.duplicate + duplicate_},
-                                            std::pair{"triangles that are not finite", facts_.notFinite}})
+                                            std::pair{"triangles that are not finite", facts_.notFinite},
+                                            std::pair{"triangles with a corner that is no vertex", facts_.bad}})
             if (count > 0) report.dropped[reason] = count;
-        report.pointsIn = facts_.triangles;
+        report.pointsIn = facts_.triangles + facts_.bad;
         report.temporaryBytes = std::max(report.temporaryBytes + source_.readBytes, source_.surveyBytes);
         description = settings_.description;
         description.points = report.pointsOut = kept_;
@@ -295,7 +298,7 @@ class MeshBuild : public CellContent {
     /// What a resumed build has to know.
     struct Facts {
         Lattice lattice;
-        uint64_t triangles = 0, degenerate = 0, notFinite = 0, duplicate = 0;
+        uint64_t triangles = 0, degenerate = 0, notFinite = 0, duplicate = 0, bad = 0;
         double rounding = 0;
     };
 

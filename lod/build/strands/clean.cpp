@@ -78,6 +78,9 @@ StrandSet cleanStrands(StrandSet in, double defaultRadius, double extent) {
     out.hasColour = in.hasColour;
     out.up = in.up;
     out.dropped = std::move(in.dropped);
+    out.mended = std::move(in.mended);
+    out.segmentsAdded = in.segmentsAdded;
+    out.segmentsIn = in.segmentsIn > 0 ? in.segmentsIn : in.position.size() - in.strands();
     out.notes = std::move(in.notes);
     if (!(extent > 0)) {
         StrandBounds bounds;
@@ -85,8 +88,8 @@ StrandSet cleanStrands(StrandSet in, double defaultRadius, double extent) {
         extent = bounds.extent();
     }
     const auto fallback = static_cast<float>(defaultRadius > 0 ? defaultRadius : extent / 4000);
-    const auto count = [&](const char* what, uint64_t n = 1) {
-        if (n > 0) out.dropped[what] += n;
+    const auto count = [](std::map<std::string, uint64_t>& to, const char* what, uint64_t n = 1) {
+        if (n > 0) to[what] += n;
     };
     for (size_t s = 0; s < in.strands(); ++s) {
         std::vector<Vertex> v;
@@ -109,11 +112,13 @@ StrandSet cleanStrands(StrandSet in, double defaultRadius, double extent) {
             v.push_back({in.position[i], hasRadius ? r : fallback, std::isfinite(n.x + n.y + n.z) ? n : glm::vec3(0),
                          in.colour[i]});
         }
-        count("vertices that are not finite", notFinite);
-        count("vertices that repeat the one before", repeated);
-        count("radii that are negative or not finite (replaced)", noRadius);
+        // (Of a strand without vertices the last one has no segment to take along.)
+        count(out.dropped, "at vertices that are not finite", v.empty() && notFinite > 0 ? notFinite - 1 : notFinite);
+        count(out.dropped, "at vertices that repeat the one before", repeated);
+        count(out.mended, "radii that are negative or not finite (replaced)", noRadius);
         if (v.size() < 2) {
-            count(in.first[s + 1] - in.first[s] < 2 ? "strands of one vertex" : "strands without length");
+            count(out.mended, in.first[s + 1] - in.first[s] < 2 ? "strands of one vertex (left out)"
+                                                                : "strands without length (left out)");
             continue;
         }
         const bool isRibbon = in.isRibbon[s] != 0;
@@ -123,6 +128,7 @@ StrandSet cleanStrands(StrandSet in, double defaultRadius, double extent) {
             if (i > 0 && isRibbon && glm::dot(v[i - 1].normal, v[i].normal) < 0.5f) addTwist(v[i - 1], v[i], smooth);
             smooth.push_back(v[i]);
         }
+        out.segmentsAdded += smooth.size() - v.size();
         for (const Vertex& q : smooth) out.addVertex(q.p, q.radius, isRibbon ? q.normal : glm::vec3(0), q.colour);
         out.endStrand(isRibbon);
     }

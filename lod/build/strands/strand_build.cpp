@@ -53,10 +53,15 @@ class StrandBuild : public CellContent {
         // number: lengths are counted once, for all sizes of cells.
         std::map<int, uint64_t> octaves;  // of lengths, rounded up to 1/64 octave: few enough to keep
         std::set<std::string> notes;
+        std::map<std::string, uint64_t> mended;
+        uint64_t given = 0;
         STIPPLE_TRY(source_.read([&](const StrandSet& block) -> Result<void> {
             facts_.hasColour = facts_.hasColour || block.hasColour;
             facts_.up = block.up;
             for (const auto& [what, count] : block.dropped) dropped_[what] += count;
+            for (const auto& [what, count] : block.mended) mended[what] += count;
+            given += block.segmentsIn;
+            if (block.segmentsAdded > 0) added_["where ribbons twist"] += block.segmentsAdded;
             notes.insert(block.notes.begin(), block.notes.end());
             for (size_t s = 0; s < block.strands(); ++s)
                 for (uint32_t i = block.first[s]; i < block.first[s + 1]; ++i) {
@@ -71,6 +76,8 @@ class StrandBuild : public CellContent {
             return workspace.checkStopped();
         }));
         notes_.assign(notes.begin(), notes.end());
+        for (const auto& [what, count] : mended) notes_.push_back(fmt::format("{} {}", count, what));
+        facts_.given = given > 0 ? given : facts_.segments;
         if (facts_.segments == 0) return fail(ErrorKind::input, "holds no strand that can be drawn", source());
         const glm::dvec3 size = facts_.hi - facts_.lo;
         const double extent = std::max({size.x, size.y, size.z, 1e-30});
@@ -206,21 +213,25 @@ class StrandBuild : public CellContent {
     void save(ByteWriter& to) const override {
         to.put(facts_);
         to.put(notes_);
-        to.put(uint64_t{dropped_.size()});
-        for (const auto& [what, count] : dropped_) {
-            to.put(what);
-            to.put(count);
+        for (const auto* counts : {&dropped_, &added_}) {
+            to.put(uint64_t{counts->size()});
+            for (const auto& [what, count] : *counts) {
+                to.put(what);
+                to.put(count);
+            }
         }
     }
     void load(ByteReader& from) override {
-        uint64_t reasons = 0;
         from.get(facts_);
         from.get(notes_);
-        from.get(reasons);
-        for (uint64_t k = 0; k < reasons && !from.isBroken(); ++k) {
-            std::string what;
-            from.get(what);
-            from.get(dropped_[what]);
+        for (auto* counts : {&dropped_, &added_}) {
+            uint64_t reasons = 0;
+            from.get(reasons);
+            for (uint64_t k = 0; k < reasons && !from.isBroken(); ++k) {
+                std::string what;
+                from.get(what);
+                from.get((*counts)[what]);
+            }
         }
     }
 
@@ -257,10 +268,12 @@ class StrandBuild : public CellContent {
         description.hasColour = facts_.hasColour;
         description.hasNormals = description.isReflectance = true;
         description.up = facts_.up;
-        report.pointsIn = facts_.segments;
+        if (facts_.parts > facts_.segments) added_["by dividing long ones"] = facts_.parts - facts_.segments;
+        report.pointsIn = description.pointsIn = facts_.given;
         report.pointsOut = facts_.parts;
         report.notes = notes_;
-        report.dropped = dropped_;
+        report.dropped = description.dropped = dropped_;
+        report.added = description.added = added_;
         if (fewestKept_ < 1)
             report.notes.push_back(fmt::format(
                 "from afar thin strands are drawn by lot: at the coarsest level 1 in {:.0f}, wider by as much; where "
@@ -277,7 +290,7 @@ class StrandBuild : public CellContent {
     struct Facts {
         glm::dvec3 lo{1e300}, hi{-1e300}, up{0, 0, 1};
         double unit = 1;
-        uint64_t segments = 0, parts = 0;
+        uint64_t given = 0, segments = 0, parts = 0;  ///< of the input, of clean strands, and divided
         uint32_t keyLevels = 0;
         bool hasColour = false;
     };
@@ -314,7 +327,7 @@ class StrandBuild : public CellContent {
     const StrandBuildSettings& settings_;
     Facts facts_;
     std::vector<std::string> notes_;
-    std::map<std::string, uint64_t> dropped_;
+    std::map<std::string, uint64_t> dropped_, added_;
     std::vector<NodeBatch> batches_;
     double rounding_ = 0, fewestKept_ = 1;
 };

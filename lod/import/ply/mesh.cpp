@@ -136,16 +136,15 @@ class VertexStore {
 
 class PlyMesh {
   public:
-    PlyMesh(std::shared_ptr<const InputFile> file, PlyHeader header, uint64_t memoryBytes, const std::string& folder,
-            std::shared_ptr<PlyMeshNotes> notes)
+    PlyMesh(std::shared_ptr<const InputFile> file, PlyHeader header, uint64_t memoryBytes, const std::string& folder)
         : file_(std::move(file)),
           header_(std::move(header)),
-          notes_(std::move(notes)),
           vertices_(vertexOf(header_), memoryBytes, folder),
           count_(vertexOf(header_).count) {}
 
     /// Of all vertices: while normals are summed, and after that.
     uint64_t surveyBytes() const { return count_ * vertices_.bytes(); }
+    uint64_t badFaces() const { return badFaces_; }
     uint64_t readBytes() const { return surveyBytes() - (vertices_.hasNormals() ? 0 : 8 * count_); }
     Result<MeshSource::Bounds> survey() {
         MeshSource::Bounds bounds;
@@ -185,11 +184,11 @@ class PlyMesh {
                 to.surface.push_back(shared::kSurfaceTwoSided);
             },
             take);
-        notes_->badFaces = 0;
+        badFaces_ = 0;
         const auto add = [&](double a, double b, double c) -> Result<void> {
             for (const double v : {a, b, c})
                 if (!(v >= 0 && v < static_cast<double>(count_))) {
-                    ++notes_->badFaces;
+                    ++badFaces_;
                     return {};
                 }
             return blocks.triangle(static_cast<uint64_t>(a), static_cast<uint64_t>(b), static_cast<uint64_t>(c));
@@ -230,9 +229,8 @@ class PlyMesh {
 
     std::shared_ptr<const InputFile> file_;
     PlyHeader header_;
-    std::shared_ptr<PlyMeshNotes> notes_;
     VertexStore vertices_;
-    uint64_t count_ = 0, facesAt_ = 0;
+    uint64_t count_ = 0, facesAt_ = 0, badFaces_ = 0;
 };
 
 }  // namespace
@@ -249,8 +247,7 @@ Result<bool> hasPlyFaces(const std::string& path) {
     });
 }
 
-Result<MeshSource> openPlyMesh(const std::string& path, uint64_t memoryBytes, const std::string& tempFolder,
-                               const std::shared_ptr<PlyMeshNotes>& notes) {
+Result<MeshSource> openPlyMesh(const std::string& path, uint64_t memoryBytes, const std::string& tempFolder) {
     STIPPLE_ASSIGN(const PointSource checked, openPly(path, {}));  // the same checks as for points
     STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
     auto file = std::make_shared<const InputFile>(std::move(opened));
@@ -262,12 +259,13 @@ Result<MeshSource> openPlyMesh(const std::string& path, uint64_t memoryBytes, co
             const bool isStrip = e.name == "tristrips";
             source.triangles += isStrip ? file->sizeBytes() / 4 : 2 * e.count;
         }
-    auto mesh = std::make_shared<PlyMesh>(file, std::move(header), memoryBytes, tempFolder, notes);
+    auto mesh = std::make_shared<PlyMesh>(file, std::move(header), memoryBytes, tempFolder);
     source.surveyBytes = mesh->surveyBytes() > memoryBytes ? mesh->surveyBytes() : 0;
     source.readBytes = source.surveyBytes > 0 ? mesh->readBytes() : 0;
     source.identity = [path] { return fileIdentity(path); };
     source.survey = [mesh] { return mesh->survey(); };
     source.read = [mesh](const MeshSource::Take& take) { return mesh->read(take); };
+    source.badTriangles = [mesh] { return mesh->badFaces(); };
     return source;
 }
 

@@ -9,17 +9,11 @@
 
 namespace stipple::lod {
 
-struct PlyMeshNotes {
-    uint64_t badFaces = 0;  ///< triangles left out because a corner is no vertex
-};
-
 /// Has the file faces or strips? False for a file that is no PLY.
 Result<bool> hasPlyFaces(const std::string& path);
 /// Vertices in file units, two-sided; sRGB 200 where the file has no colours. Where it has no normals, faces that share
 /// a vertex get smooth ones (the sum of the faces', weighted by area). Of the vertices `memoryBytes` are in memory, the
-/// rest in a file in `tempFolder`; faces are read from the file as often as it takes. `notes` are complete after a
-/// read.
-Result<MeshSource> openPlyMesh(const std::string& path, uint64_t memoryBytes, const std::string& tempFolder,
-                               const std::shared_ptr<PlyMeshNotes>& notes);
+/// rest in a file in `tempFolder`; faces are read from the file as often as it takes.
+Result<MeshSource> openPlyMesh(const std::string& path, uint64_t memoryBytes, const std::string& tempFolder);
 
 }  // namespace stipple::lod

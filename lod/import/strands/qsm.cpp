@@ -44,7 +44,7 @@ Result<StrandSet> readQsm(std::string_view text, const std::string& path) {
     std::vector<uint8_t> isExtension(cylinders.size()), isSeen(cylinders.size());
     for (Cylinder& c : cylinders) {
         if (c.extension > cylinders.size()) {
-            ++out.dropped["extensions that do not exist"];
+            ++out.mended["extensions that do not exist"];
             c.extension = 0;
         }
         if (c.extension > 0) isExtension[c.extension - 1] = 1;
@@ -66,7 +66,7 @@ Result<StrandSet> readQsm(std::string_view text, const std::string& path) {
         if (isExtension[i] == 0) follow(i);
     for (uint32_t i = 0; i < cylinders.size(); ++i)
         if (isSeen[i] == 0) {
-            ++out.dropped["extensions that lead round in a circle (cut)"];
+            ++out.mended["extensions that lead round in a circle (cut)"];
             follow(i);
         }
     return out;

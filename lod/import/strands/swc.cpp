@@ -40,7 +40,7 @@ Result<StrandSet> readSwc(std::string_view text, const std::string& path) {
             return;
         }
         if (!byId.emplace(static_cast<int64_t>(n[0]), static_cast<uint32_t>(samples.size())).second) {
-            ++out.dropped["samples whose id is taken"];
+            ++out.mended["samples whose id is taken"];
             return;
         }
         samples.push_back({{n[2], n[3], n[4]},
@@ -55,7 +55,7 @@ Result<StrandSet> readSwc(std::string_view text, const std::string& path) {
     std::vector<uint32_t> roots;
     for (uint32_t i = 0; i < samples.size(); ++i) {
         const auto parent = byId.find(samples[i].parentId);
-        if (samples[i].parentId >= 0 && parent == byId.end()) ++out.dropped["parents that do not exist (made roots)"];
+        if (samples[i].parentId >= 0 && parent == byId.end()) ++out.mended["parents that do not exist (made roots)"];
         if (samples[i].parentId < 0 || parent == byId.end()) {
             roots.push_back(i);
             continue;
@@ -101,7 +101,7 @@ Result<StrandSet> readSwc(std::string_view text, const std::string& path) {
         out.endStrand(false);
     }
     for (const uint8_t seen : isSeen)
-        if (seen == 0) ++out.dropped["samples whose parents lead round in a circle"];
+        if (seen == 0) ++out.mended["samples whose parents lead round in a circle"];
     return out;
 }
 
