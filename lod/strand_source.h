@@ -22,7 +22,7 @@ struct StrandSource {
 /// Of strands in memory.
 StrandSource sourceOf(StrandSet strands);
 /// The same strands as cleanStrands would leave them.
-StrandSource cleanSource(StrandSource raw, double defaultRadius);
+StrandSource cleanSource(const StrandSource& raw, double defaultRadius);
 /// Everything in one.
 Result<StrandSet> collect(const StrandSource& source);
 

@@ -43,7 +43,7 @@ lod::StrandSet flattenStrands(const Scene& scene, const std::vector<Placement>& 
     return out;
 }
 
-lod::StrandSource strandSource(const Scene& scene, std::vector<Placement> placed) {
+lod::StrandSource strandSource(const Scene& scene, const std::vector<Placement>& placed) {
     lod::StrandSource source;
     for (const Placement& at : placed)
         for (const Primitive& p : scene.meshes[static_cast<size_t>(at.mesh)].primitives)

@@ -10,6 +10,6 @@ namespace stipple::scene {
 /// of the attribute _RADIUS, or 0: not known. Not clean (see lod::cleanStrands).
 lod::StrandSet flattenStrands(const Scene& scene, const std::vector<Placement>& placed);
 /// The same, one placement a block. Reads `scene`, which must stay.
-lod::StrandSource strandSource(const Scene& scene, std::vector<Placement> placed);
+lod::StrandSource strandSource(const Scene& scene, const std::vector<Placement>& placed);
 
 }  // namespace stipple::scene

@@ -165,8 +165,7 @@ lod::MeshSource triangleSource(const Scene& scene, std::vector<Placement> placed
             first += p.position.size();
             return {};
         });
-        if (!read) return read;
-        return blocks.finish();
+        return read ? blocks.finish() : read;
     };
     return source;
 }

@@ -82,7 +82,7 @@ class PointBuild {
         entries = {};
         const size_t first = batches_.size();
         for (size_t b = 0; b < first; ++b) done_ += plan().buckets[b].points;
-        const Result<void> built = inOrder<BuiltBucket>(
+        Result<void> built = inOrder<BuiltBucket>(
             executor_, workers_, first, plan().buckets.size(),
             [&](size_t index) -> Result<BuiltBucket> {
                 STIPPLE_TRY(workspace_->checkStopped());

@@ -141,11 +141,6 @@ TEST_F(Mpi, KilledAtAnyMomentTheyGoOnWithAnyNumberOfRanks) {
     const test::TempFolder folder;
     const std::string one = folder / "one.stipple", many = folder / "many.stipple";
     Rng rng(8);
-#ifdef __SANITIZE_ADDRESS__
-    constexpr double kSlower = 6;
-#else
-    constexpr double kSlower = 1;
-#endif
     for (const Kind& kind : kinds(folder)) {
         if (kind.name == "a.swc") continue;
         ASSERT_EQ(std::system((STIPPLE_PROGRAM + (" " + kind.arguments + one) + " >/dev/null").c_str()), 0);
@@ -156,7 +151,7 @@ TEST_F(Mpi, KilledAtAnyMomentTheyGoOnWithAnyNumberOfRanks) {
             const bool isDone =
                 test::runAndKill({kMpirun, "--oversubscribe", "--bind-to", "none", "-n", ranks, STIPPLE_PROGRAM,
                                   "build", input, "--quiet", "--threads", "1", "-o", many, "--mpi", "--memory", "400M"},
-                                 static_cast<int>(kSlower * rng.uniform(400, 2500)), SIGKILL);
+                                 static_cast<int>(test::kSlower * rng.uniform(400, 2500)), SIGKILL);
             test::killAllWith(many);
             kept += fs::exists(many + ".build") ? 1 : 0;
             if (!isDone && !fs::exists(many)) {

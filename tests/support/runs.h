@@ -6,6 +6,14 @@
 
 namespace stipple::test {
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+inline constexpr bool isSanitized = true;  ///< memory means nothing, and everything takes longer
+inline constexpr double kSlower = 8;
+#else
+inline constexpr bool isSanitized = false;
+inline constexpr double kSlower = 1;
+#endif
+
 /// Runs the program and kills it after a while; true if it ended well before.
 bool runAndKill(const std::vector<std::string>& arguments, int milliseconds, int signal);
 /// Kills every process that has this among its arguments, and waits until they are gone.

@@ -167,6 +167,7 @@ class CellReducer {
         std::map<uint64_t, std::vector<const Cluster*>> byCell;
         for (const Cluster& c : clusters_) byCell[keyAbove(c, level)].push_back(&c);
         std::vector<GoingUp> out;
+        out.reserve(byCell.size());
         for (const auto& [key, clusters] : byCell) out.push_back({key, bytesOf(clusters)});
         return out;
     }

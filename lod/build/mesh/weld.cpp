@@ -1,5 +1,6 @@
 // Triangles as they come, to a welded mesh: one lattice, every vertex once, nothing degenerate, twice or not finite.
 #include <algorithm>
+#include <tuple>
 #include <bit>
 #include <cmath>
 
@@ -133,7 +134,7 @@ uint64_t sortTriangles(WeldedMesh& mesh, std::vector<uint32_t>& indices) {
     struct Item {
         uint64_t key;
         std::array<uint32_t, 3> corners;
-        auto operator<=>(const Item&) const = default;
+        bool operator<(const Item& o) const { return std::tie(key, corners) < std::tie(o.key, o.corners); }
     };
     std::vector<Item> order(indices.size() / 3);
     for (size_t i = 0; i < order.size(); ++i) {

@@ -29,7 +29,9 @@ void CellTree::count(const Coordinates& block) {
         if (run > 0) std::atomic_ref(entries_[last]).fetch_add(run, std::memory_order_relaxed);
     };
     for (size_t i = 0; i < block.size(); ++i) {
-        const size_t place = placeOf(frame_.keyOf(block.x[i], block.y[i], block.z[i]));
+        const size_t place = placeOf(frame_.keyOf(block.x[i], block.y[i], block.z[i]), [&](size_t e) {
+            return std::atomic_ref(entries_[e]).load(std::memory_order_relaxed);  // others count too
+        });
         if (place != last) {
             flush();
             last = place;

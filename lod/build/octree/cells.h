@@ -57,7 +57,9 @@ class CellTree {
     std::vector<Atom> atoms() const;
     /// Number of the cell that holds `key`; kNone where there are no points.
     static constexpr uint32_t kNone = 0x7fffffffu;
-    uint32_t cellOf(uint64_t key) const { return entries_[placeOf(key)]; }
+    uint32_t cellOf(uint64_t key) const {
+        return entries_[placeOf(key, [&](size_t i) { return entries_[i]; })];
+    }
     uint32_t deepestLevel() const { return deepest_; }
     uint32_t firstLevel() const { return firstLevel_; }
     /// What 95 of 100 points have as spacing at most, if they lie on surfaces; lattice units.
@@ -70,12 +72,15 @@ class CellTree {
     bool split(uint64_t most);
     uint64_t collapse(size_t first, uint32_t entries, uint32_t level);
     void findAtoms(size_t begin, size_t end, uint32_t level, std::vector<Atom>& atoms) const;
-    size_t placeOf(uint64_t key) const {
+    /// `load(i)`: entry i.
+    template <typename Load>
+    size_t placeOf(uint64_t key, const Load& load) const {
         size_t place = key >> firstShift_;
-        for (uint32_t shift = firstShift_; (entries_[place] & kBlock) != 0;) {
+        uint32_t entry = load(place);
+        for (uint32_t shift = firstShift_; (entry & kBlock) != 0; entry = load(place)) {
             const uint32_t steps = 3 * std::min(kSplitLevels, shift / 3);
             shift -= steps;
-            place = (entries_[place] & ~kBlock) + (key >> shift & ((1u << steps) - 1));
+            place = (entry & ~kBlock) + (key >> shift & ((1u << steps) - 1));
         }
         return place;
     }

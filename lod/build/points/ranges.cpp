@@ -68,6 +68,7 @@ void ValueRanges::save(ByteWriter& to) const {
     for (const Sampled& a : attributes_) a.save(to);
     for (const auto& counts : counts_) {
         std::vector<std::array<uint64_t, 2>> pairs;
+        pairs.reserve(counts.size());
         for (const auto& [value, count] : counts) pairs.push_back({value, count});
         to.put(pairs);
     }
@@ -78,6 +79,7 @@ void ValueRanges::load(ByteReader& from) {
     for (Sampled& a : attributes_) a.load(from);
     for (auto& counts : counts_) {
         std::vector<std::array<uint64_t, 2>> pairs;
+        pairs.reserve(counts.size());
         from.get(pairs);
         for (const auto& [value, count] : pairs) counts[value] = count;
     }

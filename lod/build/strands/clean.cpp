@@ -135,14 +135,14 @@ StrandSet cleanStrands(StrandSet in, double defaultRadius, double extent) {
     return out;
 }
 
-StrandSource cleanSource(StrandSource raw, double defaultRadius) {
+StrandSource cleanSource(const StrandSource& raw, double defaultRadius) {
     StrandSource source = raw;
     // The extent of all of them, found when it is first needed.
     const auto extent = std::make_shared<double>(0.0);
     source.read = [raw, defaultRadius, extent](const StrandSource::Take& take) -> Result<void> {
         if (!(*extent > 0)) {
             StrandBounds bounds;
-            const Result<void> read = raw.read([&](const StrandSet& block) -> Result<void> {
+            Result<void> read = raw.read([&](const StrandSet& block) -> Result<void> {
                 for (const glm::dvec3& p : block.position) bounds.add(p);
                 return {};
             });
