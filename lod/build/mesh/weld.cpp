@@ -135,6 +135,7 @@ uint64_t sortTriangles(WeldedMesh& mesh, std::vector<uint32_t>& indices) {
         uint64_t key;
         std::array<uint32_t, 3> corners;
         bool operator<(const Item& o) const { return std::tie(key, corners) < std::tie(o.key, o.corners); }
+        bool operator==(const Item& o) const { return key == o.key && corners == o.corners; }
     };
     std::vector<Item> order(indices.size() / 3);
     for (size_t i = 0; i < order.size(); ++i) {
