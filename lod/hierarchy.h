@@ -20,18 +20,26 @@ namespace stipple::lod {
 struct ErrorScale {
     double smallest = 1;  ///< lattice units
     static constexpr uint32_t kNoParent = 255, kLargest = 254;
-    double decode(uint32_t code) const { return code == 0 ? 0.0 : smallest * std::exp2(code / 8.0); }
+    double decode(uint32_t code) const { return smallest * kTimes[code]; }
     /// The smallest code whose value is at least `error`; kLargest if there is none.
     uint32_t encodeUp(double error) const {
         if (!(error > 0)) return 0;
-        double code = std::ceil(8.0 * std::log2(error / smallest));
-        if (code < 1) code = 1;
-        if (code > kLargest) code = kLargest;
-        auto result = static_cast<uint32_t>(code);
-        while (result < kLargest && decode(result) < error) ++result;  // log2 may round the wrong way
+        // From the exponent; the table has the last word.
+        int octave = 0;
+        const double mantissa = std::frexp(error / smallest, &octave);  // 1/2 to 1
+        const double guess = std::clamp(8.0 * (octave - 1) + 8.0 * (2 * mantissa - 1), 1.0, double{kLargest});
+        auto result = static_cast<uint32_t>(guess);
+        while (result < kLargest && decode(result) < error) ++result;
         while (result > 1 && decode(result - 1) >= error) --result;
         return result;
     }
+
+  private:
+    static inline const std::array<double, 256> kTimes = [] {
+        std::array<double, 256> times{};
+        for (uint32_t c = 1; c < times.size(); ++c) times.at(c) = std::exp2(c / 8.0);
+        return times;
+    }();
 };
 
 /// Records of a node with a code greater than c, for every c: a step function over a short range of codes.

@@ -13,6 +13,7 @@
 #include <bit>
 #include <cmath>
 
+#include "lod/build/points/select.h"
 #include "lod/octahedral.h"
 
 namespace stipple::lod {
@@ -22,13 +23,6 @@ constexpr size_t kBlockPoints = 2048, kNeighbours = 12;
 constexpr uint32_t kMostSplits = 5, kMostInThree = 128;
 constexpr float kSpacings = 1.368f;
 constexpr double kLargestSpacings = 4;
-/// Of loops worth twice the SIMD where the machine has it; the values are the same.
-#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(__clang__)
-#define STIPPLE_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define STIPPLE_WIDE
-#endif
-
 constexpr double kFlat = 1e-6;  ///< a line or a point has no normal: second variance over the first
 
 /// Count, sums and sums of products.
@@ -48,9 +42,11 @@ struct Moments {
     }
 };
 
-/// The direction of least variance; zero where there is none.
-glm::vec3 normalFrom(const Moments& m) {
-    if (m.n < 3) return glm::vec3(0);
+constexpr uint32_t kNoNormal = ~0u;  ///< no octahedral code
+
+/// The direction of least variance, octahedral; kNoNormal where there is none.
+uint32_t normalFrom(const Moments& m) {
+    if (m.n < 3) return kNoNormal;
     const double scale = 1.0 / static_cast<double>(m.n), x = m.x * scale, y = m.y * scale, z = m.z * scale;
     Eigen::Matrix3d c;
     c(0, 0) = m.xx * scale - x * x;
@@ -62,52 +58,10 @@ glm::vec3 normalFrom(const Moments& m) {
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
     solver.computeDirect(c);
     const Eigen::Vector3d& v = solver.eigenvalues();
-    if (!(v[1] > kFlat * v[2])) return glm::vec3(0);
+    if (!(v[1] > kFlat * v[2])) return kNoNormal;
     const Eigen::Vector3d n = solver.eigenvectors().col(0);
     const glm::vec3 normal(n[0], n[1], n[2]);
-    return std::isfinite(normal.x + normal.y + normal.z) ? normal : glm::vec3(0);
-}
-
-/// The value at `rank` (0: the least) of non-negative floats, given as their bits: those have the same order, and
-/// loops over whole numbers become SIMD. Guesses a threshold and counts: squared distances on a surface are spread
-/// evenly, so the count says where to guess next; every third step bisects.
-STIPPLE_WIDE float smallestAtRank(const std::vector<int32_t>& values, size_t rank) {
-    const int32_t* const v = values.data();
-    const size_t n = values.size();
-    int32_t most = 0;
-    for (size_t i = 0; i < n; ++i) most = v[i] > most ? v[i] : most;
-    float lo = 0, hi = std::bit_cast<float>(most);
-    auto below = 0.0f, above = static_cast<float>(n);  // about the counts at lo and hi
-    int32_t limit = most;                              // more than `rank` are <= limit
-    for (int step = 0; step < 60; ++step) {
-        const float share = (static_cast<float>(rank) + 0.75f - below) / (above - below);
-        float middle = lo + (step % 3 == 2 ? 0.5f : share) * (hi - lo);
-        if (!(middle > lo && middle < hi)) middle = 0.5f * (lo + hi);
-        if (!(middle > lo && middle < hi)) break;
-        const auto threshold = std::bit_cast<int32_t>(middle);
-        int32_t count = 0;
-        for (size_t i = 0; i < n; ++i) count += v[i] <= threshold ? 1 : 0;
-        const bool isEnough = static_cast<size_t>(count) > rank;
-        (isEnough ? hi : lo) = middle;
-        (isEnough ? above : below) = static_cast<float>(count);
-        limit = isEnough ? threshold : limit;
-        if (static_cast<size_t>(count) == rank + 1) break;
-    }
-    int32_t result = 0;  // the largest value within the limit
-    for (size_t i = 0; i < n; ++i) {
-        const int32_t within = v[i] <= limit ? v[i] : 0;
-        result = within > result ? within : result;
-    }
-    return std::bit_cast<float>(result);
-}
-
-/// As the bits of floats.
-STIPPLE_WIDE void squaredDistances(const float* __restrict x, const float* __restrict y, const float* __restrict z,
-                                   size_t n, glm::vec3 from, int32_t* __restrict out) {
-    for (size_t k = 0; k < n; ++k) {
-        const float dx = x[k] - from.x, dy = y[k] - from.y, dz = z[k] - from.z;
-        out[k] = std::bit_cast<int32_t>(dx * dx + dy * dy + dz * dz);
-    }
+    return std::isfinite(normal.x + normal.y + normal.z) && normal != glm::vec3(0) ? roundedNormal(normal) : kNoNormal;
 }
 
 /// Lattice box, both ends inside.
@@ -251,13 +205,14 @@ class Estimator {
         while (splits < kMostSplits && level + splits < frame_.keyLevels && n > (size_t{8} << (2 * splits))) ++splits;
         const uint32_t window = level + splits;
         const uint32_t across = (1u << splits) + 2;
-        const auto edge = static_cast<int64_t>(frame_.cellSize(window));
+        const uint32_t edgeLog2 = frame_.rootLog2 - window;
+        const int64_t edge = int64_t{1} << edgeLog2;
         const LatticeBox box = boxOf(own_.key[begin], level);
         const float inverse = 1.0f / static_cast<float>(edge), half = 0.5f * static_cast<float>(1u << splits);
         const auto cellOf = [&](int64_t x, int64_t y, int64_t z) {
-            const auto cx = static_cast<size_t>((x - box.lo[0] + edge) / edge),
-                       cy = static_cast<size_t>((y - box.lo[1] + edge) / edge),
-                       cz = static_cast<size_t>((z - box.lo[2] + edge) / edge);
+            const auto cx = static_cast<size_t>((x - box.lo[0] + edge) >> edgeLog2),
+                       cy = static_cast<size_t>((y - box.lo[1] + edge) >> edgeLog2),
+                       cz = static_cast<size_t>((z - box.lo[2] + edge) >> edgeLog2);
             return (cz * across + cy) * across + cx;
         };
         const auto localOf = [&](int64_t x, int64_t y, int64_t z) {
@@ -295,8 +250,13 @@ class Estimator {
         for (const Seen& s : seen_) ++firstSeen_[s.cell + 1];
         for (size_t i = 1; i < firstSeen_.size(); ++i) firstSeen_[i] += firstSeen_[i - 1];
         nextSeen_.assign(firstSeen_.begin(), firstSeen_.end());
-        byCell_.resize(seen_.size());
-        for (const Seen& s : seen_) byCell_[nextSeen_[s.cell]++] = s.place;
+        for (auto* axis : {&byCellX_, &byCellY_, &byCellZ_}) axis->resize(seen_.size());
+        for (const Seen& s : seen_) {
+            const uint32_t at = nextSeen_[s.cell]++;
+            byCellX_[at] = s.place.x;
+            byCellY_[at] = s.place.y;
+            byCellZ_[at] = s.place.z;
+        }
     }
 
     void clearHood() {
@@ -311,14 +271,25 @@ class Estimator {
     }
     /// The points of a window cell and its neighbours.
     void gather(size_t at, uint32_t across) {
-        clearHood();
-        for (size_t z = 0; z < 3; ++z)
-            for (size_t y = 0; y < 3; ++y) {  // three cells in x lie side by side
-                const size_t first = at + (z * across + y) * across - (across + 1) * across - 1;
-                const uint32_t begin = firstSeen_[first], end = firstSeen_[first + 3];
-                const uint32_t stride = (end - begin) / kMostInThree + 1;  // many lie at one place
-                for (uint32_t k = begin; k < end; k += stride) addToHood(byCell_[k]);
+        std::array<std::pair<uint32_t, uint32_t>, 9> runs;
+        size_t most = 0;
+        for (size_t row = 0; row < 9; ++row) {  // three cells in x lie side by side
+            const size_t first = at + (row / 3 * across + row % 3) * across - (across + 1) * across - 1;
+            runs.at(row) = {firstSeen_[first], firstSeen_[first + 3]};
+            most += runs.at(row).second - runs.at(row).first;
+        }
+        for (auto* axis : {&hoodX_, &hoodY_, &hoodZ_}) axis->resize(most);
+        float *x = hoodX_.data(), *y = hoodY_.data(), *z = hoodZ_.data();
+        for (const auto& [begin, end] : runs) {
+            const uint32_t stride = (end - begin) / kMostInThree + 1;  // many lie at one place
+            for (uint32_t k = begin; k < end; k += stride) {
+                *x++ = byCellX_[k];
+                *y++ = byCellY_[k];
+                *z++ = byCellZ_[k];
             }
+        }
+        const auto count = static_cast<size_t>(x - hoodX_.data());
+        for (auto* axis : {&hoodX_, &hoodY_, &hoodZ_}) axis->resize(count);
     }
 
     /// The points [begin, end) of one window cell that has too few around it.
@@ -348,18 +319,20 @@ class Estimator {
     /// Points [begin, end), whose places are in places_, from the hood; both in units of `edge` lattice units.
     void give(size_t begin, size_t end, float edge) {
         const size_t n = hoodX_.size();
-        glm::vec3 normal(0);
+        uint32_t normal = kNoNormal;
         if (settings_.normals && !settings_.isFine) {
             Moments all{};
             for (size_t k = 0; k < n; ++k) all.add(hoodX_[k], hoodY_[k], hoodZ_[k]);
             normal = normalFrom(all);
         }
-        squared_.resize(n);
+        squared_.resize(n + kSelectLanes);
+        float reach = 0;
         for (size_t i = begin; i < end; ++i) {
             const glm::vec3 p = places_[i - begin];
-            squaredDistances(hoodX_.data(), hoodY_.data(), hoodZ_.data(), n, p, squared_.data());
+            squaredDistances(hoodX_.data(), hoodY_.data(), hoodZ_.data(), n, {p.x, p.y, p.z}, squared_.data());
             const size_t rank = std::min(kNeighbours, n - 1);  // the point itself comes first
-            const float reach = rank > 0 ? smallestAtRank(squared_, rank) : 0.0f;
+            // (A little more than that of the point before is a good guess.)
+            reach = rank > 0 ? smallestAtRank(squared_.data(), n, rank, 1.1f * reach) : 0.0f;
             if (settings_.radii && !(own_.points.radius[i] > 0)) own_.points.radius[i] = radiusFrom(reach, rank, edge);
             if (!settings_.normals) continue;
             if (settings_.isFine) {
@@ -370,8 +343,8 @@ class Estimator {
                 normal = normalFrom(near);
             }
             uint32_t& colour = own_.points.colour[i];
-            if (normal == glm::vec3(0) || (colour >> 24 & shared::kFlagNoNormal) == 0) continue;
-            own_.points.normal[i] = roundedNormal(normal);
+            if (normal == kNoNormal || (colour >> 24 & shared::kFlagNoNormal) == 0) continue;
+            own_.points.normal[i] = normal;
             colour = (colour & 0xffffffu) | (shared::kFlagTwoSided | shared::kFlagEstimatedNormal) << 24;
         }
     }
@@ -396,8 +369,8 @@ class Estimator {
     uint32_t cellShift_ = 0;
     LatticeBox cellBox_;
     int64_t reach_ = 0;
-    std::vector<Seen> seen_;         ///< by the block: its own points first, in window cells from its centre
-    std::vector<glm::vec3> byCell_;  ///< the same by window cell
+    std::vector<Seen> seen_;  ///< by the block: its own points first, in window cells from its centre
+    std::vector<float> byCellX_, byCellY_, byCellZ_;  ///< the same by window cell
     std::vector<uint32_t> firstSeen_, nextSeen_;
     std::vector<float> hoodX_, hoodY_, hoodZ_;
     std::vector<int32_t> squared_;  ///< bits of floats

@@ -2,6 +2,8 @@
 #include "lod/build/points/rising.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 
 #include "lod/octahedral.h"
@@ -40,6 +42,15 @@ struct RadiusTable {
 };
 const RadiusTable kRadii;
 
+/// 16 log2(m), rounded, for 64 mantissas m from 1 to 2.
+struct SixteenthTable {
+    std::array<int, 64> of;
+    SixteenthTable() {
+        for (size_t i = 0; i < of.size(); ++i)
+            of.at(i) = static_cast<int>(std::lround(16 * std::log2(1 + (static_cast<double>(i) + 0.5) / 64)));
+    }
+};
+const SixteenthTable kSixteenths;
 uint32_t byteOf(float linear) {
     return static_cast<uint32_t>(std::clamp(shared::srgbFromLinear(linear) * 255.0f + 0.5f, 0.0f, 255.0f));
 }
@@ -187,11 +198,10 @@ Extent extentOf(std::span<const Rising> parts, const Rising& out) {
 
 uint32_t radiusCodeUp(double radius, double edge) {
     const double share = radius * (1 - 2e-7) / edge;
-    // 16 codes an octave; the table has the last word.
-    int exponent = 0;
-    const double mantissa = std::frexp(std::max(share, 1e-300), &exponent);  // 1/2 to 1
-    const double guess = 255.0 + 16.0 * (exponent - 1) + 16.0 * (2 * mantissa - 1);
-    auto c = static_cast<uint32_t>(std::clamp(guess, 0.0, 255.0));
+    // 16 codes an octave: from the exponent and the bits after it; the table has the last word.
+    const auto bits = std::bit_cast<uint64_t>(std::max(share, 1e-300));
+    const int octave = static_cast<int>(bits >> 52) - 1023;
+    auto c = static_cast<uint32_t>(std::clamp(255 + 16 * octave + kSixteenths.of[bits >> 46 & 63u], 0, 255));
     while (c > 0 && kRadii.of[c - 1] >= share) --c;
     while (c < 255 && kRadii.of[c] < share) ++c;
     return c;
