@@ -30,6 +30,9 @@ Result<void> run(const Options& o, bool& isSilent) {
         const auto cores = static_cast<int>(std::thread::hardware_concurrency());
         if (build.threads == 0) build.threads = std::max(cores / job.onThisMachine, 1);
     }
+    STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
+    const int threads = build.threads > 0 ? build.threads : static_cast<int>(std::thread::hardware_concurrency());
+    keepFreeMemory(settings.memoryBytes, threads);
     const auto executor = makeTbbExecutor(build.threads);
     Result<lod::BuildReport> built = [&] {
         Progress progress(!o.quiet && !isSilent, o.json);

@@ -5,6 +5,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cctype>
@@ -26,6 +27,19 @@ uint64_t peakRssBytes() {
 void releaseFreeMemory() {
 #ifdef __GLIBC__
     malloc_trim(0);
+#endif
+}
+
+void keepFreeMemory(uint64_t memoryBytes, int threads) {
+#ifdef __GLIBC__
+    constexpr uint64_t kLeast = uint64_t{256} << 10, kMost = uint64_t{64} << 20;
+    const auto kept = static_cast<int>(std::clamp(memoryBytes / 32, kLeast, kMost));
+    mallopt(M_MMAP_THRESHOLD, kept);
+    mallopt(M_TRIM_THRESHOLD, 2 * kept);
+    mallopt(M_ARENA_MAX, std::max(threads / 4, 1));  // each keeps its own
+#else
+    static_cast<void>(memoryBytes);
+    static_cast<void>(threads);
 #endif
 }
 

@@ -1,8 +1,8 @@
 // Triangles as they come, to a welded mesh: one lattice, every vertex once, nothing degenerate, twice or not finite.
 #include <algorithm>
-#include <tuple>
 #include <bit>
 #include <cmath>
+#include <tuple>
 
 #include "lod/build/mesh/mesh_work.h"
 #include "lod/build/morton.h"

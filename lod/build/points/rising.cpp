@@ -51,9 +51,7 @@ struct SixteenthTable {
     }
 };
 const SixteenthTable kSixteenths;
-uint32_t byteOf(float linear) {
-    return static_cast<uint32_t>(std::clamp(shared::srgbFromLinear(linear) * 255.0f + 0.5f, 0.0f, 255.0f));
-}
+uint32_t byteOf(float srgb) { return static_cast<uint32_t>(std::clamp(srgb * 255.0f + 0.5f, 0.0f, 255.0f)); }
 
 bool hasNormal(const Rising& r) { return (r.flags & shared::kFlagNoNormal) == 0; }
 
@@ -99,14 +97,13 @@ void addUp(std::span<const Rising> parts, Rising& out) {
     if (allNone) out.flags = static_cast<uint8_t>(out.flags | shared::kFlagNoNormal);
 }
 
-/// Largest difference of a leaf's channel from the mean, sRGB.
-float colourSpread(const Rising& r) {
+/// Largest difference of a leaf's channel from the mean; both sRGB.
+float colourSpread(const Rising& r, const glm::vec3& mean) {
     float spread = 0;
     for (int k = 0; k < 3; ++k) {
         const auto at = static_cast<size_t>(k);
-        const float mean = shared::srgbFromLinear(r.meanColour[k]);
-        spread = std::max({spread, static_cast<float>(r.greatest.at(at)) / 255.0f - mean,
-                           mean - static_cast<float>(r.least.at(at)) / 255.0f});
+        spread = std::max({spread, static_cast<float>(r.greatest.at(at)) / 255.0f - mean[k],
+                           mean[k] - static_cast<float>(r.least.at(at)) / 255.0f});
     }
     return spread;
 }
@@ -262,11 +259,12 @@ Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const 
         out.inner = parts[0].inner;
         error = glm::length(out.mean - out.place) + radius - static_cast<double>(out.inner);
     }
-    if (colourSpread(out) > kColourSpread) error = std::max(error, 2 * radius);
+    const glm::vec3 colour(shared::srgbFromLinear(out.meanColour.x), shared::srgbFromLinear(out.meanColour.y),
+                           shared::srgbFromLinear(out.meanColour.z));
+    if (colourSpread(out, colour) > kColourSpread) error = std::max(error, 2 * radius);
     out.code = std::max(static_cast<uint8_t>(grid.errors.encodeUp(error)), out.code);
     out.packed = {q[0] | q[1] << 16, q[2] | radiusCode << 16 | uint32_t{out.code} << 24, normalCode,
-                  byteOf(out.meanColour.x) | byteOf(out.meanColour.y) << 8 | byteOf(out.meanColour.z) << 16 |
-                      uint32_t{out.flags} << 24};
+                  byteOf(colour.x) | byteOf(colour.y) << 8 | byteOf(colour.z) << 16 | uint32_t{out.flags} << 24};
     return out;
 }
 
