@@ -15,7 +15,7 @@ namespace stipple {
 /// Pages of bytes that come and go; a page that was never written is zeros. Not for several threads.
 class PageCache {
   public:
-    static constexpr size_t kPageBytes = size_t{1} << 16;
+    static constexpr size_t kPageBytes = size_t{1} << 12;
     /// In `folder`; no file at all as long as everything fits in `memoryBytes`. The file vanishes with the process.
     PageCache(std::string folder, uint64_t memoryBytes);
     PageCache(PageCache&& other) noexcept;

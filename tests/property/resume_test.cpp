@@ -116,6 +116,22 @@ TEST_F(Resume, InTheMiddleOfTheInput) {
     }
 }
 
+TEST_F(Resume, WithMoreMemoryThanBefore) {
+    for (const Kind& kind : kinds(folder_)) {
+        int all = 0, before = 0, distributing = 0;
+        ASSERT_TRUE(buildUntil(kind, -1, before, all));
+        const std::string whole = test::slurp(output_);
+        fs::remove(output_);
+        ASSERT_FALSE(buildUntil(kind, all - 1, before, distributing));
+        const auto built = build(kind.input, output_, {});  // it would fit in memory
+        ASSERT_TRUE(built) << built.error().line();
+        EXPECT_TRUE(built->isResumed);
+        EXPECT_TRUE(test::slurp(output_) == whole) << kind.input;
+        EXPECT_FALSE(fs::exists(work_));
+        fs::remove(output_);
+    }
+}
+
 TEST_F(Resume, NotFromInputThatSomebodyChanged) {
     for (const Kind& kind : kinds(folder_)) {
         int all = 0, before = 0, distributing = 0;

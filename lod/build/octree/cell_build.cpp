@@ -32,7 +32,7 @@ Result<void> CellSender::append(size_t atom, const std::vector<uint8_t>& bytes, 
 }
 
 Result<void> CellSender::ends(uint64_t unitsOfBlock, uint64_t unitsOfAll, const std::function<Result<void>()>& flush) {
-    constexpr uint64_t kOften = uint64_t{1} << 24, kShare = 4;  // units between notes, and notes at least
+    constexpr uint64_t kOften = uint64_t{1} << 24, kShare = 8;  // units between notes, and notes at least
     done_ += unitsOfBlock;
     progress_.update("distribute", std::min(done_, unitsOfAll), unitsOfAll);
     if (block_ <= blocksSent_) {

@@ -49,6 +49,15 @@ std::string Journal::folderOf(const std::string& output, const std::string& temp
     return (folder / (out.filename().string() + ".build")).string();
 }
 
+bool Journal::isThere(const std::string& folder, uint64_t identity) {
+    std::error_code error;
+    if (!fs::exists(folder + "/journal", error)) return false;
+    const auto file = InputFile::open(folder + "/journal");
+    std::array<uint64_t, 2> head{};
+    return file && file->sizeBytes() > kHeadBytes && file->readAt(0, head.data(), sizeof(head)) && head[0] == kMagic &&
+           head[1] == identity;
+}
+
 Result<Journal> Journal::open(const std::string& folder, const std::string& output, uint64_t identity) {
     Journal j;
     j.folder_ = folder;

@@ -25,6 +25,8 @@ class Journal {
     };
     /// Where the build of `output` keeps what does not fit in memory; `tempFolder` empty: beside the output.
     static std::string folderOf(const std::string& output, const std::string& tempFolder);
+    /// Does an interrupted build of that identity lie there?
+    static bool isThere(const std::string& folder, uint64_t identity);
     /// Of the build of `output`; makes the folder if it is not there. `identity`: of input and settings; a folder of
     /// another is refused. Only one process at a time.
     static Result<Journal> open(const std::string& folder, const std::string& output, uint64_t identity);

@@ -11,8 +11,10 @@ namespace stipple::lod {
 Result<Workspace> Workspace::open(const std::string& output, const BuildLimits& limits, uint64_t identity,
                                   bool isOnDisk) {
     Workspace w(output, limits);
-    if (!isOnDisk) return w;
-    w.folder_ = Journal::folderOf(output, limits.tempFolder);
+    const std::string folder = Journal::folderOf(output, limits.tempFolder);
+    // (With more memory than before, an interrupted build goes on all the same.)
+    if (!isOnDisk && !Journal::isThere(folder, identity)) return w;
+    w.folder_ = folder;
     const auto openJournal = [&]() -> Result<void> {
         STIPPLE_ASSIGN(Journal journal, Journal::open(w.folder_, output, identity));
         w.journal_.emplace(std::move(journal));
