@@ -281,7 +281,7 @@ class MeshBuild : public CellContent {
 
   private:
     static constexpr uint64_t kSpillBytes = 24;      ///< of a triangle, between the steps
-    static constexpr uint64_t kMostSpillBytes = 20;  ///< the same at most, of faces in random order (measured)
+    static constexpr uint64_t kMostSpillBytes = 32;  ///< the same at most (measured: 7 to 27)
     static constexpr uint64_t kTableBytes = 2;       ///< of a triangle, of the table of groups, which stays in memory
     static constexpr uint64_t kMostOfAtom = 2 * kAtomPoints;
 

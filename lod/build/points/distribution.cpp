@@ -52,10 +52,7 @@ Result<void> Distribution::run(const std::vector<Journal::Entry>& entries, Build
     makeBuckets();
     if (sent != nullptr && !loadBuckets(sent->payload, nextPart_)) return tl::unexpected(workspace_.damaged());
     report.temporaryBytes = workspace_.isOnDisk() ? temporaryBytes() : 0;
-    if (sent != nullptr && sent->what == Journal::What::ready) {
-        // (Of what other ranks removed as they built it nothing is missing.)
-        return {};
-    }
+    if (sent != nullptr && sent->what == Journal::What::ready) return {};  // (what was built since is gone, and known)
     if (nextPart_ > 0)
         progress_.say(fmt::format("going on with the interrupted build: {} of its input are in their places",
                                   humanBytes(temporaryBytes())));
