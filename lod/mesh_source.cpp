@@ -50,7 +50,7 @@ MeshSource sourceOf(TriangleMesh given) {
         return hashBytes(mesh->indices.data(), mesh->indices.size() * 4) ^
                hashBytes(mesh->position.data(), mesh->position.size() * sizeof(glm::dvec3));
     };
-    source.survey = [mesh]() -> Result<MeshSource::Bounds> {
+    source.survey = [mesh](const MeshSource::Tell&) -> Result<MeshSource::Bounds> {
         MeshSource::Bounds bounds;
         for (const glm::dvec3& p : mesh->position) bounds.add(p);
         return bounds;

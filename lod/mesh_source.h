@@ -20,9 +20,11 @@ struct MeshSource {
     };
     using Take = std::function<Result<void>(const TriangleMesh& block)>;
 
-    uint64_t triangles = 0;                   ///< as far as is known before reading
-    std::function<uint64_t()> identity;       ///< another number: the source has changed
-    std::function<Result<Bounds>()> survey;   ///< once, before read
+    uint64_t triangles = 0;              ///< as far as is known before reading
+    std::function<uint64_t()> identity;  ///< another number: the source has changed
+    /// Told now and then how much is done of how much; an error stops what is going on.
+    using Tell = std::function<Result<void>(uint64_t done, uint64_t all)>;
+    std::function<Result<Bounds>(const Tell& tell)> survey;  ///< once, before read
     uint64_t surveyBytes = 0, readBytes = 0;  ///< on disk at most, of its own: during the survey and after that
     /// Gives every triangle once; blocks have vertices of their own. Always the same.
     std::function<Result<void>(const Take& take)> read;

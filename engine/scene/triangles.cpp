@@ -144,7 +144,7 @@ lod::MeshSource triangleSource(const Scene& scene, std::vector<Placement> placed
         }));
         return hash;
     };
-    source.survey = [forAll]() -> Result<lod::MeshSource::Bounds> {
+    source.survey = [forAll](const lod::MeshSource::Tell&) -> Result<lod::MeshSource::Bounds> {
         lod::MeshSource::Bounds bounds;
         STIPPLE_TRY(forAll([&](const Placement& at, const Primitive& p) -> Result<void> {
             for (const auto& q : p.position) bounds.add(glm::dvec3(at.world * glm::dvec4(glm::dvec3(q), 1)));

@@ -101,6 +101,7 @@ TEST_F(Resume, InTheMiddleOfTheInput) {
             const auto stopped = buildUntil(kind, at, before, distributing);
             ASSERT_FALSE(stopped) << kind.input;
             EXPECT_EQ(stopped.error().kind, ErrorKind::interrupted);
+            EXPECT_NE(stopped.error().hint.find("to go on"), std::string::npos);
             EXPECT_TRUE(fs::exists(work_ + "/journal"));
             // (Another run, stopped at once, loses nothing.)
             ASSERT_FALSE(buildUntil(kind, 1, before, distributing));
@@ -158,7 +159,9 @@ TEST_F(Resume, AFailureBeforeAnythingIsKeptLeavesNothingBehind) {
     BuildLimits limits;
     limits.memoryBytes = kind.memory;
     limits.isStopped = [] { return true; };
-    EXPECT_FALSE(build(kind.input, output_, limits));
+    const auto stopped = build(kind.input, output_, limits);
+    ASSERT_FALSE(stopped);
+    EXPECT_EQ(stopped.error().hint, "nothing was written");
     EXPECT_FALSE(fs::exists(work_));
     EXPECT_FALSE(fs::exists(output_));
 }

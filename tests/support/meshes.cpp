@@ -11,7 +11,7 @@
 namespace stipple::test {
 
 lod::TriangleMesh collect(const lod::MeshSource& source) {
-    EXPECT_TRUE(source.survey());
+    EXPECT_TRUE(source.survey(tellNobody));
     lod::TriangleMesh out;
     EXPECT_TRUE(source.read([&](const lod::TriangleMesh& block) -> Result<void> {
         const auto base = static_cast<uint32_t>(out.position.size());

@@ -14,6 +14,7 @@ struct MeshRecipe {
     glm::dmat4 place{1};
 };
 
+inline const lod::MeshSource::Tell tellNobody = [](uint64_t, uint64_t) { return Result<void>(); };
 /// All that a source gives, as one.
 lod::TriangleMesh collect(const lod::MeshSource& source);
 lod::TriangleMesh growTriangles(const MeshRecipe& recipe, lod::MeshBuildSettings& settings);

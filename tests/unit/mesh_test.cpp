@@ -20,7 +20,7 @@ namespace {
 Result<lod::TriangleMesh> readPlyMesh(const std::string& path, uint64_t& bad, uint64_t memoryBytes = 1 << 24) {
     STIPPLE_ASSIGN(const lod::MeshSource source,
                    lod::openPlyMesh(path, memoryBytes, std::filesystem::temp_directory_path().string()));
-    STIPPLE_ASSIGN(const auto bounds, source.survey());
+    STIPPLE_ASSIGN(const auto bounds, source.survey(test::tellNobody));
     static_cast<void>(bounds);
     const Result<void> read = source.read([](const lod::TriangleMesh&) -> Result<void> { return {}; });
     if (!read) return tl::unexpected(read.error());
@@ -139,7 +139,8 @@ TEST(Weld, CountsWhatItDropsAndKeepsTheRest) {
                   0, 0, 1,  // no area
                   0, 1, 4};
     const auto executor = makeSerialExecutor();
-    lod::PlacedBlock placed = lod::placeBlock(in, lod::latticeOf(*lod::sourceOf(in).survey()), *executor);
+    lod::PlacedBlock placed =
+        lod::placeBlock(in, lod::latticeOf(*lod::sourceOf(in).survey(test::tellNobody)), *executor);
     EXPECT_EQ(placed.degenerate, 2u);
     EXPECT_EQ(placed.notFinite, 1u);
     EXPECT_EQ(placed.rounding, 0);  // small whole numbers lie on the lattice

@@ -95,8 +95,12 @@ class MeshBuild : public CellContent {
 
     // ---- survey, count, distribute ----
 
-    Result<void> survey(const Workspace&, Progress&, bool) override {
-        STIPPLE_ASSIGN(const MeshSource::Bounds bounds, source_.survey());
+    Result<void> survey(const Workspace& workspace, Progress& progress, bool) override {
+        const auto tell = [&](uint64_t done, uint64_t all) {
+            progress.update("survey", std::min(done, all), all);
+            return workspace.checkStopped();
+        };
+        STIPPLE_ASSIGN(const MeshSource::Bounds bounds, source_.survey(tell));
         facts_.lattice = latticeOf(bounds);
         return {};
     }

@@ -19,6 +19,7 @@ Result<Workspace> Workspace::open(const std::string& output, const BuildLimits& 
         STIPPLE_ASSIGN(Journal journal, Journal::open(w.folder_, output, identity));
         w.journal_.emplace(std::move(journal));
         w.entries_ = w.journal_->takeEntries();
+        w.isKept_ = !w.entries_.empty();
         return {};
     };
     STIPPLE_TRY(agree(limits.ranks, w.isFirst() ? openJournal() : Result<void>()));
@@ -57,6 +58,7 @@ std::vector<uint8_t> Workspace::ofFirst(const std::vector<uint8_t>& mine) const 
 }
 
 Result<void> Workspace::note(Journal::What what, const std::vector<uint8_t>& payload) {
+    isKept_ = isOnDisk();
     return journal_ ? journal_->append(what, payload) : Result<void>();
 }
 
@@ -67,7 +69,7 @@ Result<void> Workspace::announce(uint64_t bytes, Progress& progress) const {
 Result<void> Workspace::checkStopped() const {
     if (!limits_.isStopped || !limits_.isStopped()) return {};
     return fail(ErrorKind::interrupted, "interrupted", output_,
-                isOnDisk() ? "run the same command again to go on" : "nothing was written");
+                isKept_ ? "run the same command again to go on" : "nothing was written");
 }
 
 void Workspace::remove() {

@@ -48,6 +48,7 @@ class Workspace {
     BuildLimits limits_;
     std::optional<Journal> journal_;
     std::vector<Journal::Entry> entries_;
+    bool isKept_ = false;  ///< something to go on with
 };
 
 }  // namespace stipple::lod

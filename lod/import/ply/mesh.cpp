@@ -146,7 +146,10 @@ class PlyMesh {
     uint64_t surveyBytes() const { return count_ * vertices_.bytes(); }
     uint64_t badFaces() const { return badFaces_; }
     uint64_t readBytes() const { return surveyBytes() - (vertices_.hasNormals() ? 0 : 8 * count_); }
-    Result<MeshSource::Bounds> survey() {
+    /// `triangles`: about how many there are.
+    Result<MeshSource::Bounds> survey(const MeshSource::Tell& tell, uint64_t triangles) {
+        const uint64_t all = count_ + (vertices_.hasNormals() ? 0 : triangles);
+
         MeshSource::Bounds bounds;
         vertices_.begin();
         PlyReader reader(file_, header_, 0);
@@ -163,10 +166,11 @@ class PlyMesh {
                 bounds.add(v.position);
                 vertices_.set(next, v);
             }
+            STIPPLE_TRY(tell(next, all));
         }
         facesAt_ = reader.offset();
         if (!vertices_.hasNormals()) {
-            STIPPLE_TRY(sumNormals());
+            STIPPLE_TRY(sumNormals([&](uint64_t done) { return tell(count_ + done, all); }));
             vertices_.endSums(count_);
         }
         STIPPLE_TRY(vertices_.status());
@@ -205,8 +209,11 @@ class PlyMesh {
         FaceTaker<Triangle> faces(triangle);
         return reader.readCorners(facesAt_, [&](const PlyReader::Corners& corners) { return faces.take(corners); });
     }
-    Result<void> sumNormals() {
+    Result<void> sumNormals(const std::function<Result<void>(uint64_t done)>& tell) {
+        constexpr uint64_t kOften = 65536;
+        uint64_t done = 0;
         return forTriangles([&](double a, double b, double c) -> Result<void> {
+            if (++done % kOften == 0) STIPPLE_TRY(tell(done));
             const auto n = static_cast<double>(count_);
             if (!(a >= 0 && a < n && b >= 0 && b < n && c >= 0 && c < n)) return {};
             const std::array<uint64_t, 3> corner{static_cast<uint64_t>(a), static_cast<uint64_t>(b),
@@ -263,7 +270,7 @@ Result<MeshSource> openPlyMesh(const std::string& path, uint64_t memoryBytes, co
     source.surveyBytes = mesh->surveyBytes() > memoryBytes ? mesh->surveyBytes() : 0;
     source.readBytes = source.surveyBytes > 0 ? mesh->readBytes() : 0;
     source.identity = [path] { return fileIdentity(path); };
-    source.survey = [mesh] { return mesh->survey(); };
+    source.survey = [mesh, all = source.triangles](const MeshSource::Tell& tell) { return mesh->survey(tell, all); };
     source.read = [mesh](const MeshSource::Take& take) { return mesh->read(take); };
     source.badTriangles = [mesh] { return mesh->badFaces(); };
     return source;
