@@ -20,6 +20,13 @@ struct Disc {
     bool hasNormal;
 };
 
+/// Has it children, and all of them are leaves?
+bool isAboveLeaves(const Hierarchy& h, const Node& node) {
+    for (uint32_t c = 0; c < static_cast<uint32_t>(__builtin_popcount(node.childMask)); ++c)
+        if (!h.nodes[node.firstChild + c].isLeaf()) return false;
+    return !node.isLeaf();
+}
+
 std::vector<Disc> discsOf(const Hierarchy& h, const Node& node, const Chunk& chunk, double clusterSize) {
     std::vector<Disc> discs;
     const double step = std::exp2(node.stepShift), edge = h.cellSize(node);
@@ -59,9 +66,7 @@ Result<uint64_t> measureErrors(const Store& store, uint32_t index, const Chunk& 
     const Hierarchy& h = store.hierarchy;
     const Node& node = h.nodes[index];
     const auto children = static_cast<uint32_t>(__builtin_popcount(node.childMask));
-    if (node.isLeaf()) return 0;
-    for (uint32_t c = node.firstChild; c < node.firstChild + children; ++c)
-        if (!h.nodes[c].isLeaf()) return 0;
+    if (!isAboveLeaves(h, node)) return 0;
     const uint32_t deepest = std::min(h.rootLog2, 21u), level = std::min(node.level + kClusterLevels, deepest);
     const double clusterSize = std::exp2(static_cast<double>(h.rootLog2) - level);
     std::vector<Disc> records = discsOf(h, node, chunk, clusterSize);
@@ -187,9 +192,7 @@ Result<uint64_t> measureStrands(const Store& store, uint32_t index, const Chunk&
     const Hierarchy& h = store.hierarchy;
     const Node& node = h.nodes[index];
     const auto children = static_cast<uint32_t>(__builtin_popcount(node.childMask));
-    if (node.isLeaf()) return 0;
-    for (uint32_t c = node.firstChild; c < node.firstChild + children; ++c)
-        if (!h.nodes[c].isLeaf()) return 0;
+    if (!isAboveLeaves(h, node)) return 0;
     std::vector<Strand> leaves;
     double steps = std::exp2(node.stepShift);
     for (uint32_t c = node.firstChild; c < node.firstChild + children; ++c) {
