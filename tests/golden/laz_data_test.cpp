@@ -136,6 +136,7 @@ TEST(LazData, TheEarthCentredScanKeepsItsIntegersAndDoesNotShake) {
     const auto oracle = reference::makeReferenceBackend(*executor);
     render::FrameSettings settings;
     settings.draw.lit = false;
+    settings.wantDepthAndNormal = true;
     const glm::dvec3 up = store->description.up, side = glm::normalize(glm::cross(up, glm::dvec3(0, 0, 1)));
     for (const render::Mode mode : {render::Mode::pullpush, render::Mode::points})
         for (int step = 0; step < 6; ++step) {
@@ -145,13 +146,27 @@ TEST(LazData, TheEarthCentredScanKeepsItsIntegersAndDoesNotShake) {
             camera.up = side;
             camera.eye = target->position + 0.01 * up + 1e-4 * step * side;
             const lod::View view = scene::makeView(camera, 321, 241, 1e-3);
-            const auto d =
-                reference::compareImages(test::renderView(store, *backend, *executor, view, settings),
-                                         test::renderView(store, *oracle, *executor, view, settings), 4, nullptr);
+            render::Image seen = test::renderView(store, *backend, *executor, view, settings);
+            const render::Image truth = test::renderView(store, *oracle, *executor, view, settings);
+            // Where the near surface is seen edge-on, whether a far sample lies behind it or shines through a hole can
+            // turn on the last bit (11 m in one picture, 3 cm in the other): up to 18 pixels (measured); all others are
+            // compared.
+            size_t otherSurface = 0;
+            for (size_t i = 0; i < seen.rgba.size(); ++i) {
+                int colour = 0;
+                for (unsigned c = 0; c < 24; c += 8)
+                    colour = std::max(colour, std::abs(static_cast<int>(seen.rgba[i] >> c & 255u) -
+                                                       static_cast<int>(truth.rgba[i] >> c & 255u)));
+                const auto [near, far] = std::minmax(seen.depth[i], truth.depth[i]);
+                if (colour <= 4 || far <= 10 * near) continue;
+                ++otherSurface;
+                seen.rgba[i] = truth.rgba[i];
+            }
+            EXPECT_LE(static_cast<double>(otherSurface), 4e-4 * static_cast<double>(seen.rgba.size()))
+                << "step " << step << ", mode " << static_cast<int>(mode);
+            const auto d = reference::compareImages(seen, truth, 4, nullptr);
             ASSERT_TRUE(d);
-            // (Where the near surface is seen edge-on, whether a far sample lies behind it or shines through a hole can
-            // turn on the last bit: 6 such pixels, 11 m in one picture and 3 cm in the other, are 46.6 dB.)
-            EXPECT_GE(d->psnr, 45) << "step " << step << ", mode " << static_cast<int>(mode);
+            EXPECT_GE(d->psnr, 50) << "step " << step << ", mode " << static_cast<int>(mode);
             EXPECT_LE(d->differingFraction, 0.004) << "step " << step << ", mode " << static_cast<int>(mode);
         }
 }
