@@ -8,6 +8,7 @@
 #include <map>
 #include <sstream>
 
+#include "apps/stipple/camera_options.h"
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
 #include "engine/cpu/cpu_backend.h"
@@ -43,8 +44,7 @@ void BuildOptions::addTo(CLI::App& app) {
     app.add_option("--radii", radii, "auto: estimate missing radii from the spacing; keep: only those of the file")
         ->check(CLI::IsMember({"auto", "keep"}))
         ->capture_default_str();
-    app.add_option("--up", up, "up axis, instead of the format's own (LAS: z, PLY: y)")
-        ->check(CLI::IsMember({"x", "y", "z"}));
+    addUpOption(app, up);
     app.add_option("--attributes", attributes,
                    "attributes to keep beside position, colour and normal: all, none, or names with commas")
         ->capture_default_str();
@@ -55,7 +55,7 @@ void BuildOptions::addTo(CLI::App& app) {
                  "pass over faults of a glTF file that change nothing that is drawn, and count them");
     app.add_option("--strand-radius", strandRadius,
                    "radius of strands that have none, file units (0: a 4000th of the extent)")
-        ->check(CLI::Range(0.0, 1e300));
+        ->check(numberBetween(0.0, 1e300));
     app.add_flag("--only-points", onlyPoints, "of a PLY mesh take the vertices, as points");
     app.add_flag("--skip-bad", skipBad, "go on past corrupt chunks and files, and say what was lost");
 }
@@ -135,7 +135,7 @@ Result<lod::ColourBy> applyColours(OpenedScene& scene, const std::string& what, 
 void EnvironmentOptions::addTo(CLI::App& app) {
     app.add_option("--environment", path, "HDR picture all around (.hdr, .exr; equirectangular) that lights the scene");
     app.add_option("--environment-scale", scale, "multiplies its light")
-        ->check(CLI::Range(0.0, 1e6))
+        ->check(numberBetween(0.0, 1e6))
         ->capture_default_str();
 }
 

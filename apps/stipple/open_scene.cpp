@@ -479,6 +479,7 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     if (any(isOf(false)) && !any(isOf(true)))
         for (render::PlacedStore& p : scene.placed) p.standIns = nullptr;
     scene.description = describe(scene.placed);
+    if (!build.up.empty()) scene.description.up = lod::axisVector(static_cast<lod::UpAxis>(build.up[0] - 'x'));
     releaseFreeMemory();
     return scene;
 }

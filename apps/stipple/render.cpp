@@ -6,6 +6,7 @@
 #include <fstream>
 #include <thread>
 
+#include "apps/stipple/camera_options.h"
 #include "apps/stipple/common.h"
 #include "apps/stipple/legend.h"
 #include "engine/base/process.h"
@@ -19,68 +20,17 @@ namespace {
 
 struct Options {
     std::vector<std::string> inputs;
-    std::string output, size = "1280x720", eye, target, up, path, mode = "pullpush", device = "auto", shade = "auto",
-                        background = "24,26,30";
+    std::string output, size = "1280x720", mode = "pullpush", device = "auto", shade = "auto", background = "24,26,30";
     std::string debug = "none", resident = "1G";
-    double fov = 50, error = 1, strandExact = 2, wind = 0, seconds = 0;
-    int frames = 1, samples = 4, orbit = 0, sceneCamera = 0, accumulate = 1;
+    double error = 1, strandExact = 2, wind = 0, seconds = 0;
+    int frames = 1, samples = 4, accumulate = 1;
     uint64_t budget = 0;
     bool noWait = false, json = false, quiet = false;
+    CameraOptions camera;
     BuildOptions build;
     ColourOptions colour;
     EnvironmentOptions environment;
 };
-
-struct Shot {
-    std::vector<lod::View> views;
-    std::vector<double> seconds;  ///< of each view, from the first on; empty: one moment
-    glm::dvec3 worldUp{0, 0, 1};
-};
-
-Result<Shot> makeShot(const Options& o, const OpenedScene& opened, const glm::uvec2& size) {
-    const lod::StoreDescription& d = opened.description;
-    Shot shot;
-    shot.worldUp = d.up;
-    const double aspect = static_cast<double>(size.x) / size.y;
-    const double nearPlane = std::max(1e-300, 1e-6 * glm::length(d.boundsMax - d.boundsMin));
-    if (!o.path.empty() || o.orbit > 0) {
-        scene::CameraPath path = scene::makeOrbit(d.focusMin, d.focusMax, d.up, aspect, std::max(1, o.orbit));
-        int frames = o.orbit > 0 ? o.orbit : o.frames;
-        if (!o.path.empty()) {
-            STIPPLE_ASSIGN(path, scene::readCameraPath(o.path));
-            if (o.frames <= 1) frames = std::max(1, static_cast<int>(std::lround(path.duration() * path.fps)) + 1);
-        }
-        for (int i = 0; i < frames; ++i) {
-            const double t = path.keys.front().t + (frames > 1 ? path.duration() * i / (frames - 1) : 0);
-            shot.views.push_back(scene::makeView(path.at(t), size.x, size.y, nearPlane));
-            shot.seconds.push_back(t - path.keys.front().t);
-        }
-        return shot;
-    }
-    scene::Camera camera = scene::fitCamera(d.focusMin, d.focusMax, d.up, aspect);
-    if (o.sceneCamera > 0) {
-        const auto index = static_cast<size_t>(o.sceneCamera);
-        if (index > opened.cameras.size())
-            return fail(ErrorKind::usage,
-                        fmt::format("the scene has that many perspective cameras: {}", opened.cameras.size()),
-                        fmt::format("--scene-camera {}", o.sceneCamera));
-        camera = opened.cameras[index - 1];
-        shot.views.push_back(scene::makeView(camera, size.x, size.y, nearPlane));
-        return shot;
-    }
-    camera.fovDegrees = o.eye.empty() ? camera.fovDegrees : o.fov;
-    if (!o.eye.empty()) {
-        STIPPLE_ASSIGN(camera.eye, parseVector(o.eye, "--eye"));
-    }
-    if (!o.target.empty()) {
-        STIPPLE_ASSIGN(camera.target, parseVector(o.target, "--target"));
-    }
-    if (!o.up.empty()) {
-        STIPPLE_ASSIGN(camera.up, parseVector(o.up, "--up"));
-    }
-    shot.views.push_back(scene::makeView(camera, size.x, size.y, nearPlane));
-    return shot;
-}
 
 Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDescription& d, const Shot& shot,
                                            const lod::ColourBy& colour, const std::vector<render::WorldLight>& lights) {
@@ -223,15 +173,13 @@ Result<void> accumulate(int count, const lod::View& view, render::FrameSettings 
 Result<void> run(const Options& o) {
     STIPPLE_TRY(image::checkImagePath(o.output));
     STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
-    for (const auto& [text, option] :
-         {std::pair{o.eye, "--eye"}, std::pair{o.target, "--target"}, std::pair{o.up, "--up"}})
-        if (!text.empty()) STIPPLE_TRY(parseVector(text, option));
+    STIPPLE_TRY(o.camera.check());
     if (!(o.error > 0)) return fail(ErrorKind::usage, "must be larger than 0", "--error");
     const auto executor = makeTbbExecutor(o.build.threads);
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
     STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, o.colour, *executor, !o.quiet));
     const lod::StoreDescription& description = scene.description;
-    STIPPLE_ASSIGN(const Shot shot, makeShot(o, scene, size));
+    STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
     STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
     STIPPLE_ASSIGN(render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
     STIPPLE_ASSIGN(settings.draw.environment, openEnvironment(o.environment.path, o.environment.scale, *executor));
@@ -317,18 +265,10 @@ void setupRender(CLI::App& app, int& status) {
     sub->add_option("SCENE", o->inputs, "a .stipple scene, or scans (built into the cache first)")->required();
     sub->add_option("-o,--output", o->output, "the picture (.png, .exr); a path gives NAME_0000.png ...")->required();
     sub->add_option("--size", o->size, "width x height, pixels")->capture_default_str();
-    sub->add_option("--eye", o->eye, "camera position x,y,z in file coordinates (default: fits the scene)");
-    sub->add_option("--target", o->target, "point that the camera looks at");
-    sub->add_option("--up", o->up, "up direction x,y,z");
-    sub->add_option("--fov", o->fov, "vertical field of view, degrees")
-        ->check(CLI::Range(0.1, 170.0))
-        ->capture_default_str();
-    sub->add_option("--scene-camera", o->sceneCamera, "the N-th camera of a .gltf scene (0: a view of the whole)")
-        ->check(CLI::Range(0, 100000));
-    auto* path = sub->add_option("--camera-path", o->path, "JSON file with keys; one picture per frame");
-    sub->add_option("--orbit", o->orbit, "N pictures around the scene")->check(CLI::Range(1, 100000))->excludes(path);
+    o->camera.addTo(*sub);
     sub->add_option("--frames", o->frames, "frames of the path, or repetitions of one view for timing")
         ->check(CLI::Range(1, 1000000))
+        ->excludes("--orbit")
         ->capture_default_str();
     sub->add_option("--mode", o->mode, "pullpush, points, or reference (traced full detail)")
         ->check(CLI::IsMember({"pullpush", "points", "reference"}))
@@ -347,12 +287,14 @@ void setupRender(CLI::App& app, int& status) {
         ->check(CLI::IsMember({"none", "level", "error", "holes", "normals"}))
         ->capture_default_str();
     sub->add_option("--wind", o->wind, "how far tops of plants move at most, share of their height (e.g. 0.03)")
-        ->check(CLI::Range(0.0, 0.5))
+        ->check(numberBetween(0.0, 0.5))
         ->capture_default_str();
-    sub->add_option("--time", o->seconds, "of the wind, seconds; a path adds its own")->capture_default_str();
+    sub->add_option("--time", o->seconds, "of the wind, seconds; a path adds its own")
+        ->check(numberBetween(-1e9, 1e9))
+        ->capture_default_str();
     sub->add_option("--strand-exact", o->strandExact,
                     "half-width in pixels from which ribbons and tubes are filled exactly instead of reconstructed")
-        ->check(CLI::Range(0.5, 1e9))
+        ->check(numberBetween(0.5, 1e9))
         ->capture_default_str();
     sub->add_option("--accumulate", o->accumulate,
                     "the mean of N frames: smooth coverage of strands narrower than a pixel")
@@ -367,6 +309,7 @@ void setupRender(CLI::App& app, int& status) {
     o->colour.addTo(*sub);
     o->environment.addTo(*sub);
     auto* group = sub->add_option_group("building", "for inputs that are not built yet");
+    addUpOption(*group, o->build.up);
     group->add_option("--memory", o->build.memory, "memory that the build may use")->capture_default_str();
     group->add_option("--attributes", o->build.attributes, "attributes to keep; the one of --colour always is")
         ->capture_default_str();
@@ -376,7 +319,7 @@ void setupRender(CLI::App& app, int& status) {
     group
         ->add_option("--strand-radius", o->build.strandRadius,
                      "radius of strands that have none, file units (0: a 4000th of the extent)")
-        ->check(CLI::Range(0.0, 1e300));
+        ->check(numberBetween(0.0, 1e300));
     group->add_flag("--only-points", o->build.onlyPoints, "of a PLY mesh take the vertices, as points");
     group->add_flag("--repair", o->build.repair,
                     "pass over faults of a glTF file that change nothing that is drawn, and count them");
