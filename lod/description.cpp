@@ -160,6 +160,16 @@ StoreDescription fromJson(const json& j) {
 }  // namespace
 
 std::string describeAsText(const StoreDescription& description) { return toJson(description).dump(); }
-StoreDescription descriptionFromText(const std::string& text) { return fromJson(json::parse(text)); }
+StoreDescription descriptionFromText(const std::string& text) {
+    // As many values as 65,536 materials have, and no deeper than they stand: text that is nothing but brackets takes
+    // a hundred times its size.
+    constexpr uint64_t kMostValues = 8'000'000;
+    constexpr int kDeepest = 16;
+    uint64_t values = 0;
+    return fromJson(json::parse(text, [&](int depth, json::parse_event_t, json&) {
+        if (++values > kMostValues || depth > kDeepest) throw std::runtime_error("it holds too much");
+        return true;
+    }));
+}
 
 }  // namespace stipple::lod
