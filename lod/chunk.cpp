@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "lod/store_check.h"
+#include "lod/zstd_memory.h"
 
 namespace stipple::lod {
 namespace {
@@ -23,10 +24,9 @@ struct ChunkHead {
 };
 
 std::vector<uint8_t> compress(const std::vector<uint8_t>& raw) {
-    thread_local std::unique_ptr<ZSTD_CCtx, size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(), ZSTD_freeCCtx);
     std::vector<uint8_t> out(ZSTD_compressBound(raw.size()));
-    const size_t got = ZSTD_compressCCtx(context.get(), out.data(), out.size(), raw.data(), raw.size(), kZstdLevel);
-    out.resize(ZSTD_isError(got) ? 0 : got);
+    ZSTD_CCtx& context = zstdContext(ZSTD_createCCtx, ZSTD_freeCCtx);
+    out.resize(written(ZSTD_compressCCtx(&context, out.data(), out.size(), raw.data(), raw.size(), kZstdLevel)));
     return out;
 }
 
@@ -36,9 +36,9 @@ Result<std::vector<uint8_t>> decompress(const uint8_t* bytes, size_t count, size
         !isPossibleGain(count, size))
         return fail(ErrorKind::input, fmt::format("a compressed block does not hold at most {} bytes", limit), where,
                     "the file is damaged; build it again");
-    thread_local std::unique_ptr<ZSTD_DCtx, size_t (*)(ZSTD_DCtx*)> context(ZSTD_createDCtx(), ZSTD_freeDCtx);
     std::vector<uint8_t> out(size);
-    const size_t got = ZSTD_decompressDCtx(context.get(), out.data(), out.size(), bytes, count);
+    ZSTD_DCtx& context = zstdContext(ZSTD_createDCtx, ZSTD_freeDCtx);
+    const size_t got = unlessOutOfMemory(ZSTD_decompressDCtx(&context, out.data(), out.size(), bytes, count));
     if (ZSTD_isError(got) || got != size)
         return fail(ErrorKind::input, "a compressed block is damaged", where, "build it again");
     return out;

@@ -1,7 +1,6 @@
 #include "lod/store.h"
 
 #include <fmt/format.h>
-#include <zstd.h>
 
 #include <bit>
 #include <cstring>
@@ -12,6 +11,7 @@
 #include "lod/description.h"
 #include "lod/store_check.h"
 #include "lod/store_layout.h"
+#include "lod/zstd_memory.h"
 
 namespace stipple::lod {
 namespace {
@@ -22,7 +22,7 @@ constexpr uint64_t kMostText = uint64_t{128} << 20;  // of a description
 
 std::vector<uint8_t> packed(const void* bytes, size_t count) {
     std::vector<uint8_t> out(ZSTD_compressBound(count));
-    out.resize(ZSTD_compress(out.data(), out.size(), bytes, count, 3));
+    out.resize(written(ZSTD_compress(out.data(), out.size(), bytes, count, 3)));
     return out;
 }
 
@@ -69,7 +69,7 @@ Result<std::vector<uint8_t>> readSection(const InputFile& file, const Section& s
     if (hashBytes(bytes.data(), bytes.size()) != s.hash)
         return tl::unexpected(damagedStore(where, "the hash does not match"));
     std::vector<uint8_t> raw(s.rawBytes);
-    const size_t got = ZSTD_decompress(raw.data(), raw.size(), bytes.data(), bytes.size());
+    const size_t got = unlessOutOfMemory(ZSTD_decompress(raw.data(), raw.size(), bytes.data(), bytes.size()));
     if (ZSTD_isError(got) || got != raw.size()) return tl::unexpected(damagedStore(where, "cannot be decompressed"));
     return raw;
 }
