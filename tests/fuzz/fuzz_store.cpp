@@ -1,5 +1,6 @@
 // libFuzzer: any bytes as a chunk end in records or in an error; and any fields of a store, with hashes that are right,
 // end in an error or in pictures.
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -9,6 +10,7 @@
 
 #include "lod/chunk.h"
 #include "tests/support/crafted_store.h"
+#include "tests/support/support.h"
 
 namespace {
 
