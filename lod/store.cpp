@@ -344,6 +344,11 @@ Result<Store> openStore(const std::string& path) {
     STIPPLE_TRY(readMesh(mesh, path, h));
     if (hasCounts == h.isMesh()) return tl::unexpected(damagedStore(path, "the code counts are not possible"));
     STIPPLE_TRY(checkTables(store, head.nodes.offset));
+    if (h.isMesh() && store.description.materials.empty()) {  // it is drawn with a plain one
+        shared::SurfaceMaterial& plain = store.description.materials.emplace_back();
+        plain.baseColour = {1, 1, 1};
+        plain.alpha = plain.roughness = plain.normalScale = 1;
+    }
     return store;
 }
 

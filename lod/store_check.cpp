@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
 namespace stipple::lod {
@@ -153,8 +152,7 @@ Result<void> checkMaterials(const Store& store, const Chunk& chunk, const std::s
         const uint32_t material = v.surface & shared::kSurfaceMaterialMask;
         last = material > last ? material : last;
     }
-    // A store without materials is drawn with a plain one.
-    if (last < std::max<size_t>(store.description.materials.size(), 1)) return {};
+    if (chunk.vertices.empty() || last < store.description.materials.size()) return {};
     return tl::unexpected(damagedStore(where, fmt::format("a vertex names material {}, which there is not", last)));
 }
 

@@ -135,11 +135,6 @@ class Placer {
         state_.draws.firstMaterial.push_back(static_cast<uint32_t>(state_.materials.size()));
         state_.materials.insert(state_.materials.end(), store->description.materials.begin(),
                                 store->description.materials.end());
-        if (store->hierarchy.isMesh() && store->description.materials.empty()) {
-            shared::SurfaceMaterial& plain = state_.materials.emplace_back();
-            plain.baseColour = {1, 1, 1};
-            plain.alpha = plain.roughness = plain.normalScale = 1;
-        }
         return known->second;
     }
     /// Two stores that are the same get the same records, unless coloured by something else than themselves.

@@ -211,10 +211,19 @@ TEST_F(Crafted, RadiiOfSegmentsAreNumbers) {
 TEST_F(Crafted, RunsOfGroupsAreTheirOwn) {
     CraftedStore c = take(mesh);
     const lod::Store store = open(mesh);
-    lod::MeshGroup group = store.hierarchy.groups[1];
-    group.firstRun = 0;
-    put(c, c.groupsAt() + sizeof(group), group);
-    expectRefused(c, "group 1");
+    // The last group as a copy of the one before, runs and chunk included: all of them could be walked along by each.
+    const size_t last = c.nodes.size() - 1;
+    lod::MeshGroup group = store.hierarchy.groups[last];
+    const lod::MeshGroup& before = store.hierarchy.groups[last - 1];
+    group.firstRun = before.firstRun;
+    group.runs = before.runs;
+    group.vertices = before.vertices;
+    group.clusters = before.clusters;
+    put(c, c.groupsAt() + last * sizeof(group), group);
+    c.nodes[last].records = c.nodes[last - 1].records;
+    c.nodes[last].chunkOffset = c.nodes[last - 1].chunkOffset;
+    c.nodes[last].chunkBytes = c.nodes[last - 1].chunkBytes;
+    expectRefused(c, "group " + std::to_string(last));
     c = take(mesh);
     group = store.hierarchy.groups[0];
     group.clusters += 1u << 20;
