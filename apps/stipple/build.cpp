@@ -5,6 +5,7 @@
 
 #include "apps/stipple/common.h"
 #include "apps/stipple/mpi_ranks.h"
+#include "apps/stipple/outputs.h"
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
 
@@ -15,7 +16,7 @@ struct Options {
     std::vector<std::string> inputs;
     std::string output;
     BuildOptions build;
-    bool json = false, quiet = false, mpi = false;
+    bool json = false, quiet = false, mpi = false, force = false, restart = false;
 };
 
 /// `isSilent`: another rank says what there is to say.
@@ -30,7 +31,10 @@ Result<void> run(const Options& o, bool& isSilent) {
         const auto cores = static_cast<int>(std::thread::hardware_concurrency());
         if (build.threads == 0) build.threads = std::max(cores / job.onThisMachine, 1);
     }
+    if (o.restart) build.leftovers = lod::Leftovers::replace;
     STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
+    STIPPLE_TRY(
+        agree(build.ranks, isSilent ? Result<void>() : checkOutputs({{o.output, FileKind::store}}, o.inputs, o.force)));
     const int threads = build.threads > 0 ? build.threads : static_cast<int>(std::thread::hardware_concurrency());
     keepFreeMemory(settings.memoryBytes, threads);
     const auto executor = makeTbbExecutor(build.threads);
@@ -88,6 +92,9 @@ void setupBuild(CLI::App& app, int& status) {
         ->required();
     sub->add_option("-o,--output", o->output, "the scene to write (.stipple)")->required();
     o->build.addTo(*sub);
+    addForce(*sub, o->force);
+    sub->add_flag("--restart", o->restart,
+                  "begin anew where an interrupted build of other input or with other settings is in the way");
     sub->add_flag("--json", o->json, "print the report as JSON");
     sub->add_flag("--quiet", o->quiet, "no progress on standard error");
     sub->add_flag("--mpi", o->mpi,

@@ -99,6 +99,7 @@ Result<lod::BuildSettings> BuildOptions::settings() const {
     s.tempFolder = temp;
     s.isStopped = isStopRequested;
     s.ranks = ranks;
+    s.leftovers = leftovers;
     s.estimateRadii = radii != "keep";
     s.skipBad = skipBad;
     s.open = [count = surfels, repairs = repair](const std::string& path, const lod::ReadOptions& o) {

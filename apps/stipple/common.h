@@ -29,6 +29,7 @@ struct BuildOptions {
     double strandRadius = 0;
     uint64_t surfels = 0;
     Ranks* ranks = nullptr;  ///< of an MPI job
+    lod::Leftovers leftovers = lod::Leftovers::goOn;
     void addTo(CLI::App& app);
     Result<lod::BuildSettings> settings() const;
 };

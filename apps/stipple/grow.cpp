@@ -8,6 +8,7 @@
 #include "apps/grow/meshes.h"
 #include "apps/grow/plants.h"
 #include "apps/stipple/common.h"
+#include "apps/stipple/outputs.h"
 #include "engine/base/process.h"
 #include "engine/image/image_io.h"
 
@@ -17,12 +18,13 @@ namespace {
 struct Options {
     std::string output, origin = "0,0,0";
     grow::ScanOptions scan;
-    bool json = false;
+    bool json = false, force = false;
 };
 
 Result<void> run(Options& o) {
     STIPPLE_ASSIGN(const glm::dvec3 origin, parseVector(o.origin, "--origin"));
     o.scan.origin = {origin.x, origin.y, origin.z};
+    STIPPLE_TRY(checkOutputs({{o.output}}, {}, o.force));
     const double start = nowSeconds();
     const auto points = grow::growScan(o.scan);
     STIPPLE_TRY(grow::writeScan(o.output, points, o.scan));
@@ -36,7 +38,7 @@ Result<void> run(Options& o) {
 struct MeshRun {
     std::string output, triangles = "100000";
     grow::MeshOptions mesh;
-    bool json = false;
+    bool json = false, force = false;
 };
 
 /// "10M", "250k" or a plain number; 0 if it is none.
@@ -70,6 +72,7 @@ Result<void> runMesh(MeshRun& o) {
     if (o.mesh.triangles == 0)
         return fail(ErrorKind::usage, fmt::format("'{}' is not a number up to 1000M", o.triangles), "--triangles",
                     "e.g. 250k or 10M");
+    STIPPLE_TRY(checkOutputs({{o.output}}, {}, o.force));
     const double start = nowSeconds();
     scene::Scene scene = grow::growMesh(o.mesh);
     if (o.mesh.textureSize == 0) {
@@ -98,6 +101,7 @@ void addMesh(CLI::App& parent, const char* kind, const char* what, int& status) 
         ->check(CLI::Range(0, 8192))
         ->capture_default_str();
     sub->add_flag("--json", o->json, "as JSON");
+    addForce(*sub, o->force);
     sub->callback([o, &status] {
         if (const auto result = runMesh(*o); !result) status = report(result.error());
     });
@@ -106,7 +110,7 @@ void addMesh(CLI::App& parent, const char* kind, const char* what, int& status) 
 struct PlantRun {
     std::string output, leaves = "50k", as = "strands";
     grow::PlantOptions plant;
-    bool json = false;
+    bool json = false, force = false;
 };
 
 Result<void> runPlant(PlantRun& o) {
@@ -115,6 +119,7 @@ Result<void> runPlant(PlantRun& o) {
     if (o.plant.leaves == 0)
         return fail(ErrorKind::usage, fmt::format("'{}' is not a number up to 1000M", o.leaves), "--leaves",
                     "e.g. 200k");
+    STIPPLE_TRY(checkOutputs({{o.output}}, {}, o.force));
     const double start = nowSeconds();
     const scene::Scene scene = grow::growPlant(o.plant);
     uint64_t segments = 0, triangles = 0;
@@ -152,6 +157,7 @@ void addPlant(CLI::App& parent, const char* name, const char* what, uint32_t row
             ->capture_default_str();
     sub->add_option("--seed", o->plant.seed, "another seed, another tree")->capture_default_str();
     sub->add_flag("--json", o->json, "as JSON");
+    addForce(*sub, o->force);
     sub->callback([o, &status] {
         if (const auto result = runPlant(*o); !result) status = report(result.error());
     });
@@ -161,27 +167,42 @@ struct LandscapeRun {
     std::string kind, output, trees = "10k", leaves = "200k", as = "strands";
     grow::LandscapeOptions landscape;
     uint64_t scanPoints = 2'000'000;
-    bool json = false;
+    bool json = false, force = false;
 };
+
+namespace fs = std::filesystem;
+
+/// What a folder of a demo holds.
+struct DemoFolder {
+    explicit DemoFolder(const std::string& folder)
+        : scan((fs::path(folder) / "scan.las").string()),
+          store((fs::path(folder) / "scan.stipple").string()),
+          scene((fs::path(folder) / "demo.glb").string()) {}
+    std::string scan, store, scene;
+};
+
+std::vector<Output> outputsOf(const LandscapeRun& o) {
+    if (o.kind != "demo") return {{o.output}};
+    const DemoFolder demo(o.output);
+    return {{demo.scan}, {demo.store, FileKind::store}, {demo.scene}};
+}
 
 /// The folder of a demo: a scan, built, and the scene that places it.
 Result<std::string> growDemoFolder(const LandscapeRun& o, scene::Scene& scene) {
-    namespace fs = std::filesystem;
     std::error_code error;
     fs::create_directories(o.output, error);
     if (error)
         return fail(ErrorKind::output, "cannot be created: " + error.message(), o.output, "name a folder to write");
-    const std::string scan = (fs::path(o.output) / "scan.las").string(),
-                      store = (fs::path(o.output) / "scan.stipple").string();
+    const DemoFolder demo(o.output);
     grow::ScanOptions options;
     options.points = o.scanPoints;
-    STIPPLE_TRY(grow::writeScan(scan, grow::growScan(options), options));
+    STIPPLE_TRY(grow::writeScan(demo.scan, grow::growScan(options), options));
     const auto executor = makeTbbExecutor(0);
     Progress progress(!o.json);
-    STIPPLE_TRY(lod::buildStore({scan}, store, {}, *executor, progress));
+    STIPPLE_TRY(lod::buildStore({demo.scan}, demo.store, {}, *executor, progress));
     scene = grow::growDemo(o.landscape, "scan.stipple");
     STIPPLE_TRY(addTextures({}, scene));
-    return (fs::path(o.output) / "demo.glb").string();
+    return demo.scene;
 }
 
 Result<void> runLandscape(LandscapeRun& o) {
@@ -192,6 +213,7 @@ Result<void> runLandscape(LandscapeRun& o) {
          {std::tuple{o.landscape.trees, &o.trees, "--trees"}, std::tuple{o.landscape.leaves, &o.leaves, "--leaves"}})
         if (count == 0 || count > 10'000'000)
             return fail(ErrorKind::usage, fmt::format("'{}' is not a number up to 10M", *text), option, "e.g. 100k");
+    STIPPLE_TRY(checkOutputs(outputsOf(o), {}, o.force));
     const double start = nowSeconds();
     scene::Scene scene;
     std::string output = o.output;
@@ -253,6 +275,7 @@ void addLandscape(CLI::App& parent, const char* kind, const char* what, int& sta
             ->capture_default_str();
     sub->add_option("--seed", o->landscape.seed, "another seed, another landscape")->capture_default_str();
     sub->add_flag("--json", o->json, "as JSON");
+    addForce(*sub, o->force);
     sub->callback([o, &status] {
         if (const auto result = runLandscape(*o); !result) status = report(result.error());
     });
@@ -287,6 +310,7 @@ void setupGrow(CLI::App& app, int& status) {
     addLandscape(*sub, "meadow", "grass and flowers", status);
     addLandscape(*sub, "demo", "a scan, an orchard, a meadow and a boulder on one ground", status);
     scan->add_flag("--json", o->json, "as JSON");
+    addForce(*scan, o->force);
     scan->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());
     });

@@ -8,11 +8,14 @@
 #include "apps/stipple/common.h"
 #include "apps/stipple/legend.h"
 #include "apps/stipple/render_frames.h"
+#include "apps/stipple/outputs.h"
+#include "engine/base/file.h"
 #include "engine/base/process.h"
 #include "engine/image/image_io.h"
 #include "engine/reference/reference.h"
 #include "engine/render/frame.h"
 #include "engine/scene/camera.h"
+#include "lod/store_file.h"
 
 namespace stipple::app {
 namespace {
@@ -24,7 +27,7 @@ struct Options {
     double error = 1, strandExact = 2, wind = 0, seconds = 0;
     int frames = 1, samples = 4, accumulate = 1;
     uint64_t budget = 0;
-    bool noWait = false, json = false, quiet = false;
+    bool noWait = false, json = false, quiet = false, force = false;
     CameraOptions camera;
     BuildOptions build;
     ColourOptions colour;
@@ -82,13 +85,31 @@ nlohmann::json countersJson(const FrameCounters& c) {
             {"cut_ms", c.cutMs}};
 }
 
-Result<void> run(const Options& o) {
+/// Before anything is read.
+Result<void> checkPictures(const Options& o) {
     STIPPLE_TRY(image::checkImagePath(o.output));
+    std::vector<std::string> inputs = o.inputs;
+    inputs.insert(inputs.end(), {o.camera.path, o.environment.path});
+    const bool isOne = o.camera.path.empty() && o.camera.orbit == 0;
+    if (!isOne) STIPPLE_TRY(outputTarget(numbered(o.output, 0)));
+    return checkOutputs(isOne ? std::vector<Output>{{o.output, FileKind::picture}} : numberedPictures(o.output), inputs,
+                        o.force);
+}
+
+/// Before any work. (It takes longer to load than a built scene takes to draw: then only whether it is there.)
+Result<void> checkModule(const Options& o) {
+    const bool isLong = !o.camera.path.empty() || o.camera.orbit > 0 || o.accumulate > 1 || o.mode == "reference";
+    return image::checkModule(isLong || !lod::isStoreFile(o.inputs.front()));
+}
+
+Result<void> run(const Options& o) {
+    STIPPLE_TRY(checkPictures(o));
     STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
     STIPPLE_TRY(o.camera.check());
     if (!(o.error > 0)) return fail(ErrorKind::usage, "must be larger than 0", "--error");
     const auto executor = makeTbbExecutor(o.build.threads);
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
+    STIPPLE_TRY(checkModule(o));
     STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, o.colour, *executor, !o.quiet));
     const lod::StoreDescription& description = scene.description;
     STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
@@ -217,6 +238,7 @@ void setupRender(CLI::App& app, int& status) {
     sub->add_flag("--no-wait", o->noWait, "do not wait for the complete cut");
     sub->add_flag("--json", o->json, "print measurements as JSON");
     sub->add_flag("--quiet", o->quiet, "no progress");
+    addForce(*sub, o->force);
     o->colour.addTo(*sub);
     o->environment.addTo(*sub);
     auto* group = sub->add_option_group("building", "for inputs that are not built yet");

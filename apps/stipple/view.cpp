@@ -8,6 +8,7 @@
 #include "apps/stipple/common.h"
 #include "apps/stipple/legend.h"
 #include "apps/stipple/navigation.h"
+#include "apps/stipple/outputs.h"
 #include "engine/base/process.h"
 #include "engine/gpu/window.h"
 #include "engine/image/image_io.h"
@@ -23,6 +24,7 @@ struct Options {
     double error = 1, wind = 0;
     uint64_t budget = 2'000'000;
     int frames = 0;
+    bool force = false;
     BuildOptions build;
     ColourOptions colour;
     EnvironmentOptions environment;
@@ -131,7 +133,13 @@ bool applyKeys(const std::string& pressed, render::FrameSettings& settings, Navi
 
 Result<void> run(const Options& o) {
     STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
-    if (!o.screenshot.empty()) STIPPLE_TRY(image::checkImagePath(o.screenshot));
+    if (!o.screenshot.empty()) {
+        STIPPLE_TRY(image::checkImagePath(o.screenshot));
+        STIPPLE_TRY(image::checkModule(true));
+        std::vector<std::string> inputs = o.inputs;
+        inputs.push_back(o.environment.path);
+        STIPPLE_TRY(checkOutputs({{o.screenshot, FileKind::picture}}, inputs, o.force));
+    }
     if (!gpu::hasDisplay())
         return fail(ErrorKind::device, "there is no display", "stipple view",
                     "use stipple render, or xvfb-run stipple view");
@@ -229,6 +237,7 @@ void setupView(CLI::App& app, int& status) {
         ->capture_default_str();
     sub->add_option("--frames", o->frames, "close after N frames (0: when the user does)")->capture_default_str();
     sub->add_option("--screenshot", o->screenshot, "with --frames: write what the last frame shows");
+    addForce(*sub, o->force);
     o->colour.addTo(*sub);
     o->environment.addTo(*sub);
     o->build.addTo(*sub);

@@ -2,6 +2,7 @@
 
 #include <dlfcn.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <filesystem>
@@ -20,15 +21,18 @@ struct Module {
     std::string problem;
 };
 
+/// Beside the program (build tree), in lib/stipple of an installation, or where the build put it (tests).
+std::array<std::string, 3> modulePlaces() {
+    std::error_code ignored;
+    const auto folder = std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path();
+    return {(folder / "libstipple_oiio.so").string(), (folder / STIPPLE_INSTALLED_MODULE).string(),
+            STIPPLE_BUILT_MODULE};
+}
+
 const Module& module() {
     static const Module loaded = [] {
         Module m;
-        std::error_code ignored;
-        const auto folder = std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path();
-        // Beside the program (build tree), in lib/stipple of an installation, or where the build put it (tests).
-        for (const std::string& place :
-             {(folder / "libstipple_oiio.so").string(), (folder / STIPPLE_INSTALLED_MODULE).string(),
-              std::string(STIPPLE_BUILT_MODULE)}) {
+        for (const std::string& place : modulePlaces()) {
             void* handle = ::dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL);
             if (!handle) {
                 m.problem = ::dlerror();
@@ -53,7 +57,21 @@ bool hasExtension(const std::string& path, const char* extension) {
 
 }  // namespace
 
+Result<void> checkModule(bool load) {
+    const auto missing = [](const std::string& why) {
+        return fail(ErrorKind::output, "the picture module cannot be loaded: " + why, "",
+                    "install OpenImageIO, or the program anew");
+    };
+    const std::array<std::string, 3> places = modulePlaces();
+    std::error_code ignored;
+    if (std::none_of(places.begin(), places.end(), [&](const auto& p) { return std::filesystem::exists(p, ignored); }))
+        return missing(places[0] + " is not there");
+    if (load && !module().encode) return missing(module().problem);
+    return {};
+}
+
 Result<void> checkImagePath(const std::string& path) {
+    if (path.empty()) return fail(ErrorKind::usage, "the name of the picture to write is empty", "", "e.g. scan.png");
     if (hasExtension(path, ".png") || hasExtension(path, ".exr")) return {};
     return fail(ErrorKind::usage, "pictures are written as .png or .exr", path, "change the extension");
 }

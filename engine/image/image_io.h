@@ -19,6 +19,8 @@ Result<render::Image> readImage(const std::string& path);
 Result<render::Image> decodeImage(const std::vector<uint8_t>& bytes, const std::string& name);
 /// Linear floats, e.g. of .hdr and .exr.
 Result<render::HdrImage> readHdr(const std::string& path);
+/// Is there what reads and writes pictures? Where `load` is given, by loading it.
+Result<void> checkModule(bool load);
 /// Can this extension be written? An error that names those that can, if not.
 Result<void> checkImagePath(const std::string& path);
 
