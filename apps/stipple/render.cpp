@@ -115,7 +115,8 @@ Result<void> run(const Options& o) {
     STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
     STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
     STIPPLE_ASSIGN(render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
-    STIPPLE_ASSIGN(settings.draw.environment, openEnvironment(o.environment.path, o.environment.scale, *executor));
+    STIPPLE_ASSIGN(settings.draw.environment,
+                   openEnvironment(o.environment.path, o.environment.scale, o.build.reading().memoryBytes, *executor));
     if (o.mode == "reference" && colour.mode != lod::ColourMode::own)
         return fail(ErrorKind::usage, "traced pictures have the scene's own colours", "--mode reference",
                     "leave --colour out, or use --device reference");
@@ -177,7 +178,7 @@ Result<void> run(const Options& o) {
             {"first_image_ms", timings.firstImageMs},
             {"complete_ms", timings.completeMs},
             {"counters", countersJson(c)}};
-        fmt::print("{}\n", j.dump(2));
+        fmt::print("{}\n", jsonText(j));
     } else if (!o.quiet && shot.views.size() == 1) {
         const std::string drawn = c.trianglesDrawn == 0 ? fmt::format("{} records", c.recordsDrawn)
                                   : c.recordsDrawn == 0
@@ -254,8 +255,7 @@ void setupRender(CLI::App& app, int& status) {
                      "radius of strands that have none, file units (0: a 4000th of the extent)")
         ->check(numberBetween(0.0, 1e300));
     group->add_flag("--only-points", o->build.onlyPoints, "of a PLY mesh take the vertices, as points");
-    group->add_flag("--repair", o->build.repair,
-                    "pass over faults of a glTF file that change nothing that is drawn, and count them");
+    addSceneFileOptions(*sub, o->build.allowOutside, o->build.repair);
     group->add_flag("--skip-bad", o->build.skipBad, "go on past corrupt chunks and files, and say what was lost");
     group->add_option("--threads", o->build.threads, "threads (0: all cores)")
         ->check(CLI::Range(0, 1024))

@@ -159,7 +159,8 @@ Result<void> run(const Options& o) {
     settings.budgets = {o.error, o.budget};
     settings.draw.unlitTriangles = o.shade == "unlit";
     settings.draw.lights = scene.lights;
-    STIPPLE_ASSIGN(settings.draw.environment, openEnvironment(o.environment.path, o.environment.scale, *executor));
+    STIPPLE_ASSIGN(settings.draw.environment,
+                   openEnvironment(o.environment.path, o.environment.scale, o.build.reading().memoryBytes, *executor));
     settings.draw.lit = o.shade == "lit" || (o.shade == "auto" && isShaded(d) && colour.mode == lod::ColourMode::own);
     settings.draw.worldUp = d.up;
     settings.draw.wind = {o.wind, 0, render::windAcross(d.up)};
