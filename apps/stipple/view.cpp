@@ -191,8 +191,8 @@ class Viewer {
         return window_.present(
             session_.state().image,
             [&] {
-                drawOverlay({session_.state(), settings_, session_.legend(), notices_, shownOpening_, hands,
-                             input.seconds * 1e3, input.names});
+                drawOverlay({session_.state(), settings_, session_.legend(), notices_, shownOpening_, hands, shownMs_,
+                             input.names});
             },
             capture);
     }
@@ -204,8 +204,10 @@ class Viewer {
         if (std::exchange(wantsPicture_, false) && drawn) takePicture();
         if (!drawn) tell(drawn.error());
         if (session_.state().image.rgba.empty()) return {};
+        const double start = nowSeconds();
         STIPPLE_ASSIGN(const bool shown, present(input, nullptr));
         hasChanged_ = !shown;
+        shownMs_ = session_.state().counters.frameMs + (nowSeconds() - start) * 1e3;
         return {};
     }
 
@@ -246,6 +248,7 @@ class Viewer {
     Notices notices_;
     std::string shownOpening_;
     uint32_t width_ = 0, height_ = 0;
+    double shownMs_ = 0;  ///< what the last frame took, with showing it
     int frames_ = 0, pictures_ = 1;
     bool hasChanged_ = true, isMoving_ = false, wantsPicture_ = false;
 };

@@ -135,8 +135,15 @@ class WindowImpl final : public Window {
 
     Result<bool> present(const render::Image& image, const std::function<void()>& drawOverlay,
                          render::Image* capture) override {
+        fitImgui(image);
         ImGui_ImplVulkan_NewFrame();
         ImGui_ImplGlfw_NewFrame();
+        // Twice: the first time finds how large the text is, and what is new is not shown yet. With frames drawn only
+        // when something changes, there may be no next one for it to appear in.
+        ImGui::NewFrame();
+        drawOverlay();
+        ImGui::EndFrame();
+        ImGui::GetIO().DeltaTime = 1e-3f;
         ImGui::NewFrame();
         drawOverlay();
         ImGui::Render();
@@ -200,14 +207,19 @@ class WindowImpl final : public Window {
     void scaleImgui() {
         float x = 1, y = 1;
         glfwGetWindowContentScale(window_, &x, &y);
-        int w = 0, h = 0;
-        glfwGetFramebufferSize(window_, &w, &h);
-        const float scale = std::clamp(x, 0.5f, 8.0f), pixels = static_cast<float>(pixelsPerUnit(w, h).x);
+        contentScale_ = std::clamp(x, 0.5f, 8.0f);
         ImFontConfig font;
-        font.SizePixels = std::round(13 * scale);
+        font.SizePixels = std::round(13 * contentScale_);
         ImGui::GetIO().Fonts->AddFontDefault(&font);
-        ImGui::GetIO().FontGlobalScale = 1 / pixels;
-        ImGui::GetStyle().ScaleAllSizes(scale / pixels);
+    }
+
+    /// Smaller letters where the window is too small for what they say, but never below those of a plain screen.
+    void fitImgui(const render::Image& image) {
+        const float fits = std::min(static_cast<float>(image.width) / 640, static_cast<float>(image.height) / 400);
+        const float wanted = std::clamp(fits, std::min(1.0f, contentScale_), contentScale_);
+        const auto pixels =
+            static_cast<float>(pixelsPerUnit(static_cast<int>(image.width), static_cast<int>(image.height)).x);
+        ImGui::GetIO().FontGlobalScale = wanted / contentScale_ / pixels;
     }
 
     Result<void> setupImgui() {
@@ -246,6 +258,7 @@ class WindowImpl final : public Window {
     std::unique_ptr<Swapchain> swapchain_;
     VkDescriptorPool imguiPool_ = VK_NULL_HANDLE;
     InputState inputState_;
+    float contentScale_ = 1;
     double lastPoll_ = 0, lastX_ = 0, lastY_ = 0;
     bool imguiReady_ = false;
 };

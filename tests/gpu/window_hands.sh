@@ -6,7 +6,7 @@ set -u
 program=$1 drop=$2 case=$3
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 if [ "${4:-}" != inside ]; then
-    for tool in xdotool openbox wmctrl xvfb-run python3; do
+    for tool in xdotool openbox wmctrl xprop setxkbmap xvfb-run python3; do
         command -v $tool >/dev/null || { echo "$tool is missing (see .ci/packages.txt)"; exit 1; }
     done
     folder=$(mktemp -d)
@@ -37,7 +37,7 @@ pixel() { python3 "$here/screen.py" "$folder/Xvfb_screen0" "$@"; }
 lines() { wc -l <"$1"; }
 hasLines() { [ "$(lines "$1")" -ge "$2" ]; }
 isAlive() { kill -0 "$viewer" 2>/dev/null; }
-findWindow() { window=$(xdotool search --onlyvisible --pid "$viewer" 2>/dev/null | tail -1) && [ -n "$window" ]; }
+findWindow() { isAlive || fail "it ended"; window=$(xdotool search --onlyvisible --pid "$viewer" 2>/dev/null | tail -1) && [ -n "$window" ]; }
 isFocused() { [ "$(xdotool getwindowfocus 2>/dev/null)" = "$window" ] || { xdotool windowactivate "$window" 2>/dev/null; false; }; }
 # The window's own corner on the screen.
 isDrawn() { [ "$(pixel $((X + 12)) $((Y + HEIGHT - 12)))" = "$background" ]; }
@@ -46,10 +46,11 @@ hasSize() { geometry && [ "$WIDTH" = "$1" ] && [ "$HEIGHT" = "$2" ]; }
 ticks() { awk '{print $14 + $15}' "/proc/$viewer/stat"; }
 pngSize() { python3 -c 'import struct,sys; print("%dx%d" % struct.unpack(">2I", open(sys.argv[1], "rb").read(24)[16:]))' "$1"; }
 
+size=640x480
 # view ARGUMENTS...: starts the program and waits for its window.
 view() {
     : >"$folder/out" && : >"$folder/err"
-    "$program" view --device cpu --size 640x480 "$@" >>"$folder/out" 2>>"$folder/err" &
+    "$program" view --device cpu --size "$size" "$@" >>"$folder/out" 2>>"$folder/err" &
     viewer=$!
     await 60 findWindow || fail "no window"
     await 20 isFocused || fail "the window has no focus"
@@ -137,11 +138,11 @@ window_changes_its_size() {
             [ "$(pixel $((X + WIDTH - 12)) $((Y + HEIGHT / 2)))" = "$background" ]
     }
     sized() { shoot && [ "$(pngSize "$shot")" = "${WIDTH}x$HEIGHT" ]; }
-    for size in "800 600" "420 300" "801 601"; do
-        xdotool windowsize "$window" $size
-        await 20 hasSize $size || fail "not resized to $size"
-        await 20 resized || fail "at $size the far corner is $(pixel $((X + WIDTH - 12)) $((Y + HEIGHT - 12))), not $background"
-        await 10 sized || fail "the picture is $(pngSize "$shot") at $size"
+    for wanted in "800 600" "420 300" "801 601"; do
+        xdotool windowsize "$window" $wanted
+        await 20 hasSize $wanted || fail "not resized to $wanted"
+        await 20 resized || fail "at $wanted the far corner is $(pixel $((X + WIDTH - 12)) $((Y + HEIGHT - 12))), not $background"
+        await 10 sized || fail "the picture is $(pngSize "$shot") at $wanted"
     done
     wmctrl -i -r "$window" -b add,maximized_vert,maximized_horz
     await 20 eval 'geometry; [ "$WIDTH" -gt 900 ]' || fail "not maximised"
@@ -274,6 +275,25 @@ cameras_and_paths() {
 
 trap 'kill $viewer $manager 2>/dev/null' EXIT
 viewer=
+letters_follow_the_desktop() {
+    scan
+    below() { geometry; pixel $((X + 30)) $((Y + 45)); } # under a line of figures of plain letters, in one of large ones
+    for dpi in 96 192; do
+        xprop -root -f RESOURCE_MANAGER 8s -set RESOURCE_MANAGER "$(printf 'Xft.dpi:\t%s' $dpi)"
+        size=900x700 view "$folder/a.las"
+        settle
+        geometry
+        local background
+        background=$(pixel $((X + 30)) $((Y + 120)))
+        if [ $dpi = 96 ]; then
+            [ "$(below)" = "$background" ] || fail "plain letters reach too far"
+        else
+            [ "$(below)" != "$background" ] || fail "the letters do not grow with the desktop's scale"
+        fi
+        finish
+    done
+}
+
 # Without frames around windows, xdotool says truly where they are.
 cat >"$folder/openbox.xml" <<'XML'
 <openbox_config xmlns="http://openbox.org/3.4/rc">
