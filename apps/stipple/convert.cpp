@@ -80,11 +80,13 @@ Result<void> run(const Options& o) {
     const std::string extension = fs::path(o.output).extension().string();
     if (extension != ".stipple" && extension != ".glb" && extension != ".gltf")
         return fail(ErrorKind::usage, "is neither a store nor a scene", o.output, "write to .stipple, .glb or .gltf");
+    catchStopSignals();
     const double start = nowSeconds();
     const auto executor = makeTbbExecutor(0);
     STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(o.input, o.repair));
     STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene));
     scene::StrandFit fit = scene::fitStrands(scene, images, o.fit, *executor);
+    STIPPLE_TRY(checkStopped(o.output));
     if (fit.trianglesIn == 0) return fail(ErrorKind::input, "holds no triangles", o.input);
     tidy(fit.rest);
     const bool hasStrands = fit.strands.strands() > 0;
@@ -95,9 +97,10 @@ Result<void> run(const Options& o) {
         written.push_back(o.output);
     } else {
         if (!hasStrands) return fail(ErrorKind::input, "has no part that looks like a ribbon or a tube", o.input);
-        Progress progress(!o.json);
+        Progress progress(true);
         lod::StrandBuildSettings settings;
         settings.description.source = fs::path(o.input).filename().string();
+        settings.limits.isStopped = isStopRequested;
         STIPPLE_TRY(lod::buildStrandStore(lod::sourceOf(lod::cleanStrands(fit.strands, 0)), o.output, settings,
                                           *executor, progress));
         written.push_back(o.output);
@@ -117,18 +120,16 @@ Result<void> run(const Options& o) {
         }
     }
     if (o.json) {
-        fmt::print("{}\n",
-                   nlohmann::json{
-                       {"triangles", fit.trianglesIn},
-                       {"triangles_left", fit.trianglesLeft},
-                       {"ribbons", fit.ribbons},
-                       {"tubes", fit.tubes},
-                       {"segments", fit.strands.position.size() - fit.strands.strands()},
-                       {"deviation",
-                        {{"mean", fit.meanDeviation}, {"p95", fit.p95Deviation}, {"largest", fit.largestDeviation}}},
-                       {"written", written},
-                       {"seconds", nowSeconds() - start}}
-                       .dump(2));
+        printJson(
+            "convert",
+            {{"triangles", fit.trianglesIn},
+             {"triangles_left", fit.trianglesLeft},
+             {"ribbons", fit.ribbons},
+             {"tubes", fit.tubes},
+             {"segments", fit.strands.position.size() - fit.strands.strands()},
+             {"deviation", {{"mean", fit.meanDeviation}, {"p95", fit.p95Deviation}, {"largest", fit.largestDeviation}}},
+             {"written", written},
+             {"seconds", nowSeconds() - start}});
         return {};
     }
     fmt::print("{}: {} triangles became {} ribbons and {} tubes ({} segments); {} triangles are left\n", o.input,
@@ -146,18 +147,19 @@ Result<void> run(const Options& o) {
 void setupConvert(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
     CLI::App* sub = app.add_subcommand("convert", "polygon plants to ribbons and tubes");
-    sub->add_option("input", o->input, "the plant (.gltf, .glb, .obj)")->required();
+    sub->add_option("INPUT", o->input, "the plant (.gltf, .glb, .obj)")->required();
     sub->add_option("-o,--output", o->output, "the file to write (.stipple; .glb or .gltf: lines with radii)")
+        ->type_name("FILE")
         ->required();
     sub->add_flag("--strands", o->strands, "leaves and blades become ribbons, branches tubes; what is neither is kept");
     sub->add_option("--tolerance", o->fit.tolerance, "how far a part may be from its strand, share of its own width")
-        ->check(CLI::Range(0.01, 2.0))
+        ->transform(within(0.01, 2.0))
         ->capture_default_str();
     sub->add_option("--joints", o->fit.joints, "segments of a strand at most")
-        ->check(CLI::Range(2, 1000))
+        ->transform(within(2, 1000))
         ->capture_default_str();
     sub->add_flag("--repair", o->repair, "pass over faults of a glTF file that change nothing that is drawn");
-    sub->add_flag("--json", o->json, "as JSON");
+    sub->add_flag("--json", o->json, "print what became of it as JSON (stipple help json)");
     sub->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());
     });
