@@ -5,6 +5,7 @@
 #include <atomic>
 #include <mutex>
 
+#include "engine/base/process.h"
 #include "engine/base/queue.h"
 #include "lod/store.h"
 #include "lod/verify_errors.h"
@@ -113,7 +114,7 @@ Result<VerifyReport> verifyStore(const Store& store, Executor& executor, uint64_
     CompletionQueue<std::pair<size_t, Error>> problems;
     std::atomic<uint64_t> records{0}, leafRecords{0};
     executor.parallelFor((h.nodes.size() + stride - 1) / stride, 1, [&](size_t begin, size_t end) {
-        for (size_t i = begin * stride; i < end * stride && i < h.nodes.size(); i += stride) {
+        for (size_t i = begin * stride; i < end * stride && i < h.nodes.size() && !isStopRequested(); i += stride) {
             ++checked;
             const auto chunk = readChunk(store, static_cast<uint32_t>(i), true);
             if (!chunk) {
@@ -145,10 +146,11 @@ Result<VerifyReport> verifyStore(const Store& store, Executor& executor, uint64_
         }
     });
     executor.parallelFor(h.tiles.size(), 1, [&](size_t begin, size_t end) {
-        for (size_t t = begin; t < end; ++t)
+        for (size_t t = begin; t < end && !isStopRequested(); ++t)
             if (const auto tile = readChunk(store, static_cast<uint32_t>(h.nodes.size() + t)); !tile)
                 problems.push({h.nodes.size() + t, tile.error()});
     });
+    if (isStopRequested()) return fail(ErrorKind::interrupted, "interrupted; not all of it was checked", store.path);
     auto found = problems.takeAll();
     if (!found.empty())
         return tl::unexpected(std::min_element(found.begin(), found.end(), [](const auto& a, const auto& b) {

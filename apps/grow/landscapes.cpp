@@ -8,6 +8,7 @@
 #include "apps/grow/meshes.h"
 #include "apps/grow/noise.h"
 #include "apps/grow/plants.h"
+#include "engine/base/process.h"
 #include "engine/base/rng.h"
 
 namespace stipple::grow {
@@ -243,7 +244,7 @@ scene::Scene growForest(const LandscapeOptions& o) {
         places[species * o.variants + rng.below(o.variants)].push_back(place);
     }
     for (size_t k = 0; k < places.size(); ++k) {
-        if (places[k].empty()) continue;
+        if (places[k].empty() || isStopRequested()) continue;
         PlantOptions plant;
         plant.species = kSpecies.at(k / o.variants);
         plant.leaves = o.leaves;

@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "apps/grow/noise.h"
+#include "engine/base/process.h"
 
 namespace stipple::grow {
 namespace {
@@ -18,7 +19,7 @@ void addGrid(scene::Primitive& p, uint32_t nu, uint32_t nv,
              const std::function<glm::dvec3(double u, double v)>& normal) {
     const auto base = static_cast<uint32_t>(p.position.size());
     if (p.uv.empty()) p.uv.resize(1);
-    for (uint32_t j = 0; j <= nv; ++j)
+    for (uint32_t j = 0; j <= nv && !isStopRequested(); ++j)
         for (uint32_t i = 0; i <= nu; ++i) {
             const double u = double(i) / nu, v = double(j) / nv;
             glm::dvec3 x(0);
@@ -28,7 +29,7 @@ void addGrid(scene::Primitive& p, uint32_t nu, uint32_t nv,
             p.normal.emplace_back(normal(u, v));
             p.uv[0].emplace_back(uv);
         }
-    for (uint32_t j = 0; j < nv; ++j)
+    for (uint32_t j = 0; j < nv && !isStopRequested(); ++j)
         for (uint32_t i = 0; i < nu; ++i) {
             const uint32_t a = base + j * (nu + 1) + i, b = a + 1, c = a + nu + 1, d = c + 1;
             for (const uint32_t k : {a, b, d, a, d, c}) p.indices.push_back(k);
@@ -158,7 +159,7 @@ Textures growTextures(const MeshOptions& o) {
     t.normal.rgba.resize(size_t{n} * n);
     const Noise noise(o.seed + 17), ground(o.seed);
     std::vector<double> relief(size_t{n} * n);
-    for (uint32_t y = 0; y < n; ++y)
+    for (uint32_t y = 0; y < n && !isStopRequested(); ++y)
         for (uint32_t x = 0; x < n; ++x) {
             const double u = (x + 0.5) / n, v = (y + 0.5) / n;
             const size_t i = size_t{y} * n + x;

@@ -8,6 +8,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
 
+#include "engine/base/process.h"
 #include "engine/base/rng.h"
 
 namespace stipple::grow {
@@ -86,6 +87,7 @@ class Grower {
         const double perTwig = static_cast<double>(leaves_) / std::max<double>(1, static_cast<double>(twigs_.size()));
         double owed = 0;
         for (const Strip& twig : twigs_) {
+            if (isStopRequested()) return;
             owed += perTwig;
             const int count = static_cast<int>(owed);
             owed -= count;
@@ -174,6 +176,7 @@ scene::Primitive asLines(const std::vector<Strip>& strips, bool isLeaf) {
     scene::Primitive p;
     p.kind = scene::PrimitiveKind::lines;
     for (const Strip& s : strips) {
+        if (isStopRequested()) break;
         const auto first = static_cast<uint32_t>(p.position.size());
         for (size_t i = 0; i < s.places.size(); ++i) {
             p.position.emplace_back(s.places[i]);
@@ -192,6 +195,7 @@ scene::Primitive asLines(const std::vector<Strip>& strips, bool isLeaf) {
 scene::Primitive asTriangles(const std::vector<Strip>& strips, bool isLeaf) {
     scene::Primitive p;
     for (const Strip& s : strips) {
+        if (isStopRequested()) break;
         const uint32_t sides = isLeaf ? 2 : s.radii[0] > 0.05 ? 12 : s.radii[0] > 0.01 ? 6 : 4;
         const auto first = static_cast<uint32_t>(p.position.size());
         dvec3 x(0);

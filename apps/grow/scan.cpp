@@ -5,6 +5,7 @@
 
 #include "apps/grow/grow.h"
 #include "engine/base/executor.h"
+#include "engine/base/process.h"
 #include "engine/base/rng.h"
 
 namespace stipple::grow {
@@ -316,7 +317,8 @@ std::vector<ScanPoint> growScan(const ScanOptions& options) {
         std::vector<std::vector<ScanPoint>> parts(rows * static_cast<uint64_t>(positions));
         const auto executor = makeTbbExecutor(0);
         executor->parallelFor(parts.size(), 4, [&](size_t begin, size_t end) {
-            for (size_t i = begin; i < end; ++i) castRow(static_cast<int>(i / rows), i % rows, rows, columns, parts[i]);
+            for (size_t i = begin; i < end && !isStopRequested(); ++i)
+                castRow(static_cast<int>(i / rows), i % rows, rows, columns, parts[i]);
         });
         for (const auto& part : parts) out.insert(out.end(), part.begin(), part.end());
     };

@@ -40,7 +40,7 @@ Result<void> run(const Options& o, bool& isSilent) {
     keepFreeMemory(settings.memoryBytes, threads);
     const auto executor = makeTbbExecutor(build.threads);
     Result<lod::BuildReport> built = [&] {
-        Progress progress(!o.quiet && !isSilent, o.json);
+        Progress progress(build.progressStyle(o.quiet || isSilent));
         return buildAny(o.inputs, o.output, build, *executor, progress);
     }();
     if (!built) return tl::unexpected(built.error());
@@ -64,7 +64,7 @@ Result<void> run(const Options& o, bool& isSilent) {
                                   {"temporary_bytes", r.temporaryBytes},
                                   {"resumed", r.isResumed},
                                   {"content_hash", hexDigits(r.contentHash)}};
-        fmt::print("{}\n", jsonText(j));
+        printJson("build", j);
         return {};
     }
     for (const std::string& note : r.notes) fmt::print(stderr, "note: {}\n", printable(note));
@@ -91,13 +91,13 @@ void setupBuild(CLI::App& app, int& status) {
     sub->add_option("INPUT", o->inputs,
                     "scans that together make the scene: files, folders, patterns, ept.json, cloud.js")
         ->required();
-    sub->add_option("-o,--output", o->output, "the scene to write (.stipple)")->required();
+    sub->add_option("-o,--output", o->output, "the scene to write (.stipple)")->type_name("STORE")->required();
     o->build.addTo(*sub);
     addForce(*sub, o->force);
     sub->add_flag("--restart", o->restart,
                   "begin anew where an interrupted build of other input or with other settings is in the way");
-    sub->add_flag("--json", o->json, "print the report as JSON");
-    sub->add_flag("--quiet", o->quiet, "no progress on standard error");
+    sub->add_flag("--json", o->json, "print the report as JSON (stipple help json)");
+    sub->add_flag("--quiet", o->quiet, "neither progress nor notes");
     sub->add_flag("--mpi", o->mpi,
                   "build as a rank of an MPI job (mpirun -n N stipple build --mpi ...); all ranks must see the "
                   "inputs and the folder for temporary files; --memory and --threads are of each rank");

@@ -52,7 +52,7 @@ Result<std::shared_ptr<const lod::Store>> openCached(const std::vector<std::stri
                                                      const StoreMaker& make) {
     STIPPLE_ASSIGN(const std::string path, cachePath(inputs, build, part));
     if (!fs::exists(path)) {
-        Progress progress(showProgress);
+        Progress progress(build.progressStyle(!showProgress));
         STIPPLE_ASSIGN(const lod::BuildReport built, make(path, progress));
         if (showProgress)
             fmt::print(stderr, "{} ({}): built into the cache in {:.1f} s ({})\n", inputs.front(), part, built.seconds,

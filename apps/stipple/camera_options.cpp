@@ -9,18 +9,24 @@ namespace stipple::app {
 
 void CameraOptions::addTo(CLI::App& app) {
     auto* const eyeOption =
-        app.add_option("--eye", eye, "camera position x,y,z in file coordinates (default: fits the scene)");
-    auto* const targetOption = app.add_option("--target", target, "point x,y,z that the camera looks at");
-    auto* const upOption = app.add_option("--camera-up", cameraUp, "direction x,y,z that is up in the picture");
+        app.add_option("--eye", eye, "camera position in file coordinates (default: fits the scene)")
+            ->type_name("X,Y,Z");
+    auto* const targetOption =
+        app.add_option("--target", target, "point that the camera looks at, file coordinates")->type_name("X,Y,Z");
+    auto* const upOption =
+        app.add_option("--camera-up", cameraUp, "direction that is up in the picture, file coordinates")
+            ->type_name("X,Y,Z");
     auto* const fovOption = app.add_option("--fov", fov, "vertical field of view, degrees")
-                                ->check(numberBetween(0.1, 170.0))
+                                ->transform(within(0.1, 170.0))
                                 ->capture_default_str();
     auto* const sceneOption =
         app.add_option("--scene-camera", sceneCamera, "the N-th camera of a .gltf scene (0: a view of the whole)")
-            ->check(CLI::Range(0, 100000));
-    auto* const pathOption = app.add_option("--camera-path", path, "JSON file with keys; one picture per frame");
+            ->transform(within(0, 100000));
+    auto* const pathOption =
+        app.add_option("--camera-path", path, "JSON file with keys {t, eye, target, up, fov}; one picture per frame")
+            ->type_name("FILE");
     auto* const orbitOption =
-        app.add_option("--orbit", orbit, "N pictures around the scene")->check(CLI::Range(1, 100000));
+        app.add_option("--orbit", orbit, "N pictures around the scene")->transform(within(1, 100000));
     // Each of these says where the camera stands: what another one says would be lost without a word.
     for (auto* const place : {eyeOption, targetOption, upOption})
         place->excludes(sceneOption)->excludes(pathOption)->excludes(orbitOption);
@@ -136,15 +142,6 @@ void addUpOption(CLI::App& app, std::string& up) {
         "x|y|z");
     app.add_option("--up", up, "the scene's up axis, instead of the format's own (LAS: z, PLY and glTF: y)")
         ->check(isAxis);
-}
-
-CLI::Validator numberBetween(double low, double high) {
-    return {[low, high](std::string& text) {
-                double value = 0;
-                if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) return std::string();
-                return fmt::format("'{}' is not a number from {} to {}", text, low, high);
-            },
-            fmt::format("FLOAT in [{} - {}]", low, high)};
 }
 
 }  // namespace stipple::app

@@ -36,6 +36,6 @@ Result<Shot> makeShot(const CameraOptions& o, int frames, const OpenedScene& ope
 /// Adds `--up`: the scene's axis, wherever it is asked for.
 void addUpOption(CLI::App& app, std::string& up);
 /// A number from `low` to `high`; nan is none.
-CLI::Validator numberBetween(double low, double high);
+inline CLI::Validator numberBetween(double low, double high) { return within(low, high); }
 
 }  // namespace stipple::app

@@ -11,7 +11,7 @@
 #include "apps/stipple/camera_options.h"
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
-#include "engine/base/text.h"
+#include "engine/base/units.h"
 #include "engine/cpu/cpu_backend.h"
 #include "engine/image/image_io.h"
 #include "engine/reference/reference.h"
@@ -24,38 +24,40 @@
 namespace stipple::app {
 namespace fs = std::filesystem;
 
-int report(const Error& error) {
-    fmt::print(stderr, "stipple: {}\n", printable(error.line()));
-    return static_cast<int>(error.kind);
-}
-
 void BuildOptions::addTo(CLI::App& app) {
-    app.add_option("--memory", memory, "memory that the build may use, e.g. 512M or 4G")->capture_default_str();
-    app.add_option("--temp", temp,
-                   "folder for temporary files of a build that does not fit in memory (default: the output's)");
-    app.add_option("--duplicates", duplicates, "points at one place: keep all, or merge them into one")
-        ->check(CLI::IsMember({"keep", "merge"}))
+    app.add_option("--memory", memory, "memory that the build may use, bytes: 512M, 4G (stipple help budgets)")
+        ->check(bytes())
+        ->type_name("SIZE")
         ->capture_default_str();
-    app.add_option("--threads", threads, "threads (0: all cores)")->check(CLI::Range(0, 1024))->capture_default_str();
+    addProgressTo(app);
+    app.add_option("--temp", temp,
+                   "folder for temporary files of a build that does not fit in memory (default: the output's)")
+        ->type_name("FOLDER");
+    app.add_option("--duplicates", duplicates, "points at one place: keep all, or merge them into one")
+        ->check(oneOf({"keep", "merge"}))
+        ->capture_default_str();
+    app.add_option("--threads", threads, "threads (0: all cores)")->transform(within(0, 1024))->capture_default_str();
     app.add_option("--normals", normals,
                    "auto: estimate missing normals; fine: the same, each point from its own twelve nearest; keep: only "
                    "those of the file; none: no normals at all")
-        ->check(CLI::IsMember({"auto", "fine", "keep", "none"}))
+        ->check(oneOf({"auto", "fine", "keep", "none"}))
         ->capture_default_str();
     app.add_option("--radii", radii, "auto: estimate missing radii from the spacing; keep: only those of the file")
-        ->check(CLI::IsMember({"auto", "keep"}))
+        ->check(oneOf({"auto", "keep"}))
         ->capture_default_str();
     addUpOption(app, up);
     app.add_option("--attributes", attributes,
                    "attributes to keep beside position, colour and normal: all, none, or names with commas")
+        ->type_name("NAMES")
         ->capture_default_str();
-    app.add_option("--surfels", surfels, "turn meshes (.gltf, .glb, .obj) into that many samples; 0: keep triangles")
-        ->check(CLI::Range(uint64_t{0}, uint64_t{200'000'000}))
+    app.add_option("--surfels", surfels,
+                   "turn meshes (.gltf, .glb, .obj) into that many samples, e.g. 1M; 0: keep triangles")
+        ->transform(within(uint64_t{0}, uint64_t{200'000'000}))
         ->capture_default_str();
     addSceneFileOptions(app, allowOutside, repair);
     app.add_option("--strand-radius", strandRadius,
                    "radius of strands that have none, file units (0: a 4000th of the extent)")
-        ->check(numberBetween(0.0, 1e300));
+        ->transform(within(0.0, 1e300));
     app.add_flag("--only-points", onlyPoints, "of a PLY mesh take the vertices, as points");
     app.add_flag("--skip-bad", skipBad, "go on past corrupt chunks and files, and say what was lost");
 }
@@ -75,12 +77,30 @@ scene::ReadSettings BuildOptions::reading() const {
     return reading;
 }
 
+void BuildOptions::addProgressTo(CLI::App& app) {
+    app.add_option("--progress", progress,
+                   "on standard error: auto: a bar on a terminal, only notes otherwise; json: one line a second")
+        ->check(oneOf({"auto", "bar", "json", "none"}))
+        ->capture_default_str();
+}
+
+ProgressStyle BuildOptions::progressStyle(bool isQuiet) const {
+    if (isQuiet) return ProgressStyle::silent;
+    if (progress == "none") return ProgressStyle::notes;
+    if (progress == "bar") return ProgressStyle::bar;
+    return progress == "json" ? ProgressStyle::json : automaticProgress();
+}
+
 void ColourOptions::addTo(CLI::App& app) {
     app.add_option("--colour,--color", what,
                    "rgb, intensity, class, return, height, normal or the name of an attribute")
+        ->type_name("WHAT")
         ->capture_default_str();
-    app.add_option("--colour-map,--color-map", map, "grey, viridis, magma or turbo");
-    app.add_option("--colour-range,--color-range", range, "LOW,HIGH (default: 2nd to 98th percentile)");
+    app.add_option("--colour-map,--color-map", map, "colours of a range of values: grey, viridis, magma or turbo")
+        ->type_name("MAP");
+    app.add_option("--colour-range,--color-range", range,
+                   "values at the ends of the map (default: 2nd to 98th percentile)")
+        ->type_name("LOW,HIGH");
     app.add_flag("--legend", legend, "draw what the colours stand for into the picture");
 }
 
@@ -149,9 +169,10 @@ Result<lod::ColourBy> applyColours(OpenedScene& scene, const std::string& what, 
 }
 
 void EnvironmentOptions::addTo(CLI::App& app) {
-    app.add_option("--environment", path, "HDR picture all around (.hdr, .exr; equirectangular) that lights the scene");
-    app.add_option("--environment-scale", scale, "multiplies its light")
-        ->check(numberBetween(0.0, 1e6))
+    app.add_option("--environment", path, "HDR picture all around (.hdr, .exr; equirectangular) that lights the scene")
+        ->type_name("FILE");
+    app.add_option("--environment-scale", scale, "factor of its light")
+        ->transform(within(0.0, 1e6))
         ->capture_default_str();
 }
 
@@ -220,36 +241,6 @@ Result<glm::uvec2> parseSize(const std::string& text) {
         return fail(ErrorKind::usage, fmt::format("'{}' is not a size up to 16384x16384", text), "--size",
                     "e.g. 1920x1080");
     return glm::uvec2(w, h);
-}
-
-namespace {
-
-void makeUtf8(nlohmann::json& j) {
-    if (j.is_string()) {
-        auto& text = j.get_ref<std::string&>();
-        text = toUtf8(text);
-    } else if (j.is_array()) {
-        for (nlohmann::json& item : j) makeUtf8(item);
-    } else if (j.is_object()) {
-        nlohmann::json clean = nlohmann::json::object();
-        for (const auto& [key, value] : j.items()) {
-            nlohmann::json& to = clean[toUtf8(key)] = value;
-            makeUtf8(to);
-        }
-        j = std::move(clean);
-    }
-}
-
-}  // namespace
-
-std::string jsonText(nlohmann::json j) {
-    makeUtf8(j);
-    return j.dump(2);
-}
-
-nlohmann::json jsonNumber(double value) {
-    if (std::isfinite(value)) return value;
-    return value > 0 ? "inf" : "nan";
 }
 
 }  // namespace stipple::app

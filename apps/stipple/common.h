@@ -3,11 +3,12 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "apps/stipple/options.h"
+#include "apps/stipple/report.h"
 #include "engine/base/executor.h"
 #include "engine/base/result.h"
 #include "engine/render/backend.h"
@@ -19,9 +20,6 @@
 
 namespace stipple::app {
 
-/// Thrown nowhere: a command returns its exit code; this prints the error's line and gives its code.
-int report(const Error& error);
-
 struct BuildOptions {
     std::string memory = "2G", normals = "auto", radii = "auto", up, attributes = "none", temp, duplicates = "keep";
     int threads = 0;
@@ -29,9 +27,12 @@ struct BuildOptions {
     bool repair = false;  ///< of former versions: what it did is always done
     double strandRadius = 0;
     uint64_t surfels = 0;
+    std::string progress = "auto";
     Ranks* ranks = nullptr;  ///< of an MPI job
     lod::Leftovers leftovers = lod::Leftovers::goOn;
     void addTo(CLI::App& app);
+    void addProgressTo(CLI::App& app);
+    ProgressStyle progressStyle(bool isQuiet) const;
     Result<lod::BuildSettings> settings() const;
     /// How scene files are read.
     scene::ReadSettings reading() const;
@@ -98,10 +99,6 @@ std::string listDevices();
 
 Result<glm::dvec3> parseVector(const std::string& text, const char* option);
 Result<glm::uvec2> parseSize(const std::string& text);
-/// Numbers as JSON: infinity has no number there, so it becomes the string "inf".
-nlohmann::json jsonNumber(double value);
-/// JSON as it is printed: names of files and of what is in them may be any bytes, JSON is UTF-8.
-std::string jsonText(nlohmann::json j);
 
 void setupBuild(CLI::App& app, int& status);
 void setupInfo(CLI::App& app, int& status);

@@ -37,7 +37,7 @@ Result<void> run(const Options& o) {
                                   {"threshold", o.threshold},
                                   {"silhouette_iou", d.silhouetteIou},
                                   {"holes", d.holes}};
-        fmt::print("{}\n", jsonText(j));
+        printJson("compare", j);
     } else {
         fmt::print(
             "PSNR {:.2f} dB (foreground {:.2f} dB), largest difference {}/255, {:.4f} % of the pixels differ by more "
@@ -55,9 +55,12 @@ void setupCompare(CLI::App& app, int& status) {
     CLI::App* sub = app.add_subcommand("compare", "how far picture A is from the reference B");
     sub->add_option("A", o->a, "a picture (.png, .exr)")->required();
     sub->add_option("B", o->b, "the reference")->required();
-    sub->add_option("--diff", o->diff, "write the differences, eight times enlarged, as a picture");
-    sub->add_option("--threshold", o->threshold, "channel difference that counts as differing")->capture_default_str();
-    sub->add_flag("--json", o->json, "as JSON");
+    sub->add_option("--diff", o->diff, "write the differences, eight times enlarged, as a picture")
+        ->type_name("PICTURE");
+    sub->add_option("--threshold", o->threshold, "channel difference that counts as differing, of 255")
+        ->transform(within(0, 255))
+        ->capture_default_str();
+    sub->add_flag("--json", o->json, "print the measures as JSON (stipple help json)");
     addForce(*sub, o->force);
     sub->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());

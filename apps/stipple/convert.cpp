@@ -95,11 +95,13 @@ Result<void> run(const Options& o) {
     std::vector<Output> outputs{{o.output, isStore ? FileKind::store : FileKind::other}};
     if (isStore) outputs.insert(outputs.end(), {{beside.rest}, {beside.scene}});
     STIPPLE_TRY(checkOutputs(outputs, {o.input}, o.force));
+    catchStopSignals();
     const double start = nowSeconds();
     const auto executor = makeTbbExecutor(0);
     STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(o.input, o.build.reading()));
     STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene, o.build.reading().memoryBytes));
     scene::StrandFit fit = scene::fitStrands(scene, images, o.fit, *executor);
+    STIPPLE_TRY(checkStopped(o.output));
     if (fit.trianglesIn == 0) return fail(ErrorKind::input, "holds no triangles", o.input);
     tidy(fit.rest);
     const bool hasStrands = fit.strands.strands() > 0;
@@ -110,9 +112,10 @@ Result<void> run(const Options& o) {
         written.push_back(o.output);
     } else {
         if (!hasStrands) return fail(ErrorKind::input, "has no part that looks like a ribbon or a tube", o.input);
-        Progress progress(!o.json);
+        Progress progress(true);
         lod::StrandBuildSettings settings;
         settings.description.source = fs::path(o.input).filename().string();
+        settings.limits.isStopped = isStopRequested;
         STIPPLE_TRY(lod::buildStrandStore(lod::sourceOf(lod::cleanStrands(fit.strands, 0)), o.output, settings,
                                           *executor, progress));
         written.push_back(o.output);
@@ -129,17 +132,16 @@ Result<void> run(const Options& o) {
         }
     }
     if (o.json) {
-        fmt::print("{}\n",
-                   jsonText(nlohmann::json{
-                       {"triangles", fit.trianglesIn},
-                       {"triangles_left", fit.trianglesLeft},
-                       {"ribbons", fit.ribbons},
-                       {"tubes", fit.tubes},
-                       {"segments", fit.strands.position.size() - fit.strands.strands()},
-                       {"deviation",
-                        {{"mean", fit.meanDeviation}, {"p95", fit.p95Deviation}, {"largest", fit.largestDeviation}}},
-                       {"written", written},
-                       {"seconds", nowSeconds() - start}}));
+        printJson(
+            "convert",
+            {{"triangles", fit.trianglesIn},
+             {"triangles_left", fit.trianglesLeft},
+             {"ribbons", fit.ribbons},
+             {"tubes", fit.tubes},
+             {"segments", fit.strands.position.size() - fit.strands.strands()},
+             {"deviation", {{"mean", fit.meanDeviation}, {"p95", fit.p95Deviation}, {"largest", fit.largestDeviation}}},
+             {"written", written},
+             {"seconds", nowSeconds() - start}});
         return {};
     }
     fmt::print("{}: {} triangles became {} ribbons and {} tubes ({} segments); {} triangles are left\n", o.input,
@@ -157,22 +159,26 @@ Result<void> run(const Options& o) {
 void setupConvert(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
     CLI::App* sub = app.add_subcommand("convert", "polygon plants to ribbons and tubes");
-    sub->add_option("input", o->input, "the plant (.gltf, .glb, .obj)")->required();
+    sub->add_option("INPUT", o->input, "the plant (.gltf, .glb, .obj)")->required();
     sub->add_option("-o,--output", o->output,
                     "the file to write (.stipple: what is neither ribbon nor tube goes to NAME.rest.glb beside it, and "
                     "NAME.scene.glb shows both; .glb or .gltf: lines with radii)")
+        ->type_name("FILE")
         ->required();
     addForce(*sub, o->force);
     sub->add_flag("--strands", o->strands, "leaves and blades become ribbons, branches tubes; what is neither is kept");
     sub->add_option("--tolerance", o->fit.tolerance, "how far a part may be from its strand, share of its own width")
-        ->check(CLI::Range(0.01, 2.0))
+        ->transform(within(0.01, 2.0))
         ->capture_default_str();
     sub->add_option("--joints", o->fit.joints, "segments of a strand at most")
-        ->check(CLI::Range(2, 1000))
+        ->transform(within(2, 1000))
         ->capture_default_str();
-    sub->add_option("--memory", o->build.memory, "memory that reading the plant may use")->capture_default_str();
+    sub->add_option("--memory", o->build.memory, "memory that reading the plant may use, bytes: 512M, 4G")
+        ->check(bytes())
+        ->type_name("SIZE")
+        ->capture_default_str();
     addSceneFileOptions(*sub, o->build.allowOutside, o->build.repair);
-    sub->add_flag("--json", o->json, "as JSON");
+    sub->add_flag("--json", o->json, "print what became of it as JSON (stipple help json)");
     sub->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());
     });

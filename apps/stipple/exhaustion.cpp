@@ -11,11 +11,7 @@
 #include "engine/base/result.h"
 
 namespace stipple::app {
-namespace {
 
-constexpr std::string_view kLine = "stipple: out of memory (give a smaller --memory or --budget-points)\n";
-
-/// Takes no memory.
 bool isExhausted(const std::exception& e) {
     if (dynamic_cast<const std::bad_alloc*>(&e) != nullptr) return true;
     if (const auto* system = dynamic_cast<const std::system_error*>(&e))
@@ -24,6 +20,10 @@ bool isExhausted(const std::exception& e) {
     // TBB says it in words: a thread's stack is memory, too.
     return std::strstr(e.what(), "pthread_create has failed") != nullptr;
 }
+
+namespace {
+
+constexpr std::string_view kLine = "stipple: out of memory (give a smaller --memory or --budget-points)\n";
 
 void say(std::string_view text) {
     while (!text.empty()) {
@@ -51,17 +51,6 @@ void say(std::string_view text) {
 }
 
 }  // namespace
-
-int reportThrown(const std::exception& thrown) {
-    if (isExhausted(thrown)) {
-        say(kLine);
-        return static_cast<int>(ErrorKind::budget);
-    }
-    say("stipple: ");
-    say(thrown.what());
-    say("\n");
-    return static_cast<int>(ErrorKind::input);
-}
 
 void exitWhereNothingCatches() { std::set_terminate(endHere); }
 

@@ -5,8 +5,8 @@
 
 namespace stipple::app {
 
-/// Prints the one line for something that was thrown to main; its exit code.
-int reportThrown(const std::exception& thrown);
+/// Memory or threads are what ran out. (Asking takes no memory.)
+bool isExhausted(const std::exception& thrown);
 
 /// Where an exception cannot be thrown on (a destructor, a thread of a library that starts another): the same line and
 /// code instead of a signal. What has been written so far stays as after a kill.

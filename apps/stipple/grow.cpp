@@ -25,33 +25,23 @@ Result<void> run(Options& o) {
     STIPPLE_ASSIGN(const glm::dvec3 origin, parseVector(o.origin, "--origin"));
     o.scan.origin = {origin.x, origin.y, origin.z};
     STIPPLE_TRY(checkOutputs({{o.output}}, {}, o.force));
+    catchStopSignals();
     const double start = nowSeconds();
     const auto points = grow::growScan(o.scan);
+    STIPPLE_TRY(checkStopped(o.output));
     STIPPLE_TRY(grow::writeScan(o.output, points, o.scan));
     if (o.json)
-        fmt::print("{}\n", nlohmann::json{{"points", points.size()}, {"seconds", nowSeconds() - start}}.dump(2));
+        printJson("grow", {{"points", points.size()}, {"seconds", nowSeconds() - start}});
     else
         fmt::print("{}: {} points, {:.1f} s\n", o.output, points.size(), nowSeconds() - start);
     return {};
 }
 
 struct MeshRun {
-    std::string output, triangles = "100000";
+    std::string output;
     grow::MeshOptions mesh;
     bool json = false, force = false;
 };
-
-/// "10M", "250k" or a plain number; 0 if it is none.
-uint64_t parseCount(const std::string& text) {
-    double value = 0;
-    char unit = 0, rest = 0;
-    const int got = std::sscanf(text.c_str(), "%lf%c%c", &value, &unit, &rest);
-    const double factor = got == 1                                   ? 1
-                          : got == 2 && (unit == 'k' || unit == 'K') ? 1e3
-                          : got == 2 && unit == 'M'                  ? 1e6
-                                                                     : 0;
-    return value * factor >= 1 && value * factor <= 1e9 ? static_cast<uint64_t>(value * factor) : 0;
-}
 
 /// The pictures that a grown mesh's textures refer to.
 Result<void> addTextures(const grow::MeshOptions& mesh, scene::Scene& scene) {
@@ -67,12 +57,9 @@ Result<void> addTextures(const grow::MeshOptions& mesh, scene::Scene& scene) {
     return {};
 }
 
-Result<void> runMesh(MeshRun& o) {
-    o.mesh.triangles = parseCount(o.triangles);
-    if (o.mesh.triangles == 0)
-        return fail(ErrorKind::usage, fmt::format("'{}' is not a number up to 1000M", o.triangles), "--triangles",
-                    "e.g. 250k or 10M");
+Result<void> runMesh(const MeshRun& o) {
     STIPPLE_TRY(checkOutputs({{o.output}}, {}, o.force));
+    catchStopSignals();
     const double start = nowSeconds();
     scene::Scene scene = grow::growMesh(o.mesh);
     if (o.mesh.textureSize == 0) {
@@ -82,9 +69,10 @@ Result<void> runMesh(MeshRun& o) {
     STIPPLE_TRY(addTextures(o.mesh, scene));
     uint64_t triangles = 0;
     for (const auto& p : scene.meshes[0].primitives) triangles += p.indices.size() / 3;
+    STIPPLE_TRY(checkStopped(o.output));
     STIPPLE_TRY(scene::writeGltf(scene, o.output));
     if (o.json)
-        fmt::print("{}\n", nlohmann::json{{"triangles", triangles}, {"seconds", nowSeconds() - start}}.dump(2));
+        printJson("grow", {{"triangles", triangles}, {"seconds", nowSeconds() - start}});
     else
         fmt::print("{}: {} triangles, {:.1f} s\n", o.output, triangles, nowSeconds() - start);
     return {};
@@ -94,13 +82,18 @@ void addMesh(CLI::App& parent, const char* kind, const char* what, int& status) 
     auto o = std::make_shared<MeshRun>();
     o->mesh.kind = kind;
     CLI::App* sub = parent.add_subcommand(kind, what);
-    sub->add_option("-o,--output", o->output, "the file to write (.glb, .gltf)")->required();
-    sub->add_option("--triangles", o->triangles, "about that many, e.g. 250k or 10M")->capture_default_str();
-    sub->add_option("--seed", o->mesh.seed, "another seed, another shape")->capture_default_str();
-    sub->add_option("--texture", o->mesh.textureSize, "edge of the textures, pixels; 0: none")
-        ->check(CLI::Range(0, 8192))
+    sub->add_option("-o,--output", o->output, "the file to write (.glb, .gltf)")->type_name("FILE")->required();
+    o->mesh.triangles = 100'000;
+    sub->add_option("--triangles", o->mesh.triangles, "about that many, e.g. 250k or 10M")
+        ->transform(within(uint64_t{1}, uint64_t{1'000'000'000}))
+        ->default_str("100k");
+    sub->add_option("--seed", o->mesh.seed, "another seed, another shape")
+        ->transform(within(uint64_t{0}, uint64_t{1} << 53))
         ->capture_default_str();
-    sub->add_flag("--json", o->json, "as JSON");
+    sub->add_option("--texture", o->mesh.textureSize, "edge of the textures, pixels; 0: none")
+        ->transform(within(0, 8192))
+        ->capture_default_str();
+    sub->add_flag("--json", o->json, "print what was made as JSON (stipple help json)");
     addForce(*sub, o->force);
     sub->callback([o, &status] {
         if (const auto result = runMesh(*o); !result) status = report(result.error());
@@ -108,31 +101,27 @@ void addMesh(CLI::App& parent, const char* kind, const char* what, int& status) 
 }
 
 struct PlantRun {
-    std::string output, leaves = "50k", as = "strands";
+    std::string output, as = "strands";
     grow::PlantOptions plant;
     bool json = false, force = false;
 };
 
 Result<void> runPlant(PlantRun& o) {
-    o.plant.leaves = parseCount(o.leaves);
     o.plant.asTriangles = o.as == "triangles";
-    if (o.plant.leaves == 0)
-        return fail(ErrorKind::usage, fmt::format("'{}' is not a number up to 1000M", o.leaves), "--leaves",
-                    "e.g. 200k");
     STIPPLE_TRY(checkOutputs({{o.output}}, {}, o.force));
+    catchStopSignals();
     const double start = nowSeconds();
     const scene::Scene scene = grow::growPlant(o.plant);
     uint64_t segments = 0, triangles = 0;
     for (const auto& p : scene.meshes[0].primitives)
         (o.plant.asTriangles ? triangles : segments) += p.indices.size() / (o.plant.asTriangles ? 3 : 2);
     const uint64_t trees = std::max<size_t>(1, scene.nodes[0].instances.size());
+    STIPPLE_TRY(checkStopped(o.output));
     STIPPLE_TRY(scene::writeGltf(scene, o.output));
     if (o.json)
-        fmt::print(
-            "{}\n",
-            nlohmann::json{
-                {"segments", segments}, {"triangles", triangles}, {"trees", trees}, {"seconds", nowSeconds() - start}}
-                .dump(2));
+        printJson(
+            "grow",
+            {{"segments", segments}, {"triangles", triangles}, {"trees", trees}, {"seconds", nowSeconds() - start}});
     else
         fmt::print("{}: {} {} a tree, {} trees, {:.1f} s\n", o.output, segments + triangles,
                    o.plant.asTriangles ? "triangles" : "segments", trees, nowSeconds() - start);
@@ -143,20 +132,25 @@ void addPlant(CLI::App& parent, const char* name, const char* what, uint32_t row
     auto o = std::make_shared<PlantRun>();
     o->plant.rows = rows;
     CLI::App* sub = parent.add_subcommand(name, what);
-    sub->add_option("-o,--output", o->output, "the file to write (.glb, .gltf)")->required();
+    sub->add_option("-o,--output", o->output, "the file to write (.glb, .gltf)")->type_name("FILE")->required();
     sub->add_option("--species", o->plant.species, "oak, birch or spruce")
-        ->check(CLI::IsMember({"oak", "birch", "spruce"}))
+        ->check(oneOf({"oak", "birch", "spruce"}))
         ->capture_default_str();
-    sub->add_option("--leaves", o->leaves, "about that many a tree, e.g. 200k")->capture_default_str();
+    o->plant.leaves = 50'000;
+    sub->add_option("--leaves", o->plant.leaves, "leaves of a tree, about, e.g. 200k")
+        ->transform(within(uint64_t{1}, uint64_t{1'000'000'000}))
+        ->default_str("50k");
     sub->add_option("--as", o->as, "strands: tubes and ribbons; triangles: the same shape")
-        ->check(CLI::IsMember({"strands", "triangles"}))
+        ->check(oneOf({"strands", "triangles"}))
         ->capture_default_str();
     if (rows > 1)
         sub->add_option("--rows", o->plant.rows, "rows x rows trees")
-            ->check(CLI::Range(1, 1000))
+            ->transform(within(1, 1000))
             ->capture_default_str();
-    sub->add_option("--seed", o->plant.seed, "another seed, another tree")->capture_default_str();
-    sub->add_flag("--json", o->json, "as JSON");
+    sub->add_option("--seed", o->plant.seed, "another seed, another tree")
+        ->transform(within(uint64_t{0}, uint64_t{1} << 53))
+        ->capture_default_str();
+    sub->add_flag("--json", o->json, "print what was made as JSON (stipple help json)");
     addForce(*sub, o->force);
     sub->callback([o, &status] {
         if (const auto result = runPlant(*o); !result) status = report(result.error());
@@ -164,7 +158,7 @@ void addPlant(CLI::App& parent, const char* name, const char* what, uint32_t row
 }
 
 struct LandscapeRun {
-    std::string kind, output, trees = "10k", leaves = "200k", as = "strands";
+    std::string kind, output, as = "strands";
     grow::LandscapeOptions landscape;
     uint64_t scanPoints = 2'000'000;
     bool json = false, force = false;
@@ -196,24 +190,23 @@ Result<std::string> growDemoFolder(const LandscapeRun& o, scene::Scene& scene) {
     const DemoFolder demo(o.output);
     grow::ScanOptions options;
     options.points = o.scanPoints;
-    STIPPLE_TRY(grow::writeScan(demo.scan, grow::growScan(options), options));
+    const auto points = grow::growScan(options);
+    STIPPLE_TRY(checkStopped(o.output));
+    STIPPLE_TRY(grow::writeScan(demo.scan, points, options));
     const auto executor = makeTbbExecutor(0);
-    Progress progress(!o.json);
-    STIPPLE_TRY(lod::buildStore({demo.scan}, demo.store, {}, *executor, progress));
+    Progress progress(true);
+    lod::BuildSettings settings;
+    settings.isStopped = isStopRequested;
+    STIPPLE_TRY(lod::buildStore({demo.scan}, demo.store, settings, *executor, progress));
     scene = grow::growDemo(o.landscape, "scan.stipple");
     STIPPLE_TRY(addTextures({}, scene));
     return demo.scene;
 }
 
 Result<void> runLandscape(LandscapeRun& o) {
-    o.landscape.trees = parseCount(o.trees);
-    o.landscape.leaves = parseCount(o.leaves);
     o.landscape.asTriangles = o.as == "triangles";
-    for (const auto& [count, text, option] :
-         {std::tuple{o.landscape.trees, &o.trees, "--trees"}, std::tuple{o.landscape.leaves, &o.leaves, "--leaves"}})
-        if (count == 0 || count > 10'000'000)
-            return fail(ErrorKind::usage, fmt::format("'{}' is not a number up to 10M", *text), option, "e.g. 100k");
     STIPPLE_TRY(checkOutputs(outputsOf(o), {}, o.force));
+    catchStopSignals();
     const double start = nowSeconds();
     scene::Scene scene;
     std::string output = o.output;
@@ -230,12 +223,13 @@ Result<void> runLandscape(LandscapeRun& o) {
             placed += p.indices.size() / (p.kind == scene::PrimitiveKind::lines ? 2 : 3) *
                       std::max<size_t>(1, node.instances.size());
     }
+    STIPPLE_TRY(checkStopped(output, o.kind == "demo" ? "it is not written" : "nothing is written"));
     STIPPLE_TRY(scene::writeGltf(scene, output));
     if (o.json)
-        fmt::print("{}\n", jsonText(nlohmann::json{{"output", output},
-                                                   {"instances", instances},
-                                                   {"primitives_placed", placed},
-                                                   {"seconds", nowSeconds() - start}}));
+        printJson("grow", {{"output", output},
+                           {"instances", instances},
+                           {"primitives_placed", placed},
+                           {"seconds", nowSeconds() - start}});
     else
         fmt::print("{}: {} plants and stones, {:.4g} segments and triangles, {:.1f} s\n", output, instances,
                    static_cast<double>(placed), nowSeconds() - start);
@@ -248,32 +242,40 @@ void addLandscape(CLI::App& parent, const char* kind, const char* what, int& sta
     const bool isForest = o->kind == "forest", isMeadow = o->kind == "meadow", isDemo = o->kind == "demo";
     CLI::App* sub = parent.add_subcommand(kind, what);
     sub->add_option("-o,--output", o->output, isDemo ? "the folder to write" : "the file to write (.glb, .gltf)")
+        ->type_name(isDemo ? "FOLDER" : "FILE")
         ->required();
     if (isForest) {
-        sub->add_option("--trees", o->trees, "how many, e.g. 100k")->capture_default_str();
+        o->landscape.trees = 10'000;
+        sub->add_option("--trees", o->landscape.trees, "how many, e.g. 100k")
+            ->transform(within(uint64_t{1}, uint64_t{10'000'000}))
+            ->default_str("10k");
         sub->add_option("--spacing", o->landscape.spacing, "metres between trees, about")
-            ->check(CLI::Range(2.0, 100.0))
+            ->transform(within(2.0, 100.0))
             ->capture_default_str();
         sub->add_option("--variants", o->landscape.variants, "trees that are grown of each of the three species")
-            ->check(CLI::Range(1, 16))
+            ->transform(within(1, 16))
             ->capture_default_str();
         sub->add_option("--as", o->as, "strands: tubes and ribbons; triangles: the same shapes")
-            ->check(CLI::IsMember({"strands", "triangles"}))
+            ->check(oneOf({"strands", "triangles"}))
             ->capture_default_str();
     }
-    if (isDemo) {
-        o->leaves = "60k";
-        sub->add_option("--points", o->scanPoints, "of the scan")
-            ->check(CLI::Range(uint64_t{1000}, uint64_t{100'000'000}))
-            ->capture_default_str();
-    }
-    if (!isMeadow) sub->add_option("--leaves", o->leaves, "of a tree, about, e.g. 200k")->capture_default_str();
+    if (isDemo)
+        sub->add_option("--points", o->scanPoints, "points of the scan, e.g. 2M")
+            ->transform(within(uint64_t{1000}, uint64_t{100'000'000}))
+            ->default_str("2M");
+    o->landscape.leaves = isDemo ? 60'000 : 200'000;
+    if (!isMeadow)
+        sub->add_option("--leaves", o->landscape.leaves, "leaves of a tree, about, e.g. 200k")
+            ->transform(within(uint64_t{1}, uint64_t{10'000'000}))
+            ->default_str(isDemo ? "60k" : "200k");
     if (isMeadow)
         sub->add_option("--size", o->landscape.meadow, "edge, metres")
-            ->check(CLI::Range(2.0, 2000.0))
+            ->transform(within(2.0, 2000.0))
             ->capture_default_str();
-    sub->add_option("--seed", o->landscape.seed, "another seed, another landscape")->capture_default_str();
-    sub->add_flag("--json", o->json, "as JSON");
+    sub->add_option("--seed", o->landscape.seed, "another seed, another landscape")
+        ->transform(within(uint64_t{0}, uint64_t{1} << 53))
+        ->capture_default_str();
+    sub->add_flag("--json", o->json, "print what was made as JSON (stipple help json)");
     addForce(*sub, o->force);
     sub->callback([o, &status] {
         if (const auto result = runLandscape(*o); !result) status = report(result.error());
@@ -287,18 +289,21 @@ void setupGrow(CLI::App& app, int& status) {
     CLI::App* sub = app.add_subcommand("grow", "generate test scenes");
     sub->require_subcommand(1);
     CLI::App* scan = sub->add_subcommand("scan", "simulate a laser scan of a grove with rocks and a house");
-    scan->add_option("-o,--output", o->output, "the file to write (.las, .ply)")->required();
-    scan->add_option("--points", o->scan.points, "number of points")
-        ->check(CLI::Range(uint64_t{1}, uint64_t{500'000'000}))
+    scan->add_option("-o,--output", o->output, "the file to write (.las, .ply)")->type_name("FILE")->required();
+    scan->add_option("--points", o->scan.points, "number of points, e.g. 500k or 10M")
+        ->transform(within(uint64_t{1}, uint64_t{500'000'000}))
         ->capture_default_str();
-    scan->add_option("--seed", o->scan.seed, "another seed, another grove")->capture_default_str();
-    scan->add_option("--origin", o->origin, "added to every coordinate, e.g. 500000,5400000,300")
+    scan->add_option("--seed", o->scan.seed, "another seed, another grove")
+        ->transform(within(uint64_t{0}, uint64_t{1} << 53))
+        ->capture_default_str();
+    scan->add_option("--origin", o->origin, "added to every coordinate, metres, e.g. 500000,5400000,300")
+        ->type_name("X,Y,Z")
         ->capture_default_str();
     scan->add_option("--positions", o->scan.positions, "scanner positions")
-        ->check(CLI::Range(1, 64))
+        ->transform(within(1, 64))
         ->capture_default_str();
     scan->add_option("--noise", o->scan.noiseMetres, "range noise, standard deviation, metres")
-        ->check(CLI::Range(0.0, 1.0))
+        ->transform(within(0.0, 1.0))
         ->capture_default_str();
     addMesh(*sub, "rock", "a textured boulder", status);
     addMesh(*sub, "building", "a textured block of flats with windows", status);
@@ -308,7 +313,7 @@ void setupGrow(CLI::App& app, int& status) {
     addLandscape(*sub, "forest", "trees of three species on hills, each instanced many times", status);
     addLandscape(*sub, "meadow", "grass and flowers", status);
     addLandscape(*sub, "demo", "a scan, an orchard, a meadow and a boulder on one ground", status);
-    scan->add_flag("--json", o->json, "as JSON");
+    scan->add_flag("--json", o->json, "print what was made as JSON (stipple help json)");
     addForce(*scan, o->force);
     scan->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());

@@ -7,6 +7,7 @@
 #include "apps/stipple/info_input.h"
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
+#include "engine/base/units.h"
 #include "lod/nearest.h"
 
 namespace stipple::app {
@@ -19,6 +20,18 @@ struct Options {
 };
 
 nlohmann::json vectorJson(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
+
+/// A place of the store's lattice: as its integers say, without what the sum of origin and steps added.
+nlohmann::json placeJson(const lod::Hierarchy& h, const glm::dvec3& v) {
+    return {latticeValue(v.x, h.unit, h.origin.x), latticeValue(v.y, h.unit, h.origin.y),
+            latticeValue(v.z, h.unit, h.origin.z)};
+}
+std::string placeText(const nlohmann::json& place, const nlohmann::json& unit, const nlohmann::json& origin) {
+    std::string text;
+    for (size_t a = 0; a < 3; ++a)
+        text += (a == 0 ? "" : " ") + latticeText(place[a].get<double>(), unit.get<double>(), origin[a].get<double>());
+    return text;
+}
 
 nlohmann::json storeInfo(const lod::Store& store) {
     const lod::Hierarchy& h = store.hierarchy;
@@ -66,8 +79,8 @@ nlohmann::json storeInfo(const lod::Store& store) {
             {"records", d.records},
             {"nodes", h.nodes.size()},
             {"levels", levels},
-            {"min", vectorJson(d.boundsMin)},
-            {"max", vectorJson(d.boundsMax)},
+            {"min", placeJson(h, d.boundsMin)},
+            {"max", placeJson(h, d.boundsMax)},
             {"origin", vectorJson(h.origin)},
             {"lattice_unit", h.unit},
             {"coordinate_rounding", d.roundingUnits},
@@ -83,6 +96,7 @@ void printStore(const nlohmann::json& j) {
     const auto vec = [](const nlohmann::json& v) {
         return fmt::format("{:.10g} {:.10g} {:.10g}", v[0].get<double>(), v[1].get<double>(), v[2].get<double>());
     };
+    const auto place = [&](const char* key) { return placeText(j[key], j["lattice_unit"], j["origin"]); };
     const bool isMesh = j["primitive"] == "triangles";
     fmt::print("{}: {} {} from {}, {} with all levels in {} {}, {}\n", j["path"].get<std::string>(),
                j["points"].get<uint64_t>(), j["primitive"].get<std::string>(), j["source"].get<std::string>(),
@@ -100,8 +114,8 @@ void printStore(const nlohmann::json& j) {
             fmt::print(", added {}: {}", count.get<uint64_t>(), reason);
         fmt::print("\n");
     }
-    fmt::print("  bounds        {} .. {}\n  origin        {}\n", vec(j["min"]), vec(j["max"]), vec(j["origin"]));
-    fmt::print("  lattice unit  {:.6g} (coordinates {})\n", j["lattice_unit"].get<double>(),
+    fmt::print("  bounds        {} .. {}\n  origin        {}\n", place("min"), place("max"), place("origin"));
+    fmt::print("  lattice unit  {} (coordinates {})\n", j["lattice_unit"].get<double>(),
                j["coordinate_rounding"].get<double>() == 0
                    ? std::string("exact")
                    : fmt::format("rounded by at most {:.3g}", j["coordinate_rounding"].get<double>()));
@@ -112,7 +126,7 @@ void printStore(const nlohmann::json& j) {
                    : "no");
     if (!j["crs"].get<std::string>().empty()) fmt::print("  crs           {}\n", j["crs"].get<std::string>());
     for (const auto& a : j["attributes"])
-        fmt::print("  attribute     {} ({}, coarse levels: {}), {:.10g} .. {:.10g}\n", a["name"].get<std::string>(),
+        fmt::print("  attribute     {} ({}, coarse levels: {}), {:.15g} .. {:.15g}\n", a["name"].get<std::string>(),
                    a["type"].get<std::string>(), a["aggregate"].get<std::string>(), a["least"].get<double>(),
                    a["greatest"].get<double>());
     fmt::print("  hash          {}\n  level   nodes    records      bytes  largest error\n",
@@ -131,7 +145,7 @@ Result<void> showNearest(const lod::Store& store, const Options& o) {
     STIPPLE_ASSIGN(const glm::dvec3 place, parseVector(o.at, "--at"));
     STIPPLE_ASSIGN(const lod::NearestPoint p, lod::findNearest(store, place));
     const uint32_t c = p.packed.colour;
-    nlohmann::json j = {{"position", vectorJson(p.position)},
+    nlohmann::json j = {{"position", placeJson(store.hierarchy, p.position)},
                         {"distance", p.distance},
                         {"lattice", p.lattice},
                         {"origin", vectorJson(store.hierarchy.origin)},
@@ -140,11 +154,11 @@ Result<void> showNearest(const lod::Store& store, const Options& o) {
     for (size_t a = 0; a < p.attributes.size(); ++a)
         j["attributes"][store.description.attributes[a].name] = p.attributes[a];
     if (o.json) {
-        fmt::print("{}\n", jsonText(j));
+        printJson("info", j);
         return {};
     }
-    fmt::print("{:.15g} {:.15g} {:.15g}, {:.6g} away\n", p.position.x, p.position.y, p.position.z, p.distance);
-    fmt::print("  lattice       {} {} {} steps of {:.6g} from the origin\n", p.lattice[0], p.lattice[1], p.lattice[2],
+    fmt::print("{}, {:.6g} away\n", placeText(j["position"], j["unit"], j["origin"]), p.distance);
+    fmt::print("  lattice       {} {} {} steps of {} from the origin\n", p.lattice[0], p.lattice[1], p.lattice[2],
                store.hierarchy.unit);
     fmt::print("  colour        {} {} {}\n", c & 255u, c >> 8 & 255u, c >> 16 & 255u);
     for (size_t a = 0; a < p.attributes.size(); ++a)
@@ -153,6 +167,7 @@ Result<void> showNearest(const lod::Store& store, const Options& o) {
 }
 
 Result<void> run(const Options& o) {
+    catchStopSignals();
     if (std::filesystem::path(o.input).extension() == ".stipple") {
         STIPPLE_ASSIGN(const lod::Store store, lod::openStore(o.input));
         if (!o.at.empty()) return showNearest(store, o);
@@ -163,7 +178,7 @@ Result<void> run(const Options& o) {
             j["verified"] = true;
         }
         if (o.json) {
-            fmt::print("{}\n", jsonText(j));
+            printJson("info", j);
             return {};
         }
         printStore(j);
@@ -181,12 +196,16 @@ void setupInfo(CLI::App& app, int& status) {
     CLI::App* sub = app.add_subcommand("info", "what a scene or an input file holds");
     sub->add_option("SCENE", o->input, "a .stipple scene, a scan, mesh, scene or strand file, or a folder of scans")
         ->required();
-    sub->add_flag("--verify", o->verify, "read everything and check it");
-    sub->add_option("--at", o->at, "X,Y,Z in file coordinates: the input point of a scene that is nearest to it");
+    sub->add_flag("--verify", o->verify, "read everything and check it; a fault ends with 3");
+    sub->add_option("--at", o->at, "file coordinates: the input point of a built scene that is nearest to them")
+        ->type_name("X,Y,Z");
     sub->add_flag("--skip-bad", o->skipBad, "go on past what is corrupt");
-    sub->add_option("--memory", o->build.memory, "memory that reading a scene file may use")->capture_default_str();
+    sub->add_option("--memory", o->build.memory, "memory that reading a scene file may use, bytes: 512M, 4G")
+        ->check(bytes())
+        ->type_name("SIZE")
+        ->capture_default_str();
     addSceneFileOptions(*sub, o->build.allowOutside, o->build.repair);
-    sub->add_flag("--json", o->json, "as JSON");
+    sub->add_flag("--json", o->json, "print it as JSON (stipple help json)");
     sub->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());
     });

@@ -10,6 +10,7 @@
 
 #include "apps/stipple/common.h"
 #include "engine/base/file.h"
+#include "engine/base/units.h"
 #include "engine/scene/scene.h"
 #include "lod/import/import.h"
 #include "lod/import/las/header.h"
@@ -24,6 +25,13 @@ constexpr uint64_t kQuickPoints = 20'000'000;
 constexpr size_t kMostProblems = 20;
 
 nlohmann::json vectorJson(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
+
+/// As the integers of the file say, where it has some.
+nlohmann::json placeJson(const lod::SourceInfo& i, const glm::dvec3& v) {
+    if (!i.isLattice) return vectorJson(v);
+    return {latticeValue(v.x, i.scale.x, i.offset.x), latticeValue(v.y, i.scale.y, i.offset.y),
+            latticeValue(v.z, i.scale.z, i.offset.z)};
+}
 
 nlohmann::json attributeJson(const lod::AttributeInfo& a, bool hasRange) {
     nlohmann::json j = {{"name", a.name},
@@ -112,8 +120,9 @@ Result<nlohmann::json> fileInfo(const InputInfoOptions& o, const std::string& pa
     }
     std::optional<lod::Survey> survey;
     if (o.verify || i.points <= kQuickPoints) {
-        Progress progress(!o.json);
+        Progress progress(true);
         survey = lod::surveySource(source, executor, progress);
+        STIPPLE_TRY(checkStopped(path, "not all of it was read"));
         j["points_read"] = survey->points;
         j["points_not_finite"] = survey->notFinite;
         if (survey->points != i.points)
@@ -121,8 +130,8 @@ Result<nlohmann::json> fileInfo(const InputInfoOptions& o, const std::string& pa
                 fmt::format("the header declares {} points, {} could be read", i.points, survey->points));
         for (const std::string& p : survey->problems) problems.push_back(p);
         if (survey->points > survey->notFinite) {
-            j["min"] = vectorJson(survey->least);
-            j["max"] = vectorJson(survey->greatest);
+            j["min"] = placeJson(i, survey->least);
+            j["max"] = placeJson(i, survey->greatest);
             if (i.isLattice) {
                 j["min_integers"] = {survey->leastStep.x, survey->leastStep.y, survey->leastStep.z};
                 j["max_integers"] = {survey->greatestStep.x, survey->greatestStep.y, survey->greatestStep.z};
@@ -142,8 +151,14 @@ Result<nlohmann::json> fileInfo(const InputInfoOptions& o, const std::string& pa
 
 void printVector(const nlohmann::json& j, const char* key, const char* label) {
     if (!j.contains(key)) return;
-    const auto& v = j[key];
-    fmt::print("  {:15} {:.10g} {:.10g} {:.10g}\n", label, v[0].get<double>(), v[1].get<double>(), v[2].get<double>());
+    std::string text;
+    for (size_t a = 0; a < 3; ++a) {
+        const bool isOnLattice = j.contains("scale") && key[0] == 'm';  // least and greatest place
+        const double v = j[key][a].get<double>();
+        text += " " + (isOnLattice ? latticeText(v, j["scale"][a].get<double>(), j["offset"][a].get<double>())
+                                   : fmt::format("{}", v));
+    }
+    fmt::print("  {:15}{}\n", label, text);
 }
 
 void printAttributes(const nlohmann::json& attributes) {
@@ -152,7 +167,7 @@ void printAttributes(const nlohmann::json& attributes) {
     for (const auto& a : attributes) {
         std::string range;
         if (a.contains("least"))
-            range = fmt::format("{:.10g} .. {:.10g}", a["least"].get<double>(), a["greatest"].get<double>());
+            range = fmt::format("{:.15g} .. {:.15g}", a["least"].get<double>(), a["greatest"].get<double>());
         if (a.contains("counts") && a["counts"].size() <= 12) {
             range.clear();
             std::vector<std::pair<int, uint64_t>> counts;
@@ -238,7 +253,7 @@ Result<void> showFolder(const InputInfoOptions& o, const std::vector<std::string
     all["max"] = vectorJson(greatest);
     all["problems"] = problems;
     if (o.json) {
-        fmt::print("{}\n", jsonText(all));
+        printJson("info", all);
         return {};
     }
     fmt::print("{}: {} files, {} points\n", o.input, files.size(), points);
@@ -298,7 +313,7 @@ Result<void> showScene(const InputInfoOptions& o) {
     STIPPLE_ASSIGN(const scene::Scene s, scene::readScene(o.input, reading));
     const nlohmann::json j = sceneJson(s);
     if (o.json) {
-        fmt::print("{}\n", jsonText(j));
+        printJson("info", j);
         return {};
     }
     fmt::print("{}: scene\n", o.input);
@@ -333,7 +348,7 @@ Result<void> showStrands(const InputInfoOptions& o) {
         j["max"] = vectorJson(box.greatest);
     }
     if (o.json) {
-        fmt::print("{}\n", jsonText(j));
+        printJson("info", j);
         return {};
     }
     fmt::print("{}: {} strands of {} vertices\n", o.input, strands, vertices);
@@ -355,7 +370,7 @@ Result<void> showInputInfo(const InputInfoOptions& o, Executor& executor) {
     if (files.size() != 1) return showFolder(o, files, executor);
     STIPPLE_ASSIGN(const nlohmann::json j, fileInfo(o, files.front(), executor));
     if (o.json)
-        fmt::print("{}\n", jsonText(j));
+        printJson("info", j);
     else
         printFile(j);
     return {};

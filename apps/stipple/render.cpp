@@ -11,6 +11,7 @@
 #include "apps/stipple/outputs.h"
 #include "engine/base/file.h"
 #include "engine/base/process.h"
+#include "engine/base/units.h"
 #include "engine/image/image_io.h"
 #include "engine/reference/reference.h"
 #include "engine/render/frame.h"
@@ -102,7 +103,8 @@ Result<void> checkModule(const Options& o) {
     return image::checkModule(isLong || !lod::isStoreFile(o.inputs.front()));
 }
 
-Result<void> run(const Options& o) {
+Result<void> run(const Options& o, Written& written) {
+    catchStopSignals();
     STIPPLE_TRY(checkPictures(o));
     STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
     STIPPLE_TRY(o.camera.check());
@@ -113,6 +115,7 @@ Result<void> run(const Options& o) {
     STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, o.colour, *executor, !o.quiet));
     const lod::StoreDescription& description = scene.description;
     STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
+    written.of = shot.views.size();
     STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
     STIPPLE_ASSIGN(render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
     STIPPLE_ASSIGN(settings.draw.environment,
@@ -126,12 +129,12 @@ Result<void> run(const Options& o) {
         for (size_t i = 0; i < shot.views.size(); ++i) {
             STIPPLE_ASSIGN(const render::Image traced, reference::trace(scene.placed, shot.views[i], trace, *executor));
             STIPPLE_TRY(image::writeImage(shot.views.size() > 1 ? numbered(o.output, i) : o.output, traced));
+            ++written.pictures;
         }
         if (o.json)
-            fmt::print("{}\n", nlohmann::json{{"backend", "trace"},
-                                              {"samples_per_pixel", o.samples * o.samples},
-                                              {"seconds", nowSeconds() - start}}
-                                   .dump(2));
+            printJson("render", {{"backend", "trace"},
+                                 {"samples_per_pixel", o.samples * o.samples},
+                                 {"seconds", nowSeconds() - start}});
         return {};
     }
     streaming::StreamSettings stream;
@@ -146,8 +149,9 @@ Result<void> run(const Options& o) {
                           o.accumulate, o.noWait,     o.build.skipBad, o.quiet,    !o.quiet && !o.json};
     Timings timings;
     Verdict verdict;
-    STIPPLE_TRY(runFrames(plan, settings, *state, *executor, timings, verdict));
+    STIPPLE_TRY(runFrames(plan, settings, *state, *executor, timings, written, verdict));
     if (shot.views.size() == 1) {
+        STIPPLE_TRY(checkStopped(o.output));
         drawLegend(legend, state->image);
         STIPPLE_TRY(image::writeImage(o.output, state->image));
     }
@@ -178,7 +182,7 @@ Result<void> run(const Options& o) {
             {"first_image_ms", timings.firstImageMs},
             {"complete_ms", timings.completeMs},
             {"counters", countersJson(c)}};
-        fmt::print("{}\n", jsonText(j));
+        printJson("render", j);
     } else if (!o.quiet && shot.views.size() == 1) {
         const std::string drawn = c.trianglesDrawn == 0 ? fmt::format("{} records", c.recordsDrawn)
                                   : c.recordsDrawn == 0
@@ -190,78 +194,107 @@ Result<void> run(const Options& o) {
     return checkVerdict(plan, verdict);
 }
 
+/// Wherever it was interrupted: what is there now.
+Error toldOf(Error error, const Options& o, const Written& written) {
+    if (error.kind != ErrorKind::interrupted) return error;
+    error.where = o.output;
+    error.what = written.pictures == 0
+                     ? std::string("interrupted; nothing is written")
+                     : fmt::format("interrupted; {} of {} pictures are written", written.pictures, written.of);
+    return error;
+}
+
 }  // namespace
 
 void setupRender(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
     CLI::App* sub = app.add_subcommand("render", "draw pictures without a window");
-    sub->add_option("SCENE", o->inputs, "a .stipple scene, or scans (built into the cache first)")->required();
-    sub->add_option("-o,--output", o->output, "the picture (.png, .exr); a path gives NAME_0000.png ...")->required();
-    sub->add_option("--size", o->size, "width x height, pixels")->capture_default_str();
+    sub->add_option("SCENE", o->inputs, "a .stipple scene, or scans, meshes, strands (built into the cache first)")
+        ->required();
+    sub->add_option("-o,--output", o->output, "the picture (.png, .exr); several views give NAME_0000.png ...")
+        ->type_name("PICTURE")
+        ->required();
+    sub->add_option("--size", o->size, "width x height, pixels")->type_name("WxH")->capture_default_str();
     o->camera.addTo(*sub);
     sub->add_option("--frames", o->frames, "frames of the path, or repetitions of one view for timing")
-        ->check(CLI::Range(1, 1000000))
+        ->transform(within(1, 1000000))
         ->excludes("--orbit")
         ->capture_default_str();
     sub->add_option("--mode", o->mode, "pullpush, points, or reference (traced full detail)")
-        ->check(CLI::IsMember({"pullpush", "points", "reference"}))
+        ->check(oneOf({"pullpush", "points", "reference"}))
         ->capture_default_str();
-    sub->add_option("--error", o->error, "tolerated screen-space error, pixels")->capture_default_str();
-    sub->add_option("--budget-points", o->budget, "records drawn at most; the error rises to meet it (0: no limit)")
+    sub->add_option("--error", o->error, "tolerated screen-space error, pixels")
+        ->transform(positive())
         ->capture_default_str();
-    sub->add_option("--resident", o->resident, "memory for resident chunks")->capture_default_str();
+    sub->add_option("--budget-points", o->budget,
+                    "records drawn at most, e.g. 1M; the error rises to meet it (0: no limit)")
+        ->transform(within(uint64_t{0}, uint64_t{1'000'000'000'000}))
+        ->capture_default_str();
+    sub->add_option("--resident", o->resident, "memory for what is drawn, bytes: 512M, 4G (stipple help budgets)")
+        ->check(bytes())
+        ->type_name("SIZE")
+        ->capture_default_str();
     sub->add_option("--device", o->device, "auto, cpu, gpu, gpu:NAME or reference (fp64 restatement)")
+        ->type_name("DEVICE")
         ->capture_default_str();
-    sub->add_option("--shade", o->shade, "auto: unlit where the scan has colours")
-        ->check(CLI::IsMember({"auto", "lit", "unlit"}))
+    sub->add_option("--shade", o->shade, "auto: unlit where the scan has its own colours, lit by sun and sky otherwise")
+        ->check(oneOf({"auto", "lit", "unlit"}))
         ->capture_default_str();
-    sub->add_option("--background", o->background, "R,G,B 0 to 255")->capture_default_str();
-    sub->add_option("--debug", o->debug, "debug view")
-        ->check(CLI::IsMember({"none", "level", "error", "holes", "normals"}))
+    sub->add_option("--background", o->background, "colour behind the scene, sRGB, 0 to 255 each")
+        ->type_name("R,G,B")
+        ->capture_default_str();
+    sub->add_option("--debug", o->debug, "draw what the engine did instead of colours")
+        ->check(oneOf({"none", "level", "error", "holes", "normals"}))
         ->capture_default_str();
     sub->add_option("--wind", o->wind, "how far tops of plants move at most, share of their height (e.g. 0.03)")
-        ->check(numberBetween(0.0, 0.5))
+        ->transform(within(0.0, 0.5))
         ->capture_default_str();
     sub->add_option("--time", o->seconds, "of the wind, seconds; a path adds its own")
-        ->check(numberBetween(-1e9, 1e9))
+        ->transform(within(-1e9, 1e9))
         ->capture_default_str();
     sub->add_option("--strand-exact", o->strandExact,
                     "half-width in pixels from which ribbons and tubes are filled exactly instead of reconstructed")
-        ->check(numberBetween(0.5, 1e9))
+        ->transform(within(0.5, 1e9))
         ->capture_default_str();
     sub->add_option("--accumulate", o->accumulate,
                     "the mean of N frames: smooth coverage of strands narrower than a pixel")
-        ->check(CLI::Range(1, 4096))
+        ->transform(within(1, 4096))
         ->capture_default_str();
     sub->add_option("--samples", o->samples, "mode reference: rays per pixel along each axis")
-        ->check(CLI::Range(1, 64))
+        ->transform(within(1, 64))
         ->capture_default_str();
-    sub->add_flag("--no-wait", o->noWait, "do not wait for the complete cut");
-    sub->add_flag("--json", o->json, "print measurements as JSON");
-    sub->add_flag("--quiet", o->quiet, "no progress");
+    sub->add_flag("--no-wait", o->noWait, "draw what is loaded at once, instead of waiting for the complete cut");
+    sub->add_flag("--json", o->json, "print what was drawn and measured as JSON (stipple help json)");
+    sub->add_flag("--quiet", o->quiet, "neither progress nor notes");
     addForce(*sub, o->force);
+    o->build.addProgressTo(*sub);
     o->colour.addTo(*sub);
     o->environment.addTo(*sub);
-    auto* group = sub->add_option_group("building", "for inputs that are not built yet");
+    CLI::App* group = sub;  // for inputs that are not built yet
     addUpOption(*group, o->build.up);
-    group->add_option("--memory", o->build.memory, "memory that the build may use")->capture_default_str();
-    group->add_option("--attributes", o->build.attributes, "attributes to keep; the one of --colour always is")
+    group->add_option("--memory", o->build.memory, "memory that the build may use, bytes (stipple help budgets)")
+        ->check(bytes())
+        ->type_name("SIZE")
         ->capture_default_str();
-    group->add_option("--surfels", o->build.surfels, "turn meshes into that many samples; 0: keep triangles")
-        ->check(CLI::Range(uint64_t{0}, uint64_t{200'000'000}))
+    group->add_option("--attributes", o->build.attributes, "attributes to keep; the one of --colour always is")
+        ->type_name("NAMES")
+        ->capture_default_str();
+    group->add_option("--surfels", o->build.surfels, "turn meshes into that many samples, e.g. 1M; 0: keep triangles")
+        ->transform(within(uint64_t{0}, uint64_t{200'000'000}))
         ->capture_default_str();
     group
         ->add_option("--strand-radius", o->build.strandRadius,
                      "radius of strands that have none, file units (0: a 4000th of the extent)")
-        ->check(numberBetween(0.0, 1e300));
+        ->transform(within(0.0, 1e300));
     group->add_flag("--only-points", o->build.onlyPoints, "of a PLY mesh take the vertices, as points");
     addSceneFileOptions(*sub, o->build.allowOutside, o->build.repair);
     group->add_flag("--skip-bad", o->build.skipBad, "go on past corrupt chunks and files, and say what was lost");
     group->add_option("--threads", o->build.threads, "threads (0: all cores)")
-        ->check(CLI::Range(0, 1024))
+        ->transform(within(0, 1024))
         ->capture_default_str();
     sub->callback([o, &status] {
-        if (const auto result = run(*o); !result) status = report(result.error());
+        Written written;
+        if (const auto result = run(*o, written); !result) status = report(toldOf(result.error(), *o, written));
     });
 }
 

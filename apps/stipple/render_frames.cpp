@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <thread>
 
+#include "apps/stipple/report.h"
 #include "engine/base/process.h"
 #include "engine/image/image_io.h"
 #include "shaders/shared/record.h"
@@ -66,6 +67,7 @@ namespace {
 Result<void> awaitRoot(const FramesPlan& plan, const render::FrameSettings& settings, render::FrameState& state) {
     streaming::Streamer& streamer = *state.streamer;
     for (;;) {
+        STIPPLE_TRY(checkStopped(plan.output));
         streamer.collect();
         streamer.upload();
         if (streamer.residency().drawable[0][0]) return {};
@@ -90,6 +92,7 @@ Result<void> accumulate(int count, const lod::View& view, render::FrameSettings 
     if (count <= 1) return {};
     std::vector<float> sum(state.image.linear.size()), coverage(state.image.rgba.size());
     for (int f = 0; f < count; ++f) {
+        STIPPLE_TRY(checkStopped("--accumulate"));
         settings.draw.coverageSeed = static_cast<uint32_t>(f);
         STIPPLE_TRY(render::renderFrame(state, view, settings));
         for (size_t i = 0; i < sum.size(); ++i) sum[i] += std::clamp(state.image.linear[i], 0.0f, 1.0f);
@@ -110,7 +113,7 @@ Result<void> accumulate(int count, const lod::View& view, render::FrameSettings 
 }  // namespace
 
 Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& settings, render::FrameState& state,
-                       Executor& executor, Timings& timings, Verdict& verdict) {
+                       Executor& executor, Timings& timings, Written& written, Verdict& verdict) {
     // The first image: as soon as the root is there, whatever is missing.
     STIPPLE_TRY(awaitRoot(plan, settings, state));
     const lod::View& first = plan.views.front();
@@ -127,12 +130,15 @@ Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& sett
         if (i == 0) timings.completeMs = millisecondsSinceProcessStart();
         timings.add(state.counters.frameMs, state.backend->passTimes());
         if (isSingle) break;
+        STIPPLE_TRY(checkStopped(plan.output));
         verdict.judge(state);
         STIPPLE_TRY(image::writeImage(numbered(plan.output, i), state.image));
+        ++written.pictures;
         if (plan.printNames) fmt::print("{}\n", numbered(plan.output, i));
     }
     if (!isSingle) return {};
     for (int f = 1; f < plan.repeats; ++f) {  // one view again and again, for timing
+        STIPPLE_TRY(checkStopped(plan.output));
         STIPPLE_TRY(render::renderFrame(state, first, settings));
         timings.add(state.counters.frameMs, state.backend->passTimes());
     }

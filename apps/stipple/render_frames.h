@@ -44,12 +44,17 @@ struct Verdict {
     void judge(const render::FrameState& state);
 };
 
+/// What of the pictures is there.
+struct Written {
+    size_t pictures = 0, of = 1;
+};
+
 /// out.png -> out_0007.png
 std::string numbered(const std::string& path, size_t index);
 
 /// Draws all views; writes a picture of each if there are several, leaves that of a single one in `state`.
 Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& settings, render::FrameState& state,
-                       Executor& executor, Timings& timings, Verdict& verdict);
+                       Executor& executor, Timings& timings, Written& written, Verdict& verdict);
 
 /// What becomes of pictures that are written and miss something: an error, unless the plan permits it (then a note).
 Result<void> checkVerdict(const FramesPlan& plan, const Verdict& verdict);

@@ -12,6 +12,7 @@
 #include "apps/stipple/scene_opener.h"
 #include "apps/stipple/view_session.h"
 #include "engine/base/process.h"
+#include "engine/base/units.h"
 #include "engine/image/image_io.h"
 
 namespace stipple::app {
@@ -315,24 +316,31 @@ Result<void> run(const ViewOptions& o) {
 void setupView(CLI::App& app, int& status) {
     auto o = std::make_shared<ViewOptions>();
     CLI::App* sub = app.add_subcommand("view", "walk through a scene in a window");
-    sub->add_option("SCENE", o->inputs, "a .stipple scene, or scans (built into the cache first)")->required();
-    sub->add_option("--size", o->size, "of the window, pixels")->capture_default_str();
+    sub->add_option("SCENE", o->inputs, "a .stipple scene, or scans, meshes, strands (built into the cache first)")
+        ->required();
+    sub->add_option("--size", o->size, "of the window, pixels")->type_name("WxH")->capture_default_str();
     sub->add_option("--error", o->error, "tolerated screen-space error, pixels")
-        ->check(CLI::PositiveNumber)
+        ->transform(positive())
         ->capture_default_str();
     sub->add_option("--wind", o->wind, "how far tops of plants move at most, share of their height (e.g. 0.03)")
-        ->check(CLI::Range(0.0, 0.5))
+        ->transform(within(0.0, 0.5))
         ->capture_default_str();
-    sub->add_option("--budget-points", o->budget, "records drawn at most")
-        ->check(CLI::PositiveNumber)
+    sub->add_option("--budget-points", o->budget, "records drawn at most, e.g. 2M; the error rises to meet it")
+        ->transform(within(uint64_t{1}, uint64_t{1'000'000'000'000}))
+        ->default_str("2M");
+    sub->add_option("--resident", o->resident, "memory for what is drawn, bytes: 512M, 4G (stipple help budgets)")
+        ->check(bytes())
+        ->type_name("SIZE")
         ->capture_default_str();
-    sub->add_option("--resident", o->resident, "memory for resident chunks")->capture_default_str();
-    sub->add_option("--device", o->device, "auto, cpu, gpu or gpu:NAME")->capture_default_str();
-    sub->add_option("--shade", o->shade, "auto: unlit where the scan has colours")
-        ->check(CLI::IsMember({"auto", "lit", "unlit"}))
+    sub->add_option("--device", o->device, "auto, cpu, gpu or gpu:NAME")->type_name("DEVICE")->capture_default_str();
+    sub->add_option("--shade", o->shade, "auto: unlit where the scan has its own colours, lit by sun and sky otherwise")
+        ->check(oneOf({"auto", "lit", "unlit"}))
         ->capture_default_str();
-    sub->add_option("--frames", o->frames, "close after N frames (0: when the user does)")->capture_default_str();
-    sub->add_option("--screenshot", o->screenshot, "with --frames: write what the last frame shows");
+    sub->add_option("--frames", o->frames, "close after N frames (0: when the user does)")
+        ->transform(within(0, 1'000'000'000))
+        ->capture_default_str();
+    sub->add_option("--screenshot", o->screenshot, "with --frames: write what the last frame shows (.png)")
+        ->type_name("PICTURE");
     addForce(*sub, o->force);
     o->camera.addTo(*sub);
     o->colour.addTo(*sub);

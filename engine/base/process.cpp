@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cctype>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -94,34 +93,6 @@ std::string humanBytes(uint64_t bytes) {
         ++unit;
     }
     return unit == 0 ? fmt::format("{} B", bytes) : fmt::format("{:.1f} {}", value, units.at(unit));
-}
-
-uint64_t parseBytes(const std::string& text) {
-    char* end = nullptr;
-    const double value = std::strtod(text.c_str(), &end);
-    if (end == text.c_str() || !(value > 0) || value > 1e15) return 0;
-    double factor = 1;
-    switch (std::toupper(static_cast<unsigned char>(*end))) {
-        case 'K':
-            factor = 1024.0;
-            break;
-        case 'M':
-            factor = 1048576.0;
-            break;
-        case 'G':
-            factor = 1073741824.0;
-            break;
-        case 'T':
-            factor = 1099511627776.0;
-            break;
-        case 0:
-            return static_cast<uint64_t>(value);
-        default:
-            return 0;
-    }
-    const std::string tail(end + 1);
-    if (!tail.empty() && tail != "B" && tail != "iB") return 0;
-    return static_cast<uint64_t>(value * factor);
 }
 
 }  // namespace stipple

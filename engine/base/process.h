@@ -23,7 +23,5 @@ bool isStopRequested();
 double nowSeconds();
 /// "1.5 GiB", "312 B".
 std::string humanBytes(uint64_t bytes);
-/// "2G", "512M", "1000000" -> bytes; 0 if it is not a size.
-uint64_t parseBytes(const std::string& text);
 
 }  // namespace stipple

@@ -3,66 +3,116 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
+#include <numeric>
 
 #include "engine/base/process.h"
 #include "engine/base/text.h"
 
 namespace stipple {
+namespace {
 
-Progress::Progress(bool enabled, bool json)
-    : enabled_(enabled), terminal_(!json && ::isatty(STDERR_FILENO) != 0), startSeconds_(nowSeconds()) {
+void eraseLine() { std::fputs("\r\033[K", stderr); }
+
+std::string quoted(const std::string& text) {
+    std::string out = "\"";
+    for (const char c : text) {
+        if (c == '"' || c == '\\')
+            out += {'\\', c};
+        else if (static_cast<unsigned char>(c) < 0x20)
+            out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
+        else
+            out += c;
+    }
+    return out + "\"";
+}
+
+}  // namespace
+
+ProgressStyle automaticProgress() { return ::isatty(STDERR_FILENO) != 0 ? ProgressStyle::bar : ProgressStyle::notes; }
+
+double JobPlan::advance(const std::string& stage, double done) {
+    if (stages_.empty()) return reached_ = done;
+    const double all =
+        std::accumulate(stages_.begin(), stages_.end(), 0.0, [](double sum, const Stage& s) { return sum + s.share; });
+    double before = 0;
+    for (const Stage& s : stages_) {
+        if (s.name == stage) {
+            reached_ = std::max(reached_, (before + std::clamp(done, 0.0, 1.0) * s.share) / all);
+            break;
+        }
+        before += s.share;
+    }
+    return reached_;
+}
+
+Progress::Progress(ProgressStyle style) : style_(style), startSeconds_(nowSeconds()) {
     lastPrintSeconds_ = startSeconds_;
 }
 
 Progress::~Progress() {
-    if (dirty_ && terminal_) std::fputs("\r\033[K", stderr);
+    if (dirty_) eraseLine();
+}
+
+void Progress::plan(std::vector<JobPlan::Stage> stages) {
+    const std::lock_guard lock(mutex_);
+    plan_ = JobPlan(std::move(stages));
 }
 
 void Progress::say(const std::string& line) {
-    if (!enabled_) return;
+    if (style_ == ProgressStyle::silent) return;
     const std::lock_guard lock(mutex_);
-    if (dirty_ && terminal_) std::fputs("\r\033[K", stderr);
+    if (dirty_) eraseLine();
     const std::string shown = printable(line);
-    if (terminal_) {
-        fmt::print(stderr, "{}\n", shown);
-    } else {
-        std::string text;
-        for (const char c : shown) text += c == '"' || c == '\\' ? std::string{'\\', c} : std::string{c};
-        fmt::print(stderr, "{{\"note\": \"{}\"}}\n", text);
-    }
     dirty_ = false;
+    if (style_ == ProgressStyle::json)
+        fmt::print(stderr, "{{\"schema\": \"stipple.progress/1\", \"note\": {}}}\n", quoted(shown));
+    else
+        fmt::print(stderr, "note: {}\n", shown);
 }
 
 void Progress::update(const std::string& stage, uint64_t done, uint64_t total) {
-    if (!enabled_) return;
+    if (style_ != ProgressStyle::bar && style_ != ProgressStyle::json) return;
     const std::lock_guard lock(mutex_);
     const double now = nowSeconds();
     if (stage != stage_) {
         stage_ = stage;
         stageSeconds_ = now;
     }
-    if (now - lastPrintSeconds_ < (terminal_ ? 0.1 : 1.0)) return;
+    const double fraction = plan_.advance(stage, total ? static_cast<double>(done) / static_cast<double>(total) : 0);
+    if (firstFraction_ < 0) firstFraction_ = fraction;
+    if (now - lastPrintSeconds_ < (style_ == ProgressStyle::bar ? 0.1 : 1.0)) return;
     lastPrintSeconds_ = now;
-    const double fraction = total ? static_cast<double>(done) / static_cast<double>(total) : 0;
-    const double elapsed = now - stageSeconds_;
+    const double elapsed = now - stageSeconds_, gone = fraction - firstFraction_;
     const double rate = elapsed > 0 ? static_cast<double>(done) / elapsed : 0;
-    const double left = fraction > 0 ? elapsed * (1 - fraction) / fraction : 0;
-    if (terminal_) {
-        constexpr int kBar = 24;
-        const int full = static_cast<int>(fraction * kBar + 0.5);
-        fmt::print(stderr, "\r\033[K{:<10} [{:#<{}}{:<{}}] {:3.0f} %  {:.2f} M/s  {}{}  {:.0f} s left", stage, "", full,
-                   "", kBar - full, 100 * fraction, rate * 1e-6, humanBytes(peakRssBytes()),
-                   temporaryBytes_ > 0 ? fmt::format(" + {} on disk", humanBytes(temporaryBytes_)) : "", left);
-        std::fflush(stderr);
-        dirty_ = true;
-    } else {
-        fmt::print(
-            stderr,
-            "{{\"progress\": \"{}\", \"done\": {}, \"total\": {}, \"per_second\": {:.0f}, \"peak_rss_bytes\": {}, "
-            "\"temporary_bytes\": {}, \"seconds\": {:.1f}, \"seconds_left\": {:.1f}}}\n",
-            stage, done, total, rate, peakRssBytes(), temporaryBytes_.load(), now - startSeconds_, left);
-    }
+    const double left = gone > 0 ? (now - startSeconds_) * (1 - fraction) / gone : -1;
+    if (style_ == ProgressStyle::bar)
+        printBar(fraction, rate, left);
+    else
+        printJson(done, total, fraction, rate, left);
+}
+
+void Progress::printBar(double fraction, double rate, double left) {
+    constexpr int kBar = 24;
+    const int full = static_cast<int>(std::clamp(fraction, 0.0, 1.0) * kBar + 0.5);
+    const uint64_t onDisk = temporaryBytes_;
+    eraseLine();
+    fmt::print(stderr, "[{:#<{}}{:<{}}] {:3.0f} %  {:<10}  {:.2f} M/s  {}{}{}", "", full, "", kBar - full,
+               100 * fraction, stage_, rate * 1e-6, humanBytes(peakRssBytes()),
+               onDisk > 0 ? fmt::format(" + {} on disk", humanBytes(onDisk)) : "",
+               left < 0 ? "" : fmt::format("  {:.0f} s left", left));
+    std::fflush(stderr);
+    dirty_ = true;
+}
+
+void Progress::printJson(uint64_t done, uint64_t total, double fraction, double rate, double left) const {
+    fmt::print(stderr,
+               "{{\"schema\": \"stipple.progress/1\", \"progress\": {}, \"done\": {}, \"total\": {}, \"fraction\": "
+               "{:.4f}, \"per_second\": {:.0f}, \"peak_rss_bytes\": {}, \"temporary_bytes\": {}, \"seconds\": {:.1f}, "
+               "\"seconds_left\": {}}}\n",
+               quoted(stage_), done, total, fraction, rate, peakRssBytes(), temporaryBytes_.load(),
+               nowSeconds() - startSeconds_, left < 0 ? "null" : fmt::format("{:.1f}", left));
 }
 
 }  // namespace stipple

@@ -1,35 +1,73 @@
-// Progress of a long job: a line that rewrites itself on a terminal, one JSON line a second when piped.
+// Progress of a long job: one bar for the whole of it on a terminal, one JSON line a second for programs, notes only
+// where neither is asked for.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
 #include <mutex>
 #include <string>
+#include <vector>
 
 namespace stipple {
 
+enum class ProgressStyle : uint8_t {
+    silent,  ///< nothing (library use, tests, --quiet)
+    notes,   ///< no progress, but notes as lines
+    bar,     ///< a line that rewrites itself, and notes
+    json     ///< one JSON line a second, and notes as JSON
+};
+/// The bar on a terminal, otherwise notes only.
+ProgressStyle automaticProgress();
+
+/// The stages of a job and what share of its time each takes, as measured on other jobs of its kind.
+class JobPlan {
+  public:
+    struct Stage {
+        std::string name;
+        double share = 1;
+    };
+    JobPlan() = default;
+    explicit JobPlan(std::vector<Stage> stages) : stages_(std::move(stages)) {}
+    /// Of the whole job, when `done` of one of its stages is finished: never less than before, whatever is said. A
+    /// stage that is not in the plan adds nothing; without a plan, a stage is the job.
+    double advance(const std::string& stage, double done);
+
+  private:
+    std::vector<Stage> stages_;
+    double reached_ = 0;
+};
+
 class Progress {
   public:
-    /// `enabled` false: says nothing (library use, tests).
-    /// `json`: JSON lines on a terminal too.
-    explicit Progress(bool enabled, bool json = false);
+    /// `enabled` false: says nothing.
+    explicit Progress(bool enabled) : Progress(enabled ? automaticProgress() : ProgressStyle::silent) {}
+    explicit Progress(ProgressStyle style);
     ~Progress();
     Progress(const Progress&) = delete;
     Progress& operator=(const Progress&) = delete;
+
+    /// What is going to be done; from here on there is one time left, that of all stages.
+    void plan(std::vector<JobPlan::Stage> stages);
     /// Says that `done` of `total` units of `stage` are finished; prints at most ten times (JSON: once) a second.
     /// From any thread.
     void update(const std::string& stage, uint64_t done, uint64_t total);
 
-    /// A line that stays (a JSON object where the progress is one).
+    /// A note that stays.
     void say(const std::string& line);
     /// Bytes of temporary files, to be shown with the rest.
     void setTemporaryBytes(uint64_t bytes) { temporaryBytes_ = bytes; }
 
   private:
+    void printBar(double fraction, double rate, double left);
+    void printJson(uint64_t done, uint64_t total, double fraction, double rate, double left) const;
+
     std::mutex mutex_;
     std::atomic<uint64_t> temporaryBytes_{0};
-    bool enabled_, terminal_, dirty_ = false;
+    ProgressStyle style_;
+    bool dirty_ = false;
+    JobPlan plan_;
     double startSeconds_, stageSeconds_ = 0, lastPrintSeconds_ = 0;
+    double firstFraction_ = -1;  ///< of the job, when it began or went on
     std::string stage_;
 };
 

@@ -4,6 +4,7 @@
 #include <limits>
 #include <map>
 
+#include "engine/base/process.h"
 #include "engine/base/queue.h"
 #include "engine/reference/box_tree.h"
 #include "engine/reference/decode.h"
@@ -314,7 +315,7 @@ Result<render::Image> trace(const std::vector<render::PlacedStore>& placed, cons
     const uint32_t n = std::max(1u, settings.samplesPerAxis);
     executor.parallelFor(view.height, 4, [&](size_t row0, size_t row1) {
         for (size_t y = row0; y < row1; ++y)
-            for (uint32_t x = 0; x < view.width; ++x) {
+            for (uint32_t x = 0; x < view.width && !isStopRequested(); ++x) {
                 dvec3 sum(0);
                 uint32_t hits = 0;
                 double depths = 0;
@@ -339,6 +340,7 @@ Result<render::Image> trace(const std::vector<render::PlacedStore>& placed, cons
                                     static_cast<uint32_t>(std::lround(coverage * 255)) << 24;
             }
     });
+    if (isStopRequested()) return fail(ErrorKind::interrupted, "interrupted");
     return image;
 }
 

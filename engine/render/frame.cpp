@@ -241,6 +241,7 @@ Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const
         streamer.request(state.cut);
         if (streamer.isIdle() && streamer.counters().requests == before) break;
         executor.wait();
+        if (isStopRequested()) return fail(ErrorKind::interrupted, "interrupted");
     }
     STIPPLE_TRY(renderFrame(state, view, settings));
     return state.cut.wanted.empty();

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <queue>
 
+#include "engine/base/process.h"
 #include "engine/scene/triangles.h"
 #include "shaders/shared/record.h"
 
@@ -343,7 +344,7 @@ class SceneFitter {
         std::vector<Fitted> fitted(parts.count);
         if (isWhole(p))
             executor_.parallelFor(parts.count, 64, [&](size_t begin, size_t end) {
-                for (size_t k = begin; k < end; ++k) fitPart(p, trianglesOf[k], fitted[k]);
+                for (size_t k = begin; k < end && !isStopRequested(); ++k) fitPart(p, trianglesOf[k], fitted[k]);
             });
         uint64_t places = 0;
         for (const Placement& at : placed) {

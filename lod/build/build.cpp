@@ -386,6 +386,7 @@ class PointBuild {
         clock_.ends("write");
         report_.nodes = hierarchy.nodes.size();
         hierarchy = {};  // its memory is needed
+        progress_.update("verify", 0, 1);
         STIPPLE_ASSIGN(const Store store, openStore(writer_->temporaryPath()));
         STIPPLE_TRY(verifyStore(store, executor_, kVerifiedNodes));
         clock_.ends("verify");
@@ -429,6 +430,8 @@ Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std
         return {};
     };
     STIPPLE_TRY(agree(settings.ranks, tryOutput()));
+    // (Shares as measured with 2M points, normals and radii estimated.)
+    progress.plan({{"survey", 2}, {"count", 3}, {"distribute", 16}, {"build", 70}, {"verify", 9}});
     Result<PointInput> opened = PointInput::open(inputs, settings, report);
     STIPPLE_TRY(agree(settings.ranks, opened ? Result<void>() : Result<void>(tl::unexpected(opened.error()))));
     PointInput input = std::move(*opened);

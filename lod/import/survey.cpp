@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/base/process.h"
 #include "lod/attributes.h"
 
 namespace stipple::lod {
@@ -104,7 +105,7 @@ Survey surveySource(const PointSource& source, Executor& executor, Progress& pro
     std::vector<PartSurvey> parts(source.parts.size());
     std::atomic<uint64_t> done{0};
     executor.parallelFor(parts.size(), 1, [&](size_t begin, size_t end) {
-        for (size_t i = begin; i < end; ++i) {
+        for (size_t i = begin; i < end && !isStopRequested(); ++i) {
             parts[i] = surveyPart(source, i);
             progress.update("read", done += source.parts[i], source.info.points);
         }

@@ -6,6 +6,7 @@
 
 #include "engine/base/file.h"
 #include "engine/base/process.h"
+#include "engine/base/units.h"
 #include "lod/hierarchy.h"
 #include "tests/support/support.h"
 

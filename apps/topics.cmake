@@ -1,0 +1,10 @@
+# The pages of `stipple help TOPIC` as a header: stipple/topics/*.md is their only source.
+set(topics budgets exit-codes formats json)
+set(STIPPLE_TOPICS "")
+foreach(topic ${topics})
+  set(file ${CMAKE_CURRENT_SOURCE_DIR}/stipple/topics/${topic}.md)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
+  file(READ ${file} text)
+  string(APPEND STIPPLE_TOPICS "    Topic{\"${topic}\", R\"page(${text})page\"},\n")
+endforeach()
+configure_file(${CMAKE_CURRENT_SOURCE_DIR}/stipple/topics/topics.h.in ${PROJECT_BINARY_DIR}/apps/topics.h @ONLY)
