@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include "apps/stipple/common.h"
 #include "apps/stipple/legend.h"
 #include "engine/base/process.h"
+#include "engine/image/coverage.h"
 #include "engine/image/image_io.h"
 #include "engine/reference/reference.h"
 #include "engine/render/frame.h"
@@ -20,12 +22,13 @@ namespace {
 
 struct Options {
     std::vector<std::string> inputs;
-    std::string output, size = "1280x720", mode = "pullpush", device = "auto", shade = "auto", background = "24,26,30";
+    std::string output, size = "1280x720", mode = "pullpush", device = "auto", shade = "auto",
+                        background = fmt::format("{}", fmt::join(render::kBackground, ","));
     std::string debug = "none", resident = "1G";
     double error = 1, strandExact = 2, wind = 0, seconds = 0;
     int frames = 1, samples = 4, accumulate = 1;
     uint64_t budget = 0;
-    bool noWait = false, json = false, quiet = false;
+    bool noWait = false, json = false, quiet = false, alpha = false;
     CameraOptions camera;
     BuildOptions build;
     ColourOptions colour;
@@ -40,7 +43,7 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     s.budgets.errorPixels = o.error;
     if (o.budget > 0) s.budgets.records = o.budget;
     s.draw.unlitTriangles = o.shade == "unlit";
-    s.draw.lit = o.shade == "lit" || (o.shade == "auto" && isShaded(d) && colour.mode == lod::ColourMode::own);
+    s.draw.lit = isLit(o.shade, d, colour);
     s.draw.worldUp = shot.worldUp;
     s.draw.exactStrands = static_cast<float>(o.strandExact);
     s.draw.wind = {o.wind, o.seconds, render::windAcross(shot.worldUp)};
@@ -50,6 +53,7 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
             return fail(ErrorKind::usage, "channels are 0 to 255", "--background");
         s.draw.background[c] = shared::linearFromSrgb(static_cast<float>(background[c]) / 255.0f);
     }
+    if (o.alpha) s.draw.background = glm::vec3(0);  // what is not covered adds nothing
     static const std::array<const char*, 5> names{"none", "level", "error", "holes", "normals"};
     s.draw.debugView = static_cast<uint32_t>(std::find(names.begin(), names.end(), o.debug) - names.begin());
     s.wantDepthAndNormal = std::filesystem::path(o.output).extension() == ".exr";
@@ -136,7 +140,7 @@ Result<void> runFrames(const Options& o, const Shot& shot, const render::FrameSe
         if (i == 0) timings.completeMs = millisecondsSinceProcessStart();
         timings.add(state.counters.frameMs, state.backend->passTimes());
         if (shot.views.size() > 1) {
-            STIPPLE_TRY(image::writeImage(numbered(o.output, i), state.image));
+            STIPPLE_TRY(image::writePicture(numbered(o.output, i), state.image, o.alpha));
             if (!o.quiet && !o.json) fmt::print("{}\n", numbered(o.output, i));
         }
     }
@@ -180,7 +184,10 @@ Result<void> run(const Options& o) {
     STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, o.colour, *executor, !o.quiet));
     const lod::StoreDescription& description = scene.description;
     STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
-    STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
+    // Rays see the records as they are stored.
+    const bool isTraced = o.mode == "reference" && o.colour.what == "auto";
+    STIPPLE_ASSIGN(const lod::ColourBy colour,
+                   applyColours(scene, isTraced ? "plain" : o.colour.what, o.colour.map, o.colour.range));
     STIPPLE_ASSIGN(render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
     STIPPLE_ASSIGN(settings.draw.environment, openEnvironment(o.environment.path, o.environment.scale, *executor));
     if (o.mode == "reference" && colour.mode != lod::ColourMode::own)
@@ -190,8 +197,8 @@ Result<void> run(const Options& o) {
         const double start = nowSeconds();
         reference::TraceSettings trace{static_cast<uint32_t>(o.samples), settings.draw};
         for (size_t i = 0; i < shot.views.size(); ++i) {
-            STIPPLE_ASSIGN(const render::Image traced, reference::trace(scene.placed, shot.views[i], trace, *executor));
-            STIPPLE_TRY(image::writeImage(shot.views.size() > 1 ? numbered(o.output, i) : o.output, traced));
+            STIPPLE_ASSIGN(render::Image traced, reference::trace(scene.placed, shot.views[i], trace, *executor));
+            STIPPLE_TRY(image::writePicture(shot.views.size() > 1 ? numbered(o.output, i) : o.output, traced, o.alpha));
         }
         if (o.json)
             fmt::print("{}\n", nlohmann::json{{"backend", "trace"},
@@ -214,7 +221,7 @@ Result<void> run(const Options& o) {
     if (shot.views.size() == 1) {
         STIPPLE_TRY(accumulate(o.accumulate, shot.views.front(), settings, *state));
         drawLegend(legend, state->image);
-        STIPPLE_TRY(image::writeImage(o.output, state->image));
+        STIPPLE_TRY(image::writePicture(o.output, state->image, o.alpha));
     }
     const FrameCounters& c = state->counters;
     if (!complete && !o.noWait && !o.quiet)
@@ -282,7 +289,9 @@ void setupRender(CLI::App& app, int& status) {
     sub->add_option("--shade", o->shade, "auto: unlit where the scan has colours")
         ->check(CLI::IsMember({"auto", "lit", "unlit"}))
         ->capture_default_str();
-    sub->add_option("--background", o->background, "R,G,B 0 to 255")->capture_default_str();
+    auto* const background = sub->add_option("--background", o->background, "R,G,B 0 to 255")->capture_default_str();
+    sub->add_flag("--alpha", o->alpha, "no background: how much of a pixel is covered goes into the alpha channel")
+        ->excludes(background);
     sub->add_option("--debug", o->debug, "debug view")
         ->check(CLI::IsMember({"none", "level", "error", "holes", "normals"}))
         ->capture_default_str();

@@ -152,7 +152,7 @@ Result<void> run(const Options& o) {
     settings.draw.unlitTriangles = o.shade == "unlit";
     settings.draw.lights = scene.lights;
     STIPPLE_ASSIGN(settings.draw.environment, openEnvironment(o.environment.path, o.environment.scale, *executor));
-    settings.draw.lit = o.shade == "lit" || (o.shade == "auto" && isShaded(d) && colour.mode == lod::ColourMode::own);
+    settings.draw.lit = isLit(o.shade, d, colour);
     settings.draw.worldUp = d.up;
     settings.draw.wind = {o.wind, 0, render::windAcross(d.up)};
     render::setSway(settings.draw.wind, state->hierarchies, state->instances);
@@ -173,7 +173,7 @@ Result<void> run(const Options& o) {
             state.reset();  // gives back what is resident
             state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.crowds);
             render::setSway(settings.draw.wind, state->hierarchies, state->instances);
-            settings.draw.lit = o.shade == "lit" || (colour.mode == lod::ColourMode::own && isShaded(d));
+            settings.draw.lit = isLit(o.shade, d, colour);
         }
         navigation.move(input);
         settings.draw.wind.seconds += input.seconds;
