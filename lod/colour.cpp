@@ -21,6 +21,8 @@ constexpr std::array<uint32_t, 10> kMagma{0x000004, 0x180f3d, 0x440f76, 0x721f81
 constexpr std::array<uint32_t, 15> kTurbo{0x30123b, 0x4145ab, 0x4675ed, 0x39a2fc, 0x1bcfd4,
                                           0x24eca6, 0x61fc6c, 0xa4fc3b, 0xd1e834, 0xf3c63a,
                                           0xfe9b2d, 0xf36315, 0xd93806, 0xb11901, 0x7a0403};
+/// Of heights that are also lit: no end is dark.
+constexpr std::array<uint32_t, 6> kRelief{0x4a7c94, 0x5f9b82, 0x93b071, 0xccb873, 0xe6c79c, 0xf3e6da};
 
 struct AsprsClass {
     const char* name;
@@ -79,7 +81,8 @@ uint32_t normalColour(const shared::PointRecord& r) {
 }  // namespace
 
 std::string attributeBehind(const std::string& what) {
-    if (what.empty() || what == "auto" || what == "rgb" || what == "height" || what == "normal") return "";
+    for (const char* own : {"", "auto", "plain", "rgb", "height", "normal"})
+        if (what == own) return "";
     if (what == "class") return "classification";
     if (what == "return") return "return_number";
     return what;
@@ -89,7 +92,9 @@ Result<ColourBy> parseColourBy(const std::string& what, const std::string& map, 
                                const StoreDescription& description) {
     ColourBy by;
     by.title = what;
-    if (what.empty() || what == "auto" || what == "rgb") {
+    by.up = description.up;
+    by.isChosenHere = what == "auto" && !description.hasColour;
+    if (!by.isChosenHere && (what.empty() || what == "auto" || what == "plain" || what == "rgb")) {
         if (what == "rgb" && !description.hasColour)
             return fail(ErrorKind::usage, "the scene has no colours of its own", "--colour rgb",
                         "leave --colour out to see it shaded");
@@ -100,7 +105,9 @@ Result<ColourBy> parseColourBy(const std::string& what, const std::string& map, 
         by.mode = ColourMode::normal;
         return by;
     }
-    if (what == "height") {
+    if (what == "height" || by.isChosenHere) {
+        by.title = "height";
+        if (by.isChosenHere) by.map = ColourMap::relief;
         by.mode = ColourMode::height;
         by.low = description.lowHeight;
         by.high = description.highHeight;
@@ -127,7 +134,7 @@ Result<ColourBy> parseColourBy(const std::string& what, const std::string& map, 
         const auto known = std::find(kColourMapNames.begin(), kColourMapNames.end(), map);
         if (known == kColourMapNames.end())
             return fail(ErrorKind::usage, fmt::format("'{}' is not a colour map", map), "--colour-map",
-                        "grey, viridis, magma or turbo");
+                        "grey, viridis, magma, turbo or relief");
         by.map = static_cast<ColourMap>(known - kColourMapNames.begin());
     }
     if (!range.empty()) {
@@ -157,6 +164,8 @@ uint32_t colourOf(const ColourBy& by, double value) {
             return interpolate(kMagma, t);
         case ColourMap::turbo:
             return interpolate(kTurbo, t);
+        case ColourMap::relief:
+            return interpolate(kRelief, t);
         case ColourMap::viridis:
             break;
     }
@@ -177,7 +186,7 @@ void recolour(const ColourBy& by, const Store& store, uint32_t index, Chunk& chu
     if (by.mode == ColourMode::normal) {
         for (shared::PointRecord& r : chunk.records) set(r, normalColour(r));
     } else if (by.mode == ColourMode::height) {
-        const glm::dvec3& up = store.description.up;
+        const glm::dvec3& up = by.up;
         const double base = glm::dot(up, h.origin + h.unit * h.recordOrigin(node));
         const glm::dvec3 step = up * (h.unit * std::exp2(node.stepShift));
         for (shared::PointRecord& r : chunk.records) {

@@ -10,21 +10,24 @@
 namespace stipple::lod {
 
 enum class ColourMode : uint8_t { own, normal, height, attribute };
-enum class ColourMap : uint8_t { grey, viridis, magma, turbo };
-inline constexpr std::array<const char*, 4> kColourMapNames{"grey", "viridis", "magma", "turbo"};
+enum class ColourMap : uint8_t { grey, viridis, magma, turbo, relief };
+inline constexpr std::array<const char*, 5> kColourMapNames{"grey", "viridis", "magma", "turbo", "relief"};
 
 struct ColourBy {
     ColourMode mode = ColourMode::own;
     size_t attribute = 0;        ///< of StoreDescription::attributes
     bool isCategorical = false;  ///< a colour for each whole value, instead of a map over a range
     ColourMap map = ColourMap::viridis;
-    double low = 0, high = 1;  ///< values at the ends of the map; beyond them it stays at its ends
-    std::string title;         ///< for the legend
+    double low = 0, high = 1;   ///< values at the ends of the map; beyond them it stays at its ends
+    glm::dvec3 up{0, 0, 1};     ///< heights are along it
+    bool isChosenHere = false;  ///< nobody asked for it: a scan without colours is easier to read
+    std::string title;          ///< for the legend
     bool needsAttributes() const { return mode == ColourMode::attribute; }
 };
 
-/// What a person asks for: rgb, intensity, class, return, height, normal or the name of an attribute; `map` a name or
-/// empty; `range` "LOW,HIGH" or empty for the 2nd to 98th percentile.
+/// What a person asks for: auto (own colours, or of points without any the height), plain (own colours, or grey), rgb,
+/// intensity, class, return, height, normal or the name of an attribute; `map` a name or empty; `range` "LOW,HIGH" or
+/// empty for the 2nd to 98th percentile.
 Result<ColourBy> parseColourBy(const std::string& what, const std::string& map, const std::string& range,
                                const StoreDescription& description);
 /// The attribute that `what` needs; empty: none.

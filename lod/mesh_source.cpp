@@ -73,4 +73,43 @@ MeshSource sourceOf(TriangleMesh given) {
     return source;
 }
 
+MeshSource joined(std::vector<MeshSource> given) {
+    const auto sources = std::make_shared<const std::vector<MeshSource>>(std::move(given));
+    MeshSource all;
+    for (const MeshSource& s : *sources) {
+        all.triangles += s.triangles;
+        all.surveyBytes += s.surveyBytes;
+        all.readBytes += s.readBytes;
+    }
+    all.identity = [sources] {
+        std::vector<uint64_t> each;
+        for (const MeshSource& s : *sources) each.push_back(s.identity());
+        return hashBytes(each.data(), each.size() * sizeof(uint64_t));
+    };
+    all.survey = [sources](const MeshSource::Tell& tell) -> Result<MeshSource::Bounds> {
+        MeshSource::Bounds bounds;
+        constexpr uint64_t kParts = 10'000;  // of each
+        for (size_t i = 0; i < sources->size(); ++i) {
+            const auto tellPart = [&](uint64_t done, uint64_t of) {
+                const double share = of > 0 ? static_cast<double>(std::min(done, of)) / static_cast<double>(of) : 1;
+                return tell(i * kParts + static_cast<uint64_t>(share * kParts), sources->size() * kParts);
+            };
+            STIPPLE_ASSIGN(const MeshSource::Bounds own, (*sources)[i].survey(tellPart));
+            bounds.lo = glm::min(bounds.lo, own.lo);
+            bounds.hi = glm::max(bounds.hi, own.hi);
+        }
+        return bounds;
+    };
+    all.read = [sources](const MeshSource::Take& take) -> Result<void> {
+        for (const MeshSource& s : *sources) STIPPLE_TRY(s.read(take));
+        return {};
+    };
+    all.badTriangles = [sources] {
+        uint64_t bad = 0;
+        for (const MeshSource& s : *sources) bad += s.badTriangles ? s.badTriangles() : 0;
+        return bad;
+    };
+    return all;
+}
+
 }  // namespace stipple::lod

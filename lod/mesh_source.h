@@ -33,6 +33,8 @@ struct MeshSource {
 
 /// Of triangles in memory.
 MeshSource sourceOf(TriangleMesh mesh);
+/// The triangles of several sources, one source after the other.
+MeshSource joined(std::vector<MeshSource> sources);
 
 /// Some triangles of a larger mesh as a mesh of their own: vertices come as they are used.
 class BlockMaker {

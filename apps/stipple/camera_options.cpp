@@ -79,8 +79,7 @@ Result<scene::Camera> makeCamera(const CameraOptions& o, const OpenedScene& open
                         fmt::format("--scene-camera {}", o.sceneCamera));
         return opened.cameras[index - 1];
     }
-    scene::Camera camera = scene::fitCamera(d.focusMin, d.focusMax, d.up, aspect);
-    camera.fovDegrees = o.eye.empty() ? camera.fovDegrees : o.fov;
+    scene::Camera camera = scene::fitCamera(opened.outline, d.up, aspect, o.fov);
     if (isPlace(o.eye)) {
         STIPPLE_ASSIGN(camera.eye, parseVector(o.eye, "--eye"));
     }
@@ -100,7 +99,7 @@ Result<std::optional<scene::CameraPath>> makePath(const CameraOptions& o, const 
         STIPPLE_ASSIGN(scene::CameraPath path, scene::readCameraPath(o.path));
         return std::optional(std::move(path));
     }
-    if (o.orbit > 0) return std::optional(scene::makeOrbit(d.focusMin, d.focusMax, d.up, aspect, o.orbit));
+    if (o.orbit > 0) return std::optional(scene::makeOrbit(opened.outline, d.up, aspect, o.orbit, o.fov));
     return std::optional<scene::CameraPath>();
 }
 

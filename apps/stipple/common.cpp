@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -16,6 +17,7 @@
 #include "engine/image/image_io.h"
 #include "engine/reference/reference.h"
 #include "lod/colour.h"
+#include "lod/file_kind.h"
 #include "lod/import/import.h"
 #ifdef STIPPLE_WITH_GPU
 #include "engine/gpu/gpu_backend.h"
@@ -92,11 +94,14 @@ ProgressStyle BuildOptions::progressStyle(bool isQuiet) const {
 }
 
 void ColourOptions::addTo(CLI::App& app) {
-    app.add_option("--colour,--color", what,
-                   "rgb, intensity, class, return, height, normal or the name of an attribute")
+    app.add_option(
+           "--colour,--color", what,
+           "auto (own colours; of points without any, their height), plain (own colours, or grey), rgb, intensity, "
+           "class, return, height, normal or the name of an attribute")
         ->type_name("WHAT")
         ->capture_default_str();
-    app.add_option("--colour-map,--color-map", map, "colours of a range of values: grey, viridis, magma or turbo")
+    app.add_option("--colour-map,--color-map", map,
+                   "colours of a range of values: grey, viridis, magma, turbo or relief")
         ->type_name("MAP");
     app.add_option("--colour-range,--color-range", range,
                    "values at the ends of the map (default: 2nd to 98th percentile)")
@@ -117,6 +122,8 @@ std::vector<std::string> namesOf(const std::string& list) {
 }  // namespace
 
 bool isSceneFile(const std::string& path) {
+    const lod::FileKind kind = lod::fileKindOf(path);
+    if (kind != lod::FileKind::other) return kind == lod::FileKind::glb;
     const std::string extension = fs::path(path).extension().string();
     return extension == ".gltf" || extension == ".glb" || extension == ".obj";
 }
@@ -146,21 +153,58 @@ Result<lod::BuildSettings> BuildOptions::settings() const {
     return s;
 }
 
+bool isLit(const std::string& shade, const lod::StoreDescription& d, const lod::ColourBy& colour) {
+    if (shade != "auto") return shade == "lit";
+    if (colour.mode == lod::ColourMode::own) return isShaded(d);
+    return colour.mode == lod::ColourMode::height || colour.isCategorical;
+}
+
+namespace {
+
+/// Heights of a placed store along the scene's up, in the store's own units: of all stores together, unless `isGiven`.
+void alignHeights(const OpenedScene& scene, const render::PlacedStore& p, bool isGiven, lod::ColourBy& by) {
+    const lod::StoreDescription& all = scene.description;
+    const glm::dvec3 up = glm::transpose(p.place.rotation) * all.up;
+    const bool isAlone = scene.placed.size() == 1 && glm::length(up - p.store->description.up) < 1e-6;
+    by.up = up;
+    if (!isGiven && !isAlone) {
+        by.low = 1e300;
+        by.high = -1e300;
+        for (const glm::dvec3& at : scene.outline) {
+            by.low = std::min(by.low, glm::dot(all.up, at));
+            by.high = std::max(by.high, glm::dot(all.up, at));
+        }
+    }
+    if (isAlone) return;
+    const double base = glm::dot(all.up, p.place.translation);
+    by.low = (by.low - base) / p.place.scale;
+    by.high = (by.high - base) / p.place.scale;
+    if (by.low == by.high) by.high = by.low + 1;
+}
+
+}  // namespace
+
 Result<lod::ColourBy> applyColours(OpenedScene& scene, const std::string& what, const std::string& map,
                                    const std::string& range) {
     std::optional<lod::ColourBy> first;
     std::optional<Error> problem;
+    std::map<const lod::Store*, int> places;
+    for (const render::PlacedStore& p : scene.placed) ++places[p.store.get()];
     for (render::PlacedStore& p : scene.placed) {
         const lod::Hierarchy& h = p.store->hierarchy;
-        if ((h.isMesh() || h.isStrands) && what != "auto" && what != "rgb") {
+        const bool isSurface = h.isMesh() || h.isStrands;
+        if (isSurface && what != "auto" && what != "plain" && what != "rgb") {
             const char* const kind = h.isMesh() ? "triangles" : "ribbons and tubes";
             if (!problem)
                 problem = Error{ErrorKind::usage, fmt::format("{} cannot be coloured by '{}'", kind, what), "--colour",
                                 h.isMesh() ? "--surfels N makes points of them" : "leave --colour out"};
             continue;
         }
-        const auto by = lod::parseColourBy(what, map, range, p.store->description);
+        // Stores that stand in many places share their records only if those keep their own colours.
+        const bool isPlain = what == "auto" && (isSurface || places[p.store.get()] > 1);
+        auto by = lod::parseColourBy(isPlain ? "plain" : what, map, range, p.store->description);
         if (!by) problem = problem ? problem : by.error();
+        if (by && by->mode == lod::ColourMode::height) alignHeights(scene, p, !range.empty(), *by);
         p.colour = by.value_or(lod::ColourBy{});
         if (by && !first) first = *by;
     }

@@ -54,10 +54,13 @@ struct EnvironmentOptions {
     void addTo(CLI::App& app);
 };
 
-/// What `--shade auto` does: lit, unless a scan has its own colours.
+/// Needs light to be seen: it has no photographed colours of its own.
 inline bool isShaded(const lod::StoreDescription& d) { return !d.hasColour || d.isReflectance; }
+/// What `--shade` (auto, lit, unlit) means for points that are coloured like this. Auto: lit, unless a scan has its own
+/// colours; of colours that stand for values, heights and categories, which stay what they are when lit.
+bool isLit(const std::string& shade, const lod::StoreDescription& d, const lod::ColourBy& colour);
 
-/// .gltf, .glb or .obj.
+/// .gltf, .glb or .obj, unless the bytes are of another kind; what begins as a .glb whatever its name.
 bool isSceneFile(const std::string& path);
 /// Scans by the readers of lod; meshes as `surfels` samples (0: only the points that they hold).
 Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptions& options, uint64_t surfels,
@@ -76,7 +79,10 @@ struct OpenedScene {
     lod::StoreDescription description;  ///< of all together: bounds, up, what colours can be asked for
     std::vector<render::WorldLight> lights;
     std::vector<scene::Camera> cameras;  ///< of the scene's visible nodes, in their order
+    std::vector<glm::dvec3> outline;     ///< points on the outside of what is dense: what a camera must see
 };
+/// Another up axis than the files': of heights, light and cameras.
+void turnUp(OpenedScene& scene, lod::UpAxis up);
 
 /// A .stipple file is opened; a .gltf or .glb scene is opened with the stores that its nodes refer to; anything else,
 /// and the meshes of a scene, are built into the cache first (and found there the next time), with the attribute that

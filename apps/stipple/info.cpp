@@ -1,13 +1,13 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <filesystem>
 
 #include "apps/stipple/common.h"
 #include "apps/stipple/info_input.h"
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
 #include "engine/base/units.h"
+#include "lod/file_kind.h"
 #include "lod/nearest.h"
 
 namespace stipple::app {
@@ -168,7 +168,7 @@ Result<void> showNearest(const lod::Store& store, const Options& o) {
 
 Result<void> run(const Options& o) {
     catchStopSignals();
-    if (std::filesystem::path(o.input).extension() == ".stipple") {
+    if (lod::isStoreFile(o.input)) {
         STIPPLE_ASSIGN(const lod::Store store, lod::openStore(o.input));
         if (!o.at.empty()) return showNearest(store, o);
         nlohmann::json j = storeInfo(store);
@@ -185,6 +185,9 @@ Result<void> run(const Options& o) {
         if (o.verify) fmt::print("  verified: hashes, counts, order, errors and spheres are right\n");
         return {};
     }
+    if (!o.at.empty())
+        return fail(ErrorKind::usage, "is not a built scene, in which --at finds points", o.input,
+                    "build it first: stipple build INPUT -o SCENE.stipple");
     const auto executor = makeTbbExecutor(0);
     return showInputInfo({o.input, o.verify, o.json, o.skipBad, o.build.reading()}, *executor);
 }

@@ -14,6 +14,7 @@
 #include "engine/scene/scene.h"
 #include "lod/import/import.h"
 #include "lod/import/las/header.h"
+#include "lod/import/ply/mesh.h"
 #include "lod/import/strands/strand_readers.h"
 #include "lod/import/survey.h"
 
@@ -110,6 +111,9 @@ Result<nlohmann::json> fileInfo(const InputInfoOptions& o, const std::string& pa
                         {"notes", i.notes},          {"parts", source.parts.size()},
                         {"has_colour", i.hasColour}, {"has_normals", i.hasNormal},
                         {"has_radii", i.hasRadius}};
+    STIPPLE_ASSIGN(const lod::PlyFaces faces, lod::plyFaces(path));
+    if (faces.faces > 0) j["faces"] = faces.faces;
+    if (faces.strips > 0) j["triangle_strips"] = faces.strips;
     if (i.isLattice) {
         j["scale"] = vectorJson(i.scale);
         j["offset"] = vectorJson(i.offset);
@@ -183,8 +187,14 @@ void printAttributes(const nlohmann::json& attributes) {
 }
 
 void printFile(const nlohmann::json& j) {
-    fmt::print("{}: {}, {} points\n", j["path"].get<std::string>(), j["format"].get<std::string>(),
-               j["points"].get<uint64_t>());
+    const bool isMesh = j.contains("faces") || j.contains("triangle_strips");
+    fmt::print("{}: {}, {} {}\n", j["path"].get<std::string>(), j["format"].get<std::string>(),
+               j["points"].get<uint64_t>(), isMesh ? "vertices" : "points");
+    if (isMesh)
+        fmt::print("  {:15} {}{}\n", "faces", j.value("faces", uint64_t{0}),
+                   j.contains("triangle_strips")
+                       ? fmt::format(", and {} triangle strips", j["triangle_strips"].get<uint64_t>())
+                       : "");
     printVector(j, "min", "least");
     printVector(j, "max", "greatest");
     if (!j.contains("min")) {

@@ -12,16 +12,18 @@
 #include "apps/stipple/cache.h"
 #include "apps/stipple/common.h"
 #include "apps/stipple/from_afar.h"
+#include "apps/stipple/ply_meshes.h"
 #include "engine/base/process.h"
 #include "engine/base/text.h"
 #include "engine/image/image_io.h"
+#include "engine/scene/outline.h"
 #include "engine/scene/strands.h"
 #include "engine/scene/triangles.h"
 #include "lod/build/mesh/mesh_build.h"
 #include "lod/build/strands/strand_build.h"
 #include "lod/colour.h"
+#include "lod/file_kind.h"
 #include "lod/import/import.h"
-#include "lod/import/ply/mesh.h"
 #include "lod/import/strands/strand_readers.h"
 #include "lod/nearest.h"
 
@@ -72,13 +74,20 @@ Result<lod::Instance> placeOf(const glm::dmat4& m, const std::string& where) {
     return place;
 }
 
-Result<lod::MeshBuildSettings> meshSettings(const scene::Scene& scene, uint64_t memoryBytes) {
+lod::UpAxis axisNamed(const std::string& up) { return static_cast<lod::UpAxis>(up[0] - 'x'); }
+
+/// What `--up` says, else y, as glTF, OBJ and PLY have it.
+glm::dvec3 meshUp(const BuildOptions& build) {
+    return lod::axisVector(build.up.empty() ? lod::UpAxis::y : axisNamed(build.up));
+}
+
+Result<lod::MeshBuildSettings> meshSettings(const scene::Scene& scene, const BuildOptions& build) {
     lod::MeshBuildSettings settings;
     settings.description.source = fs::path(scene.path).filename().string();
-    settings.description.up = {0, 1, 0};
+    settings.description.up = meshUp(build);
     settings.description.materials = scene::surfaceMaterials(scene);
     settings.textures = scene::textureImages(scene);
-    STIPPLE_ASSIGN(std::vector<scene::DecodedImage> images, decodeImages(scene, memoryBytes));
+    STIPPLE_ASSIGN(std::vector<scene::DecodedImage> images, decodeImages(scene, build.reading().memoryBytes));
     std::vector<size_t> last(images.size());  // texture that uses an image last, and may have it
     for (size_t t = 0; t < settings.textures.size(); ++t)
         if (scene.textures[t].image >= 0) last[static_cast<size_t>(scene.textures[t].image)] = t;
@@ -97,21 +106,6 @@ bool holds(const scene::Scene& scene, const scene::Placement& placed, scene::Pri
     return std::any_of(primitives.begin(), primitives.end(), [&](const auto& p) { return p.kind == kind; });
 }
 
-/// The triangles of a PLY file.
-Result<lod::BuildReport> buildPlyMesh(const std::string& input, const std::string& output, const BuildOptions& build,
-                                      Executor& executor, Progress& progress) {
-    STIPPLE_ASSIGN(const lod::BuildSettings wanted, build.settings());
-    const std::string folder =
-        wanted.tempFolder.empty() ? fs::absolute(output).parent_path().string() : wanted.tempFolder;
-    STIPPLE_ASSIGN(const lod::MeshSource source, lod::openPlyMesh(input, wanted.memoryBytes / 4, folder));
-    scene::Scene plain;
-    plain.path = input;
-    STIPPLE_ASSIGN(lod::MeshBuildSettings settings, meshSettings(plain, wanted.memoryBytes));
-    settings.limits = wanted;
-    settings.limits.memoryBytes -= wanted.memoryBytes / 4;
-    return lod::buildMeshStore(source, output, settings, executor, progress);
-}
-
 lod::StrandBuildSettings strandSettings(const std::string& input) {
     lod::StrandBuildSettings settings;
     settings.description.source = fs::path(input).filename().string();
@@ -123,7 +117,15 @@ Result<lod::BuildReport> buildStrands(const lod::StrandSource& raw, const std::s
                                       const BuildOptions& build, Executor& executor, Progress& progress) {
     lod::StrandBuildSettings settings = strandSettings(input);
     STIPPLE_ASSIGN(settings.limits, build.settings());
-    return lod::buildStrandStore(lod::cleanSource(raw, build.strandRadius), output, settings, executor, progress);
+    lod::StrandSource turned = raw;
+    if (!build.up.empty())
+        turned.read = [&raw, up = lod::axisVector(axisNamed(build.up))](const lod::StrandSource::Take& take) {
+            return raw.read([&](lod::StrandSet block) {
+                block.up = up;
+                return take(block);
+            });
+        };
+    return lod::buildStrandStore(lod::cleanSource(turned, build.strandRadius), output, settings, executor, progress);
 }
 
 Result<lod::BuildReport> buildStrandFile(const std::string& input, const std::string& output, const BuildOptions& build,
@@ -164,7 +166,7 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
                             std::vector<render::PlacedStore>& placed) {
     const auto make = [&](const std::vector<scene::Placement>& of) {
         return [&](const std::string& path, Progress& progress) -> Result<lod::BuildReport> {
-            STIPPLE_ASSIGN(lod::MeshBuildSettings settings, meshSettings(scene, build.reading().memoryBytes));
+            STIPPLE_ASSIGN(lod::MeshBuildSettings settings, meshSettings(scene, build));
             STIPPLE_ASSIGN(settings.limits, build.settings());
             return lod::buildMeshStore(scene::triangleSource(scene, of), path, settings, executor, progress);
         };
@@ -352,10 +354,10 @@ lod::StoreDescription describe(const std::vector<render::PlacedStore>& placed) {
 
 namespace {
 
-/// One PLY file with faces, of which not only the vertices are wanted.
-Result<bool> isMeshPly(const std::vector<std::string>& inputs, const BuildOptions& build) {
-    if (inputs.size() != 1 || build.onlyPoints || fs::path(inputs[0]).extension() != ".ply") return false;
-    return lod::hasPlyFaces(inputs[0]);
+/// Of PLY files with faces; their paths are made by whoever builds them.
+Result<lod::MeshBuildSettings> plySettings(const BuildOptions& build) {
+    scene::Scene plain;
+    return meshSettings(plain, build);
 }
 
 }  // namespace
@@ -393,16 +395,35 @@ Result<void> areSeen(const std::vector<std::string>& inputs) {
 
 }  // namespace
 
+namespace {
+
+/// Scans, or PLY files that all have faces.
+Result<lod::BuildReport> buildFiles(const std::vector<std::string>& inputs, const std::string& output,
+                                    const BuildOptions& build, Executor& executor, Progress& progress) {
+    STIPPLE_ASSIGN(const PlyMeshes meshes, findPlyMeshes(inputs, build));
+    if (meshes.areAll()) {
+        STIPPLE_ASSIGN(lod::MeshBuildSettings settings, plySettings(build));
+        return buildPlyMeshes(meshes.files, output, build, std::move(settings), executor, progress);
+    }
+    STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
+    STIPPLE_ASSIGN(lod::BuildReport report, lod::buildStore(inputs, output, settings, executor, progress));
+    if (const std::string note = meshes.note(); !note.empty()) report.notes.push_back(note);
+    return report;
+}
+
+}  // namespace
+
 Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const std::string& output,
                                   const BuildOptions& build, Executor& executor, Progress& progress) {
     STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
     STIPPLE_TRY(agree(build.ranks, areSeen(inputs)));
-    STIPPLE_ASSIGN(const bool isPlyMesh, isMeshPly(inputs, build));
-    const bool isStrands = inputs.size() == 1 && lod::isStrandFile(inputs[0]);
-    if (isPlyMesh) return buildPlyMesh(inputs.front(), output, build, executor, progress);
-    if (isStrands) return buildStrandFile(inputs[0], output, build, executor, progress);
-    if (!isSceneFile(inputs.front()) || build.surfels > 0)
-        return lod::buildStore(inputs, output, settings, executor, progress);
+    for (const std::string& input : inputs)
+        if (lod::fileKindOf(input) == lod::FileKind::store)
+            return fail(ErrorKind::usage, "is built already", input, "render or view it");
+    if (inputs.size() == 1 && lod::isStrandFile(inputs[0]))
+        return buildStrandFile(inputs[0], output, build, executor, progress);
+    if (!isSceneFile(inputs.front())) return buildFiles(inputs, output, build, executor, progress);
+    if (build.surfels > 0) return lod::buildStore(inputs, output, settings, executor, progress);
     if (inputs.size() > 1)
         return fail(ErrorKind::usage, "only one scene with meshes can be built at a time", inputs[1]);
     STIPPLE_TRY(checkSceneMemory(inputs.front(), settings.memoryBytes));
@@ -424,42 +445,73 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
         scene.notes.push_back(fmt::format(
             "a store holds one kind of primitive: {} lines and {} points are left out; view the scene file to see all",
             lines, points));
-    STIPPLE_ASSIGN(lod::MeshBuildSettings mesh, meshSettings(scene, settings.memoryBytes));
+    STIPPLE_ASSIGN(lod::MeshBuildSettings mesh, meshSettings(scene, build));
     mesh.limits = settings;
     STIPPLE_ASSIGN(lod::BuildReport report, lod::buildMeshStore(triangles, output, mesh, executor, progress));
     report.notes.insert(report.notes.begin(), scene.notes.begin(), scene.notes.end());
     return report;
 }
 
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build,
+namespace {
+
+/// The stores of inputs that are no scene file.
+Result<std::shared_ptr<const lod::Store>> openFiles(const std::vector<std::string>& inputs, const BuildOptions& build,
+                                                    const ColourOptions& colour, Executor& executor,
+                                                    bool showProgress) {
+    if (lod::isStoreFile(inputs.front())) return openStoreFile(inputs.front());
+    if (inputs.size() == 1 && lod::isStrandFile(inputs[0]))
+        return openCached(inputs, build, "strands", showProgress, [&](const std::string& path, Progress& progress) {
+            return buildStrandFile(inputs[0], path, build, executor, progress);
+        });
+    STIPPLE_ASSIGN(const PlyMeshes meshes, findPlyMeshes(inputs, build));
+    if (meshes.areAll())
+        return openCached(inputs, build, "triangles", showProgress,
+                          [&](const std::string& path, Progress& progress) -> Result<lod::BuildReport> {
+                              STIPPLE_ASSIGN(lod::MeshBuildSettings settings, plySettings(build));
+                              return buildPlyMeshes(meshes.files, path, build, std::move(settings), executor, progress);
+                          });
+    if (const std::string note = meshes.note(); !note.empty() && showProgress) fmt::print(stderr, "note: {}\n", note);
+    return openBuilt(inputs, build, colour, executor, showProgress);
+}
+
+/// What a camera must see: points on the outside of all stores, in world space.
+std::vector<glm::dvec3> outlineOf(const std::vector<render::PlacedStore>& placed) {
+    constexpr size_t kMostRead = 64, kMostPlaced = 4000;
+    std::map<const lod::Store*, std::vector<glm::dvec3>> known;
+    std::vector<glm::dvec3> all;
+    const size_t stride = placed.size() / kMostPlaced + 1;
+    for (size_t i = 0; i < placed.size(); i += stride) {
+        const render::PlacedStore& p = placed[i];
+        auto& own = known[p.store.get()];
+        if (own.empty() && known.size() <= kMostRead) own = scene::outlineOf(*p.store);
+        if (own.empty() || placed.size() > kMostRead) {
+            const auto corners = scene::cornersOf(p.store->description.focusMin, p.store->description.focusMax);
+            own.assign(corners.begin(), corners.end());
+        }
+        for (const glm::dvec3& at : own) all.push_back(p.place.translation + p.place.rotation * (p.place.scale * at));
+    }
+    return scene::outermost(all);
+}
+
+}  // namespace
+
+void turnUp(OpenedScene& scene, lod::UpAxis up) { scene.description.up = lod::axisVector(up); }
+
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& given,
                               const ColourOptions& colour, Executor& executor, bool showProgress) {
     OpenedScene scene;
-    const bool isStore = fs::path(inputs.front()).extension() == ".stipple";
+    // The axis is of the picture: what is in the cache serves any.
+    BuildOptions build = given;
+    build.up.clear();
     for (const std::string& input : inputs)
-        if (inputs.size() > 1 && (fs::path(input).extension() == ".stipple" || isSceneFile(input)))
+        if (inputs.size() > 1 && (lod::isStoreFile(input) || isSceneFile(input)))
             return fail(ErrorKind::usage, "a built scene and other inputs cannot be mixed", input,
                         "name one scene, or only raw inputs; a .gltf scene can place several stores");
-    STIPPLE_ASSIGN(const bool isPlyMesh, isMeshPly(inputs, build));
-    if (isPlyMesh) {
-        STIPPLE_ASSIGN(
-            std::shared_ptr<const lod::Store> store,
-            openCached(inputs, build, "triangles", showProgress, [&](const std::string& path, Progress& progress) {
-                return buildPlyMesh(inputs[0], path, build, executor, progress);
-            }));
-        scene.placed.push_back({std::move(store), {}, {}});
-    } else if (inputs.size() == 1 && lod::isStrandFile(inputs[0])) {
-        STIPPLE_ASSIGN(
-            std::shared_ptr<const lod::Store> store,
-            openCached(inputs, build, "strands", showProgress, [&](const std::string& path, Progress& progress) {
-                return buildStrandFile(inputs[0], path, build, executor, progress);
-            }));
-        scene.placed.push_back({std::move(store), {}, {}});
-    } else if (isSceneFile(inputs.front())) {
+    if (isSceneFile(inputs.front())) {
         STIPPLE_TRY(openSceneFile(inputs.front(), build, colour, executor, showProgress, scene));
     } else {
-        STIPPLE_ASSIGN(
-            std::shared_ptr<const lod::Store> store,
-            isStore ? openStoreFile(inputs.front()) : openBuilt(inputs, build, colour, executor, showProgress));
+        STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store,
+                       openFiles(inputs, build, colour, executor, showProgress));
         scene.placed.push_back({std::move(store), {}, {}});
     }
     // Points that stand in for meshes are lit. Beside scans that keep their photographed colours they would not be,
@@ -473,7 +525,11 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     if (any(isOf(false)) && !any(isOf(true)))
         for (render::PlacedStore& p : scene.placed) p.standIns = nullptr;
     scene.description = describe(scene.placed);
-    if (!build.up.empty()) scene.description.up = lod::axisVector(static_cast<lod::UpAxis>(build.up[0] - 'x'));
+    scene.outline = outlineOf(scene.placed);
+    if (!given.up.empty())
+        turnUp(scene, axisNamed(given.up));
+    else if (showProgress && scene::looksZUp(scene.description))
+        fmt::print(stderr, "note: the scene is flat along z, but y is up, as its format has it; is z up? --up z\n");
     releaseFreeMemory();
     return scene;
 }

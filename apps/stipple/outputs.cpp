@@ -13,7 +13,7 @@
 #include "engine/scene/gltf/container.h"
 #include "engine/scene/scene_files.h"
 #include "lod/import/import.h"
-#include "lod/store_file.h"
+#include "lod/file_kind.h"
 
 namespace stipple::app {
 namespace fs = std::filesystem;
@@ -74,7 +74,7 @@ Result<void> checkKind(const Output& output) {
     const char* const advice = "choose another name, or give --force to replace it";
     if (output.kind == FileKind::picture && !isPicture(output.path))
         return fail(ErrorKind::output, "is there already and is no picture (.png, .exr)", output.path, advice);
-    if (output.kind == FileKind::store && !lod::isStoreFile(output.path))
+    if (output.kind == FileKind::store && lod::fileKindOf(output.path) != lod::FileKind::store)
         return fail(ErrorKind::output, "is there already and is no built scene", output.path, advice);
     if (output.kind == FileKind::other) return fail(ErrorKind::output, "is there already", output.path, advice);
     return {};

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,23 +13,25 @@
 #include "engine/base/file.h"
 #include "engine/base/process.h"
 #include "engine/base/units.h"
+#include "engine/image/coverage.h"
 #include "engine/image/image_io.h"
 #include "engine/reference/reference.h"
 #include "engine/render/frame.h"
 #include "engine/scene/camera.h"
-#include "lod/store_file.h"
+#include "lod/file_kind.h"
 
 namespace stipple::app {
 namespace {
 
 struct Options {
     std::vector<std::string> inputs;
-    std::string output, size = "1280x720", mode = "pullpush", device = "auto", shade = "auto", background = "24,26,30";
+    std::string output, size = "1280x720", mode = "pullpush", device = "auto", shade = "auto",
+                        background = fmt::format("{}", fmt::join(render::kBackground, ","));
     std::string debug = "none", resident = "1G";
     double error = 1, strandExact = 2, wind = 0, seconds = 0;
     int frames = 1, samples = 4, accumulate = 1;
     uint64_t budget = 0;
-    bool noWait = false, json = false, quiet = false, force = false;
+    bool noWait = false, json = false, quiet = false, force = false, alpha = false;
     CameraOptions camera;
     BuildOptions build;
     ColourOptions colour;
@@ -43,7 +46,7 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     s.budgets.errorPixels = o.error;
     if (o.budget > 0) s.budgets.records = o.budget;
     s.draw.unlitTriangles = o.shade == "unlit";
-    s.draw.lit = o.shade == "lit" || (o.shade == "auto" && isShaded(d) && colour.mode == lod::ColourMode::own);
+    s.draw.lit = isLit(o.shade, d, colour);
     s.draw.worldUp = shot.worldUp;
     s.draw.exactStrands = static_cast<float>(o.strandExact);
     s.draw.wind = {o.wind, o.seconds, render::windAcross(shot.worldUp)};
@@ -53,6 +56,7 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
             return fail(ErrorKind::usage, "channels are 0 to 255", "--background");
         s.draw.background[c] = shared::linearFromSrgb(static_cast<float>(background[c]) / 255.0f);
     }
+    if (o.alpha) s.draw.background = glm::vec3(0);  // what is not covered adds nothing
     static const std::array<const char*, 5> names{"none", "level", "error", "holes", "normals"};
     s.draw.debugView = static_cast<uint32_t>(std::find(names.begin(), names.end(), o.debug) - names.begin());
     s.wantDepthAndNormal = std::filesystem::path(o.output).extension() == ".exr";
@@ -116,7 +120,10 @@ Result<void> run(const Options& o, Written& written) {
     const lod::StoreDescription& description = scene.description;
     STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
     written.of = shot.views.size();
-    STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
+    // Rays see the records as they are stored.
+    const bool isTraced = o.mode == "reference" && o.colour.what == "auto";
+    STIPPLE_ASSIGN(const lod::ColourBy colour,
+                   applyColours(scene, isTraced ? "plain" : o.colour.what, o.colour.map, o.colour.range));
     STIPPLE_ASSIGN(render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
     STIPPLE_ASSIGN(settings.draw.environment,
                    openEnvironment(o.environment.path, o.environment.scale, o.build.reading().memoryBytes, *executor));
@@ -127,8 +134,8 @@ Result<void> run(const Options& o, Written& written) {
         const double start = nowSeconds();
         reference::TraceSettings trace{static_cast<uint32_t>(o.samples), settings.draw};
         for (size_t i = 0; i < shot.views.size(); ++i) {
-            STIPPLE_ASSIGN(const render::Image traced, reference::trace(scene.placed, shot.views[i], trace, *executor));
-            STIPPLE_TRY(image::writeImage(shot.views.size() > 1 ? numbered(o.output, i) : o.output, traced));
+            STIPPLE_ASSIGN(render::Image traced, reference::trace(scene.placed, shot.views[i], trace, *executor));
+            STIPPLE_TRY(image::writePicture(shot.views.size() > 1 ? numbered(o.output, i) : o.output, traced, o.alpha));
             ++written.pictures;
         }
         if (o.json)
@@ -146,14 +153,14 @@ Result<void> run(const Options& o, Written& written) {
     render::setSway(settings.draw.wind, state->hierarchies, state->instances);
     const Legend legend = o.colour.legend ? makeLegend(colour, description) : Legend{};
     const FramesPlan plan{shot.views,   shot.seconds, o.output,        o.resident, o.frames,
-                          o.accumulate, o.noWait,     o.build.skipBad, o.quiet,    !o.quiet && !o.json};
+                          o.accumulate, o.noWait,     o.build.skipBad, o.quiet,    !o.quiet && !o.json, o.alpha};
     Timings timings;
     Verdict verdict;
     STIPPLE_TRY(runFrames(plan, settings, *state, *executor, timings, written, verdict));
     if (shot.views.size() == 1) {
         STIPPLE_TRY(checkStopped(o.output));
         drawLegend(legend, state->image);
-        STIPPLE_TRY(image::writeImage(o.output, state->image));
+        STIPPLE_TRY(image::writePicture(o.output, state->image, o.alpha));
     }
     const FrameCounters& c = state->counters;
     if (o.json) {
@@ -240,9 +247,11 @@ void setupRender(CLI::App& app, int& status) {
     sub->add_option("--shade", o->shade, "auto: unlit where the scan has its own colours, lit by sun and sky otherwise")
         ->check(oneOf({"auto", "lit", "unlit"}))
         ->capture_default_str();
-    sub->add_option("--background", o->background, "colour behind the scene, sRGB, 0 to 255 each")
+    auto* const background = sub->add_option("--background", o->background, "colour behind the scene, sRGB, 0 to 255 each")
         ->type_name("R,G,B")
         ->capture_default_str();
+    sub->add_flag("--alpha", o->alpha, "no background: how much of a pixel is covered goes into the alpha channel")
+        ->excludes(background);
     sub->add_option("--debug", o->debug, "draw what the engine did instead of colours")
         ->check(oneOf({"none", "level", "error", "holes", "normals"}))
         ->capture_default_str();

@@ -8,7 +8,7 @@
 
 #include "apps/stipple/report.h"
 #include "engine/base/process.h"
-#include "engine/image/image_io.h"
+#include "engine/image/coverage.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::app {
@@ -132,7 +132,7 @@ Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& sett
         if (isSingle) break;
         STIPPLE_TRY(checkStopped(plan.output));
         verdict.judge(state);
-        STIPPLE_TRY(image::writeImage(numbered(plan.output, i), state.image));
+        STIPPLE_TRY(image::writePicture(numbered(plan.output, i), state.image, plan.alpha));
         ++written.pictures;
         if (plan.printNames) fmt::print("{}\n", numbered(plan.output, i));
     }

@@ -17,7 +17,7 @@ struct FramesPlan {
     std::string output, resident;     ///< as on the command line
     int repeats = 1;                  ///< of a single view, for timing
     int accumulate = 1;               ///< frames whose mean a single picture is
-    bool noWait = false, skipBad = false, quiet = false, printNames = false;
+    bool noWait = false, skipBad = false, quiet = false, printNames = false, alpha = false;
 };
 
 struct Timings {

@@ -144,8 +144,8 @@ class Viewer {
     }
 
     void frameScene() {
-        const lod::StoreDescription& d = session_.scene().description;
-        navigation_ = Navigation(scene::fitCamera(d.focusMin, d.focusMax, d.up, aspect()), d.up, session_.diagonal());
+        const glm::dvec3 up = session_.scene().description.up;
+        navigation_ = Navigation(scene::fitCamera(session_.scene().outline, up, aspect()), up, session_.diagonal());
         hasChanged_ = true;
     }
 

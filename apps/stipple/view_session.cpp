@@ -23,8 +23,7 @@ void ViewSession::restart(render::FrameSettings& settings) {
     settings.draw.lights = scene_.lights;
     settings.draw.worldUp = d.up;
     settings.draw.wind.towards = render::windAcross(d.up);
-    settings.draw.lit =
-        options_.shade == "lit" || (options_.shade == "auto" && isShaded(d) && colour_.mode == lod::ColourMode::own);
+    settings.draw.lit = isLit(options_.shade, d, colour_);
     render::setSway(settings.draw.wind, state_->hierarchies, state_->instances);
     legend_ = makeLegend(colour_, d);
 }

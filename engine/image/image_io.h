@@ -9,7 +9,8 @@
 
 namespace stipple::image {
 
-/// By extension: .png (8 bit, alpha = coverage) or .exr (linear colour, coverage, depth, normal). Whole or not at all.
+/// By extension: .png (8 bit) or .exr (linear colour, depth, normal), both with the image's alpha as it is (see
+/// coverage.h). Whole or not at all.
 Result<void> writeImage(const std::string& path, const render::Image& image);
 /// The bytes that writeImage would write to `path`.
 Result<std::vector<char>> encodeImage(const std::string& path, const render::Image& image);

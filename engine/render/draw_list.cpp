@@ -67,6 +67,11 @@ void addMeshes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, DrawList&
 
 }  // namespace
 
+glm::vec3 linearBackground() {
+    const auto linear = [](uint8_t byte) { return shared::linearFromSrgb(static_cast<float>(byte) / 255.0f); };
+    return {linear(kBackground[0]), linear(kBackground[1]), linear(kBackground[2])};
+}
+
 void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,
                   std::span<const lod::Instance> instances, const lod::View& view, const DrawSettings& settings,
                   DrawList& out) {

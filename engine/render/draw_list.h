@@ -2,6 +2,7 @@
 // place where world-sized numbers (fp64) become camera-space fp32.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
@@ -67,11 +68,16 @@ struct DrawList {
     std::span<const lod::Instance> instances;
 };
 
+/// Behind everything, in pictures and in the window: sRGB.
+inline constexpr std::array<uint8_t, 3> kBackground{39, 39, 44};
+/// The same, linear.
+glm::vec3 linearBackground();
+
 struct DrawSettings {
     bool lit = false;  ///< points; triangles are, unless their material says otherwise
     bool unlitTriangles = false;
     uint32_t debugView = shared::kDebugNone;
-    glm::vec3 background{0.02f, 0.02f, 0.025f};  ///< linear
+    glm::vec3 background = linearBackground();  ///< linear
     glm::dvec3 worldUp{0, 0, 1};
     std::shared_ptr<const Environment> environment;
     std::vector<WorldLight> lights;  ///< none: a sun over the viewer's shoulder

@@ -20,36 +20,121 @@ T catmullRom(const T& a, const T& b, const T& c, const T& d, double s) {
                   (3.0 * b - a - 3.0 * c + d) * (s * s * s));
 }
 
-Camera viewFrom(const glm::dvec3& lo, const glm::dvec3& hi, const glm::dvec3& up, double aspect, double azimuth) {
-    Camera camera;
-    const glm::dvec3 centre = 0.5 * (lo + hi), half = 0.5 * (hi - lo);
-    camera.up = glm::normalize(up);
-    // A frame in which `up` is the third axis; for an axis, the other two axes.
+/// Two directions across `up`; for an axis, the other two axes.
+std::pair<glm::dvec3, glm::dvec3> across(const glm::dvec3& up) {
     int largest = 2;
     for (int i = 0; i < 2; ++i)
-        if (std::abs(camera.up[i]) > std::abs(camera.up[largest])) largest = i;
+        if (std::abs(up[i]) > std::abs(up[largest])) largest = i;
     glm::dvec3 first(0);
     first[(largest + 1) % 3] = 1;
-    first = glm::normalize(first - glm::dot(first, camera.up) * camera.up);
-    const glm::dvec3 second = glm::cross(camera.up, first);
-    const double elevation = 25 * kPi / 180;
-    const glm::dvec3 direction = std::cos(elevation) * (std::cos(azimuth) * first + std::sin(azimuth) * second) +
-                                 std::sin(elevation) * camera.up;
-    // Far enough that all eight corners are inside the picture.
-    const double tanV = std::tan(0.5 * camera.fovDegrees * kPi / 180) * 0.92, tanH = tanV * aspect;
-    const glm::dvec3 forward = -direction, right = glm::normalize(glm::cross(forward, camera.up)),
-                     down = glm::cross(forward, right);
-    double distance = 0;
-    for (int corner = 0; corner < 8; ++corner) {
-        const glm::dvec3 p(corner & 1 ? half.x : -half.x, corner & 2 ? half.y : -half.y, corner & 4 ? half.z : -half.z);
-        const double depth = glm::dot(p, forward);
-        distance = std::max(
-            {distance, std::abs(glm::dot(p, right)) / tanH - depth, std::abs(glm::dot(p, down)) / tanV - depth});
+    first = glm::normalize(first - glm::dot(first, up) * up);
+    return {first, glm::cross(up, first)};
+}
+
+/// The size along across(up) and up.
+glm::dvec3 sizeOf(std::span<const glm::dvec3> points, const glm::dvec3& up) {
+    const auto [first, second] = across(up);
+    glm::dvec3 lo(1e300), hi(-1e300);
+    for (const glm::dvec3& p : points) {
+        const glm::dvec3 q(glm::dot(p, first), glm::dot(p, second), glm::dot(p, up));
+        lo = glm::min(lo, q);
+        hi = glm::max(hi, q);
     }
-    if (!(distance > 0)) distance = 1;  // a single point
-    camera.target = centre;
-    camera.eye = centre + direction * distance;
-    return camera;
+    return hi - lo;
+}
+
+/// From how high above the horizon: 25 degrees for what is as tall as wide, up to 50 for what is flat.
+double elevationFor(std::span<const glm::dvec3> points, const glm::dvec3& up) {
+    const glm::dvec3 size = sizeOf(points, up);
+    const double wide = std::sqrt(std::max(size.x, 1e-300)) * std::sqrt(std::max(size.y, 1e-300));
+    const double flatness = std::clamp(1 - 2 * size.z / wide, 0.0, 1.0);
+    return (25 + 25 * flatness) * kPi / 180;
+}
+
+/// From where around: y-up files face +z, which is the first axis across, so from 20 degrees off the front; z-up: from
+/// the south-west. What is long is seen from its side.
+double azimuthFor(std::span<const glm::dvec3> points, const glm::dvec3& up) {
+    constexpr double kLong = 2;
+    const glm::dvec3 size = sizeOf(points, up);
+    const bool isFront = up.y > 0.9;
+    double degrees = isFront ? 20 : 235;
+    if (size.x > kLong * size.y) degrees = isFront ? 70 : 250;
+    if (size.y > kLong * size.x) degrees = isFront ? 20 : 200;
+    return degrees * kPi / 180;
+}
+
+/// Points in the axes of a picture, from a middle.
+struct Projected {
+    std::vector<glm::dvec3> points;  ///< right, down, forward
+    double tanX, tanY;               ///< of the part of the half field of view that may be filled
+
+    /// The nearest distance of the eye from the middle at which an axis' extent fits, wherever the eye is moved to
+    /// along that axis. A point (p, z) is seen inside iff |p - shift| <= t (z + distance): over all pairs of points
+    /// that leaves room for a shift iff max(p - t z) - min(p + t z) <= 2 t distance.
+    double nearest(int axis, double t) const {
+        double most = -1e300, least = 1e300;
+        for (const glm::dvec3& p : points) {
+            most = std::max(most, p[axis] - t * p.z);
+            least = std::min(least, p[axis] + t * p.z);
+        }
+        return (most - least) / (2 * t);
+    }
+    /// The nearest distance with the eye straight before the middle.
+    double nearestStraight() const {
+        double distance = 0;
+        for (const glm::dvec3& p : points)
+            distance = std::max({distance, std::abs(p.x) / tanX - p.z, std::abs(p.y) / tanY - p.z});
+        return distance;
+    }
+    /// The shift along an axis that puts the projection into the middle of the picture.
+    double centred(int axis, double distance) const {
+        double lo = 1e300, hi = -1e300;
+        for (const glm::dvec3& p : points) {
+            lo = std::min(lo, p[axis]);
+            hi = std::max(hi, p[axis]);
+        }
+        for (int i = 0; i < 60; ++i) {  // the sum falls as the shift grows
+            const double middle = 0.5 * (lo + hi);
+            double most = -1e300, least = 1e300;
+            for (const glm::dvec3& p : points) {
+                const double at = (p[axis] - middle) / (p.z + distance);
+                most = std::max(most, at);
+                least = std::min(least, at);
+            }
+            (most + least > 0 ? lo : hi) = middle;
+        }
+        return 0.5 * (lo + hi);
+    }
+};
+
+/// What is seen along `forward`, from a middle that is given.
+Projected project(std::span<const glm::dvec3> points, const glm::dvec3& middle, const Camera& axes,
+                  const glm::dvec3& forward, double aspect) {
+    const glm::dvec3 right = glm::normalize(glm::cross(forward, axes.up)), down = glm::cross(forward, right);
+    Projected out;
+    out.tanY = std::tan(0.5 * axes.fovDegrees * kPi / 180) * kFitShare;
+    out.tanX = out.tanY * aspect;
+    out.points.reserve(points.size());
+    for (const glm::dvec3& p : points) {
+        const glm::dvec3 from = p - middle;
+        out.points.emplace_back(glm::dot(from, right), glm::dot(from, down), glm::dot(from, forward));
+    }
+    return out;
+}
+
+glm::dvec3 middleOf(std::span<const glm::dvec3> points) {
+    glm::dvec3 lo(1e300), hi(-1e300);
+    for (const glm::dvec3& p : points) {
+        lo = glm::min(lo, p);
+        hi = glm::max(hi, p);
+    }
+    return lo + 0.5 * (hi - lo);
+}
+
+/// Towards the eye.
+glm::dvec3 directionFrom(const glm::dvec3& up, double elevation, double azimuth) {
+    const auto [first, second] = across(up);
+    return std::cos(elevation) * (std::cos(azimuth) * first + std::sin(azimuth) * second) + std::sin(elevation) * up;
 }
 
 }  // namespace
@@ -72,15 +157,61 @@ Camera CameraPath::at(double t) const {
     return out;
 }
 
-Camera fitCamera(const glm::dvec3& lo, const glm::dvec3& hi, const glm::dvec3& up, double aspect) {
-    // y-up files face +z, which is a = z, b = x: 20 degrees off the front. z-up: from the south-west.
-    return viewFrom(lo, hi, up, aspect, up.y > 0.9 ? 20 * kPi / 180 : 235 * kPi / 180);
+std::array<glm::dvec3, 8> cornersOf(const glm::dvec3& lo, const glm::dvec3& hi) {
+    std::array<glm::dvec3, 8> corners;
+    for (size_t i = 0; i < 8; ++i)
+        corners.at(i) = {(i & 1) != 0 ? hi.x : lo.x, (i & 2) != 0 ? hi.y : lo.y, (i & 4) != 0 ? hi.z : lo.z};
+    return corners;
 }
 
-CameraPath makeOrbit(const glm::dvec3& lo, const glm::dvec3& hi, const glm::dvec3& up, double aspect, int keys) {
+Camera fitCamera(std::span<const glm::dvec3> points, const glm::dvec3& up, double aspect, double fovDegrees) {
+    Camera camera;
+    camera.up = glm::normalize(up);
+    camera.fovDegrees = fovDegrees;
+    const glm::dvec3 middle = middleOf(points);
+    const glm::dvec3 forward =
+        -directionFrom(camera.up, elevationFor(points, camera.up), azimuthFor(points, camera.up));
+    const Projected seen = project(points, middle, camera, forward, aspect);
+    double distance = std::max(seen.nearest(0, seen.tanX), seen.nearest(1, seen.tanY));
+    // A long thing in a very wide picture: not from its end itself.
+    const auto byDepth = [](const glm::dvec3& a, const glm::dvec3& b) { return a.z < b.z; };
+    const auto [front, back] = std::minmax_element(seen.points.begin(), seen.points.end(), byDepth);
+    distance = std::max(distance, 0.02 * (back->z - front->z) - front->z);
+    if (!(distance > 0) || !std::isfinite(distance)) {  // a single point
+        camera.target = middle;
+        camera.eye = middle - forward;
+        return camera;
+    }
+    const glm::dvec3 right = glm::normalize(glm::cross(forward, camera.up)), down = glm::cross(forward, right);
+    camera.target = middle + right * seen.centred(0, distance) + down * seen.centred(1, distance);
+    camera.eye = camera.target - forward * distance;
+    return camera;
+}
+
+Camera fitCamera(const glm::dvec3& lo, const glm::dvec3& hi, const glm::dvec3& up, double aspect, double fovDegrees) {
+    return fitCamera(cornersOf(lo, hi), up, aspect, fovDegrees);
+}
+
+CameraPath makeOrbit(std::span<const glm::dvec3> points, const glm::dvec3& up, double aspect, int keys,
+                     double fovDegrees) {
+    Camera camera;
+    camera.up = glm::normalize(up);
+    camera.fovDegrees = fovDegrees;
+    camera.target = middleOf(points);
+    const double elevation = elevationFor(points, camera.up);
+    std::vector<glm::dvec3> directions;
+    double distance = 0;
+    for (int i = 0; i < keys; ++i) {
+        directions.push_back(directionFrom(camera.up, elevation, (20.0 + 360.0 * i / keys) * kPi / 180));
+        const Projected seen = project(points, camera.target, camera, -directions.back(), aspect);
+        distance = std::max(distance, seen.nearestStraight());
+    }
+    if (!(distance > 0) || !std::isfinite(distance)) distance = 1;  // a single point
     CameraPath path;
-    for (int i = 0; i < keys; ++i)
-        path.keys.push_back({double(i), viewFrom(lo, hi, up, aspect, (20.0 + 360.0 * i / keys) * kPi / 180)});
+    for (int i = 0; i < keys; ++i) {
+        camera.eye = camera.target + directions[static_cast<size_t>(i)] * distance;
+        path.keys.push_back({double(i), camera});
+    }
     return path;
 }
 

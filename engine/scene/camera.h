@@ -1,6 +1,8 @@
 // Cameras in file coordinates (fp64), and paths of them.
 #pragma once
 
+#include <array>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -28,16 +30,25 @@ struct CameraPath {
     double duration() const { return keys.empty() ? 0 : keys.back().t - keys.front().t; }
 };
 
-/// A camera that sees the whole box from a three-quarter view.
-Camera fitCamera(const glm::dvec3& boundsMin, const glm::dvec3& boundsMax, const glm::dvec3& up, double aspect);
+/// Share of the picture's tighter side that a scene spans when a camera is fitted to it.
+inline constexpr double kFitShare = 0.9;
+
+/// A camera that sees all of `points` (at least one) from a three-quarter view, flat scenes from steeper above: their
+/// projection spans kFitShare of the picture's tighter side and stands in its middle.
+Camera fitCamera(std::span<const glm::dvec3> points, const glm::dvec3& up, double aspect, double fovDegrees = 50);
+/// Of a box.
+Camera fitCamera(const glm::dvec3& boundsMin, const glm::dvec3& boundsMax, const glm::dvec3& up, double aspect,
+                 double fovDegrees = 50);
+/// The corners of a box.
+std::array<glm::dvec3, 8> cornersOf(const glm::dvec3& boundsMin, const glm::dvec3& boundsMax);
 
 /// The view of `camera` at width x height pixels. `nearPlane` world units.
 lod::View makeView(const Camera& camera, uint32_t width, uint32_t height, double nearPlane);
 
 /// Reads {"fps": 30, "keys": [{"t": 0, "eye": [x,y,z], "target": [...], "up": [...], "fov": 50}]}.
 Result<CameraPath> readCameraPath(const std::string& path);
-/// An orbit around the box: what a headless ./run renders.
-CameraPath makeOrbit(const glm::dvec3& boundsMin, const glm::dvec3& boundsMax, const glm::dvec3& up, double aspect,
-                     int keys);
+/// An orbit around points, at one distance and height: what a headless ./run renders. Nothing of them is ever outside.
+CameraPath makeOrbit(std::span<const glm::dvec3> points, const glm::dvec3& up, double aspect, int keys,
+                     double fovDegrees = 50);
 
 }  // namespace stipple::scene

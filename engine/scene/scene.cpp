@@ -2,10 +2,13 @@
 
 #include <filesystem>
 
+#include "lod/file_kind.h"
+
 namespace stipple::scene {
 
 Result<Scene> readScene(const std::string& path, const ReadSettings& settings) {
-    return std::filesystem::path(path).extension() == ".obj" ? readObj(path, settings) : readGltf(path, settings);
+    const bool isObj = std::filesystem::path(path).extension() == ".obj" && lod::fileKindOf(path) != lod::FileKind::glb;
+    return isObj ? readObj(path, settings) : readGltf(path, settings);
 }
 
 std::vector<glm::dmat4> Scene::worldTransforms() const {

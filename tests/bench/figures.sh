@@ -49,15 +49,15 @@ compare='"PSNR %s dB (foreground %s), %.4f %% > 4/255, IoU %.5f, holes %d" % (d[
 errors() { # errors NAME SCENE OPTIONS...
     local name=$1 scene=$2
     shift 2
-    "$program" render "$scene" -o leaves.png "$@" --error 0.001 --device cpu --quiet
+    "$program" render "$scene" -o leaves.png --alpha "$@" --error 0.001 --device cpu --quiet
     for device in cpu gpu:llvmpipe; do
-        "$program" render "$scene" -o a.png "$@" --error 1 --device $device --quiet
-        "$program" render "$scene" -o b.png "$@" --error 1 --device reference --quiet
+        "$program" render "$scene" -o a.png --alpha "$@" --error 1 --device $device --quiet
+        "$program" render "$scene" -o b.png --alpha "$@" --error 1 --device reference --quiet
         json compare compare a.png b.png
         row "implementation error, $name, $device against fp64, cut at 1 px" "$(value compare.json "$compare")" "stipple render ... --error 1 --device $device | reference; stipple compare"
     done
     for tau in 0.5 1 2 4; do
-        json render render "$scene" -o a.png "$@" --error $tau --device cpu
+        json render render "$scene" -o a.png --alpha "$@" --error $tau --device cpu
         json compare compare a.png leaves.png
         row "level-of-detail error, $name, $tau px against the leaves" "$(value render.json "'%.2fM records: ' % (d['records_drawn']/1e6)")$(value compare.json "$compare")" \
             "stipple render ... --error $tau; --error 0.001; stipple compare"
@@ -69,7 +69,7 @@ if [ -f "$statue" ]; then
     zcat "$statue" >statue.ply
     "$program" build statue.ply -o statue.stipple --quiet >/dev/null
     errors 'statue (437,645 points)' statue.stipple --size 1024x1024
-    "$program" render statue.stipple -o traced.png --size 1024x1024 --mode reference --quiet
+    "$program" render statue.stipple -o traced.png --alpha --size 1024x1024 --mode reference --quiet
     json compare compare leaves.png traced.png
     row 'reconstruction error, statue, pullpush at the leaves against traced discs (4 x 4 rays)' "$(value compare.json "$compare")" \
         'stipple render statue.stipple -o a.png --size 1024x1024 --error 0.001; --mode reference; stipple compare'

@@ -59,12 +59,12 @@ for as in triangles strands; do "$program" grow tree -o $as.glb --leaves 50k --a
 row "a polygon oak of 566k triangles to strands" "$(value convert.json '"%.1f s; %d ribbons, %d tubes, %d triangles left; %.1f mm off on average, %.1f mm for 95 %%" % (d["seconds"], d["ribbons"], d["tubes"], d["triangles_left"], 1e3*d["deviation"]["mean"], 1e3*d["deviation"]["p95"])')" "stipple grow tree -o t.glb --leaves 50k --as triangles; stipple convert t.glb --strands -o c.glb --json"
 for distance in 6 40; do
     where="--size 1920x1080 --eye=0,5,$distance --target=0,5,0"
-    "$program" render triangles.glb -o truth.png $where --mode reference --samples 3 --quiet
-    "$program" render converted.glb -o traced.png $where --mode reference --samples 3 --quiet
+    "$program" render triangles.glb -o truth.png --alpha $where --mode reference --samples 3 --quiet
+    "$program" render converted.glb -o traced.png --alpha $where --mode reference --samples 3 --quiet
     row "its cover at $distance m, traced" "$(python3 -c "print('%+.2f %%' % (100 * ($(cover traced.png) / $(cover truth.png) - 1)))")" "both with --mode reference --samples 3"
     for plant in triangles converted; do
         for tau in 0.5 2; do
-            json render render $plant.glb -o a.png $where --device cpu --error $tau --frames 20
+            json render render $plant.glb -o a.png --alpha $where --device cpu --error $tau --frames 20
             row "$plant at $distance m, $tau px, against traced triangles" "$(value render.json '"%.1f ms: " % d["frame_ms"]["median"]')$(difference a.png truth.png); cover $(python3 -c "print('%+.2f %%' % (100 * ($(cover a.png) / $(cover truth.png) - 1)))")" "stipple render $plant.glb -o a.png $where --error $tau --frames 20 --json; stipple compare"
         done
     done

@@ -40,14 +40,14 @@ for where in "" "--eye=-700,260,700 --target=0,80,0"; do
 done
 small='--size 960x540'
 for kind in rock building terrain; do
-    "$program" render $kind.stipple -o o.png $small --device reference --quiet
+    "$program" render $kind.stipple -o o.png --alpha $small --device reference --quiet
     for device in cpu gpu:llvmpipe; do
-        "$program" render $kind.stipple -o a.png $small --device $device --quiet 2>/dev/null || continue
+        "$program" render $kind.stipple -o a.png --alpha $small --device $device --quiet 2>/dev/null || continue
         row "implementation error, $kind, $device against fp64, cut at 1 px" "$(difference a.png o.png)" "stipple render $kind.stipple -o a.png $small --device $device; ... --device reference; stipple compare"
     done
-    "$program" render $kind.stipple -o full.png $small --device cpu --error 0.0001 --quiet
+    "$program" render $kind.stipple -o full.png --alpha $small --device cpu --error 0.0001 --quiet
     for tau in 0.5 1 2 4; do
-        "$program" render $kind.stipple -o a.png $small --device cpu --error $tau --json >r.json 2>/dev/null
+        "$program" render $kind.stipple -o a.png --alpha $small --device cpu --error $tau --json >r.json 2>/dev/null
         row "level-of-detail error, $kind, $tau px against all triangles" "$(value r.json '"%.0fk triangles: " % (d["triangles_drawn"]/1e3)')$(difference a.png full.png)" "stipple render $kind.stipple -o a.png $small --error $tau; ... --error 0.0001; stipple compare"
     done
 done
@@ -56,10 +56,10 @@ if [ -n "$data" ] && [ -e "$data/01_meshes/stanford-dragon/dragon_vrip.ply.gz" ]
     "$program" build statue.ply -o mesh.stipple --quiet >/dev/null
     "$program" build statue.ply -o points.stipple --only-points --quiet >/dev/null
     # Normals instead of light: what is compared is the surface, not the shading model.
-    "$program" render mesh.stipple -o truth.png --size 1920x1080 --device reference --error 0.0001 --debug normals --quiet
+    "$program" render mesh.stipple -o truth.png --alpha --size 1920x1080 --device reference --error 0.0001 --debug normals --quiet
     for tau in 0.25 0.5 1 2 4 8; do
         for kind in mesh points; do
-            json r render $kind.stipple -o a.png $view --error $tau --debug normals
+            json r render $kind.stipple -o a.png --alpha $view --error $tau --debug normals
             row "statue, $kind at $tau px: time, and normals against the full mesh (fp64)" "$(value r.json '"%.1f ms, %.0fk primitives: " % (d["frame_ms"]["median"], (d["triangles_drawn"]+d["records_drawn"])/1e3)')$(difference a.png truth.png)" "stipple render $kind.stipple -o a.png $view --error $tau --debug normals; stipple compare"
         done
     done

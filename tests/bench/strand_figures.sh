@@ -47,15 +47,15 @@ for rows in 1 3; do
     done
 done
 near='--eye=0,15,3.5 --target=4.4,19.4,4 --fov=40 --size 900x700'
-"$program" render tree.txt.stipple -o truth.png $near --mode reference --quiet
+"$program" render tree.txt.stipple -o truth.png --alpha $near --mode reference --quiet
 for exact in 2 4 8 1e9; do
-    json render render tree.txt.stipple -o a.png $near --device cpu --error 0.01 --strand-exact $exact --frames 30
+    json render render tree.txt.stipple -o a.png --alpha $near --device cpu --error 0.01 --strand-exact $exact --frames 30
     row "accuracy of a trunk against traced rays, strands filled from $exact px on" "$(value render.json '"%.1f ms: " % d["frame_ms"]["median"]')$(difference a.png truth.png)" "stipple render tree.txt.stipple -o a.png $near --strand-exact $exact; ... --mode reference; stipple compare"
 done
 for file in lines.trk fur.hair tree.txt; do
-    "$program" render $file.stipple -o o.png --size 960x540 --device reference --quiet
+    "$program" render $file.stipple -o o.png --alpha --size 960x540 --device reference --quiet
     for device in cpu gpu:llvmpipe; do
-        "$program" render $file.stipple -o a.png --size 960x540 --device $device --quiet 2>/dev/null || continue
+        "$program" render $file.stipple -o a.png --alpha --size 960x540 --device $device --quiet 2>/dev/null || continue
         row "implementation error, $file, $device against fp64, cut at 1 px" "$(difference a.png o.png)" "stipple render $file.stipple -o a.png --size 960x540 --device $device; ... --device reference; stipple compare"
     done
 done

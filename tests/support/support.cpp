@@ -147,7 +147,25 @@ std::vector<std::array<int64_t, 3>> leafLattice(const lod::Store& store) {
 
 lod::View fitView(const lod::Store& store, uint32_t width, uint32_t height) {
     const lod::StoreDescription& d = store.description;
-    const scene::Camera camera = scene::fitCamera(d.boundsMin, d.boundsMax, d.up, double(width) / height);
+    // Its own framing: pictures and figures of the tests do not change with the one of the program.
+    scene::Camera camera;
+    camera.up = d.up;
+    const glm::dvec3 first(d.up.z, d.up.x, d.up.y), second(d.up.y, d.up.z, d.up.x);  // the axes after `up`
+    const double azimuth = (d.up.y > 0.9 ? 20 : 235) * 0.017453292519943295, elevation = 25 * 0.017453292519943295;
+    const glm::dvec3 direction =
+        std::cos(elevation) * (std::cos(azimuth) * first + std::sin(azimuth) * second) + std::sin(elevation) * d.up;
+    const double tanV = std::tan(0.5 * camera.fovDegrees * 0.017453292519943295) * 0.92,
+                 tanH = tanV * double(width) / height;
+    const glm::dvec3 right = glm::normalize(glm::cross(-direction, d.up)), down = glm::cross(-direction, right);
+    camera.target = 0.5 * (d.boundsMin + d.boundsMax);
+    double distance = 0;
+    for (const glm::dvec3& corner : scene::cornersOf(d.boundsMin, d.boundsMax)) {
+        const glm::dvec3 p = corner - camera.target;
+        const double depth = -glm::dot(p, direction);
+        distance = std::max(
+            {distance, std::abs(glm::dot(p, right)) / tanH - depth, std::abs(glm::dot(p, down)) / tanV - depth});
+    }
+    camera.eye = camera.target + direction * (distance > 0 ? distance : 1);
     return scene::makeView(camera, width, height, 1e-5 * glm::length(d.boundsMax - d.boundsMin));
 }
 

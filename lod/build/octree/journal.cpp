@@ -15,7 +15,7 @@
 #include <thread>
 
 #include "engine/base/hash.h"
-#include "lod/store_file.h"
+#include "lod/file_kind.h"
 
 namespace stipple::lod {
 namespace fs = std::filesystem;
@@ -65,7 +65,7 @@ bool isOfABuild(const std::string& path) {
     uint64_t begin = 1;
     const auto file = InputFile::open(path);
     const bool isHeadless = file && file->readAt(0, &begin, std::min<uint64_t>(sizeof(begin), file->sizeBytes()));
-    return (isHeadless && begin == 0) || isStoreFile(path);
+    return (isHeadless && begin == 0) || fileKindOf(path) == FileKind::store;
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "engine/base/paged_array.h"
+#include "lod/file_kind.h"
 #include "lod/import/import.h"
 #include "lod/import/ply/rows.h"
 #include "lod/octahedral.h"
@@ -242,16 +243,15 @@ class PlyMesh {
 
 }  // namespace
 
-Result<bool> hasPlyFaces(const std::string& path) {
+Result<PlyFaces> plyFaces(const std::string& path) {
+    PlyFaces out;
+    if (fileKindOf(path) != FileKind::ply) return out;
     STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
-    std::array<char, 3> magic{};
-    if (file.sizeBytes() < 4) return false;
-    STIPPLE_TRY(file.readAt(0, magic.data(), magic.size()));
-    if (magic != std::array<char, 3>{'p', 'l', 'y'}) return false;
     STIPPLE_ASSIGN(const PlyHeader header, parsePlyHeader(file));
-    return std::any_of(header.elements.begin(), header.elements.end(), [](const PlyElement& e) {
-        return e.name != "vertex" && e.count > 0 && std::any_of(e.properties.begin(), e.properties.end(), isCornerList);
-    });
+    for (const PlyElement& e : header.elements)
+        if (e.name != "vertex" && std::any_of(e.properties.begin(), e.properties.end(), isCornerList))
+            (e.name == "tristrips" ? out.strips : out.faces) += e.count;
+    return out;
 }
 
 Result<MeshSource> openPlyMesh(const std::string& path, uint64_t memoryBytes, const std::string& tempFolder) {

@@ -9,8 +9,14 @@
 
 namespace stipple::lod {
 
-/// Has the file faces or strips? False for a file that is no PLY.
-Result<bool> hasPlyFaces(const std::string& path);
+/// What a file declares beside its vertices: rows of the elements that have corners.
+struct PlyFaces {
+    uint64_t faces = 0;   ///< polygons
+    uint64_t strips = 0;  ///< rows of triangle strips, each of any number of triangles
+    bool any() const { return faces + strips > 0; }
+};
+/// None of a file that is no PLY.
+Result<PlyFaces> plyFaces(const std::string& path);
 /// Vertices in file units, two-sided; sRGB 200 where the file has no colours. Where it has no normals, faces that share
 /// a vertex get smooth ones (the sum of the faces', weighted by area). Of the vertices `memoryBytes` are in memory, the
 /// rest in a file in `tempFolder`; faces are read from the file as often as it takes.

@@ -4,11 +4,17 @@
 #include <filesystem>
 
 #include "engine/base/file.h"
+#include "lod/file_kind.h"
 
 namespace stipple::lod {
 namespace {
 
+/// By the bytes, where the format has a mark of its own; empty: they are of another kind than strands.
 std::string extensionOf(const std::string& path) {
+    const FileKind kind = fileKindOf(path);
+    if (kind == FileKind::trk) return ".trk";
+    if (kind == FileKind::hair) return ".hair";
+    if (kind != FileKind::other) return "";
     std::string e = std::filesystem::path(path).extension().string();
     std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     return e;

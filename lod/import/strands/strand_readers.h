@@ -11,7 +11,7 @@
 
 namespace stipple::lod {
 
-/// By extension: .swc, .trk, .hair, .txt and .csv (cylinder models).
+/// By what the file begins with, then by extension: .swc, .trk, .hair, .txt and .csv (cylinder models).
 bool isStrandFile(const std::string& path);
 /// TrackVis and hair files are read block by block; the others, small by nature, as a whole.
 Result<StrandSource> openStrands(const std::string& path);

@@ -1,0 +1,57 @@
+#include "apps/stipple/ply_meshes.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "lod/import/import.h"
+#include "lod/import/ply/mesh.h"
+
+namespace stipple::app {
+namespace fs = std::filesystem;
+
+std::string PlyMeshes::note() const {
+    if (files.empty() || others == 0) return "";
+    return fmt::format(
+        "{} {} faces, which are left out: only their vertices stand beside the points of {} other file{}; build them "
+        "apart to keep triangles",
+        files.size() == 1 ? files.front() : fmt::format("{} files", files.size()), files.size() == 1 ? "has" : "have",
+        others, others == 1 ? "" : "s");
+}
+
+Result<PlyMeshes> findPlyMeshes(const std::vector<std::string>& inputs, const BuildOptions& build) {
+    PlyMeshes out;
+    if (build.onlyPoints) return out;
+    STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs(inputs));
+    for (const std::string& file : files) {
+        const auto faces = lod::plyFaces(file);
+        if (!faces && files.size() == 1) return tl::unexpected(faces.error());
+        if (faces && faces->any())  // (who opens the others says what is wrong with them)
+            out.files.push_back(file);
+        else
+            ++out.others;
+    }
+    return out;
+}
+
+Result<lod::BuildReport> buildPlyMeshes(const std::vector<std::string>& files, const std::string& output,
+                                        const BuildOptions& build, lod::MeshBuildSettings settings, Executor& executor,
+                                        Progress& progress) {
+    STIPPLE_ASSIGN(const lod::BuildSettings wanted, build.settings());
+    const std::string folder =
+        wanted.tempFolder.empty() ? fs::absolute(output).parent_path().string() : wanted.tempFolder;
+    const uint64_t forVertices = wanted.memoryBytes / 4;
+    std::vector<lod::MeshSource> sources;
+    for (const std::string& file : files) {
+        STIPPLE_ASSIGN(lod::MeshSource source, lod::openPlyMesh(file, forVertices / files.size(), folder));
+        sources.push_back(std::move(source));
+    }
+    settings.description.source = fs::path(files.front()).filename().string();
+    if (files.size() > 1) settings.description.source += fmt::format(" and {} more", files.size() - 1);
+    settings.limits = wanted;
+    settings.limits.memoryBytes -= forVertices;
+    return lod::buildMeshStore(sources.size() == 1 ? sources.front() : lod::joined(std::move(sources)), output,
+                               settings, executor, progress);
+}
+
+}  // namespace stipple::app

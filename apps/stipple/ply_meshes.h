@@ -1,0 +1,28 @@
+// PLY files with faces: triangles, unless only their points are wanted.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/stipple/common.h"
+#include "lod/build/mesh/mesh_build.h"
+
+namespace stipple::app {
+
+/// What some inputs hold, as files.
+struct PlyMeshes {
+    std::vector<std::string> files;  ///< with faces, of which not only the vertices are wanted
+    size_t others = 0;               ///< files without
+    /// Are they built as triangles?
+    bool areAll() const { return !files.empty() && others == 0; }
+    /// What is lost where they are built as points, beside files that have nothing else; empty: nothing.
+    std::string note() const;
+};
+Result<PlyMeshes> findPlyMeshes(const std::vector<std::string>& inputs, const BuildOptions& build);
+
+/// The triangles of all `files` in one store. `settings`: without limits and source.
+Result<lod::BuildReport> buildPlyMeshes(const std::vector<std::string>& files, const std::string& output,
+                                        const BuildOptions& build, lod::MeshBuildSettings settings, Executor& executor,
+                                        Progress& progress);
+
+}  // namespace stipple::app

@@ -1,0 +1,20 @@
+// What the alpha channel of a picture says: nothing (opaque, background included), or how much of a pixel is covered.
+#pragma once
+
+#include <string>
+
+#include "engine/base/result.h"
+#include "engine/render/backend.h"
+
+namespace stipple::image {
+
+/// A picture with its background: alpha 255 everywhere.
+void makeOpaque(render::Image& image);
+/// Of a picture that was drawn on black: 8-bit colours are divided by the coverage, as PNG wants them; `linear` stays
+/// multiplied with it, as EXR wants it.
+void separateCoverage(render::Image& image);
+
+/// Writes a picture: opaque, or `hasAlpha` with its coverage (then it must have been drawn on black).
+Result<void> writePicture(const std::string& path, render::Image& image, bool hasAlpha);
+
+}  // namespace stipple::image

@@ -1,0 +1,117 @@
+#include "engine/scene/outline.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/scene/camera.h"
+
+namespace stipple::scene {
+namespace {
+
+constexpr size_t kDirections = 256, kEnoughRecords = 4096, kMostChunks = 32;
+
+/// Evenly spread over the sphere (golden angle).
+const std::array<glm::dvec3, kDirections>& directions() {
+    static const auto all = [] {
+        std::array<glm::dvec3, kDirections> to{};
+        for (size_t i = 0; i < kDirections; ++i) {
+            const double z = 1 - 2 * (static_cast<double>(i) + 0.5) / kDirections, r = std::sqrt(1 - z * z);
+            const double angle = 2.399963229728653 * static_cast<double>(i);
+            to.at(i) = {r * std::cos(angle), r * std::sin(angle), z};
+        }
+        return to;
+    }();
+    return all;
+}
+
+/// Nodes that together show all of a store: as many as it takes for enough records, or as may be read.
+std::vector<uint32_t> coarseNodes(const lod::Hierarchy& h) {
+    std::vector<uint32_t> front;
+    if (h.isMesh()) {
+        // Coarse groups come first, and finer ones reach farther out.
+        for (uint32_t i = 0; i < h.nodes.size(); ++i)
+            if (i < kMostChunks || h.groups[i].parents == 0) front.push_back(i);
+        return front;
+    }
+    front.push_back(0);
+    for (size_t records = h.nodes[0].records; records < kEnoughRecords;) {
+        std::vector<uint32_t> next;
+        records = 0;
+        for (const uint32_t n : front) {
+            const lod::Node& node = h.nodes[n];
+            const int children = __builtin_popcount(node.childMask);
+            if (children == 0) next.push_back(n);
+            for (int c = 0; c < children; ++c) next.push_back(node.firstChild + static_cast<uint32_t>(c));
+        }
+        if (next.size() > kMostChunks || next == front) break;
+        for (const uint32_t n : next) records += h.nodes[n].records;
+        front = std::move(next);
+    }
+    return front;
+}
+
+void addPositions(const lod::Hierarchy& h, const lod::Node& node, const lod::Chunk& chunk,
+                  std::vector<glm::dvec3>& to) {
+    const glm::dvec3 base = h.recordOrigin(node);
+    const double step = h.isLoose() ? h.cellSize(node) / 32768 : std::exp2(node.stepShift);
+    const auto add = [&](uint32_t xy, uint32_t z) {
+        to.push_back(h.origin + h.unit * (base + step * glm::dvec3(xy & 0xffffu, xy >> 16, z & 0xffffu)));
+    };
+    for (const shared::PointRecord& r : chunk.records) add(r.positionXY, r.positionZRadiusError);
+    for (const shared::StrandSegment& s : chunk.segments) {
+        add(s.a.positionXY, s.a.positionZ);
+        add(s.b.positionXY, s.b.positionZ);
+    }
+    for (const shared::MeshVertex& v : chunk.vertices) to.push_back(h.origin + h.unit * glm::dvec3(v.x, v.y, v.z));
+}
+
+}  // namespace
+
+std::vector<glm::dvec3> outermost(std::span<const glm::dvec3> points) {
+    if (points.size() <= kDirections) return {points.begin(), points.end()};
+    std::vector<uint32_t> chosen;
+    for (const glm::dvec3& d : directions()) {
+        uint32_t best = 0;
+        double farthest = -1e300;
+        for (uint32_t i = 0; i < points.size(); ++i)
+            if (const double at = glm::dot(points[i] - points[0], d); at > farthest) {
+                farthest = at;
+                best = i;
+            }
+        chosen.push_back(best);
+    }
+    std::sort(chosen.begin(), chosen.end());
+    chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+    std::vector<glm::dvec3> out;
+    for (const uint32_t i : chosen) out.push_back(points[i]);
+    return out;
+}
+
+std::vector<glm::dvec3> outlineOf(const lod::Store& store) {
+    const lod::Hierarchy& h = store.hierarchy;
+    const lod::StoreDescription& d = store.description;
+    const auto corners = cornersOf(d.focusMin, d.focusMax);
+    const std::vector<glm::dvec3> box(corners.begin(), corners.end());
+    const std::vector<uint32_t> front = coarseNodes(h);
+    if (front.empty() || front.size() > kMostChunks) return box;
+    std::vector<glm::dvec3> all;
+    for (const uint32_t n : front) {
+        const auto chunk = lod::readChunk(store, n);
+        if (!chunk) return box;  // whoever draws it says why
+        addPositions(h, h.nodes[n], *chunk, all);
+    }
+    const glm::dvec3 slack = 1e-6 * (d.focusMax - d.focusMin) + glm::dvec3(h.unit);
+    std::erase_if(all, [&](const glm::dvec3& p) {
+        return glm::any(glm::lessThan(p, d.focusMin - slack)) || glm::any(glm::greaterThan(p, d.focusMax + slack));
+    });
+    return all.empty() ? box : outermost(all);
+}
+
+bool looksZUp(const lod::StoreDescription& d) {
+    if (d.up.z > 0.5) return false;
+    const glm::dvec3 size = d.focusMax - d.focusMin;
+    constexpr double kFlat = 0.4;
+    return size.z < kFlat * size.x && size.z < kFlat * size.y;
+}
+
+}  // namespace stipple::scene
