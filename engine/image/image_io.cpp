@@ -1,10 +1,14 @@
 #include "engine/image/image_io.h"
 
 #include <dlfcn.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <array>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <new>
 
 #include "engine/base/file.h"
 #include "engine/image/oiio_module.h"
@@ -20,8 +24,21 @@ struct Module {
     std::string problem;
 };
 
+/// Under a limit of address space: some of the module's 261 libraries end the program where they find none for their
+/// threads and tables.
+void requireAddressSpace() {
+    constexpr uint64_t kNeeded = uint64_t{768} << 20;
+    rlimit limit{};
+    if (::getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return;
+    uint64_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    const uint64_t used = pages * static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
+    if (limit.rlim_cur < used + kNeeded) throw std::bad_alloc();
+}
+
 const Module& module() {
     static const Module loaded = [] {
+        requireAddressSpace();
         Module m;
         std::error_code ignored;
         const auto folder = std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path();
