@@ -1,6 +1,8 @@
 #include "engine/image/image_io.h"
 
 #include <dlfcn.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <fmt/format.h>
 
@@ -9,6 +11,8 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <new>
 
 #include "engine/base/file.h"
 #include "engine/base/process.h"
@@ -33,8 +37,21 @@ std::array<std::string, 3> modulePlaces() {
             STIPPLE_BUILT_MODULE};
 }
 
+/// Under a limit of address space: some of the module's 261 libraries end the program where they find none for their
+/// threads and tables.
+void requireAddressSpace() {
+    constexpr uint64_t kNeeded = uint64_t{768} << 20;
+    rlimit limit{};
+    if (::getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return;
+    uint64_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    const uint64_t used = pages * static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
+    if (limit.rlim_cur < used + kNeeded) throw std::bad_alloc();
+}
+
 const Module& module() {
     static const Module loaded = [] {
+        requireAddressSpace();
         Module m;
         for (const std::string& place : modulePlaces()) {
             void* handle = ::dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL);
