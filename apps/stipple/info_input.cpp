@@ -10,6 +10,7 @@
 
 #include "apps/stipple/common.h"
 #include "engine/base/file.h"
+#include "engine/base/text.h"
 #include "engine/base/units.h"
 #include "engine/scene/scene.h"
 #include "lod/import/import.h"
@@ -188,7 +189,7 @@ void printAttributes(const nlohmann::json& attributes) {
 
 void printFile(const nlohmann::json& j) {
     const bool isMesh = j.contains("faces") || j.contains("triangle_strips");
-    fmt::print("{}: {}, {} {}\n", j["path"].get<std::string>(), j["format"].get<std::string>(),
+    fmt::print("{}: {}, {} {}\n", printable(j["path"].get<std::string>()), j["format"].get<std::string>(),
                j["points"].get<uint64_t>(), isMesh ? "vertices" : "points");
     if (isMesh)
         fmt::print("  {:15} {}{}\n", "faces", j.value("faces", uint64_t{0}),
@@ -218,8 +219,8 @@ void printFile(const nlohmann::json& j) {
                        r["user"].get<std::string>(), r["id"].get<int>(), r["bytes"].get<uint64_t>(),
                        r["description"].get<std::string>());
     printAttributes(j["attributes"]);
-    for (const auto& n : j["notes"]) fmt::print("  note: {}\n", n.get<std::string>());
-    for (const auto& p : j["problems"]) fmt::print("  problem: {}\n", p.get<std::string>());
+    for (const auto& n : j["notes"]) fmt::print("  note: {}\n", printable(n.get<std::string>()));
+    for (const auto& p : j["problems"]) fmt::print("  problem: {}\n", printable(p.get<std::string>()));
     if (!j.contains("points_read"))
         fmt::print("  the points themselves were not read: --verify does\n");
     else if (j["problems"].empty())
@@ -266,13 +267,14 @@ Result<void> showFolder(const InputInfoOptions& o, const std::vector<std::string
         printJson("info", all);
         return {};
     }
-    fmt::print("{}: {} files, {} points\n", o.input, files.size(), points);
+    fmt::print("{}: {} files, {} points\n", printable(o.input), files.size(), points);
     printVector(all, "min", "least");
     printVector(all, "max", "greatest");
     for (const auto& [format, count] : formats) fmt::print("  {:15} {} files\n", format, count);
     for (const auto& [crs, count] : systems)
         fmt::print("  {:15} {} ({} files)\n", "crs", crs.empty() ? "not named" : crs, count);
-    for (size_t i = 0; i < std::min(problems.size(), kMostProblems); ++i) fmt::print("  problem: {}\n", problems[i]);
+    for (size_t i = 0; i < std::min(problems.size(), kMostProblems); ++i)
+        fmt::print("  problem: {}\n", printable(problems[i]));
     if (problems.size() > kMostProblems)
         fmt::print("  and {} more (--json lists all)\n", problems.size() - kMostProblems);
     return {};
@@ -326,13 +328,13 @@ Result<void> showScene(const InputInfoOptions& o) {
         printJson("info", j);
         return {};
     }
-    fmt::print("{}: scene\n", o.input);
+    fmt::print("{}: scene\n", printable(o.input));
     printVector(j, "min", "least");
     printVector(j, "max", "greatest");
     for (const char* key : {"nodes", "instances", "stores", "meshes", "triangles", "lines", "points", "materials",
                             "textures", "images", "lights", "cameras"})
         if (j[key] != 0) fmt::print("  {:15} {}\n", key, j[key].get<uint64_t>());
-    for (const std::string& note : s.notes) fmt::print("  note: {}\n", note);
+    for (const std::string& note : s.notes) fmt::print("  note: {}\n", printable(note));
     return {};
 }
 
@@ -361,7 +363,7 @@ Result<void> showStrands(const InputInfoOptions& o) {
         printJson("info", j);
         return {};
     }
-    fmt::print("{}: {} strands of {} vertices\n", o.input, strands, vertices);
+    fmt::print("{}: {} strands of {} vertices\n", printable(o.input), strands, vertices);
     printVector(j, "min", "least");
     printVector(j, "max", "greatest");
     fmt::print("  {:15} {}\n  {:15} {}\n", "radii", hasRadii ? "yes" : "no: see --strand-radius", "colours",

@@ -16,6 +16,7 @@
 #include "engine/base/process.h"
 #include "engine/base/text.h"
 #include "engine/image/image_io.h"
+#include "engine/scene/gltf/container.h"
 #include "engine/scene/outline.h"
 #include "engine/scene/strands.h"
 #include "engine/scene/triangles.h"
@@ -371,12 +372,12 @@ Result<void> checkSceneMemory(const std::string& path, uint64_t memoryBytes) {
     uint64_t bytes = fs::file_size(path, error);
     if (error) return {};  // whoever opens it says why
     if (fs::path(path).extension() == ".gltf") {
-        STIPPLE_ASSIGN(const std::string whole, readTextFile(path, memoryBytes));
-        const auto text = nlohmann::json::parse(whole, nullptr, false);
-        if (text.is_object() && text.contains("buffers") && text["buffers"].is_array())
-            for (const auto& buffer : text["buffers"])
-                if (buffer.is_object() && buffer.contains("byteLength") && buffer["byteLength"].is_number_unsigned())
-                    bytes += std::min(buffer["byteLength"].get<uint64_t>(), uint64_t{1} << 40);
+        STIPPLE_ASSIGN(const scene::gltf::Container c, scene::gltf::readContainer(path, memoryBytes));
+        const nlohmann::json none = nlohmann::json::array();
+        const nlohmann::json& buffers = c.json.contains("buffers") ? c.json["buffers"] : none;
+        for (const auto& buffer : buffers)
+            if (buffer.is_object() && buffer.contains("byteLength") && buffer["byteLength"].is_number_unsigned())
+                bytes += std::min(buffer["byteLength"].get<uint64_t>(), uint64_t{1} << 40);
     }
     if (kTimes * bytes <= memoryBytes) return {};
     return fail(ErrorKind::budget,

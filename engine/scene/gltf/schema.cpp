@@ -300,7 +300,9 @@ class Checker {
             } else if (const auto rule = found->second.rules.find(key); rule != found->second.rules.end()) {
                 const auto& required = found->second.required;
                 const bool isOptional = std::find(required.begin(), required.end(), key) == required.end();
-                const auto test = [&](Checker& by) { by.check(member, rule->second.what, rule->second.arguments, at); };
+                const auto test = [&, &member = member](Checker& by) {
+                    by.check(member, rule->second.what, rule->second.arguments, at);
+                };
                 if (isOptional && member.is_array() && member.empty() && rule->second.what != "any") {
                     sayHarmless(at, "is empty");
                     mend(at);
