@@ -230,6 +230,9 @@ dropped_files_are_opened() {
     view "$folder/a.las"
     settle
     local plain=$shot
+    for _ in 1 2 3; do "$drop" "$window" --vanish; done
+    shoot
+    cmp -s "$plain" "$shot" || fail "a drag that was given up changed the picture"
     echo 'not a scan' >"$folder/bad.las"
     "$drop" "$window" "$folder/bad.las" || fail "bad.las was not taken"
     await 20 grep -q 'bad.las' "$folder/err" || fail "nothing is said about bad.las"
