@@ -140,8 +140,7 @@ class Viewer {
         render::FrameSettings withDepth = settings_.frame;
         withDepth.wantDepthAndNormal = true;
         std::optional<double> depth;
-        if (const auto drawn = render::renderFrame(session_.state(), view(), withDepth); drawn)
-            depth = depthInTheMiddle(session_.state().image);
+        if (render(withDepth)) depth = depthInTheMiddle(session_.state().image);
         navigation_.orbit(depth, session_.focus());
     }
 
@@ -201,14 +200,30 @@ class Viewer {
             capture);
     }
 
+    Result<void> render(const render::FrameSettings& frame) {
+        try {
+            return render::renderFrame(session_.state(), view(), frame);
+        } catch (const std::bad_alloc&) {
+            return fail(ErrorKind::budget, "there is not enough memory for this view", "stipple view",
+                        "a smaller window, a larger error (keys 1 to 9) or a smaller --resident");
+        }
+    }
+
     /// Renders if the picture is another one, and shows it.
     Result<void> drawNext(const gpu::Input& input) {
-        if (std::exchange(hasChanged_, false))
-            if (const auto drawn = render::renderFrame(session_.state(), view(), settings_.frame); !drawn) {
+        render::FrameState& state = session_.state();
+        if (std::exchange(hasChanged_, false)) {
+            if (const auto drawn = render(settings_.frame); !drawn) {
                 if (drawn.error().kind == ErrorKind::device) return drawn;
                 tell(drawn.error());
             }
-        if (session_.state().image.rgba.empty()) return {};
+            // Other colours, another scene: what was shown stays until the first of it is there.
+            isEmpty_ = state.counters.nodesDrawn == 0 && !state.streamer->isIdle();
+        }
+        if (isEmpty_ || state.image.rgba.empty()) {
+            isStale_ = false;
+            return {};
+        }
         if (std::exchange(wantsPicture_, false)) takePicture();
         const double start = nowSeconds();
         STIPPLE_ASSIGN(const bool shown, present(input, nullptr));
@@ -258,7 +273,7 @@ class Viewer {
     int frames_ = 0, pictures_ = 1;
     bool hasChanged_ = true;  ///< what is to be rendered
     bool isStale_ = true;     ///< what is shown: the same picture, or what lies over it
-    bool isMoving_ = false, wantsPicture_ = false;
+    bool isMoving_ = false, wantsPicture_ = false, isEmpty_ = false;
 };
 
 /// An orbit of N pictures takes as long as their film would; the path of a file is as fast as it says.
