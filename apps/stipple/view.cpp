@@ -48,7 +48,8 @@ class Viewer {
         while (!isStopRequested()) {
             const gpu::Input input = window_.poll(wait);
             if (input.shouldClose) return {};
-            hasChanged_ = hasChanged_ || input.isStale || input.width != width_ || input.height != height_;
+            isStale_ = isStale_ || input.isStale;
+            hasChanged_ = hasChanged_ || input.width != width_ || input.height != height_;
             width_ = input.width;
             height_ = input.height;
             if (!takeInput(input)) return {};
@@ -66,11 +67,11 @@ class Viewer {
     void tell(const Error& error) {
         report(error);
         notices_.add(error.line(), true, nowSeconds());
-        hasChanged_ = true;
+        isStale_ = true;
     }
     void tell(const std::string& text) {
         notices_.add(text, false, nowSeconds());
-        hasChanged_ = true;
+        isStale_ = true;
     }
 
     /// False: the user is done.
@@ -80,7 +81,8 @@ class Viewer {
         const bool drags = motion.turn != glm::dvec2(0) || motion.slide != glm::dvec2(0) || motion.scroll != 0;
         if (player_.isPlaying() && (steers || drags)) pausePath();
         isMoving_ = steers || player_.isPlaying() || settings_.frame.draw.wind.strength > 0 || o_.frames > 0;
-        hasChanged_ = hasChanged_ || drags || !input.pressed.empty() || notices_.expire(nowSeconds());
+        hasChanged_ = hasChanged_ || drags;
+        isStale_ = notices_.expire(nowSeconds()) || isStale_ || !input.pressed.empty();
         navigation_.move(motion);
         if (!input.isHidden) {
             player_.advance(input.seconds);
@@ -88,6 +90,7 @@ class Viewer {
         }
         if (!input.dropped.empty()) open(input.dropped);
         const KeyRequests asked = applyKeys(input.pressed, settings_);
+        hasChanged_ = hasChanged_ || asked.rendersAnew;
         if (asked.pause) togglePath();
         if (asked.fly) toggleFlying();
         if (asked.colours)
@@ -103,13 +106,14 @@ class Viewer {
         streamer.collect();
         Activity a;
         a.isHidden = input.isHidden;
-        a.hasChanged = hasChanged_;
+        a.hasChanged = hasChanged_ || isStale_;
         a.isMoving = isMoving_;
         a.isStreaming = streamer.counters().inFlight > 0;
         a.hasArrived = streamer.counters().inFlight != inFlight || (!a.isStreaming && !streamer.isIdle());
         a.isOpening = opener_.isBusy();
         a.untilNotice = notices_.untilNext(nowSeconds());
         a.hasChanged = a.hasChanged || (a.isOpening && openingText() != shownOpening_);
+        hasChanged_ = hasChanged_ || a.isMoving || a.hasArrived;
         return a;
     }
 
@@ -138,8 +142,7 @@ class Viewer {
         render::FrameSettings withDepth = settings_.frame;
         withDepth.wantDepthAndNormal = true;
         std::optional<double> depth;
-        if (const auto drawn = render::renderFrame(session_.state(), view(), withDepth); drawn)
-            depth = depthInTheMiddle(session_.state().image);
+        if (render(withDepth)) depth = depthInTheMiddle(session_.state().image);
         navigation_.orbit(depth, session_.focus());
     }
 
@@ -160,7 +163,7 @@ class Viewer {
     void open(std::vector<std::string> inputs) {
         if (opener_.isBusy()) return tell("still opening " + opener_.name());
         opener_.start(std::move(inputs));
-        hasChanged_ = true;
+        isStale_ = true;
     }
 
     void takeOpened() {
@@ -193,16 +196,34 @@ class Viewer {
             capture);
     }
 
+    Result<void> render(const render::FrameSettings& frame) {
+        try {
+            return render::renderFrame(session_.state(), view(), frame);
+        } catch (const std::bad_alloc&) {
+            return fail(ErrorKind::budget, "there is not enough memory for this view", "stipple view",
+                        "a smaller window, a larger error (keys 1 to 9) or a smaller --resident");
+        }
+    }
+
+    /// Renders if the picture is another one, and shows it.
     Result<void> drawNext(const gpu::Input& input) {
-        hasChanged_ = false;
-        const auto drawn = render::renderFrame(session_.state(), view(), settings_.frame);
-        if (!drawn && drawn.error().kind == ErrorKind::device) return drawn;
-        if (std::exchange(wantsPicture_, false) && drawn) takePicture();
-        if (!drawn) tell(drawn.error());
-        if (session_.state().image.rgba.empty()) return {};
+        render::FrameState& state = session_.state();
+        if (std::exchange(hasChanged_, false)) {
+            if (const auto drawn = render(settings_.frame); !drawn) {
+                if (drawn.error().kind == ErrorKind::device) return drawn;
+                tell(drawn.error());
+            }
+            // Other colours, another scene: what was shown stays until the first of it is there.
+            isEmpty_ = state.counters.nodesDrawn == 0 && !state.streamer->isIdle();
+        }
+        if (isEmpty_ || state.image.rgba.empty()) {
+            isStale_ = false;
+            return {};
+        }
+        if (std::exchange(wantsPicture_, false)) takePicture();
         const double start = nowSeconds();
         STIPPLE_ASSIGN(const bool shown, present(input, nullptr));
-        hasChanged_ = !shown;
+        isStale_ = !shown;
         shownMs_ = session_.state().counters.frameMs + (nowSeconds() - start) * 1e3;
         return {};
     }
@@ -246,7 +267,9 @@ class Viewer {
     uint32_t width_ = 0, height_ = 0;
     double shownMs_ = 0;  ///< what the last frame took, with showing it
     int frames_ = 0, pictures_ = 1;
-    bool hasChanged_ = true, isMoving_ = false, wantsPicture_ = false;
+    bool hasChanged_ = true;  ///< what is to be rendered
+    bool isStale_ = true;     ///< what is shown: the same picture, or what lies over it
+    bool isMoving_ = false, wantsPicture_ = false, isEmpty_ = false;
 };
 
 /// An orbit of N pictures takes as long as their film would; the path of a file is as fast as it says.

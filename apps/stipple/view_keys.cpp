@@ -8,6 +8,7 @@ namespace stipple::app {
 namespace {
 
 constexpr std::string_view kCommands = "FMVLCUPH";
+constexpr std::string_view kRender = "FMVLCU123456789";
 
 bool isCommand(char letter) { return kCommands.find(letter) != std::string_view::npos; }
 
@@ -67,6 +68,7 @@ KeyRequests applyKeys(const std::string& pressed, ViewSettings& settings) {
             settings.detail = settings.detail == Detail::off     ? Detail::brief
                               : settings.detail == Detail::brief ? Detail::full
                                                                  : Detail::off;
+        asked.rendersAnew = asked.rendersAnew || kRender.find(key) != std::string_view::npos;
         if (key >= '1' && key <= '9') frame.budgets.errorPixels = 0.25 * std::exp2(key - '1');
         if (key == 27) {  // closes what is open, the help first
             asked.quit = !settings.help;
@@ -83,14 +85,16 @@ Motion motionOf(const gpu::Input& in) {
     motion.height = std::max(1u, in.height);
     motion.scroll = in.scroll;
     motion.fast = in.fast;
-    if (in.leftButton) motion.turn = {in.mouseDeltaX, in.mouseDeltaY};
-    if (in.rightButton) motion.slide = {in.mouseDeltaX, in.mouseDeltaY};
+    motion.turn = in.leftDrag;
+    motion.slide = in.rightDrag;
     const auto pressed = [&](gpu::Steer s) {
         return in.arrows[s] || (in.held[s] && !isCommand(in.names[s])) ? 1.0 : 0.0;
     };
     motion.step = {pressed(gpu::kSteerRight) - pressed(gpu::kSteerLeft),
                    pressed(gpu::kSteerUp) - pressed(gpu::kSteerDown),
                    pressed(gpu::kSteerForward) - pressed(gpu::kSteerBack)};
+    // The first look after a rest: a key that was only touched moves by a frame too.
+    if (motion.step != glm::dvec3(0) && motion.seconds <= 0) motion.seconds = 1.0 / 60;
     return motion;
 }
 

@@ -32,6 +32,7 @@ struct ViewSettings {
 };
 struct KeyRequests {
     bool fly = false, colours = false, up = false, picture = false, pause = false, quit = false;
+    bool rendersAnew = false;  ///< not only the overlay is another one
 };
 KeyRequests applyKeys(const std::string& pressed, ViewSettings& settings);
 

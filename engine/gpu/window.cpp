@@ -7,6 +7,10 @@
 #include <imgui_impl_glfw.h>
 #include <imgui_impl_vulkan.h>
 
+#ifdef STIPPLE_WITH_X11
+#include <X11/Xlib.h>
+#endif
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -27,8 +31,22 @@ std::string lastGlfwError() {
     return text ? text : "unknown";
 }
 
+/// The position (see Steer) of a key, or of an arrow; kSteerCount: another key.
+size_t steerOf(int key) {
+    const size_t position = kSteerPositions.find(static_cast<char>(key));
+    return key <= GLFW_KEY_Z && position != std::string_view::npos ? position : kSteerCount;
+}
+constexpr std::array<int, kSteerCount> kArrows{GLFW_KEY_UP,    GLFW_KEY_LEFT,      GLFW_KEY_DOWN,
+                                               GLFW_KEY_RIGHT, GLFW_KEY_PAGE_DOWN, GLFW_KEY_PAGE_UP};
+size_t arrowOf(int key) {
+    return static_cast<size_t>(std::find(kArrows.begin(), kArrows.end(), key) - kArrows.begin());
+}
+
+/// What events said since the last poll: what is over by then counts too.
 struct InputState {
     double scroll = 0;
+    glm::dvec2 pointer{0}, leftDrag{0}, rightDrag{0};  ///< units of the window
+    std::array<bool, kSteerCount> held{}, arrows{};
     bool isIconified = false, isStale = true;
     std::string pressed;
     std::vector<std::string> dropped;
@@ -46,6 +64,8 @@ constexpr int kForeign = GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER;
 void onScroll(GLFWwindow* window, double, double y) { stateOf(window).scroll += y; }
 void onKey(GLFWwindow* window, int key, int scancode, int action, int modifiers) {
     if (action != GLFW_PRESS || (modifiers & kForeign) != 0) return;
+    if (const size_t steer = steerOf(key); steer < kSteerCount) stateOf(window).held[steer] = true;
+    if (const size_t arrow = arrowOf(key); arrow < kSteerCount) stateOf(window).arrows[arrow] = true;
     std::string& pressed = stateOf(window).pressed;
     if (key >= GLFW_KEY_KP_0 && key <= GLFW_KEY_KP_9) pressed += static_cast<char>('0' + key - GLFW_KEY_KP_0);
     if (key == GLFW_KEY_TAB) pressed += '\t';
@@ -55,11 +75,23 @@ void onKey(GLFWwindow* window, int key, int scancode, int action, int modifiers)
     if (key > GLFW_KEY_SPACE && key <= GLFW_KEY_WORLD_2)
         if (const char command = commandOf(key, printedOn(key, scancode)); command != 0) pressed += command;
 }
+void onPointer(GLFWwindow* window, double x, double y) {
+    InputState& state = stateOf(window);
+    const glm::dvec2 moved = glm::dvec2(x, y) - state.pointer;
+    if (glfwGetMouseButton(window, GLFW_MOUSE_BUTTON_LEFT) == GLFW_PRESS) state.leftDrag += moved;
+    if (glfwGetMouseButton(window, GLFW_MOUSE_BUTTON_RIGHT) == GLFW_PRESS) state.rightDrag += moved;
+    state.pointer = {x, y};
+}
 void onDrop(GLFWwindow* window, int count, const char** paths) {
     stateOf(window).dropped.insert(stateOf(window).dropped.end(), paths, paths + count);
 }
 void onIconify(GLFWwindow* window, int iconified) { stateOf(window).isIconified = iconified != 0; }
 void onRefresh(GLFWwindow* window) { stateOf(window).isStale = true; }
+
+#ifdef STIPPLE_WITH_X11
+/// Xlib ends the program by default, e.g. where one that dragged a file here is gone when it is answered.
+int onXError(Display*, XErrorEvent*) { return 0; }
+#endif
 
 class WindowImpl final : public Window {
   public:
@@ -89,9 +121,14 @@ class WindowImpl final : public Window {
         if (!window_)
             return fail(ErrorKind::device, "no window can be opened: " + lastGlfwError(), "display",
                         "use stipple render");
+#ifdef STIPPLE_WITH_X11
+        XSetErrorHandler(onXError);  // after GLFW, which sets its own while it makes a window
+#endif
         glfwSetWindowUserPointer(window_, &inputState_);
+        glfwGetCursorPos(window_, &inputState_.pointer.x, &inputState_.pointer.y);
         glfwSetScrollCallback(window_, onScroll);
         glfwSetKeyCallback(window_, onKey);
+        glfwSetCursorPosCallback(window_, onPointer);
         glfwSetDropCallback(window_, onDrop);
         glfwSetWindowIconifyCallback(window_, onIconify);
         glfwSetWindowRefreshCallback(window_, onRefresh);
@@ -112,6 +149,8 @@ class WindowImpl final : public Window {
 
     Input poll(double waitSeconds) override {
         inputState_.scroll = 0;
+        inputState_.leftDrag = inputState_.rightDrag = {0, 0};
+        inputState_.held = inputState_.arrows = {};
         inputState_.pressed.clear();
         inputState_.dropped.clear();
         if (waitSeconds > 0)
@@ -170,17 +209,11 @@ class WindowImpl final : public Window {
         in.width = static_cast<uint32_t>(w);
         in.height = static_cast<uint32_t>(h);
         const glm::dvec2 scale = pixelsPerUnit(w, h);
-        glfwGetCursorPos(window_, &in.mouseX, &in.mouseY);
-        in.mouseX *= scale.x;
-        in.mouseY *= scale.y;
-        in.mouseDeltaX = in.mouseX - lastX_;
-        in.mouseDeltaY = in.mouseY - lastY_;
-        lastX_ = in.mouseX;
-        lastY_ = in.mouseY;
         const bool overlayWantsMouse = ImGui::GetIO().WantCaptureMouse;  // only where something can be clicked
-        const auto button = [&](int b) { return !overlayWantsMouse && glfwGetMouseButton(window_, b) == GLFW_PRESS; };
-        in.leftButton = button(GLFW_MOUSE_BUTTON_LEFT);
-        in.rightButton = button(GLFW_MOUSE_BUTTON_RIGHT);
+        if (!overlayWantsMouse) {
+            in.leftDrag = scale * inputState_.leftDrag;
+            in.rightDrag = scale * inputState_.rightDrag;
+        }
         in.scroll = overlayWantsMouse ? 0 : inputState_.scroll;
     }
 
@@ -190,12 +223,10 @@ class WindowImpl final : public Window {
         const bool foreign = either(GLFW_KEY_LEFT_CONTROL, GLFW_KEY_RIGHT_CONTROL) ||
                              either(GLFW_KEY_LEFT_ALT, GLFW_KEY_RIGHT_ALT) ||
                              either(GLFW_KEY_LEFT_SUPER, GLFW_KEY_RIGHT_SUPER);
-        constexpr std::array<int, kSteerCount> arrows{GLFW_KEY_UP,    GLFW_KEY_LEFT,      GLFW_KEY_DOWN,
-                                                      GLFW_KEY_RIGHT, GLFW_KEY_PAGE_DOWN, GLFW_KEY_PAGE_UP};
         for (size_t i = 0; i < kSteerCount; ++i) {
             const int position = kSteerPositions[i];
-            in.held[i] = !foreign && key(position);
-            in.arrows[i] = !foreign && key(arrows[i]);
+            in.held[i] = inputState_.held[i] || (!foreign && key(position));
+            in.arrows[i] = inputState_.arrows[i] || (!foreign && key(kArrows[i]));
             in.names[i] = nameOf(position, printedOn(position, 0));
         }
         in.fast = either(GLFW_KEY_LEFT_SHIFT, GLFW_KEY_RIGHT_SHIFT);
@@ -259,7 +290,7 @@ class WindowImpl final : public Window {
     VkDescriptorPool imguiPool_ = VK_NULL_HANDLE;
     InputState inputState_;
     float contentScale_ = 1;
-    double lastPoll_ = 0, lastX_ = 0, lastY_ = 0;
+    double lastPoll_ = 0;
     bool imguiReady_ = false;
 };
 

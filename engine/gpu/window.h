@@ -3,6 +3,7 @@
 
 #include <array>
 #include <functional>
+#include <glm/vec2.hpp>
 #include <memory>
 #include <string>
 #include <vector>
@@ -18,13 +19,14 @@ namespace stipple::gpu {
 /// What the user did since the last poll. Positions in pixels of the framebuffer.
 struct Input {
     bool shouldClose = false;
-    bool isHidden = false;           ///< minimised: nothing is seen of it
-    bool isStale = false;            ///< what it showed is lost (uncovered, restored) or was never shown
-    uint32_t width = 0, height = 0;  ///< of the framebuffer
-    double seconds = 0;              ///< since the last poll; 0 after waiting
-    double mouseX = 0, mouseY = 0, mouseDeltaX = 0, mouseDeltaY = 0, scroll = 0;
-    bool leftButton = false, rightButton = false, fast = false;
-    std::array<bool, kSteerCount> held{};    ///< keys at kSteerPositions
+    bool isHidden = false;                 ///< minimised: nothing is seen of it
+    bool isStale = false;                  ///< what it showed is lost (uncovered, restored) or was never shown
+    uint32_t width = 0, height = 0;        ///< of the framebuffer
+    double seconds = 0;                    ///< since the last poll; 0 after waiting
+    glm::dvec2 leftDrag{0}, rightDrag{0};  ///< how far the pointer went while a button was down
+    double scroll = 0;
+    bool fast = false;
+    std::array<bool, kSteerCount> held{};    ///< keys at kSteerPositions that are down, or were for a moment
     std::array<bool, kSteerCount> arrows{};  ///< arrows, page down and up
     std::array<char, kSteerCount> names{};   ///< what the keyboard's layout calls the keys of `held`
     std::string pressed;               ///< commands (see commandOf), '\t' for Tab, 27 for Escape, ' '; F1 counts as H

@@ -1,4 +1,5 @@
 // drop_files WINDOW FILE...: drops files on an X window, as a file manager would (the XDND protocol, version 5).
+// drop_files WINDOW --vanish: begins to, and is gone before it is answered.
 #include <X11/Xatom.h>
 #include <X11/Xlib.h>
 #include <unistd.h>
@@ -60,6 +61,10 @@ int main(int argc, char** argv) {
                copy = static_cast<long>(drag.atom("XdndActionCopy"));
     drag.send("XdndEnter", 5L << 24, list, 0, 0);
     drag.send("XdndPosition", 0, 60L << 16 | 60, CurrentTime, copy);
+    if (std::string(argv[2]) == "--vanish") {
+        XCloseDisplay(drag.display);
+        return 0;
+    }
     for (;;) {
         XEvent event;
         XNextEvent(drag.display, &event);

@@ -162,8 +162,9 @@ rests_when_nothing_changes() {
     scan
     view "$folder/a.las"
     settle
-    sleep 9 # until the lines on the screen are gone
     local before after
+    quiet() { before=$(ticks) && sleep 1 && [ "$(ticks)" -eq "$before" ]; }
+    await 5 quiet || fail "it never comes to rest"
     before=$(ticks) && sleep 3 && after=$(ticks)
     echo "idle: $((after - before)) hundredths of a second of CPU in 3 s"
     [ $((after - before)) -le 15 ] || fail "it works while nothing changes"
@@ -230,6 +231,9 @@ dropped_files_are_opened() {
     view "$folder/a.las"
     settle
     local plain=$shot
+    for _ in 1 2 3; do "$drop" "$window" --vanish; done
+    shoot
+    cmp -s "$plain" "$shot" || fail "a drag that was given up changed the picture"
     echo 'not a scan' >"$folder/bad.las"
     "$drop" "$window" "$folder/bad.las" || fail "bad.las was not taken"
     await 20 grep -q 'bad.las' "$folder/err" || fail "nothing is said about bad.las"

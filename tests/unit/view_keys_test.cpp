@@ -72,6 +72,12 @@ TEST(Keys, EachChangesWhatItSays) {
     EXPECT_FALSE(asked.quit);
 }
 
+TEST(Keys, OnlyWhatChangesThePictureRendersAnew) {
+    ViewSettings s;
+    EXPECT_FALSE(applyKeys("\tHP \x1b", s).rendersAnew);
+    for (const char key : std::string("FMVLCU159")) EXPECT_TRUE(applyKeys(std::string(1, key), s).rendersAnew) << key;
+}
+
 TEST(Keys, TabGoesThroughTheFigures) {
     ViewSettings s;
     EXPECT_EQ(s.detail, Detail::brief);
@@ -115,17 +121,21 @@ TEST(Hands, DragsAndWheel) {
     gpu::Input in;
     in.width = 640;
     in.height = 480;
-    in.mouseDeltaX = 3;
-    in.mouseDeltaY = -4;
-    EXPECT_TRUE(motionOf(in).isIdle()) << "no button is held";
-    in.leftButton = true;
+    EXPECT_TRUE(motionOf(in).isIdle());
+    in.leftDrag = {3, -4};
     in.scroll = 2;
     EXPECT_EQ(motionOf(in).turn, glm::dvec2(3, -4));
     EXPECT_EQ(motionOf(in).slide, glm::dvec2(0));
     EXPECT_EQ(motionOf(in).scroll, 2);
-    in.leftButton = false;
-    in.rightButton = true;
+    in.leftDrag = {0, 0};
+    in.rightDrag = {3, -4};
     EXPECT_EQ(motionOf(in).slide, glm::dvec2(3, -4));
+}
+
+TEST(Hands, AKeyThatIsOnlyTouchedMovesToo) {
+    gpu::Input in;  // seconds: 0, as after waiting
+    in.arrows[gpu::kSteerForward] = true;
+    EXPECT_GT(motionOf(in).seconds, 0);
 }
 
 }  // namespace
