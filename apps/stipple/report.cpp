@@ -16,6 +16,7 @@ constexpr int kSchemaVersion = 1;
 struct Reporting {
     std::string command = "stipple";
     bool asJson = false;
+    bool hasAnswered = false;  ///< one object is all that a reader expects
 };
 Reporting& reporting() {
     static Reporting of;
@@ -42,7 +43,7 @@ std::string withoutCodes(std::string text) {
 
 }  // namespace
 
-void setReporting(std::string command, bool asJson) { reporting() = {std::move(command), asJson}; }
+void setReporting(std::string command, bool asJson) { reporting() = {std::move(command), asJson, false}; }
 
 int report(const Error& error) {
     Error told = error;
@@ -51,7 +52,7 @@ int report(const Error& error) {
         told.hint += (told.hint.empty() ? "see " : "; see ") + reporting().command + " --help";
     fmt::print(stderr, "stipple: {}\n", told.line());
     const int code = static_cast<int>(told.kind);
-    if (reporting().asJson)
+    if (reporting().asJson && !reporting().hasAnswered)
         printJson("error", {{"error",
                              {{"kind", nameOf(told.kind)},
                               {"what", told.what},
@@ -67,6 +68,7 @@ Result<void> checkStopped(const std::string& output, const std::string& state) {
 }
 
 void printJson(const std::string& kind, nlohmann::json value) {
+    reporting().hasAnswered = true;
     value["schema"] = fmt::format("stipple.{}/{}", kind, kSchemaVersion);
     // (Names of files may be any bytes.)
     fmt::print("{}\n", value.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
