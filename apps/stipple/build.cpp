@@ -5,8 +5,10 @@
 
 #include "apps/stipple/common.h"
 #include "apps/stipple/mpi_ranks.h"
+#include "apps/stipple/outputs.h"
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
+#include "engine/base/text.h"
 
 namespace stipple::app {
 namespace {
@@ -15,7 +17,7 @@ struct Options {
     std::vector<std::string> inputs;
     std::string output;
     BuildOptions build;
-    bool json = false, quiet = false, mpi = false;
+    bool json = false, quiet = false, mpi = false, force = false, restart = false;
 };
 
 /// `isSilent`: another rank says what there is to say.
@@ -30,7 +32,10 @@ Result<void> run(const Options& o, bool& isSilent) {
         const auto cores = static_cast<int>(std::thread::hardware_concurrency());
         if (build.threads == 0) build.threads = std::max(cores / job.onThisMachine, 1);
     }
+    if (o.restart) build.leftovers = lod::Leftovers::replace;
     STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
+    STIPPLE_TRY(
+        agree(build.ranks, isSilent ? Result<void>() : checkOutputs({{o.output, FileKind::store}}, o.inputs, o.force)));
     const int threads = build.threads > 0 ? build.threads : static_cast<int>(std::thread::hardware_concurrency());
     keepFreeMemory(settings.memoryBytes, threads);
     const auto executor = makeTbbExecutor(build.threads);
@@ -62,7 +67,7 @@ Result<void> run(const Options& o, bool& isSilent) {
         printJson("build", j);
         return {};
     }
-    for (const std::string& note : r.notes) fmt::print(stderr, "note: {}\n", note);
+    for (const std::string& note : r.notes) fmt::print(stderr, "note: {}\n", printable(note));
     const std::string& what = r.primitive;
     const bool isMesh = what == "triangle";
     fmt::print("{}: {} {}s in {} {}, {} ({:.1f} bytes a {}), {:.2f} s, {:.2f} M {}s/s, peak memory {}\n", o.output,
@@ -88,6 +93,9 @@ void setupBuild(CLI::App& app, int& status) {
         ->required();
     sub->add_option("-o,--output", o->output, "the scene to write (.stipple)")->type_name("STORE")->required();
     o->build.addTo(*sub);
+    addForce(*sub, o->force);
+    sub->add_flag("--restart", o->restart,
+                  "begin anew where an interrupted build of other input or with other settings is in the way");
     sub->add_flag("--json", o->json, "print the report as JSON (stipple help json)");
     sub->add_flag("--quiet", o->quiet, "neither progress nor notes");
     sub->add_flag("--mpi", o->mpi,

@@ -54,13 +54,27 @@ void BuildOptions::addTo(CLI::App& app) {
                    "turn meshes (.gltf, .glb, .obj) into that many samples, e.g. 1M; 0: keep triangles")
         ->transform(within(uint64_t{0}, uint64_t{200'000'000}))
         ->capture_default_str();
-    app.add_flag("--repair", repair,
-                 "pass over faults of a glTF file that change nothing that is drawn, and count them");
+    addSceneFileOptions(app, allowOutside, repair);
     app.add_option("--strand-radius", strandRadius,
                    "radius of strands that have none, file units (0: a 4000th of the extent)")
         ->transform(within(0.0, 1e300));
     app.add_flag("--only-points", onlyPoints, "of a PLY mesh take the vertices, as points");
     app.add_flag("--skip-bad", skipBad, "go on past corrupt chunks and files, and say what was lost");
+}
+
+void addSceneFileOptions(CLI::App& app, bool& allowOutside, bool& repair) {
+    app.add_flag("--allow-outside", allowOutside,
+                 "of a scene (.gltf, .glb, .obj) also read the files that it names outside its own folder");
+    app.add_flag("--repair", repair,
+                 "is always done: faults of a glTF file that can be drawn are noted and passed over")
+        ->group("");
+}
+
+scene::ReadSettings BuildOptions::reading() const {
+    scene::ReadSettings reading;
+    reading.allowOutside = allowOutside;
+    if (const uint64_t bytes = parseBytes(memory); bytes > 0) reading.memoryBytes = bytes;
+    return reading;
 }
 
 void BuildOptions::addProgressTo(CLI::App& app) {
@@ -120,10 +134,11 @@ Result<lod::BuildSettings> BuildOptions::settings() const {
     s.tempFolder = temp;
     s.isStopped = isStopRequested;
     s.ranks = ranks;
+    s.leftovers = leftovers;
     s.estimateRadii = radii != "keep";
     s.skipBad = skipBad;
-    s.open = [count = surfels, repairs = repair](const std::string& path, const lod::ReadOptions& o) {
-        return openInput(path, o, count, repairs);
+    s.open = [count = surfels, how = reading()](const std::string& path, const lod::ReadOptions& o) {
+        return openInput(path, o, count, how);
     };
     s.allAttributes = attributes == "all";
     s.attributes = namesOf(attributes);
@@ -162,9 +177,9 @@ void EnvironmentOptions::addTo(CLI::App& app) {
 }
 
 Result<std::shared_ptr<const render::Environment>> openEnvironment(const std::string& path, double scale,
-                                                                   Executor& executor) {
+                                                                   uint64_t memoryBytes, Executor& executor) {
     if (path.empty()) return std::shared_ptr<const render::Environment>();
-    STIPPLE_ASSIGN(const render::HdrImage image, image::readHdr(path));
+    STIPPLE_ASSIGN(const render::HdrImage image, image::readHdr(path, memoryBytes));
     return std::make_shared<const render::Environment>(
         render::makeEnvironment(image, static_cast<float>(scale), executor));
 }

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "apps/stipple/common.h"
+#include "apps/stipple/outputs.h"
 #include "engine/image/image_io.h"
 #include "engine/reference/reference.h"
 
@@ -10,10 +11,14 @@ namespace {
 struct Options {
     std::string a, b, diff;
     int threshold = 4;
-    bool json = false;
+    bool json = false, force = false;
 };
 
 Result<void> run(const Options& o) {
+    if (!o.diff.empty()) {
+        STIPPLE_TRY(image::checkImagePath(o.diff));
+        STIPPLE_TRY(checkOutputs({{o.diff, FileKind::picture}}, {o.a, o.b}, o.force));
+    }
     STIPPLE_ASSIGN(const render::Image a, image::readImage(o.a));
     STIPPLE_ASSIGN(const render::Image b, image::readImage(o.b));
     render::Image difference;
@@ -56,6 +61,7 @@ void setupCompare(CLI::App& app, int& status) {
         ->transform(within(0, 255))
         ->capture_default_str();
     sub->add_flag("--json", o->json, "print the measures as JSON (stipple help json)");
+    addForce(*sub, o->force);
     sub->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());
     });

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "apps/stipple/common.h"
+#include "apps/stipple/outputs.h"
 #include "engine/base/process.h"
 #include "engine/scene/strand_fit.h"
 #include "engine/scene/triangles.h"
@@ -15,7 +16,8 @@ namespace fs = std::filesystem;
 
 struct Options {
     std::string input, output;
-    bool strands = false, json = false, repair = false;
+    bool strands = false, json = false, force = false;
+    BuildOptions build;  ///< of which reading the input uses some
     scene::StrandFitSettings fit;
 };
 
@@ -71,6 +73,14 @@ void tidy(scene::Scene& scene) {
         }
 }
 
+/// What is written beside a store, which holds one kind: the triangles that are left, and a scene that has both.
+struct Beside {
+    explicit Beside(const std::string& store)
+        : rest(fs::path(store).replace_extension(".rest.glb").string()),
+          scene(fs::path(store).replace_extension(".scene.glb").string()) {}
+    std::string rest, scene;
+};
+
 Result<void> run(const Options& o) {
     if (!o.strands)
         return fail(ErrorKind::usage, "says nothing of what to convert to", "stipple convert",
@@ -80,18 +90,23 @@ Result<void> run(const Options& o) {
     const std::string extension = fs::path(o.output).extension().string();
     if (extension != ".stipple" && extension != ".glb" && extension != ".gltf")
         return fail(ErrorKind::usage, "is neither a store nor a scene", o.output, "write to .stipple, .glb or .gltf");
+    const bool isStore = extension == ".stipple";
+    const Beside beside(o.output);
+    std::vector<Output> outputs{{o.output, isStore ? FileKind::store : FileKind::other}};
+    if (isStore) outputs.insert(outputs.end(), {{beside.rest}, {beside.scene}});
+    STIPPLE_TRY(checkOutputs(outputs, {o.input}, o.force));
     catchStopSignals();
     const double start = nowSeconds();
     const auto executor = makeTbbExecutor(0);
-    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(o.input, o.repair));
-    STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene));
+    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(o.input, o.build.reading()));
+    STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene, o.build.reading().memoryBytes));
     scene::StrandFit fit = scene::fitStrands(scene, images, o.fit, *executor);
     STIPPLE_TRY(checkStopped(o.output));
     if (fit.trianglesIn == 0) return fail(ErrorKind::input, "holds no triangles", o.input);
     tidy(fit.rest);
     const bool hasStrands = fit.strands.strands() > 0;
     std::vector<std::string> written;
-    if (extension != ".stipple") {
+    if (!isStore) {
         addLines(fit.strands, fit.rest);
         STIPPLE_TRY(scene::writeGltf(fit.rest, o.output));
         written.push_back(o.output);
@@ -105,18 +120,15 @@ Result<void> run(const Options& o) {
                                           *executor, progress));
         written.push_back(o.output);
         if (fit.trianglesLeft > 0) {
-            // A store holds one kind: the rest stands beside it, and a scene that has both.
-            const fs::path base = fs::path(o.output).replace_extension();
-            const std::string rest = base.string() + ".rest.glb", both = base.string() + ".glb";
-            STIPPLE_TRY(scene::writeGltf(fit.rest, rest));
+            STIPPLE_TRY(scene::writeGltf(fit.rest, beside.rest));
             scene::Scene all = fit.rest;
             scene::Node node;
             node.name = "strands";
             node.store = fs::path(o.output).filename().string();
             all.nodes.push_back(node);
-            STIPPLE_TRY(scene::writeGltf(all, both));
-            written.push_back(rest);
-            written.push_back(both);
+            STIPPLE_TRY(scene::writeGltf(all, beside.scene));
+            written.push_back(beside.rest);
+            written.push_back(beside.scene);
         }
     }
     if (o.json) {
@@ -148,9 +160,12 @@ void setupConvert(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
     CLI::App* sub = app.add_subcommand("convert", "polygon plants to ribbons and tubes");
     sub->add_option("INPUT", o->input, "the plant (.gltf, .glb, .obj)")->required();
-    sub->add_option("-o,--output", o->output, "the file to write (.stipple; .glb or .gltf: lines with radii)")
+    sub->add_option("-o,--output", o->output,
+                    "the file to write (.stipple: what is neither ribbon nor tube goes to NAME.rest.glb beside it, and "
+                    "NAME.scene.glb shows both; .glb or .gltf: lines with radii)")
         ->type_name("FILE")
         ->required();
+    addForce(*sub, o->force);
     sub->add_flag("--strands", o->strands, "leaves and blades become ribbons, branches tubes; what is neither is kept");
     sub->add_option("--tolerance", o->fit.tolerance, "how far a part may be from its strand, share of its own width")
         ->transform(within(0.01, 2.0))
@@ -158,7 +173,11 @@ void setupConvert(CLI::App& app, int& status) {
     sub->add_option("--joints", o->fit.joints, "segments of a strand at most")
         ->transform(within(2, 1000))
         ->capture_default_str();
-    sub->add_flag("--repair", o->repair, "pass over faults of a glTF file that change nothing that is drawn");
+    sub->add_option("--memory", o->build.memory, "memory that reading the plant may use, bytes: 512M, 4G")
+        ->check(bytes())
+        ->type_name("SIZE")
+        ->capture_default_str();
+    addSceneFileOptions(*sub, o->build.allowOutside, o->build.repair);
     sub->add_flag("--json", o->json, "print what became of it as JSON (stipple help json)");
     sub->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());

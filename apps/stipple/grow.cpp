@@ -8,6 +8,7 @@
 #include "apps/grow/meshes.h"
 #include "apps/grow/plants.h"
 #include "apps/stipple/common.h"
+#include "apps/stipple/outputs.h"
 #include "engine/base/process.h"
 #include "engine/image/image_io.h"
 
@@ -17,12 +18,13 @@ namespace {
 struct Options {
     std::string output, origin = "0,0,0";
     grow::ScanOptions scan;
-    bool json = false;
+    bool json = false, force = false;
 };
 
 Result<void> run(Options& o) {
     STIPPLE_ASSIGN(const glm::dvec3 origin, parseVector(o.origin, "--origin"));
     o.scan.origin = {origin.x, origin.y, origin.z};
+    STIPPLE_TRY(checkOutputs({{o.output}}, {}, o.force));
     catchStopSignals();
     const double start = nowSeconds();
     const auto points = grow::growScan(o.scan);
@@ -38,7 +40,7 @@ Result<void> run(Options& o) {
 struct MeshRun {
     std::string output;
     grow::MeshOptions mesh;
-    bool json = false;
+    bool json = false, force = false;
 };
 
 /// The pictures that a grown mesh's textures refer to.
@@ -56,6 +58,7 @@ Result<void> addTextures(const grow::MeshOptions& mesh, scene::Scene& scene) {
 }
 
 Result<void> runMesh(const MeshRun& o) {
+    STIPPLE_TRY(checkOutputs({{o.output}}, {}, o.force));
     catchStopSignals();
     const double start = nowSeconds();
     scene::Scene scene = grow::growMesh(o.mesh);
@@ -91,6 +94,7 @@ void addMesh(CLI::App& parent, const char* kind, const char* what, int& status) 
         ->transform(within(0, 8192))
         ->capture_default_str();
     sub->add_flag("--json", o->json, "print what was made as JSON (stipple help json)");
+    addForce(*sub, o->force);
     sub->callback([o, &status] {
         if (const auto result = runMesh(*o); !result) status = report(result.error());
     });
@@ -99,11 +103,12 @@ void addMesh(CLI::App& parent, const char* kind, const char* what, int& status) 
 struct PlantRun {
     std::string output, as = "strands";
     grow::PlantOptions plant;
-    bool json = false;
+    bool json = false, force = false;
 };
 
 Result<void> runPlant(PlantRun& o) {
     o.plant.asTriangles = o.as == "triangles";
+    STIPPLE_TRY(checkOutputs({{o.output}}, {}, o.force));
     catchStopSignals();
     const double start = nowSeconds();
     const scene::Scene scene = grow::growPlant(o.plant);
@@ -146,6 +151,7 @@ void addPlant(CLI::App& parent, const char* name, const char* what, uint32_t row
         ->transform(within(uint64_t{0}, uint64_t{1} << 53))
         ->capture_default_str();
     sub->add_flag("--json", o->json, "print what was made as JSON (stipple help json)");
+    addForce(*sub, o->force);
     sub->callback([o, &status] {
         if (const auto result = runPlant(*o); !result) status = report(result.error());
     });
@@ -155,35 +161,51 @@ struct LandscapeRun {
     std::string kind, output, as = "strands";
     grow::LandscapeOptions landscape;
     uint64_t scanPoints = 2'000'000;
-    bool json = false;
+    bool json = false, force = false;
 };
+
+namespace fs = std::filesystem;
+
+/// What a folder of a demo holds.
+struct DemoFolder {
+    explicit DemoFolder(const std::string& folder)
+        : scan((fs::path(folder) / "scan.las").string()),
+          store((fs::path(folder) / "scan.stipple").string()),
+          scene((fs::path(folder) / "demo.glb").string()) {}
+    std::string scan, store, scene;
+};
+
+std::vector<Output> outputsOf(const LandscapeRun& o) {
+    if (o.kind != "demo") return {{o.output}};
+    const DemoFolder demo(o.output);
+    return {{demo.scan}, {demo.store, FileKind::store}, {demo.scene}};
+}
 
 /// The folder of a demo: a scan, built, and the scene that places it.
 Result<std::string> growDemoFolder(const LandscapeRun& o, scene::Scene& scene) {
-    namespace fs = std::filesystem;
     std::error_code error;
     fs::create_directories(o.output, error);
     if (error)
         return fail(ErrorKind::output, "cannot be created: " + error.message(), o.output, "name a folder to write");
-    const std::string scan = (fs::path(o.output) / "scan.las").string(),
-                      store = (fs::path(o.output) / "scan.stipple").string();
+    const DemoFolder demo(o.output);
     grow::ScanOptions options;
     options.points = o.scanPoints;
     const auto points = grow::growScan(options);
     STIPPLE_TRY(checkStopped(o.output));
-    STIPPLE_TRY(grow::writeScan(scan, points, options));
+    STIPPLE_TRY(grow::writeScan(demo.scan, points, options));
     const auto executor = makeTbbExecutor(0);
     Progress progress(true);
     lod::BuildSettings settings;
     settings.isStopped = isStopRequested;
-    STIPPLE_TRY(lod::buildStore({scan}, store, settings, *executor, progress));
+    STIPPLE_TRY(lod::buildStore({demo.scan}, demo.store, settings, *executor, progress));
     scene = grow::growDemo(o.landscape, "scan.stipple");
     STIPPLE_TRY(addTextures({}, scene));
-    return (fs::path(o.output) / "demo.glb").string();
+    return demo.scene;
 }
 
 Result<void> runLandscape(LandscapeRun& o) {
     o.landscape.asTriangles = o.as == "triangles";
+    STIPPLE_TRY(checkOutputs(outputsOf(o), {}, o.force));
     catchStopSignals();
     const double start = nowSeconds();
     scene::Scene scene;
@@ -254,6 +276,7 @@ void addLandscape(CLI::App& parent, const char* kind, const char* what, int& sta
         ->transform(within(uint64_t{0}, uint64_t{1} << 53))
         ->capture_default_str();
     sub->add_flag("--json", o->json, "print what was made as JSON (stipple help json)");
+    addForce(*sub, o->force);
     sub->callback([o, &status] {
         if (const auto result = runLandscape(*o); !result) status = report(result.error());
     });
@@ -291,6 +314,7 @@ void setupGrow(CLI::App& app, int& status) {
     addLandscape(*sub, "meadow", "grass and flowers", status);
     addLandscape(*sub, "demo", "a scan, an orchard, a meadow and a boulder on one ground", status);
     scan->add_flag("--json", o->json, "print what was made as JSON (stipple help json)");
+    addForce(*scan, o->force);
     scan->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());
     });

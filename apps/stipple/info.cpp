@@ -16,6 +16,7 @@ namespace {
 struct Options {
     std::string input, at;
     bool verify = false, json = false, skipBad = false;
+    BuildOptions build;  ///< of which reading scene files uses some
 };
 
 nlohmann::json vectorJson(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
@@ -185,7 +186,7 @@ Result<void> run(const Options& o) {
         return {};
     }
     const auto executor = makeTbbExecutor(0);
-    return showInputInfo({o.input, o.verify, o.json, o.skipBad}, *executor);
+    return showInputInfo({o.input, o.verify, o.json, o.skipBad, o.build.reading()}, *executor);
 }
 
 }  // namespace
@@ -199,6 +200,11 @@ void setupInfo(CLI::App& app, int& status) {
     sub->add_option("--at", o->at, "file coordinates: the input point of a built scene that is nearest to them")
         ->type_name("X,Y,Z");
     sub->add_flag("--skip-bad", o->skipBad, "go on past what is corrupt");
+    sub->add_option("--memory", o->build.memory, "memory that reading a scene file may use, bytes: 512M, 4G")
+        ->check(bytes())
+        ->type_name("SIZE")
+        ->capture_default_str();
+    addSceneFileOptions(*sub, o->build.allowOutside, o->build.repair);
     sub->add_flag("--json", o->json, "print it as JSON (stipple help json)");
     sub->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());

@@ -308,7 +308,9 @@ nlohmann::json sceneJson(const scene::Scene& s) {
 }
 
 Result<void> showScene(const InputInfoOptions& o) {
-    STIPPLE_ASSIGN(const scene::Scene s, scene::readScene(o.input));
+    scene::ReadSettings reading = o.reading;
+    reading.isStrict = o.verify;  // what only a validator minds is an error to who asks for a check
+    STIPPLE_ASSIGN(const scene::Scene s, scene::readScene(o.input, reading));
     const nlohmann::json j = sceneJson(s);
     if (o.json) {
         printJson("info", j);

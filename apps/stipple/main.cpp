@@ -1,12 +1,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <exception>
-#include <new>
 #include <stdexcept>
 
 #include "apps/stipple/common.h"
+#include "apps/stipple/exhaustion.h"
 #include "apps/stipple/help.h"
 #include "apps/stipple/usage.h"
 
@@ -49,7 +50,7 @@ void setupAll(CLI::App& app, int& status) {
 
 /// What the commands themselves did not turn into a Result.
 Error errorOf(const std::exception& e) {
-    if (dynamic_cast<const std::bad_alloc*>(&e) != nullptr || dynamic_cast<const std::length_error*>(&e) != nullptr)
+    if (app::isExhausted(e) || dynamic_cast<const std::length_error*>(&e) != nullptr)
         return {ErrorKind::budget, "out of memory", "", "give a smaller --memory, --resident or --budget-points"};
     return {ErrorKind::input, fmt::format("failed in a way that it should not: {}", e.what()), "",
             "please report it with the input"};
@@ -91,6 +92,8 @@ int run(std::vector<std::string> arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    stipple::app::exitWhereNothingCatches();
+    std::signal(SIGXFSZ, SIG_IGN);  // a write beyond ulimit -f fails and is reported, instead of ending the program
     try {
         return run({argv + 1, argv + argc});
     } catch (...) {  // what even printing the error could throw

@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "engine/base/process.h"
+#include "engine/base/text.h"
 
 namespace stipple::app {
 namespace {
@@ -15,8 +16,7 @@ constexpr int kSchemaVersion = 1;
 
 struct Reporting {
     std::string command = "stipple";
-    bool asJson = false;
-    bool hasAnswered = false;  ///< one object is all that a reader expects
+    bool asJson = false, hasResult = false;
 };
 Reporting& reporting() {
     static Reporting of;
@@ -41,6 +41,23 @@ std::string withoutCodes(std::string text) {
     return text;
 }
 
+/// Names of files and of what is in them may be any bytes, JSON is UTF-8.
+void makeUtf8(nlohmann::json& j) {
+    if (j.is_string()) {
+        auto& text = j.get_ref<std::string&>();
+        text = toUtf8(text);
+    } else if (j.is_array()) {
+        for (nlohmann::json& item : j) makeUtf8(item);
+    } else if (j.is_object()) {
+        nlohmann::json clean = nlohmann::json::object();
+        for (const auto& [key, value] : j.items()) {
+            nlohmann::json& to = clean[toUtf8(key)] = value;
+            makeUtf8(to);
+        }
+        j = std::move(clean);
+    }
+}
+
 }  // namespace
 
 void setReporting(std::string command, bool asJson) { reporting() = {std::move(command), asJson, false}; }
@@ -50,9 +67,9 @@ int report(const Error& error) {
     told.what = withoutCodes(told.what);
     if (told.kind == ErrorKind::usage)
         told.hint += (told.hint.empty() ? "see " : "; see ") + reporting().command + " --help";
-    fmt::print(stderr, "stipple: {}\n", told.line());
+    fmt::print(stderr, "stipple: {}\n", printable(told.line()));
     const int code = static_cast<int>(told.kind);
-    if (reporting().asJson && !reporting().hasAnswered)
+    if (reporting().asJson && !reporting().hasResult)
         printJson("error", {{"error",
                              {{"kind", nameOf(told.kind)},
                               {"what", told.what},
@@ -68,10 +85,10 @@ Result<void> checkStopped(const std::string& output, const std::string& state) {
 }
 
 void printJson(const std::string& kind, nlohmann::json value) {
-    reporting().hasAnswered = true;
     value["schema"] = fmt::format("stipple.{}/{}", kind, kSchemaVersion);
-    // (Names of files may be any bytes.)
-    fmt::print("{}\n", value.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    makeUtf8(value);
+    reporting().hasResult = true;
+    fmt::print("{}\n", value.dump(2));
 }
 
 nlohmann::json jsonNumber(double value) {

@@ -11,7 +11,8 @@ namespace stipple::app {
 /// How errors are told: of which command ("stipple render"), whose --help a usage error names, and whether as JSON too.
 void setReporting(std::string command, bool asJson);
 
-/// The error's line on standard error; with --json also as JSON on standard output. Gives its exit code.
+/// The error's line on standard error; with --json also as JSON on standard output, unless the result stands there
+/// already (a picture that is incomplete): output is one document. Gives its exit code.
 int report(const Error& error);
 
 /// An error where Ctrl-C or SIGTERM was seen (after catchStopSignals()); `state`: what is there of the output now.

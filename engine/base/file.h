@@ -35,12 +35,18 @@ Result<std::vector<uint8_t>> readWhole(const std::string& path);
 /// Changes when the file does: of its path, size and time.
 uint64_t fileIdentity(const std::string& path);
 
-/// Writes to "<path>.partial.<pid>", which commit() renames to `path`; without commit() it is removed again.
+/// The file that is written where `path` is named: links are followed. Refuses what is there and no regular file
+/// (folders, pipes, devices), a link that leads nowhere, and a file that must not be written.
+Result<std::string> outputTarget(const std::string& path);
+
+/// Writes to "<path>.partial.<pid>", which commit() renames to `path`; without commit() it is removed again. What
+/// killed processes left of earlier writes to the same path is removed. Where `path` is a link, what it leads to is
+/// replaced.
 class OutputFile {
   public:
     static Result<OutputFile> create(const std::string& path);
     /// The first `bytes` bytes of the file at `temporaryPath`, which is made if it is not there and stays without
-    /// commit(), so that work can go on later.
+    /// commit(), so that work can go on later. Refused while another process writes to it.
     static Result<OutputFile> resume(const std::string& path, const std::string& temporaryPath, uint64_t bytes);
     OutputFile(OutputFile&& other) noexcept;
     OutputFile& operator=(OutputFile&&) = delete;
@@ -54,10 +60,10 @@ class OutputFile {
     Result<void> commit();
 
   private:
-    OutputFile(int descriptor, std::string path, std::string temporaryPath);
-    int descriptor_ = -1;
+    OutputFile(int descriptor, std::string path, std::string target, std::string temporaryPath);
+    int descriptor_ = -1;  ///< locked, so that no other process takes the file for a left-over
     uint64_t position_ = 0;
-    std::string path_, temporaryPath_;
+    std::string path_, target_, temporaryPath_;
     bool isKept_ = false;
 };
 

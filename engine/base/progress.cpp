@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "engine/base/process.h"
+#include "engine/base/text.h"
 
 namespace stipple {
 namespace {
@@ -63,11 +64,12 @@ void Progress::say(const std::string& line) {
     if (style_ == ProgressStyle::silent) return;
     const std::lock_guard lock(mutex_);
     if (dirty_) eraseLine();
+    const std::string shown = printable(line);
     dirty_ = false;
     if (style_ == ProgressStyle::json)
-        fmt::print(stderr, "{{\"schema\": \"stipple.progress/1\", \"note\": {}}}\n", quoted(line));
+        fmt::print(stderr, "{{\"schema\": \"stipple.progress/1\", \"note\": {}}}\n", quoted(shown));
     else
-        fmt::print(stderr, "note: {}\n", line);
+        fmt::print(stderr, "note: {}\n", shown);
 }
 
 void Progress::update(const std::string& stage, uint64_t done, uint64_t total) {

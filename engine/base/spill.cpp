@@ -37,7 +37,7 @@ Result<std::vector<uint8_t>> Spill::take() {
     uint64_t at = 0;
     for (const Segment& s : segments_) {
         if (hashBytes(bytes.data() + at, s.bytes) != s.hash)
-            return fail(ErrorKind::input, "is not what was written", path_, "delete its folder and build again");
+            return fail(ErrorKind::input, "is not what was written", path_, "begin anew with --restart");
         at += s.bytes;
     }
     return bytes;

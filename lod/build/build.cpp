@@ -253,7 +253,7 @@ class PointBuild {
                         hashBytes(bytes.data() + w.node.chunkBytes, w.node.attributeBytes) == w.node.attributeHash;
                     if (isSame) continue;
                     errors.push({ErrorKind::input, "is not what was written", workspace_->partialPath(),
-                                 "delete it and the folder " + workspace_->folder()});
+                                 "begin anew with --restart"});
                     return;
                 }
         });

@@ -17,11 +17,19 @@ namespace stipple::lod {
 
 enum class NormalsMode { automatic, keep, none };
 
+/// What happens to what an interrupted build to the same output left.
+enum class Leftovers {
+    goOn,           ///< the build goes on with it; refused if it is of other input or has other settings
+    goOnOrReplace,  ///< likewise, but then it goes
+    replace,        ///< it goes
+};
+
 /// What any build may use.
 struct BuildLimits {
     uint64_t memoryBytes = uint64_t{2} << 30;  ///< never needs more; refuses if it would have to
     std::string tempFolder;                    ///< for what does not fit in memory; empty: beside the output
     std::function<bool()> isStopped;  ///< asked now and then, by any thread; true: stop with ErrorKind::interrupted
+    Leftovers leftovers = Leftovers::goOn;
     /// Others that build the same with the same settings; each builds its share, the first one writes. What they have
     /// for each other lies in `tempFolder`, which all must see.
     Ranks* ranks = nullptr;

@@ -107,18 +107,17 @@ TEST(Program, AFullDiskLeavesTheOldFileAlone) {
     std::filesystem::create_directory(folder / "small");
     // A file size limit stands for the full disk: both end in a failed write.
     ASSERT_EQ(run(folder, "grow scan -o a.las --points 50000").code, 0);
-    std::ofstream(folder / "small/a.stipple") << "old";
-    const Outcome r = run(folder, "build a.las -o small/a.stipple --quiet", "ulimit -f 64; trap '' XFSZ;");
-    EXPECT_EQ(r.code, 4) << r.err;
-    std::ifstream in(folder / "small/a.stipple");
-    std::string text;
-    in >> text;
-    EXPECT_EQ(text, "old");
+    ASSERT_EQ(run(folder, "grow scan -o old.las --points 100").code, 0);
+    ASSERT_EQ(run(folder, "build old.las -o small/a.stipple --quiet").code, 0);
+    const std::string old = test::slurp(folder / "small/a.stipple");
+    expectOneLine(run(folder, "build a.las -o small/a.stipple --quiet", "ulimit -f 64;"), 4, "ulimit");
+    EXPECT_TRUE(test::slurp(folder / "small/a.stipple") == old);
     ASSERT_EQ(run(folder, "build a.las -o a.stipple --quiet").code, 0);
-    const Outcome picture =
-        run(folder, "render a.stipple -o small/a.png --size 1280x720 --quiet", "ulimit -f 64; trap '' XFSZ;");
-    EXPECT_EQ(picture.code, 4) << picture.err;
-    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder / "small"), {}), 1);
+    ASSERT_EQ(run(folder, "render a.stipple -o small/a.png --size 16x16 --quiet").code, 0);
+    const std::string oldPicture = test::slurp(folder / "small/a.png");
+    expectOneLine(run(folder, "render a.stipple -o small/a.png --size 1280x720 --quiet", "ulimit -f 64;"), 4, "ulimit");
+    EXPECT_TRUE(test::slurp(folder / "small/a.png") == oldPicture);
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder / "small"), {}), 2);
 }
 
 TEST(Program, ATruncatedSceneIsRefused) {
@@ -177,7 +176,7 @@ TEST(Program, GrowsForestsMeadowsAndConvertsPlants) {
     EXPECT_GT(c["triangles_left"].get<uint64_t>(), 0u);
     EXPECT_EQ(c["written"].size(), 3u);
     EXPECT_EQ(run(folder, "info t.stipple --verify").code, 0);
-    EXPECT_EQ(run(folder, "render t.glb -o t.png --size 160x120 --device cpu").code, 0);
+    EXPECT_EQ(run(folder, "render t.scene.glb -o t.png --size 160x120 --device cpu").code, 0);
     expectOneLine(run(folder, "convert t.glb -o x.stipple"), 2, "--strands");
     expectOneLine(run(folder, "convert missing.glb --strands -o x.stipple"), 3, "missing.glb");
     expectOneLine(run(folder, "convert t.glb --strands -o x.txt"), 2, "x.txt");

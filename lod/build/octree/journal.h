@@ -27,9 +27,10 @@ class Journal {
     static std::string folderOf(const std::string& output, const std::string& tempFolder);
     /// Does an interrupted build of that identity lie there?
     static bool isThere(const std::string& folder, uint64_t identity);
-    /// Of the build of `output`; makes the folder if it is not there. `identity`: of input and settings; a folder of
-    /// another is refused. Only one process at a time.
-    static Result<Journal> open(const std::string& folder, const std::string& output, uint64_t identity);
+    /// Of the build of `output`; makes the folder if it is not there. `identity`: of input and settings. A folder that
+    /// holds something else than a build is refused. Only one process at a time.
+    static Result<Journal> open(const std::string& folder, const std::string& output, uint64_t identity,
+                                Leftovers leftovers);
     Journal(Journal&& other) noexcept;
     Journal& operator=(Journal&&) = delete;
     ~Journal();
@@ -43,14 +44,18 @@ class Journal {
     Result<void> restart();
     /// The build is complete.
     void remove();
-    /// Says how much temporary space is going to be needed, and fails if there is no room for it.
+    /// Says how much temporary space is needed, with what is there already, and fails if there is no room for it.
     Result<void> announce(uint64_t bytes, Progress& progress) const;
 
   private:
     Journal() = default;
+    Result<void> take();
+    Result<void> readEntries(const InputFile& file);
+    Error foreign() const;
     std::string folder_, output_;
     uint64_t identity_ = 0, end_ = 0;
     int lock_ = -1;
+    bool isOwn_ = false;  ///< what is in the folder is this build's to remove
     std::vector<Entry> entries_;
 };
 

@@ -95,7 +95,7 @@ Result<void> Reduction::openWriter(Executor& executor) {
                 const auto read = file.readAt(written[i].at, bytes.data(), bytes.size());
                 if (read && hashBytes(bytes.data(), bytes.size()) == written[i].hash) continue;
                 errors.push({ErrorKind::input, "is not what was written", workspace_.partialPath(),
-                             "delete it and the folder " + workspace_.folder()});
+                             "begin anew with --restart"});
                 return;
             }
         });
@@ -135,8 +135,7 @@ Result<std::vector<FromBelow>> Reduction::readBelow(const Waiting& waiting) cons
         STIPPLE_ASSIGN(std::vector<uint8_t> bytes, waiting.spill->part(at, piece.bytes));
         if (hashBytes(bytes.data(), bytes.size()) != piece.hash)
             return fail(ErrorKind::input, "holds a file that is not what was written",
-                        workspace_.isOnDisk() ? workspace_.folder() : workspace_.output(),
-                        "delete the folder and build again");
+                        workspace_.isOnDisk() ? workspace_.folder() : workspace_.output(), "begin anew with --restart");
         at += piece.bytes;
         out.push_back({piece.label, std::move(bytes)});
     }

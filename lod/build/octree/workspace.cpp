@@ -13,13 +13,20 @@ Result<Workspace> Workspace::open(const std::string& output, const BuildLimits& 
     Workspace w(output, limits);
     const std::string folder = Journal::folderOf(output, limits.tempFolder);
     // (With more memory than before, an interrupted build goes on all the same.)
-    if (!isOnDisk && !Journal::isThere(folder, identity)) return w;
+    const bool isFresh = limits.leftovers == Leftovers::replace;
+    if (!isOnDisk && (isFresh || !Journal::isThere(folder, identity))) {
+        std::error_code none;
+        if (isFresh && w.isFirst() && std::filesystem::exists(folder, none))
+            STIPPLE_TRY(Journal::open(folder, output, identity, limits.leftovers));  // which goes again
+        return w;
+    }
     w.folder_ = folder;
     const auto openJournal = [&]() -> Result<void> {
-        STIPPLE_ASSIGN(Journal journal, Journal::open(w.folder_, output, identity));
+        STIPPLE_ASSIGN(Journal journal, Journal::open(w.folder_, output, identity, limits.leftovers));
         w.journal_.emplace(std::move(journal));
         w.entries_ = w.journal_->takeEntries();
         w.isKept_ = !w.entries_.empty();
+        w.partialPath_ = w.journal_->partialPath();
         return {};
     };
     STIPPLE_TRY(agree(limits.ranks, w.isFirst() ? openJournal() : Result<void>()));

@@ -37,14 +37,17 @@ class Workspace {
     /// Says how much temporary space is going to be needed, and fails if there is no room for it.
     Result<void> announce(uint64_t bytes, Progress& progress) const;
     Result<void> checkStopped() const;
-    std::string partialPath() const { return output_ + ".partial"; }
-    Error damaged() const { return {ErrorKind::input, "holds a damaged journal", folder_, "delete the folder"}; }
+    /// Of the first rank, if on disk.
+    const std::string& partialPath() const { return partialPath_; }
+    Error damaged() const {
+        return {ErrorKind::input, "holds a damaged journal", folder_, "begin anew with --restart"};
+    }
     /// The build is complete.
     void remove();
 
   private:
     Workspace(std::string output, BuildLimits limits) : output_(std::move(output)), limits_(std::move(limits)) {}
-    std::string output_, folder_;
+    std::string output_, folder_, partialPath_;
     BuildLimits limits_;
     std::optional<Journal> journal_;
     std::vector<Journal::Entry> entries_;

@@ -57,7 +57,7 @@ Result<BuiltBucket> loadBuilt(const std::string& folder, size_t bucket, const Va
         std::memcpy(&hash, bytes.data(), sizeof(hash));
         return hash == hashBytes(bytes.data() + sizeof(hash), bytes.size() - sizeof(hash));
     };
-    if (!isIntact()) return fail(ErrorKind::input, "is not what a rank wrote", path, "delete it and build again");
+    if (!isIntact()) return fail(ErrorKind::input, "is not what a rank wrote", path, "begin anew with --restart");
     ByteReader from(bytes);
     uint64_t hash = 0;
     from.get(hash);

@@ -69,14 +69,16 @@ Result<StrandSet> readSwc(std::string_view text, const std::string& path) {
     const auto branch = [&](uint32_t at) {
         for (const uint32_t child : samples[at].children) starts.emplace_back(at, child);
     };
-    const auto add = [&](const Sample& s, int kind) { out.addVertex(s.p, s.radius, glm::vec3(0), colourOf(kind)); };
+    // (No sample is copied: one may have as many children as there are samples.)
+    const auto add = [&](const glm::dvec3& p, float radius, int kind) {
+        out.addVertex(p, radius, glm::vec3(0), colourOf(kind));
+    };
     for (const uint32_t root : roots) {
         isSeen[root] = 1;
         if (samples[root].children.empty() || samples[root].kind == 1) {  // a ball
-            add(samples[root], samples[root].kind);
-            Sample end = samples[root];
-            end.p.x += 0.01 * end.radius;
-            add(end, end.kind);
+            const Sample& ball = samples[root];
+            add(ball.p, ball.radius, ball.kind);
+            add(ball.p + glm::dvec3(0.01 * ball.radius, 0, 0), ball.radius, ball.kind);
             out.endStrand(false);
         }
         branch(root);
@@ -86,12 +88,11 @@ Result<StrandSet> readSwc(std::string_view text, const std::string& path) {
         starts.pop_back();
         const int kind = samples[first].kind;
         // Dendrites do not begin at a soma's middle with its radius.
-        Sample begin = samples[from];
-        if (begin.kind == 1 && kind != 1) begin.radius = samples[first].radius;
-        add(begin, kind);
+        const Sample& begin = samples[from];
+        add(begin.p, begin.kind == 1 && kind != 1 ? samples[first].radius : begin.radius, kind);
         for (uint32_t at = first;;) {
             isSeen[at] = 1;
-            add(samples[at], kind);
+            add(samples[at].p, samples[at].radius, kind);
             if (samples[at].children.size() != 1 || samples[samples[at].children[0]].kind != kind) {
                 branch(at);
                 break;
