@@ -1,11 +1,13 @@
 #include "lod/attributes.h"
 
 #include <fmt/format.h>
-#include <zstd.h>
 
 #include <cmath>
 #include <cstring>
 #include <limits>
+
+#include "lod/store_check.h"
+#include "lod/zstd_memory.h"
 
 namespace stipple::lod {
 namespace {
@@ -73,8 +75,8 @@ std::vector<uint8_t> encodeAttributes(const std::vector<AttributeInfo>& infos,
             for (size_t i = 0; i < records; ++i) planes[b * records + i] = streams[k][i * width + b];
         const size_t at = out.size();
         out.resize(at + ZSTD_compressBound(planes.size()));
-        const size_t got = ZSTD_compress(out.data() + at, out.size() - at, planes.data(), planes.size(), 1);
-        const auto size = static_cast<uint32_t>(ZSTD_isError(got) ? 0 : got);
+        const auto size = static_cast<uint32_t>(
+            written(ZSTD_compress(out.data() + at, out.size() - at, planes.data(), planes.size(), 1)));
         out.resize(at + size);
         std::memcpy(out.data() + 4 * k, &size, 4);
     }
@@ -97,8 +99,10 @@ Result<std::vector<uint8_t>> decodeAttribute(const uint8_t* bytes, size_t count,
         if (at > count || size > count - at) return damaged();
     }
     const size_t width = bytesOf(infos.at(index).type);
+    if (ZSTD_getFrameContentSize(bytes + at, size) != records * width || !isPossibleGain(size, records * width))
+        return damaged();
     std::vector<uint8_t> planes(records * width), values(records * width);
-    const size_t got = ZSTD_decompress(planes.data(), planes.size(), bytes + at, size);
+    const size_t got = unlessOutOfMemory(ZSTD_decompress(planes.data(), planes.size(), bytes + at, size));
     if (ZSTD_isError(got) || got != planes.size()) return damaged();
     for (size_t b = 0; b < width; ++b)
         for (size_t i = 0; i < records; ++i) values[i * width + b] = planes[b * records + i];

@@ -4,36 +4,57 @@
 #include <meshoptimizer.h>
 #include <zstd.h>
 
+#include <algorithm>
+#include <bit>
 #include <cstring>
 #include <memory>
+
+#include "lod/store_check.h"
+#include "lod/zstd_memory.h"
 
 namespace stipple::lod {
 namespace {
 
 constexpr int kZstdLevel = 1;  // 3 saves 1.5 % of the bytes and takes twice the time on scans
 
+constexpr uint32_t kNotFinite = 0x7f800000u;  // the exponent of infinities and NaN
+
 struct ChunkHead {
     uint32_t recordBytes, lowBitBytes;
 };
 
 std::vector<uint8_t> compress(const std::vector<uint8_t>& raw) {
-    thread_local std::unique_ptr<ZSTD_CCtx, size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(), ZSTD_freeCCtx);
     std::vector<uint8_t> out(ZSTD_compressBound(raw.size()));
-    const size_t got = ZSTD_compressCCtx(context.get(), out.data(), out.size(), raw.data(), raw.size(), kZstdLevel);
-    out.resize(ZSTD_isError(got) ? 0 : got);
+    ZSTD_CCtx& context = zstdContext(ZSTD_createCCtx, ZSTD_freeCCtx);
+    out.resize(written(ZSTD_compressCCtx(&context, out.data(), out.size(), raw.data(), raw.size(), kZstdLevel)));
     return out;
 }
 
 Result<std::vector<uint8_t>> decompress(const uint8_t* bytes, size_t count, size_t limit, const std::string& where) {
     const unsigned long long size = ZSTD_getFrameContentSize(bytes, count);
-    if (size == ZSTD_CONTENTSIZE_ERROR || size == ZSTD_CONTENTSIZE_UNKNOWN || size > limit)
+    if (size == ZSTD_CONTENTSIZE_ERROR || size == ZSTD_CONTENTSIZE_UNKNOWN || size > limit ||
+        !isPossibleGain(count, size))
         return fail(ErrorKind::input, fmt::format("a compressed block does not hold at most {} bytes", limit), where,
                     "the file is damaged; build it again");
-    thread_local std::unique_ptr<ZSTD_DCtx, size_t (*)(ZSTD_DCtx*)> context(ZSTD_createDCtx(), ZSTD_freeDCtx);
     std::vector<uint8_t> out(size);
-    const size_t got = ZSTD_decompressDCtx(context.get(), out.data(), out.size(), bytes, count);
+    ZSTD_DCtx& context = zstdContext(ZSTD_createDCtx, ZSTD_freeDCtx);
+    const size_t got = unlessOutOfMemory(ZSTD_decompressDCtx(&context, out.data(), out.size(), bytes, count));
     if (ZSTD_isError(got) || got != size)
         return fail(ErrorKind::input, "a compressed block is damaged", where, "build it again");
+    return out;
+}
+
+/// `count` records of T out of meshoptimizer's codec under zstd.
+template <typename T>
+Result<std::vector<T>> decodeRecords(const uint8_t* bytes, size_t size, size_t count, const std::string& where,
+                                     const char* what) {
+    const size_t limit = meshopt_encodeVertexBufferBound(count, sizeof(T));
+    STIPPLE_ASSIGN(const std::vector<uint8_t> encoded, decompress(bytes, size, limit, where));
+    std::vector<T> out;
+    if (encoded.size() >= fewestEncodedBytes(count, sizeof(T))) out.resize(count);
+    if (out.size() != count ||
+        meshopt_decodeVertexBuffer(out.data(), count, sizeof(T), encoded.data(), encoded.size()) != 0)
+        return fail(ErrorKind::input, fmt::format("{} are damaged", what), where, "build it again");
     return out;
 }
 
@@ -66,13 +87,9 @@ Result<Chunk> decodeChunk(const uint8_t* bytes, size_t count, uint32_t records, 
     std::memcpy(&head, bytes, sizeof(head));
     if (uint64_t{head.recordBytes} + head.lowBitBytes + sizeof(head) != count)
         return fail(ErrorKind::input, "the chunk's parts do not add up to its size", where, "build it again");
-    constexpr size_t stride = sizeof(shared::PointRecord);
-    const size_t limit = meshopt_encodeVertexBufferBound(records, stride);
-    STIPPLE_ASSIGN(const std::vector<uint8_t> vertex, decompress(bytes + sizeof(head), head.recordBytes, limit, where));
     Chunk chunk;
-    chunk.records.resize(records);
-    if (meshopt_decodeVertexBuffer(chunk.records.data(), records, stride, vertex.data(), vertex.size()) != 0)
-        return fail(ErrorKind::input, "the records of a chunk are damaged", where, "build it again");
+    STIPPLE_ASSIGN(chunk.records, decodeRecords<shared::PointRecord>(bytes + sizeof(head), head.recordBytes, records,
+                                                                     where, "the records of a chunk"));
     if (wantLowBits && head.lowBitBytes > 0) {
         STIPPLE_ASSIGN(const std::vector<uint8_t> raw, decompress(bytes + sizeof(head) + head.recordBytes,
                                                                   head.lowBitBytes, size_t{records} * 12, where));
@@ -93,13 +110,14 @@ std::vector<uint8_t> encodeStrandChunk(const Chunk& chunk) {
 }
 
 Result<Chunk> decodeStrandChunk(const uint8_t* bytes, size_t count, uint32_t segments, const std::string& where) {
-    constexpr size_t stride = sizeof(shared::StrandSegment);
-    const size_t limit = meshopt_encodeVertexBufferBound(segments, stride);
-    STIPPLE_ASSIGN(const std::vector<uint8_t> vertex, decompress(bytes, count, limit, where));
     Chunk chunk;
-    chunk.segments.resize(segments);
-    if (meshopt_decodeVertexBuffer(chunk.segments.data(), segments, stride, vertex.data(), vertex.size()) != 0)
-        return fail(ErrorKind::input, "the segments of a chunk are damaged", where, "build it again");
+    STIPPLE_ASSIGN(chunk.segments,
+                   decodeRecords<shared::StrandSegment>(bytes, count, segments, where, "the segments of a chunk"));
+    // Radii are the upper half of an fp32: an exponent of all ones is no number.
+    uint32_t bad = 0;
+    for (const shared::StrandSegment& s : chunk.segments)
+        for (const uint32_t word : {s.a.positionZ, s.b.positionZ}) bad |= (word & kNotFinite) == kNotFinite ? 1u : 0u;
+    if (bad != 0) return fail(ErrorKind::input, "a segment has a radius that is no number", where, "build it again");
     return chunk;
 }
 
@@ -108,6 +126,19 @@ namespace {
 struct MeshChunkHead {
     uint32_t vertexBytes, triangleBytes, clusterBytes;
 };
+
+/// Are all on the lattice, with texture coordinates that are numbers? Differences of places must be, too.
+bool arePossible(const std::vector<shared::MeshVertex>& vertices) {
+    constexpr uint32_t kLattice = 1u << 25;
+    uint32_t bad = 0;
+    for (const shared::MeshVertex& v : vertices) {
+        const auto u = std::bit_cast<uint32_t>(v.u), w = std::bit_cast<uint32_t>(v.v);
+        bad |= static_cast<uint32_t>(v.x | v.y | v.z) & ~(kLattice - 1);
+        bad |= (u & kNotFinite) == kNotFinite ? 1u : 0u;
+        bad |= (w & kNotFinite) == kNotFinite ? 1u : 0u;
+    }
+    return bad == 0;
+}
 
 template <typename T>
 Result<std::vector<T>> decompressArray(const uint8_t* bytes, size_t count, size_t items, const std::string& where) {
@@ -129,12 +160,8 @@ std::vector<uint8_t> encodeTile(const std::vector<uint32_t>& texels) {
 
 Result<Chunk> decodeTile(const uint8_t* bytes, size_t count, const std::string& where) {
     constexpr size_t kTexels = size_t{shared::kTileEdge} * shared::kTileEdge;
-    STIPPLE_ASSIGN(const std::vector<uint8_t> vertex,
-                   decompress(bytes, count, meshopt_encodeVertexBufferBound(kTexels, 4), where));
     Chunk chunk;
-    chunk.texels.resize(kTexels);
-    if (meshopt_decodeVertexBuffer(chunk.texels.data(), kTexels, 4, vertex.data(), vertex.size()) != 0)
-        return fail(ErrorKind::input, "a texture tile is damaged", where, "build it again");
+    STIPPLE_ASSIGN(chunk.texels, decodeRecords<uint32_t>(bytes, count, kTexels, where, "the texels of a tile"));
     return chunk;
 }
 
@@ -167,13 +194,12 @@ Result<Chunk> decodeMeshChunk(const uint8_t* bytes, size_t count, uint32_t trian
     if (uint64_t{head.vertexBytes} + head.triangleBytes + head.clusterBytes + sizeof(head) != count)
         return fail(ErrorKind::input, "the chunk's parts do not add up to its size", where, "build it again");
     const uint8_t* at = bytes + sizeof(head);
-    constexpr size_t stride = sizeof(shared::MeshVertex);
-    STIPPLE_ASSIGN(const std::vector<uint8_t> vertex,
-                   decompress(at, head.vertexBytes, meshopt_encodeVertexBufferBound(group.vertices, stride), where));
     Chunk chunk;
-    chunk.vertices.resize(group.vertices);
-    if (meshopt_decodeVertexBuffer(chunk.vertices.data(), group.vertices, stride, vertex.data(), vertex.size()) != 0)
-        return fail(ErrorKind::input, "the vertices of a chunk are damaged", where, "build it again");
+    STIPPLE_ASSIGN(chunk.vertices, decodeRecords<shared::MeshVertex>(at, head.vertexBytes, group.vertices, where,
+                                                                     "the vertices of a chunk"));
+    if (!arePossible(chunk.vertices))
+        return fail(ErrorKind::input, "a vertex lies nowhere, or its texture coordinates are no numbers", where,
+                    "build it again");
     at += head.vertexBytes;
     STIPPLE_ASSIGN(const std::vector<uint8_t> corners,
                    decompressArray<uint8_t>(at, head.triangleBytes, size_t{triangles} * 4, where));

@@ -123,7 +123,7 @@ void Selector::wantTiles(uint32_t instance, const LocalView& local, bool isWhole
             const shared::TextureInfo& t = h.textures[h.groupTextures[g.firstTexture + k]];
             const double texels = uvPerPixel * std::max(t.width, t.height);
             const auto finest = static_cast<uint32_t>(
-                std::clamp(std::floor(std::log2(std::max(texels, 1.0))), 0.0, double(t.levels - 1)));
+                std::clamp(std::floor(std::log2(std::max(1.0, texels))), 0.0, double(t.levels - 1)));
             const auto range = [](float lo, float hi, uint32_t wrap, uint32_t size, uint32_t tiles) {
                 // Coordinates that wrap around, or may, take the whole row.
                 const float a = std::floor(lo), texel = 1.0f / static_cast<float>(size);

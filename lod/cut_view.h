@@ -48,6 +48,7 @@ inline int32_t allowedError(const Hierarchy& h, const Node& node, const LocalVie
     const double cosine = std::max(cosAlpha * cosBeta - sinAlpha * sinBeta, view.cosineCorner);
     const double allowed = nearest * cosine * cosine / view.focal;
     const double code = std::floor(kStepsPerOctave * std::log2(allowed / h.errors.smallest));
+    if (std::isnan(code)) return kInside;  // of cameras so far off that distances are infinite
     return static_cast<int32_t>(std::clamp(code, -900'000.0, 900'000.0));
 }
 

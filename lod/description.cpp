@@ -3,6 +3,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "engine/base/text.h"
+
 namespace stipple::lod {
 namespace {
 
@@ -56,12 +58,12 @@ shared::SurfaceMaterial materialFromJson(const json& j) {
 json toJson(const StoreDescription& d) {
     json attributes = json::array();
     for (const AttributeInfo& a : d.attributes)
-        attributes.push_back({{"name", a.name},
+        attributes.push_back({{"name", toUtf8(a.name)},
                               {"type", kScalarNames.at(static_cast<size_t>(a.type))},
                               {"aggregate", kAggregateNames.at(static_cast<size_t>(a.aggregate))},
                               {"scale", a.scale},
                               {"offset", a.offset},
-                              {"description", a.description},
+                              {"description", toUtf8(a.description)},
                               {"least", a.least},
                               {"greatest", a.greatest},
                               {"low", a.low},
@@ -69,32 +71,35 @@ json toJson(const StoreDescription& d) {
                               {"counts", a.counts}});
     json materials = json::array();
     for (const shared::SurfaceMaterial& m : d.materials) materials.push_back(materialToJson(m));
-    return {
-        {"metres_per_unit", d.metresPerUnit},
-        {"up", {d.up.x, d.up.y, d.up.z}},
-        {"crs", {{"name", d.crs.name}, {"epsg", d.crs.epsg}, {"text", d.crs.text}, {"is_degrees", d.crs.isDegrees}}},
-        {"attributes", attributes},
-        {"low_height", d.lowHeight},
-        {"high_height", d.highHeight},
-        {"points", d.points},
-        {"records", d.records},
-        {"rounding", d.roundingUnits},
-        {"min", {d.boundsMin.x, d.boundsMin.y, d.boundsMin.z}},
-        {"max", {d.boundsMax.x, d.boundsMax.y, d.boundsMax.z}},
-        {"focus_min", {d.focusMin.x, d.focusMin.y, d.focusMin.z}},
-        {"focus_max", {d.focusMax.x, d.focusMax.y, d.focusMax.z}},
-        {"has_colour", d.hasColour},
-        {"is_reflectance", d.isReflectance},
-        {"is_strands", d.isStrands},
-        {"is_progressive", d.isProgressive},
-        {"disc_factors", d.discFactors},
-        {"smallest_disc", d.smallestDisc},
-        {"has_normals", d.hasNormals},
-        {"materials", materials},
-        {"points_in", d.pointsIn},
-        {"dropped", d.dropped},
-        {"added", d.added},
-        {"source", d.source}};
+    return {{"metres_per_unit", d.metresPerUnit},
+            {"up", {d.up.x, d.up.y, d.up.z}},
+            {"crs",
+             {{"name", toUtf8(d.crs.name)},
+              {"epsg", d.crs.epsg},
+              {"text", toUtf8(d.crs.text)},
+              {"is_degrees", d.crs.isDegrees}}},
+            {"attributes", attributes},
+            {"low_height", d.lowHeight},
+            {"high_height", d.highHeight},
+            {"points", d.points},
+            {"records", d.records},
+            {"rounding", d.roundingUnits},
+            {"min", {d.boundsMin.x, d.boundsMin.y, d.boundsMin.z}},
+            {"max", {d.boundsMax.x, d.boundsMax.y, d.boundsMax.z}},
+            {"focus_min", {d.focusMin.x, d.focusMin.y, d.focusMin.z}},
+            {"focus_max", {d.focusMax.x, d.focusMax.y, d.focusMax.z}},
+            {"has_colour", d.hasColour},
+            {"is_reflectance", d.isReflectance},
+            {"is_strands", d.isStrands},
+            {"is_progressive", d.isProgressive},
+            {"disc_factors", d.discFactors},
+            {"smallest_disc", d.smallestDisc},
+            {"has_normals", d.hasNormals},
+            {"materials", materials},
+            {"points_in", d.pointsIn},
+            {"dropped", d.dropped},
+            {"added", d.added},
+            {"source", toUtf8(d.source)}};
 }
 
 template <size_t N>
@@ -160,6 +165,16 @@ StoreDescription fromJson(const json& j) {
 }  // namespace
 
 std::string describeAsText(const StoreDescription& description) { return toJson(description).dump(); }
-StoreDescription descriptionFromText(const std::string& text) { return fromJson(json::parse(text)); }
+StoreDescription descriptionFromText(const std::string& text) {
+    // As many values as 65,536 materials have, and no deeper than they stand: text that is nothing but brackets takes
+    // a hundred times its size.
+    constexpr uint64_t kMostValues = 8'000'000;
+    constexpr int kDeepest = 16;
+    uint64_t values = 0;
+    return fromJson(json::parse(text, [&](int depth, json::parse_event_t, json&) {
+        if (++values > kMostValues || depth > kDeepest) throw std::runtime_error("it holds too much");
+        return true;
+    }));
+}
 
 }  // namespace stipple::lod

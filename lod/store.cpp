@@ -1,7 +1,6 @@
 #include "lod/store.h"
 
 #include <fmt/format.h>
-#include <zstd.h>
 
 #include <bit>
 #include <cstring>
@@ -10,59 +9,21 @@
 #include "engine/base/hash.h"
 #include "lod/attributes.h"
 #include "lod/description.h"
+#include "lod/store_check.h"
+#include "lod/store_layout.h"
+#include "lod/zstd_memory.h"
 
 namespace stipple::lod {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "the store is little-endian and copied as it is");
+using namespace layout;
 
-constexpr uint64_t kMagic = 0x31454c5050495453ull;      // "STIPPLE1"
-constexpr uint64_t kFootMagic = 0x444e45454c505053ull;  // "SPPLEEND"
-constexpr uint64_t kSizeLimit = uint64_t{1} << 40;      // of an uncompressed table
-
-struct Section {
-    uint64_t offset, bytes, rawBytes, hash;
-};
-
-struct Head {
-    uint64_t magic;
-    uint32_t version, rootLog2;
-    std::array<double, 3> origin;
-    double unit, smallestError;
-    uint64_t nodeCount, fileBytes, contentHash;
-    Section nodes, counts, description, mesh;
-    uint64_t hash;  // of everything before
-};
-static_assert(sizeof(Head) == 16 + 24 + 16 + 24 + 128 + 8 && std::is_trivially_copyable_v<Head>);
-
-struct Foot {
-    uint64_t headHash, magic;
-};
-
-struct NodeOnDisk {
-    std::array<double, 4> sphere;
-    uint64_t chunkOffset, chunkHash, attributeHash;
-    std::array<uint32_t, 3> cell;
-    uint32_t parent, firstChild, records, chunkBytes, attributeBytes, parentCodes, ownCodes, normalCone;
-    float normalConeCosine;
-    uint8_t level, childMask, errorCode;
-    int8_t stepShift;
-};
-static_assert(sizeof(NodeOnDisk) == 32 + 24 + 12 + 32 + 4 + 4 + 4);  // the last for alignment
-
-/// (code, count) of one code that occurs in a node.
-struct CodeCount {
-    uint32_t code, count;
-};
+constexpr uint64_t kMostText = uint64_t{128} << 20;  // of a description
 
 std::vector<uint8_t> packed(const void* bytes, size_t count) {
     std::vector<uint8_t> out(ZSTD_compressBound(count));
-    out.resize(ZSTD_compress(out.data(), out.size(), bytes, count, 3));
+    out.resize(written(ZSTD_compress(out.data(), out.size(), bytes, count, 3)));
     return out;
-}
-
-Error damaged(const std::string& where, const std::string& what) {
-    return Error{ErrorKind::input, what, where, "the store is damaged or not whole; build it again"};
 }
 
 /// Turns (code, count) pairs into the step function of CodeCounts.
@@ -95,28 +56,23 @@ void appendPairs(const Hierarchy& h, const CodeCounts& c, uint32_t records, std:
     }
 }
 
-Result<std::vector<uint8_t>> readSection(const InputFile& file, const Section& s, const char* name) {
+/// `most`: bytes that what was read before allows it to have; checked before any memory is taken.
+Result<std::vector<uint8_t>> readSection(const InputFile& file, const Section& s, uint64_t most, const char* name) {
     const std::string where = fmt::format("{}: {}", file.path(), name);
     if (s.offset > file.sizeBytes() || s.bytes > file.sizeBytes() - s.offset)
         return tl::unexpected(
-            damaged(where, fmt::format("{} bytes at offset {} lie outside the file", s.bytes, s.offset)));
-    // zstd gains at most about 2^17 to 1 on the densest input; a head that claims more lies.
-    if (s.rawBytes > kSizeLimit || s.rawBytes / 131072 > s.bytes)
-        return tl::unexpected(damaged(where, fmt::format("{} bytes cannot come from {}", s.rawBytes, s.bytes)));
+            damagedStore(where, fmt::format("{} bytes at offset {} lie outside the file", s.bytes, s.offset)));
+    if (s.rawBytes > most || !isPossibleGain(s.bytes, s.rawBytes))
+        return tl::unexpected(damagedStore(where, fmt::format("{} bytes cannot come from {}", s.rawBytes, s.bytes)));
     std::vector<uint8_t> bytes(s.bytes);
     STIPPLE_TRY(file.readAt(s.offset, bytes.data(), bytes.size()));
     if (hashBytes(bytes.data(), bytes.size()) != s.hash)
-        return tl::unexpected(damaged(where, "the hash does not match"));
+        return tl::unexpected(damagedStore(where, "the hash does not match"));
     std::vector<uint8_t> raw(s.rawBytes);
-    const size_t got = ZSTD_decompress(raw.data(), raw.size(), bytes.data(), bytes.size());
-    if (ZSTD_isError(got) || got != raw.size()) return tl::unexpected(damaged(where, "cannot be decompressed"));
+    const size_t got = unlessOutOfMemory(ZSTD_decompress(raw.data(), raw.size(), bytes.data(), bytes.size()));
+    if (ZSTD_isError(got) || got != raw.size()) return tl::unexpected(damagedStore(where, "cannot be decompressed"));
     return raw;
 }
-
-/// Of the mesh section: the counts, then groups, runs and parents.
-struct MeshHead {
-    uint64_t groups, runs, parents, groupTextures, textures, tiles;
-};
 
 std::vector<uint8_t> meshBytes(const Hierarchy& h) {
     const MeshHead head{h.groups.size(),        h.runs.size(),     h.parents.size(),
@@ -138,7 +94,7 @@ std::vector<uint8_t> meshBytes(const Hierarchy& h) {
 
 Result<void> readMesh(const std::vector<uint8_t>& bytes, const std::string& path, Hierarchy& h) {
     MeshHead head{};
-    const auto bad = [&] { return tl::unexpected(damaged(path, "the groups of the mesh are not possible")); };
+    const auto bad = [&] { return tl::unexpected(damagedStore(path, "the groups of the mesh are not possible")); };
     if (bytes.size() < sizeof(head)) return bad();
     std::memcpy(&head, bytes.data(), sizeof(head));
     const uint64_t most = bytes.size();  // of each, so that the sums below cannot overflow
@@ -164,80 +120,69 @@ Result<void> readMesh(const std::vector<uint8_t>& bytes, const std::string& path
     return {};
 }
 
-/// Every level of a texture has its tiles, and they lie in the file.
-Result<void> checkTextures(const Store& store, uint64_t chunksEnd) {
-    const Hierarchy& h = store.hierarchy;
-    uint64_t tiles = 0;
-    bool fits = true;
-    for (const shared::TextureInfo& t : h.textures) {
-        fits = fits && t.width > 0 && t.height > 0 && t.width <= 65536 && t.height <= 65536 && t.levels > 0 &&
-               t.levels <= shared::kTextureLevels && t.wrapU <= 2 && t.wrapV <= 2;
-        for (uint32_t l = 0; fits && l < t.levels; ++l) {
-            fits = t.firstTile[l] == tiles;
-            tiles += uint64_t{shared::tilesAcross(t.width, l)} * shared::tilesAcross(t.height, l);
-        }
-    }
-    fits = fits && tiles == h.tiles.size();
-    for (const TextureTile& t : h.tiles) fits = fits && t.offset <= chunksEnd && t.bytes <= chunksEnd - t.offset;
-    for (const uint32_t t : h.groupTextures) fits = fits && t < h.textures.size();
-    for (const MeshGroup& g : h.groups)
-        fits = fits && uint64_t{g.firstTexture} + g.textures <= h.groupTextures.size() &&
-               std::isfinite(g.lowU + g.lowV + g.highU + g.highV + g.uvPerStep);
-    for (const shared::SurfaceMaterial& m : store.description.materials)
-        for (const shared::TextureSlot* slot :
-             {&m.baseTexture, &m.surfaceTexture, &m.normalTexture, &m.occlusionTexture, &m.emissiveTexture})
-            fits = fits && slot->texture <= h.textures.size();
-    if (!fits) return tl::unexpected(damaged(store.path, "the textures of the mesh are not possible"));
-    return {};
+Node nodeOf(const NodeOnDisk& d) {
+    Node n;
+    n.centre = {d.sphere[0], d.sphere[1], d.sphere[2]};
+    n.radius = d.sphere[3];
+    n.chunkOffset = d.chunkOffset;
+    n.chunkHash = d.chunkHash;
+    n.attributeHash = d.attributeHash;
+    n.attributeBytes = d.attributeBytes;
+    n.cell = d.cell;
+    n.parent = d.parent;
+    n.firstChild = d.firstChild;
+    n.records = d.records;
+    n.chunkBytes = d.chunkBytes;
+    n.normalCone = d.normalCone;
+    n.normalConeCosine = d.normalConeCosine;
+    n.level = d.level;
+    n.childMask = d.childMask;
+    n.errorCode = d.errorCode;
+    n.stepShift = d.stepShift;
+    return n;
 }
 
-/// The same for groups: parents before children, producers after the groups that hold what they gave.
-Result<void> checkGroups(const Store& store, uint64_t chunksEnd) {
-    const Hierarchy& h = store.hierarchy;
+/// The node table and the counts per code; has it any?
+Result<bool> readNodes(const InputFile& file, const Head& head, Hierarchy& h) {
+    STIPPLE_ASSIGN(const std::vector<uint8_t> nodeBytes,
+                   readSection(file, head.nodes, head.nodes.rawBytes, "node table"));
+    std::vector<NodeOnDisk> onDisk(head.nodeCount);
+    std::memcpy(onDisk.data(), nodeBytes.data(), nodeBytes.size());
+    uint64_t codes = 0;
+    for (const NodeOnDisk& d : onDisk) {
+        const uint32_t most = std::min(d.records, 256u);
+        if (d.parentCodes > most || d.ownCodes > most)
+            return tl::unexpected(damagedStore(file.path(), "the code counts are not possible"));
+        codes += uint64_t{d.parentCodes} + d.ownCodes;
+    }
+    STIPPLE_ASSIGN(const std::vector<uint8_t> countBytes,
+                   readSection(file, head.counts, codes * sizeof(CodeCount), "code counts"));
+    std::vector<CodeCount> pairs(countBytes.size() / sizeof(CodeCount));
+    if (!pairs.empty()) std::memcpy(pairs.data(), countBytes.data(), pairs.size() * sizeof(CodeCount));
+    h.nodes.resize(head.nodeCount);
+    uint64_t used = 0;
     for (size_t i = 0; i < h.nodes.size(); ++i) {
-        const Node& n = h.nodes[i];
-        const MeshGroup& g = h.groups[i];
-        bool fits = n.chunkOffset <= chunksEnd && n.chunkBytes <= chunksEnd - n.chunkOffset && n.attributeBytes == 0 &&
-                    std::isfinite(n.radius) && n.radius >= 0 && std::isfinite(n.centre.x + n.centre.y + n.centre.z) &&
-                    uint64_t{g.firstRun} + g.runs <= h.runs.size() && g.runs > 0 &&
-                    uint64_t{g.firstParent} + g.parents <= h.parents.size() &&
-                    (g.parents > 0) == (n.errorCode != 255) && (i > 0 || g.parents == 0);
-        // Each vertex of a cluster is used and each cluster has a triangle, so sizes that agree with a chunk of these
-        // bytes are bounded; zstd gains at most about 2^17 to 1.
-        fits = fits && (uint64_t{g.vertices} * 32 + uint64_t{n.records} * 4) / 131072 <= n.chunkBytes;
-        uint64_t triangles = 0, clusters = 0;
-        for (uint32_t r = 0; fits && r < g.runs; ++r) {
-            const MeshRun& run = h.runs[g.firstRun + r];
-            fits = run.firstCluster == clusters &&
-                   (run.producer == MeshRun::kOriginal || (run.producer > i && run.producer < h.nodes.size()));
-            clusters += run.clusters;
-            triangles += run.triangles;
+        const NodeOnDisk& d = onDisk[i];
+        Node& n = h.nodes[i] = nodeOf(d);
+        // Groups of triangles have none; whether it is one is known once the mesh section is read.
+        if (pairs.empty()) continue;
+        for (const auto& [count, counts] :
+             {std::pair{d.parentCodes, &n.parentCounts}, std::pair{d.ownCodes, &n.ownCounts}}) {
+            uint64_t sum = 0;
+            bool rising = count > 0 && used + count <= pairs.size();
+            for (uint32_t k = 0; rising && k < count; ++k) {
+                sum += pairs[used + k].count;
+                rising = pairs[used + k].code < 256 && (k == 0 || pairs[used + k].code > pairs[used + k - 1].code);
+            }
+            if (!rising || sum != n.records)
+                return tl::unexpected(
+                    damagedStore(file.path(), fmt::format("the code counts of node {} are not possible", i)));
+            *counts = makeCounts(&pairs[used], count, h.greaterThan);
+            used += count;
         }
-        for (uint32_t k = 0; fits && k < g.parents; ++k) fits = h.parents[g.firstParent + k] < i;
-        if (!fits || triangles != n.records || clusters != g.clusters || n.records == 0)
-            return tl::unexpected(damaged(store.path, fmt::format("group {} of the mesh is not possible", i)));
     }
-    return {};
-}
-
-/// What selectCut and the streamer index with must be in range before anyone uses it.
-Result<void> checkNodes(const Store& store, uint64_t chunksEnd) {
-    const auto& nodes = store.hierarchy.nodes;
-    for (size_t i = 0; i < nodes.size(); ++i) {
-        const Node& n = nodes[i];
-        const auto children = static_cast<uint64_t>(__builtin_popcount(n.childMask));
-        const bool childrenFit = n.isLeaf() || (n.firstChild > i && n.firstChild + children <= nodes.size());
-        const bool parentFits = i == 0 ? n.level == 0 : n.parent < i && nodes[n.parent].level + 1 == n.level;
-        const bool chunkFits =
-            n.chunkOffset <= chunksEnd && uint64_t{n.chunkBytes} + n.attributeBytes <= chunksEnd - n.chunkOffset;
-        const bool finite =
-            std::isfinite(n.radius) && n.radius >= 0 && std::isfinite(n.centre.x + n.centre.y + n.centre.z);
-        if (!childrenFit || !parentFits || !chunkFits || !finite || n.records == 0 ||
-            n.level > store.hierarchy.rootLog2 ||
-            n.stepShift != static_cast<int>(store.hierarchy.rootLog2) - n.level - (store.hierarchy.isLoose() ? 15 : 16))
-            return tl::unexpected(damaged(store.path, fmt::format("node {} of the node table is not possible", i)));
-    }
-    return {};
+    if (used != pairs.size()) return tl::unexpected(damagedStore(file.path(), "there are more code counts than nodes"));
+    return !pairs.empty();
 }
 
 }  // namespace
@@ -356,71 +301,37 @@ Result<Store> openStore(const std::string& path) {
                     fmt::format("has store version {}; this program reads version {}", head.version, kStoreVersion),
                     path, "build it again with this program");
     if (head.hash != hashBytes(&head, offsetof(Head, hash)))
-        return tl::unexpected(damaged(path, "the head is damaged"));
+        return tl::unexpected(damagedStore(path, "the head is damaged"));
     if (head.fileBytes != file.sizeBytes())
         return tl::unexpected(
-            damaged(path, fmt::format("has {} bytes instead of {}", file.sizeBytes(), head.fileBytes)));
+            damagedStore(path, fmt::format("has {} bytes instead of {}", file.sizeBytes(), head.fileBytes)));
     Foot foot{};
     STIPPLE_TRY(file.readAt(file.sizeBytes() - sizeof(foot), &foot, sizeof(foot)));
     if (foot.magic != kFootMagic || foot.headHash != head.hash)
-        return tl::unexpected(damaged(path, "the foot is damaged"));
+        return tl::unexpected(damagedStore(path, "the foot is damaged"));
     if (!(head.unit > 0) || !std::isfinite(head.unit) || !(head.smallestError > 0) || head.rootLog2 > 62 ||
-        head.nodes.rawBytes != head.nodeCount * sizeof(NodeOnDisk) || head.nodeCount == 0)
-        return tl::unexpected(damaged(path, "the head holds values that are not possible"));
+        head.nodeCount == 0 || head.nodeCount > file.sizeBytes() / kFewestChunkBytes ||
+        head.nodes.rawBytes != head.nodeCount * sizeof(NodeOnDisk))
+        return tl::unexpected(damagedStore(path, "the head holds values that are not possible"));
 
-    STIPPLE_ASSIGN(const std::vector<uint8_t> nodeBytes, readSection(file, head.nodes, "node table"));
-    STIPPLE_ASSIGN(const std::vector<uint8_t> countBytes, readSection(file, head.counts, "code counts"));
-    STIPPLE_ASSIGN(const std::vector<uint8_t> text, readSection(file, head.description, "description"));
-    STIPPLE_ASSIGN(const std::vector<uint8_t> mesh, readSection(file, head.mesh, "mesh groups"));
     Hierarchy& h = store.hierarchy;
     h.origin = {head.origin[0], head.origin[1], head.origin[2]};
     h.unit = head.unit;
     h.rootLog2 = head.rootLog2;
     h.errors.smallest = head.smallestError;
-    std::vector<CodeCount> pairs(countBytes.size() / sizeof(CodeCount));
-    if (!pairs.empty()) std::memcpy(pairs.data(), countBytes.data(), pairs.size() * sizeof(CodeCount));
-    h.nodes.resize(head.nodeCount);
-    uint64_t used = 0;
-    for (size_t i = 0; i < h.nodes.size(); ++i) {
-        NodeOnDisk d{};
-        std::memcpy(&d, nodeBytes.data() + i * sizeof(d), sizeof(d));
-        Node& n = h.nodes[i];
-        n.centre = {d.sphere[0], d.sphere[1], d.sphere[2]};
-        n.radius = d.sphere[3];
-        n.chunkOffset = d.chunkOffset;
-        n.chunkHash = d.chunkHash;
-        n.attributeHash = d.attributeHash;
-        n.attributeBytes = d.attributeBytes;
-        n.cell = d.cell;
-        n.parent = d.parent;
-        n.firstChild = d.firstChild;
-        n.records = d.records;
-        n.chunkBytes = d.chunkBytes;
-        n.normalCone = d.normalCone;
-        n.normalConeCosine = d.normalConeCosine;
-        n.level = d.level;
-        n.childMask = d.childMask;
-        n.errorCode = d.errorCode;
-        n.stepShift = d.stepShift;
-        if (d.parentCodes == 0 && d.ownCodes == 0 && mesh.size() > sizeof(MeshHead)) continue;
-        for (const auto& [codes, counts] :
-             {std::pair{d.parentCodes, &n.parentCounts}, std::pair{d.ownCodes, &n.ownCounts}}) {
-            uint64_t sum = 0;
-            bool rising = codes > 0 && codes <= 256 && used + codes <= pairs.size();
-            for (uint32_t k = 0; rising && k < codes; ++k) {
-                sum += pairs[used + k].count;
-                rising = pairs[used + k].code < 256 && (k == 0 || pairs[used + k].code > pairs[used + k - 1].code);
-            }
-            if (!rising || sum != n.records)
-                return tl::unexpected(damaged(path, fmt::format("the code counts of node {} are not possible", i)));
-            *counts = makeCounts(&pairs[used], codes, h.greaterThan);
-            used += codes;
-        }
-    }
+    STIPPLE_ASSIGN(const bool hasCounts, readNodes(file, head, h));
+    STIPPLE_ASSIGN(const std::vector<uint8_t> text, readSection(file, head.description, kMostText, "description"));
+    // Every group, run and parent stands for triangles, every tile for bytes of the file.
+    uint64_t triangles = 0;
+    for (const Node& n : h.nodes) triangles += n.records;
+    const uint64_t mostMesh =
+        sizeof(MeshHead) + h.nodes.size() * sizeof(MeshGroup) + triangles * (sizeof(MeshRun) + 8) +
+        file.sizeBytes() / kFewestChunkBytes * (sizeof(TextureTile) + sizeof(shared::TextureInfo));
+    STIPPLE_ASSIGN(const std::vector<uint8_t> mesh, readSection(file, head.mesh, mostMesh, "mesh groups"));
     try {
         store.description = descriptionFromText({text.begin(), text.end()});
     } catch (const std::exception& e) {
-        return tl::unexpected(damaged(path, fmt::format("the description cannot be read: {}", e.what())));
+        return tl::unexpected(damagedStore(path, fmt::format("the description cannot be read: {}", e.what())));
     }
     h.isStrands = store.description.isStrands;
     h.isProgressive = store.description.isProgressive;
@@ -428,18 +339,16 @@ Result<Store> openStore(const std::string& path) {
         if (n.isLeaf()) h.finestCode = std::max(h.finestCode, n.errorCode);
     h.discFactors = store.description.discFactors;
     h.smallestDisc = store.description.smallestDisc / h.unit;
-    if (!h.discFactors.empty() && !(h.smallestDisc > 0 && std::isfinite(h.smallestDisc)))
-        return tl::unexpected(damaged(path, "the size of its discs is not possible"));
-    if (!(std::abs(glm::length(store.description.up) - 1) < 1e-6))
-        return tl::unexpected(damaged(path, "the up direction has not the length 1"));
     store.contentHash = head.contentHash;
     store.fileBytes = head.fileBytes;
     STIPPLE_TRY(readMesh(mesh, path, h));
-    if (h.isProgressive && (h.isStrands || h.isMesh()))
-        return tl::unexpected(damaged(path, "holds progressive points and something else"));
-    if (h.isStrands && h.isMesh()) return tl::unexpected(damaged(path, "holds strands and groups of triangles"));
-    STIPPLE_TRY(checkTextures(store, head.nodes.offset));
-    STIPPLE_TRY(h.isMesh() ? checkGroups(store, head.nodes.offset) : checkNodes(store, head.nodes.offset));
+    if (hasCounts == h.isMesh()) return tl::unexpected(damagedStore(path, "the code counts are not possible"));
+    STIPPLE_TRY(checkTables(store, head.nodes.offset));
+    if (h.isMesh() && store.description.materials.empty()) {  // it is drawn with a plain one
+        shared::SurfaceMaterial& plain = store.description.materials.emplace_back();
+        plain.baseColour = {1, 1, 1};
+        plain.alpha = plain.roughness = plain.normalScale = 1;
+    }
     return store;
 }
 
@@ -450,8 +359,10 @@ Result<Chunk> readChunk(const Store& store, uint32_t index, bool wantLowBits) {
     STIPPLE_TRY(store.file->readAt(place.offset, bytes.data(), bytes.size()));
     const std::string where = fmt::format("{}: chunk {} at offset {}", store.path, index, place.offset);
     if (hashBytes(bytes.data(), bytes.size()) != place.hash)
-        return tl::unexpected(damaged(where, "the hash does not match"));
-    return decodeNode(store.hierarchy, index, bytes.data(), bytes.size(), where, wantLowBits);
+        return tl::unexpected(damagedStore(where, "the hash does not match"));
+    STIPPLE_ASSIGN(Chunk chunk, decodeNode(store.hierarchy, index, bytes.data(), bytes.size(), where, wantLowBits));
+    STIPPLE_TRY(checkMaterials(store, chunk, where));
+    return chunk;
 }
 
 ChunkPlace chunkPlace(const Hierarchy& h, uint32_t index) {
@@ -479,7 +390,7 @@ Result<std::vector<uint8_t>> readAttribute(const Store& store, uint32_t index, s
     STIPPLE_TRY(store.file->readAt(offset, bytes.data(), bytes.size()));
     const std::string where = fmt::format("{}: attributes of node {} at offset {}", store.path, index, offset);
     if (hashBytes(bytes.data(), bytes.size()) != node.attributeHash)
-        return tl::unexpected(damaged(where, "the hash does not match"));
+        return tl::unexpected(damagedStore(where, "the hash does not match"));
     return decodeAttribute(bytes.data(), bytes.size(), store.description.attributes, attribute, node.records, where);
 }
 

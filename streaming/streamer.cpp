@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <new>
 #include <utility>
 
 #include "engine/base/check.h"
@@ -41,6 +42,18 @@ Result<lod::Chunk> fetch(const ByteSource& source, const lod::Hierarchy& h, uint
     STIPPLE_ASSIGN(lod::Chunk chunk, lod::decodeNode(h, index, bytes.data(), place.bytes, where, false));
     if (finish.apply) STIPPLE_TRY(finish.apply(index, chunk, attributes, attributeBytes));
     return chunk;
+}
+
+/// Tasks of an executor throw nothing: a chunk for which there is no memory is one that failed.
+Result<lod::Chunk> fetchOrFail(const ByteSource& source, const lod::Hierarchy& h, uint32_t index,
+                               const ChunkFinish& finish, const std::string& where) noexcept {
+    try {
+        return fetch(source, h, index, finish, where);
+    } catch (const std::bad_alloc&) {  // the text is short enough to take no memory
+        return fail(ErrorKind::budget, "out of memory");
+    } catch (...) {
+        return fail(ErrorKind::input, "no such chunk");
+    }
 }
 
 }  // namespace
@@ -202,7 +215,7 @@ void Streamer::request(const lod::Cut& cut) {
         const std::string where = fmt::format("{}: chunk {}", source.name, w.node);
         executor_.run(
             [key, where, bytes = source.bytes, h = source.hierarchy, finish = source.finish, queue = completed_] {
-                queue->push({key, fetch(*bytes, *h, key.node, *finish, where)});
+                queue->push({key, fetchOrFail(*bytes, *h, key.node, *finish, where)});
             });
     }
 }

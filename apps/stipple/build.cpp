@@ -8,6 +8,7 @@
 #include "apps/stipple/outputs.h"
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
+#include "engine/base/text.h"
 
 namespace stipple::app {
 namespace {
@@ -63,10 +64,10 @@ Result<void> run(const Options& o, bool& isSilent) {
                                   {"temporary_bytes", r.temporaryBytes},
                                   {"resumed", r.isResumed},
                                   {"content_hash", hexDigits(r.contentHash)}};
-        fmt::print("{}\n", j.dump(2));
+        fmt::print("{}\n", jsonText(j));
         return {};
     }
-    for (const std::string& note : r.notes) fmt::print(stderr, "note: {}\n", note);
+    for (const std::string& note : r.notes) fmt::print(stderr, "note: {}\n", printable(note));
     const std::string& what = r.primitive;
     const bool isMesh = what == "triangle";
     fmt::print("{}: {} {}s in {} {}, {} ({:.1f} bytes a {}), {:.2f} s, {:.2f} M {}s/s, peak memory {}\n", o.output,

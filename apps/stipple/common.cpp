@@ -11,6 +11,7 @@
 #include "apps/stipple/camera_options.h"
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
+#include "engine/base/text.h"
 #include "engine/cpu/cpu_backend.h"
 #include "engine/image/image_io.h"
 #include "engine/reference/reference.h"
@@ -24,7 +25,7 @@ namespace stipple::app {
 namespace fs = std::filesystem;
 
 int report(const Error& error) {
-    fmt::print(stderr, "stipple: {}\n", error.line());
+    fmt::print(stderr, "stipple: {}\n", printable(error.line()));
     return static_cast<int>(error.kind);
 }
 
@@ -51,13 +52,27 @@ void BuildOptions::addTo(CLI::App& app) {
     app.add_option("--surfels", surfels, "turn meshes (.gltf, .glb, .obj) into that many samples; 0: keep triangles")
         ->check(CLI::Range(uint64_t{0}, uint64_t{200'000'000}))
         ->capture_default_str();
-    app.add_flag("--repair", repair,
-                 "pass over faults of a glTF file that change nothing that is drawn, and count them");
+    addSceneFileOptions(app, allowOutside, repair);
     app.add_option("--strand-radius", strandRadius,
                    "radius of strands that have none, file units (0: a 4000th of the extent)")
         ->check(numberBetween(0.0, 1e300));
     app.add_flag("--only-points", onlyPoints, "of a PLY mesh take the vertices, as points");
     app.add_flag("--skip-bad", skipBad, "go on past corrupt chunks and files, and say what was lost");
+}
+
+void addSceneFileOptions(CLI::App& app, bool& allowOutside, bool& repair) {
+    app.add_flag("--allow-outside", allowOutside,
+                 "of a scene (.gltf, .glb, .obj) also read the files that it names outside its own folder");
+    app.add_flag("--repair", repair,
+                 "is always done: faults of a glTF file that can be drawn are noted and passed over")
+        ->group("");
+}
+
+scene::ReadSettings BuildOptions::reading() const {
+    scene::ReadSettings reading;
+    reading.allowOutside = allowOutside;
+    if (const uint64_t bytes = parseBytes(memory); bytes > 0) reading.memoryBytes = bytes;
+    return reading;
 }
 
 void ColourOptions::addTo(CLI::App& app) {
@@ -102,8 +117,8 @@ Result<lod::BuildSettings> BuildOptions::settings() const {
     s.leftovers = leftovers;
     s.estimateRadii = radii != "keep";
     s.skipBad = skipBad;
-    s.open = [count = surfels, repairs = repair](const std::string& path, const lod::ReadOptions& o) {
-        return openInput(path, o, count, repairs);
+    s.open = [count = surfels, how = reading()](const std::string& path, const lod::ReadOptions& o) {
+        return openInput(path, o, count, how);
     };
     s.allAttributes = attributes == "all";
     s.attributes = namesOf(attributes);
@@ -141,9 +156,9 @@ void EnvironmentOptions::addTo(CLI::App& app) {
 }
 
 Result<std::shared_ptr<const render::Environment>> openEnvironment(const std::string& path, double scale,
-                                                                   Executor& executor) {
+                                                                   uint64_t memoryBytes, Executor& executor) {
     if (path.empty()) return std::shared_ptr<const render::Environment>();
-    STIPPLE_ASSIGN(const render::HdrImage image, image::readHdr(path));
+    STIPPLE_ASSIGN(const render::HdrImage image, image::readHdr(path, memoryBytes));
     return std::make_shared<const render::Environment>(
         render::makeEnvironment(image, static_cast<float>(scale), executor));
 }
@@ -205,6 +220,31 @@ Result<glm::uvec2> parseSize(const std::string& text) {
         return fail(ErrorKind::usage, fmt::format("'{}' is not a size up to 16384x16384", text), "--size",
                     "e.g. 1920x1080");
     return glm::uvec2(w, h);
+}
+
+namespace {
+
+void makeUtf8(nlohmann::json& j) {
+    if (j.is_string()) {
+        auto& text = j.get_ref<std::string&>();
+        text = toUtf8(text);
+    } else if (j.is_array()) {
+        for (nlohmann::json& item : j) makeUtf8(item);
+    } else if (j.is_object()) {
+        nlohmann::json clean = nlohmann::json::object();
+        for (const auto& [key, value] : j.items()) {
+            nlohmann::json& to = clean[toUtf8(key)] = value;
+            makeUtf8(to);
+        }
+        j = std::move(clean);
+    }
+}
+
+}  // namespace
+
+std::string jsonText(nlohmann::json j) {
+    makeUtf8(j);
+    return j.dump(2);
 }
 
 nlohmann::json jsonNumber(double value) {

@@ -25,14 +25,19 @@ int report(const Error& error);
 struct BuildOptions {
     std::string memory = "2G", normals = "auto", radii = "auto", up, attributes = "none", temp, duplicates = "keep";
     int threads = 0;
-    bool skipBad = false, onlyPoints = false, repair = false;
+    bool skipBad = false, onlyPoints = false, allowOutside = false;
+    bool repair = false;  ///< of former versions: what it did is always done
     double strandRadius = 0;
     uint64_t surfels = 0;
     Ranks* ranks = nullptr;  ///< of an MPI job
     lod::Leftovers leftovers = lod::Leftovers::goOn;
     void addTo(CLI::App& app);
     Result<lod::BuildSettings> settings() const;
+    /// How scene files are read.
+    scene::ReadSettings reading() const;
 };
+/// --allow-outside, and what former versions had for scene files.
+void addSceneFileOptions(CLI::App& app, bool& allowOutside, bool& repair);
 
 /// What the colours of the picture stand for.
 struct ColourOptions {
@@ -55,8 +60,10 @@ inline bool isShaded(const lod::StoreDescription& d) { return !d.hasColour || d.
 bool isSceneFile(const std::string& path);
 /// Scans by the readers of lod; meshes as `surfels` samples (0: only the points that they hold).
 Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptions& options, uint64_t surfels,
-                                   bool repair);
-Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene);
+                                   const scene::ReadSettings& reading);
+/// The images of a scene in at most half of `memoryBytes`. One that cannot be decoded counts as white (or flat), with a
+/// line on standard error.
+Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene, uint64_t memoryBytes);
 /// Scans, or the triangles of one scene, to a store.
 Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const std::string& output,
                                   const BuildOptions& build, Executor& executor, Progress& progress);
@@ -83,7 +90,7 @@ Result<lod::ColourBy> applyColours(OpenedScene& scene, const std::string& what, 
 
 /// An HDR picture as light; null for an empty path.
 Result<std::shared_ptr<const render::Environment>> openEnvironment(const std::string& path, double scale,
-                                                                   Executor& executor);
+                                                                   uint64_t memoryBytes, Executor& executor);
 
 Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, Executor& executor);
 /// Every backend and device, one per line.
@@ -93,6 +100,8 @@ Result<glm::dvec3> parseVector(const std::string& text, const char* option);
 Result<glm::uvec2> parseSize(const std::string& text);
 /// Numbers as JSON: infinity has no number there, so it becomes the string "inf".
 nlohmann::json jsonNumber(double value);
+/// JSON as it is printed: names of files and of what is in them may be any bytes, JSON is UTF-8.
+std::string jsonText(nlohmann::json j);
 
 void setupBuild(CLI::App& app, int& status);
 void setupInfo(CLI::App& app, int& status);

@@ -37,7 +37,7 @@ Result<void> run(const Options& o) {
                                   {"threshold", o.threshold},
                                   {"silhouette_iou", d.silhouetteIou},
                                   {"holes", d.holes}};
-        fmt::print("{}\n", j.dump(2));
+        fmt::print("{}\n", jsonText(j));
     } else {
         fmt::print(
             "PSNR {:.2f} dB (foreground {:.2f} dB), largest difference {}/255, {:.4f} % of the pixels differ by more "

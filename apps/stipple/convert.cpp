@@ -16,7 +16,8 @@ namespace fs = std::filesystem;
 
 struct Options {
     std::string input, output;
-    bool strands = false, json = false, repair = false, force = false;
+    bool strands = false, json = false, force = false;
+    BuildOptions build;  ///< of which reading the input uses some
     scene::StrandFitSettings fit;
 };
 
@@ -96,8 +97,8 @@ Result<void> run(const Options& o) {
     STIPPLE_TRY(checkOutputs(outputs, {o.input}, o.force));
     const double start = nowSeconds();
     const auto executor = makeTbbExecutor(0);
-    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(o.input, o.repair));
-    STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene));
+    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(o.input, o.build.reading()));
+    STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene, o.build.reading().memoryBytes));
     scene::StrandFit fit = scene::fitStrands(scene, images, o.fit, *executor);
     if (fit.trianglesIn == 0) return fail(ErrorKind::input, "holds no triangles", o.input);
     tidy(fit.rest);
@@ -129,7 +130,7 @@ Result<void> run(const Options& o) {
     }
     if (o.json) {
         fmt::print("{}\n",
-                   nlohmann::json{
+                   jsonText(nlohmann::json{
                        {"triangles", fit.trianglesIn},
                        {"triangles_left", fit.trianglesLeft},
                        {"ribbons", fit.ribbons},
@@ -138,8 +139,7 @@ Result<void> run(const Options& o) {
                        {"deviation",
                         {{"mean", fit.meanDeviation}, {"p95", fit.p95Deviation}, {"largest", fit.largestDeviation}}},
                        {"written", written},
-                       {"seconds", nowSeconds() - start}}
-                       .dump(2));
+                       {"seconds", nowSeconds() - start}}));
         return {};
     }
     fmt::print("{}: {} triangles became {} ribbons and {} tubes ({} segments); {} triangles are left\n", o.input,
@@ -170,7 +170,8 @@ void setupConvert(CLI::App& app, int& status) {
     sub->add_option("--joints", o->fit.joints, "segments of a strand at most")
         ->check(CLI::Range(2, 1000))
         ->capture_default_str();
-    sub->add_flag("--repair", o->repair, "pass over faults of a glTF file that change nothing that is drawn");
+    sub->add_option("--memory", o->build.memory, "memory that reading the plant may use")->capture_default_str();
+    addSceneFileOptions(*sub, o->build.allowOutside, o->build.repair);
     sub->add_flag("--json", o->json, "as JSON");
     sub->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());

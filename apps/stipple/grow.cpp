@@ -232,11 +232,10 @@ Result<void> runLandscape(LandscapeRun& o) {
     }
     STIPPLE_TRY(scene::writeGltf(scene, output));
     if (o.json)
-        fmt::print("{}\n", nlohmann::json{{"output", output},
-                                          {"instances", instances},
-                                          {"primitives_placed", placed},
-                                          {"seconds", nowSeconds() - start}}
-                               .dump(2));
+        fmt::print("{}\n", jsonText(nlohmann::json{{"output", output},
+                                                   {"instances", instances},
+                                                   {"primitives_placed", placed},
+                                                   {"seconds", nowSeconds() - start}}));
     else
         fmt::print("{}: {} plants and stones, {:.4g} segments and triangles, {:.1f} s\n", output, instances,
                    static_cast<double>(placed), nowSeconds() - start);

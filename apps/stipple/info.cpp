@@ -15,6 +15,7 @@ namespace {
 struct Options {
     std::string input, at;
     bool verify = false, json = false, skipBad = false;
+    BuildOptions build;  ///< of which reading scene files uses some
 };
 
 nlohmann::json vectorJson(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
@@ -139,7 +140,7 @@ Result<void> showNearest(const lod::Store& store, const Options& o) {
     for (size_t a = 0; a < p.attributes.size(); ++a)
         j["attributes"][store.description.attributes[a].name] = p.attributes[a];
     if (o.json) {
-        fmt::print("{}\n", j.dump(2));
+        fmt::print("{}\n", jsonText(j));
         return {};
     }
     fmt::print("{:.15g} {:.15g} {:.15g}, {:.6g} away\n", p.position.x, p.position.y, p.position.z, p.distance);
@@ -162,7 +163,7 @@ Result<void> run(const Options& o) {
             j["verified"] = true;
         }
         if (o.json) {
-            fmt::print("{}\n", j.dump(2));
+            fmt::print("{}\n", jsonText(j));
             return {};
         }
         printStore(j);
@@ -170,7 +171,7 @@ Result<void> run(const Options& o) {
         return {};
     }
     const auto executor = makeTbbExecutor(0);
-    return showInputInfo({o.input, o.verify, o.json, o.skipBad}, *executor);
+    return showInputInfo({o.input, o.verify, o.json, o.skipBad, o.build.reading()}, *executor);
 }
 
 }  // namespace
@@ -183,6 +184,8 @@ void setupInfo(CLI::App& app, int& status) {
     sub->add_flag("--verify", o->verify, "read everything and check it");
     sub->add_option("--at", o->at, "X,Y,Z in file coordinates: the input point of a scene that is nearest to it");
     sub->add_flag("--skip-bad", o->skipBad, "go on past what is corrupt");
+    sub->add_option("--memory", o->build.memory, "memory that reading a scene file may use")->capture_default_str();
+    addSceneFileOptions(*sub, o->build.allowOutside, o->build.repair);
     sub->add_flag("--json", o->json, "as JSON");
     sub->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());

@@ -238,7 +238,7 @@ Result<void> showFolder(const InputInfoOptions& o, const std::vector<std::string
     all["max"] = vectorJson(greatest);
     all["problems"] = problems;
     if (o.json) {
-        fmt::print("{}\n", all.dump(2));
+        fmt::print("{}\n", jsonText(all));
         return {};
     }
     fmt::print("{}: {} files, {} points\n", o.input, files.size(), points);
@@ -293,10 +293,12 @@ nlohmann::json sceneJson(const scene::Scene& s) {
 }
 
 Result<void> showScene(const InputInfoOptions& o) {
-    STIPPLE_ASSIGN(const scene::Scene s, scene::readScene(o.input));
+    scene::ReadSettings reading = o.reading;
+    reading.isStrict = o.verify;  // what only a validator minds is an error to who asks for a check
+    STIPPLE_ASSIGN(const scene::Scene s, scene::readScene(o.input, reading));
     const nlohmann::json j = sceneJson(s);
     if (o.json) {
-        fmt::print("{}\n", j.dump(2));
+        fmt::print("{}\n", jsonText(j));
         return {};
     }
     fmt::print("{}: scene\n", o.input);
@@ -331,7 +333,7 @@ Result<void> showStrands(const InputInfoOptions& o) {
         j["max"] = vectorJson(box.greatest);
     }
     if (o.json) {
-        fmt::print("{}\n", j.dump(2));
+        fmt::print("{}\n", jsonText(j));
         return {};
     }
     fmt::print("{}: {} strands of {} vertices\n", o.input, strands, vertices);
@@ -353,7 +355,7 @@ Result<void> showInputInfo(const InputInfoOptions& o, Executor& executor) {
     if (files.size() != 1) return showFolder(o, files, executor);
     STIPPLE_ASSIGN(const nlohmann::json j, fileInfo(o, files.front(), executor));
     if (o.json)
-        fmt::print("{}\n", j.dump(2));
+        fmt::print("{}\n", jsonText(j));
     else
         printFile(j);
     return {};

@@ -3,6 +3,7 @@
 
 #include "engine/base/executor.h"
 #include "engine/base/result.h"
+#include "engine/scene/read_settings.h"
 
 namespace stipple::app {
 
@@ -11,6 +12,7 @@ struct InputInfoOptions {
     bool verify = false;  ///< read every point, however many there are
     bool json = false;
     bool skipBad = false;
+    scene::ReadSettings reading;
 };
 
 Result<void> showInputInfo(const InputInfoOptions& options, Executor& executor);

@@ -5,6 +5,7 @@
 #include <exception>
 
 #include "apps/stipple/common.h"
+#include "apps/stipple/exhaustion.h"
 
 namespace {
 
@@ -39,12 +40,8 @@ int run(int argc, char** argv) {
     } catch (const CLI::ParseError& e) {
         fmt::print(stderr, "stipple: {} (see stipple --help)\n", e.what());
         return static_cast<int>(ErrorKind::usage);
-    } catch (const std::bad_alloc&) {
-        fmt::print(stderr, "stipple: out of memory (give a smaller --memory or --budget-points)\n");
-        return static_cast<int>(ErrorKind::budget);
     } catch (const std::exception& e) {
-        fmt::print(stderr, "stipple: {}\n", e.what());
-        return static_cast<int>(ErrorKind::input);
+        return app::reportThrown(e);
     }
     if (std::fflush(stdout) != 0 && status == 0) status = static_cast<int>(ErrorKind::output);
     return status;
@@ -53,6 +50,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    stipple::app::exitWhereNothingCatches();
     std::signal(SIGXFSZ, SIG_IGN);  // a write beyond ulimit -f fails and is reported, instead of ending the program
     try {
         return run(argc, argv);

@@ -1,75 +1,126 @@
-// Orbit and fly controls. Speeds are per second, so the frame rate does not matter; a long pause counts as 0.1 s.
+// Orbit and fly controls. Speeds are per second, so the frame rate does not matter (a long pause counts as 0.1 s);
+// turns are per height of the window, so neither do its size and the density of its pixels.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
-#include "engine/gpu/window.h"
+#include "engine/render/backend.h"
 #include "engine/scene/camera.h"
 
 namespace stipple::app {
 
+/// What the user's hands do in one frame.
+struct Motion {
+    double seconds = 0;
+    glm::dvec2 turn{0}, slide{0};  ///< drags, pixels: left button, right button
+    double scroll = 0;
+    glm::dvec3 step{0};  ///< right, up, ahead: -1 to 1
+    bool fast = false;
+    uint32_t width = 1, height = 1;  ///< of the window, pixels
+    bool isIdle() const {
+        return turn == glm::dvec2(0) && slide == glm::dvec2(0) && scroll == 0 && step == glm::dvec3(0);
+    }
+};
+
+/// Distance (along the view) of what is in the middle of a picture with depths, or next to it; none: only background.
+inline std::optional<double> depthInTheMiddle(const render::Image& image) {
+    const int w = static_cast<int>(image.width), h = static_cast<int>(image.height);
+    if (image.depth.size() < size_t{image.width} * image.height) return {};
+    std::optional<double> found;
+    int nearest = (h / 20 + 1) * (h / 20 + 1);
+    for (int dy = -h / 20; dy <= h / 20; ++dy)
+        for (int dx = -h / 20; dx <= h / 20; ++dx) {
+            const int x = w / 2 + dx, y = h / 2 + dy, squared = dx * dx + dy * dy;
+            if (x < 0 || y < 0 || x >= w || y >= h || squared >= nearest) continue;
+            const float depth = image.depth[static_cast<size_t>(y) * image.width + static_cast<size_t>(x)];
+            if (!(depth > 0) || !std::isfinite(depth)) continue;
+            nearest = squared;
+            found = depth;
+        }
+    return found;
+}
+
 class Navigation {
   public:
-    Navigation(const scene::Camera& start, double diagonal)
-        : camera_(start), up_(glm::normalize(start.up)), speed_(0.2 * diagonal) {}
+    /// `up`: the axis to turn about. `diagonal`: of the scene.
+    Navigation(const scene::Camera& start, const glm::dvec3& up, double diagonal)
+        : camera_(start), up_(glm::normalize(up)), diagonal_(diagonal), speed_(0.2 * diagonal) {}
     const scene::Camera& camera() const { return camera_; }
     bool isFlying() const { return flying_; }
-    void toggleFly() { flying_ = !flying_; }
+    double speed() const { return speed_; }
+    void fly() { flying_ = true; }
+    void setCamera(const scene::Camera& camera) { camera_ = camera; }
 
-    void move(const gpu::Input& in) {
-        const double dt = std::clamp(in.seconds, 0.0, 0.1);
+    /// Goes on in orbit: about what is `depth` ahead, or, where nothing is, about `focus`, which is then looked at.
+    void orbit(std::optional<double> depth, const glm::dvec3& focus) {
+        flying_ = false;
+        const glm::dvec3 ahead = glm::normalize(camera_.target - camera_.eye);
+        if (depth)
+            camera_.target = camera_.eye + ahead * *depth;
+        else if (glm::length(focus - camera_.eye) > 1e-9 * diagonal_)
+            camera_.target = focus;
+    }
+
+    void move(const Motion& in) {
+        if (in.isIdle()) return;
         if (flying_)
-            fly(in, dt);
+            moveFlying(in);
         else
-            orbit(in);
+            moveInOrbit(in);
     }
 
   private:
-    static constexpr double kRadiansPerPixel = 0.005;
+    static constexpr double kRadiansPerHeight = 3.6;
 
     /// Turns `v` about the up axis and then towards it, staying off the poles.
-    glm::dvec3 turned(const glm::dvec3& v, double yaw, double pitch) const {
+    glm::dvec3 turned(const glm::dvec3& v, double yaw, double pitch) {
         const double length = glm::length(v);
         const double height =
             std::clamp(std::asin(std::clamp(glm::dot(v, up_) / length, -1.0, 1.0)) + pitch, -1.55, 1.55);
         glm::dvec3 flat = v - up_ * glm::dot(v, up_);
-        if (!(glm::length(flat) > 1e-12)) flat = glm::cross(up_, glm::dvec3(up_.y, up_.z, up_.x));
+        if (!(glm::length(flat) > 1e-9 * length))  // straight up or down: what was above in the picture is ahead
+            flat = camera_.up - up_ * glm::dot(camera_.up, up_);
+        if (!(glm::length(flat) > 1e-9)) flat = glm::cross(up_, glm::dvec3(up_.y, up_.z, up_.x));
         flat = glm::normalize(flat);
         flat = flat * std::cos(yaw) + glm::cross(up_, flat) * std::sin(yaw);
+        camera_.up = up_;
         return length * (flat * std::cos(height) + up_ * std::sin(height));
     }
 
-    void orbit(const gpu::Input& in) {
+    void moveInOrbit(const Motion& in) {
+        const double perPixel = kRadiansPerHeight / in.height;
         glm::dvec3 back = camera_.eye - camera_.target;
-        if (in.leftButton) back = turned(back, -kRadiansPerPixel * in.mouseDeltaX, kRadiansPerPixel * in.mouseDeltaY);
-        back *= std::exp(-0.15 * in.scroll);
-        if (in.rightButton) {
-            const glm::dvec3 right = glm::normalize(glm::cross(-back, up_)),
-                             above = glm::normalize(glm::cross(right, -back));
-            const double perPixel = glm::length(back) / std::max(1u, in.height);
-            camera_.target += perPixel * (-in.mouseDeltaX * right + in.mouseDeltaY * above);
+        if (in.turn != glm::dvec2(0)) back = turned(back, -perPixel * in.turn.x, perPixel * in.turn.y);
+        const double length = glm::length(back);
+        back *= std::clamp(length * std::exp(-0.15 * in.scroll), 1e-6 * diagonal_, 1e3 * diagonal_) / length;
+        if (in.slide != glm::dvec2(0)) {
+            const lod::View view = scene::makeView(camera_, in.width, in.height, 1);
+            // What is under the pointer stays there.
+            camera_.target -=
+                (in.slide.x * view.right + in.slide.y * view.down) * (glm::length(back) / view.focalPixels);
         }
         camera_.eye = camera_.target + back;
     }
 
-    void fly(const gpu::Input& in, double dt) {
+    void moveFlying(const Motion& in) {
+        const double perPixel = kRadiansPerHeight / in.height;
         glm::dvec3 forward = camera_.target - camera_.eye;
         const double length = glm::length(forward);
-        if (in.leftButton)
-            forward = turned(forward, -kRadiansPerPixel * in.mouseDeltaX, -kRadiansPerPixel * in.mouseDeltaY);
-        speed_ *= std::exp(0.15 * in.scroll);
-        const glm::dvec3 ahead = glm::normalize(forward), right = glm::normalize(glm::cross(ahead, up_));
-        glm::dvec3 step =
-            ahead * double(in.forward - in.back) + right * double(in.right - in.left) + up_ * double(in.up - in.down);
-        step *= dt * speed_ * (in.fast ? 5.0 : 1.0);
-        camera_.eye += step;
+        if (in.turn != glm::dvec2(0)) forward = turned(forward, -perPixel * in.turn.x, -perPixel * in.turn.y);
+        speed_ = std::clamp(speed_ * std::exp(0.15 * in.scroll), 1e-9 * diagonal_, 1e3 * diagonal_);
+        const glm::dvec3 ahead = glm::normalize(forward);
+        camera_.target = camera_.eye + forward;
+        const glm::dvec3 right = scene::makeView(camera_, in.width, in.height, 1).right;
+        const glm::dvec3 step = right * in.step.x + up_ * in.step.y + ahead * in.step.z;
+        camera_.eye += step * (std::clamp(in.seconds, 0.0, 0.1) * speed_ * (in.fast ? 5.0 : 1.0));
         camera_.target = camera_.eye + ahead * length;
     }
 
     scene::Camera camera_;
     glm::dvec3 up_;
-    double speed_;
+    double diagonal_, speed_;
     bool flying_ = false;
 };
 

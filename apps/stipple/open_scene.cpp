@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -14,6 +13,7 @@
 #include "apps/stipple/common.h"
 #include "apps/stipple/from_afar.h"
 #include "engine/base/process.h"
+#include "engine/base/text.h"
 #include "engine/image/image_io.h"
 #include "engine/scene/strands.h"
 #include "engine/scene/triangles.h"
@@ -28,20 +28,11 @@
 namespace stipple::app {
 namespace fs = std::filesystem;
 
-Result<std::vector<scene::DecodedImage>> decodeImages(const scene::Scene& scene) {
-    std::vector<scene::DecodedImage> images;
-    for (const scene::EncodedImage& encoded : scene.images) {
-        STIPPLE_ASSIGN(render::Image image, image::decodeImage(encoded.bytes, scene.path + ": " + encoded.name));
-        images.push_back({image.width, image.height, std::move(image.rgba)});
-    }
-    return images;
-}
-
 Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptions& options, uint64_t surfels,
-                                   bool repair) {
+                                   const scene::ReadSettings& reading) {
     if (!isSceneFile(path)) return lod::openPointSource(path, options);
-    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path, repair));
-    STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene));
+    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path, reading));
+    STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene, reading.memoryBytes));
     return scene::sampleSurfels(scene, images, {surfels});
 }
 
@@ -81,19 +72,22 @@ Result<lod::Instance> placeOf(const glm::dmat4& m, const std::string& where) {
     return place;
 }
 
-Result<lod::MeshBuildSettings> meshSettings(const scene::Scene& scene) {
+Result<lod::MeshBuildSettings> meshSettings(const scene::Scene& scene, uint64_t memoryBytes) {
     lod::MeshBuildSettings settings;
     settings.description.source = fs::path(scene.path).filename().string();
     settings.description.up = {0, 1, 0};
     settings.description.materials = scene::surfaceMaterials(scene);
     settings.textures = scene::textureImages(scene);
-    STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene));
+    STIPPLE_ASSIGN(std::vector<scene::DecodedImage> images, decodeImages(scene, memoryBytes));
+    std::vector<size_t> last(images.size());  // texture that uses an image last, and may have it
+    for (size_t t = 0; t < settings.textures.size(); ++t)
+        if (scene.textures[t].image >= 0) last[static_cast<size_t>(scene.textures[t].image)] = t;
     for (size_t t = 0; t < settings.textures.size(); ++t) {
-        const int image = scene.textures[t].image;
-        if (image < 0) continue;
-        settings.textures[t].width = images[static_cast<size_t>(image)].width;
-        settings.textures[t].height = images[static_cast<size_t>(image)].height;
-        settings.textures[t].rgba = images[static_cast<size_t>(image)].rgba;
+        if (scene.textures[t].image < 0) continue;
+        const auto i = static_cast<size_t>(scene.textures[t].image);
+        settings.textures[t].width = images[i].width;
+        settings.textures[t].height = images[i].height;
+        settings.textures[t].rgba = last[i] == t ? std::move(images[i].rgba) : images[i].rgba;
     }
     return settings;
 }
@@ -112,7 +106,7 @@ Result<lod::BuildReport> buildPlyMesh(const std::string& input, const std::strin
     STIPPLE_ASSIGN(const lod::MeshSource source, lod::openPlyMesh(input, wanted.memoryBytes / 4, folder));
     scene::Scene plain;
     plain.path = input;
-    STIPPLE_ASSIGN(lod::MeshBuildSettings settings, meshSettings(plain));
+    STIPPLE_ASSIGN(lod::MeshBuildSettings settings, meshSettings(plain, wanted.memoryBytes));
     settings.limits = wanted;
     settings.limits.memoryBytes -= wanted.memoryBytes / 4;
     return lod::buildMeshStore(source, output, settings, executor, progress);
@@ -170,7 +164,7 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
                             std::vector<render::PlacedStore>& placed) {
     const auto make = [&](const std::vector<scene::Placement>& of) {
         return [&](const std::string& path, Progress& progress) -> Result<lod::BuildReport> {
-            STIPPLE_ASSIGN(lod::MeshBuildSettings settings, meshSettings(scene));
+            STIPPLE_ASSIGN(lod::MeshBuildSettings settings, meshSettings(scene, build.reading().memoryBytes));
             STIPPLE_ASSIGN(settings.limits, build.settings());
             return lod::buildMeshStore(scene::triangleSource(scene, of), path, settings, executor, progress);
         };
@@ -283,7 +277,7 @@ std::vector<scene::Camera> camerasOf(const scene::Scene& scene) {
 /// The stores that a scene's nodes refer to, and its meshes.
 Result<void> openSceneFile(const std::string& path, const BuildOptions& build, const ColourOptions& colour,
                            Executor& executor, bool showProgress, OpenedScene& opened) {
-    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path, build.repair));
+    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path, build.reading()));
     opened.lights = lightsOf(scene);
     opened.cameras = camerasOf(scene);
     std::vector<render::PlacedStore>& placed = opened.placed;
@@ -316,7 +310,7 @@ Result<void> openSceneFile(const std::string& path, const BuildOptions& build, c
         placed.push_back({std::move(points), {}, {}});
     }
     for (const std::string& note : scene.notes)
-        if (showProgress) fmt::print(stderr, "note: {}\n", note);
+        if (showProgress) fmt::print(stderr, "note: {}\n", printable(note));
     return {};
 }
 
@@ -375,8 +369,8 @@ Result<void> checkSceneMemory(const std::string& path, uint64_t memoryBytes) {
     uint64_t bytes = fs::file_size(path, error);
     if (error) return {};  // whoever opens it says why
     if (fs::path(path).extension() == ".gltf") {
-        std::ifstream file(path);
-        const auto text = nlohmann::json::parse(file, nullptr, false);
+        STIPPLE_ASSIGN(const std::string whole, readTextFile(path, memoryBytes));
+        const auto text = nlohmann::json::parse(whole, nullptr, false);
         if (text.is_object() && text.contains("buffers") && text["buffers"].is_array())
             for (const auto& buffer : text["buffers"])
                 if (buffer.is_object() && buffer.contains("byteLength") && buffer["byteLength"].is_number_unsigned())
@@ -412,7 +406,7 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
     if (inputs.size() > 1)
         return fail(ErrorKind::usage, "only one scene with meshes can be built at a time", inputs[1]);
     STIPPLE_TRY(checkSceneMemory(inputs.front(), settings.memoryBytes));
-    STIPPLE_ASSIGN(scene::Scene scene, scene::readScene(inputs.front(), build.repair));
+    STIPPLE_ASSIGN(scene::Scene scene, scene::readScene(inputs.front(), build.reading()));
     const lod::MeshSource triangles = scene::triangleSource(scene, scene::placements(scene));
     const auto counted = [&](scene::PrimitiveKind kind) {
         uint64_t sum = 0;
@@ -430,7 +424,7 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
         scene.notes.push_back(fmt::format(
             "a store holds one kind of primitive: {} lines and {} points are left out; view the scene file to see all",
             lines, points));
-    STIPPLE_ASSIGN(lod::MeshBuildSettings mesh, meshSettings(scene));
+    STIPPLE_ASSIGN(lod::MeshBuildSettings mesh, meshSettings(scene, settings.memoryBytes));
     mesh.limits = settings;
     STIPPLE_ASSIGN(lod::BuildReport report, lod::buildMeshStore(triangles, output, mesh, executor, progress));
     report.notes.insert(report.notes.begin(), scene.notes.begin(), scene.notes.end());

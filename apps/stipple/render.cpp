@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <thread>
 
 #include "apps/stipple/camera_options.h"
 #include "apps/stipple/common.h"
 #include "apps/stipple/legend.h"
+#include "apps/stipple/render_frames.h"
 #include "apps/stipple/outputs.h"
 #include "engine/base/file.h"
 #include "engine/base/process.h"
@@ -86,93 +85,6 @@ nlohmann::json countersJson(const FrameCounters& c) {
             {"cut_ms", c.cutMs}};
 }
 
-/// out.png -> out_0007.png
-std::string numbered(const std::string& path, size_t index) {
-    const std::filesystem::path p(path);
-    return (p.parent_path() / fmt::format("{}_{:04}{}", p.stem().string(), index, p.extension().string())).string();
-}
-
-struct Timings {
-    std::vector<double> frames;
-    std::vector<std::string> passNames;
-    std::vector<std::vector<double>> passes;
-    double firstImageMs = 0, completeMs = 0;
-    void add(double frameMs, const std::vector<render::PassTime>& times) {
-        frames.push_back(frameMs);
-        passNames.clear();
-        passes.resize(times.size());
-        for (size_t i = 0; i < times.size(); ++i) {
-            passNames.push_back(times[i].name);
-            passes[i].push_back(times[i].ms);
-        }
-    }
-};
-
-Result<void> runFrames(const Options& o, const Shot& shot, const render::FrameSettings& settings,
-                       render::FrameState& state, Executor& executor, Timings& timings, bool& complete) {
-    // The first image: as soon as the root is there, whatever is missing.
-    const lod::View& first = shot.views.front();
-    while (!state.streamer->residency().drawable[0][0]) {
-        state.streamer->collect();
-        state.streamer->upload();
-        if (state.streamer->residency().drawable[0][0]) break;
-        if (state.streamer->counters().failures > 0) return fail(ErrorKind::input, state.streamer->lastFailure());
-        if (state.streamer->counters().refused > 0)
-            return fail(ErrorKind::budget, "the first chunk does not fit", "--resident " + o.resident,
-                        "give more memory");
-        lod::selectCut(state.scene(), state.streamer->residency(), first, settings.budgets, state.scratch, state.cut);
-        state.streamer->request(state.cut);
-        if (state.cut.wanted.empty() && state.streamer->isIdle()) break;  // it is not in view
-        std::this_thread::yield();
-    }
-    STIPPLE_TRY(render::renderFrame(state, first, settings));
-    timings.firstImageMs = millisecondsSinceProcessStart();
-    for (size_t i = 0; i < shot.views.size(); ++i) {
-        render::FrameSettings frame = settings;
-        if (!shot.seconds.empty()) frame.draw.wind.seconds += shot.seconds[i];
-        if (o.noWait) {
-            if (i > 0) STIPPLE_TRY(render::renderFrame(state, shot.views[i], frame));
-            complete = state.cut.wanted.empty();
-        } else {
-            STIPPLE_ASSIGN(complete, render::renderUntilComplete(state, shot.views[i], frame, executor));
-        }
-        if (i == 0) timings.completeMs = millisecondsSinceProcessStart();
-        timings.add(state.counters.frameMs, state.backend->passTimes());
-        if (shot.views.size() > 1) {
-            STIPPLE_TRY(image::writeImage(numbered(o.output, i), state.image));
-            if (!o.quiet && !o.json) fmt::print("{}\n", numbered(o.output, i));
-        }
-    }
-    if (shot.views.size() == 1)
-        for (int f = 1; f < o.frames; ++f) {  // one view again and again, for timing
-            STIPPLE_TRY(render::renderFrame(state, first, settings));
-            timings.add(state.counters.frameMs, state.backend->passTimes());
-        }
-    return {};
-}
-
-/// The mean of `count` frames whose strands narrower than a pixel take other pixels each time.
-Result<void> accumulate(int count, const lod::View& view, render::FrameSettings settings, render::FrameState& state) {
-    if (count <= 1) return {};
-    std::vector<float> sum(state.image.linear.size()), coverage(state.image.rgba.size());
-    for (int f = 0; f < count; ++f) {
-        settings.draw.coverageSeed = static_cast<uint32_t>(f);
-        STIPPLE_TRY(render::renderFrame(state, view, settings));
-        for (size_t i = 0; i < sum.size(); ++i) sum[i] += std::clamp(state.image.linear[i], 0.0f, 1.0f);
-        for (size_t i = 0; i < coverage.size(); ++i) coverage[i] += state.image.rgba[i] >> 24 != 0 ? 1.0f : 0.0f;
-    }
-    const float share = 1.0f / static_cast<float>(count);
-    for (size_t i = 0; i < coverage.size(); ++i) {
-        state.image.rgba[i] = static_cast<uint32_t>(coverage[i] * share * 255.0f + 0.5f) << 24;
-        for (size_t c = 0; c < 3; ++c) {
-            state.image.linear[3 * i + c] = sum[3 * i + c] * share;
-            state.image.rgba[i] |= static_cast<uint32_t>(shared::srgbFromLinear(sum[3 * i + c] * share) * 255.0f + 0.5f)
-                                   << (8 * c);
-        }
-    }
-    return {};
-}
-
 /// Before anything is read.
 Result<void> checkPictures(const Options& o) {
     STIPPLE_TRY(image::checkImagePath(o.output));
@@ -203,7 +115,8 @@ Result<void> run(const Options& o) {
     STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
     STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
     STIPPLE_ASSIGN(render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
-    STIPPLE_ASSIGN(settings.draw.environment, openEnvironment(o.environment.path, o.environment.scale, *executor));
+    STIPPLE_ASSIGN(settings.draw.environment,
+                   openEnvironment(o.environment.path, o.environment.scale, o.build.reading().memoryBytes, *executor));
     if (o.mode == "reference" && colour.mode != lod::ColourMode::own)
         return fail(ErrorKind::usage, "traced pictures have the scene's own colours", "--mode reference",
                     "leave --colour out, or use --device reference");
@@ -229,19 +142,16 @@ Result<void> run(const Options& o) {
     auto state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.crowds);
     render::setSway(settings.draw.wind, state->hierarchies, state->instances);
     const Legend legend = o.colour.legend ? makeLegend(colour, description) : Legend{};
+    const FramesPlan plan{shot.views,   shot.seconds, o.output,        o.resident, o.frames,
+                          o.accumulate, o.noWait,     o.build.skipBad, o.quiet,    !o.quiet && !o.json};
     Timings timings;
-    bool complete = false;
-    STIPPLE_TRY(runFrames(o, shot, settings, *state, *executor, timings, complete));
+    Verdict verdict;
+    STIPPLE_TRY(runFrames(plan, settings, *state, *executor, timings, verdict));
     if (shot.views.size() == 1) {
-        STIPPLE_TRY(accumulate(o.accumulate, shot.views.front(), settings, *state));
         drawLegend(legend, state->image);
         STIPPLE_TRY(image::writeImage(o.output, state->image));
     }
     const FrameCounters& c = state->counters;
-    if (!complete && !o.noWait && !o.quiet)
-        fmt::print(stderr, "note: {} chunks that this view wants are missing ({}); delivered error {:.2f} px\n",
-                   c.nodesMissing, c.failures ? state->streamer->lastFailure() : "the limit of --resident is reached",
-                   c.tauEffectivePixels);
     if (o.json) {
         nlohmann::json passes = nlohmann::json::array();
         for (size_t i = 0; i < timings.passNames.size(); ++i)
@@ -258,24 +168,26 @@ Result<void> run(const Options& o) {
             {"records_drawn", c.recordsDrawn},
             {"triangles_drawn", c.trianglesDrawn},
             {"nodes_drawn", c.nodesDrawn},
-            {"tau_eff_px", c.tauEffectivePixels},
-            {"complete", complete},
+            {"tau_eff_px", verdict.tauEffectivePixels},
+            {"complete", verdict.isComplete()},
+            {"incomplete_pictures", verdict.incomplete},
+            {"worst_picture", verdict.worst},
             {"bytes_streamed", c.bytesStreamed},
             {"resident_bytes", c.residentBytes},
             {"peak_rss_bytes", peakRssBytes()},
             {"first_image_ms", timings.firstImageMs},
             {"complete_ms", timings.completeMs},
             {"counters", countersJson(c)}};
-        fmt::print("{}\n", j.dump(2));
+        fmt::print("{}\n", jsonText(j));
     } else if (!o.quiet && shot.views.size() == 1) {
         const std::string drawn = c.trianglesDrawn == 0 ? fmt::format("{} records", c.recordsDrawn)
                                   : c.recordsDrawn == 0
                                       ? fmt::format("{} triangles", c.trianglesDrawn)
                                       : fmt::format("{} records, {} triangles", c.recordsDrawn, c.trianglesDrawn);
-        fmt::print("{}: {}, {:.2f} px error, {:.1f} ms a frame on {}\n", o.output, drawn, c.tauEffectivePixels,
+        fmt::print("{}: {}, {:.2f} px error, {:.1f} ms a frame on {}\n", o.output, drawn, verdict.tauEffectivePixels,
                    quantile(timings.frames, 0.5), backend->device());
     }
-    return {};
+    return checkVerdict(plan, verdict);
 }
 
 }  // namespace
@@ -343,8 +255,7 @@ void setupRender(CLI::App& app, int& status) {
                      "radius of strands that have none, file units (0: a 4000th of the extent)")
         ->check(numberBetween(0.0, 1e300));
     group->add_flag("--only-points", o->build.onlyPoints, "of a PLY mesh take the vertices, as points");
-    group->add_flag("--repair", o->build.repair,
-                    "pass over faults of a glTF file that change nothing that is drawn, and count them");
+    addSceneFileOptions(*sub, o->build.allowOutside, o->build.repair);
     group->add_flag("--skip-bad", o->build.skipBad, "go on past corrupt chunks and files, and say what was lost");
     group->add_option("--threads", o->build.threads, "threads (0: all cores)")
         ->check(CLI::Range(0, 1024))

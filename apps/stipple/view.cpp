@@ -1,214 +1,310 @@
+// The window: what the user's hands do, what is drawn for it, and when. Once it is open, what fails becomes a line on
+// the screen; only a device that can draw no more ends it.
 #include <fmt/format.h>
-#include <imgui.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 
-#include "apps/stipple/common.h"
-#include "apps/stipple/legend.h"
-#include "apps/stipple/navigation.h"
 #include "apps/stipple/outputs.h"
+#include "apps/stipple/overlay.h"
+#include "apps/stipple/scene_opener.h"
+#include "apps/stipple/view_session.h"
 #include "engine/base/process.h"
-#include "engine/gpu/window.h"
 #include "engine/image/image_io.h"
-#include "engine/render/frame.h"
-#include "engine/scene/camera.h"
 
 namespace stipple::app {
 namespace {
 
-struct Options {
-    std::vector<std::string> inputs;
-    std::string size = "1280x720", device = "auto", screenshot, resident = "1G", shade = "auto";
-    double error = 1, wind = 0;
-    uint64_t budget = 2'000'000;
-    int frames = 0;
-    bool force = false;
-    BuildOptions build;
-    ColourOptions colour;
-    EnvironmentOptions environment;
+/// The first free name of stipple_001.png, stipple_002.png ... in the current folder; `number`: where to begin, and
+/// then what was found.
+std::string freePictureName(int& number) {
+    for (;; ++number) {
+        std::string name = fmt::format("stipple_{:03}.png", number);
+        std::error_code error;
+        const auto type = std::filesystem::symlink_status(name, error).type();
+        // Where nothing can be known, writing says why.
+        if (type == std::filesystem::file_type::not_found || type == std::filesystem::file_type::none) return name;
+    }
+}
+
+class Viewer {
+  public:
+    Viewer(const ViewOptions& o, gpu::Window& window, ViewSession& session, ViewSettings& settings, Executor& executor,
+           Navigation navigation, PathPlayer player)
+        : o_(o),
+          window_(window),
+          session_(session),
+          settings_(settings),
+          executor_(executor),
+          opener_(o.build, ColourOptions{}),
+          navigation_(std::move(navigation)),
+          player_(std::move(player)) {}
+
+    Result<void> run() {
+        double wait = 0;
+        while (!isStopRequested()) {
+            const gpu::Input input = window_.poll(wait);
+            if (input.shouldClose) return {};
+            hasChanged_ = hasChanged_ || input.isStale || input.width != width_ || input.height != height_;
+            width_ = input.width;
+            height_ = input.height;
+            if (!takeInput(input)) return {};
+            takeOpened();
+            const Pace pace = paceOf(activity(input));
+            wait = pace.draws ? 0 : pace.waitSeconds;  // what was drawn may have asked for chunks
+            if (!pace.draws) continue;
+            if (o_.frames > 0 && ++frames_ >= o_.frames) return drawLast(input);
+            STIPPLE_TRY(drawNext(input));
+        }
+        return fail(ErrorKind::interrupted, "interrupted", "stipple view");
+    }
+
+  private:
+    void tell(const Error& error) {
+        report(error);
+        notices_.add(error.line(), true, nowSeconds());
+        hasChanged_ = true;
+    }
+    void tell(const std::string& text) {
+        notices_.add(text, false, nowSeconds());
+        hasChanged_ = true;
+    }
+
+    /// False: the user is done.
+    bool takeInput(const gpu::Input& input) {
+        const Motion motion = motionOf(input);
+        const bool steers = navigation_.isFlying() && motion.step != glm::dvec3(0);
+        const bool drags = motion.turn != glm::dvec2(0) || motion.slide != glm::dvec2(0) || motion.scroll != 0;
+        if (player_.isPlaying() && (steers || drags)) pausePath();
+        isMoving_ = steers || player_.isPlaying() || settings_.frame.draw.wind.strength > 0 || o_.frames > 0;
+        hasChanged_ = hasChanged_ || drags || !input.pressed.empty() || notices_.expire(nowSeconds());
+        navigation_.move(motion);
+        if (!input.isHidden) {
+            player_.advance(input.seconds);
+            settings_.frame.draw.wind.seconds += input.seconds;
+        }
+        if (!input.dropped.empty()) open(input.dropped);
+        const KeyRequests asked = applyKeys(input.pressed, settings_);
+        if (asked.pause) togglePath();
+        if (asked.fly) toggleFlying();
+        if (asked.colours)
+            if (const auto done = session_.nextColours(settings_.frame); !done) tell(done.error());
+        if (asked.up) turnUp();
+        wantsPicture_ = wantsPicture_ || asked.picture;
+        return !asked.quit;
+    }
+
+    Activity activity(const gpu::Input& input) {
+        streaming::Streamer& streamer = *session_.state().streamer;
+        const uint32_t inFlight = streamer.counters().inFlight;
+        streamer.collect();
+        Activity a;
+        a.isHidden = input.isHidden;
+        a.hasChanged = hasChanged_;
+        a.isMoving = isMoving_;
+        a.isStreaming = streamer.counters().inFlight > 0;
+        a.hasArrived = streamer.counters().inFlight != inFlight || (!a.isStreaming && !streamer.isIdle());
+        a.isOpening = opener_.isBusy();
+        a.untilNotice = notices_.untilNext(nowSeconds());
+        a.hasChanged = a.hasChanged || (a.isOpening && openingText() != shownOpening_);
+        return a;
+    }
+
+    std::string openingText() const {
+        return opener_.isBusy() ? fmt::format("opening {}: {:.0f} s", opener_.name(), opener_.seconds()) : "";
+    }
+
+    void pausePath() {
+        navigation_.setCamera(player_.camera());
+        player_.pause();
+    }
+    void togglePath() {
+        if (!player_.hasPath()) return tell("there is no camera path: start with --camera-path or --orbit");
+        if (player_.isPlaying())
+            pausePath();
+        else
+            player_.toggle();
+    }
+
+    double aspect() const { return static_cast<double>(std::max(1u, width_)) / std::max(1u, height_); }
+
+    /// Also what is drawn with depths, to find what is in the middle.
+    void toggleFlying() {
+        if (player_.isPlaying()) pausePath();
+        if (!navigation_.isFlying()) return navigation_.fly();
+        render::FrameSettings withDepth = settings_.frame;
+        withDepth.wantDepthAndNormal = true;
+        std::optional<double> depth;
+        if (const auto drawn = render::renderFrame(session_.state(), view(), withDepth); drawn)
+            depth = depthInTheMiddle(session_.state().image);
+        navigation_.orbit(depth, session_.focus());
+    }
+
+    void frameScene() {
+        const lod::StoreDescription& d = session_.scene().description;
+        navigation_ = Navigation(scene::fitCamera(d.focusMin, d.focusMax, d.up, aspect()), d.up, session_.diagonal());
+        hasChanged_ = true;
+    }
+
+    void turnUp() {
+        player_.pause();
+        session_.turnUp(settings_.frame);
+        frameScene();
+        const glm::dvec3 up = session_.scene().description.up;
+        tell(fmt::format("up is {0} now (--up {0})", up.x > 0.9 ? 'x' : up.y > 0.9 ? 'y' : 'z'));
+    }
+
+    void open(std::vector<std::string> inputs) {
+        if (opener_.isBusy()) return tell("still opening " + opener_.name());
+        opener_.start(std::move(inputs));
+        hasChanged_ = true;
+    }
+
+    void takeOpened() {
+        auto opened = opener_.take();
+        if (!opened) return;
+        hasChanged_ = true;
+        if (!*opened) return tell(opened->error());
+        if (const auto shown = session_.show(std::move(**opened), ColourOptions{}, settings_.frame); !shown)
+            return tell(shown.error());
+        player_ = PathPlayer();
+        frameScene();
+        window_.setTitle("Stipple: " + session_.scene().description.source);
+        tell("opened " + opener_.name());
+    }
+
+    lod::View view() const {
+        return scene::makeView(player_.isPlaying() ? player_.camera() : navigation_.camera(), std::max(1u, width_),
+                               std::max(1u, height_), nearPlaneOf(session_.scene()));
+    }
+
+    Result<bool> present(const gpu::Input& input, render::Image* capture) {
+        shownOpening_ = openingText();
+        const char* const hands = player_.isPlaying() ? "path" : navigation_.isFlying() ? "fly" : "orbit";
+        return window_.present(
+            session_.state().image,
+            [&] {
+                drawOverlay({session_.state(), settings_, session_.legend(), notices_, shownOpening_, hands, shownMs_,
+                             input.names});
+            },
+            capture);
+    }
+
+    Result<void> drawNext(const gpu::Input& input) {
+        hasChanged_ = false;
+        const auto drawn = render::renderFrame(session_.state(), view(), settings_.frame);
+        if (!drawn && drawn.error().kind == ErrorKind::device) return drawn;
+        if (std::exchange(wantsPicture_, false) && drawn) takePicture();
+        if (!drawn) tell(drawn.error());
+        if (session_.state().image.rgba.empty()) return {};
+        const double start = nowSeconds();
+        STIPPLE_ASSIGN(const bool shown, present(input, nullptr));
+        hasChanged_ = !shown;
+        shownMs_ = session_.state().counters.frameMs + (nowSeconds() - start) * 1e3;
+        return {};
+    }
+
+    /// With --frames: complete, and as it is shown.
+    Result<void> drawLast(const gpu::Input& input) {
+        STIPPLE_TRY(render::renderUntilComplete(session_.state(), view(), settings_.frame, executor_));
+        render::Image shot;
+        for (int tries = 0; tries < 50 && shot.rgba.empty(); ++tries)
+            STIPPLE_TRY(present(input, o_.screenshot.empty() ? nullptr : &shot));
+        if (o_.screenshot.empty()) return {};
+        if (shot.rgba.empty()) return fail(ErrorKind::device, "the window shows nothing", "--screenshot");
+        STIPPLE_TRY(image::writeImage(o_.screenshot, shot));
+        fmt::print("{}\n", o_.screenshot);
+        return {};
+    }
+
+    /// Of what is drawn, without what lies over it.
+    void takePicture() {
+        const render::FrameState& state = session_.state();
+        render::Image picture = state.image;
+        for (uint32_t& pixel : picture.rgba) pixel |= 0xff000000u;
+        const std::string path = freePictureName(pictures_);
+        if (const auto written = image::writeImage(path, picture); !written) return tell(written.error());
+        fmt::print("{}\n", path);
+        std::fflush(stdout);
+        tell(fmt::format("{}: {} x {}{}", path, picture.width, picture.height,
+                         state.cut.wanted.empty() ? "" : ", while more detail was on its way"));
+    }
+
+    const ViewOptions& o_;
+    gpu::Window& window_;
+    ViewSession& session_;
+    ViewSettings& settings_;
+    Executor& executor_;
+    SceneOpener opener_;
+    Navigation navigation_;
+    PathPlayer player_;
+    Notices notices_;
+    std::string shownOpening_;
+    uint32_t width_ = 0, height_ = 0;
+    double shownMs_ = 0;  ///< what the last frame took, with showing it
+    int frames_ = 0, pictures_ = 1;
+    bool hasChanged_ = true, isMoving_ = false, wantsPicture_ = false;
 };
 
-constexpr std::array<const char*, 5> kDebugNames{"none", "level", "screen-space error", "holes", "normals"};
-
-void drawOverlay(const render::FrameState& state, const render::FrameSettings& settings,
-                 const std::vector<render::PassTime>& passes, double frameSeconds, bool flying) {
-    const FrameCounters& c = state.counters;
-    ImGui::SetNextWindowPos(ImVec2(10, 10));
-    ImGui::SetNextWindowBgAlpha(0.7f);
-    ImGui::Begin("stipple", nullptr,
-                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove |
-                     ImGuiWindowFlags_NoNav);
-    ImGui::Text("%s: %s", state.backend->name().c_str(), state.backend->device().c_str());
-    ImGui::Text("%.1f ms a frame, %.1f ms with the window", c.frameMs, frameSeconds * 1e3);
-    for (const render::PassTime& p : passes) ImGui::Text("  %-8s %6.2f ms", p.name.c_str(), p.ms);
-    ImGui::Text("delivered error %.2f px (asked for %.2f)", c.tauEffectivePixels, settings.budgets.errorPixels);
-    ImGui::Text("%llu nodes, %llu missing, %u chunks on their way", static_cast<unsigned long long>(c.nodesDrawn),
-                static_cast<unsigned long long>(c.nodesMissing), static_cast<unsigned>(c.requestsInFlight));
-    const float used =
-        static_cast<float>(c.recordsDrawn + c.trianglesDrawn) / static_cast<float>(settings.budgets.records);
-    ImGui::ProgressBar(
-        used, ImVec2(300, 0),
-        fmt::format("{:.2f} M points, {:.2f} M triangles of {:.2f} M", static_cast<double>(c.recordsDrawn) * 1e-6,
-                    static_cast<double>(c.trianglesDrawn) * 1e-6, static_cast<double>(settings.budgets.records) * 1e-6)
-            .c_str());
-    ImGui::Text("resident %s", humanBytes(c.residentBytes).c_str());
-    ImGui::Text("debug view: %s", kDebugNames.at(settings.draw.debugView));
-    if (c.failures > 0) ImGui::TextColored(ImVec4(1, 0.4f, 0.3f, 1), "%s", state.streamer->lastFailure().c_str());
-    ImGui::Separator();
-    ImGui::TextUnformatted(flying ? "fly: W A S D Q E, drag to look, wheel: speed, Shift: faster"
-                                  : "orbit: drag, right drag: move, wheel: nearer");
-    ImGui::TextUnformatted(
-        "F fly/orbit  M mode  V debug view  L light  C colours  [1-9] error  P picture  Tab overlay  Esc quit");
-    ImGui::End();
+/// An orbit of N pictures takes as long as their film would; the path of a file is as fast as it says.
+Result<PathPlayer> makePlayer(const ViewOptions& o, const OpenedScene& scene, double aspect) {
+    constexpr int kKeys = 120;
+    CameraOptions camera = o.camera;
+    if (camera.orbit > 0) camera.orbit = kKeys;
+    STIPPLE_ASSIGN(std::optional<scene::CameraPath> path, makePath(camera, scene, aspect));
+    if (!path) return PathPlayer();
+    if (o.camera.orbit <= 0) return PathPlayer(std::move(*path), 1, false);
+    path->keys.push_back({static_cast<double>(kKeys), path->keys.front().camera});
+    return PathPlayer(std::move(*path), kKeys * path->fps / o.camera.orbit, true);
 }
 
-void drawLegendOverlay(const Legend& legend) {
-    if (legend.entries.empty()) return;
-    ImGui::SetNextWindowPos(ImVec2(10, ImGui::GetIO().DisplaySize.y - 10), ImGuiCond_Always, ImVec2(0, 1));
-    ImGui::SetNextWindowBgAlpha(0.7f);
-    ImGui::Begin("legend", nullptr,
-                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove |
-                     ImGuiWindowFlags_NoNav);
-    ImGui::TextUnformatted(legend.title.c_str());
-    const auto swatch = [](uint32_t rgb, float width, float height) {
-        const ImVec2 at = ImGui::GetCursorScreenPos();
-        ImGui::GetWindowDrawList()->AddRectFilled(at, ImVec2(at.x + width, at.y + height), rgb | 0xff000000u);
-    };
-    if (legend.bar.empty())
-        for (const LegendEntry& e : legend.entries) {
-            swatch(e.rgb, 13, 13);
-            ImGui::Indent(20);
-            ImGui::TextUnformatted(e.label.c_str());
-            ImGui::Unindent(20);
-        }
-    else {
-        ImGui::Dummy(ImVec2(1, 6));
-        const ImVec2 start = ImGui::GetCursorPos();
-        for (size_t j = legend.bar.size(); j-- > 0;) {
-            swatch(legend.bar[j], 13, 1);
-            ImGui::SetCursorPosY(ImGui::GetCursorPosY() + 1);
-        }
-        const float step = static_cast<float>(legend.bar.size()) / static_cast<float>(legend.entries.size() - 1);
-        for (size_t i = 0; i < legend.entries.size(); ++i) {
-            const float up = step * static_cast<float>(legend.entries.size() - 1 - i);
-            ImGui::SetCursorPos(ImVec2(start.x + 20, start.y + up - 7));
-            ImGui::TextUnformatted(legend.entries[i].label.c_str());
-        }
-    }
-    ImGui::End();
+Result<Navigation> makeNavigation(const ViewOptions& o, const ViewSession& session, double aspect) {
+    STIPPLE_ASSIGN(const scene::Camera camera, makeCamera(o.camera, session.scene(), aspect));
+    return Navigation(camera, o.camera.cameraUp.empty() ? session.scene().description.up : camera.up,
+                      session.diagonal());
 }
 
-/// Own colours, height, normals, then every attribute, and round again.
-std::string nextColour(const lod::ColourBy& now, const lod::StoreDescription& d) {
-    std::vector<std::string> names{"auto", "height"};
-    if (d.hasNormals) names.emplace_back("normal");
-    for (const lod::AttributeInfo& a : d.attributes) names.push_back(a.name);
-    size_t at = 0;
-    for (size_t i = 0; i < names.size(); ++i)
-        if (now.mode != lod::ColourMode::own && names[i] == now.title) at = i;
-    return names[(at + 1) % names.size()];
+/// Before any work.
+Result<void> checkScreenshot(const ViewOptions& o) {
+    if (o.screenshot.empty()) return {};
+    STIPPLE_TRY(image::checkImagePath(o.screenshot));
+    STIPPLE_TRY(image::checkModule(true));
+    std::vector<std::string> inputs = o.inputs;
+    inputs.insert(inputs.end(), {o.camera.path, o.environment.path});
+    return checkOutputs({{o.screenshot, FileKind::picture}}, inputs, o.force);
 }
 
-/// What the keys change. True if a picture is asked for.
-bool applyKeys(const std::string& pressed, render::FrameSettings& settings, Navigation& navigation, bool& overlay) {
-    bool picture = false;
-    for (const char key : pressed) {
-        if (key == 'F') navigation.toggleFly();
-        if (key == 'M')
-            settings.mode = settings.mode == render::Mode::pullpush ? render::Mode::points : render::Mode::pullpush;
-        if (key == 'V')
-            settings.draw.debugView = (settings.draw.debugView + 1) % static_cast<uint32_t>(kDebugNames.size());
-        if (key == 'L') {
-            settings.draw.lit = !settings.draw.lit;
-            settings.draw.unlitTriangles = !settings.draw.lit;
-        }
-        if (key == '\t') overlay = !overlay;
-        if (key == 'P') picture = true;
-        if (key >= '1' && key <= '9') settings.budgets.errorPixels = 0.25 * std::exp2(key - '1');
-    }
-    return picture;
-}
-
-Result<void> run(const Options& o) {
+Result<void> run(const ViewOptions& o) {
     STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
-    if (!o.screenshot.empty()) {
-        STIPPLE_TRY(image::checkImagePath(o.screenshot));
-        STIPPLE_TRY(image::checkModule(true));
-        std::vector<std::string> inputs = o.inputs;
-        inputs.push_back(o.environment.path);
-        STIPPLE_TRY(checkOutputs({{o.screenshot, FileKind::picture}}, inputs, o.force));
-    }
+    STIPPLE_TRY(o.camera.check());
+    STIPPLE_TRY(checkScreenshot(o));
     if (!gpu::hasDisplay())
         return fail(ErrorKind::device, "there is no display", "stipple view",
                     "use stipple render, or xvfb-run stipple view");
+    catchStopSignals();
     const auto executor = makeTbbExecutor(o.build.threads);
     STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, o.colour, *executor, true));
-    const lod::StoreDescription& d = scene.description;
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
-    STIPPLE_ASSIGN(
-        const std::unique_ptr<gpu::Window> window,
-        gpu::Window::create("Stipple: " + d.source, size.x, size.y, std::getenv("STIPPLE_VALIDATION") != nullptr));
-    streaming::StreamSettings stream;
-    stream.residentBytes = std::max<uint64_t>(1, parseBytes(o.resident));
-    STIPPLE_ASSIGN(lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
-    auto state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.crowds);
-    Legend legend = makeLegend(colour, d);
-    render::FrameSettings settings;
-    settings.budgets = {o.error, o.budget};
-    settings.draw.unlitTriangles = o.shade == "unlit";
-    settings.draw.lights = scene.lights;
-    STIPPLE_ASSIGN(settings.draw.environment, openEnvironment(o.environment.path, o.environment.scale, *executor));
-    settings.draw.lit = o.shade == "lit" || (o.shade == "auto" && isShaded(d) && colour.mode == lod::ColourMode::own);
-    settings.draw.worldUp = d.up;
-    settings.draw.wind = {o.wind, 0, render::windAcross(d.up)};
-    render::setSway(settings.draw.wind, state->hierarchies, state->instances);
-    const double diagonal = std::max(1e-300, glm::length(d.boundsMax - d.boundsMin));
-    Navigation navigation(scene::fitCamera(d.focusMin, d.focusMax, d.up, static_cast<double>(size.x) / size.y),
-                          diagonal);
-    bool overlay = true;
-    int pictures = 0;
-    for (int frame = 0;; ++frame) {
-        const gpu::Input input = window->poll();
-        const bool last = o.frames > 0 && frame + 1 >= o.frames;
-        if (input.shouldClose) break;
-        if (input.width == 0 || input.height == 0) continue;
-        const bool picture = applyKeys(input.pressed, settings, navigation, overlay);
-        if (input.pressed.find('C') != std::string::npos) {
-            STIPPLE_ASSIGN(colour, applyColours(scene, nextColour(colour, d), "", ""));
-            legend = makeLegend(colour, d);
-            state.reset();  // gives back what is resident
-            state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.crowds);
-            render::setSway(settings.draw.wind, state->hierarchies, state->instances);
-            settings.draw.lit = o.shade == "lit" || (colour.mode == lod::ColourMode::own && isShaded(d));
-        }
-        navigation.move(input);
-        settings.draw.wind.seconds += input.seconds;
-        const lod::View view = scene::makeView(navigation.camera(), input.width, input.height, 1e-6 * diagonal);
-        if (last) {
-            STIPPLE_TRY(render::renderUntilComplete(*state, view, settings, *executor));
-        } else {
-            STIPPLE_TRY(render::renderFrame(*state, view, settings));
-        }
-        render::Image shot;
-        const bool wantShot = picture || (last && !o.screenshot.empty());
-        STIPPLE_TRY(window->present(
-            state->image,
-            [&] {
-                if (overlay) drawOverlay(*state, settings, backend->passTimes(), input.seconds, navigation.isFlying());
-                if (overlay) drawLegendOverlay(legend);
-            },
-            wantShot ? &shot : nullptr));
-        if (wantShot && !shot.rgba.empty()) {
-            const std::string path =
-                last && !o.screenshot.empty() ? o.screenshot : fmt::format("stipple_{:03}.png", ++pictures);
-            STIPPLE_TRY(image::writeImage(path, shot));
-            fmt::print("{}\n", path);
-        }
-        if (last) break;
-    }
+    ViewSettings settings;
+    render::FrameSettings& frame = settings.frame;
+    frame.budgets = {o.error, o.budget};
+    frame.draw.unlitTriangles = o.shade == "unlit";
+    frame.draw.wind.strength = o.wind;
+    STIPPLE_ASSIGN(frame.draw.environment, openEnvironment(o.environment.path, o.environment.scale, *executor));
+    ViewSession session(o, *backend, *executor);
+    STIPPLE_TRY(session.show(std::move(scene), o.colour, frame));
+    const double aspect = static_cast<double>(size.x) / size.y;
+    STIPPLE_ASSIGN(Navigation navigation, makeNavigation(o, session, aspect));
+    STIPPLE_ASSIGN(PathPlayer player, makePlayer(o, session.scene(), aspect));
+    STIPPLE_ASSIGN(const std::unique_ptr<gpu::Window> window,
+                   gpu::Window::create("Stipple: " + session.scene().description.source, size.x, size.y,
+                                       std::getenv("STIPPLE_VALIDATION") != nullptr));
+    const auto result =
+        Viewer(o, *window, session, settings, *executor, std::move(navigation), std::move(player)).run();
     for (const std::string& message : window->validationMessages()) fmt::print(stderr, "validation: {}\n", message);
+    STIPPLE_TRY(result);
     if (!window->validationMessages().empty())
         return fail(ErrorKind::device, "the validation layers complained", "stipple view");
     return {};
@@ -217,7 +313,7 @@ Result<void> run(const Options& o) {
 }  // namespace
 
 void setupView(CLI::App& app, int& status) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<ViewOptions>();
     CLI::App* sub = app.add_subcommand("view", "walk through a scene in a window");
     sub->add_option("SCENE", o->inputs, "a .stipple scene, or scans (built into the cache first)")->required();
     sub->add_option("--size", o->size, "of the window, pixels")->capture_default_str();
@@ -238,9 +334,11 @@ void setupView(CLI::App& app, int& status) {
     sub->add_option("--frames", o->frames, "close after N frames (0: when the user does)")->capture_default_str();
     sub->add_option("--screenshot", o->screenshot, "with --frames: write what the last frame shows");
     addForce(*sub, o->force);
+    o->camera.addTo(*sub);
     o->colour.addTo(*sub);
     o->environment.addTo(*sub);
     o->build.addTo(*sub);
+    sub->footer(keyHelpText());
     sub->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());
     });

@@ -7,7 +7,10 @@
 #include <tbb/task_group.h>
 
 #include <atomic>
+#include <condition_variable>
 #include <deque>
+#include <mutex>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -46,6 +49,59 @@ class ThreadExecutor final : public Executor {
 };
 #endif
 
+/// Takes the tasks of run() where an arena has one thread: that one may be waiting for what they give.
+class SideThread {
+  public:
+    ~SideThread() {
+        {
+            const std::lock_guard lock(mutex_);
+            isOver_ = true;
+        }
+        changed_.notify_all();
+        if (thread_.joinable()) thread_.join();
+    }
+    void run(std::function<void()> task) {
+        if (!thread_.joinable()) try {
+                thread_ = std::thread([this] { work(); });
+            } catch (const std::system_error&) {  // there is none to be had: here and now, then
+                task();
+                return;
+            }
+        {
+            const std::lock_guard lock(mutex_);
+            tasks_.push_back(std::move(task));
+        }
+        changed_.notify_all();
+    }
+    void wait() {
+        std::unique_lock lock(mutex_);
+        changed_.wait(lock, [&] { return tasks_.empty() && !isBusy_; });
+    }
+
+  private:
+    void work() {
+        std::unique_lock lock(mutex_);
+        for (;;) {
+            changed_.wait(lock, [&] { return isOver_ || !tasks_.empty(); });
+            if (tasks_.empty()) return;
+            std::function<void()> task = std::move(tasks_.front());
+            tasks_.pop_front();
+            isBusy_ = true;
+            lock.unlock();
+            task();
+            task = nullptr;  // and what it holds
+            lock.lock();
+            isBusy_ = false;
+            changed_.notify_all();
+        }
+    }
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    std::deque<std::function<void()>> tasks_;
+    bool isBusy_ = false, isOver_ = false;
+    std::thread thread_;
+};
+
 class TbbExecutor final : public Executor {
   public:
     explicit TbbExecutor(int threads) : arena_(threads > 0 ? threads : tbb::task_arena::automatic) {
@@ -67,9 +123,13 @@ class TbbExecutor final : public Executor {
         });
     }
     void run(std::function<void()> task) override {
-        arena_.execute([&] { group_.run(std::move(task)); });
+        if (threads() == 1)
+            side_.run(std::move(task));
+        else
+            arena_.execute([&] { group_.run(std::move(task)); });
     }
     void wait() override {
+        side_.wait();
         arena_.execute([&] { group_.wait(); });
     }
     int threads() const override { return arena_.max_concurrency(); }
@@ -78,6 +138,7 @@ class TbbExecutor final : public Executor {
     std::unique_ptr<tbb::global_control> limit_;
     tbb::task_arena arena_;
     tbb::task_group group_;
+    SideThread side_;
 };
 
 class SerialExecutor final : public Executor {

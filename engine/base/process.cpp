@@ -16,6 +16,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "engine/base/stop.h"
+
 namespace stipple {
 
 uint64_t peakRssBytes() {
@@ -60,6 +62,7 @@ void catchStopSignals() {
     std::signal(SIGTERM, requestStop);
 }
 bool isStopRequested() { return stopRequested; }
+void askToStop() { stopRequested = true; }
 
 double millisecondsSinceProcessStart() {
     // Field 22 of /proc/self/stat: start time after boot, in clock ticks. The name (field 2) may hold spaces.

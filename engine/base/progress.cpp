@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "engine/base/process.h"
+#include "engine/base/text.h"
 
 namespace stipple {
 
@@ -22,11 +23,12 @@ void Progress::say(const std::string& line) {
     if (!enabled_) return;
     const std::lock_guard lock(mutex_);
     if (dirty_ && terminal_) std::fputs("\r\033[K", stderr);
+    const std::string shown = printable(line);
     if (terminal_) {
-        fmt::print(stderr, "{}\n", line);
+        fmt::print(stderr, "{}\n", shown);
     } else {
         std::string text;
-        for (const char c : line) text += c == '"' || c == '\\' ? std::string{'\\', c} : std::string{c};
+        for (const char c : shown) text += c == '"' || c == '\\' ? std::string{'\\', c} : std::string{c};
         fmt::print(stderr, "{{\"note\": \"{}\"}}\n", text);
     }
     dirty_ = false;

@@ -465,15 +465,16 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
         }
     }
     alignas(64) uint32_t ir[kTile], ig[kTile], ib[kTile];
+    // max(0, v) of what is no number is 0: these index a table.
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const bool valid = row.depth[kPad + i] > 0.0f;
         red[i] = valid ? red[i] : f.background.x;
         green[i] = valid ? green[i] : f.background.y;
         blue[i] = valid ? blue[i] : f.background.z;
-        ir[i] = uint(int(std::sqrt(min(max(red[i], 0.0f), 1.0f)) * 2047.0f + 0.5f));
-        ig[i] = uint(int(std::sqrt(min(max(green[i], 0.0f), 1.0f)) * 2047.0f + 0.5f));
-        ib[i] = uint(int(std::sqrt(min(max(blue[i], 0.0f), 1.0f)) * 2047.0f + 0.5f));
+        ir[i] = uint(int(std::sqrt(min(max(0.0f, red[i]), 1.0f)) * 2047.0f + 0.5f));
+        ig[i] = uint(int(std::sqrt(min(max(0.0f, green[i]), 1.0f)) * 2047.0f + 0.5f));
+        ib[i] = uint(int(std::sqrt(min(max(0.0f, blue[i]), 1.0f)) * 2047.0f + 0.5f));
     }
     const uint32_t* __restrict const byteOf = tables.srgbByte.data();
     uint32_t* __restrict const rgba = out.rgba;

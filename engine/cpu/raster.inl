@@ -173,6 +173,9 @@ vec3 cutEdge(vec3 a, float da, vec3 b, float db) {
 /// Clips against the near plane and four planes far outside the image, then takes the fan.
 void clipTriangle(const FrameConstants& f, const vec3* corner, const Candidate& of, const LargeSink& large,
                   uint64_t* visibility) {
+    // Corners that are no numbers would be neither in nor out, and make more of themselves at every plane.
+    for (int k = 0; k < 3; ++k)
+        if (!(std::fabs(corner[k].x) + std::fabs(corner[k].y) + std::fabs(corner[k].z) < 1.0e30f)) return;
     vec3 polygon[12] = {corner[0], corner[1], corner[2]}, other[12];
     int count = 3;
     const float slope = (kGuardPixels - 16384.0f) / f.focal;
@@ -203,8 +206,9 @@ void clipTriangle(const FrameConstants& f, const vec3* corner, const Candidate& 
     float inverse[12];
     for (int i = 0; i < count; ++i) {
         const float scale = f.focal / polygon[i].z;
-        x[i] = snapPixel(polygon[i].x * scale + f.centre.x);
-        y[i] = snapPixel(polygon[i].y * scale + f.centre.y);
+        const auto guarded = [](float p) { return min(max(-2.0f * kGuardPixels, p), 2.0f * kGuardPixels); };
+        x[i] = snapPixel(guarded(polygon[i].x * scale + f.centre.x));
+        y[i] = snapPixel(guarded(polygon[i].y * scale + f.centre.y));
         inverse[i] = 1.0f / polygon[i].z;
     }
     for (int i = 1; i + 1 < count; ++i) {

@@ -197,7 +197,7 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
         const vec2 perp = perpFromNormal(normal, vec3(ray.x * inverseRay, ray.y * inverseRay, inverseRay));
         perpX[i] = perp.x;
         perpY[i] = perp.y;
-        const auto byte = [](float value) { return uint32_t(int(min(max(value, 0.0f), 1.0f) * 255.0f + 0.5f)); };
+        const auto byte = [](float value) { return uint32_t(int(min(max(0.0f, value), 1.0f) * 255.0f + 0.5f)); };
         word[i] = s.flags[i] | byte(s.metallic[i]) | byte(s.roughness[i]) << 8 | byte(s.occlusion[i]) << 16;
     }
 #pragma GCC ivdep

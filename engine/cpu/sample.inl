@@ -9,6 +9,8 @@ struct SampledRow {
     alignas(64) float r[kTile], g[kTile], b[kTile];
     alignas(64) uint32_t isThere[kTile];
 };
+/// A texture coordinate that is a number: texels are indexed by it. (Comparisons with NaN are false.)
+[[gnu::always_inline]] inline float placed(float u) { return std::fabs(u) < 1.0e30f ? u : 0.0f; }
 /// Bilinear taps of one level and their four texels.
 struct TapRow {
     alignas(64) uint32_t tile[kTile], at[kTile];
@@ -78,8 +80,8 @@ void sampleRow(const TextureSet& set, const TextureSlot& slot, const UvRow& uv, 
     const vec3 rowU = slot.rowU, rowV = slot.rowV;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
-        u[i] = rowU.x * uv.u[first + i] + rowU.y * uv.v[first + i] + rowU.z;
-        v[i] = rowV.x * uv.u[first + i] + rowV.y * uv.v[first + i] + rowV.z;
+        u[i] = placed(rowU.x * uv.u[first + i] + rowU.y * uv.v[first + i] + rowU.z);
+        v[i] = placed(rowV.x * uv.u[first + i] + rowV.y * uv.v[first + i] + rowV.z);
         const float lod = min(textureLod(uv.footprint[first + i] * size), highest);
         level[i] = uint32_t(int(lod));
         between[i] = lod - float(int(level[i]));
@@ -134,8 +136,8 @@ void sampleRow(const TextureSet& set, const TextureSlot& slot, const UvRow& uv, 
 inline bool sampleAlpha(const TextureSet& set, const TextureSlot& slot, float u, float v, float footprint,
                         float& alpha) {
     const TextureInfo& info = set.infos[slot.texture - 1];
-    const float su = slot.rowU.x * u + slot.rowU.y * v + slot.rowU.z,
-                sv = slot.rowV.x * u + slot.rowV.y * v + slot.rowV.z;
+    const float su = placed(slot.rowU.x * u + slot.rowU.y * v + slot.rowU.z),
+                sv = placed(slot.rowV.x * u + slot.rowV.y * v + slot.rowV.z);
     const uint32_t size = info.width > info.height ? info.width : info.height;
     const float lod = min(textureLod(footprint * static_cast<float>(size)), static_cast<float>(info.levels - 1));
     const auto at = [&](uint32_t level, float& value) {

@@ -88,7 +88,7 @@ void layLines(const FrameConstants& frame, Lines& lines, size_t count) {
                     n1 = isBack ? lines.nearerA[i] : lines.nearerB[i];
         const float w0 = isBack ? lines.halfB[i] : lines.halfA[i], w1 = isBack ? lines.halfA[i] : lines.halfB[i];
         const float length = u1 - u0, slope = 1.0f / max(length, 1.0e-6f);
-        const float first = max(std::ceil(u0 - 0.5f), 0.0f);
+        const float first = max(0.0f, std::ceil(u0 - 0.5f));
         const float last = min(std::ceil(u1 - 0.5f) - 1.0f, (isSteep ? height : width) - 1.0f);
         const float tilt = (v1 - v0) * slope, longer = std::sqrt(1.0f + tilt * tilt);
         lines.start[i] = u0;
@@ -102,7 +102,7 @@ void layLines(const FrameConstants& frame, Lines& lines, size_t count) {
         lines.dHalf[i] = (w1 - w0) * slope;
         lines.isSteep[i] = isSteep ? 1.0f : 0.0f;
         lines.first[i] = int(min(first, 32767.0f));
-        const float pixels = length > 0.0f ? max(last - first + 1.0f, 0.0f) : 0.0f;
+        const float pixels = length > 0.0f ? max(0.0f, last - first + 1.0f) : 0.0f;
         lines.count[i] = int(min(pixels, 32767.0f));
         lines.longer[i] = longer;
         // Every vertex as a point: a segment that is seen along its axis has no line.
@@ -161,8 +161,10 @@ void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pix
 void fillStrand(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, uint64_t* visibility) {
     const float dx = s.xb - s.xa, dy = s.yb - s.ya, length2 = dx * dx + dy * dy;
     const float inverse2 = length2 > 1.0e-8f ? 1.0f / length2 : 0.0f;
-    const int top = int(max(min(s.ya, s.yb) - s.widest, float(firstRow))),
-              bottom = int(min(max(s.ya, s.yb) + s.widest, float(lastRow)));
+    // Whatever the numbers are, also if they are none, the loops stay inside the image.
+    const auto within = [](float v, float least, float most) { return int(min(max(least, v), most)); };
+    const int top = within(min(s.ya, s.yb) - s.widest, float(firstRow), float(lastRow) + 1.0f),
+              bottom = within(max(s.ya, s.yb) + s.widest, float(firstRow) - 1.0f, float(lastRow));
     const RibbonEdge a = s.edgeA, b = s.edgeB;
     const float nearPlane = f.nearPlane;
     for (int y = top; y <= bottom; ++y) {
@@ -176,7 +178,8 @@ void fillStrand(const FrameConstants& f, const WideStrand& s, int firstRow, int 
             from = min(x0, x1);
             to = max(x0, x1);
         }
-        const int left = int(max(from - s.widest, 0.0f)), right = int(min(to + s.widest, float(int(f.width)) - 1.0f));
+        const int left = within(from - s.widest, 0.0f, float(int(f.width))),
+                  right = within(to + s.widest, -1.0f, float(int(f.width)) - 1.0f);
         const float py = cy - s.ya;
         for (int x0 = left; x0 <= right; x0 += kStretch) {
             alignas(64) uint32_t depth[kStretch], keep[kStretch];

@@ -269,23 +269,13 @@ void Swapchain::recordFrame(const std::function<void(VkCommandBuffer)>& overlay,
                                VK_ACCESS_2_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_2_BOTTOM_OF_PIPE_BIT, 0));
 }
 
-Result<void> Swapchain::present(const render::Image& image, const std::function<void(VkCommandBuffer)>& overlay,
-                                render::Image* capture) {
-    if (image.width != canvasWidth_ || image.height != canvasHeight_)
-        STIPPLE_TRY(createCanvas(image.width, image.height));
-    std::memcpy(staging_.mapped(), image.rgba.data(), image.rgba.size() * 4);
-    uint32_t index = 0;
-    VkResult r = vkAcquireNextImageKHR(device_.device, swapchain_, ~uint64_t{0}, acquired_, VK_NULL_HANDLE, &index);
-    if (r == VK_ERROR_OUT_OF_DATE_KHR) return resize(image.width, image.height);  // the next frame shows again
-    if (r != VK_SUCCESS && r != VK_SUBOPTIMAL_KHR) return vulkanError(r, "no image from the swapchain");
-    STIPPLE_TRY(begin());
-    recordFrame(overlay, capture != nullptr, index);
-    vkEndCommandBuffer(commands_);
+/// VK_SUCCESS, or what submitting or presenting said.
+VkResult Swapchain::submitAndShow(uint32_t imageIndex) {
     VkSemaphoreSubmitInfo wait{VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO},
         signal{VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO};
     wait.semaphore = acquired_;
     wait.stageMask = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
-    signal.semaphore = rendered_[index];
+    signal.semaphore = rendered_[imageIndex];
     signal.stageMask = VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT;
     VkCommandBufferSubmitInfo buffer{VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO};
     buffer.commandBuffer = commands_;
@@ -294,25 +284,54 @@ Result<void> Swapchain::present(const render::Image& image, const std::function<
     info.pWaitSemaphoreInfos = &wait;
     info.pSignalSemaphoreInfos = &signal;
     info.pCommandBufferInfos = &buffer;
-    if (r = vkQueueSubmit2(device_.queue, 1, &info, fence_); r != VK_SUCCESS) return vulkanError(r, "cannot submit");
+    if (const VkResult r = vkQueueSubmit2(device_.queue, 1, &info, fence_); r != VK_SUCCESS) return r;
     VkPresentInfoKHR present{VK_STRUCTURE_TYPE_PRESENT_INFO_KHR};
     present.waitSemaphoreCount = present.swapchainCount = 1;
-    present.pWaitSemaphores = &rendered_[index];
+    present.pWaitSemaphores = &rendered_[imageIndex];
     present.pSwapchains = &swapchain_;
-    present.pImageIndices = &index;
-    r = vkQueuePresentKHR(device_.queue, &present);
-    vkWaitForFences(device_.device, 1, &fence_, VK_TRUE, ~uint64_t{0});
+    present.pImageIndices = &imageIndex;
+    const VkResult shown = vkQueuePresentKHR(device_.queue, &present);
+    const VkResult waited = vkWaitForFences(device_.device, 1, &fence_, VK_TRUE, ~uint64_t{0});
     vkResetFences(device_.device, 1, &fence_);
-    if (capture) {
-        capture->width = canvasWidth_;
-        capture->height = canvasHeight_;
-        capture->rgba.resize(size_t{canvasWidth_} * canvasHeight_);
-        std::memcpy(capture->rgba.data(), readback_.mapped(), capture->rgba.size() * 4);
-        for (uint32_t& p : capture->rgba) p |= 0xff000000u;
+    return waited != VK_SUCCESS ? waited : shown;
+}
+
+void Swapchain::takeCapture(render::Image& capture) const {
+    capture.width = canvasWidth_;
+    capture.height = canvasHeight_;
+    capture.rgba.resize(size_t{canvasWidth_} * canvasHeight_);
+    std::memcpy(capture.rgba.data(), readback_.mapped(), capture.rgba.size() * 4);
+    for (uint32_t& p : capture.rgba) p |= 0xff000000u;
+}
+
+Result<bool> Swapchain::present(const render::Image& image, const std::function<void(VkCommandBuffer)>& overlay,
+                                render::Image* capture) {
+    // Drivers need not say that the window has another size by now, so it is not left to them.
+    if (image.width != extent_.width || image.height != extent_.height) STIPPLE_TRY(resize(image.width, image.height));
+    if (extent_.width == 0 || extent_.height == 0) return false;  // minimised
+    if (image.width != canvasWidth_ || image.height != canvasHeight_)
+        STIPPLE_TRY(createCanvas(image.width, image.height));
+    std::memcpy(staging_.mapped(), image.rgba.data(), image.rgba.size() * 4);
+    constexpr uint64_t kPatienceNs = 200'000'000;  // a window that is not seen may give no image for ever
+    uint32_t index = 0;
+    VkResult r = vkAcquireNextImageKHR(device_.device, swapchain_, kPatienceNs, acquired_, VK_NULL_HANDLE, &index);
+    if (r == VK_TIMEOUT || r == VK_NOT_READY) return false;
+    if (r == VK_ERROR_OUT_OF_DATE_KHR) {
+        STIPPLE_TRY(resize(image.width, image.height));
+        return false;
     }
-    if (r == VK_ERROR_OUT_OF_DATE_KHR || r == VK_SUBOPTIMAL_KHR) return resize(image.width, image.height);
+    if (r != VK_SUCCESS && r != VK_SUBOPTIMAL_KHR) return vulkanError(r, "no image from the swapchain");
+    STIPPLE_TRY(begin());
+    recordFrame(overlay, capture != nullptr, index);
+    vkEndCommandBuffer(commands_);
+    r = submitAndShow(index);
+    if (capture) takeCapture(*capture);
+    if (r == VK_ERROR_OUT_OF_DATE_KHR || r == VK_SUBOPTIMAL_KHR) {
+        STIPPLE_TRY(resize(image.width, image.height));
+        return r == VK_SUBOPTIMAL_KHR;
+    }
     if (r != VK_SUCCESS) return vulkanError(r, "cannot present");
-    return {};
+    return true;
 }
 
 }  // namespace stipple::gpu

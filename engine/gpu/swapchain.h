@@ -19,7 +19,8 @@ class Swapchain {
     Swapchain& operator=(const Swapchain&) = delete;
     Result<void> resize(uint32_t width, uint32_t height);
     VkRenderPass renderPass() const { return renderPass_; }
-    Result<void> present(const render::Image& image, const std::function<void(VkCommandBuffer)>& overlay,
+    /// A swapchain of another size than the image is made anew first. False if it could not be shown now.
+    Result<bool> present(const render::Image& image, const std::function<void(VkCommandBuffer)>& overlay,
                          render::Image* capture);
     /// Records and runs commands at once.
     Result<void> runOnce(const std::function<void(VkCommandBuffer)>& record);
@@ -31,6 +32,8 @@ class Swapchain {
     Result<void> createRenderPass();
     void recordFrame(const std::function<void(VkCommandBuffer)>& overlay, bool capture, uint32_t imageIndex);
     Result<void> begin();
+    VkResult submitAndShow(uint32_t imageIndex);
+    void takeCapture(render::Image& capture) const;
 
     const Device& device_;
     VkSurfaceKHR surface_;

@@ -8,7 +8,11 @@
 #include <imgui_impl_vulkan.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <glm/vec2.hpp>
+#include <string_view>
+#include <utility>
 
 #include "engine/base/process.h"
 #include "engine/gpu/device.h"
@@ -25,19 +29,37 @@ std::string lastGlfwError() {
 
 struct InputState {
     double scroll = 0;
+    bool isIconified = false, isStale = true;
     std::string pressed;
+    std::vector<std::string> dropped;
 };
+InputState& stateOf(GLFWwindow* window) { return *static_cast<InputState*>(glfwGetWindowUserPointer(window)); }
 
-void onScroll(GLFWwindow* window, double, double y) {
-    static_cast<InputState*>(glfwGetWindowUserPointer(window))->scroll += y;
+std::string_view printedOn(int key, int scancode) {
+    const char* const name = glfwGetKeyName(key, scancode);
+    return name ? name : "";
 }
-void onKey(GLFWwindow* window, int key, int, int action, int) {
-    if (action != GLFW_PRESS) return;
-    auto* state = static_cast<InputState*>(glfwGetWindowUserPointer(window));
-    if (key >= GLFW_KEY_0 && key <= GLFW_KEY_Z) state->pressed += static_cast<char>(key);
-    if (key == GLFW_KEY_TAB) state->pressed += '\t';
-    if (key == GLFW_KEY_ESCAPE) state->pressed += char{27};
+
+/// With Ctrl, Alt or Super a key is somebody else's command, not ours.
+constexpr int kForeign = GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER;
+
+void onScroll(GLFWwindow* window, double, double y) { stateOf(window).scroll += y; }
+void onKey(GLFWwindow* window, int key, int scancode, int action, int modifiers) {
+    if (action != GLFW_PRESS || (modifiers & kForeign) != 0) return;
+    std::string& pressed = stateOf(window).pressed;
+    if (key >= GLFW_KEY_KP_0 && key <= GLFW_KEY_KP_9) pressed += static_cast<char>('0' + key - GLFW_KEY_KP_0);
+    if (key == GLFW_KEY_TAB) pressed += '\t';
+    if (key == GLFW_KEY_ESCAPE) pressed += char{27};
+    if (key == GLFW_KEY_SPACE) pressed += ' ';
+    if (key == GLFW_KEY_F1) pressed += 'H';
+    if (key > GLFW_KEY_SPACE && key <= GLFW_KEY_WORLD_2)
+        if (const char command = commandOf(key, printedOn(key, scancode)); command != 0) pressed += command;
 }
+void onDrop(GLFWwindow* window, int count, const char** paths) {
+    stateOf(window).dropped.insert(stateOf(window).dropped.end(), paths, paths + count);
+}
+void onIconify(GLFWwindow* window, int iconified) { stateOf(window).isIconified = iconified != 0; }
+void onRefresh(GLFWwindow* window) { stateOf(window).isStale = true; }
 
 class WindowImpl final : public Window {
   public:
@@ -70,6 +92,9 @@ class WindowImpl final : public Window {
         glfwSetWindowUserPointer(window_, &inputState_);
         glfwSetScrollCallback(window_, onScroll);
         glfwSetKeyCallback(window_, onKey);
+        glfwSetDropCallback(window_, onDrop);
+        glfwSetWindowIconifyCallback(window_, onIconify);
+        glfwSetWindowRefreshCallback(window_, onRefresh);
         uint32_t count = 0;
         const char** extensions = glfwGetRequiredInstanceExtensions(&count);
         if (!extensions)
@@ -85,44 +110,40 @@ class WindowImpl final : public Window {
         return setupImgui();
     }
 
-    Input poll() override {
+    Input poll(double waitSeconds) override {
         inputState_.scroll = 0;
         inputState_.pressed.clear();
-        glfwPollEvents();
+        inputState_.dropped.clear();
+        if (waitSeconds > 0)
+            glfwWaitEventsTimeout(waitSeconds);
+        else
+            glfwPollEvents();
         Input in;
-        int w = 0, h = 0;
-        glfwGetFramebufferSize(window_, &w, &h);
-        in.width = static_cast<uint32_t>(w);
-        in.height = static_cast<uint32_t>(h);
         const double now = nowSeconds();
-        in.seconds = lastPoll_ > 0 ? now - lastPoll_ : 0;
+        in.seconds = lastPoll_ > 0 && waitSeconds <= 0 ? now - lastPoll_ : 0;
         lastPoll_ = now;
-        glfwGetCursorPos(window_, &in.mouseX, &in.mouseY);
-        in.mouseDeltaX = in.mouseX - lastX_;
-        in.mouseDeltaY = in.mouseY - lastY_;
-        lastX_ = in.mouseX;
-        lastY_ = in.mouseY;
-        const bool overlayWantsMouse = ImGui::GetIO().WantCaptureMouse;
-        const auto key = [&](int k) { return glfwGetKey(window_, k) == GLFW_PRESS; };
-        in.leftButton = !overlayWantsMouse && glfwGetMouseButton(window_, GLFW_MOUSE_BUTTON_LEFT) == GLFW_PRESS;
-        in.rightButton = !overlayWantsMouse && glfwGetMouseButton(window_, GLFW_MOUSE_BUTTON_RIGHT) == GLFW_PRESS;
-        in.scroll = overlayWantsMouse ? 0 : inputState_.scroll;
-        in.forward = key(GLFW_KEY_W);
-        in.back = key(GLFW_KEY_S);
-        in.left = key(GLFW_KEY_A);
-        in.right = key(GLFW_KEY_D);
-        in.up = key(GLFW_KEY_E);
-        in.down = key(GLFW_KEY_Q);
-        in.fast = key(GLFW_KEY_LEFT_SHIFT);
-        in.pressed = inputState_.pressed;
-        in.shouldClose = glfwWindowShouldClose(window_) != 0 || in.pressed.find(char{27}) != std::string::npos;
+        readMouse(in);
+        readKeys(in);
+        // An iconified window keeps its size under X11; other systems say 0 x 0.
+        in.isHidden = inputState_.isIconified || in.width == 0 || in.height == 0 ||
+                      glfwGetWindowAttrib(window_, GLFW_VISIBLE) == GLFW_FALSE;
+        if (in.isHidden) inputState_.isStale = true;
+        in.isStale = std::exchange(inputState_.isStale, in.isHidden);
+        in.shouldClose = glfwWindowShouldClose(window_) != 0;
         return in;
     }
 
-    Result<void> present(const render::Image& image, const std::function<void()>& drawOverlay,
+    Result<bool> present(const render::Image& image, const std::function<void()>& drawOverlay,
                          render::Image* capture) override {
+        fitImgui(image);
         ImGui_ImplVulkan_NewFrame();
         ImGui_ImplGlfw_NewFrame();
+        // Twice: the first time finds how large the text is, and what is new is not shown yet. With frames drawn only
+        // when something changes, there may be no next one for it to appear in.
+        ImGui::NewFrame();
+        drawOverlay();
+        ImGui::EndFrame();
+        ImGui::GetIO().DeltaTime = 1e-3f;
         ImGui::NewFrame();
         drawOverlay();
         ImGui::Render();
@@ -130,9 +151,77 @@ class WindowImpl final : public Window {
             image, [](VkCommandBuffer c) { ImGui_ImplVulkan_RenderDrawData(ImGui::GetDrawData(), c); }, capture);
     }
 
+    void setTitle(const std::string& title) override { glfwSetWindowTitle(window_, title.c_str()); }
+
     std::vector<std::string> validationMessages() const override { return device_->messages(); }
 
   private:
+    /// Pixels of the framebuffer for one unit of the window's coordinates: not 1 where the system scales windows.
+    glm::dvec2 pixelsPerUnit(int framebufferWidth, int framebufferHeight) const {
+        int w = 0, h = 0;
+        glfwGetWindowSize(window_, &w, &h);
+        return {w > 0 ? static_cast<double>(framebufferWidth) / w : 1.0,
+                h > 0 ? static_cast<double>(framebufferHeight) / h : 1.0};
+    }
+
+    void readMouse(Input& in) {
+        int w = 0, h = 0;
+        glfwGetFramebufferSize(window_, &w, &h);
+        in.width = static_cast<uint32_t>(w);
+        in.height = static_cast<uint32_t>(h);
+        const glm::dvec2 scale = pixelsPerUnit(w, h);
+        glfwGetCursorPos(window_, &in.mouseX, &in.mouseY);
+        in.mouseX *= scale.x;
+        in.mouseY *= scale.y;
+        in.mouseDeltaX = in.mouseX - lastX_;
+        in.mouseDeltaY = in.mouseY - lastY_;
+        lastX_ = in.mouseX;
+        lastY_ = in.mouseY;
+        const bool overlayWantsMouse = ImGui::GetIO().WantCaptureMouse;  // only where something can be clicked
+        const auto button = [&](int b) { return !overlayWantsMouse && glfwGetMouseButton(window_, b) == GLFW_PRESS; };
+        in.leftButton = button(GLFW_MOUSE_BUTTON_LEFT);
+        in.rightButton = button(GLFW_MOUSE_BUTTON_RIGHT);
+        in.scroll = overlayWantsMouse ? 0 : inputState_.scroll;
+    }
+
+    void readKeys(Input& in) {
+        const auto key = [&](int k) { return glfwGetKey(window_, k) == GLFW_PRESS; };
+        const auto either = [&](int left, int right) { return key(left) || key(right); };
+        const bool foreign = either(GLFW_KEY_LEFT_CONTROL, GLFW_KEY_RIGHT_CONTROL) ||
+                             either(GLFW_KEY_LEFT_ALT, GLFW_KEY_RIGHT_ALT) ||
+                             either(GLFW_KEY_LEFT_SUPER, GLFW_KEY_RIGHT_SUPER);
+        constexpr std::array<int, kSteerCount> arrows{GLFW_KEY_UP,    GLFW_KEY_LEFT,      GLFW_KEY_DOWN,
+                                                      GLFW_KEY_RIGHT, GLFW_KEY_PAGE_DOWN, GLFW_KEY_PAGE_UP};
+        for (size_t i = 0; i < kSteerCount; ++i) {
+            const int position = kSteerPositions[i];
+            in.held[i] = !foreign && key(position);
+            in.arrows[i] = !foreign && key(arrows[i]);
+            in.names[i] = nameOf(position, printedOn(position, 0));
+        }
+        in.fast = either(GLFW_KEY_LEFT_SHIFT, GLFW_KEY_RIGHT_SHIFT);
+        in.pressed = inputState_.pressed;
+        in.dropped = inputState_.dropped;
+    }
+
+    /// Letters of the size that the desktop asks for. ImGui counts in the window's units, fonts are made in pixels.
+    void scaleImgui() {
+        float x = 1, y = 1;
+        glfwGetWindowContentScale(window_, &x, &y);
+        contentScale_ = std::clamp(x, 0.5f, 8.0f);
+        ImFontConfig font;
+        font.SizePixels = std::round(13 * contentScale_);
+        ImGui::GetIO().Fonts->AddFontDefault(&font);
+    }
+
+    /// Smaller letters where the window is too small for what they say, but never below those of a plain screen.
+    void fitImgui(const render::Image& image) {
+        const float fits = std::min(static_cast<float>(image.width) / 640, static_cast<float>(image.height) / 400);
+        const float wanted = std::clamp(fits, std::min(1.0f, contentScale_), contentScale_);
+        const auto pixels =
+            static_cast<float>(pixelsPerUnit(static_cast<int>(image.width), static_cast<int>(image.height)).x);
+        ImGui::GetIO().FontGlobalScale = wanted / contentScale_ / pixels;
+    }
+
     Result<void> setupImgui() {
         const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 4};
         VkDescriptorPoolCreateInfo pool{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
@@ -144,6 +233,7 @@ class WindowImpl final : public Window {
             return vulkanError(r, "no descriptor pool");
         ImGui::CreateContext();
         ImGui::GetIO().IniFilename = nullptr;
+        scaleImgui();
         ImGui_ImplGlfw_InitForVulkan(window_, true);
         ImGui_ImplVulkan_InitInfo info{};
         info.Instance = device_->instance;
@@ -168,6 +258,7 @@ class WindowImpl final : public Window {
     std::unique_ptr<Swapchain> swapchain_;
     VkDescriptorPool imguiPool_ = VK_NULL_HANDLE;
     InputState inputState_;
+    float contentScale_ = 1;
     double lastPoll_ = 0, lastX_ = 0, lastY_ = 0;
     bool imguiReady_ = false;
 };

@@ -2,12 +2,16 @@
 
 #include <dlfcn.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 
 #include "engine/base/file.h"
+#include "engine/base/process.h"
 #include "engine/image/oiio_module.h"
 
 namespace stipple::image {
@@ -118,65 +122,139 @@ Result<void> writeImage(const std::string& path, const render::Image& image) {
 
 namespace {
 
-/// Size first, then pixels: `call` is either way to read.
-template <typename Call>
-Result<render::Image> readWith(const std::string& name, Call call) {
-    if (!module().read) return fail(ErrorKind::input, "the picture module cannot be loaded: " + module().problem, name);
+/// What stands at the beginning of a picture, and what it can be at most.
+struct Promise {
+    const char* format = "png";
+    uint64_t bytes = 0;  ///< of the file
+    double mostPixels = HUGE_VAL;
+};
+
+Promise promiseOf(const uint8_t* head, size_t count, uint64_t fileBytes) {
+    const auto begins = [&](const char* with, size_t at = 0) {
+        const size_t n = std::strlen(with);
+        return count >= at + n && std::memcmp(head + at, with, n) == 0;
+    };
+    const auto bytes = static_cast<double>(fileBytes);
+    // Deflate makes at most 1032 bytes of one, with 8 pixels each; an MCU of a JPEG takes six bits at least (and is
+    // given some more leave); a row of an HDR file four bytes.
+    if (begins("\xff\xd8")) return {"jpeg", fileBytes, 4000 * bytes};
+    if (begins("WEBP", 8)) return {"webp", fileBytes, HUGE_VAL};
+    if (begins("#?")) return {"hdr", fileBytes, static_cast<double>(int64_t{1} << 18) * bytes / 4};
+    if (begins("\x89PNG")) return {"png", fileBytes, 8 * 1032 * bytes};
+    return {"png", fileBytes, HUGE_VAL};
+}
+
+/// Is a picture of this size possible, and is there memory for `bytesOfPixel` of each pixel and once more for who
+/// decodes it?
+Result<void> checkSize(int64_t width, int64_t height, uint64_t bytesOfPixel, const Promise& promise,
+                       const std::string& name, uint64_t memoryBytes) {
+    constexpr int64_t kWidest = int64_t{1} << 18;
+    if (width <= 0 || height <= 0 || width > kWidest || height > kWidest)
+        return fail(ErrorKind::input, fmt::format("has an impossible size: {}x{}", width, height), name);
+    if (static_cast<double>(width) * static_cast<double>(height) > promise.mostPixels)
+        return fail(ErrorKind::input,
+                    fmt::format("says that it is {}x{}, which {} bytes cannot be", width, height, promise.bytes), name,
+                    "is it a whole picture?");
+    const uint64_t needed = static_cast<uint64_t>(width * height) * bytesOfPixel * 2;
+    if (needed <= memoryBytes) return {};
+    return fail(ErrorKind::budget,
+                fmt::format("a picture of {}x{} takes about {}, but {} are left for it", width, height,
+                            humanBytes(needed), humanBytes(memoryBytes)),
+                name, "give more --memory, or make the picture smaller");
+}
+
+/// WebP files are decoded when they are opened: their size is read here. (RFC 9649; 0: not known)
+glm::ivec2 webpSize(const std::vector<uint8_t>& b) {
+    const auto is = [&](const char* form) { return std::memcmp(b.data() + 12, form, 4) == 0; };
+    const auto word = [&](size_t at, int bytes) {
+        int v = 0;
+        for (int k = 0; k < bytes; ++k) v |= static_cast<int>(b[at + static_cast<size_t>(k)]) << (8 * k);
+        return v;
+    };
+    if (b.size() < 30) return glm::ivec2(0);
+    if (is("VP8X")) return {word(24, 3) + 1, word(27, 3) + 1};
+    if (is("VP8L")) return {(word(21, 2) & 0x3fff) + 1, (word(22, 3) >> 6 & 0x3fff) + 1};
+    if (is("VP8 ")) return {word(26, 2) & 0x3fff, word(28, 2) & 0x3fff};
+    return glm::ivec2(0);
+}
+
+/// Size first, then pixels: `call` is either way to read. `make` gives room for them.
+template <typename Pixel, typename Call, typename Make>
+Result<void> readWith(const std::string& name, const Promise& promise, uint64_t bytesOfPixel, uint64_t memoryBytes,
+                      const Call& call, const Make& make) {
     std::array<char, 512> error{};
     int width = 0, height = 0;
-    const auto bad = [&] {
+    const auto read = [&](Pixel* pixels) -> Result<void> {
+        const int status = call(&width, &height, pixels, error.data(), static_cast<int>(error.size()));
+        if (status == 0) return {};
+        if (status == kStippleOiioNoMemory)
+            return fail(ErrorKind::budget, "does not fit in memory", name, "close other programs, or make it smaller");
         const std::string text = error.data();
         return fail(ErrorKind::input, "cannot be read: " + text.substr(0, text.find('\n')), name,
                     "is it a whole picture?");
     };
-    if (call(&width, &height, nullptr, error.data(), static_cast<int>(error.size())) != 0) return bad();
-    if (width <= 0 || height <= 0 || int64_t{width} * height > int64_t{1} << 30)
-        return fail(ErrorKind::input, "has an impossible size", name);
+    STIPPLE_TRY(read(nullptr));
+    STIPPLE_TRY(checkSize(width, height, bytesOfPixel, promise, name, memoryBytes));
+    return read(make(static_cast<uint32_t>(width), static_cast<uint32_t>(height)));
+}
+
+template <typename Call>
+Result<render::Image> readRgba(const std::string& name, const Promise& promise, uint64_t memoryBytes,
+                               const Call& call) {
+    if (!module().read) return fail(ErrorKind::input, "the picture module cannot be loaded: " + module().problem, name);
     render::Image image;
-    image.width = static_cast<uint32_t>(width);
-    image.height = static_cast<uint32_t>(height);
-    image.rgba.resize(size_t{image.width} * image.height);
-    auto* pixels = reinterpret_cast<unsigned char*>(image.rgba.data());
-    if (call(&width, &height, pixels, error.data(), static_cast<int>(error.size())) != 0) return bad();
+    STIPPLE_TRY((readWith<unsigned char>(name, promise, 4, memoryBytes, call, [&](uint32_t w, uint32_t h) {
+        image.width = w;
+        image.height = h;
+        image.rgba.resize(size_t{w} * h);
+        return reinterpret_cast<unsigned char*>(image.rgba.data());
+    })));
     return image;
+}
+
+/// Of a regular file (the library would wait for ever at a FIFO).
+Result<Promise> promiseOfFile(const std::string& path) {
+    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
+    std::array<uint8_t, 64> head{};
+    const auto count = static_cast<size_t>(std::min<uint64_t>(head.size(), file.sizeBytes()));
+    if (count == 0) return fail(ErrorKind::input, "is empty", path, "is the download complete?");
+    STIPPLE_TRY(file.readAt(0, head.data(), count));
+    return promiseOf(head.data(), count, file.sizeBytes());
 }
 
 }  // namespace
 
-Result<render::Image> readImage(const std::string& path) {
-    return readWith(path, [&](int* w, int* h, unsigned char* pixels, char* error, int bytes) {
+Result<render::Image> readImage(const std::string& path, uint64_t memoryBytes) {
+    STIPPLE_ASSIGN(const Promise promise, promiseOfFile(path));
+    return readRgba(path, promise, memoryBytes, [&](int* w, int* h, unsigned char* pixels, char* error, int bytes) {
         return module().read(path.c_str(), w, h, pixels, error, bytes);
     });
 }
 
-Result<render::Image> decodeImage(const std::vector<uint8_t>& bytes, const std::string& name) {
-    const bool isJpeg = bytes.size() > 2 && bytes[0] == 0xff && bytes[1] == 0xd8;
-    const bool isWebp = bytes.size() > 11 && std::memcmp(bytes.data() + 8, "WEBP", 4) == 0;
-    const char* const format = isJpeg ? "jpeg" : isWebp ? "webp" : "png";
-    return readWith(name, [&](int* w, int* h, unsigned char* pixels, char* error, int count) {
-        return module().decode(format, bytes.data(), bytes.size(), w, h, pixels, error, count);
+Result<render::Image> decodeImage(const std::vector<uint8_t>& bytes, const std::string& name, uint64_t memoryBytes) {
+    const Promise promise = promiseOf(bytes.data(), bytes.size(), bytes.size());
+    if (std::strcmp(promise.format, "webp") == 0)
+        if (const glm::ivec2 size = webpSize(bytes); size.x > 0)
+            STIPPLE_TRY(checkSize(size.x, size.y, 4, promise, name, memoryBytes));
+    return readRgba(name, promise, memoryBytes, [&](int* w, int* h, unsigned char* pixels, char* error, int count) {
+        return module().decode(promise.format, bytes.data(), bytes.size(), w, h, pixels, error, count);
     });
 }
 
-Result<render::HdrImage> readHdr(const std::string& path) {
+Result<render::HdrImage> readHdr(const std::string& path, uint64_t memoryBytes) {
+    STIPPLE_ASSIGN(const Promise promise, promiseOfFile(path));
     if (!module().readFloat)
         return fail(ErrorKind::input, "the picture module cannot be loaded: " + module().problem, path);
-    std::array<char, 512> error{};
-    int width = 0, height = 0;
-    const auto bad = [&] {
-        const std::string text = error.data();
-        return fail(ErrorKind::input, "cannot be read: " + text.substr(0, text.find('\n')), path,
-                    "is it a whole picture?");
-    };
-    const auto bytes = static_cast<int>(error.size());
-    if (module().readFloat(path.c_str(), &width, &height, nullptr, error.data(), bytes) != 0) return bad();
-    if (width <= 0 || height <= 0 || int64_t{width} * height > int64_t{1} << 28)
-        return fail(ErrorKind::input, "has an impossible size", path);
     render::HdrImage image;
-    image.width = static_cast<uint32_t>(width);
-    image.height = static_cast<uint32_t>(height);
-    image.rgb.resize(size_t{image.width} * image.height * 3);
-    if (module().readFloat(path.c_str(), &width, &height, image.rgb.data(), error.data(), bytes) != 0) return bad();
+    const auto call = [&](int* w, int* h, float* pixels, char* error, int bytes) {
+        return module().readFloat(path.c_str(), w, h, pixels, error, bytes);
+    };
+    STIPPLE_TRY((readWith<float>(path, promise, 3 * sizeof(float), memoryBytes, call, [&](uint32_t w, uint32_t h) {
+        image.width = w;
+        image.height = h;
+        image.rgb.resize(size_t{w} * h * 3);
+        return image.rgb.data();
+    })));
     return image;
 }
 

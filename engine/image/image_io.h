@@ -13,12 +13,16 @@ namespace stipple::image {
 Result<void> writeImage(const std::string& path, const render::Image& image);
 /// The bytes that writeImage would write to `path`.
 Result<std::vector<char>> encodeImage(const std::string& path, const render::Image& image);
+/// Memory that reading a picture may take, where nobody says. The size that a picture claims is checked against it, and
+/// against the bytes that are there, before anything is allocated.
+constexpr uint64_t kPictureMemory = uint64_t{4} << 30;
 /// 8-bit RGBA; files without alpha are opaque.
-Result<render::Image> readImage(const std::string& path);
+Result<render::Image> readImage(const std::string& path, uint64_t memoryBytes = kPictureMemory);
 /// Decodes an image that stands in memory (PNG, JPEG, ...); `name` is for messages.
-Result<render::Image> decodeImage(const std::vector<uint8_t>& bytes, const std::string& name);
+Result<render::Image> decodeImage(const std::vector<uint8_t>& bytes, const std::string& name,
+                                  uint64_t memoryBytes = kPictureMemory);
 /// Linear floats, e.g. of .hdr and .exr.
-Result<render::HdrImage> readHdr(const std::string& path);
+Result<render::HdrImage> readHdr(const std::string& path, uint64_t memoryBytes = kPictureMemory);
 /// Is there what reads and writes pictures? Where `load` is given, by loading it.
 Result<void> checkModule(bool load);
 /// Can this extension be written? An error that names those that can, if not.

@@ -3,8 +3,10 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -35,12 +37,34 @@ extern "C" int stippleOiioEncode(const char* path, int width, int height, int ch
             return report(out->geterror(), error, errorBytes);
         sink(user, file.buffer().data(), file.buffer().size());
         return 0;
+    } catch (const std::bad_alloc&) {
+        return kStippleOiioNoMemory;
     } catch (const std::exception& e) {
         return report(e.what(), error, errorBytes);
     }
 }
 
 namespace {
+
+/// Calls use(first pixel, values, number of pixels) from top to bottom, with the first `channels` channels; a few rows
+/// at a time (of tiled files as many as a tile is high), so that nothing else of the picture's size is held here.
+template <typename T, typename Use>
+bool forRows(OIIO::ImageInput& in, OIIO::TypeDesc type, int channels, const Use& use) {
+    const OIIO::ImageSpec& spec = in.spec();
+    const int step = spec.tile_height > 0 ? spec.tile_height : 16;
+    const auto width = static_cast<size_t>(spec.width);
+    std::vector<T> rows(width * static_cast<size_t>(channels) * static_cast<size_t>(std::min(step, spec.height)));
+    for (int y = 0; y < spec.height; y += step) {
+        const int first = spec.y + y, last = spec.y + std::min(y + step, spec.height);
+        const bool isRead =
+            spec.tile_width > 0
+                ? in.read_tiles(0, 0, spec.x, spec.x + spec.width, first, last, 0, 1, 0, channels, type, rows.data())
+                : in.read_scanlines(0, 0, first, last, 0, 0, channels, type, rows.data());
+        if (!isRead) return false;
+        use(static_cast<size_t>(y) * width, rows.data(), width * static_cast<size_t>(last - first));
+    }
+    return true;
+}
 
 /// The rest of both ways to read: size, then RGBA bytes.
 int readRgba(OIIO::ImageInput* in, int* width, int* height, unsigned char* pixels, char* error, int errorBytes) {
@@ -49,18 +73,17 @@ int readRgba(OIIO::ImageInput* in, int* width, int* height, unsigned char* pixel
     *width = spec.width;
     *height = spec.height;
     if (pixels == nullptr) return 0;
-    const int channels = spec.nchannels;
-    const size_t count = static_cast<size_t>(spec.width) * static_cast<size_t>(spec.height);
-    std::vector<unsigned char> raw(count * static_cast<size_t>(channels));
-    if (!in->read_image(0, 0, 0, channels, OIIO::TypeDesc::UINT8, raw.data()))
-        return report(in->geterror(), error, errorBytes);
-    for (size_t i = 0; i < count; ++i)
-        for (int c = 0; c < 4; ++c) {
-            const int from = channels >= 3 ? c : c < 3 ? 0 : channels == 2 ? 1 : 4;
-            pixels[i * 4 + static_cast<size_t>(c)] =
-                from < channels ? raw[i * static_cast<size_t>(channels) + static_cast<size_t>(from)] : 255;
-        }
-    return 0;
+    const int channels = std::min(spec.nchannels, 4);
+    const bool isRead = forRows<unsigned char>(
+        *in, OIIO::TypeDesc::UINT8, channels, [&](size_t first, const unsigned char* raw, size_t count) {
+            for (size_t i = 0; i < count; ++i)
+                for (int c = 0; c < 4; ++c) {
+                    const int from = channels >= 3 ? c : c < 3 ? 0 : channels == 2 ? 1 : 4;
+                    pixels[(first + i) * 4 + static_cast<size_t>(c)] =
+                        from < channels ? raw[i * static_cast<size_t>(channels) + static_cast<size_t>(from)] : 255;
+                }
+        });
+    return isRead ? 0 : report(in->geterror(), error, errorBytes);
 }
 
 }  // namespace
@@ -72,6 +95,8 @@ extern "C" int stippleOiioRead(const char* path, int* width, int* height, unsign
         config.attribute("oiio:UnassociatedAlpha", 1);
         const std::unique_ptr<OIIO::ImageInput> in = OIIO::ImageInput::open(path, &config);
         return readRgba(in.get(), width, height, pixels, error, errorBytes);
+    } catch (const std::bad_alloc&) {
+        return kStippleOiioNoMemory;
     } catch (const std::exception& e) {
         return report(e.what(), error, errorBytes);
     }
@@ -89,6 +114,8 @@ extern "C" int stippleOiioDecode(const char* format, const void* bytes, unsigned
         if (!in->set_ioproxy(&memory)) return report("this format cannot be decoded in memory", error, errorBytes);
         if (!in->open(format, spec, config)) return report(in->geterror(), error, errorBytes);
         return readRgba(in.get(), width, height, pixels, error, errorBytes);
+    } catch (const std::bad_alloc&) {
+        return kStippleOiioNoMemory;
     } catch (const std::exception& e) {
         return report(e.what(), error, errorBytes);
     }
@@ -103,13 +130,17 @@ extern "C" int stippleOiioReadFloat(const char* path, int* width, int* height, f
         *width = spec.width;
         *height = spec.height;
         if (!pixels) return 0;
-        std::vector<float> all(static_cast<size_t>(spec.width) * spec.height * spec.nchannels);
-        if (!in->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, all.data()))
-            return report(in->geterror(), error, errorBytes);
-        const size_t channels = static_cast<size_t>(spec.nchannels);
-        for (size_t i = 0; i < static_cast<size_t>(spec.width) * spec.height; ++i)
-            for (size_t c = 0; c < 3; ++c) pixels[3 * i + c] = all[i * channels + (channels >= 3 ? c : 0)];
+        const auto channels = static_cast<size_t>(std::min(spec.nchannels, 3));
+        const bool isRead = forRows<float>(
+            *in, OIIO::TypeDesc::FLOAT, static_cast<int>(channels), [&](size_t first, const float* raw, size_t count) {
+                for (size_t i = 0; i < count; ++i)
+                    for (size_t c = 0; c < 3; ++c)
+                        pixels[3 * (first + i) + c] = raw[i * channels + (channels >= 3 ? c : 0)];
+            });
+        if (!isRead) return report(in->geterror(), error, errorBytes);
         return 0;
+    } catch (const std::bad_alloc&) {
+        return kStippleOiioNoMemory;
     } catch (const std::exception& e) {
         return report(e.what(), error, errorBytes);
     }

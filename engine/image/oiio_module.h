@@ -8,6 +8,8 @@ extern "C" {
 int stippleOiioEncode(const char* path, int width, int height, int channels, int isFloat, const void* pixels,
                       const char* const* names, void (*sink)(void* user, const void* bytes, unsigned long count),
                       void* user, char* error, int errorBytes);
+/// What the reading calls give instead of 0: an error with a text, or that there is not enough memory.
+enum { kStippleOiioFailed = -1, kStippleOiioNoMemory = -2 };
 /// Decodes an encoded image in memory as RGBA bytes; `format` is "png", "jpeg" or "webp". Calls as stippleOiioRead.
 int stippleOiioDecode(const char* format, const void* bytes, unsigned long count, int* width, int* height,
                       unsigned char* pixels, char* error, int errorBytes);

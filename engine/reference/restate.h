@@ -1,6 +1,7 @@
 // What the parts of the restating backend share: one sample a pixel, before and after reconstruction.
 #pragma once
 
+#include <algorithm>
 #include <glm/glm.hpp>
 #include <unordered_map>
 #include <vector>
@@ -29,6 +30,11 @@ struct Sample {
     /// So do narrow ribbons, which are merged as a surface is: of what is not round `axis.x` is 1 where all parts are.
     bool letsLightThrough(double focal) const { return isLeaf(focal) || (!isRound && axis.x > 0.999); }
 };
+/// The pixel of a coordinate, from 0 to `most`: those far off the image, or no number at all, do not fit into an int.
+inline int pixelIn(double coordinate, int most) {
+    return coordinate > 0 ? static_cast<int>(std::min(coordinate, static_cast<double>(most))) : 0;
+}
+
 /// Thickness of leaves, over their radius.
 constexpr double kLeafThickness = 1.0 / 16;
 

@@ -77,10 +77,10 @@ class MeshProjector {
         if (area == 0) return;
         if (area < 0) std::swap(p[1], p[2]);
         const dvec2 lo = glm::min(p[0], glm::min(p[1], p[2])), hi = glm::max(p[0], glm::max(p[1], p[2]));
-        const int x0 = static_cast<int>(std::max(0.0, std::floor(lo.x / 256))),
-                  x1 = static_cast<int>(std::min(view_.width - 1.0, std::floor(hi.x / 256))),
-                  y0 = static_cast<int>(std::max(0.0, std::floor(lo.y / 256))),
-                  y1 = static_cast<int>(std::min(view_.height - 1.0, std::floor(hi.y / 256)));
+        const int right = static_cast<int>(view_.width) - 1, bottom = static_cast<int>(view_.height) - 1;
+        if (!(hi.x >= 0 && hi.y >= 0)) return;
+        const int x0 = pixelIn(lo.x / 256, right + 1), x1 = pixelIn(hi.x / 256, right),
+                  y0 = pixelIn(lo.y / 256, bottom + 1), y1 = pixelIn(hi.y / 256, bottom);
         for (int y = y0; y <= y1; ++y)
             for (int x = x0; x <= x1; ++x) {
                 const dvec2 centre(x * 256 + 128, y * 256 + 128);

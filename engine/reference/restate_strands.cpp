@@ -163,21 +163,19 @@ class StrandProjector {
         const double lo = std::min(pa_[major], pb_[major]), hi = std::max(pa_[major], pb_[major]);
         const int size = static_cast<int>(major == 0 ? view_.width : view_.height);
         const double slope = std::abs(d[major]) > 0 ? d[minor] / d[major] : 0, longer = std::sqrt(1 + slope * slope);
-        for (int m = std::max(0, static_cast<int>(std::ceil(lo - 0.5))); m < size && m + 0.5 < hi; ++m) {
+        for (int m = pixelIn(std::ceil(lo - 0.5), size); m < size && m + 0.5 < hi; ++m) {
             const double u = (m + 0.5 - pa_[major]) / d[major], other = pa_[minor] + u * d[minor];
             const double half = halfA_ + u * (halfB_ - halfA_);
-            const int x = major == 0 ? m : static_cast<int>(std::floor(other)),
-                      y = major == 0 ? static_cast<int>(std::floor(other)) : m;
-            offer(x, y, u, half, lot_, 2 * half * longer);
+            offer(major == 0 ? dvec2(m, other) : dvec2(other, m), u, half, lot_, 2 * half * longer);
         }
         const double length = std::max(std::abs(d.x), std::abs(d.y));
         for (const auto& [p, u, half] : {std::tuple{pa_, 0.0, halfA_}, std::tuple{pb_, 1.0, halfB_}})
-            offer(static_cast<int>(std::floor(p.x)), static_cast<int>(std::floor(p.y)), u, half, ~lot_,
-                  3.14159265 * half * half * (1 - length / std::max(2 * half, 1e-6)));
+            offer(p, u, half, ~lot_, 3.14159265 * half * half * (1 - length / std::max(2 * half, 1e-6)));
     }
 
-    void offer(int x, int y, double u, double half, uint32_t id, double share) {
-        if (x < 0 || y < 0 || x >= level_.width || y >= level_.height) return;
+    void offer(const dvec2& p, double u, double half, uint32_t id, double share) {
+        if (!(p.x >= 0 && p.y >= 0 && p.x < level_.width && p.y < level_.height)) return;
+        const int x = static_cast<int>(p.x), y = static_cast<int>(p.y);
         const auto pixel = static_cast<uint32_t>(y) * view_.width + static_cast<uint32_t>(x);
         if (half < kNarrow && !isTaken(pixel, id, share)) return;
         const double nearer = nearerAt(from_) + u * (nearerAt(to_) - nearerAt(from_));
@@ -195,8 +193,8 @@ class StrandProjector {
         const dvec2 lo = glm::min(pa_, pb_) - widest, hi = glm::max(pa_, pb_) + widest, d = pb_ - pa_;
         const double length2 = glm::dot(d, d);
         const double nearA = nearerAt(from_), nearB = nearerAt(to_);
-        for (int y = static_cast<int>(std::max(0.0, lo.y)); y < level_.height && y <= hi.y; ++y)
-            for (int x = static_cast<int>(std::max(0.0, lo.x)); x < level_.width && x <= hi.x; ++x) {
+        for (int y = pixelIn(lo.y, level_.height); y < level_.height && y <= hi.y; ++y)
+            for (int x = pixelIn(lo.x, level_.width); x < level_.width && x <= hi.x; ++x) {
                 const dvec2 p(x + 0.5, y + 0.5);
                 double u = length2 > 1e-8 ? std::clamp(glm::dot(p - pa_, d) / length2, 0.0, 1.0) : 0, nearer = 1;
                 if (s_.isTube) {

@@ -122,6 +122,7 @@ bool TextureReader::level(const shared::TextureInfo& info, uint32_t l, dvec2 uv,
             c = std::clamp(c, 0.0, 1.0);
         else
             c = wrap.at(k) == shared::kWrapMirror && std::fmod(std::abs(whole), 2.0) == 1 ? 1 - (c - whole) : c - whole;
+        if (!(c > 0)) c = 0;  // of coordinates so large that they have no fraction, too
         const double at = std::min(c, 1 - 1e-9) * static_cast<double>(size.at(k)) - 0.5;
         low.at(k) = static_cast<int64_t>(std::floor(at));
         part.at(k) = at - std::floor(at);

@@ -1,5 +1,6 @@
 #include "engine/render/draw_list.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace stipple::render {
@@ -24,7 +25,9 @@ shared::DrawMesh makeDrawMesh(const lod::Hierarchy& h, const lod::Instance& inst
     const double worldPerStep = instance.scale * h.unit;
     const glm::dvec3 eye =
         (glm::transpose(instance.rotation) * (view.eye - instance.translation) / instance.scale - h.origin) / h.unit;
-    const glm::dvec3 nearest = glm::floor(glm::clamp(eye, glm::dvec3(0), glm::dvec3(0x1p24)));
+    // max(0, v) of what is no number is 0: cameras may be anywhere.
+    const auto onLattice = [](double v) { return std::floor(std::max(0.0, std::min(v, 0x1p24))); };
+    const glm::dvec3 nearest(onLattice(eye.x), onLattice(eye.y), onLattice(eye.z));
     m.axisX = glm::vec3(axes[0] * worldPerStep);
     m.axisY = glm::vec3(axes[1] * worldPerStep);
     m.axisZ = glm::vec3(axes[2] * worldPerStep);

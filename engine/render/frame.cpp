@@ -11,6 +11,7 @@
 #include "engine/base/process.h"
 #include "lod/attributes.h"
 #include "lod/octahedral.h"
+#include "lod/store_check.h"
 
 namespace stipple::render {
 
@@ -54,9 +55,13 @@ std::vector<Pass> passesOf(Mode mode, const FrameContent& content) {
 
 namespace {
 
-/// The last steps of a chunk's decoding: other colours than its own.
+/// The last steps of a chunk's decoding: other colours than its own; of triangles, that their materials are there.
 streaming::ChunkFinish finishOf(const PlacedStore& placed) {
     const lod::ColourBy by = placed.colour;
+    if (placed.store->hierarchy.isMesh())
+        return {false, [store = placed.store](uint32_t node, lod::Chunk& chunk, const uint8_t*, size_t) {
+                    return lod::checkMaterials(*store, chunk, fmt::format("{}: node {}", store->path, node));
+                }};
     if (by.mode == lod::ColourMode::own) return {};
     const auto apply = [by, store = placed.store](uint32_t node, lod::Chunk& chunk, const uint8_t* bytes,
                                                   size_t count) -> Result<void> {
@@ -141,7 +146,7 @@ class Placer {
         const uint32_t number = sources_++;
         if (isPlain) plainSources_[p.store.get()] = number;
         state_.streamer->addSource(p.store->hierarchy, streaming::makeFileSource(p.store->file), p.store->path,
-                                   isPlain ? streaming::ChunkFinish{} : finishOf(p));
+                                   finishOf(p));
         return number;
     }
 

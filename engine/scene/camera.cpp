@@ -12,6 +12,7 @@ namespace stipple::scene {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
+constexpr double kLeastFov = 0.001, kGreatestFov = 179;
 
 template <typename T>
 T catmullRom(const T& a, const T& b, const T& c, const T& d, double s) {
@@ -65,7 +66,9 @@ Camera CameraPath::at(double t) const {
     out.eye = catmullRom(a.eye, b.eye, c.eye, d.eye, s);
     out.target = catmullRom(a.target, b.target, c.target, d.target, s);
     out.up = catmullRom(a.up, b.up, c.up, d.up, s);
-    out.fovDegrees = catmullRom(a.fovDegrees, b.fovDegrees, c.fovDegrees, d.fovDegrees, s);
+    // (The curve swings out beyond its keys.)
+    out.fovDegrees =
+        std::clamp(catmullRom(a.fovDegrees, b.fovDegrees, c.fovDegrees, d.fovDegrees, s), kLeastFov, kGreatestFov);
     return out;
 }
 
@@ -99,32 +102,95 @@ lod::View makeView(const Camera& camera, uint32_t width, uint32_t height, double
     return view;
 }
 
-Result<CameraPath> readCameraPath(const std::string& path) {
-    STIPPLE_ASSIGN(const std::string text, readTextFile(path, uint64_t{64} << 20));
-    CameraPath out;
-    try {
-        const nlohmann::json j = nlohmann::json::parse(text);
-        out.fps = j.value("fps", 30.0);
-        const auto vec = [](const nlohmann::json& v) {
-            return glm::dvec3(v.at(0).get<double>(), v.at(1).get<double>(), v.at(2).get<double>());
-        };
-        for (const auto& k : j.at("keys")) {
-            CameraKey key;
-            key.t = k.at("t").get<double>();
-            key.camera.eye = vec(k.at("eye"));
-            key.camera.target = vec(k.at("target"));
-            if (k.contains("up")) key.camera.up = vec(k.at("up"));
-            key.camera.fovDegrees = k.value("fov", 50.0);
-            if (!out.keys.empty() && !(key.t > out.keys.back().t))
-                return fail(ErrorKind::input, fmt::format("key {} is not later than the one before", out.keys.size()),
-                            path);
-            out.keys.push_back(key);
+namespace {
+
+using json = nlohmann::json;
+
+/// Beyond this coordinates of a camera have no use, and squares of them no room.
+constexpr double kFarthest = 1e15;
+
+/// The checks of one key; `where` names it.
+class KeyReader {
+  public:
+    KeyReader(const json& key, std::string path, std::string where)
+        : key_(key), path_(std::move(path)), where_(std::move(where)) {}
+
+    Result<double> number(const char* name, double least, double greatest) const {
+        const auto found = key_.find(name);
+        if (found == key_.end() || !found->is_number()) return bad(name, "is not a number");
+        const auto value = found->get<double>();
+        if (!(value >= least && value <= greatest))
+            return bad(name, fmt::format("is {}, must be between {} and {}", value, least, greatest));
+        return value;
+    }
+    Result<glm::dvec3> vector(const char* name) const {
+        const auto found = key_.find(name);
+        if (found == key_.end() || !found->is_array() || found->size() != 3) return bad(name, "is not three numbers");
+        glm::dvec3 v(0);
+        for (size_t i = 0; i < 3; ++i) {
+            if (!(*found)[i].is_number()) return bad(name, "is not three numbers");
+            v[static_cast<int>(i)] = (*found)[i].get<double>();
+            if (!(std::abs(v[static_cast<int>(i)]) <= kFarthest))
+                return bad(name, fmt::format("holds {}, which is too far away", (*found)[i].dump()));
         }
-    } catch (const std::exception& e) {
-        return fail(ErrorKind::input, fmt::format("is not a camera path: {}", e.what()), path,
+        return v;
+    }
+    bool has(const char* name) const { return key_.contains(name); }
+    tl::unexpected<Error> bad(const char* name, const std::string& what) const {
+        return fail(ErrorKind::input, fmt::format("{}: '{}' {}", where_, name, what), path_,
                     R"(expected {"fps": 30, "keys": [{"t": 0, "eye": [x,y,z], "target": [x,y,z]}]})");
     }
-    if (out.keys.empty() || !(out.fps > 0)) return fail(ErrorKind::input, "has no keys, or no frames per second", path);
+
+  private:
+    const json& key_;
+    std::string path_, where_;
+};
+
+Result<CameraKey> readKey(const KeyReader& from) {
+    CameraKey key;
+    STIPPLE_ASSIGN(key.t, from.number("t", -1e9, 1e9));
+    STIPPLE_ASSIGN(key.camera.eye, from.vector("eye"));
+    STIPPLE_ASSIGN(key.camera.target, from.vector("target"));
+    if (key.camera.eye == key.camera.target) return from.bad("target", "is where the eye is");
+    if (from.has("up")) {
+        STIPPLE_ASSIGN(key.camera.up, from.vector("up"));
+        if (!(glm::length(key.camera.up) > 0)) return from.bad("up", "has no length");
+    }
+    if (from.has("fov")) {
+        STIPPLE_ASSIGN(key.camera.fovDegrees, from.number("fov", kLeastFov, kGreatestFov));
+    }
+    return key;
+}
+
+}  // namespace
+
+Result<CameraPath> readCameraPath(const std::string& path) {
+    STIPPLE_ASSIGN(const std::string text, readTextFile(path, uint64_t{64} << 20));
+    const json j = json::parse(text, nullptr, false);
+    static const json none = json::array();
+    if (!j.is_object())
+        return fail(ErrorKind::input, "is not a camera path: no JSON object, or one with a number that is too large",
+                    path, R"(expected {"fps": 30, "keys": [{"t": 0, "eye": [x,y,z], "target": [x,y,z]}]})");
+    CameraPath out;
+    const KeyReader whole(j, path, "the path");
+    constexpr double kLeastRate = 1e-6, kGreatestRate = 10'000, kMostFrames = 10'000'000;
+    if (whole.has("fps")) {
+        STIPPLE_ASSIGN(out.fps, whole.number("fps", kLeastRate, kGreatestRate));
+    }
+    const json& keys = j.contains("keys") && j["keys"].is_array() ? j["keys"] : none;
+    if (keys.empty()) return whole.bad("keys", "holds no key");
+    for (const json& k : keys) {
+        STIPPLE_ASSIGN(const CameraKey key, readKey(KeyReader(k, path, fmt::format("key {}", out.keys.size()))));
+        if (!out.keys.empty() && !(key.t > out.keys.back().t))
+            return fail(ErrorKind::input, fmt::format("key {} is not later than the one before", out.keys.size()),
+                        path);
+        out.keys.push_back(key);
+    }
+    if (out.duration() * out.fps > kMostFrames)
+        return fail(
+            ErrorKind::input,
+            fmt::format("asks for {:.0f} frames, at most {:.0f} are made", out.duration() * out.fps, kMostFrames), path,
+            "give a smaller 'fps', or keys that are closer in time");
     return out;
 }
 

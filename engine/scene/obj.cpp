@@ -2,10 +2,12 @@
 #include <fmt/format.h>
 #include <tiny_obj_loader.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
-#include <tuple>
+#include <sstream>
+#include <streambuf>
 
 #include "engine/base/file.h"
 #include "engine/scene/scene.h"
@@ -13,26 +15,75 @@
 namespace stipple::scene {
 namespace {
 
-constexpr uint64_t kMostImageBytes = uint64_t{1} << 30;
+/// A file as a stream, in blocks: what is read is a regular file, and no more than what it held when it was opened.
+class FileStream final : public std::streambuf {
+  public:
+    explicit FileStream(const InputFile& file) : file_(file), block_(size_t{1} << 20) {}
+
+  protected:
+    int_type underflow() override {
+        const size_t count = static_cast<size_t>(std::min<uint64_t>(block_.size(), file_.sizeBytes() - at_));
+        if (count == 0 || !file_.readAt(at_, block_.data(), count)) return traits_type::eof();
+        at_ += count;
+        setg(block_.data(), block_.data(), block_.data() + count);
+        return traits_type::to_int_type(block_[0]);
+    }
+
+  private:
+    const InputFile& file_;
+    std::vector<char> block_;
+    uint64_t at_ = 0;
+};
+
+/// Materials of MTL files beside the OBJ file. (The library's own reader opens whatever it is told to.)
+class MaterialFiles final : public tinyobj::MaterialReader {
+  public:
+    MaterialFiles(std::string folder, const ReadSettings& settings, std::vector<std::string>& notes)
+        : folder_(std::move(folder)), settings_(settings), notes_(notes) {}
+
+    bool operator()(const std::string& name, std::vector<tinyobj::material_t>* materials,
+                    std::map<std::string, int>* byName, std::string* warning, std::string* error) override {
+        const auto leaveOut = [&](const std::string& why) {
+            notes_.push_back(fmt::format("materials are left out: {}", why));
+            return true;
+        };
+        const auto bytes = readFileOfScene(folder_, withSlashes(name), settings_);
+        if (!bytes) return leaveOut(bytes.error().line());
+        const std::string text(bytes->begin(), bytes->end());
+        uint64_t count = 1;
+        for (size_t at = text.find("newmtl"); at != std::string::npos; at = text.find("newmtl", at + 6)) ++count;
+        constexpr uint64_t kTimes = 3;  // growing arrays, and ours
+        if (count * sizeof(tinyobj::material_t) * kTimes > settings_.memoryBytes)
+            return leaveOut(fmt::format("{}: {} of them do not fit --memory", name, count));
+        std::istringstream in(text);
+        tinyobj::LoadMtl(byName, materials, &in, warning, error);
+        return true;
+    }
+
+    static std::string withSlashes(std::string name) {
+        std::replace(name.begin(), name.end(), '\\', '/');  // written on other systems
+        return name;
+    }
+
+  private:
+    std::string folder_;
+    const ReadSettings& settings_;
+    std::vector<std::string>& notes_;
+};
 
 /// An image beside the file; missing ones are noted and count as white.
-int addImage(const std::string& folder, std::string name, Scene& scene, std::map<std::string, int>& known) {
+int addImage(const std::string& folder, std::string name, const ReadSettings& settings, Scene& scene,
+             std::map<std::string, int>& known) {
     if (name.empty()) return -1;
-    for (char& c : name)
-        if (c == '\\') c = '/';  // written on other systems
+    name = MaterialFiles::withSlashes(name);
     if (const auto found = known.find(name); found != known.end()) return found->second;
-    EncodedImage image;
-    image.name = name;
-    const auto file = InputFile::open((std::filesystem::path(folder) / name).string());
-    if (file && file->sizeBytes() <= kMostImageBytes) {
-        image.bytes.resize(file->sizeBytes());
-        if (!file->readAt(0, image.bytes.data(), image.bytes.size())) image.bytes.clear();
-    }
-    if (image.bytes.empty()) {
-        scene.notes.push_back(fmt::format("texture '{}' cannot be read and counts as white", name));
+    auto bytes = readFileOfScene(folder, name, settings);
+    if (!bytes || bytes->empty()) {
+        scene.notes.push_back(
+            fmt::format("texture '{}' is left out: {}", name, bytes ? "is empty" : bytes.error().line()));
         return known[name] = -1;
     }
-    scene.images.push_back(std::move(image));
+    scene.images.push_back({name, std::move(*bytes)});
     scene.textures.push_back({static_cast<int>(scene.images.size()) - 1, Wrap::repeat, Wrap::repeat});
     return known[name] = static_cast<int>(scene.textures.size()) - 1;
 }
@@ -59,28 +110,51 @@ Material materialOf(const tinyobj::material_t& m, int texture) {
 
 }  // namespace
 
-Result<Scene> readObj(const std::string& path) {
-    STIPPLE_TRY(InputFile::open(path));  // its error says more
-    tinyobj::ObjReaderConfig config;
-    config.triangulate = true;
-    config.vertex_color = true;
-    tinyobj::ObjReader reader;
-    if (!reader.ParseFromFile(path, config)) {
-        const std::string& text = reader.Error();
-        return fail(ErrorKind::input, "is not a readable OBJ: " + text.substr(0, text.find('\n')), path);
+namespace {
+
+/// What the library makes of a file.
+struct Parsed {
+    tinyobj::attrib_t attributes;
+    std::vector<tinyobj::shape_t> shapes;
+    std::vector<tinyobj::material_t> materials;
+    std::string warning;
+};
+
+Result<Parsed> parse(const std::string& path, const std::string& folder, const ReadSettings& settings,
+                     std::vector<std::string>& notes) {
+    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
+    FileStream buffer(file);
+    std::istream in(&buffer);
+    MaterialFiles materials(folder, settings, notes);
+    Parsed out;
+    std::string error;
+    try {
+        if (tinyobj::LoadObj(&out.attributes, &out.shapes, &out.materials, &out.warning, &error, &in, &materials))
+            return out;
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorKind::budget, "does not fit in memory", path, "close other programs, or give PLY");
+    } catch (const std::exception&) {
+        error = "a line is not what OBJ expects";
     }
+    return fail(ErrorKind::input, "is not a readable OBJ: " + error.substr(0, error.find('\n')), path);
+}
+
+}  // namespace
+
+Result<Scene> readObj(const std::string& path, const ReadSettings& settings) {
     Scene scene;
     scene.path = path;
     const std::string folder = std::filesystem::path(path).parent_path().string();
+    STIPPLE_ASSIGN(const Parsed parsed, parse(path, folder, settings, scene.notes));
     std::map<std::string, int> images;
-    for (const tinyobj::material_t& m : reader.GetMaterials())
-        scene.materials.push_back(materialOf(m, addImage(folder, m.diffuse_texname, scene, images)));
-    const tinyobj::attrib_t& a = reader.GetAttrib();
+    for (const tinyobj::material_t& m : parsed.materials)
+        scene.materials.push_back(materialOf(m, addImage(folder, m.diffuse_texname, settings, scene, images)));
+    const tinyobj::attrib_t& a = parsed.attributes;
     const auto positions = static_cast<int>(a.vertices.size() / 3), normals = static_cast<int>(a.normals.size() / 3),
                uvs = static_cast<int>(a.texcoords.size() / 2);
     uint64_t dropped = 0;
     Mesh mesh;
-    for (const tinyobj::shape_t& shape : reader.GetShapes()) {
+    for (const tinyobj::shape_t& shape : parsed.shapes) {
         std::map<int, Primitive> byMaterial;
         for (size_t f = 0; f * 3 + 3 <= shape.mesh.indices.size(); ++f) {
             bool good = f >= shape.mesh.num_face_vertices.size() || shape.mesh.num_face_vertices[f] == 3;
@@ -119,7 +193,7 @@ Result<Scene> readObj(const std::string& path) {
     }
     if (dropped > 0)
         scene.notes.push_back(fmt::format("{} faces refer to vertices that are not there or no numbers", dropped));
-    if (!reader.Warning().empty()) scene.notes.push_back(reader.Warning().substr(0, reader.Warning().find('\n')));
+    if (!parsed.warning.empty()) scene.notes.push_back(parsed.warning.substr(0, parsed.warning.find('\n')));
     if (mesh.primitives.empty()) return fail(ErrorKind::input, "holds no faces", path);
     scene.meshes.push_back(std::move(mesh));
     Node node;

@@ -4,8 +4,8 @@
 
 namespace stipple::scene {
 
-Result<Scene> readScene(const std::string& path, bool repair) {
-    return std::filesystem::path(path).extension() == ".obj" ? readObj(path) : readGltf(path, repair);
+Result<Scene> readScene(const std::string& path, const ReadSettings& settings) {
+    return std::filesystem::path(path).extension() == ".obj" ? readObj(path, settings) : readGltf(path, settings);
 }
 
 std::vector<glm::dmat4> Scene::worldTransforms() const {

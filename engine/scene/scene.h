@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/base/result.h"
+#include "engine/scene/read_settings.h"
 
 namespace stipple::scene {
 
@@ -115,19 +116,17 @@ struct Box {
 Box meshBounds(const Scene& scene);
 
 /// glTF 2.0 (.gltf, .glb) with KHR_lights_punctual, KHR_texture_transform, EXT_mesh_gpu_instancing,
-/// KHR_mesh_quantization, EXT_meshopt_compression, KHR_materials_unlit, and STIPPLE_store (README). Invalid files are
-/// refused with the place.
-/// `repair`: pass over faults that change nothing that is drawn (wrong accessor bounds, extensions that are used but
-/// not listed, strides of animations), and count them in the notes.
-Result<Scene> readGltf(const std::string& path, bool repair = false);
+/// KHR_mesh_quantization, EXT_meshopt_compression, KHR_materials_unlit, and STIPPLE_store (README). What cannot be
+/// drawn is refused with the place; other faults of the file, and images that are missing, are counted in the notes.
+Result<Scene> readGltf(const std::string& path, const ReadSettings& settings = {});
 
 /// Writes .glb or .gltf (buffers inside). Shear of instances is lost; everything else comes back as it was.
 Result<void> writeGltf(const Scene& scene, const std::string& path);
 
 /// Wavefront OBJ with its MTL files; one node. Missing textures and broken faces are noted.
-Result<Scene> readObj(const std::string& path);
+Result<Scene> readObj(const std::string& path, const ReadSettings& settings = {});
 
 /// readGltf or readObj, by extension.
-Result<Scene> readScene(const std::string& path, bool repair = false);
+Result<Scene> readScene(const std::string& path, const ReadSettings& settings = {});
 
 }  // namespace stipple::scene

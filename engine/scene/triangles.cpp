@@ -105,7 +105,8 @@ struct PlacedPrimitive {
         const double length = glm::length(n);
         const double sign = isMirrored ? -1 : 1;
         to.normal.emplace_back(length > 0 && std::isfinite(length) ? n * (sign / length) : glm::dvec3(0));
-        to.uv.push_back(hasUv ? glm::vec2(use.transform * glm::vec3(p.uv[set][i], 1)) : glm::vec2(0));
+        const glm::vec2 uv = hasUv ? glm::vec2(use.transform * glm::vec3(p.uv[set][i], 1)) : glm::vec2(0);
+        to.uv.push_back(std::isfinite(uv.x + uv.y) ? uv : glm::vec2(0));
         to.colour.push_back(p.colour.empty() ? ~0u : packedColour(p.colour[i]));
         to.surface.push_back(surface);
     }

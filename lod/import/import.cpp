@@ -26,6 +26,13 @@ bool isPointFile(const fs::path& path) {
     return extension == ".las" || extension == ".laz" || extension == ".ply";
 }
 
+/// Formats of points that other programs turn into ours.
+bool isOtherPointFormat(const std::string& extension) {
+    static constexpr std::array<const char*, 12> known{".xyz", ".pts", ".ptx", ".asc", ".pcd", ".e57",
+                                                       ".txt", ".csv", ".npy", ".rcp", ".rcs", ".fls"};
+    return std::find(known.begin(), known.end(), extension) != known.end();
+}
+
 /// Every point file below `folder`.
 Result<std::vector<std::string>> filesBelow(const fs::path& folder) {
     std::vector<std::string> files;
@@ -139,8 +146,11 @@ Result<PointSource> openPointSource(const std::string& path, const ReadOptions& 
     if (extension == ".las" || extension == ".laz") return openLas(path, options);
     if (head.substr(0, 2) == "\x1f\x8b")
         return fail(ErrorKind::input, "is compressed with gzip", path, "unpack it first: gunzip -k");
-    return fail(ErrorKind::input, "is in a format that this version does not read", path,
-                "it reads .las, .laz, .ply, .gltf, .glb, .obj, .swc, .trk, .hair and cylinder models");
+    const std::string reads = "it reads .las, .laz, .ply, .gltf, .glb, .obj, .swc, .trk, .hair and cylinder models";
+    if (isOtherPointFormat(extension))
+        return fail(ErrorKind::input, "holds points in a format that this version does not read", path,
+                    reads + "; `pdal translate` or CloudCompare make .laz of it");
+    return fail(ErrorKind::input, "is in a format that this version does not read", path, reads);
 }
 
 }  // namespace stipple::lod

@@ -44,8 +44,8 @@ SHARED_FN vec2 environmentPlace(vec3 d) {
 
 SHARED_FN vec3 environmentLevel(SHARED_TABLE vec2 place, uint level) {
     const float last = float(kEnvironmentEdge) - 1.001f;
-    const float x = min(max(place.x * float(kEnvironmentEdge) - 0.5f, 0.0f), last);
-    const float y = min(max(place.y * float(kEnvironmentEdge) - 0.5f, 0.0f), last);
+    const float x = min(max(0.0f, place.x * float(kEnvironmentEdge) - 0.5f), last);
+    const float y = min(max(0.0f, place.y * float(kEnvironmentEdge) - 0.5f), last);
     const uint x0 = uint(int(x));
     const uint y0 = uint(int(y));
     const float fx = x - float(x0);
@@ -61,7 +61,7 @@ SHARED_FN vec3 environmentLevel(SHARED_TABLE vec2 place, uint level) {
 
 // What a mirror of that roughness sees in the world-space direction d.
 SHARED_FN vec3 environmentMirror(SHARED_TABLE vec3 d, float roughness) {
-    const float l = min(max(roughness, 0.0f), 1.0f) * float(kEnvironmentLevels - 1u);
+    const float l = min(max(0.0f, roughness), 1.0f) * float(kEnvironmentLevels - 1u);
     const uint level = uint(int(min(l, float(kEnvironmentLevels) - 1.001f)));
     const float between = l - float(level);
     const vec2 place = environmentPlace(d);

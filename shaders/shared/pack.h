@@ -19,17 +19,17 @@ struct PackedTexel {
 
 SHARED_FN uint upperHalf(float v) { return (floatBitsToUint(v) + 0x8000u) >> 16; }
 SHARED_FN uint packPair(float x, float y) {
-    const uint ux = uint(int(floor(min(max(x, -1.0f), 1.0f) * 32767.0f + 32768.5f)));
-    const uint uy = uint(int(floor(min(max(y, -1.0f), 1.0f) * 32767.0f + 32768.5f)));
+    const uint ux = uint(int(floor(min(max(-1.0f, x), 1.0f) * 32767.0f + 32768.5f)));
+    const uint uy = uint(int(floor(min(max(-1.0f, y), 1.0f) * 32767.0f + 32768.5f)));
     return ux | uy << 16;
 }
 SHARED_FN float unpackLow(uint p) { return (float(int(p & 0xffffu)) - 32768.0f) * (1.0f / 32767.0f); }
 SHARED_FN float unpackHigh(uint p) { return (float(int(p >> 16)) - 32768.0f) * (1.0f / 32767.0f); }
 
 SHARED_FN uint packColour(float r, float g, float b) {
-    const uint ur = uint(int(sqrt(min(max(r, 0.0f), 1.0f)) * 2047.0f + 0.5f));
-    const uint ug = uint(int(sqrt(min(max(g, 0.0f), 1.0f)) * 2047.0f + 0.5f));
-    const uint ub = uint(int(sqrt(min(max(b, 0.0f), 1.0f)) * 1023.0f + 0.5f));
+    const uint ur = uint(int(sqrt(min(max(0.0f, r), 1.0f)) * 2047.0f + 0.5f));
+    const uint ug = uint(int(sqrt(min(max(0.0f, g), 1.0f)) * 2047.0f + 0.5f));
+    const uint ub = uint(int(sqrt(min(max(0.0f, b), 1.0f)) * 1023.0f + 0.5f));
     return ur | ug << 11 | ub << 22;
 }
 SHARED_FN float unpackRed(uint c) {
@@ -72,7 +72,7 @@ SHARED_FN Texel unpackTexel(PackedTexel p) {
 // and the normal word hold axis 12 + 12 and lean 12 + 11 (the thickness is the radius). Nor is a radius: its sign marks
 // what lets light through though it is no leaf.
 SHARED_FN uint fixedBits(float v, float scale) {
-    return uint(int(floor((min(max(v, -1.0f), 1.0f) + 1.0f) * scale + 0.5f)));
+    return uint(int(floor((min(max(-1.0f, v), 1.0f) + 1.0f) * scale + 0.5f)));
 }
 SHARED_FN float fixedValue(uint bits, float scale) { return float(int(bits)) / scale - 1.0f; }
 SHARED_FN PackedTexel packAnyTexel(Texel t) {

@@ -3,11 +3,10 @@
 #include <fmt/format.h>
 #include <meshoptimizer.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
 
-#include "engine/base/file.h"
 #include "engine/scene/gltf/json_tools.h"
 #include "engine/scene/gltf/semantics.h"
 
@@ -15,8 +14,6 @@ namespace stipple::scene::gltf {
 namespace {
 
 using nlohmann::json;
-
-constexpr uint64_t kMostBytes = uint64_t{8} << 30;
 
 /// Base64 of RFC 4648; false at a character that does not belong.
 bool decodeBase64(std::string_view text, std::vector<uint8_t>& out) {
@@ -56,7 +53,8 @@ std::string decodePercent(const std::string& uri) {
 }
 
 /// The bytes behind a URI: data, or a file beside the glTF file.
-Result<std::vector<uint8_t>> fetch(const Container& c, const std::string& uri, const std::string& where) {
+Result<std::vector<uint8_t>> fetch(const Container& c, const std::string& uri, const std::string& where,
+                                   const ReadSettings& settings) {
     std::vector<uint8_t> bytes;
     if (uri.rfind("data:", 0) == 0) {
         const size_t comma = uri.find(',');
@@ -72,12 +70,9 @@ Result<std::vector<uint8_t>> fetch(const Container& c, const std::string& uri, c
     if (uri.find("://") != std::string::npos)
         return fail(ErrorKind::input, fmt::format("lies at {}, and only local files are read", uri), where,
                     "download it first");
-    const std::string path = (std::filesystem::path(c.folder) / decodePercent(uri)).string();
-    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
-    if (file.sizeBytes() > kMostBytes) return fail(ErrorKind::input, "is larger than 8 GiB", path);
-    bytes.resize(file.sizeBytes());
-    STIPPLE_TRY(file.readAt(0, bytes.data(), bytes.size()));
-    return bytes;
+    std::string name = decodePercent(uri);
+    std::replace(name.begin(), name.end(), '\\', '/');  // written on other systems
+    return readFileOfScene(c.folder, name, settings);
 }
 
 double component(const uint8_t* at, int type, bool normalised) {
@@ -120,16 +115,33 @@ const json* compression(const json& value) {
 
 }  // namespace
 
+Result<void> Buffers::fits(uint64_t bytes, const std::string& what) const {
+    const uint64_t most = settings_.memoryBytes;
+    if (bytes <= most && claimedBytes_ <= most - bytes) return {};
+    return overBudget(what, bytes < UINT64_MAX - claimedBytes_ ? bytes + claimedBytes_ : bytes, most, container_.path);
+}
+
+Result<void> Buffers::claim(uint64_t bytes, const std::string& what) {
+    STIPPLE_TRY(fits(bytes, what));
+    claimedBytes_ += bytes;
+    return {};
+}
+
 Result<void> Buffers::load() {
+    STIPPLE_TRY(claim(container_.fileBytes, "the file"));
     const json& buffers = arrayOf(container_.json, "buffers");
     buffers_.resize(buffers.size());
     for (size_t i = 0; i < buffers.size(); ++i) {
         const std::string where = fmt::format("{}: /buffers/{}", container_.path, i);
         if (!buffers[i].contains("uri")) {
-            if (i == 0 && container_.hasBinaryChunk) buffers_[0] = container_.binary;
+            if (i == 0 && container_.hasBinaryChunk) {
+                STIPPLE_TRY(claim(container_.binary.size(), "the buffers"));
+                buffers_[0] = container_.binary;
+            }
             continue;  // otherwise the empty stand-in of a compressed one
         }
-        STIPPLE_ASSIGN(buffers_[i], fetch(container_, buffers[i]["uri"].get<std::string>(), where));
+        STIPPLE_ASSIGN(buffers_[i], fetch(container_, buffers[i]["uri"].get<std::string>(), where, settings_));
+        STIPPLE_TRY(claim(buffers_[i].size(), "the buffers"));
         if (buffers_[i].size() < buffers[i]["byteLength"].get<uint64_t>())
             return fail(ErrorKind::input,
                         fmt::format("has {} bytes instead of {}", buffers_[i].size(), buffers[i]["byteLength"].dump()),
@@ -148,7 +160,7 @@ Result<void> Buffers::decompress(size_t index) {
     const auto mode = c["mode"].get<std::string>(), filter = c.value("filter", std::string("NONE"));
     if (offset > source.size() || length > source.size() - offset)
         return fail(ErrorKind::input, "the compressed bytes reach beyond their buffer", where);
-    if (count * stride != view["byteLength"].get<size_t>())
+    if (stride == 0 || count > UINT64_MAX / stride || count * stride != view["byteLength"].get<size_t>())
         return fail(
             ErrorKind::input,
             fmt::format("{} elements of {} bytes are not the {} of the view", count, stride, view["byteLength"].dump()),
@@ -160,6 +172,7 @@ Result<void> Buffers::decompress(size_t index) {
         (mode == "TRIANGLES" && count % 3 != 0))
         return fail(ErrorKind::input,
                     fmt::format("{} of {} elements with {} bytes is not possible", mode, count, stride), where);
+    STIPPLE_TRY(claim(count * stride, "the compressed buffers"));
     std::vector<uint8_t> out(count * stride);
     const uint8_t* from = source.data() + offset;
     const int failed = mode == "ATTRIBUTES"  ? meshopt_decodeVertexBuffer(out.data(), count, stride, from, length)
@@ -198,10 +211,10 @@ Result<std::vector<double>> Buffers::values(size_t index) {
     const int componentType = a["componentType"].get<int>();
     const auto count = a["count"].get<size_t>();
     const std::vector<size_t> offsets = componentOffsets(type, componentType);
-    if (count > kMostBytes / 8 / offsets.size() ||
-        (!a.contains("bufferView") && !a.contains("sparse") && count > (1u << 28)))
-        return fail(ErrorKind::input, fmt::format("has {} elements", count),
-                    fmt::format("{}: /accessors/{}", container_.path, index));
+    // An accessor without bytes behind it may promise any number.
+    constexpr uint64_t kEach = sizeof(double);
+    STIPPLE_TRY(fits(count > UINT64_MAX / kEach / offsets.size() ? UINT64_MAX : count * offsets.size() * kEach,
+                     fmt::format("/accessors/{} with {} elements", index, count)));
     std::vector<double> out(count * offsets.size(), 0.0);
     if (a.contains("bufferView")) {
         const auto viewIndex = a["bufferView"].get<size_t>();
@@ -265,8 +278,11 @@ bool Buffers::hasData(const json& accessor) const {
 Result<std::vector<uint8_t>> Buffers::image(size_t index) {
     const json& image = container_.json["images"][index];
     if (image.contains("uri"))
-        return fetch(container_, image["uri"].get<std::string>(),
-                     fmt::format("{}: /images/{}", container_.path, index));
+        return fetch(container_, image["uri"].get<std::string>(), fmt::format("{}: /images/{}", container_.path, index),
+                     settings_);
+    if (!image.contains("bufferView"))
+        return fail(ErrorKind::input, "has neither a 'uri' nor a 'bufferView'",
+                    fmt::format("{}: /images/{}", container_.path, index));
     STIPPLE_ASSIGN(const std::span<const uint8_t> bytes, view(image["bufferView"].get<size_t>()));
     return std::vector<uint8_t>(bytes.begin(), bytes.end());
 }

@@ -7,13 +7,15 @@
 
 #include "engine/scene/gltf/container.h"
 #include "engine/scene/gltf/schema.h"
+#include "engine/scene/read_settings.h"
 
 namespace stipple::scene::gltf {
 
 class Buffers {
   public:
     /// `container` must outlive it; its structure and extents must have been checked.
-    explicit Buffers(const Container& container) : container_(container) {}
+    explicit Buffers(const Container& container, ReadSettings settings = {})
+        : container_(container), settings_(settings) {}
     /// Loads every buffer; an error names the one that is missing or too short.
     Result<void> load();
     /// The bytes of a buffer view, decompressed if it is compressed.
@@ -23,6 +25,9 @@ class Buffers {
     Result<std::vector<uint32_t>> indices(size_t accessor);
     /// False for a buffer that the file leaves out (a placeholder).
     bool hasData(const nlohmann::json& accessor) const;
+    /// Counts what will be kept of the file against the memory that reading it may take: before it is taken. `what`
+    /// is a sentence's subject.
+    Result<void> claim(uint64_t bytes, const std::string& what);
     /// The bytes of an image (still encoded).
     Result<std::vector<uint8_t>> image(size_t index);
 
@@ -30,7 +35,12 @@ class Buffers {
     Result<void> decompress(size_t index);
     Result<void> addSparse(const nlohmann::json& accessor, size_t components, std::vector<double>& values);
 
+    /// Is there room for so much besides what was claimed?
+    Result<void> fits(uint64_t bytes, const std::string& what) const;
+
     const Container& container_;
+    ReadSettings settings_;
+    uint64_t claimedBytes_ = 0;
     std::vector<std::vector<uint8_t>> buffers_;
     std::map<size_t, std::vector<uint8_t>> decompressed_;
 };

@@ -1,4 +1,4 @@
-// Animations and skins: Stipple plays neither, but a file whose animations are broken is a broken file.
+// Animations and skins: Stipple plays neither, so that what is wrong with them changes nothing that is drawn.
 #include <fmt/format.h>
 
 #include <set>
@@ -15,28 +15,29 @@ void checkChannel(const json& root, const json& animation, const json& channel, 
                   std::set<std::string>& targets, Problems& p) {
     const auto index = channel["sampler"].get<size_t>();
     if (index >= animation["samplers"].size())
-        return say(p, path, fmt::format("refers to sampler {}, which is not there", index));
+        return sayHarmless(p, path, fmt::format("refers to sampler {}, which is not there", index));
     const json &sampler = animation["samplers"][index], &target = channel["target"];
     const auto what = target["path"].get<std::string>();
     const bool isPointer = target.contains("extensions") && target["extensions"].contains("KHR_animation_pointer");
     if (isPointer && (what != "pointer" || target.contains("node")))
-        say(p, path, "an animation pointer has the path 'pointer' and no node");
+        sayHarmless(p, path, "an animation pointer has the path 'pointer' and no node");
     static const std::set<std::string> paths{"translation", "rotation", "scale", "weights"};
     if (!isPointer && what != "pointer" && paths.count(what) == 0)
-        say(p, path, fmt::format("animates '{}', which glTF does not know", what));
+        sayHarmless(p, path, fmt::format("animates '{}', which glTF does not know", what));
     const json& accessors = arrayOf(root, "accessors");
     const json &input = accessors[sampler["input"].get<size_t>()], &output = accessors[sampler["output"].get<size_t>()];
     const std::string interpolation = sampler.value("interpolation", "LINEAR");
     size_t perKey = interpolation == "CUBICSPLINE" ? 3 : 1;
     if (target.contains("node")) {
         const json& node = root["nodes"][target["node"].get<size_t>()];
-        if (node.contains("matrix") && what != "weights") say(p, path, "animates a node that has a matrix");
+        if (node.contains("matrix") && what != "weights") sayHarmless(p, path, "animates a node that has a matrix");
         const json* mesh = node.contains("mesh") ? &root["meshes"][node["mesh"].get<size_t>()] : nullptr;
         const size_t morphs = mesh ? (*mesh)["primitives"][0].value("targets", json::array()).size() : 0;
-        if (what == "weights" && morphs == 0) say(p, path, "animates the weights of a node without morph targets");
+        if (what == "weights" && morphs == 0)
+            sayHarmless(p, path, "animates the weights of a node without morph targets");
         if (what == "weights") perKey *= std::max<size_t>(1, morphs);
         if (!targets.insert(fmt::format("{} {}", target["node"].dump(), what)).second)
-            say(p, path, "animates what another channel animates");
+            sayHarmless(p, path, "animates what another channel animates");
     }
     const std::string type = output["type"].get<std::string>();
     const int component = output["componentType"].get<int>();
@@ -47,11 +48,12 @@ void checkChannel(const json& root, const json& animation, const json& channel, 
                                               : true;
     const bool componentFits =
         component == 5126 || ((what == "rotation" || what == "weights" || paths.count(what) == 0) && normalised);
-    if (!typeFits || !componentFits) say(p, path, fmt::format("'{}' cannot be {} of {}", what, type, component));
+    if (!typeFits || !componentFits)
+        sayHarmless(p, path, fmt::format("'{}' cannot be {} of {}", what, type, component));
     if (paths.count(what) != 0 && output["count"].get<size_t>() != input["count"].get<size_t>() * perKey)
-        say(p, path, fmt::format("{} values for {} keys", output["count"].dump(), input["count"].dump()));
+        sayHarmless(p, path, fmt::format("{} values for {} keys", output["count"].dump(), input["count"].dump()));
     if (interpolation == "CUBICSPLINE" && input["count"].get<size_t>() < 2)
-        say(p, path, "a cubic spline needs two keys");
+        sayHarmless(p, path, "a cubic spline needs two keys");
 }
 
 }  // namespace
@@ -69,8 +71,8 @@ void checkAnimationsAndSkins(const json& root, Problems& p) {
             const json& sampler = animations[a]["samplers"][s];
             const json& input = accessors[sampler["input"].get<size_t>()];
             if (input["type"] != "SCALAR" || input["componentType"] != 5126)
-                say(p, path, "times must be scalar floats");
-            if (!input.contains("min") || !input.contains("max")) say(p, path, "times need 'min' and 'max'");
+                sayHarmless(p, path, "times must be scalar floats");
+            if (!input.contains("min") || !input.contains("max")) sayHarmless(p, path, "times need 'min' and 'max'");
             if (hasStride(root, input) || hasStride(root, accessors[sampler["output"].get<size_t>()]))
                 sayHarmless(p, path, "buffer views of animations have no 'byteStride'");
         }
@@ -100,7 +102,7 @@ void checkAnimationsAndSkins(const json& root, Problems& p) {
                 for (size_t steps = 0; n >= 0 && n != static_cast<int64_t>(skeleton) && steps <= parent.size(); ++steps)
                     n = parent[static_cast<size_t>(n)];
                 if (n < 0) {
-                    say(p, path, fmt::format("node {} is not a common root of its joints", skeleton));
+                    sayHarmless(p, path, fmt::format("node {} is not a common root of its joints", skeleton));
                     break;
                 }
             }
@@ -108,8 +110,8 @@ void checkAnimationsAndSkins(const json& root, Problems& p) {
         if (!skins[s].contains("inverseBindMatrices")) continue;
         const json& a = accessors[skins[s]["inverseBindMatrices"].get<size_t>()];
         if (a["type"] != "MAT4" || a["componentType"] != 5126)
-            say(p, path, "inverse bind matrices must be MAT4 of floats");
-        if (a["count"].get<size_t>() < joints.size()) say(p, path, "fewer inverse bind matrices than joints");
+            sayHarmless(p, path, "inverse bind matrices must be MAT4 of floats");
+        if (a["count"].get<size_t>() < joints.size()) sayHarmless(p, path, "fewer inverse bind matrices than joints");
         if (hasStride(root, a)) sayHarmless(p, path, "the buffer view of inverse bind matrices has no 'byteStride'");
     }
     for (size_t n = 0; n < parent.size(); ++n) {
@@ -120,7 +122,7 @@ void checkAnimationsAndSkins(const json& root, Problems& p) {
             const json list = scene.value("nodes", json::array());
             const auto has = [&](size_t node) { return std::find(list.begin(), list.end(), json(node)) != list.end(); };
             if (has(mine) && !has(joint))
-                say(p, fmt::format("/nodes/{}", n), "the joints of its skin are not in its scene");
+                sayHarmless(p, fmt::format("/nodes/{}", n), "the joints of its skin are not in its scene");
         }
     }
 }

@@ -7,10 +7,13 @@
 
 namespace stipple::scene::gltf {
 
+using nlohmann::json;
+
 Result<Problems> checkAll(const Container& c, Buffers& buffers) {
     Problems p;
-    checkStructure(c.json, p);
-    if (mattersAny(p)) return p;
+    Mends mends;
+    checkStructure(c.json, p, mends);
+    if (mattersAny(p) || !mends.empty()) return p;  // what follows relies on the structure
     checkGraph(c.json, p);
     checkExtents(c.json, c.isBinary, c.hasBinaryChunk, c.binary.size(), p);
     if (mattersAny(p)) return p;
@@ -24,27 +27,84 @@ Result<Problems> checkAll(const Container& c, Buffers& buffers) {
     return p;
 }
 
-Result<std::vector<std::string>> requireGood(const Container& c, Buffers& buffers, bool repair) {
-    for (const nlohmann::json& name : arrayOf(c.json, "extensionsRequired")) {
-        const auto& known = knownExtensions();
-        if (name.is_string() && std::find(known.begin(), known.end(), name.get<std::string>()) == known.end())
-            return fail(ErrorKind::input,
-                        fmt::format("requires the extension {}, which is not supported", name.get<std::string>()),
-                        c.path);
+namespace {
+
+/// Extensions without which nothing right could be drawn are refused by name, the others are a note.
+Result<void> checkRequired(const Container& c, bool isStrict, std::vector<std::string>& passedOver) {
+    const auto& known = knownExtensions();
+    for (const json& name : arrayOf(c.json, "extensionsRequired")) {
+        if (!name.is_string()) continue;  // said by the check of the structure
+        const auto& text = name.get_ref<const std::string&>();
+        if (std::find(known.begin(), known.end(), text) != known.end()) continue;
+        if (!isStrict && isAboutLooks(text)) {
+            passedOver.push_back("/extensionsRequired: requires " + text + ", which is not drawn");
+            continue;
+        }
+        const bool isDraco = text == "KHR_draco_mesh_compression";
+        return fail(ErrorKind::input, fmt::format("requires the extension {}, which is not supported", text), c.path,
+                    isDraco ? "decompress it, e.g. with gltf-transform copy or Blender" : "");
     }
-    STIPPLE_ASSIGN(Problems problems, checkAll(c, buffers));
-    std::vector<std::string> passedOver;
-    if (repair)
-        std::erase_if(problems, [&](const std::string& text) {
-            if (isHarmless(text)) passedOver.push_back(text.substr(1));
-            return isHarmless(text);
-        });
-    if (problems.empty()) return passedOver;
-    const std::string& first = problems.front();
+    return {};
+}
+
+/// Draco may be an alternative to plain accessors; where those are empty, it is the only form.
+Result<void> checkDraco(const Container& c) {
+    for (const json& mesh : arrayOf(c.json, "meshes"))
+        for (const json& primitive : mesh["primitives"]) {
+            if (extensionOf(primitive, "KHR_draco_mesh_compression").is_null()) continue;
+            const auto isEmpty = [&](const json& index) {
+                return !c.json["accessors"][index.get<size_t>()].contains("bufferView");
+            };
+            const json& attributes = primitive["attributes"];
+            if ((attributes.contains("POSITION") && isEmpty(attributes["POSITION"])) ||
+                (primitive.contains("indices") && isEmpty(primitive["indices"])))
+                return fail(ErrorKind::input,
+                            "its meshes are compressed with KHR_draco_mesh_compression, which is not supported", c.path,
+                            "decompress it, e.g. with gltf-transform copy or Blender");
+        }
+    return {};
+}
+
+Result<void> refuse(const Container& c, const Problems& problems, bool isStrict) {
+    // What matters first.
+    const auto found = std::find_if(problems.begin(), problems.end(), [](const auto& p) { return !isHarmless(p); });
+    const std::string& first = found == problems.end() ? problems.front() : *found;
     const std::string more = problems.size() > 1 ? fmt::format(" (and {} more)", problems.size() - 1) : "";
     return fail(ErrorKind::input, (isHarmless(first) ? first.substr(1) : first) + more, c.path,
-                mattersAny(problems) ? "the file is not valid glTF 2.0"
-                                     : "the file is not valid glTF 2.0; --repair passes over this");
+                isStrict && !mattersAny(problems) ? "the file is not valid glTF 2.0, but can be drawn"
+                                                  : "the file is not valid glTF 2.0");
+}
+
+/// Until the structure is one that all that follows can rely on.
+Result<void> mendStructure(Container& c, std::vector<std::string>& passedOver) {
+    constexpr int kRounds = 5;  // what is left out may be missed elsewhere
+    for (int round = 0;; ++round) {
+        Problems problems;
+        Mends mends;
+        checkStructure(c.json, problems, mends);
+        if (mattersAny(problems) || (!mends.empty() && round == kRounds)) return refuse(c, problems, false);
+        if (mends.empty()) return {};
+        for (const std::string& text : problems) passedOver.push_back(text.substr(1));
+        applyMends(mends, c.json);
+    }
+}
+
+}  // namespace
+
+Result<std::vector<std::string>> requireGood(Container& c, Buffers& buffers, bool isStrict) {
+    std::vector<std::string> passedOver;
+    STIPPLE_TRY(checkRequired(c, isStrict, passedOver));
+    if (!isStrict) {
+        STIPPLE_TRY(mendStructure(c, passedOver));
+        STIPPLE_TRY(checkDraco(c));
+    }
+    STIPPLE_ASSIGN(const Problems problems, checkAll(c, buffers));
+    if (mattersAny(problems) || (isStrict && !problems.empty()))
+        return tl::unexpected(refuse(c, problems, isStrict).error());
+    for (const std::string& text : problems)
+        if (std::find(passedOver.begin(), passedOver.end(), text.substr(1)) == passedOver.end())
+            passedOver.push_back(text.substr(1));
+    return passedOver;
 }
 
 }  // namespace stipple::scene::gltf

@@ -8,8 +8,9 @@ namespace stipple::scene::gltf {
 /// What is wrong with a file whose container could be read; empty: nothing. `buffers` is loaded on the way.
 Result<Problems> checkAll(const Container& container, Buffers& buffers);
 
-/// checkAll as one error: the first problem, and how many more there are. A required extension that is not understood
-/// is refused by name. With `repair`, harmless ones are no error but the result.
-Result<std::vector<std::string>> requireGood(const Container& container, Buffers& buffers, bool repair);
+/// checkAll as one error: the first problem, and how many more there are. What cannot be drawn is refused; with
+/// `isStrict`, whatever the specification forbids. Otherwise those faults are mended or passed over, and are the
+/// result.
+Result<std::vector<std::string>> requireGood(Container& container, Buffers& buffers, bool isStrict);
 
 }  // namespace stipple::scene::gltf

@@ -7,11 +7,11 @@
 #include <set>
 
 #include "engine/base/file.h"
+#include "engine/scene/read_settings.h"
 
 namespace stipple::scene::gltf {
 namespace {
 
-constexpr uint64_t kSizeLimit = uint64_t{8} << 30;
 constexpr uint32_t kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
 constexpr int kDeepestJson = 64;
 
@@ -66,7 +66,24 @@ class Watcher final : public nlohmann::json_sax<nlohmann::json> {
     int depth_ = 0;
 };
 
-Result<nlohmann::json> parseJson(const char* begin, const char* end, const std::string& path) {
+/// What the values of a JSON text take, from what separates them (measured: up to 100 bytes a member).
+uint64_t memoryOfJson(const char* begin, const char* end) {
+    uint64_t bytes = 0;
+    bool inText = false;
+    for (const char* p = begin; p < end; ++p) {
+        if (inText && *p == '\\')
+            ++p;
+        else if (*p == '"')
+            inText = !inText;
+        else if (!inText)
+            bytes += *p == ':' ? 120 : *p == ',' ? 24 : *p == '{' || *p == '[' ? 64 : 0;
+    }
+    return bytes + static_cast<uint64_t>(end - begin);
+}
+
+Result<nlohmann::json> parseJson(const char* begin, const char* end, const std::string& path, uint64_t memoryBytes) {
+    if (const uint64_t needed = memoryOfJson(begin, end); needed > memoryBytes)
+        return overBudget("its JSON", needed, memoryBytes, path);
     if (end - begin >= 3 && std::memcmp(begin, "\xef\xbb\xbf", 3) == 0)
         return fail(ErrorKind::input, "the JSON begins with a byte order mark", path,
                     "glTF forbids it; save it as UTF-8 without");
@@ -80,12 +97,14 @@ Result<nlohmann::json> parseJson(const char* begin, const char* end, const std::
         nlohmann::json json = nlohmann::json::parse(begin, end);
         if (!json.is_object()) return fail(ErrorKind::input, "the JSON is not an object", path);
         return json;
-    } catch (const std::exception& e) {
-        return fail(ErrorKind::input, fmt::format("is not JSON: {}", e.what()), path, "is it a glTF file?");
+    } catch (const nlohmann::json::parse_error& e) {
+        return fail(ErrorKind::input, fmt::format("is not JSON (at byte {})", e.byte), path, "is it a glTF file?");
+    } catch (const nlohmann::json::exception&) {
+        return fail(ErrorKind::input, "its JSON holds a number that is too large", path, "is it a glTF file?");
     }
 }
 
-Result<void> readBinaryForm(const std::vector<uint8_t>& bytes, Container& c) {
+Result<void> readBinaryForm(const std::vector<uint8_t>& bytes, Container& c, uint64_t memoryBytes) {
     const auto bad = [&](const std::string& what) {
         return fail(ErrorKind::input, what, c.path, "the .glb file is damaged");
     };
@@ -115,7 +134,7 @@ Result<void> readBinaryForm(const std::vector<uint8_t>& bytes, Container& c) {
         const auto* begin = bytes.data() + at + 8;
         if (type == kJsonChunk) {
             const auto* text = reinterpret_cast<const char*>(begin);
-            STIPPLE_ASSIGN(c.json, parseJson(text, text + size, c.path));
+            STIPPLE_ASSIGN(c.json, parseJson(text, text + size, c.path, memoryBytes));
             hasJson = true;
         } else if (type == kBinaryChunk) {
             c.binary.assign(begin, begin + size);
@@ -128,24 +147,25 @@ Result<void> readBinaryForm(const std::vector<uint8_t>& bytes, Container& c) {
 
 }  // namespace
 
-Result<Container> readContainer(const std::string& path) {
+Result<Container> readContainer(const std::string& path, uint64_t memoryBytes) {
     STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
     Container c;
     c.path = path;
     c.folder = std::filesystem::path(path).parent_path().string();
     c.fileBytes = file.sizeBytes();
-    if (c.fileBytes > kSizeLimit) return fail(ErrorKind::input, "is larger than 8 GiB", path, "split it");
+    if (2 * c.fileBytes > memoryBytes)  // the file, and the chunks of it
+        return overBudget("is read as a whole, which", 2 * c.fileBytes, memoryBytes, path);
     if (c.fileBytes == 0) return fail(ErrorKind::input, "is empty", path, "is the download complete?");
     std::vector<uint8_t> bytes(c.fileBytes);
     STIPPLE_TRY(file.readAt(0, bytes.data(), bytes.size()));
     const bool isNamedBinary = std::filesystem::path(path).extension() == ".glb";
     if (bytes.size() >= 4 && std::memcmp(bytes.data(), "glTF", 4) == 0) {
-        STIPPLE_TRY(readBinaryForm(bytes, c));
+        STIPPLE_TRY(readBinaryForm(bytes, c, memoryBytes));
         return c;
     }
     if (isNamedBinary) return fail(ErrorKind::input, "does not begin with glTF", path, "is it a .glb file?");
     const auto* text = reinterpret_cast<const char*>(bytes.data());
-    STIPPLE_ASSIGN(c.json, parseJson(text, text + bytes.size(), path));
+    STIPPLE_ASSIGN(c.json, parseJson(text, text + bytes.size(), path, memoryBytes));
     return c;
 }
 

@@ -17,7 +17,7 @@ struct Container {  // NOLINT(bugprone-exception-escape): moving JSON checks its
     uint64_t fileBytes = 0;
 };
 
-/// `.gltf` or `.glb`, told by content. Errors name the offset.
-Result<Container> readContainer(const std::string& path);
+/// `.gltf` or `.glb`, told by content. Errors name the offset. What would take more than `memoryBytes` is refused.
+Result<Container> readContainer(const std::string& path, uint64_t memoryBytes = uint64_t{2} << 30);
 
 }  // namespace stipple::scene::gltf

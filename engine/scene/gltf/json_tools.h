@@ -39,6 +39,14 @@ inline const nlohmann::json& arrayOf(const nlohmann::json& root, const char* nam
     return found == root.end() ? none : *found;
 }
 
+/// A glm vector of an array with as many numbers.
+template <typename V>
+V vectorOf(const nlohmann::json& array) {
+    V v;
+    for (size_t i = 0; i < array.size(); ++i) v[static_cast<int>(i)] = array[i].get<typename V::value_type>();
+    return v;
+}
+
 /// Is `name` in the root's list (extensionsUsed, extensionsRequired)?
 inline bool listed(const nlohmann::json& root, const char* list, const std::string& name) {
     const nlohmann::json& names = arrayOf(root, list);

@@ -1,12 +1,15 @@
 // From a checked glTF file to a Scene.
 #include <fmt/format.h>
 
-#include <filesystem>
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
 
 #include "engine/scene/gltf/check.h"
 #include "engine/scene/gltf/json_tools.h"
+#include "engine/scene/gltf/looks.h"
 #include "engine/scene/scene.h"
 
 namespace stipple::scene {
@@ -14,24 +17,20 @@ namespace {
 
 using gltf::arrayOf;
 using gltf::extensionOf;
+using gltf::vectorOf;
 using nlohmann::json;
 
-template <typename V>
-V vectorOf(const json& array) {
-    V v;
-    for (size_t i = 0; i < array.size(); ++i) v[static_cast<int>(i)] = array[i].get<typename V::value_type>();
-    return v;
-}
+/// Of an instance, until it is placed (measured).
+constexpr uint64_t kInstanceBytes = 512;
 
 class Reader {
   public:
-    Reader(const gltf::Container& c, gltf::Buffers& buffers) : c_(c), root_(c.json), buffers_(buffers) {}
+    Reader(const gltf::Container& c, gltf::Buffers& buffers, const ReadSettings& settings)
+        : c_(c), root_(c.json), buffers_(buffers), settings_(settings) {}
 
     Result<Scene> read() {
         scene_.path = c_.path;
-        readMaterials();
-        STIPPLE_TRY(readImages());
-        readLightsAndCameras();
+        STIPPLE_TRY(gltf::readLooks(c_, buffers_, scene_));
         for (const json& mesh : arrayOf(root_, "meshes")) {
             Mesh m;
             m.name = mesh.value("name", "");
@@ -46,122 +45,37 @@ class Reader {
     }
 
   private:
-    TextureUse textureUse(const json& parent, const char* name) const {
-        TextureUse use;
-        if (!parent.contains(name)) return use;
-        const json& info = parent[name];
-        use.texture = info["index"].get<int>();
-        use.uvSet = info.value("texCoord", 0);
-        const json& transform = extensionOf(info, "KHR_texture_transform");
-        if (!transform.is_object()) return use;
-        use.uvSet = transform.value("texCoord", use.uvSet);
-        const auto offset = transform.contains("offset") ? vectorOf<glm::vec2>(transform["offset"]) : glm::vec2(0);
-        const auto scale = transform.contains("scale") ? vectorOf<glm::vec2>(transform["scale"]) : glm::vec2(1);
-        const float r = transform.value("rotation", 0.0f), cosine = std::cos(r), sine = std::sin(r);
-        // translation * rotation * scale (KHR_texture_transform, "Overview")
-        use.transform =
-            glm::mat3(cosine * scale.x, -sine * scale.x, 0, sine * scale.y, cosine * scale.y, 0, offset.x, offset.y, 1);
-        return use;
-    }
-
-    void readMaterials() {
-        for (const json& j : arrayOf(root_, "materials")) {
-            Material m;
-            m.name = j.value("name", "");
-            static const json none = json::object();
-            const json& pbr = j.contains("pbrMetallicRoughness") ? j["pbrMetallicRoughness"] : none;
-            if (pbr.contains("baseColorFactor")) m.baseColour = vectorOf<glm::vec4>(pbr["baseColorFactor"]);
-            m.metallic = pbr.value("metallicFactor", 1.0f);
-            m.roughness = pbr.value("roughnessFactor", 1.0f);
-            m.baseColourTexture = textureUse(pbr, "baseColorTexture");
-            m.metallicRoughnessTexture = textureUse(pbr, "metallicRoughnessTexture");
-            m.normalTexture = textureUse(j, "normalTexture");
-            m.occlusionTexture = textureUse(j, "occlusionTexture");
-            m.emissiveTexture = textureUse(j, "emissiveTexture");
-            if (j.contains("normalTexture")) m.normalScale = j["normalTexture"].value("scale", 1.0f);
-            if (j.contains("occlusionTexture")) m.occlusionStrength = j["occlusionTexture"].value("strength", 1.0f);
-            if (j.contains("emissiveFactor")) m.emissive = vectorOf<glm::vec3>(j["emissiveFactor"]);
-            m.emissive *= extensionOf(j, "KHR_materials_emissive_strength").is_object()
-                              ? extensionOf(j, "KHR_materials_emissive_strength").value("emissiveStrength", 1.0f)
-                              : 1.0f;
-            const std::string alpha = j.value("alphaMode", "OPAQUE");
-            m.alphaMode = alpha == "MASK" ? AlphaMode::mask : alpha == "BLEND" ? AlphaMode::blend : AlphaMode::opaque;
-            m.alphaCutoff = j.value("alphaCutoff", 0.5f);
-            m.isDoubleSided = j.value("doubleSided", false);
-            m.isUnlit = extensionOf(j, "KHR_materials_unlit").is_object();
-            scene_.materials.push_back(std::move(m));
-        }
-    }
-
-    Result<void> readImages() {
-        const json& images = arrayOf(root_, "images");
-        for (size_t i = 0; i < images.size(); ++i) {
-            EncodedImage image;
-            image.name = images[i].value("name", images[i].value("uri", "").substr(0, 80));
-            STIPPLE_ASSIGN(image.bytes, buffers_.image(i));
-            scene_.images.push_back(std::move(image));
-        }
-        const auto wrap = [](int code) {
-            return code == 33071 ? Wrap::clamp : code == 33648 ? Wrap::mirror : Wrap::repeat;
-        };
-        for (const json& j : arrayOf(root_, "textures")) {
-            Texture t;
-            t.image = j.value("source", -1);
-            if (const json& webp = extensionOf(j, "EXT_texture_webp"); webp.is_object() && t.image < 0)
-                t.image = webp.value("source", -1);
-            if (j.contains("sampler")) {
-                const json& sampler = root_["samplers"][j["sampler"].get<size_t>()];
-                t.wrapU = wrap(sampler.value("wrapS", 10497));
-                t.wrapV = wrap(sampler.value("wrapT", 10497));
-            }
-            scene_.textures.push_back(t);
-        }
-        return {};
-    }
-
-    void readLightsAndCameras() {
-        const json& punctual = extensionOf(root_, "KHR_lights_punctual");
-        for (const json& j : punctual.is_object() ? punctual["lights"] : json::array()) {
-            Light light;
-            const std::string type = j.value("type", "point");
-            light.kind = type == "directional" ? LightKind::directional
-                         : type == "spot"      ? LightKind::spot
-                                               : LightKind::point;
-            if (j.contains("color")) light.colour = vectorOf<glm::vec3>(j["color"]);
-            light.intensity = j.value("intensity", 1.0f);
-            light.range = j.value("range", 0.0f);
-            if (j.contains("spot")) {
-                light.innerCone = j["spot"].value("innerConeAngle", 0.0f);
-                light.outerCone = j["spot"].value("outerConeAngle", 0.7853982f);
-            }
-            scene_.lights.push_back(light);
-        }
-        for (const json& j : arrayOf(root_, "cameras")) {
-            SceneCamera camera;
-            camera.isOrthographic = j["type"] == "orthographic";
-            const json& of = j[j["type"].get<std::string>()];
-            camera.nearPlane = of["znear"].get<double>();
-            if (camera.isOrthographic)
-                camera.height = 2 * of["ymag"].get<double>();
-            else
-                camera.fovDegrees = glm::degrees(of["yfov"].get<double>());
-            scene_.cameras.push_back(camera);
-        }
-    }
-
+    /// `fill`: what is not there, or no number.
     template <typename V>
-    Result<std::vector<V>> vectors(const json& attributes, const std::string& name, int components, float fill) {
+    Result<std::vector<V>> vectors(const json& attributes, const std::string& name, int components, float fill,
+                                   bool keepsNan = false) {
         std::vector<V> out;
         if (!attributes.contains(name)) return out;
-        STIPPLE_ASSIGN(const std::vector<double> values, buffers_.values(attributes[name].get<size_t>()));
         const json& accessor = root_["accessors"][attributes[name].get<size_t>()];
         const auto count = accessor["count"].get<size_t>();
+        STIPPLE_ASSIGN(const std::vector<double> values, buffers_.values(attributes[name].get<size_t>()));
+        STIPPLE_TRY(buffers_.claim(count * sizeof(V), "its vertices"));
         const auto has = static_cast<int>(values.size() / count);
-        out.resize(count);
+        out.resize(count, V(fill));
         for (size_t i = 0; i < count; ++i)
-            for (int k = 0; k < components; ++k)
-                out[i][k] =
-                    k < has ? static_cast<float>(values[i * static_cast<size_t>(has) + static_cast<size_t>(k)]) : fill;
+            for (int k = 0; k < std::min(components, has); ++k) {
+                const auto value = static_cast<float>(values[i * static_cast<size_t>(has) + static_cast<size_t>(k)]);
+                if (std::isfinite(value) || keepsNan) out[i][k] = value;
+            }
+        return out;
+    }
+
+    /// An attribute beside the positions: as many, or none.
+    template <typename V>
+    Result<std::vector<V>> beside(const Primitive& p, const json& attributes, const std::string& name, int components,
+                                  float fill) {
+        STIPPLE_ASSIGN(std::vector<V> out, vectors<V>(attributes, name, components, fill));
+        if (out.size() < p.position.size() && !out.empty()) {
+            scene_.notes.push_back(
+                fmt::format("{} is left out: {} of {} vertices have it", name, out.size(), p.position.size()));
+            return std::vector<V>();
+        }
+        if (!out.empty()) out.resize(p.position.size());
         return out;
     }
 
@@ -172,28 +86,61 @@ class Reader {
             return {};
         }
         Primitive p;
-        STIPPLE_ASSIGN(p.position, vectors<glm::vec3>(attributes, "POSITION", 3, 0));
-        STIPPLE_ASSIGN(p.normal, vectors<glm::vec3>(attributes, "NORMAL", 3, 0));
-        STIPPLE_ASSIGN(p.tangent, vectors<glm::vec4>(attributes, "TANGENT", 4, 1));
-        STIPPLE_ASSIGN(p.colour, vectors<glm::vec4>(attributes, "COLOR_0", 4, 1));
-        STIPPLE_ASSIGN(const auto radii, vectors<glm::vec1>(attributes, "_RADIUS", 1, 0));
+        STIPPLE_ASSIGN(p.position, vectors<glm::vec3>(attributes, "POSITION", 3, 0, true));
+        STIPPLE_ASSIGN(p.normal, beside<glm::vec3>(p, attributes, "NORMAL", 3, 0));
+        STIPPLE_ASSIGN(p.tangent, beside<glm::vec4>(p, attributes, "TANGENT", 4, 1));
+        STIPPLE_ASSIGN(p.colour, beside<glm::vec4>(p, attributes, "COLOR_0", 4, 1));
+        STIPPLE_ASSIGN(const auto radii, beside<glm::vec1>(p, attributes, "_RADIUS", 1, 0));
         for (const glm::vec1& r : radii) p.radius.push_back(r.x);
-        for (int set = 0; attributes.contains(fmt::format("TEXCOORD_{}", set)); ++set) {
-            STIPPLE_ASSIGN(std::vector<glm::vec2> uv,
-                           vectors<glm::vec2>(attributes, fmt::format("TEXCOORD_{}", set), 2, 0));
-            p.uv.push_back(std::move(uv));
+        constexpr int kMostSets = 16;
+        for (int set = 0; set < kMostSets; ++set) {
+            const std::string name = fmt::format("TEXCOORD_{}", set);
+            if (!attributes.contains(name)) continue;
+            p.uv.resize(static_cast<size_t>(set) + 1);
+            STIPPLE_ASSIGN(p.uv.back(), beside<glm::vec2>(p, attributes, name, 2, 0));
         }
+        STIPPLE_TRY(buffers_.claim(p.uv.size() * p.position.size() * sizeof(glm::vec2), "its vertices"));
+        for (auto& uv : p.uv) uv.resize(p.position.size(), glm::vec2(0));  // sets that are not there
         p.material = j.value("material", -1);
-        std::vector<uint32_t> order(p.position.size());
-        for (size_t i = 0; i < order.size(); ++i) order[i] = static_cast<uint32_t>(i);
+        std::vector<uint32_t> order;
         if (j.contains("indices")) {
             STIPPLE_ASSIGN(order, buffers_.indices(j["indices"].get<size_t>()));
+        } else {
+            order.resize(p.position.size());
+            for (size_t i = 0; i < order.size(); ++i) order[i] = static_cast<uint32_t>(i);
         }
-        unroll(order, j.value("mode", 4), p);
+        const int mode = j.value("mode", 4);
+        constexpr uint64_t kUnrolled = 3;  // of a strip
+        STIPPLE_TRY(buffers_.claim(order.size() * sizeof(order[0]) * (mode > 4 ? kUnrolled : 2), "its indices"));
+        unroll(order, mode, p);
+        dropBroken(p, mesh.name);
         if (j.contains("targets"))
             scene_.notes.push_back(fmt::format("mesh '{}': morph targets are left out", mesh.name));
         mesh.primitives.push_back(std::move(p));
         return {};
+    }
+
+    /// Elements whose vertices are not there or are no numbers.
+    void dropBroken(Primitive& p, const std::string& name) {
+        const size_t corners = p.kind == PrimitiveKind::points ? 1 : p.kind == PrimitiveKind::lines ? 2 : 3;
+        const auto isGood = [&](uint32_t i) {
+            return i < p.position.size() && std::isfinite(p.position[i].x + p.position[i].y + p.position[i].z);
+        };
+        size_t kept = 0;
+        for (size_t i = 0; i + corners <= p.indices.size(); i += corners) {
+            bool good = true;
+            for (size_t k = 0; k < corners; ++k) good = good && isGood(p.indices[i + k]);
+            if (!good) continue;
+            for (size_t k = 0; k < corners; ++k) p.indices[kept++] = p.indices[i + k];
+        }
+        if (kept < p.indices.size() / corners * corners)
+            scene_.notes.push_back(
+                fmt::format("mesh '{}': {} of {} elements refer to vertices that are not there or no "
+                            "numbers, and are left out",
+                            name, p.indices.size() / corners - kept / corners, p.indices.size() / corners));
+        p.indices.resize(kept);
+        for (glm::vec3& v : p.position)  // nobody refers to those any more
+            if (!std::isfinite(v.x + v.y + v.z)) v = glm::vec3(0);
     }
 
     /// glTF 2.0, 3.7.2.1: modes 0 to 6.
@@ -231,6 +178,7 @@ class Reader {
         if (j.contains("matrix")) {
             glm::dmat4 m;
             for (int k = 0; k < 16; ++k) m[k / 4][k % 4] = j["matrix"][static_cast<size_t>(k)].get<double>();
+            for (int column = 0; column < 4; ++column) m[column][3] = column == 3 ? 1 : 0;
             return m;
         }
         glm::dmat4 m(1);
@@ -246,6 +194,13 @@ class Reader {
     Result<void> readInstances(const json& extension, Node& node) {
         if (!extension.is_object()) return {};
         const json& attributes = extension["attributes"];
+        for (const char* name : {"TRANSLATION", "ROTATION", "SCALE"}) {  // each becomes a placed thing
+            if (!attributes.contains(name)) continue;
+            const auto count = root_["accessors"][attributes[name].get<size_t>()]["count"].get<uint64_t>();
+            STIPPLE_TRY(buffers_.claim(count > UINT64_MAX / kInstanceBytes ? UINT64_MAX : count * kInstanceBytes,
+                                       fmt::format("node '{}' with {} instances", node.name, count)));
+            break;
+        }
         STIPPLE_ASSIGN(const auto translations, vectors<glm::vec3>(attributes, "TRANSLATION", 3, 0));
         STIPPLE_ASSIGN(const auto rotations, vectors<glm::vec4>(attributes, "ROTATION", 4, 0));
         STIPPLE_ASSIGN(const auto scales, vectors<glm::vec3>(attributes, "SCALE", 3, 1));
@@ -266,23 +221,40 @@ class Reader {
         return {};
     }
 
-    /// The nodes of the default scene (of all, where there is none), parents first; no recursion, however deep it goes.
-    Result<void> readNodes() {
+    /// Nodes that the default scene begins with (all that are nobody's children, where there is none); second: those
+    /// of them that also stand below another.
+    std::array<std::vector<size_t>, 2> rootNodes() const {
         const json& nodes = arrayOf(root_, "nodes");
-        std::vector<std::pair<size_t, int>> open;
+        std::vector<bool> isChild(nodes.size(), false);
+        for (const json& n : nodes)
+            for (const json& child : n.value("children", json::array())) isChild[child.get<size_t>()] = true;
+        std::array<std::vector<size_t>, 2> roots;
         const json& scenes = arrayOf(root_, "scenes");
         if (!scenes.empty()) {
             const json list = scenes[root_.value("scene", size_t{0})].value("nodes", json::array());
-            for (const json& n : list) open.emplace_back(n.get<size_t>(), -1);
+            for (const json& n : list) roots[isChild[n.get<size_t>()] ? 1 : 0].push_back(n.get<size_t>());
         } else {
-            std::vector<bool> isChild(nodes.size(), false);
-            for (const json& n : nodes)
-                for (const json& child : n.value("children", json::array())) isChild[child.get<size_t>()] = true;
             for (size_t i = 0; i < nodes.size(); ++i)
-                if (!isChild[i]) open.emplace_back(i, -1);
+                if (!isChild[i]) roots[0].push_back(i);
         }
+        return roots;
+    }
+
+    /// The nodes, parents first; no recursion, however deep it goes. Each is taken once.
+    Result<void> readNodes() {
+        const json& nodes = arrayOf(root_, "nodes");
+        std::vector<bool> isTaken(nodes.size(), false);
+        for (const std::vector<size_t>& starts : rootNodes()) STIPPLE_TRY(readNodesFrom(starts, nodes, isTaken));
+        return {};
+    }
+
+    Result<void> readNodesFrom(const std::vector<size_t>& starts, const json& nodes, std::vector<bool>& isTaken) {
+        std::vector<std::pair<size_t, int>> open;
+        for (const size_t start : starts) open.emplace_back(start, -1);
         for (size_t at = 0; at < open.size(); ++at) {
             const auto [index, parent] = open[at];
+            if (isTaken[index]) continue;
+            isTaken[index] = true;
             const json& j = nodes[index];
             Node node;
             node.name = j.value("name", "");
@@ -290,10 +262,15 @@ class Reader {
             node.parent = parent;
             node.mesh = j.value("mesh", -1);
             node.camera = j.value("camera", -1);
-            if (const json& light = extensionOf(j, "KHR_lights_punctual"); light.is_object())
-                node.light = light["light"].get<int>();
-            if (const json& store = extensionOf(j, "STIPPLE_store"); store.is_object())
-                node.store = (std::filesystem::path(c_.folder) / store["uri"].get<std::string>()).string();
+            if (const json& light = extensionOf(j, "KHR_lights_punctual"); light.is_object()) {
+                const auto which = light.contains("light") && light["light"].is_number_unsigned()
+                                       ? light["light"].get<uint64_t>()
+                                       : UINT64_MAX;
+                node.light = which < scene_.lights.size() ? static_cast<int>(which) : -1;
+            }
+            if (const json& store = extensionOf(j, "STIPPLE_store"); store.is_object()) {
+                STIPPLE_ASSIGN(node.store, fileOfScene(c_.folder, store["uri"].get<std::string>(), settings_));
+            }
             if (const json& visible = extensionOf(j, "KHR_node_visibility"); visible.is_object())
                 node.isVisible = visible.value("visible", true);
             STIPPLE_TRY(readInstances(extensionOf(j, "EXT_mesh_gpu_instancing"), node));
@@ -309,24 +286,28 @@ class Reader {
     const gltf::Container& c_;
     const json& root_;
     gltf::Buffers& buffers_;
+    const ReadSettings& settings_;
     Scene scene_;
 };
 
 }  // namespace
 
-Result<Scene> readGltf(const std::string& path, bool repair) {
-    STIPPLE_ASSIGN(const gltf::Container c, gltf::readContainer(path));
-    gltf::Buffers buffers(c);
-    try {  // a property of a type that no check expected ends here
-        STIPPLE_ASSIGN(const std::vector<std::string> passedOver, gltf::requireGood(c, buffers, repair));
-        STIPPLE_ASSIGN(Scene scene, Reader(c, buffers).read());
+Result<Scene> readGltf(const std::string& path, const ReadSettings& settings) {
+    try {
+        STIPPLE_ASSIGN(gltf::Container c, gltf::readContainer(path, settings.memoryBytes));
+        gltf::Buffers buffers(c, settings);
+        STIPPLE_ASSIGN(const std::vector<std::string> passedOver, gltf::requireGood(c, buffers, settings.isStrict));
+        STIPPLE_ASSIGN(Scene scene, Reader(c, buffers, settings).read());
         if (!passedOver.empty())
-            scene.notes.push_back(
-                fmt::format("{} faults passed over (50: or more), the first at {}", passedOver.size(), passedOver[0]));
+            scene.notes.push_back(fmt::format(
+                "the file is not quite glTF 2.0: faults passed over: {}{}, the first: {}", passedOver.size(),
+                passedOver.size() >= gltf::kMostProblems / 2 ? " or more" : "", passedOver[0]));
         return scene;
-    } catch (const std::exception& e) {
-        return fail(ErrorKind::input, fmt::format("is not what glTF expects: {}", e.what()), path,
+    } catch (const json::exception&) {  // a property of a type that no check expected
+        return fail(ErrorKind::input, "holds a property of a type that glTF does not have", path,
                     "the file is not valid glTF 2.0");
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorKind::budget, "does not fit in memory", path, "close other programs, or split the scene");
     }
 }
 

@@ -236,9 +236,56 @@ bool isPointer(const std::string& s) {
     return true;
 }
 
+/// Members that a picture can do without: where they are wrong they are left out.
+bool canBeLeftOut(const std::string& name) {
+    static const std::set<std::string> names{"name",
+                                             "pbrMetallicRoughness",
+                                             "generator",
+                                             "copyright",
+                                             "minVersion",
+                                             "animations",
+                                             "skins",
+                                             "cameras",
+                                             "camera",
+                                             "skin",
+                                             "weights",
+                                             "targets",
+                                             "target",
+                                             "min",
+                                             "max",
+                                             "material",
+                                             "sampler",
+                                             "source",
+                                             "magFilter",
+                                             "minFilter",
+                                             "wrapS",
+                                             "wrapT",
+                                             "mimeType",
+                                             "doubleSided",
+                                             "alphaMode",
+                                             "alphaCutoff",
+                                             "normalTexture",
+                                             "occlusionTexture",
+                                             "baseColorTexture",
+                                             "emissiveTexture",
+                                             "metallicRoughnessTexture",
+                                             "aspectRatio",
+                                             "zfar",
+                                             "range",
+                                             "texCoord",
+                                             "scene"};
+    return names.count(name) != 0;
+}
+
+/// Without these extensions something else would be drawn than what the file means.
+bool decidesGeometry(const std::string& extension) {
+    return extension == "EXT_mesh_gpu_instancing" || extension == "EXT_meshopt_compression" ||
+           extension == "KHR_mesh_quantization" || extension == "STIPPLE_store";
+}
+
 class Checker {
   public:
-    Checker(const json& root, Problems& problems) : root_(root), problems_(problems) {}
+    Checker(const json& root, Problems& problems, Mends& mends) : root_(root), problems_(problems), mends_(mends) {}
 
     void object(const json& value, const std::string& type, const std::string& path) {
         if (!value.is_object()) return say(path, "must be an object");
@@ -251,7 +298,16 @@ class Checker {
             if (key == "extensions") {
                 extensions(member, at);
             } else if (const auto rule = found->second.rules.find(key); rule != found->second.rules.end()) {
-                check(member, rule->second.what, rule->second.arguments, at);
+                const auto& required = found->second.required;
+                const bool isOptional = std::find(required.begin(), required.end(), key) == required.end();
+                const auto test = [&](Checker& by) { by.check(member, rule->second.what, rule->second.arguments, at); };
+                if (isOptional && member.is_array() && member.empty() && rule->second.what != "any") {
+                    sayHarmless(at, "is empty");
+                    mend(at);
+                } else if (isOptional && canBeLeftOut(key))
+                    orLeaveOut(at, test);
+                else
+                    test(*this);
             }
         }
     }
@@ -259,31 +315,58 @@ class Checker {
   private:
     void say(const std::string& path, const std::string& what) { gltf::say(problems_, path, what); }
 
+    void sayHarmless(const std::string& path, const std::string& what) { gltf::sayHarmless(problems_, path, what); }
+    void mend(const std::string& path, json value = nullptr) {
+        if (path.find('~') == std::string::npos) mends_.push_back({json::json_pointer(path), std::move(value)});
+    }
+
+    /// What `test` finds wrong is harmless, since the member at `path` can be left out.
+    template <typename Test>
+    void orLeaveOut(const std::string& path, const Test& test) {
+        Problems found;
+        Mends mends;
+        Checker inner(root_, found, mends);
+        test(inner);
+        const bool isLeftOut = mattersAny(found);
+        for (const std::string& problem : found)
+            if (problems_.size() < kMostProblems / 2)
+                problems_.push_back(isHarmless(problem) ? problem : kHarmless + problem);
+        if (isLeftOut)
+            mend(path);
+        else
+            mends_.insert(mends_.end(), mends.begin(), mends.end());
+    }
+
     void extensions(const json& value, const std::string& path) {
         if (!value.is_object()) return say(path, "must be an object");
         for (const auto& [name, member] : value.items()) {
             const std::string at = below(path, name);
-            if (!member.is_object()) {
-                say(at, "must be an object");
-                continue;
-            }
-            const bool declared = root_.contains("extensionsUsed") && root_["extensionsUsed"].is_array() &&
-                                  std::find(root_["extensionsUsed"].begin(), root_["extensionsUsed"].end(),
-                                            json(name)) != root_["extensionsUsed"].end();
-            if (!declared) gltf::sayHarmless(problems_, at, "the extension is not listed in 'extensionsUsed'");
-            // At a node or primitive these two have other properties, which are checked with those.
-            const bool isDefinition = path == "/extensions";
-            if (isDefinition && name == "KHR_lights_punctual" && !member.contains("lights")) say(at, "lacks 'lights'");
-            if (isDefinition && name == "KHR_materials_variants" && !member.contains("variants"))
-                say(at, "lacks 'variants'");
-            if (name == "EXT_meshopt_compression" && path.rfind("/buffers/", 0) == 0) continue;  // only says what it is
-            const bool isMapping = name == "KHR_materials_variants" && !isDefinition;
-            if (isMapping && !member.contains("mappings")) say(at, "lacks 'mappings'");
-            if (name == "KHR_animation_pointer" && member.contains("pointer") && member["pointer"].is_string() &&
-                !isPointer(member["pointer"].get<std::string>()))
-                say(at, "its pointer is not a JSON pointer");
-            if (types().count(name) != 0) object(member, name, at);
+            const auto test = [&, &key = name, &object = member](Checker& by) { by.extension(key, object, path, at); };
+            if (decidesGeometry(name))
+                test(*this);
+            else
+                orLeaveOut(at, test);
         }
+    }
+
+    void extension(const std::string& name, const json& member, const std::string& path, const std::string& at) {
+        if (!member.is_object()) return say(at, "must be an object");
+        const bool declared = root_.contains("extensionsUsed") && root_["extensionsUsed"].is_array() &&
+                              std::find(root_["extensionsUsed"].begin(), root_["extensionsUsed"].end(), json(name)) !=
+                                  root_["extensionsUsed"].end();
+        if (!declared) sayHarmless(at, "the extension is not listed in 'extensionsUsed'");
+        // At a node or primitive these two have other properties, which are checked with those.
+        const bool isDefinition = path == "/extensions";
+        if (isDefinition && name == "KHR_lights_punctual" && !member.contains("lights")) say(at, "lacks 'lights'");
+        if (isDefinition && name == "KHR_materials_variants" && !member.contains("variants"))
+            say(at, "lacks 'variants'");
+        if (name == "EXT_meshopt_compression" && path.rfind("/buffers/", 0) == 0) return;  // only says what it is
+        const bool isMapping = name == "KHR_materials_variants" && !isDefinition;
+        if (isMapping && !member.contains("mappings")) say(at, "lacks 'mappings'");
+        if (name == "KHR_animation_pointer" && member.contains("pointer") && member["pointer"].is_string() &&
+            !isPointer(member["pointer"].get<std::string>()))
+            say(at, "its pointer is not a JSON pointer");
+        if (types().count(name) != 0) object(member, name, at);
     }
 
     void check(const json& v, const std::string& what, const std::vector<std::string>& arguments,
@@ -304,7 +387,7 @@ class Checker {
         if (what == "array" || what == "set") return array(v, what == "set", arguments, path);
         if (what == "map") {
             if (!v.is_object()) return say(path, "must be an object");
-            if (v.empty()) return say(path, "is empty");
+            if (v.empty()) return sayHarmless(path, "is empty");
             for (const auto& [key, member] : v.items()) check(member, arguments[0], {}, below(path, key));
             return;
         }
@@ -324,11 +407,11 @@ class Checker {
         if (what == "uri") {
             // Spaces are not allowed either, but many exporters write them.
             const bool isBroken = s.rfind("data:", 0) != 0 && s.find_first_of("\t\n\\") != std::string::npos;
-            if (s.empty() || isBroken) say(path, fmt::format("'{}' is not a URI", s.substr(0, 80)));
+            if (s.empty() || isBroken) sayHarmless(path, fmt::format("'{}' is not a URI", s.substr(0, 80)));
             for (size_t i = 0; i < s.size() && s.rfind("data:", 0) != 0; ++i)
                 if (s[i] == '%' && (i + 2 >= s.size() || !std::isxdigit(static_cast<unsigned char>(s[i + 1])) ||
                                     !std::isxdigit(static_cast<unsigned char>(s[i + 2]))))
-                    say(path, fmt::format("'{}' has a % without two digits", s.substr(0, 80)));
+                    sayHarmless(path, fmt::format("'{}' has a % without two digits", s.substr(0, 80)));
         }
     }
 
@@ -342,12 +425,18 @@ class Checker {
             const bool excluded = bounds[k][0] == '>';
             const double bound = std::stod(bounds[k].substr(excluded ? 1 : 0));
             const bool good = k == 0 ? (excluded ? x > bound : x >= bound) : x <= bound;
-            if (!good)
-                say(path, fmt::format("is {}, must be {} {}", x,
-                                      k == 1     ? "at most"
-                                      : excluded ? "above"
-                                                 : "at least",
-                                      bound));
+            if (good) continue;
+            const std::string text = fmt::format("is {}, must be {} {}", x,
+                                                 k == 1     ? "at most"
+                                                 : excluded ? "above"
+                                                            : "at least",
+                                                 bound);
+            if (whole || excluded) {
+                say(path, text);
+                continue;
+            }
+            sayHarmless(path, text);
+            if (path.find("/rotation/") == std::string::npos) mend(path, bound);  // (those are made unit length)
         }
         if (whole && std::abs(x) > 9007199254740992.0) say(path, fmt::format("{} is too large", x));
     }
@@ -379,17 +468,30 @@ class Checker {
             std::set<std::string> seen;
             for (const json& item : v)
                 if (!seen.insert(item.dump()).second)
-                    return say(path, fmt::format("holds {} twice", item.dump().substr(0, 60)));
+                    return sayHarmless(path, fmt::format("holds {} twice", item.dump().substr(0, 60)));
         }
     }
 
     const json& root_;
     Problems& problems_;
+    Mends& mends_;
 };
 
 }  // namespace
 
-void checkStructure(const json& root, Problems& problems) { Checker(root, problems).object(root, "root", ""); }
+void checkStructure(const json& root, Problems& problems, Mends& mends) {
+    Checker(root, problems, mends).object(root, "root", "");
+}
+
+void applyMends(const Mends& mends, json& root) {
+    for (const Mend& m : mends) {
+        if (!root.contains(m.place)) continue;
+        if (!m.value.is_null())
+            root[m.place] = m.value;
+        else if (json& parent = root[m.place.parent_pointer()]; parent.is_object())
+            parent.erase(m.place.back());
+    }
+}
 
 const std::vector<std::string>& knownExtensions() {
     static const std::vector<std::string> known{
@@ -397,6 +499,14 @@ const std::vector<std::string>& knownExtensions() {
         "KHR_mesh_quantization", "EXT_meshopt_compression", "KHR_materials_unlit",
         "STIPPLE_store"};
     return known;
+}
+
+bool isAboutLooks(const std::string& extension) {
+    static const std::set<std::string> more{"KHR_animation_pointer", "KHR_technique_webgl",   "KHR_techniques_webgl",
+                                            "KHR_node_visibility",   "KHR_xmp_json_ld",       "EXT_lights_image_based",
+                                            "MSFT_texture_dds",      "KHR_lights_environment"};
+    const auto begins = [&](const char* with) { return extension.rfind(with, 0) == 0; };
+    return begins("KHR_materials_") || begins("KHR_texture_") || begins("EXT_texture_") || more.count(extension) != 0;
 }
 
 }  // namespace stipple::scene::gltf

@@ -11,10 +11,22 @@ namespace stipple::scene::gltf {
 /// What is wrong, and where: "/accessors/0/count: is 0, must be at least 1".
 using Problems = std::vector<std::string>;
 
-/// Types, ranges, required properties, enumerations, and that every index points to something.
-void checkStructure(const nlohmann::json& root, Problems& problems);
+/// What makes a file with harmless faults readable: the member at this place gets the value, or is left out (null).
+struct Mend {
+    nlohmann::json::json_pointer place;
+    nlohmann::json value;
+};
+using Mends = std::vector<Mend>;
 
-/// Extensions that are understood; a file that requires another one is refused by name.
+/// Types, ranges, required properties, enumerations, and that every index points to something. What a picture does not
+/// need (animations, names, a texture that is not there ...) and factors beyond their range are harmless if `mends` are
+/// applied.
+void checkStructure(const nlohmann::json& root, Problems& problems, Mends& mends);
+void applyMends(const Mends& mends, nlohmann::json& root);
+
+/// Extensions that are understood.
 const std::vector<std::string>& knownExtensions();
+/// Does it only change how something looks, so that a file that requires it can be drawn without?
+bool isAboutLooks(const std::string& extension);
 
 }  // namespace stipple::scene::gltf

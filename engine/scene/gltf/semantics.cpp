@@ -46,7 +46,7 @@ void checkAttributeFormat(const json& root, const std::string& name, const json&
     if (name == "POSITION") {
         good = isFormat(accessor, {"VEC3"}, {5126}) || (quantised && small && accessor["type"] == "VEC3");
         if (!accessor.contains("min") || !accessor.contains("max"))
-            say(p, path, "the positions have no 'min' and 'max'");
+            sayHarmless(p, path, "the positions have no 'min' and 'max'");
     } else if (name == "NORMAL") {
         good = isFormat(accessor, {"VEC3"}, {5126}) || (quantised && isFormat(accessor, {"VEC3"}, {5120, 5122}));
     } else if (name == "TANGENT") {
@@ -67,9 +67,9 @@ void checkAttributeFormat(const json& root, const std::string& name, const json&
         good = accessor["componentType"] != 5125;
     }
     if (!good)
-        say(p, path,
-            fmt::format("{} cannot be {} of {}{}", name, accessor["type"].get<std::string>(),
-                        accessor["componentType"].dump(), isNormalised(accessor) ? ", normalised" : ""));
+        sayHarmless(p, path,
+                    fmt::format("{} cannot be {} of {}{}", name, accessor["type"].get<std::string>(),
+                                accessor["componentType"].dump(), isNormalised(accessor) ? ", normalised" : ""));
     const size_t bytes = componentBytes(accessor["componentType"].get<int>());
     const bool hasView = accessor.contains("bufferView");
     const json* view = hasView ? &root["bufferViews"][accessor["bufferView"].get<size_t>()] : nullptr;
@@ -78,7 +78,7 @@ void checkAttributeFormat(const json& root, const std::string& name, const json&
                              elementBytes(accessor["type"].get<std::string>(), accessor["componentType"].get<int>())) %
                          4 !=
                      0))
-        say(p, path, fmt::format("{} does not begin at multiples of 4 bytes ({} a component)", name, bytes));
+        sayHarmless(p, path, fmt::format("{} does not begin at multiples of 4 bytes ({} a component)", name, bytes));
 }
 
 void checkAttributeNames(const json& attributes, const std::string& path, Problems& p) {
@@ -93,12 +93,12 @@ void checkAttributeNames(const json& attributes, const std::string& path, Proble
             numbers[kind].insert(number);
             continue;
         }
-        say(p, path, fmt::format("'{}' is not an attribute that glTF knows", name));
+        sayHarmless(p, path, fmt::format("'{}' is not an attribute that glTF knows", name));
     }
     for (const auto& [kind, set] : numbers)
         if (*set.rbegin() != static_cast<int>(set.size()) - 1)
-            say(p, path, fmt::format("{}_{} without those before it", kind, *set.rbegin()));
-    if (numbers["JOINTS"].size() != numbers["WEIGHTS"].size()) say(p, path, "not as many JOINTS as WEIGHTS");
+            sayHarmless(p, path, fmt::format("{}_{} without those before it", kind, *set.rbegin()));
+    if (numbers["JOINTS"].size() != numbers["WEIGHTS"].size()) sayHarmless(p, path, "not as many JOINTS as WEIGHTS");
 }
 
 void checkTargets(const json& root, const json& primitive, size_t count, const std::string& path, Problems& p) {
@@ -108,27 +108,28 @@ void checkTargets(const json& root, const json& primitive, size_t count, const s
         const json& target = primitive["targets"][t];
         const std::string here = fmt::format("{}/targets/{}", path, t);
         if (!target.is_object() || target.empty()) {
-            say(p, here, "must be an object with attributes");
+            sayHarmless(p, here, "must be an object with attributes");
             continue;
         }
         for (const auto& [name, index] : target.items()) {
             const std::string kind = splitSemantic(name).first;
             const bool known = name == "POSITION" || name == "NORMAL" || name == "TANGENT" || kind == "TEXCOORD" ||
                                kind == "COLOR" || (name[0] == '_' && name.size() > 1);
-            if (!known) say(p, here, fmt::format("'{}' is not an attribute of a morph target", name));
+            if (!known) sayHarmless(p, here, fmt::format("'{}' is not an attribute of a morph target", name));
             if (!primitive["attributes"].contains(name))
-                say(p, here, fmt::format("'{}' is not among the primitive's attributes", name));
+                sayHarmless(p, here, fmt::format("'{}' is not among the primitive's attributes", name));
             if (!index.is_number() || index.get<double>() < 0 ||
                 index.get<double>() >= static_cast<double>(accessors.size())) {
-                say(p, here, fmt::format("'{}' refers to an accessor that is not there", name));
+                sayHarmless(p, here, fmt::format("'{}' refers to an accessor that is not there", name));
                 continue;
             }
             const json& a = accessors[index.get<size_t>()];
             if (a["count"] != count)
-                say(p, here, fmt::format("'{}' has {} elements, the primitive {}", name, a["count"].dump(), count));
+                sayHarmless(p, here,
+                            fmt::format("'{}' has {} elements, the primitive {}", name, a["count"].dump(), count));
             const bool isVector = a["type"] == "VEC3" || kind == "TEXCOORD" || kind == "COLOR";
             if (!isVector || (name == "POSITION" && (!a.contains("min") || !a.contains("max"))))
-                say(p, here, fmt::format("'{}' must be VEC3, positions with 'min' and 'max'", name));
+                sayHarmless(p, here, fmt::format("'{}' must be VEC3, positions with 'min' and 'max'", name));
         }
     }
 }
@@ -177,29 +178,30 @@ void checkPrimitive(const json& root, const json& primitive, const std::string& 
         checkAttributeFormat(root, name, a, below(path + "/attributes", name), p);
         const auto n = a["count"].get<size_t>();
         if (count != 0 && n != count)
-            say(p, path, fmt::format("'{}' has {} elements, other attributes {}", name, n, count));
+            sayHarmless(p, path, fmt::format("'{}' has {} elements, other attributes {}", name, n, count));
         count = n;
         if (a.contains("bufferView")) {
             const auto view = a["bufferView"].get<size_t>();
             if (uses[view]++ > 0 && !root["bufferViews"][view].contains("byteStride"))
-                say(p, path, fmt::format("several attributes share buffer view {}, which has no 'byteStride'", view));
+                sayHarmless(p, path,
+                            fmt::format("several attributes share buffer view {}, which has no 'byteStride'", view));
         }
     }
     if (primitive.contains("indices")) {
         const json& a = accessors[primitive["indices"].get<size_t>()];
         if (!isFormat(a, {"SCALAR"}, {5121, 5123, 5125}) || isNormalised(a))
             say(p, path + "/indices", "must be unsigned scalars");
-        if (hasStride(root, a)) say(p, path + "/indices", "its buffer view must not have a 'byteStride'");
+        if (hasStride(root, a)) sayHarmless(p, path + "/indices", "its buffer view must not have a 'byteStride'");
     }
     checkTargets(root, primitive, count, path, p);
     if (primitive.contains("material")) {
         const json& material = root["materials"][primitive["material"].get<size_t>()];
         const int set = largestTexCoord(material);
         if (set >= 0 && !attributes.contains(fmt::format("TEXCOORD_{}", set)))
-            say(p, path, fmt::format("its material uses TEXCOORD_{}, which it does not have", set));
+            sayHarmless(p, path, fmt::format("its material uses TEXCOORD_{}, which it does not have", set));
         const int mode = primitive.value("mode", 4);
         if (lacksTangents(material, attributes, mode))
-            say(p, path, "its material needs tangents, which do not follow from what it has");
+            sayHarmless(p, path, "its material needs tangents, which do not follow from what it has");
     }
 }
 
@@ -252,25 +254,28 @@ void checkGraph(const json& root, Problems& p) {
         if (n.contains("children"))
             for (const json& child : n["children"]) {
                 auto& of = parent[child.get<size_t>()];
-                if (of >= 0) say(p, at("nodes", i), fmt::format("node {} is a child of node {} too", child.dump(), of));
+                if (of >= 0)
+                    sayHarmless(p, at("nodes", i), fmt::format("node {} is a child of node {} too", child.dump(), of));
                 of = static_cast<int64_t>(i);
             }
         const bool hasParts = n.contains("translation") || n.contains("rotation") || n.contains("scale");
         if (n.contains("matrix") && hasParts)
-            say(p, at("nodes", i), "has a matrix and also translation, rotation or scale");
+            sayHarmless(p, at("nodes", i), "has a matrix and also translation, rotation or scale");
         if (n.contains("matrix") && !isDecomposable(n["matrix"]))
-            say(p, at("nodes", i), "its matrix is not made of translation, rotation and scale");
+            sayHarmless(p, at("nodes", i), "its matrix is not made of translation, rotation and scale");
         if (n.contains("rotation")) {
             double square = 0;
             for (const json& q : n["rotation"]) square += q.get<double>() * q.get<double>();
-            if (std::abs(square - 1) > 5e-4 * 2) say(p, at("nodes", i), "its rotation is not a unit quaternion");
+            if (std::abs(square - 1) > 5e-4 * 2)
+                sayHarmless(p, at("nodes", i), "its rotation is not a unit quaternion");
         }
         const json* mesh = n.contains("mesh") ? &root["meshes"][n["mesh"].get<size_t>()] : nullptr;
         const size_t targets = mesh ? (*mesh)["primitives"][0].value("targets", json::array()).size() : 0;
         if (n.contains("weights") && (!mesh || n["weights"].size() != targets))
-            say(p, at("nodes", i), fmt::format("has {} weights for {} morph targets", n["weights"].size(), targets));
+            sayHarmless(p, at("nodes", i),
+                        fmt::format("has {} weights for {} morph targets", n["weights"].size(), targets));
         if (n.contains("skin") && (!mesh || !(*mesh)["primitives"][0]["attributes"].contains("JOINTS_0")))
-            say(p, at("nodes", i), "has a skin, but no mesh with joints");
+            sayHarmless(p, at("nodes", i), "has a skin, but no mesh with joints");
     }
     // A node from which going up never ends is in or below a loop.
     std::vector<uint8_t> state(nodes.size(), 0);  // 1 on the way, 2 fine, 3 loop
@@ -289,12 +294,13 @@ void checkGraph(const json& root, Problems& p) {
     const json& scenes = arrayOf(root, "scenes");
     for (size_t s = 0; s < scenes.size(); ++s)
         for (const json& n : scenes[s].value("nodes", json::array()))
-            if (parent[n.get<size_t>()] >= 0) say(p, at("scenes", s), fmt::format("node {} has a parent", n.dump()));
+            if (parent[n.get<size_t>()] >= 0)
+                sayHarmless(p, at("scenes", s), fmt::format("node {} has a parent", n.dump()));
     const json& asset = root["asset"];
     const std::string version = asset["version"].get<std::string>();
     if (version.substr(0, version.find('.')) != "2") say(p, "/asset", fmt::format("is glTF {}, 2.0 is read", version));
     if (asset.contains("minVersion") && std::stod(asset["minVersion"].get<std::string>()) > std::stod(version))
-        say(p, "/asset", "needs a later version than it is");
+        sayHarmless(p, "/asset", "needs a later version than it is");
 }
 
 void checkMeshes(const json& root, Problems& p) {
@@ -306,11 +312,11 @@ void checkMeshes(const json& root, Problems& p) {
             const std::string path = fmt::format("/meshes/{}/primitives/{}", m, k);
             checkPrimitive(root, primitives[k], path, p);
             if (primitives[k].value("targets", json::array()).size() != targets)
-                say(p, path, "has another number of morph targets than the first primitive");
+                sayHarmless(p, path, "has another number of morph targets than the first primitive");
         }
         if (meshes[m].contains("weights") && meshes[m]["weights"].size() != targets)
-            say(p, at("meshes", m),
-                fmt::format("has {} weights for {} morph targets", meshes[m]["weights"].size(), targets));
+            sayHarmless(p, at("meshes", m),
+                        fmt::format("has {} weights for {} morph targets", meshes[m]["weights"].size(), targets));
     }
 }
 
@@ -325,7 +331,8 @@ void checkExtents(const json& root, bool isBinary, bool hasBinaryChunk, uint64_t
         if (i == 0 && isBinary && !hasBinaryChunk)
             say(p, at("buffers", i), "has no 'uri' and there is no binary chunk for it");
         if (i == 0 && hasBinaryChunk && length > binaryBytes)
-            say(p, at("buffers", i), fmt::format("declares {} bytes, the binary chunk has {}", length, binaryBytes));
+            sayHarmless(p, at("buffers", i),
+                        fmt::format("declares {} bytes, the binary chunk has {}", length, binaryBytes));
     }
     std::vector<int> target(views.size(), 0);
     for (size_t i = 0; i < views.size(); ++i) {
@@ -338,10 +345,10 @@ void checkExtents(const json& root, bool isBinary, bool hasBinaryChunk, uint64_t
         if (v.contains("byteStride")) {
             const auto stride = v["byteStride"].get<uint64_t>();
             if (stride % 4 != 0)
-                say(p, at("bufferViews", i), fmt::format("'byteStride' {} is not a multiple of 4", stride));
+                sayHarmless(p, at("bufferViews", i), fmt::format("'byteStride' {} is not a multiple of 4", stride));
             if (stride > length)
-                say(p, at("bufferViews", i), fmt::format("'byteStride' {} is larger than the view", stride));
-            if (v.value("target", 0) == 34963) say(p, at("bufferViews", i), "indices have no 'byteStride'");
+                sayHarmless(p, at("bufferViews", i), fmt::format("'byteStride' {} is larger than the view", stride));
+            if (v.value("target", 0) == 34963) sayHarmless(p, at("bufferViews", i), "indices have no 'byteStride'");
         }
         target[i] = v.value("target", 0);
     }
@@ -351,9 +358,9 @@ void checkExtents(const json& root, bool isBinary, bool hasBinaryChunk, uint64_t
         const uint64_t length = v["byteLength"].get<uint64_t>(),
                        stride = strided ? v.value("byteStride", element) : element;
         if (stride < element)
-            say(p, path, fmt::format("elements of {} bytes do not fit a 'byteStride' of {}", element, stride));
+            sayHarmless(p, path, fmt::format("elements of {} bytes do not fit a 'byteStride' of {}", element, stride));
         if (offset % component != 0 || (v.value("byteOffset", uint64_t{0}) + offset) % component != 0)
-            say(p, path, fmt::format("does not begin at a multiple of {} bytes", component));
+            sayHarmless(p, path, fmt::format("does not begin at a multiple of {} bytes", component));
         if (offset > length || last > length - offset || (count - 1) > (length - offset - last) / stride)
             say(p, path,
                 fmt::format("{} elements at {} reach beyond the {} bytes of buffer view {}", count, offset, length,
@@ -369,14 +376,15 @@ void checkExtents(const json& root, bool isBinary, bool hasBinaryChunk, uint64_t
                        elementBytes(type, component), lastElementBytes(type, component), componentBytes(component),
                        true);
         else if (a.contains("byteOffset"))
-            say(p, at("accessors", i), "'byteOffset' without 'bufferView'");
+            sayHarmless(p, at("accessors", i), "'byteOffset' without 'bufferView'");
         if (type.rfind("MAT", 0) == 0 && a.value("byteOffset", uint64_t{0}) % 4 != 0)
-            say(p, at("accessors", i), "matrices begin at multiples of 4 bytes");
+            sayHarmless(p, at("accessors", i), "matrices begin at multiples of 4 bytes");
         if (isNormalised(a) && (component == 5126 || component == 5125))
-            say(p, at("accessors", i), "floats and 32-bit integers cannot be normalised");
+            sayHarmless(p, at("accessors", i), "floats and 32-bit integers cannot be normalised");
         for (const char* bound : {"min", "max"})
             if (a.contains(bound) && a[bound].size() != componentsOf(type))
-                say(p, at("accessors", i), fmt::format("'{}' has {} values for {}", bound, a[bound].size(), type));
+                sayHarmless(p, at("accessors", i),
+                            fmt::format("'{}' has {} values for {}", bound, a[bound].size(), type));
         if (!a.contains("sparse")) continue;
         const json& s = a["sparse"];
         const auto n = s["count"].get<uint64_t>();
@@ -389,7 +397,8 @@ void checkExtents(const json& root, bool isBinary, bool hasBinaryChunk, uint64_t
             checkRange(fmt::format("/accessors/{}/sparse/{}", i, part), view, s[part].value("byteOffset", uint64_t{0}),
                        n, element, element, componentBytes(isIndex ? indexType : component), false);
             if (views[view].contains("byteStride") || views[view].contains("target"))
-                say(p, at("accessors", i), fmt::format("the buffer view of sparse {} has a stride or a target", part));
+                sayHarmless(p, at("accessors", i),
+                            fmt::format("the buffer view of sparse {} has a stride or a target", part));
         }
     }
     for (const json& mesh : arrayOf(root, "meshes"))
@@ -401,7 +410,8 @@ void checkExtents(const json& root, bool isBinary, bool hasBinaryChunk, uint64_t
                 if (!a.contains("bufferView")) return;
                 int& is = target[a["bufferView"].get<size_t>()];
                 if (is != 0 && is != as)
-                    say(p, at("bufferViews", a["bufferView"].get<size_t>()), "serves both attributes and indices");
+                    sayHarmless(p, at("bufferViews", a["bufferView"].get<size_t>()),
+                                "serves both attributes and indices");
                 is = as;
             };
             for (const auto& [name, accessor] : primitive["attributes"].items()) use(accessor, 34962);

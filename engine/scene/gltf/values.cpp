@@ -18,7 +18,7 @@ void checkBounds(const json& a, const std::vector<double>& stored, size_t compon
                  Problems& p) {
     std::vector<double> least(components, HUGE_VAL), greatest(components, -HUGE_VAL);
     for (size_t i = 0; i < stored.size(); ++i) {
-        if (!std::isfinite(stored[i])) return say(p, path, fmt::format("value {} is not finite", i));
+        if (!std::isfinite(stored[i])) return sayHarmless(p, path, fmt::format("value {} is not finite", i));
         least[i % components] = std::min(least[i % components], stored[i]);
         greatest[i % components] = std::max(greatest[i % components], stored[i]);
     }
@@ -26,12 +26,13 @@ void checkBounds(const json& a, const std::vector<double>& stored, size_t compon
     const auto same = [&](double declared, double found) {
         return isFloat ? static_cast<float>(declared) == static_cast<float>(found) : declared == found;
     };
+    const auto hasAll = [&](const char* bound) { return a.contains(bound) && a[bound].size() == components; };
     for (size_t k = 0; k < components; ++k) {
-        if (a.contains("min") && !same(a["min"][k].get<double>(), least[k]))
+        if (hasAll("min") && !same(a["min"][k].get<double>(), least[k]))
             sayHarmless(
                 p, path,
                 fmt::format("'min' {} of component {}, but the values begin at {}", a["min"][k].dump(), k, least[k]));
-        if (a.contains("max") && !same(a["max"][k].get<double>(), greatest[k]))
+        if (hasAll("max") && !same(a["max"][k].get<double>(), greatest[k]))
             sayHarmless(
                 p, path,
                 fmt::format("'max' {} of component {}, but the values end at {}", a["max"][k].dump(), k, greatest[k]));
@@ -43,7 +44,7 @@ void checkUnit(const std::vector<double>& v, size_t components, size_t used, con
         double square = 0;
         for (size_t k = 0; k < used; ++k) square += v[i + k] * v[i + k];
         if (std::abs(std::sqrt(square) - 1) > 0.03)
-            return say(p, path, fmt::format("element {} has not the length 1", i / components));
+            return sayHarmless(p, path, fmt::format("element {} has not the length 1", i / components));
     }
 }
 
@@ -70,8 +71,7 @@ class ValueChecker {
         const json& accessors = arrayOf(root_, "accessors");
         for (size_t i = 0; i < accessors.size(); ++i) {
             if (!buffers_.hasData(accessors[i])) continue;  // a placeholder
-            STIPPLE_ASSIGN(const std::vector<double> v, buffers_.values(i));
-            std::vector<double> stored = v;
+            STIPPLE_ASSIGN(std::vector<double> stored, buffers_.values(i));
             if (accessors[i].value("normalized", false)) {
                 const int type = accessors[i]["componentType"].get<int>();
                 const double most = type == 5120 ? 127 : type == 5121 ? 255 : type == 5122 ? 32767 : 65535;
@@ -109,14 +109,14 @@ class ValueChecker {
                 checkUnit(v, 4, 3, where + "/TANGENT", p_);
                 for (size_t i = 3; i < v.size(); i += 4)
                     if (std::abs(v[i]) != 1) {
-                        say(p_, where + "/TANGENT", fmt::format("the sign of element {} is {}", i / 4, v[i]));
+                        sayHarmless(p_, where + "/TANGENT", fmt::format("the sign of element {} is {}", i / 4, v[i]));
                         break;
                     }
             }
             if (name.rfind("COLOR_", 0) == 0)
                 for (const double c : v)
                     if (c < 0 || c > 1) {
-                        say(p_, below(where, name), fmt::format("{} is not between 0 and 1", c));
+                        sayHarmless(p_, below(where, name), fmt::format("{} is not between 0 and 1", c));
                         break;
                     }
             if (name.rfind("WEIGHTS_", 0) == 0) checkWeights(v, isFloat, below(where, name));
@@ -131,11 +131,11 @@ class ValueChecker {
         const uint32_t restart = type == 5121 ? 0xffu : type == 5123 ? 0xffffu : 0xffffffffu;
         for (const uint32_t i : v) {
             if (i == restart) {
-                say(p_, where + "/indices", "holds the primitive restart value");
+                sayHarmless(p_, where + "/indices", "holds the primitive restart value");
                 break;
             }
             if (i >= count) {
-                say(p_, where + "/indices", fmt::format("refers to vertex {}, but there are {}", i, count));
+                sayHarmless(p_, where + "/indices", fmt::format("refers to vertex {}, but there are {}", i, count));
                 break;
             }
         }
@@ -146,11 +146,11 @@ class ValueChecker {
         for (size_t i = 0; i + 4 <= v.size(); i += 4) {
             double sum = 0;
             for (size_t k = 0; k < 4; ++k) {
-                if (v[i + k] < 0) return say(p_, where, fmt::format("weight {} is negative", i + k));
+                if (v[i + k] < 0) return sayHarmless(p_, where, fmt::format("weight {} is negative", i + k));
                 sum += v[i + k];
             }
             if (std::abs(sum - 1) > (isFloat ? 2e-4 : 5e-3) && sum != 0)
-                return say(p_, where, fmt::format("the weights of vertex {} sum up to {}", i / 4, sum));
+                return sayHarmless(p_, where, fmt::format("the weights of vertex {} sum up to {}", i / 4, sum));
         }
     }
 
@@ -178,11 +178,12 @@ class ValueChecker {
             std::set<double> seen;
             for (size_t k = i; k < i + 4; ++k) {
                 if (v[k] >= static_cast<double>(joints)) {
-                    say(p_, where, fmt::format("vertex {} refers to joint {}, but there are {}", i / 4, v[k], joints));
+                    sayHarmless(p_, where,
+                                fmt::format("vertex {} refers to joint {}, but there are {}", i / 4, v[k], joints));
                     return {};
                 }
                 if (weights[k] > 0 && !seen.insert(v[k]).second) {
-                    say(p_, where, fmt::format("vertex {} refers to joint {} twice", i / 4, v[k]));
+                    sayHarmless(p_, where, fmt::format("vertex {} refers to joint {} twice", i / 4, v[k]));
                     return {};
                 }
             }
@@ -198,7 +199,8 @@ class ValueChecker {
                 STIPPLE_ASSIGN(const std::vector<double> times, buffers_.values(sampler["input"].get<size_t>()));
                 for (size_t i = 0; i < times.size(); ++i)
                     if (times[i] < 0 || (i > 0 && !(times[i] > times[i - 1]))) {
-                        say(p_, path("animations", a),
+                        sayHarmless(
+                            p_, path("animations", a),
                             fmt::format("key {} at {} s is negative or not later than the one before", i, times[i]));
                         break;
                     }
@@ -245,19 +247,24 @@ Result<void> checkImageBytes(const Container& container, Buffers& buffers, Probl
     constexpr size_t kPngHead = 33;  // signature and IHDR
     for (size_t i = 0; i < images.size(); ++i) {
         if (images[i].contains("bufferView") && !buffers.hasData(images[i])) continue;
-        STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, buffers.image(i));
+        const auto read = buffers.image(i);
+        if (!read) {
+            sayHarmless(problems, fmt::format("/images/{}", i), read.error().line());
+            continue;
+        }
+        const std::vector<uint8_t>& bytes = *read;
         const std::string head(bytes.begin(),
                                bytes.begin() + static_cast<ptrdiff_t>(std::min<size_t>(bytes.size(), 12)));
         const bool isPng = head.rfind("\x89PNG\r\n\x1a\n", 0) == 0, isJpeg = head.rfind("\xff\xd8\xff", 0) == 0;
         const bool isWebp = head.size() == 12 && head.rfind("RIFF", 0) == 0 && head.substr(8) == "WEBP",
                    isKtx = head.rfind("\xabKTX 20", 0) == 0;
         if (!isPng && !isJpeg && !isWebp && !isKtx)
-            say(problems, fmt::format("/images/{}", i), "is neither PNG nor JPEG, WebP or KTX2");
+            sayHarmless(problems, fmt::format("/images/{}", i), "is neither PNG nor JPEG, WebP or KTX2");
         // A JPEG is a chain of markers up to the frame header.
         if (isJpeg && !hasFrameHeader(bytes))
-            say(problems, fmt::format("/images/{}", i), "the JPEG has no frame header");
+            sayHarmless(problems, fmt::format("/images/{}", i), "the JPEG has no frame header");
         if (isPng && bytes.size() < kPngHead)
-            say(problems, fmt::format("/images/{}", i), "the PNG ends within its header");
+            sayHarmless(problems, fmt::format("/images/{}", i), "the PNG ends within its header");
     }
     return {};
 }

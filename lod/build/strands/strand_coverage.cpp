@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <unordered_map>
 
 namespace stipple::lod {
 namespace {
@@ -26,57 +28,115 @@ std::array<Direction, 4> directions() {
     return out;
 }
 
-/// Pixels that something covers.
+/// What is looked at of a parallel projection.
+struct Window {
+    dvec2 least{1e300}, greatest{-1e300};
+    dvec2 size() const { return greatest - least; }
+};
+
+/// Where nearly all of `places` lie, and as much again on each side, if some lie so far off that the others would be
+/// specks beside them; else the box of all.
+Window windowOf(const std::vector<dvec2>& places, double margin) {
+    constexpr double kFar = 32;
+    Window all, core;
+    for (const dvec2& p : places) {
+        all.least = glm::min(all.least, p);
+        all.greatest = glm::max(all.greatest, p);
+    }
+    std::vector<double> sorted(places.size());
+    const size_t few = (places.size() + 49) / 50, last = places.size() - 1;
+    for (int axis = 0; axis < 2 && places.size() > 2 * few; ++axis) {
+        std::transform(places.begin(), places.end(), sorted.begin(), [&](const dvec2& p) { return p[axis]; });
+        const auto at = [&](size_t k) {
+            std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(k), sorted.end());
+            return sorted[k];
+        };
+        core.least[axis] = at(few);
+        core.greatest[axis] = at(last - few);
+    }
+    const double extent = std::max(all.size().x, all.size().y), near = std::max(core.size().x, core.size().y);
+    if (near > 0 && extent + 2 * margin > kFar * (near + 2 * margin)) all = {core.least - near, core.greatest + near};
+    return {all.least - margin, all.greatest + margin};
+}
+
+/// Pixels that something covers. Large grids are kept as the small squares that are touched.
 class Grid {
   public:
     Grid(const dvec2& least, const dvec2& greatest, double pixel)
         : least_(least),
           pixel_(pixel),
-          width_(static_cast<int>((greatest.x - least.x) / pixel) + 2),
-          height_(static_cast<int>((greatest.y - least.y) / pixel) + 2),
-          covered_(static_cast<size_t>(width_) * static_cast<size_t>(height_)) {}
+          width_(cells((greatest.x - least.x) / pixel) + 2),
+          height_(cells((greatest.y - least.y) / pixel) + 2),
+          isDense_(width_ * height_ <= kMostDense) {
+        if (isDense_) covered_.resize(static_cast<size_t>(width_ * height_));
+    }
 
     /// Pixels around `centre`, no farther than `reach`, whose offset from it (in units) `isInside` says so of.
     template <typename IsInside>
     void cover(const dvec2& centre, const dvec2& reach, const IsInside& isInside) {
-        const auto first = [&](double v, double least) {
-            return static_cast<int>(std::ceil((v - least) / pixel_ - 0.5));
+        const auto first = [&](double v, double least, int64_t most) {
+            return static_cast<int64_t>(
+                std::clamp(std::ceil((v - least) / pixel_ - 0.5), 0.0, static_cast<double>(most)));
         };
-        const int x0 = std::max(first(centre.x - reach.x, least_.x), 0),
-                  x1 = std::min(first(centre.x + reach.x, least_.x), width_),
-                  y0 = std::max(first(centre.y - reach.y, least_.y), 0),
-                  y1 = std::min(first(centre.y + reach.y, least_.y), height_);
-        for (int y = y0; y < y1; ++y)
-            for (int x = x0; x < x1; ++x)
-                if (isInside(least_ + pixel_ * dvec2(x + 0.5, y + 0.5) - centre))
-                    covered_[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)] = 1;
+        const int64_t x0 = first(centre.x - reach.x, least_.x, width_),
+                      x1 = first(centre.x + reach.x, least_.x, width_),
+                      y0 = first(centre.y - reach.y, least_.y, height_),
+                      y1 = first(centre.y + reach.y, least_.y, height_);
+        for (int64_t y = y0; y < y1; ++y)
+            for (int64_t x = x0; x < x1; ++x)
+                if (isInside(least_ + pixel_ * dvec2(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5) -
+                             centre))
+                    set(x, y);
     }
     double area() const {
-        return static_cast<double>(std::count(covered_.begin(), covered_.end(), 1)) * pixel_ * pixel_;
+        int64_t count = std::count(covered_.begin(), covered_.end(), 1);
+        for (const auto& [key, square] : squares_)
+            for (const uint32_t row : square) count += __builtin_popcount(row);
+        return static_cast<double>(count) * pixel_ * pixel_;
     }
 
   private:
+    static constexpr int64_t kMostDense = int64_t{1} << 25, kMostCells = int64_t{1} << 30;
+    using Square = std::array<uint32_t, 32>;  ///< 32 x 32 pixels, a bit each
+
+    static int64_t cells(double count) {
+        return static_cast<int64_t>(std::clamp(count, 0.0, static_cast<double>(kMostCells)));
+    }
+    void set(int64_t x, int64_t y) {
+        if (isDense_) {
+            covered_[static_cast<size_t>(y * width_ + x)] = 1;
+            return;
+        }
+        if (const int64_t key = (y >> 5) << 32 | x >> 5; key != lastKey_) {
+            lastKey_ = key;
+            last_ = &squares_[key];
+        }
+        (*last_)[static_cast<size_t>(y & 31)] |= 1u << (x & 31);
+    }
+
     dvec2 least_;
     double pixel_;
-    int width_, height_;
+    int64_t width_, height_;
+    bool isDense_;
     std::vector<uint8_t> covered_;
+    std::unordered_map<int64_t, Square> squares_;
+    int64_t lastKey_ = -1;
+    Square* last_ = nullptr;
 };
 
 class Coverage {
   public:
     Coverage(const StrandSet& strands, const Direction& direction) : strands_(strands), d_(direction) {
-        for (const dvec3& p : strands.position) {
-            least_ = glm::min(least_, flat(p));
-            greatest_ = glm::max(greatest_, flat(p));
-        }
-        const double widest = *std::max_element(strands.radius.begin(), strands.radius.end());
-        least_ -= widest;
-        greatest_ += widest;
+        std::vector<dvec2> places;
+        places.reserve(strands.position.size());
+        for (const dvec3& p : strands.position) places.push_back(flat(p));
+        window_ = windowOf(places, *std::max_element(strands.radius.begin(), strands.radius.end()));
     }
 
     double ofStrands() const {
         constexpr double kPixels = 4096;
-        Grid grid(least_, greatest_, std::max(greatest_.x - least_.x, greatest_.y - least_.y) / kPixels);
+        const dvec2 size = window_.size();
+        Grid grid(window_.least, window_.greatest, std::max(size.x, size.y) / kPixels);
         for (size_t s = 0; s < strands_.strands(); ++s)
             for (uint32_t i = strands_.first[s]; i + 1 < strands_.first[s + 1]; ++i) addSegment(s, i, grid);
         return grid.area();
@@ -84,7 +144,7 @@ class Coverage {
 
     /// Of the first `count` samples, discs of this radius.
     double ofDiscs(const StrandSamples& samples, size_t count, double radius) const {
-        Grid grid(least_ - radius, greatest_ + radius, radius / 4);
+        Grid grid(window_.least - radius, window_.greatest + radius, radius / 4);
         for (size_t k = 0; k < count; ++k) {
             const dvec3 n(samples.points.normal[k]);
             const dvec2 tilt(glm::dot(n, d_.x), glm::dot(n, d_.y));
@@ -126,7 +186,7 @@ class Coverage {
 
     const StrandSet& strands_;
     const Direction& d_;
-    dvec2 least_{1e300}, greatest_{-1e300};
+    Window window_;
 };
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "engine/base/text.h"
 #include "lod/import/las/header.h"
 
 namespace stipple::lod {
@@ -164,9 +165,14 @@ lod::Crs fromGeoKeys(const std::vector<uint8_t>& keys, const std::string& ascii)
 }  // namespace
 
 lod::Crs crsOf(const std::string& wkt, const std::vector<uint8_t>& geoKeys, const std::string& geoAscii) {
-    if (!wkt.empty()) return fromWkt(wkt);
-    if (geoKeys.size() >= 8) return fromGeoKeys(geoKeys, geoAscii);
-    return {};
+    lod::Crs crs;
+    if (!wkt.empty())
+        crs = fromWkt(wkt);
+    else if (geoKeys.size() >= 8)
+        crs = fromGeoKeys(geoKeys, geoAscii);
+    crs.name = printable(crs.name);
+    crs.text = toUtf8(crs.text);
+    return crs;
 }
 
 }  // namespace stipple::las

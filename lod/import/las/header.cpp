@@ -170,6 +170,12 @@ Result<LasHeader> readLasHeader(const Bytes& in, const std::string& path, bool t
             return bad(fmt::format("scale {} and offset {} of axis {} (offsets {} and {}) are not usable", h.scale[a],
                                    h.offset[a], "xyz"[a], 131 + at, 155 + at),
                        "the header is damaged");
+        // What follows takes squares and volumes of them.
+        constexpr double kFarthest = 1e100, kSteps = 2147483648.0;
+        if (!(h.scale[a] * kSteps + std::abs(h.offset[a]) <= kFarthest))
+            return bad(fmt::format("scale {} and offset {} of axis {} (offsets {} and {}) reach farther than {}",
+                                   h.scale[a], h.offset[a], "xyz"[a], 131 + at, 155 + at, kFarthest),
+                       "the header is damaged");
     }
     h.colourOffset = kColourOffset.at(h.format);
     STIPPLE_TRY(listVlrs(in, h.headerBytes, h.dataOffset, vlrs, false, h));

@@ -5,6 +5,8 @@
 #include <charconv>
 #include <sstream>
 
+#include "engine/base/text.h"
+
 namespace stipple::lod {
 namespace {
 
@@ -113,6 +115,7 @@ Result<PlyHeader> parsePlyHeader(const InputFile& file) {
             }
             if (!parseType(type, property.type)) return bad(fmt::format("unknown type '{}'", type), line);
             words >> property.name;
+            property.name = printable(property.name);
             if (!property.isList) property.role = parseRole(property.name);
             property.slot = static_cast<int>(property.role);
             header.elements.back().properties.push_back(std::move(property));

@@ -8,19 +8,25 @@
 
 namespace stipple::lod {
 
-/// Calls use(line number from 1, numbers, whole line) for every line that is not empty and does not begin with #;
-/// numbers end where something else begins.
+/// Calls use(line number from 1, line) for every line that is not empty and does not begin with #.
 template <typename Use>
-void forRows(std::string_view text, const Use& use) {
-    std::vector<double> numbers;
+void forLines(std::string_view text, const Use& use) {
     for (size_t at = 0, line = 1; at < text.size(); ++line) {
         const size_t end = std::min(text.find_first_of("\r\n", at), text.size());
         const std::string_view row = text.substr(at, end - at);
         at = end + (text.substr(end, 2) == "\r\n" ? 2 : 1);
         const size_t first = row.find_first_not_of(" \t");
-        if (first == std::string_view::npos || row[first] == '#') continue;
+        if (first != std::string_view::npos && row[first] != '#') use(line, row.substr(first));
+    }
+}
+
+/// The same with the numbers of the line, which end where something else begins: use(line number, numbers, line).
+template <typename Use>
+void forRows(std::string_view text, const Use& use) {
+    std::vector<double> numbers;
+    forLines(text, [&](size_t line, std::string_view row) {
         numbers.clear();
-        for (const char *p = row.data() + first, *last = row.data() + row.size(); p < last;) {
+        for (const char *p = row.data(), *last = row.data() + row.size(); p < last;) {
             double value = 0;
             const auto parsed = std::from_chars(p, last, value);
             if (parsed.ec != std::errc()) break;
@@ -29,7 +35,7 @@ void forRows(std::string_view text, const Use& use) {
             while (p < last && (*p == ' ' || *p == '\t' || *p == ',' || *p == ';')) ++p;
         }
         use(line, numbers, row);
-    }
+    });
 }
 
 }  // namespace stipple::lod

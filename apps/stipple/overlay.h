@@ -1,0 +1,25 @@
+// What the window draws over the picture, by Dear ImGui calls. Nothing of it takes the mouse.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/stipple/legend.h"
+#include "apps/stipple/view_keys.h"
+#include "apps/stipple/view_pace.h"
+
+namespace stipple::app {
+
+struct OverlayFacts {
+    const render::FrameState& state;
+    const ViewSettings& settings;
+    const Legend& legend;
+    const Notices& notices;
+    std::string opening;     ///< of what is being opened; empty: nothing is
+    const char* hands = "";  ///< "orbit", "fly" or what moves the camera
+    double windowMs = 0;     ///< of the last frame, with showing it
+    std::array<char, gpu::kSteerCount> keyNames{};
+};
+void drawOverlay(const OverlayFacts& facts);
+
+}  // namespace stipple::app

@@ -1,0 +1,170 @@
+#include "apps/stipple/render_frames.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <thread>
+
+#include "engine/base/process.h"
+#include "engine/image/image_io.h"
+#include "shaders/shared/record.h"
+
+namespace stipple::app {
+
+void Timings::add(double frameMs, const std::vector<render::PassTime>& times) {
+    frames.push_back(frameMs);
+    passNames.clear();
+    passes.resize(times.size());
+    for (size_t i = 0; i < times.size(); ++i) {
+        passNames.push_back(times[i].name);
+        passes[i].push_back(times[i].ms);
+    }
+}
+
+namespace {
+
+/// Of the chunks that the last cut wants. What failed is read once more: it says whether it is bad or only lacked room.
+MissingChunks missingOf(const render::FrameState& state) {
+    MissingChunks missing;
+    std::vector<const lod::Store*> storeOf;
+    for (const lod::Instance& instance : state.instances) {
+        storeOf.resize(std::max<size_t>(storeOf.size(), instance.source + 1));
+        storeOf[instance.source] = state.stores[instance.hierarchy].get();
+    }
+    uint64_t toRead = state.streamer->counters().failures > 0 ? 1000 : 0;  // that many say enough
+    for (const lod::CutWanted& w : state.cut.wanted) {
+        const auto chunk = toRead > 0 ? lod::readChunk(*storeOf[w.source], w.node) : Result<lod::Chunk>();
+        toRead -= toRead > 0 ? 1 : 0;
+        ++(chunk ? missing.noRoom : missing.unreadable);
+        if (!chunk) missing.failure = chunk.error().line();
+    }
+    return missing;
+}
+
+}  // namespace
+
+void Verdict::judge(const render::FrameState& state) {
+    const size_t number = pictures++;
+    const bool misses = !state.cut.wanted.empty(), worstMisses = incomplete > 0;
+    incomplete += misses ? 1 : 0;
+    const double error = state.cut.tauEffective;
+    if (number > 0 && (misses != worstMisses ? worstMisses : error <= tauEffectivePixels)) return;
+    worst = number;
+    tauEffectivePixels = error;
+    missing = missingOf(state);
+}
+
+std::string numbered(const std::string& path, size_t index) {
+    const std::filesystem::path p(path);
+    return (p.parent_path() / fmt::format("{}_{:04}{}", p.stem().string(), index, p.extension().string())).string();
+}
+
+namespace {
+
+/// Asks for what the first view wants until its root can be drawn, or nothing more can come.
+Result<void> awaitRoot(const FramesPlan& plan, const render::FrameSettings& settings, render::FrameState& state) {
+    streaming::Streamer& streamer = *state.streamer;
+    for (;;) {
+        streamer.collect();
+        streamer.upload();
+        if (streamer.residency().drawable[0][0]) return {};
+        lod::selectCut(state.scene(), streamer.residency(), plan.views.front(), settings.budgets, state.scratch,
+                       state.cut);
+        const uint64_t before = streamer.counters().requests;
+        streamer.request(state.cut);
+        if (streamer.isIdle() && streamer.counters().requests == before) break;
+        std::this_thread::yield();
+    }
+    // Nothing is wanted where nothing is in view; otherwise there is nothing to show at all.
+    const MissingChunks missing = missingOf(state);
+    if (missing.unreadable > 0 && !plan.skipBad) return fail(ErrorKind::input, missing.failure);
+    if (missing.noRoom > 0)
+        return fail(ErrorKind::budget, "the first chunk does not fit", "--resident " + plan.resident,
+                    "give more memory");
+    return {};
+}
+
+/// The mean of `count` frames whose strands narrower than a pixel take other pixels each time.
+Result<void> accumulate(int count, const lod::View& view, render::FrameSettings settings, render::FrameState& state) {
+    if (count <= 1) return {};
+    std::vector<float> sum(state.image.linear.size()), coverage(state.image.rgba.size());
+    for (int f = 0; f < count; ++f) {
+        settings.draw.coverageSeed = static_cast<uint32_t>(f);
+        STIPPLE_TRY(render::renderFrame(state, view, settings));
+        for (size_t i = 0; i < sum.size(); ++i) sum[i] += std::clamp(state.image.linear[i], 0.0f, 1.0f);
+        for (size_t i = 0; i < coverage.size(); ++i) coverage[i] += state.image.rgba[i] >> 24 != 0 ? 1.0f : 0.0f;
+    }
+    const float share = 1.0f / static_cast<float>(count);
+    for (size_t i = 0; i < coverage.size(); ++i) {
+        state.image.rgba[i] = static_cast<uint32_t>(coverage[i] * share * 255.0f + 0.5f) << 24;
+        for (size_t c = 0; c < 3; ++c) {
+            state.image.linear[3 * i + c] = sum[3 * i + c] * share;
+            state.image.rgba[i] |= static_cast<uint32_t>(shared::srgbFromLinear(sum[3 * i + c] * share) * 255.0f + 0.5f)
+                                   << (8 * c);
+        }
+    }
+    return {};
+}
+
+}  // namespace
+
+Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& settings, render::FrameState& state,
+                       Executor& executor, Timings& timings, Verdict& verdict) {
+    // The first image: as soon as the root is there, whatever is missing.
+    STIPPLE_TRY(awaitRoot(plan, settings, state));
+    const lod::View& first = plan.views.front();
+    STIPPLE_TRY(render::renderFrame(state, first, settings));
+    timings.firstImageMs = millisecondsSinceProcessStart();
+    const bool isSingle = plan.views.size() == 1;
+    for (size_t i = 0; i < plan.views.size(); ++i) {
+        render::FrameSettings frame = settings;
+        if (!plan.seconds.empty()) frame.draw.wind.seconds += plan.seconds[i];
+        if (!plan.noWait)
+            STIPPLE_TRY(render::renderUntilComplete(state, plan.views[i], frame, executor));
+        else if (i > 0)
+            STIPPLE_TRY(render::renderFrame(state, plan.views[i], frame));
+        if (i == 0) timings.completeMs = millisecondsSinceProcessStart();
+        timings.add(state.counters.frameMs, state.backend->passTimes());
+        if (isSingle) break;
+        verdict.judge(state);
+        STIPPLE_TRY(image::writeImage(numbered(plan.output, i), state.image));
+        if (plan.printNames) fmt::print("{}\n", numbered(plan.output, i));
+    }
+    if (!isSingle) return {};
+    for (int f = 1; f < plan.repeats; ++f) {  // one view again and again, for timing
+        STIPPLE_TRY(render::renderFrame(state, first, settings));
+        timings.add(state.counters.frameMs, state.backend->passTimes());
+    }
+    STIPPLE_TRY(accumulate(plan.accumulate, first, settings, state));
+    verdict.judge(state);
+    return {};
+}
+
+Result<void> checkVerdict(const FramesPlan& plan, const Verdict& verdict) {
+    if (verdict.isComplete() || plan.noWait) return {};
+    const MissingChunks& missing = verdict.missing;
+    Error error{ErrorKind::budget, "", plan.output, ""};
+    const bool isBad = missing.unreadable > 0 && !(plan.skipBad && missing.noRoom > 0);
+    if (isBad) {
+        error.kind = ErrorKind::input;
+        error.what = fmt::format("{} cannot be read: {}", missing.unreadable, missing.failure);
+        error.hint = "build the store again; --skip-bad permits it";
+    } else {
+        error.what = fmt::format("{} do not fit into --resident {}", missing.noRoom, plan.resident);
+        error.hint = "give more memory; --no-wait permits it";
+    }
+    std::string which = "the picture is written, but incomplete";
+    if (verdict.pictures > 1) {
+        which = fmt::format("{} of {} pictures are incomplete (all are written); this is the worst", verdict.incomplete,
+                            verdict.pictures);
+        error.where = numbered(plan.output, verdict.worst);
+    }
+    error.what = fmt::format("{}: of the chunks that it wants {}; delivered error {:.2f} px", which, error.what,
+                             verdict.tauEffectivePixels);
+    if (!isBad || !plan.skipBad) return tl::unexpected(error);
+    if (!plan.quiet) fmt::print(stderr, "note: {}: {}\n", error.where, error.what);
+    return {};
+}
+
+}  // namespace stipple::app

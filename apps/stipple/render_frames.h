@@ -1,0 +1,57 @@
+// The frames of `render`: drawn, timed, and each judged by whether it shows what was asked for.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/base/executor.h"
+#include "engine/render/frame.h"
+
+namespace stipple::app {
+
+/// What is drawn, and what may be missing.
+struct FramesPlan {
+    std::span<const lod::View> views;
+    std::span<const double> seconds;  ///< of each view, from the first on; empty: one moment
+    std::string output, resident;     ///< as on the command line
+    int repeats = 1;                  ///< of a single view, for timing
+    int accumulate = 1;               ///< frames whose mean a single picture is
+    bool noWait = false, skipBad = false, quiet = false, printNames = false;
+};
+
+struct Timings {
+    std::vector<double> frames;
+    std::vector<std::string> passNames;
+    std::vector<std::vector<double>> passes;
+    double firstImageMs = 0, completeMs = 0;
+    void add(double frameMs, const std::vector<render::PassTime>& times);
+};
+
+/// Why chunks that a view wants are not there.
+struct MissingChunks {
+    uint64_t unreadable = 0, noRoom = 0;
+    std::string failure;  ///< of one that cannot be read
+};
+
+/// How far the pictures fall short of what was asked for: of many, the worst one.
+struct Verdict {
+    size_t pictures = 0, incomplete = 0;
+    size_t worst = 0;               ///< its number
+    double tauEffectivePixels = 0;  ///< of the worst, as all that follows
+    MissingChunks missing;
+    bool isComplete() const { return incomplete == 0; }
+    void judge(const render::FrameState& state);
+};
+
+/// out.png -> out_0007.png
+std::string numbered(const std::string& path, size_t index);
+
+/// Draws all views; writes a picture of each if there are several, leaves that of a single one in `state`.
+Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& settings, render::FrameState& state,
+                       Executor& executor, Timings& timings, Verdict& verdict);
+
+/// What becomes of pictures that are written and miss something: an error, unless the plan permits it (then a note).
+Result<void> checkVerdict(const FramesPlan& plan, const Verdict& verdict);
+
+}  // namespace stipple::app

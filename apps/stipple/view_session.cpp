@@ -1,0 +1,74 @@
+#include "apps/stipple/view_session.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/base/process.h"
+#include "engine/render/wind.h"
+
+namespace stipple::app {
+
+double ViewSession::diagonal() const {
+    const double length = glm::length(scene_.description.boundsMax - scene_.description.boundsMin);
+    return length > 0 && std::isfinite(length) ? length : 1;
+}
+
+/// What is resident is given back first: the new chunks may need its room.
+void ViewSession::restart(render::FrameSettings& settings) {
+    const lod::StoreDescription& d = scene_.description;
+    state_.reset();
+    streaming::StreamSettings stream;
+    stream.residentBytes = std::max<uint64_t>(1, parseBytes(options_.resident));
+    state_ = render::makeFrameState(scene_.placed, backend_, executor_, stream, scene_.crowds);
+    settings.draw.lights = scene_.lights;
+    settings.draw.worldUp = d.up;
+    settings.draw.wind.towards = render::windAcross(d.up);
+    settings.draw.lit =
+        options_.shade == "lit" || (options_.shade == "auto" && isShaded(d) && colour_.mode == lod::ColourMode::own);
+    render::setSway(settings.draw.wind, state_->hierarchies, state_->instances);
+    legend_ = makeLegend(colour_, d);
+}
+
+Result<void> ViewSession::show(OpenedScene scene, const ColourOptions& colour, render::FrameSettings& settings) {
+    STIPPLE_ASSIGN(colour_, applyColours(scene, colour.what, colour.map, colour.range));
+    std::swap(scene_, scene);  // what was shown lives until its chunks are given back
+    restart(settings);
+    return {};
+}
+
+std::vector<std::string> coloursAfter(const lod::ColourBy& now, const lod::StoreDescription& d) {
+    std::vector<std::string> names{"auto", "height"};
+    if (d.hasNormals) names.emplace_back("normal");
+    for (const lod::AttributeInfo& a : d.attributes) names.push_back(a.name);
+    auto next = names.begin();
+    if (now.mode != lod::ColourMode::own) next = std::find(names.begin(), names.end(), now.title);
+    if (next == names.end()) next = names.begin();
+    std::rotate(names.begin(), next + 1, names.end());
+    return names;
+}
+
+Result<void> ViewSession::nextColours(render::FrameSettings& settings) {
+    std::vector<lod::ColourBy> before;
+    for (const render::PlacedStore& p : scene_.placed) before.push_back(p.colour);
+    std::optional<Error> problem;
+    for (const std::string& name : coloursAfter(colour_, scene_.description)) {
+        const auto colours = applyColours(scene_, name, "", "");
+        if (colours && (colours->mode != lod::ColourMode::own || colour_.mode != lod::ColourMode::own)) {
+            colour_ = *colours;
+            restart(settings);
+            return {};
+        }
+        if (!colours && !problem) problem = colours.error();
+    }
+    for (size_t i = 0; i < before.size(); ++i) scene_.placed[i].colour = before[i];
+    return tl::unexpected<Error>(problem.value_or(Error{ErrorKind::usage, "has no other colours", "the scene", ""}));
+}
+
+void ViewSession::turnUp(render::FrameSettings& settings) {
+    const glm::dvec3 up = scene_.description.up;
+    scene_.description.up = up.z > 0.9 ? glm::dvec3(0, 1, 0) : up.y > 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1);
+    settings.draw.worldUp = scene_.description.up;
+    settings.draw.wind.towards = render::windAcross(settings.draw.worldUp);
+}
+
+}  // namespace stipple::app

@@ -1,0 +1,145 @@
+#include "engine/scene/gltf/looks.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "engine/scene/gltf/json_tools.h"
+
+namespace stipple::scene::gltf {
+namespace {
+
+using nlohmann::json;
+
+TextureUse textureUse(const json& parent, const char* name) {
+    TextureUse use;
+    if (!parent.contains(name)) return use;
+    const json& info = parent[name];
+    use.texture = info["index"].get<int>();
+    use.uvSet = info.value("texCoord", 0);
+    const json& transform = extensionOf(info, "KHR_texture_transform");
+    if (!transform.is_object()) return use;
+    use.uvSet = transform.value("texCoord", use.uvSet);
+    const auto offset = transform.contains("offset") ? vectorOf<glm::vec2>(transform["offset"]) : glm::vec2(0);
+    const auto scale = transform.contains("scale") ? vectorOf<glm::vec2>(transform["scale"]) : glm::vec2(1);
+    const float r = transform.value("rotation", 0.0f), cosine = std::cos(r), sine = std::sin(r);
+    if (!std::isfinite(offset.x + offset.y + scale.x + scale.y + sine)) return use;  // beyond what floats hold
+    // translation * rotation * scale (KHR_texture_transform, "Overview")
+    use.transform =
+        glm::mat3(cosine * scale.x, -sine * scale.x, 0, sine * scale.y, cosine * scale.y, 0, offset.x, offset.y, 1);
+    return use;
+}
+
+void readMaterials(const json& root, Scene& scene) {
+    for (const json& j : arrayOf(root, "materials")) {
+        Material m;
+        m.name = j.value("name", "");
+        static const json none = json::object();
+        const json& pbr = j.contains("pbrMetallicRoughness") ? j["pbrMetallicRoughness"] : none;
+        if (pbr.contains("baseColorFactor")) m.baseColour = vectorOf<glm::vec4>(pbr["baseColorFactor"]);
+        m.metallic = pbr.value("metallicFactor", 1.0f);
+        m.roughness = pbr.value("roughnessFactor", 1.0f);
+        m.baseColourTexture = textureUse(pbr, "baseColorTexture");
+        m.metallicRoughnessTexture = textureUse(pbr, "metallicRoughnessTexture");
+        m.normalTexture = textureUse(j, "normalTexture");
+        m.occlusionTexture = textureUse(j, "occlusionTexture");
+        m.emissiveTexture = textureUse(j, "emissiveTexture");
+        if (j.contains("normalTexture")) m.normalScale = j["normalTexture"].value("scale", 1.0f);
+        if (j.contains("occlusionTexture")) m.occlusionStrength = j["occlusionTexture"].value("strength", 1.0f);
+        if (j.contains("emissiveFactor")) m.emissive = vectorOf<glm::vec3>(j["emissiveFactor"]);
+        m.emissive *= extensionOf(j, "KHR_materials_emissive_strength").is_object()
+                          ? extensionOf(j, "KHR_materials_emissive_strength").value("emissiveStrength", 1.0f)
+                          : 1.0f;
+        const std::string alpha = j.value("alphaMode", "OPAQUE");
+        m.alphaMode = alpha == "MASK" ? AlphaMode::mask : alpha == "BLEND" ? AlphaMode::blend : AlphaMode::opaque;
+        m.alphaCutoff = j.value("alphaCutoff", 0.5f);
+        m.isDoubleSided = j.value("doubleSided", false);
+        m.isUnlit = extensionOf(j, "KHR_materials_unlit").is_object();
+        scene.materials.push_back(std::move(m));
+    }
+}
+
+Result<void> readImages(const json& root, Buffers& buffers, Scene& scene) {
+    const json& images = arrayOf(root, "images");
+    for (size_t i = 0; i < images.size(); ++i) {
+        EncodedImage image;
+        image.name = images[i].value("name", images[i].value("uri", "").substr(0, 80));
+        if (auto bytes = buffers.image(i)) {
+            STIPPLE_TRY(buffers.claim(bytes->size(), "its pictures"));
+            image.bytes = std::move(*bytes);
+        } else if (bytes.error().kind == ErrorKind::budget) {
+            return tl::unexpected(bytes.error());
+        } else {
+            scene.notes.push_back(fmt::format("a texture cannot be read and is left out: {}", bytes.error().line()));
+        }
+        scene.images.push_back(std::move(image));
+    }
+    const auto isThere = [&](int image) {
+        return image >= 0 && image < static_cast<int>(images.size()) &&
+               !scene.images[static_cast<size_t>(image)].bytes.empty();
+    };
+    const auto wrap = [](int code) {
+        return code == 33071 ? Wrap::clamp : code == 33648 ? Wrap::mirror : Wrap::repeat;
+    };
+    for (const json& j : arrayOf(root, "textures")) {
+        Texture t;
+        t.image = j.value("source", -1);
+        if (const json& webp = extensionOf(j, "EXT_texture_webp"); webp.is_object() && t.image < 0)
+            t.image = webp.value("source", -1);
+        if (!isThere(t.image)) t.image = -1;
+        if (j.contains("sampler")) {
+            const json& sampler = root["samplers"][j["sampler"].get<size_t>()];
+            t.wrapU = wrap(sampler.value("wrapS", 10497));
+            t.wrapV = wrap(sampler.value("wrapT", 10497));
+        }
+        scene.textures.push_back(t);
+    }
+    return {};
+}
+
+void readLightsAndCameras(const json& root, Scene& scene) {
+    const json& punctual = extensionOf(root, "KHR_lights_punctual");
+    for (const json& j : punctual.is_object() ? punctual["lights"] : json::array()) {
+        Light light;
+        const std::string type = j.value("type", "point");
+        light.kind = type == "directional" ? LightKind::directional
+                     : type == "spot"      ? LightKind::spot
+                                           : LightKind::point;
+        if (j.contains("color")) light.colour = vectorOf<glm::vec3>(j["color"]);
+        light.intensity = j.value("intensity", 1.0f);
+        light.range = j.value("range", 0.0f);
+        if (j.contains("spot")) {
+            light.innerCone = j["spot"].value("innerConeAngle", 0.0f);
+            light.outerCone = j["spot"].value("outerConeAngle", 0.7853982f);
+        }
+        scene.lights.push_back(light);
+    }
+    for (const json& j : arrayOf(root, "cameras")) {
+        SceneCamera camera;
+        camera.isOrthographic = j["type"] == "orthographic";
+        const auto type = j["type"].get<std::string>();
+        if (!j.contains(type)) {
+            scene.cameras.push_back(camera);
+            continue;
+        }
+        const json& of = j[type];
+        camera.nearPlane = of["znear"].get<double>();
+        if (camera.isOrthographic)
+            camera.height = 2 * of["ymag"].get<double>();
+        else
+            camera.fovDegrees = glm::degrees(of["yfov"].get<double>());
+        scene.cameras.push_back(camera);
+    }
+}
+
+}  // namespace
+
+Result<void> readLooks(const Container& container, Buffers& buffers, Scene& scene) {
+    const json& root = container.json;
+    readMaterials(root, scene);
+    STIPPLE_TRY(readImages(root, buffers, scene));
+    readLightsAndCameras(root, scene);
+    return {};
+}
+
+}  // namespace stipple::scene::gltf

@@ -1,0 +1,172 @@
+#include "lod/store_check.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace stipple::lod {
+
+Error damagedStore(const std::string& where, const std::string& what) {
+    return Error{ErrorKind::input, what, where, "the store is damaged or not whole; build it again"};
+}
+
+namespace {
+
+constexpr double kFarthest = 1e150;        ///< of world coordinates: their squares must be numbers, too
+constexpr double kFarthestSteps = 0x1p80;  ///< of spheres, lattice units; lattices end at 2^62
+constexpr float kLargestFactor = 1e9f;     ///< of a material
+
+bool isWithin(const glm::dvec3& v, double limit) {
+    return std::abs(v.x) <= limit && std::abs(v.y) <= limit && std::abs(v.z) <= limit;
+}
+bool isWithin(const shared::vec3& v, float limit) {
+    return std::abs(v.x) <= limit && std::abs(v.y) <= limit && std::abs(v.z) <= limit;
+}
+
+/// World coordinates of all that the lattice can name must be finite, and so must be what is measured in them.
+bool isPossibleSpace(const Store& store) {
+    const Hierarchy& h = store.hierarchy;
+    const StoreDescription& d = store.description;
+    const double edge = std::ldexp(h.unit, static_cast<int>(h.rootLog2));
+    bool fits = isWithin(h.origin, kFarthest) && h.unit >= 1e-150 && edge <= kFarthest && h.errors.smallest >= 1e-30 &&
+                h.errors.smallest <= kFarthestSteps;
+    for (const glm::dvec3& p : {d.boundsMin, d.boundsMax, d.focusMin, d.focusMax})
+        fits = fits && isWithin(p, kFarthest);
+    for (int axis = 0; axis < 3; ++axis)
+        fits = fits && d.boundsMin[axis] <= d.boundsMax[axis] && d.focusMin[axis] <= d.focusMax[axis];
+    fits = fits && std::abs(d.lowHeight) <= 2 * kFarthest && std::abs(d.highHeight) <= 2 * kFarthest;
+    for (const float factor : h.discFactors) fits = fits && factor >= 1e-6f && factor <= 1e6f;
+    return fits && d.metresPerUnit > 0 && d.metresPerUnit <= kFarthest;
+}
+
+bool isPossiblePlace(const Node& n, uint64_t chunksEnd) {
+    return n.chunkOffset <= chunksEnd && uint64_t{n.chunkBytes} + n.attributeBytes <= chunksEnd - n.chunkOffset &&
+           n.chunkBytes >= kFewestChunkBytes && isWithin(n.centre, kFarthestSteps) && n.radius >= 0 &&
+           n.radius <= kFarthestSteps && std::abs(n.normalConeCosine) <= 1 && n.records > 0;
+}
+
+bool isPossibleMaterial(const shared::SurfaceMaterial& m, size_t textures) {
+    bool fits = isWithin(m.baseColour, kLargestFactor) && isWithin(m.emissive, kLargestFactor);
+    for (const float factor : {m.alpha, m.alphaCutoff, m.metallic, m.roughness, m.normalScale, m.occlusionStrength})
+        fits = fits && std::abs(factor) <= kLargestFactor;
+    for (const shared::TextureSlot* slot :
+         {&m.baseTexture, &m.surfaceTexture, &m.normalTexture, &m.occlusionTexture, &m.emissiveTexture})
+        fits = fits && slot->texture <= textures && isWithin(slot->rowU, 1e30f) && isWithin(slot->rowV, 1e30f);
+    return fits;
+}
+
+/// Every level of a texture has its tiles, and they lie in the file.
+Result<void> checkTextures(const Store& store, uint64_t chunksEnd) {
+    const Hierarchy& h = store.hierarchy;
+    uint64_t tiles = 0;
+    bool fits = h.isMesh() || h.tiles.size() + h.textures.size() + h.runs.size() + h.parents.size() == 0;
+    for (const shared::TextureInfo& t : h.textures) {
+        fits = fits && t.width > 0 && t.height > 0 && t.width <= 65536 && t.height <= 65536 && t.levels > 0 &&
+               t.levels <= shared::kTextureLevels && t.wrapU <= 2 && t.wrapV <= 2;
+        for (uint32_t l = 0; fits && l < t.levels; ++l) {
+            fits = t.firstTile[l] == tiles;
+            tiles += uint64_t{shared::tilesAcross(t.width, l)} * shared::tilesAcross(t.height, l);
+        }
+    }
+    fits = fits && tiles == h.tiles.size();
+    for (const TextureTile& t : h.tiles) fits = fits && t.offset <= chunksEnd && t.bytes <= chunksEnd - t.offset;
+    for (const uint32_t t : h.groupTextures) fits = fits && t < h.textures.size();
+    for (const shared::SurfaceMaterial& m : store.description.materials)
+        fits = fits && isPossibleMaterial(m, h.textures.size());
+    if (!fits)
+        return tl::unexpected(damagedStore(store.path, "the textures or materials of the mesh are not possible"));
+    return {};
+}
+
+/// Parents before children, producers after the groups that hold what they gave; the arrays of one group follow those
+/// of the group before it, so that no group can be walked along twice.
+Result<void> checkGroups(const Store& store, uint64_t chunksEnd) {
+    const Hierarchy& h = store.hierarchy;
+    uint64_t runs = 0, parents = 0, textures = 0;
+    for (size_t i = 0; i < h.nodes.size(); ++i) {
+        const Node& n = h.nodes[i];
+        const MeshGroup& g = h.groups[i];
+        bool fits = isPossiblePlace(n, chunksEnd) && n.attributeBytes == 0 && n.isLeaf() && g.runs > 0 &&
+                    g.firstRun == runs && g.firstParent == parents && g.firstTexture == textures &&
+                    (g.parents > 0) == (n.errorCode != 255) && (i > 0 || g.parents == 0);
+        runs += g.runs;
+        parents += g.parents;
+        textures += g.textures;
+        fits = fits && runs <= h.runs.size() && parents <= h.parents.size() && textures <= h.groupTextures.size();
+        fits = fits && g.vertices <= uint64_t{g.clusters} * shared::kClusterVertices && g.clusters <= n.records &&
+               n.records <= uint64_t{g.clusters} * shared::kClusterTriangles;
+        fits = fits && isPossibleGain(n.chunkBytes, fewestEncodedBytes(g.vertices, sizeof(shared::MeshVertex)) +
+                                                        uint64_t{n.records} * 4 +
+                                                        uint64_t{g.clusters} * sizeof(shared::MeshCluster));
+        fits = fits && std::isfinite(g.lowU + g.lowV + g.highU + g.highV) && std::isfinite(g.uvPerStep);
+        uint64_t triangles = 0, clusters = 0;
+        for (uint32_t r = 0; fits && r < g.runs; ++r) {
+            const MeshRun& run = h.runs[g.firstRun + r];
+            fits = run.firstCluster == clusters &&
+                   (run.producer == MeshRun::kOriginal || (run.producer > i && run.producer < h.nodes.size()));
+            clusters += run.clusters;
+            triangles += run.triangles;
+        }
+        for (uint32_t k = 0; fits && k < g.parents; ++k) fits = h.parents[g.firstParent + k] < i;
+        if (!fits || triangles != n.records || clusters != g.clusters)
+            return tl::unexpected(damagedStore(store.path, fmt::format("group {} of the mesh is not possible", i)));
+    }
+    return {};
+}
+
+/// A tree, breadth first: the children of a node follow those of the node before it, so that no node is the child of
+/// two; each lies in its octant of its parent's cell.
+Result<void> checkNodes(const Store& store, uint64_t chunksEnd) {
+    const Hierarchy& h = store.hierarchy;
+    const auto& nodes = h.nodes;
+    const uint64_t stride = h.isStrands ? sizeof(shared::StrandSegment) : sizeof(shared::PointRecord);
+    uint64_t next = 1;
+    for (size_t i = 0; i < nodes.size(); ++i) {
+        const Node& n = nodes[i];
+        bool fits = isPossiblePlace(n, chunksEnd) && (i > 0 || n.level == 0) &&
+                    isPossibleGain(n.chunkBytes, fewestEncodedBytes(n.records, stride));
+        uint64_t child = n.firstChild;
+        fits = fits && (n.isLeaf() || n.firstChild == next);
+        for (uint32_t octant = 0; fits && octant < 8; ++octant) {
+            if (!(n.childMask >> octant & 1u)) continue;
+            fits = child < nodes.size() && nodes[child].parent == i && nodes[child].level == n.level + 1;
+            for (uint32_t axis = 0; fits && axis < 3; ++axis)
+                fits = nodes[child].cell.at(axis) == 2 * uint64_t{n.cell.at(axis)} + (octant >> axis & 1u);
+            ++child;
+            ++next;
+        }
+        if (!fits || n.level > h.rootLog2 ||
+            n.stepShift != static_cast<int>(h.rootLog2) - n.level - (h.isLoose() ? 15 : 16))
+            return tl::unexpected(
+                damagedStore(store.path, fmt::format("node {} of the node table is not possible", i)));
+    }
+    if (next != nodes.size()) return tl::unexpected(damagedStore(store.path, "some nodes are nobody's children"));
+    return {};
+}
+
+}  // namespace
+
+Result<void> checkMaterials(const Store& store, const Chunk& chunk, const std::string& where) {
+    uint32_t last = 0;
+    for (const shared::MeshVertex& v : chunk.vertices) {
+        const uint32_t material = v.surface & shared::kSurfaceMaterialMask;
+        last = material > last ? material : last;
+    }
+    if (chunk.vertices.empty() || last < store.description.materials.size()) return {};
+    return tl::unexpected(damagedStore(where, fmt::format("a vertex names material {}, which there is not", last)));
+}
+
+Result<void> checkTables(const Store& store, uint64_t chunksEnd) {
+    const Hierarchy& h = store.hierarchy;
+    const auto bad = [&](const char* what) { return tl::unexpected(damagedStore(store.path, what)); };
+    if (!h.discFactors.empty() && !(h.smallestDisc > 0 && std::isfinite(h.smallestDisc)))
+        return bad("the size of its discs is not possible");
+    if (!(std::abs(glm::length(store.description.up) - 1) < 1e-6)) return bad("the up direction has not the length 1");
+    if (!isPossibleSpace(store)) return bad("its coordinates are not possible");
+    if (h.isProgressive && (h.isStrands || h.isMesh())) return bad("holds progressive points and something else");
+    if (h.isStrands && h.isMesh()) return bad("holds strands and groups of triangles");
+    STIPPLE_TRY(checkTextures(store, chunksEnd));
+    return h.isMesh() ? checkGroups(store, chunksEnd) : checkNodes(store, chunksEnd);
+}
+
+}  // namespace stipple::lod

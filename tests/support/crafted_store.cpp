@@ -1,0 +1,298 @@
+#include "tests/support/crafted_store.h"
+
+#include <zstd.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+
+#include "engine/base/hash.h"
+#include "engine/cpu/cpu_backend.h"
+#include "engine/reference/reference.h"
+#include "tests/support/support.h"
+
+namespace stipple::test {
+namespace {
+
+using namespace lod::layout;
+
+std::vector<uint8_t> unpack(const std::string& file, const Section& s) {
+    std::vector<uint8_t> raw(s.rawBytes);
+    const size_t got = ZSTD_decompress(raw.data(), raw.size(), file.data() + s.offset, s.bytes);
+    if (got != raw.size()) throw std::runtime_error("a section of a store to be crafted");
+    return raw;
+}
+
+void append(std::vector<uint8_t>& out, const void* from, size_t count) {
+    if (count == 0) return;
+    const size_t at = out.size();
+    out.resize(at + count);
+    std::memcpy(out.data() + at, from, count);
+}
+
+/// Adds a section; what it claims to hold uncompressed, if not the truth.
+Section pack(std::vector<uint8_t>& out, const void* from, size_t count, uint64_t claim) {
+    std::vector<uint8_t> bytes(ZSTD_compressBound(count));
+    bytes.resize(ZSTD_compress(bytes.data(), bytes.size(), from, count, 1));
+    const Section s{out.size(), bytes.size(), claim != 0 ? claim : count, hashBytes(bytes.data(), bytes.size())};
+    append(out, bytes.data(), bytes.size());
+    return s;
+}
+
+template <typename T>
+void copyArray(std::vector<T>& to, const std::vector<uint8_t>& raw) {
+    to.resize(raw.size() / sizeof(T));
+    if (!to.empty()) std::memcpy(to.data(), raw.data(), to.size() * sizeof(T));
+}
+
+}  // namespace
+
+CraftedStore CraftedStore::read(const std::string& path) {
+    const std::string file = slurp(path);
+    CraftedStore c;
+    std::memcpy(&c.head, file.data(), sizeof(c.head));
+    copyArray(c.nodes, unpack(file, c.head.nodes));
+    copyArray(c.counts, unpack(file, c.head.counts));
+    const std::vector<uint8_t> text = unpack(file, c.head.description);
+    c.description.assign(text.begin(), text.end());
+    c.mesh = unpack(file, c.head.mesh);
+    c.body.assign(file.begin() + sizeof(Head), file.begin() + static_cast<std::ptrdiff_t>(c.head.nodes.offset));
+    return c;
+}
+
+std::vector<uint8_t> CraftedStore::bytes() const {
+    const auto hashOf = [&](uint64_t offset, uint64_t count) -> uint64_t {
+        const uint64_t at = offset - sizeof(Head);
+        if (offset < sizeof(Head) || at > body.size() || count > body.size() - at) return 0;
+        return hashBytes(body.data() + at, count);
+    };
+    std::vector<NodeOnDisk> hashed = nodes;
+    for (NodeOnDisk& n : hashed) {
+        n.chunkHash = hashOf(n.chunkOffset, n.chunkBytes);
+        n.attributeHash = hashOf(n.chunkOffset + n.chunkBytes, n.attributeBytes);
+    }
+    std::vector<uint8_t> groups = mesh;
+    const MeshHead of = meshHead();
+    for (uint64_t t = 0; of.tiles * sizeof(lod::TextureTile) <= groups.size() && t < of.tiles; ++t) {
+        lod::TextureTile tile;
+        uint8_t* const at = groups.data() + tilesAt() + t * sizeof(tile);
+        std::memcpy(&tile, at, sizeof(tile));
+        tile.hash = hashOf(tile.offset, tile.bytes);
+        std::memcpy(at, &tile, sizeof(tile));
+    }
+    std::vector<uint8_t> out(sizeof(Head));
+    append(out, body.data(), body.size());
+    Head h = head;
+    h.nodes = pack(out, hashed.data(), hashed.size() * sizeof(NodeOnDisk), claimRawNodes);
+    h.counts = pack(out, counts.data(), counts.size() * sizeof(CodeCount), claimRawCounts);
+    h.description = pack(out, description.data(), description.size(), claimRawDescription);
+    h.mesh = pack(out, groups.data(), groups.size(), claimRawMesh);
+    h.nodeCount = claimNodeCount != 0 ? claimNodeCount : nodes.size();
+    h.fileBytes = out.size() + sizeof(Foot);
+    h.hash = hashBytes(&h, offsetof(Head, hash));
+    const Foot foot{h.hash, kFootMagic};
+    append(out, &foot, sizeof(foot));
+    std::memcpy(out.data(), &h, sizeof(h));
+    return out;
+}
+
+void CraftedStore::write(const std::string& path) const {
+    const std::vector<uint8_t> all = bytes();
+    spit(path, {all.begin(), all.end()});
+}
+
+void CraftedStore::replaceChunk(size_t i, const std::vector<uint8_t>& chunk) {
+    NodeOnDisk& n = nodes.at(i);
+    const uint64_t at = n.chunkOffset + n.chunkBytes - sizeof(Head);
+    const std::vector<uint8_t> attributes(
+        body.begin() + static_cast<std::ptrdiff_t>(at),
+        body.begin() + static_cast<std::ptrdiff_t>(at + n.attributeBytes));  // they follow the chunk
+    n.chunkOffset = sizeof(Head) + body.size();
+    n.chunkBytes = static_cast<uint32_t>(chunk.size());
+    append(body, chunk.data(), chunk.size());
+    append(body, attributes.data(), attributes.size());
+}
+
+MeshHead CraftedStore::meshHead() const {
+    MeshHead h{};
+    if (mesh.size() >= sizeof(h)) std::memcpy(&h, mesh.data(), sizeof(h));
+    return h;
+}
+
+std::vector<uint8_t> encodeAgain(const lod::Hierarchy& h, const lod::Chunk& chunk) {
+    return h.isMesh()    ? lod::encodeMeshChunk(chunk)
+           : h.isStrands ? lod::encodeStrandChunk(chunk)
+                         : lod::encodeChunk(chunk);
+}
+
+namespace {
+
+/// Numbers that code forgets.
+uint64_t oddNumber(const Dice& dice, uint64_t old) {
+    switch (dice(10)) {
+        case 0:
+            return 0;
+        case 1:
+            return ~uint64_t{0};
+        case 2:
+            return old + 1;
+        case 3:
+            return old - 1;
+        case 4:
+            return old ^ uint64_t { 1 } << dice(64);
+        case 5:
+            return uint64_t{1} << dice(64);
+        case 6:
+            return (uint64_t{1} << dice(64)) - 1;
+        case 7:
+            return 0x7fc000007f800000ull >> 32 * dice(2);  // NaN and infinity of fp32
+        case 8:
+            return dice(2) == 0 ? 0x7ff0000000000000ull : 0x7ff8000000000001ull;  // of fp64
+        default:
+            return dice(~uint64_t{0});
+    }
+}
+
+void changeBytes(void* at, size_t size, const Dice& dice) {
+    static constexpr std::array<size_t, 4> widths{1, 2, 4, 8};
+    const size_t width = std::min(widths.at(dice(4)), size), place = dice(size / width) * width;
+    uint64_t value = 0;
+    std::memcpy(&value, static_cast<uint8_t*>(at) + place, width);
+    value = oddNumber(dice, value);
+    std::memcpy(static_cast<uint8_t*>(at) + place, &value, width);
+}
+
+/// Another number in the place of one of the description's.
+void changeText(std::string& text, const Dice& dice) {
+    static constexpr std::array<const char*, 14> values{"0",          "-1",     "1e308", "-1e308", "1e38",
+                                                        "4294967295", "1e-300", "65535", "65536",  "null",
+                                                        "[]",         "true",   "\"x\"", "9e999"};
+    if (text.empty()) return;
+    size_t from = dice(text.size());
+    from = text.find_first_of("0123456789", from);
+    if (from == std::string::npos) return;
+    size_t to = text.find_first_not_of("0123456789.eE+-", from);
+    if (to == std::string::npos) to = text.size();
+    text.replace(from, to - from, values.at(dice(values.size())));
+}
+
+void changeRecords(CraftedStore& c, const lod::Store& store, const Dice& dice) {
+    const size_t i = dice(c.nodes.size());
+    if (i >= store.hierarchy.nodes.size()) return;
+    auto chunk = lod::readChunk(store, static_cast<uint32_t>(i), true);
+    if (!chunk) return;
+    for (uint64_t n = 1 + dice(3); n > 0; --n) {
+        const auto change = [&](auto& items) {
+            if (!items.empty()) changeBytes(&items[dice(items.size())], sizeof(items[0]), dice);
+        };
+        switch (dice(4)) {
+            case 0:
+                change(chunk->triangles);
+                break;
+            case 1:
+                change(chunk->clusters);
+                break;
+            default:
+                change(chunk->vertices);
+        }
+        change(chunk->records);
+        change(chunk->segments);
+    }
+    c.replaceChunk(i, encodeAgain(store.hierarchy, *chunk));
+}
+
+}  // namespace
+
+std::string mutate(CraftedStore& c, const lod::Store& store, const Dice& dice) {
+    std::string what;
+    for (uint64_t n = 1 + dice(3); n > 0; --n) switch (dice(8)) {
+            case 0: {
+                // Of the head: what it says of space and errors, and what sizes it claims.
+                std::array<double*, 5> numbers{&c.head.origin[0], &c.head.origin[1], &c.head.origin[2], &c.head.unit,
+                                               &c.head.smallestError};
+                std::array<uint64_t*, 5> claims{&c.claimNodeCount, &c.claimRawNodes, &c.claimRawCounts,
+                                                &c.claimRawDescription, &c.claimRawMesh};
+                const uint64_t k = dice(11);
+                if (k < 5) changeBytes(numbers.at(k), 8, dice);
+                if (k >= 5 && k < 10) *claims.at(k - 5) = oddNumber(dice, 1000);
+                if (k == 10) changeBytes(&c.head.rootLog2, 4, dice);
+                what += " head";
+                break;
+            }
+            case 1:
+            case 2:
+                changeBytes(&c.nodes.at(dice(c.nodes.size())), sizeof(NodeOnDisk), dice);
+                what += " node";
+                break;
+            case 3:
+                if (!c.counts.empty()) changeBytes(&c.counts.at(dice(c.counts.size())), sizeof(CodeCount), dice);
+                what += " counts";
+                break;
+            case 4:
+                changeText(c.description, dice);
+                what += " description";
+                break;
+            case 5:
+                if (!c.mesh.empty()) changeBytes(c.mesh.data(), c.mesh.size(), dice);
+                what += " mesh";
+                break;
+            default:
+                changeRecords(c, store, dice);
+                what += " records";
+        }
+    return what;
+}
+
+namespace {
+
+lod::View lookAt(const glm::dvec3& eye, const glm::dvec3& target, double focal, double nearPlane) {
+    lod::View view;
+    view.width = 48;
+    view.height = 32;
+    view.focalPixels = focal;
+    view.nearPlane = nearPlane;
+    view.eye = eye;
+    const glm::dvec3 along = target - eye;
+    const double length = glm::length(along);
+    view.forward = length > 0 && std::isfinite(length) ? along / length : glm::dvec3(0, 0, -1);
+    const glm::dvec3 aside = std::abs(view.forward.z) < 0.9 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0);
+    view.right = glm::normalize(glm::cross(view.forward, aside));
+    view.down = glm::cross(view.forward, view.right);
+    return view;
+}
+
+std::vector<lod::View> viewsOf(const lod::StoreDescription& d) {
+    const glm::dvec3 middle = 0.5 * d.focusMin + 0.5 * d.focusMax, size = d.focusMax - d.focusMin;
+    const double length = std::max(glm::length(size), 1e-300), near = std::max(1e-300, 1e-6 * length);
+    return {lookAt(middle + 1.3 * size, middle, 40, near), lookAt(middle, middle + size, 40, near),
+            lookAt(d.focusMin, d.focusMax, 2, near),
+            lookAt(middle + glm::dvec3(0, 0, 1e12 * length), middle, 1e9, near),
+            lookAt(glm::dvec3(1e200, 0, 0), glm::dvec3(0), 40, 1e-300)};
+}
+
+}  // namespace
+
+bool tryEverything(const std::string& path) {
+    auto opened = lod::openStore(path);
+    if (!opened) return false;
+    const auto store = std::make_shared<const lod::Store>(std::move(*opened));
+    const auto executor = makeSerialExecutor();
+    for (const bool isReference : {false, true}) {
+        const auto backend = isReference ? reference::makeReferenceBackend(*executor) : cpu::makeCpuBackend(*executor);
+        streaming::StreamSettings stream;
+        stream.residentBytes = uint64_t{64} << 20;
+        auto state = render::makeFrameState(std::vector{store}, *backend, *executor, stream);
+        for (const lod::View& view : viewsOf(store->description)) {
+            render::FrameSettings settings;
+            settings.wantDepthAndNormal = true;
+            settings.draw.worldUp = store->description.up;
+            settings.budgets.records = 200'000;
+            (void)render::renderUntilComplete(*state, view, settings, *executor);
+        }
+    }
+    (void)lod::verifyStore(*store, *executor);
+    return true;
+}
+
+}  // namespace stipple::test

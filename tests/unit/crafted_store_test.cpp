@@ -1,0 +1,255 @@
+// Stores whose hashes are right and whose content is not: refused by name, or drawn without harm.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "tests/support/crafted_store.h"
+#include "tests/support/support.h"
+
+namespace stipple {
+namespace {
+
+using lod::layout::NodeOnDisk;
+using test::CraftedStore;
+
+class Crafted : public testing::Test {
+  protected:
+    enum Kind { points, mesh, strands, afar };
+    static void SetUpTestSuite() {
+        folder_ = new test::TempFolder;
+        paths_ = test::smallStores(folder_->path());
+    }
+    static void TearDownTestSuite() {
+        delete folder_;
+        folder_ = nullptr;
+    }
+    static CraftedStore take(Kind kind) { return CraftedStore::read(paths_.at(kind)); }
+    static lod::Store open(Kind kind) { return *lod::openStore(paths_.at(kind)); }
+    std::string written(const CraftedStore& c) const {
+        const std::string path = mine_ / "crafted.stipple";
+        c.write(path);
+        return path;
+    }
+    /// It is refused when it is opened, with `text` in the message.
+    void expectRefused(const CraftedStore& c, const std::string& text) const {
+        const auto store = lod::openStore(written(c));
+        ASSERT_FALSE(store) << text;
+        EXPECT_EQ(store.error().kind, ErrorKind::input);
+        EXPECT_NE(store.error().line().find(text), std::string::npos) << store.error().line();
+    }
+    /// It is opened; decoding and verification find it, and drawing does no harm.
+    void expectFound(const CraftedStore& c, const std::string& text) const {
+        const std::string path = written(c);
+        const auto store = lod::openStore(path);
+        ASSERT_TRUE(store) << store.error().line();
+        const auto verified = lod::verifyStore(*store, *executor_);
+        ASSERT_FALSE(verified) << text;
+        EXPECT_NE(verified.error().line().find(text), std::string::npos) << verified.error().line();
+        test::tryEverything(path);
+    }
+    /// Changes the records of one node.
+    template <typename Change>
+    static CraftedStore withChunk(Kind kind, uint32_t node, const Change& change) {
+        const lod::Store store = open(kind);
+        auto chunk = lod::readChunk(store, node, true);
+        change(*chunk);
+        CraftedStore c = take(kind);
+        c.replaceChunk(node, test::encodeAgain(store.hierarchy, *chunk));
+        return c;
+    }
+    template <typename T>
+    static void put(CraftedStore& c, size_t at, const T& value) {
+        std::memcpy(c.mesh.data() + at, &value, sizeof(value));
+    }
+    static size_t innerNode(const CraftedStore& c) {
+        size_t i = 0;
+        while (c.nodes[i].childMask == 0) ++i;
+        return i;
+    }
+
+    static test::TempFolder* folder_;
+    static std::vector<std::string> paths_;
+    test::TempFolder mine_;
+    std::unique_ptr<Executor> executor_ = makeSerialExecutor();
+};
+test::TempFolder* Crafted::folder_ = nullptr;
+std::vector<std::string> Crafted::paths_;
+
+TEST_F(Crafted, WhatIsOnlyWrittenAgainIsFine) {
+    for (const Kind kind : {points, mesh, strands, afar}) {
+        CraftedStore c = take(kind);
+        const lod::Store store = open(kind);
+        c.replaceChunk(0, test::encodeAgain(store.hierarchy, *lod::readChunk(store, 0, true)));
+        const auto again = lod::openStore(written(c));
+        ASSERT_TRUE(again) << again.error().line();
+        const auto verified = lod::verifyStore(*again, *executor_);
+        EXPECT_TRUE(verified) << verified.error().line();
+        EXPECT_GT(again->hierarchy.nodes.size(), 3u) << kind;
+    }
+}
+
+TEST_F(Crafted, NodesThatShareChildrenAreRefused) {
+    for (const Kind kind : {points, strands, afar}) {
+        CraftedStore c = take(kind);
+        const size_t inner = innerNode(c);
+        const auto children = static_cast<uint32_t>(__builtin_popcount(c.nodes[inner].childMask));
+        // Each child of the first has the same children: that many to the power of the depth would be walked along.
+        for (uint32_t k = 0; k < children; ++k) {
+            NodeOnDisk& child = c.nodes[c.nodes[inner].firstChild + k];
+            child.firstChild = c.nodes[inner].firstChild + children;
+            child.childMask = c.nodes[inner].childMask;
+        }
+        expectRefused(c, "not possible");
+        c = take(kind);
+        c.nodes.back().parent = static_cast<uint32_t>(c.nodes.size() - 2);
+        expectRefused(c, "not possible");
+    }
+}
+
+TEST_F(Crafted, RecordsThatTheBytesCannotHoldAreRefusedBeforeMemoryIsTaken) {
+    for (const Kind kind : {points, strands, afar, mesh}) {
+        CraftedStore c = take(kind);
+        const uint32_t most = ~0u;
+        size_t used = 0;
+        for (size_t i = 0; i + 1 < c.nodes.size(); ++i) used += c.nodes[i].parentCodes + c.nodes[i].ownCodes;
+        NodeOnDisk& last = c.nodes.back();
+        last.records = most;
+        for (size_t k = 0; k < last.parentCodes + last.ownCodes; ++k) c.counts[used + k].count = 0;
+        if (kind != mesh) c.counts[used].count = c.counts[used + last.parentCodes].count = most;
+        expectRefused(c, "not possible");
+    }
+}
+
+TEST_F(Crafted, WhatTheHeadClaimsIsCheckedBeforeMemoryIsTaken) {
+    // 2^64 / sizeof(NodeOnDisk) nodes have a table whose length wraps round to one that fits.
+    CraftedStore c = take(points);
+    c.claimNodeCount = c.nodes.size() + (uint64_t{1} << 60);
+    static_assert(sizeof(NodeOnDisk) % 16 == 0, "2^60 of them wrap to 0");
+    expectRefused(c, "not possible");
+    for (uint64_t CraftedStore::*claim : {&CraftedStore::claimRawNodes, &CraftedStore::claimRawCounts,
+                                          &CraftedStore::claimRawDescription, &CraftedStore::claimRawMesh})
+        for (const uint64_t bytes : {uint64_t{13} << 30, uint64_t{1} << 62}) {
+            c = take(mesh);
+            c.*claim = bytes;
+            EXPECT_FALSE(lod::openStore(written(c)));
+        }
+    // A section that really is that large once it is decompressed: 400 MB of zeros in some kilobytes.
+    c = take(mesh);
+    c.mesh.resize(size_t{400} << 20);
+    expectRefused(c, "cannot come from");
+    c = take(points);
+    c.description = std::string(size_t{130} << 20, '[');
+    expectRefused(c, "cannot come from");
+    c.description = std::string(size_t{1} << 20, '[');
+    expectRefused(c, "description");
+    c.description = "[" + std::string(size_t{20} << 20, ',') + "]";
+    expectRefused(c, "description");
+}
+
+TEST_F(Crafted, NumbersThatAreNoneAreRefused) {
+    for (const double odd : {std::numeric_limits<double>::infinity(), std::nan(""), 1e300, -1e300}) {
+        CraftedStore c = take(points);
+        c.head.origin[1] = odd;
+        expectRefused(c, "not possible");
+        c = take(points);
+        c.head.unit = odd;
+        expectRefused(c, "not possible");
+        c = take(points);
+        c.nodes[1].sphere[2] = odd;
+        expectRefused(c, "node 1");
+        c = take(mesh);
+        c.nodes[1].sphere[3] = odd;
+        expectRefused(c, "group 1");
+        c = take(points);
+        c.head.smallestError = odd;
+        expectRefused(c, "not possible");
+    }
+    for (const char* key : {"\"roughness\":", "\"base_colour\":[", "\"max\":["}) {
+        CraftedStore c = take(mesh);
+        const size_t at = c.description.find(key) + std::strlen(key);
+        c.description.replace(at, c.description.find_first_of(",]}", at) - at, "1e308");
+        expectRefused(c, "not possible");
+    }
+}
+
+TEST_F(Crafted, VerticesNameMaterialsAndPlacesThatThereAre) {
+    const auto first = [](auto change) {
+        return [change](lod::Chunk& chunk) {
+            for (shared::MeshVertex& v : chunk.vertices) change(v);
+        };
+    };
+    const std::string text = "a vertex lies nowhere";
+    expectFound(withChunk(mesh, 0, first([](shared::MeshVertex& v) { v.surface |= 0xffffu; })), "names material 65535");
+    expectFound(withChunk(mesh, 0, first([](shared::MeshVertex& v) { v.u = std::numeric_limits<float>::infinity(); })),
+                text);
+    expectFound(withChunk(mesh, 0, first([](shared::MeshVertex& v) { v.v = std::nanf(""); })), text);
+    // Beyond the lattice differences of coordinates overflow.
+    for (const int odd : {std::numeric_limits<int>::min(), std::numeric_limits<int>::max(), -1, 1 << 25})
+        expectFound(withChunk(mesh, 0, first([odd](shared::MeshVertex& v) { v.x = odd; })), text);
+}
+
+TEST_F(Crafted, TextureCoordinatesThatAreHugeDoNoHarm) {
+    for (const float huge : {3e38f, -3e38f, 1e20f}) {
+        const CraftedStore c = withChunk(mesh, 0, [&](lod::Chunk& chunk) {
+            for (shared::MeshVertex& v : chunk.vertices) v.u = huge;
+        });
+        EXPECT_TRUE(test::tryEverything(written(c)));
+    }
+}
+
+TEST_F(Crafted, RadiiOfSegmentsAreNumbers) {
+    expectFound(withChunk(strands, 0,
+                          [](lod::Chunk& chunk) {
+                              for (shared::StrandSegment& s : chunk.segments) s.a.positionZ |= 0x7fffu << 16;
+                          }),
+                "a radius that is no number");
+}
+
+TEST_F(Crafted, RunsOfGroupsAreTheirOwn) {
+    CraftedStore c = take(mesh);
+    const lod::Store store = open(mesh);
+    // The last group as a copy of the one before, runs and chunk included: all of them could be walked along by each.
+    const size_t last = c.nodes.size() - 1;
+    lod::MeshGroup group = store.hierarchy.groups[last];
+    const lod::MeshGroup& before = store.hierarchy.groups[last - 1];
+    group.firstRun = before.firstRun;
+    group.runs = before.runs;
+    group.vertices = before.vertices;
+    group.clusters = before.clusters;
+    put(c, c.groupsAt() + last * sizeof(group), group);
+    c.nodes[last].records = c.nodes[last - 1].records;
+    c.nodes[last].chunkOffset = c.nodes[last - 1].chunkOffset;
+    c.nodes[last].chunkBytes = c.nodes[last - 1].chunkBytes;
+    expectRefused(c, "group " + std::to_string(last));
+    c = take(mesh);
+    group = store.hierarchy.groups[0];
+    group.clusters += 1u << 20;
+    group.vertices = ~0u;
+    put(c, c.groupsAt(), group);
+    expectRefused(c, "group 0");
+}
+
+/// Any fields of any store, seeded. What is opened is drawn by both backends, and verified, at once and without harm.
+TEST_F(Crafted, AnyChangedFieldIsRefusedOrDrawnInTime) {
+    int opened = 0;
+    for (const Kind kind : {points, mesh, strands, afar}) {
+        const CraftedStore whole = take(kind);
+        const lod::Store store = open(kind);
+        for (uint64_t seed = 0; seed < 150; ++seed) {
+            Rng rng(1000 * kind + seed);
+            CraftedStore c = whole;
+            const std::string what = test::mutate(c, store, [&](uint64_t below) { return rng.below(below); });
+            SCOPED_TRACE("kind " + std::to_string(kind) + ", seed " + std::to_string(seed) + ":" + what);
+            const auto start = std::chrono::steady_clock::now();
+            opened += test::tryEverything(written(c)) ? 1 : 0;
+            EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
+        }
+    }
+    EXPECT_GT(opened, 100) << "otherwise nothing was tried";
+}
+
+}  // namespace
+}  // namespace stipple
