@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "tests/support/program.h"
 #include "tests/support/runs.h"
 #include "tests/support/support.h"
 
@@ -118,7 +119,10 @@ TEST(OutOfCore, KilledAtAnyMomentItGoesOnAndEndsWithTheSameBytes) {
                 finished);
     // A polite stop says how to go on, and leaves nothing where all is in memory.
     fs::remove(folder / "a.stipple");
-    EXPECT_FALSE(test::runAndKill(command, static_cast<int>(300 * test::kSlower), SIGINT));
+    test::RunningProgram polite(folder, {command.begin() + 1, command.end()});
+    EXPECT_TRUE(polite.await([&] { return fs::exists(folder / "a.stipple.partial"); }));
+    polite.signal(SIGINT);
+    EXPECT_EQ(polite.end().code, 7);
     EXPECT_TRUE(fs::exists(folder / "a.stipple.build"));
 }
 
