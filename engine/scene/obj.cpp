@@ -10,6 +10,7 @@
 #include <streambuf>
 
 #include "engine/base/file.h"
+#include "engine/scene/obj_polygons.h"
 #include "engine/scene/scene.h"
 
 namespace stipple::scene {
@@ -124,7 +125,9 @@ Result<Parsed> parse(const std::string& path, const std::string& folder, const R
                      std::vector<std::string>& notes) {
     STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
     FileStream buffer(file);
-    std::istream in(&buffer);
+    SplitFaces split(buffer);
+    STIPPLE_ASSIGN(const bool isLarge, hasLargeFaces(file));
+    std::istream in(isLarge ? static_cast<std::streambuf*>(&split) : &buffer);
     MaterialFiles materials(folder, settings, notes);
     Parsed out;
     std::string error;

@@ -116,7 +116,10 @@ class MeshBuild : public CellContent {
     }
     Result<void> check(const std::vector<Atom>& atoms) const override {
         if (!atoms.empty()) return {};
-        return fail(ErrorKind::input, "holds no triangle with an area", source());
+        // Scans are written with faces, too, which may all be empty.
+        const bool isPly = source().find(".ply") != std::string::npos;
+        return fail(ErrorKind::input, "holds no triangle with an area", source(),
+                    isPly ? "--only-points takes its vertices, as points" : "");
     }
     uint64_t temporaryBytes(int ranks) const override {
         const auto each = static_cast<uint64_t>(ranks);
