@@ -7,6 +7,7 @@
 #include "shaders/shared/pack.h"
 #include "shaders/shared/pyramid.h"
 #include "shaders/shared/shade.h"
+#include "shaders/shared/splat_size.h"
 #include "shaders/shared/strand.h"
 
 namespace stipple::cpu {
@@ -105,6 +106,7 @@ template <bool anyTurned>
     const float xx = f.viewX.x, xy = f.viewX.y, xz = f.viewX.z, yx = f.viewY.x, yy = f.viewY.y, yz = f.viewY.z,
                 zx = f.viewZ.x, zy = f.viewZ.y, zz = f.viewZ.z;
     const float focal = f.focal, support = f.supportScale, minimum = f.minimumRadius;
+    const float largest = largestSplat(focal, f.height);
     const float centreX = f.centre.x - float(int(x0)) - 0.5f, centreY = f.centre.y - float(int(y)) - 0.5f;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
@@ -123,7 +125,7 @@ template <bool anyTurned>
         nc.x = hasNormal ? nc.x : -c.x * inverse;
         nc.y = hasNormal ? nc.y : -c.y * inverse;
         nc.z = hasNormal ? nc.z : -c.z * inverse;
-        Texel t = texelFromSplat(c, nc, g.radius[i] * support, focal, minimum);
+        Texel t = texelFromSplat(c, nc, min(g.radius[i] * support, c.z * largest), focal, minimum);
         const float scale = focal / c.z;
         // Nearly the pixel's own coordinate is taken off before adding, so that the offset keeps its low bits.
         t.offset = vec2(c.x * scale + centreX - float(int(i)), c.y * scale + centreY);

@@ -207,8 +207,9 @@ class ReferenceBackend final : public render::Backend {
                 s.valid = true;
                 s.depth = c.z;
                 s.centre = p;
+                const double most = std::max(v.height / 8.0, 64.0);
                 s.radius = std::clamp(instance.scale * disc.radius * f.supportScale * v.focalPixels / c.z,
-                                      double(f.minimumRadius), 16384.0);
+                                      double(f.minimumRadius), most);
                 s.thickness = s.radius * c.z / v.focalPixels * (0.25 + std::sqrt(std::max(0.0, 1 - facing * facing)));
                 if ((disc.flags & shared::kFlagLoose) != 0)
                     s.thickness = kLeafThickness * s.radius * c.z / v.focalPixels;

@@ -2,6 +2,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../bindings.glsl"
+#include "../shared/splat_size.h"
 layout(local_size_x = 64) in;
 
 void main() {
@@ -25,7 +26,8 @@ void main() {
         const vec3 c = node.base + node.axisX * float(recordX(r)) + node.axisY * float(recordY(r)) + node.axisZ * float(recordZ(r));
         vec3 n = -normalize(c);
         if ((recordFlags(r) & kFlagNoNormal) == 0u) n = nodeDirection(node, octDecode(r.normal));
-        t = texelFromSplat(c, n, node.edge * radiusFraction(recordRadiusCode(r)) * frame.supportScale, frame.focal, frame.minimumRadius);
+        const float radius = min(node.edge * radiusFraction(recordRadiusCode(r)) * frame.supportScale, c.z * largestSplat(frame.focal, frame.height));
+        t = texelFromSplat(c, n, radius, frame.focal, frame.minimumRadius);
         if ((recordFlags(r) & kFlagLoose) != 0u) t.thickness = kLeafThickness * t.radius;
         const float scale = frame.focal / c.z;
         t.offset = vec2(c.x * scale + (frame.centre.x - 0.5) - float(pixel.x), c.y * scale + (frame.centre.y - 0.5) - float(pixel.y));

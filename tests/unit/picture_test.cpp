@@ -34,7 +34,7 @@ class Picture : public testing::Test {
         EXPECT_EQ(run("render " + input + " -o a.png --quiet --size 96x64 --device cpu " + options), 0) << said_;
         const auto image = image::readImage(folder_ / "a.png");
         std::vector<std::array<uint32_t, 4>> pixels;
-        if (!image) return pixels;
+        if (!image) return std::vector<std::array<uint32_t, 4>>(96 * 64);
         for (const uint32_t p : image->rgba) pixels.push_back({p & 255u, p >> 8 & 255u, p >> 16 & 255u, p >> 24});
         return pixels;
     }

@@ -4,6 +4,8 @@
 //   radius  1.37 spacings, from the distance d of a point's 12th neighbour there: pi d^2 holds 12 of them
 //   normal  the direction of least variance (Hoppe et al. 1992), sign unknown: two-sided. Of all points of the window,
 //           the same for all points of the cell; or, fine, of each point's own twelve nearest.
+// A point that stands alone, away from what its neighbours belong to, has the disc of those: of twice their spacing at
+// most (spacingOfOthers).
 // With fewer points in the window it grows, up to the quarter of a counted cell that buckets know of their neighbours
 // (Distributor); then what is there must do. All of this hangs on the lattice and on counts alone.
 #include "lod/build/points/estimate.h"
@@ -22,8 +24,13 @@ namespace {
 constexpr size_t kBlockPoints = 2048, kNeighbours = 12;
 constexpr uint32_t kMostSplits = 5, kMostInThree = 128;
 constexpr float kSpacings = 1.368f;
-constexpr double kLargestSpacings = 4;
-constexpr double kFlat = 1e-6;  ///< a line or a point has no normal: second variance over the first
+constexpr double kLargestSpacings = 3;
+constexpr size_t kSparse = 2;        ///< points of a window cell, or fewer, that may stand alone
+constexpr size_t kCompanions = 3;    ///< at least that many of twelve neighbours are near by, or a point stands alone:
+constexpr float kNear2 = 0.5f;       ///< squared, of the distance of the twelfth (on a surface: 1/4)
+constexpr size_t kOfOthers = 4;      ///< rank of the neighbour that tells the spacing of others
+constexpr float kAloneSpacings = 2;  ///< how much wider than of its neighbours the disc of such a point may be
+constexpr double kFlat = 1e-6;       ///< a line or a point has no normal: second variance over the first
 
 /// Count, sums and sums of products.
 struct Moments {
@@ -231,13 +238,13 @@ class Estimator {
         for (size_t i = begin; i < end;) {
             size_t next = i + 1;
             while (next < end && own_.key[next] >> windowShift == own_.key[i] >> windowShift) ++next;
-            gather(seen_[i - begin].cell, across);
-            if (hoodX_.size() <= kNeighbours && window > coarsestWindow()) {
+            gather(seen_[i - begin].cell, across, kMostInThree, hood_);
+            if (hood_.x.size() <= kNeighbours && window > coarsestWindow()) {
                 largerWindow(i, next, window);
             } else {
                 places_.clear();
                 for (size_t k = i; k < next; ++k) places_.push_back(seen_[k - begin].place);
-                give(i, next, static_cast<float>(edge));
+                give(i, next, static_cast<float>(edge), {next - i <= kSparse, seen_[i - begin].cell, across});
             }
             i = next;
         }
@@ -260,36 +267,47 @@ class Estimator {
     }
 
     void clearHood() {
-        hoodX_.clear();
-        hoodY_.clear();
-        hoodZ_.clear();
+        hood_.x.clear();
+        hood_.y.clear();
+        hood_.z.clear();
     }
     void addToHood(const glm::vec3& p) {
-        hoodX_.push_back(p.x);
-        hoodY_.push_back(p.y);
-        hoodZ_.push_back(p.z);
+        hood_.x.push_back(p.x);
+        hood_.y.push_back(p.y);
+        hood_.z.push_back(p.z);
     }
-    /// The points of a window cell and its neighbours.
-    void gather(size_t at, uint32_t across) {
+    /// Where a hood came from.
+    struct Window {
+        bool mayBeAlone;  ///< its points
+        size_t cell;
+        uint32_t across;  ///< 0: a larger window, of which the hood is all there is
+    };
+    struct Coordinates {
+        std::vector<float> x, y, z;
+        void resize(size_t n) {
+            for (auto* axis : {&x, &y, &z}) axis->resize(n);
+        }
+    };
+    /// The points of a window cell and its neighbours; of more than `most` in three cells only some.
+    void gather(size_t at, uint32_t across, uint32_t most, Coordinates& to) {
         std::array<std::pair<uint32_t, uint32_t>, 9> runs;
-        size_t most = 0;
+        size_t all = 0;
         for (size_t row = 0; row < 9; ++row) {  // three cells in x lie side by side
             const size_t first = at + (row / 3 * across + row % 3) * across - (across + 1) * across - 1;
             runs.at(row) = {firstSeen_[first], firstSeen_[first + 3]};
-            most += runs.at(row).second - runs.at(row).first;
+            all += runs.at(row).second - runs.at(row).first;
         }
-        for (auto* axis : {&hoodX_, &hoodY_, &hoodZ_}) axis->resize(most);
-        float *x = hoodX_.data(), *y = hoodY_.data(), *z = hoodZ_.data();
+        to.resize(all);
+        float *x = to.x.data(), *y = to.y.data(), *z = to.z.data();
         for (const auto& [begin, end] : runs) {
-            const uint32_t stride = (end - begin) / kMostInThree + 1;  // many lie at one place
+            const uint32_t stride = (end - begin) / most + 1;  // many lie at one place
             for (uint32_t k = begin; k < end; k += stride) {
                 *x++ = byCellX_[k];
                 *y++ = byCellY_[k];
                 *z++ = byCellZ_[k];
             }
         }
-        const auto count = static_cast<size_t>(x - hoodX_.data());
-        for (auto* axis : {&hoodX_, &hoodY_, &hoodZ_}) axis->resize(count);
+        to.resize(static_cast<size_t>(x - to.x.data()));
     }
 
     /// The points [begin, end) of one window cell that has too few around it.
@@ -302,7 +320,7 @@ class Estimator {
                              static_cast<float>(y - box.lo[1]) * inverse - 0.5f,
                              static_cast<float>(z - box.lo[2]) * inverse - 0.5f);
         };
-        for (uint32_t level = window; level > coarsestWindow() && (level == window || hoodX_.size() <= kNeighbours);) {
+        for (uint32_t level = window; level > coarsestWindow() && (level == window || hood_.x.size() <= kNeighbours);) {
             --level;
             size = static_cast<int64_t>(frame_.cellSize(level));
             box = boxOf(own_.key[begin], level);
@@ -313,33 +331,38 @@ class Estimator {
         places_.clear();
         for (size_t i = begin; i < end; ++i)
             places_.push_back(localOf(own_.points.x[i], own_.points.y[i], own_.points.z[i]));
-        give(begin, end, static_cast<float>(size));
+        give(begin, end, static_cast<float>(size), {true, 0, 0});
     }
 
     /// Points [begin, end), whose places are in places_, from the hood; both in units of `edge` lattice units.
-    void give(size_t begin, size_t end, float edge) {
-        const size_t n = hoodX_.size();
+    void give(size_t begin, size_t end, float edge, const Window& window) {
+        const size_t n = hood_.x.size();
         uint32_t normal = kNoNormal;
         if (settings_.normals && !settings_.isFine) {
             Moments all{};
-            for (size_t k = 0; k < n; ++k) all.add(hoodX_[k], hoodY_[k], hoodZ_[k]);
+            for (size_t k = 0; k < n; ++k) all.add(hood_.x[k], hood_.y[k], hood_.z[k]);
             normal = normalFrom(all);
         }
         squared_.resize(n + kSelectLanes);
         float reach = 0;
         for (size_t i = begin; i < end; ++i) {
             const glm::vec3 p = places_[i - begin];
-            squaredDistances(hoodX_.data(), hoodY_.data(), hoodZ_.data(), n, {p.x, p.y, p.z}, squared_.data());
+            squaredDistances(hood_.x.data(), hood_.y.data(), hood_.z.data(), n, {p.x, p.y, p.z}, squared_.data());
             const size_t rank = std::min(kNeighbours, n - 1);  // the point itself comes first
             // (A little more than that of the point before is a good guess.)
             reach = rank > 0 ? smallestAtRank(squared_.data(), n, rank, 1.1f * reach) : 0.0f;
-            if (settings_.radii && !(own_.points.radius[i] > 0)) own_.points.radius[i] = radiusFrom(reach, rank, edge);
+            if (settings_.radii && !(own_.points.radius[i] > 0)) {
+                float& radius = own_.points.radius[i];
+                radius = radiusFrom(reach, rank, edge);
+                if (window.mayBeAlone && settings_.limitStrays && rank == kNeighbours && isAlone(n, reach))
+                    radius = std::min(radius, kAloneSpacings * kSpacings * spacingOfOthers(window, reach) * edge);
+            }
             if (!settings_.normals) continue;
             if (settings_.isFine) {
                 Moments near{};
                 for (size_t k = 0; k < n; ++k)
                     if (std::bit_cast<float>(squared_[k]) <= reach)
-                        near.add(hoodX_[k] - p.x, hoodY_[k] - p.y, hoodZ_[k] - p.z);
+                        near.add(hood_.x[k] - p.x, hood_.y[k] - p.y, hood_.z[k] - p.z);
                 normal = normalFrom(near);
             }
             uint32_t& colour = own_.points.colour[i];
@@ -347,6 +370,30 @@ class Estimator {
             own_.points.normal[i] = normal;
             colour = (colour & 0xffffffu) | (shared::kFlagTwoSided | shared::kFlagEstimatedNormal) << 24;
         }
+    }
+    /// Of a point whose squared distances to the hood are in squared_: are fewer than three others near it?
+    bool isAlone(size_t n, float squaredReach) const {
+        return smallestAtRank(squared_.data(), n, kCompanions, kNear2 * squaredReach) > kNear2 * squaredReach;
+    }
+    /// The median spacing of such a point's neighbours, in the hood's units: pi d^2 holds four of them. (The hood
+    /// itself may hold only some of many points, see gather.)
+    float spacingOfOthers(const Window& window, float squaredReach) {
+        if (window.across > 0) gather(window.cell, window.across, ~0u, others_);
+        const Coordinates& all = window.across > 0 ? others_ : hood_;
+        const size_t n = all.x.size();
+        squaredOfOther_.resize(n + kSelectLanes);
+        spacings_.clear();
+        for (size_t k = 0; k < hood_.x.size(); ++k) {
+            const float squared = std::bit_cast<float>(squared_[k]);
+            if (!(squared > 0) || squared > squaredReach) continue;
+            squaredDistances(all.x.data(), all.y.data(), all.z.data(), n, {hood_.x[k], hood_.y[k], hood_.z[k]},
+                             squaredOfOther_.data());
+            spacings_.push_back(smallestAtRank(squaredOfOther_.data(), n, kOfOthers, 0));
+        }
+        if (spacings_.empty()) return 3.4e38f;
+        const auto middle = spacings_.begin() + static_cast<ptrdiff_t>(spacings_.size() / 2);
+        std::nth_element(spacings_.begin(), middle, spacings_.end());
+        return std::sqrt(3.14159265f * *middle / static_cast<float>(kOfOthers));
     }
     float radiusFrom(float squaredReach, size_t neighbours, float edge) const {
         if (neighbours > 0)
@@ -372,8 +419,9 @@ class Estimator {
     std::vector<Seen> seen_;  ///< by the block: its own points first, in window cells from its centre
     std::vector<float> byCellX_, byCellY_, byCellZ_;  ///< the same by window cell
     std::vector<uint32_t> firstSeen_, nextSeen_;
-    std::vector<float> hoodX_, hoodY_, hoodZ_;
-    std::vector<int32_t> squared_;  ///< bits of floats
+    Coordinates hood_, others_;
+    std::vector<int32_t> squared_, squaredOfOther_;  ///< bits of floats
+    std::vector<float> spacings_;
     std::vector<glm::vec3> places_;
 };
 
