@@ -20,7 +20,7 @@ namespace stipple::lod {
 namespace {
 
 constexpr uint64_t kVerifiedNodes = 512;  ///< at the end of a build; `info --verify` checks all
-constexpr uint64_t kBuildVersion = 2;     ///< of what the same input gives: an interrupted build of another is refused
+constexpr uint64_t kBuildVersion = 3;     ///< of what the same input gives: an interrupted build of another is refused
 
 /// The axis of the format or of the settings; away from the Earth's centre for coordinates that are relative to it.
 glm::dvec3 upOf(const PointInput& input, const BuildSettings& settings, const StoreDescription& description) {

@@ -24,7 +24,7 @@ namespace {
 constexpr size_t kBlockPoints = 2048, kNeighbours = 12;
 constexpr uint32_t kMostSplits = 5, kMostInThree = 128;
 constexpr float kSpacings = 1.368f;
-constexpr double kLargestSpacings = 4;
+constexpr double kLargestSpacings = 3;
 constexpr size_t kSparse = 2;        ///< points of a window cell, or fewer, that may stand alone
 constexpr size_t kCompanions = 3;    ///< at least that many of twelve neighbours are near by, or a point stands alone:
 constexpr float kNear2 = 0.5f;       ///< squared, of the distance of the twelfth (on a surface: 1/4)
