@@ -24,12 +24,16 @@ int report(const Error& error);
 
 struct BuildOptions {
     std::string memory = "2G", normals = "auto", radii = "auto", up, attributes = "none", temp, duplicates = "keep";
+    std::string cacheLimit;  ///< of the cache of built scenes; empty: its default
     int threads = 0;
-    bool skipBad = false, onlyPoints = false, repair = false;
+    bool skipBad = false, onlyPoints = false, repair = false, dropOutliers = false;
     double strandRadius = 0;
     uint64_t surfels = 0;
     Ranks* ranks = nullptr;  ///< of an MPI job
     void addTo(CLI::App& app);
+    void addOutliersTo(CLI::App& app);
+    /// What render and view have beside what builds have.
+    void addCacheTo(CLI::App& app);
     Result<lod::BuildSettings> settings() const;
 };
 
@@ -70,10 +74,9 @@ struct OpenedScene {
 };
 
 /// A .stipple file is opened; a .gltf or .glb scene is opened with the stores that its nodes refer to; anything else,
-/// and the meshes of a scene, are built into the cache first (and found there the next time), with the attribute that
-/// `colour` needs.
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build,
-                              const ColourOptions& colour, Executor& executor, bool showProgress);
+/// and the meshes of a scene, are built into the cache first (and found there the next time), with all attributes.
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build, Executor& executor,
+                              bool showProgress);
 
 /// Gives every store its colours; one that does not have what is asked for keeps its own. An error if none has it. The
 /// result is for the legend.
@@ -94,6 +97,7 @@ Result<glm::uvec2> parseSize(const std::string& text);
 nlohmann::json jsonNumber(double value);
 
 void setupBuild(CLI::App& app, int& status);
+void setupCache(CLI::App& app, int& status);
 void setupInfo(CLI::App& app, int& status);
 void setupRender(CLI::App& app, int& status);
 void setupView(CLI::App& app, int& status);

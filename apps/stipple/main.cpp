@@ -27,6 +27,7 @@ int run(int argc, char** argv) {
     app::setupCompare(app, status);
     app::setupGrow(app, status);
     app::setupConvert(app, status);
+    app::setupCache(app, status);
     if (argc == 2 && std::string(argv[1]) == "--version") {
         fmt::print("stipple {}\n{}", STIPPLE_VERSION, app::listDevices());
         return 0;

@@ -47,16 +47,23 @@ Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptio
 
 namespace {
 
-Result<std::shared_ptr<const lod::Store>> openBuilt(const std::vector<std::string>& inputs, BuildOptions build,
-                                                    const ColourOptions& colour, Executor& executor,
-                                                    bool showProgress) {
-    const std::string needed = isSceneFile(inputs.front()) ? "" : lod::attributeBehind(colour.what);
-    if (!needed.empty() && build.attributes != "all")
-        build.attributes = build.attributes == "none" ? needed : build.attributes + "," + needed;
-    STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
-    return openCached(inputs, build, "points", showProgress, [&](const std::string& path, Progress& progress) {
-        return lod::buildStore(inputs, path, settings, executor, progress);
-    });
+/// With every attribute that there is, so that no colour asks for another build.
+Result<std::shared_ptr<const lod::Store>> openBuilt(const std::vector<std::string>& inputs, const BuildOptions& build,
+                                                    Executor& executor, bool showProgress) {
+    STIPPLE_ASSIGN(const lod::BuildSettings asked, build.settings());
+    lod::BuildSettings settings = asked;
+    settings.attributes.clear();
+    settings.allAttributes = settings.leaveOutUnlike = !isSceneFile(inputs.front());
+    STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store,
+                   openCached(inputs, build, "points", showProgress, [&](const std::string& path, Progress& progress) {
+                       return lod::buildStore(inputs, path, settings, executor, progress);
+                   }));
+    const std::vector<lod::AttributeInfo>& has = store->description.attributes;
+    for (const std::string& name : asked.attributes)
+        if (std::none_of(has.begin(), has.end(), [&](const lod::AttributeInfo& a) { return a.name == name; }))
+            return fail(ErrorKind::usage, fmt::format("has no attribute '{}'", name), inputs.front(),
+                        "stipple info lists them");
+    return store;
 }
 
 /// A transform as rotation, even scale and translation.
@@ -281,8 +288,8 @@ std::vector<scene::Camera> camerasOf(const scene::Scene& scene) {
 }
 
 /// The stores that a scene's nodes refer to, and its meshes.
-Result<void> openSceneFile(const std::string& path, const BuildOptions& build, const ColourOptions& colour,
-                           Executor& executor, bool showProgress, OpenedScene& opened) {
+Result<void> openSceneFile(const std::string& path, const BuildOptions& build, Executor& executor, bool showProgress,
+                           OpenedScene& opened) {
     STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path, build.repair));
     opened.lights = lightsOf(scene);
     opened.cameras = camerasOf(scene);
@@ -311,8 +318,7 @@ Result<void> openSceneFile(const std::string& path, const BuildOptions& build, c
     if (build.surfels == 0) STIPPLE_TRY(placeTriangles(scene, build, executor, showProgress, placed));
     STIPPLE_TRY(placeStrands(scene, build, executor, showProgress, opened));
     if (build.surfels > 0 || anyHolds(scene::PrimitiveKind::points) || placed.empty()) {
-        STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> points,
-                       openBuilt({path}, build, colour, executor, showProgress));
+        STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> points, openBuilt({path}, build, executor, showProgress));
         placed.push_back({std::move(points), {}, {}});
     }
     for (const std::string& note : scene.notes)
@@ -437,8 +443,8 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
     return report;
 }
 
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build,
-                              const ColourOptions& colour, Executor& executor, bool showProgress) {
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build, Executor& executor,
+                              bool showProgress) {
     OpenedScene scene;
     const bool isStore = fs::path(inputs.front()).extension() == ".stipple";
     for (const std::string& input : inputs)
@@ -461,11 +467,10 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
             }));
         scene.placed.push_back({std::move(store), {}, {}});
     } else if (isSceneFile(inputs.front())) {
-        STIPPLE_TRY(openSceneFile(inputs.front(), build, colour, executor, showProgress, scene));
+        STIPPLE_TRY(openSceneFile(inputs.front(), build, executor, showProgress, scene));
     } else {
-        STIPPLE_ASSIGN(
-            std::shared_ptr<const lod::Store> store,
-            isStore ? openStoreFile(inputs.front()) : openBuilt(inputs, build, colour, executor, showProgress));
+        STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store,
+                       isStore ? openStoreFile(inputs.front()) : openBuilt(inputs, build, executor, showProgress));
         scene.placed.push_back({std::move(store), {}, {}});
     }
     // Points that stand in for meshes are lit. Beside scans that keep their photographed colours they would not be,

@@ -177,7 +177,7 @@ Result<void> run(const Options& o) {
     if (!(o.error > 0)) return fail(ErrorKind::usage, "must be larger than 0", "--error");
     const auto executor = makeTbbExecutor(o.build.threads);
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
-    STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, o.colour, *executor, !o.quiet));
+    STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, !o.quiet));
     const lod::StoreDescription& description = scene.description;
     STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
     STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
@@ -311,8 +311,10 @@ void setupRender(CLI::App& app, int& status) {
     auto* group = sub->add_option_group("building", "for inputs that are not built yet");
     addUpOption(*group, o->build.up);
     group->add_option("--memory", o->build.memory, "memory that the build may use")->capture_default_str();
-    group->add_option("--attributes", o->build.attributes, "attributes to keep; the one of --colour always is")
+    group->add_option("--attributes", o->build.attributes, "attributes that must be there; all are kept")
         ->capture_default_str();
+    o->build.addCacheTo(*group);
+    o->build.addOutliersTo(*group);
     group->add_option("--surfels", o->build.surfels, "turn meshes into that many samples; 0: keep triangles")
         ->check(CLI::Range(uint64_t{0}, uint64_t{200'000'000}))
         ->capture_default_str();

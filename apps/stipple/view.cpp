@@ -136,7 +136,7 @@ Result<void> run(const Options& o) {
         return fail(ErrorKind::device, "there is no display", "stipple view",
                     "use stipple render, or xvfb-run stipple view");
     const auto executor = makeTbbExecutor(o.build.threads);
-    STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, o.colour, *executor, true));
+    STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, true));
     const lod::StoreDescription& d = scene.description;
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
     STIPPLE_ASSIGN(
@@ -232,6 +232,7 @@ void setupView(CLI::App& app, int& status) {
     o->colour.addTo(*sub);
     o->environment.addTo(*sub);
     o->build.addTo(*sub);
+    o->build.addCacheTo(*sub);
     sub->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());
     });
