@@ -1,68 +1,186 @@
 #include "apps/stipple/cache.h"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
-#include <cstdlib>
+#include <algorithm>
 #include <filesystem>
+#include <map>
 
+#include "apps/stipple/cache_folder.h"
 #include "engine/base/hash.h"
+#include "engine/base/process.h"
+#include "engine/scene/scene_files.h"
+#include "lod/build/build_version.h"
 #include "lod/import/import.h"
 
 namespace stipple::app {
 namespace fs = std::filesystem;
+using StorePtr = std::shared_ptr<const lod::Store>;
 
 namespace {
 
-/// `part`: which of the stores that these inputs give.
-Result<std::string> cachePath(const std::vector<std::string>& inputs, const BuildOptions& build,
-                              const std::string& part) {
-    std::string key = part + (build.onlyPoints ? "|points|" : "|") + build.normals + "|" + build.radii + "|" +
-                      build.up + "|" + build.attributes + (build.skipBad ? "|skip" : "|") +
-                      std::to_string(build.surfels) + fmt::format("|{}|", build.strandRadius) + STIPPLE_VERSION +
-                      fmt::format("|{}", lod::kStoreVersion);
-    STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs(inputs));
-    for (const std::string& input : files) {
-        std::error_code error;
-        const fs::path absolute = fs::absolute(input, error);
-        const auto size = fs::file_size(absolute, error);
-        const auto time = fs::last_write_time(absolute, error);
-        key +=
-            fmt::format("|{}|{}|{}", absolute.string(), error ? 0 : size, error ? 0 : time.time_since_epoch().count());
-    }
-    const char* cache = std::getenv("XDG_CACHE_HOME");
-    const char* home = std::getenv("HOME");
-    const fs::path folder =
-        cache && *cache ? fs::path(cache) / "stipple" : fs::path(home ? home : ".") / ".cache" / "stipple";
-    std::error_code error;
-    fs::create_directories(folder, error);
-    if (error)
-        return fail(ErrorKind::output, "cannot be created: " + error.message(), folder.string(), "set XDG_CACHE_HOME");
-    return (folder / (hexDigits(hashBytes(key.data(), key.size())) + ".stipple")).string();
+/// Of everything that decides what a build gives. A new option does not compile until it is named here: does it change
+/// the bytes?
+std::string settingsText(const BuildOptions& build) {
+    const auto& [memory, normals, radii, up, attributes, temp, duplicates, cacheLimit, threads, skipBad, onlyPoints,
+                 allowOutside, dropOutliers, repair, strandRadius, surfels, progress, ranks, leftovers] = build;
+    // Not memory, temp, threads, ranks, leftovers: any give the same. Not attributes: what is cached has all of them.
+    return fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}", normals, radii, up, duplicates, skipBad, onlyPoints,
+                       allowOutside, dropOutliers, strandRadius, surfels);
 }
+
+/// Path, size and the times of the last change of content and of place: a copy that keeps its time is another file.
+std::string identityOf(const std::string& path) {
+    std::error_code error;
+    struct stat info {};
+    if (::stat(path.c_str(), &info) != 0) info = {};
+    return fmt::format("|{}|{}|{}.{}|{}.{}", fs::absolute(path, error).lexically_normal().string(), info.st_size,
+                       info.st_mtim.tv_sec, info.st_mtim.tv_nsec, info.st_ctim.tv_sec, info.st_ctim.tv_nsec);
+}
+
+/// Of scenes it holds what they are made of, so that thousands of their parts need not look again.
+const std::vector<std::string>& filesOfScene(const std::string& path) {
+    static std::map<std::string, std::vector<std::string>> known;  // (scenes are opened by one thread)
+    const auto found = known.find(path);
+    return found != known.end() ? found->second : known[path] = scene::filesOf(path);
+}
+
+Result<std::string> keyOf(const std::vector<std::string>& inputs, const BuildOptions& build, const std::string& part,
+                          std::vector<std::string>& notes) {
+    std::string text = fmt::format("{}|{}|{}|{}|{}", part, settingsText(build), STIPPLE_VERSION, lod::kStoreVersion,
+                                   lod::kBuildVersion);
+    STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs(inputs, &notes));
+    for (const std::string& file : files) {
+        text += identityOf(file);
+        if (!isSceneFile(file)) continue;
+        for (const std::string& other : filesOfScene(file)) text += identityOf(other);
+    }
+    return hexDigits(hashBytes(text.data(), text.size()));
+}
+
+Result<const CacheFolder*> folder() {
+    static Result<CacheFolder> opened = CacheFolder::open();  // its locks are held until the process ends
+    if (!opened) return tl::unexpected(opened.error());
+    return &*opened;
+}
+
+/// One lookup in the cache.
+class Lookup {
+  public:
+    /// `notes`: on the inputs, before any build.
+    Lookup(const CacheFolder& cache, std::string key, std::vector<std::string> notes,
+           const std::vector<std::string>& inputs, std::string part, const BuildOptions& build, bool isLoud)
+        : cache_(cache),
+          key_(std::move(key)),
+          notes_(std::move(notes)),
+          inputs_(inputs),
+          part_(std::move(part)),
+          build_(build),
+          isLoud_(isLoud),
+          path_(cache.storePath(key_)) {}
+
+    Result<StorePtr> open(const StoreMaker& make) {
+        STIPPLE_ASSIGN(const uint64_t limit, cacheLimit(build_.cacheLimit));
+        sayNotes(notes_);
+        cache_.use(key_);
+        if (Result<StorePtr> found = openWhole(); found) return found;
+        STIPPLE_TRY(cache_.lockBuild(key_, [&] { say("is being built by another process: waiting for it"); }));
+        const Result<StorePtr> store = openOrBuild(make, limit);
+        cache_.unlockBuild(key_);
+        return store;
+    }
+
+  private:
+    void say(const std::string& what) const {
+        if (isLoud_) fmt::print(stderr, "{} ({}): {}\n", inputs_.front(), part_, what);
+    }
+    void sayNotes(const std::vector<std::string>& notes) const {
+        for (const std::string& note : notes)
+            if (isLoud_) fmt::print(stderr, "note: {}\n", note);
+    }
+
+    /// What is there, if it is whole.
+    Result<StorePtr> openWhole() const {
+        Result<StorePtr> store = openStoreFile(path_);
+        if (!store) return store;
+        cache_.touch(key_);
+        if (const auto record = cache_.readRecord(key_)) sayNotes(record->notes);
+        return store;
+    }
+
+    Result<StorePtr> openOrBuild(const StoreMaker& make, uint64_t limit) const {
+        if (std::error_code error; fs::exists(path_, error)) {
+            Result<StorePtr> store = openWhole();  // another process was faster
+            if (store) return store;
+            if (isLoud_)
+                fmt::print(stderr, "note: the scene in the cache cannot be used and is built again: {}\n",
+                           store.error().line());
+            cache_.removeStore(key_);
+        }
+        CacheRecord record{absolute(), part_, {}, std::chrono::system_clock::now()};
+        cache_.writeRecord(key_, record);
+        STIPPLE_ASSIGN(const lod::BuildReport built, made(make));
+        for (const std::string& note : built.notes)
+            if (std::find(notes_.begin(), notes_.end(), note) == notes_.end()) record.notes.push_back(note);
+        for (const auto& [reason, count] : built.dropped)
+            record.notes.push_back(fmt::format("dropped {}: {}", count, reason));
+        cache_.writeRecord(key_, record);
+        say(fmt::format("built into the cache in {:.1f} s ({})", built.seconds, path_));
+        sayNotes(record.notes);
+        STIPPLE_ASSIGN(StorePtr store, openStoreFile(path_));
+        uint64_t bytes = 0;
+        const std::vector<CacheEntry> removed = cache_.shrinkTo(limit);
+        for (const CacheEntry& entry : removed) bytes += entry.bytes;
+        if (!removed.empty() && isLoud_)
+            fmt::print(stderr,
+                       "note: {} scenes used least recently, {}, went from the cache, whose limit is {} "
+                       "(--cache-limit, STIPPLE_CACHE_LIMIT; see stipple cache list)\n",
+                       removed.size(), humanBytes(bytes), humanBytes(limit));
+        return store;
+    }
+
+    Result<lod::BuildReport> made(const StoreMaker& make) const {
+        Progress progress(build_.progressStyle(!isLoud_));
+        Result<lod::BuildReport> built = make(path_, progress);
+        if (!built && built.error().kind == ErrorKind::output)
+            built.error().hint =
+                "it is in the cache of built scenes: make room with 'stipple cache clean', or set "
+                "XDG_CACHE_HOME to another folder";
+        return built;
+    }
+
+    std::vector<std::string> absolute() const {
+        std::vector<std::string> paths;
+        std::error_code error;
+        for (const std::string& input : inputs_)
+            paths.push_back(fs::absolute(input, error).lexically_normal().string());
+        return paths;
+    }
+
+    const CacheFolder& cache_;
+    const std::string key_;
+    const std::vector<std::string> notes_;
+    const std::vector<std::string>& inputs_;
+    const std::string part_;
+    const BuildOptions& build_;
+    const bool isLoud_;
+    const std::string path_;
+};
 
 }  // namespace
 
-Result<std::shared_ptr<const lod::Store>> openStoreFile(const std::string& path) {
+Result<StorePtr> openStoreFile(const std::string& path) {
     STIPPLE_ASSIGN(lod::Store store, lod::openStore(path));
     return std::make_shared<const lod::Store>(std::move(store));
 }
 
-Result<std::shared_ptr<const lod::Store>> openCached(const std::vector<std::string>& inputs, const BuildOptions& build,
-                                                     const std::string& part, bool showProgress,
-                                                     const StoreMaker& make) {
-    STIPPLE_ASSIGN(const std::string path, cachePath(inputs, build, part));
-    if (!fs::exists(path)) {
-        Progress progress(build.progressStyle(!showProgress));
-        STIPPLE_ASSIGN(const lod::BuildReport built, make(path, progress));
-        if (showProgress)
-            fmt::print(stderr, "{} ({}): built into the cache in {:.1f} s ({})\n", inputs.front(), part, built.seconds,
-                       path);
-        for (const std::string& note : built.notes)
-            if (showProgress) fmt::print(stderr, "note: {}\n", note);
-        for (const auto& [reason, count] : built.dropped)
-            if (showProgress) fmt::print(stderr, "dropped {}: {}\n", count, reason);
-    }
-    return openStoreFile(path);
+Result<StorePtr> openCached(const std::vector<std::string>& inputs, const BuildOptions& build, const std::string& part,
+                            bool showProgress, const StoreMaker& make) {
+    std::vector<std::string> notes;
+    STIPPLE_ASSIGN(const std::string key, keyOf(inputs, build, part, notes));
+    STIPPLE_ASSIGN(const CacheFolder* const cache, folder());
+    return Lookup(*cache, key, std::move(notes), inputs, part, build, showProgress).open(make);
 }
 
 }  // namespace stipple::app

@@ -15,7 +15,9 @@ Result<std::shared_ptr<const lod::Store>> openStoreFile(const std::string& path)
 /// Builds a store into a path.
 using StoreMaker = std::function<Result<lod::BuildReport>(const std::string& path, Progress& progress)>;
 
-/// The store that `inputs` and `build` give, made if it is not in the cache. `part`: which of their stores.
+/// The store that `inputs` and `build` give, made if it is not in the cache, or not whole there. `part`: which of their
+/// stores. What another process is making is waited for. What the cache holds beyond its limit goes then, the least
+/// recently used first; what is open stays.
 Result<std::shared_ptr<const lod::Store>> openCached(const std::vector<std::string>& inputs, const BuildOptions& build,
                                                      const std::string& part, bool showProgress,
                                                      const StoreMaker& make);

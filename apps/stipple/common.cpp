@@ -60,6 +60,7 @@ void BuildOptions::addTo(CLI::App& app) {
     app.add_option("--strand-radius", strandRadius,
                    "radius of strands that have none, file units (0: a 4000th of the extent)")
         ->transform(within(0.0, 1e300));
+    addOutliersTo(app);
     app.add_flag("--only-points", onlyPoints, "of a PLY mesh take the vertices, as points");
     app.add_flag("--skip-bad", skipBad, "go on past corrupt chunks and files, and say what was lost");
 }
@@ -77,6 +78,20 @@ scene::ReadSettings BuildOptions::reading() const {
     reading.allowOutside = allowOutside;
     if (const uint64_t bytes = parseBytes(memory); bytes > 0) reading.memoryBytes = bytes;
     return reading;
+}
+
+void BuildOptions::addOutliersTo(CLI::App& app) {
+    app.add_flag("--drop-outliers", dropOutliers,
+                 "of points leave out invalid returns at the origin (0,0,0), and places with fewer than 16 around them "
+                 "far outside of what holds 96 of 100; counted by reason");
+}
+
+void BuildOptions::addCacheTo(CLI::App& app) {
+    app.add_option(
+           "--cache-limit", cacheLimit,
+           "what the cache of built scenes may hold, e.g. 10G; beyond that the least recently used go (default: "
+           "STIPPLE_CACHE_LIMIT, or 20G, or a fifth of the disk)")
+        ->type_name("SIZE");
 }
 
 void BuildOptions::addProgressTo(CLI::App& app) {
@@ -138,6 +153,7 @@ Result<lod::BuildSettings> BuildOptions::settings() const {
                                     : lod::NormalsMode::automatic;
     s.fineNormals = normals == "fine";
     s.mergeDuplicates = duplicates == "merge";
+    s.dropOutliers = dropOutliers;
     s.tempFolder = temp;
     s.isStopped = isStopRequested;
     s.ranks = ranks;

@@ -22,8 +22,9 @@ namespace stipple::app {
 
 struct BuildOptions {
     std::string memory = "2G", normals = "auto", radii = "auto", up, attributes = "none", temp, duplicates = "keep";
+    std::string cacheLimit;  ///< of the cache of built scenes; empty: its default
     int threads = 0;
-    bool skipBad = false, onlyPoints = false, allowOutside = false;
+    bool skipBad = false, onlyPoints = false, allowOutside = false, dropOutliers = false;
     bool repair = false;  ///< of former versions: what it did is always done
     double strandRadius = 0;
     uint64_t surfels = 0;
@@ -33,6 +34,9 @@ struct BuildOptions {
     void addTo(CLI::App& app);
     void addProgressTo(CLI::App& app);
     ProgressStyle progressStyle(bool isQuiet) const;
+    void addOutliersTo(CLI::App& app);
+    /// What render and view have beside what builds have.
+    void addCacheTo(CLI::App& app);
     Result<lod::BuildSettings> settings() const;
     /// How scene files are read.
     scene::ReadSettings reading() const;
@@ -85,10 +89,9 @@ struct OpenedScene {
 void turnUp(OpenedScene& scene, lod::UpAxis up);
 
 /// A .stipple file is opened; a .gltf or .glb scene is opened with the stores that its nodes refer to; anything else,
-/// and the meshes of a scene, are built into the cache first (and found there the next time), with the attribute that
-/// `colour` needs.
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build,
-                              const ColourOptions& colour, Executor& executor, bool showProgress);
+/// and the meshes of a scene, are built into the cache first (and found there the next time), with all attributes.
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build, Executor& executor,
+                              bool showProgress);
 
 /// Gives every store its colours; one that does not have what is asked for keeps its own. An error if none has it. The
 /// result is for the legend.
@@ -107,6 +110,7 @@ Result<glm::dvec3> parseVector(const std::string& text, const char* option);
 Result<glm::uvec2> parseSize(const std::string& text);
 
 void setupBuild(CLI::App& app, int& status);
+void setupCache(CLI::App& app, int& status);
 void setupInfo(CLI::App& app, int& status);
 void setupRender(CLI::App& app, int& status);
 void setupView(CLI::App& app, int& status);

@@ -144,7 +144,8 @@ void arrangeOptions(CLI::App& command) {
            "--legend", "--environment", "--environment-scale", "--wind", "--time", "--debug"});
     group("Inputs that are not built yet",
           {"--memory", "--temp", "--duplicates", "--threads", "--normals", "--radii", "--up", "--attributes",
-           "--surfels", "--repair", "--strand-radius", "--only-points", "--skip-bad", "--drop-outliers"});
+           "--surfels", "--strand-radius", "--only-points", "--skip-bad", "--drop-outliers", "--allow-outside",
+           "--cache-limit", "--progress"});
 }
 
 void setupHelp(CLI::App& app, int& status) {

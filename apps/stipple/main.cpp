@@ -34,6 +34,7 @@ void setupAll(CLI::App& app, int& status) {
     app::setupCompare(app, status);
     app::setupGrow(app, status);
     app::setupConvert(app, status);
+    app::setupCache(app, status);
     app::setupHelp(app, status);
     for (const char* command : {"render", "view"}) app::arrangeOptions(*app.get_subcommand(command));
     app.add_flag("--version")->description("print version, backends and devices");

@@ -41,16 +41,23 @@ Result<lod::PointSource> openInput(const std::string& path, const lod::ReadOptio
 
 namespace {
 
-Result<std::shared_ptr<const lod::Store>> openBuilt(const std::vector<std::string>& inputs, BuildOptions build,
-                                                    const ColourOptions& colour, Executor& executor,
-                                                    bool showProgress) {
-    const std::string needed = isSceneFile(inputs.front()) ? "" : lod::attributeBehind(colour.what);
-    if (!needed.empty() && build.attributes != "all")
-        build.attributes = build.attributes == "none" ? needed : build.attributes + "," + needed;
-    STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
-    return openCached(inputs, build, "points", showProgress, [&](const std::string& path, Progress& progress) {
-        return lod::buildStore(inputs, path, settings, executor, progress);
-    });
+/// With every attribute that there is, so that no colour asks for another build.
+Result<std::shared_ptr<const lod::Store>> openBuilt(const std::vector<std::string>& inputs, const BuildOptions& build,
+                                                    Executor& executor, bool showProgress) {
+    STIPPLE_ASSIGN(const lod::BuildSettings asked, build.settings());
+    lod::BuildSettings settings = asked;
+    settings.attributes.clear();
+    settings.allAttributes = settings.leaveOutUnlike = !isSceneFile(inputs.front());
+    STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store,
+                   openCached(inputs, build, "points", showProgress, [&](const std::string& path, Progress& progress) {
+                       return lod::buildStore(inputs, path, settings, executor, progress);
+                   }));
+    const std::vector<lod::AttributeInfo>& has = store->description.attributes;
+    for (const std::string& name : asked.attributes)
+        if (std::none_of(has.begin(), has.end(), [&](const lod::AttributeInfo& a) { return a.name == name; }))
+            return fail(ErrorKind::usage, fmt::format("has no attribute '{}'", name), inputs.front(),
+                        "stipple info lists them");
+    return store;
 }
 
 /// A transform as rotation, even scale and translation.
@@ -278,8 +285,8 @@ std::vector<scene::Camera> camerasOf(const scene::Scene& scene) {
 }
 
 /// The stores that a scene's nodes refer to, and its meshes.
-Result<void> openSceneFile(const std::string& path, const BuildOptions& build, const ColourOptions& colour,
-                           Executor& executor, bool showProgress, OpenedScene& opened) {
+Result<void> openSceneFile(const std::string& path, const BuildOptions& build, Executor& executor, bool showProgress,
+                           OpenedScene& opened) {
     STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path, build.reading()));
     opened.lights = lightsOf(scene);
     opened.cameras = camerasOf(scene);
@@ -308,8 +315,7 @@ Result<void> openSceneFile(const std::string& path, const BuildOptions& build, c
     if (build.surfels == 0) STIPPLE_TRY(placeTriangles(scene, build, executor, showProgress, placed));
     STIPPLE_TRY(placeStrands(scene, build, executor, showProgress, opened));
     if (build.surfels > 0 || anyHolds(scene::PrimitiveKind::points) || placed.empty()) {
-        STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> points,
-                       openBuilt({path}, build, colour, executor, showProgress));
+        STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> points, openBuilt({path}, build, executor, showProgress));
         placed.push_back({std::move(points), {}, {}});
     }
     for (const std::string& note : scene.notes)
@@ -457,8 +463,7 @@ namespace {
 
 /// The stores of inputs that are no scene file.
 Result<std::shared_ptr<const lod::Store>> openFiles(const std::vector<std::string>& inputs, const BuildOptions& build,
-                                                    const ColourOptions& colour, Executor& executor,
-                                                    bool showProgress) {
+                                                    Executor& executor, bool showProgress) {
     if (lod::isStoreFile(inputs.front())) return openStoreFile(inputs.front());
     if (inputs.size() == 1 && lod::isStrandFile(inputs[0]))
         return openCached(inputs, build, "strands", showProgress, [&](const std::string& path, Progress& progress) {
@@ -472,7 +477,7 @@ Result<std::shared_ptr<const lod::Store>> openFiles(const std::vector<std::strin
                               return buildPlyMeshes(meshes.files, path, build, std::move(settings), executor, progress);
                           });
     if (const std::string note = meshes.note(); !note.empty() && showProgress) fmt::print(stderr, "note: {}\n", note);
-    return openBuilt(inputs, build, colour, executor, showProgress);
+    return openBuilt(inputs, build, executor, showProgress);
 }
 
 /// What a camera must see: points on the outside of all stores, in world space.
@@ -498,8 +503,8 @@ std::vector<glm::dvec3> outlineOf(const std::vector<render::PlacedStore>& placed
 
 void turnUp(OpenedScene& scene, lod::UpAxis up) { scene.description.up = lod::axisVector(up); }
 
-Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& given,
-                              const ColourOptions& colour, Executor& executor, bool showProgress) {
+Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& given, Executor& executor,
+                              bool showProgress) {
     OpenedScene scene;
     // The axis is of the picture: what is in the cache serves any.
     BuildOptions build = given;
@@ -509,10 +514,9 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
             return fail(ErrorKind::usage, "a built scene and other inputs cannot be mixed", input,
                         "name one scene, or only raw inputs; a .gltf scene can place several stores");
     if (isSceneFile(inputs.front())) {
-        STIPPLE_TRY(openSceneFile(inputs.front(), build, colour, executor, showProgress, scene));
+        STIPPLE_TRY(openSceneFile(inputs.front(), build, executor, showProgress, scene));
     } else {
-        STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store,
-                       openFiles(inputs, build, colour, executor, showProgress));
+        STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store, openFiles(inputs, build, executor, showProgress));
         scene.placed.push_back({std::move(store), {}, {}});
     }
     // Points that stand in for meshes are lit. Beside scans that keep their photographed colours they would not be,

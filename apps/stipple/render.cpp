@@ -8,8 +8,8 @@
 #include "apps/stipple/camera_options.h"
 #include "apps/stipple/common.h"
 #include "apps/stipple/legend.h"
-#include "apps/stipple/render_frames.h"
 #include "apps/stipple/outputs.h"
+#include "apps/stipple/render_frames.h"
 #include "engine/base/file.h"
 #include "engine/base/process.h"
 #include "engine/base/units.h"
@@ -116,7 +116,7 @@ Result<void> run(const Options& o, Written& written) {
     const auto executor = makeTbbExecutor(o.build.threads);
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
     STIPPLE_TRY(checkModule(o));
-    STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, o.colour, *executor, !o.quiet));
+    STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, !o.quiet));
     const lod::StoreDescription& description = scene.description;
     STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
     written.of = shot.views.size();
@@ -152,8 +152,8 @@ Result<void> run(const Options& o, Written& written) {
     auto state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.crowds);
     render::setSway(settings.draw.wind, state->hierarchies, state->instances);
     const Legend legend = o.colour.legend ? makeLegend(colour, description) : Legend{};
-    const FramesPlan plan{shot.views,   shot.seconds, o.output,        o.resident, o.frames,
-                          o.accumulate, o.noWait,     o.build.skipBad, o.quiet,    !o.quiet && !o.json, o.alpha};
+    const FramesPlan plan{shot.views, shot.seconds,    o.output, o.resident,          o.frames, o.accumulate,
+                          o.noWait,   o.build.skipBad, o.quiet,  !o.quiet && !o.json, o.alpha};
     Timings timings;
     Verdict verdict;
     STIPPLE_TRY(runFrames(plan, settings, *state, *executor, timings, written, verdict));
@@ -247,9 +247,10 @@ void setupRender(CLI::App& app, int& status) {
     sub->add_option("--shade", o->shade, "auto: unlit where the scan has its own colours, lit by sun and sky otherwise")
         ->check(oneOf({"auto", "lit", "unlit"}))
         ->capture_default_str();
-    auto* const background = sub->add_option("--background", o->background, "colour behind the scene, sRGB, 0 to 255 each")
-        ->type_name("R,G,B")
-        ->capture_default_str();
+    auto* const background =
+        sub->add_option("--background", o->background, "colour behind the scene, sRGB, 0 to 255 each")
+            ->type_name("R,G,B")
+            ->capture_default_str();
     sub->add_flag("--alpha", o->alpha, "no background: how much of a pixel is covered goes into the alpha channel")
         ->excludes(background);
     sub->add_option("--debug", o->debug, "draw what the engine did instead of colours")
@@ -285,9 +286,11 @@ void setupRender(CLI::App& app, int& status) {
         ->check(bytes())
         ->type_name("SIZE")
         ->capture_default_str();
-    group->add_option("--attributes", o->build.attributes, "attributes to keep; the one of --colour always is")
+    group->add_option("--attributes", o->build.attributes, "attributes that must be there; all are kept")
         ->type_name("NAMES")
         ->capture_default_str();
+    o->build.addCacheTo(*group);
+    o->build.addOutliersTo(*group);
     group->add_option("--surfels", o->build.surfels, "turn meshes into that many samples, e.g. 1M; 0: keep triangles")
         ->transform(within(uint64_t{0}, uint64_t{200'000'000}))
         ->capture_default_str();

@@ -19,10 +19,10 @@ double SceneOpener::seconds() const { return nowSeconds() - since_; }
 void SceneOpener::start(std::vector<std::string> inputs) {
     name_ = std::filesystem::path(inputs.front()).filename().string();
     since_ = nowSeconds();
-    result_ = std::async(std::launch::async, [inputs = std::move(inputs), build = build_, colour = colour_]() {
+    result_ = std::async(std::launch::async, [inputs = std::move(inputs), build = build_]() {
         try {
             const auto executor = makeTbbExecutor(build.threads);
-            return openScene(inputs, build, colour, *executor, true);
+            return openScene(inputs, build, *executor, true);
         } catch (const std::bad_alloc&) {
             return Result<OpenedScene>(fail(ErrorKind::budget, "there is not enough memory to open it", inputs.front(),
                                             "give a smaller --memory"));

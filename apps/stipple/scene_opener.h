@@ -14,7 +14,7 @@ namespace stipple::app {
 
 class SceneOpener {
   public:
-    SceneOpener(const BuildOptions& build, const ColourOptions& colour) : build_(build), colour_(colour) {}
+    explicit SceneOpener(const BuildOptions& build) : build_(build) {}
     /// Stops what is under way.
     ~SceneOpener();
     SceneOpener(const SceneOpener&) = delete;
@@ -30,7 +30,6 @@ class SceneOpener {
 
   private:
     BuildOptions build_;
-    ColourOptions colour_;
     std::string name_;
     double since_ = 0;
     std::future<Result<OpenedScene>> result_;

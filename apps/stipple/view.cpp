@@ -39,7 +39,7 @@ class Viewer {
           session_(session),
           settings_(settings),
           executor_(executor),
-          opener_(o.build, ColourOptions{}),
+          opener_(o.build),
           navigation_(std::move(navigation)),
           player_(std::move(player)) {}
 
@@ -309,7 +309,7 @@ Result<void> run(const ViewOptions& o) {
                     "use stipple render, or xvfb-run stipple view");
     catchStopSignals();
     const auto executor = makeTbbExecutor(o.build.threads);
-    STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, o.colour, *executor, true));
+    STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, true));
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
     ViewSettings settings;
     render::FrameSettings& frame = settings.frame;
@@ -369,6 +369,7 @@ void setupView(CLI::App& app, int& status) {
     o->colour.addTo(*sub);
     o->environment.addTo(*sub);
     o->build.addTo(*sub);
+    o->build.addCacheTo(*sub);
     sub->footer(keyHelpText());
     sub->callback([o, &status] {
         if (const auto result = run(*o); !result) status = report(result.error());

@@ -10,6 +10,7 @@
 #include "engine/base/hash.h"
 #include "engine/base/ordered.h"
 #include "engine/base/queue.h"
+#include "lod/build/build_version.h"
 #include "lod/build/octree/assemble.h"
 #include "lod/build/points/distribution.h"
 #include "lod/build/points/estimate.h"
@@ -20,7 +21,6 @@ namespace stipple::lod {
 namespace {
 
 constexpr uint64_t kVerifiedNodes = 512;  ///< at the end of a build; `info --verify` checks all
-constexpr uint64_t kBuildVersion = 3;     ///< of what the same input gives: an interrupted build of another is refused
 
 /// The axis of the format or of the settings; away from the Earth's centre for coordinates that are relative to it.
 glm::dvec3 upOf(const PointInput& input, const BuildSettings& settings, const StoreDescription& description) {
@@ -178,10 +178,11 @@ class PointBuild {
     }
 
     uint64_t identity() const {
-        std::string text = fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}", kStoreVersion, kBuildVersion, input_.identity(),
-                                       static_cast<int>(settings_.normals), settings_.estimateRadii,
-                                       settings_.up ? static_cast<int>(*settings_.up) : -1, settings_.leafRecords,
-                                       settings_.skipBad, settings_.fineNormals, settings_.mergeDuplicates);
+        std::string text =
+            fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}|{}", kStoreVersion, kBuildVersion, input_.identity(),
+                        static_cast<int>(settings_.normals), settings_.estimateRadii,
+                        settings_.up ? static_cast<int>(*settings_.up) : -1, settings_.leafRecords, settings_.skipBad,
+                        settings_.fineNormals, settings_.mergeDuplicates, settings_.dropOutliers);
         for (const AttributeInfo& a : input_.attributes()) text.append("|").append(a.name);
         text.append("|").append(std::filesystem::absolute(output_).lexically_normal().string());
         return hashBytes(text.data(), text.size());

@@ -1,10 +1,13 @@
 #include "lod/import/import.h"
 
+#include <fmt/format.h>
 #include <glob.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "engine/base/file.h"
@@ -64,9 +67,30 @@ std::vector<std::string> matching(const std::string& pattern) {
     return files;
 }
 
+/// The same file under another name, or again, goes.
+std::vector<std::string> onceEach(const std::vector<std::string>& files, std::vector<std::string>* notes) {
+    std::map<std::pair<dev_t, ino_t>, std::string> first;
+    std::vector<std::string> once, again;
+    for (const std::string& file : files) {
+        struct stat info {};
+        if (::stat(file.c_str(), &info) == 0 && !first.try_emplace({info.st_dev, info.st_ino}, file).second) {
+            again.push_back(file == first.at({info.st_dev, info.st_ino})
+                                ? fmt::format("{}: is named more than once", file)
+                                : fmt::format("{}: is the same file as {}", file, first[{info.st_dev, info.st_ino}]));
+            continue;
+        }
+        once.push_back(file);
+    }
+    if (notes == nullptr || again.empty()) return once;
+    notes->push_back(again.size() == 1 ? again.front() + ", and is taken once"
+                                       : fmt::format("{}, and {} more files likewise: each is taken once",
+                                                     again.front(), again.size() - 1));
+    return once;
+}
+
 }  // namespace
 
-Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& inputs) {
+Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& inputs, std::vector<std::string>* notes) {
     std::vector<std::string> files;
     for (const std::string& input : inputs) {
         std::error_code error;
@@ -91,7 +115,7 @@ Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& in
             }
         }
     }
-    return files;
+    return onceEach(files, notes);
 }
 
 std::optional<uint64_t> declaredByOctree(const std::string& input) {

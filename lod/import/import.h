@@ -25,8 +25,10 @@ Result<uint64_t> readPoints(const PointSource& source, const std::function<Resul
 
 /// What a person names as input, as files: a file is itself; a folder is every .las, .laz and .ply below it; a pattern
 /// (*, ?, [) is what it matches; the ept.json or cloud.js of a LAZ octree is its node files, whose points together are
-/// the scan. Sorted by name, so that the order does not depend on the file system.
-Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& inputs);
+/// the scan. Sorted by name, so that the order does not depend on the file system. A file that is named twice (by
+/// links, or itself and with its folder) is taken once, which `notes` says.
+Result<std::vector<std::string>> expandInputs(const std::vector<std::string>& inputs,
+                                              std::vector<std::string>* notes = nullptr);
 
 /// The number of points that the description of an octree (ept.json, cloud.js, or their folder) declares; nothing if
 /// `input` is no octree or declares none.

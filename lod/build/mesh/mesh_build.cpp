@@ -10,6 +10,7 @@
 #include "engine/base/check.h"
 #include "engine/base/hash.h"
 #include "engine/base/queue.h"
+#include "lod/build/build_version.h"
 #include "lod/build/mesh/cell.h"
 #include "lod/build/octree/cell_build.h"
 
@@ -17,7 +18,6 @@ namespace stipple::lod {
 namespace {
 
 constexpr uint64_t kManyRoots = 20'000;              ///< triangles of the coarsest level that are worth a note
-constexpr uint64_t kBuildVersion = 1;                ///< of what the same input gives
 constexpr uint64_t kCellBytes = uint64_t{80} << 20;  ///< that one cell of the work needs at most
 
 /// The tables in the order of the file: coarse before fine.

@@ -74,13 +74,17 @@ Result<void> Distribution::count(BuildReport& report, StageClock& clock) {
     tree_->expect(input_.sample.coordinates(), input_.sampleShare);
     input_.sample = {};
     Ranks* const ranks = workspace_.ranks();
+    std::vector<FarCubes> far = input_.farCubes(wanted_.workers);
     do {
-        const Result<double> counted = input_.read(executor_, wanted_.workers, progress_, "count", {},
-                                                   [&](int, const Points& block) -> Result<void> {
-                                                       tree_->count(block.coordinates());
-                                                       return workspace_.checkStopped();
-                                                   });
+        const Result<double> counted = input_.read(
+            executor_, wanted_.workers, progress_, "count", {},
+            [&](int, const Points& block) -> Result<void> {
+                tree_->count(block.coordinates());
+                return workspace_.checkStopped();
+            },
+            &far);
         STIPPLE_TRY(agree(ranks, verdict(counted)));
+        if (!far.empty()) input_.concludeOutliers(std::exchange(far, {}), report);
         rounding_ = *counted;
         if (ranks != nullptr) tree_->addUp([&](std::vector<uint32_t>& counts) { ranks->addUp(counts); });
     } while (tree_->split());

@@ -9,6 +9,7 @@
 #include "lod/build/build.h"
 #include "lod/build/lattice.h"
 #include "lod/build/octree/bytes.h"
+#include "lod/build/points/outliers.h"
 #include "lod/build/points/points.h"
 
 namespace stipple::lod {
@@ -28,6 +29,10 @@ class PointInput {
 
     /// Reads everything once: bounds, which parts are corrupt, what the colours mean. Fills `report`.
     Result<void> survey(BuildReport& report, Executor& executor, Progress& progress);
+    /// One for each worker, to be given to one whole read() and then to concludeOutliers(); none where nothing is far
+    /// or outliers are known.
+    std::vector<FarCubes> farCubes(int workers) const;
+    void concludeOutliers(const std::vector<FarCubes>& far, BuildReport& report);
     /// What the survey found, for a build that was interrupted: load instead of survey.
     void save(ByteWriter& to);
     Result<void> load(ByteReader& from, BuildReport& report);
@@ -57,7 +62,7 @@ class PointInput {
     /// The parts after `range` that hold `points` points or a little more.
     Range nextRange(const Range& range, uint64_t points) const;
     Result<double> read(Executor& executor, int workers, Progress& progress, const std::string& stage,
-                        const Range& range, const Sink& sink) const;
+                        const Range& range, const Sink& sink, std::vector<FarCubes>* far = nullptr) const;
 
   private:
     struct Part {
@@ -72,25 +77,43 @@ class PointInput {
         uint64_t firstColour = 0;
         bool hasColour = false, isVaried = false;
         std::vector<glm::dvec3> sample;  ///< as in the file: steps or world units
+        std::vector<glm::dvec3> places;  ///< likewise, each once
+        Bounds near;                     ///< of what is not far, where outliers are left out; common coordinates
+        uint64_t far = 0;
     };
 
     Result<void> openAll(const std::vector<std::string>& inputs, const BuildSettings& settings, BuildReport& report);
     Result<PointSource> openInput(const std::string& path, const ReadOptions& options) const;
-    Result<void> collectNames(const std::vector<std::string>& files, ReadOptions& options) const;
+    Result<void> collectNames(const std::vector<std::string>& files, ReadOptions& options, BuildReport& report) const;
     Result<void> adopt(PointSource source, const ReadOptions& options, std::vector<bool>& found, BuildReport& report);
     bool isOwnPart(size_t part) const;
     void exchangeParts();
     void putPart(size_t i, ByteWriter& to);
     void getPart(size_t i, ByteReader& from);
     Result<void> conclude(BuildReport& report);
+    Result<void> checkParts() const;
+    void tally(BuildReport& report);
     Result<void> surveyPart(Part& part, PointBlock& block) const;
+    void surveyBounds(const PointBlock& block, size_t count, Part& part) const;
     void surveyColours(const PointBlock& block, size_t count, Part& part) const;
+    void findDenseBox();
+    Result<void> findOutliers(Executor& executor);
+    Result<void> findFar(Part& part, PointBlock& block, FarCubes& cubes) const;
+    FarCubes together(const std::vector<FarCubes>& far) const;
+    void sayOutliers(BuildReport& report) const;
+    bool leavesOut() const { return settings_.dropOutliers && outliers_.any(); }
+    glm::dvec3 commonOf(size_t from, const PointBlock& block, size_t i) const;
+    Bounds boundsOf(const Part& part) const;
+    Bounds bounds() const;
+    Bounds worldBounds(const Part& part) const;
+    std::vector<std::string> notesOnPlaces() const;
     Result<void> placeIntegers(BuildReport& report);
     Result<void> placeFloats();
-    void findColours();
+    void findColours(BuildReport& report);
     void placeSample();
-    Result<void> readPart(const Part& part, PointBlock& block, Points& points, double& rounding,
+    Result<void> readPart(const Part& part, PointBlock& block, Points& points, double& rounding, FarCubes* far,
                           const std::function<Result<void>(const Points&)>& sink) const;
+    size_t leaveOut(const Part& part, PointBlock& block, size_t count, uint64_t& far) const;
     void place(const Part& part, const PointBlock& block, size_t count, Points& out, double& rounding) const;
     void fill(const Part& part, const PointBlock& block, Points& out) const;
 
@@ -98,13 +121,14 @@ class PointInput {
     std::vector<PointSource> sources_;
     std::vector<Part> parts_;
     std::vector<AttributeInfo> attributes_;
-    std::vector<ToLattice> toLattice_;  ///< of each source, where all are lattices
-    std::vector<bool> isWide_;          ///< colours of a source have 16 bits
+    CommonLattice lattice_;  ///< where all sources are lattices
+    Outliers outliers_;
+    std::vector<bool> isWide_;  ///< colours of a source have 16 bits
     std::vector<uint32_t> sourceColourMax_;
     glm::dvec3 least_{0};  ///< steps of the common lattice
     double step_ = 1;      ///< of the common lattice, for what 32 bits cannot hold
     uint64_t declared_ = 0;
-    bool allLattice_ = true;
+    bool allLattice_ = true, isBlack_ = false;
     std::string crsPath_;
 };
 

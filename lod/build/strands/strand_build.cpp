@@ -10,6 +10,7 @@
 
 #include "engine/base/check.h"
 #include "engine/base/hash.h"
+#include "lod/build/build_version.h"
 #include "lod/build/octree/cell_build.h"
 #include "lod/build/strands/strand_cell.h"
 
@@ -18,7 +19,6 @@ namespace {
 
 constexpr uint32_t kRootLog2 = 24;
 constexpr uint32_t kDeepest = 20;
-constexpr uint64_t kBuildVersion = 1;                ///< of what the same input gives
 constexpr uint64_t kCellBytes = uint64_t{64} << 20;  ///< that one cell of the work needs at most
 constexpr uint64_t kRunSegments = 64;                ///< of one atom that are kept until they are sent
 
