@@ -1,7 +1,10 @@
 #include "lod/description.h"
 
+#include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <utility>
 
 #include "engine/base/text.h"
 
@@ -10,15 +13,33 @@ namespace {
 
 using nlohmann::json;
 
-json toJson(const glm::vec3& v) { return {v.x, v.y, v.z}; }
-shared::vec3 vectorFromJson(const json& j) {
-    return {j.at(0).get<float>(), j.at(1).get<float>(), j.at(2).get<float>()};
+/// A whole number that T holds: others have no value in it, not even a wrong one.
+template <typename T>
+T whole(const json& j) {
+    const bool fits = j.is_number_unsigned() ? std::in_range<T>(j.get<uint64_t>())
+                                             : j.is_number_integer() && std::in_range<T>(j.get<int64_t>());
+    if (!fits) throw std::runtime_error("a whole number is none");
+    return j.get<T>();
 }
+float real(const json& j) {
+    const double value = j.get<double>();
+    if (!(std::abs(value) <= std::numeric_limits<float>::max())) throw std::runtime_error("a number is too large");
+    return static_cast<float>(value);
+}
+std::map<std::string, uint64_t> countsFromJson(const json& j, const char* name) {
+    std::map<std::string, uint64_t> out;
+    if (j.contains(name))
+        for (const auto& [reason, count] : j.at(name).items()) out[reason] = whole<uint64_t>(count);
+    return out;
+}
+
+json toJson(const glm::vec3& v) { return {v.x, v.y, v.z}; }
+shared::vec3 vectorFromJson(const json& j) { return {real(j.at(0)), real(j.at(1)), real(j.at(2))}; }
 json toJson(const shared::TextureSlot& s) {
     return {{"texture", s.texture}, {"u", toJson(s.rowU)}, {"v", toJson(s.rowV)}};
 }
 shared::TextureSlot slotFromJson(const json& j) {
-    return {j.at("texture").get<uint32_t>(), vectorFromJson(j.at("u")), vectorFromJson(j.at("v"))};
+    return {whole<uint32_t>(j.at("texture")), vectorFromJson(j.at("u")), vectorFromJson(j.at("v"))};
 }
 
 json materialToJson(const shared::SurfaceMaterial& m) {
@@ -40,13 +61,13 @@ json materialToJson(const shared::SurfaceMaterial& m) {
 shared::SurfaceMaterial materialFromJson(const json& j) {
     shared::SurfaceMaterial m{};
     m.baseColour = vectorFromJson(j.at("base_colour"));
-    m.alpha = j.at("alpha").get<float>();
-    m.alphaCutoff = j.at("alpha_cutoff").get<float>();
+    m.alpha = real(j.at("alpha"));
+    m.alphaCutoff = real(j.at("alpha_cutoff"));
     m.emissive = vectorFromJson(j.at("emissive"));
-    m.metallic = j.at("metallic").get<float>();
-    m.roughness = j.at("roughness").get<float>();
-    m.normalScale = j.at("normal_scale").get<float>();
-    m.occlusionStrength = j.at("occlusion_strength").get<float>();
+    m.metallic = real(j.at("metallic"));
+    m.roughness = real(j.at("roughness"));
+    m.normalScale = real(j.at("normal_scale"));
+    m.occlusionStrength = real(j.at("occlusion_strength"));
     m.baseTexture = slotFromJson(j.at("base_texture"));
     m.surfaceTexture = slotFromJson(j.at("surface_texture"));
     m.normalTexture = slotFromJson(j.at("normal_texture"));
@@ -121,7 +142,7 @@ AttributeInfo attributeFromJson(const json& j) {
     a.greatest = j.at("greatest").get<double>();
     a.low = j.at("low").get<double>();
     a.high = j.at("high").get<double>();
-    a.counts = j.at("counts").get<std::vector<std::pair<double, uint64_t>>>();
+    for (const json& c : j.at("counts")) a.counts.emplace_back(c.at(0).get<double>(), whole<uint64_t>(c.at(1)));
     return a;
 }
 
@@ -130,15 +151,15 @@ StoreDescription fromJson(const json& j) {
     d.metresPerUnit = j.at("metres_per_unit").get<double>();
     const json& crs = j.at("crs");
     d.crs.name = crs.at("name").get<std::string>();
-    d.crs.epsg = crs.at("epsg").get<int>();
+    d.crs.epsg = whole<int>(crs.at("epsg"));
     d.crs.text = crs.at("text").get<std::string>();
     d.crs.isDegrees = crs.at("is_degrees").get<bool>();
     d.crs.metresPerUnit = d.metresPerUnit;
     for (const json& a : j.at("attributes")) d.attributes.push_back(attributeFromJson(a));
     d.lowHeight = j.at("low_height").get<double>();
     d.highHeight = j.at("high_height").get<double>();
-    d.points = j.at("points").get<uint64_t>();
-    d.records = j.at("records").get<uint64_t>();
+    d.points = whole<uint64_t>(j.at("points"));
+    d.records = whole<uint64_t>(j.at("records"));
     d.roundingUnits = j.at("rounding").get<double>();
     for (int i = 0; i < 3; ++i) {
         d.boundsMin[i] = j.at("min").at(static_cast<size_t>(i)).get<double>();
@@ -151,13 +172,13 @@ StoreDescription fromJson(const json& j) {
     d.isReflectance = j.at("is_reflectance").get<bool>();
     d.isStrands = j.at("is_strands").get<bool>();
     d.isProgressive = j.at("is_progressive").get<bool>();
-    d.discFactors = j.at("disc_factors").get<std::vector<float>>();
+    for (const json& factor : j.at("disc_factors")) d.discFactors.push_back(real(factor));
     d.smallestDisc = j.at("smallest_disc").get<double>();
     d.hasNormals = j.at("has_normals").get<bool>();
     d.source = j.at("source").get<std::string>();
-    d.pointsIn = j.value("points_in", uint64_t{0});
-    d.dropped = j.value("dropped", std::map<std::string, uint64_t>());
-    d.added = j.value("added", std::map<std::string, uint64_t>());
+    d.pointsIn = j.contains("points_in") ? whole<uint64_t>(j.at("points_in")) : 0;
+    d.dropped = countsFromJson(j, "dropped");
+    d.added = countsFromJson(j, "added");
     for (const json& m : j.at("materials")) d.materials.push_back(materialFromJson(m));
     return d;
 }

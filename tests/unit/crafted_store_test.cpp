@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <tuple>
 
 #include "tests/support/crafted_store.h"
 #include "tests/support/support.h"
@@ -167,11 +168,14 @@ TEST_F(Crafted, NumbersThatAreNoneAreRefused) {
         c.head.smallestError = odd;
         expectRefused(c, "not possible");
     }
-    for (const char* key : {"\"roughness\":", "\"base_colour\":[", "\"max\":["}) {
+    for (const auto& [key, value, text] :
+         {std::tuple{"\"roughness\":", "1e308", "too large"}, std::tuple{"\"base_colour\":[", "1e20", "not possible"},
+          std::tuple{"\"max\":[", "1e308", "not possible"}, std::tuple{"\"texture\":", "1e308", "whole number"},
+          std::tuple{"\"points\":", "-3", "whole number"}}) {
         CraftedStore c = take(mesh);
         const size_t at = c.description.find(key) + std::strlen(key);
-        c.description.replace(at, c.description.find_first_of(",]}", at) - at, "1e308");
-        expectRefused(c, "not possible");
+        c.description.replace(at, c.description.find_first_of(",]}", at) - at, value);
+        expectRefused(c, text);
     }
 }
 
