@@ -154,14 +154,8 @@ class Viewer {
         player_.pause();
         session_.turnUp(settings_.frame);
         frameScene();
-        const glm::dvec3 up = session_.scene().description.up;
-        tell(fmt::format("up is {} now (--up {})",
-                         up.x > 0.9   ? 'x'
-                         : up.y > 0.9 ? 'y'
-                                      : 'z',
-                         up.x > 0.9   ? 'x'
-                         : up.y > 0.9 ? 'y'
-                                      : 'z'));
+        const char up = static_cast<char>('x' + session_.upAxis());
+        tell(fmt::format("up is {} now (--up {})", up, up));
     }
 
     void open(std::vector<std::string> inputs) {
