@@ -42,6 +42,15 @@ inline std::optional<double> depthInTheMiddle(const render::Image& image) {
     return found;
 }
 
+/// The next up axis (0 to 2: x to z) to try for a scene whose own is `own`: y and z are taken for each other most
+/// often.
+inline int nextUpAxis(int now, int own) {
+    constexpr int kX = 0, kY = 1, kZ = 2;
+    const int second = own == kZ ? kY : kZ, third = 3 - own - second;
+    static_assert(kX + kY + kZ == 3);
+    return now == own ? second : now == second ? third : own;
+}
+
 class Navigation {
   public:
     /// `up`: the axis to turn about. `diagonal`: of the scene.

@@ -28,12 +28,17 @@ void beginPanel(const char* name, float x, float y) {
                      ImGuiWindowFlags_NoNav | ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_NoFocusOnAppearing);
 }
 
-std::string millions(uint64_t count) { return fmt::format("{:.2f} M", static_cast<double>(count) * 1e-6); }
+std::string counted(uint64_t count) {
+    const auto value = static_cast<double>(count);
+    return count < 10'000      ? std::to_string(count)
+           : count < 1'000'000 ? fmt::format("{:.0f} k", value * 1e-3)
+                               : fmt::format("{:.2f} M", value * 1e-6);
+}
 
 std::string drawnText(const FrameCounters& c) {
-    if (c.trianglesDrawn == 0) return millions(c.recordsDrawn) + " points";
-    if (c.recordsDrawn == 0) return millions(c.trianglesDrawn) + " triangles";
-    return millions(c.recordsDrawn) + " points, " + millions(c.trianglesDrawn) + " triangles";
+    if (c.trianglesDrawn == 0) return counted(c.recordsDrawn) + " points";
+    if (c.recordsDrawn == 0) return counted(c.trianglesDrawn) + " triangles";
+    return counted(c.recordsDrawn) + " points, " + counted(c.trianglesDrawn) + " triangles";
 }
 
 void drawBrief(const OverlayFacts& f) {
@@ -55,8 +60,8 @@ void drawFull(const OverlayFacts& f) {
     line(fmt::format("{} nodes, {} missing, {} chunks on their way", c.nodesDrawn, c.nodesMissing, c.requestsInFlight));
     ImGui::ProgressBar(static_cast<float>(c.recordsDrawn + c.trianglesDrawn) / static_cast<float>(budgets.records),
                        ImVec2(300 * unit(), 0),
-                       fmt::format("{} points, {} triangles of {}", millions(c.recordsDrawn),
-                                   millions(c.trianglesDrawn), millions(budgets.records))
+                       fmt::format("{} points, {} triangles of {}", counted(c.recordsDrawn), counted(c.trianglesDrawn),
+                                   counted(budgets.records))
                            .c_str());
     line(fmt::format("resident {}", humanBytes(c.residentBytes)));
     line(fmt::format("debug view: {}   H: keys", kDebugNames.at(f.settings.frame.draw.debugView)));

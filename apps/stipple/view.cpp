@@ -156,8 +156,7 @@ class Viewer {
         player_.pause();
         session_.turnUp(settings_.frame);
         frameScene();
-        const glm::dvec3 up = session_.scene().description.up;
-        tell(fmt::format("up is {0} now (--up {0})", up.x > 0.9 ? 'x' : up.y > 0.9 ? 'y' : 'z'));
+        tell(fmt::format("up is {0} now (--up {0})", static_cast<char>('x' + session_.upAxis())));
     }
 
     void open(std::vector<std::string> inputs) {

@@ -30,7 +30,7 @@ std::vector<KeyHelp> keyHelp(const std::array<char, gpu::kSteerCount>& names) {
             {"M", "filled surfaces, or points only"},
             {"C", "next colours"},
             {"L", "light on, off"},
-            {"U", "turn the up axis: z, y, x"},
+            {"U", "another axis is up: z or y, x, back"},
             {"V", "debug views"},
             {"P", "picture of this view: stipple_001.png ..."},
             {"Space", "pause, go on along the camera path"},

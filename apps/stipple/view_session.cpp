@@ -28,9 +28,15 @@ void ViewSession::restart(render::FrameSettings& settings) {
     legend_ = makeLegend(colour_, d);
 }
 
+int ViewSession::upAxis() const {
+    const glm::dvec3 up = glm::abs(scene_.description.up);
+    return up.x > up.y && up.x > up.z ? 0 : up.y > up.z ? 1 : 2;
+}
+
 Result<void> ViewSession::show(OpenedScene scene, const ColourOptions& colour, render::FrameSettings& settings) {
     STIPPLE_ASSIGN(colour_, applyColours(scene, colour.what, colour.map, colour.range));
     std::swap(scene_, scene);  // what was shown lives until its chunks are given back
+    ownUpAxis_ = upAxis();
     restart(settings);
     return {};
 }
@@ -64,8 +70,9 @@ Result<void> ViewSession::nextColours(render::FrameSettings& settings) {
 }
 
 void ViewSession::turnUp(render::FrameSettings& settings) {
-    const glm::dvec3 up = scene_.description.up;
-    scene_.description.up = up.z > 0.9 ? glm::dvec3(0, 1, 0) : up.y > 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1);
+    glm::dvec3 up(0);
+    up[nextUpAxis(upAxis(), ownUpAxis_)] = 1;
+    scene_.description.up = up;
     settings.draw.worldUp = scene_.description.up;
     settings.draw.wind.towards = render::windAcross(settings.draw.worldUp);
 }

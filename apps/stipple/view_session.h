@@ -29,7 +29,7 @@ class ViewSession {
     Result<void> show(OpenedScene scene, const ColourOptions& colour, render::FrameSettings& settings);
     /// Own colours, height, normals, then every attribute, and round again. An error if none suits the scene.
     Result<void> nextColours(render::FrameSettings& settings);
-    /// z, y, x, z ... for scenes whose files say otherwise than they are.
+    /// Another axis, for scenes whose files say otherwise than they are.
     void turnUp(render::FrameSettings& settings);
 
     const OpenedScene& scene() const { return scene_; }
@@ -37,6 +37,7 @@ class ViewSession {
     render::FrameState& state() { return *state_; }
     glm::dvec3 focus() const { return 0.5 * (scene_.description.focusMin + scene_.description.focusMax); }
     double diagonal() const;
+    int upAxis() const;  ///< 0 to 2: the one nearest to up
 
   private:
     void restart(render::FrameSettings& settings);
@@ -45,6 +46,7 @@ class ViewSession {
     render::Backend& backend_;
     Executor& executor_;
     OpenedScene scene_;
+    int ownUpAxis_ = 2;
     lod::ColourBy colour_;
     Legend legend_;
     std::unique_ptr<render::FrameState> state_;

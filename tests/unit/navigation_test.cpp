@@ -135,6 +135,17 @@ TEST(Navigation, WithNothingInTheMiddleOrbitIsAboutTheScene) {
     expectNear(n.camera().target, {3, 4, 5}, 1e-12);
 }
 
+TEST(Navigation, UpAxesAreAllTriedTheLikeliestFirst) {
+    EXPECT_EQ(nextUpAxis(1, 1), 2) << "y-up by its format, but a scan that stands on xy";
+    EXPECT_EQ(nextUpAxis(2, 2), 1);
+    for (int own = 0; own < 3; ++own) {
+        const int second = nextUpAxis(own, own), third = nextUpAxis(second, own);
+        EXPECT_EQ(own + second + third, 3);
+        EXPECT_NE(second, third);
+        EXPECT_EQ(nextUpAxis(third, own), own);
+    }
+}
+
 TEST(Navigation, DepthIsThatOfTheMiddleOrNextToIt) {
     render::Image image;
     image.width = 200;
