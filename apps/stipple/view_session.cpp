@@ -35,6 +35,7 @@ int ViewSession::upAxis() const {
 
 Result<void> ViewSession::show(OpenedScene scene, const ColourOptions& colour, render::FrameSettings& settings) {
     STIPPLE_ASSIGN(colour_, applyColours(scene, colour.what, colour.map, colour.range));
+    shown_ = colour;
     std::swap(scene_, scene);  // what was shown lives until its chunks are given back
     ownUpAxis_ = upAxis();
     restart(settings);
@@ -60,6 +61,7 @@ Result<void> ViewSession::nextColours(render::FrameSettings& settings) {
         const auto colours = applyColours(scene_, name, "", "");
         if (colours && (colours->mode != lod::ColourMode::own || colour_.mode != lod::ColourMode::own)) {
             colour_ = *colours;
+            shown_ = {name, "", "", shown_.legend};
             restart(settings);
             return {};
         }
@@ -75,6 +77,11 @@ void ViewSession::turnUp(render::FrameSettings& settings) {
     scene_.description.up = up;
     settings.draw.worldUp = scene_.description.up;
     settings.draw.wind.towards = render::windAcross(settings.draw.worldUp);
+    if (colour_.mode != lod::ColourMode::height) return;  // heights are along it
+    if (const auto colours = applyColours(scene_, shown_.what, shown_.map, shown_.range); colours) {
+        colour_ = *colours;
+        restart(settings);
+    }
 }
 
 }  // namespace stipple::app

@@ -48,6 +48,7 @@ class ViewSession {
     OpenedScene scene_;
     int ownUpAxis_ = 2;
     lod::ColourBy colour_;
+    ColourOptions shown_;  ///< what was asked for, that colour_ is
     Legend legend_;
     std::unique_ptr<render::FrameState> state_;
 };
