@@ -315,7 +315,8 @@ Result<void> run(const ViewOptions& o) {
     frame.budgets = {o.error, o.budget};
     frame.draw.unlitTriangles = o.shade == "unlit";
     frame.draw.wind.strength = o.wind;
-    STIPPLE_ASSIGN(frame.draw.environment, openEnvironment(o.environment.path, o.environment.scale, *executor));
+    STIPPLE_ASSIGN(frame.draw.environment,
+                   openEnvironment(o.environment.path, o.environment.scale, o.build.reading().memoryBytes, *executor));
     ViewSession session(o, *backend, *executor);
     STIPPLE_TRY(session.show(std::move(scene), o.colour, frame));
     const double aspect = static_cast<double>(size.x) / size.y;

@@ -66,7 +66,7 @@ class Watcher final : public nlohmann::json_sax<nlohmann::json> {
     int depth_ = 0;
 };
 
-/// What the values of a JSON text take, from what separates them (measured: up to 100 bytes a member).
+/// What the values of a JSON text take, from what separates them (about 100 bytes a member, rounded up).
 uint64_t memoryOfJson(const char* begin, const char* end) {
     uint64_t bytes = 0;
     bool inText = false;
