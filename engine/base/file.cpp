@@ -27,6 +27,7 @@ InputFile::~InputFile() {
 }
 
 Result<InputFile> InputFile::open(const std::string& path) {
+    if (path.empty()) return fail(ErrorKind::usage, "the name of a file to read is empty", "", "name a file");
     // Opening a FIFO that nobody writes to would wait for ever.
     const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     if (descriptor < 0) return fail(ErrorKind::input, std::strerror(errno), path, "check the path and its permissions");

@@ -59,6 +59,7 @@ class Ears {
                 if (std::exchange(isChanged[i], uint8_t{1}) == 0) changed.push_back(i);
             }
         };
+        bool isTurned = false;
         const auto isOver = [&] { return triangles.size() + 2 >= count_; };
         while (!isOver()) {
             // Round by round, so that ears stay small: what changed is tried again in the next one, and all that is
@@ -67,6 +68,7 @@ class Ears {
             for (const uint32_t corner : toTry)
                 if (!isOver() && isGone[corner] == 0 && isChanged[corner] == 0 && isEar(corner)) cutOff(corner);
             toTry = std::exchange(changed, {});
+            if (isTurned = !isTurned; isTurned) std::reverse(toTry.begin(), toTry.end());  // strips zigzag, no fans
             for (const uint32_t i : toTry) isChanged[i] = 0;
             if (!toTry.empty() && triangles.size() > before) continue;
             const bool wasAll = isTryingAll_;

@@ -141,6 +141,7 @@ TEST(Overwrite, OtherFilesOnlyWhenTold) {
     expectOneLine(runProgram(folder, "build a.las -o \"\" --quiet"), 2, {"empty"});
     expectOneLine(runProgram(folder, "grow scan -o \"\""), 2, {"empty"});
     expectOneLine(runProgram(folder, "render a.las -o \"\""), 2, {"empty"});
+    expectOneLine(runProgram(folder, "build \"\" -o b.stipple"), 2, {"empty"});
     EXPECT_TRUE(fs::is_fifo(folder / "pipe"));
 }
 
