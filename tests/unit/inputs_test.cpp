@@ -195,6 +195,40 @@ TEST(Inputs, NeitherOrderNorThreadsNorMemoryNorFilesChangeWhichPointsAreOutliers
     EXPECT_EQ(three.pointsOut, first.pointsOut);
 }
 
+TEST(Inputs, AnInterruptedBuildKnowsItsOutliers) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(1);
+    std::vector<glm::ivec3> points = withOutliers(500);
+    for (uint64_t seed = 10; seed < 20; ++seed)
+        for (const glm::ivec3& p : hills(60000, seed)) points.push_back(p);
+    test::writeLas(folder / "a.las", points, 0.01, kUtm);
+    for (const bool isDropping : {true, false}) {
+        lod::BuildSettings settings;
+        settings.dropOutliers = isDropping;
+        settings.normals = lod::NormalsMode::none;
+        settings.estimateRadii = false;
+        const auto whole = test::build({folder / "a.las"}, folder / "whole.stipple", *executor, settings);
+        settings.memoryBytes = uint64_t{120} << 20;
+        const std::string journal = folder / "o.stipple.build/journal";
+        settings.isStopped = [&] {  // as soon as it is known what lies where
+            std::error_code error;
+            const auto bytes = std::filesystem::file_size(journal, error);
+            return !error && bytes > 1000;
+        };
+        Progress silent(false);
+        const auto stopped = lod::buildStore({folder / "a.las"}, folder / "o.stipple", settings, *executor, silent);
+        ASSERT_FALSE(stopped.has_value());
+        EXPECT_EQ(stopped.error().kind, ErrorKind::interrupted);
+        settings.isStopped = {};
+        const auto resumed = test::build({folder / "a.las"}, folder / "o.stipple", *executor, settings);
+        EXPECT_TRUE(resumed.isResumed);
+        EXPECT_EQ(resumed.contentHash, whole.contentHash);
+        EXPECT_EQ(resumed.dropped, whole.dropped);
+        EXPECT_EQ(resumed.notes, whole.notes);
+        EXPECT_TRUE(says(resumed, "OUTLIERS: 505 of"));
+    }
+}
+
 TEST(Inputs, OutliersOfFloatingPointFilesAreFoundToo) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(2);

@@ -162,7 +162,7 @@ void PointInput::sayOutliers(BuildReport& report) const {
     if (far.isolated() > 0) what += fmt::format("{}{} isolated", what.empty() ? "" : ", ", far.isolated());
     const double distance = outliers_.farthest() * (allLattice_ ? lattice_.unit : 1);
     report.notes.insert(report.notes.begin(),
-                        fmt::format("OUTLIERS: {} of {} points lie far outside of all others ({}; up to {:.6g} units "
+                        fmt::format("OUTLIERS: {} of {} points lie far outside of all others ({}; up to {:.7g} units "
                                     "away): {}",
                                     outliers_.count(), declared_, what, distance,
                                     settings_.dropOutliers ? "left out" : "--drop-outliers leaves them out"));

@@ -175,9 +175,13 @@ Outliers::Outliers(std::vector<glm::dvec3> places, const glm::dvec3& origin, dou
     std::vector<double> along(places.size());
     for (int a = 0; a < 3; ++a) {
         for (size_t i = 0; i < places.size(); ++i) along[i] = places[i][a];
-        std::sort(along.begin(), along.end());
-        dense_.least[a] = along[static_cast<size_t>(std::floor(last * kLowShare))];
-        dense_.greatest[a] = along[static_cast<size_t>(std::ceil(last * kHighShare))];
+        const auto below = [&](double rank) {
+            const auto nth = along.begin() + static_cast<ptrdiff_t>(rank);
+            std::nth_element(along.begin(), nth, along.end());
+            return *nth;
+        };
+        dense_.least[a] = below(std::floor(last * kLowShare));
+        dense_.greatest[a] = below(std::ceil(last * kHighShare));
     }
     const glm::dvec3 extent = dense_.greatest - dense_.least;
     const double largest = std::max({extent.x, extent.y, extent.z});

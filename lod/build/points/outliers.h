@@ -46,7 +46,7 @@ class PlaceSample {
     std::vector<glm::dvec3> take();
 
   private:
-    static constexpr double kPlaces = 65536;
+    static constexpr double kPlaces = 16384;
     static uint64_t mixed(uint64_t x, uint64_t y, uint64_t z) {
         uint64_t h = x * 0x9e3779b97f4a7c15ull + y * 0xc2b2ae3d27d4eb4full + z * 0x165667b19e3779f9ull;
         h ^= h >> 29;
