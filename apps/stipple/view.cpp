@@ -145,8 +145,8 @@ class Viewer {
     }
 
     void frameScene() {
-        const lod::StoreDescription& d = session_.scene().description;
-        navigation_ = Navigation(scene::fitCamera(d.focusMin, d.focusMax, d.up, aspect()), d.up, session_.diagonal());
+        if (const auto camera = makeCamera(CameraOptions{}, session_.scene(), aspect()); camera)
+            navigation_ = Navigation(*camera, session_.scene().description.up, session_.diagonal());
         hasChanged_ = true;
     }
 
