@@ -147,8 +147,8 @@ class Viewer {
     }
 
     void frameScene() {
-        const glm::dvec3 up = session_.scene().description.up;
-        navigation_ = Navigation(scene::fitCamera(session_.scene().outline, up, aspect()), up, session_.diagonal());
+        if (const auto camera = makeCamera(CameraOptions{}, session_.scene(), aspect()); camera)
+            navigation_ = Navigation(*camera, session_.scene().description.up, session_.diagonal());
         hasChanged_ = true;
     }
 
