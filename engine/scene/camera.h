@@ -31,7 +31,7 @@ struct CameraPath {
 };
 
 /// Share of the picture's tighter side that a scene spans when a camera is fitted to it.
-inline constexpr double kFitShare = 0.9;
+inline constexpr double kFitShare = 0.88;
 
 /// A camera that sees all of `points` (at least one) from a three-quarter view, flat scenes from steeper above: their
 /// projection spans kFitShare of the picture's tighter side and stands in its middle.
