@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "engine/base/process.h"
+#include "engine/base/units.h"
 
 namespace stipple::app {
 namespace {

@@ -12,6 +12,7 @@
 #include "apps/stipple/scene_opener.h"
 #include "apps/stipple/view_session.h"
 #include "engine/base/process.h"
+#include "engine/base/text.h"
 #include "engine/base/units.h"
 #include "engine/image/image_io.h"
 
@@ -66,11 +67,11 @@ class Viewer {
   private:
     void tell(const Error& error) {
         report(error);
-        notices_.add(error.line(), true, nowSeconds());
+        notices_.add(printable(error.line()), true, nowSeconds());
         isStale_ = true;
     }
     void tell(const std::string& text) {
-        notices_.add(text, false, nowSeconds());
+        notices_.add(printable(text), false, nowSeconds());
         isStale_ = true;
     }
 

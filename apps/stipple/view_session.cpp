@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "engine/base/process.h"
+#include "engine/base/units.h"
 #include "engine/render/wind.h"
 
 namespace stipple::app {
@@ -43,7 +44,7 @@ Result<void> ViewSession::show(OpenedScene scene, const ColourOptions& colour, r
 }
 
 std::vector<std::string> coloursAfter(const lod::ColourBy& now, const lod::StoreDescription& d) {
-    std::vector<std::string> names{"auto", "height"};
+    std::vector<std::string> names{"plain", "height"};
     if (d.hasNormals) names.emplace_back("normal");
     for (const lod::AttributeInfo& a : d.attributes) names.push_back(a.name);
     auto next = names.begin();

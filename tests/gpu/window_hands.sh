@@ -269,7 +269,7 @@ cameras_and_paths() {
     cmp -s "$plain" "$shot" || fail "U three times is not the first view"
     finish
     # The window shows what render draws.
-    "$program" render --device cpu --budget-points 2000000 --size 640x480 --background 39,39,44 --quiet \
+    "$program" render --device cpu --budget-points 2000000 --size 640x480 --quiet \
         --eye 3,-30,20 --target 0,0,2 "$folder/a.las" -o rendered.png || fail "render"
     view "$folder/a.las" --eye 3,-30,20 --target 0,0,2
     settle
