@@ -74,7 +74,7 @@ std::vector<uint8_t> CraftedStore::bytes() const {
     }
     std::vector<uint8_t> groups = mesh;
     const MeshHead of = meshHead();
-    for (uint64_t t = 0; of.tiles * sizeof(lod::TextureTile) <= groups.size() && t < of.tiles; ++t) {
+    for (uint64_t t = 0; of.tiles <= groups.size() / sizeof(lod::TextureTile) && t < of.tiles; ++t) {
         lod::TextureTile tile;
         uint8_t* const at = groups.data() + tilesAt() + t * sizeof(tile);
         std::memcpy(&tile, at, sizeof(tile));
@@ -104,10 +104,12 @@ void CraftedStore::write(const std::string& path) const {
 
 void CraftedStore::replaceChunk(size_t i, const std::vector<uint8_t>& chunk) {
     NodeOnDisk& n = nodes.at(i);
+    // They follow the chunk, unless the node was changed before and lies about it.
     const uint64_t at = n.chunkOffset + n.chunkBytes - sizeof(Head);
-    const std::vector<uint8_t> attributes(
-        body.begin() + static_cast<std::ptrdiff_t>(at),
-        body.begin() + static_cast<std::ptrdiff_t>(at + n.attributeBytes));  // they follow the chunk
+    std::vector<uint8_t> attributes;
+    if (at <= body.size() && n.attributeBytes <= body.size() - at)
+        attributes.assign(body.begin() + static_cast<std::ptrdiff_t>(at),
+                          body.begin() + static_cast<std::ptrdiff_t>(at + n.attributeBytes));
     n.chunkOffset = sizeof(Head) + body.size();
     n.chunkBytes = static_cast<uint32_t>(chunk.size());
     append(body, chunk.data(), chunk.size());
