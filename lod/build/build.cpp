@@ -382,7 +382,7 @@ class PointBuild {
         description_.pointsIn = report_.pointsIn;
         description_.dropped = report_.dropped;
         for (const Node& node : hierarchy.nodes) description_.records += node.records;
-        ranges_.describe(frame(), description_);
+        ranges_.describe(frame(), input_.withoutOutliers(), description_);
         STIPPLE_TRY(writer_->finish(hierarchy, description_));
         clock_.ends("write");
         report_.nodes = hierarchy.nodes.size();

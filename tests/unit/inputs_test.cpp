@@ -140,6 +140,12 @@ TEST(Inputs, OutliersAreCountedAndLeftOutIfAsked) {
     EXPECT_NE(kept.notes[0].find("OUTLIERS: 3005 of 63205"), std::string::npos) << kept.notes[0];
     EXPECT_NE(kept.notes[0].find("--drop-outliers"), std::string::npos);
 
+    const auto whole = lod::openStore(folder / "kept.stipple");
+    ASSERT_TRUE(whole.has_value());
+    EXPECT_LT(whole->description.boundsMin.x, 1);
+    EXPECT_GT(whole->description.focusMin.x, kUtm.x - 200) << "cameras look at what is dense";
+    EXPECT_LT(whole->description.focusMax.x, kUtm.x + 300);
+
     const auto left = test::build({folder / "a.las"}, folder / "left.stipple", *executor, dropping());
     EXPECT_EQ(left.pointsIn, 63205u);
     EXPECT_EQ(left.pointsOut, 60200u) << "the tower stays";

@@ -33,6 +33,8 @@ class PointInput {
     /// or outliers are known.
     std::vector<FarCubes> farCubes(int workers) const;
     void concludeOutliers(const std::vector<FarCubes>& far, BuildReport& report);
+    /// Outliers that were kept lie outside of this; lattice units.
+    Bounds withoutOutliers() const;
     /// What the survey found, for a build that was interrupted: load instead of survey.
     void save(ByteWriter& to);
     Result<void> load(ByteReader& from, BuildReport& report);

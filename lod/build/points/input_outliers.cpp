@@ -153,6 +153,13 @@ void PointInput::concludeOutliers(const std::vector<FarCubes>& far, BuildReport&
     sayOutliers(report);
 }
 
+Bounds PointInput::withoutOutliers() const {
+    if (!outliers_.any() || leavesOut()) return {glm::dvec3(-1e300), glm::dvec3(1e300)};
+    const Bounds& near = outliers_.farBox();
+    if (allLattice_) return {(near.least - least_) / step_, (near.greatest - least_) / step_};
+    return {(near.least - origin) / unit, (near.greatest - origin) / unit};
+}
+
 /// First of all that is said.
 void PointInput::sayOutliers(BuildReport& report) const {
     if (!outliers_.any()) return;

@@ -124,6 +124,8 @@ class Outliers {
     bool any() const { return count() > 0; }
     uint64_t count() const { return cubes_.atOrigin() + cubes_.isolated(); }
     const FarCubes& cubes() const { return cubes_; }
+    /// What lies outside is far.
+    const Bounds& farBox() const { return far_; }
     /// Of the farthest one from the dense box, along one axis.
     double farthest() const;
     void save(ByteWriter& to) const;

@@ -85,7 +85,7 @@ void ValueRanges::load(ByteReader& from) {
     }
 }
 
-void ValueRanges::describe(const Frame& frame, StoreDescription& description) {
+void ValueRanges::describe(const Frame& frame, const Bounds& within, StoreDescription& description) {
     for (size_t a = 0; a < frame.attributes.size(); ++a) {
         AttributeInfo info = frame.attributes[a];
         attributes_[a].sort();
@@ -102,6 +102,7 @@ void ValueRanges::describe(const Frame& frame, StoreDescription& description) {
     // One point in 200 lies beyond each edge; what a tenth of the extent more does not reach is stray.
     for (int a = 0; a < 3; ++a) {
         Sampled& along = axes_.at(static_cast<size_t>(a));
+        std::erase_if(along.values, [&](double v) { return v < within.least[a] || v > within.greatest[a]; });
         along.sort();
         const double low = along.below(0.005), high = along.below(0.995), margin = 0.1 * (high - low);
         description.focusMin[a] = frame.origin[a] + frame.unit * std::max(along.least, low - margin);

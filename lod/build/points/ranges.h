@@ -4,6 +4,7 @@
 #include <map>
 
 #include "lod/build/octree/bytes.h"
+#include "lod/build/points/outliers.h"
 #include "lod/build/points/points.h"
 #include "lod/description.h"
 
@@ -49,7 +50,8 @@ class ValueRanges {
     void add(const ValueRanges& other);
     void save(ByteWriter& to) const;
     void load(ByteReader& from);
-    void describe(const Frame& frame, StoreDescription& description);
+    /// `within`: what lies outside of it is no part of the focus; lattice units.
+    void describe(const Frame& frame, const Bounds& within, StoreDescription& description);
 
   private:
     uint64_t stride_ = 1;
