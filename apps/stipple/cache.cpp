@@ -10,6 +10,7 @@
 #include "apps/stipple/cache_folder.h"
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
+#include "engine/base/units.h"
 #include "engine/scene/scene_files.h"
 #include "lod/build/build_version.h"
 #include "lod/import/import.h"

@@ -7,6 +7,7 @@
 #include "apps/stipple/cache_folder.h"
 #include "apps/stipple/common.h"
 #include "engine/base/process.h"
+#include "engine/base/units.h"
 
 namespace stipple::app {
 namespace {

@@ -13,6 +13,7 @@
 
 #include "engine/base/file.h"
 #include "engine/base/process.h"
+#include "engine/base/units.h"
 
 namespace stipple::app {
 namespace fs = std::filesystem;

@@ -15,6 +15,7 @@
 #include "apps/stipple/ply_meshes.h"
 #include "engine/base/process.h"
 #include "engine/base/text.h"
+#include "engine/base/units.h"
 #include "engine/image/image_io.h"
 #include "engine/scene/gltf/container.h"
 #include "engine/scene/outline.h"
@@ -410,7 +411,10 @@ Result<lod::BuildReport> buildFiles(const std::vector<std::string>& inputs, cons
     STIPPLE_ASSIGN(const PlyMeshes meshes, findPlyMeshes(inputs, build));
     if (meshes.areAll()) {
         STIPPLE_ASSIGN(lod::MeshBuildSettings settings, plySettings(build));
-        return buildPlyMeshes(meshes.files, output, build, std::move(settings), executor, progress);
+        STIPPLE_ASSIGN(lod::BuildReport report,
+                       buildPlyMeshes(meshes.files, output, build, std::move(settings), executor, progress));
+        report.notes.insert(report.notes.begin(), meshes.notes.begin(), meshes.notes.end());
+        return report;
     }
     STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
     STIPPLE_ASSIGN(lod::BuildReport report, lod::buildStore(inputs, output, settings, executor, progress));

@@ -22,7 +22,7 @@ std::string PlyMeshes::note() const {
 Result<PlyMeshes> findPlyMeshes(const std::vector<std::string>& inputs, const BuildOptions& build) {
     PlyMeshes out;
     if (build.onlyPoints) return out;
-    STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs(inputs));
+    STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs(inputs, &out.notes));
     for (const std::string& file : files) {
         const auto faces = lod::plyFaces(file);
         if (!faces && files.size() == 1) return tl::unexpected(faces.error());

@@ -13,6 +13,7 @@ namespace stipple::app {
 struct PlyMeshes {
     std::vector<std::string> files;  ///< with faces, of which not only the vertices are wanted
     size_t others = 0;               ///< files without
+    std::vector<std::string> notes;  ///< on what was named twice
     /// Are they built as triangles?
     bool areAll() const { return !files.empty() && others == 0; }
     /// What is lost where they are built as points, beside files that have nothing else; empty: nothing.
