@@ -1,5 +1,6 @@
 #include "lod/file_kind.h"
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <string_view>

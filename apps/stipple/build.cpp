@@ -20,6 +20,12 @@ struct Options {
     bool json = false, quiet = false, mpi = false, force = false, restart = false;
 };
 
+/// Of the output, also where its temporary file was being checked.
+Error interruptedAt(Error error, const Options& o) {
+    if (error.where.find(".partial") == std::string::npos) return error;
+    return {ErrorKind::interrupted, "interrupted", o.output, "nothing was written"};
+}
+
 /// `isSilent`: another rank says what there is to say.
 Result<void> run(const Options& o, bool& isSilent) {
     catchStopSignals();
@@ -34,8 +40,8 @@ Result<void> run(const Options& o, bool& isSilent) {
     }
     if (o.restart) build.leftovers = lod::Leftovers::replace;
     STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
-    STIPPLE_TRY(
-        agree(build.ranks, isSilent ? Result<void>() : checkOutputs({{o.output, FileKind::store}}, o.inputs, o.force)));
+    STIPPLE_TRY(agree(build.ranks,
+                      isSilent ? Result<void>() : checkOutputs({{o.output, OutputKind::store}}, o.inputs, o.force)));
     const int threads = build.threads > 0 ? build.threads : static_cast<int>(std::thread::hardware_concurrency());
     keepFreeMemory(settings.memoryBytes, threads);
     const auto executor = makeTbbExecutor(build.threads);
@@ -43,6 +49,7 @@ Result<void> run(const Options& o, bool& isSilent) {
         Progress progress(build.progressStyle(o.quiet || isSilent));
         return buildAny(o.inputs, o.output, build, *executor, progress);
     }();
+    if (!built && built.error().kind == ErrorKind::interrupted) built = tl::unexpected(interruptedAt(built.error(), o));
     if (!built) return tl::unexpected(built.error());
     if (isSilent) return {};
     const lod::BuildReport& r = *built;

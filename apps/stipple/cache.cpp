@@ -10,9 +10,11 @@
 #include "apps/stipple/cache_folder.h"
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
+#include "engine/base/text.h"
 #include "engine/base/units.h"
 #include "engine/scene/scene_files.h"
 #include "lod/build/build_version.h"
+#include "lod/build/octree/journal.h"
 #include "lod/import/import.h"
 
 namespace stipple::app {
@@ -40,11 +42,25 @@ std::string identityOf(const std::string& path) {
                        info.st_mtim.tv_sec, info.st_mtim.tv_nsec, info.st_ctim.tv_sec, info.st_ctim.tv_nsec);
 }
 
-/// Of scenes it holds what they are made of, so that thousands of their parts need not look again.
-const std::vector<std::string>& filesOfScene(const std::string& path) {
-    static std::map<std::string, std::vector<std::string>> known;  // (scenes are opened by one thread)
-    const auto found = known.find(path);
-    return found != known.end() ? found->second : known[path] = scene::filesOf(path);
+/// Of a scene file and of all that it is made of. Which files these are is kept until one of them changes, so that
+/// thousands of parts need not look again.
+std::string identityOfScene(const std::string& path) {
+    struct Known {
+        std::vector<std::string> files;
+        std::string identity;
+    };
+    static std::map<std::string, Known> known;  // (scenes are opened by one thread)
+    Known& own = known[path];
+    const auto identity = [&] {
+        std::string text = identityOf(path);
+        for (const std::string& other : own.files) text += identityOf(other);
+        return text;
+    };
+    if (identity() != own.identity) {
+        own.files = scene::filesOf(path);
+        own.identity = identity();
+    }
+    return own.identity;
 }
 
 Result<std::string> keyOf(const std::vector<std::string>& inputs, const BuildOptions& build, const std::string& part,
@@ -52,11 +68,7 @@ Result<std::string> keyOf(const std::vector<std::string>& inputs, const BuildOpt
     std::string text = fmt::format("{}|{}|{}|{}|{}", part, settingsText(build), STIPPLE_VERSION, lod::kStoreVersion,
                                    lod::kBuildVersion);
     STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs(inputs, &notes));
-    for (const std::string& file : files) {
-        text += identityOf(file);
-        if (!isSceneFile(file)) continue;
-        for (const std::string& other : filesOfScene(file)) text += identityOf(other);
-    }
+    for (const std::string& file : files) text += isSceneFile(file) ? identityOfScene(file) : identityOf(file);
     return hexDigits(hashBytes(text.data(), text.size()));
 }
 
@@ -84,7 +96,7 @@ class Lookup {
     Result<StorePtr> open(const StoreMaker& make) {
         STIPPLE_ASSIGN(const uint64_t limit, cacheLimit(build_.cacheLimit));
         sayNotes(notes_);
-        cache_.use(key_);
+        STIPPLE_TRY(cache_.use(key_));
         if (Result<StorePtr> found = openWhole(); found) return found;
         STIPPLE_TRY(cache_.lockBuild(key_, [&] { say("is being built by another process: waiting for it"); }));
         const Result<StorePtr> store = openOrBuild(make, limit);
@@ -94,11 +106,11 @@ class Lookup {
 
   private:
     void say(const std::string& what) const {
-        if (isLoud_) fmt::print(stderr, "{} ({}): {}\n", inputs_.front(), part_, what);
+        if (isLoud_) fmt::print(stderr, "{} ({}): {}\n", printable(inputs_.front()), part_, printable(what));
     }
     void sayNotes(const std::vector<std::string>& notes) const {
         for (const std::string& note : notes)
-            if (isLoud_) fmt::print(stderr, "note: {}\n", note);
+            if (isLoud_) fmt::print(stderr, "note: {}\n", printable(note));
     }
 
     /// What is there, if it is whole.
@@ -116,7 +128,7 @@ class Lookup {
             if (store) return store;
             if (isLoud_)
                 fmt::print(stderr, "note: the scene in the cache cannot be used and is built again: {}\n",
-                           store.error().line());
+                           printable(store.error().line()));
             cache_.removeStore(key_);
         }
         CacheRecord record{absolute(), part_, {}, std::chrono::system_clock::now()};
@@ -142,13 +154,48 @@ class Lookup {
     }
 
     Result<lod::BuildReport> made(const StoreMaker& make) const {
-        Progress progress(build_.progressStyle(!isLoud_));
-        Result<lod::BuildReport> built = make(path_, progress);
-        if (!built && built.error().kind == ErrorKind::output)
-            built.error().hint =
+        std::error_code error;
+        const bool hasLeftovers = fs::exists(workFolder(), error) || fs::exists(partialPath(), error);
+        Result<lod::BuildReport> built = madeOnce(make);
+        if (hasLeftovers && !built && isOfLeftovers(built.error()) && removeLeftovers()) {
+            Error why = built.error();
+            why.hint.clear();
+            sayNotes({"what an interrupted build left cannot be used, it is built from the start: " + why.line()});
+            built = madeOnce(make);
+        }
+        if (built) return built;
+        Error& why = built.error();
+        if (why.kind == ErrorKind::output)
+            why.hint =
                 "it is in the cache of built scenes: make room with 'stipple cache clean', or set "
                 "XDG_CACHE_HOME to another folder";
+        else if (why.hint.find("--restart") != std::string::npos)  // which only builds to a file have
+            why.hint = fmt::format("run the same command again, or remove {}", workFolder());
         return built;
+    }
+
+    Result<lod::BuildReport> madeOnce(const StoreMaker& make) const {
+        Progress progress(build_.progressStyle(!isLoud_));
+        return make(path_, progress);
+    }
+
+    std::string workFolder() const { return lod::Journal::folderOf(path_, build_.temp); }
+    std::string partialPath() const { return path_ + ".partial"; }
+
+    /// Is it what an earlier build left that is wrong, and not what is built?
+    bool isOfLeftovers(const Error& why) const {
+        const std::string folder = workFolder();
+        const auto isBelow = [&](const std::string& path) { return why.where.rfind(path, 0) == 0; };
+        if (why.kind == ErrorKind::input) return why.where.empty() || isBelow(folder) || isBelow(path_);
+        return why.kind == ErrorKind::output && (why.where == folder || why.where == partialPath());
+    }
+
+    /// A folder that was named with --temp may hold what others put there: there only what a build left.
+    bool removeLeftovers() const {
+        if (!cache_.removeLeftovers(key_)) return false;
+        std::error_code error;
+        return !fs::exists(workFolder(), error) ||
+               lod::Journal::open(workFolder(), path_, 0, lod::Leftovers::replace).has_value();
     }
 
     std::vector<std::string> absolute() const {

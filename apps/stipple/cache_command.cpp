@@ -7,6 +7,7 @@
 #include "apps/stipple/cache_folder.h"
 #include "apps/stipple/common.h"
 #include "engine/base/process.h"
+#include "engine/base/text.h"
 #include "engine/base/units.h"
 
 namespace stipple::app {
@@ -46,7 +47,7 @@ std::string inputText(const CacheEntry& entry) {
     if (!entry.record || entry.record->inputs.empty()) return "not recorded";
     const std::vector<std::string>& inputs = entry.record->inputs;
     const std::string more = inputs.size() > 1 ? fmt::format(" and {} more", inputs.size() - 1) : "";
-    return fmt::format("{}{} ({}{})", inputs.front(), more, entry.record->part,
+    return fmt::format("{}{} ({}{})", printable(inputs.front()), more, printable(entry.record->part),
                        entry.isWhole ? "" : ", interrupted build");
 }
 
@@ -72,6 +73,7 @@ Result<void> list(const Options& o) {
     if (std::error_code error; std::filesystem::exists(folder, error)) {
         STIPPLE_ASSIGN(const CacheFolder cache, CacheFolder::open());
         entries = cache.entries();
+        for (CacheEntry& entry : entries) entry.record = cache.readRecord(entry.key);
     }
     uint64_t sum = 0;
     for (const CacheEntry& entry : entries) sum += entry.bytes;
@@ -86,8 +88,9 @@ Result<void> list(const Options& o) {
     for (const CacheEntry& entry : entries)
         fmt::print("{:>10}  {:>9}  {:>9}  {}{}\n{:36}{}\n", humanBytes(entry.bytes),
                    entry.record ? ageText(entry.record->made) : "-", ageText(entry.used), inputText(entry),
-                   entry.isInUse ? " (in use)" : "", "", entry.path);
-    fmt::print("{}: {}, {} of at most {}\n", folder, scenes(entries.size()), humanBytes(sum), humanBytes(limit));
+                   entry.isInUse ? " (in use)" : "", "", printable(entry.path));
+    fmt::print("{}: {}, {} of at most {}\n", printable(folder), scenes(entries.size()), humanBytes(sum),
+               humanBytes(limit));
     return {};
 }
 
@@ -115,7 +118,7 @@ Result<void> clean(const Options& o) {
         printJson("cache", {{"folder", folder}, {"removed", removed.size()}, {"bytes", bytes}, {"in_use", kept}});
         return {};
     }
-    fmt::print("{}: removed {}, {}{}\n", folder, scenes(removed.size()), humanBytes(bytes),
+    fmt::print("{}: removed {}, {}{}\n", printable(folder), scenes(removed.size()), humanBytes(bytes),
                kept > 0 ? fmt::format("; {} in use stay", kept) : "");
     return {};
 }

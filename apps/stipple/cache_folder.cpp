@@ -2,9 +2,12 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -13,6 +16,7 @@
 
 #include "engine/base/file.h"
 #include "engine/base/process.h"
+#include "engine/base/text.h"
 #include "engine/base/units.h"
 
 namespace stipple::app {
@@ -57,6 +61,26 @@ Clock::time_point timeOf(const fs::path& path) {
            std::chrono::duration_cast<Clock::duration>(std::chrono::nanoseconds(info.st_mtim.tv_nsec));
 }
 
+/// Does a build write there? (It has a lock on its part of a store, and on the journal in its folder.)
+bool isBeingWritten(const fs::path& path) {
+    std::error_code error;
+    const fs::path file = fs::is_directory(path, error) ? path / "journal" : path;
+    const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+    if (descriptor < 0) return false;
+    const bool isLocked = ::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+    ::close(descriptor);
+    return isLocked;
+}
+
+std::vector<std::string> utf8(std::vector<std::string> texts) {
+    for (std::string& text : texts) text = toUtf8(text);
+    return texts;
+}
+
+tl::unexpected<Error> interrupted(const std::string& path) {
+    return fail(ErrorKind::interrupted, "interrupted", path, "nothing was built");
+}
+
 double secondsOf(Clock::time_point t) { return std::chrono::duration<double>(t.time_since_epoch()).count(); }
 
 }  // namespace
@@ -84,15 +108,19 @@ Result<CacheFolder> CacheFolder::open() {
     return CacheFolder(folder, std::move(*locks));
 }
 
-void CacheFolder::use(const std::string& key) const {
-    // Only who removes it holds it alone, for a moment.
-    while (!locks_.tryShare(usePlace(key))) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+Result<void> CacheFolder::use(const std::string& key) const {
+    // Only who removes it holds it alone, for a moment (unless it was stopped just then).
+    while (!locks_.tryShare(usePlace(key))) {
+        if (isStopRequested()) return interrupted(storePath(key));
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    return {};
 }
 
 Result<void> CacheFolder::lockBuild(const std::string& key, const std::function<void()>& waits) const {
     for (bool isFirst = true; !locks_.tryTake(buildPlace(key)); isFirst = false) {
         if (isFirst) waits();
-        if (isStopRequested()) return fail(ErrorKind::interrupted, "interrupted", storePath(key), "nothing was built");
+        if (isStopRequested()) return interrupted(storePath(key));
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
     return {};
@@ -100,8 +128,10 @@ Result<void> CacheFolder::lockBuild(const std::string& key, const std::function<
 void CacheFolder::unlockBuild(const std::string& key) const { locks_.release(buildPlace(key)); }
 
 void CacheFolder::writeRecord(const std::string& key, const CacheRecord& record) const {
-    const nlohmann::json j = {
-        {"inputs", record.inputs}, {"part", record.part}, {"notes", record.notes}, {"made", secondsOf(record.made)}};
+    const nlohmann::json j = {{"inputs", utf8(record.inputs)},
+                              {"part", record.part},
+                              {"notes", utf8(record.notes)},
+                              {"made", secondsOf(record.made)}};
     const std::string text = j.dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
     // Without it the store is as good.
     (void)writeWholeFile(path_ + "/" + key + ".json", text.data(), text.size());
@@ -134,7 +164,28 @@ void CacheFolder::removeStore(const std::string& key) const {
     fs::remove(storePath(key), error);
 }
 
-std::vector<CacheEntry> CacheFolder::entries() const {
+std::vector<std::string> CacheFolder::filesOf(const std::string& key) const {
+    std::vector<std::string> files;
+    std::error_code error;
+    for (auto it = fs::directory_iterator(path_, error); !error && it != fs::directory_iterator(); it.increment(error))
+        if (keyOf(it->path().filename().string()) == key) files.push_back(it->path().string());
+    return files;
+}
+
+bool CacheFolder::removeLeftovers(const std::string& key) const {
+    const std::string store = storePath(key);
+    bool isGone = true;
+    for (const std::string& path : filesOf(key)) {
+        const bool isLeft = path == store + ".build" || path.rfind(store + ".partial", 0) == 0;
+        if (!isLeft) continue;
+        std::error_code error;
+        if (!isBeingWritten(path)) fs::remove_all(path, error);
+        isGone = isGone && !fs::exists(fs::symlink_status(path, error));
+    }
+    return isGone;
+}
+
+std::vector<CacheEntry> CacheFolder::sizes() const {
     std::map<std::string, CacheEntry> found;
     std::error_code error;
     for (auto it = fs::directory_iterator(path_, error); !error && it != fs::directory_iterator();
@@ -146,16 +197,22 @@ std::vector<CacheEntry> CacheFolder::entries() const {
         entry.used = std::max(entry.used, timeOf(it->path()));
         entry.isWhole = entry.isWhole || name == key + ".stipple";
     }
-    const auto strangers = LockFile::open(path_ + "/locks");  // what this program holds is in use as well
     std::vector<CacheEntry> entries;
     for (auto& [key, entry] : found) {
         entry.key = key;
         entry.path = storePath(key);
-        entry.record = readRecord(key);
-        entry.isInUse = strangers && (strangers->isHeld(usePlace(key)) || strangers->isHeld(buildPlace(key)));
         entries.push_back(std::move(entry));
     }
     std::stable_sort(entries.begin(), entries.end(), [](const auto& a, const auto& b) { return a.used > b.used; });
+    return entries;
+}
+
+std::vector<CacheEntry> CacheFolder::entries() const {
+    std::vector<CacheEntry> entries = sizes();
+    const auto strangers = LockFile::open(path_ + "/locks");  // what this program holds is in use as well
+    for (CacheEntry& entry : entries)
+        entry.isInUse =
+            strangers && (strangers->isHeld(usePlace(entry.key)) || strangers->isHeld(buildPlace(entry.key)));
     return entries;
 }
 
@@ -165,10 +222,7 @@ bool CacheFolder::remove(const CacheEntry& entry) const {
     std::error_code error;
     fs::remove(entry.path, error);
     bool isGone = !error;
-    std::vector<fs::path> rest;
-    for (auto it = fs::directory_iterator(path_, error); !error && it != fs::directory_iterator(); it.increment(error))
-        if (keyOf(it->path().filename().string()) == entry.key) rest.push_back(it->path());
-    for (const fs::path& path : rest) {
+    for (const std::string& path : filesOf(entry.key)) {
         fs::remove_all(path, error);
         isGone = isGone && !error;
     }
@@ -176,7 +230,7 @@ bool CacheFolder::remove(const CacheEntry& entry) const {
 }
 
 std::vector<CacheEntry> CacheFolder::shrinkTo(uint64_t bytes) const {
-    std::vector<CacheEntry> all = entries(), removed;
+    std::vector<CacheEntry> all = sizes(), removed;
     uint64_t sum = 0;
     for (const CacheEntry& entry : all) sum += entry.bytes;
     for (auto entry = all.rbegin(); entry != all.rend() && sum > bytes; ++entry) {

@@ -26,7 +26,7 @@ struct CacheEntry {
     bool isWhole = false;  ///< false: an interrupted build
     bool isInUse = false;  ///< open in some program, or being built
     std::chrono::system_clock::time_point used;
-    std::optional<CacheRecord> record;  ///< none: of an earlier version
+    std::optional<CacheRecord> record;  ///< none: not read, or of an earlier version
 };
 
 class CacheFolder {
@@ -37,8 +37,8 @@ class CacheFolder {
     static Result<CacheFolder> open();
 
     std::string storePath(const std::string& key) const { return path_ + "/" + key + ".stipple"; }
-    /// Nobody removes the store while this object lives.
-    void use(const std::string& key) const;
+    /// Nobody removes the store while this object lives. An error if it is interrupted.
+    Result<void> use(const std::string& key) const;
     /// Waits until nobody else builds that store; `waits` is called once, if it has to. An error if it is interrupted.
     Result<void> lockBuild(const std::string& key, const std::function<void()>& waits) const;
     void unlockBuild(const std::string& key) const;
@@ -48,8 +48,10 @@ class CacheFolder {
     void touch(const std::string& key) const;
     /// The store itself; whoever has it open keeps what was open.
     void removeStore(const std::string& key) const;
+    /// What interrupted builds of the store left, if it is not a build that runs. False if anything stays.
+    bool removeLeftovers(const std::string& key) const;
 
-    /// Most recently used first.
+    /// Most recently used first, without their records.
     std::vector<CacheEntry> entries() const;
     /// All of an entry; false if it is in use or cannot be removed.
     bool remove(const CacheEntry& entry) const;
@@ -58,6 +60,8 @@ class CacheFolder {
 
   private:
     CacheFolder(std::string path, LockFile locks) : path_(std::move(path)), locks_(std::move(locks)) {}
+    std::vector<std::string> filesOf(const std::string& key) const;
+    std::vector<CacheEntry> sizes() const;  ///< entries() that do not say what is in use
     std::string path_;
     LockFile locks_;
 };

@@ -96,7 +96,7 @@ Result<scene::Camera> makeCamera(const CameraOptions& o, const OpenedScene& open
 Result<std::optional<scene::CameraPath>> makePath(const CameraOptions& o, const OpenedScene& opened, double aspect) {
     const lod::StoreDescription& d = opened.description;
     if (!o.path.empty()) {
-        STIPPLE_ASSIGN(scene::CameraPath path, scene::readCameraPath(o.path));
+        STIPPLE_ASSIGN(scene::CameraPath path, scene::readCameraPath(o.path, d.up));
         return std::optional(std::move(path));
     }
     if (o.orbit > 0) return std::optional(scene::makeOrbit(opened.outline, d.up, aspect, o.orbit, o.fov));

@@ -17,7 +17,7 @@ struct Options {
 Result<void> run(const Options& o) {
     if (!o.diff.empty()) {
         STIPPLE_TRY(image::checkImagePath(o.diff));
-        STIPPLE_TRY(checkOutputs({{o.diff, FileKind::picture}}, {o.a, o.b}, o.force));
+        STIPPLE_TRY(checkOutputs({{o.diff, OutputKind::picture}}, {o.a, o.b}, o.force));
     }
     STIPPLE_ASSIGN(const render::Image a, image::readImage(o.a));
     STIPPLE_ASSIGN(const render::Image b, image::readImage(o.b));

@@ -92,7 +92,7 @@ Result<void> run(const Options& o) {
         return fail(ErrorKind::usage, "is neither a store nor a scene", o.output, "write to .stipple, .glb or .gltf");
     const bool isStore = extension == ".stipple";
     const Beside beside(o.output);
-    std::vector<Output> outputs{{o.output, isStore ? FileKind::store : FileKind::other}};
+    std::vector<Output> outputs{{o.output, isStore ? OutputKind::store : OutputKind::other}};
     if (isStore) outputs.insert(outputs.end(), {{beside.rest}, {beside.scene}});
     STIPPLE_TRY(checkOutputs(outputs, {o.input}, o.force));
     catchStopSignals();

@@ -178,7 +178,7 @@ struct DemoFolder {
 std::vector<Output> outputsOf(const LandscapeRun& o) {
     if (o.kind != "demo") return {{o.output}};
     const DemoFolder demo(o.output);
-    return {{demo.scan}, {demo.store, FileKind::store}, {demo.scene}};
+    return {{demo.scan}, {demo.store, OutputKind::store}, {demo.scene}};
 }
 
 /// The folder of a demo: a scan, built, and the scene that places it.

@@ -513,6 +513,7 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     // The axis is of the picture: what is in the cache serves any.
     BuildOptions build = given;
     build.up.clear();
+    build.leftovers = lod::Leftovers::goOnOrReplace;
     for (const std::string& input : inputs)
         if (inputs.size() > 1 && (lod::isStoreFile(input) || isSceneFile(input)))
             return fail(ErrorKind::usage, "a built scene and other inputs cannot be mixed", input,
@@ -537,7 +538,7 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     scene.outline = outlineOf(scene.placed);
     if (!given.up.empty())
         turnUp(scene, axisNamed(given.up));
-    else if (showProgress && scene::looksZUp(scene.description))
+    else if (showProgress && !isSceneFile(inputs.front()) && scene::looksZUp(scene.description))
         fmt::print(stderr, "note: the scene is flat along z, but y is up, as its format has it; is z up? --up z\n");
     releaseFreeMemory();
     return scene;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <array>
 #include <compare>
 #include <filesystem>
@@ -45,8 +46,7 @@ bool isPicture(const std::string& path) {
 
 /// Stores that the nodes of a .gltf or .glb place.
 std::vector<std::string> storesOf(const std::string& path) {
-    const std::string extension = fs::path(path).extension().string();
-    if (extension != ".gltf" && extension != ".glb") return {};
+    if (lod::fileKindOf(path) != lod::FileKind::glb && fs::path(path).extension() != ".gltf") return {};
     const auto container = scene::gltf::readContainer(path);
     if (!container || !container->json.contains("nodes") || !container->json["nodes"].is_array()) return {};
     std::vector<std::string> stores;
@@ -72,11 +72,11 @@ Result<void> checkKind(const Output& output) {
     std::error_code error;
     if (fs::file_size(output.path, error) == 0) return {};  // nothing is lost
     const char* const advice = "choose another name, or give --force to replace it";
-    if (output.kind == FileKind::picture && !isPicture(output.path))
+    if (output.kind == OutputKind::picture && !isPicture(output.path))
         return fail(ErrorKind::output, "is there already and is no picture (.png, .exr)", output.path, advice);
-    if (output.kind == FileKind::store && lod::fileKindOf(output.path) != lod::FileKind::store)
+    if (output.kind == OutputKind::store && lod::fileKindOf(output.path) != lod::FileKind::store)
         return fail(ErrorKind::output, "is there already and is no built scene", output.path, advice);
-    if (output.kind == FileKind::other) return fail(ErrorKind::output, "is there already", output.path, advice);
+    if (output.kind == OutputKind::other) return fail(ErrorKind::output, "is there already", output.path, advice);
     return {};
 }
 
@@ -86,7 +86,13 @@ Result<void> checkOutputs(const std::vector<Output>& outputs, const std::vector<
     std::vector<std::pair<Identity, const Output*>> there;
     for (const Output& output : outputs) {
         STIPPLE_TRY(outputTarget(output.path));
-        if (const auto identity = identityOf(output.path)) there.emplace_back(*identity, &output);
+        const auto identity = identityOf(output.path);
+        if (!identity) continue;
+        for (const auto& [before, other] : there)
+            if (*identity == before && other->path != output.path)
+                return fail(ErrorKind::output, "is another output of this command, too: " + other->path, output.path,
+                            "choose another output");
+        there.emplace_back(*identity, &output);
     }
     if (there.empty()) return {};  // what is not there is no input
     for (const std::string& input : inputs) {
@@ -117,7 +123,7 @@ std::vector<Output> numberedPictures(const std::string& path) {
         if (name.size() < begin.size() + 4 + end.size() || !name.starts_with(begin) || !name.ends_with(end)) continue;
         const std::string number = name.substr(begin.size(), name.size() - begin.size() - end.size());
         if (number.find_first_not_of("0123456789") == std::string::npos)
-            found.push_back({e.path().string(), FileKind::picture});
+            found.push_back({e.path().string(), OutputKind::picture});
     }
     return found;
 }

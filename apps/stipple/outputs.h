@@ -11,11 +11,11 @@
 namespace stipple::app {
 
 /// A picture may stand where a picture stood, a store where a store stood (by their bytes, not by their names).
-enum class FileKind { picture, store, other };
+enum class OutputKind { picture, store, other };
 
 struct Output {
     std::string path;
-    FileKind kind = FileKind::other;
+    OutputKind kind = OutputKind::other;
 };
 
 /// Refuses an output that is the same file as an input, whatever either is called, and one that is there and of another

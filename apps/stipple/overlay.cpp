@@ -42,11 +42,16 @@ std::string drawnText(const FrameCounters& c) {
     return counted(c.recordsDrawn) + " points, " + counted(c.trianglesDrawn) + " triangles";
 }
 
+/// Where even the coarsest level exceeds the budget, there is no error to state.
+std::string errorText(const FrameCounters& c) {
+    return c.budgetTruncated ? "only a part is drawn: --budget-points"
+                             : fmt::format("error {:.2f} px", c.tauEffectivePixels);
+}
+
 void drawBrief(const OverlayFacts& f) {
     const FrameCounters& c = f.state.counters;
-    ImGui::TextUnformatted(fmt::format("{:.1f} ms   error {:.2f} px   {}   {}   H: keys", c.frameMs,
-                                       c.tauEffectivePixels, drawnText(c), f.hands)
-                               .c_str());
+    ImGui::TextUnformatted(
+        fmt::format("{:.1f} ms   {}   {}   {}   H: keys", c.frameMs, errorText(c), drawnText(c), f.hands).c_str());
 }
 
 void drawFull(const OverlayFacts& f) {
@@ -57,7 +62,7 @@ void drawFull(const OverlayFacts& f) {
     line(fmt::format("{:.1f} ms a frame, {:.1f} ms with the window   {}", c.frameMs, f.windowMs, f.hands));
     for (const render::PassTime& p : f.state.backend->passTimes())
         line(fmt::format("  {:<8} {:6.2f} ms", p.name, p.ms));
-    line(fmt::format("delivered error {:.2f} px (asked for {:.2f})", c.tauEffectivePixels, budgets.errorPixels));
+    line(fmt::format("delivered {} (asked for {:.2f} px)", errorText(c), budgets.errorPixels));
     line(fmt::format("{} nodes, {} missing, {} chunks on their way", c.nodesDrawn, c.nodesMissing, c.requestsInFlight));
     ImGui::ProgressBar(static_cast<float>(c.recordsDrawn + c.trianglesDrawn) / static_cast<float>(budgets.records),
                        ImVec2(300 * unit(), 0),

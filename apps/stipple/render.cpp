@@ -86,7 +86,7 @@ nlohmann::json countersJson(const FrameCounters& c) {
             {"failures", c.failures},
             {"refused", c.refused},
             {"budget_truncated", c.budgetTruncated},
-            {"tau_target_px", c.tauTargetPixels},
+            {"tau_target_px", c.budgetTruncated ? jsonNumber(INFINITY) : jsonNumber(c.tauTargetPixels)},
             {"cut_ms", c.cutMs}};
 }
 
@@ -95,10 +95,13 @@ Result<void> checkPictures(const Options& o) {
     STIPPLE_TRY(image::checkImagePath(o.output));
     std::vector<std::string> inputs = o.inputs;
     inputs.insert(inputs.end(), {o.camera.path, o.environment.path});
-    const bool isOne = o.camera.path.empty() && o.camera.orbit == 0;
-    if (!isOne) STIPPLE_TRY(outputTarget(numbered(o.output, 0)));
-    return checkOutputs(isOne ? std::vector<Output>{{o.output, FileKind::picture}} : numberedPictures(o.output), inputs,
-                        o.force);
+    // An orbit of one picture, or a path with one key, writes the name itself.
+    std::vector<Output> outputs{{o.output, OutputKind::picture}};
+    if (!o.camera.path.empty() || o.camera.orbit > 0) {
+        STIPPLE_TRY(outputTarget(numbered(o.output, 0)));
+        for (Output& picture : numberedPictures(o.output)) outputs.push_back(std::move(picture));
+    }
+    return checkOutputs(outputs, inputs, o.force);
 }
 
 /// Before any work. (It takes longer to load than a built scene takes to draw: then only whether it is there.)
@@ -179,7 +182,7 @@ Result<void> run(const Options& o, Written& written) {
             {"records_drawn", c.recordsDrawn},
             {"triangles_drawn", c.trianglesDrawn},
             {"nodes_drawn", c.nodesDrawn},
-            {"tau_eff_px", verdict.tauEffectivePixels},
+            {"tau_eff_px", jsonNumber(verdict.tauEffectivePixels)},
             {"complete", verdict.isComplete()},
             {"incomplete_pictures", verdict.incomplete},
             {"worst_picture", verdict.worst},

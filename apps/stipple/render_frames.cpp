@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <limits>
 #include <thread>
 
 #include "apps/stipple/report.h"
@@ -49,7 +50,8 @@ void Verdict::judge(const render::FrameState& state) {
     const size_t number = pictures++;
     const bool misses = !state.cut.wanted.empty(), worstMisses = incomplete > 0;
     incomplete += misses ? 1 : 0;
-    const double error = state.cut.tauEffective;
+    const double error = state.cut.truncated ? std::numeric_limits<double>::infinity() : state.cut.tauEffective;
+    isTruncated = isTruncated || state.cut.truncated;
     if (number > 0 && (misses != worstMisses ? worstMisses : error <= tauEffectivePixels)) return;
     worst = number;
     tauEffectivePixels = error;
@@ -148,7 +150,13 @@ Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& sett
 }
 
 Result<void> checkVerdict(const FramesPlan& plan, const Verdict& verdict) {
-    if (verdict.isComplete() || plan.noWait) return {};
+    if (plan.noWait) return {};
+    if (verdict.isTruncated)
+        return fail(ErrorKind::budget,
+                    "the picture is written, but holds only a part of the scene: its coarsest level has more records "
+                    "than --budget-points allows",
+                    plan.output, "give more; --no-wait permits it");
+    if (verdict.isComplete()) return {};
     const MissingChunks& missing = verdict.missing;
     Error error{ErrorKind::budget, "", plan.output, ""};
     const bool isBad = missing.unreadable > 0 && !(plan.skipBad && missing.noRoom > 0);

@@ -38,9 +38,10 @@ struct MissingChunks {
 struct Verdict {
     size_t pictures = 0, incomplete = 0;
     size_t worst = 0;               ///< its number
-    double tauEffectivePixels = 0;  ///< of the worst, as all that follows
+    bool isTruncated = false;       ///< of one even the coarsest level exceeds the budget
+    double tauEffectivePixels = 0;  ///< of the worst, as all that follows; infinite where records are left out
     MissingChunks missing;
-    bool isComplete() const { return incomplete == 0; }
+    bool isComplete() const { return incomplete == 0 && !isTruncated; }
     void judge(const render::FrameState& state);
 };
 

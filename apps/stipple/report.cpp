@@ -67,7 +67,9 @@ int report(const Error& error) {
     told.what = withoutCodes(told.what);
     if (told.kind == ErrorKind::usage)
         told.hint += (told.hint.empty() ? "see " : "; see ") + reporting().command + " --help";
-    fmt::print(stderr, "stipple: {}\n", printable(told.line()));
+    Error line = told;
+    if (line.where.rfind("stipple ", 0) == 0) line.where.erase(0, 8);  // the line begins with it
+    fmt::print(stderr, "stipple: {}\n", printable(line.line()));
     const int code = static_cast<int>(told.kind);
     if (reporting().asJson && !reporting().hasResult)
         printJson("error", {{"error",

@@ -19,7 +19,15 @@ double SceneOpener::seconds() const { return nowSeconds() - since_; }
 void SceneOpener::start(std::vector<std::string> inputs) {
     name_ = std::filesystem::path(inputs.front()).filename().string();
     since_ = nowSeconds();
-    result_ = std::async(std::launch::async, [inputs = std::move(inputs), build = build_]() {
+    const auto launch = [&](auto&& work) {
+        try {
+            result_ = std::async(std::launch::async, work);
+        } catch (const std::system_error&) {  // no thread is to be had: then not beside the window
+            result_ = std::async(std::launch::deferred, work);
+            result_.wait();
+        }
+    };
+    launch([inputs = std::move(inputs), build = build_]() {
         try {
             const auto executor = makeTbbExecutor(build.threads);
             return openScene(inputs, build, *executor, true);

@@ -9,6 +9,7 @@
 
 #include "apps/stipple/outputs.h"
 #include "apps/stipple/overlay.h"
+#include "apps/stipple/render_frames.h"
 #include "apps/stipple/scene_opener.h"
 #include "apps/stipple/view_session.h"
 #include "engine/base/process.h"
@@ -238,7 +239,13 @@ class Viewer {
         if (shot.rgba.empty()) return fail(ErrorKind::device, "the window shows nothing", "--screenshot");
         STIPPLE_TRY(image::writeImage(o_.screenshot, shot));
         fmt::print("{}\n", o_.screenshot);
-        return {};
+        FramesPlan plan;
+        plan.output = o_.screenshot;
+        plan.resident = o_.resident;
+        plan.skipBad = o_.build.skipBad;
+        Verdict verdict;
+        verdict.judge(session_.state());
+        return checkVerdict(plan, verdict);
     }
 
     /// Of what is drawn, without what lies over it.
@@ -297,7 +304,7 @@ Result<void> checkScreenshot(const ViewOptions& o) {
     STIPPLE_TRY(image::checkModule(true));
     std::vector<std::string> inputs = o.inputs;
     inputs.insert(inputs.end(), {o.camera.path, o.environment.path});
-    return checkOutputs({{o.screenshot, FileKind::picture}}, inputs, o.force);
+    return checkOutputs({{o.screenshot, OutputKind::picture}}, inputs, o.force);
 }
 
 Result<void> run(const ViewOptions& o) {
@@ -363,7 +370,8 @@ void setupView(CLI::App& app, int& status) {
     sub->add_option("--frames", o->frames, "close after N frames (0: when the user does)")
         ->transform(within(0, 1'000'000'000))
         ->capture_default_str();
-    sub->add_option("--screenshot", o->screenshot, "with --frames: write what the last frame shows (.png)")
+    sub->add_option("--screenshot", o->screenshot,
+                    "with --frames: write what the window shows at last, text included (.png)")
         ->type_name("PICTURE");
     addForce(*sub, o->force);
     o->camera.addTo(*sub);

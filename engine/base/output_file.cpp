@@ -57,6 +57,12 @@ bool isTemporaryOf(const std::string& name, const std::string& entry) {
            entry.find_first_not_of("0123456789.", prefix.size()) == std::string::npos;
 }
 
+/// Is that still the file of that name? (It may be gone since it was opened, and another have its name.)
+bool isNamed(const std::string& path, const struct stat& file) {
+    struct stat named {};
+    return ::lstat(path.c_str(), &named) == 0 && named.st_dev == file.st_dev && named.st_ino == file.st_ino;
+}
+
 /// Removes temporary files of `target` that nobody writes any more.
 void removeLeftovers(const std::string& target) {
     const fs::path path(target);
@@ -70,7 +76,8 @@ void removeLeftovers(const std::string& target) {
         const int descriptor = ::open(left.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
         if (descriptor < 0) continue;
         struct stat info {};
-        if (::fstat(descriptor, &info) == 0 && S_ISREG(info.st_mode) && lock(descriptor) == Lock::ours)
+        if (::fstat(descriptor, &info) == 0 && S_ISREG(info.st_mode) && lock(descriptor) == Lock::ours &&
+            isNamed(left, info))
             ::unlink(left.c_str());
         ::close(descriptor);
     }

@@ -73,7 +73,8 @@ uint64_t parseBytes(const std::string& text) {
     const std::string tail = m->unit.empty() ? "" : m->unit.substr(1);
     const double factor = m->unit.empty() ? 1 : factorOf(m->unit[0], 1024);
     if (!tail.empty() && tail != "B" && tail != "iB") return 0;
-    return static_cast<uint64_t>(m->value * factor);
+    const double bytes = m->value * factor;
+    return bytes <= 1e18 ? static_cast<uint64_t>(bytes) : 0;
 }
 
 std::string latticeText(double value, double unit, double origin) {

@@ -66,12 +66,21 @@ bool forRows(OIIO::ImageInput& in, OIIO::TypeDesc type, int channels, const Use&
     return true;
 }
 
+/// The size of a picture; where there is room for its pixels already, it must be the one that the room was made for:
+/// files change.
+bool tellSize(const OIIO::ImageSpec& spec, bool hasRoom, int* width, int* height) {
+    if (hasRoom) return *width == spec.width && *height == spec.height;
+    *width = spec.width;
+    *height = spec.height;
+    return true;
+}
+constexpr const char* kChanged = "it changed while it was read";
+
 /// The rest of both ways to read: size, then RGBA bytes.
 int readRgba(OIIO::ImageInput* in, int* width, int* height, unsigned char* pixels, char* error, int errorBytes) {
     if (!in) return report(OIIO::geterror(), error, errorBytes);
     const OIIO::ImageSpec& spec = in->spec();
-    *width = spec.width;
-    *height = spec.height;
+    if (!tellSize(spec, pixels != nullptr, width, height)) return report(kChanged, error, errorBytes);
     if (pixels == nullptr) return 0;
     const int channels = std::min(spec.nchannels, 4);
     const bool isRead = forRows<unsigned char>(
@@ -127,8 +136,7 @@ extern "C" int stippleOiioReadFloat(const char* path, int* width, int* height, f
         const std::unique_ptr<OIIO::ImageInput> in = OIIO::ImageInput::open(path);
         if (!in) return report(OIIO::geterror(), error, errorBytes);
         const OIIO::ImageSpec& spec = in->spec();
-        *width = spec.width;
-        *height = spec.height;
+        if (!tellSize(spec, pixels != nullptr, width, height)) return report(kChanged, error, errorBytes);
         if (!pixels) return 0;
         const auto channels = static_cast<size_t>(std::min(spec.nchannels, 3));
         const bool isRead = forRows<float>(

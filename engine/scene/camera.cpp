@@ -197,15 +197,31 @@ CameraPath makeOrbit(std::span<const glm::dvec3> points, const glm::dvec3& up, d
     Camera camera;
     camera.up = glm::normalize(up);
     camera.fovDegrees = fovDegrees;
-    camera.target = middleOf(points);
+    const glm::dvec3 middle = middleOf(points);
     const double elevation = elevationFor(points, camera.up);
     std::vector<glm::dvec3> directions;
-    double distance = 0;
-    for (int i = 0; i < keys; ++i) {
+    for (int i = 0; i < keys; ++i)
         directions.push_back(directionFrom(camera.up, elevation, (20.0 + 360.0 * i / keys) * kPi / 180));
-        const Projected seen = project(points, camera.target, camera, -directions.back(), aspect);
-        distance = std::max(distance, seen.nearestStraight());
+    const auto distanceAt = [&](const glm::dvec3& target, size_t stride) {
+        double distance = 0;
+        for (size_t i = 0; i < directions.size(); i += stride)
+            distance = std::max(distance, project(points, target, camera, -directions[i], aspect).nearestStraight());
+        return distance;
+    };
+    // Looked down upon, the near edge takes more room than the far one: a lower target needs less distance.
+    constexpr size_t kTried = 32;
+    double low = -0.5, high = 0.5;
+    const glm::dvec3 size = sizeOf(points, camera.up);
+    const double reach = std::max({size.x, size.y, size.z});
+    for (int i = 0; i < 24; ++i) {
+        const double a = low + (high - low) / 3, b = high - (high - low) / 3;
+        const size_t stride = directions.size() / kTried + 1;
+        const bool isLower =
+            distanceAt(middle + a * reach * camera.up, stride) < distanceAt(middle + b * reach * camera.up, stride);
+        (isLower ? high : low) = isLower ? b : a;
     }
+    camera.target = middle + 0.5 * (low + high) * reach * camera.up;
+    double distance = distanceAt(camera.target, 1);
     if (!(distance > 0) || !std::isfinite(distance)) distance = 1;  // a single point
     CameraPath path;
     for (int i = 0; i < keys; ++i) {
@@ -277,8 +293,9 @@ class KeyReader {
     std::string path_, where_;
 };
 
-Result<CameraKey> readKey(const KeyReader& from) {
+Result<CameraKey> readKey(const KeyReader& from, const glm::dvec3& up) {
     CameraKey key;
+    key.camera.up = up;
     STIPPLE_ASSIGN(key.t, from.number("t", -1e9, 1e9));
     STIPPLE_ASSIGN(key.camera.eye, from.vector("eye"));
     STIPPLE_ASSIGN(key.camera.target, from.vector("target"));
@@ -295,7 +312,7 @@ Result<CameraKey> readKey(const KeyReader& from) {
 
 }  // namespace
 
-Result<CameraPath> readCameraPath(const std::string& path) {
+Result<CameraPath> readCameraPath(const std::string& path, const glm::dvec3& up) {
     STIPPLE_ASSIGN(const std::string text, readTextFile(path, uint64_t{64} << 20));
     const json j = json::parse(text, nullptr, false);
     static const json none = json::array();
@@ -311,7 +328,7 @@ Result<CameraPath> readCameraPath(const std::string& path) {
     const json& keys = j.contains("keys") && j["keys"].is_array() ? j["keys"] : none;
     if (keys.empty()) return whole.bad("keys", "holds no key");
     for (const json& k : keys) {
-        STIPPLE_ASSIGN(const CameraKey key, readKey(KeyReader(k, path, fmt::format("key {}", out.keys.size()))));
+        STIPPLE_ASSIGN(const CameraKey key, readKey(KeyReader(k, path, fmt::format("key {}", out.keys.size())), up));
         if (!out.keys.empty() && !(key.t > out.keys.back().t))
             return fail(ErrorKind::input, fmt::format("key {} is not later than the one before", out.keys.size()),
                         path);

@@ -46,7 +46,8 @@ std::array<glm::dvec3, 8> cornersOf(const glm::dvec3& boundsMin, const glm::dvec
 lod::View makeView(const Camera& camera, uint32_t width, uint32_t height, double nearPlane);
 
 /// Reads {"fps": 30, "keys": [{"t": 0, "eye": [x,y,z], "target": [...], "up": [...], "fov": 50}]}.
-Result<CameraPath> readCameraPath(const std::string& path);
+/// `up`: of keys that do not say.
+Result<CameraPath> readCameraPath(const std::string& path, const glm::dvec3& up = {0, 1, 0});
 /// An orbit around points, at one distance and height: what a headless ./run renders. Nothing of them is ever outside.
 CameraPath makeOrbit(std::span<const glm::dvec3> points, const glm::dvec3& up, double aspect, int keys,
                      double fovDegrees = 50);

@@ -20,11 +20,17 @@ namespace {
 class FileStream final : public std::streambuf {
   public:
     explicit FileStream(const InputFile& file) : file_(file), block_(size_t{1} << 20) {}
+    /// What went wrong: a stream only ends.
+    const Result<void>& result() const { return result_; }
 
   protected:
     int_type underflow() override {
         const size_t count = static_cast<size_t>(std::min<uint64_t>(block_.size(), file_.sizeBytes() - at_));
-        if (count == 0 || !file_.readAt(at_, block_.data(), count)) return traits_type::eof();
+        if (count == 0) return traits_type::eof();
+        if (const auto read = file_.readAt(at_, block_.data(), count); !read) {
+            result_ = read;
+            return traits_type::eof();
+        }
         at_ += count;
         setg(block_.data(), block_.data(), block_.data() + count);
         return traits_type::to_int_type(block_[0]);
@@ -34,6 +40,7 @@ class FileStream final : public std::streambuf {
     const InputFile& file_;
     std::vector<char> block_;
     uint64_t at_ = 0;
+    Result<void> result_;
 };
 
 /// Materials of MTL files beside the OBJ file. (The library's own reader opens whatever it is told to.)
@@ -61,11 +68,6 @@ class MaterialFiles final : public tinyobj::MaterialReader {
         return true;
     }
 
-    static std::string withSlashes(std::string name) {
-        std::replace(name.begin(), name.end(), '\\', '/');  // written on other systems
-        return name;
-    }
-
   private:
     std::string folder_;
     const ReadSettings& settings_;
@@ -76,7 +78,7 @@ class MaterialFiles final : public tinyobj::MaterialReader {
 int addImage(const std::string& folder, std::string name, const ReadSettings& settings, Scene& scene,
              std::map<std::string, int>& known) {
     if (name.empty()) return -1;
-    name = MaterialFiles::withSlashes(name);
+    name = withSlashes(name);
     if (const auto found = known.find(name); found != known.end()) return found->second;
     auto bytes = readFileOfScene(folder, name, settings);
     if (!bytes || bytes->empty()) {
@@ -132,8 +134,10 @@ Result<Parsed> parse(const std::string& path, const std::string& folder, const R
     Parsed out;
     std::string error;
     try {
-        if (tinyobj::LoadObj(&out.attributes, &out.shapes, &out.materials, &out.warning, &error, &in, &materials))
-            return out;
+        const bool isRead =
+            tinyobj::LoadObj(&out.attributes, &out.shapes, &out.materials, &out.warning, &error, &in, &materials);
+        STIPPLE_TRY(buffer.result());
+        if (isRead) return out;
     } catch (const std::bad_alloc&) {
         return fail(ErrorKind::budget, "does not fit in memory", path, "close other programs, or give PLY");
     } catch (const std::exception&) {

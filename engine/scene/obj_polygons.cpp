@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "engine/scene/polygon.h"
 
@@ -88,7 +89,9 @@ std::string SplitFaces::triangles(std::string_view line) const {
         const int64_t index = number < 0 ? count + number : number - 1;  // backwards from here, or from 1
         isSound = index >= 0 && index < count;
         if (isSound) corners.push_back(positions_[static_cast<size_t>(index)]);
-        isSound = isSound && std::isfinite(corners.back().x + corners.back().y + corners.back().z);
+        if (!isSound) continue;
+        const glm::dvec3 size = glm::abs(corners.back());
+        isSound = size.x + size.y + size.z <= std::numeric_limits<float>::max();  // (NaN is not)
     }
     std::string text;
     const auto add = [&](size_t a, size_t b, size_t c) {

@@ -24,15 +24,32 @@ const std::array<glm::dvec3, kDirections>& directions() {
     return all;
 }
 
+/// Of a mesh: the groups of the input's own triangles that reach farthest, in every few directions.
+std::vector<uint32_t> farthestGroups(const lod::Hierarchy& h) {
+    std::vector<uint32_t> leaves, farthest;
+    for (uint32_t i = 0; i < h.nodes.size(); ++i)
+        for (uint32_t r = 0; r < h.groups[i].runs; ++r)
+            if (h.runs[h.groups[i].firstRun + r].producer == lod::MeshRun::kOriginal) {
+                leaves.push_back(i);
+                break;
+            }
+    constexpr size_t kStride = kDirections / kMostChunks;
+    for (size_t k = 0; k < kDirections && !leaves.empty(); k += kStride) {
+        const auto reach = [&](uint32_t i) {
+            return glm::dot(h.nodes[i].centre, directions().at(k)) + h.nodes[i].radius;
+        };
+        farthest.push_back(*std::max_element(leaves.begin(), leaves.end(),
+                                             [&](uint32_t a, uint32_t b) { return reach(a) < reach(b); }));
+    }
+    std::sort(farthest.begin(), farthest.end());
+    farthest.erase(std::unique(farthest.begin(), farthest.end()), farthest.end());
+    return farthest;
+}
+
 /// Nodes that together show all of a store: as many as it takes for enough records, or as may be read.
 std::vector<uint32_t> coarseNodes(const lod::Hierarchy& h) {
     std::vector<uint32_t> front;
-    if (h.isMesh()) {
-        // Coarse groups come first, and finer ones reach farther out.
-        for (uint32_t i = 0; i < h.nodes.size(); ++i)
-            if (i < kMostChunks || h.groups[i].parents == 0) front.push_back(i);
-        return front;
-    }
+    if (h.isMesh()) return farthestGroups(h);
     front.push_back(0);
     for (size_t records = h.nodes[0].records; records < kEnoughRecords;) {
         std::vector<uint32_t> next;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <filesystem>
 
 #include "engine/base/file.h"
@@ -42,5 +44,28 @@ tl::unexpected<Error> overBudget(const std::string& what, uint64_t neededBytes, 
                             humanBytes(memoryBytes)),
                 where, fmt::format("give --memory {}M or more", (neededBytes >> 20) + 1));
 }
+
+std::string decodePercent(const std::string& uri) {
+    std::string out;
+    for (size_t i = 0; i < uri.size(); ++i) {
+        const auto isDigit = [&](size_t k) {
+            return k < uri.size() && std::isxdigit(static_cast<unsigned char>(uri[k])) != 0;
+        };
+        if (uri[i] == '%' && isDigit(i + 1) && isDigit(i + 2)) {
+            out += static_cast<char>(std::stoi(uri.substr(i + 1, 2), nullptr, 16));
+            i += 2;
+        } else {
+            out += uri[i];
+        }
+    }
+    return out;
+}
+
+std::string withSlashes(std::string name) {
+    std::replace(name.begin(), name.end(), '\\', '/');
+    return name;
+}
+
+std::string nameOfUri(const std::string& uri) { return withSlashes(decodePercent(uri)); }
 
 }  // namespace stipple::scene

@@ -22,6 +22,11 @@ Result<std::string> fileOfScene(const std::string& folder, const std::string& na
 Result<std::vector<uint8_t>> readFileOfScene(const std::string& folder, const std::string& name,
                                              const ReadSettings& settings);
 
+/// The name that a URI stands for: %20 and its like decoded, and, as in files written on other systems, \\ for /.
+std::string nameOfUri(const std::string& uri);
+std::string decodePercent(const std::string& uri);
+std::string withSlashes(std::string name);
+
 /// "takes about 3 GiB, but --memory allows 2 GiB" as an error of the budget.
 tl::unexpected<Error> overBudget(const std::string& what, uint64_t neededBytes, uint64_t memoryBytes,
                                  const std::string& where);

@@ -1,32 +1,20 @@
 #include "engine/scene/scene_files.h"
 
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <sstream>
 
 #include "engine/scene/gltf/container.h"
+#include "engine/scene/read_settings.h"
+#include "lod/file_kind.h"
 
 namespace stipple::scene {
 namespace fs = std::filesystem;
 
 namespace {
-
-std::string decodePercent(const std::string& uri) {
-    const auto digit = [](char c) {
-        const std::string digits = "0123456789abcdef";
-        return digits.find(static_cast<char>(std::tolower(static_cast<unsigned char>(c))));
-    };
-    std::string out;
-    for (size_t i = 0; i < uri.size(); ++i) {
-        const bool isCode = uri[i] == '%' && i + 2 < uri.size() && digit(uri[i + 1]) != std::string::npos &&
-                            digit(uri[i + 2]) != std::string::npos;
-        out += isCode ? static_cast<char>(digit(uri[i + 1]) * 16 + digit(uri[i + 2])) : uri[i];
-        if (isCode) i += 2;
-    }
-    return out;
-}
 
 /// Every "uri" of the file, wherever it stands, but for those of placed stores.
 void collectUris(const nlohmann::json& value, std::vector<std::string>& uris) {
@@ -36,7 +24,7 @@ void collectUris(const nlohmann::json& value, std::vector<std::string>& uris) {
     for (const auto& [key, item] : value.items()) {
         if (key == "STIPPLE_store") continue;
         if (key == "uri" && item.is_string() && item.get_ref<const std::string&>().rfind("data:", 0) != 0)
-            uris.push_back(decodePercent(item.get<std::string>()));
+            uris.push_back(nameOfUri(item.get<std::string>()));
         collectUris(item, uris);
     }
 }
@@ -66,18 +54,14 @@ std::vector<std::string> filesOfObj(const fs::path& path) {
             if (name != rest) materials.push_back(name);
     });
     for (const std::string& name : materials) {
-        const fs::path library = folder / name;
+        const fs::path library = folder / withSlashes(name);
         if (std::find(files.begin(), files.end(), library.string()) != files.end()) continue;
         files.push_back(library.string());
         eachLine(library, [&](const std::string& word, const std::string& rest) {
             if (word.rfind("map_", 0) != 0 && word != "bump" && word != "norm" && word != "disp" && word != "refl")
                 return;
             std::string texture = rest.substr(rest.find_last_of(" \t") + 1);  // after its options
-            for (const std::string& n : {rest, texture}) {
-                std::string slashed = n;
-                std::replace(slashed.begin(), slashed.end(), '\\', '/');
-                files.push_back((folder / slashed).string());
-            }
+            for (const std::string& n : {rest, texture}) files.push_back((folder / withSlashes(n)).string());
         });
     }
     return files;
@@ -88,9 +72,10 @@ std::vector<std::string> filesOfObj(const fs::path& path) {
 std::vector<std::string> filesOf(const std::string& path) {
     std::vector<std::string> files;
     const std::string extension = fs::path(path).extension().string();
-    if (extension == ".obj") {
+    const lod::FileKind kind = lod::fileKindOf(path);
+    if (kind == lod::FileKind::other && extension == ".obj") {
         files = filesOfObj(path);
-    } else if (extension == ".gltf" || extension == ".glb") {
+    } else if (kind == lod::FileKind::glb || extension == ".gltf") {
         const auto container = gltf::readContainer(path);
         if (!container) return {};
         std::vector<std::string> uris;

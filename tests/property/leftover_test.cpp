@@ -94,7 +94,7 @@ TEST_F(Leftover, OfAnotherBuildItIsRefusedOrReplaced) {
 
 TEST_F(Leftover, ItIsPartOfTheSpaceThatIsNeeded) {
     interrupt(1);
-    constexpr uint64_t kOwn = uint64_t{1} << 30;  // reserved, not written
+    constexpr uint64_t kOwn = uint64_t{64} << 20;  // reserved, not written
     const int file = ::open((work_ + "/in-1").c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
     const bool isReserved = ::fallocate(file, 0, 0, kOwn) == 0;
     ::close(file);
@@ -102,11 +102,13 @@ TEST_F(Leftover, ItIsPartOfTheSpaceThatIsNeeded) {
     auto journal = open(1);
     ASSERT_TRUE(journal);
     Progress silent(false);
-    struct statvfs disk {};
-    ASSERT_EQ(::statvfs(work_.c_str(), &disk), 0);
-    const uint64_t room = uint64_t{disk.f_bavail} * disk.f_frsize;
-    EXPECT_TRUE(journal->announce(room + kOwn / 2, silent)) << "half of what is there already";
-    const auto tooMuch = journal->announce(room + 3 * kOwn, silent);
+    const auto room = [&] {  // asked for anew each time: others use the disk as well
+        struct statvfs disk {};
+        EXPECT_EQ(::statvfs(work_.c_str(), &disk), 0);
+        return uint64_t{disk.f_bavail} * disk.f_frsize;
+    };
+    EXPECT_TRUE(journal->announce(room() + kOwn / 2, silent)) << "half of what is there already";
+    const auto tooMuch = journal->announce(room() + 3 * kOwn, silent);
     ASSERT_FALSE(tooMuch);
     EXPECT_EQ(tooMuch.error().kind, ErrorKind::budget);
 }

@@ -15,8 +15,12 @@
 #include <sstream>
 #include <thread>
 
+#include "tests/support/runs.h"
+
 namespace stipple::test {
 namespace {
+
+constexpr std::chrono::duration<double> kPatience{120 * kSlower};
 
 int codeOf(int status) { return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status); }
 
@@ -71,8 +75,9 @@ bool RunningProgram::hasEnded() {
 }
 
 bool RunningProgram::await(const std::function<bool()>& condition) {
+    const auto start = std::chrono::steady_clock::now();
     while (!condition()) {
-        if (hasEnded()) return false;
+        if (hasEnded() || std::chrono::steady_clock::now() - start > kPatience) return false;
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     return true;
@@ -91,13 +96,25 @@ double RunningProgram::processorSeconds() const {
     return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
 }
 
+bool RunningProgram::catches(int signal) const {
+    std::istringstream status(slurp("/proc/" + std::to_string(child_) + "/status"));
+    for (std::string line; std::getline(status, line);)
+        if (line.rfind("SigCgt:", 0) == 0) return (std::stoull(line.substr(7), nullptr, 16) >> (signal - 1) & 1) != 0;
+    return false;
+}
+
 void RunningProgram::signal(int number) {
     if (!hasEnded()) ::kill(child_, number);
 }
 
 Outcome RunningProgram::end() {
-    if (!ended_) ::waitpid(child_, &status_, 0);
-    ended_ = true;
+    await([] { return false; });
+    if (!hasEnded()) {
+        ADD_FAILURE() << "it does not end";
+        ::kill(child_, SIGKILL);
+        ::waitpid(child_, &status_, 0);
+        ended_ = true;
+    }
     return {codeOf(status_), slurp(out_), slurp(err_)};
 }
 

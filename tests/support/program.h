@@ -29,12 +29,14 @@ class RunningProgram {
     ~RunningProgram();
     RunningProgram(const RunningProgram&) = delete;
     RunningProgram& operator=(const RunningProgram&) = delete;
-    /// Until `condition` holds or the program has ended; true if it holds.
+    /// Until `condition` holds, the program has ended, or two minutes are over; true if it holds.
     bool await(const std::function<bool()>& condition);
     /// Seconds of processor time that it took so far.
     double processorSeconds() const;
+    /// What it does at that signal is its own: the signal no longer ends it.
+    bool catches(int signal) const;
     void signal(int number);
-    /// Waits for its end.
+    /// Waits for its end, and kills it where that takes more than two minutes.
     Outcome end();
 
   private:

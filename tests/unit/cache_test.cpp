@@ -16,6 +16,7 @@
 #include <thread>
 
 #include "engine/base/lock_file.h"
+#include "tests/support/program.h"
 #include "tests/support/support.h"
 
 namespace stipple {
@@ -155,6 +156,74 @@ TEST(Cache, ADamagedStoreIsBuiltAgain) {
     older[8] = static_cast<char>(older[8] - 1);
     expectRebuilt(older, "of another version, or not the format");
     EXPECT_FALSE(place.builds("a.las"));
+}
+
+/// Builds through temporary files until its first part is done, and is killed there. Then every temporary file changes.
+void leaveDamaged(const test::TempFolder& folder, const std::vector<std::string>& arguments, const std::string& temp) {
+    std::string partial;
+    const std::string cache = folder / ".cache/stipple";
+    test::RunningProgram killed(folder, arguments);
+    ASSERT_TRUE(killed.await([&] {
+        std::error_code error;
+        for (const auto& entry : fs::directory_iterator(cache, error))
+            if (entry.path().extension() == ".partial") partial = entry.path();
+        return !partial.empty();
+    }));
+    killed.signal(SIGKILL);
+    EXPECT_EQ(killed.end().code, 128 + SIGKILL);
+    const fs::path store = fs::path(partial).replace_extension();
+    size_t changed = 0;
+    for (const auto& entry : fs::directory_iterator(temp + "/" + store.filename().string() + ".build")) {
+        if (entry.path().filename() == "journal" || entry.file_size() < 16) continue;
+        std::string bytes = test::slurp(entry.path());
+        bytes[10] = static_cast<char>(bytes[10] ^ 1);
+        test::spit(entry.path(), bytes);
+        ++changed;
+    }
+    ASSERT_GT(changed, 0u);
+}
+
+TEST(Cache, WhatAnInterruptedBuildLeftDamagedIsBuiltAgain) {
+    const test::TempFolder folder;
+    fs::create_directory(folder / "tmp");
+    ASSERT_EQ(test::runProgram(folder, "grow scan -o a.las --points 900000").code, 0);
+    for (const bool isElsewhere : {false, true}) {
+        std::string line;
+        std::vector<std::string> arguments{"render",   "a.las", "-o",       "o.png", "--size",    "64x48",
+                                           "--device", "cpu",   "--memory", "150M",  "--threads", "2"};
+        if (isElsewhere) arguments.insert(arguments.end(), {"--temp", folder / "tmp"});
+        for (const std::string& argument : arguments) line += argument + " ";
+        leaveDamaged(folder, arguments, folder / (isElsewhere ? "tmp" : ".cache/stipple"));
+        if (HasFatalFailure()) return;
+        const test::Outcome again = test::runProgram(folder, line);
+        EXPECT_EQ(again.code, 0) << again.err;
+        EXPECT_NE(again.err.find("what an interrupted build left cannot be used"), std::string::npos) << again.err;
+        EXPECT_EQ(again.err.find("--restart"), std::string::npos) << again.err;
+        size_t left = 0;
+        for (const auto& entry : fs::recursive_directory_iterator(folder / ".cache/stipple"))
+            left += entry.path().filename().string().find(".stipple.") != std::string::npos ? 1 : 0;
+        EXPECT_EQ(left, 0u);
+        EXPECT_TRUE(fs::is_empty(folder / "tmp"));
+        EXPECT_EQ(test::runProgram(folder, "cache clean").code, 0);
+    }
+}
+
+TEST(Cache, ALeftoverThatIsNoBuildIsReplacedToo) {
+    const test::TempFolder folder;
+    ASSERT_EQ(test::runProgram(folder, "grow scan -o a.las --points 900000").code, 0);
+    const std::string line = "render a.las -o o.png --size 64x48 --device cpu --memory 150M --threads 2";
+    ASSERT_EQ(test::runProgram(folder, line).code, 0);
+    for (const auto& entry : fs::directory_iterator(folder / ".cache/stipple")) {
+        if (entry.path().extension() != ".stipple") continue;
+        const std::string work = entry.path().string() + ".build";
+        fs::remove(entry.path());
+        fs::create_directory(work);
+        test::spit(work + "/journal", std::string(4096, '\0'));  // as a crash of the machine may leave it
+        break;
+    }
+    const test::Outcome again = test::runProgram(folder, line);
+    EXPECT_EQ(again.code, 0) << again.err;
+    EXPECT_NE(again.err.find("what an interrupted build left cannot be used"), std::string::npos) << again.err;
 }
 
 TEST(Cache, OneOfTwoProcessesWaitsForTheOther) {

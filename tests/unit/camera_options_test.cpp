@@ -1,7 +1,7 @@
 // What a command is told of the camera is done in full or refused by name: nothing of it is lost without a word.
 #include <gtest/gtest.h>
 
-#include "tests/support/runs.h"
+#include "tests/support/program.h"
 #include "tests/support/support.h"
 
 namespace stipple {
@@ -10,10 +10,9 @@ namespace {
 class CameraOptionsTest : public testing::Test {
   protected:
     int run(const std::string& arguments) {
-        const int code = test::shell("cd " + folder_.path() + "; export XDG_CACHE_HOME=" + folder_.path() + "/cache",
-                                     arguments, folder_.path());
-        said_ = test::slurp(folder_ / "err");
-        return code;
+        const test::Outcome r = test::runProgram(folder_, arguments);
+        said_ = r.err;
+        return r.code;
     }
     /// A picture of a small scan.
     int render(const std::string& options) { return run("render a.stipple -o a.png --quiet --size 48x32 " + options); }

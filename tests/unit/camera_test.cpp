@@ -30,6 +30,8 @@ TEST(CameraPath, GoesThroughItsKeysAndRefusesNonsense) {
     EXPECT_EQ(path->at(1).eye, glm::dvec3(2, 0, 0));
     EXPECT_EQ(path->at(9).eye, glm::dvec3(2, 5, 0));
     EXPECT_EQ(path->at(3).fovDegrees, 30);
+    EXPECT_EQ(path->at(1).up, glm::dvec3(0, 1, 0));
+    EXPECT_EQ(readCameraPath(folder / "p.json", {0, 0, 1})->at(1).up, glm::dvec3(0, 0, 1));
     for (const char* bad :
          {"", "{}", R"({"keys": []})", R"({"keys": [{"t": 0}]})",
           R"({"fps": 0, "keys": [{"t": 0, "eye": [0,0,0], "target": [1,0,0]}]})",

@@ -56,6 +56,16 @@ class Complete : public testing::Test {
     const std::string size_ = " --size 200x120 --device cpu --error 0.3 ";
 };
 
+TEST_F(Complete, ABudgetBelowTheCoarsestLevelHasNoErrorToState) {
+    EXPECT_EQ(run("a.stipple -o p.png --json --budget-points 100" + size_), 6) << err_;
+    expectOneErrorLine("--budget-points");
+    EXPECT_TRUE(hasPicture());
+    const auto j = nlohmann::json::parse(out_);
+    EXPECT_FALSE(j["complete"].get<bool>());
+    EXPECT_EQ(j["tau_eff_px"], "inf");
+    EXPECT_EQ(run("a.stipple -o p.png --budget-points 20k" + size_), 0) << err_;
+}
+
 TEST_F(Complete, CorruptChunksAreAnErrorUnlessPermitted) {
     EXPECT_EQ(run("a.stipple -o p.png --quiet" + size_), 0) << err_;
     EXPECT_EQ(err_, "");

@@ -16,6 +16,7 @@ namespace {
 
 class Exhaustion : public testing::Test {
   protected:
+    static constexpr int kMost = 4'000'000;  ///< kilobytes of address space, more than any of this takes
     void SetUp() override {
         if (test::isSanitized) GTEST_SKIP() << "address spaces of sanitizers have no limits";
     }
@@ -31,13 +32,17 @@ class Exhaustion : public testing::Test {
     /// Kilobytes of address space with which the program starts at all.
     int fewest() const {
         int limit = 16'000;
-        while (run(limit, "--help") != 0) limit += 2000;
+        for (; run(limit, "--help") != 0; limit += 2000)
+            if (limit >= kMost) {
+                ADD_FAILURE() << "it starts with none: " << test::slurp(folder_ / "err");
+                break;
+            }
         return limit;
     }
     void sweep(const std::string& arguments) const {
         ASSERT_EQ(run(0, arguments), 0) << test::slurp(folder_ / "err");
         int exhausted = 0, fine = 0;
-        for (int limit = fewest(); fine < 2 && limit < 4'000'000; limit += std::max(3000, limit / 14)) {
+        for (int limit = fewest(); fine < 2 && limit < kMost; limit += std::max(3000, limit / 14)) {
             const int code = run(limit, arguments);
             const std::string said = test::slurp(folder_ / "err");
             // The C library's own end, where the few bytes that a thread's first variable takes are missing.

@@ -34,7 +34,7 @@ constexpr std::array<std::array<const char*, 2>, 8> kSubstitutions{{
     {"--trees 100k", "--trees 40 --leaves 1k --variants 1"},
     {"--points 10M", "--points 20k"},
     {"--size 1920x1080", "--size 480x270"},
-    {"stipple view scan.stipple", "xvfb-run -a stipple view scan.stipple --frames 3"},
+    {"stipple view scan.stipple", "xvfb-run -n 300 -a stipple view scan.stipple --frames 3"},
 }};
 
 std::vector<std::string> examples() {

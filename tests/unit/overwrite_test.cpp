@@ -65,6 +65,26 @@ TEST(Overwrite, NoInputWhateverItsNameIs) {
     EXPECT_EQ(runProgram(folder, "build tiles -o tiles/town.stipple --quiet").code, 0);
 }
 
+TEST(Overwrite, NoTextureByAnOrbitOfOnePicture) {
+    const test::TempFolder folder;
+    growScan(folder, "a.las");
+    ASSERT_EQ(runProgram(folder, "render a.las -o colour.png --size 32x32 --quiet").code, 0);
+    const std::string picture = slurp(folder / "colour.png");
+    spit(folder / "sub.mtl", "newmtl m\nmap_Kd tex\\colour.png\n");
+    fs::create_directory(folder / "tex");
+    fs::rename(folder / "colour.png", folder / "tex/colour.png");
+    spit(folder / "a.obj", "mtllib .\\sub.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n");
+    expectOneLine(runProgram(folder, "render a.obj --orbit 1 -o tex/colour.png --size 32x32 --quiet"), 4, {kIsInput});
+    EXPECT_TRUE(slurp(folder / "tex/colour.png") == picture);
+    spit(folder / "note.png", "not a picture");
+    expectOneLine(runProgram(folder, "render a.las --orbit 1 -o note.png --size 32x32 --quiet"), 4, {"is no picture"});
+    // Two outputs of one command are two files.
+    writePlant(folder / "plant.glb");
+    spit(folder / "b.rest.glb", "");
+    fs::create_symlink("b.rest.glb", folder / "b.stipple");
+    expectOneLine(runProgram(folder, "convert plant.glb --strands -o b.stipple --force"), 4, {"another output"});
+}
+
 TEST(Overwrite, NoPictureThatIsCompared) {
     const test::TempFolder folder;
     growScan(folder, "a.las");

@@ -11,7 +11,7 @@
 
 #include "engine/image/coverage.h"
 #include "engine/image/image_io.h"
-#include "tests/support/runs.h"
+#include "tests/support/program.h"
 #include "tests/support/support.h"
 
 namespace stipple {
@@ -20,14 +20,14 @@ namespace {
 class Picture : public testing::Test {
   protected:
     int run(const std::string& arguments) {
-        const int code = test::shell("cd " + folder_.path() + "; export XDG_CACHE_HOME=" + folder_.path() + "/cache",
-                                     arguments, folder_.path());
-        said_ = test::slurp(folder_ / "err");
-        return code;
+        const test::Outcome r = test::runProgram(folder_, arguments);
+        printed_ = r.out;
+        said_ = r.err;
+        return r.code;
     }
     nlohmann::json json(const std::string& arguments) {
         EXPECT_EQ(run(arguments), 0) << said_;
-        return nlohmann::json::parse(test::slurp(folder_ / "out"), nullptr, false);
+        return nlohmann::json::parse(printed_, nullptr, false);
     }
     /// Pixels, r g b a.
     std::vector<std::array<uint32_t, 4>> render(const std::string& input, const std::string& options = "") {
@@ -61,7 +61,7 @@ class Picture : public testing::Test {
         test::spit(folder_ / name, out.str());
     }
     test::TempFolder folder_;
-    std::string said_;
+    std::string printed_, said_;
 };
 
 TEST_F(Picture, IsOpaqueAndShowsItsBackground) {
@@ -166,7 +166,7 @@ TEST_F(Picture, InfoNamesTheFacesOfAPly) {
     writeWedge("a.ply", 0);
     EXPECT_EQ(json("info a.ply --json")["faces"], 2);
     ASSERT_EQ(run("info a.ply"), 0);
-    EXPECT_NE(test::slurp(folder_ / "out").find("faces"), std::string::npos);
+    EXPECT_NE(printed_.find("faces"), std::string::npos);
     test::spit(folder_ / "s.ply",
                "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
                "element tristrips 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n"

@@ -183,10 +183,15 @@ TEST(Words, PipedProgressIsSilentUnlessJsonIsAskedFor) {
     ASSERT_EQ(runProgram(folder, "grow scan -o a.las --points 20k").code, 0);
     EXPECT_EQ(runProgram(folder, "build a.las -o a.stipple --json").err, "") << "--json is about the result";
     EXPECT_EQ(runProgram(folder, "build a.las -o b.stipple").err, "");
-    const Outcome onDisk = runProgram(folder, "build a.las -o c.stipple --memory 99M --progress json --json");
+    ASSERT_EQ(runProgram(folder, "grow scan -o large.las --points 1M").code, 0);
+    const Outcome onDisk =
+        runProgram(folder, "build large.las -o c.stipple --memory 135M --threads 2 --progress json --json");
+    EXPECT_EQ(onDisk.code, 0) << onDisk.err;
     std::istringstream lines(onDisk.err);
-    for (std::string line; std::getline(lines, line);)
+    int found = 0;
+    for (std::string line; std::getline(lines, line); ++found)
         EXPECT_EQ(nlohmann::json::parse(line, nullptr, false).value("schema", ""), "stipple.progress/1") << line;
+    EXPECT_GT(found, 0) << "the note on temporary files at least";
     const Outcome cached = runProgram(folder, "render a.las -o a.png --size 64x48");
     EXPECT_EQ(cached.code, 0);
     EXPECT_EQ(cached.err.find('{'), std::string::npos) << cached.err;

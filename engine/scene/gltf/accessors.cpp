@@ -36,22 +36,6 @@ bool decodeBase64(std::string_view text, std::vector<uint8_t>& out) {
     return true;
 }
 
-std::string decodePercent(const std::string& uri) {
-    std::string out;
-    for (size_t i = 0; i < uri.size(); ++i) {
-        const auto isDigit = [&](size_t k) {
-            return k < uri.size() && std::isxdigit(static_cast<unsigned char>(uri[k])) != 0;
-        };
-        if (uri[i] == '%' && isDigit(i + 1) && isDigit(i + 2)) {
-            out += static_cast<char>(std::stoi(uri.substr(i + 1, 2), nullptr, 16));
-            i += 2;
-        } else {
-            out += uri[i];
-        }
-    }
-    return out;
-}
-
 /// The bytes behind a URI: data, or a file beside the glTF file.
 Result<std::vector<uint8_t>> fetch(const Container& c, const std::string& uri, const std::string& where,
                                    const ReadSettings& settings) {
@@ -70,9 +54,7 @@ Result<std::vector<uint8_t>> fetch(const Container& c, const std::string& uri, c
     if (uri.find("://") != std::string::npos)
         return fail(ErrorKind::input, fmt::format("lies at {}, and only local files are read", uri), where,
                     "download it first");
-    std::string name = decodePercent(uri);
-    std::replace(name.begin(), name.end(), '\\', '/');  // written on other systems
-    return readFileOfScene(c.folder, name, settings);
+    return readFileOfScene(c.folder, nameOfUri(uri), settings);
 }
 
 double component(const uint8_t* at, int type, bool normalised) {

@@ -68,6 +68,14 @@ bool isOfABuild(const std::string& path) {
     return (isHeadless && begin == 0) || fileKindOf(path) == FileKind::store;
 }
 
+/// Is that open file (-1: none) still the one of that name?
+bool isNamed(int descriptor, const std::string& path) {
+    struct stat own {};
+    struct stat named {};
+    return descriptor >= 0 && ::fstat(descriptor, &own) == 0 && own.st_nlink > 0 &&
+           ::lstat(path.c_str(), &named) == 0 && own.st_dev == named.st_dev && own.st_ino == named.st_ino;
+}
+
 }  // namespace
 
 Journal::Journal(Journal&& other) noexcept
@@ -99,27 +107,34 @@ bool Journal::isThere(const std::string& folder, uint64_t identity) {
            head[1] == identity;
 }
 
-Result<void> Journal::take() {
+Result<void> Journal::openFile() {
+    if (lock_ >= 0) ::close(std::exchange(lock_, -1));
     std::error_code error;
     fs::create_directories(folder_, error);
     const std::string path = folder_ + "/journal";
     const int flags = O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
     // (Somebody's own folder may have that name.)
     const bool isNew = !error && !fs::exists(path, error);
-    if (isNew && holdsMore(folder_)) return tl::unexpected(foreign());
+    if (isNew && holdsMore(folder_) && !fs::exists(path, error)) return tl::unexpected(foreign());
     lock_ = error ? -1 : ::open(path.c_str(), flags, 0666);
+    if (!error && lock_ < 0 && errno == ENOENT) return {};  // another build ends, and its folder went just now
     if (lock_ < 0)
         return fail(ErrorKind::output,
                     fmt::format("cannot be written: {}", error ? error.message() : std::strerror(errno)), folder_,
                     "name a folder for temporary files with --temp");
     struct stat info {};
     if (::fstat(lock_, &info) != 0 || !S_ISREG(info.st_mode)) return tl::unexpected(foreign());
-    bool isOurs = false;  // a build that was just killed may take a moment to be gone
-    for (int attempt = 0; attempt < 30 && !isOurs; ++attempt) {
+    return {};
+}
+
+Result<void> Journal::take() {
+    const std::string path = folder_ + "/journal";
+    for (int attempt = 0; attempt < 30; ++attempt) {  // a build that was just killed may take a moment to be gone
         if (attempt > 0) std::this_thread::sleep_for(std::chrono::milliseconds(100));
-        isOurs = ::flock(lock_, LOCK_EX | LOCK_NB) == 0;
+        // A build that ends removes its folder, also while others wait for it.
+        if (!isNamed(lock_, path)) STIPPLE_TRY(openFile());
+        if (lock_ >= 0 && ::flock(lock_, LOCK_EX | LOCK_NB) == 0 && isNamed(lock_, path)) return {};
     }
-    if (isOurs) return {};
     return fail(ErrorKind::output, "is in use by another build", folder_, "wait for it, or build to another file");
 }
 
@@ -217,7 +232,8 @@ Result<void> Journal::announce(uint64_t bytes, Progress& progress) const {
 void Journal::remove() {
     clear(folder_);  // the journal last: without it what is left would be nobody's
     std::error_code error;
-    fs::remove_all(folder_, error);
+    fs::remove(folder_ + "/journal", error);
+    fs::remove(folder_, error);  // not what a build that waited has begun there since
 }
 
 }  // namespace stipple::lod

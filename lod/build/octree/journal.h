@@ -49,6 +49,7 @@ class Journal {
 
   private:
     Journal() = default;
+    Result<void> openFile();  ///< lock_ stays -1 if it has to be tried again
     Result<void> take();
     Result<void> readEntries(const InputFile& file);
     Error foreign() const;

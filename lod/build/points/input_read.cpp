@@ -82,7 +82,8 @@ Result<void> PointInput::readPart(const Part& part, PointBlock& block, Points& o
                     return changed();
         at += count;
         for (size_t i = 0; isWatched && i < count; ++i)
-            if (const glm::dvec3 p = commonOf(part.source, block, i); outliers_.isFar(p)) outliers_.gather(p, *far);
+            if (const glm::dvec3 p = commonOf(part.source, block, i); isFinite(p) && outliers_.isFar(p))
+                outliers_.gather(p, *far);
         if (part.far > 0 && leavesOut()) {
             const size_t left = leaveOut(part, block, count, farPoints);
             usable += count - left;

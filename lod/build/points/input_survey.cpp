@@ -275,12 +275,14 @@ Result<void> PointInput::placeIntegers(BuildReport& report) {
     origin = lattice.base + lattice.unit * lo;
     for (int a = 0; a < 3; ++a)
         greatest.at(static_cast<size_t>(a)) = static_cast<uint32_t>(std::max(std::round(extents[a] / step_), 0.0));
-    for (size_t s = 0; s < sources_.size(); ++s)
-        if (!lattice.of[s].exact)
-            report.notes.push_back(
-                fmt::format("{}: scale and offset do not fit a common lattice; coordinates are "
-                            "rounded to {} units",
-                            sources_[s].info.path, lattice.unit));
+    const auto isOff = [](const auto& of) { return !of.exact; };
+    const auto first = std::find_if(lattice.of.begin(), lattice.of.end(), isOff);
+    if (first == lattice.of.end()) return {};
+    const auto more = std::count_if(first + 1, lattice.of.end(), isOff);
+    report.notes.push_back(
+        fmt::format("{}{}: scale and offset do not fit a common lattice; coordinates are rounded to {} units",
+                    sources_[static_cast<size_t>(first - lattice.of.begin())].info.path,
+                    more > 0 ? fmt::format(" and {} more files", more) : "", lattice.unit));
     return {};
 }
 

@@ -120,7 +120,10 @@ Result<PlyHeader> parsePlyHeader(const InputFile& file) {
             property.slot = static_cast<int>(property.role);
             header.elements.back().properties.push_back(std::move(property));
         } else if (key != "comment" && key != "obj_info" && !key.empty()) {
-            return bad(fmt::format("unknown keyword '{}'", key), line);
+            // Real scanners write more than the format knows; only what lies between an element and its properties
+            // could mean them.
+            if (!header.elements.empty()) return bad(fmt::format("unknown keyword '{}'", key), line);
+            ++header.unknownLines;
         }
     }
     if (!hasFormat) return bad("the header has no format line", 2);

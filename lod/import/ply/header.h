@@ -43,6 +43,7 @@ struct PlyHeader {
     PlyEncoding encoding = PlyEncoding::ascii;
     std::vector<PlyElement> elements;
     uint64_t bytes = 0;
+    uint32_t unknownLines = 0;  ///< before the first element; passed over
 };
 
 Result<PlyHeader> parsePlyHeader(const InputFile& file);

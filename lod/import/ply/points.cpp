@@ -30,6 +30,9 @@ Result<PointSource> openPly(const std::string& path, const ReadOptions& options)
         if (p.role != PlyRole::none) roles |= 1u << static_cast<unsigned>(p.role);
         if (p.isList) info.notes.push_back(fmt::format("list property '{}' of the vertices is skipped", p.name));
     }
+    if (header.unknownLines > 0)
+        info.notes.push_back(
+            fmt::format("header lines with unknown keywords are passed over: {}", header.unknownLines));
     if ((roles & 7u) != 7u) return fail(ErrorKind::input, "the vertices have no x, y and z", path);
     // The smallest that the declared rows can be: a promise of more is a lie, found before anything is allocated.
     const uint64_t body = file->sizeBytes() - header.bytes;
