@@ -198,7 +198,9 @@ Result<void> run(const Options& o, Written& written) {
                                   : c.recordsDrawn == 0
                                       ? fmt::format("{} triangles", c.trianglesDrawn)
                                       : fmt::format("{} records, {} triangles", c.recordsDrawn, c.trianglesDrawn);
-        fmt::print("{}: {}, {:.2f} px error, {:.1f} ms a frame on {}\n", o.output, drawn, verdict.tauEffectivePixels,
+        const double error = verdict.tauEffectivePixels;
+        fmt::print("{}: {}, {}, {:.1f} ms a frame on {}\n", o.output, drawn,
+                   std::isfinite(error) ? fmt::format("{:.2f} px error", error) : "no stated error",
                    quantile(timings.frames, 0.5), backend->device());
     }
     return checkVerdict(plan, verdict);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "engine/scene/camera.h"
 
@@ -24,32 +25,9 @@ const std::array<glm::dvec3, kDirections>& directions() {
     return all;
 }
 
-/// Of a mesh: the groups of the input's own triangles that reach farthest, in every few directions.
-std::vector<uint32_t> farthestGroups(const lod::Hierarchy& h) {
-    std::vector<uint32_t> leaves, farthest;
-    for (uint32_t i = 0; i < h.nodes.size(); ++i)
-        for (uint32_t r = 0; r < h.groups[i].runs; ++r)
-            if (h.runs[h.groups[i].firstRun + r].producer == lod::MeshRun::kOriginal) {
-                leaves.push_back(i);
-                break;
-            }
-    constexpr size_t kStride = kDirections / kMostChunks;
-    for (size_t k = 0; k < kDirections && !leaves.empty(); k += kStride) {
-        const auto reach = [&](uint32_t i) {
-            return glm::dot(h.nodes[i].centre, directions().at(k)) + h.nodes[i].radius;
-        };
-        farthest.push_back(*std::max_element(leaves.begin(), leaves.end(),
-                                             [&](uint32_t a, uint32_t b) { return reach(a) < reach(b); }));
-    }
-    std::sort(farthest.begin(), farthest.end());
-    farthest.erase(std::unique(farthest.begin(), farthest.end()), farthest.end());
-    return farthest;
-}
-
 /// Nodes that together show all of a store: as many as it takes for enough records, or as may be read.
 std::vector<uint32_t> coarseNodes(const lod::Hierarchy& h) {
     std::vector<uint32_t> front;
-    if (h.isMesh()) return farthestGroups(h);
     front.push_back(0);
     for (size_t records = h.nodes[0].records; records < kEnoughRecords;) {
         std::vector<uint32_t> next;
@@ -82,6 +60,45 @@ void addPositions(const lod::Hierarchy& h, const lod::Node& node, const lod::Chu
     for (const shared::MeshVertex& v : chunk.vertices) to.push_back(h.origin + h.unit * glm::dvec3(v.x, v.y, v.z));
 }
 
+/// Of a mesh: the vertices of those groups of the input's own triangles that reach farthest, in every few directions.
+/// (Coarse groups would do for less, but finer ones reach farther out.) Empty where too many must be read.
+std::vector<glm::dvec3> outlineOfMesh(const lod::Store& store) {
+    constexpr size_t kMostGroups = 256, kStride = 4;
+    const lod::Hierarchy& h = store.hierarchy;
+    std::vector<uint32_t> leaves;
+    for (uint32_t i = 0; i < h.nodes.size(); ++i) {
+        const auto* const runs = &h.runs[h.groups[i].firstRun];
+        if (std::any_of(runs, runs + h.groups[i].runs,
+                        [](const lod::MeshRun& r) { return r.producer == lod::MeshRun::kOriginal; }))
+            leaves.push_back(i);
+    }
+    std::vector<glm::dvec3> all;
+    std::map<uint32_t, std::pair<size_t, size_t>> known;  // group -> its part of `all`
+    for (size_t k = 0; k < kDirections; k += kStride) {
+        const glm::dvec3& d = directions().at(k);
+        std::vector<std::pair<double, uint32_t>> reach;  // no vertex of a group lies farther
+        for (const uint32_t i : leaves)
+            reach.emplace_back(glm::dot(h.origin + h.unit * h.nodes[i].centre, d) + h.unit * h.nodes[i].radius, i);
+        std::make_heap(reach.begin(), reach.end());
+        double farthest = -1e300;
+        while (!reach.empty() && reach.front().first > farthest) {
+            const uint32_t i = reach.front().second;
+            std::pop_heap(reach.begin(), reach.end());
+            reach.pop_back();
+            if (known.count(i) == 0) {
+                const auto chunk = known.size() < kMostGroups ? lod::readChunk(store, i) : Result<lod::Chunk>();
+                if (!chunk || chunk->vertices.empty()) return {};
+                const size_t first = all.size();
+                addPositions(h, h.nodes[i], *chunk, all);
+                known[i] = {first, all.size()};
+            }
+            for (size_t v = known[i].first; v < known[i].second; ++v)
+                farthest = std::max(farthest, glm::dot(all[v], d));
+        }
+    }
+    return all;
+}
+
 }  // namespace
 
 std::vector<glm::dvec3> outermost(std::span<const glm::dvec3> points) {
@@ -109,13 +126,15 @@ std::vector<glm::dvec3> outlineOf(const lod::Store& store) {
     const lod::StoreDescription& d = store.description;
     const auto corners = cornersOf(d.focusMin, d.focusMax);
     const std::vector<glm::dvec3> box(corners.begin(), corners.end());
-    const std::vector<uint32_t> front = coarseNodes(h);
-    if (front.empty() || front.size() > kMostChunks) return box;
     std::vector<glm::dvec3> all;
-    for (const uint32_t n : front) {
-        const auto chunk = lod::readChunk(store, n);
-        if (!chunk) return box;  // whoever draws it says why
-        addPositions(h, h.nodes[n], *chunk, all);
+    if (h.isMesh()) {
+        all = outlineOfMesh(store);
+    } else {
+        for (const uint32_t n : coarseNodes(h)) {
+            const auto chunk = lod::readChunk(store, n);
+            if (!chunk) return box;  // whoever draws it says why
+            addPositions(h, h.nodes[n], *chunk, all);
+        }
     }
     const glm::dvec3 slack = 1e-6 * (d.focusMax - d.focusMin) + glm::dvec3(h.unit);
     std::erase_if(all, [&](const glm::dvec3& p) {
