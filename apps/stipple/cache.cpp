@@ -133,7 +133,11 @@ class Lookup {
         }
         CacheRecord record{absolute(), part_, {}, std::chrono::system_clock::now()};
         cache_.writeRecord(key_, record);
-        STIPPLE_ASSIGN(const lod::BuildReport built, made(make));
+        const Result<lod::BuildReport> result = made(make);
+        std::error_code error;
+        if (!result && !fs::exists(workFolder(), error) && !fs::exists(partialPath(), error))
+            cache_.removeRecord(key_);  // it was refused: there is nothing to go on with
+        STIPPLE_ASSIGN(const lod::BuildReport built, result);
         for (const std::string& note : built.notes)
             if (std::find(notes_.begin(), notes_.end(), note) == notes_.end()) record.notes.push_back(note);
         for (const auto& [reason, count] : built.dropped)

@@ -159,6 +159,11 @@ void CacheFolder::touch(const std::string& key) const {
         if (::utimensat(AT_FDCWD, (path_ + "/" + key + suffix).c_str(), nullptr, 0) == 0) return;
 }
 
+void CacheFolder::removeRecord(const std::string& key) const {
+    std::error_code error;
+    fs::remove(path_ + "/" + key + ".json", error);
+}
+
 void CacheFolder::removeStore(const std::string& key) const {
     std::error_code error;
     fs::remove(storePath(key), error);

@@ -48,6 +48,7 @@ class CacheFolder {
     void touch(const std::string& key) const;
     /// The store itself; whoever has it open keeps what was open.
     void removeStore(const std::string& key) const;
+    void removeRecord(const std::string& key) const;
     /// What interrupted builds of the store left, if it is not a build that runs. False if anything stays.
     bool removeLeftovers(const std::string& key) const;
 

@@ -291,6 +291,10 @@ void setupRender(CLI::App& app, int& status) {
         ->check(bytes())
         ->type_name("SIZE")
         ->capture_default_str();
+    group
+        ->add_option("--temp", o->build.temp,
+                     "folder for temporary files of a build that does not fit in memory (default: the cache)")
+        ->type_name("FOLDER");
     group->add_option("--attributes", o->build.attributes, "attributes that must be there; all are kept")
         ->type_name("NAMES")
         ->capture_default_str();

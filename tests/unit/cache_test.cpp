@@ -226,6 +226,14 @@ TEST(Cache, ALeftoverThatIsNoBuildIsReplacedToo) {
     EXPECT_NE(again.err.find("what an interrupted build left cannot be used"), std::string::npos) << again.err;
 }
 
+TEST(Cache, WhatIsRefusedLeavesNothing) {
+    const Place place;
+    std::ofstream(place / "cut.las") << "LASF and no more";
+    std::ofstream(place / "empty.ply");
+    for (const char* input : {"cut.las", "empty.ply", "nosuch.las"}) EXPECT_EQ(place.render(input).code, 3) << input;
+    EXPECT_EQ(place.entries(), 0u);
+}
+
 TEST(Cache, OneOfTwoProcessesWaitsForTheOther) {
     const Place place;
     place.growScan("a.las", 200000);

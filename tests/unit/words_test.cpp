@@ -76,7 +76,7 @@ TEST(Words, CountsAndSizesAreWrittenAlike) {
     for (const char* bad : {"0x10", "nan", "inf", "-1", "0"})
         expectOneLine(runProgram(folder, fmt::format("render a.las -o a.png --error {}", bad)), 2, {"--error", bad});
     EXPECT_EQ(runProgram(folder, "build a.las -o a.stipple --surfels 1k --quiet").code, 0);
-    EXPECT_EQ(runProgram(folder, "render a.stipple -o a.png --size 64x48 --budget-points 1k --quiet").code, 0);
+    EXPECT_EQ(runProgram(folder, "render a.stipple -o a.png --size 64x48 --budget-points 0.1M --quiet").code, 0);
 }
 
 TEST(Words, AFileInsteadOfACommandIsViewed) {
