@@ -35,24 +35,28 @@ template <typename Int, typename Keep>
     constexpr int kOne = 256, kHalf = 128;  // kSubpixel
     const int64_t cx = int64_t{fromX} * kOne + kHalf, cy = int64_t{fromY} * kOne + kHalf;
     Int dx[3], dy[3], row[3];
+    bool isMoved[3];               // by the fill rule, which decides on coverage only: depth takes that 1 back
     for (int e = 0; e < 3; ++e) {  // edge e lies opposite corner e
         const int a = (e + 1) % 3, b = (e + 2) % 3;
         const int64_t ex = t.x[b] - t.x[a], ey = t.y[b] - t.y[a];
         dx[e] = static_cast<Int>(-ey * kOne);
         dy[e] = static_cast<Int>(ex * kOne);
         const int64_t at = ex * (cy - t.y[a]) - ey * (cx - t.x[a]);
-        row[e] = static_cast<Int>(at - (isTopLeft(static_cast<int>(ex), static_cast<int>(ey)) ? 0 : 1));
+        isMoved[e] = !isTopLeft(static_cast<int>(ex), static_cast<int>(ey));
+        row[e] = static_cast<Int>(at - (isMoved[e] ? 1 : 0));
     }
     const int64_t area = (t.x[1] - t.x[0]) * (t.y[2] - t.y[0]) - (t.y[1] - t.y[0]) * (t.x[2] - t.x[0]);
     const float inverseArea = 1.0f / static_cast<float>(area);
     const float z0 = t.inverseDepth[0] * inverseArea, z1 = t.inverseDepth[1] * inverseArea,
                 z2 = t.inverseDepth[2] * inverseArea;
+    const float moved = (isMoved[0] ? z0 : 0.0f) + (isMoved[1] ? z1 : 0.0f) + (isMoved[2] ? z2 : 0.0f);
     for (int y = fromY; y <= toY; ++y) {
         Int w0 = row[0], w1 = row[1], w2 = row[2];
         for (int x = fromX; x <= toX; ++x) {
             if ((w0 | w1 | w2) >= 0 && keep(x, y))
                 offer(visibility, static_cast<size_t>(y) * stride + static_cast<size_t>(x),
-                      static_cast<float>(w0) * z0 + static_cast<float>(w1) * z1 + static_cast<float>(w2) * z2, t.id);
+                      static_cast<float>(w0) * z0 + static_cast<float>(w1) * z1 + static_cast<float>(w2) * z2 + moved,
+                      t.id);
             w0 += dx[0];
             w1 += dx[1];
             w2 += dx[2];
