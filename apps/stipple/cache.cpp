@@ -99,7 +99,7 @@ class Lookup {
         STIPPLE_TRY(cache_.use(key_));
         if (Result<StorePtr> found = openWhole(); found) return found;
         STIPPLE_TRY(cache_.lockBuild(key_, [&] { say("is being built by another process: waiting for it"); }));
-        const Result<StorePtr> store = openOrBuild(make, limit);
+        Result<StorePtr> store = openOrBuild(make, limit);
         cache_.unlockBuild(key_);
         return store;
     }

@@ -250,7 +250,7 @@ Result<uint64_t> cacheLimit(const std::string& option) {
     const char* const variable = std::getenv("STIPPLE_CACHE_LIMIT");
     const bool isSet = variable != nullptr && *variable != 0;
     if (!option.empty() || isSet) {
-        const std::string text = option.empty() ? variable : option;
+        const std::string text = isSet && option.empty() ? variable : option;
         if (const uint64_t bytes = parseBytes(text); bytes > 0 || text == "0") return bytes;
         return fail(ErrorKind::usage, fmt::format("'{}' is not a size", text),
                     option.empty() ? "STIPPLE_CACHE_LIMIT" : "--cache-limit", "e.g. 20G");

@@ -103,6 +103,7 @@ class HelpFormatter final : public CLI::Formatter {
 
 std::vector<std::string> topicNames() {
     std::vector<std::string> names;
+    names.reserve(std::size(kTopics));
     for (const Topic& topic : kTopics) names.emplace_back(topic.name);
     return names;
 }
