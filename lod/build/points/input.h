@@ -3,6 +3,7 @@
 // two, 2^-21 of the extent.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <optional>
 
@@ -13,6 +14,9 @@
 #include "lod/build/points/points.h"
 
 namespace stipple::lod {
+
+inline constexpr size_t kBlockPoints = 65536;  ///< that a reader gives at once
+inline bool isFinite(const glm::dvec3& p) { return std::isfinite(p.x + p.y + p.z); }
 
 class PointInput {
   public:

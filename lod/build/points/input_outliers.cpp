@@ -11,14 +11,6 @@
 #include "lod/build/points/separation.h"
 
 namespace stipple::lod {
-namespace {
-
-constexpr size_t kBlockPoints = 65536;
-
-bool isFinite(const glm::dvec3& p) { return std::isfinite(p.x + p.y + p.z); }
-
-}  // namespace
-
 // ---- where points are: steps of the common lattice, or world units where there is none ----
 
 glm::dvec3 PointInput::commonOf(size_t from, const PointBlock& block, size_t i) const {

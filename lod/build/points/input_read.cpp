@@ -9,14 +9,6 @@
 #include "lod/octahedral.h"
 
 namespace stipple::lod {
-namespace {
-
-constexpr size_t kBlockPoints = 65536;
-
-bool isFinite(const glm::dvec3& p) { return std::isfinite(p.x + p.y + p.z); }
-
-}  // namespace
-
 PointInput::Range PointInput::nextRange(const Range& range, uint64_t wanted) const {
     Range next{range.end, range.end, range.before};
     for (size_t i = range.begin; i < range.end; ++i) next.before += parts_[i].usable;

@@ -15,9 +15,6 @@ namespace stipple::lod {
 namespace {
 
 constexpr double kLatticeLimit = 4294967295.0;
-constexpr size_t kBlockPoints = 65536;
-
-bool isFinite(const glm::dvec3& p) { return std::isfinite(p.x + p.y + p.z); }
 
 }  // namespace
 
