@@ -77,6 +77,18 @@ Texel finished(Texel t) {
     return t;
 }
 
+// Of a finished texel: the normal of the disc, as seen at its centre (a tube's: as seen at the pixel), and the depth of
+// its plane at the pixel.
+vec3 normalAt(Texel t, uvec2 pixel) {
+    const vec2 at = vec2(pixel) + 0.5 - frame.centre;
+    const float flat_ = 1.0 - t.isRound;
+    return normalFromPerp(t.normalPerp, viewDirection(at.x + flat_ * t.offset.x, at.y + flat_ * t.offset.y, frame.focal));
+}
+float depthAt(Texel t, uvec2 pixel) {
+    const vec2 at = vec2(pixel) + 0.5 - frame.centre;
+    return planeDepth(t.depth, max(t.radius, 1.0e-3), t.normalPerp, t.offset.x, t.offset.y, t.isRound, at.x, at.y, frame.focal);
+}
+
 void storeTexel(uint offset, uint width, uint height, uvec2 pixel, Texel t) {
     const uint plane = width * height;
     const uint at = offset + pixel.y * width + pixel.x;
@@ -92,9 +104,17 @@ void storeTexel(uint offset, uint width, uint height, uvec2 pixel, Texel t) {
 Texel pushedTexel(ivec2 pixel, Texel own) {
     const ivec2 parent = pixel >> 1;
     const ivec2 side = (pixel & 1) * 2 - 1;
+    const float fineSize = exp2(float(stepInfo.level));
+    const float coarseSize = 2.0 * fineSize;
+    const vec2 at = (vec2(pixel) + 0.5) * fineSize - frame.centre;  // px from the principal point
+    const vec2 near = (vec2(parent) + 0.5) * coarseSize - frame.centre;
+    const vec2 far = near + vec2(side) * coarseSize;
     const Texel q0 = loadTexel(stepInfo.coarse, stepInfo.coarseWidth, stepInfo.coarseHeight, parent.x, parent.y);
     const Texel q1 = loadTexel(stepInfo.coarse, stepInfo.coarseWidth, stepInfo.coarseHeight, parent.x + side.x, parent.y);
     const Texel q2 = loadTexel(stepInfo.coarse, stepInfo.coarseWidth, stepInfo.coarseHeight, parent.x, parent.y + side.y);
     const Texel q3 = loadTexel(stepInfo.coarse, stepInfo.coarseWidth, stepInfo.coarseHeight, parent.x + side.x, parent.y + side.y);
-    return pushTexel(own, q0, q1, q2, q3, float(side.x), float(side.y), exp2(float(stepInfo.level)), 1.0 / frame.focal);
+    return pushTexel(own, q0, q1, q2, q3, coarseDisc(q0, near.x, near.y, frame.focal),
+                     coarseDisc(q1, far.x, near.y, frame.focal), coarseDisc(q2, near.x, far.y, frame.focal),
+                     coarseDisc(q3, far.x, far.y, frame.focal), float(side.x), float(side.y), at.x, at.y, fineSize,
+                     frame.focal);
 }

@@ -104,7 +104,8 @@ Result<std::optional<scene::CameraPath>> makePath(const CameraOptions& o, const 
 }
 
 double nearPlaneOf(const OpenedScene& opened) {
-    return std::max(1e-300, 1e-6 * glm::length(opened.description.boundsMax - opened.description.boundsMin));
+    // Only what no double can tell from the eye: each frame finds its own from what is around the eye.
+    return std::max(1e-300, 1e-15 * glm::length(opened.description.boundsMax - opened.description.boundsMin));
 }
 
 Result<Shot> makeShot(const CameraOptions& o, int frames, const OpenedScene& opened, const glm::uvec2& size) {

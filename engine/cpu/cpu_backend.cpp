@@ -108,7 +108,7 @@ class CpuBackend final : public render::Backend {
                     clear();
                     break;
                 case render::Pass::project:
-                    project();
+                    project(hasPyramid);
                     break;
                 case render::Pass::strands:
                     drawStrands();
@@ -189,13 +189,31 @@ class CpuBackend final : public render::Backend {
             });
     }
 
-    void project() {
+    /// Does the cell of a node lie within the picture, so that none of its splats is beside it?
+    bool isWithin(const shared::DrawNode& node) const {
+        for (uint32_t k = 0; k < 8; ++k) {
+            const auto along = [&](uint32_t bit) { return (k & bit) != 0 ? 65536.0f : 0.0f; };
+            const float x = node.base.x + node.axisX.x * along(1) + node.axisY.x * along(2) + node.axisZ.x * along(4),
+                        y = node.base.y + node.axisX.y * along(1) + node.axisY.y * along(2) + node.axisZ.y * along(4),
+                        z = node.base.z + node.axisX.z * along(1) + node.axisY.z * along(2) + node.axisZ.z * along(4);
+            const float px = x * frame_.focal / z + frame_.centre.x, py = y * frame_.focal / z + frame_.centre.y;
+            if (!(z > frame_.nearPlane && px >= 0 && py >= 0 && px < static_cast<float>(frame_.width) &&
+                  py < static_cast<float>(frame_.height)))
+                return false;
+        }
+        return true;
+    }
+
+    void project(bool hasPyramid) {
+        besideToo_.resize(draws_->nodes.size());
+        for (size_t n = 0; n < besideToo_.size(); ++n) besideToo_[n] = hasPyramid && !isWithin(draws_->nodes[n]);
         executor_.parallelFor(blocks_.size(), 32, [&](size_t begin, size_t end) {
             alignas(64) std::array<uint32_t, shared::kRecordsPerBlock> pixel, depth;
             for (size_t b = begin; b < end; ++b) {
                 const uint32_t count =
                     std::min(shared::kRecordsPerBlock, blocks_[b].node->count - draws_->blocks[b].first);
-                k_.projectBlock(frame_, *blocks_[b].node, blocks_[b].records, count, pixel.data(), depth.data());
+                k_.projectBlock(frame_, *blocks_[b].node, blocks_[b].records, count,
+                                besideToo_[draws_->blocks[b].node] != 0, pixel.data(), depth.data());
                 constexpr uint32_t kAhead = 48;  // the pixels are scattered over 16 MB: ask for them in time
                 for (uint32_t i = 0; i < count; ++i) {
                     if (i + kAhead < count && pixel[i + kAhead] != ~0u)
@@ -392,8 +410,8 @@ class CpuBackend final : public render::Backend {
     }
 
     /// The expanded coarse row `y` around the fine columns [x0, x0 + n); empty outside the level.
-    bool loadCoarse(const Level& level, const Planes& planes, int y, uint32_t x0, uint32_t n, TexelRow& scratch,
-                    ExpandedRow& out) {
+    bool loadCoarse(const Level& level, const Planes& planes, float size, int y, uint32_t x0, uint32_t n,
+                    TexelRow& scratch, ExpandedRow& out) {
         const uint32_t c0 = x0 / 2, count = (n + 1) / 2;
         if (y < 0 || y >= static_cast<int>(level.height)) return false;
         const uint32_t before = c0 > 0 ? 1 : 0, after = c0 + count < level.width ? 1 : 0;
@@ -402,7 +420,9 @@ class CpuBackend final : public render::Backend {
         if (!loadRow(level, planes, static_cast<uint32_t>(y), c0 - before, count + before + after, kPad - before,
                      scratch))
             return false;
-        k_.expandRow(scratch, n, out.nearest, out.beside);
+        k_.expandRow(scratch, n, (static_cast<float>(c0) + 0.5f) * size - frame_.centre.x,
+                     (static_cast<float>(y) + 0.5f) * size - frame_.centre.y, size, frame_.focal, out.nearest,
+                     out.beside);
         out.nearest.hasTubes = scratch.hasTubes;
         if (hasStrands_ && !scratch.hasTubes)
             for (TexelRow* row : {&out.nearest, &out.beside}) {
@@ -423,13 +443,13 @@ class CpuBackend final : public render::Backend {
         std::array<bool, 3> has{};
         const int c0 = static_cast<int>(row0 / 2);
         for (int c = c0 - 1; c <= c0; ++c)
-            has.at(static_cast<size_t>(c + 1) % 3) =
-                loadCoarse(coarse, coarsePlanes, c, x0, n, scratch, ring.at(static_cast<size_t>(c + 1) % 3));
+            has.at(static_cast<size_t>(c + 1) % 3) = loadCoarse(coarse, coarsePlanes, 2 * fineSize, c, x0, n, scratch,
+                                                                ring.at(static_cast<size_t>(c + 1) % 3));
         for (uint32_t y = row0; y < row1; ++y) {
             const auto c = static_cast<size_t>(y / 2);  // ring slot of coarse row c is (c + 1) % 3
             if (y % 2 == 0)
-                has.at((c + 2) % 3) =
-                    loadCoarse(coarse, coarsePlanes, static_cast<int>(c) + 1, x0, n, scratch, ring.at((c + 2) % 3));
+                has.at((c + 2) % 3) = loadCoarse(coarse, coarsePlanes, 2 * fineSize, static_cast<int>(c) + 1, x0, n,
+                                                 scratch, ring.at((c + 2) % 3));
             const size_t nearSlot = (c + 1) % 3, farSlot = y % 2 == 0 ? c % 3 : (c + 2) % 3;
             const bool ownAny = loadRow(fine, finePlanes, y, x0, n, kPad, own);
             if (!has.at(nearSlot) && !has.at(farSlot)) {
@@ -444,8 +464,9 @@ class CpuBackend final : public render::Backend {
             }
             out.hasTubes = own.hasTubes || (has.at(nearSlot) && ring.at(nearSlot).nearest.hasTubes) ||
                            (has.at(farSlot) && ring.at(farSlot).nearest.hasTubes);
-            k_.pushRow(own, ring.at(nearSlot), ring.at(farSlot), y % 2 == 0 ? -1.0f : 1.0f, n, fineSize,
-                       1.0f / frame_.focal, out);
+            k_.pushRow(own, ring.at(nearSlot), ring.at(farSlot), y % 2 == 0 ? -1.0f : 1.0f,
+                       (static_cast<float>(x0) + 0.5f) * fineSize - frame_.centre.x,
+                       (static_cast<float>(y) + 0.5f) * fineSize - frame_.centre.y, n, fineSize, frame_.focal, out);
             use(y, own, out, true);
         }
     }
@@ -512,6 +533,7 @@ class CpuBackend final : public render::Backend {
     std::vector<WideStrand> wide_;
     CompletionQueue<std::vector<WideStrand>> foundWide_;
     std::vector<BlockSource> blocks_;
+    std::vector<uint8_t> besideToo_;  ///< of each node
     std::vector<render::PassTime> times_;
     const render::DrawList* draws_ = nullptr;
     shared::FrameConstants frame_{};

@@ -25,6 +25,8 @@ struct TexelRow {
         red[kSize], green[kSize], blue[kSize];
     // Only of frames with tubes:
     alignas(64) float isRound[kSize], axisX[kSize], axisY[kSize];
+    // Only of coarse rows that are pushed from (coarseDisc):
+    alignas(64) float slopeX[kSize], slopeY[kSize], inverseDepth[kSize];
     bool hasTubes;  ///< or narrow ribbons
 };
 
@@ -132,8 +134,10 @@ struct ShadeOutput {
 struct Kernels {
     const char* name;
     /// Pixel index (or ~0u) and depth bits of up to 256 records.
+    /// `besideToo`: also those beside the picture whose discs reach in.
     void (*projectBlock)(const shared::FrameConstants& f, const shared::DrawNode& node,
-                         const shared::PointRecord* records, uint32_t count, uint32_t* pixel, uint32_t* depth);
+                         const shared::PointRecord* records, uint32_t count, bool besideToo, uint32_t* pixel,
+                         uint32_t* depth);
     /// Decodes the winners of `n` pixels of row `y` from `x0` on; clears the visibility entries. False if all are
     /// empty.
     /// `planes`: from the row's first pixel on; null without triangles, 0 where none is seen.
@@ -144,11 +148,14 @@ struct Kernels {
     void (*unpackRow)(const Planes& from, uint32_t first, uint32_t n, TexelRow& row);
     void (*pullRow)(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float inverseFocal,
                     TexelRow& out);
-    /// `nearRow`: the coarse row of the parents; `farRow`: the one beyond, in direction sy.
-    void (*pushRow)(const TexelRow& fine, const ExpandedRow& nearRow, const ExpandedRow& farRow, float sy, uint32_t n,
-                    float fineSize, float inverseFocal, TexelRow& out);
-    /// Doubles the entries of a coarse row (-1 to (n + 1) / 2) along x.
-    void (*expandRow)(const TexelRow& coarse, uint32_t n, TexelRow& nearest, TexelRow& beside);
+    /// `nearRow`: the coarse row of the parents; `farRow`: the one beyond, in direction sy. (x, y): centre of the row's
+    /// first texel, px from the principal point.
+    void (*pushRow)(const TexelRow& fine, const ExpandedRow& nearRow, const ExpandedRow& farRow, float sy, float x,
+                    float y, uint32_t n, float fineSize, float focal, TexelRow& out);
+    /// Doubles the entries of a coarse row (-1 to (n + 1) / 2) along x, with their discs (coarseDisc). (x, y): centre
+    /// of the coarse row's first texel, px from the principal point; `size`: edge of its texels, px.
+    void (*expandRow)(TexelRow& coarse, uint32_t n, float x, float y, float size, float focal, TexelRow& nearest,
+                      TexelRow& beside);
     /// Normals and depths of tubes, pixel by pixel, once a row is reconstructed.
     void (*finishRow)(float inverseFocal, uint32_t n, TexelRow& row);
     void (*shadeRow)(const shared::FrameConstants& f, const Tables& tables, const TexelRow& own, const TexelRow& row,

@@ -47,8 +47,10 @@ template <bool hasTubes>
     row.axisY[i] = t.axis.y;
 }
 
-void projectBlock(const FrameConstants& frame, const DrawNode& drawNode, const PointRecord* __restrict records,
-                  uint32_t count, uint32_t* __restrict pixel, uint32_t* __restrict depth) {
+template <bool besideToo>
+[[gnu::always_inline]] inline void projectRecords(const FrameConstants& frame, const DrawNode& drawNode,
+                                                  const PointRecord* __restrict records, uint32_t count,
+                                                  uint32_t* __restrict pixel, uint32_t* __restrict depth) {
     const FrameConstants f = frame;
     const DrawNode node = drawNode;
     const float width = float(f.width), height = float(f.height);
@@ -57,6 +59,8 @@ void projectBlock(const FrameConstants& frame, const DrawNode& drawNode, const P
                 az = node.axisX.z, bbx = node.axisY.x, bby = node.axisY.y, bbz = node.axisY.z, ccx = node.axisZ.x,
                 ccy = node.axisZ.y, ccz = node.axisZ.z;
     const uint* __restrict const words = &records->positionXY;  // four words a record
+    const float edge = node.edge * f.supportScale, minimum = f.minimumRadius;
+    const float mostScattered = largestSplat(kFlagScattered, focal, f.height), most = largestSplat(0u, focal, f.height);
     const uint stride = f.width, errorCode = node.errorCode, octantMask = node.octantMask;
 #pragma GCC ivdep
     for (size_t i = 0; i < count; ++i) {
@@ -67,7 +71,17 @@ void projectBlock(const FrameConstants& frame, const DrawNode& drawNode, const P
         const float cz = bz + az * qx + bbz * qy + ccz * qz;
         const float scale = focal / cz;
         const float px = cx * scale + x0, py = cy * scale + y0;
-        const bool inside = (cz > nearPlane) & (px >= 0.0f) & (px < width) & (py >= 0.0f) & (py < height);
+        bool inside = (cz > nearPlane) & (px >= 0.0f) & (px < width) & (py >= 0.0f) & (py < height);
+        float atX = px, atY = py, key = cz;
+        if (besideToo) {
+            const float cap = (recordFlags(r) & kFlagScattered) != 0u ? mostScattered : most;
+            const float radius = max(min(edge * radiusFractionFast(recordRadiusCode(r)), cz * cap) * scale, minimum);
+            const SplatPixel s = splatPixel(px, py, cx, cy, cz, radius, width, height);
+            inside = (cz > nearPlane) & (s.x >= 0);
+            atX = float(s.x);
+            atY = float(s.y);
+            key = cz + s.farther * radius / scale;
+        }
         const float drawnHere = float(int(octantMask >> recordOctant(r) & 1u));  // a bool would keep GCC from SIMD
         const bool fine = (recordErrorCode(r) <= errorCode) | (drawnHere > 0.5f);
         const vec3 n = octDirection(r.normal);
@@ -77,10 +91,18 @@ void projectBlock(const FrameConstants& frame, const DrawNode& drawNode, const P
         const bool seen =
             ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) != 0u) | (nx * cx + ny * cy + nz * cz < 0.0f);
         const bool keep = inside & fine & seen;
-        const int ix = int(keep ? px : 0.0f), iy = int(keep ? py : 0.0f);
+        const int ix = int(keep ? atX : 0.0f), iy = int(keep ? atY : 0.0f);
         pixel[i] = keep ? uint(iy) * stride + uint(ix) : ~0u;
-        depth[i] = floatBitsToUint(cz);
+        depth[i] = floatBitsToUint(key);
     }
+}
+
+void projectBlock(const FrameConstants& f, const DrawNode& node, const PointRecord* records, uint32_t count,
+                  bool besideToo, uint32_t* pixel, uint32_t* depth) {
+    if (besideToo)
+        projectRecords<true>(f, node, records, count, pixel, depth);
+    else
+        projectRecords<false>(f, node, records, count, pixel, depth);
 }
 
 #include "engine/cpu/sample.inl"
@@ -106,7 +128,7 @@ template <bool anyTurned>
     const float xx = f.viewX.x, xy = f.viewX.y, xz = f.viewX.z, yx = f.viewY.x, yy = f.viewY.y, yz = f.viewY.z,
                 zx = f.viewZ.x, zy = f.viewZ.y, zz = f.viewZ.z;
     const float focal = f.focal, support = f.supportScale, minimum = f.minimumRadius;
-    const float largest = largestSplat(focal, f.height);
+    const float mostScattered = largestSplat(kFlagScattered, focal, f.height), most = largestSplat(0u, focal, f.height);
     const float centreX = f.centre.x - float(int(x0)) - 0.5f, centreY = f.centre.y - float(int(y)) - 0.5f;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
@@ -125,7 +147,8 @@ template <bool anyTurned>
         nc.x = hasNormal ? nc.x : -c.x * inverse;
         nc.y = hasNormal ? nc.y : -c.y * inverse;
         nc.z = hasNormal ? nc.z : -c.z * inverse;
-        Texel t = texelFromSplat(c, nc, min(g.radius[i] * support, c.z * largest), focal, minimum);
+        const float cap = (g.flags[i] & kFlagScattered) != 0u ? mostScattered : most;
+        Texel t = texelFromSplat(c, nc, min(g.radius[i] * support, c.z * cap), focal, minimum);
         const float scale = focal / c.z;
         // Nearly the pixel's own coordinate is taken off before adding, so that the offset keeps its low bits.
         t.offset = vec2(c.x * scale + centreX - float(int(i)), c.y * scale + centreY);
@@ -303,7 +326,22 @@ void pullRow(const TexelRow& upper, const TexelRow& lower, uint32_t n, float chi
         pullTexelRow<false>(upper, lower, n, childSize, inverseFocal, out);
 }
 
-void expandRow(const TexelRow& coarse, uint32_t n, TexelRow& nearest, TexelRow& beside) {
+void expandRow(TexelRow& __restrict coarse, uint32_t n, float x, float y, float size, float focal, TexelRow& nearest,
+               TexelRow& beside) {
+#pragma GCC ivdep
+    for (size_t i = 0; i < (n + 1) / 2 + 2; ++i) {
+        const size_t at = kPad - 1 + i;
+        Texel t;
+        t.depth = coarse.depth[at];
+        t.radius = coarse.radius[at];
+        t.offset = vec2(coarse.x[at], coarse.y[at]);
+        t.normalPerp = vec2(coarse.perpX[at], coarse.perpY[at]);
+        t.isRound = coarse.hasTubes ? coarse.isRound[at] : 0.0f;
+        const CoarseDisc d = coarseDisc(t, x + (float(int(i)) - 1.0f) * size, y, focal);
+        coarse.slopeX[at] = d.slope.x;
+        coarse.slopeY[at] = d.slope.y;
+        coarse.inverseDepth[at] = d.inverseDepth;
+    }
     const auto expand = [n](const float* __restrict from, float* __restrict to, float* __restrict side) {
         from += kPad;
         to += kPad;
@@ -329,16 +367,26 @@ void expandRow(const TexelRow& coarse, uint32_t n, TexelRow& nearest, TexelRow& 
     expand(coarse.red, nearest.red, beside.red);
     expand(coarse.green, nearest.green, beside.green);
     expand(coarse.blue, nearest.blue, beside.blue);
+    expand(coarse.slopeX, nearest.slopeX, beside.slopeX);
+    expand(coarse.slopeY, nearest.slopeY, beside.slopeY);
+    expand(coarse.inverseDepth, nearest.inverseDepth, beside.inverseDepth);
     if (!coarse.hasTubes) return;
     expand(coarse.isRound, nearest.isRound, beside.isRound);
     expand(coarse.axisX, nearest.axisX, beside.axisX);
     expand(coarse.axisY, nearest.axisY, beside.axisY);
 }
 
+[[gnu::always_inline]] inline CoarseDisc discAt(const TexelRow& row, size_t i) {
+    CoarseDisc d;
+    d.slope = vec2(row.slopeX[i], row.slopeY[i]);
+    d.inverseDepth = row.inverseDepth[i];
+    return d;
+}
+
 template <bool hasTubes>
 [[gnu::always_inline]] inline void pushTexelRow(const TexelRow& __restrict fine, const ExpandedRow& __restrict nearRow,
-                                                const ExpandedRow& __restrict farRow, float sy, uint32_t n,
-                                                float fineSize, float inverseFocal, TexelRow& __restrict out) {
+                                                const ExpandedRow& __restrict farRow, float sy, float x, float y,
+                                                uint32_t n, float fineSize, float focal, TexelRow& __restrict out) {
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const size_t at = kPad + i;
@@ -346,15 +394,17 @@ template <bool hasTubes>
         setTexel<hasTubes>(out, at,
                            pushTexel(texelAt<hasTubes>(fine, at), texelAt<hasTubes>(nearRow.nearest, at),
                                      texelAt<hasTubes>(nearRow.beside, at), texelAt<hasTubes>(farRow.nearest, at),
-                                     texelAt<hasTubes>(farRow.beside, at), sx, sy, fineSize, inverseFocal));
+                                     texelAt<hasTubes>(farRow.beside, at), discAt(nearRow.nearest, at),
+                                     discAt(nearRow.beside, at), discAt(farRow.nearest, at), discAt(farRow.beside, at),
+                                     sx, sy, x + float(int(i)) * fineSize, y, fineSize, focal));
     }
 }
-void pushRow(const TexelRow& fine, const ExpandedRow& nearRow, const ExpandedRow& farRow, float sy, uint32_t n,
-             float fineSize, float inverseFocal, TexelRow& out) {
+void pushRow(const TexelRow& fine, const ExpandedRow& nearRow, const ExpandedRow& farRow, float sy, float x, float y,
+             uint32_t n, float fineSize, float focal, TexelRow& out) {
     if (out.hasTubes)
-        pushTexelRow<true>(fine, nearRow, farRow, sy, n, fineSize, inverseFocal, out);
+        pushTexelRow<true>(fine, nearRow, farRow, sy, x, y, n, fineSize, focal, out);
     else
-        pushTexelRow<false>(fine, nearRow, farRow, sy, n, fineSize, inverseFocal, out);
+        pushTexelRow<false>(fine, nearRow, farRow, sy, x, y, n, fineSize, focal, out);
 }
 
 /// What tubes look like at each pixel: normals round their axes.
@@ -369,6 +419,19 @@ void finishRow(float inverseFocal, uint32_t n, TexelRow& __restrict row) {
         row.perpY[at] = isTubeHere ? s.normalPerp.y : t.normalPerp.y;
         row.depth[at] = isTubeHere ? s.depth : t.depth;
     }
+}
+
+/// Normal at a pixel of a reconstructed row: the disc's, as seen at its centre (a tube's: as seen at the pixel).
+/// (x, y): the pixel's centre, px from the principal point.
+[[gnu::always_inline]] inline vec3 normalAt(const TexelRow& __restrict row, size_t at, float flat, float x, float y,
+                                            float focal) {
+    const vec3 v = viewDirection(x + flat * row.x[at], y + flat * row.y[at], focal);
+    return normalFromPerp(vec2(row.perpX[at], row.perpY[at]), v);
+}
+[[gnu::always_inline]] inline float depthAt(const TexelRow& __restrict row, size_t at, float flat, float x, float y,
+                                            float focal) {
+    return planeDepth(row.depth[at], max(row.radius[at], 1.0e-3f), vec2(row.perpX[at], row.perpY[at]), row.x[at],
+                      row.y[at], 1.0f - flat, x, y, focal);
 }
 
 #include "engine/cpu/shade_surfaces.inl"
@@ -412,8 +475,10 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
         for (size_t i = 0; planes.emissive != nullptr && i < n; ++i)
             shines[i] = word[i] != kPlainSurface ? planes.emissive[i] : 0u;
     }
-    const float inverseFocal = 1.0f / f.focal;
-    const float vy = (float(int(y)) + 0.5f - f.centre.y) * inverseFocal;
+    const float focal = f.focal, offX = float(int(x0)) + 0.5f - f.centre.x, offY = float(int(y)) + 0.5f - f.centre.y;
+    // Of rows without tubes isRound is not set.
+    alignas(64) float flat[kTile];
+    for (size_t i = 0; i < n; ++i) flat[i] = row.hasTubes ? 1.0f - row.isRound[kPad + i] : 1.0f;
     alignas(64) float red[kTile], green[kTile], blue[kTile];
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
@@ -427,10 +492,7 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
             const size_t at = kPad + i;
-            const float vx = (float(int(x0) + int(i)) + 0.5f - f.centre.x) * inverseFocal;
-            const float inverse = 1.0f / std::sqrt(vx * vx + vy * vy + 1.0f);
-            const vec3 normal =
-                normalFromPerp(vec2(row.perpX[at], row.perpY[at]), vec3(vx * inverse, vy * inverse, inverse));
+            const vec3 normal = normalAt(row, at, flat[i], offX + float(int(i)), offY, focal);
             const float leaf =
                 letsLightThrough(row.thickness[at], row.radius[at], row.isRound[at], mayBeRibbon * row.axisX[at]);
             const float sunlight = irradiance(normal, f.sunDirection, f.skyDirection, leaf);
@@ -440,15 +502,12 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
             blue[i] *= brightness;
         }
     }
-    if (anyLit) shadeSurfaces(f, row, word, shines, light, mask, x0, vy, n, red, green, blue);
+    if (anyLit) shadeSurfaces(f, row, flat, word, shines, light, mask, offX, offY, n, red, green, blue);
     if (f.debugView == kDebugHoles || f.debugView == kDebugNormals || out.normal != nullptr) {
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
             const size_t at = kPad + i;
-            const float vx = (float(int(x0) + int(i)) + 0.5f - f.centre.x) * inverseFocal;
-            const float inverse = 1.0f / std::sqrt(vx * vx + vy * vy + 1.0f);
-            const vec3 c =
-                normalFromPerp(vec2(row.perpX[at], row.perpY[at]), vec3(vx * inverse, vy * inverse, inverse));
+            const vec3 c = normalAt(row, at, flat[i], offX + float(int(i)), offY, focal);
             if (f.debugView == kDebugHoles) {
                 const vec3 colour = debugHoleColour(own.depth[at], row.depth[at]);
                 red[i] = colour.x;
@@ -487,7 +546,8 @@ void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow&
     }
     if (out.depth != nullptr)
 #pragma GCC ivdep
-        for (size_t i = 0; i < n; ++i) out.depth[i] = row.depth[kPad + i];
+        for (size_t i = 0; i < n; ++i)
+            out.depth[i] = depthAt(row, kPad + i, flat[i], offX + float(int(i)), offY, focal);
     if (out.linear != nullptr)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {

@@ -5,26 +5,30 @@ constexpr uint32_t kPlainSurface = 0x00ffff00u;  ///< not metallic, rough, not o
 /// The pixels of a row that are lit, closed up: of a forest's ground there may be few in each row.
 struct alignas(64) LitPixels {
     uint32_t at[kTile];
-    float x[kTile], depth[kTile], perpX[kTile], perpY[kTile], leaf[kTile];
+    float x[kTile], depth[kTile], nx[kTile], ny[kTile], nz[kTile], leaf[kTile];
     float red[kTile], green[kTile], blue[kTile];
     uint32_t words[kTile];
 };
 
-void shadeSurfaces(const FrameConstants& f, const TexelRow& __restrict row, const uint32_t* __restrict words,
-                   const uint32_t* __restrict shines, const LightInput& input, const uint32_t* __restrict mask,
-                   uint32_t x0, float vy, uint32_t pixels, float* __restrict red, float* __restrict green,
-                   float* __restrict blue) {
-    const float inverseFocal = 1.0f / f.focal;
+/// `flat`: 0 where a pixel shows a tube; (offX, offY): the first pixel's centre, px from the principal point.
+void shadeSurfaces(const FrameConstants& f, const TexelRow& __restrict row, const float* __restrict flat,
+                   const uint32_t* __restrict words, const uint32_t* __restrict shines, const LightInput& input,
+                   const uint32_t* __restrict mask, float offX, float offY, uint32_t pixels, float* __restrict red,
+                   float* __restrict green, float* __restrict blue) {
+    const float focal = f.focal, inverseFocal = 1.0f / focal, vy = offY * inverseFocal;
     LitPixels p;
     size_t n = 0;
     for (uint32_t i = 0; i < pixels; ++i) {
         if (mask[i] == 0) continue;
         const size_t from = kPad + i;
         p.at[n] = i;
-        p.x[n] = float(int(x0) + int(i)) + 0.5f;
-        p.depth[n] = row.depth[from];
-        p.perpX[n] = row.perpX[from];
-        p.perpY[n] = row.perpY[from];
+        const float x = offX + float(int(i));
+        const vec3 normal = normalAt(row, from, flat[i], x, offY, focal);
+        p.x[n] = x;
+        p.depth[n] = depthAt(row, from, flat[i], x, offY, focal);
+        p.nx[n] = normal.x;
+        p.ny[n] = normal.y;
+        p.nz[n] = normal.z;
         p.leaf[n] = letsLightThrough(row.thickness[from], row.radius[from], row.isRound[from],
                                      row.hasTubes ? row.axisX[from] : 0.0f);
         p.red[n] = red[i];
@@ -33,17 +37,16 @@ void shadeSurfaces(const FrameConstants& f, const TexelRow& __restrict row, cons
         p.words[n++] = words[i];
     }
     alignas(64) float r[kTile], g[kTile], b[kTile];
-    const float *const px = p.x, *const depth = p.depth, *const perpX = p.perpX, *const perpY = p.perpY,
+    const float *const px = p.x, *const depth = p.depth, *const nx = p.nx, *const ny = p.ny, *const nz = p.nz,
                        *const leaf = p.leaf, *const pr = p.red, *const pg = p.green, *const pb = p.blue;
     const uint32_t* const word = p.words;
-    const float centreX = f.centre.x;
     const auto surfaceAt = [=](size_t i) {
-        const float vx = (px[i] - centreX) * inverseFocal;
+        const float vx = px[i] * inverseFocal;
         const float inverse = 1.0f / std::sqrt(vx * vx + vy * vy + 1.0f);
         const vec3 ray = vec3(vx * inverse, vy * inverse, inverse);
         Surface s;
         s.colour = vec3(pr[i], pg[i], pb[i]);
-        s.normal = normalFromPerp(vec2(perpX[i], perpY[i]), ray);
+        s.normal = vec3(nx[i], ny[i], nz[i]);
         s.toEye = vec3(-ray.x, -ray.y, -ray.z);
         s.metallic = float(int(word[i] & 255u)) * (1.0f / 255.0f);
         s.roughness = float(int(word[i] >> 8 & 255u)) * (1.0f / 255.0f);
@@ -86,7 +89,7 @@ void shadeSurfaces(const FrameConstants& f, const TexelRow& __restrict row, cons
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
             const float z = depth[i];
-            const float vx = (px[i] - centreX) * inverseFocal;
+            const float vx = px[i] * inverseFocal;
             const vec3 point = vec3(vx * z, vy * z, z);
             vec3 l = vec3(light.position.x - (isFar ? 0.0f : point.x), light.position.y - (isFar ? 0.0f : point.y),
                           light.position.z - (isFar ? 0.0f : point.z));

@@ -16,13 +16,40 @@ namespace {
 using glm::dvec2;
 using glm::dvec3;
 
-/// rho^2 of a point in the ellipse of a sample.
-double rhoSquared(const Sample& s, const dvec2& point) {
-    const dvec2 d = point - s.centre;
-    const dvec2 perp = s.isRound ? dvec2(0) : s.perp;  // a tube's disc faces the eye
-    const double facing2 = std::clamp(1 - glm::dot(perp, perp), 0.25 / (s.radius * s.radius), 1.0);
-    const double along = glm::dot(perp, d);
-    return (facing2 * glm::dot(d, d) + along * along) / (facing2 * s.radius * s.radius);
+/// The principal point and the focal length, px.
+struct Lens {
+    dvec2 centre;
+    double focal;
+    dvec3 rayTo(const dvec2& pixel) const { return {(pixel - centre) / focal, 1}; }
+};
+
+/// Normal of a sample's disc in camera space; `perp`, `facing`: across and along the view of its centre.
+dvec3 discNormal(const Sample& s, const dvec2& perp, double facing, const Lens& lens) {
+    return glm::transpose(rotationToZ(glm::normalize(lens.rayTo(s.centre)))) * dvec3(perp, -facing);
+}
+
+/// rho^2 of an image point in the disc of a sample: where the ray through it meets the plane, in radii. A disc that is
+/// seen edge-on is turned until half a pixel of it is seen to each side; a tube's faces the eye.
+double rhoSquared(const Sample& s, const dvec2& point, const Lens& lens) {
+    dvec2 perp = s.isRound ? dvec2(0) : s.perp;
+    const double sine = glm::length(perp), least = std::min(0.5 / s.radius, 1.0);
+    const double facing = std::max(std::sqrt(std::max(0.0, 1 - sine * sine)), least);
+    if (sine > 0) perp *= std::sqrt(1 - facing * facing) / sine;
+    const dvec3 n = discNormal(s, perp, facing, lens), c = lens.rayTo(s.centre), ray = lens.rayTo(point);
+    const double t = glm::dot(n, c) / glm::dot(n, ray);
+    if (!(t > 0 && t < 100)) return 1e300;
+    const dvec3 off = t * ray - c;
+    return glm::dot(off, off) * lens.focal * lens.focal / (s.radius * s.radius);
+}
+
+/// Depth of a sample's plane at an image point; see planeDepth for what is capped.
+double depthAt(const Sample& s, const dvec2& point, const Lens& lens) {
+    if (s.isRound) return s.depth;
+    const double facing = std::max(std::sqrt(std::max(0.0, 1 - glm::dot(s.perp, s.perp))), 1.0 / 32);
+    const dvec3 n = discNormal(s, s.perp, facing, lens);
+    const double nearer = glm::dot(n, lens.rayTo(point)) / glm::dot(n, lens.rayTo(s.centre));  // centre / plane
+    const double reach = std::min(std::max(2 * s.radius, 1 / facing) / lens.focal, 0.5);
+    return s.depth / std::clamp(nearer, 1 - reach, 1 + reach);
 }
 
 struct Contribution {
@@ -48,7 +75,7 @@ Sample blend(std::vector<Contribution>& list, double& back, double inverseFocal)
     });
     for (const auto& [s, w] : list) {
         weight += w;
-        sum.depth += w * s->depth;
+        sum.depth += w / s->depth;  // linear on the image
         sum.radius += w * s->radius;
         sum.thickness += w * s->thickness / s->depth;
         sum.centre += w * s->centre;
@@ -57,7 +84,7 @@ Sample blend(std::vector<Contribution>& list, double& back, double inverseFocal)
         sum.colour += w * s->colour;
     }
     sum.valid = true;
-    sum.depth /= weight;
+    sum.depth = weight / sum.depth;
     sum.radius /= weight;
     sum.thickness = sum.thickness / weight * sum.depth;
     sum.centre /= weight;
@@ -88,18 +115,24 @@ Level pullLevel(const Level& fine, double childSize, double inverseFocal) {
                 thickest = std::max(thickest, c.sample->thickness);
                 anyLeaf = anyLeaf || c.sample->isLeaf(1 / inverseFocal);
             }
-            merged.depth = front;
-            merged.thickness = merged.isRound ? merged.radius * front * inverseFocal
-                                              : std::min(thickest + deepest - front, (anyLeaf ? 1 : 2) * thickest);
+            const double end = std::min(thickest + deepest, front + (anyLeaf ? 1 : 2) * thickest);
+            merged.thickness = merged.isRound ? merged.radius * merged.depth * inverseFocal
+                                              : std::max(end - merged.depth, 0.5 * thickest);
             coarse.ref(x, y) = merged;
         }
     return coarse;
 }
 
-void pushLevel(Level& fine, const Level& coarse, double fineSize, double inverseFocal) {
+void pushLevel(Level& fine, const Level& coarse, double fineSize, const Lens& lens) {
+    const double inverseFocal = 1 / lens.focal;
     for (int y = 0; y < fine.height; ++y)
         for (int x = 0; x < fine.width; ++x) {
             const dvec2 centre = (dvec2(x, y) + 0.5) * fineSize;
+            // What stands for a splat beside the picture does not show its own pixel.
+            if (Sample& s = fine.ref(x, y);
+                fineSize == 1 && s.valid &&
+                std::max(std::abs(s.centre.x - centre.x), std::abs(s.centre.y - centre.y)) > 0.75)
+                s.valid = false;
             const int px = x / 2, py = y / 2, sx = x % 2 ? 1 : -1, sy = y % 2 ? 1 : -1;
             std::vector<std::pair<const Sample*, double>> around;  // filled coarse texels and rho^2 there
             double least = 1e300, hindmost = 0, nearBack = 1e300;
@@ -109,7 +142,7 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize, double inverse
                 outside += s == nullptr;
                 if (!s || !s->valid) continue;
                 hindmost = std::max(hindmost, s->depth + s->thickness);
-                around.emplace_back(s, rhoSquared(*s, centre));
+                around.emplace_back(s, rhoSquared(*s, centre, lens));
                 nearBack = std::min(nearBack, s->depth + s->thickness);
                 least = std::min(least, around.back().second);
             }
@@ -122,8 +155,8 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize, double inverse
             for (const auto& [s, rho2] : around) {
                 const double rest = std::max(0.0, 1 - (widen ? rho2 / 4 : rho2));
                 // An empty texel between four filled ones takes whatever is nearest, within eight radii; at the border
-                // of the image only small texels do.
-                const double farthest = outside > 0 && fineSize > 8 ? 0 : 64;
+                // of the image within two, where texels are large.
+                const double farthest = outside > 0 && fineSize > 8 ? 4 : 64;
                 const bool gap = around.size() + outside == 4 && !fine.ref(x, y).valid && least < farthest;
                 // So does what shines through from behind all four.
                 const bool shines = around.size() == 4 && fine.ref(x, y).valid && fine.ref(x, y).depth > hindmost;
@@ -138,7 +171,7 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize, double inverse
             double back = 0;
             const Sample merged = blend(list, back, inverseFocal);
             Sample& own = fine.ref(x, y);
-            if (!own.valid || own.depth > back) own = merged;
+            if (!own.valid || own.depth > back || glm::length(own.centre - centre) > own.radius) own = merged;
         }
 }
 
@@ -159,11 +192,11 @@ class ReferenceBackend final : public render::Backend {
         const render::DrawList& draws = *request.draws;
         const bool hasPyramid =
             std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
-        Level level0 = projectAll(draws);
+        Level level0 = projectAll(draws, hasPyramid);
         projectStrands(draws, chunks_, level0);
         projectMeshes(draws, chunks_, level0);
         const Level own = level0;
-        if (hasPyramid) reconstruct(level0, 1 / draws.view.focalPixels);
+        if (hasPyramid) reconstruct(level0, lensOf(draws));
         finishTubes(draws.view.focalPixels, level0);
         shade(draws, own, level0, request.wantDepthAndNormal, image);
         times_ = {{"reference", (nowSeconds() - start) * 1e3}};
@@ -171,7 +204,7 @@ class ReferenceBackend final : public render::Backend {
     }
 
   private:
-    Level projectAll(const render::DrawList& draws) {
+    Level projectAll(const render::DrawList& draws, bool hasPyramid) {
         const lod::View& v = draws.view;
         const shared::FrameConstants& f = draws.frame;
         Level level{static_cast<int>(v.width), static_cast<int>(v.height), {}};
@@ -193,23 +226,34 @@ class ReferenceBackend final : public render::Backend {
                 const dvec3 c(glm::dot(world, v.right), glm::dot(world, v.down), glm::dot(world, v.forward));
                 if (!(c.z > v.nearPlane)) continue;
                 const dvec2 p(v.focalPixels * c.x / c.z + 0.5 * v.width, v.focalPixels * c.y / c.z + 0.5 * v.height);
-                if (!(p.x >= 0 && p.y >= 0 && p.x < v.width && p.y < v.height)) continue;
+                // A stray point hides no more of the picture than this.
+                const bool isScattered = (disc.flags & shared::kFlagScattered) != 0;
+                const double most = isScattered ? std::max(v.height / 64.0, 6.0) : 16384.0;
+                const double radius = std::clamp(instance.scale * disc.radius * f.supportScale * v.focalPixels / c.z,
+                                                 double(f.minimumRadius), most);
+                // Beside the picture: kept at its border where the disc may reach in.
+                const dvec2 at(std::clamp(p.x, 0.0, v.width - 1.0), std::clamp(p.y, 0.0, v.height - 1.0));
+                const bool isInside = p.x >= 0 && p.y >= 0 && p.x < v.width && p.y < v.height;
+                const double beside = glm::length(p - at) / (1 + radius * std::min(1.25 * glm::length(c) / c.z, 15.0));
+                if (!isInside && !(hasPyramid && beside < 1)) continue;
+                // There, of one surface's splats that which reaches in farthest is kept.
+                const double key = c.z + (isInside ? 0.0 : beside * beside * radius * c.z / v.focalPixels);
                 const dvec3 nw = instance.rotation * disc.normal;
                 dvec3 n(glm::dot(nw, v.right), glm::dot(nw, v.down), glm::dot(nw, v.forward));
                 const bool oneSided = (disc.flags & (shared::kFlagTwoSided | shared::kFlagNoNormal)) == 0;
                 if (oneSided && glm::dot(n, c) >= 0) continue;
-                Sample& s = level.ref(static_cast<int>(p.x), static_cast<int>(p.y));
-                if (s.valid && s.depth <= c.z) continue;
+                Sample& s = isInside ? level.ref(static_cast<int>(p.x), static_cast<int>(p.y))
+                                     : level.ref(static_cast<int>(at.x), static_cast<int>(at.y));
+                if (s.valid && s.key <= key) continue;
                 const dvec3 toPoint = glm::normalize(c);
                 if ((disc.flags & shared::kFlagNoNormal) != 0) n = -toPoint;
                 const double facing = glm::dot(n, toPoint);
                 if (facing > 0) n = -n;
                 s.valid = true;
                 s.depth = c.z;
+                s.key = key;
                 s.centre = p;
-                const double most = std::max(v.height / 8.0, 64.0);
-                s.radius = std::clamp(instance.scale * disc.radius * f.supportScale * v.focalPixels / c.z,
-                                      double(f.minimumRadius), most);
+                s.radius = radius;
                 s.thickness = s.radius * c.z / v.focalPixels * (0.25 + std::sqrt(std::max(0.0, 1 - facing * facing)));
                 if ((disc.flags & shared::kFlagLoose) != 0)
                     s.thickness = kLeafThickness * s.radius * c.z / v.focalPixels;
@@ -222,16 +266,19 @@ class ReferenceBackend final : public render::Backend {
         return level;
     }
 
-    static void reconstruct(Level& level0, double inverseFocal) {
+    static Lens lensOf(const render::DrawList& draws) {
+        return {0.5 * dvec2(draws.view.width, draws.view.height), draws.view.focalPixels};
+    }
+    static void reconstruct(Level& level0, const Lens& lens) {
         double largest = 0;
         for (const Sample& s : level0.samples) largest = std::max(largest, s.valid ? s.radius : 0.0);
         const int count = 1 + static_cast<int>(std::ceil(std::log2(std::max(2.0, 2 * largest))));
         std::vector<Level> pyramid{level0};
         while (static_cast<int>(pyramid.size()) < count && (pyramid.back().width > 1 || pyramid.back().height > 1))
             pyramid.push_back(
-                pullLevel(pyramid.back(), std::ldexp(1.0, static_cast<int>(pyramid.size()) - 1), inverseFocal));
+                pullLevel(pyramid.back(), std::ldexp(1.0, static_cast<int>(pyramid.size()) - 1), 1 / lens.focal));
         for (size_t l = pyramid.size() - 1; l-- > 0;)
-            pushLevel(pyramid[l], pyramid[l + 1], std::ldexp(1.0, static_cast<int>(l)), inverseFocal);
+            pushLevel(pyramid[l], pyramid[l + 1], std::ldexp(1.0, static_cast<int>(l)), lens);
         level0 = std::move(pyramid[0]);
     }
 
@@ -239,6 +286,7 @@ class ReferenceBackend final : public render::Backend {
                render::Image& image) {
         const lod::View& v = draws.view;
         const shared::FrameConstants& f = draws.frame;
+        const Lens lens = lensOf(draws);
         const size_t pixels = size_t{v.width} * v.height;
         image.width = v.width;
         image.height = v.height;
@@ -252,10 +300,12 @@ class ReferenceBackend final : public render::Backend {
                 dvec3 colour(f.background);
                 if (s.valid) {
                     const dvec2 p(double(i % v.width) + 0.5, double(i / v.width) + 0.5);
-                    const dvec3 toPixel =
-                        glm::normalize(dvec3((p - dvec2(0.5 * v.width, 0.5 * v.height)) / v.focalPixels, 1));
-                    const dvec3 local(s.perp, -std::sqrt(std::max(0.0, 1 - glm::dot(s.perp, s.perp))));
-                    const dvec3 n = glm::transpose(rotationToZ(toPixel)) * local;
+                    // A disc's normal is that at its centre, a tube's that at the pixel.
+                    Sample at = s;
+                    if (s.isRound) at.centre = p;
+                    const dvec3 n =
+                        discNormal(at, s.perp, std::sqrt(std::max(0.0, 1 - glm::dot(s.perp, s.perp))), lens);
+                    const double depth = depthAt(s, p, lens);
                     colour = s.colour;
                     if (f.debugView == shared::kDebugHoles) {
                         const Sample& o = own.samples[i];
@@ -267,12 +317,12 @@ class ReferenceBackend final : public render::Backend {
                     } else if (f.debugView == shared::kDebugNone &&
                                (s.isTriangle ||
                                 ((f.shade & shared::kShadeLit) != 0 && (!draws.lights.empty() || draws.environment)))) {
-                        colour = shadeTriangle(s, n, toPixel * (s.depth / toPixel.z), draws);
+                        colour = shadeTriangle(s, n, lens.rayTo(p) * depth, draws);
                     } else if ((f.shade & shared::kShadeLit) != 0 && f.debugView == shared::kDebugNone) {
                         colour *= lightOn(n, f, s.letsLightThrough(v.focalPixels));
                     }
                     if (wantAll) {
-                        image.depth[i] = static_cast<float>(s.depth);
+                        image.depth[i] = static_cast<float>(depth);
                         const dvec3 world = v.right * n.x + v.down * n.y + v.forward * n.z;
                         for (int c = 0; c < 3; ++c)
                             image.normal[i * 3 + static_cast<size_t>(c)] = static_cast<float>(world[c]);

@@ -156,12 +156,19 @@ class Tracer {
         return {};
     }
 
-    /// Linear colour that one ray brings, and from what depth; false if it meets nothing. `ray`: camera space, z = 1.
-    bool look(const dvec3& ray, double step, dvec3& colour, double& depth) const {
+    /// Depth of what one ray meets first, and its normal towards the eye (world space); false if it meets nothing.
+    bool surface(const dvec3& ray, double step, double& depth, dvec3& normal) const {
+        const Hit hit = nearestHit(ray, step);
+        depth = hit.t;
+        normal = toWorld(hit.normal);
+        return hit.place != kNone;
+    }
+
+    /// Linear colour that one ray brings; false if it meets nothing. `ray`: camera space, z = 1.
+    bool look(const dvec3& ray, double step, dvec3& colour) const {
         Hit hit = nearestHit(ray, step);
         if (hit.place == kNone) return false;
         const dvec3 point = ray * hit.t;
-        depth = hit.t;
         if (hit.isTriangle) {
             colour = shadeTriangle(hit.sample, hit.normal, point, draws_);
             return true;
@@ -217,6 +224,7 @@ class Tracer {
                     best.t = t;
                     best.isTriangle = best.isStrand = false;
                     best.sample.thickness = 1;
+                    best.normal = toCamera(place.rotation * normal);
                     best.thickness =
                         place.scale * store.discs[item].radius * (0.25 + std::sqrt(std::max(0.0, 1 - m * m)));
                 }
@@ -311,31 +319,40 @@ Result<render::Image> trace(const std::vector<render::PlacedStore>& placed, cons
     image.height = view.height;
     image.rgba.resize(size_t{view.width} * view.height);
     image.depth.resize(image.rgba.size());
+    image.normal.resize(image.rgba.size() * 3);
     image.linear.resize(image.rgba.size() * 3);
     const uint32_t n = std::max(1u, settings.samplesPerAxis);
     executor.parallelFor(view.height, 4, [&](size_t row0, size_t row1) {
         for (size_t y = row0; y < row1; ++y)
             for (uint32_t x = 0; x < view.width && !isStopRequested(); ++x) {
-                dvec3 sum(0);
+                // Along `forward` rays have length 1, so that t is linear depth.
+                const auto rayAt = [&](double px, double py) {
+                    return dvec3((px - 0.5 * view.width) / view.focalPixels,
+                                 (py - 0.5 * view.height) / view.focalPixels, 1);
+                };
+                dvec3 sum(0), normal(0);
                 uint32_t hits = 0;
-                double depths = 0;
+                double depth = 0;
                 for (uint32_t s = 0; s < n * n; ++s) {
-                    const double px = x + (s % n + 0.5) / n - 0.5 * view.width,
-                                 py = double(y) + (s / n + 0.5) / n - 0.5 * view.height;
-                    // Along `forward` this direction has length 1, so t is linear depth.
-                    const dvec3 ray(px / view.focalPixels, py / view.focalPixels, 1);
                     dvec3 colour(0);
-                    double depth = 0;
-                    if (!tracer.look(ray, 1 / (view.focalPixels * n), colour, depth)) continue;
+                    if (!tracer.look(rayAt(x + (s % n + 0.5) / n, double(y) + (s / n + 0.5) / n),
+                                     1 / (view.focalPixels * n), colour))
+                        continue;
                     ++hits;
-                    depths += depth;
                     sum += colour;
                 }
+                // Of edges a mean would be the depth of nothing.
+                const bool isThere =
+                    tracer.surface(rayAt(x + 0.5, double(y) + 0.5), 1 / view.focalPixels, depth, normal);
                 const double coverage = double(hits) / (n * n);
                 const dvec3 c = sum / double(n * n) + (1 - coverage) * dvec3(settings.draw.background);
                 const size_t pixel = y * view.width + x;
-                image.depth[pixel] = hits > 0 ? static_cast<float>(depths / hits) : 0.0f;
-                for (int k = 0; k < 3; ++k) image.linear[3 * pixel + static_cast<size_t>(k)] = static_cast<float>(c[k]);
+                image.depth[pixel] = isThere ? static_cast<float>(depth) : 0.0f;
+                for (int k = 0; k < 3; ++k) {
+                    const size_t channel = 3 * pixel + static_cast<size_t>(k);
+                    image.linear[channel] = static_cast<float>(c[k]);
+                    image.normal[channel] = isThere ? static_cast<float>(normal[k]) : 0.0f;
+                }
                 image.rgba[pixel] = encodeSrgb(c.x) | encodeSrgb(c.y) << 8 | encodeSrgb(c.z) << 16 |
                                     static_cast<uint32_t>(std::lround(coverage * 255)) << 24;
             }

@@ -65,6 +65,29 @@ void addMeshes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, DrawList&
     }
 }
 
+/// Nearer than this nothing of the cut can be: by the nearest bounding sphere; of a node that holds the eye, a step of
+/// its lattice, nearer than which nothing of it can be told apart. (Depth is linear: a small distance costs nothing.)
+double nearestOf(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,
+                 std::span<const lod::Instance> instances, const lod::View& view) {
+    // Depth in a corner of the picture is the distance times this; discs beside the picture reach in: half of it.
+    const double cosine = view.focalPixels / std::hypot(view.focalPixels, 0.5 * view.width, 0.5 * view.height);
+    constexpr double kShare = 0.5;
+    double nearest = HUGE_VAL;
+    const auto look = [&](uint32_t instance, uint32_t number, double steps) {
+        const lod::Instance& place = instances[instance];
+        const lod::Hierarchy& h = *hierarchies[place.hierarchy];
+        const lod::Node& node = h.nodes[number];
+        const double scale = place.scale * h.unit, size = h.isMesh() ? node.radius : h.cellSize(node);
+        const glm::dvec3 centre =
+            place.translation + place.rotation * (place.scale * (h.origin + h.unit * node.centre));
+        const double apart = kShare * cosine * (glm::length(centre - view.eye) - node.radius * scale);
+        nearest = std::min(nearest, std::max(apart, size * scale / steps));
+    };
+    for (const lod::CutDraw& draw : cut.draw) look(draw.instance, draw.node, 0x1p16);
+    for (const lod::CutMeshDraw& draw : cut.meshDraw) look(draw.instance, draw.node, 0x1p20);
+    return nearest;
+}
+
 }  // namespace
 
 glm::vec3 linearBackground() {
@@ -143,7 +166,10 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     f.centre = {0.5f * static_cast<float>(view.width), 0.5f * static_cast<float>(view.height)};
     f.width = view.width;
     f.height = view.height;
-    f.nearPlane = static_cast<float>(view.nearPlane);
+    // Not below what fp32 can divide by.
+    const double nearest = nearestOf(cut, hierarchies, instances, view);
+    out.view.nearPlane = std::max({view.nearPlane, std::isfinite(nearest) ? nearest : 0.0, 1e-30});
+    f.nearPlane = static_cast<float>(out.view.nearPlane);
     f.supportScale = settings.supportScale;
     f.minimumRadius = settings.minimumRadius;
     f.exactStrands = settings.exactStrands;

@@ -28,10 +28,10 @@ void main() {
     if ((word & kPixelUnlit) == 0u && (word == kPlainSurface || (frame.shade & kShadeTriangles) != 0u)) {
         const vec3 ray = rayThrough(pixel);
         const vec3 v = normalize(ray);
-        const vec3 point = ray * own.depth;
+        const vec3 point = ray * depthAt(own, pixel);
         Surface s;
         s.colour = own.colour;
-        s.normal = normalFromPerp(own.normalPerp, v);
+        s.normal = normalAt(own, pixel);
         s.toEye = -v;
         s.metallic = float(word & 255u) / 255.0;
         s.roughness = float(word >> 8 & 255u) / 255.0;
@@ -45,7 +45,7 @@ void main() {
         for (uint k = 0u; k < frame.lightCount; ++k) {
             const LightSource light = lights[k];
             const vec3 l = light.kind == kLightDirectional ? light.position : light.position - point;
-            colour += reflectLight(s, normalize(l), light.colour * lightAt(light, point, own.depth));
+            colour += reflectLight(s, normalize(l), light.colour * lightAt(light, point, point.z));
         }
         colour += vec3(unpackRed(e), unpackGreen(e), unpackBlue(e));
     }

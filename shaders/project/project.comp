@@ -2,6 +2,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../bindings.glsl"
+#include "../shared/splat_size.h"
 layout(local_size_x = 256) in;
 
 void main() {
@@ -17,11 +18,20 @@ void main() {
     const vec3 c = node.base + node.axisX * float(recordX(r)) + node.axisY * float(recordY(r)) + node.axisZ * float(recordZ(r));
     if (!(c.z > frame.nearPlane)) return;
     const float scale = frame.focal / c.z;
-    const vec2 p = vec2(c.x * scale + frame.centre.x, c.y * scale + frame.centre.y);
-    if (!(p.x >= 0.0 && p.y >= 0.0 && p.x < float(frame.width) && p.y < float(frame.height))) return;
+    float key = c.z;
+    vec2 p = vec2(c.x * scale + frame.centre.x, c.y * scale + frame.centre.y);
+    if (!(p.x >= 0.0 && p.y >= 0.0 && p.x < float(frame.width) && p.y < float(frame.height))) {
+        if (stepInfo.hasPyramid == 0u) return;
+        const float cap = c.z * largestSplat(recordFlags(r), frame.focal, frame.height);
+        const float radius = max(min(node.edge * radiusFractionFast(recordRadiusCode(r)) * frame.supportScale, cap) * scale, frame.minimumRadius);
+        const SplatPixel s = splatPixel(p.x, p.y, c.x, c.y, c.z, radius, float(frame.width), float(frame.height));
+        if (s.x < 0) return;
+        p = vec2(float(s.x), float(s.y));
+        key = c.z + s.farther * radius / scale;
+    }
     if ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) == 0u) {
         if (!(dot(nodeDirection(node, octDirection(r.normal)), c) < 0.0)) return;
     }
-    const uint64_t key = uint64_t(floatBitsToUint(c.z)) << 32 | uint64_t(block * kRecordsPerBlock + gl_LocalInvocationID.x);
-    atomicMin(visibility[uint(p.y) * frame.width + uint(p.x)], key);
+    const uint64_t entry = uint64_t(floatBitsToUint(key)) << 32 | uint64_t(block * kRecordsPerBlock + gl_LocalInvocationID.x);
+    atomicMin(visibility[uint(p.y) * frame.width + uint(p.x)], entry);
 }

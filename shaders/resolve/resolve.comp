@@ -26,7 +26,7 @@ void main() {
         const vec3 c = node.base + node.axisX * float(recordX(r)) + node.axisY * float(recordY(r)) + node.axisZ * float(recordZ(r));
         vec3 n = -normalize(c);
         if ((recordFlags(r) & kFlagNoNormal) == 0u) n = nodeDirection(node, octDecode(r.normal));
-        const float radius = min(node.edge * radiusFraction(recordRadiusCode(r)) * frame.supportScale, c.z * largestSplat(frame.focal, frame.height));
+        const float radius = min(node.edge * radiusFraction(recordRadiusCode(r)) * frame.supportScale, c.z * largestSplat(recordFlags(r), frame.focal, frame.height));
         t = texelFromSplat(c, n, radius, frame.focal, frame.minimumRadius);
         if ((recordFlags(r) & kFlagLoose) != 0u) t.thickness = kLeafThickness * t.radius;
         const float scale = frame.focal / c.z;

@@ -15,9 +15,7 @@ void main() {
     vec3 n = vec3(0.0);
     const bool valid = t.depth > 0.0;
     if (valid) {
-        const vec3 v = normalize(vec3((float(pixel.x) + 0.5 - frame.centre.x) / frame.focal,
-                                      (float(pixel.y) + 0.5 - frame.centre.y) / frame.focal, 1.0));
-        n = normalFromPerp(t.normalPerp, v);
+        n = normalAt(t, pixel);
         colour = t.colour;
         if (frame.debugView == kDebugHoles) colour = debugHoleColour(finished(own).depth, t.depth);
         else if (frame.debugView == kDebugNormals) colour = vec3(0.5 + 0.5 * n.x, 0.5 - 0.5 * n.y, 0.5 - 0.5 * n.z);
@@ -29,7 +27,7 @@ void main() {
     image[at] = bytes.x | bytes.y << 8 | bytes.z << 16 | (valid ? 0xff000000u : 0u);
     if (stepInfo.wantExtra == 0u) return;
     const vec3 world = frame.viewX * n.x + frame.viewY * n.y + frame.viewZ * n.z;
-    extra[7u * at] = t.depth;
+    extra[7u * at] = valid ? depthAt(t, pixel) : t.depth;
     extra[7u * at + 1u] = world.x;
     extra[7u * at + 2u] = world.y;
     extra[7u * at + 3u] = world.z;

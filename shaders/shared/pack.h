@@ -1,12 +1,13 @@
 // A texel of the pyramid in five 32-bit words, one plane each:
 //   depth     fp32
 //   size      radius | thickness, each the upper half of an fp32, rounded (relative 2^-9)
-//   offset    2 x 16-bit signed fractions of four (rounded) radii
+//   offset    2 x 16-bit signed fractions of kOffsetRadii (rounded) radii
 //   normal    2 x 16-bit signed fractions
 //   colour    sqrt of linear r 11 | g 11 | b 10 bit: finer than 8-bit sRGB everywhere above 1/500
 #ifndef STIPPLE_SHARED_PACK_H
 #define STIPPLE_SHARED_PACK_H
 #include "splat.h"
+#include "splat_size.h"
 SHARED_BEGIN
 
 struct PackedTexel {
@@ -49,7 +50,7 @@ SHARED_FN PackedTexel packTexel(Texel t) {
     PackedTexel p;
     p.depth = t.depth;
     p.size = upperHalf(t.radius) | upperHalf(t.thickness) << 16;
-    const float inverseRadius = 0.25f / max(uintBitsToFloat(p.size << 16), 1.0e-30f);
+    const float inverseRadius = 1.0f / (kOffsetRadii * max(uintBitsToFloat(p.size << 16), 1.0e-30f));
     p.offset = packPair(t.offset.x * inverseRadius, t.offset.y * inverseRadius);
     p.normal = packPair(t.normalPerp.x, t.normalPerp.y);
     p.colour = packColour(t.colour.x, t.colour.y, t.colour.z);
@@ -60,7 +61,7 @@ SHARED_FN Texel unpackTexel(PackedTexel p) {
     t.depth = p.depth;
     t.radius = uintBitsToFloat(p.size << 16);
     t.thickness = uintBitsToFloat(p.size & 0xffff0000u);
-    t.offset = vec2(unpackLow(p.offset) * 4.0f * t.radius, unpackHigh(p.offset) * 4.0f * t.radius);
+    t.offset = vec2(unpackLow(p.offset) * kOffsetRadii * t.radius, unpackHigh(p.offset) * kOffsetRadii * t.radius);
     t.normalPerp = vec2(unpackLow(p.normal), unpackHigh(p.normal));
     t.colour = vec3(unpackRed(p.colour), unpackGreen(p.colour), unpackBlue(p.colour));
     t.isRound = 0.0f;

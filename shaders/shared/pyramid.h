@@ -6,12 +6,13 @@
 #ifndef STIPPLE_SHARED_PYRAMID_H
 #define STIPPLE_SHARED_PYRAMID_H
 #include "splat.h"
+#include "splat_size.h"
 SHARED_BEGIN
 
 // Running sums of texels that are merged.
 struct Blend {
     float weight;
-    float depth;
+    float inverseDepth;
     float radius;
     float thickness;
     float x;
@@ -28,7 +29,7 @@ struct Blend {
 SHARED_FN Blend emptyBlend() {
     Blend b;
     b.weight = 0.0f;
-    b.depth = 0.0f;
+    b.inverseDepth = 0.0f;
     b.radius = 0.0f;
     b.thickness = 0.0f;
     b.x = 0.0f;
@@ -43,10 +44,11 @@ SHARED_FN Blend emptyBlend() {
     return b;
 }
 
-// `x`, `y`: centre of the splat relative to the texel being made, pixels.
-SHARED_FN Blend addToBlend(Blend b, Texel t, float x, float y, float weight) {
+// `x`, `y`: centre of the splat relative to the texel being made, pixels. Of texels in one plane, 1 / depth and place
+// are averaged to a point of that plane: 1 / depth is linear on the image.
+SHARED_FN Blend addToBlend(Blend b, Texel t, float inverseDepth, float x, float y, float weight) {
     b.weight += weight;
-    b.depth += weight * t.depth;
+    b.inverseDepth += weight * inverseDepth;
     b.radius += weight * t.radius;
     b.thickness += weight * t.thickness;
     b.x += weight * x;
@@ -64,7 +66,7 @@ SHARED_FN Blend addToBlend(Blend b, Texel t, float x, float y, float weight) {
 SHARED_FN Texel texelFromBlend(Blend b, float isRound) {
     Texel t;
     const float s = b.weight > 0.0f ? 1.0f / b.weight : 0.0f;
-    t.depth = b.depth * s;
+    t.depth = b.weight > 0.0f ? b.weight / max(b.inverseDepth, 1.0e-37f) : 0.0f;
     t.radius = b.radius * s;
     t.thickness = b.thickness * s;
     t.offset = vec2(b.x * s, b.y * s);
@@ -79,6 +81,7 @@ SHARED_FN Texel texelFromBlend(Blend b, float isRound) {
 SHARED_FN float isLike(Texel t, float isRound) { return abs(t.isRound - isRound) < 0.5f ? 1.0f : 0.0f; }
 
 const float kFarAway = 3.0e38f;
+const float kLeastDepth = 1.0e-30f;
 
 // Depth of a child that reaches beyond its own texel, else kFarAway. The papers ask for more, that the ellipse contain
 // the parent's centre; with splats of about the spacing of the pixels that test drops one in three and tears holes.
@@ -93,8 +96,8 @@ SHARED_FN float thicknessWorld(Texel t, float inverseFocal) { return t.thickness
 // Merges the four children (order: (0,0) (1,0) (0,1) (1,1)) into their parent. `childSize`: edge of a child texel in
 // pixels. Kept are the children that reach beyond their own texel and whose depth interval [depth - t, depth + t] meets
 // all the others': it begins before the first of them ends. (Not "meets the front one's": copies of one splat have the
-// same depth to the last bit or not, and which of them is in front must not matter.) The interval of the result is
-// anchored at the front and capped, so that layers do not chain (F12, case 42).
+// same depth to the last bit or not, and which of them is in front must not matter.) Where the interval of the result
+// ends is counted from the front one and capped, so that layers do not chain (F12, case 42).
 SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSize, float inverseFocal) {
     const float h = 0.5f * childSize;
     const float x0 = c0.offset.x - h;
@@ -124,10 +127,10 @@ SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSi
     const float w2 = d2 < kFarAway && d2 - t2 <= back ? isLike(c2, isRound) : 0.0f;
     const float w3 = d3 < kFarAway && d3 - t3 <= back ? isLike(c3, isRound) : 0.0f;
     Blend b = emptyBlend();
-    b = addToBlend(b, c0, x0, y0, w0);
-    b = addToBlend(b, c1, x1, y1, w1);
-    b = addToBlend(b, c2, x2, y2, w2);
-    b = addToBlend(b, c3, x3, y3, w3);
+    b = addToBlend(b, c0, 1.0f / max(c0.depth, kLeastDepth), x0, y0, w0);
+    b = addToBlend(b, c1, 1.0f / max(c1.depth, kLeastDepth), x1, y1, w1);
+    b = addToBlend(b, c2, 1.0f / max(c2.depth, kLeastDepth), x2, y2, w2);
+    b = addToBlend(b, c3, 1.0f / max(c3.depth, kLeastDepth), x3, y3, w3);
     Texel t = texelFromBlend(b, isRound);
     const float deepest = max(max(w0 * c0.depth, w1 * c1.depth), max(w2 * c2.depth, w3 * c3.depth));
     const float thickest = max(max(w0 * t0, w1 * t1), max(w2 * t2, w3 * t3));
@@ -135,15 +138,28 @@ SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSi
     const float thinnest =
         min(min(w0 > 0.0f ? c0.thickness / c0.radius : 1.0f, w1 > 0.0f ? c1.thickness / c1.radius : 1.0f),
             min(w2 > 0.0f ? c2.thickness / c2.radius : 1.0f, w3 > 0.0f ? c3.thickness / c3.radius : 1.0f));
-    const float world = min(thickest + deepest - front, (thinnest < kLeafLimit ? 1.0f : 2.0f) * thickest);
-    t.depth = b.weight > 0.0f ? front : 0.0f;
-    t.thickness = b.weight > 0.0f ? world / (front * inverseFocal) : 0.0f;
+    const float end = min(thickest + deepest, front + (thinnest < kLeafLimit ? 1.0f : 2.0f) * thickest);
+    t.thickness = b.weight > 0.0f ? max(end - t.depth, 0.5f * thickest) / (t.depth * inverseFocal) : 0.0f;
     return t;
 }
 
-// rho^2 of a coarse texel at (dx, dy) pixels from its splat's centre; kFarAway where it is empty.
-SHARED_FN float pushRho2(Texel t, float dx, float dy) {
-    const float rho2 = ellipseRho2(ellipseNormal(t), max(t.radius, 1.0e-3f), dx, dy);
+// What the push needs of a coarse texel beside itself.
+struct CoarseDisc {
+    vec2 slope;  // ellipseSlope
+    float inverseDepth;
+};
+// `x`, `y`: centre of the texel, px from the principal point.
+SHARED_FN CoarseDisc coarseDisc(Texel t, float x, float y, float focal) {
+    CoarseDisc d;
+    d.slope = ellipseSlope(t.normalPerp, t.isRound, max(t.radius, 1.0e-3f), x + t.offset.x, y + t.offset.y, focal);
+    d.inverseDepth = 1.0f / max(t.depth, kLeastDepth);
+    return d;
+}
+
+// rho^2 of a coarse texel at the fine one's centre (x, y) px from the principal point; (dx, dy) leads from there to the
+// splat's centre. kFarAway where it is empty.
+SHARED_FN float pushRho2(Texel t, CoarseDisc d, float x, float y, float dx, float dy, float focal) {
+    const float rho2 = discRho2(d.slope, max(t.radius, 1.0e-3f), x + dx, y + dy, focal, -dx, -dy);
     return t.depth > 0.0f ? rho2 : kFarAway;
 }
 SHARED_FN float kernelWeight(float rho2) {
@@ -157,6 +173,7 @@ SHARED_FN float gapWeight(float rho2, float least) { return rho2 <= least ? 0.01
 // rho^2 up to which an empty texel between four filled coarse ones is closed. At the border of the image fewer than
 // four are inside: there, only texels of at most kBorderTexel pixels are closed, as gaps between small splats are.
 const float kGapReach2 = 64.0f;
+const float kBorderReach2 = 4.0f;
 const float kBorderTexel = 8.0f;
 const float kSurrounding = 4.0f;  // coarse texels of one surface that make a fine texel lie inside it
 
@@ -166,8 +183,13 @@ const float kSurrounding = 4.0f;  // coarse texels of one surface that make a fi
 // coarse ellipse reaches it, it stays as it is, unless three of the coarse texels are filled and of one surface: then
 // the texel lies inside that surface, and a gap there is only the averaging of the pull (a merged splat stands at the
 // middle of its parts), so the ellipses count with twice their radius.
-SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, float sx, float sy, float fineSize,
-                          float inverseFocal) {
+// `e0` to `e3`: coarseDisc of q0 to q3; (x, y): centre of the fine texel, px from the principal point.
+SHARED_FN Texel pushTexel(Texel own, Texel q0, Texel q1, Texel q2, Texel q3, CoarseDisc e0, CoarseDisc e1,
+                          CoarseDisc e2, CoarseDisc e3, float sx, float sy, float x, float y, float fineSize,
+                          float focal) {
+    const float inverseFocal = 1.0f / focal;
+    Texel fine = own;
+    fine.depth = fineSize < 1.5f && isBeside(own.offset) > 0.5f ? 0.0f : own.depth;
     const float coarseSize = 2.0f * fineSize;
     // Centre of each coarse texel relative to the fine texel's centre, pixels.
     const float nearX = -0.5f * fineSize * sx;
@@ -182,10 +204,10 @@ SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, fl
     const float y2 = farY + q2.offset.y;
     const float x3 = farX + q3.offset.x;
     const float y3 = farY + q3.offset.y;
-    const float r0 = pushRho2(q0, x0, y0);
-    const float r1 = pushRho2(q1, x1, y1);
-    const float r2 = pushRho2(q2, x2, y2);
-    const float r3 = pushRho2(q3, x3, y3);
+    const float r0 = pushRho2(q0, e0, x, y, x0, y0, focal);
+    const float r1 = pushRho2(q1, e1, x, y, x1, y1, focal);
+    const float r2 = pushRho2(q2, e2, x, y, x2, y2, focal);
+    const float r3 = pushRho2(q3, e3, x, y, x3, y3, focal);
     const float t0 = thicknessWorld(q0, inverseFocal);
     const float t1 = thicknessWorld(q1, inverseFocal);
     const float t2 = thicknessWorld(q2, inverseFocal);
@@ -215,7 +237,7 @@ SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, fl
         min(min(abs(q0.depth), abs(q1.depth)), min(abs(q2.depth), abs(q3.depth))) > 0.0f ? missed * isSolid : 0.0f;
     const float isBorder = min(min(q0.depth, q1.depth), min(q2.depth, q3.depth)) < 0.0f ? 1.0f : 0.0f;
     const float isLarge = fineSize > kBorderTexel ? 1.0f : 0.0f;
-    const float farthest = isBorder * isLarge > 0.5f ? 0.0f : kGapReach2;
+    const float farthest = isBorder * isLarge > 0.5f ? kBorderReach2 : kGapReach2;
     const float oneFilled = least < farthest ? noneEmpty : 0.0f;
     // So does what lies behind all four: a point of the far side that shines through between the near ones.
     const float hindmost = max(max(n0 + t0, n1 + t1), max(n2 + t2, n3 + t3));
@@ -239,14 +261,17 @@ SHARED_FN Texel pushTexel(Texel fine, Texel q0, Texel q1, Texel q2, Texel q3, fl
     const float w2 = d2 < kFarAway && d2 - t2 <= back ? k2 * isLike(q2, isRound) : 0.0f;
     const float w3 = d3 < kFarAway && d3 - t3 <= back ? k3 * isLike(q3, isRound) : 0.0f;
     Blend b = emptyBlend();
-    b = addToBlend(b, q0, x0, y0, w0);
-    b = addToBlend(b, q1, x1, y1, w1);
-    b = addToBlend(b, q2, x2, y2, w2);
-    b = addToBlend(b, q3, x3, y3, w3);
+    b = addToBlend(b, q0, e0.inverseDepth, x0, y0, w0);
+    b = addToBlend(b, q1, e1.inverseDepth, x1, y1, w1);
+    b = addToBlend(b, q2, e2.inverseDepth, x2, y2, w2);
+    b = addToBlend(b, q3, e3.inverseDepth, x3, y3, w3);
     const float hasBlend = b.weight > 0.0f ? 1.0f : 0.0f;
     const float isBehind = fine.depth > back ? 1.0f : 0.0f;
     const float isEmpty = fine.depth <= 0.0f ? 1.0f : 0.0f;
-    const bool replace = hasBlend * (isBehind + isEmpty) > 0.5f;
+    // So is one that does not reach its own texel's centre (of splats beside the picture): others may.
+    const float off2 = fine.offset.x * fine.offset.x + fine.offset.y * fine.offset.y;
+    const float isMissed = off2 > fine.radius * fine.radius ? 1.0f : 0.0f;
+    const bool replace = hasBlend * (isBehind + isEmpty + isMissed) > 0.5f;
     const Texel blended = texelFromBlend(b, isRound);
     Texel t;
     t.depth = replace ? blended.depth : fine.depth;

@@ -1,8 +1,10 @@
 // From a record in camera space to a texel of the pyramid, and the ellipse test (ALGORITHMS 1.4, common projection).
 //
 // A texel carries the splat's centre (offset from its texel's centre), linear depth, screen radius, half-thickness and
-// the normal as its two components perpendicular to the view direction v (the rotation that takes v to z by the
-// shortest way). The ellipse is then division-free:  m^2 |d|^2 + (np.d)^2 <= m^2 R^2,  m^2 = 1 - |np|^2.
+// the normal as its two components perpendicular to the view direction v of its centre (the rotation that takes v to z
+// by the shortest way). On the image, 1 / depth of the disc's plane is linear: 1/Z = (1 + s.d) / cz with the slope s of
+// the plane (1/px) and d pixels from the projected centre C = (Cx, Cy, focal). The hit is e = (cz / focal)
+// (d - (s.d) C) / (1 + s.d) from the centre, exactly, in perspective (ALGORITHMS 1.1): rho^2 = |e|^2 / r^2.
 #ifndef STIPPLE_SHARED_SPLAT_H
 #define STIPPLE_SHARED_SPLAT_H
 #include "types.h"
@@ -12,7 +14,7 @@ struct Texel {
     float depth;      // linear, world units; 0: empty; < 0: outside the image
     float radius;     // pixels of the full-size image
     float thickness;  // half-thickness along the view, in pixels at this depth (world = thickness * depth / focal)
-    vec2 offset;      // centre of the splat - centre of the texel, pixels; below three radii
+    vec2 offset;      // centre of the splat - centre of the texel, pixels; below kOffsetRadii radii
     vec2 normalPerp;  // the eye-facing normal's components perpendicular to the view direction
     vec3 colour;      // linear
     // Of a tube (ALGORITHMS 1.4, lines): its disc faces the eye, `normalPerp` says how the tube leans instead: t_v
@@ -36,24 +38,59 @@ SHARED_FN vec3 normalFromPerp(vec2 p, vec3 v) {
     return vec3(p.x + v.x * k, p.y + v.y * k, (1.0f + v.z) * k - z);
 }
 
-// Squared facing of an ellipse, floored so that an edge-on splat stays half a pixel wide.
-SHARED_FN float facingSquared(vec2 normalPerp, float radius) {
-    const float m2 = 1.0f - normalPerp.x * normalPerp.x - normalPerp.y * normalPerp.y;
+// Unit view direction of the image point that lies (x, y) px from the principal point.
+SHARED_FN vec3 viewDirection(float x, float y, float focal) {
+    const float inverse = 1.0f / sqrt(x * x + y * y + focal * focal);
+    return vec3(x * inverse, y * inverse, focal * inverse);
+}
+
+// Slope of a plane on the image, 1/px: d(1/Z) * cz per pixel. (x, y): its disc's centre, px from the principal point;
+// `tilt`: tangent of the angle between normal and view, over the sine of it (1 / cosine where nothing is floored).
+SHARED_FN vec2 planeSlope(vec2 normalPerp, float tilt, float x, float y, float focal) {
+    const float inverse = 1.0f / sqrt(x * x + y * y + focal * focal);
+    const float vx = x * inverse;
+    const float vy = y * inverse;
+    const float turn = (vx * normalPerp.x + vy * normalPerp.y) / (1.0f + focal * inverse);
+    return vec2((vx - (normalPerp.x - vx * turn) * tilt) * inverse, (vy - (normalPerp.y - vy * turn) * tilt) * inverse);
+}
+
+// Of the ellipse that is drawn: an edge-on splat stays half a pixel wide to each side. That of a tube faces the eye.
+SHARED_FN vec2 ellipseSlope(vec2 normalPerp, float isRound, float radius, float x, float y, float focal) {
+    const float flat_ = 1.0f - isRound;
+    const float px = normalPerp.x * flat_;
+    const float py = normalPerp.y * flat_;
+    const float sine2 = px * px + py * py;
     const float floor2 = 0.25f / (radius * radius);
-    return min(max(m2, floor2), 1.0f);
+    const float facing2 = min(max(1.0f - sine2, floor2), 1.0f);
+    const float tilt = sqrt(max(1.0f - facing2, 0.0f) / (max(sine2, 1.0e-12f) * facing2));
+    return planeSlope(vec2(px, py), tilt, x, y, focal);
 }
 
-// The normal that the ellipse test takes: that of a tube faces the eye.
-SHARED_FN vec2 ellipseNormal(Texel t) {
-    const float flat_ = 1.0f - t.isRound;
-    return vec2(t.normalPerp.x * flat_, t.normalPerp.y * flat_);
+// rho^2 of the image point (dx, dy) px from the centre (x, y) of a disc: inside the ellipse iff <= 1.
+const float kOffDisc = 3.0e38f;
+SHARED_FN float discRho2(vec2 slope, float radius, float x, float y, float focal, float dx, float dy) {
+    const float along = slope.x * dx + slope.y * dy;
+    const float ex = dx - along * x;
+    const float ey = dy - along * y;
+    const float ez = along * focal;
+    const float q = (1.0f + along) * radius;
+    const float rho2 = (ex * ex + ey * ey + ez * ez) / max(q * q, 1.0e-20f);
+    return along > -0.99f ? rho2 : kOffDisc;  // beyond, the plane is behind the eye
 }
 
-// rho^2 of a point at (dx, dy) pixels from the centre: inside the ellipse iff <= 1.
-SHARED_FN float ellipseRho2(vec2 normalPerp, float radius, float dx, float dy) {
-    const float m2 = facingSquared(normalPerp, radius);
-    const float along = normalPerp.x * dx + normalPerp.y * dy;
-    return (m2 * (dx * dx + dy * dy) + along * along) / (m2 * radius * radius);
+// Depth of the texel's plane at the texel's own centre (a tube: its own). Planes that face the eye by less than
+// kGrazing count as if they did by that; and no farther from the centre's depth than a disc twice as large reaches (or
+// one that is a pixel wide where it is seen edge-on).
+const float kGrazing = 0.03125f;
+SHARED_FN float planeDepth(float depth, float radius, vec2 normalPerp, float offsetX, float offsetY, float isRound,
+                           float x, float y, float focal) {
+    const float sine2 = normalPerp.x * normalPerp.x + normalPerp.y * normalPerp.y;
+    const float facing = max(sqrt(max(1.0f - sine2, 0.0f)), kGrazing);
+    const vec2 s = planeSlope(normalPerp, 1.0f / facing, x + offsetX, y + offsetY, focal);
+    const float reach = min(max(2.0f * radius, 1.0f / facing) / focal, 0.5f);
+    const float along = -(s.x * offsetX + s.y * offsetY);
+    const float flat_ = 1.0f - isRound;
+    return depth / (1.0f + flat_ * min(max(along, -reach), reach));
 }
 
 // Leaves are no surface: they have hardly any thickness (half of it, over the radius), so that they are not merged with
