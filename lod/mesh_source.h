@@ -2,7 +2,9 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 
+#include "engine/base/numbers.h"
 #include "engine/base/result.h"
 #include "lod/mesh.h"
 
@@ -11,9 +13,9 @@ namespace stipple::lod {
 /// Triangles that are read block by block, as often as it takes: they need not fit in memory.
 struct MeshSource {
     struct Bounds {
-        glm::dvec3 lo{1e300}, hi{-1e300};  ///< of finite vertices; lo > hi: there are none
+        glm::dvec3 lo{std::numeric_limits<double>::max()}, hi{-lo};  ///< of finite vertices; lo > hi: there are none
         void add(const glm::dvec3& p) {
-            if (!std::isfinite(p.x + p.y + p.z)) return;
+            if (!isFinite(p)) return;
             lo = glm::min(lo, p);
             hi = glm::max(hi, p);
         }

@@ -6,12 +6,15 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 
+#include "engine/base/numbers.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::lod {
 
-/// `n`: any length but zero.
+/// `n`: any finite length but zero.
 inline uint32_t octEncode(glm::vec3 n) {
+    const float largest = std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)});
+    if (!(largest > 1e-30f && largest < 1e30f)) n = withoutScale(n);  // their sum would be rounded, or none
     const float sum = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
     float x = n.x / sum, y = n.y / sum;
     if (n.z < 0) {
@@ -20,7 +23,7 @@ inline uint32_t octEncode(glm::vec3 n) {
         x = fx;
     }
     const auto code = [](float v) {
-        return static_cast<uint32_t>(std::clamp(std::floor((v + 1.0f) * 32767.0f + 0.5f), 0.0f, 65534.0f));
+        return toWhole<uint32_t>(std::clamp(std::floor((v + 1.0f) * 32767.0f + 0.5f), 0.0f, 65534.0f));
     };
     return code(x) | code(y) << 16;
 }

@@ -219,6 +219,7 @@ Result<void> StoreWriter::appendChunk(const std::vector<uint8_t>& bytes, const s
 }
 
 Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& description) {
+    STIPPLE_TRY(checkSpace(h, description));
     std::vector<NodeOnDisk> nodes;
     std::vector<CodeCount> pairs;
     nodes.reserve(h.nodes.size());
@@ -267,9 +268,13 @@ Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& des
     head.nodeCount = nodes.size();
     head.fileBytes = file_.position() + sizeof(Foot);
     // The node table holds the hash of every chunk, so these stand for the whole content.
+    // Names of files are no content.
+    StoreDescription nameless = description;
+    nameless.source.clear();
+    const std::string content = describeAsText(nameless);
     const std::array<uint64_t, 7> parts{head.nodes.hash,
                                         head.counts.hash,
-                                        head.description.hash,
+                                        hashBytes(content.data(), content.size()),
                                         head.mesh.hash,
                                         head.rootLog2,
                                         std::bit_cast<uint64_t>(head.unit),

@@ -24,9 +24,7 @@ bool isWithin(const shared::vec3& v, float limit) {
 }
 
 /// World coordinates of all that the lattice can name must be finite, and so must be what is measured in them.
-bool isPossibleSpace(const Store& store) {
-    const Hierarchy& h = store.hierarchy;
-    const StoreDescription& d = store.description;
+bool isPossibleSpace(const Hierarchy& h, const StoreDescription& d) {
     const double edge = std::ldexp(h.unit, static_cast<int>(h.rootLog2));
     bool fits = isWithin(h.origin, kFarthest) && h.unit >= 1e-150 && edge <= kFarthest && h.errors.smallest >= 1e-30 &&
                 h.errors.smallest <= kFarthestSteps;
@@ -162,11 +160,24 @@ Result<void> checkTables(const Store& store, uint64_t chunksEnd) {
     if (!h.discFactors.empty() && !(h.smallestDisc > 0 && std::isfinite(h.smallestDisc)))
         return bad("the size of its discs is not possible");
     if (!(std::abs(glm::length(store.description.up) - 1) < 1e-6)) return bad("the up direction has not the length 1");
-    if (!isPossibleSpace(store)) return bad("its coordinates are not possible");
+    if (!isPossibleSpace(store.hierarchy, store.description)) return bad("its coordinates are not possible");
     if (h.isProgressive && (h.isStrands || h.isMesh())) return bad("holds progressive points and something else");
     if (h.isStrands && h.isMesh()) return bad("holds strands and groups of triangles");
     STIPPLE_TRY(checkTextures(store, chunksEnd));
     return h.isMesh() ? checkGroups(store, chunksEnd) : checkNodes(store, chunksEnd);
+}
+
+Result<void> checkSpace(const Hierarchy& h, const StoreDescription& d) {
+    if (isPossibleSpace(h, d)) return {};
+    double farthest = 0;
+    for (const glm::dvec3& p : {d.boundsMin, d.boundsMax})
+        for (int a = 0; a < 3; ++a) farthest = std::max(farthest, std::abs(p[a]));
+    return fail(
+        ErrorKind::input,
+        farthest > kFarthest
+            ? fmt::format("its coordinates reach {:.3g}: beyond {:.0e} distances are no numbers", farthest, kFarthest)
+            : fmt::format("its coordinates cannot be computed with: steps of {:.3g} units", h.unit),
+        d.source, "give it other units");
 }
 
 }  // namespace stipple::lod

@@ -24,6 +24,9 @@ inline bool isPossibleGain(uint64_t bytes, uint64_t rawBytes) { return rawBytes 
 /// finite. Chunks end before `chunksEnd`.
 Result<void> checkTables(const Store& store, uint64_t chunksEnd);
 
+/// Of a store that is built: can what its coordinates say be computed with? An input error that names its source.
+Result<void> checkSpace(const Hierarchy& h, const StoreDescription& d);
+
 /// Of a decoded chunk: renderers index materials by what vertices say.
 Result<void> checkMaterials(const Store& store, const Chunk& chunk, const std::string& where);
 

@@ -5,9 +5,12 @@
 #include <cmath>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
+
+#include "engine/base/numbers.h"
 
 namespace stipple::lod {
 
@@ -40,9 +43,9 @@ struct StrandSet {
 };
 
 struct StrandBounds {
-    glm::dvec3 lo{1e300}, hi{-1e300};  ///< of finite vertices; lo > hi: there are none
+    glm::dvec3 lo{std::numeric_limits<double>::max()}, hi{-lo};  ///< of finite vertices; lo > hi: there are none
     void add(const glm::dvec3& p) {
-        if (!std::isfinite(p.x + p.y + p.z)) return;
+        if (!isFinite(p)) return;
         lo = glm::min(lo, p);
         hi = glm::max(hi, p);
     }

@@ -198,26 +198,78 @@ void Streamer::request(const lod::Cut& cut) {
     ++frame_;
     for (const auto& [source, node] : cut.keep) sources_[source].nodes[node].lastUsed = frame_;
     wanted_.assign(cut.wanted.begin(), cut.wanted.end());
-    std::sort(wanted_.begin(), wanted_.end(), [](const lod::CutWanted& a, const lod::CutWanted& b) {
-        return a.priority != b.priority ? a.priority > b.priority
-                                        : std::pair{a.source, a.node} < std::pair{b.source, b.node};
-    });
+    std::sort(wanted_.begin(), wanted_.end(), lod::isMoreUrgent);
     for (const lod::CutWanted& w : wanted_) {
         if (counters_.inFlight >= settings_.requestsInFlight) break;
-        Source& source = sources_[w.source];
-        NodeState& state = source.nodes[w.node];
-        if ((state.state != ChunkState::absent && state.state != ChunkState::failed) || frame_ < state.retryAt)
-            continue;
-        const ChunkKey key{w.source, w.node};
-        setState(key, ChunkState::requested);
-        ++counters_.inFlight;
-        ++counters_.requests;
-        const std::string where = fmt::format("{}: chunk {}", source.name, w.node);
-        executor_.run(
-            [key, where, bytes = source.bytes, h = source.hierarchy, finish = source.finish, queue = completed_] {
-                queue->push({key, fetchOrFail(*bytes, *h, key.node, *finish, where)});
-            });
+        start(w.source, w.node);
     }
+}
+
+void Streamer::start(uint32_t sourceIndex, uint32_t node) {
+    Source& source = sources_[sourceIndex];
+    NodeState& state = source.nodes[node];
+    if ((state.state != ChunkState::absent && state.state != ChunkState::failed) || frame_ < state.retryAt) return;
+    const ChunkKey key{sourceIndex, node};
+    setState(key, ChunkState::requested);
+    ++counters_.inFlight;
+    ++counters_.requests;
+    const std::string where = fmt::format("{}: chunk {}", source.name, node);
+    executor_.run([key, where, bytes = source.bytes, h = source.hierarchy, finish = source.finish, queue = completed_] {
+        queue->push({key, fetchOrFail(*bytes, *h, key.node, *finish, where)});
+    });
+}
+
+void Streamer::makeRoomFor(const lod::ResidentPlan& plan) {
+    const auto isPlanned = [&](ChunkKey key) { return plan.chunks[key.source][key.node] != 0; };
+    std::erase_if(arrived_, [&](const Arrival& a) {
+        if (isPlanned(a.key)) return false;
+        setState(a.key, ChunkState::absent);
+        return true;
+    });
+    std::vector<ChunkKey> others;
+    uint64_t together = plan.bytes;
+    for (uint32_t s = 0; s < sources_.size(); ++s)
+        for (uint32_t n = 0; n < sources_[s].nodes.size(); ++n) {
+            NodeState& state = sources_[s].nodes[n];
+            if (isPlanned({s, n})) state.retryAt = 0;  // there was no room; now there is
+            if (state.state != ChunkState::resident || isPlanned({s, n})) continue;
+            others.push_back({s, n});
+            together += sources_[s].hierarchy->decodedBytes(n);
+        }
+    const auto last = [&](ChunkKey k) { return sources_[k.source].nodes[k.node].lastUsed; };
+    // What builds on others was not used later than they, and has the higher number.
+    std::sort(others.begin(), others.end(), [&](ChunkKey a, ChunkKey b) {
+        if (last(a) != last(b)) return last(a) < last(b);
+        return a.source != b.source ? a.source < b.source : a.node > b.node;
+    });
+    for (const ChunkKey key : others) {
+        if (plan.isComplete() && together <= settings_.residentBytes) break;
+        together -= sources_[key.source].hierarchy->decodedBytes(key.node);
+        evict(key);
+    }
+}
+
+void Streamer::request(const lod::ResidentPlan& plan) {
+    ++frame_;
+    for (uint32_t s = 0; s < sources_.size(); ++s)
+        for (uint32_t n = 0; n < sources_[s].nodes.size(); ++n) {
+            if (!plan.chunks[s][n]) continue;
+            if (drawable_[s][n])
+                sources_[s].nodes[n].lastUsed = frame_;
+            else if (counters_.inFlight < settings_.requestsInFlight)
+                start(s, n);
+        }
+}
+
+std::vector<std::pair<uint32_t, uint32_t>> Streamer::failed(bool isDue) const {
+    std::vector<std::pair<uint32_t, uint32_t>> out;
+    if (counters_.failures == 0) return out;
+    for (uint32_t s = 0; s < sources_.size(); ++s)
+        for (uint32_t n = 0; n < sources_[s].nodes.size(); ++n) {
+            const NodeState& state = sources_[s].nodes[n];
+            if (state.state == ChunkState::failed && (isDue || frame_ < state.retryAt)) out.emplace_back(s, n);
+        }
+    return out;
 }
 
 }  // namespace stipple::streaming

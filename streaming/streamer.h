@@ -17,6 +17,7 @@
 #include "engine/base/queue.h"
 #include "lod/chunk.h"
 #include "lod/cut.h"
+#include "lod/resident.h"
 #include "streaming/byte_source.h"
 
 namespace stipple::streaming {
@@ -73,6 +74,17 @@ class Streamer {
     void upload();
     /// Starts what the cut wants, up to the quota; remembers what it keeps.
     void request(const lod::Cut& cut);
+
+    // For pictures that hang on a plan and not on time; nothing may be on its way from the executor.
+    /// Drops what arrived and is not in the plan; of what is resident and not in it, the least recently used until the
+    /// plan has room: all of it where the plan is not complete, as then it would show.
+    void makeRoomFor(const lod::ResidentPlan& plan);
+    /// As request: starts what the plan has and what is not there.
+    void request(const lod::ResidentPlan& plan);
+    /// (source, node) that could not be read, or that the sink could not take; `isDue`: also those to be tried again.
+    std::vector<std::pair<uint32_t, uint32_t>> failed(bool isDue) const;
+    uint64_t residentLimit() const { return settings_.residentBytes; }
+
     lod::Residency residency() const { return {drawable_}; }
     const StreamCounters& counters() const { return counters_; }
     /// True if nothing is on its way.
@@ -99,6 +111,7 @@ class Streamer {
     };
     void setState(ChunkKey key, ChunkState to);
     bool makeRoom(uint64_t bytes);
+    void start(uint32_t source, uint32_t node);
     void evict(ChunkKey key);
     void countInParents(ChunkKey key, int change);
 

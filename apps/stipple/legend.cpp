@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/base/numbers.h"
+
 namespace stipple::app {
 namespace {
 
@@ -72,7 +74,7 @@ class Canvas {
 };
 
 std::string number(double v, double span) {
-    const int digits = std::clamp(3 - static_cast<int>(std::floor(std::log10(std::abs(span)))), 0, 9);
+    const int digits = std::clamp(toWhole<int>(3 - std::floor(std::log10(std::abs(span)))), 0, 9);
     return fmt::format("{:.{}f}", v, std::min(digits, 6));
 }
 

@@ -89,14 +89,21 @@ Result<void> awaitRoot(const FramesPlan& plan, const render::FrameSettings& sett
     return {};
 }
 
-/// The mean of `count` frames whose strands narrower than a pixel take other pixels each time.
-Result<void> accumulate(int count, const lod::View& view, render::FrameSettings settings, render::FrameState& state) {
+/// The first view once more: what was waited for stays as it is.
+Result<void> again(const FramesPlan& plan, const render::FrameSettings& settings, render::FrameState& state) {
+    return plan.noWait ? render::renderFrame(state, plan.views.front(), settings)
+                       : render::renderResident(state, plan.views.front(), settings);
+}
+
+/// The mean of frames whose strands narrower than a pixel take other pixels each time.
+Result<void> accumulate(const FramesPlan& plan, render::FrameSettings settings, render::FrameState& state) {
+    const int count = plan.accumulate;
     if (count <= 1) return {};
     std::vector<float> sum(state.image.linear.size()), coverage(state.image.rgba.size());
     for (int f = 0; f < count; ++f) {
         STIPPLE_TRY(checkStopped("--accumulate"));
         settings.draw.coverageSeed = static_cast<uint32_t>(f);
-        STIPPLE_TRY(render::renderFrame(state, view, settings));
+        STIPPLE_TRY(again(plan, settings, state));
         for (size_t i = 0; i < sum.size(); ++i) sum[i] += std::clamp(state.image.linear[i], 0.0f, 1.0f);
         for (size_t i = 0; i < coverage.size(); ++i) coverage[i] += state.image.rgba[i] >> 24 != 0 ? 1.0f : 0.0f;
     }
@@ -141,10 +148,10 @@ Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& sett
     if (!isSingle) return {};
     for (int f = 1; f < plan.repeats; ++f) {  // one view again and again, for timing
         STIPPLE_TRY(checkStopped(plan.output));
-        STIPPLE_TRY(render::renderFrame(state, first, settings));
+        STIPPLE_TRY(again(plan, settings, state));
         timings.add(state.counters.frameMs, state.backend->passTimes());
     }
-    STIPPLE_TRY(accumulate(plan.accumulate, first, settings, state));
+    STIPPLE_TRY(accumulate(plan, settings, state));
     verdict.judge(state);
     return {};
 }

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <numeric>
 
+#include "engine/base/numbers.h"
 #include "engine/base/process.h"
 #include "engine/base/text.h"
 
@@ -95,7 +96,7 @@ void Progress::update(const std::string& stage, uint64_t done, uint64_t total) {
 
 void Progress::printBar(double fraction, double rate, double left) {
     constexpr int kBar = 24;
-    const int full = static_cast<int>(std::clamp(fraction, 0.0, 1.0) * kBar + 0.5);
+    const int full = toWhole<int>(std::clamp(fraction, 0.0, 1.0) * kBar + 0.5);
     const uint64_t onDisk = temporaryBytes_;
     eraseLine();
     fmt::print(stderr, "[{:#<{}}{:<{}}] {:3.0f} %  {:<10}  {:.2f} M/s  {}{}{}", "", full, "", kBar - full,

@@ -14,6 +14,7 @@
 #include <unordered_map>
 
 #include "engine/base/huge_buffer.h"
+#include "engine/base/numbers.h"
 #include "engine/base/process.h"
 #include "engine/base/queue.h"
 #include "shaders/shared/splat.h"
@@ -350,7 +351,7 @@ class CpuBackend final : public render::Backend {
             }
         });
         // Levels whose texels are larger than the largest splat hold nothing.
-        const auto needed = static_cast<size_t>(1 + std::ceil(std::log2(std::max(2.0f, 2 * largestRadius.load()))));
+        const auto needed = toWhole<size_t>(1 + std::ceil(std::log2(std::max(2.0f, 2 * largestRadius.load()))));
         levelCount_ = std::min(levels_.size(), needed);
     }
 

@@ -181,15 +181,15 @@ std::unique_ptr<FrameState> makeFrameState(std::vector<std::shared_ptr<const lod
     return makeFrameState(placed, backend, executor, settings);
 }
 
-Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSettings& settings) {
-    const double start = nowSeconds();
+namespace {
+
+/// From `start` on (seconds) it counts as time of the frame.
+Result<void> draw(FrameState& state, const lod::View& view, const FrameSettings& settings, double start, bool asks) {
     streaming::Streamer& streamer = *state.streamer;
-    streamer.collect();
-    streamer.upload();
     const double cutStart = nowSeconds();
     lod::selectCut(state.scene(), streamer.residency(), view, settings.budgets, state.scratch, state.cut);
     const double cutEnd = nowSeconds();
-    streamer.request(state.cut);
+    if (asks) streamer.request(state.cut);
     makeDrawList(state.cut, state.hierarchies, state.instances, view, settings.draw, state.draws);
     RenderRequest request;
     request.draws = &state.draws;
@@ -230,20 +230,54 @@ Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSe
     return {};
 }
 
-Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const FrameSettings& settings,
-                                 Executor& executor) {
-    streaming::Streamer& streamer = *state.streamer;
+}  // namespace
+
+Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSettings& settings) {
+    const double start = nowSeconds();
+    state.streamer->collect();
+    state.streamer->upload();
+    return draw(state, view, settings, start, true);
+}
+
+Result<void> renderResident(FrameState& state, const lod::View& view, const FrameSettings& settings) {
+    return draw(state, view, settings, nowSeconds(), false);
+}
+
+namespace {
+
+/// Waits until the plan is resident, as far as it can be.
+Result<void> await(const lod::ResidentPlan& plan, streaming::Streamer& streamer, Executor& executor) {
+    streamer.makeRoomFor(plan);
     for (;;) {
         streamer.collect();
         streamer.upload();
-        lod::selectCut(state.scene(), streamer.residency(), view, settings.budgets, state.scratch, state.cut);
         const uint64_t before = streamer.counters().requests;
-        streamer.request(state.cut);
-        if (streamer.isIdle() && streamer.counters().requests == before) break;
+        streamer.request(plan);
+        if (streamer.isIdle() && streamer.counters().requests == before) return {};
         executor.wait();
         if (isStopRequested()) return fail(ErrorKind::interrupted, "interrupted");
     }
-    STIPPLE_TRY(renderFrame(state, view, settings));
+}
+
+}  // namespace
+
+Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const FrameSettings& settings,
+                                 Executor& executor) {
+    streaming::Streamer& streamer = *state.streamer;
+    executor.wait();
+    streamer.collect();
+    auto barred = streamer.failed(false);
+    for (;;) {
+        lod::planResident(state.scene(), view, settings.budgets, streamer.residentLimit(), barred, state.scratch,
+                          state.cut, state.plan);
+        const uint64_t failures = streamer.counters().failures;
+        STIPPLE_TRY(await(state.plan, streamer, executor));
+        if (streamer.counters().failures == failures) break;
+        // Something else may be shown in the place of what cannot be read.
+        const auto more = streamer.failed(true);
+        barred.insert(barred.end(), more.begin(), more.end());
+    }
+    STIPPLE_TRY(renderResident(state, view, settings));
     return state.cut.wanted.empty();
 }
 

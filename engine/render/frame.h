@@ -31,6 +31,7 @@ struct FrameState {
     Backend* backend = nullptr;
     lod::CutScratch scratch;
     lod::Cut cut;
+    lod::ResidentPlan plan;
     DrawList draws;
     Image image;
     FrameCounters counters;
@@ -66,10 +67,13 @@ std::unique_ptr<FrameState> makeFrameState(std::vector<std::shared_ptr<const lod
                                            Executor& executor, const streaming::StreamSettings& settings,
                                            const lod::ColourBy& colour = {});
 
-/// Draws one frame into state.image and fills state.counters.
+/// Draws one frame into state.image and fills state.counters: with what arrived by now, asking for what is missing.
 Result<void> renderFrame(FrameState& state, const lod::View& view, const FrameSettings& settings);
+/// The same with what is resident: it takes nothing in and asks for nothing.
+Result<void> renderResident(FrameState& state, const lod::View& view, const FrameSettings& settings);
 
-/// Frames until nothing that the view wants is missing (or can come any more); true if complete.
+/// Waits for what planResident says of the view and draws it; true if nothing that the view wants is missing. The
+/// picture is the same whatever was drawn before and however long reading took.
 Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const FrameSettings& settings,
                                  Executor& executor);
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/base/file.h"
+#include "engine/base/numbers.h"
 
 namespace stipple::scene {
 namespace {
@@ -234,9 +235,12 @@ CameraPath makeOrbit(std::span<const glm::dvec3> points, const glm::dvec3& up, d
 lod::View makeView(const Camera& camera, uint32_t width, uint32_t height, double nearPlane) {
     lod::View view;
     view.eye = camera.eye;
-    glm::dvec3 forward = camera.target - camera.eye;
-    forward = glm::length(forward) > 0 ? glm::normalize(forward) : glm::dvec3(0, 0, -1);
-    glm::dvec3 right = glm::cross(forward, camera.up);
+    // However far away or near the target is, and however long `up`: their directions count.
+    const auto directionOf = [](const glm::dvec3& v, const glm::dvec3& other) {
+        return hasDirection(v) ? glm::normalize(withoutScale(v)) : other;
+    };
+    const glm::dvec3 forward = directionOf(camera.target - camera.eye, {0, 0, -1});
+    glm::dvec3 right = glm::cross(forward, directionOf(camera.up, glm::dvec3(0)));
     if (!(glm::length(right) > 1e-9))
         right = glm::cross(forward, std::abs(forward.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0));
     view.forward = forward;

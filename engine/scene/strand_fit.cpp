@@ -9,6 +9,7 @@
 #include <numeric>
 #include <queue>
 
+#include "engine/base/numbers.h"
 #include "engine/base/process.h"
 #include "engine/scene/triangles.h"
 #include "shaders/shared/record.h"
@@ -305,9 +306,7 @@ Parts partsOf(const Primitive& p) {
 }
 
 uint32_t packed(const glm::vec3& linear) {
-    const auto byte = [](float l) {
-        return static_cast<uint32_t>(shared::srgbFromLinear(std::clamp(l, 0.0f, 1.0f)) * 255.0f + 0.5f);
-    };
+    const auto byte = [](float l) { return unitToByte(shared::srgbFromLinear(l > 0.0f ? std::min(l, 1.0f) : 0.0f)); };
     return byte(linear.r) | byte(linear.g) << 8 | byte(linear.b) << 16;
 }
 

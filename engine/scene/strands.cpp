@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "engine/base/hash.h"
+#include "engine/base/numbers.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::scene {
@@ -13,7 +14,7 @@ lod::StrandSet flattenStrands(const Scene& scene, const std::vector<Placement>& 
     out.up = {0, 1, 0};
     out.hasColour = true;
     const auto byte = [](float linear) {
-        return static_cast<uint32_t>(shared::srgbFromLinear(std::clamp(linear, 0.0f, 1.0f)) * 255.0f + 0.5f);
+        return unitToByte(shared::srgbFromLinear(linear > 0.0f ? std::min(linear, 1.0f) : 0.0f));
     };
     for (const Placement& at : placed)
         for (const Primitive& p : scene.meshes[static_cast<size_t>(at.mesh)].primitives) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/base/numbers.h"
 #include "engine/scene/borders.h"
 #include "lod/in_memory.h"
 #include "shaders/shared/record.h"
@@ -25,8 +26,11 @@ float linearOf(uint32_t byte) {
 }
 
 uint32_t byteOf(float linear) {
-    return static_cast<uint32_t>(shared::srgbFromLinear(std::clamp(linear, 0.0f, 1.0f)) * 255.0f + 0.5f);
+    return unitToByte(shared::srgbFromLinear(linear > 0.0f ? std::min(linear, 1.0f) : 0.0f));
 }
+
+/// Far enough from the ends that neighbours are whole numbers, too.
+int64_t texelOf(float x) { return toWhole<int64_t>(std::clamp(std::floor(x), -9e15f, 9e15f)); }
 
 int64_t wrapped(int64_t i, int64_t size, Wrap wrap) {
     if (wrap == Wrap::clamp) return std::clamp<int64_t>(i, 0, size - 1);
@@ -38,7 +42,7 @@ int64_t wrapped(int64_t i, int64_t size, Wrap wrap) {
 /// Linear colour and alpha at uv; bilinear, averaged over `footprint` texels.
 glm::vec4 lookup(const DecodedImage& image, const Texture& texture, glm::vec2 uv, float footprint) {
     if (image.rgba.empty() || !std::isfinite(uv.x + uv.y)) return glm::vec4(1);
-    const int taps = std::clamp(static_cast<int>(std::ceil(footprint)), 1, kMostTaps);
+    const int taps = std::clamp(toWhole<int>(std::ceil(footprint)), 1, kMostTaps);
     const auto w = static_cast<int64_t>(image.width), h = static_cast<int64_t>(image.height);
     glm::vec4 sum(0);
     for (int ty = 0; ty < taps; ++ty)
@@ -48,8 +52,8 @@ glm::vec4 lookup(const DecodedImage& image, const Texture& texture, glm::vec2 uv
             const float x = uv.x * static_cast<float>(w) + dx - 0.5f, y = uv.y * static_cast<float>(h) + dy - 0.5f;
             const float fx = x - std::floor(x), fy = y - std::floor(y);
             for (int k = 0; k < 4; ++k) {
-                const int64_t px = wrapped(static_cast<int64_t>(std::floor(x)) + (k & 1), w, texture.wrapU);
-                const int64_t py = wrapped(static_cast<int64_t>(std::floor(y)) + (k >> 1), h, texture.wrapV);
+                const int64_t px = wrapped(texelOf(x) + (k & 1), w, texture.wrapU);
+                const int64_t py = wrapped(texelOf(y) + (k >> 1), h, texture.wrapV);
                 const uint32_t c = image.rgba[static_cast<size_t>(py * w + px)];
                 const float weight = ((k & 1) != 0 ? fx : 1 - fx) * (k > 1 ? fy : 1 - fy);
                 sum += weight * glm::vec4(linearOf(c & 255u), linearOf(c >> 8 & 255u), linearOf(c >> 16 & 255u),

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "engine/base/hash.h"
+#include "engine/base/numbers.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::scene {
@@ -35,10 +36,9 @@ uint32_t surfaceOf(const Scene& scene, const Primitive& p) {
 
 uint32_t packedColour(const glm::vec4& c) {
     const auto byte = [](float linear) {
-        return static_cast<uint32_t>(shared::srgbFromLinear(std::clamp(linear, 0.0f, 1.0f)) * 255.0f + 0.5f);
+        return unitToByte(shared::srgbFromLinear(linear > 0.0f ? std::min(linear, 1.0f) : 0.0f));
     };
-    return byte(c.r) | byte(c.g) << 8 | byte(c.b) << 16 |
-           static_cast<uint32_t>(std::clamp(c.a, 0.0f, 1.0f) * 255.0f + 0.5f) << 24;
+    return byte(c.r) | byte(c.g) << 8 | byte(c.b) << 16 | unitToByte(c.a) << 24;
 }
 
 const std::array<TextureUse Material::*, 5> kUses{&Material::baseColourTexture, &Material::normalTexture,

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/base/numbers.h"
 #include "engine/base/process.h"
 #include "lod/attributes.h"
 
@@ -35,7 +36,7 @@ void take(const SourceInfo& info, const PointBlock& block, size_t count, PartSur
         s.greatestStep = glm::max(s.greatestStep, p);
     }
     for (const glm::dvec3& p : block.position) {
-        if (!std::isfinite(p.x + p.y + p.z)) {
+        if (!isFinite(p)) {
             ++s.notFinite;
             continue;
         }

@@ -132,15 +132,24 @@ SHARED_FN float uvFootprint(vec3 ray, float inverseFocal, vec3 a, vec3 e1, vec3 
     return longest < 1.0e12f ? sqrt(longest) : 1.0e6f;
 }
 
+// The same direction, its largest part about 1: products of three of them are floats, whatever units a mesh has
+// (edges of 1e-18 to 1e18). By a power of two, so that it rounds nothing.
+SHARED_FN vec3 aboutOne(vec3 v) {
+    const uint largest = floatBitsToUint(max(max(abs(v.x), abs(v.y)), abs(v.z))) & 0x7f800000u;
+    const float inverse = uintBitsToFloat(0x7f000000u - (largest < 0x7e800000u ? largest : 0x7e800000u));
+    return vec3(v.x * inverse, v.y * inverse, v.z * inverse);
+}
+
 // Normal `n` (any length) bent by a tangent-space normal `m` (x along u, y against v). Tangents are the triangle's own:
 // they differ from those that a tool may have stored by what the texture turns within a triangle.
-SHARED_FN vec3 bumpedNormal(vec3 n, vec3 e1, vec3 e2, vec2 d1, vec2 d2, vec3 m) {
+SHARED_FN vec3 bumpedNormal(vec3 anyNormal, vec3 e1, vec3 e2, vec2 d1, vec2 d2, vec3 m) {
+    const vec3 n = aboutOne(anyNormal);
     const float det = d1.x * d2.y - d1.y * d2.x;
     const float side = det < 0.0f ? -1.0f : 1.0f;
-    vec3 t = vec3(side * (e1.x * d2.y - e2.x * d1.y), side * (e1.y * d2.y - e2.y * d1.y),
-                  side * (e1.z * d2.y - e2.z * d1.y));
-    vec3 b = vec3(side * (e1.x * d2.x - e2.x * d1.x), side * (e1.y * d2.x - e2.y * d1.x),
-                  side * (e1.z * d2.x - e2.z * d1.x));
+    vec3 t = aboutOne(vec3(side * (e1.x * d2.y - e2.x * d1.y), side * (e1.y * d2.y - e2.y * d1.y),
+                           side * (e1.z * d2.y - e2.z * d1.y)));
+    vec3 b = aboutOne(vec3(side * (e1.x * d2.x - e2.x * d1.x), side * (e1.y * d2.x - e2.y * d1.x),
+                           side * (e1.z * d2.x - e2.z * d1.x)));
     const float nn = max(n.x * n.x + n.y * n.y + n.z * n.z, 1.0e-30f);
     const float tn = (t.x * n.x + t.y * n.y + t.z * n.z) / nn;
     const float bn = (b.x * n.x + b.y * n.y + b.z * n.z) / nn;
@@ -154,7 +163,8 @@ SHARED_FN vec3 bumpedNormal(vec3 n, vec3 e1, vec3 e2, vec2 d1, vec2 d2, vec3 m) 
 
 // Unit normal to shade with, turned towards the eye. `n`: interpolated, `face`: the triangle's own, any lengths; `ray`:
 // from the eye. Interpolated normals that just turn away at a silhouette are bent back to it instead of flipped.
-SHARED_FN vec3 surfaceNormal(vec3 n, vec3 face, vec3 ray) {
+SHARED_FN vec3 surfaceNormal(vec3 anyNormal, vec3 anyFace, vec3 ray) {
+    const vec3 n = aboutOne(anyNormal), face = aboutOne(anyFace);
     const float side = face.x * ray.x + face.y * ray.y + face.z * ray.z > 0.0f ? -1.0f : 1.0f;
     const float towards =
         max(side * (n.x * ray.x + n.y * ray.y + n.z * ray.z), 0.0f) / (ray.x * ray.x + ray.y * ray.y + ray.z * ray.z);

@@ -20,6 +20,36 @@ TEST(MakeView, IsOrthonormalEvenLookingAlongUp) {
     EXPECT_NEAR(glm::length(glm::cross(v.right, v.down) - v.forward), 0, 1e-12);
 }
 
+TEST(MakeView, HangsOnDirectionsAndNotOnLengths) {
+    Camera camera;
+    camera.eye = {0, 0, 0};
+    camera.target = {1, 2, 3};
+    camera.up = {0.2, 1, -0.1};
+    const lod::View truth = makeView(camera, 100, 100, 0.1);
+    for (const double length : {1e-300, 1e-100, 1e-12, 1e-6, 1e6, 1e14, 1e100, 1e300}) {
+        Camera scaled = camera;
+        scaled.up *= length;
+        for (const bool isTarget : {false, true}) {
+            if (isTarget) scaled.target *= length;
+            const lod::View v = makeView(scaled, 100, 100, 0.1);
+            EXPECT_LT(glm::length(v.right - truth.right), 1e-12) << length;
+            EXPECT_LT(glm::length(v.forward - truth.forward), 1e-12) << length;
+        }
+    }
+}
+
+TEST(CameraPath, FieldsOfViewThatNobodyCanSeeAreRefusedByName) {
+    const test::TempFolder folder;
+    for (const char* bad : {"0", "180", "-1", "1e308", "\"nan\"", "null"}) {
+        std::ofstream(folder / "p.json") << R"({"keys": [{"t": 0, "eye": [0,0,0], "target": [1,0,0], "fov": )" << bad
+                                         << "}]}";
+        const auto path = readCameraPath(folder / "p.json");
+        ASSERT_FALSE(path) << bad;
+        EXPECT_NE(path.error().line().find("'fov'"), std::string::npos) << path.error().line();
+        EXPECT_NE(path.error().line().find("key 0"), std::string::npos) << path.error().line();
+    }
+}
+
 TEST(CameraPath, GoesThroughItsKeysAndRefusesNonsense) {
     const test::TempFolder folder;
     const auto write = [&](const std::string& text) { std::ofstream(folder / "p.json") << text; };

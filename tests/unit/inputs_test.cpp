@@ -201,6 +201,41 @@ TEST(Inputs, NeitherOrderNorThreadsNorMemoryNorFilesChangeWhichPointsAreOutliers
     EXPECT_EQ(three.pointsOut, first.pointsOut);
 }
 
+TEST(Inputs, TheNameOfAFileIsNoPartOfTheContentHash) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    auto points = test::bumpySphere(3000, 1);
+    test::writePly(folder / "a.ply", points);
+    std::filesystem::copy_file(folder / "a.ply", folder / "a much longer name.ply");
+    points[0].colour ^= 1;
+    test::writePly(folder / "other.ply", points);
+    const auto hashOf = [&](const char* name) {
+        return test::build({folder / name}, folder / "out.stipple", *executor).contentHash;
+    };
+    const uint64_t first = hashOf("a.ply");
+    EXPECT_EQ(hashOf("a much longer name.ply"), first);
+    EXPECT_EQ(lod::openStore(folder / "out.stipple")->description.source, "a much longer name.ply");
+    EXPECT_NE(hashOf("other.ply"), first) << "one bit of one colour is";
+}
+
+TEST(Inputs, PointsAtTheEndOfTheDoublesAreFiniteAndRefusedByName) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    auto points = test::bumpySphere(3000, 1);
+    points.push_back({glm::dvec3(1e308, 1e308, 0)});
+    test::writePly(folder / "a.ply", points);
+    Progress silent(false);
+    const auto built = lod::buildStore({folder / "a.ply"}, folder / "a.stipple", {}, *executor, silent);
+    ASSERT_FALSE(built);
+    EXPECT_EQ(built.error().kind, ErrorKind::input);
+    EXPECT_NE(built.error().line().find("1e+308"), std::string::npos) << built.error().line();
+    EXPECT_NE(built.error().line().find("a.ply"), std::string::npos) << built.error().line();
+    EXPECT_EQ(built.error().line().find("damaged"), std::string::npos) << built.error().line();
+    points.back().position = glm::dvec3(1e145, -1e145, 0);
+    test::writePly(folder / "a.ply", points);
+    EXPECT_EQ(test::build({folder / "a.ply"}, folder / "a.stipple", *executor).pointsOut, points.size());
+}
+
 TEST(Inputs, AnInterruptedBuildKnowsItsOutliers) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(1);

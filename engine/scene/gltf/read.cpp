@@ -7,6 +7,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
 
+#include "engine/base/numbers.h"
 #include "engine/scene/gltf/check.h"
 #include "engine/scene/gltf/json_tools.h"
 #include "engine/scene/gltf/looks.h"
@@ -123,9 +124,7 @@ class Reader {
     /// Elements whose vertices are not there or are no numbers.
     void dropBroken(Primitive& p, const std::string& name) {
         const size_t corners = p.kind == PrimitiveKind::points ? 1 : p.kind == PrimitiveKind::lines ? 2 : 3;
-        const auto isGood = [&](uint32_t i) {
-            return i < p.position.size() && std::isfinite(p.position[i].x + p.position[i].y + p.position[i].z);
-        };
+        const auto isGood = [&](uint32_t i) { return i < p.position.size() && isFinite(p.position[i]); };
         size_t kept = 0;
         for (size_t i = 0; i + corners <= p.indices.size(); i += corners) {
             bool good = true;
@@ -140,7 +139,7 @@ class Reader {
                             name, p.indices.size() / corners - kept / corners, p.indices.size() / corners));
         p.indices.resize(kept);
         for (glm::vec3& v : p.position)  // nobody refers to those any more
-            if (!std::isfinite(v.x + v.y + v.z)) v = glm::vec3(0);
+            if (!isFinite(v)) v = glm::vec3(0);
     }
 
     /// glTF 2.0, 3.7.2.1: modes 0 to 6.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/base/numbers.h"
 #include "lod/build/mesh/mesh_work.h"
 #include "lod/store.h"
 #include "shaders/shared/record.h"
@@ -33,9 +34,9 @@ uint32_t store(const Image& image, glm::vec4 v) {
     }
     uint32_t c = 0;
     for (int k = 0; k < 4; ++k) {
-        const float s = std::clamp(v[k], 0.0f, 1.0f);
+        const float s = v[k] > 0.0f ? std::min(v[k], 1.0f) : 0.0f;
         const float code = image.kind == TextureKind::colour && k < 3 ? shared::srgbFromLinear(s) : s;
-        c |= static_cast<uint32_t>(code * 255.0f + 0.5f) << (8 * k);
+        c |= unitToByte(code) << (8 * k);
     }
     return c;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "engine/base/numbers.h"
 #include "lod/build/mesh/mesh_work.h"
 #include "lod/build/morton.h"
 #include "lod/octahedral.h"
@@ -13,8 +14,6 @@ namespace {
 
 constexpr int kLatticeBits = 24;
 constexpr size_t kGrain = 16384;
-
-bool isFinite(const glm::dvec3& p) { return std::isfinite(p.x + p.y + p.z); }
 
 /// Bit by bit: two zeros of different sign are two values. Equal positions stand side by side.
 std::array<uint32_t, 8> wordsOf(const shared::MeshVertex& v) { return std::bit_cast<std::array<uint32_t, 8>>(v); }
@@ -54,14 +53,13 @@ PlacedBlock placeBlock(const TriangleMesh& in, const Lattice& lattice, Executor&
         isBad[i] = isFinite(in.position[i]) ? 0 : 1;
         const glm::dvec3 p = isBad[i] ? lattice.origin : in.position[i];
         const glm::dvec3 q = glm::floor((p - lattice.origin) / lattice.unit + 0.5);
-        v.x = static_cast<int>(q.x);
-        v.y = static_cast<int>(q.y);
-        v.z = static_cast<int>(q.z);
+        v.x = toWhole<int>(q.x);
+        v.y = toWhole<int>(q.y);
+        v.z = toWhole<int>(q.z);
         const glm::dvec3 off = glm::abs(lattice.origin + q * lattice.unit - p);
         rounding = std::max({rounding, off.x, off.y, off.z});
         const glm::vec3 n = in.normal.empty() ? glm::vec3(0) : in.normal[i];
-        const float length = glm::length(n);
-        const bool isFlat = !(length > 1e-20f) || !std::isfinite(length);
+        const bool isFlat = !hasDirection(n);
         v.normal = isFlat ? octEncode({0, 0, 1}) : octEncode(n);
         v.colour = in.colour.empty() ? ~0u : in.colour[i];
         const glm::vec2 uv = in.uv.empty() ? glm::vec2(0) : in.uv[i];

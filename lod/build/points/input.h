@@ -7,6 +7,7 @@
 #include <functional>
 #include <optional>
 
+#include "engine/base/numbers.h"
 #include "lod/build/build.h"
 #include "lod/build/lattice.h"
 #include "lod/build/octree/bytes.h"
@@ -16,7 +17,6 @@
 namespace stipple::lod {
 
 inline constexpr size_t kBlockPoints = 65536;  ///< that a reader gives at once
-inline bool isFinite(const glm::dvec3& p) { return std::isfinite(p.x + p.y + p.z); }
 
 class PointInput {
   public:

@@ -142,9 +142,8 @@ void PointInput::fill(const Part& part, const PointBlock& block, Points& out) co
     out.normal.resize(hasNormal ? count : 0);
     for (size_t i = 0; hasNormal && i < count; ++i) {
         const glm::vec3 n = block.normal.empty() ? glm::vec3(0) : block.normal[i];
-        const float scale = std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)});
-        const bool usable = scale > 0 && std::isfinite(scale) && std::isfinite(n.x + n.y + n.z);
-        out.normal[i] = usable ? roundedNormal(n / scale) : 0u;
+        const bool usable = hasDirection(n);
+        out.normal[i] = usable ? roundedNormal(n / std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)})) : 0u;
         if (!usable) out.colour[i] |= shared::kFlagNoNormal << 24;
         if (usable && info.isTwoSided) out.colour[i] |= shared::kFlagTwoSided << 24;
     }

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <memory>
 
+#include "engine/base/numbers.h"
 #include "lod/strand_source.h"
 
 namespace stipple::lod {
@@ -15,8 +16,6 @@ struct Vertex {
     glm::vec3 normal;
     uint32_t colour;
 };
-
-bool isFinite(const glm::dvec3& p) { return std::isfinite(p.x + p.y + p.z); }
 
 glm::vec3 anyAcross(const glm::vec3& t) {
     return glm::normalize(std::abs(t.x) < 0.7f ? glm::vec3(0, -t.z, t.y) : glm::vec3(-t.z, 0, t.x));
@@ -62,7 +61,7 @@ void makeFrames(std::vector<Vertex>& v) {
 void addTwist(const Vertex& a, const Vertex& b, std::vector<Vertex>& out) {
     const glm::dvec3 t = glm::normalize(b.p - a.p), na(a.normal), nb(b.normal);
     double angle = std::atan2(glm::dot(glm::cross(na, nb), t), glm::dot(na, nb));
-    const int pieces = static_cast<int>(std::ceil(std::abs(angle) / kLargestTwist));
+    const int pieces = toWhole<int>(std::ceil(std::abs(angle) / kLargestTwist));
     for (int k = 1; k < pieces; ++k) {
         const double s = static_cast<double>(k) / pieces, turn = angle * s;
         const glm::dvec3 n = na * std::cos(turn) + glm::cross(t, na) * std::sin(turn);
@@ -109,8 +108,7 @@ StrandSet cleanStrands(StrandSet in, double defaultRadius, double extent) {
             const bool hasRadius = std::isfinite(r) && (r > 0 || (r == 0 && hasRadii));  // a strand may end in a tip
             noRadius += !hasRadius && r != 0 ? 1 : 0;
             const glm::vec3 n = in.normal[i];
-            v.push_back({in.position[i], hasRadius ? r : fallback, std::isfinite(n.x + n.y + n.z) ? n : glm::vec3(0),
-                         in.colour[i]});
+            v.push_back({in.position[i], hasRadius ? r : fallback, isFinite(n) ? n : glm::vec3(0), in.colour[i]});
         }
         // (Of a strand without vertices the last one has no segment to take along.)
         count(out.dropped, "at vertices that are not finite", v.empty() && notFinite > 0 ? notFinite - 1 : notFinite);

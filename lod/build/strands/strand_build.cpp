@@ -10,6 +10,7 @@
 
 #include "engine/base/check.h"
 #include "engine/base/hash.h"
+#include "engine/base/numbers.h"
 #include "lod/build/build_version.h"
 #include "lod/build/octree/cell_build.h"
 #include "lod/build/strands/strand_cell.h"
@@ -70,7 +71,7 @@ class StrandBuild : public CellContent {
                     if (i == block.first[s]) continue;
                     ++facts_.segments;
                     const double length = glm::length(block.position[i] - block.position[i - 1]);
-                    ++octaves[static_cast<int>(std::ceil(std::log2(std::max(length, 1e-300)) * 64))];
+                    ++octaves[toWhole<int>(std::ceil(std::log2(std::max(length, 1e-300)) * 64))];
                 }
             progress.update("survey", std::min(facts_.segments, source_.vertices), source_.vertices);
             return workspace.checkStopped();

@@ -2,6 +2,7 @@
 #include <bit>
 #include <cmath>
 
+#include "engine/base/numbers.h"
 #include "lod/build/octree/packed.h"
 #include "lod/build/strands/strand_work.h"
 #include "lod/octahedral.h"
@@ -33,7 +34,7 @@ StrandPoint TravellingPoint::point() const {
 void divide(const TravellingPoint& a, const TravellingPoint& b, double longest, std::vector<TravellingPoint>& ends) {
     ends.clear();
     const StrandPoint before = a.point(), after = b.point();
-    const auto pieces = static_cast<uint32_t>(std::max(1.0, std::ceil(glm::length(after.p - before.p) / longest)));
+    const auto pieces = toWhole<uint32_t>(std::max(1.0, std::ceil(glm::length(after.p - before.p) / longest)));
     for (uint32_t k = 1; k < pieces; ++k) {
         const double u = static_cast<double>(k) / pieces;
         StrandPoint q = after;

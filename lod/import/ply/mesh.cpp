@@ -3,6 +3,7 @@
 #include <cmath>
 #include <optional>
 
+#include "engine/base/numbers.h"
 #include "engine/base/paged_array.h"
 #include "lod/file_kind.h"
 #include "lod/import/import.h"
@@ -125,10 +126,7 @@ class VertexStore {
     }
 
   private:
-    static uint32_t codeOf(const glm::vec3& normal) {
-        const float length = glm::length(normal);
-        return length > 1e-20f && std::isfinite(length) ? octEncode(normal) : ~0u;
-    }
+    static uint32_t codeOf(const glm::vec3& normal) { return hasDirection(normal) ? octEncode(normal) : ~0u; }
     bool isWide_ = false, hasNormals_ = false, hasColours_ = false, isSumming_ = false;
     uint64_t memoryBytes_ = 0;
     std::string folder_;
@@ -153,7 +151,7 @@ class PlyMesh {
 
         MeshSource::Bounds bounds;
         vertices_.begin();
-        PlyReader reader(file_, header_, 0);
+        PlyReader reader(file_, header_, 0, PlyReader::colourScaleOf(file_, header_));
         PointBlock block;
         uint64_t next = 0;
         for (;;) {
@@ -171,7 +169,7 @@ class PlyMesh {
         }
         facesAt_ = reader.offset();
         if (!vertices_.hasNormals()) {
-            STIPPLE_TRY(sumNormals([&](uint64_t done) { return tell(count_ + done, all); }));
+            STIPPLE_TRY(sumNormals(bounds, [&](uint64_t done) { return tell(count_ + done, all); }));
             vertices_.endSums(count_);
         }
         STIPPLE_TRY(vertices_.status());
@@ -210,9 +208,18 @@ class PlyMesh {
         FaceTaker<Triangle> faces(triangle);
         return reader.readCorners(facesAt_, [&](const PlyReader::Corners& corners) { return faces.take(corners); });
     }
-    Result<void> sumNormals(const std::function<Result<void>(uint64_t done)>& tell) {
+    Result<void> sumNormals(const MeshSource::Bounds& bounds, const std::function<Result<void>(uint64_t done)>& tell) {
         constexpr uint64_t kOften = 65536;
         uint64_t done = 0;
+        // Areas of meshes 1e-20 or 1e20 wide are no floats: sums are taken as of a mesh about 1 wide. A power of two,
+        // so that it rounds nothing.
+        const glm::dvec3 size = 0.5 * bounds.hi - 0.5 * bounds.lo;
+        int exponent = 0;
+        (void)std::frexp(std::max({size.x, size.y, size.z}), &exponent);
+        const auto edge = [&](const Vertex& from, const Vertex& to) {
+            const glm::dvec3 d = to.position - from.position;
+            return glm::dvec3(std::ldexp(d.x, -exponent), std::ldexp(d.y, -exponent), std::ldexp(d.z, -exponent));
+        };
         return forTriangles([&](double a, double b, double c) -> Result<void> {
             if (++done % kOften == 0) STIPPLE_TRY(tell(done));
             const auto n = static_cast<double>(count_);
@@ -220,8 +227,8 @@ class PlyMesh {
             const std::array<uint64_t, 3> corner{static_cast<uint64_t>(a), static_cast<uint64_t>(b),
                                                  static_cast<uint64_t>(c)};
             std::array<Vertex, 3> v{vertices_.get(corner[0]), vertices_.get(corner[1]), vertices_.get(corner[2])};
-            const glm::vec3 sum(glm::cross(v[1].position - v[0].position, v[2].position - v[0].position));
-            if (!std::isfinite(sum.x + sum.y + sum.z)) return {};
+            const glm::vec3 sum(glm::cross(edge(v[0], v[1]), edge(v[0], v[2])));
+            if (!isFinite(sum)) return {};
             for (size_t k = 0; k < 3; ++k) {
                 v.at(k) = vertices_.get(corner.at(k));  // (one vertex may be two corners)
                 v.at(k).normal += sum;

@@ -1,6 +1,9 @@
 // PLY as points. Read in blocks; a header that promises more than the file can hold is refused.
 #include <fmt/format.h>
 
+#include <optional>
+
+#include "engine/base/one_at_a_time.h"
 #include "lod/import/import.h"
 #include "lod/import/ply/rows.h"
 
@@ -65,9 +68,17 @@ Result<PointSource> openPly(const std::string& path, const ReadOptions& options)
     info.hasRadius = (roles >> 9 & 1u) != 0;
     info.up = UpAxis::y;
     source.parts = {info.points};
-    source.openPart = [path, header, wanted](size_t) -> Result<PointReader> {
-        STIPPLE_ASSIGN(InputFile again, InputFile::open(path));
-        auto reader = std::make_shared<PlyReader>(std::make_shared<const InputFile>(std::move(again)), header, wanted);
+    // Read once, whoever reads first.
+    auto scale = std::make_shared<std::optional<double>>();
+    auto once = std::make_shared<OneAtATime>();
+    source.openPart = [path, header, wanted, scale, once](size_t) -> Result<PointReader> {
+        STIPPLE_ASSIGN(InputFile reopened, InputFile::open(path));
+        auto again = std::make_shared<const InputFile>(std::move(reopened));
+        const double colourScale = (*once)([&] {
+            if (!*scale) *scale = PlyReader::colourScaleOf(again, header);
+            return **scale;
+        });
+        auto reader = std::make_shared<PlyReader>(std::move(again), header, wanted, colourScale);
         return PointReader([reader](PointBlock& block, size_t limit) { return reader->read(block, limit); });
     };
     return source;

@@ -6,6 +6,10 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
+
+#include "engine/base/numbers.h"
+#include "engine/base/process.h"
 
 namespace stipple::lod {
 namespace {
@@ -44,10 +48,58 @@ double decode(const uint8_t* bytes, PlyType type, bool swap) {
     return 0;
 }
 
+bool isColour(PlyRole role) { return role == PlyRole::red || role == PlyRole::green || role == PlyRole::blue; }
+/// The type of the colours (of the widest channel), if they have three channels.
+std::optional<PlyType> colourTypeOf(const PlyHeader& header) {
+    std::optional<PlyType> widest;
+    int channels = 0;
+    for (const PlyElement& e : header.elements)
+        for (const PlyProperty& p : e.properties)
+            if (e.name == "vertex" && isColour(p.role)) {
+                widest = std::max(widest.value_or(p.type), p.type);
+                ++channels;
+            }
+    return channels == 3 ? widest : std::nullopt;
+}
+
+/// Lengths of normals do not matter: what is no float keeps its direction.
+glm::vec3 normalOf(const glm::dvec3& n) {
+    const double largest = std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)});
+    const bool isFar = hasDirection(n) && !(largest > 1e-30 && largest < 1e30);
+    const glm::dvec3 v = isFar ? withoutScale(n) : n;
+    return {toFloat(v.x), toFloat(v.y), toFloat(v.z)};
+}
+
 }  // namespace
 
-PlyReader::PlyReader(std::shared_ptr<const InputFile> file, PlyHeader header, size_t wanted)
-    : file_(file), header_(std::move(header)), cursor_(std::move(file), header_.bytes), wanted_(wanted) {
+double plyColourScale(PlyType type, double largest) {
+    if (type < PlyType::i16) return 1;
+    if (type < PlyType::f32) return largest > 255 ? 1 / 257.0 : 1;
+    return largest <= 2 ? 255 : largest <= 510 ? 1 : 1 / 257.0;
+}
+
+double PlyReader::colourScaleOf(const std::shared_ptr<const InputFile>& file, const PlyHeader& header) {
+    const std::optional<PlyType> type = colourTypeOf(header);
+    if (!type || *type < PlyType::i16) return 1;
+    PlyReader reader(file, header, 0);
+    double largest = 0;
+    if (reader.begin())
+        for (uint64_t row = 0; row < reader.vertex_->count && largest <= 510; ++row) {
+            std::array<double, kPlyRoles + kMostAttributes> v{};
+            if (row % 65536 == 0 && isStopRequested()) break;
+            if (!reader.readRow(*reader.vertex_, v.data())) break;
+            for (const PlyRole role : {PlyRole::red, PlyRole::green, PlyRole::blue})
+                if (const double c = v.at(static_cast<size_t>(role)); c <= 65536) largest = std::max(largest, c);
+        }
+    return plyColourScale(*type, largest);
+}
+
+PlyReader::PlyReader(std::shared_ptr<const InputFile> file, PlyHeader header, size_t wanted, double colourScale)
+    : file_(file),
+      header_(std::move(header)),
+      cursor_(std::move(file), header_.bytes),
+      wanted_(wanted),
+      colourScale_(colourScale) {
     for (const PlyElement& e : header_.elements)
         if (e.name == "vertex")
             for (const PlyProperty& p : e.properties)
@@ -55,46 +107,43 @@ PlyReader::PlyReader(std::shared_ptr<const InputFile> file, PlyHeader header, si
                     attributes_.emplace_back(static_cast<size_t>(p.slot), isWide(p.type));
 }
 
-Result<size_t> PlyReader::read(PointBlock& block, size_t limit) {
-    if (!started_) {
-        started_ = true;
-        for (const PlyElement& element : header_.elements) {
-            if (element.name == "vertex") {
-                vertex_ = &element;
-                break;
-            }
-            for (uint64_t row = 0; row < element.count; ++row) STIPPLE_TRY(readRow(element, nullptr));
+/// To the first vertex.
+Result<void> PlyReader::begin() {
+    if (started_) return {};
+    started_ = true;
+    for (const PlyElement& element : header_.elements) {
+        if (element.name == "vertex") {
+            vertex_ = &element;
+            break;
         }
+        for (uint64_t row = 0; row < element.count; ++row) STIPPLE_TRY(readRow(element, nullptr));
     }
+    return {};
+}
+
+Result<size_t> PlyReader::read(PointBlock& block, size_t limit) {
+    STIPPLE_TRY(begin());
     const auto count = static_cast<size_t>(std::min<uint64_t>({limit, vertex_->count - next_, 65536}));
     std::array<bool, kPlyRoles> has{};
-    double colourScale = 1;
-    for (const PlyProperty& p : vertex_->properties) {
-        if (p.role == PlyRole::none) continue;
-        has.at(static_cast<size_t>(p.role)) = true;
-        if (p.role == PlyRole::red)
-            colourScale = p.type == PlyType::f32 || p.type == PlyType::f64 ? 255.0
-                          : p.type == PlyType::u16                         ? 1 / 257.0
-                                                                           : 1.0;
-    }
+    for (const PlyProperty& p : vertex_->properties)
+        if (p.role != PlyRole::none) has.at(static_cast<size_t>(p.role)) = true;
     block.position.reserve(count);
     block.attributes.resize(wanted_);
     for (size_t i = 0; i < count; ++i) {
         std::array<double, kPlyRoles + kMostAttributes> v{};
         STIPPLE_TRY(readRow(*vertex_, v.data()));
         block.position.emplace_back(v[0], v[1], v[2]);
-        if (has[3] && has[4] && has[5])
-            block.normal.emplace_back(static_cast<float>(v[3]), static_cast<float>(v[4]), static_cast<float>(v[5]));
+        if (has[3] && has[4] && has[5]) block.normal.push_back(normalOf({v[3], v[4], v[5]}));
         if (has[6] && has[7] && has[8]) {
             const auto channel = [&](double c) {
-                return static_cast<uint32_t>(std::clamp(c * colourScale + 0.5, 0.0, 255.0));
+                return toWhole<uint32_t>(std::clamp(c * colourScale_ + 0.5, 0.0, 255.0));
             };
             block.colour.push_back(channel(v[6]) | channel(v[7]) << 8 | channel(v[8]) << 16);
         }
-        if (has[9]) block.radius.push_back(static_cast<float>(v[9]));
+        if (has[9]) block.radius.push_back(toFloat(v[9]));
         for (const auto& [slot, wide] : attributes_) {
             auto& values = block.attributes[slot - kPlyRoles];
-            const auto narrow = static_cast<float>(v.at(slot));
+            const float narrow = toFloat(v.at(slot));
             const auto* bytes =
                 wide ? reinterpret_cast<const uint8_t*>(&v.at(slot)) : reinterpret_cast<const uint8_t*>(&narrow);
             values.insert(values.end(), bytes, bytes + (wide ? 8 : 4));

@@ -12,13 +12,21 @@
 namespace stipple::lod {
 
 constexpr size_t kPlyBlockBytes = size_t{4} << 20;
+/// How many of the 255 steps of a channel one unit of a file's colours is. Bytes are what they are. Wider integers are
+/// bytes too, unless one is above 255 (as LAS has it); floats are shares of 1, bytes or 16 bits, by the largest there
+/// is. (Largest: a little beyond 1 or 255 still counts as that, rendered colours overshoot.)
+double plyColourScale(PlyType type, double largest);
+
 /// Kept as f64, as f32 would not be exact.
 inline bool isWide(PlyType type) { return type == PlyType::f64 || type == PlyType::i32 || type == PlyType::u32; }
 
 class PlyReader {
   public:
-    /// `wanted`: how many attributes the properties' slots ask for.
-    PlyReader(std::shared_ptr<const InputFile> file, PlyHeader header, size_t wanted);
+    /// `wanted`: how many attributes the properties' slots ask for; `colourScale`: see plyColourScale.
+    PlyReader(std::shared_ptr<const InputFile> file, PlyHeader header, size_t wanted, double colourScale = 1);
+    /// The scale of a file's colours; its vertices are read for that where their type leaves it open. As far as the
+    /// file can be read: what is wrong with it is told by who reads it.
+    static double colourScaleOf(const std::shared_ptr<const InputFile>& file, const PlyHeader& header);
     /// The next rows of the element 'vertex', at most `limit`; 0 at the end.
     Result<size_t> read(PointBlock& block, size_t limit);
     /// After the last vertex: where the elements behind it begin.
@@ -33,6 +41,7 @@ class PlyReader {
     Result<void> readCorners(uint64_t offset, const std::function<Result<void>(const Corners&)>& take);
 
   private:
+    Result<void> begin();
     tl::unexpected<Error> truncated() const;
     Result<void> readRow(const PlyElement& element, double* values);
     Result<void> readAsciiRow(const PlyElement& element, double* values);
@@ -43,6 +52,7 @@ class PlyReader {
     PlyHeader header_;
     Cursor cursor_;
     size_t wanted_;
+    double colourScale_;
     std::vector<std::pair<size_t, bool>> attributes_;  ///< slot, stored as f64
     const PlyElement* vertex_ = nullptr;
     uint64_t next_ = 0;

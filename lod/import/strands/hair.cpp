@@ -4,6 +4,7 @@
 #include <array>
 #include <cstring>
 
+#include "engine/base/numbers.h"
 #include "lod/import/strands/strand_readers.h"
 
 namespace stipple::lod {
@@ -50,13 +51,11 @@ Result<void> readHair(const std::function<Cursor(uint64_t)>& open, const std::st
            thickness = arrayOf(kThickness, head.points, 4);
     arrayOf(kTransparency, head.points, 4);
     Cursor colours = arrayOf(kColours, head.points, 12);
-    const auto byteOf = [](float v) {
-        return static_cast<uint32_t>(std::clamp(v == v ? v : 0.0f, 0.0f, 1.0f) * 255.0f + 0.5f);
-    };
     constexpr uint32_t kBrown = 0x2a4a70;
     const bool hasOwn = head.colour[0] + head.colour[1] + head.colour[2] > 0;
     const uint32_t plain =
-        hasOwn ? byteOf(head.colour[0]) | byteOf(head.colour[1]) << 8 | byteOf(head.colour[2]) << 16 : kBrown;
+        hasOwn ? unitToByte(head.colour[0]) | unitToByte(head.colour[1]) << 8 | unitToByte(head.colour[2]) << 16
+               : kBrown;
     constexpr size_t kBlock = 65536;
     StrandSet out;
     out.hasColour = hasColours || hasOwn;
@@ -76,7 +75,7 @@ Result<void> readHair(const std::function<Cursor(uint64_t)>& open, const std::st
             if (hasThickness) STIPPLE_TRY(thickness.take(wide));
             if (hasColours) STIPPLE_TRY(colours.take(c));
             out.addVertex({p[0], p[1], p[2]}, 0.5f * wide, glm::vec3(0),
-                          hasColours ? byteOf(c[0]) | byteOf(c[1]) << 8 | byteOf(c[2]) << 16 : plain);
+                          hasColours ? unitToByte(c[0]) | unitToByte(c[1]) << 8 | unitToByte(c[2]) << 16 : plain);
         }
         out.endStrand(false);
         if (out.position.size() < kBlock) continue;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "engine/base/numbers.h"
 #include "lod/import/strands/strand_readers.h"
 
 namespace stipple::lod {
@@ -71,7 +72,7 @@ Result<void> readTrk(Cursor from, const std::string& path, const StrandSource::T
                 out.position[std::min(i + 1, out.position.size() - 1)] - out.position[i > begin ? i - 1 : begin];
             const glm::dvec3 c = glm::length(d) > 0 ? glm::abs(glm::normalize(d)) : glm::dvec3(0.5);
             for (int a = 0; a < 3; ++a)
-                out.colour[i] |= static_cast<uint32_t>(std::isfinite(c[a]) ? 40 + 215 * c[a] : 128) << (8 * a);
+                out.colour[i] |= toWhole<uint32_t>(std::isfinite(c[a]) ? 40 + 215 * c[a] : 128) << (8 * a);
         }
         out.endStrand(false);
         if (out.position.size() < kBlock) continue;
