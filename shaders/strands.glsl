@@ -40,7 +40,8 @@ void offerWide(WideStrand s, int x, int y) {
     if (s.isRound != 0u) {
         const Tube tube = tubeOf(s.a, s.b, s.radiusA, s.radiusB);
         const TubeHit hit = tubeHit(tube, (float(x) + 0.5 - frame.centre.x) * (1.0 / frame.focal),
-                                    (float(y) + 0.5 - frame.centre.y) * (1.0 / frame.focal), frame.nearPlane);
+                                    (float(y) + 0.5 - frame.centre.y) * (1.0 / frame.focal), frame.nearPlane,
+                                    false);
         if (hit.depth < kNoDepth) offer(x, y, 1.0 / hit.depth, s.id);
         return;
     }

@@ -202,8 +202,10 @@ void fillRibbon(const FrameConstants& f, const WideStrand& s, int firstRow, int 
 }
 
 /// Rows [firstRow, lastRow] of a wide tube: every pixel whose ray meets it.
-void fillTube(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, uint64_t* visibility) {
-    const int first = pixelWithin(min(s.top[0], s.top[1]), float(firstRow), float(lastRow) + 1.0f),
+template <bool isPlain>
+void fillTubeRows(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, uint64_t* visibility) {
+    constexpr int kTubeStretch = 8;  // most tubes are a few pixels wide
+    const int first = pixelWithin(std::ceil(min(s.top[0], s.top[1])), float(firstRow), float(lastRow) + 1.0f),
               last = pixelWithin(max(s.bottom[0], s.bottom[1]), float(firstRow) - 1.0f, float(lastRow));
     const Tube tube = s.tube;
     const float inverseFocal = 1.0f / f.focal, nearPlane = f.nearPlane;
@@ -212,7 +214,7 @@ void fillTube(const FrameConstants& f, const WideStrand& s, int firstRow, int la
         const float cy = float(y);
         const float dTop = s.top[1] - s.top[0], dBottom = s.bottom[1] - s.bottom[0];
         float lo = 0.0f, hi = 1.0f;
-        if (std::fabs(dTop) > 1.0e-6f) (dTop > 0.0f ? hi : lo) = min(max((cy + 1.0f - s.top[0]) / dTop, 0.0f), 1.0f);
+        if (std::fabs(dTop) > 1.0e-6f) (dTop > 0.0f ? hi : lo) = min(max((cy - s.top[0]) / dTop, 0.0f), 1.0f);
         if (std::fabs(dBottom) > 1.0e-6f) {
             const float at = min(max((cy - s.bottom[0]) / dBottom, 0.0f), 1.0f);
             if (dBottom > 0.0f)
@@ -221,16 +223,16 @@ void fillTube(const FrameConstants& f, const WideStrand& s, int firstRow, int la
                 hi = min(hi, at);
         }
         const auto mix = [](const float* v, float u) { return v[0] + u * (v[1] - v[0]); };
-        const int left = pixelWithin(min(mix(s.left, lo), mix(s.left, hi)), 0.0f, float(int(f.width))),
+        const int left = pixelWithin(std::ceil(min(mix(s.left, lo), mix(s.left, hi))), 0.0f, float(int(f.width))),
                   right = pixelWithin(max(mix(s.right, lo), mix(s.right, hi)), -1.0f, float(int(f.width)) - 1.0f);
         const float ey = (cy + 0.5f - f.centre.y) * inverseFocal;
-        for (int x0 = left; x0 <= right; x0 += kStretch) {
-            alignas(64) uint32_t depth[kStretch], keep[kStretch];
-            const int count = right - x0 + 1 < kStretch ? right - x0 + 1 : kStretch;
+        for (int x0 = left; x0 <= right; x0 += kTubeStretch) {
+            alignas(64) uint32_t depth[kTubeStretch], keep[kTubeStretch];
+            const int count = right - x0 + 1 < kTubeStretch ? right - x0 + 1 : kTubeStretch;
             const float ex0 = float(x0) + 0.5f - f.centre.x;
 #pragma GCC ivdep
-            for (size_t k = 0; k < kStretch; ++k) {
-                const TubeHit hit = tubeHit(tube, (ex0 + float(int(k))) * inverseFocal, ey, nearPlane);
+            for (size_t k = 0; k < kTubeStretch; ++k) {
+                const TubeHit hit = tubeHit(tube, (ex0 + float(int(k))) * inverseFocal, ey, nearPlane, isPlain);
                 depth[k] = floatBitsToUint(hit.depth);
                 keep[k] = hit.depth < kNoDepth ? 1u : 0u;
             }
@@ -239,6 +241,13 @@ void fillTube(const FrameConstants& f, const WideStrand& s, int firstRow, int la
                 if (keep[k] != 0) offerKey(row, size_t(k), uint64_t{depth[k]} << 32 | s.id);
         }
     }
+}
+
+void fillTube(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, uint64_t* visibility) {
+    if (isBeforeEye(s.tube, f.nearPlane) && isShort(s.tube))
+        fillTubeRows<true>(f, s, firstRow, lastRow, visibility);
+    else
+        fillTubeRows<false>(f, s, firstRow, lastRow, visibility);
 }
 
 void fillStrand(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, uint64_t* visibility) {
@@ -264,10 +273,10 @@ WideStrand wideTube(const FrameConstants& f, const CameraSegment& c, uint32_t id
             return sign *
                    tubeSlope(sign * (ends[l].*axis), ends[l].z, radii[l], sign * (ends[m].*axis), ends[m].z, radii[m]);
         };
-        w.left[k] = slope(-1.0f, &vec3::x) * f.focal + f.centre.x - 1.5f;
-        w.right[k] = slope(1.0f, &vec3::x) * f.focal + f.centre.x + 0.5f;
-        w.top[k] = slope(-1.0f, &vec3::y) * f.focal + f.centre.y - 1.5f;
-        w.bottom[k] = slope(1.0f, &vec3::y) * f.focal + f.centre.y + 0.5f;
+        w.left[k] = slope(-1.0f, &vec3::x) * f.focal + f.centre.x - 0.51f;  // of pixels' centres, rounded
+        w.right[k] = slope(1.0f, &vec3::x) * f.focal + f.centre.x - 0.49f;
+        w.top[k] = slope(-1.0f, &vec3::y) * f.focal + f.centre.y - 0.51f;
+        w.bottom[k] = slope(1.0f, &vec3::y) * f.focal + f.centre.y - 0.49f;
     }
     return w;
 }
@@ -390,7 +399,6 @@ struct StrandPixels {
 struct StrandTexels {
     alignas(64) float depth[kTile], radius[kTile], thickness[kTile], x[kTile], y[kTile], perpX[kTile], perpY[kTile],
         red[kTile], green[kTile], blue[kTile], isRound[kTile], axisX[kTile], axisY[kTile], isFilledTube[kTile];
-    alignas(64) uint32_t tube[kTile];  ///< which are filled tubes
 };
 
 /// One of a segment's colours, linear, at a place from 0 to 1.
@@ -465,36 +473,51 @@ bool resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
         o.green[i] = mixedColour(packed, 8, place);
         o.blue[i] = mixedColour(packed, 16, place);
     }
-    // Filled tubes, by the rays of their pixels.
+    // Filled tubes, by the rays of their pixels: side by side, or they would not be worked on together.
+    StrandPixels t;
+    alignas(64) float pixel[kTile], depth[kTile], perpX[kTile], perpY[kTile], red[kTile], green[kTile], blue[kTile];
+    alignas(64) uint32_t from[kTile];
     size_t filled = 0;
     for (size_t i = 0; i < n; ++i) {
-        o.tube[filled] = uint32_t(i);
-        filled += o.isFilledTube[i] > 0.5f ? 1 : 0;
+        if (!(o.isFilledTube[i] > 0.5f)) continue;
+        for (size_t k = 0; k < 8; ++k) t.words[k][filled] = e.words[k][i];
+        for (size_t k = 0; k < 3; ++k) t.base[k][filled] = e.base[k][i];
+        for (size_t k = 0; k < 9; ++k) t.axes[k][filled] = e.axes[k][i];
+        t.edge[filled] = e.edge[i];
+        pixel[filled] = float(int(p.pixel[i]));
+        from[filled++] = uint32_t(i);
     }
     const float inverseFocal = 1.0f / focal, ex0 = -cx * inverseFocal, ey = -cy * inverseFocal;
 #pragma GCC ivdep
     for (size_t k = 0; k < filled; ++k) {
-        const size_t i = o.tube[k];
-        const StrandSegment packed{{e.words[0][i], e.words[1][i], e.words[2][i], e.words[3][i]},
-                                   {e.words[4][i], e.words[5][i], e.words[6][i], e.words[7][i]}};
+        const StrandSegment packed{{t.words[0][k], t.words[1][k], t.words[2][k], t.words[3][k]},
+                                   {t.words[4][k], t.words[5][k], t.words[6][k], t.words[7][k]}};
         DrawNode node{};
-        node.base = vec3(e.base[0][i], e.base[1][i], e.base[2][i]);
-        node.axisX = vec3(e.axes[0][i], e.axes[1][i], e.axes[2][i]);
-        node.axisY = vec3(e.axes[3][i], e.axes[4][i], e.axes[5][i]);
-        node.axisZ = vec3(e.axes[6][i], e.axes[7][i], e.axes[8][i]);
-        node.edge = e.edge[i];
-        const TubePixel t =
-            tubePixel(cameraSegment(node, packed), ex0 + float(int(p.pixel[i])) * inverseFocal, ey, nearPlane);
-        const bool isHit = t.depth < kNoDepth;
-        o.depth[i] = isHit ? t.depth : o.depth[i];
+        node.base = vec3(t.base[0][k], t.base[1][k], t.base[2][k]);
+        node.axisX = vec3(t.axes[0][k], t.axes[1][k], t.axes[2][k]);
+        node.axisY = vec3(t.axes[3][k], t.axes[4][k], t.axes[5][k]);
+        node.axisZ = vec3(t.axes[6][k], t.axes[7][k], t.axes[8][k]);
+        node.edge = t.edge[k];
+        const TubePixel seen = tubePixel(cameraSegment(node, packed), ex0 + pixel[k] * inverseFocal, ey, nearPlane);
+        depth[k] = seen.depth;
+        perpX[k] = seen.normalPerp.x;
+        perpY[k] = seen.normalPerp.y;
+        red[k] = mixedColour(packed, 0, seen.place);
+        green[k] = mixedColour(packed, 8, seen.place);
+        blue[k] = mixedColour(packed, 16, seen.place);
+    }
+    for (size_t k = 0; k < filled; ++k) {
+        const size_t i = from[k];
+        const bool isHit = depth[k] < kNoDepth;
+        o.depth[i] = isHit ? depth[k] : o.depth[i];
         o.radius[i] = o.thickness[i] = 0.25f;
         o.x[i] = o.y[i] = 0.0f;
-        o.perpX[i] = isHit ? t.normalPerp.x : 0.0f;
-        o.perpY[i] = isHit ? t.normalPerp.y : 0.0f;
+        o.perpX[i] = isHit ? perpX[k] : 0.0f;
+        o.perpY[i] = isHit ? perpY[k] : 0.0f;
         o.isRound[i] = o.axisX[i] = o.axisY[i] = 0.0f;
-        o.red[i] = mixedColour(packed, 0, t.place);
-        o.green[i] = mixedColour(packed, 8, t.place);
-        o.blue[i] = mixedColour(packed, 16, t.place);
+        o.red[i] = red[k];
+        o.green[i] = green[k];
+        o.blue[i] = blue[k];
     }
     float round_ = 0;
     for (size_t i = 0; i < n; ++i) {

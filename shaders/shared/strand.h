@@ -363,7 +363,7 @@ SHARED_FN Texel exactTexel(Texel t, float farther) {
 // What a filled tube shows at the pixel whose ray is (ex, ey, 1), and where on the segment.
 SHARED_FN TubePixel tubePixel(CameraSegment s, float ex, float ey, float nearPlane) {
     const Tube tube = tubeOf(s.a, s.b, s.radiusA, s.radiusB);
-    const TubeHit hit = tubeHit(tube, ex, ey, nearPlane);
+    const TubeHit hit = tubeHit(tube, ex, ey, nearPlane, false);
     const float inverse = 1.0f / sqrt(ex * ex + ey * ey + 1.0f);
     const vec3 v = vec3(ex * inverse, ey * inverse, inverse);
     TubePixel p;  // where rounding lets the ray pass by: a rim is no nearer to anything

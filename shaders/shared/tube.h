@@ -56,27 +56,35 @@ SHARED_FN float ballDepth(float nearest, float q, float side, float y, float dy,
     return isThere * (depth > nearPlane ? 1.0f : 0.0f) > 0.5f ? depth : kNoDepth;
 }
 
+// Is nothing of it beside or behind the eye, so that only what faces the eye can be seen?
+SHARED_FN bool isBeforeEye(Tube t, float nearPlane) { return min(t.a.z - t.radiusA, t.b.z - t.radiusB) > nearPlane; }
+// So short that places along it may be counted from its first end: their squares, over that of the radius, keep four
+// digits.
+SHARED_FN bool isShort(Tube t) { return t.span < 30.0f * min(t.radiusA, t.radiusB); }
+
 // The nearest place before the near plane where the ray (ex, ey, 1) from the eye meets the tube. Everything is counted
-// from the ray's own place nearest to what it may meet, so that fp32 loses nothing of thin tubes far away.
-SHARED_FN TubeHit tubeHit(Tube t, float ex, float ey, float nearPlane) {
+// from the ray's own place nearest to what it may meet, so that fp32 loses nothing of thin tubes far away. `isPlain`:
+// the tube is short and before the eye, which is less work.
+SHARED_FN TubeHit tubeHit(Tube t, float ex, float ey, float nearPlane, bool isPlain) {
     const float e2 = ex * ex + ey * ey + 1.0f;
+    const float inverseE2 = 1.0f / e2;
     const float dy = ex * t.axis.x + ey * t.axis.y + t.axis.z;
     const float touchA = t.radiusA * t.sine;
     const float touchB = t.span + t.radiusB * t.sine;
     const float slack = 1.0e-4f * (t.radiusA + t.radiusB);  // no gap between balls and cone
     // Balls.
-    const float za = (ex * t.a.x + ey * t.a.y + t.a.z) / e2;
+    const float za = (ex * t.a.x + ey * t.a.y + t.a.z) * inverseE2;
     const vec3 oa = vec3(ex * za - t.a.x, ey * za - t.a.y, za - t.a.z);
-    const float qa = (t.radiusA * t.radiusA - dot(oa, oa)) / e2;
+    const float qa = (t.radiusA * t.radiusA - dot(oa, oa)) * inverseE2;
     const float ya = dot(oa, t.axis);
-    const float zb = (ex * t.b.x + ey * t.b.y + t.b.z) / e2;
+    const float zb = (ex * t.b.x + ey * t.b.y + t.b.z) * inverseE2;
     const vec3 ob = vec3(ex * zb - t.b.x, ey * zb - t.b.y, zb - t.b.z);
-    const float qb = (t.radiusB * t.radiusB - dot(ob, ob)) / e2;
+    const float qb = (t.radiusB * t.radiusB - dot(ob, ob)) * inverseE2;
     const float yb = dot(ob, t.axis) + t.span;
     const float frontA = ballDepth(za, qa, -1.0f, ya, dy, -kNoDepth, touchA + slack, nearPlane);
-    const float backA = ballDepth(za, qa, 1.0f, ya, dy, -kNoDepth, touchA + slack, nearPlane);
     const float frontB = ballDepth(zb, qb, -1.0f, yb, dy, touchB - slack, kNoDepth, nearPlane);
-    const float backB = ballDepth(zb, qb, 1.0f, yb, dy, touchB - slack, kNoDepth, nearPlane);
+    const float backA = isPlain ? kNoDepth : ballDepth(za, qa, 1.0f, ya, dy, -kNoDepth, touchA + slack, nearPlane);
+    const float backB = isPlain ? kNoDepth : ballDepth(zb, qb, 1.0f, yb, dy, touchB - slack, kNoDepth, nearPlane);
     // Cone: |o + s d| cosine = radiusA - y sine, o and d across the axis. First the ray's place nearest to the axis,
     // or, where it leads along the axis, beside the segment.
     const vec3 d = vec3(ex - dy * t.axis.x, ey - dy * t.axis.y, 1.0f - dy * t.axis.z);
@@ -84,9 +92,9 @@ SHARED_FN TubeHit tubeHit(Tube t, float ex, float ey, float nearPlane) {
     const float toAxis = -dot(oa, d) / max(d2, 1.0e-12f * e2);
     const float there = min(max(ya + toAxis * dy, -t.radiusA), t.span + t.radiusB);
     const bool isAlong = dy * dy > 0.01f * e2;
-    const float z0 = za + (isAlong ? (there - ya) / dy : toAxis);
-    const vec3 o0 = vec3(ex * z0 - t.a.x, ey * z0 - t.a.y, z0 - t.a.z);
-    const float y0 = dot(o0, t.axis);
+    const float z0 = isPlain ? za : za + (isAlong ? (there - ya) / dy : toAxis);
+    const vec3 o0 = isPlain ? oa : vec3(ex * z0 - t.a.x, ey * z0 - t.a.y, z0 - t.a.z);
+    const float y0 = isPlain ? ya : dot(o0, t.axis);
     const vec3 o = vec3(o0.x - y0 * t.axis.x, o0.y - y0 * t.axis.y, o0.z - y0 * t.axis.z);
     const float slope = t.sine / t.cosine;
     const float k0 = t.radiusA / t.cosine - y0 * slope;
