@@ -4,6 +4,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "engine/base/finite.h"
 #include "lod/build/mesh/mesh_work.h"
 #include "lod/build/morton.h"
 #include "lod/octahedral.h"
@@ -13,8 +14,6 @@ namespace {
 
 constexpr int kLatticeBits = 24;
 constexpr size_t kGrain = 16384;
-
-bool isFinite(const glm::dvec3& p) { return std::isfinite(p.x + p.y + p.z); }
 
 /// Bit by bit: two zeros of different sign are two values. Equal positions stand side by side.
 std::array<uint32_t, 8> wordsOf(const shared::MeshVertex& v) { return std::bit_cast<std::array<uint32_t, 8>>(v); }

@@ -3,10 +3,10 @@
 // two, 2^-21 of the extent.
 #pragma once
 
-#include <cmath>
 #include <functional>
 #include <optional>
 
+#include "engine/base/finite.h"
 #include "lod/build/build.h"
 #include "lod/build/lattice.h"
 #include "lod/build/octree/bytes.h"
@@ -16,7 +16,6 @@
 namespace stipple::lod {
 
 inline constexpr size_t kBlockPoints = 65536;  ///< that a reader gives at once
-inline bool isFinite(const glm::dvec3& p) { return std::isfinite(p.x + p.y + p.z); }
 
 class PointInput {
   public:

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <memory>
 
+#include "engine/base/finite.h"
 #include "lod/strand_source.h"
 
 namespace stipple::lod {
@@ -15,8 +16,6 @@ struct Vertex {
     glm::vec3 normal;
     uint32_t colour;
 };
-
-bool isFinite(const glm::dvec3& p) { return std::isfinite(p.x + p.y + p.z); }
 
 glm::vec3 anyAcross(const glm::vec3& t) {
     return glm::normalize(std::abs(t.x) < 0.7f ? glm::vec3(0, -t.z, t.y) : glm::vec3(-t.z, 0, t.x));
