@@ -9,7 +9,7 @@
 
 #include "engine/cpu/cpu_backend.h"
 #include "engine/cpu/kernels.h"
-#ifdef STIPPLE_HAS_GPU
+#ifdef STIPPLE_ON_GPU
 #include "engine/gpu/gpu_backend.h"
 #endif
 #include "engine/reference/decode.h"
@@ -257,6 +257,7 @@ class Tubes : public testing::Test {
     std::unique_ptr<Executor> executor_ = makeTbbExecutor(0);
 };
 
+#ifndef STIPPLE_ON_GPU
 TEST_F(Tubes, OfTheCpuBackendAndTheOracleAreWhatRaysMeetFromEverySide) {
     size_t count = 0;
     const cpu::Kernels* const* all = cpu::availableKernels(count);
@@ -327,7 +328,7 @@ TEST_F(Tubes, KeepTheirOutlineAndTheirCoverageInWidePictures) {
     }
 }
 
-#ifdef STIPPLE_HAS_GPU
+#else
 TEST_F(Tubes, OfTheGpuBackendAreWhatRaysMeetFromEverySide) {
     gpu::GpuSettings settings;
     settings.validation = true;

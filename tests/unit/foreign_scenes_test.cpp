@@ -173,7 +173,6 @@ TEST_F(ForeignScenes, TexturesOfGpuFormatsAreNamedOneByOneAndThoseOfWebpAreNotCa
     root["images"] = json::array({{{"uri", "t.ktx2"}}});
     const json basis{{"extensions", {{"KHR_texture_basisu", {{"source", 0}}}}}};
     root["textures"] = json::array({basis, basis});
-    root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", 0}};
     const auto scene = read(root);
     ASSERT_TRUE(scene) << scene.error().line();
     ASSERT_EQ(scene->notes.size(), 2u) << notesOf(*scene);
@@ -458,7 +457,7 @@ TEST(ForeignObj, MutatedFilesEndInASceneOrAnError) {
     const std::string mtl = "newmtl a\nKd 1 0 0\nmap_Kd -s 1 1 1 t.png\nd 0.5\nnewmtl b\nKe 1 1 1\n";
     Rng rng(5);
     const auto mutate = [&](std::string text) {
-        static const std::string bytes("0123456789/-+. \n\r\tevfnt\0\xff", 27);
+        static const std::string bytes("0123456789/-+. \n\r\tevfnt\0\xff", 25);
         for (uint64_t n = 1 + rng.below(4); n > 0; --n) {
             const size_t at = rng.below(text.size());
             if (rng.below(4) == 0)
