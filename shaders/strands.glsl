@@ -9,7 +9,9 @@ struct WideStrand {
     float halfA, halfB;
     float nearerA, nearerB;
     RibbonEdge edgeA, edgeB;
-    float widest;
+    vec3 a, b;  // of a filled tube, camera space
+    float radiusA, radiusB;
+    ivec4 box;  // pixels that may be covered: from xy to zw
     uint isRound;
     uint id;
 };
@@ -33,26 +35,19 @@ CameraSegment cameraSegment(DrawNode node, StrandSegment s) {
     return c;
 }
 
-// Offers one pixel of a wide strand, if its centre is within the half-width.
+// Offers one pixel of a wide strand: if its ray meets the tube, or its centre lies between the ribbon's edges.
 void offerWide(WideStrand s, int x, int y) {
-    const float dx = s.xb - s.xa, dy = s.yb - s.ya;
-    const float length2 = dx * dx + dy * dy;
-    const float px = float(x) + 0.5 - s.xa, py = float(y) + 0.5 - s.ya;
-    float u, nearer;
     if (s.isRound != 0u) {
-        u = clamp((px * dx + py * dy) * (length2 > 1.0e-8 ? 1.0 / length2 : 0.0), 0.0, 1.0);
-        const float ex = px - u * dx, ey = py - u * dy;
-        const float halfWidth = s.halfA + u * (s.halfB - s.halfA);
-        const float q = ex * ex + ey * ey;
-        if (q > halfWidth * halfWidth) return;
-        const float rise = sqrt(1.0 - min(q / (halfWidth * halfWidth), 1.0));
-        nearer = 1.0 - rise * (1.0 - (s.nearerA + u * (s.nearerB - s.nearerA)));
-    } else {
-        const RibbonPlace p = ribbonPlace(px, py, dx, dy, s.edgeA, s.edgeB);
-        if (!(abs(p.across) <= 1.0)) return;
-        u = p.along;
-        nearer = 1.0 + p.across * (s.edgeA.slope + u * (s.edgeB.slope - s.edgeA.slope));
+        const Tube tube = tubeOf(s.a, s.b, s.radiusA, s.radiusB);
+        const TubeHit hit = tubeHit(tube, (float(x) + 0.5 - frame.centre.x) * (1.0 / frame.focal),
+                                    (float(y) + 0.5 - frame.centre.y) * (1.0 / frame.focal), frame.nearPlane,
+                                    false);
+        if (hit.depth < kNoDepth) offer(x, y, 1.0 / hit.depth, s.id);
+        return;
     }
-    const float axis = 1.0 / (s.inverseA + u * (s.inverseB - s.inverseA));
+    const RibbonPlace p = ribbonPlace(float(x) + 0.5 - s.xa, float(y) + 0.5 - s.ya, s.xb - s.xa, s.yb - s.ya, s.edgeA, s.edgeB);
+    if (!(abs(p.across) <= 1.0)) return;
+    const float nearer = 1.0 + p.across * (s.edgeA.slope + p.along * (s.edgeB.slope - s.edgeA.slope));
+    const float axis = 1.0 / (s.inverseA + p.along * (s.inverseB - s.inverseA));
     offer(x, y, 1.0 / max(axis * nearer, frame.nearPlane), s.id);
 }

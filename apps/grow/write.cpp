@@ -27,6 +27,8 @@ Result<void> writeLas(OutputFile& file, const std::vector<ScanPoint>& points, co
     header[25] = 2;
     std::memcpy(header.data() + 26, "SIMULATED", 9);
     std::memcpy(header.data() + 58, "stipple grow scan", 17);
+    put<uint16_t>(header, 90, 1);  // the first day of 2026, always: the same points are the same bytes
+    put<uint16_t>(header, 92, 2026);
     put<uint16_t>(header, 94, kHeader);
     put<uint32_t>(header, 96, kHeader);
     header[104] = 2;

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <map>
 
+#include "apps/stipple/builds_of_scene.h"
 #include "apps/stipple/cache_folder.h"
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
@@ -27,8 +28,10 @@ namespace {
 /// the bytes?
 std::string settingsText(const BuildOptions& build) {
     const auto& [memory, normals, radii, up, attributes, temp, duplicates, cacheLimit, threads, skipBad, onlyPoints,
-                 allowOutside, dropOutliers, repair, strandRadius, surfels, progress, ranks, leftovers] = build;
-    // Not memory, temp, threads, ranks, leftovers: any give the same. Not attributes: what is cached has all of them.
+                 allowOutside, dropOutliers, repair, strandRadius, surfels, progress, ranks, together, leftovers] =
+        build;
+    // Not memory, temp, threads, ranks, together, leftovers: any give the same. Not attributes: what is cached has all
+    // of them.
     return fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}", normals, radii, up, duplicates, skipBad, onlyPoints,
                        allowOutside, dropOutliers, strandRadius, surfels);
 }
@@ -139,7 +142,9 @@ class Lookup {
             cache_.removeRecord(key_);  // it was refused: there is nothing to go on with
         STIPPLE_ASSIGN(const lod::BuildReport built, result);
         for (const std::string& note : built.notes)
-            if (std::find(notes_.begin(), notes_.end(), note) == notes_.end()) record.notes.push_back(note);
+            if (std::find(notes_.begin(), notes_.end(), note) == notes_.end() &&
+                !(build_.together && build_.together->says(note)))
+                record.notes.push_back(note);
         for (const auto& [reason, count] : built.dropped)
             record.notes.push_back(fmt::format("dropped {}: {}", count, reason));
         cache_.writeRecord(key_, record);
@@ -179,6 +184,11 @@ class Lookup {
     }
 
     Result<lod::BuildReport> madeOnce(const StoreMaker& make) const {
+        if (build_.together) {
+            Result<lod::BuildReport> built = make(path_, build_.together->begin(part_));
+            build_.together->settle(part_);
+            return built;
+        }
         Progress progress(build_.progressStyle(!isLoud_));
         return make(path_, progress);
     }
@@ -232,7 +242,9 @@ Result<StorePtr> openCached(const std::vector<std::string>& inputs, const BuildO
     std::vector<std::string> notes;
     STIPPLE_ASSIGN(const std::string key, keyOf(inputs, build, part, notes));
     STIPPLE_ASSIGN(const CacheFolder* const cache, folder());
-    return Lookup(*cache, key, std::move(notes), inputs, part, build, showProgress).open(make);
+    Result<StorePtr> store = Lookup(*cache, key, std::move(notes), inputs, part, build, showProgress).open(make);
+    if (build.together) build.together->settle(part);
+    return store;
 }
 
 }  // namespace stipple::app

@@ -20,6 +20,8 @@
 
 namespace stipple::app {
 
+class BuildsOfScene;
+
 struct BuildOptions {
     std::string memory = "2G", normals = "auto", radii = "auto", up, attributes = "none", temp, duplicates = "keep";
     std::string cacheLimit;  ///< of the cache of built scenes; empty: its default
@@ -29,7 +31,8 @@ struct BuildOptions {
     double strandRadius = 0;
     uint64_t surfels = 0;
     std::string progress = "auto";
-    Ranks* ranks = nullptr;  ///< of an MPI job
+    Ranks* ranks = nullptr;                   ///< of an MPI job
+    std::shared_ptr<BuildsOfScene> together;  ///< of the scene that is opened: its builds show one progress
     lod::Leftovers leftovers = lod::Leftovers::goOn;
     void addTo(CLI::App& app);
     void addProgressTo(CLI::App& app);

@@ -50,11 +50,22 @@ class Font {
     int width_ = 0, height_ = 0;
 };
 
-/// sRGB pixels of a picture with bounds.
+/// sRGB pixels of a picture with bounds; what is drawn is enlarged by a whole factor, so that letters stay sharp.
 class Canvas {
   public:
-    explicit Canvas(render::Image& image) : image_(image) {}
+    Canvas(render::Image& image, int scale) : image_(image), scale_(scale) {}
+    int height() const { return static_cast<int>(image_.height) / scale_; }
     void blend(int x, int y, uint32_t rgb, uint32_t alpha) {
+        for (int j = 0; j < scale_; ++j)
+            for (int i = 0; i < scale_; ++i) blendPixel(x * scale_ + i, y * scale_ + j, rgb, alpha);
+    }
+    void fill(int x, int y, int w, int h, uint32_t rgb, uint32_t alpha) {
+        for (int j = 0; j < h; ++j)
+            for (int i = 0; i < w; ++i) blend(x + i, y + j, rgb, alpha);
+    }
+
+  private:
+    void blendPixel(int x, int y, uint32_t rgb, uint32_t alpha) {
         if (x < 0 || y < 0 || x >= static_cast<int>(image_.width) || y >= static_cast<int>(image_.height)) return;
         uint32_t& to = image_.rgba[static_cast<size_t>(y) * image_.width + static_cast<size_t>(x)];
         uint32_t out = 0xff000000u;
@@ -64,13 +75,9 @@ class Canvas {
         }
         to = out;
     }
-    void fill(int x, int y, int w, int h, uint32_t rgb, uint32_t alpha) {
-        for (int j = 0; j < h; ++j)
-            for (int i = 0; i < w; ++i) blend(x + i, y + j, rgb, alpha);
-    }
 
-  private:
     render::Image& image_;
+    int scale_;
 };
 
 std::string number(double v, double span) {
@@ -120,8 +127,10 @@ void drawLegend(const Legend& legend, render::Image& image) {
     const int rows = static_cast<int>(legend.entries.size());
     const int body = isBar ? kBar + line : rows * line;
     const int w = 3 * kPad + kSwatch + labelWidth, h = 2 * kPad + line + 4 + body;
-    const int x = kMargin, y = static_cast<int>(image.height) - kMargin - h;
-    Canvas canvas(image);
+    // As large a part of a large picture as of one of 720 rows.
+    constexpr double kRows = 720;
+    Canvas canvas(image, std::max(1, static_cast<int>(std::lround(image.height / kRows))));
+    const int x = kMargin, y = canvas.height() - kMargin - h;
     canvas.fill(x, y, w, h, 0x181410u, 190);
     const auto text = [&](const std::string& s, int tx, int ty) {
         font.draw(s, tx, ty, [&](int px, int py, uint32_t alpha) { canvas.blend(px, py, 0xf0f0f0u, alpha); });

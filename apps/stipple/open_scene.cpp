@@ -9,6 +9,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "apps/stipple/builds_of_scene.h"
 #include "apps/stipple/cache.h"
 #include "apps/stipple/common.h"
 #include "apps/stipple/from_afar.h"
@@ -188,6 +189,7 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
         render::PlacedStore one{store, {}, {}};
         STIPPLE_ASSIGN(one.standIns,
                        meshFromAfar(scene, own, *store, fmt::format("mesh {}", mesh), build, executor, showProgress));
+        build.together->settle(fmt::format("mesh {}, from afar", mesh));  // what is small has none
         for (const lod::Instance& instance : instances) {
             one.place = instance;
             placed.push_back(one);
@@ -198,6 +200,7 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
                    openCached({scene.path}, build, "triangles", showProgress, make(places.once)));
     render::PlacedStore one{store, {}, {}};
     STIPPLE_ASSIGN(one.standIns, meshFromAfar(scene, places.once, *store, "triangles", build, executor, showProgress));
+    build.together->settle("triangles, from afar");
     placed.push_back(std::move(one));
     return {};
 }
@@ -230,6 +233,7 @@ Result<void> placeStrands(const scene::Scene& scene, const BuildOptions& build, 
         STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store, open(model, part));
         render::PlacedStore one{store, {}, {}};
         STIPPLE_ASSIGN(one.standIns, strandsFromAfar(model, *store, scene.path, part, build, executor, showProgress));
+        build.together->settle(part + ", from afar");
         const auto first = static_cast<uint32_t>(opened.placed.size());
         for (const lod::Instance& instance : instances) {
             one.place = instance;
@@ -285,10 +289,43 @@ std::vector<scene::Camera> camerasOf(const scene::Scene& scene) {
     return cameras;
 }
 
+/// Vertices of a kind in those places.
+double workOf(const scene::Scene& scene, const std::vector<scene::Placement>& of, scene::PrimitiveKind kind) {
+    double work = 1;
+    for (const scene::Placement& p : of)
+        for (const scene::Primitive& primitive : scene.meshes[static_cast<size_t>(p.mesh)].primitives)
+            if (primitive.kind == kind) work += static_cast<double>(primitive.position.size());
+    return work;
+}
+
+/// What may have to be built of a scene. (Stand-ins for afar take about as long as what they stand for.)
+std::shared_ptr<BuildsOfScene> expectedBuilds(const scene::Scene& scene, bool areTriangles, ProgressStyle style) {
+    std::vector<std::string> notes;
+    for (const std::string& note : scene.notes) notes.push_back(fmt::format("{}: {}", scene.path, note));
+    auto builds = std::make_shared<BuildsOfScene>(style, std::move(notes));
+    const auto expect = [&](const std::string& part, double work, bool hasStandIn) {
+        builds->expect(part, work);
+        if (hasStandIn) builds->expect(part + ", from afar", work);
+    };
+    const auto expectKind = [&](scene::PrimitiveKind kind, const char* shared, const char* once, bool hasStandIn) {
+        const SharedPlaces places = sharePlaces(scene, kind);
+        for (const auto& [mesh, instances] : places.shared)
+            expect(fmt::format("{} {}", shared, mesh), workOf(scene, {{mesh, glm::dmat4(1)}}, kind), true);
+        if (!places.once.empty()) expect(once, workOf(scene, places.once, kind), hasStandIn);
+    };
+    if (areTriangles) expectKind(scene::PrimitiveKind::triangles, "mesh", "triangles", true);
+    expectKind(scene::PrimitiveKind::lines, "strands of mesh", "strands", false);
+    const double points = workOf(scene, scene::placements(scene), scene::PrimitiveKind::points);
+    if (points > 1) builds->expect("points", points);
+    return builds;
+}
+
 /// The stores that a scene's nodes refer to, and its meshes.
-Result<void> openSceneFile(const std::string& path, const BuildOptions& build, Executor& executor, bool showProgress,
+Result<void> openSceneFile(const std::string& path, const BuildOptions& options, Executor& executor, bool showProgress,
                            OpenedScene& opened) {
-    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path, build.reading()));
+    STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(path, options.reading()));
+    BuildOptions build = options;
+    build.together = expectedBuilds(scene, build.surfels == 0, build.progressStyle(!showProgress));
     opened.lights = lightsOf(scene);
     opened.cameras = camerasOf(scene);
     std::vector<render::PlacedStore>& placed = opened.placed;

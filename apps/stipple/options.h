@@ -7,6 +7,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "engine/base/words.h"
+
 namespace stipple::app {
 
 /// One of these words; for another, the nearest is proposed. `->check(oneOf({...}))`.
@@ -27,8 +29,5 @@ CLI::Validator within(T least, T most) {
 CLI::Validator positive();
 /// A number of bytes: "512M", "4G". `->check(bytes())`.
 CLI::Validator bytes();
-
-/// The word of `words` that `text` was probably meant to be; empty: none is near.
-std::string nearestWord(const std::string& text, const std::vector<std::string>& words);
 
 }  // namespace stipple::app

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <thread>
 
 #include "apps/stipple/outputs.h"
 #include "apps/stipple/overlay.h"
@@ -225,6 +226,7 @@ class Viewer {
         const double start = nowSeconds();
         STIPPLE_ASSIGN(const bool shown, present(input, nullptr));
         isStale_ = !shown;
+        if (shown) loadPictures();
         shownMs_ = session_.state().counters.frameMs + (nowSeconds() - start) * 1e3;
         return {};
     }
@@ -249,6 +251,17 @@ class Viewer {
     }
 
     /// Of what is drawn, without what lies over it.
+    /// Behind the first frame, so that the first picture need not wait for the 260 libraries.
+    void loadPictures() {
+        if (pictureLoader_.joinable()) return;
+        pictureLoader_ = std::jthread([] {
+            try {
+                (void)image::checkModule(true);  // what is wrong is said when a picture is taken
+            } catch (const std::bad_alloc&) {
+            }
+        });
+    }
+
     void takePicture() {
         const render::FrameState& state = session_.state();
         render::Image picture = state.image;
@@ -274,8 +287,9 @@ class Viewer {
     uint32_t width_ = 0, height_ = 0;
     double shownMs_ = 0;  ///< what the last frame took, with showing it
     int frames_ = 0, pictures_ = 1;
-    bool hasChanged_ = true;  ///< what is to be rendered
-    bool isStale_ = true;     ///< what is shown: the same picture, or what lies over it
+    bool hasChanged_ = true;      ///< what is to be rendered
+    bool isStale_ = true;         ///< what is shown: the same picture, or what lies over it
+    std::jthread pictureLoader_;  ///< loads what writes pictures
     bool isMoving_ = false, wantsPicture_ = false, isEmpty_ = false;
 };
 

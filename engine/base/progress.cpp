@@ -34,7 +34,11 @@ std::string quoted(const std::string& text) {
 ProgressStyle automaticProgress() { return ::isatty(STDERR_FILENO) != 0 ? ProgressStyle::bar : ProgressStyle::notes; }
 
 double JobPlan::advance(const std::string& stage, double done) {
-    if (stages_.empty()) return reached_ = done;
+    const auto ofWhole = [&] { return whole_ = std::max(whole_, from_ + share_ * reached_); };
+    if (stages_.empty()) {
+        reached_ = done;
+        return share_ < 1 ? ofWhole() : reached_;
+    }
     const double all =
         std::accumulate(stages_.begin(), stages_.end(), 0.0, [](double sum, const Stage& s) { return sum + s.share; });
     double before = 0;
@@ -45,7 +49,19 @@ double JobPlan::advance(const std::string& stage, double done) {
         }
         before += s.share;
     }
-    return reached_;
+    return ofWhole();
+}
+
+void JobPlan::setStages(std::vector<Stage> stages) {
+    stages_ = std::move(stages);
+    reached_ = 0;
+}
+
+void JobPlan::beginPart(double before, double own, double after) {
+    const double all = std::max(before + own + after, 1e-300);
+    from_ = before / all;
+    share_ = own / all;
+    setStages({});
 }
 
 Progress::Progress(ProgressStyle style) : style_(style), startSeconds_(nowSeconds()) {
@@ -58,7 +74,18 @@ Progress::~Progress() {
 
 void Progress::plan(std::vector<JobPlan::Stage> stages) {
     const std::lock_guard lock(mutex_);
-    plan_ = JobPlan(std::move(stages));
+    plan_.setStages(std::move(stages));
+}
+
+void Progress::beginPart(double before, double own, double after) {
+    const std::lock_guard lock(mutex_);
+    plan_.beginPart(before, own, after);
+}
+
+void Progress::rest() {
+    const std::lock_guard lock(mutex_);
+    if (dirty_) eraseLine();
+    dirty_ = false;
 }
 
 void Progress::say(const std::string& line) {

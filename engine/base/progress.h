@@ -31,10 +31,16 @@ class JobPlan {
     /// Of the whole job, when `done` of one of its stages is finished: never less than before, whatever is said. A
     /// stage that is not in the plan adds nothing; without a plan, a stage is the job.
     double advance(const std::string& stage, double done);
+    /// Other stages, of the same job or of its next part.
+    void setStages(std::vector<Stage> stages);
+    /// What follows is only a part of the job: `own` of it, with `before` behind and `after` ahead. `advance` stays
+    /// that of the whole.
+    void beginPart(double before, double own, double after);
 
   private:
     std::vector<Stage> stages_;
-    double reached_ = 0;
+    double reached_ = 0;  ///< of the part
+    double from_ = 0, share_ = 1, whole_ = 0;
 };
 
 class Progress {
@@ -51,6 +57,11 @@ class Progress {
     /// Says that `done` of `total` units of `stage` are finished; prints at most ten times (JSON: once) a second.
     /// From any thread.
     void update(const std::string& stage, uint64_t done, uint64_t total);
+
+    /// One of several jobs that are one to who waits, see JobPlan: one bar and one time left for all.
+    void beginPart(double before, double own, double after);
+    /// Takes the bar away until the next update, so that others can write lines.
+    void rest();
 
     /// A note that stays.
     void say(const std::string& line);

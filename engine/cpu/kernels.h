@@ -79,14 +79,15 @@ struct LargeTriangle {
 };
 /// A strand so wide that its pixels are filled, and so large that its rows are shared out among threads.
 struct WideStrand {
-    float xa, ya, xb, yb;  ///< ends, px
-    float inverseA, inverseB;
-    float halfA, halfB;               ///< half-widths, px
-    float nearerA, nearerB;           ///< tube: depth of the surface / of the axis
-    shared::RibbonEdge edgeA, edgeB;  ///< ribbon: from the axis to its edge
-    float widest;                     ///< pixels farther from the axis are not covered
     bool isRound;
     uint32_t id;
+    shared::Tube tube;        ///< what a tube's rays meet
+    float left[2], right[2];  ///< tube: pixels around both ends; what lies between the boxes is all it covers
+    float top[2], bottom[2];
+    float xa, ya, xb, yb;  ///< ribbon: ends, px
+    float inverseA, inverseB;
+    shared::RibbonEdge edgeA, edgeB;  ///< from the axis to its edge
+    float widest;                     ///< pixels farther from the axis are not covered
 };
 struct WideSink {
     void* context;

@@ -44,8 +44,8 @@ struct alignas(64) Lines {
     // From a ribbon's axis to its edge, see ribbonEdge.
     float edgeAx[kSegmentsPerBlock], edgeAy[kSegmentsPerBlock], slopeA[kSegmentsPerBlock];
     float edgeBx[kSegmentsPerBlock], edgeBy[kSegmentsPerBlock], slopeB[kSegmentsPerBlock];
-    float isRound[kSegmentsPerBlock], radius[kSegmentsPerBlock];  ///< radius: the larger one, px
-    uint32_t lot[kSegmentsPerBlock];                              ///< strandLot
+    float isFilledTube[kSegmentsPerBlock], radius[kSegmentsPerBlock];  ///< radius: the larger one, px
+    uint32_t lot[kSegmentsPerBlock];                                   ///< strandLot
     uint32_t keep[kSegmentsPerBlock];
     // As one-pixel lines: along u, the axis along which they are longer, from `first` on; values at u = start, and
     // their slopes.
@@ -157,14 +157,16 @@ void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pix
     }
 }
 
-/// Rows [firstRow, lastRow] of a wide strand: every pixel whose centre is within its half-width.
-void fillStrand(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, uint64_t* visibility) {
-    const float dx = s.xb - s.xa, dy = s.yb - s.ya, length2 = dx * dx + dy * dy;
-    const float inverse2 = length2 > 1.0e-8f ? 1.0f / length2 : 0.0f;
-    // Whatever the numbers are, also if they are none, the loops stay inside the image.
-    const auto within = [](float v, float least, float most) { return int(min(max(least, v), most)); };
-    const int top = within(min(s.ya, s.yb) - s.widest, float(firstRow), float(lastRow) + 1.0f),
-              bottom = within(max(s.ya, s.yb) + s.widest, float(firstRow) - 1.0f, float(lastRow));
+// Whatever the numbers are, also if they are none, loops over pixels stay inside the image.
+[[gnu::always_inline]] inline int pixelWithin(float v, float least, float most) {
+    return int(min(max(least, v), most));
+}
+
+/// Rows [firstRow, lastRow] of a wide ribbon: every pixel whose centre lies between its edges.
+void fillRibbon(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, uint64_t* visibility) {
+    const float dx = s.xb - s.xa, dy = s.yb - s.ya;
+    const int top = pixelWithin(min(s.ya, s.yb) - s.widest, float(firstRow), float(lastRow) + 1.0f),
+              bottom = pixelWithin(max(s.ya, s.yb) + s.widest, float(firstRow) - 1.0f, float(lastRow));
     const RibbonEdge a = s.edgeA, b = s.edgeB;
     const float nearPlane = f.nearPlane;
     for (int y = top; y <= bottom; ++y) {
@@ -178,39 +180,105 @@ void fillStrand(const FrameConstants& f, const WideStrand& s, int firstRow, int 
             from = min(x0, x1);
             to = max(x0, x1);
         }
-        const int left = within(from - s.widest, 0.0f, float(int(f.width))),
-                  right = within(to + s.widest, -1.0f, float(int(f.width)) - 1.0f);
+        const int left = pixelWithin(from - s.widest, 0.0f, float(int(f.width))),
+                  right = pixelWithin(to + s.widest, -1.0f, float(int(f.width)) - 1.0f);
         const float py = cy - s.ya;
         for (int x0 = left; x0 <= right; x0 += kStretch) {
             alignas(64) uint32_t depth[kStretch], keep[kStretch];
             const int count = right - x0 + 1 < kStretch ? right - x0 + 1 : kStretch;
             const float px0 = float(x0) + 0.5f - s.xa;
-            if (s.isRound) {
 #pragma GCC ivdep
-                for (size_t k = 0; k < kStretch; ++k) {
-                    const float px = px0 + float(int(k));
-                    const float u = min(max((px * dx + py * dy) * inverse2, 0.0f), 1.0f);
-                    const float ex = px - u * dx, ey = py - u * dy, half = s.halfA + u * (s.halfB - s.halfA);
-                    const float q = (ex * ex + ey * ey) / (half * half);
-                    const float rise = std::sqrt(max(1.0f - q, 0.0f));
-                    const float nearer = 1.0f - rise * (1.0f - (s.nearerA + u * (s.nearerB - s.nearerA)));
-                    depth[k] = floatBitsToUint(max(nearer / (s.inverseA + u * (s.inverseB - s.inverseA)), nearPlane));
-                    keep[k] = q <= 1.0f ? 1u : 0u;
-                }
-            } else {
-#pragma GCC ivdep
-                for (size_t k = 0; k < kStretch; ++k) {
-                    const RibbonPlace p = ribbonPlace(px0 + float(int(k)), py, dx, dy, a, b);
-                    const float u = p.along, nearer = 1.0f + p.across * (a.slope + u * (b.slope - a.slope));
-                    depth[k] = floatBitsToUint(max(nearer / (s.inverseA + u * (s.inverseB - s.inverseA)), nearPlane));
-                    keep[k] = std::fabs(p.across) <= 1.0f ? 1u : 0u;
-                }
+            for (size_t k = 0; k < kStretch; ++k) {
+                const RibbonPlace p = ribbonPlace(px0 + float(int(k)), py, dx, dy, a, b);
+                const float u = p.along, nearer = 1.0f + p.across * (a.slope + u * (b.slope - a.slope));
+                depth[k] = floatBitsToUint(max(nearer / (s.inverseA + u * (s.inverseB - s.inverseA)), nearPlane));
+                keep[k] = std::fabs(p.across) <= 1.0f ? 1u : 0u;
             }
             uint64_t* const row = visibility + size_t(y) * f.width + size_t(x0);
             for (int k = 0; k < count; ++k)
                 if (keep[k] != 0) offerKey(row, size_t(k), uint64_t{depth[k]} << 32 | s.id);
         }
     }
+}
+
+/// Rows [firstRow, lastRow] of a wide tube: every pixel whose ray meets it.
+template <bool isPlain>
+void fillTubeRows(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, uint64_t* visibility) {
+    constexpr int kTubeStretch = 8;  // most tubes are a few pixels wide
+    const int first = pixelWithin(std::ceil(min(s.top[0], s.top[1])), float(firstRow), float(lastRow) + 1.0f),
+              last = pixelWithin(max(s.bottom[0], s.bottom[1]), float(firstRow) - 1.0f, float(lastRow));
+    const Tube tube = s.tube;
+    const float inverseFocal = 1.0f / f.focal, nearPlane = f.nearPlane;
+    for (int y = first; y <= last; ++y) {
+        // Between the boxes of both ends lie boxes, of which the row meets those from u = lo to hi.
+        const float cy = float(y);
+        const float dTop = s.top[1] - s.top[0], dBottom = s.bottom[1] - s.bottom[0];
+        float lo = 0.0f, hi = 1.0f;
+        if (std::fabs(dTop) > 1.0e-6f) (dTop > 0.0f ? hi : lo) = min(max((cy - s.top[0]) / dTop, 0.0f), 1.0f);
+        if (std::fabs(dBottom) > 1.0e-6f) {
+            const float at = min(max((cy - s.bottom[0]) / dBottom, 0.0f), 1.0f);
+            if (dBottom > 0.0f)
+                lo = max(lo, at);
+            else
+                hi = min(hi, at);
+        }
+        const auto mix = [](const float* v, float u) { return v[0] + u * (v[1] - v[0]); };
+        const int left = pixelWithin(std::ceil(min(mix(s.left, lo), mix(s.left, hi))), 0.0f, float(int(f.width))),
+                  right = pixelWithin(max(mix(s.right, lo), mix(s.right, hi)), -1.0f, float(int(f.width)) - 1.0f);
+        const float ey = (cy + 0.5f - f.centre.y) * inverseFocal;
+        for (int x0 = left; x0 <= right; x0 += kTubeStretch) {
+            alignas(64) uint32_t depth[kTubeStretch], keep[kTubeStretch];
+            const int count = right - x0 + 1 < kTubeStretch ? right - x0 + 1 : kTubeStretch;
+            const float ex0 = float(x0) + 0.5f - f.centre.x;
+#pragma GCC ivdep
+            for (size_t k = 0; k < kTubeStretch; ++k) {
+                const TubeHit hit = tubeHit(tube, (ex0 + float(int(k))) * inverseFocal, ey, nearPlane, isPlain);
+                depth[k] = floatBitsToUint(hit.depth);
+                keep[k] = hit.depth < kNoDepth ? 1u : 0u;
+            }
+            uint64_t* const row = visibility + size_t(y) * f.width + size_t(x0);
+            for (int k = 0; k < count; ++k)
+                if (keep[k] != 0) offerKey(row, size_t(k), uint64_t{depth[k]} << 32 | s.id);
+        }
+    }
+}
+
+void fillTube(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, uint64_t* visibility) {
+    if (isBeforeEye(s.tube, f.nearPlane) && isShort(s.tube))
+        fillTubeRows<true>(f, s, firstRow, lastRow, visibility);
+    else
+        fillTubeRows<false>(f, s, firstRow, lastRow, visibility);
+}
+
+void fillStrand(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, uint64_t* visibility) {
+    if (s.isRound)
+        fillTube(f, s, firstRow, lastRow, visibility);
+    else
+        fillRibbon(f, s, firstRow, lastRow, visibility);
+}
+
+/// A tube that is to be filled, and the pixels around its ends. One that reaches beside the eye has one box.
+WideStrand wideTube(const FrameConstants& f, const CameraSegment& c, uint32_t id) {
+    WideStrand w{};
+    w.isRound = true;
+    w.id = id;
+    w.tube = tubeOf(c.a, c.b, c.radiusA, c.radiusB);
+    const vec3 ends[2] = {c.a, c.b};
+    const float radii[2] = {c.radiusA, c.radiusB};
+    const bool isBefore =
+        c.a.z > 1.0001f * c.radiusA && c.b.z > 1.0001f * c.radiusB;  // both have an outline of their own
+    for (size_t k = 0; k < 2; ++k) {
+        const size_t l = isBefore ? k : 0, m = isBefore ? k : 1;
+        const auto slope = [&](float sign, float vec3::*axis) {
+            return sign *
+                   tubeSlope(sign * (ends[l].*axis), ends[l].z, radii[l], sign * (ends[m].*axis), ends[m].z, radii[m]);
+        };
+        w.left[k] = slope(-1.0f, &vec3::x) * f.focal + f.centre.x - 0.51f;  // of pixels' centres, rounded
+        w.right[k] = slope(1.0f, &vec3::x) * f.focal + f.centre.x - 0.49f;
+        w.top[k] = slope(-1.0f, &vec3::y) * f.focal + f.centre.y - 0.51f;
+        w.bottom[k] = slope(1.0f, &vec3::y) * f.focal + f.centre.y - 0.49f;
+    }
+    return w;
 }
 
 void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_t count, uint32_t firstId,
@@ -235,9 +303,7 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
         const auto nearer = [&](const vec3& end, float radius) {
             const float distance = std::sqrt(max(dot(end, end), 1.0e-30f));
             const float tv = dot(t, end) / distance;
-            const float front =
-                min(min(radius / std::sqrt(max(1.0f - tv * tv, 1.0e-6f)), 4.0f * radius), 0.9f * distance);
-            return c.isRound > 0.5f ? 1.0f - front / distance : 1.0f;
+            return c.isRound > 0.5f ? 1.0f - tubeFront(radius, 1.0f - tv * tv, distance) / distance : 1.0f;
         };
         lines.xa[i] = p.xa;
         lines.ya[i] = p.ya;
@@ -257,11 +323,13 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
         lines.edgeBx[i] = edgeB.x;
         lines.edgeBy[i] = edgeB.y;
         lines.slopeB[i] = edgeB.slope;
-        lines.isRound[i] = c.isRound;
         lines.lot[i] = strandLot(s);
         lines.radius[i] = widestRadius(c, p, f.focal);
+        lines.isFilledTube[i] = isFilledTube(c, p, f.focal, f.exactStrands);
         const bool isFine = (segmentErrorCode(s) <= node.errorCode) | ((segmentOctants(s) & node.octantMask) != 0u);
-        lines.keep[i] = (isFine & (p.isThere > 0.5f)) ? 1u : 0u;
+        const float reaches =
+            tubeReaches(c, f.focal, f.centre.x, f.centre.y, float(int(f.width)), float(int(f.height)), f.nearPlane);
+        lines.keep[i] = (isFine & (max(p.isThere, reaches) > 0.5f)) ? 1u : 0u;
     }
     layLines(f, lines, count);
     const float width = float(f.width), height = float(f.height);
@@ -270,37 +338,38 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
     for (size_t i = 0; i < count; ++i) {
         if (lines.keep[i] == 0) continue;
         const uint32_t id = kKindStrand | (firstId + uint32_t(i));
-        if (lines.radius[i] >= f.exactStrands) {
-            const float xa = lines.xa[i], ya = lines.ya[i], xb = lines.xb[i], yb = lines.yb[i];
-            const RibbonEdge a{lines.edgeAx[i], lines.edgeAy[i], lines.slopeA[i]},
-                b{lines.edgeBx[i], lines.edgeBy[i], lines.slopeB[i]};
-            const bool isTubeHere = lines.isRound[i] > 0.5f;
-            const float widest =
-                isTubeHere ? lines.radius[i] : std::sqrt(max(a.x * a.x + a.y * a.y, b.x * b.x + b.y * b.y));
-            if (max(xa, xb) < -widest || max(ya, yb) < -widest || min(xa, xb) >= width + widest ||
-                min(ya, yb) >= height + widest)
-                continue;
-            const WideStrand s{xa,
-                               ya,
-                               xb,
-                               yb,
-                               lines.inverseA[i],
-                               lines.inverseB[i],
-                               lines.halfA[i],
-                               lines.halfB[i],
-                               lines.nearerA[i],
-                               lines.nearerB[i],
-                               a,
-                               b,
-                               widest,
-                               isTubeHere,
-                               id};
-            // One that covers much of the image is work for all threads.
-            const float rows = std::fabs(yb - ya) + 2 * widest, columns = std::fabs(xb - xa) + 2 * widest;
+        // One that covers much of the image is work for all threads.
+        const auto fill = [&](const WideStrand& s, float columns, float rows) {
             if (min(rows, height) * min(columns, width) > float(kLargePixels))
                 wide.keep(wide.context, s);
             else
                 fillStrand(f, s, 0, int(f.height) - 1, visibility);
+        };
+        if (lines.isFilledTube[i] > 0.5f) {
+            const WideStrand s = wideTube(f, cameraSegment(node, segmentAt(words, i)), id);
+            const float left = min(s.left[0], s.left[1]), right = max(s.right[0], s.right[1]);
+            const float top = min(s.top[0], s.top[1]), bottom = max(s.bottom[0], s.bottom[1]);
+            if (right < 0.0f || bottom < 0.0f || left >= width || top >= height) continue;
+            fill(s, right - left, bottom - top);
+            continue;
+        }
+        if (lines.radius[i] >= f.exactStrands) {
+            WideStrand s{};
+            s.id = id;
+            s.xa = lines.xa[i];
+            s.ya = lines.ya[i];
+            s.xb = lines.xb[i];
+            s.yb = lines.yb[i];
+            s.inverseA = lines.inverseA[i];
+            s.inverseB = lines.inverseB[i];
+            s.edgeA = {lines.edgeAx[i], lines.edgeAy[i], lines.slopeA[i]};
+            s.edgeB = {lines.edgeBx[i], lines.edgeBy[i], lines.slopeB[i]};
+            s.widest = std::sqrt(
+                max(s.edgeA.x * s.edgeA.x + s.edgeA.y * s.edgeA.y, s.edgeB.x * s.edgeB.x + s.edgeB.y * s.edgeB.y));
+            if (max(s.xa, s.xb) < -s.widest || max(s.ya, s.yb) < -s.widest || min(s.xa, s.xb) >= width + s.widest ||
+                min(s.ya, s.yb) >= height + s.widest)
+                continue;
+            fill(s, std::fabs(s.xb - s.xa) + 2 * s.widest, std::fabs(s.yb - s.ya) + 2 * s.widest);
             continue;
         }
         for (int k = 0; k < lines.count[i]; ++k) {
@@ -329,8 +398,15 @@ struct StrandPixels {
 };
 struct StrandTexels {
     alignas(64) float depth[kTile], radius[kTile], thickness[kTile], x[kTile], y[kTile], perpX[kTile], perpY[kTile],
-        red[kTile], green[kTile], blue[kTile], isRound[kTile], axisX[kTile], axisY[kTile];
+        red[kTile], green[kTile], blue[kTile], isRound[kTile], axisX[kTile], axisY[kTile], isFilledTube[kTile];
 };
+
+/// One of a segment's colours, linear, at a place from 0 to 1.
+[[gnu::always_inline]] inline float mixedColour(const StrandSegment& s, uint32_t shift, float place) {
+    const float a = linearFromByte(float(int(s.a.colour >> shift & 255u)) * (1.0f / 255.0f));
+    const float b = linearFromByte(float(int(s.b.colour >> shift & 255u)) * (1.0f / 255.0f));
+    return a + place * (b - a);
+}
 
 /// Texels of the pixels that show strands; is any of them a tube to be reconstructed?
 bool resolveStrands(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, uint32_t x0, uint32_t y,
@@ -392,14 +468,56 @@ bool resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
         o.isRound[i] = t.isRound;
         o.axisX[i] = t.axis.x;
         o.axisY[i] = t.axis.y;
-        const auto mix = [&](uint32_t shift) {
-            const float a = linearFromByte(float(int(packed.a.colour >> shift & 255u)) * (1.0f / 255.0f));
-            const float b = linearFromByte(float(int(packed.b.colour >> shift & 255u)) * (1.0f / 255.0f));
-            return a + place * (b - a);
-        };
-        o.red[i] = mix(0);
-        o.green[i] = mix(8);
-        o.blue[i] = mix(16);
+        o.isFilledTube[i] = isFilledTube(s, on, focal, exactStrands);
+        o.red[i] = mixedColour(packed, 0, place);
+        o.green[i] = mixedColour(packed, 8, place);
+        o.blue[i] = mixedColour(packed, 16, place);
+    }
+    // Filled tubes, by the rays of their pixels: side by side, or they would not be worked on together.
+    StrandPixels t;
+    alignas(64) float pixel[kTile], depth[kTile], perpX[kTile], perpY[kTile], red[kTile], green[kTile], blue[kTile];
+    alignas(64) uint32_t from[kTile];
+    size_t filled = 0;
+    for (size_t i = 0; i < n; ++i) {
+        if (!(o.isFilledTube[i] > 0.5f)) continue;
+        for (size_t k = 0; k < 8; ++k) t.words[k][filled] = e.words[k][i];
+        for (size_t k = 0; k < 3; ++k) t.base[k][filled] = e.base[k][i];
+        for (size_t k = 0; k < 9; ++k) t.axes[k][filled] = e.axes[k][i];
+        t.edge[filled] = e.edge[i];
+        pixel[filled] = float(int(p.pixel[i]));
+        from[filled++] = uint32_t(i);
+    }
+    const float inverseFocal = 1.0f / focal, ex0 = -cx * inverseFocal, ey = -cy * inverseFocal;
+#pragma GCC ivdep
+    for (size_t k = 0; k < filled; ++k) {
+        const StrandSegment packed{{t.words[0][k], t.words[1][k], t.words[2][k], t.words[3][k]},
+                                   {t.words[4][k], t.words[5][k], t.words[6][k], t.words[7][k]}};
+        DrawNode node{};
+        node.base = vec3(t.base[0][k], t.base[1][k], t.base[2][k]);
+        node.axisX = vec3(t.axes[0][k], t.axes[1][k], t.axes[2][k]);
+        node.axisY = vec3(t.axes[3][k], t.axes[4][k], t.axes[5][k]);
+        node.axisZ = vec3(t.axes[6][k], t.axes[7][k], t.axes[8][k]);
+        node.edge = t.edge[k];
+        const TubePixel seen = tubePixel(cameraSegment(node, packed), ex0 + pixel[k] * inverseFocal, ey, nearPlane);
+        depth[k] = seen.depth;
+        perpX[k] = seen.normalPerp.x;
+        perpY[k] = seen.normalPerp.y;
+        red[k] = mixedColour(packed, 0, seen.place);
+        green[k] = mixedColour(packed, 8, seen.place);
+        blue[k] = mixedColour(packed, 16, seen.place);
+    }
+    for (size_t k = 0; k < filled; ++k) {
+        const size_t i = from[k];
+        const bool isHit = depth[k] < kNoDepth;
+        o.depth[i] = isHit ? depth[k] : o.depth[i];
+        o.radius[i] = o.thickness[i] = 0.25f;
+        o.x[i] = o.y[i] = 0.0f;
+        o.perpX[i] = isHit ? perpX[k] : 0.0f;
+        o.perpY[i] = isHit ? perpY[k] : 0.0f;
+        o.isRound[i] = o.axisX[i] = o.axisY[i] = 0.0f;
+        o.red[i] = red[k];
+        o.green[i] = green[k];
+        o.blue[i] = blue[k];
     }
     float round_ = 0;
     for (size_t i = 0; i < n; ++i) {

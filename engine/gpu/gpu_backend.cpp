@@ -193,7 +193,7 @@ class GpuBackend final : public render::Backend {
         hasStrands_ = !draws.strandNodes.empty();
         if (hasStrands_) {
             STIPPLE_TRY(pipelines_->addStrandPasses());
-            STIPPLE_TRY(ensure(wide_, 4 + uint64_t{kWideCapacity} * 76, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+            STIPPLE_TRY(ensure(wide_, 4 + uint64_t{kWideCapacity} * 120, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
                                false, "wide strands"));
         }
         if (!draws.meshDraws.empty()) STIPPLE_TRY(prepareMeshes(draws, pixels));

@@ -144,7 +144,15 @@ struct Promise {
     const char* format = "png";
     uint64_t bytes = 0;  ///< of the file
     double mostPixels = HUGE_VAL;
+    uint64_t wholeBytes = 0;  ///< for each pixel: of what the library decodes as a whole; 0: as many as are made of it
 };
+
+/// An interlaced PNG is decoded as a whole, with the samples that it has; all others by rows. (PNG, 11.2.1)
+uint64_t wholeBytesOfPng(const uint8_t* head, size_t count) {
+    if (count < 29 || head[28] == 0) return 0;
+    const uint64_t channels = head[25] == 0 ? 1 : head[25] == 2 ? 3 : head[25] == 4 ? 2 : 4;  // a palette: of colours
+    return channels * (head[24] == 16 ? 2 : 1) + 1;                                           // alpha that a chunk adds
+}
 
 Promise promiseOf(const uint8_t* head, size_t count, uint64_t fileBytes) {
     const auto begins = [&](const char* with, size_t at = 0) {
@@ -157,7 +165,7 @@ Promise promiseOf(const uint8_t* head, size_t count, uint64_t fileBytes) {
     if (begins("\xff\xd8")) return {"jpeg", fileBytes, 4000 * bytes};
     if (begins("WEBP", 8)) return {"webp", fileBytes, HUGE_VAL};
     if (begins("#?")) return {"hdr", fileBytes, static_cast<double>(int64_t{1} << 18) * bytes / 4};
-    if (begins("\x89PNG")) return {"png", fileBytes, 8 * 1032 * bytes};
+    if (begins("\x89PNG")) return {"png", fileBytes, 8 * 1032 * bytes, wholeBytesOfPng(head, count)};
     return {"png", fileBytes, HUGE_VAL};
 }
 
@@ -172,7 +180,8 @@ Result<void> checkSize(int64_t width, int64_t height, uint64_t bytesOfPixel, con
         return fail(ErrorKind::input,
                     fmt::format("says that it is {}x{}, which {} bytes cannot be", width, height, promise.bytes), name,
                     "is it a whole picture?");
-    const uint64_t needed = static_cast<uint64_t>(width * height) * bytesOfPixel * 2;
+    const uint64_t needed =
+        static_cast<uint64_t>(width * height) * (bytesOfPixel + std::max(bytesOfPixel, promise.wholeBytes));
     if (needed <= memoryBytes) return {};
     return fail(ErrorKind::budget,
                 fmt::format("a picture of {}x{} takes about {}, but {} are left for it", width, height,

@@ -1,10 +1,12 @@
 // Ribbons and tubes once more, in fp64, from the definitions: a segment narrower than the limit is a line of pixels (by
-// columns or rows, whichever it crosses more of) and its two ends, a wide one all pixels within its half-width.
+// columns or rows, whichever it crosses more of) and its two ends, a wide ribbon all pixels between its edges, a wide
+// tube all pixels whose rays meet it (strand_rays.h).
 #include <algorithm>
 #include <cmath>
 
 #include "engine/reference/decode.h"
 #include "engine/reference/restate.h"
+#include "engine/reference/strand_rays.h"
 
 namespace stipple::reference {
 namespace {
@@ -34,11 +36,21 @@ TubeView tubeAt(const Sample& s, dvec2 off, double focal) {
     const double sine2 = glm::length(s.axis);
     const double angle = 0.5 * std::atan2(s.axis.y, s.axis.x);
     const dvec2 axis(std::cos(angle), std::sin(angle));
-    off -= axis * glm::dot(off, axis) * std::min(4 * sine2, 1.0);
     if (glm::length(off) > 1) off = glm::normalize(off);
-    const double rise = std::sqrt(std::max(0.0, 1 - glm::dot(off, off))), sine = std::sqrt(sine2);
-    return {off + s.perp * (rise / std::max(sine, 0.1)),
-            s.depth * (1 + (1 - rise) * std::max(s.radius, 0.0) / focal / std::max(sine, 0.25))};
+    // A mean of a ball (an end that is seen along the axis) and of a cylinder's side.
+    const double side = std::min(4 * sine2, 1.0), sine = std::max(std::sqrt(sine2), 0.5);
+    const dvec2 across = off - axis * glm::dot(off, axis);
+    const double ball = std::sqrt(std::max(0.0, 1 - glm::dot(off, off))),
+                 rise = std::sqrt(std::max(0.0, 1 - glm::dot(across, across)));
+    const double deeper = glm::mix(1 - ball, (1 - rise) / sine, side);
+    return {glm::mix(off, across + s.perp * (rise / sine), side),
+            s.depth * (1 + deeper * std::max(s.radius, 0.0) / focal)};
+}
+
+/// How far a narrow tube's surface lies before its axis; `sine2`: between tube and view.
+double frontOf(double radius, double sine2, double distance) {
+    return std::min(radius * glm::mix(1.0, 1 / std::max(std::sqrt(sine2), 0.5), std::min(4 * sine2, 1.0)),
+                    0.9 * distance);
 }
 
 class StrandProjector {
@@ -65,31 +77,40 @@ class StrandProjector {
         s_.directionA = toCamera(instance.rotation * world.directionA);
         s_.directionB = toCamera(instance.rotation * world.directionB);
         tangent_ = glm::length(b_ - a_) > 0 ? glm::normalize(b_ - a_) : dvec3(0);
-        // Before the near plane, and no more than 16,384 px from the middle of the image.
         from_ = 0;
         to_ = 1;
-        const double slope = 16384 / view_.focalPixels;
-        for (const dvec4& plane : {dvec4(0, 0, 1, -view_.nearPlane), dvec4(1, 0, slope, 0), dvec4(-1, 0, slope, 0),
-                                   dvec4(0, 1, slope, 0), dvec4(0, -1, slope, 0)}) {
-            const double da = glm::dot(plane, dvec4(a_, 1)), db = glm::dot(plane, dvec4(b_, 1));
-            if (da < 0 && db < 0) return;
-            if (da < 0) from_ = std::max(from_, da / (da - db));
-            if (db < 0) to_ = std::min(to_, da / (da - db));
+        if (!clip()) {  // of a tube a flank may still be seen
+            if (s_.isTube) meet();
+            return;
         }
-        if (!(from_ < to_)) return;
         pa_ = imageOf(at(from_).c);
         pb_ = imageOf(at(to_).c);
         halfA_ = halfWidth(from_, s_.directionA);
         halfB_ = halfWidth(to_, s_.directionB);
         isWide_ = view_.focalPixels * std::max(at(from_).radius / at(from_).c.z, at(to_).radius / at(to_).c.z) >=
                   double{f_.exactStrands};
-        if (isWide_)
+        if (isWide_ && s_.isTube)
+            meet();
+        else if (isWide_)
             fill();
         else
             line();
     }
 
   private:
+    /// Leaves what is before the near plane, and no more than 16,384 px from the middle of the image.
+    bool clip() {
+        const double slope = 16384 / view_.focalPixels;
+        for (const dvec4& plane : {dvec4(0, 0, 1, -view_.nearPlane), dvec4(1, 0, slope, 0), dvec4(-1, 0, slope, 0),
+                                   dvec4(0, 1, slope, 0), dvec4(0, -1, slope, 0)}) {
+            const double da = glm::dot(plane, dvec4(a_, 1)), db = glm::dot(plane, dvec4(b_, 1));
+            if (da < 0 && db < 0) return false;
+            if (da < 0) from_ = std::max(from_, da / (da - db));
+            if (db < 0) to_ = std::min(to_, da / (da - db));
+        }
+        return from_ < to_;
+    }
+
     Place at(double t) const {
         Place p;
         p.c = a_ + t * (b_ - a_);
@@ -102,21 +123,17 @@ class StrandProjector {
     dvec2 imageOf(const dvec3& c) const {
         return view_.focalPixels * dvec2(c) / c.z + 0.5 * dvec2(view_.width, view_.height);
     }
-    double halfWidth(double t, const dvec3& n) const {
-        const Place p = at(t);
-        const dvec3 v = glm::normalize(p.c);
-        const double sine = std::sqrt(std::max(1 - std::pow(glm::dot(tangent_, v), 2), 1e-6));
-        const dvec3 normal = glm::cross(tangent_, n);
-        const double share =
-            s_.isTube ? 1 : std::min(std::abs(glm::dot(normal, v)) / std::max(glm::length(normal), 1e-6) / sine, 1.0);
-        return p.radius * share * view_.focalPixels / p.c.z;
+    double halfWidth(double t, const dvec3& across) const {
+        Place p = at(t);
+        p.direction = across;
+        return halfWidthAt(p);
     }
     /// Depth of a tube's surface over its axis / depth of the axis, for the order of what is drawn.
     double nearerAt(double t) const {
         if (!s_.isTube) return 1;
         const Place p = at(t);
         const double d = glm::length(p.c), along = glm::dot(tangent_, p.c) / d;
-        return 1 - std::min({p.radius / std::sqrt(std::max(1 - along * along, 1e-6)), 4 * p.radius, 0.9 * d}) / d;
+        return 1 - frontOf(p.radius, std::max(1 - along * along, 0.0), d) / d;
     }
     /// From a ribbon's axis to its edge, px and share of the depth.
     dvec3 edgeAt(double t, const dvec3& w) const {
@@ -186,29 +203,61 @@ class StrandProjector {
         return 1 / (1 / za + u * (1 / zb - 1 / za));
     }
 
-    void fill() {
-        const dvec3 edgeA = edgeAt(from_, s_.directionA), edgeB = edgeAt(to_, s_.directionB);
-        const double widest =
-            s_.isTube ? std::max(halfA_, halfB_) : std::max(glm::length(dvec2(edgeA)), glm::length(dvec2(edgeB)));
-        const dvec2 lo = glm::min(pa_, pb_) - widest, hi = glm::max(pa_, pb_) + widest, d = pb_ - pa_;
-        const double length2 = glm::dot(d, d);
-        const double nearA = nearerAt(from_), nearB = nearerAt(to_);
+    /// A wide tube: every pixel whose ray meets it.
+    void meet() {
+        Segment own = s_;
+        own.a = a_;
+        own.b = b_;
+        // Pixels of the cubes around both balls; all where they reach beside the eye.
+        dvec2 lo(1e300), hi(-1e300);
+        bool isBefore = true;
+        for (int k = 0; k < 16; ++k) {
+            const double r = k < 8 ? own.radiusA : own.radiusB;
+            const dvec3 corner = (k < 8 ? a_ : b_) + r * (2.0 * dvec3(k & 1, k >> 1 & 1, k >> 2 & 1) - 1.0);
+            isBefore = isBefore && corner.z > view_.nearPlane;
+            if (!isBefore) break;
+            lo = glm::min(lo, imageOf(corner));
+            hi = glm::max(hi, imageOf(corner));
+        }
+        if (!isBefore) {
+            // Nothing of it if both balls lie beyond one side of the picture.
+            const dvec2 half = 0.5 * dvec2(view_.width, view_.height) / view_.focalPixels;
+            for (const dvec3& side :
+                 {dvec3(1, 0, half.x), dvec3(-1, 0, half.x), dvec3(0, 1, half.y), dvec3(0, -1, half.y), dvec3(0, 0, 1)})
+                if (std::max(glm::dot(side, a_) + glm::length(side) * own.radiusA,
+                             glm::dot(side, b_) + glm::length(side) * own.radiusB) <= 0)
+                    return;
+            lo = dvec2(0);
+            hi = dvec2(level_.width, level_.height);
+        }
         for (int y = pixelIn(lo.y, level_.height); y < level_.height && y <= hi.y; ++y)
             for (int x = pixelIn(lo.x, level_.width); x < level_.width && x <= hi.x; ++x) {
-                const dvec2 p(x + 0.5, y + 0.5);
-                double u = length2 > 1e-8 ? std::clamp(glm::dot(p - pa_, d) / length2, 0.0, 1.0) : 0, nearer = 1;
-                if (s_.isTube) {
-                    const dvec2 off = p - (pa_ + u * d);
-                    const double half = halfA_ + u * (halfB_ - halfA_), q = glm::dot(off, off) / (half * half);
-                    if (q > 1) continue;
-                    nearer = 1 - std::sqrt(1 - q) * (1 - (nearA + u * (nearB - nearA)));
-                } else {
-                    const dvec2 on = onRibbon(p);
-                    if (std::abs(on.y) > 1) continue;
-                    u = on.x;
-                    nearer = 1 + on.y * glm::mix(edgeA.z, edgeB.z, u);
-                }
-                keep(x, y, std::max(axisDepth(u) * nearer, view_.nearPlane));
+                const dvec3 ray((dvec2(x, y) + 0.5 - 0.5 * dvec2(view_.width, view_.height)) / view_.focalPixels, 1);
+                StrandHit hit;
+                if (!meetsSegment(own, {dvec3(0), ray}, view_.nearPlane, hit)) continue;
+                Sample& s = level_.ref(x, y);
+                if (s.valid && s.key <= hit.t) continue;
+                s = {};
+                s.valid = true;
+                s.key = s.depth = hit.t;
+                s.centre = dvec2(x, y) + 0.5;
+                s.colour = debugColour_ ? *debugColour_ : glm::mix(own.colourA, own.colourB, hit.place);
+                s.perp = dvec2(rotationToZ(glm::normalize(ray)) * hit.normal);
+                s.radius = 0.25;
+                s.thickness = 0.25 * s.depth / view_.focalPixels;
+            }
+    }
+
+    /// A wide ribbon: every pixel between its edges.
+    void fill() {
+        const dvec3 edgeA = edgeAt(from_, s_.directionA), edgeB = edgeAt(to_, s_.directionB);
+        const double widest = std::max(glm::length(dvec2(edgeA)), glm::length(dvec2(edgeB)));
+        const dvec2 lo = glm::min(pa_, pb_) - widest, hi = glm::max(pa_, pb_) + widest;
+        for (int y = pixelIn(lo.y, level_.height); y < level_.height && y <= hi.y; ++y)
+            for (int x = pixelIn(lo.x, level_.width); x < level_.width && x <= hi.x; ++x) {
+                const dvec2 on = onRibbon(dvec2(x + 0.5, y + 0.5));
+                if (std::abs(on.y) > 1) continue;
+                keep(x, y, std::max(axisDepth(on.x) * (1 + on.y * glm::mix(edgeA.z, edgeB.z, on.x)), view_.nearPlane));
             }
     }
 
@@ -218,7 +267,7 @@ class StrandProjector {
         if (s.valid && s.key <= key) return;
         const dvec2 pixel(x + 0.5, y + 0.5), d = pb_ - pa_;
         double u = std::clamp(glm::dot(pixel - pa_, d) / std::max(glm::dot(d, d), 1e-8), 0.0, 1.0), farther = 0;
-        if (isWide_ && !s_.isTube) {
+        if (isWide_) {
             const dvec2 on = onRibbon(pixel);
             u = on.x;
             farther = on.y * glm::mix(edgeAt(from_, s_.directionA).z, edgeAt(to_, s_.directionB).z, u);
@@ -238,9 +287,8 @@ class StrandProjector {
             const dvec3 t = glm::normalize(p.direction);
             const double along = glm::dot(t, v);
             const dvec2 across = dvec2(rotationToZ(v) * t);
-            const double sine = std::sqrt(std::max(1 - along * along, 1e-6)),
-                         reach = std::min(p.radius / distance, 0.9);
-            s.depth = std::max(p.c.z * (1 - std::min({p.radius / sine, 4 * p.radius, 0.9 * distance}) / distance),
+            const double reach = std::min(p.radius / distance, 0.9);
+            s.depth = std::max(p.c.z * (1 - frontOf(p.radius, std::max(1 - along * along, 0.0), distance) / distance),
                                view_.nearPlane);
             s.radius = p.radius * view_.focalPixels / p.c.z / std::sqrt(1 - reach * reach) * support;
             s.isRound = half >= kNarrow;
@@ -261,27 +309,24 @@ class StrandProjector {
             s.thickness = std::max(p.radius * view_.focalPixels / p.c.z, kNarrow) *
                           (0.25 + std::sqrt(std::max(0.0, 1 - facing))) * s.depth / view_.focalPixels;
         if (!isWide_) return;
-        const dvec2 off = pixel - s.centre;
-        if (s.isRound) {
-            const TubeView seen = tubeAt(s, off, view_.focalPixels);
-            s.perp = seen.perp;
-            s.depth = seen.depth;
-        } else {
-            s.depth *= 1 + farther;
-        }
+        s.depth *= 1 + farther;
         s.radius = 0.25;
-        s.thickness = (s_.isTube ? 1 : kLeafThickness) * 0.25 * s.depth / view_.focalPixels;
+        s.thickness = kLeafThickness * 0.25 * s.depth / view_.focalPixels;
         s.centre = pixel;
         s.isRound = false;
         s.axis = dvec2(0);
     }
+    /// Half of what is seen across the line that the axis is on the image, px.
     double halfWidthAt(const Place& p) const {
         const dvec3 v = glm::normalize(p.c);
         const double sine = std::sqrt(std::max(1 - std::pow(glm::dot(tangent_, v), 2), 1e-6));
         const dvec3 normal = glm::cross(tangent_, p.direction);
         const double share =
             s_.isTube ? 1 : std::min(std::abs(glm::dot(normal, v)) / std::max(glm::length(normal), 1e-6) / sine, 1.0);
-        return p.radius * share * view_.focalPixels / p.c.z;
+        // The plane through eye and axis, and how much of its normal lies in the image.
+        const double off = glm::cross(v, tangent_).z / sine;
+        const double inImage = std::sqrt(std::max({1 - off * off, v.z * v.z, 1e-6}));
+        return p.radius * share * view_.focalPixels / p.c.z / inImage;
     }
     dvec3 narrowNormal(const dvec3& t, const dvec3& v) const {
         const dvec3 sun(f_.sunDirection);

@@ -8,39 +8,50 @@ namespace {
 
 using glm::dvec3;
 
-/// Nearest t of a ball.
-bool meetsBall(const dvec3& centre, double radius, const LocalRay& ray, double nearT, double& t) {
-    const dvec3 off = ray.origin - centre;
-    const double a = glm::dot(ray.direction, ray.direction), b = glm::dot(off, ray.direction),
-                 c = glm::dot(off, off) - radius * radius, d = b * b - a * c;
-    if (d < 0) return false;
-    const double root = std::sqrt(d);
-    t = (-b - root) / a;
-    if (t <= nearT) t = (-b + root) / a;
-    return t > nearT;
+/// The normal of a tube that is bent as its vertices' tangents say: where the axis was, the mean of both tangents is.
+/// `lean`: share of the normal along the axis.
+dvec3 bentNormal(const Segment& s, double place, const dvec3& straight, double lean) {
+    const dvec3 d = glm::mix(s.directionA, s.directionB, place);
+    if (!(glm::length(d) > 0)) return straight;
+    const dvec3 axis = glm::normalize(d), across = glm::cross(glm::cross(axis, straight), axis);
+    if (!(glm::length(across) > 0)) return straight;
+    const double angle = std::asin(std::clamp(lean, -1.0, 1.0));
+    return std::sin(angle) * axis + std::cos(angle) * glm::normalize(across);
 }
 
 /// Two balls and the cone that touches both. On it a point p at y along the axis from a has
 /// (p - a)^2 - y^2 = (cone's radius there)^2; the cone begins where it touches the balls.
 bool meetsTube(const Segment& s, const LocalRay& ray, double nearT, StrandHit& hit) {
-    double best = 1e300, place = 0;
+    double best = 1e300, place = 0, lean = 0;
     dvec3 normal(0);
-    const dvec3 axis = s.b - s.a;
-    const double length = glm::length(axis);
-    const auto ball = [&](const dvec3& centre, double radius, double at) {
-        double t = 0;
-        if (!meetsBall(centre, radius, ray, nearT, t) || t >= best) return;
-        best = t;
-        place = at;
-        normal = (ray.origin + t * ray.direction - centre) / radius;
+    const double length = glm::length(s.b - s.a), shrink = s.radiusA - s.radiusB;
+    const bool hasCone = length > std::abs(shrink);
+    const dvec3 w = length > 0 ? (s.b - s.a) / length : dvec3(0);
+    // The tangent cone: distance from the axis = (radiusA - slope' y) / cosine, with sine = shrink / length.
+    const double sine = hasCone ? shrink / length : 0, cosine = std::sqrt(1 - sine * sine);
+    const double first = s.radiusA * sine, last = length + s.radiusB * sine, slack = 1e-9 * (s.radiusA + s.radiusB);
+    const auto ball = [&](const dvec3& centre, double radius, int end) {
+        const dvec3 off = ray.origin - centre;
+        const double a = glm::dot(ray.direction, ray.direction), b = glm::dot(off, ray.direction),
+                     c = glm::dot(off, off) - radius * radius, d = b * b - a * c;
+        if (d < 0) return;
+        for (const double t : {(-b - std::sqrt(d)) / a, (-b + std::sqrt(d)) / a}) {
+            if (!(t > nearT) || t >= best) continue;
+            const dvec3 n = (off + t * ray.direction) / radius;
+            // What lies inside the cone is no surface.
+            const double y = glm::dot(ray.origin + t * ray.direction - s.a, w);
+            if (hasCone && (end == 0 ? y > first + slack : y < last - slack)) continue;
+            best = t;
+            place = end;
+            normal = n;
+            const dvec3 d0 = end == 0 ? s.directionA : s.directionB;
+            const double own = glm::length(d0) > 0 ? glm::dot(n, glm::normalize(d0)) : 0;
+            lean = end == 0 ? std::min(own, sine) : std::max(own, sine);
+        }
     };
-    ball(s.a, s.radiusA, 0);
-    ball(s.b, s.radiusB, 1);
-    const double shrink = s.radiusA - s.radiusB;
-    if (length > std::abs(shrink)) {
-        const dvec3 w = axis / length;
-        // The tangent cone: distance from the axis = (radiusA - slope' y) / cosine, with sine = shrink / length.
-        const double sine = shrink / length, cosine = std::sqrt(1 - sine * sine);
+    if (hasCone || shrink >= 0) ball(s.a, s.radiusA, 0);
+    if (hasCone || shrink < 0) ball(s.b, s.radiusB, 1);
+    if (hasCone) {
         const dvec3 off = ray.origin - s.a;
         const double oy = glm::dot(off, w), dy = glm::dot(ray.direction, w);
         const dvec3 op = off - oy * w, dp = ray.direction - dy * w;
@@ -52,16 +63,19 @@ bool meetsTube(const Segment& s, const LocalRay& ray, double nearT, StrandHit& h
             for (const double t : {(-b - std::sqrt(d)) / a, (-b + std::sqrt(d)) / a}) {
                 if (!(t > nearT) || t >= best || k0 + t * k1 < 0) continue;
                 const double y = oy + t * dy;
-                // Where it touches the balls: y = radius * sine from each middle.
-                if (y < s.radiusA * sine || y > length + s.radiusB * sine) continue;
+                if (y < first || y > last) continue;
                 best = t;
-                const dvec3 across = op + t * dp;
-                normal = glm::normalize(across) * cosine + w * sine;
-                place = std::clamp((y - s.radiusA * sine) / (length + (s.radiusB - s.radiusA) * sine), 0.0, 1.0);
+                normal = glm::normalize(op + t * dp) * cosine + w * sine;
+                lean = sine;
+                place = std::clamp((y - first) / (last - first), 0.0, 1.0);
             }
     }
     if (best >= 1e300) return false;
-    hit = {best, place, glm::dot(normal, ray.direction) > 0 ? -normal : normal};
+    const bool isInside = glm::dot(normal, ray.direction) > 0;
+    dvec3 bent = (isInside ? -1.0 : 1.0) * (hasCone ? bentNormal(s, place, normal, lean) : normal);
+    const dvec3 v = glm::normalize(ray.direction);
+    if (glm::dot(bent, v) > 0) bent = glm::normalize(bent - glm::dot(bent, v) * v);
+    hit = {best, place, bent};
     return true;
 }
 

@@ -1,6 +1,7 @@
 #include "engine/scene/camera.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +9,8 @@
 
 #include "engine/base/file.h"
 #include "engine/base/numbers.h"
+#include "engine/base/text.h"
+#include "engine/base/words.h"
 
 namespace stipple::scene {
 namespace {
@@ -287,6 +290,18 @@ class KeyReader {
         return v;
     }
     bool has(const char* name) const { return key_.contains(name); }
+    /// Nothing but these: a misspelt name would be passed over without a word.
+    Result<void> holdsOnly(const std::vector<std::string>& names) const {
+        if (!key_.is_object()) return {};
+        for (const auto& [name, value] : key_.items()) {
+            if (std::find(names.begin(), names.end(), name) != names.end()) continue;
+            const std::string nearest = nearestWord(name, names);
+            return fail(ErrorKind::input, fmt::format("{}: '{}' is not known", where_, printable(name)), path_,
+                        nearest.empty() ? fmt::format("there are {}", fmt::join(names, ", "))
+                                        : fmt::format("did you mean '{}'?", nearest));
+        }
+        return {};
+    }
     tl::unexpected<Error> bad(const char* name, const std::string& what) const {
         return fail(ErrorKind::input, fmt::format("{}: '{}' {}", where_, name, what), path_,
                     R"(expected {"fps": 30, "keys": [{"t": 0, "eye": [x,y,z], "target": [x,y,z]}]})");
@@ -300,6 +315,7 @@ class KeyReader {
 Result<CameraKey> readKey(const KeyReader& from, const glm::dvec3& up) {
     CameraKey key;
     key.camera.up = up;
+    STIPPLE_TRY(from.holdsOnly({"t", "eye", "target", "up", "fov"}));
     STIPPLE_ASSIGN(key.t, from.number("t", -1e9, 1e9));
     STIPPLE_ASSIGN(key.camera.eye, from.vector("eye"));
     STIPPLE_ASSIGN(key.camera.target, from.vector("target"));
@@ -325,6 +341,7 @@ Result<CameraPath> readCameraPath(const std::string& path, const glm::dvec3& up)
                     path, R"(expected {"fps": 30, "keys": [{"t": 0, "eye": [x,y,z], "target": [x,y,z]}]})");
     CameraPath out;
     const KeyReader whole(j, path, "the path");
+    STIPPLE_TRY(whole.holdsOnly({"fps", "keys"}));
     constexpr double kLeastRate = 1e-6, kGreatestRate = 10'000, kMostFrames = 10'000'000;
     if (whole.has("fps")) {
         STIPPLE_ASSIGN(out.fps, whole.number("fps", kLeastRate, kGreatestRate));

@@ -4,6 +4,7 @@
 #ifndef STIPPLE_SHARED_STRAND_H
 #define STIPPLE_SHARED_STRAND_H
 #include "splat.h"
+#include "tube.h"
 SHARED_BEGIN
 
 // Positions are steps of 1/32768 of the node's cell, counted from half a cell before it: a segment belongs to the cell
@@ -108,7 +109,8 @@ SHARED_FN vec3 ribbonNormal(vec3 t, vec3 w) {
 }
 
 // Half-width across the line of sight, px: what is seen of a ribbon depends on how it faces the eye. `c`: a place on
-// the segment, `t`: unit tangent, `w`: across the ribbon.
+// the segment, `t`: unit tangent, `w`: across the ribbon. With m the normal of the plane through the eye and the
+// segment, the image stretches what lies along m by 1 / sqrt(1 - m_z^2) beside the middle of a wide picture.
 SHARED_FN float seenHalfWidth(vec3 c, float radius, vec3 t, vec3 w, float isRound, float focal) {
     const float inverse = 1.0f / sqrt(max(dot(c, c), 1.0e-30f));
     const vec3 v = vec3(c.x * inverse, c.y * inverse, c.z * inverse);
@@ -117,7 +119,9 @@ SHARED_FN float seenHalfWidth(vec3 c, float radius, vec3 t, vec3 w, float isRoun
     const vec3 m = ribbonNormal(t, w);
     const float facing = abs(dot(m, v)) / sqrt(max(dot(m, m), 1.0e-12f));
     const float share = isRound > 0.5f ? 1.0f : min(facing / sine, 1.0f);
-    return radius * share * focal / c.z;
+    const float mz = (v.x * t.y - v.y * t.x) / sine;
+    const float stretch2 = max(1.0f - mz * mz, v.z * v.z);  // m lies across v, so that it is no less
+    return radius * share * focal / (c.z * sqrt(max(stretch2, 1.0e-6f)));
 }
 
 SHARED_FN vec3 segmentTangent(CameraSegment s) {
@@ -141,6 +145,28 @@ SHARED_FN float widestRadius(CameraSegment s, ScreenSegment on, float focal) {
     return max(a, b) * focal;
 }
 
+// Does anything of a tube lie before the near plane and inside the picture's four sides, though its axis does not?
+SHARED_FN float tubeReaches(CameraSegment s, float focal, float cx, float cy, float width, float height,
+                            float nearPlane) {
+    const float left = 1.0f / sqrt(focal * focal + cx * cx);
+    const float right = 1.0f / sqrt(focal * focal + (width - cx) * (width - cx));
+    const float top = 1.0f / sqrt(focal * focal + cy * cy);
+    const float bottom = 1.0f / sqrt(focal * focal + (height - cy) * (height - cy));
+    const float l =
+        max((focal * s.a.x + cx * s.a.z) * left + s.radiusA, (focal * s.b.x + cx * s.b.z) * left + s.radiusB);
+    const float r = max(((width - cx) * s.a.z - focal * s.a.x) * right + s.radiusA,
+                        ((width - cx) * s.b.z - focal * s.b.x) * right + s.radiusB);
+    const float t = max((focal * s.a.y + cy * s.a.z) * top + s.radiusA, (focal * s.b.y + cy * s.b.z) * top + s.radiusB);
+    const float b = max(((height - cy) * s.a.z - focal * s.a.y) * bottom + s.radiusA,
+                        ((height - cy) * s.b.z - focal * s.b.y) * bottom + s.radiusB);
+    const float n = max(s.a.z + s.radiusA, s.b.z + s.radiusB) - nearPlane;
+    return min(min(min(l, r), min(t, b)), n) > 0.0f ? s.isRound : 0.0f;
+}
+// Is a tube filled by its pixels' rays? `on.isThere` of 0: only its flank is seen.
+SHARED_FN float isFilledTube(CameraSegment s, ScreenSegment on, float focal, float exactStrands) {
+    return on.isThere < 0.5f || widestRadius(s, on, focal) >= exactStrands ? s.isRound : 0.0f;
+}
+
 // Normal of a tube too narrow to show its roundness: the one whose light is that of the whole, sqrt(1 - (l t)^2), bent
 // to the eye where it turns away. `t`: tangent, `v`: view direction, `l`: towards the light; unit.
 SHARED_FN vec3 narrowTubeNormal(vec3 t, vec3 v, vec3 l) {
@@ -152,6 +178,14 @@ SHARED_FN vec3 narrowTubeNormal(vec3 t, vec3 v, vec3 l) {
     const float inverse = 1.0f / sqrt(max(length2, 1.0e-12f));
     const bool isThere = length2 > 1.0e-6f;  // else the light comes along the tube
     return vec3(isThere ? n.x * inverse : -v.x, isThere ? n.y * inverse : -v.y, isThere ? n.z * inverse : -v.z);
+}
+
+// How far a narrow tube's surface lies before its axis: radius / sine of its side (`sine2`: between tube and view), a
+// radius of the end that is seen along the axis. Off the surface by no more than a radius.
+SHARED_FN float tubeFront(float radius, float sine2, float distance) {
+    const float side = min(4.0f * sine2, 1.0f);
+    const float front = 1.0f + side * (1.0f / max(sqrt(max(sine2, 0.0f)), 0.5f) - 1.0f);
+    return min(front * radius, 0.9f * distance);
 }
 
 // Everything of the texel at a place on the segment but its offset from the pixel and its colour. `support`: radius of
@@ -175,7 +209,7 @@ SHARED_FN Texel texelFromStrand(CameraSegment s, float place, float support, flo
     const vec2 across = perpFromNormal(t, v);
     const float sine2 = max(1.0f - tv * tv, 0.0f);
     const float reach = min(radius / distance, 0.9f);
-    const float front = min(min(radius / sqrt(max(sine2, 1.0e-6f)), 4.0f * radius), 0.9f * distance);
+    const float front = tubeFront(radius, sine2, distance);
     const float roundRadius = radius * focal / (z * sqrt(1.0f - reach * reach));
     const vec3 m = ribbonNormal(own, d);
     const float inverseM = 1.0f / sqrt(max(dot(m, m), 1.0e-12f));
@@ -287,43 +321,60 @@ SHARED_FN TubeSurface tubeSurface(Texel t, float inverseFocal) {
     const float second = 0.5f * sin2 / first;
     const float ax = isFlat ? first : second;
     const float ay = isFlat ? second : first;
-    // What the centre is off along the axis says nothing.
-    const float along = (x * ax + y * ay) * min(4.0f * sine2, 1.0f);
-    x -= ax * along;
-    y -= ay * along;
     const float q = x * x + y * y;
     const float shrink = q > 1.0f ? 1.0f / sqrt(q) : 1.0f;
     x *= shrink;
     y *= shrink;
-    const float rise = sqrt(max(1.0f - x * x - y * y, 0.0f));
+    // Between the ball of an end that is seen along its axis and the side of a cylinder, of which what the centre is
+    // off along the axis says nothing. (A mean of two normals: never longer than 1.)
+    const float along = x * ax + y * ay;
+    const float round_ = 1.0f - min(4.0f * sine2, 1.0f);
+    const float wx = x - ax * along;
+    const float wy = y - ay * along;
+    const float ball = sqrt(max(1.0f - x * x - y * y, 0.0f));
+    const float rise = sqrt(max(1.0f - wx * wx - wy * wy, 0.0f));
     const float sine = sqrt(sine2);
-    const float lean = rise / max(sine, 0.1f);
+    const float lean = (1.0f - round_) * rise / max(sine, 0.5f);
     TubeSurface s;
-    s.normalPerp = vec2(x + lean * t.normalPerp.x, y + lean * t.normalPerp.y);
-    s.depth = t.depth * (1.0f + min(1.0f - rise, 1.0f) * t.radius * inverseFocal / max(sine, 0.25f));
+    s.normalPerp =
+        vec2(wx + round_ * ax * along + lean * t.normalPerp.x, wy + round_ * ay * along + lean * t.normalPerp.y);
+    const float deeper = round_ * (1.0f - ball) + (1.0f - round_) * (1.0f - rise) / max(sine, 0.5f);
+    s.depth = t.depth * (1.0f + min(deeper, 2.0f) * t.radius * inverseFocal);
     return s;
 }
 
-// What a wide strand shows at the pixel whose centre is `dx`, `dy` from the place on its axis (px): a texel that stands
-// for nothing but its own pixel. `t`: texelFromStrand at that place, `farther`: of a ribbon's place, share of the
-// depth.
-SHARED_FN Texel exactTexel(Texel t, float dx, float dy, float farther, float inverseFocal) {
-    Texel round_ = t;
-    round_.offset = vec2(-dx, -dy);
-    const TubeSurface s = tubeSurface(round_, inverseFocal);
-    const bool isRound = t.isRound > 0.5f;
+struct TubePixel {
+    float depth;  // kNoDepth: the ray passes by
+    vec2 normalPerp;
+    float place;
+};
+// What a filled ribbon shows at a pixel: a texel that stands for nothing but that. `farther`: of its place across the
+// ribbon, share of the depth.
+SHARED_FN Texel exactTexel(Texel t, float farther) {
     Texel r = t;
-    r.depth = isRound ? s.depth : t.depth * (1.0f + farther);
-    r.normalPerp = vec2(isRound ? s.normalPerp.x : t.normalPerp.x, isRound ? s.normalPerp.y : t.normalPerp.y);
+    r.depth = t.depth * (1.0f + farther);
     r.radius = 0.25f;
-    r.thickness = (isRound ? 1.0f : kLeafThickness) * 0.25f;  // a filled ribbon is a leaf
+    r.thickness = kLeafThickness * 0.25f;  // a filled ribbon is a leaf
     r.offset = vec2(0.0f, 0.0f);
     r.isRound = 0.0f;
     r.axis = vec2(0.0f, 0.0f);
     return r;
 }
+// What a filled tube shows at the pixel whose ray is (ex, ey, 1), and where on the segment.
+SHARED_FN TubePixel tubePixel(CameraSegment s, float ex, float ey, float nearPlane) {
+    const Tube tube = tubeOf(s.a, s.b, s.radiusA, s.radiusB);
+    const TubeHit hit = tubeHit(tube, ex, ey, nearPlane, false);
+    const float inverse = 1.0f / sqrt(ex * ex + ey * ey + 1.0f);
+    const vec3 v = vec3(ex * inverse, ey * inverse, inverse);
+    TubePixel p;  // where rounding lets the ray pass by: a rim is no nearer to anything
+    p.depth = hit.depth;
+    p.normalPerp = perpFromNormal(tubeNormal(tube, hit, s.directionA, s.directionB, v), v);
+    p.place = hit.place;
+    return p;
+}
 
-// What a pixel of a strand shows. `on`: the segment projected with the pixel's centre as the origin.
+// What a pixel of a strand shows, unless it is a filled tube's. `on`: the segment projected with the pixel's centre as
+// the origin.
 struct StrandPixel {
     Texel texel;
     float place;  // along the segment, 0 to 1
@@ -349,13 +400,12 @@ SHARED_FN StrandPixel strandPixel(CameraSegment s, ScreenSegment on, float suppo
     const float x = c.x * focal / c.z + cx;
     const float y = c.y * focal / c.z + cy;
     const float farther = isOnRibbon ? p.across * (ea.slope + u * (eb.slope - ea.slope)) : 0.0f;
-    const Texel filled = exactTexel(disc, -x, -y, farther, 1.0f / focal);
+    const Texel filled = exactTexel(disc, farther);
+    r.texel = disc;
     r.texel.depth = isWide ? filled.depth : disc.depth;
     r.texel.radius = isWide ? filled.radius : disc.radius;
     r.texel.thickness = isWide ? filled.thickness : disc.thickness;
     r.texel.offset = vec2(isWide ? 0.0f : x, isWide ? 0.0f : y);
-    r.texel.normalPerp =
-        vec2(isWide ? filled.normalPerp.x : disc.normalPerp.x, isWide ? filled.normalPerp.y : disc.normalPerp.y);
     r.texel.colour = vec3(0.0f, 0.0f, 0.0f);
     r.texel.isRound = isWide ? 0.0f : disc.isRound;
     r.texel.axis = vec2(isWide ? 0.0f : disc.axis.x, isWide ? 0.0f : disc.axis.y);

@@ -20,7 +20,18 @@ void main() {
     const ScreenSegment on = projectSegment(s.a, s.b, frame.focal, cx, cy, frame.nearPlane);
     const StrandPixel seen = strandPixel(s, on, frame.supportScale, frame.focal, cx, cy, frame.nearPlane, frame.exactStrands, frame.sunDirection);
     Texel t = seen.texel;
-    const float place = seen.place;
+    float place = seen.place;
+    if (isFilledTube(s, on, frame.focal, frame.exactStrands) > 0.5) {
+        const TubePixel hit = tubePixel(s, -cx * (1.0 / frame.focal), -cy * (1.0 / frame.focal), frame.nearPlane);
+        if (hit.depth < kNoDepth) t.depth = hit.depth;
+        t.normalPerp = hit.depth < kNoDepth ? hit.normalPerp : vec2(0.0);
+        t.radius = 0.25;
+        t.thickness = 0.25;
+        t.offset = vec2(0.0);
+        t.isRound = 0.0;
+        t.axis = vec2(0.0);
+        place = hit.place;
+    }
     const vec4 a = decodeTexel(segment.a.colour, true);
     const vec4 b = decodeTexel(segment.b.colour, true);
     t.colour = a.xyz + place * (b.xyz - a.xyz);

@@ -54,8 +54,7 @@ void drawEnd(float x, float y, float inverseDepth, float halfWidth, float nearer
 float nearerAt(vec3 end, vec3 t, float radius, float isRound) {
     const float distance = sqrt(max(dot(end, end), 1.0e-30));
     const float tv = dot(t, end) / distance;
-    const float front = min(min(radius / sqrt(max(1.0 - tv * tv, 1.0e-6)), 4.0 * radius), 0.9 * distance);
-    return isRound > 0.5 ? 1.0 - front / distance : 1.0;
+    return isRound > 0.5 ? 1.0 - tubeFront(radius, 1.0 - tv * tv, distance) / distance : 1.0;
 }
 
 void main() {
@@ -70,7 +69,9 @@ void main() {
     lot = strandLot(segment);
     const CameraSegment c = cameraSegment(node, segment);
     const ScreenSegment p = projectSegment(c.a, c.b, frame.focal, frame.centre.x, frame.centre.y, frame.nearPlane);
-    if (p.isThere < 0.5) return;
+    const float width = float(frame.width);
+    const float height = float(frame.height);
+    if (max(p.isThere, tubeReaches(c, frame.focal, frame.centre.x, frame.centre.y, width, height, frame.nearPlane)) < 0.5) return;
     const vec3 t = segmentTangent(c);
     vec3 a = c.a + p.from * (c.b - c.a);
     vec3 b = c.a + p.to * (c.b - c.a);
@@ -89,20 +90,27 @@ void main() {
     const float rb = c.radiusA + p.to * (c.radiusB - c.radiusA);
     s.edgeA = ribbonEdge(a, c.directionA, ra, frame.focal);
     s.edgeB = ribbonEdge(b, c.directionB, rb, frame.focal);
-    s.isRound = c.isRound > 0.5 ? 1u : 0u;
-    const float radius = widestRadius(c, p, frame.focal);
-    const float widest = s.isRound != 0u ? radius
-                                         : sqrt(max(s.edgeA.x * s.edgeA.x + s.edgeA.y * s.edgeA.y,
-                                                    s.edgeB.x * s.edgeB.x + s.edgeB.y * s.edgeB.y));
-    s.widest = widest;
-    const vec2 lo = min(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) - widest;
-    const vec2 hi = max(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) + widest;
-    if (hi.x < 0.0 || hi.y < 0.0 || lo.x >= float(frame.width) || lo.y >= float(frame.height)) return;
+    s.isRound = isFilledTube(c, p, frame.focal, frame.exactStrands) > 0.5 ? 1u : 0u;
+    s.a = c.a;
+    s.b = c.b;
+    s.radiusA = c.radiusA;
+    s.radiusB = c.radiusB;
+    const float widest = sqrt(max(s.edgeA.x * s.edgeA.x + s.edgeA.y * s.edgeA.y, s.edgeB.x * s.edgeB.x + s.edgeB.y * s.edgeB.y));
+    vec2 lo = min(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) - widest;
+    vec2 hi = max(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) + widest;
+    if (s.isRound != 0u) {
+        lo = -vec2(tubeSlope(-c.a.x, c.a.z, c.radiusA, -c.b.x, c.b.z, c.radiusB), tubeSlope(-c.a.y, c.a.z, c.radiusA, -c.b.y, c.b.z, c.radiusB)) * frame.focal + frame.centre - 1.5;
+        hi = vec2(tubeSlope(c.a.x, c.a.z, c.radiusA, c.b.x, c.b.z, c.radiusB), tubeSlope(c.a.y, c.a.z, c.radiusA, c.b.y, c.b.z, c.radiusB)) * frame.focal + frame.centre + 0.5;
+    } else if (c.isRound > 0.5) {
+        lo = min(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) - 1.0;
+        hi = max(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) + 1.0;
+    }
+    if (!(hi.x >= 0.0 && hi.y >= 0.0 && lo.x < width && lo.y < height)) return;
     s.nearerA = nearerAt(a, t, ra, c.isRound);
     s.nearerB = nearerAt(b, t, rb, c.isRound);
     const vec2 d = vec2(p.xb - p.xa, p.yb - p.ya);
     s.id = kKindStrand | (block * kSegmentsPerBlock + gl_LocalInvocationID.x);
-    if (radius < frame.exactStrands) {
+    if (s.isRound == 0u && (c.isRound > 0.5 || widestRadius(c, p, frame.focal) < frame.exactStrands)) {
         drawLine(s);
         const float across = max(abs(d.x), abs(d.y));
         drawEnd(s.xa, s.ya, s.inverseA, s.halfA, s.nearerA, across, s.id);
@@ -110,7 +118,8 @@ void main() {
         return;
     }
     const ivec2 from = ivec2(max(lo, vec2(0.0)));
-    const ivec2 to = ivec2(min(hi, vec2(frame.width, frame.height) - 1.0));
+    const ivec2 to = ivec2(min(hi, vec2(width, height) - 1.0));
+    s.box = ivec4(from, to);
     if ((to.x - from.x + 1) * (to.y - from.y + 1) > kMostPixels) {
         const uint place = atomicAdd(wideCount, 1u);
         if (place < kWideCapacity) {

@@ -11,11 +11,10 @@ void main() {
     const int firstRow = int(gl_WorkGroupID.y) * kRows;
     for (uint i = gl_WorkGroupID.x; i < count; i += gl_NumWorkGroups.x) {
         const WideStrand s = wide[i];
-        const float widest = s.widest;
-        const int x0 = int(max(min(s.xa, s.xb) - widest, 0.0));
-        const int x1 = int(min(max(s.xa, s.xb) + widest, float(frame.width) - 1.0));
-        const int y0 = int(max(min(s.ya, s.yb) - widest, float(firstRow)));
-        const int y1 = int(min(max(s.ya, s.yb) + widest, min(float(firstRow + kRows), float(frame.height)) - 1.0));
+        const int x0 = s.box.x;
+        const int x1 = s.box.z;
+        const int y0 = max(s.box.y, firstRow);
+        const int y1 = min(s.box.w, firstRow + kRows - 1);
         const int width = x1 - x0 + 1;
         if (width <= 0 || y1 < y0) continue;
         const int pixels = width * (y1 - y0 + 1);

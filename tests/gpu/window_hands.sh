@@ -120,6 +120,9 @@ pictures_are_of_the_scene() {
     scan
     echo mine >stipple_001.png
     view "$folder/a.las"
+    # What writes pictures is loaded behind the first frame: the first P does not wait for it.
+    hasLoaded() { grep -q libstipple_oiio "/proc/$viewer/maps"; }
+    await 60 hasLoaded || fail "what writes pictures was not loaded"
     settle
     [ "$(cat stipple_001.png)" = mine ] || fail "P wrote over an earlier picture"
     [ -f stipple_002.png ] || fail "no picture of the first free number"

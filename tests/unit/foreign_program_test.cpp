@@ -20,7 +20,7 @@ using test::spit;
 using test::TempFolder;
 
 /// A PNG of this size without pixels: signature, IHDR, an empty IDAT. (CRCs are of zlib's polynomial.)
-std::string pngHead(uint32_t width, uint32_t height) {
+std::string pngHead(uint32_t width, uint32_t height, const std::string& kind = std::string("\x08\x06\0\0\0", 5)) {
     const auto number = [](uint32_t v) {
         std::string s;
         for (int shift = 24; shift >= 0; shift -= 8) s += static_cast<char>(v >> shift & 255u);
@@ -34,8 +34,7 @@ std::string pngHead(uint32_t width, uint32_t height) {
         }
         return number(static_cast<uint32_t>(body.size() - 4)) + body + number(~crc);
     };
-    return "\x89PNG\r\n\x1a\n" + chunk("IHDR" + number(width) + number(height) + std::string("\x08\x06\0\0\0", 5)) +
-           chunk("IDAT");
+    return "\x89PNG\r\n\x1a\n" + chunk("IHDR" + number(width) + number(height) + kind) + chunk("IDAT");
 }
 
 TEST(ForeignText, AnyBytesBecomeOneLineOfValidUtf8) {
@@ -110,6 +109,15 @@ TEST(ForeignPictures, WhatAPictureClaimsIsCheckedBeforeMemoryIsTaken) {
     ASSERT_FALSE(large);
     EXPECT_EQ(large.error().kind, ErrorKind::budget) << large.error().line();
     EXPECT_NE(large.error().line().find("--memory"), std::string::npos) << large.error().line();
+    // An interlaced one is decoded as a whole, 9 bytes a pixel where it has 16 bits a sample: 468 MB, not 288.
+    for (const auto& [kind, fits] :
+         {std::pair{std::string("\x10\x06\0\0\1", 5), false}, {std::string("\x10\x06\0\0\0", 5), true}}) {
+        constexpr uint64_t kBetween = uint64_t{320} << 20;
+        const auto whole =
+            image::decodeImage(bytesOf(pngHead(6000, 6000, kind) + std::string(100'000, '\0')), "i", kBetween);
+        ASSERT_FALSE(whole) << "there is nothing in it";
+        EXPECT_EQ(whole.error().kind, fits ? ErrorKind::input : ErrorKind::budget) << whole.error().line();
+    }
     const auto webp = image::decodeImage(
         bytesOf(std::string("RIFF\x30\0\0\0WEBPVP8X\x0a\0\0\0\0\0\0\0\xfe\x3f\0\xfe\x3f\0VP8L\0\0\0\0", 38)), "w",
         kMemory);

@@ -127,6 +127,70 @@ TEST_F(ForeignScenes, FaultsThatChangeNothingDrawableAreNotedAndOnlyAStrictReade
     EXPECT_EQ(notesOf(*good), "");
 }
 
+TEST_F(ForeignScenes, ContainersThatOtherViewersOpenAreRead) {
+    const auto word = [](size_t v) {
+        const auto w = static_cast<uint32_t>(v);
+        return std::string(reinterpret_cast<const char*>(&w), 4);
+    };
+    const std::string mark = "\xef\xbb\xbf", points = floats({0, 0, 0, 1, 0, 0, 0, 1, 0});
+    const auto chunk = [&](const char* type, const std::string& body) {
+        return word(body.size()) + std::string(type, 4) + body;
+    };
+    const auto glb = [&](const std::string& text, const std::string& rest) {
+        const std::string body = chunk("JSON", text) + rest;
+        return "glTF" + word(2) + word(12 + body.size()) + body;
+    };
+    json inside = triangle();
+    inside["buffers"][0].erase("uri");
+    std::string text = inside.dump(), odd = inside.dump();
+    while (text.size() % 4 != 0) text += ' ';
+    while (odd.size() % 4 != 3) odd += ' ';
+    const std::string bin = chunk("BIN\0", points);
+    const std::vector<std::tuple<const char*, std::string, std::string>> files{
+        {"a.gltf", mark + triangle().dump(), "byte order mark"},
+        {"a.glb", glb(mark + text + " ", bin), "byte order mark"},
+        {"a.glb", glb(odd, bin), "not a multiple of 4"},
+        {"a.glb", glb(text, chunk("MORE", "....") + bin), "must be the second"},
+        {"a.glb", glb(text, bin + chunk("BIN\0", "....")), "second binary chunk"},
+        {"a.glb", glb(text, bin + chunk("MORE", "....")), ""}};
+    for (const auto& [name, bytes, note] : files) {
+        spit(folder_ / name, bytes);
+        const auto scene = readGltf(folder_ / name);
+        ASSERT_TRUE(scene) << note << ": " << scene.error().line();
+        EXPECT_EQ(trianglesOf(*scene), 1u) << note;
+        EXPECT_NE(notesOf(*scene).find(note), std::string::npos) << notesOf(*scene);
+        EXPECT_EQ(notesOf(*scene).empty(), note.empty()) << notesOf(*scene);
+        ReadSettings strict;
+        strict.isStrict = true;
+        EXPECT_EQ(readGltf(folder_ / name, strict).has_value(), note.empty()) << note;
+    }
+}
+
+TEST_F(ForeignScenes, TexturesOfGpuFormatsAreNamedOneByOneAndThoseOfWebpAreNotCalledAFault) {
+    spit(folder_ / "t.ktx2", "\xabKTX 20\xbb\r\n\x1a\n and more");
+    json root = triangle();
+    root["extensionsUsed"] = root["extensionsRequired"] = {"KHR_texture_basisu"};
+    root["images"] = json::array({{{"uri", "t.ktx2"}}});
+    const json basis{{"extensions", {{"KHR_texture_basisu", {{"source", 0}}}}}};
+    root["textures"] = json::array({basis, basis});
+    const auto scene = read(root);
+    ASSERT_TRUE(scene) << scene.error().line();
+    ASSERT_EQ(scene->notes.size(), 2u) << notesOf(*scene);
+    for (size_t i = 0; i < 2; ++i)
+        EXPECT_EQ(scene->notes[i],
+                  "texture " + std::to_string(i) + " is KTX2 (Basis), which is not read: drawn without it");
+    EXPECT_TRUE(scene->images[0].bytes.empty()) << "nobody is to decode it";
+    EXPECT_EQ(scene->textures[0].image, -1);
+    spit(folder_ / "t.webp", "RIFF....WEBP");
+    root["extensionsUsed"] = root["extensionsRequired"] = {"EXT_texture_webp"};
+    root["images"] = json::array({{{"uri", "t.webp"}, {"mimeType", "image/webp"}}});
+    root["textures"] = json::array({{{"extensions", {{"EXT_texture_webp", {{"source", 0}}}}}}});
+    const auto webp = read(root);
+    ASSERT_TRUE(webp) << webp.error().line();
+    EXPECT_EQ(notesOf(*webp), "");
+    EXPECT_EQ(webp->textures[0].image, 0);
+}
+
 TEST_F(ForeignScenes, ElementsThatCannotBeDrawnAreLeftOutAndCounted) {
     spit(folder_ / "triangle.bin",
          floats({0, 0, 0, 1, 0, 0, 0, 1, 0, HUGE_VALF, 0, 0}) + std::string("\0\1\2\0\1\3\0\1\77", 9));
@@ -393,7 +457,7 @@ TEST(ForeignObj, MutatedFilesEndInASceneOrAnError) {
     const std::string mtl = "newmtl a\nKd 1 0 0\nmap_Kd -s 1 1 1 t.png\nd 0.5\nnewmtl b\nKe 1 1 1\n";
     Rng rng(5);
     const auto mutate = [&](std::string text) {
-        static const std::string bytes("0123456789/-+. \n\r\tevfnt\0\xff", 27);
+        static const std::string bytes("0123456789/-+. \n\r\tevfnt\0\xff", 25);
         for (uint64_t n = 1 + rng.below(4); n > 0; --n) {
             const size_t at = rng.below(text.size());
             if (rng.below(4) == 0)
@@ -450,6 +514,19 @@ TEST(ForeignPaths, EveryValueOfACameraPathIsCheckedByName) {
         const auto path = readCameraPath(folder / "p.json");
         ASSERT_FALSE(path) << text;
         EXPECT_EQ(path.error().line().find("exception"), std::string::npos) << path.error().line();
+    }
+    // A misspelt name is not passed over.
+    for (const auto& [text, meant] :
+         {std::pair<std::string, std::string>{R"({"fsp": 30, "keys": [)" + key + "]}",
+                                              "the path: 'fsp' is not known (did you mean 'fps'?)"},
+          {R"({"keys": [{"t": 0, "eye": [0, 0, 1], "targte": [0, 0, 0], "target": [0, 0, 0]}]})",
+           "key 0: 'targte' is not known (did you mean 'target'?)"},
+          {R"({"keys": [{"t": 0, "eye": [0, 0, 1], "target": [0, 0, 0], "roll": 5}]})",
+           "key 0: 'roll' is not known (there are t, eye, target, up, fov)"}}) {
+        spit(folder / "p.json", text);
+        const auto path = readCameraPath(folder / "p.json");
+        ASSERT_FALSE(path) << text;
+        EXPECT_NE(path.error().line().find(meant), std::string::npos) << path.error().line();
     }
     // Between keys with wide angles the curve swings out, but not beyond what a picture can show.
     spit(folder / "p.json",

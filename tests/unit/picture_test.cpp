@@ -113,6 +113,27 @@ TEST_F(Picture, AScanWithoutColoursShowsItsHeightAndItsShape) {
         << "traced pictures stay grey: " << said_;
 }
 
+TEST_F(Picture, TheLegendTakesTheSamePartOfLargePictures) {
+    writeBall("ball.ply");
+    const auto partOf = [&](const std::string& size) {
+        const auto pixels = [&](const std::string& options) {
+            EXPECT_EQ(
+                run("render ball.ply -o l.png --quiet --force --device cpu --colour height --size " + size + options),
+                0)
+                << said_;
+            const auto image = image::readImage(folder_ / "l.png");
+            return image ? image->rgba : std::vector<uint32_t>(1);
+        };
+        const std::vector<uint32_t> with = pixels(" --legend"), without = pixels("");
+        size_t differ = 0;
+        for (size_t i = 0; i < with.size(); ++i) differ += with[i] != without[i] ? 1 : 0;
+        return static_cast<double>(differ) / static_cast<double>(with.size());
+    };
+    const double usual = partOf("1280x720");
+    EXPECT_GT(usual, 0.005);
+    EXPECT_NEAR(partOf("3840x2160") / usual, 1, 0.1);
+}
+
 TEST_F(Picture, ClassesAreLit) {
     ASSERT_EQ(run("grow scan -o a.las --points 5000"), 0) << said_;
     ASSERT_EQ(run("build a.las -o a.stipple --attributes classification --quiet"), 0) << said_;

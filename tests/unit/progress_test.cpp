@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "apps/stipple/builds_of_scene.h"
+
 namespace stipple {
 namespace {
 
@@ -22,6 +24,39 @@ TEST(JobPlan, NeverGoesBack) {
     EXPECT_DOUBLE_EQ(other.advance("survey", 1), 0.1);
     EXPECT_DOUBLE_EQ(other.advance("something else", 0.9), 0.1);
     EXPECT_DOUBLE_EQ(other.advance("build", 7), 1.0) << "more than was declared";
+}
+
+TEST(JobPlan, SeveralJobsOfOneSceneAreOneJob) {
+    // Three builds, of 2, 1 and 1 units, the second found in the cache: nothing begins anew.
+    JobPlan plan;
+    plan.beginPart(0, 2, 2);
+    EXPECT_DOUBLE_EQ(plan.advance("read", 0.5), 0.25) << "before it has stages";
+    plan.setStages({{"survey", 1}, {"build", 3}});
+    EXPECT_DOUBLE_EQ(plan.advance("survey", 0.5), 0.25) << "never back";
+    EXPECT_DOUBLE_EQ(plan.advance("build", 1.0 / 3), 0.25);
+    EXPECT_DOUBLE_EQ(plan.advance("build", 1), 0.5);
+    plan.beginPart(2, 1, 0);
+    plan.setStages({{"survey", 1}, {"build", 3}});
+    EXPECT_DOUBLE_EQ(plan.advance("survey", 0), 2.0 / 3);
+    EXPECT_DOUBLE_EQ(plan.advance("build", 1), 1.0);
+    JobPlan alone;  // negative control: what each build had to itself
+    alone.setStages({{"survey", 1}, {"build", 3}});
+    EXPECT_LT(alone.advance("survey", 0), 0.5);
+}
+
+TEST(BuildsOfScene, ShareOneBar) {
+    app::BuildsOfScene builds(ProgressStyle::silent, {"a.glb: a note"});
+    builds.expect("mesh 0", 10);
+    builds.expect("mesh 0, from afar", 10);
+    builds.expect("strands", 20);
+    Progress* const first = &builds.begin("mesh 0");
+    builds.settle("mesh 0");
+    builds.settle("mesh 0, from afar");  // found
+    EXPECT_EQ(&builds.begin("strands"), first);
+    builds.settle("strands");
+    EXPECT_EQ(&builds.begin("what nobody expected"), first);
+    EXPECT_TRUE(builds.says("a.glb: a note"));
+    EXPECT_FALSE(builds.says("another"));
 }
 
 TEST(JobPlan, WithoutAPlanAStageIsTheJob) {

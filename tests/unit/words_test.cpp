@@ -51,6 +51,7 @@ TEST(Words, ProposesWhatWasProbablyMeant) {
     expect("render a.las -o a.png --mode pulpush", "pullpush");
     expect("render a.las -o a.png --shade=unlitt", "unlit");
     expect("help budget", "budgets");
+    expect("help rendr", "render");
     const Outcome far = runProgram(folder, "render a.las -o a.png --xyzzy 3");
     EXPECT_EQ(far.err.find("did you mean"), std::string::npos) << "nothing is near: " << far.err;
 }

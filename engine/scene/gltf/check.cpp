@@ -37,12 +37,16 @@ Result<void> checkRequired(const Container& c, bool isStrict, std::vector<std::s
         const auto& text = name.get_ref<const std::string&>();
         if (std::find(known.begin(), known.end(), text) != known.end()) continue;
         if (!isStrict && isAboutLooks(text)) {
+            // Said texture by texture.
+            if (text == "KHR_texture_basisu") continue;
             passedOver.push_back("/extensionsRequired: requires " + text + ", which is not drawn");
             continue;
         }
-        const bool isDraco = text == "KHR_draco_mesh_compression";
+        const bool isDraco = text == "KHR_draco_mesh_compression", isMeshopt = text == "KHR_meshopt_compression";
         return fail(ErrorKind::input, fmt::format("requires the extension {}, which is not supported", text), c.path,
-                    isDraco ? "decompress it, e.g. with gltf-transform copy or Blender" : "");
+                    isDraco     ? "decompress it, e.g. with gltf-transform copy or Blender"
+                    : isMeshopt ? "EXT_meshopt_compression is: save it so, or not compressed"
+                                : "");
     }
     return {};
 }
@@ -92,7 +96,9 @@ Result<void> mendStructure(Container& c, std::vector<std::string>& passedOver) {
 }  // namespace
 
 Result<std::vector<std::string>> requireGood(Container& c, Buffers& buffers, bool isStrict) {
-    std::vector<std::string> passedOver;
+    if (isStrict && !c.oddities.empty())
+        return fail(ErrorKind::input, c.oddities.front(), c.path, "the file is not valid glTF 2.0, but can be drawn");
+    std::vector<std::string> passedOver = c.oddities;
     STIPPLE_TRY(checkRequired(c, isStrict, passedOver));
     if (!isStrict) {
         STIPPLE_TRY(mendStructure(c, passedOver));

@@ -81,12 +81,14 @@ uint64_t memoryOfJson(const char* begin, const char* end) {
     return bytes + static_cast<uint64_t>(end - begin);
 }
 
-Result<nlohmann::json> parseJson(const char* begin, const char* end, const std::string& path, uint64_t memoryBytes) {
+Result<nlohmann::json> parseJson(const char* begin, const char* end, Container& c, uint64_t memoryBytes) {
+    const std::string& path = c.path;
+    if (end - begin >= 3 && std::memcmp(begin, "\xef\xbb\xbf", 3) == 0) {
+        begin += 3;
+        c.oddities.emplace_back("the JSON begins with a byte order mark");
+    }
     if (const uint64_t needed = memoryOfJson(begin, end); needed > memoryBytes)
         return overBudget("its JSON", needed, memoryBytes, path);
-    if (end - begin >= 3 && std::memcmp(begin, "\xef\xbb\xbf", 3) == 0)
-        return fail(ErrorKind::input, "the JSON begins with a byte order mark", path,
-                    "glTF forbids it; save it as UTF-8 without");
     Watcher watcher;
     nlohmann::json::sax_parse(begin, end, &watcher);
     if (watcher.tooDeep)
@@ -120,7 +122,8 @@ Result<void> readBinaryForm(const std::vector<uint8_t>& bytes, Container& c, uin
         if (length - at < 8) return bad(fmt::format("ends within the head of chunk {} at offset {}", chunk, at));
         const uint32_t size = wordAt(bytes, at), type = wordAt(bytes, at + 4);
         if (size % 4 != 0)
-            return bad(fmt::format("chunk {} at offset {} has {} bytes, not a multiple of 4", chunk, at, size));
+            c.oddities.push_back(
+                fmt::format("chunk {} at offset {} has {} bytes, not a multiple of 4", chunk, at, size));
         if (size > length - at - 8)
             return bad(
                 fmt::format("chunk {} at offset {} has {} bytes, only {} are left", chunk, at, size, length - at - 8));
@@ -128,13 +131,19 @@ Result<void> readBinaryForm(const std::vector<uint8_t>& bytes, Container& c, uin
             return bad(fmt::format("the first chunk has type {:#x}, expected JSON", type));
         if (chunk > 0 && type == kJsonChunk)
             return bad(fmt::format("chunk {} at offset {} is a second JSON chunk", chunk, at));
-        if (type == kBinaryChunk && (chunk != 1 || c.hasBinaryChunk))
-            return bad(fmt::format("chunk {} at offset {} is a binary chunk, which must be the second", chunk, at));
+        if (type == kBinaryChunk && c.hasBinaryChunk) {
+            c.oddities.push_back(fmt::format("chunk {} at offset {} is a second binary chunk", chunk, at));
+            at += 8 + size_t{size};
+            continue;
+        }
+        if (type == kBinaryChunk && chunk != 1)
+            c.oddities.push_back(
+                fmt::format("chunk {} at offset {} is a binary chunk, which must be the second", chunk, at));
         if (size == 0 && type != kBinaryChunk) return bad(fmt::format("chunk {} at offset {} is empty", chunk, at));
         const auto* begin = bytes.data() + at + 8;
         if (type == kJsonChunk) {
             const auto* text = reinterpret_cast<const char*>(begin);
-            STIPPLE_ASSIGN(c.json, parseJson(text, text + size, c.path, memoryBytes));
+            STIPPLE_ASSIGN(c.json, parseJson(text, text + size, c, memoryBytes));
             hasJson = true;
         } else if (type == kBinaryChunk) {
             c.binary.assign(begin, begin + size);
@@ -165,7 +174,7 @@ Result<Container> readContainer(const std::string& path, uint64_t memoryBytes) {
     }
     if (isNamedBinary) return fail(ErrorKind::input, "does not begin with glTF", path, "is it a .glb file?");
     const auto* text = reinterpret_cast<const char*>(bytes.data());
-    STIPPLE_ASSIGN(c.json, parseJson(text, text + bytes.size(), path, memoryBytes));
+    STIPPLE_ASSIGN(c.json, parseJson(text, text + bytes.size(), c, memoryBytes));
     return c;
 }
 

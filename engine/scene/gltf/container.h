@@ -15,6 +15,7 @@ struct Container {  // NOLINT(bugprone-exception-escape): moving JSON checks its
     bool isBinary = false, hasBinaryChunk = false;
     std::string path, folder;
     uint64_t fileBytes = 0;
+    std::vector<std::string> oddities;  ///< not as the format has it, and passed over
 };
 
 /// `.gltf` or `.glb`, told by content. Errors name the offset. What would take more than `memoryBytes` is refused.

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "engine/scene/gltf/json_tools.h"
@@ -59,14 +61,22 @@ void readMaterials(const json& root, Scene& scene) {
     }
 }
 
+/// Textures of a GPU's own formats in a container; by what stands at its beginning (KTX 2.0, 3.1).
+bool isKtx2(const std::vector<uint8_t>& bytes) {
+    static constexpr std::array<uint8_t, 12> kHead{0xab, 'K', 'T', 'X', ' ', '2', '0', 0xbb, '\r', '\n', 0x1a, '\n'};
+    return bytes.size() >= kHead.size() && std::equal(kHead.begin(), kHead.end(), bytes.begin());
+}
+
 Result<void> readImages(const json& root, Buffers& buffers, Scene& scene) {
     const json& images = arrayOf(root, "images");
+    std::vector<bool> isKtx(images.size(), false);
     for (size_t i = 0; i < images.size(); ++i) {
         EncodedImage image;
         image.name = images[i].value("name", images[i].value("uri", "").substr(0, 80));
         if (auto bytes = buffers.image(i)) {
             STIPPLE_TRY(buffers.claim(bytes->size(), "its pictures"));
-            image.bytes = std::move(*bytes);
+            isKtx[i] = isKtx2(*bytes);
+            if (!isKtx[i]) image.bytes = std::move(*bytes);
         } else if (bytes.error().kind == ErrorKind::budget) {
             return tl::unexpected(bytes.error());
         } else {
@@ -86,6 +96,11 @@ Result<void> readImages(const json& root, Buffers& buffers, Scene& scene) {
         t.image = j.value("source", -1);
         if (const json& webp = extensionOf(j, "EXT_texture_webp"); webp.is_object() && t.image < 0)
             t.image = webp.value("source", -1);
+        const json& basis = extensionOf(j, "KHR_texture_basisu");
+        const int shown = t.image >= 0 || !basis.is_object() ? t.image : basis.value("source", -1);
+        if (shown >= 0 && shown < static_cast<int>(images.size()) && isKtx[static_cast<size_t>(shown)])
+            scene.notes.push_back(
+                fmt::format("texture {} is KTX2 (Basis), which is not read: drawn without it", scene.textures.size()));
         if (!isThere(t.image)) t.image = -1;
         if (j.contains("sampler")) {
             const json& sampler = root["samplers"][j["sampler"].get<size_t>()];

@@ -3,7 +3,6 @@
 // two, 2^-21 of the extent.
 #pragma once
 
-#include <cmath>
 #include <functional>
 #include <optional>
 
