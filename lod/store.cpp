@@ -128,7 +128,7 @@ Node nodeOf(const NodeOnDisk& d) {
     n.chunkHash = d.chunkHash;
     n.attributeHash = d.attributeHash;
     n.attributeBytes = d.attributeBytes;
-    n.cell = d.cell;
+    n.cell = {d.cell[0], d.cell[1], d.cell[2]};
     n.parent = d.parent;
     n.firstChild = d.firstChild;
     n.records = d.records;
@@ -229,7 +229,7 @@ Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& des
         d.chunkHash = n.chunkHash;
         d.attributeHash = n.attributeHash;
         d.attributeBytes = n.attributeBytes;
-        d.cell = n.cell;
+        for (size_t a = 0; a < 3; ++a) d.cell.at(a) = static_cast<uint32_t>(n.cell.at(a));  // the low 32 bits
         d.parent = n.parent;
         d.firstChild = n.firstChild;
         d.records = n.records;

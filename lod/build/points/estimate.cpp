@@ -106,18 +106,19 @@ class Estimator {
 
   private:
     /// Of the cell of `level` that holds `place`.
-    LatticeBox boxOf(uint64_t place, uint32_t level) const {
+    LatticeBox boxOf(Key place, uint32_t level) const {
         const uint32_t drop = frame_.rootLog2 - frame_.keyLevels, shift = frame_.shiftOf(level);
-        const uint64_t key = place >> shift << shift;
+        const Key key = place >> shift << shift;
         const auto size = static_cast<int64_t>(frame_.cellSize(level));
         LatticeBox b;
-        b.lo = {int64_t{compactBits(key)} << drop, int64_t{compactBits(key >> 1)} << drop,
-                int64_t{compactBits(key >> 2)} << drop};
-        for (size_t a = 0; a < 3; ++a) b.hi[a] = b.lo[a] + size - 1;
+        for (size_t a = 0; a < 3; ++a) {
+            b.lo[a] = static_cast<int64_t>(compactBits(key >> a) << drop);
+            b.hi[a] = b.lo[a] + size - 1;
+        }
         return b;
     }
-    static std::pair<size_t, size_t> rangeOf(const std::vector<uint64_t>& keys, uint64_t key, uint32_t shift) {
-        const uint64_t lo = key >> shift << shift, last = lo | ((uint64_t{1} << shift) - 1);
+    static std::pair<size_t, size_t> rangeOf(const std::vector<Key>& keys, Key key, uint32_t shift) {
+        const Key lo = key >> shift << shift, last = lo | ((Key{1} << shift) - 1);
         const auto first = std::lower_bound(keys.begin(), keys.end(), lo);
         const auto end = std::upper_bound(first, keys.end(), last);
         return {static_cast<size_t>(first - keys.begin()), static_cast<size_t>(end - keys.begin())};
@@ -132,10 +133,10 @@ class Estimator {
         }
         const uint32_t shift = frame_.shiftOf(level + 1);
         while (begin < end) {
-            const uint64_t child = own_.key[begin] >> shift;
+            const Key child = own_.key[begin] >> shift;
             const auto next = std::partition_point(own_.key.begin() + static_cast<ptrdiff_t>(begin),
                                                    own_.key.begin() + static_cast<ptrdiff_t>(end),
-                                                   [&](uint64_t k) { return k >> shift == child; }) -
+                                                   [&](Key k) { return k >> shift == child; }) -
                               own_.key.begin();
             blocks(begin, static_cast<size_t>(next), level + 1, least);
             begin = static_cast<size_t>(next);
@@ -145,41 +146,48 @@ class Estimator {
     /// Calls f(x, y, z) for every point inside `box` that the counted cell sees, in the order of the keys: own first,
     /// then ghosts.
     template <typename F>
-    void forPoints(const LatticeBox& box, uint64_t key, uint32_t level, const F& f) const {
+    void forPoints(const LatticeBox& box, Key key, uint32_t level, const F& f) const {
         const uint32_t shift = frame_.shiftOf(level);
         const auto [begin, end] = rangeOf(own_.key, key, shift);
-        descend(own_.key, own_.points.x, own_.points.y, own_.points.z, begin, end, level, box, f);
+        descend(own_.key, own_.points, begin, end, level, box, f);
         const auto [first, last] = rangeOf(ghosts_.key, key, shift);
-        descend(ghosts_.key, ghosts_.x, ghosts_.y, ghosts_.z, first, last, level, box, f);
+        descend(ghosts_.key, ghosts_, first, last, level, box, f);
     }
-    template <typename F>
-    void descend(const std::vector<uint64_t>& keys, const std::vector<uint32_t>& x, const std::vector<uint32_t>& y,
-                 const std::vector<uint32_t>& z, size_t begin, size_t end, uint32_t level, const LatticeBox& box,
-                 const F& f) const {
+    /// Calls f(x, y, z) for point i.
+    template <typename Of, typename F>
+    static auto withPlace(const Of& points, size_t i, const F& f) {
+        if (points.high.empty()) return f(points.x[i], points.y[i], points.z[i]);
+        const Place p = placeOf(points.x[i], points.y[i], points.z[i], points.high[i]);
+        return f(static_cast<int64_t>(p[0]), static_cast<int64_t>(p[1]), static_cast<int64_t>(p[2]));
+    }
+    template <typename Of, typename F>
+    void descend(const std::vector<Key>& keys, const Of& points, size_t begin, size_t end, uint32_t level,
+                 const LatticeBox& box, const F& f) const {
         constexpr size_t kFew = 128;
         if (begin == end) return;
         if (end - begin <= kFew || level >= frame_.keyLevels) {
             for (size_t i = begin; i < end; ++i)
-                if (box.holds(x[i], y[i], z[i]) && isSeen(keys[i], x[i], y[i], z[i])) f(x[i], y[i], z[i]);
+                withPlace(points, i, [&](int64_t x, int64_t y, int64_t z) {
+                    if (box.holds(x, y, z) && isSeen(keys[i], x, y, z)) f(x, y, z);
+                });
             return;
         }
         const uint32_t shift = frame_.shiftOf(level + 1);
         while (begin < end) {
-            const uint64_t child = keys[begin] >> shift;
-            const auto next =
-                static_cast<size_t>(std::partition_point(keys.begin() + static_cast<ptrdiff_t>(begin),
-                                                         keys.begin() + static_cast<ptrdiff_t>(end),
-                                                         [&](uint64_t k) { return k >> shift == child; }) -
-                                    keys.begin());
+            const Key child = keys[begin] >> shift;
+            const auto next = static_cast<size_t>(std::partition_point(keys.begin() + static_cast<ptrdiff_t>(begin),
+                                                                       keys.begin() + static_cast<ptrdiff_t>(end),
+                                                                       [&](Key k) { return k >> shift == child; }) -
+                                                  keys.begin());
             const LatticeBox at = boxOf(child << shift, level + 1);
             bool meets = true;
             for (size_t a = 0; a < 3; ++a) meets = meets && at.lo[a] <= box.hi[a] && at.hi[a] >= box.lo[a];
-            if (meets) descend(keys, x, y, z, begin, next, level + 1, box, f);
+            if (meets) descend(keys, points, begin, next, level + 1, box, f);
             begin = next;
         }
     }
     /// The rule of Distributor.
-    bool isSeen(uint64_t key, int64_t x, int64_t y, int64_t z) const {
+    bool isSeen(Key key, int64_t x, int64_t y, int64_t z) const {
         if (key >> cellShift_ == cell_.key >> cellShift_) return true;
         int64_t reach = reach_;
         if (tree_.deepestLevel() > tree_.firstLevel()) {
@@ -191,7 +199,7 @@ class Estimator {
 
     /// Everything within `margin` of the box of a cell of `level`, from that cell and its neighbours.
     template <typename F>
-    void forNeighbourhood(uint64_t key, uint32_t level, int64_t margin, bool withOwn, const F& f) const {
+    void forNeighbourhood(Key key, uint32_t level, int64_t margin, bool withOwn, const F& f) const {
         const LatticeBox own = boxOf(key, level), box = own.grown(margin);
         const auto size = static_cast<int64_t>(frame_.cellSize(level)), root = int64_t{1} << frame_.rootLog2;
         for (int64_t dz = -1; dz <= 1; ++dz)
@@ -201,7 +209,7 @@ class Estimator {
                     const int64_t x = own.lo[0] + dx * size, y = own.lo[1] + dy * size, z = own.lo[2] + dz * size;
                     if (x < 0 || y < 0 || z < 0 || x >= root || y >= root || z >= root) continue;
                     forPoints(
-                        box, frame_.keyOf(static_cast<uint32_t>(x), static_cast<uint32_t>(y), static_cast<uint32_t>(z)),
+                        box, frame_.keyOf(static_cast<uint64_t>(x), static_cast<uint64_t>(y), static_cast<uint64_t>(z)),
                         level, f);
                 }
     }
@@ -231,7 +239,7 @@ class Estimator {
         const auto add = [&](int64_t x, int64_t y, int64_t z) {
             seen_.push_back({static_cast<uint32_t>(cellOf(x, y, z)), localOf(x, y, z)});
         };
-        for (size_t i = begin; i < end; ++i) add(own_.points.x[i], own_.points.y[i], own_.points.z[i]);
+        for (size_t i = begin; i < end; ++i) withPlace(own_.points, i, add);
         forNeighbourhood(own_.key[begin], level, edge, false, add);
         indexSeen(size_t{across} * across * across);
         const uint32_t windowShift = frame_.shiftOf(window);
@@ -329,8 +337,7 @@ class Estimator {
                              [&](int64_t x, int64_t y, int64_t z) { addToHood(localOf(x, y, z)); });
         }
         places_.clear();
-        for (size_t i = begin; i < end; ++i)
-            places_.push_back(localOf(own_.points.x[i], own_.points.y[i], own_.points.z[i]));
+        for (size_t i = begin; i < end; ++i) places_.push_back(withPlace(own_.points, i, localOf));
         give(begin, end, static_cast<float>(size), {true, 0, 0});
     }
 
