@@ -166,6 +166,9 @@ Result<bool> readNodes(const InputFile& file, const Head& head, Hierarchy& h) {
         Node& n = h.nodes[i] = nodeOf(d);
         // Groups of triangles have none; whether it is one is known once the mesh section is read.
         if (pairs.empty()) continue;
+        // On disk are the low 32 bits of a cell's index; the parent's tells the rest.
+        for (size_t a = 0; a < 3 && n.level > 32 && n.parent < i; ++a)
+            n.cell.at(a) |= 2 * h.nodes[n.parent].cell.at(a) >> 32 << 32;
         for (const auto& [count, counts] :
              {std::pair{d.parentCodes, &n.parentCounts}, std::pair{d.ownCodes, &n.ownCounts}}) {
             uint64_t sum = 0;

@@ -166,20 +166,31 @@ TEST(Coordinates, OnePointFarAwayChangesNothing) {
     const auto backend = cpu::makeCpuBackend(*executor);
     const render::Image without = test::renderView(alone, *backend, *executor, viewOf(centre), {});
     const double rounding = drawnPlaces(*alone, truth, 0.05).storedOff;
-    for (const glm::dvec3& far : {glm::dvec3(0), centre + glm::dvec3(1e4, 0, 0), glm::dvec3(0, 1e9, 0),
-                                  glm::dvec3(-1e11, 1e11, 3), glm::dvec3(1e12, 0, 0)}) {
+    // Any other point, too, lets the octree's cells lie elsewhere, and what is estimated in its windows changes a
+    // little.
+    const auto withOne = [&](const glm::dvec3& place) {
         std::vector<TestPoint> more = truth;
-        more.push_back({far, glm::vec3(0, 0, 1), 0xffffff, 0});
+        more.push_back({place, glm::vec3(0, 0, 1), 0xffffff, 0});
         test::writePly(folder / "far.ply", more, false);
         test::build({folder / "far.ply"}, folder / "far.stipple", *executor);
-        const auto store = opened(folder / "far.stipple");
+        return opened(folder / "far.stipple");
+    };
+    double usual = 99;
+    for (const glm::dvec3& near : {glm::dvec3(1.9, -1.3, -1.7), glm::dvec3(-1.4, -1.8, 1.1), glm::dvec3(-2, 1.3, -1.9)})
+        usual = std::min(
+            usual, psnr(test::renderView(withOne(centre + near), *backend, *executor, viewOf(centre), {}), without));
+    for (const glm::dvec3& far : {glm::dvec3(0), centre + glm::dvec3(1e4, 0, 0), glm::dvec3(0, 1e9, 0),
+                                  glm::dvec3(-1e11, 1e11, 3), glm::dvec3(1e12, 0, 0)}) {
+        const auto store = withOne(far);
         const Drawn drawn = drawnPlaces(*store, truth, 0.05);
         EXPECT_EQ(drawn.found, truth.size()) << far.x << " " << far.y;
-        EXPECT_LE(drawn.storedOff, rounding * (1 + 1e-6) + 1e-9) << far.x << " " << far.y;
+        // Coordinates have 53 bits, and so has their sum with the origin.
+        const double ofDoubles = 2 * std::max(glm::length(far - centre), glm::length(centre)) * std::exp2(-53);
+        EXPECT_LE(drawn.storedOff, std::max(rounding * (1 + 1e-6), ofDoubles) + 1e-9) << far.x << " " << far.y;
         EXPECT_LE(drawn.off, kTenthOfAPixel) << far.x << " " << far.y;
-        EXPECT_EQ(store->description.points, more.size());
+        EXPECT_EQ(store->description.points, truth.size() + 1);
         const render::Image with = test::renderView(store, *backend, *executor, viewOf(centre), {});
-        EXPECT_GT(psnr(with, without), 38) << far.x << " " << far.y;
+        EXPECT_GT(psnr(with, without), usual - 2) << far.x << " " << far.y << ", usually " << usual;
         EXPECT_TRUE(verifyStore(*store, *executor, 0)) << far.x << " " << far.y;
     }
 }
