@@ -138,7 +138,7 @@ class PointBuild {
     }
 
     uint64_t pointBytes() const {  // that a worker needs for each point of its bucket
-        uint64_t bytes = 144;
+        uint64_t bytes = 128;
         for (const AttributeInfo& a : input_.attributes()) bytes += 4 * bytesOf(a.type);
         return bytes;
     }
