@@ -109,12 +109,30 @@ Result<uint64_t> measureErrors(const Store& store, uint32_t index, const Chunk& 
     return measureErrorsAt(store, index, chunk, level);
 }
 
+namespace {
+
+constexpr uint32_t kNearSteps = 6;    ///< as a power of two: points in one cell of so many steps lie near each other
+constexpr size_t kFewNearPlaces = 8;  ///< that may lie in one
+
+/// Fast: false if no cell holds more than a few. Several cells are counted as one.
+bool mayBeCrowded(const Chunk& chunk) {
+    constexpr uint32_t kBits = 15;
+    std::vector<uint8_t> counts(size_t{1} << kBits);
+    for (const shared::PointRecord& r : chunk.records) {
+        const uint32_t cell = (shared::recordX(r) >> kNearSteps) | (shared::recordY(r) >> kNearSteps) << 10 |
+                              (shared::recordZ(r) >> kNearSteps) << 20;
+        if (++counts[cell * 0x9e3779b1u >> (32 - kBits)] > kFewNearPlaces) return true;
+    }
+    return false;
+}
+
+}  // namespace
+
 Result<void> checkDrawnPlaces(const Store& store, uint32_t index, const Chunk& chunk) {
-    constexpr uint32_t kNearSteps = 6;  // as a power of two
-    constexpr size_t kFew = 8, kMany = 64, kShare = 4;
+    constexpr size_t kMany = 64, kShare = 4;
     const Hierarchy& h = store.hierarchy;
     const Node& node = h.nodes[index];
-    if (chunk.lowBits.empty()) return {};
+    if (chunk.lowBits.empty() || !mayBeCrowded(chunk)) return {};
     using Stored = std::array<uint64_t, 3>;         // within the node's cell
     std::vector<std::pair<Stored, Stored>> places;  // where it is near others, and itself
     double off = 0;
@@ -136,7 +154,7 @@ Result<void> checkDrawnPlaces(const Store& store, uint32_t index, const Chunk& c
     size_t coarse = 0;
     for (size_t begin = 0, end = 0; begin < places.size(); begin = end) {
         for (end = begin + 1; end < places.size() && places[end].first == places[begin].first;) ++end;
-        coarse += end - begin > kFew ? end - begin : 0;
+        coarse += end - begin > kFewNearPlaces ? end - begin : 0;
     }
     if (coarse <= kMany && coarse * kShare <= places.size()) return {};
     return fail(ErrorKind::input,

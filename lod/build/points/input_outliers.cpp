@@ -67,7 +67,12 @@ void PointInput::findDenseBox() {
     };
     std::sort(places.begin(), places.end(), isBefore);
     places.erase(std::unique(places.begin(), places.end()), places.end());
-    dense_.spacing = denseSpacing(places, PlaceSample::shareOf(declared_));
+    Bounds all;
+    for (const Part& part : parts_) all.add(boundsOf(part));
+    const glm::dvec3 extent = all.isEmpty() ? glm::dvec3(0) : all.greatest - all.least;
+    // (So few steps are told apart whatever lies how near.)
+    const bool isKnown = allLattice_ && std::max({extent.x, extent.y, extent.z}) < std::exp2(kShortBits);
+    dense_.spacing = isKnown ? 0 : denseSpacing(places, PlaceSample::shareOf(declared_));
     dense_.extent = denseExtent(places);
     dense_.farthest = denseDistance(places);
     const glm::dvec3 world(0);
