@@ -177,7 +177,8 @@ Result<Scene> readObj(const std::string& path, const ReadSettings& settings) {
             for (size_t k = 0; k < 3; ++k) {
                 const int v = shape.mesh.indices[f * 3 + k].vertex_index;
                 good = good && v >= 0 && v < positions;
-                for (size_t c = 0; good && c < 3; ++c) good = std::abs(a.vertices[3 * static_cast<size_t>(v) + c]) <= kLargest;
+                for (size_t c = 0; good && c < 3; ++c)
+                    good = std::abs(a.vertices[3 * static_cast<size_t>(v) + c]) <= kLargest;
             }
             if (!good) {
                 ++dropped;

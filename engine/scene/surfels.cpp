@@ -118,8 +118,7 @@ class Sampler {
     using Corners = std::array<glm::dvec3, 3>;
     static Corners corners(const Primitive& p, const glm::dmat4& m, size_t i) {
         Corners c;
-        for (size_t k = 0; k < 3; ++k)
-            c.at(k) = glm::dvec3(m * glm::dvec4(p.at(p.indices[i + k]), 1));
+        for (size_t k = 0; k < 3; ++k) c.at(k) = glm::dvec3(m * glm::dvec4(p.at(p.indices[i + k]), 1));
         return c;
     }
     static double areaOf(const Corners& c) {
