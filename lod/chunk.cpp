@@ -129,11 +129,11 @@ struct MeshChunkHead {
 
 /// Are all on the lattice, with texture coordinates that are numbers? Differences of places must be, too.
 bool arePossible(const std::vector<shared::MeshVertex>& vertices) {
-    constexpr uint32_t kLattice = 1u << 25;
+    constexpr int kLargest = 1 << 30;
     uint32_t bad = 0;
     for (const shared::MeshVertex& v : vertices) {
         const auto u = std::bit_cast<uint32_t>(v.u), w = std::bit_cast<uint32_t>(v.v);
-        bad |= static_cast<uint32_t>(v.x | v.y | v.z) & ~(kLattice - 1);
+        bad |= std::min({v.x, v.y, v.z}) < 0 || std::max({v.x, v.y, v.z}) > kLargest ? 1u : 0u;
         bad |= (u & kNotFinite) == kNotFinite ? 1u : 0u;
         bad |= (w & kNotFinite) == kNotFinite ? 1u : 0u;
     }

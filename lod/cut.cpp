@@ -19,6 +19,13 @@ bool isReachable(const std::vector<uint8_t>& drawable, const Hierarchy& h, uint3
     return true;
 }
 
+/// The largest code of an error that a view may allow. Where the scale ends below twice the diagonal of the root, the
+/// last code stands for whatever is larger.
+uint32_t largestAllowed(const Hierarchy& h) {
+    const bool isWhole = h.errors.decode(ErrorScale::kLargest) >= 3.4 * std::exp2(static_cast<double>(h.rootLog2));
+    return isWhole ? ErrorScale::kLargest : ErrorScale::kLargest - 1;
+}
+
 }  // namespace
 
 Selector::Selector(const CutScene& scene, const Residency& residency, const View& view, const Budgets& budgets,
@@ -164,6 +171,7 @@ uint64_t Selector::cost(int step) {
 uint64_t Selector::pointCost(size_t i, int step, uint64_t most) {
     const Hierarchy& h = hierarchyOf(i);
     CutScratch::Slot& slot = slotOf(i);
+    const uint32_t largest = largestAllowed(h);
     uint64_t total = 0;
     auto& stack = scratch_.stack;
     stack.assign(1, 0u);
@@ -174,8 +182,9 @@ uint64_t Selector::pointCost(size_t i, int step, uint64_t most) {
         const int32_t parentEpsilon = index == 0 ? kInside : slot.epsilon[node.parent];
         const int32_t epsilon = epsilonOf(i, slot, index, parentEpsilon);
         if (epsilon == kCulled) continue;
-        const uint32_t parentCode = index == 0 ? ErrorScale::kLargest : codeOf(slot, parentEpsilon, step);
-        const uint32_t code = codeOf(slot, epsilon, step);
+        const uint32_t parentCode =
+            index == 0 ? ErrorScale::kLargest : std::min(codeOf(slot, parentEpsilon, step), largest);
+        const uint32_t code = std::min(codeOf(slot, epsilon, step), largest);
         total += h.countGreater(node.parentCounts, node.records, parentCode) -
                  h.countGreater(node.ownCounts, node.records, code);
         if (total > most) return total;
@@ -250,6 +259,7 @@ void Selector::emitPoints(uint32_t i, int step) {
     const uint32_t source = instances_[i].source;
     const std::vector<uint8_t>& drawable = residency_.drawable[source];
     CutScratch::Slot& slot = slotOf(i);
+    const uint32_t largest = largestAllowed(h);
     const size_t firstDraw = cut_.draw.size();
     auto& stack = scratch_.stack;
     stack.assign(1, 0u);
@@ -265,7 +275,7 @@ void Selector::emitPoints(uint32_t i, int step) {
             continue;
         }
         const bool isDrawable = drawable[index] != 0;
-        const uint32_t code = codeOf(slot, epsilon, step);
+        const uint32_t code = std::min(codeOf(slot, epsilon, step), largest);
         if (isDrawable) {
             cut_.keep.emplace_back(source, index);
         } else {
@@ -286,14 +296,15 @@ void Selector::emitPoints(uint32_t i, int step) {
         }
         // Only what hangs together with the root is drawn: a node whose parent is missing is covered above.
         if (!isDrawable || !isReachable(drawable, h, index)) continue;
-        const uint32_t parentCode = index == 0 ? ErrorScale::kLargest : codeOf(slot, parentEpsilon, step);
+        const uint32_t parentCode =
+            index == 0 ? ErrorScale::kLargest : std::min(codeOf(slot, parentEpsilon, step), largest);
         const uint32_t count = h.countGreater(node.parentCounts, node.records, parentCode);
         if (count == 0) continue;
         const uint32_t tooCoarse = octantMask ? 0 : h.countGreater(node.ownCounts, node.records, code);
         cut_.counters.recordsDrawn += count - tooCoarse;
         cut_.counters.recordsTested += count;
-        const double delivered =
-            pixelsOf(slot, octantMask ? node.errorCode : std::min<uint32_t>(node.errorCode, code), epsilon);
+        const uint32_t drawnCode = octantMask ? node.errorCode : std::min<uint32_t>(node.errorCode, code);
+        const double delivered = pixelsOf(slot, drawnCode, drawnCode > largest ? kInside : epsilon);
         if (octantMask) cut_.tauEffective = std::max(cut_.tauEffective, delivered);
         if (count > tooCoarse) cut_.draw.push_back({i, index, count, code, octantMask, static_cast<float>(delivered)});
     }

@@ -57,7 +57,7 @@ struct Node {
     uint64_t chunkOffset = 0, chunkHash = 0;
     uint64_t attributeHash = 0;
     uint32_t attributeBytes = 0;     ///< the attribute streams follow the chunk
-    std::array<uint32_t, 3> cell{};  ///< index of the node's cell at its level
+    std::array<uint64_t, 3> cell{};  ///< index of the node's cell at its level
     uint8_t level = 0, childMask = 0;
     uint8_t errorCode = 0;  ///< largest own error among the records
     int8_t stepShift = 0;   ///< position step of the records: 2^stepShift lattice units = cell / 65536

@@ -1,6 +1,8 @@
 #include "lod/mesh_source.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <memory>
 
 #include "engine/base/hash.h"
@@ -11,7 +13,40 @@ namespace {
 constexpr size_t kBlockTriangles = 65536;
 constexpr size_t kSlots = size_t{1} << 19;  ///< more than twice the corners of a block
 
+/// Of a place, evenly spread: the two zeros are one place.
+uint64_t hashOf(const glm::dvec3& p) {
+    const std::array<double, 3> words{p.x + 0, p.y + 0, p.z + 0};
+    return hashBytes(words.data(), sizeof(words));
+}
+bool isKept(const glm::dvec3& p, uint32_t thinned) { return thinned == 0 || hashOf(p) >> (64 - thinned) == 0; }
+
 }  // namespace
+
+void MeshSource::Bounds::add(const glm::dvec3& p) {
+    if (!std::isfinite(p.x + p.y + p.z)) return;
+    lo = glm::min(lo, p);
+    hi = glm::max(hi, p);
+    keep(p);
+}
+
+void MeshSource::Bounds::add(const Bounds& other) {
+    lo = glm::min(lo, other.lo);
+    hi = glm::max(hi, other.hi);
+    thinned_ = std::max(thinned_, other.thinned_);
+    std::erase_if(sample, [&](const glm::dvec3& p) { return !isKept(p, thinned_); });
+    for (const glm::dvec3& p : other.sample) keep(p);
+}
+
+void MeshSource::Bounds::keep(const glm::dvec3& p) {
+    constexpr size_t kMost = 16384;
+    constexpr uint32_t kMostThinned = 60;  // (what is left then is one place)
+    if (!isKept(p, thinned_)) return;
+    sample.push_back(p);
+    while (sample.size() > kMost && thinned_ < kMostThinned) {
+        ++thinned_;
+        std::erase_if(sample, [&](const glm::dvec3& q) { return !isKept(q, thinned_); });
+    }
+}
 
 Result<void> BlockMaker::triangle(uint64_t a, uint64_t b, uint64_t c) {
     if (table_.empty()) table_.assign(kSlots, 0);
@@ -95,8 +130,7 @@ MeshSource joined(std::vector<MeshSource> given) {
                 return tell(i * kParts + static_cast<uint64_t>(share * kParts), sources->size() * kParts);
             };
             STIPPLE_ASSIGN(const MeshSource::Bounds own, (*sources)[i].survey(tellPart));
-            bounds.lo = glm::min(bounds.lo, own.lo);
-            bounds.hi = glm::max(bounds.hi, own.hi);
+            bounds.add(own);
         }
         return bounds;
     };

@@ -14,11 +14,14 @@ namespace stipple::lod {
 struct MeshSource {
     struct Bounds {
         glm::dvec3 lo{std::numeric_limits<double>::max()}, hi{-lo};  ///< of finite vertices; lo > hi: there are none
-        void add(const glm::dvec3& p) {
-            if (!isFinite(p)) return;
-            lo = glm::min(lo, p);
-            hi = glm::max(hi, p);
-        }
+        /// Some of them. Which ones hangs on their coordinates alone, not on their order.
+        std::vector<glm::dvec3> sample;
+        void add(const glm::dvec3& p);
+        void add(const Bounds& other);
+
+      private:
+        void keep(const glm::dvec3& p);
+        uint32_t thinned_ = 0;  ///< times that the sample was halved
     };
     using Take = std::function<Result<void>(const TriangleMesh& block)>;
 

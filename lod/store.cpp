@@ -128,7 +128,7 @@ Node nodeOf(const NodeOnDisk& d) {
     n.chunkHash = d.chunkHash;
     n.attributeHash = d.attributeHash;
     n.attributeBytes = d.attributeBytes;
-    n.cell = d.cell;
+    n.cell = {d.cell[0], d.cell[1], d.cell[2]};
     n.parent = d.parent;
     n.firstChild = d.firstChild;
     n.records = d.records;
@@ -166,6 +166,9 @@ Result<bool> readNodes(const InputFile& file, const Head& head, Hierarchy& h) {
         Node& n = h.nodes[i] = nodeOf(d);
         // Groups of triangles have none; whether it is one is known once the mesh section is read.
         if (pairs.empty()) continue;
+        // On disk are the low 32 bits of a cell's index; the parent's tells the rest.
+        for (size_t a = 0; a < 3 && n.level > 32 && n.parent < i; ++a)
+            n.cell.at(a) |= 2 * h.nodes[n.parent].cell.at(a) >> 32 << 32;
         for (const auto& [count, counts] :
              {std::pair{d.parentCodes, &n.parentCounts}, std::pair{d.ownCodes, &n.ownCounts}}) {
             uint64_t sum = 0;
@@ -230,7 +233,7 @@ Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& des
         d.chunkHash = n.chunkHash;
         d.attributeHash = n.attributeHash;
         d.attributeBytes = n.attributeBytes;
-        d.cell = n.cell;
+        for (size_t a = 0; a < 3; ++a) d.cell.at(a) = static_cast<uint32_t>(n.cell.at(a));  // the low 32 bits
         d.parent = n.parent;
         d.firstChild = n.firstChild;
         d.records = n.records;

@@ -129,7 +129,7 @@ Result<void> checkNodes(const Store& store, uint64_t chunksEnd) {
             if (!(n.childMask >> octant & 1u)) continue;
             fits = child < nodes.size() && nodes[child].parent == i && nodes[child].level == n.level + 1;
             for (uint32_t axis = 0; fits && axis < 3; ++axis)
-                fits = nodes[child].cell.at(axis) == 2 * uint64_t{n.cell.at(axis)} + (octant >> axis & 1u);
+                fits = nodes[child].cell.at(axis) == 2 * n.cell.at(axis) + (octant >> axis & 1u);
             ++child;
             ++next;
         }

@@ -39,7 +39,7 @@ struct Foot {
 struct NodeOnDisk {
     std::array<double, 4> sphere;
     uint64_t chunkOffset, chunkHash, attributeHash;
-    std::array<uint32_t, 3> cell;
+    std::array<uint32_t, 3> cell;  // low bits: see readNodes
     uint32_t parent, firstChild, records, chunkBytes, attributeBytes, parentCodes, ownCodes, normalCone;
     float normalConeCosine;
     uint8_t level, childMask, errorCode;

@@ -135,6 +135,7 @@ Result<VerifyReport> verifyStore(const Store& store, Executor& executor, uint64_
                 else
                     measured += *worst;
             }
+            if (const auto drawn = checkDrawnPlaces(store, index, *chunk); !drawn) problems.push({i, drawn.error()});
             for (size_t a = 0; a < store.description.attributes.size(); ++a)
                 if (const auto values = readAttribute(store, static_cast<uint32_t>(i), a); !values)
                     problems.push({i, values.error()});

@@ -60,15 +60,11 @@ double distanceOf(const Disc& record, const Disc& leaf) {
     return std::hypot(std::abs(height) + rise, sideways);
 }
 
-}  // namespace
-
-Result<uint64_t> measureErrors(const Store& store, uint32_t index, const Chunk& chunk) {
+Result<uint64_t> measureErrorsAt(const Store& store, uint32_t index, const Chunk& chunk, uint32_t clusterLevel) {
     const Hierarchy& h = store.hierarchy;
     const Node& node = h.nodes[index];
     const auto children = static_cast<uint32_t>(__builtin_popcount(node.childMask));
-    if (!isAboveLeaves(h, node)) return 0;
-    const uint32_t deepest = std::min(h.rootLog2, 21u), level = std::min(node.level + kClusterLevels, deepest);
-    const double clusterSize = std::exp2(static_cast<double>(h.rootLog2) - level);
+    const double clusterSize = std::exp2(static_cast<double>(h.rootLog2) - clusterLevel);
     std::vector<Disc> records = discsOf(h, node, chunk, clusterSize);
     const auto isLess = [](const Disc& a, const Disc& b) { return a.cell < b.cell; };
     std::sort(records.begin(), records.end(), isLess);
@@ -78,14 +74,16 @@ Result<uint64_t> measureErrors(const Store& store, uint32_t index, const Chunk& 
             // A cell may have several records, for several cones of normals: one of them stands for the leaf.
             auto at = std::lower_bound(records.begin(), records.end(), leaf, isLess);
             double off = 1e300, error = 0;
+            bool isUnbounded = false;
             for (; at != records.end() && at->cell == leaf.cell; ++at) {
                 const double distance = distanceOf(*at, leaf), bound = h.errors.decode(at->code);
+                isUnbounded = isUnbounded || at->code >= ErrorScale::kLargest;
                 if (distance - bound >= off - error) continue;
                 off = distance;
                 error = bound;
             }
             // Discs are rounded to fp32 in between.
-            if (off <= error * (1 + 1e-5) + 1e-6 * h.cellSize(node)) continue;
+            if (off <= error * (1 + 1e-5) + 1e-6 * h.cellSize(node) || isUnbounded) continue;
             return fail(ErrorKind::input,
                         off < 1e300 ? fmt::format("a record is {:.6g} lattice units off a leaf, its error says {:.6g}",
                                                   off, error)
@@ -95,6 +93,75 @@ Result<uint64_t> measureErrors(const Store& store, uint32_t index, const Chunk& 
         }
     }
     return records.size();
+}
+
+}  // namespace
+
+Result<uint64_t> measureErrors(const Store& store, uint32_t index, const Chunk& chunk) {
+    const Hierarchy& h = store.hierarchy;
+    const Node& node = h.nodes[index];
+    if (!isAboveLeaves(h, node)) return 0;
+    // Clusters are cells of keys, which are as deep as a build needs, but 21 levels at least.
+    uint32_t level = std::min(node.level + kClusterLevels, h.rootLog2);
+    const uint32_t least = std::min(level, 21u);
+    for (; level > least; --level)
+        if (const auto measured = measureErrorsAt(store, index, chunk, level)) return measured;
+    return measureErrorsAt(store, index, chunk, level);
+}
+
+namespace {
+
+constexpr uint32_t kNearSteps = 6;    ///< as a power of two: points in one cell of so many steps lie near each other
+constexpr size_t kFewNearPlaces = 8;  ///< that may lie in one
+
+/// Fast: false if no cell holds more than a few. Several cells are counted as one.
+bool mayBeCrowded(const Chunk& chunk) {
+    constexpr uint32_t kBits = 15;
+    std::vector<uint8_t> counts(size_t{1} << kBits);
+    for (const shared::PointRecord& r : chunk.records) {
+        const uint32_t cell = (shared::recordX(r) >> kNearSteps) | (shared::recordY(r) >> kNearSteps) << 10 |
+                              (shared::recordZ(r) >> kNearSteps) << 20;
+        if (++counts[cell * 0x9e3779b1u >> (32 - kBits)] > kFewNearPlaces) return true;
+    }
+    return false;
+}
+
+}  // namespace
+
+Result<void> checkDrawnPlaces(const Store& store, uint32_t index, const Chunk& chunk) {
+    constexpr size_t kMany = 64, kShare = 4;
+    const Hierarchy& h = store.hierarchy;
+    const Node& node = h.nodes[index];
+    if (chunk.lowBits.empty() || !mayBeCrowded(chunk)) return {};
+    using Stored = std::array<uint64_t, 3>;         // within the node's cell
+    std::vector<std::pair<Stored, Stored>> places;  // where it is near others, and itself
+    double off = 0;
+    for (size_t i = 0; i < chunk.records.size(); ++i) {
+        const shared::PointRecord& r = chunk.records[i];
+        const Stored steps{shared::recordX(r), shared::recordY(r), shared::recordZ(r)};
+        std::pair<Stored, Stored> at;
+        glm::dvec3 from(0);
+        for (size_t a = 0; a < 3; ++a) {
+            at.first.at(a) = steps.at(a) >> kNearSteps;
+            at.second.at(a) = steps.at(a) << node.stepShift | chunk.lowBits[3 * i + a];
+            from[static_cast<int>(a)] = double(chunk.lowBits[3 * i + a]) - 0.5 * (std::exp2(node.stepShift) - 1);
+        }
+        off = std::max(off, glm::length(from));
+        places.push_back(at);
+    }
+    std::sort(places.begin(), places.end());
+    places.erase(std::unique(places.begin(), places.end()), places.end());
+    size_t coarse = 0;
+    for (size_t begin = 0, end = 0; begin < places.size(); begin = end) {
+        for (end = begin + 1; end < places.size() && places[end].first == places[begin].first;) ++end;
+        coarse += end - begin > kFewNearPlaces ? end - begin : 0;
+    }
+    if (coarse <= kMany && coarse * kShare <= places.size()) return {};
+    return fail(ErrorKind::input,
+                fmt::format("{} points are drawn up to {:.3g} units off where they are stored, within {:.3g} units of "
+                            "others, and their error says 0",
+                            coarse, h.unit * off, h.unit * std::exp2(node.stepShift + double{kNearSteps})),
+                fmt::format("{}: node {}", store.path, index), "build it again with this program");
 }
 
 namespace {

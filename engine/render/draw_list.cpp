@@ -26,7 +26,7 @@ shared::DrawMesh makeDrawMesh(const lod::Hierarchy& h, const lod::Instance& inst
     const glm::dvec3 eye =
         (glm::transpose(instance.rotation) * (view.eye - instance.translation) / instance.scale - h.origin) / h.unit;
     // max(0, v) of what is no number is 0: cameras may be anywhere.
-    const auto onLattice = [](double v) { return std::floor(std::max(0.0, std::min(v, 0x1p24))); };
+    const auto onLattice = [](double v) { return std::floor(std::max(0.0, std::min(v, 0x1p30))); };
     const glm::dvec3 nearest(onLattice(eye.x), onLattice(eye.y), onLattice(eye.z));
     m.axisX = glm::vec3(axes[0] * worldPerStep);
     m.axisY = glm::vec3(axes[1] * worldPerStep);

@@ -1,13 +1,16 @@
 // Wavefront OBJ with MTL materials, by tinyobjloader; only what it gives is checked, since it believes its input.
+// Numbers are doubles: map coordinates have more digits than fp32.
 #include <fmt/format.h>
 #include <tiny_obj_loader.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <sstream>
 #include <streambuf>
+#include <type_traits>
 
 #include "engine/base/file.h"
 #include "engine/scene/obj_polygons.h"
@@ -91,15 +94,20 @@ int addImage(const std::string& folder, std::string name, const ReadSettings& se
     return known[name] = static_cast<int>(scene.textures.size()) - 1;
 }
 
+static_assert(std::is_same_v<tinyobj::real_t, double>);
+
 /// OBJ colours are sRGB by custom; materials here are linear.
-float linear(float s) { return s <= 0.04045f ? s / 12.92f : std::pow((s + 0.055f) / 1.055f, 2.4f); }
+float linear(double srgb) {
+    const auto s = static_cast<float>(srgb);
+    return s <= 0.04045f ? s / 12.92f : std::pow((s + 0.055f) / 1.055f, 2.4f);
+}
 
 Material materialOf(const tinyobj::material_t& m, int texture) {
     Material out;
     out.name = m.name;
     for (int c = 0; c < 3; ++c) {
-        out.baseColour[c] = texture >= 0 ? 1.0f : linear(std::isfinite(m.diffuse[c]) ? m.diffuse[c] : 1.0f);
-        out.emissive[c] = linear(std::isfinite(m.emission[c]) ? m.emission[c] : 0.0f);
+        out.baseColour[c] = texture >= 0 ? 1.0f : linear(std::isfinite(m.diffuse[c]) ? m.diffuse[c] : 1.0);
+        out.emissive[c] = linear(std::isfinite(m.emission[c]) ? m.emission[c] : 0.0);
     }
     out.metallic = 0;
     out.roughness = 1;
@@ -107,7 +115,7 @@ Material materialOf(const tinyobj::material_t& m, int texture) {
     // v grows upwards in OBJ and downwards in glTF and here.
     out.baseColourTexture.transform = glm::mat3(1, 0, 0, 0, -1, 0, 0, 1, 1);
     if (!m.alpha_texname.empty() || m.dissolve < 1) out.alphaMode = AlphaMode::mask;
-    out.baseColour.a = std::isfinite(m.dissolve) ? m.dissolve : 1.0f;
+    out.baseColour.a = std::isfinite(m.dissolve) ? static_cast<float>(m.dissolve) : 1.0f;
     return out;
 }
 
@@ -159,6 +167,7 @@ Result<Scene> readObj(const std::string& path, const ReadSettings& settings) {
     const tinyobj::attrib_t& a = parsed.attributes;
     const auto positions = static_cast<int>(a.vertices.size() / 3), normals = static_cast<int>(a.normals.size() / 3),
                uvs = static_cast<int>(a.texcoords.size() / 2);
+    constexpr double kLargest = std::numeric_limits<float>::max();
     uint64_t dropped = 0;
     Mesh mesh;
     for (const tinyobj::shape_t& shape : parsed.shapes) {
@@ -168,7 +177,8 @@ Result<Scene> readObj(const std::string& path, const ReadSettings& settings) {
             for (size_t k = 0; k < 3; ++k) {
                 const int v = shape.mesh.indices[f * 3 + k].vertex_index;
                 good = good && v >= 0 && v < positions;
-                for (size_t c = 0; good && c < 3; ++c) good = std::isfinite(a.vertices[3 * static_cast<size_t>(v) + c]);
+                for (size_t c = 0; good && c < 3; ++c)
+                    good = std::abs(a.vertices[3 * static_cast<size_t>(v) + c]) <= kLargest;
             }
             if (!good) {
                 ++dropped;
@@ -183,7 +193,9 @@ Result<Scene> readObj(const std::string& path, const ReadSettings& settings) {
                 const tinyobj::index_t& i = shape.mesh.indices[f * 3 + k];
                 const auto v = static_cast<size_t>(i.vertex_index);
                 p.indices.push_back(static_cast<uint32_t>(p.position.size()));
-                p.position.emplace_back(a.vertices[3 * v], a.vertices[3 * v + 1], a.vertices[3 * v + 2]);
+                const glm::dvec3 place(a.vertices[3 * v], a.vertices[3 * v + 1], a.vertices[3 * v + 2]);
+                p.position.emplace_back(place);
+                p.rest.emplace_back(place - glm::dvec3(p.position.back()));
                 const bool hasNormal = i.normal_index >= 0 && i.normal_index < normals;
                 const auto n = static_cast<size_t>(hasNormal ? i.normal_index : 0) * 3;
                 p.normal.push_back(hasNormal ? glm::vec3(a.normals[n], a.normals[n + 1], a.normals[n + 2])

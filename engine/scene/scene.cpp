@@ -36,8 +36,8 @@ Box meshBounds(const Scene& scene) {
         if (places.empty()) places.emplace_back(1);
         for (const glm::dmat4& place : places)
             for (const Primitive& primitive : scene.meshes[static_cast<size_t>(node.mesh)].primitives)
-                for (const glm::vec3& p : primitive.position)
-                    box.add(glm::dvec3(world[n] * (place * glm::dvec4(glm::dvec3(p), 1))));
+                for (size_t i = 0; i < primitive.position.size(); ++i)
+                    box.add(glm::dvec3(world[n] * (place * glm::dvec4(primitive.at(i), 1))));
     }
     return box;
 }

@@ -54,7 +54,12 @@ struct Primitive {
     std::vector<std::vector<glm::vec2>> uv;  ///< by set
     std::vector<float> radius;               ///< of lines: attribute _RADIUS
     std::vector<uint32_t> indices;           ///< 1, 2 or 3 an element; every one below position.size()
+    /// Where the file has doubles: what `position` leaves of them (together 48 bits). writeGltf does without.
+    std::vector<glm::vec3> rest;
     int material = -1;
+    glm::dvec3 at(size_t i) const {
+        return rest.empty() ? glm::dvec3(position[i]) : glm::dvec3(position[i]) + glm::dvec3(rest[i]);
+    }
 };
 
 struct Mesh {

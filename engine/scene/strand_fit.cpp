@@ -287,9 +287,10 @@ Parts partsOf(const Primitive& p) {
         while (group[v] != v) v = group[v] = group[group[v]];
         return v;
     };
-    std::map<std::array<float, 3>, uint32_t> known;
+    std::map<std::array<double, 3>, uint32_t> known;
     for (uint32_t v = 0; v < p.position.size(); ++v) {
-        const auto [at, isNew] = known.try_emplace({p.position[v].x, p.position[v].y, p.position[v].z}, v);
+        const glm::dvec3 place = p.at(v);
+        const auto [at, isNew] = known.try_emplace({place.x, place.y, place.z}, v);
         if (!isNew) group[root(v)] = root(at->second);
     }
     for (size_t i = 0; i + 3 <= p.indices.size(); i += 3) {
@@ -380,7 +381,7 @@ class SceneFitter {
     void fitPart(const Primitive& p, const std::vector<uint32_t>& triangles, Fitted& out) const {
         constexpr size_t kMostTriangles = 4096;  // more than that is no leaf and no twig
         if (triangles.size() > kMostTriangles) return;
-        std::map<std::array<float, 3>, uint32_t> known;
+        std::map<std::array<double, 3>, uint32_t> known;
         std::vector<dvec3> position;
         std::vector<std::array<uint32_t, 3>> corners;
         glm::vec3 colour(0);
@@ -388,7 +389,7 @@ class SceneFitter {
             std::array<uint32_t, 3> own{};
             for (size_t k = 0; k < 3; ++k) {
                 const uint32_t v = p.indices[3 * t + k];
-                const glm::vec3& at = p.position[v];
+                const dvec3 at = p.at(v);
                 const auto [found, isNew] =
                     known.try_emplace({at.x, at.y, at.z}, static_cast<uint32_t>(position.size()));
                 if (isNew) position.emplace_back(at);

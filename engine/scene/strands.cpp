@@ -27,7 +27,7 @@ lod::StrandSet flattenStrands(const Scene& scene, const std::vector<Placement>& 
                 p.material < 0 ? glm::vec4(1) : scene.materials[static_cast<size_t>(p.material)].baseColour;
             const auto add = [&](uint32_t v) {
                 const glm::vec4 c = p.colour.empty() ? base : base * p.colour[v];
-                out.addVertex(glm::dvec3(at.world * glm::dvec4(glm::dvec3(p.position[v]), 1)),
+                out.addVertex(glm::dvec3(at.world * glm::dvec4(p.at(v), 1)),
                               p.radius.empty() ? 0.0f : p.radius[v] * scale,
                               p.normal.empty() ? glm::vec3(0) : glm::vec3(forNormals * glm::dvec3(p.normal[v])),
                               byte(c.r) | byte(c.g) << 8 | byte(c.b) << 16);

@@ -122,8 +122,7 @@ class Sampler {
     using Corners = std::array<glm::dvec3, 3>;
     static Corners corners(const Primitive& p, const glm::dmat4& m, size_t i) {
         Corners c;
-        for (size_t k = 0; k < 3; ++k)
-            c.at(k) = glm::dvec3(m * glm::dvec4(glm::dvec3(p.position[p.indices[i + k]]), 1));
+        for (size_t k = 0; k < 3; ++k) c.at(k) = glm::dvec3(m * glm::dvec4(p.at(p.indices[i + k]), 1));
         return c;
     }
     static double areaOf(const Corners& c) {
@@ -204,7 +203,7 @@ class Sampler {
 
     void takePoints(const Primitive& p, const glm::dmat4& m) {
         for (const uint32_t i : p.indices) {
-            out_.position.emplace_back(m * glm::dvec4(glm::dvec3(p.position[i]), 1));
+            out_.position.emplace_back(m * glm::dvec4(p.at(i), 1));
             out_.normal.push_back(p.normal.empty() ? glm::vec3(0) : glm::vec3(glm::dmat3(m) * glm::dvec3(p.normal[i])));
             const glm::vec4 c = p.colour.empty() ? glm::vec4(1) : p.colour[i];
             out_.colour.push_back(byteOf(c.r) | byteOf(c.g) << 8 | byteOf(c.b) << 16);

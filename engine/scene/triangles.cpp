@@ -100,7 +100,7 @@ struct PlacedPrimitive {
         isMirrored = glm::determinant(linear) < 0;
     }
     void copy(size_t i, lod::TriangleMesh& to) const {
-        to.position.emplace_back(world * glm::dvec4(glm::dvec3(p.position[i]), 1));
+        to.position.emplace_back(world * glm::dvec4(p.at(i), 1));
         const glm::dvec3 n = p.normal.empty() ? glm::dvec3(0) : forNormals * glm::dvec3(p.normal[i]);
         const double length = glm::length(n);
         const double sign = isMirrored ? -1 : 1;
@@ -140,6 +140,7 @@ lod::MeshSource triangleSource(const Scene& scene, std::vector<Placement> placed
         static_cast<void>(forAll([&](const Placement& at, const Primitive& p) -> Result<void> {
             hash = hashBytes(&at.world, sizeof(at.world), hash);
             hash = hashBytes(p.position.data(), p.position.size() * sizeof(p.position[0]), hash);
+            hash = hashBytes(p.rest.data(), p.rest.size() * sizeof(p.rest[0]), hash);
             hash = hashBytes(p.indices.data(), p.indices.size() * sizeof(p.indices[0]), hash);
             return {};
         }));
@@ -148,7 +149,7 @@ lod::MeshSource triangleSource(const Scene& scene, std::vector<Placement> placed
     source.survey = [forAll](const lod::MeshSource::Tell&) -> Result<lod::MeshSource::Bounds> {
         lod::MeshSource::Bounds bounds;
         STIPPLE_TRY(forAll([&](const Placement& at, const Primitive& p) -> Result<void> {
-            for (const auto& q : p.position) bounds.add(glm::dvec3(at.world * glm::dvec4(glm::dvec3(q), 1)));
+            for (size_t i = 0; i < p.position.size(); ++i) bounds.add(glm::dvec3(at.world * glm::dvec4(p.at(i), 1)));
             return {};
         }));
         return bounds;

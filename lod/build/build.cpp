@@ -279,7 +279,7 @@ class PointBuild {
         out.tooMany = sorted.tooMany;
         {
             STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, spread_->buckets()[index]->ghosts.take());
-            const Places ghosts = sortGhosts(frame(), bytes, settings_.mergeDuplicates);
+            const Places ghosts = sortGhosts(frame(), layout_, bytes, settings_.mergeDuplicates);
             EstimateSettings wanted;
             wanted.radii = settings_.estimateRadii;
             wanted.normals = settings_.normals == NormalsMode::automatic;
@@ -290,7 +290,7 @@ class PointBuild {
         ends("threads: estimate");
         out.ranges = ValueRanges(frame(), input_.points, description_.up);
         uint64_t number = bucket.firstPoint;
-        const std::vector<uint64_t>& keys = sorted.sorted.key;
+        const std::vector<Key>& keys = sorted.sorted.key;
         size_t begin = 0;
         for (const Atom& atom : bucket.atoms) {
             const uint32_t shift = frame().shiftOf(atom.level);
@@ -408,7 +408,7 @@ class PointBuild {
     BuildReport report_;
     StageClock clock_;  ///< what is not "threads: ..." adds up to the whole
     int workers_;
-    const RecordLayout layout_;
+    RecordLayout layout_;
     MemoryPlan memory_;
     std::optional<Workspace> workspace_;
     std::optional<Distribution> spread_;

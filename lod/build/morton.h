@@ -1,10 +1,15 @@
+// Morton codes of octrees: a code for each cell, in the order of the curve.
 #pragma once
 
 #include <cstdint>
 
 namespace stipple::lod {
 
-constexpr uint32_t kMortonBits = 21;  ///< per axis, so that a code fits 63 bits
+/// 42 bits per axis: two places may lie four thousand billion times as far apart as the cells that tell them apart.
+__extension__ typedef unsigned __int128 Key;
+constexpr uint32_t kMortonBits = 42;
+/// Per axis, of a code that fits 63 bits.
+constexpr uint32_t kShortBits = 21;
 
 /// Spreads the low 21 bits: bit i goes to bit 3i.
 inline uint64_t spreadBits(uint64_t v) {
@@ -16,17 +21,28 @@ inline uint64_t spreadBits(uint64_t v) {
     v = (v | v << 2) & 0x1249249249249249ull;
     return v;
 }
-inline uint64_t mortonCode(uint32_t x, uint32_t y, uint32_t z) {
+/// Of 21 bits per axis.
+inline uint64_t shortMortonCode(uint64_t x, uint64_t y, uint64_t z) {
     return spreadBits(x) | spreadBits(y) << 1 | spreadBits(z) << 2;
 }
-inline uint32_t compactBits(uint64_t v) {
+inline Key mortonCode(uint64_t x, uint64_t y, uint64_t z) {
+    const Key low = shortMortonCode(x, y, z);
+    if ((x | y | z) >> kShortBits == 0) return low;
+    return low | Key{shortMortonCode(x >> kShortBits, y >> kShortBits, z >> kShortBits)} << (3 * kShortBits);
+}
+/// Every third bit of the low 63.
+inline uint64_t compactShort(uint64_t v) {
     v &= 0x1249249249249249ull;
     v = (v | v >> 2) & 0x10c30c30c30c30c3ull;
     v = (v | v >> 4) & 0x100f00f00f00f00full;
     v = (v | v >> 8) & 0x1f0000ff0000ffull;
     v = (v | v >> 16) & 0x1f00000000ffffull;
     v = (v | v >> 32) & 0x1fffff;
-    return static_cast<uint32_t>(v);
+    return v;
+}
+inline uint64_t compactBits(Key v) {
+    return compactShort(static_cast<uint64_t>(v)) | compactShort(static_cast<uint64_t>(v >> (3 * kShortBits)))
+                                                        << kShortBits;
 }
 
 }  // namespace stipple::lod

@@ -192,7 +192,7 @@ TEST_F(Crafted, VerticesNameMaterialsAndPlacesThatThereAre) {
                 text);
     expectFound(withChunk(mesh, 0, first([](shared::MeshVertex& v) { v.v = std::nanf(""); })), text);
     // Beyond the lattice differences of coordinates overflow.
-    for (const int odd : {std::numeric_limits<int>::min(), std::numeric_limits<int>::max(), -1, 1 << 25})
+    for (const int odd : {std::numeric_limits<int>::min(), std::numeric_limits<int>::max(), -1, (1 << 30) + 1})
         expectFound(withChunk(mesh, 0, first([odd](shared::MeshVertex& v) { v.x = odd; })), text);
 }
 

@@ -26,19 +26,19 @@ struct Sphere {
     double radius = 0;
 };
 
-Sphere sphereOf(const LocalMesh& local, const std::vector<Sphere>& inside) {
+Sphere sphereOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<Sphere>& inside) {
     glm::dvec3 lo(1e300), hi(-1e300);
-    for (const glm::vec3& p : local.position) {
-        lo = glm::min(lo, glm::dvec3(p));
-        hi = glm::max(hi, glm::dvec3(p));
+    for (const uint32_t v : local.global) {
+        lo = glm::min(lo, glm::dvec3(mesh.at(v)));
+        hi = glm::max(hi, glm::dvec3(mesh.at(v)));
     }
     for (const Sphere& s : inside) {
         lo = glm::min(lo, s.centre - s.radius);
         hi = glm::max(hi, s.centre + s.radius);
     }
     Sphere out{0.5 * (lo + hi), 0};
-    for (const glm::vec3& p : local.position)
-        out.radius = std::max(out.radius, glm::length(glm::dvec3(p) - out.centre));
+    for (const uint32_t v : local.global)
+        out.radius = std::max(out.radius, glm::length(glm::dvec3(mesh.at(v)) - out.centre));
     for (const Sphere& s : inside) out.radius = std::max(out.radius, glm::length(s.centre - out.centre) + s.radius);
     out.radius *= 1 + 1e-12;
     return out;
@@ -148,7 +148,7 @@ class CellReducer {
     /// Cells one level up are shifted by a third of their edge, so that a border between two cells, along which
     /// nothing can be simplified, lies inside a cell of the next level. (Those of the plain octree would keep every
     /// edge along a cell's border until the cell that holds both sides.)
-    uint64_t keyAbove(const Cluster& c, int level) const {
+    Key keyAbove(const Cluster& c, int level) const {
         if (level < 0) return 0;
         glm::ivec3 lo(1 << 30), hi(-1);
         for (const uint32_t i : c.indices) {
@@ -158,13 +158,13 @@ class CellReducer {
         }
         const auto edge = static_cast<int64_t>(frame_.cellSize(static_cast<uint32_t>(level)));
         const auto along = [&](int a, int b) {
-            return static_cast<uint32_t>((3 * ((int64_t{a} + b) / 2) + 2 * edge) / (3 * edge));
+            return static_cast<uint64_t>((3 * ((int64_t{a} + b) / 2) + 2 * edge) / (3 * edge));
         };
         return mortonCode(along(lo.x, hi.x), along(lo.y, hi.y), along(lo.z, hi.z));
     }
 
     std::vector<GoingUp> goingUp(int level) const {
-        std::map<uint64_t, std::vector<const Cluster*>> byCell;
+        std::map<Key, std::vector<const Cluster*>> byCell;
         for (const Cluster& c : clusters_) byCell[keyAbove(c, level)].push_back(&c);
         std::vector<GoingUp> out;
         out.reserve(byCell.size());
@@ -285,7 +285,7 @@ class CellReducer {
         }
         made.isSimplified = true;
         made.group.error = isRoot ? Group::kRootError : made.group.error + below;
-        const Sphere sphere = sphereOf(local, inside);
+        const Sphere sphere = sphereOf(mesh_, local, inside);
         made.group.node.centre = sphere.centre;
         made.group.node.radius = sphere.radius;
         made.bytes = encodeGroup(mesh_, members, producers_, settings_, made.group);

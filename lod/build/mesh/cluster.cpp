@@ -15,6 +15,27 @@ constexpr size_t kBlockTriangles = 32768;  ///< of the Morton order, clustered o
 
 }  // namespace
 
+namespace {
+
+void placeLocal(const WeldedMesh& mesh, LocalMesh& local) {
+    constexpr uint32_t kExact = 1u << 24;
+    uint32_t any = 0;
+    for (const uint32_t v : local.global) {
+        const glm::ivec3 p = mesh.at(v);
+        any |= static_cast<uint32_t>(p.x | p.y | p.z);
+    }
+    std::vector<int> along(local.global.size());
+    for (int a = 0; a < 3 && any > kExact; ++a) {  // the median
+        for (size_t i = 0; i < along.size(); ++i) along[i] = mesh.at(local.global[i])[a];
+        const auto middle = along.begin() + static_cast<ptrdiff_t>(along.size() / 2);
+        std::nth_element(along.begin(), middle, along.end());
+        local.shift[a] = *middle;
+    }
+    for (const uint32_t v : local.global) local.position.emplace_back(mesh.at(v) - local.shift);
+}
+
+}  // namespace
+
 LocalMesh makeLocal(const WeldedMesh& mesh, const std::vector<const Cluster*>& clusters) {
     // Global vertex -> local, valid where the stamp is this call's.
     thread_local std::vector<uint32_t> local, stamp;
@@ -35,10 +56,10 @@ LocalMesh makeLocal(const WeldedMesh& mesh, const std::vector<const Cluster*>& c
                 stamp[v] = epoch;
                 local[v] = static_cast<uint32_t>(out.global.size());
                 out.global.push_back(v);
-                out.position.push_back(mesh.at(v));
             }
             out.indices.push_back(local[v]);
         }
+    placeLocal(mesh, out);
     return out;
 }
 

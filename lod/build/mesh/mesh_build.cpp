@@ -25,7 +25,7 @@ void writeTables(const std::vector<Group>& groups, const Lattice& lattice, Hiera
     const auto count = static_cast<uint32_t>(groups.size());
     h.origin = lattice.origin;
     h.unit = lattice.unit;
-    h.rootLog2 = 24;
+    h.rootLog2 = lattice.bits;
     double smallest = 1e300;
     for (const Group& g : groups)
         if (g.error > 0 && g.error < Group::kRootError) smallest = std::min(smallest, g.error);
@@ -292,7 +292,10 @@ class MeshBuild : public CellContent {
     static constexpr uint64_t kTableBytes = 2;       ///< of a triangle, of the table of groups, which stays in memory
     static constexpr uint64_t kMostOfAtom = 2 * kAtomPoints;
 
-    static Frame frameOf(const Lattice& lattice) { return makeFrame(lattice.origin, lattice.unit, lattice.largest, 0); }
+    static Frame frameOf(const Lattice& lattice) {
+        constexpr double kNear = 16;  // steps: where few vertices are far out, all others may lie within few key cells
+        return makeFrame(lattice.origin, lattice.unit, lattice.largest, 0, lattice.bits > 24 ? kNear : 0);
+    }
     /// Triangles in any order share few vertices with those beside them.
     static bool isScattered(const Soup& soup) { return soup.vertices.size() * 3 > 4 * (soup.indices.size() / 3); }
     /// More have their centre in one place than a cell holds.

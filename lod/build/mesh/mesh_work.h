@@ -17,7 +17,8 @@ namespace stipple::lod {
 struct Lattice {
     glm::dvec3 origin{0};
     double unit = 1;
-    uint32_t largest = 0;  ///< coordinate; at most 2^24, so that fp32 holds them exactly
+    uint32_t largest = 0;  ///< coordinate; at most 2^bits
+    uint32_t bits = 24;    ///< then fp32 holds coordinates exactly; more where a few vertices lie far out
 };
 Lattice latticeOf(const MeshSource::Bounds& bounds);
 
@@ -47,10 +48,7 @@ PlacedBlock placeBlock(const TriangleMesh& block, const Lattice& lattice, Execut
 struct WeldedMesh {
     std::vector<shared::MeshVertex> vertices;
     std::vector<uint32_t> position;  ///< vertex -> number of its position: seams of attributes do not part a surface
-    glm::vec3 at(uint32_t vertex) const {
-        const shared::MeshVertex& v = vertices[vertex];
-        return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
-    }
+    glm::ivec3 at(uint32_t vertex) const { return {vertices[vertex].x, vertices[vertex].y, vertices[vertex].z}; }
 };
 /// Makes equal vertices of `soup` one. The order of the result hangs on the vertices alone; so does that of the
 /// triangles if they are sorted: then they stand along a Morton curve, equal ones once, and `duplicate` counts those.
@@ -73,9 +71,10 @@ struct Cluster {
 
 /// Vertices of a list of triangles, numbered from 0.
 struct LocalMesh {
-    std::vector<uint32_t> global;   ///< local -> WeldedMesh vertex
-    std::vector<uint32_t> indices;  ///< local
-    std::vector<glm::vec3> position;
+    std::vector<uint32_t> global;     ///< local -> WeldedMesh vertex
+    std::vector<uint32_t> indices;    ///< local
+    std::vector<glm::vec3> position;  ///< from `shift`, where most of them are: there fp32 is exact
+    glm::ivec3 shift{0};
 };
 LocalMesh makeLocal(const WeldedMesh& mesh, const std::vector<const Cluster*>& clusters);
 

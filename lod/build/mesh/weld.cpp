@@ -7,21 +7,28 @@
 #include "engine/base/numbers.h"
 #include "lod/build/mesh/mesh_work.h"
 #include "lod/build/morton.h"
+#include "lod/build/points/spacing.h"
 #include "lod/octahedral.h"
 
 namespace stipple::lod {
 namespace {
 
-constexpr int kLatticeBits = 24;
+constexpr int kLatticeBits = 24, kMostBits = 30;  ///< with 31, differences would overflow
 constexpr size_t kGrain = 16384;
 
 /// Bit by bit: two zeros of different sign are two values. Equal positions stand side by side.
 std::array<uint32_t, 8> wordsOf(const shared::MeshVertex& v) { return std::bit_cast<std::array<uint32_t, 8>>(v); }
 
-uint64_t keyOf(int64_t x, int64_t y, int64_t z) {
-    constexpr int kDrop = kLatticeBits - static_cast<int>(kMortonBits);
-    return mortonCode(static_cast<uint32_t>(x >> kDrop), static_cast<uint32_t>(y >> kDrop),
-                      static_cast<uint32_t>(z >> kDrop));
+uint64_t keyOf(int64_t x, int64_t y, int64_t z, int drop) {
+    return shortMortonCode(static_cast<uint64_t>(x >> drop), static_cast<uint64_t>(y >> drop),
+                           static_cast<uint64_t>(z >> drop));
+}
+
+/// Bits that a key leaves out.
+int dropOf(const std::vector<shared::MeshVertex>& vertices) {
+    uint32_t any = 0;
+    for (const shared::MeshVertex& v : vertices) any |= static_cast<uint32_t>(v.x | v.y | v.z);
+    return std::max(static_cast<int>(std::bit_width(any)), kLatticeBits) - static_cast<int>(kShortBits);
 }
 
 bool hasArea(const shared::MeshVertex& a, const shared::MeshVertex& b, const shared::MeshVertex& c) {
@@ -35,7 +42,17 @@ Lattice latticeOf(const MeshSource::Bounds& bounds) {
     Lattice lattice;
     if (bounds.lo.x > bounds.hi.x) return lattice;
     const glm::dvec3 size = bounds.hi - bounds.lo;
-    lattice.unit = std::exp2(std::floor(std::log2(std::max({size.x, size.y, size.z, 1e-30}))) + 1 - kLatticeBits);
+    const auto unitOf = [](double extent, int bits) {
+        return std::exp2(std::floor(std::log2(std::max(extent, 1e-30))) + 1 - bits);
+    };
+    const double extent = std::max({size.x, size.y, size.z});
+    lattice.unit = unitOf(extent, kLatticeBits);
+    // What most vertices are is told apart as it would be without those far out, as well as 30 bits can.
+    constexpr double kFar = 16;
+    if (const double dense = denseExtent(bounds.sample); dense > 0 && extent > kFar * dense) {
+        lattice.unit = std::max(unitOf(dense, kLatticeBits), unitOf(extent, kMostBits));
+        lattice.bits = kMostBits;
+    }
     // Whole steps from zero, so that coordinates that lie on the lattice stay exact.
     lattice.origin = glm::floor(bounds.lo / lattice.unit) * lattice.unit;
     const glm::dvec3 last = glm::floor((bounds.hi - lattice.origin) / lattice.unit + 0.5);
@@ -104,7 +121,8 @@ WeldedMesh weld(Soup& soup) {
     };
     const auto& v = soup.vertices;
     std::vector<Item> order(v.size());
-    for (uint32_t i = 0; i < v.size(); ++i) order[i] = {keyOf(v[i].x, v[i].y, v[i].z), i};
+    const int drop = dropOf(v);
+    for (uint32_t i = 0; i < v.size(); ++i) order[i] = {keyOf(v[i].x, v[i].y, v[i].z, drop), i};
     std::sort(order.begin(), order.end(), [&](const Item& a, const Item& b) {
         return a.key != b.key ? a.key < b.key : wordsOf(v[a.vertex]) < wordsOf(v[b.vertex]);
     });
@@ -136,6 +154,7 @@ uint64_t sortTriangles(WeldedMesh& mesh, std::vector<uint32_t>& indices) {
         bool operator==(const Item& o) const { return key == o.key && corners == o.corners; }
     };
     std::vector<Item> order(indices.size() / 3);
+    const int drop = dropOf(mesh.vertices);
     for (size_t i = 0; i < order.size(); ++i) {
         auto& t = order[i].corners;
         std::copy_n(indices.begin() + static_cast<ptrdiff_t>(3 * i), 3, t.begin());
@@ -143,7 +162,7 @@ uint64_t sortTriangles(WeldedMesh& mesh, std::vector<uint32_t>& indices) {
         std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
         const auto &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
         order[i].key =
-            keyOf((int64_t{a.x} + b.x + c.x) / 3, (int64_t{a.y} + b.y + c.y) / 3, (int64_t{a.z} + b.z + c.z) / 3);
+            keyOf((int64_t{a.x} + b.x + c.x) / 3, (int64_t{a.y} + b.y + c.y) / 3, (int64_t{a.z} + b.z + c.z) / 3, drop);
     }
     std::sort(order.begin(), order.end());
     const size_t before = order.size();

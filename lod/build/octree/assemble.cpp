@@ -13,20 +13,20 @@ Hierarchy assemble(const Frame& frame, const std::vector<NodeBatch>& batches) {
     h.unit = frame.unit;
     h.rootLog2 = frame.rootLog2;
     h.errors = frame.errors;
-    struct Place {
+    struct At {
         uint32_t batch, index;
         uint8_t level;
-        uint64_t key;
+        Key key;
     };
-    std::vector<Place> order;
+    std::vector<At> order;
     for (uint32_t b = 0; b < batches.size(); ++b)
         for (uint32_t i = 0; i < batches[b].nodes.size(); ++i)
             order.push_back({b, i, batches[b].nodes[i].node.level, batches[b].nodes[i].key});
     // Breadth first: by level, then along the Morton curve.
     std::sort(order.begin(), order.end(),
-              [](const Place& a, const Place& b) { return std::tie(a.level, a.key) < std::tie(b.level, b.key); });
+              [](const At& a, const At& b) { return std::tie(a.level, a.key) < std::tie(b.level, b.key); });
     h.nodes.reserve(order.size());
-    for (const Place& place : order) h.nodes.push_back(batches[place.batch].nodes[place.index].node);
+    for (const At& place : order) h.nodes.push_back(batches[place.batch].nodes[place.index].node);
     uint32_t next = 1;
     std::vector<uint32_t> histogram(256);
     for (uint32_t i = 0; i < h.nodes.size(); ++i) {

@@ -11,7 +11,7 @@ namespace stipple::lod {
 struct NodeBatch {
     struct Written {
         Node node;
-        uint64_t key = 0;
+        Key key = 0;
         uint32_t firstCount = 0;  ///< into `counts`: records of each code that occurs, of parents and own
         uint16_t parentCodes = 0, ownCodes = 0;
     };

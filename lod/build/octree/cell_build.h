@@ -29,7 +29,7 @@ class CellSender {
     const std::vector<Atom>& atoms() const { return inputs_.atoms(); }
     /// That may wait for being sent, of all atoms.
     uint64_t bufferBytes() const { return bufferBytes_; }
-    uint32_t atomOf(uint64_t key) const { return ofCell_[tree_.cellOf(key)]; }
+    uint32_t atomOf(Key key) const { return ofCell_[tree_.cellOf(key)]; }
     bool isOwn(size_t atom) const { return workspace_.isOwn(atom); }
     /// For each block of the input: was it sent by an earlier run? Then it is only to be counted.
     bool begins() { return block_++ < blocksSent_; }

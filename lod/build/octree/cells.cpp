@@ -29,7 +29,7 @@ void CellTree::count(const Coordinates& block) {
         if (run > 0) std::atomic_ref(entries_[last]).fetch_add(run, std::memory_order_relaxed);
     };
     for (size_t i = 0; i < block.size(); ++i) {
-        const size_t place = placeOf(frame_.keyOf(block.x[i], block.y[i], block.z[i]), [&](size_t e) {
+        const size_t place = placeOf(frame_.keyOf(block.at(i)), [&](size_t e) {
             return std::atomic_ref(entries_[e]).load(std::memory_order_relaxed);  // others count too
         });
         if (place != last) {
@@ -42,11 +42,11 @@ void CellTree::count(const Coordinates& block) {
     flush();
 }
 
-void CellTree::walk(size_t first, uint32_t entries, uint64_t key, uint32_t level, bool isSplit) {
+void CellTree::walk(size_t first, uint32_t entries, Key key, uint32_t level, bool isSplit) {
     const uint32_t shift = frame_.shiftOf(level);
     for (uint32_t k = 0; k < entries; ++k) {
         const size_t place = first + k;
-        const uint64_t at = key | uint64_t{k} << shift;
+        const Key at = key | Key{k} << shift;
         const uint32_t steps = std::min(kSplitLevels, shift / 3);
         if ((entries_[place] & kBlock) != 0) {
             walk(entries_[place] & ~kBlock, 1u << (3 * steps), at, level + steps, isSplit);
@@ -142,7 +142,7 @@ void CellTree::findAtoms(size_t begin, size_t end, uint32_t level, std::vector<A
     }
     const uint32_t shift = frame_.shiftOf(level + 1);
     while (begin < end) {
-        const uint64_t child = cells_[begin].key >> shift;
+        const Key child = cells_[begin].key >> shift;
         size_t next = begin;
         while (next < end && cells_[next].key >> shift == child) ++next;
         findAtoms(begin, next, level + 1, atoms);

@@ -14,14 +14,15 @@ constexpr uint64_t kAtomPoints = 131072;
 
 /// A counted cell.
 struct Cell {
-    uint64_t key = 0;  ///< of its corner
+    Key key = 0;  ///< of its corner
     uint64_t count = 0;
     uint8_t level = 0;
 };
 
 /// Of the largest octree node that is built as one.
 struct Atom {
-    uint64_t key = 0, count = 0;
+    Key key = 0;
+    uint64_t count = 0;
     uint8_t level = 0;
     uint32_t firstCell = 0, cells = 0;  ///< counted cells that it holds
 };
@@ -29,7 +30,9 @@ struct Atom {
 /// Lattice coordinates of points; parallel.
 struct Coordinates {
     std::span<const uint32_t> x, y, z;
+    std::span<const uint64_t> high{};  ///< see Place; empty: none
     size_t size() const { return x.size(); }
+    Place at(size_t i) const { return placeOf(x[i], y[i], z[i], high.empty() ? 0 : high[i]); }
 };
 
 /// The root's cell split evenly into cells of a first level; where those hold more than kAtomPoints, they are split
@@ -57,7 +60,7 @@ class CellTree {
     std::vector<Atom> atoms() const;
     /// Number of the cell that holds `key`; kNone where there are no points.
     static constexpr uint32_t kNone = 0x7fffffffu;
-    uint32_t cellOf(uint64_t key) const {
+    uint32_t cellOf(Key key) const {
         return entries_[placeOf(key, [&](size_t i) { return entries_[i]; })];
     }
     uint32_t deepestLevel() const { return deepest_; }
@@ -74,18 +77,18 @@ class CellTree {
     void findAtoms(size_t begin, size_t end, uint32_t level, std::vector<Atom>& atoms) const;
     /// `load(i)`: entry i.
     template <typename Load>
-    size_t placeOf(uint64_t key, const Load& load) const {
-        size_t place = key >> firstShift_;
+    size_t placeOf(Key key, const Load& load) const {
+        auto place = static_cast<size_t>(key >> firstShift_);
         uint32_t entry = load(place);
         for (uint32_t shift = firstShift_; (entry & kBlock) != 0; entry = load(place)) {
             const uint32_t steps = 3 * std::min(kSplitLevels, shift / 3);
             shift -= steps;
-            place = (entry & ~kBlock) + (key >> shift & ((1u << steps) - 1));
+            place = (entry & ~kBlock) + static_cast<size_t>(key >> shift & ((1u << steps) - 1));
         }
         return place;
     }
     /// The entries of one block in order: splits (`isSplit`) or numbers them. `level`: of the entries.
-    void walk(size_t first, uint32_t entries, uint64_t key, uint32_t level, bool isSplit);
+    void walk(size_t first, uint32_t entries, Key key, uint32_t level, bool isSplit);
 
     const Frame frame_;
     uint32_t firstLevel_ = 0, firstShift_ = 0, deepest_ = 0;

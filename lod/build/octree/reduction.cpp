@@ -18,7 +18,11 @@ namespace {
 struct Entry {
     uint64_t at = 0, bytes = 0, hash = 0;
     std::vector<uint8_t> table;
-    std::vector<std::array<uint64_t, 3>> up;  ///< key, bytes, hash
+    struct Up {
+        Key key = 0;
+        uint64_t bytes = 0, hash = 0;
+    };
+    std::vector<Up> up;
     bool read(const std::vector<uint8_t>& payload) {
         ByteReader from(payload);
         from.get(at);
@@ -106,8 +110,9 @@ Result<void> Reduction::openWriter(Executor& executor) {
     return {};
 }
 
-std::unique_ptr<Spill> Reduction::upSpill(int level, uint64_t key) const {
-    return workspace_.spill(fmt::format("up-{}-{:x}", level, key));
+std::unique_ptr<Spill> Reduction::upSpill(int level, Key key) const {
+    return workspace_.spill(
+        fmt::format("up-{}-{:x}-{:x}", level, static_cast<uint64_t>(key >> 64), static_cast<uint64_t>(key)));
 }
 
 Reduction::LevelCells Reduction::takeLevel(int level) {
@@ -268,7 +273,7 @@ void Reduction::tellAbove(int level) {
     }
     const std::vector<uint8_t> bytes = workspace_.ofFirst(mine.bytes());
     for (ByteReader from(bytes); !workspace_.isFirst() && !from.isWhole();) {
-        uint64_t key = 0;
+        Key key = 0;
         from.get(key);
         Waiting& to = above_[key];
         from.get(to.pieces);

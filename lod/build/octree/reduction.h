@@ -19,14 +19,14 @@ namespace stipple::lod {
 struct WorkCell {
     static constexpr uint32_t kNone = ~0u;
     int level = 0;
-    uint64_t key = 0;
+    Key key = 0;
     uint32_t atom = kNone;  ///< number of the atom that it is
     bool isLast = false;    ///< nothing is left to do but this
 };
 
 /// For a cell one level up; `key` is the caller's name for it.
 struct GoingUp {
-    uint64_t key = 0;
+    Key key = 0;
     std::vector<uint8_t> bytes;
 };
 struct CellProduct {
@@ -72,7 +72,7 @@ class Reduction {
         std::vector<Waiting> waiting;  ///< of each; empty of atoms
     };
     LevelCells takeLevel(int level);
-    std::unique_ptr<Spill> upSpill(int level, uint64_t key) const;
+    std::unique_ptr<Spill> upSpill(int level, Key key) const;
     Result<void> openWriter(Executor& executor);
     Result<std::vector<FromBelow>> readBelow(const Waiting& waiting) const;
     Result<CellProduct> makeCell(const LevelCells& level, size_t i, const Make& make) const;
@@ -89,7 +89,7 @@ class Reduction {
     Workspace& workspace_;
     CellInputs& inputs_;
     std::vector<Journal::Entry> done_;
-    std::map<uint64_t, Waiting> above_;  ///< for the next level, by key
+    std::map<Key, Waiting> above_;  ///< for the next level, by key
     std::optional<StoreWriter> writer_;
     size_t replayed_ = 0;  ///< of done_
     uint64_t doneInput_ = 0, allInput_ = 0, temporary_ = 0, mostTemporary_ = 0;

@@ -10,10 +10,13 @@
 namespace stipple::lod {
 namespace {
 
-std::array<int64_t, 3> cornerOf(const Frame& frame, uint64_t key) {
+std::array<int64_t, 3> cornerOf(const Frame& frame, Key key) {
     const uint32_t drop = frame.rootLog2 - frame.keyLevels;
-    return {int64_t{compactBits(key)} << drop, int64_t{compactBits(key >> 1)} << drop,
-            int64_t{compactBits(key >> 2)} << drop};
+    const auto along = [&](int a) { return static_cast<int64_t>(compactBits(key >> a) << drop); };
+    return {along(0), along(1), along(2)};
+}
+Key keyAt(const Frame& frame, const std::array<int64_t, 3>& p) {
+    return frame.keyOf(static_cast<uint64_t>(p[0]), static_cast<uint64_t>(p[1]), static_cast<uint64_t>(p[2]));
 }
 
 /// The cell that holds a lattice position, if it is inside the root.
@@ -21,8 +24,7 @@ uint32_t cellAt(const Frame& frame, const CellTree& tree, const std::array<int64
     const int64_t size = int64_t{1} << frame.rootLog2;
     for (const int64_t v : p)
         if (v < 0 || v >= size) return CellTree::kNone;
-    return tree.cellOf(
-        frame.keyOf(static_cast<uint32_t>(p[0]), static_cast<uint32_t>(p[1]), static_cast<uint32_t>(p[2])));
+    return tree.cellOf(keyAt(frame, p));
 }
 
 }  // namespace
@@ -57,8 +59,7 @@ BucketPlan planBuckets(const Frame& frame, const CellTree& tree, uint64_t most) 
             const std::array<int64_t, 3> p{corner[0] + (k % 3 - 1) * edge, corner[1] + (k / 3 % 3 - 1) * edge,
                                            corner[2] + (k / 9 - 1) * edge};
             if (std::any_of(p.begin(), p.end(), [&](int64_t v) { return v < 0 || v >= root; })) continue;
-            const uint64_t key =
-                frame.keyOf(static_cast<uint32_t>(p[0]), static_cast<uint32_t>(p[1]), static_cast<uint32_t>(p[2]));
+            const Key key = keyAt(frame, p);
             const auto first = std::partition_point(cells.begin(), cells.end(),
                                                     [&](const Cell& c) { return c.key >> shift < key >> shift; });
             const auto end =
@@ -90,10 +91,18 @@ RecordLayout::RecordLayout(bool hasColour, bool hasNormal, bool hasRadius, const
 }
 
 void RecordLayout::write(const Points& from, size_t i, uint8_t* to) const {
-    const std::array<uint32_t, 4> first{from.x[i], from.y[i], from.z[i], from.colour[i]};
-    const size_t width = hasWord_ ? 16 : 12;
-    std::memcpy(to, first.data(), width);
-    to += width;
+    const std::array<uint32_t, 3> first{from.x[i], from.y[i], from.z[i]};
+    std::memcpy(to, first.data(), 12);
+    to += 12;
+    if (isWide_) {
+        const uint64_t high = from.high.empty() ? 0 : from.high[i];
+        std::memcpy(to, &high, 8);
+        to += 8;
+    }
+    if (hasWord_) {
+        std::memcpy(to, &from.colour[i], 4);
+        to += 4;
+    }
     if (hasNormal_) {
         std::memcpy(to, &from.normal[i], 4);
         to += 4;
@@ -108,20 +117,38 @@ void RecordLayout::write(const Points& from, size_t i, uint8_t* to) const {
     }
 }
 
+void RecordLayout::readPlace(const uint8_t*& from, size_t i, Points& to) const {
+    std::array<uint32_t, 3> first{};
+    std::memcpy(first.data(), from, 12);
+    to.x[i] = first[0];
+    to.y[i] = first[1];
+    to.z[i] = first[2];
+    from += 12;
+    if (!isWide_) return;
+    std::memcpy(&to.high[i], from, 8);
+    from += 8;
+}
+
+void RecordLayout::readGhosts(const uint8_t* from, size_t count, Points& to) const {
+    for (auto* column : {&to.x, &to.y, &to.z}) column->resize(count);
+    to.high.resize(isWide_ ? count : 0);
+    for (size_t i = 0; i < count; ++i) readPlace(from, i, to);
+}
+
 void RecordLayout::read(const uint8_t* from, size_t count, Points& to) const {
     const size_t before = to.size();
+    to.high.resize(isWide_ ? before + count : 0);
     for (auto* column : {&to.x, &to.y, &to.z, &to.colour, &to.normal}) column->resize(before + count);
     to.radius.resize(before + count);
     to.attributes.resize(widths_.size());
     for (size_t a = 0; a < widths_.size(); ++a) to.attributes[a].resize((before + count) * widths_[a]);
     for (size_t i = before; i < before + count; ++i) {
-        std::array<uint32_t, 4> first{0, 0, 0, kPlainColour | shared::kFlagNoNormal << 24};
-        std::memcpy(first.data(), from, hasWord_ ? 16 : 12);
-        to.x[i] = first[0];
-        to.y[i] = first[1];
-        to.z[i] = first[2];
-        to.colour[i] = first[3];
-        from += hasWord_ ? 16 : 12;
+        readPlace(from, i, to);
+        to.colour[i] = kPlainColour | shared::kFlagNoNormal << 24;
+        if (hasWord_) {
+            std::memcpy(&to.colour[i], from, 4);
+            from += 4;
+        }
         if (hasNormal_) {
             std::memcpy(&to.normal[i], from, 4);
             from += 4;
@@ -157,9 +184,9 @@ Distributor::Distributor(const Frame& frame, const CellTree& tree, const BucketP
     const size_t slots = 2 * plan.buckets.size();
     bufferBytes_ = std::clamp<size_t>(bufferBytes / (static_cast<size_t>(workers) * slots), 4096, 1 << 18);
     buffers_.assign(static_cast<size_t>(workers), std::vector<std::vector<uint8_t>>(slots));
-    std::array<bool, 32> has{};
+    std::array<bool, kPlaceBits + 1> has{};
     for (const Cell& c : tree.cells()) has.at(c.level) = true;
-    for (uint32_t level = 0; level < 32; ++level)
+    for (uint32_t level = 0; level < has.size(); ++level)
         if (has.at(level)) levels_.push_back(level);
 }
 
@@ -191,19 +218,19 @@ Result<void> Distributor::add(int worker, const Points& block) {
     std::vector<uint8_t> record(layout_.bytes());
     std::vector<uint32_t> seenFrom;
     for (size_t i = 0; i < block.size(); ++i) {
-        const uint32_t cell = tree_.cellOf(frame_.keyOf(block.x[i], block.y[i], block.z[i]));
+        const Place place = block.place(i);
+        const uint32_t cell = tree_.cellOf(frame_.keyOf(place));
         layout_.write(block, i, record.data());
         STIPPLE_TRY(put(worker, plan_.ofCell[cell], 0, record.data(), record.size()));
         if (!wantGhosts_ || plan_.isBorder[cell] == 0) continue;
-        ghosts(cell, block.x[i], block.y[i], block.z[i], seenFrom);
-        for (const uint32_t bucket : seenFrom)
-            STIPPLE_TRY(put(worker, bucket, 1, record.data(), RecordLayout::kGhostBytes));
+        ghosts(cell, place, seenFrom);
+        for (const uint32_t bucket : seenFrom) STIPPLE_TRY(put(worker, bucket, 1, record.data(), layout_.ghostBytes()));
     }
     return {};
 }
 
 /// Other buckets whose cells see a point of `cell`.
-void Distributor::ghosts(uint32_t cell, uint32_t x, uint32_t y, uint32_t z, std::vector<uint32_t>& to) const {
+void Distributor::ghosts(uint32_t cell, const Place& place, std::vector<uint32_t>& to) const {
     to.clear();
     const uint32_t own = tree_.cells()[cell].level;
     for (const uint32_t level : levels_) {
@@ -211,7 +238,8 @@ void Distributor::ghosts(uint32_t cell, uint32_t x, uint32_t y, uint32_t z, std:
         // A cell of this size (or, at the point's own, a larger one) within a quarter of it holds one of these places.
         const int64_t size = int64_t{1} << (frame_.rootLog2 - level), reach = size / 4,
                       ownSize = int64_t{1} << (frame_.rootLog2 - own);
-        const std::array<int64_t, 3> p{x, y, z};
+        const std::array<int64_t, 3> p{static_cast<int64_t>(place[0]), static_cast<int64_t>(place[1]),
+                                       static_cast<int64_t>(place[2])};
         std::array<std::array<bool, 3>, 3>
             leaves{};  // per axis: does -reach, 0, +reach lead out of a cell of this size?
         bool isNear = false;

@@ -28,14 +28,23 @@ class RecordLayout {
   public:
     /// Without colours and normals all points have one colour word: it does not travel.
     RecordLayout(bool hasColour, bool hasNormal, bool hasRadius, const std::vector<AttributeInfo>& attributes);
+    /// With the high bits of coordinates: known after the survey.
+    void widen(bool isWide) {
+        bytes_ += (isWide ? 8u : 0u) - (isWide_ ? 8u : 0u);
+        isWide_ = isWide;
+    }
     size_t bytes() const { return bytes_; }
-    static constexpr size_t kGhostBytes = 12;
+    /// A ghost is the beginning of a record: its place.
+    size_t ghostBytes() const { return isWide_ ? 20 : 12; }
     void write(const Points& from, size_t i, uint8_t* to) const;
     /// Appends records to `to`.
     void read(const uint8_t* from, size_t count, Points& to) const;
+    /// Places alone.
+    void readGhosts(const uint8_t* from, size_t count, Points& to) const;
 
   private:
-    bool hasWord_, hasNormal_, hasRadius_;
+    void readPlace(const uint8_t*& from, size_t i, Points& to) const;
+    bool hasWord_, hasNormal_, hasRadius_, isWide_ = false;
     std::vector<size_t> widths_;
     size_t bytes_;
 };
@@ -60,7 +69,7 @@ class Distributor {
     Result<void> flush();
 
   private:
-    void ghosts(uint32_t cell, uint32_t x, uint32_t y, uint32_t z, std::vector<uint32_t>& to) const;
+    void ghosts(uint32_t cell, const Place& place, std::vector<uint32_t>& to) const;
     Result<void> put(int worker, uint32_t bucket, int kind, const uint8_t* bytes, size_t count);
 
     const Frame& frame_;

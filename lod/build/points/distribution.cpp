@@ -101,7 +101,9 @@ Result<void> Distribution::count(BuildReport& report, StageClock& clock) {
 
 void Distribution::setFrame() {
     const auto& g = input_.greatest;
-    frame_ = makeFrame(input_.origin, input_.unit, std::max({g[0], g[1], g[2]}), settings_.leafRecords);
+    frame_ =
+        makeFrame(input_.origin, input_.unit, std::max({g[0], g[1], g[2]}), settings_.leafRecords, input_.resolution);
+    layout_.widen(frame_.rootLog2 > 32);
     frame_.attributes = input_.attributes();
 }
 
@@ -135,7 +137,7 @@ Result<void> Distribution::announce() const {
     uint64_t atBorders = 0;
     for (size_t c = 0; c < tree_->cells().size(); ++c)
         atBorders += wanted_.wantGhosts && plan_.isBorder[c] != 0 ? tree_->cells()[c].count : 0;
-    return workspace_.announce(input_.points * layout_.bytes() + atBorders * RecordLayout::kGhostBytes, progress_);
+    return workspace_.announce(input_.points * layout_.bytes() + atBorders * layout_.ghostBytes(), progress_);
 }
 
 Result<void> Distribution::send() {

@@ -16,7 +16,8 @@ class Distribution {
         uint64_t bufferBytes = 0, bucketPoints = 0;
         bool wantGhosts = false;  ///< neighbours are looked at
     };
-    Distribution(PointInput& input, const BuildSettings& settings, const RecordLayout& layout, const Plan& plan,
+    /// `layout`: widened where the input is wide.
+    Distribution(PointInput& input, const BuildSettings& settings, RecordLayout& layout, const Plan& plan,
                  Workspace& workspace, Executor& executor, Progress& progress)
         : input_(input),
           settings_(settings),
@@ -55,7 +56,7 @@ class Distribution {
 
     PointInput& input_;
     const BuildSettings& settings_;
-    const RecordLayout& layout_;
+    RecordLayout& layout_;
     Plan wanted_;
     Workspace& workspace_;
     Executor& executor_;

@@ -87,37 +87,46 @@ struct LatticeBox {
     }
 };
 
+/// K: Key, or uint64_t where that holds all keys, which is most often and faster.
+template <typename K>
 class Estimator {
   public:
     Estimator(const Frame& frame, const CellTree& tree, const EstimateSettings& settings, const Places& ghosts,
               SortedPoints& own)
-        : frame_(frame), tree_(tree), settings_(settings), ghosts_(ghosts), own_(own) {}
+        : frame_(frame),
+          tree_(tree),
+          settings_(settings),
+          ghosts_(ghosts),
+          own_(own),
+          keys_(own.key.begin(), own.key.end()),
+          ghostKeys_(ghosts.key.begin(), ghosts.key.end()) {}
 
     void cell(uint32_t index) {
         const Cell& c = tree_.cells()[index];
         cell_ = c;
         cellShift_ = frame_.shiftOf(c.level);
-        cellBox_ = boxOf(c.key, c.level);
+        cellBox_ = boxOf(static_cast<K>(c.key), c.level);
         reach_ = static_cast<int64_t>(frame_.cellSize(c.level)) / 4;
-        const auto [begin, end] = rangeOf(own_.key, c.key, cellShift_);
+        const auto [begin, end] = rangeOf(keys_, static_cast<K>(c.key), cellShift_);
         if (begin == end) return;
         blocks(begin, end, c.level, std::min<uint32_t>(c.level + 2u, frame_.keyLevels));
     }
 
   private:
     /// Of the cell of `level` that holds `place`.
-    LatticeBox boxOf(uint64_t place, uint32_t level) const {
+    LatticeBox boxOf(K place, uint32_t level) const {
         const uint32_t drop = frame_.rootLog2 - frame_.keyLevels, shift = frame_.shiftOf(level);
-        const uint64_t key = place >> shift << shift;
+        const K key = place >> shift << shift;
         const auto size = static_cast<int64_t>(frame_.cellSize(level));
         LatticeBox b;
-        b.lo = {int64_t{compactBits(key)} << drop, int64_t{compactBits(key >> 1)} << drop,
-                int64_t{compactBits(key >> 2)} << drop};
-        for (size_t a = 0; a < 3; ++a) b.hi[a] = b.lo[a] + size - 1;
+        for (size_t a = 0; a < 3; ++a) {
+            b.lo[a] = static_cast<int64_t>(compactBits(key >> a) << drop);
+            b.hi[a] = b.lo[a] + size - 1;
+        }
         return b;
     }
-    static std::pair<size_t, size_t> rangeOf(const std::vector<uint64_t>& keys, uint64_t key, uint32_t shift) {
-        const uint64_t lo = key >> shift << shift, last = lo | ((uint64_t{1} << shift) - 1);
+    static std::pair<size_t, size_t> rangeOf(const std::vector<K>& keys, K key, uint32_t shift) {
+        const K lo = key >> shift << shift, last = lo | ((K{1} << shift) - 1);
         const auto first = std::lower_bound(keys.begin(), keys.end(), lo);
         const auto end = std::upper_bound(first, keys.end(), last);
         return {static_cast<size_t>(first - keys.begin()), static_cast<size_t>(end - keys.begin())};
@@ -132,11 +141,11 @@ class Estimator {
         }
         const uint32_t shift = frame_.shiftOf(level + 1);
         while (begin < end) {
-            const uint64_t child = own_.key[begin] >> shift;
-            const auto next = std::partition_point(own_.key.begin() + static_cast<ptrdiff_t>(begin),
-                                                   own_.key.begin() + static_cast<ptrdiff_t>(end),
-                                                   [&](uint64_t k) { return k >> shift == child; }) -
-                              own_.key.begin();
+            const K child = keys_[begin] >> shift;
+            const auto next = std::partition_point(keys_.begin() + static_cast<ptrdiff_t>(begin),
+                                                   keys_.begin() + static_cast<ptrdiff_t>(end),
+                                                   [&](K k) { return k >> shift == child; }) -
+                              keys_.begin();
             blocks(begin, static_cast<size_t>(next), level + 1, least);
             begin = static_cast<size_t>(next);
         }
@@ -145,42 +154,49 @@ class Estimator {
     /// Calls f(x, y, z) for every point inside `box` that the counted cell sees, in the order of the keys: own first,
     /// then ghosts.
     template <typename F>
-    void forPoints(const LatticeBox& box, uint64_t key, uint32_t level, const F& f) const {
+    void forPoints(const LatticeBox& box, K key, uint32_t level, const F& f) const {
         const uint32_t shift = frame_.shiftOf(level);
-        const auto [begin, end] = rangeOf(own_.key, key, shift);
-        descend(own_.key, own_.points.x, own_.points.y, own_.points.z, begin, end, level, box, f);
-        const auto [first, last] = rangeOf(ghosts_.key, key, shift);
-        descend(ghosts_.key, ghosts_.x, ghosts_.y, ghosts_.z, first, last, level, box, f);
+        const auto [begin, end] = rangeOf(keys_, key, shift);
+        descend(keys_, own_.points, begin, end, level, box, f);
+        const auto [first, last] = rangeOf(ghostKeys_, key, shift);
+        descend(ghostKeys_, ghosts_, first, last, level, box, f);
     }
-    template <typename F>
-    void descend(const std::vector<uint64_t>& keys, const std::vector<uint32_t>& x, const std::vector<uint32_t>& y,
-                 const std::vector<uint32_t>& z, size_t begin, size_t end, uint32_t level, const LatticeBox& box,
-                 const F& f) const {
+    /// Calls f(x, y, z) for point i.
+    template <typename Of, typename F>
+    static auto withPlace(const Of& points, size_t i, const F& f) {
+        if (points.high.empty()) return f(points.x[i], points.y[i], points.z[i]);
+        const Place p = placeOf(points.x[i], points.y[i], points.z[i], points.high[i]);
+        return f(static_cast<int64_t>(p[0]), static_cast<int64_t>(p[1]), static_cast<int64_t>(p[2]));
+    }
+    template <typename Of, typename F>
+    void descend(const std::vector<K>& keys, const Of& points, size_t begin, size_t end, uint32_t level,
+                 const LatticeBox& box, const F& f) const {
         constexpr size_t kFew = 128;
         if (begin == end) return;
         if (end - begin <= kFew || level >= frame_.keyLevels) {
             for (size_t i = begin; i < end; ++i)
-                if (box.holds(x[i], y[i], z[i]) && isSeen(keys[i], x[i], y[i], z[i])) f(x[i], y[i], z[i]);
+                withPlace(points, i, [&](int64_t x, int64_t y, int64_t z) {
+                    if (box.holds(x, y, z) && isSeen(keys[i], x, y, z)) f(x, y, z);
+                });
             return;
         }
         const uint32_t shift = frame_.shiftOf(level + 1);
         while (begin < end) {
-            const uint64_t child = keys[begin] >> shift;
-            const auto next =
-                static_cast<size_t>(std::partition_point(keys.begin() + static_cast<ptrdiff_t>(begin),
-                                                         keys.begin() + static_cast<ptrdiff_t>(end),
-                                                         [&](uint64_t k) { return k >> shift == child; }) -
-                                    keys.begin());
+            const K child = keys[begin] >> shift;
+            const auto next = static_cast<size_t>(std::partition_point(keys.begin() + static_cast<ptrdiff_t>(begin),
+                                                                       keys.begin() + static_cast<ptrdiff_t>(end),
+                                                                       [&](K k) { return k >> shift == child; }) -
+                                                  keys.begin());
             const LatticeBox at = boxOf(child << shift, level + 1);
             bool meets = true;
             for (size_t a = 0; a < 3; ++a) meets = meets && at.lo[a] <= box.hi[a] && at.hi[a] >= box.lo[a];
-            if (meets) descend(keys, x, y, z, begin, next, level + 1, box, f);
+            if (meets) descend(keys, points, begin, next, level + 1, box, f);
             begin = next;
         }
     }
     /// The rule of Distributor.
-    bool isSeen(uint64_t key, int64_t x, int64_t y, int64_t z) const {
-        if (key >> cellShift_ == cell_.key >> cellShift_) return true;
+    bool isSeen(K key, int64_t x, int64_t y, int64_t z) const {
+        if (key >> cellShift_ == static_cast<K>(cell_.key) >> cellShift_) return true;
         int64_t reach = reach_;
         if (tree_.deepestLevel() > tree_.firstLevel()) {
             const Cell& other = tree_.cells()[tree_.cellOf(key)];
@@ -191,7 +207,7 @@ class Estimator {
 
     /// Everything within `margin` of the box of a cell of `level`, from that cell and its neighbours.
     template <typename F>
-    void forNeighbourhood(uint64_t key, uint32_t level, int64_t margin, bool withOwn, const F& f) const {
+    void forNeighbourhood(K key, uint32_t level, int64_t margin, bool withOwn, const F& f) const {
         const LatticeBox own = boxOf(key, level), box = own.grown(margin);
         const auto size = static_cast<int64_t>(frame_.cellSize(level)), root = int64_t{1} << frame_.rootLog2;
         for (int64_t dz = -1; dz <= 1; ++dz)
@@ -200,9 +216,9 @@ class Estimator {
                     if (!withOwn && dx == 0 && dy == 0 && dz == 0) continue;
                     const int64_t x = own.lo[0] + dx * size, y = own.lo[1] + dy * size, z = own.lo[2] + dz * size;
                     if (x < 0 || y < 0 || z < 0 || x >= root || y >= root || z >= root) continue;
-                    forPoints(
-                        box, frame_.keyOf(static_cast<uint32_t>(x), static_cast<uint32_t>(y), static_cast<uint32_t>(z)),
-                        level, f);
+                    const Key at =
+                        frame_.keyOf(static_cast<uint64_t>(x), static_cast<uint64_t>(y), static_cast<uint64_t>(z));
+                    forPoints(box, static_cast<K>(at), level, f);
                 }
     }
 
@@ -214,7 +230,7 @@ class Estimator {
         const uint32_t across = (1u << splits) + 2;
         const uint32_t edgeLog2 = frame_.rootLog2 - window;
         const int64_t edge = int64_t{1} << edgeLog2;
-        const LatticeBox box = boxOf(own_.key[begin], level);
+        const LatticeBox box = boxOf(keys_[begin], level);
         const float inverse = 1.0f / static_cast<float>(edge), half = 0.5f * static_cast<float>(1u << splits);
         const auto cellOf = [&](int64_t x, int64_t y, int64_t z) {
             const auto cx = static_cast<size_t>((x - box.lo[0] + edge) >> edgeLog2),
@@ -231,13 +247,13 @@ class Estimator {
         const auto add = [&](int64_t x, int64_t y, int64_t z) {
             seen_.push_back({static_cast<uint32_t>(cellOf(x, y, z)), localOf(x, y, z)});
         };
-        for (size_t i = begin; i < end; ++i) add(own_.points.x[i], own_.points.y[i], own_.points.z[i]);
-        forNeighbourhood(own_.key[begin], level, edge, false, add);
+        for (size_t i = begin; i < end; ++i) withPlace(own_.points, i, add);
+        forNeighbourhood(keys_[begin], level, edge, false, add);
         indexSeen(size_t{across} * across * across);
         const uint32_t windowShift = frame_.shiftOf(window);
         for (size_t i = begin; i < end;) {
             size_t next = i + 1;
-            while (next < end && own_.key[next] >> windowShift == own_.key[i] >> windowShift) ++next;
+            while (next < end && keys_[next] >> windowShift == keys_[i] >> windowShift) ++next;
             gather(seen_[i - begin].cell, across, kMostInThree, hood_);
             if (hood_.x.size() <= kNeighbours && window > coarsestWindow()) {
                 largerWindow(i, next, window);
@@ -323,14 +339,13 @@ class Estimator {
         for (uint32_t level = window; level > coarsestWindow() && (level == window || hood_.x.size() <= kNeighbours);) {
             --level;
             size = static_cast<int64_t>(frame_.cellSize(level));
-            box = boxOf(own_.key[begin], level);
+            box = boxOf(keys_[begin], level);
             clearHood();
-            forNeighbourhood(own_.key[begin], level, size, true,
+            forNeighbourhood(keys_[begin], level, size, true,
                              [&](int64_t x, int64_t y, int64_t z) { addToHood(localOf(x, y, z)); });
         }
         places_.clear();
-        for (size_t i = begin; i < end; ++i)
-            places_.push_back(localOf(own_.points.x[i], own_.points.y[i], own_.points.z[i]));
+        for (size_t i = begin; i < end; ++i) places_.push_back(withPlace(own_.points, i, localOf));
         give(begin, end, static_cast<float>(size), {true, 0, 0});
     }
 
@@ -412,6 +427,7 @@ class Estimator {
     const EstimateSettings settings_;
     const Places& ghosts_;
     SortedPoints& own_;
+    const std::vector<K> keys_, ghostKeys_;
     Cell cell_;
     uint32_t cellShift_ = 0;
     LatticeBox cellBox_;
@@ -433,8 +449,13 @@ void estimate(const Frame& frame, const CellTree& tree, uint32_t firstCell, uint
     p.normal.resize(p.size());
     p.radius.resize(p.size());
     if (settings.radii || settings.normals) {
-        Estimator estimator(frame, tree, settings, ghosts, own);
-        for (uint32_t k = 0; k < cells; ++k) estimator.cell(firstCell + k);
+        const auto all = [&](auto estimator) {
+            for (uint32_t k = 0; k < cells; ++k) estimator.cell(firstCell + k);
+        };
+        if (frame.keyLevels > kShortBits)
+            all(Estimator<Key>(frame, tree, settings, ghosts, own));
+        else
+            all(Estimator<uint64_t>(frame, tree, settings, ghosts, own));
     }
     // Stray points have their neighbours far away.
     const float limit =

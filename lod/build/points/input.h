@@ -1,6 +1,7 @@
 // The input of a build, read as often as it takes: first surveyed, then delivered as points on one lattice. Scanner
 // integers stay what they are: the lattice unit is the files' scale. For floating-point input the unit is a power of
-// two, 2^-21 of the extent.
+// two, 2^-21 of the extent; where that is no small part of the spacing (objects far apart, a point far outside of all
+// others) it follows from the spacing and from the extent without what is far out.
 #pragma once
 
 #include <functional>
@@ -45,7 +46,8 @@ class PointInput {
     // After that:
     glm::dvec3 origin{0};
     double unit = 1;
-    std::array<uint32_t, 3> greatest{};  ///< of the coordinates; the least are 0
+    double resolution = 0;  ///< how near to each other points lie where they are dense, lattice units; 0: not known
+    std::array<uint64_t, 3> greatest{};  ///< of the coordinates; the least are 0
     uint64_t points = 0;                 ///< that can be used
     Points sample;                       ///< places of every sampleShare-th point, about
     uint64_t sampleShare = 1;
@@ -116,10 +118,15 @@ class PointInput {
     Result<void> placeFloats();
     void findColours(BuildReport& report);
     void placeSample();
+    bool isWide() const { return std::max({greatest[0], greatest[1], greatest[2]}) >> 32 != 0; }
     Result<void> readPart(const Part& part, PointBlock& block, Points& points, double& rounding, FarCubes* far,
                           const std::function<Result<void>(const Points&)>& sink) const;
     size_t leaveOut(const Part& part, PointBlock& block, size_t count, uint64_t& far) const;
     void place(const Part& part, const PointBlock& block, size_t count, Points& out, double& rounding) const;
+    void placeWide(const Part& part, const PointBlock& block, size_t count, Points& out, double& rounding) const;
+    template <typename Put>
+    void placeEach(const Part& part, const PointBlock& block, size_t count, Points& out, const Put& put) const;
+    bool isWithin(const Points& block) const;
     void fill(const Part& part, const PointBlock& block, Points& out) const;
 
     BuildSettings settings_;
@@ -130,6 +137,11 @@ class PointInput {
     Outliers outliers_;
     std::vector<bool> isWide_;  ///< colours of a source have 16 bits
     std::vector<uint32_t> sourceColourMax_;
+    /// Of the points without the farthest, in the coordinates that all share: see spacing.h.
+    struct Dense {
+        double spacing = 0, extent = 0, farthest = 0;
+    };
+    Dense dense_;
     glm::dvec3 least_{0};  ///< steps of the common lattice
     double step_ = 1;      ///< of the common lattice, for what 32 bits cannot hold
     uint64_t declared_ = 0;

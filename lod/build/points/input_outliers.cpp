@@ -9,6 +9,7 @@
 #include "engine/base/queue.h"
 #include "lod/build/points/input.h"
 #include "lod/build/points/separation.h"
+#include "lod/build/points/spacing.h"
 
 namespace stipple::lod {
 // ---- where points are: steps of the common lattice, or world units where there is none ----
@@ -61,6 +62,19 @@ void PointInput::findDenseBox() {
                                              : p * info.scale + info.offset);
         }
     }
+    const auto isBefore = [](const glm::dvec3& a, const glm::dvec3& b) {
+        return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
+    };
+    std::sort(places.begin(), places.end(), isBefore);
+    places.erase(std::unique(places.begin(), places.end()), places.end());
+    Bounds all;
+    for (const Part& part : parts_) all.add(boundsOf(part));
+    const glm::dvec3 extent = all.isEmpty() ? glm::dvec3(0) : all.greatest - all.least;
+    // (So few steps are told apart whatever lies how near.)
+    const bool isKnown = allLattice_ && std::max({extent.x, extent.y, extent.z}) < std::exp2(kShortBits);
+    dense_.spacing = isKnown ? 0 : denseSpacing(places, PlaceSample::shareOf(declared_));
+    dense_.extent = denseExtent(places);
+    dense_.farthest = denseDistance(places);
     const glm::dvec3 world(0);
     outliers_ = allLattice_ ? Outliers(std::move(places), (world - lattice_.base) / lattice_.unit, 0.5)
                             : Outliers(std::move(places), world, 0);

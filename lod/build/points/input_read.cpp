@@ -86,9 +86,7 @@ Result<void> PointInput::readPart(const Part& part, PointBlock& block, Points& o
         fill(part, block, out);
         place(part, block, count, out, rounding);
         usable += out.size();
-        for (const auto& [axis, limit] : {std::pair{&out.x, greatest[0]}, {&out.y, greatest[1]}, {&out.z, greatest[2]}})
-            for (const uint32_t v : *axis)
-                if (v > limit) return changed();
+        if (!isWithin(out)) return changed();
         STIPPLE_TRY(sink(out));
     }
 }
@@ -106,6 +104,21 @@ void keepOnly(std::vector<T>& values, const std::vector<uint32_t>& kept, size_t 
 }
 
 }  // namespace
+
+/// Are all coordinates what the survey found?
+bool PointInput::isWithin(const Points& block) const {
+    if (!block.high.empty()) {
+        for (size_t i = 0; i < block.size(); ++i)
+            for (size_t a = 0; a < 3; ++a)
+                if (block.place(i).at(a) > greatest.at(a)) return false;
+        return true;
+    }
+    for (const auto& [axis, limit] :
+         {std::pair{&block.x, greatest[0]}, {&block.y, greatest[1]}, {&block.z, greatest[2]}})
+        for (const uint32_t v : *axis)
+            if (v > limit) return false;
+    return true;
+}
 
 /// Takes outliers out of a block; returns how many points stay. `far` grows by how many are far.
 size_t PointInput::leaveOut(const Part& part, PointBlock& block, size_t count, uint64_t& far) const {
@@ -163,8 +176,12 @@ void PointInput::fill(const Part& part, const PointBlock& block, Points& out) co
 }
 
 void PointInput::place(const Part& part, const PointBlock& block, size_t count, Points& out, double& rounding) const {
-    const SourceInfo& info = sources_[part.source].info;
     for (auto* axis : {&out.x, &out.y, &out.z}) axis->resize(count);
+    out.high.assign(isWide() ? count : 0, 0);
+    if (isWide()) {
+        placeWide(part, block, count, out, rounding);
+        return;
+    }
     if (allLattice_) {
         const ToLattice& to = lattice_.of[part.source];
         for (int a = 0; a < 3; ++a) {
@@ -185,16 +202,47 @@ void PointInput::place(const Part& part, const PointBlock& block, size_t count, 
         }
         return;
     }
-    size_t to = 0;
-    for (size_t i = 0; i < count; ++i) {
-        const glm::dvec3 p =
-            info.isLattice ? glm::dvec3(block.lattice[i]) * info.scale + info.offset : block.position[i];
-        if (!isFinite(p)) continue;
+    placeEach(part, block, count, out, [&](const glm::dvec3& p, size_t to) {
         const glm::dvec3 q = (p - origin) / unit, r = glm::round(q), d = glm::abs(r - q);
         rounding = std::max({rounding, d.x, d.y, d.z});
         out.x[to] = static_cast<uint32_t>(std::max(r.x, 0.0));
         out.y[to] = static_cast<uint32_t>(std::max(r.y, 0.0));
         out.z[to] = static_cast<uint32_t>(std::max(r.z, 0.0));
+    });
+}
+
+/// Coordinates of more than 32 bits.
+void PointInput::placeWide(const Part& part, const PointBlock& block, size_t count, Points& out,
+                           double& rounding) const {
+    const double perStep = allLattice_ ? step_ : 1;
+    const auto put = [&](const glm::dvec3& q, size_t to) {
+        const glm::dvec3 r = glm::clamp(glm::round(q), glm::dvec3(0), glm::dvec3(std::exp2(kPlaceBits) - 1));
+        const glm::dvec3 d = glm::abs(r - q) * perStep;
+        rounding = std::max({rounding, d.x, d.y, d.z});
+        const Place place{static_cast<uint64_t>(r.x), static_cast<uint64_t>(r.y), static_cast<uint64_t>(r.z)};
+        out.x[to] = static_cast<uint32_t>(place[0]);
+        out.y[to] = static_cast<uint32_t>(place[1]);
+        out.z[to] = static_cast<uint32_t>(place[2]);
+        out.high[to] = highOf(place);
+    };
+    if (!allLattice_) {
+        placeEach(part, block, count, out, [&](const glm::dvec3& p, size_t to) { put((p - origin) / unit, to); });
+        return;
+    }
+    const ToLattice& of = lattice_.of[part.source];
+    for (size_t i = 0; i < count; ++i) put((glm::dvec3(block.lattice[i]) * of.ratio + (of.shift - least_)) / step_, i);
+}
+
+/// Of points with world coordinates: calls put(p, i) for those that are finite, and closes up what belongs to them.
+template <typename Put>
+void PointInput::placeEach(const Part& part, const PointBlock& block, size_t count, Points& out, const Put& put) const {
+    const SourceInfo& info = sources_[part.source].info;
+    size_t to = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const glm::dvec3 p =
+            info.isLattice ? glm::dvec3(block.lattice[i]) * info.scale + info.offset : block.position[i];
+        if (!isFinite(p)) continue;
+        put(p, to);
         if (to != i) {
             out.colour[to] = out.colour[i];
             if (!out.normal.empty()) out.normal[to] = out.normal[i];
@@ -209,6 +257,7 @@ void PointInput::place(const Part& part, const PointBlock& block, size_t count, 
     }
     if (to == count) return;
     for (auto* axis : {&out.x, &out.y, &out.z}) axis->resize(to);
+    if (!out.high.empty()) out.high.resize(to);
     out.colour.resize(to);
     if (!out.normal.empty()) out.normal.resize(to);
     if (!out.radius.empty()) out.radius.resize(to);

@@ -14,7 +14,7 @@
 namespace stipple::lod {
 namespace {
 
-constexpr double kLatticeLimit = 4294967295.0;
+constexpr double kLatticeLimit = 9007199254740991.0;  // 2^kPlaceBits - 1
 
 }  // namespace
 
@@ -128,11 +128,13 @@ void PointInput::getPart(size_t i, ByteReader& from) {
 void PointInput::save(ByteWriter& to) {
     for (size_t i = 0; i < parts_.size(); ++i) putPart(i, to);
     outliers_.save(to);
+    to.put(dense_);
 }
 
 Result<void> PointInput::load(ByteReader& from, BuildReport& report) {
     for (size_t i = 0; i < parts_.size(); ++i) getPart(i, from);
     outliers_.load(from);
+    from.get(dense_);
     STIPPLE_TRY(checkParts());
     return conclude(report);
 }
@@ -162,9 +164,11 @@ void PointInput::placeSample() {
                 q = ((info.isLattice ? p * info.scale + info.offset : p) - origin) / unit;
             }
             q = glm::clamp(glm::round(q), glm::dvec3(0), glm::dvec3(greatest[0], greatest[1], greatest[2]));
-            sample.x.push_back(static_cast<uint32_t>(q.x));
-            sample.y.push_back(static_cast<uint32_t>(q.y));
-            sample.z.push_back(static_cast<uint32_t>(q.z));
+            const Place at{static_cast<uint64_t>(q.x), static_cast<uint64_t>(q.y), static_cast<uint64_t>(q.z)};
+            sample.x.push_back(static_cast<uint32_t>(at[0]));
+            sample.y.push_back(static_cast<uint32_t>(at[1]));
+            sample.z.push_back(static_cast<uint32_t>(at[2]));
+            if (isWide()) sample.high.push_back(highOf(at));
         }
     }
 }
@@ -271,7 +275,8 @@ Result<void> PointInput::placeIntegers(BuildReport& report) {
     unit = lattice.unit * step_;
     origin = lattice.base + lattice.unit * lo;
     for (int a = 0; a < 3; ++a)
-        greatest.at(static_cast<size_t>(a)) = static_cast<uint32_t>(std::max(std::round(extents[a] / step_), 0.0));
+        greatest.at(static_cast<size_t>(a)) = static_cast<uint64_t>(std::max(std::round(extents[a] / step_), 0.0));
+    resolution = dense_.spacing / step_;
     const auto isOff = [](const auto& of) { return !of.exact; };
     const auto first = std::find_if(lattice.of.begin(), lattice.of.end(), isOff);
     if (first == lattice.of.end()) return {};
@@ -290,14 +295,26 @@ Result<void> PointInput::placeFloats() {
     const double extent = std::max({extents.x, extents.y, extents.z});
     if (!std::isfinite(extent))
         return fail(ErrorKind::input, "the coordinates span more than a double can hold", firstPath());
-    unit = extent > 0 ? std::exp2(std::ceil(std::log2(extent)) - 21) : std::exp2(-10);
-    // Below the spacing of doubles at this place there is nothing to resolve.
-    const double farthest =
+    constexpr double kBitsOfExtent = 21, kBitsOfDouble = 52, kFewSteps = 64, kManySteps = 2048;
+    const auto powerAbove = [](double v) { return std::ceil(std::log2(v)); };
+    unit = extent > 0 ? std::exp2(powerAbove(extent) - kBitsOfExtent) : std::exp2(-10);
+    double farthest =
         std::max({std::abs(lo.x), std::abs(lo.y), std::abs(lo.z), std::abs(hi.x), std::abs(hi.y), std::abs(hi.z)});
-    if (farthest > 0) unit = std::max(unit, std::exp2(std::ceil(std::log2(farthest)) - 52));
     origin = lo;
+    if (dense_.spacing > 0 && unit > dense_.spacing / kFewSteps) {
+        unit = std::exp2(std::floor(std::log2(dense_.spacing / kManySteps)));
+        if (dense_.extent > 0) unit = std::min(unit, std::exp2(powerAbove(dense_.extent) - kBitsOfExtent));
+        unit = std::max(unit, std::exp2(powerAbove(extent) - kPlaceBits));
+        farthest = dense_.farthest;
+        // Whole steps from zero: what is rounded, and to what, does not hang on where the farthest point lies.
+        if (const glm::dvec3 whole = glm::floor(lo / unit) * unit; glm::all(glm::lessThanEqual(whole, lo)))
+            origin = whole;
+    }
+    // Below the spacing of doubles at this place there is nothing to resolve.
+    if (farthest > 0) unit = std::max(unit, std::exp2(powerAbove(farthest) - kBitsOfDouble));
     for (int a = 0; a < 3; ++a)
-        greatest.at(static_cast<size_t>(a)) = static_cast<uint32_t>(std::round(extents[a] / unit));
+        greatest.at(static_cast<size_t>(a)) = static_cast<uint64_t>(std::round((hi[a] - origin[a]) / unit));
+    resolution = dense_.spacing / unit;
     return {};
 }
 

@@ -27,10 +27,10 @@ struct Box {
     glm::dvec3 centre() const { return 0.5 * (lo + hi); }
 };
 
-Node emptyNode(const Frame& frame, uint32_t level, uint64_t key) {
+Node emptyNode(const Frame& frame, uint32_t level, Key key) {
     Node node;
     node.level = static_cast<uint8_t>(level);
-    const uint64_t cell = key >> frame.shiftOf(level);
+    const Key cell = key >> frame.shiftOf(level);
     node.cell = {compactBits(cell), compactBits(cell >> 1), compactBits(cell >> 2)};
     node.stepShift = static_cast<int8_t>(static_cast<int>(frame.rootLog2) - static_cast<int>(level) - 16);
     return node;
@@ -82,7 +82,7 @@ void innerCone(std::span<const PendingNode> children, Node& node) {
 
 // ---- chunks ----
 
-uint32_t coordinate(uint32_t v, uint64_t size, int stepShift) {
+uint32_t coordinate(uint64_t v, uint64_t size, int stepShift) {
     const uint64_t local = v & (size - 1);
     return static_cast<uint32_t>(stepShift >= 0 ? local >> stepShift : local << -stepShift);
 }
@@ -145,14 +145,12 @@ void encodeNode(const Frame& frame, PendingNode& pending, NodeBatch& batch) {
         }
         const Points& p = pending.leaf;
         const uint32_t radius = radiusCodeUp(static_cast<double>(p.radius[k]), edge);
-        const auto steps = [&](uint32_t v) { return coordinate(v, size, node.stepShift); };
-        chunk.records[at] = {steps(p.x[k]) | steps(p.y[k]) << 16, steps(p.z[k]) | radius << 16, p.normal[k],
-                             p.colour[k]};
+        const Place place = p.place(k);
+        const auto steps = [&](size_t a) { return coordinate(place.at(a), size, node.stepShift); };
+        chunk.records[at] = {steps(0) | steps(1) << 16, steps(2) | radius << 16, p.normal[k], p.colour[k]};
         if (!hasLowBits) continue;
-        const uint32_t mask = (1u << node.stepShift) - 1;
-        chunk.lowBits[at * 3] = p.x[k] & mask;
-        chunk.lowBits[at * 3 + 1] = p.y[k] & mask;
-        chunk.lowBits[at * 3 + 2] = p.z[k] & mask;
+        const uint64_t mask = (uint64_t{1} << node.stepShift) - 1;
+        for (size_t a = 0; a < 3; ++a) chunk.lowBits[at * 3 + a] = static_cast<uint32_t>(place.at(a) & mask);
     }
     const std::vector<uint8_t> bytes = encodeChunk(chunk), attributes = encodeAttributes(frame.attributes, streams);
     node.chunkOffset = batch.bytes.size();
@@ -198,6 +196,7 @@ PendingNode makeLeaf(const Frame& frame, SortedPoints& from, size_t begin, size_
     copy(out.leaf.x, from.points.x);
     copy(out.leaf.y, from.points.y);
     copy(out.leaf.z, from.points.z);
+    if (!from.points.high.empty()) copy(out.leaf.high, from.points.high);
     copy(out.leaf.colour, from.points.colour);
     copy(out.leaf.normal, from.points.normal);
     copy(out.leaf.radius, from.points.radius);
@@ -306,12 +305,12 @@ PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, Node
     thread_local ConeMerger cones;
     for (PendingNode& child : children) {
         const bool isLeaf = child.node.isLeaf();
-        out.node.childMask =
-            static_cast<uint8_t>(out.node.childMask | 1u << (child.key >> frame.shiftOf(level + 1) & 7u));
+        out.node.childMask = static_cast<uint8_t>(
+            out.node.childMask | 1u << static_cast<uint32_t>(child.key >> frame.shiftOf(level + 1) & 7u));
         const size_t count = child.node.records;
         const auto keyAt = [&](size_t k) { return isLeaf ? child.leafKey[k] : child.records[k].key; };
         for (size_t begin = 0, end = 0; begin < count; begin = end) {
-            const uint64_t cell = keyAt(begin) >> grid.clusterShift;
+            const Key cell = keyAt(begin) >> grid.clusterShift;
             for (end = begin + 1; end < count && keyAt(end) >> grid.clusterShift == cell;) ++end;
             std::span<const Rising> parts;
             std::span<const RisingValue> values;
@@ -349,16 +348,60 @@ void finishRoot(const Frame& frame, PendingNode& root, NodeBatch& batch) { encod
 
 namespace {
 
+/// Records are drawn to the steps of their node. Would points of this leaf be off by what can be seen beside their
+/// neighbours? Then it is split, until a step is one lattice unit at most:
+///   - more than 4 places in the 64ths of the edge that hold any, on average: nearer to each other than 512 steps. (A
+///     full leaf of evenly scanned points has 2 there.)
+///   - more than 16 in one of them, or 8 in a 128th
+///   - a few points, many of them as near to the next one along the curve
+///   - hardly any, with small discs
+/// So what lies closer together is at most eight points among many that do not.
+bool isCoarse(const Frame& frame, const SortedPoints& from, size_t begin, size_t end, uint32_t level) {
+    constexpr std::array<std::pair<uint32_t, size_t>, 2> kMostBelow{{{6, 16}, {7, 8}}};  // levels, places
+    constexpr size_t kMostOnAverage = 4, kFew = 64, kHardlyAny = 8;
+    constexpr double kSteps = 256, kStepsOfDisc = 64, kMany = 0.25;
+    const double step = std::exp2(static_cast<double>(frame.rootLog2) - level - 16);
+    if (step <= 1) return false;
+    const size_t count = end - begin;
+    std::array<size_t, kMostBelow.size()> places{};
+    size_t different = 0, near = 0, cells = 0;
+    Place before{};
+    for (size_t i = begin; i < end; ++i) {
+        const Place place = from.points.place(i);
+        if (i > begin && place == before) continue;
+        ++different;
+        for (size_t k = 0; k < places.size(); ++k) {
+            const uint32_t shift = frame.shiftOf(std::min(level + kMostBelow.at(k).first, frame.keyLevels));
+            const bool isSame = i > begin && from.key[i] >> shift == from.key[i - 1] >> shift;
+            places.at(k) = isSame ? places.at(k) + 1 : 1;
+            cells += k == 0 && !isSame ? 1 : 0;
+            if (places.at(k) > kMostBelow.at(k).second) return true;
+        }
+        uint64_t apart = 0;
+        for (size_t a = 0; a < 3; ++a)
+            apart = std::max(apart, std::max(place.at(a), before.at(a)) - std::min(place.at(a), before.at(a)));
+        near += i > begin && static_cast<double>(apart) < kSteps * step ? 1 : 0;
+        before = place;
+    }
+    if (different > kMostOnAverage * cells) return true;
+    if (count <= kFew && static_cast<double>(near) > kMany * static_cast<double>(different)) return true;
+    if (count > kHardlyAny) return false;
+    for (size_t i = begin; i < end; ++i)
+        if (kStepsOfDisc * step > static_cast<double>(from.points.radius[i])) return true;
+    return false;
+}
+
 PendingNode subtreeOf(const Frame& frame, SortedPoints& from, size_t begin, size_t end, uint32_t level,
                       NodeBatch& batch, const Leaves& leaves) {
-    if (end - begin <= frame.leafRecords || level >= frame.keyLevels) return makeLeaf(frame, from, begin, end, level);
+    const bool isSmall = end - begin <= frame.leafRecords && !isCoarse(frame, from, begin, end, level);
+    if (isSmall || level >= frame.keyLevels) return makeLeaf(frame, from, begin, end, level);
     std::vector<PendingNode> children;
     children.reserve(8);
     const uint32_t shift = frame.shiftOf(level + 1);
     for (uint64_t octant = 0; octant < 8 && begin < end; ++octant) {
         const auto first = from.key.begin() + static_cast<ptrdiff_t>(begin),
                    last = from.key.begin() + static_cast<ptrdiff_t>(end);
-        const auto split = std::partition_point(first, last, [&](uint64_t k) { return (k >> shift & 7u) <= octant; });
+        const auto split = std::partition_point(first, last, [&](Key k) { return (k >> shift & 7u) <= octant; });
         const auto next = static_cast<size_t>(split - from.key.begin());
         if (next == begin) continue;
         children.push_back(subtreeOf(frame, from, begin, next, level + 1, batch, leaves));

@@ -21,7 +21,7 @@ namespace stipple::lod {
 
 /// A record on its way up.
 struct Rising {
-    uint64_t key = 0;                            ///< of the first point below
+    Key key = 0;                                 ///< of the first point below
     uint32_t first = 0;                          ///< of the points below, where those are at hand
     uint32_t count = 0;                          ///< points below
     glm::dvec3 mean{0};                          ///< of them, lattice units
@@ -46,12 +46,12 @@ struct RisingValue {
 /// A node whose records are known and whose chunk is not yet written, as its order needs the parent's codes.
 struct PendingNode {
     Node node;
-    uint64_t key = 0;                 ///< of its cell: Morton code of `keyLevels` levels
+    Key key = 0;                      ///< of its cell: Morton code of `keyLevels` levels
     std::vector<Rising> records;      ///< of an inner node
     std::vector<RisingValue> values;  ///< records x attributes
     Points leaf;                      ///< of a leaf
     uint32_t firstPoint = 0;          ///< of a leaf, where its points are at hand
-    std::vector<uint64_t> leafKey;
+    std::vector<Key> leafKey;
     std::vector<uint8_t> leafParentCode;
 };
 

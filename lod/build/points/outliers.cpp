@@ -24,9 +24,7 @@ void makeUnique(std::vector<glm::dvec3>& places) {
 
 // ---- the sample ----
 
-PlaceSample::PlaceSample(uint64_t points)
-    : share_(static_cast<uint64_t>(std::exp2(32) *
-                                   std::min(1.0, kPlaces / static_cast<double>(std::max<uint64_t>(points, 1))))) {}
+PlaceSample::PlaceSample(uint64_t points) : share_(static_cast<uint64_t>(std::exp2(32) * shareOf(points))) {}
 
 bool PlaceSample::isTaken(const glm::dvec3& p) const {
     // (+ 0: the two zeros are one place.)

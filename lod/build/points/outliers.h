@@ -11,6 +11,7 @@
 //                around it. A distant tower is far, but not isolated.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <optional>
@@ -39,6 +40,9 @@ class PlaceSample {
   public:
     /// About `kPlaces` of `points`.
     explicit PlaceSample(uint64_t points = 0);
+    static double shareOf(uint64_t points) {
+        return std::min(1.0, kPlaces / static_cast<double>(std::max<uint64_t>(points, 1)));
+    }
     template <typename V>
     void add(const V& p) {  // glm::ivec3 or glm::dvec3, as the file has them
         if (isTaken(p)) keep(glm::dvec3(p));

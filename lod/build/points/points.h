@@ -16,19 +16,25 @@ namespace stipple::lod {
 /// Points on the lattice. Arrays are parallel; `normal` and `radius` may be empty until they are estimated.
 struct Points {
     std::vector<uint32_t> x, y, z;
+    std::vector<uint64_t> high;    ///< see Place; empty where 32 bits hold all coordinates
     std::vector<uint32_t> colour;  ///< r g b 8 | flags 8
     std::vector<uint32_t> normal;  ///< octahedral; meaning given by the flags
     std::vector<float> radius;     ///< lattice units; 0: to be estimated
     std::vector<std::vector<uint8_t>> attributes;
     size_t size() const { return x.size(); }
-    glm::dvec3 at(size_t i) const { return {x[i], y[i], z[i]}; }
-    Coordinates coordinates() const { return {x, y, z}; }
+    Place place(size_t i) const { return placeOf(x[i], y[i], z[i], high.empty() ? 0 : high[i]); }
+    glm::dvec3 at(size_t i) const {
+        if (high.empty()) return {x[i], y[i], z[i]};
+        const Place p = place(i);
+        return {p[0], p[1], p[2]};
+    }
+    Coordinates coordinates() const { return {x, y, z, high}; }
 };
 
 /// In Morton order; points with one key in the order of all they hold, so that any order of the input gives the same.
 struct SortedPoints {
     Points points;
-    std::vector<uint64_t> key;
+    std::vector<Key> key;
 };
 
 }  // namespace stipple::lod

@@ -205,7 +205,7 @@ uint32_t radiusCodeUp(double radius, double edge) {
 }
 double radiusOf(uint32_t code, double edge) { return kRadii.of.at(code) * edge; }
 
-Rising risingLeaf(const Points& points, size_t i, uint64_t key) {
+Rising risingLeaf(const Points& points, size_t i, Key key) {
     Rising r;
     r.first = static_cast<uint32_t>(i);
     r.key = key;
@@ -230,11 +230,11 @@ Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const 
     if (hasNormal(out)) out.normal = shared::octDecode(normalCode);
     // Position: to the nearest step, inside the cluster's own cell.
     std::array<uint32_t, 3> q{};
-    const uint64_t cell = out.key >> grid.clusterShift;
-    const std::array<uint32_t, 3> index{compactBits(cell), compactBits(cell >> 1), compactBits(cell >> 2)};
+    const Key cell = out.key >> grid.clusterShift;
+    const std::array<uint64_t, 3> index{compactBits(cell), compactBits(cell >> 1), compactBits(cell >> 2)};
     for (int a = 0; a < 3; ++a) {
         const auto at = static_cast<size_t>(a);
-        const uint32_t first = (index[at] & (grid.cellsAcross - 1)) * grid.cellSteps;
+        const uint32_t first = static_cast<uint32_t>(index[at] & (grid.cellsAcross - 1)) * grid.cellSteps;
         const double wanted = std::floor((out.mean[a] - grid.base[a]) / grid.step + 0.5);
         q[at] = static_cast<uint32_t>(std::clamp(wanted, double(first), double(first + grid.cellSteps - 1)));
         out.place[a] = grid.base[a] + grid.step * q[at];

@@ -21,7 +21,7 @@ uint32_t radiusCodeUp(double radius, double edge);
 double radiusOf(uint32_t code, double edge);
 
 /// Point i as a record that stands for itself.
-Rising risingLeaf(const Points& points, size_t i, uint64_t key);
+Rising risingLeaf(const Points& points, size_t i, Key key);
 /// Records in one cell whose normals lie in two cones, apart by more than 35 degrees: `side` says which one each
 /// belongs to. False if there is one cone, or a record without a normal.
 bool splitByNormals(std::span<const Rising> parts, std::vector<uint8_t>& side);

@@ -8,43 +8,58 @@
 namespace stipple::lod {
 namespace {
 
-struct KeyIndex {
-    uint64_t key;
+template <typename K>
+struct Keyed {
+    K key;
     uint32_t index;
 };
 
+unsigned bitWidth(Key k) {
+    const auto high = static_cast<uint64_t>(k >> 64);
+    return static_cast<unsigned>(high != 0 ? 64 + std::bit_width(high) : std::bit_width(static_cast<uint64_t>(k)));
+}
+
 /// Stable, least significant digit first, over the bits in which the keys differ.
-void radixSort(std::vector<KeyIndex>& items) {
+template <typename K>
+void radixSort(std::vector<Keyed<K>>& items) {
     constexpr unsigned kDigitBits = 11, kDigits = 1u << kDigitBits;
-    uint64_t any = 0, all = ~uint64_t{0};
-    for (const KeyIndex& k : items) {
+    K any = 0, all = ~K{0};
+    for (const Keyed<K>& k : items) {
         any |= k.key;
         all &= k.key;
     }
-    const auto bits = static_cast<unsigned>(std::bit_width(any ^ all));
+    const unsigned bits = bitWidth(any ^ all);
     if (items.empty() || bits == 0) return;
-    std::vector<KeyIndex> other(items.size());
+    std::vector<Keyed<K>> other(items.size());
     std::vector<uint32_t> counts(kDigits);
     for (unsigned shift = 0; shift < bits; shift += kDigitBits) {
         std::fill(counts.begin(), counts.end(), 0);
-        for (const KeyIndex& k : items) ++counts[k.key >> shift & (kDigits - 1)];
+        for (const Keyed<K>& k : items) ++counts[static_cast<size_t>(k.key >> shift & (kDigits - 1))];
         uint32_t sum = 0;
         for (uint32_t& c : counts) sum += std::exchange(c, sum);
-        for (const KeyIndex& k : items) other[counts[k.key >> shift & (kDigits - 1)]++] = k;
+        for (const Keyed<K>& k : items) other[counts[static_cast<size_t>(k.key >> shift & (kDigits - 1))]++] = k;
         items.swap(other);
     }
 }
 
-template <typename T>
-void permute(std::vector<T>& values, const std::vector<KeyIndex>& order) {
+template <typename K, typename PlaceOf>
+std::vector<Keyed<K>> inOrder(const Frame& frame, size_t count, const PlaceOf& placeOf) {
+    std::vector<Keyed<K>> order(count);
+    for (size_t i = 0; i < count; ++i) order[i] = {static_cast<K>(frame.keyOf(placeOf(i))), static_cast<uint32_t>(i)};
+    radixSort(order);
+    return order;
+}
+
+template <typename T, typename K>
+void permute(std::vector<T>& values, const std::vector<Keyed<K>>& order) {
     std::vector<T> sorted(order.size());
     for (size_t i = 0; i < order.size(); ++i) sorted[i] = values[order[i].index];
     values.swap(sorted);
 }
 
 /// Runs of one key: by place, then by all that the records hold. Calls keep(place's begin, end) for each place.
-template <typename PlaceOf, typename IsLess, typename Keep>
-void sortTies(std::vector<KeyIndex>& order, const PlaceOf& placeOf, const IsLess& isLess, const Keep& keep) {
+template <typename K, typename PlaceOf, typename IsLess, typename Keep>
+void sortTies(std::vector<Keyed<K>>& order, const PlaceOf& placeOf, const IsLess& isLess, const Keep& keep) {
     for (size_t begin = 0; begin < order.size();) {
         size_t end = begin + 1;
         while (end < order.size() && order[end].key == order[begin].key) ++end;
@@ -65,20 +80,19 @@ void sortTies(std::vector<KeyIndex>& order, const PlaceOf& placeOf, const IsLess
 
 namespace {
 
-SortResult sortBytes(const Frame& frame, const RecordLayout& layout, const std::vector<uint8_t>& bytes,
-                     bool mergeDuplicates) {
+template <typename K>
+SortResult sortBytesBy(const Frame& frame, const RecordLayout& layout, const std::vector<uint8_t>& bytes,
+                       bool mergeDuplicates) {
     SortResult result;
     Points& p = result.sorted.points;
     const size_t stride = layout.bytes(), count = bytes.size() / stride;
     layout.read(bytes.data(), count, p);
-    std::vector<KeyIndex> order(count);
-    for (size_t i = 0; i < count; ++i) order[i] = {frame.keyOf(p.x[i], p.y[i], p.z[i]), static_cast<uint32_t>(i)};
-    radixSort(order);
+    std::vector<Keyed<K>> order = inOrder<K>(frame, count, [&](size_t i) { return p.place(i); });
     const size_t most = mergeDuplicates ? 1 : kMostAtOnePlace;
-    std::vector<KeyIndex> kept;
+    std::vector<Keyed<K>> kept;
     kept.reserve(count);
-    const auto placeOf = [&](uint32_t i) { return std::array<uint32_t, 3>{p.x[i], p.y[i], p.z[i]}; };
-    const auto isLess = [&](const KeyIndex& a, const KeyIndex& b) {
+    const auto placeOf = [&](uint32_t i) { return p.place(i); };
+    const auto isLess = [&](const Keyed<K>& a, const Keyed<K>& b) {
         return std::memcmp(bytes.data() + a.index * stride, bytes.data() + b.index * stride, stride) < 0;
     };
     sortTies(order, placeOf, isLess, [&](size_t begin, size_t end) {
@@ -90,6 +104,7 @@ SortResult sortBytes(const Frame& frame, const RecordLayout& layout, const std::
     permute(p.x, kept);
     permute(p.y, kept);
     permute(p.z, kept);
+    if (!p.high.empty()) permute(p.high, kept);
     permute(p.colour, kept);
     permute(p.normal, kept);
     permute(p.radius, kept);
@@ -103,6 +118,13 @@ SortResult sortBytes(const Frame& frame, const RecordLayout& layout, const std::
     result.sorted.key.resize(kept.size());
     for (size_t i = 0; i < kept.size(); ++i) result.sorted.key[i] = kept[i].key;
     return result;
+}
+
+/// Keys of 64 bits do for all but the widest scenes, and move half the bytes.
+SortResult sortBytes(const Frame& frame, const RecordLayout& layout, const std::vector<uint8_t>& bytes,
+                     bool mergeDuplicates) {
+    return frame.keyLevels > kShortBits ? sortBytesBy<Key>(frame, layout, bytes, mergeDuplicates)
+                                        : sortBytesBy<uint64_t>(frame, layout, bytes, mergeDuplicates);
 }
 
 }  // namespace
@@ -136,31 +158,42 @@ Result<SortResult> sortBucket(const Frame& frame, const RecordLayout& layout, Sp
     return result;
 }
 
-Places sortGhosts(const Frame& frame, const std::vector<uint8_t>& bytes, bool mergeDuplicates) {
-    const size_t count = bytes.size() / RecordLayout::kGhostBytes;
-    std::vector<std::array<uint32_t, 3>> from(count);
-    if (count > 0) std::memcpy(from.data(), bytes.data(), count * RecordLayout::kGhostBytes);
-    std::vector<KeyIndex> order(count);
-    for (size_t i = 0; i < count; ++i)
-        order[i] = {frame.keyOf(from[i][0], from[i][1], from[i][2]), static_cast<uint32_t>(i)};
-    radixSort(order);
+namespace {
+
+template <typename K>
+Places sortGhostsBy(const Frame& frame, const RecordLayout& layout, const std::vector<uint8_t>& bytes,
+                    bool mergeDuplicates) {
+    const size_t count = bytes.size() / layout.ghostBytes();
+    Points from;
+    layout.readGhosts(bytes.data(), count, from);
+    std::vector<Keyed<K>> order = inOrder<K>(frame, count, [&](size_t i) { return from.place(i); });
     const size_t most = mergeDuplicates ? 1 : kMostAtOnePlace;
     Places out;
+    const auto bytesOf = [&](const Keyed<K>& k) { return bytes.data() + k.index * layout.ghostBytes(); };
     sortTies(
-        order, [&](uint32_t i) { return from[i]; },
-        [&](const KeyIndex& a, const KeyIndex& b) {
-            return std::memcmp(&from[a.index], &from[b.index], RecordLayout::kGhostBytes) < 0;
+        order, [&](uint32_t i) { return from.place(i); },
+        [&](const Keyed<K>& a, const Keyed<K>& b) {
+            return std::memcmp(bytesOf(a), bytesOf(b), layout.ghostBytes()) < 0;
         },
         [&](size_t begin, size_t end) {
             for (size_t i = begin; i < std::min(end, begin + most); ++i) {
-                const auto& [x, y, z] = from[order[i].index];
+                const uint32_t at = order[i].index;
                 out.key.push_back(order[i].key);
-                out.x.push_back(x);
-                out.y.push_back(y);
-                out.z.push_back(z);
+                out.x.push_back(from.x[at]);
+                out.y.push_back(from.y[at]);
+                out.z.push_back(from.z[at]);
+                if (!from.high.empty()) out.high.push_back(from.high[at]);
             }
         });
     return out;
+}
+
+}  // namespace
+
+Places sortGhosts(const Frame& frame, const RecordLayout& layout, const std::vector<uint8_t>& bytes,
+                  bool mergeDuplicates) {
+    return frame.keyLevels > kShortBits ? sortGhostsBy<Key>(frame, layout, bytes, mergeDuplicates)
+                                        : sortGhostsBy<uint64_t>(frame, layout, bytes, mergeDuplicates);
 }
 
 }  // namespace stipple::lod

@@ -20,10 +20,12 @@ Result<SortResult> sortBucket(const Frame& frame, const RecordLayout& layout, Sp
 
 /// Places of points that others may look at.
 struct Places {
-    std::vector<uint64_t> key;
+    std::vector<Key> key;
     std::vector<uint32_t> x, y, z;
+    std::vector<uint64_t> high;  ///< see Place
 };
 /// Thinned like the buckets that they come from.
-Places sortGhosts(const Frame& frame, const std::vector<uint8_t>& bytes, bool mergeDuplicates);
+Places sortGhosts(const Frame& frame, const RecordLayout& layout, const std::vector<uint8_t>& bytes,
+                  bool mergeDuplicates);
 
 }  // namespace stipple::lod

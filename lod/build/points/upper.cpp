@@ -8,7 +8,7 @@ namespace stipple::lod {
 
 void UpperTree::closeLast(NodeBatch& batch) {
     const uint32_t level = open_.back().node.level, shift = frame_.shiftOf(level - 1);
-    const uint64_t parent = open_.back().key >> shift;
+    const Key parent = open_.back().key >> shift;
     size_t first = open_.size();
     while (first > 0 && open_[first - 1].key >> shift == parent) --first;
     const std::span<PendingNode> children = std::span(open_).subspan(first);
@@ -19,7 +19,7 @@ void UpperTree::closeLast(NodeBatch& batch) {
     open_.push_back(std::move(node));
 }
 
-void UpperTree::closeBefore(uint64_t key, NodeBatch& batch) {
+void UpperTree::closeBefore(Key key, NodeBatch& batch) {
     while (!open_.empty() && open_.back().node.level > 0) {
         const uint32_t shift = frame_.shiftOf(open_.back().node.level - 1u);
         if (open_.back().key >> shift == key >> shift) return;
@@ -49,6 +49,7 @@ void visit(Archive& archive, Pending& p) {
     with(p.records);
     with(p.values);
     for (auto* column : {&p.leaf.x, &p.leaf.y, &p.leaf.z, &p.leaf.colour, &p.leaf.normal}) with(*column);
+    with(p.leaf.high);
     with(p.leaf.radius);
     with(p.leaf.attributes);
     with(p.leafKey);

@@ -19,7 +19,7 @@ class UpperTree {
   public:
     explicit UpperTree(const Frame& frame) : frame_(frame) {}
     /// Nodes that end before `key` are made and their children's chunks appended to `batch`.
-    void closeBefore(uint64_t key, NodeBatch& batch);
+    void closeBefore(Key key, NodeBatch& batch);
     void add(PendingNode atom) { open_.push_back(std::move(atom)); }
     /// The root, once all atoms are there.
     void finish(NodeBatch& batch);

@@ -18,8 +18,9 @@
 namespace stipple::lod {
 namespace {
 
-constexpr uint32_t kRootLog2 = 24;
-constexpr uint32_t kDeepest = 20;
+constexpr uint32_t kRootLog2 = 24, kMostRootLog2 = 32 - TravellingPoint::kStepBits;
+constexpr uint32_t kDeepest = 20;                    ///< of 24
+constexpr double kMorePieces = 1 << 18;              ///< that segments may be divided into where cells are too large
 constexpr uint64_t kCellBytes = uint64_t{64} << 20;  ///< that one cell of the work needs at most
 constexpr uint64_t kRunSegments = 64;                ///< of one atom that are kept until they are sent
 
@@ -53,6 +54,7 @@ class StrandBuild : public CellContent {
         // Segments longer than a cell are divided. The shortest cell for which that does not more than double their
         // number: lengths are counted once, for all sizes of cells.
         std::map<int, uint64_t> octaves;  // of lengths, rounded up to 1/64 octave: few enough to keep
+        std::map<int, uint64_t> details;  // likewise of what is visible of a segment, rounded down
         std::set<std::string> notes;
         std::map<std::string, uint64_t> mended;
         uint64_t given = 0;
@@ -72,6 +74,8 @@ class StrandBuild : public CellContent {
                     ++facts_.segments;
                     const double length = glm::length(block.position[i] - block.position[i - 1]);
                     ++octaves[toWhole<int>(std::ceil(std::log2(std::max(length, 1e-300)) * 64))];
+                    const double detail = detailOf(double{block.radius[i]}, length);
+                    ++details[toWhole<int>(std::floor(std::log2(std::max(detail, 1e-300)) * 64))];
                 }
             progress.update("survey", std::min(facts_.segments, source_.vertices), source_.vertices);
             return workspace.checkStopped();
@@ -83,7 +87,17 @@ class StrandBuild : public CellContent {
         const glm::dvec3 size = facts_.hi - facts_.lo;
         const double extent = std::max({size.x, size.y, size.z, 1e-30});
         facts_.unit = std::exp2(std::floor(std::log2(extent)) + 1 - kRootLog2);
-        facts_.keyLevels = kDeepest;
+        facts_.rootLog2 = kRootLog2;
+        // The finest, but for one segment in a hundred, is told apart however far strands lie from each other.
+        uint64_t below = 0;
+        double detail = 0;
+        for (const auto& [octave, count] : details) {
+            detail = std::exp2(octave / 64.0);
+            if ((below += count) * 100 >= facts_.segments) break;
+        }
+        for (; facts_.rootLog2 < kMostRootLog2 && 4 * facts_.unit > detail; ++facts_.rootLog2) facts_.unit *= 0.5;
+        const uint32_t deepest = facts_.rootLog2 - (kRootLog2 - kDeepest);
+        facts_.keyLevels = deepest;
         const auto piecesFor = [&](double longest) {
             double pieces = 0;
             for (const auto& [octave, count] : octaves)
@@ -91,9 +105,13 @@ class StrandBuild : public CellContent {
                           std::max(1.0, std::ceil(std::exp2(octave / 64.0) / facts_.unit / longest));
             return pieces;
         };
-        while (facts_.keyLevels > 0 &&
-               piecesFor(std::exp2(double{kRootLog2} - facts_.keyLevels)) > 2.0 * static_cast<double>(facts_.segments))
-            --facts_.keyLevels;
+        const auto cellOf = [&](uint32_t level) { return std::exp2(double(facts_.rootLog2) - level); };
+        const double most = 2.0 * static_cast<double>(facts_.segments);
+        while (facts_.keyLevels > 0 && piecesFor(cellOf(facts_.keyLevels)) > most) --facts_.keyLevels;
+        // (A few long ones among many short ones.)
+        while (facts_.keyLevels < deepest && isCoarseStep(strandStep(cellOf(facts_.keyLevels)), detail / facts_.unit) &&
+               piecesFor(cellOf(facts_.keyLevels + 1)) <= most + kMorePieces)
+            ++facts_.keyLevels;
         return {};
     }
 
@@ -101,9 +119,9 @@ class StrandBuild : public CellContent {
         Frame f;
         f.origin = facts_.lo;
         f.unit = facts_.unit;
-        f.rootLog2 = kRootLog2;
+        f.rootLog2 = facts_.rootLog2;
         f.keyLevels = facts_.keyLevels;
-        f.errors = errorsOf(kRootLog2);
+        f.errors = errorsOf(facts_.rootLog2);
         return f;
     }
 
@@ -292,7 +310,7 @@ class StrandBuild : public CellContent {
         glm::dvec3 lo{1e300}, hi{-1e300}, up{0, 0, 1};
         double unit = 1;
         uint64_t given = 0, segments = 0, parts = 0;  ///< of the input, of clean strands, and divided
-        uint32_t keyLevels = 0;
+        uint32_t rootLog2 = kRootLog2, keyLevels = 0;
         bool hasColour = false;
     };
     glm::dvec3 onLattice(const glm::dvec3& p) const { return (p - facts_.lo) / facts_.unit; }
@@ -322,7 +340,7 @@ class StrandBuild : public CellContent {
         for (uint32_t i = set.first[s]; i < set.first[s + 1]; ++i) out.emplace_back(pointOf(set, s, i));
         return out;
     }
-    double longest() const { return std::exp2(double{kRootLog2} - facts_.keyLevels); }
+    double longest() const { return std::exp2(double(facts_.rootLog2) - facts_.keyLevels); }
 
     const StrandSource& source_;
     const StrandBuildSettings& settings_;

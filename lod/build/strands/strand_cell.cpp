@@ -18,7 +18,7 @@ constexpr size_t kMostFactor = 4;          ///< parts of a node before lots are 
 
 struct StrandNode {
     Node node;
-    uint64_t key = 0;
+    Key key = 0;
     double kept = 1;  ///< share of the strands that the node draws, by area
     std::vector<StrandPart> parts;
 };
@@ -35,17 +35,17 @@ class StrandCell {
         ByteReader from(bytes);
         while (!from.isWhole())
             if (!in.get(from)) return damaged();
-        struct Place {
+        struct Run {
             StrandRun run;
             size_t at;
         };
-        std::vector<Place> order;
+        std::vector<Run> order;
         size_t at = 0;
         for (const StrandRun& run : in.runs) {
             order.push_back({run, at});
             at += run.points;
         }
-        std::sort(order.begin(), order.end(), [](const Place& a, const Place& b) {
+        std::sort(order.begin(), order.end(), [](const Run& a, const Run& b) {
             return std::tie(a.run.strand, a.run.firstNumber) < std::tie(b.run.strand, b.run.firstNumber);
         });
         for (const auto& [run, begin] : order) takeRun(run, &in.points[begin]);
@@ -122,7 +122,7 @@ class StrandCell {
             divide(points[i - 1], points[i], longest, ends_);
             TravellingPoint before = points[i - 1];
             for (const TravellingPoint& end : ends_) {
-                const uint64_t key =
+                const Key key =
                     frame_.keyOf(TravellingPoint::middle(before.x, end.x), TravellingPoint::middle(before.y, end.y),
                                  TravellingPoint::middle(before.z, end.z));
                 if (key >> shift == own.key >> shift) {
@@ -153,21 +153,35 @@ class StrandCell {
         return static_cast<uint32_t>(points_.size() - 1);
     }
 
-    StrandNode nodeAt(uint32_t level, uint64_t key) const {
+    StrandNode nodeAt(uint32_t level, Key key) const {
         StrandNode n;
         n.key = key;
         n.node.level = static_cast<uint8_t>(level);
-        const uint64_t cell = key >> frame_.shiftOf(level);
+        const Key cell = key >> frame_.shiftOf(level);
         n.node.cell = {compactBits(cell), compactBits(cell >> 1), compactBits(cell >> 2)};
         n.node.stepShift = static_cast<int8_t>(static_cast<int>(frame_.rootLog2) - static_cast<int>(level) - 15);
         return n;
+    }
+
+    /// Are the ends of many of its segments drawn to steps that can be seen?
+    bool isCoarse(const StrandNode& node) const {
+        constexpr size_t kShare = 16;
+        const double step = strandStep(frame_.cellSize(node.node.level));
+        if (step <= TravellingPoint::rounding()) return false;
+        size_t coarse = 0;
+        for (const StrandPart& p : node.parts) {
+            const double length = glm::length(points_[p.b].p - points_[p.a].p);
+            coarse += isCoarseStep(step, detailOf(double{std::max(p.radiusA, p.radiusB)}, length)) ? 1 : 0;
+        }
+        return coarse * kShare > node.parts.size();
     }
 
     /// An octree of the segments' middles, breadth first.
     void partition() {
         for (size_t i = 0; i < nodes_.size(); ++i) {
             const uint32_t level = nodes_[i].node.level;
-            if (nodes_[i].parts.size() <= leafSegments_ || level >= frame_.keyLevels) continue;
+            if (level >= frame_.keyLevels || (nodes_[i].parts.size() <= leafSegments_ && !isCoarse(nodes_[i])))
+                continue;
             const uint32_t bit = frame_.rootLog2 - level - 1;
             std::array<std::vector<StrandPart>, 8> parts;
             for (const StrandPart& p : nodes_[i].parts) {
@@ -181,7 +195,7 @@ class StrandCell {
             for (uint64_t octant = 0; octant < 8; ++octant) {
                 if (parts.at(octant).empty()) continue;
                 nodes_[i].node.childMask |= static_cast<uint8_t>(1u << octant);
-                StrandNode child = nodeAt(level + 1, nodes_[i].key | octant << frame_.shiftOf(level + 1));
+                StrandNode child = nodeAt(level + 1, nodes_[i].key | Key{octant} << frame_.shiftOf(level + 1));
                 child.parts = std::move(parts.at(octant));
                 nodes_.push_back(std::move(child));
             }
@@ -207,7 +221,7 @@ class StrandCell {
             }
     }
 
-    uint64_t keyAbove() const {
+    Key keyAbove() const {
         const uint32_t level = nodes_[0].node.level;
         const uint32_t shift = frame_.shiftOf(level - 1);
         return nodes_[0].key >> shift << shift;

@@ -13,6 +13,12 @@ namespace stipple::lod {
 Result<CellProduct> buildStrandCell(const WorkCell& cell, const std::vector<uint8_t>& input,
                                     const std::vector<FromBelow>& below, const Frame& frame, uint32_t leafSegments);
 
+/// Distance between places that a node with cells of this edge tells apart.
+inline double strandStep(double cell) { return cell / 32768; }
+/// What can be seen of a segment: its radius; of a very thin one how it lies.
+inline double detailOf(double radius, double length) { return std::max(radius, length / 64); }
+inline bool isCoarseStep(double step, double detail) { return 8 * step > detail; }
+
 /// What a product's table holds.
 struct StrandTable {
     NodeBatch batch;
