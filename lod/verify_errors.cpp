@@ -49,20 +49,104 @@ std::vector<Disc> discsOf(const Hierarchy& h, const Node& node, const Chunk& chu
     return discs;
 }
 
-/// Largest distance of a place of `leaf` from the disc `record`: heights over its plane are exact, sideways at most.
+/// Largest distance of a place of `leaf` from the disc `record`, at most.
 double distanceOf(const Disc& record, const Disc& leaf) {
     const glm::dvec3 d = leaf.place - record.place;
     if (!record.hasNormal) return std::max(0.0, glm::length(d) + leaf.radius - record.radius);
     const double along = leaf.hasNormal ? std::abs(glm::dot(record.normal, leaf.normal)) : 0.0;
     const double height = glm::dot(d, record.normal);
     const double rise = leaf.radius * std::sqrt(std::max(0.0, 1 - along * along));
-    const double sideways = std::max(0.0, glm::length(d - height * record.normal) - record.radius);
+    const double sideways = std::max(0.0, glm::length(d - height * record.normal) + leaf.radius - record.radius);
     return std::hypot(std::abs(height) + rise, sideways);
+}
+
+/// Distance of a place from a leaf's disc. One without a normal turns with the view: only its centre is there in all of
+/// them, unless the record turns as well.
+double distanceOf(const glm::dvec3& place, const Disc& leaf, bool isBall) {
+    const glm::dvec3 d = place - leaf.place;
+    if (!leaf.hasNormal) return std::max(0.0, glm::length(d) - (isBall ? leaf.radius : 0.0));
+    const double height = glm::dot(d, leaf.normal);
+    return std::hypot(height, std::max(0.0, glm::length(d - height * leaf.normal) - leaf.radius));
+}
+
+/// Leaves of a node by the clusters' cells that they lie in.
+class LeafGrid {
+  public:
+    LeafGrid(std::vector<Disc> leaves, const Node& node, uint32_t across)
+        : leaves_(std::move(leaves)), across_(across), start_(size_t{across} * across * across + 1, 0) {
+        for (size_t a = 0; a < 3; ++a) first_.at(a) = uint64_t{node.cell.at(a)} * across;
+        for (const Disc& leaf : leaves_) ++start_[numberOf(leaf)];
+        for (uint32_t sum = 0; uint32_t & s : start_) s = sum += s;
+        order_.resize(leaves_.size());
+        for (uint32_t i = 0; i < leaves_.size(); ++i) order_[--start_[numberOf(leaves_[i])]] = i;
+    }
+    /// Of `place`, which belongs to a record in `cell`, from the nearest leaf; where one is as near as `enough`, of
+    /// any such.
+    double distance(const glm::dvec3& place, const std::array<uint64_t, 3>& cell, bool isBall, double enough) const {
+        double least = 1e300;
+        const auto isEnough = [&](const Disc& leaf) {
+            least = std::min(least, distanceOf(place, leaf, isBall));
+            return least <= enough;
+        };
+        for (const int reach : {0, 1})
+            for (int k = 0; k < 27; ++k) {
+                const std::array<int, 3> to{k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1};
+                if ((k == 13) != (reach == 0)) continue;
+                size_t number = 0;
+                bool isInside = true;
+                for (size_t a = 3; a-- > 0;) {
+                    const uint64_t at = cell.at(a) - first_.at(a) + static_cast<uint64_t>(to.at(a));
+                    isInside = isInside && at < across_;
+                    number = number * across_ + at;
+                }
+                if (!isInside) continue;
+                for (uint32_t i = start_[number]; i < start_[number + 1]; ++i)
+                    if (isEnough(leaves_[order_[i]])) return least;
+            }
+        for (const Disc& leaf : leaves_)
+            if (isEnough(leaf)) return least;
+        return least;
+    }
+
+  private:
+    size_t numberOf(const Disc& leaf) const {
+        size_t number = 0;
+        for (size_t a = 3; a-- > 0;)
+            number = number * across_ + std::min<uint64_t>(leaf.cell.at(a) - first_.at(a), across_ - 1);
+        return number;
+    }
+    std::vector<Disc> leaves_;
+    uint64_t across_;
+    std::array<uint64_t, 3> first_{};
+    std::vector<uint32_t> start_, order_;
+};
+
+/// Largest distance of some places of a record's disc (or ball) from the leaves, if it exceeds `enough`; else less.
+double farthestPlace(const Disc& record, const LeafGrid& leaves, double enough) {
+    constexpr int kRings = 2, kAngles = 16;
+    double worst = 0;
+    const auto look = [&](const glm::dvec3& off) {
+        if (worst <= enough)
+            worst = std::max(
+                worst, leaves.distance(record.place + record.radius * off, record.cell, !record.hasNormal, enough));
+    };
+    look(glm::dvec3(0));
+    const glm::dvec3 n = record.hasNormal ? record.normal : glm::dvec3(0, 0, 1);
+    const glm::dvec3 t = glm::normalize(std::abs(n.x) < 0.7 ? glm::dvec3(0, -n.z, n.y) : glm::dvec3(-n.z, 0, n.x)),
+                     b = glm::cross(n, t);
+    for (int ring = 1; ring <= kRings; ++ring)
+        for (int k = 0; k < kAngles; ++k) {
+            const double angle = 6.283185307179586 * k / kAngles, share = static_cast<double>(ring) / kRings;
+            const glm::dvec3 inPlane = std::cos(angle) * t + std::sin(angle) * b;
+            look(share * inPlane);
+            if (!record.hasNormal) look(share * (std::cos(angle) * t + std::sin(angle) * n));
+        }
+    return worst;
 }
 
 }  // namespace
 
-Result<uint64_t> measureErrors(const Store& store, uint32_t index, const Chunk& chunk) {
+Result<uint64_t> measureErrors(const Store& store, uint32_t index, const Chunk& chunk, uint64_t most) {
     const Hierarchy& h = store.hierarchy;
     const Node& node = h.nodes[index];
     const auto children = static_cast<uint32_t>(__builtin_popcount(node.childMask));
@@ -72,27 +156,44 @@ Result<uint64_t> measureErrors(const Store& store, uint32_t index, const Chunk& 
     std::vector<Disc> records = discsOf(h, node, chunk, clusterSize);
     const auto isLess = [](const Disc& a, const Disc& b) { return a.cell < b.cell; };
     std::sort(records.begin(), records.end(), isLess);
+    const auto wrong = [&](std::string what) {
+        return fail(ErrorKind::input, std::move(what), fmt::format("{}: node {}", store.path, index),
+                    "this is a fault of the build; build the scene again, and please report it with the input if that "
+                    "does not help");
+    };
+    // Discs are rounded to fp32 in between.
+    const double rounding = 1e-6 * h.cellSize(node);
+    std::vector<Disc> leaves;
     for (uint32_t c = node.firstChild; c < node.firstChild + children; ++c) {
-        STIPPLE_ASSIGN(const Chunk leaves, readChunk(store, c, true));
-        for (const Disc& leaf : discsOf(h, h.nodes[c], leaves, clusterSize)) {
-            // A cell may have several records, for several cones of normals: one of them stands for the leaf.
-            auto at = std::lower_bound(records.begin(), records.end(), leaf, isLess);
-            double off = 1e300, error = 0;
-            for (; at != records.end() && at->cell == leaf.cell; ++at) {
-                const double distance = distanceOf(*at, leaf), bound = h.errors.decode(at->code);
-                if (distance - bound >= off - error) continue;
-                off = distance;
-                error = bound;
-            }
-            // Discs are rounded to fp32 in between.
-            if (off <= error * (1 + 1e-5) + 1e-6 * h.cellSize(node)) continue;
-            return fail(ErrorKind::input,
-                        off < 1e300 ? fmt::format("a record is {:.6g} lattice units off a leaf, its error says {:.6g}",
-                                                  off, error)
-                                    : "a leaf has no record above it",
-                        fmt::format("{}: node {}", store.path, index),
-                        "this is a fault of the build; please report it with the input");
+        STIPPLE_ASSIGN(const Chunk below, readChunk(store, c, true));
+        const std::vector<Disc> more = discsOf(h, h.nodes[c], below, clusterSize);
+        leaves.insert(leaves.end(), more.begin(), more.end());
+    }
+    for (const Disc& leaf : leaves) {
+        // A cell may have several records, for several cones of normals: one of them stands for the leaf.
+        auto at = std::lower_bound(records.begin(), records.end(), leaf, isLess);
+        double off = 1e300, error = 0;
+        for (; at != records.end() && at->cell == leaf.cell; ++at) {
+            const double distance = distanceOf(*at, leaf), bound = h.errors.decode(at->code);
+            if (distance - bound >= off - error) continue;
+            off = distance;
+            error = bound;
         }
+        if (off <= error * (1 + 1e-5) + rounding) continue;
+        return wrong(off < 1e300
+                         ? fmt::format("a record is {:.6g} lattice units off a leaf, its error says {:.6g}", off, error)
+                         : "a leaf has no record above it");
+    }
+    const LeafGrid grid(std::move(leaves), node, 1u << (level - node.level));
+    const size_t stride = records.size() / most + 1;
+    for (size_t i = 0; i < records.size(); i += stride) {
+        const double error = h.errors.decode(records[i].code), enough = error * (1 + 1e-5) + rounding;
+        const double off = farthestPlace(records[i], grid, enough);
+        if (off > enough)
+            return wrong(
+                fmt::format("a place of a record's disc is {:.6g} lattice units off the nearest leaf, its error "
+                            "says {:.6g}",
+                            off, error));
     }
     return records.size();
 }

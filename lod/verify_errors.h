@@ -1,14 +1,18 @@
 // The errors of a store, measured again from what the file holds.
 #pragma once
 
+#include <limits>
+
 #include "lod/store.h"
 
 namespace stipple::lod {
 
-/// Measures records of an inner node, all whose children are leaves, against the leaf records in their cells: every
-/// place of a leaf's disc has to lie within the record's error of its disc. An error if one does not; else how many
-/// records were measured (0 for other nodes: below those the leaves are many).
-Result<uint64_t> measureErrors(const Store& store, uint32_t node, const Chunk& chunk);
+/// Measures records of an inner node, all whose children are leaves, against the leaf records below it, both ways:
+/// every place of a leaf's disc has to lie within the record's error of the disc above it, and every place of a
+/// record's disc (33 of each are looked at, of about `most` records) within its error of a leaf. An error if one does
+/// not; else how many records were measured (0 for other nodes: below those the leaves are many).
+Result<uint64_t> measureErrors(const Store& store, uint32_t node, const Chunk& chunk,
+                               uint64_t most = std::numeric_limits<uint64_t>::max());
 
 /// Measures the simplification of a group against its triangles, both ways, at a few dozen corners of each: none may be
 /// farther away than the group's error says. An error if one is; else how many triangles were compared (0 for a group
