@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <optional>
 
 #include "lod/triangle.h"
 
@@ -69,6 +71,18 @@ double distanceOf(const glm::dvec3& place, const Disc& leaf, bool isBall) {
     return std::hypot(height, std::max(0.0, glm::length(d - height * leaf.normal) - leaf.radius));
 }
 
+tl::unexpected<Error> wrong(const Store& store, uint32_t index, std::string what) {
+    return fail(ErrorKind::input, std::move(what), fmt::format("{}: node {}", store.path, index),
+                "this is a fault of the build; build the scene again, and please report it with the input if that does "
+                "not help");
+}
+tl::unexpected<Error> tooFar(const Store& store, uint32_t index, double off, double error) {
+    return wrong(store, index,
+                 fmt::format("a place of a record's disc is {:.6g} lattice units off the nearest leaf, its error says "
+                             "{:.6g}",
+                             off, error));
+}
+
 /// Leaves of a node by the clusters' cells that they lie in.
 class LeafGrid {
   public:
@@ -122,26 +136,96 @@ class LeafGrid {
 };
 
 /// Largest distance of some places of a record's disc (or ball) from the leaves, if it exceeds `enough`; else less.
-double farthestPlace(const Disc& record, const LeafGrid& leaves, double enough) {
-    constexpr int kRings = 2, kAngles = 16;
+/// `distanceOf(place)`: from the leaves.
+template <typename DistanceOf>
+double farthestPlace(const Disc& record, int rings, int angles, double enough, const DistanceOf& distanceOf) {
     double worst = 0;
     const auto look = [&](const glm::dvec3& off) {
-        if (worst <= enough)
-            worst = std::max(
-                worst, leaves.distance(record.place + record.radius * off, record.cell, !record.hasNormal, enough));
+        if (worst <= enough) worst = std::max(worst, distanceOf(record.place + record.radius * off));
     };
     look(glm::dvec3(0));
     const glm::dvec3 n = record.hasNormal ? record.normal : glm::dvec3(0, 0, 1);
     const glm::dvec3 t = glm::normalize(std::abs(n.x) < 0.7 ? glm::dvec3(0, -n.z, n.y) : glm::dvec3(-n.z, 0, n.x)),
                      b = glm::cross(n, t);
-    for (int ring = 1; ring <= kRings; ++ring)
-        for (int k = 0; k < kAngles; ++k) {
-            const double angle = 6.283185307179586 * k / kAngles, share = static_cast<double>(ring) / kRings;
-            const glm::dvec3 inPlane = std::cos(angle) * t + std::sin(angle) * b;
-            look(share * inPlane);
+    for (int ring = 1; ring <= rings; ++ring)
+        for (int k = 0; k < angles; ++k) {
+            const double angle = 6.283185307179586 * k / angles, share = static_cast<double>(ring) / rings;
+            look(share * (std::cos(angle) * t + std::sin(angle) * b));
             if (!record.hasNormal) look(share * (std::cos(angle) * t + std::sin(angle) * n));
         }
     return worst;
+}
+
+/// The leaves below a node, read as they are asked for.
+class LeavesBelow {
+  public:
+    LeavesBelow(const Store& store, uint32_t top) : store_(store), top_(top) {}
+    /// From the nearest leaf; where one is as near as `enough`, of any such.
+    Result<double> distance(const glm::dvec3& place, bool isBall, double enough) {
+        double least = 1e300;
+        STIPPLE_TRY(look(top_, place, isBall, enough, least));
+        return least;
+    }
+
+  private:
+    static constexpr size_t kMostKept = 32;
+    double outside(const Node& node, const glm::dvec3& place) const {
+        return glm::length(place - node.centre) - node.radius;
+    }
+    Result<void> look(uint32_t index, const glm::dvec3& place, bool isBall, double enough, double& least) {
+        const Hierarchy& h = store_.hierarchy;
+        const Node& node = h.nodes[index];
+        if (least <= enough || outside(node, place) > least) return {};
+        if (node.isLeaf()) {
+            auto kept = kept_.find(index);
+            if (kept == kept_.end()) {
+                if (kept_.size() >= kMostKept) kept_.clear();
+                STIPPLE_ASSIGN(const Chunk chunk, readChunk(store_, index, true));
+                kept = kept_.emplace(index, discsOf(h, node, chunk, 1)).first;
+            }
+            for (const Disc& leaf : kept->second) {
+                least = std::min(least, distanceOf(place, leaf, isBall));
+                if (least <= enough) break;
+            }
+            return {};
+        }
+        std::vector<std::pair<double, uint32_t>> order;
+        const auto children = static_cast<uint32_t>(__builtin_popcount(node.childMask));
+        for (uint32_t c = node.firstChild; c < node.firstChild + children; ++c)
+            order.emplace_back(glm::length(place - h.nodes[c].centre), c);
+        std::sort(order.begin(), order.end());
+        for (const auto& [distance, child] : order) STIPPLE_TRY(look(child, place, isBall, enough, least));
+        return {};
+    }
+    const Store& store_;
+    uint32_t top_;
+    std::map<uint32_t, std::vector<Disc>> kept_;
+};
+
+/// A few records of a node far above the leaves: those whose errors say least for their size.
+Result<uint64_t> measureFew(const Store& store, uint32_t index, const std::vector<Disc>& records) {
+    constexpr size_t kFew = 16;
+    const Hierarchy& h = store.hierarchy;
+    std::vector<std::pair<double, size_t>> order;
+    for (size_t i = 0; i < records.size(); ++i)
+        order.emplace_back(h.errors.decode(records[i].code) / records[i].radius, i);
+    const size_t count = std::min(kFew, order.size());
+    std::partial_sort(order.begin(), order.begin() + static_cast<ptrdiff_t>(count), order.end());
+    LeavesBelow leaves(store, index);
+    for (size_t k = 0; k < count; ++k) {
+        const Disc& record = records[order[k].second];
+        const double error = h.errors.decode(record.code),
+                     enough = error * (1 + 1e-5) + 1e-6 * h.cellSize(h.nodes[index]);
+        std::optional<Error> unreadable;
+        const double off = farthestPlace(record, 1, 8, enough, [&](const glm::dvec3& place) {
+            const auto distance = leaves.distance(place, !record.hasNormal, enough);
+            if (!distance) unreadable = distance.error();
+            return distance ? *distance : 0.0;
+        });
+        if (unreadable) return tl::unexpected(*unreadable);
+        if (off > enough) return tooFar(store, index, off, error);
+    }
+    return count;
 }
 
 }  // namespace
@@ -150,17 +234,14 @@ Result<uint64_t> measureErrors(const Store& store, uint32_t index, const Chunk& 
     const Hierarchy& h = store.hierarchy;
     const Node& node = h.nodes[index];
     const auto children = static_cast<uint32_t>(__builtin_popcount(node.childMask));
-    if (!isAboveLeaves(h, node)) return 0;
+    const bool isSample = most != std::numeric_limits<uint64_t>::max();
+    if (node.isLeaf() || (isSample && !isAboveLeaves(h, node))) return 0;
     const uint32_t deepest = std::min(h.rootLog2, 21u), level = std::min(node.level + kClusterLevels, deepest);
     const double clusterSize = std::exp2(static_cast<double>(h.rootLog2) - level);
     std::vector<Disc> records = discsOf(h, node, chunk, clusterSize);
+    if (!isAboveLeaves(h, node)) return measureFew(store, index, records);
     const auto isLess = [](const Disc& a, const Disc& b) { return a.cell < b.cell; };
     std::sort(records.begin(), records.end(), isLess);
-    const auto wrong = [&](std::string what) {
-        return fail(ErrorKind::input, std::move(what), fmt::format("{}: node {}", store.path, index),
-                    "this is a fault of the build; build the scene again, and please report it with the input if that "
-                    "does not help");
-    };
     // Discs are rounded to fp32 in between.
     const double rounding = 1e-6 * h.cellSize(node);
     std::vector<Disc> leaves;
@@ -180,7 +261,8 @@ Result<uint64_t> measureErrors(const Store& store, uint32_t index, const Chunk& 
             error = bound;
         }
         if (off <= error * (1 + 1e-5) + rounding) continue;
-        return wrong(off < 1e300
+        return wrong(store, index,
+                     off < 1e300
                          ? fmt::format("a record is {:.6g} lattice units off a leaf, its error says {:.6g}", off, error)
                          : "a leaf has no record above it");
     }
@@ -188,12 +270,10 @@ Result<uint64_t> measureErrors(const Store& store, uint32_t index, const Chunk& 
     const size_t stride = records.size() / most + 1;
     for (size_t i = 0; i < records.size(); i += stride) {
         const double error = h.errors.decode(records[i].code), enough = error * (1 + 1e-5) + rounding;
-        const double off = farthestPlace(records[i], grid, enough);
-        if (off > enough)
-            return wrong(
-                fmt::format("a place of a record's disc is {:.6g} lattice units off the nearest leaf, its error "
-                            "says {:.6g}",
-                            off, error));
+        const double off = farthestPlace(records[i], 2, 16, enough, [&](const glm::dvec3& place) {
+            return grid.distance(place, records[i].cell, !records[i].hasNormal, enough);
+        });
+        if (off > enough) return tooFar(store, index, off, error);
     }
     return records.size();
 }
