@@ -346,9 +346,7 @@ class Holding {
         for (size_t k = 0; k < count_; ++k) add(beside_.at(k), kMostBeside, error);
         fan.close(circles_, [&](float, float) { return std::pair(first, circles_.count); });
         if (fan.isHeld()) return error;
-        // Circles may hold only what others inside of them have brought within their reach.
-        for (size_t k = first; k < circles_.count; ++k) add(k, fan);
-        return fan.isHeld() ? error : (error + fan.missing(circles_)) * (1 + 1e-5f);
+        return (error + fan.missing(circles_)) * (1 + 1e-5f);
     }
     void add(size_t k, Fan& fan) const { fan.add(circles_.u[k], circles_.v[k], circles_.radius[k]); }
     void add(Around::Run run, size_t most, float error) {
