@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
 #include <mutex>
 
 #include "engine/base/process.h"
@@ -109,6 +110,8 @@ std::string checkGroup(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
 
 Result<VerifyReport> verifyStore(const Store& store, Executor& executor, uint64_t nodes) {
     const Hierarchy& h = store.hierarchy;
+    // Of a sample of nodes a sample of their discs is held against the leaves.
+    const uint64_t discs = nodes == 0 ? std::numeric_limits<uint64_t>::max() : 64;
     const size_t stride = nodes == 0 ? 1 : h.nodes.size() / nodes + 1;
     std::atomic<uint64_t> checked{0}, measured{0};
     CompletionQueue<std::pair<size_t, Error>> problems;
@@ -129,7 +132,7 @@ Result<VerifyReport> verifyStore(const Store& store, Executor& executor, uint64_
             if (!h.isProgressive) {
                 const auto worst = h.isStrands  ? measureStrands(store, index, *chunk)
                                    : h.isMesh() ? measureGroup(store, index, *chunk)
-                                                : measureErrors(store, index, *chunk);
+                                                : measureErrors(store, index, *chunk, discs);
                 if (!worst)
                     problems.push({i, worst.error()});
                 else

@@ -1,14 +1,19 @@
 // The errors of a store, measured again from what the file holds.
 #pragma once
 
+#include <limits>
+
 #include "lod/store.h"
 
 namespace stipple::lod {
 
-/// Measures records of an inner node, all whose children are leaves, against the leaf records in their cells: every
-/// place of a leaf's disc has to lie within the record's error of its disc. An error if one does not; else how many
-/// records were measured (0 for other nodes: below those the leaves are many).
-Result<uint64_t> measureErrors(const Store& store, uint32_t node, const Chunk& chunk);
+/// Measures records of an inner node, all whose children are leaves, against the leaf records below it, both ways:
+/// every place of a leaf's disc has to lie within the record's error of the disc above it, and every place of a
+/// record's disc (33 of each are looked at, of about `most` records) within its error of a leaf. Of other inner nodes,
+/// below which the leaves are many, 9 places of 16 records, those with the smallest errors for their size (none where
+/// `most` is given). An error if one does not; else how many records were measured.
+Result<uint64_t> measureErrors(const Store& store, uint32_t node, const Chunk& chunk,
+                               uint64_t most = std::numeric_limits<uint64_t>::max());
 
 /// Are the points of a leaf drawn where they are stored? Records are drawn to the steps of their node, and the low bits
 /// of places are not: an error if many of them lie as near to each other as such steps.

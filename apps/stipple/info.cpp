@@ -8,6 +8,7 @@
 #include "engine/base/process.h"
 #include "engine/base/units.h"
 #include "lod/file_kind.h"
+#include "lod/lots.h"
 #include "lod/nearest.h"
 
 namespace stipple::app {
@@ -39,7 +40,8 @@ nlohmann::json storeInfo(const lod::Store& store) {
     nlohmann::json levels = nlohmann::json::array();
     for (const lod::Node& n : h.nodes) {
         while (levels.size() <= n.level)
-            levels.push_back({{"nodes", 0}, {"records", 0}, {"bytes", 0}, {"largest_error", 0.0}});
+            levels.push_back(
+                {{"nodes", 0}, {"records", 0}, {"bytes", 0}, {"largest_error", 0.0}, {"kept_by_lot", 1.0}});
         nlohmann::json& l = levels[n.level];
         l["nodes"] = l["nodes"].get<uint64_t>() + 1;
         l["records"] = l["records"].get<uint64_t>() + n.records;
@@ -47,6 +49,7 @@ nlohmann::json storeInfo(const lod::Store& store) {
         // The coarsest groups of a mesh are never replaced: they have no error to speak of.
         const double error = n.errorCode == lod::ErrorScale::kNoParent ? 0 : h.unit * h.errors.decode(n.errorCode);
         l["largest_error"] = std::max(l["largest_error"].get<double>(), error);
+        if (h.isStrands) l["kept_by_lot"] = std::min(l["kept_by_lot"].get<double>(), lod::keptByLot(n));
     }
     nlohmann::json attributes = nlohmann::json::array();
     for (const lod::AttributeInfo& a : d.attributes)
@@ -137,6 +140,12 @@ void printStore(const nlohmann::json& j) {
                    level["records"].get<uint64_t>(), humanBytes(level["bytes"].get<uint64_t>()),
                    level["largest_error"].get<double>());
     }
+    if (j["primitive"] != "segments") return;
+    double kept = 1;
+    for (const auto& level : j["levels"]) kept = std::min(kept, level["kept_by_lot"].get<double>());
+    fmt::print(
+        "  by lot, beside the errors: pixels of strands narrower than a pixel{}\n",
+        kept < 1 ? fmt::format("; of thin strands at the coarsest level 1 in {:.0f}, as much wider", 1 / kept) : "");
 }
 
 Result<void> showNearest(const lod::Store& store, const Options& o) {

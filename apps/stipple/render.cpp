@@ -110,6 +110,18 @@ Result<void> checkModule(const Options& o) {
     return image::checkModule(isLong || !lod::isStoreFile(o.inputs.front()));
 }
 
+/// What goes beside the error because it is not in it; nothing where nothing is left to chance.
+std::string lotText(const render::LotShares& lots) {
+    std::vector<std::string> parts;
+    const auto addShare = [&](double share, const char* of) {
+        if (share > 0) parts.push_back(fmt::format("{:.3g} % of the strands' area ({})", 100 * share, of));
+    };
+    addShare(lots.narrowShare(), "narrower than a pixel");
+    addShare(lots.thinnedShare(), "wider for others left out");
+    if (lots.discs > 0) parts.push_back(fmt::format("{} discs of plants from afar", lots.discs));
+    return parts.empty() ? "" : fmt::format(" (beside it, by lot: {})", fmt::join(parts, ", "));
+}
+
 Result<void> run(const Options& o, Written& written) {
     catchStopSignals();
     STIPPLE_TRY(checkPictures(o));
@@ -182,7 +194,12 @@ Result<void> run(const Options& o, Written& written) {
             {"records_drawn", c.recordsDrawn},
             {"triangles_drawn", c.trianglesDrawn},
             {"nodes_drawn", c.nodesDrawn},
+            {"closes_gaps", o.mode != "points"},
             {"tau_eff_px", jsonNumber(verdict.tauEffectivePixels)},
+            {"by_lot",
+             {{"narrow_strands", verdict.lots.narrowShare()},
+              {"thinned_strands", verdict.lots.thinnedShare()},
+              {"discs", verdict.lots.discs}}},
             {"complete", verdict.isComplete()},
             {"incomplete_pictures", verdict.incomplete},
             {"worst_picture", verdict.worst},
@@ -199,9 +216,10 @@ Result<void> run(const Options& o, Written& written) {
                                       ? fmt::format("{} triangles", c.trianglesDrawn)
                                       : fmt::format("{} records, {} triangles", c.recordsDrawn, c.trianglesDrawn);
         const double error = verdict.tauEffectivePixels;
-        fmt::print("{}: {}, {}, {:.1f} ms a frame on {}\n", o.output, drawn,
-                   std::isfinite(error) ? fmt::format("{:.2f} px error", error) : "no stated error",
-                   quantile(timings.frames, 0.5), backend->device());
+        fmt::print("{}: {}, {}{}, {:.1f} ms a frame on {}\n", o.output, drawn,
+                   (std::isfinite(error) ? fmt::format("{:.2f} px error", error) : "no stated error") +
+                       (o.mode == "points" ? " of each, gaps between them stay open" : ""),
+                   lotText(verdict.lots), quantile(timings.frames, 0.5), backend->device());
     }
     return checkVerdict(plan, verdict);
 }
@@ -232,7 +250,8 @@ void setupRender(CLI::App& app, int& status) {
         ->transform(within(1, 1000000))
         ->excludes("--orbit")
         ->capture_default_str();
-    sub->add_option("--mode", o->mode, "pullpush, points, or reference (traced full detail)")
+    sub->add_option("--mode", o->mode,
+                    "pullpush, points (a pixel a record: surfaces stay open), or reference (traced full detail)")
         ->check(oneOf({"pullpush", "points", "reference"}))
         ->capture_default_str();
     sub->add_option("--error", o->error, "tolerated screen-space error, pixels")

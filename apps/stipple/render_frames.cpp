@@ -46,7 +46,7 @@ MissingChunks missingOf(const render::FrameState& state) {
 
 }  // namespace
 
-void Verdict::judge(const render::FrameState& state) {
+void Verdict::judge(const render::FrameState& state, const lod::View* view) {
     const size_t number = pictures++;
     const bool misses = !state.cut.wanted.empty(), worstMisses = incomplete > 0;
     incomplete += misses ? 1 : 0;
@@ -56,6 +56,9 @@ void Verdict::judge(const render::FrameState& state) {
     worst = number;
     tauEffectivePixels = error;
     missing = missingOf(state);
+    // A chunk that cannot be read any more is told of where it is missed.
+    if (view == nullptr) return;
+    if (const auto measured = render::measureLots(state, *view)) lots = *measured;
 }
 
 std::string numbered(const std::string& path, size_t index) {
@@ -140,7 +143,7 @@ Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& sett
         timings.add(state.counters.frameMs, state.backend->passTimes());
         if (isSingle) break;
         STIPPLE_TRY(checkStopped(plan.output));
-        verdict.judge(state);
+        verdict.judge(state, &plan.views[i]);
         STIPPLE_TRY(image::writePicture(numbered(plan.output, i), state.image, plan.alpha));
         ++written.pictures;
         if (plan.printNames) fmt::print("{}\n", numbered(plan.output, i));
@@ -152,7 +155,7 @@ Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& sett
         timings.add(state.counters.frameMs, state.backend->passTimes());
     }
     STIPPLE_TRY(accumulate(plan, settings, state));
-    verdict.judge(state);
+    verdict.judge(state, &first);
     return {};
 }
 

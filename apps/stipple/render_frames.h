@@ -7,6 +7,7 @@
 
 #include "engine/base/executor.h"
 #include "engine/render/frame.h"
+#include "engine/render/lots.h"
 
 namespace stipple::app {
 
@@ -41,8 +42,10 @@ struct Verdict {
     bool isTruncated = false;       ///< of one even the coarsest level exceeds the budget
     double tauEffectivePixels = 0;  ///< of the worst, as all that follows; infinite where records are left out
     MissingChunks missing;
+    render::LotShares lots;  ///< what the error does not speak of
     bool isComplete() const { return incomplete == 0 && !isTruncated; }
-    void judge(const render::FrameState& state);
+    /// `view`: of the lots; null: they are not wanted.
+    void judge(const render::FrameState& state, const lod::View* view);
 };
 
 /// What of the pictures is there.

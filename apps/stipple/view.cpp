@@ -246,7 +246,7 @@ class Viewer {
         plan.resident = o_.resident;
         plan.skipBad = o_.build.skipBad;
         Verdict verdict;
-        verdict.judge(session_.state());
+        verdict.judge(session_.state(), nullptr);
         return checkVerdict(plan, verdict);
     }
 

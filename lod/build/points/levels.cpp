@@ -8,6 +8,7 @@
 #include "engine/base/check.h"
 #include "engine/base/hash.h"
 #include "lod/attributes.h"
+#include "lod/build/points/covered.h"
 #include "lod/build/points/rising.h"
 #include "lod/build/points/rising_values.h"
 #include "lod/chunk.h"
@@ -229,10 +230,11 @@ PendingNode makeLeaf(const Frame& frame, SortedPoints& from, size_t begin, size_
 class ConeMerger {
   public:
     template <typename CodeOf>
-    void merge(const RecordGrid& grid, const Frame& frame, std::span<const Rising> parts,
-               std::span<const RisingValue> values, const Leaves* leaves, const CodeOf& codeOf, PendingNode& out) {
-        const Rising one = mergeRising(grid, parts, leaves);
-        if (!isSplit(grid, parts, one)) {
+    void merge(const Frame& frame, std::span<const Rising> parts, std::span<const RisingValue> values,
+               const Around& around, const CodeOf& codeOf, PendingNode& out) {
+        const RecordGrid& grid = around.grid;
+        const Rising one = mergeRising(grid, parts, around.leaves, around);
+        if (!isSplit(grid, parts, one, around)) {
             out.records.push_back(one);
             for (size_t k = 0; k < parts.size(); ++k) codeOf(k) = one.code;
             mergeAttributes(frame, parts, values, out);
@@ -255,13 +257,13 @@ class ConeMerger {
     static constexpr int kWorthwhile = 8;       ///< codes of error (1/8 octaves) that two records must gain
     static constexpr double kGoodAsItIs = 0.5;  ///< radii: a disc with a smaller error is not split
 
-    bool isSplit(const RecordGrid& grid, std::span<const Rising> parts, const Rising& one) {
+    bool isSplit(const RecordGrid& grid, std::span<const Rising> parts, const Rising& one, const Around& around) {
         if (grid.errors.decode(one.code) < kGoodAsItIs * static_cast<double>(one.radius)) return false;
         if (!splitByNormals(parts, side_)) return false;
         for (auto& m : members_) m.clear();
         for (size_t k = 0; k < parts.size(); ++k) members_.at(side_[k]).push_back(parts[k]);
         for (size_t g = 0; g < 2; ++g) {
-            of_.at(g) = mergeRising(grid, members_.at(g), nullptr);
+            of_.at(g) = mergeRising(grid, members_.at(g), nullptr, around);
             if (of_.at(g).code + kWorthwhile > one.code) return false;
         }
         return true;
@@ -282,6 +284,29 @@ class ConeMerger {
     std::vector<RisingValue> values_, column_;
 };
 
+RecordGrid gridOf(const Frame& frame, const Node& node) {
+    const uint32_t clusterLevel = std::min(node.level + kClusterLevels, frame.keyLevels);
+    RecordGrid grid;
+    grid.base = recordBase(frame, node);
+    grid.step = std::exp2(node.stepShift);
+    grid.edge = frame.cellSize(node.level);
+    grid.clusterShift = frame.shiftOf(clusterLevel);
+    grid.cellsAcross = 1u << (clusterLevel - node.level);
+    grid.cellSteps = 65536u / grid.cellsAcross;
+    grid.errors = frame.errors;
+    return grid;
+}
+
+/// What those above want to know of a node's records, whose leaves are not at hand there.
+void measureCores(std::span<Rising> records, const Around& around) {
+    const uint32_t shift = around.grid.clusterShift;
+    for (size_t first = 0, last = 0; first < records.size(); first = last) {
+        for (last = first + 1; last < records.size(); ++last)
+            if (records[last].key >> shift != records[first].key >> shift) break;
+        for (size_t k = first; k < last; ++k) measureCore(records[k], around, last == first + 1);
+    }
+}
+
 }  // namespace
 
 PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, NodeBatch& batch, const Leaves* leaves) {
@@ -290,15 +315,8 @@ PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, Node
     const uint32_t level = children[0].node.level - 1u, shift = frame.shiftOf(level);
     out.key = children[0].key >> shift << shift;
     out.node = emptyNode(frame, level, out.key);
-    const uint32_t clusterLevel = std::min(level + kClusterLevels, frame.keyLevels);
-    RecordGrid grid;
-    grid.base = recordBase(frame, out.node);
-    grid.step = std::exp2(out.node.stepShift);
-    grid.edge = frame.cellSize(level);
-    grid.clusterShift = frame.shiftOf(clusterLevel);
-    grid.cellsAcross = 1u << (clusterLevel - level);
-    grid.cellSteps = 65536u / grid.cellsAcross;
-    grid.errors = frame.errors;
+    const Around around(gridOf(frame, out.node), out.key, frame.shiftOf(level), leaves, children);
+    const RecordGrid& grid = around.grid;
     const size_t kinds = frame.attributes.size();
     thread_local std::vector<Rising> points;
     thread_local std::vector<RisingValue> leafValues;
@@ -333,9 +351,10 @@ PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, Node
             const auto codeOf = [&](size_t k) -> uint8_t& {
                 return isLeaf ? child.leafParentCode[begin + k] : child.records[begin + k].parentCode;
             };
-            cones.merge(grid, frame, parts, values, leaves, codeOf, out);
+            cones.merge(frame, parts, values, around, codeOf, out);
         }
     }
+    if (leaves == nullptr) measureCores(out.records, around);
     out.node.records = static_cast<uint32_t>(out.records.size());
     for (const Rising& r : out.records) out.node.errorCode = std::max(out.node.errorCode, r.code);
     innerSphere(frame, children, out);
@@ -414,11 +433,14 @@ PendingNode subtreeOf(const Frame& frame, SortedPoints& from, size_t begin, size
 
 PendingNode makeSubtree(const Frame& frame, SortedPoints& from, size_t begin, size_t end, uint32_t level,
                         NodeBatch& batch) {
-    Leaves leaves{from.points, std::vector<glm::vec3>(from.points.size(), glm::vec3(0))};
+    Leaves leaves{from.points, from.key, begin, std::vector<glm::vec3>(end - begin, glm::vec3(0))};
     for (size_t i = begin; i < end; ++i)
         if ((from.points.colour[i] >> 24 & shared::kFlagNoNormal) == 0)
-            leaves.normal[i] = shared::octDecode(from.points.normal[i]);
-    return subtreeOf(frame, from, begin, end, level, batch, leaves);
+            leaves.normal[i - begin] = shared::octDecode(from.points.normal[i]);
+    PendingNode root = subtreeOf(frame, from, begin, end, level, batch, leaves);
+    const Around around(gridOf(frame, root.node), root.key, frame.shiftOf(level), &leaves, {});
+    measureCores(root.records, around);
+    return root;
 }
 
 }  // namespace stipple::lod

@@ -6,11 +6,14 @@
 // the leaves below a record is known, in lattice units:
 //   above, below   how far they reach over and under the plane of its disc
 //   inner          how far they reach from its centre in every direction of that plane, at least
+//   core, hole     no place of its disc within `core` of the centre is farther than `hole` from where one of them is
 // The slab of a coarser disc follows from those of the finer ones, tilted by the angle between both planes; so does
 // `inner`, over 16 directions (between two of them it may be less by 2 % of the radius). The error is
 //   sqrt(max(above, below)^2 + max(0, radius - inner)^2)
 // (sequential point trees, Dachsbacher et al. 2003), at least the diameter where the colours below differ by more than
-// kColourSpread, and never less than that of a record below.
+// kColourSpread, and never less than that of a record below. `inner` sees no holes: so it is raised until no place of
+// the disc is farther than that from a leaf of the node (covered.h). Both ways, then, it bounds the distance between
+// what is drawn and the leaves.
 #pragma once
 
 #include "lod/build/octree/assemble.h"
@@ -34,6 +37,7 @@ struct Rising {
     glm::vec3 normal{0};  ///< the same
     float radius = 0, above = 0, below = 0;
     float inner = 0;  ///< of a single leaf its own radius
+    float core = 0, hole = 0;
     shared::PointRecord packed{};
 };
 /// What a coarse record says of an attribute: a mean, or a stored value and how many points below have it.
@@ -55,10 +59,13 @@ struct PendingNode {
     std::vector<uint8_t> leafParentCode;
 };
 
-/// Points with their normals decoded (zero: none), to measure against.
+/// Points [first, first + normal.size()) with their normals decoded (zero: none), to measure against.
 struct Leaves {
     const Points& points;
+    std::span<const Key> key;  ///< of all points
+    size_t first = 0;
     std::vector<glm::vec3> normal;
+    const glm::vec3& normalOf(size_t point) const { return normal[point - first]; }
 };
 
 /// Makes the parent of `children` (in octant order), encodes them into `batch` and empties them. `leaves`: see

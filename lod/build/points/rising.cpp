@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 
+#include "lod/build/points/covered.h"
 #include "lod/octahedral.h"
 
 namespace stipple::lod {
@@ -141,7 +142,7 @@ Extent extentOfLeaves(const Leaves& leaves, size_t begin, size_t end, const Risi
             const glm::vec3 d(leaves.points.at(i) - out.place);
             const float radius = leaves.points.radius[i];
             const float u = glm::dot(d, t1), v = glm::dot(d, t2), w = none ? 0.0f : glm::dot(d, n);
-            const float along = glm::dot(n, leaves.normal[i]);
+            const float along = glm::dot(n, leaves.normalOf(i));
             const float rise = radius * std::sqrt(std::max(0.0f, 1.0f - along * along));
             e.above = std::max(e.above, w + rise);
             e.below = std::max(e.below, rise - w);
@@ -219,19 +220,19 @@ Rising risingLeaf(const Points& points, size_t i, Key key) {
         r.meanColour[static_cast<int>(k)] = kLinear.of[r.least[k]];
     }
     r.radius = points.radius[i];
-    r.inner = hasNormal(r) ? r.radius : 0.0f;
+    r.inner = r.core = hasNormal(r) ? r.radius : 0.0f;
     return r;
 }
 
-Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const Leaves* leaves) {
+Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const Leaves* leaves, const Around& around) {
     Rising out;
     addUp(parts, out);
     const uint32_t normalCode = hasNormal(out) ? roundedNormal(out.normal) : 0;
     if (hasNormal(out)) out.normal = shared::octDecode(normalCode);
     // Position: to the nearest step, inside the cluster's own cell.
     std::array<uint32_t, 3> q{};
-    const Key cell = out.key >> grid.clusterShift;
-    const std::array<uint64_t, 3> index{compactBits(cell), compactBits(cell >> 1), compactBits(cell >> 2)};
+    const Key cluster = out.key >> grid.clusterShift;
+    const std::array<uint64_t, 3> index{compactBits(cluster), compactBits(cluster >> 1), compactBits(cluster >> 2)};
     for (int a = 0; a < 3; ++a) {
         const auto at = static_cast<size_t>(a);
         const uint32_t first = static_cast<uint32_t>(index[at] & (grid.cellsAcross - 1)) * grid.cellSteps;
@@ -253,7 +254,7 @@ Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const 
         error = std::hypot(static_cast<double>(std::max(out.above, out.below)), sideways) * (1 + 1e-5);
     } else {
         out.inner = 0;
-        error = radius;
+        error = out.count == 1 ? 0.0 : coveringErrorOfBall(out, parts, leaves);
     }
     if (out.count == 1) {  // the same disc, moved and rounded up
         out.inner = parts[0].inner;
@@ -263,6 +264,7 @@ Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const 
                            shared::srgbFromLinear(out.meanColour.z));
     if (colourSpread(out, colour) > kColourSpread) error = std::max(error, 2 * radius);
     out.code = std::max(static_cast<uint8_t>(grid.errors.encodeUp(error)), out.code);
+    if (out.count > 1) out.code = static_cast<uint8_t>(coveringCode(out, around, out.code));
     out.packed = {q[0] | q[1] << 16, q[2] | radiusCode << 16 | uint32_t{out.code} << 24, normalCode,
                   byteOf(colour.x) | byteOf(colour.y) << 8 | byteOf(colour.z) << 16 | uint32_t{out.flags} << 24};
     return out;

@@ -5,6 +5,8 @@
 
 namespace stipple::lod {
 
+class Around;
+
 /// Where the records of one inner node may lie.
 struct RecordGrid {
     glm::dvec3 base{0};         ///< lattice position of coordinate 0
@@ -26,7 +28,7 @@ Rising risingLeaf(const Points& points, size_t i, Key key);
 /// belongs to. False if there is one cone, or a record without a normal.
 bool splitByNormals(std::span<const Rising> parts, std::vector<uint8_t>& side);
 /// `parts`: records in one cluster's cell, in order. `leaves`: the points below them, where they are at hand and all
-/// points of the cell are meant.
-Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const Leaves* leaves);
+/// points of the cell are meant. `around`: what the disc is held against.
+Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const Leaves* leaves, const Around& around);
 
 }  // namespace stipple::lod

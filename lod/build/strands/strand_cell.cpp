@@ -8,6 +8,7 @@
 #include "engine/base/hash.h"
 #include "lod/build/octree/packed.h"
 #include "lod/chunk.h"
+#include "lod/lots.h"
 #include "lod/octahedral.h"
 
 namespace stipple::lod {
@@ -300,7 +301,8 @@ class StrandCell {
                     static_cast<uint8_t>(1u << ((at[0] & 1u) | (at[1] & 1u) << 1 | (at[2] & 1u) << 2));
             }
             StrandMerge merge = mergeParts(
-                points_, parts, {cell / kStepsPerTolerance, std::exp2(out.stepShift), kMostFactor * leafSegments_});
+                points_, parts,
+                {cell / kStepsPerTolerance, std::exp2(out.stepShift), kThinStrand * cell, kMostFactor * leafSegments_});
             for (StrandPart& p : merge.parts) p.ownCode = static_cast<uint8_t>(frame_.errors.encodeUp(p.error));
             const auto common = static_cast<uint8_t>(frame_.errors.encodeUp(merge.commonError));
             for (size_t i = 0; i < from.size(); ++i)
@@ -311,6 +313,7 @@ class StrandCell {
             for (uint32_t c = out.firstChild; c < out.firstChild + children; ++c)
                 node.kept = std::min(node.kept, nodes_[c].kept);
             node.kept *= merge.kept;
+            out.normalConeCosine = static_cast<float>(node.kept);
         }
         out.records = static_cast<uint32_t>(node.parts.size());
         for (const StrandPart& p : node.parts) out.errorCode = std::max(out.errorCode, p.ownCode);

@@ -19,7 +19,6 @@ namespace {
 
 constexpr size_t kLongestRun = 64;    ///< parts that are merged into one
 constexpr double kFewestKept = 0.25;  ///< of one level
-constexpr double kThin = 2;           ///< tolerances: parts with a smaller radius may be drawn by lot
 constexpr int kColourStep = 48;       ///< sRGB steps from which colours count as different, as for points
 
 class Merger {
@@ -140,7 +139,7 @@ void drawLots(const std::vector<StrandPoint>& points, const StrandLevel& level, 
     std::vector<uint8_t> isThin(parts.size());
     std::vector<uint32_t> lots(parts.size()), order;
     for (size_t i = 0; i < parts.size(); ++i) {
-        isThin[i] = radiusOf(parts[i]) <= kThin * level.tolerance ? 1 : 0;
+        isThin[i] = radiusOf(parts[i]) <= level.thin ? 1 : 0;
         lots[i] = lotOf(points[parts[i].a].strand);
         if (isThin[i] != 0) order.push_back(lots[i]);
     }

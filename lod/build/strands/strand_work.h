@@ -35,6 +35,7 @@ struct StrandPart {
 struct StrandLevel {
     double tolerance = 0;  ///< error that merging may add
     double rounding = 0;   ///< of positions
+    double thin = 0;       ///< radius of strands that are, at most
     size_t mostParts = 0;  ///< beyond that, thin strands are drawn by lot
 };
 
