@@ -1,6 +1,8 @@
 // Morton codes of octrees: a code for each cell, in the order of the curve.
 #pragma once
 
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 
 namespace stipple::lod {
@@ -10,6 +12,12 @@ __extension__ typedef unsigned __int128 Key;
 constexpr uint32_t kMortonBits = 42;
 /// Per axis, of a code that fits 63 bits.
 constexpr uint32_t kShortBits = 21;
+
+/// Bits up to the highest that is set.
+inline size_t bitWidth(Key v) {
+    const auto high = static_cast<uint64_t>(v >> 64);
+    return static_cast<size_t>(high != 0 ? 64 + std::bit_width(high) : std::bit_width(static_cast<uint64_t>(v)));
+}
 
 /// Spreads the low 21 bits: bit i goes to bit 3i.
 inline uint64_t spreadBits(uint64_t v) {

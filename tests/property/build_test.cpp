@@ -212,7 +212,7 @@ TEST(Build, EstimatedNormalsAndRadiiFitTheSurface) {
                     const double cosine = std::abs(glm::dot(d.normal, glm::normalize(d.position)));
                     angles.push_back(std::acos(std::min(cosine, 1.0)) * 180 / M_PI);
                     mean[isFine] += angles.back() / static_cast<double>(count);
-                    odd += d.radius < 0.7 * spacing || d.radius > 3 * spacing;
+                    odd += d.radius < 0.4 * spacing || d.radius > 2.4 * spacing;
                     ASSERT_EQ(d.flags & 3u, 3u) << "two-sided and estimated";
                 }
             }

@@ -1,7 +1,9 @@
 // A block is an octree cell of at most kBlockPoints points, a quarter of its counted cell at most. It is split evenly
 // into window cells of two to eight points (if they lie on a surface). What is estimated at the points of a window cell
 // comes from it and its 26 neighbours:
-//   radius  1.37 spacings, from the distance d of a point's 12th neighbour there: pi d^2 holds 12 of them
+//   radius  to the farthest corner of its Voronoi cell in the plane (farthestCorner), and a tenth more: no larger than
+//           what closes the surface. Corners farther than 1.8 spacings (1.25 where it bends) are its edge; the spacing
+//           comes from the distance d of the 12th neighbour: pi d^2 holds 12 of them. Copies count once.
 //   normal  the direction of least variance (Hoppe et al. 1992), sign unknown: two-sided. Of all points of the window,
 //           the same for all points of the cell; or, fine, of each point's own twelve nearest.
 // A point that stands alone, away from what its neighbours belong to, has the disc of those: of twice their spacing at
@@ -10,12 +12,13 @@
 // (Distributor); then what is there must do. All of this hangs on the lattice and on counts alone.
 #include "lod/build/points/estimate.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <bit>
 #include <cmath>
 
+#include "lod/build/points/lattice_box.h"
 #include "lod/build/points/select.h"
+#include "lod/build/points/surface_fit.h"
 #include "lod/octahedral.h"
 
 namespace stipple::lod {
@@ -30,62 +33,17 @@ constexpr size_t kCompanions = 3;    ///< at least that many of twelve neighbour
 constexpr float kNear2 = 0.5f;       ///< squared, of the distance of the twelfth (on a surface: 1/4)
 constexpr size_t kOfOthers = 4;      ///< rank of the neighbour that tells the spacing of others
 constexpr float kAloneSpacings = 2;  ///< how much wider than of its neighbours the disc of such a point may be
-constexpr double kFlat = 1e-6;       ///< a line or a point has no normal: second variance over the first
-
-/// Count, sums and sums of products.
-struct Moments {
-    float n, x, y, z, xx, xy, xz, yy, yz, zz;
-    void add(float px, float py, float pz) {
-        n += 1;
-        x += px;
-        y += py;
-        z += pz;
-        xx += px * px;
-        xy += px * py;
-        xz += px * pz;
-        yy += py * py;
-        yz += py * pz;
-        zz += pz * pz;
-    }
-};
+constexpr size_t kCrowd = 8;
+constexpr float kCrowdsGap = 2.0f;
+constexpr uint32_t kAcrossLines = 3;  ///< so often a window that holds but a line is doubled
+constexpr double kFlat = 0.02;
+constexpr double kSlim = 0.06, kSlimOfFew = 0.2;
+constexpr float kPlain = 0.8f;
+constexpr float kWidestGap = 1.8f, kWidestFold = 1.25f;  ///< spacings; farther corners are edges
+constexpr float kAcrossGap = 2.5f, kAcrossMost = 1.6f, kUneven = 1.2f;
+constexpr float kOverlap = 1.1f;
 
 constexpr uint32_t kNoNormal = ~0u;  ///< no octahedral code
-
-/// The direction of least variance, octahedral; kNoNormal where there is none.
-uint32_t normalFrom(const Moments& m) {
-    if (m.n < 3) return kNoNormal;
-    const double scale = 1.0 / static_cast<double>(m.n), x = m.x * scale, y = m.y * scale, z = m.z * scale;
-    Eigen::Matrix3d c;
-    c(0, 0) = m.xx * scale - x * x;
-    c(1, 0) = m.xy * scale - x * y;
-    c(2, 0) = m.xz * scale - x * z;
-    c(1, 1) = m.yy * scale - y * y;
-    c(2, 1) = m.yz * scale - y * z;
-    c(2, 2) = m.zz * scale - z * z;
-    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-    solver.computeDirect(c);
-    const Eigen::Vector3d& v = solver.eigenvalues();
-    if (!(v[1] > kFlat * v[2])) return kNoNormal;
-    const Eigen::Vector3d n = solver.eigenvectors().col(0);
-    const glm::vec3 normal(n[0], n[1], n[2]);
-    return std::isfinite(normal.x + normal.y + normal.z) && normal != glm::vec3(0) ? roundedNormal(normal) : kNoNormal;
-}
-
-/// Lattice box, both ends inside.
-struct LatticeBox {
-    std::array<int64_t, 3> lo{}, hi{};
-    bool holds(int64_t x, int64_t y, int64_t z) const {
-        return x >= lo[0] && x <= hi[0] && y >= lo[1] && y <= hi[1] && z >= lo[2] && z <= hi[2];
-    }
-    LatticeBox grown(int64_t by) const {
-        LatticeBox b = *this;
-        for (size_t a = 0; a < 3; ++a) {
-            b.lo[a] -= by;
-            b.hi[a] += by;
-        }
-        return b;
-    }
-};
 
 /// K: Key, or uint64_t where that holds all keys, which is most often and faster.
 template <typename K>
@@ -107,7 +65,7 @@ class Estimator {
         cellShift_ = frame_.shiftOf(c.level);
         cellBox_ = boxOf(static_cast<K>(c.key), c.level);
         reach_ = static_cast<int64_t>(frame_.cellSize(c.level)) / 4;
-        const auto [begin, end] = rangeOf(keys_, static_cast<K>(c.key), cellShift_);
+        const auto [begin, end] = rangeOf(keys_, static_cast<K>(c.key), cellShift_, allOwn());
         if (begin == end) return;
         blocks(begin, end, c.level, std::min<uint32_t>(c.level + 2u, frame_.keyLevels));
     }
@@ -125,12 +83,18 @@ class Estimator {
         }
         return b;
     }
-    static std::pair<size_t, size_t> rangeOf(const std::vector<K>& keys, K key, uint32_t shift) {
+    using Range = std::pair<size_t, size_t>;
+    /// Of the keys of the cell of `key`, looked for `within`.
+    static Range rangeOf(const std::vector<K>& keys, K key, uint32_t shift, const Range& within) {
+        if (within.first == within.second) return within;
         const K lo = key >> shift << shift, last = lo | ((K{1} << shift) - 1);
-        const auto first = std::lower_bound(keys.begin(), keys.end(), lo);
-        const auto end = std::upper_bound(first, keys.end(), last);
+        const auto first = std::lower_bound(keys.begin() + static_cast<ptrdiff_t>(within.first),
+                                            keys.begin() + static_cast<ptrdiff_t>(within.second), lo);
+        const auto end = std::upper_bound(first, keys.begin() + static_cast<ptrdiff_t>(within.second), last);
         return {static_cast<size_t>(first - keys.begin()), static_cast<size_t>(end - keys.begin())};
     }
+    Range allOwn() const { return {0, keys_.size()}; }
+    Range allGhosts() const { return {0, ghostKeys_.size()}; }
 
     /// Splits [begin, end), a cell of `level`, into blocks of `least` and finer.
     void blocks(size_t begin, size_t end, uint32_t level, uint32_t least) {
@@ -154,11 +118,12 @@ class Estimator {
     /// Calls f(x, y, z) for every point inside `box` that the counted cell sees, in the order of the keys: own first,
     /// then ghosts.
     template <typename F>
-    void forPoints(const LatticeBox& box, K key, uint32_t level, const F& f) const {
+    void forPoints(const LatticeBox& box, K key, uint32_t level, const Range& own, const Range& ghosts,
+                   const F& f) const {
         const uint32_t shift = frame_.shiftOf(level);
-        const auto [begin, end] = rangeOf(keys_, key, shift);
+        const auto [begin, end] = rangeOf(keys_, key, shift, own);
         descend(keys_, own_.points, begin, end, level, box, f);
-        const auto [first, last] = rangeOf(ghostKeys_, key, shift);
+        const auto [first, last] = rangeOf(ghostKeys_, key, shift, ghosts);
         descend(ghostKeys_, ghosts_, first, last, level, box, f);
     }
     /// Calls f(x, y, z) for point i.
@@ -216,16 +181,76 @@ class Estimator {
                     if (!withOwn && dx == 0 && dy == 0 && dz == 0) continue;
                     const int64_t x = own.lo[0] + dx * size, y = own.lo[1] + dy * size, z = own.lo[2] + dz * size;
                     if (x < 0 || y < 0 || z < 0 || x >= root || y >= root || z >= root) continue;
-                    const Key at =
-                        frame_.keyOf(static_cast<uint64_t>(x), static_cast<uint64_t>(y), static_cast<uint64_t>(z));
-                    forPoints(box, static_cast<K>(at), level, f);
+                    const auto at = static_cast<K>(
+                        frame_.keyOf(static_cast<uint64_t>(x), static_cast<uint64_t>(y), static_cast<uint64_t>(z)));
+                    const Around* const near = level >= blockLevel_ ? &around_.at(aroundOf(x, y, z)) : nullptr;
+                    forPoints(box, at, level, near != nullptr ? near->own : allOwn(),
+                              near != nullptr ? near->ghosts : allGhosts(), f);
                 }
     }
 
+    void findPlaces(size_t begin, size_t end) {
+        const Points& p = own_.points;
+        placeBegin_.clear();
+        for (size_t i = begin; i < end; ++i)
+            if (i == begin || keys_[i] != keys_[i - 1] || p.x[i] != p.x[i - 1] || p.y[i] != p.y[i - 1] ||
+                p.z[i] != p.z[i - 1] || (!p.high.empty() && p.high[i] != p.high[i - 1]))
+                placeBegin_.push_back(i);
+        placeBegin_.push_back(end);
+    }
+    /// Clusters far apart: splitting cells that hold one each leaves as many of them. True if so; then fewer splits.
+    bool skipEmptySplits(uint32_t level, uint32_t& splits) const {
+        // Cells of each split that hold places: a new one begins where keys differ in a bit above it.
+        std::array<size_t, kMostSplits + 2> occupied{};
+        const uint32_t shift = frame_.shiftOf(level + splits);
+        for (size_t j = 1; j + 1 < placeBegin_.size(); ++j) {
+            const K differs = (keys_[placeBegin_[j]] ^ keys_[placeBegin_[j - 1]]) >> shift;
+            ++occupied.at(differs == 0 ? kMostSplits + 1 : splits - (bitWidth(differs) - 1) / 3);
+        }
+        ++occupied[0];
+        for (size_t s = 1; s <= splits; ++s) occupied.at(s) += occupied.at(s - 1);
+        const uint32_t wanted = splits;
+        const size_t places = placeBegin_.size() - 1;
+        while (splits > 0 && occupied.at(splits) >= kCrowd && places > kCrowd * occupied.at(splits) &&
+               occupied.at(splits) * 10 < occupied.at(splits - 1) * 14)
+            --splits;
+        return splits < wanted;
+    }
+
+    /// Where the points of a block and its neighbours of the same size stand: the finer cells beside its own are there.
+    struct Around {
+        Range own{0, 0}, ghosts{0, 0};
+    };
+    size_t aroundOf(int64_t x, int64_t y, int64_t z) const {
+        const uint32_t log2 = frame_.rootLog2 - blockLevel_;
+        const auto step = [&](int64_t v, size_t a) { return static_cast<size_t>((v >> log2) - blockAt_.at(a) + 1); };
+        return (step(z, 2) * 3 + step(y, 1)) * 3 + step(x, 0);
+    }
+    void findAround(K key, uint32_t level) {
+        const LatticeBox box = boxOf(key, level);
+        const uint32_t log2 = frame_.rootLog2 - level;
+        const int64_t root = int64_t{1} << frame_.rootLog2;
+        blockLevel_ = level;
+        for (size_t a = 0; a < 3; ++a) blockAt_.at(a) = box.lo.at(a) >> log2;
+        for (int64_t k = 0; k < 27; ++k) {
+            const int64_t x = (blockAt_[0] + k % 3 - 1) << log2, y = (blockAt_[1] + k / 3 % 3 - 1) << log2,
+                          z = (blockAt_[2] + k / 9 - 1) << log2;
+            Around& to = around_.at(static_cast<size_t>(k)) = {};
+            if (x < 0 || y < 0 || z < 0 || x >= root || y >= root || z >= root) continue;
+            const auto at = static_cast<K>(
+                frame_.keyOf(static_cast<uint64_t>(x), static_cast<uint64_t>(y), static_cast<uint64_t>(z)));
+            to.own = rangeOf(keys_, at, frame_.shiftOf(level), allOwn());
+            to.ghosts = rangeOf(ghostKeys_, at, frame_.shiftOf(level), allGhosts());
+        }
+    }
+
     void block(size_t begin, size_t end, uint32_t level) {
-        const size_t n = end - begin;
+        findPlaces(begin, end);
+        findAround(keys_[begin], level);
+        const size_t n = placeBegin_.size() - 1;
         uint32_t splits = 0;
         while (splits < kMostSplits && level + splits < frame_.keyLevels && n > (size_t{8} << (2 * splits))) ++splits;
+        const bool isClustered = skipEmptySplits(level, splits);
         const uint32_t window = level + splits;
         const uint32_t across = (1u << splits) + 2;
         const uint32_t edgeLog2 = frame_.rootLog2 - window;
@@ -244,25 +269,34 @@ class Estimator {
                              static_cast<float>(z - box.lo[2]) * inverse - half);
         };
         seen_.clear();
-        const auto add = [&](int64_t x, int64_t y, int64_t z) {
+        const auto see = [&](int64_t x, int64_t y, int64_t z) {
             seen_.push_back({static_cast<uint32_t>(cellOf(x, y, z)), localOf(x, y, z)});
         };
-        for (size_t i = begin; i < end; ++i) withPlace(own_.points, i, add);
-        forNeighbourhood(keys_[begin], level, edge, false, add);
+        for (size_t j = 0; j < n; ++j) {
+            const size_t i = placeBegin_[j];
+            withPlace(own_.points, i, see);
+        }
+        forNeighbourhood(keys_[begin], level, edge, false, OncePerPlace{see});
         indexSeen(size_t{across} * across * across);
         const uint32_t windowShift = frame_.shiftOf(window);
-        for (size_t i = begin; i < end;) {
-            size_t next = i + 1;
-            while (next < end && keys_[next] >> windowShift == keys_[i] >> windowShift) ++next;
-            gather(seen_[i - begin].cell, across, kMostInThree, hood_);
-            if (hood_.x.size() <= kNeighbours && window > coarsestWindow()) {
-                largerWindow(i, next, window);
-            } else {
-                places_.clear();
-                for (size_t k = i; k < next; ++k) places_.push_back(seen_[k - begin].place);
-                give(i, next, static_cast<float>(edge), {next - i <= kSparse, seen_[i - begin].cell, across});
-            }
-            i = next;
+        for (size_t j = 0; j < n;) {
+            const K key = keys_[placeBegin_[j]] >> windowShift;
+            size_t next = j + 1;
+            while (next < n && keys_[placeBegin_[next]] >> windowShift == key) ++next;
+            gather(seen_[j].cell, across, kMostInThree, hood_);
+            places_.clear();
+            for (size_t k = j; k < next; ++k) places_.push_back(seen_[k].place);
+            Window at;
+            at.edge = static_cast<float>(edge);
+            at.mayBeAlone = next - j <= kSparse;
+            at.cell = seen_[j].cell;
+            at.across = across;
+            at.widestGap = isClustered ? kCrowdsGap : 0.0f;
+            measure(at);
+            if (window > coarsestWindow() && (hood_.count <= kNeighbours || at.isLine))
+                largerWindow(j, next, window, at);
+            give(j, next, at);
+            j = next;
         }
     }
     uint32_t coarsestWindow() const { return std::min(cell_.level + 2u, frame_.keyLevels); }
@@ -282,28 +316,30 @@ class Estimator {
         }
     }
 
-    void clearHood() {
-        hood_.x.clear();
-        hood_.y.clear();
-        hood_.z.clear();
-    }
-    void addToHood(const glm::vec3& p) {
-        hood_.x.push_back(p.x);
-        hood_.y.push_back(p.y);
-        hood_.z.push_back(p.z);
-    }
-    /// Where a hood came from.
+    /// Where a hood came from, and how it is spread.
     struct Window {
-        bool mayBeAlone;  ///< its points
-        size_t cell;
-        uint32_t across;  ///< 0: a larger window, of which the hood is all there is
+        float edge = 1;           ///< lattice units; all lengths in hoods are in units of it
+        bool mayBeAlone = false;  ///< its points
+        size_t cell = 0;
+        uint32_t across = 0;  ///< 0: a larger window, of which the hood is all there is
+        Spread spread;
+        bool isLine = false, isFlat = false;
+        float widestGap = 0;  ///< between its neighbours, if they are not spread evenly; 0: they are
     };
-    struct Coordinates {
-        std::vector<float> x, y, z;
-        void resize(size_t n) {
-            for (auto* axis : {&x, &y, &z}) axis->resize(n);
-        }
-    };
+    void measure(Window& window) {
+        const size_t n = hood_.count;
+        squared_.assign((n + kSelectLanes) / kSelectLanes * kSelectLanes, kNothing);
+        std::fill_n(squared_.begin(), n, 0);
+        const glm::vec3 p = places_.front();
+        window.spread = spreadOf(hood_.neighbours(), {p.x, p.y, p.z}, squared_.data(), 0);
+        window.isLine = window.spread.isLine(roundingIn(window.edge), kSlim);
+        window.isFlat = window.spread.least < kFlat * window.spread.middle;
+    }
+    /// Variance of a coordinate's rounding to the lattice.
+    static double roundingIn(float edge) {
+        return 1.0 / (12.0 * static_cast<double>(edge) * static_cast<double>(edge));
+    }
+
     /// The points of a window cell and its neighbours; of more than `most` in three cells only some.
     void gather(size_t at, uint32_t across, uint32_t most, Coordinates& to) {
         std::array<std::pair<uint32_t, uint32_t>, 9> runs;
@@ -323,11 +359,11 @@ class Estimator {
                 *z++ = byCellZ_[k];
             }
         }
-        to.resize(static_cast<size_t>(x - to.x.data()));
+        to.count = static_cast<size_t>(x - to.x.data());
     }
 
-    /// The points [begin, end) of one window cell that has too few around it.
-    void largerWindow(size_t begin, size_t end, uint32_t window) {
+    /// The places [begin, end) of one window cell that has too few around it, or only such along a line.
+    void largerWindow(size_t begin, size_t end, uint32_t level, Window& window) {
         int64_t size = 1;
         LatticeBox box;
         const auto localOf = [&](int64_t x, int64_t y, int64_t z) {
@@ -336,55 +372,153 @@ class Estimator {
                              static_cast<float>(y - box.lo[1]) * inverse - 0.5f,
                              static_cast<float>(z - box.lo[2]) * inverse - 0.5f);
         };
-        for (uint32_t level = window; level > coarsestWindow() && (level == window || hood_.x.size() <= kNeighbours);) {
+        const size_t first = placeBegin_[begin];
+        bool isKept = false;
+        const auto keep = [&] {  // a line, if nothing lies beside it
+            isKept = true;
+            std::swap(hood_, lineHood_);
+            std::swap(places_, linePlaces_);
+            lineWindow_ = window;
+        };
+        if (hood_.count > kNeighbours) keep();
+        hood_.count = 0;
+        for (uint32_t across = 0; level > coarsestWindow() && (hood_.count <= kNeighbours || across < kAcrossLines);) {
             --level;
             size = static_cast<int64_t>(frame_.cellSize(level));
-            box = boxOf(keys_[begin], level);
-            clearHood();
-            forNeighbourhood(keys_[begin], level, size, true,
-                             [&](int64_t x, int64_t y, int64_t z) { addToHood(localOf(x, y, z)); });
+            box = boxOf(keys_[first], level);
+            hood_.count = 0;
+            forNeighbourhood(keys_[first], level, size, true,
+                             OncePerPlace{[&](int64_t x, int64_t y, int64_t z) { hood_.add(localOf(x, y, z)); }});
+            places_.clear();
+            for (size_t j = begin; j < end; ++j) {
+                const size_t i = placeBegin_[j];
+                places_.push_back(withPlace(own_.points, i, localOf));
+            }
+            window.edge = static_cast<float>(size);
+            measure(window);
+            if (hood_.count <= kNeighbours) continue;
+            if (!window.isLine) break;
+            if (!isKept) keep();
+            ++across;
         }
-        places_.clear();
-        for (size_t i = begin; i < end; ++i) places_.push_back(withPlace(own_.points, i, localOf));
-        give(begin, end, static_cast<float>(size), {true, 0, 0});
+        if (window.isLine && isKept) {
+            std::swap(hood_, lineHood_);
+            std::swap(places_, linePlaces_);
+            window = lineWindow_;
+            return;
+        }
+        window.mayBeAlone = window.mayBeAlone || !isKept;
+        window.across = 0;
     }
 
-    /// Points [begin, end), whose places are in places_, from the hood; both in units of `edge` lattice units.
-    void give(size_t begin, size_t end, float edge, const Window& window) {
-        const size_t n = hood_.x.size();
-        uint32_t normal = kNoNormal;
-        if (settings_.normals && !settings_.isFine) {
-            Moments all{};
-            for (size_t k = 0; k < n; ++k) all.add(hood_.x[k], hood_.y[k], hood_.z[k]);
-            normal = normalFrom(all);
-        }
+    /// Places [begin, end), whose coordinates are in places_, from the hood.
+    void give(size_t begin, size_t end, const Window& window) {
+        const size_t n = hood_.count, rank = std::min(kNeighbours, n - 1);  // the point itself comes first
+        const Neighbours all = hood_.neighbours();
+        const bool isEach = settings_.isFine || window.mayBeAlone;
         squared_.resize(n + kSelectLanes);
+        // Of a rectangle's points that are spread evenly: variances are 1/12 of its sides squared.
+        const Spread& whole = window.spread;
+        const auto evenly = static_cast<float>(whole.points < 3 ? 0
+                                                                : std::sqrt(12 * std::sqrt(whole.most * whole.middle) /
+                                                                            static_cast<double>(whole.points)));
         float reach = 0;
-        for (size_t i = begin; i < end; ++i) {
-            const glm::vec3 p = places_[i - begin];
-            squaredDistances(hood_.x.data(), hood_.y.data(), hood_.z.data(), n, {p.x, p.y, p.z}, squared_.data());
-            const size_t rank = std::min(kNeighbours, n - 1);  // the point itself comes first
+        const auto measureReach = [&](const glm::vec3& p) {
+            squaredDistances(all.x, all.y, all.z, n, {p.x, p.y, p.z}, squared_.data());
             // (A little more than that of the point before is a good guess.)
             reach = rank > 0 ? smallestAtRank(squared_.data(), n, rank, 1.1f * reach) : 0.0f;
-            if (settings_.radii && !(own_.points.radius[i] > 0)) {
-                float& radius = own_.points.radius[i];
-                radius = radiusFrom(reach, rank, edge);
-                if (window.mayBeAlone && settings_.limitStrays && rank == kNeighbours && isAlone(n, reach))
-                    radius = std::min(radius, kAloneSpacings * kSpacings * spacingOfOthers(window, reach) * edge);
-            }
-            if (!settings_.normals) continue;
-            if (settings_.isFine) {
-                Moments near{};
-                for (size_t k = 0; k < n; ++k)
-                    if (std::bit_cast<float>(squared_[k]) <= reach)
-                        near.add(hood_.x[k] - p.x, hood_.y[k] - p.y, hood_.z[k] - p.z);
-                normal = normalFrom(near);
-            }
-            uint32_t& colour = own_.points.colour[i];
-            if (normal == kNoNormal || (colour >> 24 & shared::kFlagNoNormal) == 0) continue;
-            own_.points.normal[i] = normal;
-            colour = (colour & 0xffffffu) | (shared::kFlagTwoSided | shared::kFlagEstimatedNormal) << 24;
+        };
+        float nearer = 3.4e38f;
+        if (!isEach) {
+            measureReach(places_.front());
+            const float one = reach;
+            measureReach(places_.back());
+            nearer = spacingOf(std::min(one, reach), rank);
+            reach = std::max(one, reach);
         }
+        Spread spread = window.spread;
+        bool isLine = window.isLine;
+        uint32_t normal = isLine || spread.normal == glm::vec3(0) ? kNoNormal : roundedNormal(spread.normal);
+        for (size_t j = begin; j < end; ++j) {
+            const glm::vec3 p = places_[j - begin];
+            if (isEach) measureReach(p);
+            if (settings_.isFine && n > 3) {
+                // Those along one line say nothing: twice as far, until there are others.
+                float squared = reach;
+                do {
+                    spread = spreadOf(all, {p.x, p.y, p.z}, squared_.data(), squared);
+                    squared *= 4;
+                    isLine = spread.isLine(roundingIn(window.edge), kSlimOfFew);
+                } while (isLine && spread.points < n && squared < 1e30f && squared > 0);
+                normal = isLine || spread.normal == glm::vec3(0) ? kNoNormal : roundedNormal(spread.normal);
+            }
+            float wanted = 0;  // one for all at the place that have no normals of their own
+            for (size_t i = placeBegin_[j]; i < placeBegin_[j + 1]; ++i) {
+                uint32_t& colour = own_.points.colour[i];
+                const bool hasOwn = (colour >> 24 & shared::kFlagNoNormal) == 0;
+                if (settings_.radii && !(own_.points.radius[i] > 0)) {
+                    if (hasOwn || !(wanted > 0)) {
+                        glm::vec3 axis = spread.along, across = glm::cross(spread.normal, spread.along);
+                        if (hasOwn) {
+                            const glm::vec3 own = shared::octDecode(own_.points.normal[i]);
+                            axis = glm::normalize(std::abs(own.x) < 0.7f ? glm::vec3(0, -own.z, own.y)
+                                                                         : glm::vec3(-own.z, 0, own.x));
+                            across = glm::cross(own, axis);
+                        }
+                        wanted = radiusAt(p, axis, across, isLine && !hasOwn, reach, rank, window, evenly, nearer);
+                    }
+                    own_.points.radius[i] = wanted;
+                    if (hasOwn) wanted = 0;
+                    if (isLine || spread.isScattered()) colour |= shared::kFlagScattered << 24;
+                }
+                if (!settings_.normals || normal == kNoNormal || hasOwn) continue;
+                own_.points.normal[i] = normal;
+                colour = (colour & ~(shared::kFlagNoNormal << 24)) |
+                         (shared::kFlagTwoSided | shared::kFlagEstimatedNormal) << 24;
+            }
+        }
+    }
+    /// Of points on a surface, from the squared distance of the one at `rank`: pi d^2 holds as many.
+    static float spacingOf(float squaredReach, size_t rank) {
+        return rank == 0 ? 0.0f : std::sqrt(3.14159265f * squaredReach / static_cast<float>(rank));
+    }
+    /// Lattice units.
+    float radiusAt(const glm::vec3& p, const glm::vec3& axis, const glm::vec3& across, bool isLine, float squaredReach,
+                   size_t rank, const Window& window, float evenly, float nearer) {
+        if (rank == 0) {
+            const double alone = frame_.cellSize(cell_.level) / std::sqrt(static_cast<double>(cell_.count));
+            return kSpacings * static_cast<float>(alone);
+        }
+        const float spacing = spacingOf(squaredReach, rank);
+        nearer = std::min(nearer, spacing);
+        float most = std::max((window.isFlat ? kWidestGap : kWidestFold) * spacing, window.widestGap);
+        // Scan lines: nearer along them than is even.
+        bool isUneven = window.isFlat && evenly > kUneven * nearer;
+        glm::vec3 first = axis, second = across;
+        if (isUneven) {
+            // The cells are narrow: the directions have to fit them.
+            squaredDistances(hood_.x.data(), hood_.y.data(), hood_.z.data(), hood_.count, {p.x, p.y, p.z},
+                             squared_.data());
+            const Spread near = spreadOf(hood_.neighbours(), {p.x, p.y, p.z}, squared_.data(), squaredReach);
+            const glm::vec3& along = near.along;
+            isUneven = near.middle < kSlimOfFew * near.most || evenly > 2 * nearer;
+            const glm::vec3 flat = glm::dot(along, axis) * axis + glm::dot(along, across) * across;
+            if (glm::dot(flat, flat) > 0.25f) {
+                first = glm::normalize(flat);
+                second = glm::cross(glm::cross(axis, across), first);
+            }
+        }
+        if (isUneven) most = std::max(most, std::min(kAcrossGap * evenly, kAcrossMost));
+        std::array<float, kDirections> inverse =
+            inverseExtents(hood_.neighbours(), {p.x, p.y, p.z}, first, second, most);
+        if (isLine)  // only the two along it count
+            for (size_t k = 0; k < kDirections; ++k)
+                if (k % (kDirections / 2) != 0) inverse.at(k) = 3.4e38f;
+        float radius = kOverlap * farthestCorner(inverse, most, isUneven || isLine || window.widestGap > 0);
+        if (!(radius > 0)) radius = kPlain * spacing;
+        if (window.mayBeAlone && settings_.limitStrays && rank == kNeighbours && isAlone(hood_.count, squaredReach))
+            radius = std::min(radius, kAloneSpacings * kSpacings * spacingOfOthers(window, squaredReach));
+        return radius * window.edge;
     }
     /// Of a point whose squared distances to the hood are in squared_: are fewer than three others near it?
     bool isAlone(size_t n, float squaredReach) const {
@@ -395,10 +529,10 @@ class Estimator {
     float spacingOfOthers(const Window& window, float squaredReach) {
         if (window.across > 0) gather(window.cell, window.across, ~0u, others_);
         const Coordinates& all = window.across > 0 ? others_ : hood_;
-        const size_t n = all.x.size();
+        const size_t n = all.count;
         squaredOfOther_.resize(n + kSelectLanes);
         spacings_.clear();
-        for (size_t k = 0; k < hood_.x.size(); ++k) {
+        for (size_t k = 0; k < hood_.count; ++k) {
             const float squared = std::bit_cast<float>(squared_[k]);
             if (!(squared > 0) || squared > squaredReach) continue;
             squaredDistances(all.x.data(), all.y.data(), all.z.data(), n, {hood_.x[k], hood_.y[k], hood_.z[k]},
@@ -410,13 +544,6 @@ class Estimator {
         std::nth_element(spacings_.begin(), middle, spacings_.end());
         return std::sqrt(3.14159265f * *middle / static_cast<float>(kOfOthers));
     }
-    float radiusFrom(float squaredReach, size_t neighbours, float edge) const {
-        if (neighbours > 0)
-            return kSpacings * std::sqrt(3.14159265f * squaredReach / static_cast<float>(neighbours)) * edge;
-        const double alone = frame_.cellSize(cell_.level) / std::sqrt(static_cast<double>(cell_.count));
-        return kSpacings * static_cast<float>(alone);
-    }
-
     struct Seen {
         uint32_t cell;
         glm::vec3 place;
@@ -432,13 +559,18 @@ class Estimator {
     uint32_t cellShift_ = 0;
     LatticeBox cellBox_;
     int64_t reach_ = 0;
+    uint32_t blockLevel_ = 0;
+    std::array<int64_t, 3> blockAt_{};  ///< in its own size
+    std::array<Around, 27> around_;
     std::vector<Seen> seen_;  ///< by the block: its own points first, in window cells from its centre
     std::vector<float> byCellX_, byCellY_, byCellZ_;  ///< the same by window cell
     std::vector<uint32_t> firstSeen_, nextSeen_;
-    Coordinates hood_, others_;
+    Coordinates hood_, others_, lineHood_;
     std::vector<int32_t> squared_, squaredOfOther_;  ///< bits of floats
     std::vector<float> spacings_;
-    std::vector<glm::vec3> places_;
+    std::vector<size_t> placeBegin_;  ///< of the block's own places, the first point of each, and the end
+    std::vector<glm::vec3> places_, linePlaces_;
+    Window lineWindow_;
 };
 
 }  // namespace
