@@ -341,7 +341,7 @@ class Estimator {
     }
 
     /// The points of a window cell and its neighbours; of more than `most` in three cells only some.
-    void gather(size_t at, uint32_t across, uint32_t most, Coordinates& to) {
+    void gather(size_t at, uint32_t across, uint32_t most, Hood& to) {
         std::array<std::pair<uint32_t, uint32_t>, 9> runs;
         size_t all = 0;
         for (size_t row = 0; row < 9; ++row) {  // three cells in x lie side by side
@@ -528,7 +528,7 @@ class Estimator {
     /// itself may hold only some of many points, see gather.)
     float spacingOfOthers(const Window& window, float squaredReach) {
         if (window.across > 0) gather(window.cell, window.across, ~0u, others_);
-        const Coordinates& all = window.across > 0 ? others_ : hood_;
+        const Hood& all = window.across > 0 ? others_ : hood_;
         const size_t n = all.count;
         squaredOfOther_.resize(n + kSelectLanes);
         spacings_.clear();
@@ -565,7 +565,7 @@ class Estimator {
     std::vector<Seen> seen_;  ///< by the block: its own points first, in window cells from its centre
     std::vector<float> byCellX_, byCellY_, byCellZ_;  ///< the same by window cell
     std::vector<uint32_t> firstSeen_, nextSeen_;
-    Coordinates hood_, others_, lineHood_;
+    Hood hood_, others_, lineHood_;
     std::vector<int32_t> squared_, squaredOfOther_;  ///< bits of floats
     std::vector<float> spacings_;
     std::vector<size_t> placeBegin_;  ///< of the block's own places, the first point of each, and the end

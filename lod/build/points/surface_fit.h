@@ -12,14 +12,14 @@
 
 namespace stipple::lod {
 
-/// Coordinates of neighbours, parallel; each with room for whole vectors of kSelectLanes.
+/// Hood of neighbours, parallel; each with room for whole vectors of kSelectLanes.
 struct Neighbours {
     const float *x, *y, *z;
     size_t count;
 };
 
 /// Neighbours as they are found.
-struct Coordinates {
+struct Hood {
     std::vector<float> x, y, z;  ///< whole vectors
     size_t count = 0;
     void resize(size_t n) {
