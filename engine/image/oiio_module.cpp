@@ -29,6 +29,7 @@ extern "C" int stippleOiioEncode(const char* path, int width, int height, int ch
         spec.attribute("oiio:ColorSpace", isFloat ? "Linear" : "sRGB");
         spec.attribute("png:compressionLevel", 3);
         spec.attribute("compression", "zip");
+        spec.attribute("DateTime", "");  // or the same picture would have other bytes every second
         const std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create(path);
         if (!out) return report(OIIO::geterror(), error, errorBytes);
         OIIO::Filesystem::IOVecOutput file;

@@ -103,7 +103,7 @@ Level pullLevel(const Level& fine, double childSize, double inverseFocal) {
             std::vector<Contribution> list;
             for (int k = 0; k < 4; ++k) {
                 const Sample* s = fine.at(2 * x + k % 2, 2 * y + k / 2);
-                if (s && s->valid && s->radius >= 0.5 * childSize) list.push_back({s, 1.0});
+                if (s && s->valid && s->radius >= 0.5 * childSize) list.push_back({s, s->radius * s->radius});
             }
             if (list.empty()) continue;
             double back = 0, front = 1e300, deepest = 0, thickest = 0;
@@ -171,7 +171,8 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize, const Lens& le
             double back = 0;
             const Sample merged = blend(list, back, inverseFocal);
             Sample& own = fine.ref(x, y);
-            if (!own.valid || own.depth > back || glm::length(own.centre - centre) > own.radius) own = merged;
+            if (!own.valid || own.depth > back || glm::length(own.centre - centre) > std::max(own.radius, fineSize))
+                own = merged;
         }
 }
 
@@ -228,7 +229,7 @@ class ReferenceBackend final : public render::Backend {
                 const dvec2 p(v.focalPixels * c.x / c.z + 0.5 * v.width, v.focalPixels * c.y / c.z + 0.5 * v.height);
                 // A stray point hides no more of the picture than this.
                 const bool isScattered = (disc.flags & shared::kFlagScattered) != 0;
-                const double most = isScattered ? std::max(v.height / 64.0, 6.0) : 16384.0;
+                const double most = isScattered ? std::max(v.height / 128.0, 4.0) : 16384.0;
                 const double radius = std::clamp(instance.scale * disc.radius * f.supportScale * v.focalPixels / c.z,
                                                  double(f.minimumRadius), most);
                 // Beside the picture: kept at its border where the disc may reach in.

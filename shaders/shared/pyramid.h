@@ -97,7 +97,8 @@ SHARED_FN float thicknessWorld(Texel t, float inverseFocal) { return t.thickness
 // pixels. Kept are the children that reach beyond their own texel and whose depth interval [depth - t, depth + t] meets
 // all the others': it begins before the first of them ends. (Not "meets the front one's": copies of one splat have the
 // same depth to the last bit or not, and which of them is in front must not matter.) Where the interval of the result
-// ends is counted from the front one and capped, so that layers do not chain (F12, case 42).
+// ends is counted from the front one and capped, so that layers do not chain (F12, case 42). They count by their areas:
+// of wide and narrow splats side by side the wide ones close the gaps.
 SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSize, float inverseFocal) {
     const float h = 0.5f * childSize;
     const float x0 = c0.offset.x - h;
@@ -127,10 +128,10 @@ SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSi
     const float w2 = d2 < kFarAway && d2 - t2 <= back ? isLike(c2, isRound) : 0.0f;
     const float w3 = d3 < kFarAway && d3 - t3 <= back ? isLike(c3, isRound) : 0.0f;
     Blend b = emptyBlend();
-    b = addToBlend(b, c0, 1.0f / max(c0.depth, kLeastDepth), x0, y0, w0);
-    b = addToBlend(b, c1, 1.0f / max(c1.depth, kLeastDepth), x1, y1, w1);
-    b = addToBlend(b, c2, 1.0f / max(c2.depth, kLeastDepth), x2, y2, w2);
-    b = addToBlend(b, c3, 1.0f / max(c3.depth, kLeastDepth), x3, y3, w3);
+    b = addToBlend(b, c0, 1.0f / max(c0.depth, kLeastDepth), x0, y0, w0 * (c0.radius * c0.radius));
+    b = addToBlend(b, c1, 1.0f / max(c1.depth, kLeastDepth), x1, y1, w1 * (c1.radius * c1.radius));
+    b = addToBlend(b, c2, 1.0f / max(c2.depth, kLeastDepth), x2, y2, w2 * (c2.radius * c2.radius));
+    b = addToBlend(b, c3, 1.0f / max(c3.depth, kLeastDepth), x3, y3, w3 * (c3.radius * c3.radius));
     Texel t = texelFromBlend(b, isRound);
     const float deepest = max(max(w0 * c0.depth, w1 * c1.depth), max(w2 * c2.depth, w3 * c3.depth));
     const float thickest = max(max(w0 * t0, w1 * t1), max(w2 * t2, w3 * t3));
@@ -270,7 +271,9 @@ SHARED_FN Texel pushTexel(Texel own, Texel q0, Texel q1, Texel q2, Texel q3, Coa
     const float isEmpty = fine.depth <= 0.0f ? 1.0f : 0.0f;
     // So is one that does not reach its own texel's centre (of splats beside the picture): others may.
     const float off2 = fine.offset.x * fine.offset.x + fine.offset.y * fine.offset.y;
-    const float isMissed = off2 > fine.radius * fine.radius ? 1.0f : 0.0f;
+    const float least2 =
+        max(fine.radius * fine.radius, fineSize * fineSize);  // (of others the centre lies in the texel)
+    const float isMissed = off2 > least2 ? 1.0f : 0.0f;
     const bool replace = hasBlend * (isBehind + isEmpty + isMissed) > 0.5f;
     const Texel blended = texelFromBlend(b, isRound);
     Texel t;

@@ -4,11 +4,11 @@
 #include "record.h"
 SHARED_BEGIN
 
-// What no surface joins to others (kFlagScattered: strays, single leaves, wires) is drawn at most a sixty-fourth of the
-// picture's height wide to each side, or 6 pixels: a stray point before the camera hides no more than that. A surface
+// What no surface joins to others (kFlagScattered: strays, single leaves, wires) is drawn at most a 128th of the
+// picture's height wide to each side, or 4 pixels: a stray point before the camera hides no more than that. A surface
 // is not capped: from wherever it is looked at, its discs overlap. Per unit of depth, world units.
-const float kSplatShare = 0.015625f;
-const float kSplatPixels = 6.0f;
+const float kSplatShare = 0.0078125f;
+const float kSplatPixels = 4.0f;
 SHARED_FN float largestSplat(uint flags, float focal, uint height) {
     const float scattered = max(kSplatShare * float(int(height)), kSplatPixels) / focal;
     return (flags & kFlagScattered) != 0u ? scattered : 16384.0f / focal;

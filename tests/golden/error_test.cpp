@@ -72,7 +72,8 @@ TEST_F(Errors, OddSizesAreDrawnAsWell) {
          {std::pair{1u, 1u}, {1u, 7u}, {7u, 1u}, {2u, 3u}, {127u, 129u}, {641u, 479u}, {257u, 33u}}) {
         const auto d =
             differ(draw(*backend, 0.5, render::Mode::pullpush, w, h), draw(*oracle, 0.5, render::Mode::pullpush, w, h));
-        EXPECT_LE(d.differingFraction * w * h, 1 + 0.001 * w * h) << w << " x " << h;
+        // (In one row or column all splats beside the picture share its few pixels: of nearly equal ones any may win.)
+        EXPECT_LE(d.differingFraction * w * h, 2 + 0.001 * w * h) << w << " x " << h;
     }
 }
 

@@ -190,7 +190,9 @@ TEST(Coordinates, OnePointFarAwayChangesNothing) {
         EXPECT_LE(drawn.off, kTenthOfAPixel) << far.x << " " << far.y;
         EXPECT_EQ(store->description.points, truth.size() + 1);
         const render::Image with = test::renderView(store, *backend, *executor, viewOf(centre), {});
-        EXPECT_GT(psnr(with, without), usual - 2) << far.x << " " << far.y << ", usually " << usual;
+        // At 1e12 a double has a step of a tenth of a millimetre: some points change their order.
+        EXPECT_GT(psnr(with, without), usual - (std::abs(far.x) < 1e12 ? 2 : 6))
+            << far.x << " " << far.y << ", usually " << usual;
         EXPECT_TRUE(verifyStore(*store, *executor, 0)) << far.x << " " << far.y;
     }
 }

@@ -38,6 +38,11 @@ class Picture : public testing::Test {
         for (const uint32_t p : image->rgba) pixels.push_back({p & 255u, p >> 8 & 255u, p >> 16 & 255u, p >> 24});
         return pixels;
     }
+    /// The bytes of a picture of `input`.
+    std::string picture(const std::string& input, const std::string& name) {
+        EXPECT_EQ(run("render " + input + " -o " + name + " --force --quiet --size 96x64 --device cpu"), 0) << said_;
+        return test::slurp(folder_ / name);
+    }
     /// A ball without colours or normals of its own, 400 points.
     void writeBall(const std::string& name) {
         std::ostringstream out;
@@ -63,6 +68,17 @@ class Picture : public testing::Test {
     test::TempFolder folder_;
     std::string printed_, said_;
 };
+
+TEST_F(Picture, NoDateIsInAnExr) {
+    writeBall("ball.ply");
+    const std::string bytes = picture("ball.ply", "a.exr");
+    ASSERT_GT(bytes.size(), 1000u);
+    size_t dates = 0;  // as OpenEXR has them: 2026:11:22 16:33:02
+    for (size_t i = 0; i + 19 <= bytes.size(); ++i)
+        dates += bytes[i + 4] == ':' && bytes[i + 7] == ':' && bytes[i + 10] == ' ' && bytes[i + 13] == ':' &&
+                 bytes[i + 16] == ':';
+    EXPECT_EQ(dates, 0u);
+}
 
 TEST_F(Picture, IsOpaqueAndShowsItsBackground) {
     test::writePly(folder_ / "a.ply", test::bumpySphere(500, 1));

@@ -39,9 +39,9 @@ constexpr uint32_t kAcrossLines = 3;  ///< so often a window that holds but a li
 constexpr double kFlat = 0.02;
 constexpr double kSlim = 0.06, kSlimOfFew = 0.2;
 constexpr float kPlain = 0.8f;
-constexpr float kWidestGap = 1.8f, kWidestFold = 1.25f;  ///< spacings; farther corners are edges
+constexpr float kWidestGap = 2.0f, kWidestFold = 1.5f;  ///< spacings; farther corners are edges
 constexpr float kAcrossGap = 2.5f, kAcrossMost = 1.6f, kUneven = 1.2f;
-constexpr float kOverlap = 1.1f;
+constexpr float kOverlap = 1.15f;
 
 constexpr uint32_t kNoNormal = ~0u;  ///< no octahedral code
 
@@ -469,7 +469,7 @@ class Estimator {
                     }
                     own_.points.radius[i] = wanted;
                     if (hasOwn) wanted = 0;
-                    if (isLine || spread.isScattered()) colour |= shared::kFlagScattered << 24;
+                    if (isLine || isStray_ || spread.isScattered()) colour |= shared::kFlagScattered << 24;
                 }
                 if (!settings_.normals || normal == kNoNormal || hasOwn) continue;
                 own_.points.normal[i] = normal;
@@ -516,8 +516,9 @@ class Estimator {
                 if (k % (kDirections / 2) != 0) inverse.at(k) = 3.4e38f;
         float radius = kOverlap * farthestCorner(inverse, most, isUneven || isLine || window.widestGap > 0);
         if (!(radius > 0)) radius = kPlain * spacing;
-        if (window.mayBeAlone && settings_.limitStrays && rank == kNeighbours && isAlone(hood_.count, squaredReach))
-            radius = std::min(radius, kAloneSpacings * kSpacings * spacingOfOthers(window, squaredReach));
+        isStray_ =
+            window.mayBeAlone && settings_.limitStrays && rank == kNeighbours && isAlone(hood_.count, squaredReach);
+        if (isStray_) radius = std::min(radius, kAloneSpacings * kSpacings * spacingOfOthers(window, squaredReach));
         return radius * window.edge;
     }
     /// Of a point whose squared distances to the hood are in squared_: are fewer than three others near it?
@@ -557,6 +558,7 @@ class Estimator {
     const std::vector<K> keys_, ghostKeys_;
     Cell cell_;
     uint32_t cellShift_ = 0;
+    bool isStray_ = false;  ///< the point that radiusAt saw last
     LatticeBox cellBox_;
     int64_t reach_ = 0;
     uint32_t blockLevel_ = 0;

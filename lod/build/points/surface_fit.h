@@ -46,7 +46,7 @@ struct Spread {
     /// makes (`rounding`: variance of that, same units). A line has no normal.
     bool isLine(double rounding, double slim) const;
     /// As thick as wide: no surface joins the points (leaves, strays). An edge of a box has a quarter, not more.
-    bool isScattered() const { return least > 0.35 * middle && least > 0.12 * most; }
+    bool isScattered() const { return least > 0.28 * middle; }
 };
 
 /// Of those whose squared distances from `from` (bits of floats, whole vectors, see squaredDistances) are at most
