@@ -69,6 +69,29 @@ class Picture : public testing::Test {
     std::string printed_, said_;
 };
 
+TEST_F(Picture, OneStrayPointFarAwayCutsNothingOffInFront) {
+    // The near plane was a millionth of the scene: 2 units for a stray point 2,000 km away, before all of the ball.
+    const auto cover = [&](bool hasStray) {
+        std::ostringstream out;
+        const int count = 8000;
+        out << "ply\nformat ascii 1.0\nelement vertex " << count + (hasStray ? 1 : 0)
+            << "\nproperty double x\nproperty double y\nproperty double z\nend_header\n";
+        for (int i = 0; i < count; ++i) {
+            const double z = 1 - 2 * (i + 0.5) / count, r = std::sqrt(1 - z * z), a = 2.399963 * i;
+            out << r * std::cos(a) << ' ' << r * std::sin(a) << ' ' << z << '\n';
+        }
+        if (hasStray) out << "2000000 0 0\n";
+        const std::string name = hasStray ? "stray.ply" : "alone.ply";
+        test::spit(folder_ / name, out.str());
+        const auto pixels =
+            render(name, "--force --colour plain --eye 0,0,1.2 --target 0,0,0 --camera-up 0,1,0 --alpha");
+        return std::count_if(pixels.begin(), pixels.end(), [](const auto& p) { return p[3] == 255; });
+    };
+    const auto alone = cover(false), beside = cover(true);
+    EXPECT_EQ(alone, 96 * 64);
+    EXPECT_EQ(beside, alone);
+}
+
 TEST_F(Picture, NoDateIsInAnExr) {
     writeBall("ball.ply");
     const std::string bytes = picture("ball.ply", "a.exr");
