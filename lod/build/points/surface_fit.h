@@ -45,8 +45,8 @@ struct Spread {
     /// first, or at most `slim` of it and not much more than the third (a line with noise), or what rounding alone
     /// makes (`rounding`: variance of that, same units). A line has no normal.
     bool isLine(double rounding, double slim) const;
-    /// As thick as wide: no surface joins the points (leaves, strays). An edge of a box has a quarter, not more.
-    bool isScattered() const { return least > 0.28 * middle; }
+    /// Too thick to be a surface: leaves, strays; edges of boxes as well (a quarter), which does them no harm.
+    bool isScattered() const { return least > 0.12 * middle; }
 };
 
 /// Of those whose squared distances from `from` (bits of floats, whole vectors, see squaredDistances) are at most
