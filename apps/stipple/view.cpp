@@ -43,7 +43,7 @@ class Viewer {
           settings_(settings),
           executor_(executor),
           opener_(o.build),
-          navigation_(std::move(navigation)),
+          navigation_(navigation),
           player_(std::move(player)) {}
 
     Result<void> run() {
@@ -211,7 +211,7 @@ class Viewer {
     Result<void> drawNext(const gpu::Input& input) {
         render::FrameState& state = session_.state();
         if (std::exchange(hasChanged_, false)) {
-            if (const auto drawn = render(settings_.frame); !drawn) {
+            if (auto drawn = render(settings_.frame); !drawn) {
                 if (drawn.error().kind == ErrorKind::device) return drawn;
                 tell(drawn.error());
             }
@@ -347,8 +347,7 @@ Result<void> run(const ViewOptions& o) {
     STIPPLE_ASSIGN(const std::unique_ptr<gpu::Window> window,
                    gpu::Window::create("Stipple: " + session.scene().description.source, size.x, size.y,
                                        std::getenv("STIPPLE_VALIDATION") != nullptr));
-    const auto result =
-        Viewer(o, *window, session, settings, *executor, std::move(navigation), std::move(player)).run();
+    const auto result = Viewer(o, *window, session, settings, *executor, navigation, std::move(player)).run();
     for (const std::string& message : window->validationMessages()) fmt::print(stderr, "validation: {}\n", message);
     STIPPLE_TRY(result);
     if (!window->validationMessages().empty())

@@ -204,6 +204,7 @@ CameraPath makeOrbit(std::span<const glm::dvec3> points, const glm::dvec3& up, d
     const glm::dvec3 middle = middleOf(points);
     const double elevation = elevationFor(points, camera.up);
     std::vector<glm::dvec3> directions;
+    directions.reserve(static_cast<size_t>(std::max(keys, 0)));
     for (int i = 0; i < keys; ++i)
         directions.push_back(directionFrom(camera.up, elevation, (20.0 + 360.0 * i / keys) * kPi / 180));
     const auto distanceAt = [&](const glm::dvec3& target, size_t stride) {

@@ -249,6 +249,7 @@ class Reader {
 
     Result<void> readNodesFrom(const std::vector<size_t>& starts, const json& nodes, std::vector<bool>& isTaken) {
         std::vector<std::pair<size_t, int>> open;
+        open.reserve(starts.size());
         for (const size_t start : starts) open.emplace_back(start, -1);
         for (size_t at = 0; at < open.size(); ++at) {
             const auto [index, parent] = open[at];
