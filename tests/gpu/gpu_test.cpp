@@ -1,6 +1,7 @@
 // The gpu backend on whatever Vulkan there is (CI: llvmpipe), always with core and synchronization validation.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <stdexcept>
@@ -58,6 +59,36 @@ TEST_F(Gpu, DrawsAsTheOracleDrawsAndValidationIsSilent) {
                     << "tau " << tau << " debug " << debug;
                 if (debug == shared::kDebugNone) EXPECT_GE(d->psnr, 50) << "tau " << tau;
             }
+    for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
+}
+
+TEST_F(Gpu, DepthNormalsAndCoverageOfPointsAreTheOracles) {
+    const auto gpu = make();
+    const auto oracle = reference::makeReferenceBackend(*executor_);
+    render::FrameSettings settings;
+    settings.wantDepthAndNormal = true;
+    for (const double tau : {0.25, 4.0}) {
+        settings.budgets.errorPixels = tau;
+        const lod::View view = test::fitView(*store_, 400, 300);
+        const render::Image a = test::renderView(store_, *gpu, *executor_, view, settings),
+                            b = test::renderView(store_, *oracle, *executor_, view, settings);
+        std::vector<double> depth, lean;
+        size_t uncovered = 0;
+        for (size_t i = 0; i < a.depth.size(); ++i) {
+            uncovered += (a.depth[i] > 0) != (b.depth[i] > 0);
+            if (!(a.depth[i] > 0 && b.depth[i] > 0)) continue;
+            depth.push_back(std::abs(a.depth[i] - b.depth[i]) * view.focalPixels / b.depth[i]);
+            double cosine = 0;
+            for (size_t c = 0; c < 3; ++c) cosine += double{a.normal[3 * i + c]} * double{b.normal[3 * i + c]};
+            lean.push_back(std::acos(std::min(cosine, 1.0)) * 180 / M_PI);
+        }
+        ASSERT_GT(depth.size(), 10000u);
+        std::sort(depth.begin(), depth.end());
+        std::sort(lean.begin(), lean.end());
+        EXPECT_LE(depth[depth.size() * 99 / 100], 0.05) << "pixels, tau " << tau;
+        EXPECT_LE(lean[lean.size() * 99 / 100], 0.2) << "degrees, tau " << tau;
+        EXPECT_LE(uncovered, depth.size() / 1000) << "pixels, tau " << tau;
+    }
     for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
 }
 
