@@ -111,6 +111,9 @@ class CpuBackend final : public render::Backend {
                 case render::Pass::project:
                     project(hasPyramid);
                     break;
+                case render::Pass::discs:
+                    fillDiscs();
+                    break;
                 case render::Pass::strands:
                     drawStrands();
                     break;
@@ -207,9 +210,12 @@ class CpuBackend final : public render::Backend {
 
     void project(bool hasPyramid) {
         besideToo_.resize(draws_->nodes.size());
-        for (size_t n = 0; n < besideToo_.size(); ++n) besideToo_[n] = hasPyramid && !isWithin(draws_->nodes[n]);
+        for (size_t n = 0; n < besideToo_.size(); ++n)
+            besideToo_[n] =
+                hasPyramid && ((draws_->nodes[n].octantMask & shared::kNodeWide) != 0 || !isWithin(draws_->nodes[n]));
         executor_.parallelFor(blocks_.size(), 32, [&](size_t begin, size_t end) {
             alignas(64) std::array<uint32_t, shared::kRecordsPerBlock> pixel, depth;
+            std::vector<shared::WideDisc> mine;
             for (size_t b = begin; b < end; ++b) {
                 const uint32_t count =
                     std::min(shared::kRecordsPerBlock, blocks_[b].node->count - draws_->blocks[b].first);
@@ -217,9 +223,15 @@ class CpuBackend final : public render::Backend {
                                 besideToo_[draws_->blocks[b].node] != 0, pixel.data(), depth.data());
                 constexpr uint32_t kAhead = 48;  // the pixels are scattered over 16 MB: ask for them in time
                 for (uint32_t i = 0; i < count; ++i) {
-                    if (i + kAhead < count && pixel[i + kAhead] != ~0u)
+                    if (i + kAhead < count && pixel[i + kAhead] < kWidePixel)
                         __builtin_prefetch(&visibility_[pixel[i + kAhead]], 1);
-                    if (pixel[i] == ~0u) continue;
+                    if (pixel[i] >= kWidePixel) {
+                        if (pixel[i] == kWidePixel)
+                            mine.push_back(shared::wideDisc(*blocks_[b].node, blocks_[b].records[i],
+                                                            frame_.supportScale,
+                                                            static_cast<uint32_t>(b) * shared::kRecordsPerBlock + i));
+                        continue;
+                    }
                     const uint64_t key = uint64_t{depth[i]} << 32 | (b * shared::kRecordsPerBlock + i);
                     const std::atomic_ref<uint64_t> entry(visibility_[pixel[i]]);
                     uint64_t old = entry.load(std::memory_order_relaxed);
@@ -227,7 +239,17 @@ class CpuBackend final : public render::Backend {
                     }
                 }
             }
+            if (!mine.empty()) foundDiscs_.push(std::move(mine));
         });
+        discs_.clear();
+        for (const auto& some : foundDiscs_.takeAll()) discs_.insert(discs_.end(), some.begin(), some.end());
+    }
+
+    void fillDiscs() {
+        if (!discs_.empty())
+            forBands([&](uint32_t first, uint32_t last) {
+                k_.fillDiscs(frame_, discs_.data(), discs_.size(), first, last, visibility_.data());
+            });
     }
 
     void rasterise() {
@@ -534,6 +556,8 @@ class CpuBackend final : public render::Backend {
     std::vector<WideStrand> wide_;
     CompletionQueue<std::vector<WideStrand>> foundWide_;
     std::vector<BlockSource> blocks_;
+    std::vector<shared::WideDisc> discs_;
+    CompletionQueue<std::vector<shared::WideDisc>> foundDiscs_;
     std::vector<uint8_t> besideToo_;  ///< of each node
     std::vector<render::PassTime> times_;
     const render::DrawList* draws_ = nullptr;

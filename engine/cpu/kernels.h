@@ -11,11 +11,14 @@
 #include "shaders/shared/record.h"
 #include "shaders/shared/strand.h"
 #include "shaders/shared/texture.h"
+#include "shaders/shared/wide_disc.h"
 
 namespace stipple::cpu {
 
 constexpr uint32_t kTile = 128;  ///< pixels of a row that are worked on together: all rows of a tile stay in L1 and L2
 constexpr uint32_t kPad = 16;    ///< entries in front of the first one; also room behind the last one
+
+constexpr uint32_t kWidePixel = ~1u;  ///< in the place of a pixel's index: a wide disc
 
 /// A row of unpacked texels; entry x of a tile is at [kPad + x]. Entries -1 and n may be read as neighbours.
 struct TexelRow {
@@ -135,7 +138,7 @@ struct ShadeOutput {
 struct Kernels {
     const char* name;
     /// Pixel index (or ~0u) and depth bits of up to 256 records.
-    /// `besideToo`: also those beside the picture whose discs reach in.
+    /// `besideToo`: also those beside the picture whose discs reach in; wide discs give kWidePixel.
     void (*projectBlock)(const shared::FrameConstants& f, const shared::DrawNode& node,
                          const shared::PointRecord* records, uint32_t count, bool besideToo, uint32_t* pixel,
                          uint32_t* depth);
@@ -174,6 +177,9 @@ struct Kernels {
     /// Rows [firstRow, lastRow] of the strands that were kept.
     void (*fillWide)(const shared::FrameConstants& f, const WideStrand* strands, size_t count, uint32_t firstRow,
                      uint32_t lastRow, uint64_t* visibility);
+    /// Rows [firstRow, lastRow] of wide discs.
+    void (*fillDiscs)(const shared::FrameConstants& f, const shared::WideDisc* discs, size_t count, uint32_t firstRow,
+                      uint32_t lastRow, uint64_t* visibility);
 };
 
 /// The best kernels that this processor runs; STIPPLE_SIMD=sse|avx2|avx512 asks for fewer.

@@ -9,6 +9,7 @@
 #include "shaders/shared/shade.h"
 #include "shaders/shared/splat_size.h"
 #include "shaders/shared/strand.h"
+#include "shaders/shared/wide_disc.h"
 
 namespace stipple::cpu {
 namespace {
@@ -47,7 +48,8 @@ template <bool hasTubes>
     row.axisY[i] = t.axis.y;
 }
 
-template <bool besideToo>
+/// `besideToo`: also those beside the picture; `wideToo`: wide discs are told apart.
+template <bool besideToo, bool wideToo>
 [[gnu::always_inline]] inline void projectRecords(const FrameConstants& frame, const DrawNode& drawNode,
                                                   const PointRecord* __restrict records, uint32_t count,
                                                   uint32_t* __restrict pixel, uint32_t* __restrict depth) {
@@ -61,6 +63,7 @@ template <bool besideToo>
     const uint* __restrict const words = &records->positionXY;  // four words a record
     const float edge = node.edge * f.supportScale, minimum = f.minimumRadius;
     const float mostScattered = largestSplat(kFlagScattered, focal, f.height), most = largestSplat(0u, focal, f.height);
+    const float wideShare = wideRadius(f.width, f.height) / focal;
     const uint stride = f.width, errorCode = node.errorCode, octantMask = node.octantMask;
 #pragma GCC ivdep
     for (size_t i = 0; i < count; ++i) {
@@ -93,16 +96,23 @@ template <bool besideToo>
         const bool keep = inside & fine & seen;
         const int ix = int(keep ? atX : 0.0f), iy = int(keep ? atY : 0.0f);
         pixel[i] = keep ? uint(iy) * stride + uint(ix) : ~0u;
+        if (wideToo) {
+            const float wide =
+                isWideDisc(recordFlags(r), cz, edge * radiusFractionFast(recordRadiusCode(r)), wideShare, nearPlane);
+            pixel[i] = wide > 0.5f ? (fine & seen ? kWidePixel : ~0u) : pixel[i];
+        }
         depth[i] = floatBitsToUint(key);
     }
 }
 
 void projectBlock(const FrameConstants& f, const DrawNode& node, const PointRecord* records, uint32_t count,
                   bool besideToo, uint32_t* pixel, uint32_t* depth) {
-    if (besideToo)
-        projectRecords<true>(f, node, records, count, pixel, depth);
+    if ((node.octantMask & kNodeWide) != 0u && besideToo)
+        projectRecords<true, true>(f, node, records, count, pixel, depth);
+    else if (besideToo)
+        projectRecords<true, false>(f, node, records, count, pixel, depth);
     else
-        projectRecords<false>(f, node, records, count, pixel, depth);
+        projectRecords<false, false>(f, node, records, count, pixel, depth);
 }
 
 #include "engine/cpu/sample.inl"
@@ -117,6 +127,8 @@ struct Gathered {
 };
 
 #include "engine/cpu/resolve_triangles.inl"
+
+#include "engine/cpu/discs.inl"
 
 #include "engine/cpu/strands.inl"
 
@@ -168,8 +180,8 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
     const FrameConstants f = frame;
     constexpr size_t kPrefetch = 12;  // pixels ahead: records lie anywhere in memory
     Gathered g;
-    WinningPixels triangles, strands;
-    triangles.count = strands.count = 0;
+    WinningPixels triangles, strands, discs;
+    triangles.count = strands.count = discs.count = 0;
     bool any = false, anyTurned = false;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
@@ -180,7 +192,8 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         const uint64_t key = visibility[i];
         if ((key & kKindMask) != 0) {  // nothing (all bits), or a triangle
             if (key != ~uint64_t{0}) {
-                WinningPixels& to = (key & kKindMask) == kKindTriangle ? triangles : strands;
+                const uint64_t kind = key & kKindMask;
+                WinningPixels& to = kind == kKindTriangle ? triangles : kind == kKindStrand ? strands : discs;
                 to.pixel[to.count] = static_cast<uint32_t>(i);
                 to.id[to.count] = static_cast<uint32_t>(key) & ~kKindMask;
                 to.depth[to.count++] = uintBitsToFloat(static_cast<uint32_t>(key >> 32));
@@ -236,9 +249,10 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         if (row.hasTubes)
 #pragma GCC ivdep
             for (size_t i = 0; i < n; ++i) row.isRound[kPad + i] = row.axisX[kPad + i] = 0;
+        if (discs.count > 0) resolveDiscs(f, tables, in, discs, x0, y, row);
         if (triangles.count > 0) resolveTriangles(f, in, triangles, x0, y, row, planes);
         row.hasTubes = strands.count > 0 && resolveStrands(f, in, strands, x0, y, row, largestRadius);
-        return triangles.count + strands.count > 0;
+        return triangles.count + strands.count + discs.count > 0;
     }
     if (anyTurned)
         resolveSplats<true>(f, g, x0, y, n, row);
@@ -253,6 +267,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
     if (row.hasTubes)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) row.isRound[kPad + i] = row.axisX[kPad + i] = 0;
+    if (discs.count > 0) resolveDiscs(f, tables, in, discs, x0, y, row);
     if (triangles.count > 0) resolveTriangles(f, in, triangles, x0, y, row, planes);
     row.hasTubes = strands.count > 0 && resolveStrands(f, in, strands, x0, y, row, largestRadius);
     return true;
@@ -573,6 +588,7 @@ const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
                               rasterCluster,
                               rasterLarge,
                               drawSegments,
-                              fillWide};
+                              fillWide,
+                              fillDiscs};
 
 }  // namespace stipple::cpu

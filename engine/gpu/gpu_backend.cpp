@@ -11,6 +11,7 @@
 #include "engine/gpu/pages.h"
 #include "engine/gpu/pass_list.h"
 #include "engine/gpu/pipelines.h"
+#include "shaders/shared/wide_disc.h"
 
 namespace stipple::gpu {
 namespace {
@@ -18,6 +19,7 @@ namespace {
 constexpr VkBufferUsageFlags kStorage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
 constexpr uint32_t kLargeCapacity = 65536, kLargeGroups = 64, kLargeRows = 16;  // see shaders/rasterise
 constexpr uint32_t kWideCapacity = 65536;                                       // see shaders/strands
+constexpr uint32_t kDiscCapacity = 65536;                                       // see shaders/discs.glsl
 constexpr uint32_t kGroup = 64, kGroupsPerDimension = 65535;
 
 uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | key.node; }
@@ -53,7 +55,7 @@ class GpuBackend final : public render::Backend {
         render::BackendResources r;
         r.strandPipelines = pipelines_->strandCount();
         r.strandBytes = wide_.bytes();
-        r.meshPipelines = pipelines_->count() - Pipelines::kPointPasses - r.strandPipelines;
+        r.meshPipelines = pipelines_->count() - Pipelines::kPointPasses - r.strandPipelines - pipelines_->discCount();
         for (const Buffer* b : {&meshes_, &clusters_, &materials_, &textures_, &tiles_, &surfaces_, &large_})
             r.meshBytes += b->bytes();
         for (const auto& t : meshFrame_.tiles) r.textureTiles += t.low != 0 || t.high != 0;
@@ -196,6 +198,11 @@ class GpuBackend final : public render::Backend {
             STIPPLE_TRY(ensure(wide_, 4 + uint64_t{kWideCapacity} * 120, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
                                false, "wide strands"));
         }
+        if (draws.hasWideDiscs) {
+            STIPPLE_TRY(pipelines_->addDiscPass());
+            STIPPLE_TRY(ensure(discs_, 4 + uint64_t{kDiscCapacity} * sizeof(shared::WideDisc),
+                               kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "wide discs"));
+        }
         if (!draws.meshDraws.empty()) STIPPLE_TRY(prepareMeshes(draws, pixels));
         if (needsLightPass(draws)) STIPPLE_TRY(prepareLights(draws));
         if (descriptorsChanged_) {
@@ -203,7 +210,7 @@ class GpuBackend final : public render::Backend {
             pipelines_->writeDescriptors({&frameBuffer_, &nodeBuffer_, &blockBuffer_, &visibility_, &texels_, &stats_,
                                           &image_, &extra_, bound(meshes_), bound(clusters_), bound(materials_),
                                           bound(textures_), bound(tiles_), bound(lights_), bound(surfaces_),
-                                          bound(large_), bound(environment_), bound(wide_)});
+                                          bound(large_), bound(environment_), bound(wide_), bound(discs_)});
             descriptorsChanged_ = false;
         }
         return {};
@@ -307,15 +314,29 @@ class GpuBackend final : public render::Backend {
                 vkCmdFillBuffer(commands_, stats_.handle(), 0, VK_WHOLE_SIZE, 0);
                 break;
             case render::Pass::project: {
-                list.begin("project", {write(visibility_)}, false);
+                const bool hasDiscs = hasPyramid && draws.hasWideDiscs;
+                if (hasDiscs) {
+                    list.begin("disc list", {write(discs_)}, true);
+                    vkCmdFillBuffer(commands_, discs_.handle(), 0, 4, 0);
+                    list.end();
+                    list.begin("project", {write(visibility_), write(discs_)}, false);
+                } else {
+                    list.begin("project", {write(visibility_)}, false);
+                }
                 pipelines_->use(commands_, "project");
-                pushStep(0, hasPyramid, wantAll);
+                pushStep(0, hasPyramid, wantAll, hasDiscs ? 1 : 0);
                 const auto blocks = static_cast<uint32_t>(draws.blocks.size());
                 if (blocks > 0)
                     vkCmdDispatch(commands_, std::min(blocks, kGroupsPerDimension),
                                   (blocks + kGroupsPerDimension - 1) / kGroupsPerDimension, 1);
                 break;
             }
+            case render::Pass::discs:
+                list.begin("discs", {write(visibility_), read(discs_)}, false);
+                pipelines_->use(commands_, "discs");
+                pushStep(0, hasPyramid, wantAll);
+                vkCmdDispatch(commands_, kLargeGroups, (levels_[0].height + kLargeRows - 1) / kLargeRows, 1);
+                break;
             case render::Pass::strands: {
                 list.begin("wide list", {write(wide_)}, true);
                 vkCmdFillBuffer(commands_, wide_.handle(), 0, 4, 0);
@@ -485,6 +506,7 @@ class GpuBackend final : public render::Backend {
     Buffer meshes_, clusters_, materials_, textures_, tiles_, surfaces_, large_;  // only with triangles
     Buffer wide_;                                                                 // only with strands
     Buffer lights_, environment_;                                                 // only with lights
+    Buffer discs_;                                                                // only with wide discs
     std::unordered_map<uint64_t, MeshChunk> meshChunks_;
     MeshFrame meshFrame_;
     VkCommandPool commandPool_ = VK_NULL_HANDLE;

@@ -37,6 +37,9 @@ constexpr uint32_t kStrandsWide[] = {
 constexpr uint32_t kStrandTexels[] = {
 #include "strand_texels.inc"
 };
+constexpr uint32_t kDiscs[] = {
+#include "discs.inc"
+};
 constexpr uint32_t kLight[] = {
 #include "light.inc"
 };
@@ -95,6 +98,10 @@ Result<void> Pipelines::addStrandPasses() {
     STIPPLE_TRY(add("strands", kStrands, std::size(kStrands)));
     STIPPLE_TRY(add("strands_wide", kStrandsWide, std::size(kStrandsWide)));
     return add("strand_texels", kStrandTexels, std::size(kStrandTexels));
+}
+
+Result<void> Pipelines::addDiscPass() {
+    return pipelines_.count("discs") > 0 ? Result<void>() : add("discs", kDiscs, std::size(kDiscs));
 }
 
 Result<void> Pipelines::addLightPass() {

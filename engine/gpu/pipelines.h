@@ -19,7 +19,7 @@ static_assert(sizeof(StepConstants) == 44);
 
 class Pipelines {
   public:
-    static constexpr size_t kBindings = 18, kPointPasses = 5;
+    static constexpr size_t kBindings = 19, kPointPasses = 5;
     static Result<std::unique_ptr<Pipelines>> create(const Device& device);
     ~Pipelines();
     Pipelines(const Pipelines&) = delete;
@@ -31,10 +31,13 @@ class Pipelines {
     Result<void> addMeshPasses();
     /// The passes that only ribbons and tubes need.
     Result<void> addStrandPasses();
+    /// The pass that wide discs need.
+    Result<void> addDiscPass();
     /// The pass that lights need, of triangles and of points under lights of the scene's own.
     Result<void> addLightPass();
     size_t count() const { return pipelines_.size(); }
     size_t strandCount() const { return pipelines_.count("strand_texels") > 0 ? 3 : 0; }
+    size_t discCount() const { return pipelines_.count("discs"); }
     void use(VkCommandBuffer commands, const std::string& pass) const;
     void push(VkCommandBuffer commands, const StepConstants& step) const;
 

@@ -225,6 +225,15 @@ class ReferenceBackend final : public render::Backend {
                 if (!draws.bends.empty()) world = draws.bends[d].moved(world);
                 world -= v.eye;
                 const dvec3 c(glm::dot(world, v.right), glm::dot(world, v.down), glm::dot(world, v.forward));
+                const dvec3 nw = instance.rotation * disc.normal;
+                dvec3 n(glm::dot(nw, v.right), glm::dot(nw, v.down), glm::dot(nw, v.forward));
+                const bool oneSided = (disc.flags & (shared::kFlagTwoSided | shared::kFlagNoNormal)) == 0;
+                if (oneSided && glm::dot(n, c) >= 0) continue;
+                disc.colour = f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError
+                                  ? debugColour(f, node, cut)
+                                  : disc.colour;
+                if (hasPyramid && showWide(draws, disc, instance.scale * disc.radius * f.supportScale, c, n, level))
+                    continue;
                 if (!(c.z > v.nearPlane)) continue;
                 const dvec2 p(v.focalPixels * c.x / c.z + 0.5 * v.width, v.focalPixels * c.y / c.z + 0.5 * v.height);
                 // A stray point hides no more of the picture than this.
@@ -239,10 +248,6 @@ class ReferenceBackend final : public render::Backend {
                 if (!isInside && !(hasPyramid && beside < 1)) continue;
                 // There, of one surface's splats that which reaches in farthest is kept.
                 const double key = c.z + (isInside ? 0.0 : beside * beside * radius * c.z / v.focalPixels);
-                const dvec3 nw = instance.rotation * disc.normal;
-                dvec3 n(glm::dot(nw, v.right), glm::dot(nw, v.down), glm::dot(nw, v.forward));
-                const bool oneSided = (disc.flags & (shared::kFlagTwoSided | shared::kFlagNoNormal)) == 0;
-                if (oneSided && glm::dot(n, c) >= 0) continue;
                 Sample& s = isInside ? level.ref(static_cast<int>(p.x), static_cast<int>(p.y))
                                      : level.ref(static_cast<int>(at.x), static_cast<int>(at.y));
                 if (s.valid && s.key <= key) continue;
@@ -260,11 +265,39 @@ class ReferenceBackend final : public render::Backend {
                     s.thickness = kLeafThickness * s.radius * c.z / v.focalPixels;
                 s.perp = dvec2(rotationToZ(toPoint) * n);
                 s.colour = disc.colour;
-                if (f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError)
-                    s.colour = debugColour(f, node, cut);
             }
         }
         return level;
+    }
+
+    /// Discs so wide that an ellipse a texel does not hold them: every pixel whose ray meets one. False: it is not.
+    static bool showWide(const render::DrawList& draws, const Disc& disc, double radius, const dvec3& c, dvec3 n,
+                         Level& level) {
+        const lod::View& v = draws.view;
+        const bool isFree = (disc.flags & shared::kFlagNoNormal) != 0;
+        const double widest = std::max(0.25 * std::max(v.width, v.height), 16.0);  // px
+        if ((disc.flags & shared::kFlagScattered) != 0 || (isFree && c.z <= v.nearPlane)) return false;
+        if (radius * v.focalPixels <= widest * c.z || c.z + radius <= v.nearPlane) return false;
+        if (isFree) n = glm::normalize(c);
+        for (int y = 0; y < level.height; ++y)
+            for (int x = 0; x < level.width; ++x) {
+                const dvec2 at(x + 0.5, y + 0.5);
+                const dvec3 ray = lensOf(draws).rayTo(at);
+                const double depth = glm::dot(n, c) / glm::dot(n, ray);
+                Sample& s = level.ref(x, y);
+                if (!(depth > v.nearPlane) || glm::length(depth * ray - c) > radius || (s.valid && s.key <= depth))
+                    continue;
+                const dvec3 seen = glm::dot(n, ray) > 0 ? -n : n;
+                const bool isLeaf = (disc.flags & shared::kFlagLoose) != 0;
+                s.valid = true;
+                s.depth = s.key = depth;
+                s.centre = at;
+                s.radius = 0.25;  // no ellipse: what the pixel shows
+                s.thickness = (isLeaf ? kLeafThickness : 1) * 0.25 * depth / v.focalPixels;
+                s.perp = dvec2(rotationToZ(glm::normalize(ray)) * seen);
+                s.colour = disc.colour;
+            }
+        return true;
     }
 
     static Lens lensOf(const render::DrawList& draws) {

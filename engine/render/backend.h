@@ -15,11 +15,12 @@ namespace stipple::render {
 enum class Mode : uint8_t { pullpush, points };
 
 /// Passes in the order in which they run; a pass that the frame does not call for is not in the list.
-enum class Pass : uint8_t { clear, project, strands, rasterise, resolve, pull, push, shade };
+enum class Pass : uint8_t { clear, project, discs, strands, rasterise, resolve, pull, push, shade };
 const char* passName(Pass pass);
 /// What a frame draws, for what it calls for.
 struct FrameContent {
     bool hasPoints = true, hasTriangles = false, hasStrands = false;
+    bool hasWideDiscs = false;  ///< points may be
 };
 /// The passes of a mode.
 std::vector<Pass> passesOf(Mode mode, const FrameContent& content);

@@ -47,6 +47,7 @@ struct DrawList {
     std::vector<shared::DrawNode> nodes;
     std::vector<shared::DrawBlock> blocks;
     std::vector<streaming::ChunkKey> keys;   ///< chunk of each node
+    bool hasWideDiscs = false;               ///< some of `nodes` may hold some (kNodeWide)
     std::vector<shared::DrawMesh> meshes;    ///< instances of mesh stores that are in view
     std::vector<MeshTextures> meshTextures;  ///< of each of `meshes`
     std::vector<shared::DrawNode> strandNodes;

@@ -21,6 +21,8 @@ const char* passName(Pass pass) {
             return "clear";
         case Pass::project:
             return "project";
+        case Pass::discs:
+            return "discs";
         case Pass::strands:
             return "strands";
         case Pass::rasterise:
@@ -40,6 +42,7 @@ const char* passName(Pass pass) {
 std::vector<Pass> passesOf(Mode mode, const FrameContent& content) {
     std::vector<Pass> passes{Pass::clear};
     if (content.hasPoints) passes.push_back(Pass::project);
+    if (content.hasWideDiscs && mode == Mode::pullpush) passes.push_back(Pass::discs);
     if (content.hasStrands) passes.push_back(Pass::strands);
     if (content.hasTriangles) passes.push_back(Pass::rasterise);
     passes.push_back(Pass::resolve);
@@ -193,8 +196,8 @@ Result<void> draw(FrameState& state, const lod::View& view, const FrameSettings&
     makeDrawList(state.cut, state.hierarchies, state.instances, view, settings.draw, state.draws);
     RenderRequest request;
     request.draws = &state.draws;
-    request.passes = passesOf(
-        settings.mode, {!state.draws.nodes.empty(), !state.draws.meshDraws.empty(), !state.draws.strandNodes.empty()});
+    request.passes = passesOf(settings.mode, {!state.draws.nodes.empty(), !state.draws.meshDraws.empty(),
+                                              !state.draws.strandNodes.empty(), state.draws.hasWideDiscs});
     request.wantDepthAndNormal = settings.wantDepthAndNormal;
     STIPPLE_TRY(state.backend->render(request, state.image));
 

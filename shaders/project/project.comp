@@ -1,7 +1,7 @@
 // One workgroup per block of 256 draw ids: each record to its pixel, by 64-bit atomic minimum of (depth, kind, id).
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "../bindings.glsl"
+#include "../discs.glsl"
 #include "../shared/splat_size.h"
 layout(local_size_x = 256) in;
 
@@ -16,6 +16,16 @@ void main() {
     const bool fine = recordErrorCode(r) <= node.errorCode || (node.octantMask >> recordOctant(r) & 1u) != 0u;
     if (!fine) return;
     const vec3 c = node.base + node.axisX * float(recordX(r)) + node.axisY * float(recordY(r)) + node.axisZ * float(recordZ(r));
+    const bool isOneSided = (recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) == 0u;
+    if (stepInfo.count != 0u && (node.octantMask & kNodeWide) != 0u &&
+        isWideDisc(recordFlags(r), c.z, node.edge * frame.supportScale * radiusFractionFast(recordRadiusCode(r)), wideRadius(frame.width, frame.height) / frame.focal, frame.nearPlane) > 0.5) {
+        if (isOneSided && !(dot(nodeDirection(node, octDirection(r.normal)), c) < 0.0)) return;
+        const uint place = atomicAdd(discCount, 1u);
+        if (place < kDiscCapacity) {
+            discs[place] = wideDisc(node, r, frame.supportScale, block * kRecordsPerBlock + gl_LocalInvocationID.x);
+            return;
+        }
+    }
     if (!(c.z > frame.nearPlane)) return;
     const float scale = frame.focal / c.z;
     float key = c.z;
@@ -29,9 +39,7 @@ void main() {
         p = vec2(float(s.x), float(s.y));
         key = c.z + s.farther * radius / scale;
     }
-    if ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) == 0u) {
-        if (!(dot(nodeDirection(node, octDirection(r.normal)), c) < 0.0)) return;
-    }
+    if (isOneSided && !(dot(nodeDirection(node, octDirection(r.normal)), c) < 0.0)) return;
     const uint64_t entry = uint64_t(floatBitsToUint(key)) << 32 | uint64_t(block * kRecordsPerBlock + gl_LocalInvocationID.x);
     atomicMin(visibility[uint(p.y) * frame.width + uint(p.x)], entry);
 }

@@ -16,7 +16,7 @@ struct DrawNode {
     vec3 base;
     float edge;       // edge of the node's cell, world units: scale of the radius codes
     uint errorCode;   // records with an own error code <= this are fine enough
-    uint octantMask;  // octants whose child is not drawn: their records are drawn whatever their error; kNodeTurned
+    uint octantMask;  // octants whose child is not drawn: their records are drawn whatever their error; kNode...
     uint count;       // records of the prefix
     uint addressLow;  // device address of the first record (gpu backend)
     uint addressHigh;
@@ -25,6 +25,7 @@ struct DrawNode {
 };
 
 const uint kNodeTurned = 256u;  // the store's own axes are not those of the world
+const uint kNodeWide = 512u;    // points of it may be wide discs (wide_disc.h)
 
 // A direction of the store (a normal, a tangent) in camera space; as long as it was. Instances are scaled evenly.
 SHARED_FN vec3 nodeDirection(DrawNode node, vec3 n) {

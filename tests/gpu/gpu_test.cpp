@@ -6,6 +6,7 @@
 #include <map>
 #include <stdexcept>
 
+#include "engine/cpu/cpu_backend.h"
 #include "engine/gpu/gpu_backend.h"
 #include "engine/gpu/pages.h"
 #include "engine/reference/reference.h"
@@ -62,32 +63,63 @@ TEST_F(Gpu, DrawsAsTheOracleDrawsAndValidationIsSilent) {
     for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
 }
 
+/// Depth, normals and coverage of two pictures of one view.
+void expectSameSurface(const render::Image& a, const render::Image& b, const lod::View& view, double mostDepth) {
+    std::vector<double> depth, lean;
+    size_t uncovered = 0;
+    for (size_t i = 0; i < a.depth.size(); ++i) {
+        uncovered += (a.depth[i] > 0) != (b.depth[i] > 0);
+        if (!(a.depth[i] > 0 && b.depth[i] > 0)) continue;
+        depth.push_back(std::abs(a.depth[i] - b.depth[i]) * view.focalPixels / b.depth[i]);
+        double cosine = 0;
+        for (size_t c = 0; c < 3; ++c) cosine += double{a.normal[3 * i + c]} * double{b.normal[3 * i + c]};
+        lean.push_back(std::acos(std::min(cosine, 1.0)) * 180 / M_PI);
+    }
+    ASSERT_GT(depth.size(), 10000u);
+    std::sort(depth.begin(), depth.end());
+    std::sort(lean.begin(), lean.end());
+    EXPECT_LE(depth[depth.size() * 99 / 100], mostDepth) << "pixels";
+    EXPECT_LE(lean[lean.size() * 99 / 100], 0.2) << "degrees";
+    EXPECT_LE(uncovered, depth.size() / 1000) << "pixels";
+}
+
 TEST_F(Gpu, DepthNormalsAndCoverageOfPointsAreTheOracles) {
     const auto gpu = make();
     const auto oracle = reference::makeReferenceBackend(*executor_);
     render::FrameSettings settings;
     settings.wantDepthAndNormal = true;
     for (const double tau : {0.25, 4.0}) {
+        SCOPED_TRACE(testing::Message() << "tau " << tau);
         settings.budgets.errorPixels = tau;
         const lod::View view = test::fitView(*store_, 400, 300);
-        const render::Image a = test::renderView(store_, *gpu, *executor_, view, settings),
-                            b = test::renderView(store_, *oracle, *executor_, view, settings);
-        std::vector<double> depth, lean;
-        size_t uncovered = 0;
-        for (size_t i = 0; i < a.depth.size(); ++i) {
-            uncovered += (a.depth[i] > 0) != (b.depth[i] > 0);
-            if (!(a.depth[i] > 0 && b.depth[i] > 0)) continue;
-            depth.push_back(std::abs(a.depth[i] - b.depth[i]) * view.focalPixels / b.depth[i]);
-            double cosine = 0;
-            for (size_t c = 0; c < 3; ++c) cosine += double{a.normal[3 * i + c]} * double{b.normal[3 * i + c]};
-            lean.push_back(std::acos(std::min(cosine, 1.0)) * 180 / M_PI);
+        expectSameSurface(test::renderView(store_, *gpu, *executor_, view, settings),
+                          test::renderView(store_, *oracle, *executor_, view, settings), view, 0.05);
+    }
+    for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
+}
+
+TEST_F(Gpu, FromNearDiscsThatFillThePictureAreTheOraclesToo) {
+    const auto gpu = make();
+    const auto cpu = cpu::makeCpuBackend(*executor_);
+    const auto oracle = reference::makeReferenceBackend(*executor_);
+    render::FrameSettings settings;
+    settings.wantDepthAndNormal = true;
+    lod::View view = test::fitView(*store_, 400, 300);
+    const render::Image far = test::renderView(store_, *oracle, *executor_, view, settings);
+    const size_t middle = 150 * 400 + 200;
+    ASSERT_GT(far.depth[middle], 0);
+    const glm::dvec3 surface = view.eye + view.forward * double{far.depth[middle]};
+    for (const double share : {0.03, 0.01, 0.002}) {
+        SCOPED_TRACE(testing::Message() << share << " of the way");
+        view.eye = surface - view.forward * (share * double{far.depth[middle]});
+        const render::Image exact = test::renderView(store_, *oracle, *executor_, view, settings);
+        for (render::Backend* backend : {gpu.get(), cpu.get()}) {
+            SCOPED_TRACE(backend->name());
+            expectSameSurface(test::renderView(store_, *backend, *executor_, view, settings), exact, view,
+                              0.1);  // of splats a hundred pixels wide
+            const auto& times = backend->passTimes();
+            EXPECT_TRUE(std::any_of(times.begin(), times.end(), [](const auto& t) { return t.name == "discs"; }));
         }
-        ASSERT_GT(depth.size(), 10000u);
-        std::sort(depth.begin(), depth.end());
-        std::sort(lean.begin(), lean.end());
-        EXPECT_LE(depth[depth.size() * 99 / 100], 0.05) << "pixels, tau " << tau;
-        EXPECT_LE(lean[lean.size() * 99 / 100], 0.2) << "degrees, tau " << tau;
-        EXPECT_LE(uncovered, depth.size() / 1000) << "pixels, tau " << tau;
     }
     for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
 }

@@ -1,0 +1,107 @@
+// Discs so wide on the image that one ellipse a texel does not hold them: from near by, a few of them fill the picture,
+// and some have their centres beside it or behind the eye. Their pixels are filled exactly, by rays; the nearest wins.
+// Camera space is that of frame.h.
+#ifndef STIPPLE_SHARED_WIDE_DISC_H
+#define STIPPLE_SHARED_WIDE_DISC_H
+#include "frame.h"
+#include "record.h"
+SHARED_BEGIN
+
+const uint kKindDisc = 0x60000000u;  // of a visibility id: the rest is the point's
+
+struct WideDisc {
+    vec3 centre;
+    vec3 normal;   // unit, any side
+    float radius;  // world units
+    uint id;       // for the visibility buffer
+};
+
+// From this radius on, px, a disc is wide: a quarter of the longer side of the picture.
+const float kWideShare = 0.25f;
+const float kWidePixels = 16.0f;
+SHARED_FN float wideRadius(uint width, uint height) {
+    return max(kWideShare * max(float(int(width)), float(int(height))), kWidePixels);
+}
+
+// 1 if a point is a wide disc. `depth`: of its centre; `radius`: world units; `perFocal`: wideRadius over the focal
+// length. Those that face the eye (no normal) have no place behind it; what no surface joins to others is drawn small
+// (largestSplat).
+SHARED_FN float isWideDisc(uint flags, float depth, float radius, float perFocal, float nearPlane) {
+    const float reaches = radius > depth * perFocal && depth + radius > nearPlane ? 1.0f : 0.0f;
+    const float faces = (flags & kFlagNoNormal) != 0u && !(depth > nearPlane) ? 0.0f : 1.0f;
+    return (flags & kFlagScattered) != 0u ? 0.0f : reaches * faces;
+}
+
+// Depth at which the ray (ex, ey, 1) meets a disc; kNoDisc where it does not, or before the near plane.
+const float kNoDisc = 3.0e38f;
+SHARED_FN float discDepth(WideDisc d, float ex, float ey, float nearPlane) {
+    const float facing = d.normal.x * ex + d.normal.y * ey + d.normal.z;
+    const float ahead = d.normal.x * d.centre.x + d.normal.y * d.centre.y + d.normal.z * d.centre.z;
+    const float z = ahead / (abs(facing) > 1.0e-12f ? facing : 1.0e-12f);
+    const float offX = z * ex - d.centre.x;
+    const float offY = z * ey - d.centre.y;
+    const float offZ = z - d.centre.z;
+    const bool isHit = z > nearPlane && offX * offX + offY * offY + offZ * offZ <= d.radius * d.radius;
+    return isHit ? z : kNoDisc;
+}
+
+// Slopes x / z between which a disc lies, seen along y: (centre, normal) are its components across and along the view.
+// x / z = s touches it where the distance of its centre from that plane is the radius, seen in the disc's own plane.
+// All there are, where it is not wholly before the eye.
+SHARED_FN vec2 discSlopes(float across, float depth, float normalAcross, float normalAlong, float radius) {
+    const float r2 = radius * radius;
+    const float reach2 = r2 * max(1.0f - normalAlong * normalAlong, 0.0f);
+    const float a = depth * depth - reach2;
+    const float b = across * depth + r2 * normalAcross * normalAlong;
+    const float c = across * across - r2 * max(1.0f - normalAcross * normalAcross, 0.0f);
+    const float root = sqrt(max(b * b - a * c, 0.0f));
+    const bool isAhead = depth > 0.0f && a > 0.01f * depth * depth;
+    return isAhead ? vec2((b - root) / a, (b + root) / a) : vec2(-3.0e38f, 3.0e38f);
+}
+
+// The pixels of a row (or column) whose centres may lie between two slopes: first and last, within the picture.
+struct PixelRange {
+    int first;
+    int last;
+};
+SHARED_FN PixelRange pixelsBetween(vec2 slopes, float focal, float centre, uint size) {
+    const float most = float(int(size)) - 1.0f;
+    PixelRange p;
+    p.first = int(floor(min(max(slopes.x * focal + centre - 1.5f, 0.0f), most + 1.0f)));
+    p.last = int(floor(min(max(slopes.y * focal + centre + 0.5f, -1.0f), most)));
+    return p;
+}
+
+// Where a point is in camera space.
+SHARED_FN vec3 recordPlace(DrawNode node, PointRecord r) {
+    const float qx = float(int(recordX(r)));
+    const float qy = float(int(recordY(r)));
+    const float qz = float(int(recordZ(r)));
+    return vec3(node.base.x + node.axisX.x * qx + node.axisY.x * qy + node.axisZ.x * qz,
+                node.base.y + node.axisX.y * qx + node.axisY.y * qy + node.axisZ.y * qz,
+                node.base.z + node.axisX.z * qx + node.axisY.z * qy + node.axisZ.z * qz);
+}
+
+// The normal of a point's disc in camera space; of one without, towards the eye.
+SHARED_FN vec3 discNormal(DrawNode node, PointRecord r) {
+    const vec3 c = recordPlace(node, r);
+    const float inverse = -1.0f / sqrt(max(dot(c, c), 1.0e-37f));
+    const vec3 n = nodeDirection(node, octDecode(r.normal));
+    const bool isFree = (recordFlags(r) & kFlagNoNormal) != 0u;
+    return vec3(isFree ? c.x * inverse : n.x, isFree ? c.y * inverse : n.y, isFree ? c.z * inverse : n.z);
+}
+
+SHARED_FN WideDisc wideDisc(DrawNode node, PointRecord r, float supportScale, uint id) {
+    WideDisc d;
+    d.centre = recordPlace(node, r);
+    d.normal = discNormal(node, r);
+    d.radius = node.edge * supportScale * radiusFractionFast(recordRadiusCode(r));
+    d.id = kKindDisc | id;
+    return d;
+}
+
+// Radius (and thickness, but of leaves) of a texel that is its own pixel and no ellipse, px.
+const float kExactRadius = 0.25f;
+
+SHARED_END
+#endif
