@@ -68,6 +68,12 @@ Texel loadTexel(uint offset, uint width, uint height, int x, int y) {
     return unpackTexel(p);
 }
 
+vec3 pointColour(DrawNode node, PointRecord r) {
+    if (frame.debugView == kDebugLevel) return debugLevelColour(node.level);
+    if (frame.debugView == kDebugError) return debugErrorColour(node.errorPixels);
+    return vec3(linearFromSrgb(float(r.colour & 255u) / 255.0), linearFromSrgb(float(r.colour >> 8 & 255u) / 255.0), linearFromSrgb(float(r.colour >> 16 & 255u) / 255.0));
+}
+
 // What a reconstructed texel shows at its pixel: tubes have normals round their axes.
 Texel finished(Texel t) {
     if (t.isRound < 0.5) return t;

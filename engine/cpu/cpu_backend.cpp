@@ -226,10 +226,11 @@ class CpuBackend final : public render::Backend {
                     if (i + kAhead < count && pixel[i + kAhead] < kWidePixel)
                         __builtin_prefetch(&visibility_[pixel[i + kAhead]], 1);
                     if (pixel[i] >= kWidePixel) {
-                        if (pixel[i] == kWidePixel)
-                            mine.push_back(shared::wideDisc(*blocks_[b].node, blocks_[b].records[i],
-                                                            frame_.supportScale,
-                                                            static_cast<uint32_t>(b) * shared::kRecordsPerBlock + i));
+                        if (pixel[i] == ~0u) continue;
+                        const auto id = static_cast<uint32_t>(b) * shared::kRecordsPerBlock + i;
+                        const shared::WideDisc d =
+                            shared::wideDisc(*blocks_[b].node, blocks_[b].records[i], frame_.supportScale, id);
+                        if (shared::reachesPicture(d, frame_) > 0.5f) mine.push_back(d);
                         continue;
                     }
                     const uint64_t key = uint64_t{depth[i]} << 32 | (b * shared::kRecordsPerBlock + i);
@@ -243,6 +244,8 @@ class CpuBackend final : public render::Backend {
         });
         discs_.clear();
         for (const auto& some : foundDiscs_.takeAll()) discs_.insert(discs_.end(), some.begin(), some.end());
+        // Sums are rounded: their order must not be that of the threads.
+        std::sort(discs_.begin(), discs_.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
     }
 
     void fillDiscs() {
@@ -339,7 +342,8 @@ class CpuBackend final : public render::Backend {
         Level* coarse = hasPyramid && levels_.size() > 1 ? &levels_[1] : nullptr;
         const Planes finePlanes = fine.planes();
         preparePlanes(size_t{fine.width} * fine.height);
-        const ResolveInput input{blocks_.data(), meshBlocks_.data(), draws_->materials.data(), strandBlocks_.data()};
+        const ResolveInput input{blocks_.data(),       meshBlocks_.data(), draws_->materials.data(),
+                                 strandBlocks_.data(), discs_.data(),      discs_.size()};
         std::atomic<float> largestRadius{0};
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
             TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite

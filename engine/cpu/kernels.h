@@ -123,6 +123,8 @@ struct ResolveInput {
     const MeshBlock* meshBlocks;
     const shared::SurfaceMaterial* materials;
     const StrandBlock* strandBlocks;
+    const shared::WideDisc* discs;
+    size_t discCount;
 };
 
 struct LightInput {

@@ -199,7 +199,7 @@ class GpuBackend final : public render::Backend {
                                false, "wide strands"));
         }
         if (draws.hasWideDiscs) {
-            STIPPLE_TRY(pipelines_->addDiscPass());
+            STIPPLE_TRY(pipelines_->addDiscPasses());
             STIPPLE_TRY(ensure(discs_, 4 + uint64_t{kDiscCapacity} * sizeof(shared::WideDisc),
                                kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "wide discs"));
         }
@@ -376,6 +376,13 @@ class GpuBackend final : public render::Backend {
                 pipelines_->use(commands_, "resolve");
                 pushStep(0, hasPyramid, wantAll);
                 dispatch(levels_[0].width, levels_[0].height);
+                if (hasPyramid && draws.hasWideDiscs) {
+                    list.end();
+                    list.begin("disc texels", {read(visibility_), read(discs_), write(texels_)}, false);
+                    pipelines_->use(commands_, "disc_texels");
+                    pushStep(0, hasPyramid, wantAll);
+                    dispatch(levels_[0].width, levels_[0].height);
+                }
                 if (hasStrands_) {
                     list.end();
                     list.begin("strand texels", {read(visibility_), write(texels_), write(stats_)}, false);

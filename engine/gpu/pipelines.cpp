@@ -40,6 +40,9 @@ constexpr uint32_t kStrandTexels[] = {
 constexpr uint32_t kDiscs[] = {
 #include "discs.inc"
 };
+constexpr uint32_t kDiscTexels[] = {
+#include "disc_texels.inc"
+};
 constexpr uint32_t kLight[] = {
 #include "light.inc"
 };
@@ -100,8 +103,10 @@ Result<void> Pipelines::addStrandPasses() {
     return add("strand_texels", kStrandTexels, std::size(kStrandTexels));
 }
 
-Result<void> Pipelines::addDiscPass() {
-    return pipelines_.count("discs") > 0 ? Result<void>() : add("discs", kDiscs, std::size(kDiscs));
+Result<void> Pipelines::addDiscPasses() {
+    if (pipelines_.count("disc_texels") > 0) return {};
+    STIPPLE_TRY(add("discs", kDiscs, std::size(kDiscs)));
+    return add("disc_texels", kDiscTexels, std::size(kDiscTexels));
 }
 
 Result<void> Pipelines::addLightPass() {

@@ -31,13 +31,13 @@ class Pipelines {
     Result<void> addMeshPasses();
     /// The passes that only ribbons and tubes need.
     Result<void> addStrandPasses();
-    /// The pass that wide discs need.
-    Result<void> addDiscPass();
+    /// The passes that wide discs need.
+    Result<void> addDiscPasses();
     /// The pass that lights need, of triangles and of points under lights of the scene's own.
     Result<void> addLightPass();
     size_t count() const { return pipelines_.size(); }
     size_t strandCount() const { return pipelines_.count("strand_texels") > 0 ? 3 : 0; }
-    size_t discCount() const { return pipelines_.count("discs"); }
+    size_t discCount() const { return pipelines_.count("disc_texels") > 0 ? 2 : 0; }
     void use(VkCommandBuffer commands, const std::string& pass) const;
     void push(VkCommandBuffer commands, const StepConstants& step) const;
 

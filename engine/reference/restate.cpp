@@ -210,6 +210,7 @@ class ReferenceBackend final : public render::Backend {
         const shared::FrameConstants& f = draws.frame;
         Level level{static_cast<int>(v.width), static_cast<int>(v.height), {}};
         level.samples.resize(size_t{v.width} * v.height);
+        std::vector<Wide> wide;
         for (size_t d = 0; d < draws.cut.size(); ++d) {
             const lod::CutDraw& cut = draws.cut[d];
             const lod::Instance& instance = draws.instances[cut.instance];
@@ -232,15 +233,19 @@ class ReferenceBackend final : public render::Backend {
                 disc.colour = f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError
                                   ? debugColour(f, node, cut)
                                   : disc.colour;
-                if (hasPyramid && showWide(draws, disc, instance.scale * disc.radius * f.supportScale, c, n, level))
+                const double radiusWorld = instance.scale * disc.radius * f.supportScale;
+                if (hasPyramid && isWide(v, disc, radiusWorld, c)) {
+                    const bool isFree = (disc.flags & shared::kFlagNoNormal) != 0;
+                    wide.push_back({c, isFree ? glm::normalize(-c) : n, disc.colour, radiusWorld,
+                                    (disc.flags & shared::kFlagLoose) != 0});
                     continue;
+                }
                 if (!(c.z > v.nearPlane)) continue;
                 const dvec2 p(v.focalPixels * c.x / c.z + 0.5 * v.width, v.focalPixels * c.y / c.z + 0.5 * v.height);
                 // A stray point hides no more of the picture than this.
                 const bool isScattered = (disc.flags & shared::kFlagScattered) != 0;
                 const double most = isScattered ? std::max(v.height / 128.0, 4.0) : 16384.0;
-                const double radius = std::clamp(instance.scale * disc.radius * f.supportScale * v.focalPixels / c.z,
-                                                 double(f.minimumRadius), most);
+                const double radius = std::clamp(radiusWorld * v.focalPixels / c.z, double(f.minimumRadius), most);
                 // Beside the picture: kept at its border where the disc may reach in.
                 const dvec2 at(std::clamp(p.x, 0.0, v.width - 1.0), std::clamp(p.y, 0.0, v.height - 1.0));
                 const bool isInside = p.x >= 0 && p.y >= 0 && p.x < v.width && p.y < v.height;
@@ -267,37 +272,66 @@ class ReferenceBackend final : public render::Backend {
                 s.colour = disc.colour;
             }
         }
+        showWide(draws, wide, level);
         return level;
     }
 
-    /// Discs so wide that an ellipse a texel does not hold them: every pixel whose ray meets one. False: it is not.
-    static bool showWide(const render::DrawList& draws, const Disc& disc, double radius, const dvec3& c, dvec3 n,
-                         Level& level) {
-        const lod::View& v = draws.view;
-        const bool isFree = (disc.flags & shared::kFlagNoNormal) != 0;
+    struct Wide {
+        dvec3 centre, normal, colour;
+        double radius;
+        bool isLeaf;
+    };
+    /// Is a disc so wide that an ellipse a texel does not hold it?
+    static bool isWide(const lod::View& v, const Disc& disc, double radius, const dvec3& c) {
         const double widest = std::max(0.25 * std::max(v.width, v.height), 16.0);  // px
-        if ((disc.flags & shared::kFlagScattered) != 0 || (isFree && c.z <= v.nearPlane)) return false;
-        if (radius * v.focalPixels <= widest * c.z || c.z + radius <= v.nearPlane) return false;
-        if (isFree) n = glm::normalize(c);
-        for (int y = 0; y < level.height; ++y)
+        if ((disc.flags & shared::kFlagScattered) != 0) return false;
+        if ((disc.flags & shared::kFlagNoNormal) != 0 && c.z <= v.nearPlane) return false;
+        return radius * v.focalPixels > widest * c.z && c.z + radius > v.nearPlane;
+    }
+    /// Depth of a wide disc on a ray, and rho^2 there; infinite where it is not met.
+    static std::pair<double, double> meet(const Wide& w, const dvec3& ray, double nearPlane) {
+        const double depth = glm::dot(w.normal, w.centre) / glm::dot(w.normal, ray);
+        const dvec3 off = depth * ray - w.centre;
+        const double rho2 = glm::dot(off, off) / (w.radius * w.radius);
+        return depth > nearPlane && rho2 <= 1 ? std::pair(depth, rho2) : std::pair(HUGE_VAL, HUGE_VAL);
+    }
+    /// Every pixel whose ray meets wide discs: the mean of those about the nearest.
+    static void showWide(const render::DrawList& draws, const std::vector<Wide>& wide, Level& level) {
+        const Lens lens = lensOf(draws);
+        for (int y = 0; y < level.height && !wide.empty(); ++y)
             for (int x = 0; x < level.width; ++x) {
                 const dvec2 at(x + 0.5, y + 0.5);
-                const dvec3 ray = lensOf(draws).rayTo(at);
-                const double depth = glm::dot(n, c) / glm::dot(n, ray);
+                const dvec3 ray = lens.rayTo(at);
+                const Wide* front = nullptr;
+                double depth = HUGE_VAL;
+                for (const Wide& w : wide)
+                    if (const double z = meet(w, ray, draws.view.nearPlane).first; z < depth) {
+                        depth = z;
+                        front = &w;
+                    }
                 Sample& s = level.ref(x, y);
-                if (!(depth > v.nearPlane) || glm::length(depth * ray - c) > radius || (s.valid && s.key <= depth))
-                    continue;
-                const dvec3 seen = glm::dot(n, ray) > 0 ? -n : n;
-                const bool isLeaf = (disc.flags & shared::kFlagLoose) != 0;
+                if (!front || (s.valid && s.key <= depth)) continue;
+                const double facing = std::abs(glm::dot(front->normal, ray)) / glm::length(ray);
+                const double apart = 0.25 * front->radius / glm::length(ray) / std::max(facing, 0.125);
+                double weight = 0, inverse = 0;
+                dvec3 n(0), colour(0);
+                for (const Wide& w : wide) {
+                    const auto [z, rho2] = meet(w, ray, draws.view.nearPlane);
+                    if (!(std::abs(z - depth) <= apart)) continue;
+                    const double k = (1 - rho2) * (1 - rho2) + 1e-4;
+                    weight += k;
+                    inverse += k / z;
+                    n += (glm::dot(w.normal, ray) > 0 ? -k : k) * w.normal;
+                    colour += k * w.colour;
+                }
                 s.valid = true;
-                s.depth = s.key = depth;
+                s.depth = s.key = weight / inverse;
                 s.centre = at;
                 s.radius = 0.25;  // no ellipse: what the pixel shows
-                s.thickness = (isLeaf ? kLeafThickness : 1) * 0.25 * depth / v.focalPixels;
-                s.perp = dvec2(rotationToZ(glm::normalize(ray)) * seen);
-                s.colour = disc.colour;
+                s.thickness = (front->isLeaf ? kLeafThickness : 1) * 0.25 * s.depth / lens.focal;
+                s.perp = dvec2(rotationToZ(glm::normalize(ray)) * glm::normalize(n));
+                s.colour = colour / weight;
             }
-        return true;
     }
 
     static Lens lensOf(const render::DrawList& draws) {

@@ -20,9 +20,11 @@ void main() {
     if (stepInfo.count != 0u && (node.octantMask & kNodeWide) != 0u &&
         isWideDisc(recordFlags(r), c.z, node.edge * frame.supportScale * radiusFractionFast(recordRadiusCode(r)), wideRadius(frame.width, frame.height) / frame.focal, frame.nearPlane) > 0.5) {
         if (isOneSided && !(dot(nodeDirection(node, octDirection(r.normal)), c) < 0.0)) return;
+        const WideDisc d = wideDisc(node, r, frame.supportScale, block * kRecordsPerBlock + gl_LocalInvocationID.x);
+        if (reachesPicture(d, frame) < 0.5) return;
         const uint place = atomicAdd(discCount, 1u);
         if (place < kDiscCapacity) {
-            discs[place] = wideDisc(node, r, frame.supportScale, block * kRecordsPerBlock + gl_LocalInvocationID.x);
+            discs[place] = d;
             return;
         }
     }

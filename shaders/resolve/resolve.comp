@@ -3,7 +3,6 @@
 #extension GL_GOOGLE_include_directive : require
 #include "../bindings.glsl"
 #include "../shared/splat_size.h"
-#include "../shared/wide_disc.h"
 layout(local_size_x = 64) in;
 
 void main() {
@@ -19,32 +18,20 @@ void main() {
     t.isRound = 0.0;
     t.axis = vec2(0.0);
     const uint64_t key = visibility[pixel.y * frame.width + pixel.x];
-    const uint kind = uint(key) & 0xe0000000u;
-    if (kind == 0u || kind == kKindDisc) {  // points; triangles come later, and nothing has all bits set
+    if ((uint(key) & 0xe0000000u) == 0u) {  // a point; triangles come later, and nothing has all bits set
         const uint id = uint(key) & 0x1fffffffu;
         const DrawBlock source = blocks[id / kRecordsPerBlock];
         const DrawNode node = nodes[source.node];
         const PointRecord r = Records(uvec2(node.addressLow, node.addressHigh)).records[source.first + id % kRecordsPerBlock];
         const vec3 c = node.base + node.axisX * float(recordX(r)) + node.axisY * float(recordY(r)) + node.axisZ * float(recordZ(r));
-        const vec3 n = discNormal(node, r);
+        vec3 n = -normalize(c);
+        if ((recordFlags(r) & kFlagNoNormal) == 0u) n = nodeDirection(node, octDecode(r.normal));
         const float radius = min(node.edge * radiusFraction(recordRadiusCode(r)) * frame.supportScale, c.z * largestSplat(recordFlags(r), frame.focal, frame.height));
         t = texelFromSplat(c, n, radius, frame.focal, frame.minimumRadius);
         if ((recordFlags(r) & kFlagLoose) != 0u) t.thickness = kLeafThickness * t.radius;
         const float scale = frame.focal / c.z;
         t.offset = vec2(c.x * scale + (frame.centre.x - 0.5) - float(pixel.x), c.y * scale + (frame.centre.y - 0.5) - float(pixel.y));
-        if (kind == kKindDisc) {
-            const vec2 at = vec2(pixel) + 0.5 - frame.centre;
-            const vec3 v = viewDirection(at.x, at.y, frame.focal);
-            t.depth = uintBitsToFloat(uint(key >> 32));
-            t.radius = kExactRadius;
-            t.thickness = (recordFlags(r) & kFlagLoose) != 0u ? kLeafThickness * kExactRadius : kExactRadius;
-            t.offset = vec2(0.0);
-            t.normalPerp = perpFromNormal(n, v) * (dot(n, v) > 0.0 ? -1.0 : 1.0);
-        }
-        t.colour = vec3(linearFromSrgb(float(r.colour & 255u) / 255.0), linearFromSrgb(float(r.colour >> 8 & 255u) / 255.0),
-                        linearFromSrgb(float(r.colour >> 16 & 255u) / 255.0));
-        if (frame.debugView == kDebugLevel) t.colour = debugLevelColour(node.level);
-        if (frame.debugView == kDebugError) t.colour = debugErrorColour(node.errorPixels);
+        t.colour = pointColour(node, r);
         atomicMax(largestRadiusBits, floatBitsToUint(t.radius));
     }
     storeTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, pixel, t);

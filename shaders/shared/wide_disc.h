@@ -1,10 +1,12 @@
 // Discs so wide on the image that one ellipse a texel does not hold them: from near by, a few of them fill the picture,
-// and some have their centres beside it or behind the eye. Their pixels are filled exactly, by rays; the nearest wins.
-// Camera space is that of frame.h.
+// and some have their centres beside it or behind the eye. Their pixels are filled exactly, by rays: first the nearest
+// depth, then the mean of all discs about there (two passes, as Botsch & Kobbelt 2003). Camera space is that of
+// frame.h.
 #ifndef STIPPLE_SHARED_WIDE_DISC_H
 #define STIPPLE_SHARED_WIDE_DISC_H
 #include "frame.h"
 #include "record.h"
+#include "splat.h"
 SHARED_BEGIN
 
 const uint kKindDisc = 0x60000000u;  // of a visibility id: the rest is the point's
@@ -32,17 +34,38 @@ SHARED_FN float isWideDisc(uint flags, float depth, float radius, float perFocal
     return (flags & kFlagScattered) != 0u ? 0.0f : reaches * faces;
 }
 
-// Depth at which the ray (ex, ey, 1) meets a disc; kNoDisc where it does not, or before the near plane.
+// Where the ray (ex, ey, 1) meets the plane of a disc: its depth, and rho^2, the distance from the centre in radii,
+// squared. kNoDisc where it meets none, or before the near plane.
 const float kNoDisc = 3.0e38f;
-SHARED_FN float discDepth(WideDisc d, float ex, float ey, float nearPlane) {
+struct DiscHit {
+    float depth;
+    float rho2;
+};
+SHARED_FN DiscHit discHit(WideDisc d, float ex, float ey, float nearPlane) {
     const float facing = d.normal.x * ex + d.normal.y * ey + d.normal.z;
     const float ahead = d.normal.x * d.centre.x + d.normal.y * d.centre.y + d.normal.z * d.centre.z;
     const float z = ahead / (abs(facing) > 1.0e-12f ? facing : 1.0e-12f);
     const float offX = z * ex - d.centre.x;
     const float offY = z * ey - d.centre.y;
     const float offZ = z - d.centre.z;
-    const bool isHit = z > nearPlane && offX * offX + offY * offY + offZ * offZ <= d.radius * d.radius;
-    return isHit ? z : kNoDisc;
+    const float rho2 = (offX * offX + offY * offY + offZ * offZ) / (d.radius * d.radius);
+    DiscHit hit;
+    hit.rho2 = z > nearPlane ? rho2 : kNoDisc;
+    hit.depth = hit.rho2 <= 1.0f ? z : kNoDisc;
+    return hit;
+}
+
+// What is merged at a pixel: the discs whose depths there are the front one's, but for so much: what a quarter of its
+// radius along its normal is along the ray (ex, ey, 1).
+SHARED_FN float depthShared(WideDisc front, float ex, float ey) {
+    const float facing = abs(front.normal.x * ex + front.normal.y * ey + front.normal.z);
+    const float length = sqrt(ex * ex + ey * ey + 1.0f);
+    return kThicknessRadii * front.radius / max(facing, 0.125f * length);
+}
+// They count by the weight of splats (pyramid.h), at their rims hardly at all.
+SHARED_FN float discWeight(DiscHit hit, float front, float apart) {
+    const float k = max(1.0f - hit.rho2, 0.0f);
+    return abs(hit.depth - front) <= apart ? k * k + 1.0e-4f : 0.0f;
 }
 
 // Slopes x / z between which a disc lies, seen along y: (centre, normal) are its components across and along the view.
@@ -57,6 +80,23 @@ SHARED_FN vec2 discSlopes(float across, float depth, float normalAcross, float n
     const float root = sqrt(max(b * b - a * c, 0.0f));
     const bool isAhead = depth > 0.0f && a > 0.01f * depth * depth;
     return isAhead ? vec2((b - root) / a, (b + root) / a) : vec2(-3.0e38f, 3.0e38f);
+}
+
+// How far the most of a disc lies on the side of a plane through the eye to which (x, y, z) points; of any length.
+SHARED_FN float discBeyond(WideDisc d, float x, float y, float z) {
+    const float facing = x * d.normal.x + y * d.normal.y + z * d.normal.z;
+    const float across = sqrt(max(x * x + y * y + z * z - facing * facing, 0.0f));
+    return x * d.centre.x + y * d.centre.y + z * d.centre.z + d.radius * across;
+}
+// 1 if a disc reaches before the near plane and between the planes through the eye and the picture's edges.
+SHARED_FN float reachesPicture(WideDisc d, FrameConstants f) {
+    const float left = f.centre.x / f.focal;
+    const float right = (float(int(f.width)) - f.centre.x) / f.focal;
+    const float top = f.centre.y / f.focal;
+    const float bottom = (float(int(f.height)) - f.centre.y) / f.focal;
+    const float least = min(min(discBeyond(d, 1.0f, 0.0f, left), discBeyond(d, -1.0f, 0.0f, right)),
+                            min(discBeyond(d, 0.0f, 1.0f, top), discBeyond(d, 0.0f, -1.0f, bottom)));
+    return least >= 0.0f && discBeyond(d, 0.0f, 0.0f, 1.0f) > f.nearPlane ? 1.0f : 0.0f;
 }
 
 // The pixels of a row (or column) whose centres may lie between two slopes: first and last, within the picture.
