@@ -17,6 +17,7 @@
 #include "engine/base/numbers.h"
 #include "engine/base/process.h"
 #include "engine/base/queue.h"
+#include "engine/cpu/level.h"
 #include "shaders/shared/splat.h"
 
 namespace stipple::cpu {
@@ -24,38 +25,6 @@ namespace {
 
 constexpr float kOutside = -1;      ///< depth of a texel outside the image
 constexpr uint32_t kBandRows = 16;  ///< coarse rows per task
-
-/// One level of the pyramid in memory; five planes.
-struct Level {
-    uint32_t width = 0, height = 0;
-    HugeBuffer<uint32_t> words;
-    void resize(uint32_t w, uint32_t h) {
-        width = w;
-        height = h;
-        words.assign(size_t{5} * w * h, 0);
-    }
-    Planes planes() {
-        const size_t n = size_t{width} * height;
-        uint32_t* p = words.data();
-        return {reinterpret_cast<float*>(p), p + n, p + 2 * n, p + 3 * n, p + 4 * n};
-    }
-};
-
-Tables makeTables() {
-    Tables t{};
-    for (uint32_t i = 0; i < 256; ++i) {
-        t.radiusFraction.at(i) = shared::radiusFraction(i);
-        const float root = std::sqrt(shared::linearFromSrgb(static_cast<float>(i) / 255.0f));
-        t.red.at(i) = static_cast<uint32_t>(root * 2047.0f + 0.5f);
-        t.green.at(i) = t.red.at(i) << 11;
-        t.blue.at(i) = static_cast<uint32_t>(root * 1023.0f + 0.5f) << 22;
-    }
-    for (uint32_t i = 0; i < 2048; ++i) {
-        const float root = static_cast<float>(i) / 2047.0f;
-        t.srgbByte.at(i) = static_cast<uint32_t>(shared::srgbFromLinear(root * root) * 255.0f + 0.5f);
-    }
-    return t;
-}
 
 uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | key.node; }
 
@@ -139,6 +108,15 @@ class CpuBackend final : public render::Backend {
     }
 
   private:
+    Visibility visibility() { return {visibility_.data(), runs_.data()}; }
+    /// May any of these pixels show something?
+    bool isSeen(size_t first, uint32_t n) const {
+        bool any = false;
+        for (size_t r = first >> Visibility::kRunBits; r <= (first + n - 1) >> Visibility::kRunBits; ++r)
+            any = any || runs_[r] != 0;
+        return any;
+    }
+
     void resize() {
         const uint32_t w = frame_.width, h = frame_.height;
         image_->width = w;
@@ -150,6 +128,7 @@ class CpuBackend final : public render::Backend {
         image_->linear.resize(wantAll_ ? pixels * 3 : 0);
         if (!levels_.empty() && levels_[0].width == w && levels_[0].height == h) return;
         visibility_.assign(pixels, ~uint64_t{0});
+        runs_.assign(pixels / Visibility::kRun + 1, 0);
         levels_.clear();
         for (uint32_t lw = w, lh = h;; lw = (lw + 1) / 2, lh = (lh + 1) / 2) {
             levels_.emplace_back();
@@ -182,14 +161,14 @@ class CpuBackend final : public render::Backend {
             for (size_t b = begin; b < end; ++b) {
                 const uint32_t left = strandBlocks_[b].node->count - draws_->strandBlocks[b].first;
                 k_.drawSegments(frame_, strandBlocks_[b], std::min(left, shared::kSegmentsPerBlock),
-                                static_cast<uint32_t>(b * shared::kSegmentsPerBlock), sink, visibility_.data());
+                                static_cast<uint32_t>(b * shared::kSegmentsPerBlock), sink, visibility());
             }
             if (!mine.empty()) foundWide_.push(std::move(mine));
         });
         for (const auto& some : foundWide_.takeAll()) wide_.insert(wide_.end(), some.begin(), some.end());
         if (!wide_.empty())
             forBands([&](uint32_t first, uint32_t last) {
-                k_.fillWide(frame_, wide_.data(), wide_.size(), first, last, visibility_.data());
+                k_.fillWide(frame_, wide_.data(), wide_.size(), first, last, visibility());
             });
     }
 
@@ -234,6 +213,8 @@ class CpuBackend final : public render::Backend {
                         continue;
                     }
                     const uint64_t key = uint64_t{depth[i]} << 32 | (b * shared::kRecordsPerBlock + i);
+                    const std::atomic_ref<uint8_t> run(runs_[pixel[i] >> Visibility::kRunBits]);
+                    if (run.load(std::memory_order_relaxed) == 0) run.store(1, std::memory_order_relaxed);
                     const std::atomic_ref<uint64_t> entry(visibility_[pixel[i]]);
                     uint64_t old = entry.load(std::memory_order_relaxed);
                     while (key < old && !entry.compare_exchange_weak(old, key, std::memory_order_relaxed)) {
@@ -251,7 +232,7 @@ class CpuBackend final : public render::Backend {
     void fillDiscs() {
         if (!discs_.empty())
             forBands([&](uint32_t first, uint32_t last) {
-                k_.fillDiscs(frame_, discs_.data(), discs_.size(), first, last, visibility_.data());
+                k_.fillDiscs(frame_, discs_.data(), discs_.size(), first, last, visibility());
             });
     }
 
@@ -282,13 +263,13 @@ class CpuBackend final : public render::Backend {
                                  }};
             for (size_t b = begin; b < end; ++b)
                 k_.rasterCluster(frame_, draws_->materials.data(), meshBlocks_[b], static_cast<uint32_t>(b * 256), sink,
-                                 visibility_.data());
+                                 visibility());
             if (!mine.empty()) found_.push(std::move(mine));
         });
         for (const auto& some : found_.takeAll()) large_.insert(large_.end(), some.begin(), some.end());
         if (large_.empty()) return;
         forBands([&](uint32_t first, uint32_t last) {
-            k_.rasterLarge(frame_, large_.data(), large_.size(), first, last, visibility_.data());
+            k_.rasterLarge(frame_, large_.data(), large_.size(), first, last, visibility());
         });
     }
 
@@ -354,48 +335,60 @@ class CpuBackend final : public render::Backend {
                 for (TexelRow* row : {&upper, &lower}) {
                     const uint32_t yy = y + (row == &lower ? 1 : 0);
                     row->depth[kPad + n] = 0;  // beyond the right edge of an odd width
-                    if (yy >= row1) {
+                    const size_t at = size_t{yy} * fine.width + x0;
+                    if (yy >= row1 || !isSeen(at, n)) {
+                        row->hasTubes = false;
                         std::fill_n(row->depth + kPad, n, 0.0f);
+                        if (hasStrands_) clearTubes(*row);
+                        if (yy < row1) fine.empty(yy, x0, n);
                         continue;
                     }
-                    const size_t at = size_t{yy} * fine.width + x0;
                     row->hasTubes = hasStrands_;  // may have; the kernel says whether it does
                     const bool has = k_.resolveRow(frame_, tables_, input, visibility_.data() + at, x0, yy, n, *row,
                                                    largest, planesAt(at));
-                    if (has)
+                    if (has) {
+                        fine.hold(yy, x0, n);
                         k_.packRow(*row, n, finePlanes.at(at));
-                    else
-                        std::fill_n(finePlanes.depth + at, n, 0.0f);
+                    } else {
+                        fine.empty(yy, x0, n);
+                    }
                     any = any || has;
                 }
                 if (!coarse) continue;
-                const size_t at = size_t{y / 2} * coarse->width + x0 / 2;
-                pullPair(upper, lower, any, (n + 1) / 2, 1.0f, coarse->planes().at(at), out);
+                pullPair(upper, lower, any, (n + 1) / 2, 1.0f, *coarse, x0 / 2, y / 2, out);
             }
             float seen = largestRadius.load(std::memory_order_relaxed);
             while (largest > seen && !largestRadius.compare_exchange_weak(seen, largest, std::memory_order_relaxed)) {
             }
         });
+        std::fill(runs_.begin(), runs_.end(), uint8_t{0});  // resolveRow has cleared what they stood for
         // Levels whose texels are larger than the largest splat hold nothing.
         const auto needed = toWhole<size_t>(1 + std::ceil(std::log2(std::max(2.0f, 2 * largestRadius.load()))));
         levelCount_ = std::min(levels_.size(), needed);
     }
 
-    void pullPair(const TexelRow& upper, const TexelRow& lower, bool any, uint32_t n, float childSize, const Planes& to,
-                  TexelRow& out) {
+    static void clearTubes(TexelRow& row) {
+        std::fill_n(row.isRound, TexelRow::kSize, 0.0f);
+        std::fill_n(row.axisX, TexelRow::kSize, 0.0f);
+    }
+
+    /// Two rows to `n` texels of row `y` of the coarser level, from `x` on.
+    void pullPair(const TexelRow& upper, const TexelRow& lower, bool any, uint32_t n, float childSize, Level& to,
+                  uint32_t x, uint32_t y, TexelRow& out) {
         if (!any) {
-            std::fill_n(to.depth, n, 0.0f);
+            to.empty(y, x, n);
             return;
         }
+        to.hold(y, x, n);
         out.hasTubes = upper.hasTubes || lower.hasTubes;
         k_.pullRow(upper, lower, n, childSize, 1.0f / frame_.focal, out);
-        k_.packRow(out, n, to);
+        k_.packRow(out, n, to.planes().at(size_t{y} * to.width + x));
     }
 
     void pull() {
         for (size_t l = 1; l + 1 < levelCount_; ++l) {
             Level &fine = levels_[l], &coarse = levels_[l + 1];
-            const Planes from = fine.planes(), to = coarse.planes();
+            const Planes from = fine.planes();
             forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
                 TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
                 upper.hasTubes = lower.hasTubes = out.hasTubes = hasStrands_;
@@ -407,8 +400,8 @@ class CpuBackend final : public render::Backend {
                         if (yy >= row1) std::fill_n(row->depth + kPad, n, 0.0f);
                         row->depth[kPad + n] = 0;
                     }
-                    pullPair(upper, lower, any, (n + 1) / 2, std::exp2(static_cast<float>(l)),
-                             to.at(size_t{y / 2} * coarse.width + x0 / 2), out);
+                    pullPair(upper, lower, any, (n + 1) / 2, std::exp2(static_cast<float>(l)), coarse, x0 / 2, y / 2,
+                             out);
                 }
             });
         }
@@ -420,7 +413,7 @@ class CpuBackend final : public render::Backend {
         const Planes at = planes.at(size_t{y} * level.width + x);
         bool any = false;
         uint32_t signs = 0;
-        for (uint32_t i = 0; i < n; ++i) {
+        for (uint32_t i = 0; level.mayHold(y, x, n) && i < n; ++i) {
             any |= at.depth[i] > 0;
             signs |= at.depth[i] > 0 ? at.size[i] : 0u;
         }
@@ -452,10 +445,7 @@ class CpuBackend final : public render::Backend {
                      out.beside);
         out.nearest.hasTubes = scratch.hasTubes;
         if (hasStrands_ && !scratch.hasTubes)
-            for (TexelRow* row : {&out.nearest, &out.beside}) {
-                std::fill_n(row->isRound, TexelRow::kSize, 0.0f);
-                std::fill_n(row->axisX, TexelRow::kSize, 0.0f);
-            }
+            for (TexelRow* row : {&out.nearest, &out.beside}) clearTubes(*row);
         return true;
     }
 
@@ -506,7 +496,9 @@ class CpuBackend final : public render::Backend {
             forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
                 pushTile(fine, coarse, std::exp2(static_cast<float>(l)), x0, n, row0, row1,
                          [&](uint32_t y, const TexelRow&, const TexelRow& row, bool any) {
-                             if (any) k_.packRow(row, n, planes.at(size_t{y} * fine.width + x0));
+                             if (!any) return;
+                             fine.hold(y, x0, n);
+                             k_.packRow(row, n, planes.at(size_t{y} * fine.width + x0));
                          });
             });
         }
@@ -518,28 +510,52 @@ class CpuBackend final : public render::Backend {
         const Planes planes = fine.planes();
         const LightInput light{draws_->lights.data(),
                                draws_->environment ? draws_->environment->table.data() : nullptr};
-        const auto shadeRow = [&](uint32_t x0, uint32_t n, uint32_t y, TexelRow& own, TexelRow& row) {
+        const ShadedRow empty = emptyRow(light);
+        const auto shadeRow = [&](uint32_t x0, uint32_t n, uint32_t y, TexelRow& own, TexelRow& row, bool any) {
+            const size_t at = size_t{y} * fine.width + x0;
+            const ShadeOutput out{image_->rgba.data() + at, wantAll_ ? image_->depth.data() + at : nullptr,
+                                  wantAll_ ? image_->normal.data() + 3 * at : nullptr,
+                                  wantAll_ ? image_->linear.data() + 3 * at : nullptr};
+            if (!any) return empty.copyTo(out, n);
             if (row.hasTubes) k_.finishRow(1.0f / frame_.focal, n, row);
             if (own.hasTubes && &own != &row) k_.finishRow(1.0f / frame_.focal, n, own);
-            const size_t at = size_t{y} * fine.width + x0;
-            k_.shadeRow(frame_, tables_, own, row, planesAt(at), light, x0, y, n,
-                        {image_->rgba.data() + at, wantAll_ ? image_->depth.data() + at : nullptr,
-                         wantAll_ ? image_->normal.data() + 3 * at : nullptr,
-                         wantAll_ ? image_->linear.data() + 3 * at : nullptr});
+            // Of a row without winners the planes are those of an older frame.
+            const SurfacePlanes planesHere = fine.mayHold(y, x0, n) ? planesAt(at) : SurfacePlanes{};
+            k_.shadeRow(frame_, tables_, own, row, planesHere, light, x0, y, n, out);
         };
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
             if (hasPyramid && levelCount_ > 1) {
-                pushTile(fine, levels_[1], 1.0f, x0, n, row0, row1,
-                         [&](uint32_t y, TexelRow& own, TexelRow& row, bool) { shadeRow(x0, n, y, own, row); });
+                pushTile(
+                    fine, levels_[1], 1.0f, x0, n, row0, row1,
+                    [&](uint32_t y, TexelRow& own, TexelRow& row, bool any) { shadeRow(x0, n, y, own, row, any); });
                 return;
             }
             thread_local TexelRow row{};
             row.hasTubes = hasStrands_;
             for (uint32_t y = row0; y < row1; ++y) {
-                loadRow(fine, planes, y, x0, n, kPad, row);
-                shadeRow(x0, n, y, row, row);
+                const bool any = loadRow(fine, planes, y, x0, n, kPad, row);
+                shadeRow(x0, n, y, row, row, any);
             }
         });
+    }
+
+    /// What an empty row of a tile looks like.
+    struct ShadedRow {
+        std::array<uint32_t, kTile> rgba{};
+        std::array<float, size_t{3} * kTile> linear{};
+        void copyTo(const ShadeOutput& out, uint32_t n) const {
+            std::copy_n(rgba.begin(), n, out.rgba);
+            if (out.depth) std::fill_n(out.depth, n, 0.0f);
+            if (out.normal) std::fill_n(out.normal, 3 * n, 0.0f);
+            if (out.linear) std::copy_n(linear.begin(), 3 * n, out.linear);
+        }
+    };
+    ShadedRow emptyRow(const LightInput& light) {
+        ShadedRow shaded;
+        static const TexelRow kNothing{};
+        k_.shadeRow(frame_, tables_, kNothing, kNothing, {}, light, 0, 0, kTile,
+                    {shaded.rgba.data(), nullptr, nullptr, shaded.linear.data()});
+        return shaded;
     }
 
     Executor& executor_;
@@ -547,6 +563,7 @@ class CpuBackend final : public render::Backend {
     Tables tables_;
     std::unordered_map<uint64_t, lod::Chunk> chunks_;
     HugeBuffer<uint64_t> visibility_;
+    std::vector<uint8_t> runs_;  ///< of `visibility_`
     std::vector<Level> levels_;
     std::vector<MeshBlock> meshBlocks_;
     std::vector<LargeTriangle> large_;

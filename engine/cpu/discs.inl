@@ -13,7 +13,7 @@ struct DiscBox {
 }
 
 void fillDiscs(const FrameConstants& frame, const WideDisc* discs, size_t count, uint32_t firstRow, uint32_t lastRow,
-               uint64_t* visibility) {
+               const Visibility& visibility) {
     const FrameConstants f = frame;
     const float inverseFocal = 1.0f / f.focal, nearPlane = f.nearPlane;
     alignas(64) float depth[kTile];
@@ -30,9 +30,10 @@ void fillDiscs(const FrameConstants& frame, const WideDisc* discs, size_t count,
 #pragma GCC ivdep
                 for (int i = 0; i < n; ++i)
                     depth[i] = discHit(d, (float(i) + shift) * inverseFocal, ey, nearPlane).depth;
-                uint64_t* const row = visibility + size_t(y) * f.width + size_t(from);
+                const size_t first = size_t(y) * f.width + size_t(from);
                 for (int i = 0; i < n; ++i)
-                    if (depth[i] < kNoDisc) offerKey(row, size_t(i), uint64_t{floatBitsToUint(depth[i])} << 32 | d.id);
+                    if (depth[i] < kNoDisc)
+                        offerKey(visibility, first + size_t(i), uint64_t{floatBitsToUint(depth[i])} << 32 | d.id);
             }
     }
 }

@@ -46,6 +46,13 @@ struct Planes {
     Planes at(size_t i) const { return {depth + i, size + i, offset + i, normal + i, colour + i}; }
 };
 
+/// The nearest of each pixel, and which runs of kRun pixels hold any: the others cost nothing in later passes.
+struct Visibility {
+    static constexpr uint32_t kRunBits = 8, kRun = 1u << kRunBits;
+    uint64_t* keys;
+    uint8_t* runs;  ///< 1: may hold some
+};
+
 struct BlockSource {
     const shared::PointRecord* records;  ///< first record of the block
     const shared::DrawNode* node;
@@ -117,6 +124,8 @@ struct Tables {
     std::array<uint32_t, 2048> srgbByte;         ///< sqrt(linear) * 2047 -> sRGB byte
 };
 
+Tables makeTables();
+
 /// What the passes after coverage read of the frame beside records.
 struct ResolveInput {
     const BlockSource* blocks;
@@ -169,19 +178,20 @@ struct Kernels {
                      const ShadeOutput& out);
     /// Offers the triangles of one cluster (ids from firstId on) to the visibility buffer.
     void (*rasterCluster)(const shared::FrameConstants& f, const shared::SurfaceMaterial* materials,
-                          const MeshBlock& block, uint32_t firstId, const LargeSink& large, uint64_t* visibility);
+                          const MeshBlock& block, uint32_t firstId, const LargeSink& large,
+                          const Visibility& visibility);
     /// Rows [firstRow, lastRow] of the triangles that were kept.
     void (*rasterLarge)(const shared::FrameConstants& f, const LargeTriangle* large, size_t count, uint32_t firstRow,
-                        uint32_t lastRow, uint64_t* visibility);
+                        uint32_t lastRow, const Visibility& visibility);
     /// Offers up to 256 segments of strands (ids from firstId on) to the visibility buffer.
     void (*drawSegments)(const shared::FrameConstants& f, const StrandBlock& block, uint32_t count, uint32_t firstId,
-                         const WideSink& wide, uint64_t* visibility);
+                         const WideSink& wide, const Visibility& visibility);
     /// Rows [firstRow, lastRow] of the strands that were kept.
     void (*fillWide)(const shared::FrameConstants& f, const WideStrand* strands, size_t count, uint32_t firstRow,
-                     uint32_t lastRow, uint64_t* visibility);
+                     uint32_t lastRow, const Visibility& visibility);
     /// Rows [firstRow, lastRow] of wide discs.
     void (*fillDiscs)(const shared::FrameConstants& f, const shared::WideDisc* discs, size_t count, uint32_t firstRow,
-                      uint32_t lastRow, uint64_t* visibility);
+                      uint32_t lastRow, const Visibility& visibility);
 };
 
 /// The best kernels that this processor runs; STIPPLE_SIMD=sse|avx2|avx512 asks for fewer.

@@ -15,15 +15,17 @@ struct Fixed {
     uint32_t id;
 };
 
-[[gnu::always_inline]] inline void offerKey(uint64_t* visibility, size_t pixel, uint64_t key) {
+[[gnu::always_inline]] inline void offerKey(const Visibility& visibility, size_t pixel, uint64_t key) {
     // Builtins: std::atomic_ref would be a function of its own, see kernels.inl.
-    uint64_t old = __atomic_load_n(&visibility[pixel], __ATOMIC_RELAXED);
-    while (key < old &&
-           !__atomic_compare_exchange_n(&visibility[pixel], &old, key, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
+    uint8_t* const run = &visibility.runs[pixel >> Visibility::kRunBits];
+    if (__atomic_load_n(run, __ATOMIC_RELAXED) == 0) __atomic_store_n(run, uint8_t{1}, __ATOMIC_RELAXED);
+    uint64_t* const entry = &visibility.keys[pixel];
+    uint64_t old = __atomic_load_n(entry, __ATOMIC_RELAXED);
+    while (key < old && !__atomic_compare_exchange_n(entry, &old, key, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
     }
 }
 
-[[gnu::always_inline]] inline void offer(uint64_t* visibility, size_t pixel, float inverseDepth, uint32_t id) {
+[[gnu::always_inline]] inline void offer(const Visibility& visibility, size_t pixel, float inverseDepth, uint32_t id) {
     offerKey(visibility, pixel, uint64_t{floatBitsToUint(1.0f / inverseDepth)} << 32 | id);
 }
 
@@ -31,7 +33,7 @@ struct Fixed {
 /// `keep(x, y)`: false where an alpha mask cuts the triangle out.
 template <typename Int, typename Keep>
 [[gnu::always_inline]] inline void fill(const Fixed& t, int fromX, int toX, int fromY, int toY, uint32_t stride,
-                                        uint64_t* visibility, const Keep& keep) {
+                                        const Visibility& visibility, const Keep& keep) {
     constexpr int kOne = 256, kHalf = 128;  // kSubpixel
     const int64_t cx = int64_t{fromX} * kOne + kHalf, cy = int64_t{fromY} * kOne + kHalf;
     Int dx[3], dy[3], row[3];
@@ -106,7 +108,7 @@ struct KeepAll {
 
 /// Rows [firstRow, lastRow] of a triangle.
 template <typename Keep = KeepAll>
-void fillRows(const FrameConstants& f, const Fixed& t, int firstRow, int lastRow, uint64_t* visibility,
+void fillRows(const FrameConstants& f, const Fixed& t, int firstRow, int lastRow, const Visibility& visibility,
               const Keep& keep = {}) {
     const auto least = [](const int64_t* v) {
         return v[0] < v[1] ? (v[0] < v[2] ? v[0] : v[2]) : (v[1] < v[2] ? v[1] : v[2]);
@@ -137,7 +139,7 @@ struct Candidate {
 
 /// Fills a triangle or, where it is large, keeps it for later.
 void takeTriangle(const FrameConstants& f, Fixed& t, const Candidate& of, const LargeSink& large,
-                  uint64_t* visibility) {
+                  const Visibility& visibility) {
     const int64_t area = (t.x[1] - t.x[0]) * (t.y[2] - t.y[0]) - (t.y[1] - t.y[0]) * (t.x[2] - t.x[0]);
     // Counter-clockwise in the scene is clockwise on a screen whose y points down: negative.
     if (area == 0 || (area > 0 && !of.isTwoSided)) return;
@@ -176,7 +178,7 @@ vec3 cutEdge(vec3 a, float da, vec3 b, float db) {
 
 /// Clips against the near plane and four planes far outside the image, then takes the fan.
 void clipTriangle(const FrameConstants& f, const vec3* corner, const Candidate& of, const LargeSink& large,
-                  uint64_t* visibility) {
+                  const Visibility& visibility) {
     // Corners that are no numbers would be neither in nor out, and make more of themselves at every plane.
     for (int k = 0; k < 3; ++k)
         if (!(std::fabs(corner[k].x) + std::fabs(corner[k].y) + std::fabs(corner[k].z) < 1.0e30f)) return;
@@ -222,7 +224,7 @@ void clipTriangle(const FrameConstants& f, const vec3* corner, const Candidate& 
 }
 
 void rasterCluster(const FrameConstants& frame, const SurfaceMaterial* materials, const MeshBlock& block,
-                   uint32_t firstId, const LargeSink& large, uint64_t* visibility) {
+                   uint32_t firstId, const LargeSink& large, const Visibility& visibility) {
     const MeshVertex* const vertices = block.vertices;
     const uint32_t* const triangles = block.triangles;
     const uint32_t vertexCount = block.counts & 0xffffu, triangleCount = block.counts >> 16;
@@ -278,7 +280,7 @@ void rasterCluster(const FrameConstants& frame, const SurfaceMaterial* materials
 }
 
 void rasterLarge(const FrameConstants& frame, const LargeTriangle* large, size_t count, uint32_t firstRow,
-                 uint32_t lastRow, uint64_t* visibility) {
+                 uint32_t lastRow, const Visibility& visibility) {
     const FrameConstants f = frame;
     for (size_t i = 0; i < count; ++i) {
         Fixed t{};

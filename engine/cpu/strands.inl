@@ -123,7 +123,7 @@ void layLines(const FrameConstants& frame, Lines& lines, size_t count) {
 
 /// Offers the pixels that were collected.
 void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pixels, size_t count, uint32_t firstId,
-                uint64_t* visibility) {
+                const Visibility& visibility) {
     const FrameConstants f = frame;
     const float width = float(int(f.width)), height = float(int(f.height));
     const uint32_t* __restrict const segment = pixels.segment;
@@ -151,7 +151,7 @@ void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pix
     constexpr size_t kAhead = 24;  // their cache lines come meanwhile
     for (size_t k = 0; k < count; ++k) {
         if (k + kAhead < count && pixels.pixel[k + kAhead] != ~0u)
-            __builtin_prefetch(&visibility[pixels.pixel[k + kAhead]], 1);
+            __builtin_prefetch(&visibility.keys[pixels.pixel[k + kAhead]], 1);
         if (pixels.pixel[k] == ~0u) continue;
         offerKey(visibility, pixels.pixel[k], uint64_t{pixels.depth[k]} << 32 | kKindStrand | (firstId + segment[k]));
     }
@@ -163,7 +163,7 @@ void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pix
 }
 
 /// Rows [firstRow, lastRow] of a wide ribbon: every pixel whose centre lies between its edges.
-void fillRibbon(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, uint64_t* visibility) {
+void fillRibbon(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, const Visibility& visibility) {
     const float dx = s.xb - s.xa, dy = s.yb - s.ya;
     const int top = pixelWithin(min(s.ya, s.yb) - s.widest, float(firstRow), float(lastRow) + 1.0f),
               bottom = pixelWithin(max(s.ya, s.yb) + s.widest, float(firstRow) - 1.0f, float(lastRow));
@@ -194,16 +194,17 @@ void fillRibbon(const FrameConstants& f, const WideStrand& s, int firstRow, int 
                 depth[k] = floatBitsToUint(max(nearer / (s.inverseA + u * (s.inverseB - s.inverseA)), nearPlane));
                 keep[k] = std::fabs(p.across) <= 1.0f ? 1u : 0u;
             }
-            uint64_t* const row = visibility + size_t(y) * f.width + size_t(x0);
+            const size_t firstPixel = size_t(y) * f.width + size_t(x0);
             for (int k = 0; k < count; ++k)
-                if (keep[k] != 0) offerKey(row, size_t(k), uint64_t{depth[k]} << 32 | s.id);
+                if (keep[k] != 0) offerKey(visibility, firstPixel + size_t(k), uint64_t{depth[k]} << 32 | s.id);
         }
     }
 }
 
 /// Rows [firstRow, lastRow] of a wide tube: every pixel whose ray meets it.
 template <bool isPlain>
-void fillTubeRows(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, uint64_t* visibility) {
+void fillTubeRows(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow,
+                  const Visibility& visibility) {
     constexpr int kTubeStretch = 8;  // most tubes are a few pixels wide
     const int first = pixelWithin(std::ceil(min(s.top[0], s.top[1])), float(firstRow), float(lastRow) + 1.0f),
               last = pixelWithin(max(s.bottom[0], s.bottom[1]), float(firstRow) - 1.0f, float(lastRow));
@@ -236,21 +237,21 @@ void fillTubeRows(const FrameConstants& f, const WideStrand& s, int firstRow, in
                 depth[k] = floatBitsToUint(hit.depth);
                 keep[k] = hit.depth < kNoDepth ? 1u : 0u;
             }
-            uint64_t* const row = visibility + size_t(y) * f.width + size_t(x0);
+            const size_t firstPixel = size_t(y) * f.width + size_t(x0);
             for (int k = 0; k < count; ++k)
-                if (keep[k] != 0) offerKey(row, size_t(k), uint64_t{depth[k]} << 32 | s.id);
+                if (keep[k] != 0) offerKey(visibility, firstPixel + size_t(k), uint64_t{depth[k]} << 32 | s.id);
         }
     }
 }
 
-void fillTube(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, uint64_t* visibility) {
+void fillTube(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, const Visibility& visibility) {
     if (isBeforeEye(s.tube, f.nearPlane) && isShort(s.tube))
         fillTubeRows<true>(f, s, firstRow, lastRow, visibility);
     else
         fillTubeRows<false>(f, s, firstRow, lastRow, visibility);
 }
 
-void fillStrand(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, uint64_t* visibility) {
+void fillStrand(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, const Visibility& visibility) {
     if (s.isRound)
         fillTube(f, s, firstRow, lastRow, visibility);
     else
@@ -282,7 +283,7 @@ WideStrand wideTube(const FrameConstants& f, const CameraSegment& c, uint32_t id
 }
 
 void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_t count, uint32_t firstId,
-                  const WideSink& wide, uint64_t* visibility) {
+                  const WideSink& wide, const Visibility& visibility) {
     const FrameConstants f = frame;
     const DrawNode node = *block.node;
     const uint32_t* __restrict const words = &block.segments->a.positionXY;
@@ -386,7 +387,7 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
 }
 
 void fillWide(const FrameConstants& frame, const WideStrand* strands, size_t count, uint32_t firstRow, uint32_t lastRow,
-              uint64_t* visibility) {
+              const Visibility& visibility) {
     const FrameConstants f = frame;
     for (size_t i = 0; i < count; ++i) fillStrand(f, strands[i], int(firstRow), int(lastRow), visibility);
 }
