@@ -510,7 +510,7 @@ class CpuBackend final : public render::Backend {
         const Planes planes = fine.planes();
         const LightInput light{draws_->lights.data(),
                                draws_->environment ? draws_->environment->table.data() : nullptr};
-        const ShadedRow empty = emptyRow(light);
+        const ShadedRow empty = emptyRow();
         const auto shadeRow = [&](uint32_t x0, uint32_t n, uint32_t y, TexelRow& own, TexelRow& row, bool any) {
             const size_t at = size_t{y} * fine.width + x0;
             const ShadeOutput out{image_->rgba.data() + at, wantAll_ ? image_->depth.data() + at : nullptr,
@@ -521,7 +521,16 @@ class CpuBackend final : public render::Backend {
             if (own.hasTubes && &own != &row) k_.finishRow(1.0f / frame_.focal, n, own);
             // Of a row without winners the planes are those of an older frame.
             const SurfacePlanes planesHere = fine.mayHold(y, x0, n) ? planesAt(at) : SurfacePlanes{};
-            k_.shadeRow(frame_, tables_, own, row, planesHere, light, x0, y, n, out);
+            thread_local SurfaceRow surface{};
+            const bool isLit = frame_.debugView == shared::kDebugNone &&
+                               (planesHere.surface != nullptr || (frame_.shade & shared::kShadeLit) != 0);
+            const bool showsNormals = wantAll_ || frame_.debugView == shared::kDebugNormals;
+            k_.surfaceRow(frame_, own, row, planesHere,
+                          {wantAll_ || (isLit && frame_.lightCount > 0), isLit || showsNormals, isLit,
+                           frame_.debugView == shared::kDebugHoles},
+                          x0, y, n, surface);
+            if (isLit) k_.lightRow(frame_, light, x0, y, n, surface);
+            k_.outputRow(frame_, tables_, n, surface, out);
         };
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
             if (hasPyramid && levelCount_ > 1) {
@@ -550,11 +559,10 @@ class CpuBackend final : public render::Backend {
             if (out.linear) std::copy_n(linear.begin(), 3 * n, out.linear);
         }
     };
-    ShadedRow emptyRow(const LightInput& light) {
+    ShadedRow emptyRow() {
         ShadedRow shaded;
-        static const TexelRow kNothing{};
-        k_.shadeRow(frame_, tables_, kNothing, kNothing, {}, light, 0, 0, kTile,
-                    {shaded.rgba.data(), nullptr, nullptr, shaded.linear.data()});
+        static const SurfaceRow kNothing{};
+        k_.outputRow(frame_, tables_, kTile, kNothing, {shaded.rgba.data(), nullptr, nullptr, shaded.linear.data()});
         return shaded;
     }
 

@@ -111,6 +111,7 @@ struct LargeSink {
 
 /// What a triangle's pixel is made of beside colour and normal: metallic 8 | roughness 8 | occlusion 8 | flags.
 constexpr uint32_t kPixelTriangle = 0x80000000u, kPixelUnlit = 0x40000000u;
+constexpr uint32_t kPlainSurface = 0x00ffff00u;  ///< not metallic, rough, not occluded: what points are
 /// Planes over the whole image, only where triangles are drawn; `emissive` only where a material shines.
 struct SurfacePlanes {
     uint32_t* surface;
@@ -139,6 +140,23 @@ struct ResolveInput {
 struct LightInput {
     const shared::LightSource* lights;
     const float* environment;  ///< table of shaders/shared/environment.h; null: none
+};
+
+/// The visible surface at the pixels of a tile's row, whatever it was made of: what reconstruction leaves, light
+/// changes (colours only) and output reads.
+struct SurfaceRow {
+    alignas(64) float depth[kTile];  ///< linear, world units; 0: nothing. Only > 0 is sure unless depths are wanted
+    alignas(64) float nx[kTile], ny[kTile], nz[kTile];        ///< camera space, towards the eye; only if wanted
+    alignas(64) float red[kTile], green[kTile], blue[kTile];  ///< linear: of the surface, then what it sends
+    alignas(64) float leaf[kTile];                            ///< 1: lets light through; only if wanted
+    alignas(64) uint32_t material[kTile];                     ///< metallic 8 | roughness 8 | occlusion 8 | flags
+    alignas(64) uint32_t emission[kTile];                     ///< packColour; only if hasEmission
+    alignas(64) float ownDepth[kTile];                        ///< before reconstruction; only if wanted
+    bool hasTriangles, hasEmission;
+};
+/// What of a surface is needed beyond whether there is one, and its colour.
+struct SurfaceWants {
+    bool depth, normal, leaf, ownDepth;
 };
 
 struct ShadeOutput {
@@ -173,9 +191,16 @@ struct Kernels {
                       TexelRow& beside);
     /// Normals and depths of tubes, pixel by pixel, once a row is reconstructed.
     void (*finishRow)(float inverseFocal, uint32_t n, TexelRow& row);
-    void (*shadeRow)(const shared::FrameConstants& f, const Tables& tables, const TexelRow& own, const TexelRow& row,
-                     const SurfacePlanes& planes, const LightInput& light, uint32_t x0, uint32_t y, uint32_t n,
-                     const ShadeOutput& out);
+    /// The surface of a reconstructed row; `own`: the row before. `planes`: from the row's first pixel on, or null.
+    void (*surfaceRow)(const shared::FrameConstants& f, const TexelRow& own, const TexelRow& row,
+                       const SurfacePlanes& planes, const SurfaceWants& wants, uint32_t x0, uint32_t y, uint32_t n,
+                       SurfaceRow& out);
+    /// What the surface sends to the eye.
+    void (*lightRow)(const shared::FrameConstants& f, const LightInput& light, uint32_t x0, uint32_t y, uint32_t n,
+                     SurfaceRow& row);
+    /// The picture's pixels, over the background.
+    void (*outputRow)(const shared::FrameConstants& f, const Tables& tables, uint32_t n, const SurfaceRow& row,
+                      const ShadeOutput& out);
     /// Offers the triangles of one cluster (ids from firstId on) to the visibility buffer.
     void (*rasterCluster)(const shared::FrameConstants& f, const shared::SurfaceMaterial* materials,
                           const MeshBlock& block, uint32_t firstId, const LargeSink& large,

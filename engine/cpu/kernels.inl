@@ -436,141 +436,9 @@ void finishRow(float inverseFocal, uint32_t n, TexelRow& __restrict row) {
     }
 }
 
-/// Normal at a pixel of a reconstructed row: the disc's, as seen at its centre (a tube's: as seen at the pixel).
-/// (x, y): the pixel's centre, px from the principal point.
-[[gnu::always_inline]] inline vec3 normalAt(const TexelRow& __restrict row, size_t at, float flat, float x, float y,
-                                            float focal) {
-    const vec3 v = viewDirection(x + flat * row.x[at], y + flat * row.y[at], focal);
-    return normalFromPerp(vec2(row.perpX[at], row.perpY[at]), v);
-}
-[[gnu::always_inline]] inline float depthAt(const TexelRow& __restrict row, size_t at, float flat, float x, float y,
-                                            float focal) {
-    return planeDepth(row.depth[at], max(row.radius[at], 1.0e-3f), vec2(row.perpX[at], row.perpY[at]), row.x[at],
-                      row.y[at], 1.0f - flat, x, y, focal);
-}
+#include "engine/cpu/light.inl"
 
-#include "engine/cpu/shade_surfaces.inl"
-
-void shadeRow(const FrameConstants& frame, const Tables& tables, const TexelRow& __restrict own,
-              const TexelRow& __restrict row, const SurfacePlanes& planes, const LightInput& light, uint32_t x0,
-              uint32_t y, uint32_t n, const ShadeOutput& out) {
-    const FrameConstants f = frame;
-    const uint32_t* const surface = planes.surface;
-    const bool lit = (surface != nullptr || (f.shade & kShadeLit) != 0) && f.debugView == kDebugNone;
-    alignas(64) float share[kTile];    // of the light: 0 where a pixel keeps its colour
-    alignas(64) uint32_t mask[kTile];  // pixels of triangles to be lit
-    alignas(64) uint32_t word[kTile], shines[kTile];
-    // Points under lights of the scene's own are surfaces like any other.
-    const bool hasLights = f.lightCount > 0 || f.hasEnvironment != 0;
-    bool anyLit = false;
-    const float points = (f.shade & kShadeLit) != 0 ? 1.0f : 0.0f,
-                triangles = (f.shade & kShadeTriangles) != 0 ? 1.0f : 0.0f;
-    const uint32_t litPoints = points > 0 && hasLights ? 1 : 0, litTriangles = triangles > 0 ? 1 : 0;
-    for (size_t i = 0; lit && i < n; ++i) {
-        share[i] = hasLights ? 0.0f : points;
-        mask[i] = litPoints;
-        word[i] = kPlainSurface;
-        shines[i] = 0;
-    }
-    anyLit = lit && litPoints != 0;
-    if (lit && surface != nullptr) {
-#pragma GCC ivdep
-        for (size_t i = 0; i < n; ++i) {
-            // A triangle's pixel that no splat stands in front of.
-            const uint32_t drawn = surface[i];
-            const uint32_t inFront = row.depth[kPad + i] == own.depth[kPad + i] ? drawn : 0u;
-            const uint32_t isLit = (inFront & kPixelUnlit) == 0 ? litTriangles : 0u;
-            share[i] = inFront != 0 ? 0.0f : share[i];
-            mask[i] = inFront != 0 ? isLit : litPoints;
-            word[i] = inFront != 0 ? inFront : kPlainSurface;
-        }
-        uint32_t any = 0;
-        for (size_t i = 0; i < n; ++i) any |= mask[i];
-        anyLit = any != 0;
-        for (size_t i = 0; planes.emissive != nullptr && i < n; ++i)
-            shines[i] = word[i] != kPlainSurface ? planes.emissive[i] : 0u;
-    }
-    const float focal = f.focal, offX = float(int(x0)) + 0.5f - f.centre.x, offY = float(int(y)) + 0.5f - f.centre.y;
-    // Of rows without tubes isRound is not set.
-    alignas(64) float flat[kTile];
-    for (size_t i = 0; i < n; ++i) flat[i] = row.hasTubes ? 1.0f - row.isRound[kPad + i] : 1.0f;
-    alignas(64) float red[kTile], green[kTile], blue[kTile];
-#pragma GCC ivdep
-    for (size_t i = 0; i < n; ++i) {
-        const size_t at = kPad + i;
-        red[i] = row.red[at];
-        green[i] = row.green[at];
-        blue[i] = row.blue[at];
-    }
-    if (lit && points > 0) {
-        const float mayBeRibbon = row.hasTubes ? 1.0f : 0.0f;
-#pragma GCC ivdep
-        for (size_t i = 0; i < n; ++i) {
-            const size_t at = kPad + i;
-            const vec3 normal = normalAt(row, at, flat[i], offX + float(int(i)), offY, focal);
-            const float leaf =
-                letsLightThrough(row.thickness[at], row.radius[at], row.isRound[at], mayBeRibbon * row.axisX[at]);
-            const float sunlight = irradiance(normal, f.sunDirection, f.skyDirection, leaf);
-            const float brightness = 1.0f + share[i] * (sunlight - 1.0f);
-            red[i] *= brightness;
-            green[i] *= brightness;
-            blue[i] *= brightness;
-        }
-    }
-    if (anyLit) shadeSurfaces(f, row, flat, word, shines, light, mask, offX, offY, n, red, green, blue);
-    if (f.debugView == kDebugHoles || f.debugView == kDebugNormals || out.normal != nullptr) {
-#pragma GCC ivdep
-        for (size_t i = 0; i < n; ++i) {
-            const size_t at = kPad + i;
-            const vec3 c = normalAt(row, at, flat[i], offX + float(int(i)), offY, focal);
-            if (f.debugView == kDebugHoles) {
-                const vec3 colour = debugHoleColour(own.depth[at], row.depth[at]);
-                red[i] = colour.x;
-                green[i] = colour.y;
-                blue[i] = colour.z;
-            } else if (f.debugView == kDebugNormals) {
-                red[i] = 0.5f + 0.5f * c.x;
-                green[i] = 0.5f - 0.5f * c.y;
-                blue[i] = 0.5f - 0.5f * c.z;
-            }
-            if (out.normal == nullptr) continue;
-            const bool valid = row.depth[at] > 0.0f;
-            out.normal[3 * i] = valid ? f.viewX.x * c.x + f.viewY.x * c.y + f.viewZ.x * c.z : 0.0f;
-            out.normal[3 * i + 1] = valid ? f.viewX.y * c.x + f.viewY.y * c.y + f.viewZ.y * c.z : 0.0f;
-            out.normal[3 * i + 2] = valid ? f.viewX.z * c.x + f.viewY.z * c.y + f.viewZ.z * c.z : 0.0f;
-        }
-    }
-    alignas(64) uint32_t ir[kTile], ig[kTile], ib[kTile];
-    // max(0, v) of what is no number is 0: these index a table.
-#pragma GCC ivdep
-    for (size_t i = 0; i < n; ++i) {
-        const bool valid = row.depth[kPad + i] > 0.0f;
-        red[i] = valid ? red[i] : f.background.x;
-        green[i] = valid ? green[i] : f.background.y;
-        blue[i] = valid ? blue[i] : f.background.z;
-        ir[i] = uint(int(std::sqrt(min(max(0.0f, red[i]), 1.0f)) * 2047.0f + 0.5f));
-        ig[i] = uint(int(std::sqrt(min(max(0.0f, green[i]), 1.0f)) * 2047.0f + 0.5f));
-        ib[i] = uint(int(std::sqrt(min(max(0.0f, blue[i]), 1.0f)) * 2047.0f + 0.5f));
-    }
-    const uint32_t* __restrict const byteOf = tables.srgbByte.data();
-    uint32_t* __restrict const rgba = out.rgba;
-#pragma GCC ivdep
-    for (size_t i = 0; i < n; ++i) {
-        const uint32_t alpha = row.depth[kPad + i] > 0.0f ? 0xff000000u : 0u;
-        rgba[i] = byteOf[ir[i]] | byteOf[ig[i]] << 8 | byteOf[ib[i]] << 16 | alpha;
-    }
-    if (out.depth != nullptr)
-#pragma GCC ivdep
-        for (size_t i = 0; i < n; ++i)
-            out.depth[i] = depthAt(row, kPad + i, flat[i], offX + float(int(i)), offY, focal);
-    if (out.linear != nullptr)
-#pragma GCC ivdep
-        for (size_t i = 0; i < n; ++i) {
-            out.linear[3 * i] = red[i];
-            out.linear[3 * i + 1] = green[i];
-            out.linear[3 * i + 2] = blue[i];
-        }
-}
+#include "engine/cpu/surface.inl"
 
 }  // namespace
 
@@ -584,7 +452,9 @@ const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
                               pushRow,
                               expandRow,
                               finishRow,
-                              shadeRow,
+                              surfaceRow,
+                              lightRow,
+                              outputRow,
                               rasterCluster,
                               rasterLarge,
                               drawSegments,

@@ -18,7 +18,7 @@ struct Corners {
 };
 
 /// A material's properties at the pixels, and what the shading needs of the surface.
-struct SurfaceRow {
+struct MaterialRow {
     alignas(64) float nx[kTile], ny[kTile], nz[kTile], faceX[kTile], faceY[kTile], faceZ[kTile];
     alignas(64) float red[kTile], green[kTile], blue[kTile];
     alignas(64) float metallic[kTile], roughness[kTile], occlusion[kTile];
@@ -36,7 +36,7 @@ struct MaterialRun {
 };
 
 void applyMaterial(const MaterialRun& run, const Corners& c, const UvRow& uv, bool hasEmission,
-                   SurfaceRow& __restrict s) {
+                   MaterialRow& __restrict s) {
     const DrawMesh m = *run.mesh;
     const SurfaceMaterial& material = *run.material;
     const size_t end = run.first + run.n;
@@ -118,7 +118,7 @@ void applyMaterial(const MaterialRun& run, const Corners& c, const UvRow& uv, bo
 void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, uint32_t x0, uint32_t y,
                       TexelRow& __restrict row, const SurfacePlanes& planes) {
     Corners c;
-    SurfaceRow s;
+    MaterialRow s;
     UvRow uv;
     alignas(64) float wb[kTile], wc[kTile];
     alignas(64) uint32_t surface[kTile];

@@ -1,6 +1,4 @@
-// Light on the pixels of a row: triangles, and points under lights of the scene's own. Included by kernels.inl.
-
-constexpr uint32_t kPlainSurface = 0x00ffff00u;  ///< not metallic, rough, not occluded: what points are
+// Light on the pixels of a row (SurfaceRow). Included by kernels.inl, once per instruction set.
 
 /// The pixels of a row that are lit, closed up: of a forest's ground there may be few in each row.
 struct alignas(64) LitPixels {
@@ -10,31 +8,25 @@ struct alignas(64) LitPixels {
     uint32_t words[kTile];
 };
 
-/// `flat`: 0 where a pixel shows a tube; (offX, offY): the first pixel's centre, px from the principal point.
-void shadeSurfaces(const FrameConstants& f, const TexelRow& __restrict row, const float* __restrict flat,
-                   const uint32_t* __restrict words, const uint32_t* __restrict shines, const LightInput& input,
-                   const uint32_t* __restrict mask, float offX, float offY, uint32_t pixels, float* __restrict red,
-                   float* __restrict green, float* __restrict blue) {
+/// Where `mask` says so. (offX, offY): the first pixel's centre, px from the principal point.
+void lightSurfaces(const FrameConstants& f, const LightInput& input, const uint32_t* __restrict mask, float offX,
+                   float offY, uint32_t pixels, SurfaceRow& __restrict row) {
     const float focal = f.focal, inverseFocal = 1.0f / focal, vy = offY * inverseFocal;
     LitPixels p;
     size_t n = 0;
     for (uint32_t i = 0; i < pixels; ++i) {
         if (mask[i] == 0) continue;
-        const size_t from = kPad + i;
         p.at[n] = i;
-        const float x = offX + float(int(i));
-        const vec3 normal = normalAt(row, from, flat[i], x, offY, focal);
-        p.x[n] = x;
-        p.depth[n] = depthAt(row, from, flat[i], x, offY, focal);
-        p.nx[n] = normal.x;
-        p.ny[n] = normal.y;
-        p.nz[n] = normal.z;
-        p.leaf[n] = letsLightThrough(row.thickness[from], row.radius[from], row.isRound[from],
-                                     row.hasTubes ? row.axisX[from] : 0.0f);
-        p.red[n] = red[i];
-        p.green[n] = green[i];
-        p.blue[n] = blue[i];
-        p.words[n++] = words[i];
+        p.x[n] = offX + float(int(i));
+        p.depth[n] = row.depth[i];
+        p.nx[n] = row.nx[i];
+        p.ny[n] = row.ny[i];
+        p.nz[n] = row.nz[i];
+        p.leaf[n] = row.leaf[i];
+        p.red[n] = row.red[i];
+        p.green[n] = row.green[i];
+        p.blue[n] = row.blue[i];
+        p.words[n++] = row.material[i];
     }
     alignas(64) float r[kTile], g[kTile], b[kTile];
     const float *const px = p.x, *const depth = p.depth, *const nx = p.nx, *const ny = p.ny, *const nz = p.nz,
@@ -105,8 +97,51 @@ void shadeSurfaces(const FrameConstants& f, const TexelRow& __restrict row, cons
     }
     for (size_t i = 0; i < n; ++i) {
         const uint32_t at = p.at[i];
-        red[at] = r[i] + unpackRed(shines[at]);
-        green[at] = g[i] + unpackGreen(shines[at]);
-        blue[at] = b[i] + unpackBlue(shines[at]);
+        row.red[at] = r[i];
+        row.green[at] = g[i];
+        row.blue[at] = b[i];
+        if (!row.hasEmission) continue;
+        row.red[at] += unpackRed(row.emission[at]);
+        row.green[at] += unpackGreen(row.emission[at]);
+        row.blue[at] += unpackBlue(row.emission[at]);
     }
+}
+
+void lightRow(const FrameConstants& frame, const LightInput& light, uint32_t x0, uint32_t y, uint32_t n,
+              SurfaceRow& __restrict row) {
+    const FrameConstants f = frame;
+    const bool litPoints = (f.shade & kShadeLit) != 0, litTriangles = (f.shade & kShadeTriangles) != 0;
+    // Points under lights of the scene's own are surfaces like any other; else theirs is one formula.
+    const bool hasLights = f.lightCount > 0 || f.hasEnvironment != 0;
+    alignas(64) float share[kTile];    // of that formula: 0 where a pixel keeps its colour
+    alignas(64) uint32_t mask[kTile];  // pixels that are lit as surfaces
+    const float pointShare = litPoints && !hasLights ? 1.0f : 0.0f;
+    const uint32_t pointMask = litPoints && hasLights ? 1u : 0u, triangleMask = litTriangles ? 1u : 0u;
+    for (size_t i = 0; i < n; ++i) {
+        share[i] = pointShare;
+        mask[i] = pointMask;
+    }
+    uint32_t anyMask = pointMask;
+    if (row.hasTriangles)
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            const bool isTriangle = (row.material[i] & kPixelTriangle) != 0;
+            const uint32_t isLit = (row.material[i] & kPixelUnlit) == 0 ? triangleMask : 0u;
+            share[i] = isTriangle ? 0.0f : share[i];
+            mask[i] = isTriangle ? isLit : pointMask;
+            anyMask |= mask[i];
+        }
+    if (litPoints) {
+        const vec3 sun = f.sunDirection, sky = f.skyDirection;
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            const float sunlight = irradiance(vec3(row.nx[i], row.ny[i], row.nz[i]), sun, sky, row.leaf[i]);
+            const float brightness = 1.0f + share[i] * (sunlight - 1.0f);
+            row.red[i] *= brightness;
+            row.green[i] *= brightness;
+            row.blue[i] *= brightness;
+        }
+    }
+    if (anyMask != 0)
+        lightSurfaces(f, light, mask, float(int(x0)) + 0.5f - f.centre.x, float(int(y)) + 0.5f - f.centre.y, n, row);
 }

@@ -1,0 +1,134 @@
+// From reconstructed rows to surfaces, and from surfaces to the picture. Included by kernels.inl, once per instruction
+// set.
+
+/// (x, y): the first pixel's centre, px from the principal point. `flat`: 0 where a pixel shows a tube.
+[[gnu::always_inline]] inline void surfaceNormals(const TexelRow& __restrict row, const float* __restrict flat, float x,
+                                                  float y, float focal, uint32_t n, SurfaceRow& __restrict out) {
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const size_t at = kPad + i;
+        // The disc's, as seen at its centre (a tube's: as seen at the pixel).
+        const vec3 v = viewDirection(x + float(int(i)) + flat[i] * row.x[at], y + flat[i] * row.y[at], focal);
+        const vec3 normal = normalFromPerp(vec2(row.perpX[at], row.perpY[at]), v);
+        out.nx[i] = normal.x;
+        out.ny[i] = normal.y;
+        out.nz[i] = normal.z;
+    }
+}
+
+void surfaceRow(const FrameConstants& frame, const TexelRow& __restrict own, const TexelRow& __restrict row,
+                const SurfacePlanes& planes, const SurfaceWants& wants, uint32_t x0, uint32_t y, uint32_t n,
+                SurfaceRow& __restrict out) {
+    const float focal = frame.focal, x = float(int(x0)) + 0.5f - frame.centre.x,
+                py = float(int(y)) + 0.5f - frame.centre.y;
+    // Of rows without tubes isRound is not set.
+    alignas(64) float flat[kTile];
+    for (size_t i = 0; i < n; ++i) flat[i] = row.hasTubes ? 1.0f - row.isRound[kPad + i] : 1.0f;
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const size_t at = kPad + i;
+        out.depth[i] = row.depth[at];
+        out.red[i] = row.red[at];
+        out.green[i] = row.green[at];
+        out.blue[i] = row.blue[at];
+    }
+    const uint32_t* const triangles = planes.surface;
+    out.hasTriangles = triangles != nullptr;
+    out.hasEmission = triangles != nullptr && planes.emissive != nullptr;
+    if (triangles == nullptr)
+        for (size_t i = 0; i < n; ++i) out.material[i] = kPlainSurface;
+    else
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            // A triangle's pixel that no splat stands in front of.
+            const uint32_t drawn = triangles[i];
+            const uint32_t inFront = row.depth[kPad + i] == own.depth[kPad + i] ? drawn : 0u;
+            out.material[i] = inFront != 0 ? inFront : kPlainSurface;
+        }
+    for (size_t i = 0; out.hasEmission && i < n; ++i)
+        out.emission[i] = out.material[i] != kPlainSurface ? planes.emissive[i] : 0u;
+    if (wants.normal) surfaceNormals(row, flat, x, py, focal, n, out);
+    if (wants.depth)
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            const size_t at = kPad + i;
+            out.depth[i] = planeDepth(row.depth[at], max(row.radius[at], 1.0e-3f), vec2(row.perpX[at], row.perpY[at]),
+                                      row.x[at], row.y[at], 1.0f - flat[i], x + float(int(i)), py, focal);
+        }
+    const float mayBeRibbon = row.hasTubes ? 1.0f : 0.0f;
+    if (wants.leaf)
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            const size_t at = kPad + i;
+            out.leaf[i] =
+                letsLightThrough(row.thickness[at], row.radius[at], row.isRound[at], mayBeRibbon * row.axisX[at]);
+        }
+    if (wants.ownDepth)
+        for (size_t i = 0; i < n; ++i)
+            out.ownDepth[i] = row.depth[kPad + i] == own.depth[kPad + i] ? out.depth[i] : own.depth[kPad + i];
+}
+
+/// The debug views that are seen in the place of colours.
+void debugColours(const FrameConstants& f, uint32_t n, const SurfaceRow& __restrict row, float* __restrict red,
+                  float* __restrict green, float* __restrict blue) {
+    const bool showsHoles = f.debugView == kDebugHoles;
+    for (size_t i = 0; i < n; ++i) {
+        const vec3 c = showsHoles ? debugHoleColour(row.ownDepth[i], row.depth[i])
+                                  : vec3(0.5f + 0.5f * row.nx[i], 0.5f - 0.5f * row.ny[i], 0.5f - 0.5f * row.nz[i]);
+        red[i] = c.x;
+        green[i] = c.y;
+        blue[i] = c.z;
+    }
+}
+
+void outputRow(const FrameConstants& frame, const Tables& tables, uint32_t n, const SurfaceRow& __restrict row,
+               const ShadeOutput& out) {
+    const FrameConstants f = frame;
+    alignas(64) float red[kTile], green[kTile], blue[kTile];
+    alignas(64) uint32_t ir[kTile], ig[kTile], ib[kTile];
+    if (f.debugView == kDebugHoles || f.debugView == kDebugNormals)
+        debugColours(f, n, row, red, green, blue);
+    else
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            red[i] = row.red[i];
+            green[i] = row.green[i];
+            blue[i] = row.blue[i];
+        }
+        // max(0, v) of what is no number is 0: these index a table.
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const bool valid = row.depth[i] > 0.0f;
+        red[i] = valid ? red[i] : f.background.x;
+        green[i] = valid ? green[i] : f.background.y;
+        blue[i] = valid ? blue[i] : f.background.z;
+        ir[i] = uint(int(std::sqrt(min(max(0.0f, red[i]), 1.0f)) * 2047.0f + 0.5f));
+        ig[i] = uint(int(std::sqrt(min(max(0.0f, green[i]), 1.0f)) * 2047.0f + 0.5f));
+        ib[i] = uint(int(std::sqrt(min(max(0.0f, blue[i]), 1.0f)) * 2047.0f + 0.5f));
+    }
+    const uint32_t* __restrict const byteOf = tables.srgbByte.data();
+    uint32_t* __restrict const rgba = out.rgba;
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const uint32_t alpha = row.depth[i] > 0.0f ? 0xff000000u : 0u;
+        rgba[i] = byteOf[ir[i]] | byteOf[ig[i]] << 8 | byteOf[ib[i]] << 16 | alpha;
+    }
+    if (out.normal != nullptr)
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            const bool valid = row.depth[i] > 0.0f;
+            const float x = row.nx[i], y = row.ny[i], z = row.nz[i];
+            out.normal[3 * i] = valid ? f.viewX.x * x + f.viewY.x * y + f.viewZ.x * z : 0.0f;
+            out.normal[3 * i + 1] = valid ? f.viewX.y * x + f.viewY.y * y + f.viewZ.y * z : 0.0f;
+            out.normal[3 * i + 2] = valid ? f.viewX.z * x + f.viewY.z * y + f.viewZ.z * z : 0.0f;
+        }
+    if (out.depth != nullptr)
+        for (size_t i = 0; i < n; ++i) out.depth[i] = row.depth[i];
+    if (out.linear != nullptr)
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            out.linear[3 * i] = red[i];
+            out.linear[3 * i + 1] = green[i];
+            out.linear[3 * i + 2] = blue[i];
+        }
+}
