@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "shaders/shared/wide_disc.h"
-
 namespace stipple::render {
 
 static_assert(sizeof(shared::PointRecord) == 16);
@@ -67,14 +65,6 @@ void addMeshes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, DrawList&
     }
 }
 
-/// May points of a node be wide discs? Their radii are at most its edge.
-bool mayBeWide(const shared::DrawNode& d, const lod::View& view, const DrawSettings& settings) {
-    const auto least = [](float step) { return 65536 * std::min(0.0, double{step}); };
-    const double nearest = double{d.base.z} + least(d.axisX.z) + least(d.axisY.z) + least(d.axisZ.z);
-    const double radius = 1.01 * double{d.edge} * double{settings.supportScale};  // (fp32 rounds)
-    return radius * view.focalPixels > double{shared::wideRadius(view.width, view.height)} * nearest;
-}
-
 /// Nearer than this nothing of the cut can be: by the nearest bounding sphere; of a node that holds the eye, a step of
 /// its lattice, nearer than which nothing of it can be told apart. (Depth is linear: a small distance costs nothing.)
 double nearestOf(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,
@@ -111,7 +101,6 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     out.nodes.clear();
     out.blocks.clear();
     out.keys.clear();
-    out.hasWideDiscs = false;
     out.meshes.clear();
     out.meshTextures.clear();
     out.meshDraws.clear();
@@ -159,10 +148,6 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
         d.count = draw.count;
         d.level = node.level;
         d.errorPixels = draw.errorPixels;
-        if (!h.isStrands && mayBeWide(d, view, settings)) {
-            d.octantMask |= shared::kNodeWide;
-            out.hasWideDiscs = true;
-        }
         auto& nodes = h.isStrands ? out.strandNodes : out.nodes;
         auto& blocks = h.isStrands ? out.strandBlocks : out.blocks;
         static_assert(shared::kSegmentsPerBlock == shared::kRecordsPerBlock);
