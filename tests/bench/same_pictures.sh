@@ -2,6 +2,7 @@
 # tests/bench/same_pictures.sh [OPTIONS] OLD [NEW]: the same pictures and stores of two programs, one line a case; 1 if
 # any differs. See README.md here.
 set -euo pipefail
+export LC_ALL=C
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 source_tree=$(cd "$here/../.." && pwd)
 usage() {
@@ -51,7 +52,9 @@ program_of() {
         mkdir -p "$tree" "$bin/tests"
         echo "building $commit" >&2
         git -C "$source_tree" archive "$commit" | tar -x -C "$tree"
-        (cd "$tree" && cmake --preset release && cmake --build build -j "$jobs" --target stipple &&
+        # A compiler cache then takes the files for those of any other tree.
+        (export CCACHE_BASEDIR=$tree CCACHE_NOHASHDIR=1
+            cd "$tree" && cmake --preset release && cmake --build build -j "$jobs" --target stipple &&
             { ! grep -q stipple_same tests/CMakeLists.txt || cmake --build build -j "$jobs" --target stipple_same; }) >"$work/build.log" 2>&1 ||
             { tail -20 "$work/build.log" >&2; return 2; }
         [ ! -f "$tree/build/tests/stipple_same" ] || cp "$tree/build/tests/stipple_same" "$bin/tests/"
@@ -76,6 +79,7 @@ add() { # add LIST KIND NAME ARGS...
                 line+=" inputs/$(basename "${argument%.gz}")"
                 [ -f "$work/unpacked/$(basename "${argument%.gz}")" ] || { mkdir -p "$work/unpacked"; zcat "$data/$argument" >"$work/unpacked/$(basename "${argument%.gz}")"; } ;;
             @*) [ -e "$data/${argument#@}" ] || { skip "$name" "${argument#@}"; return; }; line+=" $data/${argument#@}" ;;
+            %*.gltf) line+=" drawn/${argument#%}" ;;
             %*) line+=" drawn/${argument#%}.stipple" ;;
             {*}) argument=${argument#\{}; line+=" inputs/${argument%\}}" ;;
             *) line+=" $argument" ;;
@@ -83,11 +87,12 @@ add() { # add LIST KIND NAME ARGS...
     done
     printf '%s\t%s\t%s\t%s\n' "$kind" "$name" "$environment" "$line" >>"$work/$list"
 }
-skip() { skipped=$((skipped + 1)); printf 'SKIP     %-24s %s is missing\n' "$1" "$2"; }
+skip() { [[ $1 =~ $only ]] || return 0; skipped=$((skipped + 1)); printf 'SKIP     %-24s %s is missing\n' "$1" "$2"; }
 on() { environment=$1; shift; "$@"; environment=; }
 grown() { add grown grow "$@"; }
 store() { add stores build "$@"; }
 converted() { add stores convert "$@"; }
+placed() { add stores place "$@"; }
 picture() {
     local name=$1
     shift
@@ -99,17 +104,34 @@ picture() {
 select_cases() {
     touch "$work/grown" "$work/stores" "$work/pictures"
     source "$here/same_pictures_cases.sh"
-    awk -F'\t' -v only="$only" -v pictures="$work/pictures" '
-        BEGIN { while ((getline line < pictures) > 0) all = all " " line " " }
-        $2 ~ only || index(all, " drawn/" $2 ".stipple ")' "$work/stores" >"$work/s" && mv "$work/s" "$work/stores"
+    cp "$work/stores" "$work/all_stores"
+    needed pictures stores drawn/
     cat "$work/stores" "$work/pictures" >"$work/rest"
-    awk -F'\t' -v only="$only" -v rest="$work/rest" '
-        BEGIN { while ((getline line < rest) > 0) all = all " " line " " }
-        $2 ~ only || index(all, " inputs/" $2 " ")' "$work/grown" >"$work/g" && mv "$work/g" "$work/grown"
+    needed rest all_stores drawn/  # what is placed needs stores too
+    mv "$work/all_stores" "$work/stores"
+    cat "$work/stores" "$work/pictures" >"$work/rest"
+    needed rest grown inputs/
+}
+# needed BY LIST PREFIX: leaves in LIST what matches by name, or what the lines of BY mention with that prefix.
+needed() {
+    awk -F'\t' -v only="$only" -v by="$work/$1" -v prefix=" $3" '
+        BEGIN { while ((getline line < by) > 0) all = all " " line " " }
+        $2 ~ only || index(all, prefix $2 " ") || index(all, prefix $2 ".stipple ") || index(all, prefix $2 ".gltf ")' \
+        "$work/$2" >"$work/s" && mv "$work/s" "$work/$2"
 }
 
 # --- one side: a folder with grown/ inputs/ stores/ drawn/ pictures/ exit/ log/
 
+place() { # place STORE SCALE,X,Y,Z ...: a scene of stores
+    local nodes=() numbers
+    while [ $# -gt 1 ]; do
+        IFS=, read -ra numbers <<<"$2"
+        nodes+=("{\"scale\":[${numbers[0]},${numbers[0]},${numbers[0]}],\"translation\":[${numbers[1]},${numbers[2]},${numbers[3]}],\"extensions\":{\"STIPPLE_store\":{\"uri\":\"${1#drawn/}\"}}}")
+        shift 2
+    done
+    printf '{"asset":{"version":"2.0"},"extensionsUsed":["STIPPLE_store"],"scene":0,"scenes":[{"nodes":[%s]}],"nodes":[%s]}\n' \
+        "$(seq -s, 0 $((${#nodes[@]} - 1)))" "$(IFS=,; echo "${nodes[*]}")"
+}
 run_case() { # run_case PROGRAM LINE, in the side's folder
     local program=$1 kind name environment arguments folder output
     IFS=$'\t' read -r kind name environment arguments < <(printf '%s\n' "$2" | sed 's/\t\t/\t-\t/')
@@ -121,13 +143,14 @@ run_case() { # run_case PROGRAM LINE, in the side's folder
     esac
     case $kind in grow) ;; *) arguments+=' --quiet' ;; esac
     [ "$kind" != convert ] || arguments=${arguments% --quiet}
+    [ "$kind" != place ] || { place $arguments >"stores/$name.gltf"; return; }
     local status=0
     # The arguments are words without blanks, as the cases have them.
     # shellcheck disable=SC2086
     env $environment XDG_CACHE_HOME="$PWD/cache" timeout 300 "$program" $kind $arguments -o "$output" --force >"log/$kind-$name" 2>&1 || status=$?
     echo "$status" >"exit/$kind-$name"
 }
-export -f run_case
+export -f run_case place
 run_list() { xargs -r -d '\n' -P "$jobs" -I{} bash -c 'run_case "$1" "$2"' _ "$1" {} <"$2"; }
 
 # run_side PROGRAM FOLDER INPUTS STORES: INPUTS and STORES are folders of the other side, or empty.
@@ -187,11 +210,16 @@ how_far() { # how_far NAME
     esac
 }
 report() {
-    local same=0 changed=0 allowed=0 name old new word
+    local same=0 changed=0 allowed=0 failed=0 name old new word
     while read -r name old new; do
         if [ "$old" = "$new" ]; then
-            same=$((same + 1))
-            [[ $name == exit/* ]] || printf 'same     %s\n' "$name"
+            if [[ $name != exit/* ]]; then
+                same=$((same + 1))
+                printf 'same     %s\n' "$name"
+            elif [ "$old" != 0 ]; then  # a case that shows nothing
+                failed=$((failed + 1))
+                printf 'FAILS    %s: %s\n' "$name" "$(tail -1 "$new_side/log/${name#exit/}")"
+            fi
             continue
         fi
         word=DIFFERS
@@ -207,8 +235,9 @@ report() {
             printf '%-8s %s: %s\n' "$word" "$name" "$(how_far "$name")"
         fi
     done < <(join -1 2 -2 2 -a 1 -a 2 -e - -o 0,1.1,2.1 "$work/old.hash" "$work/new.hash")
-    printf '%d same, %d differ, %d differ as expected, %d skipped for want of data; %d s\n' $same $changed $allowed $skipped $SECONDS
-    [ $changed -eq 0 ]
+    printf '%d same, %d differ, %d differ as expected, %d fail on both sides, %d skipped for want of data; %d s\n' \
+        $same $changed $allowed $failed $skipped $SECONDS
+    [ $changed -eq 0 ] && [ $failed -eq 0 ]
 }
 
 # --- the self-test: a program that draws one picture and builds one store differently
@@ -240,27 +269,32 @@ W
     exit 0
 fi
 
-[ $# -ge 1 ] && [ $# -le 2 ] || usage
-old=$(program_of "$1") new=$(program_of "${2:-$source_tree/build/stipple}")
-for helper in "$(dirname "$new")/tests/stipple_same" "$(dirname "$old")/tests/stipple_same" ''; do
-    [ -n "$helper" ] || { echo 'neither side has tests/stipple_same: build that target' >&2; exit 2; }
-    [ ! -x "$helper" ] || break
-done
-old_helper=$(dirname "$old")/tests/stipple_same
-[ -x "$old_helper" ] || old_helper=$helper
-select_cases
-old_side=$work/old new_side=${keep:-$work/new}
-mkdir -p "$new_side"
-new_side=$(realpath "$new_side")
-if [[ $old == "$cache"/*/bin/stipple ]]; then
-    key=$( (cat "$work"/grown "$work"/stores "$work"/pictures; grep -m1 'model name' /proc/cpuinfo) | sha256sum | head -c 16)
-    old_side=$cache/$(basename "$(dirname "$(dirname "$old")")")/$key
-fi
-if [ ! -f "$old_side/done" ]; then
-    run_side "$old" "$old_side" '' ''
-    touch "$old_side/done"
-fi
-run_side "$new" "$new_side" "$old_side/inputs" "$([ $same_stores -eq 0 ] || echo "$old_side/stores")"
-hashes "$old_side" "$old_helper" >"$work/old.hash"
-hashes "$new_side" "$helper" >"$work/new.hash"
-report
+# Read whole before it runs: the file may change meanwhile.
+main() {
+    [ $# -ge 1 ] && [ $# -le 2 ] || usage
+    old=$(program_of "$1") new=$(program_of "${2:-$source_tree/build/stipple}")
+    for helper in "$(dirname "$new")/tests/stipple_same" "$(dirname "$old")/tests/stipple_same" ''; do
+        [ -n "$helper" ] || { echo 'neither side has tests/stipple_same: build that target' >&2; exit 2; }
+        [ ! -x "$helper" ] || break
+    done
+    old_helper=$(dirname "$old")/tests/stipple_same
+    [ -x "$old_helper" ] || old_helper=$helper
+    select_cases
+    old_side=$work/old new_side=${keep:-$work/new}
+    mkdir -p "$new_side"
+    new_side=$(realpath "$new_side")
+    if [[ $old == "$cache"/*/bin/stipple ]]; then
+        key=$( (cat "$work"/grown "$work"/stores "$work"/pictures; grep -m1 'model name' /proc/cpuinfo) | sha256sum | head -c 16)
+        old_side=$cache/$(basename "$(dirname "$(dirname "$old")")")/$key
+    fi
+    if [ ! -f "$old_side/done" ]; then
+        run_side "$old" "$old_side" '' ''
+        touch "$old_side/done"
+    fi
+    run_side "$new" "$new_side" "$old_side/inputs" "$([ $same_stores -eq 0 ] || echo "$old_side/stores")"
+    hashes "$old_side" "$old_helper" >"$work/old.hash"
+    hashes "$new_side" "$helper" >"$work/new.hash"
+    report
+}
+main "$@"
+exit

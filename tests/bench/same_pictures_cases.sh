@@ -3,6 +3,7 @@
 #   store NAME ARGS...     `stipple build`; {NAME.las} is an input, @PATH a file of STIPPLE_DATA (unpacked where it ends
 #                          in .gz), skipped where it is missing
 #   converted NAME ARGS... `stipple convert`
+#   placed NAME %STORE SCALE,X,Y,Z ...  a glTF scene that places stores
 #   picture NAME ARGS...   `stipple render`; %NAME is a store of above. `on NAME=VALUE picture ...` sets its environment.
 
 grown scan.las scan --points 150k --origin 500000,5400000,300
@@ -54,6 +55,8 @@ store fur @05_tubes/hair/fur.hair
 store stroke @05_tubes/streamlines_niivue/stroke.trk.gz --memory 512M
 store qsm @05_tubes/qsm/Tree_1_TreeQSM.txt
 converted birch_strands {birch.glb} --strands
+placed hybrid %ball 1,0,0,0 %rock 0.5,1.2,0,0.3 %oak 0.25,-0.9,-1,0.2
+placed pair %ball 1,0,0,0 %rock 1,1.5,0,0
 
 # Scans on cpu: modes, odd and even sizes, errors, budgets, alpha, depth and normals, colours.
 picture scan %scan --size 640x360
@@ -121,9 +124,9 @@ picture forest_wind {forest.glb} --size 640x360 --error 2 --wind 0.03 --time 2.2
 picture forest_level {forest.glb} --size 320x180 --error 4 --debug level
 picture forest_within {forest.glb} --size 320x180 --eye=0,1.8,14 --target=0,6,-40 --fov 60
 picture meadow {meadow.glb} --size 480x270 --wind 0.1 --time 0.4
-picture hybrid %ball %rock %oak --size 480x360 --error 0.5
-picture hybrid.exr %ball %rock %oak --size 241x181 --alpha
-picture orbit %ball %rock --size 160x120 --orbit 3
+picture hybrid %hybrid.gltf --size 480x360 --error 0.5
+picture hybrid.exr %hybrid.gltf --size 241x181 --alpha
+picture orbit %pair.gltf --size 160x120 --orbit 3
 
 # Software Vulkan.
 picture gpu_scan %scan --size 640x360 --device gpu:llvmpipe
@@ -135,7 +138,7 @@ picture gpu_terrain %terrain --size 321x181 --error 2 --device gpu:llvmpipe
 picture gpu_oak %oak --size 240x240 --wind 0.05 --time 1.5 --device gpu:llvmpipe
 picture gpu_fur %fur --size 240x180 --device gpu:llvmpipe
 picture gpu_forest {forest.glb} --size 320x180 --error 2 --device gpu:llvmpipe
-picture gpu_hybrid.exr %ball %rock %oak --size 240x180 --alpha --device gpu:llvmpipe
+picture gpu_hybrid.exr %hybrid.gltf --size 240x180 --alpha --device gpu:llvmpipe
 
 # The fp64 restatement, and rays.
 picture restated_scan %scan --size 160x90 --device reference
@@ -143,7 +146,7 @@ picture restated_points %scan --size 161x91 --mode points --device reference
 picture restated_rock.exr %rock --size 120x90 --alpha --device reference
 picture restated_oak %oak --size 120x120 --wind 0.05 --time 1.5 --device reference
 picture restated_forest {forest.glb} --size 120x68 --error 4 --device reference
-picture restated_hybrid %ball %rock %oak --size 121x91 --device reference
+picture restated_hybrid %hybrid.gltf --size 121x91 --device reference
 picture traced_ball %ball --size 120x90 --mode reference --samples 2
 picture traced_rock.exr %rock --size 120x90 --mode reference --samples 1 --alpha
 picture traced_oak %oak --size 90x91 --mode reference --samples 2
