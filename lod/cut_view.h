@@ -32,13 +32,15 @@ inline LocalView makeLocalView(const Hierarchy& h, const Instance& instance, con
     return local;
 }
 
+/// Room for the rounding of normals beyond the cone of a node, radians.
+inline constexpr double kConeMargin = 0.05;
+
 /// Do all discs of N and of the nodes below it face away from the eye? `d`: from the eye to the centre of N's sphere of
 /// radius r, `distance` its length. A disc at p with normal n is not drawn if n.p >= 0 from the eye; |p - d| <= r, and
 /// n is within the cone's half-angle of its axis, hence  n.p >= |d| cos(angle(axis, d) + half-angle) - r. Means of
 /// normals stay in a cone, but each is rounded by up to 0.12 degrees once more: kConeMargin has room for 20 generations
 /// of them.
 inline bool facesAway(const Node& node, const glm::dvec3& d, double distance, double r) {
-    constexpr double kConeMargin = 0.05;  // radians
     if (!(node.normalConeCosine > 0)) return false;
     const glm::dvec3 axis(shared::octDecode(node.normalCone));
     const double along = glm::dot(axis, d);
