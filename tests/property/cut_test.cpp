@@ -7,6 +7,7 @@
 #include <map>
 
 #include "engine/reference/decode.h"
+#include "tests/support/crafted_store.h"
 #include "tests/support/support.h"
 
 namespace stipple::lod {
@@ -412,6 +413,16 @@ TEST(Cut, WhatFacesAwayIsNotVisitedAndWhatDoesNotIs) {
     EXPECT_GT(control.wrong, 100u);
     RecordProperty("spared", static_cast<int>(sum.spared));
     RecordProperty("drawn", static_cast<int>(sum.drawn));
+    // A store whose cones are too narrow would hide what can be seen: verifying finds it.
+    EXPECT_TRUE(verifyStore(*store, *executor));
+    test::CraftedStore narrow = test::CraftedStore::read(folder / "a.stipple");
+    for (auto& node : narrow.nodes) node.normalConeCosine = std::min(1.0f, node.normalConeCosine + 0.2f);
+    narrow.write(folder / "b.stipple");
+    const auto lying = openStore(folder / "b.stipple");
+    ASSERT_TRUE(lying) << lying.error().line();
+    const auto verified = verifyStore(*lying, *executor);
+    ASSERT_FALSE(verified);
+    EXPECT_NE(verified.error().what.find("cone"), std::string::npos) << verified.error().line();
 }
 
 }  // namespace
