@@ -342,6 +342,7 @@ Result<Store> openStore(const std::string& path) {
         return tl::unexpected(damagedStore(path, fmt::format("the description cannot be read: {}", e.what())));
     }
     h.isStrands = store.description.isStrands;
+    h.isRigid = store.description.isRigid;
     h.isProgressive = store.description.isProgressive;
     for (const Node& n : h.nodes)
         if (n.isLeaf()) h.finestCode = std::max(h.finestCode, n.errorCode);
