@@ -7,6 +7,7 @@
 #include <map>
 
 #include "engine/scene/triangles.h"
+#include "lod/mesh_place.h"
 
 namespace stipple::test {
 
@@ -62,7 +63,7 @@ std::shared_ptr<const lod::Store> growMeshStore(const MeshRecipe& recipe, const 
 
 namespace {
 
-void append(const lod::Store& store, const lod::Chunk& chunk, uint32_t first, uint32_t count,
+void append(const lod::Store& store, uint32_t node, const lod::Chunk& chunk, uint32_t first, uint32_t count,
             std::vector<Triangle>& out) {
     const lod::Hierarchy& h = store.hierarchy;
     for (uint32_t c = first; c < first + count; ++c)
@@ -70,8 +71,8 @@ void append(const lod::Store& store, const lod::Chunk& chunk, uint32_t first, ui
             Triangle corners;
             for (uint32_t k = 0; k < 3; ++k) {
                 const uint32_t corner = chunk.triangles[chunk.clusters[c].firstTriangle + t] >> (8 * k) & 255u;
-                const shared::MeshVertex& v = chunk.vertices[chunk.clusters[c].firstVertex + corner];
-                corners.at(k) = h.origin + h.unit * glm::dvec3(v.x, v.y, v.z);
+                corners.at(k) =
+                    h.origin + h.unit * lod::vertexPlace(h.nodes[node], chunk, chunk.clusters[c], corner);
             }
             out.push_back(corners);
         }
@@ -121,7 +122,7 @@ std::vector<Triangle> leafTriangles(const lod::Store& store) {
 
 std::vector<Triangle> drawnTriangles(const lod::Store& store, const std::vector<lod::CutMeshDraw>& draws) {
     std::vector<Triangle> out;
-    for (const lod::CutMeshDraw& d : draws) append(store, chunkOf(store, d.node), d.firstCluster, d.clusters, out);
+    for (const lod::CutMeshDraw& d : draws) append(store, d.node, chunkOf(store, d.node), d.firstCluster, d.clusters, out);
     return out;
 }
 
