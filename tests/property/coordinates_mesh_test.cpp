@@ -122,6 +122,7 @@ render::Image pictureOf(const std::shared_ptr<const Store>& store, Executor& exe
     const auto backend = cpu::makeCpuBackend(executor);
     render::FrameSettings settings;
     settings.budgets.errorPixels = 0.1;
+    settings.draw.exactStrands = 0;
     return test::renderView(store, *backend, executor, view, settings);
 }
 
@@ -259,18 +260,30 @@ std::vector<glm::dvec3> endsOf(const Store& store) {
 TEST(CoordinatesOfCurves, AStrandFarAwayChangesNothing) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);
-    const StrandSet alone = test::curls({.count = 100, .vertices = 40});
-    const View view = viewOf(glm::dvec3(0, 0, 1));
-    const render::Image without =
-        pictureOf(test::buildStrands(alone, folder / "alone", *executor, 8192), *executor, view);
-    for (const glm::dvec3& far : farPlaces()) {
-        StrandSet set = alone;
-        for (const glm::dvec3& off : {glm::dvec3(0), glm::dvec3(0, 1, 0)}) set.addVertex(far + off, 0.01f, glm::vec3(0), 0);
-        set.endStrand(false);
-        const auto store = test::buildStrands(set, folder / "far", *executor, 8192);
-        EXPECT_LE(farthest(alone.position, endsOf(*store), 0.05), kTenthOfAPixel) << far.x << " " << far.z;
-        EXPECT_GE(psnr(pictureOf(store, *executor, view), without), 50) << far.x << " " << far.z;
-        EXPECT_TRUE(verifyStore(*store, *executor, 0)) << far.x << " " << far.z;
+    for (const float radius : {0.01f, 0.06f}) {
+        const StrandSet alone = test::curls({.count = 60, .vertices = 40, .radius = radius});
+        const View view = viewOf(glm::dvec3(0, 0, 1));
+        const render::Image without =
+            pictureOf(test::buildStrands(alone, folder / "alone", *executor, 8192), *executor, view);
+        const auto withOne = [&](const glm::dvec3& place) {
+            StrandSet set = alone;
+            for (const double y : {0.0, 1.0}) set.addVertex(place + glm::dvec3(0, y, 0), 0.01f, glm::vec3(0), 0);
+            set.endStrand(false);
+            return test::buildStrands(set, folder / "far", *executor, 8192);
+        };
+        // Any other strand, too, lets the cells lie elsewhere, and with them the steps of a 30,000th of a cell: at
+        // outlines, which are not smoothed, a pixel turns here and there, and thin strands cover others by lot.
+        double usual = 99;
+        for (const glm::dvec3& near : {glm::dvec3(0.3, 0.1, 4.5), glm::dvec3(0, -0.4, 5), glm::dvec3(0.2, 0, 6)})
+            usual = std::min(usual, psnr(pictureOf(withOne(near), *executor, view), without));
+        for (const glm::dvec3& far : farPlaces()) {
+            const auto store = withOne(far);
+            EXPECT_LE(farthest(alone.position, endsOf(*store), 0.05), kTenthOfAPixel) << far.x << " " << far.z;
+            EXPECT_GE(psnr(pictureOf(store, *executor, view), without), usual - 1) << far.x << " " << far.z;
+            EXPECT_TRUE(verifyStore(*store, *executor, 0)) << far.x << " " << far.z;
+            const glm::dvec3 focus = store->description.focusMax - store->description.focusMin;
+            EXPECT_LE(std::max({focus.x, focus.y, focus.z}), 3) << "what a camera looks at first";
+        }
     }
 }
 

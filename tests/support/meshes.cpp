@@ -114,7 +114,7 @@ std::vector<Triangle> leafTriangles(const lod::Store& store) {
         const lod::Chunk chunk = chunkOf(store, n);
         for (uint32_t r = 0; r < h.groups[n].runs; ++r) {
             const lod::MeshRun& run = h.runs[h.groups[n].firstRun + r];
-            if (run.producer == lod::MeshRun::kOriginal) append(store, chunk, run.firstCluster, run.clusters, out);
+            if (run.producer == lod::MeshRun::kOriginal) append(store, n, chunk, run.firstCluster, run.clusters, out);
         }
     }
     return out;

@@ -12,7 +12,7 @@ namespace {
 constexpr int kLatticeBits = 24;
 constexpr double kFar = 16;  ///< times what most vertices span: that is far out
 /// Steps in the spacing where vertices lie densest: as many, where the lattice of the whole has fewer than the fewest.
-constexpr double kFewestSteps = 256, kSteps = 2048;
+constexpr double kFewestSteps = 256, kSteps = 32768;
 
 /// A power of two of which `extent` has 2^bits at most.
 double unitOf(double extent, int bits) {

@@ -23,8 +23,7 @@ namespace {
 constexpr uint32_t kRootLog2 = 24, kMostRootLog2 = kPlaceBits - TravellingPoint::kStepBits;
 constexpr uint32_t kDeepest = 20;                    ///< of 24
 constexpr double kFar = 16;                          ///< times what most vertices span: that is far out
-constexpr double kFineSteps = 8;                     ///< of a node, in what is visible of a segment
-constexpr double kFineStepsFar = 64;                 ///< the same where strands lie far from each other
+constexpr double kFineSteps = 64;                    ///< in what is visible of a segment, where strands lie far apart
 constexpr double kMorePieces = 1 << 18;              ///< that segments may be divided into where cells are too large
 constexpr uint64_t kCellBytes = uint64_t{64} << 20;  ///< that one cell of the work needs at most
 constexpr uint64_t kRunSegments = 64;                ///< of one atom that are kept until they are sent
@@ -116,7 +115,7 @@ class StrandBuild : public CellContent {
         const double most = 2.0 * static_cast<double>(facts_.segments);
         while (facts_.keyLevels > 0 && piecesFor(cellOf(facts_.keyLevels)) > most) --facts_.keyLevels;
         // (A few long ones among many short ones.)
-        while (facts_.keyLevels < deepest && isCoarseStep(strandStep(cellOf(facts_.keyLevels)), detail / facts_.unit, facts_.fineSteps) &&
+        while (facts_.keyLevels < deepest && facts_.fineness.isCoarse(strandStep(cellOf(facts_.keyLevels)), detail / facts_.unit) &&
                piecesFor(cellOf(facts_.keyLevels + 1)) <= most + kMorePieces)
             ++facts_.keyLevels;
         return {};
@@ -267,7 +266,7 @@ class StrandBuild : public CellContent {
 
     Result<CellProduct> make(const WorkCell& cell, const std::vector<uint8_t>& input,
                              const std::vector<FromBelow>& below) const override {
-        return buildStrandCell(cell, input, below, frame(), settings_.leafSegments, facts_.fineSteps);
+        return buildStrandCell(cell, input, below, frame(), settings_.leafSegments, facts_.fineness);
     }
 
     uint64_t take(uint64_t at, const std::vector<uint8_t>& bytes) override {
@@ -319,7 +318,8 @@ class StrandBuild : public CellContent {
     /// What is known after reading everything once, and what a resumed build has to know.
     struct Facts {
         glm::dvec3 lo{1e300}, hi{-1e300}, focusLow{0}, focusHigh{0}, up{0, 0, 1};
-        double unit = 1, fineSteps = kFineSteps;
+        double unit = 1;
+        Fineness fineness;
         uint64_t given = 0, segments = 0, parts = 0;  ///< of the input, of clean strands, and divided
         uint32_t rootLog2 = kRootLog2, keyLevels = 0;
         bool hasColour = false;
@@ -339,9 +339,11 @@ class StrandBuild : public CellContent {
         const double wanted = isFarOut ? std::min(detail, dense * std::exp2(-double{kDeepest})) : detail;
         const bool isFar = isFarOut || 4 * facts_.unit > detail;
         if (!isFar) return;
-        facts_.fineSteps = kFineStepsFar;
-        for (; facts_.rootLog2 < kMostRootLog2 && kFineStepsFar * facts_.unit > wanted; ++facts_.rootLog2)
+        for (; facts_.rootLog2 < kMostRootLog2 && kFineSteps * facts_.unit > wanted; ++facts_.rootLog2)
             facts_.unit *= 0.5;
+        facts_.fineness.stepsInDetail = kFineSteps;
+        // (The root of what is not far out, alone, has 2^15 steps.)
+        if (isFarOut) facts_.fineness.mostStep = std::max(dense * 0x1p-14 / facts_.unit, 0x1p-6);
         // Whole steps from zero, so that sums with it are as exact as doubles are.
         const glm::dvec3 whole = glm::floor(facts_.lo / facts_.unit) * facts_.unit, size = facts_.hi - whole;
         if (std::max({size.x, size.y, size.z}) < facts_.unit * (std::exp2(facts_.rootLog2) - 1)) facts_.lo = whole;

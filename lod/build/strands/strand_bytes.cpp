@@ -13,7 +13,7 @@ namespace stipple::lod {
 TravellingPoint::TravellingPoint(const StrandPoint& p) {
     constexpr double kLast = 0x1p53 - 1;
     static_assert(kPlaceBits == 53);
-    const auto step = [](double v) {
+    const auto step = [kLast](double v) {
         return toWhole<uint64_t>(std::clamp(std::floor(std::ldexp(v, kStepBits) + 0.5), 0.0, kLast));
     };
     const Place place{step(p.p.x), step(p.p.y), step(p.p.z)};

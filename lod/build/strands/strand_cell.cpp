@@ -26,8 +26,8 @@ struct StrandNode {
 
 class StrandCell {
   public:
-    StrandCell(const WorkCell& cell, const Frame& frame, uint32_t leafSegments, double fineSteps)
-        : frame_(frame), leafSegments_(leafSegments), fineSteps_(fineSteps) {
+    StrandCell(const WorkCell& cell, const Frame& frame, uint32_t leafSegments, const Fineness& fineness)
+        : frame_(frame), leafSegments_(leafSegments), fineness_(fineness) {
         nodes_.push_back(nodeAt(static_cast<uint32_t>(cell.level), cell.key));
     }
 
@@ -170,7 +170,7 @@ class StrandCell {
         size_t coarse = 0;
         for (const StrandPart& p : node.parts) {
             const double length = glm::length(points_[p.b].p - points_[p.a].p);
-            coarse += isCoarseStep(step, detailOf(double{std::max(p.radiusA, p.radiusB)}, length), fineSteps_) ? 1 : 0;
+            coarse += fineness_.isCoarse(step, detailOf(double{std::max(p.radiusA, p.radiusB)}, length)) ? 1 : 0;
         }
         return coarse * kShare > node.parts.size();
     }
@@ -387,7 +387,7 @@ class StrandCell {
 
     const Frame& frame_;
     const uint32_t leafSegments_;
-    const double fineSteps_;
+    const Fineness fineness_;
     std::vector<StrandPoint> points_;
     std::vector<Place> places_;  ///< of an atom's points, as they travelled
     std::vector<StrandNode> nodes_;                ///< the first one is the cell's own
@@ -399,8 +399,8 @@ class StrandCell {
 
 Result<CellProduct> buildStrandCell(const WorkCell& cell, const std::vector<uint8_t>& input,
                                     const std::vector<FromBelow>& below, const Frame& frame, uint32_t leafSegments,
-                                    double fineSteps) {
-    StrandCell work(cell, frame, leafSegments, fineSteps);
+                                    const Fineness& fineness) {
+    StrandCell work(cell, frame, leafSegments, fineness);
     if (cell.atom != WorkCell::kNone) {
         STIPPLE_TRY(work.takeInput(input));
     } else {
