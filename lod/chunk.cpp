@@ -127,8 +127,8 @@ struct MeshChunkHead {
     uint32_t vertexBytes, triangleBytes, clusterBytes;
 };
 
-/// Are all on the lattice, with texture coordinates that are numbers? Differences of places must be, too. (Of pairs, what
-/// clusters hold is looked at.)
+/// Are all on the lattice, with texture coordinates that are numbers? Differences of places must be, too. (Of pairs,
+/// what clusters hold is looked at.)
 bool arePossible(const std::vector<shared::MeshVertex>& vertices, MeshVertices kind) {
     constexpr int kLargest = 1 << 30;
     const int least = kind == MeshVertices::shortOnes ? 0 : -kLargest;

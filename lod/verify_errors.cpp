@@ -353,13 +353,15 @@ namespace {
 
 using Corners = std::array<glm::dvec3, 3>;
 
-void appendTriangles(const Node& node, const Chunk& chunk, uint32_t firstCluster, uint32_t clusters, std::vector<Corners>& to) {
+void appendTriangles(const Node& node, const Chunk& chunk, uint32_t firstCluster, uint32_t clusters,
+                     std::vector<Corners>& to) {
     for (uint32_t c = firstCluster; c < firstCluster + clusters; ++c) {
         const shared::MeshCluster& cluster = chunk.clusters[c];
         for (uint32_t t = 0; t < cluster.counts >> 16; ++t) {
             const uint32_t packed = chunk.triangles[cluster.firstTriangle + t];
             Corners corners;
-            for (uint32_t k = 0; k < 3; ++k) corners.at(k) = vertexPlace(node, chunk, cluster, packed >> (8 * k) & 255u);
+            for (uint32_t k = 0; k < 3; ++k)
+                corners.at(k) = vertexPlace(node, chunk, cluster, packed >> (8 * k) & 255u);
             to.push_back(corners);
         }
     }

@@ -232,8 +232,8 @@ void clipTriangle(const FrameConstants& f, const vec3* corner, const Candidate& 
 }
 
 /// Camera-space positions of a cluster's vertices.
-[[gnu::always_inline]] inline void placeShort(const DrawMesh& m, const int* __restrict words, size_t count, float* __restrict x,
-                       float* __restrict y, float* __restrict z) {
+[[gnu::always_inline]] inline void placeShort(const DrawMesh& m, const int* __restrict words, size_t count,
+                                              float* __restrict x, float* __restrict y, float* __restrict z) {
 #pragma GCC ivdep
     for (size_t i = 0; i < count; ++i) {
         const vec3 c = meshPosition(words[8 * i], words[8 * i + 1], words[8 * i + 2], m);

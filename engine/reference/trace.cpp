@@ -33,9 +33,7 @@ struct TracedStore {
     render::MeshTextures textures;
     BoxTree tree;  ///< items: discs, then triangles, then segments (a store has one kind)
 
-    dvec3 positionOf(uint32_t vertex) const {
-        return store->hierarchy.origin + store->hierarchy.unit * places[vertex];
-    }
+    dvec3 positionOf(uint32_t vertex) const { return store->hierarchy.origin + store->hierarchy.unit * places[vertex]; }
 };
 
 Box boxOf(const Disc& d) {

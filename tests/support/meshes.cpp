@@ -71,8 +71,7 @@ void append(const lod::Store& store, uint32_t node, const lod::Chunk& chunk, uin
             Triangle corners;
             for (uint32_t k = 0; k < 3; ++k) {
                 const uint32_t corner = chunk.triangles[chunk.clusters[c].firstTriangle + t] >> (8 * k) & 255u;
-                corners.at(k) =
-                    h.origin + h.unit * lod::vertexPlace(h.nodes[node], chunk, chunk.clusters[c], corner);
+                corners.at(k) = h.origin + h.unit * lod::vertexPlace(h.nodes[node], chunk, chunk.clusters[c], corner);
             }
             out.push_back(corners);
         }
@@ -122,7 +121,8 @@ std::vector<Triangle> leafTriangles(const lod::Store& store) {
 
 std::vector<Triangle> drawnTriangles(const lod::Store& store, const std::vector<lod::CutMeshDraw>& draws) {
     std::vector<Triangle> out;
-    for (const lod::CutMeshDraw& d : draws) append(store, d.node, chunkOf(store, d.node), d.firstCluster, d.clusters, out);
+    for (const lod::CutMeshDraw& d : draws)
+        append(store, d.node, chunkOf(store, d.node), d.firstCluster, d.clusters, out);
     return out;
 }
 

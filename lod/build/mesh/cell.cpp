@@ -307,8 +307,8 @@ class CellReducer {
 }  // namespace
 
 Result<CellProduct> reduceMeshCell(const WorkCell& cell, const std::vector<uint8_t>& input,
-                                   const std::vector<FromBelow>& below, const Frame& frame,
-                                   const Lattice& lattice, const MeshBuildSettings& settings, Executor& executor) {
+                                   const std::vector<FromBelow>& below, const Frame& frame, const Lattice& lattice,
+                                   const MeshBuildSettings& settings, Executor& executor) {
     CellReducer reducer(frame, lattice, settings, executor);
     if (cell.atom != WorkCell::kNone) {
         STIPPLE_TRY(reducer.takeInput(input));

@@ -223,7 +223,8 @@ size_t longOnesLast(const WeldedMesh& mesh, std::vector<uint32_t>& indices) {
     std::vector<uint32_t> others, longOnes;
     for (size_t i = 0; i < indices.size(); i += 3) {
         auto& to = isLong(mesh, &indices[i]) ? longOnes : others;
-        to.insert(to.end(), indices.begin() + static_cast<ptrdiff_t>(i), indices.begin() + static_cast<ptrdiff_t>(i + 3));
+        to.insert(to.end(), indices.begin() + static_cast<ptrdiff_t>(i),
+                  indices.begin() + static_cast<ptrdiff_t>(i + 3));
     }
     indices = others;
     indices.insert(indices.end(), longOnes.begin(), longOnes.end());

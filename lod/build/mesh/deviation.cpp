@@ -303,7 +303,8 @@ double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const st
     const Target toFine(position, near.indices);
     for (uint32_t i = 0; i < near.indices.size(); ++i) nearest[near.indices[i]] = {0, i / 3};
     worst = measureSurface(toFine, position, left, fine, nearest, worst);
-    return (static_cast<double>(worst) * (1 + 1e-5) + static_cast<double>(extent) * 1e-6) * double{unit};  // fp32's share
+    return (static_cast<double>(worst) * (1 + 1e-5) + static_cast<double>(extent) * 1e-6) *
+           double{unit};  // fp32's share
 }
 
 }  // namespace stipple::lod

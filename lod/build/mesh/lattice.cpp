@@ -15,9 +15,7 @@ constexpr double kFar = 16;  ///< times what most vertices span: that is far out
 constexpr double kFewestSteps = 256, kSteps = 32768;
 
 /// A power of two of which `extent` has 2^bits at most.
-double unitOf(double extent, int bits) {
-    return std::exp2(std::floor(std::log2(std::max(extent, 1e-30))) + 1 - bits);
-}
+double unitOf(double extent, int bits) { return std::exp2(std::floor(std::log2(std::max(extent, 1e-30))) + 1 - bits); }
 
 /// Places once each: vertices of faces that share none lie where others do.
 std::vector<glm::dvec3> different(std::vector<glm::dvec3> places) {
@@ -60,8 +58,7 @@ Lattice latticeOf(const MeshSource::Bounds& bounds) {
     if (dense > 0 && extent > kFar * dense) lattice.unit = unitOf(dense, kLatticeBits);
     // So are small objects far from each other.
     const double spacing = denseSpacing(different(bounds.sample), bounds.share());
-    if (spacing > 0 && spacing < kFewestSteps * lattice.unit)
-        lattice.unit = unitOf(spacing / kSteps, 0);
+    if (spacing > 0 && spacing < kFewestSteps * lattice.unit) lattice.unit = unitOf(spacing / kSteps, 0);
     lattice.unit = std::max(lattice.unit, unitOf(extent, static_cast<int>(kWideMeshBits) - 1));
     if (extent >= lattice.unit * std::exp2(kShortMeshBits)) {
         makeWide(bounds, lattice);

@@ -8,8 +8,8 @@
 #include "engine/base/executor.h"
 #include "lod/build/octree/bytes.h"
 #include "lod/build/octree/cells.h"
-#include "lod/mesh_source.h"
 #include "lod/mesh_place.h"
+#include "lod/mesh_source.h"
 #include "lod/store.h"
 
 namespace stipple::lod {
@@ -21,12 +21,12 @@ using Steps = glm::i64vec3;
 struct Lattice {
     glm::dvec3 origin{0};
     double unit = 1;
-    /// 24: then fp32 holds coordinates exactly; more where a few vertices lie far out. Beyond kShortMeshBits coordinates
-    /// lie around zero, which is where most vertices are: there doubles are finest, too.
+    /// 24: then fp32 holds coordinates exactly; more where a few vertices lie far out. Beyond kShortMeshBits
+    /// coordinates lie around zero, which is where most vertices are: there doubles are finest, too.
     uint32_t bits = 24;
-    Steps firstKey{0};                        ///< see keyPlace
-    uint64_t largestKey = 0;                  ///< of all axes
-    glm::dvec3 focusLow{0}, focusHigh{0};     ///< what most vertices span, world units; of a wide lattice
+    Steps firstKey{0};                     ///< see keyPlace
+    uint64_t largestKey = 0;               ///< of all axes
+    glm::dvec3 focusLow{0}, focusHigh{0};  ///< what most vertices span, world units; of a wide lattice
     bool isWide() const { return bits > kShortMeshBits; }
 };
 Lattice latticeOf(const MeshSource::Bounds& bounds);

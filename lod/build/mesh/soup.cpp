@@ -23,7 +23,8 @@ bool getSoup(ByteReader& from, Soup& to) {
     if (!getPacked(from, to.vertices.low)) return false;
     uint8_t isWide = 0;
     from.get(isWide);
-    if (isWide != 0 && (!getPacked(from, to.vertices.high) || to.vertices.high.size() != to.vertices.size())) return false;
+    if (isWide != 0 && (!getPacked(from, to.vertices.high) || to.vertices.high.size() != to.vertices.size()))
+        return false;
     if (isWide == 0 && !to.vertices.high.empty()) return false;
     const size_t vertices = to.vertices.size() - oldVertices;
     uint64_t indices = 0;

@@ -115,7 +115,8 @@ class StrandBuild : public CellContent {
         const double most = 2.0 * static_cast<double>(facts_.segments);
         while (facts_.keyLevels > 0 && piecesFor(cellOf(facts_.keyLevels)) > most) --facts_.keyLevels;
         // (A few long ones among many short ones.)
-        while (facts_.keyLevels < deepest && facts_.fineness.isCoarse(strandStep(cellOf(facts_.keyLevels)), detail / facts_.unit) &&
+        while (facts_.keyLevels < deepest &&
+               facts_.fineness.isCoarse(strandStep(cellOf(facts_.keyLevels)), detail / facts_.unit) &&
                piecesFor(cellOf(facts_.keyLevels + 1)) <= most + kMorePieces)
             ++facts_.keyLevels;
         return {};
@@ -327,7 +328,8 @@ class StrandBuild : public CellContent {
     /// What most strands are is told apart however far from them, or from each other, strands lie.
     void refine(double extent, const std::vector<glm::dvec3>& sample, double detail) {
         const double dense = denseExtent(sample);
-        const bool isFarOut = dense > 0 && extent > kFar * dense;
+        constexpr size_t kFew = 64;  // of fewer, one in fifty cannot be told from the others
+        const bool isFarOut = dense > 0 && extent > kFar * dense && sample.size() >= kFew;
         if (isFarOut) {
             const DenseBox box = denseBox(sample);
             facts_.focusLow = box.lo;

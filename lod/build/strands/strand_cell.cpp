@@ -389,8 +389,8 @@ class StrandCell {
     const uint32_t leafSegments_;
     const Fineness fineness_;
     std::vector<StrandPoint> points_;
-    std::vector<Place> places_;  ///< of an atom's points, as they travelled
-    std::vector<StrandNode> nodes_;                ///< the first one is the cell's own
+    std::vector<Place> places_;      ///< of an atom's points, as they travelled
+    std::vector<StrandNode> nodes_;  ///< the first one is the cell's own
     std::vector<TravellingPoint> ends_;
     size_t firstOwn_ = 0;  ///< 0: all nodes are to be made
 };

@@ -26,7 +26,6 @@ inline double strandStep(double cell) { return cell / 32768; }
 /// What can be seen of a segment: its radius; of a very thin one how it lies.
 inline double detailOf(double radius, double length) { return std::max(radius, length / 64); }
 
-
 /// What a product's table holds.
 struct StrandTable {
     NodeBatch batch;
