@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 
 #include "engine/base/progress.h"
 #include "engine/cpu/cpu_backend.h"
 #include "engine/reference/reference.h"
+#include "engine/scene/scene.h"
 #include "engine/scene/triangles.h"
 #include "lod/chunk.h"
 #include "tests/support/meshes.h"
@@ -235,6 +237,41 @@ TEST(CoordinatesOfMeshes, WideStoresAreTheSameBytesForAnyThreadsAndOrder) {
         builtMesh(in, folder / "m", *executor);
         if (first.empty()) first = test::slurp(folder / "m");
         EXPECT_TRUE(first == test::slurp(folder / "m")) << threads;
+    }
+}
+
+TEST(CoordinatesOfMeshes, GltfKeepsTheDigitsOfMapCoordinates) {
+    const test::TempFolder folder;
+    const glm::dvec3 centre(431'234.567, 5'321'987.125, 512.375);
+    TriangleMesh truth;
+    addBall(24, centre, truth);
+    {
+        std::ofstream out(folder / "a.obj");
+        out.precision(17);
+        for (const glm::dvec3& p : truth.position) out << "v " << p.x << ' ' << p.y << ' ' << p.z << '\n';
+        for (size_t i = 0; i < truth.indices.size(); i += 3)
+            out << "f " << truth.indices[i] + 1 << ' ' << truth.indices[i + 1] + 1 << ' ' << truth.indices[i + 2] + 1
+                << '\n';
+    }
+    const auto scene = scene::readObj(folder / "a.obj");
+    ASSERT_TRUE(scene) << scene.error().line();
+    for (const char* name : {"b.glb", "b.gltf"}) {
+        ASSERT_TRUE(scene::writeGltf(*scene, folder / name));
+        const auto back = scene::readGltf(folder / name);
+        ASSERT_TRUE(back) << back.error().line();
+        std::vector<glm::dvec3> found;
+        const auto worlds = back->worldTransforms();
+        for (size_t n = 0; n < back->nodes.size(); ++n) {
+            if (back->nodes[n].mesh < 0) continue;
+            for (const auto& p : back->meshes[static_cast<size_t>(back->nodes[n].mesh)].primitives)
+                for (size_t i = 0; i < p.position.size(); ++i) found.emplace_back(worlds[n] * glm::dvec4(p.at(i), 1));
+        }
+        constexpr double kSpacing = 0.1;
+        EXPECT_LE(farthest(truth.position, found, 0.5), 1e-3 * kSpacing) << name;
+        // What programs make of it that read triangles, too.
+        const TriangleMesh read = test::collect(scene::triangleSource(*back, scene::placements(*back)));
+        EXPECT_EQ(read.indices.size(), truth.indices.size());
+        EXPECT_LE(farthest(truth.position, read.position, 0.5), 1e-3 * kSpacing) << name;
     }
 }
 
