@@ -9,6 +9,7 @@
 #include "engine/base/process.h"
 #include "engine/base/queue.h"
 #include "lod/cut_view.h"
+#include "lod/mesh_place.h"
 #include "lod/store.h"
 #include "lod/verify_errors.h"
 
@@ -99,9 +100,10 @@ namespace {
 std::string checkGroup(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
     const Node& node = h.nodes[index];
     const MeshGroup& group = h.groups[index];
-    for (const shared::MeshVertex& v : chunk.vertices)
-        if (glm::length(glm::dvec3(v.x, v.y, v.z) - node.centre) > node.radius * (1 + 1e-9))
-            return "a vertex reaches out of the bounding sphere";
+    for (const shared::MeshCluster& c : chunk.clusters)
+        for (uint32_t i = 0; i < verticesOf(node, c); ++i)
+            if (glm::length(vertexPlace(node, chunk, c, i) - node.centre) > node.radius * (1 + 1e-9))
+                return "a vertex reaches out of the bounding sphere";
     uint32_t cluster = 0;
     for (uint32_t r = 0; r < group.runs; ++r) {
         const MeshRun& run = h.runs[group.firstRun + r];

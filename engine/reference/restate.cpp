@@ -5,6 +5,7 @@
 #include <unordered_map>
 
 #include "engine/base/check.h"
+#include "engine/base/numbers.h"
 #include "engine/base/process.h"
 #include "engine/reference/decode.h"
 #include "engine/reference/reference.h"
@@ -253,8 +254,8 @@ class ReferenceBackend final : public render::Backend {
                 if (!isInside && !(hasPyramid && beside < 1)) continue;
                 // There, of one surface's splats that which reaches in farthest is kept.
                 const double key = c.z + (isInside ? 0.0 : beside * beside * radius * c.z / v.focalPixels);
-                Sample& s = isInside ? level.ref(static_cast<int>(p.x), static_cast<int>(p.y))
-                                     : level.ref(static_cast<int>(at.x), static_cast<int>(at.y));
+                Sample& s = isInside ? level.ref(toWhole<int>(p.x), toWhole<int>(p.y))
+                                     : level.ref(toWhole<int>(at.x), toWhole<int>(at.y));
                 if (s.valid && s.key <= key) continue;
                 const dvec3 toPoint = glm::normalize(c);
                 if ((disc.flags & shared::kFlagNoNormal) != 0) n = -toPoint;
@@ -340,7 +341,7 @@ class ReferenceBackend final : public render::Backend {
     static void reconstruct(Level& level0, const Lens& lens) {
         double largest = 0;
         for (const Sample& s : level0.samples) largest = std::max(largest, s.valid ? s.radius : 0.0);
-        const int count = 1 + static_cast<int>(std::ceil(std::log2(std::max(2.0, 2 * largest))));
+        const int count = 1 + toWhole<int>(std::ceil(std::log2(std::max(2.0, 2 * largest))));
         std::vector<Level> pyramid{level0};
         while (static_cast<int>(pyramid.size()) < count && (pyramid.back().width > 1 || pyramid.back().height > 1))
             pyramid.push_back(

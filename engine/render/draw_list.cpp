@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lod/mesh_place.h"
+
 namespace stipple::render {
 
 static_assert(sizeof(shared::PointRecord) == 16);
@@ -12,21 +14,23 @@ static_assert(sizeof(shared::StrandSegment) == 32);
 static_assert(sizeof(shared::FrameConstants) == 172);
 static_assert(sizeof(shared::MeshVertex) == 32);
 static_assert(sizeof(shared::MeshCluster) == 12);
-static_assert(sizeof(shared::DrawMesh) == 104);
+static_assert(sizeof(shared::DrawMesh) == 120);
 static_assert(sizeof(shared::SurfaceMaterial) == 188);
 
 namespace {
 
-/// One instance of a mesh in camera space, composed in fp64.
+/// One instance of a mesh in camera space, composed in fp64. `eyeStep`: the lattice point nearest to the eye.
 shared::DrawMesh makeDrawMesh(const lod::Hierarchy& h, const lod::Instance& instance, const lod::View& view,
-                              const glm::dmat3& cameraFromWorld) {
+                              const glm::dmat3& cameraFromWorld, lod::MeshPlace& eyeStep) {
     shared::DrawMesh m{};
     const glm::dmat3 axes = cameraFromWorld * instance.rotation;
     const double worldPerStep = instance.scale * h.unit;
     const glm::dvec3 eye =
         (glm::transpose(instance.rotation) * (view.eye - instance.translation) / instance.scale - h.origin) / h.unit;
-    // max(0, v) of what is no number is 0: cameras may be anywhere.
-    const auto onLattice = [](double v) { return std::floor(std::max(0.0, std::min(v, 0x1p30))); };
+    // max(low, v) of what is no number is low: cameras may be anywhere.
+    const bool isWide = h.rootLog2 > lod::kShortMeshBits;
+    const double low = isWide ? -0x1p61 : 0.0, high = isWide ? 0x1p61 : 0x1p30;
+    const auto onLattice = [&](double v) { return std::floor(std::max(low, std::min(v, high))); };
     const glm::dvec3 nearest(onLattice(eye.x), onLattice(eye.y), onLattice(eye.z));
     m.axisX = glm::vec3(axes[0] * worldPerStep);
     m.axisY = glm::vec3(axes[1] * worldPerStep);
@@ -36,21 +40,45 @@ shared::DrawMesh makeDrawMesh(const lod::Hierarchy& h, const lod::Instance& inst
     m.normalX = glm::vec3(axes[0]);
     m.normalY = glm::vec3(axes[1]);
     m.normalZ = glm::vec3(axes[2]);
-    m.eyeX = static_cast<int>(nearest.x);
-    m.eyeY = static_cast<int>(nearest.y);
-    m.eyeZ = static_cast<int>(nearest.z);
+    eyeStep = {static_cast<int64_t>(nearest.x), static_cast<int64_t>(nearest.y), static_cast<int64_t>(nearest.z)};
     m.mirror = 1;
+    return m;
+}
+
+/// `m` for the vertices of one group.
+shared::DrawMesh countedFrom(const lod::Node& group, const lod::MeshPlace& eyeStep, shared::DrawMesh m) {
+    const lod::MeshPlace origin = lod::meshOrigin(group);
+    const std::array<int*, 3> low{&m.eyeX, &m.eyeY, &m.eyeZ}, high{&m.eyeHighX, &m.eyeHighY, &m.eyeHighZ};
+    bool isShort = true;
+    for (size_t a = 0; a < 3; ++a) {
+        const int64_t eye = eyeStep.at(a) - origin.at(a);
+        *low.at(a) = static_cast<int>(static_cast<uint32_t>(eye));
+        *high.at(a) = static_cast<int>(eye >> 32);
+        // Vertices reach to 2^30, so that no difference overflows.
+        isShort = isShort && eye >= -(int64_t{1} << 29) && eye <= int64_t{1} << 30;
+    }
+    m.places = lod::hasPairs(group) ? shared::kPlacesPaired : isShort ? shared::kPlacesShort : shared::kPlacesFar;
     return m;
 }
 
 void addMeshes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, DrawList& out) {
     uint32_t last = ~0u;
+    lod::MeshPlace eyeStep{}, origin{};
+    bool isPaired = false;
+    shared::DrawMesh mesh{};
     for (const lod::CutMeshDraw& draw : cut.meshDraw) {
         const lod::Instance& instance = out.instances[draw.instance];
         const lod::Hierarchy& h = *out.hierarchies[instance.hierarchy];
-        if (draw.instance != last) {
-            out.meshes.push_back(makeDrawMesh(h, instance, out.view, cameraFromWorld));
-            out.meshes.back().firstMaterial = out.firstMaterial[instance.hierarchy];
+        const lod::Node& group = h.nodes[draw.node];
+        const bool isNew = draw.instance != last;
+        if (isNew) {
+            mesh = makeDrawMesh(h, instance, out.view, cameraFromWorld, eyeStep);
+            mesh.firstMaterial = out.firstMaterial[instance.hierarchy];
+        }
+        if (isNew || lod::meshOrigin(group) != origin || lod::hasPairs(group) != isPaired) {
+            origin = lod::meshOrigin(group);
+            isPaired = lod::hasPairs(group);
+            out.meshes.push_back(countedFrom(group, eyeStep, mesh));
             out.meshTextures.push_back({h.textures, instance.source, static_cast<uint32_t>(h.nodes.size()),
                                         static_cast<uint32_t>(h.tiles.size())});
             last = draw.instance;

@@ -46,8 +46,8 @@ Sphere sphereOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vecto
 
 class CellReducer {
   public:
-    CellReducer(const Frame& frame, const MeshBuildSettings& settings, Executor& executor)
-        : frame_(frame), settings_(settings), executor_(executor) {}
+    CellReducer(const Frame& frame, const Lattice& lattice, const MeshBuildSettings& settings, Executor& executor)
+        : frame_(frame), lattice_(lattice), settings_(settings), executor_(executor) {}
 
     Result<void> takeInput(const std::vector<uint8_t>& bytes) {
         Soup soup;
@@ -58,13 +58,16 @@ class CellReducer {
         soup.vertices = {};
         table_.duplicate = sortTriangles(mesh_, soup.indices);
         table_.triangles = soup.indices.size() / 3;
-        table_.lo = glm::ivec3(1 << 30);
-        table_.hi = glm::ivec3(-1);
-        for (const shared::MeshVertex& v : mesh_.vertices) {
-            table_.lo = glm::min(table_.lo, glm::ivec3(v.x, v.y, v.z));
-            table_.hi = glm::max(table_.hi, glm::ivec3(v.x, v.y, v.z));
+        for (uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
+            table_.lo = v == 0 ? mesh_.at(v) : glm::min(table_.lo, mesh_.at(v));
+            table_.hi = v == 0 ? mesh_.at(v) : glm::max(table_.hi, mesh_.at(v));
         }
-        clusters_ = makeClusters(mesh_, soup.indices, executor_);
+        const size_t others = longOnesLast(mesh_, soup.indices);
+        clusters_ = makeClusters(mesh_, {soup.indices.begin(), soup.indices.begin() + static_cast<ptrdiff_t>(others)},
+                                 executor_);
+        if (others == soup.indices.size()) return {};
+        soup.indices.erase(soup.indices.begin(), soup.indices.begin() + static_cast<ptrdiff_t>(others));
+        for (Cluster& c : makeClusters(mesh_, soup.indices, executor_)) clusters_.push_back(std::move(c));
         return {};
     }
 
@@ -150,17 +153,15 @@ class CellReducer {
     /// edge along a cell's border until the cell that holds both sides.)
     Key keyAbove(const Cluster& c, int level) const {
         if (level < 0) return 0;
-        glm::ivec3 lo(1 << 30), hi(-1);
+        Steps lo = mesh_.at(c.indices[0]), hi = lo;
         for (const uint32_t i : c.indices) {
-            const shared::MeshVertex& v = mesh_.vertices[i];
-            lo = glm::min(lo, glm::ivec3(v.x, v.y, v.z));
-            hi = glm::max(hi, glm::ivec3(v.x, v.y, v.z));
+            lo = glm::min(lo, mesh_.at(i));
+            hi = glm::max(hi, mesh_.at(i));
         }
-        const auto edge = static_cast<int64_t>(frame_.cellSize(static_cast<uint32_t>(level)));
-        const auto along = [&](int a, int b) {
-            return static_cast<uint64_t>((3 * ((int64_t{a} + b) / 2) + 2 * edge) / (3 * edge));
-        };
-        return mortonCode(along(lo.x, hi.x), along(lo.y, hi.y), along(lo.z, hi.z));
+        const glm::u64vec3 middle = keyPlace((lo + hi) / int64_t{2}, lattice_);
+        const auto edge = static_cast<uint64_t>(frame_.cellSize(static_cast<uint32_t>(level)));
+        const auto along = [&](uint64_t at) { return (3 * at + 2 * edge) / (3 * edge); };
+        return mortonCode(along(middle.x), along(middle.y), along(middle.z));
     }
 
     std::vector<GoingUp> goingUp(int level) const {
@@ -191,7 +192,7 @@ class CellReducer {
             for (const uint32_t v : c->indices) {
                 if (place[v] == ~0u) {
                     place[v] = static_cast<uint32_t>(soup.vertices.size());
-                    soup.vertices.push_back(mesh_.vertices[v]);
+                    soup.vertices.add(mesh_.vertices, v);
                 }
                 soup.indices.push_back(place[v]);
             }
@@ -204,7 +205,7 @@ class CellReducer {
     }
 
     std::vector<Cluster> nextLevel(std::vector<Cluster> clusters) {
-        const auto members = groupClusters(mesh_, clusters, settings_.groupClusters, executor_);
+        const auto members = groupApart(mesh_, clusters, settings_.groupClusters, executor_);
         std::vector<Cluster> next;
         constexpr size_t kBatch = 64;  // bounds what waits to be written
         for (size_t first = 0; first < members.size(); first += kBatch) {
@@ -235,7 +236,7 @@ class CellReducer {
     }
 
     void writeRoots() {
-        for (const auto& group : groupClusters(mesh_, clusters_, settings_.groupClusters, executor_)) {
+        for (const auto& group : groupApart(mesh_, clusters_, settings_.groupClusters, executor_)) {
             std::vector<const Cluster*> of;
             of.reserve(group.size());
             for (const uint32_t c : group) of.push_back(&clusters_[c]);
@@ -293,6 +294,7 @@ class CellReducer {
     }
 
     const Frame& frame_;
+    const Lattice& lattice_;
     const MeshBuildSettings& settings_;
     Executor& executor_;
     WeldedMesh mesh_;
@@ -305,9 +307,9 @@ class CellReducer {
 }  // namespace
 
 Result<CellProduct> reduceMeshCell(const WorkCell& cell, const std::vector<uint8_t>& input,
-                                   const std::vector<FromBelow>& below, const Frame& frame,
+                                   const std::vector<FromBelow>& below, const Frame& frame, const Lattice& lattice,
                                    const MeshBuildSettings& settings, Executor& executor) {
-    CellReducer reducer(frame, settings, executor);
+    CellReducer reducer(frame, lattice, settings, executor);
     if (cell.atom != WorkCell::kNone) {
         STIPPLE_TRY(reducer.takeInput(input));
     } else {

@@ -216,9 +216,9 @@ float shiftOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<
     const glm::vec2 w = closestWeights(p, a, b, c);
     distance = glm::length(p - (a + w.x * (b - a) + w.y * (c - a)));
     const std::array<float, 3> weights{1 - w.x - w.y, w.x, w.y};
-    const shared::MeshVertex& own = mesh.vertices[local.global[v]];
+    const shared::MeshVertex& own = mesh.vertex(local.global[v]);
     std::array<const shared::MeshVertex*, 3> corners{};
-    for (size_t k = 0; k < 3; ++k) corners.at(k) = &mesh.vertices[local.global[coarse[3 * size_t{t} + k]]];
+    for (size_t k = 0; k < 3; ++k) corners.at(k) = &mesh.vertex(local.global[coarse[3 * size_t{t} + k]]);
     const glm::vec3 e1 = b - a, e2 = c - a;
     const float longest = std::max({glm::length(e1), glm::length(e2), glm::length(c - b)});
     float shift = (own.surface & shared::kSurfaceMaterialMask) == (corners[0]->surface & shared::kSurfaceMaterialMask)
@@ -247,9 +247,14 @@ double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const st
     // Near zero, so that fp32 keeps its precision: the group is small.
     const glm::vec3 shift = local.position[0];
     std::vector<glm::vec3> position(local.position.size());
-    float extent = 0;
+    // Products of four lengths must be numbers.
+    float extent = 0, unit = 1;
+    for (const glm::vec3& p : local.position) {
+        const glm::vec3 off = glm::abs(p - shift);
+        while (std::max({off.x, off.y, off.z}) > 0x1p31f * unit) unit *= 2;
+    }
     for (size_t i = 0; i < position.size(); ++i) {
-        position[i] = local.position[i] - shift;
+        position[i] = (local.position[i] - shift) / unit;
         extent = std::max({extent, std::abs(position[i].x), std::abs(position[i].y), std::abs(position[i].z)});
     }
     LocalMesh near = local;
@@ -262,7 +267,7 @@ double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const st
         isKept[coarse[i]] = 1;
     }
     // So far a true distance, or not worth a closer look: what rounding makes of flat surfaces is not.
-    auto worst = std::max(static_cast<float>(unimportant), 1.0f + 2e-6f * extent);
+    auto worst = std::max(static_cast<float>(unimportant) / unit, 1.0f / unit + 2e-6f * extent);
     // A vertex that is gone starts from the nearest triangle of a neighbour, so that few are looked at. Looked for is
     // the least of distance and shift: beside a seam the nearest triangle may be the wrong one.
     std::vector<uint8_t>& isKnown = isKept;
@@ -298,7 +303,8 @@ double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const st
     const Target toFine(position, near.indices);
     for (uint32_t i = 0; i < near.indices.size(); ++i) nearest[near.indices[i]] = {0, i / 3};
     worst = measureSurface(toFine, position, left, fine, nearest, worst);
-    return static_cast<double>(worst) * (1 + 1e-5) + static_cast<double>(extent) * 1e-6;  // fp32's share
+    return (static_cast<double>(worst) * (1 + 1e-5) + static_cast<double>(extent) * 1e-6) *
+           double{unit};  // fp32's share
 }
 
 }  // namespace stipple::lod

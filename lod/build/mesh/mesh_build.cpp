@@ -157,7 +157,7 @@ class MeshBuild : public CellContent {
             std::vector<uint64_t> order(placed.x.size());  // atom, triangle
             executor_.parallelFor(order.size(), 4096, [&](size_t begin, size_t end) {
                 for (size_t t = begin; t < end; ++t)
-                    order[t] = uint64_t{to.atomOf(frame.keyOf(placed.x[t], placed.y[t], placed.z[t]))} << 32 | t;
+                    order[t] = uint64_t{to.atomOf(frame.keyOf(placed.centres().at(t)))} << 32 | t;
             });
             std::erase_if(order, [&](uint64_t o) { return !to.isOwn(o >> 32); });
             std::sort(order.begin(), order.end());
@@ -177,7 +177,7 @@ class MeshBuild : public CellContent {
                             const uint32_t v = placed.soup.indices[3 * (order[i] & 0xffffffffu) + k];
                             if (place[v] == ~0u) {
                                 place[v] = static_cast<uint32_t>(soup.vertices.size());
-                                soup.vertices.push_back(placed.soup.vertices[v]);
+                                soup.vertices.add(placed.soup.vertices, v);
                                 used.push_back(v);
                             }
                             soup.indices.push_back(place[v]);
@@ -229,7 +229,7 @@ class MeshBuild : public CellContent {
 
     Result<CellProduct> make(const WorkCell& cell, const std::vector<uint8_t>& input,
                              const std::vector<FromBelow>& below) const override {
-        return reduceMeshCell(cell, input, below, frameOf(facts_.lattice), settings_, executor_);
+        return reduceMeshCell(cell, input, below, frameOf(facts_.lattice), facts_.lattice, settings_, executor_);
     }
 
     uint64_t take(uint64_t at, const std::vector<uint8_t>& bytes) override {
@@ -274,6 +274,10 @@ class MeshBuild : public CellContent {
         description.roundingUnits = facts_.rounding;
         description.boundsMin = description.focusMin = facts_.lattice.origin + facts_.lattice.unit * glm::dvec3(lo_);
         description.boundsMax = description.focusMax = facts_.lattice.origin + facts_.lattice.unit * glm::dvec3(hi_);
+        if (facts_.lattice.isWide()) {
+            description.focusMin = glm::max(description.focusMin, facts_.lattice.focusLow);
+            description.focusMax = glm::min(description.focusMax, facts_.lattice.focusHigh);
+        }
         description.hasColour = description.hasNormals = description.isReflectance = true;
         uint64_t coarsest = 0;
         for (size_t i = 0; i < hierarchy.nodes.size(); ++i)
@@ -294,7 +298,7 @@ class MeshBuild : public CellContent {
 
     static Frame frameOf(const Lattice& lattice) {
         constexpr double kNear = 16;  // steps: where few vertices are far out, all others may lie within few key cells
-        return makeFrame(lattice.origin, lattice.unit, lattice.largest, 0, lattice.bits > 24 ? kNear : 0);
+        return makeFrame(lattice.origin, lattice.unit, lattice.largestKey, 0, lattice.bits > 24 ? kNear : 0);
     }
     /// Triangles in any order share few vertices with those beside them.
     static bool isScattered(const Soup& soup) { return soup.vertices.size() * 3 > 4 * (soup.indices.size() / 3); }
@@ -318,7 +322,7 @@ class MeshBuild : public CellContent {
     Facts facts_;
     std::vector<Group> groups_;
     uint64_t kept_ = 0, duplicate_ = 0;
-    glm::ivec3 lo_{1 << 30}, hi_{-1};
+    Steps lo_{std::numeric_limits<int64_t>::max()}, hi_{std::numeric_limits<int64_t>::min()};
 };
 
 }  // namespace

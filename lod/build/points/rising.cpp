@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 
+#include "engine/base/numbers.h"
 #include "lod/build/points/covered.h"
 #include "lod/octahedral.h"
 
@@ -52,7 +53,7 @@ struct SixteenthTable {
     }
 };
 const SixteenthTable kSixteenths;
-uint32_t byteOf(float srgb) { return static_cast<uint32_t>(std::clamp(srgb * 255.0f + 0.5f, 0.0f, 255.0f)); }
+uint32_t byteOf(float srgb) { return unitToByte(srgb); }
 
 bool hasNormal(const Rising& r) { return (r.flags & shared::kFlagNoNormal) == 0; }
 
@@ -237,7 +238,7 @@ Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const 
         const auto at = static_cast<size_t>(a);
         const uint32_t first = static_cast<uint32_t>(index[at] & (grid.cellsAcross - 1)) * grid.cellSteps;
         const double wanted = std::floor((out.mean[a] - grid.base[a]) / grid.step + 0.5);
-        q[at] = static_cast<uint32_t>(std::clamp(wanted, double(first), double(first + grid.cellSteps - 1)));
+        q[at] = toWhole<uint32_t>(std::clamp(wanted, double(first), double(first + grid.cellSteps - 1)));
         out.place[a] = grid.base[a] + grid.step * q[at];
     }
     const Extent x = leaves != nullptr ? extentOfLeaves(*leaves, out.first, size_t{out.first} + out.count, out)
