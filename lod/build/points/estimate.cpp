@@ -48,8 +48,8 @@ constexpr float kAcrossGap = 2.5f, kAcrossMost = 1.6f, kUneven = 1.2f;
 constexpr float kOverlap = 1.15f;
 // Variances, least over middle: an edge between two walls has a quarter at most.
 constexpr double kThick = 0.3, kThickish = 0.12;
-constexpr size_t kFewNearest = 3;      ///< rank of the neighbour that says how near others are
-constexpr float kAmongLeaves = 0.85f;  ///< radius over its distance, where there is no surface
+constexpr size_t kFewNearest = 3;                          ///< rank of the neighbour that says how near others are
+constexpr float kAmongLeaves = 0.85f, kAcrossBend = 1.2f;  ///< radius over its distance, at most
 
 constexpr uint32_t kNoNormal = ~0u;  ///< no octahedral code
 
@@ -502,9 +502,10 @@ class Estimator {
         const float others = std::sqrt(smallestAtRank(squared_.data(), hood_.count, kFewNearest, 0)) * window.edge;
         const bool isVolume =
             window.spread.isThick(kThick) || (window.spread.isThick(kThickish) && near.isThick(kThick));
-        const bool isLoose = radius > others;
-        radius = std::min(radius, (isVolume ? kAmongLeaves : 1.0f) * others);
-        return (isVolume || isLoose ? shared::kFlagScattered : 0u) | (isLoose ? shared::kFlagLoose : 0u);
+        const bool isLeafy = window.spread.isThick(kThickish) || (window.across == 0 && near.isThick(kThickish));
+        const bool isLoose = radius > (isVolume ? 1.0f : kAcrossBend) * others;
+        radius = std::min(radius, (isVolume ? kAmongLeaves : kAcrossBend) * others);
+        return (isLeafy || isLoose ? shared::kFlagScattered : 0u) | (isLoose ? shared::kFlagLoose : 0u);
     }
     /// Of a point whose squared distances to the hood are in squared_: are fewer than three others near it?
     bool isAlone(size_t n, float squaredReach) const {
