@@ -1,0 +1,126 @@
+// Sparse crowns in pictures: what is drawn stays near the points that the scan has, and the ground below stays closed.
+// Judged by where the points themselves project, in doubles; nothing here knows how a radius was found.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/cpu/cpu_backend.h"
+#include "engine/reference/reference.h"
+#include "tests/support/support.h"
+
+namespace stipple {
+namespace {
+
+struct Crown {
+    std::vector<test::TestPoint> points;
+    size_t ground = 0;  ///< that many of them come first: a plane at z = 0, of 20 x 20 m
+};
+/// Blobs of points on twigs, from 4 to 12 m above the ground.
+Crown grow(size_t twigs, uint64_t seed) {
+    Rng rng(seed);
+    Crown crown;
+    for (int i = 0; i < 40000; ++i)
+        crown.points.push_back({{0.1 * (i % 200 + rng.uniform(0.2, 0.8)) - 10,
+                                 0.1 * (i / 200 + rng.uniform(0.2, 0.8)) - 10, 0}});  // NOLINT: a grid's row
+    crown.ground = crown.points.size();
+    for (size_t t = 0; t < twigs; ++t) {
+        const double height = rng.uniform(4, 12), turn = rng.uniform(0, 2 * M_PI),
+                     length = 3.5 * std::sin((height - 3.5) / 9 * M_PI) * std::sqrt(rng.uniform());
+        const glm::dvec3 along(std::cos(turn), std::sin(turn), 0.3);
+        for (int blob = 0; blob < 3; ++blob) {
+            const glm::dvec3 at = glm::dvec3(0, 0, height) + (length - 0.35 * blob) * along;
+            const int leaves = 2 + static_cast<int>(rng.uniform(0, 7));
+            for (int k = 0; k < leaves; ++k)
+                crown.points.push_back({at + 0.07 * glm::dvec3(rng.normal(), rng.normal(), rng.normal())});
+        }
+    }
+    return crown;
+}
+
+lod::View lookAt(const glm::dvec3& eye, const glm::dvec3& target, uint32_t width, uint32_t height) {
+    lod::View view;
+    view.eye = eye;
+    view.forward = glm::normalize(target - eye);
+    view.right = glm::normalize(glm::cross(view.forward, glm::dvec3(0, 0, 1)));
+    view.down = glm::cross(view.forward, view.right);
+    view.width = width;
+    view.height = height;
+    view.focalPixels = 1.1 * height;
+    return view;
+}
+glm::dvec2 project(const lod::View& view, const glm::dvec3& p) {
+    const glm::dvec3 d = p - view.eye;
+    const double scale = view.focalPixels / glm::dot(d, view.forward);
+    return {0.5 * view.width + scale * glm::dot(d, view.right), 0.5 * view.height + scale * glm::dot(d, view.down)};
+}
+
+/// For each pixel whether a point projects within `reach` of its centre.
+std::vector<uint8_t> near(const lod::View& view, const std::vector<test::TestPoint>& points, double reach) {
+    std::vector<uint8_t> is(size_t{view.width} * view.height, 0);
+    for (const test::TestPoint& point : points) {
+        const glm::dvec2 at = project(view, point.position);
+        for (auto y = static_cast<int>(std::ceil(at.y - reach - 0.5)); y + 0.5 <= at.y + reach; ++y)
+            for (auto x = static_cast<int>(std::ceil(at.x - reach - 0.5)); x + 0.5 <= at.x + reach; ++x) {
+                if (x < 0 || y < 0 || x >= static_cast<int>(view.width) || y >= static_cast<int>(view.height)) continue;
+                const glm::dvec2 off = glm::dvec2(x, y) + 0.5 - at;
+                if (glm::dot(off, off) <= reach * reach)
+                    is[static_cast<size_t>(y) * view.width + static_cast<size_t>(x)] = 1;
+            }
+    }
+    return is;
+}
+
+struct Shares {
+    double far = 0;      ///< of the covered pixels, those with no point within reach
+    double open = 0;     ///< of the pixels that look at the ground
+    double missing = 0;  ///< of the pixels next to a point of the crown, those that are open
+};
+Shares measure(const Crown& crown, const render::Image& image, const lod::View& view, double reach) {
+    const auto isNear = near(view, crown.points, reach);
+    const auto isAt =
+        near(view, {crown.points.begin() + static_cast<ptrdiff_t>(crown.ground), crown.points.end()}, 0.5);
+    double covered = 0, far = 0, ground = 0, open = 0, at = 0, missing = 0;
+    for (uint32_t y = 0; y < view.height; ++y)
+        for (uint32_t x = 0; x < view.width; ++x) {
+            const size_t i = size_t{y} * view.width + x;
+            const bool isCovered = image.rgba[i] >> 24 != 0;
+            covered += isCovered;
+            at += isAt[i];
+            missing += isAt[i] && !isCovered;
+            const glm::dvec3 ray = view.forward * view.focalPixels + (x + 0.5 - 0.5 * view.width) * view.right +
+                                   (y + 0.5 - 0.5 * view.height) * view.down;
+            const glm::dvec3 hit = view.eye - view.eye.z / ray.z * ray;
+            const bool isGround = ray.z < 0 && std::max(std::abs(hit.x), std::abs(hit.y)) < 9.8;
+            ground += isGround;
+            open += isGround && !isCovered;
+            far += isCovered && !isNear[i] && !isGround;
+        }
+    return {far / covered, open / ground, missing / at};
+}
+
+TEST(Crown, NothingIsDrawnFarFromItsPoints) {
+    for (const size_t twigs : {150u, 600u}) {
+        const Crown crown = grow(twigs, 11);
+        const test::TempFolder folder;
+        const auto executor = makeTbbExecutor(2);
+        test::writePly(folder / "a.ply", crown.points, false);
+        const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+        for (const double distance : {16.0, 40.0}) {
+            const lod::View view = lookAt({0, -distance, 9}, {0, 0, 7}, 600, 700);
+            for (const auto& backend : {cpu::makeCpuBackend(*executor), reference::makeReferenceBackend(*executor)}) {
+                const Shares s = measure(crown, test::renderView(store, *backend, *executor, view, {}), view, 6);
+                std::printf(
+                    "%zu twigs from %.0f m, %s: %.2f %% far from any point, ground %.3f %% open, %.2f %% of "
+                    "the points missing\n",
+                    twigs, distance, backend->name().c_str(), 100 * s.far, 100 * s.open, 100 * s.missing);
+                EXPECT_LE(s.far, 0.005) << twigs << " from " << distance;
+                EXPECT_LE(s.open, 0.001);
+                EXPECT_LE(s.missing, 0.01);
+            }
+        }
+    }
+}
+
+}  // namespace
+}  // namespace stipple
