@@ -100,25 +100,31 @@ Shares measure(const Crown& crown, const render::Image& image, const lod::View& 
 }
 
 TEST(Crown, NothingIsDrawnFarFromItsPoints) {
+    constexpr double kReach = 6;  // pixels, besides the error asked for
     for (const size_t twigs : {150u, 600u}) {
         const Crown crown = grow(twigs, 11);
         const test::TempFolder folder;
         const auto executor = makeTbbExecutor(2);
         test::writePly(folder / "a.ply", crown.points, false);
         const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
-        for (const double distance : {16.0, 40.0}) {
+        const auto draw = [&](render::Backend& backend, double distance, double error) {
             const lod::View view = lookAt({0, -distance, 9}, {0, 0, 7}, 600, 700);
-            for (const auto& backend : {cpu::makeCpuBackend(*executor), reference::makeReferenceBackend(*executor)}) {
-                const Shares s = measure(crown, test::renderView(store, *backend, *executor, view, {}), view, 6);
-                std::printf(
-                    "%zu twigs from %.0f m, %s: %.2f %% far from any point, ground %.3f %% open, %.2f %% of "
-                    "the points missing\n",
-                    twigs, distance, backend->name().c_str(), 100 * s.far, 100 * s.open, 100 * s.missing);
-                EXPECT_LE(s.far, 0.005) << twigs << " from " << distance;
-                EXPECT_LE(s.open, 0.001);
-                EXPECT_LE(s.missing, 0.01);
-            }
-        }
+            render::FrameSettings settings;
+            settings.budgets.errorPixels = error;
+            const render::Image image = test::renderView(store, backend, *executor, view, settings);
+            const Shares s = measure(crown, image, view, kReach + error);
+            std::printf(
+                "%zu twigs from %.0f m, error %.0f, %s: %.2f %% far, ground %.3f %% open, %.2f %% of the points "
+                "missing\n",
+                twigs, distance, error, backend.name().c_str(), 100 * s.far, 100 * s.open, 100 * s.missing);
+            EXPECT_LE(s.far, 0.003) << twigs << " from " << distance << " at " << error;
+            EXPECT_LE(s.open, 0.001);
+            EXPECT_LE(s.missing, 0.01);
+        };
+        const auto cpu = cpu::makeCpuBackend(*executor), restated = reference::makeReferenceBackend(*executor);
+        for (const double distance : {16.0, 40.0})
+            for (const double error : {0.5, 1.0, 4.0, 8.0}) draw(*cpu, distance, error);
+        draw(*restated, 16, 1);
     }
 }
 
