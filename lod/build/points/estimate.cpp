@@ -40,7 +40,7 @@ constexpr float kAloneSpacings = 2;  ///< how much wider than of its neighbours 
 constexpr size_t kCrowd = 8;
 constexpr float kCrowdsGap = 2.0f;
 constexpr uint32_t kAcrossLines = 3;  ///< so often a window that holds but a line is doubled
-constexpr double kFlat = 0.02;
+constexpr double kFlat = 0.02, kBent = 0.08;
 constexpr double kSlim = 0.06, kSlimOfFew = 0.2;
 constexpr float kPlain = 0.8f;
 constexpr float kWidestGap = 2.0f, kWidestFold = 1.5f;  ///< spacings; farther corners are edges
@@ -49,6 +49,7 @@ constexpr float kOverlap = 1.15f;
 // Variances, least over middle: an edge between two walls has a quarter at most.
 constexpr double kThick = 0.3, kThickish = 0.12;
 constexpr size_t kFewNearest = 3;                          ///< rank of the neighbour that says how near others are
+constexpr float kFewOfReach = 0.35f;                       ///< its squared distance over that of the twelfth, about
 constexpr float kAmongLeaves = 0.85f, kAcrossBend = 1.2f;  ///< radius over its distance, at most
 
 constexpr uint32_t kNoNormal = ~0u;  ///< no octahedral code
@@ -316,7 +317,7 @@ class Estimator {
         size_t cell = 0;
         uint32_t across = 0;  ///< 0: a larger window, of which the hood is all there is
         Spread spread;
-        bool isLine = false, isFlat = false;
+        bool isLine = false, isFlat = false, isBent = false;
         float widestGap = 0;  ///< between its neighbours, if they are not spread evenly; 0: they are
     };
     void measure(Window& window) {
@@ -327,6 +328,7 @@ class Estimator {
         window.spread = spreadOf(hood_.neighbours(), {p.x, p.y, p.z}, squared_.data(), 0);
         window.isLine = window.spread.isLine(roundingIn(window.edge), kSlim);
         window.isFlat = window.spread.least < kFlat * window.spread.middle;
+        window.isBent = !(window.spread.least < kBent * window.spread.middle);
     }
     /// Variance of a coordinate's rounding to the lattice.
     static double roundingIn(float edge) {
@@ -386,7 +388,7 @@ class Estimator {
     void give(size_t begin, size_t end, const Window& window) {
         const size_t n = hood_.count, rank = std::min(kNeighbours, n - 1);  // the point itself comes first
         const Neighbours all = hood_.neighbours();
-        const bool hasOwnNormals = settings_.isFine || !window.isFlat, isEach = hasOwnNormals || window.mayBeAlone;
+        const bool hasOwnNormals = settings_.isFine || window.isBent, isEach = hasOwnNormals || window.mayBeAlone;
         squared_.resize(n + kSelectLanes);
         // Of a rectangle's points that are spread evenly: variances are 1/12 of its sides squared.
         const Spread& whole = window.spread;
@@ -439,8 +441,8 @@ class Estimator {
                         }
                         wanted = radiusAt(p, axis, across, isLine && !hasOwn, reach, rank, window, evenly, nearer);
                         joined = isLine || isStray_ ? shared::kFlagScattered : 0u;
-                        if (!window.isFlat && !window.isLine && n > kFewNearest)
-                            joined |= limitToNearest(wanted, window, spread);
+                        if (window.isBent && !window.isLine && n > kFewNearest)
+                            joined |= limitToNearest(wanted, reach, window, spread);
                     }
                     own_.points.radius[i] = wanted;
                     if (hasOwn) wanted = 0;
@@ -498,8 +500,9 @@ class Estimator {
     }
     /// Of a point whose squared distances to the hood are in squared_ and which may be no part of a surface: `radius`
     /// (lattice units) as far as the next few others are. Returns flags. `near`: how the twelve nearest are spread.
-    uint32_t limitToNearest(float& radius, const Window& window, const Spread& near) const {
-        const float others = std::sqrt(smallestAtRank(squared_.data(), hood_.count, kFewNearest, 0)) * window.edge;
+    uint32_t limitToNearest(float& radius, float squaredReach, const Window& window, const Spread& near) const {
+        const float squared = smallestAtRank(squared_.data(), hood_.count, kFewNearest, kFewOfReach * squaredReach);
+        const float others = std::sqrt(squared) * window.edge;
         const bool isVolume =
             window.spread.isThick(kThick) || (window.spread.isThick(kThickish) && near.isThick(kThick));
         const bool isLeafy = window.spread.isThick(kThickish) || (window.across == 0 && near.isThick(kThickish));
