@@ -129,7 +129,7 @@ TEST(Crown, NothingIsDrawnFarFromItsPoints) {
                 "%zu twigs from %.0f m, error %.1f, %s: %.2f %% far, ground %.3f %% open, %.2f %% of the points "
                 "missing\n",
                 twigs, distance, error, backend.name().c_str(), 100 * s.far, 100 * s.open, 100 * s.missing);
-            EXPECT_LE(s.far, 0.003) << twigs << " from " << distance << " at " << error;
+            EXPECT_LE(s.far, 0.005) << twigs << " from " << distance << " at " << error;
             EXPECT_LE(s.open, 0.001);
             EXPECT_LE(s.missing, 0.001);
         };
@@ -137,6 +137,39 @@ TEST(Crown, NothingIsDrawnFarFromItsPoints) {
         for (const double distance : {16.0, 40.0})
             for (const double error : {0.5, 1.0, 4.0, 8.0}) draw(*cpu, distance, error);
         draw(*restated, 16, 1);
+    }
+}
+
+// The opposite: what is as thick as a crown close by, but a sheet as a whole, is no crown.
+TEST(Crown, NoisyGroundStaysClosed) {
+    for (const double noise : {0.3, 0.8, 1.5}) {  // of the spacing
+        Rng rng(4);
+        std::vector<test::TestPoint> points;
+        for (int i = 0; i < 10000; ++i)
+            points.push_back(
+                {{i % 100 + rng.uniform(0.2, 0.8), i / 100 + rng.uniform(0.2, 0.8),  // NOLINT: a grid's row
+                  noise * rng.normal()}});
+        const test::TempFolder folder;
+        const auto executor = makeTbbExecutor(2);
+        test::writePly(folder / "a.ply", points, false);
+        const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor, 8192);
+        for (const double pixels : {3.0, 12.0}) {  // between points
+            lod::View view = lookAt({50, 50, 200}, {50, 50.01, 0}, 600, 600);
+            view.focalPixels = 200 * pixels;
+            const auto backend = cpu::makeCpuBackend(*executor);
+            const render::Image image = test::renderView(store, *backend, *executor, view, {});
+            const double reach = 45 * pixels;
+            size_t all = 0, open = 0;
+            for (uint32_t y = 0; y < view.height; ++y)
+                for (uint32_t x = 0; x < view.width; ++x) {
+                    if (std::max(std::abs(x - 299.5), std::abs(y - 299.5)) > reach) continue;
+                    ++all;
+                    open += image.rgba[size_t{y} * view.width + x] >> 24 == 0;
+                }
+            const double share = static_cast<double>(open) / static_cast<double>(all);
+            std::printf("noise of %.1f spacings, %.0f px: %.3f %% open\n", noise, pixels, 100 * share);
+            EXPECT_LE(share, 0.001) << noise << " " << pixels;
+        }
     }
 }
 

@@ -4,11 +4,12 @@
 //   radius  to the farthest corner of its Voronoi cell in the plane (farthestCorner), and a tenth more: no larger than
 //           what closes the surface. Corners farther than 1.8 spacings (1.25 where it bends) are its edge; the spacing
 //           comes from the distance d of the 12th neighbour: pi d^2 holds 12 of them. Copies count once.
-//           Where the window is not flat, no farther than the third neighbour; where it is a volume (leaves) 0.85 of
-//           that. Discs that this makes narrower leave the gaps between them open: nothing was seen there.
+//           Where the window bends, no farther than 1.2 times the third neighbour; where it is a volume (leaves) 0.85
+//           times. Discs that this makes narrower leave the gaps between them open: nothing was seen there. (Not if the
+//           block as a whole is a sheet, which is noise or grass that has to stay closed.)
 //   normal  the direction of least variance (Hoppe et al. 1992), sign unknown: two-sided. Of all points of the window,
-//           the same for all points of the cell; or, fine and where the window is not flat (one normal for both sides
-//           of a fold would leave it open), of each point's own twelve nearest.
+//           the same for all points of the cell; or, fine and where the window bends (one normal for both sides of a
+//           fold would leave it open), of each point's own twelve nearest.
 // A point that stands alone, away from what its neighbours belong to, has the disc of those: of twice their spacing at
 // most (spacingOfOthers).
 // With fewer points in the window it grows, up to the quarter of a counted cell that buckets know of their neighbours
@@ -40,14 +41,15 @@ constexpr float kAloneSpacings = 2;  ///< how much wider than of its neighbours 
 constexpr size_t kCrowd = 8;
 constexpr float kCrowdsGap = 2.0f;
 constexpr uint32_t kAcrossLines = 3;  ///< so often a window that holds but a line is doubled
-constexpr double kFlat = 0.02, kBent = 0.08;
+constexpr double kFlat = 0.02, kBent = 0.05;
 constexpr double kSlim = 0.06, kSlimOfFew = 0.2;
 constexpr float kPlain = 0.8f;
 constexpr float kWidestGap = 2.0f, kWidestFold = 1.5f;  ///< spacings; farther corners are edges
 constexpr float kAcrossGap = 2.5f, kAcrossMost = 1.6f, kUneven = 1.2f;
 constexpr float kOverlap = 1.15f;
 // Variances, least over middle: an edge between two walls has a quarter at most.
-constexpr double kThick = 0.3, kThickish = 0.12;
+constexpr double kThick = 0.3, kThickish = 0.12, kSheet = 0.04;
+constexpr size_t kEnoughOfSheet = 256;                     ///< places of a block
 constexpr size_t kFewNearest = 3;                          ///< rank of the neighbour that says how near others are
 constexpr float kFewOfReach = 0.35f;                       ///< its squared distance over that of the twelfth, about
 constexpr float kAmongLeaves = 0.85f, kAcrossBend = 1.2f;  ///< radius over its distance, at most
@@ -285,6 +287,7 @@ class Estimator {
             const size_t i = placeBegin_[j];
             withPlace(own_.points, i, see);
         }
+        isSheet_ = isSheet(n);
         forNeighbourhood(keys_[begin], level, edge, false, OncePerPlace{see});
         seen_.index(size_t{across} * across * across);
         const uint32_t windowShift = frame_.shiftOf(window);
@@ -310,6 +313,14 @@ class Estimator {
     }
     uint32_t coarsestWindow() const { return std::min(cell_.level + 2u, frame_.keyLevels); }
 
+    /// Are the first `n` places seen, a block's own, a sheet as a whole? Then it may be noise that makes windows thick.
+    bool isSheet(size_t n) {
+        if (n < kEnoughOfSheet) return false;
+        hood_.count = 0;
+        for (size_t j = 0; j < n; ++j) hood_.add(seen_[j].at);
+        return !spreadOfHood(seen_[0].at).isThick(kSheet);
+    }
+
     /// Where a hood came from, and how it is spread.
     struct Window {
         float edge = 1;           ///< lattice units; all lengths in hoods are in units of it
@@ -320,12 +331,14 @@ class Estimator {
         bool isLine = false, isFlat = false, isBent = false;
         float widestGap = 0;  ///< between its neighbours, if they are not spread evenly; 0: they are
     };
+    /// Of all in the hood. `p`: one of them.
+    Spread spreadOfHood(const glm::vec3& p) {
+        squared_.assign((hood_.count + kSelectLanes) / kSelectLanes * kSelectLanes, kNothing);
+        std::fill_n(squared_.begin(), hood_.count, 0);
+        return spreadOf(hood_.neighbours(), {p.x, p.y, p.z}, squared_.data(), 0);
+    }
     void measure(Window& window) {
-        const size_t n = hood_.count;
-        squared_.assign((n + kSelectLanes) / kSelectLanes * kSelectLanes, kNothing);
-        std::fill_n(squared_.begin(), n, 0);
-        const glm::vec3 p = places_.front();
-        window.spread = spreadOf(hood_.neighbours(), {p.x, p.y, p.z}, squared_.data(), 0);
+        window.spread = spreadOfHood(places_.front());
         window.isLine = window.spread.isLine(roundingIn(window.edge), kSlim);
         window.isFlat = window.spread.least < kFlat * window.spread.middle;
         window.isBent = !(window.spread.least < kBent * window.spread.middle);
@@ -441,7 +454,7 @@ class Estimator {
                         }
                         wanted = radiusAt(p, axis, across, isLine && !hasOwn, reach, rank, window, evenly, nearer);
                         joined = isLine || isStray_ ? shared::kFlagScattered : 0u;
-                        if (window.isBent && !window.isLine && n > kFewNearest)
+                        if (window.isBent && !isSheet_ && !window.isLine && n > kFewNearest)
                             joined |= limitToNearest(wanted, reach, window, spread);
                     }
                     own_.points.radius[i] = wanted;
@@ -543,6 +556,7 @@ class Estimator {
     const std::vector<K> keys_, ghostKeys_;
     Cell cell_;
     uint32_t cellShift_ = 0;
+    bool isSheet_ = false;  ///< the block
     bool isStray_ = false;  ///< the point that radiusAt saw last
     LatticeBox cellBox_;
     int64_t reach_ = 0;
