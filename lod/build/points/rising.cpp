@@ -88,6 +88,12 @@ void addUp(std::span<const Rising> parts, Rising& out) {
         const bool flip = (p.flags & shared::kFlagTwoSided) != 0 && glm::dot(p.normal, reference) < 0;
         normal += flip ? -w * p.meanNormal : w * p.meanNormal;
     }
+    // What most of the leaves are.
+    for (const uint32_t flag : {shared::kFlagLoose, shared::kFlagScattered}) {
+        double such = 0;
+        for (const Rising& p : parts) such += (p.flags & flag) != 0 ? p.count : 0;
+        if (2 * such > count) out.flags = static_cast<uint8_t>(out.flags | flag);
+    }
     out.key = parts[0].key;
     out.mean = parts[0].mean + sum / count;
     out.meanColour = colour / static_cast<float>(count);
