@@ -119,7 +119,7 @@ void expectWithin(const char* name, const std::shared_ptr<const lod::Store>& sto
 
 // Wanted are 0.01 %. Two classes are above: along outlines, where a splat seen nearly edge-on stands for a pixel that
 // its disc does not reach, the plane goes on too far; and behind folds, where discs lie within each other's thickness,
-// their planes are averaged. Nothing lies in closed gaps.
+// their planes are averaged. Hardly any are in closed gaps.
 TEST(FullDetail, OfGrownSurfacesIsWhereThePictureSays) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(2);
