@@ -166,7 +166,7 @@ TEST(Surface, APlaneSeenFromNearIsThereToTheBorder) {
     int number = 0;
     for (const double degrees : {0.0, 50.0})
         for (const double spacings : {30.0, 10.0, 3.0, 0.8, 0.2}) {  // from the eye to the plane
-            const double least = spacings > 5 ? 0.999 : spacings > 1 ? 0.94 : 0.4;
+            const double least = spacings > 5 ? 0.999 : spacings > 1 ? 0.94 : 0.39;
             SCOPED_TRACE(testing::Message() << spacings << " spacings, " << degrees << " degrees");
             const double angle = degrees * M_PI / 180;
             const dvec3 n(std::sin(angle), 0, -std::cos(angle));
