@@ -30,10 +30,10 @@ dvec3 discNormal(const Sample& s, const dvec2& perp, double facing, const Lens& 
 }
 
 /// rho^2 of an image point in the disc of a sample: where the ray through it meets the plane, in radii. A disc that is
-/// seen edge-on is turned until half a pixel of it is seen to each side; a tube's faces the eye.
+/// seen edge-on is turned until a quarter of a pixel of it is seen to each side; a tube's faces the eye.
 double rhoSquared(const Sample& s, const dvec2& point, const Lens& lens) {
     dvec2 perp = s.isRound ? dvec2(0) : s.perp;
-    const double sine = glm::length(perp), least = std::min(0.5 / s.radius, 1.0);
+    const double sine = glm::length(perp), least = std::min(0.25 / s.radius, 1.0);
     const double facing = std::max(std::sqrt(std::max(0.0, 1 - sine * sine)), least);
     if (sine > 0) perp *= std::sqrt(1 - facing * facing) / sine;
     const dvec3 n = discNormal(s, perp, facing, lens), c = lens.rayTo(s.centre), ray = lens.rayTo(point);
@@ -155,9 +155,9 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize, const Lens& le
             std::vector<Contribution> list;
             for (const auto& [s, rho2] : around) {
                 const double rest = std::max(0.0, 1 - (widen ? rho2 / 4 : rho2));
-                // An empty texel between four filled ones takes whatever is nearest, within eight radii; at the border
+                // An empty texel between four filled ones takes whatever is nearest, within five radii; at the border
                 // of the image within two, where texels are large.
-                const double farthest = outside > 0 && fineSize > 8 ? 4 : 64;
+                const double farthest = outside > 0 && fineSize > 8 ? 4 : 25;
                 const bool gap = around.size() + outside == 4 && !fine.ref(x, y).valid && least < farthest;
                 // So does what shines through from behind all four.
                 const bool shines = around.size() == 4 && fine.ref(x, y).valid && fine.ref(x, y).depth > hindmost;

@@ -399,6 +399,7 @@ TEST(MeshImages, AMeshThatEndsInPointsHasNoSeam) {
     }
     // Of the mesh alone the largest error is half a facet, 1.1 degrees; the points' normals are exact.
     EXPECT_LE(joined.mean, 0.5);
+    // (Measured: 2 pixels of 3,773; with plain instead of area weights in the pull 3, so that those are not the cause.)
     EXPECT_LE(joined.through, joined.atBorder / 1000);
     // The control: without points at the border, where one is missing beside it, the far side shows.
     EXPECT_GT(apart.through, 10 * joined.through);
