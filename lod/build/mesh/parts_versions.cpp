@@ -12,9 +12,9 @@
 namespace stipple::lod {
 namespace {
 
-constexpr float kAnyError = 1e9f;    ///< the target is a number of triangles
-constexpr float kMostArea = 1.5f;    ///< of a version, of the part's
-constexpr size_t kMostProbes = 256;  ///< of each surface that are looked at for a cost
+constexpr float kAnyError = 1e9f;   ///< the target is a number of triangles
+constexpr float kMostArea = 1.5f;   ///< of a version, of the part's
+constexpr size_t kMostProbes = 48;  ///< of each surface that are looked at for a cost
 
 /// A part on its own: meshoptimizer looks at all vertices that it is given.
 struct Alone {
@@ -69,6 +69,16 @@ float areaOf(const Alone& mesh, const std::vector<uint32_t>& indices) {
     return sum;
 }
 
+/// The sum of the normals.
+glm::vec3 facingOf(const Alone& mesh, const std::vector<uint32_t>& indices) {
+    glm::vec3 sum(0);
+    for (size_t i = 0; i < indices.size(); i += 3) {
+        const glm::vec3& a = mesh.position[indices[i]];
+        sum += glm::cross(mesh.position[indices[i + 1]] - a, mesh.position[indices[i + 2]] - a);
+    }
+    return sum;
+}
+
 /// Two triangles between the ends of a long part, or between its ends and its sides; from both sides where each shows
 /// one only.
 void addStrips(const Alone& mesh, const PartShape& shape, bool isTwoSided,
@@ -108,7 +118,11 @@ void addStrips(const Alone& mesh, const PartShape& shape, bool isTwoSided,
             if (v == ~0u) return;
         if (a == b || a == c || a == d || b == c || b == d || c == d) return;
         std::vector<uint32_t> strip{a, b, c, a, c, d};
-        if (!isTwoSided) strip.insert(strip.end(), {a, c, b, a, d, c});
+        if (!isTwoSided)
+            strip.insert(strip.end(), {a, c, b, a, d, c});
+        else if (glm::dot(facingOf(mesh, strip), facingOf(mesh, mesh.indices)) < 0)
+            for (size_t i = 0; i < strip.size(); i += 3)
+                std::swap(strip[i + 1], strip[i + 2]);  // else it is lit from behind
         candidates.push_back(std::move(strip));
     };
     constexpr float kEnd = 0.25f;  // of the length
