@@ -12,6 +12,7 @@
 #include <functional>
 
 #include "lod/build/mesh/parts.h"
+#include "lod/build/mesh/parts_cover.h"
 #include "lod/build/mesh/parts_versions.h"
 
 namespace stipple::lod {
@@ -28,6 +29,7 @@ using Points = std::vector<glm::dvec3>;
 struct Part {
     std::vector<uint32_t> fine, coarse;  ///< local vertices, 3 a triangle
     double wanted = 0, reached = 0;      ///< mean projected area
+    bool isCoarser = false;
 };
 
 /// Mean projected area over directions all around. Of what is drawn from one side only: of the faces in front; of the
@@ -270,6 +272,28 @@ void moveVertices(std::vector<uint32_t>& coarse, const std::vector<glm::dvec3>& 
     }
 }
 
+std::vector<CoverTriangle> trianglesOf(const WeldedMesh& mesh, const LocalMesh& local,
+                                       const std::vector<uint32_t>& indices) {
+    std::vector<CoverTriangle> out;
+    out.reserve(indices.size() / 3);
+    for (size_t i = 0; i < indices.size(); i += 3) {
+        const uint32_t surface = mesh.vertices[local.global[indices[i]]].surface;
+        out.push_back({{local.position[indices[i]], local.position[indices[i + 1]], local.position[indices[i + 2]]},
+                       (surface & shared::kSurfaceTwoSided) != 0});
+    }
+    return out;
+}
+
+/// How much more of its area the coarse version hides behind itself than the fine one.
+double hiddenMore(const WeldedMesh& mesh, const LocalMesh& local, const Coverage& coverage, const Part& part) {
+    const auto at = [&](uint32_t v) { return glm::dvec3(local.position[v]); };
+    const glm::dvec3 axis = shapeOf(part.fine, local).axis;
+    const double coarse = coverOf(trianglesOf(mesh, local, part.coarse), axis),
+                 fine = coverOf(trianglesOf(mesh, local, part.fine), axis);
+    const double ofArea = fine * coverage.of(part.coarse, at), area = coarse * coverage.of(part.fine, at);
+    return area > 0 ? std::clamp(ofArea / area, 0.5, 2.0) : 1;
+}
+
 }  // namespace
 
 std::vector<uint32_t> simplifyParts(const WeldedMesh& mesh, LocalMesh& local, size_t target, int largest) {
@@ -283,7 +307,10 @@ std::vector<uint32_t> simplifyParts(const WeldedMesh& mesh, LocalMesh& local, si
         versions.push_back(versionsOf(part.fine, local, (surface & shared::kSurfaceTwoSided) != 0));
     }
     const std::vector<uint32_t> chosen = chooseVersions(versions, target);
-    for (size_t k = 0; k < parts.size(); ++k) parts[k].coarse = std::move(versions[k][chosen[k]].indices);
+    for (size_t k = 0; k < parts.size(); ++k) {
+        parts[k].isCoarser = chosen[k] > 0;
+        parts[k].coarse = std::move(versions[k][chosen[k]].indices);
+    }
     const Coverage coverage(mesh, local);
     const auto at = [&](uint32_t v) { return glm::dvec3(local.position[v]); };
     Widening widening(mesh, local, coverage);
@@ -292,8 +319,11 @@ std::vector<uint32_t> simplifyParts(const WeldedMesh& mesh, LocalMesh& local, si
     for (const glm::vec3& p : local.position) to.emplace_back(p);
     double all = 0, covered = 0;
     for (Part& part : parts) {
-        part.wanted = coverage.of(part.fine, at);
-        widening.widen(part, to);
+        part.wanted = part.reached = coverage.of(part.fine, at);
+        if (part.isCoarser) {
+            part.wanted *= hiddenMore(mesh, local, coverage, part);
+            widening.widen(part, to);
+        }
         all += part.wanted;
         covered += part.reached;
     }

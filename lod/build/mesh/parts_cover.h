@@ -1,0 +1,22 @@
+// What a small part of a mesh covers in a picture, seen from all sides in the mean.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/glm.hpp>
+#include <vector>
+
+namespace stipple::lod {
+
+/// Corners, and whether a triangle is drawn from both sides.
+struct CoverTriangle {
+    std::array<glm::dvec3, 3> corners;
+    bool isTwoSided;
+};
+
+/// Mean over directions all around of what triangles cover together: what lies behind another counts once. Along rows
+/// at right angles to `axis`, of which there are few: right in the mean over many parts, not for each.
+double coverOf(const std::vector<CoverTriangle>& triangles, const glm::dvec3& axis);
+
+}  // namespace stipple::lod
