@@ -39,7 +39,7 @@ class Coverage {
     Coverage(const WeldedMesh& mesh, const LocalMesh& local) : mesh_(mesh), local_(local) {}
     template <typename At>
     double of(const std::vector<uint32_t>& indices, const At& at) const {
-        std::array<double, kDirections> front{}, back{};
+        std::array<double, kCoverDirections> front{}, back{};
         double oneSided = 0;
         for (size_t i = 0; i < indices.size(); i += 3) {
             const glm::dvec3 a = at(indices[i]), n = 0.5 * glm::cross(at(indices[i + 1]) - a, at(indices[i + 2]) - a);
@@ -47,35 +47,18 @@ class Coverage {
                 oneSided += 0.25 * glm::length(n);
                 continue;
             }
-            for (size_t d = 0; d < kDirections; ++d) {
-                const double share = glm::dot(n, direction(d));
+            for (size_t d = 0; d < kCoverDirections; ++d) {
+                const double share = glm::dot(n, coverDirections().at(d).to);
                 (share > 0 ? front : back).at(d) += std::abs(share);
             }
         }
         double sum = 0;
-        for (size_t d = 0; d < kDirections; ++d) sum += std::max(front.at(d), back.at(d)) / kDirections;
+        for (size_t d = 0; d < kCoverDirections; ++d)
+            sum += coverDirections().at(d).share * std::max(front.at(d), back.at(d));
         return sum + oneSided;
     }
 
   private:
-    static constexpr size_t kDirections = 13;  ///< to the faces, edges and corners of a cube
-    static glm::dvec3 direction(size_t d) {
-        constexpr double s = 0.7071067811865476, t = 0.5773502691896258;
-        static const std::array<glm::dvec3, kDirections> all{{{1, 0, 0},
-                                                              {0, 1, 0},
-                                                              {0, 0, 1},
-                                                              {s, s, 0},
-                                                              {s, -s, 0},
-                                                              {s, 0, s},
-                                                              {s, 0, -s},
-                                                              {0, s, s},
-                                                              {0, s, -s},
-                                                              {t, t, t},
-                                                              {t, t, -t},
-                                                              {t, -t, t},
-                                                              {-t, t, t}}};
-        return all.at(d);
-    }
     const WeldedMesh& mesh_;
     const LocalMesh& local_;
 };

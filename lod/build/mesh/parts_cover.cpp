@@ -3,7 +3,7 @@
 namespace stipple::lod {
 namespace {
 
-constexpr int kRows = 8;  ///< across the longest axis
+constexpr int kRows = 6;  ///< across the longest axis
 
 struct Span {
     double from, to;
@@ -20,7 +20,8 @@ double unionOf(std::vector<Span>& spans) {
 }
 
 /// Of one direction and the opposite one.
-double coverAlong(const std::vector<CoverTriangle>& triangles, const glm::dvec3& direction, const glm::dvec3& axis) {
+double coverAlong(const std::vector<CoverTriangle>& triangles, const glm::dvec3& direction, const glm::dvec3& axis,
+                  double offset) {
     glm::dvec3 up = axis - glm::dot(axis, direction) * direction;
     const glm::dvec3 other = std::abs(direction.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
     up = glm::normalize(glm::length(up) > 1e-3 ? up : glm::cross(direction, other));
@@ -41,13 +42,13 @@ double coverAlong(const std::vector<CoverTriangle>& triangles, const glm::dvec3&
         const glm::dvec2 a = p[1] - p[0], b = p[2] - p[0];
         const bool isFront = a.x * b.y - a.y * b.x > 0;
         const auto [bottom, top] = std::minmax({p[0].y, p[1].y, p[2].y});
-        const int last = std::min(kRows - 1, static_cast<int>(std::ceil(top - 0.5)) - 1);
-        for (int r = std::max(0, static_cast<int>(std::ceil(bottom - 0.5))); r <= last; ++r) {
+        const int last = std::min(kRows - 1, static_cast<int>(std::ceil(top - offset)) - 1);
+        for (int r = std::max(0, static_cast<int>(std::ceil(bottom - offset))); r <= last; ++r) {
             Span span{1e300, -1e300};
             for (size_t k = 0; k < 3; ++k) {
                 const glm::dvec2 &c = p.at(k), &d = p.at((k + 1) % 3);
-                if ((c.y <= r + 0.5) == (d.y <= r + 0.5)) continue;
-                const double x = c.x + (r + 0.5 - c.y) / (d.y - c.y) * (d.x - c.x);
+                if ((c.y <= r + offset) == (d.y <= r + offset)) continue;
+                const double x = c.x + (r + offset - c.y) / (d.y - c.y) * (d.x - c.x);
                 span.from = std::min(span.from, x);
                 span.to = std::max(span.to, x);
             }
@@ -64,14 +65,39 @@ double coverAlong(const std::vector<CoverTriangle>& triangles, const glm::dvec3&
 
 }  // namespace
 
+const std::array<CoverDirection, kCoverDirections>& coverDirections() {
+    static const std::array<CoverDirection, kCoverDirections> all = [] {
+        constexpr double g = 1.618033988749895, corner = 25.0 / 420, face = 27.0 / 420;
+        std::array<CoverDirection, kCoverDirections> out{{{{0, 1, g}, corner},
+                                                          {{0, -1, g}, corner},
+                                                          {{1, g, 0}, corner},
+                                                          {{-1, g, 0}, corner},
+                                                          {{g, 0, 1}, corner},
+                                                          {{g, 0, -1}, corner},
+                                                          {{1, 1, 1}, face},
+                                                          {{1, 1, -1}, face},
+                                                          {{1, -1, 1}, face},
+                                                          {{-1, 1, 1}, face},
+                                                          {{0, g, 1 / g}, face},
+                                                          {{0, g, -1 / g}, face},
+                                                          {{1 / g, 0, g}, face},
+                                                          {{-1 / g, 0, g}, face},
+                                                          {{g, 1 / g, 0}, face},
+                                                          {{g, -1 / g, 0}, face}}};
+        for (CoverDirection& d : out) d.to = glm::normalize(d.to);
+        return out;
+    }();
+    return all;
+}
+
 double coverOf(const std::vector<CoverTriangle>& triangles, const glm::dvec3& axis) {
-    constexpr double t = 0.5773502691896258;
-    constexpr size_t kDirections = 7;  // to the faces and corners of a cube
-    static const std::array<glm::dvec3, kDirections> directions{
-        {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {t, t, t}, {t, t, -t}, {t, -t, t}, {-t, t, t}}};
     double sum = 0;
-    for (const glm::dvec3& d : directions) sum += coverAlong(triangles, d, axis);
-    return sum / kDirections;
+    // Rows of different directions lie at different places, so that shapes that all parts share are not all missed.
+    for (size_t d = 0; d < kCoverDirections; ++d) {
+        const double offset = (static_cast<double>(d * 7 % kCoverDirections) + 0.5) / kCoverDirections;
+        sum += coverDirections().at(d).share * coverAlong(triangles, coverDirections().at(d).to, axis, offset);
+    }
+    return sum;
 }
 
 }  // namespace stipple::lod

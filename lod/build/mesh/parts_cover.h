@@ -9,6 +9,16 @@
 
 namespace stipple::lod {
 
+/// A direction of those all around, up to its sign, and its share of them. The axes of an icosahedron and of its dual:
+/// with these weights polynomials of degree 9 are integrated exactly (McLaren 1963), so that it hardly matters how a
+/// part lies.
+struct CoverDirection {
+    glm::dvec3 to;
+    double share;
+};
+constexpr size_t kCoverDirections = 16;
+const std::array<CoverDirection, kCoverDirections>& coverDirections();
+
 /// Corners, and whether a triangle is drawn from both sides.
 struct CoverTriangle {
     std::array<glm::dvec3, 3> corners;

@@ -91,18 +91,21 @@ void addStrips(const Alone& mesh, const PartShape& shape, bool isTwoSided,
         if (along(v) < along(low)) low = v;
         if (along(v) > along(high)) high = v;
     }
-    // The side on which the part is widest.
+    // What shows both sides is flat: it stays as it faces. Of the rest the side on which it is widest.
     const glm::vec3 middle = 0.5f * (mesh.position[low] + mesh.position[high]);
-    glm::vec3 side(0);
     const auto across = [&](uint32_t v) {
         const glm::vec3 d = mesh.position[v] - middle;
         return d - glm::dot(d, axis) * axis;
     };
-    for (uint32_t v = 0; v < count; ++v)
-        for (uint32_t w = 0; w < count && w < 64; ++w) {
-            const glm::vec3 d = across(v) - across(w);
-            if (glm::dot(d, d) > glm::dot(side, side)) side = d;
-        }
+    glm::vec3 side = isTwoSided ? glm::cross(axis, facingOf(mesh, mesh.indices)) : glm::vec3(0);
+    for (uint32_t v = 0; v < count && side == glm::vec3(0); ++v) side = across(v);
+    if (!isTwoSided) {
+        for (uint32_t v = 0; v < count; ++v)
+            for (uint32_t w = 0; w < v; ++w) {
+                const glm::vec3 d = across(v) - across(w);
+                if (glm::dot(d, d) > glm::dot(side, side)) side = d;
+            }
+    }
     const float span = along(high) - along(low);
     const auto extreme = [&](float sign, float from, float to) {
         uint32_t best = ~0u;
