@@ -131,7 +131,7 @@ void addStrips(const Alone& mesh, const PartShape& shape, bool isTwoSided,
     constexpr float kEnd = 0.25f;  // of the length
     const uint32_t right = extreme(1, 0.2f, 0.8f), left = extreme(-1, 0.2f, 0.8f);
     add(extreme(1, 0, kEnd), extreme(1, 1 - kEnd, 1), extreme(-1, 1 - kEnd, 1), extreme(-1, 0, kEnd));
-    add(low, right, high, left);
+    add(right, high, left, low);  // folded between the sides, as leaves bend
 }
 
 }  // namespace
