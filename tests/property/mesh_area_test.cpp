@@ -182,7 +182,7 @@ double expectSameCover(const lod::Store& store, const std::string& what) {
     const lod::View view = test::fitView(store, kPixels, kPixels);
     const auto full = sidesOf(store, cutAt(store, view, 1e-6));
     const double wanted = coveredPixels(full, view);
-    EXPECT_GT(wanted, 1000);
+    EXPECT_GT(wanted, 500);
     double left = 1;
     for (const double tau : {1.0, 2.0, 4.0, 8.0}) {
         const auto drawn = sidesOf(store, cutAt(store, view, tau));

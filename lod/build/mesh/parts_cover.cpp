@@ -3,8 +3,6 @@
 namespace stipple::lod {
 namespace {
 
-constexpr int kRows = 6;  ///< across the longest axis
-
 struct Span {
     double from, to;
 };
@@ -21,7 +19,7 @@ double unionOf(std::vector<Span>& spans) {
 
 /// Of one direction and the opposite one.
 double coverAlong(const std::vector<CoverTriangle>& triangles, const glm::dvec3& direction, const glm::dvec3& axis,
-                  double offset) {
+                  int count, double offset) {
     glm::dvec3 up = axis - glm::dot(axis, direction) * direction;
     const glm::dvec3 other = std::abs(direction.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
     up = glm::normalize(glm::length(up) > 1e-3 ? up : glm::cross(direction, other));
@@ -32,9 +30,9 @@ double coverAlong(const std::vector<CoverTriangle>& triangles, const glm::dvec3&
             low = std::min(low, glm::dot(p, up));
             high = std::max(high, glm::dot(p, up));
         }
-    const double step = (high - low) / kRows;
+    const double step = (high - low) / count;
     if (!(step > 0)) return 0;
-    std::array<std::array<std::vector<Span>, 2>, kRows> rows;  // seen from the front, from behind
+    std::vector<std::array<std::vector<Span>, 2>> rows(static_cast<size_t>(count));  // seen from the front, from behind
     for (const CoverTriangle& t : triangles) {
         std::array<glm::dvec2, 3> p{};
         for (size_t k = 0; k < 3; ++k)
@@ -42,7 +40,7 @@ double coverAlong(const std::vector<CoverTriangle>& triangles, const glm::dvec3&
         const glm::dvec2 a = p[1] - p[0], b = p[2] - p[0];
         const bool isFront = a.x * b.y - a.y * b.x > 0;
         const auto [bottom, top] = std::minmax({p[0].y, p[1].y, p[2].y});
-        const int last = std::min(kRows - 1, static_cast<int>(std::ceil(top - offset)) - 1);
+        const int last = std::min(count - 1, static_cast<int>(std::ceil(top - offset)) - 1);
         for (int r = std::max(0, static_cast<int>(std::ceil(bottom - offset))); r <= last; ++r) {
             Span span{1e300, -1e300};
             for (size_t k = 0; k < 3; ++k) {
@@ -90,12 +88,12 @@ const std::array<CoverDirection, kCoverDirections>& coverDirections() {
     return all;
 }
 
-double coverOf(const std::vector<CoverTriangle>& triangles, const glm::dvec3& axis) {
+double coverOf(const std::vector<CoverTriangle>& triangles, const glm::dvec3& axis, int rows) {
     double sum = 0;
     // Rows of different directions lie at different places, so that shapes that all parts share are not all missed.
     for (size_t d = 0; d < kCoverDirections; ++d) {
         const double offset = (static_cast<double>(d * 7 % kCoverDirections) + 0.5) / kCoverDirections;
-        sum += coverDirections().at(d).share * coverAlong(triangles, coverDirections().at(d).to, axis, offset);
+        sum += coverDirections().at(d).share * coverAlong(triangles, coverDirections().at(d).to, axis, rows, offset);
     }
     return sum;
 }

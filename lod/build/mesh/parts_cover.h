@@ -26,7 +26,7 @@ struct CoverTriangle {
 };
 
 /// Mean over directions all around of what triangles cover together: what lies behind another counts once. Along rows
-/// at right angles to `axis`, of which there are few: right in the mean over many parts, not for each.
-double coverOf(const std::vector<CoverTriangle>& triangles, const glm::dvec3& axis);
+/// at right angles to `axis`, `rows` of them in each direction; where these are few, right in the mean over many parts.
+double coverOf(const std::vector<CoverTriangle>& triangles, const glm::dvec3& axis, int rows);
 
 }  // namespace stipple::lod
