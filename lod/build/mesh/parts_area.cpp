@@ -22,7 +22,7 @@ namespace {
 constexpr double kMostWiden = 6;                   ///< times; more would turn a rest into something else
 constexpr double kMostNarrow = 0.9;                ///< of the width
 constexpr double kFewestOf = 0.02;                 ///< of what it covered: less is nothing to widen
-constexpr int kRowsOfPart = 6, kRowsOfGroup = 48;  ///< see coverOf
+constexpr int kRowsOfPart = 6, kRowsOfGroup = 24;  ///< see coverOf
 constexpr double kCloseEnough = 1e-3;
 
 using Field = std::function<glm::dvec3(uint32_t vertex)>;
@@ -346,6 +346,8 @@ class PartGroup {
     }
     /// How much more of its area the coarse version hides behind itself than the fine one.
     double hiddenMore(const Part& part) const {
+        // Of leaves, of which both sides count, Coverage knows it well enough.
+        if ((mesh_.vertices[local_.global[part.fine[0]]].surface & shared::kSurfaceTwoSided) != 0) return 1;
         const glm::dvec3 axis = shapeOf(part.fine, local_).axis;
         const double coarse = coverOf(trianglesOf(mesh_, local_, part.coarse, from()), axis, kRowsOfPart),
                      fine = coverOf(trianglesOf(mesh_, local_, part.fine, from()), axis, kRowsOfPart);
