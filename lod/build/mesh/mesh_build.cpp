@@ -12,6 +12,7 @@
 #include "engine/base/queue.h"
 #include "lod/build/build_version.h"
 #include "lod/build/mesh/cell.h"
+#include "lod/build/mesh/parts.h"
 #include "lod/build/octree/cell_build.h"
 
 namespace stipple::lod {
@@ -102,14 +103,17 @@ class MeshBuild : public CellContent {
         };
         STIPPLE_ASSIGN(const MeshSource::Bounds bounds, source_.survey(tell));
         facts_.lattice = latticeOf(bounds);
-        return {};
+        return findParts();
     }
     Frame frame() const override { return frameOf(facts_.lattice); }
     Result<void> places(const Places& take) override {
         facts_.triangles = 0;
+        size_t number = 0;
         STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
             facts_.triangles += block.indices.size() / 3;
-            return take(placeBlock(block, facts_.lattice, executor_).centres(), source_.triangles);
+            PlacedBlock placed = placeBlock(block, facts_.lattice, executor_);
+            parts_.place(placed, number++);
+            return take(placed.centres(), source_.triangles);
         }));
         facts_.bad = source_.badTriangles ? source_.badTriangles() : 0;
         return {};
@@ -131,6 +135,7 @@ class MeshBuild : public CellContent {
         const Frame frame = frameOf(facts_.lattice);
         const std::vector<Atom>& atoms = to.atoms();
         std::vector<Soup> buffers(atoms.size());
+        size_t number = 0;
         const uint64_t wanted = std::max<uint64_t>(to.bufferBytes() / atoms.size(), 8192);
         const auto flush = [&](size_t a) {
             Soup& soup = buffers[a];
@@ -149,8 +154,10 @@ class MeshBuild : public CellContent {
         };
         STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
             const uint64_t triangles = block.indices.size() / 3;
+            const size_t here = number++;
             if (to.begins()) return to.ends(triangles, facts_.triangles, flushAll);
-            const PlacedBlock placed = placeBlock(block, facts_.lattice, executor_);
+            PlacedBlock placed = placeBlock(block, facts_.lattice, executor_);
+            parts_.place(placed, here);
             facts_.degenerate += placed.degenerate;
             facts_.notFinite += placed.notFinite;
             facts_.rounding = std::max(facts_.rounding, placed.rounding);
@@ -296,6 +303,20 @@ class MeshBuild : public CellContent {
     static constexpr uint64_t kTableBytes = 2;       ///< of a triangle, of the table of groups, which stays in memory
     static constexpr uint64_t kMostOfAtom = 2 * kAtomPoints;
 
+    /// What is small and stands alone stays together (parts.h), if the mesh can be looked at as a whole.
+    Result<void> findParts() {
+        // (Parts are moved on short lattices only.)
+        bool isKnown = source_.triangles <= PartFinder::kMostTriangles && !facts_.lattice.isWide();
+        parts_ = {};
+        if (isKnown)
+            STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
+                isKnown = isKnown && parts_.add(placeBlock(block, facts_.lattice, executor_));
+                return {};
+            }));
+        parts_.finish(isKnown);
+        return {};
+    }
+
     static Frame frameOf(const Lattice& lattice) {
         constexpr double kNear = 16;  // steps: where few vertices are far out, all others may lie within few key cells
         return makeFrame(lattice.origin, lattice.unit, lattice.largestKey, 0, lattice.bits > 24 ? kNear : 0);
@@ -320,6 +341,7 @@ class MeshBuild : public CellContent {
     const MeshBuildSettings& settings_;
     Executor& executor_;
     Facts facts_;
+    PartFinder parts_;
     std::vector<Group> groups_;
     uint64_t kept_ = 0, duplicate_ = 0;
     Steps lo_{std::numeric_limits<int64_t>::max()}, hi_{std::numeric_limits<int64_t>::min()};

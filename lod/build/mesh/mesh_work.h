@@ -101,6 +101,8 @@ constexpr uint32_t kNoProducer = ~0u;
 struct Cluster {
     std::vector<uint32_t> indices;  ///< 3 a triangle, into WeldedMesh::vertices
     uint32_t producer = kNoProducer;
+    bool isWhole = false;      ///< nothing but small parts that nothing else touches (parts.h)
+    bool isContinued = false;  ///< the same part as the cluster before
 };
 
 /// Vertices of a list of triangles, numbered from 0.
@@ -110,6 +112,9 @@ struct LocalMesh {
     std::vector<glm::vec3> position;  ///< from `shift`, where most of them are: there fp32 is exact
     Steps shift{0};
     bool isWide = false;
+    std::vector<uint32_t> movedFrom;  ///< of the last vertices: those whose looks they have, at another place
+    uint32_t firstMoved() const { return static_cast<uint32_t>(position.size() - movedFrom.size()); }
+    uint32_t beforeMove(uint32_t v) const { return v < firstMoved() ? v : movedFrom[v - firstMoved()]; }
 };
 LocalMesh makeLocal(const WeldedMesh& mesh, const std::vector<const Cluster*>& clusters);
 
@@ -130,9 +135,10 @@ std::vector<std::vector<uint32_t>> groupApart(const WeldedMesh& mesh, std::vecto
 size_t longOnesLast(const WeldedMesh& mesh, std::vector<uint32_t>& indices);
 
 /// Lattice units: the distance between the surface of `local` and its simplification, both ways, and how far a texture
-/// is shifted along it where `mesh` is textured. Not below `unimportant`, which saves looking closer.
+/// is shifted along it where `mesh` is textured. Not below `unimportant`, which saves looking closer. `isBorderKept`:
+/// the border of both is the same.
 double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& coarse,
-                        double unimportant);
+                        double unimportant, bool isBorderKept);
 
 /// Writes all levels of all textures and fills the tables of `h`.
 Result<void> writeTextures(const std::vector<TextureImage>& images, StoreWriter& writer, Hierarchy& h,
