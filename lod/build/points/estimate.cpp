@@ -518,7 +518,8 @@ class Estimator {
         const float others = std::sqrt(squared) * window.edge;
         const bool isVolume =
             window.spread.isThick(kThick) || (window.spread.isThick(kThickish) && near.isThick(kThick));
-        const bool isLeafy = window.spread.isThick(kThickish) || (window.across == 0 && near.isThick(kThickish));
+        // Round bodies of few points bend their windows, not what is around a point.
+        const bool isLeafy = near.isThick(kThickish) && (window.spread.isThick(kThickish) || window.across == 0);
         const bool isLoose = radius > (isVolume ? 1.0f : kAcrossBend) * others;
         radius = std::min(radius, (isVolume ? kAmongLeaves : kAcrossBend) * others);
         return (isLeafy || isLoose ? shared::kFlagScattered : 0u) | (isLoose ? shared::kFlagLoose : 0u);
