@@ -127,13 +127,16 @@ struct MeshChunkHead {
     uint32_t vertexBytes, triangleBytes, clusterBytes;
 };
 
-/// Are all on the lattice, with texture coordinates that are numbers? Differences of places must be, too.
-bool arePossible(const std::vector<shared::MeshVertex>& vertices) {
+/// Are all on the lattice, with texture coordinates that are numbers? Differences of places must be, too. (Of pairs,
+/// what clusters hold is looked at.)
+bool arePossible(const std::vector<shared::MeshVertex>& vertices, MeshVertices kind) {
     constexpr int kLargest = 1 << 30;
+    const int least = kind == MeshVertices::shortOnes ? 0 : -kLargest;
     uint32_t bad = 0;
     for (const shared::MeshVertex& v : vertices) {
         const auto u = std::bit_cast<uint32_t>(v.u), w = std::bit_cast<uint32_t>(v.v);
-        bad |= std::min({v.x, v.y, v.z}) < 0 || std::max({v.x, v.y, v.z}) > kLargest ? 1u : 0u;
+        const bool isOut = std::min({v.x, v.y, v.z}) < least || std::max({v.x, v.y, v.z}) > kLargest;
+        bad |= isOut && kind != MeshVertices::pairs ? 1u : 0u;
         bad |= (u & kNotFinite) == kNotFinite ? 1u : 0u;
         bad |= (w & kNotFinite) == kNotFinite ? 1u : 0u;
     }
@@ -187,7 +190,7 @@ std::vector<uint8_t> encodeMeshChunk(const Chunk& chunk) {
 }
 
 Result<Chunk> decodeMeshChunk(const uint8_t* bytes, size_t count, uint32_t triangles, const MeshGroup& group,
-                              const std::string& where) {
+                              MeshVertices kind, const std::string& where) {
     MeshChunkHead head{};
     if (count < sizeof(head)) return fail(ErrorKind::input, "the chunk is shorter than its head", where);
     std::memcpy(&head, bytes, sizeof(head));
@@ -197,7 +200,7 @@ Result<Chunk> decodeMeshChunk(const uint8_t* bytes, size_t count, uint32_t trian
     Chunk chunk;
     STIPPLE_ASSIGN(chunk.vertices, decodeRecords<shared::MeshVertex>(at, head.vertexBytes, group.vertices, where,
                                                                      "the vertices of a chunk"));
-    if (!arePossible(chunk.vertices))
+    if (!arePossible(chunk.vertices, kind))
         return fail(ErrorKind::input, "a vertex lies nowhere, or its texture coordinates are no numbers", where,
                     "build it again");
     at += head.vertexBytes;
@@ -211,9 +214,15 @@ Result<Chunk> decodeMeshChunk(const uint8_t* bytes, size_t count, uint32_t trian
     STIPPLE_ASSIGN(chunk.clusters, decompressArray<shared::MeshCluster>(at, head.clusterBytes, group.clusters, where));
     // The renderers index with these: every cluster within the chunk, every corner within its cluster.
     for (const shared::MeshCluster& c : chunk.clusters) {
-        const uint64_t vertices = c.counts & 0xffffu, count3 = c.counts >> 16;
-        bool fits = vertices <= shared::kClusterVertices && count3 <= shared::kClusterTriangles &&
-                    c.firstVertex + vertices <= group.vertices && c.firstTriangle + count3 <= triangles;
+        const uint64_t slots = c.counts & 0xffffu, count3 = c.counts >> 16;
+        const uint64_t vertices = kind == MeshVertices::pairs ? slots / 2 : slots;
+        bool fits = slots <= shared::kClusterVertices && count3 <= shared::kClusterTriangles &&
+                    c.firstVertex + slots <= group.vertices && c.firstTriangle + count3 <= triangles;
+        for (uint64_t i = vertices; fits && i < slots; ++i) {
+            const shared::MeshVertex& high = chunk.vertices[c.firstVertex + i];
+            constexpr int kFarthest = 1 << 29;  // 2^61 steps
+            fits = std::min({high.x, high.y, high.z}) >= -kFarthest && std::max({high.x, high.y, high.z}) <= kFarthest;
+        }
         for (uint64_t t = 0; fits && t < count3; ++t) {
             const uint32_t corner = chunk.triangles[c.firstTriangle + t];
             fits = (corner & 255u) < vertices && (corner >> 8 & 255u) < vertices && (corner >> 16 & 255u) < vertices;

@@ -44,9 +44,12 @@ Result<Chunk> decodeStrandChunk(const uint8_t* bytes, size_t count, uint32_t seg
 std::vector<uint8_t> encodeTile(const std::vector<uint32_t>& texels);
 Result<Chunk> decodeTile(const uint8_t* bytes, size_t count, const std::string& where);
 
+/// How the coordinates of a mesh's vertices are kept, see mesh_place.h.
+enum class MeshVertices : uint8_t { shortOnes, counted, pairs };
+
 /// The same for a chunk of a mesh store.
 std::vector<uint8_t> encodeMeshChunk(const Chunk& chunk);
 Result<Chunk> decodeMeshChunk(const uint8_t* bytes, size_t count, uint32_t triangles, const MeshGroup& group,
-                              const std::string& where);
+                              MeshVertices vertices, const std::string& where);
 
 }  // namespace stipple::lod

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "lod/cut.h"
+#include "shaders/shared/record.h"
 
 namespace stipple::lod {
 
@@ -31,7 +32,25 @@ inline LocalView makeLocalView(const Hierarchy& h, const Instance& instance, con
     return local;
 }
 
-/// Allowed error of N at tau = 1 px as a code of 1/32 octave, rounded down; kCulled if N is out of view.
+/// Room for the rounding of normals beyond the cone of a node, radians.
+inline constexpr double kConeMargin = 0.05;
+
+/// Do all discs of N and of the nodes below it face away from the eye? `d`: from the eye to the centre of N's sphere of
+/// radius r, `distance` its length. A disc at p with normal n is not drawn if n.p >= 0 from the eye; |p - d| <= r, and
+/// n is within the cone's half-angle of its axis, hence  n.p >= |d| cos(angle(axis, d) + half-angle) - r. Means of
+/// normals stay in a cone, but each is rounded by up to 0.12 degrees once more: kConeMargin has room for 20 generations
+/// of them.
+inline bool facesAway(const Node& node, const glm::dvec3& d, double distance, double r) {
+    if (!(node.normalConeCosine > 0)) return false;
+    const glm::dvec3 axis(shared::octDecode(node.normalCone));
+    const double along = glm::dot(axis, d);
+    if (!(along > 0)) return false;
+    const double between = std::acos(std::min(along / (glm::length(axis) * distance), 1.0));
+    const double widest = between + std::acos(std::min(double{node.normalConeCosine}, 1.0)) + kConeMargin;
+    return widest < 1.5 && distance * std::cos(widest) > r * (1 + 1e-6);
+}
+
+/// Allowed error of N at tau = 1 px as a code of 1/32 octave, rounded down; kCulled if nothing of N can be seen.
 inline int32_t allowedError(const Hierarchy& h, const Node& node, const LocalView& view, double sway) {
     const glm::dvec3 d = node.centre - view.eye;
     const double r = node.radius + sway;
@@ -42,6 +61,8 @@ inline int32_t allowedError(const Hierarchy& h, const Node& node, const LocalVie
     const double distance = glm::length(d);
     const double nearest = distance - r;
     if (!(nearest > 0)) return kInside;
+    // (Of strands the field of the cone holds another number.)
+    if (!h.isLoose() && facesAway(node, d, distance, r)) return kCulled;
     // cos(alpha + beta), alpha: axis to centre, beta: angular radius.
     const double cosAlpha = depth / distance, sinAlpha = std::sqrt(std::max(0.0, 1 - cosAlpha * cosAlpha));
     const double sinBeta = r / distance, cosBeta = std::sqrt(std::max(0.0, 1 - sinBeta * sinBeta));

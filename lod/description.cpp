@@ -92,35 +92,37 @@ json toJson(const StoreDescription& d) {
                               {"counts", a.counts}});
     json materials = json::array();
     for (const shared::SurfaceMaterial& m : d.materials) materials.push_back(materialToJson(m));
-    return {{"metres_per_unit", d.metresPerUnit},
-            {"up", {d.up.x, d.up.y, d.up.z}},
-            {"crs",
-             {{"name", toUtf8(d.crs.name)},
-              {"epsg", d.crs.epsg},
-              {"text", toUtf8(d.crs.text)},
-              {"is_degrees", d.crs.isDegrees}}},
-            {"attributes", attributes},
-            {"low_height", d.lowHeight},
-            {"high_height", d.highHeight},
-            {"points", d.points},
-            {"records", d.records},
-            {"rounding", d.roundingUnits},
-            {"min", {d.boundsMin.x, d.boundsMin.y, d.boundsMin.z}},
-            {"max", {d.boundsMax.x, d.boundsMax.y, d.boundsMax.z}},
-            {"focus_min", {d.focusMin.x, d.focusMin.y, d.focusMin.z}},
-            {"focus_max", {d.focusMax.x, d.focusMax.y, d.focusMax.z}},
-            {"has_colour", d.hasColour},
-            {"is_reflectance", d.isReflectance},
-            {"is_strands", d.isStrands},
-            {"is_progressive", d.isProgressive},
-            {"disc_factors", d.discFactors},
-            {"smallest_disc", d.smallestDisc},
-            {"has_normals", d.hasNormals},
-            {"materials", materials},
-            {"points_in", d.pointsIn},
-            {"dropped", d.dropped},
-            {"added", d.added},
-            {"source", toUtf8(d.source)}};
+    json out = {{"metres_per_unit", d.metresPerUnit},
+                {"up", {d.up.x, d.up.y, d.up.z}},
+                {"crs",
+                 {{"name", toUtf8(d.crs.name)},
+                  {"epsg", d.crs.epsg},
+                  {"text", toUtf8(d.crs.text)},
+                  {"is_degrees", d.crs.isDegrees}}},
+                {"attributes", attributes},
+                {"low_height", d.lowHeight},
+                {"high_height", d.highHeight},
+                {"points", d.points},
+                {"records", d.records},
+                {"rounding", d.roundingUnits},
+                {"min", {d.boundsMin.x, d.boundsMin.y, d.boundsMin.z}},
+                {"max", {d.boundsMax.x, d.boundsMax.y, d.boundsMax.z}},
+                {"focus_min", {d.focusMin.x, d.focusMin.y, d.focusMin.z}},
+                {"focus_max", {d.focusMax.x, d.focusMax.y, d.focusMax.z}},
+                {"has_colour", d.hasColour},
+                {"is_reflectance", d.isReflectance},
+                {"is_strands", d.isStrands},
+                {"is_progressive", d.isProgressive},
+                {"disc_factors", d.discFactors},
+                {"smallest_disc", d.smallestDisc},
+                {"has_normals", d.hasNormals},
+                {"materials", materials},
+                {"points_in", d.pointsIn},
+                {"dropped", d.dropped},
+                {"added", d.added},
+                {"source", toUtf8(d.source)}};
+    if (d.isRigid) out["is_rigid"] = true;
+    return out;
 }
 
 template <size_t N>
@@ -171,6 +173,7 @@ StoreDescription fromJson(const json& j) {
     d.hasColour = j.at("has_colour").get<bool>();
     d.isReflectance = j.at("is_reflectance").get<bool>();
     d.isStrands = j.at("is_strands").get<bool>();
+    d.isRigid = j.value("is_rigid", false);
     d.isProgressive = j.at("is_progressive").get<bool>();
     for (const json& factor : j.at("disc_factors")) d.discFactors.push_back(real(factor));
     d.smallestDisc = j.at("smallest_disc").get<double>();

@@ -26,6 +26,7 @@ struct StoreDescription {
     bool hasColour = false;                 ///< the points have colours of their own
     bool isReflectance = false;             ///< those are of the material, to be lit
     bool isStrands = false;                 ///< ribbons and tubes: points count segments
+    bool isRigid = false;                   ///< wind does not bend it: curves of what is no plant
     bool isProgressive = false;             ///< see Hierarchy::isProgressive
     std::vector<float> discFactors;         ///< of a progressive store, see Hierarchy
     double smallestDisc = 0;                ///< world units

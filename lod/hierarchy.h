@@ -83,6 +83,7 @@ struct Hierarchy {
     std::vector<shared::TextureInfo> textures;
     std::vector<TextureTile> tiles;  ///< streamed like chunks: tile t is chunk nodes.size() + t
     bool isStrands = false;          ///< records are segments of ribbons and tubes
+    bool isRigid = false;            ///< such that wind does not bend
     /// Records of a node are discs of one size, in an order in which any beginning shows the whole: n of them stand for
     /// all, sqrt(records / n) times as large. Error codes are those of the radius.
     bool isProgressive = false;

@@ -18,6 +18,8 @@ struct MeshSource {
         std::vector<glm::dvec3> sample;
         void add(const glm::dvec3& p);
         void add(const Bounds& other);
+        /// Of all places that are in the sample.
+        double share() const { return std::ldexp(1.0, -static_cast<int>(thinned_)); }
 
       private:
         void keep(const glm::dvec3& p);

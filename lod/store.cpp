@@ -9,6 +9,7 @@
 #include "engine/base/hash.h"
 #include "lod/attributes.h"
 #include "lod/description.h"
+#include "lod/mesh_place.h"
 #include "lod/store_check.h"
 #include "lod/store_layout.h"
 #include "lod/zstd_memory.h"
@@ -263,7 +264,7 @@ Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& des
     const std::vector<uint8_t> mesh = meshBytes(h);
     STIPPLE_TRY(write(mesh.data(), mesh.size(), head.mesh));
     head.magic = kMagic;
-    head.version = kStoreVersion;
+    head.version = h.isMesh() && h.rootLog2 > kShortMeshBits ? kWideMeshVersion : kStoreVersion;
     head.rootLog2 = h.rootLog2;
     head.origin = {h.origin.x, h.origin.y, h.origin.z};
     head.unit = h.unit;
@@ -304,7 +305,7 @@ Result<Store> openStore(const std::string& path) {
     if (head.magic != kMagic)
         return fail(ErrorKind::input, "is not a stipple store", path,
                     "build one with: stipple build INPUT -o SCENE.stipple");
-    if (head.version != kStoreVersion)
+    if (head.version != kStoreVersion && head.version != kWideMeshVersion)
         return fail(ErrorKind::input,
                     fmt::format("has store version {}; this program reads version {}", head.version, kStoreVersion),
                     path, "build it again with this program");
@@ -342,6 +343,7 @@ Result<Store> openStore(const std::string& path) {
         return tl::unexpected(damagedStore(path, fmt::format("the description cannot be read: {}", e.what())));
     }
     h.isStrands = store.description.isStrands;
+    h.isRigid = store.description.isRigid;
     h.isProgressive = store.description.isProgressive;
     for (const Node& n : h.nodes)
         if (n.isLeaf()) h.finestCode = std::max(h.finestCode, n.errorCode);
@@ -350,6 +352,8 @@ Result<Store> openStore(const std::string& path) {
     store.contentHash = head.contentHash;
     store.fileBytes = head.fileBytes;
     STIPPLE_TRY(readMesh(mesh, path, h));
+    if ((head.version == kWideMeshVersion) != (h.isMesh() && h.rootLog2 > kShortMeshBits))
+        return tl::unexpected(damagedStore(path, "its version is not that of its coordinates"));
     if (hasCounts == h.isMesh()) return tl::unexpected(damagedStore(path, "the code counts are not possible"));
     STIPPLE_TRY(checkTables(store, head.nodes.offset));
     if (h.isMesh() && store.description.materials.empty()) {  // it is drawn with a plain one
@@ -387,7 +391,10 @@ Result<Chunk> decodeNode(const Hierarchy& h, uint32_t index, const uint8_t* byte
     if (index >= h.nodes.size()) return decodeTile(bytes, count, where);
     const uint32_t records = h.nodes[index].records;
     if (h.isStrands) return decodeStrandChunk(bytes, count, records, where);
-    return h.isMesh() ? decodeMeshChunk(bytes, count, records, h.groups[index], where)
+    const MeshVertices vertices = h.rootLog2 <= kShortMeshBits ? MeshVertices::shortOnes
+                                  : hasPairs(h.nodes[index])   ? MeshVertices::pairs
+                                                               : MeshVertices::counted;
+    return h.isMesh() ? decodeMeshChunk(bytes, count, records, h.groups[index], vertices, where)
                       : decodeChunk(bytes, count, records, where, wantLowBits);
 }
 

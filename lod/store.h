@@ -17,6 +17,8 @@ namespace stipple::lod {
 
 /// Of the file format; a store of another version must be built again.
 inline constexpr uint32_t kStoreVersion = 6;
+/// Of mesh stores whose coordinates have more than 30 bits: earlier programs would draw them elsewhere.
+inline constexpr uint32_t kWideMeshVersion = 7;
 
 /// An opened store. Reading chunks is safe from several threads.
 struct Store {

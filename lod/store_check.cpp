@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "lod/mesh_place.h"
+
 namespace stipple::lod {
 
 Error damagedStore(const std::string& where, const std::string& what) {
@@ -87,6 +89,9 @@ Result<void> checkGroups(const Store& store, uint64_t chunksEnd) {
         bool fits = isPossiblePlace(n, chunksEnd) && n.attributeBytes == 0 && n.isLeaf() && g.runs > 0 &&
                     g.firstRun == runs && g.firstParent == parents && g.firstTexture == textures &&
                     (g.parents > 0) == (n.errorCode != 255) && (i > 0 || g.parents == 0);
+        const bool isWide = h.rootLog2 > kShortMeshBits;
+        for (const uint64_t c : n.cell) fits = fits && (c == 0 || isWide);
+        fits = fits && (n.stepShift == 0 || (isWide && n.stepShift == 1));
         runs += g.runs;
         parents += g.parents;
         textures += g.textures;

@@ -14,6 +14,7 @@ struct StrandSource {
     using Take = std::function<Result<void>(const StrandSet& block)>;
 
     uint64_t vertices = 0;               ///< about
+    bool isPlant = true;                 ///< wind bends it; not so neurons, streamlines, hair
     std::function<uint64_t()> identity;  ///< another number: the source has changed
     /// Gives every strand once, always the same, and at least one block.
     std::function<Result<void>(const Take& take)> read;

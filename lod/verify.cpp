@@ -8,6 +8,8 @@
 
 #include "engine/base/process.h"
 #include "engine/base/queue.h"
+#include "lod/cut_view.h"
+#include "lod/mesh_place.h"
 #include "lod/store.h"
 #include "lod/verify_errors.h"
 
@@ -56,6 +58,17 @@ std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
         if (!h.isProgressive && r.code > 0 && node.childMask != 0 && (r.octants & ~uint32_t{node.childMask}) != 0)
             return "a record has an error but its octant has no child";
     }
+    if (!h.isLoose() && node.normalConeCosine > 0) {  // see facesAway
+        const glm::dvec3 axis = glm::normalize(glm::dvec3(shared::octDecode(node.normalCone)));
+        const double widest = std::acos(std::min(double{node.normalConeCosine}, 1.0)) + kConeMargin;
+        for (const shared::PointRecord& r : chunk.records) {
+            if ((shared::recordFlags(r) & (shared::kFlagTwoSided | shared::kFlagNoNormal)) != 0)
+                return "a record can be seen from everywhere, but the node has a cone of normals";
+            const glm::dvec3 n = glm::normalize(glm::dvec3(shared::octDecode(r.normal)));
+            if (std::acos(std::clamp(glm::dot(axis, n), -1.0, 1.0)) > widest)
+                return "a normal is outside the node's cone";
+        }
+    }
     if (!h.isProgressive && node.isLeaf() && largest != 0) return "a leaf record has an error";
     if (largest != node.errorCode) return "the largest error is not the one in the node table";
     uint32_t left = node.records;
@@ -87,9 +100,10 @@ namespace {
 std::string checkGroup(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
     const Node& node = h.nodes[index];
     const MeshGroup& group = h.groups[index];
-    for (const shared::MeshVertex& v : chunk.vertices)
-        if (glm::length(glm::dvec3(v.x, v.y, v.z) - node.centre) > node.radius * (1 + 1e-9))
-            return "a vertex reaches out of the bounding sphere";
+    for (const shared::MeshCluster& c : chunk.clusters)
+        for (uint32_t i = 0; i < verticesOf(node, c); ++i)
+            if (glm::length(vertexPlace(node, chunk, c, i) - node.centre) > node.radius * (1 + 1e-9))
+                return "a vertex reaches out of the bounding sphere";
     uint32_t cluster = 0;
     for (uint32_t r = 0; r < group.runs; ++r) {
         const MeshRun& run = h.runs[group.firstRun + r];

@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 
+#include "lod/mesh_place.h"
 #include "lod/triangle.h"
 
 namespace stipple::lod {
@@ -352,16 +353,15 @@ namespace {
 
 using Corners = std::array<glm::dvec3, 3>;
 
-void appendTriangles(const Chunk& chunk, uint32_t firstCluster, uint32_t clusters, std::vector<Corners>& to) {
+void appendTriangles(const Node& node, const Chunk& chunk, uint32_t firstCluster, uint32_t clusters,
+                     std::vector<Corners>& to) {
     for (uint32_t c = firstCluster; c < firstCluster + clusters; ++c) {
         const shared::MeshCluster& cluster = chunk.clusters[c];
         for (uint32_t t = 0; t < cluster.counts >> 16; ++t) {
             const uint32_t packed = chunk.triangles[cluster.firstTriangle + t];
             Corners corners;
-            for (uint32_t k = 0; k < 3; ++k) {
-                const shared::MeshVertex& v = chunk.vertices[cluster.firstVertex + (packed >> (8 * k) & 255u)];
-                corners.at(k) = {v.x, v.y, v.z};
-            }
+            for (uint32_t k = 0; k < 3; ++k)
+                corners.at(k) = vertexPlace(node, chunk, cluster, packed >> (8 * k) & 255u);
             to.push_back(corners);
         }
     }
@@ -389,17 +389,19 @@ Result<uint64_t> measureGroup(const Store& store, uint32_t index, const Chunk& c
     const Hierarchy& h = store.hierarchy;
     const MeshGroup& group = h.groups[index];
     std::vector<Corners> fine, coarse;
-    appendTriangles(chunk, 0, group.clusters, fine);
+    appendTriangles(h.nodes[index], chunk, 0, group.clusters, fine);
     for (uint32_t p = group.firstParent; p < group.firstParent + group.parents; ++p) {
         const MeshGroup& parent = h.groups[h.parents[p]];
         STIPPLE_ASSIGN(const Chunk above, readChunk(store, h.parents[p]));
         for (uint32_t r = parent.firstRun; r < parent.firstRun + parent.runs; ++r)
-            if (h.runs[r].producer == index) appendTriangles(above, h.runs[r].firstCluster, h.runs[r].clusters, coarse);
+            if (h.runs[r].producer == index)
+                appendTriangles(h.nodes[h.parents[p]], above, h.runs[r].firstCluster, h.runs[r].clusters, coarse);
     }
     if (coarse.empty() || fine.empty()) return 0;
     const double error = h.errors.decode(h.nodes[index].errorCode);
     const double off = std::max(farthestCorner(fine, coarse), farthestCorner(coarse, fine));
-    // Distances are measured in fp32 when it is built.
+    // Distances are measured in fp32 when it is built. (The last code stands for whatever the scale does not reach.)
+    if (h.nodes[index].errorCode == ErrorScale::kLargest) return fine.size() + coarse.size();
     if (off <= error * (1 + 1e-5) + 1e-6 * h.nodes[index].radius) return fine.size() + coarse.size();
     return fail(
         ErrorKind::input,

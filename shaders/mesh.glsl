@@ -86,14 +86,28 @@ vec3 rayThrough(uvec2 pixel) {
     return vec3((float(pixel.x) + 0.5 - frame.centre.x) / frame.focal, (float(pixel.y) + 0.5 - frame.centre.y) / frame.focal, 1.0);
 }
 
+// Position of a cluster's vertex in camera space.
+vec3 placeOf(DrawCluster c, DrawMesh m, uint i) {
+    Vertices vertices = Vertices(uvec2(c.verticesLow, c.verticesHigh));
+    const MeshVertex v = vertices.vertices[i];
+    if (m.places == kPlacesShort) return meshPosition(v.x, v.y, v.z, m);
+    if (m.places == kPlacesFar) return meshPositionWide(v.x, v.y, v.z, v.x >> 31, v.y >> 31, v.z >> 31, m);
+    const MeshVertex high = vertices.vertices[i + (c.counts & 0xffffu) / 2u];
+    return meshPositionWide(v.x, v.y, v.z, high.x, high.y, high.z, m);
+}
+
 // Does an alpha mask leave the triangle at this pixel?
-bool isKept(DrawCluster c, MeshVertex va, MeshVertex vb, MeshVertex vc, uvec2 pixel) {
+bool isKept(DrawCluster c, uint corners, uvec2 pixel) {
     const DrawMesh m = meshes[c.mesh];
+    Vertices vertices = Vertices(uvec2(c.verticesLow, c.verticesHigh));
+    const MeshVertex va = vertices.vertices[corners & 255u];
+    const MeshVertex vb = vertices.vertices[corners >> 8 & 255u];
+    const MeshVertex vc = vertices.vertices[corners >> 16 & 255u];
     const SurfaceMaterial material = materials[m.firstMaterial + (va.surface & kSurfaceMaterialMask)];
     const vec3 ray = rayThrough(pixel);
-    const vec3 a = meshPosition(va.x, va.y, va.z, m);
-    const vec3 e1 = meshPosition(vb.x, vb.y, vb.z, m) - a;
-    const vec3 e2 = meshPosition(vc.x, vc.y, vc.z, m) - a;
+    const vec3 a = placeOf(c, m, corners & 255u);
+    const vec3 e1 = placeOf(c, m, corners >> 8 & 255u) - a;
+    const vec3 e2 = placeOf(c, m, corners >> 16 & 255u) - a;
     const vec2 w = triangleWeights(ray, a, a + e1, a + e2);
     const float wa = 1.0 - w.x - w.y;
     float alpha = material.alpha * (wa * float(va.colour >> 24) + w.x * float(vb.colour >> 24) + w.y * float(vc.colour >> 24)) / 255.0;

@@ -127,6 +127,7 @@ Result<lod::BuildReport> buildStrands(const lod::StrandSource& raw, const std::s
                                       const BuildOptions& build, Executor& executor, Progress& progress) {
     lod::StrandBuildSettings settings = strandSettings(input);
     STIPPLE_ASSIGN(settings.limits, build.settings());
+    settings.description.isRigid = !raw.isPlant;
     lod::StrandSource turned = raw;
     if (!build.up.empty())
         turned.read = [&raw, up = lod::axisVector(axisNamed(build.up))](const lod::StrandSource::Take& take) {

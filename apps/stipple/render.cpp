@@ -280,7 +280,9 @@ void setupRender(CLI::App& app, int& status) {
     sub->add_option("--debug", o->debug, "draw what the engine did instead of colours")
         ->check(oneOf({"none", "level", "error", "holes", "normals"}))
         ->capture_default_str();
-    sub->add_option("--wind", o->wind, "how far tops of plants move at most, share of their height (e.g. 0.03)")
+    sub->add_option(
+           "--wind", o->wind,
+           "how far tops of plants move at most, share of their height (e.g. 0.03); not neurons, streamlines and hair")
         ->transform(within(0.0, 0.5))
         ->capture_default_str();
     sub->add_option("--time", o->seconds, "of the wind, seconds; a path adds its own")

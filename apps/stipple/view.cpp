@@ -366,7 +366,9 @@ void setupView(CLI::App& app, int& status) {
     sub->add_option("--error", o->error, "tolerated screen-space error, pixels")
         ->transform(positive())
         ->capture_default_str();
-    sub->add_option("--wind", o->wind, "how far tops of plants move at most, share of their height (e.g. 0.03)")
+    sub->add_option(
+           "--wind", o->wind,
+           "how far tops of plants move at most, share of their height (e.g. 0.03); not neurons, streamlines and hair")
         ->transform(within(0.0, 0.5))
         ->capture_default_str();
     sub->add_option("--budget-points", o->budget, "records drawn at most, e.g. 2M; the error rises to meet it")

@@ -19,7 +19,7 @@ void ViewSession::restart(render::FrameSettings& settings) {
     const lod::StoreDescription& d = scene_.description;
     state_.reset();
     streaming::StreamSettings stream;
-    stream.residentBytes = std::max<uint64_t>(1, parseBytes(options_.resident));
+    stream.residentBytes = parseBytes(options_.resident);
     state_ = render::makeFrameState(scene_.placed, backend_, executor_, stream, scene_.crowds);
     settings.draw.lights = scene_.lights;
     settings.draw.worldUp = d.up;

@@ -8,6 +8,16 @@ template <typename T>
     b = c;
 }
 
+/// Camera-space position of a cluster's vertex.
+[[gnu::always_inline]] inline vec3 placeOf(const MeshBlock& block, uint32_t i) {
+    const DrawMesh& m = *block.mesh;
+    const MeshVertex& v = block.vertices[i];
+    if (m.places == kPlacesShort) return meshPosition(v.x, v.y, v.z, m);
+    if (m.places == kPlacesFar) return meshPositionWide(v.x, v.y, v.z, v.x >> 31, v.y >> 31, v.z >> 31, m);
+    const MeshVertex& high = block.vertices[i + (block.counts & 0xffffu) / 2];
+    return meshPositionWide(v.x, v.y, v.z, high.x, high.y, high.z, m);
+}
+
 /// A triangle in fixed point, oriented so that its inside is positive.
 struct Fixed {
     int64_t x[3], y[3];
@@ -223,6 +233,27 @@ void clipTriangle(const FrameConstants& f, const vec3* corner, const Candidate& 
     }
 }
 
+/// Camera-space positions of a cluster's vertices.
+[[gnu::always_inline]] inline void placeShort(const DrawMesh& m, const int* __restrict words, size_t count,
+                                              float* __restrict x, float* __restrict y, float* __restrict z) {
+#pragma GCC ivdep
+    for (size_t i = 0; i < count; ++i) {
+        const vec3 c = meshPosition(words[8 * i], words[8 * i + 1], words[8 * i + 2], m);
+        x[i] = c.x;
+        y[i] = c.y;
+        z[i] = c.z;
+    }
+}
+void placeWide(const MeshBlock& block, float* x, float* y, float* z) {
+    const uint32_t slots = block.counts & 0xffffu;
+    for (uint32_t i = 0; i < slots; ++i) {  // (slots without a vertex, too: no triangle names them)
+        const vec3 c = placeOf(block, i < slots / 2 || block.mesh->places != kPlacesPaired ? i : 0);
+        x[i] = c.x;
+        y[i] = c.y;
+        z[i] = c.z;
+    }
+}
+
 void rasterCluster(const FrameConstants& frame, const SurfaceMaterial* materials, const MeshBlock& block,
                    uint32_t firstId, const LargeSink& large, const Visibility& visibility) {
     const MeshVertex* const vertices = block.vertices;
@@ -232,16 +263,16 @@ void rasterCluster(const FrameConstants& frame, const SurfaceMaterial* materials
     const DrawMesh m = *block.mesh;
     alignas(64) float x[256], y[256], z[256], inverse[256];
     alignas(64) int32_t px[256], py[256], clip[256];
-    const int* __restrict const words = &vertices->x;
+    if (m.places == kPlacesShort)
+        placeShort(m, &vertices->x, vertexCount, x, y, z);
+    else
+        placeWide(block, x, y, z);
 #pragma GCC ivdep
     for (size_t i = 0; i < vertexCount; ++i) {
-        const vec3 c = meshPosition(words[8 * i], words[8 * i + 1], words[8 * i + 2], m);
+        const vec3 c = vec3(x[i], y[i], z[i]);
         const float scale = f.focal / c.z;
         const float sx = c.x * scale + f.centre.x, sy = c.y * scale + f.centre.y;
         const bool isIn = (c.z >= f.nearPlane) & (abs(sx) < kGuardPixels) & (abs(sy) < kGuardPixels);
-        x[i] = c.x;
-        y[i] = c.y;
-        z[i] = c.z;
         inverse[i] = 1.0f / c.z;
         px[i] = isIn ? int(floor(sx * kSubpixel + 0.5f)) : 0;
         py[i] = isIn ? int(floor(sy * kSubpixel + 0.5f)) : 0;

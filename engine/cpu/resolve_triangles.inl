@@ -127,10 +127,9 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
     for (size_t i = 0; i < n; ++i) {
         const MeshBlock& block = in.meshBlocks[p.id[i] / 256u];
         const uint32_t t = block.triangles[p.id[i] & 255u];
-        const DrawMesh& m = *block.mesh;
         for (uint32_t k = 0; k < 3; ++k) {
             const MeshVertex& v = block.vertices[t >> (8 * k) & 255u];
-            const vec3 at = meshPosition(v.x, v.y, v.z, m);
+            const vec3 at = placeOf(block, t >> (8 * k) & 255u);
             c.x[k][i] = at.x;
             c.y[k][i] = at.y;
             c.z[k][i] = at.z;

@@ -92,9 +92,31 @@ tl::unexpected<Error> vulkanError(VkResult result, const std::string& what) {
     return fail(kind, fmt::format("{} (VkResult {})", what, static_cast<int>(result)), "Vulkan", "try --device cpu");
 }
 
+Result<uint64_t> roomFor(const DeviceLimits& limits, uint64_t bytes, VkBufferUsageFlags usage, const std::string& name,
+                         const std::string& deviceName) {
+    const bool isBound = (usage & VK_BUFFER_USAGE_STORAGE_BUFFER_BIT) != 0;
+    const uint64_t most = isBound ? std::min(limits.storageRange, limits.buffer) : limits.buffer;
+    if (bytes <= most) return bytes + std::min(bytes / 4, most - bytes);
+    return fail(
+        ErrorKind::device,
+        fmt::format("{} for this picture would take {} MB, but the device {} at most {} MB at once ({})", name,
+                    bytes >> 20, isBound ? "binds" : "holds", most >> 20,
+                    isBound && limits.storageRange <= limits.buffer ? "maxStorageBufferRange" : "maxBufferSize"),
+        deviceName, "a smaller --size, or --device cpu");
+}
+
+std::optional<uint32_t> pickQueueFamily(std::span<const VkQueueFamilyProperties> families, bool forWindow) {
+    const VkQueueFlags wanted = VK_QUEUE_COMPUTE_BIT | (forWindow ? VkQueueFlags{VK_QUEUE_GRAPHICS_BIT} : 0);
+    std::optional<uint32_t> found;
+    for (uint32_t i = 0; i < families.size(); ++i) {
+        if ((families[i].queueFlags & wanted) != wanted || families[i].queueCount == 0) continue;
+        if (!found || (families[*found].timestampValidBits == 0 && families[i].timestampValidBits > 0)) found = i;
+    }
+    return found;
+}
+
 Result<std::unique_ptr<Device>> Device::create(const DeviceSettings& settings) {
     std::unique_ptr<Device> d(new Device);
-    d->validation_ = settings.validation;
     STIPPLE_ASSIGN(d->instance, createInstance(settings, d->messages_.get()));
     if (settings.validation) {
         const auto make = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
@@ -106,6 +128,8 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceSettings& settings) {
         debug.pfnUserCallback = onMessage;
         debug.pUserData = d->messages_.get();
         if (make) make(d->instance, &debug, nullptr, &d->messenger_);
+        d->setName_ = reinterpret_cast<PFN_vkSetDebugUtilsObjectNameEXT>(
+            vkGetInstanceProcAddr(d->instance, "vkSetDebugUtilsObjectNameEXT"));
     }
     std::vector<VkPhysicalDevice> devices = physicalDevices(d->instance);
     std::stable_sort(devices.begin(), devices.end(), [](VkPhysicalDevice a, VkPhysicalDevice b) {
@@ -130,16 +154,23 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceSettings& settings) {
                                 seen.empty() ? "none" : seen),
                     "--device", "stipple --version lists them");
 
+    VkPhysicalDeviceMaintenance4Properties sizes{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES};
+    VkPhysicalDeviceProperties2 properties{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2};
+    properties.pNext = &sizes;
+    vkGetPhysicalDeviceProperties2(d->physical, &properties);
+    d->limits = {properties.properties.limits.maxStorageBufferRange, sizes.maxBufferSize};
+
     uint32_t families = 0;
     vkGetPhysicalDeviceQueueFamilyProperties(d->physical, &families, nullptr);
     std::vector<VkQueueFamilyProperties> family(families);
     vkGetPhysicalDeviceQueueFamilyProperties(d->physical, &families, family.data());
-    const auto usable = std::find_if(family.begin(), family.end(), [](const VkQueueFamilyProperties& f) {
-        return (f.queueFlags & VK_QUEUE_COMPUTE_BIT) != 0 && (f.queueFlags & VK_QUEUE_GRAPHICS_BIT) != 0;
-    });
-    if (usable == family.end())
-        return fail(ErrorKind::device, "has no queue for graphics and compute", d->deviceName, "try --device cpu");
-    d->queueFamily = static_cast<uint32_t>(usable - family.begin());
+    const bool forWindow = !settings.deviceExtensions.empty();
+    const std::optional<uint32_t> usable = pickQueueFamily(family, forWindow);
+    if (!usable)
+        return fail(ErrorKind::device, forWindow ? "has no queue for graphics and compute" : "has no queue for compute",
+                    d->deviceName, "try --device cpu");
+    d->queueFamily = *usable;
+    d->hasTimestamps = family[*usable].timestampValidBits > 0;
 
     const float priority = 1;
     VkDeviceQueueCreateInfo queueInfo{VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO};
@@ -195,14 +226,12 @@ Result<uint32_t> Device::memoryType(uint32_t bits, VkMemoryPropertyFlags wanted,
 }
 
 void Device::setName(VkObjectType type, uint64_t handle, const std::string& name) const {
-    if (!validation_) return;
-    static const auto set = reinterpret_cast<PFN_vkSetDebugUtilsObjectNameEXT>(
-        vkGetInstanceProcAddr(instance, "vkSetDebugUtilsObjectNameEXT"));
+    if (!setName_) return;
     VkDebugUtilsObjectNameInfoEXT info{VK_STRUCTURE_TYPE_DEBUG_UTILS_OBJECT_NAME_INFO_EXT};
     info.objectType = type;
     info.objectHandle = handle;
     info.pObjectName = name.c_str();
-    if (set) set(device, &info);
+    setName_(device, &info);
 }
 
 Result<Buffer> Buffer::create(const Device& d, uint64_t bytes, VkBufferUsageFlags usage, bool hostVisible,

@@ -6,6 +6,8 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,6 +21,21 @@ struct Messages {
     std::mutex mutex;
     std::vector<std::string> texts;
 };
+
+/// What a device can hold and bind, bytes.
+struct DeviceLimits {
+    uint64_t storageRange = 0;  ///< of a buffer that is bound by descriptor (maxStorageBufferRange)
+    uint64_t buffer = 0;        ///< of any buffer (maxBufferSize)
+};
+
+/// How large to make a buffer that must hold `bytes`: a quarter more, so that the next frame need not make it again, as
+/// far as the limits go. An error that names the limit where even `bytes` are beyond it.
+Result<uint64_t> roomFor(const DeviceLimits& limits, uint64_t bytes, VkBufferUsageFlags usage, const std::string& name,
+                         const std::string& deviceName);
+
+/// The queue family that passes are sent to: compute is all that they need (which can copy, says the specification), a
+/// window also wants graphics. Among those that will do, one that can tell times, then the first.
+std::optional<uint32_t> pickQueueFamily(std::span<const VkQueueFamilyProperties> families, bool forWindow);
 
 struct DeviceSettings {
     std::string name;         ///< part of the device's name; empty: the first, real GPUs before software
@@ -40,7 +57,9 @@ class Device {
     VkQueue queue = VK_NULL_HANDLE;
     uint32_t queueFamily = 0;
     std::string deviceName;
+    DeviceLimits limits;
     float timestampPeriodNs = 1;
+    bool hasTimestamps = true;  ///< of the queue
     bool isSoftware = false;
 
     std::vector<std::string> messages() const;
@@ -51,8 +70,8 @@ class Device {
   private:
     Device() = default;
     VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
+    PFN_vkSetDebugUtilsObjectNameEXT setName_ = nullptr;  ///< of this instance; null without validation
     std::shared_ptr<Messages> messages_ = std::make_shared<Messages>();
-    bool validation_ = false;
 };
 
 /// "what: VK_ERROR_..." as a device error.

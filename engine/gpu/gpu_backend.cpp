@@ -145,7 +145,8 @@ class GpuBackend final : public render::Backend {
     Result<void> ensure(Buffer& buffer, uint64_t bytes, VkBufferUsageFlags usage, bool hostVisible, const char* name) {
         bytes = std::max<uint64_t>(bytes, 256);
         if (buffer.bytes() >= bytes) return {};
-        STIPPLE_ASSIGN(buffer, Buffer::create(*device_, bytes + bytes / 4, usage, hostVisible, name));
+        STIPPLE_ASSIGN(const uint64_t room, roomFor(device_->limits, bytes, usage, name, device_->deviceName));
+        STIPPLE_ASSIGN(buffer, Buffer::create(*device_, room, usage, hostVisible, name));
         descriptorsChanged_ = true;
         return {};
     }

@@ -28,6 +28,7 @@ class PassList {
     const std::vector<std::string>& names() const { return names_; }
 
   private:
+    void stamp(uint32_t query);
     struct Last {
         VkPipelineStageFlags2 stage;
         VkAccessFlags2 access;

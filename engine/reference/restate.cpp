@@ -5,6 +5,7 @@
 #include <unordered_map>
 
 #include "engine/base/check.h"
+#include "engine/base/numbers.h"
 #include "engine/base/process.h"
 #include "engine/reference/decode.h"
 #include "engine/reference/reference.h"
@@ -29,10 +30,10 @@ dvec3 discNormal(const Sample& s, const dvec2& perp, double facing, const Lens& 
 }
 
 /// rho^2 of an image point in the disc of a sample: where the ray through it meets the plane, in radii. A disc that is
-/// seen edge-on is turned until half a pixel of it is seen to each side; a tube's faces the eye.
+/// seen edge-on is turned until a quarter of a pixel of it is seen to each side; a tube's faces the eye.
 double rhoSquared(const Sample& s, const dvec2& point, const Lens& lens) {
     dvec2 perp = s.isRound ? dvec2(0) : s.perp;
-    const double sine = glm::length(perp), least = std::min(0.5 / s.radius, 1.0);
+    const double sine = glm::length(perp), least = std::min(0.25 / s.radius, 1.0);
     const double facing = std::max(std::sqrt(std::max(0.0, 1 - sine * sine)), least);
     if (sine > 0) perp *= std::sqrt(1 - facing * facing) / sine;
     const dvec3 n = discNormal(s, perp, facing, lens), c = lens.rayTo(s.centre), ray = lens.rayTo(point);
@@ -154,9 +155,9 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize, const Lens& le
             std::vector<Contribution> list;
             for (const auto& [s, rho2] : around) {
                 const double rest = std::max(0.0, 1 - (widen ? rho2 / 4 : rho2));
-                // An empty texel between four filled ones takes whatever is nearest, within eight radii; at the border
+                // An empty texel between four filled ones takes whatever is nearest, within five radii; at the border
                 // of the image within two, where texels are large.
-                const double farthest = outside > 0 && fineSize > 8 ? 4 : 64;
+                const double farthest = outside > 0 && fineSize > 8 ? 4 : 25;
                 const bool gap = around.size() + outside == 4 && !fine.ref(x, y).valid && least < farthest;
                 // So does what shines through from behind all four.
                 const bool shines = around.size() == 4 && fine.ref(x, y).valid && fine.ref(x, y).depth > hindmost;
@@ -253,8 +254,8 @@ class ReferenceBackend final : public render::Backend {
                 if (!isInside && !(hasPyramid && beside < 1)) continue;
                 // There, of one surface's splats that which reaches in farthest is kept.
                 const double key = c.z + (isInside ? 0.0 : beside * beside * radius * c.z / v.focalPixels);
-                Sample& s = isInside ? level.ref(static_cast<int>(p.x), static_cast<int>(p.y))
-                                     : level.ref(static_cast<int>(at.x), static_cast<int>(at.y));
+                Sample& s = isInside ? level.ref(toWhole<int>(p.x), toWhole<int>(p.y))
+                                     : level.ref(toWhole<int>(at.x), toWhole<int>(at.y));
                 if (s.valid && s.key <= key) continue;
                 const dvec3 toPoint = glm::normalize(c);
                 if ((disc.flags & shared::kFlagNoNormal) != 0) n = -toPoint;
@@ -340,7 +341,7 @@ class ReferenceBackend final : public render::Backend {
     static void reconstruct(Level& level0, const Lens& lens) {
         double largest = 0;
         for (const Sample& s : level0.samples) largest = std::max(largest, s.valid ? s.radius : 0.0);
-        const int count = 1 + static_cast<int>(std::ceil(std::log2(std::max(2.0, 2 * largest))));
+        const int count = 1 + toWhole<int>(std::ceil(std::log2(std::max(2.0, 2 * largest))));
         std::vector<Level> pyramid{level0};
         while (static_cast<int>(pyramid.size()) < count && (pyramid.back().width > 1 || pyramid.back().height > 1))
             pyramid.push_back(

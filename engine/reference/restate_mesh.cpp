@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "engine/reference/surface.h"
+#include "lod/mesh_place.h"
 
 namespace stipple::reference {
 namespace {
@@ -18,15 +19,12 @@ class MeshProjector {
         : draws_(draws), chunks_(chunks), level_(level), view_(draws.view) {}
 
     void run() {
-        uint32_t last = ~0u;
-        size_t mesh = 0;
-        for (const lod::CutMeshDraw& cut : draws_.meshCut) {
-            if (cut.instance != last && last != ~0u) ++mesh;
-            last = cut.instance;
+        for (size_t i = 0; i < draws_.meshCut.size(); ++i) {
+            const lod::CutMeshDraw& cut = draws_.meshCut[i];
             const lod::Instance& instance = draws_.instances[cut.instance];
             const lod::Hierarchy& h = *draws_.hierarchies[instance.hierarchy];
             const lod::Chunk& chunk = chunks_.at(uint64_t{instance.source} << 32 | cut.node);
-            const TextureReader textures{draws_.meshTextures[mesh], chunks_};
+            const TextureReader textures{draws_.meshTextures[draws_.meshDraws[i].mesh], chunks_};
             const uint32_t firstMaterial = draws_.firstMaterial[instance.hierarchy];
             for (uint32_t c = cut.firstCluster; c < cut.firstCluster + cut.clusters; ++c) {
                 const shared::MeshCluster& cluster = chunk.clusters.at(c);
@@ -36,7 +34,10 @@ class MeshProjector {
                     const auto vertex = [&](uint32_t k) -> const shared::MeshVertex& {
                         return chunk.vertices.at(cluster.firstVertex + (word >> (8 * k)) % 256);
                     };
-                    for (uint32_t k = 0; k < 3; ++k) corners.at(k) = cornerOf(h, instance, vertex(k), view_);
+                    for (uint32_t k = 0; k < 3; ++k)
+                        corners.at(k) = cornerOf(
+                            h, instance, vertex(k),
+                            lod::vertexPlace(h.nodes[cut.node], chunk, cluster, (word >> (8 * k)) % 256), view_);
                     const uint32_t surface = vertex(0).surface;
                     triangle(corners, surface, draws_.materials[firstMaterial + surface % 65536], textures, cut,
                              h.nodes[cut.node].level);

@@ -78,14 +78,14 @@ dvec3 mirrored(const std::vector<float>& t, const dvec3& direction, double rough
 
 }  // namespace
 
-Corner cornerOf(const lod::Hierarchy& h, const lod::Instance& instance, const shared::MeshVertex& v,
+Corner cornerOf(const lod::Hierarchy& h, const lod::Instance& instance, const shared::MeshVertex& v, const dvec3& place,
                 const lod::View& view) {
     const auto toCamera = [&](const dvec3& d) {
         return dvec3(glm::dot(d, view.right), glm::dot(d, view.down), glm::dot(d, view.forward));
     };
     Corner c;
-    c.at = toCamera(instance.translation +
-                    instance.rotation * (instance.scale * (h.origin + h.unit * dvec3(v.x, v.y, v.z))) - view.eye);
+    c.at =
+        toCamera(instance.translation + instance.rotation * (instance.scale * (h.origin + h.unit * place)) - view.eye);
     c.normal = toCamera(instance.rotation * decodeDirection(v.normal));
     c.colour = {decodeSrgb(v.colour & 255u), decodeSrgb(v.colour >> 8 & 255u), decodeSrgb(v.colour >> 16 & 255u),
                 (v.colour >> 24) / 255.0};

@@ -16,9 +16,9 @@ struct Corner {
 };
 using Corners = std::array<Corner, 3>;
 
-/// Camera-space corner of a vertex.
+/// Camera-space corner of a vertex at `place` on the lattice.
 Corner cornerOf(const lod::Hierarchy& h, const lod::Instance& instance, const shared::MeshVertex& v,
-                const lod::View& view);
+                const glm::dvec3& place, const lod::View& view);
 
 /// Weights of the second and third corner where the ray meets the triangle's plane. `face`: (b - a) x (c - a).
 glm::dvec2 weightsOn(const glm::dvec3& ray, const Corners& c, const glm::dvec3& face);

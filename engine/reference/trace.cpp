@@ -11,6 +11,7 @@
 #include "engine/reference/reference.h"
 #include "engine/reference/strand_rays.h"
 #include "engine/reference/surface.h"
+#include "lod/mesh_place.h"
 
 namespace stipple::reference {
 namespace {
@@ -26,15 +27,13 @@ struct TracedStore {
     std::vector<Disc> discs;
     std::vector<Segment> segments;
     std::vector<shared::MeshVertex> vertices;
+    std::vector<dvec3> places;  ///< of each, lattice units
     std::vector<std::array<uint32_t, 3>> triangles;
     Chunks tiles;  ///< all levels of all textures
     render::MeshTextures textures;
     BoxTree tree;  ///< items: discs, then triangles, then segments (a store has one kind)
 
-    dvec3 positionOf(uint32_t vertex) const {
-        const shared::MeshVertex& v = vertices[vertex];
-        return store->hierarchy.origin + store->hierarchy.unit * dvec3(v.x, v.y, v.z);
-    }
+    dvec3 positionOf(uint32_t vertex) const { return store->hierarchy.origin + store->hierarchy.unit * places[vertex]; }
 };
 
 Box boxOf(const Disc& d) {
@@ -70,9 +69,12 @@ Result<void> readMesh(TracedStore& t) {
                 STIPPLE_ASSIGN(chunk, lod::readChunk(*t.store, i));
                 base = static_cast<uint32_t>(t.vertices.size());
                 t.vertices.insert(t.vertices.end(), chunk.vertices.begin(), chunk.vertices.end());
+                t.places.resize(t.vertices.size());
             }
             for (uint32_t c = run.firstCluster; c < run.firstCluster + run.clusters; ++c) {
                 const shared::MeshCluster& cluster = chunk.clusters[c];
+                for (uint32_t v = 0; v < lod::verticesOf(h.nodes[i], cluster); ++v)
+                    t.places[base + cluster.firstVertex + v] = lod::vertexPlace(h.nodes[i], chunk, cluster, v);
                 for (uint32_t k = 0; k < cluster.counts >> 16; ++k) {
                     const uint32_t word = chunk.triangles[cluster.firstTriangle + k],
                                    first = base + cluster.firstVertex;
@@ -256,7 +258,8 @@ class Tracer {
             return;
         Corners c;
         for (size_t k = 0; k < 3; ++k)
-            c.at(k) = cornerOf(store.store->hierarchy, place, store.vertices[corners.at(k)], view_);
+            c.at(k) = cornerOf(store.store->hierarchy, place, store.vertices[corners.at(k)],
+                               store.places[corners.at(k)], view_);
         const dvec3 face = glm::cross(c[1].at - c[0].at, c[2].at - c[0].at);
         const dvec2 w = glm::clamp(weightsOn(ray, c, face), dvec2(0), dvec2(1));
         Sample sample;

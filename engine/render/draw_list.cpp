@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "shaders/shared/wide_disc.h"
+#include "lod/mesh_place.h"
 
 namespace stipple::render {
 
@@ -14,21 +14,23 @@ static_assert(sizeof(shared::StrandSegment) == 32);
 static_assert(sizeof(shared::FrameConstants) == 172);
 static_assert(sizeof(shared::MeshVertex) == 32);
 static_assert(sizeof(shared::MeshCluster) == 12);
-static_assert(sizeof(shared::DrawMesh) == 104);
+static_assert(sizeof(shared::DrawMesh) == 120);
 static_assert(sizeof(shared::SurfaceMaterial) == 188);
 
 namespace {
 
-/// One instance of a mesh in camera space, composed in fp64.
+/// One instance of a mesh in camera space, composed in fp64. `eyeStep`: the lattice point nearest to the eye.
 shared::DrawMesh makeDrawMesh(const lod::Hierarchy& h, const lod::Instance& instance, const lod::View& view,
-                              const glm::dmat3& cameraFromWorld) {
+                              const glm::dmat3& cameraFromWorld, lod::MeshPlace& eyeStep) {
     shared::DrawMesh m{};
     const glm::dmat3 axes = cameraFromWorld * instance.rotation;
     const double worldPerStep = instance.scale * h.unit;
     const glm::dvec3 eye =
         (glm::transpose(instance.rotation) * (view.eye - instance.translation) / instance.scale - h.origin) / h.unit;
-    // max(0, v) of what is no number is 0: cameras may be anywhere.
-    const auto onLattice = [](double v) { return std::floor(std::max(0.0, std::min(v, 0x1p30))); };
+    // max(low, v) of what is no number is low: cameras may be anywhere.
+    const bool isWide = h.rootLog2 > lod::kShortMeshBits;
+    const double low = isWide ? -0x1p61 : 0.0, high = isWide ? 0x1p61 : 0x1p30;
+    const auto onLattice = [&](double v) { return std::floor(std::max(low, std::min(v, high))); };
     const glm::dvec3 nearest(onLattice(eye.x), onLattice(eye.y), onLattice(eye.z));
     m.axisX = glm::vec3(axes[0] * worldPerStep);
     m.axisY = glm::vec3(axes[1] * worldPerStep);
@@ -38,21 +40,45 @@ shared::DrawMesh makeDrawMesh(const lod::Hierarchy& h, const lod::Instance& inst
     m.normalX = glm::vec3(axes[0]);
     m.normalY = glm::vec3(axes[1]);
     m.normalZ = glm::vec3(axes[2]);
-    m.eyeX = static_cast<int>(nearest.x);
-    m.eyeY = static_cast<int>(nearest.y);
-    m.eyeZ = static_cast<int>(nearest.z);
+    eyeStep = {static_cast<int64_t>(nearest.x), static_cast<int64_t>(nearest.y), static_cast<int64_t>(nearest.z)};
     m.mirror = 1;
+    return m;
+}
+
+/// `m` for the vertices of one group.
+shared::DrawMesh countedFrom(const lod::Node& group, const lod::MeshPlace& eyeStep, shared::DrawMesh m) {
+    const lod::MeshPlace origin = lod::meshOrigin(group);
+    const std::array<int*, 3> low{&m.eyeX, &m.eyeY, &m.eyeZ}, high{&m.eyeHighX, &m.eyeHighY, &m.eyeHighZ};
+    bool isShort = true;
+    for (size_t a = 0; a < 3; ++a) {
+        const int64_t eye = eyeStep.at(a) - origin.at(a);
+        *low.at(a) = static_cast<int>(static_cast<uint32_t>(eye));
+        *high.at(a) = static_cast<int>(eye >> 32);
+        // Vertices reach to 2^30, so that no difference overflows.
+        isShort = isShort && eye >= -(int64_t{1} << 29) && eye <= int64_t{1} << 30;
+    }
+    m.places = lod::hasPairs(group) ? shared::kPlacesPaired : isShort ? shared::kPlacesShort : shared::kPlacesFar;
     return m;
 }
 
 void addMeshes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, DrawList& out) {
     uint32_t last = ~0u;
+    lod::MeshPlace eyeStep{}, origin{};
+    bool isPaired = false;
+    shared::DrawMesh mesh{};
     for (const lod::CutMeshDraw& draw : cut.meshDraw) {
         const lod::Instance& instance = out.instances[draw.instance];
         const lod::Hierarchy& h = *out.hierarchies[instance.hierarchy];
-        if (draw.instance != last) {
-            out.meshes.push_back(makeDrawMesh(h, instance, out.view, cameraFromWorld));
-            out.meshes.back().firstMaterial = out.firstMaterial[instance.hierarchy];
+        const lod::Node& group = h.nodes[draw.node];
+        const bool isNew = draw.instance != last;
+        if (isNew) {
+            mesh = makeDrawMesh(h, instance, out.view, cameraFromWorld, eyeStep);
+            mesh.firstMaterial = out.firstMaterial[instance.hierarchy];
+        }
+        if (isNew || lod::meshOrigin(group) != origin || lod::hasPairs(group) != isPaired) {
+            origin = lod::meshOrigin(group);
+            isPaired = lod::hasPairs(group);
+            out.meshes.push_back(countedFrom(group, eyeStep, mesh));
             out.meshTextures.push_back({h.textures, instance.source, static_cast<uint32_t>(h.nodes.size()),
                                         static_cast<uint32_t>(h.tiles.size())});
             last = draw.instance;
@@ -65,14 +91,6 @@ void addMeshes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, DrawList&
                                  draw.errorPixels});
         out.clusters += draw.clusters;
     }
-}
-
-/// May points of a node be wide discs? Their radii are at most its edge.
-bool mayBeWide(const shared::DrawNode& d, const lod::View& view, const DrawSettings& settings) {
-    const auto least = [](float step) { return 65536 * std::min(0.0, double{step}); };
-    const double nearest = double{d.base.z} + least(d.axisX.z) + least(d.axisY.z) + least(d.axisZ.z);
-    const double radius = 1.01 * double{d.edge} * double{settings.supportScale};  // (fp32 rounds)
-    return radius * view.focalPixels > double{shared::wideRadius(view.width, view.height)} * nearest;
 }
 
 /// Nearer than this nothing of the cut can be: by the nearest bounding sphere; of a node that holds the eye, a step of
@@ -111,7 +129,6 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     out.nodes.clear();
     out.blocks.clear();
     out.keys.clear();
-    out.hasWideDiscs = false;
     out.meshes.clear();
     out.meshTextures.clear();
     out.meshDraws.clear();
@@ -159,10 +176,6 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
         d.count = draw.count;
         d.level = node.level;
         d.errorPixels = draw.errorPixels;
-        if (!h.isStrands && mayBeWide(d, view, settings)) {
-            d.octantMask |= shared::kNodeWide;
-            out.hasWideDiscs = true;
-        }
         auto& nodes = h.isStrands ? out.strandNodes : out.nodes;
         auto& blocks = h.isStrands ? out.strandBlocks : out.blocks;
         static_assert(shared::kSegmentsPerBlock == shared::kRecordsPerBlock);

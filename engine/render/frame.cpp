@@ -165,7 +165,8 @@ std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& place
                                            const std::vector<PlacedCrowd>& crowds) {
     auto state = std::make_unique<FrameState>();
     state->backend = &backend;
-    state->streamer = std::make_unique<streaming::Streamer>(executor, backend, settings);
+    state->radii = std::make_unique<GreatestRadii>(backend);
+    state->streamer = std::make_unique<streaming::Streamer>(executor, *state->radii, settings);
     Placer placer(*state);
     std::vector<uint32_t> numbers;
     numbers.reserve(placed.size());
@@ -194,6 +195,7 @@ Result<void> draw(FrameState& state, const lod::View& view, const FrameSettings&
     const double cutEnd = nowSeconds();
     if (asks) streamer.request(state.cut);
     makeDrawList(state.cut, state.hierarchies, state.instances, view, settings.draw, state.draws);
+    markWideDiscs(*state.radii, state.draws);
     RenderRequest request;
     request.draws = &state.draws;
     request.passes = passesOf(settings.mode, {!state.draws.nodes.empty(), !state.draws.meshDraws.empty(),

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "engine/scene/camera.h"
+#include "lod/mesh_place.h"
 
 namespace stipple::scene {
 namespace {
@@ -57,7 +58,9 @@ void addPositions(const lod::Hierarchy& h, const lod::Node& node, const lod::Chu
         add(s.a.positionXY, s.a.positionZ);
         add(s.b.positionXY, s.b.positionZ);
     }
-    for (const shared::MeshVertex& v : chunk.vertices) to.push_back(h.origin + h.unit * glm::dvec3(v.x, v.y, v.z));
+    for (const shared::MeshCluster& c : chunk.clusters)
+        for (uint32_t i = 0; i < lod::verticesOf(node, c); ++i)
+            to.push_back(h.origin + h.unit * lod::vertexPlace(node, chunk, c, i));
 }
 
 /// Of a mesh: the vertices of those groups of the input's own triangles that reach farthest, in every few directions.

@@ -54,7 +54,7 @@ struct Primitive {
     std::vector<std::vector<glm::vec2>> uv;  ///< by set
     std::vector<float> radius;               ///< of lines: attribute _RADIUS
     std::vector<uint32_t> indices;           ///< 1, 2 or 3 an element; every one below position.size()
-    /// Where the file has doubles: what `position` leaves of them (together 48 bits). writeGltf does without.
+    /// Where the file has doubles: what `position` leaves of them (together 48 bits).
     std::vector<glm::vec3> rest;
     int material = -1;
     glm::dvec3 at(size_t i) const {
@@ -125,7 +125,8 @@ Box meshBounds(const Scene& scene);
 /// drawn is refused with the place; other faults of the file, and images that are missing, are counted in the notes.
 Result<Scene> readGltf(const std::string& path, const ReadSettings& settings = {});
 
-/// Writes .glb or .gltf (buffers inside). Shear of instances is lost; everything else comes back as it was.
+/// Writes .glb or .gltf (buffers inside). Shear of instances is lost, and what meshes have beyond floats goes to nodes
+/// of their own, which move them (instances do without); everything else comes back as it was.
 Result<void> writeGltf(const Scene& scene, const std::string& path);
 
 /// Wavefront OBJ with its MTL files; one node. Missing textures and broken faces are noted.

@@ -3,18 +3,31 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 #include "../shared/frame.h"
+#include "../shared/material.h"
+#include "../shared/mesh.h"
 #include "../shared/record.h"
+#include "../shared/strand.h"
+#include "../shared/texture.h"
 layout(local_size_x = 1) in;
 layout(set = 0, binding = 0, scalar) readonly buffer In {
     FrameConstants frame;
     DrawNode node;
     DrawBlock block;
     PointRecord record;
+    LightSource light;
+    MeshVertex vertex;
+    MeshCluster cluster;
+    DrawMesh mesh;
+    DrawCluster drawCluster;
+    SurfaceMaterial material;
+    StrandSegment segment;
+    TextureInfo textureInfo;
 };
 layout(set = 0, binding = 1, scalar) writeonly buffer Out { uint words[]; };
 
 uint at = 0u;
 void put(uint v) { words[at++] = v; }
+void put(int v) { put(uint(v)); }
 void put(float v) { put(floatBitsToUint(v)); }
 void put(vec2 v) {
     put(v.x);
@@ -69,4 +82,82 @@ void main() {
     put(record.positionZRadiusError);
     put(record.normal);
     put(record.colour);
+    put(light.position);
+    put(light.kind);
+    put(light.colour);
+    put(light.range);
+    put(light.axis);
+    put(light.cosInner);
+    put(light.cosOuter);
+    put(vertex.x);
+    put(vertex.y);
+    put(vertex.z);
+    put(vertex.normal);
+    put(vertex.colour);
+    put(vertex.u);
+    put(vertex.v);
+    put(vertex.surface);
+    put(cluster.firstVertex);
+    put(cluster.firstTriangle);
+    put(cluster.counts);
+    put(mesh.axisX);
+    put(mesh.axisY);
+    put(mesh.axisZ);
+    put(mesh.base);
+    put(mesh.normalX);
+    put(mesh.normalY);
+    put(mesh.normalZ);
+    put(mesh.eyeX);
+    put(mesh.eyeY);
+    put(mesh.eyeZ);
+    put(mesh.firstMaterial);
+    put(mesh.mirror);
+    put(drawCluster.mesh);
+    put(drawCluster.counts);
+    put(drawCluster.verticesLow);
+    put(drawCluster.verticesHigh);
+    put(drawCluster.trianglesLow);
+    put(drawCluster.trianglesHigh);
+    put(drawCluster.firstTexture);
+    put(drawCluster.firstTile);
+    put(drawCluster.level);
+    put(drawCluster.errorPixels);
+    put(material.baseColour);
+    put(material.alphaCutoff);
+    put(material.emissive);
+    put(material.metallic);
+    put(material.roughness);
+    put(material.normalScale);
+    put(material.occlusionStrength);
+    put(material.alpha);
+    put(material.baseTexture.texture);
+    put(material.baseTexture.rowU);
+    put(material.baseTexture.rowV);
+    put(material.surfaceTexture.texture);
+    put(material.surfaceTexture.rowU);
+    put(material.surfaceTexture.rowV);
+    put(material.normalTexture.texture);
+    put(material.normalTexture.rowU);
+    put(material.normalTexture.rowV);
+    put(material.occlusionTexture.texture);
+    put(material.occlusionTexture.rowU);
+    put(material.occlusionTexture.rowV);
+    put(material.emissiveTexture.texture);
+    put(material.emissiveTexture.rowU);
+    put(material.emissiveTexture.rowV);
+    put(segment.a.positionXY);
+    put(segment.a.positionZ);
+    put(segment.a.direction);
+    put(segment.a.colour);
+    put(segment.b.positionXY);
+    put(segment.b.positionZ);
+    put(segment.b.direction);
+    put(segment.b.colour);
+    put(textureInfo.width);
+    put(textureInfo.height);
+    put(textureInfo.levels);
+    put(textureInfo.wrapU);
+    put(textureInfo.wrapV);
+    put(textureInfo.isColour);
+    for (uint i = 0u; i < kTextureLevels; ++i) put(textureInfo.firstTile[i]);
 }

@@ -20,9 +20,9 @@ vec3 cutEdge(vec3 a, float da, vec3 b, float db) {
     return p + (q - p) * (dp / (dp - dq));
 }
 
-void takeTriangle(LargeTriangle t, DrawCluster c, MeshVertex va, MeshVertex vb, MeshVertex vc) {
+void takeTriangle(LargeTriangle t, DrawCluster c, uint surface, uint corners) {
     const int64_t area = (int64_t(t.x1) - t.x0) * (int64_t(t.y2) - t.y0) - (int64_t(t.y1) - t.y0) * (int64_t(t.x2) - t.x0);
-    if (area == 0l || (area > 0l && (va.surface & kSurfaceTwoSided) == 0u)) return;
+    if (area == 0l || (area > 0l && (surface & kSurfaceTwoSided) == 0u)) return;
     if (area < 0l) {
         const int x = t.x1, y = t.y1;
         const float d = t.inverseDepth1;
@@ -38,7 +38,7 @@ void takeTriangle(LargeTriangle t, DrawCluster c, MeshVertex va, MeshVertex vb, 
     const int y0 = max((min(t.y0, min(t.y1, t.y2)) + 127) >> 8, 0);
     const int y1 = min((max(t.y0, max(t.y1, t.y2)) - 128) >> 8, int(frame.height) - 1);
     if (x0 > x1 || y0 > y1) return;
-    const bool isMasked = (va.surface & kSurfaceMasked) != 0u;
+    const bool isMasked = (surface & kSurfaceMasked) != 0u;
     if (!isMasked && (x1 - x0 + 1) * (y1 - y0 + 1) > kMostPixels) {
         const uint place = atomicAdd(largeCount, 1u);
         if (place < kLargeCapacity) {
@@ -49,7 +49,7 @@ void takeTriangle(LargeTriangle t, DrawCluster c, MeshVertex va, MeshVertex vb, 
     for (int y = y0; y <= y1; ++y)
         for (int x = x0; x <= x1; ++x) {
             float inverseDepth;
-            if (isCovered(t, x, y, inverseDepth) && (!isMasked || isKept(c, va, vb, vc, uvec2(x, y))))
+            if (isCovered(t, x, y, inverseDepth) && (!isMasked || isKept(c, corners, uvec2(x, y))))
                 offer(x, y, inverseDepth, t.id);
         }
 }
@@ -61,9 +61,8 @@ void main() {
     const DrawMesh m = meshes[c.mesh];
     Vertices vertices = Vertices(uvec2(c.verticesLow, c.verticesHigh));
     const uint i = gl_LocalInvocationID.x;
-    if (i < (c.counts & 0xffffu)) {
-        const MeshVertex v = vertices.vertices[i];
-        const vec3 p = meshPosition(v.x, v.y, v.z, m);
+    if (i < (c.counts & 0xffffu) >> (m.places == kPlacesPaired ? 1 : 0)) {
+        const vec3 p = placeOf(c, m, i);
         const float scale = frame.focal / p.z;
         const vec2 s = vec2(p.x * scale + frame.centre.x, p.y * scale + frame.centre.y);
         const bool isIn = p.z >= frame.nearPlane && abs(s.x) < kGuardPixels && abs(s.y) < kGuardPixels;
@@ -90,7 +89,7 @@ void main() {
         t.inverseDepth0 = 1.0 / at[a].z;
         t.inverseDepth1 = 1.0 / at[b].z;
         t.inverseDepth2 = 1.0 / at[d].z;
-        takeTriangle(t, c, vertices.vertices[a], vertices.vertices[b], vertices.vertices[d]);
+        takeTriangle(t, c, vertices.vertices[a].surface, word);
         return;
     }
     vec3 polygon[9];
@@ -129,6 +128,6 @@ void main() {
         t.inverseDepth0 = 1.0 / p.z;
         t.inverseDepth1 = 1.0 / q.z;
         t.inverseDepth2 = 1.0 / r.z;
-        takeTriangle(t, c, vertices.vertices[a], vertices.vertices[b], vertices.vertices[d]);
+        takeTriangle(t, c, vertices.vertices[a].surface, word);
     }
 }

@@ -37,8 +37,9 @@ struct MeshCluster {
 const uint kClusterVertices = 255u;
 const uint kClusterTriangles = 256u;
 
-// One instance of a mesh. Position of a vertex q in camera space: base + axes * (q - eye), `eye` being the lattice
-// point of the mesh nearest to the camera: near it the integers are small and exact, far away their rounding is.
+// One instance of a mesh, or of a wide one (coordinates beyond 30 bits) one of its groups. Position of a vertex q in
+// camera space: base + axes * (q - eye), `eye` being the lattice point of the mesh nearest to the camera: near it the
+// integers are small and exact, far away their rounding is. Of a wide mesh both are counted from the group's origin.
 struct DrawMesh {
     vec3 axisX;
     vec3 axisY;
@@ -50,9 +51,19 @@ struct DrawMesh {
     int eyeX;
     int eyeY;
     int eyeZ;
+    int eyeHighX;  // upper halves, where `places` is not kPlacesShort
+    int eyeHighY;
+    int eyeHighZ;
+    uint places;
     uint firstMaterial;
     float mirror;  // -1 where the instance mirrors, else 1
 };
+
+// How far q - eye reaches: 32 bits do; the eye has 64; vertices have 64, too: the second half of a cluster's vertices
+// holds the upper halves of the first one's coordinates.
+const uint kPlacesShort = 0u;
+const uint kPlacesFar = 1u;
+const uint kPlacesPaired = 2u;
 
 // One cluster of the frame as the gpu backend sees it: one block of 256 draw ids.
 struct DrawCluster {
@@ -71,13 +82,32 @@ struct DrawCluster {
 const uint kKindTriangle = 0x20000000u;  // bits 29 to 31 of a visibility id
 const uint kKindMask = 0xe0000000u;
 
-SHARED_FN vec3 meshPosition(int x, int y, int z, DrawMesh m) {
-    const float qx = float(x - m.eyeX);
-    const float qy = float(y - m.eyeY);
-    const float qz = float(z - m.eyeZ);
+SHARED_FN vec3 meshPositionFrom(float qx, float qy, float qz, DrawMesh m) {
     return vec3(m.base.x + (m.axisX.x * qx + (m.axisY.x * qy + m.axisZ.x * qz)),
                 m.base.y + (m.axisX.y * qx + (m.axisY.y * qy + m.axisZ.y * qz)),
                 m.base.z + (m.axisX.z * qx + (m.axisY.z * qy + m.axisZ.z * qz)));
+}
+
+SHARED_FN vec3 meshPosition(int x, int y, int z, DrawMesh m) {
+    return meshPositionFrom(float(x - m.eyeX), float(y - m.eyeY), float(z - m.eyeZ), m);
+}
+
+// Difference of two integers of 64 bits, below 2^63. One of less than 32 bits is rounded as such an integer is, so that
+// copies of a vertex meet whatever their groups' origins.
+SHARED_FN float wideDifference(int low, int high, int eyeLow, int eyeHigh) {
+    uint l = uint(low) - uint(eyeLow);
+    uint h = uint(high) - uint(eyeHigh) - (uint(low) < uint(eyeLow) ? 1u : 0u);
+    const bool isNegative = h >= 0x80000000u;
+    if (isNegative) {
+        l = 0u - l;
+        h = ~h + (l == 0u ? 1u : 0u);
+    }
+    const float size = float(h) * 4294967296.0f + float(l);
+    return isNegative ? -size : size;
+}
+SHARED_FN vec3 meshPositionWide(int x, int y, int z, int highX, int highY, int highZ, DrawMesh m) {
+    return meshPositionFrom(wideDifference(x, highX, m.eyeX, m.eyeHighX), wideDifference(y, highY, m.eyeY, m.eyeHighY),
+                            wideDifference(z, highZ, m.eyeZ, m.eyeHighZ), m);
 }
 
 const float kSubpixel = 256.0f;

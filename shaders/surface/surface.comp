@@ -26,9 +26,9 @@ void main() {
     const MeshVertex vb = vertices.vertices[word >> 8 & 255u];
     const MeshVertex vc = vertices.vertices[word >> 16 & 255u];
     const vec3 ray = rayThrough(pixel);
-    const vec3 p0 = meshPosition(va.x, va.y, va.z, m);
-    const vec3 p1 = meshPosition(vb.x, vb.y, vb.z, m);
-    const vec3 p2 = meshPosition(vc.x, vc.y, vc.z, m);
+    const vec3 p0 = placeOf(c, m, word & 255u);
+    const vec3 p1 = placeOf(c, m, word >> 8 & 255u);
+    const vec3 p2 = placeOf(c, m, word >> 16 & 255u);
     const vec2 w = triangleWeights(ray, p0, p1, p2);
     const float a = 1.0 - w.x - w.y;
     const vec3 n = a * octDecode(va.normal) + w.x * octDecode(vb.normal) + w.y * octDecode(vc.normal);

@@ -37,7 +37,8 @@ void decodeAsItIs(const uint8_t* data, size_t size) {
     lod::MeshGroup group;
     group.vertices = data[0];
     group.clusters = 1 + data[0] / 64u;
-    (void)lod::decodeMeshChunk(data + 1, size - 1, data[0] * 2u, group, "fuzz");
+    for (const auto kind : {lod::MeshVertices::shortOnes, lod::MeshVertices::counted, lod::MeshVertices::pairs})
+        (void)lod::decodeMeshChunk(data + 1, size - 1, data[0] * 2u, group, kind, "fuzz");
     (void)lod::decodeStrandChunk(data + 1, size - 1, data[0] + 1u, "fuzz");
     (void)lod::decodeTile(data + 1, size - 1, "fuzz");
 }

@@ -2,6 +2,7 @@
 // are none.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "engine/cpu/cpu_backend.h"
@@ -19,6 +20,12 @@ namespace stipple {
 namespace {
 
 using test::draw;
+
+/// Had the last frame this pass?
+bool had(const render::Backend& backend, const std::string& pass) {
+    const auto& times = backend.passTimes();
+    return std::any_of(times.begin(), times.end(), [&](const render::PassTime& t) { return t.name == pass; });
+}
 
 std::vector<render::WorldLight> threeLights(const glm::dvec3& at, double size) {
     std::vector<render::WorldLight> lights(3);
@@ -208,7 +215,8 @@ TEST_F(Hybrid, WhatASceneDoesNotCallForDoesNotExist) {
     const auto backend = cpu::makeCpuBackend(*executor_);
     FrameCounters counters;
     draw({placed_[0]}, *backend, *executor_, view_, settings_, &counters);  // points alone
-    EXPECT_EQ(counters.passes, 6u);
+    EXPECT_TRUE(had(*backend, "project"));
+    EXPECT_FALSE(had(*backend, "rasterise"));
     EXPECT_EQ(counters.trianglesDrawn, 0u);
     EXPECT_EQ(backend->resources().meshBytes, 0u);
     EXPECT_EQ(backend->resources().emissiveBytes, 0u);
@@ -219,16 +227,19 @@ TEST_F(Hybrid, WhatASceneDoesNotCallForDoesNotExist) {
     const auto untextured = test::growMeshStore(plain, folder_ / "c.stipple", *executor_);
     EXPECT_EQ(untextured->hierarchy.tiles.size(), 0u);
     draw({{untextured, {}, {}}}, *backend, *executor_, view_, settings_, &counters);  // no textures, no points
-    EXPECT_EQ(counters.passes, 4u);
+    EXPECT_TRUE(had(*backend, "rasterise"));
+    for (const char* pass : {"project", "strands", "pull", "push"}) EXPECT_FALSE(had(*backend, pass)) << pass;
     EXPECT_EQ(counters.recordsDrawn, 0u);
     EXPECT_GT(backend->resources().meshBytes, 0u);
     EXPECT_EQ(backend->resources().emissiveBytes, 0u);
     EXPECT_EQ(backend->resources().textureTiles, 0u);
     draw({placed_[1]}, *backend, *executor_, view_, settings_, &counters);
-    EXPECT_EQ(counters.passes, 4u);
+    EXPECT_FALSE(had(*backend, "pull"));
     EXPECT_EQ(backend->resources().textureTiles, 0u) << "tiles outlive their frame state";
     draw(placed_, *backend, *executor_, view_, settings_, &counters);
-    EXPECT_EQ(counters.passes, 7u);
+    for (const char* pass : {"project", "rasterise", "resolve", "pull", "push", "shade"})
+        EXPECT_TRUE(had(*backend, pass)) << pass;
+    EXPECT_FALSE(had(*backend, "strands"));
 }
 
 TEST_F(Hybrid, LightsAndAnEnvironmentShineOnPointsAndTrianglesAsTheOracleSays) {
@@ -388,6 +399,7 @@ TEST(MeshImages, AMeshThatEndsInPointsHasNoSeam) {
     }
     // Of the mesh alone the largest error is half a facet, 1.1 degrees; the points' normals are exact.
     EXPECT_LE(joined.mean, 0.5);
+    // (Measured: 2 pixels of 3,773; with plain instead of area weights in the pull 3, so that those are not the cause.)
     EXPECT_LE(joined.through, joined.atBorder / 1000);
     // The control: without points at the border, where one is missing beside it, the far side shows.
     EXPECT_GT(apart.through, 10 * joined.through);

@@ -1,6 +1,7 @@
 // Ribbons and tubes in pictures: as the fp64 oracle draws them and as traced rays see them, among points and triangles.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "engine/cpu/cpu_backend.h"
@@ -14,6 +15,12 @@ namespace stipple {
 namespace {
 
 using test::draw;
+
+/// Had the last frame this pass?
+bool had(const render::Backend& backend, const std::string& pass) {
+    const auto& times = backend.passTimes();
+    return std::any_of(times.begin(), times.end(), [&](const render::PassTime& t) { return t.name == pass; });
+}
 
 class Strands : public testing::Test {
   protected:
@@ -72,7 +79,9 @@ TEST_F(Strands, AreThoseOfTheOracleOnEveryInstructionSet) {
                         const auto d =
                             differ(draw({{store, place, {}}}, *backend, *executor_, view, settings), expected);
                         // Radii are rounded to 1/512 in the pyramid: of a disc of 30 px that is a twentieth of a
-                        // pixel, and silhouettes are many.
+                        // pixel, and silhouettes are many. That is all of it: with an oracle that rounds the radii of
+                        // its levels in the same way 31.2 dB become 43.7 (with plain instead of area weights in the
+                        // pull, which squares no radii, 34.7 dB without it).
                         const bool isAll = exact > 1e6f;
                         EXPECT_GE(d.psnr, isAll ? 31 : 42)
                             << all[k]->name << ", radius " << radius << ", tau " << tau << ", exact " << exact;
@@ -196,7 +205,8 @@ TEST_F(FourKinds, OccludeEachOtherAsOracleAndRaysSay) {
     render::FrameSettings settings = lit(0.5);
     FrameCounters counters;
     const render::Image drawn = draw(placed_, *backend, *executor_, view_, settings, &counters);
-    EXPECT_EQ(counters.passes, 8u);
+    for (const char* pass : {"project", "strands", "rasterise", "resolve", "pull", "push", "shade"})
+        EXPECT_TRUE(had(*backend, pass)) << pass;
     const auto d = differ(drawn, draw(placed_, *oracle, *executor_, view_, settings));
     EXPECT_GE(d.psnr, 45);
     EXPECT_LE(d.differingFraction, 0.003);
@@ -230,10 +240,13 @@ TEST_F(FourKinds, WhatASceneDoesNotCallForDoesNotExist) {
     const auto backend = cpu::makeCpuBackend(*executor_);
     FrameCounters counters;
     draw({placed_[0]}, *backend, *executor_, view_, lit(1), &counters);
-    EXPECT_EQ(counters.passes, 6u);  // no pass of strands
+    EXPECT_TRUE(had(*backend, "project"));
+    EXPECT_FALSE(had(*backend, "strands"));
     EXPECT_EQ(backend->resources().strandBytes, 0u);
     draw({placed_[2]}, *backend, *executor_, view_, lit(1), &counters);
-    EXPECT_EQ(counters.passes, 6u);  // no projection of points
+    EXPECT_FALSE(had(*backend, "project"));
+    EXPECT_TRUE(had(*backend, "strands"));
+    EXPECT_FALSE(had(*backend, "rasterise"));
     EXPECT_GT(backend->resources().strandBytes, 0u);
     EXPECT_EQ(backend->resources().meshBytes, 0u);
 }

@@ -7,7 +7,11 @@
 
 #include "engine/gpu/device.h"
 #include "shaders/shared/frame.h"
+#include "shaders/shared/material.h"
+#include "shaders/shared/mesh.h"
 #include "shaders/shared/record.h"
+#include "shaders/shared/strand.h"
+#include "shaders/shared/texture.h"
 
 namespace stipple::gpu {
 namespace {
@@ -21,8 +25,21 @@ struct Shared {
     shared::DrawNode node;
     shared::DrawBlock block;
     shared::PointRecord record;
+    shared::LightSource light;
+    shared::MeshVertex vertex;
+    shared::MeshCluster cluster;
+    shared::DrawMesh mesh;
+    shared::DrawCluster drawCluster;
+    shared::SurfaceMaterial material;
+    shared::StrandSegment segment;
+    shared::TextureInfo textureInfo;
 };
-static_assert(sizeof(Shared) == sizeof(shared::FrameConstants) + sizeof(shared::DrawNode) + 8 + 16);
+// Words of four bytes throughout: no padding, in whatever order.
+static_assert(sizeof(Shared) ==
+              sizeof(shared::FrameConstants) + sizeof(shared::DrawNode) + sizeof(shared::DrawBlock) +
+                  sizeof(shared::PointRecord) + sizeof(shared::LightSource) + sizeof(shared::MeshVertex) +
+                  sizeof(shared::MeshCluster) + sizeof(shared::DrawMesh) + sizeof(shared::DrawCluster) +
+                  sizeof(shared::SurfaceMaterial) + sizeof(shared::StrandSegment) + sizeof(shared::TextureInfo));
 
 TEST(SharedStructs, EveryFieldComesBackFromTheGpu) {
     auto made = Device::create({"", true, {}, {}});

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <map>
 
+#include "engine/reference/decode.h"
+#include "tests/support/crafted_store.h"
 #include "tests/support/support.h"
 
 namespace stipple::lod {
@@ -278,42 +280,149 @@ TEST(Cut, FromInsideEverythingNearIsExact) {
         if (glm::length(t.h.nodes[d.node].centre - view.eye) < t.h.nodes[d.node].radius) EXPECT_EQ(d.errorCode, 0u);
 }
 
+/// From p to the nearest place of a disc.
+double distanceToDisc(const reference::Disc& disc, const glm::dvec3& p) {
+    const glm::dvec3 d = p - disc.position, n = glm::normalize(disc.normal);
+    const double above = glm::dot(d, n), aside = glm::length(d - above * n);
+    return std::hypot(above, std::max(0.0, aside - disc.radius));
+}
+
+/// Of points of the input that are in view and face the eye: the largest distance to what is drawn, as a share of what
+/// `tau` pixels are there. Distances are measured in space; no code of an error is read.
+double worstShare(const Store& store, const std::vector<test::TestPoint>& points, const View& view, double tau,
+                  const Cut& cut) {
+    const Hierarchy& h = store.hierarchy;
+    std::vector<reference::Disc> drawn;
+    for (const CutDraw& d : cut.draw) {
+        const auto chunk = readChunk(store, d.node);
+        EXPECT_TRUE(chunk);
+        for (uint32_t i = 0; i < d.count; ++i)
+            if (shared::recordErrorCode(chunk->records[i]) <= d.errorCode)
+                drawn.push_back(reference::decodeDisc(h, h.nodes[d.node], chunk->records[i]));
+    }
+    double worst = 0;
+    for (const test::TestPoint& point : points) {
+        const glm::dvec3 p = point.position - view.eye;
+        const double depth = glm::dot(p, view.forward), distance = glm::length(p), cosine = depth / distance;
+        if (depth <= view.nearPlane || glm::dot(p, glm::dvec3(point.normal)) > -0.1 * distance) continue;
+        if (std::abs(glm::dot(p, view.right)) / depth * view.focalPixels > 0.5 * view.width ||
+            std::abs(glm::dot(p, view.down)) / depth * view.focalPixels > 0.5 * view.height)
+            continue;
+        double nearest = 1e100;
+        for (const reference::Disc& disc : drawn) {
+            const double most = nearest + disc.radius;  // farther away it cannot be nearer
+            const glm::dvec3 d = point.position - disc.position;
+            if (glm::dot(d, d) < most * most) nearest = std::min(nearest, distanceToDisc(disc, point.position));
+        }
+        worst = std::max(worst, nearest * view.focalPixels / (distance * cosine * cosine) / tau);
+    }
+    return worst;
+}
+
 TEST(Cut, MeetsItsErrorInPixelsOnABuiltStore) {
     const test::TempFolder folder;
     const auto executor = makeSerialExecutor();
-    test::writePly(folder / "a.ply", test::bumpySphere(40'000, 1));
+    const std::vector<test::TestPoint> points = test::bumpySphere(10'000, 1);
+    test::writePly(folder / "a.ply", points);
     const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
     const Hierarchy& h = store->hierarchy;
     Rng rng(16);
-    for (int k = 0; k < 100; ++k) {
+    double closest = 0, control = 0;
+    for (int k = 0; k < 10; ++k) {
         View view = test::fitView(*store, 800, 600);
         view.eye = glm::dvec3(rng.uniform(-4, 4), rng.uniform(-4, 4), rng.uniform(-4, 4));
         view.forward = glm::normalize(-view.eye);
         view.right = glm::normalize(glm::cross(view.forward, glm::dvec3(0.1, 1, 0)));
         view.down = glm::cross(view.forward, view.right);
-        const double tau = std::exp2(rng.uniform(-2, 4));
-        const Selection s = select(h, std::vector<uint8_t>(h.nodes.size(), 1), view, {tau, kNoLimit});
-        for (const CutDraw& d : s.cut.draw) {
-            const auto chunk = readChunk(*store, d.node);
-            ASSERT_TRUE(chunk);
-            const Node& n = h.nodes[d.node];
-            for (uint32_t i = 0; i < d.count; i += 7) {
-                const auto& r = chunk->records[i];
-                if (shared::recordErrorCode(r) > d.errorCode) continue;
-                const glm::dvec3 p = h.origin +
-                                     h.unit * (h.recordOrigin(n) + std::exp2(n.stepShift) *
-                                                                       glm::dvec3(recordX(r), recordY(r), recordZ(r))) -
-                                     view.eye;
-                const double depth = glm::dot(p, view.forward);
-                const double x = glm::dot(p, view.right) / depth * view.focalPixels,
-                             y = glm::dot(p, view.down) / depth * view.focalPixels;
-                if (depth <= 0 || std::abs(x) > 400 || std::abs(y) > 300) continue;
-                const double error = h.unit * h.errors.decode(shared::recordErrorCode(r));
-                const double distance = glm::length(p), cosine = depth / distance;
-                ASSERT_LE(view.focalPixels * error / (distance * cosine * cosine), tau * 1.0001);
-            }
+        const double tau = std::exp2(rng.uniform(-1, 5));
+        const auto shareAt = [&](double asked) {
+            const Selection s = select(h, std::vector<uint8_t>(h.nodes.size(), 1), view, {asked, kNoLimit});
+            return worstShare(*store, points, view, tau, s.cut);
+        };
+        // Of leaves too: their places are rounded to 16 bits of a cell.
+        const double share = shareAt(tau);
+        ASSERT_LE(share, 1.0001) << "tau " << tau;
+        closest = std::max(closest, share);
+        control = std::max(control, shareAt(16 * tau));
+    }
+    EXPECT_GT(closest, 0.1) << "the bound is so far off that this shows nothing";
+    EXPECT_GT(control, 1) << "a cut of sixteen times the error must be found";
+}
+
+/// Nodes of which every disc faces away are not visited, and nothing that could be seen is among them.
+struct ConeCut {
+    size_t drawn = 0, spared = 0, wrong = 0;
+};
+ConeCut compareWithoutCones(const Store& store, const View& view, double tau, const Hierarchy& withCones) {
+    Hierarchy bare = store.hierarchy;
+    for (Node& n : bare.nodes) n.normalConeCosine = -1;
+    const std::vector<uint8_t> all(bare.nodes.size(), 1);
+    const Selection with = select(withCones, all, view, {tau, kNoLimit}),
+                    without = select(bare, all, view, {tau, kNoLimit});
+    std::map<uint32_t, CutDraw> kept;
+    for (const CutDraw& d : with.cut.draw) kept[d.node] = d;
+    ConeCut out;
+    out.drawn = without.cut.draw.size();
+    for (const CutDraw& d : without.cut.draw) {
+        if (const auto k = kept.find(d.node); k != kept.end()) {
+            out.wrong += k->second.count != d.count || k->second.errorCode != d.errorCode ||
+                         k->second.octantMask != d.octantMask;
+            continue;
+        }
+        ++out.spared;
+        const auto chunk = readChunk(store, d.node);
+        EXPECT_TRUE(chunk);
+        for (uint32_t i = 0; i < d.count; ++i) {
+            const reference::Disc disc = reference::decodeDisc(bare, bare.nodes[d.node], chunk->records[i]);
+            out.wrong += (disc.flags & (shared::kFlagTwoSided | shared::kFlagNoNormal)) != 0 ||
+                         glm::dot(disc.normal, disc.position - view.eye) < 0;
         }
     }
+    return out;
+}
+
+TEST(Cut, WhatFacesAwayIsNotVisitedAndWhatDoesNotIs) {
+    const test::TempFolder folder;
+    const auto executor = makeSerialExecutor();
+    test::writePly(folder / "a.ply", test::bumpySphere(40'000, 1));
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    Hierarchy turned = store->hierarchy;  // negative control: cones that are those of other nodes
+    for (size_t i = 1; i < turned.nodes.size(); ++i)
+        turned.nodes[i].normalCone = store->hierarchy.nodes[i - 1].normalCone;
+    Rng rng(17);
+    ConeCut sum, control;
+    for (int k = 0; k < 60; ++k) {
+        View view = test::fitView(*store, 800, 600);
+        view.eye =
+            std::exp2(rng.uniform(0.2, 4)) * glm::normalize(glm::dvec3(rng.normal(), rng.normal(), rng.normal()));
+        view.forward = glm::normalize(-view.eye);
+        view.right = glm::normalize(glm::cross(view.forward, glm::dvec3(0.1, 1, 0)));
+        view.down = glm::cross(view.forward, view.right);
+        const double tau = std::exp2(rng.uniform(-3, 3));
+        const auto add = [&](ConeCut& to, const Hierarchy& cones) {
+            const ConeCut one = compareWithoutCones(*store, view, tau, cones);
+            to.drawn += one.drawn;
+            to.spared += one.spared;
+            to.wrong += one.wrong;
+        };
+        add(sum, store->hierarchy);
+        add(control, turned);
+    }
+    EXPECT_EQ(sum.wrong, 0u);
+    EXPECT_GT(sum.spared, sum.drawn / 5) << "of " << sum.drawn << " nodes";
+    EXPECT_GT(control.wrong, 100u);
+    RecordProperty("spared", static_cast<int>(sum.spared));
+    RecordProperty("drawn", static_cast<int>(sum.drawn));
+    // A store whose cones are too narrow would hide what can be seen: verifying finds it.
+    EXPECT_TRUE(verifyStore(*store, *executor));
+    test::CraftedStore narrow = test::CraftedStore::read(folder / "a.stipple");
+    for (auto& node : narrow.nodes) node.normalConeCosine = std::min(1.0f, node.normalConeCosine + 0.2f);
+    narrow.write(folder / "b.stipple");
+    const auto lying = openStore(folder / "b.stipple");
+    ASSERT_TRUE(lying) << lying.error().line();
+    const auto verified = verifyStore(*lying, *executor);
+    ASSERT_FALSE(verified);
+    EXPECT_NE(verified.error().what.find("cone"), std::string::npos) << verified.error().line();
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "engine/scene/triangles.h"
+#include "lod/mesh_place.h"
 
 namespace stipple::test {
 
@@ -62,7 +63,7 @@ std::shared_ptr<const lod::Store> growMeshStore(const MeshRecipe& recipe, const 
 
 namespace {
 
-void append(const lod::Store& store, const lod::Chunk& chunk, uint32_t first, uint32_t count,
+void append(const lod::Store& store, uint32_t node, const lod::Chunk& chunk, uint32_t first, uint32_t count,
             std::vector<Triangle>& out) {
     const lod::Hierarchy& h = store.hierarchy;
     for (uint32_t c = first; c < first + count; ++c)
@@ -70,8 +71,7 @@ void append(const lod::Store& store, const lod::Chunk& chunk, uint32_t first, ui
             Triangle corners;
             for (uint32_t k = 0; k < 3; ++k) {
                 const uint32_t corner = chunk.triangles[chunk.clusters[c].firstTriangle + t] >> (8 * k) & 255u;
-                const shared::MeshVertex& v = chunk.vertices[chunk.clusters[c].firstVertex + corner];
-                corners.at(k) = h.origin + h.unit * glm::dvec3(v.x, v.y, v.z);
+                corners.at(k) = h.origin + h.unit * lod::vertexPlace(h.nodes[node], chunk, chunk.clusters[c], corner);
             }
             out.push_back(corners);
         }
@@ -113,7 +113,7 @@ std::vector<Triangle> leafTriangles(const lod::Store& store) {
         const lod::Chunk chunk = chunkOf(store, n);
         for (uint32_t r = 0; r < h.groups[n].runs; ++r) {
             const lod::MeshRun& run = h.runs[h.groups[n].firstRun + r];
-            if (run.producer == lod::MeshRun::kOriginal) append(store, chunk, run.firstCluster, run.clusters, out);
+            if (run.producer == lod::MeshRun::kOriginal) append(store, n, chunk, run.firstCluster, run.clusters, out);
         }
     }
     return out;
@@ -121,7 +121,8 @@ std::vector<Triangle> leafTriangles(const lod::Store& store) {
 
 std::vector<Triangle> drawnTriangles(const lod::Store& store, const std::vector<lod::CutMeshDraw>& draws) {
     std::vector<Triangle> out;
-    for (const lod::CutMeshDraw& d : draws) append(store, chunkOf(store, d.node), d.firstCluster, d.clusters, out);
+    for (const lod::CutMeshDraw& d : draws)
+        append(store, d.node, chunkOf(store, d.node), d.firstCluster, d.clusters, out);
     return out;
 }
 

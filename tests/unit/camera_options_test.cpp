@@ -37,6 +37,14 @@ TEST_F(CameraOptionsTest, WhatCannotBeLookedAtIsRefused) {
     EXPECT_EQ(render("--eye 0,0,5 --target 0,0,0 --camera-up 0,1,0 --fov 30 --time 2"), 0) << said_;
 }
 
+TEST_F(CameraOptionsTest, ASizeThatIsNoneIsRefusedByViewAsByRender) {
+    for (const char* command : {"view a.stipple", "render a.stipple -o a.png"})
+        for (const char* size : {"potato", "0", "-1G", "1Q", "nan"}) {
+            EXPECT_EQ(run(std::string(command) + " --resident=" + size), 2) << command << size << ": " << said_;
+            EXPECT_NE(said_.find("--resident"), std::string::npos) << said_;
+        }
+}
+
 TEST_F(CameraOptionsTest, PlacesOfTheCameraExcludeEachOther) {
     test::spit(folder_ / "path.json", R"({"keys": [{"t": 0, "eye": [0,0,5], "target": [0,0,0]}]})");
     for (const char* bad :

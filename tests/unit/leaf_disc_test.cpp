@@ -50,6 +50,13 @@ std::vector<Triangle> torus() {
         return glm::dvec3(r * std::cos(a), r * std::sin(a), 0.35 * std::sin(b));
     });
 }
+/// A sheet with folds of a right angle.
+std::vector<Triangle> folds() {
+    return patch(12, 1, [](double u, double v) {
+        const double x = 6 * u, along = x - 2 * std::floor(x / 2);
+        return glm::dvec3(x, 6 * v, along < 1 ? along : 2 - along);
+    });
+}
 std::vector<Triangle> box() {
     std::vector<Triangle> all;
     for (int axis = 0; axis < 3; ++axis)
@@ -291,18 +298,21 @@ std::vector<reference::Disc> discsOf(const std::vector<Sample>& samples, bool wi
 TEST(LeafDiscs, OutlinesAgreeWithTheSurface) {
     struct Case {
         double apart, estimated, given;  ///< pixels between points; least overlap (IoU) with normals of either kind
+        double openAtEdges = 0.004;      ///< share of the surface that may be open, normals given
+        size_t missed = 20;              ///< the same, pixels
     };
     struct Shape {
         std::string name;
         std::vector<Triangle> surface;
         std::vector<Case> cases;
-        double former;  ///< 4 pixels apart, discs of 1.44 spacings overlap less than that
     };
-    std::vector<Shape> shapes{{"torus", torus(), {{4, 0.98, 0.985}, {12, 0.88, 0.94}}, 0.97},
-                              {"box", box(), {{4, 0.95, 0.95}, {12, 0.85, 0.85}}, 0.95}};
+    // (Discs of a wall with its exact normal do not reach round its edges.)
+    std::vector<Shape> shapes{{"torus", torus(), {{4, 0.985, 0.985}, {12, 0.94, 0.94}}},
+                              {"box", box(), {{4, 0.965, 0.955, 0.008}, {12, 0.91, 0.885, 0.022}}},
+                              {"folds", folds(), {{4, 0.94, 0.935, 0.004, 60}, {12, 0.86, 0.85, 0.014, 280}}}};
     if (const std::string path = test::dataFile("01_meshes/bunny/bun_zipper.ply"); !path.empty())
-        shapes.push_back({"bunny", bunny(path), {{4, 0.95, 0.96}, {12, 0.85, 0.87}}, 0.94});
-    for (const auto& [name, surface, cases, former] : shapes)
+        shapes.push_back({"bunny", bunny(path), {{4, 0.97, 0.97}, {12, 0.89, 0.885}}});
+    for (const auto& [name, surface, cases] : shapes)
         for (const Case& c : cases)
             for (const bool isGiven : {false, true}) {
                 const double area = areaOf(surface), pixel = std::sqrt(area) / 300, wanted = c.apart * pixel;
@@ -314,10 +324,12 @@ TEST(LeafDiscs, OutlinesAgreeWithTheSurface) {
                 std::printf("%s, %.0f px, normals %s: IoU %.4f, %zu pixels inside missed, %.3f %% open\n", name.c_str(),
                             c.apart, isGiven ? "given" : "estimated", outline.iou, outline.missed, 100 * open);
                 EXPECT_GE(outline.iou, isGiven ? c.given : c.estimated) << name << " " << c.apart;
-                if (isGiven) EXPECT_LE(outline.missed, 20u) << name << " " << c.apart;
+                EXPECT_LE(open, isGiven ? c.openAtEdges : 0.004) << name << " " << c.apart;
+                if (isGiven) EXPECT_LE(outline.missed, c.missed) << name << " " << c.apart;
                 if (c.apart != 4) continue;
+                // Discs of 1.44 spacings, whatever is near.
                 for (reference::Disc& d : discs) d.radius = 1.44 * spacing;
-                EXPECT_LT(compareOutlines(surface, discs, pixel).iou, isGiven ? former + 0.01 : former) << name;
+                EXPECT_LT(compareOutlines(surface, discs, pixel).iou, outline.iou - 0.008) << name;
             }
 }
 

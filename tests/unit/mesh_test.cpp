@@ -163,8 +163,9 @@ TEST(MeshStore, DamagedChunksAndTablesAreRefused) {
     const lod::Node& node = h.nodes[h.nodes.size() - 1];
     std::vector<uint8_t> bytes(node.chunkBytes);
     ASSERT_TRUE(store->file->readAt(node.chunkOffset, bytes.data(), bytes.size()));
+    lod::MeshVertices kind = lod::MeshVertices::shortOnes;
     const auto decode = [&](const std::vector<uint8_t>& b) {
-        return lod::decodeMeshChunk(b.data(), b.size(), node.records, h.groups.back(), "test");
+        return lod::decodeMeshChunk(b.data(), b.size(), node.records, h.groups.back(), kind, "test");
     };
     ASSERT_TRUE(decode(bytes));
     for (size_t length = 0; length < bytes.size(); length += length < 200 ? 1 : 37)
@@ -173,6 +174,8 @@ TEST(MeshStore, DamagedChunksAndTablesAreRefused) {
     for (int k = 0; k < 2000; ++k) {  // changed bytes: an error or a chunk whose indices are within it
         std::vector<uint8_t> changed = bytes;
         for (int c = 0; c < 3; ++c) changed[rng.below(changed.size())] = static_cast<uint8_t>(rng.next());
+        kind = std::array{lod::MeshVertices::shortOnes, lod::MeshVertices::counted, lod::MeshVertices::pairs}.at(
+            static_cast<size_t>(k % 3));
         const auto chunk = decode(changed);
         if (!chunk) continue;
         for (const shared::MeshCluster& c : chunk->clusters)

@@ -24,6 +24,7 @@ struct Plane {
 
 struct Picture {
     std::vector<uint64_t> keys = std::vector<uint64_t>(size_t{kWidth} * kHeight, ~uint64_t{0});
+    std::vector<uint8_t> runs = std::vector<uint8_t>(kWidth * kHeight / cpu::Visibility::kRun + 1);
     float depthAt(size_t pixel) const { return shared::uintBitsToFloat(static_cast<uint32_t>(keys[pixel] >> 32)); }
     bool isCovered(size_t pixel) const { return keys[pixel] != ~uint64_t{0}; }
 };
@@ -73,7 +74,7 @@ void drawPlane(const cpu::Kernels& kernels, const Plane& plane, double size, uin
             block.triangles = triangles.data();
             block.mesh = &mesh;
             block.counts = 9 * (kCells + 1) | static_cast<uint32_t>(triangles.size()) << 16;
-            kernels.rasterCluster(frame, nullptr, block, firstId, none, picture.keys.data());
+            kernels.rasterCluster(frame, nullptr, block, firstId, none, {picture.keys.data(), picture.runs.data()});
         }
 }
 

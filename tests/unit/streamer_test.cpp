@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <map>
 #include <set>
@@ -138,13 +139,20 @@ TEST_F(StreamerTest, ASinkThatIsFullDoesNotStall) {
 
 TEST(ChunkState, TheTableOfTransitionsIsWhatTheLifeOfARequestSays) {
     using S = ChunkState;
-    int legal = 0;
-    for (int from = 0; from < 5; ++from)
-        for (int to = 0; to < 5; ++to) legal += isLegalTransition(static_cast<S>(from), static_cast<S>(to));
-    EXPECT_EQ(legal, 8);
-    EXPECT_FALSE(isLegalTransition(S::absent, S::resident));
-    EXPECT_FALSE(isLegalTransition(S::resident, S::requested));
-    EXPECT_FALSE(isLegalTransition(S::requested, S::requested));
+    constexpr std::array kAll{S::absent, S::requested, S::arrived, S::resident, S::failed};
+    const auto before = [&](S to) {
+        std::set<S> from;
+        for (const S s : kAll)
+            if (isLegalTransition(s, to)) from.insert(s);
+        return from;
+    };
+    // One request at a time; nothing can be drawn that did not arrive; what is drawn is not asked for again.
+    EXPECT_EQ(before(S::requested), (std::set{S::absent, S::failed}));
+    EXPECT_EQ(before(S::arrived), std::set{S::requested});
+    EXPECT_EQ(before(S::resident), std::set{S::arrived});
+    // Reading and taking in may fail, being resident may not; a chunk that is on its way cannot be forgotten.
+    EXPECT_EQ(before(S::failed), (std::set{S::requested, S::arrived}));
+    EXPECT_EQ(before(S::absent), (std::set{S::arrived, S::resident}));
 }
 
 }  // namespace

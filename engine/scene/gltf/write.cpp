@@ -31,7 +31,8 @@ class Writer {
         for (const EncodedImage& image : scene_.images) addImage(image);
         for (const Texture& t : scene_.textures) addTexture(t);
         for (const Material& m : scene_.materials) addMaterial(m);
-        for (const Mesh& m : scene_.meshes) addMesh(m);
+        findOrigins();
+        for (size_t m = 0; m < scene_.meshes.size(); ++m) addMesh(scene_.meshes[m], origins_[m]);
         for (const SceneCamera& c : scene_.cameras) addCamera(c);
         for (const Light& l : scene_.lights) addLight(l);
         tinygltf::Scene root;
@@ -43,6 +44,7 @@ class Writer {
             else
                 model_.nodes[static_cast<size_t>(parent)].children.push_back(static_cast<int>(n));
         }
+        addMoved();
         model_.scenes.push_back(root);
         model_.defaultScene = 0;
         std::sort(model_.extensionsUsed.begin(), model_.extensionsUsed.end());
@@ -151,7 +153,45 @@ class Writer {
         }
         model_.materials.push_back(out);
     }
-    void addMesh(const Mesh& m) {
+    /// Vertices are floats in the file, and the matrices of nodes doubles: meshes that have more digits than floats are
+    /// written around zero, below nodes that move them back. (Instances are floats, too: their meshes stay.)
+    void findOrigins() {
+        origins_.assign(scene_.meshes.size(), glm::dvec3(0));
+        for (size_t m = 0; m < scene_.meshes.size(); ++m) {
+            Box box;
+            bool isFiner = false;
+            for (const Primitive& p : scene_.meshes[m].primitives) {
+                isFiner = isFiner || !p.rest.empty();
+                for (size_t i = 0; i < p.position.size(); ++i) box.add(p.at(i));
+            }
+            if (isFiner && !box.isEmpty()) origins_[m] = glm::round(0.5 * (box.least + box.greatest));
+        }
+        for (const Node& n : scene_.nodes)
+            if (n.mesh >= 0 && !n.instances.empty()) origins_[static_cast<size_t>(n.mesh)] = glm::dvec3(0);
+    }
+    /// A node below each that shows a mesh around zero.
+    void addMoved() {
+        for (size_t n = 0; n < scene_.nodes.size(); ++n) {
+            const int mesh = scene_.nodes[n].mesh;
+            if (mesh < 0 || origins_[static_cast<size_t>(mesh)] == glm::dvec3(0)) continue;
+            const glm::dvec3& to = origins_[static_cast<size_t>(mesh)];
+            tinygltf::Node out;
+            out.mesh = mesh;
+            out.translation = {to.x, to.y, to.z};
+            model_.nodes[n].mesh = -1;
+            model_.nodes[n].children.push_back(static_cast<int>(model_.nodes.size()));
+            model_.nodes.push_back(out);
+        }
+    }
+    static std::vector<glm::vec3> positionsFrom(const Primitive& p, const glm::dvec3& origin) {
+        if (origin == glm::dvec3(0)) return p.position;
+        std::vector<glm::vec3> out;
+        out.reserve(p.position.size());
+        for (size_t i = 0; i < p.position.size(); ++i) out.emplace_back(p.at(i) - origin);
+        return out;
+    }
+
+    void addMesh(const Mesh& m, const glm::dvec3& origin) {
         tinygltf::Mesh out;
         out.name = m.name;
         for (const Primitive& p : m.primitives) {
@@ -160,7 +200,7 @@ class Writer {
                      : p.kind == PrimitiveKind::lines ? TINYGLTF_MODE_LINE
                                                       : TINYGLTF_MODE_TRIANGLES;
             q.material = p.material;
-            q.attributes["POSITION"] = addFloats(p.position, TINYGLTF_TYPE_VEC3, true);
+            q.attributes["POSITION"] = addFloats(positionsFrom(p, origin), TINYGLTF_TYPE_VEC3, true);
             if (!p.normal.empty()) q.attributes["NORMAL"] = addFloats(p.normal, TINYGLTF_TYPE_VEC3);
             if (!p.tangent.empty()) q.attributes["TANGENT"] = addFloats(p.tangent, TINYGLTF_TYPE_VEC4);
             if (!p.colour.empty()) q.attributes["COLOR_0"] = addFloats(p.colour, TINYGLTF_TYPE_VEC4);
@@ -269,6 +309,7 @@ class Writer {
     }
 
     const Scene& scene_;
+    std::vector<glm::dvec3> origins_;  ///< of each mesh: what its vertices are counted from in the file
     tinygltf::Model model_;
 };
 

@@ -9,17 +9,19 @@
 #include "engine/base/check.h"
 #include "engine/base/hash.h"
 #include "lod/build/mesh/encode.h"
+#include "lod/build/mesh/parts.h"
 
 namespace stipple::lod {
 namespace {
 
-constexpr double kWorthwhile = 0.85;     ///< a simplification that keeps more triangles than this is not used
-constexpr double kUnimportant = 0.25;    ///< share of the error below that one level may add unseen
-constexpr double kStalled = 0.97;        ///< a level that keeps more than this of all triangles is the last one
-constexpr size_t kFewestTriangles = 16;  ///< below that nothing is simplified any more
-constexpr size_t kGoingUp = 16384;       ///< triangles of a cell that its parent goes on with
-constexpr size_t kMostGoingUp = 32768;   ///< of what cannot be simplified
-constexpr float kAnyError = 1e9f;        ///< the target is a number of triangles
+constexpr double kWorthwhile = 0.85;      ///< a simplification that keeps more triangles than this is not used
+constexpr double kUnimportant = 0.25;     ///< share of the error below that one level may add unseen
+constexpr double kStalled = 0.97;         ///< a level that keeps more than this of all triangles is the last one
+constexpr size_t kFewestTriangles = 16;   ///< below that nothing is simplified any more
+constexpr size_t kGoingUp = 16384;        ///< triangles of a cell that its parent goes on with
+constexpr size_t kMostGoingUp = 32768;    ///< of what cannot be simplified
+constexpr float kAnyError = 1e9f;         ///< the target is a number of triangles
+constexpr uint32_t kMoved = 0x80000000u;  ///< in the number of a vertex: of those that a group moved
 
 struct Sphere {
     glm::dvec3 centre{0};
@@ -46,8 +48,8 @@ Sphere sphereOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vecto
 
 class CellReducer {
   public:
-    CellReducer(const Frame& frame, const MeshBuildSettings& settings, Executor& executor)
-        : frame_(frame), settings_(settings), executor_(executor) {}
+    CellReducer(const Frame& frame, const Lattice& lattice, const MeshBuildSettings& settings, Executor& executor)
+        : frame_(frame), lattice_(lattice), settings_(settings), executor_(executor) {}
 
     Result<void> takeInput(const std::vector<uint8_t>& bytes) {
         Soup soup;
@@ -58,13 +60,11 @@ class CellReducer {
         soup.vertices = {};
         table_.duplicate = sortTriangles(mesh_, soup.indices);
         table_.triangles = soup.indices.size() / 3;
-        table_.lo = glm::ivec3(1 << 30);
-        table_.hi = glm::ivec3(-1);
-        for (const shared::MeshVertex& v : mesh_.vertices) {
-            table_.lo = glm::min(table_.lo, glm::ivec3(v.x, v.y, v.z));
-            table_.hi = glm::max(table_.hi, glm::ivec3(v.x, v.y, v.z));
+        for (uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
+            table_.lo = v == 0 ? mesh_.at(v) : glm::min(table_.lo, mesh_.at(v));
+            table_.hi = v == 0 ? mesh_.at(v) : glm::max(table_.hi, mesh_.at(v));
         }
-        clusters_ = makeClusters(mesh_, soup.indices, executor_);
+        makeFirstClusters(soup.indices);
         return {};
     }
 
@@ -90,6 +90,8 @@ class CellReducer {
                 const auto first = soup.indices.begin() + static_cast<ptrdiff_t>(at);
                 c.indices.assign(first, first + head.indices);
                 if (head.producer != kNoProducer) c.producer = firstProducer + head.producer;
+                c.isWhole = head.isWhole != 0;
+                c.isContinued = head.isContinued != 0;
                 at += head.indices;
                 clusters_.push_back(std::move(c));
             }
@@ -126,12 +128,14 @@ class CellReducer {
 
   private:
     struct ClusterHead {
-        uint32_t indices, producer;
+        uint32_t indices, producer, isWhole, isContinued;
     };
     struct Made {
         Group group;
         std::vector<uint8_t> bytes;
         std::vector<Cluster> products;
+        std::vector<shared::MeshVertex> moved;  ///< numbered from the mesh's last on
+        std::vector<uint32_t> movedPosition;
         bool isSimplified = false;
     };
 
@@ -150,22 +154,24 @@ class CellReducer {
     /// edge along a cell's border until the cell that holds both sides.)
     Key keyAbove(const Cluster& c, int level) const {
         if (level < 0) return 0;
-        glm::ivec3 lo(1 << 30), hi(-1);
+        Steps lo = mesh_.at(c.indices[0]), hi = lo;
         for (const uint32_t i : c.indices) {
-            const shared::MeshVertex& v = mesh_.vertices[i];
-            lo = glm::min(lo, glm::ivec3(v.x, v.y, v.z));
-            hi = glm::max(hi, glm::ivec3(v.x, v.y, v.z));
+            lo = glm::min(lo, mesh_.at(i));
+            hi = glm::max(hi, mesh_.at(i));
         }
-        const auto edge = static_cast<int64_t>(frame_.cellSize(static_cast<uint32_t>(level)));
-        const auto along = [&](int a, int b) {
-            return static_cast<uint64_t>((3 * ((int64_t{a} + b) / 2) + 2 * edge) / (3 * edge));
-        };
-        return mortonCode(along(lo.x, hi.x), along(lo.y, hi.y), along(lo.z, hi.z));
+        const glm::u64vec3 middle = keyPlace((lo + hi) / int64_t{2}, lattice_);
+        const auto edge = static_cast<uint64_t>(frame_.cellSize(static_cast<uint32_t>(level)));
+        const auto along = [&](uint64_t at) { return (3 * at + 2 * edge) / (3 * edge); };
+        return mortonCode(along(middle.x), along(middle.y), along(middle.z));
     }
 
     std::vector<GoingUp> goingUp(int level) const {
         std::map<Key, std::vector<const Cluster*>> byCell;
-        for (const Cluster& c : clusters_) byCell[keyAbove(c, level)].push_back(&c);
+        Key above = 0;
+        for (const Cluster& c : clusters_) {
+            if (!c.isContinued) above = keyAbove(c, level);
+            byCell[above].push_back(&c);
+        }
         std::vector<GoingUp> out;
         out.reserve(byCell.size());
         for (const auto& [key, clusters] : byCell) out.push_back({key, bytesOf(clusters)});
@@ -178,7 +184,8 @@ class CellReducer {
         std::vector<ClusterHead> heads;
         Soup soup;
         for (const Cluster* c : clusters) {
-            ClusterHead head{static_cast<uint32_t>(c->indices.size()), kNoProducer};
+            ClusterHead head{static_cast<uint32_t>(c->indices.size()), kNoProducer, c->isWhole ? 1u : 0u,
+                             c->isContinued ? 1u : 0u};
             if (c->producer != kNoProducer) {
                 uint32_t& n = number[c->producer];
                 if (n == ~0u) {
@@ -191,7 +198,7 @@ class CellReducer {
             for (const uint32_t v : c->indices) {
                 if (place[v] == ~0u) {
                     place[v] = static_cast<uint32_t>(soup.vertices.size());
-                    soup.vertices.push_back(mesh_.vertices[v]);
+                    soup.vertices.add(mesh_.vertices, v);
                 }
                 soup.indices.push_back(place[v]);
             }
@@ -204,7 +211,7 @@ class CellReducer {
     }
 
     std::vector<Cluster> nextLevel(std::vector<Cluster> clusters) {
-        const auto members = groupClusters(mesh_, clusters, settings_.groupClusters, executor_);
+        const auto members = groupsOf(clusters);
         std::vector<Cluster> next;
         constexpr size_t kBatch = 64;  // bounds what waits to be written
         for (size_t first = 0; first < members.size(); first += kBatch) {
@@ -223,7 +230,12 @@ class CellReducer {
                     continue;
                 }
                 const auto number = static_cast<uint32_t>(producers_.size());
+                const auto firstMoved = static_cast<uint32_t>(mesh_.vertices.size());
+                mesh_.vertices.low.insert(mesh_.vertices.low.end(), made[i].moved.begin(), made[i].moved.end());
+                mesh_.position.insert(mesh_.position.end(), made[i].movedPosition.begin(), made[i].movedPosition.end());
                 for (Cluster& c : made[i].products) {
+                    for (uint32_t& v : c.indices)
+                        if ((v & kMoved) != 0) v = firstMoved + (v & ~kMoved);
                     c.producer = number;
                     next.push_back(std::move(c));
                 }
@@ -235,7 +247,7 @@ class CellReducer {
     }
 
     void writeRoots() {
-        for (const auto& group : groupClusters(mesh_, clusters_, settings_.groupClusters, executor_)) {
+        for (const auto& group : groupsOf(clusters_)) {
             std::vector<const Cluster*> of;
             of.reserve(group.size());
             for (const uint32_t c : group) of.push_back(&clusters_[c]);
@@ -255,12 +267,72 @@ class CellReducer {
         table_.groups.push_back(std::move(g));
     }
 
+    /// The largest coordinate.
+    int largest() const { return static_cast<int>((uint64_t{1} << frame_.rootLog2) - 1); }
+
+    std::vector<std::vector<uint32_t>> groupsOf(std::vector<Cluster>& clusters) {
+        return mesh_.isWide() ? groupApart(mesh_, clusters, settings_.groupClusters, executor_)
+                              : groupAll(mesh_, clusters, settings_.groupClusters, executor_);
+    }
+
+    /// What was marked on the way (PartFinder) in clusters of its own.
+    void makeFirstClusters(const std::vector<uint32_t>& indices) {
+        std::vector<uint32_t> others;
+        Cluster whole;
+        for (size_t i = 0; i < indices.size(); i += 3) {
+            const bool isOfPart = (mesh_.vertex(indices[i]).surface & kSurfaceOfPart) != 0;
+            auto& to = isOfPart ? whole.indices : others;
+            to.insert(to.end(), indices.begin() + static_cast<ptrdiff_t>(i),
+                      indices.begin() + static_cast<ptrdiff_t>(i + 3));
+        }
+        for (shared::MeshVertex& v : mesh_.vertices.low) v.surface &= ~kSurfaceOfPart;
+        const auto firstLong = others.begin() + static_cast<ptrdiff_t>(longOnesLast(mesh_, others));
+        clusters_ = makeClusters(mesh_, {others.begin(), firstLong}, executor_);
+        if (firstLong != others.end())
+            for (Cluster& c : makeClusters(mesh_, {firstLong, others.end()}, executor_))
+                clusters_.push_back(std::move(c));
+        if (whole.indices.empty()) return;
+        const LocalMesh local = makeLocal(mesh_, {&whole});
+        appendParts(local, local.indices, clusters_);
+    }
+
+    void appendParts(const LocalMesh& local, const std::vector<uint32_t>& indices, std::vector<Cluster>& to) const {
+        std::vector<uint32_t> ofTriangle;
+        std::vector<std::vector<uint32_t>> parts(partsOf(mesh_, local, indices, ofTriangle));
+        for (size_t i = 0; i < indices.size(); ++i) parts[ofTriangle[i / 3]].push_back(indices[i]);
+        appendWholeClusters(local, parts, to);
+    }
+
+    /// Vertices at new places, numbered as kMoved + n until they have their places in the mesh.
+    void takeMoved(LocalMesh& local, Made& made) const {
+        for (uint32_t v = local.firstMoved(); v < local.position.size(); ++v) {
+            const uint32_t from = local.global[v];
+            const glm::ivec3 at = glm::ivec3(local.position[v]) + glm::ivec3(local.shift);
+            shared::MeshVertex vertex = mesh_.vertex(from);
+            vertex.x = at.x;
+            vertex.y = at.y;
+            vertex.z = at.z;
+            local.global[v] = kMoved | static_cast<uint32_t>(made.moved.size());
+            made.moved.push_back(vertex);
+            made.movedPosition.push_back(mesh_.position[from]);
+        }
+    }
+
+    static std::vector<uint32_t> simplifySurface(const LocalMesh& local) {
+        const size_t target = local.indices.size() / 6 * 3;
+        std::vector<uint32_t> coarse(local.indices.size());
+        coarse.resize(meshopt_simplify(coarse.data(), local.indices.data(), local.indices.size(), &local.position[0].x,
+                                       local.position.size(), sizeof(glm::vec3), target, kAnyError,
+                                       meshopt_SimplifyLockBorder, nullptr));
+        return coarse;
+    }
+
     /// One group: what it is simplified to and how far that is from the input, and its own chunk.
     Made simplify(std::vector<const Cluster*> members, bool isRoot) const {
         Made made;
         std::stable_sort(members.begin(), members.end(),
                          [](const Cluster* a, const Cluster* b) { return a->producer < b->producer; });
-        const LocalMesh local = makeLocal(mesh_, members);
+        LocalMesh local = makeLocal(mesh_, members);
         // Monotone, and a bound against the input: what is already wrong plus what is added.
         double below = 0;
         std::vector<Sphere> inside;
@@ -270,22 +342,26 @@ class CellReducer {
             below = std::max(below, producers_[p].error);
             inside.push_back({producers_[p].centre, producers_[p].radius});
         }
+        const Sphere sphere = sphereOf(mesh_, local, inside);
         if (!isRoot) {
-            const size_t target = local.indices.size() / 6 * 3;
-            std::vector<uint32_t> coarse(local.indices.size());
-            coarse.resize(meshopt_simplify(coarse.data(), local.indices.data(), local.indices.size(),
-                                           &local.position[0].x, local.position.size(), sizeof(glm::vec3), target,
-                                           kAnyError, meshopt_SimplifyLockBorder, nullptr));
+            const bool areParts = members.front()->isWhole;
+            const std::vector<uint32_t> coarse =
+                areParts ? simplifyParts(mesh_, local, local.indices.size() / 6 * 3, largest())
+                         : simplifySurface(local);
             if (coarse.empty() ||
                 static_cast<double>(coarse.size()) > kWorthwhile * static_cast<double>(local.indices.size()))
                 return made;
-            made.group.error = measureDeviation(mesh_, local, coarse, kUnimportant * below);
+            made.group.error = measureDeviation(mesh_, local, coarse, kUnimportant * below, !areParts);
             STIPPLE_CHECK(made.group.error >= 0 && made.group.error < Group::kRootError, "deviation of a group");
-            appendClusters(local, coarse, kNoProducer, false, made.products);
+            if (areParts) {
+                takeMoved(local, made);
+                appendParts(local, coarse, made.products);
+            } else {
+                appendClusters(local, coarse, kNoProducer, false, made.products);
+            }
         }
         made.isSimplified = true;
         made.group.error = isRoot ? Group::kRootError : made.group.error + below;
-        const Sphere sphere = sphereOf(mesh_, local, inside);
         made.group.node.centre = sphere.centre;
         made.group.node.radius = sphere.radius;
         made.bytes = encodeGroup(mesh_, members, producers_, settings_, made.group);
@@ -293,6 +369,7 @@ class CellReducer {
     }
 
     const Frame& frame_;
+    const Lattice& lattice_;
     const MeshBuildSettings& settings_;
     Executor& executor_;
     WeldedMesh mesh_;
@@ -305,9 +382,9 @@ class CellReducer {
 }  // namespace
 
 Result<CellProduct> reduceMeshCell(const WorkCell& cell, const std::vector<uint8_t>& input,
-                                   const std::vector<FromBelow>& below, const Frame& frame,
+                                   const std::vector<FromBelow>& below, const Frame& frame, const Lattice& lattice,
                                    const MeshBuildSettings& settings, Executor& executor) {
-    CellReducer reducer(frame, settings, executor);
+    CellReducer reducer(frame, lattice, settings, executor);
     if (cell.atom != WorkCell::kNone) {
         STIPPLE_TRY(reducer.takeInput(input));
     } else {

@@ -10,7 +10,7 @@ namespace stipple::lod {
 /// Welds and simplifies what is in a cell: the input of an atom or what came up from below, until few enough triangles
 /// are left to go up. Of the last cell nothing goes up; neither does what cannot be simplified and is too much.
 Result<CellProduct> reduceMeshCell(const WorkCell& cell, const std::vector<uint8_t>& input,
-                                   const std::vector<FromBelow>& below, const Frame& frame,
+                                   const std::vector<FromBelow>& below, const Frame& frame, const Lattice& lattice,
                                    const MeshBuildSettings& settings, Executor& executor);
 
 /// A group in the order of the build: fine before coarse.
@@ -28,7 +28,7 @@ struct Group {
 struct CellTable {
     std::vector<Group> groups;
     uint64_t triangles = 0, duplicate = 0;  ///< of the input
-    glm::ivec3 lo{0}, hi{0};                ///< of its vertices
+    Steps lo{0}, hi{0};                     ///< of its vertices
     void put(ByteWriter& to) const;
     bool get(ByteReader& from);
 };

@@ -18,13 +18,13 @@ constexpr size_t kBlockTriangles = 32768;  ///< of the Morton order, clustered o
 namespace {
 
 void placeLocal(const WeldedMesh& mesh, LocalMesh& local) {
-    constexpr uint32_t kExact = 1u << 24;
-    uint32_t any = 0;
+    constexpr uint64_t kExact = 1u << 24;
+    uint64_t any = 0;
     for (const uint32_t v : local.global) {
-        const glm::ivec3 p = mesh.at(v);
-        any |= static_cast<uint32_t>(p.x | p.y | p.z);
+        const Steps p = mesh.at(v);
+        any |= static_cast<uint64_t>(p.x | p.y | p.z);  // (of negative ones more than kExact)
     }
-    std::vector<int> along(local.global.size());
+    std::vector<int64_t> along(local.global.size());
     for (int a = 0; a < 3 && any > kExact; ++a) {  // the median
         for (size_t i = 0; i < along.size(); ++i) along[i] = mesh.at(local.global[i])[a];
         const auto middle = along.begin() + static_cast<ptrdiff_t>(along.size() / 2);
@@ -32,6 +32,7 @@ void placeLocal(const WeldedMesh& mesh, LocalMesh& local) {
         local.shift[a] = *middle;
     }
     for (const uint32_t v : local.global) local.position.emplace_back(mesh.at(v) - local.shift);
+    local.isWide = mesh.isWide();
 }
 
 }  // namespace
@@ -65,17 +66,19 @@ LocalMesh makeLocal(const WeldedMesh& mesh, const std::vector<const Cluster*>& c
 
 void appendClusters(const LocalMesh& local, const std::vector<uint32_t>& indices, uint32_t producer, bool isAlongCurve,
                     std::vector<Cluster>& out) {
-    constexpr size_t kVertices = shared::kClusterVertices, kTriangles = shared::kClusterTriangles;
-    const size_t bound = meshopt_buildMeshletsBound(indices.size(), kVertices, kTriangles);
+    // (Coordinates of 64 bits take two places.)
+    const size_t mostVertices = local.isWide ? shared::kClusterVertices / 2 : shared::kClusterVertices;
+    constexpr size_t kTriangles = shared::kClusterTriangles;
+    const size_t bound = meshopt_buildMeshletsBound(indices.size(), mostVertices, kTriangles);
     std::vector<meshopt_Meshlet> meshlets(bound);
-    std::vector<uint32_t> vertices(bound * kVertices);
+    std::vector<uint32_t> vertices(bound * mostVertices);
     std::vector<uint8_t> corners(bound * kTriangles * 3);
     const size_t count =
         isAlongCurve ? meshopt_buildMeshletsScan(meshlets.data(), vertices.data(), corners.data(), indices.data(),
-                                                 indices.size(), local.position.size(), kVertices, kTriangles)
+                                                 indices.size(), local.position.size(), mostVertices, kTriangles)
                      : meshopt_buildMeshlets(meshlets.data(), vertices.data(), corners.data(), indices.data(),
                                              indices.size(), &local.position[0].x, local.position.size(),
-                                             sizeof(glm::vec3), kVertices, kTriangles, 0.0f);
+                                             sizeof(glm::vec3), mostVertices, kTriangles, 0.0f);
     meshlets.resize(count);
     for (const meshopt_Meshlet& m : meshlets) {
         Cluster c;
@@ -203,6 +206,49 @@ std::vector<std::vector<uint32_t>> groupClusters(const WeldedMesh& mesh, const s
                               g.begin() + static_cast<ptrdiff_t>(std::min(g.size(), i + size_t{2} * size)));
     std::sort(even.begin(), even.end());
     return even;
+}
+
+namespace {
+
+bool isLong(const WeldedMesh& mesh, const uint32_t* corners) {
+    const Steps a = mesh.at(corners[0]), b = mesh.at(corners[1]), c = mesh.at(corners[2]);
+    const Steps size = glm::max(a, glm::max(b, c)) - glm::min(a, glm::min(b, c));
+    return std::max({size.x, size.y, size.z}) > int64_t{1} << kShortMeshBits;
+}
+
+}  // namespace
+
+size_t longOnesLast(const WeldedMesh& mesh, std::vector<uint32_t>& indices) {
+    if (!mesh.isWide()) return indices.size();
+    std::vector<uint32_t> others, longOnes;
+    for (size_t i = 0; i < indices.size(); i += 3) {
+        auto& to = isLong(mesh, &indices[i]) ? longOnes : others;
+        to.insert(to.end(), indices.begin() + static_cast<ptrdiff_t>(i),
+                  indices.begin() + static_cast<ptrdiff_t>(i + 3));
+    }
+    indices = others;
+    indices.insert(indices.end(), longOnes.begin(), longOnes.end());
+    return others.size();
+}
+
+std::vector<std::vector<uint32_t>> groupApart(const WeldedMesh& mesh, std::vector<Cluster>& clusters, uint32_t size,
+                                              Executor& executor) {
+    const auto hasNoLong = [&](const Cluster& c) {
+        for (size_t i = 0; i < c.indices.size(); i += 3)
+            if (isLong(mesh, &c.indices[i])) return false;
+        return true;
+    };
+    const auto others =
+        mesh.isWide() ? std::stable_partition(clusters.begin(), clusters.end(), hasNoLong) : clusters.end();
+    if (others == clusters.begin() || others == clusters.end()) return groupClusters(mesh, clusters, size, executor);
+    const auto first = static_cast<uint32_t>(others - clusters.begin());
+    const std::vector<Cluster> near(clusters.begin(), others), far(others, clusters.end());
+    std::vector<std::vector<uint32_t>> groups = groupClusters(mesh, near, size, executor);
+    for (auto& group : groupClusters(mesh, far, size, executor)) {
+        for (uint32_t& c : group) c += first;
+        groups.push_back(std::move(group));
+    }
+    return groups;
 }
 
 }  // namespace stipple::lod

@@ -166,7 +166,8 @@ bool isMeasuredHere(const glm::vec3& a, const glm::vec3& b) {
 /// Largest distance of `triangles` from the target, whose own are `others`; what stands in both needs no look.
 /// `nearest`: of the vertices. Not below `worst`.
 float measureSurface(const Target& target, const std::vector<glm::vec3>& position, const std::vector<Triple>& triangles,
-                     const std::vector<Triple>& others, const std::vector<Nearest>& nearest, float worst) {
+                     const std::vector<Triple>& others, const std::vector<Nearest>& nearest, bool isBorderKept,
+                     float worst) {
     // First only what the corners' nearest triangles say; then the worst are looked at closely, and what cannot exceed
     // them needs no search.
     std::vector<Probe> probes;
@@ -191,7 +192,7 @@ float measureSurface(const Target& target, const std::vector<glm::vec3>& positio
         for (size_t k = 0; k < 3; ++k) {
             const uint32_t v = t.at(k), w = t.at((k + 1) % 3);
             all = std::max(all, nearest[v].distance);
-            if (isMeasuredHere(position[v], position[w]))
+            if (!isBorderKept || isMeasuredHere(position[v], position[w]))
                 take(0.5f * (position[v] + position[w]), std::max(nearest[v].distance, nearest[w].distance));
         }
         take((position[t[0]] + position[t[1]] + position[t[2]]) * (1.0f / 3), all);
@@ -216,9 +217,9 @@ float shiftOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<
     const glm::vec2 w = closestWeights(p, a, b, c);
     distance = glm::length(p - (a + w.x * (b - a) + w.y * (c - a)));
     const std::array<float, 3> weights{1 - w.x - w.y, w.x, w.y};
-    const shared::MeshVertex& own = mesh.vertices[local.global[v]];
+    const shared::MeshVertex& own = mesh.vertex(local.global[v]);
     std::array<const shared::MeshVertex*, 3> corners{};
-    for (size_t k = 0; k < 3; ++k) corners.at(k) = &mesh.vertices[local.global[coarse[3 * size_t{t} + k]]];
+    for (size_t k = 0; k < 3; ++k) corners.at(k) = &mesh.vertex(local.global[coarse[3 * size_t{t} + k]]);
     const glm::vec3 e1 = b - a, e2 = c - a;
     const float longest = std::max({glm::length(e1), glm::length(e2), glm::length(c - b)});
     float shift = (own.surface & shared::kSurfaceMaterialMask) == (corners[0]->surface & shared::kSurfaceMaterialMask)
@@ -243,13 +244,18 @@ float shiftOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<
 }  // namespace
 
 double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& coarse,
-                        double unimportant) {
+                        double unimportant, bool isBorderKept) {
     // Near zero, so that fp32 keeps its precision: the group is small.
     const glm::vec3 shift = local.position[0];
     std::vector<glm::vec3> position(local.position.size());
-    float extent = 0;
+    // Products of four lengths must be numbers.
+    float extent = 0, unit = 1;
+    for (const glm::vec3& p : local.position) {
+        const glm::vec3 off = glm::abs(p - shift);
+        while (std::max({off.x, off.y, off.z}) > 0x1p31f * unit) unit *= 2;
+    }
     for (size_t i = 0; i < position.size(); ++i) {
-        position[i] = local.position[i] - shift;
+        position[i] = (local.position[i] - shift) / unit;
         extent = std::max({extent, std::abs(position[i].x), std::abs(position[i].y), std::abs(position[i].z)});
     }
     LocalMesh near = local;
@@ -261,8 +267,12 @@ double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const st
         nearest[coarse[i]] = {0, i / 3};
         isKept[coarse[i]] = 1;
     }
+    // What moved starts from where it went.
+    std::vector<uint32_t> went(position.size(), ~0u);
+    for (uint32_t i = 0; i < coarse.size(); ++i)
+        if (coarse[i] >= local.firstMoved()) went[local.beforeMove(coarse[i])] = i / 3;
     // So far a true distance, or not worth a closer look: what rounding makes of flat surfaces is not.
-    auto worst = std::max(static_cast<float>(unimportant), 1.0f + 2e-6f * extent);
+    auto worst = std::max(static_cast<float>(unimportant) / unit, 1.0f / unit + 2e-6f * extent);
     // A vertex that is gone starts from the nearest triangle of a neighbour, so that few are looked at. Looked for is
     // the least of distance and shift: beside a seam the nearest triangle may be the wrong one.
     std::vector<uint8_t>& isKnown = isKept;
@@ -282,6 +292,8 @@ double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const st
         isKnown[v] = 1;
         worst = std::max(worst, look);
     };
+    for (uint32_t v = 0; v < local.firstMoved(); ++v)
+        if (!isKnown[v] && went[v] != ~0u) find(v, went[v]);
     for (bool isMore = true; isMore;) {
         isMore = false;
         for (size_t i = 0; i < near.indices.size(); ++i) {
@@ -291,14 +303,20 @@ double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const st
             isMore = true;
         }
     }
-    for (uint32_t v = 0; v < position.size(); ++v)
+    for (uint32_t v = 0; v < local.firstMoved(); ++v)
         if (!isKnown[v]) find(v, 0);  // a part of its own that is gone altogether
     const std::vector<Triple> fine = sorted(near.indices), left = sorted(coarse);
-    worst = measureSurface(toCoarse, position, fine, left, nearest, worst);
+    worst = measureSurface(toCoarse, position, fine, left, nearest, isBorderKept, worst);
     const Target toFine(position, near.indices);
     for (uint32_t i = 0; i < near.indices.size(); ++i) nearest[near.indices[i]] = {0, i / 3};
-    worst = measureSurface(toFine, position, left, fine, nearest, worst);
-    return static_cast<double>(worst) * (1 + 1e-5) + static_cast<double>(extent) * 1e-6;  // fp32's share
+    for (uint32_t v = local.firstMoved(); v < position.size(); ++v) {
+        const uint32_t hint = nearest[local.beforeMove(v)].triangle;
+        nearest[v] = toFine.nearest(position[v], {toFine.distance(position[v], hint), hint}, 0);
+        worst = std::max(worst, nearest[v].distance);
+    }
+    worst = measureSurface(toFine, position, left, fine, nearest, isBorderKept, worst);
+    return (static_cast<double>(worst) * (1 + 1e-5) + static_cast<double>(extent) * 1e-6) *
+           double{unit};  // fp32's share
 }
 
 }  // namespace stipple::lod

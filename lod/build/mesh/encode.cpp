@@ -37,10 +37,12 @@ void describeTextures(const MeshBuildSettings& settings, const Chunk& chunk, Gro
             const auto vertex = [&](uint32_t k) -> const shared::MeshVertex& {
                 return chunk.vertices[c.firstVertex + (chunk.triangles[t] >> (8 * k) & 255u)];
             };
+            const auto place = [&](uint32_t k) {
+                return vertexPlace(group.node, chunk, c, chunk.triangles[t] >> (8 * k) & 255u);
+            };
             const auto &a = vertex(0), &b = vertex(1), &d = vertex(2);
             if ((a.surface & shared::kSurfaceTextured) == 0) continue;
-            inSpace += glm::length(
-                glm::cross(glm::dvec3(b.x - a.x, b.y - a.y, b.z - a.z), glm::dvec3(d.x - a.x, d.y - a.y, d.z - a.z)));
+            inSpace += glm::length(glm::cross(place(1) - place(0), place(2) - place(0)));
             inTexture += std::abs(double(b.u - a.u) * (d.v - a.v) - double(b.v - a.v) * (d.u - a.u));
         }
     for (uint32_t t = 0; t < isUsed.size(); ++t)
@@ -53,12 +55,53 @@ void describeTextures(const MeshBuildSettings& settings, const Chunk& chunk, Gro
     group.counts.uvPerStep = inSpace > 0 ? static_cast<float>(std::sqrt(inTexture / inSpace)) : 0.0f;
 }
 
+/// Of a wide lattice: where the group's vertices are counted from, and whether 32 bits do.
+void countFromOrigin(const WeldedMesh& mesh, const std::vector<const Cluster*>& members, Node& node) {
+    Steps lo = mesh.at(members[0]->indices[0]), hi = lo;
+    for (const Cluster* c : members)
+        for (const uint32_t v : c->indices) {
+            lo = glm::min(lo, mesh.at(v));
+            hi = glm::max(hi, mesh.at(v));
+        }
+    constexpr int64_t kEdge = int64_t{1} << 30, kHalf = kEdge / 2;
+    const Steps size = hi - lo, middle = (lo + hi) >> int64_t{1};
+    if (std::max({size.x, size.y, size.z}) > kEdge) {
+        node.stepShift = 1;  // pairs
+        return;
+    }
+    for (int a = 0; a < 3; ++a) node.cell.at(static_cast<size_t>(a)) = static_cast<uint32_t>((middle[a] + kHalf) >> 30);
+}
+
+/// Appends the vertices of a cluster; of pairs then their upper halves.
+void appendVertices(const WeldedMesh& mesh, const std::vector<uint32_t>& order, const Node& node, Chunk& chunk) {
+    const MeshPlace origin = meshOrigin(node);
+    for (const uint32_t v : order) {
+        shared::MeshVertex vertex = mesh.vertex(v);
+        if (mesh.isWide() && !hasPairs(node)) {
+            const Steps at = mesh.at(v);
+            vertex.x = static_cast<int>(at.x - origin[0]);
+            vertex.y = static_cast<int>(at.y - origin[1]);
+            vertex.z = static_cast<int>(at.z - origin[2]);
+        }
+        chunk.vertices.push_back(vertex);
+    }
+    for (size_t i = 0; hasPairs(node) && i < order.size(); ++i) {
+        const glm::ivec3& high = mesh.vertices.high[order[i]];
+        shared::MeshVertex vertex{};
+        vertex.x = high.x;
+        vertex.y = high.y;
+        vertex.z = high.z;
+        chunk.vertices.push_back(vertex);
+    }
+}
+
 }  // namespace
 
 std::vector<uint8_t> encodeGroup(const WeldedMesh& mesh, const std::vector<const Cluster*>& members,
                                  const std::vector<Producer>& producers, const MeshBuildSettings& settings,
                                  Group& group) {
     Chunk chunk;
+    if (mesh.isWide()) countFromOrigin(mesh, members, group.node);
     std::vector<uint32_t> order;  // vertices of one cluster, by first use
     // Vertex -> its number in the cluster: open addressing, four places for each vertex that there can be.
     struct Slot {
@@ -88,8 +131,8 @@ std::vector<uint8_t> encodeGroup(const WeldedMesh& mesh, const std::vector<const
             chunk.triangles.push_back(a | b << 8 | numberOf(c->indices[i + 2]) << 16);
         }
         const auto triangles = static_cast<uint32_t>(c->indices.size() / 3);
-        cluster.counts = static_cast<uint32_t>(order.size()) | triangles << 16;
-        for (const uint32_t v : order) chunk.vertices.push_back(mesh.vertices[v]);
+        appendVertices(mesh, order, group.node, chunk);
+        cluster.counts = static_cast<uint32_t>(chunk.vertices.size() - cluster.firstVertex) | triangles << 16;
         const uint32_t producer = c->producer == kNoProducer ? MeshRun::kOriginal : producers[c->producer].number;
         if (group.runs.empty() || group.runs.back().producer != producer)
             group.runs.push_back({producer, static_cast<uint32_t>(chunk.clusters.size()), 0, 0});

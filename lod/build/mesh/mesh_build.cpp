@@ -12,6 +12,7 @@
 #include "engine/base/queue.h"
 #include "lod/build/build_version.h"
 #include "lod/build/mesh/cell.h"
+#include "lod/build/mesh/parts.h"
 #include "lod/build/octree/cell_build.h"
 
 namespace stipple::lod {
@@ -102,14 +103,17 @@ class MeshBuild : public CellContent {
         };
         STIPPLE_ASSIGN(const MeshSource::Bounds bounds, source_.survey(tell));
         facts_.lattice = latticeOf(bounds);
-        return {};
+        return findParts();
     }
     Frame frame() const override { return frameOf(facts_.lattice); }
     Result<void> places(const Places& take) override {
         facts_.triangles = 0;
+        size_t number = 0;
         STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
             facts_.triangles += block.indices.size() / 3;
-            return take(placeBlock(block, facts_.lattice, executor_).centres(), source_.triangles);
+            PlacedBlock placed = placeBlock(block, facts_.lattice, executor_);
+            parts_.place(placed, number++);
+            return take(placed.centres(), source_.triangles);
         }));
         facts_.bad = source_.badTriangles ? source_.badTriangles() : 0;
         return {};
@@ -131,6 +135,7 @@ class MeshBuild : public CellContent {
         const Frame frame = frameOf(facts_.lattice);
         const std::vector<Atom>& atoms = to.atoms();
         std::vector<Soup> buffers(atoms.size());
+        size_t number = 0;
         const uint64_t wanted = std::max<uint64_t>(to.bufferBytes() / atoms.size(), 8192);
         const auto flush = [&](size_t a) {
             Soup& soup = buffers[a];
@@ -149,15 +154,17 @@ class MeshBuild : public CellContent {
         };
         STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
             const uint64_t triangles = block.indices.size() / 3;
+            const size_t here = number++;
             if (to.begins()) return to.ends(triangles, facts_.triangles, flushAll);
-            const PlacedBlock placed = placeBlock(block, facts_.lattice, executor_);
+            PlacedBlock placed = placeBlock(block, facts_.lattice, executor_);
+            parts_.place(placed, here);
             facts_.degenerate += placed.degenerate;
             facts_.notFinite += placed.notFinite;
             facts_.rounding = std::max(facts_.rounding, placed.rounding);
             std::vector<uint64_t> order(placed.x.size());  // atom, triangle
             executor_.parallelFor(order.size(), 4096, [&](size_t begin, size_t end) {
                 for (size_t t = begin; t < end; ++t)
-                    order[t] = uint64_t{to.atomOf(frame.keyOf(placed.x[t], placed.y[t], placed.z[t]))} << 32 | t;
+                    order[t] = uint64_t{to.atomOf(frame.keyOf(placed.centres().at(t)))} << 32 | t;
             });
             std::erase_if(order, [&](uint64_t o) { return !to.isOwn(o >> 32); });
             std::sort(order.begin(), order.end());
@@ -177,7 +184,7 @@ class MeshBuild : public CellContent {
                             const uint32_t v = placed.soup.indices[3 * (order[i] & 0xffffffffu) + k];
                             if (place[v] == ~0u) {
                                 place[v] = static_cast<uint32_t>(soup.vertices.size());
-                                soup.vertices.push_back(placed.soup.vertices[v]);
+                                soup.vertices.add(placed.soup.vertices, v);
                                 used.push_back(v);
                             }
                             soup.indices.push_back(place[v]);
@@ -229,7 +236,7 @@ class MeshBuild : public CellContent {
 
     Result<CellProduct> make(const WorkCell& cell, const std::vector<uint8_t>& input,
                              const std::vector<FromBelow>& below) const override {
-        return reduceMeshCell(cell, input, below, frameOf(facts_.lattice), settings_, executor_);
+        return reduceMeshCell(cell, input, below, frameOf(facts_.lattice), facts_.lattice, settings_, executor_);
     }
 
     uint64_t take(uint64_t at, const std::vector<uint8_t>& bytes) override {
@@ -274,6 +281,10 @@ class MeshBuild : public CellContent {
         description.roundingUnits = facts_.rounding;
         description.boundsMin = description.focusMin = facts_.lattice.origin + facts_.lattice.unit * glm::dvec3(lo_);
         description.boundsMax = description.focusMax = facts_.lattice.origin + facts_.lattice.unit * glm::dvec3(hi_);
+        if (facts_.lattice.isWide()) {
+            description.focusMin = glm::max(description.focusMin, facts_.lattice.focusLow);
+            description.focusMax = glm::min(description.focusMax, facts_.lattice.focusHigh);
+        }
         description.hasColour = description.hasNormals = description.isReflectance = true;
         uint64_t coarsest = 0;
         for (size_t i = 0; i < hierarchy.nodes.size(); ++i)
@@ -292,9 +303,23 @@ class MeshBuild : public CellContent {
     static constexpr uint64_t kTableBytes = 2;       ///< of a triangle, of the table of groups, which stays in memory
     static constexpr uint64_t kMostOfAtom = 2 * kAtomPoints;
 
+    /// What is small and stands alone stays together (parts.h), if the mesh can be looked at as a whole.
+    Result<void> findParts() {
+        // (Parts are moved on short lattices only.)
+        bool isKnown = source_.triangles <= PartFinder::kMostTriangles && !facts_.lattice.isWide();
+        parts_ = {};
+        if (isKnown)
+            STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
+                isKnown = isKnown && parts_.add(placeBlock(block, facts_.lattice, executor_));
+                return {};
+            }));
+        parts_.finish(isKnown);
+        return {};
+    }
+
     static Frame frameOf(const Lattice& lattice) {
         constexpr double kNear = 16;  // steps: where few vertices are far out, all others may lie within few key cells
-        return makeFrame(lattice.origin, lattice.unit, lattice.largest, 0, lattice.bits > 24 ? kNear : 0);
+        return makeFrame(lattice.origin, lattice.unit, lattice.largestKey, 0, lattice.bits > 24 ? kNear : 0);
     }
     /// Triangles in any order share few vertices with those beside them.
     static bool isScattered(const Soup& soup) { return soup.vertices.size() * 3 > 4 * (soup.indices.size() / 3); }
@@ -316,9 +341,10 @@ class MeshBuild : public CellContent {
     const MeshBuildSettings& settings_;
     Executor& executor_;
     Facts facts_;
+    PartFinder parts_;
     std::vector<Group> groups_;
     uint64_t kept_ = 0, duplicate_ = 0;
-    glm::ivec3 lo_{1 << 30}, hi_{-1};
+    Steps lo_{std::numeric_limits<int64_t>::max()}, hi_{std::numeric_limits<int64_t>::min()};
 };
 
 }  // namespace

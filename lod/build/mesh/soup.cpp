@@ -9,7 +9,9 @@
 namespace stipple::lod {
 
 void putSoup(const Soup& soup, ByteWriter& to) {
-    putPacked(soup.vertices, to);
+    putPacked(soup.vertices.low, to);
+    to.put(uint8_t{soup.vertices.high.empty() ? uint8_t{0} : uint8_t{1}});
+    if (!soup.vertices.high.empty()) putPacked(soup.vertices.high, to);
     std::vector<uint8_t> bytes(meshopt_encodeIndexSequenceBound(soup.indices.size(), soup.vertices.size()));
     bytes.resize(meshopt_encodeIndexSequence(bytes.data(), bytes.size(), soup.indices.data(), soup.indices.size()));
     to.put(uint64_t{soup.indices.size()});
@@ -18,7 +20,12 @@ void putSoup(const Soup& soup, ByteWriter& to) {
 
 bool getSoup(ByteReader& from, Soup& to) {
     const size_t oldVertices = to.vertices.size(), oldIndices = to.indices.size();
-    if (!getPacked(from, to.vertices)) return false;
+    if (!getPacked(from, to.vertices.low)) return false;
+    uint8_t isWide = 0;
+    from.get(isWide);
+    if (isWide != 0 && (!getPacked(from, to.vertices.high) || to.vertices.high.size() != to.vertices.size()))
+        return false;
+    if (isWide == 0 && !to.vertices.high.empty()) return false;
     const size_t vertices = to.vertices.size() - oldVertices;
     uint64_t indices = 0;
     std::vector<uint8_t> bytes;

@@ -2,77 +2,90 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <tuple>
 
 #include "engine/base/numbers.h"
 #include "lod/build/mesh/mesh_work.h"
 #include "lod/build/morton.h"
-#include "lod/build/points/spacing.h"
 #include "lod/octahedral.h"
 
 namespace stipple::lod {
 namespace {
 
-constexpr int kLatticeBits = 24, kMostBits = 30;  ///< with 31, differences would overflow
+constexpr int kLatticeBits = 24;
 constexpr size_t kGrain = 16384;
 
 /// Bit by bit: two zeros of different sign are two values. Equal positions stand side by side.
 std::array<uint32_t, 8> wordsOf(const shared::MeshVertex& v) { return std::bit_cast<std::array<uint32_t, 8>>(v); }
 
-uint64_t keyOf(int64_t x, int64_t y, int64_t z, int drop) {
-    return shortMortonCode(static_cast<uint64_t>(x >> drop), static_cast<uint64_t>(y >> drop),
-                           static_cast<uint64_t>(z >> drop));
+/// Keys of vertices along a Morton curve: of those of a wide lattice within their own extent.
+class CurveKeys {
+  public:
+    explicit CurveKeys(const LatticeVertices& vertices) {
+        uint64_t any = 0;
+        if (vertices.high.empty()) {
+            for (const shared::MeshVertex& v : vertices.low) any |= static_cast<uint32_t>(v.x | v.y | v.z);
+            drop_ = std::max(static_cast<int>(std::bit_width(any)), kLatticeBits) - static_cast<int>(kShortBits);
+            return;
+        }
+        Steps lo(std::numeric_limits<int64_t>::max()), hi(std::numeric_limits<int64_t>::min());
+        for (size_t i = 0; i < vertices.size(); ++i) {
+            lo = glm::min(lo, vertices.at(i));
+            hi = glm::max(hi, vertices.at(i));
+        }
+        first_ = lo;
+        for (int a = 0; a < 3; ++a) any |= static_cast<uint64_t>(hi[a]) - static_cast<uint64_t>(lo[a]);
+        drop_ = std::max(static_cast<int>(std::bit_width(any)) - static_cast<int>(kShortBits), 0);
+    }
+    uint64_t of(const Steps& at) const {
+        const auto along = [&](int a) { return static_cast<uint64_t>(at[a] - first_[a]) >> drop_; };
+        return shortMortonCode(along(0), along(1), along(2));
+    }
+
+  private:
+    Steps first_{0};
+    int drop_ = 0;  ///< bits that a key leaves out
+};
+
+bool hasArea(const Steps& a, const Steps& b, const Steps& c) {
+    return glm::cross(glm::dvec3(b - a), glm::dvec3(c - a)) != glm::dvec3(0);
 }
 
-/// Bits that a key leaves out.
-int dropOf(const std::vector<shared::MeshVertex>& vertices) {
-    uint32_t any = 0;
-    for (const shared::MeshVertex& v : vertices) any |= static_cast<uint32_t>(v.x | v.y | v.z);
-    return std::max(static_cast<int>(std::bit_width(any)), kLatticeBits) - static_cast<int>(kShortBits);
+/// Below 2^40 the number itself, then 2^40 for each octave: monotone, to 2^-40 of it.
+int64_t inLogarithms(int64_t v) {
+    constexpr int kLinear = 40;
+    const uint64_t size = v < 0 ? 0 - static_cast<uint64_t>(v) : static_cast<uint64_t>(v);
+    const int octave = static_cast<int>(std::bit_width(size)) - 1 - kLinear;  // from 2^40 on: 0
+    if (octave < 0) return v;
+    const auto key = static_cast<int64_t>((size >> octave) + (static_cast<uint64_t>(octave) << kLinear));
+    return v < 0 ? -key : key;
 }
-
-bool hasArea(const shared::MeshVertex& a, const shared::MeshVertex& b, const shared::MeshVertex& c) {
-    const auto at = [](const shared::MeshVertex& v) { return glm::dvec3(v.x, v.y, v.z); };
-    return glm::cross(at(b) - at(a), at(c) - at(a)) != glm::dvec3(0);
-}
+Steps inLogarithms(const Steps& v) { return {inLogarithms(v.x), inLogarithms(v.y), inLogarithms(v.z)}; }
 
 }  // namespace
 
-Lattice latticeOf(const MeshSource::Bounds& bounds) {
-    Lattice lattice;
-    if (bounds.lo.x > bounds.hi.x) return lattice;
-    const glm::dvec3 size = bounds.hi - bounds.lo;
-    const auto unitOf = [](double extent, int bits) {
-        return std::exp2(std::floor(std::log2(std::max(extent, 1e-30))) + 1 - bits);
-    };
-    const double extent = std::max({size.x, size.y, size.z});
-    lattice.unit = unitOf(extent, kLatticeBits);
-    // What most vertices are is told apart as it would be without those far out, as well as 30 bits can.
-    constexpr double kFar = 16;
-    if (const double dense = denseExtent(bounds.sample); dense > 0 && extent > kFar * dense) {
-        lattice.unit = std::max(unitOf(dense, kLatticeBits), unitOf(extent, kMostBits));
-        lattice.bits = kMostBits;
-    }
-    // Whole steps from zero, so that coordinates that lie on the lattice stay exact.
-    lattice.origin = glm::floor(bounds.lo / lattice.unit) * lattice.unit;
-    const glm::dvec3 last = glm::floor((bounds.hi - lattice.origin) / lattice.unit + 0.5);
-    lattice.largest = static_cast<uint32_t>(std::max({last.x, last.y, last.z}));
-    return lattice;
+glm::u64vec3 keyPlace(const Steps& at, const Lattice& lattice) {
+    return lattice.isWide() ? glm::u64vec3(inLogarithms(at) - lattice.firstKey) : glm::u64vec3(at);
 }
 
 PlacedBlock placeBlock(const TriangleMesh& in, const Lattice& lattice, Executor& executor) {
     PlacedBlock out;
-    auto& vertices = out.soup.vertices;
+    auto& vertices = out.soup.vertices.low;
+    auto& high = out.soup.vertices.high;
     vertices.resize(in.position.size());
+    if (lattice.isWide()) high.resize(vertices.size());
     std::vector<uint8_t> isBad(vertices.size());
     const auto place = [&](size_t i, double& rounding) {
         shared::MeshVertex& v = vertices[i];
         isBad[i] = isFinite(in.position[i]) ? 0 : 1;
         const glm::dvec3 p = isBad[i] ? lattice.origin : in.position[i];
         const glm::dvec3 q = glm::floor((p - lattice.origin) / lattice.unit + 0.5);
-        v.x = toWhole<int>(q.x);
-        v.y = toWhole<int>(q.y);
-        v.z = toWhole<int>(q.z);
+        const Steps at(toWhole<int64_t>(q.x), toWhole<int64_t>(q.y), toWhole<int64_t>(q.z));
+        v.x = static_cast<int>(static_cast<uint32_t>(at.x));
+        v.y = static_cast<int>(static_cast<uint32_t>(at.y));
+        v.z = static_cast<int>(static_cast<uint32_t>(at.z));
+        if (!high.empty()) high[i] = glm::ivec3(at >> int64_t{32});
         const glm::dvec3 off = glm::abs(lattice.origin + q * lattice.unit - p);
         rounding = std::max({rounding, off.x, off.y, off.z});
         const glm::vec3 n = in.normal.empty() ? glm::vec3(0) : in.normal[i];
@@ -100,16 +113,17 @@ PlacedBlock placeBlock(const TriangleMesh& in, const Lattice& lattice, Executor&
             ++out.notFinite;
             continue;
         }
-        const auto &a = vertices[t[0]], &b = vertices[t[1]], &c = vertices[t[2]];
+        const Steps a = out.soup.vertices.at(t[0]), b = out.soup.vertices.at(t[1]), c = out.soup.vertices.at(t[2]);
         if (!hasArea(a, b, c)) {
             ++out.degenerate;
             continue;
         }
         out.soup.indices.insert(out.soup.indices.end(), t, t + 3);
-        const auto middle = [](int p, int q, int r) { return static_cast<uint32_t>((int64_t{p} + q + r) / 3); };
-        out.x.push_back(middle(a.x, b.x, c.x));
-        out.y.push_back(middle(a.y, b.y, c.y));
-        out.z.push_back(middle(a.z, b.z, c.z));
+        const glm::u64vec3 middle = keyPlace((a + b + c) / int64_t{3}, lattice);
+        out.x.push_back(static_cast<uint32_t>(middle.x));
+        out.y.push_back(static_cast<uint32_t>(middle.y));
+        out.z.push_back(static_cast<uint32_t>(middle.z));
+        if (lattice.isWide()) out.high.push_back(highOf({middle.x, middle.y, middle.z}));
     }
     return out;
 }
@@ -119,27 +133,33 @@ WeldedMesh weld(Soup& soup) {
         uint64_t key;
         uint32_t vertex;
     };
-    const auto& v = soup.vertices;
+    const LatticeVertices& v = soup.vertices;
     std::vector<Item> order(v.size());
-    const int drop = dropOf(v);
-    for (uint32_t i = 0; i < v.size(); ++i) order[i] = {keyOf(v[i].x, v[i].y, v[i].z, drop), i};
+    const CurveKeys keys(v);
+    for (uint32_t i = 0; i < v.size(); ++i) order[i] = {keys.of(v.at(i)), i};
+    const auto highOf = [&](uint32_t i) {
+        return v.high.empty() ? std::array<int, 3>{} : std::array<int, 3>{v.high[i].x, v.high[i].y, v.high[i].z};
+    };
+    const bool isWide = !v.high.empty();
     std::sort(order.begin(), order.end(), [&](const Item& a, const Item& b) {
-        return a.key != b.key ? a.key < b.key : wordsOf(v[a.vertex]) < wordsOf(v[b.vertex]);
+        if (a.key != b.key) return a.key < b.key;
+        if (isWide && v.high[a.vertex] != v.high[b.vertex]) return highOf(a.vertex) < highOf(b.vertex);
+        return wordsOf(v.low[a.vertex]) < wordsOf(v.low[b.vertex]);
     });
     WeldedMesh out;
     std::vector<uint32_t> place(v.size());
     uint32_t positions = 0;
     for (size_t i = 0; i < order.size(); ++i) {
-        const shared::MeshVertex& vertex = v[order[i].vertex];
-        const bool isFirst = out.vertices.empty();
-        if (isFirst || wordsOf(out.vertices.back()) != wordsOf(vertex)) {
-            const bool isSamePlace = !isFirst && out.vertices.back().x == vertex.x &&
-                                     out.vertices.back().y == vertex.y && out.vertices.back().z == vertex.z;
+        const uint32_t vertex = order[i].vertex;
+        const size_t last = out.vertices.size() - 1;
+        const bool isFirst = i == 0;
+        const bool isSamePlace = !isFirst && out.vertices.at(last) == v.at(vertex);
+        if (!isSamePlace || wordsOf(out.vertices.low[last]) != wordsOf(v.low[vertex])) {
             positions += isFirst || isSamePlace ? 0 : 1;
-            out.vertices.push_back(vertex);
+            out.vertices.add(v, vertex);
             out.position.push_back(positions);
         }
-        place[order[i].vertex] = static_cast<uint32_t>(out.vertices.size() - 1);
+        place[vertex] = static_cast<uint32_t>(out.vertices.size() - 1);
     }
     for (uint32_t& i : soup.indices) i = place[i];
     soup.vertices = out.vertices;
@@ -154,15 +174,13 @@ uint64_t sortTriangles(WeldedMesh& mesh, std::vector<uint32_t>& indices) {
         bool operator==(const Item& o) const { return key == o.key && corners == o.corners; }
     };
     std::vector<Item> order(indices.size() / 3);
-    const int drop = dropOf(mesh.vertices);
+    const CurveKeys keys(mesh.vertices);
     for (size_t i = 0; i < order.size(); ++i) {
         auto& t = order[i].corners;
         std::copy_n(indices.begin() + static_cast<ptrdiff_t>(3 * i), 3, t.begin());
         // The smallest index first: equal triangles are then equal words, and the winding stays.
         std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
-        const auto &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
-        order[i].key =
-            keyOf((int64_t{a.x} + b.x + c.x) / 3, (int64_t{a.y} + b.y + c.y) / 3, (int64_t{a.z} + b.z + c.z) / 3, drop);
+        order[i].key = keys.of((mesh.at(t[0]) + mesh.at(t[1]) + mesh.at(t[2])) / int64_t{3});
     }
     std::sort(order.begin(), order.end());
     const size_t before = order.size();
@@ -175,7 +193,7 @@ uint64_t sortTriangles(WeldedMesh& mesh, std::vector<uint32_t>& indices) {
         for (const uint32_t vertex : item.corners) {
             if (place[vertex] == ~0u) {
                 place[vertex] = static_cast<uint32_t>(used.vertices.size());
-                used.vertices.push_back(mesh.vertices[vertex]);
+                used.vertices.add(mesh.vertices, vertex);
                 used.position.push_back(mesh.position[vertex]);
             }
             indices.push_back(place[vertex]);

@@ -4,8 +4,12 @@
 //   radius  to the farthest corner of its Voronoi cell in the plane (farthestCorner), and a tenth more: no larger than
 //           what closes the surface. Corners farther than 1.8 spacings (1.25 where it bends) are its edge; the spacing
 //           comes from the distance d of the 12th neighbour: pi d^2 holds 12 of them. Copies count once.
+//           Where the window bends, no farther than 1.2 times the third neighbour; where it is a volume (leaves) 0.85
+//           times. Discs that this makes narrower leave the gaps between them open: nothing was seen there. (Not if the
+//           block as a whole is a sheet, which is noise or grass that has to stay closed.)
 //   normal  the direction of least variance (Hoppe et al. 1992), sign unknown: two-sided. Of all points of the window,
-//           the same for all points of the cell; or, fine, of each point's own twelve nearest.
+//           the same for all points of the cell; or, fine and where the window bends (one normal for both sides of a
+//           fold would leave it open), of each point's own twelve nearest.
 // A point that stands alone, away from what its neighbours belong to, has the disc of those: of twice their spacing at
 // most (spacingOfOthers).
 // With fewer points in the window it grows, up to the quarter of a counted cell that buckets know of their neighbours
@@ -17,6 +21,7 @@
 #include <cmath>
 
 #include "lod/build/points/lattice_box.h"
+#include "lod/build/points/seen.h"
 #include "lod/build/points/select.h"
 #include "lod/build/points/surface_fit.h"
 #include "lod/octahedral.h"
@@ -36,12 +41,18 @@ constexpr float kAloneSpacings = 2;  ///< how much wider than of its neighbours 
 constexpr size_t kCrowd = 8;
 constexpr float kCrowdsGap = 2.0f;
 constexpr uint32_t kAcrossLines = 3;  ///< so often a window that holds but a line is doubled
-constexpr double kFlat = 0.02;
+constexpr double kFlat = 0.02, kBent = 0.05;
 constexpr double kSlim = 0.06, kSlimOfFew = 0.2;
 constexpr float kPlain = 0.8f;
 constexpr float kWidestGap = 2.0f, kWidestFold = 1.5f;  ///< spacings; farther corners are edges
 constexpr float kAcrossGap = 2.5f, kAcrossMost = 1.6f, kUneven = 1.2f;
 constexpr float kOverlap = 1.15f;
+// Variances, least over middle: an edge between two walls has a quarter at most.
+constexpr double kThick = 0.3, kThickish = 0.12, kSheet = 0.04;
+constexpr size_t kEnoughOfSheet = 256;                     ///< places of a block
+constexpr size_t kFewNearest = 3;                          ///< rank of the neighbour that says how near others are
+constexpr float kFewOfReach = 0.35f;                       ///< its squared distance over that of the twelfth, about
+constexpr float kAmongLeaves = 0.85f, kAcrossBend = 1.2f;  ///< radius over its distance, at most
 
 constexpr uint32_t kNoNormal = ~0u;  ///< no octahedral code
 
@@ -270,22 +281,23 @@ class Estimator {
         };
         seen_.clear();
         const auto see = [&](int64_t x, int64_t y, int64_t z) {
-            seen_.push_back({static_cast<uint32_t>(cellOf(x, y, z)), localOf(x, y, z)});
+            seen_.add(static_cast<uint32_t>(cellOf(x, y, z)), localOf(x, y, z));
         };
         for (size_t j = 0; j < n; ++j) {
             const size_t i = placeBegin_[j];
             withPlace(own_.points, i, see);
         }
+        isSheet_ = isSheet(n);
         forNeighbourhood(keys_[begin], level, edge, false, OncePerPlace{see});
-        indexSeen(size_t{across} * across * across);
+        seen_.index(size_t{across} * across * across);
         const uint32_t windowShift = frame_.shiftOf(window);
         for (size_t j = 0; j < n;) {
             const K key = keys_[placeBegin_[j]] >> windowShift;
             size_t next = j + 1;
             while (next < n && keys_[placeBegin_[next]] >> windowShift == key) ++next;
-            gather(seen_[j].cell, across, kMostInThree, hood_);
+            seen_.gather(seen_[j].cell, across, kMostInThree, hood_);
             places_.clear();
-            for (size_t k = j; k < next; ++k) places_.push_back(seen_[k].place);
+            for (size_t k = j; k < next; ++k) places_.push_back(seen_[k].at);
             Window at;
             at.edge = static_cast<float>(edge);
             at.mayBeAlone = next - j <= kSparse;
@@ -301,19 +313,12 @@ class Estimator {
     }
     uint32_t coarsestWindow() const { return std::min(cell_.level + 2u, frame_.keyLevels); }
 
-    /// Sorts what a block sees by window cell.
-    void indexSeen(size_t cells) {
-        firstSeen_.assign(cells + 1, 0);
-        for (const Seen& s : seen_) ++firstSeen_[s.cell + 1];
-        for (size_t i = 1; i < firstSeen_.size(); ++i) firstSeen_[i] += firstSeen_[i - 1];
-        nextSeen_.assign(firstSeen_.begin(), firstSeen_.end());
-        for (auto* axis : {&byCellX_, &byCellY_, &byCellZ_}) axis->resize(seen_.size());
-        for (const Seen& s : seen_) {
-            const uint32_t at = nextSeen_[s.cell]++;
-            byCellX_[at] = s.place.x;
-            byCellY_[at] = s.place.y;
-            byCellZ_[at] = s.place.z;
-        }
+    /// Are the first `n` places seen, a block's own, a sheet as a whole? Then it may be noise that makes windows thick.
+    bool isSheet(size_t n) {
+        if (n < kEnoughOfSheet) return false;
+        hood_.count = 0;
+        for (size_t j = 0; j < n; ++j) hood_.add(seen_[j].at);
+        return !spreadOfHood(seen_[0].at).isThick(kSheet);
     }
 
     /// Where a hood came from, and how it is spread.
@@ -323,43 +328,24 @@ class Estimator {
         size_t cell = 0;
         uint32_t across = 0;  ///< 0: a larger window, of which the hood is all there is
         Spread spread;
-        bool isLine = false, isFlat = false;
+        bool isLine = false, isFlat = false, isBent = false;
         float widestGap = 0;  ///< between its neighbours, if they are not spread evenly; 0: they are
     };
+    /// Of all in the hood. `p`: one of them.
+    Spread spreadOfHood(const glm::vec3& p) {
+        squared_.assign((hood_.count + kSelectLanes) / kSelectLanes * kSelectLanes, kNothing);
+        std::fill_n(squared_.begin(), hood_.count, 0);
+        return spreadOf(hood_.neighbours(), {p.x, p.y, p.z}, squared_.data(), 0);
+    }
     void measure(Window& window) {
-        const size_t n = hood_.count;
-        squared_.assign((n + kSelectLanes) / kSelectLanes * kSelectLanes, kNothing);
-        std::fill_n(squared_.begin(), n, 0);
-        const glm::vec3 p = places_.front();
-        window.spread = spreadOf(hood_.neighbours(), {p.x, p.y, p.z}, squared_.data(), 0);
+        window.spread = spreadOfHood(places_.front());
         window.isLine = window.spread.isLine(roundingIn(window.edge), kSlim);
         window.isFlat = window.spread.least < kFlat * window.spread.middle;
+        window.isBent = !(window.spread.least < kBent * window.spread.middle);
     }
     /// Variance of a coordinate's rounding to the lattice.
     static double roundingIn(float edge) {
         return 1.0 / (12.0 * static_cast<double>(edge) * static_cast<double>(edge));
-    }
-
-    /// The points of a window cell and its neighbours; of more than `most` in three cells only some.
-    void gather(size_t at, uint32_t across, uint32_t most, Hood& to) {
-        std::array<std::pair<uint32_t, uint32_t>, 9> runs;
-        size_t all = 0;
-        for (size_t row = 0; row < 9; ++row) {  // three cells in x lie side by side
-            const size_t first = at + (row / 3 * across + row % 3) * across - (across + 1) * across - 1;
-            runs.at(row) = {firstSeen_[first], firstSeen_[first + 3]};
-            all += runs.at(row).second - runs.at(row).first;
-        }
-        to.resize(all);
-        float *x = to.x.data(), *y = to.y.data(), *z = to.z.data();
-        for (const auto& [begin, end] : runs) {
-            const uint32_t stride = (end - begin) / most + 1;  // many lie at one place
-            for (uint32_t k = begin; k < end; k += stride) {
-                *x++ = byCellX_[k];
-                *y++ = byCellY_[k];
-                *z++ = byCellZ_[k];
-            }
-        }
-        to.count = static_cast<size_t>(x - to.x.data());
     }
 
     /// The places [begin, end) of one window cell that has too few around it, or only such along a line.
@@ -415,7 +401,7 @@ class Estimator {
     void give(size_t begin, size_t end, const Window& window) {
         const size_t n = hood_.count, rank = std::min(kNeighbours, n - 1);  // the point itself comes first
         const Neighbours all = hood_.neighbours();
-        const bool isEach = settings_.isFine || window.mayBeAlone;
+        const bool hasOwnNormals = settings_.isFine || window.isBent, isEach = hasOwnNormals || window.mayBeAlone;
         squared_.resize(n + kSelectLanes);
         // Of a rectangle's points that are spread evenly: variances are 1/12 of its sides squared.
         const Spread& whole = window.spread;
@@ -442,7 +428,7 @@ class Estimator {
         for (size_t j = begin; j < end; ++j) {
             const glm::vec3 p = places_[j - begin];
             if (isEach) measureReach(p);
-            if (settings_.isFine && n > 3) {
+            if (hasOwnNormals && n > 3) {
                 // Those along one line say nothing: twice as far, until there are others.
                 float squared = reach;
                 do {
@@ -453,6 +439,7 @@ class Estimator {
                 normal = isLine || spread.normal == glm::vec3(0) ? kNoNormal : roundedNormal(spread.normal);
             }
             float wanted = 0;  // one for all at the place that have no normals of their own
+            uint32_t joined = 0;
             for (size_t i = placeBegin_[j]; i < placeBegin_[j + 1]; ++i) {
                 uint32_t& colour = own_.points.colour[i];
                 const bool hasOwn = (colour >> 24 & shared::kFlagNoNormal) == 0;
@@ -466,10 +453,13 @@ class Estimator {
                             across = glm::cross(own, axis);
                         }
                         wanted = radiusAt(p, axis, across, isLine && !hasOwn, reach, rank, window, evenly, nearer);
+                        joined = isLine || isStray_ ? shared::kFlagScattered : 0u;
+                        if (window.isBent && !isSheet_ && !window.isLine && n > kFewNearest)
+                            joined |= limitToNearest(wanted, reach, window, spread);
                     }
                     own_.points.radius[i] = wanted;
                     if (hasOwn) wanted = 0;
-                    if (isLine || isStray_ || spread.isScattered()) colour |= shared::kFlagScattered << 24;
+                    colour |= joined << 24;
                 }
                 if (!settings_.normals || normal == kNoNormal || hasOwn) continue;
                 own_.points.normal[i] = normal;
@@ -521,6 +511,19 @@ class Estimator {
         if (isStray_) radius = std::min(radius, kAloneSpacings * kSpacings * spacingOfOthers(window, squaredReach));
         return radius * window.edge;
     }
+    /// Of a point whose squared distances to the hood are in squared_ and which may be no part of a surface: `radius`
+    /// (lattice units) as far as the next few others are. Returns flags. `near`: how the twelve nearest are spread.
+    uint32_t limitToNearest(float& radius, float squaredReach, const Window& window, const Spread& near) const {
+        const float squared = smallestAtRank(squared_.data(), hood_.count, kFewNearest, kFewOfReach * squaredReach);
+        const float others = std::sqrt(squared) * window.edge;
+        const bool isVolume =
+            window.spread.isThick(kThick) || (window.spread.isThick(kThickish) && near.isThick(kThick));
+        // Round bodies of few points bend their windows, not what is around a point.
+        const bool isLeafy = near.isThick(kThickish) && (window.spread.isThick(kThickish) || window.across == 0);
+        const bool isLoose = radius > (isVolume ? 1.0f : kAcrossBend) * others;
+        radius = std::min(radius, (isVolume ? kAmongLeaves : kAcrossBend) * others);
+        return (isLeafy || isLoose ? shared::kFlagScattered : 0u) | (isLoose ? shared::kFlagLoose : 0u);
+    }
     /// Of a point whose squared distances to the hood are in squared_: are fewer than three others near it?
     bool isAlone(size_t n, float squaredReach) const {
         return smallestAtRank(squared_.data(), n, kCompanions, kNear2 * squaredReach) > kNear2 * squaredReach;
@@ -528,7 +531,7 @@ class Estimator {
     /// The median spacing of such a point's neighbours, in the hood's units: pi d^2 holds four of them. (The hood
     /// itself may hold only some of many points, see gather.)
     float spacingOfOthers(const Window& window, float squaredReach) {
-        if (window.across > 0) gather(window.cell, window.across, ~0u, others_);
+        if (window.across > 0) seen_.gather(window.cell, window.across, ~0u, others_);
         const Hood& all = window.across > 0 ? others_ : hood_;
         const size_t n = all.count;
         squaredOfOther_.resize(n + kSelectLanes);
@@ -545,10 +548,6 @@ class Estimator {
         std::nth_element(spacings_.begin(), middle, spacings_.end());
         return std::sqrt(3.14159265f * *middle / static_cast<float>(kOfOthers));
     }
-    struct Seen {
-        uint32_t cell;
-        glm::vec3 place;
-    };
 
     const Frame& frame_;
     const CellTree& tree_;
@@ -558,15 +557,14 @@ class Estimator {
     const std::vector<K> keys_, ghostKeys_;
     Cell cell_;
     uint32_t cellShift_ = 0;
+    bool isSheet_ = false;  ///< the block
     bool isStray_ = false;  ///< the point that radiusAt saw last
     LatticeBox cellBox_;
     int64_t reach_ = 0;
     uint32_t blockLevel_ = 0;
     std::array<int64_t, 3> blockAt_{};  ///< in its own size
     std::array<Around, 27> around_;
-    std::vector<Seen> seen_;  ///< by the block: its own points first, in window cells from its centre
-    std::vector<float> byCellX_, byCellY_, byCellZ_;  ///< the same by window cell
-    std::vector<uint32_t> firstSeen_, nextSeen_;
+    Seen seen_;  ///< by the block: its own points first
     Hood hood_, others_, lineHood_;
     std::vector<int32_t> squared_, squaredOfOther_;  ///< bits of floats
     std::vector<float> spacings_;

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "engine/base/numbers.h"
 #include "engine/base/queue.h"
 #include "lod/build/points/input.h"
 #include "lod/build/points/input_colours.h"
@@ -186,8 +187,8 @@ void PointInput::place(const Part& part, const PointBlock& block, size_t count, 
         const ToLattice& to = lattice_.of[part.source];
         for (int a = 0; a < 3; ++a) {
             auto& axis = a == 0 ? out.x : a == 1 ? out.y : out.z;
-            const auto ratio = static_cast<int64_t>(to.ratio[a]);
-            const auto shift = static_cast<int64_t>(to.shift[a] - least_[a]);
+            const auto ratio = toWhole<int64_t>(to.ratio[a]);
+            const auto shift = toWhole<int64_t>(to.shift[a] - least_[a]);
             const bool whole = to.exact && step_ == 1 && std::abs(to.shift[a] - least_[a]) < 9e15;
             if (whole) {
                 for (size_t i = 0; i < count; ++i) axis[i] = static_cast<uint32_t>(block.lattice[i][a] * ratio + shift);
@@ -197,7 +198,7 @@ void PointInput::place(const Part& part, const PointBlock& block, size_t count, 
                 const double q = (block.lattice[i][a] * to.ratio[a] + to.shift[a] - least_[a]) / step_,
                              r = std::round(q);
                 rounding = std::max(rounding, std::abs(r - q) * step_);
-                axis[i] = static_cast<uint32_t>(std::max(r, 0.0));
+                axis[i] = toWhole<uint32_t>(r);
             }
         }
         return;
@@ -205,9 +206,9 @@ void PointInput::place(const Part& part, const PointBlock& block, size_t count, 
     placeEach(part, block, count, out, [&](const glm::dvec3& p, size_t to) {
         const glm::dvec3 q = (p - origin) / unit, r = glm::round(q), d = glm::abs(r - q);
         rounding = std::max({rounding, d.x, d.y, d.z});
-        out.x[to] = static_cast<uint32_t>(std::max(r.x, 0.0));
-        out.y[to] = static_cast<uint32_t>(std::max(r.y, 0.0));
-        out.z[to] = static_cast<uint32_t>(std::max(r.z, 0.0));
+        out.x[to] = toWhole<uint32_t>(r.x);
+        out.y[to] = toWhole<uint32_t>(r.y);
+        out.z[to] = toWhole<uint32_t>(r.z);
     });
 }
 
@@ -219,7 +220,7 @@ void PointInput::placeWide(const Part& part, const PointBlock& block, size_t cou
         const glm::dvec3 r = glm::clamp(glm::round(q), glm::dvec3(0), glm::dvec3(std::exp2(kPlaceBits) - 1));
         const glm::dvec3 d = glm::abs(r - q) * perStep;
         rounding = std::max({rounding, d.x, d.y, d.z});
-        const Place place{static_cast<uint64_t>(r.x), static_cast<uint64_t>(r.y), static_cast<uint64_t>(r.z)};
+        const Place place{toWhole<uint64_t>(r.x), toWhole<uint64_t>(r.y), toWhole<uint64_t>(r.z)};
         out.x[to] = static_cast<uint32_t>(place[0]);
         out.y[to] = static_cast<uint32_t>(place[1]);
         out.z[to] = static_cast<uint32_t>(place[2]);

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "engine/base/numbers.h"
 #include "engine/base/queue.h"
 #include "lod/build/points/input.h"
 #include "lod/build/points/input_colours.h"
@@ -164,7 +165,7 @@ void PointInput::placeSample() {
                 q = ((info.isLattice ? p * info.scale + info.offset : p) - origin) / unit;
             }
             q = glm::clamp(glm::round(q), glm::dvec3(0), glm::dvec3(greatest[0], greatest[1], greatest[2]));
-            const Place at{static_cast<uint64_t>(q.x), static_cast<uint64_t>(q.y), static_cast<uint64_t>(q.z)};
+            const Place at{toWhole<uint64_t>(q.x), toWhole<uint64_t>(q.y), toWhole<uint64_t>(q.z)};
             sample.x.push_back(static_cast<uint32_t>(at[0]));
             sample.y.push_back(static_cast<uint32_t>(at[1]));
             sample.z.push_back(static_cast<uint32_t>(at[2]));
@@ -274,8 +275,7 @@ Result<void> PointInput::placeIntegers(BuildReport& report) {
     least_ = lo;
     unit = lattice.unit * step_;
     origin = lattice.base + lattice.unit * lo;
-    for (int a = 0; a < 3; ++a)
-        greatest.at(static_cast<size_t>(a)) = static_cast<uint64_t>(std::max(std::round(extents[a] / step_), 0.0));
+    for (int a = 0; a < 3; ++a) greatest.at(static_cast<size_t>(a)) = toWhole<uint64_t>(std::round(extents[a] / step_));
     resolution = dense_.spacing / step_;
     const auto isOff = [](const auto& of) { return !of.exact; };
     const auto first = std::find_if(lattice.of.begin(), lattice.of.end(), isOff);
@@ -313,7 +313,7 @@ Result<void> PointInput::placeFloats() {
     // Below the spacing of doubles at this place there is nothing to resolve.
     if (farthest > 0) unit = std::max(unit, std::exp2(powerAbove(farthest) - kBitsOfDouble));
     for (int a = 0; a < 3; ++a)
-        greatest.at(static_cast<size_t>(a)) = static_cast<uint64_t>(std::round((hi[a] - origin[a]) / unit));
+        greatest.at(static_cast<size_t>(a)) = toWhole<uint64_t>(std::round((hi[a] - origin[a]) / unit));
     resolution = dense_.spacing / unit;
     return {};
 }

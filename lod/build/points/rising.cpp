@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 
+#include "engine/base/numbers.h"
 #include "lod/build/points/covered.h"
 #include "lod/octahedral.h"
 
@@ -52,7 +53,7 @@ struct SixteenthTable {
     }
 };
 const SixteenthTable kSixteenths;
-uint32_t byteOf(float srgb) { return static_cast<uint32_t>(std::clamp(srgb * 255.0f + 0.5f, 0.0f, 255.0f)); }
+uint32_t byteOf(float srgb) { return unitToByte(srgb); }
 
 bool hasNormal(const Rising& r) { return (r.flags & shared::kFlagNoNormal) == 0; }
 
@@ -86,6 +87,12 @@ void addUp(std::span<const Rising> parts, Rising& out) {
         // A two-sided normal has no sign of its own: take the one that agrees with the first.
         const bool flip = (p.flags & shared::kFlagTwoSided) != 0 && glm::dot(p.normal, reference) < 0;
         normal += flip ? -w * p.meanNormal : w * p.meanNormal;
+    }
+    // What most of the leaves are.
+    for (const uint32_t flag : {shared::kFlagLoose, shared::kFlagScattered}) {
+        double such = 0;
+        for (const Rising& p : parts) such += (p.flags & flag) != 0 ? p.count : 0;
+        if (2 * such > count) out.flags = static_cast<uint8_t>(out.flags | flag);
     }
     out.key = parts[0].key;
     out.mean = parts[0].mean + sum / count;
@@ -237,7 +244,7 @@ Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const 
         const auto at = static_cast<size_t>(a);
         const uint32_t first = static_cast<uint32_t>(index[at] & (grid.cellsAcross - 1)) * grid.cellSteps;
         const double wanted = std::floor((out.mean[a] - grid.base[a]) / grid.step + 0.5);
-        q[at] = static_cast<uint32_t>(std::clamp(wanted, double(first), double(first + grid.cellSteps - 1)));
+        q[at] = toWhole<uint32_t>(std::clamp(wanted, double(first), double(first + grid.cellSteps - 1)));
         out.place[a] = grid.base[a] + grid.step * q[at];
     }
     const Extent x = leaves != nullptr ? extentOfLeaves(*leaves, out.first, size_t{out.first} + out.count, out)

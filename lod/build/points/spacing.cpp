@@ -110,6 +110,26 @@ double denseDistance(const std::vector<glm::dvec3>& places) {
     return distance;
 }
 
+DenseBox denseBox(const std::vector<glm::dvec3>& places) {
+    DenseBox box;
+    if (places.empty()) return box;
+    for (int axis = 0; axis < 3; ++axis) {
+        std::vector<double> values;
+        values.reserve(places.size());
+        for (const glm::dvec3& p : places) values.push_back(p[axis]);
+        box.middle[axis] = valueAt(values, 0.5);
+    }
+    const double reach = 2 * denseExtent(places);
+    box.lo = box.hi = box.middle;
+    for (const glm::dvec3& p : places) {
+        const glm::dvec3 off = glm::abs(p - box.middle);
+        if (std::max({off.x, off.y, off.z}) > reach) continue;
+        box.lo = glm::min(box.lo, p);
+        box.hi = glm::max(box.hi, p);
+    }
+    return box;
+}
+
 double denseSpacing(std::vector<glm::dvec3> places, double share) {
     constexpr double kDense = 0.01;
     if (places.size() < kFewest) return 0;

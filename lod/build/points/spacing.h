@@ -16,4 +16,10 @@ double denseExtent(const std::vector<glm::dvec3>& places);
 /// Likewise the largest distance from zero along an axis.
 double denseDistance(const std::vector<glm::dvec3>& places);
 
+/// What lies within twice that extent of the median along each axis.
+struct DenseBox {
+    glm::dvec3 middle{0}, lo{0}, hi{0};
+};
+DenseBox denseBox(const std::vector<glm::dvec3>& places);
+
 }  // namespace stipple::lod

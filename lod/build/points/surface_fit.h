@@ -45,8 +45,8 @@ struct Spread {
     /// first, or at most `slim` of it and not much more than the third (a line with noise), or what rounding alone
     /// makes (`rounding`: variance of that, same units). A line has no normal.
     bool isLine(double rounding, double slim) const;
-    /// Too thick to be a surface: leaves, strays; edges of boxes as well (a quarter), which does them no harm.
-    bool isScattered() const { return least > 0.12 * middle; }
+    /// Thicker than a surface that bends by that much: `share` of the second variance.
+    bool isThick(double share) const { return least > share * middle; }
 };
 
 /// Of those whose squared distances from `from` (bits of floats, whole vectors, see squaredDistances) are at most

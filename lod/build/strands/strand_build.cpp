@@ -13,13 +13,17 @@
 #include "engine/base/numbers.h"
 #include "lod/build/build_version.h"
 #include "lod/build/octree/cell_build.h"
+#include "lod/build/points/spacing.h"
 #include "lod/build/strands/strand_cell.h"
+#include "lod/mesh_source.h"
 
 namespace stipple::lod {
 namespace {
 
-constexpr uint32_t kRootLog2 = 24, kMostRootLog2 = 32 - TravellingPoint::kStepBits;
+constexpr uint32_t kRootLog2 = 24, kMostRootLog2 = kPlaceBits - TravellingPoint::kStepBits;
 constexpr uint32_t kDeepest = 20;                    ///< of 24
+constexpr double kFar = 16;                          ///< times what most vertices span: that is far out
+constexpr double kFineSteps = 64;                    ///< in what is visible of a segment, where strands lie far apart
 constexpr double kMorePieces = 1 << 18;              ///< that segments may be divided into where cells are too large
 constexpr uint64_t kCellBytes = uint64_t{64} << 20;  ///< that one cell of the work needs at most
 constexpr uint64_t kRunSegments = 64;                ///< of one atom that are kept until they are sent
@@ -57,6 +61,7 @@ class StrandBuild : public CellContent {
         std::map<int, uint64_t> details;  // likewise of what is visible of a segment, rounded down
         std::set<std::string> notes;
         std::map<std::string, uint64_t> mended;
+        MeshSource::Bounds bounds;
         uint64_t given = 0;
         STIPPLE_TRY(source_.read([&](const StrandSet& block) -> Result<void> {
             facts_.hasColour = facts_.hasColour || block.hasColour;
@@ -68,8 +73,7 @@ class StrandBuild : public CellContent {
             notes.insert(block.notes.begin(), block.notes.end());
             for (size_t s = 0; s < block.strands(); ++s)
                 for (uint32_t i = block.first[s]; i < block.first[s + 1]; ++i) {
-                    facts_.lo = glm::min(facts_.lo, block.position[i]);
-                    facts_.hi = glm::max(facts_.hi, block.position[i]);
+                    bounds.add(block.position[i]);
                     if (i == block.first[s]) continue;
                     ++facts_.segments;
                     const double length = glm::length(block.position[i] - block.position[i - 1]);
@@ -84,6 +88,8 @@ class StrandBuild : public CellContent {
         for (const auto& [what, count] : mended) notes_.push_back(fmt::format("{} {}", count, what));
         facts_.given = given > 0 ? given : facts_.segments;
         if (facts_.segments == 0) return fail(ErrorKind::input, "holds no strand that can be drawn", source());
+        facts_.lo = bounds.lo;
+        facts_.hi = bounds.hi;
         const glm::dvec3 size = facts_.hi - facts_.lo;
         const double extent = std::max({size.x, size.y, size.z, 1e-30});
         facts_.unit = std::exp2(std::floor(std::log2(extent)) + 1 - kRootLog2);
@@ -95,8 +101,8 @@ class StrandBuild : public CellContent {
             detail = std::exp2(octave / 64.0);
             if ((below += count) * 100 >= facts_.segments) break;
         }
-        for (; facts_.rootLog2 < kMostRootLog2 && 4 * facts_.unit > detail; ++facts_.rootLog2) facts_.unit *= 0.5;
-        const uint32_t deepest = facts_.rootLog2 - (kRootLog2 - kDeepest);
+        refine(extent, bounds.sample, detail);
+        const uint32_t deepest = std::min(facts_.rootLog2 - (kRootLog2 - kDeepest), kMortonBits);
         facts_.keyLevels = deepest;
         const auto piecesFor = [&](double longest) {
             double pieces = 0;
@@ -109,7 +115,8 @@ class StrandBuild : public CellContent {
         const double most = 2.0 * static_cast<double>(facts_.segments);
         while (facts_.keyLevels > 0 && piecesFor(cellOf(facts_.keyLevels)) > most) --facts_.keyLevels;
         // (A few long ones among many short ones.)
-        while (facts_.keyLevels < deepest && isCoarseStep(strandStep(cellOf(facts_.keyLevels)), detail / facts_.unit) &&
+        while (facts_.keyLevels < deepest &&
+               facts_.fineness.isCoarse(strandStep(cellOf(facts_.keyLevels)), detail / facts_.unit) &&
                piecesFor(cellOf(facts_.keyLevels + 1)) <= most + kMorePieces)
             ++facts_.keyLevels;
         return {};
@@ -127,27 +134,31 @@ class StrandBuild : public CellContent {
 
     Result<void> places(const Places& take) override {
         std::vector<uint32_t> x, y, z;
+        std::vector<uint64_t> high;
         std::vector<TravellingPoint> ends;
         facts_.parts = 0;
         return source_.read([&](const StrandSet& block) -> Result<void> {
             x.clear();
             y.clear();
             z.clear();
+            high.clear();
             for (size_t s = 0; s < block.strands(); ++s) {
                 const std::vector<TravellingPoint> points = pointsOf(block, s);
                 for (size_t i = 1; i < points.size(); ++i) {
                     divide(points[i - 1], points[i], longest(), ends);
                     const TravellingPoint* before = &points[i - 1];
                     for (const TravellingPoint& end : ends) {
-                        x.push_back(TravellingPoint::middle(before->x, end.x));
-                        y.push_back(TravellingPoint::middle(before->y, end.y));
-                        z.push_back(TravellingPoint::middle(before->z, end.z));
+                        const Place middle = TravellingPoint::middle(*before, end);
+                        x.push_back(static_cast<uint32_t>(middle[0]));
+                        y.push_back(static_cast<uint32_t>(middle[1]));
+                        z.push_back(static_cast<uint32_t>(middle[2]));
+                        if (facts_.rootLog2 > 32) high.push_back(highOf(middle));
                         before = &end;
                     }
                 }
             }
             facts_.parts += x.size();
-            return take({x, y, z}, facts_.segments);
+            return take({x, y, z, high}, facts_.segments);
         });
     }
     Result<void> check(const std::vector<Atom>& atoms) const override {
@@ -198,9 +209,7 @@ class StrandBuild : public CellContent {
                     atoms.clear();
                     const TravellingPoint* before = &points[i - 1];
                     for (const TravellingPoint& end : ends) {
-                        const uint32_t atom = to.atomOf(on.keyOf(TravellingPoint::middle(before->x, end.x),
-                                                                 TravellingPoint::middle(before->y, end.y),
-                                                                 TravellingPoint::middle(before->z, end.z)));
+                        const uint32_t atom = to.atomOf(on.keyOf(TravellingPoint::middle(*before, end)));
                         if (to.isOwn(atom) && std::find(atoms.begin(), atoms.end(), atom) == atoms.end())
                             atoms.push_back(atom);
                         before = &end;
@@ -258,7 +267,7 @@ class StrandBuild : public CellContent {
 
     Result<CellProduct> make(const WorkCell& cell, const std::vector<uint8_t>& input,
                              const std::vector<FromBelow>& below) const override {
-        return buildStrandCell(cell, input, below, frame(), settings_.leafSegments);
+        return buildStrandCell(cell, input, below, frame(), settings_.leafSegments, facts_.fineness);
     }
 
     uint64_t take(uint64_t at, const std::vector<uint8_t>& bytes) override {
@@ -282,8 +291,10 @@ class StrandBuild : public CellContent {
         description.isStrands = true;
         description.points = facts_.parts;
         description.roundingUnits = rounding_ * facts_.unit;
-        description.boundsMin = description.focusMin = facts_.lo;
-        description.boundsMax = description.focusMax = facts_.hi;
+        description.boundsMin = facts_.lo;
+        description.boundsMax = facts_.hi;
+        description.focusMin = facts_.focusLow;
+        description.focusMax = facts_.focusHigh;
         description.hasColour = facts_.hasColour;
         description.hasNormals = description.isReflectance = true;
         description.up = facts_.up;
@@ -307,12 +318,38 @@ class StrandBuild : public CellContent {
 
     /// What is known after reading everything once, and what a resumed build has to know.
     struct Facts {
-        glm::dvec3 lo{1e300}, hi{-1e300}, up{0, 0, 1};
+        glm::dvec3 lo{1e300}, hi{-1e300}, focusLow{0}, focusHigh{0}, up{0, 0, 1};
         double unit = 1;
+        Fineness fineness;
         uint64_t given = 0, segments = 0, parts = 0;  ///< of the input, of clean strands, and divided
         uint32_t rootLog2 = kRootLog2, keyLevels = 0;
         bool hasColour = false;
     };
+    /// What most strands are is told apart however far from them, or from each other, strands lie.
+    void refine(double extent, const std::vector<glm::dvec3>& sample, double detail) {
+        const double dense = denseExtent(sample);
+        constexpr size_t kFew = 64;  // of fewer, one in fifty cannot be told from the others
+        const bool isFarOut = dense > 0 && extent > kFar * dense && sample.size() >= kFew;
+        if (isFarOut) {
+            const DenseBox box = denseBox(sample);
+            facts_.focusLow = box.lo;
+            facts_.focusHigh = box.hi;
+        } else {
+            facts_.focusLow = facts_.lo;
+            facts_.focusHigh = facts_.hi;
+        }
+        const double wanted = isFarOut ? std::min(detail, dense * std::exp2(-double{kDeepest})) : detail;
+        const bool isFar = isFarOut || 4 * facts_.unit > detail;
+        if (!isFar) return;
+        for (; facts_.rootLog2 < kMostRootLog2 && kFineSteps * facts_.unit > wanted; ++facts_.rootLog2)
+            facts_.unit *= 0.5;
+        facts_.fineness.stepsInDetail = kFineSteps;
+        // (The root of what is not far out, alone, has 2^15 steps.)
+        if (isFarOut) facts_.fineness.mostStep = std::max(dense * 0x1p-14 / facts_.unit, 0x1p-6);
+        // Whole steps from zero, so that sums with it are as exact as doubles are.
+        const glm::dvec3 whole = glm::floor(facts_.lo / facts_.unit) * facts_.unit, size = facts_.hi - whole;
+        if (std::max({size.x, size.y, size.z}) < facts_.unit * (std::exp2(facts_.rootLog2) - 1)) facts_.lo = whole;
+    }
     glm::dvec3 onLattice(const glm::dvec3& p) const { return (p - facts_.lo) / facts_.unit; }
 
     StrandPoint pointOf(const StrandSet& set, size_t s, uint32_t i) const {

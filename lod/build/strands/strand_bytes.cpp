@@ -11,12 +11,16 @@
 namespace stipple::lod {
 
 TravellingPoint::TravellingPoint(const StrandPoint& p) {
-    const auto step = [](double v) {
-        return static_cast<uint32_t>(std::clamp(std::floor(std::ldexp(v, kStepBits) + 0.5), 0.0, 4294967295.0));
+    constexpr double kLast = 0x1p53 - 1;
+    static_assert(kPlaceBits == 53);
+    const auto step = [kLast](double v) {
+        return toWhole<uint64_t>(std::clamp(std::floor(std::ldexp(v, kStepBits) + 0.5), 0.0, kLast));
     };
-    x = step(p.p.x);
-    y = step(p.p.y);
-    z = step(p.p.z);
+    const Place place{step(p.p.x), step(p.p.y), step(p.p.z)};
+    x = static_cast<uint32_t>(place[0]);
+    y = static_cast<uint32_t>(place[1]);
+    z = static_cast<uint32_t>(place[2]);
+    high = highOf(place);
     radius = std::bit_cast<float>((std::bit_cast<uint32_t>(p.radius) + 0x80u) & ~0xffu);
     direction = roundedNormal<16>(p.direction);
     colour = p.colour;
@@ -24,7 +28,8 @@ TravellingPoint::TravellingPoint(const StrandPoint& p) {
 
 StrandPoint TravellingPoint::point() const {
     StrandPoint p;
-    p.p = glm::dvec3(x, y, z) / std::exp2(kStepBits);
+    const Place place = steps();
+    p.p = glm::dvec3(place[0], place[1], place[2]) / std::exp2(kStepBits);
     p.radius = radius;
     p.direction = shared::octDecode(direction);
     p.colour = colour;

@@ -26,8 +26,8 @@ struct StrandNode {
 
 class StrandCell {
   public:
-    StrandCell(const WorkCell& cell, const Frame& frame, uint32_t leafSegments)
-        : frame_(frame), leafSegments_(leafSegments) {
+    StrandCell(const WorkCell& cell, const Frame& frame, uint32_t leafSegments, const Fineness& fineness)
+        : frame_(frame), leafSegments_(leafSegments), fineness_(fineness) {
         nodes_.push_back(nodeAt(static_cast<uint32_t>(cell.level), cell.key));
     }
 
@@ -123,9 +123,7 @@ class StrandCell {
             divide(points[i - 1], points[i], longest, ends_);
             TravellingPoint before = points[i - 1];
             for (const TravellingPoint& end : ends_) {
-                const Key key =
-                    frame_.keyOf(TravellingPoint::middle(before.x, end.x), TravellingPoint::middle(before.y, end.y),
-                                 TravellingPoint::middle(before.z, end.z));
+                const Key key = frame_.keyOf(TravellingPoint::middle(before, end));
                 if (key >> shift == own.key >> shift) {
                     StrandPart part;
                     part.a = addPoint(before, run, number);
@@ -149,7 +147,7 @@ class StrandCell {
             p.number = number;
             p.isRibbon = run.isRibbon;
             points_.push_back(p);
-            places_.push_back({from.x, from.y, from.z});
+            places_.push_back(from.steps());
         }
         return static_cast<uint32_t>(points_.size() - 1);
     }
@@ -172,7 +170,7 @@ class StrandCell {
         size_t coarse = 0;
         for (const StrandPart& p : node.parts) {
             const double length = glm::length(points_[p.b].p - points_[p.a].p);
-            coarse += isCoarseStep(step, detailOf(double{std::max(p.radiusA, p.radiusB)}, length)) ? 1 : 0;
+            coarse += fineness_.isCoarse(step, detailOf(double{std::max(p.radiusA, p.radiusB)}, length)) ? 1 : 0;
         }
         return coarse * kShare > node.parts.size();
     }
@@ -186,9 +184,9 @@ class StrandCell {
             const uint32_t bit = frame_.rootLog2 - level - 1;
             std::array<std::vector<StrandPart>, 8> parts;
             for (const StrandPart& p : nodes_[i].parts) {
+                const Place middle = TravellingPoint::middle(places_[p.a], places_[p.b]);
                 size_t octant = 0;
-                for (size_t a = 0; a < 3; ++a)
-                    octant |= (TravellingPoint::middle(places_[p.a].at(a), places_[p.b].at(a)) >> bit & 1u) << a;
+                for (size_t a = 0; a < 3; ++a) octant |= (middle.at(a) >> bit & 1u) << a;
                 parts.at(octant).push_back(p);
             }
             nodes_[i].node.firstChild = static_cast<uint32_t>(nodes_.size());
@@ -389,9 +387,10 @@ class StrandCell {
 
     const Frame& frame_;
     const uint32_t leafSegments_;
+    const Fineness fineness_;
     std::vector<StrandPoint> points_;
-    std::vector<std::array<uint32_t, 3>> places_;  ///< of an atom's points, as they travelled
-    std::vector<StrandNode> nodes_;                ///< the first one is the cell's own
+    std::vector<Place> places_;      ///< of an atom's points, as they travelled
+    std::vector<StrandNode> nodes_;  ///< the first one is the cell's own
     std::vector<TravellingPoint> ends_;
     size_t firstOwn_ = 0;  ///< 0: all nodes are to be made
 };
@@ -399,8 +398,9 @@ class StrandCell {
 }  // namespace
 
 Result<CellProduct> buildStrandCell(const WorkCell& cell, const std::vector<uint8_t>& input,
-                                    const std::vector<FromBelow>& below, const Frame& frame, uint32_t leafSegments) {
-    StrandCell work(cell, frame, leafSegments);
+                                    const std::vector<FromBelow>& below, const Frame& frame, uint32_t leafSegments,
+                                    const Fineness& fineness) {
+    StrandCell work(cell, frame, leafSegments, fineness);
     if (cell.atom != WorkCell::kNone) {
         STIPPLE_TRY(work.takeInput(input));
     } else {

@@ -7,17 +7,24 @@
 
 namespace stipple::lod {
 
+/// What is asked of the steps of leaves.
+struct Fineness {
+    double stepsInDetail = 8;  ///< of what is visible of a segment
+    double mostStep = 1e300;   ///< lattice units
+    bool isCoarse(double step, double detail) const { return stepsInDetail * step > detail || step > mostStep; }
+};
+
 /// Builds the subtree of an atom, or joins those that came up from the octants of a cell. All nodes but the topmost are
 /// encoded: that waits for its parent, as its order needs the parent's codes. `leafSegments`: cells with more are
-/// divided, down to `frame.keyLevels`.
+/// divided, down to `frame.keyLevels`, and so are those that are too coarse for `fineness`.
 Result<CellProduct> buildStrandCell(const WorkCell& cell, const std::vector<uint8_t>& input,
-                                    const std::vector<FromBelow>& below, const Frame& frame, uint32_t leafSegments);
+                                    const std::vector<FromBelow>& below, const Frame& frame, uint32_t leafSegments,
+                                    const Fineness& fineness);
 
 /// Distance between places that a node with cells of this edge tells apart.
 inline double strandStep(double cell) { return cell / 32768; }
 /// What can be seen of a segment: its radius; of a very thin one how it lies.
 inline double detailOf(double radius, double length) { return std::max(radius, length / 64); }
-inline bool isCoarseStep(double step, double detail) { return 8 * step > detail; }
 
 /// What a product's table holds.
 struct StrandTable {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "lod/build/octree/bytes.h"
+#include "lod/build/octree/frame.h"
 #include "lod/strands.h"
 
 namespace stipple::lod {
@@ -51,20 +52,26 @@ struct StrandMerge {
 StrandMerge mergeParts(const std::vector<StrandPoint>& points, const std::vector<StrandPart>& children,
                        const StrandLevel& level);
 
-/// A point as it travels, with no more bits than matter: places to a quarter of a lattice unit (2^-26 of the extent),
+/// A point as it travels, with no more bits than matter: places to a quarter of a lattice unit (2^-26 of the extent, or
+/// finer where strands lie far from each other),
 /// directions to 0.06 degrees, radii to 2^-17 of themselves.
 struct TravellingPoint {
     static constexpr uint32_t kStepBits = 2;
     uint32_t x = 0, y = 0, z = 0;
     float radius = 0;
     uint32_t direction = 0, colour = 0;
+    uint64_t high = 0;  ///< see Place
     TravellingPoint() = default;
     explicit TravellingPoint(const StrandPoint& p);
     StrandPoint point() const;
-    /// Lattice coordinate of the middle of a segment.
-    static uint32_t middle(uint32_t a, uint32_t b) {
-        return static_cast<uint32_t>((uint64_t{a} + b) >> (kStepBits + 1));
+    /// In steps of a quarter of a lattice unit.
+    Place steps() const { return placeOf(x, y, z, high); }
+    /// Lattice coordinates of the middle of a segment.
+    static Place middle(const Place& a, const Place& b) {
+        constexpr uint32_t kShift = kStepBits + 1;
+        return {(a[0] + b[0]) >> kShift, (a[1] + b[1]) >> kShift, (a[2] + b[2]) >> kShift};
     }
+    static Place middle(const TravellingPoint& a, const TravellingPoint& b) { return middle(a.steps(), b.steps()); }
     /// Largest distance from where the point was, lattice units.
     static double rounding() { return std::exp2(-1.0 - kStepBits) * std::sqrt(3.0); }
 };

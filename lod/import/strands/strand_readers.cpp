@@ -34,6 +34,7 @@ Result<StrandSource> openStrands(const std::string& path) {
     source.vertices = file->sizeBytes() / 12;
     source.identity = [path] { return fileIdentity(path); };
     const std::string e = extensionOf(path);
+    source.isPlant = e != ".swc" && e != ".trk" && e != ".hair";  // of cylinder models trees are made
     if (e == ".trk") {
         source.read = [file, path](const StrandSource::Take& take) { return readTrk(Cursor(file, 0), path, take); };
         return source;
@@ -54,6 +55,7 @@ Result<StrandSource> openStrands(const std::string& path) {
     STIPPLE_ASSIGN(StrandSet set, e == ".swc" ? readSwc(text, path) : readQsm(text, path));
     StrandSource whole = sourceOf(std::move(set));
     whole.identity = source.identity;
+    whole.isPlant = source.isPlant;
     return whole;
 }
 

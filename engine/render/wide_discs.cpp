@@ -1,0 +1,40 @@
+#include "engine/render/wide_discs.h"
+
+#include <algorithm>
+
+#include "shaders/shared/wide_disc.h"
+
+namespace stipple::render {
+
+Result<void> GreatestRadii::upload(streaming::ChunkKey key, const lod::Chunk& chunk) {
+    uint32_t code = 0;
+    for (const shared::PointRecord& r : chunk.records) code = std::max(code, shared::recordRadiusCode(r) + 1);
+    if (codes_.size() <= key.source) codes_.resize(key.source + 1);
+    auto& codes = codes_[key.source];
+    if (codes.size() <= key.node) codes.resize(key.node + 1);
+    codes[key.node] = static_cast<uint8_t>(std::min(code, 255u));
+    return backend_.upload(key, chunk);
+}
+
+float GreatestRadii::shareOf(streaming::ChunkKey key) const {
+    if (key.source >= codes_.size() || key.node >= codes_[key.source].size()) return 0;
+    const uint32_t code = codes_[key.source][key.node];
+    return code == 0 ? 0 : code == 255 ? 1 : shared::radiusFraction(code - 1);
+}
+
+void markWideDiscs(const GreatestRadii& radii, DrawList& draws) {
+    const shared::FrameConstants& f = draws.frame;
+    const double perFocal = double{shared::wideRadius(f.width, f.height)} / double{f.focal};
+    draws.hasWideDiscs = false;
+    for (size_t i = 0; i < draws.nodes.size(); ++i) {
+        shared::DrawNode& d = draws.nodes[i];
+        const auto least = [](float step) { return 65536 * std::min(0.0, double{step}); };
+        const double nearest = double{d.base.z} + least(d.axisX.z) + least(d.axisY.z) + least(d.axisZ.z);
+        const double radius = 1.01 * double{d.edge} * double{f.supportScale * radii.shareOf(draws.keys[i])};  // (fp32)
+        if (!(radius > perFocal * nearest)) continue;
+        d.octantMask |= shared::kNodeWide;
+        draws.hasWideDiscs = true;
+    }
+}
+
+}  // namespace stipple::render

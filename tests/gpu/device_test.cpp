@@ -1,0 +1,81 @@
+// What a device can hold and which of its queues is taken: limits are asked for, and refused with their name.
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "engine/gpu/gpu_backend.h"
+#include "tests/support/support.h"
+
+namespace stipple::gpu {
+namespace {
+
+VkQueueFamilyProperties family(VkQueueFlags flags, uint32_t timestampBits = 64) {
+    return {flags, 1, timestampBits, {1, 1, 1}};
+}
+
+TEST(Device, AQueueForComputeAloneSufficesWithoutAWindow) {
+    const auto copies = family(VK_QUEUE_TRANSFER_BIT), computes = family(VK_QUEUE_COMPUTE_BIT),
+               all = family(VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT), timeless = family(VK_QUEUE_COMPUTE_BIT, 0);
+    EXPECT_EQ(pickQueueFamily(std::array{copies, computes}, false), 1u);
+    EXPECT_EQ(pickQueueFamily(std::array{copies, computes}, true), std::nullopt);
+    EXPECT_EQ(pickQueueFamily(std::array{computes, all}, true), 1u);
+    EXPECT_EQ(pickQueueFamily(std::array{copies}, false), std::nullopt);
+    EXPECT_EQ(pickQueueFamily(std::array{timeless}, false), 0u);
+    EXPECT_EQ(pickQueueFamily(std::array{timeless, computes}, false), 1u);
+}
+
+TEST(Device, ABufferBeyondALimitIsRefusedByTheNameOfTheLimit) {
+    const DeviceLimits limits{uint64_t{1000} << 20, uint64_t{2000} << 20};
+    constexpr VkBufferUsageFlags kBound = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
+                                 kCopied = VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+    const auto bytes = [&](uint64_t megabytes, VkBufferUsageFlags usage) {
+        return roomFor(limits, megabytes << 20, usage, "texels", "a card");
+    };
+    EXPECT_EQ(*bytes(100, kBound), uint64_t{125} << 20);
+    EXPECT_EQ(*bytes(900, kBound), uint64_t{1000} << 20);  // no more than may be bound
+    EXPECT_EQ(*bytes(1000, kBound), uint64_t{1000} << 20);
+    const auto refused = bytes(1001, kBound);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().kind, ErrorKind::device);
+    EXPECT_NE(refused.error().line().find("maxStorageBufferRange"), std::string::npos) << refused.error().line();
+    EXPECT_NE(refused.error().line().find("1001 MB"), std::string::npos) << refused.error().line();
+    EXPECT_TRUE(bytes(1001, kCopied));
+    const auto tooLarge = bytes(5000, kCopied);
+    ASSERT_FALSE(tooLarge);
+    EXPECT_NE(tooLarge.error().line().find("maxBufferSize"), std::string::npos) << tooLarge.error().line();
+}
+
+/// At 4K the pyramid has 221 MB. A device that binds less says so, and goes on with smaller pictures; none is asked for
+/// what it does not promise.
+TEST(Device, A4KPictureIsDrawnOrRefusedAndValidationIsSilent) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    test::writePly(folder / "a.ply", test::bumpySphere(2'000, 1));
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    auto device = Device::create({});
+    ASSERT_TRUE(device) << device.error().line();
+    GpuSettings settings;
+    settings.validation = true;
+    const auto backend = makeGpuBackend(settings);
+    ASSERT_TRUE(backend) << backend.error().line();
+    const std::vector<render::PlacedStore> placed{{store, {}, {}}};
+    const auto state = render::makeFrameState(placed, **backend, *executor, {});
+    const auto drawn =
+        render::renderUntilComplete(*state, test::fitView(*store, 3840, 2160), render::FrameSettings{}, *executor);
+    constexpr uint64_t kPyramid = uint64_t{3840} * 2160 * 5 * 4 * 4 / 3;
+    if ((*device)->limits.storageRange >= kPyramid + (1 << 20)) {
+        ASSERT_TRUE(drawn) << drawn.error().line();
+        EXPECT_GT(state->image.rgba.size(), 0u);
+    } else {
+        ASSERT_FALSE(drawn) << "drawn beyond a limit of " << (*device)->limits.storageRange;
+        EXPECT_EQ(drawn.error().kind, ErrorKind::device);
+        EXPECT_NE(drawn.error().line().find("maxStorageBufferRange"), std::string::npos) << drawn.error().line();
+    }
+    const auto small =
+        render::renderUntilComplete(*state, test::fitView(*store, 320, 240), render::FrameSettings{}, *executor);
+    EXPECT_TRUE(small) << small.error().line();
+    for (const std::string& message : validationMessages(**backend)) ADD_FAILURE() << message;
+}
+
+}  // namespace
+}  // namespace stipple::gpu

@@ -1,0 +1,54 @@
+// What discs cover and where they are, by brute force in fp64: rays of pixels' centres against every disc near them,
+// distances of places from the nearest disc. Decoded from the stored records; it knows nothing of slopes, pyramids and
+// kernels.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "engine/reference/decode.h"
+#include "engine/render/frame.h"
+#include "lod/store.h"
+
+namespace stipple::test {
+
+/// All leaf records of a store.
+std::vector<reference::Disc> leafDiscs(const lod::Store& store);
+/// The records that a frame of this one store draws, with the radii that it draws them with.
+std::vector<reference::Disc> discsOfCut(const lod::Store& store, const render::FrameState& state);
+
+/// Direction of the ray through a place on the image, with z = 1 along `forward`, so that t is depth; world space.
+glm::dvec3 rayThrough(const lod::View& view, double x, double y);
+
+/// Which discs the rays of all pixels' centres meet.
+struct RayHits {
+    uint32_t width = 0, height = 0;
+    std::vector<std::vector<double>> depths;  ///< of each pixel, nearest first
+    bool isCovered(size_t pixel) const { return !depths[pixel].empty(); }
+};
+/// Rays against discs as the frame draws them: at least `leastPixels` in radius, those of strays at most a 128th of the
+/// picture's height (4 pixels); a disc of one side only from there; without a normal it faces the eye.
+RayHits hitDiscs(const std::vector<reference::Disc>& discs, const lod::View& view, double leastPixels = 1);
+
+/// Distances from the nearest of many discs.
+class DiscField {
+  public:
+    explicit DiscField(std::vector<reference::Disc> discs);
+    /// World units; `limit` where none is nearer.
+    double distance(const glm::dvec3& place, double limit) const;
+
+  private:
+    struct Node {
+        glm::dvec3 lo{0}, hi{0};
+        uint32_t begin = 0, end = 0, left = 0;  ///< left: 0 at leaves; the other child follows it
+    };
+    void split(uint32_t node);
+
+    std::vector<reference::Disc> discs_;
+    std::vector<Node> nodes_;
+};
+/// Distance of a place from one disc; without a normal it is a ball.
+double distanceTo(const reference::Disc& disc, const glm::dvec3& place);
+
+}  // namespace stipple::test
