@@ -66,7 +66,7 @@ picture scan_flat.exr %scan --size 320x181 --alpha --shade lit
 picture scan_points %scan --size 640x360 --mode points
 picture scan_points.exr %scan --size 321x200 --mode points --alpha
 picture scan_budget %scan --size 640x360 --budget-points 20k
-picture scan_resident %scan --size 320x200 --resident 2M
+picture scan_resident %scan --size 320x200 --resident 3M
 picture scan_close %scan --size 480x270 --eye=500002,5399990,304 --target=500002,5400000,301 --shade lit
 picture scan_within %scan --size 320x241 --eye=500000.5,5400000.5,300.6 --target=500003,5400002,300.5 --fov 100
 picture scan_fine %scan_fine --size 640x360 --shade lit
