@@ -14,8 +14,8 @@
 #include "engine/base/text.h"
 #include "engine/base/units.h"
 #include "engine/scene/scene_files.h"
-#include "lod/build/build_version.h"
-#include "lod/build/octree/journal.h"
+#include "lod/builder/build_version.h"
+#include "lod/builder/octree/journal.h"
 #include "lod/import/import.h"
 
 namespace stipple::app {

@@ -15,7 +15,7 @@
 #include "engine/render/frame.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/surfels.h"
-#include "lod/build/build.h"
+#include "lod/builder/build.h"
 #include "lod/store.h"
 
 namespace stipple::app {

@@ -7,8 +7,8 @@
 #include "engine/base/process.h"
 #include "engine/scene/strand_fit.h"
 #include "engine/scene/triangles.h"
-#include "lod/build/mesh/mesh_build.h"
-#include "lod/build/strands/strand_build.h"
+#include "lod/builder/mesh/mesh_build.h"
+#include "lod/builder/strands/strand_build.h"
 
 namespace stipple::app {
 namespace {

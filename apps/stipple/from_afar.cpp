@@ -7,8 +7,8 @@
 #include <filesystem>
 
 #include "apps/stipple/cache.h"
-#include "lod/build/progressive/progressive_build.h"
-#include "lod/build/strands/strand_coverage.h"
+#include "lod/builder/progressive/progressive_build.h"
+#include "lod/builder/strands/strand_coverage.h"
 #include "lod/nearest.h"
 
 namespace stipple::app {

@@ -7,7 +7,7 @@
 
 #include "apps/stipple/common.h"
 #include "engine/scene/triangles.h"
-#include "lod/build/progressive/progressive_build.h"
+#include "lod/builder/progressive/progressive_build.h"
 #include "lod/strands.h"
 
 namespace stipple::app {
@@ -38,7 +38,7 @@ class StrandModel {
 };
 using SharedModel = std::shared_ptr<StrandModel>;
 
-/// Of strands, which `of` holds: discs, as few as the view allows (lod/build/progressive). Null where there are few
+/// Of strands, which `of` holds: discs, as few as the view allows (lod/builder/progressive). Null where there are few
 /// strands.
 Result<StandIns> strandsFromAfar(const SharedModel& model, const lod::Store& of, const std::string& input,
                                  const std::string& part, const BuildOptions& build, Executor& executor,

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "apps/stipple/common.h"
-#include "lod/build/mesh/mesh_build.h"
+#include "lod/builder/mesh/mesh_build.h"
 
 namespace stipple::app {
 

@@ -12,7 +12,7 @@
 #include "engine/scene/camera.h"
 #include "engine/scene/strand_fit.h"
 #include "engine/scene/triangles.h"
-#include "lod/build/mesh/mesh_build.h"
+#include "lod/builder/mesh/mesh_build.h"
 #include "tests/support/forests.h"
 
 namespace stipple {

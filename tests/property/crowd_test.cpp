@@ -8,7 +8,7 @@
 #include "engine/cpu/cpu_backend.h"
 #include "engine/reference/decode.h"
 #include "engine/scene/camera.h"
-#include "lod/build/strands/strand_coverage.h"
+#include "lod/builder/strands/strand_coverage.h"
 #include "tests/support/forests.h"
 
 namespace stipple {

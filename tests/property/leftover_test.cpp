@@ -8,8 +8,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "lod/build/build.h"
-#include "lod/build/octree/journal.h"
+#include "lod/builder/build.h"
+#include "lod/builder/octree/journal.h"
 #include "tests/support/support.h"
 
 namespace stipple::lod {

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "lod/build/build.h"
-#include "lod/build/mesh/mesh_build.h"
-#include "lod/build/strands/strand_build.h"
+#include "lod/builder/build.h"
+#include "lod/builder/mesh/mesh_build.h"
+#include "lod/builder/strands/strand_build.h"
 #include "lod/import/ply/mesh.h"
 #include "lod/import/strands/strand_readers.h"
 #include "tests/support/big_inputs.h"

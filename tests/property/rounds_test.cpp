@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/base/process.h"
-#include "lod/build/mesh/mesh_build.h"
-#include "lod/build/strands/strand_build.h"
+#include "lod/builder/mesh/mesh_build.h"
+#include "lod/builder/strands/strand_build.h"
 #include "lod/import/ply/mesh.h"
 #include "lod/import/strands/strand_readers.h"
 #include "tests/support/big_inputs.h"

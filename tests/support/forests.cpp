@@ -6,7 +6,7 @@
 
 #include "apps/grow/plants.h"
 #include "engine/scene/strands.h"
-#include "lod/build/strands/strand_coverage.h"
+#include "lod/builder/strands/strand_coverage.h"
 
 namespace stipple::test {
 

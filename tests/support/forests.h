@@ -1,7 +1,7 @@
 // A small forest for the tests: one tree that stands in many places, with what is seen of it from afar.
 #pragma once
 
-#include "lod/build/progressive/progressive_build.h"
+#include "lod/builder/progressive/progressive_build.h"
 #include "tests/support/strands.h"
 
 namespace stipple::test {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "apps/grow/meshes.h"
-#include "lod/build/mesh/mesh_build.h"
+#include "lod/builder/mesh/mesh_build.h"
 #include "lod/store.h"
 #include "tests/support/support.h"
 

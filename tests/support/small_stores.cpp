@@ -1,6 +1,6 @@
 #include <stdexcept>
 
-#include "lod/build/progressive/progressive_build.h"
+#include "lod/builder/progressive/progressive_build.h"
 #include "tests/support/crafted_store.h"
 #include "tests/support/meshes.h"
 #include "tests/support/strands.h"

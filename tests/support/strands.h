@@ -1,7 +1,7 @@
 // Strands for the tests: curls of known shape, and their stores.
 #pragma once
 
-#include "lod/build/strands/strand_build.h"
+#include "lod/builder/strands/strand_build.h"
 #include "lod/strands.h"
 #include "tests/support/support.h"
 

@@ -9,7 +9,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/rng.h"
 #include "engine/render/frame.h"
-#include "lod/build/build.h"
+#include "lod/builder/build.h"
 #include "lod/store.h"
 
 namespace stipple::test {

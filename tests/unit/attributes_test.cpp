@@ -10,7 +10,7 @@
 #include "engine/cpu/cpu_backend.h"
 #include "engine/scene/camera.h"
 #include "lod/attributes.h"
-#include "lod/build/points/rising_values.h"
+#include "lod/builder/points/rising_values.h"
 #include "lod/colour.h"
 #include "lod/import/import.h"
 #include "lod/import/las/header.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "engine/base/process.h"
-#include "lod/build/strands/strand_coverage.h"
+#include "lod/builder/strands/strand_coverage.h"
 #include "lod/strands.h"
 #include "tests/support/runs.h"
 #include "tests/support/strands.h"

@@ -14,7 +14,7 @@ allow() {
 allow shaders/shared 'shaders/shared'
 allow engine/base 'engine/base|shaders/shared'
 allow lod/import 'engine/base|shaders/shared|lod'
-allow lod/build 'engine/base|shaders/shared|lod'
+allow lod/builder 'engine/base|shaders/shared|lod'
 allow streaming 'engine/base|shaders/shared|lod|streaming'
 allow engine/scene 'engine/base|engine/scene|shaders/shared|lod'
 allow engine/render 'engine/base|engine/render|engine/scene|shaders/shared|lod|streaming'

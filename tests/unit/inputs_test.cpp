@@ -5,9 +5,9 @@
 #include <filesystem>
 
 #include "engine/base/rng.h"
-#include "lod/build/build.h"
-#include "lod/build/points/outliers.h"
-#include "lod/build/points/separation.h"
+#include "lod/builder/build.h"
+#include "lod/builder/points/outliers.h"
+#include "lod/builder/points/separation.h"
 #include "lod/import/import.h"
 #include "tests/support/support.h"
 

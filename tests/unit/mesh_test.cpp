@@ -9,7 +9,7 @@
 #include <limits>
 
 #include "engine/scene/triangles.h"
-#include "lod/build/mesh/mesh_work.h"
+#include "lod/builder/mesh/mesh_work.h"
 #include "lod/import/ply/mesh.h"
 #include "tests/support/meshes.h"
 

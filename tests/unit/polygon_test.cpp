@@ -8,7 +8,7 @@
 
 #include "engine/scene/polygon.h"
 #include "engine/scene/scene.h"
-#include "lod/build/mesh/mesh_build.h"
+#include "lod/builder/mesh/mesh_build.h"
 #include "lod/import/ply/mesh.h"
 #include "tests/support/runs.h"
 #include "tests/support/support.h"

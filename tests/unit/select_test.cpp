@@ -5,7 +5,7 @@
 #include <bit>
 #include <vector>
 
-#include "lod/build/points/select.h"
+#include "lod/builder/points/select.h"
 #include "tests/support/support.h"
 
 namespace stipple::lod {

@@ -1,0 +1,442 @@
+// A build of points as a straight line: survey, count, distribute, then bucket by bucket estimate, build, write;
+// verify.
+#include "lod/builder/build.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "engine/base/hash.h"
+#include "engine/base/ordered.h"
+#include "engine/base/queue.h"
+#include "lod/builder/build_version.h"
+#include "lod/builder/octree/assemble.h"
+#include "lod/builder/points/distribution.h"
+#include "lod/builder/points/estimate.h"
+#include "lod/builder/points/exchange.h"
+#include "lod/store.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr uint64_t kVerifiedNodes = 512;  ///< at the end of a build; `info --verify` checks all
+
+/// The axis of the format or of the settings; away from the Earth's centre for coordinates that are relative to it.
+glm::dvec3 upOf(const PointInput& input, const BuildSettings& settings, const StoreDescription& description) {
+    constexpr double kLeastRadius = 6.33e6, kGreatestRadius = 6.40e6;  // metres, sea floor to mountain tops
+    const glm::dvec3 centre = 0.5 * (description.boundsMin + description.boundsMax);
+    const double radius = glm::length(centre) * description.metresPerUnit;
+    const double extent = glm::length(description.boundsMax - description.boundsMin) * description.metresPerUnit;
+    const bool isGeocentric =
+        radius > kLeastRadius && radius < kGreatestRadius && extent < 1e5 && std::abs(centre.z) > 1e5;
+    if (!settings.up && isGeocentric && !input.crs.isDegrees && (input.crs.isGeocentric || input.crs.label().empty()))
+        return glm::normalize(centre);
+    return axisVector(input.up);
+}
+
+/// How the memory is shared out.
+struct MemoryPlan {
+    uint64_t bucketPoints = 0, bufferBytes = 0;
+    bool isOnDisk = false;
+};
+
+class PointBuild {
+  public:
+    PointBuild(std::string output, const BuildSettings& settings, Executor& executor, Progress& progress,
+               PointInput input, BuildReport report)
+        : output_(std::move(output)),
+          settings_(settings),
+          executor_(executor),
+          progress_(progress),
+          input_(std::move(input)),
+          report_(std::move(report)),
+          clock_(report_),
+          workers_(std::max(executor.threads(), 1)),
+          layout_(input_.hasColour, input_.hasNormal, input_.hasRadius, input_.attributes()) {}
+
+    Result<BuildReport> run() {
+        STIPPLE_TRY(agree(settings_.ranks, planMemory()));
+        // Enough buckets for all, and the same ones whatever each machine has.
+        memory_.bucketPoints = leastOf(memory_.bucketPoints);
+        STIPPLE_ASSIGN(Workspace opened, Workspace::open(output_, settings_, identity(), memory_.isOnDisk));
+        workspace_.emplace(std::move(opened));
+        std::vector<Journal::Entry> entries = workspace_->takeEntries();
+        report_.isResumed = !entries.empty();
+        spread_.emplace(input_, settings_, layout_,
+                        Distribution::Plan{workers_, memory_.bufferBytes, memory_.bucketPoints, wantsEstimates()},
+                        *workspace_, executor_, progress_);
+        STIPPLE_TRY(agree(settings_.ranks, spread_->run(entries, report_, clock_)));
+        std::erase_if(entries, [](const Journal::Entry& e) { return e.what != Journal::What::done; });
+        description_ = describe();
+        ranges_ = ValueRanges(frame(), input_.points, description_.up);
+        upper_.emplace(frame());
+        STIPPLE_TRY(settings_.ranks != nullptr ? buildTogether() : buildAlone(entries));
+        report_.seconds = clock_.seconds();
+        return std::move(report_);
+    }
+
+  private:
+    Result<void> buildAlone(std::vector<Journal::Entry>& entries) {
+        STIPPLE_TRY(openWriter(entries));
+        entries = {};
+        const size_t first = batches_.size();
+        for (size_t b = 0; b < first; ++b) done_ += plan().buckets[b].points;
+        Result<void> built = inOrder<BuiltBucket>(
+            executor_, workers_, first, plan().buckets.size(),
+            [&](size_t index) -> Result<BuiltBucket> {
+                STIPPLE_TRY(workspace_->checkStopped());
+                return buildBucket(index);
+            },
+            [&](size_t index, BuiltBucket bucket) {
+                progress_.update("build", done_ += plan().buckets[index].points, input_.points);
+                return commit(index, std::move(bucket));
+            });
+        if (!built) return built;
+        clock_.ends("build");
+        return finish();
+    }
+
+    /// With others: each builds its share of the buckets, the first one puts them together. What was built stays until
+    /// the end, and an interrupted build goes on after that.
+    Result<void> buildTogether() {
+        Ranks& ranks = *settings_.ranks;
+        std::vector<size_t> own;
+        for (size_t b = 0; b < plan().buckets.size(); ++b)
+            if (workspace_->isOwn(b) && !isBuilt(workspace_->folder(), b)) own.push_back(b);
+        const Result<void> made = inOrder<BuiltBucket>(
+            executor_, workers_, 0, own.size(),
+            [&](size_t k) -> Result<BuiltBucket> {
+                STIPPLE_TRY(workspace_->checkStopped());
+                return buildBucket(own[k]);
+            },
+            [&](size_t k, const BuiltBucket& built) -> Result<void> {
+                progress_.update("build", done_ += plan().buckets[own[k]].points, input_.points);
+                STIPPLE_TRY(saveBuilt(workspace_->folder(), own[k], built));
+                removeBucket(own[k]);
+                return {};
+            });
+        STIPPLE_TRY(agree(&ranks, made));
+        clock_.ends("build");
+        return agree(&ranks, workspace_->isFirst() ? putTogether() : Result<void>());
+    }
+    Result<void> putTogether() {
+        STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output_));
+        writer_.emplace(std::move(writer));
+        const ValueRanges empty = ranges_;
+        for (size_t b = 0; b < plan().buckets.size(); ++b) {
+            STIPPLE_TRY(workspace_->checkStopped());
+            STIPPLE_ASSIGN(BuiltBucket built, loadBuilt(workspace_->folder(), b, empty));
+            STIPPLE_TRY(commit(b, std::move(built)));
+        }
+        clock_.ends("put together");
+        return finish();
+    }
+    void removeBucket(size_t index) {
+        spread_->buckets()[index]->points.remove();
+        spread_->buckets()[index]->ghosts.remove();
+    }
+
+    uint64_t pointBytes() const {  // that a worker needs for each point of its bucket
+        uint64_t bytes = 128;
+        for (const AttributeInfo& a : input_.attributes()) bytes += 4 * bytesOf(a.type);
+        return bytes;
+    }
+
+    Result<void> planMemory() {
+        constexpr uint64_t kFixed = uint64_t{72} << 20, kReader = uint64_t{12} << 20;
+        const auto fixedFor = [&](uint64_t threads) { return kFixed + threads * kReader; };
+        const auto leastFor = [&](uint64_t threads) {
+            return fixedFor(threads) + (threads + 1) * kAtomPoints * pointBytes() + input_.declared() / 2;
+        };
+        // Fewer threads rather than more memory.
+        while (workers_ > 1 && leastFor(static_cast<uint64_t>(workers_)) > settings_.memoryBytes) --workers_;
+        const auto workers = static_cast<uint64_t>(workers_);
+        const uint64_t fixed = fixedFor(workers), least = leastFor(workers);
+        const uint64_t n = input_.declared(), all = n * layout_.bytes();
+        // What is small needs no more than its own points.
+        const uint64_t small = fixed + all + 2 * n * pointBytes();
+        if (settings_.memoryBytes < std::min(least, small))
+            return fail(ErrorKind::budget,
+                        fmt::format("building {} points needs {} MiB, but --memory allows {} MiB", n,
+                                    (std::min(least, small) >> 20) + 1, settings_.memoryBytes >> 20),
+                        input_.firstPath(), fmt::format("give --memory {}M", (std::min(least, small) >> 20) + 1));
+        const uint64_t room = settings_.memoryBytes - fixed;
+        const auto bucketOf = [&](uint64_t bytes) {
+            return std::min<uint64_t>(bytes / ((workers + 1) * pointBytes()), uint64_t{1} << 20);
+        };
+        // (Half of the memory at most: what neighbours see, buffers and the allocator's own losses come on top.)
+        memory_.isOnDisk = 2 * all + (workers + 1) * kAtomPoints * pointBytes() > room && small > room + fixed;
+        memory_.bufferBytes = std::min<uint64_t>(room / 8, uint64_t{64} << 20);
+        memory_.bucketPoints = bucketOf(memory_.isOnDisk ? room / 2 : room / 4);
+        // Enough of them for all threads, but none smaller than an atom.
+        const uint64_t ranks = settings_.ranks == nullptr ? 1 : static_cast<uint64_t>(settings_.ranks->count());
+        memory_.bucketPoints =
+            std::max<uint64_t>(std::min<uint64_t>(memory_.bucketPoints, n / (6 * workers * ranks)), kAtomPoints);
+        memory_.isOnDisk = memory_.isOnDisk || settings_.ranks != nullptr;
+        return {};
+    }
+
+    uint64_t identity() const {
+        std::string text =
+            fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}|{}", kStoreVersion, kBuildVersion, input_.identity(),
+                        static_cast<int>(settings_.normals), settings_.estimateRadii,
+                        settings_.up ? static_cast<int>(*settings_.up) : -1, settings_.leafRecords, settings_.skipBad,
+                        settings_.fineNormals, settings_.mergeDuplicates, settings_.dropOutliers);
+        for (const AttributeInfo& a : input_.attributes()) text.append("|").append(a.name);
+        text.append("|").append(std::filesystem::absolute(output_).lexically_normal().string());
+        return hashBytes(text.data(), text.size());
+    }
+    bool wantsEstimates() const { return settings_.estimateRadii || settings_.normals == NormalsMode::automatic; }
+    uint64_t leastOf(uint64_t value) const {
+        if (settings_.ranks == nullptr) return value;
+        ByteWriter to;
+        to.put(value);
+        for (const std::vector<uint8_t>& bytes : settings_.ranks->gather(to.bytes())) {
+            uint64_t theirs = value;
+            ByteReader(bytes).get(theirs);
+            value = std::min(value, theirs);
+        }
+        return value;
+    }
+    const Frame& frame() const { return spread_->frame(); }
+    const BucketPlan& plan() const { return spread_->plan(); }
+
+    // ---- buckets ----
+
+    Result<void> openWriter(const std::vector<Journal::Entry>& entries) {
+        if (!workspace_->isOnDisk()) {
+            STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output_));
+            writer_.emplace(std::move(writer));
+            return {};
+        }
+        uint64_t written = 0;
+        for (const Journal::Entry& entry : entries) {
+            ByteReader from(entry.payload);
+            NodeBatch batch;
+            uint64_t merged = 0, tooMany = 0;
+            from.get(written);
+            from.get(merged);
+            from.get(tooMany);
+            from.get(batch.nodes);
+            from.get(batch.counts);
+            ValueRanges ranges(frame(), input_.points, description_.up);
+            ranges.load(from);
+            upper_->loadChanges(from);
+            if (!from.isWhole()) return tl::unexpected(workspace_->damaged());
+            merged_ += merged;
+            tooMany_ += tooMany;
+            ranges_.add(ranges);
+            batches_.push_back(std::move(batch));
+        }
+        if (!entries.empty())
+            progress_.say(fmt::format("going on with the interrupted build: {} of {} buckets are done", entries.size(),
+                                      plan().buckets.size()));
+        STIPPLE_TRY(checkWritten());
+        STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::resume(output_, workspace_->partialPath(), written));
+        writer_.emplace(std::move(writer));
+        return {};
+    }
+
+    /// Are the chunks that an earlier run wrote still what they were?
+    Result<void> checkWritten() {
+        if (batches_.empty()) return {};
+        STIPPLE_ASSIGN(const InputFile file, InputFile::open(workspace_->partialPath()));
+        CompletionQueue<Error> errors;
+        executor_.parallelFor(batches_.size(), 1, [&](size_t begin, size_t end) {
+            std::vector<uint8_t> bytes;
+            for (size_t b = begin; b < end; ++b)
+                for (const NodeBatch::Written& w : batches_[b].nodes) {
+                    bytes.resize(size_t{w.node.chunkBytes} + w.node.attributeBytes);
+                    const auto read = file.readAt(w.node.chunkOffset, bytes.data(), bytes.size());
+                    const bool isSame =
+                        read && hashBytes(bytes.data(), w.node.chunkBytes) == w.node.chunkHash &&
+                        hashBytes(bytes.data() + w.node.chunkBytes, w.node.attributeBytes) == w.node.attributeHash;
+                    if (isSame) continue;
+                    errors.push({ErrorKind::input, "is not what was written", workspace_->partialPath(),
+                                 "begin anew with --restart"});
+                    return;
+                }
+        });
+        if (const auto found = errors.takeAll(); !found.empty()) return tl::unexpected(found.front());
+        return {};
+    }
+
+    Result<BuiltBucket> buildBucket(size_t index) {
+        const BucketPlan::Bucket& bucket = plan().buckets[index];
+        BuiltBucket out;
+        double last = nowSeconds();
+        const auto ends = [&](const char* what) {
+            out.seconds[what] += nowSeconds() - std::exchange(last, nowSeconds());
+        };
+        if (spread_->buckets()[index]->points.bytes() != bucket.points * layout_.bytes())
+            return fail(ErrorKind::input, "changed while it was read", input_.firstPath(),
+                        "build again when it is complete");
+        STIPPLE_ASSIGN(SortResult sorted, sortBucket(frame(), layout_, spread_->buckets()[index]->points,
+                                                     settings_.mergeDuplicates, 2 * spread_->bucketPoints()));
+        ends("threads: load, sort");
+        out.merged = sorted.merged;
+        out.tooMany = sorted.tooMany;
+        {
+            STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, spread_->buckets()[index]->ghosts.take());
+            const Places ghosts = sortGhosts(frame(), layout_, bytes, settings_.mergeDuplicates);
+            EstimateSettings wanted;
+            wanted.radii = settings_.estimateRadii;
+            wanted.normals = settings_.normals == NormalsMode::automatic;
+            wanted.isFine = settings_.fineNormals;
+            wanted.limitStrays = settings_.estimateRadii && !input_.hasRadius;
+            estimate(frame(), spread_->tree(), bucket.firstCell, bucket.cells, wanted, ghosts, sorted.sorted);
+        }
+        ends("threads: estimate");
+        out.ranges = ValueRanges(frame(), input_.points, description_.up);
+        uint64_t number = bucket.firstPoint;
+        const std::vector<Key>& keys = sorted.sorted.key;
+        size_t begin = 0;
+        for (const Atom& atom : bucket.atoms) {
+            const uint32_t shift = frame().shiftOf(atom.level);
+            size_t end = begin;
+            while (end < keys.size() && keys[end] >> shift == atom.key >> shift) ++end;
+            out.ranges.add(frame(), sorted.sorted.points, begin, end, number);
+            BuiltAtom built;
+            built.root = makeSubtree(frame(), sorted.sorted, begin, end, atom.level, built.batch);
+            out.atoms.push_back(std::move(built));
+            number += atom.count;
+            begin = end;
+        }
+        ends("threads: levels, encode");
+        return out;
+    }
+
+    Result<void> append(NodeBatch& batch, NodeBatch& all) {
+        STIPPLE_ASSIGN(const uint64_t at, writer_->appendEncoded(batch.bytes));
+        const auto counts = static_cast<uint32_t>(all.counts.size());
+        for (NodeBatch::Written& w : batch.nodes) {
+            w.node.chunkOffset += at;
+            w.firstCount += counts;
+            all.nodes.push_back(w);
+        }
+        all.counts.insert(all.counts.end(), batch.counts.begin(), batch.counts.end());
+        batch = {};
+        return {};
+    }
+
+    /// In the order of the buckets.
+    Result<void> commit(size_t index, BuiltBucket built) {
+        const double begun = nowSeconds();
+        for (const auto& [what, seconds] : built.seconds) report_.stageSeconds[what] += seconds;
+        NodeBatch all, between;
+        for (BuiltAtom& atom : built.atoms) {
+            upper_->closeBefore(atom.root.key, between);
+            STIPPLE_TRY(append(between, all));
+            STIPPLE_TRY(append(atom.batch, all));
+            upper_->add(std::move(atom.root));
+        }
+        merged_ += built.merged;
+        tooMany_ += built.tooMany;
+        ranges_.add(built.ranges);
+        if (workspace_->isOnDisk() && settings_.ranks == nullptr) {
+            ByteWriter to;
+            to.put(writer_->bytes());
+            to.put(built.merged);
+            to.put(built.tooMany);
+            to.put(all.nodes);
+            to.put(all.counts);
+            built.ranges.save(to);
+            upper_->saveChanges(to);
+            STIPPLE_TRY(workspace_->note(Journal::What::done, to.bytes()));
+            removeBucket(index);
+        }
+        batches_.push_back(std::move(all));
+        report_.stageSeconds["threads: append"] += nowSeconds() - begun;
+        return {};
+    }
+
+    // ---- the end ----
+
+    StoreDescription describe() const {
+        StoreDescription d;
+        d.crs = input_.crs;
+        d.metresPerUnit = input_.crs.metresPerUnit;
+        d.roundingUnits = spread_->rounding();
+        d.hasColour = input_.hasColour;
+        d.isReflectance = input_.isReflectance;
+        d.hasNormals = input_.hasNormal || settings_.normals == NormalsMode::automatic;
+        d.source = input_.source;
+        const auto& g = input_.greatest;
+        d.boundsMin = input_.origin;
+        d.boundsMax = input_.origin + input_.unit * glm::dvec3(g[0], g[1], g[2]);
+        d.up = upOf(input_, settings_, d);
+        return d;
+    }
+
+    Result<void> finish() {
+        NodeBatch last, all;
+        upper_->finish(last);
+        STIPPLE_TRY(append(last, all));
+        batches_.push_back(std::move(all));
+        Hierarchy hierarchy = assemble(frame(), batches_);
+        batches_ = {};
+        if (merged_ > 0) report_.dropped["duplicate"] += merged_;
+        if (tooMany_ > 0) report_.dropped[fmt::format("beyond {} at one place", kMostAtOnePlace)] += tooMany_;
+        description_.points = input_.points - merged_ - tooMany_;
+        description_.pointsIn = report_.pointsIn;
+        description_.dropped = report_.dropped;
+        for (const Node& node : hierarchy.nodes) description_.records += node.records;
+        ranges_.describe(frame(), input_.withoutOutliers(), description_);
+        STIPPLE_TRY(writer_->finish(hierarchy, description_));
+        clock_.ends("write");
+        report_.nodes = hierarchy.nodes.size();
+        hierarchy = {};  // its memory is needed
+        progress_.update("verify", 0, 1);
+        STIPPLE_ASSIGN(const Store store, openStore(writer_->temporaryPath()));
+        STIPPLE_TRY(verifyStore(store, executor_, kVerifiedNodes));
+        clock_.ends("verify");
+        report_.bytesOut = writer_->bytes();
+        STIPPLE_TRY(writer_->commit());
+        workspace_->remove();
+        report_.pointsOut = description_.points;
+        report_.records = description_.records;
+        report_.contentHash = writer_->contentHash();
+        return {};
+    }
+
+    const std::string output_;
+    const BuildSettings& settings_;
+    Executor& executor_;
+    Progress& progress_;
+    PointInput input_;
+    BuildReport report_;
+    StageClock clock_;  ///< what is not "threads: ..." adds up to the whole
+    int workers_;
+    RecordLayout layout_;
+    MemoryPlan memory_;
+    std::optional<Workspace> workspace_;
+    std::optional<Distribution> spread_;
+    StoreDescription description_;
+    ValueRanges ranges_;
+    std::optional<UpperTree> upper_;
+    std::optional<StoreWriter> writer_;
+    std::vector<NodeBatch> batches_;  ///< of each bucket; bytes are written
+    uint64_t done_ = 0, merged_ = 0, tooMany_ = 0;
+};
+
+}  // namespace
+
+Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std::string& output,
+                               const BuildSettings& settings, Executor& executor, Progress& progress) {
+    BuildReport report;
+    const auto tryOutput = [&]() -> Result<void> {  // an unwritable output is found first
+        if (settings.ranks != nullptr && settings.ranks->rank() > 0) return {};
+        STIPPLE_ASSIGN(const StoreWriter writer, StoreWriter::create(output));
+        return {};
+    };
+    STIPPLE_TRY(agree(settings.ranks, tryOutput()));
+    // (Shares as measured with 2M points, normals and radii estimated.)
+    progress.plan({{"survey", 2}, {"count", 3}, {"distribute", 16}, {"build", 70}, {"verify", 9}});
+    Result<PointInput> opened = PointInput::open(inputs, settings, report);
+    STIPPLE_TRY(agree(settings.ranks, opened ? Result<void>() : Result<void>(tl::unexpected(opened.error()))));
+    PointInput input = std::move(*opened);
+    return PointBuild(output, settings, executor, progress, std::move(input), std::move(report)).run();
+}
+
+}  // namespace stipple::lod

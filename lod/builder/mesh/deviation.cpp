@@ -1,0 +1,322 @@
+// The distance between two triangle surfaces with the same border, both ways.
+//
+// Measured are the corners, the middles of the edges and the centre of every triangle that is not in both. Between them
+// the distance to a piecewise flat surface rises from two sides like a tent; where its top is not at the middle, the
+// middle still has half of what the tent rises above the corners, so that excess counts twice. (A bound by convexity,
+// min over the target's triangles of the largest corner distance, was tried: it needs deep subdivision wherever a
+// triangle straddles two coplanar ones, cost ten times as much and gave errors a third larger.) The tests attack the
+// result with dense samples.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "lod/builder/mesh/mesh_work.h"
+#include "lod/triangle.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr int kColourStep = 48;  ///< sRGB steps from which colours count as different, as for points
+
+struct Nearest {
+    float distance = 3e38f;
+    uint32_t triangle = 0;
+};
+
+/// Triangles in the cells of an even grid, for nearest-triangle queries.
+class Target {
+  public:
+    Target(const std::vector<glm::vec3>& position, const std::vector<uint32_t>& indices)
+        : position_(position), indices_(indices) {
+        glm::vec3 lo(3e38f), hi(-3e38f);
+        double area = 0;
+        for (size_t i = 0; i < indices.size(); i += 3) {
+            for (size_t k = 0; k < 3; ++k) {
+                lo = glm::min(lo, position[indices[i + k]]);
+                hi = glm::max(hi, position[indices[i + k]]);
+            }
+            area += 0.5 * static_cast<double>(glm::length(glm::cross(position[indices[i + 1]] - position[indices[i]],
+                                                                     position[indices[i + 2]] - position[indices[i]])));
+        }
+        const double triangles = static_cast<double>(indices.size()) / 3;
+        lo_ = lo;
+        cell_ = std::max(static_cast<float>(std::sqrt(area / std::max(1.0, triangles)) * 2.0),
+                         std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z}) / 48);
+        cell_ = std::max(cell_, 1e-3f);
+        for (int a = 0; a < 3; ++a) size_[a] = 1 + static_cast<int>((hi[a] - lo[a]) / cell_);
+        start_.assign(static_cast<size_t>(size_.x) * static_cast<size_t>(size_.y) * static_cast<size_t>(size_.z) + 1,
+                      0);
+        spheres_.resize(indices.size() / 3);
+        for (uint32_t t = 0; t < spheres_.size(); ++t) {
+            const glm::vec3 &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
+            const glm::vec3 m = (a + b + c) * (1.0f / 3);
+            const float r = std::max({glm::length(a - m), glm::length(b - m), glm::length(c - m)});
+            spheres_[t] = glm::vec4(m, r * 1.00001f + 1e-6f);
+        }
+        for (const bool isCounting : {true, false}) {
+            for (uint32_t t = 0; t < indices.size() / 3; ++t) {
+                const glm::vec3 &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
+                const glm::ivec3 from = cellOf(glm::min(a, glm::min(b, c))), to = cellOf(glm::max(a, glm::max(b, c)));
+                for (int z = from.z; z <= to.z; ++z)
+                    for (int y = from.y; y <= to.y; ++y)
+                        for (int x = from.x; x <= to.x; ++x) {
+                            uint32_t& at = start_[number(x, y, z)];
+                            if (isCounting)
+                                ++at;
+                            else
+                                items_[--at] = t;
+                        }
+            }
+            if (!isCounting) break;
+            uint32_t sum = 0;
+            for (uint32_t& s : start_) s = sum += s;
+            items_.resize(sum);
+        }
+    }
+
+    const glm::vec3& corner(uint32_t t, size_t k) const { return position_[indices_[3 * size_t{t} + k]]; }
+    float distance(const glm::vec3& p, uint32_t t) const {
+        const glm::vec3 &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
+        const glm::vec2 w = closestWeights(p, a, b, c);
+        return glm::length(p - (a + w.x * (b - a) + w.y * (c - a)));
+    }
+
+    /// Calls visit(triangle) for all that may be nearer to p than `limit`, which visit lowers, until it says that it
+    /// has seen enough; some are visited twice.
+    template <typename Visit>
+    void inBall(const glm::vec3& p, const float& limit, const Visit& isEnough) const {
+        const auto row = [&](int x0, int x1, int y, int z) {
+            const uint32_t last = start_[number(x1, y, z) + 1];
+            for (uint32_t i = start_[number(x0, y, z)]; i < last; ++i)
+                if (isNear(p, items_[i], limit) && isEnough(items_[i])) return true;
+            return false;
+        };
+        // What lies in the same cell first: the ball is much smaller afterwards.
+        const glm::ivec3 own = cellOf(p);
+        if (row(own.x, own.x, own.y, own.z)) return;
+        const glm::ivec3 from = cellOf(p - limit), to = cellOf(p + limit);
+        if (from == to) return;
+        for (int z = from.z; z <= to.z; ++z)
+            for (int y = from.y; y <= to.y; ++y)
+                if (row(from.x, to.x, y, z)) return;
+    }
+
+    /// The nearest triangle, or one not farther than `enough`; `best`: one that is known to be near.
+    Nearest nearest(const glm::vec3& p, Nearest best, float enough) const {
+        inBall(p, best.distance, [&](uint32_t t) {
+            const float d = distance(p, t);
+            if (d < best.distance) best = {d, t};
+            return best.distance <= enough;
+        });
+        return best;
+    }
+
+  private:
+    /// Can any point of triangle t be nearer than `limit`?
+    bool isNear(const glm::vec3& p, uint32_t t, float limit) const {
+        const glm::vec4& s = spheres_[t];
+        const glm::vec3 d = p - glm::vec3(s);
+        const float reach = limit + s.w;
+        return glm::dot(d, d) < reach * reach;
+    }
+    glm::ivec3 cellOf(const glm::vec3& p) const {
+        return glm::clamp(glm::ivec3((p - lo_) / cell_), glm::ivec3(0), size_ - 1);
+    }
+    size_t number(int x, int y, int z) const {
+        return (static_cast<size_t>(z) * static_cast<size_t>(size_.y) + static_cast<size_t>(y)) *
+                   static_cast<size_t>(size_.x) +
+               static_cast<size_t>(x);
+    }
+    const std::vector<glm::vec3>& position_;
+    const std::vector<uint32_t>& indices_;
+    glm::vec3 lo_{0};
+    float cell_ = 1;
+    glm::ivec3 size_{1};
+    std::vector<uint32_t> start_, items_;
+    std::vector<glm::vec4> spheres_;  ///< of each triangle: centre, radius
+};
+
+using Triple = std::array<uint32_t, 3>;
+
+/// Triangles in an order and form that lets equal ones be found: the smallest corner first, turned as before.
+std::vector<Triple> sorted(const std::vector<uint32_t>& indices) {
+    std::vector<Triple> out(indices.size() / 3);
+    for (size_t i = 0; i < out.size(); ++i) {
+        out[i] = {indices[3 * i], indices[3 * i + 1], indices[3 * i + 2]};
+        std::rotate(out[i].begin(), std::min_element(out[i].begin(), out[i].end()), out[i].end());
+    }
+    std::sort(out.begin(), out.end());
+    return out;
+}
+
+/// A place whose distance is wanted: `most` is what the result would be if the nearest triangle were no nearer than the
+/// hint.
+struct Probe {
+    glm::vec3 p;
+    uint32_t hint;
+    float above, corners, most;
+};
+
+/// Of the two triangles at an edge, which turn round it in opposite directions, one measures its middle. By position:
+/// at a seam they have vertices of their own. An edge with one triangle is a border, which simplification keeps.
+bool isMeasuredHere(const glm::vec3& a, const glm::vec3& b) {
+    return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
+}
+
+/// Largest distance of `triangles` from the target, whose own are `others`; what stands in both needs no look.
+/// `nearest`: of the vertices. Not below `worst`.
+float measureSurface(const Target& target, const std::vector<glm::vec3>& position, const std::vector<Triple>& triangles,
+                     const std::vector<Triple>& others, const std::vector<Nearest>& nearest, bool isBorderKept,
+                     float worst) {
+    // First only what the corners' nearest triangles say; then the worst are looked at closely, and what cannot exceed
+    // them needs no search.
+    std::vector<Probe> probes;
+    const auto resultOf = [](float corners, float distance) {
+        return corners + 2 * std::max(0.0f, distance - corners);
+    };
+    auto other = others.begin();
+    for (const Triple& t : triangles) {
+        while (other != others.end() && *other < t) ++other;
+        if (other != others.end() && *other == t) continue;
+        const auto take = [&](const glm::vec3& p, float corners) {
+            Probe probe{p, 0, 3e38f, corners, 0};
+            for (const uint32_t v : t) {
+                const float d = target.distance(p, nearest[v].triangle);
+                if (d < probe.above) probe = {p, nearest[v].triangle, d, corners, 0};
+                probe.most = resultOf(corners, probe.above);
+                if (probe.most <= worst) return;
+            }
+            probes.push_back(probe);
+        };
+        float all = 0;
+        for (size_t k = 0; k < 3; ++k) {
+            const uint32_t v = t.at(k), w = t.at((k + 1) % 3);
+            all = std::max(all, nearest[v].distance);
+            if (!isBorderKept || isMeasuredHere(position[v], position[w]))
+                take(0.5f * (position[v] + position[w]), std::max(nearest[v].distance, nearest[w].distance));
+        }
+        take((position[t[0]] + position[t[1]] + position[t[2]]) * (1.0f / 3), all);
+    }
+    const auto byMost = [](const Probe& a, const Probe& b) { return a.most > b.most; };
+    const size_t first = std::min<size_t>(probes.size(), 64);
+    std::partial_sort(probes.begin(), probes.begin() + static_cast<ptrdiff_t>(first), probes.end(), byMost);
+    for (const Probe& probe : probes) {
+        if (probe.most <= worst) continue;
+        const float harmless = 0.5f * (worst + probe.corners);
+        worst = std::max(
+            worst, resultOf(probe.corners, target.nearest(probe.p, {probe.above, probe.hint}, harmless).distance));
+    }
+    return worst;
+}
+
+/// How far the look of vertex `v` moves along the surface if triangle `t` of the target stands in its place.
+float shiftOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& coarse, uint32_t v,
+              const Target& target, uint32_t t, float& distance) {
+    const glm::vec3 &p = local.position[v], &a = target.corner(t, 0), &b = target.corner(t, 1),
+                    &c = target.corner(t, 2);
+    const glm::vec2 w = closestWeights(p, a, b, c);
+    distance = glm::length(p - (a + w.x * (b - a) + w.y * (c - a)));
+    const std::array<float, 3> weights{1 - w.x - w.y, w.x, w.y};
+    const shared::MeshVertex& own = mesh.vertex(local.global[v]);
+    std::array<const shared::MeshVertex*, 3> corners{};
+    for (size_t k = 0; k < 3; ++k) corners.at(k) = &mesh.vertex(local.global[coarse[3 * size_t{t} + k]]);
+    const glm::vec3 e1 = b - a, e2 = c - a;
+    const float longest = std::max({glm::length(e1), glm::length(e2), glm::length(c - b)});
+    float shift = (own.surface & shared::kSurfaceMaterialMask) == (corners[0]->surface & shared::kSurfaceMaterialMask)
+                      ? 0
+                      : longest;
+    for (uint32_t bits = 0; bits < 24; bits += 8) {
+        float mean = 0;
+        for (size_t k = 0; k < 3; ++k) mean += weights.at(k) * static_cast<float>(corners.at(k)->colour >> bits & 255u);
+        if (std::abs(mean - static_cast<float>(own.colour >> bits & 255u)) > kColourStep) shift = longest;
+    }
+    if ((own.surface & shared::kSurfaceTextured) == 0) return shift;
+    glm::vec2 uv(0);
+    for (size_t k = 0; k < 3; ++k) uv += weights.at(k) * glm::vec2(corners.at(k)->u, corners.at(k)->v);
+    const glm::vec2 f1(corners[1]->u - corners[0]->u, corners[1]->v - corners[0]->v),
+        f2(corners[2]->u - corners[0]->u, corners[2]->v - corners[0]->v);
+    const float inTexture = std::abs(f1.x * f2.y - f1.y * f2.x), inSpace = glm::length(glm::cross(e1, e2));
+    const float moved = glm::length(uv - glm::vec2(own.u, own.v));
+    if (moved == 0) return shift;
+    return shift + std::min(inTexture > 0 ? moved * std::sqrt(inSpace / inTexture) : longest, 4 * longest);
+}
+
+}  // namespace
+
+double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& coarse,
+                        double unimportant, bool isBorderKept) {
+    // Near zero, so that fp32 keeps its precision: the group is small.
+    const glm::vec3 shift = local.position[0];
+    std::vector<glm::vec3> position(local.position.size());
+    // Products of four lengths must be numbers.
+    float extent = 0, unit = 1;
+    for (const glm::vec3& p : local.position) {
+        const glm::vec3 off = glm::abs(p - shift);
+        while (std::max({off.x, off.y, off.z}) > 0x1p31f * unit) unit *= 2;
+    }
+    for (size_t i = 0; i < position.size(); ++i) {
+        position[i] = (local.position[i] - shift) / unit;
+        extent = std::max({extent, std::abs(position[i].x), std::abs(position[i].y), std::abs(position[i].z)});
+    }
+    LocalMesh near = local;
+    near.position = position;
+    const Target toCoarse(position, coarse);
+    std::vector<Nearest> nearest(position.size());
+    std::vector<uint8_t> isKept(position.size());
+    for (uint32_t i = 0; i < coarse.size(); ++i) {
+        nearest[coarse[i]] = {0, i / 3};
+        isKept[coarse[i]] = 1;
+    }
+    // What moved starts from where it went.
+    std::vector<uint32_t> went(position.size(), ~0u);
+    for (uint32_t i = 0; i < coarse.size(); ++i)
+        if (coarse[i] >= local.firstMoved()) went[local.beforeMove(coarse[i])] = i / 3;
+    // So far a true distance, or not worth a closer look: what rounding makes of flat surfaces is not.
+    auto worst = std::max(static_cast<float>(unimportant) / unit, 1.0f / unit + 2e-6f * extent);
+    // A vertex that is gone starts from the nearest triangle of a neighbour, so that few are looked at. Looked for is
+    // the least of distance and shift: beside a seam the nearest triangle may be the wrong one.
+    std::vector<uint8_t>& isKnown = isKept;
+    const auto find = [&](uint32_t v, uint32_t hint) {
+        Nearest best{3e38f, hint};
+        float look = 3e38f;
+        const auto visit = [&](uint32_t t) {
+            float d = 0;
+            const float moved = shiftOf(mesh, near, coarse, v, toCoarse, t, d);
+            if (d < best.distance) best = {d, t};
+            look = std::min(look, d + moved);
+            return false;
+        };
+        visit(hint);
+        toCoarse.inBall(position[v], look, visit);
+        nearest[v] = best;
+        isKnown[v] = 1;
+        worst = std::max(worst, look);
+    };
+    for (uint32_t v = 0; v < local.firstMoved(); ++v)
+        if (!isKnown[v] && went[v] != ~0u) find(v, went[v]);
+    for (bool isMore = true; isMore;) {
+        isMore = false;
+        for (size_t i = 0; i < near.indices.size(); ++i) {
+            const uint32_t v = near.indices[i], w = near.indices[i % 3 == 2 ? i - 2 : i + 1];
+            if (isKnown[v] == isKnown[w]) continue;
+            find(isKnown[v] ? w : v, nearest[isKnown[v] ? v : w].triangle);
+            isMore = true;
+        }
+    }
+    for (uint32_t v = 0; v < local.firstMoved(); ++v)
+        if (!isKnown[v]) find(v, 0);  // a part of its own that is gone altogether
+    const std::vector<Triple> fine = sorted(near.indices), left = sorted(coarse);
+    worst = measureSurface(toCoarse, position, fine, left, nearest, isBorderKept, worst);
+    const Target toFine(position, near.indices);
+    for (uint32_t i = 0; i < near.indices.size(); ++i) nearest[near.indices[i]] = {0, i / 3};
+    for (uint32_t v = local.firstMoved(); v < position.size(); ++v) {
+        const uint32_t hint = nearest[local.beforeMove(v)].triangle;
+        nearest[v] = toFine.nearest(position[v], {toFine.distance(position[v], hint), hint}, 0);
+        worst = std::max(worst, nearest[v].distance);
+    }
+    worst = measureSurface(toFine, position, left, fine, nearest, isBorderKept, worst);
+    return (static_cast<double>(worst) * (1 + 1e-5) + static_cast<double>(extent) * 1e-6) *
+           double{unit};  // fp32's share
+}
+
+}  // namespace stipple::lod

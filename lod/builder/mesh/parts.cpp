@@ -1,0 +1,200 @@
+// Parts by union-find over positions, and their clusters.
+#include "lod/builder/mesh/parts.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "lod/builder/morton.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr uint32_t kNone = ~0u;
+
+/// Path halving.
+uint32_t rootIn(std::vector<uint32_t>& parent, uint32_t of) {
+    while (parent[of] != of) of = parent[of] = parent[parent[of]];
+    return of;
+}
+
+void unite(std::vector<uint32_t>& parent, uint32_t a, uint32_t b) {
+    a = rootIn(parent, a);
+    b = rootIn(parent, b);
+    parent[std::max(a, b)] = std::min(a, b);
+}
+
+uint64_t mixed(const glm::ivec3& p) {
+    const uint64_t h = (static_cast<uint64_t>(p.x) * 0x9e3779b97f4a7c15ull) ^
+                       (static_cast<uint64_t>(p.y) * 0xc2b2ae3d27d4eb4full) ^
+                       (static_cast<uint64_t>(p.z) * 0x165667b19e3779f9ull);
+    return (h ^ h >> 29) * 0xbf58476d1ce4e5b9ull >> 20;
+}
+
+}  // namespace
+
+void PartFinder::grow() {
+    slots_.assign(std::max<size_t>(1024, 2 * slots_.size()), kNone);
+    for (uint32_t i = 0; i < positions_.size(); ++i) {
+        size_t at = mixed(positions_[i]) & (slots_.size() - 1);
+        while (slots_[at] != kNone) at = (at + 1) & (slots_.size() - 1);
+        slots_[at] = i;
+    }
+}
+
+uint32_t PartFinder::numberOf(const glm::ivec3& p) {
+    if (3 * (positions_.size() + 1) > 2 * slots_.size()) grow();
+    size_t at = mixed(p) & (slots_.size() - 1);
+    for (; slots_[at] != kNone; at = (at + 1) & (slots_.size() - 1))
+        if (positions_[slots_[at]] == p) return slots_[at];
+    slots_[at] = static_cast<uint32_t>(positions_.size());
+    parent_.push_back(slots_[at]);
+    positions_.push_back(p);
+    return slots_[at];
+}
+
+bool PartFinder::add(const PlacedBlock& block) {
+    const auto& indices = block.soup.indices;
+    if (ofTriangle_.size() + indices.size() / 3 > kMostTriangles) return false;
+    std::vector<uint32_t> number(block.soup.vertices.size(), kNone);
+    for (const uint32_t i : indices) {
+        const shared::MeshVertex& v = block.soup.vertices.low[i];
+        if (number[i] == kNone) number[i] = numberOf({v.x, v.y, v.z});
+    }
+    for (size_t t = 0; t < indices.size() / 3; ++t) {
+        const uint32_t first = number[indices[3 * t]];
+        unite(parent_, first, number[indices[3 * t + 1]]);
+        unite(parent_, first, number[indices[3 * t + 2]]);
+        ofTriangle_.push_back(first);
+        centre_.push_back({block.x[t], block.y[t], block.z[t]});
+    }
+    firstOfBlock_.push_back(ofTriangle_.size());
+    return true;
+}
+
+void PartFinder::finish(bool isKnown) {
+    if (!isKnown) *this = {};
+    std::vector<uint32_t> triangles(positions_.size(), 0);
+    for (uint32_t& t : ofTriangle_) ++triangles[t = rootIn(parent_, t)];
+    // The place of a part is that of the centre that is first along the curve: no matter in which order they came.
+    std::vector<uint32_t> part(positions_.size(), kNone);
+    std::vector<std::array<uint32_t, 3>> places;
+    const auto keyOf = [](const std::array<uint32_t, 3>& c) {
+        return std::pair(shortMortonCode(c[0] >> 10, c[1] >> 10, c[2] >> 10), c);
+    };
+    for (size_t t = 0; t < ofTriangle_.size(); ++t) {
+        const uint32_t root = ofTriangle_[t];
+        if (triangles[root] > kPartTriangles) {
+            ofTriangle_[t] = kNone;
+            continue;
+        }
+        if (part[root] == kNone) {
+            part[root] = static_cast<uint32_t>(places.size());
+            places.push_back(centre_[t]);
+        }
+        ofTriangle_[t] = part[root];
+        if (keyOf(centre_[t]) < keyOf(places[part[root]])) places[part[root]] = centre_[t];
+    }
+    centre_ = std::move(places);
+    positions_ = {};
+    slots_ = {};
+    parent_ = {};
+}
+
+void PartFinder::place(PlacedBlock& placed, size_t block) const {
+    if (block + 1 >= firstOfBlock_.size()) return;
+    const size_t first = firstOfBlock_[block];
+    for (size_t t = 0; t < placed.x.size(); ++t) {
+        const uint32_t part = ofTriangle_[first + t];
+        if (part == kNone) continue;
+        placed.x[t] = centre_[part][0];
+        placed.y[t] = centre_[part][1];
+        placed.z[t] = centre_[part][2];
+        for (size_t k = 0; k < 3; ++k)
+            placed.soup.vertices.low[placed.soup.indices[3 * t + k]].surface |= kSurfaceOfPart;
+    }
+}
+
+uint32_t partsOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& indices,
+                 std::vector<uint32_t>& ofTriangle) {
+    // Vertices of one position are one: sorted by position, each refers to the first.
+    std::vector<uint32_t> order(local.global.size()), parent(local.global.size());
+    std::iota(order.begin(), order.end(), 0u);
+    const auto positionOf = [&](uint32_t v) { return mesh.position[local.global[local.beforeMove(v)]]; };
+    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+        return positionOf(a) != positionOf(b) ? positionOf(a) < positionOf(b) : a < b;
+    });
+    std::iota(parent.begin(), parent.end(), 0u);
+    for (size_t i = 1; i < order.size(); ++i)
+        if (positionOf(order[i]) == positionOf(order[i - 1])) unite(parent, order[i - 1], order[i]);
+    for (size_t i = 0; i < indices.size(); i += 3) {
+        unite(parent, indices[i], indices[i + 1]);
+        unite(parent, indices[i], indices[i + 2]);
+    }
+    std::vector<uint32_t> number(local.global.size(), kNone);
+    ofTriangle.resize(indices.size() / 3);
+    uint32_t parts = 0;
+    for (size_t t = 0; t < ofTriangle.size(); ++t) {
+        uint32_t& n = number[rootIn(parent, indices[3 * t])];
+        if (n == kNone) n = parts++;
+        ofTriangle[t] = n;
+    }
+    return parts;
+}
+
+void appendWholeClusters(const LocalMesh& local, const std::vector<std::vector<uint32_t>>& parts,
+                         std::vector<Cluster>& out) {
+    Cluster open;
+    open.isWhole = true;
+    size_t vertices = 0;
+    const auto close = [&] {
+        if (!open.indices.empty()) out.push_back(open);
+        open.indices.clear();
+        vertices = 0;
+    };
+    for (const std::vector<uint32_t>& part : parts) {
+        std::vector<uint32_t> used = part;
+        std::sort(used.begin(), used.end());
+        const auto own = static_cast<size_t>(std::unique(used.begin(), used.end()) - used.begin());
+        if (open.indices.size() + part.size() > size_t{3} * shared::kClusterTriangles ||
+            vertices + own > shared::kClusterVertices)
+            close();
+        if (part.size() <= size_t{3} * shared::kClusterTriangles && own <= shared::kClusterVertices) {
+            for (const uint32_t v : part) open.indices.push_back(local.global[v]);
+            vertices += own;
+            continue;
+        }
+        const size_t first = out.size();
+        appendClusters(local, part, kNoProducer, false, out);
+        for (size_t c = first; c < out.size(); ++c) {
+            out[c].isWhole = true;
+            out[c].isContinued = c > first;
+        }
+    }
+    close();
+}
+
+std::vector<std::vector<uint32_t>> groupAll(const WeldedMesh& mesh, const std::vector<Cluster>& clusters, uint32_t size,
+                                            Executor& executor) {
+    std::vector<uint32_t> others;
+    std::vector<std::vector<uint32_t>> groups;
+    for (uint32_t c = 0; c < clusters.size(); ++c) {
+        if (!clusters[c].isWhole) {
+            others.push_back(c);
+        } else {
+            if (groups.empty() || (groups.back().size() >= size && !clusters[c].isContinued)) groups.emplace_back();
+            groups.back().push_back(c);
+        }
+    }
+    if (others.size() == clusters.size()) return groupClusters(mesh, clusters, size, executor);
+    if (others.empty()) return groups;
+    std::vector<Cluster> rest;
+    rest.reserve(others.size());
+    for (const uint32_t c : others) rest.push_back(clusters[c]);
+    for (auto& group : groupClusters(mesh, rest, size, executor)) {
+        for (uint32_t& c : group) c = others[c];
+        groups.push_back(std::move(group));
+    }
+    return groups;
+}
+
+}  // namespace stipple::lod

@@ -1,0 +1,55 @@
+// Small separate parts of a mesh: leaves, twigs, blades of grass. Nothing else touches their borders, so that these may
+// be moved and simplified, which those of a larger surface may not (its neighbours keep theirs).
+#pragma once
+
+#include "lod/builder/mesh/mesh_work.h"
+
+namespace stipple::lod {
+
+/// Triangles of a part that is kept together at most.
+constexpr uint32_t kPartTriangles = 2048;
+/// In MeshVertex::surface, on the way from the input to its cell only: belongs to such a part.
+constexpr uint32_t kSurfaceOfPart = 0x80000000u;
+
+/// The parts of a whole mesh, by the positions that their triangles share. Two readings of the same blocks: add() all
+/// of them, finish(), then place() all of them again.
+class PartFinder {
+  public:
+    /// Triangles of a mesh that is looked at as a whole; of a larger one no part is known.
+    static constexpr uint64_t kMostTriangles = uint64_t{1} << 21;
+    /// False: there are too many.
+    bool add(const PlacedBlock& block);
+    void finish(bool isKnown);
+    /// Gives the triangles of small parts one place each, and marks their vertices. `block`: number in the source.
+    void place(PlacedBlock& placed, size_t block) const;
+
+  private:
+    uint32_t numberOf(const glm::ivec3& p);
+    uint32_t rootOf(uint32_t of);
+    void grow();
+
+    std::vector<glm::ivec3> positions_;
+    std::vector<uint32_t> slots_, parent_;
+    std::vector<uint32_t> ofTriangle_;             ///< a position of it; after finish() its part, or kNoPart
+    std::vector<std::array<uint32_t, 3>> centre_;  ///< of a triangle; after finish() of a part
+    std::vector<size_t> firstOfBlock_{0};
+};
+
+/// Numbers of the parts of some triangles by position, in the order of their first triangles; returns how many.
+uint32_t partsOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& indices,
+                 std::vector<uint32_t>& ofTriangle);
+
+/// Clusters of whole parts: one that fits into a cluster is in one. `parts`: triangles, local.
+void appendWholeClusters(const LocalMesh& local, const std::vector<std::vector<uint32_t>>& parts,
+                         std::vector<Cluster>& out);
+
+/// Groups of about `size` clusters each, no part in two: of those with isWhole in their order, of the others by METIS.
+std::vector<std::vector<uint32_t>> groupAll(const WeldedMesh& mesh, const std::vector<Cluster>& clusters, uint32_t size,
+                                            Executor& executor);
+
+/// Simplifies whole parts to about `target` indices. Each covers as much of a picture afterwards, seen from all sides
+/// in the mean, as before: it is widened, and what went altogether is made up for by those that stay. `local` gets the
+/// moved vertices.
+std::vector<uint32_t> simplifyParts(const WeldedMesh& mesh, LocalMesh& local, size_t target, int largest);
+
+}  // namespace stipple::lod

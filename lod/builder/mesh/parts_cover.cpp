@@ -1,0 +1,101 @@
+#include "lod/builder/mesh/parts_cover.h"
+
+namespace stipple::lod {
+namespace {
+
+struct Span {
+    double from, to;
+};
+
+double unionOf(std::vector<Span>& spans) {
+    std::sort(spans.begin(), spans.end(), [](const Span& a, const Span& b) { return a.from < b.from; });
+    double sum = 0, reached = -1e300;
+    for (const Span& s : spans) {
+        sum += std::max(0.0, s.to - std::max(s.from, reached));
+        reached = std::max(reached, s.to);
+    }
+    return sum;
+}
+
+/// Of one direction and the opposite one.
+double coverAlong(const std::vector<CoverTriangle>& triangles, const glm::dvec3& direction, const glm::dvec3& axis,
+                  int count, double offset) {
+    glm::dvec3 up = axis - glm::dot(axis, direction) * direction;
+    const glm::dvec3 other = std::abs(direction.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
+    up = glm::normalize(glm::length(up) > 1e-3 ? up : glm::cross(direction, other));
+    const glm::dvec3 right = glm::cross(up, direction);
+    double low = 1e300, high = -1e300;
+    for (const CoverTriangle& t : triangles)
+        for (const glm::dvec3& p : t.corners) {
+            low = std::min(low, glm::dot(p, up));
+            high = std::max(high, glm::dot(p, up));
+        }
+    const double step = (high - low) / count;
+    if (!(step > 0)) return 0;
+    std::vector<std::array<std::vector<Span>, 2>> rows(static_cast<size_t>(count));  // seen from the front, from behind
+    for (const CoverTriangle& t : triangles) {
+        std::array<glm::dvec2, 3> p{};
+        for (size_t k = 0; k < 3; ++k)
+            p.at(k) = {glm::dot(t.corners.at(k), right), (glm::dot(t.corners.at(k), up) - low) / step};
+        const glm::dvec2 a = p[1] - p[0], b = p[2] - p[0];
+        const bool isFront = a.x * b.y - a.y * b.x > 0;
+        const auto [bottom, top] = std::minmax({p[0].y, p[1].y, p[2].y});
+        const int last = std::min(count - 1, static_cast<int>(std::ceil(top - offset)) - 1);
+        for (int r = std::max(0, static_cast<int>(std::ceil(bottom - offset))); r <= last; ++r) {
+            Span span{1e300, -1e300};
+            for (size_t k = 0; k < 3; ++k) {
+                const glm::dvec2 &c = p.at(k), &d = p.at((k + 1) % 3);
+                if ((c.y <= r + offset) == (d.y <= r + offset)) continue;
+                const double x = c.x + (r + offset - c.y) / (d.y - c.y) * (d.x - c.x);
+                span.from = std::min(span.from, x);
+                span.to = std::max(span.to, x);
+            }
+            if (span.from > span.to) continue;
+            auto& row = rows.at(static_cast<size_t>(r));
+            if (t.isTwoSided || isFront) row[0].push_back(span);
+            if (t.isTwoSided || !isFront) row[1].push_back(span);
+        }
+    }
+    double sum = 0;
+    for (auto& row : rows) sum += unionOf(row[0]) + unionOf(row[1]);
+    return 0.5 * sum * step;
+}
+
+}  // namespace
+
+const std::array<CoverDirection, kCoverDirections>& coverDirections() {
+    static const std::array<CoverDirection, kCoverDirections> all = [] {
+        constexpr double g = 1.618033988749895, corner = 25.0 / 420, face = 27.0 / 420;
+        std::array<CoverDirection, kCoverDirections> out{{{{0, 1, g}, corner},
+                                                          {{0, -1, g}, corner},
+                                                          {{1, g, 0}, corner},
+                                                          {{-1, g, 0}, corner},
+                                                          {{g, 0, 1}, corner},
+                                                          {{g, 0, -1}, corner},
+                                                          {{1, 1, 1}, face},
+                                                          {{1, 1, -1}, face},
+                                                          {{1, -1, 1}, face},
+                                                          {{-1, 1, 1}, face},
+                                                          {{0, g, 1 / g}, face},
+                                                          {{0, g, -1 / g}, face},
+                                                          {{1 / g, 0, g}, face},
+                                                          {{-1 / g, 0, g}, face},
+                                                          {{g, 1 / g, 0}, face},
+                                                          {{g, -1 / g, 0}, face}}};
+        for (CoverDirection& d : out) d.to = glm::normalize(d.to);
+        return out;
+    }();
+    return all;
+}
+
+double coverOf(const std::vector<CoverTriangle>& triangles, const glm::dvec3& axis, int rows) {
+    double sum = 0;
+    // Rows of different directions lie at different places, so that shapes that all parts share are not all missed.
+    for (size_t d = 0; d < kCoverDirections; ++d) {
+        const double offset = (static_cast<double>(d * 7 % kCoverDirections) + 0.5) / kCoverDirections;
+        sum += coverDirections().at(d).share * coverAlong(triangles, coverDirections().at(d).to, axis, rows, offset);
+    }
+    return sum;
+}
+
+}  // namespace stipple::lod

@@ -1,0 +1,64 @@
+// The other half of a record's error: how far places of its disc are from the leaves. (The first half, how far the
+// leaves are from the disc, is its slab: see levels.h.)
+//
+// A leaf within the error E of all places of a circle of the disc's plane lets that circle be drawn. The disc keeps E
+// if such circles cover it:
+//
+//        ___-----___        o o  leaves, each with the circle that is within E of it: of a leaf at height h over the
+//      /  o  .  o    \           plane that is its own disc, wider by sqrt(E^2 - h^2)
+//     |  .       . o  |      .   what none of them reaches: the inside of a ring, the window of a wall
+//      \  o . o     /
+//        ---_____---
+//
+// Whether they do is seen along 32 rays from the disc's centre: between two of them the disc is held as far out as one
+// circle after the other holds both rays. That errs towards larger errors only.
+#pragma once
+
+#include "lod/builder/points/rising.h"
+
+namespace stipple::lod {
+
+/// What of one node lies where: its points, or where those are not at hand its children's records. One at a time in a
+/// thread.
+class Around {
+  public:
+    /// `key`: of the node's corner; `leaves` may be null.
+    Around(const RecordGrid& grid, Key key, uint32_t keyBits, const Leaves* leaves,
+           std::span<const PendingNode> children);
+    ~Around();
+    Around(const Around&) = delete;
+    Around& operator=(const Around&) = delete;
+
+    struct Run {
+        uint32_t begin = 0, end = 0;
+    };
+    /// In the cluster's cell of that key, in those beside it, and in the one that holds a place.
+    Run at(Key key) const;
+    uint32_t cellAt(const glm::dvec3& place) const;
+    Run inCell(uint32_t cell) const;
+    template <typename Use>
+    void forBeside(Key key, const Use& use) const;
+
+    RecordGrid grid;
+    const Leaves* leaves = nullptr;
+    std::vector<Rising> parts;  ///< without leaves
+    // Otherwise of the leaves, beside the node's corner: place, normal (zero: none), radius.
+    std::vector<float> x, y, z, nx, ny, nz, radius;
+    glm::dvec3 corner{0};
+
+  private:
+    void number(std::span<const Key> keys);
+    Key firstCell_ = 0;
+    std::vector<uint32_t> used_;
+};
+
+/// Code of an error not below that of `code` which all places of the record's disc keep to the nearest leaf of its
+/// node. Of a record without a normal: `code`.
+uint32_t coveringCode(const Rising& record, const Around& around, uint32_t code);
+/// The same of records without a normal, which are balls: lattice units, at least the radius. `parts` as in
+/// mergeRising.
+double coveringErrorOfBall(const Rising& record, std::span<const Rising> parts, const Leaves* leaves);
+/// Sets `core` and `hole` of a record. `isAll`: no other record stands for leaves in its cell.
+void measureCore(Rising& record, const Around& around, bool isAll);
+
+}  // namespace stipple::lod

@@ -1,0 +1,446 @@
+#include "lod/builder/points/levels.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+#include "engine/base/check.h"
+#include "engine/base/hash.h"
+#include "lod/attributes.h"
+#include "lod/builder/points/covered.h"
+#include "lod/builder/points/rising.h"
+#include "lod/builder/points/rising_values.h"
+#include "lod/chunk.h"
+#include "lod/octahedral.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr uint32_t kClusterLevels = 6;
+
+struct Box {
+    glm::dvec3 lo{1e300}, hi{-1e300};
+    void add(const glm::dvec3& p, double margin = 0) {
+        lo = glm::min(lo, p - margin);
+        hi = glm::max(hi, p + margin);
+    }
+    glm::dvec3 centre() const { return 0.5 * (lo + hi); }
+};
+
+Node emptyNode(const Frame& frame, uint32_t level, Key key) {
+    Node node;
+    node.level = static_cast<uint8_t>(level);
+    const Key cell = key >> frame.shiftOf(level);
+    node.cell = {compactBits(cell), compactBits(cell >> 1), compactBits(cell >> 2)};
+    node.stepShift = static_cast<int8_t>(static_cast<int>(frame.rootLog2) - static_cast<int>(level) - 16);
+    return node;
+}
+
+/// Lattice position of record coordinate 0: see Hierarchy::recordOrigin.
+glm::dvec3 recordBase(const Frame& frame, const Node& node) {
+    const double half = node.stepShift > 0 ? 0.5 * (std::exp2(node.stepShift) - 1) : 0.0;
+    return glm::dvec3(node.cell[0], node.cell[1], node.cell[2]) * frame.cellSize(node.level) + half;
+}
+
+// ---- normal cones ----
+
+void leafCone(const Points& points, Node& node) {
+    glm::dvec3 sum(0);
+    for (size_t i = 0; i < points.size(); ++i) {
+        if ((points.colour[i] >> 24 & (shared::kFlagTwoSided | shared::kFlagNoNormal)) != 0) return;
+        sum += glm::dvec3(shared::octDecode(points.normal[i]));
+    }
+    if (!(glm::length(sum) > 1e-3 * static_cast<double>(points.size()))) return;
+    node.normalCone = octEncode(glm::vec3(glm::normalize(sum)));
+    const glm::vec3 axis = shared::octDecode(node.normalCone);
+    node.normalConeCosine = 1;
+    for (const uint32_t n : points.normal)
+        node.normalConeCosine =
+            std::min(node.normalConeCosine, glm::dot(axis, glm::vec3(shared::octDecode(n))) - 1e-6f);
+}
+
+void innerCone(std::span<const PendingNode> children, Node& node) {
+    glm::dvec3 sum(0);
+    for (const PendingNode& c : children) {
+        if (c.node.normalConeCosine <= -1) return;
+        sum += glm::dvec3(shared::octDecode(c.node.normalCone));
+    }
+    if (!(glm::length(sum) > 1e-3)) return;
+    const uint32_t cone = octEncode(glm::vec3(glm::normalize(sum)));
+    const glm::dvec3 axis(shared::octDecode(cone));
+    double widest = 0;
+    for (const PendingNode& c : children) {
+        const glm::dvec3 child(shared::octDecode(c.node.normalCone));
+        const double between = 2 * std::asin(std::min(1.0, 0.5 * glm::length(child - axis)));
+        const double half = std::acos(std::clamp(static_cast<double>(c.node.normalConeCosine), -1.0, 1.0));
+        widest = std::max(widest, between + half);
+    }
+    if (widest >= 3.14) return;
+    node.normalCone = cone;
+    node.normalConeCosine = static_cast<float>(std::cos(widest)) - 1e-6f;
+}
+
+// ---- chunks ----
+
+uint32_t coordinate(uint64_t v, uint64_t size, int stepShift) {
+    const uint64_t local = v & (size - 1);
+    return static_cast<uint32_t>(stepShift >= 0 ? local >> stepShift : local << -stepShift);
+}
+
+/// Where each record goes: by its parent's code, largest first, then in order.
+struct Order {
+    std::array<uint32_t, 256> parents{}, own{}, next{};
+    template <typename ParentCodeOf, typename CodeOf>
+    Order(size_t count, const ParentCodeOf& parentCodeOf, const CodeOf& codeOf) {
+        for (size_t k = 0; k < count; ++k) {
+            ++parents[parentCodeOf(k)];
+            ++own[codeOf(k)];
+        }
+        uint32_t sum = 0;
+        for (size_t code = 256; code-- > 0;) {
+            next[code] = sum;
+            sum += parents[code];
+        }
+    }
+};
+
+void appendCounts(const std::array<uint32_t, 256>& histogram, NodeBatch& batch, uint16_t& codes) {
+    codes = 0;
+    for (uint32_t code = 0; code < 256; ++code) {
+        if (histogram[code] == 0) continue;
+        batch.addCount(code, histogram[code]);
+        ++codes;
+    }
+}
+
+/// Writes a node whose records know their parents' codes.
+void encodeNode(const Frame& frame, PendingNode& pending, NodeBatch& batch) {
+    Node& node = pending.node;
+    const bool isLeaf = node.isLeaf();
+    const size_t count = node.records, kinds = frame.attributes.size();
+    Order order(
+        count, [&](size_t k) { return isLeaf ? pending.leafParentCode[k] : pending.records[k].parentCode; },
+        [&](size_t k) { return isLeaf ? uint8_t{0} : pending.records[k].code; });
+    thread_local Chunk chunk;
+    chunk.records.resize(count);
+    const bool hasLowBits = isLeaf && node.stepShift > 0;
+    chunk.lowBits.resize(hasLowBits ? count * 3 : 0);
+    std::vector<std::vector<uint8_t>> streams;
+    for (const AttributeInfo& a : frame.attributes) streams.emplace_back(count * bytesOf(a.type));
+    const uint64_t size = uint64_t{1} << (frame.rootLog2 - node.level);
+    const double edge = frame.cellSize(node.level);
+    for (size_t k = 0; k < count; ++k) {
+        const size_t at = order.next[isLeaf ? pending.leafParentCode[k] : pending.records[k].parentCode]++;
+        for (size_t a = 0; a < kinds; ++a) {
+            const size_t width = bytesOf(frame.attributes[a].type);
+            uint8_t* const to = streams[a].data() + at * width;
+            if (isLeaf)
+                std::memcpy(to, pending.leaf.attributes[a].data() + k * width, width);
+            else
+                storeValue(frame.attributes[a], pending.values[k * kinds + a], pending.records[k].count, to);
+        }
+        if (!isLeaf) {
+            chunk.records[at] = pending.records[k].packed;
+            continue;
+        }
+        const Points& p = pending.leaf;
+        const uint32_t radius = radiusCodeUp(static_cast<double>(p.radius[k]), edge);
+        const Place place = p.place(k);
+        const auto steps = [&](size_t a) { return coordinate(place.at(a), size, node.stepShift); };
+        chunk.records[at] = {steps(0) | steps(1) << 16, steps(2) | radius << 16, p.normal[k], p.colour[k]};
+        if (!hasLowBits) continue;
+        const uint64_t mask = (uint64_t{1} << node.stepShift) - 1;
+        for (size_t a = 0; a < 3; ++a) chunk.lowBits[at * 3 + a] = static_cast<uint32_t>(place.at(a) & mask);
+    }
+    const std::vector<uint8_t> bytes = encodeChunk(chunk), attributes = encodeAttributes(frame.attributes, streams);
+    node.chunkOffset = batch.bytes.size();
+    node.chunkBytes = static_cast<uint32_t>(bytes.size());
+    node.chunkHash = hashBytes(bytes.data(), bytes.size());
+    node.attributeBytes = static_cast<uint32_t>(attributes.size());
+    node.attributeHash = hashBytes(attributes.data(), attributes.size());
+    batch.bytes.insert(batch.bytes.end(), bytes.begin(), bytes.end());
+    batch.bytes.insert(batch.bytes.end(), attributes.begin(), attributes.end());
+    NodeBatch::Written written{node, pending.key, static_cast<uint32_t>(batch.counts.size()), 0, 0};
+    appendCounts(order.parents, batch, written.parentCodes);
+    appendCounts(order.own, batch, written.ownCodes);
+    batch.nodes.push_back(written);
+    pending = {};
+}
+
+/// Encloses the own discs and the children's spheres.
+void innerSphere(const Frame& frame, std::span<const PendingNode> children, PendingNode& parent) {
+    Node& node = parent.node;
+    Box box;
+    for (const PendingNode& c : children) box.add(c.node.centre, c.node.radius);
+    node.centre = box.centre();
+    for (const PendingNode& c : children)
+        node.radius = std::max(node.radius, glm::length(c.node.centre - node.centre) + c.node.radius);
+    for (const Rising& r : parent.records) {
+        const double reach = radiusOf(recordRadiusCode(r.packed), frame.cellSize(node.level));
+        node.radius = std::max(node.radius, glm::length(r.place - node.centre) + reach);
+    }
+    node.radius *= 1 + 1e-6;
+}
+
+PendingNode makeLeaf(const Frame& frame, SortedPoints& from, size_t begin, size_t end, uint32_t level) {
+    PendingNode out;
+    const double edge = frame.cellSize(level);
+    for (size_t i = begin; i < end; ++i) {
+        const uint32_t code = radiusCodeUp(static_cast<double>(from.points.radius[i]), edge);
+        from.points.radius[i] = static_cast<float>(radiusOf(code, edge));
+    }
+    out.firstPoint = static_cast<uint32_t>(begin);
+    const auto copy = [&](auto& to, const auto& values) {
+        to.assign(values.begin() + static_cast<ptrdiff_t>(begin), values.begin() + static_cast<ptrdiff_t>(end));
+    };
+    copy(out.leaf.x, from.points.x);
+    copy(out.leaf.y, from.points.y);
+    copy(out.leaf.z, from.points.z);
+    if (!from.points.high.empty()) copy(out.leaf.high, from.points.high);
+    copy(out.leaf.colour, from.points.colour);
+    copy(out.leaf.normal, from.points.normal);
+    copy(out.leaf.radius, from.points.radius);
+    copy(out.leafKey, from.key);
+    for (size_t a = 0; a < frame.attributes.size(); ++a) {
+        const size_t width = bytesOf(frame.attributes[a].type);
+        const uint8_t* const values = from.points.attributes[a].data();
+        out.leaf.attributes.emplace_back(values + begin * width, values + end * width);
+    }
+    out.leafParentCode.assign(end - begin, static_cast<uint8_t>(ErrorScale::kNoParent));
+    const uint32_t shift = frame.shiftOf(level);
+    out.key = from.key[begin] >> shift << shift;
+    out.node = emptyNode(frame, level, out.key);
+    Box box;
+    for (size_t i = 0; i < out.leaf.size(); ++i) box.add(out.leaf.at(i));
+    Node& node = out.node;
+    node.centre = box.centre();
+    double radius = 0;
+    for (size_t i = 0; i < out.leaf.size(); ++i)
+        radius = std::max(radius, glm::length(out.leaf.at(i) - node.centre) + static_cast<double>(out.leaf.radius[i]));
+    // Positions may be held in steps coarser than the lattice.
+    node.radius = radius * (1 + 1e-6) + (node.stepShift > 0 ? std::exp2(node.stepShift) : 0.0);
+    node.records = static_cast<uint32_t>(end - begin);
+    leafCone(out.leaf, node);
+    return out;
+}
+
+/// One record for the records of a cell; two, where those lie in two cones of normals and one disc would be a poor
+/// stand-in for both (an edge between two walls), so that flat parts get large discs and edges keep small errors.
+class ConeMerger {
+  public:
+    template <typename CodeOf>
+    void merge(const Frame& frame, std::span<const Rising> parts, std::span<const RisingValue> values,
+               const Around& around, const CodeOf& codeOf, PendingNode& out) {
+        const RecordGrid& grid = around.grid;
+        const Rising one = mergeRising(grid, parts, around.leaves, around);
+        if (!isSplit(grid, parts, one, around)) {
+            out.records.push_back(one);
+            for (size_t k = 0; k < parts.size(); ++k) codeOf(k) = one.code;
+            mergeAttributes(frame, parts, values, out);
+            return;
+        }
+        for (size_t k = 0; k < parts.size(); ++k) codeOf(k) = of_.at(side_[k]).code;
+        for (uint8_t g = 0; g < 2; ++g) {
+            out.records.push_back(of_.at(g));
+            values_.clear();
+            const size_t kinds = frame.attributes.size();
+            for (size_t k = 0; k < parts.size(); ++k)
+                if (side_[k] == g)
+                    values_.insert(values_.end(), values.begin() + static_cast<ptrdiff_t>(k * kinds),
+                                   values.begin() + static_cast<ptrdiff_t>((k + 1) * kinds));
+            mergeAttributes(frame, members_.at(g), values_, out);
+        }
+    }
+
+  private:
+    static constexpr int kWorthwhile = 8;       ///< codes of error (1/8 octaves) that two records must gain
+    static constexpr double kGoodAsItIs = 0.5;  ///< radii: a disc with a smaller error is not split
+
+    bool isSplit(const RecordGrid& grid, std::span<const Rising> parts, const Rising& one, const Around& around) {
+        if (grid.errors.decode(one.code) < kGoodAsItIs * static_cast<double>(one.radius)) return false;
+        if (!splitByNormals(parts, side_)) return false;
+        for (auto& m : members_) m.clear();
+        for (size_t k = 0; k < parts.size(); ++k) members_.at(side_[k]).push_back(parts[k]);
+        for (size_t g = 0; g < 2; ++g) {
+            of_.at(g) = mergeRising(grid, members_.at(g), nullptr, around);
+            if (of_.at(g).code + kWorthwhile > one.code) return false;
+        }
+        return true;
+    }
+    void mergeAttributes(const Frame& frame, std::span<const Rising> parts, std::span<const RisingValue> values,
+                         PendingNode& out) {
+        const size_t kinds = frame.attributes.size();
+        for (size_t a = 0; a < kinds; ++a) {
+            column_.clear();
+            for (size_t k = 0; k < parts.size(); ++k) column_.push_back(values[k * kinds + a]);
+            out.values.push_back(mergeValues(frame.attributes[a], column_, parts));
+        }
+    }
+
+    std::vector<uint8_t> side_;
+    std::array<std::vector<Rising>, 2> members_;
+    std::array<Rising, 2> of_;
+    std::vector<RisingValue> values_, column_;
+};
+
+RecordGrid gridOf(const Frame& frame, const Node& node) {
+    const uint32_t clusterLevel = std::min(node.level + kClusterLevels, frame.keyLevels);
+    RecordGrid grid;
+    grid.base = recordBase(frame, node);
+    grid.step = std::exp2(node.stepShift);
+    grid.edge = frame.cellSize(node.level);
+    grid.clusterShift = frame.shiftOf(clusterLevel);
+    grid.cellsAcross = 1u << (clusterLevel - node.level);
+    grid.cellSteps = 65536u / grid.cellsAcross;
+    grid.errors = frame.errors;
+    return grid;
+}
+
+/// What those above want to know of a node's records, whose leaves are not at hand there.
+void measureCores(std::span<Rising> records, const Around& around) {
+    const uint32_t shift = around.grid.clusterShift;
+    for (size_t first = 0, last = 0; first < records.size(); first = last) {
+        for (last = first + 1; last < records.size(); ++last)
+            if (records[last].key >> shift != records[first].key >> shift) break;
+        for (size_t k = first; k < last; ++k) measureCore(records[k], around, last == first + 1);
+    }
+}
+
+}  // namespace
+
+PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, NodeBatch& batch, const Leaves* leaves) {
+    STIPPLE_CHECK(!children.empty(), "a parent has children");
+    PendingNode out;
+    const uint32_t level = children[0].node.level - 1u, shift = frame.shiftOf(level);
+    out.key = children[0].key >> shift << shift;
+    out.node = emptyNode(frame, level, out.key);
+    const Around around(gridOf(frame, out.node), out.key, frame.shiftOf(level), leaves, children);
+    const RecordGrid& grid = around.grid;
+    const size_t kinds = frame.attributes.size();
+    thread_local std::vector<Rising> points;
+    thread_local std::vector<RisingValue> leafValues;
+    thread_local ConeMerger cones;
+    for (PendingNode& child : children) {
+        const bool isLeaf = child.node.isLeaf();
+        out.node.childMask = static_cast<uint8_t>(
+            out.node.childMask | 1u << static_cast<uint32_t>(child.key >> frame.shiftOf(level + 1) & 7u));
+        const size_t count = child.node.records;
+        const auto keyAt = [&](size_t k) { return isLeaf ? child.leafKey[k] : child.records[k].key; };
+        for (size_t begin = 0, end = 0; begin < count; begin = end) {
+            const Key cell = keyAt(begin) >> grid.clusterShift;
+            for (end = begin + 1; end < count && keyAt(end) >> grid.clusterShift == cell;) ++end;
+            std::span<const Rising> parts;
+            std::span<const RisingValue> values;
+            if (isLeaf) {
+                points.clear();
+                leafValues.clear();
+                for (size_t k = begin; k < end; ++k) {
+                    points.push_back(risingLeaf(child.leaf, k, child.leafKey[k]));
+                    points.back().first += child.firstPoint;
+                    for (size_t a = 0; a < kinds; ++a)
+                        leafValues.push_back(leafValue(frame.attributes[a], child.leaf.attributes[a].data() +
+                                                                                k * bytesOf(frame.attributes[a].type)));
+                }
+                parts = points;
+                values = leafValues;
+            } else {
+                parts = std::span(child.records).subspan(begin, end - begin);
+                values = std::span(child.values).subspan(begin * kinds, (end - begin) * kinds);
+            }
+            const auto codeOf = [&](size_t k) -> uint8_t& {
+                return isLeaf ? child.leafParentCode[begin + k] : child.records[begin + k].parentCode;
+            };
+            cones.merge(frame, parts, values, around, codeOf, out);
+        }
+    }
+    if (leaves == nullptr) measureCores(out.records, around);
+    out.node.records = static_cast<uint32_t>(out.records.size());
+    for (const Rising& r : out.records) out.node.errorCode = std::max(out.node.errorCode, r.code);
+    innerSphere(frame, children, out);
+    innerCone(children, out.node);
+    for (PendingNode& child : children) encodeNode(frame, child, batch);
+    return out;
+}
+
+void finishRoot(const Frame& frame, PendingNode& root, NodeBatch& batch) { encodeNode(frame, root, batch); }
+
+namespace {
+
+/// Records are drawn to the steps of their node. Would points of this leaf be off by what can be seen beside their
+/// neighbours? Then it is split, until a step is one lattice unit at most:
+///   - more than 4 places in the 64ths of the edge that hold any, on average: nearer to each other than 512 steps. (A
+///     full leaf of evenly scanned points has 2 there.)
+///   - more than 16 in one of them, or 8 in a 128th
+///   - a few points, many of them as near to the next one along the curve
+///   - hardly any, with small discs
+/// So what lies closer together is at most eight points among many that do not.
+bool isCoarse(const Frame& frame, const SortedPoints& from, size_t begin, size_t end, uint32_t level) {
+    constexpr std::array<std::pair<uint32_t, size_t>, 2> kMostBelow{{{6, 16}, {7, 8}}};  // levels, places
+    constexpr size_t kMostOnAverage = 4, kFew = 64, kHardlyAny = 8;
+    constexpr double kSteps = 256, kStepsOfDisc = 64, kMany = 0.25;
+    const double step = std::exp2(static_cast<double>(frame.rootLog2) - level - 16);
+    if (step <= 1) return false;
+    const size_t count = end - begin;
+    std::array<size_t, kMostBelow.size()> places{};
+    size_t different = 0, near = 0, cells = 0;
+    Place before{};
+    for (size_t i = begin; i < end; ++i) {
+        const Place place = from.points.place(i);
+        if (i > begin && place == before) continue;
+        ++different;
+        for (size_t k = 0; k < places.size(); ++k) {
+            const uint32_t shift = frame.shiftOf(std::min(level + kMostBelow.at(k).first, frame.keyLevels));
+            const bool isSame = i > begin && from.key[i] >> shift == from.key[i - 1] >> shift;
+            places.at(k) = isSame ? places.at(k) + 1 : 1;
+            cells += k == 0 && !isSame ? 1 : 0;
+            if (places.at(k) > kMostBelow.at(k).second) return true;
+        }
+        uint64_t apart = 0;
+        for (size_t a = 0; a < 3; ++a)
+            apart = std::max(apart, std::max(place.at(a), before.at(a)) - std::min(place.at(a), before.at(a)));
+        near += i > begin && static_cast<double>(apart) < kSteps * step ? 1 : 0;
+        before = place;
+    }
+    if (different > kMostOnAverage * cells) return true;
+    if (count <= kFew && static_cast<double>(near) > kMany * static_cast<double>(different)) return true;
+    if (count > kHardlyAny) return false;
+    for (size_t i = begin; i < end; ++i)
+        if (kStepsOfDisc * step > static_cast<double>(from.points.radius[i])) return true;
+    return false;
+}
+
+PendingNode subtreeOf(const Frame& frame, SortedPoints& from, size_t begin, size_t end, uint32_t level,
+                      NodeBatch& batch, const Leaves& leaves) {
+    const bool isSmall = end - begin <= frame.leafRecords && !isCoarse(frame, from, begin, end, level);
+    if (isSmall || level >= frame.keyLevels) return makeLeaf(frame, from, begin, end, level);
+    std::vector<PendingNode> children;
+    children.reserve(8);
+    const uint32_t shift = frame.shiftOf(level + 1);
+    for (uint64_t octant = 0; octant < 8 && begin < end; ++octant) {
+        const auto first = from.key.begin() + static_cast<ptrdiff_t>(begin),
+                   last = from.key.begin() + static_cast<ptrdiff_t>(end);
+        const auto split = std::partition_point(first, last, [&](Key k) { return (k >> shift & 7u) <= octant; });
+        const auto next = static_cast<size_t>(split - from.key.begin());
+        if (next == begin) continue;
+        children.push_back(subtreeOf(frame, from, begin, next, level + 1, batch, leaves));
+        begin = next;
+    }
+    return makeParent(frame, children, batch, &leaves);
+}
+
+}  // namespace
+
+PendingNode makeSubtree(const Frame& frame, SortedPoints& from, size_t begin, size_t end, uint32_t level,
+                        NodeBatch& batch) {
+    Leaves leaves{from.points, from.key, begin, std::vector<glm::vec3>(end - begin, glm::vec3(0))};
+    for (size_t i = begin; i < end; ++i)
+        if ((from.points.colour[i] >> 24 & shared::kFlagNoNormal) == 0)
+            leaves.normal[i - begin] = shared::octDecode(from.points.normal[i]);
+    PendingNode root = subtreeOf(frame, from, begin, end, level, batch, leaves);
+    const Around around(gridOf(frame, root.node), root.key, frame.shiftOf(level), &leaves, {});
+    measureCores(root.records, around);
+    return root;
+}
+
+}  // namespace stipple::lod

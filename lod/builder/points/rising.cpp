@@ -1,0 +1,324 @@
+// One coarse record from the finer ones in its cell.
+#include "lod/builder/points/rising.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include "engine/base/numbers.h"
+#include "lod/builder/points/covered.h"
+#include "lod/octahedral.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr uint32_t kDirections = 16;
+constexpr float kColourSpread = 48.0f / 255.0f;  ///< largest tolerated difference from the mean, per channel, sRGB
+
+struct Directions {
+    std::array<float, kDirections> c, s;
+    Directions() {
+        for (uint32_t k = 0; k < kDirections; ++k) {
+            const double a = 6.283185307179586 * k / kDirections;
+            c.at(k) = static_cast<float>(std::cos(a));
+            s.at(k) = static_cast<float>(std::sin(a));
+        }
+    }
+};
+const Directions kPlane;
+
+struct LinearTable {
+    std::array<float, 256> of;
+    LinearTable() {
+        for (uint32_t i = 0; i < 256; ++i) of.at(i) = shared::linearFromSrgb(static_cast<float>(i) / 255.0f);
+    }
+};
+const LinearTable kLinear;
+
+struct RadiusTable {
+    std::array<double, 256> of;
+    RadiusTable() {
+        for (uint32_t c = 0; c < 256; ++c) of.at(c) = static_cast<double>(shared::radiusFraction(c));
+    }
+};
+const RadiusTable kRadii;
+
+/// 16 log2(m), rounded, for 64 mantissas m from 1 to 2.
+struct SixteenthTable {
+    std::array<int, 64> of;
+    SixteenthTable() {
+        for (size_t i = 0; i < of.size(); ++i)
+            of.at(i) = static_cast<int>(std::lround(16 * std::log2(1 + (static_cast<double>(i) + 0.5) / 64)));
+    }
+};
+const SixteenthTable kSixteenths;
+uint32_t byteOf(float srgb) { return unitToByte(srgb); }
+
+bool hasNormal(const Rising& r) { return (r.flags & shared::kFlagNoNormal) == 0; }
+
+/// Means, ranges and flags of the parts.
+void addUp(std::span<const Rising> parts, Rising& out) {
+    double count = 0;
+    glm::dvec3 sum(0);
+    glm::vec3 colour(0), normal(0), reference(0);
+    bool allNone = true;
+    out.first = parts[0].first;
+    out.least = parts[0].least;
+    out.greatest = parts[0].greatest;
+    for (const Rising& p : parts) {
+        const double weight = p.count;
+        const auto w = static_cast<float>(p.count);
+        count += weight;
+        sum += weight * (p.mean - parts[0].mean);
+        colour += w * p.meanColour;
+        for (size_t k = 0; k < 3; ++k) {
+            out.least[k] = std::min(out.least[k], p.least[k]);
+            out.greatest[k] = std::max(out.greatest[k], p.greatest[k]);
+        }
+        out.flags =
+            static_cast<uint8_t>(out.flags | (p.flags & (shared::kFlagTwoSided | shared::kFlagEstimatedNormal)));
+        out.code = std::max(out.code, p.code);
+        out.first = std::min(out.first, p.first);
+        out.count += p.count;
+        if (!hasNormal(p)) continue;
+        if (allNone) reference = p.normal;
+        allNone = false;
+        // A two-sided normal has no sign of its own: take the one that agrees with the first.
+        const bool flip = (p.flags & shared::kFlagTwoSided) != 0 && glm::dot(p.normal, reference) < 0;
+        normal += flip ? -w * p.meanNormal : w * p.meanNormal;
+    }
+    // What most of the leaves are.
+    for (const uint32_t flag : {shared::kFlagLoose, shared::kFlagScattered}) {
+        double such = 0;
+        for (const Rising& p : parts) such += (p.flags & flag) != 0 ? p.count : 0;
+        if (2 * such > count) out.flags = static_cast<uint8_t>(out.flags | flag);
+    }
+    out.key = parts[0].key;
+    out.mean = parts[0].mean + sum / count;
+    out.meanColour = colour / static_cast<float>(count);
+    out.meanNormal = normal / static_cast<float>(count);
+    const float length = glm::length(out.meanNormal);
+    // Opposing normals cancel: the first stands for all (hard case 30).
+    if (!allNone) out.normal = length > 1e-3f ? out.meanNormal / length : reference;
+    if (!allNone && !(length > 1e-3f)) out.meanNormal = 1e-3f * reference;
+    if (allNone) out.flags = static_cast<uint8_t>(out.flags | shared::kFlagNoNormal);
+}
+
+/// Largest difference of a leaf's channel from the mean; both sRGB.
+float colourSpread(const Rising& r, const glm::vec3& mean) {
+    float spread = 0;
+    for (int k = 0; k < 3; ++k) {
+        const auto at = static_cast<size_t>(k);
+        spread = std::max({spread, static_cast<float>(r.greatest.at(at)) / 255.0f - mean[k],
+                           mean[k] - static_cast<float>(r.least.at(at)) / 255.0f});
+    }
+    return spread;
+}
+
+struct Extent {
+    float reach = 0, inner = 0, above = 0, below = 0;
+};
+
+/// Axes of a disc's plane.
+struct Plane {
+    glm::vec3 n, t1, t2;
+    bool none;
+    explicit Plane(const Rising& out) : none(!hasNormal(out)) {
+        n = none ? glm::vec3(0, 0, 1) : out.normal;
+        t1 = glm::normalize(std::abs(n.x) < 0.7f ? glm::vec3(0, -n.z, n.y) : glm::vec3(-n.z, 0, n.x));
+        t2 = glm::cross(n, t1);
+    }
+};
+
+/// Of the leaves themselves.
+Extent extentOfLeaves(const Leaves& leaves, size_t begin, size_t end, const Rising& out) {
+    const Plane plane(out);
+    const glm::vec3 n = plane.n, t1 = plane.t1, t2 = plane.t2;
+    const bool none = plane.none;
+    constexpr size_t kBlock = 64;
+    alignas(64) float us[kBlock], vs[kBlock], insides[kBlock];
+    alignas(64) std::array<float, kDirections> extent{};
+    extent.fill(-1e30f);
+    Extent e;
+    e.above = e.below = -1e30f;
+    for (size_t first = begin; first < end; first += kBlock) {
+        const size_t count = std::min(kBlock, end - first);
+        for (size_t k = 0; k < count; ++k) {
+            const size_t i = first + k;
+            const glm::vec3 d(leaves.points.at(i) - out.place);
+            const float radius = leaves.points.radius[i];
+            const float u = glm::dot(d, t1), v = glm::dot(d, t2), w = none ? 0.0f : glm::dot(d, n);
+            const float along = glm::dot(n, leaves.normalOf(i));
+            const float rise = radius * std::sqrt(std::max(0.0f, 1.0f - along * along));
+            e.above = std::max(e.above, w + rise);
+            e.below = std::max(e.below, rise - w);
+            const float distance = none ? glm::length(d) : std::sqrt(u * u + v * v);
+            e.reach = std::max(e.reach, distance + radius);
+            us[k] = u;
+            vs[k] = v;
+            insides[k] = radius * std::abs(along);
+        }
+        for (size_t k = 0; k < count; ++k)
+            for (uint32_t direction = 0; direction < kDirections; ++direction)
+                extent[direction] =
+                    std::max(extent[direction], us[k] * kPlane.c[direction] + vs[k] * kPlane.s[direction] + insides[k]);
+    }
+    e.inner = *std::min_element(extent.begin(), extent.end());
+    return e;
+}
+
+/// Of the leaves of all parts, against the disc's plane through out.place.
+Extent extentOf(std::span<const Rising> parts, const Rising& out) {
+    const Plane plane(out);
+    const glm::vec3 n = plane.n, t1 = plane.t1, t2 = plane.t2;
+    const bool none = plane.none;
+    alignas(64) std::array<float, kDirections> extent{};
+    extent.fill(-1e30f);
+    Extent e;
+    e.above = e.below = -1e30f;
+    for (const Rising& p : parts) {
+        const glm::vec3 d(p.place - out.place);
+        const float u = glm::dot(d, t1), v = glm::dot(d, t2), w = none ? 0.0f : glm::dot(d, n);
+        const float along = hasNormal(p) ? glm::dot(n, p.normal) : 0.0f;
+        // A record without a normal is a ball: its rim rises by its whole radius.
+        const float sine = std::sqrt(std::max(0.0f, 1.0f - along * along));
+        const float slab = std::max(p.above, p.below);
+        const float rise = p.radius * sine;
+        e.above = std::max(e.above, w + rise + std::max(p.above * along, -p.below * along));
+        e.below = std::max(e.below, -w + rise + std::max(p.below * along, -p.above * along));
+        const float distance = none ? glm::length(d) + slab : std::sqrt(u * u + v * v) + slab * sine;
+        e.reach = std::max(e.reach, distance + p.radius);
+        // In any direction of the plane the leaves reach at least that far from the part's centre.
+        const float moved = p.count == 1 ? static_cast<float>(glm::length(p.mean - p.place)) : 0.0f;
+        const float inside = std::max(p.inner * std::abs(along) - slab * sine - moved, -p.radius);
+        for (uint32_t k = 0; k < kDirections; ++k)
+            extent[k] = std::max(extent[k], u * kPlane.c[k] + v * kPlane.s[k] + inside);
+    }
+    e.inner = *std::min_element(extent.begin(), extent.end());
+    return e;
+}
+
+}  // namespace
+
+uint32_t radiusCodeUp(double radius, double edge) {
+    const double share = radius * (1 - 2e-7) / edge;
+    // 16 codes an octave: from the exponent and the bits after it; the table has the last word.
+    const auto bits = std::bit_cast<uint64_t>(std::max(share, 1e-300));
+    const int octave = static_cast<int>(bits >> 52) - 1023;
+    auto c = static_cast<uint32_t>(std::clamp(255 + 16 * octave + kSixteenths.of[bits >> 46 & 63u], 0, 255));
+    while (c > 0 && kRadii.of[c - 1] >= share) --c;
+    while (c < 255 && kRadii.of[c] < share) ++c;
+    return c;
+}
+double radiusOf(uint32_t code, double edge) { return kRadii.of.at(code) * edge; }
+
+Rising risingLeaf(const Points& points, size_t i, Key key) {
+    Rising r;
+    r.first = static_cast<uint32_t>(i);
+    r.key = key;
+    r.count = 1;
+    r.mean = r.place = points.at(i);
+    const uint32_t c = points.colour[i];
+    r.flags = static_cast<uint8_t>(c >> 24);
+    if (hasNormal(r)) r.normal = r.meanNormal = shared::octDecode(points.normal[i]);
+    for (size_t k = 0; k < 3; ++k) {
+        r.least[k] = r.greatest[k] = static_cast<uint8_t>(c >> (8 * k));
+        r.meanColour[static_cast<int>(k)] = kLinear.of[r.least[k]];
+    }
+    r.radius = points.radius[i];
+    r.inner = r.core = hasNormal(r) ? r.radius : 0.0f;
+    return r;
+}
+
+Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const Leaves* leaves, const Around& around) {
+    Rising out;
+    addUp(parts, out);
+    const uint32_t normalCode = hasNormal(out) ? roundedNormal(out.normal) : 0;
+    if (hasNormal(out)) out.normal = shared::octDecode(normalCode);
+    // Position: to the nearest step, inside the cluster's own cell.
+    std::array<uint32_t, 3> q{};
+    const Key cluster = out.key >> grid.clusterShift;
+    const std::array<uint64_t, 3> index{compactBits(cluster), compactBits(cluster >> 1), compactBits(cluster >> 2)};
+    for (int a = 0; a < 3; ++a) {
+        const auto at = static_cast<size_t>(a);
+        const uint32_t first = static_cast<uint32_t>(index[at] & (grid.cellsAcross - 1)) * grid.cellSteps;
+        const double wanted = std::floor((out.mean[a] - grid.base[a]) / grid.step + 0.5);
+        q[at] = toWhole<uint32_t>(std::clamp(wanted, double(first), double(first + grid.cellSteps - 1)));
+        out.place[a] = grid.base[a] + grid.step * q[at];
+    }
+    const Extent x = leaves != nullptr ? extentOfLeaves(*leaves, out.first, size_t{out.first} + out.count, out)
+                                       : extentOf(parts, out);
+    const uint32_t radiusCode = radiusCodeUp(std::max(static_cast<double>(x.reach) * (1 + 1e-6), 0.5), grid.edge);
+    const double radius = radiusOf(radiusCode, grid.edge);
+    out.radius = static_cast<float>(radius);
+    out.inner = x.inner;
+    double error = 0;
+    if (hasNormal(out)) {
+        out.above = x.above * (1 + 1e-5f);
+        out.below = x.below * (1 + 1e-5f);
+        const double sideways = std::max(0.0, radius - static_cast<double>(x.inner));
+        error = std::hypot(static_cast<double>(std::max(out.above, out.below)), sideways) * (1 + 1e-5);
+    } else {
+        out.inner = 0;
+        error = out.count == 1 ? 0.0 : coveringErrorOfBall(out, parts, leaves);
+    }
+    if (out.count == 1) {  // the same disc, moved and rounded up
+        out.inner = parts[0].inner;
+        error = glm::length(out.mean - out.place) + radius - static_cast<double>(out.inner);
+    }
+    const glm::vec3 colour(shared::srgbFromLinear(out.meanColour.x), shared::srgbFromLinear(out.meanColour.y),
+                           shared::srgbFromLinear(out.meanColour.z));
+    if (colourSpread(out, colour) > kColourSpread) error = std::max(error, 2 * radius);
+    out.code = std::max(static_cast<uint8_t>(grid.errors.encodeUp(error)), out.code);
+    if (out.count > 1) out.code = static_cast<uint8_t>(coveringCode(out, around, out.code));
+    out.packed = {q[0] | q[1] << 16, q[2] | radiusCode << 16 | uint32_t{out.code} << 24, normalCode,
+                  byteOf(colour.x) | byteOf(colour.y) << 8 | byteOf(colour.z) << 16 | uint32_t{out.flags} << 24};
+    return out;
+}
+
+bool splitByNormals(std::span<const Rising> parts, std::vector<uint8_t>& side) {
+    constexpr float kOneCone = 0.82f;  // cosine of 35 degrees
+    constexpr int kRounds = 2;
+    if (parts.size() < 2) return false;
+    // How well a normal agrees with an axis; a two-sided one has no sign.
+    const auto agrees = [](const Rising& p, const glm::vec3& axis) {
+        const float d = glm::dot(p.normal, axis);
+        return (p.flags & shared::kFlagTwoSided) != 0 ? std::abs(d) : d;
+    };
+    const auto farthestFrom = [&](const glm::vec3& axis) {
+        size_t worst = 0;
+        float least = 2;
+        for (size_t k = 0; k < parts.size(); ++k) {
+            if (!hasNormal(parts[k])) return parts.size();
+            const float d = agrees(parts[k], axis);
+            if (d < least) {
+                least = d;
+                worst = k;
+            }
+        }
+        return worst;
+    };
+    const size_t a = farthestFrom(parts[0].normal);
+    if (a == parts.size()) return false;
+    const size_t b = farthestFrom(parts[a].normal);
+    std::array<glm::vec3, 2> axis{parts[a].normal, parts[b].normal};
+    if (agrees(parts[b], axis[0]) > kOneCone) return false;
+    side.resize(parts.size());
+    std::array<size_t, 2> members{};
+    for (int round = 0; round < kRounds; ++round) {
+        std::array<glm::vec3, 2> sum{glm::vec3(0), glm::vec3(0)};
+        members = {};
+        for (size_t k = 0; k < parts.size(); ++k) {
+            side[k] = agrees(parts[k], axis[1]) > agrees(parts[k], axis[0]) ? 1 : 0;
+            const bool flip = glm::dot(parts[k].normal, axis.at(side[k])) < 0;
+            sum.at(side[k]) += static_cast<float>(parts[k].count) * (flip ? -parts[k].normal : parts[k].normal);
+            ++members.at(side[k]);
+        }
+        for (size_t g = 0; g < 2; ++g)
+            if (glm::length(sum.at(g)) > 0) axis.at(g) = glm::normalize(sum.at(g));
+    }
+    return members[0] > 0 && members[1] > 0;
+}
+
+}  // namespace stipple::lod

@@ -1,0 +1,34 @@
+// One coarse record from the finer ones in its cell.
+#pragma once
+
+#include "lod/builder/points/levels.h"
+
+namespace stipple::lod {
+
+class Around;
+
+/// Where the records of one inner node may lie.
+struct RecordGrid {
+    glm::dvec3 base{0};         ///< lattice position of coordinate 0
+    double step = 1, edge = 1;  ///< lattice units a step, and of the node's cell
+    uint32_t clusterShift = 0;  ///< key bits below a cluster's cell
+    uint32_t cellsAcross = 1;   ///< clusters along the node's edge
+    uint32_t cellSteps = 1;     ///< steps of one cluster's cell
+    ErrorScale errors;
+};
+
+/// Code of the smallest radius >= `radius` at a node of this edge; but for 2e-7 relative, so that a decoded radius that
+/// was rounded to fp32 gets its own code again.
+uint32_t radiusCodeUp(double radius, double edge);
+double radiusOf(uint32_t code, double edge);
+
+/// Point i as a record that stands for itself.
+Rising risingLeaf(const Points& points, size_t i, Key key);
+/// Records in one cell whose normals lie in two cones, apart by more than 35 degrees: `side` says which one each
+/// belongs to. False if there is one cone, or a record without a normal.
+bool splitByNormals(std::span<const Rising> parts, std::vector<uint8_t>& side);
+/// `parts`: records in one cluster's cell, in order. `leaves`: the points below them, where they are at hand and all
+/// points of the cell are meant. `around`: what the disc is held against.
+Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const Leaves* leaves, const Around& around);
+
+}  // namespace stipple::lod

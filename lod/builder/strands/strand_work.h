@@ -1,0 +1,95 @@
+// What the stages of a strand build hand to each other. Lengths are lattice units.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "lod/builder/octree/bytes.h"
+#include "lod/builder/octree/frame.h"
+#include "lod/strands.h"
+
+namespace stipple::lod {
+
+/// A vertex of a strand, long segments divided; the same in every cell that it belongs to.
+struct StrandPoint {
+    glm::dvec3 p{0};
+    float radius = 0;
+    glm::vec3 direction{0};           ///< unit: across a ribbon, along a tube
+    uint32_t strand = 0, number = 0;  ///< number: along the strand
+    uint32_t colour = 0;              ///< sRGB
+    uint32_t isRibbon = 0;
+};
+
+/// Part of a strand between two points, at some level of detail.
+struct StrandPart {
+    uint32_t a = 0, b = 0;  ///< points
+    uint32_t colourA = 0, colourB = 0;
+    float radiusA = 0, radiusB = 0;  ///< of its own: what it stands for has the same area
+    double error = 0;                ///< bound of the distance from what it stands for
+    uint8_t ownCode = 0, parentCode = 255;
+    uint8_t octants = 0;
+    std::array<uint8_t, 5> unused{};
+};
+
+struct StrandLevel {
+    double tolerance = 0;  ///< error that merging may add
+    double rounding = 0;   ///< of positions
+    double thin = 0;       ///< radius of strands that are, at most
+    size_t mostParts = 0;  ///< beyond that, thin strands are drawn by lot
+};
+
+/// One node's parts from its children's, sorted along the strands. `standsFor[i]`: the part that child part i became,
+/// kDrawnByLot where others stand for it.
+inline constexpr uint32_t kDrawnByLot = ~0u;
+struct StrandMerge {
+    std::vector<StrandPart> parts;
+    std::vector<uint32_t> standsFor;
+    double kept = 1;         ///< share of the thin strands' area that was drawn
+    double commonError = 0;  ///< of all thin parts, where some were
+};
+StrandMerge mergeParts(const std::vector<StrandPoint>& points, const std::vector<StrandPart>& children,
+                       const StrandLevel& level);
+
+/// A point as it travels, with no more bits than matter: places to a quarter of a lattice unit (2^-26 of the extent, or
+/// finer where strands lie far from each other),
+/// directions to 0.06 degrees, radii to 2^-17 of themselves.
+struct TravellingPoint {
+    static constexpr uint32_t kStepBits = 2;
+    uint32_t x = 0, y = 0, z = 0;
+    float radius = 0;
+    uint32_t direction = 0, colour = 0;
+    uint64_t high = 0;  ///< see Place
+    TravellingPoint() = default;
+    explicit TravellingPoint(const StrandPoint& p);
+    StrandPoint point() const;
+    /// In steps of a quarter of a lattice unit.
+    Place steps() const { return placeOf(x, y, z, high); }
+    /// Lattice coordinates of the middle of a segment.
+    static Place middle(const Place& a, const Place& b) {
+        constexpr uint32_t kShift = kStepBits + 1;
+        return {(a[0] + b[0]) >> kShift, (a[1] + b[1]) >> kShift, (a[2] + b[2]) >> kShift};
+    }
+    static Place middle(const TravellingPoint& a, const TravellingPoint& b) { return middle(a.steps(), b.steps()); }
+    /// Largest distance from where the point was, lattice units.
+    static double rounding() { return std::exp2(-1.0 - kStepBits) * std::sqrt(3.0); }
+};
+/// A segment from `a` to `b` in even pieces no longer than `longest` lattice units: their ends, `b` the last. Part of
+/// the segments of a strand can be divided anywhere with the same result.
+void divide(const TravellingPoint& a, const TravellingPoint& b, double longest, std::vector<TravellingPoint>& ends);
+
+/// Successive points of one strand as its source has them; numbers count the ends of divided segments.
+struct StrandRun {
+    uint32_t strand = 0, firstNumber = 0, points = 0, isRibbon = 0;
+};
+/// Runs of leaf segments as bytes.
+struct StrandRuns {
+    std::vector<StrandRun> runs;
+    std::vector<TravellingPoint> points;  ///< of all runs
+    void put(ByteWriter& to) const;
+    /// Appends; false if the bytes are not what put wrote.
+    bool get(ByteReader& from);
+};
+
+}  // namespace stipple::lod
