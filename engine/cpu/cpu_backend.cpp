@@ -17,20 +17,18 @@
 #include "engine/base/numbers.h"
 #include "engine/base/process.h"
 #include "engine/base/queue.h"
-#include "engine/cpu/level.h"
+#include "engine/cpu/pyramid.h"
 #include "shaders/shared/splat.h"
 
 namespace stipple::cpu {
 namespace {
 
-constexpr float kOutside = -1;      ///< depth of a texel outside the image
-constexpr uint32_t kBandRows = 16;  ///< coarse rows per task
-
 uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | key.node; }
 
 class CpuBackend final : public render::Backend {
   public:
-    CpuBackend(Executor& executor, const Kernels& kernels) : executor_(executor), k_(kernels), tables_(makeTables()) {}
+    CpuBackend(Executor& executor, const Kernels& kernels)
+        : executor_(executor), k_(kernels), tables_(makeTables()), pyramid_(executor, kernels) {}
 
     std::string name() const override { return "cpu"; }
     std::string device() const override {
@@ -93,10 +91,10 @@ class CpuBackend final : public render::Backend {
                     resolve(hasPyramid);
                     break;
                 case render::Pass::pull:
-                    pull();
+                    pyramid_.pull();
                     break;
                 case render::Pass::push:
-                    push();
+                    pyramid_.push();
                     break;
                 case render::Pass::shade:
                     shade(hasPyramid);
@@ -126,15 +124,11 @@ class CpuBackend final : public render::Backend {
         image_->depth.resize(wantAll_ ? pixels : 0);
         image_->normal.resize(wantAll_ ? pixels * 3 : 0);
         image_->linear.resize(wantAll_ ? pixels * 3 : 0);
-        if (!levels_.empty() && levels_[0].width == w && levels_[0].height == h) return;
+        pyramid_.resize(w, h);
+        if (visibilityPixels_ == pixels) return;  // it is clear whatever its shape
+        visibilityPixels_ = pixels;
         visibility_.assign(pixels, ~uint64_t{0});
         runs_.assign(pixels / Visibility::kRun + 1, 0);
-        levels_.clear();
-        for (uint32_t lw = w, lh = h;; lw = (lw + 1) / 2, lh = (lh + 1) / 2) {
-            levels_.emplace_back();
-            levels_.back().resize(lw, lh);
-            if (lw == 1 && lh == 1) break;
-        }
     }
 
     /// The visibility buffer is already clear (see resolve); what is made here is the block table.
@@ -283,21 +277,6 @@ class CpuBackend final : public render::Backend {
         });
     }
 
-    /// Calls body(x0, n, row0, row1) for tiles of `level`: columns [x0, x0 + n), rows [row0, row1), row0 even.
-    template <typename Body>
-    void forTiles(const Level& level, const Body& body) {
-        const uint32_t columns = (level.width + kTile - 1) / kTile,
-                       bands = (level.height + 2 * kBandRows - 1) / (2 * kBandRows);
-        executor_.parallelFor(
-            size_t{columns} * bands, level.width * level.height < 65536 ? 64 : 1, [&](size_t begin, size_t end) {
-                for (size_t t = begin; t < end; ++t) {
-                    const auto x0 = static_cast<uint32_t>(t % columns) * kTile,
-                               row0 = static_cast<uint32_t>(t / columns) * 2 * kBandRows;
-                    body(x0, std::min(kTile, level.width - x0), row0, std::min(level.height, row0 + 2 * kBandRows));
-                }
-            });
-    }
-
     /// Planes that only triangles need, and only those with a shining material.
     void preparePlanes(size_t pixels) {
         const auto fit = [&](HugeBuffer<uint32_t>& plane, size_t& size, bool isNeeded) {
@@ -319,14 +298,15 @@ class CpuBackend final : public render::Backend {
 
     /// Level 0 from the visibility buffer; with a pyramid, level 1 on the way.
     void resolve(bool hasPyramid) {
-        Level& fine = levels_[0];
-        Level* coarse = hasPyramid && levels_.size() > 1 ? &levels_[1] : nullptr;
+        Level& fine = pyramid_.level(0);
+        Level* coarse = hasPyramid && pyramid_.levels() > 1 ? &pyramid_.level(1) : nullptr;
+        pyramid_.beginFrame(frame_, hasStrands_);
         const Planes finePlanes = fine.planes();
         preparePlanes(size_t{fine.width} * fine.height);
         const ResolveInput input{blocks_.data(),       meshBlocks_.data(), draws_->materials.data(),
                                  strandBlocks_.data(), discs_.data(),      discs_.size()};
         std::atomic<float> largestRadius{0};
-        forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
+        pyramid_.forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
             TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
             upper.hasTubes = lower.hasTubes = out.hasTubes = hasStrands_;
             float largest = 0;
@@ -339,7 +319,7 @@ class CpuBackend final : public render::Backend {
                     if (yy >= row1 || !isSeen(at, n)) {
                         row->hasTubes = false;
                         std::fill_n(row->depth + kPad, n, 0.0f);
-                        if (hasStrands_) clearTubes(*row);
+                        if (hasStrands_) Pyramid::clearTubes(*row);
                         if (yy < row1) fine.empty(yy, x0, n);
                         continue;
                     }
@@ -355,158 +335,19 @@ class CpuBackend final : public render::Backend {
                     any = any || has;
                 }
                 if (!coarse) continue;
-                pullPair(upper, lower, any, (n + 1) / 2, 1.0f, *coarse, x0 / 2, y / 2, out);
+                pyramid_.pullPair(upper, lower, any, (n + 1) / 2, 1.0f, *coarse, x0 / 2, y / 2, out);
             }
             float seen = largestRadius.load(std::memory_order_relaxed);
             while (largest > seen && !largestRadius.compare_exchange_weak(seen, largest, std::memory_order_relaxed)) {
             }
         });
         std::fill(runs_.begin(), runs_.end(), uint8_t{0});  // resolveRow has cleared what they stood for
-        // Levels whose texels are larger than the largest splat hold nothing.
-        const auto needed = toWhole<size_t>(1 + std::ceil(std::log2(std::max(2.0f, 2 * largestRadius.load()))));
-        levelCount_ = std::min(levels_.size(), needed);
-    }
-
-    static void clearTubes(TexelRow& row) {
-        std::fill_n(row.isRound, TexelRow::kSize, 0.0f);
-        std::fill_n(row.axisX, TexelRow::kSize, 0.0f);
-    }
-
-    /// Two rows to `n` texels of row `y` of the coarser level, from `x` on.
-    void pullPair(const TexelRow& upper, const TexelRow& lower, bool any, uint32_t n, float childSize, Level& to,
-                  uint32_t x, uint32_t y, TexelRow& out) {
-        if (!any) {
-            to.empty(y, x, n);
-            return;
-        }
-        to.hold(y, x, n);
-        out.hasTubes = upper.hasTubes || lower.hasTubes;
-        k_.pullRow(upper, lower, n, childSize, 1.0f / frame_.focal, out);
-        k_.packRow(out, n, to.planes().at(size_t{y} * to.width + x));
-    }
-
-    void pull() {
-        for (size_t l = 1; l + 1 < levelCount_; ++l) {
-            Level &fine = levels_[l], &coarse = levels_[l + 1];
-            const Planes from = fine.planes();
-            forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
-                TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
-                upper.hasTubes = lower.hasTubes = out.hasTubes = hasStrands_;
-                for (uint32_t y = row0; y < row1; y += 2) {
-                    bool any = false;
-                    for (TexelRow* row : {&upper, &lower}) {
-                        const uint32_t yy = y + (row == &lower ? 1 : 0);
-                        any = (yy < row1 && loadRow(fine, from, yy, x0, n, kPad, *row)) || any;
-                        if (yy >= row1) std::fill_n(row->depth + kPad, n, 0.0f);
-                        row->depth[kPad + n] = 0;
-                    }
-                    pullPair(upper, lower, any, (n + 1) / 2, std::exp2(static_cast<float>(l)), coarse, x0 / 2, y / 2,
-                             out);
-                }
-            });
-        }
-    }
-
-    /// Unpacks n texels of a row; false (and only the depths set) if all are empty.
-    bool loadRow(const Level& level, const Planes& planes, uint32_t y, uint32_t x, uint32_t n, uint32_t first,
-                 TexelRow& row) {
-        const Planes at = planes.at(size_t{y} * level.width + x);
-        bool any = false;
-        uint32_t signs = 0;
-        for (uint32_t i = 0; level.mayHold(y, x, n) && i < n; ++i) {
-            any |= at.depth[i] > 0;
-            signs |= at.depth[i] > 0 ? at.size[i] : 0u;
-        }
-        row.hasTubes = hasStrands_ && (signs & 0x80008000u) != 0;
-        if (any)
-            k_.unpackRow(at, first, n, row);
-        else
-            std::fill_n(row.depth + first, n, 0.0f);
-        if (hasStrands_ && !row.hasTubes) {  // others beside it may have some
-            std::fill_n(row.isRound + first, n, 0.0f);
-            std::fill_n(row.axisX + first, n, 0.0f);
-        }
-        return any;
-    }
-
-    /// The expanded coarse row `y` around the fine columns [x0, x0 + n); empty outside the level.
-    bool loadCoarse(const Level& level, const Planes& planes, float size, int y, uint32_t x0, uint32_t n,
-                    TexelRow& scratch, ExpandedRow& out) {
-        const uint32_t c0 = x0 / 2, count = (n + 1) / 2;
-        if (y < 0 || y >= static_cast<int>(level.height)) return false;
-        const uint32_t before = c0 > 0 ? 1 : 0, after = c0 + count < level.width ? 1 : 0;
-        scratch.depth[kPad - 1] = kOutside;  // overwritten below where there is a neighbour
-        scratch.depth[kPad + count] = kOutside;
-        if (!loadRow(level, planes, static_cast<uint32_t>(y), c0 - before, count + before + after, kPad - before,
-                     scratch))
-            return false;
-        k_.expandRow(scratch, n, (static_cast<float>(c0) + 0.5f) * size - frame_.centre.x,
-                     (static_cast<float>(y) + 0.5f) * size - frame_.centre.y, size, frame_.focal, out.nearest,
-                     out.beside);
-        out.nearest.hasTubes = scratch.hasTubes;
-        if (hasStrands_ && !scratch.hasTubes)
-            for (TexelRow* row : {&out.nearest, &out.beside}) clearTubes(*row);
-        return true;
-    }
-
-    /// Pushes coarse into fine over one tile, row by row: use(y, own row, pushed row, any).
-    template <typename Use>
-    void pushTile(Level& fine, Level& coarse, float fineSize, uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1,
-                  const Use& use) {
-        const Planes finePlanes = fine.planes(), coarsePlanes = coarse.planes();
-        thread_local TexelRow scratch{}, own{}, out{};
-        thread_local std::array<ExpandedRow, 3> ring{};
-        scratch.hasTubes = own.hasTubes = out.hasTubes = hasStrands_;
-        std::array<bool, 3> has{};
-        const int c0 = static_cast<int>(row0 / 2);
-        for (int c = c0 - 1; c <= c0; ++c)
-            has.at(static_cast<size_t>(c + 1) % 3) = loadCoarse(coarse, coarsePlanes, 2 * fineSize, c, x0, n, scratch,
-                                                                ring.at(static_cast<size_t>(c + 1) % 3));
-        for (uint32_t y = row0; y < row1; ++y) {
-            const auto c = static_cast<size_t>(y / 2);  // ring slot of coarse row c is (c + 1) % 3
-            if (y % 2 == 0)
-                has.at((c + 2) % 3) = loadCoarse(coarse, coarsePlanes, 2 * fineSize, static_cast<int>(c) + 1, x0, n,
-                                                 scratch, ring.at((c + 2) % 3));
-            const size_t nearSlot = (c + 1) % 3, farSlot = y % 2 == 0 ? c % 3 : (c + 2) % 3;
-            const bool ownAny = loadRow(fine, finePlanes, y, x0, n, kPad, own);
-            if (!has.at(nearSlot) && !has.at(farSlot)) {
-                use(y, own, own, ownAny);
-                continue;
-            }
-            for (const size_t slot : {nearSlot, farSlot}) {
-                if (has.at(slot)) continue;
-                const bool isOutside = slot == farSlot && (y % 2 == 0 ? c == 0 : c + 1 >= coarse.height);
-                std::fill_n(ring.at(slot).nearest.depth, TexelRow::kSize, isOutside ? kOutside : 0.0f);
-                std::fill_n(ring.at(slot).beside.depth, TexelRow::kSize, isOutside ? kOutside : 0.0f);
-            }
-            out.hasTubes = own.hasTubes || (has.at(nearSlot) && ring.at(nearSlot).nearest.hasTubes) ||
-                           (has.at(farSlot) && ring.at(farSlot).nearest.hasTubes);
-            k_.pushRow(own, ring.at(nearSlot), ring.at(farSlot), y % 2 == 0 ? -1.0f : 1.0f,
-                       (static_cast<float>(x0) + 0.5f) * fineSize - frame_.centre.x,
-                       (static_cast<float>(y) + 0.5f) * fineSize - frame_.centre.y, n, fineSize, frame_.focal, out);
-            use(y, own, out, true);
-        }
-    }
-
-    void push() {
-        for (size_t l = levelCount_; l-- > 1;) {
-            if (l + 1 >= levelCount_) continue;
-            Level &fine = levels_[l], &coarse = levels_[l + 1];
-            const Planes planes = fine.planes();
-            forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
-                pushTile(fine, coarse, std::exp2(static_cast<float>(l)), x0, n, row0, row1,
-                         [&](uint32_t y, const TexelRow&, const TexelRow& row, bool any) {
-                             if (!any) return;
-                             fine.hold(y, x0, n);
-                             k_.packRow(row, n, planes.at(size_t{y} * fine.width + x0));
-                         });
-            });
-        }
+        pyramid_.setLargestRadius(largestRadius.load());
     }
 
     /// The last push (into level 0) and the shading of its result, or the shading alone.
     void shade(bool hasPyramid) {
-        Level& fine = levels_[0];
+        Level& fine = pyramid_.level(0);
         const Planes planes = fine.planes();
         const LightInput light{draws_->lights.data(),
                                draws_->environment ? draws_->environment->table.data() : nullptr};
@@ -532,17 +373,17 @@ class CpuBackend final : public render::Backend {
             if (isLit) k_.lightRow(frame_, light, x0, y, n, surface);
             k_.outputRow(frame_, tables_, n, surface, out);
         };
-        forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
-            if (hasPyramid && levelCount_ > 1) {
-                pushTile(
-                    fine, levels_[1], 1.0f, x0, n, row0, row1,
+        pyramid_.forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
+            if (hasPyramid && pyramid_.isUsed()) {
+                pyramid_.pushTile(
+                    fine, pyramid_.level(1), 1.0f, x0, n, row0, row1,
                     [&](uint32_t y, TexelRow& own, TexelRow& row, bool any) { shadeRow(x0, n, y, own, row, any); });
                 return;
             }
             thread_local TexelRow row{};
             row.hasTubes = hasStrands_;
             for (uint32_t y = row0; y < row1; ++y) {
-                const bool any = loadRow(fine, planes, y, x0, n, kPad, row);
+                const bool any = pyramid_.loadRow(fine, planes, y, x0, n, kPad, row);
                 shadeRow(x0, n, y, row, row, any);
             }
         });
@@ -572,7 +413,8 @@ class CpuBackend final : public render::Backend {
     std::unordered_map<uint64_t, lod::Chunk> chunks_;
     HugeBuffer<uint64_t> visibility_;
     std::vector<uint8_t> runs_;  ///< of `visibility_`
-    std::vector<Level> levels_;
+    size_t visibilityPixels_ = 0;
+    Pyramid pyramid_;
     std::vector<MeshBlock> meshBlocks_;
     std::vector<LargeTriangle> large_;
     CompletionQueue<std::vector<LargeTriangle>> found_;
@@ -592,7 +434,6 @@ class CpuBackend final : public render::Backend {
     const render::DrawList* draws_ = nullptr;
     shared::FrameConstants frame_{};
     render::Image* image_ = nullptr;
-    size_t levelCount_ = 0;
     bool wantAll_ = false;
 };
 

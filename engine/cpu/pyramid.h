@@ -1,0 +1,118 @@
+// Pull and push over the levels of the pyramid, tile by tile (Marroquim, Kraus, Cavalcanti 2008;
+// shaders/shared/pyramid.h).
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "engine/base/executor.h"
+#include "engine/cpu/level.h"
+
+namespace stipple::cpu {
+
+constexpr float kOutside = -1;      ///< depth of a texel outside the image
+constexpr uint32_t kBandRows = 16;  ///< coarse rows per task
+
+class Pyramid {
+  public:
+    Pyramid(Executor& executor, const Kernels& kernels) : executor_(executor), k_(kernels) {}
+
+    void resize(uint32_t width, uint32_t height);
+    size_t levels() const { return levels_.size(); }
+    Level& level(size_t l) { return levels_[l]; }
+    /// `hasStrands`: texels may be of tubes.
+    void beginFrame(const shared::FrameConstants& frame, bool hasStrands) {
+        frame_ = frame;
+        hasStrands_ = hasStrands;
+    }
+    /// Levels whose texels are larger than the largest splat hold nothing. Once level 0 and 1 are filled.
+    void setLargestRadius(float radius);
+    /// Is there more than level 0?
+    bool isUsed() const { return levelCount_ > 1; }
+
+    /// Level 1 to the top.
+    void pull();
+    /// The top to level 1.
+    void push();
+
+    /// Calls body(x0, n, row0, row1) for tiles of `level`: columns [x0, x0 + n), rows [row0, row1), row0 even.
+    template <typename Body>
+    void forTiles(const Level& level, const Body& body) {
+        const uint32_t columns = (level.width + kTile - 1) / kTile,
+                       bands = (level.height + 2 * kBandRows - 1) / (2 * kBandRows);
+        executor_.parallelFor(
+            size_t{columns} * bands, level.width * level.height < 65536 ? 64 : 1, [&](size_t begin, size_t end) {
+                for (size_t t = begin; t < end; ++t) {
+                    const auto x0 = static_cast<uint32_t>(t % columns) * kTile,
+                               row0 = static_cast<uint32_t>(t / columns) * 2 * kBandRows;
+                    body(x0, std::min(kTile, level.width - x0), row0, std::min(level.height, row0 + 2 * kBandRows));
+                }
+            });
+    }
+
+    static void clearTubes(TexelRow& row) {
+        std::fill_n(row.isRound, TexelRow::kSize, 0.0f);
+        std::fill_n(row.axisX, TexelRow::kSize, 0.0f);
+    }
+    /// Two rows to `n` texels of row `y` of the coarser level, from `x` on.
+    void pullPair(const TexelRow& upper, const TexelRow& lower, bool any, uint32_t n, float childSize, Level& to,
+                  uint32_t x, uint32_t y, TexelRow& out);
+    /// Unpacks n texels of a row; false (and only the depths set) if all are empty.
+    bool loadRow(const Level& level, const Planes& planes, uint32_t y, uint32_t x, uint32_t n, uint32_t first,
+                 TexelRow& row) const;
+
+    /// Pushes coarse into fine over one tile, row by row: use(y, own row, pushed row, any).
+    template <typename Use>
+    void pushTile(Level& fine, Level& coarse, float fineSize, uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1,
+                  const Use& use) {
+        const Planes finePlanes = fine.planes(), coarsePlanes = coarse.planes();
+        thread_local TexelRow scratch{}, own{}, out{};
+        thread_local std::array<ExpandedRow, 3> ring{};
+        scratch.hasTubes = own.hasTubes = out.hasTubes = hasStrands_;
+        std::array<bool, 3> has{};
+        const int c0 = static_cast<int>(row0 / 2);
+        for (int c = c0 - 1; c <= c0; ++c)
+            has.at(static_cast<size_t>(c + 1) % 3) = loadCoarse(coarse, coarsePlanes, 2 * fineSize, c, x0, n, scratch,
+                                                                ring.at(static_cast<size_t>(c + 1) % 3));
+        for (uint32_t y = row0; y < row1; ++y) {
+            const auto c = static_cast<size_t>(y / 2);  // ring slot of coarse row c is (c + 1) % 3
+            if (y % 2 == 0)
+                has.at((c + 2) % 3) = loadCoarse(coarse, coarsePlanes, 2 * fineSize, static_cast<int>(c) + 1, x0, n,
+                                                 scratch, ring.at((c + 2) % 3));
+            const size_t nearSlot = (c + 1) % 3, farSlot = y % 2 == 0 ? c % 3 : (c + 2) % 3;
+            const bool ownAny = loadRow(fine, finePlanes, y, x0, n, kPad, own);
+            if (!has.at(nearSlot) && !has.at(farSlot)) {
+                use(y, own, own, ownAny);
+                continue;
+            }
+            for (const size_t slot : {nearSlot, farSlot}) {
+                if (has.at(slot)) continue;
+                const bool isOutside = slot == farSlot && (y % 2 == 0 ? c == 0 : c + 1 >= coarse.height);
+                std::fill_n(ring.at(slot).nearest.depth, TexelRow::kSize, isOutside ? kOutside : 0.0f);
+                std::fill_n(ring.at(slot).beside.depth, TexelRow::kSize, isOutside ? kOutside : 0.0f);
+            }
+            out.hasTubes = own.hasTubes || (has.at(nearSlot) && ring.at(nearSlot).nearest.hasTubes) ||
+                           (has.at(farSlot) && ring.at(farSlot).nearest.hasTubes);
+            k_.pushRow(own, ring.at(nearSlot), ring.at(farSlot), y % 2 == 0 ? -1.0f : 1.0f,
+                       (static_cast<float>(x0) + 0.5f) * fineSize - frame_.centre.x,
+                       (static_cast<float>(y) + 0.5f) * fineSize - frame_.centre.y, n, fineSize, frame_.focal, out);
+            use(y, own, out, true);
+        }
+    }
+
+  private:
+    /// The expanded coarse row `y` around the fine columns [x0, x0 + n); empty outside the level.
+    bool loadCoarse(const Level& level, const Planes& planes, float size, int y, uint32_t x0, uint32_t n,
+                    TexelRow& scratch, ExpandedRow& out) const;
+
+    Executor& executor_;
+    const Kernels& k_;
+    std::vector<Level> levels_;
+    size_t levelCount_ = 0;
+    shared::FrameConstants frame_{};
+    bool hasStrands_ = false;
+};
+
+}  // namespace stipple::cpu
