@@ -3,8 +3,9 @@
 #include "bindings.glsl"
 #include "shared/wide_disc.h"
 
-layout(set = 0, binding = 18, scalar) buffer DiscBlock {
+layout(set = 0, binding = 18, scalar) coherent buffer DiscBlock {
     uint discCount;
     WideDisc discs[];
 };
-const uint kDiscCapacity = 65536u;  // what is beyond is drawn as an ellipse a texel
+const uint kPointMask = 0x1fffffffu;  // of a visibility id
+

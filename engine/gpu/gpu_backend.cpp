@@ -19,7 +19,6 @@ namespace {
 constexpr VkBufferUsageFlags kStorage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
 constexpr uint32_t kLargeCapacity = 65536, kLargeGroups = 64, kLargeRows = 16;  // see shaders/rasterise
 constexpr uint32_t kWideCapacity = 65536;                                       // see shaders/strands
-constexpr uint32_t kDiscCapacity = 65536;                                       // see shaders/discs.glsl
 constexpr uint32_t kGroup = 64, kGroupsPerDimension = 65535;
 
 uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | key.node; }
@@ -201,7 +200,7 @@ class GpuBackend final : public render::Backend {
         }
         if (draws.hasWideDiscs) {
             STIPPLE_TRY(pipelines_->addDiscPasses());
-            STIPPLE_TRY(ensure(discs_, 4 + uint64_t{kDiscCapacity} * sizeof(shared::WideDisc),
+            STIPPLE_TRY(ensure(discs_, 4 + uint64_t{shared::kDiscCapacity} * sizeof(shared::WideDisc),
                                kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "wide discs"));
         }
         if (!draws.meshDraws.empty()) STIPPLE_TRY(prepareMeshes(draws, pixels));
@@ -333,6 +332,10 @@ class GpuBackend final : public render::Backend {
                 break;
             }
             case render::Pass::discs:
+                list.begin("disc order", {write(discs_)}, false);
+                pipelines_->use(commands_, "disc_order");
+                vkCmdDispatch(commands_, 1, 1, 1);
+                list.end();
                 list.begin("discs", {write(visibility_), read(discs_)}, false);
                 pipelines_->use(commands_, "discs");
                 pushStep(0, hasPyramid, wantAll);

@@ -40,6 +40,9 @@ constexpr uint32_t kStrandTexels[] = {
 constexpr uint32_t kDiscs[] = {
 #include "discs.inc"
 };
+constexpr uint32_t kDiscOrder[] = {
+#include "disc_order.inc"
+};
 constexpr uint32_t kDiscTexels[] = {
 #include "disc_texels.inc"
 };
@@ -105,6 +108,7 @@ Result<void> Pipelines::addStrandPasses() {
 
 Result<void> Pipelines::addDiscPasses() {
     if (pipelines_.count("disc_texels") > 0) return {};
+    STIPPLE_TRY(add("disc_order", kDiscOrder, std::size(kDiscOrder)));
     STIPPLE_TRY(add("discs", kDiscs, std::size(kDiscs)));
     return add("disc_texels", kDiscTexels, std::size(kDiscTexels));
 }

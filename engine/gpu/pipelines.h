@@ -37,7 +37,7 @@ class Pipelines {
     Result<void> addLightPass();
     size_t count() const { return pipelines_.size(); }
     size_t strandCount() const { return pipelines_.count("strand_texels") > 0 ? 3 : 0; }
-    size_t discCount() const { return pipelines_.count("disc_texels") > 0 ? 2 : 0; }
+    size_t discCount() const { return pipelines_.count("disc_texels") > 0 ? 3 : 0; }
     void use(VkCommandBuffer commands, const std::string& pass) const;
     void push(VkCommandBuffer commands, const StepConstants& step) const;
 

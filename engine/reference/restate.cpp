@@ -219,6 +219,7 @@ class ReferenceBackend final : public render::Backend {
             const lod::Node& node = h.nodes[cut.node];
             if (h.isStrands) continue;
             const auto& records = chunks_.at(uint64_t{instance.source} << 32 | cut.node).records;
+            const bool mayBeWide = hasPyramid && areFew(h, node, records);
             for (uint32_t i = 0; i < cut.count; ++i) {
                 Disc disc = decodeDisc(h, node, records[i]);
                 disc.radius *= cut.radiusScale;
@@ -235,7 +236,7 @@ class ReferenceBackend final : public render::Backend {
                                   ? debugColour(f, node, cut)
                                   : disc.colour;
                 const double radiusWorld = instance.scale * disc.radius * f.supportScale;
-                if (hasPyramid && isWide(v, disc, radiusWorld, c)) {
+                if (mayBeWide && isWide(v, disc, radiusWorld, c)) {
                     const bool isFree = (disc.flags & shared::kFlagNoNormal) != 0;
                     wide.push_back({c, isFree ? glm::normalize(-c) : n, disc.colour, radiusWorld,
                                     (disc.flags & shared::kFlagLoose) != 0});
@@ -282,6 +283,13 @@ class ReferenceBackend final : public render::Backend {
         double radius;
         bool isLeaf;
     };
+    /// Do discs of a node reach only a few of each other's spacings? Where they reach farther none is filled exactly.
+    static bool areFew(const lod::Hierarchy& h, const lod::Node& node,
+                       const std::vector<shared::PointRecord>& records) {
+        double most = 0;
+        for (const shared::PointRecord& r : records) most = std::max(most, decodeDisc(h, node, r).radius);
+        return most * std::sqrt(static_cast<double>(records.size())) <= 4 * h.unit * h.cellSize(node);
+    }
     /// Is a disc so wide that an ellipse a texel does not hold it?
     static bool isWide(const lod::View& v, const Disc& disc, double radius, const dvec3& c) {
         const double widest = std::max(0.25 * std::max(v.width, v.height), 16.0);  // px

@@ -28,8 +28,8 @@ struct FrameState {
     std::vector<lod::Instance> instances;
     std::vector<lod::Crowd> crowds;
     std::vector<shared::SurfaceMaterial> materials;  ///< of all stores, one after another
-    std::unique_ptr<GreatestRadii> radii;  ///< between streamer and backend
-    std::unique_ptr<streaming::Streamer> streamer;  // evicts at its end
+    std::unique_ptr<GreatestRadii> radii;            ///< between streamer and backend
+    std::unique_ptr<streaming::Streamer> streamer;   // evicts at its end
     Backend* backend = nullptr;
     lod::CutScratch scratch;
     lod::Cut cut;

@@ -1,6 +1,7 @@
 #include "engine/render/wide_discs.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "shaders/shared/wide_disc.h"
 
@@ -9,6 +10,8 @@ namespace stipple::render {
 Result<void> GreatestRadii::upload(streaming::ChunkKey key, const lod::Chunk& chunk) {
     uint32_t code = 0;
     for (const shared::PointRecord& r : chunk.records) code = std::max(code, shared::recordRadiusCode(r) + 1);
+    const auto points = static_cast<float>(chunk.records.size());
+    if (code > 0 && shared::radiusFraction(code - 1) * std::sqrt(points) > kMostSpacings) code = 0;
     if (codes_.size() <= key.source) codes_.resize(key.source + 1);
     auto& codes = codes_[key.source];
     if (codes.size() <= key.node) codes.resize(key.node + 1);

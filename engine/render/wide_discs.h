@@ -8,13 +8,18 @@
 
 namespace stipple::render {
 
+/// Radii times the square root of the number of points, over the edge of their cell: about the spacings of a surface
+/// that a disc reaches. Where they are more (many copies of the points, or given radii that are very large), ellipses a
+/// texel are as good, and what is drawn exactly would cost pixels times thousands of discs.
+constexpr float kMostSpacings = 4.0f;
+
 /// Hands chunks on to a backend and keeps in mind how large the largest radius of each is.
 class GreatestRadii final : public streaming::ChunkSink {
   public:
     explicit GreatestRadii(Backend& backend) : backend_(backend) {}
     Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override;
     void evict(streaming::ChunkKey key) override { backend_.evict(key); }
-    /// Over the edge of the node's cell; 0 of what has no points.
+    /// Over the edge of the node's cell; 0 of what has no points, or beyond kMostSpacings.
     float shareOf(streaming::ChunkKey key) const;
 
   private:

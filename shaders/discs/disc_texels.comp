@@ -14,11 +14,11 @@ void main() {
     const uvec2 pixel = gl_GlobalInvocationID.xy;
     if (pixel.x >= frame.width || pixel.y >= frame.height) return;
     const uint64_t key = visibility[pixel.y * frame.width + pixel.x];
-    if ((uint(key) & 0xe0000000u) != kKindDisc) return;
+    if ((uint(key) & ~kPointMask) != kKindDisc) return;
     const vec2 ray = (vec2(pixel) + 0.5 - frame.centre) * (1.0 / frame.focal);
     const float depth = uintBitsToFloat(uint(key >> 32));
     DrawNode node;
-    const uint frontId = uint(key) & 0x1fffffffu;
+    const uint frontId = uint(key) & kPointMask;
     const PointRecord front = recordOf(frontId, node);
     const float apart = depthShared(wideDisc(node, front, frame.supportScale, frontId), ray.x, ray.y);
     float weight = 0.0;
@@ -31,7 +31,7 @@ void main() {
         const DiscHit hit = discHit(d, ray.x, ray.y, frame.nearPlane);
         const float w = discWeight(hit, depth, apart);
         if (w == 0.0) continue;
-        const PointRecord r = recordOf(d.id & 0x1fffffffu, node);
+        const PointRecord r = recordOf(d.id & kPointMask, node);
         weight += w;
         inverseDepth += w / hit.depth;
         n += d.normal * (dot(d.normal, d.centre) > 0.0 ? -w : w);

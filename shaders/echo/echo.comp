@@ -110,6 +110,10 @@ void main() {
     put(mesh.eyeX);
     put(mesh.eyeY);
     put(mesh.eyeZ);
+    put(mesh.eyeHighX);
+    put(mesh.eyeHighY);
+    put(mesh.eyeHighZ);
+    put(mesh.places);
     put(mesh.firstMaterial);
     put(mesh.mirror);
     put(drawCluster.mesh);

@@ -9,6 +9,7 @@
 #include "splat.h"
 SHARED_BEGIN
 
+const uint kDiscCapacity = 65536u;   // of a gpu's list; what is beyond is drawn as an ellipse a texel
 const uint kKindDisc = 0x60000000u;  // of a visibility id: the rest is the point's
 
 struct WideDisc {
