@@ -94,10 +94,8 @@ struct WideStrand {
     shared::Tube tube;        ///< what a tube's rays meet
     float left[2], right[2];  ///< tube: pixels around both ends; what lies between the boxes is all it covers
     float top[2], bottom[2];
-    float xa, ya, xb, yb;  ///< ribbon: ends, px
-    float inverseA, inverseB;
-    shared::RibbonEdge edgeA, edgeB;  ///< from the axis to its edge
-    float widest;                     ///< pixels farther from the axis are not covered
+    shared::Ribbon ribbon;  ///< what a ribbon's rays meet
+    float x[4], y[4];       ///< ribbon: its corners, px; all it covers lies between them
 };
 struct WideSink {
     void* context;
