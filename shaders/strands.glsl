@@ -8,8 +8,8 @@ struct WideStrand {
     float inverseA, inverseB;
     float halfA, halfB;
     float nearerA, nearerB;
-    RibbonEdge edgeA, edgeB;
-    vec3 a, b;  // of a filled tube, camera space
+    vec3 acrossA, acrossB;  // of a filled ribbon
+    vec3 a, b;              // of a filled strand, camera space
     float radiusA, radiusB;
     ivec4 box;  // pixels that may be covered: from xy to zw
     uint isRound;
@@ -35,19 +35,17 @@ CameraSegment cameraSegment(DrawNode node, StrandSegment s) {
     return c;
 }
 
-// Offers one pixel of a wide strand: if its ray meets the tube, or its centre lies between the ribbon's edges.
-void offerWide(WideStrand s, int x, int y) {
+Ribbon ribbonOfWide(WideStrand s) { return ribbonOf(s.a, s.b, s.acrossA, s.acrossB, s.radiusA, s.radiusB); }
+
+// Offers one pixel of a wide strand if its ray meets the strand. `ribbon`: what ribbonOfWide says, once for all pixels.
+void offerWide(WideStrand s, Ribbon ribbon, int x, int y) {
+    const float ex = (float(x) + 0.5 - frame.centre.x) * (1.0 / frame.focal);
+    const float ey = (float(y) + 0.5 - frame.centre.y) * (1.0 / frame.focal);
     if (s.isRound != 0u) {
-        const Tube tube = tubeOf(s.a, s.b, s.radiusA, s.radiusB);
-        const TubeHit hit = tubeHit(tube, (float(x) + 0.5 - frame.centre.x) * (1.0 / frame.focal),
-                                    (float(y) + 0.5 - frame.centre.y) * (1.0 / frame.focal), frame.nearPlane,
-                                    false);
+        const TubeHit hit = tubeHit(tubeOf(s.a, s.b, s.radiusA, s.radiusB), ex, ey, frame.nearPlane, false);
         if (hit.depth < kNoDepth) offer(x, y, 1.0 / hit.depth, s.id);
         return;
     }
-    const RibbonPlace p = ribbonPlace(float(x) + 0.5 - s.xa, float(y) + 0.5 - s.ya, s.xb - s.xa, s.yb - s.ya, s.edgeA, s.edgeB);
-    if (!(abs(p.across) <= 1.0)) return;
-    const float nearer = 1.0 + p.across * (s.edgeA.slope + p.along * (s.edgeB.slope - s.edgeA.slope));
-    const float axis = 1.0 / (s.inverseA + p.along * (s.inverseB - s.inverseA));
-    offer(x, y, 1.0 / max(axis * nearer, frame.nearPlane), s.id);
+    const RibbonHit hit = ribbonHit(ribbon, ex, ey, frame.nearPlane, kRibbonSlack);
+    if (hit.depth < kNoRibbon) offer(x, y, 1.0 / hit.depth, s.id);
 }

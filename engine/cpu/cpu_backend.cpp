@@ -221,12 +221,14 @@ class CpuBackend final : public render::Backend {
         for (const auto& some : foundDiscs_.takeAll()) discs_.insert(discs_.end(), some.begin(), some.end());
         // Sums are rounded: their order must not be that of the threads.
         std::sort(discs_.begin(), discs_.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
+        discBoxes_.clear();
+        for (const shared::WideDisc& d : discs_) discBoxes_.push_back(shared::discBox(d, frame_));
     }
 
     void fillDiscs() {
         if (!discs_.empty())
             forBands([&](uint32_t first, uint32_t last) {
-                k_.fillDiscs(frame_, discs_.data(), discs_.size(), first, last, visibility());
+                k_.fillDiscs(frame_, discs_.data(), discBoxes_.data(), discs_.size(), first, last, visibility());
             });
     }
 
@@ -304,7 +306,8 @@ class CpuBackend final : public render::Backend {
         const Planes finePlanes = fine.planes();
         preparePlanes(size_t{fine.width} * fine.height);
         const ResolveInput input{blocks_.data(),       meshBlocks_.data(), draws_->materials.data(),
-                                 strandBlocks_.data(), discs_.data(),      discs_.size()};
+                                 strandBlocks_.data(), discs_.data(),      discBoxes_.data(),
+                                 discs_.size()};
         std::atomic<float> largestRadius{0};
         pyramid_.forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
             TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
@@ -428,6 +431,7 @@ class CpuBackend final : public render::Backend {
     CompletionQueue<std::vector<WideStrand>> foundWide_;
     std::vector<BlockSource> blocks_;
     std::vector<shared::WideDisc> discs_;
+    std::vector<shared::DiscBox> discBoxes_;  ///< of each
     CompletionQueue<std::vector<shared::WideDisc>> foundDiscs_;
     std::vector<uint8_t> besideToo_;  ///< of each node
     std::vector<render::PassTime> times_;

@@ -1,25 +1,14 @@
 // Wide discs of the cpu backend (shaders/shared/wide_disc.h): their pixels into the visibility buffer, and texels of
 // those that won. Included by kernels.inl, once per instruction set.
 
-/// The pixels that a disc may cover.
-struct DiscBox {
-    PixelRange x, y;
-};
-[[gnu::always_inline]] inline DiscBox boxOf(const FrameConstants& f, const WideDisc& d) {
-    return {pixelsBetween(discSlopes(d.centre.x, d.centre.z, d.normal.x, d.normal.z, d.radius), f.focal, f.centre.x,
-                          f.width),
-            pixelsBetween(discSlopes(d.centre.y, d.centre.z, d.normal.y, d.normal.z, d.radius), f.focal, f.centre.y,
-                          f.height)};
-}
-
-void fillDiscs(const FrameConstants& frame, const WideDisc* discs, size_t count, uint32_t firstRow, uint32_t lastRow,
-               const Visibility& visibility) {
+void fillDiscs(const FrameConstants& frame, const WideDisc* discs, const DiscBox* boxes, size_t count,
+               uint32_t firstRow, uint32_t lastRow, const Visibility& visibility) {
     const FrameConstants f = frame;
     const float inverseFocal = 1.0f / f.focal, nearPlane = f.nearPlane;
     alignas(64) float depth[kTile];
     for (size_t k = 0; k < count; ++k) {
         const WideDisc d = discs[k];
-        const DiscBox box = boxOf(f, d);
+        const DiscBox& box = boxes[k];
         const int y0 = box.y.first < int(firstRow) ? int(firstRow) : box.y.first;
         const int y1 = box.y.last > int(lastRow) ? int(lastRow) : box.y.last;
         for (int y = y0; y <= y1; ++y)
@@ -100,7 +89,7 @@ void resolveDiscs(const FrameConstants& f, const Tables& tables, const ResolveIn
     }
     for (size_t k = 0; k < in.discCount; ++k) {
         const uint32_t id = in.discs[k].id & ~kKindMask;
-        const DiscBox box = boxOf(f, in.discs[k]);
+        const DiscBox& box = in.discBoxes[k];
         if (int(y) < box.y.first || int(y) > box.y.last || int(x0) > box.x.last || int(x0 + kTile) <= box.x.first)
             continue;
         addDisc(in.discs[k], pointColour(f, tables, nodeOf(id), recordOf(id)), ey, f.nearPlane, p.count, s);

@@ -94,10 +94,8 @@ struct WideStrand {
     shared::Tube tube;        ///< what a tube's rays meet
     float left[2], right[2];  ///< tube: pixels around both ends; what lies between the boxes is all it covers
     float top[2], bottom[2];
-    float xa, ya, xb, yb;  ///< ribbon: ends, px
-    float inverseA, inverseB;
-    shared::RibbonEdge edgeA, edgeB;  ///< from the axis to its edge
-    float widest;                     ///< pixels farther from the axis are not covered
+    shared::Ribbon ribbon;  ///< what a ribbon's rays meet
+    float x[4], y[4];       ///< ribbon: its corners, px; all it covers lies between them
 };
 struct WideSink {
     void* context;
@@ -134,6 +132,7 @@ struct ResolveInput {
     const shared::SurfaceMaterial* materials;
     const StrandBlock* strandBlocks;
     const shared::WideDisc* discs;
+    const shared::DiscBox* discBoxes;  ///< of each
     size_t discCount;
 };
 
@@ -215,8 +214,8 @@ struct Kernels {
     void (*fillWide)(const shared::FrameConstants& f, const WideStrand* strands, size_t count, uint32_t firstRow,
                      uint32_t lastRow, const Visibility& visibility);
     /// Rows [firstRow, lastRow] of wide discs.
-    void (*fillDiscs)(const shared::FrameConstants& f, const shared::WideDisc* discs, size_t count, uint32_t firstRow,
-                      uint32_t lastRow, const Visibility& visibility);
+    void (*fillDiscs)(const shared::FrameConstants& f, const shared::WideDisc* discs, const shared::DiscBox* boxes,
+                      size_t count, uint32_t firstRow, uint32_t lastRow, const Visibility& visibility);
 };
 
 /// The best kernels that this processor runs; STIPPLE_SIMD=sse|avx2|avx512 asks for fewer.

@@ -1,5 +1,6 @@
 // Ribbons and tubes of the cpu backend: segments as lines into the visibility buffer, and texels back out of it.
 // Included by kernels.inl.
+#include "engine/cpu/wide_strands.inl"
 
 [[gnu::always_inline]] inline CameraSegment cameraSegment(const DrawNode& node, const StrandSegment& s) {
     const auto place = [&](const StrandVertex& v) {
@@ -41,11 +42,8 @@ struct alignas(64) Lines {
     float inverseA[kSegmentsPerBlock], inverseB[kSegmentsPerBlock];
     float halfA[kSegmentsPerBlock], halfB[kSegmentsPerBlock];      ///< seen half-widths, px
     float nearerA[kSegmentsPerBlock], nearerB[kSegmentsPerBlock];  ///< depth of the surface / of the axis
-    // From a ribbon's axis to its edge, see ribbonEdge.
-    float edgeAx[kSegmentsPerBlock], edgeAy[kSegmentsPerBlock], slopeA[kSegmentsPerBlock];
-    float edgeBx[kSegmentsPerBlock], edgeBy[kSegmentsPerBlock], slopeB[kSegmentsPerBlock];
-    float isFilledTube[kSegmentsPerBlock], radius[kSegmentsPerBlock];  ///< radius: the larger one, px
-    uint32_t lot[kSegmentsPerBlock];                                   ///< strandLot
+    float isRound[kSegmentsPerBlock], isFilled[kSegmentsPerBlock];
+    uint32_t lot[kSegmentsPerBlock];  ///< strandLot
     uint32_t keep[kSegmentsPerBlock];
     // As one-pixel lines: along u, the axis along which they are longer, from `first` on; values at u = start, and
     // their slopes.
@@ -59,8 +57,6 @@ struct alignas(64) Lines {
     // Ends as points.
     uint32_t pixelA[kSegmentsPerBlock], pixelB[kSegmentsPerBlock];  ///< ~0: none
 };
-
-constexpr int kStretch = 16;  ///< pixels that are worked on together
 
 /// Pixels of many short lines, to be worked on together.
 struct LinePixels {
@@ -157,131 +153,6 @@ void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pix
     }
 }
 
-// Whatever the numbers are, also if they are none, loops over pixels stay inside the image.
-[[gnu::always_inline]] inline int pixelWithin(float v, float least, float most) {
-    return int(min(max(least, v), most));
-}
-
-/// Rows [firstRow, lastRow] of a wide ribbon: every pixel whose centre lies between its edges.
-void fillRibbon(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, const Visibility& visibility) {
-    const float dx = s.xb - s.xa, dy = s.yb - s.ya;
-    const int top = pixelWithin(min(s.ya, s.yb) - s.widest, float(firstRow), float(lastRow) + 1.0f),
-              bottom = pixelWithin(max(s.ya, s.yb) + s.widest, float(firstRow) - 1.0f, float(lastRow));
-    const RibbonEdge a = s.edgeA, b = s.edgeB;
-    const float nearPlane = f.nearPlane;
-    for (int y = top; y <= bottom; ++y) {
-        const float cy = float(y) + 0.5f;
-        // Where the axis is within reach of this row.
-        float from = min(s.xa, s.xb), to = max(s.xa, s.xb);
-        if (std::fabs(dy) > 1.0e-6f) {
-            const float u0 = (cy - s.widest - s.ya) / dy, u1 = (cy + s.widest - s.ya) / dy;
-            const float lo = min(max(min(u0, u1), 0.0f), 1.0f), hi = min(max(max(u0, u1), 0.0f), 1.0f);
-            const float x0 = s.xa + lo * dx, x1 = s.xa + hi * dx;
-            from = min(x0, x1);
-            to = max(x0, x1);
-        }
-        const int left = pixelWithin(from - s.widest, 0.0f, float(int(f.width))),
-                  right = pixelWithin(to + s.widest, -1.0f, float(int(f.width)) - 1.0f);
-        const float py = cy - s.ya;
-        for (int x0 = left; x0 <= right; x0 += kStretch) {
-            alignas(64) uint32_t depth[kStretch], keep[kStretch];
-            const int count = right - x0 + 1 < kStretch ? right - x0 + 1 : kStretch;
-            const float px0 = float(x0) + 0.5f - s.xa;
-#pragma GCC ivdep
-            for (size_t k = 0; k < kStretch; ++k) {
-                const RibbonPlace p = ribbonPlace(px0 + float(int(k)), py, dx, dy, a, b);
-                const float u = p.along, nearer = 1.0f + p.across * (a.slope + u * (b.slope - a.slope));
-                depth[k] = floatBitsToUint(max(nearer / (s.inverseA + u * (s.inverseB - s.inverseA)), nearPlane));
-                keep[k] = std::fabs(p.across) <= 1.0f ? 1u : 0u;
-            }
-            const size_t firstPixel = size_t(y) * f.width + size_t(x0);
-            for (int k = 0; k < count; ++k)
-                if (keep[k] != 0) offerKey(visibility, firstPixel + size_t(k), uint64_t{depth[k]} << 32 | s.id);
-        }
-    }
-}
-
-/// Rows [firstRow, lastRow] of a wide tube: every pixel whose ray meets it.
-template <bool isPlain>
-void fillTubeRows(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow,
-                  const Visibility& visibility) {
-    constexpr int kTubeStretch = 8;  // most tubes are a few pixels wide
-    const int first = pixelWithin(std::ceil(min(s.top[0], s.top[1])), float(firstRow), float(lastRow) + 1.0f),
-              last = pixelWithin(max(s.bottom[0], s.bottom[1]), float(firstRow) - 1.0f, float(lastRow));
-    const Tube tube = s.tube;
-    const float inverseFocal = 1.0f / f.focal, nearPlane = f.nearPlane;
-    for (int y = first; y <= last; ++y) {
-        // Between the boxes of both ends lie boxes, of which the row meets those from u = lo to hi.
-        const float cy = float(y);
-        const float dTop = s.top[1] - s.top[0], dBottom = s.bottom[1] - s.bottom[0];
-        float lo = 0.0f, hi = 1.0f;
-        if (std::fabs(dTop) > 1.0e-6f) (dTop > 0.0f ? hi : lo) = min(max((cy - s.top[0]) / dTop, 0.0f), 1.0f);
-        if (std::fabs(dBottom) > 1.0e-6f) {
-            const float at = min(max((cy - s.bottom[0]) / dBottom, 0.0f), 1.0f);
-            if (dBottom > 0.0f)
-                lo = max(lo, at);
-            else
-                hi = min(hi, at);
-        }
-        const auto mix = [](const float* v, float u) { return v[0] + u * (v[1] - v[0]); };
-        const int left = pixelWithin(std::ceil(min(mix(s.left, lo), mix(s.left, hi))), 0.0f, float(int(f.width))),
-                  right = pixelWithin(max(mix(s.right, lo), mix(s.right, hi)), -1.0f, float(int(f.width)) - 1.0f);
-        const float ey = (cy + 0.5f - f.centre.y) * inverseFocal;
-        for (int x0 = left; x0 <= right; x0 += kTubeStretch) {
-            alignas(64) uint32_t depth[kTubeStretch], keep[kTubeStretch];
-            const int count = right - x0 + 1 < kTubeStretch ? right - x0 + 1 : kTubeStretch;
-            const float ex0 = float(x0) + 0.5f - f.centre.x;
-#pragma GCC ivdep
-            for (size_t k = 0; k < kTubeStretch; ++k) {
-                const TubeHit hit = tubeHit(tube, (ex0 + float(int(k))) * inverseFocal, ey, nearPlane, isPlain);
-                depth[k] = floatBitsToUint(hit.depth);
-                keep[k] = hit.depth < kNoDepth ? 1u : 0u;
-            }
-            const size_t firstPixel = size_t(y) * f.width + size_t(x0);
-            for (int k = 0; k < count; ++k)
-                if (keep[k] != 0) offerKey(visibility, firstPixel + size_t(k), uint64_t{depth[k]} << 32 | s.id);
-        }
-    }
-}
-
-void fillTube(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, const Visibility& visibility) {
-    if (isBeforeEye(s.tube, f.nearPlane) && isShort(s.tube))
-        fillTubeRows<true>(f, s, firstRow, lastRow, visibility);
-    else
-        fillTubeRows<false>(f, s, firstRow, lastRow, visibility);
-}
-
-void fillStrand(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, const Visibility& visibility) {
-    if (s.isRound)
-        fillTube(f, s, firstRow, lastRow, visibility);
-    else
-        fillRibbon(f, s, firstRow, lastRow, visibility);
-}
-
-/// A tube that is to be filled, and the pixels around its ends. One that reaches beside the eye has one box.
-WideStrand wideTube(const FrameConstants& f, const CameraSegment& c, uint32_t id) {
-    WideStrand w{};
-    w.isRound = true;
-    w.id = id;
-    w.tube = tubeOf(c.a, c.b, c.radiusA, c.radiusB);
-    const vec3 ends[2] = {c.a, c.b};
-    const float radii[2] = {c.radiusA, c.radiusB};
-    const bool isBefore =
-        c.a.z > 1.0001f * c.radiusA && c.b.z > 1.0001f * c.radiusB;  // both have an outline of their own
-    for (size_t k = 0; k < 2; ++k) {
-        const size_t l = isBefore ? k : 0, m = isBefore ? k : 1;
-        const auto slope = [&](float sign, float vec3::*axis) {
-            return sign *
-                   tubeSlope(sign * (ends[l].*axis), ends[l].z, radii[l], sign * (ends[m].*axis), ends[m].z, radii[m]);
-        };
-        w.left[k] = slope(-1.0f, &vec3::x) * f.focal + f.centre.x - 0.51f;  // of pixels' centres, rounded
-        w.right[k] = slope(1.0f, &vec3::x) * f.focal + f.centre.x - 0.49f;
-        w.top[k] = slope(-1.0f, &vec3::y) * f.focal + f.centre.y - 0.51f;
-        w.bottom[k] = slope(1.0f, &vec3::y) * f.focal + f.centre.y - 0.49f;
-    }
-    return w;
-}
-
 void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_t count, uint32_t firstId,
                   const WideSink& wide, const Visibility& visibility) {
     const FrameConstants f = frame;
@@ -316,20 +187,12 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
         lines.halfB[i] = endHalfWidth(c, p.to, c.directionB, f.focal, f.nearPlane);
         lines.nearerA[i] = nearer(a, ra);
         lines.nearerB[i] = nearer(b, rb);
-        const RibbonEdge edgeA = ribbonEdge(a, c.directionA, ra, f.focal),
-                         edgeB = ribbonEdge(b, c.directionB, rb, f.focal);
-        lines.edgeAx[i] = edgeA.x;
-        lines.edgeAy[i] = edgeA.y;
-        lines.slopeA[i] = edgeA.slope;
-        lines.edgeBx[i] = edgeB.x;
-        lines.edgeBy[i] = edgeB.y;
-        lines.slopeB[i] = edgeB.slope;
         lines.lot[i] = strandLot(s);
-        lines.radius[i] = widestRadius(c, p, f.focal);
-        lines.isFilledTube[i] = isFilledTube(c, p, f.focal, f.exactStrands);
+        lines.isRound[i] = c.isRound;
+        lines.isFilled[i] = isFilled(c, p, f.focal, f.exactStrands);
         const bool isFine = (segmentErrorCode(s) <= node.errorCode) | ((segmentOctants(s) & node.octantMask) != 0u);
         const float reaches =
-            tubeReaches(c, f.focal, f.centre.x, f.centre.y, float(int(f.width)), float(int(f.height)), f.nearPlane);
+            strandReaches(c, f.focal, f.centre.x, f.centre.y, float(int(f.width)), float(int(f.height)), f.nearPlane);
         lines.keep[i] = (isFine & (max(p.isThere, reaches) > 0.5f)) ? 1u : 0u;
     }
     layLines(f, lines, count);
@@ -346,7 +209,7 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
             else
                 fillStrand(f, s, 0, int(f.height) - 1, visibility);
         };
-        if (lines.isFilledTube[i] > 0.5f) {
+        if (lines.isFilled[i] * lines.isRound[i] > 0.5f) {
             const WideStrand s = wideTube(f, cameraSegment(node, segmentAt(words, i)), id);
             const float left = min(s.left[0], s.left[1]), right = max(s.right[0], s.right[1]);
             const float top = min(s.top[0], s.top[1]), bottom = max(s.bottom[0], s.bottom[1]);
@@ -354,23 +217,14 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
             fill(s, right - left, bottom - top);
             continue;
         }
-        if (lines.radius[i] >= f.exactStrands) {
-            WideStrand s{};
-            s.id = id;
-            s.xa = lines.xa[i];
-            s.ya = lines.ya[i];
-            s.xb = lines.xb[i];
-            s.yb = lines.yb[i];
-            s.inverseA = lines.inverseA[i];
-            s.inverseB = lines.inverseB[i];
-            s.edgeA = {lines.edgeAx[i], lines.edgeAy[i], lines.slopeA[i]};
-            s.edgeB = {lines.edgeBx[i], lines.edgeBy[i], lines.slopeB[i]};
-            s.widest = std::sqrt(
-                max(s.edgeA.x * s.edgeA.x + s.edgeA.y * s.edgeA.y, s.edgeB.x * s.edgeB.x + s.edgeB.y * s.edgeB.y));
-            if (max(s.xa, s.xb) < -s.widest || max(s.ya, s.yb) < -s.widest || min(s.xa, s.xb) >= width + s.widest ||
-                min(s.ya, s.yb) >= height + s.widest)
-                continue;
-            fill(s, std::fabs(s.xb - s.xa) + 2 * s.widest, std::fabs(s.yb - s.ya) + 2 * s.widest);
+        if (lines.isFilled[i] > 0.5f) {
+            const WideStrand s = wideRibbon(f, cameraSegment(node, segmentAt(words, i)), id);
+            const float left = min(min(s.x[0], s.x[1]), min(s.x[2], s.x[3])),
+                        right = max(max(s.x[0], s.x[1]), max(s.x[2], s.x[3]));
+            const float top = min(min(s.y[0], s.y[1]), min(s.y[2], s.y[3])),
+                        bottom = max(max(s.y[0], s.y[1]), max(s.y[2], s.y[3]));
+            if (right < 0.0f || bottom < 0.0f || left > width || top > height) continue;
+            fill(s, right - left, bottom - top);
             continue;
         }
         for (int k = 0; k < lines.count[i]; ++k) {
@@ -399,14 +253,83 @@ struct StrandPixels {
 };
 struct StrandTexels {
     alignas(64) float depth[kTile], radius[kTile], thickness[kTile], x[kTile], y[kTile], perpX[kTile], perpY[kTile],
-        red[kTile], green[kTile], blue[kTile], isRound[kTile], axisX[kTile], axisY[kTile], isFilledTube[kTile];
+        red[kTile], green[kTile], blue[kTile], isRound[kTile], axisX[kTile], axisY[kTile],
+        filled[kTile];  ///< filled: kFilledRibbon, kFilledTube or 0
 };
+
+constexpr int kFilledRibbon = 1, kFilledTube = 2;
+
+[[gnu::always_inline]] inline StrandSegment packedOf(const StrandPixels& e, size_t i) {
+    return {{e.words[0][i], e.words[1][i], e.words[2][i], e.words[3][i]},
+            {e.words[4][i], e.words[5][i], e.words[6][i], e.words[7][i]}};
+}
+[[gnu::always_inline]] inline DrawNode nodeOf(const StrandPixels& e, size_t i) {
+    DrawNode node{};
+    node.base = vec3(e.base[0][i], e.base[1][i], e.base[2][i]);
+    node.axisX = vec3(e.axes[0][i], e.axes[1][i], e.axes[2][i]);
+    node.axisY = vec3(e.axes[3][i], e.axes[4][i], e.axes[5][i]);
+    node.axisZ = vec3(e.axes[6][i], e.axes[7][i], e.axes[8][i]);
+    node.edge = e.edge[i];
+    return node;
+}
 
 /// One of a segment's colours, linear, at a place from 0 to 1.
 [[gnu::always_inline]] inline float mixedColour(const StrandSegment& s, uint32_t shift, float place) {
     const float a = linearFromByte(float(int(s.a.colour >> shift & 255u)) * (1.0f / 255.0f));
     const float b = linearFromByte(float(int(s.b.colour >> shift & 255u)) * (1.0f / 255.0f));
     return a + place * (b - a);
+}
+
+/// Filled tubes or filled ribbons, by the rays of their pixels: side by side, or they would not be worked on together.
+/// (ex0, ey, 1): ray of the row's first pixel.
+template <int kind>
+void resolveFilled(const FrameConstants& f, const StrandPixels& e, const WinningPixels& p, float ex0, float ey,
+                   StrandTexels& o) {
+    StrandPixels t;
+    alignas(64) float pixel[kTile], depth[kTile], perpX[kTile], perpY[kTile], red[kTile], green[kTile], blue[kTile];
+    alignas(64) uint32_t from[kTile];
+    size_t filled = 0;
+    for (size_t i = 0; i < p.count; ++i) {
+        if (o.filled[i] != float(kind)) continue;
+        for (size_t k = 0; k < 8; ++k) t.words[k][filled] = e.words[k][i];
+        for (size_t k = 0; k < 3; ++k) t.base[k][filled] = e.base[k][i];
+        for (size_t k = 0; k < 9; ++k) t.axes[k][filled] = e.axes[k][i];
+        t.edge[filled] = e.edge[i];
+        pixel[filled] = float(int(p.pixel[i]));
+        from[filled++] = uint32_t(i);
+    }
+    const float inverseFocal = 1.0f / f.focal, nearPlane = f.nearPlane;
+#pragma GCC ivdep
+    for (size_t k = 0; k < filled; ++k) {
+        const StrandSegment packed = packedOf(t, k);
+        const CameraSegment s = cameraSegment(nodeOf(t, k), packed);
+        const float ex = ex0 + pixel[k] * inverseFocal;
+        FilledPixel seen;
+        if constexpr (kind == kFilledTube)
+            seen = tubePixel(s, ex, ey, nearPlane);
+        else
+            seen = ribbonPixel(s, ex, ey, nearPlane);
+        depth[k] = seen.depth;
+        perpX[k] = seen.normalPerp.x;
+        perpY[k] = seen.normalPerp.y;
+        red[k] = mixedColour(packed, 0, seen.place);
+        green[k] = mixedColour(packed, 8, seen.place);
+        blue[k] = mixedColour(packed, 16, seen.place);
+    }
+    for (size_t k = 0; k < filled; ++k) {
+        const size_t i = from[k];
+        const bool isHit = depth[k] < kNoDepth;
+        o.depth[i] = isHit ? depth[k] : o.depth[i];
+        o.radius[i] = 0.25f;
+        o.thickness[i] = kind == kFilledTube ? 0.25f : kLeafThickness * 0.25f;  // a filled ribbon is a leaf
+        o.x[i] = o.y[i] = 0.0f;
+        o.perpX[i] = isHit ? perpX[k] : 0.0f;
+        o.perpY[i] = isHit ? perpY[k] : 0.0f;
+        o.isRound[i] = o.axisX[i] = o.axisY[i] = 0.0f;
+        o.red[i] = red[k];
+        o.green[i] = green[k];
+        o.blue[i] = blue[k];
+    }
 }
 
 /// Texels of the pixels that show strands; is any of them a tube to be reconstructed?
@@ -444,19 +367,12 @@ bool resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
     const float exactStrands = f.exactStrands;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
-        const StrandSegment packed{{e.words[0][i], e.words[1][i], e.words[2][i], e.words[3][i]},
-                                   {e.words[4][i], e.words[5][i], e.words[6][i], e.words[7][i]}};
-        DrawNode node{};
-        node.base = vec3(e.base[0][i], e.base[1][i], e.base[2][i]);
-        node.axisX = vec3(e.axes[0][i], e.axes[1][i], e.axes[2][i]);
-        node.axisY = vec3(e.axes[3][i], e.axes[4][i], e.axes[5][i]);
-        node.axisZ = vec3(e.axes[6][i], e.axes[7][i], e.axes[8][i]);
-        node.edge = e.edge[i];
-        const CameraSegment s = cameraSegment(node, packed);
+        const StrandSegment packed = packedOf(e, i);
+        const CameraSegment s = cameraSegment(nodeOf(e, i), packed);
         const float px = float(int(p.pixel[i]));
         // Image coordinates from this pixel's centre on, so that the low bits are kept.
         const ScreenSegment on = projectSegment(s.a, s.b, focal, cx - px, cy, nearPlane);
-        const StrandPixel seen = strandPixel(s, on, support, focal, cx - px, cy, nearPlane, exactStrands, sun);
+        const StrandPixel seen = strandPixel(s, on, support, focal, cx - px, cy, nearPlane, sun);
         const Texel t = seen.texel;
         const float place = seen.place;
         o.depth[i] = t.depth;
@@ -469,57 +385,15 @@ bool resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
         o.isRound[i] = t.isRound;
         o.axisX[i] = t.axis.x;
         o.axisY[i] = t.axis.y;
-        o.isFilledTube[i] = isFilledTube(s, on, focal, exactStrands);
+        o.filled[i] = isFilled(s, on, focal, exactStrands) *
+                      (float(kFilledRibbon) + s.isRound * float(kFilledTube - kFilledRibbon));
         o.red[i] = mixedColour(packed, 0, place);
         o.green[i] = mixedColour(packed, 8, place);
         o.blue[i] = mixedColour(packed, 16, place);
     }
-    // Filled tubes, by the rays of their pixels: side by side, or they would not be worked on together.
-    StrandPixels t;
-    alignas(64) float pixel[kTile], depth[kTile], perpX[kTile], perpY[kTile], red[kTile], green[kTile], blue[kTile];
-    alignas(64) uint32_t from[kTile];
-    size_t filled = 0;
-    for (size_t i = 0; i < n; ++i) {
-        if (!(o.isFilledTube[i] > 0.5f)) continue;
-        for (size_t k = 0; k < 8; ++k) t.words[k][filled] = e.words[k][i];
-        for (size_t k = 0; k < 3; ++k) t.base[k][filled] = e.base[k][i];
-        for (size_t k = 0; k < 9; ++k) t.axes[k][filled] = e.axes[k][i];
-        t.edge[filled] = e.edge[i];
-        pixel[filled] = float(int(p.pixel[i]));
-        from[filled++] = uint32_t(i);
-    }
-    const float inverseFocal = 1.0f / focal, ex0 = -cx * inverseFocal, ey = -cy * inverseFocal;
-#pragma GCC ivdep
-    for (size_t k = 0; k < filled; ++k) {
-        const StrandSegment packed{{t.words[0][k], t.words[1][k], t.words[2][k], t.words[3][k]},
-                                   {t.words[4][k], t.words[5][k], t.words[6][k], t.words[7][k]}};
-        DrawNode node{};
-        node.base = vec3(t.base[0][k], t.base[1][k], t.base[2][k]);
-        node.axisX = vec3(t.axes[0][k], t.axes[1][k], t.axes[2][k]);
-        node.axisY = vec3(t.axes[3][k], t.axes[4][k], t.axes[5][k]);
-        node.axisZ = vec3(t.axes[6][k], t.axes[7][k], t.axes[8][k]);
-        node.edge = t.edge[k];
-        const TubePixel seen = tubePixel(cameraSegment(node, packed), ex0 + pixel[k] * inverseFocal, ey, nearPlane);
-        depth[k] = seen.depth;
-        perpX[k] = seen.normalPerp.x;
-        perpY[k] = seen.normalPerp.y;
-        red[k] = mixedColour(packed, 0, seen.place);
-        green[k] = mixedColour(packed, 8, seen.place);
-        blue[k] = mixedColour(packed, 16, seen.place);
-    }
-    for (size_t k = 0; k < filled; ++k) {
-        const size_t i = from[k];
-        const bool isHit = depth[k] < kNoDepth;
-        o.depth[i] = isHit ? depth[k] : o.depth[i];
-        o.radius[i] = o.thickness[i] = 0.25f;
-        o.x[i] = o.y[i] = 0.0f;
-        o.perpX[i] = isHit ? perpX[k] : 0.0f;
-        o.perpY[i] = isHit ? perpY[k] : 0.0f;
-        o.isRound[i] = o.axisX[i] = o.axisY[i] = 0.0f;
-        o.red[i] = red[k];
-        o.green[i] = green[k];
-        o.blue[i] = blue[k];
-    }
+    const float ex0 = -cx / focal, ey = -cy / focal;
+    resolveFilled<kFilledTube>(f, e, p, ex0, ey, o);
+    resolveFilled<kFilledRibbon>(f, e, p, ex0, ey, o);
     float round_ = 0;
     for (size_t i = 0; i < n; ++i) {
         const size_t at = kPad + p.pixel[i];

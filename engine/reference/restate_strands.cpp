@@ -1,6 +1,6 @@
 // Ribbons and tubes once more, in fp64, from the definitions: a segment narrower than the limit is a line of pixels (by
-// columns or rows, whichever it crosses more of) and its two ends, a wide ribbon all pixels between its edges, a wide
-// tube all pixels whose rays meet it (strand_rays.h).
+// columns or rows, whichever it crosses more of) and its two ends, a wide ribbon or tube all pixels whose rays meet it
+// (strand_rays.h).
 #include <algorithm>
 #include <cmath>
 
@@ -79,20 +79,19 @@ class StrandProjector {
         tangent_ = glm::length(b_ - a_) > 0 ? glm::normalize(b_ - a_) : dvec3(0);
         from_ = 0;
         to_ = 1;
-        if (!clip()) {  // of a tube a flank may still be seen
-            if (s_.isTube) meet();
+        if (!clip()) {  // a flank may still be seen
+            meet();
             return;
         }
         pa_ = imageOf(at(from_).c);
         pb_ = imageOf(at(to_).c);
         halfA_ = halfWidth(from_, s_.directionA);
         halfB_ = halfWidth(to_, s_.directionB);
-        isWide_ = view_.focalPixels * std::max(at(from_).radius / at(from_).c.z, at(to_).radius / at(to_).c.z) >=
-                  double{f_.exactStrands};
-        if (isWide_ && s_.isTube)
+        const bool isWide =
+            view_.focalPixels * std::max(at(from_).radius / at(from_).c.z, at(to_).radius / at(to_).c.z) >=
+            double{f_.exactStrands};
+        if (isWide)
             meet();
-        else if (isWide_)
-            fill();
         else
             line();
     }
@@ -135,37 +134,6 @@ class StrandProjector {
         const double d = glm::length(p.c), along = glm::dot(tangent_, p.c) / d;
         return 1 - frontOf(p.radius, std::max(1 - along * along, 0.0), d) / d;
     }
-    /// From a ribbon's axis to its edge, px and share of the depth.
-    dvec3 edgeAt(double t, const dvec3& w) const {
-        const Place p = at(t);
-        const dvec3 half = p.radius * glm::normalize(w);
-        return {view_.focalPixels / p.c.z * (dvec2(half) - dvec2(p.c) / p.c.z * half.z),
-                std::clamp(half.z / p.c.z, -0.9, 0.9)};
-    }
-    /// Where a pixel lies on a wide ribbon: along the axis (0 to 1) and across (-1 to 1); across is 10^6 beyond its
-    /// ends.
-    dvec2 onRibbon(const dvec2& pixel) const {
-        const auto cross = [](const dvec2& a, const dvec2& b) { return a.x * b.y - a.y * b.x; };
-        const dvec2 e = pixel - pa_, d = pb_ - pa_, a(edgeAt(from_, s_.directionA)), b(edgeAt(to_, s_.directionB));
-        // (e - u d) x (a + u (b - a)) = 0
-        const double k2 = -cross(d, b - a), k1 = cross(e, b - a) - cross(d, a), k0 = cross(e, a);
-        std::vector<double> roots;
-        const double disc = k1 * k1 - 4 * k2 * k0;
-        if (disc < 0) return {0, 1e6};
-        if (std::abs(k2) > 1e-6 * std::abs(k1)) {
-            roots = {(-k1 - std::sqrt(disc)) / (2 * k2), (-k1 + std::sqrt(disc)) / (2 * k2)};
-        } else if (k1 != 0) {
-            roots = {-k0 / k1};
-        }
-        dvec2 best(0, 1e6);
-        for (const double u : roots) {
-            const dvec2 w = a + u * (b - a);
-            const double across = glm::dot(e - u * d, w) / std::max(glm::dot(w, w), 1e-12);
-            if (u >= 0 && u <= 1 && std::abs(across) < std::abs(best.y)) best = {u, across};
-        }
-        return best;
-    }
-
     bool isTaken(uint32_t pixel, uint32_t id, double share) const {
         uint32_t h = (pixel * 0x9e3779b1u) ^ (id * 0x85ebca6bu) ^ (f_.coverageSeed * 0xc2b2ae35u);
         h = (h ^ h >> 16) * 0x7feb352du;
@@ -203,7 +171,7 @@ class StrandProjector {
         return 1 / (1 / za + u * (1 / zb - 1 / za));
     }
 
-    /// A wide tube: every pixel whose ray meets it.
+    /// A wide strand: every pixel whose ray meets it.
     void meet() {
         Segment own = s_;
         own.a = a_;
@@ -244,20 +212,7 @@ class StrandProjector {
                 s.colour = debugColour_ ? *debugColour_ : glm::mix(own.colourA, own.colourB, hit.place);
                 s.perp = dvec2(rotationToZ(glm::normalize(ray)) * hit.normal);
                 s.radius = 0.25;
-                s.thickness = 0.25 * s.depth / view_.focalPixels;
-            }
-    }
-
-    /// A wide ribbon: every pixel between its edges.
-    void fill() {
-        const dvec3 edgeA = edgeAt(from_, s_.directionA), edgeB = edgeAt(to_, s_.directionB);
-        const double widest = std::max(glm::length(dvec2(edgeA)), glm::length(dvec2(edgeB)));
-        const dvec2 lo = glm::min(pa_, pb_) - widest, hi = glm::max(pa_, pb_) + widest;
-        for (int y = pixelIn(lo.y, level_.height); y < level_.height && y <= hi.y; ++y)
-            for (int x = pixelIn(lo.x, level_.width); x < level_.width && x <= hi.x; ++x) {
-                const dvec2 on = onRibbon(dvec2(x + 0.5, y + 0.5));
-                if (std::abs(on.y) > 1) continue;
-                keep(x, y, std::max(axisDepth(on.x) * (1 + on.y * glm::mix(edgeA.z, edgeB.z, on.x)), view_.nearPlane));
+                s.thickness = (own.isTube ? 1 : kLeafThickness) * 0.25 * s.depth / view_.focalPixels;
             }
     }
 
@@ -266,12 +221,7 @@ class StrandProjector {
         Sample& s = level_.ref(x, y);
         if (s.valid && s.key <= key) return;
         const dvec2 pixel(x + 0.5, y + 0.5), d = pb_ - pa_;
-        double u = std::clamp(glm::dot(pixel - pa_, d) / std::max(glm::dot(d, d), 1e-8), 0.0, 1.0), farther = 0;
-        if (isWide_) {
-            const dvec2 on = onRibbon(pixel);
-            u = on.x;
-            farther = on.y * glm::mix(edgeAt(from_, s_.directionA).z, edgeAt(to_, s_.directionB).z, u);
-        }
+        const double u = std::clamp(glm::dot(pixel - pa_, d) / std::max(glm::dot(d, d), 1e-8), 0.0, 1.0);
         const double za = at(from_).c.z, zb = at(to_).c.z;
         const Place p = at(from_ + u * za / ((1 - u) * zb + u * za) * (to_ - from_));
         const double distance = glm::length(p.c);
@@ -308,13 +258,6 @@ class StrandProjector {
         if (!s_.isTube)
             s.thickness = std::max(p.radius * view_.focalPixels / p.c.z, kNarrow) *
                           (0.25 + std::sqrt(std::max(0.0, 1 - facing))) * s.depth / view_.focalPixels;
-        if (!isWide_) return;
-        s.depth *= 1 + farther;
-        s.radius = 0.25;
-        s.thickness = kLeafThickness * 0.25 * s.depth / view_.focalPixels;
-        s.centre = pixel;
-        s.isRound = false;
-        s.axis = dvec2(0);
     }
     /// Half of what is seen across the line that the axis is on the image, px.
     double halfWidthAt(const Place& p) const {
@@ -345,7 +288,6 @@ class StrandProjector {
     dvec3 a_{0}, b_{0}, tangent_{0};
     double from_ = 0, to_ = 1, halfA_ = 0, halfB_ = 0;
     dvec2 pa_{0}, pb_{0};
-    bool isWide_ = false;
 };
 
 }  // namespace

@@ -10,33 +10,59 @@ PointRecord recordOf(uint id, out DrawNode node) {
     return Records(uvec2(node.addressLow, node.addressHigh)).records[source.first + id % kRecordsPerBlock];
 }
 
+shared uint mayCover[64];  // of 64 discs: any of the workgroup's pixels
+shared uint anyHere;
+
 void main() {
     const uvec2 pixel = gl_GlobalInvocationID.xy;
-    if (pixel.x >= frame.width || pixel.y >= frame.height) return;
-    const uint64_t key = visibility[pixel.y * frame.width + pixel.x];
-    if ((uint(key) & ~kPointMask) != kKindDisc) return;
+    const bool isInside = pixel.x < frame.width && pixel.y < frame.height;
+    uint64_t key = ~uint64_t(0);
+    if (isInside) key = visibility[pixel.y * frame.width + pixel.x];
+    const bool isDisc = isInside && (uint(key) & ~kPointMask) == kKindDisc;
+    if (gl_LocalInvocationID.x == 0u) anyHere = 0u;
+    barrier();
+    if (isDisc) anyHere = 1u;
+    barrier();
+    if (anyHere == 0u) return;
     const vec2 ray = (vec2(pixel) + 0.5 - frame.centre) * (1.0 / frame.focal);
     const float depth = uintBitsToFloat(uint(key >> 32));
     DrawNode node;
-    const uint frontId = uint(key) & kPointMask;
-    const PointRecord front = recordOf(frontId, node);
-    const float apart = depthShared(wideDisc(node, front, frame.supportScale, frontId), ray.x, ray.y);
+    float apart = 0.0;
+    PointRecord front;
+    if (isDisc) {
+        const uint frontId = uint(key) & kPointMask;
+        front = recordOf(frontId, node);
+        apart = depthShared(wideDisc(node, front, frame.supportScale, frontId), ray.x, ray.y);
+    }
     float weight = 0.0;
     float inverseDepth = 0.0;
     vec3 n = vec3(0.0);
     vec3 colour = vec3(0.0);
     const uint count = min(discCount, kDiscCapacity);
-    for (uint i = 0; i < count; ++i) {
-        const WideDisc d = discs[i];
-        const DiscHit hit = discHit(d, ray.x, ray.y, frame.nearPlane);
-        const float w = discWeight(hit, depth, apart);
-        if (w == 0.0) continue;
-        const PointRecord r = recordOf(d.id & kPointMask, node);
-        weight += w;
-        inverseDepth += w / hit.depth;
-        n += d.normal * (dot(d.normal, d.centre) > 0.0 ? -w : w);
-        colour += w * pointColour(node, r);
+    const int firstX = int(gl_WorkGroupID.x * 64u);
+    for (uint first = 0u; first < count; first += 64u) {
+        const uint mine = first + gl_LocalInvocationID.x;
+        mayCover[gl_LocalInvocationID.x] = 0u;
+        if (mine < count) {
+            const DiscBox box = discBox(discs[mine], frame);
+            if (box.x.first < firstX + 64 && box.x.last >= firstX && box.y.first <= int(pixel.y) && box.y.last >= int(pixel.y)) mayCover[gl_LocalInvocationID.x] = 1u;
+        }
+        barrier();
+        for (uint k = 0u; k < 64u; ++k) {
+            if (mayCover[k] == 0u || !isDisc) continue;
+            const WideDisc d = discs[first + k];
+            const DiscHit hit = discHit(d, ray.x, ray.y, frame.nearPlane);
+            const float w = discWeight(hit, depth, apart);
+            if (w == 0.0) continue;
+            const PointRecord r = recordOf(d.id & kPointMask, node);
+            weight += w;
+            inverseDepth += w / hit.depth;
+            n += d.normal * (dot(d.normal, d.centre) > 0.0 ? -w : w);
+            colour += w * pointColour(node, r);
+        }
+        barrier();
     }
+    if (!isDisc) return;
     Texel t;
     t.depth = weight / inverseDepth;
     t.radius = kExactRadius;

@@ -12,8 +12,9 @@ void main() {
     const float inverseFocal = 1.0 / frame.focal;
     for (uint i = gl_WorkGroupID.x; i < count; i += gl_NumWorkGroups.x) {
         const WideDisc d = discs[i];
-        const PixelRange x = pixelsBetween(discSlopes(d.centre.x, d.centre.z, d.normal.x, d.normal.z, d.radius), frame.focal, frame.centre.x, frame.width);
-        const PixelRange all = pixelsBetween(discSlopes(d.centre.y, d.centre.z, d.normal.y, d.normal.z, d.radius), frame.focal, frame.centre.y, frame.height);
+        const DiscBox box = discBox(d, frame);
+        const PixelRange x = box.x;
+        const PixelRange all = box.y;
         const ivec2 y = ivec2(max(all.first, firstRow), min(all.last, firstRow + kRows - 1));
         const int width = x.last - x.first + 1;
         if (width <= 0 || y.y < y.x) continue;

@@ -3,6 +3,7 @@
 // strand there, along the surface (ribbon) or facing the eye (tube).
 #ifndef STIPPLE_SHARED_STRAND_H
 #define STIPPLE_SHARED_STRAND_H
+#include "ribbon.h"
 #include "splat.h"
 #include "tube.h"
 SHARED_BEGIN
@@ -103,11 +104,6 @@ SHARED_FN float segmentParameter(ScreenSegment s, float x, float y) {
     return s.from + t * (s.to - s.from);
 }
 
-// Normal of a ribbon, not of unit length. `t`: tangent, `w`: across.
-SHARED_FN vec3 ribbonNormal(vec3 t, vec3 w) {
-    return vec3(t.y * w.z - t.z * w.y, t.z * w.x - t.x * w.z, t.x * w.y - t.y * w.x);
-}
-
 // Half-width across the line of sight, px: what is seen of a ribbon depends on how it faces the eye. `c`: a place on
 // the segment, `t`: unit tangent, `w`: across the ribbon. With m the normal of the plane through the eye and the
 // segment, the image stretches what lies along m by 1 / sqrt(1 - m_z^2) beside the middle of a wide picture.
@@ -116,7 +112,7 @@ SHARED_FN float seenHalfWidth(vec3 c, float radius, vec3 t, vec3 w, float isRoun
     const vec3 v = vec3(c.x * inverse, c.y * inverse, c.z * inverse);
     const float tv = dot(t, v);
     const float sine = sqrt(max(1.0f - tv * tv, 1.0e-6f));
-    const vec3 m = ribbonNormal(t, w);
+    const vec3 m = crossOf(t, w);
     const float facing = abs(dot(m, v)) / sqrt(max(dot(m, m), 1.0e-12f));
     const float share = isRound > 0.5f ? 1.0f : min(facing / sine, 1.0f);
     const float mz = (v.x * t.y - v.y * t.x) / sine;
@@ -139,15 +135,17 @@ SHARED_FN float endHalfWidth(CameraSegment s, float place, vec3 direction, float
                          focal);
 }
 // The larger radius of the ends, px: decides whether a strand is filled or reconstructed, however it faces the eye.
+// Where nothing of the axis is left, what is seen of the strand is wide.
 SHARED_FN float widestRadius(CameraSegment s, ScreenSegment on, float focal) {
     const float a = (s.radiusA + on.from * (s.radiusB - s.radiusA)) / on.za;
     const float b = (s.radiusA + on.to * (s.radiusB - s.radiusA)) / on.zb;
-    return max(a, b) * focal;
+    return on.isThere < 0.5f ? 3.0e38f : max(a, b) * focal;
 }
 
-// Does anything of a tube lie before the near plane and inside the picture's four sides, though its axis does not?
-SHARED_FN float tubeReaches(CameraSegment s, float focal, float cx, float cy, float width, float height,
-                            float nearPlane) {
+// May anything of a strand lie before the near plane and inside the picture's four sides, though its axis does not?
+// (1 or 0; by the balls around its places.)
+SHARED_FN float strandReaches(CameraSegment s, float focal, float cx, float cy, float width, float height,
+                              float nearPlane) {
     const float left = 1.0f / sqrt(focal * focal + cx * cx);
     const float right = 1.0f / sqrt(focal * focal + (width - cx) * (width - cx));
     const float top = 1.0f / sqrt(focal * focal + cy * cy);
@@ -160,11 +158,11 @@ SHARED_FN float tubeReaches(CameraSegment s, float focal, float cx, float cy, fl
     const float b = max(((height - cy) * s.a.z - focal * s.a.y) * bottom + s.radiusA,
                         ((height - cy) * s.b.z - focal * s.b.y) * bottom + s.radiusB);
     const float n = max(s.a.z + s.radiusA, s.b.z + s.radiusB) - nearPlane;
-    return min(min(min(l, r), min(t, b)), n) > 0.0f ? s.isRound : 0.0f;
+    return min(min(min(l, r), min(t, b)), n) > 0.0f ? 1.0f : 0.0f;
 }
-// Is a tube filled by its pixels' rays? `on.isThere` of 0: only its flank is seen.
-SHARED_FN float isFilledTube(CameraSegment s, ScreenSegment on, float focal, float exactStrands) {
-    return on.isThere < 0.5f || widestRadius(s, on, focal) >= exactStrands ? s.isRound : 0.0f;
+// Is a strand filled by its pixels' rays (1 or 0)?
+SHARED_FN float isFilled(CameraSegment s, ScreenSegment on, float focal, float exactStrands) {
+    return widestRadius(s, on, focal) >= exactStrands ? 1.0f : 0.0f;
 }
 
 // Normal of a tube too narrow to show its roundness: the one whose light is that of the whole, sqrt(1 - (l t)^2), bent
@@ -211,7 +209,7 @@ SHARED_FN Texel texelFromStrand(CameraSegment s, float place, float support, flo
     const float reach = min(radius / distance, 0.9f);
     const float front = tubeFront(radius, sine2, distance);
     const float roundRadius = radius * focal / (z * sqrt(1.0f - reach * reach));
-    const vec3 m = ribbonNormal(own, d);
+    const vec3 m = crossOf(own, d);
     const float inverseM = 1.0f / sqrt(max(dot(m, m), 1.0e-12f));
     const Texel flat_ =
         texelFromSplat(vec3(c.x, c.y, z), vec3(m.x * inverseM, m.y * inverseM, m.z * inverseM), radius, focal, kNarrow);
@@ -231,56 +229,6 @@ SHARED_FN Texel texelFromStrand(CameraSegment s, float place, float support, flo
     r.axis =
         vec2(isRound ? across.x * across.x - across.y * across.y : ribbon, isRound ? 2.0f * across.x * across.y : 0.0f);
     return r;
-}
-
-// From a ribbon's axis to its edge on the image, px, and by what share of the depth the edge is farther. `c`: a place
-// on the axis, `w`: across. (To first order: the two edges lie opposite.)
-struct RibbonEdge {
-    float x;
-    float y;
-    float slope;
-};
-SHARED_FN RibbonEdge ribbonEdge(vec3 c, vec3 w, float radius, float focal) {
-    const float size = radius / (c.z * sqrt(max(dot(w, w), 1.0e-12f)));
-    RibbonEdge e;
-    e.x = (w.x - c.x / c.z * w.z) * size * focal;
-    e.y = (w.y - c.y / c.z * w.z) * size * focal;
-    e.slope = min(max(w.z * size, -0.9f), 0.9f);
-    return e;
-}
-
-// Where an image point lies on a ribbon whose axis leads along (dx, dy) and whose edges are `a` and `b` at its ends:
-// (ex, ey) = along d + across (a + along (b - a)), a quadratic in `along` (an inverse bilinear map). Of two solutions
-// the one nearer to the axis.
-struct RibbonPlace {
-    float along;   // 0 to 1 inside
-    float across;  // -1 to 1 inside
-};
-SHARED_FN float ribbonAcross(float along, float ex, float ey, float dx, float dy, RibbonEdge a, RibbonEdge b) {
-    const float wx = a.x + along * (b.x - a.x);
-    const float wy = a.y + along * (b.y - a.y);
-    const float inside = min(along, 1.0f - along);
-    const float across = ((ex - along * dx) * wx + (ey - along * dy) * wy) / max(wx * wx + wy * wy, 1.0e-12f);
-    return inside >= 0.0f ? across : 1.0e6f;
-}
-SHARED_FN RibbonPlace ribbonPlace(float ex, float ey, float dx, float dy, RibbonEdge a, RibbonEdge b) {
-    const float gx = b.x - a.x;
-    const float gy = b.y - a.y;
-    const float k2 = dy * gx - dx * gy;
-    const float k1 = ex * gy - ey * gx - (dx * a.y - dy * a.x);
-    const float k0 = ex * a.y - ey * a.x;
-    const float inner = k1 * k1 - 4.0f * k2 * k0;
-    const float root = sqrt(max(inner, 0.0f));
-    const float q = -0.5f * (k1 + (k1 < 0.0f ? -root : root));
-    const float u0 = abs(q) > 0.0f ? k0 / q : -1.0f;
-    const float u1 = abs(k2) > 1.0e-6f * abs(k1) ? q / k2 : u0;
-    const float v0 = ribbonAcross(u0, ex, ey, dx, dy, a, b);
-    const float v1 = ribbonAcross(u1, ex, ey, dx, dy, a, b);
-    const bool isFirst = abs(v0) <= abs(v1);
-    RibbonPlace p;
-    p.along = isFirst ? u0 : u1;
-    p.across = inner < 0.0f ? 1.0e6f : isFirst ? v0 : v1;
-    return p;
 }
 
 // A number of a segment's own, the same in every cut: which pixels a narrow strand takes must not change when others
@@ -343,72 +291,52 @@ SHARED_FN TubeSurface tubeSurface(Texel t, float inverseFocal) {
     return s;
 }
 
-struct TubePixel {
+// What a filled strand shows at a pixel.
+struct FilledPixel {
     float depth;  // kNoDepth: the ray passes by
     vec2 normalPerp;
     float place;
 };
-// What a filled ribbon shows at a pixel: a texel that stands for nothing but that. `farther`: of its place across the
-// ribbon, share of the depth.
-SHARED_FN Texel exactTexel(Texel t, float farther) {
-    Texel r = t;
-    r.depth = t.depth * (1.0f + farther);
-    r.radius = 0.25f;
-    r.thickness = kLeafThickness * 0.25f;  // a filled ribbon is a leaf
-    r.offset = vec2(0.0f, 0.0f);
-    r.isRound = 0.0f;
-    r.axis = vec2(0.0f, 0.0f);
-    return r;
-}
-// What a filled tube shows at the pixel whose ray is (ex, ey, 1), and where on the segment.
-SHARED_FN TubePixel tubePixel(CameraSegment s, float ex, float ey, float nearPlane) {
+// A tube at the pixel whose ray is (ex, ey, 1).
+SHARED_FN FilledPixel tubePixel(CameraSegment s, float ex, float ey, float nearPlane) {
     const Tube tube = tubeOf(s.a, s.b, s.radiusA, s.radiusB);
     const TubeHit hit = tubeHit(tube, ex, ey, nearPlane, false);
     const float inverse = 1.0f / sqrt(ex * ex + ey * ey + 1.0f);
     const vec3 v = vec3(ex * inverse, ey * inverse, inverse);
-    TubePixel p;  // where rounding lets the ray pass by: a rim is no nearer to anything
+    FilledPixel p;  // where rounding lets the ray pass by: a rim is no nearer to anything
     p.depth = hit.depth;
     p.normalPerp = perpFromNormal(tubeNormal(tube, hit, s.directionA, s.directionB, v), v);
     p.place = hit.place;
     return p;
 }
 
-// What a pixel of a strand shows, unless it is a filled tube's. `on`: the segment projected with the pixel's centre as
-// the origin.
+// A ribbon at the pixel whose ray is (ex, ey, 1).
+SHARED_FN FilledPixel ribbonPixel(CameraSegment s, float ex, float ey, float nearPlane) {
+    const Ribbon ribbon = ribbonOf(s.a, s.b, s.directionA, s.directionB, s.radiusA, s.radiusB);
+    const RibbonHit hit = ribbonHit(ribbon, ex, ey, nearPlane, kRibbonTexelSlack);
+    const float inverse = 1.0f / sqrt(ex * ex + ey * ey + 1.0f);
+    const vec3 v = vec3(ex * inverse, ey * inverse, inverse);
+    FilledPixel p;
+    p.depth = hit.depth;
+    p.normalPerp = perpFromNormal(ribbonHitNormal(ribbon, hit, v), v);
+    p.place = hit.along;
+    return p;
+}
+
+// What a pixel of a strand shows that is not filled. `on`: the segment projected with the pixel's centre as the origin.
 struct StrandPixel {
     Texel texel;
     float place;  // along the segment, 0 to 1
 };
 SHARED_FN StrandPixel strandPixel(CameraSegment s, ScreenSegment on, float support, float focal, float cx, float cy,
-                                  float nearPlane, float exactStrands, vec3 light) {
-    const vec3 a = vec3(s.a.x + on.from * (s.b.x - s.a.x), s.a.y + on.from * (s.b.y - s.a.y), on.za);
-    const vec3 b = vec3(s.a.x + on.to * (s.b.x - s.a.x), s.a.y + on.to * (s.b.y - s.a.y), on.zb);
-    const RibbonEdge ea = ribbonEdge(a, s.directionA, s.radiusA + on.from * (s.radiusB - s.radiusA), focal);
-    const RibbonEdge eb = ribbonEdge(b, s.directionB, s.radiusA + on.to * (s.radiusB - s.radiusA), focal);
-    const RibbonPlace p = ribbonPlace(-on.xa, -on.ya, on.xb - on.xa, on.yb - on.ya, ea, eb);
-    const bool isWide = widestRadius(s, on, focal) >= exactStrands;
-    const float onRibbon = (isWide ? 1.0f : 0.0f) * (1.0f - s.isRound) * max(2.0f - abs(p.across), 0.0f);
-    const bool isOnRibbon = onRibbon > 0.0f;
-    const float u = min(max(p.along, 0.0f), 1.0f);
-    const float t = u * on.za / max((1.0f - u) * on.zb + u * on.za, 1.0e-30f);
-    const float nearest = segmentParameter(on, 0.0f, 0.0f);
+                                  float nearPlane, vec3 light) {
     StrandPixel r;
-    r.place = isOnRibbon ? on.from + t * (on.to - on.from) : nearest;
-    const Texel disc = texelFromStrand(s, r.place, support, focal, nearPlane, light);
+    r.place = segmentParameter(on, 0.0f, 0.0f);
+    r.texel = texelFromStrand(s, r.place, support, focal, nearPlane, light);
     const vec3 c = vec3(s.a.x + r.place * (s.b.x - s.a.x), s.a.y + r.place * (s.b.y - s.a.y),
                         max(s.a.z + r.place * (s.b.z - s.a.z), nearPlane));
-    const float x = c.x * focal / c.z + cx;
-    const float y = c.y * focal / c.z + cy;
-    const float farther = isOnRibbon ? p.across * (ea.slope + u * (eb.slope - ea.slope)) : 0.0f;
-    const Texel filled = exactTexel(disc, farther);
-    r.texel = disc;
-    r.texel.depth = isWide ? filled.depth : disc.depth;
-    r.texel.radius = isWide ? filled.radius : disc.radius;
-    r.texel.thickness = isWide ? filled.thickness : disc.thickness;
-    r.texel.offset = vec2(isWide ? 0.0f : x, isWide ? 0.0f : y);
+    r.texel.offset = vec2(c.x * focal / c.z + cx, c.y * focal / c.z + cy);
     r.texel.colour = vec3(0.0f, 0.0f, 0.0f);
-    r.texel.isRound = isWide ? 0.0f : disc.isRound;
-    r.texel.axis = vec2(isWide ? 0.0f : disc.axis.x, isWide ? 0.0f : disc.axis.y);
     return r;
 }
 

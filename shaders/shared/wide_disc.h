@@ -19,8 +19,9 @@ struct WideDisc {
     uint id;       // for the visibility buffer
 };
 
-// From this radius on, px, a disc is wide: a quarter of the longer side of the picture.
-const float kWideShare = 0.25f;
+// From this radius on, px, a disc is wide: a 32nd of the longer side of the picture. (Below, what pull-push loses of
+// discs that share a texel is small.)
+const float kWideShare = 0.03125f;
 const float kWidePixels = 16.0f;
 SHARED_FN float wideRadius(uint width, uint height) {
     return max(kWideShare * max(float(int(width)), float(int(height))), kWidePixels);
@@ -111,6 +112,20 @@ SHARED_FN PixelRange pixelsBetween(vec2 slopes, float focal, float centre, uint 
     p.first = int(floor(min(max(slopes.x * focal + centre - 1.5f, 0.0f), most + 1.0f)));
     p.last = int(floor(min(max(slopes.y * focal + centre + 0.5f, -1.0f), most)));
     return p;
+}
+
+// The pixels that a disc may cover.
+struct DiscBox {
+    PixelRange x;
+    PixelRange y;
+};
+SHARED_FN DiscBox discBox(WideDisc d, FrameConstants f) {
+    DiscBox b;
+    b.x = pixelsBetween(discSlopes(d.centre.x, d.centre.z, d.normal.x, d.normal.z, d.radius), f.focal, f.centre.x,
+                        f.width);
+    b.y = pixelsBetween(discSlopes(d.centre.y, d.centre.z, d.normal.y, d.normal.z, d.radius), f.focal, f.centre.y,
+                        f.height);
+    return b;
 }
 
 // Where a point is in camera space.

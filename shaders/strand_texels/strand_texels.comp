@@ -18,15 +18,21 @@ void main() {
     const float cx = frame.centre.x - 0.5 - float(pixel.x);
     const float cy = frame.centre.y - 0.5 - float(pixel.y);
     const ScreenSegment on = projectSegment(s.a, s.b, frame.focal, cx, cy, frame.nearPlane);
-    const StrandPixel seen = strandPixel(s, on, frame.supportScale, frame.focal, cx, cy, frame.nearPlane, frame.exactStrands, frame.sunDirection);
+    const StrandPixel seen = strandPixel(s, on, frame.supportScale, frame.focal, cx, cy, frame.nearPlane, frame.sunDirection);
     Texel t = seen.texel;
     float place = seen.place;
-    if (isFilledTube(s, on, frame.focal, frame.exactStrands) > 0.5) {
-        const TubePixel hit = tubePixel(s, -cx * (1.0 / frame.focal), -cy * (1.0 / frame.focal), frame.nearPlane);
+    if (isFilled(s, on, frame.focal, frame.exactStrands) > 0.5) {
+        const float ex = -cx * (1.0 / frame.focal);
+        const float ey = -cy * (1.0 / frame.focal);
+        FilledPixel hit;
+        if (s.isRound > 0.5)
+            hit = tubePixel(s, ex, ey, frame.nearPlane);
+        else
+            hit = ribbonPixel(s, ex, ey, frame.nearPlane);
         if (hit.depth < kNoDepth) t.depth = hit.depth;
         t.normalPerp = hit.depth < kNoDepth ? hit.normalPerp : vec2(0.0);
         t.radius = 0.25;
-        t.thickness = 0.25;
+        t.thickness = s.isRound > 0.5 ? 0.25 : kLeafThickness * 0.25;  // a filled ribbon is a leaf
         t.offset = vec2(0.0);
         t.isRound = 0.0;
         t.axis = vec2(0.0);

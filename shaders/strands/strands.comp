@@ -71,7 +71,8 @@ void main() {
     const ScreenSegment p = projectSegment(c.a, c.b, frame.focal, frame.centre.x, frame.centre.y, frame.nearPlane);
     const float width = float(frame.width);
     const float height = float(frame.height);
-    if (max(p.isThere, tubeReaches(c, frame.focal, frame.centre.x, frame.centre.y, width, height, frame.nearPlane)) < 0.5) return;
+    const float reaches = strandReaches(c, frame.focal, frame.centre.x, frame.centre.y, width, height, frame.nearPlane);
+    if (max(p.isThere, reaches) < 0.5) return;
     const vec3 t = segmentTangent(c);
     vec3 a = c.a + p.from * (c.b - c.a);
     vec3 b = c.a + p.to * (c.b - c.a);
@@ -88,29 +89,44 @@ void main() {
     s.halfB = endHalfWidth(c, p.to, c.directionB, frame.focal, frame.nearPlane);
     const float ra = c.radiusA + p.from * (c.radiusB - c.radiusA);
     const float rb = c.radiusA + p.to * (c.radiusB - c.radiusA);
-    s.edgeA = ribbonEdge(a, c.directionA, ra, frame.focal);
-    s.edgeB = ribbonEdge(b, c.directionB, rb, frame.focal);
-    s.isRound = isFilledTube(c, p, frame.focal, frame.exactStrands) > 0.5 ? 1u : 0u;
+    s.acrossA = c.directionA;
+    s.acrossB = c.directionB;
+    s.isRound = c.isRound > 0.5 ? 1u : 0u;
     s.a = c.a;
     s.b = c.b;
     s.radiusA = c.radiusA;
     s.radiusB = c.radiusB;
-    const float widest = sqrt(max(s.edgeA.x * s.edgeA.x + s.edgeA.y * s.edgeA.y, s.edgeB.x * s.edgeB.x + s.edgeB.y * s.edgeB.y));
-    vec2 lo = min(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) - widest;
-    vec2 hi = max(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) + widest;
-    if (s.isRound != 0u) {
+    // What it may cover.
+    const bool isWide = isFilled(c, p, frame.focal, frame.exactStrands) > 0.5;
+    const Ribbon ribbon = ribbonOfWide(s);
+    vec2 lo = min(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) - 1.0;
+    vec2 hi = max(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) + 1.0;
+    if (isWide && s.isRound != 0u) {
         lo = -vec2(tubeSlope(-c.a.x, c.a.z, c.radiusA, -c.b.x, c.b.z, c.radiusB), tubeSlope(-c.a.y, c.a.z, c.radiusA, -c.b.y, c.b.z, c.radiusB)) * frame.focal + frame.centre - 1.5;
         hi = vec2(tubeSlope(c.a.x, c.a.z, c.radiusA, c.b.x, c.b.z, c.radiusB), tubeSlope(c.a.y, c.a.z, c.radiusA, c.b.y, c.b.z, c.radiusB)) * frame.focal + frame.centre + 0.5;
-    } else if (c.isRound > 0.5) {
-        lo = min(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) - 1.0;
-        hi = max(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) + 1.0;
+    } else if (isWide) {
+        bool isBefore = true;
+        lo = vec2(3.0e38);
+        hi = vec2(-3.0e38);
+        for (int k = 0; k < 4; ++k) {
+            const vec3 corner = ribbonCorner(ribbon, k < 2 ? 0.0 : 1.0, (k & 1) == 0 ? -1.0 : 1.0);
+            const vec2 at = corner.xy * (frame.focal / max(corner.z, frame.nearPlane)) + frame.centre;
+            isBefore = isBefore && corner.z > frame.nearPlane;
+            lo = min(lo, at - 1.0);
+            hi = max(hi, at + 1.0);
+        }
+        if (!isBefore) {  // some of it has no place on the picture
+            if (reaches < 0.5) return;
+            lo = vec2(0.0);
+            hi = vec2(width, height);
+        }
     }
     if (!(hi.x >= 0.0 && hi.y >= 0.0 && lo.x < width && lo.y < height)) return;
     s.nearerA = nearerAt(a, t, ra, c.isRound);
     s.nearerB = nearerAt(b, t, rb, c.isRound);
     const vec2 d = vec2(p.xb - p.xa, p.yb - p.ya);
     s.id = kKindStrand | (block * kSegmentsPerBlock + gl_LocalInvocationID.x);
-    if (s.isRound == 0u && (c.isRound > 0.5 || widestRadius(c, p, frame.focal) < frame.exactStrands)) {
+    if (!isWide) {
         drawLine(s);
         const float across = max(abs(d.x), abs(d.y));
         drawEnd(s.xa, s.ya, s.inverseA, s.halfA, s.nearerA, across, s.id);
@@ -128,5 +144,5 @@ void main() {
         }
     }
     for (int y = from.y; y <= to.y; ++y)
-        for (int x = from.x; x <= to.x; ++x) offerWide(s, x, y);
+        for (int x = from.x; x <= to.x; ++x) offerWide(s, ribbon, x, y);
 }

@@ -18,6 +18,7 @@ void main() {
         const int width = x1 - x0 + 1;
         if (width <= 0 || y1 < y0) continue;
         const int pixels = width * (y1 - y0 + 1);
-        for (int p = int(gl_LocalInvocationID.x); p < pixels; p += 256) offerWide(s, x0 + p % width, y0 + p / width);
+        const Ribbon ribbon = ribbonOfWide(s);
+        for (int p = int(gl_LocalInvocationID.x); p < pixels; p += 256) offerWide(s, ribbon, x0 + p % width, y0 + p / width);
     }
 }

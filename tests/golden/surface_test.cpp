@@ -189,7 +189,7 @@ TEST(Surface, APlaneSeenFromNearIsThereToTheBorder) {
                 ASSERT_GT(covered, image.depth.size() * (degrees > 60 ? 4 : 9) / 10);
                 // (At 80 degrees much of the plane is far away, and splats there are seen nearly edge-on.)
                 const double all = static_cast<double>(covered), some = static_cast<double>(both);
-                EXPECT_GE(some, (degrees > 60 ? 0.995 : 1.0) * all) << backend->name();
+                EXPECT_GE(some, (degrees > 60 ? 0.995 : 0.998) * all) << backend->name();
                 EXPECT_LE(static_cast<double>(off), (degrees > 60 ? 0.04 : 0.0005) * some) << backend->name();
             }
         }
