@@ -46,8 +46,8 @@ RecordFacts factsOf(const Hierarchy& h, const Node& node, const Chunk& chunk, si
 glm::dvec3 coneAxis(const Node& node) { return glm::normalize(glm::dvec3(shared::octDecode(node.normalCone))); }
 double coneAngle(const Node& node) { return std::acos(std::min(double{node.normalConeCosine}, 1.0)); }
 
-/// Cones hide all that is below their node (facesAway): what a node's holds must be in those of all above it. Rounding
-/// of the records' normals has its own margin, of which nothing is left to each level here.
+/// Cones hide all that is below their node (facesAway), so each must be inside of those above it. kConeMargin is for
+/// the rounding of records' normals alone.
 bool isConeInside(const Node& node, const Node& parent) {
     if (!(parent.normalConeCosine > 0)) return true;
     constexpr double kRounding = 1e-7;  // radians, of axes in single precision; builders widen by more

@@ -228,9 +228,10 @@ TEST_F(Crafted, GroupsOfWideMeshesLieOnTheirLattice) {
     for (const uint32_t group : {counted, paired}) {
         CraftedStore c = take(wide);
         c.nodes[group].stepShift = static_cast<int8_t>(1 - c.nodes[group].stepShift);
-        c.write(mine_ / "kind.stipple");
-        const auto opened = lod::openStore(mine_ / "kind.stipple");
+        const std::string path = written(c);
+        const auto opened = lod::openStore(path);
         EXPECT_FALSE(opened && lod::verifyStore(*opened, *executor_)) << group;
+        test::tryEverything(path);
     }
     for (const uint32_t far : {0x7fffffffu, 0x80000000u, ~0u, 1u << 20}) {
         CraftedStore c = take(wide);
