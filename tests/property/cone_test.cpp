@@ -82,7 +82,7 @@ std::vector<test::TestPoint> roomWithBall(double noise) {
     return room;
 }
 
-/// A sheet of which one normal in 100 leans aside: means of them, in the levels above, lean less.
+/// A sheet of which one normal in 100 leans aside.
 std::vector<test::TestPoint> sheetWithBurrs() {
     Rng rng(4);
     std::vector<test::TestPoint> points(40'000);
