@@ -43,6 +43,18 @@ RecordFacts factsOf(const Hierarchy& h, const Node& node, const Chunk& chunk, si
     return facts;
 }
 
+glm::dvec3 coneAxis(const Node& node) { return glm::normalize(glm::dvec3(shared::octDecode(node.normalCone))); }
+double coneAngle(const Node& node) { return std::acos(std::min(double{node.normalConeCosine}, 1.0)); }
+
+/// Cones hide all that is below their node (facesAway), so each must be inside of those above it. kConeMargin is for
+/// the rounding of records' normals alone.
+bool isConeInside(const Node& node, const Node& parent) {
+    if (!(parent.normalConeCosine > 0)) return true;
+    constexpr double kRounding = 1e-7;  // radians, of axes in single precision; builders widen by more
+    const double sine = 0.5 * glm::length(coneAxis(node) - coneAxis(parent));
+    return 2 * std::asin(std::min(sine, 1.0)) + coneAngle(node) <= coneAngle(parent) + kRounding;
+}
+
 std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
     const Node& node = h.nodes[index];
     std::array<uint32_t, 256> own{};
@@ -59,8 +71,8 @@ std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
             return "a record has an error but its octant has no child";
     }
     if (!h.isLoose() && node.normalConeCosine > 0) {  // see facesAway
-        const glm::dvec3 axis = glm::normalize(glm::dvec3(shared::octDecode(node.normalCone)));
-        const double widest = std::acos(std::min(double{node.normalConeCosine}, 1.0)) + kConeMargin;
+        const glm::dvec3 axis = coneAxis(node);
+        const double widest = coneAngle(node) + kConeMargin;
         for (const shared::PointRecord& r : chunk.records) {
             if ((shared::recordFlags(r) & (shared::kFlagTwoSided | shared::kFlagNoNormal)) != 0)
                 return "a record can be seen from everywhere, but the node has a cone of normals";
@@ -80,6 +92,7 @@ std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
     const Node& parent = h.nodes[node.parent];
     if (glm::length(node.centre - parent.centre) + node.radius > parent.radius * (1 + 1e-9) + 1e-6)
         return "the bounding sphere is not inside the parent's";
+    if (!h.isLoose() && !isConeInside(node, parent)) return "the cone of normals is not inside the parent's";
     if (node.errorCode > parent.errorCode) return "the error is larger than the parent's";
     // Monotone along every chain: sorted by the parent's code, so the own code must not exceed it.
     uint32_t position = 0;
@@ -100,6 +113,7 @@ namespace {
 std::string checkGroup(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
     const Node& node = h.nodes[index];
     const MeshGroup& group = h.groups[index];
+    if (node.normalConeCosine > 0) return "a group of the mesh has a cone of normals";
     for (const shared::MeshCluster& c : chunk.clusters)
         for (uint32_t i = 0; i < verticesOf(node, c); ++i)
             if (glm::length(vertexPlace(node, chunk, c, i) - node.centre) > node.radius * (1 + 1e-9))

@@ -219,6 +219,38 @@ TEST(CoordinatesOfMeshes, ObjectsFarApartAreDrawnWhereTheyAre) {
     }
 }
 
+TEST(CoordinatesOfMeshes, FacesWithoutAreaFarFromTheOthersLeaveWhatIsLookedAt) {
+    const test::TempFolder folder;
+    const auto executor = makeSerialExecutor();
+    const glm::dvec3 centre(1000, -1000, 0.5);
+    for (const glm::dvec3& off : {glm::dvec3(0), glm::dvec3(0, 0, 1e9)}) {
+        TriangleMesh mesh;
+        addBall(2, centre, mesh);
+        const size_t real = mesh.indices.size() / 3;
+        // Most vertices are corners of faces that no store keeps.
+        Rng rng(3);
+        for (int k = 0; k < 2000; ++k) {
+            const glm::dvec3 p = off + glm::dvec3(rng.uniform(), rng.uniform(), rng.uniform());
+            for (const double y : {0.0, 0.0, 0.5}) {
+                mesh.indices.push_back(static_cast<uint32_t>(mesh.position.size()));
+                mesh.position.push_back(p + glm::dvec3(0, y, 0));
+            }
+        }
+        Progress silent(false);
+        const auto built = buildMeshStore(sourceOf(mesh), folder / "m", {}, *executor, silent);
+        ASSERT_TRUE(built) << built.error().line();
+        EXPECT_EQ(built->pointsOut, real);
+        const auto store = opened(folder / "m");
+        EXPECT_TRUE(verifyStore(*store, *executor, 0));
+        const StoreDescription& d = store->description;
+        for (int a = 0; a < 3; ++a) {
+            EXPECT_NEAR(d.focusMin[a], centre[a], 1.1);
+            EXPECT_NEAR(d.focusMax[a], centre[a], 1.1);
+            EXPECT_LT(d.focusMin[a], d.focusMax[a]);
+        }
+    }
+}
+
 TEST(CoordinatesOfMeshes, WideStoresAreTheSameBytesForAnyThreadsAndOrder) {
     const test::TempFolder folder;
     TriangleMesh mesh;

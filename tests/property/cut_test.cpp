@@ -7,7 +7,6 @@
 #include <map>
 
 #include "engine/reference/decode.h"
-#include "tests/support/crafted_store.h"
 #include "tests/support/support.h"
 
 namespace stipple::lod {
@@ -347,82 +346,6 @@ TEST(Cut, MeetsItsErrorInPixelsOnABuiltStore) {
     }
     EXPECT_GT(closest, 0.1) << "the bound is so far off that this shows nothing";
     EXPECT_GT(control, 1) << "a cut of sixteen times the error must be found";
-}
-
-/// Nodes of which every disc faces away are not visited, and nothing that could be seen is among them.
-struct ConeCut {
-    size_t drawn = 0, spared = 0, wrong = 0;
-};
-ConeCut compareWithoutCones(const Store& store, const View& view, double tau, const Hierarchy& withCones) {
-    Hierarchy bare = store.hierarchy;
-    for (Node& n : bare.nodes) n.normalConeCosine = -1;
-    const std::vector<uint8_t> all(bare.nodes.size(), 1);
-    const Selection with = select(withCones, all, view, {tau, kNoLimit}),
-                    without = select(bare, all, view, {tau, kNoLimit});
-    std::map<uint32_t, CutDraw> kept;
-    for (const CutDraw& d : with.cut.draw) kept[d.node] = d;
-    ConeCut out;
-    out.drawn = without.cut.draw.size();
-    for (const CutDraw& d : without.cut.draw) {
-        if (const auto k = kept.find(d.node); k != kept.end()) {
-            out.wrong += k->second.count != d.count || k->second.errorCode != d.errorCode ||
-                         k->second.octantMask != d.octantMask;
-            continue;
-        }
-        ++out.spared;
-        const auto chunk = readChunk(store, d.node);
-        EXPECT_TRUE(chunk);
-        for (uint32_t i = 0; i < d.count; ++i) {
-            const reference::Disc disc = reference::decodeDisc(bare, bare.nodes[d.node], chunk->records[i]);
-            out.wrong += (disc.flags & (shared::kFlagTwoSided | shared::kFlagNoNormal)) != 0 ||
-                         glm::dot(disc.normal, disc.position - view.eye) < 0;
-        }
-    }
-    return out;
-}
-
-TEST(Cut, WhatFacesAwayIsNotVisitedAndWhatDoesNotIs) {
-    const test::TempFolder folder;
-    const auto executor = makeSerialExecutor();
-    test::writePly(folder / "a.ply", test::bumpySphere(40'000, 1));
-    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
-    Hierarchy turned = store->hierarchy;  // negative control: cones that are those of other nodes
-    for (size_t i = 1; i < turned.nodes.size(); ++i)
-        turned.nodes[i].normalCone = store->hierarchy.nodes[i - 1].normalCone;
-    Rng rng(17);
-    ConeCut sum, control;
-    for (int k = 0; k < 60; ++k) {
-        View view = test::fitView(*store, 800, 600);
-        view.eye =
-            std::exp2(rng.uniform(0.2, 4)) * glm::normalize(glm::dvec3(rng.normal(), rng.normal(), rng.normal()));
-        view.forward = glm::normalize(-view.eye);
-        view.right = glm::normalize(glm::cross(view.forward, glm::dvec3(0.1, 1, 0)));
-        view.down = glm::cross(view.forward, view.right);
-        const double tau = std::exp2(rng.uniform(-3, 3));
-        const auto add = [&](ConeCut& to, const Hierarchy& cones) {
-            const ConeCut one = compareWithoutCones(*store, view, tau, cones);
-            to.drawn += one.drawn;
-            to.spared += one.spared;
-            to.wrong += one.wrong;
-        };
-        add(sum, store->hierarchy);
-        add(control, turned);
-    }
-    EXPECT_EQ(sum.wrong, 0u);
-    EXPECT_GT(sum.spared, sum.drawn / 5) << "of " << sum.drawn << " nodes";
-    EXPECT_GT(control.wrong, 100u);
-    RecordProperty("spared", static_cast<int>(sum.spared));
-    RecordProperty("drawn", static_cast<int>(sum.drawn));
-    // A store whose cones are too narrow would hide what can be seen: verifying finds it.
-    EXPECT_TRUE(verifyStore(*store, *executor));
-    test::CraftedStore narrow = test::CraftedStore::read(folder / "a.stipple");
-    for (auto& node : narrow.nodes) node.normalConeCosine = std::min(1.0f, node.normalConeCosine + 0.2f);
-    narrow.write(folder / "b.stipple");
-    const auto lying = openStore(folder / "b.stipple");
-    ASSERT_TRUE(lying) << lying.error().line();
-    const auto verified = verifyStore(*lying, *executor);
-    ASSERT_FALSE(verified);
-    EXPECT_NE(verified.error().what.find("cone"), std::string::npos) << verified.error().line();
 }
 
 }  // namespace

@@ -1,10 +1,12 @@
 // Stores whose hashes are right and whose content is not: refused by name, or drawn without harm.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <stdexcept>
 #include <tuple>
 
 #include "tests/support/crafted_store.h"
@@ -19,7 +21,7 @@ using test::CraftedStore;
 
 class Crafted : public testing::Test {
   protected:
-    enum Kind { points, mesh, strands, afar };
+    enum Kind { points, mesh, strands, afar, wide };
     static void SetUpTestSuite() {
         folder_ = new test::TempFolder;
         paths_ = test::smallStores(folder_->path());
@@ -81,7 +83,7 @@ test::TempFolder* Crafted::folder_ = nullptr;
 std::vector<std::string> Crafted::paths_;
 
 TEST_F(Crafted, WhatIsOnlyWrittenAgainIsFine) {
-    for (const Kind kind : {points, mesh, strands, afar}) {
+    for (const Kind kind : {points, mesh, strands, afar, wide}) {
         CraftedStore c = take(kind);
         const lod::Store store = open(kind);
         c.replaceChunk(0, test::encodeAgain(store.hierarchy, *lod::readChunk(store, 0, true)));
@@ -112,7 +114,7 @@ TEST_F(Crafted, NodesThatShareChildrenAreRefused) {
 }
 
 TEST_F(Crafted, RecordsThatTheBytesCannotHoldAreRefusedBeforeMemoryIsTaken) {
-    for (const Kind kind : {points, strands, afar, mesh}) {
+    for (const Kind kind : {points, strands, afar, mesh, wide}) {
         CraftedStore c = take(kind);
         const uint32_t most = ~0u;
         size_t used = 0;
@@ -120,7 +122,7 @@ TEST_F(Crafted, RecordsThatTheBytesCannotHoldAreRefusedBeforeMemoryIsTaken) {
         NodeOnDisk& last = c.nodes.back();
         last.records = most;
         for (size_t k = 0; k < last.parentCodes + last.ownCodes; ++k) c.counts[used + k].count = 0;
-        if (kind != mesh) c.counts[used].count = c.counts[used + last.parentCodes].count = most;
+        if (kind != mesh && kind != wide) c.counts[used].count = c.counts[used + last.parentCodes].count = most;
         expectRefused(c, "not possible");
     }
 }
@@ -196,6 +198,61 @@ TEST_F(Crafted, VerticesNameMaterialsAndPlacesThatThereAre) {
         expectFound(withChunk(mesh, 0, first([odd](shared::MeshVertex& v) { v.x = odd; })), text);
 }
 
+/// The first group of the wide mesh with pairs, or with an origin of its own and none.
+uint32_t wideGroup(const lod::Store& store, bool hasPairs) {
+    const auto& nodes = store.hierarchy.nodes;
+    const auto found = std::find_if(nodes.begin(), nodes.end(), [&](const lod::Node& n) {
+        return hasPairs ? n.stepShift == 1 : n.stepShift == 0 && (n.cell[0] | n.cell[1] | n.cell[2]) != 0;
+    });
+    if (found == nodes.end()) throw std::runtime_error("the wide mesh has not every kind of group");
+    return static_cast<uint32_t>(found - nodes.begin());
+}
+
+TEST_F(Crafted, GroupsOfWideMeshesLieOnTheirLattice) {
+    const lod::Store store = open(wide);
+    ASSERT_EQ(store.hierarchy.rootLog2, 62u);
+    const uint32_t counted = wideGroup(store, false), paired = wideGroup(store, true);
+    for (const int odd : {std::numeric_limits<int>::min(), std::numeric_limits<int>::max(), (1 << 30) + 1}) {
+        const auto move = [odd](lod::Chunk& chunk) { chunk.vertices.back().y = odd; };
+        expectFound(withChunk(wide, counted, move), "a vertex lies nowhere");
+        // The last vertex of a cluster of pairs is an upper half.
+        expectFound(withChunk(wide, paired, move), "points outside its chunk");
+    }
+    const std::string text = "group " + std::to_string(counted);
+    for (const int8_t shift : {int8_t{2}, int8_t{-1}, int8_t{127}}) {
+        CraftedStore c = take(wide);
+        c.nodes[counted].stepShift = shift;
+        expectRefused(c, text);
+    }
+    // Vertices are pairs or are none: read as the other they lie outside of the group's sphere or their cluster.
+    for (const uint32_t group : {counted, paired}) {
+        CraftedStore c = take(wide);
+        c.nodes[group].stepShift = static_cast<int8_t>(1 - c.nodes[group].stepShift);
+        const std::string path = written(c);
+        const auto opened = lod::openStore(path);
+        EXPECT_FALSE(opened && lod::verifyStore(*opened, *executor_)) << group;
+        test::tryEverything(path);
+    }
+    for (const uint32_t far : {0x7fffffffu, 0x80000000u, ~0u, 1u << 20}) {
+        CraftedStore c = take(wide);
+        c.nodes[counted].cell[1] = far;
+        const std::string path = written(c);
+        const auto opened = lod::openStore(path);
+        EXPECT_FALSE(opened && lod::verifyStore(*opened, *executor_)) << far;
+        test::tryEverything(path);
+    }
+}
+
+/// The cut leaves out what faces away by its cone (facesAway): nothing holds a group's to its triangles.
+TEST_F(Crafted, GroupsOfMeshesHaveNoConesOfNormals) {
+    for (const Kind kind : {mesh, wide})
+        for (const size_t group : {size_t{0}, take(kind).nodes.size() - 1}) {
+            CraftedStore c = take(kind);
+            c.nodes[group].normalConeCosine = 0.9f;
+            expectFound(c, "cone of normals");
+        }
+}
+
 TEST_F(Crafted, TextureCoordinatesThatAreHugeDoNoHarm) {
     for (const float huge : {3e38f, -3e38f, 1e20f}) {
         const CraftedStore c = withChunk(mesh, 0, [&](lod::Chunk& chunk) {
@@ -240,7 +297,7 @@ TEST_F(Crafted, RunsOfGroupsAreTheirOwn) {
 /// Any fields of any store, seeded. What is opened is drawn by both backends, and verified, at once and without harm.
 TEST_F(Crafted, AnyChangedFieldIsRefusedOrDrawnInTime) {
     int opened = 0;
-    for (const Kind kind : {points, mesh, strands, afar}) {
+    for (const Kind kind : {points, mesh, strands, afar, wide}) {
         const CraftedStore whole = take(kind);
         const lod::Store store = open(kind);
         for (uint64_t seed = 0; seed < 150; ++seed) {

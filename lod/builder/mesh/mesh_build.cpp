@@ -282,8 +282,13 @@ class MeshBuild : public CellContent {
         description.boundsMin = description.focusMin = facts_.lattice.origin + facts_.lattice.unit * glm::dvec3(lo_);
         description.boundsMax = description.focusMax = facts_.lattice.origin + facts_.lattice.unit * glm::dvec3(hi_);
         if (facts_.lattice.isWide()) {
-            description.focusMin = glm::max(description.focusMin, facts_.lattice.focusLow);
-            description.focusMax = glm::min(description.focusMax, facts_.lattice.focusHigh);
+            const glm::dvec3 low = glm::max(description.boundsMin, facts_.lattice.focusLow);
+            const glm::dvec3 high = glm::min(description.boundsMax, facts_.lattice.focusHigh);
+            // What most vertices span may hold no triangle that is kept: theirs may be without an area.
+            if (glm::all(glm::lessThanEqual(low, high))) {
+                description.focusMin = low;
+                description.focusMax = high;
+            }
         }
         description.hasColour = description.hasNormals = description.isReflectance = true;
         uint64_t coarsest = 0;
