@@ -292,7 +292,7 @@ class ReferenceBackend final : public render::Backend {
     }
     /// Is a disc so wide that an ellipse a texel does not hold it?
     static bool isWide(const lod::View& v, const Disc& disc, double radius, const dvec3& c) {
-        const double widest = std::max(std::max(v.width, v.height) / 32.0, 16.0);  // px
+        const double widest = std::max(std::max(v.width, v.height) / 32.0, 32.0);  // px
         if ((disc.flags & shared::kFlagScattered) != 0) return false;
         if ((disc.flags & shared::kFlagNoNormal) != 0 && c.z <= v.nearPlane) return false;
         return radius * v.focalPixels > widest * c.z && c.z + radius > v.nearPlane;

@@ -19,10 +19,10 @@ struct WideDisc {
     uint id;       // for the visibility buffer
 };
 
-// From this radius on, px, a disc is wide: a 32nd of the longer side of the picture. (Below, what pull-push loses of
-// discs that share a texel is small.)
+// From this radius on, px, a disc is wide: a 32nd of the longer side of the picture, at least 32. (Below, what
+// pull-push loses of discs that share a texel is small, and it closes the slits that discs of a rough surface leave.)
 const float kWideShare = 0.03125f;
-const float kWidePixels = 16.0f;
+const float kWidePixels = 32.0f;
 SHARED_FN float wideRadius(uint width, uint height) {
     return max(kWideShare * max(float(int(width)), float(int(height))), kWidePixels);
 }

@@ -142,20 +142,22 @@ TEST(FullDetail, OfGrownSurfacesIsWhereThePictureSays) {
     }
 }
 
-// Scans are rough: neighbouring discs lie at heights and angles of their own, and what averages them lies between them.
+// Wanted are 0.01 % here, too; the limits are what is reached, so that it does not get worse. Scans are rough:
+// neighbouring discs lie at heights and angles of their own, and what averages them lies between them.
 TEST(FullDetail, OfScansIsWhereThePictureSays) {
     const auto executor = makeTbbExecutor(2);
     const test::TempFolder folder;
     if (const std::string path = test::dataFile("01_meshes/misc/lucy.ply"); !path.empty())
-        expectWithin(
-            "lucy", test::buildAndOpen(path, folder / "a.stipple", *executor, 2048),
-            {{"overview", 35, 0.9, 1, 1, 1, 1}, {"close", 25, 0.5, 2, 5, 1, 1}, {"grazing", -5, 0.7, 3, 5, 2, 2}},
-            *executor);
+        expectWithin("lucy", test::buildAndOpen(path, folder / "a.stipple", *executor, 2048),
+                     {{"overview", 35, 0.9, 1.2, 1, 0.3, 0.3},
+                      {"close", 25, 0.5, 1.2, 4, 0.5, 0.6},
+                      {"grazing", -5, 0.7, 2, 4, 1, 1}},
+                     *executor);
     if (const std::string path = test::dataFile("02_scans/als_ahn3_delft/ahn3_cropped_2.laz"); !path.empty())
         expectWithin("als", test::buildAndOpen(path, folder / "b.stipple", *executor, 2048),
-                     {{"overview", 35, 0.9, 1.3, 3, 1, 2},
-                      {"close", 25, 0.25, 2.6, 9, 2, 5},
-                      {"grazing", 4, 0.7, 4.2, 8, 3.2, 4}},
+                     {{"overview", 35, 0.9, 0.8, 2.6, 0.3, 0.6},
+                      {"close", 25, 0.25, 0.8, 4, 0.3, 0.6},
+                      {"grazing", 4, 0.7, 1.8, 5, 0.8, 2.2}},
                      *executor);
 }
 

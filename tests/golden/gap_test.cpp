@@ -96,7 +96,7 @@ TEST(Gaps, AreClosedInSurfacesAndStayOpenBetweenThem) {
                           {Ground::noisy, "noisy", 70, 200},
                           {Ground::irregular, "irregular", 0, 80},
                           {Ground::irregular, "irregular", 70, 80},
-                          {Ground::folds, "folds", 0, 400},
+                          {Ground::folds, "folds", 0, 200},
                           {Ground::folds, "folds", 70, 120},
                           {Ground::grass, "grass", 0, 11'500},
                           {Ground::grass, "grass", 70, 15'000}}) {
@@ -115,7 +115,8 @@ TEST(Gaps, AreClosedInSurfacesAndStayOpenBetweenThem) {
         }
         std::printf("%-9s %2.0f degrees: closed %zu, of the sheet open %zu (of its discs %zu)\n", c.name, c.degrees,
                     sum.closed, sum.open, sum.uncovered);
-        EXPECT_LE(sum.open, 4u) << c.name << " " << c.degrees;
+        // Where windows of a fold bend, points stand for themselves, as leaves do, and gaps between them stay open.
+        EXPECT_LE(sum.open, c.kind == Ground::folds ? 12u : 4u) << c.name << " " << c.degrees;
         EXPECT_LE(sum.closed, c.closed) << c.name << " " << c.degrees;
     }
 }
