@@ -112,7 +112,7 @@ class MeshBuild : public CellContent {
         STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
             facts_.triangles += block.indices.size() / 3;
             PlacedBlock placed = placeBlock(block, facts_.lattice, executor_);
-            parts_.place(placed, number++);
+            if (!parts_.place(placed, number++)) return changed();
             return take(placed.centres(), source_.triangles);
         }));
         facts_.bad = source_.badTriangles ? source_.badTriangles() : 0;
@@ -157,7 +157,7 @@ class MeshBuild : public CellContent {
             const size_t here = number++;
             if (to.begins()) return to.ends(triangles, facts_.triangles, flushAll);
             PlacedBlock placed = placeBlock(block, facts_.lattice, executor_);
-            parts_.place(placed, here);
+            if (!parts_.place(placed, here)) return changed();
             facts_.degenerate += placed.degenerate;
             facts_.notFinite += placed.notFinite;
             facts_.rounding = std::max(facts_.rounding, placed.rounding);
@@ -325,6 +325,9 @@ class MeshBuild : public CellContent {
     static bool isScattered(const Soup& soup) { return soup.vertices.size() * 3 > 4 * (soup.indices.size() / 3); }
     /// More have their centre in one place than a cell holds.
     static bool isCrowded(const Atom& atom) { return atom.count > kAtomPoints; }
+    tl::unexpected<Error> changed() const {
+        return fail(ErrorKind::input, "changed while it was read", source(), "build again when it is complete");
+    }
     tl::unexpected<Error> tooMany(uint64_t triangles) const {
         return fail(ErrorKind::budget, fmt::format("{} different triangles have their centre at one place", triangles),
                     source(), "is the mesh what it should be?");

@@ -100,9 +100,11 @@ void PartFinder::finish(bool isKnown) {
     parent_ = {};
 }
 
-void PartFinder::place(PlacedBlock& placed, size_t block) const {
-    if (block + 1 >= firstOfBlock_.size()) return;
+bool PartFinder::place(PlacedBlock& placed, size_t block) const {
+    if (firstOfBlock_.size() == 1) return true;  // of no triangle anything is known
+    if (block + 1 >= firstOfBlock_.size()) return false;
     const size_t first = firstOfBlock_[block];
+    if (placed.x.size() != firstOfBlock_[block + 1] - first) return false;
     for (size_t t = 0; t < placed.x.size(); ++t) {
         const uint32_t part = ofTriangle_[first + t];
         if (part == kNone) continue;
@@ -112,6 +114,7 @@ void PartFinder::place(PlacedBlock& placed, size_t block) const {
         for (size_t k = 0; k < 3; ++k)
             placed.soup.vertices.low[placed.soup.indices[3 * t + k]].surface |= kSurfaceOfPart;
     }
+    return true;
 }
 
 uint32_t partsOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& indices,
