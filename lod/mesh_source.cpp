@@ -81,6 +81,7 @@ MeshSource sourceOf(TriangleMesh given) {
     const auto mesh = std::make_shared<const TriangleMesh>(std::move(given));
     MeshSource source;
     source.triangles = mesh->indices.size() / 3;
+    source.vertices = mesh->position.size();
     source.identity = [mesh] {
         return hashBytes(mesh->indices.data(), mesh->indices.size() * 4) ^
                hashBytes(mesh->position.data(), mesh->position.size() * sizeof(glm::dvec3));

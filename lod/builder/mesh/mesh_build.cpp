@@ -82,6 +82,7 @@ class MeshBuild : public CellContent {
         needs.aWorker = kCellBytes;
         needs.tables = source_.triangles * kTableBytes;
         needs.between = source_.triangles * kSpillBytes;
+        needs.survey = partBytes();
         needs.whole = source_.triangles * 700;
         return needs;
     }
@@ -197,6 +198,7 @@ class MeshBuild : public CellContent {
             if (const auto found = errors.takeAll(); !found.empty()) return tl::unexpected(found.front());
             return to.ends(triangles, facts_.triangles, flushAll);
         }));
+        parts_ = {};
         return flushAll();
     }
 
@@ -303,16 +305,28 @@ class MeshBuild : public CellContent {
     static constexpr uint64_t kTableBytes = 2;       ///< of a triangle, of the table of groups, which stays in memory
     static constexpr uint64_t kMostOfAtom = 2 * kAtomPoints;
 
+    /// A PLY file says how many faces it has, which may have four corners: twice that is declared.
+    bool mayHaveParts() const { return source_.triangles <= 2 * PartFinder::kMostTriangles; }
+    /// That looking for parts takes.
+    uint64_t partBytes() const {
+        if (!mayHaveParts()) return 0;
+        const uint64_t triangles = std::min(source_.triangles, PartFinder::kMostTriangles),
+                       vertices = source_.vertices > 0 ? std::min(source_.vertices, 3 * triangles) : 3 * triangles;
+        return triangles * PartFinder::kTriangleBytes + vertices * PartFinder::kVertexBytes;
+    }
     /// What is small and stands alone stays together (parts.h), if the mesh can be looked at as a whole.
     Result<void> findParts() {
         // (Parts are moved on short lattices only.)
-        bool isKnown = source_.triangles <= PartFinder::kMostTriangles && !facts_.lattice.isWide();
+        bool isKnown = mayHaveParts() && !facts_.lattice.isWide();
         parts_ = {};
-        if (isKnown)
-            STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
-                isKnown = isKnown && parts_.add(placeBlock(block, facts_.lattice, executor_));
+        if (isKnown) {
+            const Result<void> read = source_.read([&](const TriangleMesh& block) -> Result<void> {
+                isKnown = parts_.add(placeBlock(block, facts_.lattice, executor_));
+                if (!isKnown) return fail(ErrorKind::budget, "too many triangles to look for parts", source());
                 return {};
-            }));
+            });
+            if (isKnown && !read) return read;  // otherwise reading has ended early
+        }
         parts_.finish(isKnown);
         return {};
     }

@@ -2,6 +2,8 @@
 // be moved and simplified, which those of a larger surface may not (its neighbours keep theirs).
 #pragma once
 
+#include <deque>
+
 #include "lod/builder/mesh/mesh_work.h"
 
 namespace stipple::lod {
@@ -17,6 +19,9 @@ class PartFinder {
   public:
     /// Triangles of a mesh that is looked at as a whole; of a larger one no part is known.
     static constexpr uint64_t kMostTriangles = uint64_t{1} << 21;
+    /// Memory until finish(), at most: a triangle's centre and position 16, a vertex's position 12, its numbers by hash
+    /// 12, its parent 4.
+    static constexpr uint64_t kTriangleBytes = 16, kVertexBytes = 28;
     /// False: there are too many.
     bool add(const PlacedBlock& block);
     void finish(bool isKnown);
@@ -28,10 +33,12 @@ class PartFinder {
     uint32_t numberOf(const glm::ivec3& p);
     void grow();
 
-    std::vector<glm::ivec3> positions_;
-    std::vector<uint32_t> slots_, parent_;
-    std::vector<uint32_t> ofTriangle_;             ///< a position of it; after finish() its part, or ~0
-    std::vector<std::array<uint32_t, 3>> centre_;  ///< of a triangle; after finish() of a part
+    // (What grows without being copied: twice as much for a moment would count.)
+    std::deque<glm::ivec3> positions_;
+    std::deque<uint32_t> parent_;
+    std::vector<uint32_t> slots_;
+    std::deque<uint32_t> ofTriangle_;             ///< a position of it; after finish() its part, or ~0
+    std::deque<std::array<uint32_t, 3>> centre_;  ///< of a triangle; after finish() of a part
     std::vector<size_t> firstOfBlock_{0};
 };
 
