@@ -331,6 +331,31 @@ TEST(MeshArea, AnInputThatChangesBetweenItsReadingsIsRefused) {
     }
 }
 
+/// Triangles that share nothing.
+lod::TriangleMesh separateTriangles(uint32_t count) {
+    lod::TriangleMesh mesh;
+    Rng rng(5);
+    for (uint32_t t = 0; t < count; ++t) {
+        const glm::dvec3 at(rng.uniform(0, 1), rng.uniform(0, 1), rng.uniform(0, 1));
+        mesh.position.insert(mesh.position.end(), {at, at + glm::dvec3(0.004, 0, 0), at + glm::dvec3(0, 0.004, 0.001)});
+        mesh.indices.insert(mesh.indices.end(), {3 * t, 3 * t + 1, 3 * t + 2});
+    }
+    return mesh;
+}
+
+TEST(MeshArea, MemoryThatLookingForPartsTakesIsSaid) {
+    const test::TempFolder folder;
+    const auto executor = makeSerialExecutor();
+    lod::MeshBuildSettings settings;
+    settings.limits.memoryBytes = uint64_t{185} << 20;  // (96 MiB and 115 for the parts; 180 for the work after that)
+    Progress progress(false);
+    const auto built = lod::buildMeshStore(lod::sourceOf(separateTriangles(1'200'000)), folder / "a.stipple", settings,
+                                           *executor, progress);
+    ASSERT_FALSE(built);
+    EXPECT_EQ(built.error().kind, ErrorKind::budget);
+    EXPECT_NE(built.error().hint.find("--memory"), std::string::npos);
+}
+
 TEST(MeshArea, BodiesDoNotGrow) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(2);

@@ -281,6 +281,11 @@ class PartGroup {
         for (size_t i = 0; i < local.indices.size(); ++i) parts_[ofTriangle[i / 3]].fine.push_back(local.indices[i]);
     }
 
+    /// Where vertices are.
+    auto from() const {
+        return [this](uint32_t v) { return glm::dvec3(local_.position[v]); };
+    }
+
     void simplify(size_t target) {
         std::vector<std::vector<PartVersion>> versions;
         versions.reserve(parts_.size());
@@ -328,10 +333,6 @@ class PartGroup {
             if (part.isCoarser) widenBy(part, ratio);
     }
 
-    /// Where vertices are.
-    Field from() const {
-        return [this](uint32_t v) { return glm::dvec3(local_.position[v]); };
-    }
     std::vector<uint32_t> coarse() const {
         std::vector<uint32_t> out;
         for (const Part& part : parts_) out.insert(out.end(), part.coarse.begin(), part.coarse.end());

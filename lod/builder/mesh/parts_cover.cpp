@@ -32,7 +32,11 @@ double coverAlong(const std::vector<CoverTriangle>& triangles, const glm::dvec3&
         }
     const double step = (high - low) / count;
     if (!(step > 0)) return 0;
-    std::vector<std::array<std::vector<Span>, 2>> rows(static_cast<size_t>(count));  // seen from the front, from behind
+    // Seen from the front, from behind; both are the same where all is drawn from both sides.
+    thread_local std::vector<std::array<std::vector<Span>, 2>> rows;
+    rows.resize(std::max(rows.size(), static_cast<size_t>(count)));
+    bool isSame = true;
+    for (const CoverTriangle& t : triangles) isSame = isSame && t.isTwoSided;
     for (const CoverTriangle& t : triangles) {
         std::array<glm::dvec2, 3> p{};
         for (size_t k = 0; k < 3; ++k)
@@ -53,11 +57,15 @@ double coverAlong(const std::vector<CoverTriangle>& triangles, const glm::dvec3&
             if (span.from > span.to) continue;
             auto& row = rows.at(static_cast<size_t>(r));
             if (t.isTwoSided || isFront) row[0].push_back(span);
-            if (t.isTwoSided || !isFront) row[1].push_back(span);
+            if (!isSame && (t.isTwoSided || !isFront)) row[1].push_back(span);
         }
     }
     double sum = 0;
-    for (auto& row : rows) sum += unionOf(row[0]) + unionOf(row[1]);
+    for (size_t r = 0; r < static_cast<size_t>(count); ++r) {
+        const double front = unionOf(rows[r][0]);
+        sum += front + (isSame ? front : unionOf(rows[r][1]));
+        for (auto& side : rows[r]) side.clear();
+    }
     return 0.5 * sum * step;
 }
 
