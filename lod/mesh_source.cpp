@@ -114,6 +114,7 @@ MeshSource joined(std::vector<MeshSource> given) {
     MeshSource all;
     for (const MeshSource& s : *sources) {
         all.triangles += s.triangles;
+        all.vertices += s.vertices > 0 ? s.vertices : 3 * s.triangles;
         all.surveyBytes += s.surveyBytes;
         all.readBytes += s.readBytes;
     }
