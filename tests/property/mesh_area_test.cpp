@@ -356,6 +356,17 @@ TEST(MeshArea, MemoryThatLookingForPartsTakesIsSaid) {
     EXPECT_NE(built.error().hint.find("--memory"), std::string::npos);
 }
 
+/// A PLY file has twice as many triangles as faces before it is read.
+TEST(MeshArea, PartsAreFoundByHowManyTrianglesThereAreNotByHowManyAreDeclared) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    lod::MeshSource source = lod::sourceOf(leavesAndTwigs(800, 0));
+    buildOf(source, {shared::SurfaceMaterial{}}, folder / "exact.stipple", *executor);
+    source.triangles = 3'000'000;
+    buildOf(source, {shared::SurfaceMaterial{}}, folder / "declared.stipple", *executor);
+    EXPECT_TRUE(test::slurp(folder / "exact.stipple") == test::slurp(folder / "declared.stipple"));
+}
+
 TEST(MeshArea, BodiesDoNotGrow) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(2);
