@@ -81,6 +81,7 @@ MeshSource sourceOf(TriangleMesh given) {
     const auto mesh = std::make_shared<const TriangleMesh>(std::move(given));
     MeshSource source;
     source.triangles = mesh->indices.size() / 3;
+    source.vertices = mesh->position.size();
     source.identity = [mesh] {
         return hashBytes(mesh->indices.data(), mesh->indices.size() * 4) ^
                hashBytes(mesh->position.data(), mesh->position.size() * sizeof(glm::dvec3));
@@ -113,6 +114,7 @@ MeshSource joined(std::vector<MeshSource> given) {
     MeshSource all;
     for (const MeshSource& s : *sources) {
         all.triangles += s.triangles;
+        all.vertices += s.vertices > 0 ? s.vertices : 3 * s.triangles;
         all.surveyBytes += s.surveyBytes;
         all.readBytes += s.readBytes;
     }

@@ -28,6 +28,7 @@ struct MeshSource {
     using Take = std::function<Result<void>(const TriangleMesh& block)>;
 
     uint64_t triangles = 0;              ///< as far as is known before reading
+    uint64_t vertices = 0;               ///< at most; 0: as many as triangles have corners
     std::function<uint64_t()> identity;  ///< another number: the source has changed
     /// Told now and then how much is done of how much; an error stops what is going on.
     using Tell = std::function<Result<void>(uint64_t done, uint64_t all)>;

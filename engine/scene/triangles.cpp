@@ -133,6 +133,7 @@ lod::MeshSource triangleSource(const Scene& scene, std::vector<Placement> placed
     lod::MeshSource source;
     static_cast<void>(forAll([&](const Placement&, const Primitive& p) -> Result<void> {
         source.triangles += p.indices.size() / 3;
+        source.vertices += p.position.size();
         return {};
     }));
     source.identity = [forAll] {

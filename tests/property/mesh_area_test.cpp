@@ -1,5 +1,6 @@
 // What meshes of small separate parts cover from afar: as much as in full detail, counted by a rasteriser of its own
 // with many samples a pixel. Bodies must not grow by it.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 
 #include "apps/grow/plants.h"
 #include "engine/scene/triangles.h"
+#include "lod/builder/mesh/parts.h"
 #include "tests/support/meshes.h"
 
 namespace stipple {
@@ -248,6 +250,121 @@ TEST(MeshArea, MovedVerticesStayWithinTheStatedErrorBothWays) {
         EXPECT_LE(test::largestDistance(leaves, drawn, 20'000, 7), bound) << share;
         EXPECT_LE(test::largestDistance(drawn, leaves, 20'000, 8), bound) << share;
     }
+}
+
+/// A few vertices far out: at 10 to 64 times what most span the lattice has more bits than fp32 (mesh/lattice.cpp).
+TEST(MeshArea, LeavesFarOutAreBuiltOnAllSides) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    const lod::TriangleMesh dense = leavesAndTwigs(800, 200);
+    glm::dvec3 lo(1e300), hi(-1e300);
+    for (const glm::dvec3& p : dense.position) {
+        lo = glm::min(lo, p);
+        hi = glm::max(hi, p);
+    }
+    const double extent = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
+    const std::vector<glm::dvec3> sides{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0},
+                                        {0, 0, 1}, {0, 0, -1}, {1, 1, 1}, {-1, -1.01, -0.97}};
+    for (const double far : {10.0, 15.2, 23.0, 41.7, 64.0})
+        for (const glm::dvec3& side : sides) {
+            const auto what = fmt::format("{} times as far on side {} {} {}", far, side.x, side.y, side.z);
+            lod::TriangleMesh mesh = dense;
+            const lod::TriangleMesh stray = leavesAndTwigs(1, 0);
+            const auto first = static_cast<uint32_t>(mesh.position.size());
+            for (const glm::dvec3& p : stray.position) mesh.position.push_back(p + far * extent * side);
+            mesh.normal.insert(mesh.normal.end(), stray.normal.begin(), stray.normal.end());
+            mesh.surface.insert(mesh.surface.end(), stray.surface.begin(), stray.surface.end());
+            for (const uint32_t i : stray.indices) mesh.indices.push_back(first + i);
+            StoreRef store;
+            EXPECT_NO_THROW(
+                store = buildOf(lod::sourceOf(mesh), {shared::SurfaceMaterial{}}, folder / "a.stipple", *executor))
+                << what;
+            if (!store) continue;
+            EXPECT_TRUE(lod::verifyStore(*store, *executor, 0)) << what;
+            // What is coarsest stays within its error of the input, the stray too.
+            const lod::Hierarchy& h = store->hierarchy;
+            uint32_t code = 0;
+            for (const lod::Node& n : h.nodes)
+                if (n.errorCode < lod::ErrorScale::kNoParent) code = std::max<uint32_t>(code, n.errorCode);
+            const auto leaves = test::leafTriangles(*store), drawn = test::drawnTriangles(*store, evenCut(h, code));
+            EXPECT_LT(drawn.size(), leaves.size() / 2) << what;
+            const double bound = h.errors.decode(code) * h.unit;
+            EXPECT_LE(bound, 0.1 * extent) << what;
+            EXPECT_LE(test::largestDistance(leaves, drawn, 400, 7), bound) << what;
+            EXPECT_LE(test::largestDistance(drawn, leaves, 400, 8), bound) << what;
+        }
+}
+
+TEST(MeshArea, PlacesOfMovedVerticesStayOnTheLattice) {
+    constexpr int kLargest = (1 << 30) - 1;
+    const lod::Steps from(0, kLargest, 5);
+    EXPECT_EQ(lod::movedPlace(from, {0, 0, 0}, kLargest), glm::ivec3(0, kLargest, 5));
+    EXPECT_EQ(lod::movedPlace(from, {-31, 32, -5.4}, kLargest), glm::ivec3(0, kLargest, 0));
+    EXPECT_EQ(lod::movedPlace(from, {31.6, -32.4, 2.5}, kLargest), glm::ivec3(32, kLargest - 32, 8));
+    // Farther than integers of 32 bits reach.
+    EXPECT_EQ(lod::movedPlace(from, {3e9, -3e9, 5e18}, kLargest), glm::ivec3(kLargest, 0, kLargest));
+    EXPECT_EQ(lod::movedPlace(from, {-1e30, 1e30, 1e300}, kLargest), glm::ivec3(0, kLargest, kLargest));
+}
+
+TEST(MeshArea, AnInputThatChangesBetweenItsReadingsIsRefused) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    // Its first block grows from the second reading on; another has one more, or one less, block.
+    enum class Change { more, fewer, anotherBlock };
+    for (const Change change : {Change::more, Change::fewer, Change::anotherBlock}) {
+        const lod::TriangleMesh mesh = leavesAndTwigs(200, 0), larger = leavesAndTwigs(30'000, 0);
+        lod::MeshSource source = lod::sourceOf(larger);
+        int readings = 0;
+        source.read = [&](const lod::MeshSource::Take& take) -> Result<void> {
+            const bool isFirst = readings++ == 0;
+            STIPPLE_TRY(take((change == Change::more) != isFirst ? larger : mesh));
+            if (!isFirst && change == Change::anotherBlock) STIPPLE_TRY(take(mesh));
+            return {};
+        };
+        lod::MeshBuildSettings settings;
+        settings.description.materials = {shared::SurfaceMaterial{}};
+        Progress progress(false);
+        const auto built = lod::buildMeshStore(source, folder / "a.stipple", settings, *executor, progress);
+        ASSERT_FALSE(built) << static_cast<int>(change);
+        EXPECT_EQ(built.error().kind, ErrorKind::input);
+        EXPECT_NE(built.error().line().find("changed"), std::string::npos) << built.error().line();
+    }
+}
+
+/// Triangles that share nothing.
+lod::TriangleMesh separateTriangles(uint32_t count) {
+    lod::TriangleMesh mesh;
+    Rng rng(5);
+    for (uint32_t t = 0; t < count; ++t) {
+        const glm::dvec3 at(rng.uniform(0, 1), rng.uniform(0, 1), rng.uniform(0, 1));
+        mesh.position.insert(mesh.position.end(), {at, at + glm::dvec3(0.004, 0, 0), at + glm::dvec3(0, 0.004, 0.001)});
+        mesh.indices.insert(mesh.indices.end(), {3 * t, 3 * t + 1, 3 * t + 2});
+    }
+    return mesh;
+}
+
+TEST(MeshArea, MemoryThatLookingForPartsTakesIsSaid) {
+    const test::TempFolder folder;
+    const auto executor = makeSerialExecutor();
+    lod::MeshBuildSettings settings;
+    settings.limits.memoryBytes = uint64_t{185} << 20;  // (96 MiB and 115 for the parts; 180 for the work after that)
+    Progress progress(false);
+    const auto built = lod::buildMeshStore(lod::sourceOf(separateTriangles(1'200'000)), folder / "a.stipple", settings,
+                                           *executor, progress);
+    ASSERT_FALSE(built);
+    EXPECT_EQ(built.error().kind, ErrorKind::budget);
+    EXPECT_NE(built.error().hint.find("--memory"), std::string::npos);
+}
+
+/// A PLY file has twice as many triangles as faces before it is read.
+TEST(MeshArea, PartsAreFoundByHowManyTrianglesThereAreNotByHowManyAreDeclared) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    lod::MeshSource source = lod::sourceOf(leavesAndTwigs(800, 0));
+    buildOf(source, {shared::SurfaceMaterial{}}, folder / "exact.stipple", *executor);
+    source.triangles = 3'000'000;
+    buildOf(source, {shared::SurfaceMaterial{}}, folder / "declared.stipple", *executor);
+    EXPECT_TRUE(test::slurp(folder / "exact.stipple") == test::slurp(folder / "declared.stipple"));
 }
 
 TEST(MeshArea, BodiesDoNotGrow) {

@@ -307,7 +307,7 @@ class CellReducer {
     void takeMoved(LocalMesh& local, Made& made) const {
         for (uint32_t v = local.firstMoved(); v < local.position.size(); ++v) {
             const uint32_t from = local.global[v];
-            const glm::ivec3 at = glm::ivec3(local.position[v]) + glm::ivec3(local.shift);
+            const glm::ivec3 at = local.movedTo[v - local.firstMoved()];
             shared::MeshVertex vertex = mesh_.vertex(from);
             vertex.x = at.x;
             vertex.y = at.y;

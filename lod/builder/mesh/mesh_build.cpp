@@ -82,6 +82,7 @@ class MeshBuild : public CellContent {
         needs.aWorker = kCellBytes;
         needs.tables = source_.triangles * kTableBytes;
         needs.between = source_.triangles * kSpillBytes;
+        needs.survey = partBytes();
         needs.whole = source_.triangles * 700;
         return needs;
     }
@@ -112,7 +113,7 @@ class MeshBuild : public CellContent {
         STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
             facts_.triangles += block.indices.size() / 3;
             PlacedBlock placed = placeBlock(block, facts_.lattice, executor_);
-            parts_.place(placed, number++);
+            if (!parts_.place(placed, number++)) return changed();
             return take(placed.centres(), source_.triangles);
         }));
         facts_.bad = source_.badTriangles ? source_.badTriangles() : 0;
@@ -157,7 +158,7 @@ class MeshBuild : public CellContent {
             const size_t here = number++;
             if (to.begins()) return to.ends(triangles, facts_.triangles, flushAll);
             PlacedBlock placed = placeBlock(block, facts_.lattice, executor_);
-            parts_.place(placed, here);
+            if (!parts_.place(placed, here)) return changed();
             facts_.degenerate += placed.degenerate;
             facts_.notFinite += placed.notFinite;
             facts_.rounding = std::max(facts_.rounding, placed.rounding);
@@ -197,6 +198,7 @@ class MeshBuild : public CellContent {
             if (const auto found = errors.takeAll(); !found.empty()) return tl::unexpected(found.front());
             return to.ends(triangles, facts_.triangles, flushAll);
         }));
+        parts_ = {};
         return flushAll();
     }
 
@@ -308,16 +310,28 @@ class MeshBuild : public CellContent {
     static constexpr uint64_t kTableBytes = 2;       ///< of a triangle, of the table of groups, which stays in memory
     static constexpr uint64_t kMostOfAtom = 2 * kAtomPoints;
 
+    /// A PLY file says how many faces it has, which may have four corners: twice that is declared.
+    bool mayHaveParts() const { return source_.triangles <= 2 * PartFinder::kMostTriangles; }
+    /// That looking for parts takes.
+    uint64_t partBytes() const {
+        if (!mayHaveParts()) return 0;
+        const uint64_t triangles = std::min(source_.triangles, PartFinder::kMostTriangles),
+                       vertices = source_.vertices > 0 ? std::min(source_.vertices, 3 * triangles) : 3 * triangles;
+        return triangles * PartFinder::kTriangleBytes + vertices * PartFinder::kVertexBytes;
+    }
     /// What is small and stands alone stays together (parts.h), if the mesh can be looked at as a whole.
     Result<void> findParts() {
         // (Parts are moved on short lattices only.)
-        bool isKnown = source_.triangles <= PartFinder::kMostTriangles && !facts_.lattice.isWide();
+        bool isKnown = mayHaveParts() && !facts_.lattice.isWide();
         parts_ = {};
-        if (isKnown)
-            STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
-                isKnown = isKnown && parts_.add(placeBlock(block, facts_.lattice, executor_));
+        if (isKnown) {
+            const Result<void> read = source_.read([&](const TriangleMesh& block) -> Result<void> {
+                isKnown = parts_.add(placeBlock(block, facts_.lattice, executor_));
+                if (!isKnown) return fail(ErrorKind::budget, "too many triangles to look for parts", source());
                 return {};
-            }));
+            });
+            if (isKnown && !read) return read;  // otherwise reading has ended early
+        }
         parts_.finish(isKnown);
         return {};
     }
@@ -330,6 +344,9 @@ class MeshBuild : public CellContent {
     static bool isScattered(const Soup& soup) { return soup.vertices.size() * 3 > 4 * (soup.indices.size() / 3); }
     /// More have their centre in one place than a cell holds.
     static bool isCrowded(const Atom& atom) { return atom.count > kAtomPoints; }
+    tl::unexpected<Error> changed() const {
+        return fail(ErrorKind::input, "changed while it was read", source(), "build again when it is complete");
+    }
     tl::unexpected<Error> tooMany(uint64_t triangles) const {
         return fail(ErrorKind::budget, fmt::format("{} different triangles have their centre at one place", triangles),
                     source(), "is the mesh what it should be?");

@@ -113,6 +113,7 @@ struct LocalMesh {
     Steps shift{0};
     bool isWide = false;
     std::vector<uint32_t> movedFrom;  ///< of the last vertices: those whose looks they have, at another place
+    std::vector<glm::ivec3> movedTo;  ///< where these are: `position` is rounded where a lattice has many bits
     uint32_t firstMoved() const { return static_cast<uint32_t>(position.size() - movedFrom.size()); }
     uint32_t beforeMove(uint32_t v) const { return v < firstMoved() ? v : movedFrom[v - firstMoved()]; }
 };

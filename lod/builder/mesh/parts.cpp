@@ -12,12 +12,14 @@ namespace {
 constexpr uint32_t kNone = ~0u;
 
 /// Path halving.
-uint32_t rootIn(std::vector<uint32_t>& parent, uint32_t of) {
+template <typename Parents>
+uint32_t rootIn(Parents& parent, uint32_t of) {
     while (parent[of] != of) of = parent[of] = parent[parent[of]];
     return of;
 }
 
-void unite(std::vector<uint32_t>& parent, uint32_t a, uint32_t b) {
+template <typename Parents>
+void unite(Parents& parent, uint32_t a, uint32_t b) {
     a = rootIn(parent, a);
     b = rootIn(parent, b);
     parent[std::max(a, b)] = std::min(a, b);
@@ -33,7 +35,9 @@ uint64_t mixed(const glm::ivec3& p) {
 }  // namespace
 
 void PartFinder::grow() {
-    slots_.assign(std::max<size_t>(1024, 2 * slots_.size()), kNone);
+    const size_t size = std::max<size_t>(1024, 2 * slots_.size());
+    slots_ = {};  // before there is the larger one
+    slots_.assign(size, kNone);
     for (uint32_t i = 0; i < positions_.size(); ++i) {
         size_t at = mixed(positions_[i]) & (slots_.size() - 1);
         while (slots_[at] != kNone) at = (at + 1) & (slots_.size() - 1);
@@ -73,11 +77,13 @@ bool PartFinder::add(const PlacedBlock& block) {
 
 void PartFinder::finish(bool isKnown) {
     if (!isKnown) *this = {};
-    std::vector<uint32_t> triangles(positions_.size(), 0);
+    positions_ = {};
+    slots_ = {};
+    std::vector<uint32_t> triangles(parent_.size(), 0);
     for (uint32_t& t : ofTriangle_) ++triangles[t = rootIn(parent_, t)];
     // The place of a part is that of the centre that is first along the curve: no matter in which order they came.
-    std::vector<uint32_t> part(positions_.size(), kNone);
-    std::vector<std::array<uint32_t, 3>> places;
+    std::vector<uint32_t> part(parent_.size(), kNone);
+    std::deque<std::array<uint32_t, 3>> places;
     const auto keyOf = [](const std::array<uint32_t, 3>& c) {
         return std::pair(shortMortonCode(c[0] >> 10, c[1] >> 10, c[2] >> 10), c);
     };
@@ -95,14 +101,14 @@ void PartFinder::finish(bool isKnown) {
         if (keyOf(centre_[t]) < keyOf(places[part[root]])) places[part[root]] = centre_[t];
     }
     centre_ = std::move(places);
-    positions_ = {};
-    slots_ = {};
     parent_ = {};
 }
 
-void PartFinder::place(PlacedBlock& placed, size_t block) const {
-    if (block + 1 >= firstOfBlock_.size()) return;
+bool PartFinder::place(PlacedBlock& placed, size_t block) const {
+    if (firstOfBlock_.size() == 1) return true;  // of no triangle anything is known
+    if (block + 1 >= firstOfBlock_.size()) return false;
     const size_t first = firstOfBlock_[block];
+    if (placed.x.size() != firstOfBlock_[block + 1] - first) return false;
     for (size_t t = 0; t < placed.x.size(); ++t) {
         const uint32_t part = ofTriangle_[first + t];
         if (part == kNone) continue;
@@ -112,6 +118,7 @@ void PartFinder::place(PlacedBlock& placed, size_t block) const {
         for (size_t k = 0; k < 3; ++k)
             placed.soup.vertices.low[placed.soup.indices[3 * t + k]].surface |= kSurfaceOfPart;
     }
+    return true;
 }
 
 uint32_t partsOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& indices,

@@ -2,6 +2,8 @@
 // be moved and simplified, which those of a larger surface may not (its neighbours keep theirs).
 #pragma once
 
+#include <deque>
+
 #include "lod/builder/mesh/mesh_work.h"
 
 namespace stipple::lod {
@@ -17,21 +19,26 @@ class PartFinder {
   public:
     /// Triangles of a mesh that is looked at as a whole; of a larger one no part is known.
     static constexpr uint64_t kMostTriangles = uint64_t{1} << 21;
+    /// Memory until finish(), at most: a triangle's centre and position 16, a vertex's position 12, its numbers by hash
+    /// 12, its parent 4.
+    static constexpr uint64_t kTriangleBytes = 16, kVertexBytes = 28;
     /// False: there are too many.
     bool add(const PlacedBlock& block);
     void finish(bool isKnown);
     /// Gives the triangles of small parts one place each, and marks their vertices. `block`: number in the source.
-    void place(PlacedBlock& placed, size_t block) const;
+    /// False: it is not the block that it was.
+    bool place(PlacedBlock& placed, size_t block) const;
 
   private:
     uint32_t numberOf(const glm::ivec3& p);
-    uint32_t rootOf(uint32_t of);
     void grow();
 
-    std::vector<glm::ivec3> positions_;
-    std::vector<uint32_t> slots_, parent_;
-    std::vector<uint32_t> ofTriangle_;             ///< a position of it; after finish() its part, or kNoPart
-    std::vector<std::array<uint32_t, 3>> centre_;  ///< of a triangle; after finish() of a part
+    // (What grows without being copied: twice as much for a moment would count.)
+    std::deque<glm::ivec3> positions_;
+    std::deque<uint32_t> parent_;
+    std::vector<uint32_t> slots_;
+    std::deque<uint32_t> ofTriangle_;             ///< a position of it; after finish() its part, or ~0
+    std::deque<std::array<uint32_t, 3>> centre_;  ///< of a triangle; after finish() of a part
     std::vector<size_t> firstOfBlock_{0};
 };
 
@@ -46,6 +53,9 @@ void appendWholeClusters(const LocalMesh& local, const std::vector<std::vector<u
 /// Groups of about `size` clusters each, no part in two: of those with isWhole in their order, of the others by METIS.
 std::vector<std::vector<uint32_t>> groupAll(const WeldedMesh& mesh, const std::vector<Cluster>& clusters, uint32_t size,
                                             Executor& executor);
+
+/// The place `by` steps from `from` on a lattice that ends at 0 and `largest`.
+glm::ivec3 movedPlace(const Steps& from, const glm::dvec3& by, int largest);
 
 /// Simplifies whole parts to about `target` indices. Each covers as much of a picture afterwards, seen from all sides
 /// in the mean, as before: it is widened, and what went altogether is made up for by those that stay. `local` gets the

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <functional>
 
+#include "engine/base/numbers.h"
 #include "lod/builder/mesh/parts.h"
 #include "lod/builder/mesh/parts_cover.h"
 #include "lod/builder/mesh/parts_versions.h"
@@ -234,23 +235,21 @@ class Widening {
     std::vector<glm::dvec3> normal_;  ///< of each
 };
 
-/// Vertices that moved, as new ones; the lattice ends at 0 and `largest`.
-void moveVertices(std::vector<uint32_t>& coarse, const std::vector<glm::dvec3>& to, int largest, LocalMesh& local) {
-    const size_t fine = local.position.size();
-    const glm::ivec3 shift(local.shift);
-    std::vector<uint32_t> copy(fine, ~0u);
+/// Vertices that moved, as new ones.
+void moveVertices(std::vector<uint32_t>& coarse, const std::vector<glm::dvec3>& to, int largest, const WeldedMesh& mesh,
+                  LocalMesh& local) {
+    std::vector<uint32_t> copy(local.position.size(), ~0u);
     for (uint32_t& v : coarse) {
         if (copy[v] == ~0u) {
-            const glm::ivec3 from = glm::ivec3(local.position[v]),
-                             moved =
-                                 glm::clamp(glm::ivec3(glm::round(to[v])) + shift, glm::ivec3(0), glm::ivec3(largest)) -
-                                 shift;
+            const Steps from = mesh.at(local.global[v]);
+            const glm::ivec3 moved = movedPlace(from, to[v] - glm::dvec3(local.position[v]), largest);
             copy[v] = v;
-            if (moved != from) {
+            if (Steps(moved) != from) {
                 copy[v] = static_cast<uint32_t>(local.position.size());
-                local.position.emplace_back(moved);
+                local.position.emplace_back(Steps(moved) - local.shift);
                 local.global.push_back(local.global[v]);
                 local.movedFrom.push_back(v);
+                local.movedTo.push_back(moved);
             }
         }
         v = copy[v];
@@ -280,6 +279,11 @@ class PartGroup {
         std::vector<uint32_t> ofTriangle;
         parts_.resize(partsOf(mesh, local, local.indices, ofTriangle));
         for (size_t i = 0; i < local.indices.size(); ++i) parts_[ofTriangle[i / 3]].fine.push_back(local.indices[i]);
+    }
+
+    /// Where vertices are.
+    auto from() const {
+        return [this](uint32_t v) { return glm::dvec3(local_.position[v]); };
     }
 
     void simplify(size_t target) {
@@ -329,10 +333,6 @@ class PartGroup {
             if (part.isCoarser) widenBy(part, ratio);
     }
 
-    /// Where vertices are.
-    Field from() const {
-        return [this](uint32_t v) { return glm::dvec3(local_.position[v]); };
-    }
     std::vector<uint32_t> coarse() const {
         std::vector<uint32_t> out;
         for (const Part& part : parts_) out.insert(out.end(), part.coarse.begin(), part.coarse.end());
@@ -367,13 +367,18 @@ class PartGroup {
 
 }  // namespace
 
+glm::ivec3 movedPlace(const Steps& from, const glm::dvec3& by, int largest) {
+    const glm::dvec3 to = glm::clamp(glm::dvec3(from) + glm::round(by), glm::dvec3(0), glm::dvec3(largest));
+    return {toWhole<int>(to.x), toWhole<int>(to.y), toWhole<int>(to.z)};
+}
+
 std::vector<uint32_t> simplifyParts(const WeldedMesh& mesh, LocalMesh& local, size_t target, int largest) {
     PartGroup group(mesh, local);
     group.simplify(target);
     group.widenParts();
     group.widenTogether();
     std::vector<uint32_t> out = group.coarse();
-    moveVertices(out, group.places(), largest, local);
+    moveVertices(out, group.places(), largest, mesh, local);
     return out;
 }
 

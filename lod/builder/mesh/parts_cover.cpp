@@ -25,23 +25,34 @@ double coverAlong(const std::vector<CoverTriangle>& triangles, const glm::dvec3&
     up = glm::normalize(glm::length(up) > 1e-3 ? up : glm::cross(direction, other));
     const glm::dvec3 right = glm::cross(up, direction);
     double low = 1e300, high = -1e300;
-    for (const CoverTriangle& t : triangles)
-        for (const glm::dvec3& p : t.corners) {
-            low = std::min(low, glm::dot(p, up));
-            high = std::max(high, glm::dot(p, up));
-        }
+    thread_local std::vector<glm::dvec3> heights;  // of the corners of each
+    heights.clear();
+    for (const CoverTriangle& t : triangles) {
+        const glm::dvec3 h(glm::dot(t.corners[0], up), glm::dot(t.corners[1], up), glm::dot(t.corners[2], up));
+        low = std::min({low, h.x, h.y, h.z});
+        high = std::max({high, h.x, h.y, h.z});
+        heights.push_back(h);
+    }
     const double step = (high - low) / count;
     if (!(step > 0)) return 0;
-    std::vector<std::array<std::vector<Span>, 2>> rows(static_cast<size_t>(count));  // seen from the front, from behind
-    for (const CoverTriangle& t : triangles) {
-        std::array<glm::dvec2, 3> p{};
-        for (size_t k = 0; k < 3; ++k)
-            p.at(k) = {glm::dot(t.corners.at(k), right), (glm::dot(t.corners.at(k), up) - low) / step};
+    // Seen from the front, from behind; both are the same where all is drawn from both sides.
+    thread_local std::vector<std::array<std::vector<Span>, 2>> rows;
+    rows.resize(std::max(rows.size(), static_cast<size_t>(count)));
+    bool isSame = true;
+    for (const CoverTriangle& t : triangles) isSame = isSame && t.isTwoSided;
+    for (size_t i = 0; i < triangles.size(); ++i) {
+        const CoverTriangle& t = triangles[i];
+        const glm::dvec3 y = (heights[i] - low) / step;
+        const auto [bottom, top] = std::minmax({y.x, y.y, y.z});
+        const int first = std::max(0, static_cast<int>(std::ceil(bottom - offset))),
+                  last = std::min(count - 1, static_cast<int>(std::ceil(top - offset)) - 1);
+        if (first > last) continue;  // between two rows
+        const std::array<glm::dvec2, 3> p{{{glm::dot(t.corners[0], right), y.x},
+                                           {glm::dot(t.corners[1], right), y.y},
+                                           {glm::dot(t.corners[2], right), y.z}}};
         const glm::dvec2 a = p[1] - p[0], b = p[2] - p[0];
         const bool isFront = a.x * b.y - a.y * b.x > 0;
-        const auto [bottom, top] = std::minmax({p[0].y, p[1].y, p[2].y});
-        const int last = std::min(count - 1, static_cast<int>(std::ceil(top - offset)) - 1);
-        for (int r = std::max(0, static_cast<int>(std::ceil(bottom - offset))); r <= last; ++r) {
+        for (int r = first; r <= last; ++r) {
             Span span{1e300, -1e300};
             for (size_t k = 0; k < 3; ++k) {
                 const glm::dvec2 &c = p.at(k), &d = p.at((k + 1) % 3);
@@ -53,11 +64,15 @@ double coverAlong(const std::vector<CoverTriangle>& triangles, const glm::dvec3&
             if (span.from > span.to) continue;
             auto& row = rows.at(static_cast<size_t>(r));
             if (t.isTwoSided || isFront) row[0].push_back(span);
-            if (t.isTwoSided || !isFront) row[1].push_back(span);
+            if (!isSame && (t.isTwoSided || !isFront)) row[1].push_back(span);
         }
     }
     double sum = 0;
-    for (auto& row : rows) sum += unionOf(row[0]) + unionOf(row[1]);
+    for (size_t r = 0; r < static_cast<size_t>(count); ++r) {
+        const double front = unionOf(rows[r][0]);
+        sum += front + (isSame ? front : unionOf(rows[r][1]));
+        for (auto& side : rows[r]) side.clear();
+    }
     return 0.5 * sum * step;
 }
 

@@ -161,7 +161,7 @@ class CellBuild {
     Result<void> planMemory() {
         const MemoryNeeds needs = content_.memory();
         const auto leastFor = [&](int workers) {
-            return needs.fixed + needs.tables + static_cast<uint64_t>(workers) * needs.aWorker;
+            return needs.fixed + std::max(needs.tables + static_cast<uint64_t>(workers) * needs.aWorker, needs.survey);
         };
         const uint64_t memory = limits_.memoryBytes, small = needs.fixed + needs.whole;
         while (workers_ > 1 && leastFor(workers_) > memory) --workers_;

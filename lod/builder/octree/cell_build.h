@@ -16,6 +16,7 @@ struct MemoryNeeds {
     uint64_t aWorker = 0;  ///< for the largest cell
     uint64_t tables = 0;   ///< that stay in memory
     uint64_t between = 0;  ///< what waits between the steps
+    uint64_t survey = 0;   ///< of the survey, which goes again before there are workers and tables
     uint64_t whole = 0;    ///< of everything, if it is so little that it needs no more
 };
 

@@ -268,7 +268,9 @@ Result<MeshSource> openPlyMesh(const std::string& path, uint64_t memoryBytes, co
     STIPPLE_ASSIGN(PlyHeader header, parsePlyHeader(*file));
     MeshSource source;
     for (const PlyElement& e : header.elements)
-        if (std::any_of(e.properties.begin(), e.properties.end(), isCornerList)) {
+        if (e.name == "vertex") {
+            source.vertices += e.count;
+        } else if (std::any_of(e.properties.begin(), e.properties.end(), isCornerList)) {
             // A strip's row may hold any number of triangles: as many corners as there is room for.
             const bool isStrip = e.name == "tristrips";
             source.triangles += isStrip ? file->sizeBytes() / 4 : 2 * e.count;
