@@ -63,7 +63,7 @@ render::FrameSettings fullDetail() {
 }
 
 // Overlap (IoU) with the surface is at most 0.003 less than that of the discs; where discs are as small as pixels,
-// 0.008: there a pixel is drawn wherever the centre of a disc lies in it, so that outlines are half a pixel farther
+// 0.01: there a pixel is drawn wherever the centre of a disc lies in it, so that outlines are half a pixel farther
 // out. (Left open, such a pixel would be a hole where a triangle or another surface is behind: a pixel keeps its front
 // splat only.)
 TEST(Silhouettes, AreThoseOfTheDiscs) {
