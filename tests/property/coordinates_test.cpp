@@ -199,6 +199,45 @@ TEST(Coordinates, OnePointFarAwayChangesNothing) {
     }
 }
 
+/// The largest radius of a leaf disc within `reach` of a place.
+double largestRadius(const Store& store, const glm::dvec3& place, double reach) {
+    double largest = 0;
+    for (uint32_t n = 0; n < store.hierarchy.nodes.size(); ++n) {
+        if (!store.hierarchy.nodes[n].isLeaf()) continue;
+        const Chunk chunk = *readChunk(store, n);
+        for (const shared::PointRecord& r : chunk.records) {
+            const reference::Disc disc = reference::decodeDisc(store.hierarchy, store.hierarchy.nodes[n], r);
+            if (glm::length(disc.position - place) < reach) largest = std::max(largest, disc.radius);
+        }
+    }
+    return largest;
+}
+
+// With a point far away cells are large and lie elsewhere: a few rows of the ground are then alone in theirs, and all
+// that they belong to is beyond its border.
+TEST(Coordinates, OnePointFarAwayLeavesTheRadiiOfTheOthers) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    const glm::dvec3 centre(500'010, 5'400'010, 300);
+    Rng rng(3);
+    std::vector<TestPoint> ground;
+    for (int k = 0; k < 40'000; ++k) {
+        const double x = k % 200 * 0.1 + 0.03 * rng.uniform(-1, 1) - 10, y = k / 200 * 0.1 - 10.02;
+        ground.push_back({centre + glm::dvec3(x, y, 0.5 * std::sin(x) * std::cos(y)), {}, 0x808080, 0});
+    }
+    test::writePly(folder / "alone.ply", ground, false);
+    test::build({folder / "alone.ply"}, folder / "alone.stipple", *executor);
+    const double usual = largestRadius(*opened(folder / "alone.stipple"), centre, 100);
+    EXPECT_LT(usual, 0.4);
+    for (const glm::dvec3& far : {glm::dvec3(0), centre + glm::dvec3(1e4, 0, 0), glm::dvec3(0, 1e9, 0)}) {
+        ground.push_back({far, {}, 0x808080, 0});
+        test::writePly(folder / "far.ply", ground, false);
+        ground.pop_back();
+        test::build({folder / "far.ply"}, folder / "far.stipple", *executor);
+        EXPECT_LE(largestRadius(*opened(folder / "far.stipple"), centre, 100), 2 * usual) << far.x << " " << far.y;
+    }
+}
+
 TEST(Coordinates, WideBuildsGiveTheSameBytesForAnyThreadsAndOrder) {
     const test::TempFolder folder;
     std::vector<TestPoint> truth = objectsAt(fortyPlaces(1e7), 3000);

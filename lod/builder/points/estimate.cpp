@@ -31,6 +31,7 @@ namespace {
 
 constexpr size_t kBlockPoints = 2048, kNeighbours = 12;
 constexpr uint32_t kMostSplits = 5, kMostInThree = 128;
+constexpr size_t kCrowdAround = 9, kFewAround = 256;  ///< places seen, of a place of its own and beside
 constexpr float kSpacings = 1.368f;
 constexpr double kLargestSpacings = 3;
 constexpr size_t kSparse = 2;        ///< points of a window cell, or fewer, that may stand alone
@@ -76,7 +77,7 @@ class Estimator {
         cellShift_ = frame_.shiftOf(c.level);
         cellBox_ = boxOf(static_cast<K>(c.key), c.level);
         reach_ = static_cast<int64_t>(frame_.cellSize(c.level)) / 4;
-        const auto [begin, end] = rangeOf(keys_, static_cast<K>(c.key), cellShift_, allOwn());
+        const auto [begin, end] = keyRange(keys_, static_cast<K>(c.key), cellShift_, allOwn());
         if (begin == end) return;
         blocks(begin, end, c.level, std::min<uint32_t>(c.level + 2u, frame_.keyLevels));
     }
@@ -94,16 +95,7 @@ class Estimator {
         }
         return b;
     }
-    using Range = std::pair<size_t, size_t>;
-    /// Of the keys of the cell of `key`, looked for `within`.
-    static Range rangeOf(const std::vector<K>& keys, K key, uint32_t shift, const Range& within) {
-        if (within.first == within.second) return within;
-        const K lo = key >> shift << shift, last = lo | ((K{1} << shift) - 1);
-        const auto first = std::lower_bound(keys.begin() + static_cast<ptrdiff_t>(within.first),
-                                            keys.begin() + static_cast<ptrdiff_t>(within.second), lo);
-        const auto end = std::upper_bound(first, keys.begin() + static_cast<ptrdiff_t>(within.second), last);
-        return {static_cast<size_t>(first - keys.begin()), static_cast<size_t>(end - keys.begin())};
-    }
+    using Range = KeyRange;
     Range allOwn() const { return {0, keys_.size()}; }
     Range allGhosts() const { return {0, ghostKeys_.size()}; }
 
@@ -114,15 +106,16 @@ class Estimator {
             block(begin, end, level);
             return;
         }
+        forChildren(begin, end, level, [&](size_t from, size_t to) { blocks(from, to, level + 1, least); });
+    }
+    /// Calls f(begin, end) for each child of a cell of `level` that holds some of [begin, end).
+    template <typename F>
+    void forChildren(size_t begin, size_t end, uint32_t level, const F& f) {
         const uint32_t shift = frame_.shiftOf(level + 1);
         while (begin < end) {
-            const K child = keys_[begin] >> shift;
-            const auto next = std::partition_point(keys_.begin() + static_cast<ptrdiff_t>(begin),
-                                                   keys_.begin() + static_cast<ptrdiff_t>(end),
-                                                   [&](K k) { return k >> shift == child; }) -
-                              keys_.begin();
-            blocks(begin, static_cast<size_t>(next), level + 1, least);
-            begin = static_cast<size_t>(next);
+            const Range child = keyRange(keys_, keys_[begin], shift, {begin, end});
+            f(begin, child.second);
+            begin = child.second;
         }
     }
 
@@ -132,9 +125,9 @@ class Estimator {
     void forPoints(const LatticeBox& box, K key, uint32_t level, const Range& own, const Range& ghosts,
                    const F& f) const {
         const uint32_t shift = frame_.shiftOf(level);
-        const auto [begin, end] = rangeOf(keys_, key, shift, own);
+        const auto [begin, end] = keyRange(keys_, key, shift, own);
         descend(keys_, own_.points, begin, end, level, box, f);
-        const auto [first, last] = rangeOf(ghostKeys_, key, shift, ghosts);
+        const auto [first, last] = keyRange(ghostKeys_, key, shift, ghosts);
         descend(ghostKeys_, ghosts_, first, last, level, box, f);
     }
     /// Calls f(x, y, z) for point i.
@@ -250,8 +243,8 @@ class Estimator {
             if (x < 0 || y < 0 || z < 0 || x >= root || y >= root || z >= root) continue;
             const auto at = static_cast<K>(
                 frame_.keyOf(static_cast<uint64_t>(x), static_cast<uint64_t>(y), static_cast<uint64_t>(z)));
-            to.own = rangeOf(keys_, at, frame_.shiftOf(level), allOwn());
-            to.ghosts = rangeOf(ghostKeys_, at, frame_.shiftOf(level), allGhosts());
+            to.own = keyRange(keys_, at, frame_.shiftOf(level), allOwn());
+            to.ghosts = keyRange(ghostKeys_, at, frame_.shiftOf(level), allGhosts());
         }
     }
 
@@ -289,6 +282,9 @@ class Estimator {
         }
         isSheet_ = isSheet(n);
         forNeighbourhood(keys_[begin], level, edge, false, OncePerPlace{see});
+        // A few points on this side of a border and many beyond: windows are to be as small as theirs.
+        if (seen_.size() > kCrowdAround * n + kFewAround && level + 1 < frame_.keyLevels)
+            return forChildren(begin, end, level, [&](size_t from, size_t to) { block(from, to, level + 1); });
         seen_.index(size_t{across} * across * across);
         const uint32_t windowShift = frame_.shiftOf(window);
         for (size_t j = 0; j < n;) {

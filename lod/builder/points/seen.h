@@ -1,14 +1,28 @@
 // What a block of the estimates sees, by window cell.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <utility>
 #include <vector>
 
 #include "lod/builder/points/surface_fit.h"
 
 namespace stipple::lod {
+
+using KeyRange = std::pair<size_t, size_t>;
+/// Where the keys of a cell stand: those that are `key` but for the last `shift` bits; looked for `within`.
+template <typename K>
+KeyRange keyRange(const std::vector<K>& keys, K key, uint32_t shift, const KeyRange& within) {
+    if (within.first == within.second) return within;
+    const K lo = key >> shift << shift, last = lo | ((K{1} << shift) - 1);
+    const auto first = std::lower_bound(keys.begin() + static_cast<ptrdiff_t>(within.first),
+                                        keys.begin() + static_cast<ptrdiff_t>(within.second), lo);
+    const auto end = std::upper_bound(first, keys.begin() + static_cast<ptrdiff_t>(within.second), last);
+    return {static_cast<size_t>(first - keys.begin()), static_cast<size_t>(end - keys.begin())};
+}
 
 /// Places around a block, first in the order they came, then by window cell. Cells are numbered x first, `across` to an
 /// edge, with a layer around the block's own.
@@ -20,6 +34,7 @@ class Seen {
     };
     void clear() { places_.clear(); }
     void add(uint32_t cell, const glm::vec3& at) { places_.push_back({cell, at}); }
+    size_t size() const { return places_.size(); }
     const Place& operator[](size_t i) const { return places_[i]; }
 
     /// Sorts what was added by its cell, of `cells`.
