@@ -35,15 +35,16 @@ Result<void> run(const Options& o) {
                                   {"max_diff", d.maxDiff},
                                   {"differing_fraction", d.differingFraction},
                                   {"threshold", o.threshold},
-                                  {"silhouette_iou", d.silhouetteIou},
-                                  {"holes", d.holes}};
+                                  {"silhouette_iou", d.hasCoverage ? nlohmann::json(d.silhouetteIou) : nullptr},
+                                  {"holes", d.hasCoverage ? nlohmann::json(d.holes) : nullptr}};
         printJson("compare", j);
     } else {
         fmt::print(
             "PSNR {:.2f} dB (foreground {:.2f} dB), largest difference {}/255, {:.4f} % of the pixels differ by more "
-            "than {}/255, "
-            "silhouette IoU {:.5f}, holes {}\n",
-            d.psnr, d.foregroundPsnr, d.maxDiff, 100 * d.differingFraction, o.threshold, d.silhouetteIou, d.holes);
+            "than {}/255, {}\n",
+            d.psnr, d.foregroundPsnr, d.maxDiff, 100 * d.differingFraction, o.threshold,
+            d.hasCoverage ? fmt::format("silhouette IoU {:.5f}, holes {}", d.silhouetteIou, d.holes)
+                          : "silhouettes not known: both pictures are opaque (render them with --alpha)");
     }
     return {};
 }

@@ -158,8 +158,9 @@ Result<void> showNearest(const lod::Store& store, const Options& o) {
                         {"distance", p.distance},
                         {"lattice", p.lattice},
                         {"origin", vectorJson(store.hierarchy.origin)},
-                        {"unit", store.hierarchy.unit},
-                        {"colour", {c & 255u, c >> 8 & 255u, c >> 16 & 255u}}};
+                        {"unit", store.hierarchy.unit}};
+    const bool hasColour = store.description.hasColour;
+    if (hasColour) j["colour"] = {c & 255u, c >> 8 & 255u, c >> 16 & 255u};
     for (size_t a = 0; a < p.attributes.size(); ++a)
         j["attributes"][store.description.attributes[a].name] = p.attributes[a];
     if (o.json) {
@@ -169,7 +170,7 @@ Result<void> showNearest(const lod::Store& store, const Options& o) {
     fmt::print("{}, {:.6g} away\n", placeText(j["position"], j["unit"], j["origin"]), p.distance);
     fmt::print("  lattice       {} {} {} steps of {} from the origin\n", p.lattice[0], p.lattice[1], p.lattice[2],
                store.hierarchy.unit);
-    fmt::print("  colour        {} {} {}\n", c & 255u, c >> 8 & 255u, c >> 16 & 255u);
+    if (hasColour) fmt::print("  colour        {} {} {}\n", c & 255u, c >> 8 & 255u, c >> 16 & 255u);
     for (size_t a = 0; a < p.attributes.size(); ++a)
         fmt::print("  {:13} {:.15g}\n", store.description.attributes[a].name, p.attributes[a]);
     return {};

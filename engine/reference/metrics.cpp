@@ -26,6 +26,7 @@ Result<ImageDifference> compareImages(const render::Image& a, const render::Imag
         const uint32_t ca = a.rgba[i], cb = b.rgba[i];
         const bool inA = ca >> 24 >= 128, inB = cb >> 24 >= 128;
         both += inA && inB;
+        out.hasCoverage = out.hasCoverage || ((ca & cb) >> 24) != 255;
         either += inA || inB;
         int worst = 0;
         double squares = 0;

@@ -32,6 +32,7 @@ struct ImageDifference {
     double foregroundPsnr = 0;     ///< dB where either image has coverage
     int maxDiff = 0;               ///< largest channel difference
     double differingFraction = 0;  ///< pixels with a channel more than `threshold` apart
+    bool hasCoverage = false;      ///< either image has pixels that nothing covers: else the next two tell nothing
     double silhouetteIou = 1;      ///< of the pixels with coverage >= 1/2
     uint64_t holes = 0;            ///< pixels empty in A whose 5 x 5 neighbourhood is covered in B
 };

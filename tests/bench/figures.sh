@@ -45,7 +45,7 @@ if [ -x "$bench" ]; then
         "build/tests/stipple_bench"
 fi
 
-compare='"PSNR %s dB (foreground %s), %.4f %% > 4/255, IoU %.5f, holes %d" % (d["psnr"] if d["psnr"]=="inf" else "%.1f"%d["psnr"], d["foreground_psnr"] if d["foreground_psnr"]=="inf" else "%.1f"%d["foreground_psnr"], 100*d["differing_fraction"], d["silhouette_iou"], d["holes"])'
+compare='"PSNR %s dB (foreground %s), %.4f %% > 4/255, IoU %.5f, holes %d" % (d["psnr"] if d["psnr"]=="inf" else "%.1f"%d["psnr"], d["foreground_psnr"] if d["foreground_psnr"]=="inf" else "%.1f"%d["foreground_psnr"], 100*d["differing_fraction"], d["silhouette_iou"] if d["holes"] is not None else float("nan"), d["holes"] or 0)'
 errors() { # errors NAME SCENE OPTIONS...
     local name=$1 scene=$2
     shift 2

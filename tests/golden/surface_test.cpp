@@ -195,5 +195,46 @@ TEST(Surface, APlaneSeenFromNearIsThereToTheBorder) {
         }
 }
 
+// From near, of two surfaces the front one is seen where it is, and the other beside it: depth and colour against rays
+// through the discs, which know neither lists nor means.
+TEST(Surface, FromNearTheFrontOneOfTwoPlanesIsSeen) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    std::vector<test::TestPoint> points = plane({0, 0, -1}, 200, 1.3 * kSpacing, 11);
+    for (test::TestPoint& p : points) p.colour = 0xff0000;
+    std::vector<test::TestPoint> front = plane({0, 0, -1}, 200, 1.3 * kSpacing, 12);
+    std::erase_if(front, [](const test::TestPoint& p) { return p.position.x > -0.7 * kSpacing; });
+    for (test::TestPoint& p : front) {
+        p.position.z = -kSpacing;
+        p.colour = 0x00ff00;
+        points.push_back(p);
+    }
+    test::writePly(folder / "a.ply", points, true, true);
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    for (const double spacings : {2.5, 3.5}) {
+        lod::View view = viewFrom(spacings * kSpacing, 160, 160, 120);
+        view.nearPlane = 1e-12;
+        const auto traced = reference::trace({{store, {}, {}}}, view, {1, {}}, *executor);
+        ASSERT_TRUE(traced);
+        for (const auto& backend : backends(*executor)) {
+            SCOPED_TRACE(testing::Message() << backend->name() << ", " << spacings << " spacings");
+            render::FrameSettings settings = fullDetail();
+            settings.draw.lit = false;
+            const render::Image image = test::renderView(store, *backend, *executor, view, settings);
+            size_t wrong = 0, seenFront = 0;
+            for (size_t i = 0; i < image.depth.size(); ++i) {
+                const bool isFront = traced->depth[i] < (spacings - 0.5) * kSpacing;
+                seenFront += isFront;
+                const bool isDrawnGreen = (image.rgba[i] >> 8 & 255u) > (image.rgba[i] & 255u);
+                wrong +=
+                    std::abs(image.depth[i] - traced->depth[i]) > 0.01 * traced->depth[i] || isDrawnGreen != isFront;
+            }
+            EXPECT_GT(seenFront, image.depth.size() / 8);
+            EXPECT_LT(seenFront, image.depth.size() * 3 / 4);
+            EXPECT_LE(wrong, image.depth.size() / 200);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace stipple

@@ -259,16 +259,9 @@ class Tubes : public testing::Test {
 
 #ifndef STIPPLE_ON_GPU
 TEST_F(Tubes, OfTheCpuBackendAndTheOracleAreWhatRaysMeetFromEverySide) {
-    size_t count = 0;
-    const cpu::Kernels* const* all = cpu::availableKernels(count);
-    std::vector<std::unique_ptr<render::Backend>> backends;
+    const auto backends = test::cpuBackendsAndOracle(*executor_);
     std::map<std::string, render::Backend*> named;
-    for (size_t k = 0; k < count; ++k) {
-        backends.push_back(cpu::makeCpuBackend(*executor_, all[k]));
-        named[all[k]->name] = backends.back().get();
-    }
-    backends.push_back(reference::makeReferenceBackend(*executor_));
-    named["fp64"] = backends.back().get();
+    for (const auto& [name, backend] : backends) named[name] = backend.get();
     expectTrue(named);
 }
 

@@ -194,6 +194,7 @@ struct Case {
     NormalsMode normals = NormalsMode::automatic;
     uint32_t leafRecords = 400;
     bool hasHoles = true;  ///< hulls are a poor bound
+    bool isFound = true;   ///< by more than what codes of errors round up
 };
 
 class Bounds : public ::testing::TestWithParam<Case> {
@@ -276,8 +277,7 @@ TEST_P(Bounds, VerifyFindsErrorsThatSeeOnlyHulls) {
     }
     std::printf("%s: found in %zu of %zu inner nodes\n", GetParam().name, found, nodes);
     EXPECT_GT(nodes, 3u);
-    // (Of the windows hardly any error is larger than that of the hulls beside its radius: one node at most.)
-    if (std::string(GetParam().name) != "windows") EXPECT_GT(found, 0u);
+    if (GetParam().isFound) EXPECT_GT(found, 0u);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -285,7 +285,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(Case{"rings", rings}, Case{"fence", [] { return fence(0.005); }},
                       // Of more than the 131,072 points that are built at once.
                       Case{"largeFence", [] { return fence(0.0024); }, NormalsMode::automatic, 2000},
-                      Case{"windows", windows}, Case{"cage", cage},
+                      Case{"windows", windows, NormalsMode::automatic, 400, true, false}, Case{"cage", cage},
                       Case{"sphere", [] { return test::bumpySphere(60'000, 4); }, NormalsMode::automatic, 400, false},
                       Case{"ringsWithoutNormals", rings, NormalsMode::none, 400, false},
                       Case{"windowsWithoutNormals", windows, NormalsMode::none, 400, false}),

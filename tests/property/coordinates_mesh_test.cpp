@@ -97,28 +97,6 @@ double farthest(const std::vector<glm::dvec3>& truth, std::vector<glm::dvec3> fo
     return worst;
 }
 
-/// Of what is drawn in either.
-double psnr(const render::Image& a, const render::Image& b) {
-    double sum = 0, count = 1;
-    for (size_t i = 0; i < a.rgba.size(); ++i) {
-        if (((a.rgba[i] | b.rgba[i]) >> 24) == 0) continue;
-        for (uint32_t shift = 0; shift < 24; shift += 8, ++count) {
-            const double d = (double(a.rgba[i] >> shift & 255u) - double(b.rgba[i] >> shift & 255u)) / 255;
-            sum += d * d;
-        }
-    }
-    return -10 * std::log10(std::max(sum / count, 1e-12));
-}
-
-View viewOf(const glm::dvec3& centre) {
-    View view;
-    view.eye = centre + glm::dvec3(0, 0, 3);
-    view.width = view.height = 400;
-    view.focalPixels = 420;
-    view.nearPlane = 0.01;
-    return view;
-}
-
 /// Pictures of full detail: what levels of detail choose is not what is looked at here.
 render::Image pictureOf(const std::shared_ptr<const Store>& store, Executor& executor, const View& view) {
     const auto backend = cpu::makeCpuBackend(executor);
@@ -143,7 +121,8 @@ TEST(CoordinatesOfMeshes, ATriangleFarAwayChangesNothing) {
     const glm::dvec3 centre(4.3, -2.7, 1.1);
     TriangleMesh alone;
     addBall(96, centre, alone);
-    const render::Image without = pictureOf(builtMesh(alone, folder / "alone", *executor), *executor, viewOf(centre));
+    const render::Image without =
+        pictureOf(builtMesh(alone, folder / "alone", *executor), *executor, test::viewFromAbove(centre));
     for (const glm::dvec3& far : farPlaces()) {
         TriangleMesh mesh = alone;
         for (const glm::dvec3& off : {glm::dvec3(0), glm::dvec3(0.3, 0, 0) * glm::length(far) * 1e-3,
@@ -153,7 +132,8 @@ TEST(CoordinatesOfMeshes, ATriangleFarAwayChangesNothing) {
         }
         const auto store = builtMesh(mesh, folder / "far", *executor);
         EXPECT_LE(farthest(alone.position, cornersOf(*store), 0.05), kTenthOfAPixel / 100) << far.x << " " << far.z;
-        EXPECT_GE(psnr(pictureOf(store, *executor, viewOf(centre)), without), 50) << far.x << " " << far.z;
+        EXPECT_GE(test::drawnPsnr(pictureOf(store, *executor, test::viewFromAbove(centre)), without), 50)
+            << far.x << " " << far.z;
         // One double at 1e12 has a step of 1e-4: what info says holds for the triangle far away, too.
         std::vector<glm::dvec3> stray(mesh.position.end() - 3, mesh.position.end());
         EXPECT_LE(farthest(stray, cornersOf(*store), 1),
@@ -178,7 +158,7 @@ TEST(CoordinatesOfMeshes, AVertexFarAwayLeavesTheOtherTriangles) {
         if (std::find(&alone.indices[i], &alone.indices[i] + 3, moved) == &alone.indices[i] + 3)
             open.indices.insert(open.indices.end(), &alone.indices[i], &alone.indices[i] + 3);
     const render::Image without =
-        pictureOf(builtMesh(open, folder / "open", *executor), *executor, viewOf(glm::dvec3(0)));
+        pictureOf(builtMesh(open, folder / "open", *executor), *executor, test::viewFromAbove(glm::dvec3(0)));
     std::vector<glm::dvec3> others = alone.position;
     others.erase(others.begin() + moved);
     for (const double far : {1e7, 1e9, 1e12}) {
@@ -188,11 +168,11 @@ TEST(CoordinatesOfMeshes, AVertexFarAwayLeavesTheOtherTriangles) {
         EXPECT_LE(farthest(others, cornersOf(*store), 0.05), kTenthOfAPixel / 100) << far;
         EXPECT_TRUE(verifyStore(*store, *executor, 0)) << far;
         // Six triangles as long as that reach behind the ball past its outline; what they cover is not compared.
-        const render::Image with = pictureOf(store, *executor, viewOf(glm::dvec3(0)));
+        const render::Image with = pictureOf(store, *executor, test::viewFromAbove(glm::dvec3(0)));
         render::Image within = with, expected = without;
         for (size_t i = 0; i < with.rgba.size(); ++i)
             if (without.rgba[i] >> 24 == 0) within.rgba[i] = expected.rgba[i] = 0;
-        EXPECT_GE(psnr(within, expected), 50) << far;
+        EXPECT_GE(test::drawnPsnr(within, expected), 50) << far;
     }
 }
 
@@ -212,8 +192,9 @@ TEST(CoordinatesOfMeshes, ObjectsFarApartAreDrawnWhereTheyAre) {
         EXPECT_TRUE(verifyStore(*store, *executor, 0)) << extent;
         // The farthest one as if it stood alone.
         addBall(24, places[1], last);
-        const render::Image with = pictureOf(store, *executor, viewOf(places[1]));
-        EXPECT_GE(psnr(with, pictureOf(builtMesh(last, folder / "l", *executor), *executor, viewOf(places[1]))),
+        const render::Image with = pictureOf(store, *executor, test::viewFromAbove(places[1]));
+        EXPECT_GE(test::drawnPsnr(with, pictureOf(builtMesh(last, folder / "l", *executor), *executor,
+                                                  test::viewFromAbove(places[1]))),
                   extent < 1e6 ? 50 : 45)
             << extent;
     }
@@ -331,7 +312,7 @@ TEST(CoordinatesOfCurves, AStrandFarAwayChangesNothing) {
     const auto executor = makeTbbExecutor(0);
     for (const float radius : {0.01f, 0.06f}) {
         const StrandSet alone = test::curls({.count = 60, .vertices = 40, .radius = radius});
-        const View view = viewOf(glm::dvec3(0, 0, 1));
+        const View view = test::viewFromAbove(glm::dvec3(0, 0, 1));
         const render::Image without =
             pictureOf(test::buildStrands(alone, folder / "alone", *executor, 8192), *executor, view);
         const auto withOne = [&](const glm::dvec3& place) {
@@ -344,11 +325,12 @@ TEST(CoordinatesOfCurves, AStrandFarAwayChangesNothing) {
         // outlines, which are not smoothed, a pixel turns here and there, and thin strands cover others by lot.
         double usual = 99;
         for (const glm::dvec3& near : {glm::dvec3(0.3, 0.1, 4.5), glm::dvec3(0, -0.4, 5), glm::dvec3(0.2, 0, 6)})
-            usual = std::min(usual, psnr(pictureOf(withOne(near), *executor, view), without));
+            usual = std::min(usual, test::drawnPsnr(pictureOf(withOne(near), *executor, view), without));
         for (const glm::dvec3& far : farPlaces()) {
             const auto store = withOne(far);
             EXPECT_LE(farthest(alone.position, endsOf(*store), 0.05), kTenthOfAPixel) << far.x << " " << far.z;
-            EXPECT_GE(psnr(pictureOf(store, *executor, view), without), usual - 1.5) << far.x << " " << far.z;
+            EXPECT_GE(test::drawnPsnr(pictureOf(store, *executor, view), without), usual - 1.5)
+                << far.x << " " << far.z;
             EXPECT_TRUE(verifyStore(*store, *executor, 0)) << far.x << " " << far.z;
             const glm::dvec3 focus = store->description.focusMax - store->description.focusMin;
             EXPECT_LE(std::max({focus.x, focus.y, focus.z}), 3) << "what a camera looks at first";

@@ -133,28 +133,6 @@ TEST(Coordinates, ScannerIntegersFarApartAreDrawnWhereTheyAre) {
     EXPECT_TRUE(verifyStore(*store, *executor, 0));
 }
 
-/// Of what is drawn in either.
-double psnr(const render::Image& a, const render::Image& b) {
-    double sum = 0, count = 1;
-    for (size_t i = 0; i < a.rgba.size(); ++i) {
-        if (((a.rgba[i] | b.rgba[i]) >> 24) == 0) continue;
-        for (uint32_t shift = 0; shift < 24; shift += 8, ++count) {
-            const double d = (double(a.rgba[i] >> shift & 255u) - double(b.rgba[i] >> shift & 255u)) / 255;
-            sum += d * d;
-        }
-    }
-    return -10 * std::log10(std::max(sum / count, 1e-12));
-}
-
-View viewOf(const glm::dvec3& centre) {
-    View view;
-    view.eye = centre + glm::dvec3(0, 0, 3);
-    view.width = view.height = 400;
-    view.focalPixels = 420;
-    view.nearPlane = 0.01;
-    return view;
-}
-
 TEST(Coordinates, OnePointFarAwayChangesNothing) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);
@@ -164,7 +142,7 @@ TEST(Coordinates, OnePointFarAwayChangesNothing) {
     test::build({folder / "alone.ply"}, folder / "alone.stipple", *executor);
     const auto alone = opened(folder / "alone.stipple");
     const auto backend = cpu::makeCpuBackend(*executor);
-    const render::Image without = test::renderView(alone, *backend, *executor, viewOf(centre), {});
+    const render::Image without = test::renderView(alone, *backend, *executor, test::viewFromAbove(centre), {});
     const double rounding = drawnPlaces(*alone, truth, 0.05).storedOff;
     // Any other point, too, lets the octree's cells lie elsewhere, and what is estimated in its windows changes a
     // little.
@@ -177,8 +155,9 @@ TEST(Coordinates, OnePointFarAwayChangesNothing) {
     };
     double usual = 99;
     for (const glm::dvec3& near : {glm::dvec3(1.9, -1.3, -1.7), glm::dvec3(-1.4, -1.8, 1.1), glm::dvec3(-2, 1.3, -1.9)})
-        usual = std::min(
-            usual, psnr(test::renderView(withOne(centre + near), *backend, *executor, viewOf(centre), {}), without));
+        usual = std::min(usual, test::drawnPsnr(test::renderView(withOne(centre + near), *backend, *executor,
+                                                                 test::viewFromAbove(centre), {}),
+                                                without));
     for (const glm::dvec3& far : {glm::dvec3(0), centre + glm::dvec3(1e4, 0, 0), glm::dvec3(0, 1e9, 0),
                                   glm::dvec3(-1e11, 1e11, 3), glm::dvec3(1e12, 0, 0)}) {
         const auto store = withOne(far);
@@ -189,11 +168,11 @@ TEST(Coordinates, OnePointFarAwayChangesNothing) {
         EXPECT_LE(drawn.storedOff, std::max(rounding * (1 + 1e-6), ofDoubles) + 1e-9) << far.x << " " << far.y;
         EXPECT_LE(drawn.off, kTenthOfAPixel) << far.x << " " << far.y;
         EXPECT_EQ(store->description.points, truth.size() + 1);
-        const render::Image with = test::renderView(store, *backend, *executor, viewOf(centre), {});
+        const render::Image with = test::renderView(store, *backend, *executor, test::viewFromAbove(centre), {});
         // At 1e12 keys of 42 bits an axis have cells of a quarter of a unit, 14 spacings: within them points are not in
         // the order of the curve, in which neighbours are looked for. (It is not the steps of 2^-13: the same points
         // rounded to these in the input, with a stray nearby, give 26.7 dB, usually 26.9, and with one at 1e12 21.9.)
-        EXPECT_GT(psnr(with, without), usual - (std::abs(far.x) < 1e12 ? 2 : 6))
+        EXPECT_GT(test::drawnPsnr(with, without), usual - (std::abs(far.x) < 1e12 ? 2 : 6))
             << far.x << " " << far.y << ", usually " << usual;
         EXPECT_TRUE(verifyStore(*store, *executor, 0)) << far.x << " " << far.y;
     }

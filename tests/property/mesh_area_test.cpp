@@ -217,20 +217,6 @@ TEST(MeshArea, LeavesAndTwigsThatTouchNothingKeepTheirCover) {
     EXPECT_LT(coverOf(4000, 1500, "leaves and twigs"), 0.2);
 }
 
-/// The cut of one error everywhere: runs whose own error is at most `code`, in groups whose error is larger.
-std::vector<lod::CutMeshDraw> evenCut(const lod::Hierarchy& h, uint32_t code) {
-    std::vector<lod::CutMeshDraw> draws;
-    for (uint32_t n = 0; n < h.nodes.size(); ++n) {
-        if (h.nodes[n].errorCode <= code) continue;
-        for (uint32_t r = 0; r < h.groups[n].runs; ++r) {
-            const lod::MeshRun& run = h.runs[h.groups[n].firstRun + r];
-            if (run.producer != lod::MeshRun::kOriginal && h.nodes[run.producer].errorCode > code) continue;
-            draws.push_back({0, n, run.firstCluster, run.clusters, run.triangles, 0});
-        }
-    }
-    return draws;
-}
-
 TEST(MeshArea, MovedVerticesStayWithinTheStatedErrorBothWays) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(2);
@@ -245,7 +231,7 @@ TEST(MeshArea, MovedVerticesStayWithinTheStatedErrorBothWays) {
     std::sort(codes.begin(), codes.end());
     for (const double share : {0.1, 0.5, 0.8, 1.0}) {
         const uint32_t code = codes[static_cast<size_t>(share * static_cast<double>(codes.size() - 1))];
-        const auto drawn = test::drawnTriangles(*store, evenCut(h, code));
+        const auto drawn = test::drawnTriangles(*store, test::evenCut(h, code));
         const double bound = h.errors.decode(code) * h.unit;
         EXPECT_LE(test::largestDistance(leaves, drawn, 20'000, 7), bound) << share;
         EXPECT_LE(test::largestDistance(drawn, leaves, 20'000, 8), bound) << share;
@@ -286,7 +272,8 @@ TEST(MeshArea, LeavesFarOutAreBuiltOnAllSides) {
             uint32_t code = 0;
             for (const lod::Node& n : h.nodes)
                 if (n.errorCode < lod::ErrorScale::kNoParent) code = std::max<uint32_t>(code, n.errorCode);
-            const auto leaves = test::leafTriangles(*store), drawn = test::drawnTriangles(*store, evenCut(h, code));
+            const auto leaves = test::leafTriangles(*store),
+                       drawn = test::drawnTriangles(*store, test::evenCut(h, code));
             EXPECT_LT(drawn.size(), leaves.size() / 2) << what;
             const double bound = h.errors.decode(code) * h.unit;
             EXPECT_LE(bound, 0.1 * extent) << what;

@@ -137,20 +137,6 @@ TEST(MeshCut, DrawsEveryTriangleOfTheInputOnceWhereNothingIsTolerated) {
     EXPECT_GT(budgeted.tauEffective, 0.01);
 }
 
-/// The cut of one error everywhere: runs whose own error is at most `code`, in groups whose error is larger.
-std::vector<lod::CutMeshDraw> evenCut(const lod::Hierarchy& h, uint32_t code) {
-    std::vector<lod::CutMeshDraw> draws;
-    for (uint32_t n = 0; n < h.nodes.size(); ++n) {
-        if (h.nodes[n].errorCode <= code) continue;
-        for (uint32_t r = 0; r < h.groups[n].runs; ++r) {
-            const lod::MeshRun& run = h.runs[h.groups[n].firstRun + r];
-            if (run.producer != lod::MeshRun::kOriginal && h.nodes[run.producer].errorCode > code) continue;
-            draws.push_back({0, n, run.firstCluster, run.clusters, run.triangles, 0});
-        }
-    }
-    return draws;
-}
-
 TEST(MeshErrors, BoundTheDistanceToTheInputBothWays) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(2);
@@ -173,7 +159,7 @@ TEST(MeshErrors, BoundTheDistanceToTheInputBothWays) {
             size_t before = leaves.size() + 1;
             for (const double share : {0.2, 0.6, 0.9, 1.0}) {
                 const uint32_t code = codes[static_cast<size_t>(share * static_cast<double>(codes.size() - 1))];
-                const auto drawn = test::drawnTriangles(*store, evenCut(h, code));
+                const auto drawn = test::drawnTriangles(*store, test::evenCut(h, code));
                 ASSERT_FALSE(drawn.empty());
                 EXPECT_LT(drawn.size(), before) << kind;
                 before = drawn.size();

@@ -177,4 +177,17 @@ double largestDistance(const std::vector<Triangle>& from, const std::vector<Tria
     return worst;
 }
 
+std::vector<lod::CutMeshDraw> evenCut(const lod::Hierarchy& h, uint32_t code) {
+    std::vector<lod::CutMeshDraw> draws;
+    for (uint32_t n = 0; n < h.nodes.size(); ++n) {
+        if (h.nodes[n].errorCode <= code) continue;
+        for (uint32_t r = 0; r < h.groups[n].runs; ++r) {
+            const lod::MeshRun& run = h.runs[h.groups[n].firstRun + r];
+            if (run.producer != lod::MeshRun::kOriginal && h.nodes[run.producer].errorCode > code) continue;
+            draws.push_back({0, n, run.firstCluster, run.clusters, run.triangles, 0});
+        }
+    }
+    return draws;
+}
+
 }  // namespace stipple::test

@@ -24,6 +24,8 @@ std::shared_ptr<const lod::Store> growMeshStore(const MeshRecipe& recipe, const 
 using Triangle = std::array<glm::dvec3, 3>;
 /// All triangles of the input, as the store keeps them.
 std::vector<Triangle> leafTriangles(const lod::Store& store);
+/// The cut of one error everywhere: runs whose own error is at most `code`, in groups whose error is larger.
+std::vector<lod::CutMeshDraw> evenCut(const lod::Hierarchy& h, uint32_t code);
 /// Clusters that a cut draws.
 std::vector<Triangle> drawnTriangles(const lod::Store& store, const std::vector<lod::CutMeshDraw>& draws);
 

@@ -1,6 +1,8 @@
 #include "tests/support/support.h"
 #include <gtest/gtest.h>
 #include <iterator>
+#include "engine/cpu/cpu_backend.h"
+#include "engine/cpu/kernels.h"
 #include "engine/image/image_io.h"
 #include "engine/reference/reference.h"
 
@@ -202,6 +204,36 @@ void expectGolden(const render::Image& image, const std::string& name) {
     EXPECT_LE(d->differingFraction, 0.002);
     EXPECT_GE(d->silhouetteIou, 0.999);
     EXPECT_GT(d->psnr, 40);
+}
+
+double drawnPsnr(const render::Image& a, const render::Image& b) {
+    double sum = 0, count = 1;
+    for (size_t i = 0; i < a.rgba.size(); ++i) {
+        if (((a.rgba[i] | b.rgba[i]) >> 24) == 0) continue;
+        for (uint32_t shift = 0; shift < 24; shift += 8, ++count) {
+            const double d = (double(a.rgba[i] >> shift & 255u) - double(b.rgba[i] >> shift & 255u)) / 255;
+            sum += d * d;
+        }
+    }
+    return -10 * std::log10(std::max(sum / count, 1e-12));
+}
+
+lod::View viewFromAbove(const glm::dvec3& centre) {
+    lod::View view;
+    view.eye = centre + glm::dvec3(0, 0, 3);
+    view.width = view.height = 400;
+    view.focalPixels = 420;
+    view.nearPlane = 0.01;
+    return view;
+}
+
+std::map<std::string, std::unique_ptr<render::Backend>> cpuBackendsAndOracle(Executor& executor) {
+    std::map<std::string, std::unique_ptr<render::Backend>> out;
+    size_t count = 0;
+    const cpu::Kernels* const* all = cpu::availableKernels(count);
+    for (size_t k = 0; k < count; ++k) out[all[k]->name] = cpu::makeCpuBackend(executor, all[k]);
+    out["fp64"] = reference::makeReferenceBackend(executor);
+    return out;
 }
 
 }  // namespace stipple::test

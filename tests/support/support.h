@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -59,6 +60,12 @@ render::Image draw(const std::vector<render::PlacedStore>& placed, render::Backe
 render::Image renderView(std::shared_ptr<const lod::Store> store, render::Backend& backend, Executor& executor,
                          const lod::View& view, const render::FrameSettings& settings,
                          FrameCounters* counters = nullptr);
+/// The cpu backend on every instruction set that this machine has, and the fp64 restatement.
+std::map<std::string, std::unique_ptr<render::Backend>> cpuBackendsAndOracle(Executor& executor);
+/// Of what is drawn in either picture, dB.
+double drawnPsnr(const render::Image& a, const render::Image& b);
+/// 400 x 400 pixels, from 3 units above an object of radius 1.
+lod::View viewFromAbove(const glm::dvec3& centre);
 lod::View fitView(const lod::Store& store, uint32_t width, uint32_t height);
 
 /// Path of a file of the data folder; empty (with a SKIP line, or a failure if the data is required) where it is
