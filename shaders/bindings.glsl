@@ -37,7 +37,7 @@ layout(push_constant, scalar) uniform Step {
     uint wantExtra;  // write depth, normals and linear colour
     uint hasPyramid;
     uint hasTubes;  // texels may be of tubes
-    uint count;  // clusters (rasterise); whether there are triangles (light)
+    uint count;  // clusters (rasterise); blocks (strands); whether there are triangles (surface), exact points (resolve)
 } stepInfo;
 
 // Levels whose texels are larger than the largest splat hold nothing; the resolve pass has measured it.

@@ -2,6 +2,7 @@
 #include "bindings.glsl"
 #include "shared/material.h"
 #include "shared/mesh.h"
+#include "shared/surface.h"
 #include "shared/texture.h"
 
 // A triangle that many threads fill together: corners in 1/256 pixel, oriented so that the inside is positive.
@@ -23,23 +24,15 @@ layout(set = 0, binding = 9, scalar) readonly buffer ClusterBlock { DrawCluster 
 layout(set = 0, binding = 10, scalar) readonly buffer MaterialBlock { SurfaceMaterial materials[]; };
 layout(set = 0, binding = 11, scalar) readonly buffer TextureBlock { TextureInfo textures[]; };
 layout(set = 0, binding = 12, scalar) readonly buffer TileBlock { uvec2 tiles[]; };  // addresses; 0: not resident
-layout(set = 0, binding = 13, scalar) readonly buffer LightBlock { LightSource lights[]; };
-layout(set = 0, binding = 14, scalar) buffer SurfaceBlock { uint surfaces[]; };  // two words a pixel
+layout(set = 0, binding = 14, scalar) buffer TriangleBlock { uint triangleWords[]; };  // two a pixel: material, emission
 layout(set = 0, binding = 15, scalar) buffer LargeBlock {
     uint largeCount;
     LargeTriangle large[];
 };
 
-layout(set = 0, binding = 16, scalar) readonly buffer EnvironmentBlock { float environment[]; };
-#include "shared/environment.h"
-
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Vertices { MeshVertex vertices[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Words { uint words[]; };
 
-// Of a pixel's first surface word: metallic 8 | roughness 8 | occlusion 8 | these.
-const uint kPixelTriangle = 0x80000000u;
-const uint kPixelUnlit = 0x40000000u;
-const uint kPlainSurface = 0x00ffff00u;  // what points are: not metallic, rough, not occluded
 const uint kLargeCapacity = 65536u;
 
 vec4 decodeTexel(uint c, bool isColour) {

@@ -38,11 +38,29 @@ struct Options {
     EnvironmentOptions environment;
 };
 
+bool closesGaps(const std::string& mode) {
+    const render::Reconstruction* of = render::reconstructionNamed(mode);
+    return !of || of->closesGaps;
+}
+
+std::vector<std::string> modeNames() {
+    std::vector<std::string> names;
+    for (const render::Reconstruction& r : render::reconstructions()) names.emplace_back(r.name);
+    names.emplace_back("reference");
+    return names;
+}
+std::string modeHelp() {
+    std::string help;
+    for (const render::Reconstruction& r : render::reconstructions())
+        help += fmt::format("{} ({}), ", r.name, r.summary);
+    return help + "or reference (traced full detail)";
+}
+
 Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDescription& d, const Shot& shot,
                                            const lod::ColourBy& colour, const std::vector<render::WorldLight>& lights) {
     render::FrameSettings s;
     s.draw.lights = lights;
-    s.mode = o.mode == "points" ? render::Mode::points : render::Mode::pullpush;
+    if (const render::Reconstruction* mode = render::reconstructionNamed(o.mode)) s.mode = mode->mode;
     s.budgets.errorPixels = o.error;
     if (o.budget > 0) s.budgets.records = o.budget;
     s.draw.unlitTriangles = o.shade == "unlit";
@@ -194,7 +212,7 @@ Result<void> run(const Options& o, Written& written) {
             {"records_drawn", c.recordsDrawn},
             {"triangles_drawn", c.trianglesDrawn},
             {"nodes_drawn", c.nodesDrawn},
-            {"closes_gaps", o.mode != "points"},
+            {"closes_gaps", closesGaps(o.mode)},
             {"tau_eff_px", jsonNumber(verdict.tauEffectivePixels)},
             {"by_lot",
              {{"narrow_strands", verdict.lots.narrowShare()},
@@ -218,7 +236,7 @@ Result<void> run(const Options& o, Written& written) {
         const double error = verdict.tauEffectivePixels;
         fmt::print("{}: {}, {}{}, {:.1f} ms a frame on {}\n", o.output, drawn,
                    (std::isfinite(error) ? fmt::format("{:.2f} px error", error) : "no stated error") +
-                       (o.mode == "points" ? " of each, gaps between them stay open" : ""),
+                       (!closesGaps(o.mode) ? " of each, gaps between them stay open" : ""),
                    lotText(verdict.lots), quantile(timings.frames, 0.5), backend->device());
     }
     return checkVerdict(plan, verdict);
@@ -250,10 +268,7 @@ void setupRender(CLI::App& app, int& status) {
         ->transform(within(1, 1000000))
         ->excludes("--orbit")
         ->capture_default_str();
-    sub->add_option("--mode", o->mode,
-                    "pullpush, points (a pixel a record: surfaces stay open), or reference (traced full detail)")
-        ->check(oneOf({"pullpush", "points", "reference"}))
-        ->capture_default_str();
+    sub->add_option("--mode", o->mode, modeHelp())->check(oneOf(modeNames()))->capture_default_str();
     sub->add_option("--error", o->error, "tolerated screen-space error, pixels")
         ->transform(positive())
         ->capture_default_str();

@@ -10,6 +10,7 @@
 #include "shaders/shared/mesh.h"
 #include "shaders/shared/record.h"
 #include "shaders/shared/strand.h"
+#include "shaders/shared/surface.h"
 #include "shaders/shared/texture.h"
 #include "shaders/shared/wide_disc.h"
 
@@ -51,6 +52,24 @@ struct Visibility {
     static constexpr uint32_t kRunBits = 8, kRun = 1u << kRunBits;
     uint64_t* keys;
     uint8_t* runs;  ///< 1: may hold some
+};
+
+/// Discs are drawn exactly tile by tile: the planes of one stay in L1.
+struct SplatTile {
+    static constexpr uint32_t kWidth = 32, kHeight = 16;
+    uint32_t x0, y0, width, height;  ///< px
+};
+/// A disc that is to be drawn, camera space.
+struct PlacedSplat {
+    float cx, cy, cz, nx, ny, nz, radius;
+    uint32_t id;  ///< of the visibility buffer
+};
+/// The discs of one block, and boxes of pixels that hold them.
+struct SplatBlock {
+    static constexpr uint32_t kSize = shared::kRecordsPerBlock;
+    alignas(64) float cx[kSize], cy[kSize], cz[kSize], nx[kSize], ny[kSize], nz[kSize], radius[kSize];
+    alignas(64) int firstX[kSize], lastX[kSize], firstY[kSize], lastY[kSize];
+    alignas(64) uint32_t keep[kSize];  ///< 0: not to be drawn
 };
 
 struct BlockSource {
@@ -107,9 +126,6 @@ struct LargeSink {
     void (*keep)(void* context, const LargeTriangle& triangle);
 };
 
-/// What a triangle's pixel is made of beside colour and normal: metallic 8 | roughness 8 | occlusion 8 | flags.
-constexpr uint32_t kPixelTriangle = 0x80000000u, kPixelUnlit = 0x40000000u;
-constexpr uint32_t kPlainSurface = 0x00ffff00u;  ///< not metallic, rough, not occluded: what points are
 /// Planes over the whole image, only where triangles are drawn; `emissive` only where a material shines.
 struct SurfacePlanes {
     uint32_t* surface;
@@ -134,6 +150,7 @@ struct ResolveInput {
     const shared::WideDisc* discs;
     const shared::DiscBox* discBoxes;  ///< of each
     size_t discCount;
+    bool exactPoints;  ///< points are what their pixels show, at the depth of the visibility buffer
 };
 
 struct LightInput {
@@ -216,6 +233,12 @@ struct Kernels {
     /// Rows [firstRow, lastRow] of wide discs.
     void (*fillDiscs)(const shared::FrameConstants& f, const shared::WideDisc* discs, const shared::DiscBox* boxes,
                       size_t count, uint32_t firstRow, uint32_t lastRow, const Visibility& visibility);
+    /// Up to 256 records as discs in camera space.
+    void (*placeSplats)(const shared::FrameConstants& f, const shared::DrawNode& node,
+                        const shared::PointRecord* records, uint32_t count, SplatBlock& out);
+    /// Draws some discs into the pixels of one tile, which is nobody else's meanwhile.
+    void (*splatTile)(const shared::FrameConstants& f, const PlacedSplat* splats, const uint32_t* places, size_t count,
+                      const SplatTile& tile, const Visibility& visibility);
 };
 
 /// The best kernels that this processor runs; STIPPLE_SIMD=sse|avx2|avx512 asks for fewer.

@@ -7,6 +7,7 @@
 #include "shaders/shared/pack.h"
 #include "shaders/shared/pyramid.h"
 #include "shaders/shared/shade.h"
+#include "shaders/shared/splat_disc.h"
 #include "shaders/shared/splat_size.h"
 #include "shaders/shared/strand.h"
 #include "shaders/shared/wide_disc.h"
@@ -124,7 +125,30 @@ struct Gathered {
     alignas(64) uint32_t normal[kTile], colour[kTile], flags[kTile];
     // Of turned instances: normals in camera space.
     alignas(64) float turned[kTile], nx[kTile], ny[kTile], nz[kTile];
+    alignas(64) float front[kTile];  // depth by which each was the nearest
 };
+
+/// Camera-space normals of the points that were gathered, any side. `anyTurned`: of instances that are not turned the
+/// frame's own rotation is all that normals need.
+template <bool anyTurned>
+[[gnu::always_inline]] inline vec3 gatheredNormal(const FrameConstants& f, const Gathered& g, size_t i, vec3 c) {
+    const vec3 d = octDecode(g.normal[i]);
+    const bool hasNormal = (g.flags[i] & kFlagNoNormal) == 0u;
+    vec3 n =
+        vec3(f.viewX.x * d.x + f.viewX.y * d.y + f.viewX.z * d.z, f.viewY.x * d.x + f.viewY.y * d.y + f.viewY.z * d.z,
+             f.viewZ.x * d.x + f.viewZ.y * d.y + f.viewZ.z * d.z);
+    if (anyTurned) {
+        const bool isTurned = g.turned[i] > 0.5f;
+        n.x = isTurned ? g.nx[i] : n.x;
+        n.y = isTurned ? g.ny[i] : n.y;
+        n.z = isTurned ? g.nz[i] : n.z;
+    }
+    const float inverse = 1.0f / std::sqrt(c.x * c.x + c.y * c.y + c.z * c.z);
+    n.x = hasNormal ? n.x : -c.x * inverse;
+    n.y = hasNormal ? n.y : -c.y * inverse;
+    n.z = hasNormal ? n.z : -c.z * inverse;
+    return n;
+}
 
 #include "engine/cpu/resolve_triangles.inl"
 
@@ -132,13 +156,12 @@ struct Gathered {
 
 #include "engine/cpu/strands.inl"
 
-/// Texels of the points that were gathered. `anyTurned`: of instances that are not turned the frame's own rotation is
-/// all that normals need.
+#include "engine/cpu/splat.inl"
+
+/// Texels of the points that were gathered.
 template <bool anyTurned>
 [[gnu::always_inline]] inline void resolveSplats(const FrameConstants& f, const Gathered& g, uint32_t x0, uint32_t y,
                                                  uint32_t n, TexelRow& __restrict row) {
-    const float xx = f.viewX.x, xy = f.viewX.y, xz = f.viewX.z, yx = f.viewY.x, yy = f.viewY.y, yz = f.viewY.z,
-                zx = f.viewZ.x, zy = f.viewZ.y, zz = f.viewZ.z;
     const float focal = f.focal, support = f.supportScale, minimum = f.minimumRadius;
     const float mostScattered = largestSplat(kFlagScattered, focal, f.height), most = largestSplat(0u, focal, f.height);
     const float centreX = f.centre.x - float(int(x0)) - 0.5f, centreY = f.centre.y - float(int(y)) - 0.5f;
@@ -146,19 +169,7 @@ template <bool anyTurned>
     for (size_t i = 0; i < n; ++i) {
         const bool valid = g.z[i] > 0.0f;
         const vec3 c = vec3(valid ? g.x[i] : 0.0f, valid ? g.y[i] : 0.0f, valid ? g.z[i] : 1.0f);
-        const vec3 d = octDecode(g.normal[i]);
-        const bool hasNormal = (g.flags[i] & kFlagNoNormal) == 0u;
-        vec3 nc = vec3(xx * d.x + xy * d.y + xz * d.z, yx * d.x + yy * d.y + yz * d.z, zx * d.x + zy * d.y + zz * d.z);
-        if (anyTurned) {
-            const bool isTurned = g.turned[i] > 0.5f;
-            nc.x = isTurned ? g.nx[i] : nc.x;
-            nc.y = isTurned ? g.ny[i] : nc.y;
-            nc.z = isTurned ? g.nz[i] : nc.z;
-        }
-        const float inverse = 1.0f / std::sqrt(c.x * c.x + c.y * c.y + c.z * c.z);
-        nc.x = hasNormal ? nc.x : -c.x * inverse;
-        nc.y = hasNormal ? nc.y : -c.y * inverse;
-        nc.z = hasNormal ? nc.z : -c.z * inverse;
+        const vec3 nc = gatheredNormal<anyTurned>(f, g, i, c);
         const float cap = (g.flags[i] & kFlagScattered) != 0u ? mostScattered : most;
         Texel t = texelFromSplat(c, nc, min(g.radius[i] * support, c.z * cap), focal, minimum);
         const float scale = focal / c.z;
@@ -170,6 +181,39 @@ template <bool anyTurned>
         t.colour = vec3(unpackRed(g.colour[i]), unpackGreen(g.colour[i]), unpackBlue(g.colour[i]));
         setTexel<false>(row, kPad + i, t);
     }
+}
+
+/// The same where every pixel that a disc covers is its own: no splats, but what the pixels show.
+template <bool anyTurned>
+[[gnu::always_inline]] inline void resolveExact(const FrameConstants& f, const Gathered& g, uint32_t x0, uint32_t y,
+                                                uint32_t n, TexelRow& __restrict row) {
+    const float focal = f.focal, x = float(int(x0)) + 0.5f - f.centre.x, py = float(int(y)) + 0.5f - f.centre.y;
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const bool valid = g.front[i] > 0.0f;
+        const vec3 c = vec3(valid ? g.x[i] : 0.0f, valid ? g.y[i] : 0.0f, valid ? g.z[i] : 1.0f);
+        const vec3 nc = gatheredNormal<anyTurned>(f, g, i, c);
+        const vec3 v = viewDirection(x + float(int(i)), py, focal);
+        const float flip = dot(nc, v) > 0.0f ? -1.0f : 1.0f;
+        const vec2 perp = perpFromNormal(nc, v);
+        Texel t;
+        t.depth = valid ? g.front[i] : 0.0f;
+        t.radius = valid ? kExactRadius : 0.0f;
+        t.thickness = (g.flags[i] & kFlagLoose) != 0u ? kLeafThickness * t.radius : t.radius;
+        t.offset = vec2(0.0f, 0.0f);
+        t.normalPerp = vec2(perp.x * flip, perp.y * flip);
+        t.colour = vec3(unpackRed(g.colour[i]), unpackGreen(g.colour[i]), unpackBlue(g.colour[i]));
+        setTexel<false>(row, kPad + i, t);
+    }
+}
+
+template <bool anyTurned>
+void resolvePoints(const FrameConstants& f, const ResolveInput& in, const Gathered& g, uint32_t x0, uint32_t y,
+                   uint32_t n, TexelRow& row) {
+    if (in.exactPoints)
+        resolveExact<anyTurned>(f, g, x0, y, n, row);
+    else
+        resolveSplats<anyTurned>(f, g, x0, y, n, row);
 }
 
 bool resolveRow(const FrameConstants& frame, const Tables& tables, const ResolveInput& in, uint64_t* visibility,
@@ -202,6 +246,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
             g.x[i] = 0;
             g.y[i] = 0;
             g.z[i] = -1;
+            g.front[i] = 0;
             g.radius[i] = 0;
             g.normal[i] = 0;
             g.colour[i] = 0;
@@ -222,6 +267,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         g.radius[i] = node.edge * tables.radiusFraction[recordRadiusCode(r)];
         g.normal[i] = r.normal;
         g.flags[i] = recordFlags(r);
+        g.front[i] = uintBitsToFloat(static_cast<uint32_t>(key >> 32));
         g.turned[i] = 0;
         if ((node.octantMask & kNodeTurned) != 0) {
             anyTurned = true;
@@ -255,9 +301,9 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         return triangles.count + strands.count + discs.count > 0;
     }
     if (anyTurned)
-        resolveSplats<true>(f, g, x0, y, n, row);
+        resolvePoints<true>(f, in, g, x0, y, n, row);
     else
-        resolveSplats<false>(f, g, x0, y, n, row);
+        resolvePoints<false>(f, in, g, x0, y, n, row);
     uint largest = 0;  // as bits: positive floats sort like integers
     for (size_t i = 0; i < n; ++i) {
         const uint bits = floatBitsToUint(row.radius[kPad + i]);
@@ -459,6 +505,8 @@ const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
                               rasterLarge,
                               drawSegments,
                               fillWide,
-                              fillDiscs};
+                              fillDiscs,
+                              placeSplats,
+                              splatTile};
 
 }  // namespace stipple::cpu

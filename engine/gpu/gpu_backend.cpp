@@ -9,23 +9,16 @@
 
 #include "engine/gpu/mesh_frame.h"
 #include "engine/gpu/pages.h"
-#include "engine/gpu/pass_list.h"
-#include "engine/gpu/pipelines.h"
+#include "engine/gpu/record.h"
+#include "shaders/shared/surface.h"
 #include "shaders/shared/wide_disc.h"
 
 namespace stipple::gpu {
 namespace {
 
 constexpr VkBufferUsageFlags kStorage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
-constexpr uint32_t kLargeCapacity = 65536, kLargeGroups = 64, kLargeRows = 16;  // see shaders/rasterise
-constexpr uint32_t kWideCapacity = 65536;                                       // see shaders/strands
-constexpr uint32_t kGroup = 64, kGroupsPerDimension = 65535;
 
 uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | key.node; }
-
-struct Level {
-    uint32_t width, height, offset;  ///< offset in words
-};
 
 class GpuBackend final : public render::Backend {
   public:
@@ -52,10 +45,12 @@ class GpuBackend final : public render::Backend {
 
     render::BackendResources resources() const override {
         render::BackendResources r;
-        r.strandPipelines = pipelines_->strandCount();
-        r.strandBytes = wide_.bytes();
-        r.meshPipelines = pipelines_->count() - Pipelines::kPointPasses - r.strandPipelines - pipelines_->discCount();
-        for (const Buffer* b : {&meshes_, &clusters_, &materials_, &textures_, &tiles_, &surfaces_, &large_})
+        r.strandPipelines = pipelines_->countOf(Pipelines::Set::curves);
+        r.lightPipelines = pipelines_->countOf(Pipelines::Set::light);
+        r.strandBytes = buffers_.wide.bytes();
+        r.meshPipelines = pipelines_->countOf(Pipelines::Set::triangles);
+        for (const Buffer* b : {&buffers_.meshes, &buffers_.clusters, &buffers_.materials, &buffers_.textures,
+                                &buffers_.tiles, &buffers_.triangleWords, &buffers_.large})
             r.meshBytes += b->bytes();
         for (const auto& t : meshFrame_.tiles) r.textureTiles += t.low != 0 || t.high != 0;
         return r;
@@ -84,14 +79,24 @@ class GpuBackend final : public render::Backend {
 
     Result<void> render(const render::RenderRequest& request, render::Image& image) override {
         const render::DrawList& draws = *request.draws;
-        const bool hasPyramid =
-            std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
-        STIPPLE_TRY(prepare(draws, request.wantDepthAndNormal));
+        const render::Reconstruction& mode = render::reconstructionOf(request.mode);
+        const bool isLit =
+            std::find(request.passes.begin(), request.passes.end(), render::Pass::light) != request.passes.end();
+        STIPPLE_TRY(prepare(draws, mode, isLit, request.wantDepthAndNormal));
         STIPPLE_TRY(begin());
         PassList list(*device_, commands_, queries_, omitBarriersBefore_);
         if (!pending_.empty()) STIPPLE_TRY(recordUploads(list));
-        for (const render::Pass pass : request.passes)
-            record(list, pass, draws, hasPyramid, request.wantDepthAndNormal);
+        const Recording recording{list,
+                                  *pipelines_,
+                                  commands_,
+                                  buffers_,
+                                  levels_,
+                                  draws,
+                                  mode,
+                                  draws.meshDraws.empty() ? 0 : static_cast<uint32_t>(meshFrame_.clusters.size()),
+                                  request.wantDepthAndNormal,
+                                  isLit};
+        for (const render::Pass pass : request.passes) recordPass(recording, pass);
         recordReadback(list, request.wantDepthAndNormal);
         STIPPLE_TRY(submit());
         takeTimes(list);
@@ -150,7 +155,7 @@ class GpuBackend final : public render::Backend {
         return {};
     }
 
-    Result<void> prepare(const render::DrawList& draws, bool wantAll) {
+    Result<void> prepare(const render::DrawList& draws, const render::Reconstruction& mode, bool isLit, bool wantAll) {
         const uint32_t w = draws.frame.width, h = draws.frame.height;
         levels_.clear();
         uint64_t words = 0;
@@ -160,22 +165,25 @@ class GpuBackend final : public render::Backend {
             if (lw == 1 && lh == 1) break;
         }
         const uint64_t pixels = uint64_t{w} * h;
-        STIPPLE_TRY(ensure(frameBuffer_, sizeof(shared::FrameConstants), kStorage, true, "frame constants"));
+        STIPPLE_TRY(ensure(buffers_.frame, sizeof(shared::FrameConstants), kStorage, true, "frame constants"));
         // Nodes and blocks of points, then those of strands.
-        STIPPLE_TRY(ensure(nodeBuffer_, (draws.nodes.size() + draws.strandNodes.size()) * sizeof(shared::DrawNode),
+        STIPPLE_TRY(ensure(buffers_.nodes, (draws.nodes.size() + draws.strandNodes.size()) * sizeof(shared::DrawNode),
                            kStorage, true, "draw nodes"));
-        STIPPLE_TRY(ensure(blockBuffer_, (draws.blocks.size() + draws.strandBlocks.size()) * sizeof(shared::DrawBlock),
-                           kStorage, true, "draw blocks"));
-        STIPPLE_TRY(ensure(visibility_, pixels * 8, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "visibility"));
-        STIPPLE_TRY(ensure(texels_, words * 4, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "texels"));
-        STIPPLE_TRY(ensure(stats_, 256, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "stats"));
-        STIPPLE_TRY(ensure(image_, pixels * 4, kStorage | VK_BUFFER_USAGE_TRANSFER_SRC_BIT, false, "image"));
-        STIPPLE_TRY(ensure(extra_, wantAll ? pixels * 28 : 256, kStorage | VK_BUFFER_USAGE_TRANSFER_SRC_BIT, false,
-                           "depth and normals"));
-        STIPPLE_TRY(ensure(readback_, pixels * 4 + (wantAll ? pixels * 28 : 0), VK_BUFFER_USAGE_TRANSFER_DST_BIT, true,
-                           "readback"));
-        std::memcpy(frameBuffer_.mapped(), &draws.frame, sizeof(draws.frame));
-        auto* nodes = static_cast<shared::DrawNode*>(nodeBuffer_.mapped());
+        STIPPLE_TRY(ensure(buffers_.blocks,
+                           (draws.blocks.size() + draws.strandBlocks.size()) * sizeof(shared::DrawBlock), kStorage,
+                           true, "draw blocks"));
+        STIPPLE_TRY(
+            ensure(buffers_.visibility, pixels * 8, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "visibility"));
+        STIPPLE_TRY(ensure(buffers_.texels, words * 4, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "texels"));
+        STIPPLE_TRY(ensure(buffers_.stats, 256, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "stats"));
+        STIPPLE_TRY(ensure(buffers_.surface, pixels * sizeof(shared::SurfaceWords), kStorage, false, "surface buffer"));
+        STIPPLE_TRY(ensure(buffers_.image, pixels * 4, kStorage | VK_BUFFER_USAGE_TRANSFER_SRC_BIT, false, "image"));
+        STIPPLE_TRY(ensure(buffers_.extra, wantAll ? pixels * 28 : 256, kStorage | VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                           false, "depth and normals"));
+        STIPPLE_TRY(ensure(buffers_.readback, pixels * 4 + (wantAll ? pixels * 28 : 0),
+                           VK_BUFFER_USAGE_TRANSFER_DST_BIT, true, "readback"));
+        std::memcpy(buffers_.frame.mapped(), &draws.frame, sizeof(draws.frame));
+        auto* nodes = static_cast<shared::DrawNode*>(buffers_.nodes.mapped());
         const auto placeNode = [&](shared::DrawNode node, streaming::ChunkKey key) {
             const VkDeviceAddress address = pages_.address(places_.at(chunkId(key)));
             node.addressLow = static_cast<uint32_t>(address);
@@ -184,7 +192,7 @@ class GpuBackend final : public render::Backend {
         };
         for (size_t i = 0; i < draws.nodes.size(); ++i) placeNode(draws.nodes[i], draws.keys[i]);
         for (size_t i = 0; i < draws.strandNodes.size(); ++i) placeNode(draws.strandNodes[i], draws.strandKeys[i]);
-        auto* blocks = static_cast<shared::DrawBlock*>(blockBuffer_.mapped());
+        auto* blocks = static_cast<shared::DrawBlock*>(buffers_.blocks.mapped());
         if (!draws.blocks.empty())
             std::memcpy(blocks, draws.blocks.data(), draws.blocks.size() * sizeof(shared::DrawBlock));
         for (size_t i = 0; i < draws.strandBlocks.size(); ++i) {
@@ -192,25 +200,46 @@ class GpuBackend final : public render::Backend {
             block.node += static_cast<uint32_t>(draws.nodes.size());
             std::memcpy(blocks + draws.blocks.size() + i, &block, sizeof(block));
         }
-        hasStrands_ = !draws.strandNodes.empty();
-        if (hasStrands_) {
-            STIPPLE_TRY(pipelines_->addStrandPasses());
-            STIPPLE_TRY(ensure(wide_, 4 + uint64_t{kWideCapacity} * 120, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
-                               false, "wide strands"));
+        if (!draws.strandNodes.empty()) {
+            STIPPLE_TRY(pipelines_->call(Pipelines::Set::curves));
+            STIPPLE_TRY(ensure(buffers_.wide, 4 + uint64_t{kWideCapacity} * 120,
+                               kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "wide strands"));
         }
-        if (draws.hasWideDiscs) {
-            STIPPLE_TRY(pipelines_->addDiscPasses());
-            STIPPLE_TRY(ensure(discs_, 4 + uint64_t{shared::kDiscCapacity} * sizeof(shared::WideDisc),
+        const bool hasDiscs = mode.hasPyramid && draws.hasWideDiscs;
+        const bool hasSplats = mode.fillsSplats && !draws.nodes.empty();
+        if (hasDiscs) STIPPLE_TRY(pipelines_->call(Pipelines::Set::wideDiscs));
+        if (hasSplats) STIPPLE_TRY(pipelines_->call(Pipelines::Set::splats));
+        if (hasDiscs || hasSplats) {
+            STIPPLE_TRY(ensure(buffers_.discs, 4 + uint64_t{shared::kDiscCapacity} * sizeof(shared::WideDisc),
                                kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "wide discs"));
         }
         if (!draws.meshDraws.empty()) STIPPLE_TRY(prepareMeshes(draws, pixels));
-        if (needsLightPass(draws)) STIPPLE_TRY(prepareLights(draws));
+        STIPPLE_TRY(pipelines_->call(isLit ? Pipelines::Set::light : Pipelines::Set::plain));
+        if (isLit) STIPPLE_TRY(prepareLights(draws));
         if (descriptorsChanged_) {
-            const auto bound = [&](const Buffer& b) { return b.bytes() > 0 ? &b : &stats_; };  // unused: anything
-            pipelines_->writeDescriptors({&frameBuffer_, &nodeBuffer_, &blockBuffer_, &visibility_, &texels_, &stats_,
-                                          &image_, &extra_, bound(meshes_), bound(clusters_), bound(materials_),
-                                          bound(textures_), bound(tiles_), bound(lights_), bound(surfaces_),
-                                          bound(large_), bound(environment_), bound(wide_), bound(discs_)});
+            const auto bound = [&](const Buffer& b) {
+                return b.bytes() > 0 ? &b : &buffers_.stats;
+            };  // unused: anything
+            pipelines_->writeDescriptors({&buffers_.frame,
+                                          &buffers_.nodes,
+                                          &buffers_.blocks,
+                                          &buffers_.visibility,
+                                          &buffers_.texels,
+                                          &buffers_.stats,
+                                          &buffers_.image,
+                                          &buffers_.extra,
+                                          bound(buffers_.meshes),
+                                          bound(buffers_.clusters),
+                                          bound(buffers_.materials),
+                                          bound(buffers_.textures),
+                                          bound(buffers_.tiles),
+                                          bound(buffers_.lights),
+                                          bound(buffers_.triangleWords),
+                                          bound(buffers_.large),
+                                          bound(buffers_.environment),
+                                          bound(buffers_.wide),
+                                          bound(buffers_.discs),
+                                          &buffers_.surface});
             descriptorsChanged_ = false;
         }
         return {};
@@ -223,35 +252,32 @@ class GpuBackend final : public render::Backend {
         return {};
     }
 
-    static bool needsLightPass(const render::DrawList& draws) {
-        return !draws.meshDraws.empty() ||
-               ((draws.frame.shade & shared::kShadeLit) != 0 && (!draws.lights.empty() || draws.environment));
-    }
     Result<void> prepareLights(const render::DrawList& draws) {
-        STIPPLE_TRY(pipelines_->addLightPass());
-        STIPPLE_TRY(fillBuffer(lights_, draws.lights.data(), draws.lights.size(), "lights"));
+        if (draws.lights.empty() && !draws.environment) return {};
+        STIPPLE_TRY(fillBuffer(buffers_.lights, draws.lights.data(), draws.lights.size(), "lights"));
         if (!draws.environment) return {};
-        return fillBuffer(environment_, draws.environment->table.data(), draws.environment->table.size(),
+        return fillBuffer(buffers_.environment, draws.environment->table.data(), draws.environment->table.size(),
                           "environment");
     }
 
     /// Buffers and pipelines that only triangles need.
     Result<void> prepareMeshes(const render::DrawList& draws, uint64_t pixels) {
-        STIPPLE_TRY(pipelines_->addMeshPasses());
+        STIPPLE_TRY(pipelines_->call(Pipelines::Set::triangles));
         meshFrame_.fill(
             draws, [&](streaming::ChunkKey key) -> const MeshChunk& { return meshChunks_.at(chunkId(key)); },
             [&](uint32_t source, uint32_t chunk) -> VkDeviceAddress {
                 const auto found = places_.find(chunkId({source, chunk}));
                 return found == places_.end() ? 0 : pages_.address(found->second);
             });
-        STIPPLE_TRY(fillBuffer(meshes_, draws.meshes.data(), draws.meshes.size(), "draw meshes"));
-        STIPPLE_TRY(fillBuffer(clusters_, meshFrame_.clusters.data(), meshFrame_.clusters.size(), "draw clusters"));
-        STIPPLE_TRY(fillBuffer(materials_, draws.materials.data(), draws.materials.size(), "materials"));
-        STIPPLE_TRY(fillBuffer(textures_, meshFrame_.textures.data(), meshFrame_.textures.size(), "textures"));
-        STIPPLE_TRY(fillBuffer(tiles_, meshFrame_.tiles.data(), meshFrame_.tiles.size(), "texture tiles"));
-        STIPPLE_TRY(ensure(surfaces_, pixels * 8, kStorage, false, "surfaces"));
-        return ensure(large_, 4 + uint64_t{kLargeCapacity} * 40, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false,
-                      "large triangles");
+        STIPPLE_TRY(fillBuffer(buffers_.meshes, draws.meshes.data(), draws.meshes.size(), "draw meshes"));
+        STIPPLE_TRY(
+            fillBuffer(buffers_.clusters, meshFrame_.clusters.data(), meshFrame_.clusters.size(), "draw clusters"));
+        STIPPLE_TRY(fillBuffer(buffers_.materials, draws.materials.data(), draws.materials.size(), "materials"));
+        STIPPLE_TRY(fillBuffer(buffers_.textures, meshFrame_.textures.data(), meshFrame_.textures.size(), "textures"));
+        STIPPLE_TRY(fillBuffer(buffers_.tiles, meshFrame_.tiles.data(), meshFrame_.tiles.size(), "texture tiles"));
+        STIPPLE_TRY(ensure(buffers_.triangleWords, pixels * 8, kStorage, false, "triangle pixels"));
+        return ensure(buffers_.large, 4 + uint64_t{kLargeCapacity} * 40, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                      false, "large triangles");
     }
 
     Result<void> begin() {
@@ -267,14 +293,14 @@ class GpuBackend final : public render::Backend {
     Result<void> recordUploads(PassList& list) {
         uint64_t bytes = 0;
         for (const PendingUpload& p : pending_) bytes += p.bytes.size();
-        STIPPLE_TRY(ensure(staging_, bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, true, "staging"));
+        STIPPLE_TRY(ensure(buffers_.staging, bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, true, "staging"));
         list.begin("upload", {}, true);
         uint64_t at = 0;
         for (const PendingUpload& p : pending_) {
             const uint64_t size = p.bytes.size();
-            std::memcpy(static_cast<char*>(staging_.mapped()) + at, p.bytes.data(), size);
+            std::memcpy(static_cast<char*>(buffers_.staging.mapped()) + at, p.bytes.data(), size);
             const VkBufferCopy region{at, p.place.offset, size};
-            vkCmdCopyBuffer(commands_, staging_.handle(), pages_.buffer(p.place), 1, &region);
+            vkCmdCopyBuffer(commands_, buffers_.staging.handle(), pages_.buffer(p.place), 1, &region);
             at += size;
         }
         list.end();
@@ -282,175 +308,20 @@ class GpuBackend final : public render::Backend {
         return {};
     }
 
-    void dispatch(uint32_t width, uint32_t height) {
-        vkCmdDispatch(commands_, (width + kGroup - 1) / kGroup, height, 1);
-    }
-
-    /// `count`: what else a pass needs to know (clusters; whether there are triangles).
-    void pushStep(size_t level, bool hasPyramid, bool wantAll, uint32_t count = 0) {
-        const Level& fine = levels_[level];
-        const Level& coarse = levels_[std::min(level + 1, levels_.size() - 1)];
-        const StepConstants step{fine.offset,
-                                 fine.width,
-                                 fine.height,
-                                 coarse.offset,
-                                 coarse.width,
-                                 coarse.height,
-                                 static_cast<uint32_t>(level),
-                                 wantAll,
-                                 hasPyramid && levels_.size() > 1,
-                                 hasStrands_,
-                                 count};
-        pipelines_->push(commands_, step);
-    }
-
-    void record(PassList& list, render::Pass pass, const render::DrawList& draws, bool hasPyramid, bool wantAll) {
-        const auto write = [](const Buffer& b) { return BufferUse{b.handle(), true}; };
-        const auto read = [](const Buffer& b) { return BufferUse{b.handle(), false}; };
-        switch (pass) {
-            case render::Pass::clear:
-                list.begin("clear", {write(visibility_), write(stats_)}, true);
-                vkCmdFillBuffer(commands_, visibility_.handle(), 0, VK_WHOLE_SIZE, 0xffffffffu);
-                vkCmdFillBuffer(commands_, stats_.handle(), 0, VK_WHOLE_SIZE, 0);
-                break;
-            case render::Pass::project: {
-                const bool hasDiscs = hasPyramid && draws.hasWideDiscs;
-                if (hasDiscs) {
-                    list.begin("disc list", {write(discs_)}, true);
-                    vkCmdFillBuffer(commands_, discs_.handle(), 0, 4, 0);
-                    list.end();
-                    list.begin("project", {write(visibility_), write(discs_)}, false);
-                } else {
-                    list.begin("project", {write(visibility_)}, false);
-                }
-                pipelines_->use(commands_, "project");
-                pushStep(0, hasPyramid, wantAll, hasDiscs ? 1 : 0);
-                const auto blocks = static_cast<uint32_t>(draws.blocks.size());
-                if (blocks > 0)
-                    vkCmdDispatch(commands_, std::min(blocks, kGroupsPerDimension),
-                                  (blocks + kGroupsPerDimension - 1) / kGroupsPerDimension, 1);
-                break;
-            }
-            case render::Pass::discs:
-                list.begin("disc order", {write(discs_)}, false);
-                pipelines_->use(commands_, "disc_order");
-                vkCmdDispatch(commands_, 1, 1, 1);
-                list.end();
-                list.begin("discs", {write(visibility_), read(discs_)}, false);
-                pipelines_->use(commands_, "discs");
-                pushStep(0, hasPyramid, wantAll);
-                vkCmdDispatch(commands_, kLargeGroups, (levels_[0].height + kLargeRows - 1) / kLargeRows, 1);
-                break;
-            case render::Pass::strands: {
-                list.begin("wide list", {write(wide_)}, true);
-                vkCmdFillBuffer(commands_, wide_.handle(), 0, 4, 0);
-                list.end();
-                const auto blocks = static_cast<uint32_t>(draws.strandBlocks.size());
-                list.begin("strands", {write(visibility_), write(wide_)}, false);
-                pipelines_->use(commands_, "strands");
-                pushStep(0, hasPyramid, wantAll, blocks);
-                vkCmdDispatch(commands_, std::min(blocks, kGroupsPerDimension),
-                              (blocks + kGroupsPerDimension - 1) / kGroupsPerDimension, 1);
-                list.end();
-                list.begin("wide strands", {write(visibility_), read(wide_)}, false);
-                pipelines_->use(commands_, "strands_wide");
-                pushStep(0, hasPyramid, wantAll);
-                vkCmdDispatch(commands_, kLargeGroups, (levels_[0].height + kLargeRows - 1) / kLargeRows, 1);
-                break;
-            }
-            case render::Pass::rasterise: {
-                list.begin("large list", {write(large_)}, true);
-                vkCmdFillBuffer(commands_, large_.handle(), 0, 4, 0);
-                list.end();
-                const auto clusters = static_cast<uint32_t>(meshFrame_.clusters.size());
-                list.begin("rasterise", {write(visibility_), write(large_)}, false);
-                pipelines_->use(commands_, "rasterise");
-                pushStep(0, hasPyramid, wantAll, clusters);
-                vkCmdDispatch(commands_, std::min(clusters, kGroupsPerDimension),
-                              (clusters + kGroupsPerDimension - 1) / kGroupsPerDimension, 1);
-                list.end();
-                list.begin("rasterise large", {write(visibility_), read(large_)}, false);
-                pipelines_->use(commands_, "rasterise_large");
-                pushStep(0, hasPyramid, wantAll);
-                vkCmdDispatch(commands_, kLargeGroups, (levels_[0].height + kLargeRows - 1) / kLargeRows, 1);
-                break;
-            }
-            case render::Pass::resolve:
-                list.begin("resolve", {read(visibility_), write(texels_), write(stats_)}, false);
-                pipelines_->use(commands_, "resolve");
-                pushStep(0, hasPyramid, wantAll);
-                dispatch(levels_[0].width, levels_[0].height);
-                if (hasPyramid && draws.hasWideDiscs) {
-                    list.end();
-                    list.begin("disc texels", {read(visibility_), read(discs_), write(texels_)}, false);
-                    pipelines_->use(commands_, "disc_texels");
-                    pushStep(0, hasPyramid, wantAll);
-                    dispatch(levels_[0].width, levels_[0].height);
-                }
-                if (hasStrands_) {
-                    list.end();
-                    list.begin("strand texels", {read(visibility_), write(texels_), write(stats_)}, false);
-                    pipelines_->use(commands_, "strand_texels");
-                    pushStep(0, hasPyramid, wantAll);
-                    dispatch(levels_[0].width, levels_[0].height);
-                }
-                if (draws.meshDraws.empty()) break;
-                list.end();
-                list.begin("surface", {read(visibility_), write(texels_), write(surfaces_)}, false);
-                pipelines_->use(commands_, "surface");
-                pushStep(0, hasPyramid, wantAll);
-                dispatch(levels_[0].width, levels_[0].height);
-                break;
-            case render::Pass::pull:
-                for (size_t l = 0; l + 1 < levels_.size(); ++l) {
-                    list.begin("pull", {write(texels_), read(stats_)}, false);
-                    pipelines_->use(commands_, "pull");
-                    pushStep(l, hasPyramid, wantAll);
-                    dispatch(levels_[l + 1].width, levels_[l + 1].height);
-                    if (l + 2 < levels_.size()) list.end();
-                }
-                if (levels_.size() == 1) return;
-                break;
-            case render::Pass::push:
-                if (levels_.size() < 3) return;
-                for (size_t l = levels_.size() - 1; l-- > 1;) {
-                    list.begin("push", {write(texels_), read(stats_)}, false);
-                    pipelines_->use(commands_, "push");
-                    pushStep(l, hasPyramid, wantAll);
-                    dispatch(levels_[l].width, levels_[l].height);
-                    if (l > 1) list.end();
-                }
-                break;
-            case render::Pass::shade:
-                list.begin("shade", {read(texels_), write(image_), write(extra_)}, false);
-                pipelines_->use(commands_, "shade");
-                pushStep(0, hasPyramid, wantAll);
-                dispatch(levels_[0].width, levels_[0].height);
-                if (!needsLightPass(draws)) break;
-                list.end();
-                if (draws.meshDraws.empty())
-                    list.begin("light", {read(texels_), write(image_), write(extra_)}, false);
-                else
-                    list.begin("light", {read(texels_), read(surfaces_), write(image_), write(extra_)}, false);
-                pipelines_->use(commands_, "light");
-                pushStep(0, hasPyramid, wantAll, draws.meshDraws.empty() ? 0 : 1);
-                dispatch(levels_[0].width, levels_[0].height);
-                break;
-        }
-        list.end();
-    }
-
     void recordReadback(PassList& list, bool wantAll) {
         const uint64_t pixels = uint64_t{levels_[0].width} * levels_[0].height;
-        list.begin("readback", {{image_.handle(), false}, {extra_.handle(), false}, {readback_.handle(), true}}, true);
+        list.begin(
+            "readback",
+            {{buffers_.image.handle(), false}, {buffers_.extra.handle(), false}, {buffers_.readback.handle(), true}},
+            true);
         VkBufferCopy region{0, 0, pixels * 4};
-        vkCmdCopyBuffer(commands_, image_.handle(), readback_.handle(), 1, &region);
+        vkCmdCopyBuffer(commands_, buffers_.image.handle(), buffers_.readback.handle(), 1, &region);
         if (wantAll) {
             region = {0, pixels * 4, pixels * 28};
-            vkCmdCopyBuffer(commands_, extra_.handle(), readback_.handle(), 1, &region);
+            vkCmdCopyBuffer(commands_, buffers_.extra.handle(), buffers_.readback.handle(), 1, &region);
         }
         list.end();
-        list.toHost(readback_.handle());
+        list.toHost(buffers_.readback.handle());
     }
 
     Result<void> submit() {
@@ -491,11 +362,12 @@ class GpuBackend final : public render::Backend {
         image.height = draws.frame.height;
         const size_t pixels = size_t{image.width} * image.height;
         image.rgba.resize(pixels);
-        std::memcpy(image.rgba.data(), readback_.mapped(), pixels * 4);
+        std::memcpy(image.rgba.data(), buffers_.readback.mapped(), pixels * 4);
         image.depth.resize(wantAll ? pixels : 0);
         image.normal.resize(wantAll ? pixels * 3 : 0);
         image.linear.resize(wantAll ? pixels * 3 : 0);
-        const auto* extra = reinterpret_cast<const float*>(static_cast<const char*>(readback_.mapped()) + pixels * 4);
+        const auto* extra =
+            reinterpret_cast<const float*>(static_cast<const char*>(buffers_.readback.mapped()) + pixels * 4);
         for (size_t i = 0; wantAll && i < pixels; ++i) {
             image.depth[i] = extra[7 * i];
             std::copy_n(extra + 7 * i + 1, 3, image.normal.begin() + static_cast<std::ptrdiff_t>(3 * i));
@@ -513,11 +385,7 @@ class GpuBackend final : public render::Backend {
     PageStore pages_;
     std::unordered_map<uint64_t, PageStore::Place> places_;
     std::vector<PendingUpload> pending_;
-    Buffer frameBuffer_, nodeBuffer_, blockBuffer_, visibility_, texels_, stats_, image_, extra_, readback_, staging_;
-    Buffer meshes_, clusters_, materials_, textures_, tiles_, surfaces_, large_;  // only with triangles
-    Buffer wide_;                                                                 // only with strands
-    Buffer lights_, environment_;                                                 // only with lights
-    Buffer discs_;                                                                // only with wide discs
+    FrameBuffers buffers_;
     std::unordered_map<uint64_t, MeshChunk> meshChunks_;
     MeshFrame meshFrame_;
     VkCommandPool commandPool_ = VK_NULL_HANDLE;
@@ -527,7 +395,7 @@ class GpuBackend final : public render::Backend {
     std::vector<Level> levels_;
     std::vector<render::PassTime> times_;
     std::string omitBarriersBefore_;
-    bool descriptorsChanged_ = true, hasStrands_ = false;
+    bool descriptorsChanged_ = true;
 };
 
 }  // namespace

@@ -1,5 +1,8 @@
 #include "engine/gpu/pipelines.h"
 
+#include <span>
+#include <vector>
+
 namespace stipple::gpu {
 namespace {
 
@@ -15,8 +18,17 @@ constexpr uint32_t kPull[] = {
 constexpr uint32_t kPush[] = {
 #include "push.inc"
 };
-constexpr uint32_t kShade[] = {
-#include "shade.inc"
+constexpr uint32_t kSurface[] = {
+#include "surface.inc"
+};
+constexpr uint32_t kOutput[] = {
+#include "output.inc"
+};
+constexpr uint32_t kOutputLit[] = {
+#include "output_lit.inc"
+};
+constexpr uint32_t kSplat[] = {
+#include "splat.inc"
 };
 
 constexpr uint32_t kRasterise[] = {
@@ -25,8 +37,8 @@ constexpr uint32_t kRasterise[] = {
 constexpr uint32_t kRasteriseLarge[] = {
 #include "rasterise_large.inc"
 };
-constexpr uint32_t kSurface[] = {
-#include "surface.inc"
+constexpr uint32_t kTriangleTexels[] = {
+#include "triangle_texels.inc"
 };
 constexpr uint32_t kStrands[] = {
 #include "strands.inc"
@@ -45,9 +57,6 @@ constexpr uint32_t kDiscOrder[] = {
 };
 constexpr uint32_t kDiscTexels[] = {
 #include "disc_texels.inc"
-};
-constexpr uint32_t kLight[] = {
-#include "light.inc"
 };
 
 }  // namespace
@@ -88,33 +97,33 @@ Result<std::unique_ptr<Pipelines>> Pipelines::create(const Device& device) {
     STIPPLE_TRY(p->add("resolve", kResolve, std::size(kResolve)));
     STIPPLE_TRY(p->add("pull", kPull, std::size(kPull)));
     STIPPLE_TRY(p->add("push", kPush, std::size(kPush)));
-    STIPPLE_TRY(p->add("shade", kShade, std::size(kShade)));
+    STIPPLE_TRY(p->add("surface", kSurface, std::size(kSurface)));
     return p;
 }
 
-Result<void> Pipelines::addMeshPasses() {
-    if (pipelines_.count("surface") > 0) return {};
-    STIPPLE_TRY(add("rasterise", kRasterise, std::size(kRasterise)));
-    STIPPLE_TRY(add("rasterise_large", kRasteriseLarge, std::size(kRasteriseLarge)));
-    return add("surface", kSurface, std::size(kSurface));
+Result<void> Pipelines::call(Set set) {
+    struct Shader {
+        const char* name;
+        std::span<const uint32_t> code;
+    };
+    static const std::map<Set, std::vector<Shader>> kSets{
+        {Set::triangles,
+         {{"rasterise", kRasterise}, {"rasterise_large", kRasteriseLarge}, {"triangle_texels", kTriangleTexels}}},
+        {Set::curves, {{"strands", kStrands}, {"strands_wide", kStrandsWide}, {"strand_texels", kStrandTexels}}},
+        {Set::wideDiscs, {{"disc_order", kDiscOrder}, {"discs", kDiscs}, {"disc_texels", kDiscTexels}}},
+        {Set::splats, {{"splat", kSplat}, {"discs", kDiscs}}},
+        {Set::plain, {{"output", kOutput}}},
+        {Set::light, {{"output_lit", kOutputLit}}},
+    };
+    for (const Shader& s : kSets.at(set))
+        if (pipelines_.count(s.name) == 0) STIPPLE_TRY(add(s.name, s.code.data(), s.code.size()));
+    called_[set] = kSets.at(set).size();
+    return {};
 }
 
-Result<void> Pipelines::addStrandPasses() {
-    if (pipelines_.count("strand_texels") > 0) return {};
-    STIPPLE_TRY(add("strands", kStrands, std::size(kStrands)));
-    STIPPLE_TRY(add("strands_wide", kStrandsWide, std::size(kStrandsWide)));
-    return add("strand_texels", kStrandTexels, std::size(kStrandTexels));
-}
-
-Result<void> Pipelines::addDiscPasses() {
-    if (pipelines_.count("disc_texels") > 0) return {};
-    STIPPLE_TRY(add("disc_order", kDiscOrder, std::size(kDiscOrder)));
-    STIPPLE_TRY(add("discs", kDiscs, std::size(kDiscs)));
-    return add("disc_texels", kDiscTexels, std::size(kDiscTexels));
-}
-
-Result<void> Pipelines::addLightPass() {
-    return pipelines_.count("light") > 0 ? Result<void>() : add("light", kLight, std::size(kLight));
+size_t Pipelines::countOf(Set set) const {
+    const auto found = called_.find(set);
+    return found == called_.end() ? 0 : found->second;
 }
 
 Result<void> Pipelines::add(const std::string& pass, const uint32_t* code, size_t words) {

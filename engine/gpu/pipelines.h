@@ -19,7 +19,7 @@ static_assert(sizeof(StepConstants) == 44);
 
 class Pipelines {
   public:
-    static constexpr size_t kBindings = 19, kPointPasses = 5;
+    static constexpr size_t kBindings = 20;
     static Result<std::unique_ptr<Pipelines>> create(const Device& device);
     ~Pipelines();
     Pipelines(const Pipelines&) = delete;
@@ -27,17 +27,11 @@ class Pipelines {
     /// In the order of the bindings.
     void writeDescriptors(const std::array<const Buffer*, kBindings>& buffers);
     void bind(VkCommandBuffer commands) const;
-    /// The passes that only triangles need; created at the first call.
-    Result<void> addMeshPasses();
-    /// The passes that only ribbons and tubes need.
-    Result<void> addStrandPasses();
-    /// The passes that wide discs need.
-    Result<void> addDiscPasses();
-    /// The pass that lights need, of triangles and of points under lights of the scene's own.
-    Result<void> addLightPass();
-    size_t count() const { return pipelines_.size(); }
-    size_t strandCount() const { return pipelines_.count("strand_texels") > 0 ? 3 : 0; }
-    size_t discCount() const { return pipelines_.count("disc_texels") > 0 ? 3 : 0; }
+    /// Pipelines that not every frame needs; they are compiled when one first calls for them.
+    enum class Set : uint8_t { triangles, curves, wideDiscs, splats, plain, light };
+    Result<void> call(Set set);
+    /// How many were compiled for it.
+    size_t countOf(Set set) const;
     void use(VkCommandBuffer commands, const std::string& pass) const;
     void push(VkCommandBuffer commands, const StepConstants& step) const;
 
@@ -50,6 +44,7 @@ class Pipelines {
     VkDescriptorPool pool_ = VK_NULL_HANDLE;
     VkDescriptorSet set_ = VK_NULL_HANDLE;
     std::map<std::string, VkPipeline> pipelines_;
+    std::map<Set, size_t> called_;
 };
 
 }  // namespace stipple::gpu

@@ -7,8 +7,8 @@
 #include "engine/base/check.h"
 #include "engine/base/numbers.h"
 #include "engine/base/process.h"
-#include "engine/reference/decode.h"
 #include "engine/reference/reference.h"
+#include "engine/reference/restate_discs.h"
 #include "engine/reference/surface.h"
 
 namespace stipple::reference {
@@ -16,13 +16,6 @@ namespace {
 
 using glm::dvec2;
 using glm::dvec3;
-
-/// The principal point and the focal length, px.
-struct Lens {
-    dvec2 centre;
-    double focal;
-    dvec3 rayTo(const dvec2& pixel) const { return {(pixel - centre) / focal, 1}; }
-};
 
 /// Normal of a sample's disc in camera space; `perp`, `facing`: across and along the view of its centre.
 dvec3 discNormal(const Sample& s, const dvec2& perp, double facing, const Lens& lens) {
@@ -192,13 +185,12 @@ class ReferenceBackend final : public render::Backend {
     Result<void> render(const render::RenderRequest& request, render::Image& image) override {
         const double start = nowSeconds();
         const render::DrawList& draws = *request.draws;
-        const bool hasPyramid =
-            std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
-        Level level0 = projectAll(draws, hasPyramid);
+        const render::Reconstruction& mode = render::reconstructionOf(request.mode);
+        Level level0 = projectAll(draws, mode);
         projectStrands(draws, chunks_, level0);
         projectMeshes(draws, chunks_, level0);
         const Level own = level0;
-        if (hasPyramid) reconstruct(level0, lensOf(draws));
+        if (mode.hasPyramid) reconstruct(level0, lensOf(draws));
         finishTubes(draws.view.focalPixels, level0);
         shade(draws, own, level0, request.wantDepthAndNormal, image);
         times_ = {{"reference", (nowSeconds() - start) * 1e3}};
@@ -206,146 +198,57 @@ class ReferenceBackend final : public render::Backend {
     }
 
   private:
-    Level projectAll(const render::DrawList& draws, bool hasPyramid) {
+    Level projectAll(const render::DrawList& draws, const render::Reconstruction& mode) {
         const lod::View& v = draws.view;
-        const shared::FrameConstants& f = draws.frame;
         Level level{static_cast<int>(v.width), static_cast<int>(v.height), {}};
         level.samples.resize(size_t{v.width} * v.height);
-        std::vector<Wide> wide;
-        for (size_t d = 0; d < draws.cut.size(); ++d) {
-            const lod::CutDraw& cut = draws.cut[d];
-            const lod::Instance& instance = draws.instances[cut.instance];
-            const lod::Hierarchy& h = *draws.hierarchies[instance.hierarchy];
-            const lod::Node& node = h.nodes[cut.node];
-            if (h.isStrands) continue;
-            const auto& records = chunks_.at(uint64_t{instance.source} << 32 | cut.node).records;
-            const bool mayBeWide = hasPyramid && areFew(h, node, records);
-            for (uint32_t i = 0; i < cut.count; ++i) {
-                Disc disc = decodeDisc(h, node, records[i]);
-                disc.radius *= cut.radiusScale;
-                if (disc.errorCode > cut.errorCode && !(cut.octantMask >> disc.octant & 1u)) continue;
-                dvec3 world = instance.translation + instance.rotation * (instance.scale * disc.position);
-                if (!draws.bends.empty()) world = draws.bends[d].moved(world);
-                world -= v.eye;
-                const dvec3 c(glm::dot(world, v.right), glm::dot(world, v.down), glm::dot(world, v.forward));
-                const dvec3 nw = instance.rotation * disc.normal;
-                dvec3 n(glm::dot(nw, v.right), glm::dot(nw, v.down), glm::dot(nw, v.forward));
-                const bool oneSided = (disc.flags & (shared::kFlagTwoSided | shared::kFlagNoNormal)) == 0;
-                if (oneSided && glm::dot(n, c) >= 0) continue;
-                disc.colour = f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError
-                                  ? debugColour(f, node, cut)
-                                  : disc.colour;
-                const double radiusWorld = instance.scale * disc.radius * f.supportScale;
-                if (mayBeWide && isWide(v, disc, radiusWorld, c)) {
-                    const bool isFree = (disc.flags & shared::kFlagNoNormal) != 0;
-                    wide.push_back({c, isFree ? glm::normalize(-c) : n, disc.colour, radiusWorld,
-                                    (disc.flags & shared::kFlagLoose) != 0});
-                    continue;
-                }
-                if (!(c.z > v.nearPlane)) continue;
-                const dvec2 p(v.focalPixels * c.x / c.z + 0.5 * v.width, v.focalPixels * c.y / c.z + 0.5 * v.height);
-                // A stray point hides no more of the picture than this.
-                const bool isScattered = (disc.flags & shared::kFlagScattered) != 0;
-                const double most = isScattered ? std::max(v.height / 128.0, 4.0) : 16384.0;
-                const double radius = std::clamp(radiusWorld * v.focalPixels / c.z, double(f.minimumRadius), most);
-                // Beside the picture: kept at its border where the disc may reach in.
-                const dvec2 at(std::clamp(p.x, 0.0, v.width - 1.0), std::clamp(p.y, 0.0, v.height - 1.0));
-                const bool isInside = p.x >= 0 && p.y >= 0 && p.x < v.width && p.y < v.height;
-                const double beside = glm::length(p - at) / (1 + radius * std::min(1.25 * glm::length(c) / c.z, 15.0));
-                if (!isInside && !(hasPyramid && beside < 1)) continue;
-                // There, of one surface's splats that which reaches in farthest is kept.
-                const double key = c.z + (isInside ? 0.0 : beside * beside * radius * c.z / v.focalPixels);
-                Sample& s = isInside ? level.ref(toWhole<int>(p.x), toWhole<int>(p.y))
-                                     : level.ref(toWhole<int>(at.x), toWhole<int>(at.y));
-                if (s.valid && s.key <= key) continue;
-                const dvec3 toPoint = glm::normalize(c);
-                if ((disc.flags & shared::kFlagNoNormal) != 0) n = -toPoint;
-                const double facing = glm::dot(n, toPoint);
-                if (facing > 0) n = -n;
-                s.valid = true;
-                s.depth = c.z;
-                s.key = key;
-                s.centre = p;
-                s.radius = radius;
-                s.thickness = s.radius * c.z / v.focalPixels * (0.25 + std::sqrt(std::max(0.0, 1 - facing * facing)));
-                if ((disc.flags & shared::kFlagLoose) != 0)
-                    s.thickness = kLeafThickness * s.radius * c.z / v.focalPixels;
-                s.perp = dvec2(rotationToZ(toPoint) * n);
-                s.colour = disc.colour;
-            }
+        const std::vector<PlacedDisc> discs = placedDiscs(draws, chunks_);
+        if (mode.fillsSplats) {
+            showSplats(draws, discs, level);
+            return level;
+        }
+        std::vector<PlacedDisc> wide;
+        for (const PlacedDisc& d : discs) {
+            if (mode.hasPyramid && d.mayBeWide && isWide(v, d))
+                wide.push_back(d);
+            else if (d.centre.z > v.nearPlane)
+                project(draws, d, mode.hasPyramid, level);
         }
         showWide(draws, wide, level);
         return level;
     }
 
-    struct Wide {
-        dvec3 centre, normal, colour;
-        double radius;
-        bool isLeaf;
-    };
-    /// Do discs of a node reach only a few of each other's spacings? Where they reach farther none is filled exactly.
-    static bool areFew(const lod::Hierarchy& h, const lod::Node& node,
-                       const std::vector<shared::PointRecord>& records) {
-        double most = 0;
-        for (const shared::PointRecord& r : records) most = std::max(most, decodeDisc(h, node, r).radius);
-        return most * std::sqrt(static_cast<double>(records.size())) <= 4 * h.unit * h.cellSize(node);
-    }
-    /// Is a disc so wide that an ellipse a texel does not hold it?
-    static bool isWide(const lod::View& v, const Disc& disc, double radius, const dvec3& c) {
-        const double widest = std::max(std::max(v.width, v.height) / 32.0, 32.0);  // px
-        if ((disc.flags & shared::kFlagScattered) != 0) return false;
-        if ((disc.flags & shared::kFlagNoNormal) != 0 && c.z <= v.nearPlane) return false;
-        return radius * v.focalPixels > widest * c.z && c.z + radius > v.nearPlane;
-    }
-    /// Depth of a wide disc on a ray, and rho^2 there; infinite where it is not met.
-    static std::pair<double, double> meet(const Wide& w, const dvec3& ray, double nearPlane) {
-        const double depth = glm::dot(w.normal, w.centre) / glm::dot(w.normal, ray);
-        const dvec3 off = depth * ray - w.centre;
-        const double rho2 = glm::dot(off, off) / (w.radius * w.radius);
-        return depth > nearPlane && rho2 <= 1 ? std::pair(depth, rho2) : std::pair(HUGE_VAL, HUGE_VAL);
-    }
-    /// Every pixel whose ray meets wide discs: the mean of those about the nearest.
-    static void showWide(const render::DrawList& draws, const std::vector<Wide>& wide, Level& level) {
-        const Lens lens = lensOf(draws);
-        for (int y = 0; y < level.height && !wide.empty(); ++y)
-            for (int x = 0; x < level.width; ++x) {
-                const dvec2 at(x + 0.5, y + 0.5);
-                const dvec3 ray = lens.rayTo(at);
-                const Wide* front = nullptr;
-                double depth = HUGE_VAL;
-                for (const Wide& w : wide)
-                    if (const double z = meet(w, ray, draws.view.nearPlane).first; z < depth) {
-                        depth = z;
-                        front = &w;
-                    }
-                Sample& s = level.ref(x, y);
-                if (!front || (s.valid && s.key <= depth)) continue;
-                const double facing = std::abs(glm::dot(front->normal, ray)) / glm::length(ray);
-                const double apart = 0.25 * front->radius / glm::length(ray) / std::max(facing, 0.125);
-                double weight = 0, inverse = 0;
-                dvec3 n(0), colour(0);
-                for (const Wide& w : wide) {
-                    const auto [z, rho2] = meet(w, ray, draws.view.nearPlane);
-                    if (!(std::abs(z - depth) <= apart)) continue;
-                    const double k = (1 - rho2) * (1 - rho2) + 1e-4;
-                    weight += k;
-                    inverse += k / z;
-                    n += (glm::dot(w.normal, ray) > 0 ? -k : k) * w.normal;
-                    colour += k * w.colour;
-                }
-                s.valid = true;
-                s.depth = s.key = weight / inverse;
-                s.centre = at;
-                s.radius = 0.25;  // no ellipse: what the pixel shows
-                s.thickness = (front->isLeaf ? kLeafThickness : 1) * 0.25 * s.depth / lens.focal;
-                s.perp = dvec2(rotationToZ(glm::normalize(ray)) * glm::normalize(n));
-                s.colour = colour / weight;
-            }
+    /// A disc to the pixel of its centre, or, where `besideToo` and it reaches in, to one at the border.
+    static void project(const render::DrawList& draws, const PlacedDisc& d, bool besideToo, Level& level) {
+        const lod::View& v = draws.view;
+        const dvec3 c = d.centre;
+        const dvec2 p(v.focalPixels * c.x / c.z + 0.5 * v.width, v.focalPixels * c.y / c.z + 0.5 * v.height);
+        // A stray point hides no more of the picture than this.
+        const bool isScattered = (d.flags & shared::kFlagScattered) != 0;
+        const double most = isScattered ? std::max(v.height / 128.0, 4.0) : 16384.0;
+        const double radius = std::clamp(d.radius * v.focalPixels / c.z, double(draws.frame.minimumRadius), most);
+        const dvec2 at(std::clamp(p.x, 0.0, v.width - 1.0), std::clamp(p.y, 0.0, v.height - 1.0));
+        const bool isInside = p.x >= 0 && p.y >= 0 && p.x < v.width && p.y < v.height;
+        const double beside = glm::length(p - at) / (1 + radius * std::min(1.25 * glm::length(c) / c.z, 15.0));
+        if (!isInside && !(besideToo && beside < 1)) return;
+        // There, of one surface's splats that which reaches in farthest is kept.
+        const double key = c.z + (isInside ? 0.0 : beside * beside * radius * c.z / v.focalPixels);
+        Sample& s = isInside ? level.ref(toWhole<int>(p.x), toWhole<int>(p.y))
+                             : level.ref(toWhole<int>(at.x), toWhole<int>(at.y));
+        if (s.valid && s.key <= key) return;
+        const dvec3 toPoint = glm::normalize(c);
+        const double facing = glm::dot(d.normal, toPoint);
+        s.valid = true;
+        s.depth = c.z;
+        s.key = key;
+        s.centre = p;
+        s.radius = radius;
+        s.thickness = s.radius * c.z / v.focalPixels * (0.25 + std::sqrt(std::max(0.0, 1 - facing * facing)));
+        if ((d.flags & shared::kFlagLoose) != 0) s.thickness = kLeafThickness * s.radius * c.z / v.focalPixels;
+        s.perp = dvec2(rotationToZ(toPoint) * (facing > 0 ? -d.normal : d.normal));
+        s.colour = d.colour;
     }
 
-    static Lens lensOf(const render::DrawList& draws) {
-        return {0.5 * dvec2(draws.view.width, draws.view.height), draws.view.focalPixels};
-    }
     static void reconstruct(Level& level0, const Lens& lens) {
         double largest = 0;
         for (const Sample& s : level0.samples) largest = std::max(largest, s.valid ? s.radius : 0.0);

@@ -8,22 +8,10 @@
 
 #include "engine/base/result.h"
 #include "engine/render/draw_list.h"
+#include "engine/render/reconstructions/table.h"
 #include "streaming/streamer.h"
 
 namespace stipple::render {
-
-enum class Mode : uint8_t { pullpush, points };
-
-/// Passes in the order in which they run; a pass that the frame does not call for is not in the list.
-enum class Pass : uint8_t { clear, project, discs, strands, rasterise, resolve, pull, push, shade };
-const char* passName(Pass pass);
-/// What a frame draws, for what it calls for.
-struct FrameContent {
-    bool hasPoints = true, hasTriangles = false, hasStrands = false;
-    bool hasWideDiscs = false;  ///< points may be
-};
-/// The passes of a mode.
-std::vector<Pass> passesOf(Mode mode, const FrameContent& content);
 
 struct PassTime {
     std::string name;
@@ -41,7 +29,8 @@ struct Image {
 
 struct RenderRequest {
     const DrawList* draws = nullptr;
-    std::vector<Pass> passes;
+    Mode mode = Mode::pullpush;
+    std::vector<Pass> passes;  ///< of the mode, for what the draw list calls for
     bool wantDepthAndNormal = false;
 };
 
@@ -53,6 +42,7 @@ struct BackendResources {
     uint64_t textureTiles = 0;     ///< resident
     uint64_t strandPipelines = 0;  ///< compiled for ribbons and tubes
     uint64_t strandBytes = 0;      ///< per-frame buffers for them
+    uint64_t lightPipelines = 0;   ///< compiled for light
 };
 
 class Backend : public streaming::ChunkSink {

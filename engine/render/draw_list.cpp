@@ -123,6 +123,18 @@ glm::vec3 linearBackground() {
     return {linear(kBackground[0]), linear(kBackground[1]), linear(kBackground[2])};
 }
 
+FrameContent contentOf(const DrawList& draws) {
+    FrameContent content;
+    content.hasPoints = !draws.nodes.empty();
+    content.hasTriangles = !draws.meshDraws.empty();
+    content.hasStrands = !draws.strandNodes.empty();
+    content.hasWideDiscs = draws.hasWideDiscs;
+    const bool shows = content.hasPoints || content.hasTriangles || content.hasStrands;
+    content.isLit = shows && draws.frame.debugView == shared::kDebugNone &&
+                    (content.hasTriangles || (draws.frame.shade & shared::kShadeLit) != 0);
+    return content;
+}
+
 void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,
                   std::span<const lod::Instance> instances, const lod::View& view, const DrawSettings& settings,
                   DrawList& out) {

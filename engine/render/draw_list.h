@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/render/environment.h"
+#include "engine/render/reconstructions/table.h"
 #include "engine/render/wind.h"
 #include "lod/cut.h"
 #include "shaders/shared/frame.h"
@@ -88,6 +89,9 @@ struct DrawSettings {
     Wind wind;                       ///< moves what setSway was told of
     uint32_t coverageSeed = 0;       ///< of strands narrower than a pixel
 };
+
+/// What a frame of these draws calls for.
+FrameContent contentOf(const DrawList& draws);
 
 void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,
                   std::span<const lod::Instance> instances, const lod::View& view, const DrawSettings& settings,

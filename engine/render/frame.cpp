@@ -15,47 +15,6 @@
 
 namespace stipple::render {
 
-const char* passName(Pass pass) {
-    switch (pass) {
-        case Pass::clear:
-            return "clear";
-        case Pass::project:
-            return "project";
-        case Pass::discs:
-            return "discs";
-        case Pass::strands:
-            return "strands";
-        case Pass::rasterise:
-            return "rasterise";
-        case Pass::resolve:
-            return "resolve";
-        case Pass::pull:
-            return "pull";
-        case Pass::push:
-            return "push";
-        case Pass::shade:
-            return "shade";
-    }
-    return "?";
-}
-
-std::vector<Pass> passesOf(Mode mode, const FrameContent& content) {
-    std::vector<Pass> passes{Pass::clear};
-    if (content.hasPoints) passes.push_back(Pass::project);
-    if (content.hasWideDiscs && mode == Mode::pullpush) passes.push_back(Pass::discs);
-    if (content.hasStrands) passes.push_back(Pass::strands);
-    if (content.hasTriangles) passes.push_back(Pass::rasterise);
-    passes.push_back(Pass::resolve);
-    // Triangles keep their exact pixels: only splats are reconstructed. The last push and the shading are one pass:
-    // each pixel is touched once.
-    if (mode == Mode::pullpush && (content.hasPoints || content.hasStrands)) {
-        passes.push_back(Pass::pull);
-        passes.push_back(Pass::push);
-    }
-    passes.push_back(Pass::shade);
-    return passes;
-}
-
 namespace {
 
 /// The last steps of a chunk's decoding: other colours than its own; of triangles, that their materials are there.
@@ -194,12 +153,14 @@ Result<void> draw(FrameState& state, const lod::View& view, const FrameSettings&
     lod::selectCut(state.scene(), streamer.residency(), view, settings.budgets, state.scratch, state.cut);
     const double cutEnd = nowSeconds();
     if (asks) streamer.request(state.cut);
-    makeDrawList(state.cut, state.hierarchies, state.instances, view, settings.draw, state.draws);
+    DrawSettings settingsOfMode = settings.draw;
+    settingsOfMode.exactStrands = std::min(settings.draw.exactStrands, reconstructionOf(settings.mode).exactCurves);
+    makeDrawList(state.cut, state.hierarchies, state.instances, view, settingsOfMode, state.draws);
     markWideDiscs(*state.radii, state.draws);
     RenderRequest request;
     request.draws = &state.draws;
-    request.passes = passesOf(settings.mode, {!state.draws.nodes.empty(), !state.draws.meshDraws.empty(),
-                                              !state.draws.strandNodes.empty(), state.draws.hasWideDiscs});
+    request.mode = settings.mode;
+    request.passes = passesOf(settings.mode, contentOf(state.draws));
     request.wantDepthAndNormal = settings.wantDepthAndNormal;
     STIPPLE_TRY(state.backend->render(request, state.image));
 

@@ -3,6 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "../bindings.glsl"
 #include "../shared/splat_size.h"
+#include "../shared/wide_disc.h"
 layout(local_size_x = 64) in;
 
 void main() {
@@ -27,6 +28,16 @@ void main() {
         vec3 n = -normalize(c);
         if ((recordFlags(r) & kFlagNoNormal) == 0u) n = nodeDirection(node, octDecode(r.normal));
         const float radius = min(node.edge * radiusFraction(recordRadiusCode(r)) * frame.supportScale, c.z * largestSplat(recordFlags(r), frame.focal, frame.height));
+        if (stepInfo.count != 0u) {  // no splat, but what the pixel shows
+            const vec3 v = viewDirection(float(pixel.x) + 0.5 - frame.centre.x, float(pixel.y) + 0.5 - frame.centre.y, frame.focal);
+            t.depth = uintBitsToFloat(uint(key >> 32));
+            t.radius = kExactRadius;
+            t.thickness = (recordFlags(r) & kFlagLoose) != 0u ? kLeafThickness * kExactRadius : kExactRadius;
+            t.normalPerp = perpFromNormal(dot(n, v) > 0.0 ? -n : n, v);
+            t.colour = pointColour(node, r);
+            storeTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, pixel, t);
+            return;
+        }
         t = texelFromSplat(c, n, radius, frame.focal, frame.minimumRadius);
         if ((recordFlags(r) & kFlagLoose) != 0u) t.thickness = kLeafThickness * t.radius;
         const float scale = frame.focal / c.z;

@@ -78,8 +78,12 @@ SHARED_FN vec2 discSlopes(float across, float depth, float normalAcross, float n
     const float reach2 = r2 * max(1.0f - normalAlong * normalAlong, 0.0f);
     const float a = depth * depth - reach2;
     const float b = across * depth + r2 * normalAcross * normalAlong;
-    const float c = across * across - r2 * max(1.0f - normalAcross * normalAcross, 0.0f);
-    const float root = sqrt(max(b * b - a * c, 0.0f));
+    // b^2 - a (across^2 - r^2 (1 - normalAcross^2)), written out: without differences of large numbers.
+    const float rest = across * across * max(1.0f - normalAlong * normalAlong, 0.0f) +
+                       depth * depth * max(1.0f - normalAcross * normalAcross, 0.0f) +
+                       2.0f * across * depth * normalAcross * normalAlong -
+                       r2 * (1.0f - normalAcross * normalAcross - normalAlong * normalAlong);
+    const float root = radius * sqrt(max(rest, 0.0f));
     const bool isAhead = depth > 0.0f && a > 0.01f * depth * depth;
     return isAhead ? vec2((b - root) / a, (b + root) / a) : vec2(-3.0e38f, 3.0e38f);
 }
@@ -98,7 +102,8 @@ SHARED_FN float reachesPicture(WideDisc d, FrameConstants f) {
     const float bottom = (float(int(f.height)) - f.centre.y) / f.focal;
     const float least = min(min(discBeyond(d, 1.0f, 0.0f, left), discBeyond(d, -1.0f, 0.0f, right)),
                             min(discBeyond(d, 0.0f, 1.0f, top), discBeyond(d, 0.0f, -1.0f, bottom)));
-    return least >= 0.0f && discBeyond(d, 0.0f, 0.0f, 1.0f) > f.nearPlane ? 1.0f : 0.0f;
+    const float isAhead = discBeyond(d, 0.0f, 0.0f, 1.0f) > f.nearPlane ? 1.0f : 0.0f;
+    return least >= 0.0f ? isAhead : 0.0f;
 }
 
 // The pixels of a row (or column) whose centres may lie between two slopes: first and last, within the picture.

@@ -237,7 +237,7 @@ TEST_F(Hybrid, WhatASceneDoesNotCallForDoesNotExist) {
     EXPECT_FALSE(had(*backend, "pull"));
     EXPECT_EQ(backend->resources().textureTiles, 0u) << "tiles outlive their frame state";
     draw(placed_, *backend, *executor_, view_, settings_, &counters);
-    for (const char* pass : {"project", "rasterise", "resolve", "pull", "push", "shade"})
+    for (const char* pass : {"project", "rasterise", "resolve", "pull", "push", "surface+light+output"})
         EXPECT_TRUE(had(*backend, pass)) << pass;
     EXPECT_FALSE(had(*backend, "strands"));
 }

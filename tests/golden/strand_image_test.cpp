@@ -205,7 +205,7 @@ TEST_F(FourKinds, OccludeEachOtherAsOracleAndRaysSay) {
     render::FrameSettings settings = lit(0.5);
     FrameCounters counters;
     const render::Image drawn = draw(placed_, *backend, *executor_, view_, settings, &counters);
-    for (const char* pass : {"project", "strands", "rasterise", "resolve", "pull", "push", "shade"})
+    for (const char* pass : {"project", "strands", "rasterise", "resolve", "pull", "push", "surface+light+output"})
         EXPECT_TRUE(had(*backend, pass)) << pass;
     const auto d = differ(drawn, draw(placed_, *oracle, *executor_, view_, settings));
     EXPECT_GE(d.psnr, 45);

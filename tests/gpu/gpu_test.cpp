@@ -159,7 +159,8 @@ TEST_F(Gpu, DrawsMeshesAndHybridScenesAsTheOracleDoesAndOnlyThenHasWhatTheyNeed)
             }
         }
     }
-    EXPECT_EQ(gpu->resources().meshPipelines, 4u);
+    EXPECT_EQ(gpu->resources().meshPipelines, 3u);
+    EXPECT_EQ(gpu->resources().lightPipelines, 1u);
     for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
 }
 
@@ -241,13 +242,13 @@ TEST_F(Gpu, OddSizesAndDepthAndNormals) {
 
 TEST_F(Gpu, ADeliberateHazardIsReported) {
     // Without this, silence above would prove nothing: the layer ignores misspelt settings.
-    const auto gpu = make("shade");
+    const auto gpu = make("surface");
     draw(*gpu, {});
     bool found = false;
     for (const std::string& message : validationMessages(*gpu))
         found = found || message.find("SYNC-HAZARD") != std::string::npos;
     EXPECT_TRUE(found)
-        << "a missing barrier between the last push and shade went unseen: synchronization validation is off";
+        << "a missing barrier between the last push and the surface went unseen: synchronization validation is off";
 }
 
 TEST(RangeAllocator, NeverOverlapsAndMergesAll) {

@@ -57,7 +57,8 @@ uint64_t emptyPixels(const lod::Store& store, const lod::Cut& cut, const lod::Vi
     makeDrawList(cut, {&h, 1}, {&instance, 1}, view, {}, draws);
     render::RenderRequest request;
     request.draws = &draws;
-    request.passes = render::passesOf(render::Mode::points, {false, true});
+    request.mode = render::Mode::points;
+    request.passes = render::passesOf(request.mode, render::contentOf(draws));
     render::Image image;
     EXPECT_TRUE(backend.render(request, image));
     return static_cast<uint64_t>(

@@ -1,0 +1,98 @@
+// What the passes of one frame share on the cpu: what is drawn, and the planes that one pass hands to the next.
+#pragma once
+
+#include <algorithm>
+#include <unordered_map>
+#include <vector>
+
+#include "engine/base/executor.h"
+#include "engine/base/huge_buffer.h"
+#include "engine/base/queue.h"
+#include "engine/cpu/kernels.h"
+#include "engine/cpu/pyramid.h"
+#include "engine/render/backend.h"
+
+namespace stipple::cpu {
+
+/// Resident chunks; `tiles`: of textures, by source and chunk; null: not resident.
+struct Chunks {
+    std::unordered_map<uint64_t, lod::Chunk> chunks;
+    std::vector<std::vector<const uint32_t*>> tiles;
+
+    static uint64_t idOf(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | key.node; }
+    const lod::Chunk& at(streaming::ChunkKey key) const { return chunks.at(idOf(key)); }
+};
+
+/// The tiles that a disc reaches.
+struct TileRange {
+    uint16_t firstX, firstY, lastX, lastY;
+    uint64_t tiles() const { return uint64_t{lastX - firstX + 1u} * (lastY - firstY + 1u); }
+};
+
+struct Frame {
+    Frame(Executor& of, const Kernels& kernels, Chunks& resident)
+        : executor(of), k(kernels), tables(makeTables()), chunks(resident), pyramid(of, kernels) {}
+
+    Executor& executor;
+    const Kernels& k;
+    const Tables tables;
+    Chunks& chunks;
+
+    // Of the frame at hand.
+    const render::DrawList* draws = nullptr;
+    const render::Reconstruction* mode = nullptr;
+    shared::FrameConstants constants{};
+    render::Image* image = nullptr;
+    bool wantAll = false;
+
+    // Plane::visibility. It is clear between frames: resolve resets each entry that it has read.
+    HugeBuffer<uint64_t> visibility;
+    std::vector<uint8_t> runs;  ///< of `visibility`
+    size_t visibilityPixels = 0;
+
+    // Where the draws' records are.
+    std::vector<BlockSource> blocks;
+    std::vector<StrandBlock> strandBlocks;
+    std::vector<MeshBlock> meshBlocks;
+    std::vector<TextureSet> textureSets;
+    bool hasTriangles = false, hasEmissive = false, hasStrands = false;
+
+    // What covers so many pixels that its rows are shared out.
+    std::vector<LargeTriangle> large;
+    std::vector<WideStrand> wide;
+    std::vector<shared::WideDisc> discs;     ///< Plane::discList
+    std::vector<shared::DiscBox> discBoxes;  ///< of each
+
+    // Of discs drawn exactly (passes/splat.cpp); kept for their memory only.
+    std::vector<PlacedSplat> placedSplats;
+    std::vector<TileRange> splatTiles;
+    std::vector<uint32_t> tilePlaces, tileEnds;
+
+    Pyramid pyramid;  ///< Plane::texels and Plane::coarse
+    // Of the pixels of triangles, beside their texels.
+    HugeBuffer<uint32_t> surface, emissive;
+    size_t surfacePixels = 0, emissivePixels = 0;
+
+    Visibility visible() { return {visibility.data(), runs.data()}; }
+    /// May any of these pixels show something?
+    bool isSeen(size_t first, uint32_t n) const {
+        bool any = false;
+        for (size_t r = first >> Visibility::kRunBits; r <= (first + n - 1) >> Visibility::kRunBits; ++r)
+            any = any || runs[r] != 0;
+        return any;
+    }
+    SurfacePlanes planesAt(size_t pixel) {
+        return {hasTriangles ? surface.data() + pixel : nullptr, hasEmissive ? emissive.data() + pixel : nullptr};
+    }
+    /// Rows of the image for all threads: what covers much of it must not be the work of one.
+    template <typename Use>
+    void forBands(const Use& use) {
+        constexpr uint32_t kRows = 16;
+        executor.parallelFor((constants.height + kRows - 1) / kRows, 1, [&](size_t begin, size_t end) {
+            const auto first = static_cast<uint32_t>(begin) * kRows, last = static_cast<uint32_t>(end) * kRows - 1;
+            use(first, std::min(last, constants.height - 1));
+        });
+    }
+};
+
+}  // namespace stipple::cpu

@@ -1,0 +1,56 @@
+// What every frame begins with, and the table of passes.
+#include <map>
+
+#include "engine/cpu/passes/passes.h"
+
+namespace stipple::cpu {
+namespace {
+
+void resize(Frame& frame) {
+    const uint32_t w = frame.constants.width, h = frame.constants.height;
+    frame.image->width = w;
+    frame.image->height = h;
+    const size_t pixels = size_t{w} * h;
+    frame.image->rgba.resize(pixels);
+    frame.image->depth.resize(frame.wantAll ? pixels : 0);
+    frame.image->normal.resize(frame.wantAll ? pixels * 3 : 0);
+    frame.image->linear.resize(frame.wantAll ? pixels * 3 : 0);
+    frame.pyramid.resize(w, h);
+    if (frame.visibilityPixels == pixels) return;  // it is clear whatever its shape
+    frame.visibilityPixels = pixels;
+    frame.visibility.assign(pixels, ~uint64_t{0});
+    frame.runs.assign(pixels / Visibility::kRun + 1, 0);
+}
+
+}  // namespace
+
+void clear(Frame& frame) {
+    resize(frame);
+    frame.blocks.resize(frame.draws->blocks.size());
+    for (size_t b = 0; b < frame.blocks.size(); ++b) {
+        const shared::DrawBlock& block = frame.draws->blocks[b];
+        frame.blocks[b] = {frame.chunks.at(frame.draws->keys[block.node]).records.data() + block.first,
+                           &frame.draws->nodes[block.node]};
+    }
+    frame.strandBlocks.clear();
+    for (const shared::DrawBlock& block : frame.draws->strandBlocks)
+        frame.strandBlocks.push_back(
+            {frame.chunks.at(frame.draws->strandKeys[block.node]).segments.data() + block.first,
+             &frame.draws->strandNodes[block.node]});
+    frame.hasStrands = !frame.strandBlocks.empty();
+}
+
+void pull(Frame& frame) { frame.pyramid.pull(); }
+void push(Frame& frame) { frame.pyramid.push(); }
+
+RunPass runPassOf(render::Pass pass) {
+    static const std::map<render::Pass, RunPass> kTable{
+        {render::Pass::clear, clear},     {render::Pass::project, project},    {render::Pass::discs, fillDiscs},
+        {render::Pass::splat, splat},     {render::Pass::strands, drawCurves}, {render::Pass::rasterise, rasterise},
+        {render::Pass::resolve, resolve}, {render::Pass::pull, pull},          {render::Pass::push, push},
+    };
+    const auto found = kTable.find(pass);
+    return found == kTable.end() ? nullptr : found->second;
+}
+
+}  // namespace stipple::cpu

@@ -1,0 +1,27 @@
+// Ribbons and tubes into the visibility buffer.
+#include "engine/cpu/passes/passes.h"
+
+namespace stipple::cpu {
+
+void drawCurves(Frame& frame) {
+    CompletionQueue<std::vector<WideStrand>> found;
+    frame.wide.clear();
+    frame.executor.parallelFor(frame.strandBlocks.size(), 4, [&](size_t begin, size_t end) {
+        std::vector<WideStrand> mine;
+        const WideSink sink{
+            &mine, [](void* to, const WideStrand& s) { static_cast<std::vector<WideStrand>*>(to)->push_back(s); }};
+        for (size_t b = begin; b < end; ++b) {
+            const uint32_t left = frame.strandBlocks[b].node->count - frame.draws->strandBlocks[b].first;
+            frame.k.drawSegments(frame.constants, frame.strandBlocks[b], std::min(left, shared::kSegmentsPerBlock),
+                                 static_cast<uint32_t>(b * shared::kSegmentsPerBlock), sink, frame.visible());
+        }
+        if (!mine.empty()) found.push(std::move(mine));
+    });
+    for (const auto& some : found.takeAll()) frame.wide.insert(frame.wide.end(), some.begin(), some.end());
+    if (!frame.wide.empty())
+        frame.forBands([&](uint32_t first, uint32_t last) {
+            frame.k.fillWide(frame.constants, frame.wide.data(), frame.wide.size(), first, last, frame.visible());
+        });
+}
+
+}  // namespace stipple::cpu

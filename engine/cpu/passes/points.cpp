@@ -1,0 +1,80 @@
+// Points into the visibility buffer: one pixel each, wide discs by rays.
+#include <array>
+#include <atomic>
+
+#include "engine/cpu/passes/passes.h"
+
+namespace stipple::cpu {
+namespace {
+
+/// Does the cell of a node lie within the picture, so that none of its splats is beside it?
+bool isWithin(const shared::FrameConstants& f, const shared::DrawNode& node) {
+    for (uint32_t k = 0; k < 8; ++k) {
+        const auto along = [&](uint32_t bit) { return (k & bit) != 0 ? 65536.0f : 0.0f; };
+        const float x = node.base.x + node.axisX.x * along(1) + node.axisY.x * along(2) + node.axisZ.x * along(4),
+                    y = node.base.y + node.axisX.y * along(1) + node.axisY.y * along(2) + node.axisZ.y * along(4),
+                    z = node.base.z + node.axisX.z * along(1) + node.axisY.z * along(2) + node.axisZ.z * along(4);
+        const float px = x * f.focal / z + f.centre.x, py = y * f.focal / z + f.centre.y;
+        if (!(z > f.nearPlane && px >= 0 && py >= 0 && px < static_cast<float>(f.width) &&
+              py < static_cast<float>(f.height)))
+            return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+void project(Frame& frame) {
+    std::vector<uint8_t> besideToo(frame.draws->nodes.size());  // of each node
+    CompletionQueue<std::vector<shared::WideDisc>> found;
+    for (size_t n = 0; n < besideToo.size(); ++n)
+        besideToo[n] = frame.mode->hasPyramid && ((frame.draws->nodes[n].octantMask & shared::kNodeWide) != 0 ||
+                                                  !isWithin(frame.constants, frame.draws->nodes[n]));
+    frame.executor.parallelFor(frame.blocks.size(), 32, [&](size_t begin, size_t end) {
+        alignas(64) std::array<uint32_t, shared::kRecordsPerBlock> pixel, depth;
+        std::vector<shared::WideDisc> mine;
+        for (size_t b = begin; b < end; ++b) {
+            const uint32_t count =
+                std::min(shared::kRecordsPerBlock, frame.blocks[b].node->count - frame.draws->blocks[b].first);
+            frame.k.projectBlock(frame.constants, *frame.blocks[b].node, frame.blocks[b].records, count,
+                                 besideToo[frame.draws->blocks[b].node] != 0, pixel.data(), depth.data());
+            constexpr uint32_t kAhead = 48;  // the pixels are scattered over 16 MB: ask for them in time
+            for (uint32_t i = 0; i < count; ++i) {
+                if (i + kAhead < count && pixel[i + kAhead] < kWidePixel)
+                    __builtin_prefetch(&frame.visibility[pixel[i + kAhead]], 1);
+                if (pixel[i] >= kWidePixel) {
+                    if (pixel[i] == ~0u) continue;
+                    const auto id = static_cast<uint32_t>(b) * shared::kRecordsPerBlock + i;
+                    const shared::WideDisc d = shared::wideDisc(*frame.blocks[b].node, frame.blocks[b].records[i],
+                                                                frame.constants.supportScale, id);
+                    if (shared::reachesPicture(d, frame.constants) > 0.5f) mine.push_back(d);
+                    continue;
+                }
+                const uint64_t key = uint64_t{depth[i]} << 32 | (b * shared::kRecordsPerBlock + i);
+                const std::atomic_ref<uint8_t> run(frame.runs[pixel[i] >> Visibility::kRunBits]);
+                if (run.load(std::memory_order_relaxed) == 0) run.store(1, std::memory_order_relaxed);
+                const std::atomic_ref<uint64_t> entry(frame.visibility[pixel[i]]);
+                uint64_t old = entry.load(std::memory_order_relaxed);
+                while (key < old && !entry.compare_exchange_weak(old, key, std::memory_order_relaxed)) {
+                }
+            }
+        }
+        if (!mine.empty()) found.push(std::move(mine));
+    });
+    frame.discs.clear();
+    for (const auto& some : found.takeAll()) frame.discs.insert(frame.discs.end(), some.begin(), some.end());
+    // Sums are rounded: their order must not be that of the threads.
+    std::sort(frame.discs.begin(), frame.discs.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
+    frame.discBoxes.clear();
+    for (const shared::WideDisc& d : frame.discs) frame.discBoxes.push_back(shared::discBox(d, frame.constants));
+}
+
+void fillDiscs(Frame& frame) {
+    if (!frame.discs.empty())
+        frame.forBands([&](uint32_t first, uint32_t last) {
+            frame.k.fillDiscs(frame.constants, frame.discs.data(), frame.discBoxes.data(), frame.discs.size(), first,
+                              last, frame.visible());
+        });
+}
+
+}  // namespace stipple::cpu

@@ -1,0 +1,75 @@
+// From the visibility buffer to the texels of level 0.
+#include <atomic>
+
+#include "engine/cpu/passes/passes.h"
+
+namespace stipple::cpu {
+namespace {
+
+/// Planes that only triangles need, and only those with a shining material.
+void preparePlanes(Frame& frame, size_t pixels) {
+    const auto fit = [&](HugeBuffer<uint32_t>& plane, size_t& size, bool isNeeded) {
+        if (isNeeded && size != pixels) {
+            plane.assign(pixels, 0);
+            size = pixels;
+        }
+    };
+    frame.hasTriangles = !frame.draws->meshDraws.empty();
+    frame.hasEmissive = false;
+    for (const shared::SurfaceMaterial& m : frame.draws->materials)
+        frame.hasEmissive = frame.hasEmissive || (frame.hasTriangles && m.emissive.x + m.emissive.y + m.emissive.z > 0);
+    fit(frame.surface, frame.surfacePixels, frame.hasTriangles);
+    fit(frame.emissive, frame.emissivePixels, frame.hasEmissive);
+}
+}  // namespace
+
+void resolve(Frame& frame) {
+    Level& fine = frame.pyramid.level(0);
+    Level* coarse = frame.mode->hasPyramid && frame.pyramid.levels() > 1 ? &frame.pyramid.level(1) : nullptr;
+    frame.pyramid.beginFrame(frame.constants, frame.hasStrands);
+    const Planes finePlanes = fine.planes();
+    preparePlanes(frame, size_t{fine.width} * fine.height);
+    const ResolveInput input{frame.blocks.data(),       frame.meshBlocks.data(), frame.draws->materials.data(),
+                             frame.strandBlocks.data(), frame.discs.data(),      frame.discBoxes.data(),
+                             frame.discs.size(),        frame.mode->fillsSplats};
+    std::atomic<float> largestRadius{0};
+    frame.pyramid.forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
+        TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
+        upper.hasTubes = lower.hasTubes = out.hasTubes = frame.hasStrands;
+        float largest = 0;
+        for (uint32_t y = row0; y < row1; y += 2) {
+            bool any = false;
+            for (TexelRow* row : {&upper, &lower}) {
+                const uint32_t yy = y + (row == &lower ? 1 : 0);
+                row->depth[kPad + n] = 0;  // beyond the right edge of an odd width
+                const size_t at = size_t{yy} * fine.width + x0;
+                if (yy >= row1 || !frame.isSeen(at, n)) {
+                    row->hasTubes = false;
+                    std::fill_n(row->depth + kPad, n, 0.0f);
+                    if (frame.hasStrands) Pyramid::clearTubes(*row);
+                    if (yy < row1) fine.empty(yy, x0, n);
+                    continue;
+                }
+                row->hasTubes = frame.hasStrands;  // may have; the kernel says whether it does
+                const bool has = frame.k.resolveRow(frame.constants, frame.tables, input, frame.visibility.data() + at,
+                                                    x0, yy, n, *row, largest, frame.planesAt(at));
+                if (has) {
+                    fine.hold(yy, x0, n);
+                    frame.k.packRow(*row, n, finePlanes.at(at));
+                } else {
+                    fine.empty(yy, x0, n);
+                }
+                any = any || has;
+            }
+            if (!coarse) continue;
+            frame.pyramid.pullPair(upper, lower, any, (n + 1) / 2, 1.0f, *coarse, x0 / 2, y / 2, out);
+        }
+        float seen = largestRadius.load(std::memory_order_relaxed);
+        while (largest > seen && !largestRadius.compare_exchange_weak(seen, largest, std::memory_order_relaxed)) {
+        }
+    });
+    std::fill(frame.runs.begin(), frame.runs.end(), uint8_t{0});  // resolveRow has cleared what they stood for
+    frame.pyramid.setLargestRadius(largestRadius.load());
+}
+
+}  // namespace stipple::cpu

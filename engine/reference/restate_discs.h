@@ -1,0 +1,37 @@
+// Points of the cut as discs in camera space, and those of them that are drawn as such: wide ones, and all in mode
+// splat.
+#pragma once
+
+#include <vector>
+
+#include "engine/reference/decode.h"
+#include "engine/reference/restate.h"
+
+namespace stipple::reference {
+
+/// The principal point and the focal length, px.
+struct Lens {
+    glm::dvec2 centre;
+    double focal;
+    glm::dvec3 rayTo(const glm::dvec2& pixel) const { return {(pixel - centre) / focal, 1}; }
+};
+Lens lensOf(const render::DrawList& draws);
+
+/// A point that is to be drawn: fine enough, and seen from its front.
+struct PlacedDisc {
+    glm::dvec3 centre, normal;  ///< camera space; of no normal, towards the eye
+    double radius;              ///< world units, as stored
+    glm::dvec3 colour;
+    uint32_t flags;
+    bool mayBeWide;  ///< discs of its node reach only a few of each other's spacings
+};
+std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks& chunks);
+
+/// Is a disc so wide that an ellipse a texel does not hold it?
+bool isWide(const lod::View& view, const PlacedDisc& disc);
+/// Every pixel whose ray meets these discs: the mean of those about the nearest.
+void showWide(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level);
+/// Every pixel whose ray meets a disc, and that of each disc's centre: the nearest.
+void showSplats(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level);
+
+}  // namespace stipple::reference

@@ -1,0 +1,54 @@
+// Passes of a frame: their names, and the planes that they read and write. Which of them a frame has is a pure function
+// of its reconstruction (reconstructions/) and of what it calls for.
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+
+namespace stipple::render {
+
+enum class Pass : uint8_t {
+    clear,
+    project,
+    discs,
+    splat,
+    strands,
+    rasterise,
+    resolve,
+    pull,
+    push,
+    surface,
+    light,
+    output
+};
+
+/// What passes hand on to each other, besides the draw list and the chunks, which all may read.
+enum class Plane : uint8_t {
+    visibility,  ///< the nearest of each pixel: depth and draw id
+    discList,    ///< wide discs that reach the picture
+    texels,      ///< level 0: the winner of each pixel as a splat; of exact pixels, what the pixel shows
+    coarse,      ///< the levels above
+    surface,     ///< what is seen at each pixel, whoever filled it
+    image
+};
+
+/// A set of planes.
+struct Planes {
+    uint32_t bits = 0;
+    constexpr Planes() = default;
+    constexpr Planes(std::initializer_list<Plane> planes) {
+        for (const Plane p : planes) bits |= 1u << static_cast<uint32_t>(p);
+    }
+    constexpr bool has(Plane p) const { return (bits >> static_cast<uint32_t>(p) & 1u) != 0; }
+};
+
+struct PassInfo {
+    Pass pass;
+    const char* name;
+    Planes reads, writes;
+    bool isOfOwnPixel;  ///< reads nothing but its own pixel of what the pass before wrote: may run in the same tile
+};
+const PassInfo& passInfo(Pass pass);
+const char* passName(Pass pass);
+
+}  // namespace stipple::render

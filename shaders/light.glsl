@@ -1,0 +1,47 @@
+// Light on a pixel of the surface buffer, to the eye.
+#include "surface.glsl"
+
+layout(set = 0, binding = 13, scalar) readonly buffer LightBlock { LightSource lights[]; };
+layout(set = 0, binding = 14, scalar) readonly buffer TriangleBlock { uint triangleWords[]; };  // two a pixel
+layout(set = 0, binding = 16, scalar) readonly buffer EnvironmentBlock { float environment[]; };
+#include "shared/environment.h"
+
+vec3 lightOf(Surface s, vec3 point) {
+    vec3 colour;
+    if (frame.hasEnvironment != 0u)
+        colour = frame.ambient * reflectEnvironment(s, frame.environmentX, frame.environmentY, frame.environmentZ);
+    else
+        colour = frame.ambient * reflectSky(s, frame.skyDirection);
+    if (frame.lightCount == 0u && frame.hasEnvironment == 0u) colour += reflectLight(s, frame.sunDirection, vec3(0.75));
+    for (uint k = 0u; k < frame.lightCount; ++k) {
+        const LightSource light = lights[k];
+        const vec3 l = light.kind == kLightDirectional ? light.position : light.position - point;
+        colour += reflectLight(s, normalize(l), light.colour * lightAt(light, point, point.z));
+    }
+    return colour;
+}
+
+// `colour`, `normal`: of the words.
+vec3 litColour(SurfaceWords words, vec3 colour, vec3 normal, uvec2 pixel) {
+    const bool isTriangle = (words.material & kPixelTriangle) != 0u;
+    const float leaf = (words.material & kPixelLeaf) != 0u ? 1.0 : 0.0;
+    if (isTriangle ? (words.material & kPixelUnlit) != 0u || (frame.shade & kShadeTriangles) == 0u : (frame.shade & kShadeLit) == 0u) return colour;
+    // Points under lights of the scene's own are surfaces like any other; else theirs is one formula.
+    if (!isTriangle && frame.lightCount == 0u && frame.hasEnvironment == 0u)
+        return colour * irradiance(normal, frame.sunDirection, frame.skyDirection, leaf);
+    const vec3 ray = vec3((vec2(pixel) + 0.5 - frame.centre) / frame.focal, 1.0);
+    Surface s;
+    s.colour = colour;
+    s.normal = normal;
+    s.toEye = -normalize(ray);
+    s.metallic = float(words.material & 255u) / 255.0;
+    s.roughness = float(words.material >> 8 & 255u) / 255.0;
+    s.occlusion = float(words.material >> 16 & 255u) / 255.0;
+    s.leaf = leaf;
+    vec3 lit = lightOf(s, ray * words.depth);
+    if (isTriangle) {
+        const uint e = triangleWords[2u * (pixel.y * frame.width + pixel.x) + 1u];
+        lit += vec3(unpackRed(e), unpackGreen(e), unpackBlue(e));
+    }
+    return lit;
+}

@@ -1,0 +1,36 @@
+// The picture's pixels, over the background. LIT: with the light on them, which reads nothing but its own pixel.
+#ifdef LIT
+#include "../light.glsl"
+#else
+#include "../surface.glsl"
+#endif
+layout(local_size_x = 64) in;
+
+void main() {
+    const uvec2 pixel = gl_GlobalInvocationID.xy;
+    if (pixel.x >= frame.width || pixel.y >= frame.height) return;
+    const uint at = pixel.y * frame.width + pixel.x;
+    const SurfaceWords s = surfaceBuffer[at];
+    const bool valid = s.depth > 0.0;
+    vec3 colour = frame.background;
+    vec3 n = vec3(0.0);
+    if (valid) {
+        n = octDecode(s.normal);
+        colour = vec3(unpackRed(s.albedo), unpackGreen(s.albedo), unpackBlue(s.albedo));
+#ifdef LIT
+        colour = litColour(s, colour, n, pixel);
+#endif
+    }
+    const vec3 c = clamp(colour, 0.0, 1.0);
+    const uvec3 bytes = uvec3(vec3(srgbFromLinear(c.x), srgbFromLinear(c.y), srgbFromLinear(c.z)) * 255.0 + 0.5);
+    image[at] = bytes.x | bytes.y << 8 | bytes.z << 16 | (valid ? 0xff000000u : 0u);
+    if (stepInfo.wantExtra == 0u) return;
+    const vec3 world = frame.viewX * n.x + frame.viewY * n.y + frame.viewZ * n.z;
+    extra[7u * at] = s.depth;
+    extra[7u * at + 1u] = world.x;
+    extra[7u * at + 2u] = world.y;
+    extra[7u * at + 3u] = world.z;
+    extra[7u * at + 4u] = colour.x;
+    extra[7u * at + 5u] = colour.y;
+    extra[7u * at + 6u] = colour.z;
+}

@@ -1,0 +1,54 @@
+// Points as discs that are drawn exactly (mode splat; Botsch & Kobbelt 2003, 3.1 and 3.2, with Eq 2 for a pinhole
+// camera): every pixel whose ray meets a disc is its own, at the depth where it does. The pixel that holds a disc's
+// centre is always one of them, at the centre's depth if its own ray misses: no disc is too small to be seen.
+#ifndef STIPPLE_SHARED_SPLAT_DISC_H
+#define STIPPLE_SHARED_SPLAT_DISC_H
+#include "splat_size.h"
+#include "wide_disc.h"
+SHARED_BEGIN
+
+// `scattered`: largestSplat of what no surface joins to others.
+SHARED_FN WideDisc splatDisc(DrawNode node, PointRecord r, float supportScale, float scattered, uint id) {
+    WideDisc d = wideDisc(node, r, supportScale, id);
+    const float cap = (recordFlags(r) & kFlagScattered) != 0u ? max(d.centre.z, 0.0f) * scattered : 3.0e38f;
+    d.radius = min(d.radius, cap);
+    d.id = id;
+    return d;
+}
+
+// 1 if a point's disc is to be drawn: it is fine enough for its node, and faces the eye.
+SHARED_FN float isSplatSeen(DrawNode node, PointRecord r, WideDisc d, float nearPlane) {
+    // Products, not conditions: compilers make SIMD of these.
+    const float drawnHere = float(int(node.octantMask >> recordOctant(r) & 1u));
+    const float fine = max(drawnHere, recordErrorCode(r) <= node.errorCode ? 1.0f : 0.0f);
+    const float front = dot(d.normal, d.centre) < 0.0f ? 1.0f : 0.0f;
+    const float seen = (recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) != 0u ? 1.0f : front;
+    // Of no normal, it faces the eye from where it is: behind the eye there is no such side.
+    const float isAhead = d.centre.z > nearPlane ? 1.0f : 0.0f;
+    const float faces = (recordFlags(r) & kFlagNoNormal) != 0u ? isAhead : 1.0f;
+    return fine * seen * faces;
+}
+
+// The pixel that holds the centre; x is -1 where there is none.
+struct CentrePixel {
+    int x;
+    int y;
+};
+SHARED_FN CentrePixel centrePixel(WideDisc d, FrameConstants f) {
+    const bool isAhead = d.centre.z > f.nearPlane;
+    const float scale = f.focal / (isAhead ? d.centre.z : 1.0f);
+    const float x = d.centre.x * scale + f.centre.x;
+    const float y = d.centre.y * scale + f.centre.y;
+    const float right = float(int(f.width)) - 0.5f;
+    const float bottom = float(int(f.height)) - 0.5f;
+    // Beside the picture, or behind the eye: less than 0.
+    const float within = min(min(x, right - floor(x)), min(y, bottom - floor(y)));
+    const bool isInside = (isAhead ? within : -1.0f) >= 0.0f;
+    CentrePixel p;
+    p.x = isInside ? int(x) : -1;
+    p.y = isInside ? int(y) : -1;
+    return p;
+}
+
+SHARED_END
+#endif

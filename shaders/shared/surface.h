@@ -1,0 +1,34 @@
+// The surface buffer: what is seen at a pixel, whichever reconstruction filled it, in 16 bytes. What lights it reads
+// nothing else (but the emission of triangles, which lies beside it).
+#ifndef STIPPLE_SHARED_SURFACE_H
+#define STIPPLE_SHARED_SURFACE_H
+#include "types.h"
+SHARED_BEGIN
+
+struct SurfaceWords {
+    float depth;    // linear, world units; 0: nothing
+    uint normal;    // octahedral 16 + 16, camera space, towards the eye
+    uint albedo;    // packColour
+    uint material;  // metallic 8 | roughness 8 | occlusion 8 | flags
+};
+const uint kPixelTriangle = 0x80000000u;
+const uint kPixelUnlit = 0x40000000u;
+const uint kPixelLeaf = 0x20000000u;      // lets light through
+const uint kPlainSurface = 0x00ffff00u;  // what points are: not metallic, rough, not occluded
+
+// The nearest code of a unit vector: see octDirection.
+SHARED_FN uint octEncode(vec3 n) {
+    const float inverse = 1.0f / max(abs(n.x) + abs(n.y) + abs(n.z), 1.0e-20f);
+    const float x = n.x * inverse;
+    const float y = n.y * inverse;
+    const float foldX = (1.0f - abs(y)) * (x >= 0.0f ? 1.0f : -1.0f);
+    const float foldY = (1.0f - abs(x)) * (y >= 0.0f ? 1.0f : -1.0f);
+    const float u = n.z < 0.0f ? foldX : x;
+    const float v = n.z < 0.0f ? foldY : y;
+    const uint cu = uint(int(floor((u + 1.0f) * 32767.0f + 0.5f)));
+    const uint cv = uint(int(floor((v + 1.0f) * 32767.0f + 0.5f)));
+    return cu | cv << 16;
+}
+
+SHARED_END
+#endif

@@ -1,0 +1,6 @@
+// The surface buffer, for the pass that fills it and for those that read it.
+#extension GL_GOOGLE_include_directive : require
+#include "bindings.glsl"
+#include "shared/surface.h"
+
+layout(set = 0, binding = 19, scalar) buffer SurfaceBufferBlock { SurfaceWords surfaceBuffer[]; };
