@@ -12,6 +12,7 @@
 #include "shared/record.h"
 #include "shared/shade.h"
 #include "shared/strand.h"
+#include "shared/visibility.h"
 
 layout(set = 0, binding = 0, scalar) readonly buffer FrameBlock { FrameConstants frame; };
 layout(set = 0, binding = 1, scalar) readonly buffer NodeBlock { DrawNode nodes[]; };

@@ -127,7 +127,7 @@ class CpuBackend final : public render::Backend {
         pyramid_.resize(w, h);
         if (visibilityPixels_ == pixels) return;  // it is clear whatever its shape
         visibilityPixels_ = pixels;
-        visibility_.assign(pixels, ~uint64_t{0});
+        visibility_.assign(pixels, shared::kNoKey);
         runs_.assign(pixels / Visibility::kRun + 1, 0);
     }
 
@@ -206,7 +206,7 @@ class CpuBackend final : public render::Backend {
                         if (shared::reachesPicture(d, frame_) > 0.5f) mine.push_back(d);
                         continue;
                     }
-                    const uint64_t key = uint64_t{depth[i]} << 32 | (b * shared::kRecordsPerBlock + i);
+                    const uint64_t key = shared::visibilityKey(depth[i], shared::drawId(static_cast<uint32_t>(b), i));
                     const std::atomic_ref<uint8_t> run(runs_[pixel[i] >> Visibility::kRunBits]);
                     if (run.load(std::memory_order_relaxed) == 0) run.store(1, std::memory_order_relaxed);
                     const std::atomic_ref<uint64_t> entry(visibility_[pixel[i]]);
@@ -258,7 +258,7 @@ class CpuBackend final : public render::Backend {
                                      static_cast<std::vector<LargeTriangle>*>(to)->push_back(t);
                                  }};
             for (size_t b = begin; b < end; ++b)
-                k_.rasterCluster(frame_, draws_->materials.data(), meshBlocks_[b], static_cast<uint32_t>(b * 256), sink,
+                k_.rasterCluster(frame_, draws_->materials.data(), meshBlocks_[b], static_cast<uint32_t>(b * shared::kClusterTriangles), sink,
                                  visibility());
             if (!mine.empty()) found_.push(std::move(mine));
         });

@@ -18,11 +18,10 @@ void main() {
     t.isRound = 0.0;
     t.axis = vec2(0.0);
     const uint64_t key = visibility[pixel.y * frame.width + pixel.x];
-    if ((uint(key) & 0xe0000000u) == 0u) {  // a point; triangles come later, and nothing has all bits set
-        const uint id = uint(key) & 0x1fffffffu;
-        const DrawBlock source = blocks[id / kRecordsPerBlock];
+    if (isPointKey(key, frame.firstBlock)) {  // other kinds come later
+        const DrawBlock source = blocks[keyBlock(key)];
         const DrawNode node = nodes[source.node];
-        const PointRecord r = Records(uvec2(node.addressLow, node.addressHigh)).records[source.first + id % kRecordsPerBlock];
+        const PointRecord r = Records(uvec2(node.addressLow, node.addressHigh)).records[source.first + keyLane(key)];
         const vec3 c = node.base + node.axisX * float(recordX(r)) + node.axisY * float(recordY(r)) + node.axisZ * float(recordZ(r));
         vec3 n = -normalize(c);
         if ((recordFlags(r) & kFlagNoNormal) == 0u) n = nodeDirection(node, octDecode(r.normal));
