@@ -122,17 +122,28 @@ struct CutScratch {
     /// What a frame remembers of an instance that it looks at.
     struct Slot {
         LocalView view;
-        double sway = 0;               ///< lattice units
-        double inputError = 0;         ///< in steps of the smallest error code
-        std::vector<int32_t> epsilon;  ///< by node: allowed error of tau = 1, 1/32 octave codes
-        std::vector<uint32_t> stamp;   ///< frame in which epsilon was set
+        double sway = 0;        ///< lattice units
+        double inputError = 0;  ///< in steps of the smallest error code
+        size_t first = 0;       ///< of its nodes in `allowed`
+    };
+    /// Of a node: allowed error of tau = 1 in 1/32 octave codes, and the frame that it is of.
+    struct Allowed {
+        int32_t epsilon = 0;
+        uint32_t frame = 0;
+    };
+    /// Members of crowds that are drawn themselves, and the evaluation in which each was last found to be.
+    struct Members {
+        std::vector<uint32_t> stamp, active;
+        uint32_t evaluation = 0;
     };
     std::deque<Slot> slots;
     uint32_t slotsUsed = 0;
+    std::vector<Allowed> allowed;
+    size_t allowedUsed = 0;
     std::vector<std::pair<uint32_t, uint32_t>> slotOf;  ///< by instance: frame and slot
     std::vector<uint32_t> drivers;                      ///< instances that are not driven by others
-    std::vector<uint32_t> activeStamp, active;          ///< members of crowds that are drawn themselves
-    uint32_t evaluation = 0;
+    std::vector<uint8_t> isReady;                       ///< of each crowd: can its members be drawn?
+    Members members;
     std::vector<uint32_t> stack;
     std::vector<uint8_t> groupState, tileSeen;
     uint32_t frame = 0;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "lod/kinds.h"
+
 namespace stipple::lod {
 namespace {
 
@@ -26,7 +28,7 @@ class Planner {
     void keepOnly(const Cut& cut) {
         fill(0);
         for (const auto& [source, node] : cut.keep)
-            if (!std::exchange(plan_.chunks[source][node], uint8_t{1})) plan_.bytes += of_[source]->decodedBytes(node);
+            if (!std::exchange(plan_.chunks[source][node], uint8_t{1})) plan_.bytes += decodedBytes(*of_[source], node);
     }
     bool fits() const { return plan_.bytes <= residentBytes_; }
 
@@ -42,7 +44,7 @@ class Planner {
         bool isLean = false, grew = false;
         for (const CutWanted& w : wanted_) {
             if (asked_[w.source][w.node] || !hasParents(w)) continue;
-            const uint64_t bytes = of_[w.source]->decodedBytes(w.node);
+            const uint64_t bytes = decodedBytes(*of_[w.source], w.node);
             if (plan_.bytes + bytes > residentBytes_ && !isLean) {
                 const std::vector<std::vector<uint8_t>> before = plan_.chunks;
                 keepOnly(cut);
@@ -63,17 +65,14 @@ class Planner {
   private:
     void add(const CutWanted& w) {
         plan_.chunks[w.source][w.node] = 1;
-        plan_.bytes += of_[w.source]->decodedBytes(w.node);
+        plan_.bytes += decodedBytes(*of_[w.source], w.node);
     }
     /// Is there all that the chunk builds on?
     bool hasParents(const CutWanted& w) const {
         const Hierarchy& h = *of_[w.source];
         if (w.node >= h.nodes.size()) return true;  // a texture tile
-        if (!h.isMesh()) return w.node == 0 || plan_.chunks[w.source][h.nodes[w.node].parent];
-        const MeshGroup& g = h.groups[w.node];
-        for (uint32_t k = 0; k < g.parents; ++k)
-            if (!plan_.chunks[w.source][h.parents[g.firstParent + k]]) return false;
-        return true;
+        const std::span<const uint32_t> parents = traitsOf(h).dependsOn(h, w.node);
+        return std::all_of(parents.begin(), parents.end(), [&](uint32_t p) { return plan_.chunks[w.source][p] != 0; });
     }
 
     uint64_t residentBytes_;

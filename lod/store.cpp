@@ -9,6 +9,7 @@
 #include "engine/base/hash.h"
 #include "lod/attributes.h"
 #include "lod/description.h"
+#include "lod/kinds.h"
 #include "lod/mesh_place.h"
 #include "lod/store_check.h"
 #include "lod/store_layout.h"
@@ -389,13 +390,7 @@ ChunkPlace chunkPlace(const Hierarchy& h, uint32_t index) {
 Result<Chunk> decodeNode(const Hierarchy& h, uint32_t index, const uint8_t* bytes, size_t count,
                          const std::string& where, bool wantLowBits) {
     if (index >= h.nodes.size()) return decodeTile(bytes, count, where);
-    const uint32_t records = h.nodes[index].records;
-    if (h.isStrands) return decodeStrandChunk(bytes, count, records, where);
-    const MeshVertices vertices = h.rootLog2 <= kShortMeshBits ? MeshVertices::shortOnes
-                                  : hasPairs(h.nodes[index])   ? MeshVertices::pairs
-                                                               : MeshVertices::counted;
-    return h.isMesh() ? decodeMeshChunk(bytes, count, records, h.groups[index], vertices, where)
-                      : decodeChunk(bytes, count, records, where, wantLowBits);
+    return traitsOf(h).decode(h, index, bytes, count, where, wantLowBits);
 }
 
 Result<std::vector<uint8_t>> readAttribute(const Store& store, uint32_t index, size_t attribute) {

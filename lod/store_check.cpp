@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "lod/kinds.h"
 #include "lod/mesh_place.h"
 
 namespace stipple::lod {
@@ -122,7 +123,7 @@ Result<void> checkGroups(const Store& store, uint64_t chunksEnd) {
 Result<void> checkNodes(const Store& store, uint64_t chunksEnd) {
     const Hierarchy& h = store.hierarchy;
     const auto& nodes = h.nodes;
-    const uint64_t stride = h.isStrands ? sizeof(shared::StrandSegment) : sizeof(shared::PointRecord);
+    const uint64_t stride = traitsOf(h).recordBytes;
     uint64_t next = 1;
     for (size_t i = 0; i < nodes.size(); ++i) {
         const Node& n = nodes[i];

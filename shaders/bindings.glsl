@@ -12,6 +12,7 @@
 #include "shared/record.h"
 #include "shared/shade.h"
 #include "shared/strand.h"
+#include "shared/visibility.h"
 
 layout(set = 0, binding = 0, scalar) readonly buffer FrameBlock { FrameConstants frame; };
 layout(set = 0, binding = 1, scalar) readonly buffer NodeBlock { DrawNode nodes[]; };
@@ -37,7 +38,8 @@ layout(push_constant, scalar) uniform Step {
     uint wantExtra;  // write depth, normals and linear colour
     uint hasPyramid;
     uint hasTubes;  // texels may be of tubes
-    uint count;  // clusters (rasterise); blocks (strands); whether there are triangles (surface), exact points (resolve)
+    uint count;     // clusters (rasterise); blocks (strands); first block (discs); whether there are triangles
+                    // (surface), exact points (resolve)
 } stepInfo;
 
 // Levels whose texels are larger than the largest splat hold nothing; the resolve pass has measured it.

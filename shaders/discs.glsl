@@ -7,5 +7,4 @@ layout(set = 0, binding = 18, scalar) coherent buffer DiscBlock {
     uint discCount;
     WideDisc discs[];
 };
-const uint kPointMask = 0x1fffffffu;  // of a visibility id
 

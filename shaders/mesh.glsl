@@ -127,6 +127,6 @@ bool isCovered(LargeTriangle t, int x, int y, out float inverseDepth) {
     return w0 >= b0 && w1 >= b1 && w2 >= b2;
 }
 
-void offer(int x, int y, float inverseDepth, uint id) {
-    atomicMin(visibility[uint(y) * frame.width + uint(x)], uint64_t(floatBitsToUint(1.0 / inverseDepth)) << 32 | uint64_t(id));
+void offer(int x, int y, float inverseDepth, uint64_t id) {
+    atomicMin(visibility[uint(y) * frame.width + uint(x)], visibilityKey(floatBitsToUint(1.0 / inverseDepth), id));
 }

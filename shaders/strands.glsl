@@ -43,9 +43,9 @@ void offerWide(WideStrand s, Ribbon ribbon, int x, int y) {
     const float ey = (float(y) + 0.5 - frame.centre.y) * (1.0 / frame.focal);
     if (s.isRound != 0u) {
         const TubeHit hit = tubeHit(tubeOf(s.a, s.b, s.radiusA, s.radiusB), ex, ey, frame.nearPlane, false);
-        if (hit.depth < kNoDepth) offer(x, y, 1.0 / hit.depth, s.id);
+        if (hit.depth < kNoDepth) offer(x, y, 1.0 / hit.depth, drawId(frame.firstBlock.curves, s.id));
         return;
     }
     const RibbonHit hit = ribbonHit(ribbon, ex, ey, frame.nearPlane, kRibbonSlack);
-    if (hit.depth < kNoRibbon) offer(x, y, 1.0 / hit.depth, s.id);
+    if (hit.depth < kNoRibbon) offer(x, y, 1.0 / hit.depth, drawId(frame.firstBlock.curves, s.id));
 }

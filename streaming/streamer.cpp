@@ -9,6 +9,7 @@
 
 #include "engine/base/check.h"
 #include "engine/base/hash.h"
+#include "lod/kinds.h"
 #include "lod/store.h"
 
 namespace stipple::streaming {
@@ -156,12 +157,7 @@ void Streamer::countInParents(ChunkKey key, int change) {
         uint16_t& children = source.nodes[parent].residentChildren;
         children = static_cast<uint16_t>(children + change);
     };
-    if (h.isMesh()) {
-        const lod::MeshGroup& group = h.groups[key.node];
-        for (uint32_t k = 0; k < group.parents; ++k) count(h.parents[group.firstParent + k]);
-    } else if (key.node != 0) {
-        count(h.nodes[key.node].parent);
-    }
+    for (const uint32_t parent : lod::traitsOf(h).dependsOn(h, key.node)) count(parent);
 }
 
 void Streamer::evict(ChunkKey key) {
@@ -169,7 +165,7 @@ void Streamer::evict(ChunkKey key) {
     sink_.evict(key);
     setState(key, ChunkState::absent);
     countInParents(key, -1);
-    counters_.residentBytes -= source.hierarchy->decodedBytes(key.node);
+    counters_.residentBytes -= lod::decodedBytes(*source.hierarchy, key.node);
     ++counters_.evictions;
 }
 
@@ -182,8 +178,8 @@ bool Streamer::makeRoom(uint64_t bytes) {
             for (uint32_t n = 1; n < sources_[i].nodes.size(); ++n) {
                 const NodeState& s = sources_[i].nodes[n];
                 const lod::Hierarchy& h = *sources_[i].hierarchy;
-                if (h.isMesh() && n < h.nodes.size() && h.groups[n].parents == 0) continue;
                 if (s.state != ChunkState::resident || s.residentChildren != 0 || s.lastUsed >= oldestUse) continue;
+                if (n < h.nodes.size() && lod::traitsOf(h).dependsOn(h, n).empty()) continue;
                 oldestUse = s.lastUsed;
                 oldest = {i, n};
                 found = true;
@@ -234,7 +230,7 @@ void Streamer::makeRoomFor(const lod::ResidentPlan& plan) {
             if (isPlanned({s, n})) state.retryAt = 0;  // there was no room; now there is
             if (state.state != ChunkState::resident || isPlanned({s, n})) continue;
             others.push_back({s, n});
-            together += sources_[s].hierarchy->decodedBytes(n);
+            together += lod::decodedBytes(*sources_[s].hierarchy, n);
         }
     const auto last = [&](ChunkKey k) { return sources_[k.source].nodes[k.node].lastUsed; };
     // What builds on others was not used later than they, and has the higher number.
@@ -244,7 +240,7 @@ void Streamer::makeRoomFor(const lod::ResidentPlan& plan) {
     });
     for (const ChunkKey key : others) {
         if (plan.isComplete() && together <= settings_.residentBytes) break;
-        together -= sources_[key.source].hierarchy->decodedBytes(key.node);
+        together -= lod::decodedBytes(*sources_[key.source].hierarchy, key.node);
         evict(key);
     }
 }

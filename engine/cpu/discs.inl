@@ -8,6 +8,7 @@ void fillDiscs(const FrameConstants& frame, const WideDisc* discs, const DiscBox
     alignas(64) float depth[kTile];
     for (size_t k = 0; k < count; ++k) {
         const WideDisc d = discs[k];
+        const uint64_t id = drawId(f.firstBlock.discs, d.id);
         const DiscBox& box = boxes[k];
         const int y0 = box.y.first < int(firstRow) ? int(firstRow) : box.y.first;
         const int y1 = box.y.last > int(lastRow) ? int(lastRow) : box.y.last;
@@ -22,7 +23,7 @@ void fillDiscs(const FrameConstants& frame, const WideDisc* discs, const DiscBox
                 const size_t first = size_t(y) * f.width + size_t(from);
                 for (int i = 0; i < n; ++i)
                     if (depth[i] < kNoDisc)
-                        offerKey(visibility, first + size_t(i), uint64_t{floatBitsToUint(depth[i])} << 32 | d.id);
+                        offerKey(visibility, first + size_t(i), visibilityKey(floatBitsToUint(depth[i]), id));
             }
     }
 }
@@ -88,7 +89,7 @@ void resolveDiscs(const FrameConstants& f, const Tables& tables, const ResolveIn
         s.weight[i] = s.inverseDepth[i] = s.nx[i] = s.ny[i] = s.nz[i] = s.red[i] = s.green[i] = s.blue[i] = 0.0f;
     }
     for (size_t k = 0; k < in.discCount; ++k) {
-        const uint32_t id = in.discs[k].id & ~kKindMask;
+        const uint32_t id = in.discs[k].id;
         const DiscBox& box = in.discBoxes[k];
         if (int(y) < box.y.first || int(y) > box.y.last || int(x0) > box.x.last || int(x0 + kTile) <= box.x.first)
             continue;

@@ -12,6 +12,7 @@
 #include "shaders/shared/strand.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/texture.h"
+#include "shaders/shared/visibility.h"
 #include "shaders/shared/wide_disc.h"
 
 namespace stipple::cpu {
@@ -104,12 +105,12 @@ struct MeshBlock {
 struct LargeTriangle {
     int32_t x[3], y[3];
     float inverseDepth[3];
-    uint32_t id;
+    uint64_t id;  ///< drawId
 };
 /// A strand so wide that its pixels are filled, and so large that its rows are shared out among threads.
 struct WideStrand {
     bool isRound;
-    uint32_t id;
+    uint64_t id;              ///< drawId
     shared::Tube tube;        ///< what a tube's rays meet
     float left[2], right[2];  ///< tube: pixels around both ends; what lies between the boxes is all it covers
     float top[2], bottom[2];
@@ -217,15 +218,15 @@ struct Kernels {
     /// The picture's pixels, over the background.
     void (*outputRow)(const shared::FrameConstants& f, const Tables& tables, uint32_t n, const SurfaceRow& row,
                       const ShadeOutput& out);
-    /// Offers the triangles of one cluster (ids from firstId on) to the visibility buffer.
+    /// Offers the triangles of one cluster (places from firstPlace on) to the visibility buffer.
     void (*rasterCluster)(const shared::FrameConstants& f, const shared::SurfaceMaterial* materials,
-                          const MeshBlock& block, uint32_t firstId, const LargeSink& large,
+                          const MeshBlock& block, uint32_t firstPlace, const LargeSink& large,
                           const Visibility& visibility);
     /// Rows [firstRow, lastRow] of the triangles that were kept.
     void (*rasterLarge)(const shared::FrameConstants& f, const LargeTriangle* large, size_t count, uint32_t firstRow,
                         uint32_t lastRow, const Visibility& visibility);
-    /// Offers up to 256 segments of strands (ids from firstId on) to the visibility buffer.
-    void (*drawSegments)(const shared::FrameConstants& f, const StrandBlock& block, uint32_t count, uint32_t firstId,
+    /// Offers up to 256 segments of strands (places from firstPlace on) to the visibility buffer.
+    void (*drawSegments)(const shared::FrameConstants& f, const StrandBlock& block, uint32_t count, uint32_t firstPlace,
                          const WideSink& wide, const Visibility& visibility);
     /// Rows [firstRow, lastRow] of the strands that were kept.
     void (*fillWide)(const shared::FrameConstants& f, const WideStrand* strands, size_t count, uint32_t firstRow,

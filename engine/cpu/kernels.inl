@@ -222,6 +222,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
     const BlockSource* const blocks = in.blocks;
     uint32_t* const surface = planes.surface;
     const FrameConstants f = frame;
+    const BlockRanges firstBlock = f.firstBlock;
     constexpr size_t kPrefetch = 12;  // pixels ahead: records lie anywhere in memory
     Gathered g;
     WinningPixels triangles, strands, discs;
@@ -229,19 +230,22 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
     bool any = false, anyTurned = false;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
-        if (i + kPrefetch < n && (visibility[i + kPrefetch] & kKindMask) == 0) {
-            const auto ahead = static_cast<uint32_t>(visibility[i + kPrefetch]) & 0x1fffffffu;
-            __builtin_prefetch(blocks[ahead / kRecordsPerBlock].records + ahead % kRecordsPerBlock);
+        if (i + kPrefetch < n && isPointKey(visibility[i + kPrefetch], firstBlock)) {
+            const uint64_t ahead = visibility[i + kPrefetch];
+            __builtin_prefetch(blocks[keyBlock(ahead)].records + keyLane(ahead));
         }
         const uint64_t key = visibility[i];
-        if ((key & kKindMask) != 0) {  // nothing (all bits), or a triangle
-            if (key != ~uint64_t{0}) {
-                const uint64_t kind = key & kKindMask;
-                WinningPixels& to = kind == kKindTriangle ? triangles : kind == kKindStrand ? strands : discs;
+        if (!isPointKey(key, firstBlock)) {
+            if (key != kNoKey) {
+                const uint32_t kind = keyKind(key, firstBlock);
+                const bool isTriangle = kind == kKindTriangles, isCurve = kind == kKindCurves;
+                WinningPixels& to = isTriangle ? triangles : isCurve ? strands : discs;
                 to.pixel[to.count] = static_cast<uint32_t>(i);
-                to.id[to.count] = static_cast<uint32_t>(key) & ~kKindMask;
-                to.depth[to.count++] = uintBitsToFloat(static_cast<uint32_t>(key >> 32));
-                visibility[i] = ~uint64_t{0};
+                to.id[to.count] = keyPlace(key, isTriangle ? firstBlock.triangles
+                                                : isCurve  ? firstBlock.curves
+                                                           : firstBlock.discs);
+                to.depth[to.count++] = keyDepth(key);
+                visibility[i] = kNoKey;
             }
             g.x[i] = 0;
             g.y[i] = 0;
@@ -255,10 +259,9 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
             continue;
         }
         any = true;
-        visibility[i] = ~uint64_t{0};
-        const auto id = static_cast<uint32_t>(key) & 0x1fffffffu;
-        const BlockSource& block = blocks[id / kRecordsPerBlock];
-        const PointRecord r = block.records[id % kRecordsPerBlock];
+        visibility[i] = kNoKey;
+        const BlockSource& block = blocks[keyBlock(key)];
+        const PointRecord r = block.records[keyLane(key)];
         const DrawNode& node = *block.node;
         const float qx = float(int(recordX(r))), qy = float(int(recordY(r))), qz = float(int(recordZ(r)));
         g.x[i] = node.base.x + node.axisX.x * qx + node.axisY.x * qy + node.axisZ.x * qz;
@@ -267,7 +270,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         g.radius[i] = node.edge * tables.radiusFraction[recordRadiusCode(r)];
         g.normal[i] = r.normal;
         g.flags[i] = recordFlags(r);
-        g.front[i] = uintBitsToFloat(static_cast<uint32_t>(key >> 32));
+        g.front[i] = keyDepth(key);
         g.turned[i] = 0;
         if ((node.octantMask & kNodeTurned) != 0) {
             anyTurned = true;

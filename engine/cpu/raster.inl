@@ -22,7 +22,7 @@ template <typename T>
 struct Fixed {
     int64_t x[3], y[3];
     float inverseDepth[3];
-    uint32_t id;
+    uint64_t id;
 };
 
 [[gnu::always_inline]] inline void offerKey(const Visibility& visibility, size_t pixel, uint64_t key) {
@@ -35,8 +35,8 @@ struct Fixed {
     }
 }
 
-[[gnu::always_inline]] inline void offer(const Visibility& visibility, size_t pixel, float inverseDepth, uint32_t id) {
-    offerKey(visibility, pixel, uint64_t{floatBitsToUint(1.0f / inverseDepth)} << 32 | id);
+[[gnu::always_inline]] inline void offer(const Visibility& visibility, size_t pixel, float inverseDepth, uint64_t id) {
+    offerKey(visibility, pixel, visibilityKey(floatBitsToUint(1.0f / inverseDepth), id));
 }
 
 /// Pixels [fromX, toX] x [fromY, toY] of a triangle. `Int`: holds twice the area of the triangle and the box.
@@ -142,7 +142,7 @@ void fillRows(const FrameConstants& f, const Fixed& t, int firstRow, int lastRow
 
 /// What one triangle needs beside its corners.
 struct Candidate {
-    uint32_t id;
+    uint64_t id;
     bool isTwoSided;
     const MaskInput* mask;  ///< null: all of it counts
 };
@@ -255,7 +255,7 @@ void placeWide(const MeshBlock& block, float* x, float* y, float* z) {
 }
 
 void rasterCluster(const FrameConstants& frame, const SurfaceMaterial* materials, const MeshBlock& block,
-                   uint32_t firstId, const LargeSink& large, const Visibility& visibility) {
+                   uint32_t firstPlace, const LargeSink& large, const Visibility& visibility) {
     const MeshVertex* const vertices = block.vertices;
     const uint32_t* const triangles = block.triangles;
     const uint32_t vertexCount = block.counts & 0xffffu, triangleCount = block.counts >> 16;
@@ -284,7 +284,7 @@ void rasterCluster(const FrameConstants& frame, const SurfaceMaterial* materials
         const uint32_t a = t & 255u, b = t >> 8 & 255u, c = t >> 16 & 255u;
         const uint32_t surface = vertices[a].surface;
         MaskInput mask;
-        Candidate of{kKindTriangle | (firstId + k), (surface & kSurfaceTwoSided) != 0, nullptr};
+        Candidate of{drawId(f.firstBlock.triangles, firstPlace + k), (surface & kSurfaceTwoSided) != 0, nullptr};
         if ((surface & kSurfaceMasked) != 0) {
             mask = {block.textures,
                     &materials[m.firstMaterial + (surface & kSurfaceMaterialMask)],

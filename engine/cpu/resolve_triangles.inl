@@ -6,7 +6,7 @@
 /// The pixels of a row that show one kind of primitive.
 struct WinningPixels {
     uint32_t count;
-    alignas(64) uint32_t pixel[kTile], id[kTile];
+    alignas(64) uint32_t pixel[kTile], id[kTile];  ///< id: the place within its kind (visibility.h)
     alignas(64) float depth[kTile];
 };
 
@@ -125,8 +125,8 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
     uint32_t anyTextured = 0;
     const size_t n = p.count;
     for (size_t i = 0; i < n; ++i) {
-        const MeshBlock& block = in.meshBlocks[p.id[i] / 256u];
-        const uint32_t t = block.triangles[p.id[i] & 255u];
+        const MeshBlock& block = in.meshBlocks[p.id[i] / kClusterTriangles];
+        const uint32_t t = block.triangles[p.id[i] % kClusterTriangles];
         for (uint32_t k = 0; k < 3; ++k) {
             const MeshVertex& v = block.vertices[t >> (8 * k) & 255u];
             const vec3 at = placeOf(block, t >> (8 * k) & 255u);
@@ -177,9 +177,9 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
         }
     }
     for (size_t first = 0; first < n;) {
-        const MeshBlock& block = in.meshBlocks[p.id[first] / 256u];
+        const MeshBlock& block = in.meshBlocks[p.id[first] / kClusterTriangles];
         size_t end = first + 1;
-        while (end < n && surface[end] == surface[first] && in.meshBlocks[p.id[end] / 256u].mesh == block.mesh) ++end;
+        while (end < n && surface[end] == surface[first] && in.meshBlocks[p.id[end] / kClusterTriangles].mesh == block.mesh) ++end;
         applyMaterial({block.mesh, &in.materials[block.mesh->firstMaterial + (surface[first] & kSurfaceMaterialMask)],
                        block.textures, surface[first], first, end - first},
                       c, uv, planes.emissive != nullptr, s);
@@ -213,7 +213,7 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
     }
     if (f.debugView == kDebugLevel || f.debugView == kDebugError)
         for (size_t i = 0; i < n; ++i) {
-            const MeshBlock& block = in.meshBlocks[p.id[i] / 256u];
+            const MeshBlock& block = in.meshBlocks[p.id[i] / kClusterTriangles];
             const vec3 d =
                 f.debugView == kDebugLevel ? debugLevelColour(block.level) : debugErrorColour(block.errorPixels);
             s.red[i] = d.x;

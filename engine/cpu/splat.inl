@@ -114,8 +114,9 @@ void prepareSplats(const FrameConstants& frame, const PlacedSplat* splats, const
     }
 }
 
-/// The nearest of each pixel of a tile.
+/// The nearest of each pixel of a tile: bits of its depth, and which point, or kOther.
 struct TileFront {
+    static constexpr uint32_t kOther = ~0u;  ///< of another kind, or nothing: what is equally deep goes to points
     static constexpr size_t kPixels = size_t{SplatTile::kWidth} * SplatTile::kHeight;
     alignas(64) uint32_t depth[kPixels], id[kPixels];
 };
@@ -174,8 +175,9 @@ void splatTile(const FrameConstants& frame, const PlacedSplat* splats, const uin
     for (size_t y = 0; y < tile.height; ++y) {
         const uint64_t* const keys = visibility.keys + (tile.y0 + y) * f.width + tile.x0;
         for (size_t x = 0; x < tile.width; ++x) {
-            front.depth[y * SplatTile::kWidth + x] = static_cast<uint32_t>(keys[x] >> 32);
-            front.id[y * SplatTile::kWidth + x] = static_cast<uint32_t>(keys[x]);
+            front.depth[y * SplatTile::kWidth + x] = keyDepthBits(keys[x]);
+            front.id[y * SplatTile::kWidth + x] =
+                isPointKey(keys[x], f.firstBlock) ? keyPlace(keys[x], 0u) : TileFront::kOther;
         }
     }
     SplatBatch batch;
@@ -186,9 +188,11 @@ void splatTile(const FrameConstants& frame, const PlacedSplat* splats, const uin
     }
     for (size_t y = 0; y < tile.height; ++y) {
         const size_t first = (tile.y0 + y) * f.width + tile.x0;
-        for (size_t x = 0; x < tile.width; ++x)
-            visibility.keys[first + x] =
-                uint64_t{front.depth[y * SplatTile::kWidth + x]} << 32 | front.id[y * SplatTile::kWidth + x];
+        for (size_t x = 0; x < tile.width; ++x) {
+            const uint32_t id = front.id[y * SplatTile::kWidth + x];
+            if (id != TileFront::kOther)
+                visibility.keys[first + x] = visibilityKey(front.depth[y * SplatTile::kWidth + x], drawId(0u, id));
+        }
         for (size_t r = first >> Visibility::kRunBits; r <= (first + tile.width - 1) >> Visibility::kRunBits; ++r)
             __atomic_store_n(&visibility.runs[r], uint8_t{1}, __ATOMIC_RELAXED);
     }

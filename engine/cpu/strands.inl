@@ -118,7 +118,7 @@ void layLines(const FrameConstants& frame, Lines& lines, size_t count) {
 }
 
 /// Offers the pixels that were collected.
-void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pixels, size_t count, uint32_t firstId,
+void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pixels, size_t count, uint32_t firstPlace,
                 const Visibility& visibility) {
     const FrameConstants f = frame;
     const float width = float(int(f.width)), height = float(int(f.height));
@@ -144,16 +144,17 @@ void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pix
         depth[k] = floatBitsToUint((nearer[i] + u * dNearer[i]) / (inverse[i] + u * dInverse[i]));
         pixel[k] = taken > 0.5f ? where : ~0u;
     }
+    const uint64_t first = drawId(f.firstBlock.curves, firstPlace);
     constexpr size_t kAhead = 24;  // their cache lines come meanwhile
     for (size_t k = 0; k < count; ++k) {
         if (k + kAhead < count && pixels.pixel[k + kAhead] != ~0u)
             __builtin_prefetch(&visibility.keys[pixels.pixel[k + kAhead]], 1);
         if (pixels.pixel[k] == ~0u) continue;
-        offerKey(visibility, pixels.pixel[k], uint64_t{pixels.depth[k]} << 32 | kKindStrand | (firstId + segment[k]));
+        offerKey(visibility, pixels.pixel[k], visibilityKey(pixels.depth[k], first + segment[k]));
     }
 }
 
-void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_t count, uint32_t firstId,
+void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_t count, uint32_t firstPlace,
                   const WideSink& wide, const Visibility& visibility) {
     const FrameConstants f = frame;
     const DrawNode node = *block.node;
@@ -201,7 +202,7 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
     size_t collected = 0;
     for (size_t i = 0; i < count; ++i) {
         if (lines.keep[i] == 0) continue;
-        const uint32_t id = kKindStrand | (firstId + uint32_t(i));
+        const uint64_t id = drawId(f.firstBlock.curves, firstPlace + uint32_t(i));
         // One that covers much of the image is work for all threads.
         const auto fill = [&](const WideStrand& s, float columns, float rows) {
             if (min(rows, height) * min(columns, width) > float(kLargePixels))
@@ -231,13 +232,13 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
             pixels.segment[collected] = uint32_t(i);
             pixels.at[collected] = lines.first[i] + k;
             if (++collected < LinePixels::kMost) continue;
-            drawPixels(f, lines, pixels, collected, firstId, visibility);
+            drawPixels(f, lines, pixels, collected, firstPlace, visibility);
             collected = 0;
         }
         if (lines.pixelA[i] != ~0u) offer(visibility, lines.pixelA[i], lines.inverseA[i] / lines.nearerA[i], id);
         if (lines.pixelB[i] != ~0u) offer(visibility, lines.pixelB[i], lines.inverseB[i] / lines.nearerB[i], id);
     }
-    drawPixels(f, lines, pixels, collected, firstId, visibility);
+    drawPixels(f, lines, pixels, collected, firstPlace, visibility);
 }
 
 void fillWide(const FrameConstants& frame, const WideStrand* strands, size_t count, uint32_t firstRow, uint32_t lastRow,

@@ -68,7 +68,7 @@ void fillRibbon(const FrameConstants& f, const WideStrand& s, int firstRow, int 
             }
             const size_t firstPixel = size_t(y) * f.width + size_t(x0);
             for (int k = 0; k < count; ++k)
-                if (keep[k] != 0) offerKey(visibility, firstPixel + size_t(k), uint64_t{depth[k]} << 32 | s.id);
+                if (keep[k] != 0) offerKey(visibility, firstPixel + size_t(k), visibilityKey(depth[k], s.id));
         }
     }
 }
@@ -111,7 +111,7 @@ void fillTubeRows(const FrameConstants& f, const WideStrand& s, int firstRow, in
             }
             const size_t firstPixel = size_t(y) * f.width + size_t(x0);
             for (int k = 0; k < count; ++k)
-                if (keep[k] != 0) offerKey(visibility, firstPixel + size_t(k), uint64_t{depth[k]} << 32 | s.id);
+                if (keep[k] != 0) offerKey(visibility, firstPixel + size_t(k), visibilityKey(depth[k], s.id));
         }
     }
 }
@@ -131,7 +131,7 @@ void fillStrand(const FrameConstants& f, const WideStrand& s, int firstRow, int 
 }
 
 /// A tube that is to be filled, and the pixels around its ends. One that reaches beside the eye has one box.
-WideStrand wideTube(const FrameConstants& f, const CameraSegment& c, uint32_t id) {
+WideStrand wideTube(const FrameConstants& f, const CameraSegment& c, uint64_t id) {
     WideStrand w{};
     w.isRound = true;
     w.id = id;
@@ -155,7 +155,7 @@ WideStrand wideTube(const FrameConstants& f, const CameraSegment& c, uint32_t id
 }
 
 /// A ribbon that is to be filled, and its corners: those of the picture where one of its own has no place on it.
-WideStrand wideRibbon(const FrameConstants& f, const CameraSegment& c, uint32_t id) {
+WideStrand wideRibbon(const FrameConstants& f, const CameraSegment& c, uint64_t id) {
     WideStrand w{};
     w.id = id;
     w.ribbon = ribbonOf(c.a, c.b, c.directionA, c.directionB, c.radiusA, c.radiusB);

@@ -45,10 +45,11 @@ void overBlocks(const Recording& f, const char* label, const std::vector<BufferU
 }
 
 /// Groups for bands of rows: what covers many pixels is shared out.
-void overBands(const Recording& f, const char* label, const char* pipeline, const std::vector<BufferUse>& uses) {
+void overBands(const Recording& f, const char* label, const char* pipeline, const std::vector<BufferUse>& uses,
+               uint32_t count = 0) {
     f.list.begin(label, uses, false);
     f.pipelines.use(f.commands, pipeline);
-    pushStep(f, 0, 0);
+    pushStep(f, 0, count);
     vkCmdDispatch(f.commands, kLargeGroups, (f.levels[0].height + kLargeRows - 1) / kLargeRows, 1);
     f.list.end();
 }
@@ -82,7 +83,7 @@ void discs(const Recording& f) {
     f.pipelines.use(f.commands, "disc_order");
     vkCmdDispatch(f.commands, 1, 1, 1);
     f.list.end();
-    overBands(f, "discs", "discs", {write(b.visibility), read(b.discs)});
+    overBands(f, "discs", "discs", {write(b.visibility), read(b.discs)}, f.draws.frame.firstBlock.discs);
 }
 
 void splat(const Recording& f) {

@@ -58,9 +58,8 @@ class StrandProjector {
     StrandProjector(const render::DrawList& draws, Level& level)
         : draws_(draws), level_(level), view_(draws.view), f_(draws.frame) {}
 
-    void segment(const Segment& world, const lod::Instance& instance, const render::Bend& bend, uint32_t id,
-                 uint32_t lot, const dvec3* debugColour) {
-        id_ = id;
+    void segment(const Segment& world, const lod::Instance& instance, const render::Bend& bend, uint32_t lot,
+                 const dvec3* debugColour) {
         lot_ = lot;
         s_ = world;
         debugColour_ = debugColour;
@@ -283,7 +282,7 @@ class StrandProjector {
     const lod::View& view_;
     const shared::FrameConstants& f_;
     Segment s_;
-    uint32_t id_ = 0, lot_ = 0;
+    uint32_t lot_ = 0;
     const dvec3* debugColour_ = nullptr;
     dvec3 a_{0}, b_{0}, tangent_{0};
     double from_ = 0, to_ = 1, halfA_ = 0, halfB_ = 0;
@@ -295,7 +294,6 @@ class StrandProjector {
 void projectStrands(const render::DrawList& draws, const Chunks& chunks, Level& level) {
     StrandProjector projector(draws, level);
     for (Sample& s : level.samples) s.key = s.valid ? s.depth : 0;
-    uint32_t block = 0;
     for (size_t d = 0; d < draws.cut.size(); ++d) {
         const lod::CutDraw& cut = draws.cut[d];
         const lod::Instance& instance = draws.instances[cut.instance];
@@ -314,9 +312,8 @@ void projectStrands(const render::DrawList& draws, const Chunks& chunks, Level& 
             const shared::StrandVertex &va = chunk.segments[i].a, &vb = chunk.segments[i].b;
             const uint32_t lot = va.positionXY * 0x9e3779b1u ^ vb.positionXY * 0x85ebca6bu ^
                                  va.positionZ % 65536 * 0xc2b2ae35u ^ vb.positionZ % 65536 * 0x27d4eb2fu;
-            projector.segment(s, instance, bend, 0x40000000u | (block * 256 + i), lot, isDebug ? &colour : nullptr);
+            projector.segment(s, instance, bend, lot, isDebug ? &colour : nullptr);
         }
-        block += (cut.count + 255) / 256;
     }
 }
 

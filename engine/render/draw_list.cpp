@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/base/check.h"
 #include "lod/mesh_place.h"
+#include "shaders/shared/visibility.h"
 
 namespace stipple::render {
 
@@ -11,7 +13,7 @@ static_assert(sizeof(shared::PointRecord) == 16);
 static_assert(sizeof(shared::DrawNode) == 80);
 static_assert(sizeof(shared::DrawBlock) == 8);
 static_assert(sizeof(shared::StrandSegment) == 32);
-static_assert(sizeof(shared::FrameConstants) == 172);
+static_assert(sizeof(shared::FrameConstants) == 180);
 static_assert(sizeof(shared::MeshVertex) == 32);
 static_assert(sizeof(shared::MeshCluster) == 12);
 static_assert(sizeof(shared::DrawMesh) == 120);
@@ -190,7 +192,6 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
         d.errorPixels = draw.errorPixels;
         auto& nodes = h.isStrands ? out.strandNodes : out.nodes;
         auto& blocks = h.isStrands ? out.strandBlocks : out.blocks;
-        static_assert(shared::kSegmentsPerBlock == shared::kRecordsPerBlock);
         const auto index = static_cast<uint32_t>(nodes.size());
         for (uint32_t first = 0; first < draw.count; first += shared::kRecordsPerBlock)
             blocks.push_back({index, first});
@@ -247,7 +248,16 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     f.lightCount = static_cast<uint32_t>(out.lights.size());
     f.ambient = out.lights.empty() || settings.environment ? 1.0f : kAmbientBesideLights;
     f.background = settings.background;
-    f.blockCount = static_cast<uint32_t>(out.blocks.size());
+    // Blocks by kind (visibility.h): what is equally deep goes to points, then curves, then triangles.
+    static_assert(shared::kRecordsPerBlock == shared::kBlockLanes && shared::kSegmentsPerBlock == shared::kBlockLanes &&
+                  shared::kClusterTriangles == shared::kBlockLanes);
+    const size_t points = out.blocks.size(), curves = out.strandBlocks.size();
+    STIPPLE_CHECK(2 * points + curves + out.clusters < shared::kMostBlocks &&
+                      std::max({points, curves, size_t{out.clusters}}) < shared::kMostBlocksOfKind,
+                  "blocks of a frame");
+    f.firstBlock.curves = static_cast<uint32_t>(points);
+    f.firstBlock.triangles = f.firstBlock.curves + static_cast<uint32_t>(curves);
+    f.firstBlock.discs = f.firstBlock.triangles + out.clusters;
 }
 
 }  // namespace stipple::render

@@ -16,21 +16,21 @@ shared uint anyHere;
 void main() {
     const uvec2 pixel = gl_GlobalInvocationID.xy;
     const bool isInside = pixel.x < frame.width && pixel.y < frame.height;
-    uint64_t key = ~uint64_t(0);
+    uint64_t key = kNoKey;
     if (isInside) key = visibility[pixel.y * frame.width + pixel.x];
-    const bool isDisc = isInside && (uint(key) & ~kPointMask) == kKindDisc;
+    const bool isDisc = isInside && keyKind(key, frame.firstBlock) == kKindDiscs;
     if (gl_LocalInvocationID.x == 0u) anyHere = 0u;
     barrier();
     if (isDisc) anyHere = 1u;
     barrier();
     if (anyHere == 0u) return;
     const vec2 ray = (vec2(pixel) + 0.5 - frame.centre) * (1.0 / frame.focal);
-    const float depth = uintBitsToFloat(uint(key >> 32));
+    const float depth = keyDepth(key);
     DrawNode node;
     float apart = 0.0;
     PointRecord front;
     if (isDisc) {
-        const uint frontId = uint(key) & kPointMask;
+        const uint frontId = keyPlace(key, frame.firstBlock.discs);
         front = recordOf(frontId, node);
         apart = depthShared(wideDisc(node, front, frame.supportScale, frontId), ray.x, ray.y);
     }
@@ -54,7 +54,7 @@ void main() {
             const DiscHit hit = discHit(d, ray.x, ray.y, frame.nearPlane);
             const float w = discWeight(hit, depth, apart);
             if (w == 0.0) continue;
-            const PointRecord r = recordOf(d.id & kPointMask, node);
+            const PointRecord r = recordOf(d.id, node);
             weight += w;
             inverseDepth += w / hit.depth;
             n += d.normal * (dot(d.normal, d.centre) > 0.0 ? -w : w);

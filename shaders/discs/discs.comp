@@ -23,7 +23,7 @@ void main() {
             const ivec2 at = ivec2(x.first + p % width, y.x + p / width);
             const vec2 ray = (vec2(at) + 0.5 - frame.centre) * inverseFocal;
             const float depth = discHit(d, ray.x, ray.y, frame.nearPlane).depth;
-            if (depth < kNoDisc) atomicMin(visibility[uint(at.y) * frame.width + uint(at.x)], uint64_t(floatBitsToUint(depth)) << 32 | uint64_t(d.id));
+            if (depth < kNoDisc) atomicMin(visibility[uint(at.y) * frame.width + uint(at.x)], visibilityKey(floatBitsToUint(depth), drawId(stepInfo.count, d.id)));
         }
     }
 }

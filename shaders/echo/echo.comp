@@ -55,7 +55,9 @@ void main() {
     put(frame.sunDirection);
     put(frame.skyDirection);
     put(frame.background);
-    put(frame.blockCount);
+    put(frame.firstBlock.curves);
+    put(frame.firstBlock.triangles);
+    put(frame.firstBlock.discs);
     put(frame.lightCount);
     put(frame.ambient);
     put(frame.hasEnvironment);

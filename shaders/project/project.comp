@@ -1,4 +1,4 @@
-// One workgroup per block of 256 draw ids: each record to its pixel, by 64-bit atomic minimum of (depth, kind, id).
+// One workgroup per block of 256 draw ids: each record to its pixel, by 64-bit atomic minimum of (depth, draw id).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../discs.glsl"
@@ -7,7 +7,7 @@ layout(local_size_x = 256) in;
 
 void main() {
     const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * 65535u;
-    if (block >= frame.blockCount) return;
+    if (block >= frame.firstBlock.curves) return;
     const DrawBlock source = blocks[block];
     const DrawNode node = nodes[source.node];
     const uint index = source.first + gl_LocalInvocationID.x;
@@ -42,6 +42,6 @@ void main() {
         key = c.z + s.farther * radius / scale;
     }
     if (isOneSided && !(dot(nodeDirection(node, octDirection(r.normal)), c) < 0.0)) return;
-    const uint64_t entry = uint64_t(floatBitsToUint(key)) << 32 | uint64_t(block * kRecordsPerBlock + gl_LocalInvocationID.x);
-    atomicMin(visibility[uint(p.y) * frame.width + uint(p.x)], entry);
+    const uint64_t id = drawId(block, gl_LocalInvocationID.x);
+    atomicMin(visibility[uint(p.y) * frame.width + uint(p.x)], visibilityKey(floatBitsToUint(key), id));
 }

@@ -50,7 +50,7 @@ void takeTriangle(LargeTriangle t, DrawCluster c, uint surface, uint corners) {
         for (int x = x0; x <= x1; ++x) {
             float inverseDepth;
             if (isCovered(t, x, y, inverseDepth) && (!isMasked || isKept(c, corners, uvec2(x, y))))
-                offer(x, y, inverseDepth, t.id);
+                offer(x, y, inverseDepth, drawId(frame.firstBlock.triangles, t.id));
         }
 }
 
@@ -75,7 +75,7 @@ void main() {
     const uint word = Words(uvec2(c.trianglesLow, c.trianglesHigh)).words[i];
     const uint a = word & 255u, b = word >> 8 & 255u, d = word >> 16 & 255u;
     LargeTriangle t;
-    t.id = kKindTriangle | (block * 256u + i);
+    t.id = block * kClusterTriangles + i;
     if ((clipped[a] | clipped[b] | clipped[d]) == 0u) {
         t.x0 = snapped[a].x;
         t.y0 = snapped[a].y;

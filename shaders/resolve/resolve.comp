@@ -19,18 +19,17 @@ void main() {
     t.isRound = 0.0;
     t.axis = vec2(0.0);
     const uint64_t key = visibility[pixel.y * frame.width + pixel.x];
-    if ((uint(key) & 0xe0000000u) == 0u) {  // a point; triangles come later, and nothing has all bits set
-        const uint id = uint(key) & 0x1fffffffu;
-        const DrawBlock source = blocks[id / kRecordsPerBlock];
+    if (isPointKey(key, frame.firstBlock)) {  // other kinds come later
+        const DrawBlock source = blocks[keyBlock(key)];
         const DrawNode node = nodes[source.node];
-        const PointRecord r = Records(uvec2(node.addressLow, node.addressHigh)).records[source.first + id % kRecordsPerBlock];
+        const PointRecord r = Records(uvec2(node.addressLow, node.addressHigh)).records[source.first + keyLane(key)];
         const vec3 c = node.base + node.axisX * float(recordX(r)) + node.axisY * float(recordY(r)) + node.axisZ * float(recordZ(r));
         vec3 n = -normalize(c);
         if ((recordFlags(r) & kFlagNoNormal) == 0u) n = nodeDirection(node, octDecode(r.normal));
         const float radius = min(node.edge * radiusFraction(recordRadiusCode(r)) * frame.supportScale, c.z * largestSplat(recordFlags(r), frame.focal, frame.height));
         if (stepInfo.count != 0u) {  // no splat, but what the pixel shows
             const vec3 v = viewDirection(float(pixel.x) + 0.5 - frame.centre.x, float(pixel.y) + 0.5 - frame.centre.y, frame.focal);
-            t.depth = uintBitsToFloat(uint(key >> 32));
+            t.depth = keyDepth(key);
             t.radius = kExactRadius;
             t.thickness = (recordFlags(r) & kFlagLoose) != 0u ? kLeafThickness * kExactRadius : kExactRadius;
             t.normalPerp = perpFromNormal(dot(n, v) > 0.0 ? -n : n, v);

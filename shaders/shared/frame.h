@@ -42,6 +42,13 @@ struct DrawBlock {
     uint first;  // first record of this block within the node's chunk
 };
 
+// The first block of each kind of primitive but points, whose blocks begin at 0 (visibility.h).
+struct BlockRanges {
+    uint curves;
+    uint triangles;
+    uint discs;
+};
+
 const uint kShadeUnlit = 0u;
 const uint kShadeLit = 1u;        // points
 const uint kShadeTriangles = 2u;  // a bit of its own
@@ -68,7 +75,7 @@ struct FrameConstants {
     vec3 sunDirection;  // camera space, towards the sun
     vec3 skyDirection;  // camera space, up
     vec3 background;    // linear
-    uint blockCount;
+    BlockRanges firstBlock;
     uint lightCount;  // 0: the sun above, else these instead
     float ambient;    // share of the sky's light
     uint hasEnvironment;

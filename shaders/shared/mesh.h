@@ -79,9 +79,6 @@ struct DrawCluster {
     float errorPixels;
 };
 
-const uint kKindTriangle = 0x20000000u;  // bits 29 to 31 of a visibility id
-const uint kKindMask = 0xe0000000u;
-
 SHARED_FN vec3 meshPositionFrom(float qx, float qy, float qz, DrawMesh m) {
     return vec3(m.base.x + (m.axisX.x * qx + (m.axisY.x * qy + m.axisZ.x * qz)),
                 m.base.y + (m.axisX.y * qx + (m.axisY.y * qy + m.axisZ.y * qz)),

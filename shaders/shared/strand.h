@@ -23,7 +23,6 @@ struct StrandSegment {
 
 const float kStrandMargin = 0.5f;  // cells
 const float kStrandCells = 2.0f;   // across all positions
-const uint kKindStrand = 0x40000000u;
 const uint kSegmentsPerBlock = 256u;
 const float kNarrow = 0.5f;  // px: a strand of a smaller half-width keeps its own pixels, with some probability
 

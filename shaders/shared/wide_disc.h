@@ -9,14 +9,13 @@
 #include "splat.h"
 SHARED_BEGIN
 
-const uint kDiscCapacity = 65536u;   // of a gpu's list; what is beyond is drawn as an ellipse a texel
-const uint kKindDisc = 0x60000000u;  // of a visibility id: the rest is the point's
+const uint kDiscCapacity = 65536u;  // of a gpu's list; what is beyond is drawn as an ellipse a texel
 
 struct WideDisc {
     vec3 centre;
     vec3 normal;   // unit, any side
     float radius;  // world units
-    uint id;       // for the visibility buffer
+    uint id;       // the point's place among all points (visibility.h)
 };
 
 // From this radius on, px, a disc is wide: a 32nd of the longer side of the picture, at least 32. (Below, what
@@ -157,7 +156,7 @@ SHARED_FN WideDisc wideDisc(DrawNode node, PointRecord r, float supportScale, ui
     d.centre = recordPlace(node, r);
     d.normal = discNormal(node, r);
     d.radius = node.edge * supportScale * radiusFractionFast(recordRadiusCode(r));
-    d.id = kKindDisc | id;
+    d.id = id;
     return d;
 }
 

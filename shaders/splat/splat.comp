@@ -9,12 +9,12 @@ layout(local_size_x = 256) in;
 const int kMostPixels = 1024;
 
 void offer(int x, int y, float depth, uint id) {
-    atomicMin(visibility[uint(y) * frame.width + uint(x)], uint64_t(floatBitsToUint(depth)) << 32 | uint64_t(id));
+    atomicMin(visibility[uint(y) * frame.width + uint(x)], visibilityKey(floatBitsToUint(depth), drawId(0u, id)));
 }
 
 void main() {
     const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * 65535u;
-    if (block >= frame.blockCount) return;
+    if (block >= frame.firstBlock.curves) return;
     const DrawBlock source = blocks[block];
     const DrawNode node = nodes[source.node];
     const uint index = source.first + gl_LocalInvocationID.x;

@@ -8,12 +8,11 @@ void main() {
     const uvec2 pixel = gl_GlobalInvocationID.xy;
     if (pixel.x >= frame.width || pixel.y >= frame.height) return;
     const uint64_t key = visibility[pixel.y * frame.width + pixel.x];
-    if (key == ~uint64_t(0) || (uint(key) & kKindMask) != kKindStrand) return;
-    const uint id = uint(key) & ~kKindMask;
-    const DrawBlock source = blocks[frame.blockCount + id / kSegmentsPerBlock];
+    if (keyKind(key, frame.firstBlock) != kKindCurves) return;
+    const DrawBlock source = blocks[keyBlock(key)];
     const DrawNode node = nodes[source.node];
     const StrandSegment segment =
-        Segments(uvec2(node.addressLow, node.addressHigh)).segments[source.first + id % kSegmentsPerBlock];
+        Segments(uvec2(node.addressLow, node.addressHigh)).segments[source.first + keyLane(key)];
     const CameraSegment s = cameraSegment(node, segment);
     const float cx = frame.centre.x - 0.5 - float(pixel.x);
     const float cy = frame.centre.y - 0.5 - float(pixel.y);

@@ -39,7 +39,7 @@ void drawLine(WideStrand s) {
         const vec4 here = atA + u * (atB - atA);
         if (here.y < kNarrow && coverageThreshold(uint(y) * frame.width + uint(x), lot, frame.coverageSeed) >= 2.0 * here.y * longer)
             continue;
-        offer(x, y, here.x / here.z, s.id);
+        offer(x, y, here.x / here.z, drawId(frame.firstBlock.curves, s.id));
     }
 }
 
@@ -48,7 +48,7 @@ void drawEnd(float x, float y, float inverseDepth, float halfWidth, float nearer
     const uint pixel = uint(y) * frame.width + uint(x);
     const float share = 3.14159265 * halfWidth * halfWidth * (1.0 - across / max(2.0 * halfWidth, 1.0e-6));
     if (halfWidth < kNarrow && coverageThreshold(pixel, ~lot, frame.coverageSeed) >= share) return;
-    offer(int(x), int(y), inverseDepth / nearer, id);
+    offer(int(x), int(y), inverseDepth / nearer, drawId(frame.firstBlock.curves, id));
 }
 
 float nearerAt(vec3 end, vec3 t, float radius, float isRound) {
@@ -60,7 +60,7 @@ float nearerAt(vec3 end, vec3 t, float radius, float isRound) {
 void main() {
     const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * 65535u;
     if (block >= stepInfo.count) return;
-    const DrawBlock source = blocks[frame.blockCount + block];
+    const DrawBlock source = blocks[frame.firstBlock.curves + block];
     const DrawNode node = nodes[source.node];
     const uint index = source.first + gl_LocalInvocationID.x;
     if (index >= node.count) return;
@@ -125,7 +125,7 @@ void main() {
     s.nearerA = nearerAt(a, t, ra, c.isRound);
     s.nearerB = nearerAt(b, t, rb, c.isRound);
     const vec2 d = vec2(p.xb - p.xa, p.yb - p.ya);
-    s.id = kKindStrand | (block * kSegmentsPerBlock + gl_LocalInvocationID.x);
+    s.id = block * kSegmentsPerBlock + gl_LocalInvocationID.x;
     if (!isWide) {
         drawLine(s);
         const float across = max(abs(d.x), abs(d.y));

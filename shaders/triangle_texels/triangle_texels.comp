@@ -12,15 +12,15 @@ void main() {
     if (pixel.x >= frame.width || pixel.y >= frame.height) return;
     const uint place = pixel.y * frame.width + pixel.x;
     const uint64_t key = visibility[place];
-    const bool isTriangle = key != ~uint64_t(0) && (uint(key) & kKindMask) == kKindTriangle;
+    const bool isTriangle = keyKind(key, frame.firstBlock) == kKindTriangles;
     if (!isTriangle) {
         triangleWords[2u * place] = 0u;
         return;
     }
-    const uint id = uint(key) & ~kKindMask;
-    const DrawCluster c = clusters[id / 256u];
+    const uint id = keyPlace(key, frame.firstBlock.triangles);
+    const DrawCluster c = clusters[id / kClusterTriangles];
     const DrawMesh m = meshes[c.mesh];
-    const uint word = Words(uvec2(c.trianglesLow, c.trianglesHigh)).words[id & 255u];
+    const uint word = Words(uvec2(c.trianglesLow, c.trianglesHigh)).words[id % kClusterTriangles];
     Vertices vertices = Vertices(uvec2(c.verticesLow, c.verticesHigh));
     const MeshVertex va = vertices.vertices[word & 255u];
     const MeshVertex vb = vertices.vertices[word >> 8 & 255u];
@@ -62,7 +62,7 @@ void main() {
     }
     normal = surfaceNormal(normal, face, ray);
     Texel t;
-    t.depth = uintBitsToFloat(uint(key >> 32));
+    t.depth = keyDepth(key);
     t.radius = kTriangleRadius;
     t.thickness = kTriangleRadius;
     t.offset = vec2(0.0);

@@ -61,12 +61,13 @@ size_t& classOf(Beyond& b, const render::Image& image, const test::RayHits& hits
 }
 
 Beyond measure(const std::shared_ptr<const lod::Store>& store, const test::DiscField& full, const lod::View& view,
-               double tau, Executor& executor) {
+               double tau, Executor& executor, render::Mode mode = render::Mode::pullpush) {
     const auto backend = cpu::makeCpuBackend(executor);
     auto state = render::makeFrameState(std::vector<render::PlacedStore>{{store, {}, {}}}, *backend, executor, {});
     render::FrameSettings settings;
     settings.budgets.errorPixels = tau;
     settings.wantDepthAndNormal = true;
+    settings.mode = mode;
     EXPECT_TRUE(render::renderUntilComplete(*state, view, settings, executor).value_or(false));
     const render::Image& image = state->image;
     const test::RayHits hits = test::hitDiscs(test::discsOfCut(*store, *state), view);
@@ -159,6 +160,34 @@ TEST(FullDetail, OfScansIsWhereThePictureSays) {
                       {"close", 25, 0.25, 0.8, 4, 0.3, 0.6},
                       {"grazing", 4, 0.7, 1.8, 5, 0.8, 2.2}},
                      *executor);
+}
+
+// What mode splat draws keeps the bound at 0.01 % of the pixels and less: each pixel lies on a disc that was chosen.
+TEST(FullDetail, OfSplatsIsWhereThePictureSays) {
+    const auto executor = makeTbbExecutor(2);
+    const test::TempFolder folder;
+    std::vector<std::pair<std::string, std::string>> inputs;
+    for (const test::Shape shape : {test::Shape::statue, test::Shape::torus}) {
+        const std::string name = shape == test::Shape::statue ? "statue" : "torus";
+        test::writePly(folder / (name + ".ply"), test::samplesOf(shape, 40'000, 3));
+        inputs.emplace_back(name, folder / (name + ".ply"));
+    }
+    for (const char* name : {"01_meshes/misc/lucy.ply", "02_scans/als_ahn3_delft/ahn3_cropped_2.laz"})
+        if (const std::string path = test::dataFile(name); !path.empty()) inputs.emplace_back(name, path);
+    for (const auto& [name, path] : inputs) {
+        const auto store = test::buildAndOpen(path, folder / "a.stipple", *executor, 2048);
+        const test::DiscField full(test::leafDiscs(*store));
+        for (const auto& [elevation, distance] : {std::pair{35.0, 0.9}, {25.0, 0.5}, {4.0, 0.7}})
+            for (const double tau : {0.5, 1.0, 4.0}) {
+                const lod::View view = test::lookAt(*store, 30, elevation, distance, 400);
+                const Beyond b = measure(store, full, view, tau, *executor, render::Mode::splat);
+                std::printf("%s from %.0f degrees, tau %.1f: %zu drawn, beyond %.4f %%, worst %.1f px\n", name.c_str(),
+                            elevation, tau, b.drawn, b.share(b.all()), b.worst);
+                std::fflush(stdout);
+                EXPECT_GT(b.drawn, 20'000u);
+                EXPECT_LE(b.share(b.all()), 0.01) << name << " " << elevation << " " << tau;
+            }
+    }
 }
 
 }  // namespace

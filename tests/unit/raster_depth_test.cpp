@@ -23,14 +23,14 @@ struct Plane {
 };
 
 struct Picture {
-    std::vector<uint64_t> keys = std::vector<uint64_t>(size_t{kWidth} * kHeight, ~uint64_t{0});
+    std::vector<uint64_t> keys = std::vector<uint64_t>(size_t{kWidth} * kHeight, shared::kNoKey);
     std::vector<uint8_t> runs = std::vector<uint8_t>(kWidth * kHeight / cpu::Visibility::kRun + 1);
-    float depthAt(size_t pixel) const { return shared::uintBitsToFloat(static_cast<uint32_t>(keys[pixel] >> 32)); }
-    bool isCovered(size_t pixel) const { return keys[pixel] != ~uint64_t{0}; }
+    float depthAt(size_t pixel) const { return shared::keyDepth(keys[pixel]); }
+    bool isCovered(size_t pixel) const { return keys[pixel] != shared::kNoKey; }
 };
 
 /// Tiles the picture with triangles of about `size` pixels, vertices off the grid by a third of that.
-void drawPlane(const cpu::Kernels& kernels, const Plane& plane, double size, uint32_t firstId, Picture& picture) {
+void drawPlane(const cpu::Kernels& kernels, const Plane& plane, double size, uint32_t firstPlace, Picture& picture) {
     shared::FrameConstants frame{};
     frame.focal = static_cast<float>(kFocal);
     frame.centre = {0.5f * kWidth, 0.5f * kHeight};
@@ -74,7 +74,7 @@ void drawPlane(const cpu::Kernels& kernels, const Plane& plane, double size, uin
             block.triangles = triangles.data();
             block.mesh = &mesh;
             block.counts = 9 * (kCells + 1) | static_cast<uint32_t>(triangles.size()) << 16;
-            kernels.rasterCluster(frame, nullptr, block, firstId, none, {picture.keys.data(), picture.runs.data()});
+            kernels.rasterCluster(frame, nullptr, block, firstPlace, none, {picture.keys.data(), picture.runs.data()});
         }
 }
 
@@ -116,8 +116,7 @@ TEST(RasterDepth, ADenseSheetInFrontHidesWhatLiesBehindIt) {
             drawPlane(kernels, {kDistance, 0}, size, kSheet, picture);
             drawPlane(kernels, {kDistance + 0.05 * pixel, 0}, 4, kBehind, picture);
             size_t wrong = 0;
-            for (const uint64_t key : picture.keys)
-                wrong += (static_cast<uint32_t>(key) & ~shared::kKindMask) >= kBehind;
+            for (const uint64_t key : picture.keys) wrong += shared::keyPlace(key, 0) >= kBehind ? 1 : 0;
             EXPECT_EQ(wrong, 0u) << "triangles of " << size << " px";
         }
     });

@@ -18,7 +18,7 @@ void resize(Frame& frame) {
     frame.pyramid.resize(w, h);
     if (frame.visibilityPixels == pixels) return;  // it is clear whatever its shape
     frame.visibilityPixels = pixels;
-    frame.visibility.assign(pixels, ~uint64_t{0});
+    frame.visibility.assign(pixels, shared::kNoKey);
     frame.runs.assign(pixels / Visibility::kRun + 1, 0);
 }
 

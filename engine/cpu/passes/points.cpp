@@ -50,7 +50,7 @@ void project(Frame& frame) {
                     if (shared::reachesPicture(d, frame.constants) > 0.5f) mine.push_back(d);
                     continue;
                 }
-                const uint64_t key = uint64_t{depth[i]} << 32 | (b * shared::kRecordsPerBlock + i);
+                const uint64_t key = shared::visibilityKey(depth[i], shared::drawId(static_cast<uint32_t>(b), i));
                 const std::atomic_ref<uint8_t> run(frame.runs[pixel[i] >> Visibility::kRunBits]);
                 if (run.load(std::memory_order_relaxed) == 0) run.store(1, std::memory_order_relaxed);
                 const std::atomic_ref<uint64_t> entry(frame.visibility[pixel[i]]);

@@ -33,7 +33,7 @@ void rasterise(Frame& frame) {
                              }};
         for (size_t b = begin; b < end; ++b)
             frame.k.rasterCluster(frame.constants, frame.draws->materials.data(), frame.meshBlocks[b],
-                                  static_cast<uint32_t>(b * 256), sink, frame.visible());
+                                  static_cast<uint32_t>(b * shared::kClusterTriangles), sink, frame.visible());
         if (!mine.empty()) found.push(std::move(mine));
     });
     for (const auto& some : found.takeAll()) frame.large.insert(frame.large.end(), some.begin(), some.end());

@@ -1,0 +1,87 @@
+// What the cuts of all kinds share: a frame's inputs, the allowed errors of its nodes, and the members of instance
+// groups that are drawn themselves.
+#pragma once
+
+#include <cmath>
+
+#include "lod/cut.h"
+#include "lod/cut_view.h"
+#include "lod/kinds.h"
+
+namespace stipple::lod {
+
+/// One frame of selectCut. What is worked out of it on the way is remembered in `scratch` and the same whenever it is
+/// asked for: to ask is to change nothing.
+struct CutFrame {
+    const CutScene& scene;
+    const Residency& residency;
+    const View& view;
+    CutScratch& scratch;
+
+    const Instance& instance(uint32_t i) const { return scene.instances[i]; }
+    const Hierarchy& hierarchyOf(uint32_t i) const { return *scene.hierarchies[instance(i).hierarchy]; }
+    const std::vector<uint8_t>& drawableOf(uint32_t i) const { return residency.drawable[instance(i).source]; }
+};
+
+/// The members of instance groups that are drawn themselves, each once.
+struct ActiveMembers {
+    CutScratch::Members& of;
+    void clear() {
+        ++of.evaluation;
+        of.active.clear();
+    }
+    /// Those that a leaf of the group's points stands for.
+    void activate(const Crowd& group, uint32_t leaf) {
+        for (uint32_t k = group.first[leaf]; k < group.first[leaf + 1]; ++k) {
+            const uint32_t member = group.members[k];
+            if (of.stamp[member] == of.evaluation) continue;
+            of.stamp[member] = of.evaluation;
+            of.active.push_back(member);
+        }
+    }
+};
+
+/// What a frame remembers of instance i.
+CutScratch::Slot& slotOf(const CutFrame& frame, uint32_t i);
+
+/// Allowed error at tau = 1 px of a node, given its parent's (kInside: it has none).
+inline int32_t epsilonOf(const CutFrame& frame, const Hierarchy& h, const CutScratch::Slot& slot, uint32_t node,
+                         int32_t parentEpsilon) {
+    CutScratch::Allowed& memo = frame.scratch.allowed[slot.first + node];
+    if (memo.frame != frame.scratch.frame) {
+        memo.frame = frame.scratch.frame;
+        memo.epsilon = allowedError(h, h.nodes[node], slot.view, slot.sway);
+        // Nested spheres give eps_child >= eps_parent; this makes it so to the last rounding.
+        if (memo.epsilon != kCulled) memo.epsilon = std::max(memo.epsilon, parentEpsilon);
+    }
+    return memo.epsilon;
+}
+/// The same of a node that was asked about before.
+inline int32_t epsilonAt(const CutFrame& frame, const CutScratch::Slot& slot, uint32_t node) {
+    return frame.scratch.allowed[slot.first + node].epsilon;
+}
+
+/// Allowed error in steps of the smallest code at tau = 2^(step/32).
+inline double allowedAt(int32_t epsilon, int step) {
+    return epsilon == kInside ? 0.0 : std::exp2(static_cast<double>(epsilon + step) / kStepsPerOctave);
+}
+
+/// Screen-space error, px, of error code `code` at a node with allowed error `epsilon`.
+inline double pixelsOf(const CutScratch::Slot& slot, uint32_t code, int32_t epsilon) {
+    const double error = (code == 0 ? 0 : std::exp2(code / 8.0)) + slot.inputError;
+    if (error == 0) return 0;
+    return epsilon == kInside ? 1e6 : error * std::exp2(-static_cast<double>(epsilon) / kStepsPerOctave);
+}
+
+/// Entries of kinds.h, in a file each.
+CutCost costOfPoints(const CutFrame& frame, uint32_t instance, int step, uint64_t most, Counted counted,
+                     ActiveMembers* members);
+void emitPoints(const CutFrame& frame, uint32_t instance, int step, ActiveMembers& members, Cut& cut);
+CutCost costOfProgressive(const CutFrame& frame, uint32_t instance, int step, uint64_t most, Counted counted,
+                          ActiveMembers* members);
+void emitProgressive(const CutFrame& frame, uint32_t instance, int step, ActiveMembers& members, Cut& cut);
+CutCost costOfTriangles(const CutFrame& frame, uint32_t instance, int step, uint64_t most, Counted counted,
+                        ActiveMembers* members);
+void emitTriangles(const CutFrame& frame, uint32_t instance, int step, ActiveMembers& members, Cut& cut);
+
+}  // namespace stipple::lod

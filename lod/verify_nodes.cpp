@@ -1,0 +1,129 @@
+#include "lod/verify_nodes.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "lod/cut_view.h"
+#include "lod/mesh_place.h"
+
+namespace stipple::lod {
+namespace {
+
+/// What the cut relies on, of a point or of a segment.
+struct RecordFacts {
+    uint32_t code, octants;            ///< own error; octants whose children it stands for
+    std::array<glm::dvec3, 2> places;  ///< ends, lattice units
+    std::array<double, 2> radii;
+};
+
+RecordFacts factsOf(const Hierarchy& h, const Node& node, const Chunk& chunk, size_t i) {
+    const double step = std::exp2(node.stepShift), edge = h.cellSize(node);
+    const glm::dvec3 base = h.recordOrigin(node);
+    if (!h.isStrands) {
+        const shared::PointRecord& r = chunk.records[i];
+        const glm::dvec3 p = base + step * glm::dvec3(shared::recordX(r), shared::recordY(r), shared::recordZ(r));
+        const double radius = edge * static_cast<double>(shared::radiusFraction(shared::recordRadiusCode(r)));
+        return {shared::recordErrorCode(r), 1u << shared::recordOctant(r), {p, p}, {radius, radius}};
+    }
+    const shared::StrandSegment& s = chunk.segments[i];
+    RecordFacts facts{shared::segmentErrorCode(s), shared::segmentOctants(s), {}, {}};
+    for (size_t k = 0; k < 2; ++k) {
+        const shared::StrandVertex& v = k == 0 ? s.a : s.b;
+        facts.places.at(k) =
+            base + step * glm::dvec3(v.positionXY & 0xffffu, v.positionXY >> 16, v.positionZ & 0xffffu);
+        facts.radii.at(k) = edge * static_cast<double>(shared::strandRadius(v, 1.0f));
+    }
+    return facts;
+}
+
+glm::dvec3 coneAxis(const Node& node) { return glm::normalize(glm::dvec3(shared::octDecode(node.normalCone))); }
+double coneAngle(const Node& node) { return std::acos(std::min(double{node.normalConeCosine}, 1.0)); }
+
+/// Cones hide all that is below their node (facesAway), so each must be inside of those above it. kConeMargin is for
+/// the rounding of records' normals alone.
+bool isConeInside(const Node& node, const Node& parent) {
+    if (!(parent.normalConeCosine > 0)) return true;
+    constexpr double kRounding = 1e-7;  // radians, of axes in single precision; builders widen by more
+    const double sine = 0.5 * glm::length(coneAxis(node) - coneAxis(parent));
+    return 2 * std::asin(std::min(sine, 1.0)) + coneAngle(node) <= coneAngle(parent) + kRounding;
+}
+
+}  // namespace
+
+std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
+    const Node& node = h.nodes[index];
+    std::array<uint32_t, 256> own{};
+    uint32_t largest = 0;
+    for (size_t i = 0; i < node.records; ++i) {
+        const RecordFacts r = factsOf(h, node, chunk, i);
+        ++own.at(r.code);
+        largest = std::max(largest, r.code);
+        for (size_t k = 0; k < 2; ++k)
+            if (!(glm::length(r.places.at(k) - node.centre) + r.radii.at(k) <= node.radius * (1 + 1e-9) + 1e-6))
+                return "a record reaches out of the bounding sphere";
+        // Only exact records may stand in an octant without a child.
+        if (!h.isProgressive && r.code > 0 && node.childMask != 0 && (r.octants & ~uint32_t{node.childMask}) != 0)
+            return "a record has an error but its octant has no child";
+    }
+    if (!h.isLoose() && node.normalConeCosine > 0) {  // see facesAway
+        const glm::dvec3 axis = coneAxis(node);
+        const double widest = coneAngle(node) + kConeMargin;
+        for (const shared::PointRecord& r : chunk.records) {
+            if ((shared::recordFlags(r) & (shared::kFlagTwoSided | shared::kFlagNoNormal)) != 0)
+                return "a record can be seen from everywhere, but the node has a cone of normals";
+            const glm::dvec3 n = glm::normalize(glm::dvec3(shared::octDecode(r.normal)));
+            if (std::acos(std::clamp(glm::dot(axis, n), -1.0, 1.0)) > widest)
+                return "a normal is outside the node's cone";
+        }
+    }
+    if (!h.isProgressive && node.isLeaf() && largest != 0) return "a leaf record has an error";
+    if (largest != node.errorCode) return "the largest error is not the one in the node table";
+    uint32_t left = node.records;
+    for (uint32_t code = 0; code < 256; ++code) {
+        left -= own[code];
+        if (h.countGreater(node.ownCounts, node.records, code) != left) return "the counts per error code are wrong";
+    }
+    if (index == 0) return {};
+    const Node& parent = h.nodes[node.parent];
+    if (glm::length(node.centre - parent.centre) + node.radius > parent.radius * (1 + 1e-9) + 1e-6)
+        return "the bounding sphere is not inside the parent's";
+    if (!h.isLoose() && !isConeInside(node, parent)) return "the cone of normals is not inside the parent's";
+    if (node.errorCode > parent.errorCode) return "the error is larger than the parent's";
+    // Monotone along every chain: sorted by the parent's code, so the own code must not exceed it.
+    uint32_t position = 0;
+    for (int code = 255; code >= 0; --code) {
+        const uint32_t atLeast =
+            code == 0 ? node.records : h.countGreater(node.parentCounts, node.records, static_cast<uint32_t>(code) - 1);
+        for (; position < atLeast; ++position)
+            if (factsOf(h, node, chunk, position).code > static_cast<uint32_t>(code))
+                return "a record has a larger error than its parent record";
+    }
+    return {};
+}
+
+std::string checkGroup(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
+    const Node& node = h.nodes[index];
+    const MeshGroup& group = h.groups[index];
+    if (node.normalConeCosine > 0) return "a group of the mesh has a cone of normals";
+    for (const shared::MeshCluster& c : chunk.clusters)
+        for (uint32_t i = 0; i < verticesOf(node, c); ++i)
+            if (glm::length(vertexPlace(node, chunk, c, i) - node.centre) > node.radius * (1 + 1e-9))
+                return "a vertex reaches out of the bounding sphere";
+    uint32_t cluster = 0;
+    for (uint32_t r = 0; r < group.runs; ++r) {
+        const MeshRun& run = h.runs[group.firstRun + r];
+        uint32_t triangles = 0;
+        for (uint32_t c = 0; c < run.clusters; ++c, ++cluster) triangles += chunk.clusters.at(cluster).counts >> 16;
+        if (triangles != run.triangles) return "a run has not its number of triangles";
+    }
+    for (uint32_t k = 0; k < group.parents; ++k) {
+        const Node& parent = h.nodes[h.parents[group.firstParent + k]];
+        if (glm::length(node.centre - parent.centre) + node.radius > parent.radius * (1 + 1e-9))
+            return "the bounding sphere is not inside a parent's";
+        if (node.errorCode > parent.errorCode) return "the error is larger than a parent's";
+    }
+    return {};
+}
+
+}  // namespace stipple::lod

@@ -1,0 +1,43 @@
+// The visibility key: what is in front at a pixel. 64 bits, of which the smallest wins:
+//
+//   depth 31 | draw id 33 = 256 * block + lane
+//
+// depth: the bits of a linear depth in fp32, whose sign is always 0 (so that they sort like integers). Blocks are those
+// of the frame, sorted by kind: all of points, all of curves, all of triangles, then the points' once more, for those
+// that are wide discs (wide_disc.h). What is equally deep goes to the kinds in that order. This file alone knows bits.
+#ifndef STIPPLE_SHARED_VISIBILITY_H
+#define STIPPLE_SHARED_VISIBILITY_H
+#include "frame.h"
+SHARED_BEGIN
+
+const uint kKindPoints = 0u;
+const uint kKindCurves = 1u;
+const uint kKindTriangles = 2u;
+const uint kKindDiscs = 3u;
+const uint kKindNothing = 4u;
+
+const uint kBlockLanes = 256u;  // draw ids of a block
+const uint kLaneBits = 8u;
+const uint kMostBlocks = 1u << 25;        // of a frame, all kinds
+const uint kMostBlocksOfKind = 1u << 24;  // so that a place within a kind has 32 bits
+
+const uint64_t kNoKey = ~uint64_t(0);  // nothing is seen
+const uint64_t kDrawIdMask = (uint64_t(1) << 33) - uint64_t(1);
+
+// `place`: 256 * block + lane, counted from the first block of the kind on.
+SHARED_FN uint64_t drawId(uint firstBlock, uint place) { return (uint64_t(firstBlock) << kLaneBits) + uint64_t(place); }
+SHARED_FN uint64_t visibilityKey(uint depthBits, uint64_t id) { return uint64_t(depthBits) << 33 | id; }
+SHARED_FN uint keyDepthBits(uint64_t key) { return uint(key >> 33); }
+SHARED_FN float keyDepth(uint64_t key) { return uintBitsToFloat(keyDepthBits(key)); }
+SHARED_FN uint keyBlock(uint64_t key) { return uint((key & kDrawIdMask) >> kLaneBits); }
+SHARED_FN uint keyLane(uint64_t key) { return uint(key) % kBlockLanes; }
+SHARED_FN uint keyPlace(uint64_t key, uint firstBlock) { return uint((key & kDrawIdMask) - drawId(firstBlock, 0u)); }
+SHARED_FN bool isPointKey(uint64_t key, BlockRanges first) { return keyBlock(key) < first.curves; }
+SHARED_FN uint keyKind(uint64_t key, BlockRanges first) {
+    const uint block = keyBlock(key);
+    const uint solid = block < first.triangles ? kKindCurves : block < first.discs ? kKindTriangles : kKindDiscs;
+    return key == kNoKey ? kKindNothing : block < first.curves ? kKindPoints : solid;
+}
+
+SHARED_END
+#endif

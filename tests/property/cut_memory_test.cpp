@@ -1,0 +1,150 @@
+// A cut allocates nothing once its scratch is warm, with crowds and budgets too, and what it asks on the way about
+// costs leaves no trace in what it reports.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <new>
+
+#include "engine/cpu/cpu_backend.h"
+#include "engine/scene/camera.h"
+#include "tests/support/forests.h"
+#include "tests/support/meshes.h"
+#include "tests/support/support.h"
+
+namespace {
+std::atomic<uint64_t> allocations{0};
+}
+
+void* operator new(size_t bytes) {
+    ++allocations;
+    if (void* p = std::malloc(bytes)) return p;
+    throw std::bad_alloc();
+}
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, size_t) noexcept { std::free(p); }
+
+namespace stipple {
+namespace {
+
+constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max();
+
+/// Round a place, near and far.
+std::vector<lod::View> viewsOf(const glm::dvec3& centre, double size) {
+    std::vector<lod::View> views;
+    for (int k = 0; k < 40; ++k) {
+        scene::Camera camera;
+        const double a = 0.5 * k, distance = size * std::exp2(0.2 * (k % 20) - 1);
+        camera.eye = centre + distance * glm::dvec3(std::cos(a), 0.4, std::sin(a));
+        camera.target = centre;
+        camera.up = {0, 1, 0};
+        views.push_back(scene::makeView(camera, 1280, 720, 1e-3));
+    }
+    return views;
+}
+
+struct Laps {
+    uint64_t first = 0, second = 0;           ///< allocations
+    size_t bound = 0, partly = 0, mixed = 0;  ///< cuts with a budget that binds, that miss chunks, with some members
+};
+/// The same cuts twice with one scratch: every budget from every view, all resident and not.
+Laps fly(const lod::CutScene& scene, const std::vector<lod::View>& views) {
+    std::vector<std::vector<uint8_t>> all, some;
+    Rng rng(3);
+    for (const lod::Instance& i : scene.instances) {
+        if (all.size() <= i.source) all.resize(i.source + 1);
+        all[i.source].assign(scene.hierarchies[i.hierarchy]->chunks(), 1);
+    }
+    some = all;
+    for (auto& of : some)
+        for (size_t n = 1; n < of.size(); ++n) of[n] = rng.below(3) > 0 ? 1 : 0;
+    lod::CutScratch scratch;
+    lod::Cut cut;
+    Laps laps;
+    for (uint64_t* const count : {&laps.first, &laps.second})
+        for (const lod::View& view : views)
+            for (const auto* drawable : {&all, &some})
+                for (const uint64_t records : {kNoLimit, uint64_t{50'000}, uint64_t{5'000}}) {
+                    const uint64_t before = allocations;
+                    lod::selectCut(scene, {*drawable}, view, {1, records}, scratch, cut);
+                    *count += allocations - before;
+                    laps.bound += cut.tauTarget > 1 ? 1 : 0;
+                    laps.partly += cut.wanted.empty() ? 0 : 1;
+                    laps.mixed += cut.counters.crowdMembers > 0 ? 1 : 0;
+                }
+    return laps;
+}
+
+TEST(CutMemory, NothingIsAllocatedOnceWarm) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    test::writePly(folder / "a.ply", test::bumpySphere(30'000, 1));
+    const auto points = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    test::MeshRecipe recipe;
+    recipe.grow.kind = "terrain";
+    recipe.grow.triangles = 30'000;
+    recipe.grow.textureSize = 512;
+    const auto mesh = test::growMeshStore(recipe, folder / "b.stipple", *executor);
+    const std::vector<const lod::Hierarchy*> hierarchies{&points->hierarchy, &mesh->hierarchy};
+    std::vector<lod::Instance> instances(2);
+    instances[1].hierarchy = instances[1].source = 1;
+    const lod::Hierarchy& h = points->hierarchy;
+    const Laps laps = fly({hierarchies, instances, {}}, viewsOf(h.origin + h.unit * h.nodes[0].centre, 4));
+    EXPECT_GT(laps.first, 0u) << "the count must see what a cold scratch takes";
+    EXPECT_EQ(laps.second, 0u);
+    EXPECT_GT(laps.bound, 40u);
+    EXPECT_GT(laps.partly, 40u);
+}
+
+TEST(CutMemory, NothingIsAllocatedOnceWarmWithCrowds) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    const test::Forest forest = test::plantForest(folder.path(), 12, *executor);
+    const auto backend = cpu::makeCpuBackend(*executor);
+    const auto state = render::makeFrameState(forest.placed, *backend, *executor, {}, forest.crowds);
+    const Laps laps = fly(state->scene(), viewsOf({44, 8, 44}, 60));
+    EXPECT_GT(laps.first, 0u);
+    EXPECT_EQ(laps.second, 0u);
+    EXPECT_GT(laps.bound, 40u);
+    EXPECT_GT(laps.partly, 40u);
+    EXPECT_GT(laps.mixed, 40u);
+}
+
+// What a cut reports to have visited is what it went through to draw, not what it compared that with.
+TEST(CutMemory, QuestionsAboutCostsAreNotCounted) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    test::writePly(folder / "a.ply", test::bumpySphere(2'000, 1));
+    const auto points = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    test::MeshRecipe recipe;
+    recipe.grow.kind = "terrain";
+    recipe.grow.triangles = 30'000;
+    const auto mesh = test::growMeshStore(recipe, folder / "b.stipple", *executor);
+    const std::vector<const lod::Hierarchy*> hierarchies{&mesh->hierarchy, &points->hierarchy};
+    std::vector<lod::Instance> pair(2);
+    pair[0].standIn = 1;
+    pair[1].hierarchy = pair[1].source = 1;
+    pair[1].isDriven = true;
+    std::vector<lod::Instance> alone(1);
+    alone[0] = pair[1];
+    alone[0].isDriven = false;
+    const std::vector<std::vector<uint8_t>> drawable{std::vector<uint8_t>(mesh->hierarchy.chunks(), 1),
+                                                     std::vector<uint8_t>(points->hierarchy.chunks(), 1)};
+    const lod::Hierarchy& h = points->hierarchy;
+    size_t drawn = 0;
+    for (const lod::View& view : viewsOf(h.origin + h.unit * h.nodes[0].centre, 2)) {
+        lod::CutScratch a, b;
+        lod::Cut with, without;
+        lod::selectCut({hierarchies, pair, {}}, {drawable}, view, {0.25, kNoLimit}, a, with);
+        lod::selectCut({hierarchies, alone, {}}, {drawable}, view, {0.25, kNoLimit}, b, without);
+        if (with.counters.standIns == 0) continue;
+        ++drawn;
+        ASSERT_EQ(with.counters.nodesVisited, without.counters.nodesVisited);
+        ASSERT_EQ(with.counters.nodesCulled, without.counters.nodesCulled);
+    }
+    EXPECT_GT(drawn, 3u);
+}
+
+}  // namespace
+}  // namespace stipple
