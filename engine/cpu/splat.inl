@@ -76,7 +76,8 @@ void placeSplats(const FrameConstants& frame, const DrawNode& drawNode, const Po
 struct SplatBatch {
     static constexpr size_t kSize = 64;
     alignas(64) float cx[kSize], cy[kSize], cz[kSize], nx[kSize], ny[kSize], nz[kSize], ahead[kSize], radius2[kSize];
-    alignas(64) int firstX[kSize], lastX[kSize], firstY[kSize], lastY[kSize], atX[kSize], atY[kSize];
+    alignas(64) int firstX[kSize], lastX[kSize], firstY[kSize], lastY[kSize];
+    alignas(64) int missed[kSize];  // pixel of the tile that holds the centre, but whose ray misses; else -1
 };
 
 void prepareSplats(const FrameConstants& frame, const PlacedSplat* splats, const uint32_t* places, size_t count,
@@ -94,7 +95,8 @@ void prepareSplats(const FrameConstants& frame, const PlacedSplat* splats, const
         radius[i] = s.radius;
     }
     const int x0 = int(tile.x0), y0 = int(tile.y0);
-    const float focal = f.focal, far = 1.0e6f;
+    const float focal = f.focal, inverseFocal = 1.0f / focal, nearPlane = f.nearPlane, far = 1.0e6f;
+    const int width = int(tile.width), height = int(tile.height);
     const float shiftX = float(x0) + 0.5f - f.centre.x, shiftY = float(y0) + 0.5f - f.centre.y;
 #pragma GCC ivdep
     for (size_t i = 0; i < count; ++i) {
@@ -109,8 +111,15 @@ void prepareSplats(const FrameConstants& frame, const PlacedSplat* splats, const
         b.lastX[i] = int(std::floor(min(max(across.y * focal - shiftX, -far), far) + 0.01f));
         b.firstY[i] = -int(std::floor(min(max(shiftY - down.x * focal, -far), far) + 0.01f));
         b.lastY[i] = int(std::floor(min(max(down.y * focal - shiftY, -far), far) + 0.01f));
-        b.atX[i] = c.x - x0;
-        b.atY[i] = c.y - y0;
+        // Where the ray of the centre's pixel misses the disc, that pixel shows it at the centre's depth.
+        const float ex = (float(c.x) + 0.5f - f.centre.x) * inverseFocal,
+                    ey = (float(c.y) + 0.5f - f.centre.y) * inverseFocal;
+        const float z = b.ahead[i] / (d.normal.x * ex + (d.normal.y * ey + d.normal.z));
+        const float offX = z * ex - d.centre.x, offY = z * ey - d.centre.y, offZ = z - d.centre.z;
+        const bool isHit = (offX * offX + offY * offY + offZ * offZ <= b.radius2[i]) & (z > nearPlane);
+        const int atX = c.x - x0, atY = c.y - y0;
+        const bool isHere = (atX >= 0) & (atX < width) & (atY >= 0) & (atY < height);
+        b.missed[i] = isHere & !isHit ? atY * int(SplatTile::kWidth) + atX : -1;
     }
 }
 
@@ -153,14 +162,8 @@ void drawSplat(const SplatBatch& b, size_t i, uint32_t id, const SplatTile& tile
             }
         }
     }
-    // The pixel of the centre, where its ray misses the disc.
-    const int x = b.atX[i], y = b.atY[i];
-    if (x < 0 || y < 0 || x >= int(tile.width) || y >= int(tile.height)) return;
-    const float ex = (float(x) + shift) * inverseFocal, ey = (float(y) + shiftY) * inverseFocal;
-    const float z = ahead / (nx * ex + (ny * ey + nz));
-    const float offX = z * ex - cx, offY = z * ey - cy, offZ = z - cz;
-    if ((offX * offX + offY * offY + offZ * offZ <= radius2) & (z > nearPlane)) return;
-    const size_t at = size_t(y) * SplatTile::kWidth + size_t(x);
+    if (b.missed[i] < 0) return;
+    const auto at = size_t(b.missed[i]);
     const uint32_t bits = floatBitsToUint(cz);
     if (bits > front.depth[at] || (bits == front.depth[at] && id >= front.id[at])) return;
     front.depth[at] = bits;

@@ -53,7 +53,7 @@ TEST_F(Errors, ImplementationOfEveryInstructionSetIsWithinItsBound) {
     size_t count = 0;
     const cpu::Kernels* const* kernels = cpu::availableKernels(count);
     const auto oracle = reference::makeReferenceBackend(*executor_);
-    for (const render::Mode mode : {render::Mode::pullpush, render::Mode::points})
+    for (const render::Mode mode : {render::Mode::pullpush, render::Mode::splat, render::Mode::points})
         for (const double tau : {0.25, 1.0, 8.0, 64.0}) {
             const render::Image truth = draw(*oracle, tau, mode);
             for (size_t k = 0; k < count; ++k) {

@@ -48,7 +48,7 @@ TEST(Frames, ShowNothingOfThoseBefore) {
         view.height = 203;
         view.focalPixels = 250;
         render::FrameSettings settings;
-        settings.mode = rng.uniform(0, 1) < 0.3 ? render::Mode::points : render::Mode::pullpush;
+        settings.mode = render::reconstructions()[rng.below(render::reconstructions().size())].mode;
         settings.draw.lit = rng.uniform(0, 1) < 0.5;
         settings.wantDepthAndNormal = rng.uniform(0, 1) < 0.7;
         settings.budgets.errorPixels = 1;

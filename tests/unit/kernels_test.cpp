@@ -36,7 +36,7 @@ TEST_P(InstructionSets, DrawTheBytesThatSseDraws) {
         test::buildStrands(test::curls({}), folder / "d.stipple", *executor)};
     size_t compared = 0;
     for (const auto& store : stores)
-        for (const render::Mode mode : {render::Mode::pullpush, render::Mode::points})
+        for (const render::Mode mode : {render::Mode::pullpush, render::Mode::splat, render::Mode::points})
             for (const double tau : {0.25, 1.0, 4.0})
                 for (const bool lit : {true, false}) {
                     render::FrameSettings settings;

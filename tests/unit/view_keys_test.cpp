@@ -60,12 +60,14 @@ TEST(Keys, EachChangesWhatItSays) {
     ViewSettings s;
     s.frame.draw.lit = true;
     EXPECT_FALSE(applyKeys("MVL", s).quit);
-    EXPECT_EQ(s.frame.mode, render::Mode::points);
+    EXPECT_EQ(s.frame.mode, render::Mode::splat);
     EXPECT_EQ(s.frame.draw.debugView, 1u);
     EXPECT_FALSE(s.frame.draw.lit);
     EXPECT_TRUE(s.frame.draw.unlitTriangles);
     applyKeys("M5", s);
-    EXPECT_EQ(s.frame.mode, render::Mode::pullpush);
+    EXPECT_EQ(s.frame.mode, render::Mode::points);
+    applyKeys("M", s);
+    EXPECT_EQ(s.frame.mode, render::Mode::pullpush) << "around";
     EXPECT_EQ(s.frame.budgets.errorPixels, 4);
     const KeyRequests asked = applyKeys("FCUP ", s);
     EXPECT_TRUE(asked.fly && asked.colours && asked.up && asked.picture && asked.pause);

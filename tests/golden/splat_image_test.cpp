@@ -1,0 +1,260 @@
+// Mode splat against rays and discs by brute force in fp64 (tests/support/drawn_discs.h): coverage and depth of every
+// pixel, colours and normals of the disc in front; closed surfaces from anywhere; the same bytes for any threads.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/cpu/cpu_backend.h"
+#include "engine/reference/reference.h"
+#include "tests/support/drawn_discs.h"
+#include "tests/support/drawn_shapes.h"
+#include "tests/support/support.h"
+
+namespace stipple {
+namespace {
+
+using glm::dvec3;
+
+render::FrameSettings splats() {
+    render::FrameSettings settings;
+    settings.mode = render::Mode::splat;
+    settings.budgets.errorPixels = 1e-4;
+    settings.wantDepthAndNormal = true;
+    return settings;
+}
+
+/// Discs of any size and direction in a cube of edge 2, some of one side, of two, without a normal.
+std::vector<test::TestPoint> anyDiscs(size_t count, uint64_t seed) {
+    Rng rng(seed);
+    std::vector<test::TestPoint> points;
+    while (points.size() < count) {
+        const auto any = [&] { return rng.uniform(-1, 1); };
+        const dvec3 n = glm::normalize(dvec3(any(), any(), any()));
+        points.push_back({{any(), any(), any()},
+                          glm::vec3(n),
+                          static_cast<uint32_t>(rng.below(1u << 24)),
+                          static_cast<float>(0.01 * std::exp2(rng.uniform(0, 4)))});
+    }
+    return points;
+}
+
+/// Pixels that hold the centre of a disc.
+std::vector<bool> centresOf(const std::vector<reference::Disc>& discs, const lod::View& view) {
+    std::vector<bool> out(size_t{view.width} * view.height);
+    for (const reference::Disc& d : discs) {
+        const dvec3 off = d.position - view.eye;
+        const double z = glm::dot(off, view.forward);
+        const double x = view.focalPixels * glm::dot(off, view.right) / z + 0.5 * view.width,
+                     y = view.focalPixels * glm::dot(off, view.down) / z + 0.5 * view.height;
+        if (z > 0 && x >= 0 && y >= 0 && x < view.width && y < view.height)
+            out[static_cast<size_t>(y) * view.width + static_cast<size_t>(x)] = true;
+    }
+    return out;
+}
+
+/// Depth of the first disc that each pixel's ray meets, 0: none; every ray against every disc.
+std::vector<double> frontOf(const std::vector<reference::Disc>& discs, const lod::View& view) {
+    std::vector<double> out(size_t{view.width} * view.height, 0);
+    for (const reference::Disc& d : discs) {
+        const dvec3 at = d.position - view.eye;
+        const double across = glm::dot(d.normal, at);
+        if ((d.flags & shared::kFlagTwoSided) == 0 && across >= 0) continue;
+        for (size_t i = 0; i < out.size(); ++i) {
+            const dvec3 ray = test::rayThrough(view, static_cast<double>(i % view.width) + 0.5,
+                                               static_cast<double>(i / view.width) + 0.5);
+            const double t = across / glm::dot(d.normal, ray);
+            const dvec3 off = t * ray - at;
+            if (t > 1e-4 && glm::dot(off, off) <= d.radius * d.radius && (out[i] == 0 || t < out[i])) out[i] = t;
+        }
+    }
+    return out;
+}
+
+struct Wrong {
+    size_t covered = 0, missing = 0, tooMuch = 0, depth = 0;
+};
+/// Of a picture of full detail. A ray may pass a rim on one side or the other: within 1e-4 of the depth, or not.
+Wrong compare(const render::Image& image, const std::vector<double>& truth, const std::vector<bool>& centres) {
+    Wrong w;
+    for (size_t i = 0; i < image.depth.size(); ++i) {
+        const double z = image.depth[i], front = truth[i];
+        w.covered += front > 0;
+        w.missing += front > 0 && z <= 0;
+        w.tooMuch += front <= 0 && !centres[i] && z > 0;
+        if (front <= 0 || z <= 0) continue;
+        w.depth += z > front * (1 + 1e-4) || (z < front * (1 - 1e-4) && !centres[i]);
+    }
+    return w;
+}
+
+TEST(Splats, CoverWhatRaysMeetAtItsDepth) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    test::writePly(folder / "a.ply", anyDiscs(2000, 5), true, true);
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    const auto discs = test::leafDiscs(*store);
+    // From outside, from between the discs (some reach behind the eye), through a wide lens, far away.
+    struct Look {
+        dvec3 eye;
+        double focal;
+    };
+    for (const Look& look :
+         {Look{{0.2, 0.1, 3.5}, 300}, {{0.1, 0.05, 0.3}, 120}, {{-0.4, 0.3, 0.9}, 60}, {{0, 0.1, 60}, 6000}}) {
+        lod::View view = test::viewFromAbove({0, 0, 0});
+        view.eye = look.eye;
+        view.focalPixels = look.focal;
+        view.width = 201;
+        view.height = 151;
+        view.focalPixels *= 0.65;
+        view.nearPlane = 1e-6;
+        const std::vector<bool> centres = centresOf(discs, view);
+        const std::vector<double> truth = frontOf(discs, view);
+        for (auto& [name, backend] : test::cpuBackendsAndOracle(*executor)) {
+            SCOPED_TRACE(testing::Message() << name << " from " << look.eye.z);
+            const Wrong w = compare(test::renderView(store, *backend, *executor, view, splats()), truth, centres);
+            EXPECT_GT(w.covered, 8'000u);
+            EXPECT_LE(w.missing, w.covered / 5000);
+            EXPECT_LE(w.tooMuch, w.covered / 5000);
+            EXPECT_LE(w.depth, w.covered / 2000);
+            // The control: a pixel a record covers little of it.
+            render::FrameSettings points = splats();
+            points.mode = render::Mode::points;
+            if (look.focal > 200)
+                EXPECT_GT(compare(test::renderView(store, *backend, *executor, view, points), truth, centres).missing,
+                          w.covered / 4);
+        }
+    }
+}
+
+TEST(Splats, ShowTheColoursAndNormalsOfTheDiscInFront) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    // Two crossing squares of many discs: red and green.
+    std::vector<test::TestPoint> points;
+    for (int k = 0; k < 2; ++k)
+        for (int y = -40; y <= 40; ++y)
+            for (int x = -40; x <= 40; ++x) {
+                const double a = 0.02 * x, b = 0.02 * y, tilt = k == 0 ? 0.5 : -0.5;
+                points.push_back(
+                    {{a, b, tilt * a}, glm::normalize(glm::vec3(-tilt, 0, 1)), k == 0 ? 0x0000ffu : 0x00ff00u, 0.02f});
+            }
+    test::writePly(folder / "a.ply", points, true, true);
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    lod::View view = test::viewFromAbove({0, 0, 0});
+    view.focalPixels = 700;
+    for (auto& [name, backend] : test::cpuBackendsAndOracle(*executor)) {
+        SCOPED_TRACE(name);
+        render::FrameSettings settings = splats();
+        settings.draw.lit = false;
+        const render::Image image = test::renderView(store, *backend, *executor, view, settings);
+        size_t wrong = 0, seen = 0;
+        for (size_t i = 0; i < image.depth.size(); ++i) {
+            const dvec3 ray =
+                test::rayThrough(view, static_cast<double>(i % 400) + 0.5, static_cast<double>(i / 400) + 0.5);
+            // Where the ray meets the planes z = 0.5 x and z = -0.5 x: the nearer is in front.
+            const auto depthOf = [&](double tilt) { return (tilt * view.eye.x - view.eye.z) / (ray.z - tilt * ray.x); };
+            const double red = depthOf(0.5), green = depthOf(-0.5);
+            const dvec3 at = view.eye + std::min(red, green) * ray;
+            if (std::abs(at.x) > 0.78 || std::abs(at.y) > 0.78 || std::abs(red - green) < 0.02) continue;
+            ++seen;
+            const bool isRed = red < green;
+            const glm::vec3 n(image.normal[3 * i], image.normal[3 * i + 1], image.normal[3 * i + 2]);
+            const glm::vec3 truth = glm::normalize(glm::vec3(isRed ? -0.5 : 0.5, 0, 1));
+            wrong += (image.rgba[i] & 0xffffffu) != (isRed ? 0x0000ffu : 0x00ff00u) || glm::dot(n, truth) < 0.99998f ||
+                     std::abs(image.depth[i] - std::min(red, green)) > 1e-4;
+        }
+        EXPECT_GT(seen, 40'000u);
+        EXPECT_EQ(wrong, 0u);
+    }
+}
+
+TEST(Splats, LeaveNoHolesInClosedSurfaces) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    const auto backend = cpu::makeCpuBackend(*executor);
+    test::writePly(folder / "a.ply", test::samplesOf(test::Shape::torus, 20'000, 3));
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    Rng rng(8);
+    size_t holes = 0, looked = 0, ofPoints = 0;
+    for (int pose = 0; pose < 60; ++pose) {
+        const lod::View view =
+            test::lookAt(*store, rng.uniform(0, 360), rng.uniform(-80, 80), std::exp2(rng.uniform(-0.7, 2)), 128);
+        for (const render::Mode mode : {render::Mode::splat, render::Mode::points}) {
+            render::FrameSettings settings = splats();
+            settings.mode = mode;
+            settings.budgets.errorPixels = pose % 2 == 0 ? 1 : 1e-4;
+            const render::Image image = test::renderView(store, *backend, *executor, view, settings);
+            for (uint32_t y = 2; y + 2 < view.height; ++y)
+                for (uint32_t x = 2; x + 2 < view.width; ++x) {
+                    // Well inside the outline: the rays all around meet the torus.
+                    bool isInside = true;
+                    for (int k = 0; k < 9 && isInside; ++k)
+                        isInside = test::meetsShape(
+                            test::Shape::torus, view.eye,
+                            test::rayThrough(view, x + 0.5 + 2 * (k % 3 - 1), y + 0.5 + 2 * (k / 3 - 1)));
+                    if (!isInside) continue;
+                    const bool isOpen = image.depth[size_t{y} * view.width + x] <= 0;
+                    if (mode == render::Mode::splat) {
+                        ++looked;
+                        holes += isOpen;
+                    } else {
+                        ofPoints += isOpen;
+                    }
+                }
+        }
+    }
+    std::printf("%zu pixels inside outlines: %zu holes, of points %zu\n", looked, holes, ofPoints);
+    EXPECT_GT(looked, 50'000u);
+    EXPECT_EQ(holes, 0u);
+    EXPECT_GT(ofPoints, looked / 10);
+}
+
+TEST(Splats, AreTheSameBytesForAnyThreads) {
+    const test::TempFolder folder;
+    const auto one = makeTbbExecutor(1), four = makeTbbExecutor(4);
+    test::writePly(folder / "a.ply", anyDiscs(30'000, 6), true, true);
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *four);
+    lod::View view = test::viewFromAbove({0, 0, 0});
+    view.width = 333;
+    const auto of = [&](Executor& executor) {
+        render::Image image;
+        for (auto& [name, backend] : test::cpuBackendsAndOracle(executor)) {
+            if (name == "fp64") continue;
+            const render::Image drawn = test::renderView(store, *backend, executor, view, splats());
+            if (!image.rgba.empty()) EXPECT_TRUE(image.rgba == drawn.rgba && image.depth == drawn.depth) << name;
+            image = drawn;
+        }
+        return image;
+    };
+    const render::Image a = of(*one), b = of(*four);
+    EXPECT_TRUE(a.rgba == b.rgba && a.depth == b.depth && a.normal == b.normal);
+}
+
+TEST(Splats, ThousandsAtOnePixelAreAsOne) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    Rng rng(4);
+    std::vector<test::TestPoint> points;
+    for (int i = 0; i < 10'000; ++i)
+        points.push_back({{rng.uniform(-0.5, 0.5), rng.uniform(-0.5, 0.5), 0}, {0, 0, 1}, 0x303030u, 0.3f});
+    test::writePly(folder / "a.ply", points, true, true);
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor, 16384);
+    lod::View view = test::viewFromAbove({0, 0, 0});
+    view.width = view.height = 100;
+    view.focalPixels = 300;
+    const std::vector<double> middle = frontOf(test::leafDiscs(*store), view);
+    ASSERT_GT(std::count_if(middle.begin(), middle.end(), [](double z) { return z > 0; }), 9000);
+    render::FrameSettings settings = splats();
+    settings.draw.lit = false;
+    for (auto& [name, backend] : test::cpuBackendsAndOracle(*executor)) {
+        const render::Image image = test::renderView(store, *backend, *executor, view, settings);
+        size_t wrong = 0;
+        for (size_t i = 0; i < middle.size(); ++i)
+            wrong += middle[i] > 0 && ((image.rgba[i] & 0xffffffu) != 0x303030u || std::abs(image.depth[i] - 3) > 1e-4);
+        EXPECT_EQ(wrong, 0u) << name;
+    }
+}
+
+}  // namespace
+}  // namespace stipple

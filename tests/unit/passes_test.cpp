@@ -1,0 +1,70 @@
+// The passes that a frame has, by its reconstruction and by what it calls for.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+#include "engine/render/reconstructions/table.h"
+
+namespace stipple::render {
+namespace {
+
+std::vector<FrameContent> allContents() {
+    std::vector<FrameContent> out;
+    for (unsigned bits = 0; bits < 32; ++bits)
+        out.push_back({(bits & 1) != 0, (bits & 2) != 0, (bits & 4) != 0, (bits & 8) != 0, (bits & 16) != 0});
+    return out;
+}
+bool has(const std::vector<Pass>& passes, Pass pass) {
+    return std::find(passes.begin(), passes.end(), pass) != passes.end();
+}
+
+TEST(Passes, ReadNothingThatNobodyWrote) {
+    for (const Reconstruction& r : reconstructions())
+        for (const FrameContent& content : allContents()) {
+            Planes written;
+            for (const Pass pass : passesOf(r.mode, content)) {
+                const PassInfo& info = passInfo(pass);
+                for (uint32_t p = 0; p <= static_cast<uint32_t>(Plane::image); ++p) {
+                    const auto plane = static_cast<Plane>(p);
+                    // The levels above the first are there in modes with a pyramid only.
+                    if (plane == Plane::coarse && !r.hasPyramid) continue;
+                    if (plane == Plane::coarse && !content.hasPoints && !content.hasStrands) continue;
+                    if (info.reads.has(plane))
+                        EXPECT_TRUE(written.has(plane)) << r.name << ": " << info.name << " reads " << p;
+                }
+                written.bits |= info.writes.bits;
+            }
+            EXPECT_TRUE(written.has(Plane::image)) << r.name;
+        }
+}
+
+TEST(Passes, AreThereOnlyWhereTheFrameCallsForThem) {
+    for (const Reconstruction& r : reconstructions())
+        for (const FrameContent& c : allContents()) {
+            const std::vector<Pass> passes = passesOf(r.mode, c);
+            EXPECT_EQ(std::set<Pass>(passes.begin(), passes.end()).size(), passes.size());
+            EXPECT_EQ(has(passes, Pass::light), c.isLit);
+            EXPECT_EQ(has(passes, Pass::rasterise), c.hasTriangles);
+            EXPECT_EQ(has(passes, Pass::strands), c.hasStrands);
+            EXPECT_EQ(has(passes, Pass::project) || has(passes, Pass::splat), c.hasPoints);
+            EXPECT_EQ(has(passes, Pass::push), r.hasPyramid && (c.hasPoints || c.hasStrands));
+            EXPECT_EQ(passes.back(), Pass::output);
+        }
+}
+
+TEST(Passes, ModesAreFoundByTheirNames) {
+    std::set<std::string> names;
+    for (const Reconstruction& r : reconstructions()) {
+        EXPECT_TRUE(names.insert(r.name).second);
+        EXPECT_EQ(reconstructionNamed(r.name), &r);
+        EXPECT_EQ(reconstructionOf(r.mode).name, r.name);
+    }
+    EXPECT_EQ(reconstructionNamed("splatt"), nullptr);
+    Mode mode = reconstructions().front().mode;
+    for (size_t i = 0; i < reconstructions().size(); ++i) mode = nextMode(mode);
+    EXPECT_EQ(mode, reconstructions().front().mode) << "around";
+}
+
+}  // namespace
+}  // namespace stipple::render
