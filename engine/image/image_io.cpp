@@ -17,6 +17,7 @@
 #include "engine/base/file.h"
 #include "engine/base/process.h"
 #include "engine/image/oiio_module.h"
+#include "engine/image/png_check.h"
 
 namespace stipple::image {
 namespace {
@@ -81,7 +82,7 @@ bool hasExtension(const std::string& path, const char* extension) {
 Result<void> checkModule(bool load) {
     const auto missing = [](const std::string& why) {
         return fail(ErrorKind::output, "the picture module cannot be loaded: " + why, "",
-                    "install OpenImageIO, or the program anew");
+                    "install the program anew, with the packages that it names");
     };
     const std::array<std::string, 3> places = modulePlaces();
     std::error_code ignored;
@@ -204,6 +205,13 @@ glm::ivec2 webpSize(const std::vector<uint8_t>& b) {
     return glm::ivec2(0);
 }
 
+/// What the module says, without its library's own words.
+std::string plainReason(const std::string& text) {
+    if (text.find("OpenImageIO") != std::string::npos || text.find("format reader") != std::string::npos)
+        return "is no picture that can be read (.png, .jpg, .webp, .exr, .hdr)";
+    return "cannot be read: " + text.substr(0, text.find('\n'));
+}
+
 /// Size first, then pixels: `call` is either way to read. `make` gives room for them.
 template <typename Pixel, typename Call, typename Make>
 Result<void> readWith(const std::string& name, const Promise& promise, uint64_t bytesOfPixel, uint64_t memoryBytes,
@@ -215,9 +223,7 @@ Result<void> readWith(const std::string& name, const Promise& promise, uint64_t 
         if (status == 0) return {};
         if (status == kStippleOiioNoMemory)
             return fail(ErrorKind::budget, "does not fit in memory", name, "close other programs, or make it smaller");
-        const std::string text = error.data();
-        return fail(ErrorKind::input, "cannot be read: " + text.substr(0, text.find('\n')), name,
-                    "is it a whole picture?");
+        return fail(ErrorKind::input, plainReason(error.data()), name, "is it a whole picture?");
     };
     STIPPLE_TRY(read(nullptr));
     STIPPLE_TRY(checkSize(width, height, bytesOfPixel, promise, name, memoryBytes));
@@ -238,6 +244,15 @@ Result<render::Image> readRgba(const std::string& name, const Promise& promise, 
     return image;
 }
 
+/// Whatever is wrong with a PNG, before its library prints it.
+Result<void> checkPng(const uint8_t* head, size_t count, uint64_t bytes, const std::string& name,
+                      const ReadAt& readAt) {
+    if (count < 4 || std::memcmp(head, "\x89PNG", 4) != 0) return {};
+    STIPPLE_ASSIGN(const std::string fault, faultOfPng(bytes, readAt));
+    if (fault.empty()) return {};
+    return fail(ErrorKind::input, fault, name, "is the download complete?");
+}
+
 /// Of a regular file (the library would wait for ever at a FIFO).
 Result<Promise> promiseOfFile(const std::string& path) {
     STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
@@ -245,6 +260,8 @@ Result<Promise> promiseOfFile(const std::string& path) {
     const auto count = static_cast<size_t>(std::min<uint64_t>(head.size(), file.sizeBytes()));
     if (count == 0) return fail(ErrorKind::input, "is empty", path, "is the download complete?");
     STIPPLE_TRY(file.readAt(0, head.data(), count));
+    STIPPLE_TRY(checkPng(head.data(), count, file.sizeBytes(), path,
+                         [&](uint64_t at, void* to, size_t n) { return file.readAt(at, to, n); }));
     return promiseOf(head.data(), count, file.sizeBytes());
 }
 
@@ -258,6 +275,11 @@ Result<render::Image> readImage(const std::string& path, uint64_t memoryBytes) {
 }
 
 Result<render::Image> decodeImage(const std::vector<uint8_t>& bytes, const std::string& name, uint64_t memoryBytes) {
+    STIPPLE_TRY(
+        checkPng(bytes.data(), bytes.size(), bytes.size(), name, [&](uint64_t at, void* to, size_t n) -> Result<void> {
+            std::memcpy(to, bytes.data() + at, n);
+            return {};
+        }));
     const Promise promise = promiseOf(bytes.data(), bytes.size(), bytes.size());
     if (std::strcmp(promise.format, "webp") == 0)
         if (const glm::ivec2 size = webpSize(bytes); size.x > 0)
