@@ -12,6 +12,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <new>
 
 #include "engine/base/file.h"
@@ -146,7 +147,16 @@ struct Promise {
     uint64_t bytes = 0;  ///< of the file
     double mostPixels = HUGE_VAL;
     uint64_t wholeBytes = 0;  ///< for each pixel: of what the library decodes as a whole; 0: as many as are made of it
+    ReadAt readAt{};          ///< of a PNG
 };
+
+/// Whatever is wrong with a PNG, before its library prints it: up to the pixels, or `wholly`.
+Result<void> checkPng(const Promise& promise, const std::string& name, bool wholly) {
+    if (!promise.readAt) return {};
+    STIPPLE_ASSIGN(const std::string fault, faultOfPng(promise.bytes, promise.readAt, wholly));
+    if (fault.empty()) return {};
+    return fail(ErrorKind::input, fault, name, "is it a whole picture?");
+}
 
 /// An interlaced PNG is decoded as a whole, with the samples that it has; all others by rows. (PNG, 11.2.1)
 uint64_t wholeBytesOfPng(const uint8_t* head, size_t count) {
@@ -154,6 +164,8 @@ uint64_t wholeBytesOfPng(const uint8_t* head, size_t count) {
     const uint64_t channels = head[25] == 0 ? 1 : head[25] == 2 ? 3 : head[25] == 4 ? 2 : 4;  // a palette: of colours
     return channels * (head[24] == 16 ? 2 : 1) + 1;                                           // alpha that a chunk adds
 }
+
+bool isPng(const uint8_t* head, size_t count) { return count >= 4 && std::memcmp(head, "\x89PNG", 4) == 0; }
 
 Promise promiseOf(const uint8_t* head, size_t count, uint64_t fileBytes) {
     const auto begins = [&](const char* with, size_t at = 0) {
@@ -225,8 +237,10 @@ Result<void> readWith(const std::string& name, const Promise& promise, uint64_t 
             return fail(ErrorKind::budget, "does not fit in memory", name, "close other programs, or make it smaller");
         return fail(ErrorKind::input, plainReason(error.data()), name, "is it a whole picture?");
     };
+    STIPPLE_TRY(checkPng(promise, name, false));
     STIPPLE_TRY(read(nullptr));
     STIPPLE_TRY(checkSize(width, height, bytesOfPixel, promise, name, memoryBytes));
+    STIPPLE_TRY(checkPng(promise, name, true));
     return read(make(static_cast<uint32_t>(width), static_cast<uint32_t>(height)));
 }
 
@@ -244,25 +258,18 @@ Result<render::Image> readRgba(const std::string& name, const Promise& promise, 
     return image;
 }
 
-/// Whatever is wrong with a PNG, before its library prints it.
-Result<void> checkPng(const uint8_t* head, size_t count, uint64_t bytes, const std::string& name,
-                      const ReadAt& readAt) {
-    if (count < 4 || std::memcmp(head, "\x89PNG", 4) != 0) return {};
-    STIPPLE_ASSIGN(const std::string fault, faultOfPng(bytes, readAt));
-    if (fault.empty()) return {};
-    return fail(ErrorKind::input, fault, name, "is the download complete?");
-}
-
 /// Of a regular file (the library would wait for ever at a FIFO).
 Result<Promise> promiseOfFile(const std::string& path) {
-    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
+    STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
+    const auto file = std::make_shared<const InputFile>(std::move(opened));
     std::array<uint8_t, 64> head{};
-    const auto count = static_cast<size_t>(std::min<uint64_t>(head.size(), file.sizeBytes()));
+    const auto count = static_cast<size_t>(std::min<uint64_t>(head.size(), file->sizeBytes()));
     if (count == 0) return fail(ErrorKind::input, "is empty", path, "is the download complete?");
-    STIPPLE_TRY(file.readAt(0, head.data(), count));
-    STIPPLE_TRY(checkPng(head.data(), count, file.sizeBytes(), path,
-                         [&](uint64_t at, void* to, size_t n) { return file.readAt(at, to, n); }));
-    return promiseOf(head.data(), count, file.sizeBytes());
+    STIPPLE_TRY(file->readAt(0, head.data(), count));
+    Promise promise = promiseOf(head.data(), count, file->sizeBytes());
+    if (isPng(head.data(), count))
+        promise.readAt = [file](uint64_t at, void* to, size_t n) { return file->readAt(at, to, n); };
+    return promise;
 }
 
 }  // namespace
@@ -275,12 +282,12 @@ Result<render::Image> readImage(const std::string& path, uint64_t memoryBytes) {
 }
 
 Result<render::Image> decodeImage(const std::vector<uint8_t>& bytes, const std::string& name, uint64_t memoryBytes) {
-    STIPPLE_TRY(
-        checkPng(bytes.data(), bytes.size(), bytes.size(), name, [&](uint64_t at, void* to, size_t n) -> Result<void> {
+    Promise promise = promiseOf(bytes.data(), bytes.size(), bytes.size());
+    if (isPng(bytes.data(), bytes.size()))
+        promise.readAt = [&](uint64_t at, void* to, size_t n) -> Result<void> {
             std::memcpy(to, bytes.data() + at, n);
             return {};
-        }));
-    const Promise promise = promiseOf(bytes.data(), bytes.size(), bytes.size());
+        };
     if (std::strcmp(promise.format, "webp") == 0)
         if (const glm::ivec2 size = webpSize(bytes); size.x > 0)
             STIPPLE_TRY(checkSize(size.x, size.y, 4, promise, name, memoryBytes));
