@@ -49,6 +49,17 @@ double attributeValue(const AttributeInfo& info, const uint8_t* stored) {
     });
 }
 
+bool isNoData(const AttributeInfo& info, const uint8_t* stored) {
+    return withType(info.type, [&](auto v) {
+        using T = decltype(v);
+        std::memcpy(&v, stored, sizeof(v));
+        const auto raw = static_cast<double>(v);
+        if (info.noData && raw == *info.noData) return true;
+        if constexpr (std::numeric_limits<T>::is_integer) return false;
+        return !(std::abs(raw) < static_cast<double>(std::numeric_limits<float>::max()));
+    });
+}
+
 void storeAttribute(const AttributeInfo& info, double value, uint8_t* to) {
     const double raw = (value - info.offset) / info.scale;
     withType(info.type, [&](auto v) {

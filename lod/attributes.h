@@ -12,6 +12,9 @@ namespace stipple::lod {
 
 /// Value of one attribute of one record.
 double attributeValue(const AttributeInfo& info, const uint8_t* stored);
+/// "Not measured": the value that the file declares for it; of floating-point attributes also what is not a number or
+/// no smaller than the largest fp32 (1.8e308, 3.4e38), as many programs write it.
+bool isNoData(const AttributeInfo& info, const uint8_t* stored);
 /// The stored form that is nearest to `value`.
 void storeAttribute(const AttributeInfo& info, double value, uint8_t* to);
 

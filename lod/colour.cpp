@@ -6,6 +6,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "engine/base/words.h"
 #include "lod/attributes.h"
 
 namespace stipple::lod {
@@ -118,9 +119,17 @@ Result<ColourBy> parseColourBy(const std::string& what, const std::string& map, 
             std::find_if(attributes.begin(), attributes.end(), [&](const AttributeInfo& a) { return a.name == name; });
         if (found == attributes.end()) {
             std::string known = "rgb, height, normal";
-            for (const AttributeInfo& a : attributes) known += ", " + a.name;
+            std::vector<std::string> words{"rgb", "height", "normal", "class", "return", "auto", "plain"};
+            for (const AttributeInfo& a : attributes) {
+                known += ", " + a.name;
+                words.push_back(a.name);
+            }
+            if (const std::string meant = nearestWord(name, words); !meant.empty())
+                known = fmt::format("did you mean '{}'? It has {}", meant, known);
+            else
+                known = "it has " + known;
             return fail(ErrorKind::usage, fmt::format("the scene has no attribute '{}'", name), "--colour",
-                        "it has " + known + "; others are kept when it is built with --attributes");
+                        known + "; others are kept when it is built with --attributes");
         }
         by.mode = ColourMode::attribute;
         by.attribute = static_cast<size_t>(found - attributes.begin());
@@ -140,8 +149,8 @@ Result<ColourBy> parseColourBy(const std::string& what, const std::string& map, 
     if (!range.empty()) {
         std::istringstream in(range);
         char comma = 0;
-        if (!(in >> by.low >> comma >> by.high) || comma != ',' || !(in >> std::ws).eof() ||
-            !std::isfinite(by.low + by.high) || by.low == by.high)
+        if (!(in >> by.low >> comma >> by.high) || comma != ',' || !(in >> std::ws).eof() || !std::isfinite(by.low) ||
+            !std::isfinite(by.high) || !std::isfinite(by.high - by.low) || by.low == by.high)
             return fail(ErrorKind::usage, fmt::format("'{}' is not a range", range), "--colour-range", "e.g. 0,255");
     }
     if (by.low == by.high) by.high = by.low + 1;
@@ -197,7 +206,9 @@ void recolour(const ColourBy& by, const Store& store, uint32_t index, Chunk& chu
         const AttributeInfo& info = store.description.attributes.at(by.attribute);
         const size_t width = bytesOf(info.type);
         for (size_t i = 0; i < chunk.records.size(); ++i)
-            set(chunk.records[i], colourOf(by, attributeValue(info, values.data() + i * width)));
+            set(chunk.records[i], isNoData(info, values.data() + i * width)
+                                      ? kNoDataColour
+                                      : colourOf(by, attributeValue(info, values.data() + i * width)));
     }
 }
 

@@ -33,6 +33,8 @@ Result<ColourBy> parseColourBy(const std::string& what, const std::string& map, 
 /// The attribute that `what` needs; empty: none.
 std::string attributeBehind(const std::string& what);
 
+/// sRGB colour of records whose attribute has no data: grey, whatever the map.
+inline constexpr uint32_t kNoDataColour = 0x808080u;
 /// r | g << 8 | b << 16, sRGB.
 uint32_t colourOf(const ColourBy& by, double value);
 /// What a category is called: the ASPRS name of a class, otherwise the number.

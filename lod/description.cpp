@@ -78,7 +78,7 @@ shared::SurfaceMaterial materialFromJson(const json& j) {
 
 json toJson(const StoreDescription& d) {
     json attributes = json::array();
-    for (const AttributeInfo& a : d.attributes)
+    for (const AttributeInfo& a : d.attributes) {
         attributes.push_back({{"name", toUtf8(a.name)},
                               {"type", kScalarNames.at(static_cast<size_t>(a.type))},
                               {"aggregate", kAggregateNames.at(static_cast<size_t>(a.aggregate))},
@@ -90,6 +90,9 @@ json toJson(const StoreDescription& d) {
                               {"low", a.low},
                               {"high", a.high},
                               {"counts", a.counts}});
+        if (a.noData) attributes.back()["no_data"] = *a.noData;
+        if (a.withoutData > 0) attributes.back()["without_data"] = a.withoutData;
+    }
     json materials = json::array();
     for (const shared::SurfaceMaterial& m : d.materials) materials.push_back(materialToJson(m));
     json out = {{"metres_per_unit", d.metresPerUnit},
@@ -144,6 +147,8 @@ AttributeInfo attributeFromJson(const json& j) {
     a.greatest = j.at("greatest").get<double>();
     a.low = j.at("low").get<double>();
     a.high = j.at("high").get<double>();
+    if (j.contains("no_data")) a.noData = j["no_data"].get<double>();
+    if (j.contains("without_data")) a.withoutData = whole<uint64_t>(j["without_data"]);
     for (const json& c : j.at("counts")) a.counts.emplace_back(c.at(0).get<double>(), whole<uint64_t>(c.at(1)));
     return a;
 }

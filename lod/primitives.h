@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,8 +38,10 @@ struct AttributeInfo {
     Aggregate aggregate = Aggregate::mean;
     double scale = 1, offset = 0;
     std::string description;
-    // Only in a store, over all its points: range, and 2nd and 98th percentile.
+    std::optional<double> noData;  ///< the stored value that says "not measured", where the file declares one
+    // Only in a store, over all its points that have data: range, and 2nd and 98th percentile.
     double least = 0, greatest = 0, low = 0, high = 0;
+    uint64_t withoutData = 0;                         ///< points that have no data
     std::vector<std::pair<double, uint64_t>> counts;  ///< value and number of points, of 8-bit categories
 };
 

@@ -27,6 +27,8 @@ struct ScanPoint {
 /// About options.points points (a ray that meets nothing gives none; the angular step is set from a pilot scan).
 std::vector<ScanPoint> growScan(const ScanOptions& options);
 
+/// Can writeScan write to that name?
+Result<void> checkScanPath(const std::string& path);
 /// By extension: .las (1.2, point format 2, scale 0.001) or .ply (binary, double coordinates).
 Result<void> writeScan(const std::string& path, const std::vector<ScanPoint>& points, const ScanOptions& options);
 

@@ -91,12 +91,17 @@ Result<void> writePly(OutputFile& file, const std::vector<ScanPoint>& points, co
 
 }  // namespace
 
-Result<void> writeScan(const std::string& path, const std::vector<ScanPoint>& points, const ScanOptions& options) {
+Result<void> checkScanPath(const std::string& path) {
     const std::string extension = std::filesystem::path(path).extension().string();
-    if (extension != ".las" && extension != ".ply")
-        return fail(ErrorKind::usage, "scans are written as .las or .ply", path, "change the extension");
+    if (extension == ".las" || extension == ".ply") return {};
+    return fail(ErrorKind::usage, "scans are written as .las or .ply", path, "change the extension");
+}
+
+Result<void> writeScan(const std::string& path, const std::vector<ScanPoint>& points, const ScanOptions& options) {
+    STIPPLE_TRY(checkScanPath(path));
     STIPPLE_ASSIGN(OutputFile file, OutputFile::create(path));
-    STIPPLE_TRY(extension == ".las" ? writeLas(file, points, options) : writePly(file, points, options));
+    STIPPLE_TRY(std::filesystem::path(path).extension() == ".las" ? writeLas(file, points, options)
+                                                                  : writePly(file, points, options));
     return file.commit();
 }
 

@@ -9,6 +9,7 @@
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
 #include "engine/base/text.h"
+#include "engine/base/words.h"
 
 namespace stipple::app {
 namespace {
@@ -23,7 +24,7 @@ struct Options {
 /// Of the output, also where its temporary file was being checked.
 Error interruptedAt(Error error, const Options& o) {
     if (error.where.find(".partial") == std::string::npos) return error;
-    return {ErrorKind::interrupted, "interrupted", o.output, "nothing was written"};
+    return {ErrorKind::interrupted, "interrupted; nothing is written", o.output, ""};
 }
 
 /// `isSilent`: another rank says what there is to say.
@@ -77,13 +78,14 @@ Result<void> run(const Options& o, bool& isSilent) {
     for (const std::string& note : r.notes) fmt::print(stderr, "note: {}\n", printable(note));
     const std::string& what = r.primitive;
     const bool isMesh = what == "triangle";
-    fmt::print("{}: {} {}s in {} {}, {} ({:.1f} bytes a {}), {:.2f} s, {:.2f} M {}s/s, peak memory {}\n", o.output,
-               r.pointsOut, what, r.nodes, isMesh ? "groups" : "nodes", humanBytes(r.bytesOut),
+    fmt::print("{}: {} in {}, {} ({:.1f} bytes a {}), {:.2f} s, {:.2f} M {}s/s, peak memory {}\n", o.output,
+               counted(r.pointsOut, what), counted(r.nodes, isMesh ? "group" : "node"), humanBytes(r.bytesOut),
                static_cast<double>(r.bytesOut) / static_cast<double>(r.pointsOut), what, r.seconds,
                static_cast<double>(r.pointsIn) / r.seconds * 1e-6, what, humanBytes(peakRssBytes()));
-    for (const auto& [reason, count] : r.added) fmt::print("added {}s: {} {}\n", what, count, reason);
+    for (const auto& [reason, count] : r.added)
+        fmt::print("added {}: {} {}\n", count == 1 ? what : what + "s", count, reason);
     for (const auto& [reason, count] : r.dropped)
-        fmt::print("dropped {}{}: {}\n", count, what == "point" ? " points" : "", reason);
+        fmt::print("dropped {}: {}\n", what == "point" ? counted(count, "point") : fmt::format("{}", count), reason);
     return {};
 }
 

@@ -117,9 +117,10 @@ void ColourOptions::addTo(CLI::App& app) {
         ->capture_default_str();
     app.add_option("--colour-map,--color-map", map,
                    "colours of a range of values: grey, viridis, magma, turbo or relief")
+        ->check(oneOf({"grey", "viridis", "magma", "turbo", "relief"}))
         ->type_name("MAP");
     app.add_option("--colour-range,--color-range", range,
-                   "values at the ends of the map (default: 2nd to 98th percentile)")
+                   "values at the ends of the map (default: 2nd to 98th percentile of what has data)")
         ->type_name("LOW,HIGH");
     app.add_flag("--legend", legend, "draw what the colours stand for into the picture");
 }

@@ -86,7 +86,8 @@ Result<void> run(const Options& o) {
         return fail(ErrorKind::usage, "says nothing of what to convert to", "stipple convert",
                     "give --strands: polygon plants become ribbons and tubes");
     if (!isSceneFile(o.input))
-        return fail(ErrorKind::usage, "is not a mesh", o.input, "give a .gltf, .glb or .obj file");
+        return fail(ErrorKind::usage, "is not read by convert, which takes polygon plants as .gltf, .glb or .obj",
+                    o.input, "other files are drawn as they are: stipple render, stipple view");
     const std::string extension = fs::path(o.output).extension().string();
     if (extension != ".stipple" && extension != ".glb" && extension != ".gltf")
         return fail(ErrorKind::usage, "is neither a store nor a scene", o.output, "write to .stipple, .glb or .gltf");

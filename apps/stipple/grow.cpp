@@ -25,6 +25,7 @@ Result<void> run(Options& o) {
     STIPPLE_ASSIGN(const glm::dvec3 origin, parseVector(o.origin, "--origin"));
     o.scan.origin = {origin.x, origin.y, origin.z};
     STIPPLE_TRY(checkOutputs({{o.output}}, {}, o.force));
+    STIPPLE_TRY(grow::checkScanPath(o.output));
     catchStopSignals();
     const double start = nowSeconds();
     const auto points = grow::growScan(o.scan);

@@ -57,7 +57,8 @@ nlohmann::json storeInfo(const lod::Store& store) {
                               {"type", lod::kScalarNames.at(static_cast<size_t>(a.type))},
                               {"aggregate", lod::kAggregateNames.at(static_cast<size_t>(a.aggregate))},
                               {"least", a.least},
-                              {"greatest", a.greatest}});
+                              {"greatest", a.greatest},
+                              {"points_without_data", a.withoutData}});
     nlohmann::json textures = nlohmann::json::array();
     for (const shared::TextureInfo& t : h.textures)
         textures.push_back({{"width", t.width}, {"height", t.height}, {"levels", t.levels}});
@@ -129,9 +130,12 @@ void printStore(const nlohmann::json& j) {
                    : "no");
     if (!j["crs"].get<std::string>().empty()) fmt::print("  crs           {}\n", j["crs"].get<std::string>());
     for (const auto& a : j["attributes"])
-        fmt::print("  attribute     {} ({}, coarse levels: {}), {:.15g} .. {:.15g}\n", a["name"].get<std::string>(),
+        fmt::print("  attribute     {} ({}, coarse levels: {}), {:.15g} .. {:.15g}{}\n", a["name"].get<std::string>(),
                    a["type"].get<std::string>(), a["aggregate"].get<std::string>(), a["least"].get<double>(),
-                   a["greatest"].get<double>());
+                   a["greatest"].get<double>(),
+                   a["points_without_data"] == 0
+                       ? ""
+                       : fmt::format("; {} points without data", a["points_without_data"].get<uint64_t>()));
     fmt::print("  hash          {}\n  level   nodes    records      bytes  largest error\n",
                j["content_hash"].get<std::string>());
     for (size_t l = 0; l < j["levels"].size(); ++l) {

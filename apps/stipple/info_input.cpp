@@ -12,6 +12,7 @@
 #include "engine/base/file.h"
 #include "engine/base/text.h"
 #include "engine/base/units.h"
+#include "engine/base/words.h"
 #include "engine/scene/scene.h"
 #include "lod/import/import.h"
 #include "lod/import/las/header.h"
@@ -44,6 +45,8 @@ nlohmann::json attributeJson(const lod::AttributeInfo& a, bool hasRange) {
         j["offset"] = a.offset;
     }
     if (!a.description.empty()) j["description"] = a.description;
+    if (a.noData) j["no_data"] = *a.noData * a.scale + a.offset;
+    if (hasRange) j["points_without_data"] = a.withoutData;
     if (hasRange) {
         j["least"] = a.least;
         j["greatest"] = a.greatest;
@@ -81,22 +84,52 @@ Result<void> addLas(const std::string& path, bool skipBad, nlohmann::json& j, st
                                       [](const lod::AttributeInfo& a) { return a.name == "return_number"; });
     std::array<uint64_t, 15> found{};
     for (const auto& [value, count] : returns->counts)
-        if (value >= 1 && value <= 15) found.at(static_cast<size_t>(value) - 1) = count;
-    if (found != h.pointsByReturn)
+        // (Before LAS 1.4 a header counts five returns, whatever the points have.)
+        if (value >= 1 && value <= (h.minor >= 4 ? 15 : 5)) found.at(static_cast<size_t>(value) - 1) = count;
+    if (h.pointsByReturn == decltype(h.pointsByReturn){})
+        j["notes"].push_back("the header does not count points by return");
+    else if (found != h.pointsByReturn)
         problems.push_back(fmt::format("points by return: the header says {}, the file holds {}",
                                        fmt::join(h.pointsByReturn, " "), fmt::join(found, " ")));
     return {};
 }
 
-/// A box that is larger than the points is allowed (octrees give each node its cell); points outside it are not.
-void compareBounds(const lod::SourceInfo& i, const lod::Survey& s, std::vector<std::string>& problems) {
-    for (int a = 0; a < 3; ++a) {
-        const double slack = 1.001 * i.scale[a];  // headers are rounded
-        if (!(s.least[a] >= i.declaredMin[a] - slack) || !(s.greatest[a] <= i.declaredMax[a] + slack))
-            problems.push_back(
-                fmt::format("the header's box is {:.10g} .. {:.10g} along {}, the points reach {:.10g} .. {:.10g}",
-                            i.declaredMin[a], i.declaredMax[a], "xyz"[a], s.least[a], s.greatest[a]));
+/// How the header's box differs from that of the points, along each axis where it does by more than headers are rounded
+/// by. Points outside of it are a problem; a larger one is allowed (octrees give each node its cell) and said.
+void compareBounds(const lod::SourceInfo& i, const lod::Survey& s, nlohmann::json& j,
+                   std::vector<std::string>& problems) {
+    std::vector<std::string> larger;
+    bool isTooSmall = false;
+    if (i.declaredMin == glm::dvec3(0) && i.declaredMax == glm::dvec3(0) && s.least != s.greatest) {
+        j["header_box"] = "absent";
+        j["notes"].push_back("the header has no box: all of it is 0");
+        return;
     }
+    for (int a = 0; a < 3; ++a) {
+        const double slack = 1.001 * i.scale[a];
+        // How far the points reach beyond the box; negative: how far the box reaches beyond them.
+        const std::array<double, 2> beyond{i.declaredMin[a] - s.least[a], s.greatest[a] - i.declaredMax[a]};
+        const auto place = [&](double v) { return latticeText(v, i.scale[a], i.offset[a]); };
+        for (size_t end = 0; end < 2; ++end) {
+            const char* const side = end == 0 ? "least" : "greatest";
+            const double of = end == 0 ? i.declaredMin[a] : i.declaredMax[a],
+                         is = end == 0 ? s.least[a] : s.greatest[a];
+            if (std::abs(beyond.at(end)) <= slack) continue;
+            const std::string text =
+                fmt::format("{} {} is {:.15g}, that of the points {}", side, "xyz"[a], of, place(is));
+            if (beyond.at(end) < 0) {
+                larger.push_back(fmt::format("{} ({:.6g} farther out)", text, -beyond.at(end)));
+                continue;
+            }
+            isTooSmall = true;  // (also what is no number)
+            problems.push_back(
+                fmt::format("points lie outside of the header's box: its {} ({:.6g} beyond)", text, beyond.at(end)));
+        }
+    }
+    j["header_box"] = isTooSmall ? "too small" : larger.empty() ? "agrees" : "larger";
+    if (!larger.empty())
+        j["notes"].push_back(
+            fmt::format("the header's box is larger than that of the points: its {}", fmt::join(larger, "; ")));
 }
 
 Result<nlohmann::json> fileInfo(const InputInfoOptions& o, const std::string& path, Executor& executor) {
@@ -141,7 +174,7 @@ Result<nlohmann::json> fileInfo(const InputInfoOptions& o, const std::string& pa
                 j["min_integers"] = {survey->leastStep.x, survey->leastStep.y, survey->leastStep.z};
                 j["max_integers"] = {survey->greatestStep.x, survey->greatestStep.y, survey->greatestStep.z};
             }
-            if (i.hasDeclaredBounds) compareBounds(i, *survey, problems);
+            if (i.hasDeclaredBounds) compareBounds(i, *survey, j, problems);
         }
         if (survey->colourMax > 0) j["colour_bits"] = survey->colourMax > 255 ? 16 : 8;
     }
@@ -161,7 +194,7 @@ void printVector(const nlohmann::json& j, const char* key, const char* label) {
         const bool isOnLattice = j.contains("scale") && key[0] == 'm';  // least and greatest place
         const double v = j[key][a].get<double>();
         text += " " + (isOnLattice ? latticeText(v, j["scale"][a].get<double>(), j["offset"][a].get<double>())
-                                   : fmt::format("{}", v));
+                                   : fmt::format("{:.15g}", v));
     }
     fmt::print("  {:15}{}\n", label, text);
 }
@@ -181,6 +214,8 @@ void printAttributes(const nlohmann::json& attributes) {
             for (const auto& [value, count] : counts)
                 range += fmt::format("{}{}: {}", range.empty() ? "" : ", ", value, count);
         }
+        if (const auto without = a.value("points_without_data", uint64_t{0}); without > 0)
+            range += fmt::format("; {} points without data", without);
         fmt::print("    {:22} {:4} {:5} {}{}\n", a["name"].get<std::string>(), a["type"].get<std::string>(),
                    a["aggregate"].get<std::string>(), range,
                    a.contains("description") ? "  (" + a["description"].get<std::string>() + ")" : "");
@@ -189,8 +224,8 @@ void printAttributes(const nlohmann::json& attributes) {
 
 void printFile(const nlohmann::json& j) {
     const bool isMesh = j.contains("faces") || j.contains("triangle_strips");
-    fmt::print("{}: {}, {} {}\n", printable(j["path"].get<std::string>()), j["format"].get<std::string>(),
-               j["points"].get<uint64_t>(), isMesh ? "vertices" : "points");
+    fmt::print("{}: {}, {}\n", printable(j["path"].get<std::string>()), j["format"].get<std::string>(),
+               counted(j["points"].get<uint64_t>(), isMesh ? "vertex" : "point", isMesh ? "vertices" : "points"));
     if (isMesh)
         fmt::print("  {:15} {}{}\n", "faces", j.value("faces", uint64_t{0}),
                    j.contains("triangle_strips")
@@ -224,8 +259,18 @@ void printFile(const nlohmann::json& j) {
     if (!j.contains("points_read"))
         fmt::print("  the points themselves were not read: --verify does\n");
     else if (j["problems"].empty())
-        fmt::print("  all {} points were read; counts and bounds agree with the header\n",
-                   j["points_read"].get<uint64_t>());
+        fmt::print("  all {} points were read; {}\n", j["points_read"].get<uint64_t>(),
+                   !j.contains("header_box")     ? "as many as the header says"
+                   : j["header_box"] == "absent" ? "as many as the header says"
+                   : j["header_box"] == "agrees" ? "counts and box agree with the header"
+                                                 : "counts agree with the header, whose box holds all of them");
+}
+
+/// Files that are not what they say end with 3, after all that there is to say.
+Result<void> asTheySay(const InputInfoOptions& o, size_t problems) {
+    if (problems == 0 || o.skipBad) return {};
+    return fail(ErrorKind::input, fmt::format("is not what it says: {} (listed above)", counted(problems, "problem")),
+                o.input, "--skip-bad permits it");
 }
 
 /// Many files: sums, and the files that differ or fail.
@@ -265,19 +310,19 @@ Result<void> showFolder(const InputInfoOptions& o, const std::vector<std::string
     all["problems"] = problems;
     if (o.json) {
         printJson("info", all);
-        return {};
+        return asTheySay(o, problems.size());
     }
-    fmt::print("{}: {} files, {} points\n", printable(o.input), files.size(), points);
+    fmt::print("{}: {}, {}\n", printable(o.input), counted(files.size(), "file"), counted(points, "point"));
     printVector(all, "min", "least");
     printVector(all, "max", "greatest");
-    for (const auto& [format, count] : formats) fmt::print("  {:15} {} files\n", format, count);
+    for (const auto& [format, count] : formats) fmt::print("  {:15} {}\n", format, counted(count, "file"));
     for (const auto& [crs, count] : systems)
-        fmt::print("  {:15} {} ({} files)\n", "crs", crs.empty() ? "not named" : crs, count);
+        fmt::print("  {:15} {} ({})\n", "crs", crs.empty() ? "not named" : crs, counted(count, "file"));
     for (size_t i = 0; i < std::min(problems.size(), kMostProblems); ++i)
         fmt::print("  problem: {}\n", printable(problems[i]));
     if (problems.size() > kMostProblems)
         fmt::print("  and {} more (--json lists all)\n", problems.size() - kMostProblems);
-    return {};
+    return asTheySay(o, problems.size());
 }
 
 }  // namespace
@@ -363,7 +408,8 @@ Result<void> showStrands(const InputInfoOptions& o) {
         printJson("info", j);
         return {};
     }
-    fmt::print("{}: {} strands of {} vertices\n", printable(o.input), strands, vertices);
+    fmt::print("{}: {} of {}\n", printable(o.input), counted(strands, "strand"),
+               counted(vertices, "vertex", "vertices"));
     printVector(j, "min", "least");
     printVector(j, "max", "greatest");
     fmt::print("  {:15} {}\n  {:15} {}\n", "radii", hasRadii ? "yes" : "no: see --strand-radius", "colours",
@@ -385,7 +431,7 @@ Result<void> showInputInfo(const InputInfoOptions& o, Executor& executor) {
         printJson("info", j);
     else
         printFile(j);
-    return {};
+    return asTheySay(o, j["problems"].size());
 }
 
 }  // namespace stipple::app

@@ -80,9 +80,16 @@ class Canvas {
     int scale_;
 };
 
+/// With as many digits as tell the ticks of a bar apart that spans `span`; short, however large or small the values.
 std::string number(double v, double span) {
+    constexpr double kLong = 1e10, kSmall = 1e-4;
+    const double size = std::max(std::abs(v), std::abs(span));
+    if (size > kLong || std::abs(span) < kSmall) {
+        const int digits = toWhole<int>(std::ceil(std::log10(size / std::abs(span)))) + 4;
+        return fmt::format("{:.{}g}", v, std::clamp(digits, 4, 17));
+    }
     const int digits = std::clamp(toWhole<int>(3 - std::floor(std::log10(std::abs(span)))), 0, 9);
-    return fmt::format("{:.{}f}", v, std::min(digits, 6));
+    return fmt::format("{:.{}f}", v, std::min(digits, 8));
 }
 
 }  // namespace
@@ -108,6 +115,8 @@ Legend makeLegend(const lod::ColourBy& by, const lod::StoreDescription& d) {
     }
     if (by.mode == lod::ColourMode::attribute && !d.attributes.at(by.attribute).description.empty())
         legend.title += ", " + d.attributes.at(by.attribute).description;
+    if (by.mode == lod::ColourMode::attribute && d.attributes.at(by.attribute).withoutData > 0)
+        legend.noData = {lod::kNoDataColour, "no data"};
     for (int j = 0; j < kBar; ++j)
         legend.bar.push_back(lod::colourOf(by, by.low + (by.high - by.low) * (j + 0.5) / kBar));
     for (size_t i = 0; i < kTicks; ++i) {
@@ -124,8 +133,10 @@ void drawLegend(const Legend& legend, render::Image& image) {
     const int line = font.lineHeight();
     int labelWidth = font.widthOf(legend.title) - kSwatch - kPad;
     for (const LegendEntry& e : legend.entries) labelWidth = std::max(labelWidth, font.widthOf(e.label));
+    labelWidth = std::max(labelWidth, font.widthOf(legend.noData.label));
     const int rows = static_cast<int>(legend.entries.size());
-    const int body = isBar ? kBar + line : rows * line;
+    const int below = legend.noData.label.empty() ? 0 : line + 4;
+    const int body = (isBar ? kBar + line : rows * line) + below;
     const int w = 3 * kPad + kSwatch + labelWidth, h = 2 * kPad + line + 4 + body;
     // As large a part of a large picture as of one of 720 rows.
     constexpr double kRows = 720;
@@ -142,6 +153,10 @@ void drawLegend(const Legend& legend, render::Image& image) {
         const int at = isBar ? top + kBar - kBar * i / (rows - 1) : top + i * line;
         if (!isBar) canvas.fill(x + kPad, at, kSwatch, line - 3, e.rgb, 255);
         text(e.label, x + 2 * kPad + kSwatch, at);
+    }
+    if (below > 0) {
+        canvas.fill(x + kPad, top + body - line, kSwatch, line - 3, legend.noData.rgb, 255);
+        text(legend.noData.label, x + 2 * kPad + kSwatch, top + body - line);
     }
     for (int j = 0; isBar && j < kBar; ++j)
         canvas.fill(x + kPad, top + line / 2 + j, kSwatch, 1, legend.bar[static_cast<size_t>(kBar - 1 - j)], 255);

@@ -15,6 +15,7 @@ struct Legend {
     std::string title;
     std::vector<uint32_t> bar;         ///< colours from low to high; empty: a list of categories
     std::vector<LegendEntry> entries;  ///< evenly spaced along the bar; empty: the colours are the scene's own
+    LegendEntry noData;                ///< below the bar; no label: all points have data
 };
 
 Legend makeLegend(const lod::ColourBy& by, const lod::StoreDescription& description);

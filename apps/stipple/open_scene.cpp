@@ -531,7 +531,7 @@ std::vector<glm::dvec3> outlineOf(const std::vector<render::PlacedStore>& placed
     for (size_t i = 0; i < placed.size(); i += stride) {
         const render::PlacedStore& p = placed[i];
         auto& own = known[p.store.get()];
-        if (own.empty() && known.size() <= kMostRead) own = scene::outlineOf(*p.store);
+        if (own.empty() && placed.size() <= kMostRead) own = scene::outlineOf(*p.store);
         if (own.empty() || placed.size() > kMostRead) {
             const auto corners = scene::cornersOf(p.store->description.focusMin, p.store->description.focusMax);
             own.assign(corners.begin(), corners.end());

@@ -68,6 +68,15 @@ std::vector<std::string> filesRead(const std::string& input) {
     return files;
 }
 
+/// Found before hours of work, not after.
+Result<void> checkFolder(const std::string& path) {
+    const fs::path folder = fs::path(path).parent_path();
+    std::error_code error;
+    if (folder.empty() || fs::is_directory(folder, error)) return {};
+    return fail(ErrorKind::output, fmt::format("cannot be written: there is no folder {}", folder.string()), path,
+                "make it first, or name another");
+}
+
 Result<void> checkKind(const Output& output) {
     std::error_code error;
     if (fs::file_size(output.path, error) == 0) return {};  // nothing is lost
@@ -86,6 +95,7 @@ Result<void> checkOutputs(const std::vector<Output>& outputs, const std::vector<
     std::vector<std::pair<Identity, const Output*>> there;
     for (const Output& output : outputs) {
         STIPPLE_TRY(outputTarget(output.path));
+        STIPPLE_TRY(checkFolder(output.path));
         const auto identity = identityOf(output.path);
         if (!identity) continue;
         for (const auto& [before, other] : there)

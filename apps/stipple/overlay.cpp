@@ -135,6 +135,12 @@ void drawLegendPanel(const Legend& legend) {
         ImGui::TextUnformatted(e.label.c_str());
         ImGui::Unindent(20 * unit());
     }
+    if (!legend.noData.label.empty()) {
+        swatch(legend.noData.rgb, 13 * unit(), 13 * unit());
+        ImGui::Indent(20 * unit());
+        ImGui::TextUnformatted(legend.noData.label.c_str());
+        ImGui::Unindent(20 * unit());
+    }
     ImGui::End();
 }
 

@@ -40,7 +40,8 @@ Result<lod::BuildReport> buildPlyMeshes(const std::vector<std::string>& files, c
     STIPPLE_ASSIGN(const lod::BuildSettings wanted, build.settings());
     const std::string folder =
         wanted.tempFolder.empty() ? fs::absolute(output).parent_path().string() : wanted.tempFolder;
-    const uint64_t forVertices = wanted.memoryBytes / 4;
+    settings.readerShare = 0.25;
+    const auto forVertices = static_cast<uint64_t>(settings.readerShare * static_cast<double>(wanted.memoryBytes));
     std::vector<lod::MeshSource> sources;
     for (const std::string& file : files) {
         STIPPLE_ASSIGN(lod::MeshSource source, lod::openPlyMesh(file, forVertices / files.size(), folder));

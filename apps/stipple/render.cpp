@@ -13,6 +13,7 @@
 #include "engine/base/file.h"
 #include "engine/base/process.h"
 #include "engine/base/units.h"
+#include "engine/base/words.h"
 #include "engine/image/coverage.h"
 #include "engine/image/image_io.h"
 #include "engine/reference/reference.h"
@@ -56,6 +57,26 @@ std::string modeHelp() {
     return help + "or reference (traced full detail)";
 }
 
+Result<glm::dvec3> backgroundOf(const Options& o) {
+    STIPPLE_ASSIGN(const glm::dvec3 background, parseVector(o.background, "--background"));
+    for (int c = 0; c < 3; ++c)
+        if (!(background[c] >= 0 && background[c] <= 255))
+            return fail(ErrorKind::usage, "channels are 0 to 255", "--background");
+    return background;
+}
+
+/// What can be found out before a scene is built, which may take hours.
+Result<void> checkArguments(const Options& o) {
+    STIPPLE_TRY(o.camera.check());
+    if (!(o.error > 0)) return fail(ErrorKind::usage, "must be larger than 0", "--error");
+    STIPPLE_TRY(backgroundOf(o));
+    if (parseBytes(o.resident) == 0)
+        return fail(ErrorKind::usage, "is not a size", "--resident " + o.resident, "e.g. 1G");
+    for (const std::string& file : {o.camera.path, o.environment.path})
+        if (!file.empty()) STIPPLE_TRY(InputFile::open(file));
+    return {};
+}
+
 Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDescription& d, const Shot& shot,
                                            const lod::ColourBy& colour, const std::vector<render::WorldLight>& lights) {
     render::FrameSettings s;
@@ -68,12 +89,9 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     s.draw.worldUp = shot.worldUp;
     s.draw.exactStrands = static_cast<float>(o.strandExact);
     s.draw.wind = {o.wind, o.seconds, render::windAcross(shot.worldUp)};
-    STIPPLE_ASSIGN(const glm::dvec3 background, parseVector(o.background, "--background"));
-    for (int c = 0; c < 3; ++c) {
-        if (!(background[c] >= 0 && background[c] <= 255))
-            return fail(ErrorKind::usage, "channels are 0 to 255", "--background");
+    STIPPLE_ASSIGN(const glm::dvec3 background, backgroundOf(o));
+    for (int c = 0; c < 3; ++c)
         s.draw.background[c] = shared::linearFromSrgb(static_cast<float>(background[c]) / 255.0f);
-    }
     if (o.alpha) s.draw.background = glm::vec3(0);  // what is not covered adds nothing
     static const std::array<const char*, 5> names{"none", "level", "error", "holes", "normals"};
     s.draw.debugView = static_cast<uint32_t>(std::find(names.begin(), names.end(), o.debug) - names.begin());
@@ -140,69 +158,48 @@ std::string lotText(const render::LotShares& lots) {
     return parts.empty() ? "" : fmt::format(" (beside it, by lot: {})", fmt::join(parts, ", "));
 }
 
-Result<void> run(const Options& o, Written& written) {
-    catchStopSignals();
-    STIPPLE_TRY(checkPictures(o));
-    STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
-    STIPPLE_TRY(o.camera.check());
-    if (!(o.error > 0)) return fail(ErrorKind::usage, "must be larger than 0", "--error");
-    const auto executor = makeTbbExecutor(o.build.threads);
-    STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
-    STIPPLE_TRY(checkModule(o));
-    STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, !o.quiet));
-    const lod::StoreDescription& description = scene.description;
-    STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
-    written.of = shot.views.size();
-    // Rays see the records as they are stored.
-    const bool isTraced = o.mode == "reference" && o.colour.what == "auto";
-    STIPPLE_ASSIGN(const lod::ColourBy colour,
-                   applyColours(scene, isTraced ? "plain" : o.colour.what, o.colour.map, o.colour.range));
-    STIPPLE_ASSIGN(render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
-    STIPPLE_ASSIGN(settings.draw.environment,
-                   openEnvironment(o.environment.path, o.environment.scale, o.build.reading().memoryBytes, *executor));
-    if (o.mode == "reference" && colour.mode != lod::ColourMode::own)
-        return fail(ErrorKind::usage, "traced pictures have the scene's own colours", "--mode reference",
-                    "leave --colour out, or use --device reference");
-    if (o.mode == "reference") {
-        const double start = nowSeconds();
-        reference::TraceSettings trace{static_cast<uint32_t>(o.samples), settings.draw};
-        for (size_t i = 0; i < shot.views.size(); ++i) {
-            STIPPLE_ASSIGN(render::Image traced, reference::trace(scene.placed, shot.views[i], trace, *executor));
-            STIPPLE_TRY(image::writePicture(shot.views.size() > 1 ? numbered(o.output, i) : o.output, traced, o.alpha));
-            ++written.pictures;
-        }
-        if (o.json)
-            printJson("render", {{"backend", "trace"},
-                                 {"samples_per_pixel", o.samples * o.samples},
-                                 {"seconds", nowSeconds() - start}});
-        return {};
+/// The delivered error, in words.
+std::string errorText(const Verdict& verdict, const std::string& mode) {
+    const double error = verdict.tauEffectivePixels;
+    return (std::isfinite(error) ? fmt::format("{:.2f} px error", error) : "no stated error") +
+           (!closesGaps(mode) ? " of each, gaps between them stay open" : "");
+}
+
+/// `--mode reference`: rays against the full detail.
+Result<void> runTraced(const Options& o, const OpenedScene& scene, const Shot& shot,
+                       const render::FrameSettings& settings, const Legend& legend, Executor& executor,
+                       Written& written) {
+    const double start = nowSeconds();
+    const reference::TraceSettings trace{static_cast<uint32_t>(o.samples), settings.draw};
+    const auto nameOf = [&](size_t i) { return shot.views.size() > 1 ? numbered(o.output, i) : o.output; };
+    for (size_t i = 0; i < shot.views.size(); ++i) {
+        STIPPLE_ASSIGN(render::Image traced, reference::trace(scene.placed, shot.views[i], trace, executor));
+        drawLegend(legend, traced);
+        STIPPLE_TRY(image::writePicture(nameOf(i), traced, o.alpha));
+        ++written.pictures;
+        if (!o.quiet && !o.json)
+            fmt::print("{}: full detail, traced with {} a pixel, {:.1f} s\n", nameOf(i),
+                       counted(static_cast<uint64_t>(o.samples) * static_cast<uint64_t>(o.samples), "ray"),
+                       nowSeconds() - start);
     }
-    streaming::StreamSettings stream;
-    stream.residentBytes = parseBytes(o.resident);
-    if (stream.residentBytes == 0)
-        return fail(ErrorKind::usage, "is not a size", "--resident " + o.resident, "e.g. 1G");
-    settings.wantDepthAndNormal = settings.wantDepthAndNormal || o.accumulate > 1;
-    auto state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.crowds);
-    render::setSway(settings.draw.wind, state->hierarchies, state->instances);
-    const Legend legend = o.colour.legend ? makeLegend(colour, description) : Legend{};
-    const FramesPlan plan{shot.views, shot.seconds,    o.output, o.resident,          o.frames, o.accumulate,
-                          o.noWait,   o.build.skipBad, o.quiet,  !o.quiet && !o.json, o.alpha};
-    Timings timings;
-    Verdict verdict;
-    STIPPLE_TRY(runFrames(plan, settings, *state, *executor, timings, written, verdict));
-    if (shot.views.size() == 1) {
-        STIPPLE_TRY(checkStopped(o.output));
-        drawLegend(legend, state->image);
-        STIPPLE_TRY(image::writePicture(o.output, state->image, o.alpha));
-    }
-    const FrameCounters& c = state->counters;
+    if (o.json)
+        printJson(
+            "render",
+            {{"backend", "trace"}, {"samples_per_pixel", o.samples * o.samples}, {"seconds", nowSeconds() - start}});
+    return {};
+}
+
+/// The result, as text or JSON.
+void tell(const Options& o, const render::FrameState& state, const Verdict& verdict, const Timings& timings,
+          const glm::uvec2& size, size_t views) {
+    const FrameCounters& c = state.counters;
     if (o.json) {
         nlohmann::json passes = nlohmann::json::array();
         for (size_t i = 0; i < timings.passNames.size(); ++i)
             passes.push_back({{"name", timings.passNames[i]}, {"ms", quantile(timings.passes[i], 0.5)}});
         const nlohmann::json j = {
-            {"backend", backend->name()},
-            {"device", backend->device()},
+            {"backend", state.backend->name()},
+            {"device", state.backend->device()},
             {"mode", o.mode},
             {"width", size.x},
             {"height", size.y},
@@ -221,6 +218,7 @@ Result<void> run(const Options& o, Written& written) {
             {"complete", verdict.isComplete()},
             {"incomplete_pictures", verdict.incomplete},
             {"worst_picture", verdict.worst},
+            {"worst_picture_path", views > 1 ? numbered(o.output, verdict.worst) : o.output},
             {"bytes_streamed", c.bytesStreamed},
             {"resident_bytes", c.residentBytes},
             {"peak_rss_bytes", peakRssBytes()},
@@ -228,17 +226,55 @@ Result<void> run(const Options& o, Written& written) {
             {"complete_ms", timings.completeMs},
             {"counters", countersJson(c)}};
         printJson("render", j);
-    } else if (!o.quiet && shot.views.size() == 1) {
+    } else if (!o.quiet && views > 1) {
+        fmt::print("{} pictures; the worst is {}: {}{}, {:.1f} ms a frame on {}\n", views,
+                   numbered(o.output, verdict.worst), errorText(verdict, o.mode), lotText(verdict.lots),
+                   quantile(timings.frames, 0.5), state.backend->device());
+    } else if (!o.quiet) {
         const std::string drawn = c.trianglesDrawn == 0 ? fmt::format("{} records", c.recordsDrawn)
                                   : c.recordsDrawn == 0
                                       ? fmt::format("{} triangles", c.trianglesDrawn)
                                       : fmt::format("{} records, {} triangles", c.recordsDrawn, c.trianglesDrawn);
-        const double error = verdict.tauEffectivePixels;
-        fmt::print("{}: {}, {}{}, {:.1f} ms a frame on {}\n", o.output, drawn,
-                   (std::isfinite(error) ? fmt::format("{:.2f} px error", error) : "no stated error") +
-                       (!closesGaps(o.mode) ? " of each, gaps between them stay open" : ""),
-                   lotText(verdict.lots), quantile(timings.frames, 0.5), backend->device());
+        fmt::print("{}: {}, {}{}, {:.1f} ms a frame on {}\n", o.output, drawn, errorText(verdict, o.mode),
+                   lotText(verdict.lots), quantile(timings.frames, 0.5), state.backend->device());
     }
+}
+
+Result<void> run(const Options& o, Written& written) {
+    catchStopSignals();
+    STIPPLE_TRY(checkPictures(o));
+    STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
+    STIPPLE_TRY(checkArguments(o));
+    const auto executor = makeTbbExecutor(o.build.threads);
+    STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
+    STIPPLE_TRY(checkModule(o));
+    STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, !o.quiet));
+    const lod::StoreDescription& description = scene.description;
+    STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
+    written.of = shot.views.size();
+    STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
+    STIPPLE_ASSIGN(render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
+    STIPPLE_ASSIGN(settings.draw.environment,
+                   openEnvironment(o.environment.path, o.environment.scale, o.build.reading().memoryBytes, *executor));
+    const Legend legend = o.colour.legend ? makeLegend(colour, description) : Legend{};
+    if (o.mode == "reference") return runTraced(o, scene, shot, settings, legend, *executor, written);
+    streaming::StreamSettings stream;
+    stream.residentBytes = parseBytes(o.resident);
+    settings.wantDepthAndNormal = settings.wantDepthAndNormal || o.accumulate > 1;
+    auto state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.crowds);
+    render::setSway(settings.draw.wind, state->hierarchies, state->instances);
+    const FramesPlan plan{shot.views, shot.seconds,    o.output, o.resident,          o.frames, o.accumulate,
+                          o.noWait,   o.build.skipBad, o.quiet,  !o.quiet && !o.json, o.alpha,  &legend};
+    Timings timings;
+    Verdict verdict;
+    STIPPLE_TRY(runFrames(plan, settings, *state, *executor, timings, written, verdict));
+    if (shot.views.size() == 1) {
+        STIPPLE_TRY(checkStopped(o.output));
+        drawLegend(legend, state->image);
+        STIPPLE_TRY(image::writePicture(o.output, state->image, o.alpha));
+    }
+    tell(o, *state, verdict, timings, size, shot.views.size());
+    if (!o.quiet && o.budget > 0) sayIfUseless(plan, settings, *state, verdict);
     return checkVerdict(plan, verdict);
 }
 
@@ -246,6 +282,7 @@ Result<void> run(const Options& o, Written& written) {
 Error toldOf(Error error, const Options& o, const Written& written) {
     if (error.kind != ErrorKind::interrupted) return error;
     error.where = o.output;
+    if (error.hint == "nothing was written") error.hint.clear();  // of a build inside
     error.what = written.pictures == 0
                      ? std::string("interrupted; nothing is written")
                      : fmt::format("interrupted; {} of {} pictures are written", written.pictures, written.of);

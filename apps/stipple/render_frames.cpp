@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <limits>
 #include <thread>
 
 #include "apps/stipple/report.h"
 #include "engine/base/process.h"
+#include "engine/base/words.h"
 #include "engine/image/coverage.h"
 #include "shaders/shared/record.h"
 
@@ -144,6 +146,7 @@ Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& sett
         if (isSingle) break;
         STIPPLE_TRY(checkStopped(plan.output));
         verdict.judge(state, &plan.views[i]);
+        if (plan.legend) drawLegend(*plan.legend, state.image);
         STIPPLE_TRY(image::writePicture(numbered(plan.output, i), state.image, plan.alpha));
         ++written.pictures;
         if (plan.printNames) fmt::print("{}\n", numbered(plan.output, i));
@@ -157,6 +160,27 @@ Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& sett
     STIPPLE_TRY(accumulate(plan, settings, state));
     verdict.judge(state, &first);
     return {};
+}
+
+void sayIfUseless(const FramesPlan& plan, const render::FrameSettings& settings, const render::FrameState& state,
+                  const Verdict& verdict) {
+    constexpr double kShare = 1.0 / 16;  // of the picture's shorter side
+    const lod::View& view = plan.views[verdict.worst];
+    const double error = verdict.tauEffectivePixels;
+    if (error <= kShare * std::min(view.width, view.height)) return;
+    // As if everything were there.
+    std::vector<std::vector<uint8_t>> all(state.streamer->residency().drawable.begin(),
+                                          state.streamer->residency().drawable.end());
+    for (auto& nodes : all) std::fill(nodes.begin(), nodes.end(), uint8_t{1});
+    lod::CutScratch scratch;
+    lod::Cut cut;
+    lod::selectCut(state.scene(), {all}, view, {settings.budgets.errorPixels}, scratch, cut);
+    fmt::print(
+        stderr,
+        "note: --budget-points {} leaves {}, with which the picture shows little; {} would bring it to {:g} px\n",
+        settings.budgets.records,
+        std::isfinite(error) ? fmt::format("an error of {:.0f} px", error) : std::string("no stated error"),
+        counted(cut.counters.recordsDrawn + cut.counters.trianglesDrawn, "record"), settings.budgets.errorPixels);
 }
 
 Result<void> checkVerdict(const FramesPlan& plan, const Verdict& verdict) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/stipple/legend.h"
 #include "engine/base/executor.h"
 #include "engine/render/frame.h"
 #include "engine/render/lots.h"
@@ -19,6 +20,7 @@ struct FramesPlan {
     int repeats = 1;                  ///< of a single view, for timing
     int accumulate = 1;               ///< frames whose mean a single picture is
     bool noWait = false, skipBad = false, quiet = false, printNames = false, alpha = false;
+    const Legend* legend = nullptr;  ///< that pictures of a path get
 };
 
 struct Timings {
@@ -59,6 +61,10 @@ std::string numbered(const std::string& path, size_t index);
 /// Draws all views; writes a picture of each if there are several, leaves that of a single one in `state`.
 Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& settings, render::FrameState& state,
                        Executor& executor, Timings& timings, Written& written, Verdict& verdict);
+
+/// A note where the budget leaves an error that says nothing: how many records the asked one takes.
+void sayIfUseless(const FramesPlan& plan, const render::FrameSettings& settings, const render::FrameState& state,
+                  const Verdict& verdict);
 
 /// What becomes of pictures that are written and miss something: an error, unless the plan permits it (then a note).
 Result<void> checkVerdict(const FramesPlan& plan, const Verdict& verdict);

@@ -99,6 +99,22 @@ Error valueMissing(const CLI::App& at, const std::string& message) {
 
 }  // namespace
 
+namespace {
+
+/// "render scan.las out.png": the last of several inputs that looks like an output.
+std::string meantAsOutput(const CLI::App& at) {
+    for (const CLI::Option* option : at.get_options()) {
+        const std::vector<std::string>& given = option->results();
+        if (!option->get_positional() || given.size() < 2) continue;
+        const std::string extension = std::filesystem::path(given.back()).extension().string();
+        for (const char* written : {".png", ".exr", ".stipple"})
+            if (extension == written) return fmt::format("did you mean '-o {}'?", given.back());
+    }
+    return "";
+}
+
+}  // namespace
+
 std::string commandOf(const CLI::App& app, const std::vector<std::string>& arguments) {
     const CLI::App* at = &app;
     for (const std::string& argument : arguments) {
@@ -132,8 +148,10 @@ Error usageError(const CLI::App& app, const CLI::ParseError& error) {
         return leftOver(at, std::move(rest));
     if (needsCommand)
         return {ErrorKind::usage, fmt::format("needs one of {}", fmt::join(commandsOf(at), ", ")), shortName(at), ""};
-    if (isRequired)
-        return {ErrorKind::usage, splitAt(message, " is required").first + " is missing", shortName(at), ""};
+    if (isRequired) {
+        const std::string what = splitAt(message, " is required").first;
+        return {ErrorKind::usage, what + " is missing", shortName(at), what == "--output" ? meantAsOutput(at) : ""};
+    }
     if (is<CLI::ValidationError>(error)) {
         const auto [option, what] = splitAt(message, ": ");
         return {ErrorKind::usage, what, option, ""};

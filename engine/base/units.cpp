@@ -78,7 +78,13 @@ uint64_t parseBytes(const std::string& text) {
 }
 
 std::string latticeText(double value, double unit, double origin) {
-    const auto ofUnit = decimalsOf(unit), ofOrigin = decimalsOf(origin);
+    const auto ofUnit = decimalsOf(unit);
+    auto ofOrigin = decimalsOf(origin);
+    // What an origin has beyond the decimals of the unit, if it is next to nothing, was left over by who computed it.
+    constexpr double kLeftOver = 1e-6;
+    if (ofUnit && parseNumber(fmt::format("{:.{}f}", origin, *ofUnit)).has_value() &&
+        std::abs(*parseNumber(fmt::format("{:.{}f}", origin, *ofUnit)) - origin) <= kLeftOver * unit)
+        ofOrigin = 0;
     if (!std::isfinite(value) || !ofUnit || !ofOrigin) return fmt::format("{}", value);
     const int decimals = std::max(*ofUnit, *ofOrigin);
     std::string text = fmt::format("{:.{}f}", value, decimals);

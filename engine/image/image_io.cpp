@@ -12,11 +12,13 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <new>
 
 #include "engine/base/file.h"
 #include "engine/base/process.h"
 #include "engine/image/oiio_module.h"
+#include "engine/image/png_check.h"
 
 namespace stipple::image {
 namespace {
@@ -81,7 +83,7 @@ bool hasExtension(const std::string& path, const char* extension) {
 Result<void> checkModule(bool load) {
     const auto missing = [](const std::string& why) {
         return fail(ErrorKind::output, "the picture module cannot be loaded: " + why, "",
-                    "install OpenImageIO, or the program anew");
+                    "install the program anew, with the packages that it names");
     };
     const std::array<std::string, 3> places = modulePlaces();
     std::error_code ignored;
@@ -145,7 +147,16 @@ struct Promise {
     uint64_t bytes = 0;  ///< of the file
     double mostPixels = HUGE_VAL;
     uint64_t wholeBytes = 0;  ///< for each pixel: of what the library decodes as a whole; 0: as many as are made of it
+    ReadAt readAt{};          ///< of a PNG
 };
+
+/// Whatever is wrong with a PNG, before its library prints it: up to the pixels, or `wholly`.
+Result<void> checkPng(const Promise& promise, const std::string& name, bool wholly) {
+    if (!promise.readAt) return {};
+    STIPPLE_ASSIGN(const std::string fault, faultOfPng(promise.bytes, promise.readAt, wholly));
+    if (fault.empty()) return {};
+    return fail(ErrorKind::input, fault, name, "is it a whole picture?");
+}
 
 /// An interlaced PNG is decoded as a whole, with the samples that it has; all others by rows. (PNG, 11.2.1)
 uint64_t wholeBytesOfPng(const uint8_t* head, size_t count) {
@@ -153,6 +164,8 @@ uint64_t wholeBytesOfPng(const uint8_t* head, size_t count) {
     const uint64_t channels = head[25] == 0 ? 1 : head[25] == 2 ? 3 : head[25] == 4 ? 2 : 4;  // a palette: of colours
     return channels * (head[24] == 16 ? 2 : 1) + 1;                                           // alpha that a chunk adds
 }
+
+bool isPng(const uint8_t* head, size_t count) { return count >= 4 && std::memcmp(head, "\x89PNG", 4) == 0; }
 
 Promise promiseOf(const uint8_t* head, size_t count, uint64_t fileBytes) {
     const auto begins = [&](const char* with, size_t at = 0) {
@@ -204,6 +217,13 @@ glm::ivec2 webpSize(const std::vector<uint8_t>& b) {
     return glm::ivec2(0);
 }
 
+/// What the module says, without its library's own words.
+std::string plainReason(const std::string& text) {
+    if (text.find("OpenImageIO") != std::string::npos || text.find("format reader") != std::string::npos)
+        return "is no picture that can be read (.png, .jpg, .webp, .exr, .hdr)";
+    return "cannot be read: " + text.substr(0, text.find('\n'));
+}
+
 /// Size first, then pixels: `call` is either way to read. `make` gives room for them.
 template <typename Pixel, typename Call, typename Make>
 Result<void> readWith(const std::string& name, const Promise& promise, uint64_t bytesOfPixel, uint64_t memoryBytes,
@@ -215,12 +235,12 @@ Result<void> readWith(const std::string& name, const Promise& promise, uint64_t 
         if (status == 0) return {};
         if (status == kStippleOiioNoMemory)
             return fail(ErrorKind::budget, "does not fit in memory", name, "close other programs, or make it smaller");
-        const std::string text = error.data();
-        return fail(ErrorKind::input, "cannot be read: " + text.substr(0, text.find('\n')), name,
-                    "is it a whole picture?");
+        return fail(ErrorKind::input, plainReason(error.data()), name, "is it a whole picture?");
     };
+    STIPPLE_TRY(checkPng(promise, name, false));
     STIPPLE_TRY(read(nullptr));
     STIPPLE_TRY(checkSize(width, height, bytesOfPixel, promise, name, memoryBytes));
+    STIPPLE_TRY(checkPng(promise, name, true));
     return read(make(static_cast<uint32_t>(width), static_cast<uint32_t>(height)));
 }
 
@@ -240,12 +260,16 @@ Result<render::Image> readRgba(const std::string& name, const Promise& promise, 
 
 /// Of a regular file (the library would wait for ever at a FIFO).
 Result<Promise> promiseOfFile(const std::string& path) {
-    STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
+    STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
+    const auto file = std::make_shared<const InputFile>(std::move(opened));
     std::array<uint8_t, 64> head{};
-    const auto count = static_cast<size_t>(std::min<uint64_t>(head.size(), file.sizeBytes()));
+    const auto count = static_cast<size_t>(std::min<uint64_t>(head.size(), file->sizeBytes()));
     if (count == 0) return fail(ErrorKind::input, "is empty", path, "is the download complete?");
-    STIPPLE_TRY(file.readAt(0, head.data(), count));
-    return promiseOf(head.data(), count, file.sizeBytes());
+    STIPPLE_TRY(file->readAt(0, head.data(), count));
+    Promise promise = promiseOf(head.data(), count, file->sizeBytes());
+    if (isPng(head.data(), count))
+        promise.readAt = [file](uint64_t at, void* to, size_t n) { return file->readAt(at, to, n); };
+    return promise;
 }
 
 }  // namespace
@@ -258,7 +282,12 @@ Result<render::Image> readImage(const std::string& path, uint64_t memoryBytes) {
 }
 
 Result<render::Image> decodeImage(const std::vector<uint8_t>& bytes, const std::string& name, uint64_t memoryBytes) {
-    const Promise promise = promiseOf(bytes.data(), bytes.size(), bytes.size());
+    Promise promise = promiseOf(bytes.data(), bytes.size(), bytes.size());
+    if (isPng(bytes.data(), bytes.size()))
+        promise.readAt = [&](uint64_t at, void* to, size_t n) -> Result<void> {
+            std::memcpy(to, bytes.data() + at, n);
+            return {};
+        };
     if (std::strcmp(promise.format, "webp") == 0)
         if (const glm::ivec2 size = webpSize(bytes); size.x > 0)
             STIPPLE_TRY(checkSize(size.x, size.y, 4, promise, name, memoryBytes));

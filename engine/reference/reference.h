@@ -22,8 +22,8 @@ struct TraceSettings {
 /// Rays against the full detail of a scene. A triangle shows its own surface, textured at the width of a ray; at a
 /// front disc, colours and normals of the discs within the front thickness are blended with the kernel (1 - rho^2)^2.
 /// Samples are averaged in linear light, alpha is coverage; depth (linear, along the view axis) and normal (world
-/// space, towards the eye) are those of the ray through the pixel's centre, not averaged. Stand-ins and colours by
-/// value are not looked at.
+/// space, towards the eye) are those of the ray through the pixel's centre, not averaged. Points have the colours of
+/// PlacedStore::colour, stray ones are as small as in other modes; stand-ins are not looked at.
 Result<render::Image> trace(const std::vector<render::PlacedStore>& placed, const lod::View& view,
                             const TraceSettings& settings, Executor& executor);
 

@@ -11,6 +11,7 @@
 #include "engine/reference/reference.h"
 #include "engine/reference/strand_rays.h"
 #include "engine/reference/surface.h"
+#include "lod/colour.h"
 #include "lod/mesh_place.h"
 
 namespace stipple::reference {
@@ -24,6 +25,7 @@ constexpr double kNever = std::numeric_limits<double>::max();
 /// Everything that a store draws in full detail, in its own coordinates.
 struct TracedStore {
     const lod::Store* store = nullptr;
+    lod::ColourBy colour;
     std::vector<Disc> discs;
     std::vector<Segment> segments;
     std::vector<shared::MeshVertex> vertices;
@@ -48,7 +50,12 @@ Result<void> readPoints(TracedStore& t) {
     t.discs.reserve(t.store->description.points);
     for (uint32_t i = 0; i < h.nodes.size(); ++i) {
         if (!h.nodes[i].isLeaf()) continue;
-        STIPPLE_ASSIGN(const lod::Chunk chunk, lod::readChunk(*t.store, i));
+        STIPPLE_ASSIGN(lod::Chunk chunk, lod::readChunk(*t.store, i));
+        std::vector<uint8_t> values;
+        if (t.colour.needsAttributes()) {
+            STIPPLE_ASSIGN(values, lod::readAttribute(*t.store, i, t.colour.attribute));
+        }
+        lod::recolour(t.colour, *t.store, i, chunk, values);
         for (const shared::StrandSegment& s : chunk.segments) t.segments.push_back(decodeSegment(h, h.nodes[i], s));
         for (const shared::PointRecord& r : chunk.records) t.discs.push_back(decodeDisc(h, h.nodes[i], r));
     }
@@ -89,8 +96,10 @@ Result<void> readMesh(TracedStore& t) {
     return {};
 }
 
-Result<void> readStore(const lod::Store& store, TracedStore& t) {
+Result<void> readStore(const render::PlacedStore& placed, TracedStore& t) {
+    const lod::Store& store = *placed.store;
     t.store = &store;
+    t.colour = placed.colour;
     STIPPLE_TRY(store.hierarchy.isMesh() ? readMesh(t) : readPoints(t));
     std::vector<Box> boxes;
     boxes.reserve(t.discs.size() + t.triangles.size());
@@ -107,15 +116,15 @@ Result<void> readStore(const lod::Store& store, TracedStore& t) {
     return {};
 }
 
-/// Where the ray meets the disc within its radius; its side towards the eye.
-bool meetsDisc(const Disc& d, const LocalRay& ray, double& t, double& rho2, dvec3& normal) {
+/// Where the ray meets the disc within a radius; its side towards the eye.
+bool meetsDisc(const Disc& d, double radius, const LocalRay& ray, double& t, double& rho2, dvec3& normal) {
     const dvec3 n = d.normal == dvec3(0) ? -glm::normalize(d.position - ray.origin) : d.normal;
     const double facing = glm::dot(n, ray.direction);
     if (facing == 0) return false;
     if (facing > 0 && (d.flags & (shared::kFlagTwoSided | shared::kFlagNoNormal)) == 0) return false;
     t = glm::dot(n, d.position - ray.origin) / facing;
     const dvec3 off = ray.origin + t * ray.direction - d.position;
-    rho2 = glm::dot(off, off) / (d.radius * d.radius);
+    rho2 = glm::dot(off, off) / (radius * radius);
     normal = facing > 0 ? -n : n;
     return rho2 <= 1;
 }
@@ -141,8 +150,10 @@ class Tracer {
     Result<void> prepare() {
         std::vector<Box> boxes;
         for (const render::PlacedStore& p : placed_) {
-            auto [at, isNew] = stores_.try_emplace(p.store.get());
-            if (isNew) STIPPLE_TRY(readStore(*p.store, at->second));
+            // A store in other colours is another one.
+            const bool isOwn = p.colour.mode == lod::ColourMode::own;
+            auto [at, isNew] = stores_.try_emplace({p.store.get(), isOwn ? 0 : places_.size() + 1});
+            if (isNew) STIPPLE_TRY(readStore(p, at->second));
             at->second.textures.source = 0;
             places_.push_back(&at->second);
             const Box own = at->second.tree.bounds();
@@ -206,6 +217,16 @@ class Tracer {
         return {back * (view_.eye - place.translation) / place.scale, back * toWorld(ray) / place.scale};
     }
 
+    /// What of a disc is drawn, store units: a stray point hides no more of the picture than a 128th of its height.
+    double drawnRadius(const Disc& d, const lod::Instance& place) const {
+        if ((d.flags & shared::kFlagScattered) == 0) return d.radius;
+        constexpr double kShare = 1.0 / 128, kLeastPixels = 4;
+        const dvec3 at = place.translation + place.rotation * (place.scale * d.position) - view_.eye;
+        const double depth = std::max(glm::dot(at, view_.forward), view_.nearPlane);
+        const double most = std::max(kShare * view_.height, kLeastPixels) * depth / view_.focalPixels;
+        return std::min(d.radius, most / place.scale);
+    }
+
     Hit nearestHit(const dvec3& ray, double step) const {
         Hit best;
         const double length = glm::length(ray);
@@ -216,19 +237,22 @@ class Tracer {
             store.tree.visit(local.origin, local.direction, view_.nearPlane, best.t, [&](uint32_t item) {
                 double t = 0, rho2 = 0;
                 dvec3 normal;
+                const auto meets = [&](const Disc& d) {
+                    return meetsDisc(d, drawnRadius(d, place), local, t, rho2, normal);
+                };
                 if (!store.segments.empty()) {
                     hitSegment(store.segments[item], place, local, p, best);
                 } else if (item >= store.discs.size()) {
                     hitTriangle(store, place, store.triangles[item - store.discs.size()], local, ray, step, p, best);
-                } else if (meetsDisc(store.discs[item], local, t, rho2, normal) && t > view_.nearPlane && t < best.t) {
+                } else if (meets(store.discs[item]) && t > view_.nearPlane && t < best.t) {
                     const double m = std::abs(glm::dot(place.rotation * normal, toWorld(ray))) / length;
                     best.place = p;
                     best.t = t;
                     best.isTriangle = best.isStrand = false;
                     best.sample.thickness = 1;
                     best.normal = toCamera(place.rotation * normal);
-                    best.thickness =
-                        place.scale * store.discs[item].radius * (0.25 + std::sqrt(std::max(0.0, 1 - m * m)));
+                    best.thickness = place.scale * drawnRadius(store.discs[item], place) *
+                                     (0.25 + std::sqrt(std::max(0.0, 1 - m * m)));
                 }
             });
         });
@@ -289,8 +313,10 @@ class Tracer {
             store.tree.visit(local.origin, local.direction, view_.nearPlane, limit, [&](uint32_t item) {
                 double t = 0, rho2 = 0;
                 dvec3 normal;
-                if (item >= store.discs.size() || !meetsDisc(store.discs[item], local, t, rho2, normal) ||
-                    t <= view_.nearPlane || t >= limit)
+                if (item >= store.discs.size()) return;
+                const Disc& d = store.discs[item];
+                if (!meetsDisc(d, drawnRadius(d, placed_[p].place), local, t, rho2, normal) || t <= view_.nearPlane ||
+                    t >= limit)
                     return;
                 const double w = (1 - rho2) * (1 - rho2) + 1e-9;
                 weights += w;
@@ -305,7 +331,7 @@ class Tracer {
     const std::vector<render::PlacedStore>& placed_;
     const lod::View& view_;
     const TraceSettings& settings_;
-    std::map<const lod::Store*, TracedStore> stores_;
+    std::map<std::pair<const lod::Store*, size_t>, TracedStore> stores_;
     std::vector<const TracedStore*> places_;
     BoxTree tree_;  ///< of the places, relative to the eye
     render::DrawList draws_;

@@ -131,6 +131,15 @@ struct Parsed {
     std::string warning;
 };
 
+/// What the library says, in our words: of which line it speaks.
+std::string plainReason(const std::string& error) {
+    const size_t at = error.find("line ");
+    const size_t digits = at == std::string::npos ? at : error.find_first_of("0123456789", at);
+    if (digits == std::string::npos) return "is not a readable OBJ";
+    const size_t end = error.find_first_not_of("0123456789", digits);
+    return fmt::format("is not a readable OBJ: line {} is not what OBJ expects", error.substr(digits, end - digits));
+}
+
 Result<Parsed> parse(const std::string& path, const std::string& folder, const ReadSettings& settings,
                      std::vector<std::string>& notes) {
     STIPPLE_ASSIGN(const InputFile file, InputFile::open(path));
@@ -151,7 +160,7 @@ Result<Parsed> parse(const std::string& path, const std::string& folder, const R
     } catch (const std::exception&) {
         error = "a line is not what OBJ expects";
     }
-    return fail(ErrorKind::input, "is not a readable OBJ: " + error.substr(0, error.find('\n')), path);
+    return fail(ErrorKind::input, plainReason(error), path, "is it a whole OBJ file?");
 }
 
 }  // namespace

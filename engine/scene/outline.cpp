@@ -63,23 +63,28 @@ void addPositions(const lod::Hierarchy& h, const lod::Node& node, const lod::Chu
             to.push_back(h.origin + h.unit * lod::vertexPlace(node, chunk, c, i));
 }
 
-/// Of a mesh: the vertices of those groups of the input's own triangles that reach farthest, in every few directions.
-/// (Coarse groups would do for less, but finer ones reach farther out.) Empty where too many must be read.
-std::vector<glm::dvec3> outlineOfMesh(const lod::Store& store) {
-    constexpr size_t kMostGroups = 256, kStride = 4;
+/// Does a node hold triangles or segments of the input itself?
+bool holdsInput(const lod::Hierarchy& h, uint32_t node) {
+    if (!h.isMesh()) return h.nodes[node].isLeaf();
+    const auto* const runs = &h.runs[h.groups[node].firstRun];
+    return std::any_of(runs, runs + h.groups[node].runs,
+                       [](const lod::MeshRun& r) { return r.producer == lod::MeshRun::kOriginal; });
+}
+
+/// Of a mesh or strands: the vertices of those nodes of the input's own triangles or segments that reach farthest, in
+/// every few directions. (Coarse nodes would do for less, but finer ones reach farther out, and of strands coarse ones
+/// leave most out: of a tree the foot of its trunk.) Empty where too many must be read.
+std::vector<glm::dvec3> outlineOfInput(const lod::Store& store) {
+    constexpr size_t kMostRead = 256, kStride = 4;
     const lod::Hierarchy& h = store.hierarchy;
     std::vector<uint32_t> leaves;
-    for (uint32_t i = 0; i < h.nodes.size(); ++i) {
-        const auto* const runs = &h.runs[h.groups[i].firstRun];
-        if (std::any_of(runs, runs + h.groups[i].runs,
-                        [](const lod::MeshRun& r) { return r.producer == lod::MeshRun::kOriginal; }))
-            leaves.push_back(i);
-    }
+    for (uint32_t i = 0; i < h.nodes.size(); ++i)
+        if (holdsInput(h, i)) leaves.push_back(i);
     std::vector<glm::dvec3> all;
-    std::map<uint32_t, std::pair<size_t, size_t>> known;  // group -> its part of `all`
+    std::map<uint32_t, std::pair<size_t, size_t>> known;  // node -> its part of `all`
     for (size_t k = 0; k < kDirections; k += kStride) {
         const glm::dvec3& d = directions().at(k);
-        std::vector<std::pair<double, uint32_t>> reach;  // no vertex of a group lies farther
+        std::vector<std::pair<double, uint32_t>> reach;  // no vertex of a node lies farther
         for (const uint32_t i : leaves)
             reach.emplace_back(glm::dot(h.origin + h.unit * h.nodes[i].centre, d) + h.unit * h.nodes[i].radius, i);
         std::make_heap(reach.begin(), reach.end());
@@ -89,8 +94,8 @@ std::vector<glm::dvec3> outlineOfMesh(const lod::Store& store) {
             std::pop_heap(reach.begin(), reach.end());
             reach.pop_back();
             if (known.count(i) == 0) {
-                const auto chunk = known.size() < kMostGroups ? lod::readChunk(store, i) : Result<lod::Chunk>();
-                if (!chunk || chunk->vertices.empty()) return {};
+                const auto chunk = known.size() < kMostRead ? lod::readChunk(store, i) : Result<lod::Chunk>();
+                if (!chunk || (chunk->vertices.empty() && chunk->segments.empty())) return {};
                 const size_t first = all.size();
                 addPositions(h, h.nodes[i], *chunk, all);
                 known[i] = {first, all.size()};
@@ -130,8 +135,10 @@ std::vector<glm::dvec3> outlineOf(const lod::Store& store) {
     const auto corners = cornersOf(d.focusMin, d.focusMax);
     const std::vector<glm::dvec3> box(corners.begin(), corners.end());
     std::vector<glm::dvec3> all;
-    if (h.isMesh()) {
-        all = outlineOfMesh(store);
+    // (Where some strands are stray, the nodes that reach farthest are theirs.)
+    const bool hasStrays = d.focusMin != d.boundsMin || d.focusMax != d.boundsMax;
+    if (h.isMesh() || (h.isStrands && !hasStrays)) {
+        all = outlineOfInput(store);
     } else {
         for (const uint32_t n : coarseNodes(h)) {
             const auto chunk = lod::readChunk(store, n);

@@ -14,6 +14,7 @@ namespace {
 
 struct Tally {
     double least = std::numeric_limits<double>::infinity(), greatest = -least;
+    uint64_t withoutData = 0;
     std::vector<uint64_t> counts;  ///< of 8-bit categories
 };
 
@@ -53,6 +54,10 @@ void take(const SourceInfo& info, const PointBlock& block, size_t count, PartSur
         }
         const size_t width = bytesOf(a.type);
         for (size_t i = 0; i < values.size(); i += width) {
+            if (isNoData(a, values.data() + i)) {
+                ++t.withoutData;
+                continue;
+            }
             const double v = attributeValue(a, values.data() + i);
             t.least = std::min(t.least, v);
             t.greatest = std::max(t.greatest, v);
@@ -88,6 +93,7 @@ void finishAttribute(const std::vector<PartSurvey>& parts, size_t k, AttributeIn
     for (const PartSurvey& s : parts) {
         all.least = std::min(all.least, s.attributes[k].least);
         all.greatest = std::max(all.greatest, s.attributes[k].greatest);
+        a.withoutData += s.attributes[k].withoutData;
         for (size_t v = 0; v < s.attributes[k].counts.size(); ++v) all.counts[v] += s.attributes[k].counts[v];
     }
     for (size_t v = 0; isCategory(a) && v < all.counts.size(); ++v)

@@ -7,6 +7,8 @@
 #include "engine/image/image_io.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/outline.h"
+#include "engine/scene/scene.h"
+#include "engine/scene/strands.h"
 #include "tests/support/runs.h"
 #include "tests/support/support.h"
 
@@ -150,6 +152,45 @@ TEST(Framing, ARoundSceneFillsThePictureToo) {
         const double share = drawnShare(folder, folder / "ball.ply", size);
         EXPECT_GE(share, 0.80) << size;
         EXPECT_LE(share, 0.95) << size;
+    }
+}
+
+/// Vertices of a grown tree's tubes and ribbons, of its file.
+std::vector<glm::dvec3> verticesOf(const std::string& path) {
+    const auto tree = readScene(path, {});
+    if (!tree) return {};
+    return flattenStrands(*tree, placements(*tree)).position;
+}
+
+TEST(Framing, AGrownTreeIsWholeFromItsFootToItsTop) {
+    const test::TempFolder folder;
+    for (const std::string species : {"oak", "birch"}) {
+        SCOPED_TRACE(species);
+        const std::string tree = folder / (species + ".glb");
+        const auto run = [&](const std::string& arguments) {
+            return test::shell("export XDG_CACHE_HOME=" + folder / "cache", arguments, folder.path());
+        };
+        ASSERT_EQ(run("grow tree -o " + tree + " --species " + species), 0) << test::slurp(folder / "err");
+        ASSERT_EQ(run("build " + tree + " -o " + folder / "a.stipple" + " --force --quiet"), 0);
+        const auto store = lod::openStore(folder / "a.stipple");
+        ASSERT_TRUE(store);
+        const std::vector<glm::dvec3> vertices = verticesOf(tree);
+        ASSERT_GT(vertices.size(), 10'000u);
+        const lod::View v = makeView(fitCamera(outlineOf(*store), store->description.up, 16.0 / 9), 640, 360, 1e-3);
+        const Span span = projected(vertices, v);
+        EXPECT_TRUE(span.isInside(640, 360))
+            << span.lo[0] << " " << span.lo[1] << " " << span.hi[0] << " " << span.hi[1];
+        EXPECT_GE(span.share(640, 360), 0.80);
+        // The program's picture: nothing reaches its border.
+        ASSERT_EQ(run("render " + tree + " -o " + folder / "a.png" + " --alpha --quiet --size 640x360"), 0);
+        const auto image = image::readImage(folder / "a.png");
+        ASSERT_TRUE(image);
+        size_t atBorder = 0;
+        for (uint32_t y = 0; y < image->height; ++y)
+            for (uint32_t x = 0; x < image->width; ++x)
+                if (x < 3 || y < 3 || x + 3 >= image->width || y + 3 >= image->height)
+                    atBorder += image->rgba[size_t{y} * image->width + x] >> 24 != 0 ? 1 : 0;
+        EXPECT_EQ(atBorder, 0u);
     }
 }
 

@@ -100,6 +100,26 @@ TEST(Attributes, LeavesKeepEveryValueAndSayItToWhoAsks) {
     }
 }
 
+TEST(Attributes, MeansAreOfWhatHasData) {
+    AttributeInfo info;
+    info.type = ScalarType::i16;
+    info.noData = 0;
+    const auto meanOf = [&](const std::vector<int16_t>& values) {
+        std::vector<RisingValue> leaves;
+        for (const int16_t v : values) leaves.push_back(leafValue(info, reinterpret_cast<const uint8_t*>(&v)));
+        int16_t stored = 0;
+        storeValue(info, mergeValues(info, leaves), static_cast<uint32_t>(values.size()),
+                   reinterpret_cast<uint8_t*>(&stored));
+        return stored;
+    };
+    EXPECT_EQ(meanOf({0, 6, 0, 8}), 7);
+    EXPECT_EQ(meanOf({6, 0, 0, 0}), 6);
+    EXPECT_EQ(meanOf({0, 0}), 0) << "nothing was measured";
+    EXPECT_EQ(meanOf({-5, 5}), 1) << "next to 0, which would say that nothing was measured";
+    info.noData.reset();
+    EXPECT_EQ(meanOf({0, 6, 0, 8}), 4) << "(3.5)";
+}
+
 TEST(Attributes, MeanModeAndNoneAreWhatTheySay) {
     AttributeInfo info;
     info.type = ScalarType::i16;
@@ -109,23 +129,18 @@ TEST(Attributes, MeanModeAndNoneAreWhatTheySay) {
     const auto of = [&](Aggregate how, size_t begin, size_t end, size_t split = 0) {
         info.aggregate = how;
         std::vector<RisingValue> parts;
-        std::vector<Rising> records;
         const auto merged = [&](size_t from, size_t to) {
             std::vector<RisingValue> leaves;
             for (size_t i = from; i < to; ++i)
                 leaves.push_back(leafValue(info, reinterpret_cast<const uint8_t*>(&values.at(i))));
-            Rising one;
-            one.count = 1;
-            return mergeValues(info, leaves, std::vector<Rising>(leaves.size(), one));
+            return mergeValues(info, leaves);
         };
         for (const auto& [from, to] : {std::pair{begin, begin + split}, {begin + split, end}}) {
             if (from == to) continue;
             parts.push_back(merged(from, to));
-            records.emplace_back().count = static_cast<uint32_t>(to - from);
         }
         int16_t v = 0;
-        storeValue(info, mergeValues(info, parts, records), static_cast<uint32_t>(end - begin),
-                   reinterpret_cast<uint8_t*>(&v));
+        storeValue(info, mergeValues(info, parts), static_cast<uint32_t>(end - begin), reinterpret_cast<uint8_t*>(&v));
         return v;
     };
     EXPECT_EQ(of(Aggregate::mean, 0, 5, 2), 3);

@@ -148,8 +148,7 @@ TEST_F(Picture, AScanWithoutColoursShowsItsHeightAndItsShape) {
     while (bottom > 0 && columnAt(bottom)[3] == 0) --bottom;
     EXPECT_GT(columnAt(top + 2)[0], columnAt(top + 2)[2]);
     EXPECT_LT(columnAt(bottom - 2)[0], columnAt(bottom - 2)[2]);
-    EXPECT_EQ(run("render ball.ply -o t.png --quiet --size 32x32 --mode reference --samples 1"), 0)
-        << "traced pictures stay grey: " << said_;
+    EXPECT_EQ(run("render ball.ply -o t.png --quiet --size 32x32 --mode reference --samples 1"), 0) << said_;
 }
 
 TEST_F(Picture, TheLegendTakesTheSamePartOfLargePictures) {

@@ -34,6 +34,10 @@ TEST(LatticeText, HasTheDecimalsOfTheScannersUnit) {
     EXPECT_EQ(latticeText(0.1 + 0.2, 0.1), "0.3") << "not 0.30000000000000004";
     EXPECT_EQ(latticeText(-1e-17, 0.01), "0.00");
     EXPECT_EQ(latticeText(1234.5678 + 2 * 0.01, 0.01, 1234.5678), "1234.5878") << "the offset's decimals too";
+    EXPECT_EQ(latticeText(49.02539999999999 + 164 * 0.0001, 0.0001, 49.02539999999999), "49.0418")
+        << "an offset that somebody computed";
+    EXPECT_EQ(latticeText(3815.999999999953 - 15, 0.001, 3815.999999999953), "3801.000");
+    EXPECT_EQ(latticeValue(49.02539999999999 + 164 * 0.0001, 0.0001, 49.02539999999999), 49.0418);
     EXPECT_EQ(latticeText(12, 1), "12");
     // No decimal lattice: the shortest text that gives the number back.
     EXPECT_EQ(latticeText(0.375, 0.125), "0.375");

@@ -50,6 +50,9 @@ TEST(Words, ProposesWhatWasProbablyMeant) {
     expect("build a.las -o a.stipple --normals fien", "fine");
     expect("render a.las -o a.png --mode pulpush", "pullpush");
     expect("render a.las -o a.png --shade=unlitt", "unlit");
+    ASSERT_EQ(runProgram(folder, "grow scan -o s.las --points 500").code, 0);
+    expect("render s.las -o a.png --quiet --colour intensty", "intensity");
+    expect("render s.las out.png", "-o out.png");
     expect("help budget", "budgets");
     expect("help rendr", "render");
     const Outcome far = runProgram(folder, "render a.las -o a.png --xyzzy 3");
@@ -78,6 +81,22 @@ TEST(Words, CountsAndSizesAreWrittenAlike) {
         expectOneLine(runProgram(folder, fmt::format("render a.las -o a.png --error {}", bad)), 2, {"--error", bad});
     EXPECT_EQ(runProgram(folder, "build a.las -o a.stipple --surfels 1k --quiet").code, 0);
     EXPECT_EQ(runProgram(folder, "render a.stipple -o a.png --size 64x48 --budget-points 0.1M --quiet").code, 0);
+}
+
+TEST(Words, OutputsThatCannotBeAreFoundBeforeTheWork) {
+    const TempFolder folder;
+    ASSERT_EQ(runProgram(folder, "grow scan -o a.las --points 500").code, 0);
+    for (const char* arguments : {"render a.las -o no/a.png", "render a.las -o no/a.png --orbit 3",
+                                  "build a.las -o no/a.stipple", "grow scan -o no/b.las --points 500M"})
+        expectOneLine(runProgram(folder, arguments), 4, {"there is no folder no"});
+    const std::string render = "render a.las -o a.png --size 64x48 ";
+    expectOneLine(runProgram(folder, render + "--camera-path no.json"), 3, {"no.json"});
+    expectOneLine(runProgram(folder, render + "--environment no.hdr"), 3, {"no.hdr"});
+    expectOneLine(runProgram(folder, render + "--background 0,0,256"), 2, {"--background"});
+    expectOneLine(runProgram(folder, render + "--colour height --colour-map jet"), 2, {"jet"});
+    const Outcome cached = runProgram(folder, "cache list");
+    EXPECT_EQ(cached.out.find("a.las"), std::string::npos) << "nothing was built: " << cached.out;
+    expectOneLine(runProgram(folder, "grow scan -o b.xyz --points 500M"), 2, {".las or .ply"});
 }
 
 TEST(Words, AFileInsteadOfACommandIsViewed) {

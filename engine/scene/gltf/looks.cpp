@@ -59,6 +59,13 @@ void readMaterials(const json& root, Scene& scene) {
         m.isUnlit = extensionOf(j, "KHR_materials_unlit").is_object();
         scene.materials.push_back(std::move(m));
     }
+    const auto blended = std::count_if(scene.materials.begin(), scene.materials.end(),
+                                       [](const Material& m) { return m.alphaMode == AlphaMode::blend; });
+    if (blended > 0)
+        scene.notes.push_back(fmt::format(
+            "{} of {} materials {} transparent (alphaMode BLEND), which is not drawn: what covers less than "
+            "half is left out, all else is opaque",
+            blended, scene.materials.size(), blended == 1 ? "is" : "are"));
 }
 
 /// Textures of a GPU's own formats in a container; by what stands at its beginning (KTX 2.0, 3.1).

@@ -84,6 +84,7 @@ class MeshBuild : public CellContent {
         needs.between = source_.triangles * kSpillBytes;
         needs.survey = partBytes();
         needs.whole = source_.triangles * 700;
+        needs.readerShare = settings_.readerShare;
         return needs;
     }
     std::string settingsAsText() const override {

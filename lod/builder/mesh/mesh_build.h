@@ -11,6 +11,7 @@ namespace stipple::lod {
 
 struct MeshBuildSettings {
     BuildLimits limits;
+    double readerShare = 0;  ///< of the memory that was asked for, which is no part of `limits`: what the source holds
     uint32_t groupClusters = 8;
     StoreDescription description;        ///< what the input says; bounds and counts are filled in
     std::vector<TextureImage> textures;  ///< that the description's materials name

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 
 #include "engine/base/hash.h"
+#include "engine/base/numbers.h"
 
 namespace stipple::lod {
 
@@ -166,11 +168,16 @@ class CellBuild {
         const uint64_t memory = limits_.memoryBytes, small = needs.fixed + needs.whole;
         while (workers_ > 1 && leastFor(workers_) > memory) --workers_;
         const uint64_t least = std::min(leastFor(workers_), small);
-        if (least > memory)
+        if (least > memory) {
+            const auto asked = [&](uint64_t bytes) {  // on the command line, in MiB
+                return static_cast<double>(bytes) / (1 - needs.readerShare) / (uint64_t{1} << 20);
+            };
+            const auto wanted = toWhole<uint64_t>(std::ceil(asked(least)) + 1);
             return fail(ErrorKind::budget,
-                        fmt::format("building {} needs {} MiB, but --memory allows {} MiB", needs.content,
-                                    (least >> 20) + 1, memory >> 20),
-                        content_.source(), fmt::format("give --memory {}M", (least >> 20) + 1));
+                        fmt::format("building {} needs {} MiB, but --memory allows {} MiB", needs.content, wanted,
+                                    toWhole<uint64_t>(std::round(asked(memory)))),
+                        content_.source(), fmt::format("give --memory {}M", wanted));
+        }
         const uint64_t room = memory > leastFor(workers_) ? memory - leastFor(workers_) : 0;
         isOnDisk_ = limits_.ranks != nullptr || (small > memory && needs.between > room / 2);
         bufferBytes_ = std::clamp<uint64_t>(room / 4, uint64_t{4} << 20, uint64_t{64} << 20);

@@ -11,13 +11,14 @@ namespace stipple::lod {
 
 /// What a build needs, in bytes.
 struct MemoryNeeds {
-    std::string content;   ///< in words
-    uint64_t fixed = 0;    ///< whatever the content
-    uint64_t aWorker = 0;  ///< for the largest cell
-    uint64_t tables = 0;   ///< that stay in memory
-    uint64_t between = 0;  ///< what waits between the steps
-    uint64_t survey = 0;   ///< of the survey, which goes again before there are workers and tables
-    uint64_t whole = 0;    ///< of everything, if it is so little that it needs no more
+    std::string content;     ///< in words
+    uint64_t fixed = 0;      ///< whatever the content
+    uint64_t aWorker = 0;    ///< for the largest cell
+    uint64_t tables = 0;     ///< that stay in memory
+    uint64_t between = 0;    ///< what waits between the steps
+    uint64_t survey = 0;     ///< of the survey, which goes again before there are workers and tables
+    uint64_t whole = 0;      ///< of everything, if it is so little that it needs no more
+    double readerShare = 0;  ///< of the memory that was asked for: the reader has it, it is no part of the limit
 };
 
 class CellContent;

@@ -13,7 +13,8 @@ namespace stipple::lod {
 namespace {
 
 bool isStoredAlike(const AttributeInfo& a, const AttributeInfo& b) {
-    return a.type == b.type && a.scale == b.scale && a.offset == b.offset;
+    return a.type == b.type && a.scale == b.scale && a.offset == b.offset &&
+           (!a.noData || !b.noData || *a.noData == *b.noData);
 }
 
 }  // namespace
@@ -119,7 +120,9 @@ Result<void> PointInput::adopt(PointSource from, const ReadOptions& options, std
                                         kScalarNames.at(static_cast<size_t>(a.type)), a.scale, a.offset,
                                         kScalarNames.at(static_cast<size_t>(mine.type)), mine.scale, mine.offset),
                             info.path, "leave this attribute out");
+            const std::optional<double> declared = mine.noData;  // one file of several may say it
             mine = a;
+            if (!mine.noData) mine.noData = declared;
             found[k] = true;
         }
     for (size_t p = 0; p < from.parts.size(); ++p) {

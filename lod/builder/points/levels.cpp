@@ -237,7 +237,7 @@ class ConeMerger {
         if (!isSplit(grid, parts, one, around)) {
             out.records.push_back(one);
             for (size_t k = 0; k < parts.size(); ++k) codeOf(k) = one.code;
-            mergeAttributes(frame, parts, values, out);
+            mergeAttributes(frame, parts.size(), values, out);
             return;
         }
         for (size_t k = 0; k < parts.size(); ++k) codeOf(k) = of_.at(side_[k]).code;
@@ -249,7 +249,7 @@ class ConeMerger {
                 if (side_[k] == g)
                     values_.insert(values_.end(), values.begin() + static_cast<ptrdiff_t>(k * kinds),
                                    values.begin() + static_cast<ptrdiff_t>((k + 1) * kinds));
-            mergeAttributes(frame, members_.at(g), values_, out);
+            mergeAttributes(frame, members_.at(g).size(), values_, out);
         }
     }
 
@@ -268,13 +268,12 @@ class ConeMerger {
         }
         return true;
     }
-    void mergeAttributes(const Frame& frame, std::span<const Rising> parts, std::span<const RisingValue> values,
-                         PendingNode& out) {
+    void mergeAttributes(const Frame& frame, size_t parts, std::span<const RisingValue> values, PendingNode& out) {
         const size_t kinds = frame.attributes.size();
         for (size_t a = 0; a < kinds; ++a) {
             column_.clear();
-            for (size_t k = 0; k < parts.size(); ++k) column_.push_back(values[k * kinds + a]);
-            out.values.push_back(mergeValues(frame.attributes[a], column_, parts));
+            for (size_t k = 0; k < parts; ++k) column_.push_back(values[k * kinds + a]);
+            out.values.push_back(mergeValues(frame.attributes[a], column_));
         }
     }
 

@@ -28,7 +28,11 @@ double Sampled::below(double share) const {
 }
 
 ValueRanges::ValueRanges(const Frame& frame, uint64_t points, const glm::dvec3& up)
-    : stride_(points / kSamples + 1), up_(up), attributes_(frame.attributes.size()), counts_(frame.attributes.size()) {}
+    : stride_(points / kSamples + 1),
+      up_(up),
+      attributes_(frame.attributes.size()),
+      counts_(frame.attributes.size()),
+      withoutData_(frame.attributes.size()) {}
 
 void ValueRanges::add(const Frame& frame, const Points& points, size_t begin, size_t end, uint64_t number) {
     uint64_t until = (stride_ - number % stride_) % stride_;  // points to the next sample
@@ -45,7 +49,10 @@ void ValueRanges::add(const Frame& frame, const Points& points, size_t begin, si
         const uint8_t* const values = points.attributes[a].data();
         std::array<uint64_t, 256> counts{};
         for (size_t i = begin; i < end; ++i) {
-            attributes_[a].add(attributeValue(info, values + i * width), (number + i - begin) % stride_ == 0);
+            if (isNoData(info, values + i * width))
+                ++withoutData_[a];
+            else
+                attributes_[a].add(attributeValue(info, values + i * width), (number + i - begin) % stride_ == 0);
             if (width == 1) ++counts.at(values[i]);
         }
         for (uint64_t v = 0; isCategory(info) && v < 256; ++v)
@@ -58,6 +65,7 @@ void ValueRanges::add(const ValueRanges& other) {
     for (size_t a = 0; a < 3; ++a) axes_[a].add(other.axes_[a]);
     for (size_t a = 0; a < attributes_.size(); ++a) {
         attributes_[a].add(other.attributes_[a]);
+        withoutData_[a] += other.withoutData_[a];
         for (const auto& [value, count] : other.counts_[a]) counts_[a][value] += count;
     }
 }
@@ -66,6 +74,7 @@ void ValueRanges::save(ByteWriter& to) const {
     height_.save(to);
     for (const Sampled& a : axes_) a.save(to);
     for (const Sampled& a : attributes_) a.save(to);
+    to.put(withoutData_);
     for (const auto& counts : counts_) {
         std::vector<std::array<uint64_t, 2>> pairs;
         pairs.reserve(counts.size());
@@ -77,6 +86,7 @@ void ValueRanges::load(ByteReader& from) {
     height_.load(from);
     for (Sampled& a : axes_) a.load(from);
     for (Sampled& a : attributes_) a.load(from);
+    from.get(withoutData_);
     for (auto& counts : counts_) {
         std::vector<std::array<uint64_t, 2>> pairs;
         pairs.reserve(counts.size());
@@ -89,6 +99,7 @@ void ValueRanges::describe(const Frame& frame, const Bounds& within, StoreDescri
     for (size_t a = 0; a < frame.attributes.size(); ++a) {
         AttributeInfo info = frame.attributes[a];
         attributes_[a].sort();
+        info.withoutData = withoutData_[a];
         info.least = attributes_[a].least;
         info.greatest = attributes_[a].greatest;
         info.low = attributes_[a].below(0.02);

@@ -60,6 +60,7 @@ class ValueRanges {
     std::array<Sampled, 3> axes_;
     std::vector<Sampled> attributes_;
     std::vector<std::map<uint64_t, uint64_t>> counts_;  ///< of 8-bit categories
+    std::vector<uint64_t> withoutData_;                 ///< points, of each attribute
 };
 
 }  // namespace stipple::lod

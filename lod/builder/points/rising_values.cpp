@@ -17,19 +17,25 @@ uint64_t storedBits(const AttributeInfo& info, const uint8_t* from) {
 }  // namespace
 
 RisingValue leafValue(const AttributeInfo& info, const uint8_t* from) {
-    return {info.aggregate == Aggregate::mean ? attributeValue(info, from) : 0, storedBits(info, from), 1};
+    if (info.aggregate != Aggregate::mean) return {0, storedBits(info, from), 1};
+    if (isNoData(info, from)) return {0, storedBits(info, from), 0};
+    return {attributeValue(info, from), storedBits(info, from), 1};
 }
 
-RisingValue mergeValues(const AttributeInfo& info, std::span<const RisingValue> parts,
-                        std::span<const Rising> records) {
+RisingValue mergeValues(const AttributeInfo& info, std::span<const RisingValue> parts) {
     RisingValue out = parts[0];
     if (info.aggregate == Aggregate::mean) {
-        double sum = 0, count = 0;  // against the first value, so that large offsets cost no digits
-        for (size_t i = 0; i < parts.size(); ++i) {
-            sum += records[i].count * (parts[i].mean - parts[0].mean);
-            count += records[i].count;
+        // Of what has data; against the first value, so that large offsets cost no digits.
+        const auto first = std::find_if(parts.begin(), parts.end(), [](const RisingValue& p) { return p.votes > 0; });
+        if (first == parts.end()) return out;
+        double sum = 0, count = 0;
+        for (const RisingValue& p : parts) {
+            if (p.votes == 0) continue;
+            sum += static_cast<double>(p.votes) * (p.mean - first->mean);
+            count += static_cast<double>(p.votes);
         }
-        out.mean = parts[0].mean + sum / count;
+        out.mean = first->mean + sum / count;
+        out.votes = static_cast<uint64_t>(count);
         return out;
     }
     if (info.aggregate == Aggregate::none) return out;
@@ -51,10 +57,12 @@ RisingValue mergeValues(const AttributeInfo& info, std::span<const RisingValue> 
 }
 
 void storeValue(const AttributeInfo& info, const RisingValue& value, uint32_t count, uint8_t* to) {
-    if (info.aggregate == Aggregate::mean && count > 1)
-        storeAttribute(info, value.mean, to);
-    else
+    if (info.aggregate != Aggregate::mean || count == 1 || value.votes == 0) {
         std::memcpy(to, &value.stored, bytesOf(info.type));
+        return;
+    }
+    storeAttribute(info, value.mean, to);
+    if (isNoData(info, to)) storeAttribute(info, value.mean + info.scale, to);  // a mean that only looks like it
 }
 
 }  // namespace stipple::lod

@@ -136,8 +136,9 @@ class StrandBuild : public CellContent {
         std::vector<uint32_t> x, y, z;
         std::vector<uint64_t> high;
         std::vector<TravellingPoint> ends;
-        facts_.parts = 0;
+        facts_.parts = facts_.vertices = facts_.farOut = 0;
         return source_.read([&](const StrandSet& block) -> Result<void> {
+            for (const glm::dvec3& p : block.position) countFarOut(p);
             x.clear();
             y.clear();
             z.clear();
@@ -302,6 +303,11 @@ class StrandBuild : public CellContent {
         report.pointsIn = description.pointsIn = facts_.given;
         report.pointsOut = facts_.parts;
         report.notes = notes_;
+        if (facts_.farOut > 0)
+            report.notes.insert(report.notes.begin(),
+                                fmt::format("OUTLIERS: {} of {} vertices lie far outside of all others (up to {:.7g} "
+                                            "units away): the default view leaves them out",
+                                            facts_.farOut, facts_.vertices, facts_.farthest));
         report.dropped = description.dropped = dropped_;
         report.added = description.added = added_;
         if (fewestKept_ < 1)
@@ -322,9 +328,21 @@ class StrandBuild : public CellContent {
         double unit = 1;
         Fineness fineness;
         uint64_t given = 0, segments = 0, parts = 0;  ///< of the input, of clean strands, and divided
+        uint64_t vertices = 0, farOut = 0;            ///< of them, far outside of all others
+        double farthest = 0;                          ///< of those from the others' box, file units
         uint32_t rootLog2 = kRootLog2, keyLevels = 0;
         bool hasColour = false;
     };
+    /// (The box is that of a sample: what lies within its own size of it may belong to it.)
+    void countFarOut(const glm::dvec3& p) {
+        ++facts_.vertices;
+        const glm::dvec3 size = facts_.focusHigh - facts_.focusLow;
+        const glm::dvec3 off = glm::max(glm::max(facts_.focusLow - p, p - facts_.focusHigh), glm::dvec3(0));
+        const double reach = std::max({size.x, size.y, size.z}), distance = std::max({off.x, off.y, off.z});
+        if (!(distance > reach)) return;
+        ++facts_.farOut;
+        facts_.farthest = std::max(facts_.farthest, distance);
+    }
     /// What most strands are is told apart however far from them, or from each other, strands lie.
     void refine(double extent, const std::vector<glm::dvec3>& sample, double detail) {
         const double dense = denseExtent(sample);

@@ -97,6 +97,19 @@ double doubleAt(const uint8_t* from) {
     return v;
 }
 
+/// Integers stand there in 64 bits, fp32 as fp64. Nothing for what is no number: that has no data anyway.
+std::optional<double> noDataAt(const uint8_t* from, ScalarType type) {
+    if (type == ScalarType::f32 || type == ScalarType::f64) {
+        const double v = doubleAt(from);
+        return std::isfinite(v) ? std::optional(v) : std::nullopt;
+    }
+    int64_t v = 0;
+    std::memcpy(&v, from, 8);
+    const bool isSigned =
+        type == ScalarType::i8 || type == ScalarType::i16 || type == ScalarType::i32 || type == ScalarType::i64;
+    return isSigned ? static_cast<double>(v) : static_cast<double>(static_cast<uint64_t>(v));
+}
+
 /// The fields of one descriptor; its bytes in the record. Types 11 to 30 are the deprecated pairs and triples.
 uint32_t addDescribed(const uint8_t* d, uint32_t at, std::vector<Field>& fields) {
     const unsigned type = d[2], options = d[3];
@@ -111,6 +124,7 @@ uint32_t addDescribed(const uint8_t* d, uint32_t at, std::vector<Field>& fields)
         f.info.description = text(d + 160, 32);
         if ((options & 8u) != 0) f.info.scale = doubleAt(d + 112 + 8 * i);
         if ((options & 16u) != 0) f.info.offset = doubleAt(d + 136 + 8 * i);
+        if ((options & 1u) != 0) f.info.noData = noDataAt(d + 40 + 8 * i, scalar);
         if (!std::isfinite(f.info.scale) || f.info.scale == 0 || !std::isfinite(f.info.offset)) {
             f.info.scale = 1;
             f.info.offset = 0;
