@@ -231,22 +231,25 @@ size_t longOnesLast(const WeldedMesh& mesh, std::vector<uint32_t>& indices) {
     return others.size();
 }
 
-std::vector<std::vector<uint32_t>> groupApart(const WeldedMesh& mesh, std::vector<Cluster>& clusters, uint32_t size,
-                                              Executor& executor) {
-    const auto hasNoLong = [&](const Cluster& c) {
-        for (size_t i = 0; i < c.indices.size(); i += 3)
-            if (isLong(mesh, &c.indices[i])) return false;
-        return true;
-    };
-    const auto others =
-        mesh.isWide() ? std::stable_partition(clusters.begin(), clusters.end(), hasNoLong) : clusters.end();
-    if (others == clusters.begin() || others == clusters.end()) return groupClusters(mesh, clusters, size, executor);
-    const auto first = static_cast<uint32_t>(others - clusters.begin());
-    const std::vector<Cluster> near(clusters.begin(), others), far(others, clusters.end());
-    std::vector<std::vector<uint32_t>> groups = groupClusters(mesh, near, size, executor);
-    for (auto& group : groupClusters(mesh, far, size, executor)) {
-        for (uint32_t& c : group) c += first;
-        groups.push_back(std::move(group));
+std::vector<std::vector<uint32_t>> groupApart(const WeldedMesh& mesh, const std::vector<Cluster>& clusters,
+                                              uint32_t size, Executor& executor) {
+    if (!mesh.isWide()) return groupClusters(mesh, clusters, size, executor);
+    std::array<std::vector<uint32_t>, 2> numbers;  // without long ones, with
+    std::array<std::vector<Cluster>, 2> apart;
+    for (uint32_t c = 0; c < clusters.size(); ++c) {
+        const std::vector<uint32_t>& corners = clusters[c].indices;
+        bool hasLong = false;
+        for (size_t i = 0; i < corners.size() && !hasLong; i += 3) hasLong = isLong(mesh, &corners[i]);
+        numbers.at(hasLong ? 1 : 0).push_back(c);
+        apart.at(hasLong ? 1 : 0).push_back(clusters[c]);
+    }
+    std::vector<std::vector<uint32_t>> groups;
+    for (size_t k = 0; k < 2; ++k) {
+        if (apart.at(k).empty()) continue;
+        for (auto& group : groupClusters(mesh, apart.at(k), size, executor)) {
+            for (uint32_t& c : group) c = numbers.at(k)[c];
+            groups.push_back(std::move(group));
+        }
     }
     return groups;
 }

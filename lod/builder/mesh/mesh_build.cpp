@@ -198,7 +198,7 @@ class MeshBuild : public CellContent {
             if (const auto found = errors.takeAll(); !found.empty()) return tl::unexpected(found.front());
             return to.ends(triangles, facts_.triangles, flushAll);
         }));
-        parts_ = {};
+        parts_ = PartFinder();
         return flushAll();
     }
 
@@ -321,9 +321,8 @@ class MeshBuild : public CellContent {
     }
     /// What is small and stands alone stays together (parts.h), if the mesh can be looked at as a whole.
     Result<void> findParts() {
-        // (Parts are moved on short lattices only.)
-        bool isKnown = mayHaveParts() && !facts_.lattice.isWide();
-        parts_ = {};
+        bool isKnown = mayHaveParts();
+        parts_ = PartFinder(facts_.lattice);
         if (isKnown) {
             const Result<void> read = source_.read([&](const TriangleMesh& block) -> Result<void> {
                 isKnown = parts_.add(placeBlock(block, facts_.lattice, executor_));
