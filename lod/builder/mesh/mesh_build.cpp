@@ -317,7 +317,7 @@ class MeshBuild : public CellContent {
         if (!mayHaveParts()) return 0;
         const uint64_t triangles = std::min(source_.triangles, PartFinder::kMostTriangles),
                        vertices = source_.vertices > 0 ? std::min(source_.vertices, 3 * triangles) : 3 * triangles;
-        return triangles * PartFinder::kTriangleBytes + vertices * PartFinder::kVertexBytes;
+        return PartFinder::memory(triangles, vertices);
     }
     /// What is small and stands alone stays together (parts.h), if the mesh can be looked at as a whole.
     Result<void> findParts() {

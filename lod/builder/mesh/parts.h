@@ -24,9 +24,13 @@ class PartFinder {
   public:
     /// Triangles of a mesh that is looked at as a whole; of a larger one no part is known.
     static constexpr uint64_t kMostTriangles = uint64_t{1} << 21;
-    /// Memory until finish(), at most: a triangle's centre and position 16, a vertex's position 12, its numbers by hash
-    /// 12, its parent 4.
-    static constexpr uint64_t kTriangleBytes = 16, kVertexBytes = 28;
+    /// Memory at most: a triangle's centre and position 16, a vertex's position 12, its numbers by hash 12, its parent
+    /// 4, a twentieth more for how deques keep them; and the block that is looked at, as it is read and as it is
+    /// placed.
+    static constexpr uint64_t memory(uint64_t triangles, uint64_t vertices) {
+        constexpr uint64_t kTriangleBytes = 17, kVertexBytes = 29, kBlockBytes = uint64_t{36} << 20;
+        return triangles * kTriangleBytes + vertices * kVertexBytes + kBlockBytes;
+    }
     explicit PartFinder(const Lattice& lattice = {});
     /// False: there are too many.
     bool add(const PlacedBlock& block);
