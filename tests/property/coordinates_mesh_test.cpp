@@ -383,6 +383,16 @@ TEST(CoordinatesOfCurves, OneThatReachesFarAwayLeavesTheOthersWhereTheyAre) {
                 for (const glm::dvec3& q : ends) nearest = std::min(nearest, glm::length(p - q));
                 EXPECT_LE(nearest, said + ofDoubles) << far.x << " " << far.z;
             }
+            // Between them it is as straight as the count of added pieces says.
+            double bend = 0;
+            for (const glm::dvec3& p : ends) {
+                const double way = std::min({glm::length(p - from), glm::length(p - far), glm::length(p)});
+                if (glm::length(p) < 4) continue;  // among the others
+                const glm::dvec3 d = glm::normalize(far - from), off = p - from - glm::dot(p - from, d) * d;
+                bend = std::max(bend, (glm::length(off) - said - ofDoubles) / std::max(way, 1e-3));
+            }
+            EXPECT_LE(bend, 1.0 / 16384) << far.x << " " << far.z;
+            printf("[ measured ] a %.0fth of the way off\n", 1 / std::max(bend, 1e-12));
             EXPECT_LE(ends.size(), 2 * (alone.position.size() + 4000));
             EXPECT_TRUE(verifyStore(*store, *executor, 0)) << far.x << " " << far.z;
         }

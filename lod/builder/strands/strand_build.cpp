@@ -314,7 +314,7 @@ class StrandBuild : public CellContent {
         const uint64_t even = facts_.parts - facts_.segments - facts_.farFromAll;
         if (even > 0) added_["by dividing long ones"] = even;
         if (facts_.farFromAll > 0)
-            added_["by dividing very long ones (between vertices within a 65,536th of the way to the nearest one)"] =
+            added_["by dividing very long ones (between vertices within a 16,384th of the way to the nearest one)"] =
                 facts_.farFromAll;
         report.pointsIn = description.pointsIn = facts_.given;
         report.pointsOut = facts_.parts;
