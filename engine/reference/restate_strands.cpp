@@ -55,8 +55,7 @@ double frontOf(double radius, double sine2, double distance) {
 
 class StrandProjector {
   public:
-    StrandProjector(const render::DrawList& draws, Level& level)
-        : draws_(draws), level_(level), view_(draws.view), f_(draws.frame) {}
+    StrandProjector(const render::DrawList& draws, Level& level) : level_(level), view_(draws.view), f_(draws.frame) {}
 
     void segment(const Segment& world, const lod::Instance& instance, const render::Bend& bend, uint32_t lot,
                  const dvec3* debugColour) {
@@ -277,7 +276,6 @@ class StrandProjector {
         return glm::dot(n, n) > 1e-6 ? glm::normalize(n) : -v;
     }
 
-    const render::DrawList& draws_;
     Level& level_;
     const lod::View& view_;
     const shared::FrameConstants& f_;

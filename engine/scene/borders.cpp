@@ -37,7 +37,10 @@ class Grid {
     }
 
   private:
-    glm::i64vec3 cellOf(const glm::dvec3& p) const { return glm::i64vec3(glm::floor(p / cell_)); }
+    glm::i64vec3 cellOf(const glm::dvec3& p) const {
+        constexpr double kFarthest = 0x1p62;  // of those beside it, too, integers hold the numbers
+        return glm::i64vec3(glm::clamp(glm::floor(p / cell_), -kFarthest, kFarthest));
+    }
     static uint64_t keyOf(const glm::i64vec3& c) {  // 21 bits an axis; what wraps round costs a test of distance
         constexpr int64_t kMask = (1 << 21) - 1;
         return static_cast<uint64_t>((c.x & kMask) << 42 | (c.y & kMask) << 21 | (c.z & kMask));

@@ -147,15 +147,17 @@ TEST_F(Hybrid, StandsInDepthAsTracedRaysSay) {
     trace.draw = settings_.draw;
     const auto smooth = reference::trace(placed_, view_, trace, *executor_);
     ASSERT_TRUE(smooth);
-    // (Discs just close the surface: where its rim is seen through their edges a few pixels are open.)
-    EXPECT_LE(reference::compareImages(drawn, *smooth, 4, nullptr)->holes, 8u);
+    // All of this is an error of reconstruction: that of the implementation is 50 dB and more (the test above), and the
+    // cut draws the leaves. Discs just close the surface: where its rim is seen through their edges a few pixels are
+    // open (measured: 4).
+    EXPECT_LE(reference::compareImages(drawn, *smooth, 4, nullptr)->holes, 4u);
     trace.samplesPerAxis = 1;
     const auto traced = reference::trace(placed_, view_, trace, *executor_);
     ASSERT_TRUE(traced);
     const auto d = reference::compareImages(drawn, *traced, 4, nullptr);
     ASSERT_TRUE(d);
     EXPECT_GE(d->silhouetteIou, 0.99);
-    EXPECT_GE(d->foregroundPsnr, 28);
+    EXPECT_GE(d->foregroundPsnr, 28.8);  // measured: 28.9
     const double size = glm::length(points_->description.boundsMax - points_->description.boundsMin);
     const auto apart = [&](const render::Image& a) {
         size_t both = 0, differ = 0;
@@ -168,7 +170,7 @@ TEST_F(Hybrid, StandsInDepthAsTracedRaysSay) {
     };
     // What differs lies along silhouettes, where one ray meets the nearer surface and the splat does not, or the
     // reverse.
-    EXPECT_LE(apart(drawn), 0.005);
+    EXPECT_LE(apart(drawn), 0.0005);
     // Negative control: without the mesh in front the depths are others.
     EXPECT_GE(apart(draw({placed_[0]}, *backend, *executor_, view_, settings_)), 0.05);
 }
@@ -400,7 +402,7 @@ TEST(MeshImages, AMeshThatEndsInPointsHasNoSeam) {
     // Of the mesh alone the largest error is half a facet, 1.1 degrees; the points' normals are exact.
     EXPECT_LE(joined.mean, 0.5);
     // (Measured: 2 pixels of 3,773; with plain instead of area weights in the pull 3, so that those are not the cause.)
-    EXPECT_LE(joined.through, joined.atBorder / 1000);
+    EXPECT_LE(joined.through, 2u);
     // The control: without points at the border, where one is missing beside it, the far side shows.
     EXPECT_GT(apart.through, 10 * joined.through);
 }

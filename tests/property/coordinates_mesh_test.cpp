@@ -360,5 +360,60 @@ TEST(CoordinatesOfCurves, ObjectsFarApartAreDrawnWhereTheyAre) {
     }
 }
 
+TEST(CoordinatesOfCurves, OneThatReachesFarAwayLeavesTheOthersWhereTheyAre) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    const StrandSet alone = test::curls({.count = 60, .vertices = 40, .radius = 0.01f});
+    for (const glm::dvec3& far : farPlaces()) {
+        // From among the others; through them, from far to far.
+        for (const glm::dvec3& from : {glm::dvec3(0.3, 0.1, 0.2), -far}) {
+            StrandSet set = alone;
+            set.addVertex(from, 0.01f, glm::vec3(0), 0);
+            set.addVertex(far, 0.01f, glm::vec3(0), 0);
+            set.endStrand(false);
+            const auto store = test::buildStrands(set, folder / "far", *executor, 8192);
+            const std::vector<glm::dvec3> ends = endsOf(*store);
+            const double ofDoubles = glm::length(far - from) * 0x1p-52;
+            EXPECT_LE(farthest(alone.position, ends, 0.05), kTenthOfAPixel + ofDoubles) << far.x << " " << far.z;
+            // Its own vertices as near as `info` says.
+            const double said = store->description.roundingUnits;
+            EXPECT_LE(said, 0.01 + ofDoubles);
+            for (const glm::dvec3& p : {from, far}) {
+                double nearest = 1e300;
+                for (const glm::dvec3& q : ends) nearest = std::min(nearest, glm::length(p - q));
+                EXPECT_LE(nearest, said + ofDoubles) << far.x << " " << far.z;
+            }
+            // Between them it is as straight as the count of added pieces says.
+            double bend = 0;
+            for (const glm::dvec3& p : ends) {
+                const double way = std::min({glm::length(p - from), glm::length(p - far), glm::length(p)});
+                if (glm::length(p) < 4) continue;  // among the others
+                const glm::dvec3 d = glm::normalize(far - from), off = p - from - glm::dot(p - from, d) * d;
+                bend = std::max(bend, (glm::length(off) - said - ofDoubles) / std::max(way, 1e-3));
+            }
+            EXPECT_LE(bend, 1.0 / 16384) << far.x << " " << far.z;
+            printf("[ measured ] a %.0fth of the way off\n", 1 / std::max(bend, 1e-12));
+            EXPECT_LE(ends.size(), 2 * (alone.position.size() + 4000));
+            EXPECT_TRUE(verifyStore(*store, *executor, 0)) << far.x << " " << far.z;
+        }
+    }
+}
+
+TEST(CoordinatesOfCurves, ShortSegmentsAreNoRepeatsHoweverFarAnotherLies) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    StrandSet set;  // as readers give it
+    for (uint32_t i = 0; i < 200; ++i) set.addVertex({0.3 * i, 0.2 * (i % 2), 0}, 0.05f, glm::vec3(0), 0);
+    set.endStrand(false);
+    const std::vector<glm::dvec3> truth = set.position;
+    for (const double y : {0.0, 1.0}) set.addVertex({1e12, y, 0}, 0.05f, glm::vec3(0), 0);
+    set.endStrand(false);
+    const auto store = test::buildStrands(cleanStrands(set, 0), folder / "far", *executor, 8192);
+    EXPECT_TRUE(store->description.dropped.empty());
+    const double ofDoubles = 1e12 * 0x1p-52;
+    EXPECT_LE(farthest(truth, endsOf(*store), 0.5), store->description.roundingUnits + ofDoubles);
+    EXPECT_LE(store->description.roundingUnits, 0.005);
+}
+
 }  // namespace
 }  // namespace stipple::lod

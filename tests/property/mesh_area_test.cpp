@@ -116,8 +116,9 @@ std::vector<Side> sidesOf(const lod::Store& store, const std::vector<lod::CutMes
                 Side side{};
                 for (uint32_t k = 0; k < 3; ++k) {
                     const uint32_t corner = chunk->triangles[chunk->clusters[c].firstTriangle + t] >> (8 * k) & 255u;
-                    const shared::MeshVertex& v = chunk->vertices[chunk->clusters[c].firstVertex + corner];
-                    side.corners.at(k) = h.origin + h.unit * glm::dvec3(v.x, v.y, v.z);
+                    const shared::MeshCluster& cluster = chunk->clusters[c];
+                    const shared::MeshVertex& v = chunk->vertices[cluster.firstVertex + corner];
+                    side.corners.at(k) = h.origin + h.unit * lod::vertexPlace(h.nodes[d.node], *chunk, cluster, corner);
                     side.isTwoSided = (v.surface & shared::kSurfaceTwoSided) != 0;
                 }
                 out.push_back(side);
@@ -180,8 +181,8 @@ double areaOf(const std::vector<Side>& sides) {
 constexpr uint32_t kPixels = 240;
 
 /// At all error targets of a picture; returns how many of all triangles the coarsest draws.
-double expectSameCover(const lod::Store& store, const std::string& what) {
-    const lod::View view = test::fitView(store, kPixels, kPixels);
+double expectSameCover(const lod::Store& store, const std::string& what, const lod::View* from = nullptr) {
+    const lod::View view = from != nullptr ? *from : test::fitView(store, kPixels, kPixels);
     const auto full = sidesOf(store, cutAt(store, view, 1e-6));
     const double wanted = coveredPixels(full, view);
     EXPECT_GT(wanted, 500);
@@ -215,6 +216,42 @@ TEST(MeshArea, LeavesAndTwigsThatTouchNothingKeepTheirCover) {
     EXPECT_LT(coverOf(4000, 0, "leaves"), 0.3);
     EXPECT_LT(coverOf(0, 1500, "twigs"), 0.1);
     EXPECT_LT(coverOf(4000, 1500, "leaves and twigs"), 0.2);
+}
+
+/// With one triangle so far out that coordinates take more than 30 bits (a wide lattice).
+TEST(MeshArea, OneFarOutlierLeavesPartsToBeSimplified) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    const lod::TriangleMesh dense = leavesAndTwigs(4000, 1500);
+    const auto alone = buildOf(lod::sourceOf(dense), {shared::SurfaceMaterial{}}, folder / "alone.stipple", *executor);
+    const lod::View view = test::fitView(*alone, kPixels, kPixels);
+    const double left = expectSameCover(*alone, "alone", &view);
+    EXPECT_LT(left, 0.2);
+    for (const glm::dvec3& far : {glm::dvec3(1e5, 0, 0), glm::dvec3(-1e9, 2e8, 0), glm::dvec3(0, -1e3, 1e12)}) {
+        lod::TriangleMesh mesh = dense;
+        const auto first = static_cast<uint32_t>(mesh.position.size());
+        for (const glm::dvec3& off : {glm::dvec3(0), glm::dvec3(0, 0.1, 0), glm::dvec3(0, 0, 0.1)}) {
+            mesh.position.push_back(far + 1e-3 * glm::length(far) * off);
+            mesh.normal.emplace_back(0, 1, 0);
+            mesh.surface.push_back(shared::kSurfaceFlat);
+        }
+        mesh.indices.insert(mesh.indices.end(), {first, first + 1, first + 2});
+        const auto what = fmt::format("outlier at {} {}", far.x, far.z);
+        const auto store = buildOf(lod::sourceOf(mesh), {shared::SurfaceMaterial{}}, folder / "far.stipple", *executor);
+        ASSERT_GT(store->hierarchy.rootLog2, lod::kShortMeshBits) << what;
+        EXPECT_LT(expectSameCover(*store, what, &view), 1.1 * left) << what;
+        EXPECT_TRUE(lod::verifyStore(*store, *executor, 0)) << what;
+        // What is coarsest stays within its error of the input.
+        const lod::Hierarchy& h = store->hierarchy;
+        uint32_t code = 0;
+        for (const lod::Node& n : h.nodes)
+            if (n.errorCode < lod::ErrorScale::kNoParent) code = std::max<uint32_t>(code, n.errorCode);
+        const auto leaves = test::leafTriangles(*store), drawn = test::drawnTriangles(*store, test::evenCut(h, code));
+        const double bound = h.errors.decode(code) * h.unit;
+        EXPECT_LE(bound, 1) << what;
+        EXPECT_LE(test::largestDistance(leaves, drawn, 200, 7), bound) << what;
+        EXPECT_LE(test::largestDistance(drawn, leaves, 200, 8), bound) << what;
+    }
 }
 
 TEST(MeshArea, MovedVerticesStayWithinTheStatedErrorBothWays) {
@@ -285,12 +322,12 @@ TEST(MeshArea, LeavesFarOutAreBuiltOnAllSides) {
 TEST(MeshArea, PlacesOfMovedVerticesStayOnTheLattice) {
     constexpr int kLargest = (1 << 30) - 1;
     const lod::Steps from(0, kLargest, 5);
-    EXPECT_EQ(lod::movedPlace(from, {0, 0, 0}, kLargest), glm::ivec3(0, kLargest, 5));
-    EXPECT_EQ(lod::movedPlace(from, {-31, 32, -5.4}, kLargest), glm::ivec3(0, kLargest, 0));
-    EXPECT_EQ(lod::movedPlace(from, {31.6, -32.4, 2.5}, kLargest), glm::ivec3(32, kLargest - 32, 8));
+    EXPECT_EQ(lod::movedPlace(from, {0, 0, 0}, 0, kLargest), glm::ivec3(0, kLargest, 5));
+    EXPECT_EQ(lod::movedPlace(from, {-31, 32, -5.4}, 0, kLargest), glm::ivec3(0, kLargest, 0));
+    EXPECT_EQ(lod::movedPlace(from, {31.6, -32.4, 2.5}, 0, kLargest), glm::ivec3(32, kLargest - 32, 8));
     // Farther than integers of 32 bits reach.
-    EXPECT_EQ(lod::movedPlace(from, {3e9, -3e9, 5e18}, kLargest), glm::ivec3(kLargest, 0, kLargest));
-    EXPECT_EQ(lod::movedPlace(from, {-1e30, 1e30, 1e300}, kLargest), glm::ivec3(0, kLargest, kLargest));
+    EXPECT_EQ(lod::movedPlace(from, {3e9, -3e9, 5e18}, 0, kLargest), glm::ivec3(kLargest, 0, kLargest));
+    EXPECT_EQ(lod::movedPlace(from, {-1e30, 1e30, 1e300}, 0, kLargest), glm::ivec3(0, kLargest, kLargest));
 }
 
 TEST(MeshArea, AnInputThatChangesBetweenItsReadingsIsRefused) {

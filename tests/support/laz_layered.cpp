@@ -70,27 +70,34 @@ class Sides {
     std::array<std::unique_ptr<Side<M>>, 4> sides_;
 };
 
-}  // namespace
+/// Where the fields of a record lie.
+struct Layout {
+    uint32_t bytes, extraBytes;
+    bool hasColour, hasInfrared, hasWave;
+    size_t colourBytes, waveAt, extraAt;
+    explicit Layout(const LazSpec& spec)
+        : bytes(lazRecordBytes(spec)),
+          extraBytes(spec.extraBytes),
+          hasColour(spec.format == 7 || spec.format == 8 || spec.format == 10),
+          hasInfrared(spec.format == 8 || spec.format == 10),
+          hasWave(spec.format >= 9),
+          colourBytes(hasInfrared ? 8
+                      : hasColour ? 6
+                                  : 0),
+          waveAt(30 + colourBytes),
+          extraAt(waveAt + (hasWave ? 29 : 0)) {}
+    size_t layers() const {
+        return size_t{9} + (hasColour ? 1 : 0) + (hasInfrared ? 1 : 0) + (hasWave ? 1 : 0) + extraBytes;
+    }
+};
 
-std::vector<uint8_t> encodeLayered(const LazSpec& spec, const uint8_t* records, size_t count, Rng& rng) {
-    const uint32_t bytes = lazRecordBytes(spec);
-    const bool hasColour = spec.format == 7 || spec.format == 8 || spec.format == 10;
-    const bool hasInfrared = spec.format == 8 || spec.format == 10, hasWave = spec.format >= 9;
-    const size_t colourBytes = hasInfrared ? 8 : hasColour ? 6 : 0;
-    const size_t waveAt = 30 + colourBytes, extraAt = waveAt + (hasWave ? 29 : 0);
-    std::vector<Encoder> layer(9 + (hasColour ? 1 : 0) + (hasInfrared ? 1 : 0) + (hasWave ? 1 : 0) + spec.extraBytes);
-    std::vector<bool> moved(layer.size(), false);  // a field that never changes gives an empty layer
+/// A layer is left out as a whole where its field never changes.
+std::vector<bool> movedLayers(const Layout& at, const uint8_t* records, size_t count) {
+    std::vector<bool> moved(at.layers(), false);
     moved[0] = true;
-    std::array<std::unique_ptr<NewPoint>, 4> channels;
-    uint32_t channel = records[15] >> 4 & 3u;
-    channels[channel] = std::make_unique<NewPoint>(std::vector<uint8_t>(records, records + 30));
-    Sides<Infrared> colours(spec.version, channel, records + 30, colourBytes);
-    Sides<Wave> waves(spec.version, channel, records + waveAt, hasWave ? 29 : 0);
-    Sides<Bytes> extras(spec.version, channel, records + extraAt, spec.extraBytes);
-    // A layer is left out as a whole: find out which first.
     for (size_t i = 1; i < count; ++i) {
-        const uint8_t* is = records + i * bytes;
-        const auto differs = [&](size_t at, size_t n) { return std::memcmp(is + at, records + at, n) != 0; };
+        const uint8_t* is = records + i * at.bytes;
+        const auto differs = [&](size_t from, size_t n) { return std::memcmp(is + from, records + from, n) != 0; };
         moved[1] = moved[1] || differs(8, 4);
         moved[2] = moved[2] || is[16] != records[16];
         moved[3] = moved[3] || ((is[15] ^ records[15]) & 0xcf) != 0;
@@ -100,73 +107,95 @@ std::vector<uint8_t> encodeLayered(const LazSpec& spec, const uint8_t* records, 
         moved[7] = moved[7] || differs(20, 2);
         moved[8] = moved[8] || differs(22, 8);
         size_t k = 9;
-        if (hasColour) moved[k] = moved[k] || differs(30, 6), ++k;
-        if (hasInfrared) moved[k] = moved[k] || differs(36, 2), ++k;
-        if (hasWave) moved[k] = moved[k] || differs(waveAt, 29), ++k;
-        for (uint32_t b = 0; b < spec.extraBytes; ++b)
-            moved[k + b] = moved[k + b] || is[extraAt + b] != records[extraAt + b];
+        if (at.hasColour) moved[k] = moved[k] || differs(30, 6), ++k;
+        if (at.hasInfrared) moved[k] = moved[k] || differs(36, 2), ++k;
+        if (at.hasWave) moved[k] = moved[k] || differs(at.waveAt, 29), ++k;
+        for (uint32_t b = 0; b < at.extraBytes; ++b)
+            moved[k + b] = moved[k + b] || is[at.extraAt + b] != records[at.extraAt + b];
     }
+    return moved;
+}
+
+/// What every record has; returns whether it is of another scanner channel than the one before.
+bool encodePoint(const uint8_t* is, std::array<std::unique_ptr<NewPoint>, 4>& channels, uint32_t& channel,
+                 const std::vector<bool>& moved, std::vector<Encoder>& layer, Rng& rng) {
+    const uint32_t target = is[15] >> 4 & 3u;
+    NewPoint* p = channels[channel].get();
+    const uint32_t beforeN = p->last[14] >> 4, beforeR = p->last[14] & 15u;
+    const uint32_t context = (beforeR == 1 ? 1u : 0u) | (beforeR >= beforeN ? 2u : 0u) | (p->timeChanged ? 4u : 0u);
+    NewPoint* previous = p;
+    const bool channelChanged = target != channel;
+    if (channelChanged) {
+        if (!channels[target]) channels[target] = std::make_unique<NewPoint>(p->last);
+        p = channels[target].get();
+    }
+    const uint32_t lastN = p->last[14] >> 4, lastR = p->last[14] & 15u, n = is[14] >> 4, r = is[14] & 15u;
+    const bool timeChanged = load<int64_t>(is + 22) != load<int64_t>(p->last.data() + 22);
+    const bool angleChanged = load<int16_t>(is + 18) != load<int16_t>(p->last.data() + 18);
+    const bool sourceChanged = load<uint16_t>(is + 20) != load<uint16_t>(p->last.data() + 20);
+    const uint32_t step = r == lastR ? 0 : r == ((lastR + 1) & 15u) ? 1 : r == ((lastR + 15) & 15u) ? 2 : 3;
+    Encoder& xy = layer[0];
+    xy.symbol(previous->changed[context], (channelChanged ? 64u : 0u) | (sourceChanged ? 32u : 0u) |
+                                              (timeChanged ? 16u : 0u) | (angleChanged ? 8u : 0u) |
+                                              (n != lastN ? 4u : 0u) | step);
+    if (channelChanged) xy.symbol(previous->channel, (target + 4 - channel - 1) & 3u);
+    channel = target;
+    if (n != lastN) xy.symbol(p->count[lastN], n);
+    if (step == 3) {
+        if (timeChanged)
+            xy.symbol(p->number[lastR], r);
+        else
+            xy.symbol(p->same, (r + 16 - lastR - 2) & 15u);
+    }
+    const uint32_t t = timeChanged ? 1 : 0, single = n == 1 ? 1 : 0;
+    const auto m = static_cast<uint32_t>(kNewContext[n][r] - '0') << 1 | t;
+    const uint32_t level = std::min(n > r ? n - r : r - n, 7u), ends = (r == 1 ? 2u : 0u) + (r >= n ? 1u : 0u);
+    const int32_t dx = minus(load<int32_t>(is), load<int32_t>(p->last.data()));
+    p->x.encode(xy, p->stepX[m].get(), dx, single);
+    p->stepX[m].add(dx);
+    const int32_t dy = minus(load<int32_t>(is + 4), load<int32_t>(p->last.data() + 4));
+    p->y.encode(xy, p->stepY[m].get(), dy, single + std::min(p->x.last & ~1u, 20u));
+    p->stepY[m].add(dy);
+    if (moved[1]) {
+        p->z.encode(layer[1], p->height[level], load<int32_t>(is + 8),
+                    single + std::min((p->x.last + p->y.last) / 2 & ~1u, 18u));
+        p->height[level] = load<int32_t>(is + 8);
+    }
+    if (moved[2]) layer[2].symbol(p->classes[(p->last[16] & 31u) << 1 | (ends == 3 ? 1u : 0u)], is[16]);
+    const auto flagsOf = [](uint8_t f) { return (f & 15u) | (f >> 6 & 1u) << 4 | (f >> 7) << 5; };
+    if (moved[3]) layer[3].symbol(p->flags[flagsOf(p->last[15])], flagsOf(is[15]));
+    if (moved[4]) {
+        uint16_t& was = p->intensityOf[ends << 1 | t];
+        p->intensity.encode(layer[4], was, load<uint16_t>(is + 12), ends);
+        was = load<uint16_t>(is + 12);
+    }
+    if (moved[5] && angleChanged)
+        p->angle.encode(layer[5], load<int16_t>(p->last.data() + 18), load<int16_t>(is + 18), t);
+    if (moved[6]) layer[6].symbol(p->user[p->last[17] / 4u], is[17]);
+    if (moved[7] && sourceChanged)
+        p->source.encode(layer[7], load<uint16_t>(p->last.data() + 20), load<uint16_t>(is + 20), 0);
+    if (moved[8] && timeChanged) p->time.encode(layer[8], load<int64_t>(is + 22), rng);
+    p->timeChanged = timeChanged;
+    p->last.assign(is, is + 30);
+    return channelChanged;
+}
+
+}  // namespace
+
+std::vector<uint8_t> encodeLayered(const LazSpec& spec, const uint8_t* records, size_t count, Rng& rng) {
+    const Layout at(spec);
+    const auto& [bytes, extraBytes, hasColour, hasInfrared, hasWave, colourBytes, waveAt, extraAt] = at;
+    std::vector<Encoder> layer(at.layers());
+    const std::vector<bool> moved = movedLayers(at, records, count);
+    std::array<std::unique_ptr<NewPoint>, 4> channels;
+    uint32_t channel = records[15] >> 4 & 3u;
+    channels[channel] = std::make_unique<NewPoint>(std::vector<uint8_t>(records, records + 30));
+    Sides<Infrared> colours(spec.version, channel, records + 30, colourBytes);
+    Sides<Wave> waves(spec.version, channel, records + waveAt, hasWave ? 29 : 0);
+    Sides<Bytes> extras(spec.version, channel, records + extraAt, spec.extraBytes);
     for (size_t i = 1; i < count; ++i) {
         const uint8_t* is = records + i * bytes;
-        const uint32_t target = is[15] >> 4 & 3u;
-        NewPoint* p = channels[channel].get();
-        const uint32_t beforeN = p->last[14] >> 4, beforeR = p->last[14] & 15u;
-        const uint32_t context = (beforeR == 1 ? 1u : 0u) | (beforeR >= beforeN ? 2u : 0u) | (p->timeChanged ? 4u : 0u);
-        NewPoint* previous = p;
-        const bool channelChanged = target != channel;
-        if (channelChanged) {
-            if (!channels[target]) channels[target] = std::make_unique<NewPoint>(p->last);
-            p = channels[target].get();
-        }
-        const uint32_t lastN = p->last[14] >> 4, lastR = p->last[14] & 15u, n = is[14] >> 4, r = is[14] & 15u;
-        const bool timeChanged = load<int64_t>(is + 22) != load<int64_t>(p->last.data() + 22);
-        const bool angleChanged = load<int16_t>(is + 18) != load<int16_t>(p->last.data() + 18);
-        const bool sourceChanged = load<uint16_t>(is + 20) != load<uint16_t>(p->last.data() + 20);
-        const uint32_t step = r == lastR ? 0 : r == ((lastR + 1) & 15u) ? 1 : r == ((lastR + 15) & 15u) ? 2 : 3;
-        Encoder& xy = layer[0];
-        xy.symbol(previous->changed[context], (channelChanged ? 64u : 0u) | (sourceChanged ? 32u : 0u) |
-                                                  (timeChanged ? 16u : 0u) | (angleChanged ? 8u : 0u) |
-                                                  (n != lastN ? 4u : 0u) | step);
-        if (channelChanged) xy.symbol(previous->channel, (target + 4 - channel - 1) & 3u);
-        channel = target;
-        if (n != lastN) xy.symbol(p->count[lastN], n);
-        if (step == 3) {
-            if (timeChanged)
-                xy.symbol(p->number[lastR], r);
-            else
-                xy.symbol(p->same, (r + 16 - lastR - 2) & 15u);
-        }
-        const uint32_t t = timeChanged ? 1 : 0, single = n == 1 ? 1 : 0;
-        const auto m = static_cast<uint32_t>(kNewContext[n][r] - '0') << 1 | t;
-        const uint32_t level = std::min(n > r ? n - r : r - n, 7u), ends = (r == 1 ? 2u : 0u) + (r >= n ? 1u : 0u);
-        const int32_t dx = minus(load<int32_t>(is), load<int32_t>(p->last.data()));
-        p->x.encode(xy, p->stepX[m].get(), dx, single);
-        p->stepX[m].add(dx);
-        const int32_t dy = minus(load<int32_t>(is + 4), load<int32_t>(p->last.data() + 4));
-        p->y.encode(xy, p->stepY[m].get(), dy, single + std::min(p->x.last & ~1u, 20u));
-        p->stepY[m].add(dy);
-        if (moved[1]) {
-            p->z.encode(layer[1], p->height[level], load<int32_t>(is + 8),
-                        single + std::min((p->x.last + p->y.last) / 2 & ~1u, 18u));
-            p->height[level] = load<int32_t>(is + 8);
-        }
-        if (moved[2]) layer[2].symbol(p->classes[(p->last[16] & 31u) << 1 | (ends == 3 ? 1u : 0u)], is[16]);
-        const auto flagsOf = [](uint8_t f) { return (f & 15u) | (f >> 6 & 1u) << 4 | (f >> 7) << 5; };
-        if (moved[3]) layer[3].symbol(p->flags[flagsOf(p->last[15])], flagsOf(is[15]));
-        if (moved[4]) {
-            uint16_t& was = p->intensityOf[ends << 1 | t];
-            p->intensity.encode(layer[4], was, load<uint16_t>(is + 12), ends);
-            was = load<uint16_t>(is + 12);
-        }
-        if (moved[5] && angleChanged)
-            p->angle.encode(layer[5], load<int16_t>(p->last.data() + 18), load<int16_t>(is + 18), t);
-        if (moved[6]) layer[6].symbol(p->user[p->last[17] / 4u], is[17]);
-        if (moved[7] && sourceChanged)
-            p->source.encode(layer[7], load<uint16_t>(p->last.data() + 20), load<uint16_t>(is + 20), 0);
-        if (moved[8] && timeChanged) p->time.encode(layer[8], load<int64_t>(is + 22), rng);
-        p->timeChanged = timeChanged;
-        p->last.assign(is, is + 30);
-
+        const bool channelChanged = encodePoint(is, channels, channel, moved, layer, rng);
         const uint32_t told = spec.version == 3 && !channelChanged ? 0 : channel;
         size_t k = 9;
         if (hasColour) {

@@ -253,8 +253,8 @@ TEST(MeshStore, TablesThatLieAreRefused) {
     reject("more vertices than the bytes can hold", [](lod::Hierarchy& h) { h.groups[0].vertices = 0xffffffff; });
 }
 
-TEST(GltfWriter, WhatIsWrittenIsReadAgain) {
-    const test::TempFolder folder;
+/// Materials, a light, instances and a reference to a store.
+scene::Scene sceneOfEverything() {
     scene::Scene scene = grow::growMesh({"building", 12'000, 3, 16});
     scene.textures.clear();
     for (scene::Material& m : scene.materials) m.baseColourTexture = m.normalTexture = {};
@@ -293,6 +293,12 @@ TEST(GltfWriter, WhatIsWrittenIsReadAgain) {
     scan.store = "grove.stipple";
     scan.isVisible = false;
     scene.nodes.push_back(scan);
+    return scene;
+}
+
+TEST(GltfWriter, WhatIsWrittenIsReadAgain) {
+    const test::TempFolder folder;
+    const scene::Scene scene = sceneOfEverything();
     for (const char* name : {"a.glb", "a.gltf"}) {
         const auto written = scene::writeGltf(scene, folder / name);
         ASSERT_TRUE(written) << written.error().line();

@@ -320,9 +320,10 @@ void checkMeshes(const json& root, Problems& p) {
     }
 }
 
-void checkExtents(const json& root, bool isBinary, bool hasBinaryChunk, uint64_t binaryBytes, Problems& p) {
-    const json &buffers = arrayOf(root, "buffers"), &views = arrayOf(root, "bufferViews"),
-               &accessors = arrayOf(root, "accessors");
+namespace {
+
+void checkBuffers(const json& root, bool isBinary, bool hasBinaryChunk, uint64_t binaryBytes, Problems& p) {
+    const json& buffers = arrayOf(root, "buffers");
     for (size_t i = 0; i < buffers.size(); ++i) {
         const bool isFallback =
             buffers[i].contains("extensions") && buffers[i]["extensions"].contains("EXT_meshopt_compression");
@@ -334,6 +335,11 @@ void checkExtents(const json& root, bool isBinary, bool hasBinaryChunk, uint64_t
             sayHarmless(p, at("buffers", i),
                         fmt::format("declares {} bytes, the binary chunk has {}", length, binaryBytes));
     }
+}
+
+/// Returns what each view says that it is for (`target`), 0 where it says nothing.
+std::vector<int> checkViews(const json& root, Problems& p) {
+    const json &buffers = arrayOf(root, "buffers"), &views = arrayOf(root, "bufferViews");
     std::vector<int> target(views.size(), 0);
     for (size_t i = 0; i < views.size(); ++i) {
         const json& v = views[i];
@@ -352,29 +358,65 @@ void checkExtents(const json& root, bool isBinary, bool hasBinaryChunk, uint64_t
         }
         target[i] = v.value("target", 0);
     }
-    const auto checkRange = [&](const std::string& path, size_t view, uint64_t offset, uint64_t count, uint64_t element,
-                                uint64_t last, uint64_t component, bool strided) {
-        const json& v = views[view];
-        const uint64_t length = v["byteLength"].get<uint64_t>(),
-                       stride = strided ? v.value("byteStride", element) : element;
-        if (stride < element)
-            sayHarmless(p, path, fmt::format("elements of {} bytes do not fit a 'byteStride' of {}", element, stride));
-        if (offset % component != 0 || (v.value("byteOffset", uint64_t{0}) + offset) % component != 0)
-            sayHarmless(p, path, fmt::format("does not begin at a multiple of {} bytes", component));
-        if (offset > length || last > length - offset || (count - 1) > (length - offset - last) / stride)
-            say(p, path,
-                fmt::format("{} elements at {} reach beyond the {} bytes of buffer view {}", count, offset, length,
-                            view));
-    };
+    return target;
+}
+
+/// Elements of `element` bytes each, the last one of `last`, from `offset` on in a view.
+struct Range {
+    size_t view;
+    uint64_t offset, count, element, last, component;
+    bool isStrided;
+};
+
+void checkRange(const json& views, const std::string& path, const Range& range, Problems& p) {
+    const auto& [view, offset, count, element, last, component, strided] = range;
+    const json& v = views[view];
+    const uint64_t length = v["byteLength"].get<uint64_t>(),
+                   stride = strided ? v.value("byteStride", element) : element;
+    if (stride < element)
+        sayHarmless(p, path, fmt::format("elements of {} bytes do not fit a 'byteStride' of {}", element, stride));
+    if (offset % component != 0 || (v.value("byteOffset", uint64_t{0}) + offset) % component != 0)
+        sayHarmless(p, path, fmt::format("does not begin at a multiple of {} bytes", component));
+    if (offset > length || last > length - offset || (count - 1) > (length - offset - last) / stride)
+        say(p, path,
+            fmt::format("{} elements at {} reach beyond the {} bytes of buffer view {}", count, offset, length, view));
+}
+
+void checkSparse(const json& views, const json& a, size_t i, Problems& p) {
+    const auto type = a["type"].get<std::string>();
+    const int component = a["componentType"].get<int>();
+    const auto count = a["count"].get<uint64_t>();
+    const json& s = a["sparse"];
+    const auto n = s["count"].get<uint64_t>();
+    if (n > count) say(p, at("accessors", i), fmt::format("replaces {} of {} elements", n, count));
+    const int indexType = s["indices"]["componentType"].get<int>();
+    for (const char* part : {"indices", "values"}) {
+        const bool isIndex = part[0] == 'i';
+        const auto view = s[part]["bufferView"].get<size_t>();
+        const size_t element = isIndex ? componentBytes(indexType) : elementBytes(type, component);
+        checkRange(views, fmt::format("/accessors/{}/sparse/{}", i, part),
+                   {view, s[part].value("byteOffset", uint64_t{0}), n, element, element,
+                    componentBytes(isIndex ? indexType : component), false},
+                   p);
+        if (views[view].contains("byteStride") || views[view].contains("target"))
+            sayHarmless(p, at("accessors", i),
+                        fmt::format("the buffer view of sparse {} has a stride or a target", part));
+    }
+}
+
+void checkAccessors(const json& root, Problems& p) {
+    const json &views = arrayOf(root, "bufferViews"), &accessors = arrayOf(root, "accessors");
     for (size_t i = 0; i < accessors.size(); ++i) {
         const json& a = accessors[i];
         const auto type = a["type"].get<std::string>();
         const int component = a["componentType"].get<int>();
         const auto count = a["count"].get<uint64_t>();
         if (a.contains("bufferView"))
-            checkRange(at("accessors", i), a["bufferView"].get<size_t>(), a.value("byteOffset", uint64_t{0}), count,
-                       elementBytes(type, component), lastElementBytes(type, component), componentBytes(component),
-                       true);
+            checkRange(
+                views, at("accessors", i),
+                {a["bufferView"].get<size_t>(), a.value("byteOffset", uint64_t{0}), count,
+                 elementBytes(type, component), lastElementBytes(type, component), componentBytes(component), true},
+                p);
         else if (a.contains("byteOffset"))
             sayHarmless(p, at("accessors", i), "'byteOffset' without 'bufferView'");
         if (type.rfind("MAT", 0) == 0 && a.value("byteOffset", uint64_t{0}) % 4 != 0)
@@ -385,22 +427,13 @@ void checkExtents(const json& root, bool isBinary, bool hasBinaryChunk, uint64_t
             if (a.contains(bound) && a[bound].size() != componentsOf(type))
                 sayHarmless(p, at("accessors", i),
                             fmt::format("'{}' has {} values for {}", bound, a[bound].size(), type));
-        if (!a.contains("sparse")) continue;
-        const json& s = a["sparse"];
-        const auto n = s["count"].get<uint64_t>();
-        if (n > count) say(p, at("accessors", i), fmt::format("replaces {} of {} elements", n, count));
-        const int indexType = s["indices"]["componentType"].get<int>();
-        for (const char* part : {"indices", "values"}) {
-            const bool isIndex = part[0] == 'i';
-            const auto view = s[part]["bufferView"].get<size_t>();
-            const size_t element = isIndex ? componentBytes(indexType) : elementBytes(type, component);
-            checkRange(fmt::format("/accessors/{}/sparse/{}", i, part), view, s[part].value("byteOffset", uint64_t{0}),
-                       n, element, element, componentBytes(isIndex ? indexType : component), false);
-            if (views[view].contains("byteStride") || views[view].contains("target"))
-                sayHarmless(p, at("accessors", i),
-                            fmt::format("the buffer view of sparse {} has a stride or a target", part));
-        }
+        if (a.contains("sparse")) checkSparse(views, a, i, p);
     }
+}
+
+/// `target`: of each view what it is for.
+void checkUses(const json& root, std::vector<int> target, Problems& p) {
+    const json& accessors = arrayOf(root, "accessors");
     for (const json& mesh : arrayOf(root, "meshes"))
         for (const json& primitive : mesh["primitives"]) {
             const auto use = [&](const json& accessor, int as) {
@@ -419,6 +452,15 @@ void checkExtents(const json& root, bool isBinary, bool hasBinaryChunk, uint64_t
                 for (const auto& [name, accessor] : morph.items()) use(accessor, 34962);
             if (primitive.contains("indices")) use(primitive["indices"], 34963);
         }
+}
+
+}  // namespace
+
+void checkExtents(const json& root, bool isBinary, bool hasBinaryChunk, uint64_t binaryBytes, Problems& p) {
+    checkBuffers(root, isBinary, hasBinaryChunk, binaryBytes, p);
+    const std::vector<int> target = checkViews(root, p);
+    checkAccessors(root, p);
+    checkUses(root, target, p);
 }
 
 }  // namespace stipple::scene::gltf

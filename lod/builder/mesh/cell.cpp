@@ -231,7 +231,7 @@ class CellReducer {
                 }
                 const auto number = static_cast<uint32_t>(producers_.size());
                 const auto firstMoved = static_cast<uint32_t>(mesh_.vertices.size());
-                mesh_.vertices.low.insert(mesh_.vertices.low.end(), made[i].moved.begin(), made[i].moved.end());
+                for (const shared::MeshVertex& v : made[i].moved) mesh_.vertices.addShort(v, lattice_.isWide());
                 mesh_.position.insert(mesh_.position.end(), made[i].movedPosition.begin(), made[i].movedPosition.end());
                 for (Cluster& c : made[i].products) {
                     for (uint32_t& v : c.indices)
@@ -267,12 +267,12 @@ class CellReducer {
         table_.groups.push_back(std::move(g));
     }
 
-    /// The largest coordinate.
-    int largest() const { return static_cast<int>((uint64_t{1} << frame_.rootLog2) - 1); }
+    /// The least and the largest coordinate of what belongs to a part.
+    int least() const { return lattice_.isWide() ? -static_cast<int>(kPartReach) : 0; }
+    int largest() const { return static_cast<int>(lattice_.isWide() ? kPartReach : int64_t{1} << frame_.rootLog2) - 1; }
 
     std::vector<std::vector<uint32_t>> groupsOf(std::vector<Cluster>& clusters) {
-        return mesh_.isWide() ? groupApart(mesh_, clusters, settings_.groupClusters, executor_)
-                              : groupAll(mesh_, clusters, settings_.groupClusters, executor_);
+        return groupAll(mesh_, clusters, settings_.groupClusters, executor_);
     }
 
     /// What was marked on the way (PartFinder) in clusters of its own.
@@ -346,7 +346,7 @@ class CellReducer {
         if (!isRoot) {
             const bool areParts = members.front()->isWhole;
             const std::vector<uint32_t> coarse =
-                areParts ? simplifyParts(mesh_, local, local.indices.size() / 6 * 3, largest())
+                areParts ? simplifyParts(mesh_, local, local.indices.size() / 6 * 3, least(), largest())
                          : simplifySurface(local);
             if (coarse.empty() ||
                 static_cast<double>(coarse.size()) > kWorthwhile * static_cast<double>(local.indices.size()))

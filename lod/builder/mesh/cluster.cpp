@@ -108,22 +108,17 @@ std::vector<Cluster> makeClusters(const WeldedMesh& mesh, const std::vector<uint
     return all;
 }
 
-std::vector<std::vector<uint32_t>> groupClusters(const WeldedMesh& mesh, const std::vector<Cluster>& clusters,
-                                                 uint32_t size, Executor& executor) {
-    const auto count = static_cast<uint32_t>(clusters.size());
-    std::vector<std::vector<uint32_t>> groups;
-    if (count <= size) {
-        groups.emplace_back();
-        for (uint32_t i = 0; i < count; ++i) groups[0].push_back(i);
-        return groups;
-    }
-    // Edges on the border of a cluster, by position: they are what two clusters can share.
-    struct BorderEdge {
-        uint64_t key;
-        uint32_t cluster;
-    };
-    std::vector<std::vector<BorderEdge>> borders(count);
-    executor.parallelFor(count, 64, [&](size_t begin, size_t end) {
+namespace {
+
+/// Edges on the border of a cluster, by position: they are what two clusters can share.
+struct BorderEdge {
+    uint64_t key;
+    uint32_t cluster;
+};
+
+std::vector<BorderEdge> borderEdges(const WeldedMesh& mesh, const std::vector<Cluster>& clusters, Executor& executor) {
+    std::vector<std::vector<BorderEdge>> borders(clusters.size());
+    executor.parallelFor(clusters.size(), 64, [&](size_t begin, size_t end) {
         // How often the cluster has each edge: open addressing, at least two places for each there can be.
         constexpr uint32_t kSlots = 2048;
         static_assert(kSlots >= 2 * 3 * shared::kClusterTriangles);
@@ -153,7 +148,12 @@ std::vector<std::vector<uint32_t>> groupClusters(const WeldedMesh& mesh, const s
     std::sort(edges.begin(), edges.end(), [](const BorderEdge& a, const BorderEdge& b) {
         return a.key != b.key ? a.key < b.key : a.cluster < b.cluster;
     });
-    std::vector<uint64_t> links;  // both directions, from << 32 | to, once for every shared edge
+    return edges;
+}
+
+/// Pairs of clusters, both directions, from << 32 | to, once for every edge that they share.
+std::vector<uint64_t> sharedEdges(const std::vector<BorderEdge>& edges) {
+    std::vector<uint64_t> links;
     for (size_t i = 0; i < edges.size();) {
         size_t j = i;
         while (j < edges.size() && edges[j].key == edges[i].key) ++j;
@@ -162,6 +162,16 @@ std::vector<std::vector<uint32_t>> groupClusters(const WeldedMesh& mesh, const s
                 if (a != b) links.push_back(uint64_t{edges[a].cluster} << 32 | edges[b].cluster);
         i = j;
     }
+    return links;
+}
+
+/// What METIS takes: the neighbours of each cluster one after the other.
+struct Graph {
+    std::vector<idx_t> start{0}, neighbour, weight;
+};
+
+Graph graphOf(std::vector<uint64_t> links, uint32_t count) {
+    Graph graph;
     // Clusters that touch nothing belong to those beside them on the curve.
     constexpr idx_t kShared = 16;
     for (uint32_t c = 0; c + 1 < count; ++c) {
@@ -169,19 +179,33 @@ std::vector<std::vector<uint32_t>> groupClusters(const WeldedMesh& mesh, const s
         links.push_back(uint64_t{c + 1} << 32 | c);
     }
     std::sort(links.begin(), links.end());
-    std::vector<idx_t> start{0}, neighbour, weight;
     uint32_t from = 0;
     for (size_t i = 0; i < links.size();) {
         size_t j = i;
         while (j < links.size() && links[j] == links[i]) ++j;
         const auto a = static_cast<uint32_t>(links[i] >> 32), b = static_cast<uint32_t>(links[i]);
-        for (; from < a; ++from) start.push_back(static_cast<idx_t>(neighbour.size()));
-        neighbour.push_back(static_cast<idx_t>(b));
+        for (; from < a; ++from) graph.start.push_back(static_cast<idx_t>(graph.neighbour.size()));
+        graph.neighbour.push_back(static_cast<idx_t>(b));
         const bool isBeside = a + 1 == b || b + 1 == a;
-        weight.push_back(kShared * static_cast<idx_t>(j - i - (isBeside ? 1 : 0)) + 1);
+        graph.weight.push_back(kShared * static_cast<idx_t>(j - i - (isBeside ? 1 : 0)) + 1);
         i = j;
     }
-    for (; from < count; ++from) start.push_back(static_cast<idx_t>(neighbour.size()));
+    for (; from < count; ++from) graph.start.push_back(static_cast<idx_t>(graph.neighbour.size()));
+    return graph;
+}
+
+}  // namespace
+
+std::vector<std::vector<uint32_t>> groupClusters(const WeldedMesh& mesh, const std::vector<Cluster>& clusters,
+                                                 uint32_t size, Executor& executor) {
+    const auto count = static_cast<uint32_t>(clusters.size());
+    std::vector<std::vector<uint32_t>> groups;
+    if (count <= size) {
+        groups.emplace_back();
+        for (uint32_t i = 0; i < count; ++i) groups[0].push_back(i);
+        return groups;
+    }
+    Graph graph = graphOf(sharedEdges(borderEdges(mesh, clusters, executor)), count);
     idx_t vertices = static_cast<idx_t>(count), constraints = 1, parts = static_cast<idx_t>((count + size - 1) / size),
           cut = 0;
     std::array<idx_t, METIS_NOPTIONS> options{};
@@ -191,8 +215,9 @@ std::vector<std::vector<uint32_t>> groupClusters(const WeldedMesh& mesh, const s
     std::vector<idx_t> part(count);
     static OneAtATime partitioner;  // its random numbers are the process's: two at once would share one sequence
     const int status = partitioner([&] {
-        return METIS_PartGraphKway(&vertices, &constraints, start.data(), neighbour.data(), nullptr, nullptr,
-                                   weight.data(), &parts, nullptr, nullptr, options.data(), &cut, part.data());
+        return METIS_PartGraphKway(&vertices, &constraints, graph.start.data(), graph.neighbour.data(), nullptr,
+                                   nullptr, graph.weight.data(), &parts, nullptr, nullptr, options.data(), &cut,
+                                   part.data());
     });
     STIPPLE_CHECK(status == METIS_OK, "METIS");
     groups.resize(static_cast<size_t>(parts));
@@ -231,22 +256,25 @@ size_t longOnesLast(const WeldedMesh& mesh, std::vector<uint32_t>& indices) {
     return others.size();
 }
 
-std::vector<std::vector<uint32_t>> groupApart(const WeldedMesh& mesh, std::vector<Cluster>& clusters, uint32_t size,
-                                              Executor& executor) {
-    const auto hasNoLong = [&](const Cluster& c) {
-        for (size_t i = 0; i < c.indices.size(); i += 3)
-            if (isLong(mesh, &c.indices[i])) return false;
-        return true;
-    };
-    const auto others =
-        mesh.isWide() ? std::stable_partition(clusters.begin(), clusters.end(), hasNoLong) : clusters.end();
-    if (others == clusters.begin() || others == clusters.end()) return groupClusters(mesh, clusters, size, executor);
-    const auto first = static_cast<uint32_t>(others - clusters.begin());
-    const std::vector<Cluster> near(clusters.begin(), others), far(others, clusters.end());
-    std::vector<std::vector<uint32_t>> groups = groupClusters(mesh, near, size, executor);
-    for (auto& group : groupClusters(mesh, far, size, executor)) {
-        for (uint32_t& c : group) c += first;
-        groups.push_back(std::move(group));
+std::vector<std::vector<uint32_t>> groupApart(const WeldedMesh& mesh, const std::vector<Cluster>& clusters,
+                                              uint32_t size, Executor& executor) {
+    if (!mesh.isWide()) return groupClusters(mesh, clusters, size, executor);
+    std::array<std::vector<uint32_t>, 2> numbers;  // without long ones, with
+    std::array<std::vector<Cluster>, 2> apart;
+    for (uint32_t c = 0; c < clusters.size(); ++c) {
+        const std::vector<uint32_t>& corners = clusters[c].indices;
+        bool hasLong = false;
+        for (size_t i = 0; i < corners.size() && !hasLong; i += 3) hasLong = isLong(mesh, &corners[i]);
+        numbers.at(hasLong ? 1 : 0).push_back(c);
+        apart.at(hasLong ? 1 : 0).push_back(clusters[c]);
+    }
+    std::vector<std::vector<uint32_t>> groups;
+    for (size_t k = 0; k < 2; ++k) {
+        if (apart.at(k).empty()) continue;
+        for (auto& group : groupClusters(mesh, apart.at(k), size, executor)) {
+            for (uint32_t& c : group) c = numbers.at(k)[c];
+            groups.push_back(std::move(group));
+        }
     }
     return groups;
 }

@@ -120,7 +120,8 @@ class Target {
         return glm::dot(d, d) < reach * reach;
     }
     glm::ivec3 cellOf(const glm::vec3& p) const {
-        return glm::clamp(glm::ivec3((p - lo_) / cell_), glm::ivec3(0), size_ - 1);
+        // (Before it is whole: a ball may be larger than integers are, and then begins in the first cell.)
+        return glm::ivec3(glm::clamp((p - lo_) / cell_, glm::vec3(0), glm::vec3(size_ - 1)));
     }
     size_t number(int x, int y, int z) const {
         return (static_cast<size_t>(z) * static_cast<size_t>(size_.y) + static_cast<size_t>(y)) *

@@ -199,7 +199,7 @@ class MeshBuild : public CellContent {
             if (const auto found = errors.takeAll(); !found.empty()) return tl::unexpected(found.front());
             return to.ends(triangles, facts_.triangles, flushAll);
         }));
-        parts_ = {};
+        parts_ = PartFinder();
         return flushAll();
     }
 
@@ -318,13 +318,12 @@ class MeshBuild : public CellContent {
         if (!mayHaveParts()) return 0;
         const uint64_t triangles = std::min(source_.triangles, PartFinder::kMostTriangles),
                        vertices = source_.vertices > 0 ? std::min(source_.vertices, 3 * triangles) : 3 * triangles;
-        return triangles * PartFinder::kTriangleBytes + vertices * PartFinder::kVertexBytes;
+        return PartFinder::memory(triangles, vertices);
     }
     /// What is small and stands alone stays together (parts.h), if the mesh can be looked at as a whole.
     Result<void> findParts() {
-        // (Parts are moved on short lattices only.)
-        bool isKnown = mayHaveParts() && !facts_.lattice.isWide();
-        parts_ = {};
+        bool isKnown = mayHaveParts();
+        parts_ = PartFinder(facts_.lattice);
         if (isKnown) {
             const Result<void> read = source_.read([&](const TriangleMesh& block) -> Result<void> {
                 isKnown = parts_.add(placeBlock(block, facts_.lattice, executor_));

@@ -47,6 +47,11 @@ struct LatticeVertices {
         };
         return {joined(high[i].x, v.x), joined(high[i].y, v.y), joined(high[i].z, v.z)};
     }
+    /// Of coordinates that have 32 bits.
+    void addShort(const shared::MeshVertex& v, bool isWide) {
+        low.push_back(v);
+        if (isWide) high.emplace_back(v.x < 0 ? -1 : 0, v.y < 0 ? -1 : 0, v.z < 0 ? -1 : 0);
+    }
     void add(const LatticeVertices& from, size_t i) {
         low.push_back(from.low[i]);
         if (!from.high.empty()) high.push_back(from.high[i]);
@@ -128,10 +133,10 @@ std::vector<Cluster> makeClusters(const WeldedMesh& mesh, const std::vector<uint
 /// Groups of about `size` clusters with few edges between groups; deterministic.
 std::vector<std::vector<uint32_t>> groupClusters(const WeldedMesh& mesh, const std::vector<Cluster>& clusters,
                                                  uint32_t size, Executor& executor);
-/// The same for clusters some of whose triangles are longer than coordinates of 30 bits reach, which come last: these
-/// are grouped by themselves, or what fp32 rounds of them would be an error of all that is simplified with them.
-std::vector<std::vector<uint32_t>> groupApart(const WeldedMesh& mesh, std::vector<Cluster>& clusters, uint32_t size,
-                                              Executor& executor);
+/// The same for clusters some of whose triangles are longer than coordinates of 30 bits reach: these are grouped by
+/// themselves, or what fp32 rounds of them would be an error of all that is simplified with them.
+std::vector<std::vector<uint32_t>> groupApart(const WeldedMesh& mesh, const std::vector<Cluster>& clusters,
+                                              uint32_t size, Executor& executor);
 /// Triangles that are longer than that behind the others; returns where they begin.
 size_t longOnesLast(const WeldedMesh& mesh, std::vector<uint32_t>& indices);
 

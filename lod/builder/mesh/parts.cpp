@@ -2,6 +2,7 @@
 #include "lod/builder/mesh/parts.h"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 
 #include "lod/builder/morton.h"
@@ -56,27 +57,48 @@ uint32_t PartFinder::numberOf(const glm::ivec3& p) {
     return slots_[at];
 }
 
+PartFinder::PartFinder(const Lattice& lattice) : isWide_(lattice.isWide()) {
+    if (!isWide_) return;
+    const glm::u64vec3 least = keyPlace(Steps(-kPartReach), lattice);
+    nearest_ = {least.x, least.y, least.z};
+    // The first position stands for all that are too far out: more triangles than a part has are theirs.
+    parent_.push_back(0);
+    positions_.emplace_back(std::numeric_limits<int>::min());
+}
+
+uint32_t PartFinder::numberAt(const LatticeVertices& vertices, uint32_t i) {
+    const Steps p = vertices.at(i);
+    if (isWide_ && glm::any(glm::greaterThan(glm::abs(p), Steps(kPartReach)))) return 0;
+    return numberOf(glm::ivec3(p));
+}
+
+std::array<uint32_t, 3> PartFinder::shortCentre(const PlacedBlock& block, size_t t) const {
+    const Place centre = block.centres().at(t);
+    // (Of what lies too far out nothing is kept: it is no part.)
+    const auto along = [&](size_t a) { return static_cast<uint32_t>(centre.at(a) - nearest_.at(a)); };
+    return {along(0), along(1), along(2)};
+}
+
 bool PartFinder::add(const PlacedBlock& block) {
     const auto& indices = block.soup.indices;
     if (ofTriangle_.size() + indices.size() / 3 > kMostTriangles) return false;
     std::vector<uint32_t> number(block.soup.vertices.size(), kNone);
     for (const uint32_t i : indices) {
-        const shared::MeshVertex& v = block.soup.vertices.low[i];
-        if (number[i] == kNone) number[i] = numberOf({v.x, v.y, v.z});
+        if (number[i] == kNone) number[i] = numberAt(block.soup.vertices, i);
     }
     for (size_t t = 0; t < indices.size() / 3; ++t) {
         const uint32_t first = number[indices[3 * t]];
         unite(parent_, first, number[indices[3 * t + 1]]);
         unite(parent_, first, number[indices[3 * t + 2]]);
         ofTriangle_.push_back(first);
-        centre_.push_back({block.x[t], block.y[t], block.z[t]});
+        centre_.push_back(shortCentre(block, t));
     }
     firstOfBlock_.push_back(ofTriangle_.size());
     return true;
 }
 
 void PartFinder::finish(bool isKnown) {
-    if (!isKnown) *this = {};
+    if (!isKnown) *this = PartFinder();
     positions_ = {};
     slots_ = {};
     std::vector<uint32_t> triangles(parent_.size(), 0);
@@ -89,7 +111,7 @@ void PartFinder::finish(bool isKnown) {
     };
     for (size_t t = 0; t < ofTriangle_.size(); ++t) {
         const uint32_t root = ofTriangle_[t];
-        if (triangles[root] > kPartTriangles) {
+        if (triangles[root] > kPartTriangles || (isWide_ && root == 0)) {
             ofTriangle_[t] = kNone;
             continue;
         }
@@ -112,9 +134,12 @@ bool PartFinder::place(PlacedBlock& placed, size_t block) const {
     for (size_t t = 0; t < placed.x.size(); ++t) {
         const uint32_t part = ofTriangle_[first + t];
         if (part == kNone) continue;
-        placed.x[t] = centre_[part][0];
-        placed.y[t] = centre_[part][1];
-        placed.z[t] = centre_[part][2];
+        Place centre = nearest_;
+        for (size_t a = 0; a < 3; ++a) centre.at(a) += centre_[part].at(a);
+        placed.x[t] = static_cast<uint32_t>(centre[0]);
+        placed.y[t] = static_cast<uint32_t>(centre[1]);
+        placed.z[t] = static_cast<uint32_t>(centre[2]);
+        if (isWide_) placed.high[t] = highOf(centre);
         for (size_t k = 0; k < 3; ++k)
             placed.soup.vertices.low[placed.soup.indices[3 * t + k]].surface |= kSurfaceOfPart;
     }
@@ -153,6 +178,7 @@ void appendWholeClusters(const LocalMesh& local, const std::vector<std::vector<u
     Cluster open;
     open.isWhole = true;
     size_t vertices = 0;
+    const size_t mostVertices = local.isWide ? shared::kClusterVertices / 2 : shared::kClusterVertices;
     const auto close = [&] {
         if (!open.indices.empty()) out.push_back(open);
         open.indices.clear();
@@ -162,10 +188,9 @@ void appendWholeClusters(const LocalMesh& local, const std::vector<std::vector<u
         std::vector<uint32_t> used = part;
         std::sort(used.begin(), used.end());
         const auto own = static_cast<size_t>(std::unique(used.begin(), used.end()) - used.begin());
-        if (open.indices.size() + part.size() > size_t{3} * shared::kClusterTriangles ||
-            vertices + own > shared::kClusterVertices)
+        if (open.indices.size() + part.size() > size_t{3} * shared::kClusterTriangles || vertices + own > mostVertices)
             close();
-        if (part.size() <= size_t{3} * shared::kClusterTriangles && own <= shared::kClusterVertices) {
+        if (part.size() <= size_t{3} * shared::kClusterTriangles && own <= mostVertices) {
             for (const uint32_t v : part) open.indices.push_back(local.global[v]);
             vertices += own;
             continue;
@@ -192,12 +217,12 @@ std::vector<std::vector<uint32_t>> groupAll(const WeldedMesh& mesh, const std::v
             groups.back().push_back(c);
         }
     }
-    if (others.size() == clusters.size()) return groupClusters(mesh, clusters, size, executor);
+    if (others.size() == clusters.size()) return groupApart(mesh, clusters, size, executor);
     if (others.empty()) return groups;
     std::vector<Cluster> rest;
     rest.reserve(others.size());
     for (const uint32_t c : others) rest.push_back(clusters[c]);
-    for (auto& group : groupClusters(mesh, rest, size, executor)) {
+    for (auto& group : groupApart(mesh, rest, size, executor)) {
         for (uint32_t& c : group) c = others[c];
         groups.push_back(std::move(group));
     }

@@ -236,13 +236,13 @@ class Widening {
 };
 
 /// Vertices that moved, as new ones.
-void moveVertices(std::vector<uint32_t>& coarse, const std::vector<glm::dvec3>& to, int largest, const WeldedMesh& mesh,
-                  LocalMesh& local) {
+void moveVertices(std::vector<uint32_t>& coarse, const std::vector<glm::dvec3>& to, int least, int largest,
+                  const WeldedMesh& mesh, LocalMesh& local) {
     std::vector<uint32_t> copy(local.position.size(), ~0u);
     for (uint32_t& v : coarse) {
         if (copy[v] == ~0u) {
             const Steps from = mesh.at(local.global[v]);
-            const glm::ivec3 moved = movedPlace(from, to[v] - glm::dvec3(local.position[v]), largest);
+            const glm::ivec3 moved = movedPlace(from, to[v] - glm::dvec3(local.position[v]), least, largest);
             copy[v] = v;
             if (Steps(moved) != from) {
                 copy[v] = static_cast<uint32_t>(local.position.size());
@@ -367,18 +367,18 @@ class PartGroup {
 
 }  // namespace
 
-glm::ivec3 movedPlace(const Steps& from, const glm::dvec3& by, int largest) {
-    const glm::dvec3 to = glm::clamp(glm::dvec3(from) + glm::round(by), glm::dvec3(0), glm::dvec3(largest));
+glm::ivec3 movedPlace(const Steps& from, const glm::dvec3& by, int least, int largest) {
+    const glm::dvec3 to = glm::clamp(glm::dvec3(from) + glm::round(by), glm::dvec3(least), glm::dvec3(largest));
     return {toWhole<int>(to.x), toWhole<int>(to.y), toWhole<int>(to.z)};
 }
 
-std::vector<uint32_t> simplifyParts(const WeldedMesh& mesh, LocalMesh& local, size_t target, int largest) {
+std::vector<uint32_t> simplifyParts(const WeldedMesh& mesh, LocalMesh& local, size_t target, int least, int largest) {
     PartGroup group(mesh, local);
     group.simplify(target);
     group.widenParts();
     group.widenTogether();
     std::vector<uint32_t> out = group.coarse();
-    moveVertices(out, group.places(), largest, mesh, local);
+    moveVertices(out, group.places(), least, largest, mesh, local);
     return out;
 }
 

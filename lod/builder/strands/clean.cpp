@@ -8,6 +8,7 @@
 namespace stipple::lod {
 namespace {
 
+constexpr double kShortest = 1e-150;    ///< segment that has a direction in doubles
 constexpr double kLargestTwist = 1.05;  ///< radians between two vertices of a ribbon
 
 struct Vertex {
@@ -100,7 +101,7 @@ StrandSet cleanStrands(StrandSet in, double defaultRadius, double extent) {
                 ++notFinite;
                 continue;
             }
-            if (!v.empty() && glm::length(in.position[i] - v.back().p) <= 1e-12 * extent) {
+            if (!v.empty() && !(glm::length(in.position[i] - v.back().p) > kShortest)) {
                 ++repeated;
                 continue;
             }

@@ -24,7 +24,7 @@ constexpr uint32_t kRootLog2 = 24, kMostRootLog2 = kPlaceBits - TravellingPoint:
 constexpr uint32_t kDeepest = 20;                    ///< of 24
 constexpr double kFar = 16;                          ///< times what most vertices span: that is far out
 constexpr double kFineSteps = 64;                    ///< in what is visible of a segment, where strands lie far apart
-constexpr double kMorePieces = 1 << 18;              ///< that segments may be divided into where cells are too large
+constexpr double kMorePieces = 1 << 18;              ///< that all may be divided into where cells are too large
 constexpr uint64_t kCellBytes = uint64_t{64} << 20;  ///< that one cell of the work needs at most
 constexpr uint64_t kRunSegments = 64;                ///< of one atom that are kept until they are sent
 
@@ -104,11 +104,11 @@ class StrandBuild : public CellContent {
         refine(extent, bounds.sample, detail);
         const uint32_t deepest = std::min(facts_.rootLog2 - (kRootLog2 - kDeepest), kMortonBits);
         facts_.keyLevels = deepest;
-        const auto piecesFor = [&](double longest) {
+        const auto piecesFor = [&](double cell) {
             double pieces = 0;
             for (const auto& [octave, count] : octaves)
-                pieces += static_cast<double>(count) *
-                          std::max(1.0, std::ceil(std::exp2(octave / 64.0) / facts_.unit / longest));
+                pieces +=
+                    static_cast<double>(count) * StrandDivision::pieces(std::exp2(octave / 64.0) / facts_.unit, cell);
             return pieces;
         };
         const auto cellOf = [&](uint32_t level) { return std::exp2(double(facts_.rootLog2) - level); };
@@ -119,6 +119,15 @@ class StrandBuild : public CellContent {
                facts_.fineness.isCoarse(strandStep(cellOf(facts_.keyLevels)), detail / facts_.unit) &&
                piecesFor(cellOf(facts_.keyLevels + 1)) <= most + kMorePieces)
             ++facts_.keyLevels;
+        const Frame on = frame();
+        std::vector<Key> vertices;
+        for (const glm::dvec3& p : bounds.sample) {
+            const glm::dvec3 at = glm::max(glm::floor(onLattice(p)), glm::dvec3(0));
+            vertices.push_back(on.keyOf({toWhole<uint64_t>(at.x), toWhole<uint64_t>(at.y), toWhole<uint64_t>(at.z)}));
+        }
+        std::sort(vertices.begin(), vertices.end());
+        vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+        division_ = StrandDivision(on, std::move(vertices));
         return {};
     }
 
@@ -136,7 +145,7 @@ class StrandBuild : public CellContent {
         std::vector<uint32_t> x, y, z;
         std::vector<uint64_t> high;
         std::vector<TravellingPoint> ends;
-        facts_.parts = facts_.vertices = facts_.farOut = 0;
+        facts_.parts = facts_.vertices = facts_.farOut = facts_.farFromAll = 0;
         return source_.read([&](const StrandSet& block) -> Result<void> {
             for (const glm::dvec3& p : block.position) countFarOut(p);
             x.clear();
@@ -146,7 +155,7 @@ class StrandBuild : public CellContent {
             for (size_t s = 0; s < block.strands(); ++s) {
                 const std::vector<TravellingPoint> points = pointsOf(block, s);
                 for (size_t i = 1; i < points.size(); ++i) {
-                    divide(points[i - 1], points[i], longest(), ends);
+                    if (division_.divide(points[i - 1], points[i], ends)) facts_.farFromAll += ends.size() - 1;
                     const TravellingPoint* before = &points[i - 1];
                     for (const TravellingPoint& end : ends) {
                         const Place middle = TravellingPoint::middle(*before, end);
@@ -206,7 +215,7 @@ class StrandBuild : public CellContent {
                 const std::vector<TravellingPoint> points = pointsOf(block, s);
                 uint32_t number = 0;
                 for (size_t i = 1; i < points.size(); ++i) {
-                    divide(points[i - 1], points[i], longest(), ends);
+                    division_.divide(points[i - 1], points[i], ends);
                     atoms.clear();
                     const TravellingPoint* before = &points[i - 1];
                     for (const TravellingPoint& end : ends) {
@@ -241,6 +250,7 @@ class StrandBuild : public CellContent {
 
     void save(ByteWriter& to) const override {
         to.put(facts_);
+        to.put(division_.vertices());
         to.put(notes_);
         for (const auto* counts : {&dropped_, &added_}) {
             to.put(uint64_t{counts->size()});
@@ -252,6 +262,9 @@ class StrandBuild : public CellContent {
     }
     void load(ByteReader& from) override {
         from.get(facts_);
+        std::vector<Key> vertices;
+        from.get(vertices);
+        division_ = StrandDivision(frame(), std::move(vertices));
         from.get(notes_);
         for (auto* counts : {&dropped_, &added_}) {
             uint64_t reasons = 0;
@@ -268,7 +281,7 @@ class StrandBuild : public CellContent {
 
     Result<CellProduct> make(const WorkCell& cell, const std::vector<uint8_t>& input,
                              const std::vector<FromBelow>& below) const override {
-        return buildStrandCell(cell, input, below, frame(), settings_.leafSegments, facts_.fineness);
+        return buildStrandCell(cell, input, below, frame(), settings_.leafSegments, facts_.fineness, division_);
     }
 
     uint64_t take(uint64_t at, const std::vector<uint8_t>& bytes) override {
@@ -299,7 +312,11 @@ class StrandBuild : public CellContent {
         description.hasColour = facts_.hasColour;
         description.hasNormals = description.isReflectance = true;
         description.up = facts_.up;
-        if (facts_.parts > facts_.segments) added_["by dividing long ones"] = facts_.parts - facts_.segments;
+        const uint64_t even = facts_.parts - facts_.segments - facts_.farFromAll;
+        if (even > 0) added_["by dividing long ones"] = even;
+        if (facts_.farFromAll > 0)
+            added_["by dividing very long ones (between vertices within a 16,384th of the way to the nearest one)"] =
+                facts_.farFromAll;
         report.pointsIn = description.pointsIn = facts_.given;
         report.pointsOut = facts_.parts;
         report.notes = notes_;
@@ -330,6 +347,7 @@ class StrandBuild : public CellContent {
         uint64_t given = 0, segments = 0, parts = 0;  ///< of the input, of clean strands, and divided
         uint64_t vertices = 0, farOut = 0;            ///< of them, far outside of all others
         double farthest = 0;                          ///< of those from the others' box, file units
+        uint64_t farFromAll = 0;                      ///< added to segments that are divided unevenly
         uint32_t rootLog2 = kRootLog2, keyLevels = 0;
         bool hasColour = false;
     };
@@ -395,11 +413,10 @@ class StrandBuild : public CellContent {
         for (uint32_t i = set.first[s]; i < set.first[s + 1]; ++i) out.emplace_back(pointOf(set, s, i));
         return out;
     }
-    double longest() const { return std::exp2(double(facts_.rootLog2) - facts_.keyLevels); }
-
     const StrandSource& source_;
     const StrandBuildSettings& settings_;
     Facts facts_;
+    StrandDivision division_;
     std::vector<std::string> notes_;
     std::map<std::string, uint64_t> dropped_, added_;
     std::vector<NodeBatch> batches_;

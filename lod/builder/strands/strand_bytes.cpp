@@ -36,27 +36,6 @@ StrandPoint TravellingPoint::point() const {
     return p;
 }
 
-void divide(const TravellingPoint& a, const TravellingPoint& b, double longest, std::vector<TravellingPoint>& ends) {
-    ends.clear();
-    const StrandPoint before = a.point(), after = b.point();
-    const auto pieces = toWhole<uint32_t>(std::max(1.0, std::ceil(glm::length(after.p - before.p) / longest)));
-    for (uint32_t k = 1; k < pieces; ++k) {
-        const double u = static_cast<double>(k) / pieces;
-        StrandPoint q = after;
-        q.p = glm::mix(before.p, after.p, u);
-        q.radius = static_cast<float>((1 - u) * before.radius + u * after.radius);
-        const glm::vec3 d = glm::mix(before.direction, after.direction, static_cast<float>(u));
-        q.direction = glm::length(d) > 1e-3f ? glm::normalize(d) : before.direction;
-        q.colour = 0;
-        for (uint32_t shift = 0; shift < 24; shift += 8)
-            q.colour |= static_cast<uint32_t>(
-                            std::lround((1 - u) * (before.colour >> shift & 255u) + u * (after.colour >> shift & 255u)))
-                        << shift;
-        ends.emplace_back(q);
-    }
-    ends.push_back(b);
-}
-
 namespace {
 
 /// Places as steps along the strand, and back: the codec stores how a value differs

@@ -26,8 +26,9 @@ struct StrandNode {
 
 class StrandCell {
   public:
-    StrandCell(const WorkCell& cell, const Frame& frame, uint32_t leafSegments, const Fineness& fineness)
-        : frame_(frame), leafSegments_(leafSegments), fineness_(fineness) {
+    StrandCell(const WorkCell& cell, const Frame& frame, uint32_t leafSegments, const Fineness& fineness,
+               const StrandDivision& division)
+        : frame_(frame), leafSegments_(leafSegments), fineness_(fineness), division_(division) {
         nodes_.push_back(nodeAt(static_cast<uint32_t>(cell.level), cell.key));
     }
 
@@ -50,6 +51,9 @@ class StrandCell {
             return std::tie(a.run.strand, a.run.firstNumber) < std::tie(b.run.strand, b.run.firstNumber);
         });
         for (const auto& [run, begin] : order) takeRun(run, &in.points[begin]);
+        if (longestOf(nodes_[0]) > frame_.cellSize(nodes_[0].node.level))
+            return fail(ErrorKind::input, "a segment is far longer than the many others that lie around it", "",
+                        "give it vertices where it passes them");
         partition();
         return {};
     }
@@ -115,19 +119,19 @@ class StrandCell {
 
     /// The pieces of a run that lie in the cell.
     void takeRun(const StrandRun& run, const TravellingPoint* points) {
-        const double longest = frame_.cellSize(frame_.keyLevels);
         const StrandNode& own = nodes_[0];
         const uint32_t shift = frame_.shiftOf(own.node.level);
         uint32_t number = run.firstNumber;
         for (uint32_t i = 1; i < run.points; ++i) {
-            divide(points[i - 1], points[i], longest, ends_);
+            const bool isGraded = division_.divide(points[i - 1], points[i], ends_);
             TravellingPoint before = points[i - 1];
-            for (const TravellingPoint& end : ends_) {
+            for (size_t k = 0; k < ends_.size(); ++k) {
+                const TravellingPoint& end = ends_[k];
                 const Key key = frame_.keyOf(TravellingPoint::middle(before, end));
                 if (key >> shift == own.key >> shift) {
                     StrandPart part;
-                    part.a = addPoint(before, run, number);
-                    part.b = addPoint(end, run, number + 1);
+                    part.a = addPoint(before, run, number, isGraded && k > 0);
+                    part.b = addPoint(end, run, number + 1, isGraded && k + 1 < ends_.size());
                     part.radiusA = points_[part.a].radius;
                     part.radiusB = points_[part.b].radius;
                     part.colourA = points_[part.a].colour;
@@ -139,13 +143,14 @@ class StrandCell {
             }
         }
     }
-    uint32_t addPoint(const TravellingPoint& from, const StrandRun& run, uint32_t number) {
+    uint32_t addPoint(const TravellingPoint& from, const StrandRun& run, uint32_t number, bool isFarFromAll) {
         const bool isThere = !points_.empty() && points_.back().strand == run.strand && points_.back().number == number;
         if (!isThere) {
             StrandPoint p = from.point();
             p.strand = run.strand;
             p.number = number;
             p.isRibbon = run.isRibbon;
+            p.isFarFromAll = isFarFromAll;
             points_.push_back(p);
             places_.push_back(from.steps());
         }
@@ -160,6 +165,18 @@ class StrandCell {
         n.node.cell = {compactBits(cell), compactBits(cell >> 1), compactBits(cell >> 2)};
         n.node.stepShift = static_cast<int8_t>(static_cast<int>(frame_.rootLog2) - static_cast<int>(level) - 15);
         return n;
+    }
+
+    double longestOf(const StrandNode& node) const {
+        double longest = 0;
+        for (const StrandPart& p : node.parts)
+            longest = std::max(longest, glm::length(points_[p.b].p - points_[p.a].p));
+        return longest;
+    }
+    bool hasVertices(const StrandNode& node) const {
+        return std::any_of(node.parts.begin(), node.parts.end(), [&](const StrandPart& p) {
+            return !points_[p.a].isFarFromAll || !points_[p.b].isFarFromAll;
+        });
     }
 
     /// Are the ends of many of its segments drawn to steps that can be seen?
@@ -179,7 +196,8 @@ class StrandCell {
     void partition() {
         for (size_t i = 0; i < nodes_.size(); ++i) {
             const uint32_t level = nodes_[i].node.level;
-            if (level >= frame_.keyLevels || (nodes_[i].parts.size() <= leafSegments_ && !isCoarse(nodes_[i])))
+            if (level >= frame_.keyLevels || (nodes_[i].parts.size() <= leafSegments_ && !isCoarse(nodes_[i])) ||
+                longestOf(nodes_[i]) > frame_.cellSize(level + 1))
                 continue;
             const uint32_t bit = frame_.rootLog2 - level - 1;
             std::array<std::vector<StrandPart>, 8> parts;
@@ -268,7 +286,7 @@ class StrandCell {
                 }
         table.batch.bytes.insert(table.batch.bytes.end(), bytes.begin(), bytes.end());
         table.batch.nodes.push_back(w);
-        if (node.node.isLeaf())
+        if (node.node.isLeaf() && hasVertices(node))
             table.rounding = std::max(
                 table.rounding, std::exp2(node.node.stepShift) * 0.5 * std::sqrt(3.0) + TravellingPoint::rounding());
         node.parts = {};
@@ -388,6 +406,7 @@ class StrandCell {
     const Frame& frame_;
     const uint32_t leafSegments_;
     const Fineness fineness_;
+    const StrandDivision& division_;
     std::vector<StrandPoint> points_;
     std::vector<Place> places_;      ///< of an atom's points, as they travelled
     std::vector<StrandNode> nodes_;  ///< the first one is the cell's own
@@ -399,8 +418,8 @@ class StrandCell {
 
 Result<CellProduct> buildStrandCell(const WorkCell& cell, const std::vector<uint8_t>& input,
                                     const std::vector<FromBelow>& below, const Frame& frame, uint32_t leafSegments,
-                                    const Fineness& fineness) {
-    StrandCell work(cell, frame, leafSegments, fineness);
+                                    const Fineness& fineness, const StrandDivision& division) {
+    StrandCell work(cell, frame, leafSegments, fineness, division);
     if (cell.atom != WorkCell::kNone) {
         STIPPLE_TRY(work.takeInput(input));
     } else {

@@ -3,6 +3,7 @@
 
 #include "lod/builder/octree/assemble.h"
 #include "lod/builder/octree/reduction.h"
+#include "lod/builder/strands/strand_division.h"
 #include "lod/builder/strands/strand_work.h"
 
 namespace stipple::lod {
@@ -19,7 +20,7 @@ struct Fineness {
 /// divided, down to `frame.keyLevels`, and so are those that are too coarse for `fineness`.
 Result<CellProduct> buildStrandCell(const WorkCell& cell, const std::vector<uint8_t>& input,
                                     const std::vector<FromBelow>& below, const Frame& frame, uint32_t leafSegments,
-                                    const Fineness& fineness);
+                                    const Fineness& fineness, const StrandDivision& division);
 
 /// Distance between places that a node with cells of this edge tells apart.
 inline double strandStep(double cell) { return cell / 32768; }

@@ -20,6 +20,7 @@ struct StrandPoint {
     uint32_t strand = 0, number = 0;  ///< number: along the strand
     uint32_t colour = 0;              ///< sRGB
     uint32_t isRibbon = 0;
+    bool isFarFromAll = false;  ///< no vertex of the source: see StrandDivision; known where leaves are made
 };
 
 /// Part of a strand between two points, at some level of detail.
@@ -75,9 +76,6 @@ struct TravellingPoint {
     /// Largest distance from where the point was, lattice units.
     static double rounding() { return std::exp2(-1.0 - kStepBits) * std::sqrt(3.0); }
 };
-/// A segment from `a` to `b` in even pieces no longer than `longest` lattice units: their ends, `b` the last. Part of
-/// the segments of a strand can be divided anywhere with the same result.
-void divide(const TravellingPoint& a, const TravellingPoint& b, double longest, std::vector<TravellingPoint>& ends);
 
 /// Successive points of one strand as its source has them; numbers count the ends of divided segments.
 struct StrandRun {

@@ -96,6 +96,53 @@ Result<void> useVlrs(const Bytes& in, LasHeader& h, bool compressed) {
     return {};
 }
 
+Result<void> readScales(const std::vector<uint8_t>& b, LasHeader& h) {
+    const auto bad = [&](const std::string& what) {
+        return fail(ErrorKind::input, what, h.path, "the header is damaged");
+    };
+    for (int a = 0; a < 3; ++a) {
+        const auto at = static_cast<size_t>(a) * 8;
+        h.scale[a] = get<double>(b, 131 + at);
+        h.offset[a] = get<double>(b, 155 + at);
+        h.greatest[a] = get<double>(b, 179 + at * 2);
+        h.least[a] = get<double>(b, 187 + at * 2);
+        if (!(h.scale[a] > 0) || !std::isfinite(h.scale[a]) || !std::isfinite(h.offset[a]))
+            return bad(fmt::format("scale {} and offset {} of axis {} (offsets {} and {}) are not usable", h.scale[a],
+                                   h.offset[a], "xyz"[a], 131 + at, 155 + at));
+        // What follows takes squares and volumes of them.
+        constexpr double kFarthest = 1e100, kSteps = 2147483648.0;
+        if (!(h.scale[a] * kSteps + std::abs(h.offset[a]) <= kFarthest))
+            return bad(fmt::format("scale {} and offset {} of axis {} (offsets {} and {}) reach farther than {}",
+                                   h.scale[a], h.offset[a], "xyz"[a], 131 + at, 155 + at, kFarthest));
+    }
+    return {};
+}
+
+/// What a file of its size can hold.
+Result<void> checkPoints(bool compressed, bool tolerant, LasHeader& h) {
+    const auto bad = [&](const std::string& what, const std::string& hint) {
+        return fail(ErrorKind::input, what, h.path, hint);
+    };
+    if (compressed) {
+        if (!h.laz) return bad("is compressed (offset 104) but has no `laszip encoded` record", "the file is damaged");
+        // A compressed point takes at least some bits; a chunk its first point in full.
+        const uint64_t most = (h.fileBytes - h.dataOffset) * kMostPointsPerByte;
+        if (h.points > most)
+            return bad(fmt::format("the header declares {} points, {} bytes cannot hold more than {}", h.points,
+                                   h.fileBytes - h.dataOffset, most),
+                       "the file is truncated or its header lies");
+    } else {
+        const uint64_t fits = (h.fileBytes - h.dataOffset) / h.recordBytes;
+        if (h.points > fits && !tolerant)
+            return bad(fmt::format("the header declares {} points, but only {} fit into the file", h.points, fits),
+                       "the file is truncated or its header lies; --skip-bad reads what is there");
+        if (h.points > fits)
+            h.notes.push_back(
+                fmt::format("the header declares {} points, but only {} fit into the file", h.points, fits));
+    }
+    return {};
+}
+
 }  // namespace
 
 std::string LasHeader::describe() const {
@@ -160,45 +207,13 @@ Result<LasHeader> readLasHeader(const Bytes& in, const std::string& path, bool t
     if (h.dataOffset < h.headerBytes || h.dataOffset > in.size)
         return bad(fmt::format("the points begin at offset {}, but the file has {} bytes", h.dataOffset, in.size),
                    "the file is truncated");
-    for (int a = 0; a < 3; ++a) {
-        const auto at = static_cast<size_t>(a) * 8;
-        h.scale[a] = get<double>(b, 131 + at);
-        h.offset[a] = get<double>(b, 155 + at);
-        h.greatest[a] = get<double>(b, 179 + at * 2);
-        h.least[a] = get<double>(b, 187 + at * 2);
-        if (!(h.scale[a] > 0) || !std::isfinite(h.scale[a]) || !std::isfinite(h.offset[a]))
-            return bad(fmt::format("scale {} and offset {} of axis {} (offsets {} and {}) are not usable", h.scale[a],
-                                   h.offset[a], "xyz"[a], 131 + at, 155 + at),
-                       "the header is damaged");
-        // What follows takes squares and volumes of them.
-        constexpr double kFarthest = 1e100, kSteps = 2147483648.0;
-        if (!(h.scale[a] * kSteps + std::abs(h.offset[a]) <= kFarthest))
-            return bad(fmt::format("scale {} and offset {} of axis {} (offsets {} and {}) reach farther than {}",
-                                   h.scale[a], h.offset[a], "xyz"[a], 131 + at, 155 + at, kFarthest),
-                       "the header is damaged");
-    }
+    STIPPLE_TRY(readScales(b, h));
     h.colourOffset = kColourOffset.at(h.format);
     STIPPLE_TRY(listVlrs(in, h.headerBytes, h.dataOffset, vlrs, false, h));
     if (isWide && get<uint32_t>(b, 243) != 0)
         STIPPLE_TRY(listVlrs(in, get<uint64_t>(b, 235), in.size, get<uint32_t>(b, 243), true, h));
     STIPPLE_TRY(useVlrs(in, h, compressed));
-    if (compressed) {
-        if (!h.laz) return bad("is compressed (offset 104) but has no `laszip encoded` record", "the file is damaged");
-        // A compressed point takes at least some bits; a chunk its first point in full.
-        const uint64_t most = (in.size - h.dataOffset) * kMostPointsPerByte;
-        if (h.points > most)
-            return bad(fmt::format("the header declares {} points, {} bytes cannot hold more than {}", h.points,
-                                   in.size - h.dataOffset, most),
-                       "the file is truncated or its header lies");
-    } else {
-        const uint64_t fits = (in.size - h.dataOffset) / h.recordBytes;
-        if (h.points > fits && !tolerant)
-            return bad(fmt::format("the header declares {} points, but only {} fit into the file", h.points, fits),
-                       "the file is truncated or its header lies; --skip-bad reads what is there");
-        if (h.points > fits)
-            h.notes.push_back(
-                fmt::format("the header declares {} points, but only {} fit into the file", h.points, fits));
-    }
+    STIPPLE_TRY(checkPoints(compressed, tolerant, h));
     return h;
 }
 
