@@ -133,16 +133,17 @@ class CpuBackend final : public render::Backend {
 
     /// The visibility buffer is already clear (see resolve); what is made here is the block table.
     void clear() {
-        blocks_.resize(draws_->blocks.size());
+        blocks_.resize(draws_->points().blocks.size());
         for (size_t b = 0; b < blocks_.size(); ++b) {
-            const shared::DrawBlock& block = draws_->blocks[b];
-            const auto found = chunks_.find(chunkId(draws_->keys[block.node]));
-            blocks_[b] = {found->second.records.data() + block.first, &draws_->nodes[block.node]};
+            const shared::DrawBlock& block = draws_->points().blocks[b];
+            const auto found = chunks_.find(chunkId(draws_->points().keys[block.node]));
+            blocks_[b] = {found->second.records.data() + block.first, &draws_->points().nodes[block.node]};
         }
         strandBlocks_.clear();
-        for (const shared::DrawBlock& block : draws_->strandBlocks)
-            strandBlocks_.push_back({chunks_.at(chunkId(draws_->strandKeys[block.node])).segments.data() + block.first,
-                                     &draws_->strandNodes[block.node]});
+        for (const shared::DrawBlock& block : draws_->curves().blocks)
+            strandBlocks_.push_back(
+                {chunks_.at(chunkId(draws_->curves().keys[block.node])).segments.data() + block.first,
+                 &draws_->curves().nodes[block.node]});
         hasStrands_ = !strandBlocks_.empty();
     }
 
@@ -153,7 +154,7 @@ class CpuBackend final : public render::Backend {
             const WideSink sink{
                 &mine, [](void* to, const WideStrand& s) { static_cast<std::vector<WideStrand>*>(to)->push_back(s); }};
             for (size_t b = begin; b < end; ++b) {
-                const uint32_t left = strandBlocks_[b].node->count - draws_->strandBlocks[b].first;
+                const uint32_t left = strandBlocks_[b].node->count - draws_->curves().blocks[b].first;
                 k_.drawSegments(frame_, strandBlocks_[b], std::min(left, shared::kSegmentsPerBlock),
                                 static_cast<uint32_t>(b * shared::kSegmentsPerBlock), sink, visibility());
             }
@@ -182,18 +183,18 @@ class CpuBackend final : public render::Backend {
     }
 
     void project(bool hasPyramid) {
-        besideToo_.resize(draws_->nodes.size());
+        besideToo_.resize(draws_->points().nodes.size());
         for (size_t n = 0; n < besideToo_.size(); ++n)
-            besideToo_[n] =
-                hasPyramid && ((draws_->nodes[n].octantMask & shared::kNodeWide) != 0 || !isWithin(draws_->nodes[n]));
+            besideToo_[n] = hasPyramid && ((draws_->points().nodes[n].octantMask & shared::kNodeWide) != 0 ||
+                                           !isWithin(draws_->points().nodes[n]));
         executor_.parallelFor(blocks_.size(), 32, [&](size_t begin, size_t end) {
             alignas(64) std::array<uint32_t, shared::kRecordsPerBlock> pixel, depth;
             std::vector<shared::WideDisc> mine;
             for (size_t b = begin; b < end; ++b) {
                 const uint32_t count =
-                    std::min(shared::kRecordsPerBlock, blocks_[b].node->count - draws_->blocks[b].first);
+                    std::min(shared::kRecordsPerBlock, blocks_[b].node->count - draws_->points().blocks[b].first);
                 k_.projectBlock(frame_, *blocks_[b].node, blocks_[b].records, count,
-                                besideToo_[draws_->blocks[b].node] != 0, pixel.data(), depth.data());
+                                besideToo_[draws_->points().blocks[b].node] != 0, pixel.data(), depth.data());
                 constexpr uint32_t kAhead = 48;  // the pixels are scattered over 16 MB: ask for them in time
                 for (uint32_t i = 0; i < count; ++i) {
                     if (i + kAhead < count && pixel[i + kAhead] < kWidePixel)
@@ -242,8 +243,9 @@ class CpuBackend final : public render::Backend {
             }
             textureSets_.push_back({t.infos.data(), t.tiles > 0 ? tiles_[t.source].data() + t.firstChunk : nullptr});
         }
-        for (const render::MeshDraw& draw : draws_->meshDraws) {
-            const lod::Chunk& chunk = chunks_.at(chunkId(draw.key));
+        for (size_t r = 0; r < draws_->meshDraws.size(); ++r) {
+            const render::MeshDraw& draw = draws_->meshDraws[r];
+            const lod::Chunk& chunk = chunks_.at(chunkId(draws_->triangles().keys[r]));
             for (uint32_t c = 0; c < draw.clusters; ++c) {
                 const shared::MeshCluster& cluster = chunk.clusters[draw.firstCluster + c];
                 meshBlocks_.push_back({chunk.vertices.data() + cluster.firstVertex,
@@ -258,8 +260,8 @@ class CpuBackend final : public render::Backend {
                                      static_cast<std::vector<LargeTriangle>*>(to)->push_back(t);
                                  }};
             for (size_t b = begin; b < end; ++b)
-                k_.rasterCluster(frame_, draws_->materials.data(), meshBlocks_[b], static_cast<uint32_t>(b * shared::kClusterTriangles), sink,
-                                 visibility());
+                k_.rasterCluster(frame_, draws_->materials.data(), meshBlocks_[b],
+                                 static_cast<uint32_t>(b * shared::kClusterTriangles), sink, visibility());
             if (!mine.empty()) found_.push(std::move(mine));
         });
         for (const auto& some : found_.takeAll()) large_.insert(large_.end(), some.begin(), some.end());
@@ -287,7 +289,7 @@ class CpuBackend final : public render::Backend {
                 size = pixels;
             }
         };
-        hasTriangles_ = !draws_->meshDraws.empty();
+        hasTriangles_ = !draws_->triangles().isEmpty();
         hasEmissive_ = false;
         for (const shared::SurfaceMaterial& m : draws_->materials)
             hasEmissive_ = hasEmissive_ || (hasTriangles_ && m.emissive.x + m.emissive.y + m.emissive.z > 0);

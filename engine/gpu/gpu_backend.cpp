@@ -161,10 +161,11 @@ class GpuBackend final : public render::Backend {
         }
         const uint64_t pixels = uint64_t{w} * h;
         STIPPLE_TRY(ensure(frameBuffer_, sizeof(shared::FrameConstants), kStorage, true, "frame constants"));
-        // Nodes and blocks of points, then those of strands.
-        STIPPLE_TRY(ensure(nodeBuffer_, (draws.nodes.size() + draws.strandNodes.size()) * sizeof(shared::DrawNode),
+        // Nodes and blocks of points, then those of curves.
+        const render::DrawBatch &points = draws.points(), &curves = draws.curves();
+        STIPPLE_TRY(ensure(nodeBuffer_, (points.nodes.size() + curves.nodes.size()) * sizeof(shared::DrawNode),
                            kStorage, true, "draw nodes"));
-        STIPPLE_TRY(ensure(blockBuffer_, (draws.blocks.size() + draws.strandBlocks.size()) * sizeof(shared::DrawBlock),
+        STIPPLE_TRY(ensure(blockBuffer_, (points.blocks.size() + curves.blocks.size()) * sizeof(shared::DrawBlock),
                            kStorage, true, "draw blocks"));
         STIPPLE_TRY(ensure(visibility_, pixels * 8, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "visibility"));
         STIPPLE_TRY(ensure(texels_, words * 4, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "texels"));
@@ -182,17 +183,17 @@ class GpuBackend final : public render::Backend {
             node.addressHigh = static_cast<uint32_t>(address >> 32);
             std::memcpy(nodes++, &node, sizeof(node));
         };
-        for (size_t i = 0; i < draws.nodes.size(); ++i) placeNode(draws.nodes[i], draws.keys[i]);
-        for (size_t i = 0; i < draws.strandNodes.size(); ++i) placeNode(draws.strandNodes[i], draws.strandKeys[i]);
+        for (const render::DrawBatch* batch : {&points, &curves})
+            for (size_t i = 0; i < batch->nodes.size(); ++i) placeNode(batch->nodes[i], batch->keys[i]);
         auto* blocks = static_cast<shared::DrawBlock*>(blockBuffer_.mapped());
-        if (!draws.blocks.empty())
-            std::memcpy(blocks, draws.blocks.data(), draws.blocks.size() * sizeof(shared::DrawBlock));
-        for (size_t i = 0; i < draws.strandBlocks.size(); ++i) {
-            shared::DrawBlock block = draws.strandBlocks[i];
-            block.node += static_cast<uint32_t>(draws.nodes.size());
-            std::memcpy(blocks + draws.blocks.size() + i, &block, sizeof(block));
+        if (!points.isEmpty())
+            std::memcpy(blocks, points.blocks.data(), points.blocks.size() * sizeof(shared::DrawBlock));
+        for (size_t i = 0; i < curves.blocks.size(); ++i) {
+            shared::DrawBlock block = curves.blocks[i];
+            block.node += static_cast<uint32_t>(points.nodes.size());
+            std::memcpy(blocks + points.blocks.size() + i, &block, sizeof(block));
         }
-        hasStrands_ = !draws.strandNodes.empty();
+        hasStrands_ = !curves.isEmpty();
         if (hasStrands_) {
             STIPPLE_TRY(pipelines_->addStrandPasses());
             STIPPLE_TRY(ensure(wide_, 4 + uint64_t{kWideCapacity} * 120, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
@@ -203,7 +204,7 @@ class GpuBackend final : public render::Backend {
             STIPPLE_TRY(ensure(discs_, 4 + uint64_t{shared::kDiscCapacity} * sizeof(shared::WideDisc),
                                kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "wide discs"));
         }
-        if (!draws.meshDraws.empty()) STIPPLE_TRY(prepareMeshes(draws, pixels));
+        if (!draws.triangles().isEmpty()) STIPPLE_TRY(prepareMeshes(draws, pixels));
         if (needsLightPass(draws)) STIPPLE_TRY(prepareLights(draws));
         if (descriptorsChanged_) {
             const auto bound = [&](const Buffer& b) { return b.bytes() > 0 ? &b : &stats_; };  // unused: anything
@@ -224,7 +225,7 @@ class GpuBackend final : public render::Backend {
     }
 
     static bool needsLightPass(const render::DrawList& draws) {
-        return !draws.meshDraws.empty() ||
+        return !draws.triangles().isEmpty() ||
                ((draws.frame.shade & shared::kShadeLit) != 0 && (!draws.lights.empty() || draws.environment));
     }
     Result<void> prepareLights(const render::DrawList& draws) {
@@ -325,7 +326,7 @@ class GpuBackend final : public render::Backend {
                 }
                 pipelines_->use(commands_, "project");
                 pushStep(0, hasPyramid, wantAll, hasDiscs ? 1 : 0);
-                const auto blocks = static_cast<uint32_t>(draws.blocks.size());
+                const auto blocks = static_cast<uint32_t>(draws.points().blocks.size());
                 if (blocks > 0)
                     vkCmdDispatch(commands_, std::min(blocks, kGroupsPerDimension),
                                   (blocks + kGroupsPerDimension - 1) / kGroupsPerDimension, 1);
@@ -345,7 +346,7 @@ class GpuBackend final : public render::Backend {
                 list.begin("wide list", {write(wide_)}, true);
                 vkCmdFillBuffer(commands_, wide_.handle(), 0, 4, 0);
                 list.end();
-                const auto blocks = static_cast<uint32_t>(draws.strandBlocks.size());
+                const auto blocks = static_cast<uint32_t>(draws.curves().blocks.size());
                 list.begin("strands", {write(visibility_), write(wide_)}, false);
                 pipelines_->use(commands_, "strands");
                 pushStep(0, hasPyramid, wantAll, blocks);
@@ -394,7 +395,7 @@ class GpuBackend final : public render::Backend {
                     pushStep(0, hasPyramid, wantAll);
                     dispatch(levels_[0].width, levels_[0].height);
                 }
-                if (draws.meshDraws.empty()) break;
+                if (draws.triangles().isEmpty()) break;
                 list.end();
                 list.begin("surface", {read(visibility_), write(texels_), write(surfaces_)}, false);
                 pipelines_->use(commands_, "surface");
@@ -428,12 +429,12 @@ class GpuBackend final : public render::Backend {
                 dispatch(levels_[0].width, levels_[0].height);
                 if (!needsLightPass(draws)) break;
                 list.end();
-                if (draws.meshDraws.empty())
+                if (draws.triangles().isEmpty())
                     list.begin("light", {read(texels_), write(image_), write(extra_)}, false);
                 else
                     list.begin("light", {read(texels_), read(surfaces_), write(image_), write(extra_)}, false);
                 pipelines_->use(commands_, "light");
-                pushStep(0, hasPyramid, wantAll, draws.meshDraws.empty() ? 0 : 1);
+                pushStep(0, hasPyramid, wantAll, draws.triangles().isEmpty() ? 0 : 1);
                 dispatch(levels_[0].width, levels_[0].height);
                 break;
         }

@@ -198,8 +198,8 @@ Result<void> draw(FrameState& state, const lod::View& view, const FrameSettings&
     markWideDiscs(*state.radii, state.draws);
     RenderRequest request;
     request.draws = &state.draws;
-    request.passes = passesOf(settings.mode, {!state.draws.nodes.empty(), !state.draws.meshDraws.empty(),
-                                              !state.draws.strandNodes.empty(), state.draws.hasWideDiscs});
+    request.passes = passesOf(settings.mode, {!state.draws.points().isEmpty(), !state.draws.triangles().isEmpty(),
+                                              !state.draws.curves().isEmpty(), state.draws.hasWideDiscs});
     request.wantDepthAndNormal = settings.wantDepthAndNormal;
     STIPPLE_TRY(state.backend->render(request, state.image));
 
@@ -221,7 +221,7 @@ Result<void> draw(FrameState& state, const lod::View& view, const FrameSettings&
     c.tauTargetPixels = state.cut.tauTarget;
     c.tauEffectivePixels = state.cut.tauEffective;
     c.passes = request.passes.size();
-    c.blocks = state.draws.blocks.size();
+    c.blocks = state.draws.points().blocks.size();
     c.bytesStreamed = stream.bytesStreamed;
     c.residentBytes = stream.residentBytes;
     c.requests = stream.requests;
