@@ -104,14 +104,6 @@ struct Hierarchy {
     bool isLoose() const { return isStrands || isProgressive; }
     bool isMesh() const { return !groups.empty(); }
     size_t chunks() const { return nodes.size() + tiles.size(); }
-    /// Bytes of a decoded chunk.
-    uint64_t decodedBytes(uint32_t node) const {
-        if (node >= nodes.size()) return uint64_t{shared::kTileEdge} * shared::kTileEdge * 4;
-        if (!isMesh()) return uint64_t{nodes[node].records} * (isStrands ? 32 : 16);
-        const MeshGroup& g = groups[node];
-        return uint64_t{g.vertices} * sizeof(shared::MeshVertex) + uint64_t{nodes[node].records} * 4 +
-               uint64_t{g.clusters} * sizeof(shared::MeshCluster);
-    }
 
     /// Records with a code > `code`.
     uint32_t countGreater(const CodeCounts& c, uint32_t records, uint32_t code) const {

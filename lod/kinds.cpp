@@ -63,7 +63,7 @@ Result<uint64_t> measureTriangles(const Store& store, uint32_t node, const Chunk
     return measureGroup(store, node, chunk);
 }
 
-constexpr std::array<KindTraits, 3> kKinds{
+constexpr std::array<KindTraits, kKinds> kTraits{
     KindTraits{"points", sizeof(shared::PointRecord), bytesOfRecords<shared::PointRecord>, parentOf, decodePoints,
                checkNode, measureErrors, recordsOfLeaf, costOfPoints, emitPoints},
     KindTraits{"curves", sizeof(shared::StrandSegment), bytesOfRecords<shared::StrandSegment>, parentOf, decodeCurves,
@@ -73,7 +73,7 @@ constexpr std::array<KindTraits, 3> kKinds{
 
 }  // namespace
 
-const KindTraits& traitsOf(Kind kind) { return kKinds.at(static_cast<size_t>(kind)); }
+const KindTraits& traitsOf(Kind kind) { return kTraits.at(static_cast<size_t>(kind)); }
 
 uint64_t decodedBytes(const Hierarchy& h, uint32_t chunk) {
     if (chunk >= h.nodes.size()) return uint64_t{shared::kTileEdge} * shared::kTileEdge * sizeof(uint32_t);

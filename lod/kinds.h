@@ -12,6 +12,7 @@
 namespace stipple::lod {
 
 enum class Kind : uint8_t { points, curves, triangles };
+inline constexpr size_t kKinds = 3;
 
 struct CutFrame;
 struct ActiveMembers;

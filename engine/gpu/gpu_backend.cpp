@@ -93,7 +93,7 @@ class GpuBackend final : public render::Backend {
                                   levels_,
                                   draws,
                                   mode,
-                                  draws.meshDraws.empty() ? 0 : static_cast<uint32_t>(meshFrame_.clusters.size()),
+                                  draws.triangles().isEmpty() ? 0 : static_cast<uint32_t>(meshFrame_.clusters.size()),
                                   request.wantDepthAndNormal,
                                   isLit};
         for (const render::Pass pass : request.passes) recordPass(recording, pass);
@@ -167,11 +167,12 @@ class GpuBackend final : public render::Backend {
         const uint64_t pixels = uint64_t{w} * h;
         STIPPLE_TRY(ensure(buffers_.frame, sizeof(shared::FrameConstants), kStorage, true, "frame constants"));
         // Nodes and blocks of points, then those of strands.
-        STIPPLE_TRY(ensure(buffers_.nodes, (draws.nodes.size() + draws.strandNodes.size()) * sizeof(shared::DrawNode),
+        STIPPLE_TRY(ensure(buffers_.nodes,
+                           (draws.points().nodes.size() + draws.curves().nodes.size()) * sizeof(shared::DrawNode),
                            kStorage, true, "draw nodes"));
         STIPPLE_TRY(ensure(buffers_.blocks,
-                           (draws.blocks.size() + draws.strandBlocks.size()) * sizeof(shared::DrawBlock), kStorage,
-                           true, "draw blocks"));
+                           (draws.points().blocks.size() + draws.curves().blocks.size()) * sizeof(shared::DrawBlock),
+                           kStorage, true, "draw blocks"));
         STIPPLE_TRY(
             ensure(buffers_.visibility, pixels * 8, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "visibility"));
         STIPPLE_TRY(ensure(buffers_.texels, words * 4, kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "texels"));
@@ -190,30 +191,32 @@ class GpuBackend final : public render::Backend {
             node.addressHigh = static_cast<uint32_t>(address >> 32);
             std::memcpy(nodes++, &node, sizeof(node));
         };
-        for (size_t i = 0; i < draws.nodes.size(); ++i) placeNode(draws.nodes[i], draws.keys[i]);
-        for (size_t i = 0; i < draws.strandNodes.size(); ++i) placeNode(draws.strandNodes[i], draws.strandKeys[i]);
+        for (size_t i = 0; i < draws.points().nodes.size(); ++i)
+            placeNode(draws.points().nodes[i], draws.points().keys[i]);
+        for (size_t i = 0; i < draws.curves().nodes.size(); ++i)
+            placeNode(draws.curves().nodes[i], draws.curves().keys[i]);
         auto* blocks = static_cast<shared::DrawBlock*>(buffers_.blocks.mapped());
-        if (!draws.blocks.empty())
-            std::memcpy(blocks, draws.blocks.data(), draws.blocks.size() * sizeof(shared::DrawBlock));
-        for (size_t i = 0; i < draws.strandBlocks.size(); ++i) {
-            shared::DrawBlock block = draws.strandBlocks[i];
-            block.node += static_cast<uint32_t>(draws.nodes.size());
-            std::memcpy(blocks + draws.blocks.size() + i, &block, sizeof(block));
+        if (!draws.points().blocks.empty())
+            std::memcpy(blocks, draws.points().blocks.data(), draws.points().blocks.size() * sizeof(shared::DrawBlock));
+        for (size_t i = 0; i < draws.curves().blocks.size(); ++i) {
+            shared::DrawBlock block = draws.curves().blocks[i];
+            block.node += static_cast<uint32_t>(draws.points().nodes.size());
+            std::memcpy(blocks + draws.points().blocks.size() + i, &block, sizeof(block));
         }
-        if (!draws.strandNodes.empty()) {
+        if (!draws.curves().isEmpty()) {
             STIPPLE_TRY(pipelines_->call(Pipelines::Set::curves));
             STIPPLE_TRY(ensure(buffers_.wide, 4 + uint64_t{kWideCapacity} * 120,
                                kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "wide strands"));
         }
         const bool hasDiscs = mode.hasPyramid && draws.hasWideDiscs;
-        const bool hasSplats = mode.fillsSplats && !draws.nodes.empty();
+        const bool hasSplats = mode.fillsSplats && !draws.points().isEmpty();
         if (hasDiscs) STIPPLE_TRY(pipelines_->call(Pipelines::Set::wideDiscs));
         if (hasSplats) STIPPLE_TRY(pipelines_->call(Pipelines::Set::splats));
         if (hasDiscs || hasSplats) {
             STIPPLE_TRY(ensure(buffers_.discs, 4 + uint64_t{shared::kDiscCapacity} * sizeof(shared::WideDisc),
                                kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "wide discs"));
         }
-        if (!draws.meshDraws.empty()) STIPPLE_TRY(prepareMeshes(draws, pixels));
+        if (!draws.triangles().isEmpty()) STIPPLE_TRY(prepareMeshes(draws, pixels));
         STIPPLE_TRY(pipelines_->call(isLit ? Pipelines::Set::light : Pipelines::Set::plain));
         if (isLit) STIPPLE_TRY(prepareLights(draws));
         if (descriptorsChanged_) {

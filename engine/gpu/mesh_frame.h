@@ -47,8 +47,9 @@ struct MeshFrame {
                 tiles.push_back({static_cast<uint32_t>(address), static_cast<uint32_t>(address >> 32)});
             }
         }
-        for (const render::MeshDraw& draw : draws.meshDraws) {
-            const MeshChunk& chunk = chunkOf(draw.key);
+        for (size_t r = 0; r < draws.meshDraws.size(); ++r) {
+            const render::MeshDraw& draw = draws.meshDraws[r];
+            const MeshChunk& chunk = chunkOf(draws.triangles().keys[r]);
             for (uint32_t c = draw.firstCluster; c < draw.firstCluster + draw.clusters; ++c) {
                 const shared::MeshCluster& cluster = chunk.clusters[c];
                 const uint64_t v = chunk.vertices + uint64_t{cluster.firstVertex} * sizeof(shared::MeshVertex),

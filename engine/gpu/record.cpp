@@ -18,7 +18,7 @@ void pushStep(const Recording& f, size_t level, uint32_t count) {
     const Level& coarse = f.levels[std::min(level + 1, f.levels.size() - 1)];
     f.pipelines.push(f.commands, {fine.offset, fine.width, fine.height, coarse.offset, coarse.width, coarse.height,
                                   static_cast<uint32_t>(level), f.wantAll, f.mode.hasPyramid && f.levels.size() > 1,
-                                  !f.draws.strandNodes.empty(), count});
+                                  !f.draws.curves().isEmpty(), count});
 }
 
 /// One thread a pixel of a level.
@@ -74,7 +74,7 @@ void project(const Recording& f) {
     if (hasDiscs) emptyList(f, "disc list", b.discs);
     const std::vector<BufferUse> uses =
         hasDiscs ? std::vector{write(b.visibility), write(b.discs)} : std::vector{write(b.visibility)};
-    overBlocks(f, "project", uses, f.draws.blocks.size(), hasDiscs ? 1 : 0);
+    overBlocks(f, "project", uses, f.draws.points().blocks.size(), hasDiscs ? 1 : 0);
 }
 
 void discs(const Recording& f) {
@@ -89,14 +89,14 @@ void discs(const Recording& f) {
 void splat(const Recording& f) {
     const FrameBuffers& b = f.buffers;
     emptyList(f, "disc list", b.discs);
-    overBlocks(f, "splat", {write(b.visibility), write(b.discs)}, f.draws.blocks.size(), 0);
+    overBlocks(f, "splat", {write(b.visibility), write(b.discs)}, f.draws.points().blocks.size(), 0);
     overBands(f, "discs", "discs", {write(b.visibility), read(b.discs)});
 }
 
 void curves(const Recording& f) {
     const FrameBuffers& b = f.buffers;
     emptyList(f, "wide list", b.wide);
-    const size_t blocks = f.draws.strandBlocks.size();
+    const size_t blocks = f.draws.curves().blocks.size();
     overBlocks(f, "strands", {write(b.visibility), write(b.wide)}, blocks, static_cast<uint32_t>(blocks));
     overBands(f, "wide strands", "strands_wide", {write(b.visibility), read(b.wide)});
 }
@@ -114,9 +114,9 @@ void resolve(const Recording& f) {
                f.mode.fillsSplats ? 1 : 0);
     if (f.mode.hasPyramid && f.draws.hasWideDiscs)
         overPixels(f, "disc texels", "disc_texels", {read(b.visibility), read(b.discs), write(b.texels)});
-    if (!f.draws.strandNodes.empty())
+    if (!f.draws.curves().isEmpty())
         overPixels(f, "strand texels", "strand_texels", {read(b.visibility), write(b.texels), write(b.stats)});
-    if (!f.draws.meshDraws.empty())
+    if (!f.draws.triangles().isEmpty())
         overPixels(f, "triangle texels", "triangle_texels",
                    {read(b.visibility), write(b.texels), write(b.triangleWords)});
 }
@@ -134,7 +134,7 @@ void push(const Recording& f) {
 
 void surface(const Recording& f) {
     const FrameBuffers& b = f.buffers;
-    const bool hasTriangles = !f.draws.meshDraws.empty();
+    const bool hasTriangles = !f.draws.triangles().isEmpty();
     std::vector<BufferUse> uses{read(b.texels), write(b.surface)};
     if (hasTriangles) uses.push_back(read(b.triangleWords));
     overPixels(f, "surface", "surface", uses, 0, hasTriangles ? 1 : 0);
@@ -143,7 +143,7 @@ void surface(const Recording& f) {
 void output(const Recording& f) {
     const FrameBuffers& b = f.buffers;
     std::vector<BufferUse> uses{read(b.surface), write(b.image), write(b.extra)};
-    if (f.isLit && !f.draws.meshDraws.empty()) uses.push_back(read(b.triangleWords));
+    if (f.isLit && !f.draws.triangles().isEmpty()) uses.push_back(read(b.triangleWords));
     overPixels(f, f.isLit ? "light+output" : "output", f.isLit ? "output_lit" : "output", uses);
 }
 

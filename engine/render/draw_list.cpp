@@ -85,13 +85,12 @@ void addMeshes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, DrawList&
                                         static_cast<uint32_t>(h.tiles.size())});
             last = draw.instance;
         }
-        out.meshDraws.push_back({static_cast<uint32_t>(out.meshes.size() - 1),
-                                 {instance.source, draw.node},
-                                 draw.firstCluster,
-                                 draw.clusters,
-                                 h.nodes[draw.node].level,
-                                 draw.errorPixels});
-        out.clusters += draw.clusters;
+        const auto run = static_cast<uint32_t>(out.meshDraws.size());
+        out.meshDraws.push_back({static_cast<uint32_t>(out.meshes.size() - 1), draw.firstCluster, draw.clusters,
+                                 group.level, draw.errorPixels});
+        DrawBatch& batch = out.of(lod::Kind::triangles);
+        batch.keys.push_back({instance.source, draw.node});
+        for (uint32_t c = 0; c < draw.clusters; ++c) batch.blocks.push_back({run, draw.firstCluster + c});
     }
 }
 
@@ -118,87 +117,71 @@ double nearestOf(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hie
     return nearest;
 }
 
-}  // namespace
-
-glm::vec3 linearBackground() {
-    const auto linear = [](uint8_t byte) { return shared::linearFromSrgb(static_cast<float>(byte) / 255.0f); };
-    return {linear(kBackground[0]), linear(kBackground[1]), linear(kBackground[2])};
-}
-
-FrameContent contentOf(const DrawList& draws) {
-    FrameContent content;
-    content.hasPoints = !draws.nodes.empty();
-    content.hasTriangles = !draws.meshDraws.empty();
-    content.hasStrands = !draws.strandNodes.empty();
-    content.hasWideDiscs = draws.hasWideDiscs;
-    const bool shows = content.hasPoints || content.hasTriangles || content.hasStrands;
-    content.isLit = shows && draws.frame.debugView == shared::kDebugNone &&
-                    (content.hasTriangles || (draws.frame.shade & shared::kShadeLit) != 0);
-    return content;
-}
-
-void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,
-                  std::span<const lod::Instance> instances, const lod::View& view, const DrawSettings& settings,
-                  DrawList& out) {
-    out.nodes.clear();
-    out.blocks.clear();
-    out.keys.clear();
+/// Keeps the memory.
+void clear(DrawList& out) {
+    for (size_t k = 0; k < lod::kKinds; ++k) {
+        out.batches.at(k).kind = static_cast<lod::Kind>(k);
+        out.batches.at(k).clear();
+    }
     out.meshes.clear();
     out.meshTextures.clear();
     out.meshDraws.clear();
-    out.strandNodes.clear();
-    out.strandBlocks.clear();
-    out.strandKeys.clear();
     out.lights.clear();
     out.bends.clear();
     out.swaying = 0;
-    out.clusters = 0;
-    out.view = view;
-    out.cut.assign(cut.draw.begin(), cut.draw.end());
-    out.meshCut.assign(cut.meshDraw.begin(), cut.meshDraw.end());
-    out.hierarchies = hierarchies;
-    out.instances = instances;
-    const glm::dmat3 cameraFromWorld = glm::transpose(glm::dmat3(view.right, view.down, view.forward));
+}
+
+/// A node of points or curves in camera space.
+shared::DrawNode makeDrawNode(const lod::CutDraw& draw, const Bend& bend, const glm::dmat3& cameraFromWorld,
+                              const DrawList& list) {
+    const lod::View& view = list.view;
+    const lod::Instance& instance = list.instances[draw.instance];
+    const lod::Hierarchy& h = *list.hierarchies[instance.hierarchy];
+    const lod::Node& node = h.nodes[draw.node];
+    // Composed in fp64 relative to the eye, rounded once (hard cases 1 and 2).
+    const double worldPerStep = instance.scale * h.unit * std::exp2(node.stepShift);
+    const glm::dmat3 axes = cameraFromWorld * instance.rotation;
+    const glm::dvec3 base =
+        cameraFromWorld * (instance.translation - view.eye +
+                           instance.rotation * (instance.scale * (h.origin + h.unit * h.recordOrigin(node))));
+    shared::DrawNode d{};
+    // Moved with the wind: one more linear map, in camera space.
+    const glm::dvec3 along = cameraFromWorld * bend.along, up = cameraFromWorld * bend.up;
+    const auto bent = [&](const glm::dvec3& axis) { return axis + along * (bend.slope * glm::dot(up, axis)); };
+    const double atEye = bend.slope * glm::dot(bend.up, view.eye) + bend.offset;
+    d.axisX = glm::vec3(bent(axes[0] * worldPerStep));
+    d.axisY = glm::vec3(bent(axes[1] * worldPerStep));
+    d.axisZ = glm::vec3(bent(axes[2] * worldPerStep));
+    d.base = glm::vec3(bent(base) + along * atEye);
+    d.edge = static_cast<float>(instance.scale * h.unit * h.cellSize(node)) * draw.radiusScale;
+    d.errorCode = draw.errorCode;
+    d.octantMask = draw.octantMask | (instance.rotation != glm::dmat3(1) || !bend.isStill() ? shared::kNodeTurned : 0u);
+    d.count = draw.count;
+    d.level = node.level;
+    d.errorPixels = draw.errorPixels;
+    return d;
+}
+
+void addNodes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, const DrawSettings& settings, DrawList& out) {
+    const bool isWindy = settings.wind.strength > 0;
+    const glm::dvec3 up = glm::normalize(settings.worldUp);
     for (const lod::CutDraw& draw : cut.draw) {
-        const lod::Instance& instance = instances[draw.instance];
-        const lod::Hierarchy& h = *hierarchies[instance.hierarchy];
-        const lod::Node& node = h.nodes[draw.node];
-        // Composed in fp64 relative to the eye, rounded once (hard cases 1 and 2).
-        const double worldPerStep = instance.scale * h.unit * std::exp2(node.stepShift);
-        const glm::dmat3 axes = cameraFromWorld * instance.rotation;
-        const glm::dvec3 base =
-            cameraFromWorld * (instance.translation - view.eye +
-                               instance.rotation * (instance.scale * (h.origin + h.unit * h.recordOrigin(node))));
-        shared::DrawNode d{};
-        const Bend bend = settings.wind.strength > 0
-                              ? bendOf(settings.wind, h, instance, draw.node, view, glm::normalize(settings.worldUp))
-                              : Bend{};
-        if (settings.wind.strength > 0) out.bends.push_back(bend);
+        const lod::Instance& instance = out.instances[draw.instance];
+        const lod::Hierarchy& h = *out.hierarchies[instance.hierarchy];
+        const Bend bend = isWindy ? bendOf(settings.wind, h, instance, draw.node, out.view, up) : Bend{};
+        if (isWindy) out.bends.push_back(bend);
         out.swaying += bend.isStill() ? 0 : 1;
-        // Moved with the wind: one more linear map, in camera space.
-        const glm::dvec3 along = cameraFromWorld * bend.along, up = cameraFromWorld * bend.up;
-        const auto bent = [&](const glm::dvec3& axis) { return axis + along * (bend.slope * glm::dot(up, axis)); };
-        const double atEye = bend.slope * glm::dot(bend.up, view.eye) + bend.offset;
-        d.axisX = glm::vec3(bent(axes[0] * worldPerStep));
-        d.axisY = glm::vec3(bent(axes[1] * worldPerStep));
-        d.axisZ = glm::vec3(bent(axes[2] * worldPerStep));
-        d.base = glm::vec3(bent(base) + along * atEye);
-        d.edge = static_cast<float>(instance.scale * h.unit * h.cellSize(node)) * draw.radiusScale;
-        d.errorCode = draw.errorCode;
-        d.octantMask =
-            draw.octantMask | (instance.rotation != glm::dmat3(1) || !bend.isStill() ? shared::kNodeTurned : 0u);
-        d.count = draw.count;
-        d.level = node.level;
-        d.errorPixels = draw.errorPixels;
-        auto& nodes = h.isStrands ? out.strandNodes : out.nodes;
-        auto& blocks = h.isStrands ? out.strandBlocks : out.blocks;
-        const auto index = static_cast<uint32_t>(nodes.size());
-        for (uint32_t first = 0; first < draw.count; first += shared::kRecordsPerBlock)
-            blocks.push_back({index, first});
-        nodes.push_back(d);
-        (h.isStrands ? out.strandKeys : out.keys).push_back({instance.source, draw.node});
+        DrawBatch& batch = out.of(lod::kindOf(h));
+        const auto index = static_cast<uint32_t>(batch.nodes.size());
+        for (uint32_t first = 0; first < draw.count; first += shared::kBlockLanes)
+            batch.blocks.push_back({index, first});
+        batch.nodes.push_back(makeDrawNode(draw, bend, cameraFromWorld, out));
+        batch.keys.push_back({instance.source, draw.node});
     }
-    addMeshes(cut, cameraFromWorld, out);
+}
+
+/// Where the eye is, and how records are drawn.
+void setView(const lod::Cut& cut, const lod::View& view, const DrawSettings& settings, DrawList& out) {
     shared::FrameConstants& f = out.frame;
     f.viewX = glm::vec3(view.right);
     f.viewY = glm::vec3(view.down);
@@ -208,7 +191,7 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     f.width = view.width;
     f.height = view.height;
     // Not below what fp32 can divide by.
-    const double nearest = nearestOf(cut, hierarchies, instances, view);
+    const double nearest = nearestOf(cut, out.hierarchies, out.instances, view);
     out.view.nearPlane = std::max({view.nearPlane, std::isfinite(nearest) ? nearest : 0.0, 1e-30});
     f.nearPlane = static_cast<float>(out.view.nearPlane);
     f.supportScale = settings.supportScale;
@@ -218,8 +201,13 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     f.shade = (settings.lit ? shared::kShadeLit : shared::kShadeUnlit) |
               (settings.unlitTriangles ? 0u : shared::kShadeTriangles);
     f.debugView = settings.debugView;
+    f.background = settings.background;
     // A sun over the viewer's left shoulder: every view of a scan is lit from where one looks.
     f.sunDirection = glm::normalize(glm::vec3(-0.45f, -0.55f, -0.7f));
+}
+
+void setLights(const lod::View& view, const glm::dmat3& cameraFromWorld, const DrawSettings& settings, DrawList& out) {
+    shared::FrameConstants& f = out.frame;
     f.skyDirection = glm::vec3(cameraFromWorld * settings.worldUp);
     constexpr double kPi = 3.14159265358979323846;
     constexpr float kAmbientBesideLights = 0.2f;
@@ -247,17 +235,57 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     f.environmentZ = glm::vec3(cameraFromWorld * back);
     f.lightCount = static_cast<uint32_t>(out.lights.size());
     f.ambient = out.lights.empty() || settings.environment ? 1.0f : kAmbientBesideLights;
-    f.background = settings.background;
+}
+
+void setBlocks(DrawList& out) {
+    shared::FrameConstants& f = out.frame;
     // Blocks by kind (visibility.h): what is equally deep goes to points, then curves, then triangles.
     static_assert(shared::kRecordsPerBlock == shared::kBlockLanes && shared::kSegmentsPerBlock == shared::kBlockLanes &&
                   shared::kClusterTriangles == shared::kBlockLanes);
-    const size_t points = out.blocks.size(), curves = out.strandBlocks.size();
-    STIPPLE_CHECK(2 * points + curves + out.clusters < shared::kMostBlocks &&
-                      std::max({points, curves, size_t{out.clusters}}) < shared::kMostBlocksOfKind,
+    const size_t points = out.points().blocks.size(), curves = out.curves().blocks.size(),
+                 triangles = out.triangles().blocks.size();
+    STIPPLE_CHECK(2 * points + curves + triangles < shared::kMostBlocks &&
+                      std::max({points, curves, triangles}) < shared::kMostBlocksOfKind,
                   "blocks of a frame");
     f.firstBlock.curves = static_cast<uint32_t>(points);
     f.firstBlock.triangles = f.firstBlock.curves + static_cast<uint32_t>(curves);
-    f.firstBlock.discs = f.firstBlock.triangles + out.clusters;
+    f.firstBlock.discs = f.firstBlock.triangles + static_cast<uint32_t>(triangles);
+}
+
+}  // namespace
+
+glm::vec3 linearBackground() {
+    const auto linear = [](uint8_t byte) { return shared::linearFromSrgb(static_cast<float>(byte) / 255.0f); };
+    return {linear(kBackground[0]), linear(kBackground[1]), linear(kBackground[2])};
+}
+
+FrameContent contentOf(const DrawList& draws) {
+    FrameContent content;
+    content.hasPoints = !draws.points().isEmpty();
+    content.hasTriangles = !draws.triangles().isEmpty();
+    content.hasStrands = !draws.curves().isEmpty();
+    content.hasWideDiscs = draws.hasWideDiscs;
+    const bool shows = content.hasPoints || content.hasTriangles || content.hasStrands;
+    content.isLit = shows && draws.frame.debugView == shared::kDebugNone &&
+                    (content.hasTriangles || (draws.frame.shade & shared::kShadeLit) != 0);
+    return content;
+}
+
+void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,
+                  std::span<const lod::Instance> instances, const lod::View& view, const DrawSettings& settings,
+                  DrawList& out) {
+    clear(out);
+    out.view = view;
+    out.cut.assign(cut.draw.begin(), cut.draw.end());
+    out.meshCut.assign(cut.meshDraw.begin(), cut.meshDraw.end());
+    out.hierarchies = hierarchies;
+    out.instances = instances;
+    const glm::dmat3 cameraFromWorld = glm::transpose(glm::dmat3(view.right, view.down, view.forward));
+    addNodes(cut, cameraFromWorld, settings, out);
+    addMeshes(cut, cameraFromWorld, out);
+    setView(cut, view, settings, out);
+    setLights(view, cameraFromWorld, settings, out);
+    setBlocks(out);
 }
 
 }  // namespace stipple::render

@@ -1,4 +1,5 @@
-// From a cut to what the passes read: one DrawNode per node, one DrawBlock per 256 records, frame constants. The only
+// From a cut to what the passes read: a batch per kind of primitive (one DrawNode per node, one DrawBlock per 256
+// records), frame constants. The only
 // place where world-sized numbers (fp64) become camera-space fp32.
 #pragma once
 
@@ -11,6 +12,7 @@
 #include "engine/render/reconstructions/table.h"
 #include "engine/render/wind.h"
 #include "lod/cut.h"
+#include "lod/kinds.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
 #include "shaders/shared/mesh.h"
@@ -28,10 +30,24 @@ struct WorldLight {
     float range = 0, innerCone = 0, outerCone = 0.785f;
 };
 
-/// Clusters of one chunk of a mesh; each is one block of 256 draw ids.
+/// What is drawn of one kind of primitive: nodes, their records in blocks of 256 draw ids, and the chunks that hold
+/// them.
+struct DrawBatch {
+    lod::Kind kind = lod::Kind::points;
+    std::vector<shared::DrawNode> nodes;    ///< of triangles none: DrawList::meshDraws
+    std::vector<shared::DrawBlock> blocks;  ///< of triangles one a cluster: its run and place in the chunk
+    std::vector<streaming::ChunkKey> keys;  ///< chunk of each node (run)
+    bool isEmpty() const { return blocks.empty(); }
+    void clear() {
+        nodes.clear();
+        blocks.clear();
+        keys.clear();
+    }
+};
+
+/// Clusters of one chunk of a mesh, as many blocks of the batch of triangles.
 struct MeshDraw {
     uint32_t mesh = 0;  ///< of DrawList::meshes
-    streaming::ChunkKey key;
     uint32_t firstCluster = 0, clusters = 0;
     uint32_t level = 0;
     float errorPixels = 0;
@@ -45,19 +61,18 @@ struct MeshTextures {
 
 struct DrawList {
     shared::FrameConstants frame{};
-    std::vector<shared::DrawNode> nodes;
-    std::vector<shared::DrawBlock> blocks;
-    std::vector<streaming::ChunkKey> keys;   ///< chunk of each node
-    bool hasWideDiscs = false;               ///< some of `nodes` may hold some (kNodeWide)
+    std::array<DrawBatch, lod::kKinds> batches;  ///< by kind
+    DrawBatch& of(lod::Kind kind) { return batches.at(static_cast<size_t>(kind)); }
+    const DrawBatch& of(lod::Kind kind) const { return batches.at(static_cast<size_t>(kind)); }
+    const DrawBatch& points() const { return of(lod::Kind::points); }
+    const DrawBatch& curves() const { return of(lod::Kind::curves); }
+    const DrawBatch& triangles() const { return of(lod::Kind::triangles); }
+    bool hasWideDiscs = false;               ///< some nodes of points may hold some (kNodeWide)
     std::vector<shared::DrawMesh> meshes;    ///< instances of mesh stores that are in view
     std::vector<MeshTextures> meshTextures;  ///< of each of `meshes`
-    std::vector<shared::DrawNode> strandNodes;
-    std::vector<shared::DrawBlock> strandBlocks;  ///< kSegmentsPerBlock segments each
-    std::vector<streaming::ChunkKey> strandKeys;  ///< chunk of each of strandNodes
-    std::vector<MeshDraw> meshDraws;
+    std::vector<MeshDraw> meshDraws;  ///< runs of clusters: what blocks and keys of the batch of triangles belong to
     std::vector<shared::LightSource> lights;
     std::shared_ptr<const Environment> environment;  ///< null: a sky without features
-    uint32_t clusters = 0;                           ///< of all mesh draws
     uint64_t swaying = 0;                            ///< nodes that wind moves
     std::span<const shared::SurfaceMaterial> materials;
     // What the fp32 numbers above were made from: the reference starts from these.

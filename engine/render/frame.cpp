@@ -182,7 +182,7 @@ Result<void> draw(FrameState& state, const lod::View& view, const FrameSettings&
     c.tauTargetPixels = state.cut.tauTarget;
     c.tauEffectivePixels = state.cut.tauEffective;
     c.passes = request.passes.size();
-    c.blocks = state.draws.blocks.size();
+    c.blocks = state.draws.points().blocks.size();
     c.bytesStreamed = stream.bytesStreamed;
     c.residentBytes = stream.residentBytes;
     c.requests = stream.requests;

@@ -29,11 +29,12 @@ void markWideDiscs(const GreatestRadii& radii, DrawList& draws) {
     const shared::FrameConstants& f = draws.frame;
     const double perFocal = double{shared::wideRadius(f.width, f.height)} / double{f.focal};
     draws.hasWideDiscs = false;
-    for (size_t i = 0; i < draws.nodes.size(); ++i) {
-        shared::DrawNode& d = draws.nodes[i];
+    DrawBatch& points = draws.of(lod::Kind::points);
+    for (size_t i = 0; i < points.nodes.size(); ++i) {
+        shared::DrawNode& d = points.nodes[i];
         const auto least = [](float step) { return 65536 * std::min(0.0, double{step}); };
         const double nearest = double{d.base.z} + least(d.axisX.z) + least(d.axisY.z) + least(d.axisZ.z);
-        const double radius = 1.01 * double{d.edge} * double{f.supportScale * radii.shareOf(draws.keys[i])};  // (fp32)
+        const double radius = 1.01 * double{d.edge} * double{f.supportScale * radii.shareOf(points.keys[i])};  // (fp32)
         if (!(radius > perFocal * nearest)) continue;
         d.octantMask |= shared::kNodeWide;
         draws.hasWideDiscs = true;

@@ -13,57 +13,11 @@
 #include "engine/base/hash.h"
 #include "tests/support/crafted_store.h"
 #include "tests/support/planes.h"
+#include "tests/support/store_hash.h"
 #include "tests/support/support.h"
 
 namespace stipple::test {
 namespace {
-
-template <typename T>
-void add(uint64_t& hash, const std::vector<T>& values) {
-    const uint64_t count = values.size();
-    hash = hashBytes(&count, sizeof(count), hash);
-    hash = hashBytes(values.data(), values.size() * sizeof(T), hash);
-}
-
-template <typename... T>
-void addFields(uint64_t& hash, const T&... fields) {
-    ((hash = hashBytes(&fields, sizeof(fields), hash)), ...);
-}
-
-/// Of every chunk and every attribute stream, in the order of the nodes.
-uint64_t hashRecords(const lod::Store& store) {
-    uint64_t hash = 0;
-    const lod::Hierarchy& h = store.hierarchy;
-    for (uint32_t i = 0; i < h.chunks(); ++i) {
-        const auto chunk = lod::readChunk(store, i, true);
-        if (!chunk) throw std::runtime_error(chunk.error().line());
-        add(hash, chunk->records);
-        add(hash, chunk->lowBits);
-        add(hash, chunk->vertices);
-        add(hash, chunk->triangles);
-        add(hash, chunk->clusters);
-        add(hash, chunk->segments);
-        add(hash, chunk->texels);
-        if (i >= h.nodes.size() || h.nodes[i].attributeBytes == 0) continue;
-        for (size_t k = 0; k < store.description.attributes.size(); ++k) {
-            const auto values = lod::readAttribute(store, i, k);
-            if (!values) throw std::runtime_error(values.error().line());
-            add(hash, *values);
-        }
-    }
-    return hash;
-}
-
-/// Of what the cut reads of the nodes: spheres, errors, counts, places; not where chunks lie in the file.
-uint64_t hashTable(const lod::Store& store) {
-    const lod::Hierarchy& h = store.hierarchy;
-    uint64_t hash = 0;
-    addFields(hash, h.origin, h.unit, h.rootLog2, h.errors.smallest);
-    for (const lod::Node& n : h.nodes)
-        addFields(hash, n.centre, n.radius, n.parent, n.firstChild, n.records, n.cell, n.level, n.childMask,
-                  n.errorCode, n.stepShift, n.normalCone, n.normalConeCosine);
-    return hash;
-}
 
 void hashStore(const std::string& path) {
     const auto store = lod::openStore(path);

@@ -99,11 +99,11 @@ TEST_F(Errors, EqualCutsGiveEqualIdsWhateverElseIsResident) {
     ASSERT_TRUE(render::renderUntilComplete(*used, view, coarse, *executor_));
     ASSERT_TRUE(render::renderUntilComplete(*fresh, view, coarse, *executor_));
     ASSERT_NE(fresh->counters.residentBytes, used->counters.residentBytes) << "the residency must differ";
-    ASSERT_EQ(fresh->draws.blocks.size(), used->draws.blocks.size());
-    for (size_t b = 0; b < fresh->draws.blocks.size(); ++b) {
-        ASSERT_EQ(fresh->draws.blocks[b].first, used->draws.blocks[b].first);
-        ASSERT_EQ(fresh->draws.keys[fresh->draws.blocks[b].node].node,
-                  used->draws.keys[used->draws.blocks[b].node].node);
+    ASSERT_EQ(fresh->draws.points().blocks.size(), used->draws.points().blocks.size());
+    for (size_t b = 0; b < fresh->draws.points().blocks.size(); ++b) {
+        ASSERT_EQ(fresh->draws.points().blocks[b].first, used->draws.points().blocks[b].first);
+        ASSERT_EQ(fresh->draws.points().keys[fresh->draws.points().blocks[b].node].node,
+                  used->draws.points().keys[used->draws.points().blocks[b].node].node);
     }
     EXPECT_TRUE(fresh->image.rgba == used->image.rgba);
     fresh->streamer.reset();  // hands its chunks back before the backend goes

@@ -9,6 +9,7 @@
 
 #include "engine/cpu/cpu_backend.h"
 #include "engine/scene/camera.h"
+#include "lod/cut_frame.h"
 #include "tests/support/forests.h"
 #include "tests/support/meshes.h"
 #include "tests/support/support.h"
@@ -144,6 +145,56 @@ TEST(CutMemory, QuestionsAboutCostsAreNotCounted) {
         ASSERT_EQ(with.counters.nodesCulled, without.counters.nodesCulled);
     }
     EXPECT_GT(drawn, 3u);
+}
+
+// Budgets are met by counting before anything is emitted: what is counted is what is drawn then, and to count, at
+// whatever step, changes nothing of it.
+TEST(CutMemory, WhatIsCountedIsWhatIsDrawn) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    test::writePly(folder / "a.ply", test::bumpySphere(20'000, 1));
+    const auto points = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    test::MeshRecipe recipe;
+    recipe.grow.kind = "terrain";
+    recipe.grow.triangles = 20'000;
+    const auto mesh = test::growMeshStore(recipe, folder / "b.stipple", *executor);
+    const test::Forest forest = test::plantForest(folder.path(), 4, *executor);
+    Rng rng(9);
+    size_t partly = 0;
+    for (const lod::Store* store : {points.get(), mesh.get(), forest.strands.get(), forest.afar.get()}) {
+        const lod::Hierarchy& h = store->hierarchy;
+        const std::vector<const lod::Hierarchy*> hierarchies{&h};
+        const std::vector<lod::Instance> instances(1);
+        const lod::CutScene scene{hierarchies, instances, {}};
+        for (const lod::View& view : viewsOf(h.origin + h.unit * h.nodes[0].centre, h.unit * h.nodes[0].radius)) {
+            std::vector<std::vector<uint8_t>> drawable{std::vector<uint8_t>(h.chunks(), 1)};
+            const bool isWhole = rng.below(3) == 0;
+            for (uint8_t& d : drawable[0]) d = isWhole || rng.below(3) > 0 ? 1 : 0;
+            const lod::Residency residency{drawable};
+            lod::CutScratch scratch;
+            lod::Cut cut;
+            lod::selectCut(scene, residency, view, {1, kNoLimit}, scratch, cut);  // tau = 1: step 0
+            const uint64_t drawn = cut.counters.recordsDrawn + cut.counters.trianglesDrawn;
+            const lod::CutFrame frame{scene, residency, view, scratch};
+            const lod::KindTraits& kind = lod::traitsOf(h);
+            const auto cost = [&](int step, lod::Counted counted) {
+                return kind.cutCost(frame, 0, step, kNoLimit, counted, nullptr);
+            };
+            for (const int step : {-64, 100, 0}) {
+                (void)cost(step, lod::Counted::all);
+                (void)cost(step, lod::Counted::drawable);
+            }
+            ASSERT_EQ(cost(0, lod::Counted::drawable).records, drawn) << kind.name;
+            if (cost(0, lod::Counted::all).isWhole) ASSERT_EQ(cost(0, lod::Counted::all).records, drawn) << kind.name;
+            partly += cost(0, lod::Counted::all).isWhole ? 0 : 1;
+            lod::Cut again;
+            lod::ActiveMembers members{scratch.members};
+            kind.cutEmit(frame, 0, 0, members, again);
+            ASSERT_EQ(again.draw.size() + again.meshDraw.size(), cut.draw.size() + cut.meshDraw.size());
+            ASSERT_EQ(again.counters.recordsDrawn + again.counters.trianglesDrawn, drawn);
+        }
+    }
+    EXPECT_GT(partly, 40u);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "engine/cpu/cpu_backend.h"
+#include "lod/kinds.h"
 #include "lod/resident.h"
 #include "tests/support/meshes.h"
 #include "tests/support/strands.h"
@@ -51,7 +52,7 @@ class Resident : public testing::Test {
     }
     uint64_t bytesOf(const lod::Store& store) const {
         uint64_t sum = 0;
-        for (uint32_t n = 0; n < store.hierarchy.chunks(); ++n) sum += store.hierarchy.decodedBytes(n);
+        for (uint32_t n = 0; n < store.hierarchy.chunks(); ++n) sum += lod::decodedBytes(store.hierarchy, n);
         return sum;
     }
     static lod::View turned(const lod::View& view, double angle) {
@@ -158,7 +159,7 @@ TEST_F(Resident, ThePlanIsFullAndHangsTogether) {
             const auto budget = static_cast<uint64_t>(share * static_cast<double>(bytesOf(*store)));
             lod::planResident({hierarchies, instances, {}}, view, {0.25}, budget, {}, scratch, cut, plan);
             uint64_t bytes = 0;
-            for (uint32_t n = 0; n < h.chunks(); ++n) bytes += has(n) ? h.decodedBytes(n) : 0;
+            for (uint32_t n = 0; n < h.chunks(); ++n) bytes += has(n) ? lod::decodedBytes(h, n) : 0;
             EXPECT_EQ(bytes, plan.bytes);
             EXPECT_LE(bytes, budget);
             EXPECT_GT(plan.refused, 0u);
@@ -176,7 +177,7 @@ TEST_F(Resident, ThePlanIsFullAndHangsTogether) {
                 if (has(n))
                     EXPECT_TRUE(isReached) << "a chunk that nothing leads to";
                 else if (isReached && wanted.count(n) > 0)
-                    EXPECT_GT(plan.bytes + h.decodedBytes(n), budget) << "there is room for " << n;
+                    EXPECT_GT(plan.bytes + lod::decodedBytes(h, n), budget) << "there is room for " << n;
             }
         }
     }

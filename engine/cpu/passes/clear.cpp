@@ -26,17 +26,17 @@ void resize(Frame& frame) {
 
 void clear(Frame& frame) {
     resize(frame);
-    frame.blocks.resize(frame.draws->blocks.size());
+    frame.blocks.resize(frame.draws->points().blocks.size());
     for (size_t b = 0; b < frame.blocks.size(); ++b) {
-        const shared::DrawBlock& block = frame.draws->blocks[b];
-        frame.blocks[b] = {frame.chunks.at(frame.draws->keys[block.node]).records.data() + block.first,
-                           &frame.draws->nodes[block.node]};
+        const shared::DrawBlock& block = frame.draws->points().blocks[b];
+        frame.blocks[b] = {frame.chunks.at(frame.draws->points().keys[block.node]).records.data() + block.first,
+                           &frame.draws->points().nodes[block.node]};
     }
     frame.strandBlocks.clear();
-    for (const shared::DrawBlock& block : frame.draws->strandBlocks)
+    for (const shared::DrawBlock& block : frame.draws->curves().blocks)
         frame.strandBlocks.push_back(
-            {frame.chunks.at(frame.draws->strandKeys[block.node]).segments.data() + block.first,
-             &frame.draws->strandNodes[block.node]});
+            {frame.chunks.at(frame.draws->curves().keys[block.node]).segments.data() + block.first,
+             &frame.draws->curves().nodes[block.node]});
     frame.hasStrands = !frame.strandBlocks.empty();
 }
 

@@ -11,7 +11,7 @@ void drawCurves(Frame& frame) {
         const WideSink sink{
             &mine, [](void* to, const WideStrand& s) { static_cast<std::vector<WideStrand>*>(to)->push_back(s); }};
         for (size_t b = begin; b < end; ++b) {
-            const uint32_t left = frame.strandBlocks[b].node->count - frame.draws->strandBlocks[b].first;
+            const uint32_t left = frame.strandBlocks[b].node->count - frame.draws->curves().blocks[b].first;
             frame.k.drawSegments(frame.constants, frame.strandBlocks[b], std::min(left, shared::kSegmentsPerBlock),
                                  static_cast<uint32_t>(b * shared::kSegmentsPerBlock), sink, frame.visible());
         }

@@ -25,19 +25,20 @@ bool isWithin(const shared::FrameConstants& f, const shared::DrawNode& node) {
 }  // namespace
 
 void project(Frame& frame) {
-    std::vector<uint8_t> besideToo(frame.draws->nodes.size());  // of each node
+    std::vector<uint8_t> besideToo(frame.draws->points().nodes.size());  // of each node
     CompletionQueue<std::vector<shared::WideDisc>> found;
     for (size_t n = 0; n < besideToo.size(); ++n)
-        besideToo[n] = frame.mode->hasPyramid && ((frame.draws->nodes[n].octantMask & shared::kNodeWide) != 0 ||
-                                                  !isWithin(frame.constants, frame.draws->nodes[n]));
+        besideToo[n] =
+            frame.mode->hasPyramid && ((frame.draws->points().nodes[n].octantMask & shared::kNodeWide) != 0 ||
+                                       !isWithin(frame.constants, frame.draws->points().nodes[n]));
     frame.executor.parallelFor(frame.blocks.size(), 32, [&](size_t begin, size_t end) {
         alignas(64) std::array<uint32_t, shared::kRecordsPerBlock> pixel, depth;
         std::vector<shared::WideDisc> mine;
         for (size_t b = begin; b < end; ++b) {
             const uint32_t count =
-                std::min(shared::kRecordsPerBlock, frame.blocks[b].node->count - frame.draws->blocks[b].first);
+                std::min(shared::kRecordsPerBlock, frame.blocks[b].node->count - frame.draws->points().blocks[b].first);
             frame.k.projectBlock(frame.constants, *frame.blocks[b].node, frame.blocks[b].records, count,
-                                 besideToo[frame.draws->blocks[b].node] != 0, pixel.data(), depth.data());
+                                 besideToo[frame.draws->points().blocks[b].node] != 0, pixel.data(), depth.data());
             constexpr uint32_t kAhead = 48;  // the pixels are scattered over 16 MB: ask for them in time
             for (uint32_t i = 0; i < count; ++i) {
                 if (i + kAhead < count && pixel[i + kAhead] < kWidePixel)

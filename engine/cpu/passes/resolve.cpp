@@ -14,7 +14,7 @@ void preparePlanes(Frame& frame, size_t pixels) {
             size = pixels;
         }
     };
-    frame.hasTriangles = !frame.draws->meshDraws.empty();
+    frame.hasTriangles = !frame.draws->triangles().isEmpty();
     frame.hasEmissive = false;
     for (const shared::SurfaceMaterial& m : frame.draws->materials)
         frame.hasEmissive = frame.hasEmissive || (frame.hasTriangles && m.emissive.x + m.emissive.y + m.emissive.z > 0);

@@ -31,7 +31,7 @@ class TileLists {
                 for (size_t b = first; b < last; ++b) {
                     const BlockSource& block = frame_.blocks[b];
                     const uint32_t count =
-                        std::min(shared::kRecordsPerBlock, block.node->count - frame_.draws->blocks[b].first);
+                        std::min(shared::kRecordsPerBlock, block.node->count - frame_.draws->points().blocks[b].first);
                     frame_.k.placeSplats(frame_.constants, *block.node, block.records, count, placed);
                     keep(placed, count, c, static_cast<uint32_t>(b * shared::kRecordsPerBlock));
                 }

@@ -16,8 +16,9 @@ void rasterise(Frame& frame) {
         frame.textureSets.push_back(
             {t.infos.data(), t.tiles > 0 ? frame.chunks.tiles[t.source].data() + t.firstChunk : nullptr});
     }
-    for (const render::MeshDraw& draw : frame.draws->meshDraws) {
-        const lod::Chunk& chunk = frame.chunks.at(draw.key);
+    for (size_t r = 0; r < frame.draws->meshDraws.size(); ++r) {
+        const render::MeshDraw& draw = frame.draws->meshDraws[r];
+        const lod::Chunk& chunk = frame.chunks.at(frame.draws->triangles().keys[r]);
         for (uint32_t c = 0; c < draw.clusters; ++c) {
             const shared::MeshCluster& cluster = chunk.clusters[draw.firstCluster + c];
             frame.meshBlocks.push_back({chunk.vertices.data() + cluster.firstVertex,

@@ -1,0 +1,70 @@
+// Stores of the versions that this program reads, kept as bytes: they still open, are still true, and hold what they
+// held when they were written. (tests/golden/stores; the number in a name is the version.)
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <set>
+
+#include "lod/kinds.h"
+#include "lod/store_layout.h"
+#include "tests/support/store_hash.h"
+#include "tests/support/support.h"
+
+namespace stipple::lod {
+namespace {
+
+struct Golden {
+    const char* name;
+    uint32_t version;
+    Kind kind;
+    size_t nodes;
+    uint64_t records, table;  ///< hashes of what is decoded
+};
+constexpr std::array<Golden, 5> kGoldens{
+    {{"points", 6, Kind::points, 11, 0x5303292940de763c, 0x20af3ef2c3f273ac},
+     {"progressive", 6, Kind::points, 1, 0xa8c37fef9aee0c9f, 0x17357675d06252b0},
+     {"curves", 6, Kind::curves, 29, 0xb99341d7983e2135, 0xf4bf98ee1b06cb81},
+     {"triangles", 6, Kind::triangles, 4, 0xf237df112dffc251, 0xeddcb2f2903bb5dd},
+     {"triangles", 7, Kind::triangles, 4, 0x5717fdad8f22f3ff, 0x20867ccfa0f04b85}}};
+
+std::string pathOf(const Golden& g) {
+    return std::string(STIPPLE_SOURCE_DIR) + "/tests/golden/stores/" + g.name + "_" + std::to_string(g.version) +
+           ".stipple";
+}
+
+TEST(StoreVersions, OldBytesOpenAndHoldWhatTheyHeld) {
+    const auto executor = makeSerialExecutor();
+    std::set<uint32_t> versions;
+    for (const Golden& g : kGoldens) {
+        SCOPED_TRACE(pathOf(g));
+        const std::string bytes = test::slurp(pathOf(g));
+        layout::Head head{};
+        ASSERT_GT(bytes.size(), sizeof(head));
+        std::memcpy(&head, bytes.data(), sizeof(head));
+        ASSERT_EQ(head.version, g.version);
+        versions.insert(head.version);
+        const auto store = openStore(pathOf(g));
+        ASSERT_TRUE(store) << store.error().line();
+        EXPECT_EQ(kindOf(store->hierarchy), g.kind);
+        EXPECT_EQ(store->hierarchy.nodes.size(), g.nodes);
+        EXPECT_EQ(test::hashRecords(*store), g.records);
+        EXPECT_EQ(test::hashTable(*store), g.table);
+        const auto report = verifyStore(*store, *executor);
+        EXPECT_TRUE(report) << report.error().line();
+    }
+    // A new version comes with its own bytes.
+    EXPECT_EQ(versions, (std::set<uint32_t>{kStoreVersion, kWideMeshVersion}));
+}
+
+// Negative control: the hashes see one changed record.
+TEST(StoreVersions, TheHashesSeeAChange) {
+    const auto a = openStore(pathOf(kGoldens[0])), b = openStore(pathOf(kGoldens[1]));
+    ASSERT_TRUE(a && b);
+    EXPECT_NE(test::hashRecords(*a), test::hashRecords(*b));
+    Store changed = *a;
+    changed.hierarchy.nodes[0].radius = std::nextafter(changed.hierarchy.nodes[0].radius, 1e9);
+    EXPECT_NE(test::hashTable(changed), test::hashTable(*a));
+}
+
+}  // namespace
+}  // namespace stipple::lod
