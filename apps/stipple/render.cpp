@@ -274,7 +274,7 @@ Result<void> run(const Options& o, Written& written) {
         STIPPLE_TRY(image::writePicture(o.output, state->image, o.alpha));
     }
     tell(o, *state, verdict, timings, size, shot.views.size());
-    if (!o.quiet && o.budget > 0) sayIfUseless(plan, settings, *state, verdict);
+    if (o.budget > 0) sayIfUseless(plan, settings, *state, verdict);
     return checkVerdict(plan, verdict);
 }
 

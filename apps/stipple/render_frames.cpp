@@ -163,7 +163,7 @@ Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& sett
 }
 
 void sayIfUseless(const FramesPlan& plan, const render::FrameSettings& settings, const render::FrameState& state,
-                  const Verdict& verdict) {
+                  Verdict& verdict) {
     constexpr double kShare = 1.0 / 16;  // of the picture's shorter side
     const lod::View& view = plan.views[verdict.worst];
     const double error = verdict.tauEffectivePixels;
@@ -175,12 +175,12 @@ void sayIfUseless(const FramesPlan& plan, const render::FrameSettings& settings,
     lod::CutScratch scratch;
     lod::Cut cut;
     lod::selectCut(state.scene(), {all}, view, {settings.budgets.errorPixels}, scratch, cut);
-    fmt::print(
-        stderr,
-        "note: --budget-points {} leaves {}, with which the picture shows little; {} would bring it to {:g} px\n",
-        settings.budgets.records,
-        std::isfinite(error) ? fmt::format("an error of {:.0f} px", error) : std::string("no stated error"),
-        counted(cut.counters.recordsDrawn + cut.counters.trianglesDrawn, "record"), settings.budgets.errorPixels);
+    verdict.recordsWanted = cut.counters.recordsDrawn + cut.counters.trianglesDrawn;
+    if (plan.quiet || !std::isfinite(error)) return;  // (the latter is an error, which says it)
+    fmt::print(stderr,
+               "note: --budget-points {} leaves an error of {:.0f} px, with which the picture shows little; {} would "
+               "bring it to {:g} px\n",
+               settings.budgets.records, error, counted(verdict.recordsWanted, "record"), settings.budgets.errorPixels);
 }
 
 Result<void> checkVerdict(const FramesPlan& plan, const Verdict& verdict) {
@@ -189,7 +189,9 @@ Result<void> checkVerdict(const FramesPlan& plan, const Verdict& verdict) {
         return fail(ErrorKind::budget,
                     "the picture is written, but holds only a part of the scene: its coarsest level has more records "
                     "than --budget-points allows",
-                    plan.output, "give more; --no-wait permits it");
+                    plan.output,
+                    fmt::format("give more: {} would bring it to the error asked for; --no-wait permits it",
+                                counted(verdict.recordsWanted, "record")));
     if (verdict.isComplete()) return {};
     const MissingChunks& missing = verdict.missing;
     Error error{ErrorKind::budget, "", plan.output, ""};

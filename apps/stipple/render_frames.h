@@ -44,7 +44,8 @@ struct Verdict {
     bool isTruncated = false;       ///< of one even the coarsest level exceeds the budget
     double tauEffectivePixels = 0;  ///< of the worst, as all that follows; infinite where records are left out
     MissingChunks missing;
-    render::LotShares lots;  ///< what the error does not speak of
+    render::LotShares lots;      ///< what the error does not speak of
+    uint64_t recordsWanted = 0;  ///< by the error asked for; 0: not looked for
     bool isComplete() const { return incomplete == 0 && !isTruncated; }
     /// `view`: of the lots; null: they are not wanted.
     void judge(const render::FrameState& state, const lod::View* view);
@@ -62,9 +63,9 @@ std::string numbered(const std::string& path, size_t index);
 Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& settings, render::FrameState& state,
                        Executor& executor, Timings& timings, Written& written, Verdict& verdict);
 
-/// A note where the budget leaves an error that says nothing: how many records the asked one takes.
+/// Where the budget leaves an error that says nothing: how many records the asked one takes, and a note.
 void sayIfUseless(const FramesPlan& plan, const render::FrameSettings& settings, const render::FrameState& state,
-                  const Verdict& verdict);
+                  Verdict& verdict);
 
 /// What becomes of pictures that are written and miss something: an error, unless the plan permits it (then a note).
 Result<void> checkVerdict(const FramesPlan& plan, const Verdict& verdict);

@@ -127,11 +127,19 @@ TEST(Budgets, SoSmallThatTheErrorSaysNothingAreExplained) {
     ASSERT_EQ(runProgram(folder, "build a.las -o a.stipple --quiet").code, 0);
     const std::string render = "render a.stipple -o a.png --size 320x200 --eye 0,-6,4 --target 0,0,0 --camera-up 0,0,1";
     const auto enough = nlohmann::json::parse(runProgram(folder, render + " --json").out);
-    const std::string much = fmt::format("{} records would bring it to 1 px", enough["records_drawn"].get<uint64_t>());
+    const std::string much = fmt::format("{} records would bring it to", enough["records_drawn"].get<uint64_t>());
     const Outcome r = runProgram(folder, render + " --budget-points 700");
-    EXPECT_TRUE(says(r.err, "note: --budget-points 700 leaves no stated error")) << r.err;
-    EXPECT_TRUE(says(r.err, much)) << r.err;
-    EXPECT_FALSE(says(runProgram(folder, render + " --budget-points 700 --quiet").err, "note:"));
+    expectOneLine(r, 6, {"--budget-points", "give more: " + much});
+    // From farther away the coarsest level fits, with an error that says little.
+    const std::string far =
+        "render a.stipple -o b.png --size 320x200 --fov 12 --eye 0,-60,40 --target 0,0,0 --camera-up 0,0,1";
+    const auto all = nlohmann::json::parse(runProgram(folder, far + " --json").out);
+    const Outcome few = runProgram(folder, far + " --budget-points 5600");
+    EXPECT_EQ(few.code, 0) << few.err;
+    EXPECT_TRUE(says(few.err, "note: --budget-points 5600 leaves an error of")) << few.err;
+    EXPECT_TRUE(says(few.err, fmt::format("; {} records would bring", all["records_drawn"].get<uint64_t>())))
+        << few.err;
+    EXPECT_EQ(runProgram(folder, far + " --budget-points 5600 --quiet").err, "");
     EXPECT_FALSE(says(runProgram(folder, render).err, "budget-points"));
 }
 
