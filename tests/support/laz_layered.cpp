@@ -162,7 +162,7 @@ bool encodePoint(const uint8_t* is, std::array<std::unique_ptr<NewPoint>, 4>& ch
         p->height[level] = load<int32_t>(is + 8);
     }
     if (moved[2]) layer[2].symbol(p->classes[(p->last[16] & 31u) << 1 | (ends == 3 ? 1u : 0u)], is[16]);
-    const auto flagsOf = [](uint8_t f) { return (f & 15u) | (f >> 6 & 1u) << 4 | (f >> 7) << 5; };
+    const auto flagsOf = [](uint8_t f) { return (f & 15u) | (f >> 6 & 1u) << 4 | (f >> 7 & 1u) << 5; };
     if (moved[3]) layer[3].symbol(p->flags[flagsOf(p->last[15])], flagsOf(is[15]));
     if (moved[4]) {
         uint16_t& was = p->intensityOf[ends << 1 | t];

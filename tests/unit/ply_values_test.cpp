@@ -143,10 +143,11 @@ TEST(PlyValues, NormalsOfAnyLengthAreKept) {
                                        {"double", 1e300}}) {
         const std::vector<glm::dvec3> truth = writeSphere(folder / "a.ply", 1, type, length);
         size_t seen = 0;
+        const double given = length;
         ASSERT_TRUE(
             lod::readPoints(*lod::openPointSource(folder / "a.ply"), [&](const lod::PointBlock& block) -> Result<void> {
                 for (const glm::vec3& n : block.normal) {
-                    EXPECT_LT(degreesBetween(glm::dvec3(n), truth[seen]), 0.01) << length;
+                    EXPECT_LT(degreesBetween(glm::dvec3(n), truth[seen]), 0.01) << given;
                     ++seen;
                 }
                 return {};

@@ -170,7 +170,7 @@ std::vector<PartVersion> versionsOf(const std::vector<uint32_t>& part, const Loc
     std::vector<std::vector<uint32_t>> candidates;
     const size_t triangles = part.size() / 3;
     for (const unsigned options : {unsigned{meshopt_SimplifyLockBorder}, 0u})
-        for (const size_t share : {2, 4}) {
+        for (const size_t share : {size_t{2}, size_t{4}}) {
             if (triangles / share < 2) continue;
             std::vector<uint32_t> coarse(part.size());
             coarse.resize(meshopt_simplify(coarse.data(), mesh.indices.data(), part.size(), &mesh.position[0].x,

@@ -83,7 +83,10 @@ void addLeaves(const Around& around, const DiscPlane& plane, size_t begin, size_
             to.v[to.count] = vs[k];
             to.radius[to.count] = rs[k];
             const float outside = rs[k] + plane.radius;
-            to.count += (rs[k] > 0) & (us[k] * us[k] + vs[k] * vs[k] < outside * outside) ? 1 : 0;
+            // (Without a branch.)
+            const unsigned isDisc = rs[k] > 0 ? 1 : 0,
+                           reaches = us[k] * us[k] + vs[k] * vs[k] < outside * outside ? 1 : 0;
+            to.count += isDisc & reaches;
         }
     }
 }
