@@ -116,9 +116,7 @@ void Selector::wantTiles(uint32_t instance, const LocalView& local, bool isWhole
     for (uint32_t index = 0; index < h.nodes.size(); ++index) {
         const MeshGroup& g = h.groups[index];
         if (scratch_.groupState[index] != kRefined || g.textures == 0 || !drawsAny(h, index)) continue;
-        const double nearest =
-            std::max(glm::length(h.nodes[index].centre - local.eye) - h.nodes[index].radius, local.nearPlane);
-        const double uvPerPixel = 0.5 * g.uvPerStep * nearest / local.focal;
+        const double uvPerPixel = 0.5 * g.uvPerStep * stepsPerPixel(h.nodes[index], local);
         for (uint32_t k = 0; k < g.textures; ++k) {
             const shared::TextureInfo& t = h.textures[h.groupTextures[g.firstTexture + k]];
             const double texels = uvPerPixel * std::max(t.width, t.height);

@@ -28,7 +28,7 @@ uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | 
 class CpuBackend final : public render::Backend {
   public:
     CpuBackend(Executor& executor, const Kernels& kernels)
-        : executor_(executor), k_(kernels), tables_(makeTables()), pyramid_(executor, kernels) {}
+        : executor_(executor), kernels_(kernels), k_(kernels), tables_(makeTables()), pyramid_(executor, k_) {}
 
     std::string name() const override { return "cpu"; }
     std::string device() const override {
@@ -63,6 +63,7 @@ class CpuBackend final : public render::Backend {
     Result<void> render(const render::RenderRequest& request, render::Image& image) override {
         draws_ = request.draws;
         frame_ = draws_->frame;
+        k_ = frame_.orthographic != 0 ? *kernels_.orthographic : kernels_;
         image_ = &image;
         wantAll_ = request.wantDepthAndNormal;
         times_.clear();
@@ -173,7 +174,8 @@ class CpuBackend final : public render::Backend {
             const float x = node.base.x + node.axisX.x * along(1) + node.axisY.x * along(2) + node.axisZ.x * along(4),
                         y = node.base.y + node.axisX.y * along(1) + node.axisY.y * along(2) + node.axisZ.y * along(4),
                         z = node.base.z + node.axisX.z * along(1) + node.axisY.z * along(2) + node.axisZ.z * along(4);
-            const float px = x * frame_.focal / z + frame_.centre.x, py = y * frame_.focal / z + frame_.centre.y;
+            const float w = shared::lensDepth(shared::frameLens(frame_), z);
+            const float px = x * frame_.focal / w + frame_.centre.x, py = y * frame_.focal / w + frame_.centre.y;
             if (!(z > frame_.nearPlane && px >= 0 && py >= 0 && px < static_cast<float>(frame_.width) &&
                   py < static_cast<float>(frame_.height)))
                 return false;
@@ -201,8 +203,8 @@ class CpuBackend final : public render::Backend {
                     if (pixel[i] >= kWidePixel) {
                         if (pixel[i] == ~0u) continue;
                         const auto id = static_cast<uint32_t>(b) * shared::kRecordsPerBlock + i;
-                        const shared::WideDisc d =
-                            shared::wideDisc(*blocks_[b].node, blocks_[b].records[i], frame_.supportScale, id);
+                        const shared::WideDisc d = shared::wideDisc(*blocks_[b].node, blocks_[b].records[i],
+                                                                    frame_.supportScale, id, shared::frameLens(frame_));
                         if (shared::reachesPicture(d, frame_) > 0.5f) mine.push_back(d);
                         continue;
                     }
@@ -361,8 +363,8 @@ class CpuBackend final : public render::Backend {
                                   wantAll_ ? image_->normal.data() + 3 * at : nullptr,
                                   wantAll_ ? image_->linear.data() + 3 * at : nullptr};
             if (!any) return empty.copyTo(out, n);
-            if (row.hasTubes) k_.finishRow(1.0f / frame_.focal, n, row);
-            if (own.hasTubes && &own != &row) k_.finishRow(1.0f / frame_.focal, n, own);
+            if (row.hasTubes) k_.finishRow(frame_.focal, n, row);
+            if (own.hasTubes && &own != &row) k_.finishRow(frame_.focal, n, own);
             // Of a row without winners the planes are those of an older frame.
             const SurfacePlanes planesHere = fine.mayHold(y, x0, n) ? planesAt(at) : SurfacePlanes{};
             thread_local SurfaceRow surface{};
@@ -411,7 +413,8 @@ class CpuBackend final : public render::Backend {
     }
 
     Executor& executor_;
-    const Kernels& k_;
+    const Kernels& kernels_;
+    Kernels k_;  ///< of the frame's kind of view
     Tables tables_;
     std::unordered_map<uint64_t, lod::Chunk> chunks_;
     HugeBuffer<uint64_t> visibility_;

@@ -28,7 +28,7 @@ void main() {
     if ((word & kPixelUnlit) == 0u && (word == kPlainSurface || (frame.shade & kShadeTriangles) != 0u)) {
         const vec3 ray = rayThrough(pixel);
         const vec3 v = normalize(ray);
-        const vec3 point = ray * depthAt(own, pixel);
+        const vec3 point = alongRay(pixelRayHere(pixel), depthAt(own, pixel));
         Surface s;
         s.colour = own.colour;
         s.normal = normalAt(own, pixel);
