@@ -21,13 +21,15 @@
 
 namespace stipple::lod {
 
-/// A camera in world space: z-forward, y-down.
+/// A camera in world space: z-forward, y-down. In perspective, or orthographic: rays are parallel to `forward`, and
+/// what an error may be is the same everywhere, tau / focalPixels.
 struct View {
     glm::dvec3 eye{0};
     glm::dvec3 right{1, 0, 0}, down{0, -1, 0}, forward{0, 0, -1};
-    double focalPixels = 1000;
+    double focalPixels = 1000;  ///< orthographic: pixels per world unit
     uint32_t width = 1280, height = 720;
     double nearPlane = 1e-3;  ///< world units
+    bool isOrthographic = false;
 };
 
 /// A placed hierarchy. world = translation + rotation * (scale * (origin + unit * lattice)).
@@ -113,8 +115,16 @@ struct Cut {
 /// A view in the lattice space of one instance.
 struct LocalView {
     glm::dvec3 eye{0}, forward{0};
-    std::array<glm::dvec3, 4> planes{};  ///< inward normals of the frustum's sides, through the eye
-    double nearPlane = 0, focal = 0, cosineCorner = 0;
+    std::array<glm::dvec3, 4> planes{};  ///< inward normals of the frustum's sides ...
+    std::array<double, 4> off{};         ///< ... and how far behind the eye they lie: in perspective they go through it
+    double nearPlane = 0, focal = 0, cosineCorner = 0;  ///< orthographic: focal in pixels per step
+    bool isOrthographic = false;
+    /// Is what lies within `r` of the eye + d beyond one of the sides?
+    bool isBeside(const glm::dvec3& d, double r) const {
+        for (size_t k = 0; k < planes.size(); ++k)
+            if (glm::dot(d, planes.at(k)) + off.at(k) < -r) return true;
+        return false;
+    }
 };
 
 /// Reused between frames of one scene, so that a cut allocates nothing once warm.

@@ -107,9 +107,7 @@ void wantTiles(const CutFrame& frame, uint32_t instance, bool isWhole, Cut& cut)
     for (uint32_t index = 0; index < h.nodes.size(); ++index) {
         const MeshGroup& g = h.groups[index];
         if (state[index] != kRefined || g.textures == 0 || !drawsAny(h, state, index)) continue;
-        const double nearest =
-            std::max(glm::length(h.nodes[index].centre - local.eye) - h.nodes[index].radius, local.nearPlane);
-        const double uvPerPixel = 0.5 * g.uvPerStep * nearest / local.focal;
+        const double uvPerPixel = 0.5 * g.uvPerStep * stepsPerPixel(h.nodes[index], local);
         for (uint32_t k = 0; k < g.textures; ++k) {
             const shared::TextureInfo& t = h.textures[h.groupTextures[g.firstTexture + k]];
             const double texels = uvPerPixel * std::max(t.width, t.height);

@@ -23,13 +23,28 @@ inline LocalView makeLocalView(const Hierarchy& h, const Instance& instance, con
     local.forward = inverse * view.forward;
     const glm::dvec3 right = inverse * view.right, down = inverse * view.down;
     const double halfW = 0.5 * view.width, halfH = 0.5 * view.height, f = view.focalPixels;
+    local.nearPlane = view.nearPlane / unitsPerStep;
+    local.isOrthographic = view.isOrthographic;
+    if (view.isOrthographic) {
+        local.focal = f * unitsPerStep;
+        local.planes = {right, -right, down, -down};
+        const double across = halfW / local.focal, along = halfH / local.focal;
+        local.off = {across, across, along, along};
+        local.cosineCorner = 1;
+        return local;
+    }
     local.planes = {
         glm::normalize(right * f + local.forward * halfW), glm::normalize(-right * f + local.forward * halfW),
         glm::normalize(down * f + local.forward * halfH), glm::normalize(-down * f + local.forward * halfH)};
-    local.nearPlane = view.nearPlane / unitsPerStep;
     local.focal = f;
     local.cosineCorner = f / std::sqrt(f * f + halfW * halfW + halfH * halfH);
     return local;
+}
+
+/// Steps of the lattice that a pixel shows at the nearest place of a node.
+inline double stepsPerPixel(const Node& node, const LocalView& view) {
+    if (view.isOrthographic) return 1 / view.focal;
+    return std::max(glm::length(node.centre - view.eye) - node.radius, view.nearPlane) / view.focal;
 }
 
 /// Room for the rounding of normals beyond the cone of a node, radians.
@@ -49,6 +64,10 @@ inline bool facesAway(const Node& node, const glm::dvec3& d, double distance, do
     const double widest = between + std::acos(std::min(double{node.normalConeCosine}, 1.0)) + kConeMargin;
     return widest < 1.5 && distance * std::cos(widest) > r * (1 + 1e-6);
 }
+/// The same where all is seen along `forward`, wherever it lies: n.forward >= cos(angle(axis, forward) + half-angle).
+inline bool facesAlong(const Node& node, const glm::dvec3& forward) {
+    return facesAway(node, forward, glm::length(forward), 0);
+}
 
 /// Allowed error of N at tau = 1 px as a code of 1/32 octave, rounded down; kCulled if nothing of N can be seen.
 inline int32_t allowedError(const Hierarchy& h, const Node& node, const LocalView& view, double sway) {
@@ -56,8 +75,12 @@ inline int32_t allowedError(const Hierarchy& h, const Node& node, const LocalVie
     const double r = node.radius + sway;
     const double depth = glm::dot(d, view.forward);
     if (depth + r < view.nearPlane) return kCulled;
-    for (const glm::dvec3& plane : view.planes)
-        if (glm::dot(d, plane) < -r) return kCulled;
+    if (view.isBeside(d, r)) return kCulled;
+    if (view.isOrthographic) {
+        if (!h.isLoose() && facesAlong(node, view.forward)) return kCulled;
+        const double code = std::floor(kStepsPerOctave * std::log2(1 / (view.focal * h.errors.smallest)));
+        return std::isnan(code) ? kInside : static_cast<int32_t>(std::clamp(code, -900'000.0, 900'000.0));
+    }
     const double distance = glm::length(d);
     const double nearest = distance - r;
     if (!(nearest > 0)) return kInside;

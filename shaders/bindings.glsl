@@ -42,6 +42,12 @@ layout(push_constant, scalar) uniform Step {
                     // (surface), exact points (resolve)
 } stepInfo;
 
+Lens frameLensHere() { return lensOf(frame.focal, frame.orthographic != 0u); }
+// The ray through a pixel's centre.
+PixelRay pixelRayHere(uvec2 pixel) {
+    return pixelRay(frameLensHere(), (float(pixel.x) + 0.5 - frame.centre.x) / frame.focal, (float(pixel.y) + 0.5 - frame.centre.y) / frame.focal);
+}
+
 // Levels whose texels are larger than the largest splat hold nothing; the resolve pass has measured it.
 uint levelCount() {
     const float largest = uintBitsToFloat(largestRadiusBits);
@@ -79,7 +85,7 @@ vec3 pointColour(DrawNode node, PointRecord r) {
 // What a reconstructed texel shows at its pixel: tubes have normals round their axes.
 Texel finished(Texel t) {
     if (t.isRound < 0.5) return t;
-    const TubeSurface s = tubeSurface(t, 1.0 / frame.focal);
+    const TubeSurface s = tubeSurface(t, frameLensHere());
     t.normalPerp = s.normalPerp;
     t.depth = s.depth;
     return t;
@@ -90,11 +96,11 @@ Texel finished(Texel t) {
 vec3 normalAt(Texel t, uvec2 pixel) {
     const vec2 at = vec2(pixel) + 0.5 - frame.centre;
     const float flat_ = 1.0 - t.isRound;
-    return normalFromPerp(t.normalPerp, viewDirection(at.x + flat_ * t.offset.x, at.y + flat_ * t.offset.y, frame.focal));
+    return normalFromPerp(t.normalPerp, viewDirection(at.x + flat_ * t.offset.x, at.y + flat_ * t.offset.y, frameLensHere()));
 }
 float depthAt(Texel t, uvec2 pixel) {
     const vec2 at = vec2(pixel) + 0.5 - frame.centre;
-    return planeDepth(t.depth, max(t.radius, 1.0e-3), t.normalPerp, t.offset.x, t.offset.y, t.isRound, at.x, at.y, frame.focal);
+    return planeDepth(t.depth, max(t.radius, 1.0e-3), t.normalPerp, t.offset.x, t.offset.y, t.isRound, at.x, at.y, frameLensHere());
 }
 
 void storeTexel(uint offset, uint width, uint height, uvec2 pixel, Texel t) {
@@ -110,6 +116,7 @@ void storeTexel(uint offset, uint width, uint height, uvec2 pixel, Texel t) {
 }
 
 Texel pushedTexel(ivec2 pixel, Texel own) {
+    const Lens lens = frameLensHere();
     const ivec2 parent = pixel >> 1;
     const ivec2 side = (pixel & 1) * 2 - 1;
     const float fineSize = exp2(float(stepInfo.level));
@@ -121,8 +128,8 @@ Texel pushedTexel(ivec2 pixel, Texel own) {
     const Texel q1 = loadTexel(stepInfo.coarse, stepInfo.coarseWidth, stepInfo.coarseHeight, parent.x + side.x, parent.y);
     const Texel q2 = loadTexel(stepInfo.coarse, stepInfo.coarseWidth, stepInfo.coarseHeight, parent.x, parent.y + side.y);
     const Texel q3 = loadTexel(stepInfo.coarse, stepInfo.coarseWidth, stepInfo.coarseHeight, parent.x + side.x, parent.y + side.y);
-    return pushTexel(own, q0, q1, q2, q3, coarseDisc(q0, near.x, near.y, frame.focal),
-                     coarseDisc(q1, far.x, near.y, frame.focal), coarseDisc(q2, near.x, far.y, frame.focal),
-                     coarseDisc(q3, far.x, far.y, frame.focal), float(side.x), float(side.y), at.x, at.y, fineSize,
-                     frame.focal);
+    return pushTexel(own, q0, q1, q2, q3, coarseDisc(q0, near.x, near.y, lens),
+                     coarseDisc(q1, far.x, near.y, lens), coarseDisc(q2, near.x, far.y, lens),
+                     coarseDisc(q3, far.x, far.y, lens), float(side.x), float(side.y), at.x, at.y, fineSize,
+                     lens);
 }

@@ -29,16 +29,16 @@ vec3 litColour(SurfaceWords words, vec3 colour, vec3 normal, uvec2 pixel) {
     // Points under lights of the scene's own are surfaces like any other; else theirs is one formula.
     if (!isTriangle && frame.lightCount == 0u && frame.hasEnvironment == 0u)
         return colour * irradiance(normal, frame.sunDirection, frame.skyDirection, leaf);
-    const vec3 ray = vec3((vec2(pixel) + 0.5 - frame.centre) / frame.focal, 1.0);
+    const PixelRay ray = pixelRayHere(pixel);
     Surface s;
     s.colour = colour;
     s.normal = normal;
-    s.toEye = -normalize(ray);
+    s.toEye = -normalize(rayDirection(ray));
     s.metallic = float(words.material & 255u) / 255.0;
     s.roughness = float(words.material >> 8 & 255u) / 255.0;
     s.occlusion = float(words.material >> 16 & 255u) / 255.0;
     s.leaf = leaf;
-    vec3 lit = lightOf(s, ray * words.depth);
+    vec3 lit = lightOf(s, alongRay(ray, words.depth));
     if (isTriangle) {
         const uint e = triangleWords[2u * (pixel.y * frame.width + pixel.x) + 1u];
         lit += vec3(unpackRed(e), unpackGreen(e), unpackBlue(e));

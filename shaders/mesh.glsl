@@ -13,7 +13,7 @@ struct LargeTriangle {
     int y1;
     int x2;
     int y2;
-    float inverseDepth0;
+    float inverseDepth0;  // imageLinear
     float inverseDepth1;
     float inverseDepth2;
     uint id;
@@ -75,9 +75,8 @@ bool sampleTexture(DrawCluster c, TextureSlot slot, vec2 uv, float footprint, ou
     return isThere;
 }
 
-vec3 rayThrough(uvec2 pixel) {
-    return vec3((float(pixel.x) + 0.5 - frame.centre.x) / frame.focal, (float(pixel.y) + 0.5 - frame.centre.y) / frame.focal, 1.0);
-}
+// Direction of the ray through a pixel's centre.
+vec3 rayThrough(uvec2 pixel) { return rayDirection(pixelRayHere(pixel)); }
 
 // Position of a cluster's vertex in camera space.
 vec3 placeOf(DrawCluster c, DrawMesh m, uint i) {
@@ -97,11 +96,11 @@ bool isKept(DrawCluster c, uint corners, uvec2 pixel) {
     const MeshVertex vb = vertices.vertices[corners >> 8 & 255u];
     const MeshVertex vc = vertices.vertices[corners >> 16 & 255u];
     const SurfaceMaterial material = materials[m.firstMaterial + (va.surface & kSurfaceMaterialMask)];
-    const vec3 ray = rayThrough(pixel);
+    const PixelRay ray = pixelRayHere(pixel);
     const vec3 a = placeOf(c, m, corners & 255u);
     const vec3 e1 = placeOf(c, m, corners >> 8 & 255u) - a;
     const vec3 e2 = placeOf(c, m, corners >> 16 & 255u) - a;
-    const vec2 w = triangleWeights(ray, a, a + e1, a + e2);
+    const vec2 w = triangleWeights(rayDirection(ray), fromRay(ray, a), fromRay(ray, a + e1), fromRay(ray, a + e2));
     const float wa = 1.0 - w.x - w.y;
     float alpha = material.alpha * (wa * float(va.colour >> 24) + w.x * float(vb.colour >> 24) + w.y * float(vc.colour >> 24)) / 255.0;
     const float footprint = uvFootprint(ray, 1.0 / frame.focal, a, e1, e2, vec2(vb.u - va.u, vb.v - va.v), vec2(vc.u - va.u, vc.v - va.v));
@@ -127,6 +126,7 @@ bool isCovered(LargeTriangle t, int x, int y, out float inverseDepth) {
     return w0 >= b0 && w1 >= b1 && w2 >= b2;
 }
 
-void offer(int x, int y, float inverseDepth, uint64_t id) {
-    atomicMin(visibility[uint(y) * frame.width + uint(x)], visibilityKey(floatBitsToUint(1.0 / inverseDepth), id));
+// `linear`: imageLinear of the depth.
+void offer(int x, int y, float linear, uint64_t id) {
+    atomicMin(visibility[uint(y) * frame.width + uint(x)], visibilityKey(floatBitsToUint(depthOfLinear(frameLensHere(), linear)), id));
 }

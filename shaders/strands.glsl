@@ -39,13 +39,12 @@ Ribbon ribbonOfWide(WideStrand s) { return ribbonOf(s.a, s.b, s.acrossA, s.acros
 
 // Offers one pixel of a wide strand if its ray meets the strand. `ribbon`: what ribbonOfWide says, once for all pixels.
 void offerWide(WideStrand s, Ribbon ribbon, int x, int y) {
-    const float ex = (float(x) + 0.5 - frame.centre.x) * (1.0 / frame.focal);
-    const float ey = (float(y) + 0.5 - frame.centre.y) * (1.0 / frame.focal);
+    const PixelRay ray = pixelRay(frameLensHere(), (float(x) + 0.5 - frame.centre.x) * (1.0 / frame.focal), (float(y) + 0.5 - frame.centre.y) * (1.0 / frame.focal));
     if (s.isRound != 0u) {
-        const TubeHit hit = tubeHit(tubeOf(s.a, s.b, s.radiusA, s.radiusB), ex, ey, frame.nearPlane, false);
-        if (hit.depth < kNoDepth) offer(x, y, 1.0 / hit.depth, drawId(frame.firstBlock.curves, s.id));
+        const TubeHit hit = tubeHit(tubeOf(s.a, s.b, s.radiusA, s.radiusB), ray, frame.nearPlane, false);
+        if (hit.depth < kNoDepth) offer(x, y, imageLinear(frameLensHere(), hit.depth), drawId(frame.firstBlock.curves, s.id));
         return;
     }
-    const RibbonHit hit = ribbonHit(ribbon, ex, ey, frame.nearPlane, kRibbonSlack);
-    if (hit.depth < kNoRibbon) offer(x, y, 1.0 / hit.depth, drawId(frame.firstBlock.curves, s.id));
+    const RibbonHit hit = ribbonHit(ribbon, ray, frame.nearPlane, kRibbonSlack);
+    if (hit.depth < kNoRibbon) offer(x, y, imageLinear(frameLensHere(), hit.depth), drawId(frame.firstBlock.curves, s.id));
 }

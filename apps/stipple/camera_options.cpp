@@ -19,11 +19,17 @@ void CameraOptions::addTo(CLI::App& app) {
     auto* const fovOption = app.add_option("--fov", fov, "vertical field of view, degrees")
                                 ->transform(within(0.1, 170.0))
                                 ->capture_default_str();
+    auto* const orthoOption =
+        app.add_option("--ortho", ortho,
+                       "orthographic: parallel rays, and so much of the world, in its units, across the picture")
+            ->type_name("WIDTH")
+            ->transform(within(1e-12, 1e15));
     auto* const sceneOption =
         app.add_option("--scene-camera", sceneCamera, "the N-th camera of a .gltf scene (0: a view of the whole)")
             ->transform(within(0, 100000));
     auto* const pathOption =
-        app.add_option("--camera-path", path, "JSON file with keys {t, eye, target, up, fov}; one picture per frame")
+        app.add_option("--camera-path", path,
+                       "JSON file with keys {t, eye, target, up, fov or ortho}; one picture per frame")
             ->type_name("FILE");
     auto* const orbitOption =
         app.add_option("--orbit", orbit, "N pictures around the scene")->transform(within(1, 100000));
@@ -31,6 +37,7 @@ void CameraOptions::addTo(CLI::App& app) {
     for (auto* const place : {eyeOption, targetOption, upOption})
         place->excludes(sceneOption)->excludes(pathOption)->excludes(orbitOption);
     fovOption->excludes(sceneOption)->excludes(pathOption);
+    orthoOption->excludes(sceneOption)->excludes(fovOption);
     sceneOption->excludes(pathOption)->excludes(orbitOption);
     pathOption->excludes(orbitOption);
 }
@@ -74,8 +81,7 @@ Result<scene::Camera> makeCamera(const CameraOptions& o, const OpenedScene& open
     if (o.sceneCamera > 0) {
         const auto index = static_cast<size_t>(o.sceneCamera);
         if (index > opened.cameras.size())
-            return fail(ErrorKind::usage,
-                        fmt::format("the scene has that many perspective cameras: {}", opened.cameras.size()),
+            return fail(ErrorKind::usage, fmt::format("the scene has that many cameras: {}", opened.cameras.size()),
                         fmt::format("--scene-camera {}", o.sceneCamera));
         return opened.cameras[index - 1];
     }
@@ -90,6 +96,17 @@ Result<scene::Camera> makeCamera(const CameraOptions& o, const OpenedScene& open
         STIPPLE_ASSIGN(camera.up, parseVector(o.cameraUp, "--camera-up"));
     }
     STIPPLE_TRY(checkDirection(camera, o));
+    if (!(o.ortho > 0)) return camera;
+    camera.orthoWidth = o.ortho;
+    if (isPlace(o.eye)) return camera;
+    // Nobody said from how far away: from before all of it. The target stays in the middle of the picture if it is
+    // given.
+    const scene::Camera fitted = scene::fitOrthographic(camera, opened.outline, o.ortho);
+    if (!isPlace(o.target)) return fitted;
+    const glm::dvec3 forward = glm::normalize(camera.target - camera.eye);
+    const double back =
+        std::max(glm::dot(camera.target - fitted.eye, forward), glm::length(fitted.target - fitted.eye));
+    camera.eye = camera.target - back * forward;
     return camera;
 }
 
@@ -97,9 +114,17 @@ Result<std::optional<scene::CameraPath>> makePath(const CameraOptions& o, const 
     const lod::StoreDescription& d = opened.description;
     if (!o.path.empty()) {
         STIPPLE_ASSIGN(scene::CameraPath path, scene::readCameraPath(o.path, d.up));
+        if (o.ortho > 0)
+            for (scene::CameraKey& key : path.keys) key.camera.orthoWidth = o.ortho;
         return std::optional(std::move(path));
     }
-    if (o.orbit > 0) return std::optional(scene::makeOrbit(opened.outline, d.up, aspect, o.orbit, o.fov));
+    if (o.orbit > 0) {
+        scene::CameraPath path = scene::makeOrbit(opened.outline, d.up, aspect, o.orbit, o.fov);
+        if (o.ortho > 0)
+            for (scene::CameraKey& key : path.keys)
+                key.camera.orthoWidth = o.ortho;  // its eyes stand before all of the scene
+        return std::optional(std::move(path));
+    }
     return std::optional<scene::CameraPath>();
 }
 

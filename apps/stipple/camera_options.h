@@ -12,6 +12,7 @@ namespace stipple::app {
 struct CameraOptions {
     std::string eye, target, cameraUp, path;
     double fov = 50;
+    double ortho = 0;  ///< width that the picture shows, world units; 0: in perspective
     int sceneCamera = 0, orbit = 0;
     void addTo(CLI::App& app);
     /// What can be said before anything is opened.

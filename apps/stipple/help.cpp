@@ -136,8 +136,8 @@ void arrangeOptions(CLI::App& command) {
         for (const char* option : options)
             if (CLI::Option* o = command.get_option_no_throw(option)) o->group(name);
     };
-    group("Camera",
-          {"--eye", "--target", "--camera-up", "--fov", "--scene-camera", "--camera-path", "--orbit", "--frames"});
+    group("Camera", {"--eye", "--target", "--camera-up", "--fov", "--ortho", "--scene-camera", "--camera-path",
+                     "--orbit", "--frames"});
     group("Accuracy and budgets (stipple help budgets)",
           {"--error", "--budget-points", "--resident", "--no-wait", "--strand-exact", "--accumulate", "--samples"});
     group("Picture",

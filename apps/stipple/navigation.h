@@ -98,17 +98,27 @@ class Navigation {
         return length * (flat * std::cos(height) + up_ * std::sin(height));
     }
 
+    void zoomOrthographic(double scroll) {
+        const double now = std::max(camera_.orthoWidth, camera_.orthoHeight);
+        const double factor = std::clamp(now * std::exp(-0.15 * scroll), 1e-6 * diagonal_, 1e3 * diagonal_) / now;
+        camera_.orthoWidth *= factor;
+        camera_.orthoHeight *= factor;
+    }
+
     void moveInOrbit(const Motion& in) {
         const double perPixel = kRadiansPerHeight / in.height;
         glm::dvec3 back = camera_.eye - camera_.target;
         if (in.turn != glm::dvec2(0)) back = turned(back, -perPixel * in.turn.x, perPixel * in.turn.y);
         const double length = glm::length(back);
-        back *= std::clamp(length * std::exp(-0.15 * in.scroll), 1e-6 * diagonal_, 1e3 * diagonal_) / length;
+        if (camera_.isOrthographic())  // nearer shows nothing more of it
+            zoomOrthographic(in.scroll);
+        else
+            back *= std::clamp(length * std::exp(-0.15 * in.scroll), 1e-6 * diagonal_, 1e3 * diagonal_) / length;
         if (in.slide != glm::dvec2(0)) {
             const lod::View view = scene::makeView(camera_, in.width, in.height, 1);
             // What is under the pointer stays there.
-            camera_.target -=
-                (in.slide.x * view.right + in.slide.y * view.down) * (glm::length(back) / view.focalPixels);
+            camera_.target -= (in.slide.x * view.right + in.slide.y * view.down) *
+                              ((view.isOrthographic ? 1 : glm::length(back)) / view.focalPixels);
         }
         camera_.eye = camera_.target + back;
     }

@@ -272,19 +272,25 @@ std::vector<render::WorldLight> lightsOf(const scene::Scene& scene) {
     return lights;
 }
 
-/// Perspective cameras; a camera looks along -z of its node, y up.
+/// A camera looks along -z of its node, y up.
 std::vector<scene::Camera> camerasOf(const scene::Scene& scene) {
     std::vector<scene::Camera> cameras;
     const std::vector<glm::dmat4> world = scene.worldTransforms();
     for (size_t n = 0; n < scene.nodes.size(); ++n) {
         if (scene.nodes[n].camera < 0) continue;
         const scene::SceneCamera& from = scene.cameras[static_cast<size_t>(scene.nodes[n].camera)];
-        if (from.isOrthographic || !(glm::length(glm::dvec3(world[n][2])) > 0)) continue;
+        if (!(glm::length(glm::dvec3(world[n][2])) > 0)) continue;
+        if (from.isOrthographic && !(from.width > 0 || from.height > 0)) continue;
         scene::Camera camera;
         camera.eye = glm::dvec3(world[n][3]);
         camera.target = camera.eye - glm::normalize(glm::dvec3(world[n][2]));
         camera.up = glm::dvec3(world[n][1]);
         camera.fovDegrees = from.fovDegrees;
+        if (from.isOrthographic) {
+            // What it shows is as large as its node makes it.
+            camera.orthoWidth = from.width * glm::length(glm::dvec3(world[n][0]));
+            camera.orthoHeight = from.height * glm::length(glm::dvec3(world[n][1]));
+        }
         cameras.push_back(camera);
     }
     return cameras;

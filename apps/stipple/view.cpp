@@ -150,8 +150,14 @@ class Viewer {
     }
 
     void frameScene() {
-        if (const auto camera = makeCamera(CameraOptions{}, session_.scene(), aspect()); camera)
+        if (auto camera = makeCamera(CameraOptions{}, session_.scene(), aspect()); camera) {
+            if (navigation_.camera().isOrthographic()) {  // and stays so: as wide as the perspective shows it
+                const double height =
+                    2 * glm::length(camera->target - camera->eye) * std::tan(0.5 * glm::radians(camera->fovDegrees));
+                camera = scene::fitOrthographic(*camera, session_.scene().outline, height * aspect());
+            }
             navigation_ = Navigation(*camera, session_.scene().description.up, session_.diagonal());
+        }
         hasChanged_ = true;
     }
 

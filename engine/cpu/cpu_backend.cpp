@@ -57,6 +57,7 @@ class CpuBackend final : public render::Backend {
         frame_.draws = request.draws;
         frame_.mode = &render::reconstructionOf(request.mode);
         frame_.constants = request.draws->frame;
+        frame_.k = frame_.constants.orthographic != 0 ? *frame_.kernels.orthographic : frame_.kernels;
         frame_.image = &image;
         frame_.wantAll = request.wantDepthAndNormal;
         times_.clear();

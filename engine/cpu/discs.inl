@@ -5,6 +5,7 @@ void fillDiscs(const FrameConstants& frame, const WideDisc* discs, const DiscBox
                uint32_t firstRow, uint32_t lastRow, const Visibility& visibility) {
     const FrameConstants f = frame;
     const float inverseFocal = 1.0f / f.focal, nearPlane = f.nearPlane;
+    const Lens lens = lensHere(f.focal);
     alignas(64) float depth[kTile];
     for (size_t k = 0; k < count; ++k) {
         const WideDisc d = discs[k];
@@ -19,7 +20,7 @@ void fillDiscs(const FrameConstants& frame, const WideDisc* discs, const DiscBox
                 const float shift = float(from) + 0.5f - f.centre.x;
 #pragma GCC ivdep
                 for (int i = 0; i < n; ++i)
-                    depth[i] = discHit(d, (float(i) + shift) * inverseFocal, ey, nearPlane).depth;
+                    depth[i] = discHit(d, pixelRay(lens, (float(i) + shift) * inverseFocal, ey), nearPlane).depth;
                 const size_t first = size_t(y) * f.width + size_t(from);
                 for (int i = 0; i < n; ++i)
                     if (depth[i] < kNoDisc)
@@ -48,14 +49,15 @@ void addDisc(const WideDisc& disc, const vec3& colour, float ey, float nearPlane
     const WideDisc d = disc;
     const float r = colour.x, g = colour.y, b = colour.z;
     // Towards the eye, all over the picture: the eye lies on one side of the plane.
-    const float flip = dot(d.normal, d.centre) > 0.0f ? -1.0f : 1.0f;
+    const Lens lens = lensHere(1.0f);
+    const float flip = dot(d.normal, sightTo(lens, d.centre)) > 0.0f ? -1.0f : 1.0f;
     const float nx = flip * d.normal.x, ny = flip * d.normal.y, nz = flip * d.normal.z;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
-        const DiscHit hit = discHit(d, s.ex[i], ey, nearPlane);
+        const DiscHit hit = discHit(d, pixelRay(lens, s.ex[i], ey), nearPlane);
         const float w = discWeight(hit, s.front[i], s.apart[i]);
         s.weight[i] += w;
-        s.inverseDepth[i] += w / hit.depth;
+        s.inverseDepth[i] += kOrthographic ? w * hit.depth : w / hit.depth;
         s.nx[i] += w * nx;
         s.ny[i] += w * ny;
         s.nz[i] += w * nz;
@@ -72,6 +74,7 @@ void resolveDiscs(const FrameConstants& f, const Tables& tables, const ResolveIn
     const auto recordOf = [&](uint32_t id) { return in.blocks[id / kRecordsPerBlock].records[id % kRecordsPerBlock]; };
     const auto nodeOf = [&](uint32_t id) -> const DrawNode& { return *in.blocks[id / kRecordsPerBlock].node; };
     const float inverseFocal = 1.0f / f.focal, ey = (float(y) + 0.5f - f.centre.y) * inverseFocal;
+    const Lens lens = lensHere(f.focal);
     uint32_t last = ~0u;
     WideDisc front{};
     float thickness = 0;
@@ -79,12 +82,12 @@ void resolveDiscs(const FrameConstants& f, const Tables& tables, const ResolveIn
         if (p.id[i] != last) {
             last = p.id[i];
             const PointRecord r = recordOf(last);
-            front = wideDisc(nodeOf(last), r, f.supportScale, last);
+            front = wideDisc(nodeOf(last), r, f.supportScale, last, lens);
             thickness = (recordFlags(r) & kFlagLoose) != 0u ? kLeafThickness * kExactRadius : kExactRadius;
         }
         s.ex[i] = (float(x0 + p.pixel[i]) + 0.5f - f.centre.x) * inverseFocal;
         s.front[i] = p.depth[i];
-        s.apart[i] = depthShared(front, s.ex[i], ey);
+        s.apart[i] = depthShared(front, pixelRay(lens, s.ex[i], ey));
         s.thickness[i] = thickness;
         s.weight[i] = s.inverseDepth[i] = s.nx[i] = s.ny[i] = s.nz[i] = s.red[i] = s.green[i] = s.blue[i] = 0.0f;
     }
@@ -101,8 +104,8 @@ void resolveDiscs(const FrameConstants& f, const Tables& tables, const ResolveIn
         const vec3 sum = vec3(s.nx[i], s.ny[i], s.nz[i]);
         const float shorten = 1.0f / std::sqrt(max(dot(sum, sum), 1.0e-20f));
         const vec3 n = vec3(sum.x * shorten, sum.y * shorten, sum.z * shorten);
-        const vec2 perp = perpFromNormal(n, viewDirection(s.ex[i] * f.focal, ey * f.focal, f.focal));
-        row.depth[at] = s.weight[i] / s.inverseDepth[i];
+        const vec2 perp = perpFromNormal(n, viewDirection(s.ex[i] * f.focal, ey * f.focal, lens));
+        row.depth[at] = kOrthographic ? s.inverseDepth[i] * inverse : s.weight[i] / s.inverseDepth[i];
         row.radius[at] = kExactRadius;
         row.thickness[at] = s.thickness[i];
         row.x[at] = row.y[at] = 0.0f;

@@ -30,11 +30,12 @@ struct TileRange {
 };
 
 struct Frame {
-    Frame(Executor& of, const Kernels& kernels, Chunks& resident)
-        : executor(of), k(kernels), tables(makeTables()), chunks(resident), pyramid(of, kernels) {}
+    Frame(Executor& of, const Kernels& kernels_, Chunks& resident)
+        : executor(of), kernels(kernels_), k(kernels_), tables(makeTables()), chunks(resident), pyramid(of, k) {}
 
     Executor& executor;
-    const Kernels& k;
+    const Kernels& kernels;
+    Kernels k;  ///< those of the frame's kind of view
     const Tables tables;
     Chunks& chunks;
 

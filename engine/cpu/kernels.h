@@ -104,8 +104,8 @@ struct MeshBlock {
 /// A triangle that covers so many pixels that its rows are shared out among threads.
 struct LargeTriangle {
     int32_t x[3], y[3];
-    float inverseDepth[3];
-    uint64_t id;  ///< drawId
+    float inverseDepth[3];  ///< imageLinear
+    uint64_t id;            ///< drawId
 };
 /// A strand so wide that its pixels are filled, and so large that its rows are shared out among threads.
 struct WideStrand {
@@ -181,8 +181,10 @@ struct ShadeOutput {
     float *depth, *normal, *linear;  ///< may be null
 };
 
+/// Compiled once for views in perspective and once for orthographic ones, which `orthographic` leads to.
 struct Kernels {
     const char* name;
+    const Kernels* orthographic;
     /// Pixel index (or ~0u) and depth bits of up to 256 records.
     /// `besideToo`: also those beside the picture whose discs reach in; wide discs give kWidePixel.
     void (*projectBlock)(const shared::FrameConstants& f, const shared::DrawNode& node,
@@ -196,7 +198,7 @@ struct Kernels {
                        const SurfacePlanes& planes);
     void (*packRow)(const TexelRow& row, uint32_t n, const Planes& to);
     void (*unpackRow)(const Planes& from, uint32_t first, uint32_t n, TexelRow& row);
-    void (*pullRow)(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float inverseFocal,
+    void (*pullRow)(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float focal,
                     TexelRow& out);
     /// `nearRow`: the coarse row of the parents; `farRow`: the one beyond, in direction sy. (x, y): centre of the row's
     /// first texel, px from the principal point.
@@ -207,7 +209,7 @@ struct Kernels {
     void (*expandRow)(TexelRow& coarse, uint32_t n, float x, float y, float size, float focal, TexelRow& nearest,
                       TexelRow& beside);
     /// Normals and depths of tubes, pixel by pixel, once a row is reconstructed.
-    void (*finishRow)(float inverseFocal, uint32_t n, TexelRow& row);
+    void (*finishRow)(float focal, uint32_t n, TexelRow& row);
     /// The surface of a reconstructed row; `own`: the row before. `planes`: from the row's first pixel on, or null.
     void (*surfaceRow)(const shared::FrameConstants& f, const TexelRow& own, const TexelRow& row,
                        const SurfacePlanes& planes, const SurfaceWants& wants, uint32_t x0, uint32_t y, uint32_t n,

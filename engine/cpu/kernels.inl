@@ -1,9 +1,11 @@
-// Included once per instruction set, with STIPPLE_KERNELS naming the table. No header with functions of its own may be
-// included here except shaders/shared, whose functions are static: the linker must not mix instruction sets.
+// Included once per instruction set and kind of view, with STIPPLE_KERNELS naming the table and STIPPLE_ORTHOGRAPHIC
+// saying whether its views are orthographic (lens.h): what asks for that costs nothing. No header with functions of its
+// own may be included here except shaders/shared, whose functions are static: the linker must not mix instruction sets.
 #include <cmath>
 
 #include "engine/cpu/kernels.h"
 #include "shaders/shared/environment.h"
+#include "shaders/shared/lens.h"
 #include "shaders/shared/pack.h"
 #include "shaders/shared/pyramid.h"
 #include "shaders/shared/shade.h"
@@ -16,6 +18,9 @@ namespace stipple::cpu {
 namespace {
 
 using namespace stipple::shared;
+
+constexpr bool kOrthographic = STIPPLE_ORTHOGRAPHIC;
+[[gnu::always_inline]] inline Lens lensHere(float focal) { return lensOf(focal, kOrthographic); }
 
 /// `hasTubes`: of frames that may hold tubes; others do not pay for them.
 template <bool hasTubes>
@@ -58,6 +63,7 @@ template <bool besideToo, bool wideToo>
     const DrawNode node = drawNode;
     const float width = float(f.width), height = float(f.height);
     const float focal = f.focal, nearPlane = f.nearPlane, x0 = f.centre.x, y0 = f.centre.y;
+    const Lens lens = lensHere(focal);
     const float bx = node.base.x, by = node.base.y, bz = node.base.z, ax = node.axisX.x, ay = node.axisX.y,
                 az = node.axisX.z, bbx = node.axisY.x, bby = node.axisY.y, bbz = node.axisY.z, ccx = node.axisZ.x,
                 ccy = node.axisZ.y, ccz = node.axisZ.z;
@@ -73,14 +79,16 @@ template <bool besideToo, bool wideToo>
         const float cx = bx + ax * qx + bbx * qy + ccx * qz;
         const float cy = by + ay * qx + bby * qy + ccy * qz;
         const float cz = bz + az * qx + bbz * qy + ccz * qz;
-        const float scale = focal / cz;
+        const float scale = focal / lensDepth(lens, cz);
         const float px = cx * scale + x0, py = cy * scale + y0;
         bool inside = (cz > nearPlane) & (px >= 0.0f) & (px < width) & (py >= 0.0f) & (py < height);
         float atX = px, atY = py, key = cz;
         if (besideToo) {
             const float cap = (recordFlags(r) & kFlagScattered) != 0u ? mostScattered : most;
-            const float radius = max(min(edge * radiusFractionFast(recordRadiusCode(r)), cz * cap) * scale, minimum);
-            const SplatPixel s = splatPixel(px, py, cx, cy, cz, radius, width, height);
+            const float radius =
+                max(min(edge * radiusFractionFast(recordRadiusCode(r)), lensDepth(lens, cz) * cap) * scale, minimum);
+            const vec3 sight = sightTo(lens, vec3(cx, cy, cz));
+            const SplatPixel s = splatPixel(px, py, sight.x, sight.y, sight.z, radius, width, height);
             inside = (cz > nearPlane) & (s.x >= 0);
             atX = float(s.x);
             atY = float(s.y);
@@ -92,14 +100,14 @@ template <bool besideToo, bool wideToo>
         const float nx = ax * n.x + bbx * n.y + ccx * n.z;  // any length will do
         const float ny = ay * n.x + bby * n.y + ccy * n.z;
         const float nz = az * n.x + bbz * n.y + ccz * n.z;
-        const bool seen =
-            ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) != 0u) | (nx * cx + ny * cy + nz * cz < 0.0f);
+        const float facing = kOrthographic ? nz : nx * cx + ny * cy + nz * cz;
+        const bool seen = ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) != 0u) | (facing < 0.0f);
         const bool keep = inside & fine & seen;
         const int ix = int(keep ? atX : 0.0f), iy = int(keep ? atY : 0.0f);
         pixel[i] = keep ? uint(iy) * stride + uint(ix) : ~0u;
         if (wideToo) {
-            const float wide =
-                isWideDisc(recordFlags(r), cz, edge * radiusFractionFast(recordRadiusCode(r)), wideShare, nearPlane);
+            const float wide = isWideDisc(recordFlags(r), cz, edge * radiusFractionFast(recordRadiusCode(r)), wideShare,
+                                          nearPlane, lens);
             pixel[i] = wide > 0.5f ? (fine & seen ? kWidePixel : ~0u) : pixel[i];
         }
         depth[i] = floatBitsToUint(key);
@@ -143,10 +151,11 @@ template <bool anyTurned>
         n.y = isTurned ? g.ny[i] : n.y;
         n.z = isTurned ? g.nz[i] : n.z;
     }
-    const float inverse = 1.0f / std::sqrt(c.x * c.x + c.y * c.y + c.z * c.z);
-    n.x = hasNormal ? n.x : -c.x * inverse;
-    n.y = hasNormal ? n.y : -c.y * inverse;
-    n.z = hasNormal ? n.z : -c.z * inverse;
+    const vec3 sight = sightTo(lensHere(f.focal), c);
+    const float inverse = 1.0f / std::sqrt(sight.x * sight.x + sight.y * sight.y + sight.z * sight.z);
+    n.x = hasNormal ? n.x : -sight.x * inverse;
+    n.y = hasNormal ? n.y : -sight.y * inverse;
+    n.z = hasNormal ? n.z : -sight.z * inverse;
     return n;
 }
 
@@ -163,6 +172,7 @@ template <bool anyTurned>
 [[gnu::always_inline]] inline void resolveSplats(const FrameConstants& f, const Gathered& g, uint32_t x0, uint32_t y,
                                                  uint32_t n, TexelRow& __restrict row) {
     const float focal = f.focal, support = f.supportScale, minimum = f.minimumRadius;
+    const Lens lens = lensHere(focal);
     const float mostScattered = largestSplat(kFlagScattered, focal, f.height), most = largestSplat(0u, focal, f.height);
     const float centreX = f.centre.x - float(int(x0)) - 0.5f, centreY = f.centre.y - float(int(y)) - 0.5f;
 #pragma GCC ivdep
@@ -171,8 +181,8 @@ template <bool anyTurned>
         const vec3 c = vec3(valid ? g.x[i] : 0.0f, valid ? g.y[i] : 0.0f, valid ? g.z[i] : 1.0f);
         const vec3 nc = gatheredNormal<anyTurned>(f, g, i, c);
         const float cap = (g.flags[i] & kFlagScattered) != 0u ? mostScattered : most;
-        Texel t = texelFromSplat(c, nc, min(g.radius[i] * support, c.z * cap), focal, minimum);
-        const float scale = focal / c.z;
+        Texel t = texelFromSplat(c, nc, min(g.radius[i] * support, lensDepth(lens, c.z) * cap), lens, minimum);
+        const float scale = focal / lensDepth(lens, c.z);
         // Nearly the pixel's own coordinate is taken off before adding, so that the offset keeps its low bits.
         t.offset = vec2(c.x * scale + centreX - float(int(i)), c.y * scale + centreY);
         t.depth = valid ? t.depth : 0.0f;
@@ -193,7 +203,7 @@ template <bool anyTurned>
         const bool valid = g.front[i] > 0.0f;
         const vec3 c = vec3(valid ? g.x[i] : 0.0f, valid ? g.y[i] : 0.0f, valid ? g.z[i] : 1.0f);
         const vec3 nc = gatheredNormal<anyTurned>(f, g, i, c);
-        const vec3 v = viewDirection(x + float(int(i)), py, focal);
+        const vec3 v = viewDirection(x + float(int(i)), py, lensHere(focal));
         const float flip = dot(nc, v) > 0.0f ? -1.0f : 1.0f;
         const vec2 perp = perpFromNormal(nc, v);
         Texel t;
@@ -371,27 +381,26 @@ void unpackRow(const Planes& planes, uint32_t first, uint32_t n, TexelRow& row) 
 
 template <bool hasTubes>
 [[gnu::always_inline]] inline void pullTexelRow(const TexelRow& __restrict upper, const TexelRow& __restrict lower,
-                                                uint32_t n, float childSize, float inverseFocal,
-                                                TexelRow& __restrict out) {
+                                                uint32_t n, float childSize, float focal, TexelRow& __restrict out) {
+    const Lens lens = lensHere(focal);
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const size_t a = kPad + 2 * i, b = a + 1;
-        setTexel<hasTubes>(
-            out, kPad + i,
-            pullTexels(texelAt<hasTubes>(upper, a), texelAt<hasTubes>(upper, b), texelAt<hasTubes>(lower, a),
-                       texelAt<hasTubes>(lower, b), childSize, inverseFocal));
+        setTexel<hasTubes>(out, kPad + i,
+                           pullTexels(texelAt<hasTubes>(upper, a), texelAt<hasTubes>(upper, b),
+                                      texelAt<hasTubes>(lower, a), texelAt<hasTubes>(lower, b), childSize, lens));
     }
 }
-void pullRow(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float inverseFocal,
-             TexelRow& out) {
+void pullRow(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float focal, TexelRow& out) {
     if (out.hasTubes)
-        pullTexelRow<true>(upper, lower, n, childSize, inverseFocal, out);
+        pullTexelRow<true>(upper, lower, n, childSize, focal, out);
     else
-        pullTexelRow<false>(upper, lower, n, childSize, inverseFocal, out);
+        pullTexelRow<false>(upper, lower, n, childSize, focal, out);
 }
 
 void expandRow(TexelRow& __restrict coarse, uint32_t n, float x, float y, float size, float focal, TexelRow& nearest,
                TexelRow& beside) {
+    const Lens lens = lensHere(focal);
 #pragma GCC ivdep
     for (size_t i = 0; i < (n + 1) / 2 + 2; ++i) {
         const size_t at = kPad - 1 + i;
@@ -401,7 +410,7 @@ void expandRow(TexelRow& __restrict coarse, uint32_t n, float x, float y, float 
         t.offset = vec2(coarse.x[at], coarse.y[at]);
         t.normalPerp = vec2(coarse.perpX[at], coarse.perpY[at]);
         t.isRound = coarse.hasTubes ? coarse.isRound[at] : 0.0f;
-        const CoarseDisc d = coarseDisc(t, x + (float(int(i)) - 1.0f) * size, y, focal);
+        const CoarseDisc d = coarseDisc(t, x + (float(int(i)) - 1.0f) * size, y, lens);
         coarse.slopeX[at] = d.slope.x;
         coarse.slopeY[at] = d.slope.y;
         coarse.inverseDepth[at] = d.inverseDepth;
@@ -451,6 +460,7 @@ template <bool hasTubes>
 [[gnu::always_inline]] inline void pushTexelRow(const TexelRow& __restrict fine, const ExpandedRow& __restrict nearRow,
                                                 const ExpandedRow& __restrict farRow, float sy, float x, float y,
                                                 uint32_t n, float fineSize, float focal, TexelRow& __restrict out) {
+    const Lens lens = lensHere(focal);
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const size_t at = kPad + i;
@@ -460,7 +470,7 @@ template <bool hasTubes>
                                      texelAt<hasTubes>(nearRow.beside, at), texelAt<hasTubes>(farRow.nearest, at),
                                      texelAt<hasTubes>(farRow.beside, at), discAt(nearRow.nearest, at),
                                      discAt(nearRow.beside, at), discAt(farRow.nearest, at), discAt(farRow.beside, at),
-                                     sx, sy, x + float(int(i)) * fineSize, y, fineSize, focal));
+                                     sx, sy, x + float(int(i)) * fineSize, y, fineSize, lens));
     }
 }
 void pushRow(const TexelRow& fine, const ExpandedRow& nearRow, const ExpandedRow& farRow, float sy, float x, float y,
@@ -472,12 +482,13 @@ void pushRow(const TexelRow& fine, const ExpandedRow& nearRow, const ExpandedRow
 }
 
 /// What tubes look like at each pixel: normals round their axes.
-void finishRow(float inverseFocal, uint32_t n, TexelRow& __restrict row) {
+void finishRow(float focal, uint32_t n, TexelRow& __restrict row) {
+    const Lens lens = lensHere(focal);
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const size_t at = kPad + i;
         const Texel t = texelAt<true>(row, at);
-        const TubeSurface s = tubeSurface(t, inverseFocal);
+        const TubeSurface s = tubeSurface(t, lens);
         const bool isTubeHere = t.isRound > 0.5f;
         row.perpX[at] = isTubeHere ? s.normalPerp.x : t.normalPerp.x;
         row.perpY[at] = isTubeHere ? s.normalPerp.y : t.normalPerp.y;
@@ -491,8 +502,9 @@ void finishRow(float inverseFocal, uint32_t n, TexelRow& __restrict row) {
 
 }  // namespace
 
-extern const Kernels STIPPLE_KERNELS;
+extern const Kernels STIPPLE_KERNELS, STIPPLE_KERNELS_ORTHOGRAPHIC;
 const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
+                              &STIPPLE_KERNELS_ORTHOGRAPHIC,
                               projectBlock,
                               resolveRow,
                               packRow,

@@ -12,6 +12,7 @@ struct alignas(64) LitPixels {
 void lightSurfaces(const FrameConstants& f, const LightInput& input, const uint32_t* __restrict mask, float offX,
                    float offY, uint32_t pixels, SurfaceRow& __restrict row) {
     const float focal = f.focal, inverseFocal = 1.0f / focal, vy = offY * inverseFocal;
+    const Lens lens = lensHere(focal);
     LitPixels p;
     size_t n = 0;
     for (uint32_t i = 0; i < pixels; ++i) {
@@ -33,9 +34,9 @@ void lightSurfaces(const FrameConstants& f, const LightInput& input, const uint3
                        *const leaf = p.leaf, *const pr = p.red, *const pg = p.green, *const pb = p.blue;
     const uint32_t* const word = p.words;
     const auto surfaceAt = [=](size_t i) {
-        const float vx = px[i] * inverseFocal;
-        const float inverse = 1.0f / std::sqrt(vx * vx + vy * vy + 1.0f);
-        const vec3 ray = vec3(vx * inverse, vy * inverse, inverse);
+        const vec3 e = rayDirection(pixelRay(lens, px[i] * inverseFocal, vy));
+        const float inverse = 1.0f / std::sqrt(e.x * e.x + e.y * e.y + 1.0f);
+        const vec3 ray = vec3(e.x * inverse, e.y * inverse, inverse);
         Surface s;
         s.colour = vec3(pr[i], pg[i], pb[i]);
         s.normal = vec3(nx[i], ny[i], nz[i]);
@@ -81,8 +82,7 @@ void lightSurfaces(const FrameConstants& f, const LightInput& input, const uint3
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
             const float z = depth[i];
-            const float vx = px[i] * inverseFocal;
-            const vec3 point = vec3(vx * z, vy * z, z);
+            const vec3 point = alongRay(pixelRay(lens, px[i] * inverseFocal, vy), z);
             vec3 l = vec3(light.position.x - (isFar ? 0.0f : point.x), light.position.y - (isFar ? 0.0f : point.y),
                           light.position.z - (isFar ? 0.0f : point.z));
             const float inverse = 1.0f / std::sqrt(max(l.x * l.x + l.y * l.y + l.z * l.z, 1.0e-12f));

@@ -26,7 +26,7 @@ void Pyramid::pullPair(const TexelRow& upper, const TexelRow& lower, bool any, u
     }
     to.hold(y, x, n);
     out.hasTubes = upper.hasTubes || lower.hasTubes;
-    k_.pullRow(upper, lower, n, childSize, 1.0f / frame_.focal, out);
+    k_.pullRow(upper, lower, n, childSize, frame_.focal, out);
     k_.packRow(out, n, to.planes().at(size_t{y} * to.width + x));
 }
 

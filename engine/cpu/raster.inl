@@ -21,7 +21,7 @@ template <typename T>
 /// A triangle in fixed point, oriented so that its inside is positive.
 struct Fixed {
     int64_t x[3], y[3];
-    float inverseDepth[3];
+    float inverseDepth[3];  // imageLinear
     uint64_t id;
 };
 
@@ -35,8 +35,8 @@ struct Fixed {
     }
 }
 
-[[gnu::always_inline]] inline void offer(const Visibility& visibility, size_t pixel, float inverseDepth, uint64_t id) {
-    offerKey(visibility, pixel, visibilityKey(floatBitsToUint(1.0f / inverseDepth), id));
+[[gnu::always_inline]] inline void offer(const Visibility& visibility, size_t pixel, float linear, uint64_t id) {
+    offerKey(visibility, pixel, visibilityKey(floatBitsToUint(depthOfLinear(lensHere(1.0f), linear)), id));
 }
 
 /// Pixels [fromX, toX] x [fromY, toY] of a triangle. `Int`: holds twice the area of the triangle and the box.
@@ -89,11 +89,11 @@ struct MaskInput {
 
 bool isKept(const FrameConstants& f, const MaskInput& m, int x, int y) {
     const float inverseFocal = 1.0f / f.focal;
-    const vec3 ray =
-        vec3((float(x) + 0.5f - f.centre.x) * inverseFocal, (float(y) + 0.5f - f.centre.y) * inverseFocal, 1.0f);
+    const PixelRay ray = pixelRay(lensHere(f.focal), (float(x) + 0.5f - f.centre.x) * inverseFocal,
+                                  (float(y) + 0.5f - f.centre.y) * inverseFocal);
     const vec3 &a = m.corners[0], &b = m.corners[1], &c = m.corners[2];
     const MeshVertex &va = *m.vertices[0], &vb = *m.vertices[1], &vc = *m.vertices[2];
-    const vec2 w = triangleWeights(ray, a, b, c);
+    const vec2 w = triangleWeights(rayDirection(ray), fromRay(ray, a), fromRay(ray, b), fromRay(ray, c));
     const float wa = 1.0f - w.x - w.y;
     const auto alphaOf = [](const MeshVertex& v) { return float(int(v.colour >> 24)) * (1.0f / 255.0f); };
     float alpha = m.material->alpha * (wa * alphaOf(va) + w.x * alphaOf(vb) + w.y * alphaOf(vc));
@@ -195,13 +195,15 @@ void clipTriangle(const FrameConstants& f, const vec3* corner, const Candidate& 
     vec3 polygon[12] = {corner[0], corner[1], corner[2]}, other[12];
     int count = 3;
     const float slope = (kGuardPixels - 16384.0f) / f.focal;
+    const Lens lens = lensHere(f.focal);
     for (int plane = 0; plane < 5 && count >= 3; ++plane) {
         const auto distance = [&](const vec3& p) {
+            const float w = lensDepth(lens, p.z);
             return plane == 0   ? p.z - f.nearPlane
-                   : plane == 1 ? p.z * slope - p.x
-                   : plane == 2 ? p.z * slope + p.x
-                   : plane == 3 ? p.z * slope - p.y
-                                : p.z * slope + p.y;
+                   : plane == 1 ? w * slope - p.x
+                   : plane == 2 ? w * slope + p.x
+                   : plane == 3 ? w * slope - p.y
+                                : w * slope + p.y;
         };
         int kept = 0;
         for (int i = 0; i < count; ++i) {
@@ -221,11 +223,11 @@ void clipTriangle(const FrameConstants& f, const vec3* corner, const Candidate& 
     int64_t x[12], y[12];
     float inverse[12];
     for (int i = 0; i < count; ++i) {
-        const float scale = f.focal / polygon[i].z;
+        const float scale = f.focal / lensDepth(lens, polygon[i].z);
         const auto guarded = [](float p) { return min(max(-2.0f * kGuardPixels, p), 2.0f * kGuardPixels); };
         x[i] = snapPixel(guarded(polygon[i].x * scale + f.centre.x));
         y[i] = snapPixel(guarded(polygon[i].y * scale + f.centre.y));
-        inverse[i] = 1.0f / polygon[i].z;
+        inverse[i] = imageLinear(lens, polygon[i].z);
     }
     for (int i = 1; i + 1 < count; ++i) {
         Fixed t{{x[0], x[i], x[i + 1]}, {y[0], y[i], y[i + 1]}, {inverse[0], inverse[i], inverse[i + 1]}, of.id};
@@ -261,6 +263,7 @@ void rasterCluster(const FrameConstants& frame, const SurfaceMaterial* materials
     const uint32_t vertexCount = block.counts & 0xffffu, triangleCount = block.counts >> 16;
     const FrameConstants f = frame;
     const DrawMesh m = *block.mesh;
+    const Lens lens = lensHere(f.focal);
     alignas(64) float x[256], y[256], z[256], inverse[256];
     alignas(64) int32_t px[256], py[256], clip[256];
     if (m.places == kPlacesShort)
@@ -270,10 +273,10 @@ void rasterCluster(const FrameConstants& frame, const SurfaceMaterial* materials
 #pragma GCC ivdep
     for (size_t i = 0; i < vertexCount; ++i) {
         const vec3 c = vec3(x[i], y[i], z[i]);
-        const float scale = f.focal / c.z;
+        const float scale = f.focal / lensDepth(lens, c.z);
         const float sx = c.x * scale + f.centre.x, sy = c.y * scale + f.centre.y;
         const bool isIn = (c.z >= f.nearPlane) & (abs(sx) < kGuardPixels) & (abs(sy) < kGuardPixels);
-        inverse[i] = 1.0f / c.z;
+        inverse[i] = imageLinear(lens, c.z);
         px[i] = isIn ? int(floor(sx * kSubpixel + 0.5f)) : 0;
         py[i] = isIn ? int(floor(sy * kSubpixel + 0.5f)) : 0;
         clip[i] = isIn ? 0 : 1;

@@ -142,13 +142,15 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
         anyTextured |= surface[i] & kSurfaceTextured;
     }
     const float inverseFocal = 1.0f / f.focal;
+    const Lens lens = lensHere(f.focal);
     const float centreX = f.centre.x - float(int(x0)) - 0.5f, rayY = (float(int(y)) + 0.5f - f.centre.y) * inverseFocal;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
-        const vec3 ray = vec3((float(int(p.pixel[i])) - centreX) * inverseFocal, rayY, 1.0f);
+        const PixelRay ray = pixelRay(lens, (float(int(p.pixel[i])) - centreX) * inverseFocal, rayY);
         const vec3 a = vec3(c.x[0][i], c.y[0][i], c.z[0][i]);
         const vec2 w =
-            triangleWeights(ray, a, vec3(c.x[1][i], c.y[1][i], c.z[1][i]), vec3(c.x[2][i], c.y[2][i], c.z[2][i]));
+            triangleWeights(rayDirection(ray), fromRay(ray, a), fromRay(ray, vec3(c.x[1][i], c.y[1][i], c.z[1][i])),
+                            fromRay(ray, vec3(c.x[2][i], c.y[2][i], c.z[2][i])));
         const vec3 n0 = octDecode(c.normal[0][i]), n1 = octDecode(c.normal[1][i]), n2 = octDecode(c.normal[2][i]);
         const float first = 1.0f - w.x - w.y;
         wb[i] = w.x;
@@ -167,7 +169,7 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
     if (anyTextured != 0) {
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
-            const vec3 ray = vec3((float(int(p.pixel[i])) - centreX) * inverseFocal, rayY, 1.0f);
+            const PixelRay ray = pixelRay(lens, (float(int(p.pixel[i])) - centreX) * inverseFocal, rayY);
             const vec3 corner = vec3(c.x[0][i], c.y[0][i], c.z[0][i]);
             const vec3 e1 = vec3(c.x[1][i] - corner.x, c.y[1][i] - corner.y, c.z[1][i] - corner.z);
             const vec3 e2 = vec3(c.x[2][i] - corner.x, c.y[2][i] - corner.y, c.z[2][i] - corner.z);
@@ -179,7 +181,9 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
     for (size_t first = 0; first < n;) {
         const MeshBlock& block = in.meshBlocks[p.id[first] / kClusterTriangles];
         size_t end = first + 1;
-        while (end < n && surface[end] == surface[first] && in.meshBlocks[p.id[end] / kClusterTriangles].mesh == block.mesh) ++end;
+        while (end < n && surface[end] == surface[first] &&
+               in.meshBlocks[p.id[end] / kClusterTriangles].mesh == block.mesh)
+            ++end;
         applyMaterial({block.mesh, &in.materials[block.mesh->firstMaterial + (surface[first] & kSurfaceMaterialMask)],
                        block.textures, surface[first], first, end - first},
                       c, uv, planes.emissive != nullptr, s);
@@ -189,7 +193,7 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
     alignas(64) uint32_t word[kTile], shine[kTile];
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
-        const vec3 ray = vec3((float(int(p.pixel[i])) - centreX) * inverseFocal, rayY, 1.0f);
+        const vec3 ray = rayDirection(pixelRay(lens, (float(int(p.pixel[i])) - centreX) * inverseFocal, rayY));
         const vec3 normal =
             surfaceNormal(vec3(s.nx[i], s.ny[i], s.nz[i]), vec3(s.faceX[i], s.faceY[i], s.faceZ[i]), ray);
         const float inverseRay = 1.0f / std::sqrt(ray.x * ray.x + ray.y * ray.y + 1.0f);

@@ -12,6 +12,7 @@ void placeSplats(const FrameConstants& frame, const DrawNode& drawNode, const Po
     const float shorten = 1.0f / std::sqrt(ax * ax + ay * ay + az * az);
     const float edge = node.edge * f.supportScale, scattered = largestSplat(kFlagScattered, focal, f.height);
     const uint32_t errorCode = node.errorCode, octantMask = node.octantMask;
+    const Lens lens = lensHere(focal);
     const uint* __restrict const words = &records->positionXY;  // four words a record
 #pragma GCC ivdep
     for (size_t i = 0; i < count; ++i) {
@@ -21,12 +22,14 @@ void placeSplats(const FrameConstants& frame, const DrawNode& drawNode, const Po
         const float cy = by + ay * qx + bby * qy + ccy * qz;
         const float cz = bz + az * qx + bbz * qy + ccz * qz;
         const vec3 d = octDecode(r.normal);
-        const float away = -1.0f / std::sqrt(max(cx * cx + cy * cy + cz * cz, 1.0e-37f));
+        const vec3 sight = sightTo(lens, vec3(cx, cy, cz));
+        const float away = -1.0f / std::sqrt(max(dot(sight, sight), 1.0e-37f));
         const bool isFree = (recordFlags(r) & kFlagNoNormal) != 0u;
-        const float nx = isFree ? cx * away : (ax * d.x + bbx * d.y + ccx * d.z) * shorten;
-        const float ny = isFree ? cy * away : (ay * d.x + bby * d.y + ccy * d.z) * shorten;
-        const float nz = isFree ? cz * away : (az * d.x + bbz * d.y + ccz * d.z) * shorten;
-        const float cap = (recordFlags(r) & kFlagScattered) != 0u ? max(cz, 0.0f) * scattered : 3.0e38f;
+        const float nx = isFree ? sight.x * away : (ax * d.x + bbx * d.y + ccx * d.z) * shorten;
+        const float ny = isFree ? sight.y * away : (ay * d.x + bby * d.y + ccy * d.z) * shorten;
+        const float nz = isFree ? sight.z * away : (az * d.x + bbz * d.y + ccz * d.z) * shorten;
+        const float cap =
+            (recordFlags(r) & kFlagScattered) != 0u ? max(lensDepth(lens, cz), 0.0f) * scattered : 3.0e38f;
         const float radius = min(edge * radiusFractionFast(recordRadiusCode(r)), cap);
         out.cx[i] = cx;
         out.cy[i] = cy;
@@ -37,13 +40,13 @@ void placeSplats(const FrameConstants& frame, const DrawNode& drawNode, const Po
         out.radius[i] = radius;
         const float drawnHere = float(int(octantMask >> recordOctant(r) & 1u));  // a bool would keep GCC from SIMD
         const bool fine = (recordErrorCode(r) <= errorCode) | (drawnHere > 0.5f);
-        const bool seen =
-            ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) != 0u) | (nx * cx + ny * cy + nz * cz < 0.0f);
+        const bool seen = ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) != 0u) |
+                          (nx * sight.x + ny * sight.y + nz * sight.z < 0.0f);
         const bool faces = !isFree | (cz > nearPlane);
         // The box of the disc's sphere, where that lies wholly before the eye; else whatever box it has (isNear).
         const float front = cz - radius, back = cz + radius;
-        const bool isNear = !(front > 0.05f * cz);
-        const float toFront = focal / front, toBack = focal / back;
+        const bool isNear = !kOrthographic & !(front > 0.05f * cz);
+        const float toFront = focal / lensDepth(lens, front), toBack = focal / lensDepth(lens, back);
         const float left = cx - radius, right = cx + radius, top = cy - radius, bottom = cy + radius;
         const float x0 = left * (left < 0.0f ? toFront : toBack) + midX,
                     x1 = right * (right > 0.0f ? toFront : toBack) + midX;
@@ -72,6 +75,22 @@ void placeSplats(const FrameConstants& frame, const DrawNode& drawNode, const Po
     }
 }
 
+/// Where a pixel's ray meets the plane of a disc, and how far from the centre, squared. (ex, ey): the pixel, px from
+/// the principal point, over the focal length. `ahead`: normal . centre; `rest`: normal.y ey + normal.z.
+struct SplatHit {
+    float depth, off2;
+};
+[[gnu::always_inline]] inline SplatHit splatHit(vec3 centre, vec3 normal, float ahead, float rest, float ex, float ey) {
+    if (kOrthographic) {
+        const float x = centre.x - ex, y = centre.y - ey;
+        const float z = (normal.x * x + normal.y * y) / normal.z;
+        return {centre.z + z, x * x + y * y + z * z};
+    }
+    const float z = ahead / (normal.x * ex + rest);
+    const float offX = z * ex - centre.x, offY = z * ey - centre.y, offZ = z - centre.z;
+    return {z, offX * offX + offY * offY + offZ * offZ};
+}
+
 /// Some discs of a tile, ready to be drawn. `ahead`: distance of the eye from the plane, times the normal's sign.
 struct SplatBatch {
     static constexpr size_t kSize = 64;
@@ -96,6 +115,7 @@ void prepareSplats(const FrameConstants& frame, const PlacedSplat* splats, const
     }
     const int x0 = int(tile.x0), y0 = int(tile.y0);
     const float focal = f.focal, inverseFocal = 1.0f / focal, nearPlane = f.nearPlane, far = 1.0e6f;
+    const Lens lens = lensHere(focal);
     const int width = int(tile.width), height = int(tile.height);
     const float shiftX = float(x0) + 0.5f - f.centre.x, shiftY = float(y0) + 0.5f - f.centre.y;
 #pragma GCC ivdep
@@ -103,8 +123,8 @@ void prepareSplats(const FrameConstants& frame, const PlacedSplat* splats, const
         const WideDisc d{vec3(b.cx[i], b.cy[i], b.cz[i]), vec3(b.nx[i], b.ny[i], b.nz[i]), radius[i], 0u};
         const CentrePixel c = centrePixel(d, f);
         // Pixels whose centres lie between the slopes that bound it; a hundredth is for rounding.
-        const vec2 across = discSlopes(d.centre.x, d.centre.z, d.normal.x, d.normal.z, d.radius);
-        const vec2 down = discSlopes(d.centre.y, d.centre.z, d.normal.y, d.normal.z, d.radius);
+        const vec2 across = discSlopes(lens, d.centre.x, d.centre.z, d.normal.x, d.normal.z, d.radius);
+        const vec2 down = discSlopes(lens, d.centre.y, d.centre.z, d.normal.y, d.normal.z, d.radius);
         b.ahead[i] = dot(d.normal, d.centre);
         b.radius2[i] = d.radius * d.radius;
         b.firstX[i] = -int(std::floor(min(max(shiftX - across.x * focal, -far), far) + 0.01f));
@@ -114,9 +134,8 @@ void prepareSplats(const FrameConstants& frame, const PlacedSplat* splats, const
         // Where the ray of the centre's pixel misses the disc, that pixel shows it at the centre's depth.
         const float ex = (float(c.x) + 0.5f - f.centre.x) * inverseFocal,
                     ey = (float(c.y) + 0.5f - f.centre.y) * inverseFocal;
-        const float z = b.ahead[i] / (d.normal.x * ex + (d.normal.y * ey + d.normal.z));
-        const float offX = z * ex - d.centre.x, offY = z * ey - d.centre.y, offZ = z - d.centre.z;
-        const bool isHit = (offX * offX + offY * offY + offZ * offZ <= b.radius2[i]) & (z > nearPlane);
+        const SplatHit hit = splatHit(d.centre, d.normal, b.ahead[i], d.normal.y * ey + d.normal.z, ex, ey);
+        const bool isHit = (hit.off2 <= b.radius2[i]) & (hit.depth > nearPlane);
         const int atX = c.x - x0, atY = c.y - y0;
         const bool isHere = (atX >= 0) & (atX < width) & (atY >= 0) & (atY < height);
         b.missed[i] = isHere & !isHit ? atY * int(SplatTile::kWidth) + atX : -1;
@@ -152,10 +171,9 @@ void drawSplat(const SplatBatch& b, size_t i, uint32_t id, const SplatTile& tile
 #pragma GCC ivdep
             for (int l = 0; l < kSplatLanes; ++l) {
                 const float ex = (float(x + l) + shift) * inverseFocal;
-                const float z = ahead / (nx * ex + rest);
-                const float offX = z * ex - cx, offY = z * ey - cy, offZ = z - cz;
-                const bool isHit = (offX * offX + offY * offY + offZ * offZ <= radius2) & (z > nearPlane);
-                const uint32_t bits = floatBitsToUint(z);
+                const SplatHit hit = splatHit(vec3(cx, cy, cz), vec3(nx, ny, nz), ahead, rest, ex, ey);
+                const bool isHit = (hit.off2 <= radius2) & (hit.depth > nearPlane);
+                const uint32_t bits = floatBitsToUint(hit.depth);
                 const bool isFront = isHit & ((bits < depth[l]) | ((bits == depth[l]) & (id < owner[l])));
                 depth[l] = isFront ? bits : depth[l];
                 owner[l] = isFront ? id : owner[l];

@@ -39,9 +39,9 @@
 /// themselves cannot be gathered.)
 struct alignas(64) Lines {
     float xa[kSegmentsPerBlock], ya[kSegmentsPerBlock], xb[kSegmentsPerBlock], yb[kSegmentsPerBlock];
-    float inverseA[kSegmentsPerBlock], inverseB[kSegmentsPerBlock];
-    float halfA[kSegmentsPerBlock], halfB[kSegmentsPerBlock];      ///< seen half-widths, px
-    float nearerA[kSegmentsPerBlock], nearerB[kSegmentsPerBlock];  ///< depth of the surface / of the axis
+    float inverseA[kSegmentsPerBlock], inverseB[kSegmentsPerBlock];  ///< imageLinear of the axis
+    float halfA[kSegmentsPerBlock], halfB[kSegmentsPerBlock];        ///< seen half-widths, px
+    float nearerA[kSegmentsPerBlock], nearerB[kSegmentsPerBlock];    ///< surfaceStep
     float isRound[kSegmentsPerBlock], isFilled[kSegmentsPerBlock];
     uint32_t lot[kSegmentsPerBlock];  ///< strandLot
     uint32_t keep[kSegmentsPerBlock];
@@ -130,6 +130,8 @@ void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pix
                        *const steep = lines.isSteep;
     const uint32_t* const lot = lines.lot;
     uint32_t* __restrict const depth = pixels.depth, * __restrict const pixel = pixels.pixel;
+    const Lens lens = lensHere(f.focal);
+    const float nearPlane = f.nearPlane;
 #pragma GCC ivdep
     for (size_t k = 0; k < count; ++k) {
         const uint32_t i = segment[k];
@@ -141,7 +143,8 @@ void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pix
         const uint32_t where = isSteep ? column * f.width + row : row * f.width + column;
         const float covered = 2.0f * half * longer[i], share = half < kNarrow ? covered : 2.0f;
         const float taken = coverageThreshold(where, lot[i], f.coverageSeed) < share ? inside : 0.0f;
-        depth[k] = floatBitsToUint((nearer[i] + u * dNearer[i]) / (inverse[i] + u * dInverse[i]));
+        depth[k] =
+            floatBitsToUint(lineDepth(lens, inverse[i] + u * dInverse[i], nearer[i] + u * dNearer[i], nearPlane));
         pixel[k] = taken > 0.5f ? where : ~0u;
     }
     const uint64_t first = drawId(f.firstBlock.curves, firstPlace);
@@ -159,12 +162,13 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
     const FrameConstants f = frame;
     const DrawNode node = *block.node;
     const uint32_t* __restrict const words = &block.segments->a.positionXY;
+    const Lens lens = lensHere(f.focal);
     Lines lines;
 #pragma GCC ivdep
     for (size_t i = 0; i < count; ++i) {
         const StrandSegment s = segmentAt(words, i);
         const CameraSegment c = cameraSegment(node, s);
-        const ScreenSegment p = projectSegment(c.a, c.b, f.focal, f.centre.x, f.centre.y, f.nearPlane);
+        const ScreenSegment p = projectSegment(c.a, c.b, lens, f.centre.x, f.centre.y, f.nearPlane);
         const vec3 t = segmentTangent(c);
         const auto at = [&](float place) {
             return vec3(c.a.x + place * (c.b.x - c.a.x), c.a.y + place * (c.b.y - c.a.y),
@@ -173,27 +177,22 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
         const vec3 a = at(p.from), b = at(p.to);
         const float ra = c.radiusA + p.from * (c.radiusB - c.radiusA), rb = c.radiusA + p.to * (c.radiusB - c.radiusA);
         // The same depth that the texel gets: that of the surface over the axis.
-        const auto nearer = [&](const vec3& end, float radius) {
-            const float distance = std::sqrt(max(dot(end, end), 1.0e-30f));
-            const float tv = dot(t, end) / distance;
-            return c.isRound > 0.5f ? 1.0f - tubeFront(radius, 1.0f - tv * tv, distance) / distance : 1.0f;
-        };
         lines.xa[i] = p.xa;
         lines.ya[i] = p.ya;
         lines.xb[i] = p.xb;
         lines.yb[i] = p.yb;
-        lines.inverseA[i] = 1.0f / p.za;
-        lines.inverseB[i] = 1.0f / p.zb;
-        lines.halfA[i] = endHalfWidth(c, p.from, c.directionA, f.focal, f.nearPlane);
-        lines.halfB[i] = endHalfWidth(c, p.to, c.directionB, f.focal, f.nearPlane);
-        lines.nearerA[i] = nearer(a, ra);
-        lines.nearerB[i] = nearer(b, rb);
+        lines.inverseA[i] = imageLinear(lens, p.za);
+        lines.inverseB[i] = imageLinear(lens, p.zb);
+        lines.halfA[i] = endHalfWidth(c, p.from, c.directionA, lens, f.nearPlane);
+        lines.halfB[i] = endHalfWidth(c, p.to, c.directionB, lens, f.nearPlane);
+        lines.nearerA[i] = surfaceStep(lens, a, t, ra, c.isRound);
+        lines.nearerB[i] = surfaceStep(lens, b, t, rb, c.isRound);
         lines.lot[i] = strandLot(s);
         lines.isRound[i] = c.isRound;
-        lines.isFilled[i] = isFilled(c, p, f.focal, f.exactStrands);
+        lines.isFilled[i] = isFilled(c, p, lens, f.exactStrands);
         const bool isFine = (segmentErrorCode(s) <= node.errorCode) | ((segmentOctants(s) & node.octantMask) != 0u);
         const float reaches =
-            strandReaches(c, f.focal, f.centre.x, f.centre.y, float(int(f.width)), float(int(f.height)), f.nearPlane);
+            strandReaches(c, lens, f.centre.x, f.centre.y, float(int(f.width)), float(int(f.height)), f.nearPlane);
         lines.keep[i] = (isFine & (max(p.isThere, reaches) > 0.5f)) ? 1u : 0u;
     }
     layLines(f, lines, count);
@@ -235,8 +234,12 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
             drawPixels(f, lines, pixels, collected, firstPlace, visibility);
             collected = 0;
         }
-        if (lines.pixelA[i] != ~0u) offer(visibility, lines.pixelA[i], lines.inverseA[i] / lines.nearerA[i], id);
-        if (lines.pixelB[i] != ~0u) offer(visibility, lines.pixelB[i], lines.inverseB[i] / lines.nearerB[i], id);
+        // (In perspective what is linear on the image is divided twice, as ever.)
+        const auto end = [&](float linear, float nearer) {
+            return kOrthographic ? lineDepth(lens, linear, nearer, f.nearPlane) : linear / nearer;
+        };
+        if (lines.pixelA[i] != ~0u) offer(visibility, lines.pixelA[i], end(lines.inverseA[i], lines.nearerA[i]), id);
+        if (lines.pixelB[i] != ~0u) offer(visibility, lines.pixelB[i], end(lines.inverseB[i], lines.nearerB[i]), id);
     }
     drawPixels(f, lines, pixels, collected, firstPlace, visibility);
 }
@@ -282,7 +285,7 @@ constexpr int kFilledRibbon = 1, kFilledTube = 2;
 }
 
 /// Filled tubes or filled ribbons, by the rays of their pixels: side by side, or they would not be worked on together.
-/// (ex0, ey, 1): ray of the row's first pixel.
+/// (ex0, ey): the row's first pixel, px from the principal point, over the focal length.
 template <int kind>
 void resolveFilled(const FrameConstants& f, const StrandPixels& e, const WinningPixels& p, float ex0, float ey,
                    StrandTexels& o) {
@@ -300,16 +303,17 @@ void resolveFilled(const FrameConstants& f, const StrandPixels& e, const Winning
         from[filled++] = uint32_t(i);
     }
     const float inverseFocal = 1.0f / f.focal, nearPlane = f.nearPlane;
+    const Lens lens = lensHere(f.focal);
 #pragma GCC ivdep
     for (size_t k = 0; k < filled; ++k) {
         const StrandSegment packed = packedOf(t, k);
         const CameraSegment s = cameraSegment(nodeOf(t, k), packed);
-        const float ex = ex0 + pixel[k] * inverseFocal;
+        const PixelRay ray = pixelRay(lens, ex0 + pixel[k] * inverseFocal, ey);
         FilledPixel seen;
         if constexpr (kind == kFilledTube)
-            seen = tubePixel(s, ex, ey, nearPlane);
+            seen = tubePixel(s, ray, nearPlane);
         else
-            seen = ribbonPixel(s, ex, ey, nearPlane);
+            seen = ribbonPixel(s, ray, nearPlane);
         depth[k] = seen.depth;
         perpX[k] = seen.normalPerp.x;
         perpY[k] = seen.normalPerp.y;
@@ -364,6 +368,7 @@ bool resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
     }
     const float focal = f.focal, cx = f.centre.x - float(int(x0)) - 0.5f, cy = f.centre.y - float(int(y)) - 0.5f;
     const float nearPlane = f.nearPlane, support = f.supportScale;
+    const Lens lens = lensHere(focal);
     const vec3 sun = f.sunDirection;
     const float exactStrands = f.exactStrands;
 #pragma GCC ivdep
@@ -372,8 +377,8 @@ bool resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
         const CameraSegment s = cameraSegment(nodeOf(e, i), packed);
         const float px = float(int(p.pixel[i]));
         // Image coordinates from this pixel's centre on, so that the low bits are kept.
-        const ScreenSegment on = projectSegment(s.a, s.b, focal, cx - px, cy, nearPlane);
-        const StrandPixel seen = strandPixel(s, on, support, focal, cx - px, cy, nearPlane, sun);
+        const ScreenSegment on = projectSegment(s.a, s.b, lens, cx - px, cy, nearPlane);
+        const StrandPixel seen = strandPixel(s, on, support, lens, cx - px, cy, nearPlane, sun);
         const Texel t = seen.texel;
         const float place = seen.place;
         o.depth[i] = t.depth;
@@ -386,7 +391,7 @@ bool resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
         o.isRound[i] = t.isRound;
         o.axisX[i] = t.axis.x;
         o.axisY[i] = t.axis.y;
-        o.filled[i] = isFilled(s, on, focal, exactStrands) *
+        o.filled[i] = isFilled(s, on, lens, exactStrands) *
                       (float(kFilledRibbon) + s.isRound * float(kFilledTube - kFilledRibbon));
         o.red[i] = mixedColour(packed, 0, place);
         o.green[i] = mixedColour(packed, 8, place);

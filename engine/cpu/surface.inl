@@ -8,7 +8,7 @@
     for (size_t i = 0; i < n; ++i) {
         const size_t at = kPad + i;
         // The disc's, as seen at its centre (a tube's: as seen at the pixel).
-        const vec3 v = viewDirection(x + float(int(i)) + flat[i] * row.x[at], y + flat[i] * row.y[at], focal);
+        const vec3 v = viewDirection(x + float(int(i)) + flat[i] * row.x[at], y + flat[i] * row.y[at], lensHere(focal));
         const vec3 normal = normalFromPerp(vec2(row.perpX[at], row.perpY[at]), v);
         out.nx[i] = normal.x;
         out.ny[i] = normal.y;
@@ -52,8 +52,10 @@ void surfaceRow(const FrameConstants& frame, const TexelRow& __restrict own, con
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
             const size_t at = kPad + i;
-            out.depth[i] = planeDepth(row.depth[at], max(row.radius[at], 1.0e-3f), vec2(row.perpX[at], row.perpY[at]),
-                                      row.x[at], row.y[at], 1.0f - flat[i], x + float(int(i)), py, focal);
+            const float depth =
+                planeDepth(row.depth[at], max(row.radius[at], 1.0e-3f), vec2(row.perpX[at], row.perpY[at]), row.x[at],
+                           row.y[at], 1.0f - flat[i], x + float(int(i)), py, lensHere(focal));
+            out.depth[i] = kOrthographic && !(row.depth[at] > 0.0f) ? row.depth[at] : depth;  // nothing stays nothing
         }
     const float mayBeRibbon = row.hasTubes ? 1.0f : 0.0f;
     if (wants.leaf)

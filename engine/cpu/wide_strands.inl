@@ -49,6 +49,7 @@ void fillRibbon(const FrameConstants& f, const WideStrand& s, int firstRow, int 
     const Ribbon ribbon = s.ribbon;
     const HullLines hull = hullLines(s);
     const float inverseFocal = 1.0f / f.focal, nearPlane = f.nearPlane;
+    const Lens lens = lensHere(f.focal);
     for (int y = first; y <= last; ++y) {
         const float cy = float(y) + 0.5f, ey = (cy - f.centre.y) * inverseFocal;
         float from = 3.0e38f, to = -3.0e38f;
@@ -61,8 +62,8 @@ void fillRibbon(const FrameConstants& f, const WideStrand& s, int firstRow, int 
             const float ex0 = float(x0) + 0.5f - f.centre.x;
 #pragma GCC ivdep
             for (size_t k = 0; k < kRibbonStretch; ++k) {
-                const RibbonHit hit =
-                    ribbonHit(ribbon, (ex0 + float(int(k))) * inverseFocal, ey, nearPlane, kRibbonSlack);
+                const RibbonHit hit = ribbonHit(ribbon, pixelRay(lens, (ex0 + float(int(k))) * inverseFocal, ey),
+                                                nearPlane, kRibbonSlack);
                 depth[k] = floatBitsToUint(hit.depth);
                 keep[k] = hit.depth < kNoRibbon ? 1u : 0u;
             }
@@ -82,6 +83,7 @@ void fillTubeRows(const FrameConstants& f, const WideStrand& s, int firstRow, in
               last = pixelWithin(max(s.bottom[0], s.bottom[1]), float(firstRow) - 1.0f, float(lastRow));
     const Tube tube = s.tube;
     const float inverseFocal = 1.0f / f.focal, nearPlane = f.nearPlane;
+    const Lens lens = lensHere(f.focal);
     for (int y = first; y <= last; ++y) {
         // Between the boxes of both ends lie boxes, of which the row meets those from u = lo to hi.
         const float cy = float(y);
@@ -105,7 +107,8 @@ void fillTubeRows(const FrameConstants& f, const WideStrand& s, int firstRow, in
             const float ex0 = float(x0) + 0.5f - f.centre.x;
 #pragma GCC ivdep
             for (size_t k = 0; k < kTubeStretch; ++k) {
-                const TubeHit hit = tubeHit(tube, (ex0 + float(int(k))) * inverseFocal, ey, nearPlane, isPlain);
+                const TubeHit hit =
+                    tubeHit(tube, pixelRay(lens, (ex0 + float(int(k))) * inverseFocal, ey), nearPlane, isPlain);
                 depth[k] = floatBitsToUint(hit.depth);
                 keep[k] = hit.depth < kNoDepth ? 1u : 0u;
             }
@@ -138,13 +141,14 @@ WideStrand wideTube(const FrameConstants& f, const CameraSegment& c, uint64_t id
     w.tube = tubeOf(c.a, c.b, c.radiusA, c.radiusB);
     const vec3 ends[2] = {c.a, c.b};
     const float radii[2] = {c.radiusA, c.radiusB};
-    const bool isBefore =
-        c.a.z > 1.0001f * c.radiusA && c.b.z > 1.0001f * c.radiusB;  // both have an outline of their own
+    const Lens lens = lensHere(f.focal);
+    const bool isBefore = kOrthographic || (c.a.z > 1.0001f * c.radiusA &&
+                                            c.b.z > 1.0001f * c.radiusB);  // both have an outline of their own
     for (size_t k = 0; k < 2; ++k) {
         const size_t l = isBefore ? k : 0, m = isBefore ? k : 1;
         const auto slope = [&](float sign, float vec3::*axis) {
-            return sign *
-                   tubeSlope(sign * (ends[l].*axis), ends[l].z, radii[l], sign * (ends[m].*axis), ends[m].z, radii[m]);
+            return sign * tubeSlope(lens, sign * (ends[l].*axis), ends[l].z, radii[l], sign * (ends[m].*axis),
+                                    ends[m].z, radii[m]);
         };
         w.left[k] = slope(-1.0f, &vec3::x) * f.focal + f.centre.x - 0.51f;  // of pixels' centres, rounded
         w.right[k] = slope(1.0f, &vec3::x) * f.focal + f.centre.x - 0.49f;
@@ -159,17 +163,18 @@ WideStrand wideRibbon(const FrameConstants& f, const CameraSegment& c, uint64_t 
     WideStrand w{};
     w.id = id;
     w.ribbon = ribbonOf(c.a, c.b, c.directionA, c.directionB, c.radiusA, c.radiusB);
+    const Lens lens = lensHere(f.focal);
     bool isBefore = true;
     for (size_t k = 0; k < 4; ++k) {
         const vec3 corner = ribbonCorner(w.ribbon, k < 2 ? 0.0f : 1.0f, k % 2 == 0 ? -1.0f : 1.0f);
-        const float scale = f.focal / max(corner.z, f.nearPlane);
+        const float scale = f.focal / lensDepth(lens, max(corner.z, f.nearPlane));
         w.x[k] = corner.x * scale + f.centre.x;
         w.y[k] = corner.y * scale + f.centre.y;
-        isBefore =
-            isBefore && corner.z > f.nearPlane && std::fabs(w.x[k]) < kStrandGuard && std::fabs(w.y[k]) < kStrandGuard;
+        isBefore = isBefore && (kOrthographic || corner.z > f.nearPlane) && std::fabs(w.x[k]) < kStrandGuard &&
+                   std::fabs(w.y[k]) < kStrandGuard;
     }
     const float width = float(int(f.width)), height = float(int(f.height));
-    const float reaches = strandReaches(c, f.focal, f.centre.x, f.centre.y, width, height, f.nearPlane);
+    const float reaches = strandReaches(c, lens, f.centre.x, f.centre.y, width, height, f.nearPlane);
     for (size_t k = 0; k < 4 && !isBefore; ++k) {
         w.x[k] = k % 2 == 0 ? 0.0f : width;
         w.y[k] = k < 2 || reaches < 0.5f ? 0.0f : height;

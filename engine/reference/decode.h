@@ -5,11 +5,36 @@
 #include <cmath>
 #include <glm/glm.hpp>
 
+#include "lod/cut.h"
 #include "lod/hierarchy.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::reference {
+
+/// A ray of camera space: `origin` + t `direction`, whose z is 1, so that t is the depth.
+struct ViewRay {
+    glm::dvec3 origin{0}, direction{0, 0, 1};
+    glm::dvec3 at(double depth) const { return origin + depth * direction; }
+    glm::dvec3 sight() const { return glm::normalize(direction); }
+};
+/// Through an image point, px from the upper left corner.
+inline ViewRay viewRay(const lod::View& view, const glm::dvec2& point) {
+    const glm::dvec2 off = (point - 0.5 * glm::dvec2(view.width, view.height)) / view.focalPixels;
+    if (view.isOrthographic) return {{off.x, off.y, 0}, {0, 0, 1}};
+    return {{0, 0, 0}, {off.x, off.y, 1}};
+}
+/// Pixels of a world unit across the view, at a depth.
+inline double pixelsAt(const lod::View& view, double depth) {
+    return view.isOrthographic ? view.focalPixels : view.focalPixels / depth;
+}
+/// Where a place of camera space is seen, and the unit direction in which.
+inline glm::dvec2 imageOf(const lod::View& view, const glm::dvec3& c) {
+    return pixelsAt(view, c.z) * glm::dvec2(c) + 0.5 * glm::dvec2(view.width, view.height);
+}
+inline glm::dvec3 sightOf(const lod::View& view, const glm::dvec3& c) {
+    return view.isOrthographic ? glm::dvec3(0, 0, 1) : glm::normalize(c);
+}
 
 struct Disc {
     glm::dvec3 position{0};  ///< world

@@ -17,32 +17,43 @@ namespace {
 using glm::dvec2;
 using glm::dvec3;
 
+/// What a sample's disc has to do with rays: its place where its depth is `depth`.
+dvec3 placeOf(const Sample& s, double depth, const lod::View& view) { return viewRay(view, s.centre).at(depth); }
+
 /// Normal of a sample's disc in camera space; `perp`, `facing`: across and along the view of its centre.
-dvec3 discNormal(const Sample& s, const dvec2& perp, double facing, const Lens& lens) {
-    return glm::transpose(rotationToZ(glm::normalize(lens.rayTo(s.centre)))) * dvec3(perp, -facing);
+dvec3 discNormal(const Sample& s, const dvec2& perp, double facing, const lod::View& view) {
+    return glm::transpose(rotationToZ(viewRay(view, s.centre).sight())) * dvec3(perp, -facing);
 }
 
 /// rho^2 of an image point in the disc of a sample: where the ray through it meets the plane, in radii. A disc that is
 /// seen edge-on is turned until a quarter of a pixel of it is seen to each side; a tube's faces the eye.
-double rhoSquared(const Sample& s, const dvec2& point, const Lens& lens) {
+double rhoSquared(const Sample& s, const dvec2& point, const lod::View& view) {
     dvec2 perp = s.isRound ? dvec2(0) : s.perp;
     const double sine = glm::length(perp), least = std::min(0.25 / s.radius, 1.0);
     const double facing = std::max(std::sqrt(std::max(0.0, 1 - sine * sine)), least);
     if (sine > 0) perp *= std::sqrt(1 - facing * facing) / sine;
-    const dvec3 n = discNormal(s, perp, facing, lens), c = lens.rayTo(s.centre), ray = lens.rayTo(point);
-    const double t = glm::dot(n, c) / glm::dot(n, ray);
-    if (!(t > 0 && t < 100)) return 1e300;
-    const dvec3 off = t * ray - c;
-    return glm::dot(off, off) * lens.focal * lens.focal / (s.radius * s.radius);
+    // Where the centre's depth is 1, which is as good as any.
+    const dvec3 n = discNormal(s, perp, facing, view), c = placeOf(s, 1, view);
+    const ViewRay ray = viewRay(view, point);
+    const double t = glm::dot(n, c - ray.origin) / glm::dot(n, ray.direction);
+    if (!view.isOrthographic && !(t > 0 && t < 100)) return 1e300;
+    const dvec3 off = ray.at(t) - c;
+    return glm::dot(off, off) * view.focalPixels * view.focalPixels / (s.radius * s.radius);
 }
 
 /// Depth of a sample's plane at an image point; see planeDepth for what is capped.
-double depthAt(const Sample& s, const dvec2& point, const Lens& lens) {
+double depthAt(const Sample& s, const dvec2& point, const lod::View& view) {
     if (s.isRound) return s.depth;
     const double facing = std::max(std::sqrt(std::max(0.0, 1 - glm::dot(s.perp, s.perp))), 1.0 / 32);
-    const dvec3 n = discNormal(s, s.perp, facing, lens);
-    const double nearer = glm::dot(n, lens.rayTo(point)) / glm::dot(n, lens.rayTo(s.centre));  // centre / plane
-    const double reach = std::min(std::max(2 * s.radius, 1 / facing) / lens.focal, 0.5);
+    const dvec3 n = discNormal(s, s.perp, facing, view);
+    const double across = std::max(2 * s.radius, 1 / facing) / view.focalPixels;
+    if (view.isOrthographic) {
+        const ViewRay ray = viewRay(view, point);
+        const double t = glm::dot(n, placeOf(s, s.depth, view) - ray.origin) / n.z;
+        return std::clamp(t, s.depth - across, s.depth + across);
+    }
+    const double nearer = glm::dot(n, placeOf({.centre = point}, 1, view)) / glm::dot(n, placeOf(s, 1, view));
+    const double reach = std::min(across, 0.5);
     return s.depth / std::clamp(nearer, 1 - reach, 1 + reach);
 }
 
@@ -53,7 +64,7 @@ struct Contribution {
 
 /// Weighted mean of the contributions whose depth interval begins before the first one ends, at `back`, and that are
 /// round if that one is. A tube is as thick as it is wide.
-Sample blend(std::vector<Contribution>& list, double& back, double inverseFocal) {
+Sample blend(std::vector<Contribution>& list, double& back, const lod::View& view) {
     STIPPLE_CHECK(!list.empty(), "nothing to blend");
     back = 1e300;
     for (const Contribution& c : list) back = std::min(back, c.sample->depth + c.sample->thickness);
@@ -69,27 +80,27 @@ Sample blend(std::vector<Contribution>& list, double& back, double inverseFocal)
     });
     for (const auto& [s, w] : list) {
         weight += w;
-        sum.depth += w / s->depth;  // linear on the image
+        sum.depth += view.isOrthographic ? w * s->depth : w / s->depth;  // what is linear on the image
         sum.radius += w * s->radius;
-        sum.thickness += w * s->thickness / s->depth;
+        sum.thickness += w * s->thickness * pixelsAt(view, s->depth);
         sum.centre += w * s->centre;
         sum.perp += w * s->perp;
         sum.axis += w * s->axis;
         sum.colour += w * s->colour;
     }
     sum.valid = true;
-    sum.depth = weight / sum.depth;
+    sum.depth = view.isOrthographic ? sum.depth / weight : weight / sum.depth;
     sum.radius /= weight;
-    sum.thickness = sum.thickness / weight * sum.depth;
+    sum.thickness = sum.thickness / weight / pixelsAt(view, sum.depth);
     sum.centre /= weight;
     sum.perp /= weight;
     sum.axis /= weight;
     sum.colour /= weight;
-    if (sum.isRound) sum.thickness = sum.radius * sum.depth * inverseFocal;
+    if (sum.isRound) sum.thickness = sum.radius / pixelsAt(view, sum.depth);
     return sum;
 }
 
-Level pullLevel(const Level& fine, double childSize, double inverseFocal) {
+Level pullLevel(const Level& fine, double childSize, const lod::View& view) {
     Level coarse{(fine.width + 1) / 2, (fine.height + 1) / 2, {}};
     coarse.samples.resize(static_cast<size_t>(coarse.width) * static_cast<size_t>(coarse.height));
     for (int y = 0; y < coarse.height; ++y)
@@ -102,23 +113,22 @@ Level pullLevel(const Level& fine, double childSize, double inverseFocal) {
             if (list.empty()) continue;
             double back = 0, front = 1e300, deepest = 0, thickest = 0;
             bool anyLeaf = false;
-            Sample merged = blend(list, back, inverseFocal);
+            Sample merged = blend(list, back, view);
             for (const Contribution& c : list) {
                 front = std::min(front, c.sample->depth);
                 deepest = std::max(deepest, c.sample->depth);
                 thickest = std::max(thickest, c.sample->thickness);
-                anyLeaf = anyLeaf || c.sample->isLeaf(1 / inverseFocal);
+                anyLeaf = anyLeaf || c.sample->isLeaf(pixelsAt(view, c.sample->depth));
             }
             const double end = std::min(thickest + deepest, front + (anyLeaf ? 1 : 2) * thickest);
-            merged.thickness = merged.isRound ? merged.radius * merged.depth * inverseFocal
+            merged.thickness = merged.isRound ? merged.radius / pixelsAt(view, merged.depth)
                                               : std::max(end - merged.depth, 0.5 * thickest);
             coarse.ref(x, y) = merged;
         }
     return coarse;
 }
 
-void pushLevel(Level& fine, const Level& coarse, double fineSize, const Lens& lens) {
-    const double inverseFocal = 1 / lens.focal;
+void pushLevel(Level& fine, const Level& coarse, double fineSize, const lod::View& view) {
     for (int y = 0; y < fine.height; ++y)
         for (int x = 0; x < fine.width; ++x) {
             const dvec2 centre = (dvec2(x, y) + 0.5) * fineSize;
@@ -136,7 +146,7 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize, const Lens& le
                 outside += s == nullptr;
                 if (!s || !s->valid) continue;
                 hindmost = std::max(hindmost, s->depth + s->thickness);
-                around.emplace_back(s, rhoSquared(*s, centre, lens));
+                around.emplace_back(s, rhoSquared(*s, centre, view));
                 nearBack = std::min(nearBack, s->depth + s->thickness);
                 least = std::min(least, around.back().second);
             }
@@ -155,15 +165,16 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize, const Lens& le
                 // So does what shines through from behind all four.
                 const bool shines = around.size() == 4 && fine.ref(x, y).valid && fine.ref(x, y).depth > hindmost;
                 // Leaves are no surface: between them it stays open.
-                const bool isSolid = std::all_of(around.begin(), around.end(),
-                                                 [&](const auto& a) { return !a.first->isLeaf(1 / inverseFocal); });
+                const bool isSolid = std::all_of(around.begin(), around.end(), [&](const auto& a) {
+                    return !a.first->isLeaf(pixelsAt(view, a.first->depth));
+                });
                 const bool between = least >= 1 && isSolid && (gap || shines);
                 const double weight = std::max(rest * rest, between && rho2 <= least ? 0.01 : 0.0);
                 if (weight > 0) list.push_back({s, weight});
             }
             if (list.empty()) continue;
             double back = 0;
-            const Sample merged = blend(list, back, inverseFocal);
+            const Sample merged = blend(list, back, view);
             Sample& own = fine.ref(x, y);
             if (!own.valid || own.depth > back || glm::length(own.centre - centre) > std::max(own.radius, fineSize))
                 own = merged;
@@ -190,8 +201,8 @@ class ReferenceBackend final : public render::Backend {
         projectStrands(draws, chunks_, level0);
         projectMeshes(draws, chunks_, level0);
         const Level own = level0;
-        if (mode.hasPyramid) reconstruct(level0, lensOf(draws));
-        finishTubes(draws.view.focalPixels, level0);
+        if (mode.hasPyramid) reconstruct(level0, draws.view);
+        finishTubes(draws.view, level0);
         shade(draws, own, level0, request.wantDepthAndNormal, image);
         times_ = {{"reference", (nowSeconds() - start) * 1e3}};
         return {};
@@ -222,43 +233,43 @@ class ReferenceBackend final : public render::Backend {
     static void project(const render::DrawList& draws, const PlacedDisc& d, bool besideToo, Level& level) {
         const lod::View& v = draws.view;
         const dvec3 c = d.centre;
-        const dvec2 p(v.focalPixels * c.x / c.z + 0.5 * v.width, v.focalPixels * c.y / c.z + 0.5 * v.height);
+        const dvec2 p = imageOf(v, c);
+        const double pixels = pixelsAt(v, c.z);
+        const dvec3 toPoint = sightOf(v, c);
         // A stray point hides no more of the picture than this.
         const bool isScattered = (d.flags & shared::kFlagScattered) != 0;
         const double most = isScattered ? std::max(v.height / 128.0, 4.0) : 16384.0;
-        const double radius = std::clamp(d.radius * v.focalPixels / c.z, double(draws.frame.minimumRadius), most);
+        const double radius = std::clamp(d.radius * pixels, double(draws.frame.minimumRadius), most);
         const dvec2 at(std::clamp(p.x, 0.0, v.width - 1.0), std::clamp(p.y, 0.0, v.height - 1.0));
         const bool isInside = p.x >= 0 && p.y >= 0 && p.x < v.width && p.y < v.height;
-        const double beside = glm::length(p - at) / (1 + radius * std::min(1.25 * glm::length(c) / c.z, 15.0));
+        const double beside = glm::length(p - at) / (1 + radius * std::min(1.25 / toPoint.z, 15.0));
         if (!isInside && !(besideToo && beside < 1)) return;
         // There, of one surface's splats that which reaches in farthest is kept.
-        const double key = c.z + (isInside ? 0.0 : beside * beside * radius * c.z / v.focalPixels);
+        const double key = c.z + (isInside ? 0.0 : beside * beside * radius / pixels);
         Sample& s = isInside ? level.ref(toWhole<int>(p.x), toWhole<int>(p.y))
                              : level.ref(toWhole<int>(at.x), toWhole<int>(at.y));
         if (s.valid && s.key <= key) return;
-        const dvec3 toPoint = glm::normalize(c);
         const double facing = glm::dot(d.normal, toPoint);
         s.valid = true;
         s.depth = c.z;
         s.key = key;
         s.centre = p;
         s.radius = radius;
-        s.thickness = s.radius * c.z / v.focalPixels * (0.25 + std::sqrt(std::max(0.0, 1 - facing * facing)));
-        if ((d.flags & shared::kFlagLoose) != 0) s.thickness = kLeafThickness * s.radius * c.z / v.focalPixels;
+        s.thickness = s.radius / pixels * (0.25 + std::sqrt(std::max(0.0, 1 - facing * facing)));
+        if ((d.flags & shared::kFlagLoose) != 0) s.thickness = kLeafThickness * s.radius / pixels;
         s.perp = dvec2(rotationToZ(toPoint) * (facing > 0 ? -d.normal : d.normal));
         s.colour = d.colour;
     }
 
-    static void reconstruct(Level& level0, const Lens& lens) {
+    static void reconstruct(Level& level0, const lod::View& view) {
         double largest = 0;
         for (const Sample& s : level0.samples) largest = std::max(largest, s.valid ? s.radius : 0.0);
         const int count = 1 + toWhole<int>(std::ceil(std::log2(std::max(2.0, 2 * largest))));
         std::vector<Level> pyramid{level0};
         while (static_cast<int>(pyramid.size()) < count && (pyramid.back().width > 1 || pyramid.back().height > 1))
-            pyramid.push_back(
-                pullLevel(pyramid.back(), std::ldexp(1.0, static_cast<int>(pyramid.size()) - 1), 1 / lens.focal));
+            pyramid.push_back(pullLevel(pyramid.back(), std::ldexp(1.0, static_cast<int>(pyramid.size()) - 1), view));
         for (size_t l = pyramid.size() - 1; l-- > 0;)
-            pushLevel(pyramid[l], pyramid[l + 1], std::ldexp(1.0, static_cast<int>(l)), lens);
+            pushLevel(pyramid[l], pyramid[l + 1], std::ldexp(1.0, static_cast<int>(l)), view);
         level0 = std::move(pyramid[0]);
     }
 
@@ -266,7 +277,6 @@ class ReferenceBackend final : public render::Backend {
                render::Image& image) {
         const lod::View& v = draws.view;
         const shared::FrameConstants& f = draws.frame;
-        const Lens lens = lensOf(draws);
         const size_t pixels = size_t{v.width} * v.height;
         image.width = v.width;
         image.height = v.height;
@@ -283,9 +293,8 @@ class ReferenceBackend final : public render::Backend {
                     // A disc's normal is that at its centre, a tube's that at the pixel.
                     Sample at = s;
                     if (s.isRound) at.centre = p;
-                    const dvec3 n =
-                        discNormal(at, s.perp, std::sqrt(std::max(0.0, 1 - glm::dot(s.perp, s.perp))), lens);
-                    const double depth = depthAt(s, p, lens);
+                    const dvec3 n = discNormal(at, s.perp, std::sqrt(std::max(0.0, 1 - glm::dot(s.perp, s.perp))), v);
+                    const double depth = depthAt(s, p, v);
                     colour = s.colour;
                     if (f.debugView == shared::kDebugHoles) {
                         const Sample& o = own.samples[i];
@@ -297,9 +306,9 @@ class ReferenceBackend final : public render::Backend {
                     } else if (f.debugView == shared::kDebugNone &&
                                (s.isTriangle ||
                                 ((f.shade & shared::kShadeLit) != 0 && (!draws.lights.empty() || draws.environment)))) {
-                        colour = shadeTriangle(s, n, lens.rayTo(p) * depth, draws);
+                        colour = shadeTriangle(s, n, viewRay(v, p).at(depth), draws);
                     } else if ((f.shade & shared::kShadeLit) != 0 && f.debugView == shared::kDebugNone) {
-                        colour *= lightOn(n, f, s.letsLightThrough(v.focalPixels));
+                        colour *= lightOn(n, f, s.letsLightThrough(pixelsAt(v, s.depth)));
                     }
                     if (wantAll) {
                         image.depth[i] = static_cast<float>(depth);

@@ -25,10 +25,10 @@ struct Sample {
     bool isTriangle = false, isUnlit = false;
     double metallic = 0, roughness = 1, occlusion = 1;
     glm::dvec3 emissive{0};
-    /// No surface, and lets light through: hardly any thickness.
-    bool isLeaf(double focal) const { return thickness * focal < 0.125 * radius * depth; }
+    /// No surface, and lets light through: hardly any thickness. `pixels`: of a world unit at its depth.
+    bool isLeaf(double pixels) const { return thickness * pixels < 0.125 * radius; }
     /// So do narrow ribbons, which are merged as a surface is: of what is not round `axis.x` is 1 where all parts are.
-    bool letsLightThrough(double focal) const { return isLeaf(focal) || (!isRound && axis.x > 0.999); }
+    bool letsLightThrough(double pixels) const { return isLeaf(pixels) || (!isRound && axis.x > 0.999); }
 };
 /// The pixel of a coordinate, from 0 to `most`: those far off the image, or no number at all, do not fit into an int.
 inline int pixelIn(double coordinate, int most) {
@@ -64,7 +64,7 @@ void projectStrands(const render::DrawList& draws, const Chunks& chunks, Level& 
 
 /// What tubes look like pixel by pixel, once the level is reconstructed: normals round their axes, depths of the
 /// surface.
-void finishTubes(double focal, Level& level);
+void finishTubes(const lod::View& view, Level& level);
 
 /// Triangles of the cut into the level: nearest surface at each pixel's centre.
 void projectMeshes(const render::DrawList& draws, const Chunks& chunks, Level& level);

@@ -16,23 +16,23 @@ bool areFew(const lod::Hierarchy& h, const lod::Node& node, const std::vector<sh
 }
 
 /// Depth of a disc on a ray, and rho^2 there; infinite where it is not met.
-std::pair<double, double> meet(const PlacedDisc& d, const dvec3& ray, double nearPlane) {
-    const double depth = glm::dot(d.normal, d.centre) / glm::dot(d.normal, ray);
-    const dvec3 off = depth * ray - d.centre;
+std::pair<double, double> meet(const PlacedDisc& d, const ViewRay& ray, double nearPlane) {
+    const double depth = glm::dot(d.normal, d.centre - ray.origin) / glm::dot(d.normal, ray.direction);
+    const dvec3 off = ray.at(depth) - d.centre;
     const double rho2 = glm::dot(off, off) / (d.radius * d.radius);
     return depth > nearPlane && rho2 <= 1 ? std::pair(depth, rho2) : std::pair(HUGE_VAL, HUGE_VAL);
 }
 
 /// A pixel that shows a disc, and no ellipse. `n`: unit, towards the eye.
-Sample shownPixel(const dvec2& at, const dvec3& ray, double depth, const dvec3& n, const dvec3& colour, bool isLeaf,
-                  double focal) {
+Sample shownPixel(const lod::View& view, const dvec2& at, double depth, const dvec3& n, const dvec3& colour,
+                  bool isLeaf) {
     Sample s;
     s.valid = true;
     s.depth = s.key = depth;
     s.centre = at;
     s.radius = 0.25;
-    s.thickness = (isLeaf ? kLeafThickness : 1) * 0.25 * depth / focal;
-    s.perp = dvec2(rotationToZ(glm::normalize(ray)) * n);
+    s.thickness = (isLeaf ? kLeafThickness : 1) * 0.25 / pixelsAt(view, depth);
+    s.perp = dvec2(rotationToZ(viewRay(view, at).sight()) * n);
     s.colour = colour;
     return s;
 }
@@ -40,10 +40,6 @@ Sample shownPixel(const dvec2& at, const dvec3& ray, double depth, const dvec3& 
 bool isLeaf(const PlacedDisc& d) { return (d.flags & shared::kFlagLoose) != 0; }
 
 }  // namespace
-
-Lens lensOf(const render::DrawList& draws) {
-    return {0.5 * dvec2(draws.view.width, draws.view.height), draws.view.focalPixels};
-}
 
 std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks& chunks) {
     const lod::View& v = draws.view;
@@ -68,8 +64,8 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
             const dvec3 nw = instance.rotation * disc.normal;
             dvec3 n(glm::dot(nw, v.right), glm::dot(nw, v.down), glm::dot(nw, v.forward));
             const bool oneSided = (disc.flags & (shared::kFlagTwoSided | shared::kFlagNoNormal)) == 0;
-            if (oneSided && glm::dot(n, c) >= 0) continue;
-            if ((disc.flags & shared::kFlagNoNormal) != 0) n = -glm::normalize(c);
+            if (oneSided && glm::dot(n, sightOf(v, c)) >= 0) continue;
+            if ((disc.flags & shared::kFlagNoNormal) != 0) n = -sightOf(v, c);
             const bool isDebug = f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError;
             out.push_back({c, n, instance.scale * disc.radius * f.supportScale,
                            isDebug ? debugColour(f, node, cut) : disc.colour, disc.flags, few});
@@ -82,16 +78,17 @@ bool isWide(const lod::View& v, const PlacedDisc& d) {
     const double widest = std::max(std::max(v.width, v.height) / 32.0, 32.0);  // px
     if ((d.flags & shared::kFlagScattered) != 0) return false;
     if ((d.flags & shared::kFlagNoNormal) != 0 && d.centre.z <= v.nearPlane) return false;
-    return d.radius * v.focalPixels > widest * d.centre.z && d.centre.z + d.radius > v.nearPlane;
+    return d.radius * v.focalPixels > widest * (v.isOrthographic ? 1 : d.centre.z) &&
+           d.centre.z + d.radius > v.nearPlane;
 }
 
 void showWide(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level) {
-    const Lens lens = lensOf(draws);
-    const double nearPlane = draws.view.nearPlane;
+    const lod::View& view = draws.view;
+    const double nearPlane = view.nearPlane;
     for (int y = 0; y < level.height && !discs.empty(); ++y)
         for (int x = 0; x < level.width; ++x) {
             const dvec2 at(x + 0.5, y + 0.5);
-            const dvec3 ray = lens.rayTo(at);
+            const ViewRay ray = viewRay(view, at);
             const PlacedDisc* front = nullptr;
             double depth = HUGE_VAL;
             for (const PlacedDisc& d : discs)
@@ -101,60 +98,61 @@ void showWide(const render::DrawList& draws, const std::vector<PlacedDisc>& disc
                 }
             Sample& s = level.ref(x, y);
             if (!front || (s.valid && s.key <= depth)) continue;
-            const double facing = std::abs(glm::dot(front->normal, ray)) / glm::length(ray);
-            const double apart = 0.25 * front->radius / glm::length(ray) / std::max(facing, 0.125);
-            double weight = 0, inverse = 0;
+            const double length = glm::length(ray.direction);
+            const double facing = std::abs(glm::dot(front->normal, ray.direction)) / length;
+            const double apart = 0.25 * front->radius / length / std::max(facing, 0.125);
+            double weight = 0, linear = 0;
             dvec3 n(0), colour(0);
             for (const PlacedDisc& d : discs) {
                 const auto [z, rho2] = meet(d, ray, nearPlane);
                 if (!(std::abs(z - depth) <= apart)) continue;
                 const double k = (1 - rho2) * (1 - rho2) + 1e-4;
                 weight += k;
-                inverse += k / z;
-                n += (glm::dot(d.normal, ray) > 0 ? -k : k) * d.normal;
+                linear += view.isOrthographic ? k * z : k / z;
+                n += (glm::dot(d.normal, ray.direction) > 0 ? -k : k) * d.normal;
                 colour += k * d.colour;
             }
-            s = shownPixel(at, ray, weight / inverse, glm::normalize(n), colour / weight, isLeaf(*front), lens.focal);
+            s = shownPixel(view, at, view.isOrthographic ? linear / weight : weight / linear, glm::normalize(n),
+                           colour / weight, isLeaf(*front));
         }
 }
 
 void showSplats(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level) {
-    const Lens lens = lensOf(draws);
     const lod::View& v = draws.view;
     const auto offer = [&](int x, int y, const PlacedDisc& d, bool isCentre) {
         const dvec2 at(x + 0.5, y + 0.5);
-        const dvec3 ray = lens.rayTo(at);
+        const ViewRay ray = viewRay(v, at);
         double depth = meet(d, ray, v.nearPlane).first;
         if (depth == HUGE_VAL && isCentre) depth = d.centre.z;
         Sample& s = level.ref(x, y);
         if (depth == HUGE_VAL || (s.valid && s.key <= depth)) return;
-        const dvec3 n = glm::dot(d.normal, ray) > 0 ? -d.normal : d.normal;
-        s = shownPixel(at, ray, depth, n, d.colour, isLeaf(d), lens.focal);
+        const dvec3 n = glm::dot(d.normal, ray.direction) > 0 ? -d.normal : d.normal;
+        s = shownPixel(v, at, depth, n, d.colour, isLeaf(d));
     };
     for (PlacedDisc d : discs) {
         const bool isAhead = d.centre.z > v.nearPlane;
         if ((d.flags & shared::kFlagNoNormal) != 0 && !isAhead) continue;
         // A stray point hides no more of the picture than this.
         if ((d.flags & shared::kFlagScattered) != 0)
-            d.radius = std::min(d.radius, std::max(v.height / 128.0, 4.0) * std::max(d.centre.z, 0.0) / v.focalPixels);
+            d.radius = std::min(d.radius, std::max(v.height / 128.0, 4.0) / pixelsAt(v, std::max(d.centre.z, 1e-300)));
         // All of it lies within its sphere; that is seen within a box of pixels if it is wholly before the eye.
         int x0 = 0, x1 = level.width - 1, y0 = 0, y1 = level.height - 1;
-        if (d.centre.z > 1.01 * d.radius) {
+        if (v.isOrthographic || d.centre.z > 1.01 * d.radius) {
             const auto range = [&](double across, double middle, int most, int& first, int& last) {
                 const double nearest = d.centre.z - d.radius, farthest = d.centre.z + d.radius;
                 const double lo = across - d.radius, hi = across + d.radius;
-                const double a = middle + lens.focal * (lo < 0 ? lo / nearest : lo / farthest),
-                             b = middle + lens.focal * (hi > 0 ? hi / nearest : hi / farthest);
+                const double a = middle + lo * pixelsAt(v, lo < 0 ? nearest : farthest),
+                             b = middle + hi * pixelsAt(v, hi > 0 ? nearest : farthest);
                 first = a > most ? most + 1 : std::max(0, pixelIn(a, most) - 1);
                 last = b < 0 ? -1 : std::min(most, pixelIn(b, most) + 1);
             };
-            range(d.centre.x, lens.centre.x, level.width - 1, x0, x1);
-            range(d.centre.y, lens.centre.y, level.height - 1, y0, y1);
+            range(d.centre.x, 0.5 * v.width, level.width - 1, x0, x1);
+            range(d.centre.y, 0.5 * v.height, level.height - 1, y0, y1);
         }
         for (int y = y0; y <= y1; ++y)
             for (int x = x0; x <= x1; ++x) offer(x, y, d, false);
         if (!isAhead) continue;
-        const dvec2 p = lens.centre + dvec2(d.centre) * (lens.focal / d.centre.z);
+        const dvec2 p = imageOf(v, d.centre);
         if (p.x >= 0 && p.y >= 0 && p.x < level.width && p.y < level.height)
             offer(static_cast<int>(p.x), static_cast<int>(p.y), d, true);
     }

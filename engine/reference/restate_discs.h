@@ -9,14 +9,6 @@
 
 namespace stipple::reference {
 
-/// The principal point and the focal length, px.
-struct Lens {
-    glm::dvec2 centre;
-    double focal;
-    glm::dvec3 rayTo(const glm::dvec2& pixel) const { return {(pixel - centre) / focal, 1}; }
-};
-Lens lensOf(const render::DrawList& draws);
-
 /// A point that is to be drawn: fine enough, and seen from its front.
 struct PlacedDisc {
     glm::dvec3 centre, normal;  ///< camera space; of no normal, towards the eye

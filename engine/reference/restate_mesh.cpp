@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "engine/reference/decode.h"
 #include "engine/reference/surface.h"
 #include "lod/mesh_place.h"
 
@@ -50,7 +51,7 @@ class MeshProjector {
     void triangle(const Corners& c, uint32_t surface, const shared::SurfaceMaterial& material,
                   const TextureReader& textures, const lod::CutMeshDraw& cut, uint32_t treeLevel) {
         const dvec3 face = glm::cross(c[1].at - c[0].at, c[2].at - c[0].at);
-        const double facing = glm::dot(face, c[0].at);
+        const double facing = view_.isOrthographic ? face.z : glm::dot(face, c[0].at);
         if (facing == 0 || (facing > 0 && (surface & shared::kSurfaceTwoSided) == 0)) return;
         // What is in front of the near plane, as a polygon on the screen.
         std::vector<dvec3> polygon;
@@ -63,9 +64,7 @@ class MeshProjector {
         if (polygon.size() < 3) return;
         std::vector<dvec2> snapped;  // in 1/256 pixel, whole
         snapped.reserve(polygon.size());
-        for (const dvec3& p : polygon)
-            snapped.push_back(glm::floor(
-                (view_.focalPixels * dvec2(p) / p.z + 0.5 * dvec2(view_.width, view_.height)) * 256.0 + 0.5));
+        for (const dvec3& p : polygon) snapped.push_back(glm::floor(imageOf(view_, p) * 256.0 + 0.5));
         for (size_t k = 1; k + 1 < polygon.size(); ++k)
             cover({snapped[0], snapped[k], snapped[k + 1]},
                   [&](int x, int y) { pixel(x, y, c, face, surface, material, textures, cut, treeLevel); });
@@ -96,13 +95,9 @@ class MeshProjector {
             }
     }
 
-    dvec3 rayThrough(double x, double y) const {
-        return {(x - 0.5 * view_.width) / view_.focalPixels, (y - 0.5 * view_.height) / view_.focalPixels, 1};
-    }
-
     void pixel(int x, int y, const Corners& c, const dvec3& face, uint32_t surface, const shared::SurfaceMaterial& m,
                const TextureReader& textures, const lod::CutMeshDraw& cut, uint32_t treeLevel) {
-        const dvec3 ray = rayThrough(x + 0.5, y + 0.5);
+        const ViewRay ray = viewRay(view_, dvec2(x + 0.5, y + 0.5));
         const dvec2 exact = weightsOn(ray, c, face);
         const double wb = std::clamp(exact.x, 0.0, 1.0), wc = std::clamp(exact.y, 0.0, 1.0 - wb), wa = 1 - wb - wc;
         const double depth = (wa * c[0].at + wb * c[1].at + wc * c[2].at).z;
@@ -110,15 +105,15 @@ class MeshProjector {
         if (s.valid && s.depth <= depth) return;
         Sample hit;
         dvec3 n;
-        const double footprint = footprintOn(ray, 1 / view_.focalPixels, c, face);
-        if (!surfaceOn(ray, {wb, wc}, footprint, c, face, surface, m, textures, hit, n)) return;
+        const double footprint = footprintOn(ray, view_.isOrthographic, 1 / view_.focalPixels, c, face);
+        if (!surfaceOn(ray.direction, {wb, wc}, footprint, c, face, surface, m, textures, hit, n)) return;
         s = hit;
         s.valid = true;
         s.depth = depth;
         s.radius = 0.25;
-        s.thickness = 0.25 * depth / view_.focalPixels;
+        s.thickness = 0.25 / pixelsAt(view_, depth);
         s.centre = dvec2(x + 0.5, y + 0.5);
-        s.perp = dvec2(rotationToZ(glm::normalize(ray)) * n);
+        s.perp = dvec2(rotationToZ(ray.sight()) * n);
         const shared::FrameConstants& f = draws_.frame;
         const double t = f.debugView == shared::kDebugLevel
                              ? (treeLevel % 8) / 7.0

@@ -31,7 +31,7 @@ struct TubeView {
 };
 
 /// Normal across the view and depth of a tube's surface at `off` px from its axis.
-TubeView tubeAt(const Sample& s, dvec2 off, double focal) {
+TubeView tubeAt(const Sample& s, dvec2 off, const lod::View& view) {
     off = s.radius > kNarrow ? off / s.radius : dvec2(0);
     const double sine2 = glm::length(s.axis);
     const double angle = 0.5 * std::atan2(s.axis.y, s.axis.x);
@@ -44,7 +44,7 @@ TubeView tubeAt(const Sample& s, dvec2 off, double focal) {
                  rise = std::sqrt(std::max(0.0, 1 - glm::dot(across, across)));
     const double deeper = glm::mix(1 - ball, (1 - rise) / sine, side);
     return {glm::mix(off, across + s.perp * (rise / sine), side),
-            s.depth * (1 + deeper * std::max(s.radius, 0.0) / focal)};
+            s.depth + deeper * std::max(s.radius, 0.0) / pixelsAt(view, s.depth)};
 }
 
 /// How far a narrow tube's surface lies before its axis; `sine2`: between tube and view.
@@ -85,9 +85,8 @@ class StrandProjector {
         pb_ = imageOf(at(to_).c);
         halfA_ = halfWidth(from_, s_.directionA);
         halfB_ = halfWidth(to_, s_.directionB);
-        const bool isWide =
-            view_.focalPixels * std::max(at(from_).radius / at(from_).c.z, at(to_).radius / at(to_).c.z) >=
-            double{f_.exactStrands};
+        const auto seen = [&](const Place& p) { return p.radius * pixelsAt(view_, p.c.z); };
+        const bool isWide = std::max(seen(at(from_)), seen(at(to_))) >= double{f_.exactStrands};
         if (isWide)
             meet();
         else
@@ -97,9 +96,10 @@ class StrandProjector {
   private:
     /// Leaves what is before the near plane, and no more than 16,384 px from the middle of the image.
     bool clip() {
-        const double slope = 16384 / view_.focalPixels;
-        for (const dvec4& plane : {dvec4(0, 0, 1, -view_.nearPlane), dvec4(1, 0, slope, 0), dvec4(-1, 0, slope, 0),
-                                   dvec4(0, 1, slope, 0), dvec4(0, -1, slope, 0)}) {
+        const double reach = 16384 / view_.focalPixels, slope = view_.isOrthographic ? 0 : reach,
+                     off = view_.isOrthographic ? reach : 0;
+        for (const dvec4& plane : {dvec4(0, 0, 1, -view_.nearPlane), dvec4(1, 0, slope, off), dvec4(-1, 0, slope, off),
+                                   dvec4(0, 1, slope, off), dvec4(0, -1, slope, off)}) {
             const double da = glm::dot(plane, dvec4(a_, 1)), db = glm::dot(plane, dvec4(b_, 1));
             if (da < 0 && db < 0) return false;
             if (da < 0) from_ = std::max(from_, da / (da - db));
@@ -117,20 +117,22 @@ class StrandProjector {
         p.colour = debugColour_ ? *debugColour_ : s_.colourA + t * (s_.colourB - s_.colourA);
         return p;
     }
-    dvec2 imageOf(const dvec3& c) const {
-        return view_.focalPixels * dvec2(c) / c.z + 0.5 * dvec2(view_.width, view_.height);
-    }
+    dvec2 imageOf(const dvec3& c) const { return reference::imageOf(view_, c); }
     double halfWidth(double t, const dvec3& across) const {
         Place p = at(t);
         p.direction = across;
         return halfWidthAt(p);
     }
-    /// Depth of a tube's surface over its axis / depth of the axis, for the order of what is drawn.
+    /// How far away the eye is from a place; infinitely in orthographic views.
+    double distanceTo(const dvec3& c) const { return view_.isOrthographic ? 1e300 : glm::length(c); }
+    /// For the order of what is drawn: depth of a tube's surface over its axis / depth of the axis; orthographic: what
+    /// it lies before it.
     double nearerAt(double t) const {
-        if (!s_.isTube) return 1;
+        if (!s_.isTube) return view_.isOrthographic ? 0 : 1;
         const Place p = at(t);
-        const double d = glm::length(p.c), along = glm::dot(tangent_, p.c) / d;
-        return 1 - frontOf(p.radius, std::max(1 - along * along, 0.0), d) / d;
+        const double d = distanceTo(p.c), along = glm::dot(tangent_, sightOf(view_, p.c));
+        const double front = frontOf(p.radius, std::max(1 - along * along, 0.0), d);
+        return view_.isOrthographic ? front : 1 - front / d;
     }
     bool isTaken(uint32_t pixel, uint32_t id, double share) const {
         uint32_t h = (pixel * 0x9e3779b1u) ^ (id * 0x85ebca6bu) ^ (f_.coverageSeed * 0xc2b2ae35u);
@@ -162,11 +164,11 @@ class StrandProjector {
         const auto pixel = static_cast<uint32_t>(y) * view_.width + static_cast<uint32_t>(x);
         if (half < kNarrow && !isTaken(pixel, id, share)) return;
         const double nearer = nearerAt(from_) + u * (nearerAt(to_) - nearerAt(from_));
-        keep(x, y, axisDepth(u) * nearer);
+        keep(x, y, view_.isOrthographic ? axisDepth(u) - nearer : axisDepth(u) * nearer);
     }
     double axisDepth(double u) const {
         const double za = at(from_).c.z, zb = at(to_).c.z;
-        return 1 / (1 / za + u * (1 / zb - 1 / za));
+        return view_.isOrthographic ? za + u * (zb - za) : 1 / (1 / za + u * (1 / zb - 1 / za));
     }
 
     /// A wide strand: every pixel whose ray meets it.
@@ -180,13 +182,14 @@ class StrandProjector {
         for (int k = 0; k < 16; ++k) {
             const double r = k < 8 ? own.radiusA : own.radiusB;
             const dvec3 corner = (k < 8 ? a_ : b_) + r * (2.0 * dvec3(k & 1, k >> 1 & 1, k >> 2 & 1) - 1.0);
-            isBefore = isBefore && corner.z > view_.nearPlane;
+            isBefore = isBefore && (view_.isOrthographic || corner.z > view_.nearPlane);
             if (!isBefore) break;
             lo = glm::min(lo, imageOf(corner));
             hi = glm::max(hi, imageOf(corner));
         }
         if (!isBefore) {
             // Nothing of it if both balls lie beyond one side of the picture.
+            // (Only in perspective.)
             const dvec2 half = 0.5 * dvec2(view_.width, view_.height) / view_.focalPixels;
             for (const dvec3& side :
                  {dvec3(1, 0, half.x), dvec3(-1, 0, half.x), dvec3(0, 1, half.y), dvec3(0, -1, half.y), dvec3(0, 0, 1)})
@@ -198,9 +201,9 @@ class StrandProjector {
         }
         for (int y = pixelIn(lo.y, level_.height); y < level_.height && y <= hi.y; ++y)
             for (int x = pixelIn(lo.x, level_.width); x < level_.width && x <= hi.x; ++x) {
-                const dvec3 ray((dvec2(x, y) + 0.5 - 0.5 * dvec2(view_.width, view_.height)) / view_.focalPixels, 1);
+                const ViewRay ray = viewRay(view_, dvec2(x, y) + 0.5);
                 StrandHit hit;
-                if (!meetsSegment(own, {dvec3(0), ray}, view_.nearPlane, hit)) continue;
+                if (!meetsSegment(own, {ray.origin, ray.direction}, view_.nearPlane, hit)) continue;
                 Sample& s = level_.ref(x, y);
                 if (s.valid && s.key <= hit.t) continue;
                 s = {};
@@ -208,9 +211,9 @@ class StrandProjector {
                 s.key = s.depth = hit.t;
                 s.centre = dvec2(x, y) + 0.5;
                 s.colour = debugColour_ ? *debugColour_ : glm::mix(own.colourA, own.colourB, hit.place);
-                s.perp = dvec2(rotationToZ(glm::normalize(ray)) * hit.normal);
+                s.perp = dvec2(rotationToZ(ray.sight()) * hit.normal);
                 s.radius = 0.25;
-                s.thickness = (own.isTube ? 1 : kLeafThickness) * 0.25 * s.depth / view_.focalPixels;
+                s.thickness = (own.isTube ? 1 : kLeafThickness) * 0.25 / pixelsAt(view_, s.depth);
             }
     }
 
@@ -221,9 +224,10 @@ class StrandProjector {
         const dvec2 pixel(x + 0.5, y + 0.5), d = pb_ - pa_;
         const double u = std::clamp(glm::dot(pixel - pa_, d) / std::max(glm::dot(d, d), 1e-8), 0.0, 1.0);
         const double za = at(from_).c.z, zb = at(to_).c.z;
-        const Place p = at(from_ + u * za / ((1 - u) * zb + u * za) * (to_ - from_));
-        const double distance = glm::length(p.c);
-        const dvec3 v = p.c / distance;
+        const double along = view_.isOrthographic ? u : u * za / ((1 - u) * zb + u * za);
+        const Place p = at(from_ + along * (to_ - from_));
+        const double distance = distanceTo(p.c), pixels = pixelsAt(view_, p.c.z);
+        const dvec3 v = sightOf(view_, p.c);
         const double half = halfWidthAt(p);
         s = {};
         s.valid = true;
@@ -233,33 +237,33 @@ class StrandProjector {
         const double support = f_.supportScale;
         if (s_.isTube) {
             const dvec3 t = glm::normalize(p.direction);
-            const double along = glm::dot(t, v);
+            const double tv = glm::dot(t, v);
             const dvec2 across = dvec2(rotationToZ(v) * t);
             const double reach = std::min(p.radius / distance, 0.9);
-            s.depth = std::max(p.c.z * (1 - frontOf(p.radius, std::max(1 - along * along, 0.0), distance) / distance),
-                               view_.nearPlane);
-            s.radius = p.radius * view_.focalPixels / p.c.z / std::sqrt(1 - reach * reach) * support;
+            const double front = frontOf(p.radius, std::max(1 - tv * tv, 0.0), distance);
+            s.depth = std::max(p.c.z - front * v.z, view_.nearPlane);
+            s.radius = p.radius * pixels / std::sqrt(1 - reach * reach) * support;
             s.isRound = half >= kNarrow;
-            s.perp = s.isRound ? along * across : dvec2(rotationToZ(v) * narrowNormal(t, v));
+            s.perp = s.isRound ? tv * across : dvec2(rotationToZ(v) * narrowNormal(t, v));
             if (s.isRound) s.axis = {across.x * across.x - across.y * across.y, 2 * across.x * across.y};
         } else {
             dvec3 n = glm::normalize(glm::cross(tangent_, p.direction));
             if (glm::dot(n, v) > 0) n = -n;
             s.depth = p.c.z;
-            s.radius = std::max(p.radius * view_.focalPixels / p.c.z, kNarrow) * support;
+            s.radius = std::max(p.radius * pixels, kNarrow) * support;
             s.perp = dvec2(rotationToZ(v) * n);
             s.axis = {1, 0};
         }
         s.radius = half < kNarrow ? 0.25 : std::min(s.radius, 16384.0);
         const double facing = 1 - glm::dot(s.perp, s.perp);
-        s.thickness = s.radius * s.depth / view_.focalPixels;
+        s.thickness = s.radius / pixelsAt(view_, s.depth);
         if (!s_.isTube)
-            s.thickness = std::max(p.radius * view_.focalPixels / p.c.z, kNarrow) *
-                          (0.25 + std::sqrt(std::max(0.0, 1 - facing))) * s.depth / view_.focalPixels;
+            s.thickness = std::max(p.radius * pixels, kNarrow) * (0.25 + std::sqrt(std::max(0.0, 1 - facing))) /
+                          pixelsAt(view_, s.depth);
     }
     /// Half of what is seen across the line that the axis is on the image, px.
     double halfWidthAt(const Place& p) const {
-        const dvec3 v = glm::normalize(p.c);
+        const dvec3 v = sightOf(view_, p.c);
         const double sine = std::sqrt(std::max(1 - std::pow(glm::dot(tangent_, v), 2), 1e-6));
         const dvec3 normal = glm::cross(tangent_, p.direction);
         const double share =
@@ -267,7 +271,7 @@ class StrandProjector {
         // The plane through eye and axis, and how much of its normal lies in the image.
         const double off = glm::cross(v, tangent_).z / sine;
         const double inImage = std::sqrt(std::max({1 - off * off, v.z * v.z, 1e-6}));
-        return p.radius * share * view_.focalPixels / p.c.z / inImage;
+        return p.radius * share * pixelsAt(view_, p.c.z) / inImage;
     }
     dvec3 narrowNormal(const dvec3& t, const dvec3& v) const {
         const dvec3 sun(f_.sunDirection);
@@ -315,12 +319,12 @@ void projectStrands(const render::DrawList& draws, const Chunks& chunks, Level& 
     }
 }
 
-void finishTubes(double focal, Level& level) {
+void finishTubes(const lod::View& view, Level& level) {
     for (int y = 0; y < level.height; ++y)
         for (int x = 0; x < level.width; ++x) {
             Sample& s = level.ref(x, y);
             if (!s.valid || !s.isRound) continue;
-            const TubeView seen = tubeAt(s, dvec2(x + 0.5, y + 0.5) - s.centre, focal);
+            const TubeView seen = tubeAt(s, dvec2(x + 0.5, y + 0.5) - s.centre, view);
             s.perp = seen.perp;
             s.depth = seen.depth;
         }

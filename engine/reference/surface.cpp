@@ -30,10 +30,10 @@ dvec3 bump(const dvec3& normal, const Corners& c, const dvec3& texel, double sca
 }
 
 /// Times pi, as a light's colour is what a white diffuse surface sends back.
-dvec3 reflected(const Sample& s, const dvec3& n, const dvec3& v, const dvec3& l, const dvec3& light, double focal) {
+dvec3 reflected(const Sample& s, const dvec3& n, const dvec3& v, const dvec3& l, const dvec3& light, double pixels) {
     const double nl = glm::dot(n, l), nv = std::max(glm::dot(n, v), 1e-3);
     if (!(nl > 0))
-        return !s.letsLightThrough(focal) ? dvec3(0) : light * s.colour * (1 - s.metallic) * (kThroughLeaf * -nl);
+        return !s.letsLightThrough(pixels) ? dvec3(0) : light * s.colour * (1 - s.metallic) * (kThroughLeaf * -nl);
     const dvec3 h = glm::normalize(l + v);
     const double nh = std::max(0.0, glm::dot(n, h)), vh = std::max(0.0, glm::dot(v, h));
     const double alpha2 = std::pow(std::max(s.roughness * s.roughness, 2e-3), 2);
@@ -93,16 +93,18 @@ Corner cornerOf(const lod::Hierarchy& h, const lod::Instance& instance, const sh
     return c;
 }
 
-dvec2 weightsOn(const dvec3& ray, const Corners& c, const dvec3& face) {
+dvec2 weightsOn(const ViewRay& ray, const Corners& c, const dvec3& face) {
     const dvec3 e1 = c[1].at - c[0].at, e2 = c[2].at - c[0].at;
-    const dvec3 off = ray * (glm::dot(face, c[0].at) / glm::dot(face, ray)) - c[0].at;
+    const dvec3 off = ray.at(glm::dot(face, c[0].at - ray.origin) / glm::dot(face, ray.direction)) - c[0].at;
     const double f2 = glm::dot(face, face);
     return {glm::dot(glm::cross(off, e2), face) / f2, glm::dot(glm::cross(e1, off), face) / f2};
 }
 
-double footprintOn(const dvec3& ray, double step, const Corners& c, const dvec3& face) {
+double footprintOn(const ViewRay& ray, bool isOrthographic, double step, const Corners& c, const dvec3& face) {
     const auto uvAt = [&](double dx, double dy) {
-        const dvec2 w = weightsOn(ray + dvec3(dx, dy, 0), c, face);
+        ViewRay beside = ray;
+        (isOrthographic ? beside.origin : beside.direction) += dvec3(dx, dy, 0);
+        const dvec2 w = weightsOn(beside, c, face);
         return (1 - w.x - w.y) * c[0].uv + w.x * c[1].uv + w.y * c[2].uv;
     };
     const double h = 1e-3 * step;
@@ -198,8 +200,8 @@ bool surfaceOn(const dvec3& ray, const dvec2& weights, double footprint, const C
 dvec3 shadeTriangle(const Sample& s, const dvec3& n, const dvec3& point, const render::DrawList& draws) {
     const shared::FrameConstants& f = draws.frame;
     if (s.isTriangle && (s.isUnlit || (f.shade & shared::kShadeTriangles) == 0)) return s.colour;
-    const dvec3 v = -glm::normalize(point), up(f.skyDirection);
-    const double nv = std::max(glm::dot(n, v), 1e-3);
+    const dvec3 v = -sightOf(draws.view, point), up(f.skyDirection);
+    const double nv = std::max(glm::dot(n, v), 1e-3), pixels = pixelsAt(draws.view, s.depth);
     const dvec3 mirror = 2 * nv * n - v;
     // The environment's share of a microfacet mirror (Karis 2013, fit by Lazarov).
     const dvec4 r = s.roughness * dvec4(-1, -0.0275, -0.572, 0.022) + dvec4(1, 0.0425, 1.04, -0.04);
@@ -215,11 +217,11 @@ dvec3 shadeTriangle(const Sample& s, const dvec3& n, const dvec3& point, const r
     }
     dvec3 sum = double(f.ambient) * s.occlusion * (s.colour * (1 - s.metallic) * around + (f0 * ab.x + ab.y) * blurred);
     if (draws.lights.empty() && !draws.environment)
-        sum += reflected(s, n, v, dvec3(f.sunDirection), dvec3(0.75), draws.view.focalPixels);
+        sum += reflected(s, n, v, dvec3(f.sunDirection), dvec3(0.75), pixels);
     for (const shared::LightSource& light : draws.lights) {
         const dvec3 colour(light.colour);
         if (light.kind == shared::kLightDirectional) {
-            sum += reflected(s, n, v, dvec3(light.position), colour, draws.view.focalPixels);
+            sum += reflected(s, n, v, dvec3(light.position), colour, pixels);
             continue;
         }
         const dvec3 to = dvec3(light.position) - point;
@@ -231,7 +233,7 @@ dvec3 shadeTriangle(const Sample& s, const dvec3& n, const dvec3& point, const r
             share *= std::pow(
                 std::clamp((along - light.cosOuter) / std::max(1e-4f, light.cosInner - light.cosOuter), 0.0, 1.0), 2);
         }
-        sum += reflected(s, n, v, to / distance, colour * share, draws.view.focalPixels);
+        sum += reflected(s, n, v, to / distance, colour * share, pixels);
     }
     return sum + s.emissive;
 }

@@ -5,6 +5,7 @@
 #include <array>
 #include <glm/glm.hpp>
 
+#include "engine/reference/decode.h"
 #include "engine/reference/restate.h"
 
 namespace stipple::reference {
@@ -21,10 +22,11 @@ Corner cornerOf(const lod::Hierarchy& h, const lod::Instance& instance, const sh
                 const glm::dvec3& place, const lod::View& view);
 
 /// Weights of the second and third corner where the ray meets the triangle's plane. `face`: (b - a) x (c - a).
-glm::dvec2 weightsOn(const glm::dvec3& ray, const Corners& c, const glm::dvec3& face);
+glm::dvec2 weightsOn(const ViewRay& ray, const Corners& c, const glm::dvec3& face);
 
-/// Texture coordinates per `step` of the ray's x and y (the longer of both), on the triangle's plane.
-double footprintOn(const glm::dvec3& ray, double step, const Corners& c, const glm::dvec3& face);
+/// Texture coordinates per `step` of the ray's x and y (the longer of both), on the triangle's plane: those of its
+/// direction, or, orthographic, of its origin.
+double footprintOn(const ViewRay& ray, bool isOrthographic, double step, const Corners& c, const glm::dvec3& face);
 
 /// Textures of one mesh.
 struct TextureReader {
@@ -38,8 +40,8 @@ struct TextureReader {
     bool level(const shared::TextureInfo& info, uint32_t l, glm::dvec2 uv, glm::dvec4& out) const;
 };
 
-/// The surface where the ray (z = 1) meets the triangle: colour, material, and the unit normal `n`, turned to the eye.
-/// False where an alpha mask cuts it out.
+/// The surface where the ray (its direction) meets the triangle: colour, material, and the unit normal `n`, turned to
+/// the eye. False where an alpha mask cuts it out.
 bool surfaceOn(const glm::dvec3& ray, const glm::dvec2& weights, double footprint, const Corners& c,
                const glm::dvec3& face, uint32_t surface, const shared::SurfaceMaterial& m,
                const TextureReader& textures, Sample& s, glm::dvec3& n);

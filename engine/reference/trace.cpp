@@ -117,8 +117,11 @@ Result<void> readStore(const render::PlacedStore& placed, TracedStore& t) {
 }
 
 /// Where the ray meets the disc within a radius; its side towards the eye.
-bool meetsDisc(const Disc& d, double radius, const LocalRay& ray, double& t, double& rho2, dvec3& normal) {
-    const dvec3 n = d.normal == dvec3(0) ? -glm::normalize(d.position - ray.origin) : d.normal;
+bool meetsDisc(const Disc& d, double radius, const LocalRay& ray, bool isOrthographic, double& t, double& rho2,
+               dvec3& normal) {
+    const dvec3 n = d.normal != dvec3(0) ? d.normal
+                    : isOrthographic     ? -glm::normalize(ray.direction)
+                                         : -glm::normalize(d.position - ray.origin);
     const double facing = glm::dot(n, ray.direction);
     if (facing == 0) return false;
     if (facing > 0 && (d.flags & (shared::kFlagTwoSided | shared::kFlagNoNormal)) == 0) return false;
@@ -170,18 +173,18 @@ class Tracer {
     }
 
     /// Depth of what one ray meets first, and its normal towards the eye (world space); false if it meets nothing.
-    bool surface(const dvec3& ray, double step, double& depth, dvec3& normal) const {
+    bool surface(const ViewRay& ray, double step, double& depth, dvec3& normal) const {
         const Hit hit = nearestHit(ray, step);
         depth = hit.t;
         normal = toWorld(hit.normal);
         return hit.place != kNone;
     }
 
-    /// Linear colour that one ray brings; false if it meets nothing. `ray`: camera space, z = 1.
-    bool look(const dvec3& ray, double step, dvec3& colour) const {
+    /// Linear colour that one ray brings; false if it meets nothing. `ray`: camera space.
+    bool look(const ViewRay& ray, double step, dvec3& colour) const {
         Hit hit = nearestHit(ray, step);
         if (hit.place == kNone) return false;
-        const dvec3 point = ray * hit.t;
+        const dvec3 point = ray.at(hit.t);
         if (hit.isTriangle) {
             colour = shadeTriangle(hit.sample, hit.normal, point, draws_);
             return true;
@@ -192,7 +195,7 @@ class Tracer {
         colour = s.colour;
         if ((f.shade & shared::kShadeLit) == 0) return true;
         if (draws_.lights.empty() && !draws_.environment)
-            colour *= lightOn(n, f, s.isLeaf(view_.focalPixels));
+            colour *= lightOn(n, f, s.isLeaf(pixelsAt(view_, s.depth)));
         else
             colour = shadeTriangle(s, n, point, draws_);
         return true;
@@ -212,9 +215,10 @@ class Tracer {
     dvec3 toCamera(const dvec3& w) const {
         return {glm::dot(w, view_.right), glm::dot(w, view_.down), glm::dot(w, view_.forward)};
     }
-    LocalRay localRay(const lod::Instance& place, const dvec3& ray) const {
+    LocalRay localRay(const lod::Instance& place, const ViewRay& ray) const {
         const glm::dmat3 back = glm::transpose(place.rotation);
-        return {back * (view_.eye - place.translation) / place.scale, back * toWorld(ray) / place.scale};
+        return {back * (view_.eye + toWorld(ray.origin) - place.translation) / place.scale,
+                back * toWorld(ray.direction) / place.scale};
     }
 
     /// What of a disc is drawn, store units: a stray point hides no more of the picture than a 128th of its height.
@@ -223,14 +227,14 @@ class Tracer {
         constexpr double kShare = 1.0 / 128, kLeastPixels = 4;
         const dvec3 at = place.translation + place.rotation * (place.scale * d.position) - view_.eye;
         const double depth = std::max(glm::dot(at, view_.forward), view_.nearPlane);
-        const double most = std::max(kShare * view_.height, kLeastPixels) * depth / view_.focalPixels;
+        const double most = std::max(kShare * view_.height, kLeastPixels) / pixelsAt(view_, depth);
         return std::min(d.radius, most / place.scale);
     }
 
-    Hit nearestHit(const dvec3& ray, double step) const {
+    Hit nearestHit(const ViewRay& ray, double step) const {
         Hit best;
-        const double length = glm::length(ray);
-        tree_.visit(dvec3(0), toWorld(ray), view_.nearPlane, best.t, [&](uint32_t p) {
+        const double length = glm::length(ray.direction);
+        tree_.visit(toWorld(ray.origin), toWorld(ray.direction), view_.nearPlane, best.t, [&](uint32_t p) {
             const TracedStore& store = *places_[p];
             const lod::Instance& place = placed_[p].place;
             const LocalRay local = localRay(place, ray);
@@ -238,14 +242,14 @@ class Tracer {
                 double t = 0, rho2 = 0;
                 dvec3 normal;
                 const auto meets = [&](const Disc& d) {
-                    return meetsDisc(d, drawnRadius(d, place), local, t, rho2, normal);
+                    return meetsDisc(d, drawnRadius(d, place), local, view_.isOrthographic, t, rho2, normal);
                 };
                 if (!store.segments.empty()) {
                     hitSegment(store.segments[item], place, local, p, best);
                 } else if (item >= store.discs.size()) {
                     hitTriangle(store, place, store.triangles[item - store.discs.size()], local, ray, step, p, best);
                 } else if (meets(store.discs[item]) && t > view_.nearPlane && t < best.t) {
-                    const double m = std::abs(glm::dot(place.rotation * normal, toWorld(ray))) / length;
+                    const double m = std::abs(glm::dot(place.rotation * normal, toWorld(ray.direction))) / length;
                     best.place = p;
                     best.t = t;
                     best.isTriangle = best.isStrand = false;
@@ -267,13 +271,13 @@ class Tracer {
         best.t = hit.t;
         best.isStrand = true;
         best.sample.colour = glm::mix(s.colourA, s.colourB, hit.place);
-        best.sample.thickness = s.isTube ? 1 : 0;  // a ribbon is a leaf
+        best.sample.thickness = s.isTube ? 1e30 : 0;  // a ribbon is a leaf, in all units
         best.sample.radius = best.sample.depth = 1;
         best.normal = toCamera(place.rotation * hit.normal);
     }
 
     void hitTriangle(const TracedStore& store, const lod::Instance& place, const std::array<uint32_t, 3>& corners,
-                     const LocalRay& local, const dvec3& ray, double step, uint32_t p, Hit& best) const {
+                     const LocalRay& local, const ViewRay& ray, double step, uint32_t p, Hit& best) const {
         const uint32_t surface = store.vertices[corners[0]].surface;
         double t = 0;
         if (!meetsTriangle(store.positionOf(corners[0]), store.positionOf(corners[1]), store.positionOf(corners[2]),
@@ -288,7 +292,7 @@ class Tracer {
         const dvec2 w = glm::clamp(weightsOn(ray, c, face), dvec2(0), dvec2(1));
         Sample sample;
         dvec3 n;
-        if (!surfaceOn(ray, w, footprintOn(ray, step, c, face), c, face, surface,
+        if (!surfaceOn(ray.direction, w, footprintOn(ray, view_.isOrthographic, step, c, face), c, face, surface,
                        store.store->description.materials.at(surface & shared::kSurfaceMaterialMask),
                        {store.textures, store.tiles}, sample, n))
             return;
@@ -302,12 +306,12 @@ class Tracer {
     }
 
     /// Mean colour of the discs within the front thickness, weighted by (1 - rho^2)^2; returns their normal.
-    dvec3 blendDiscs(const dvec3& ray, const Hit& front, dvec3& colour) const {
+    dvec3 blendDiscs(const ViewRay& ray, const Hit& front, dvec3& colour) const {
         const double limit = front.t + front.thickness;
         double weights = 0;
         dvec3 normals(0);
         colour = dvec3(0);
-        tree_.visit(dvec3(0), toWorld(ray), view_.nearPlane, limit, [&](uint32_t p) {
+        tree_.visit(toWorld(ray.origin), toWorld(ray.direction), view_.nearPlane, limit, [&](uint32_t p) {
             const TracedStore& store = *places_[p];
             const LocalRay local = localRay(placed_[p].place, ray);
             store.tree.visit(local.origin, local.direction, view_.nearPlane, limit, [&](uint32_t item) {
@@ -315,8 +319,8 @@ class Tracer {
                 dvec3 normal;
                 if (item >= store.discs.size()) return;
                 const Disc& d = store.discs[item];
-                if (!meetsDisc(d, drawnRadius(d, placed_[p].place), local, t, rho2, normal) || t <= view_.nearPlane ||
-                    t >= limit)
+                if (!meetsDisc(d, drawnRadius(d, placed_[p].place), local, view_.isOrthographic, t, rho2, normal) ||
+                    t <= view_.nearPlane || t >= limit)
                     return;
                 const double w = (1 - rho2) * (1 - rho2) + 1e-9;
                 weights += w;
@@ -354,11 +358,7 @@ Result<render::Image> trace(const std::vector<render::PlacedStore>& placed, cons
     executor.parallelFor(view.height, 4, [&](size_t row0, size_t row1) {
         for (size_t y = row0; y < row1; ++y)
             for (uint32_t x = 0; x < view.width && !isStopRequested(); ++x) {
-                // Along `forward` rays have length 1, so that t is linear depth.
-                const auto rayAt = [&](double px, double py) {
-                    return dvec3((px - 0.5 * view.width) / view.focalPixels,
-                                 (py - 0.5 * view.height) / view.focalPixels, 1);
-                };
+                const auto rayAt = [&](double px, double py) { return viewRay(view, dvec2(px, py)); };
                 dvec3 sum(0), normal(0);
                 uint32_t hits = 0;
                 double depth = 0;

@@ -13,7 +13,7 @@ static_assert(sizeof(shared::PointRecord) == 16);
 static_assert(sizeof(shared::DrawNode) == 80);
 static_assert(sizeof(shared::DrawBlock) == 8);
 static_assert(sizeof(shared::StrandSegment) == 32);
-static_assert(sizeof(shared::FrameConstants) == 180);
+static_assert(sizeof(shared::FrameConstants) == 184);
 static_assert(sizeof(shared::MeshVertex) == 32);
 static_assert(sizeof(shared::MeshCluster) == 12);
 static_assert(sizeof(shared::DrawMesh) == 120);
@@ -117,6 +117,32 @@ double nearestOf(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hie
     return nearest;
 }
 
+/// The orthographic view of the same picture whose eye stands just before what is drawn, if it is far before that:
+/// depths in fp32 keep their digits however far away the eye is. Returns how far it was moved.
+double advanceEye(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,
+                  std::span<const lod::Instance> instances, lod::View& view) {
+    double nearest = HUGE_VAL, farthest = -HUGE_VAL;
+    const auto look = [&](uint32_t instance, uint32_t number) {
+        const lod::Instance& place = instances[instance];
+        const lod::Hierarchy& h = *hierarchies[place.hierarchy];
+        const lod::Node& node = h.nodes[number];
+        const glm::dvec3 centre =
+            place.translation + place.rotation * (place.scale * (h.origin + h.unit * node.centre));
+        const double depth = glm::dot(centre - view.eye, view.forward),
+                     radius = node.radius * place.scale * h.unit + place.sway;
+        nearest = std::min(nearest, depth - radius);
+        farthest = std::max(farthest, depth + radius);
+    };
+    for (const lod::CutDraw& draw : cut.draw) look(draw.instance, draw.node);
+    for (const lod::CutMeshDraw& draw : cut.meshDraw) look(draw.instance, draw.node);
+    constexpr double kMargin = 0x1p-6;  // of the depth of what is drawn
+    const double advance = nearest - std::max(kMargin * (farthest - nearest), 2 / view.focalPixels);
+    if (!(advance > 0) || !std::isfinite(advance)) return 0;
+    view.eye += view.forward * advance;
+    view.nearPlane = std::max(view.nearPlane - advance, 0.5 * (nearest - advance));
+    return advance;
+}
+
 /// Keeps the memory.
 void clear(DrawList& out) {
     for (size_t k = 0; k < lod::kKinds; ++k) {
@@ -187,11 +213,12 @@ void setView(const lod::Cut& cut, const lod::View& view, const DrawSettings& set
     f.viewY = glm::vec3(view.down);
     f.viewZ = glm::vec3(view.forward);
     f.focal = static_cast<float>(view.focalPixels);
+    f.orthographic = view.isOrthographic ? 1 : 0;
     f.centre = {0.5f * static_cast<float>(view.width), 0.5f * static_cast<float>(view.height)};
     f.width = view.width;
     f.height = view.height;
     // Not below what fp32 can divide by.
-    const double nearest = nearestOf(cut, out.hierarchies, out.instances, view);
+    const double nearest = view.isOrthographic ? 0 : nearestOf(cut, out.hierarchies, out.instances, view);
     out.view.nearPlane = std::max({view.nearPlane, std::isfinite(nearest) ? nearest : 0.0, 1e-30});
     f.nearPlane = static_cast<float>(out.view.nearPlane);
     f.supportScale = settings.supportScale;
@@ -272,9 +299,11 @@ FrameContent contentOf(const DrawList& draws) {
 }
 
 void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,
-                  std::span<const lod::Instance> instances, const lod::View& view, const DrawSettings& settings,
+                  std::span<const lod::Instance> instances, const lod::View& asked, const DrawSettings& settings,
                   DrawList& out) {
     clear(out);
+    lod::View view = asked;
+    out.eyeAdvanced = view.isOrthographic ? advanceEye(cut, hierarchies, instances, view) : 0;
     out.view = view;
     out.cut.assign(cut.draw.begin(), cut.draw.end());
     out.meshCut.assign(cut.meshDraw.begin(), cut.meshDraw.end());

@@ -76,7 +76,8 @@ struct DrawList {
     uint64_t swaying = 0;                            ///< nodes that wind moves
     std::span<const shared::SurfaceMaterial> materials;
     // What the fp32 numbers above were made from: the reference starts from these.
-    lod::View view;
+    lod::View view;          ///< orthographic: its eye stands before what is drawn ...
+    double eyeAdvanced = 0;  ///< ... so far before the eye that was asked for
     std::vector<lod::CutDraw> cut;
     std::vector<Bend> bends;  ///< of each of `cut`; empty without wind
     std::vector<lod::CutMeshDraw> meshCut;

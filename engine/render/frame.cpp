@@ -163,6 +163,10 @@ Result<void> draw(FrameState& state, const lod::View& view, const FrameSettings&
     request.passes = passesOf(settings.mode, contentOf(state.draws));
     request.wantDepthAndNormal = settings.wantDepthAndNormal;
     STIPPLE_TRY(state.backend->render(request, state.image));
+    // Depths count from the eye that was asked for.
+    if (state.draws.eyeAdvanced != 0)
+        for (float& depth : state.image.depth)
+            depth = depth > 0 ? static_cast<float>(double{depth} + state.draws.eyeAdvanced) : depth;
 
     FrameCounters& c = state.counters;
     const lod::CutCounters& cut = state.cut.counters;

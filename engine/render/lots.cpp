@@ -34,9 +34,9 @@ class StrandLots {
             const double radius =
                 0.5 * edge * (double{shared::strandRadius(s.a, 1.0f)} + double{shared::strandRadius(s.b, 1.0f)});
             const double depth = glm::dot(middle, view_.forward);
-            if (!(depth > view_.nearPlane) || isOutside(middle, radius)) continue;
-            const glm::dvec3 sight = glm::normalize(middle), along = b - a;
-            const double length = glm::length(along), perPixel = view_.focal / depth;
+            if (!(depth > view_.nearPlane) || view_.isBeside(middle, radius)) continue;
+            const glm::dvec3 sight = view_.isOrthographic ? view_.forward : glm::normalize(middle), along = b - a;
+            const double length = glm::length(along), perPixel = view_.focal / (view_.isOrthographic ? 1 : depth);
             if (!(length > 0)) continue;
             const double sine = glm::length(glm::cross(along / length, sight));
             double half = radius * perPixel;
@@ -57,10 +57,6 @@ class StrandLots {
     }
 
   private:
-    bool isOutside(const glm::dvec3& off, double radius) const {
-        return std::any_of(view_.planes.begin(), view_.planes.end(),
-                           [&](const glm::dvec3& plane) { return glm::dot(off, plane) < -radius; });
-    }
     const lod::Hierarchy& h_;
     lod::LocalView view_;
     LotShares& shares_;

@@ -35,7 +35,7 @@ void markWideDiscs(const GreatestRadii& radii, DrawList& draws) {
         const auto least = [](float step) { return 65536 * std::min(0.0, double{step}); };
         const double nearest = double{d.base.z} + least(d.axisX.z) + least(d.axisY.z) + least(d.axisZ.z);
         const double radius = 1.01 * double{d.edge} * double{f.supportScale * radii.shareOf(points.keys[i])};  // (fp32)
-        if (!(radius > perFocal * nearest)) continue;
+        if (!(radius > perFocal * (f.orthographic != 0 ? 1 : nearest))) continue;
         d.octantMask |= shared::kNodeWide;
         draws.hasWideDiscs = true;
     }

@@ -27,7 +27,7 @@ Bend bendOf(const Wind& wind, const lod::Hierarchy& h, const lod::Instance& inst
     };
     const double perStep = instance.scale * h.unit, reach = perStep * h.nodes[0].radius, height = 2 * reach;
     const glm::dvec3 middle = world(h.nodes[0].centre);
-    const double nearest = std::max(glm::length(middle - view.eye) - reach, view.nearPlane);
+    const double nearest = view.isOrthographic ? 1 : std::max(glm::length(middle - view.eye) - reach, view.nearPlane);
     if (instance.sway * view.focalPixels < kLeastSway * nearest) return {};
     const double foot = glm::dot(up, middle) - reach;
     const double at = std::clamp((glm::dot(up, world(h.nodes[node].centre)) - foot) / height, 0.0, 1.0);

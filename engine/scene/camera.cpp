@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kLeastFov = 0.001, kGreatestFov = 179;
+constexpr double kLeastOrtho = 1e-12, kGreatestOrtho = 1e15;  // world units
 
 template <typename T>
 T catmullRom(const T& a, const T& b, const T& c, const T& d, double s) {
@@ -158,6 +159,10 @@ Camera CameraPath::at(double t) const {
     // (The curve swings out beyond its keys.)
     out.fovDegrees =
         std::clamp(catmullRom(a.fovDegrees, b.fovDegrees, c.fovDegrees, d.fovDegrees, s), kLeastFov, kGreatestFov);
+    const bool isOrthographic = b.orthoWidth > 0;
+    if (isOrthographic)
+        out.orthoWidth = std::clamp(catmullRom(a.orthoWidth, b.orthoWidth, c.orthoWidth, d.orthoWidth, s),
+                                    std::min(b.orthoWidth, c.orthoWidth), std::max(b.orthoWidth, c.orthoWidth));
     return out;
 }
 
@@ -189,6 +194,24 @@ Camera fitCamera(std::span<const glm::dvec3> points, const glm::dvec3& up, doubl
     const glm::dvec3 right = glm::normalize(glm::cross(forward, camera.up)), down = glm::cross(forward, right);
     camera.target = middle + right * seen.centred(0, distance) + down * seen.centred(1, distance);
     camera.eye = camera.target - forward * distance;
+    return camera;
+}
+
+Camera fitOrthographic(const Camera& perspective, std::span<const glm::dvec3> points, double width) {
+    Camera camera = perspective;
+    const glm::dvec3 forward = glm::normalize(camera.target - camera.eye), middle = middleOf(points);
+    const Projected seen = project(points, middle, camera, forward, 1);
+    glm::dvec3 lo(1e300), hi(-1e300);
+    for (const glm::dvec3& p : seen.points) {
+        lo = glm::min(lo, p);
+        hi = glm::max(hi, p);
+    }
+    const glm::dvec3 right = glm::normalize(glm::cross(forward, camera.up)), down = glm::cross(forward, right);
+    camera.target = middle + 0.5 * (lo.x + hi.x) * right + 0.5 * (lo.y + hi.y) * down;
+    // Half the size before it all: splats and what wind moves reach beyond the points.
+    const double size = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z, width});
+    camera.eye = camera.target + (lo.z - 0.5 * size) * forward;
+    camera.orthoWidth = width;
     return camera;
 }
 
@@ -253,6 +276,8 @@ lod::View makeView(const Camera& camera, uint32_t width, uint32_t height, double
     view.width = width;
     view.height = height;
     view.focalPixels = 0.5 * height / std::tan(0.5 * camera.fovDegrees * kPi / 180);
+    view.isOrthographic = camera.isOrthographic();
+    if (view.isOrthographic) view.focalPixels = 1 / std::max(camera.orthoWidth / width, camera.orthoHeight / height);
     view.nearPlane = nearPlane;
     return view;
 }
@@ -316,7 +341,7 @@ class KeyReader {
 Result<CameraKey> readKey(const KeyReader& from, const glm::dvec3& up) {
     CameraKey key;
     key.camera.up = up;
-    STIPPLE_TRY(from.holdsOnly({"t", "eye", "target", "up", "fov"}));
+    STIPPLE_TRY(from.holdsOnly({"t", "eye", "target", "up", "fov", "ortho"}));
     STIPPLE_ASSIGN(key.t, from.number("t", -1e9, 1e9));
     STIPPLE_ASSIGN(key.camera.eye, from.vector("eye"));
     STIPPLE_ASSIGN(key.camera.target, from.vector("target"));
@@ -324,6 +349,10 @@ Result<CameraKey> readKey(const KeyReader& from, const glm::dvec3& up) {
     if (from.has("up")) {
         STIPPLE_ASSIGN(key.camera.up, from.vector("up"));
         if (!(glm::length(key.camera.up) > 0)) return from.bad("up", "has no length");
+    }
+    if (from.has("fov") && from.has("ortho")) return from.bad("ortho", "is given beside 'fov'");
+    if (from.has("ortho")) {
+        STIPPLE_ASSIGN(key.camera.orthoWidth, from.number("ortho", kLeastOrtho, kGreatestOrtho));
     }
     if (from.has("fov")) {
         STIPPLE_ASSIGN(key.camera.fovDegrees, from.number("fov", kLeastFov, kGreatestFov));
@@ -354,6 +383,10 @@ Result<CameraPath> readCameraPath(const std::string& path, const glm::dvec3& up)
         if (!out.keys.empty() && !(key.t > out.keys.back().t))
             return fail(ErrorKind::input, fmt::format("key {} is not later than the one before", out.keys.size()),
                         path);
+        if (!out.keys.empty() && out.keys[0].camera.isOrthographic() != key.camera.isOrthographic())
+            return fail(ErrorKind::input,
+                        fmt::format("'ortho' stands in some keys only: key {} differs from key 0", out.keys.size()),
+                        path, "give it in all keys or in none");
         out.keys.push_back(key);
     }
     if (out.duration() * out.fps > kMostFrames)

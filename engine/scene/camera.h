@@ -15,6 +15,9 @@ namespace stipple::scene {
 struct Camera {
     glm::dvec3 eye{0, 0, 1}, target{0}, up{0, 1, 0};
     double fovDegrees = 50;  ///< vertical
+    /// Orthographic, if either is above 0: at least so much of the world is seen across and along the picture.
+    double orthoWidth = 0, orthoHeight = 0;
+    bool isOrthographic() const { return orthoWidth > 0 || orthoHeight > 0; }
 };
 
 /// A key of a camera path.
@@ -36,6 +39,9 @@ inline constexpr double kFitShare = 0.88;
 /// A camera that sees all of `points` (at least one) from a three-quarter view, flat scenes from steeper above: their
 /// projection spans kFitShare of the picture's tighter side and stands in its middle.
 Camera fitCamera(std::span<const glm::dvec3> points, const glm::dvec3& up, double aspect, double fovDegrees = 50);
+/// `perspective` as an orthographic camera from the same side: the scene's projection is in the middle of the picture
+/// and nothing of `points` is behind the eye.
+Camera fitOrthographic(const Camera& perspective, std::span<const glm::dvec3> points, double width);
 /// Of a box.
 Camera fitCamera(const glm::dvec3& boundsMin, const glm::dvec3& boundsMax, const glm::dvec3& up, double aspect,
                  double fovDegrees = 50);
@@ -45,8 +51,8 @@ std::array<glm::dvec3, 8> cornersOf(const glm::dvec3& boundsMin, const glm::dvec
 /// The view of `camera` at width x height pixels. `nearPlane` world units.
 lod::View makeView(const Camera& camera, uint32_t width, uint32_t height, double nearPlane);
 
-/// Reads {"fps": 30, "keys": [{"t": 0, "eye": [x,y,z], "target": [...], "up": [...], "fov": 50}]}.
-/// `up`: of keys that do not say.
+/// Reads {"fps": 30, "keys": [{"t": 0, "eye": [x,y,z], "target": [...], "up": [...], "fov": 50}]}; with "ortho", the
+/// width that the picture shows, instead of "fov" in all keys, the path is orthographic. `up`: of keys that do not say.
 Result<CameraPath> readCameraPath(const std::string& path, const glm::dvec3& up = {0, 1, 0});
 /// An orbit around points, at one distance and height: what a headless ./run renders. Nothing of them is ever outside.
 CameraPath makeOrbit(std::span<const glm::dvec3> points, const glm::dvec3& up, double aspect, int keys,

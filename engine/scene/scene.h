@@ -80,7 +80,7 @@ struct Light {
 struct SceneCamera {
     double fovDegrees = 50, nearPlane = 0.1;
     bool isOrthographic = false;
-    double height = 1;  ///< of an orthographic view, world units
+    double width = 1, height = 1;  ///< of an orthographic view, world units
 };
 
 struct Node {

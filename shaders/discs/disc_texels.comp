@@ -24,7 +24,9 @@ void main() {
     if (isDisc) anyHere = 1u;
     barrier();
     if (anyHere == 0u) return;
-    const vec2 ray = (vec2(pixel) + 0.5 - frame.centre) * (1.0 / frame.focal);
+    const vec2 at = (vec2(pixel) + 0.5 - frame.centre) * (1.0 / frame.focal);
+    const Lens lens = frameLensHere();
+    const PixelRay ray = pixelRay(lens, at.x, at.y);
     const float depth = keyDepth(key);
     DrawNode node;
     float apart = 0.0;
@@ -32,7 +34,7 @@ void main() {
     if (isDisc) {
         const uint frontId = keyPlace(key, frame.firstBlock.discs);
         front = recordOf(frontId, node);
-        apart = depthShared(wideDisc(node, front, frame.supportScale, frontId), ray.x, ray.y);
+        apart = depthShared(wideDisc(node, front, frame.supportScale, frontId, lens), ray);
     }
     float weight = 0.0;
     float inverseDepth = 0.0;
@@ -51,24 +53,24 @@ void main() {
         for (uint k = 0u; k < 64u; ++k) {
             if (mayCover[k] == 0u || !isDisc) continue;
             const WideDisc d = discs[first + k];
-            const DiscHit hit = discHit(d, ray.x, ray.y, frame.nearPlane);
+            const DiscHit hit = discHit(d, ray, frame.nearPlane);
             const float w = discWeight(hit, depth, apart);
             if (w == 0.0) continue;
             const PointRecord r = recordOf(d.id, node);
             weight += w;
-            inverseDepth += w / hit.depth;
-            n += d.normal * (dot(d.normal, d.centre) > 0.0 ? -w : w);
+            inverseDepth += lens.isOrthographic ? w * hit.depth : w / hit.depth;
+            n += d.normal * (dot(d.normal, sightTo(lens, d.centre)) > 0.0 ? -w : w);
             colour += w * pointColour(node, r);
         }
         barrier();
     }
     if (!isDisc) return;
     Texel t;
-    t.depth = weight / inverseDepth;
+    t.depth = lens.isOrthographic ? inverseDepth / weight : weight / inverseDepth;
     t.radius = kExactRadius;
     t.thickness = (recordFlags(front) & kFlagLoose) != 0u ? kLeafThickness * kExactRadius : kExactRadius;
     t.offset = vec2(0.0);
-    t.normalPerp = perpFromNormal(normalize(n), viewDirection(ray.x * frame.focal, ray.y * frame.focal, frame.focal));
+    t.normalPerp = perpFromNormal(normalize(n), viewDirection(at.x * frame.focal, at.y * frame.focal, lens));
     t.colour = colour / weight;
     t.isRound = 0.0;
     t.axis = vec2(0.0);

@@ -22,7 +22,7 @@ void main() {
         for (int p = int(gl_LocalInvocationID.x); p < pixels; p += 256) {
             const ivec2 at = ivec2(x.first + p % width, y.x + p / width);
             const vec2 ray = (vec2(at) + 0.5 - frame.centre) * inverseFocal;
-            const float depth = discHit(d, ray.x, ray.y, frame.nearPlane).depth;
+            const float depth = discHit(d, pixelRay(frameLensHere(), ray.x, ray.y), frame.nearPlane).depth;
             if (depth < kNoDisc) atomicMin(visibility[uint(at.y) * frame.width + uint(at.x)], visibilityKey(floatBitsToUint(depth), drawId(stepInfo.count, d.id)));
         }
     }

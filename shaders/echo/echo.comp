@@ -66,6 +66,7 @@ void main() {
     put(frame.environmentX);
     put(frame.environmentY);
     put(frame.environmentZ);
+    put(frame.orthographic);
     put(node.axisX);
     put(node.axisY);
     put(node.axisZ);

@@ -16,11 +16,13 @@ void main() {
     const bool fine = recordErrorCode(r) <= node.errorCode || (node.octantMask >> recordOctant(r) & 1u) != 0u;
     if (!fine) return;
     const vec3 c = node.base + node.axisX * float(recordX(r)) + node.axisY * float(recordY(r)) + node.axisZ * float(recordZ(r));
+    const Lens lens = frameLensHere();
+    const vec3 sight = sightTo(lens, c);
     const bool isOneSided = (recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) == 0u;
     if (stepInfo.count != 0u && (node.octantMask & kNodeWide) != 0u &&
-        isWideDisc(recordFlags(r), c.z, node.edge * frame.supportScale * radiusFractionFast(recordRadiusCode(r)), wideRadius(frame.width, frame.height) / frame.focal, frame.nearPlane) > 0.5) {
-        if (isOneSided && !(dot(nodeDirection(node, octDirection(r.normal)), c) < 0.0)) return;
-        const WideDisc d = wideDisc(node, r, frame.supportScale, block * kRecordsPerBlock + gl_LocalInvocationID.x);
+        isWideDisc(recordFlags(r), c.z, node.edge * frame.supportScale * radiusFractionFast(recordRadiusCode(r)), wideRadius(frame.width, frame.height) / frame.focal, frame.nearPlane, lens) > 0.5) {
+        if (isOneSided && !(dot(nodeDirection(node, octDirection(r.normal)), sight) < 0.0)) return;
+        const WideDisc d = wideDisc(node, r, frame.supportScale, block * kRecordsPerBlock + gl_LocalInvocationID.x, lens);
         if (reachesPicture(d, frame) < 0.5) return;
         const uint place = atomicAdd(discCount, 1u);
         if (place < kDiscCapacity) {
@@ -29,19 +31,19 @@ void main() {
         }
     }
     if (!(c.z > frame.nearPlane)) return;
-    const float scale = frame.focal / c.z;
+    const float scale = frame.focal / lensDepth(lens, c.z);
     float key = c.z;
     vec2 p = vec2(c.x * scale + frame.centre.x, c.y * scale + frame.centre.y);
     if (!(p.x >= 0.0 && p.y >= 0.0 && p.x < float(frame.width) && p.y < float(frame.height))) {
         if (stepInfo.hasPyramid == 0u) return;
-        const float cap = c.z * largestSplat(recordFlags(r), frame.focal, frame.height);
+        const float cap = lensDepth(lens, c.z) * largestSplat(recordFlags(r), frame.focal, frame.height);
         const float radius = max(min(node.edge * radiusFractionFast(recordRadiusCode(r)) * frame.supportScale, cap) * scale, frame.minimumRadius);
-        const SplatPixel s = splatPixel(p.x, p.y, c.x, c.y, c.z, radius, float(frame.width), float(frame.height));
+        const SplatPixel s = splatPixel(p.x, p.y, sight.x, sight.y, sight.z, radius, float(frame.width), float(frame.height));
         if (s.x < 0) return;
         p = vec2(float(s.x), float(s.y));
         key = c.z + s.farther * radius / scale;
     }
-    if (isOneSided && !(dot(nodeDirection(node, octDirection(r.normal)), c) < 0.0)) return;
+    if (isOneSided && !(dot(nodeDirection(node, octDirection(r.normal)), sight) < 0.0)) return;
     const uint64_t id = drawId(block, gl_LocalInvocationID.x);
     atomicMin(visibility[uint(p.y) * frame.width + uint(p.x)], visibilityKey(floatBitsToUint(key), id));
 }

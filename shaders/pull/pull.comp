@@ -13,6 +13,6 @@ void main() {
                                loadTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, c.x + 1, c.y),
                                loadTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, c.x, c.y + 1),
                                loadTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, c.x + 1, c.y + 1),
-                               exp2(float(stepInfo.level)), 1.0 / frame.focal);
+                               exp2(float(stepInfo.level)), frameLensHere());
     storeTexel(stepInfo.coarse, stepInfo.coarseWidth, stepInfo.coarseHeight, pixel, t);
 }

@@ -63,7 +63,7 @@ void main() {
     const uint i = gl_LocalInvocationID.x;
     if (i < (c.counts & 0xffffu) >> (m.places == kPlacesPaired ? 1 : 0)) {
         const vec3 p = placeOf(c, m, i);
-        const float scale = frame.focal / p.z;
+        const float scale = frame.focal / lensDepth(frameLensHere(), p.z);
         const vec2 s = vec2(p.x * scale + frame.centre.x, p.y * scale + frame.centre.y);
         const bool isIn = p.z >= frame.nearPlane && abs(s.x) < kGuardPixels && abs(s.y) < kGuardPixels;
         at[i] = p;
@@ -86,9 +86,9 @@ void main() {
         // Most triangles of a dense mesh contain no pixel's centre.
         if ((min(t.x0, min(t.x1, t.x2)) + 127) >> 8 > (max(t.x0, max(t.x1, t.x2)) - 128) >> 8) return;
         if ((min(t.y0, min(t.y1, t.y2)) + 127) >> 8 > (max(t.y0, max(t.y1, t.y2)) - 128) >> 8) return;
-        t.inverseDepth0 = 1.0 / at[a].z;
-        t.inverseDepth1 = 1.0 / at[b].z;
-        t.inverseDepth2 = 1.0 / at[d].z;
+        t.inverseDepth0 = imageLinear(frameLensHere(), at[a].z);
+        t.inverseDepth1 = imageLinear(frameLensHere(), at[b].z);
+        t.inverseDepth2 = imageLinear(frameLensHere(), at[d].z);
         takeTriangle(t, c, vertices.vertices[a].surface, word);
         return;
     }
@@ -98,6 +98,7 @@ void main() {
     polygon[1] = at[b];
     polygon[2] = at[d];
     int count = 3;
+    const Lens lens = frameLensHere();
     const float slope = (kGuardPixels - 16384.0) / frame.focal;
     for (int plane = 0; plane < 5 && count >= 3; ++plane) {
         int kept = 0;
@@ -105,8 +106,8 @@ void main() {
             const vec3 p = polygon[k];
             const vec3 q = polygon[k + 1 < count ? k + 1 : 0];
             const float side = plane == 1 || plane == 3 ? -1.0 : 1.0;
-            const float dp = plane == 0 ? p.z - frame.nearPlane : p.z * slope + side * (plane < 3 ? p.x : p.y);
-            const float dq = plane == 0 ? q.z - frame.nearPlane : q.z * slope + side * (plane < 3 ? q.x : q.y);
+            const float dp = plane == 0 ? p.z - frame.nearPlane : lensDepth(lens, p.z) * slope + side * (plane < 3 ? p.x : p.y);
+            const float dq = plane == 0 ? q.z - frame.nearPlane : lensDepth(lens, q.z) * slope + side * (plane < 3 ? q.x : q.y);
             if (dp >= 0.0) other[kept++] = p;
             if ((dp >= 0.0) != (dq >= 0.0)) {
                 other[kept] = cutEdge(p, dp, q, dq);
@@ -119,15 +120,15 @@ void main() {
     }
     for (int k = 1; k + 1 < count; ++k) {
         const vec3 p = polygon[0], q = polygon[k], r = polygon[k + 1];
-        t.x0 = snapPixel(p.x * (frame.focal / p.z) + frame.centre.x);
-        t.y0 = snapPixel(p.y * (frame.focal / p.z) + frame.centre.y);
-        t.x1 = snapPixel(q.x * (frame.focal / q.z) + frame.centre.x);
-        t.y1 = snapPixel(q.y * (frame.focal / q.z) + frame.centre.y);
-        t.x2 = snapPixel(r.x * (frame.focal / r.z) + frame.centre.x);
-        t.y2 = snapPixel(r.y * (frame.focal / r.z) + frame.centre.y);
-        t.inverseDepth0 = 1.0 / p.z;
-        t.inverseDepth1 = 1.0 / q.z;
-        t.inverseDepth2 = 1.0 / r.z;
+        t.x0 = snapPixel(p.x * (frame.focal / lensDepth(lens, p.z)) + frame.centre.x);
+        t.y0 = snapPixel(p.y * (frame.focal / lensDepth(lens, p.z)) + frame.centre.y);
+        t.x1 = snapPixel(q.x * (frame.focal / lensDepth(lens, q.z)) + frame.centre.x);
+        t.y1 = snapPixel(q.y * (frame.focal / lensDepth(lens, q.z)) + frame.centre.y);
+        t.x2 = snapPixel(r.x * (frame.focal / lensDepth(lens, r.z)) + frame.centre.x);
+        t.y2 = snapPixel(r.y * (frame.focal / lensDepth(lens, r.z)) + frame.centre.y);
+        t.inverseDepth0 = imageLinear(lens, p.z);
+        t.inverseDepth1 = imageLinear(lens, q.z);
+        t.inverseDepth2 = imageLinear(lens, r.z);
         takeTriangle(t, c, vertices.vertices[a].surface, word);
     }
 }

@@ -24,11 +24,12 @@ void main() {
         const DrawNode node = nodes[source.node];
         const PointRecord r = Records(uvec2(node.addressLow, node.addressHigh)).records[source.first + keyLane(key)];
         const vec3 c = node.base + node.axisX * float(recordX(r)) + node.axisY * float(recordY(r)) + node.axisZ * float(recordZ(r));
-        vec3 n = -normalize(c);
+        const Lens lens = frameLensHere();
+        vec3 n = -normalize(sightTo(lens, c));
         if ((recordFlags(r) & kFlagNoNormal) == 0u) n = nodeDirection(node, octDecode(r.normal));
-        const float radius = min(node.edge * radiusFraction(recordRadiusCode(r)) * frame.supportScale, c.z * largestSplat(recordFlags(r), frame.focal, frame.height));
+        const float radius = min(node.edge * radiusFraction(recordRadiusCode(r)) * frame.supportScale, lensDepth(lens, c.z) * largestSplat(recordFlags(r), frame.focal, frame.height));
         if (stepInfo.count != 0u) {  // no splat, but what the pixel shows
-            const vec3 v = viewDirection(float(pixel.x) + 0.5 - frame.centre.x, float(pixel.y) + 0.5 - frame.centre.y, frame.focal);
+            const vec3 v = viewDirection(float(pixel.x) + 0.5 - frame.centre.x, float(pixel.y) + 0.5 - frame.centre.y, lens);
             t.depth = keyDepth(key);
             t.radius = kExactRadius;
             t.thickness = (recordFlags(r) & kFlagLoose) != 0u ? kLeafThickness * kExactRadius : kExactRadius;
@@ -37,9 +38,9 @@ void main() {
             storeTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, pixel, t);
             return;
         }
-        t = texelFromSplat(c, n, radius, frame.focal, frame.minimumRadius);
+        t = texelFromSplat(c, n, radius, lens, frame.minimumRadius);
         if ((recordFlags(r) & kFlagLoose) != 0u) t.thickness = kLeafThickness * t.radius;
-        const float scale = frame.focal / c.z;
+        const float scale = frame.focal / lensDepth(lens, c.z);
         t.offset = vec2(c.x * scale + (frame.centre.x - 0.5) - float(pixel.x), c.y * scale + (frame.centre.y - 0.5) - float(pixel.y));
         t.colour = pointColour(node, r);
         atomicMax(largestRadiusBits, floatBitsToUint(t.radius));

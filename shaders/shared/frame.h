@@ -4,7 +4,7 @@
 // Camera space is z-forward, y-down, in world units relative to the eye.
 #ifndef STIPPLE_SHARED_FRAME_H
 #define STIPPLE_SHARED_FRAME_H
-#include "types.h"
+#include "lens.h"
 SHARED_BEGIN
 
 // One node of the cut. Position of record (x, y, z) in camera space: base + axisX*x + axisY*y + axisZ*z; the
@@ -63,7 +63,7 @@ struct FrameConstants {
     vec3 viewX;  // rows of the rotation from world to camera space, for normals
     vec3 viewY;
     vec3 viewZ;
-    float focal;  // pixels
+    float focal;  // pixels; orthographic: pixels per world unit
     vec2 centre;  // principal point, pixels
     uint width;
     uint height;
@@ -84,7 +84,9 @@ struct FrameConstants {
     vec3 environmentX;   // rows of the rotation from camera space to the environment's (y up)
     vec3 environmentY;
     vec3 environmentZ;
+    uint orthographic;  // 1: rays are parallel (lens.h)
 };
+SHARED_FN Lens frameLens(FrameConstants f) { return lensOf(f.focal, f.orthographic != 0u); }
 
 // A light in camera space. `colour`: what a white diffuse surface that faces it sends back at distance 1 (directional:
 // at any).

@@ -6,7 +6,7 @@
 // exactly.
 #ifndef STIPPLE_SHARED_MESH_H
 #define STIPPLE_SHARED_MESH_H
-#include "types.h"
+#include "lens.h"
 SHARED_BEGIN
 
 struct MeshVertex {
@@ -119,7 +119,7 @@ SHARED_FN int snapPixel(float p) { return int(floor(p * kSubpixel + 0.5f)); }
 SHARED_FN bool isTopLeft(int dx, int dy) { return dy < 0 || (dy == 0 && dx > 0); }
 
 // Where the ray through a pixel meets a triangle: weights of the second and third corner, in [0, 1]. `ray`: direction
-// in camera space; a, b, c: corners (Moeller and Trumbore 1997, solved for the weights alone).
+// in camera space; a, b, c: corners, counted from its origin (Moeller and Trumbore 1997, solved for the weights alone).
 SHARED_FN vec2 triangleWeights(vec3 ray, vec3 a, vec3 b, vec3 c) {
     const vec3 e1 = vec3(b.x - a.x, b.y - a.y, b.z - a.z);
     const vec3 e2 = vec3(c.x - a.x, c.y - a.y, c.z - a.z);
@@ -132,15 +132,16 @@ SHARED_FN vec2 triangleWeights(vec3 ray, vec3 a, vec3 b, vec3 c) {
     return vec2(u, v);
 }
 
-// Texture coordinates that a pixel covers: the longer of its two edges, on the triangle's plane. `ray`: through the
-// pixel, z = 1; a: first corner; e1, e2: edges to the others; d1, d2: texture coordinates along them.
-SHARED_FN float uvFootprint(vec3 ray, float inverseFocal, vec3 a, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
+// Texture coordinates that a pixel covers: the longer of its two edges, on the triangle's plane. `a`: first corner; e1,
+// e2: edges to the others; d1, d2: texture coordinates along them.
+SHARED_FN float uvFootprint(PixelRay of, float inverseFocal, vec3 a, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
+    const vec3 ray = rayDirection(of);
     const vec3 n = vec3(e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x);
     const float na = n.x * a.x + n.y * a.y + n.z * a.z;
     const float nr = n.x * ray.x + n.y * ray.y + n.z * ray.z;
     const float nn = n.x * n.x + n.y * n.y + n.z * n.z;
     // Point on the plane P = ray * na / nr; its change with the ray's x and y.
-    const float t = na / nr;
+    const float t = of.isOrthographic ? 1.0f : na / nr;  // (there the origin moves, whatever the depth)
     const float k = -t / nr;
     const vec3 px = vec3((t + k * n.x * ray.x) * inverseFocal, k * n.x * ray.y * inverseFocal, k * n.x * inverseFocal);
     const vec3 py = vec3(k * n.y * ray.x * inverseFocal, (t + k * n.y * ray.y) * inverseFocal, k * n.y * inverseFocal);

@@ -45,7 +45,7 @@ SHARED_FN Blend emptyBlend() {
 }
 
 // `x`, `y`: centre of the splat relative to the texel being made, pixels. Of texels in one plane, 1 / depth and place
-// are averaged to a point of that plane: 1 / depth is linear on the image.
+// are averaged to a point of that plane: 1 / depth is linear on the image. (Orthographic: the depth, imageLinear.)
 SHARED_FN Blend addToBlend(Blend b, Texel t, float inverseDepth, float x, float y, float weight) {
     b.weight += weight;
     b.inverseDepth += weight * inverseDepth;
@@ -63,10 +63,11 @@ SHARED_FN Blend addToBlend(Blend b, Texel t, float inverseDepth, float x, float 
     return b;
 }
 
-SHARED_FN Texel texelFromBlend(Blend b, float isRound) {
+SHARED_FN Texel texelFromBlend(Blend b, float isRound, Lens lens) {
     Texel t;
     const float s = b.weight > 0.0f ? 1.0f / b.weight : 0.0f;
-    t.depth = b.weight > 0.0f ? b.weight / max(b.inverseDepth, 1.0e-37f) : 0.0f;
+    const float depth = lens.isOrthographic ? b.inverseDepth * s : b.weight / max(b.inverseDepth, 1.0e-37f);
+    t.depth = b.weight > 0.0f ? depth : 0.0f;
     t.radius = b.radius * s;
     t.thickness = b.thickness * s;
     t.offset = vec2(b.x * s, b.y * s);
@@ -91,7 +92,9 @@ SHARED_FN float depthIfWide(Texel t, float childSize) {
 }
 
 // Half-thickness in world units.
-SHARED_FN float thicknessWorld(Texel t, float inverseFocal) { return t.thickness * t.depth * inverseFocal; }
+SHARED_FN float thicknessWorld(Texel t, Lens lens, float inverseFocal) {
+    return t.thickness * lensDepth(lens, t.depth) * inverseFocal;
+}
 
 // Merges the four children (order: (0,0) (1,0) (0,1) (1,1)) into their parent. `childSize`: edge of a child texel in
 // pixels. Kept are the children that reach beyond their own texel and whose depth interval [depth - t, depth + t] meets
@@ -99,7 +102,8 @@ SHARED_FN float thicknessWorld(Texel t, float inverseFocal) { return t.thickness
 // same depth to the last bit or not, and which of them is in front must not matter.) Where the interval of the result
 // ends is counted from the front one and capped, so that layers do not chain (F12, case 42). They count by their areas:
 // of wide and narrow splats side by side the wide ones close the gaps.
-SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSize, float inverseFocal) {
+SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSize, Lens lens) {
+    const float inverseFocal = 1.0f / lens.focal;
     const float h = 0.5f * childSize;
     const float x0 = c0.offset.x - h;
     const float y0 = c0.offset.y - h;
@@ -114,10 +118,10 @@ SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSi
     const float d2 = depthIfWide(c2, childSize);
     const float d3 = depthIfWide(c3, childSize);
     const float front = min(min(d0, d1), min(d2, d3));
-    const float t0 = thicknessWorld(c0, inverseFocal);
-    const float t1 = thicknessWorld(c1, inverseFocal);
-    const float t2 = thicknessWorld(c2, inverseFocal);
-    const float t3 = thicknessWorld(c3, inverseFocal);
+    const float t0 = thicknessWorld(c0, lens, inverseFocal);
+    const float t1 = thicknessWorld(c1, lens, inverseFocal);
+    const float t2 = thicknessWorld(c2, lens, inverseFocal);
+    const float t3 = thicknessWorld(c3, lens, inverseFocal);
     const float back = min(min(d0 + t0, d1 + t1), min(d2 + t2, d3 + t3));
     const float isRound = d0 + t0 <= back   ? c0.isRound
                           : d1 + t1 <= back ? c1.isRound
@@ -128,11 +132,11 @@ SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSi
     const float w2 = d2 < kFarAway && d2 - t2 <= back ? isLike(c2, isRound) : 0.0f;
     const float w3 = d3 < kFarAway && d3 - t3 <= back ? isLike(c3, isRound) : 0.0f;
     Blend b = emptyBlend();
-    b = addToBlend(b, c0, 1.0f / max(c0.depth, kLeastDepth), x0, y0, w0 * (c0.radius * c0.radius));
-    b = addToBlend(b, c1, 1.0f / max(c1.depth, kLeastDepth), x1, y1, w1 * (c1.radius * c1.radius));
-    b = addToBlend(b, c2, 1.0f / max(c2.depth, kLeastDepth), x2, y2, w2 * (c2.radius * c2.radius));
-    b = addToBlend(b, c3, 1.0f / max(c3.depth, kLeastDepth), x3, y3, w3 * (c3.radius * c3.radius));
-    Texel t = texelFromBlend(b, isRound);
+    b = addToBlend(b, c0, imageLinear(lens, max(c0.depth, kLeastDepth)), x0, y0, w0 * (c0.radius * c0.radius));
+    b = addToBlend(b, c1, imageLinear(lens, max(c1.depth, kLeastDepth)), x1, y1, w1 * (c1.radius * c1.radius));
+    b = addToBlend(b, c2, imageLinear(lens, max(c2.depth, kLeastDepth)), x2, y2, w2 * (c2.radius * c2.radius));
+    b = addToBlend(b, c3, imageLinear(lens, max(c3.depth, kLeastDepth)), x3, y3, w3 * (c3.radius * c3.radius));
+    Texel t = texelFromBlend(b, isRound, lens);
     const float deepest = max(max(w0 * c0.depth, w1 * c1.depth), max(w2 * c2.depth, w3 * c3.depth));
     const float thickest = max(max(w0 * t0, w1 * t1), max(w2 * t2, w3 * t3));
     // Leaves stay leaves.
@@ -140,32 +144,33 @@ SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSi
         min(min(w0 > 0.0f ? c0.thickness / c0.radius : 1.0f, w1 > 0.0f ? c1.thickness / c1.radius : 1.0f),
             min(w2 > 0.0f ? c2.thickness / c2.radius : 1.0f, w3 > 0.0f ? c3.thickness / c3.radius : 1.0f));
     const float end = min(thickest + deepest, front + (thinnest < kLeafLimit ? 1.0f : 2.0f) * thickest);
-    t.thickness = b.weight > 0.0f ? max(end - t.depth, 0.5f * thickest) / (t.depth * inverseFocal) : 0.0f;
+    t.thickness =
+        b.weight > 0.0f ? max(end - t.depth, 0.5f * thickest) / (lensDepth(lens, t.depth) * inverseFocal) : 0.0f;
     return t;
 }
 
 // What the push needs of a coarse texel beside itself.
 struct CoarseDisc {
-    vec2 slope;  // ellipseSlope
-    float inverseDepth;
+    vec2 slope;          // ellipseSlope
+    float inverseDepth;  // imageLinear
 };
 // Half the width to which an edge-on splat is drawn, pixels. Half a pixel would show it wherever it is; that sets the
 // outlines of round bodies, where all discs are seen edge-on, half a pixel out (and with them points of planes that no
 // disc reaches).
 const float kEdgeOn = 0.25f;
 // `x`, `y`: centre of the texel, px from the principal point. (ellipseSlope keeps half a pixel of the radius it gets.)
-SHARED_FN CoarseDisc coarseDisc(Texel t, float x, float y, float focal) {
+SHARED_FN CoarseDisc coarseDisc(Texel t, float x, float y, Lens lens) {
     CoarseDisc d;
     d.slope = ellipseSlope(t.normalPerp, t.isRound, max(t.radius, 1.0e-3f) * (0.5f / kEdgeOn), x + t.offset.x,
-                           y + t.offset.y, focal);
-    d.inverseDepth = 1.0f / max(t.depth, kLeastDepth);
+                           y + t.offset.y, lens);
+    d.inverseDepth = imageLinear(lens, max(t.depth, kLeastDepth));
     return d;
 }
 
 // rho^2 of a coarse texel at the fine one's centre (x, y) px from the principal point; (dx, dy) leads from there to the
 // splat's centre. kFarAway where it is empty.
-SHARED_FN float pushRho2(Texel t, CoarseDisc d, float x, float y, float dx, float dy, float focal) {
-    const float rho2 = discRho2(d.slope, max(t.radius, 1.0e-3f), x + dx, y + dy, focal, -dx, -dy);
+SHARED_FN float pushRho2(Texel t, CoarseDisc d, float x, float y, float dx, float dy, Lens lens) {
+    const float rho2 = discRho2(d.slope, max(t.radius, 1.0e-3f), x + dx, y + dy, lens, -dx, -dy);
     return t.depth > 0.0f ? rho2 : kFarAway;
 }
 SHARED_FN float kernelWeight(float rho2) {
@@ -202,8 +207,8 @@ const float kSurrounding = 4.0f;  // coarse texels of one surface that make a fi
 // `e0` to `e3`: coarseDisc of q0 to q3; (x, y): centre of the fine texel, px from the principal point.
 SHARED_FN Texel pushTexel(Texel own, Texel q0, Texel q1, Texel q2, Texel q3, CoarseDisc e0, CoarseDisc e1,
                           CoarseDisc e2, CoarseDisc e3, float sx, float sy, float x, float y, float fineSize,
-                          float focal) {
-    const float inverseFocal = 1.0f / focal;
+                          Lens lens) {
+    const float inverseFocal = 1.0f / lens.focal;
     Texel fine = own;
     fine.depth = fineSize < 1.5f && isBeside(own.offset) > 0.5f ? 0.0f : own.depth;
     const float coarseSize = 2.0f * fineSize;
@@ -220,14 +225,14 @@ SHARED_FN Texel pushTexel(Texel own, Texel q0, Texel q1, Texel q2, Texel q3, Coa
     const float y2 = farY + q2.offset.y;
     const float x3 = farX + q3.offset.x;
     const float y3 = farY + q3.offset.y;
-    const float r0 = pushRho2(q0, e0, x, y, x0, y0, focal);
-    const float r1 = pushRho2(q1, e1, x, y, x1, y1, focal);
-    const float r2 = pushRho2(q2, e2, x, y, x2, y2, focal);
-    const float r3 = pushRho2(q3, e3, x, y, x3, y3, focal);
-    const float t0 = thicknessWorld(q0, inverseFocal);
-    const float t1 = thicknessWorld(q1, inverseFocal);
-    const float t2 = thicknessWorld(q2, inverseFocal);
-    const float t3 = thicknessWorld(q3, inverseFocal);
+    const float r0 = pushRho2(q0, e0, x, y, x0, y0, lens);
+    const float r1 = pushRho2(q1, e1, x, y, x1, y1, lens);
+    const float r2 = pushRho2(q2, e2, x, y, x2, y2, lens);
+    const float r3 = pushRho2(q3, e3, x, y, x3, y3, lens);
+    const float t0 = thicknessWorld(q0, lens, inverseFocal);
+    const float t1 = thicknessWorld(q1, lens, inverseFocal);
+    const float t2 = thicknessWorld(q2, lens, inverseFocal);
+    const float t3 = thicknessWorld(q3, lens, inverseFocal);
     const float least = min(min(r0, r1), min(r2, r3));
     const float missed = least < 1.0f ? 0.0f : 1.0f;
     const float n0 = q0.depth > 0.0f ? q0.depth : kFarAway;
@@ -290,7 +295,7 @@ SHARED_FN Texel pushTexel(Texel own, Texel q0, Texel q1, Texel q2, Texel q3, Coa
         max(fine.radius * fine.radius, fineSize * fineSize);  // (of others the centre lies in the texel)
     const float isMissed = off2 > least2 ? 1.0f : 0.0f;
     const bool replace = hasBlend * (isBehind + isEmpty + isMissed) > 0.5f;
-    const Texel blended = texelFromBlend(b, isRound);
+    const Texel blended = texelFromBlend(b, isRound, lens);
     Texel t;
     t.depth = replace ? blended.depth : fine.depth;
     t.radius = replace ? blended.radius : fine.radius;

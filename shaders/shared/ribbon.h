@@ -3,7 +3,7 @@
 // across it, and both c and w linear in v. (ALGORITHMS 1.4, lines: rays against quads of ribbons.)
 #ifndef STIPPLE_SHARED_RIBBON_H
 #define STIPPLE_SHARED_RIBBON_H
-#include "types.h"
+#include "lens.h"
 SHARED_BEGIN
 
 SHARED_FN vec3 crossOf(vec3 a, vec3 b) {
@@ -50,14 +50,17 @@ const float kNoRibbon = 3.0e38f;
 const float kRibbonSlack = 1.0e-5f;
 const float kRibbonTexelSlack = 1.0e-3f;
 
-// Where the ray (ex, ey, 1) from the eye meets the line across the ribbon at `along`, if that is one of its lines.
-SHARED_FN RibbonHit ribbonLine(Ribbon r, float along, float ex, float ey, float slack, float nearPlane) {
+// Where a ray meets the line across the ribbon at `along`, if that is one of its lines. (ox, oy): the ray's origin,
+// over the larger radius.
+SHARED_FN RibbonHit ribbonLine(Ribbon r, float along, PixelRay ray, float ox, float oy, float slack, float nearPlane) {
+    const float ex = ray.ex;
+    const float ey = ray.ey;
     const float v = min(max(along, 0.0f), 1.0f);
     const vec3 c = vec3(r.a.x + v * r.along.x, r.a.y + v * r.along.y, r.a.z + v * r.along.z);
     const vec3 w = vec3(r.w.x + v * r.turn.x, r.w.y + v * r.turn.y, r.w.z + v * r.turn.z);
     // Both as seen along the ray: parallel there.
-    const float px = c.x - ex * c.z;
-    const float py = c.y - ey * c.z;
+    const float px = ray.isOrthographic ? c.x - ox : c.x - ex * c.z;
+    const float py = ray.isOrthographic ? c.y - oy : c.y - ey * c.z;
     const float qx = w.x - ex * w.z;
     const float qy = w.y - ey * w.z;
     const float q2 = qx * qx + qy * qy;
@@ -75,10 +78,18 @@ SHARED_FN RibbonHit ribbonLine(Ribbon r, float along, float ex, float ey, float 
 
 // The nearest place before the near plane where a ray e = (ex, ey, 1) from the eye meets the ribbon. Eye, ray and the
 // line across the ribbon at v lie in one plane where e . (c(v) x w(v)) = 0: a quadratic in v whose coefficients are
-// linear in the ray.
-SHARED_FN RibbonHit ribbonHit(Ribbon r, float ex, float ey, float nearPlane, float slack) {
-    const float k0 = ex * r.n0.x + (ey * r.n0.y + r.n0.z);
-    const float k1 = ex * r.n1.x + (ey * r.n1.y + r.n1.z);
+// linear in the ray. Along the axis the same with c counted from the ray's origin.
+SHARED_FN RibbonHit ribbonHit(Ribbon r, PixelRay ray, float nearPlane, float slack) {
+    const float ex = ray.ex;
+    const float ey = ray.ey;
+    const float ox = r.unit > 0.0f ? ray.ox / r.unit : 0.0f;
+    const float oy = r.unit > 0.0f ? ray.oy / r.unit : 0.0f;
+    const float ax = r.a.x - ox;
+    const float ay = r.a.y - oy;
+    const float straight0 = ax * r.w.y - ay * r.w.x;
+    const float straight1 = (ax * r.turn.y - ay * r.turn.x) + (r.along.x * r.w.y - r.along.y * r.w.x);
+    const float k0 = ray.isOrthographic ? straight0 : ex * r.n0.x + (ey * r.n0.y + r.n0.z);
+    const float k1 = ray.isOrthographic ? straight1 : ex * r.n1.x + (ey * r.n1.y + r.n1.z);
     const float k2 = ex * r.n2.x + (ey * r.n2.y + r.n2.z);
     const float inner = k1 * k1 - 4.0f * k2 * k0;
     const float root = sqrt(max(inner, 0.0f));
@@ -86,8 +97,8 @@ SHARED_FN RibbonHit ribbonHit(Ribbon r, float ex, float ey, float nearPlane, flo
     const bool isReal = inner >= -slack * slack * k1 * k1;
     const float v0 = isReal && abs(q) > 0.0f ? k0 / q : -1.0f;
     const float v1 = isReal && abs(k2) > 0.0f ? q / k2 : -1.0f;
-    const RibbonHit first = ribbonLine(r, v0, ex, ey, slack, nearPlane);
-    const RibbonHit second = ribbonLine(r, v1, ex, ey, slack, nearPlane);
+    const RibbonHit first = ribbonLine(r, v0, ray, ox, oy, slack, nearPlane);
+    const RibbonHit second = ribbonLine(r, v1, ray, ox, oy, slack, nearPlane);
     const bool isFirst = first.depth <= second.depth;
     RibbonHit hit;
     hit.depth = isFirst ? first.depth : second.depth;

@@ -7,13 +7,13 @@
 // (d - (s.d) C) / (1 + s.d) from the centre, exactly, in perspective (ALGORITHMS 1.1): rho^2 = |e|^2 / r^2.
 #ifndef STIPPLE_SHARED_SPLAT_H
 #define STIPPLE_SHARED_SPLAT_H
-#include "types.h"
+#include "lens.h"
 SHARED_BEGIN
 
 struct Texel {
     float depth;      // linear, world units; 0: empty; < 0: outside the image
     float radius;     // pixels of the full-size image
-    float thickness;  // half-thickness along the view, in pixels at this depth (world = thickness * depth / focal)
+    float thickness;  // half-thickness along the view, in pixels at this depth (world = thickness * lensDepth / focal)
     vec2 offset;      // centre of the splat - centre of the texel, pixels; below kOffsetRadii radii
     vec2 normalPerp;  // the eye-facing normal's components perpendicular to the view direction
     vec3 colour;      // linear
@@ -39,14 +39,20 @@ SHARED_FN vec3 normalFromPerp(vec2 p, vec3 v) {
 }
 
 // Unit view direction of the image point that lies (x, y) px from the principal point.
-SHARED_FN vec3 viewDirection(float x, float y, float focal) {
+SHARED_FN vec3 viewDirection(float x, float y, Lens lens) {
+    const float focal = lens.focal;
     const float inverse = 1.0f / sqrt(x * x + y * y + focal * focal);
-    return vec3(x * inverse, y * inverse, focal * inverse);
+    return vec3(lens.isOrthographic ? 0.0f : x * inverse, lens.isOrthographic ? 0.0f : y * inverse,
+                lens.isOrthographic ? 1.0f : focal * inverse);
 }
 
 // Slope of a plane on the image, 1/px: d(1/Z) * cz per pixel. (x, y): its disc's centre, px from the principal point;
 // `tilt`: tangent of the angle between normal and view, over the sine of it (1 / cosine where nothing is floored).
-SHARED_FN vec2 planeSlope(vec2 normalPerp, float tilt, float x, float y, float focal) {
+// Orthographic: -dZ per pixel, as everything is seen where x and y are 0.
+SHARED_FN vec2 planeSlope(vec2 normalPerp, float tilt, float placeX, float placeY, Lens lens) {
+    const float focal = lens.focal;
+    const float x = lens.isOrthographic ? 0.0f : placeX;
+    const float y = lens.isOrthographic ? 0.0f : placeY;
     const float inverse = 1.0f / sqrt(x * x + y * y + focal * focal);
     const float vx = x * inverse;
     const float vy = y * inverse;
@@ -55,7 +61,7 @@ SHARED_FN vec2 planeSlope(vec2 normalPerp, float tilt, float x, float y, float f
 }
 
 // Of the ellipse that is drawn: an edge-on splat stays half a pixel wide to each side. That of a tube faces the eye.
-SHARED_FN vec2 ellipseSlope(vec2 normalPerp, float isRound, float radius, float x, float y, float focal) {
+SHARED_FN vec2 ellipseSlope(vec2 normalPerp, float isRound, float radius, float x, float y, Lens lens) {
     const float flat_ = 1.0f - isRound;
     const float px = normalPerp.x * flat_;
     const float py = normalPerp.y * flat_;
@@ -63,19 +69,21 @@ SHARED_FN vec2 ellipseSlope(vec2 normalPerp, float isRound, float radius, float 
     const float floor2 = 0.25f / (radius * radius);
     const float facing2 = min(max(1.0f - sine2, floor2), 1.0f);
     const float tilt = sqrt(max(1.0f - facing2, 0.0f) / (max(sine2, 1.0e-12f) * facing2));
-    return planeSlope(vec2(px, py), tilt, x, y, focal);
+    return planeSlope(vec2(px, py), tilt, x, y, lens);
 }
 
 // rho^2 of the image point (dx, dy) px from the centre (x, y) of a disc: inside the ellipse iff <= 1.
 const float kOffDisc = 3.0e38f;
-SHARED_FN float discRho2(vec2 slope, float radius, float x, float y, float focal, float dx, float dy) {
+SHARED_FN float discRho2(vec2 slope, float radius, float placeX, float placeY, Lens lens, float dx, float dy) {
+    const float x = lens.isOrthographic ? 0.0f : placeX;
+    const float y = lens.isOrthographic ? 0.0f : placeY;
     const float along = slope.x * dx + slope.y * dy;
     const float ex = dx - along * x;
     const float ey = dy - along * y;
-    const float ez = along * focal;
-    const float q = (1.0f + along) * radius;
+    const float ez = along * lens.focal;
+    const float q = (lens.isOrthographic ? 1.0f : 1.0f + along) * radius;
     const float rho2 = (ex * ex + ey * ey + ez * ez) / max(q * q, 1.0e-20f);
-    return along > -0.99f ? rho2 : kOffDisc;  // beyond, the plane is behind the eye
+    return lens.isOrthographic || along > -0.99f ? rho2 : kOffDisc;  // beyond, the plane is behind the eye
 }
 
 // Depth of the texel's plane at the texel's own centre (a tube: its own). Planes that face the eye by less than
@@ -83,14 +91,15 @@ SHARED_FN float discRho2(vec2 slope, float radius, float x, float y, float focal
 // one that is a pixel wide where it is seen edge-on).
 const float kGrazing = 0.03125f;
 SHARED_FN float planeDepth(float depth, float radius, vec2 normalPerp, float offsetX, float offsetY, float isRound,
-                           float x, float y, float focal) {
+                           float x, float y, Lens lens) {
     const float sine2 = normalPerp.x * normalPerp.x + normalPerp.y * normalPerp.y;
     const float facing = max(sqrt(max(1.0f - sine2, 0.0f)), kGrazing);
-    const vec2 s = planeSlope(normalPerp, 1.0f / facing, x + offsetX, y + offsetY, focal);
-    const float reach = min(max(2.0f * radius, 1.0f / facing) / focal, 0.5f);
+    const vec2 s = planeSlope(normalPerp, 1.0f / facing, x + offsetX, y + offsetY, lens);
+    const float reach = min(max(2.0f * radius, 1.0f / facing) / lens.focal, lens.isOrthographic ? 3.0e38f : 0.5f);
     const float along = -(s.x * offsetX + s.y * offsetY);
     const float flat_ = 1.0f - isRound;
-    return depth / (1.0f + flat_ * min(max(along, -reach), reach));
+    const float nearer = flat_ * min(max(along, -reach), reach);
+    return lens.isOrthographic ? depth - nearer : depth / (1.0f + nearer);
 }
 
 // Leaves are no surface: they have hardly any thickness (half of it, over the radius), so that they are not merged with
@@ -107,16 +116,17 @@ SHARED_FN float letsLightThrough(float thickness, float radius, float isRound, f
 
 // Everything of a full-size texel but its place and colour. `c`: centre in camera space, `n`: unit normal (any side),
 // `radiusWorld`: support radius, world units.
-SHARED_FN Texel texelFromSplat(vec3 c, vec3 n, float radiusWorld, float focal, float minimumRadius) {
+SHARED_FN Texel texelFromSplat(vec3 c, vec3 n, float radiusWorld, Lens lens, float minimumRadius) {
     Texel t;
-    const float inverseLength = 1.0f / sqrt(dot(c, c));
-    const vec3 v = vec3(c.x * inverseLength, c.y * inverseLength, c.z * inverseLength);
+    const vec3 sight = sightTo(lens, c);
+    const float inverseLength = 1.0f / sqrt(dot(sight, sight));
+    const vec3 v = vec3(sight.x * inverseLength, sight.y * inverseLength, sight.z * inverseLength);
     const float facing = dot(n, v);
     const float flip = facing > 0.0f ? -1.0f : 1.0f;
     const vec2 perp = perpFromNormal(n, v);
     t.normalPerp = vec2(perp.x * flip, perp.y * flip);
     t.depth = c.z;
-    const float radius = max(radiusWorld * focal / c.z, minimumRadius);
+    const float radius = max(radiusWorld * lens.focal / lensDepth(lens, c.z), minimumRadius);
     t.radius = min(radius, 16384.0f);
     t.thickness = t.radius * (kThicknessRadii + sqrt(max(1.0f - facing * facing, 0.0f)));
     t.offset = vec2(0.0f, 0.0f);

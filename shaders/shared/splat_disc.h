@@ -8,20 +8,20 @@
 SHARED_BEGIN
 
 // `scattered`: largestSplat of what no surface joins to others.
-SHARED_FN WideDisc splatDisc(DrawNode node, PointRecord r, float supportScale, float scattered, uint id) {
-    WideDisc d = wideDisc(node, r, supportScale, id);
-    const float cap = (recordFlags(r) & kFlagScattered) != 0u ? max(d.centre.z, 0.0f) * scattered : 3.0e38f;
+SHARED_FN WideDisc splatDisc(DrawNode node, PointRecord r, float supportScale, float scattered, uint id, Lens lens) {
+    WideDisc d = wideDisc(node, r, supportScale, id, lens);
+    const float cap = (recordFlags(r) & kFlagScattered) != 0u ? max(lensDepth(lens, d.centre.z), 0.0f) * scattered : 3.0e38f;
     d.radius = min(d.radius, cap);
     d.id = id;
     return d;
 }
 
 // 1 if a point's disc is to be drawn: it is fine enough for its node, and faces the eye.
-SHARED_FN float isSplatSeen(DrawNode node, PointRecord r, WideDisc d, float nearPlane) {
+SHARED_FN float isSplatSeen(DrawNode node, PointRecord r, WideDisc d, float nearPlane, Lens lens) {
     // Products, not conditions: compilers make SIMD of these.
     const float drawnHere = float(int(node.octantMask >> recordOctant(r) & 1u));
     const float fine = max(drawnHere, recordErrorCode(r) <= node.errorCode ? 1.0f : 0.0f);
-    const float front = dot(d.normal, d.centre) < 0.0f ? 1.0f : 0.0f;
+    const float front = dot(d.normal, sightTo(lens, d.centre)) < 0.0f ? 1.0f : 0.0f;
     const float seen = (recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) != 0u ? 1.0f : front;
     // Of no normal, it faces the eye from where it is: behind the eye there is no such side.
     const float isAhead = d.centre.z > nearPlane ? 1.0f : 0.0f;
@@ -36,7 +36,7 @@ struct CentrePixel {
 };
 SHARED_FN CentrePixel centrePixel(WideDisc d, FrameConstants f) {
     const bool isAhead = d.centre.z > f.nearPlane;
-    const float scale = f.focal / (isAhead ? d.centre.z : 1.0f);
+    const float scale = f.focal / (isAhead ? lensDepth(frameLens(f), d.centre.z) : 1.0f);
     const float x = d.centre.x * scale + f.centre.x;
     const float y = d.centre.y * scale + f.centre.y;
     const float right = float(int(f.width)) - 0.5f;

@@ -6,7 +6,7 @@ SHARED_BEGIN
 
 // What no surface joins to others (kFlagScattered: strays, single leaves, wires) is drawn at most a 128th of the
 // picture's height wide to each side, or 4 pixels: a stray point before the camera hides no more than that. A surface
-// is not capped: from wherever it is looked at, its discs overlap. Per unit of depth, world units.
+// is not capped: from wherever it is looked at, its discs overlap. Per unit of lensDepth, world units.
 const float kSplatShare = 0.0078125f;
 const float kSplatPixels = 4.0f;
 SHARED_FN float largestSplat(uint flags, float focal, uint height) {
@@ -15,9 +15,9 @@ SHARED_FN float largestSplat(uint flags, float focal, uint height) {
 }
 
 // The pixel of a splat, where p is its centre on the image: that which holds it, or, of one beside the picture whose
-// disc reaches in, the nearest at the border: its offset leads out there. -1 where it reaches no pixel. `c`: centre in
-// camera space; `radius`: px. `farther`: by what share of its radius a splat counts as deeper where several share a
-// pixel: at the border, of those of one surface that which reaches in farthest is kept.
+// disc reaches in, the nearest at the border: its offset leads out there. -1 where it reaches no pixel. `c`: towards
+// the centre (sightTo); `radius`: px. `farther`: by what share of its radius a splat counts as deeper where several
+// share a pixel: at the border, of those of one surface that which reaches in farthest is kept.
 const float kOffsetRadii = 16.0f;  // offsets are kept up to that many radii
 struct SplatPixel {
     int x;

@@ -70,21 +70,22 @@ SHARED_FN vec2 cutRange(vec2 range, float da, float db) {
     const float last = db < 0.0f ? at : 1.0f;
     return vec2(max(range.x, first), min(range.y, last));
 }
-SHARED_FN ScreenSegment projectSegment(vec3 a, vec3 b, float focal, float cx, float cy, float nearPlane) {
-    const float slope = kStrandGuard / focal;
+SHARED_FN ScreenSegment projectSegment(vec3 a, vec3 b, Lens lens, float cx, float cy, float nearPlane) {
+    const float slopeA = kStrandGuard / lens.focal * lensDepth(lens, a.z);
+    const float slopeB = kStrandGuard / lens.focal * lensDepth(lens, b.z);
     vec2 range = cutRange(vec2(0.0f, 1.0f), a.z - nearPlane, b.z - nearPlane);
-    range = cutRange(range, slope * a.z - a.x, slope * b.z - b.x);
-    range = cutRange(range, slope * a.z + a.x, slope * b.z + b.x);
-    range = cutRange(range, slope * a.z - a.y, slope * b.z - b.y);
-    range = cutRange(range, slope * a.z + a.y, slope * b.z + b.y);
+    range = cutRange(range, slopeA - a.x, slopeB - b.x);
+    range = cutRange(range, slopeA + a.x, slopeB + b.x);
+    range = cutRange(range, slopeA - a.y, slopeB - b.y);
+    range = cutRange(range, slopeA + a.y, slopeB + b.y);
     ScreenSegment s;
     s.isThere = range.x < range.y ? 1.0f : 0.0f;
     s.from = min(range.x, 1.0f);
     s.to = max(range.y, 0.0f);
     s.za = max(a.z + s.from * (b.z - a.z), nearPlane);
     s.zb = max(a.z + s.to * (b.z - a.z), nearPlane);
-    const float ka = focal / s.za;
-    const float kb = focal / s.zb;
+    const float ka = lens.focal / lensDepth(lens, s.za);
+    const float kb = lens.focal / lensDepth(lens, s.zb);
     s.xa = (a.x + s.from * (b.x - a.x)) * ka + cx;
     s.ya = (a.y + s.from * (b.y - a.y)) * ka + cy;
     s.xb = (a.x + s.to * (b.x - a.x)) * kb + cx;
@@ -93,22 +94,23 @@ SHARED_FN ScreenSegment projectSegment(vec3 a, vec3 b, float focal, float cx, fl
 }
 
 // The place on the segment that is seen nearest to an image point, 0 to 1 along the whole of it.
-SHARED_FN float segmentParameter(ScreenSegment s, float x, float y) {
+SHARED_FN float segmentParameter(ScreenSegment s, float x, float y, Lens lens) {
     const float dx = s.xb - s.xa;
     const float dy = s.yb - s.ya;
     const float length2 = dx * dx + dy * dy;
     const float across = ((x - s.xa) * dx + (y - s.ya) * dy) / max(length2, 1.0e-8f);
     const float u = min(max(across, 0.0f), 1.0f);
-    const float t = u * s.za / max((1.0f - u) * s.zb + u * s.za, 1.0e-30f);
+    const float t = lens.isOrthographic ? u : u * s.za / max((1.0f - u) * s.zb + u * s.za, 1.0e-30f);
     return s.from + t * (s.to - s.from);
 }
 
 // Half-width across the line of sight, px: what is seen of a ribbon depends on how it faces the eye. `c`: a place on
 // the segment, `t`: unit tangent, `w`: across the ribbon. With m the normal of the plane through the eye and the
 // segment, the image stretches what lies along m by 1 / sqrt(1 - m_z^2) beside the middle of a wide picture.
-SHARED_FN float seenHalfWidth(vec3 c, float radius, vec3 t, vec3 w, float isRound, float focal) {
-    const float inverse = 1.0f / sqrt(max(dot(c, c), 1.0e-30f));
-    const vec3 v = vec3(c.x * inverse, c.y * inverse, c.z * inverse);
+SHARED_FN float seenHalfWidth(vec3 c, float radius, vec3 t, vec3 w, float isRound, Lens lens) {
+    const vec3 sight = sightTo(lens, c);
+    const float inverse = 1.0f / sqrt(max(dot(sight, sight), 1.0e-30f));
+    const vec3 v = vec3(sight.x * inverse, sight.y * inverse, sight.z * inverse);
     const float tv = dot(t, v);
     const float sine = sqrt(max(1.0f - tv * tv, 1.0e-6f));
     const vec3 m = crossOf(t, w);
@@ -116,7 +118,7 @@ SHARED_FN float seenHalfWidth(vec3 c, float radius, vec3 t, vec3 w, float isRoun
     const float share = isRound > 0.5f ? 1.0f : min(facing / sine, 1.0f);
     const float mz = (v.x * t.y - v.y * t.x) / sine;
     const float stretch2 = max(1.0f - mz * mz, v.z * v.z);  // m lies across v, so that it is no less
-    return radius * share * focal / (c.z * sqrt(max(stretch2, 1.0e-6f)));
+    return radius * share * lens.focal / (lensDepth(lens, c.z) * sqrt(max(stretch2, 1.0e-6f)));
 }
 
 SHARED_FN vec3 segmentTangent(CameraSegment s) {
@@ -127,41 +129,43 @@ SHARED_FN vec3 segmentTangent(CameraSegment s) {
 }
 
 // Seen half-width at one end of what is left of a segment, px.
-SHARED_FN float endHalfWidth(CameraSegment s, float place, vec3 direction, float focal, float nearPlane) {
+SHARED_FN float endHalfWidth(CameraSegment s, float place, vec3 direction, Lens lens, float nearPlane) {
     const vec3 c = vec3(s.a.x + place * (s.b.x - s.a.x), s.a.y + place * (s.b.y - s.a.y),
                         max(s.a.z + place * (s.b.z - s.a.z), nearPlane));
-    return seenHalfWidth(c, s.radiusA + place * (s.radiusB - s.radiusA), segmentTangent(s), direction, s.isRound,
-                         focal);
+    return seenHalfWidth(c, s.radiusA + place * (s.radiusB - s.radiusA), segmentTangent(s), direction, s.isRound, lens);
 }
 // The larger radius of the ends, px: decides whether a strand is filled or reconstructed, however it faces the eye.
 // Where nothing of the axis is left, what is seen of the strand is wide.
-SHARED_FN float widestRadius(CameraSegment s, ScreenSegment on, float focal) {
-    const float a = (s.radiusA + on.from * (s.radiusB - s.radiusA)) / on.za;
-    const float b = (s.radiusA + on.to * (s.radiusB - s.radiusA)) / on.zb;
-    return on.isThere < 0.5f ? 3.0e38f : max(a, b) * focal;
+SHARED_FN float widestRadius(CameraSegment s, ScreenSegment on, Lens lens) {
+    const float a = (s.radiusA + on.from * (s.radiusB - s.radiusA)) / lensDepth(lens, on.za);
+    const float b = (s.radiusA + on.to * (s.radiusB - s.radiusA)) / lensDepth(lens, on.zb);
+    return on.isThere < 0.5f ? 3.0e38f : max(a, b) * lens.focal;
 }
 
 // May anything of a strand lie before the near plane and inside the picture's four sides, though its axis does not?
 // (1 or 0; by the balls around its places.)
-SHARED_FN float strandReaches(CameraSegment s, float focal, float cx, float cy, float width, float height,
+SHARED_FN float strandReaches(CameraSegment s, Lens lens, float cx, float cy, float width, float height,
                               float nearPlane) {
-    const float left = 1.0f / sqrt(focal * focal + cx * cx);
-    const float right = 1.0f / sqrt(focal * focal + (width - cx) * (width - cx));
-    const float top = 1.0f / sqrt(focal * focal + cy * cy);
-    const float bottom = 1.0f / sqrt(focal * focal + (height - cy) * (height - cy));
-    const float l =
-        max((focal * s.a.x + cx * s.a.z) * left + s.radiusA, (focal * s.b.x + cx * s.b.z) * left + s.radiusB);
-    const float r = max(((width - cx) * s.a.z - focal * s.a.x) * right + s.radiusA,
-                        ((width - cx) * s.b.z - focal * s.b.x) * right + s.radiusB);
-    const float t = max((focal * s.a.y + cy * s.a.z) * top + s.radiusA, (focal * s.b.y + cy * s.b.z) * top + s.radiusB);
-    const float b = max(((height - cy) * s.a.z - focal * s.a.y) * bottom + s.radiusA,
-                        ((height - cy) * s.b.z - focal * s.b.y) * bottom + s.radiusB);
+    const float focal = lens.focal;
+    const float lean = lens.isOrthographic ? 0.0f : 1.0f;  // of the picture's sides
+    const float left = 1.0f / sqrt(focal * focal + lean * (cx * cx));
+    const float right = 1.0f / sqrt(focal * focal + lean * ((width - cx) * (width - cx)));
+    const float top = 1.0f / sqrt(focal * focal + lean * (cy * cy));
+    const float bottom = 1.0f / sqrt(focal * focal + lean * ((height - cy) * (height - cy)));
+    const float wa = lensDepth(lens, s.a.z);
+    const float wb = lensDepth(lens, s.b.z);
+    const float l = max((focal * s.a.x + cx * wa) * left + s.radiusA, (focal * s.b.x + cx * wb) * left + s.radiusB);
+    const float r = max(((width - cx) * wa - focal * s.a.x) * right + s.radiusA,
+                        ((width - cx) * wb - focal * s.b.x) * right + s.radiusB);
+    const float t = max((focal * s.a.y + cy * wa) * top + s.radiusA, (focal * s.b.y + cy * wb) * top + s.radiusB);
+    const float b = max(((height - cy) * wa - focal * s.a.y) * bottom + s.radiusA,
+                        ((height - cy) * wb - focal * s.b.y) * bottom + s.radiusB);
     const float n = max(s.a.z + s.radiusA, s.b.z + s.radiusB) - nearPlane;
     return min(min(min(l, r), min(t, b)), n) > 0.0f ? 1.0f : 0.0f;
 }
 // Is a strand filled by its pixels' rays (1 or 0)?
-SHARED_FN float isFilled(CameraSegment s, ScreenSegment on, float focal, float exactStrands) {
-    return widestRadius(s, on, focal) >= exactStrands ? 1.0f : 0.0f;
+SHARED_FN float isFilled(CameraSegment s, ScreenSegment on, Lens lens, float exactStrands) {
+    return widestRadius(s, on, lens) >= exactStrands ? 1.0f : 0.0f;
 }
 
 // Normal of a tube too narrow to show its roundness: the one whose light is that of the whole, sqrt(1 - (l t)^2), bent
@@ -185,20 +189,39 @@ SHARED_FN float tubeFront(float radius, float sine2, float distance) {
     return min(front * radius, 0.9f * distance);
 }
 
+// Length of the sight to a place; in orthographic views the eye is infinitely far away.
+SHARED_FN float sightLength(Lens lens, vec3 c) {
+    return lens.isOrthographic ? 1.0e30f : sqrt(max(dot(c, c), 1.0e-30f));
+}
+// What a strand's depth is made of where it is drawn as a line: that of its axis, as it is linear on the image, and
+// what brings it from there to its surface. `t`: the axis' unit tangent.
+SHARED_FN float surfaceStep(Lens lens, vec3 c, vec3 t, float radius, float isRound) {
+    const vec3 sight = sightTo(lens, c);
+    const float distance = sightLength(lens, c);
+    const float tv = lens.isOrthographic ? t.z : dot(t, sight) / distance;
+    const float front = tubeFront(radius, 1.0f - tv * tv, distance);
+    const float nearer = lens.isOrthographic ? -front : 1.0f - front / distance;
+    return isRound > 0.5f ? nearer : (lens.isOrthographic ? 0.0f : 1.0f);
+}
+SHARED_FN float lineDepth(Lens lens, float linear, float surface, float nearPlane) {
+    return lens.isOrthographic ? max(linear + surface, nearPlane) : surface / linear;
+}
+
 // Everything of the texel at a place on the segment but its offset from the pixel and its colour. `support`: radius of
 // the reconstruction / own radius; `light`: direction of the sun, for what is narrower than a pixel.
-SHARED_FN Texel texelFromStrand(CameraSegment s, float place, float support, float focal, float nearPlane, vec3 light) {
+SHARED_FN Texel texelFromStrand(CameraSegment s, float place, float support, Lens lens, float nearPlane, vec3 light) {
     const vec3 c =
         vec3(s.a.x + place * (s.b.x - s.a.x), s.a.y + place * (s.b.y - s.a.y), s.a.z + place * (s.b.z - s.a.z));
     const float z = max(c.z, nearPlane);
     const float radius = s.radiusA + place * (s.radiusB - s.radiusA);
-    const float distance = sqrt(max(dot(c, c), 1.0e-30f));
-    const vec3 v = vec3(c.x / distance, c.y / distance, c.z / distance);
+    const float distance = sightLength(lens, c);
+    const vec3 v = vec3(lens.isOrthographic ? 0.0f : c.x / distance, lens.isOrthographic ? 0.0f : c.y / distance,
+                        lens.isOrthographic ? 1.0f : c.z / distance);
     const vec3 own = segmentTangent(s);
     const vec3 d = vec3(s.directionA.x + place * (s.directionB.x - s.directionA.x),
                         s.directionA.y + place * (s.directionB.y - s.directionA.y),
                         s.directionA.z + place * (s.directionB.z - s.directionA.z));
-    const float halfWidth = seenHalfWidth(vec3(c.x, c.y, z), radius, own, d, s.isRound, focal);
+    const float halfWidth = seenHalfWidth(vec3(c.x, c.y, z), radius, own, d, s.isRound, lens);
     // Tube: tangents of the vertices, so that bends are round.
     const float inverse = 1.0f / sqrt(max(dot(d, d), 1.0e-12f));
     const vec3 t = vec3(d.x * inverse, d.y * inverse, d.z * inverse);
@@ -207,15 +230,16 @@ SHARED_FN Texel texelFromStrand(CameraSegment s, float place, float support, flo
     const float sine2 = max(1.0f - tv * tv, 0.0f);
     const float reach = min(radius / distance, 0.9f);
     const float front = tubeFront(radius, sine2, distance);
-    const float roundRadius = radius * focal / (z * sqrt(1.0f - reach * reach));
+    const float roundRadius = radius * lens.focal / (lensDepth(lens, z) * sqrt(1.0f - reach * reach));
     const vec3 m = crossOf(own, d);
     const float inverseM = 1.0f / sqrt(max(dot(m, m), 1.0e-12f));
     const Texel flat_ =
-        texelFromSplat(vec3(c.x, c.y, z), vec3(m.x * inverseM, m.y * inverseM, m.z * inverseM), radius, focal, kNarrow);
+        texelFromSplat(vec3(c.x, c.y, z), vec3(m.x * inverseM, m.y * inverseM, m.z * inverseM), radius, lens, kNarrow);
     const bool isTube_ = s.isRound > 0.5f;
     const float wide = min((isTube_ ? roundRadius : flat_.radius) * support, 16384.0f);
     Texel r = flat_;
-    r.depth = isTube_ ? max(z * (1.0f - front / distance), nearPlane) : z;
+    const float surface = lens.isOrthographic ? z - front : z * (1.0f - front / distance);
+    r.depth = isTube_ ? max(surface, nearPlane) : z;
     r.radius = halfWidth < kNarrow ? 0.25f : wide;
     r.thickness = isTube_ ? r.radius : flat_.thickness;
     const vec2 narrow = perpFromNormal(narrowTubeNormal(t, v, light), v);
@@ -254,7 +278,8 @@ struct TubeSurface {
     vec2 normalPerp;
     float depth;
 };
-SHARED_FN TubeSurface tubeSurface(Texel t, float inverseFocal) {
+SHARED_FN TubeSurface tubeSurface(Texel t, Lens lens) {
+    const float inverseFocal = 1.0f / lens.focal;
     const float inverseRadius = 1.0f / max(t.radius, kNarrow);
     const bool isWide = t.radius > kNarrow;
     float x = isWide ? -t.offset.x * inverseRadius : 0.0f;
@@ -286,7 +311,8 @@ SHARED_FN TubeSurface tubeSurface(Texel t, float inverseFocal) {
     s.normalPerp =
         vec2(wx + round_ * ax * along + lean * t.normalPerp.x, wy + round_ * ay * along + lean * t.normalPerp.y);
     const float deeper = round_ * (1.0f - ball) + (1.0f - round_) * (1.0f - rise) / max(sine, 0.5f);
-    s.depth = t.depth * (1.0f + min(deeper, 2.0f) * t.radius * inverseFocal);
+    const float behind = min(deeper, 2.0f) * t.radius * inverseFocal;
+    s.depth = lens.isOrthographic ? t.depth + behind : t.depth * (1.0f + behind);
     return s;
 }
 
@@ -296,10 +322,12 @@ struct FilledPixel {
     vec2 normalPerp;
     float place;
 };
-// A tube at the pixel whose ray is (ex, ey, 1).
-SHARED_FN FilledPixel tubePixel(CameraSegment s, float ex, float ey, float nearPlane) {
+// A tube at the pixel of a ray.
+SHARED_FN FilledPixel tubePixel(CameraSegment s, PixelRay ray, float nearPlane) {
+    const float ex = ray.ex;
+    const float ey = ray.ey;
     const Tube tube = tubeOf(s.a, s.b, s.radiusA, s.radiusB);
-    const TubeHit hit = tubeHit(tube, ex, ey, nearPlane, false);
+    const TubeHit hit = tubeHit(tube, ray, nearPlane, false);
     const float inverse = 1.0f / sqrt(ex * ex + ey * ey + 1.0f);
     const vec3 v = vec3(ex * inverse, ey * inverse, inverse);
     FilledPixel p;  // where rounding lets the ray pass by: a rim is no nearer to anything
@@ -309,10 +337,12 @@ SHARED_FN FilledPixel tubePixel(CameraSegment s, float ex, float ey, float nearP
     return p;
 }
 
-// A ribbon at the pixel whose ray is (ex, ey, 1).
-SHARED_FN FilledPixel ribbonPixel(CameraSegment s, float ex, float ey, float nearPlane) {
+// A ribbon at the pixel of a ray.
+SHARED_FN FilledPixel ribbonPixel(CameraSegment s, PixelRay ray, float nearPlane) {
+    const float ex = ray.ex;
+    const float ey = ray.ey;
     const Ribbon ribbon = ribbonOf(s.a, s.b, s.directionA, s.directionB, s.radiusA, s.radiusB);
-    const RibbonHit hit = ribbonHit(ribbon, ex, ey, nearPlane, kRibbonTexelSlack);
+    const RibbonHit hit = ribbonHit(ribbon, ray, nearPlane, kRibbonTexelSlack);
     const float inverse = 1.0f / sqrt(ex * ex + ey * ey + 1.0f);
     const vec3 v = vec3(ex * inverse, ey * inverse, inverse);
     FilledPixel p;
@@ -327,14 +357,15 @@ struct StrandPixel {
     Texel texel;
     float place;  // along the segment, 0 to 1
 };
-SHARED_FN StrandPixel strandPixel(CameraSegment s, ScreenSegment on, float support, float focal, float cx, float cy,
+SHARED_FN StrandPixel strandPixel(CameraSegment s, ScreenSegment on, float support, Lens lens, float cx, float cy,
                                   float nearPlane, vec3 light) {
     StrandPixel r;
-    r.place = segmentParameter(on, 0.0f, 0.0f);
-    r.texel = texelFromStrand(s, r.place, support, focal, nearPlane, light);
+    r.place = segmentParameter(on, 0.0f, 0.0f, lens);
+    r.texel = texelFromStrand(s, r.place, support, lens, nearPlane, light);
     const vec3 c = vec3(s.a.x + r.place * (s.b.x - s.a.x), s.a.y + r.place * (s.b.y - s.a.y),
                         max(s.a.z + r.place * (s.b.z - s.a.z), nearPlane));
-    r.texel.offset = vec2(c.x * focal / c.z + cx, c.y * focal / c.z + cy);
+    const float w = lensDepth(lens, c.z);
+    r.texel.offset = vec2(c.x * lens.focal / w + cx, c.y * lens.focal / w + cy);
     r.texel.colour = vec3(0.0f, 0.0f, 0.0f);
     return r;
 }

@@ -7,7 +7,7 @@
 //        '--------'
 #ifndef STIPPLE_SHARED_TUBE_H
 #define STIPPLE_SHARED_TUBE_H
-#include "types.h"
+#include "lens.h"
 SHARED_BEGIN
 
 struct Tube {
@@ -62,10 +62,14 @@ SHARED_FN bool isBeforeEye(Tube t, float nearPlane) { return min(t.a.z - t.radiu
 // digits.
 SHARED_FN bool isShort(Tube t) { return t.span < 30.0f * min(t.radiusA, t.radiusB); }
 
-// The nearest place before the near plane where the ray (ex, ey, 1) from the eye meets the tube. Everything is counted
+// The nearest place before the near plane where a ray meets the tube. Everything is counted
 // from the ray's own place nearest to what it may meet, so that fp32 loses nothing of thin tubes far away. `isPlain`:
 // the tube is short and before the eye, which is less work.
-SHARED_FN TubeHit tubeHit(Tube t, float ex, float ey, float nearPlane, bool isPlain) {
+SHARED_FN TubeHit tubeHit(Tube t, PixelRay ray, float nearPlane, bool isPlain) {
+    const float ex = ray.ex;
+    const float ey = ray.ey;
+    const vec3 endA = fromRay(ray, t.a);
+    const vec3 endB = fromRay(ray, t.b);
     const float e2 = ex * ex + ey * ey + 1.0f;
     const float inverseE2 = 1.0f / e2;
     const float dy = ex * t.axis.x + ey * t.axis.y + t.axis.z;
@@ -73,12 +77,12 @@ SHARED_FN TubeHit tubeHit(Tube t, float ex, float ey, float nearPlane, bool isPl
     const float touchB = t.span + t.radiusB * t.sine;
     const float slack = 1.0e-4f * (t.radiusA + t.radiusB);  // no gap between balls and cone
     // Balls.
-    const float za = (ex * t.a.x + ey * t.a.y + t.a.z) * inverseE2;
-    const vec3 oa = vec3(ex * za - t.a.x, ey * za - t.a.y, za - t.a.z);
+    const float za = (ex * endA.x + ey * endA.y + endA.z) * inverseE2;
+    const vec3 oa = vec3(ex * za - endA.x, ey * za - endA.y, za - endA.z);
     const float qa = (t.radiusA * t.radiusA - dot(oa, oa)) * inverseE2;
     const float ya = dot(oa, t.axis);
-    const float zb = (ex * t.b.x + ey * t.b.y + t.b.z) * inverseE2;
-    const vec3 ob = vec3(ex * zb - t.b.x, ey * zb - t.b.y, zb - t.b.z);
+    const float zb = (ex * endB.x + ey * endB.y + endB.z) * inverseE2;
+    const vec3 ob = vec3(ex * zb - endB.x, ey * zb - endB.y, zb - endB.z);
     const float qb = (t.radiusB * t.radiusB - dot(ob, ob)) * inverseE2;
     const float yb = dot(ob, t.axis) + t.span;
     const float frontA = ballDepth(za, qa, -1.0f, ya, dy, -kNoDepth, touchA + slack, nearPlane);
@@ -93,7 +97,7 @@ SHARED_FN TubeHit tubeHit(Tube t, float ex, float ey, float nearPlane, bool isPl
     const float there = min(max(ya + toAxis * dy, -t.radiusA), t.span + t.radiusB);
     const bool isAlong = dy * dy > 0.01f * e2;
     const float z0 = isPlain ? za : za + (isAlong ? (there - ya) / dy : toAxis);
-    const vec3 o0 = isPlain ? oa : vec3(ex * z0 - t.a.x, ey * z0 - t.a.y, z0 - t.a.z);
+    const vec3 o0 = isPlain ? oa : vec3(ex * z0 - endA.x, ey * z0 - endA.y, z0 - endA.z);
     const float y0 = isPlain ? ya : dot(o0, t.axis);
     const vec3 o = vec3(o0.x - y0 * t.axis.x, o0.y - y0 * t.axis.y, o0.z - y0 * t.axis.z);
     const float slope = t.sine / t.cosine;
@@ -173,15 +177,17 @@ SHARED_FN float ballSlope(float x, float z, float radius) {
     const float slope = (x * z + radius * root) / max((z - radius) * (z + radius), 1.0e-30f);
     return isBefore ? min(slope, kUnbounded) : kUnbounded;
 }
-// The same of the whole tube: it lies on one side of a plane through the eye if both balls do.
-SHARED_FN float tubeSlope(float xa, float za, float ra, float xb, float zb, float rb) {
+// The same of the whole tube: it lies on one side of a plane through the eye if both balls do. (Orthographic: largest
+// x.)
+SHARED_FN float tubeSlope(Lens lens, float xa, float za, float ra, float xb, float zb, float rb) {
     const float a = ballSlope(xa, za, ra);
     const float b = ballSlope(xb, zb, rb);
     const float larger = max(a, b);
     const float smaller = min(a, b);
     const float size = sqrt(1.0f + smaller * smaller);
     const float other = a <= b ? xb - smaller * zb + rb * size : xa - smaller * za + ra * size;
-    return larger < kUnbounded || other > 0.0f ? larger : smaller;
+    const float slope = larger < kUnbounded || other > 0.0f ? larger : smaller;
+    return lens.isOrthographic ? max(xa + ra, xb + rb) : slope;
 }
 
 SHARED_END

@@ -29,26 +29,29 @@ SHARED_FN float wideRadius(uint width, uint height) {
 // 1 if a point is a wide disc. `depth`: of its centre; `radius`: world units; `perFocal`: wideRadius over the focal
 // length. Those that face the eye (no normal) have no place behind it; what no surface joins to others is drawn small
 // (largestSplat).
-SHARED_FN float isWideDisc(uint flags, float depth, float radius, float perFocal, float nearPlane) {
-    const float reaches = radius > depth * perFocal && depth + radius > nearPlane ? 1.0f : 0.0f;
+SHARED_FN float isWideDisc(uint flags, float depth, float radius, float perFocal, float nearPlane, Lens lens) {
+    const float reaches = radius > lensDepth(lens, depth) * perFocal && depth + radius > nearPlane ? 1.0f : 0.0f;
     const float faces = (flags & kFlagNoNormal) != 0u && !(depth > nearPlane) ? 0.0f : 1.0f;
     return (flags & kFlagScattered) != 0u ? 0.0f : reaches * faces;
 }
 
-// Where the ray (ex, ey, 1) meets the plane of a disc: its depth, and rho^2, the distance from the centre in radii,
+// Where a ray meets the plane of a disc: its depth, and rho^2, the distance from the centre in radii,
 // squared. kNoDisc where it meets none, or before the near plane.
 const float kNoDisc = 3.0e38f;
 struct DiscHit {
     float depth;
     float rho2;
 };
-SHARED_FN DiscHit discHit(WideDisc d, float ex, float ey, float nearPlane) {
+SHARED_FN DiscHit discHit(WideDisc d, PixelRay ray, float nearPlane) {
+    const float ex = ray.ex;
+    const float ey = ray.ey;
+    const vec3 c = fromRay(ray, d.centre);
     const float facing = d.normal.x * ex + d.normal.y * ey + d.normal.z;
-    const float ahead = d.normal.x * d.centre.x + d.normal.y * d.centre.y + d.normal.z * d.centre.z;
+    const float ahead = d.normal.x * c.x + d.normal.y * c.y + d.normal.z * c.z;
     const float z = ahead / (abs(facing) > 1.0e-12f ? facing : 1.0e-12f);
-    const float offX = z * ex - d.centre.x;
-    const float offY = z * ey - d.centre.y;
-    const float offZ = z - d.centre.z;
+    const float offX = z * ex - c.x;
+    const float offY = z * ey - c.y;
+    const float offZ = z - c.z;
     const float rho2 = (offX * offX + offY * offY + offZ * offZ) / (d.radius * d.radius);
     DiscHit hit;
     hit.rho2 = z > nearPlane ? rho2 : kNoDisc;
@@ -57,8 +60,10 @@ SHARED_FN DiscHit discHit(WideDisc d, float ex, float ey, float nearPlane) {
 }
 
 // What is merged at a pixel: the discs whose depths there are the front one's, but for so much: what a quarter of its
-// radius along its normal is along the ray (ex, ey, 1).
-SHARED_FN float depthShared(WideDisc front, float ex, float ey) {
+// radius along its normal is along the ray.
+SHARED_FN float depthShared(WideDisc front, PixelRay ray) {
+    const float ex = ray.ex;
+    const float ey = ray.ey;
     const float facing = abs(front.normal.x * ex + front.normal.y * ey + front.normal.z);
     const float length = sqrt(ex * ex + ey * ey + 1.0f);
     return kThicknessRadii * front.radius / max(facing, 0.125f * length);
@@ -71,8 +76,8 @@ SHARED_FN float discWeight(DiscHit hit, float front, float apart) {
 
 // Slopes x / z between which a disc lies, seen along y: (centre, normal) are its components across and along the view.
 // x / z = s touches it where the distance of its centre from that plane is the radius, seen in the disc's own plane.
-// All there are, where it is not wholly before the eye.
-SHARED_FN vec2 discSlopes(float across, float depth, float normalAcross, float normalAlong, float radius) {
+// All there are, where it is not wholly before the eye. (Orthographic: x itself.)
+SHARED_FN vec2 discSlopes(Lens lens, float across, float depth, float normalAcross, float normalAlong, float radius) {
     const float r2 = radius * radius;
     const float reach2 = r2 * max(1.0f - normalAlong * normalAlong, 0.0f);
     const float a = depth * depth - reach2;
@@ -84,7 +89,10 @@ SHARED_FN vec2 discSlopes(float across, float depth, float normalAcross, float n
                        r2 * (1.0f - normalAcross * normalAcross - normalAlong * normalAlong);
     const float root = radius * sqrt(max(rest, 0.0f));
     const bool isAhead = depth > 0.0f && a > 0.01f * depth * depth;
-    return isAhead ? vec2((b - root) / a, (b + root) / a) : vec2(-3.0e38f, 3.0e38f);
+    const float half_ = radius * sqrt(max(1.0f - normalAcross * normalAcross, 0.0f));
+    const float least = isAhead ? (b - root) / a : -3.0e38f;
+    const float most = isAhead ? (b + root) / a : 3.0e38f;
+    return vec2(lens.isOrthographic ? across - half_ : least, lens.isOrthographic ? across + half_ : most);
 }
 
 // How far the most of a disc lies on the side of a plane through the eye to which (x, y, z) points; of any length.
@@ -99,8 +107,14 @@ SHARED_FN float reachesPicture(WideDisc d, FrameConstants f) {
     const float right = (float(int(f.width)) - f.centre.x) / f.focal;
     const float top = f.centre.y / f.focal;
     const float bottom = (float(int(f.height)) - f.centre.y) / f.focal;
-    const float least = min(min(discBeyond(d, 1.0f, 0.0f, left), discBeyond(d, -1.0f, 0.0f, right)),
-                            min(discBeyond(d, 0.0f, 1.0f, top), discBeyond(d, 0.0f, -1.0f, bottom)));
+    // Orthographic: the sides are parallel, and so far from the axis.
+    const float lean = f.orthographic != 0u ? 0.0f : 1.0f;
+    const float off = 1.0f - lean;
+    const float beyondX = min(discBeyond(d, 1.0f, 0.0f, lean * left) + off * left,
+                              discBeyond(d, -1.0f, 0.0f, lean * right) + off * right);
+    const float beyondY = min(discBeyond(d, 0.0f, 1.0f, lean * top) + off * top,
+                              discBeyond(d, 0.0f, -1.0f, lean * bottom) + off * bottom);
+    const float least = min(beyondX, beyondY);
     const float isAhead = discBeyond(d, 0.0f, 0.0f, 1.0f) > f.nearPlane ? 1.0f : 0.0f;
     return least >= 0.0f ? isAhead : 0.0f;
 }
@@ -125,10 +139,10 @@ struct DiscBox {
 };
 SHARED_FN DiscBox discBox(WideDisc d, FrameConstants f) {
     DiscBox b;
-    b.x = pixelsBetween(discSlopes(d.centre.x, d.centre.z, d.normal.x, d.normal.z, d.radius), f.focal, f.centre.x,
-                        f.width);
-    b.y = pixelsBetween(discSlopes(d.centre.y, d.centre.z, d.normal.y, d.normal.z, d.radius), f.focal, f.centre.y,
-                        f.height);
+    b.x = pixelsBetween(discSlopes(frameLens(f), d.centre.x, d.centre.z, d.normal.x, d.normal.z, d.radius), f.focal,
+                        f.centre.x, f.width);
+    b.y = pixelsBetween(discSlopes(frameLens(f), d.centre.y, d.centre.z, d.normal.y, d.normal.z, d.radius), f.focal,
+                        f.centre.y, f.height);
     return b;
 }
 
@@ -143,18 +157,18 @@ SHARED_FN vec3 recordPlace(DrawNode node, PointRecord r) {
 }
 
 // The normal of a point's disc in camera space; of one without, towards the eye.
-SHARED_FN vec3 discNormal(DrawNode node, PointRecord r) {
-    const vec3 c = recordPlace(node, r);
+SHARED_FN vec3 discNormal(DrawNode node, PointRecord r, Lens lens) {
+    const vec3 c = sightTo(lens, recordPlace(node, r));
     const float inverse = -1.0f / sqrt(max(dot(c, c), 1.0e-37f));
     const vec3 n = nodeDirection(node, octDecode(r.normal));
     const bool isFree = (recordFlags(r) & kFlagNoNormal) != 0u;
     return vec3(isFree ? c.x * inverse : n.x, isFree ? c.y * inverse : n.y, isFree ? c.z * inverse : n.z);
 }
 
-SHARED_FN WideDisc wideDisc(DrawNode node, PointRecord r, float supportScale, uint id) {
+SHARED_FN WideDisc wideDisc(DrawNode node, PointRecord r, float supportScale, uint id, Lens lens) {
     WideDisc d;
     d.centre = recordPlace(node, r);
-    d.normal = discNormal(node, r);
+    d.normal = discNormal(node, r, lens);
     d.radius = node.edge * supportScale * radiusFractionFast(recordRadiusCode(r));
     d.id = id;
     return d;

@@ -20,13 +20,13 @@ void main() {
     const uint index = source.first + gl_LocalInvocationID.x;
     if (index >= node.count) return;
     const PointRecord r = Records(uvec2(node.addressLow, node.addressHigh)).records[index];
-    const WideDisc d = splatDisc(node, r, frame.supportScale, largestSplat(kFlagScattered, frame.focal, frame.height), block * kRecordsPerBlock + gl_LocalInvocationID.x);
-    if (isSplatSeen(node, r, d, frame.nearPlane) * reachesPicture(d, frame) < 0.5) return;
+    const WideDisc d = splatDisc(node, r, frame.supportScale, largestSplat(kFlagScattered, frame.focal, frame.height), block * kRecordsPerBlock + gl_LocalInvocationID.x, frameLensHere());
+    if (isSplatSeen(node, r, d, frame.nearPlane, frameLensHere()) * reachesPicture(d, frame) < 0.5) return;
     const float inverseFocal = 1.0 / frame.focal;
     const CentrePixel c = centrePixel(d, frame);
     if (c.x >= 0) {
         const vec2 ray = (vec2(c.x, c.y) + 0.5 - frame.centre) * inverseFocal;
-        if (!(discHit(d, ray.x, ray.y, frame.nearPlane).depth < kNoDisc)) offer(c.x, c.y, d.centre.z, d.id);
+        if (!(discHit(d, pixelRay(frameLensHere(), ray.x, ray.y), frame.nearPlane).depth < kNoDisc)) offer(c.x, c.y, d.centre.z, d.id);
     }
     const DiscBox box = discBox(d, frame);
     const int width = box.x.last - box.x.first + 1;
@@ -42,7 +42,7 @@ void main() {
     for (int y = box.y.first; y <= box.y.last; ++y)
         for (int x = box.x.first; x <= box.x.last; ++x) {
             const vec2 ray = (vec2(x, y) + 0.5 - frame.centre) * inverseFocal;
-            const float depth = discHit(d, ray.x, ray.y, frame.nearPlane).depth;
+            const float depth = discHit(d, pixelRay(frameLensHere(), ray.x, ray.y), frame.nearPlane).depth;
             if (depth < kNoDisc) offer(x, y, depth, d.id);
         }
 }

@@ -16,18 +16,18 @@ void main() {
     const CameraSegment s = cameraSegment(node, segment);
     const float cx = frame.centre.x - 0.5 - float(pixel.x);
     const float cy = frame.centre.y - 0.5 - float(pixel.y);
-    const ScreenSegment on = projectSegment(s.a, s.b, frame.focal, cx, cy, frame.nearPlane);
-    const StrandPixel seen = strandPixel(s, on, frame.supportScale, frame.focal, cx, cy, frame.nearPlane, frame.sunDirection);
+    const Lens lens = frameLensHere();
+    const ScreenSegment on = projectSegment(s.a, s.b, lens, cx, cy, frame.nearPlane);
+    const StrandPixel seen = strandPixel(s, on, frame.supportScale, lens, cx, cy, frame.nearPlane, frame.sunDirection);
     Texel t = seen.texel;
     float place = seen.place;
-    if (isFilled(s, on, frame.focal, frame.exactStrands) > 0.5) {
-        const float ex = -cx * (1.0 / frame.focal);
-        const float ey = -cy * (1.0 / frame.focal);
+    if (isFilled(s, on, lens, frame.exactStrands) > 0.5) {
+        const PixelRay ray = pixelRay(lens, -cx * (1.0 / frame.focal), -cy * (1.0 / frame.focal));
         FilledPixel hit;
         if (s.isRound > 0.5)
-            hit = tubePixel(s, ex, ey, frame.nearPlane);
+            hit = tubePixel(s, ray, frame.nearPlane);
         else
-            hit = ribbonPixel(s, ex, ey, frame.nearPlane);
+            hit = ribbonPixel(s, ray, frame.nearPlane);
         if (hit.depth < kNoDepth) t.depth = hit.depth;
         t.normalPerp = hit.depth < kNoDepth ? hit.normalPerp : vec2(0.0);
         t.radius = 0.25;

@@ -8,6 +8,11 @@ uint lot;  // of this segment, see strandLot
 
 const int kMostPixels = 4096;
 
+// imageLinear of a line's surface, from that of its axis.
+float lineLinear(float linear, float surface) {
+    return frame.orthographic != 0u ? lineDepth(frameLensHere(), linear, surface, frame.nearPlane) : linear / surface;
+}
+
 void drawLine(WideStrand s) {
     const bool isSteep = abs(s.xb - s.xa) < abs(s.yb - s.ya);
     vec2 a = isSteep ? vec2(s.ya, s.xa) : vec2(s.xa, s.ya);
@@ -39,7 +44,7 @@ void drawLine(WideStrand s) {
         const vec4 here = atA + u * (atB - atA);
         if (here.y < kNarrow && coverageThreshold(uint(y) * frame.width + uint(x), lot, frame.coverageSeed) >= 2.0 * here.y * longer)
             continue;
-        offer(x, y, here.x / here.z, drawId(frame.firstBlock.curves, s.id));
+        offer(x, y, lineLinear(here.x, here.z), drawId(frame.firstBlock.curves, s.id));
     }
 }
 
@@ -48,13 +53,7 @@ void drawEnd(float x, float y, float inverseDepth, float halfWidth, float nearer
     const uint pixel = uint(y) * frame.width + uint(x);
     const float share = 3.14159265 * halfWidth * halfWidth * (1.0 - across / max(2.0 * halfWidth, 1.0e-6));
     if (halfWidth < kNarrow && coverageThreshold(pixel, ~lot, frame.coverageSeed) >= share) return;
-    offer(int(x), int(y), inverseDepth / nearer, drawId(frame.firstBlock.curves, id));
-}
-
-float nearerAt(vec3 end, vec3 t, float radius, float isRound) {
-    const float distance = sqrt(max(dot(end, end), 1.0e-30));
-    const float tv = dot(t, end) / distance;
-    return isRound > 0.5 ? 1.0 - tubeFront(radius, 1.0 - tv * tv, distance) / distance : 1.0;
+    offer(int(x), int(y), lineLinear(inverseDepth, nearer), drawId(frame.firstBlock.curves, id));
 }
 
 void main() {
@@ -68,10 +67,11 @@ void main() {
     if (segmentErrorCode(segment) > node.errorCode && (segmentOctants(segment) & node.octantMask) == 0u) return;
     lot = strandLot(segment);
     const CameraSegment c = cameraSegment(node, segment);
-    const ScreenSegment p = projectSegment(c.a, c.b, frame.focal, frame.centre.x, frame.centre.y, frame.nearPlane);
+    const Lens lens = frameLensHere();
+    const ScreenSegment p = projectSegment(c.a, c.b, lens, frame.centre.x, frame.centre.y, frame.nearPlane);
     const float width = float(frame.width);
     const float height = float(frame.height);
-    const float reaches = strandReaches(c, frame.focal, frame.centre.x, frame.centre.y, width, height, frame.nearPlane);
+    const float reaches = strandReaches(c, lens, frame.centre.x, frame.centre.y, width, height, frame.nearPlane);
     if (max(p.isThere, reaches) < 0.5) return;
     const vec3 t = segmentTangent(c);
     vec3 a = c.a + p.from * (c.b - c.a);
@@ -83,10 +83,10 @@ void main() {
     s.ya = p.ya;
     s.xb = p.xb;
     s.yb = p.yb;
-    s.inverseA = 1.0 / p.za;
-    s.inverseB = 1.0 / p.zb;
-    s.halfA = endHalfWidth(c, p.from, c.directionA, frame.focal, frame.nearPlane);
-    s.halfB = endHalfWidth(c, p.to, c.directionB, frame.focal, frame.nearPlane);
+    s.inverseA = imageLinear(lens, p.za);
+    s.inverseB = imageLinear(lens, p.zb);
+    s.halfA = endHalfWidth(c, p.from, c.directionA, lens, frame.nearPlane);
+    s.halfB = endHalfWidth(c, p.to, c.directionB, lens, frame.nearPlane);
     const float ra = c.radiusA + p.from * (c.radiusB - c.radiusA);
     const float rb = c.radiusA + p.to * (c.radiusB - c.radiusA);
     s.acrossA = c.directionA;
@@ -97,21 +97,21 @@ void main() {
     s.radiusA = c.radiusA;
     s.radiusB = c.radiusB;
     // What it may cover.
-    const bool isWide = isFilled(c, p, frame.focal, frame.exactStrands) > 0.5;
+    const bool isWide = isFilled(c, p, lens, frame.exactStrands) > 0.5;
     const Ribbon ribbon = ribbonOfWide(s);
     vec2 lo = min(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) - 1.0;
     vec2 hi = max(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) + 1.0;
     if (isWide && s.isRound != 0u) {
-        lo = -vec2(tubeSlope(-c.a.x, c.a.z, c.radiusA, -c.b.x, c.b.z, c.radiusB), tubeSlope(-c.a.y, c.a.z, c.radiusA, -c.b.y, c.b.z, c.radiusB)) * frame.focal + frame.centre - 1.5;
-        hi = vec2(tubeSlope(c.a.x, c.a.z, c.radiusA, c.b.x, c.b.z, c.radiusB), tubeSlope(c.a.y, c.a.z, c.radiusA, c.b.y, c.b.z, c.radiusB)) * frame.focal + frame.centre + 0.5;
+        lo = -vec2(tubeSlope(lens, -c.a.x, c.a.z, c.radiusA, -c.b.x, c.b.z, c.radiusB), tubeSlope(lens, -c.a.y, c.a.z, c.radiusA, -c.b.y, c.b.z, c.radiusB)) * frame.focal + frame.centre - 1.5;
+        hi = vec2(tubeSlope(lens, c.a.x, c.a.z, c.radiusA, c.b.x, c.b.z, c.radiusB), tubeSlope(lens, c.a.y, c.a.z, c.radiusA, c.b.y, c.b.z, c.radiusB)) * frame.focal + frame.centre + 0.5;
     } else if (isWide) {
         bool isBefore = true;
         lo = vec2(3.0e38);
         hi = vec2(-3.0e38);
         for (int k = 0; k < 4; ++k) {
             const vec3 corner = ribbonCorner(ribbon, k < 2 ? 0.0 : 1.0, (k & 1) == 0 ? -1.0 : 1.0);
-            const vec2 at = corner.xy * (frame.focal / max(corner.z, frame.nearPlane)) + frame.centre;
-            isBefore = isBefore && corner.z > frame.nearPlane;
+            const vec2 at = corner.xy * (frame.focal / lensDepth(lens, max(corner.z, frame.nearPlane))) + frame.centre;
+            isBefore = isBefore && (lens.isOrthographic || corner.z > frame.nearPlane);
             lo = min(lo, at - 1.0);
             hi = max(hi, at + 1.0);
         }
@@ -122,8 +122,8 @@ void main() {
         }
     }
     if (!(hi.x >= 0.0 && hi.y >= 0.0 && lo.x < width && lo.y < height)) return;
-    s.nearerA = nearerAt(a, t, ra, c.isRound);
-    s.nearerB = nearerAt(b, t, rb, c.isRound);
+    s.nearerA = surfaceStep(lens, a, t, ra, c.isRound);
+    s.nearerB = surfaceStep(lens, b, t, rb, c.isRound);
     const vec2 d = vec2(p.xb - p.xa, p.yb - p.ya);
     s.id = block * kSegmentsPerBlock + gl_LocalInvocationID.x;
     if (!isWide) {

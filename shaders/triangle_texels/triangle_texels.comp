@@ -25,11 +25,12 @@ void main() {
     const MeshVertex va = vertices.vertices[word & 255u];
     const MeshVertex vb = vertices.vertices[word >> 8 & 255u];
     const MeshVertex vc = vertices.vertices[word >> 16 & 255u];
-    const vec3 ray = rayThrough(pixel);
+    const PixelRay pixelsRay = pixelRayHere(pixel);
+    const vec3 ray = rayDirection(pixelsRay);
     const vec3 p0 = placeOf(c, m, word & 255u);
     const vec3 p1 = placeOf(c, m, word >> 8 & 255u);
     const vec3 p2 = placeOf(c, m, word >> 16 & 255u);
-    const vec2 w = triangleWeights(ray, p0, p1, p2);
+    const vec2 w = triangleWeights(ray, fromRay(pixelsRay, p0), fromRay(pixelsRay, p1), fromRay(pixelsRay, p2));
     const float a = 1.0 - w.x - w.y;
     const vec3 n = a * octDecode(va.normal) + w.x * octDecode(vb.normal) + w.y * octDecode(vc.normal);
     vec3 normal = m.normalX * n.x + m.normalY * n.y + m.normalZ * n.z;
@@ -48,7 +49,7 @@ void main() {
         const vec2 uv = vec2(a * va.u + w.x * vb.u + w.y * vc.u, a * va.v + w.x * vb.v + w.y * vc.v);
         const vec2 d1 = vec2(vb.u - va.u, vb.v - va.v);
         const vec2 d2 = vec2(vc.u - va.u, vc.v - va.v);
-        const float footprint = uvFootprint(ray, 1.0 / frame.focal, p0, e1, e2, d1, d2);
+        const float footprint = uvFootprint(pixelsRay, 1.0 / frame.focal, p0, e1, e2, d1, d2);
         vec4 s;
         if (sampleTexture(c, material.baseTexture, uv, footprint, s)) colour *= s.xyz;
         if (sampleTexture(c, material.surfaceTexture, uv, footprint, s)) {

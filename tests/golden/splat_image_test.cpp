@@ -45,8 +45,9 @@ std::vector<bool> centresOf(const std::vector<reference::Disc>& discs, const lod
     for (const reference::Disc& d : discs) {
         const dvec3 off = d.position - view.eye;
         const double z = glm::dot(off, view.forward);
-        const double x = view.focalPixels * glm::dot(off, view.right) / z + 0.5 * view.width,
-                     y = view.focalPixels * glm::dot(off, view.down) / z + 0.5 * view.height;
+        const double scale = view.focalPixels / (view.isOrthographic ? 1 : z);
+        const double x = scale * glm::dot(off, view.right) + 0.5 * view.width,
+                     y = scale * glm::dot(off, view.down) + 0.5 * view.height;
         if (z > 0 && x >= 0 && y >= 0 && x < view.width && y < view.height)
             out[static_cast<size_t>(y) * view.width + static_cast<size_t>(x)] = true;
     }
@@ -56,14 +57,19 @@ std::vector<bool> centresOf(const std::vector<reference::Disc>& discs, const lod
 /// Depth of the first disc that each pixel's ray meets, 0: none; every ray against every disc.
 std::vector<double> frontOf(const std::vector<reference::Disc>& discs, const lod::View& view) {
     std::vector<double> out(size_t{view.width} * view.height, 0);
+    const bool isFlat = view.isOrthographic;
     for (const reference::Disc& d : discs) {
-        const dvec3 at = d.position - view.eye;
-        const double across = glm::dot(d.normal, at);
-        if ((d.flags & shared::kFlagTwoSided) == 0 && across >= 0) continue;
+        const dvec3 toDisc = d.position - view.eye;
+        const double facing = glm::dot(d.normal, isFlat ? view.forward : toDisc);
+        if ((d.flags & shared::kFlagTwoSided) == 0 && facing >= 0) continue;
         for (size_t i = 0; i < out.size(); ++i) {
-            const dvec3 ray = test::rayThrough(view, static_cast<double>(i % view.width) + 0.5,
-                                               static_cast<double>(i / view.width) + 0.5);
-            const double t = across / glm::dot(d.normal, ray);
+            const double x = static_cast<double>(i % view.width) + 0.5, y = static_cast<double>(i / view.width) + 0.5;
+            // Parallel rays of orthographic views begin beside the eye.
+            const dvec3 from =
+                isFlat ? ((x - 0.5 * view.width) * view.right + (y - 0.5 * view.height) * view.down) / view.focalPixels
+                       : dvec3(0);
+            const dvec3 ray = isFlat ? view.forward : test::rayThrough(view, x, y), at = toDisc - from;
+            const double t = glm::dot(d.normal, at) / glm::dot(d.normal, ray);
             const dvec3 off = t * ray - at;
             if (t > 1e-4 && glm::dot(off, off) <= d.radius * d.radius && (out[i] == 0 || t < out[i])) out[i] = t;
         }
@@ -98,12 +104,18 @@ TEST(Splats, CoverWhatRaysMeetAtItsDepth) {
     struct Look {
         dvec3 eye;
         double focal;
+        bool isOrthographic = false;
     };
-    for (const Look& look :
-         {Look{{0.2, 0.1, 3.5}, 300}, {{0.1, 0.05, 0.3}, 120}, {{-0.4, 0.3, 0.9}, 60}, {{0, 0.1, 60}, 6000}}) {
+    for (const Look& look : {Look{{0.2, 0.1, 3.5}, 300},
+                             {{0.1, 0.05, 0.3}, 120},
+                             {{-0.4, 0.3, 0.9}, 60},
+                             {{0, 0.1, 60}, 6000},
+                             {{0.1, 0.1, 3}, 80, true},
+                             {{0.1, 0.1, 0.2}, 150, true}}) {
         lod::View view = test::viewFromAbove({0, 0, 0});
         view.eye = look.eye;
         view.focalPixels = look.focal;
+        view.isOrthographic = look.isOrthographic;
         view.width = 201;
         view.height = 151;
         view.focalPixels *= 0.65;

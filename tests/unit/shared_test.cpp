@@ -87,14 +87,14 @@ shared::Texel plainTexel(float depth, float radius) {
 /// On the axis of a lens of 1000 px.
 shared::Texel push(const shared::Texel& fine, const std::array<shared::Texel, 4>& coarse, float sx, float sy,
                    float fineSize) {
-    const auto disc = [&](size_t i) { return shared::coarseDisc(coarse.at(i), 0, 0, 1000); };
+    const auto disc = [&](size_t i) { return shared::coarseDisc(coarse.at(i), 0, 0, shared::lensOf(1000, false)); };
     return shared::pushTexel(fine, coarse[0], coarse[1], coarse[2], coarse[3], disc(0), disc(1), disc(2), disc(3), sx,
-                             sy, 0, 0, fineSize, 1000);
+                             sy, 0, 0, fineSize, shared::lensOf(1000, false));
 }
 
 TEST(Pull, ConstantInGivesConstantOut) {
     const shared::Texel c = plainTexel(10, 3);
-    const shared::Texel t = shared::pullTexels(c, c, c, c, 1, 0.001f);
+    const shared::Texel t = shared::pullTexels(c, c, c, c, 1, shared::lensOf(1000, false));
     EXPECT_FLOAT_EQ(t.depth, 10);
     EXPECT_EQ(t.radius, 3);
     EXPECT_EQ(t.colour.x, 0.5f);
@@ -104,12 +104,13 @@ TEST(Pull, ConstantInGivesConstantOut) {
 TEST(Pull, ManyThinLayersDoNotChain) {
     // A staircase 0.9 thickness apart: only what touches the front layer may be merged (hard case 42).
     const float inverseFocal = 0.001f;
+    const shared::Lens lens = shared::lensOf(1000, false);
     shared::Texel c[4];
-    const float world = shared::thicknessWorld(plainTexel(10, 4), inverseFocal);
+    const float world = shared::thicknessWorld(plainTexel(10, 4), lens, inverseFocal);
     for (int i = 0; i < 4; ++i) c[i] = plainTexel(10 + 1.8f * world * static_cast<float>(i), 4);
-    const shared::Texel t = shared::pullTexels(c[3], c[1], c[2], c[0], 1, inverseFocal);
-    EXPECT_LE(t.depth + shared::thicknessWorld(t, inverseFocal),
-              10 + 2.01f * shared::thicknessWorld(c[1], inverseFocal));
+    const shared::Texel t = shared::pullTexels(c[3], c[1], c[2], c[0], 1, lens);
+    EXPECT_LE(t.depth + shared::thicknessWorld(t, lens, inverseFocal),
+              10 + 2.01f * shared::thicknessWorld(c[1], lens, inverseFocal));
     EXPECT_LT(t.depth, c[2].depth);
 }
 

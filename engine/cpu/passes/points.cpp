@@ -14,7 +14,8 @@ bool isWithin(const shared::FrameConstants& f, const shared::DrawNode& node) {
         const float x = node.base.x + node.axisX.x * along(1) + node.axisY.x * along(2) + node.axisZ.x * along(4),
                     y = node.base.y + node.axisX.y * along(1) + node.axisY.y * along(2) + node.axisZ.y * along(4),
                     z = node.base.z + node.axisX.z * along(1) + node.axisY.z * along(2) + node.axisZ.z * along(4);
-        const float px = x * f.focal / z + f.centre.x, py = y * f.focal / z + f.centre.y;
+        const float w = shared::lensDepth(shared::frameLens(f), z);
+        const float px = x * f.focal / w + f.centre.x, py = y * f.focal / w + f.centre.y;
         if (!(z > f.nearPlane && px >= 0 && py >= 0 && px < static_cast<float>(f.width) &&
               py < static_cast<float>(f.height)))
             return false;
@@ -46,8 +47,9 @@ void project(Frame& frame) {
                 if (pixel[i] >= kWidePixel) {
                     if (pixel[i] == ~0u) continue;
                     const auto id = static_cast<uint32_t>(b) * shared::kRecordsPerBlock + i;
-                    const shared::WideDisc d = shared::wideDisc(*frame.blocks[b].node, frame.blocks[b].records[i],
-                                                                frame.constants.supportScale, id);
+                    const shared::WideDisc d =
+                        shared::wideDisc(*frame.blocks[b].node, frame.blocks[b].records[i],
+                                         frame.constants.supportScale, id, shared::frameLens(frame.constants));
                     if (shared::reachesPicture(d, frame.constants) > 0.5f) mine.push_back(d);
                     continue;
                 }

@@ -46,8 +46,8 @@ class RowProgram {
                               wantAll ? image.normal.data() + 3 * at : nullptr,
                               wantAll ? image.linear.data() + 3 * at : nullptr};
         if (!any) return empty_.copyTo(out, n);
-        if (row.hasTubes) frame_.k.finishRow(1.0f / f.focal, n, row);
-        if (own.hasTubes && &own != &row) frame_.k.finishRow(1.0f / f.focal, n, own);
+        if (row.hasTubes) frame_.k.finishRow(f.focal, n, row);
+        if (own.hasTubes && &own != &row) frame_.k.finishRow(f.focal, n, own);
         // Of a row without winners the planes are those of an older frame.
         const SurfacePlanes planes = fine_.mayHold(y, x0, n) ? frame_.planesAt(at) : SurfacePlanes{};
         thread_local SurfaceRow surface{};

@@ -146,10 +146,12 @@ void readLightsAndCameras(const json& root, Scene& scene) {
         }
         const json& of = j[type];
         camera.nearPlane = of["znear"].get<double>();
-        if (camera.isOrthographic)
-            camera.height = 2 * of["ymag"].get<double>();
-        else
+        if (camera.isOrthographic) {  // (negative ones would mirror, which glTF advises against)
+            camera.width = 2 * std::abs(of["xmag"].get<double>());
+            camera.height = 2 * std::abs(of["ymag"].get<double>());
+        } else {
             camera.fovDegrees = glm::degrees(of["yfov"].get<double>());
+        }
         scene.cameras.push_back(camera);
     }
 }

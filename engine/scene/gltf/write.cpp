@@ -226,7 +226,8 @@ class Writer {
         out.type = c.isOrthographic ? "orthographic" : "perspective";
         out.perspective.yfov = c.fovDegrees * 3.14159265358979323846 / 180;
         out.perspective.znear = c.nearPlane;
-        out.orthographic.xmag = out.orthographic.ymag = 0.5 * c.height;
+        out.orthographic.xmag = 0.5 * c.width;
+        out.orthographic.ymag = 0.5 * c.height;
         out.orthographic.znear = c.nearPlane;
         out.orthographic.zfar = 1e6;
         model_.cameras.push_back(out);
