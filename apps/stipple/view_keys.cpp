@@ -57,8 +57,7 @@ KeyRequests applyKeys(const std::string& pressed, ViewSettings& settings) {
         if (key == 'P') asked.picture = true;
         if (key == ' ') asked.pause = true;
         if (key == 'H') settings.help = !settings.help;
-        if (key == 'M')
-            frame.mode = render::nextMode(frame.mode);
+        if (key == 'M') frame.mode = render::nextMode(frame.mode);
         if (key == 'V') frame.draw.debugView = (frame.draw.debugView + 1) % static_cast<uint32_t>(kDebugNames.size());
         if (key == 'L') {
             frame.draw.lit = !frame.draw.lit;

@@ -1,7 +1,7 @@
 // Data flow of one frame (mode pullpush):
 //
 //   records --project--> visibility (64-bit min per pixel) --resolve+pull--> level 0, level 1 --pull--> level 2 ... top
-//   image <--shade+push-- level 0 <-- level 1 <--push-- ... top
+//   image <--output+light+surface+push-- level 0 <-- level 1 <--push-- ... top
 //
 // Work is cut into tiles of kTile columns and a band of rows; within a tile, rows are unpacked to floats that stay in
 // cache. Clearing is free: resolve resets each visibility entry it has read.
@@ -60,6 +60,8 @@ class CpuBackend final : public render::Backend {
         frame_.k = frame_.constants.orthographic != 0 ? *frame_.kernels.orthographic : frame_.kernels;
         frame_.image = &image;
         frame_.wantAll = request.wantDepthAndNormal;
+        frame_.hasPyramid =
+            std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
         times_.clear();
         const std::span<const render::Pass> passes(request.passes);
         for (size_t p = 0; p < passes.size();) {

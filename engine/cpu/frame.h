@@ -45,6 +45,7 @@ struct Frame {
     shared::FrameConstants constants{};
     render::Image* image = nullptr;
     bool wantAll = false;
+    bool hasPyramid = false;  ///< the levels above the first are of this frame: push runs
 
     // Plane::visibility. It is clear between frames: resolve resets each entry that it has read.
     HugeBuffer<uint64_t> visibility;

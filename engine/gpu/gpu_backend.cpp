@@ -80,8 +80,10 @@ class GpuBackend final : public render::Backend {
     Result<void> render(const render::RenderRequest& request, render::Image& image) override {
         const render::DrawList& draws = *request.draws;
         const render::Reconstruction& mode = render::reconstructionOf(request.mode);
-        const bool isLit =
-            std::find(request.passes.begin(), request.passes.end(), render::Pass::light) != request.passes.end();
+        const auto has = [&](render::Pass pass) {
+            return std::find(request.passes.begin(), request.passes.end(), pass) != request.passes.end();
+        };
+        const bool isLit = has(render::Pass::light);
         STIPPLE_TRY(prepare(draws, mode, isLit, request.wantDepthAndNormal));
         STIPPLE_TRY(begin());
         PassList list(*device_, commands_, queries_, omitBarriersBefore_);
@@ -95,7 +97,8 @@ class GpuBackend final : public render::Backend {
                                   mode,
                                   draws.triangles().isEmpty() ? 0 : static_cast<uint32_t>(meshFrame_.clusters.size()),
                                   request.wantDepthAndNormal,
-                                  isLit};
+                                  isLit,
+                                  has(render::Pass::push)};
         for (const render::Pass pass : request.passes) recordPass(recording, pass);
         recordReadback(list, request.wantDepthAndNormal);
         STIPPLE_TRY(submit());
@@ -156,6 +159,31 @@ class GpuBackend final : public render::Backend {
     }
 
     Result<void> prepare(const render::DrawList& draws, const render::Reconstruction& mode, bool isLit, bool wantAll) {
+        const uint64_t pixels = uint64_t{draws.frame.width} * draws.frame.height;
+        STIPPLE_TRY(preparePlanes(draws, wantAll));
+        fillDraws(draws);
+        if (!draws.curves().isEmpty()) {
+            STIPPLE_TRY(pipelines_->call(Pipelines::Set::curves));
+            STIPPLE_TRY(ensure(buffers_.wide, 4 + uint64_t{kWideCapacity} * 120,
+                               kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "wide strands"));
+        }
+        const bool hasDiscs = mode.hasPyramid && draws.hasWideDiscs;
+        const bool hasSplats = mode.fillsSplats && !draws.points().isEmpty();
+        if (hasDiscs) STIPPLE_TRY(pipelines_->call(Pipelines::Set::wideDiscs));
+        if (hasSplats) STIPPLE_TRY(pipelines_->call(Pipelines::Set::splats));
+        if (hasDiscs || hasSplats) {
+            STIPPLE_TRY(ensure(buffers_.discs, 4 + uint64_t{shared::kDiscCapacity} * sizeof(shared::WideDisc),
+                               kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "wide discs"));
+        }
+        if (!draws.triangles().isEmpty()) STIPPLE_TRY(prepareMeshes(draws, pixels));
+        STIPPLE_TRY(pipelines_->call(isLit ? Pipelines::Set::light : Pipelines::Set::plain));
+        if (isLit) STIPPLE_TRY(prepareLights(draws));
+        if (descriptorsChanged_) writeDescriptors();
+        return {};
+    }
+
+    /// Levels of the pyramid, and buffers that every frame needs.
+    Result<void> preparePlanes(const render::DrawList& draws, bool wantAll) {
         const uint32_t w = draws.frame.width, h = draws.frame.height;
         levels_.clear();
         uint64_t words = 0;
@@ -183,6 +211,11 @@ class GpuBackend final : public render::Backend {
                            false, "depth and normals"));
         STIPPLE_TRY(ensure(buffers_.readback, pixels * 4 + (wantAll ? pixels * 28 : 0),
                            VK_BUFFER_USAGE_TRANSFER_DST_BIT, true, "readback"));
+        return {};
+    }
+
+    /// Frame constants, nodes and blocks of points, then those of curves.
+    void fillDraws(const render::DrawList& draws) {
         std::memcpy(buffers_.frame.mapped(), &draws.frame, sizeof(draws.frame));
         auto* nodes = static_cast<shared::DrawNode*>(buffers_.nodes.mapped());
         const auto placeNode = [&](shared::DrawNode node, streaming::ChunkKey key) {
@@ -203,49 +236,31 @@ class GpuBackend final : public render::Backend {
             block.node += static_cast<uint32_t>(draws.points().nodes.size());
             std::memcpy(blocks + draws.points().blocks.size() + i, &block, sizeof(block));
         }
-        if (!draws.curves().isEmpty()) {
-            STIPPLE_TRY(pipelines_->call(Pipelines::Set::curves));
-            STIPPLE_TRY(ensure(buffers_.wide, 4 + uint64_t{kWideCapacity} * 120,
-                               kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "wide strands"));
-        }
-        const bool hasDiscs = mode.hasPyramid && draws.hasWideDiscs;
-        const bool hasSplats = mode.fillsSplats && !draws.points().isEmpty();
-        if (hasDiscs) STIPPLE_TRY(pipelines_->call(Pipelines::Set::wideDiscs));
-        if (hasSplats) STIPPLE_TRY(pipelines_->call(Pipelines::Set::splats));
-        if (hasDiscs || hasSplats) {
-            STIPPLE_TRY(ensure(buffers_.discs, 4 + uint64_t{shared::kDiscCapacity} * sizeof(shared::WideDisc),
-                               kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "wide discs"));
-        }
-        if (!draws.triangles().isEmpty()) STIPPLE_TRY(prepareMeshes(draws, pixels));
-        STIPPLE_TRY(pipelines_->call(isLit ? Pipelines::Set::light : Pipelines::Set::plain));
-        if (isLit) STIPPLE_TRY(prepareLights(draws));
-        if (descriptorsChanged_) {
-            const auto bound = [&](const Buffer& b) {
-                return b.bytes() > 0 ? &b : &buffers_.stats;
-            };  // unused: anything
-            pipelines_->writeDescriptors({&buffers_.frame,
-                                          &buffers_.nodes,
-                                          &buffers_.blocks,
-                                          &buffers_.visibility,
-                                          &buffers_.texels,
-                                          &buffers_.stats,
-                                          &buffers_.image,
-                                          &buffers_.extra,
-                                          bound(buffers_.meshes),
-                                          bound(buffers_.clusters),
-                                          bound(buffers_.materials),
-                                          bound(buffers_.textures),
-                                          bound(buffers_.tiles),
-                                          bound(buffers_.lights),
-                                          bound(buffers_.triangleWords),
-                                          bound(buffers_.large),
-                                          bound(buffers_.environment),
-                                          bound(buffers_.wide),
-                                          bound(buffers_.discs),
-                                          &buffers_.surface});
-            descriptorsChanged_ = false;
-        }
-        return {};
+    }
+
+    void writeDescriptors() {
+        const auto bound = [&](const Buffer& b) { return b.bytes() > 0 ? &b : &buffers_.stats; };  // unused: anything
+        pipelines_->writeDescriptors({&buffers_.frame,
+                                      &buffers_.nodes,
+                                      &buffers_.blocks,
+                                      &buffers_.visibility,
+                                      &buffers_.texels,
+                                      &buffers_.stats,
+                                      &buffers_.image,
+                                      &buffers_.extra,
+                                      bound(buffers_.meshes),
+                                      bound(buffers_.clusters),
+                                      bound(buffers_.materials),
+                                      bound(buffers_.textures),
+                                      bound(buffers_.tiles),
+                                      bound(buffers_.lights),
+                                      bound(buffers_.triangleWords),
+                                      bound(buffers_.large),
+                                      bound(buffers_.environment),
+                                      bound(buffers_.wide),
+                                      bound(buffers_.discs),
+                                      &buffers_.surface});
+        descriptorsChanged_ = false;
     }
 
     template <typename T>

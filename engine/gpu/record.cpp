@@ -17,7 +17,7 @@ void pushStep(const Recording& f, size_t level, uint32_t count) {
     const Level& fine = f.levels[level];
     const Level& coarse = f.levels[std::min(level + 1, f.levels.size() - 1)];
     f.pipelines.push(f.commands, {fine.offset, fine.width, fine.height, coarse.offset, coarse.width, coarse.height,
-                                  static_cast<uint32_t>(level), f.wantAll, f.mode.hasPyramid && f.levels.size() > 1,
+                                  static_cast<uint32_t>(level), f.wantAll, f.hasPyramid && f.levels.size() > 1,
                                   !f.draws.curves().isEmpty(), count});
 }
 

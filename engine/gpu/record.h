@@ -36,6 +36,7 @@ struct Recording {
     const render::Reconstruction& mode;
     uint32_t clusters;  ///< of triangles
     bool wantAll, isLit;
+    bool hasPyramid;  ///< the levels above the first are of this frame
 };
 
 void recordPass(const Recording& frame, render::Pass pass);

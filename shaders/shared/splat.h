@@ -99,7 +99,8 @@ SHARED_FN float planeDepth(float depth, float radius, vec2 normalPerp, float off
     const float along = -(s.x * offsetX + s.y * offsetY);
     const float flat_ = 1.0f - isRound;
     const float nearer = flat_ * min(max(along, -reach), reach);
-    return lens.isOrthographic ? depth - nearer : depth / (1.0f + nearer);
+    // Never before the eye: what is there stays there.
+    return lens.isOrthographic ? max(depth - nearer, 0.001f * depth) : depth / (1.0f + nearer);
 }
 
 // Leaves are no surface: they have hardly any thickness (half of it, over the radius), so that they are not merged with

@@ -10,7 +10,8 @@ SHARED_BEGIN
 // `scattered`: largestSplat of what no surface joins to others.
 SHARED_FN WideDisc splatDisc(DrawNode node, PointRecord r, float supportScale, float scattered, uint id, Lens lens) {
     WideDisc d = wideDisc(node, r, supportScale, id, lens);
-    const float cap = (recordFlags(r) & kFlagScattered) != 0u ? max(lensDepth(lens, d.centre.z), 0.0f) * scattered : 3.0e38f;
+    const float cap =
+        (recordFlags(r) & kFlagScattered) != 0u ? max(lensDepth(lens, d.centre.z), 0.0f) * scattered : 3.0e38f;
     d.radius = min(d.radius, cap);
     d.id = id;
     return d;

@@ -13,7 +13,7 @@ struct SurfaceWords {
 };
 const uint kPixelTriangle = 0x80000000u;
 const uint kPixelUnlit = 0x40000000u;
-const uint kPixelLeaf = 0x20000000u;      // lets light through
+const uint kPixelLeaf = 0x20000000u;     // lets light through
 const uint kPlainSurface = 0x00ffff00u;  // what points are: not metallic, rough, not occluded
 
 // The nearest code of a unit vector: see octDirection.

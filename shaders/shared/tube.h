@@ -66,8 +66,7 @@ SHARED_FN bool isShort(Tube t) { return t.span < 30.0f * min(t.radiusA, t.radius
 // from the ray's own place nearest to what it may meet, so that fp32 loses nothing of thin tubes far away. `isPlain`:
 // the tube is short and before the eye, which is less work.
 SHARED_FN TubeHit tubeHit(Tube t, PixelRay ray, float nearPlane, bool isPlain) {
-    const float ex = ray.ex;
-    const float ey = ray.ey;
+    const float ex = ray.ex, ey = ray.ey;
     const vec3 endA = fromRay(ray, t.a);
     const vec3 endB = fromRay(ray, t.b);
     const float e2 = ex * ex + ey * ey + 1.0f;

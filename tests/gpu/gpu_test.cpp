@@ -240,6 +240,19 @@ TEST_F(Gpu, OddSizesAndDepthAndNormals) {
     for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
 }
 
+TEST_F(Gpu, AFrameWithoutPointsShowsNothingOfThoseBefore) {
+    // No pull and no push run in it: the levels of the pyramid are those of the frame before.
+    const auto gpu = make();
+    lod::View view = test::fitView(*store_, 160, 120);
+    const render::Image first = test::renderView(store_, *gpu, *executor_, view, {});
+    EXPECT_GT(std::count_if(first.rgba.begin(), first.rgba.end(), [](uint32_t c) { return c >> 24 != 0; }), 1000);
+    view.forward = -view.forward;
+    view.right = -view.right;
+    const render::Image away = test::renderView(store_, *gpu, *executor_, view, {});
+    EXPECT_EQ(std::count_if(away.rgba.begin(), away.rgba.end(), [](uint32_t c) { return c >> 24 != 0; }), 0);
+    for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
+}
+
 TEST_F(Gpu, ADeliberateHazardIsReported) {
     // Without this, silence above would prove nothing: the layer ignores misspelt settings.
     const auto gpu = make("surface");

@@ -522,7 +522,7 @@ TEST(ForeignPaths, EveryValueOfACameraPathIsCheckedByName) {
           {R"({"keys": [{"t": 0, "eye": [0, 0, 1], "targte": [0, 0, 0], "target": [0, 0, 0]}]})",
            "key 0: 'targte' is not known (did you mean 'target'?)"},
           {R"({"keys": [{"t": 0, "eye": [0, 0, 1], "target": [0, 0, 0], "roll": 5}]})",
-           "key 0: 'roll' is not known (there are t, eye, target, up, fov)"}}) {
+           "key 0: 'roll' is not known (there are t, eye, target, up, fov, ortho)"}}) {
         spit(folder / "p.json", text);
         const auto path = readCameraPath(folder / "p.json");
         ASSERT_FALSE(path) << text;

@@ -29,9 +29,8 @@ void project(Frame& frame) {
     std::vector<uint8_t> besideToo(frame.draws->points().nodes.size());  // of each node
     CompletionQueue<std::vector<shared::WideDisc>> found;
     for (size_t n = 0; n < besideToo.size(); ++n)
-        besideToo[n] =
-            frame.mode->hasPyramid && ((frame.draws->points().nodes[n].octantMask & shared::kNodeWide) != 0 ||
-                                       !isWithin(frame.constants, frame.draws->points().nodes[n]));
+        besideToo[n] = frame.hasPyramid && ((frame.draws->points().nodes[n].octantMask & shared::kNodeWide) != 0 ||
+                                            !isWithin(frame.constants, frame.draws->points().nodes[n]));
     frame.executor.parallelFor(frame.blocks.size(), 32, [&](size_t begin, size_t end) {
         alignas(64) std::array<uint32_t, shared::kRecordsPerBlock> pixel, depth;
         std::vector<shared::WideDisc> mine;

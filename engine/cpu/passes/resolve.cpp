@@ -25,7 +25,7 @@ void preparePlanes(Frame& frame, size_t pixels) {
 
 void resolve(Frame& frame) {
     Level& fine = frame.pyramid.level(0);
-    Level* coarse = frame.mode->hasPyramid && frame.pyramid.levels() > 1 ? &frame.pyramid.level(1) : nullptr;
+    Level* coarse = frame.hasPyramid && frame.pyramid.levels() > 1 ? &frame.pyramid.level(1) : nullptr;
     frame.pyramid.beginFrame(frame.constants, frame.hasStrands);
     const Planes finePlanes = fine.planes();
     preparePlanes(frame, size_t{fine.width} * fine.height);

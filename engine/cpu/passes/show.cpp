@@ -76,7 +76,7 @@ void showRows(Frame& frame, std::span<const render::Pass> passes) {
     const Planes planes = fine.planes();
     const RowProgram program(frame, passes);
     frame.pyramid.forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
-        if (frame.mode->hasPyramid && frame.pyramid.isUsed()) {
+        if (frame.hasPyramid && frame.pyramid.isUsed()) {
             // The last push, into level 0.
             frame.pyramid.pushTile(
                 fine, frame.pyramid.level(1), 1.0f, x0, n, row0, row1,

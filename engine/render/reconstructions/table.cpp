@@ -1,14 +1,17 @@
 #include "engine/render/reconstructions/table.h"
 
 #include <array>
+#include <limits>
 
 namespace stipple::render {
 namespace {
 
+constexpr float kAsSet = std::numeric_limits<float>::infinity();
+
 constexpr std::array<Reconstruction, 3> kReconstructions{{
-    {Mode::pullpush, "pullpush", "gaps between points are closed by pull and push", true, true, false, 2.0f},
+    {Mode::pullpush, "pullpush", "gaps between points are closed by pull and push", true, true, false, kAsSet},
     {Mode::splat, "splat", "every disc exactly, the nearest wins", false, true, true, 0.5f},
-    {Mode::points, "points", "a pixel a record: surfaces stay open", false, false, false, 2.0f},
+    {Mode::points, "points", "a pixel a record: surfaces stay open", false, false, false, kAsSet},
 }};
 
 }  // namespace

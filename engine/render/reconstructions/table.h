@@ -27,7 +27,8 @@ struct Reconstruction {
     bool hasPyramid;      ///< gaps between splats are closed by pull and push
     bool closesGaps;      ///< surfaces have no gaps between their records
     bool fillsSplats;     ///< every pixel that a disc covers is its own
-    /// From which half-width on, px, curves have exact pixels: those below are left to the reconstruction.
+    /// From which half-width on, px, curves have exact pixels at the latest (DrawSettings::exactStrands may ask for
+    /// more): those below are left to the reconstruction.
     float exactCurves;
 };
 /// In the order in which help lists them; the first is the default.
