@@ -45,6 +45,9 @@ std::vector<bool> centresOf(const std::vector<reference::Disc>& discs, const lod
     for (const reference::Disc& d : discs) {
         const dvec3 off = d.position - view.eye;
         const double z = glm::dot(off, view.forward);
+        // Those that are seen from behind are not drawn, and excuse nothing.
+        const double facing = glm::dot(d.normal, view.isOrthographic ? view.forward : off);
+        if ((d.flags & shared::kFlagTwoSided) == 0 && facing >= 0) continue;
         const double scale = view.focalPixels / (view.isOrthographic ? 1 : z);
         const double x = scale * glm::dot(off, view.right) + 0.5 * view.width,
                      y = scale * glm::dot(off, view.down) + 0.5 * view.height;

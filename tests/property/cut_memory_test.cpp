@@ -31,6 +31,18 @@ namespace {
 
 constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max();
 
+using OpenStore = std::shared_ptr<const lod::Store>;
+/// A ball of points, and a terrain of triangles.
+std::pair<OpenStore, OpenStore> ballAndTerrain(const test::TempFolder& folder, size_t points, uint64_t triangles,
+                                               Executor& executor) {
+    test::writePly(folder / "a.ply", test::bumpySphere(points, 1));
+    test::MeshRecipe recipe;
+    recipe.grow.kind = "terrain";
+    recipe.grow.triangles = triangles;
+    return {test::buildAndOpen(folder / "a.ply", folder / "a.stipple", executor),
+            test::growMeshStore(recipe, folder / "b.stipple", executor)};
+}
+
 /// Round a place, near and far.
 std::vector<lod::View> viewsOf(const glm::dvec3& centre, double size) {
     std::vector<lod::View> views;
@@ -116,12 +128,7 @@ TEST(CutMemory, NothingIsAllocatedOnceWarmWithCrowds) {
 TEST(CutMemory, QuestionsAboutCostsAreNotCounted) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);
-    test::writePly(folder / "a.ply", test::bumpySphere(2'000, 1));
-    const auto points = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
-    test::MeshRecipe recipe;
-    recipe.grow.kind = "terrain";
-    recipe.grow.triangles = 30'000;
-    const auto mesh = test::growMeshStore(recipe, folder / "b.stipple", *executor);
+    const auto [points, mesh] = ballAndTerrain(folder, 2'000, 30'000, *executor);
     const std::vector<const lod::Hierarchy*> hierarchies{&mesh->hierarchy, &points->hierarchy};
     std::vector<lod::Instance> pair(2);
     pair[0].standIn = 1;
@@ -152,12 +159,7 @@ TEST(CutMemory, QuestionsAboutCostsAreNotCounted) {
 TEST(CutMemory, WhatIsCountedIsWhatIsDrawn) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);
-    test::writePly(folder / "a.ply", test::bumpySphere(20'000, 1));
-    const auto points = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
-    test::MeshRecipe recipe;
-    recipe.grow.kind = "terrain";
-    recipe.grow.triangles = 20'000;
-    const auto mesh = test::growMeshStore(recipe, folder / "b.stipple", *executor);
+    const auto [points, mesh] = ballAndTerrain(folder, 20'000, 20'000, *executor);
     const test::Forest forest = test::plantForest(folder.path(), 4, *executor);
     Rng rng(9);
     size_t partly = 0;
