@@ -47,6 +47,7 @@ class CpuBackend final : public render::Backend {
         r.emissiveBytes = frame_.emissivePixels * 4;
         r.strandBytes =
             frame_.strandBlocks.capacity() * sizeof(StrandBlock) + frame_.wide.capacity() * sizeof(WideStrand);
+        r.effectBytes = frame_.surfaceWordPixels * sizeof(shared::SurfaceWords);
         for (const auto& tiles : chunks_.tiles)
             r.textureTiles += static_cast<uint64_t>(
                 std::count_if(tiles.begin(), tiles.end(), [](const uint32_t* t) { return t != nullptr; }));
@@ -68,12 +69,12 @@ class CpuBackend final : public render::Backend {
             const double start = nowSeconds();
             std::string name = render::passName(passes[p]);
             size_t next = p + 1;
-            if (const RunPass run = runPassOf(passes[p])) {
-                run(frame_);
+            if (const CpuPass& pass = cpuPassOf(passes[p]); pass.run != nullptr) {
+                pass.run(frame_);
             } else {
-                for (; next < passes.size() && render::passInfo(passes[next]).isOfOwnPixel; ++next)
+                for (; next < passes.size() && cpuPassOf(passes[next]).run == nullptr; ++next)
                     name += std::string("+") + render::passName(passes[next]);
-                showRows(frame_, passes.subspan(p, next - p));
+                runRows(frame_, passes.subspan(p, next - p));
             }
             times_.push_back({name, (nowSeconds() - start) * 1e3});
             p = next;

@@ -74,6 +74,8 @@ struct Frame {
     // Of the pixels of triangles, beside their texels.
     HugeBuffer<uint32_t> surface, emissive;
     size_t surfacePixels = 0, emissivePixels = 0;
+    HugeBuffer<shared::SurfaceWords> surfaceWords;  ///< Plane::surface, only where rows are kept between passes
+    size_t surfaceWordPixels = 0;
 
     Visibility visible() { return {visibility.data(), runs.data()}; }
     /// May any of these pixels show something?

@@ -48,6 +48,7 @@ class GpuBackend final : public render::Backend {
         r.strandPipelines = pipelines_->countOf(Pipelines::Set::curves);
         r.lightPipelines = pipelines_->countOf(Pipelines::Set::light);
         r.strandBytes = buffers_.wide.bytes();
+        r.effectBytes = buffers_.lights.bytes() + buffers_.environment.bytes();
         r.meshPipelines = pipelines_->countOf(Pipelines::Set::triangles);
         for (const Buffer* b : {&buffers_.meshes, &buffers_.clusters, &buffers_.materials, &buffers_.textures,
                                 &buffers_.tiles, &buffers_.triangleWords, &buffers_.large})

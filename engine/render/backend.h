@@ -43,6 +43,7 @@ struct BackendResources {
     uint64_t strandPipelines = 0;  ///< compiled for ribbons and tubes
     uint64_t strandBytes = 0;      ///< per-frame buffers for them
     uint64_t lightPipelines = 0;   ///< compiled for light
+    uint64_t effectBytes = 0;      ///< tables and planes that only effects need
 };
 
 class Backend : public streaming::ChunkSink {

@@ -153,8 +153,10 @@ void clear(DrawList& out) {
     out.meshTextures.clear();
     out.meshDraws.clear();
     out.lights.clear();
+    out.environment.reset();
     out.bends.clear();
     out.swaying = 0;
+    out.hasWideDiscs = false;
 }
 
 /// A node of points or curves in camera space.
@@ -188,14 +190,23 @@ shared::DrawNode makeDrawNode(const lod::CutDraw& draw, const Bend& bend, const 
     return d;
 }
 
-void addNodes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, const DrawSettings& settings, DrawList& out) {
-    const bool isWindy = settings.wind.strength > 0;
-    const glm::dvec3 up = glm::normalize(settings.worldUp);
+/// Counts the nodes that feed each of the effects, which may move them.
+void addNodes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, const DrawSettings& settings, EffectSet requested,
+              std::span<uint64_t> fed, DrawList& out) {
+    std::vector<size_t> asked;  // mostly none
+    for (size_t e = 0; e < effects().size(); ++e)
+        if (requested.has(e) && effects()[e]->ofNode != nullptr) asked.push_back(e);
     for (const lod::CutDraw& draw : cut.draw) {
         const lod::Instance& instance = out.instances[draw.instance];
         const lod::Hierarchy& h = *out.hierarchies[instance.hierarchy];
-        const Bend bend = isWindy ? bendOf(settings.wind, h, instance, draw.node, out.view, up) : Bend{};
-        if (isWindy) out.bends.push_back(bend);
+        Bend bend;
+        for (const size_t e : asked) {
+            const Bend by = effects()[e]->ofNode({h, instance, draw.node, out.view, settings});
+            if (by.isStill()) continue;
+            bend = by;
+            ++fed[e];
+        }
+        if (!asked.empty()) out.bends.push_back(bend);
         out.swaying += bend.isStill() ? 0 : 1;
         DrawBatch& batch = out.of(lod::kindOf(h));
         const auto index = static_cast<uint32_t>(batch.nodes.size());
@@ -204,6 +215,7 @@ void addNodes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, const Draw
         batch.nodes.push_back(makeDrawNode(draw, bend, cameraFromWorld, out));
         batch.keys.push_back({instance.source, draw.node});
     }
+    if (out.swaying == 0) out.bends.clear();
 }
 
 /// Where the eye is, and how records are drawn.
@@ -233,35 +245,17 @@ void setView(const lod::Cut& cut, const lod::View& view, const DrawSettings& set
     f.sunDirection = glm::normalize(glm::vec3(-0.45f, -0.55f, -0.7f));
 }
 
-void setLights(const lod::View& view, const glm::dmat3& cameraFromWorld, const DrawSettings& settings, DrawList& out) {
+/// What the frame shows of what is requested, and its tables.
+void addEffects(EffectSet requested, std::span<const uint64_t> fed, const glm::dmat3& cameraFromWorld,
+                const DrawSettings& settings, DrawList& out) {
     shared::FrameConstants& f = out.frame;
     f.skyDirection = glm::vec3(cameraFromWorld * settings.worldUp);
-    constexpr double kPi = 3.14159265358979323846;
-    constexpr float kAmbientBesideLights = 0.2f;
-    for (const WorldLight& light : settings.lights) {
-        shared::LightSource l{};
-        const glm::dvec3 axis = cameraFromWorld * light.direction;
-        const bool isFar = light.kind == shared::kLightDirectional;
-        l.position = glm::vec3(isFar ? -axis : cameraFromWorld * (light.position - view.eye));
-        l.kind = light.kind;
-        l.colour = light.colour * static_cast<float>(1 / kPi);
-        l.range = light.range;
-        l.axis = glm::vec3(axis);
-        l.cosInner = std::cos(light.innerCone);
-        l.cosOuter = std::cos(light.outerCone);
-        out.lights.push_back(l);
-    }
-    out.environment = settings.environment;
-    f.hasEnvironment = settings.environment ? 1 : 0;
-    // The environment's y is the scene's up, its -z as near to the scene's as that allows.
-    const glm::dvec3 up = glm::normalize(settings.worldUp);
-    const glm::dvec3 aside = std::abs(up.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1);
-    const glm::dvec3 back = glm::normalize(glm::cross(aside, up)), right = glm::cross(up, back);
-    f.environmentX = glm::vec3(cameraFromWorld * right);
-    f.environmentY = glm::vec3(cameraFromWorld * up);
-    f.environmentZ = glm::vec3(cameraFromWorld * back);
-    f.lightCount = static_cast<uint32_t>(out.lights.size());
-    f.ambient = out.lights.empty() || settings.environment ? 1.0f : kAmbientBesideLights;
+    f.lightCount = 0;
+    f.hasEnvironment = 0;
+    f.ambient = 1;
+    out.effects = effectsOfFrame(requested, contentOf(out), settings, fed);
+    for (size_t e = 0; e < effects().size(); ++e)
+        if (out.effects.has(e) && effects()[e]->fill != nullptr) effects()[e]->fill(settings, cameraFromWorld, out);
 }
 
 void setBlocks(DrawList& out) {
@@ -292,9 +286,6 @@ FrameContent contentOf(const DrawList& draws) {
     content.hasTriangles = !draws.triangles().isEmpty();
     content.hasStrands = !draws.curves().isEmpty();
     content.hasWideDiscs = draws.hasWideDiscs;
-    const bool shows = content.hasPoints || content.hasTriangles || content.hasStrands;
-    content.isLit = shows && draws.frame.debugView == shared::kDebugNone &&
-                    (content.hasTriangles || (draws.frame.shade & shared::kShadeLit) != 0);
     return content;
 }
 
@@ -310,10 +301,12 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     out.hierarchies = hierarchies;
     out.instances = instances;
     const glm::dmat3 cameraFromWorld = glm::transpose(glm::dmat3(view.right, view.down, view.forward));
-    addNodes(cut, cameraFromWorld, settings, out);
+    const EffectSet requested = requestedEffects(out.effectsOfScene, settings);
+    std::vector<uint64_t> fed(effects().size());
+    addNodes(cut, cameraFromWorld, settings, requested, fed, out);
     addMeshes(cut, cameraFromWorld, out);
     setView(cut, view, settings, out);
-    setLights(view, cameraFromWorld, settings, out);
+    addEffects(requested, fed, cameraFromWorld, settings, out);
     setBlocks(out);
 }
 

@@ -6,11 +6,12 @@
 #include <array>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "engine/render/content.h"
+#include "engine/render/effects/table.h"
 #include "engine/render/environment.h"
-#include "engine/render/reconstructions/table.h"
-#include "engine/render/wind.h"
 #include "lod/cut.h"
 #include "lod/kinds.h"
 #include "shaders/shared/frame.h"
@@ -73,13 +74,15 @@ struct DrawList {
     std::vector<MeshDraw> meshDraws;  ///< runs of clusters: what blocks and keys of the batch of triangles belong to
     std::vector<shared::LightSource> lights;
     std::shared_ptr<const Environment> environment;  ///< null: a sky without features
-    uint64_t swaying = 0;                            ///< nodes that wind moves
+    uint64_t swaying = 0;                            ///< nodes that effects move
+    EffectSet effectsOfScene = allEffects();         ///< what it could show; set before the list is made
+    EffectSet effects;                               ///< what the frame shows
     std::span<const shared::SurfaceMaterial> materials;
     // What the fp32 numbers above were made from: the reference starts from these.
     lod::View view;          ///< orthographic: its eye stands before what is drawn ...
     double eyeAdvanced = 0;  ///< ... so far before the eye that was asked for
     std::vector<lod::CutDraw> cut;
-    std::vector<Bend> bends;  ///< of each of `cut`; empty without wind
+    std::vector<Bend> bends;  ///< of each of `cut`; empty where nothing is moved
     std::vector<lod::CutMeshDraw> meshCut;
     std::vector<uint32_t> firstMaterial;  ///< of each hierarchy
     std::span<const lod::Hierarchy* const> hierarchies;
@@ -98,12 +101,13 @@ struct DrawSettings {
     glm::vec3 background = linearBackground();  ///< linear
     glm::dvec3 worldUp{0, 0, 1};
     std::shared_ptr<const Environment> environment;
-    std::vector<WorldLight> lights;  ///< none: a sun over the viewer's shoulder
-    float supportScale = 1.0f;       ///< splat radius of the reconstruction / stored radius
-    float minimumRadius = 1.0f;      ///< pixels
-    float exactStrands = 2.0f;       ///< pixels of half-width from which strands are filled, not reconstructed
-    Wind wind;                       ///< moves what setSway was told of
-    uint32_t coverageSeed = 0;       ///< of strands narrower than a pixel
+    std::vector<WorldLight> lights;    ///< none: a sun over the viewer's shoulder
+    float supportScale = 1.0f;         ///< splat radius of the reconstruction / stored radius
+    float minimumRadius = 1.0f;        ///< pixels
+    float exactStrands = 2.0f;         ///< pixels of half-width from which strands are filled, not reconstructed
+    Wind wind;                         ///< moves what setSway was told of
+    uint32_t coverageSeed = 0;         ///< of strands narrower than a pixel
+    std::vector<std::string> effects;  ///< that are asked for by their names
 };
 
 /// What a frame of these draws calls for.

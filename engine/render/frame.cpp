@@ -9,6 +9,7 @@
 #include <unordered_map>
 
 #include "engine/base/process.h"
+#include "engine/render/frame_passes.h"
 #include "lod/attributes.h"
 #include "lod/octahedral.h"
 #include "lod/store_check.h"
@@ -132,6 +133,7 @@ std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& place
     for (const PlacedStore& p : placed) numbers.push_back(placer.addWithStandIns(p));
     for (const PlacedCrowd& crowd : crowds) placer.addCrowd(crowd, numbers);
     state->draws.materials = state->materials;
+    state->draws.effectsOfScene = effectsOfScene({state->hierarchies, state->instances});
     return state;
 }
 
@@ -160,7 +162,7 @@ Result<void> draw(FrameState& state, const lod::View& view, const FrameSettings&
     RenderRequest request;
     request.draws = &state.draws;
     request.mode = settings.mode;
-    request.passes = passesOf(settings.mode, contentOf(state.draws));
+    request.passes = passesOf(settings.mode, contentOf(state.draws), state.draws.effects);
     request.wantDepthAndNormal = settings.wantDepthAndNormal;
     STIPPLE_TRY(state.backend->render(request, state.image));
     // Depths count from the eye that was asked for.

@@ -8,20 +8,11 @@ namespace {
 
 using enum Plane;
 
-constexpr std::array<PassInfo, 12> kPasses{{
-    {Pass::clear, "clear", {}, {visibility, discList}, false},
-    {Pass::project, "project", {}, {visibility, discList}, false},
-    {Pass::discs, "discs", {discList}, {visibility}, false},
-    {Pass::splat, "splat", {}, {visibility}, false},
-    {Pass::strands, "strands", {}, {visibility}, false},
-    {Pass::rasterise, "rasterise", {}, {visibility}, false},
-    {Pass::resolve, "resolve", {visibility, discList}, {texels}, false},
-    {Pass::pull, "pull", {texels}, {coarse}, false},
-    {Pass::push, "push", {texels, coarse}, {coarse}, false},
-    {Pass::surface, "surface", {texels, coarse}, {surface}, false},
-    {Pass::light, "light", {surface}, {surface}, true},
-    {Pass::output, "output", {surface}, {image}, true},
-}};
+constexpr std::array kPasses{
+#define STIPPLE_PASS(name, reads, writes, isOfOwnPixel) PassInfo{Pass::name, #name, reads, writes, isOfOwnPixel},
+#include "engine/render/passes.inl"
+#undef STIPPLE_PASS
+};
 
 }  // namespace
 

@@ -1,5 +1,5 @@
-// Passes of a frame: their names, and the planes that they read and write. Which of them a frame has is a pure function
-// of its reconstruction (reconstructions/) and of what it calls for.
+// Passes of a frame: their names, and the planes that they read and write (passes.inl). Which of them a frame has is a
+// pure function of its reconstruction (reconstructions/), of what it draws and of its effects (effects/).
 #pragma once
 
 #include <cstdint>
@@ -8,18 +8,9 @@
 namespace stipple::render {
 
 enum class Pass : uint8_t {
-    clear,
-    project,
-    discs,
-    splat,
-    strands,
-    rasterise,
-    resolve,
-    pull,
-    push,
-    surface,
-    light,
-    output
+#define STIPPLE_PASS(name, reads, writes, isOfOwnPixel) name,
+#include "engine/render/passes.inl"
+#undef STIPPLE_PASS
 };
 
 /// What passes hand on to each other, besides the draw list and the chunks, which all may read.
@@ -40,6 +31,7 @@ struct Planes {
         for (const Plane p : planes) bits |= 1u << static_cast<uint32_t>(p);
     }
     constexpr bool has(Plane p) const { return (bits >> static_cast<uint32_t>(p) & 1u) != 0; }
+    constexpr bool holds(Planes other) const { return (other.bits & ~bits) == 0; }
 };
 
 struct PassInfo {

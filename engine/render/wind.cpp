@@ -41,11 +41,14 @@ Bend bendOf(const Wind& wind, const lod::Hierarchy& h, const lod::Instance& inst
     return bend;
 }
 
+bool mayBend(const lod::Hierarchy& h, const lod::Instance& instance) {
+    return h.isLoose() && !h.isRigid && instance.crowd == lod::Instance::kNone && !h.nodes.empty();
+}
+
 void setSway(const Wind& wind, std::span<const lod::Hierarchy* const> hierarchies, std::span<lod::Instance> instances) {
     for (lod::Instance& i : instances) {
         const lod::Hierarchy& h = *hierarchies[i.hierarchy];
-        const bool moves = h.isLoose() && !h.isRigid && i.crowd == lod::Instance::kNone && !h.nodes.empty();
-        i.sway = moves ? wind.strength * 2 * i.scale * h.unit * h.nodes[0].radius : 0;
+        i.sway = mayBend(h, i) ? wind.strength * 2 * i.scale * h.unit * h.nodes[0].radius : 0;
     }
     // What stands in for something rigid is as rigid.
     for (const lod::Instance& i : instances) {

@@ -37,9 +37,11 @@ inline glm::dvec3 windAcross(const glm::dvec3& up) {
     return glm::normalize(aside - up * glm::dot(aside, up));
 }
 
-/// Sets Instance::sway of what stands in the wind: strands and what is seen of them from afar, unless their store says
-/// that they are no plants; but not crowds (where those are drawn, the error allowed is larger than the motion of a
-/// tree).
+/// Could wind move it? Strands and what is seen of them from afar, unless their store says that they are no plants; but
+/// not crowds (where those are drawn, the error allowed is larger than the motion of a tree).
+bool mayBend(const lod::Hierarchy& h, const lod::Instance& instance);
+
+/// Sets Instance::sway of what wind could move.
 void setSway(const Wind& wind, std::span<const lod::Hierarchy* const> hierarchies, std::span<lod::Instance> instances);
 
 }  // namespace stipple::render

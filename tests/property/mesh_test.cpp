@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "engine/cpu/cpu_backend.h"
+#include "engine/render/frame_passes.h"
 #include "engine/scene/camera.h"
 #include "tests/support/meshes.h"
 
@@ -58,7 +59,7 @@ uint64_t emptyPixels(const lod::Store& store, const lod::Cut& cut, const lod::Vi
     render::RenderRequest request;
     request.draws = &draws;
     request.mode = render::Mode::points;
-    request.passes = render::passesOf(request.mode, render::contentOf(draws));
+    request.passes = render::passesOf(request.mode, render::contentOf(draws), draws.effects);
     render::Image image;
     EXPECT_TRUE(backend.render(request, image));
     return static_cast<uint64_t>(

@@ -4,15 +4,22 @@
 #include <algorithm>
 #include <set>
 
-#include "engine/render/reconstructions/table.h"
+#include "engine/render/effects/table.h"
+#include "engine/render/frame_passes.h"
 
 namespace stipple::render {
 namespace {
 
 std::vector<FrameContent> allContents() {
     std::vector<FrameContent> out;
-    for (unsigned bits = 0; bits < 32; ++bits)
-        out.push_back({(bits & 1) != 0, (bits & 2) != 0, (bits & 4) != 0, (bits & 8) != 0, (bits & 16) != 0});
+    for (unsigned bits = 0; bits < 16; ++bits)
+        out.push_back({(bits & 1) != 0, (bits & 2) != 0, (bits & 4) != 0, (bits & 8) != 0});
+    return out;
+}
+/// Every choice of effects.
+std::vector<EffectSet> allSets() {
+    std::vector<EffectSet> out;
+    for (uint32_t bits = 0; bits < 1u << effects().size(); ++bits) out.push_back({bits});
     return out;
 }
 bool has(const std::vector<Pass>& passes, Pass pass) {
@@ -21,31 +28,31 @@ bool has(const std::vector<Pass>& passes, Pass pass) {
 
 TEST(Passes, ReadNothingThatNobodyWrote) {
     for (const Reconstruction& r : reconstructions())
-        for (const FrameContent& content : allContents()) {
-            Planes written;
-            const std::vector<Pass> passes = passesOf(r.mode, content);
-            for (const Pass pass : passes) {
-                const PassInfo& info = passInfo(pass);
-                for (uint32_t p = 0; p <= static_cast<uint32_t>(Plane::image); ++p) {
-                    const auto plane = static_cast<Plane>(p);
-                    // Backends read the levels above the first only where push ran (Frames, Gpu: nothing of those
-                    // before).
-                    if (plane == Plane::coarse && pass == Pass::surface && !has(passes, Pass::push)) continue;
-                    if (info.reads.has(plane))
-                        EXPECT_TRUE(written.has(plane)) << r.name << ": " << info.name << " reads " << p;
+        for (const FrameContent& content : allContents())
+            for (const EffectSet set : allSets()) {
+                Planes written;
+                const std::vector<Pass> passes = passesOf(r.mode, content, set);
+                for (const Pass pass : passes) {
+                    const PassInfo& info = passInfo(pass);
+                    for (uint32_t p = 0; p <= static_cast<uint32_t>(Plane::image); ++p) {
+                        const auto plane = static_cast<Plane>(p);
+                        // Backends read the levels above the first only where push ran (Frames, Gpu: nothing of those
+                        // before).
+                        if (plane == Plane::coarse && pass == Pass::surface && !has(passes, Pass::push)) continue;
+                        if (info.reads.has(plane))
+                            EXPECT_TRUE(written.has(plane)) << r.name << ": " << info.name << " reads " << p;
+                    }
+                    written.bits |= info.writes.bits;
                 }
-                written.bits |= info.writes.bits;
+                EXPECT_TRUE(written.has(Plane::image)) << r.name;
             }
-            EXPECT_TRUE(written.has(Plane::image)) << r.name;
-        }
 }
 
 TEST(Passes, AreThereOnlyWhereTheFrameCallsForThem) {
     for (const Reconstruction& r : reconstructions())
         for (const FrameContent& c : allContents()) {
-            const std::vector<Pass> passes = passesOf(r.mode, c);
+            const std::vector<Pass> passes = passesOf(r.mode, c, {});
             EXPECT_EQ(std::set<Pass>(passes.begin(), passes.end()).size(), passes.size());
-            EXPECT_EQ(has(passes, Pass::light), c.isLit);
             EXPECT_EQ(has(passes, Pass::rasterise), c.hasTriangles);
             EXPECT_EQ(has(passes, Pass::strands), c.hasStrands);
             EXPECT_EQ(has(passes, Pass::project) || has(passes, Pass::splat), c.hasPoints);
@@ -55,6 +62,27 @@ TEST(Passes, AreThereOnlyWhereTheFrameCallsForThem) {
             const auto at = [&](Pass pass) { return std::find(passes.begin(), passes.end(), pass) - passes.begin(); };
             for (const Pass before : {Pass::strands, Pass::rasterise})
                 if (has(passes, Pass::splat) && has(passes, before)) EXPECT_LT(at(before), at(Pass::splat));
+        }
+}
+
+TEST(Passes, OfAnEffectAreThereOnlyWithTheEffect) {
+    for (const Reconstruction& r : reconstructions())
+        for (const FrameContent& content : allContents()) {
+            const std::vector<Pass> plain = passesOf(r.mode, content, {});
+            for (const EffectSet set : allSets()) {
+                std::vector<Pass> passes = passesOf(r.mode, content, set);
+                size_t of = 0;
+                for (size_t e = 0; e < effects().size(); ++e)
+                    for (const Pass pass : effects()[e]->passes) {
+                        EXPECT_EQ(has(passes, pass), set.has(e)) << effects()[e]->name;
+                        std::erase(passes, pass);
+                        of += set.has(e);
+                        // Between what makes surfaces and what shows them.
+                        EXPECT_FALSE(has(plain, pass));
+                    }
+                EXPECT_EQ(passes, plain) << "nothing else changes";
+                EXPECT_EQ(plain.size() + of, passesOf(r.mode, content, set).size());
+            }
         }
 }
 

@@ -1,6 +1,4 @@
-// What every frame begins with, and the table of passes.
-#include <map>
-
+// What every frame begins with: block tables and image of the frame; the planes grow to its size.
 #include "engine/cpu/passes/passes.h"
 
 namespace stipple::cpu {
@@ -22,8 +20,6 @@ void resize(Frame& frame) {
     frame.runs.assign(pixels / Visibility::kRun + 1, 0);
 }
 
-}  // namespace
-
 void clear(Frame& frame) {
     resize(frame);
     frame.blocks.resize(frame.draws->points().blocks.size());
@@ -40,17 +36,8 @@ void clear(Frame& frame) {
     frame.hasStrands = !frame.strandBlocks.empty();
 }
 
-void pull(Frame& frame) { frame.pyramid.pull(); }
-void push(Frame& frame) { frame.pyramid.push(); }
+}  // namespace
 
-RunPass runPassOf(render::Pass pass) {
-    static const std::map<render::Pass, RunPass> kTable{
-        {render::Pass::clear, clear},     {render::Pass::project, project},    {render::Pass::discs, fillDiscs},
-        {render::Pass::splat, splat},     {render::Pass::strands, drawCurves}, {render::Pass::rasterise, rasterise},
-        {render::Pass::resolve, resolve}, {render::Pass::pull, pull},          {render::Pass::push, push},
-    };
-    const auto found = kTable.find(pass);
-    return found == kTable.end() ? nullptr : found->second;
-}
+constinit const CpuPass clearPass{.run = clear};
 
 }  // namespace stipple::cpu

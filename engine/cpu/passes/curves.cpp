@@ -3,6 +3,8 @@
 
 namespace stipple::cpu {
 
+namespace {
+
 void drawCurves(Frame& frame) {
     CompletionQueue<std::vector<WideStrand>> found;
     frame.wide.clear();
@@ -23,5 +25,9 @@ void drawCurves(Frame& frame) {
             frame.k.fillWide(frame.constants, frame.wide.data(), frame.wide.size(), first, last, frame.visible());
         });
 }
+
+}  // namespace
+
+constinit const CpuPass strandsPass{.run = drawCurves};
 
 }  // namespace stipple::cpu

@@ -1,4 +1,4 @@
-// The passes of the cpu backend (engine/render/passes.h), each a function of the frame.
+// The passes of the cpu backend (engine/render/passes.inl): each is a function of the frame, or of a row of a tile.
 #pragma once
 
 #include <span>
@@ -7,23 +7,35 @@
 
 namespace stipple::cpu {
 
-/// Block tables and image of the frame; the planes grow to its size.
-void clear(Frame& frame);
-void project(Frame& frame);
-void fillDiscs(Frame& frame);
-void drawCurves(Frame& frame);
-void rasterise(Frame& frame);
-/// Every disc exactly: tile by tile, in front of what is there.
-void splat(Frame& frame);
-/// Level 0 from the visibility buffer; with a pyramid, level 1 on the way.
-void resolve(Frame& frame);
-void pull(Frame& frame);
-void push(Frame& frame);
-/// From reconstructed rows to the picture: surface, and those of its followers that are in `passes`, back to back.
-void showRows(Frame& frame, std::span<const render::Pass> passes);
+/// A row of a tile, `n` pixels from (x0, y) on.
+struct RowPlace {
+    Frame& frame;
+    uint32_t x0, y, n;
+    size_t first;  ///< pixel of the image
+};
 
-using RunPass = void (*)(Frame&);
-/// Null for what showRows runs.
-RunPass runPassOf(render::Pass pass);
+/// What runs over rows while they are in cache, back to back with its neighbours in the list.
+struct RowPass {
+    /// Has the row's pixels anything that the pass changes? `planes`: of triangles there. Null: always.
+    bool (*concerns)(const Frame& frame, const SurfacePlanes& planes);
+    /// Adds what it reads of surfaces.
+    void (*wants)(const Frame& frame, SurfaceWants& wants);
+    void (*run)(const RowPlace& at, SurfaceRow& row);
+};
+
+/// One of the two.
+struct CpuPass {
+    void (*run)(Frame& frame) = nullptr;
+    RowPass row{};
+};
+#define STIPPLE_PASS(name, reads, writes, isOfOwnPixel) extern const CpuPass name##Pass;
+#include "engine/render/passes.inl"
+#undef STIPPLE_PASS
+
+const CpuPass& cpuPassOf(render::Pass pass);
+
+/// Runs passes of rows back to back: the first is surface, or reads what an earlier run left; what the last one leaves
+/// is kept for later passes, unless it is the picture.
+void runRows(Frame& frame, std::span<const render::Pass> passes);
 
 }  // namespace stipple::cpu

@@ -23,8 +23,6 @@ bool isWithin(const shared::FrameConstants& f, const shared::DrawNode& node) {
     return true;
 }
 
-}  // namespace
-
 void project(Frame& frame) {
     std::vector<uint8_t> besideToo(frame.draws->points().nodes.size());  // of each node
     CompletionQueue<std::vector<shared::WideDisc>> found;
@@ -78,5 +76,10 @@ void fillDiscs(Frame& frame) {
                               last, frame.visible());
         });
 }
+
+}  // namespace
+
+constinit const CpuPass projectPass{.run = project};
+constinit const CpuPass discsPass{.run = fillDiscs};
 
 }  // namespace stipple::cpu

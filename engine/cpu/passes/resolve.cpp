@@ -21,8 +21,8 @@ void preparePlanes(Frame& frame, size_t pixels) {
     fit(frame.surface, frame.surfacePixels, frame.hasTriangles);
     fit(frame.emissive, frame.emissivePixels, frame.hasEmissive);
 }
-}  // namespace
 
+/// Level 0 from the visibility buffer; with a pyramid, level 1 on the way.
 void resolve(Frame& frame) {
     Level& fine = frame.pyramid.level(0);
     Level* coarse = frame.hasPyramid && frame.pyramid.levels() > 1 ? &frame.pyramid.level(1) : nullptr;
@@ -71,5 +71,9 @@ void resolve(Frame& frame) {
     std::fill(frame.runs.begin(), frame.runs.end(), uint8_t{0});  // resolveRow has cleared what they stood for
     frame.pyramid.setLargestRadius(largestRadius.load());
 }
+
+}  // namespace
+
+constinit const CpuPass resolvePass{.run = resolve};
 
 }  // namespace stipple::cpu

@@ -126,12 +126,15 @@ class TileLists {
     std::vector<uint64_t> entries_;     ///< of each chunk: sum of their tiles
 };
 
-}  // namespace
-
+/// Every disc exactly: tile by tile, in front of what is there.
 void splat(Frame& frame) {
     TileLists lists(frame);
     lists.place();
     lists.draw();
 }
+
+}  // namespace
+
+constinit const CpuPass splatPass{.run = splat};
 
 }  // namespace stipple::cpu

@@ -3,6 +3,8 @@
 
 namespace stipple::cpu {
 
+namespace {
+
 void rasterise(Frame& frame) {
     CompletionQueue<std::vector<LargeTriangle>> found;
     frame.meshBlocks.clear();
@@ -43,5 +45,9 @@ void rasterise(Frame& frame) {
         frame.k.rasterLarge(frame.constants, frame.large.data(), frame.large.size(), first, last, frame.visible());
     });
 }
+
+}  // namespace
+
+constinit const CpuPass rasterisePass{.run = rasterise};
 
 }  // namespace stipple::cpu

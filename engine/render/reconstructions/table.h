@@ -5,20 +5,12 @@
 #include <cstdint>
 #include <span>
 #include <string_view>
-#include <vector>
 
 #include "engine/render/passes.h"
 
 namespace stipple::render {
 
 enum class Mode : uint8_t { pullpush, points, splat };
-
-/// What a frame draws, for what it calls for.
-struct FrameContent {
-    bool hasPoints = true, hasTriangles = false, hasStrands = false;
-    bool hasWideDiscs = false;  ///< points may be
-    bool isLit = false;         ///< by a sun, by lights of the scene's own, or by an environment
-};
 
 struct Reconstruction {
     Mode mode;
@@ -27,6 +19,8 @@ struct Reconstruction {
     bool hasPyramid;      ///< gaps between splats are closed by pull and push
     bool closesGaps;      ///< surfaces have no gaps between their records
     bool fillsSplats;     ///< every pixel that a disc covers is its own
+    Pass points;          ///< what draws points into the visibility buffer
+    bool pointsAreLast;   ///< ... after all other kinds: its tiles are nobody else's meanwhile
     /// From which half-width on, px, curves have exact pixels at the latest (DrawSettings::exactStrands may ask for
     /// more): those below are left to the reconstruction.
     float exactCurves;
@@ -38,8 +32,5 @@ const Reconstruction& reconstructionOf(Mode mode);
 Mode nextMode(Mode mode);
 /// Null where there is none of that name.
 const Reconstruction* reconstructionNamed(std::string_view name);
-
-/// The passes of a frame, in order; a pass that the frame does not call for is not in the list.
-std::vector<Pass> passesOf(Mode mode, const FrameContent& content);
 
 }  // namespace stipple::render

@@ -1,0 +1,71 @@
+// An effect is a manifest: when it is called for, what it does to nodes and tables, its passes, and how far off it may
+// be. A frame has it where it is requested, where the scene could show it, and where this frame does.
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+#include <span>
+
+#include "engine/render/content.h"
+#include "engine/render/passes.h"
+#include "engine/render/wind.h"
+#include "lod/cut.h"
+
+namespace stipple::render {
+
+struct DrawSettings;
+struct DrawList;
+
+/// All that is placed; asked once a scene.
+struct EffectScene {
+    std::span<const lod::Hierarchy* const> hierarchies;
+    std::span<const lod::Instance> instances;
+};
+/// A node of points or curves that is drawn.
+struct EffectNode {
+    const lod::Hierarchy& hierarchy;
+    const lod::Instance& instance;
+    uint32_t node;
+    const lod::View& view;
+    const DrawSettings& settings;
+};
+struct EffectFrame {
+    FrameContent content;
+    const DrawSettings& settings;
+    uint64_t nodes = 0;  ///< that feed the effect
+};
+
+/// Where in a frame the passes of an effect run.
+enum class Stage : uint8_t {
+    surface,  ///< on surfaces, before light
+    light,    ///< from surfaces to what they send to the eye
+    lit       ///< on what they send
+};
+
+struct Effect {
+    const char* name;
+    const char* summary;
+    /// Null: where its name is among DrawSettings::effects.
+    bool (*isRequested)(const DrawSettings& settings);
+    bool (*ofScene)(const EffectScene& scene);  ///< could any of it need the effect? Conservative
+    bool (*ofFrame)(const EffectFrame& frame);  ///< does this frame show it?
+    /// Does a node feed it, and how is that node moved? Still: it does not. Null: nodes do not matter.
+    Bend (*ofNode)(const EffectNode& node);
+    /// Tables and constants that its passes read, in camera space. Null: none.
+    void (*fill)(const DrawSettings& settings, const glm::dmat3& cameraFromWorld, DrawList& out);
+    Stage stage;
+    std::span<const Pass> passes;  ///< of its own; what they read and write: passes.inl
+    /// Largest difference that the effect would make where a predicate says no: pixels of motion, and 1/255 of a
+    /// colour.
+    double tolerancePixels, toleranceSteps;
+};
+
+/// Some of the effects of the table, by their places in it.
+struct EffectSet {
+    uint32_t bits = 0;
+    bool has(size_t effect) const { return (bits >> effect & 1u) != 0; }
+    void add(size_t effect) { bits |= 1u << effect; }
+    bool operator==(const EffectSet&) const = default;
+};
+
+}  // namespace stipple::render

@@ -1,0 +1,55 @@
+// Light: a sun over the viewer's shoulder, or lights of the scene's own, on what is not drawn as it is.
+#include <array>
+#include <cmath>
+
+#include "engine/render/draw_list.h"
+#include "engine/render/effects/effect.h"
+
+namespace stipple::render {
+namespace {
+
+constexpr std::array kPasses{Pass::light};
+
+void fill(const DrawSettings& settings, const glm::dmat3& cameraFromWorld, DrawList& out) {
+    constexpr double kPi = 3.14159265358979323846;
+    constexpr float kAmbientBesideLights = 0.2f;
+    for (const WorldLight& light : settings.lights) {
+        shared::LightSource l{};
+        const glm::dvec3 axis = cameraFromWorld * light.direction;
+        const bool isFar = light.kind == shared::kLightDirectional;
+        l.position = glm::vec3(isFar ? -axis : cameraFromWorld * (light.position - out.view.eye));
+        l.kind = light.kind;
+        l.colour = light.colour * static_cast<float>(1 / kPi);
+        l.range = light.range;
+        l.axis = glm::vec3(axis);
+        l.cosInner = std::cos(light.innerCone);
+        l.cosOuter = std::cos(light.outerCone);
+        out.lights.push_back(l);
+    }
+    out.frame.lightCount = static_cast<uint32_t>(out.lights.size());
+    if (!out.lights.empty()) out.frame.ambient = kAmbientBesideLights;
+}
+
+}  // namespace
+
+bool isLit(const EffectFrame& frame) {
+    const DrawSettings& s = frame.settings;
+    const bool litTriangles = frame.content.hasTriangles && !s.unlitTriangles;
+    const bool litOthers = (frame.content.hasPoints || frame.content.hasStrands) && s.lit;
+    return s.debugView == shared::kDebugNone && (litTriangles || litOthers);
+}
+
+extern const Effect kLight;
+constinit const Effect kLight{.name = "light",
+                              .summary = "a sun, or the scene's own lights",
+                              .isRequested = [](const DrawSettings& s) { return s.lit || !s.unlitTriangles; },
+                              .ofScene = [](const EffectScene& scene) { return !scene.instances.empty(); },
+                              .ofFrame = isLit,
+                              .ofNode = nullptr,
+                              .fill = fill,
+                              .stage = Stage::light,
+                              .passes = kPasses,
+                              .tolerancePixels = 0,
+                              .toleranceSteps = 0};
+
+}  // namespace stipple::render

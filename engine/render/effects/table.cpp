@@ -1,0 +1,59 @@
+#include "engine/render/effects/table.h"
+
+#include <algorithm>
+#include <array>
+
+#include "engine/render/draw_list.h"
+
+namespace stipple::render {
+
+extern const Effect kWind, kLight, kEnvironment;
+
+namespace {
+
+constexpr std::array kEffects{&kWind, &kLight, &kEnvironment};
+static_assert(kEffects.size() <= 32, "EffectSet");
+
+template <typename Holds>
+EffectSet setOf(const Holds& holds) {
+    EffectSet set;
+    for (size_t e = 0; e < kEffects.size(); ++e)
+        if (holds(e)) set.add(e);
+    return set;
+}
+
+}  // namespace
+
+std::span<const Effect* const> effects() { return kEffects; }
+
+const Effect* effectNamed(std::string_view name) {
+    for (const Effect* e : kEffects)
+        if (name == e->name) return e;
+    return nullptr;
+}
+
+EffectSet allEffects() {
+    return setOf([](size_t) { return true; });
+}
+
+EffectSet effectsOfScene(const EffectScene& scene) {
+    return setOf([&](size_t e) { return kEffects.at(e)->ofScene(scene); });
+}
+
+EffectSet requestedEffects(EffectSet scene, const DrawSettings& settings) {
+    return setOf([&](size_t e) {
+        const Effect& effect = *kEffects.at(e);
+        if (!scene.has(e)) return false;
+        if (effect.isRequested) return effect.isRequested(settings);
+        return std::find(settings.effects.begin(), settings.effects.end(), effect.name) != settings.effects.end();
+    });
+}
+
+EffectSet effectsOfFrame(EffectSet requested, const FrameContent& content, const DrawSettings& settings,
+                         std::span<const uint64_t> nodes) {
+    return setOf([&](size_t e) {
+        return requested.has(e) && kEffects.at(e)->ofFrame({content, settings, nodes.empty() ? 0 : nodes[e]});
+    });
+}
+
+}  // namespace stipple::render

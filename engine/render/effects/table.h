@@ -1,0 +1,24 @@
+// The effects: a new one is a file of this folder with its manifest, and a line of the table (README.md).
+#pragma once
+
+#include <string_view>
+
+#include "engine/render/effects/effect.h"
+
+namespace stipple::render {
+
+/// In the order in which they are asked, and in which those of one stage run.
+std::span<const Effect* const> effects();
+/// Null where there is none of that name.
+const Effect* effectNamed(std::string_view name);
+
+/// Those that a scene could show; without a scene: all.
+EffectSet effectsOfScene(const EffectScene& scene);
+EffectSet allEffects();
+/// Those of `scene` that the settings ask for.
+EffectSet requestedEffects(EffectSet scene, const DrawSettings& settings);
+/// Those of `requested` that a frame shows. `nodes`: how many feed each effect of the table.
+EffectSet effectsOfFrame(EffectSet requested, const FrameContent& content, const DrawSettings& settings,
+                         std::span<const uint64_t> nodes);
+
+}  // namespace stipple::render

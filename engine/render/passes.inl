@@ -1,0 +1,15 @@
+// The passes of a frame, one a line: STIPPLE_PASS(name, the planes that it reads, those that it writes, does it read of
+// what the pass before wrote nothing but its own pixel: then both may run in the same tile). Each backend has an entry
+// for each of them (engine/cpu/passes, engine/gpu/passes: `namePass`), which the linker asks for.
+STIPPLE_PASS(clear, (Planes{}), (Planes{visibility, discList}), false)
+STIPPLE_PASS(project, (Planes{}), (Planes{visibility, discList}), false)
+STIPPLE_PASS(discs, (Planes{discList}), (Planes{visibility}), false)
+STIPPLE_PASS(splat, (Planes{}), (Planes{visibility}), false)
+STIPPLE_PASS(strands, (Planes{}), (Planes{visibility}), false)
+STIPPLE_PASS(rasterise, (Planes{}), (Planes{visibility}), false)
+STIPPLE_PASS(resolve, (Planes{visibility, discList}), (Planes{texels}), false)
+STIPPLE_PASS(pull, (Planes{texels}), (Planes{coarse}), false)
+STIPPLE_PASS(push, (Planes{texels, coarse}), (Planes{coarse}), false)
+STIPPLE_PASS(surface, (Planes{texels, coarse}), (Planes{surface}), false)
+STIPPLE_PASS(light, (Planes{surface}), (Planes{surface}), true)
+STIPPLE_PASS(output, (Planes{surface}), (Planes{image}), true)
