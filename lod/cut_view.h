@@ -69,16 +69,23 @@ inline bool facesAlong(const Node& node, const glm::dvec3& forward) {
     return facesAway(node, forward, glm::length(forward), 0);
 }
 
+/// How much longer wind makes a distance at most. It moves what stands `height` above the foot by sway (height / 2R)^2:
+/// a shear of no more than 2 s with s = sway / 2R, whose largest singular value is s + sqrt(1 + s^2).
+inline double longestIn(const Hierarchy& h, double sway) {
+    const double s = sway / (2 * h.nodes[0].radius);
+    return s + std::sqrt(1 + s * s);
+}
+
 /// Allowed error of N at tau = 1 px as a code of 1/32 octave, rounded down; kCulled if nothing of N can be seen.
 inline int32_t allowedError(const Hierarchy& h, const Node& node, const LocalView& view, double sway) {
     const glm::dvec3 d = node.centre - view.eye;
-    const double r = node.radius + sway;
+    const double r = node.radius + sway, stretch = sway > 0 ? longestIn(h, sway) : 1;
     const double depth = glm::dot(d, view.forward);
     if (depth + r < view.nearPlane) return kCulled;
     if (view.isBeside(d, r)) return kCulled;
     if (view.isOrthographic) {
         if (!h.isLoose() && facesAlong(node, view.forward)) return kCulled;
-        const double code = std::floor(kStepsPerOctave * std::log2(1 / (view.focal * h.errors.smallest)));
+        const double code = std::floor(kStepsPerOctave * std::log2(1 / (view.focal * stretch * h.errors.smallest)));
         return std::isnan(code) ? kInside : static_cast<int32_t>(std::clamp(code, -900'000.0, 900'000.0));
     }
     const double distance = glm::length(d);
@@ -90,7 +97,7 @@ inline int32_t allowedError(const Hierarchy& h, const Node& node, const LocalVie
     const double cosAlpha = depth / distance, sinAlpha = std::sqrt(std::max(0.0, 1 - cosAlpha * cosAlpha));
     const double sinBeta = r / distance, cosBeta = std::sqrt(std::max(0.0, 1 - sinBeta * sinBeta));
     const double cosine = std::max(cosAlpha * cosBeta - sinAlpha * sinBeta, view.cosineCorner);
-    const double allowed = nearest * cosine * cosine / view.focal;
+    const double allowed = nearest * cosine * cosine / view.focal / stretch;
     const double code = std::floor(kStepsPerOctave * std::log2(allowed / h.errors.smallest));
     if (std::isnan(code)) return kInside;  // of cameras so far off that distances are infinite
     return static_cast<int32_t>(std::clamp(code, -900'000.0, 900'000.0));

@@ -72,6 +72,7 @@ template <bool besideToo, bool wideToo>
     const float mostScattered = largestSplat(kFlagScattered, focal, f.height), most = largestSplat(0u, focal, f.height);
     const float wideShare = wideRadius(f.width, f.height) / focal;
     const uint stride = f.width, errorCode = node.errorCode, octantMask = node.octantMask;
+    const NormalAxes m = normalAxes(node);
 #pragma GCC ivdep
     for (size_t i = 0; i < count; ++i) {
         const PointRecord r{words[4 * i], words[4 * i + 1], words[4 * i + 2], words[4 * i + 3]};
@@ -97,9 +98,9 @@ template <bool besideToo, bool wideToo>
         const float drawnHere = float(int(octantMask >> recordOctant(r) & 1u));  // a bool would keep GCC from SIMD
         const bool fine = (recordErrorCode(r) <= errorCode) | (drawnHere > 0.5f);
         const vec3 n = octDirection(r.normal);
-        const float nx = ax * n.x + bbx * n.y + ccx * n.z;  // any length will do
-        const float ny = ay * n.x + bby * n.y + ccy * n.z;
-        const float nz = az * n.x + bbz * n.y + ccz * n.z;
+        const float nx = m.x.x * n.x + m.y.x * n.y + m.z.x * n.z;  // any length will do
+        const float ny = m.x.y * n.x + m.y.y * n.y + m.z.y * n.z;
+        const float nz = m.x.z * n.x + m.y.z * n.y + m.z.z * n.z;
         const float facing = kOrthographic ? nz : nx * cx + ny * cy + nz * cz;
         const bool seen = ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) != 0u) | (facing < 0.0f);
         const bool keep = inside & fine & seen;
@@ -284,7 +285,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
         g.turned[i] = 0;
         if ((node.octantMask & kNodeTurned) != 0) {
             anyTurned = true;
-            const vec3 d = nodeDirection(node, octDecode(r.normal));
+            const vec3 d = nodeUnitNormal(node, octDecode(r.normal));
             g.turned[i] = 1;
             g.nx[i] = d.x;
             g.ny[i] = d.y;

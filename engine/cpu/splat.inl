@@ -9,7 +9,7 @@ void placeSplats(const FrameConstants& frame, const DrawNode& drawNode, const Po
     const float bx = node.base.x, by = node.base.y, bz = node.base.z, ax = node.axisX.x, ay = node.axisX.y,
                 az = node.axisX.z, bbx = node.axisY.x, bby = node.axisY.y, bbz = node.axisY.z, ccx = node.axisZ.x,
                 ccy = node.axisZ.y, ccz = node.axisZ.z;
-    const float shorten = 1.0f / std::sqrt(ax * ax + ay * ay + az * az);
+    const NormalAxes m = normalAxes(node);
     const float edge = node.edge * f.supportScale, scattered = largestSplat(kFlagScattered, focal, f.height);
     const uint32_t errorCode = node.errorCode, octantMask = node.octantMask;
     const Lens lens = lensHere(focal);
@@ -25,9 +25,9 @@ void placeSplats(const FrameConstants& frame, const DrawNode& drawNode, const Po
         const vec3 sight = sightTo(lens, vec3(cx, cy, cz));
         const float away = -1.0f / std::sqrt(max(dot(sight, sight), 1.0e-37f));
         const bool isFree = (recordFlags(r) & kFlagNoNormal) != 0u;
-        const float nx = isFree ? sight.x * away : (ax * d.x + bbx * d.y + ccx * d.z) * shorten;
-        const float ny = isFree ? sight.y * away : (ay * d.x + bby * d.y + ccy * d.z) * shorten;
-        const float nz = isFree ? sight.z * away : (az * d.x + bbz * d.y + ccz * d.z) * shorten;
+        const float nx = isFree ? sight.x * away : (m.x.x * d.x + m.y.x * d.y + m.z.x * d.z) * m.scale;
+        const float ny = isFree ? sight.y * away : (m.x.y * d.x + m.y.y * d.y + m.z.y * d.z) * m.scale;
+        const float nz = isFree ? sight.z * away : (m.x.z * d.x + m.y.z * d.y + m.z.z * d.z) * m.scale;
         const float cap =
             (recordFlags(r) & kFlagScattered) != 0u ? max(lensDepth(lens, cz), 0.0f) * scattered : 3.0e38f;
         const float radius = min(edge * radiusFractionFast(recordRadiusCode(r)), cap);
@@ -59,6 +59,16 @@ void placeSplats(const FrameConstants& frame, const DrawNode& drawNode, const Po
         out.firstY[i] = int(min(max(y0, 0.0f), lastY));
         out.lastY[i] = int(min(max(y1, 0.0f), lastY));
         out.keep[i] = keep ? (isNear ? 2u : 1u) : 0u;
+    }
+    if ((node.octantMask & kNodeBent) != 0u) {  // normals are not as long as they were
+#pragma GCC ivdep
+        for (size_t i = 0; i < count; ++i) {
+            const float nx = out.nx[i], ny = out.ny[i], nz = out.nz[i];
+            const float shorten = 1.0f / std::sqrt(max(nx * nx + ny * ny + nz * nz, 1.0e-37f));
+            out.nx[i] = nx * shorten;
+            out.ny[i] = ny * shorten;
+            out.nz[i] = nz * shorten;
+        }
     }
     // Those about the eye, one by one.
     for (size_t i = 0; i < count; ++i) {

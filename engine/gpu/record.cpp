@@ -72,8 +72,8 @@ void project(const Recording& f) {
     const FrameBuffers& b = f.buffers;
     const bool hasDiscs = f.mode.hasPyramid && f.draws.hasWideDiscs;
     if (hasDiscs) emptyList(f, "disc list", b.discs);
-    const std::vector<BufferUse> uses =
-        hasDiscs ? std::vector{write(b.visibility), write(b.discs)} : std::vector{write(b.visibility)};
+    // Without a list the buffer of measures is bound in its stead: layers take it for written.
+    const std::vector<BufferUse> uses{write(b.visibility), write(hasDiscs ? b.discs : b.stats)};
     overBlocks(f, "project", uses, f.draws.points().blocks.size(), hasDiscs ? 1 : 0);
 }
 

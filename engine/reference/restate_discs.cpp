@@ -15,6 +15,14 @@ bool areFew(const lod::Hierarchy& h, const lod::Node& node, const std::vector<sh
     return most * std::sqrt(static_cast<double>(records.size())) <= 4 * h.unit * h.cellSize(node);
 }
 
+/// Of the plane of a disc where wind has moved it: three points of it, `reach` apart, moved one by one.
+dvec3 bentNormal(const render::Bend& bend, const dvec3& p, const dvec3& n, double reach) {
+    if (bend.isStill() || !(glm::length(n) > 0)) return n;
+    const dvec3 a = glm::normalize(glm::cross(n, std::abs(n.x) < 0.7 ? dvec3(1, 0, 0) : dvec3(0, 1, 0)));
+    const dvec3 b = glm::cross(n, a), at = bend.moved(p);
+    return glm::normalize(glm::cross(bend.moved(p + reach * a) - at, bend.moved(p + reach * b) - at));
+}
+
 /// Depth of a disc on a ray, and rho^2 there; infinite where it is not met.
 std::pair<double, double> meet(const PlacedDisc& d, const ViewRay& ray, double nearPlane) {
     const double depth = glm::dot(d.normal, d.centre - ray.origin) / glm::dot(d.normal, ray.direction);
@@ -58,10 +66,14 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
             disc.radius *= cut.radiusScale;
             if (disc.errorCode > cut.errorCode && !(cut.octantMask >> disc.octant & 1u)) continue;
             dvec3 world = instance.translation + instance.rotation * (instance.scale * disc.position);
-            if (!draws.bends.empty()) world = draws.bends[d].moved(world);
+            dvec3 nw = instance.rotation * disc.normal;
+            if (!draws.bends.empty()) {
+                const double reach = instance.scale * disc.radius;
+                nw = bentNormal(draws.bends[d], world, nw, reach > 0 ? reach : 1);
+                world = draws.bends[d].moved(world);
+            }
             world -= v.eye;
             const dvec3 c(glm::dot(world, v.right), glm::dot(world, v.down), glm::dot(world, v.forward));
-            const dvec3 nw = instance.rotation * disc.normal;
             dvec3 n(glm::dot(nw, v.right), glm::dot(nw, v.down), glm::dot(nw, v.forward));
             const bool oneSided = (disc.flags & (shared::kFlagTwoSided | shared::kFlagNoNormal)) == 0;
             if (oneSided && glm::dot(n, sightOf(v, c)) >= 0) continue;

@@ -72,8 +72,14 @@ class StrandProjector {
         b_ = place(world.b);
         s_.radiusA *= instance.scale;
         s_.radiusB *= instance.scale;
-        s_.directionA = toCamera(instance.rotation * world.directionA);
-        s_.directionB = toCamera(instance.rotation * world.directionB);
+        // Where wind has moved a place and its neighbour.
+        const auto direction = [&](const dvec3& p, const dvec3& along) {
+            const dvec3 at = instance.translation + instance.rotation * (instance.scale * p);
+            const dvec3 d = instance.rotation * along;
+            return toCamera(bend.isStill() ? d : bend.moved(at + d) - bend.moved(at));
+        };
+        s_.directionA = direction(world.a, world.directionA);
+        s_.directionB = direction(world.b, world.directionB);
         tangent_ = glm::length(b_ - a_) > 0 ? glm::normalize(b_ - a_) : dvec3(0);
         from_ = 0;
         to_ = 1;
@@ -176,6 +182,10 @@ class StrandProjector {
         Segment own = s_;
         own.a = a_;
         own.b = b_;
+        if (!own.isTube) {  // as wide as they were, however wind pulls at them
+            own.directionA = glm::normalize(own.directionA);
+            own.directionB = glm::normalize(own.directionB);
+        }
         // Pixels of the cubes around both balls; all where they reach beside the eye.
         dvec2 lo(1e300), hi(-1e300);
         bool isBefore = true;

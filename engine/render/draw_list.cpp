@@ -183,7 +183,8 @@ shared::DrawNode makeDrawNode(const lod::CutDraw& draw, const Bend& bend, const 
     d.base = glm::vec3(bent(base) + along * atEye);
     d.edge = static_cast<float>(instance.scale * h.unit * h.cellSize(node)) * draw.radiusScale;
     d.errorCode = draw.errorCode;
-    d.octantMask = draw.octantMask | (instance.rotation != glm::dmat3(1) || !bend.isStill() ? shared::kNodeTurned : 0u);
+    d.octantMask = draw.octantMask | (bend.isStill() ? 0u : shared::kNodeBent | shared::kNodeTurned) |
+                   (instance.rotation != glm::dmat3(1) ? shared::kNodeTurned : 0u);
     d.count = draw.count;
     d.level = node.level;
     d.errorPixels = draw.errorPixels;

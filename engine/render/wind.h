@@ -18,7 +18,8 @@ struct Wind {
 
 /// How a node of an instance is moved: p' = p + along * (slope * dot(up, p) + offset). Of the bend's curve this is the
 /// tangent at the node's centre: at most sway (size of the node / height)^2 off. |p' - p| <= Instance::sway for all p
-/// between foot and top.
+/// between foot and top. Distances become longer by no more than lod::longestIn says, which errors are multiplied by;
+/// normals follow the inverse transpose (nodeNormal); discs and curves keep their radii.
 struct Bend {
     glm::dvec3 along{0}, up{0};
     double slope = 0, offset = 0;

@@ -21,7 +21,7 @@ void main() {
     const bool isOneSided = (recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) == 0u;
     if (stepInfo.count != 0u && (node.octantMask & kNodeWide) != 0u &&
         isWideDisc(recordFlags(r), c.z, node.edge * frame.supportScale * radiusFractionFast(recordRadiusCode(r)), wideRadius(frame.width, frame.height) / frame.focal, frame.nearPlane, lens) > 0.5) {
-        if (isOneSided && !(dot(nodeDirection(node, octDirection(r.normal)), sight) < 0.0)) return;
+        if (isOneSided && !(dot(nodeNormal(node, octDirection(r.normal)), sight) < 0.0)) return;
         const WideDisc d = wideDisc(node, r, frame.supportScale, block * kRecordsPerBlock + gl_LocalInvocationID.x, lens);
         if (reachesPicture(d, frame) < 0.5) return;
         const uint place = atomicAdd(discCount, 1u);
@@ -43,7 +43,7 @@ void main() {
         p = vec2(float(s.x), float(s.y));
         key = c.z + s.farther * radius / scale;
     }
-    if (isOneSided && !(dot(nodeDirection(node, octDirection(r.normal)), sight) < 0.0)) return;
+    if (isOneSided && !(dot(nodeNormal(node, octDirection(r.normal)), sight) < 0.0)) return;
     const uint64_t id = drawId(block, gl_LocalInvocationID.x);
     atomicMin(visibility[uint(p.y) * frame.width + uint(p.x)], visibilityKey(floatBitsToUint(key), id));
 }

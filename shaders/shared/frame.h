@@ -26,14 +26,59 @@ struct DrawNode {
 
 const uint kNodeTurned = 256u;  // the store's own axes are not those of the world
 const uint kNodeWide = 512u;    // points of it may be wide discs (wide_disc.h)
+const uint kNodeBent = 1024u;   // wind shears it: directions are not as long as they were, normals are no tangents
 
-// A direction of the store (a normal, a tangent) in camera space; as long as it was. Instances are scaled evenly.
+// A tangent of the store in camera space; as long as it was where nothing is bent. Instances are scaled evenly.
 SHARED_FN vec3 nodeDirection(DrawNode node, vec3 n) {
     const vec3 x = node.axisX;
     const float inverse = 1.0f / sqrt(x.x * x.x + x.y * x.y + x.z * x.z);
     return vec3((x.x * n.x + node.axisY.x * n.y + node.axisZ.x * n.z) * inverse,
                 (x.y * n.x + node.axisY.y * n.y + node.axisZ.y * n.z) * inverse,
                 (x.z * n.x + node.axisY.z * n.y + node.axisZ.z * n.z) * inverse);
+}
+
+// The same of normals. They stand on surfaces: where wind shears those, normals follow the inverse transpose of what
+// tangents follow, which is the matrix of cofactors but for its scale. Of any length where a node is bent.
+struct NormalAxes {
+    vec3 x;
+    vec3 y;
+    vec3 z;
+    float scale;
+};
+SHARED_FN vec3 crossed(vec3 a, vec3 b, float scale) {
+    return vec3((a.y * b.z - a.z * b.y) * scale, (a.z * b.x - a.x * b.z) * scale, (a.x * b.y - a.y * b.x) * scale);
+}
+SHARED_FN NormalAxes normalAxes(DrawNode node) {
+    const vec3 x = node.axisX;
+    const float inverse = 1.0f / sqrt(x.x * x.x + x.y * x.y + x.z * x.z);
+    const bool isBent = (node.octantMask & kNodeBent) != 0u;
+    // First to a length of about 1: products of three lengths do not fit into a float.
+    const vec3 a = vec3(x.x * inverse, x.y * inverse, x.z * inverse);
+    const vec3 b = vec3(node.axisY.x * inverse, node.axisY.y * inverse, node.axisY.z * inverse);
+    const vec3 c = vec3(node.axisZ.x * inverse, node.axisZ.y * inverse, node.axisZ.z * inverse);
+    const vec3 bc = crossed(b, c, 1.0f);
+    const float side = a.x * bc.x + a.y * bc.y + a.z * bc.z < 0.0f ? -1.0f : 1.0f;  // of a mirrored placement
+    const vec3 ca = crossed(c, a, side);
+    const vec3 ab = crossed(a, b, side);
+    NormalAxes n;
+    n.x = vec3(isBent ? bc.x * side : x.x, isBent ? bc.y * side : x.y, isBent ? bc.z * side : x.z);
+    n.y = vec3(isBent ? ca.x : node.axisY.x, isBent ? ca.y : node.axisY.y, isBent ? ca.z : node.axisY.z);
+    n.z = vec3(isBent ? ab.x : node.axisZ.x, isBent ? ab.y : node.axisZ.y, isBent ? ab.z : node.axisZ.z);
+    n.scale = isBent ? 1.0f : inverse;
+    return n;
+}
+SHARED_FN vec3 nodeNormal(DrawNode node, vec3 n) {
+    const NormalAxes m = normalAxes(node);
+    return vec3((m.x.x * n.x + m.y.x * n.y + m.z.x * n.z) * m.scale,
+                (m.x.y * n.x + m.y.y * n.y + m.z.y * n.z) * m.scale,
+                (m.x.z * n.x + m.y.z * n.y + m.z.z * n.z) * m.scale);
+}
+// Unit, of a unit normal.
+SHARED_FN vec3 nodeUnitNormal(DrawNode node, vec3 unit) {
+    const vec3 n = nodeNormal(node, unit);
+    const bool isBent = (node.octantMask & kNodeBent) != 0u;
+    const float shorten = isBent ? 1.0f / sqrt(max(n.x * n.x + n.y * n.y + n.z * n.z, 1.0e-37f)) : 1.0f;
+    return vec3(isBent ? n.x * shorten : n.x, isBent ? n.y * shorten : n.y, isBent ? n.z * shorten : n.z);
 }
 
 // One block of 256 draw ids.

@@ -160,8 +160,8 @@ SHARED_FN vec3 recordPlace(DrawNode node, PointRecord r) {
 SHARED_FN vec3 discNormal(DrawNode node, PointRecord r, Lens lens) {
     const vec3 c = sightTo(lens, recordPlace(node, r));
     const float inverse = -1.0f / sqrt(max(dot(c, c), 1.0e-37f));
-    vec3 n = nodeDirection(node, octDecode(r.normal));
-    // Wind shears: of nodes that it bends, directions are not as long as they were.
+    vec3 n = nodeNormal(node, octDecode(r.normal));
+    // Wind shears: of nodes that it bends, normals are not as long as they were.
     const float shorten = 1.0f / sqrt(max(dot(n, n), 1.0e-37f));
     const float scale = (node.octantMask & kNodeTurned) != 0u ? shorten : 1.0f;
     n = vec3(n.x * scale, n.y * scale, n.z * scale);
