@@ -1,5 +1,16 @@
 // Discs drawn exactly (shaders/shared/splat_disc.h). Included by kernels.inl, once per instruction set.
 
+/// Normals of what wind bends are not as long as they were.
+inline void makeUnit(size_t count, float* __restrict x, float* __restrict y, float* __restrict z) {
+#pragma GCC ivdep
+    for (size_t i = 0; i < count; ++i) {
+        const float shorten = 1.0f / std::sqrt(max(x[i] * x[i] + y[i] * y[i] + z[i] * z[i], 1.0e-37f));
+        x[i] *= shorten;
+        y[i] *= shorten;
+        z[i] *= shorten;
+    }
+}
+
 void placeSplats(const FrameConstants& frame, const DrawNode& drawNode, const PointRecord* records, uint32_t count,
                  SplatBlock& out) {
     const FrameConstants f = frame;
@@ -60,16 +71,7 @@ void placeSplats(const FrameConstants& frame, const DrawNode& drawNode, const Po
         out.lastY[i] = int(min(max(y1, 0.0f), lastY));
         out.keep[i] = keep ? (isNear ? 2u : 1u) : 0u;
     }
-    if ((node.octantMask & kNodeBent) != 0u) {  // normals are not as long as they were
-#pragma GCC ivdep
-        for (size_t i = 0; i < count; ++i) {
-            const float nx = out.nx[i], ny = out.ny[i], nz = out.nz[i];
-            const float shorten = 1.0f / std::sqrt(max(nx * nx + ny * ny + nz * nz, 1.0e-37f));
-            out.nx[i] = nx * shorten;
-            out.ny[i] = ny * shorten;
-            out.nz[i] = nz * shorten;
-        }
-    }
+    if ((node.octantMask & kNodeBent) != 0u) makeUnit(count, out.nx, out.ny, out.nz);
     // Those about the eye, one by one.
     for (size_t i = 0; i < count; ++i) {
         if (out.keep[i] != 2u) continue;

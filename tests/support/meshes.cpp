@@ -83,7 +83,9 @@ lod::Chunk chunkOf(const lod::Store& store, uint32_t node) {
     return std::move(*chunk);
 }
 
-glm::dvec3 closest(const glm::dvec3& p, const Triangle& t) {
+}  // namespace
+
+glm::dvec3 closestPlace(const Triangle& t, const glm::dvec3& p) {
     // The plane's point if it lies inside, else the nearest of the edges' points.
     const glm::dvec3 n = glm::cross(t[1] - t[0], t[2] - t[0]);
     const double n2 = glm::dot(n, n);
@@ -103,8 +105,6 @@ glm::dvec3 closest(const glm::dvec3& p, const Triangle& t) {
     }
     return best;
 }
-
-}  // namespace
 
 std::vector<Triangle> leafTriangles(const lod::Store& store) {
     std::vector<Triangle> out;
@@ -158,7 +158,7 @@ double largestDistance(const std::vector<Triangle>& from, const std::vector<Tria
                         const auto found = grid.find({x, y, z});
                         if (found == grid.end()) continue;
                         for (const uint32_t i : found->second)
-                            best = std::min(best, glm::length(closest(p, to[i]) - p));
+                            best = std::min(best, glm::length(closestPlace(to[i], p) - p));
                     }
         return best;
     };

@@ -22,6 +22,7 @@ std::shared_ptr<const lod::Store> growMeshStore(const MeshRecipe& recipe, const 
 
 /// Three corners each, world space.
 using Triangle = std::array<glm::dvec3, 3>;
+glm::dvec3 closestPlace(const Triangle& triangle, const glm::dvec3& place);
 /// All triangles of the input, as the store keeps them.
 std::vector<Triangle> leafTriangles(const lod::Store& store);
 /// The cut of one error everywhere: runs whose own error is at most `code`, in groups whose error is larger.
