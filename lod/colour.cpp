@@ -190,14 +190,14 @@ std::string categoryName(const ColourBy& by, double value) {
 void recolour(const ColourBy& by, const Store& store, uint32_t index, Chunk& chunk,
               const std::vector<uint8_t>& values) {
     const Hierarchy& h = store.hierarchy;
-    const Node& node = h.nodes[index];
+    const Payload& payload = h.payload(index);
     const auto set = [](shared::PointRecord& r, uint32_t rgb) { r.colour = (r.colour & 0xff000000u) | rgb; };
     if (by.mode == ColourMode::normal) {
         for (shared::PointRecord& r : chunk.records) set(r, normalColour(r));
     } else if (by.mode == ColourMode::height) {
         const glm::dvec3& up = by.up;
-        const double base = glm::dot(up, h.origin + h.unit * h.recordOrigin(node));
-        const glm::dvec3 step = up * (h.unit * std::exp2(node.stepShift));
+        const double base = glm::dot(up, h.origin + h.unit * h.recordOrigin(h.nodes[h.nodeOf(index)], payload));
+        const glm::dvec3 step = up * (h.unit * std::exp2(payload.stepShift));
         for (shared::PointRecord& r : chunk.records) {
             const glm::dvec3 q(shared::recordX(r), shared::recordY(r), shared::recordZ(r));
             set(r, colourOf(by, base + glm::dot(step, q)));

@@ -34,7 +34,7 @@ constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max();
 
 CutCost costOf(const CutFrame& frame, uint32_t i, int step, uint64_t most, Counted counted = Counted::all,
                ActiveMembers* members = nullptr) {
-    return traitsOf(frame.hierarchyOf(i)).cutCost(frame, i, step, most, counted, members);
+    return shapeOf(frame.hierarchyOf(i)).cutCost(frame, i, step, most, counted, members);
 }
 
 /// Once for a scene: there may be so many instances that only to look at them takes milliseconds.
@@ -164,7 +164,7 @@ void emitBest(const CutFrame& frame, uint32_t i, int step, ActiveMembers& member
         best = i;
     }
     cut.counters.standIns += best != i ? 1 : 0;
-    traitsOf(frame.hierarchyOf(best)).cutEmit(frame, best, step, members, cut);
+    shapeOf(frame.hierarchyOf(best)).cutEmit(frame, best, step, members, cut);
 }
 
 /// Members of instance groups are drawn from one moment to the next: the roots of their stores are always wanted.

@@ -65,7 +65,7 @@ struct CutScene {
     std::span<const Crowd> crowds;  ///< by Instance::crowd
 };
 
-/// One byte per node of each source's hierarchy: 1 where the chunk can be drawn.
+/// One byte per chunk of each source's hierarchy: 1 where it can be drawn.
 struct Residency {
     std::span<const std::vector<uint8_t>> drawable;
 };
@@ -75,8 +75,10 @@ struct Budgets {
     uint64_t records = std::numeric_limits<uint64_t>::max();  ///< records and triangles drawn at most
 };
 
+/// Of a payload of points or curves.
 struct CutDraw {
     uint32_t instance = 0, node = 0;
+    uint32_t chunk = 0;       ///< that holds the records
     uint32_t count = 0;       ///< first records of the chunk
     uint32_t errorCode = 0;   ///< draw records with own error <= this ...
     uint32_t octantMask = 0;  ///< ... and all records of these octants
@@ -84,16 +86,17 @@ struct CutDraw {
     float radiusScale = 1;    ///< of a progressive store: discs drawn are larger than stored
 };
 
-/// Clusters of a mesh store: one run of one group.
+/// Clusters of triangles: one run of one group.
 struct CutMeshDraw {
     uint32_t instance = 0, node = 0;
+    uint32_t chunk = 0;
     uint32_t firstCluster = 0, clusters = 0, triangles = 0;
     float errorPixels = 0;
 };
 
 struct CutWanted {
-    uint32_t source = 0, node = 0;
-    float priority = 0;  ///< pixels of error that this chunk would remove, parents always above children
+    uint32_t source = 0, chunk = 0;
+    float priority = 0;  ///< pixels of error that it would remove, parents always above children
 };
 
 struct CutCounters {
@@ -102,10 +105,10 @@ struct CutCounters {
 };
 
 struct Cut {
-    std::vector<CutDraw> draw;                        ///< sorted by instance, then node
-    std::vector<CutMeshDraw> meshDraw;                ///< sorted by instance, then node
+    std::vector<CutDraw> draw;                        ///< sorted by instance, node, then chunk
+    std::vector<CutMeshDraw> meshDraw;                ///< sorted by instance, node, then chunk
     std::vector<CutWanted> wanted;                    ///< chunks that the full cut needs and that are not drawable
-    std::vector<std::pair<uint32_t, uint32_t>> keep;  ///< (source, node) that must not be evicted
+    std::vector<std::pair<uint32_t, uint32_t>> keep;  ///< (source, chunk) that must not be evicted
     double tauTarget = 0;                             ///< error, px, that the budget allows once everything is resident
     double tauEffective = 0;                          ///< error, px, delivered by what is drawn now
     bool truncated = false;  ///< even the roots exceed the record budget: some of their records are left out

@@ -6,7 +6,7 @@
 
 #include "lod/cut.h"
 #include "lod/cut_view.h"
-#include "lod/kinds.h"
+#include "lod/primitives/kinds.h"
 
 namespace stipple::lod {
 
@@ -73,15 +73,26 @@ inline double pixelsOf(const CutScratch::Slot& slot, uint32_t code, int32_t epsi
     return epsilon == kInside ? 1e6 : error * std::exp2(-static_cast<double>(epsilon) / kStepsPerOctave);
 }
 
-/// Entries of kinds.h, in a file each.
-CutCost costOfPoints(const CutFrame& frame, uint32_t instance, int step, uint64_t most, Counted counted,
-                     ActiveMembers* members);
-void emitPoints(const CutFrame& frame, uint32_t instance, int step, ActiveMembers& members, Cut& cut);
+/// Error, px, of what is drawn of a payload whose largest own error is `errorCode`.
+inline double deliveredPixels(const CutScratch::Slot& slot, uint32_t errorCode, const Asked& asked) {
+    const uint32_t drawn = asked.octantMask ? errorCode : std::min(errorCode, asked.code);
+    return pixelsOf(slot, drawn, drawn > asked.largestCode ? kInside : asked.epsilon);
+}
+
+/// Entries of kinds.h: what cuts of octrees have of payloads ...
+uint64_t costOfRecords(const Hierarchy& h, uint32_t chunk, const Asked& asked);
+void emitRecords(const CutFrame& frame, uint32_t instance, uint32_t chunk, const Asked& asked, Cut& cut);
+uint64_t costOfClusters(const Hierarchy& h, uint32_t chunk, const Asked& asked);
+void emitClusters(const CutFrame& frame, uint32_t instance, uint32_t chunk, const Asked& asked, Cut& cut);
+/// ... and the cuts of stores of each shape.
+CutCost costOfTree(const CutFrame& frame, uint32_t instance, int step, uint64_t most, Counted counted,
+                   ActiveMembers* members);
+void emitTree(const CutFrame& frame, uint32_t instance, int step, ActiveMembers& members, Cut& cut);
 CutCost costOfProgressive(const CutFrame& frame, uint32_t instance, int step, uint64_t most, Counted counted,
                           ActiveMembers* members);
 void emitProgressive(const CutFrame& frame, uint32_t instance, int step, ActiveMembers& members, Cut& cut);
-CutCost costOfTriangles(const CutFrame& frame, uint32_t instance, int step, uint64_t most, Counted counted,
-                        ActiveMembers* members);
-void emitTriangles(const CutFrame& frame, uint32_t instance, int step, ActiveMembers& members, Cut& cut);
+CutCost costOfGraph(const CutFrame& frame, uint32_t instance, int step, uint64_t most, Counted counted,
+                    ActiveMembers* members);
+void emitGraph(const CutFrame& frame, uint32_t instance, int step, ActiveMembers& members, Cut& cut);
 
 }  // namespace stipple::lod

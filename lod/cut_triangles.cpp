@@ -1,5 +1,7 @@
-// The cut of triangles: groups are refined or not, all of a group's clusters at once (lod/mesh.h).
+// The cut of a graph of groups of triangles: groups are refined or not, all of a group's clusters at once (lod/mesh.h);
+// and what the cut of an octree has of a payload of triangles.
 #include <algorithm>
+#include <span>
 
 #include "lod/cut_frame.h"
 
@@ -127,8 +129,8 @@ void wantTiles(const CutFrame& frame, uint32_t instance, bool isWhole, Cut& cut)
 
 }  // namespace
 
-CutCost costOfTriangles(const CutFrame& frame, uint32_t i, int step, uint64_t /*most*/, Counted counted,
-                        ActiveMembers* /*members*/) {
+CutCost costOfGraph(const CutFrame& frame, uint32_t i, int step, uint64_t /*most*/, Counted counted,
+                    ActiveMembers* /*members*/) {
     const std::vector<uint8_t>& drawable = frame.drawableOf(i);
     CutCost cost;
     refineGroups(frame, i, step, [&](uint32_t index, int32_t) {
@@ -140,7 +142,7 @@ CutCost costOfTriangles(const CutFrame& frame, uint32_t i, int step, uint64_t /*
     return cost;
 }
 
-void emitTriangles(const CutFrame& frame, uint32_t instance, int step, ActiveMembers& /*members*/, Cut& cut) {
+void emitGraph(const CutFrame& frame, uint32_t instance, int step, ActiveMembers& /*members*/, Cut& cut) {
     const Hierarchy& h = frame.hierarchyOf(instance);
     const CutScratch::Slot& slot = slotOf(frame, instance);
     const uint32_t source = frame.instance(instance).source;
@@ -170,11 +172,47 @@ void emitTriangles(const CutFrame& frame, uint32_t instance, int step, ActiveMem
             isExact ? 0
                     : pixelsOf(slot, h.nodes[run.producer].errorCode, epsilonOf(frame, h, slot, run.producer, kInside));
         cut.meshDraw.push_back(
-            {instance, index, run.firstCluster, run.clusters, run.triangles, static_cast<float>(pixels)});
+            {instance, index, index, run.firstCluster, run.clusters, run.triangles, static_cast<float>(pixels)});
         cut.counters.trianglesDrawn += run.triangles;
         cut.counters.nodesDrawn += index != last ? 1 : 0;
         last = index;
     });
+}
+
+// ---- in an octree: all triangles of a payload have one error, and its parent's; a run stands in an octant
+
+namespace {
+
+/// Calls use(run) for the runs of a payload that are drawn.
+template <typename Use>
+void askedRuns(const Hierarchy& h, const Payload& p, const Asked& asked, const Use& use) {
+    if (h.countGreater(p.parentCounts, p.records, asked.parentCode) == 0) return;
+    const bool isFine = h.countGreater(p.ownCounts, p.records, asked.code) == 0;
+    const MeshGroup& g = h.groups[p.group];
+    for (const MeshRun& run : std::span(h.runs).subspan(g.firstRun, g.runs))
+        if (isFine || (asked.octantMask >> run.producer & 1u) != 0) use(run);
+}
+
+}  // namespace
+
+uint64_t costOfClusters(const Hierarchy& h, uint32_t chunk, const Asked& asked) {
+    uint64_t triangles = 0;
+    askedRuns(h, h.payload(chunk), asked, [&](const MeshRun& run) { triangles += run.triangles; });
+    return triangles;
+}
+
+void emitClusters(const CutFrame& frame, uint32_t i, uint32_t chunk, const Asked& asked, Cut& cut) {
+    const Hierarchy& h = frame.hierarchyOf(i);
+    const Payload& p = h.payload(chunk);
+    const double delivered = deliveredPixels(slotOf(frame, i), p.errorCode, asked);
+    const size_t before = cut.meshDraw.size();
+    askedRuns(h, p, asked, [&](const MeshRun& run) {
+        if (asked.octantMask) cut.tauEffective = std::max(cut.tauEffective, delivered);
+        cut.meshDraw.push_back(
+            {i, h.nodeOf(chunk), chunk, run.firstCluster, run.clusters, run.triangles, static_cast<float>(delivered)});
+        cut.counters.trianglesDrawn += run.triangles;
+    });
+    cut.counters.nodesDrawn += cut.meshDraw.size() > before ? 1 : 0;
 }
 
 }  // namespace stipple::lod

@@ -11,6 +11,7 @@
 
 #include "lod/mesh.h"
 #include "lod/primitives.h"
+#include "lod/primitives/payload.h"
 #include "shaders/shared/strand.h"
 
 namespace stipple::lod {
@@ -42,29 +43,23 @@ struct ErrorScale {
     }();
 };
 
-/// Records of a node with a code greater than c, for every c: a step function over a short range of codes.
-struct CodeCounts {
-    uint32_t first = 0;      ///< into Hierarchy::greaterThan
-    uint8_t lo = 0, hi = 0;  ///< codes below lo: all records; from hi on: none
-};
-
-struct Node {
-    glm::dvec3 centre{0};  ///< bounding sphere, lattice units; encloses the discs and the spheres of the children
+/// A node, with the first of its payloads (most have no other; those that have: Hierarchy::further).
+struct Node : Payload {
+    glm::dvec3 centre{0};  ///< bounding sphere, lattice units; encloses all payloads and the spheres of the children
     double radius = 0;
     uint32_t parent = 0, firstChild = 0;  ///< children are contiguous, in octant order
-    uint32_t records = 0;
-    uint32_t chunkBytes = 0;  ///< compressed
-    uint64_t chunkOffset = 0, chunkHash = 0;
-    uint64_t attributeHash = 0;
-    uint32_t attributeBytes = 0;     ///< the attribute streams follow the chunk
-    std::array<uint64_t, 3> cell{};  ///< index of the node's cell at its level
+    std::array<uint64_t, 3> cell{};       ///< index of the node's cell at its level
     uint8_t level = 0, childMask = 0;
-    uint8_t errorCode = 0;  ///< largest own error among the records
-    int8_t stepShift = 0;   ///< position step of the records: 2^stepShift lattice units = cell / 65536
-    CodeCounts parentCounts, ownCounts;
+    uint8_t furtherPayloads = 0;
+    uint32_t firstFurther = 0;    ///< into Hierarchy::further
     uint32_t normalCone = 0;      ///< axis, octahedral
     float normalConeCosine = -1;  ///< cosine of the half-angle; -1: all directions
     bool isLeaf() const { return childMask == 0; }
+};
+
+/// A payload that is not the first of its node.
+struct FurtherPayload : Payload {
+    uint32_t node = 0;
 };
 
 struct Hierarchy {
@@ -72,18 +67,24 @@ struct Hierarchy {
     double unit = 1;        ///< world units per lattice step
     uint32_t rootLog2 = 0;  ///< the root's cell has 2^rootLog2 lattice steps along each axis
     ErrorScale errors;
-    std::vector<Node> nodes;            ///< breadth first; node 0 is the root
-    std::vector<uint32_t> greaterThan;  ///< see CodeCounts
-    // Only of a mesh store: nodes are groups (lod/mesh.h), parents before children; `records` counts triangles and
-    // `errorCode` is what a view that does not refine the group would see; cells, children and counts are not used.
-    std::vector<MeshGroup> groups;  ///< one a node
+    std::vector<Node> nodes;              ///< breadth first; node 0 is the root
+    std::vector<uint32_t> greaterThan;    ///< see CodeCounts
+    std::vector<FurtherPayload> further;  ///< of the nodes that have several payloads, in the order of the nodes
+    std::vector<Stream> streams;          ///< beside records and attributes
+    /// Nodes are no octree but groups of triangles (lod/mesh.h), parents before children; `records` counts triangles
+    /// and `errorCode` is what a view that does not refine the group would see; cells, children and counts are not
+    /// used.
+    bool isGraph = false;
+    bool isMixed = false;  ///< payloads are of several kinds, or some nodes have several
+    // Of payloads of triangles:
+    std::vector<MeshGroup> groups;  ///< of a graph one a node
     std::vector<MeshRun> runs;
     std::vector<uint32_t> parents;
     std::vector<uint32_t> groupTextures;  ///< see MeshGroup
     std::vector<shared::TextureInfo> textures;
-    std::vector<TextureTile> tiles;  ///< streamed like chunks: tile t is chunk nodes.size() + t
-    bool isStrands = false;          ///< records are segments of ribbons and tubes
-    bool isRigid = false;            ///< such that wind does not bend
+    std::vector<TextureTile> tiles;
+    bool isStrands = false;  ///< all records are segments of ribbons and tubes
+    bool isRigid = false;    ///< such that wind does not bend
     /// Records of a node are discs of one size, in an order in which any beginning shows the whole: n of them stand for
     /// all, sqrt(records / n) times as large. Error codes are those of the radius.
     bool isProgressive = false;
@@ -102,8 +103,36 @@ struct Hierarchy {
     }
     /// Cells of records reach beyond those of nodes: by half a cell on each side.
     bool isLoose() const { return isStrands || isProgressive; }
-    bool isMesh() const { return !groups.empty(); }
-    size_t chunks() const { return nodes.size() + tiles.size(); }
+    bool isMesh() const { return isGraph; }
+
+    // A CHUNK is what is loaded at once: of node n its first payload is chunk n; then come the tiles of textures, then
+    // the further payloads.
+    size_t chunks() const { return nodes.size() + tiles.size() + further.size(); }
+    bool isTile(uint32_t chunk) const { return chunk >= nodes.size() && chunk - nodes.size() < tiles.size(); }
+    uint32_t chunkOfFurther(uint32_t k) const { return static_cast<uint32_t>(nodes.size() + tiles.size()) + k; }
+    /// Of a chunk that is no tile.
+    const Payload& payload(uint32_t chunk) const {
+        if (chunk < nodes.size()) return nodes[chunk];
+        return further[chunk - nodes.size() - tiles.size()];
+    }
+    uint32_t nodeOf(uint32_t chunk) const {
+        return chunk < nodes.size() ? chunk : further[chunk - nodes.size() - tiles.size()].node;
+    }
+    /// Calls use(chunk) for every payload of a node.
+    template <typename Use>
+    void forEachPayload(uint32_t node, const Use& use) const {
+        use(node);
+        if (further.empty()) return;
+        const Node& n = nodes[node];
+        for (uint32_t k = 0; k < n.furtherPayloads; ++k) use(chunkOfFurther(n.firstFurther + k));
+    }
+    /// Largest own error of a node's payloads: what its children take away.
+    uint32_t errorCodeOf(uint32_t node) const {
+        uint32_t code = nodes[node].errorCode;
+        if (!further.empty())
+            forEachPayload(node, [&](uint32_t chunk) { code = std::max<uint32_t>(code, payload(chunk).errorCode); });
+        return code;
+    }
 
     /// Records with a code > `code`.
     uint32_t countGreater(const CodeCounts& c, uint32_t records, uint32_t code) const {
@@ -113,10 +142,11 @@ struct Hierarchy {
     double cellSize(const Node& n) const { return std::exp2(static_cast<double>(rootLog2) - n.level); }
     /// Lattice position that record coordinate (0,0,0) stands for: the centre of the lattice steps that the
     /// first position step holds.
-    glm::dvec3 recordOrigin(const Node& n) const {
-        if (isLoose())
+    glm::dvec3 recordOrigin(const Node& n) const { return recordOrigin(n, n); }
+    glm::dvec3 recordOrigin(const Node& n, const Payload& p) const {
+        if (isLoose() || (isMixed && p.stepShift == static_cast<int>(rootLog2) - n.level - 15))
             return (glm::dvec3(n.cell[0], n.cell[1], n.cell[2]) - double{shared::kStrandMargin}) * cellSize(n);
-        const double size = cellSize(n), half = n.stepShift > 0 ? 0.5 * (std::exp2(n.stepShift) - 1) : 0.0;
+        const double size = cellSize(n), half = p.stepShift > 0 ? 0.5 * (std::exp2(p.stepShift) - 1) : 0.0;
         return glm::dvec3(n.cell[0], n.cell[1], n.cell[2]) * size + glm::dvec3(half);
     }
 };

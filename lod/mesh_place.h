@@ -17,6 +17,12 @@ inline constexpr uint32_t kWideMeshBits = 62;
 
 using MeshPlace = std::array<int64_t, 3>;
 
+/// The node that says how vertices of triangles are counted: their group's. In octrees they are counted from zero.
+inline const Node& meshNode(const Hierarchy& h, uint32_t node) {
+    static const Node plain;
+    return h.isGraph ? h.nodes[node] : plain;
+}
+
 /// Lattice point that the vertices of a group are counted from.
 inline MeshPlace meshOrigin(const Node& node) {
     MeshPlace origin{};

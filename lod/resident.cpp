@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "lod/kinds.h"
+#include "lod/primitives/kinds.h"
 
 namespace stipple::lod {
 namespace {
@@ -27,15 +27,16 @@ class Planner {
     /// The chunks that `cut` keeps, and no others; what they take.
     void keepOnly(const Cut& cut) {
         fill(0);
-        for (const auto& [source, node] : cut.keep)
-            if (!std::exchange(plan_.chunks[source][node], uint8_t{1})) plan_.bytes += decodedBytes(*of_[source], node);
+        for (const auto& [source, chunk] : cut.keep)
+            if (!std::exchange(plan_.chunks[source][chunk], uint8_t{1}))
+                plan_.bytes += decodedBytes(*of_[source], chunk);
     }
     bool fits() const { return plan_.bytes <= residentBytes_; }
 
     void beginRounds(std::span<const std::pair<uint32_t, uint32_t>> barred) {
         fill(0);
         asked_ = plan_.chunks;
-        for (const auto& [source, node] : barred) asked_[source][node] = 1;
+        for (const auto& [source, chunk] : barred) asked_[source][chunk] = 1;
     }
     /// Takes in what `cut` misses and what fits; false if that is nothing.
     bool takeIn(const Cut& cut) {
@@ -43,18 +44,18 @@ class Planner {
         std::sort(wanted_.begin(), wanted_.end(), isMoreUrgent);
         bool isLean = false, grew = false;
         for (const CutWanted& w : wanted_) {
-            if (asked_[w.source][w.node] || !hasParents(w)) continue;
-            const uint64_t bytes = decodedBytes(*of_[w.source], w.node);
+            if (asked_[w.source][w.chunk] || !hasParents(w)) continue;
+            const uint64_t bytes = decodedBytes(*of_[w.source], w.chunk);
             if (plan_.bytes + bytes > residentBytes_ && !isLean) {
                 const std::vector<std::vector<uint8_t>> before = plan_.chunks;
                 keepOnly(cut);
                 for (const CutWanted& taken : wanted_) {  // of this round
                     if (&taken == &w) break;
-                    if (before[taken.source][taken.node] && !plan_.chunks[taken.source][taken.node]) add(taken);
+                    if (before[taken.source][taken.chunk] && !plan_.chunks[taken.source][taken.chunk]) add(taken);
                 }
                 isLean = true;
             }
-            asked_[w.source][w.node] = 1;
+            asked_[w.source][w.chunk] = 1;
             if (plan_.bytes + bytes > residentBytes_) continue;
             add(w);
             grew = true;
@@ -64,15 +65,14 @@ class Planner {
 
   private:
     void add(const CutWanted& w) {
-        plan_.chunks[w.source][w.node] = 1;
-        plan_.bytes += decodedBytes(*of_[w.source], w.node);
+        plan_.chunks[w.source][w.chunk] = 1;
+        plan_.bytes += decodedBytes(*of_[w.source], w.chunk);
     }
     /// Is there all that the chunk builds on?
     bool hasParents(const CutWanted& w) const {
-        const Hierarchy& h = *of_[w.source];
-        if (w.node >= h.nodes.size()) return true;  // a texture tile
-        const std::span<const uint32_t> parents = traitsOf(h).dependsOn(h, w.node);
-        return std::all_of(parents.begin(), parents.end(), [&](uint32_t p) { return plan_.chunks[w.source][p] != 0; });
+        bool all = true;
+        forEachRequired(*of_[w.source], w.chunk, [&](uint32_t chunk) { all = all && plan_.chunks[w.source][chunk]; });
+        return all;
     }
 
     uint64_t residentBytes_;
@@ -85,7 +85,7 @@ class Planner {
 /// Chunks, each once.
 uint64_t countOf(std::vector<CutWanted> wanted) {
     const auto byChunk = [](const CutWanted& a, const CutWanted& b) {
-        return a.source != b.source ? a.source < b.source : a.node < b.node;
+        return a.source != b.source ? a.source < b.source : a.chunk < b.chunk;
     };
     std::sort(wanted.begin(), wanted.end(), byChunk);
     uint64_t count = 0;
@@ -101,7 +101,7 @@ void planResident(const CutScene& scene, const View& view, const Budgets& budget
     Planner planner(scene, residentBytes, plan);
     plan.refused = 0;
     planner.fill(1);
-    for (const auto& [source, node] : barred) plan.chunks[source][node] = 0;
+    for (const auto& [source, chunk] : barred) plan.chunks[source][chunk] = 0;
     selectCut(scene, {plan.chunks}, view, budgets, scratch, cut);
     planner.keepOnly(cut);
     if (planner.fits()) return;

@@ -26,10 +26,10 @@ struct ResidentPlan {
 /// The order in which chunks are taken in: what removes most error first, equals by their numbers.
 inline bool isMoreUrgent(const CutWanted& a, const CutWanted& b) {
     if (a.priority != b.priority) return a.priority > b.priority;
-    return a.source != b.source ? a.source < b.source : a.node < b.node;
+    return a.source != b.source ? a.source < b.source : a.chunk < b.chunk;
 }
 
-/// `plan` and `cut` are filled; their memory is reused. `residentBytes`: of decoded chunks. `barred`: (source, node)
+/// `plan` and `cut` are filled; their memory is reused. `residentBytes`: of decoded chunks. `barred`: (source, chunk)
 /// that cannot be had, e.g. as they cannot be read.
 void planResident(const CutScene& scene, const View& view, const Budgets& budgets, uint64_t residentBytes,
                   std::span<const std::pair<uint32_t, uint32_t>> barred, CutScratch& scratch, Cut& cut,

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
-#include "lod/kinds.h"
 #include "lod/mesh_place.h"
+#include "lod/primitives/codecs.h"
+#include "lod/primitives/kinds.h"
 
 namespace stipple::lod {
 
@@ -40,10 +42,46 @@ bool isPossibleSpace(const Hierarchy& h, const StoreDescription& d) {
     return fits && d.metresPerUnit > 0 && d.metresPerUnit <= kFarthest;
 }
 
-bool isPossiblePlace(const Node& n, uint64_t chunksEnd) {
-    return n.chunkOffset <= chunksEnd && uint64_t{n.chunkBytes} + n.attributeBytes <= chunksEnd - n.chunkOffset &&
-           n.chunkBytes >= kFewestChunkBytes && isWithin(n.centre, kFarthestSteps) && n.radius >= 0 &&
-           n.radius <= kFarthestSteps && std::abs(n.normalConeCosine) <= 1 && n.records > 0;
+bool isPossiblePlace(const Node& n) {
+    return isWithin(n.centre, kFarthestSteps) && n.radius >= 0 && n.radius <= kFarthestSteps &&
+           std::abs(n.normalConeCosine) <= 1;
+}
+
+/// Does a payload lie in the file, and can its bytes hold its records?
+bool isPossiblePayload(const Hierarchy& h, uint32_t chunk, uint64_t chunksEnd) {
+    const Payload& p = h.payload(chunk);
+    const CodecTraits& codec = traitsOf(p.codec);
+    bool fits = p.chunkOffset <= chunksEnd && uint64_t{p.chunkBytes} + p.attributeBytes <= chunksEnd - p.chunkOffset &&
+                p.chunkBytes >= kFewestChunkBytes && p.records > 0 && codec.kind == p.kind;
+    for (uint32_t k = p.firstStream; k < p.firstStream + p.streams; ++k)
+        fits = fits && h.streams[k].offset <= chunksEnd && h.streams[k].bytes <= chunksEnd - h.streams[k].offset;
+    return fits && isPossibleGain(p.chunkBytes, codec.fewestBytes(h, chunk));
+}
+
+/// No byte of the file is in two streams: what they hold together is no more than the file is.
+Result<void> checkOverlaps(const Store& store) {
+    const Hierarchy& h = store.hierarchy;
+    std::vector<std::pair<uint64_t, uint64_t>> ranges;
+    ranges.reserve(h.nodes.size() + h.further.size() + h.streams.size());
+    bool isRising = true;
+    const auto add = [&](uint64_t offset, uint64_t bytes) {
+        if (bytes == 0) return;
+        isRising = isRising && (ranges.empty() || ranges.back().second <= offset);
+        ranges.emplace_back(offset, offset + bytes);
+    };
+    for (uint32_t n = 0; n < h.nodes.size(); ++n)
+        h.forEachPayload(n, [&](uint32_t chunk) {
+            const Payload& p = h.payload(chunk);
+            add(p.chunkOffset, uint64_t{p.chunkBytes} + p.attributeBytes);
+        });
+    for (const Stream& s : h.streams) add(s.offset, s.bytes);
+    if (isRising) return {};
+    std::sort(ranges.begin(), ranges.end());
+    for (size_t i = 1; i < ranges.size(); ++i)
+        if (ranges[i].first < ranges[i - 1].second)
+            return tl::unexpected(damagedStore(
+                store.path, fmt::format("two streams share the bytes at offset {}: not possible", ranges[i].first)));
+    return {};
 }
 
 bool isPossibleMaterial(const shared::SurfaceMaterial& m, size_t textures) {
@@ -60,7 +98,9 @@ bool isPossibleMaterial(const shared::SurfaceMaterial& m, size_t textures) {
 Result<void> checkTextures(const Store& store, uint64_t chunksEnd) {
     const Hierarchy& h = store.hierarchy;
     uint64_t tiles = 0;
-    bool fits = h.isMesh() || h.tiles.size() + h.textures.size() + h.runs.size() + h.parents.size() == 0;
+    bool fits = h.isGraph || h.tiles.size() + h.textures.size() + h.groupTextures.size() + h.parents.size() +
+                                     (h.groups.empty() ? h.runs.size() : 0) ==
+                                 0;
     for (const shared::TextureInfo& t : h.textures) {
         fits = fits && t.width > 0 && t.height > 0 && t.width <= 65536 && t.height <= 65536 && t.levels > 0 &&
                t.levels <= shared::kTextureLevels && t.wrapU <= 2 && t.wrapV <= 2;
@@ -87,9 +127,9 @@ Result<void> checkGroups(const Store& store, uint64_t chunksEnd) {
     for (size_t i = 0; i < h.nodes.size(); ++i) {
         const Node& n = h.nodes[i];
         const MeshGroup& g = h.groups[i];
-        bool fits = isPossiblePlace(n, chunksEnd) && n.attributeBytes == 0 && n.isLeaf() && g.runs > 0 &&
-                    g.firstRun == runs && g.firstParent == parents && g.firstTexture == textures &&
-                    (g.parents > 0) == (n.errorCode != 255) && (i > 0 || g.parents == 0);
+        bool fits = isPossiblePlace(n) && n.attributeBytes == 0 && n.isLeaf() && g.runs > 0 && g.firstRun == runs &&
+                    g.firstParent == parents && g.firstTexture == textures && (g.parents > 0) == (n.errorCode != 255) &&
+                    (i > 0 || g.parents == 0);
         const bool isWide = h.rootLog2 > kShortMeshBits;
         for (const uint64_t c : n.cell) fits = fits && (c == 0 || isWide);
         fits = fits && (n.stepShift == 0 || (isWide && n.stepShift == 1));
@@ -99,9 +139,7 @@ Result<void> checkGroups(const Store& store, uint64_t chunksEnd) {
         fits = fits && runs <= h.runs.size() && parents <= h.parents.size() && textures <= h.groupTextures.size();
         fits = fits && g.vertices <= uint64_t{g.clusters} * shared::kClusterVertices && g.clusters <= n.records &&
                n.records <= uint64_t{g.clusters} * shared::kClusterTriangles;
-        fits = fits && isPossibleGain(n.chunkBytes, fewestEncodedBytes(g.vertices, sizeof(shared::MeshVertex)) +
-                                                        uint64_t{n.records} * 4 +
-                                                        uint64_t{g.clusters} * sizeof(shared::MeshCluster));
+        fits = fits && isPossiblePayload(h, static_cast<uint32_t>(i), chunksEnd);
         fits = fits && std::isfinite(g.lowU + g.lowV + g.highU + g.highV) && std::isfinite(g.uvPerStep);
         uint64_t triangles = 0, clusters = 0;
         for (uint32_t r = 0; fits && r < g.runs; ++r) {
@@ -123,12 +161,19 @@ Result<void> checkGroups(const Store& store, uint64_t chunksEnd) {
 Result<void> checkNodes(const Store& store, uint64_t chunksEnd) {
     const Hierarchy& h = store.hierarchy;
     const auto& nodes = h.nodes;
-    const uint64_t stride = traitsOf(h).recordBytes;
     uint64_t next = 1;
     for (size_t i = 0; i < nodes.size(); ++i) {
         const Node& n = nodes[i];
-        bool fits = isPossiblePlace(n, chunksEnd) && (i > 0 || n.level == 0) &&
-                    isPossibleGain(n.chunkBytes, fewestEncodedBytes(n.records, stride));
+        bool fits = isPossiblePlace(n) && (i > 0 || n.level == 0) && n.level <= h.rootLog2;
+        h.forEachPayload(static_cast<uint32_t>(i), [&](uint32_t chunk) {
+            const Payload& p = h.payload(chunk);
+            const KindTraits& kind = traitsOf(p.kind);
+            const int bits = h.isProgressive ? 15 : static_cast<int>(kind.cellBits);
+            const int shift = bits == 0 ? 0 : static_cast<int>(h.rootLog2) - n.level - bits;
+            fits = fits && p.stepShift == shift && kind.isPossible(h, chunk) && isPossiblePayload(h, chunk, chunksEnd);
+        });
+        // A cone says of all that is below its node that it faces away: only points do.
+        fits = fits && !(h.isMixed && n.normalConeCosine > 0);
         uint64_t child = n.firstChild;
         fits = fits && (n.isLeaf() || n.firstChild == next);
         for (uint32_t octant = 0; fits && octant < 8; ++octant) {
@@ -139,8 +184,7 @@ Result<void> checkNodes(const Store& store, uint64_t chunksEnd) {
             ++child;
             ++next;
         }
-        if (!fits || n.level > h.rootLog2 ||
-            n.stepShift != static_cast<int>(h.rootLog2) - n.level - (h.isLoose() ? 15 : 16))
+        if (!fits)
             return tl::unexpected(
                 damagedStore(store.path, fmt::format("node {} of the node table is not possible", i)));
     }
@@ -167,10 +211,39 @@ Result<void> checkTables(const Store& store, uint64_t chunksEnd) {
         return bad("the size of its discs is not possible");
     if (!(std::abs(glm::length(store.description.up) - 1) < 1e-6)) return bad("the up direction has not the length 1");
     if (!isPossibleSpace(store.hierarchy, store.description)) return bad("its coordinates are not possible");
-    if (h.isProgressive && (h.isStrands || h.isMesh())) return bad("holds progressive points and something else");
-    if (h.isStrands && h.isMesh()) return bad("holds strands and groups of triangles");
+    if (h.isStrands != store.description.isStrands) return bad("is not of the kind that it says it is");
+    const bool isPoints = !h.isMixed && h.nodes[0].kind == Kind::points;
+    if (h.isProgressive && !isPoints) return bad("holds progressive points and something else");
+    if (h.isGraph && (h.isMixed || h.groups.size() != h.nodes.size()))
+        return bad("the groups of the mesh are not possible");
+    uint64_t groups = 0;
+    for (uint32_t n = 0; n < h.nodes.size(); ++n)
+        h.forEachPayload(n, [&](uint32_t chunk) { groups += kindOf(h, chunk) == Kind::triangles ? 1 : 0; });
+    if (groups != h.groups.size()) return bad("the groups of the mesh are not possible");
     STIPPLE_TRY(checkTextures(store, chunksEnd));
-    return h.isMesh() ? checkGroups(store, chunksEnd) : checkNodes(store, chunksEnd);
+    STIPPLE_TRY(h.isGraph ? checkGroups(store, chunksEnd) : checkNodes(store, chunksEnd));
+    return checkOverlaps(store);
+}
+
+bool isPossibleGroup(const Hierarchy& h, uint32_t chunk) {
+    const Payload& p = h.payload(chunk);
+    const MeshGroup& g = h.groups[p.group];
+    const auto oneCode = [](const CodeCounts& c) { return c.lo == c.hi; };
+    const MeshGroup before = p.group == 0 ? MeshGroup{} : h.groups[p.group - 1];
+    bool fits = h.rootLog2 <= kShortMeshBits && oneCode(p.parentCounts) && oneCode(p.ownCounts) &&
+                p.errorCode == p.ownCounts.hi && g.parents == 0 && g.textures == 0 && g.runs > 0 && g.runs <= 8 &&
+                g.firstRun == uint64_t{before.firstRun} + before.runs && uint64_t{g.firstRun} + g.runs <= h.runs.size();
+    fits = fits && g.vertices <= uint64_t{g.clusters} * shared::kClusterVertices && g.clusters <= p.records &&
+           p.records <= uint64_t{g.clusters} * shared::kClusterTriangles;
+    uint64_t triangles = 0, clusters = 0;
+    for (uint32_t r = 0, octants = 0; fits && r < g.runs; ++r) {
+        const MeshRun& run = h.runs[g.firstRun + r];
+        fits = run.firstCluster == clusters && run.producer < 8 && (octants >> run.producer & 1u) == 0;
+        if (fits) octants |= 1u << run.producer;
+        clusters += run.clusters;
+        triangles += run.triangles;
+    }
+    return fits && triangles == p.records && clusters == g.clusters;
 }
 
 Result<void> checkSpace(const Hierarchy& h, const StoreDescription& d) {

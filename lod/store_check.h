@@ -24,6 +24,10 @@ inline bool isPossibleGain(uint64_t bytes, uint64_t rawBytes) { return rawBytes 
 /// finite. Chunks end before `chunksEnd`.
 Result<void> checkTables(const Store& store, uint64_t chunksEnd);
 
+/// Of a payload of triangles of an octree: is its group? A run is what lies in an octant of the node's cell; textures
+/// and coordinates of more than 30 bits there are none.
+bool isPossibleGroup(const Hierarchy& h, uint32_t chunk);
+
 /// Of a store that is built: can what its coordinates say be computed with? An input error that names its source.
 Result<void> checkSpace(const Hierarchy& h, const StoreDescription& d);
 

@@ -8,46 +8,59 @@
 
 #include "engine/base/process.h"
 #include "engine/base/queue.h"
-#include "lod/kinds.h"
+#include "lod/primitives/kinds.h"
 #include "lod/store.h"
 #include "lod/verify_errors.h"
 
 namespace stipple::lod {
 
+namespace {
+
+struct Counts {
+    std::atomic<uint64_t> nodes{0}, payloads{0}, records{0}, leafRecords{0}, measured{0};
+};
+
+/// Reads one payload and all of its streams. `discs`: see measure.
+Result<void> verifyPayload(const Store& store, uint32_t index, uint64_t discs, Counts& counts) {
+    const Hierarchy& h = store.hierarchy;
+    const Payload& payload = h.payload(index);
+    const KindTraits& kind = traitsOf(payload.kind);
+    STIPPLE_ASSIGN(const Chunk chunk, readChunk(store, index, true));
+    if (std::string text = kind.check(h, index, chunk); !text.empty())
+        return fail(ErrorKind::input, std::move(text), fmt::format("{}: node {}", store.path, h.nodeOf(index)),
+                    "this is a fault of the build; please report it with the input");
+    if (!h.isProgressive && !h.isMixed) {
+        STIPPLE_ASSIGN(const uint64_t measured, kind.measure(store, index, chunk, discs));
+        counts.measured += measured;
+    }
+    STIPPLE_TRY(checkDrawnPlaces(store, index, chunk));
+    const bool hasAttributes = payload.attributeBytes > 0 || !h.isMixed;
+    for (size_t a = 0; hasAttributes && a < store.description.attributes.size(); ++a)
+        STIPPLE_TRY(readAttribute(store, index, a));
+    for (uint32_t k = payload.firstStream; k < payload.firstStream + payload.streams; ++k)
+        STIPPLE_TRY(readStream(store, index, h.streams[k]));
+    ++counts.payloads;
+    counts.records += payload.records;
+    counts.leafRecords += kind.leafRecords(h, index);
+    return {};
+}
+
+}  // namespace
+
 Result<VerifyReport> verifyStore(const Store& store, Executor& executor, uint64_t nodes) {
     const Hierarchy& h = store.hierarchy;
-    const KindTraits& kind = traitsOf(h);
     // Of a sample of nodes a sample of their discs is held against the leaves.
     const uint64_t discs = nodes == 0 ? std::numeric_limits<uint64_t>::max() : 64;
     const size_t stride = nodes == 0 ? 1 : h.nodes.size() / nodes + 1;
-    std::atomic<uint64_t> checked{0}, measured{0};
+    Counts counts;
     CompletionQueue<std::pair<size_t, Error>> problems;
-    std::atomic<uint64_t> records{0}, leafRecords{0};
     executor.parallelFor((h.nodes.size() + stride - 1) / stride, 1, [&](size_t begin, size_t end) {
         for (size_t i = begin * stride; i < end * stride && i < h.nodes.size() && !isStopRequested(); i += stride) {
-            ++checked;
-            const auto chunk = readChunk(store, static_cast<uint32_t>(i), true);
-            if (!chunk) {
-                problems.push({i, chunk.error()});
-                continue;
-            }
-            const auto index = static_cast<uint32_t>(i);
-            if (std::string text = kind.check(h, index, *chunk); !text.empty())
-                problems.push({i, Error{ErrorKind::input, std::move(text), fmt::format("{}: node {}", store.path, i),
-                                        "this is a fault of the build; please report it with the input"}});
-            if (!h.isProgressive) {
-                const auto worst = kind.measure(store, index, *chunk, discs);
-                if (!worst)
-                    problems.push({i, worst.error()});
-                else
-                    measured += *worst;
-            }
-            if (const auto drawn = checkDrawnPlaces(store, index, *chunk); !drawn) problems.push({i, drawn.error()});
-            for (size_t a = 0; a < store.description.attributes.size(); ++a)
-                if (const auto values = readAttribute(store, static_cast<uint32_t>(i), a); !values)
-                    problems.push({i, values.error()});
-            records += h.nodes[i].records;
-            leafRecords += kind.leafRecords(h, index);
+            ++counts.nodes;
+            h.forEachPayload(static_cast<uint32_t>(i), [&](uint32_t chunk) {
+                if (const auto right = verifyPayload(store, chunk, discs, counts); !right)
+                    problems.push({i, right.error()});
+            });
         }
     });
     executor.parallelFor(h.tiles.size(), 1, [&](size_t begin, size_t end) {
@@ -61,11 +74,11 @@ Result<VerifyReport> verifyStore(const Store& store, Executor& executor, uint64_
         return tl::unexpected(std::min_element(found.begin(), found.end(), [](const auto& a, const auto& b) {
                                   return a.first < b.first;
                               })->second);
-    if (stride == 1 && leafRecords != store.description.points)
+    if (stride == 1 && counts.leafRecords != store.description.points)
         return fail(ErrorKind::input,
-                    fmt::format("{} leaf records, but {} points", leafRecords.load(), store.description.points),
+                    fmt::format("{} leaf records, but {} points", counts.leafRecords.load(), store.description.points),
                     store.path);
-    return VerifyReport{checked, records, leafRecords, measured};
+    return VerifyReport{counts.nodes, counts.payloads, counts.records, counts.leafRecords, counts.measured};
 }
 
 }  // namespace stipple::lod

@@ -316,7 +316,7 @@ bool mayBeCrowded(const Chunk& chunk) {
 Result<void> checkDrawnPlaces(const Store& store, uint32_t index, const Chunk& chunk) {
     constexpr size_t kMany = 64, kShare = 4;
     const Hierarchy& h = store.hierarchy;
-    const Node& node = h.nodes[index];
+    const Payload& payload = h.payload(index);
     if (chunk.lowBits.empty() || !mayBeCrowded(chunk)) return {};
     using Stored = std::array<uint64_t, 3>;         // within the node's cell
     std::vector<std::pair<Stored, Stored>> places;  // where it is near others, and itself
@@ -328,8 +328,8 @@ Result<void> checkDrawnPlaces(const Store& store, uint32_t index, const Chunk& c
         glm::dvec3 from(0);
         for (size_t a = 0; a < 3; ++a) {
             at.first.at(a) = steps.at(a) >> kNearSteps;
-            at.second.at(a) = steps.at(a) << node.stepShift | chunk.lowBits[3 * i + a];
-            from[static_cast<int>(a)] = double(chunk.lowBits[3 * i + a]) - 0.5 * (std::exp2(node.stepShift) - 1);
+            at.second.at(a) = steps.at(a) << payload.stepShift | chunk.lowBits[3 * i + a];
+            from[static_cast<int>(a)] = double(chunk.lowBits[3 * i + a]) - 0.5 * (std::exp2(payload.stepShift) - 1);
         }
         off = std::max(off, glm::length(from));
         places.push_back(at);
@@ -345,8 +345,8 @@ Result<void> checkDrawnPlaces(const Store& store, uint32_t index, const Chunk& c
     return fail(ErrorKind::input,
                 fmt::format("{} points are drawn up to {:.3g} units off where they are stored, within {:.3g} units of "
                             "others, and their error says 0",
-                            coarse, h.unit * off, h.unit * std::exp2(node.stepShift + double{kNearSteps})),
-                fmt::format("{}: node {}", store.path, index), "build it again with this program");
+                            coarse, h.unit * off, h.unit * std::exp2(payload.stepShift + double{kNearSteps})),
+                fmt::format("{}: node {}", store.path, h.nodeOf(index)), "build it again with this program");
 }
 
 namespace {

@@ -17,7 +17,7 @@ Result<uint64_t> measureErrors(const Store& store, uint32_t node, const Chunk& c
 
 /// Are the points of a leaf drawn where they are stored? Records are drawn to the steps of their node, and the low bits
 /// of places are not: an error if many of them lie as near to each other as such steps.
-Result<void> checkDrawnPlaces(const Store& store, uint32_t node, const Chunk& chunk);
+Result<void> checkDrawnPlaces(const Store& store, uint32_t index, const Chunk& chunk);
 
 /// Measures the simplification of a group against its triangles, both ways, at a few dozen corners of each: none may be
 /// farther away than the group's error says. An error if one is; else how many triangles were compared (0 for a group

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #include "lod/cut_view.h"
 #include "lod/mesh_place.h"
@@ -17,10 +18,10 @@ struct RecordFacts {
     std::array<double, 2> radii;
 };
 
-RecordFacts factsOf(const Hierarchy& h, const Node& node, const Chunk& chunk, size_t i) {
-    const double step = std::exp2(node.stepShift), edge = h.cellSize(node);
-    const glm::dvec3 base = h.recordOrigin(node);
-    if (!h.isStrands) {
+RecordFacts factsOf(const Hierarchy& h, const Node& node, const Payload& payload, const Chunk& chunk, size_t i) {
+    const double step = std::exp2(payload.stepShift), edge = h.cellSize(node);
+    const glm::dvec3 base = h.recordOrigin(node, payload);
+    if (chunk.segments.empty()) {
         const shared::PointRecord& r = chunk.records[i];
         const glm::dvec3 p = base + step * glm::dvec3(shared::recordX(r), shared::recordY(r), shared::recordZ(r));
         const double radius = edge * static_cast<double>(shared::radiusFraction(shared::recordRadiusCode(r)));
@@ -52,11 +53,13 @@ bool isConeInside(const Node& node, const Node& parent) {
 }  // namespace
 
 std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
-    const Node& node = h.nodes[index];
+    const Payload& payload = h.payload(index);
+    const uint32_t number = h.nodeOf(index);
+    const Node& node = h.nodes[number];
     std::array<uint32_t, 256> own{};
     uint32_t largest = 0;
-    for (size_t i = 0; i < node.records; ++i) {
-        const RecordFacts r = factsOf(h, node, chunk, i);
+    for (size_t i = 0; i < payload.records; ++i) {
+        const RecordFacts r = factsOf(h, node, payload, chunk, i);
         ++own.at(r.code);
         largest = std::max(largest, r.code);
         for (size_t k = 0; k < 2; ++k)
@@ -78,37 +81,62 @@ std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
         }
     }
     if (!h.isProgressive && node.isLeaf() && largest != 0) return "a leaf record has an error";
-    if (largest != node.errorCode) return "the largest error is not the one in the node table";
-    uint32_t left = node.records;
+    if (largest != payload.errorCode) return "the largest error is not the one in the node table";
+    uint32_t left = payload.records;
     for (uint32_t code = 0; code < 256; ++code) {
         left -= own[code];
-        if (h.countGreater(node.ownCounts, node.records, code) != left) return "the counts per error code are wrong";
+        if (h.countGreater(payload.ownCounts, payload.records, code) != left)
+            return "the counts per error code are wrong";
     }
-    if (index == 0) return {};
+    if (number == 0) return {};
     const Node& parent = h.nodes[node.parent];
     if (glm::length(node.centre - parent.centre) + node.radius > parent.radius * (1 + 1e-9) + 1e-6)
         return "the bounding sphere is not inside the parent's";
     if (!h.isLoose() && !isConeInside(node, parent)) return "the cone of normals is not inside the parent's";
-    if (node.errorCode > parent.errorCode) return "the error is larger than the parent's";
+    if (payload.errorCode > h.errorCodeOf(node.parent)) return "the error is larger than the parent's";
     // Monotone along every chain: sorted by the parent's code, so the own code must not exceed it.
     uint32_t position = 0;
     for (int code = 255; code >= 0; --code) {
         const uint32_t atLeast =
-            code == 0 ? node.records : h.countGreater(node.parentCounts, node.records, static_cast<uint32_t>(code) - 1);
+            code == 0 ? payload.records
+                      : h.countGreater(payload.parentCounts, payload.records, static_cast<uint32_t>(code) - 1);
         for (; position < atLeast; ++position)
-            if (factsOf(h, node, chunk, position).code > static_cast<uint32_t>(code))
+            if (factsOf(h, node, payload, chunk, position).code > static_cast<uint32_t>(code))
                 return "a record has a larger error than its parent record";
     }
     return {};
 }
 
+namespace {
+
+/// Of triangles of an octree: what replaces them has smaller errors, and lies inside.
+std::string checkTriangles(const Hierarchy& h, uint32_t index) {
+    const uint32_t number = h.nodeOf(index);
+    const Payload& payload = h.payload(index);
+    const Node& node = h.nodes[number];
+    if (node.isLeaf() && payload.errorCode > 0) return "triangles of a leaf have an error";
+    if (payload.errorCode > payload.parentCounts.hi) return "triangles have a larger error than what they replace";
+    for (const MeshRun& run : std::span(h.runs).subspan(h.groups[payload.group].firstRun, h.groups[payload.group].runs))
+        if (payload.errorCode > 0 && (node.childMask >> run.producer & 1u) == 0)
+            return "triangles have an error but their octant has no child";
+    if (number == 0) return {};
+    const Node& parent = h.nodes[node.parent];
+    if (glm::length(node.centre - parent.centre) + node.radius > parent.radius * (1 + 1e-9) + 1e-6)
+        return "the bounding sphere is not inside the parent's";
+    if (payload.errorCode > h.errorCodeOf(node.parent)) return "the error is larger than the parent's";
+    return {};
+}
+
+}  // namespace
+
 std::string checkGroup(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
-    const Node& node = h.nodes[index];
-    const MeshGroup& group = h.groups[index];
+    const Payload& payload = h.payload(index);
+    const Node &node = h.nodes[h.nodeOf(index)], &place = meshNode(h, h.nodeOf(index));
+    const MeshGroup& group = h.groups[payload.group];
     if (node.normalConeCosine > 0) return "a group of the mesh has a cone of normals";
     for (const shared::MeshCluster& c : chunk.clusters)
-        for (uint32_t i = 0; i < verticesOf(node, c); ++i)
-            if (glm::length(vertexPlace(node, chunk, c, i) - node.centre) > node.radius * (1 + 1e-9))
+        for (uint32_t i = 0; i < verticesOf(place, c); ++i)
+            if (glm::length(vertexPlace(place, chunk, c, i) - node.centre) > node.radius * (1 + 1e-9))
                 return "a vertex reaches out of the bounding sphere";
     uint32_t cluster = 0;
     for (uint32_t r = 0; r < group.runs; ++r) {
@@ -117,6 +145,7 @@ std::string checkGroup(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
         for (uint32_t c = 0; c < run.clusters; ++c, ++cluster) triangles += chunk.clusters.at(cluster).counts >> 16;
         if (triangles != run.triangles) return "a run has not its number of triangles";
     }
+    if (!h.isGraph) return checkTriangles(h, index);
     for (uint32_t k = 0; k < group.parents; ++k) {
         const Node& parent = h.nodes[h.parents[group.firstParent + k]];
         if (glm::length(node.centre - parent.centre) + node.radius > parent.radius * (1 + 1e-9))

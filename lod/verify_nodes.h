@@ -1,4 +1,4 @@
-// A node's chunk against what the node table says of it: all that the cut relies on.
+// A chunk against what the tables say of it: all that the cut relies on.
 #pragma once
 
 #include <string>

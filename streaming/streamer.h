@@ -22,9 +22,9 @@
 
 namespace stipple::streaming {
 
-/// `source`: in the order of addSource.
+/// `source`: in the order of addSource; `chunk`: see lod::Hierarchy.
 struct ChunkKey {
-    uint32_t source = 0, node = 0;
+    uint32_t source = 0, chunk = 0;
 };
 
 /// Takes decoded chunks: implemented by each backend (and by the tests, which count what is alive).
@@ -35,11 +35,11 @@ class ChunkSink {
     virtual void evict(ChunkKey key) = 0;
 };
 
-/// A last step before a chunk is handed over, e.g. colours from attributes: told the node, the chunk and, if asked for,
-/// the bytes of its attribute streams (checked against their hash).
+/// A last step before a chunk is handed over, e.g. colours from attributes: told its number, the chunk and, if asked
+/// for, the bytes of its attribute streams (checked against their hash).
 struct ChunkFinish {
     bool wantsAttributes = false;
-    std::function<Result<void>(uint32_t node, lod::Chunk& chunk, const uint8_t* attributes, size_t bytes)> apply;
+    std::function<Result<void>(uint32_t index, lod::Chunk& chunk, const uint8_t* attributes, size_t bytes)> apply;
 };
 
 enum class ChunkState : uint8_t { absent, requested, arrived, resident, failed };
@@ -81,7 +81,7 @@ class Streamer {
     void makeRoomFor(const lod::ResidentPlan& plan);
     /// As request: starts what the plan has and what is not there.
     void request(const lod::ResidentPlan& plan);
-    /// (source, node) that could not be read, or that the sink could not take; `isDue`: also those to be tried again.
+    /// (source, chunk) that could not be read, or that the sink could not take; `isDue`: also those to be tried again.
     std::vector<std::pair<uint32_t, uint32_t>> failed(bool isDue) const;
     uint64_t residentLimit() const { return settings_.residentBytes; }
 
@@ -93,9 +93,9 @@ class Streamer {
     const std::string& lastFailure() const { return lastFailure_; }
 
   private:
-    struct NodeState {
+    struct ChunkLife {
         ChunkState state = ChunkState::absent;
-        uint16_t residentChildren = 0;
+        uint16_t residentBelow = 0;  ///< that build on it
         uint64_t lastUsed = 0, retryAt = 0;
     };
     struct Source {
@@ -103,7 +103,7 @@ class Streamer {
         std::shared_ptr<const ByteSource> bytes;
         std::string name;
         std::shared_ptr<const ChunkFinish> finish;
-        std::vector<NodeState> nodes;
+        std::vector<ChunkLife> chunks;
     };
     struct Arrival {
         ChunkKey key;
@@ -111,7 +111,7 @@ class Streamer {
     };
     void setState(ChunkKey key, ChunkState to);
     bool makeRoom(uint64_t bytes);
-    void start(uint32_t source, uint32_t node);
+    void start(uint32_t source, uint32_t chunk);
     void evict(ChunkKey key);
     void countInParents(ChunkKey key, int change);
 

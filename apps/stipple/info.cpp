@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <map>
+#include <set>
 
 #include "apps/stipple/common.h"
 #include "apps/stipple/info_input.h"
@@ -10,6 +12,8 @@
 #include "lod/file_kind.h"
 #include "lod/lots.h"
 #include "lod/nearest.h"
+#include "lod/primitives/codecs.h"
+#include "lod/primitives/kinds.h"
 
 namespace stipple::app {
 namespace {
@@ -34,6 +38,42 @@ std::string placeText(const nlohmann::json& place, const nlohmann::json& unit, c
     return text;
 }
 
+/// What nodes hold: by kind and codec, how many payloads of how many records, and the ids of their streams.
+nlohmann::json payloadInfo(const lod::Hierarchy& h) {
+    struct Sum {
+        uint64_t payloads = 0, records = 0, bytes = 0;
+        double largestError = 0;
+        std::set<uint32_t> streams;
+    };
+    std::map<std::pair<lod::Kind, lod::Codec>, Sum> sums;
+    for (uint32_t n = 0; n < h.nodes.size(); ++n)
+        h.forEachPayload(n, [&](uint32_t chunk) {
+            const lod::Payload& p = h.payload(chunk);
+            Sum& sum = sums[{p.kind, p.codec}];
+            ++sum.payloads;
+            sum.records += p.records;
+            sum.bytes += uint64_t{p.chunkBytes} + p.attributeBytes;
+            if (p.errorCode != lod::ErrorScale::kNoParent)
+                sum.largestError = std::max(sum.largestError, h.unit * h.errors.decode(p.errorCode));
+            sum.streams.insert(static_cast<uint32_t>(lod::StreamId::records));
+            if (p.attributeBytes > 0) sum.streams.insert(static_cast<uint32_t>(lod::StreamId::attributes));
+            for (uint32_t k = p.firstStream; k < p.firstStream + p.streams; ++k) {
+                sum.streams.insert(static_cast<uint32_t>(h.streams[k].id));
+                sum.bytes += h.streams[k].bytes;
+            }
+        });
+    nlohmann::json out = nlohmann::json::array();
+    for (const auto& [of, sum] : sums)
+        out.push_back({{"kind", lod::traitsOf(of.first).name},
+                       {"codec", lod::traitsOf(of.second).name},
+                       {"payloads", sum.payloads},
+                       {"records", sum.records},
+                       {"bytes", sum.bytes},
+                       {"largest_error", sum.largestError},
+                       {"streams", sum.streams}});
+    return out;
+}
+
 nlohmann::json storeInfo(const lod::Store& store) {
     const lod::Hierarchy& h = store.hierarchy;
     const lod::StoreDescription& d = store.description;
@@ -44,10 +84,14 @@ nlohmann::json storeInfo(const lod::Store& store) {
                 {{"nodes", 0}, {"records", 0}, {"bytes", 0}, {"largest_error", 0.0}, {"kept_by_lot", 1.0}});
         nlohmann::json& l = levels[n.level];
         l["nodes"] = l["nodes"].get<uint64_t>() + 1;
-        l["records"] = l["records"].get<uint64_t>() + n.records;
-        l["bytes"] = l["bytes"].get<uint64_t>() + n.chunkBytes;
+        const auto number = static_cast<uint32_t>(&n - h.nodes.data());
+        h.forEachPayload(number, [&](uint32_t chunk) {
+            l["records"] = l["records"].get<uint64_t>() + h.payload(chunk).records;
+            l["bytes"] = l["bytes"].get<uint64_t>() + h.payload(chunk).chunkBytes;
+        });
         // The coarsest groups of a mesh are never replaced: they have no error to speak of.
-        const double error = n.errorCode == lod::ErrorScale::kNoParent ? 0 : h.unit * h.errors.decode(n.errorCode);
+        const uint32_t code = h.errorCodeOf(number);
+        const double error = code == lod::ErrorScale::kNoParent ? 0 : h.unit * h.errors.decode(code);
         l["largest_error"] = std::max(l["largest_error"].get<double>(), error);
         if (h.isStrands) l["kept_by_lot"] = std::min(l["kept_by_lot"].get<double>(), lod::keptByLot(n));
     }
@@ -65,9 +109,8 @@ nlohmann::json storeInfo(const lod::Store& store) {
     uint64_t tileBytes = 0;
     for (const lod::TextureTile& t : h.tiles) tileBytes += t.bytes;
     return {{"kind", "stipple store"},
-            {"primitive", h.isMesh()    ? "triangles"
-                          : h.isStrands ? "segments"
-                                        : "points"},
+            {"primitive", h.isMixed ? "records" : lod::traitsOf(h.nodes[0].kind).records},
+            {"payloads", payloadInfo(h)},
             {"materials", d.materials.size()},
             {"textures", textures},
             {"texture_tiles", h.tiles.size()},
@@ -136,6 +179,13 @@ void printStore(const nlohmann::json& j) {
                    a["points_without_data"] == 0
                        ? ""
                        : fmt::format("; {} points without data", a["points_without_data"].get<uint64_t>()));
+    // (Of one kind the table below says all.)
+    if (j["payloads"].size() > 1)
+        for (const auto& p : j["payloads"])
+            fmt::print("  payloads      {} of {} ({}): {} records, {}, largest error {:.4g}\n",
+                       p["payloads"].get<uint64_t>(), p["kind"].get<std::string>(), p["codec"].get<std::string>(),
+                       p["records"].get<uint64_t>(), humanBytes(p["bytes"].get<uint64_t>()),
+                       p["largest_error"].get<double>());
     fmt::print("  hash          {}\n  level   nodes    records      bytes  largest error\n",
                j["content_hash"].get<std::string>());
     for (size_t l = 0; l < j["levels"].size(); ++l) {
@@ -153,7 +203,7 @@ void printStore(const nlohmann::json& j) {
 }
 
 Result<void> showNearest(const lod::Store& store, const Options& o) {
-    if (store.hierarchy.isMesh() || store.hierarchy.isStrands)
+    if (store.hierarchy.isMixed || store.hierarchy.nodes[0].kind != lod::Kind::points)
         return fail(ErrorKind::usage, "holds no points: --at finds points", store.path, "leave --at out");
     STIPPLE_ASSIGN(const glm::dvec3 place, parseVector(o.at, "--at"));
     STIPPLE_ASSIGN(const lod::NearestPoint p, lod::findNearest(store, place));
@@ -186,17 +236,21 @@ Result<void> run(const Options& o) {
         STIPPLE_ASSIGN(const lod::Store store, lod::openStore(o.input));
         if (!o.at.empty()) return showNearest(store, o);
         nlohmann::json j = storeInfo(store);
+        const bool isMixed = store.hierarchy.isMixed;
         if (o.verify) {
             const auto executor = makeTbbExecutor(0);
             STIPPLE_TRY(lod::verifyStore(store, *executor));
             j["verified"] = true;
+            j["errors_measured"] = !isMixed && !store.hierarchy.isProgressive;
         }
         if (o.json) {
             printJson("info", j);
             return {};
         }
         printStore(j);
-        if (o.verify) fmt::print("  verified: hashes, counts, order, errors and spheres are right\n");
+        if (o.verify)
+            fmt::print("  verified: hashes, counts, order, {} and spheres are right\n",
+                       isMixed ? "codes (errors across kinds are not measured)" : "errors");
         return {};
     }
     if (!o.at.empty())

@@ -29,14 +29,14 @@ class CpuBackend final : public render::Backend {
         if (!kept.texels.empty()) {
             if (chunks_.tiles.size() <= key.source) chunks_.tiles.resize(key.source + 1);
             auto& tiles = chunks_.tiles[key.source];
-            if (tiles.size() <= key.node) tiles.resize(key.node + 1);
-            tiles[key.node] = kept.texels.data();
+            if (tiles.size() <= key.chunk) tiles.resize(key.chunk + 1);
+            tiles[key.chunk] = kept.texels.data();
         }
         return {};
     }
     void evict(streaming::ChunkKey key) override {
-        if (key.source < chunks_.tiles.size() && key.node < chunks_.tiles[key.source].size())
-            chunks_.tiles[key.source][key.node] = nullptr;
+        if (key.source < chunks_.tiles.size() && key.chunk < chunks_.tiles[key.source].size())
+            chunks_.tiles[key.source][key.chunk] = nullptr;
         chunks_.chunks.erase(Chunks::idOf(key));
     }
     const std::vector<render::PassTime>& passTimes() const override { return times_; }

@@ -19,7 +19,7 @@ struct Chunks {
     std::unordered_map<uint64_t, lod::Chunk> chunks;
     std::vector<std::vector<const uint32_t*>> tiles;
 
-    static uint64_t idOf(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | key.node; }
+    static uint64_t idOf(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | key.chunk; }
     const lod::Chunk& at(streaming::ChunkKey key) const { return chunks.at(idOf(key)); }
 };
 

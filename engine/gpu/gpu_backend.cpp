@@ -18,7 +18,7 @@ namespace {
 
 constexpr VkBufferUsageFlags kStorage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
 
-uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | key.node; }
+uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | key.chunk; }
 
 class GpuBackend final : public render::Backend {
   public:

@@ -187,10 +187,10 @@ class ReferenceBackend final : public render::Backend {
     std::string name() const override { return "reference"; }
     std::string device() const override { return "fp64 reference, scalar"; }
     Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override {
-        chunks_[uint64_t{key.source} << 32 | key.node] = chunk;
+        chunks_[uint64_t{key.source} << 32 | key.chunk] = chunk;
         return {};
     }
-    void evict(streaming::ChunkKey key) override { chunks_.erase(uint64_t{key.source} << 32 | key.node); }
+    void evict(streaming::ChunkKey key) override { chunks_.erase(uint64_t{key.source} << 32 | key.chunk); }
     const std::vector<render::PassTime>& passTimes() const override { return times_; }
 
     Result<void> render(const render::RenderRequest& request, render::Image& image) override {

@@ -24,7 +24,7 @@ class MeshProjector {
             const lod::CutMeshDraw& cut = draws_.meshCut[i];
             const lod::Instance& instance = draws_.instances[cut.instance];
             const lod::Hierarchy& h = *draws_.hierarchies[instance.hierarchy];
-            const lod::Chunk& chunk = chunks_.at(uint64_t{instance.source} << 32 | cut.node);
+            const lod::Chunk& chunk = chunks_.at(uint64_t{instance.source} << 32 | cut.chunk);
             const TextureReader textures{draws_.meshTextures[draws_.meshDraws[i].mesh], chunks_};
             const uint32_t firstMaterial = draws_.firstMaterial[instance.hierarchy];
             for (uint32_t c = cut.firstCluster; c < cut.firstCluster + cut.clusters; ++c) {
@@ -38,7 +38,8 @@ class MeshProjector {
                     for (uint32_t k = 0; k < 3; ++k)
                         corners.at(k) = cornerOf(
                             h, instance, vertex(k),
-                            lod::vertexPlace(h.nodes[cut.node], chunk, cluster, (word >> (8 * k)) % 256), view_);
+                            lod::vertexPlace(lod::meshNode(h, cut.node), chunk, cluster, (word >> (8 * k)) % 256),
+                            view_);
                     const uint32_t surface = vertex(0).surface;
                     triangle(corners, surface, draws_.materials[firstMaterial + surface % 65536], textures, cut,
                              h.nodes[cut.node].level);

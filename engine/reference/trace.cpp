@@ -45,21 +45,54 @@ Box boxOf(const Disc& d) {
     return {d.position - half, d.position + half};
 }
 
-Result<void> readPoints(TracedStore& t) {
+/// Makes room for the vertices of a chunk; where they begin.
+uint32_t addVertices(const lod::Chunk& chunk, TracedStore& t) {
+    const auto base = static_cast<uint32_t>(t.vertices.size());
+    t.vertices.insert(t.vertices.end(), chunk.vertices.begin(), chunk.vertices.end());
+    t.places.resize(t.vertices.size());
+    return base;
+}
+
+/// The triangles of some clusters of a chunk, whose vertices begin at `base`.
+void addClusters(const lod::Chunk& chunk, uint32_t node, uint32_t begin, uint32_t end, uint32_t base, TracedStore& t) {
+    const lod::Node& group = lod::meshNode(t.store->hierarchy, node);
+    for (uint32_t c = begin; c < end; ++c) {
+        const shared::MeshCluster& cluster = chunk.clusters[c];
+        for (uint32_t v = 0; v < lod::verticesOf(group, cluster); ++v)
+            t.places[base + cluster.firstVertex + v] = lod::vertexPlace(group, chunk, cluster, v);
+        for (uint32_t k = 0; k < cluster.counts >> 16; ++k) {
+            const uint32_t word = chunk.triangles[cluster.firstTriangle + k], first = base + cluster.firstVertex;
+            t.triangles.push_back({first + word % 256, first + (word >> 8) % 256, first + (word >> 16) % 256});
+        }
+    }
+}
+
+Result<void> readLeaf(uint32_t index, TracedStore& t) {
+    const lod::Hierarchy& h = t.store->hierarchy;
+    const uint32_t number = h.nodeOf(index);
+    const lod::Node& node = h.nodes[number];
+    STIPPLE_ASSIGN(lod::Chunk chunk, lod::readChunk(*t.store, index));
+    std::vector<uint8_t> values;
+    if (t.colour.needsAttributes() && chunk.clusters.empty()) {
+        STIPPLE_ASSIGN(values, lod::readAttribute(*t.store, index, t.colour.attribute));
+    }
+    lod::recolour(t.colour, *t.store, index, chunk, values);
+    for (const shared::StrandSegment& s : chunk.segments) t.segments.push_back(decodeSegment(h, node, s));
+    for (const shared::PointRecord& r : chunk.records) t.discs.push_back(decodeDisc(h, node, r));
+    addClusters(chunk, number, 0, static_cast<uint32_t>(chunk.clusters.size()), addVertices(chunk, t), t);
+    return {};
+}
+
+Result<void> readTree(TracedStore& t) {
     const lod::Hierarchy& h = t.store->hierarchy;
     t.discs.reserve(t.store->description.points);
-    for (uint32_t i = 0; i < h.nodes.size(); ++i) {
-        if (!h.nodes[i].isLeaf()) continue;
-        STIPPLE_ASSIGN(lod::Chunk chunk, lod::readChunk(*t.store, i));
-        std::vector<uint8_t> values;
-        if (t.colour.needsAttributes()) {
-            STIPPLE_ASSIGN(values, lod::readAttribute(*t.store, i, t.colour.attribute));
-        }
-        lod::recolour(t.colour, *t.store, i, chunk, values);
-        for (const shared::StrandSegment& s : chunk.segments) t.segments.push_back(decodeSegment(h, h.nodes[i], s));
-        for (const shared::PointRecord& r : chunk.records) t.discs.push_back(decodeDisc(h, h.nodes[i], r));
-    }
-    return {};
+    Result<void> read;
+    for (uint32_t i = 0; i < h.nodes.size(); ++i)
+        if (h.nodes[i].isLeaf())
+            h.forEachPayload(i, [&](uint32_t index) {
+                if (read) read = readLeaf(index, t);
+            });
+    return read;
 }
 
 Result<void> readMesh(TracedStore& t) {
@@ -74,23 +107,12 @@ Result<void> readMesh(TracedStore& t) {
             if (run.producer != lod::MeshRun::kOriginal) continue;
             if (chunk.clusters.empty()) {
                 STIPPLE_ASSIGN(chunk, lod::readChunk(*t.store, i));
-                base = static_cast<uint32_t>(t.vertices.size());
-                t.vertices.insert(t.vertices.end(), chunk.vertices.begin(), chunk.vertices.end());
-                t.places.resize(t.vertices.size());
+                base = addVertices(chunk, t);
             }
-            for (uint32_t c = run.firstCluster; c < run.firstCluster + run.clusters; ++c) {
-                const shared::MeshCluster& cluster = chunk.clusters[c];
-                for (uint32_t v = 0; v < lod::verticesOf(h.nodes[i], cluster); ++v)
-                    t.places[base + cluster.firstVertex + v] = lod::vertexPlace(h.nodes[i], chunk, cluster, v);
-                for (uint32_t k = 0; k < cluster.counts >> 16; ++k) {
-                    const uint32_t word = chunk.triangles[cluster.firstTriangle + k],
-                                   first = base + cluster.firstVertex;
-                    t.triangles.push_back({first + word % 256, first + (word >> 8) % 256, first + (word >> 16) % 256});
-                }
-            }
+            addClusters(chunk, i, run.firstCluster, run.firstCluster + run.clusters, base, t);
         }
     }
-    for (uint32_t i = t.textures.firstChunk; i < h.chunks(); ++i) {
+    for (uint32_t i = t.textures.firstChunk; h.isTile(i); ++i) {
         STIPPLE_ASSIGN(t.tiles[i], lod::readChunk(*t.store, i));
     }
     return {};
@@ -100,7 +122,7 @@ Result<void> readStore(const render::PlacedStore& placed, TracedStore& t) {
     const lod::Store& store = *placed.store;
     t.store = &store;
     t.colour = placed.colour;
-    STIPPLE_TRY(store.hierarchy.isMesh() ? readMesh(t) : readPoints(t));
+    STIPPLE_TRY(store.hierarchy.isMesh() ? readMesh(t) : readTree(t));
     std::vector<Box> boxes;
     boxes.reserve(t.discs.size() + t.triangles.size());
     for (const Disc& d : t.discs) boxes.push_back(boxOf(d));
@@ -244,10 +266,11 @@ class Tracer {
                 const auto meets = [&](const Disc& d) {
                     return meetsDisc(d, drawnRadius(d, place), local, view_.isOrthographic, t, rho2, normal);
                 };
-                if (!store.segments.empty()) {
-                    hitSegment(store.segments[item], place, local, p, best);
-                } else if (item >= store.discs.size()) {
-                    hitTriangle(store, place, store.triangles[item - store.discs.size()], local, ray, step, p, best);
+                const size_t discs = store.discs.size(), triangles = store.triangles.size();
+                if (item >= discs + triangles) {
+                    hitSegment(store.segments[item - discs - triangles], place, local, p, best);
+                } else if (item >= discs) {
+                    hitTriangle(store, place, store.triangles[item - discs], local, ray, step, p, best);
                 } else if (meets(store.discs[item]) && t > view_.nearPlane && t < best.t) {
                     const double m = std::abs(glm::dot(place.rotation * normal, toWorld(ray.direction))) / length;
                     best.place = p;

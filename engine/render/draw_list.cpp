@@ -71,7 +71,7 @@ void addMeshes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, DrawList&
     for (const lod::CutMeshDraw& draw : cut.meshDraw) {
         const lod::Instance& instance = out.instances[draw.instance];
         const lod::Hierarchy& h = *out.hierarchies[instance.hierarchy];
-        const lod::Node& group = h.nodes[draw.node];
+        const lod::Node& group = lod::meshNode(h, draw.node);
         const bool isNew = draw.instance != last;
         if (isNew) {
             mesh = makeDrawMesh(h, instance, out.view, cameraFromWorld, eyeStep);
@@ -87,9 +87,9 @@ void addMeshes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, DrawList&
         }
         const auto run = static_cast<uint32_t>(out.meshDraws.size());
         out.meshDraws.push_back({static_cast<uint32_t>(out.meshes.size() - 1), draw.firstCluster, draw.clusters,
-                                 group.level, draw.errorPixels});
+                                 h.nodes[draw.node].level, draw.errorPixels});
         DrawBatch& batch = out.of(lod::Kind::triangles);
-        batch.keys.push_back({instance.source, draw.node});
+        batch.keys.push_back({instance.source, draw.chunk});
         for (uint32_t c = 0; c < draw.clusters; ++c) batch.blocks.push_back({run, draw.firstCluster + c});
     }
 }
@@ -166,12 +166,13 @@ shared::DrawNode makeDrawNode(const lod::CutDraw& draw, const Bend& bend, const 
     const lod::Instance& instance = list.instances[draw.instance];
     const lod::Hierarchy& h = *list.hierarchies[instance.hierarchy];
     const lod::Node& node = h.nodes[draw.node];
+    const lod::Payload& payload = h.payload(draw.chunk);
     // Composed in fp64 relative to the eye, rounded once (hard cases 1 and 2).
-    const double worldPerStep = instance.scale * h.unit * std::exp2(node.stepShift);
+    const double worldPerStep = instance.scale * h.unit * std::exp2(payload.stepShift);
     const glm::dmat3 axes = cameraFromWorld * instance.rotation;
     const glm::dvec3 base =
         cameraFromWorld * (instance.translation - view.eye +
-                           instance.rotation * (instance.scale * (h.origin + h.unit * h.recordOrigin(node))));
+                           instance.rotation * (instance.scale * (h.origin + h.unit * h.recordOrigin(node, payload))));
     shared::DrawNode d{};
     // Moved with the wind: one more linear map, in camera space.
     const glm::dvec3 along = cameraFromWorld * bend.along, up = cameraFromWorld * bend.up;
@@ -209,12 +210,12 @@ void addNodes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, const Draw
         }
         if (!asked.empty()) out.bends.push_back(bend);
         out.swaying += bend.isStill() ? 0 : 1;
-        DrawBatch& batch = out.of(lod::kindOf(h));
+        DrawBatch& batch = out.of(lod::kindOf(h, draw.chunk));
         const auto index = static_cast<uint32_t>(batch.nodes.size());
         for (uint32_t first = 0; first < draw.count; first += shared::kBlockLanes)
             batch.blocks.push_back({index, first});
         batch.nodes.push_back(makeDrawNode(draw, bend, cameraFromWorld, out));
-        batch.keys.push_back({instance.source, draw.node});
+        batch.keys.push_back({instance.source, draw.chunk});
     }
     if (out.swaying == 0) out.bends.clear();
 }

@@ -13,7 +13,7 @@
 #include "engine/render/effects/table.h"
 #include "engine/render/environment.h"
 #include "lod/cut.h"
-#include "lod/kinds.h"
+#include "lod/primitives/kinds.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
 #include "shaders/shared/mesh.h"

@@ -21,21 +21,24 @@ namespace {
 /// The last steps of a chunk's decoding: other colours than its own; of triangles, that their materials are there.
 streaming::ChunkFinish finishOf(const PlacedStore& placed) {
     const lod::ColourBy by = placed.colour;
-    if (placed.store->hierarchy.isMesh())
-        return {false, [store = placed.store](uint32_t node, lod::Chunk& chunk, const uint8_t*, size_t) {
-                    return lod::checkMaterials(*store, chunk, fmt::format("{}: node {}", store->path, node));
+    const bool hasTriangles = !placed.store->hierarchy.groups.empty();
+    if (placed.store->hierarchy.isGraph || (hasTriangles && by.mode == lod::ColourMode::own))
+        return {false, [store = placed.store](uint32_t index, lod::Chunk& chunk, const uint8_t*, size_t) {
+                    return lod::checkMaterials(*store, chunk, fmt::format("{}: chunk {}", store->path, index));
                 }};
     if (by.mode == lod::ColourMode::own) return {};
-    const auto apply = [by, store = placed.store](uint32_t node, lod::Chunk& chunk, const uint8_t* bytes,
+    const auto apply = [by, store = placed.store](uint32_t index, lod::Chunk& chunk, const uint8_t* bytes,
                                                   size_t count) -> Result<void> {
+        if (!chunk.vertices.empty())
+            return lod::checkMaterials(*store, chunk, fmt::format("{}: chunk {}", store->path, index));
         std::vector<uint8_t> values;
         if (by.needsAttributes()) {
             const auto& attributes = store->description.attributes;
-            const uint32_t records = store->hierarchy.nodes[node].records;
+            const uint32_t records = store->hierarchy.payload(index).records;
             STIPPLE_ASSIGN(values, lod::decodeAttribute(bytes, count, attributes, by.attribute, records,
-                                                        fmt::format("{}: node {}", store->path, node)));
+                                                        fmt::format("{}: chunk {}", store->path, index)));
         }
-        lod::recolour(by, *store, node, chunk, values);
+        lod::recolour(by, *store, index, chunk, values);
         return {};
     };
     return {by.needsAttributes(), apply};

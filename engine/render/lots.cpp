@@ -6,6 +6,7 @@
 #include "lod/chunk.h"
 #include "lod/cut_view.h"
 #include "lod/lots.h"
+#include "lod/primitives/kinds.h"
 #include "lod/store.h"
 
 namespace stipple::render {
@@ -19,10 +20,12 @@ class StrandLots {
 
     void add(const lod::CutDraw& draw, const lod::Chunk& chunk) {
         const lod::Node& node = h_.nodes[draw.node];
-        const double step = std::exp2(node.stepShift), edge = h_.cellSize(node), kept = lod::keptByLot(node);
+        const lod::Payload& payload = h_.payload(draw.chunk);
+        const double step = std::exp2(payload.stepShift), edge = h_.cellSize(node),
+                     kept = h_.isStrands ? lod::keptByLot(node) : 1;
         // What the build may have thinned out, and made wider by what went.
         const double thin = kept < 1 ? lod::kThinStrand * edge / kept : 0;
-        const glm::dvec3 base = h_.recordOrigin(node);
+        const glm::dvec3 base = h_.recordOrigin(node, payload);
         const auto placeOf = [&](const shared::StrandVertex& v) {
             return base + step * glm::dvec3(v.positionXY & 0xffffu, v.positionXY >> 16, v.positionZ & 0xffffu);
         };
@@ -70,8 +73,8 @@ Result<LotShares> measureLots(const FrameState& state, const lod::View& view) {
         const lod::Instance& instance = state.instances[draw.instance];
         const lod::Hierarchy& h = *state.hierarchies[instance.hierarchy];
         if (h.isProgressive) shares.discs += draw.count;
-        if (!h.isStrands) continue;
-        STIPPLE_ASSIGN(const lod::Chunk chunk, lod::readChunk(*state.stores[instance.hierarchy], draw.node));
+        if (lod::kindOf(h, draw.chunk) != lod::Kind::curves) continue;
+        STIPPLE_ASSIGN(const lod::Chunk chunk, lod::readChunk(*state.stores[instance.hierarchy], draw.chunk));
         StrandLots(h, instance, view, shares).add(draw, chunk);
     }
     return shares;

@@ -14,14 +14,14 @@ Result<void> GreatestRadii::upload(streaming::ChunkKey key, const lod::Chunk& ch
     if (code > 0 && shared::radiusFraction(code - 1) * std::sqrt(points) > kMostSpacings) code = 0;
     if (codes_.size() <= key.source) codes_.resize(key.source + 1);
     auto& codes = codes_[key.source];
-    if (codes.size() <= key.node) codes.resize(key.node + 1);
-    codes[key.node] = static_cast<uint8_t>(std::min(code, 255u));
+    if (codes.size() <= key.chunk) codes.resize(key.chunk + 1);
+    codes[key.chunk] = static_cast<uint8_t>(std::min(code, 255u));
     return backend_.upload(key, chunk);
 }
 
 float GreatestRadii::shareOf(streaming::ChunkKey key) const {
-    if (key.source >= codes_.size() || key.node >= codes_[key.source].size()) return 0;
-    const uint32_t code = codes_[key.source][key.node];
+    if (key.source >= codes_.size() || key.chunk >= codes_[key.source].size()) return 0;
+    const uint32_t code = codes_[key.source][key.chunk];
     return code == 0 ? 0 : code == 255 ? 1 : shared::radiusFraction(code - 1);
 }
 

@@ -46,10 +46,11 @@ std::vector<uint32_t> coarseNodes(const lod::Hierarchy& h) {
     return front;
 }
 
-void addPositions(const lod::Hierarchy& h, const lod::Node& node, const lod::Chunk& chunk,
-                  std::vector<glm::dvec3>& to) {
-    const glm::dvec3 base = h.recordOrigin(node);
-    const double step = h.isLoose() ? h.cellSize(node) / 32768 : std::exp2(node.stepShift);
+void addPositions(const lod::Hierarchy& h, uint32_t index, const lod::Chunk& chunk, std::vector<glm::dvec3>& to) {
+    const lod::Node &node = h.nodes[h.nodeOf(index)], &group = lod::meshNode(h, h.nodeOf(index));
+    const lod::Payload& payload = h.payload(index);
+    const glm::dvec3 base = h.recordOrigin(node, payload);
+    const double step = h.isLoose() ? h.cellSize(node) / 32768 : std::exp2(payload.stepShift);
     const auto add = [&](uint32_t xy, uint32_t z) {
         to.push_back(h.origin + h.unit * (base + step * glm::dvec3(xy & 0xffffu, xy >> 16, z & 0xffffu)));
     };
@@ -59,8 +60,8 @@ void addPositions(const lod::Hierarchy& h, const lod::Node& node, const lod::Chu
         add(s.b.positionXY, s.b.positionZ);
     }
     for (const shared::MeshCluster& c : chunk.clusters)
-        for (uint32_t i = 0; i < lod::verticesOf(node, c); ++i)
-            to.push_back(h.origin + h.unit * lod::vertexPlace(node, chunk, c, i));
+        for (uint32_t i = 0; i < lod::verticesOf(group, c); ++i)
+            to.push_back(h.origin + h.unit * lod::vertexPlace(group, chunk, c, i));
 }
 
 /// Does a node hold triangles or segments of the input itself?
@@ -97,7 +98,7 @@ std::vector<glm::dvec3> outlineOfInput(const lod::Store& store) {
                 const auto chunk = known.size() < kMostRead ? lod::readChunk(store, i) : Result<lod::Chunk>();
                 if (!chunk || (chunk->vertices.empty() && chunk->segments.empty())) return {};
                 const size_t first = all.size();
-                addPositions(h, h.nodes[i], *chunk, all);
+                addPositions(h, i, *chunk, all);
                 known[i] = {first, all.size()};
             }
             for (size_t v = known[i].first; v < known[i].second; ++v)
@@ -140,11 +141,14 @@ std::vector<glm::dvec3> outlineOf(const lod::Store& store) {
     if (h.isMesh() || (h.isStrands && !hasStrays)) {
         all = outlineOfInput(store);
     } else {
-        for (const uint32_t n : coarseNodes(h)) {
-            const auto chunk = lod::readChunk(store, n);
-            if (!chunk) return box;  // whoever draws it says why
-            addPositions(h, h.nodes[n], *chunk, all);
-        }
+        bool isRead = true;
+        for (const uint32_t n : coarseNodes(h))
+            h.forEachPayload(n, [&](uint32_t index) {
+                const auto chunk = lod::readChunk(store, index);
+                isRead = isRead && chunk;
+                if (chunk) addPositions(h, index, *chunk, all);
+            });
+        if (!isRead) return box;  // whoever draws it says why
     }
     const glm::dvec3 slack = 1e-6 * (d.focusMax - d.focusMin) + glm::dvec3(h.unit);
     std::erase_if(all, [&](const glm::dvec3& p) {

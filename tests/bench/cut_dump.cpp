@@ -25,7 +25,7 @@ uint64_t hashOf(const lod::Cut& cut) {
         addFields(hash, d.instance, d.node, d.count, d.errorCode, d.octantMask, d.errorPixels, d.radiusScale);
     for (const lod::CutMeshDraw& d : cut.meshDraw)
         addFields(hash, d.instance, d.node, d.firstCluster, d.clusters, d.triangles, d.errorPixels);
-    for (const lod::CutWanted& w : cut.wanted) addFields(hash, w.source, w.node, w.priority);
+    for (const lod::CutWanted& w : cut.wanted) addFields(hash, w.source, w.chunk, w.priority);
     for (const auto& [source, node] : cut.keep) addFields(hash, source, node);
     const lod::CutCounters& c = cut.counters;
     addFields(hash, cut.tauTarget, cut.tauEffective, cut.truncated, c.nodesDrawn, c.nodesMissing, c.recordsDrawn,

@@ -20,7 +20,7 @@ void decodeChunks(benchmark::State& state) {
     int64_t records = 0;
     for (auto _ : state)
         for (uint32_t i = 0; i < chunks.size(); ++i) {
-            const auto chunk = lod::decodeNode(store->hierarchy, i, chunks[i].data(), chunks[i].size(), "", false);
+            const auto chunk = lod::decodeStored(store->hierarchy, i, chunks[i].data(), chunks[i].size(), "", false);
             records += static_cast<int64_t>(chunk->records.size());
         }
     state.SetItemsProcessed(records);

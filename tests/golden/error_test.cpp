@@ -108,8 +108,8 @@ TEST_F(Errors, EqualCutsGiveEqualIdsWhateverElseIsResident) {
     ASSERT_EQ(fresh->draws.points().blocks.size(), used->draws.points().blocks.size());
     for (size_t b = 0; b < fresh->draws.points().blocks.size(); ++b) {
         ASSERT_EQ(fresh->draws.points().blocks[b].first, used->draws.points().blocks[b].first);
-        ASSERT_EQ(fresh->draws.points().keys[fresh->draws.points().blocks[b].node].node,
-                  used->draws.points().keys[used->draws.points().blocks[b].node].node);
+        ASSERT_EQ(fresh->draws.points().keys[fresh->draws.points().blocks[b].node].chunk,
+                  used->draws.points().keys[used->draws.points().blocks[b].node].chunk);
     }
     EXPECT_TRUE(fresh->image.rgba == used->image.rgba);
     fresh->streamer.reset();  // hands its chunks back before the backend goes

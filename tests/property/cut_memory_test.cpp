@@ -178,7 +178,7 @@ TEST(CutMemory, WhatIsCountedIsWhatIsDrawn) {
             lod::selectCut(scene, residency, view, {1, kNoLimit}, scratch, cut);  // tau = 1: step 0
             const uint64_t drawn = cut.counters.recordsDrawn + cut.counters.trianglesDrawn;
             const lod::CutFrame frame{scene, residency, view, scratch};
-            const lod::KindTraits& kind = lod::traitsOf(h);
+            const lod::ShapeTraits& kind = lod::shapeOf(h);
             const auto cost = [&](int step, lod::Counted counted) {
                 return kind.cutCost(frame, 0, step, kNoLimit, counted, nullptr);
             };

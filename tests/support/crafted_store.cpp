@@ -57,6 +57,19 @@ CraftedStore CraftedStore::read(const std::string& path) {
     const std::vector<uint8_t> text = unpack(file, c.head.description);
     c.description.assign(text.begin(), text.end());
     c.mesh = unpack(file, c.head.mesh);
+    const std::vector<uint8_t> table = unpack(file, c.head.payloads);
+    PayloadHead of{};
+    std::memcpy(&of, table.data(), sizeof(of));
+    size_t at = sizeof(of);
+    const auto take = [&](auto& to, uint64_t count) {
+        to.resize(count);
+        if (count > 0) std::memcpy(to.data(), table.data() + at, count * sizeof(to[0]));
+        at += count * sizeof(to[0]);
+    };
+    take(c.kinds, of.kinds);
+    take(c.codecs, of.codecs);
+    take(c.payloads, of.payloads);
+    take(c.streams, of.streams);
     c.body.assign(file.begin() + sizeof(Head), file.begin() + static_cast<std::ptrdiff_t>(c.head.nodes.offset));
     return c;
 }
@@ -67,11 +80,17 @@ std::vector<uint8_t> CraftedStore::bytes() const {
         if (offset < sizeof(Head) || at > body.size() || count > body.size() - at) return 0;
         return hashBytes(body.data() + at, count);
     };
-    std::vector<NodeOnDisk> hashed = nodes;
-    for (NodeOnDisk& n : hashed) {
-        n.chunkHash = hashOf(n.chunkOffset, n.chunkBytes);
-        n.attributeHash = hashOf(n.chunkOffset + n.chunkBytes, n.attributeBytes);
-    }
+    std::vector<StreamOnDisk> hashed = streams;
+    for (StreamOnDisk& s : hashed) s.hash = hashOf(s.offset, s.bytes);
+    const PayloadHead counted{claimKinds != 0 ? claimKinds : kinds.size(), codecs.size(),
+                              claimPayloads != 0 ? claimPayloads : payloads.size(),
+                              claimStreams != 0 ? claimStreams : streams.size()};
+    std::vector<uint8_t> table;
+    append(table, &counted, sizeof(counted));
+    append(table, kinds.data(), kinds.size() * sizeof(NameOnDisk));
+    append(table, codecs.data(), codecs.size() * sizeof(NameOnDisk));
+    append(table, payloads.data(), payloads.size() * sizeof(PayloadOnDisk));
+    append(table, hashed.data(), hashed.size() * sizeof(StreamOnDisk));
     std::vector<uint8_t> groups = mesh;
     const MeshHead of = meshHead();
     for (uint64_t t = 0; of.tiles <= groups.size() / sizeof(lod::TextureTile) && t < of.tiles; ++t) {
@@ -84,10 +103,11 @@ std::vector<uint8_t> CraftedStore::bytes() const {
     std::vector<uint8_t> out(sizeof(Head));
     append(out, body.data(), body.size());
     Head h = head;
-    h.nodes = pack(out, hashed.data(), hashed.size() * sizeof(NodeOnDisk), claimRawNodes);
+    h.nodes = pack(out, nodes.data(), nodes.size() * sizeof(NodeOnDisk), claimRawNodes);
     h.counts = pack(out, counts.data(), counts.size() * sizeof(CodeCount), claimRawCounts);
     h.description = pack(out, description.data(), description.size(), claimRawDescription);
     h.mesh = pack(out, groups.data(), groups.size(), claimRawMesh);
+    h.payloads = pack(out, table.data(), table.size(), claimRawPayloads);
     h.nodeCount = claimNodeCount != 0 ? claimNodeCount : nodes.size();
     h.fileBytes = out.size() + sizeof(Foot);
     h.hash = hashBytes(&h, offsetof(Head, hash));
@@ -102,17 +122,27 @@ void CraftedStore::write(const std::string& path) const {
     spit(path, {all.begin(), all.end()});
 }
 
+StreamOnDisk& CraftedStore::streamOf(size_t i) {
+    size_t first = 0;
+    for (size_t k = 0; k < i; ++k) first += payloads.at(k).streams;
+    return streams.at(std::min(first, streams.size() - 1));
+}
+
 void CraftedStore::replaceChunk(size_t i, const std::vector<uint8_t>& chunk) {
-    NodeOnDisk& n = nodes.at(i);
-    // They follow the chunk, unless the node was changed before and lies about it.
-    const uint64_t at = n.chunkOffset + n.chunkBytes - sizeof(Head);
-    std::vector<uint8_t> attributes;
-    if (at <= body.size() && n.attributeBytes <= body.size() - at)
-        attributes.assign(body.begin() + static_cast<std::ptrdiff_t>(at),
-                          body.begin() + static_cast<std::ptrdiff_t>(at + n.attributeBytes));
-    n.chunkOffset = sizeof(Head) + body.size();
-    n.chunkBytes = static_cast<uint32_t>(chunk.size());
+    StreamOnDisk& records = streamOf(i);
+    const uint64_t end = records.offset + records.bytes;
+    records.offset = sizeof(Head) + body.size();
+    records.bytes = static_cast<uint32_t>(chunk.size());
     append(body, chunk.data(), chunk.size());
+    // They follow the chunk, unless the payload was changed before and lies about it.
+    StreamOnDisk* const next = &records + 1;
+    const uint64_t at = end - sizeof(Head);
+    if (payloads.at(i).streams < 2 || next > &streams.back() || next->offset != end || at > body.size() ||
+        next->bytes > body.size() - at)
+        return;
+    const std::vector<uint8_t> attributes(body.begin() + static_cast<std::ptrdiff_t>(at),
+                                          body.begin() + static_cast<std::ptrdiff_t>(at + next->bytes));
+    next->offset = sizeof(Head) + body.size();
     append(body, attributes.data(), attributes.size());
 }
 
@@ -122,10 +152,10 @@ MeshHead CraftedStore::meshHead() const {
     return h;
 }
 
-std::vector<uint8_t> encodeAgain(const lod::Hierarchy& h, const lod::Chunk& chunk) {
-    return h.isMesh()    ? lod::encodeMeshChunk(chunk)
-           : h.isStrands ? lod::encodeStrandChunk(chunk)
-                         : lod::encodeChunk(chunk);
+std::vector<uint8_t> encodeAgain(const lod::Chunk& chunk) {
+    return !chunk.clusters.empty()   ? lod::encodeMeshChunk(chunk)
+           : !chunk.segments.empty() ? lod::encodeStrandChunk(chunk)
+                                     : lod::encodeChunk(chunk);
 }
 
 namespace {
@@ -180,9 +210,13 @@ void changeText(std::string& text, const Dice& dice) {
 }
 
 void changeRecords(CraftedStore& c, const lod::Store& store, const Dice& dice) {
-    const size_t i = dice(c.nodes.size());
-    if (i >= store.hierarchy.nodes.size()) return;
-    auto chunk = lod::readChunk(store, static_cast<uint32_t>(i), true);
+    // Payloads in the order of the file are those of the nodes, one after the other.
+    std::vector<uint32_t> chunks;
+    for (uint32_t n = 0; n < store.hierarchy.nodes.size(); ++n)
+        store.hierarchy.forEachPayload(n, [&](uint32_t index) { chunks.push_back(index); });
+    const size_t i = dice(c.payloads.size());
+    if (i >= chunks.size()) return;
+    auto chunk = lod::readChunk(store, chunks[i], true);
     if (!chunk) return;
     for (uint64_t n = 1 + dice(3); n > 0; --n) {
         const auto change = [&](auto& items) {
@@ -201,24 +235,26 @@ void changeRecords(CraftedStore& c, const lod::Store& store, const Dice& dice) {
         change(chunk->records);
         change(chunk->segments);
     }
-    c.replaceChunk(i, encodeAgain(store.hierarchy, *chunk));
+    c.replaceChunk(i, encodeAgain(*chunk));
 }
 
 }  // namespace
 
 std::string mutate(CraftedStore& c, const lod::Store& store, const Dice& dice) {
     std::string what;
-    for (uint64_t n = 1 + dice(3); n > 0; --n) switch (dice(8)) {
+    for (uint64_t n = 1 + dice(3); n > 0; --n) switch (dice(11)) {
             case 0: {
                 // Of the head: what it says of space and errors, and what sizes it claims.
                 std::array<double*, 5> numbers{&c.head.origin[0], &c.head.origin[1], &c.head.origin[2], &c.head.unit,
                                                &c.head.smallestError};
-                std::array<uint64_t*, 5> claims{&c.claimNodeCount, &c.claimRawNodes, &c.claimRawCounts,
-                                                &c.claimRawDescription, &c.claimRawMesh};
-                const uint64_t k = dice(11);
+                std::array<uint64_t*, 9> claims{&c.claimNodeCount,      &c.claimRawNodes, &c.claimRawCounts,
+                                                &c.claimRawDescription, &c.claimRawMesh,  &c.claimRawPayloads,
+                                                &c.claimKinds,          &c.claimPayloads, &c.claimStreams};
+                const uint64_t k = dice(16);
                 if (k < 5) changeBytes(numbers.at(k), 8, dice);
-                if (k >= 5 && k < 10) *claims.at(k - 5) = oddNumber(dice, 1000);
-                if (k == 10) changeBytes(&c.head.rootLog2, 4, dice);
+                if (k >= 5 && k < 14) *claims.at(k - 5) = oddNumber(dice, 1000);
+                if (k == 14) changeBytes(&c.head.rootLog2, 4, dice);
+                if (k == 15) changeBytes(&c.head.isGraph, 4, dice);
                 what += " head";
                 break;
             }
@@ -239,6 +275,20 @@ std::string mutate(CraftedStore& c, const lod::Store& store, const Dice& dice) {
                 if (!c.mesh.empty()) changeBytes(c.mesh.data(), c.mesh.size(), dice);
                 what += " mesh";
                 break;
+            case 6:
+                changeBytes(&c.payloads.at(dice(c.payloads.size())), sizeof(PayloadOnDisk), dice);
+                what += " payload";
+                break;
+            case 7:
+                changeBytes(&c.streams.at(dice(c.streams.size())), sizeof(StreamOnDisk), dice);
+                what += " stream";
+                break;
+            case 8: {
+                auto& names = dice(2) == 0 ? c.kinds : c.codecs;
+                if (!names.empty()) changeBytes(&names.at(dice(names.size())), sizeof(NameOnDisk), dice);
+                what += " name";
+                break;
+            }
             default:
                 changeRecords(c, store, dice);
                 what += " records";

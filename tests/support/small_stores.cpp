@@ -3,6 +3,7 @@
 #include "lod/builder/progressive/progressive_build.h"
 #include "tests/support/crafted_store.h"
 #include "tests/support/meshes.h"
+#include "tests/support/mixed_store.h"
 #include "tests/support/strands.h"
 
 namespace stipple::test {
@@ -63,7 +64,8 @@ std::vector<std::string> smallStores(const std::string& folder) {
     }
     if (const auto built = lod::buildProgressiveStore(items, afar, far, *executor, silent); !built)
         throw std::runtime_error(built.error().line());
-    return {points, mesh, strands, afar, wide};
+    writeMixedStore(folder + "/mixed.stipple");
+    return {points, mesh, strands, afar, wide, folder + "/mixed.stipple"};
 }
 
 }  // namespace stipple::test

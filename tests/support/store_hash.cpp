@@ -34,7 +34,7 @@ uint64_t hashRecords(const lod::Store& store) {
         add(hash, chunk->clusters);
         add(hash, chunk->segments);
         add(hash, chunk->texels);
-        if (i >= h.nodes.size() || h.nodes[i].attributeBytes == 0) continue;
+        if (h.isTile(i) || h.payload(i).attributeBytes == 0) continue;
         for (size_t k = 0; k < store.description.attributes.size(); ++k) {
             const auto values = lod::readAttribute(store, i, k);
             if (!values) throw std::runtime_error(values.error().line());
@@ -51,6 +51,8 @@ uint64_t hashTable(const lod::Store& store) {
     for (const lod::Node& n : h.nodes)
         addFields(hash, n.centre, n.radius, n.parent, n.firstChild, n.records, n.cell, n.level, n.childMask,
                   n.errorCode, n.stepShift, n.normalCone, n.normalConeCosine);
+    for (const lod::FurtherPayload& p : h.further)
+        addFields(hash, p.node, p.kind, p.records, p.errorCode, p.stepShift);
     return hash;
 }
 

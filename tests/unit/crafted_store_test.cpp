@@ -21,7 +21,7 @@ using test::CraftedStore;
 
 class Crafted : public testing::Test {
   protected:
-    enum Kind { points, mesh, strands, afar, wide };
+    enum Kind { points, mesh, strands, afar, wide, mixed };
     static void SetUpTestSuite() {
         folder_ = new test::TempFolder;
         paths_ = test::smallStores(folder_->path());
@@ -61,7 +61,7 @@ class Crafted : public testing::Test {
         auto chunk = lod::readChunk(store, node, true);
         change(*chunk);
         CraftedStore c = take(kind);
-        c.replaceChunk(node, test::encodeAgain(store.hierarchy, *chunk));
+        c.replaceChunk(node, test::encodeAgain(*chunk));
         return c;
     }
     template <typename T>
@@ -83,10 +83,10 @@ test::TempFolder* Crafted::folder_ = nullptr;
 std::vector<std::string> Crafted::paths_;
 
 TEST_F(Crafted, WhatIsOnlyWrittenAgainIsFine) {
-    for (const Kind kind : {points, mesh, strands, afar, wide}) {
+    for (const Kind kind : {points, mesh, strands, afar, wide, mixed}) {
         CraftedStore c = take(kind);
         const lod::Store store = open(kind);
-        c.replaceChunk(0, test::encodeAgain(store.hierarchy, *lod::readChunk(store, 0, true)));
+        c.replaceChunk(0, test::encodeAgain(*lod::readChunk(store, 0, true)));
         const auto again = lod::openStore(written(c));
         ASSERT_TRUE(again) << again.error().line();
         const auto verified = lod::verifyStore(*again, *executor_);
@@ -118,8 +118,8 @@ TEST_F(Crafted, RecordsThatTheBytesCannotHoldAreRefusedBeforeMemoryIsTaken) {
         CraftedStore c = take(kind);
         const uint32_t most = ~0u;
         size_t used = 0;
-        for (size_t i = 0; i + 1 < c.nodes.size(); ++i) used += c.nodes[i].parentCodes + c.nodes[i].ownCodes;
-        NodeOnDisk& last = c.nodes.back();
+        for (size_t i = 0; i + 1 < c.payloads.size(); ++i) used += c.payloads[i].parentCodes + c.payloads[i].ownCodes;
+        lod::layout::PayloadOnDisk& last = c.payloads.back();
         last.records = most;
         for (size_t k = 0; k < last.parentCodes + last.ownCodes; ++k) c.counts[used + k].count = 0;
         if (kind != mesh && kind != wide) c.counts[used].count = c.counts[used + last.parentCodes].count = most;
@@ -133,8 +133,10 @@ TEST_F(Crafted, WhatTheHeadClaimsIsCheckedBeforeMemoryIsTaken) {
     c.claimNodeCount = c.nodes.size() + (uint64_t{1} << 60);
     static_assert(sizeof(NodeOnDisk) % 16 == 0, "2^60 of them wrap to 0");
     expectRefused(c, "not possible");
-    for (uint64_t CraftedStore::*claim : {&CraftedStore::claimRawNodes, &CraftedStore::claimRawCounts,
-                                          &CraftedStore::claimRawDescription, &CraftedStore::claimRawMesh})
+    for (uint64_t CraftedStore::*claim :
+         {&CraftedStore::claimRawNodes, &CraftedStore::claimRawCounts, &CraftedStore::claimRawDescription,
+          &CraftedStore::claimRawMesh, &CraftedStore::claimRawPayloads, &CraftedStore::claimPayloads,
+          &CraftedStore::claimStreams, &CraftedStore::claimKinds})
         for (const uint64_t bytes : {uint64_t{13} << 30, uint64_t{1} << 62}) {
             c = take(mesh);
             c.*claim = bytes;
@@ -221,13 +223,13 @@ TEST_F(Crafted, GroupsOfWideMeshesLieOnTheirLattice) {
     const std::string text = "group " + std::to_string(counted);
     for (const int8_t shift : {int8_t{2}, int8_t{-1}, int8_t{127}}) {
         CraftedStore c = take(wide);
-        c.nodes[counted].stepShift = shift;
+        c.payloads[counted].stepShift = shift;
         expectRefused(c, text);
     }
     // Vertices are pairs or are none: read as the other they lie outside of the group's sphere or their cluster.
     for (const uint32_t group : {counted, paired}) {
         CraftedStore c = take(wide);
-        c.nodes[group].stepShift = static_cast<int8_t>(1 - c.nodes[group].stepShift);
+        c.payloads[group].stepShift = static_cast<int8_t>(1 - c.payloads[group].stepShift);
         const std::string path = written(c);
         const auto opened = lod::openStore(path);
         EXPECT_FALSE(opened && lod::verifyStore(*opened, *executor_)) << group;
@@ -282,9 +284,8 @@ TEST_F(Crafted, RunsOfGroupsAreTheirOwn) {
     group.vertices = before.vertices;
     group.clusters = before.clusters;
     put(c, c.groupsAt() + last * sizeof(group), group);
-    c.nodes[last].records = c.nodes[last - 1].records;
-    c.nodes[last].chunkOffset = c.nodes[last - 1].chunkOffset;
-    c.nodes[last].chunkBytes = c.nodes[last - 1].chunkBytes;
+    c.payloads[last].records = c.payloads[last - 1].records;
+    c.streamOf(last) = c.streamOf(last - 1);
     expectRefused(c, "group " + std::to_string(last));
     c = take(mesh);
     group = store.hierarchy.groups[0];
@@ -297,7 +298,7 @@ TEST_F(Crafted, RunsOfGroupsAreTheirOwn) {
 /// Any fields of any store, seeded. What is opened is drawn by both backends, and verified, at once and without harm.
 TEST_F(Crafted, AnyChangedFieldIsRefusedOrDrawnInTime) {
     int opened = 0;
-    for (const Kind kind : {points, mesh, strands, afar, wide}) {
+    for (const Kind kind : {points, mesh, strands, afar, wide, mixed}) {
         const CraftedStore whole = take(kind);
         const lod::Store store = open(kind);
         for (uint64_t seed = 0; seed < 150; ++seed) {

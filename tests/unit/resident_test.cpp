@@ -5,7 +5,7 @@
 #include <set>
 
 #include "engine/cpu/cpu_backend.h"
-#include "lod/kinds.h"
+#include "lod/primitives/kinds.h"
 #include "lod/resident.h"
 #include "tests/support/meshes.h"
 #include "tests/support/strands.h"
@@ -165,7 +165,7 @@ TEST_F(Resident, ThePlanIsFullAndHangsTogether) {
             EXPECT_GT(plan.refused, 0u);
             lod::selectCut({hierarchies, instances, {}}, {plan.chunks}, view, {0.25}, scratch, cut);
             std::set<uint32_t> wanted;
-            for (const lod::CutWanted& w : cut.wanted) wanted.insert(w.node);
+            for (const lod::CutWanted& w : cut.wanted) wanted.insert(w.chunk);
             EXPECT_EQ(plan.refused, wanted.size());
             for (uint32_t n = 0; n < h.chunks(); ++n) {
                 bool isReached = true;

@@ -17,15 +17,15 @@ class CountingSink final : public ChunkSink {
     ~CountingSink() override { EXPECT_EQ(alive.size(), 0u) << "chunks leaked"; }
     Result<void> upload(ChunkKey key, const lod::Chunk& chunk) override {
         if (refuse) return fail(ErrorKind::budget, "no room in the sink");
-        EXPECT_TRUE(alive.insert({key.source, key.node}).second);
+        EXPECT_TRUE(alive.insert({key.source, key.chunk}).second);
         bytes += chunk.sizeBytes();
         most = std::max(most, bytes);
-        sizes[{key.source, key.node}] = chunk.sizeBytes();
+        sizes[{key.source, key.chunk}] = chunk.sizeBytes();
         return {};
     }
     void evict(ChunkKey key) override {
-        EXPECT_EQ(alive.erase({key.source, key.node}), 1u);
-        bytes -= sizes[{key.source, key.node}];
+        EXPECT_EQ(alive.erase({key.source, key.chunk}), 1u);
+        bytes -= sizes[{key.source, key.chunk}];
     }
     std::set<std::pair<uint32_t, uint32_t>> alive;
     std::map<std::pair<uint32_t, uint32_t>, uint64_t> sizes;

@@ -34,9 +34,12 @@ void writeTables(const std::vector<Group>& groups, const Lattice& lattice, Hiera
     std::vector<std::vector<uint32_t>> parents(count);
     h.nodes.resize(count);
     h.groups.resize(count);
+    h.isGraph = true;
     for (uint32_t i = 0; i < count; ++i) {
         const Group& g = groups[count - 1 - i];
         h.nodes[i] = g.node;
+        setKind(h.nodes[i], Kind::triangles);
+        h.nodes[i].group = i;
         h.groups[i] = g.counts;
         h.nodes[i].errorCode =
             static_cast<uint8_t>(g.error >= Group::kRootError ? ErrorScale::kNoParent : h.errors.encodeUp(g.error));

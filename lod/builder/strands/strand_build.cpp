@@ -301,6 +301,7 @@ class StrandBuild : public CellContent {
         Hierarchy hierarchy = assemble(frame(), batches_);
         batches_ = {};
         hierarchy.isStrands = true;
+        for (Node& node : hierarchy.nodes) setKind(node, Kind::curves);
         description = settings_.description;
         description.isStrands = true;
         description.points = facts_.parts;

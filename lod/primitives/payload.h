@@ -1,0 +1,66 @@
+// What a node holds of one kind of primitive. A node has up to four payloads, e.g. patches and the points that no patch
+// fits; each has its own errors, its own codec and its own streams, which are found by their ids.
+#pragma once
+
+#include <cstdint>
+
+namespace stipple::lod {
+
+/// Kinds of primitives; what is known of each stands in the table of kinds.h. Files name them: the numbers are those of
+/// this program.
+enum class Kind : uint8_t { points, curves, triangles };
+inline constexpr size_t kKinds = 3;
+
+/// How records are coded; a source may bring its own. What is known of each stands in the table of codecs.h, and files
+/// name them, too.
+enum class Codec : uint8_t { points, curves, triangles };
+inline constexpr size_t kCodecs = 3;
+
+inline constexpr uint32_t kMostPayloads = 4;
+
+/// What a stream of a payload holds. Ids that a reader does not know are none of its business.
+enum class StreamId : uint16_t {
+    records = 1,     ///< what the codec decodes
+    attributes = 2,  ///< values of every record (lod/attributes.h)
+    // Kept for what is to come:
+    normals = 3,
+    surfelWeights = 4,
+    material = 5,
+    spacingCode = 6,
+};
+
+/// Bytes of the file.
+struct Stream {
+    uint64_t offset = 0, hash = 0;
+    uint32_t bytes = 0;
+    StreamId id = StreamId::records;
+};
+
+/// Records of a node with a code greater than c, for every c: a step function over a short range of codes.
+struct CodeCounts {
+    uint32_t first = 0;      ///< into Hierarchy::greaterThan
+    uint8_t lo = 0, hi = 0;  ///< codes below lo: all records; from hi on: none
+};
+
+struct Payload {
+    uint32_t records = 0;
+    uint32_t chunkBytes = 0;  ///< of the stream of records, compressed
+    uint64_t chunkOffset = 0, chunkHash = 0;
+    uint64_t attributeHash = 0;
+    uint32_t attributeBytes = 0;  ///< of the stream of attributes, which follows that of records
+    CodeCounts parentCounts, ownCounts;
+    uint32_t firstStream = 0, streams = 0;  ///< further streams, into Hierarchy::streams
+    uint32_t group = 0;                     ///< of triangles: into Hierarchy::groups
+    Kind kind = Kind::points;
+    Codec codec = Codec::points;
+    uint8_t errorCode = 0;  ///< largest own error among the records
+    int8_t stepShift = 0;   ///< position step of the records: 2^stepShift lattice units
+};
+
+/// `kind` as this program codes it.
+inline void setKind(Payload& p, Kind kind) {
+    p.kind = kind;
+    p.codec = static_cast<Codec>(kind);
+}
+
+}  // namespace stipple::lod
