@@ -73,10 +73,32 @@ inline double pixelsOf(const CutScratch::Slot& slot, uint32_t code, int32_t epsi
     return epsilon == kInside ? 1e6 : error * std::exp2(-static_cast<double>(epsilon) / kStepsPerOctave);
 }
 
+/// Of a payload of records: the first ones that are looked at, and those among them that are left to the children.
+struct Prefix {
+    uint32_t count, tooCoarse;
+};
+inline Prefix prefixOf(const Hierarchy& h, const Payload& p, const Asked& asked) {
+    return {h.countGreater(p.parentCounts, p.records, asked.parentCode),
+            asked.octantMask != 0 ? 0 : h.countGreater(p.ownCounts, p.records, asked.code)};
+}
+
 /// Error, px, of what is drawn of a payload whose largest own error is `errorCode`.
 inline double deliveredPixels(const CutScratch::Slot& slot, uint32_t errorCode, const Asked& asked) {
     const uint32_t drawn = asked.octantMask ? errorCode : std::min(errorCode, asked.code);
     return pixelsOf(slot, drawn, drawn > asked.largestCode ? kInside : asked.epsilon);
+}
+
+/// emitRecords, of a payload whose node and frame are at hand.
+inline void appendRecords(const CutScratch::Slot& slot, const Hierarchy& h, uint32_t instance, uint32_t node,
+                          uint32_t chunk, const Payload& p, const Asked& asked, Cut& cut) {
+    const auto [count, tooCoarse] = prefixOf(h, p, asked);
+    if (count == 0) return;
+    cut.counters.recordsDrawn += count - tooCoarse;
+    cut.counters.recordsTested += count;
+    const double delivered = deliveredPixels(slot, p.errorCode, asked);
+    if (asked.octantMask) cut.tauEffective = std::max(cut.tauEffective, delivered);
+    if (count > tooCoarse)
+        cut.draw.push_back({instance, node, chunk, count, asked.code, asked.octantMask, static_cast<float>(delivered)});
 }
 
 /// Entries of kinds.h: what cuts of octrees have of payloads ...

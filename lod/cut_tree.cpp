@@ -7,6 +7,51 @@
 namespace stipple::lod {
 namespace {
 
+// What a walk asks of the payloads of nodes, whatever they are ...
+struct AnyPayloads {
+    const Hierarchy& h;
+    uint32_t errorCode(uint32_t node) const { return h.errorCodeOf(node); }
+    template <typename Use>
+    void forEach(uint32_t node, const Use& use) const {
+        h.forEachPayload(node, use);
+    }
+    uint64_t cost(uint32_t node, const Asked& asked) const {
+        uint64_t records = 0;
+        forEach(node, [&](uint32_t chunk) { records += traitsOf(kindOf(h, chunk)).cutCost(h, chunk, asked); });
+        return records;
+    }
+    void emit(const CutFrame& frame, const CutScratch::Slot&, uint32_t i, uint32_t node, const Asked& asked,
+              Cut& cut) const {
+        forEach(node, [&](uint32_t chunk) { traitsOf(kindOf(h, chunk)).cutEmit(frame, i, chunk, asked, cut); });
+    }
+};
+/// ... and where every node has one, of records: the same, without asking the table of kinds at each node.
+struct OneOfRecords {
+    const Hierarchy& h;
+    static bool isAll(const Hierarchy& h) { return !h.isMixed && traitsOf(h.nodes[0].kind).cutEmit == emitRecords; }
+    uint32_t errorCode(uint32_t node) const { return h.nodes[node].errorCode; }
+    template <typename Use>
+    void forEach(uint32_t node, const Use& use) const {
+        use(node);
+    }
+    uint64_t cost(uint32_t node, const Asked& asked) const {
+        const Prefix prefix = prefixOf(h, h.nodes[node], asked);
+        return prefix.count - prefix.tooCoarse;
+    }
+    void emit(const CutFrame&, const CutScratch::Slot& slot, uint32_t i, uint32_t node, const Asked& asked,
+              Cut& cut) const {
+        appendRecords(slot, h, i, node, node, h.nodes[node], asked, cut);
+    }
+};
+
+/// Can all payloads of a node be drawn?
+template <typename Payloads>
+bool isThere(const Payloads& of, const std::vector<uint8_t>& drawable, uint32_t node) {
+    bool all = true;
+    of.forEach(node, [&](uint32_t chunk) { all = all && drawable[chunk] != 0; });
+    return all;
+}
+
 /// The largest code of an error that a view may allow. Where the scale ends below twice the diagonal of the root, the
 /// last code stands for whatever is larger.
 uint32_t largestAllowed(const Hierarchy& h) {
@@ -31,9 +76,9 @@ struct OnTheWay {
 
 /// Calls use(at) for every node in view that any record may be drawn of, parents first; it says whether to go on.
 /// onCulled(): of one out of view. `isReached(node)`: may its children be looked at?
-template <typename OnCulled, typename IsReached, typename Use>
-void walkTree(const CutFrame& frame, uint32_t i, int step, const OnCulled& onCulled, const IsReached& isReached,
-              const Use& use) {
+template <typename Payloads, typename OnCulled, typename IsReached, typename Use>
+void walkTree(const Payloads& of, const CutFrame& frame, uint32_t i, int step, const OnCulled& onCulled,
+              const IsReached& isReached, const Use& use) {
     const Hierarchy& h = frame.hierarchyOf(i);
     const CutScratch::Slot& slot = slotOf(frame, i);
     const uint32_t largest = largestAllowed(h);
@@ -53,30 +98,23 @@ void walkTree(const CutFrame& frame, uint32_t i, int step, const OnCulled& onCul
             index == 0 ? ErrorScale::kLargest : std::min(codeOf(slot, parentEpsilon, step), largest);
         const uint32_t code = std::min(codeOf(slot, epsilon, step), largest);
         if (!use(OnTheWay{index, epsilon, parentEpsilon, code, parentCode})) return;
-        if (h.errorCodeOf(index) <= code || !isReached(index)) continue;
+        if (of.errorCode(index) <= code || !isReached(index)) continue;
         const auto children = static_cast<uint32_t>(__builtin_popcount(node.childMask));
         for (uint32_t c = 0; c < children; ++c) stack.push_back(node.firstChild + c);
     }
 }
 
-/// Can all payloads of a node be drawn?
-bool isThere(const Hierarchy& h, const std::vector<uint8_t>& drawable, uint32_t node) {
-    if (h.further.empty()) return drawable[node] != 0;
-    bool all = true;
-    h.forEachPayload(node, [&](uint32_t chunk) { all = all && drawable[chunk] != 0; });
-    return all;
-}
-
 /// Octants of children that are in view and cannot be drawn.
-uint32_t missingOctants(const CutFrame& frame, const Hierarchy& h, const CutScratch::Slot& slot,
+template <typename Payloads>
+uint32_t missingOctants(const Payloads& of, const CutFrame& frame, const Hierarchy& h, const CutScratch::Slot& slot,
                         const std::vector<uint8_t>& drawable, const OnTheWay& at) {
     const Node& node = h.nodes[at.index];
-    if (h.errorCodeOf(at.index) <= at.code) return 0;
+    if (of.errorCode(at.index) <= at.code) return 0;
     uint32_t mask = 0, child = node.firstChild;
     for (uint32_t octant = 0; octant < 8; ++octant) {
         if (!(node.childMask >> octant & 1u)) continue;
         // A child out of view is not drawn and not missing either.
-        if (!isThere(h, drawable, child) && epsilonOf(frame, h, slot, child, at.epsilon) != kCulled)
+        if (!isThere(of, drawable, child) && epsilonOf(frame, h, slot, child, at.epsilon) != kCulled)
             mask |= 1u << octant;
         ++child;
     }
@@ -84,10 +122,11 @@ uint32_t missingOctants(const CutFrame& frame, const Hierarchy& h, const CutScra
 }
 
 /// True if every ancestor is drawable (a child whose parent's chunk is missing is covered by a coarser ancestor).
-bool hangsTogether(const std::vector<uint8_t>& drawable, const Hierarchy& h, uint32_t index) {
+template <typename Payloads>
+bool hangsTogether(const Payloads& of, const std::vector<uint8_t>& drawable, const Hierarchy& h, uint32_t index) {
     while (index != 0) {
         index = h.nodes[index].parent;
-        if (!isThere(h, drawable, index)) return false;
+        if (!isThere(of, drawable, index)) return false;
     }
     return true;
 }
@@ -97,58 +136,54 @@ Asked askedOf(const OnTheWay& at, uint32_t octantMask, uint32_t largest) {
     return {at.code, at.parentCode, octantMask, at.epsilon, largest};
 }
 
-}  // namespace
-
-CutCost costOfTree(const CutFrame& frame, uint32_t i, int step, uint64_t most, Counted counted,
-                   ActiveMembers* /*members*/) {
+template <typename Payloads>
+CutCost costOfWalk(const Payloads& of, const CutFrame& frame, uint32_t i, int step, uint64_t most, Counted counted) {
     const Hierarchy& h = frame.hierarchyOf(i);
     const std::vector<uint8_t>& drawable = frame.drawableOf(i);
     CutCost cost;
     const auto add = [&](const OnTheWay& at, uint32_t octantMask) {
-        const Asked asked = askedOf(at, octantMask, ErrorScale::kLargest);
-        h.forEachPayload(at.index,
-                         [&](uint32_t chunk) { cost.records += traitsOf(kindOf(h, chunk)).cutCost(h, chunk, asked); });
+        cost.records += of.cost(at.index, askedOf(at, octantMask, ErrorScale::kLargest));
         return cost.records <= most;
     };
     if (counted == Counted::all) {
         walkTree(
-            frame, i, step, [] {}, [](uint32_t) { return true; },
+            of, frame, i, step, [] {}, [](uint32_t) { return true; },
             [&](const OnTheWay& at) {
-                cost.isWhole = cost.isWhole && isThere(h, drawable, at.index);
+                cost.isWhole = cost.isWhole && isThere(of, drawable, at.index);
                 return add(at, 0);
             });
         return cost;
     }
     const CutScratch::Slot& slot = slotOf(frame, i);
-    const auto isReached = [&](uint32_t index) { return isThere(h, drawable, index); };
+    const auto isReached = [&](uint32_t index) { return isThere(of, drawable, index); };
     walkTree(
-        frame, i, step, [] {}, isReached,
+        of, frame, i, step, [] {}, isReached,
         [&](const OnTheWay& at) {
             cost.isWhole = cost.isWhole && isReached(at.index);
-            return !isReached(at.index) || add(at, missingOctants(frame, h, slot, drawable, at));
+            return !isReached(at.index) || add(at, missingOctants(of, frame, h, slot, drawable, at));
         });
     return cost;
 }
 
-void emitTree(const CutFrame& frame, uint32_t i, int step, ActiveMembers& /*members*/, Cut& cut) {
+template <typename Payloads>
+void emitWalk(const Payloads& of, const CutFrame& frame, uint32_t i, int step, Cut& cut) {
     const Hierarchy& h = frame.hierarchyOf(i);
     const uint32_t source = frame.instance(i).source, largest = largestAllowed(h);
     const std::vector<uint8_t>& drawable = frame.drawableOf(i);
     const CutScratch::Slot& slot = slotOf(frame, i);
-    const size_t firstDraw = cut.draw.size(), firstMesh = cut.meshDraw.size();
     const auto onCulled = [&] {
         ++cut.counters.nodesVisited;
         ++cut.counters.nodesCulled;
     };
     const auto priorityOf = [&](const OnTheWay& at) {
         const Node& node = h.nodes[at.index];
-        const double pixels = at.index == 0 ? 1e9 : pixelsOf(slot, h.errorCodeOf(node.parent), at.parentEpsilon);
+        const double pixels = at.index == 0 ? 1e9 : pixelsOf(slot, of.errorCode(node.parent), at.parentEpsilon);
         return static_cast<float>(pixels * std::exp2(8.0 - node.level));
     };
     const auto take = [&](const OnTheWay& at) {
         ++cut.counters.nodesVisited;
         bool isWhole = true;
-        h.forEachPayload(at.index, [&](uint32_t chunk) {
+        of.forEach(at.index, [&](uint32_t chunk) {
             if (drawable[chunk]) {
                 cut.keep.emplace_back(source, chunk);
                 return;
@@ -158,14 +193,31 @@ void emitTree(const CutFrame& frame, uint32_t i, int step, ActiveMembers& /*memb
         });
         cut.counters.nodesMissing += isWhole ? 0 : 1;
         // Only what hangs together with the root is drawn: a node whose parent is missing is covered above.
-        if (!isWhole || !hangsTogether(drawable, h, at.index)) return true;
-        const Asked asked = askedOf(at, missingOctants(frame, h, slot, drawable, at), largest);
-        h.forEachPayload(at.index,
-                         [&](uint32_t chunk) { traitsOf(kindOf(h, chunk)).cutEmit(frame, i, chunk, asked, cut); });
+        if (isWhole && hangsTogether(of, drawable, h, at.index))
+            of.emit(frame, slot, i, at.index, askedOf(at, missingOctants(of, frame, h, slot, drawable, at), largest),
+                    cut);
         return true;
     };
     walkTree(
-        frame, i, step, onCulled, [](uint32_t) { return true; }, take);
+        of, frame, i, step, onCulled, [](uint32_t) { return true; }, take);
+}
+
+}  // namespace
+
+CutCost costOfTree(const CutFrame& frame, uint32_t i, int step, uint64_t most, Counted counted,
+                   ActiveMembers* /*members*/) {
+    const Hierarchy& h = frame.hierarchyOf(i);
+    return OneOfRecords::isAll(h) ? costOfWalk(OneOfRecords{h}, frame, i, step, most, counted)
+                                  : costOfWalk(AnyPayloads{h}, frame, i, step, most, counted);
+}
+
+void emitTree(const CutFrame& frame, uint32_t i, int step, ActiveMembers& /*members*/, Cut& cut) {
+    const Hierarchy& h = frame.hierarchyOf(i);
+    const size_t firstDraw = cut.draw.size(), firstMesh = cut.meshDraw.size();
+    if (OneOfRecords::isAll(h))
+        emitWalk(OneOfRecords{h}, frame, i, step, cut);
+    else
+        emitWalk(AnyPayloads{h}, frame, i, step, cut);
     std::sort(
         cut.draw.begin() + static_cast<std::ptrdiff_t>(firstDraw), cut.draw.end(),
         [](const CutDraw& a, const CutDraw& b) { return a.node != b.node ? a.node < b.node : a.chunk < b.chunk; });
