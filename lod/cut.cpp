@@ -30,8 +30,6 @@ CutScratch::Slot& slotOf(const CutFrame& frame, uint32_t i) {
 
 namespace {
 
-constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max();
-
 CutCost costOf(const CutFrame& frame, uint32_t i, int step, uint64_t most, Counted counted = Counted::all,
                ActiveMembers* members = nullptr) {
     return shapeOf(frame.hierarchyOf(i)).cutCost(frame, i, step, most, counted, members);
@@ -103,7 +101,8 @@ CutCost costOfBest(const CutFrame& frame, uint32_t i, int step, uint64_t most, C
     return costOf(frame, best, step, most, counted, &members);
 }
 
-/// Records and triangles of the whole cut at `step`; stops counting above the budget.
+}  // namespace
+
 CutCost costOfCut(const CutFrame& frame, int step, uint64_t budget, Counted counted) {
     ActiveMembers members{frame.scratch.members};
     members.clear();
@@ -119,43 +118,7 @@ CutCost costOfCut(const CutFrame& frame, int step, uint64_t budget, Counted coun
     return total;
 }
 
-/// A step of tau, and whether everything that it needs can be drawn.
-struct Step {
-    int step;
-    bool isWhole;
-};
-
-/// The smallest step >= target whose full cut fits the budget (cost falls with the step).
-Step stepForBudget(const CutFrame& frame, int target, uint64_t budget, CutCounters& counters) {
-    if (budget == kNoLimit) return {target, true};
-    bool isWhole = false;  // of the last that fitted
-    const auto fits = [&](int step) {
-        ++counters.evaluations;
-        const CutCost cost = costOfCut(frame, step, budget, Counted::all);
-        if (cost.records > budget) return false;
-        isWhole = cost.isWhole;
-        return true;
-    };
-    // From the coarse side, so that no evaluation walks much more than the budget's worth of nodes.
-    int hi = std::max(target, 0) + 8 * kStepsPerOctave;
-    while (hi < kLargestTauStep && !fits(hi)) hi = std::min(hi + 8 * kStepsPerOctave, kLargestTauStep);
-    int lo = target;
-    if (fits(lo)) return {lo, isWhole};
-    while (hi - lo > 1) {
-        const int middle = lo + (hi - lo) / 2;
-        (fits(middle) ? hi : lo) = middle;
-    }
-    return {hi, isWhole};
-}
-
-/// The step whose cut is drawn. Missing chunks put parents in the place of children. That draws fewer records, except
-/// where children are partly out of view: then the step is raised until what can be drawn fits.
-int stepToDraw(const CutFrame& frame, const Step& planned, uint64_t budget) {
-    int step = planned.step;
-    if (planned.isWhole) return step;
-    while (step < kLargestTauStep && costOfCut(frame, step, budget, Counted::drawable).records > budget) ++step;
-    return step;
-}
+namespace {
 
 void emitBest(const CutFrame& frame, uint32_t i, int step, ActiveMembers& members, Cut& cut) {
     uint32_t best = chooseFor(frame, i, step).instance;
@@ -207,7 +170,13 @@ void truncate(uint64_t budget, Cut& cut) {
     cut.counters.trianglesDrawn = triangles;
 }
 
-void beginFrame(const CutFrame& frame, Cut& cut) {
+double tauAt(int step, int target, double tau) {
+    return step == target ? tau : std::exp2(static_cast<double>(step) / kStepsPerOctave);
+}
+
+}  // namespace
+
+void beginCut(const CutFrame& frame, Cut& cut) {
     cut.draw.clear();
     cut.meshDraw.clear();
     cut.wanted.clear();
@@ -224,25 +193,22 @@ void beginFrame(const CutFrame& frame, Cut& cut) {
     for (const Crowd& group : frame.scene.crowds) scratch.isReady.push_back(isReady(frame, group) ? 1 : 0);
 }
 
-double tauAt(int step, int target, double tau) {
-    return step == target ? tau : std::exp2(static_cast<double>(step) / kStepsPerOctave);
+void emitCutAt(const CutFrame& frame, const PlannedStep& step, const Target& target, uint64_t budget, Cut& cut) {
+    cut.tauTarget = tauAt(step.planned, target.step, target.tau);
+    emitCut(frame, step.drawn, cut);
+    cut.tauEffective = std::max(cut.tauEffective, tauAt(step.drawn, target.step, target.tau));
+    if (cut.counters.recordsDrawn + cut.counters.trianglesDrawn > budget) truncate(budget, cut);
+    cut.counters.nodesDrawn += cut.draw.size();
 }
-
-}  // namespace
 
 void selectCut(const CutScene& scene, const Residency& residency, const View& view, const Budgets& budgets,
                CutScratch& scratch, Cut& cut) {
     const CutFrame frame{scene, residency, view, scratch};
-    beginFrame(frame, cut);
-    const double tau = std::max(budgets.errorPixels, 1e-6);
-    const int target = static_cast<int>(std::floor(kStepsPerOctave * std::log2(tau)));
-    const Step planned = stepForBudget(frame, target, budgets.records, cut.counters);
-    const int step = stepToDraw(frame, planned, budgets.records);
-    cut.tauTarget = tauAt(planned.step, target, tau);
-    emitCut(frame, step, cut);
-    cut.tauEffective = std::max(cut.tauEffective, tauAt(step, target, tau));
-    if (cut.counters.recordsDrawn + cut.counters.trianglesDrawn > budgets.records) truncate(budgets.records, cut);
-    cut.counters.nodesDrawn += cut.draw.size();
+    beginCut(frame, cut);
+    const Target target(budgets.errorPixels);
+    const auto cost = [&](int step, uint64_t most, Counted counted) { return costOfCut(frame, step, most, counted); };
+    const PlannedStep step = planStep(cost, target.step, budgets.records, cut.counters);
+    emitCutAt(frame, step, target, budgets.records, cut);
 }
 
 }  // namespace stipple::lod

@@ -3,10 +3,14 @@
 #pragma once
 
 #include <cmath>
+#include <functional>
+#include <limits>
+#include <span>
 
 #include "lod/cut.h"
 #include "lod/cut_view.h"
 #include "lod/primitives/kinds.h"
+#include "lod/resident.h"
 
 namespace stipple::lod {
 
@@ -81,6 +85,64 @@ inline Prefix prefixOf(const Hierarchy& h, const Payload& p, const Asked& asked)
     return {h.countGreater(p.parentCounts, p.records, asked.parentCode),
             asked.octantMask != 0 ? 0 : h.countGreater(p.ownCounts, p.records, asked.code)};
 }
+
+// ---- the cut of one view, in the parts that cuts of several views are made of
+
+inline constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max();
+
+/// tau that is asked for, and its step.
+struct Target {
+    explicit Target(double errorPixels)
+        : tau(std::max(errorPixels, 1e-6)), step(static_cast<int>(std::floor(kStepsPerOctave * std::log2(tau)))) {}
+    double tau;
+    int step;
+};
+/// The step whose full cut fits a budget, and the one of what is drawn: missing chunks put parents in the place of
+/// children. That draws fewer records, except where children are partly out of view: then the step is raised until what
+/// can be drawn fits.
+struct PlannedStep {
+    int planned = 0, drawn = 0;
+};
+
+/// Empties `cut`, and begins a frame of the view's scratch.
+void beginCut(const CutFrame& frame, Cut& cut);
+/// Records and triangles of the whole cut at `step`; stops counting above the budget.
+CutCost costOfCut(const CutFrame& frame, int step, uint64_t budget, Counted counted);
+void emitCutAt(const CutFrame& frame, const PlannedStep& step, const Target& target, uint64_t budget, Cut& cut);
+
+/// The smallest steps from `target` on that fit (cost falls with the step). cost(step, most, counted): as costOfCut.
+template <typename Cost>
+PlannedStep planStep(const Cost& cost, int target, uint64_t budget, CutCounters& counters) {
+    if (budget == kNoLimit) return {target, target};
+    bool isWhole = false;  // of the last that fitted
+    const auto fits = [&](int step) {
+        ++counters.evaluations;
+        const CutCost found = cost(step, budget, Counted::all);
+        if (found.records > budget) return false;
+        isWhole = found.isWhole;
+        return true;
+    };
+    // From the coarse side, so that no evaluation walks much more than the budget's worth of nodes.
+    int hi = std::max(target, 0) + 8 * kStepsPerOctave;
+    while (hi < kLargestTauStep && !fits(hi)) hi = std::min(hi + 8 * kStepsPerOctave, kLargestTauStep);
+    int lo = target;
+    if (fits(lo)) {
+        hi = lo;
+    } else {
+        while (hi - lo > 1) {
+            const int middle = lo + (hi - lo) / 2;
+            (fits(middle) ? hi : lo) = middle;
+        }
+    }
+    int drawn = hi;
+    if (!isWhole)
+        while (drawn < kLargestTauStep && cost(drawn, budget, Counted::drawable).records > budget) ++drawn;
+    return {hi, drawn};
+}
+
+/// As planResident of a view: cutOf(residency) is the cut of all that is shown, with what it misses and needs.
+void planResident(const CutScene& scene, uint64_t residentBytes, std::span<const std::pair<uint32_t, uint32_t>> barred,
+                  const std::function<const Cut&(const Residency&)>& cutOf, ResidentPlan& plan);
 
 /// Error, px, of what is drawn of a payload whose largest own error is `errorCode`.
 inline double deliveredPixels(const CutScratch::Slot& slot, uint32_t errorCode, const Asked& asked) {

@@ -14,7 +14,7 @@ namespace stipple::lod {
 
 struct ViewRequest {
     View view;
-    double errorPixels = 1;    ///< tau asked for; of primary views the smallest counts for all, and so of secondary ones
+    double errorPixels = 1;  ///< tau asked for; of primary views the smallest counts for all, and so of secondary ones
     bool isSecondary = false;  ///< seen by nobody: what it decides may be coarser
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "lod/cut_frame.h"
 #include "lod/primitives/kinds.h"
 
 namespace stipple::lod {
@@ -95,20 +96,33 @@ uint64_t countOf(std::vector<CutWanted> wanted) {
 
 }  // namespace
 
-void planResident(const CutScene& scene, const View& view, const Budgets& budgets, uint64_t residentBytes,
-                  std::span<const std::pair<uint32_t, uint32_t>> barred, CutScratch& scratch, Cut& cut,
-                  ResidentPlan& plan) {
+void planResident(const CutScene& scene, uint64_t residentBytes, std::span<const std::pair<uint32_t, uint32_t>> barred,
+                  const std::function<const Cut&(const Residency&)>& cutOf, ResidentPlan& plan) {
     Planner planner(scene, residentBytes, plan);
     plan.refused = 0;
     planner.fill(1);
     for (const auto& [source, chunk] : barred) plan.chunks[source][chunk] = 0;
-    selectCut(scene, {plan.chunks}, view, budgets, scratch, cut);
-    planner.keepOnly(cut);
+    planner.keepOnly(cutOf({plan.chunks}));
     if (planner.fits()) return;
     planner.beginRounds(barred);
-    do selectCut(scene, {plan.chunks}, view, budgets, scratch, cut);
-    while (planner.takeIn(cut));
-    plan.refused = countOf(cut.wanted);
+    for (;;) {
+        const Cut& cut = cutOf({plan.chunks});
+        if (planner.takeIn(cut)) continue;
+        plan.refused = countOf(cut.wanted);
+        return;
+    }
+}
+
+void planResident(const CutScene& scene, const View& view, const Budgets& budgets, uint64_t residentBytes,
+                  std::span<const std::pair<uint32_t, uint32_t>> barred, CutScratch& scratch, Cut& cut,
+                  ResidentPlan& plan) {
+    planResident(
+        scene, residentBytes, barred,
+        [&](const Residency& residency) -> const Cut& {
+            selectCut(scene, residency, view, budgets, scratch, cut);
+            return cut;
+        },
+        plan);
 }
 
 }  // namespace stipple::lod

@@ -10,6 +10,7 @@
 
 #include "engine/base/process.h"
 #include "engine/render/frame_passes.h"
+#include "engine/render/views.h"
 #include "lod/attributes.h"
 #include "lod/octahedral.h"
 #include "lod/store_check.h"
@@ -149,15 +150,8 @@ std::unique_ptr<FrameState> makeFrameState(std::vector<std::shared_ptr<const lod
     return makeFrameState(placed, backend, executor, settings);
 }
 
-namespace {
-
-/// From `start` on (seconds) it counts as time of the frame.
-Result<void> draw(FrameState& state, const lod::View& view, const FrameSettings& settings, double start, bool asks) {
-    streaming::Streamer& streamer = *state.streamer;
-    const double cutStart = nowSeconds();
-    lod::selectCut(state.scene(), streamer.residency(), view, settings.budgets, state.scratch, state.cut);
-    const double cutEnd = nowSeconds();
-    if (asks) streamer.request(state.cut);
+Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettings& settings, double start,
+                     double cutMs) {
     DrawSettings settingsOfMode = settings.draw;
     settingsOfMode.exactStrands = std::min(settings.draw.exactStrands, reconstructionOf(settings.mode).exactCurves);
     makeDrawList(state.cut, state.hierarchies, state.instances, view, settingsOfMode, state.draws);
@@ -175,7 +169,7 @@ Result<void> draw(FrameState& state, const lod::View& view, const FrameSettings&
 
     FrameCounters& c = state.counters;
     const lod::CutCounters& cut = state.cut.counters;
-    const streaming::StreamCounters& stream = streamer.counters();
+    const streaming::StreamCounters& stream = state.streamer->counters();
     c.nodesVisited = cut.nodesVisited;
     c.nodesDrawn = cut.nodesDrawn;
     c.nodesCulled = cut.nodesCulled;
@@ -200,9 +194,21 @@ Result<void> draw(FrameState& state, const lod::View& view, const FrameSettings&
     c.failures = stream.failures;
     c.refused = stream.refused;
     c.requestsInFlight = stream.inFlight;
-    c.cutMs = (cutEnd - cutStart) * 1e3;
+    c.cutMs = cutMs;
     c.frameMs = (nowSeconds() - start) * 1e3;
     return {};
+}
+
+namespace {
+
+/// From `start` on (seconds) it counts as time of the frame.
+Result<void> draw(FrameState& state, const lod::View& view, const FrameSettings& settings, double start, bool asks) {
+    streaming::Streamer& streamer = *state.streamer;
+    const double cutStart = nowSeconds();
+    lod::selectCut(state.scene(), streamer.residency(), view, settings.budgets, state.scratch, state.cut);
+    const double cutEnd = nowSeconds();
+    if (asks) streamer.request(state.cut);
+    return drawCut(state, view, settings, start, (cutEnd - cutStart) * 1e3);
 }
 
 }  // namespace
