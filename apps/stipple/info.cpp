@@ -203,8 +203,11 @@ void printStore(const nlohmann::json& j) {
 }
 
 Result<void> showNearest(const lod::Store& store, const Options& o) {
-    if (store.hierarchy.isMixed || store.hierarchy.nodes[0].kind != lod::Kind::points)
-        return fail(ErrorKind::usage, "holds no points: --at finds points", store.path, "leave --at out");
+    const bool isMixed = store.hierarchy.isMixed;
+    if (isMixed || store.hierarchy.nodes[0].kind != lod::Kind::points)
+        return fail(ErrorKind::usage,
+                    isMixed ? "holds more than points: --at finds points" : "holds no points: --at finds points",
+                    store.path, "leave --at out");
     STIPPLE_ASSIGN(const glm::dvec3 place, parseVector(o.at, "--at"));
     STIPPLE_ASSIGN(const lod::NearestPoint p, lod::findNearest(store, place));
     const uint32_t c = p.packed.colour;

@@ -51,8 +51,7 @@ uint64_t hashTable(const lod::Store& store) {
     for (const lod::Node& n : h.nodes)
         addFields(hash, n.centre, n.radius, n.parent, n.firstChild, n.records, n.cell, n.level, n.childMask,
                   n.errorCode, n.stepShift, n.normalCone, n.normalConeCosine);
-    for (const lod::FurtherPayload& p : h.further)
-        addFields(hash, p.node, p.kind, p.records, p.errorCode, p.stepShift);
+    for (const lod::FurtherPayload& p : h.further) addFields(hash, p.node, p.kind, p.records, p.errorCode, p.stepShift);
     return hash;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "engine/cpu/cpu_backend.h"
@@ -13,6 +14,7 @@
 #include "lod/primitives/kinds.h"
 #include "streaming/streamer.h"
 #include "tests/support/mixed_store.h"
+#include "tests/support/program.h"
 #include "tests/support/store_hash.h"
 #include "tests/support/support.h"
 
@@ -343,6 +345,39 @@ TEST_F(Payloads, OldVersionsWrittenAgainHoldTheSame) {
         const auto verified = lod::verifyStore(*now, *executor_);
         EXPECT_TRUE(verified) << verified.error().line();
     }
+}
+
+TEST_F(Payloads, InfoSaysWhatAStoreHas) {
+    const auto said = test::runProgram(folder_, "info mixed.stipple --verify --json");
+    ASSERT_EQ(said.code, 0) << said.err;
+    const auto json = nlohmann::json::parse(said.out);
+    EXPECT_EQ(json.at("primitive"), "records");
+    EXPECT_FALSE(json.at("errors_measured").get<bool>());
+    const lod::Hierarchy& h = mixed()->hierarchy;
+    uint64_t payloads = 0, records = 0;
+    std::set<std::string> kinds;
+    for (const auto& p : json.at("payloads")) {
+        kinds.insert(p.at("kind").get<std::string>());
+        EXPECT_EQ(p.at("codec").get<std::string>(), "meshopt-" + p.at("kind").get<std::string>());
+        payloads += p.at("payloads").get<uint64_t>();
+        records += p.at("records").get<uint64_t>();
+        const auto streams = p.at("streams").get<std::vector<int>>();
+        EXPECT_EQ(streams, p.at("kind") == "points" ? (std::vector{1, 6}) : std::vector{1});
+    }
+    EXPECT_EQ(kinds, (std::set<std::string>{"points", "curves", "triangles"}));
+    EXPECT_EQ(payloads, h.chunks());
+    EXPECT_EQ(records, json.at("records").get<uint64_t>());
+    const auto text = test::runProgram(folder_, "info mixed.stipple --verify");
+    EXPECT_NE(text.out.find("4 of triangles (meshopt-triangles): 608 records"), std::string::npos) << text.out;
+    EXPECT_NE(text.out.find("errors across kinds are not measured"), std::string::npos) << text.out;
+    // Of one kind there is nothing to list.
+    test::writeMixedStore(folder_ / "points.stipple", test::kMixedPoints);
+    const auto one = test::runProgram(folder_, "info points.stipple");
+    EXPECT_EQ(one.out.find("payloads"), std::string::npos) << one.out;
+    // What finds points says that there are other things.
+    const auto at = test::runProgram(folder_, "info mixed.stipple --at 0,0,0");
+    EXPECT_EQ(at.code, 2);
+    EXPECT_NE(at.err.find("holds more than points"), std::string::npos) << at.err;
 }
 
 /// Names in files are for ever: each is another, and fits.
