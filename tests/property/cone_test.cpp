@@ -190,7 +190,7 @@ TEST_F(Cones, VerifyingFindsOneThatHoldsItsOwnNormalsButNotThoseBelow) {
         ASSERT_TRUE(chunk);
         for (shared::PointRecord& r : chunk->records) r.normal = node.normalCone;
         test::CraftedStore crafted = whole;
-        crafted.replaceChunk(i, test::encodeAgain(store->hierarchy, *chunk));
+        crafted.replaceChunk(i, test::encodeAgain(*chunk));
         EXPECT_EQ(verified(crafted, folder_ / "b.stipple", *executor_), "") << "node " << i << ": other normals";
         crafted.nodes[i].normalConeCosine = 0.99999f;
         EXPECT_EQ(verified(crafted, folder_ / "b.stipple", *executor_),
