@@ -6,6 +6,7 @@
 #extension GL_EXT_buffer_reference_uvec2 : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #extension GL_EXT_shader_atomic_int64 : require
+#include "shared/bindings.h"
 #include "shared/frame.h"
 #include "shared/pack.h"
 #include "shared/pyramid.h"
@@ -14,33 +15,19 @@
 #include "shared/strand.h"
 #include "shared/visibility.h"
 
-layout(set = 0, binding = 0, scalar) readonly buffer FrameBlock { FrameConstants frame; };
-layout(set = 0, binding = 1, scalar) readonly buffer NodeBlock { DrawNode nodes[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer BlockBlock { DrawBlock blocks[]; };
-layout(set = 0, binding = 3, scalar) buffer VisibilityBlock { uint64_t visibility[]; };
-layout(set = 0, binding = 4, scalar) buffer TexelBlock { uint texels[]; };
-layout(set = 0, binding = 5, scalar) buffer StatsBlock { uint largestRadiusBits; };
-layout(set = 0, binding = 6, scalar) writeonly buffer ImageBlock { uint image[]; };
-layout(set = 0, binding = 7, scalar) writeonly buffer ExtraBlock { float extra[]; };  // depth, normal xyz, linear rgb
+layout(set = 0, binding = kFrameBinding, scalar) readonly buffer FrameBlock { FrameConstants frame; };
+layout(set = 0, binding = kNodesBinding, scalar) readonly buffer NodeBlock { DrawNode nodes[]; };
+layout(set = 0, binding = kBlocksBinding, scalar) readonly buffer BlockBlock { DrawBlock blocks[]; };
+layout(set = 0, binding = kVisibilityBinding, scalar) buffer VisibilityBlock { uint64_t visibility[]; };
+layout(set = 0, binding = kTexelsBinding, scalar) buffer TexelBlock { uint texels[]; };
+layout(set = 0, binding = kStatsBinding, scalar) buffer StatsBlock { uint largestRadiusBits; };
+layout(set = 0, binding = kImageBinding, scalar) writeonly buffer ImageBlock { uint image[]; };
+layout(set = 0, binding = kExtraBinding, scalar) writeonly buffer ExtraBlock { float extra[]; };  // depth, normal xyz, linear rgb
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Records { PointRecord records[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Segments { StrandSegment segments[]; };
 
-// One step of the pyramid: `fine` and `coarse` are word offsets of a level's five planes.
-layout(push_constant, scalar) uniform Step {
-    uint fine;
-    uint fineWidth;
-    uint fineHeight;
-    uint coarse;
-    uint coarseWidth;
-    uint coarseHeight;
-    uint level;      // of the fine side
-    uint wantExtra;  // write depth, normals and linear colour
-    uint hasPyramid;
-    uint hasTubes;  // texels may be of tubes
-    uint count;     // clusters (rasterise); blocks (strands); first block (discs); whether there are triangles
-                    // (surface), exact points (resolve)
-} stepInfo;
+layout(push_constant, scalar) uniform StepBlock { Step stepInfo; };
 
 Lens frameLensHere() { return lensOf(frame.focal, frame.orthographic != 0u); }
 // The ray through a pixel's centre.

@@ -3,7 +3,7 @@
 #include "bindings.glsl"
 #include "shared/wide_disc.h"
 
-layout(set = 0, binding = 18, scalar) coherent buffer DiscBlock {
+layout(set = 0, binding = kDiscsBinding, scalar) coherent buffer DiscBlock {
     uint discCount;
     WideDisc discs[];
 };

@@ -1,9 +1,9 @@
 // Light on a pixel of the surface buffer, to the eye.
 #include "surface.glsl"
 
-layout(set = 0, binding = 13, scalar) readonly buffer LightBlock { LightSource lights[]; };
-layout(set = 0, binding = 14, scalar) readonly buffer TriangleBlock { uint triangleWords[]; };  // two a pixel
-layout(set = 0, binding = 16, scalar) readonly buffer EnvironmentBlock { float environment[]; };
+layout(set = 0, binding = kLightsBinding, scalar) readonly buffer LightBlock { LightSource lights[]; };
+layout(set = 0, binding = kTriangleWordsBinding, scalar) readonly buffer TriangleBlock { uint triangleWords[]; };  // two a pixel
+layout(set = 0, binding = kEnvironmentBinding, scalar) readonly buffer EnvironmentBlock { float environment[]; };
 #include "shared/environment.h"
 
 vec3 lightOf(Surface s, vec3 point) {

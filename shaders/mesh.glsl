@@ -19,21 +19,19 @@ struct LargeTriangle {
     uint id;
 };
 
-layout(set = 0, binding = 8, scalar) readonly buffer MeshBlock { DrawMesh meshes[]; };
-layout(set = 0, binding = 9, scalar) readonly buffer ClusterBlock { DrawCluster clusters[]; };
-layout(set = 0, binding = 10, scalar) readonly buffer MaterialBlock { SurfaceMaterial materials[]; };
-layout(set = 0, binding = 11, scalar) readonly buffer TextureBlock { TextureInfo textures[]; };
-layout(set = 0, binding = 12, scalar) readonly buffer TileBlock { uvec2 tiles[]; };  // addresses; 0: not resident
-layout(set = 0, binding = 14, scalar) buffer TriangleBlock { uint triangleWords[]; };  // two a pixel: material, emission
-layout(set = 0, binding = 15, scalar) buffer LargeBlock {
+layout(set = 0, binding = kMeshesBinding, scalar) readonly buffer MeshBlock { DrawMesh meshes[]; };
+layout(set = 0, binding = kClustersBinding, scalar) readonly buffer ClusterBlock { DrawCluster clusters[]; };
+layout(set = 0, binding = kMaterialsBinding, scalar) readonly buffer MaterialBlock { SurfaceMaterial materials[]; };
+layout(set = 0, binding = kTexturesBinding, scalar) readonly buffer TextureBlock { TextureInfo textures[]; };
+layout(set = 0, binding = kTilesBinding, scalar) readonly buffer TileBlock { uvec2 tiles[]; };  // addresses; 0: not resident
+layout(set = 0, binding = kTriangleWordsBinding, scalar) buffer TriangleBlock { uint triangleWords[]; };  // two a pixel: material, emission
+layout(set = 0, binding = kLargeBinding, scalar) buffer LargeBlock {
     uint largeCount;
     LargeTriangle large[];
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Vertices { MeshVertex vertices[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Words { uint words[]; };
-
-const uint kLargeCapacity = 65536u;
 
 vec4 decodeTexel(uint c, bool isColour) {
     vec4 v = vec4(float(c & 255u), float(c >> 8 & 255u), float(c >> 16 & 255u), float(c >> 24)) / 255.0;

@@ -15,11 +15,10 @@ struct WideStrand {
     uint isRound;
     uint id;
 };
-layout(set = 0, binding = 17, scalar) buffer WideBlock {
+layout(set = 0, binding = kWideBinding, scalar) buffer WideBlock {
     uint wideCount;
     WideStrand wide[];
 };
-const uint kWideCapacity = 65536u;
 
 CameraSegment cameraSegment(DrawNode node, StrandSegment s) {
     CameraSegment c;

@@ -3,4 +3,4 @@
 #include "bindings.glsl"
 #include "shared/surface.h"
 
-layout(set = 0, binding = 19, scalar) buffer SurfaceBufferBlock { SurfaceWords surfaceBuffer[]; };
+layout(set = 0, binding = kSurfaceBinding, scalar) buffer SurfaceBufferBlock { SurfaceWords surfaceBuffer[]; };

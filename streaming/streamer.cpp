@@ -77,10 +77,14 @@ bool isLegalTransition(ChunkState from, ChunkState to) {
 }
 
 Streamer::Streamer(Executor& executor, ChunkSink& sink, StreamSettings settings)
-    : executor_(executor), sink_(sink), settings_(settings), completed_(std::make_shared<CompletionQueue<Arrival>>()) {}
+    : executor_(executor),
+      executorLife_(executor.life()),
+      sink_(sink),
+      settings_(settings),
+      completed_(std::make_shared<CompletionQueue<Arrival>>()) {}
 
 Streamer::~Streamer() {
-    executor_.wait();
+    if (!executorLife_.expired()) executor_.wait();
     for (uint32_t i = 0; i < sources_.size(); ++i)
         for (uint32_t n = 0; n < sources_[i].chunks.size(); ++n)
             if (sources_[i].chunks[n].state == ChunkState::resident) sink_.evict({i, n});

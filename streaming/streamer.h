@@ -87,6 +87,8 @@ class Streamer {
 
     lod::Residency residency() const { return {drawable_}; }
     const StreamCounters& counters() const { return counters_; }
+    /// Waits for all that is on its way from the executor.
+    void wait() { executor_.wait(); }
     /// True if nothing is on its way.
     bool isIdle() const { return counters_.inFlight == 0 && arrived_.empty(); }
     /// The last failure, for the overlay and the log; empty if there was none.
@@ -116,6 +118,7 @@ class Streamer {
     void countInParents(ChunkKey key, int change);
 
     Executor& executor_;
+    std::weak_ptr<const void> executorLife_;  ///< one that is gone has finished what it had
     ChunkSink& sink_;
     StreamSettings settings_;
     std::vector<Source> sources_;

@@ -17,6 +17,11 @@ class Executor {
     /// Waits for everything that run() started.
     virtual void wait() = 0;
     virtual int threads() const = 0;
+    /// Ends with the executor: whoever may outlive it asks before going on.
+    std::weak_ptr<const void> life() const { return life_; }
+
+  private:
+    std::shared_ptr<const int> life_ = std::make_shared<const int>(0);
 };
 
 /// oneTBB arena of `threads` threads (0: all cores).

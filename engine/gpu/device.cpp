@@ -115,6 +115,41 @@ std::optional<uint32_t> pickQueueFamily(std::span<const VkQueueFamilyProperties>
     return found;
 }
 
+namespace {
+
+/// The logical device, with the features that the passes need.
+Result<VkDevice> createLogicalDevice(const Device& d, const std::vector<const char*>& extensions) {
+    const float priority = 1;
+    VkDeviceQueueCreateInfo queueInfo{VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO};
+    queueInfo.queueFamilyIndex = d.queueFamily;
+    queueInfo.queueCount = 1;
+    queueInfo.pQueuePriorities = &priority;
+    VkPhysicalDeviceVulkan13Features v13{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES};
+    v13.synchronization2 = VK_TRUE;
+    v13.maintenance4 = VK_TRUE;  // glslc writes LocalSizeId
+    VkPhysicalDeviceVulkan12Features v12{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES};
+    v12.pNext = &v13;
+    v12.bufferDeviceAddress = VK_TRUE;
+    v12.scalarBlockLayout = VK_TRUE;
+    v12.shaderBufferInt64Atomics = VK_TRUE;
+    v12.hostQueryReset = VK_TRUE;
+    VkPhysicalDeviceFeatures2 features{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2};
+    features.pNext = &v12;
+    features.features.shaderInt64 = VK_TRUE;
+    VkDeviceCreateInfo info{VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO};
+    info.pNext = &features;
+    info.queueCreateInfoCount = 1;
+    info.pQueueCreateInfos = &queueInfo;
+    info.enabledExtensionCount = static_cast<uint32_t>(extensions.size());
+    info.ppEnabledExtensionNames = extensions.data();
+    VkDevice device = VK_NULL_HANDLE;
+    if (const VkResult r = vkCreateDevice(d.physical, &info, nullptr, &device); r != VK_SUCCESS)
+        return vulkanError(r, d.deviceName + " lacks a feature that Stipple needs (64-bit atomics, device addresses)");
+    return device;
+}
+
+}  // namespace
+
 Result<std::unique_ptr<Device>> Device::create(const DeviceSettings& settings) {
     std::unique_ptr<Device> d(new Device);
     STIPPLE_ASSIGN(d->instance, createInstance(settings, d->messages_.get()));
@@ -172,31 +207,7 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceSettings& settings) {
     d->queueFamily = *usable;
     d->hasTimestamps = family[*usable].timestampValidBits > 0;
 
-    const float priority = 1;
-    VkDeviceQueueCreateInfo queueInfo{VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO};
-    queueInfo.queueFamilyIndex = d->queueFamily;
-    queueInfo.queueCount = 1;
-    queueInfo.pQueuePriorities = &priority;
-    VkPhysicalDeviceVulkan13Features v13{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES};
-    v13.synchronization2 = VK_TRUE;
-    v13.maintenance4 = VK_TRUE;  // glslc writes LocalSizeId
-    VkPhysicalDeviceVulkan12Features v12{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES};
-    v12.pNext = &v13;
-    v12.bufferDeviceAddress = VK_TRUE;
-    v12.scalarBlockLayout = VK_TRUE;
-    v12.shaderBufferInt64Atomics = VK_TRUE;
-    v12.hostQueryReset = VK_TRUE;
-    VkPhysicalDeviceFeatures2 features{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2};
-    features.pNext = &v12;
-    features.features.shaderInt64 = VK_TRUE;
-    VkDeviceCreateInfo info{VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO};
-    info.pNext = &features;
-    info.queueCreateInfoCount = 1;
-    info.pQueueCreateInfos = &queueInfo;
-    info.enabledExtensionCount = static_cast<uint32_t>(settings.deviceExtensions.size());
-    info.ppEnabledExtensionNames = settings.deviceExtensions.data();
-    if (const VkResult r = vkCreateDevice(d->physical, &info, nullptr, &d->device); r != VK_SUCCESS)
-        return vulkanError(r, d->deviceName + " lacks a feature that Stipple needs (64-bit atomics, device addresses)");
+    STIPPLE_ASSIGN(d->device, createLogicalDevice(*d, settings.deviceExtensions));
     vkGetDeviceQueue(d->device, d->queueFamily, 0, &d->queue);
     return d;
 }

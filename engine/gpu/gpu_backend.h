@@ -13,8 +13,6 @@ namespace stipple::gpu {
 struct GpuSettings {
     std::string deviceName;   ///< part of a name; empty: the first device
     bool validation = false;  ///< core and synchronization validation; messages are kept
-    /// For the test that proves synchronization validation is on: leave out the barriers before this pass.
-    std::string omitBarriersBefore;
 };
 
 Result<std::unique_ptr<render::Backend>> makeGpuBackend(const GpuSettings& settings);

@@ -36,12 +36,24 @@ void PassList::begin(const std::string& name, const std::vector<BufferUse>& uses
     info.pMemoryBarriers = &memory;
     info.bufferMemoryBarrierCount = static_cast<uint32_t>(barriers.size());
     info.pBufferMemoryBarriers = barriers.data();
-    if ((info.memoryBarrierCount || info.bufferMemoryBarrierCount) && name != omitBarriersBefore_)
-        vkCmdPipelineBarrier2(commands_, &info);
+    if (info.memoryBarrierCount || info.bufferMemoryBarrierCount) vkCmdPipelineBarrier2(commands_, &info);
     if (info.memoryBarrierCount) uploaded_ = false;
-    if (name == "upload") uploaded_ = true;
     stamp(static_cast<uint32_t>(names_.size()) * 2);
     names_.push_back(name);
+}
+
+void PassList::beginUpload() {
+    VkMemoryBarrier2 memory{VK_STRUCTURE_TYPE_MEMORY_BARRIER_2};
+    memory.srcStageMask = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_2_TRANSFER_BIT;
+    memory.srcAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT;
+    memory.dstStageMask = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
+    memory.dstAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT;
+    VkDependencyInfo info{VK_STRUCTURE_TYPE_DEPENDENCY_INFO};
+    info.memoryBarrierCount = 1;
+    info.pMemoryBarriers = &memory;
+    vkCmdPipelineBarrier2(commands_, &info);
+    begin("upload", {}, true);
+    uploaded_ = true;
 }
 
 void PassList::end() { stamp(static_cast<uint32_t>(names_.size()) * 2 - 1); }

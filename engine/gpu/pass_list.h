@@ -18,8 +18,10 @@ struct BufferUse {
 class PassList {
   public:
     static constexpr uint32_t kMaxPasses = 64;
-    PassList(const Device& device, VkCommandBuffer commands, VkQueryPool queries, std::string omitBarriersBefore)
-        : device_(device), commands_(commands), queries_(queries), omitBarriersBefore_(std::move(omitBarriersBefore)) {}
+    PassList(const Device& device, VkCommandBuffer commands, VkQueryPool queries)
+        : device_(device), commands_(commands), queries_(queries) {}
+    /// Copies into pages, of which frames before may still read other parts, or those of chunks that are gone.
+    void beginUpload();
     /// `isTransfer`: fills and copies instead of a dispatch.
     void begin(const std::string& name, const std::vector<BufferUse>& uses, bool isTransfer);
     void end();
@@ -37,7 +39,6 @@ class PassList {
     const Device& device_;
     VkCommandBuffer commands_;
     VkQueryPool queries_;
-    std::string omitBarriersBefore_;
     std::map<VkBuffer, Last> last_;
     std::vector<std::string> names_;
     bool uploaded_ = false;

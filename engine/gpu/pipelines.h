@@ -1,50 +1,43 @@
-// The compute pipelines of all passes: one descriptor set layout, one push constant block (see shaders/bindings.glsl).
+// The compute pipelines: one descriptor set layout, one push constant block (shaders/shared/bindings.h). Each is
+// compiled when a frame first calls for it.
 #pragma once
 
-#include <array>
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "engine/gpu/device.h"
+#include "engine/gpu/shader_table.h"
 
 namespace stipple::gpu {
 
-/// Mirrors `Step` of shaders/bindings.glsl.
-struct StepConstants {
-    uint32_t fine, fineWidth, fineHeight, coarse, coarseWidth, coarseHeight, level, wantExtra, hasPyramid, hasTubes,
-        count;
-};
-static_assert(sizeof(StepConstants) == 44);
-
 class Pipelines {
   public:
-    static constexpr size_t kBindings = 20;
     static Result<std::unique_ptr<Pipelines>> create(const Device& device);
     ~Pipelines();
     Pipelines(const Pipelines&) = delete;
     Pipelines& operator=(const Pipelines&) = delete;
-    /// In the order of the bindings.
-    void writeDescriptors(const std::array<const Buffer*, kBindings>& buffers);
-    void bind(VkCommandBuffer commands) const;
-    /// Pipelines that not every frame needs; they are compiled when one first calls for them.
-    enum class Set : uint8_t { triangles, curves, wideDiscs, splats, plain, light };
-    Result<void> call(Set set);
-    /// How many were compiled for it.
-    size_t countOf(Set set) const;
-    void use(VkCommandBuffer commands, const std::string& pass) const;
-    void push(VkCommandBuffer commands, const StepConstants& step) const;
+
+    /// A set of descriptors, for one frame in flight. They live as long as the pipelines.
+    Result<VkDescriptorSet> makeSet();
+    void bind(VkCommandBuffer commands, VkDescriptorSet set) const;
+    /// From here on `shader` is dispatched.
+    Result<void> use(VkCommandBuffer commands, const Shader& shader);
+    void push(VkCommandBuffer commands, const shared::Step& step) const;
+    bool isCompiled(std::string_view shader) const { return pipelines_.find(shader) != pipelines_.end(); }
 
   private:
     explicit Pipelines(const Device& device) : device_(device) {}
-    Result<void> add(const std::string& pass, const uint32_t* code, size_t words);
+    Result<void> add(const Shader& shader);
     const Device& device_;
     VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;
     VkPipelineLayout layout_ = VK_NULL_HANDLE;
     VkDescriptorPool pool_ = VK_NULL_HANDLE;
-    VkDescriptorSet set_ = VK_NULL_HANDLE;
-    std::map<std::string, VkPipeline> pipelines_;
-    std::map<Set, size_t> called_;
+    std::map<std::string, VkPipeline, std::less<>> pipelines_;
 };
+
+/// Frames that may be in flight at once.
+constexpr uint32_t kMostInFlight = 2;
 
 }  // namespace stipple::gpu

@@ -1,163 +1,116 @@
 #include "engine/gpu/record.h"
 
 #include <algorithm>
-#include <map>
+
+#include "engine/base/check.h"
+#include "engine/gpu/passes/passes.h"
 
 namespace stipple::gpu {
-namespace {
 
-constexpr uint32_t kLargeGroups = 64, kLargeRows = 16;  // see shaders/rasterise
-constexpr uint32_t kGroup = 64, kGroupsPerDimension = 65535;
+Recording::Recording(PassList& list, Pipelines& pipelines, VkCommandBuffer commands, const FrameBuffers& buffers,
+                     const render::RenderRequest& request)
+    : list_(list), pipelines_(pipelines), commands_(commands), buffers_(buffers), request_(request) {}
 
-BufferUse write(const Buffer& b) { return {b.handle(), true}; }
-BufferUse read(const Buffer& b) { return {b.handle(), false}; }
-
-/// `count`: what else a pass needs to know, see Step of shaders/bindings.glsl.
-void pushStep(const Recording& f, size_t level, uint32_t count) {
-    const Level& fine = f.levels[level];
-    const Level& coarse = f.levels[std::min(level + 1, f.levels.size() - 1)];
-    f.pipelines.push(f.commands, {fine.offset, fine.width, fine.height, coarse.offset, coarse.width, coarse.height,
-                                  static_cast<uint32_t>(level), f.wantAll, f.hasPyramid && f.levels.size() > 1,
-                                  !f.draws.curves().isEmpty(), count});
+bool Recording::has(render::Pass pass) const {
+    return std::find(request_.passes.begin(), request_.passes.end(), pass) != request_.passes.end();
 }
 
-/// One thread a pixel of a level.
-void overPixels(const Recording& f, const char* label, const char* pipeline, const std::vector<BufferUse>& uses,
-                size_t level = 0, uint32_t count = 0, size_t target = 0) {
-    f.list.begin(label, uses, false);
-    f.pipelines.use(f.commands, pipeline);
-    pushStep(f, level, count);
-    vkCmdDispatch(f.commands, (f.levels[target].width + kGroup - 1) / kGroup, f.levels[target].height, 1);
-    f.list.end();
+Result<void> Recording::recordPasses() {
+    const auto& passes = request_.passes;
+    for (size_t p = 0; p < passes.size(); ++p) {
+        label_ = shader_ = render::passName(passes[p]);
+        // Two neighbours that read only their own pixel run as one where they have a common shader.
+        if (p + 1 < passes.size() && render::passInfo(passes[p + 1]).isOfOwnPixel) {
+            const std::string next = render::passName(passes[p + 1]);
+            if (shaderNamed(shader_ + "_" + next) != nullptr) {
+                shader_ += "_" + next;
+                label_ += "+" + next;
+                ++p;
+            }
+        }
+        gpuPassOf(passes[p]).record(*this);
+    }
+    return status_;
 }
 
-/// One group a block of draw ids (a cluster).
-void overBlocks(const Recording& f, const char* label, const std::vector<BufferUse>& uses, size_t blocks,
-                uint32_t count) {
-    f.list.begin(label, uses, false);
-    f.pipelines.use(f.commands, label);
-    pushStep(f, 0, count);
-    const auto n = static_cast<uint32_t>(blocks);
-    if (n > 0)
-        vkCmdDispatch(f.commands, std::min(n, kGroupsPerDimension), (n + kGroupsPerDimension - 1) / kGroupsPerDimension,
-                      1);
-    f.list.end();
+const Shader& Recording::known(const std::string& name) const {
+    const Shader* const shader = shaderNamed(name);
+    STIPPLE_CHECK(shader != nullptr, "no shader has the name of a pass");
+    return *shader;
 }
 
-/// Groups for bands of rows: what covers many pixels is shared out.
-void overBands(const Recording& f, const char* label, const char* pipeline, const std::vector<BufferUse>& uses,
-               uint32_t count = 0) {
-    f.list.begin(label, uses, false);
-    f.pipelines.use(f.commands, pipeline);
-    pushStep(f, 0, count);
-    vkCmdDispatch(f.commands, kLargeGroups, (f.levels[0].height + kLargeRows - 1) / kLargeRows, 1);
-    f.list.end();
+shared::Step Recording::stepAt(size_t level) const {
+    const std::vector<Level>& levels = buffers_.levels();
+    const Level &fine = levels[level], &coarse = levels[std::min(level + 1, levels.size() - 1)];
+    shared::Step step{};
+    step.fine = fine.offset;
+    step.fineWidth = fine.width;
+    step.fineHeight = fine.height;
+    step.coarse = coarse.offset;
+    step.coarseWidth = coarse.width;
+    step.coarseHeight = coarse.height;
+    step.level = static_cast<uint32_t>(level);
+    step.wantExtra = request_.wantDepthAndNormal ? 1 : 0;
+    step.hasPyramid = has(render::Pass::push) && levels.size() > 1 ? 1 : 0;
+    step.hasTubes = hasCurves() ? 1 : 0;
+    step.hasTriangles = hasTriangles() ? 1 : 0;
+    step.hasWideDiscs = has(render::Pass::discs) ? 1 : 0;
+    step.exactPoints = render::reconstructionOf(request_.mode).fillsSplats ? 1 : 0;
+    return step;
 }
 
-/// A list of what covers many pixels begins with its length.
-void emptyList(const Recording& f, const char* label, const Buffer& buffer) {
-    f.list.begin(label, {write(buffer)}, true);
-    vkCmdFillBuffer(f.commands, buffer.handle(), 0, 4, 0);
-    f.list.end();
+void Recording::dispatch(const std::string& label, const Shader& shader, const shared::Step& step, Groups groups) {
+    std::vector<BufferUse> uses;
+    for (const BindingUse& u : shader.uses) uses.push_back({buffers_.bound(u.binding).handle(), u.writes});
+    list_.begin(label, uses, false);
+    if (const auto used = pipelines_.use(commands_, shader); used) {
+        if (shader.pushBytes > 0) pipelines_.push(commands_, step);
+        if (groups.x > 0 && groups.y > 0) vkCmdDispatch(commands_, groups.x, groups.y, 1);
+    } else if (status_) {
+        status_ = used;
+    }
+    list_.end();
 }
 
-void clear(const Recording& f) {
-    f.list.begin("clear", {write(f.buffers.visibility), write(f.buffers.stats)}, true);
-    vkCmdFillBuffer(f.commands, f.buffers.visibility.handle(), 0, VK_WHOLE_SIZE, 0xffffffffu);
-    vkCmdFillBuffer(f.commands, f.buffers.stats.handle(), 0, VK_WHOLE_SIZE, 0);
-    f.list.end();
+void Recording::overPixels(const std::string& label, const std::string& name, size_t level, size_t target) {
+    const Shader& shader = known(name);
+    const Level& to = buffers_.levels()[target];
+    dispatch(label, shader, stepAt(level),
+             {(to.width + shader.group[0] - 1) / shader.group[0], (to.height + shader.group[1] - 1) / shader.group[1]});
 }
 
-void project(const Recording& f) {
-    const FrameBuffers& b = f.buffers;
-    const bool hasDiscs = f.mode.hasPyramid && f.draws.hasWideDiscs;
-    if (hasDiscs) emptyList(f, "disc list", b.discs);
-    // Without a list the buffer of measures is bound in its stead: layers take it for written.
-    const std::vector<BufferUse> uses{write(b.visibility), write(hasDiscs ? b.discs : b.stats)};
-    overBlocks(f, "project", uses, f.draws.points().blocks.size(), hasDiscs ? 1 : 0);
+void Recording::overBlocks(const std::string& name, size_t blocks) {
+    shared::Step step = stepAt(0);
+    step.count = static_cast<uint32_t>(blocks);
+    constexpr uint32_t kMost = shared::kGroupsPerDimension;
+    dispatch(name, known(name), step, {std::min(step.count, kMost), (step.count + kMost - 1) / kMost});
 }
 
-void discs(const Recording& f) {
-    const FrameBuffers& b = f.buffers;
-    f.list.begin("disc order", {write(b.discs)}, false);
-    f.pipelines.use(f.commands, "disc_order");
-    vkCmdDispatch(f.commands, 1, 1, 1);
-    f.list.end();
-    overBands(f, "discs", "discs", {write(b.visibility), read(b.discs)}, f.draws.frame.firstBlock.discs);
+void Recording::overBands(const std::string& label, const std::string& name, uint32_t firstBlock) {
+    shared::Step step = stepAt(0);
+    step.firstBlock = firstBlock;
+    dispatch(label, known(name), step,
+             {shared::kBandGroups, (buffers_.levels()[0].height + shared::kBandRows - 1) / shared::kBandRows});
 }
 
-void splat(const Recording& f) {
-    const FrameBuffers& b = f.buffers;
-    emptyList(f, "disc list", b.discs);
-    overBlocks(f, "splat", {write(b.visibility), write(b.discs)}, f.draws.points().blocks.size(), 0);
-    overBands(f, "discs", "discs", {write(b.visibility), read(b.discs)});
+void Recording::once(const std::string& label, const std::string& name) {
+    dispatch(label, known(name), stepAt(0), {1, 1});
 }
 
-void curves(const Recording& f) {
-    const FrameBuffers& b = f.buffers;
-    emptyList(f, "wide list", b.wide);
-    const size_t blocks = f.draws.curves().blocks.size();
-    overBlocks(f, "strands", {write(b.visibility), write(b.wide)}, blocks, static_cast<uint32_t>(blocks));
-    overBands(f, "wide strands", "strands_wide", {write(b.visibility), read(b.wide)});
+void Recording::emptyList(const std::string& label, uint32_t binding) {
+    const VkBuffer buffer = buffers_.at(binding).handle();
+    list_.begin(label, {{buffer, true}}, true);
+    vkCmdFillBuffer(commands_, buffer, 0, 4, 0);
+    list_.end();
 }
 
-void rasterise(const Recording& f) {
-    const FrameBuffers& b = f.buffers;
-    emptyList(f, "large list", b.large);
-    overBlocks(f, "rasterise", {write(b.visibility), write(b.large)}, f.clusters, f.clusters);
-    overBands(f, "rasterise large", "rasterise_large", {write(b.visibility), read(b.large)});
-}
-
-void resolve(const Recording& f) {
-    const FrameBuffers& b = f.buffers;
-    overPixels(f, "resolve", "resolve", {read(b.visibility), write(b.texels), write(b.stats)}, 0,
-               f.mode.fillsSplats ? 1 : 0);
-    if (f.mode.hasPyramid && f.draws.hasWideDiscs)
-        overPixels(f, "disc texels", "disc_texels", {read(b.visibility), read(b.discs), write(b.texels)});
-    if (!f.draws.curves().isEmpty())
-        overPixels(f, "strand texels", "strand_texels", {read(b.visibility), write(b.texels), write(b.stats)});
-    if (!f.draws.triangles().isEmpty())
-        overPixels(f, "triangle texels", "triangle_texels",
-                   {read(b.visibility), write(b.texels), write(b.triangleWords)});
-}
-
-void pull(const Recording& f) {
-    for (size_t l = 0; l + 1 < f.levels.size(); ++l)
-        overPixels(f, "pull", "pull", {write(f.buffers.texels), read(f.buffers.stats)}, l, 0, l + 1);
-}
-
-/// Down to level 1: the last push fills the surface buffer.
-void push(const Recording& f) {
-    for (size_t l = f.levels.size() - 1; l-- > 1;)
-        overPixels(f, "push", "push", {write(f.buffers.texels), read(f.buffers.stats)}, l, 0, l);
-}
-
-void surface(const Recording& f) {
-    const FrameBuffers& b = f.buffers;
-    const bool hasTriangles = !f.draws.triangles().isEmpty();
-    std::vector<BufferUse> uses{read(b.texels), write(b.surface)};
-    if (hasTriangles) uses.push_back(read(b.triangleWords));
-    overPixels(f, "surface", "surface", uses, 0, hasTriangles ? 1 : 0);
-}
-
-void output(const Recording& f) {
-    const FrameBuffers& b = f.buffers;
-    std::vector<BufferUse> uses{read(b.surface), write(b.image), write(b.extra)};
-    if (f.isLit && !f.draws.triangles().isEmpty()) uses.push_back(read(b.triangleWords));
-    overPixels(f, f.isLit ? "light+output" : "output", f.isLit ? "output_lit" : "output", uses);
-}
-
-}  // namespace
-
-void recordPass(const Recording& frame, render::Pass pass) {
-    using render::Pass;
-    static const std::map<Pass, void (*)(const Recording&)> kTable{
-        {Pass::clear, clear},    {Pass::project, project},     {Pass::discs, discs},     {Pass::splat, splat},
-        {Pass::strands, curves}, {Pass::rasterise, rasterise}, {Pass::resolve, resolve}, {Pass::pull, pull},
-        {Pass::push, push},      {Pass::surface, surface},     {Pass::output, output},
-    };
-    // Light runs in the pass of the output.
-    if (const auto found = kTable.find(pass); found != kTable.end()) found->second(frame);
+void Recording::fill(const std::string& label, std::initializer_list<std::pair<uint32_t, uint32_t>> bindingsAndWords) {
+    std::vector<BufferUse> uses;
+    for (const auto& [binding, word] : bindingsAndWords) uses.push_back({buffers_.at(binding).handle(), true});
+    list_.begin(label, uses, true);
+    for (const auto& [binding, word] : bindingsAndWords)
+        vkCmdFillBuffer(commands_, buffers_.at(binding).handle(), 0, VK_WHOLE_SIZE, word);
+    list_.end();
 }
 
 }  // namespace stipple::gpu

@@ -1,44 +1,61 @@
-// Records the passes of a frame (engine/render/passes.h): for each its dispatches, and the buffers that these read and
-// write.
+// What the passes of a frame are recorded with: dispatches over pixels, blocks and bands. The buffers that a dispatch
+// reads and writes are those of its shader (shader_table.h).
 #pragma once
 
+#include <string>
 #include <vector>
 
+#include "engine/gpu/frame_buffers.h"
 #include "engine/gpu/pass_list.h"
 #include "engine/gpu/pipelines.h"
-#include "engine/render/backend.h"
 
 namespace stipple::gpu {
 
-constexpr uint32_t kLargeCapacity = 65536, kWideCapacity = 65536;  // see shaders/rasterise, shaders/strands
+class Recording {
+  public:
+    Recording(PassList& list, Pipelines& pipelines, VkCommandBuffer commands, const FrameBuffers& buffers,
+              const render::RenderRequest& request);
 
-/// A level of the pyramid; `offset` in words.
-struct Level {
-    uint32_t width, height, offset;
+    /// All passes of the request. Error: a pipeline that cannot be made.
+    Result<void> recordPasses();
+
+    const render::DrawList& draws() const { return *request_.draws; }
+    const FrameBuffers& buffers() const { return buffers_; }
+    bool has(render::Pass pass) const;
+    bool hasCurves() const { return !draws().curves().isEmpty(); }
+    bool hasTriangles() const { return !draws().triangles().isEmpty(); }
+    /// Of the pass at hand, or of it and its neighbour where they have a common one.
+    const std::string& shader() const { return shader_; }
+    const std::string& label() const { return label_; }
+
+    /// One thread a pixel of level `target`; the step is from `level` to the next.
+    void overPixels(const std::string& label, const std::string& shader, size_t level = 0, size_t target = 0);
+    /// One group a block of draw ids (a cluster); what the first block of the kind is.
+    void overBlocks(const std::string& shader, size_t blocks);
+    /// Groups for bands of rows: what covers many pixels is shared out. `firstBlock`: of the ids that are drawn.
+    void overBands(const std::string& label, const std::string& shader, uint32_t firstBlock = 0);
+    /// One group.
+    void once(const std::string& label, const std::string& shader);
+    /// A list of what covers many pixels begins with its length.
+    void emptyList(const std::string& label, uint32_t binding);
+    /// Buffers full of one word, side by side.
+    void fill(const std::string& label, std::initializer_list<std::pair<uint32_t, uint32_t>> bindingsAndWords);
+
+  private:
+    struct Groups {
+        uint32_t x, y;
+    };
+    void dispatch(const std::string& label, const Shader& shader, const shared::Step& step, Groups groups);
+    shared::Step stepAt(size_t level) const;
+    const Shader& known(const std::string& name) const;
+
+    PassList& list_;
+    Pipelines& pipelines_;
+    VkCommandBuffer commands_;
+    const FrameBuffers& buffers_;
+    const render::RenderRequest& request_;
+    std::string shader_, label_;
+    Result<void> status_;  ///< the first error
 };
-
-struct FrameBuffers {
-    Buffer frame, nodes, blocks, visibility, texels, stats, surface, image, extra, readback, staging;
-    Buffer meshes, clusters, materials, textures, tiles, triangleWords, large;  // only with triangles
-    Buffer wide;                                                                // only with curves
-    Buffer lights, environment;                                                 // only with lights
-    Buffer discs;                                                               // only with discs of many pixels
-};
-
-/// What a frame's passes are recorded from.
-struct Recording {
-    PassList& list;
-    const Pipelines& pipelines;
-    VkCommandBuffer commands;
-    const FrameBuffers& buffers;
-    const std::vector<Level>& levels;
-    const render::DrawList& draws;
-    const render::Reconstruction& mode;
-    uint32_t clusters;  ///< of triangles
-    bool wantAll, isLit;
-    bool hasPyramid;  ///< the levels above the first are of this frame
-};
-
-void recordPass(const Recording& frame, render::Pass pass);
 
 }  // namespace stipple::gpu

@@ -193,7 +193,7 @@ class ReferenceBackend final : public render::Backend {
     void evict(streaming::ChunkKey key) override { chunks_.erase(uint64_t{key.source} << 32 | key.chunk); }
     const std::vector<render::PassTime>& passTimes() const override { return times_; }
 
-    Result<void> render(const render::RenderRequest& request, render::Image& image) override {
+    Result<render::Ticket> submit(const render::RenderRequest& request) override {
         const double start = nowSeconds();
         const render::DrawList& draws = *request.draws;
         const render::Reconstruction& mode = render::reconstructionOf(request.mode);
@@ -203,8 +203,16 @@ class ReferenceBackend final : public render::Backend {
         const Level own = level0;
         if (mode.hasPyramid) reconstruct(level0, draws.view);
         finishTubes(draws.view, level0);
-        shade(draws, own, level0, request.wantDepthAndNormal, image);
+        shade(draws, own, level0, request.wantDepthAndNormal, image_);
         times_ = {{"reference", (nowSeconds() - start) * 1e3}};
+        isRead_ = false;
+        return render::Ticket{++submitted_};
+    }
+    bool isDone(render::Ticket) const override { return true; }
+    Result<void> read(render::Ticket ticket, render::Image& image) override {
+        if (ticket.number != submitted_ || isRead_) return render::noSuchPicture(ticket);
+        std::swap(image, image_);
+        isRead_ = true;
         return {};
     }
 
@@ -328,6 +336,9 @@ class ReferenceBackend final : public render::Backend {
 
     Executor& executor_;
     Chunks chunks_;
+    render::Image image_;  ///< of the last frame, until it is read
+    bool isRead_ = true;
+    uint64_t submitted_ = 0;
     std::vector<render::PassTime> times_;
 };
 

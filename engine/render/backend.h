@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -46,15 +47,45 @@ struct BackendResources {
     uint64_t effectBytes = 0;      ///< tables and planes that only effects need
 };
 
+/// A frame that was handed in; numbers rise.
+struct Ticket {
+    uint64_t number = 0;
+};
+
 class Backend : public streaming::ChunkSink {
   public:
     virtual std::string name() const = 0;    ///< "cpu", "gpu", "reference"
     virtual std::string device() const = 0;  ///< for a person
-    /// Draws into `image`, whose storage is reused.
-    virtual Result<void> render(const RenderRequest& request, Image& image) = 0;
+    /// Hands in a frame, which may be drawn while the caller goes on: nothing of the request must outlive the call.
+    /// Where too many are in flight it waits for the oldest, whose picture, if nobody has read it, is given up.
+    virtual Result<Ticket> submit(const RenderRequest& request) = 0;
+    /// True if read would not wait.
+    virtual bool isDone(Ticket ticket) const = 0;
+    /// Waits for a frame and hands over its picture, once, into `image`, whose storage is reused.
+    virtual Result<void> read(Ticket ticket, Image& image) = 0;
+    /// Both.
+    Result<void> render(const RenderRequest& request, Image& image) {
+        STIPPLE_ASSIGN(const Ticket ticket, submit(request));
+        return read(ticket, image);
+    }
     virtual BackendResources resources() const { return {}; }
-    /// Of the last render.
+    /// Of the frame that was read last.
     virtual const std::vector<PassTime>& passTimes() const = 0;
+
+    /// Numbers of `count` sources of chunks that nobody else has who draws with this backend: the first of them.
+    uint32_t claimSources(uint32_t count) {
+        claimed_ += count;
+        return claimed_ - count;
+    }
+    /// Ends with the backend: whoever may outlive it asks before going on.
+    std::weak_ptr<const void> life() const { return life_; }
+
+  private:
+    uint32_t claimed_ = 0;
+    std::shared_ptr<const int> life_ = std::make_shared<const int>(0);
 };
+
+/// What read says of a picture that was read or given up.
+tl::unexpected<Error> noSuchPicture(Ticket ticket);
 
 }  // namespace stipple::render

@@ -81,15 +81,15 @@ void addMeshes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, DrawList&
             origin = lod::meshOrigin(group);
             isPaired = lod::hasPairs(group);
             out.meshes.push_back(countedFrom(group, eyeStep, mesh));
-            out.meshTextures.push_back({h.textures, instance.source, static_cast<uint32_t>(h.nodes.size()),
-                                        static_cast<uint32_t>(h.tiles.size())});
+            out.meshTextures.push_back({h.textures, out.firstSource + instance.source,
+                                        static_cast<uint32_t>(h.nodes.size()), static_cast<uint32_t>(h.tiles.size())});
             last = draw.instance;
         }
         const auto run = static_cast<uint32_t>(out.meshDraws.size());
         out.meshDraws.push_back({static_cast<uint32_t>(out.meshes.size() - 1), draw.firstCluster, draw.clusters,
                                  h.nodes[draw.node].level, draw.errorPixels});
         DrawBatch& batch = out.of(lod::Kind::triangles);
-        batch.keys.push_back({instance.source, draw.chunk});
+        batch.keys.push_back({out.firstSource + instance.source, draw.chunk});
         for (uint32_t c = 0; c < draw.clusters; ++c) batch.blocks.push_back({run, draw.firstCluster + c});
     }
 }
@@ -215,7 +215,7 @@ void addNodes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, const Draw
         for (uint32_t first = 0; first < draw.count; first += shared::kBlockLanes)
             batch.blocks.push_back({index, first});
         batch.nodes.push_back(makeDrawNode(draw, bend, cameraFromWorld, out));
-        batch.keys.push_back({instance.source, draw.chunk});
+        batch.keys.push_back({out.firstSource + instance.source, draw.chunk});
     }
     if (out.swaying == 0) out.bends.clear();
 }

@@ -75,6 +75,7 @@ struct DrawList {
     std::vector<shared::LightSource> lights;
     std::shared_ptr<const Environment> environment;  ///< null: a sky without features
     uint64_t swaying = 0;                            ///< nodes that effects move
+    uint32_t firstSource = 0;                        ///< what the backend calls source 0; set before the list is made
     EffectSet effectsOfScene = allEffects();         ///< what it could show; set before the list is made
     EffectSet effects;                               ///< what the frame shows
     std::span<const shared::SurfaceMaterial> materials;

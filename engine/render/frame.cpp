@@ -75,6 +75,8 @@ class Placer {
         return own;
     }
 
+    uint32_t sources() const { return sources_; }
+
     /// `numbers`: instances of the placed stores.
     void addCrowd(const PlacedCrowd& from, const std::vector<uint32_t>& numbers) {
         lod::Crowd crowd;
@@ -129,6 +131,7 @@ std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& place
                                            const std::vector<PlacedCrowd>& crowds) {
     auto state = std::make_unique<FrameState>();
     state->backend = &backend;
+    state->backendLife = backend.life();
     state->radii = std::make_unique<GreatestRadii>(backend);
     state->streamer = std::make_unique<streaming::Streamer>(executor, *state->radii, settings);
     Placer placer(*state);
@@ -136,6 +139,8 @@ std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& place
     numbers.reserve(placed.size());
     for (const PlacedStore& p : placed) numbers.push_back(placer.addWithStandIns(p));
     for (const PlacedCrowd& crowd : crowds) placer.addCrowd(crowd, numbers);
+    state->draws.firstSource = backend.claimSources(placer.sources());
+    state->radii->setFirstSource(state->draws.firstSource);
     state->draws.materials = state->materials;
     state->draws.effectsOfScene = effectsOfScene({state->hierarchies, state->instances});
     return state;
@@ -152,6 +157,9 @@ std::unique_ptr<FrameState> makeFrameState(std::vector<std::shared_ptr<const lod
 
 Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettings& settings, double start,
                      double cutMs) {
+    if (state.backendLife.expired())
+        return fail(ErrorKind::device, "what draws the scene is gone", "the frame",
+                    "keep the backend while it is used");
     DrawSettings settingsOfMode = settings.draw;
     settingsOfMode.exactStrands = std::min(settings.draw.exactStrands, reconstructionOf(settings.mode).exactCurves);
     makeDrawList(state.cut, state.hierarchies, state.instances, view, settingsOfMode, state.draws);
@@ -227,7 +235,7 @@ Result<void> renderResident(FrameState& state, const lod::View& view, const Fram
 namespace {
 
 /// Waits until the plan is resident, as far as it can be.
-Result<void> await(const lod::ResidentPlan& plan, streaming::Streamer& streamer, Executor& executor) {
+Result<void> await(const lod::ResidentPlan& plan, streaming::Streamer& streamer) {
     streamer.makeRoomFor(plan);
     for (;;) {
         streamer.collect();
@@ -235,24 +243,23 @@ Result<void> await(const lod::ResidentPlan& plan, streaming::Streamer& streamer,
         const uint64_t before = streamer.counters().requests;
         streamer.request(plan);
         if (streamer.isIdle() && streamer.counters().requests == before) return {};
-        executor.wait();
+        streamer.wait();
         if (isStopRequested()) return fail(ErrorKind::interrupted, "interrupted");
     }
 }
 
 }  // namespace
 
-Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const FrameSettings& settings,
-                                 Executor& executor) {
+Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const FrameSettings& settings) {
     streaming::Streamer& streamer = *state.streamer;
-    executor.wait();
+    streamer.wait();
     streamer.collect();
     auto barred = streamer.failed(false);
     for (;;) {
         lod::planResident(state.scene(), view, settings.budgets, streamer.residentLimit(), barred, state.scratch,
                           state.cut, state.plan);
         const uint64_t failures = streamer.counters().failures;
-        STIPPLE_TRY(await(state.plan, streamer, executor));
+        STIPPLE_TRY(await(state.plan, streamer));
         if (streamer.counters().failures == failures) break;
         // Something else may be shown in the place of what cannot be read.
         const auto more = streamer.failed(true);

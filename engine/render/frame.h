@@ -31,6 +31,7 @@ struct FrameState {
     std::unique_ptr<GreatestRadii> radii;            ///< between streamer and backend
     std::unique_ptr<streaming::Streamer> streamer;   // evicts at its end
     Backend* backend = nullptr;
+    std::weak_ptr<const void> backendLife;
     lod::CutScratch scratch;
     lod::Cut cut;
     lod::ResidentPlan plan;
@@ -76,7 +77,10 @@ Result<void> renderResident(FrameState& state, const lod::View& view, const Fram
 
 /// Waits for what planResident says of the view and draws it; true if nothing that the view wants is missing. The
 /// picture is the same whatever was drawn before and however long reading took.
-Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const FrameSettings& settings,
-                                 Executor& executor);
+Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const FrameSettings& settings);
+inline Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const FrameSettings& settings,
+                                        Executor&) {
+    return renderUntilComplete(state, view, settings);
+}
 
 }  // namespace stipple::render

@@ -8,6 +8,7 @@
 namespace stipple::render {
 
 Result<void> GreatestRadii::upload(streaming::ChunkKey key, const lod::Chunk& chunk) {
+    if (life_.expired()) return fail(ErrorKind::device, "what draws the scene is gone");
     uint32_t code = 0;
     for (const shared::PointRecord& r : chunk.records) code = std::max(code, shared::recordRadiusCode(r) + 1);
     const auto points = static_cast<float>(chunk.records.size());
@@ -16,10 +17,20 @@ Result<void> GreatestRadii::upload(streaming::ChunkKey key, const lod::Chunk& ch
     auto& codes = codes_[key.source];
     if (codes.size() <= key.chunk) codes.resize(key.chunk + 1);
     codes[key.chunk] = static_cast<uint8_t>(std::min(code, 255u));
-    return backend_.upload(key, chunk);
+    return backend_.upload(keyOfBackend(key), chunk);
+}
+
+void GreatestRadii::evict(streaming::ChunkKey key) {
+    if (!life_.expired()) backend_.evict(keyOfBackend(key));
+}
+
+streaming::ChunkKey GreatestRadii::keyOfBackend(streaming::ChunkKey key) const {
+    key.source += first_;
+    return key;
 }
 
 float GreatestRadii::shareOf(streaming::ChunkKey key) const {
+    key.source -= first_;
     if (key.source >= codes_.size() || key.chunk >= codes_[key.source].size()) return 0;
     const uint32_t code = codes_[key.source][key.chunk];
     return code == 0 ? 0 : code == 255 ? 1 : shared::radiusFraction(code - 1);

@@ -16,14 +16,21 @@ constexpr float kMostSpacings = 4.0f;
 /// Hands chunks on to a backend and keeps in mind how large the largest radius of each is.
 class GreatestRadii final : public streaming::ChunkSink {
   public:
-    explicit GreatestRadii(Backend& backend) : backend_(backend) {}
+    explicit GreatestRadii(Backend& backend) : backend_(backend), life_(backend.life()) {}
+    /// What the backend calls source 0.
+    void setFirstSource(uint32_t first) { first_ = first; }
     Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override;
-    void evict(streaming::ChunkKey key) override { backend_.evict(key); }
-    /// Over the edge of the node's cell; 0 of what has no points, or beyond kMostSpacings.
+    void evict(streaming::ChunkKey key) override;
+    /// Over the edge of the node's cell; 0 of what has no points, or beyond kMostSpacings. `key`: as the backend has
+    /// it.
     float shareOf(streaming::ChunkKey key) const;
 
   private:
+    streaming::ChunkKey keyOfBackend(streaming::ChunkKey key) const;
+
     Backend& backend_;
+    std::weak_ptr<const void> life_;  ///< of the backend: what is gone needs nothing back
+    uint32_t first_ = 0;
     std::vector<std::vector<uint8_t>> codes_;  ///< radius code + 1 (at most 255) by source and node; 0: no points
 };
 

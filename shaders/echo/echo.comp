@@ -39,7 +39,7 @@ void put(vec3 v) {
     put(v.z);
 }
 
-void main() {
+void putFrame() {
     put(frame.viewX);
     put(frame.viewY);
     put(frame.viewZ);
@@ -67,6 +67,9 @@ void main() {
     put(frame.environmentY);
     put(frame.environmentZ);
     put(frame.orthographic);
+}
+
+void putNode() {
     put(node.axisX);
     put(node.axisY);
     put(node.axisZ);
@@ -79,12 +82,21 @@ void main() {
     put(node.addressHigh);
     put(node.level);
     put(node.errorPixels);
+}
+
+void putBlock() {
     put(block.node);
     put(block.first);
+}
+
+void putRecord() {
     put(record.positionXY);
     put(record.positionZRadiusError);
     put(record.normal);
     put(record.colour);
+}
+
+void putLight() {
     put(light.position);
     put(light.kind);
     put(light.colour);
@@ -92,6 +104,9 @@ void main() {
     put(light.axis);
     put(light.cosInner);
     put(light.cosOuter);
+}
+
+void putVertex() {
     put(vertex.x);
     put(vertex.y);
     put(vertex.z);
@@ -100,9 +115,15 @@ void main() {
     put(vertex.u);
     put(vertex.v);
     put(vertex.surface);
+}
+
+void putCluster() {
     put(cluster.firstVertex);
     put(cluster.firstTriangle);
     put(cluster.counts);
+}
+
+void putMesh() {
     put(mesh.axisX);
     put(mesh.axisY);
     put(mesh.axisZ);
@@ -119,6 +140,9 @@ void main() {
     put(mesh.places);
     put(mesh.firstMaterial);
     put(mesh.mirror);
+}
+
+void putDrawCluster() {
     put(drawCluster.mesh);
     put(drawCluster.counts);
     put(drawCluster.verticesLow);
@@ -129,6 +153,9 @@ void main() {
     put(drawCluster.firstTile);
     put(drawCluster.level);
     put(drawCluster.errorPixels);
+}
+
+void putMaterial() {
     put(material.baseColour);
     put(material.alphaCutoff);
     put(material.emissive);
@@ -152,6 +179,9 @@ void main() {
     put(material.emissiveTexture.texture);
     put(material.emissiveTexture.rowU);
     put(material.emissiveTexture.rowV);
+}
+
+void putSegment() {
     put(segment.a.positionXY);
     put(segment.a.positionZ);
     put(segment.a.direction);
@@ -160,6 +190,9 @@ void main() {
     put(segment.b.positionZ);
     put(segment.b.direction);
     put(segment.b.colour);
+}
+
+void putTextureInfo() {
     put(textureInfo.width);
     put(textureInfo.height);
     put(textureInfo.levels);
@@ -167,4 +200,19 @@ void main() {
     put(textureInfo.wrapV);
     put(textureInfo.isColour);
     for (uint i = 0u; i < kTextureLevels; ++i) put(textureInfo.firstTile[i]);
+}
+
+void main() {
+    putFrame();
+    putNode();
+    putBlock();
+    putRecord();
+    putLight();
+    putVertex();
+    putCluster();
+    putMesh();
+    putDrawCluster();
+    putMaterial();
+    putSegment();
+    putTextureInfo();
 }

@@ -6,7 +6,7 @@
 layout(local_size_x = 256) in;
 
 void main() {
-    const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * 65535u;
+    const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * kGroupsPerDimension;
     if (block >= frame.firstBlock.curves) return;
     const DrawBlock source = blocks[block];
     const DrawNode node = nodes[source.node];
@@ -19,7 +19,7 @@ void main() {
     const Lens lens = frameLensHere();
     const vec3 sight = sightTo(lens, c);
     const bool isOneSided = (recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) == 0u;
-    if (stepInfo.count != 0u && (node.octantMask & kNodeWide) != 0u &&
+    if (stepInfo.hasWideDiscs != 0u && (node.octantMask & kNodeWide) != 0u &&
         isWideDisc(recordFlags(r), c.z, node.edge * frame.supportScale * radiusFractionFast(recordRadiusCode(r)), wideRadius(frame.width, frame.height) / frame.focal, frame.nearPlane, lens) > 0.5) {
         if (isOneSided && !(dot(nodeNormal(node, octDirection(r.normal)), sight) < 0.0)) return;
         const WideDisc d = wideDisc(node, r, frame.supportScale, block * kRecordsPerBlock + gl_LocalInvocationID.x, lens);

@@ -55,7 +55,7 @@ void takeTriangle(LargeTriangle t, DrawCluster c, uint surface, uint corners) {
 }
 
 void main() {
-    const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * 65535u;
+    const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * kGroupsPerDimension;
     if (block >= stepInfo.count) return;
     const DrawCluster c = clusters[block];
     const DrawMesh m = meshes[c.mesh];

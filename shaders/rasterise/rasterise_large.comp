@@ -4,17 +4,15 @@
 #include "../mesh.glsl"
 layout(local_size_x = 256) in;
 
-const int kRows = 16;
-
 void main() {
     const uint count = min(largeCount, kLargeCapacity);
-    const int firstRow = int(gl_WorkGroupID.y) * kRows;
+    const int firstRow = int(gl_WorkGroupID.y) * int(kBandRows);
     for (uint i = gl_WorkGroupID.x; i < count; i += gl_NumWorkGroups.x) {
         const LargeTriangle t = large[i];
         const int x0 = max((min(t.x0, min(t.x1, t.x2)) + 127) >> 8, 0);
         const int x1 = min((max(t.x0, max(t.x1, t.x2)) - 128) >> 8, int(frame.width) - 1);
         const int y0 = max((min(t.y0, min(t.y1, t.y2)) + 127) >> 8, firstRow);
-        const int y1 = min((max(t.y0, max(t.y1, t.y2)) - 128) >> 8, min(firstRow + kRows, int(frame.height)) - 1);
+        const int y1 = min((max(t.y0, max(t.y1, t.y2)) - 128) >> 8, min(firstRow + int(kBandRows), int(frame.height)) - 1);
         const int width = x1 - x0 + 1;
         if (width <= 0 || y1 < y0) continue;
         const int pixels = width * (y1 - y0 + 1);

@@ -28,7 +28,7 @@ void main() {
         vec3 n = -normalize(sightTo(lens, c));
         if ((recordFlags(r) & kFlagNoNormal) == 0u) n = nodeUnitNormal(node, octDecode(r.normal));
         const float radius = min(node.edge * radiusFraction(recordRadiusCode(r)) * frame.supportScale, lensDepth(lens, c.z) * largestSplat(recordFlags(r), frame.focal, frame.height));
-        if (stepInfo.count != 0u) {  // no splat, but what the pixel shows
+        if (stepInfo.exactPoints != 0u) {  // no splat, but what the pixel shows
             const vec3 v = viewDirection(float(pixel.x) + 0.5 - frame.centre.x, float(pixel.y) + 0.5 - frame.centre.y, lens);
             t.depth = keyDepth(key);
             t.radius = kExactRadius;

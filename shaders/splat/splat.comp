@@ -13,7 +13,7 @@ void offer(int x, int y, float depth, uint id) {
 }
 
 void main() {
-    const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * 65535u;
+    const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * kGroupsPerDimension;
     if (block >= frame.firstBlock.curves) return;
     const DrawBlock source = blocks[block];
     const DrawNode node = nodes[source.node];

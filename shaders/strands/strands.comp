@@ -56,8 +56,36 @@ void drawEnd(float x, float y, float inverseDepth, float halfWidth, float nearer
     offer(int(x), int(y), lineLinear(inverseDepth, nearer), drawId(frame.firstBlock.curves, id));
 }
 
+// The pixels that a segment may cover, from lo to hi. False: none, as it lies before the near plane.
+bool coverOf(WideStrand s, CameraSegment c, ScreenSegment p, Ribbon ribbon, bool isWide, float reaches, out vec2 lo, out vec2 hi) {
+    const Lens lens = frameLensHere();
+    lo = min(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) - 1.0;
+    hi = max(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) + 1.0;
+    if (isWide && s.isRound != 0u) {
+        lo = -vec2(tubeSlope(lens, -c.a.x, c.a.z, c.radiusA, -c.b.x, c.b.z, c.radiusB), tubeSlope(lens, -c.a.y, c.a.z, c.radiusA, -c.b.y, c.b.z, c.radiusB)) * frame.focal + frame.centre - 1.5;
+        hi = vec2(tubeSlope(lens, c.a.x, c.a.z, c.radiusA, c.b.x, c.b.z, c.radiusB), tubeSlope(lens, c.a.y, c.a.z, c.radiusA, c.b.y, c.b.z, c.radiusB)) * frame.focal + frame.centre + 0.5;
+    } else if (isWide) {
+        bool isBefore = true;
+        lo = vec2(3.0e38);
+        hi = vec2(-3.0e38);
+        for (int k = 0; k < 4; ++k) {
+            const vec3 corner = ribbonCorner(ribbon, k < 2 ? 0.0 : 1.0, (k & 1) == 0 ? -1.0 : 1.0);
+            const vec2 at = corner.xy * (frame.focal / lensDepth(lens, max(corner.z, frame.nearPlane))) + frame.centre;
+            isBefore = isBefore && (lens.isOrthographic || corner.z > frame.nearPlane);
+            lo = min(lo, at - 1.0);
+            hi = max(hi, at + 1.0);
+        }
+        if (!isBefore) {  // some of it has no place on the picture
+            if (reaches < 0.5) return false;
+            lo = vec2(0.0);
+            hi = vec2(frame.width, frame.height);
+        }
+    }
+    return true;
+}
+
 void main() {
-    const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * 65535u;
+    const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * kGroupsPerDimension;
     if (block >= stepInfo.count) return;
     const DrawBlock source = blocks[frame.firstBlock.curves + block];
     const DrawNode node = nodes[source.node];
@@ -96,31 +124,11 @@ void main() {
     s.b = c.b;
     s.radiusA = c.radiusA;
     s.radiusB = c.radiusB;
-    // What it may cover.
     const bool isWide = isFilled(c, p, lens, frame.exactStrands) > 0.5;
     const Ribbon ribbon = ribbonOfWide(s);
-    vec2 lo = min(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) - 1.0;
-    vec2 hi = max(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) + 1.0;
-    if (isWide && s.isRound != 0u) {
-        lo = -vec2(tubeSlope(lens, -c.a.x, c.a.z, c.radiusA, -c.b.x, c.b.z, c.radiusB), tubeSlope(lens, -c.a.y, c.a.z, c.radiusA, -c.b.y, c.b.z, c.radiusB)) * frame.focal + frame.centre - 1.5;
-        hi = vec2(tubeSlope(lens, c.a.x, c.a.z, c.radiusA, c.b.x, c.b.z, c.radiusB), tubeSlope(lens, c.a.y, c.a.z, c.radiusA, c.b.y, c.b.z, c.radiusB)) * frame.focal + frame.centre + 0.5;
-    } else if (isWide) {
-        bool isBefore = true;
-        lo = vec2(3.0e38);
-        hi = vec2(-3.0e38);
-        for (int k = 0; k < 4; ++k) {
-            const vec3 corner = ribbonCorner(ribbon, k < 2 ? 0.0 : 1.0, (k & 1) == 0 ? -1.0 : 1.0);
-            const vec2 at = corner.xy * (frame.focal / lensDepth(lens, max(corner.z, frame.nearPlane))) + frame.centre;
-            isBefore = isBefore && (lens.isOrthographic || corner.z > frame.nearPlane);
-            lo = min(lo, at - 1.0);
-            hi = max(hi, at + 1.0);
-        }
-        if (!isBefore) {  // some of it has no place on the picture
-            if (reaches < 0.5) return;
-            lo = vec2(0.0);
-            hi = vec2(width, height);
-        }
-    }
+    vec2 lo;
+    vec2 hi;
+    if (!coverOf(s, c, p, ribbon, isWide, reaches, lo, hi)) return;
     if (!(hi.x >= 0.0 && hi.y >= 0.0 && lo.x < width && lo.y < height)) return;
     s.nearerA = surfaceStep(lens, a, t, ra, c.isRound);
     s.nearerB = surfaceStep(lens, b, t, rb, c.isRound);

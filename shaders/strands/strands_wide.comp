@@ -4,17 +4,15 @@
 #include "../strands.glsl"
 layout(local_size_x = 256) in;
 
-const int kRows = 16;
-
 void main() {
     const uint count = min(wideCount, kWideCapacity);
-    const int firstRow = int(gl_WorkGroupID.y) * kRows;
+    const int firstRow = int(gl_WorkGroupID.y) * int(kBandRows);
     for (uint i = gl_WorkGroupID.x; i < count; i += gl_NumWorkGroups.x) {
         const WideStrand s = wide[i];
         const int x0 = s.box.x;
         const int x1 = s.box.z;
         const int y0 = max(s.box.y, firstRow);
-        const int y1 = min(s.box.w, firstRow + kRows - 1);
+        const int y1 = min(s.box.w, firstRow + int(kBandRows) - 1);
         const int width = x1 - x0 + 1;
         if (width <= 0 || y1 < y0) continue;
         const int pixels = width * (y1 - y0 + 1);

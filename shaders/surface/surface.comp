@@ -4,7 +4,7 @@
 #include "../surface.glsl"
 layout(local_size_x = 64) in;
 
-layout(set = 0, binding = 14, scalar) readonly buffer TriangleBlock { uint triangleWords[]; };  // two a pixel
+layout(set = 0, binding = kTriangleWordsBinding, scalar) readonly buffer TriangleBlock { uint triangleWords[]; };  // two a pixel
 
 void main() {
     const uvec2 pixel = gl_GlobalInvocationID.xy;
@@ -14,7 +14,7 @@ void main() {
     Texel t = own;
     if (stepInfo.hasPyramid != 0u) t = pushedTexel(ivec2(pixel), own);
     SurfaceWords s;
-    s.material = stepInfo.count != 0u ? triangleWords[2u * place] : 0u;
+    s.material = stepInfo.hasTriangles != 0u ? triangleWords[2u * place] : 0u;
     if (t.depth != own.depth || s.material == 0u) s.material = kPlainSurface;  // no triangle, or a splat in front
     t = finished(t);
     s.depth = t.depth > 0.0 ? depthAt(t, pixel) : t.depth;

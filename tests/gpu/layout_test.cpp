@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "engine/gpu/device.h"
+#include "engine/gpu/shader_table.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
 #include "shaders/shared/mesh.h"
@@ -16,9 +17,8 @@
 namespace stipple::gpu {
 namespace {
 
-constexpr uint32_t kEcho[] = {
-#include "echo.inc"
-};
+#include "test_shaders.inc"
+constexpr const auto& kEcho = kCode_echo;
 
 struct Shared {
     shared::FrameConstants frame;
@@ -41,6 +41,95 @@ static_assert(sizeof(Shared) ==
                   sizeof(shared::MeshCluster) + sizeof(shared::DrawMesh) + sizeof(shared::DrawCluster) +
                   sizeof(shared::SurfaceMaterial) + sizeof(shared::StrandSegment) + sizeof(shared::TextureInfo));
 
+/// One dispatch of the echo shader.
+class Echo {
+  public:
+    Echo(const Device& of, const Buffer& in, const Buffer& out) : device(of) { createPipeline(in, out); }
+    ~Echo() {
+        vkDestroyCommandPool(device.device, commandPool, nullptr);
+        vkDestroyDescriptorPool(device.device, pool, nullptr);
+        vkDestroyPipeline(device.device, pipeline, nullptr);
+        vkDestroyShaderModule(device.device, module, nullptr);
+        vkDestroyPipelineLayout(device.device, layout, nullptr);
+        vkDestroyDescriptorSetLayout(device.device, setLayout, nullptr);
+    }
+    Echo(const Echo&) = delete;
+    Echo& operator=(const Echo&) = delete;
+    void run() {
+        VkCommandPoolCreateInfo commandPoolInfo{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
+        commandPoolInfo.queueFamilyIndex = device.queueFamily;
+        ASSERT_EQ(vkCreateCommandPool(device.device, &commandPoolInfo, nullptr, &commandPool), VK_SUCCESS);
+        VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
+        allocate.commandPool = commandPool;
+        allocate.commandBufferCount = 1;
+        VkCommandBuffer commands{};
+        ASSERT_EQ(vkAllocateCommandBuffers(device.device, &allocate, &commands), VK_SUCCESS);
+        const VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
+        vkBeginCommandBuffer(commands, &begin);
+        vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
+        vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout, 0, 1, &set, 0, nullptr);
+        vkCmdDispatch(commands, 1, 1, 1);
+        vkEndCommandBuffer(commands);
+        VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO};
+        submit.commandBufferCount = 1;
+        submit.pCommandBuffers = &commands;
+        ASSERT_EQ(vkQueueSubmit(device.queue, 1, &submit, VK_NULL_HANDLE), VK_SUCCESS);
+        vkDeviceWaitIdle(device.device);
+    }
+
+  private:
+    void createPipeline(const Buffer& in, const Buffer& out) {
+        std::array<VkDescriptorSetLayoutBinding, 2> bindings{};
+        for (uint32_t i = 0; i < 2; ++i)
+            bindings.at(i) = {i, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
+        VkDescriptorSetLayoutCreateInfo setInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO};
+        setInfo.bindingCount = 2;
+        setInfo.pBindings = bindings.data();
+        ASSERT_EQ(vkCreateDescriptorSetLayout(device.device, &setInfo, nullptr, &setLayout), VK_SUCCESS);
+        VkPipelineLayoutCreateInfo layoutInfo{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO};
+        layoutInfo.setLayoutCount = 1;
+        layoutInfo.pSetLayouts = &setLayout;
+        ASSERT_EQ(vkCreatePipelineLayout(device.device, &layoutInfo, nullptr, &layout), VK_SUCCESS);
+        VkShaderModuleCreateInfo moduleInfo{VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO};
+        moduleInfo.codeSize = sizeof(kEcho);
+        moduleInfo.pCode = kEcho;
+        ASSERT_EQ(vkCreateShaderModule(device.device, &moduleInfo, nullptr, &module), VK_SUCCESS);
+        VkComputePipelineCreateInfo info{VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO};
+        info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
+        info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
+        info.stage.module = module;
+        info.stage.pName = "main";
+        info.layout = layout;
+        ASSERT_EQ(vkCreateComputePipelines(device.device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline), VK_SUCCESS);
+        const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2};
+        VkDescriptorPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
+        poolInfo.maxSets = 1;
+        poolInfo.poolSizeCount = 1;
+        poolInfo.pPoolSizes = &size;
+        ASSERT_EQ(vkCreateDescriptorPool(device.device, &poolInfo, nullptr, &pool), VK_SUCCESS);
+        VkDescriptorSetAllocateInfo setAllocate{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO};
+        setAllocate.descriptorPool = pool;
+        setAllocate.descriptorSetCount = 1;
+        setAllocate.pSetLayouts = &setLayout;
+        ASSERT_EQ(vkAllocateDescriptorSets(device.device, &setAllocate, &set), VK_SUCCESS);
+        for (uint32_t i = 0; i < 2; ++i) {
+            const VkDescriptorBufferInfo buffer{(i == 0 ? in : out).handle(), 0, VK_WHOLE_SIZE};
+            const VkWriteDescriptorSet write{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET, nullptr, set,     i,      0, 1,
+                                             VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,      nullptr, &buffer, nullptr};
+            vkUpdateDescriptorSets(device.device, 1, &write, 0, nullptr);
+        }
+    }
+
+    const Device& device;
+    VkDescriptorSetLayout setLayout{};
+    VkPipelineLayout layout{};
+    VkShaderModule module{};
+    VkPipeline pipeline{};
+    VkDescriptorPool pool{};
+    VkDescriptorSet set{};
+    VkCommandPool commandPool{};
+};
+
 TEST(SharedStructs, EveryFieldComesBackFromTheGpu) {
     auto made = Device::create({"", true, {}, {}});
     ASSERT_TRUE(made) << made.error().line();
@@ -55,83 +144,12 @@ TEST(SharedStructs, EveryFieldComesBackFromTheGpu) {
     }
     std::memset(out->mapped(), 0, 4096);
 
-    std::array<VkDescriptorSetLayoutBinding, 2> bindings{};
-    for (uint32_t i = 0; i < 2; ++i)
-        bindings.at(i) = {i, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
-    VkDescriptorSetLayoutCreateInfo setInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO};
-    setInfo.bindingCount = 2;
-    setInfo.pBindings = bindings.data();
-    VkDescriptorSetLayout setLayout{};
-    ASSERT_EQ(vkCreateDescriptorSetLayout(device.device, &setInfo, nullptr, &setLayout), VK_SUCCESS);
-    VkPipelineLayoutCreateInfo layoutInfo{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO};
-    layoutInfo.setLayoutCount = 1;
-    layoutInfo.pSetLayouts = &setLayout;
-    VkPipelineLayout layout{};
-    ASSERT_EQ(vkCreatePipelineLayout(device.device, &layoutInfo, nullptr, &layout), VK_SUCCESS);
-    VkShaderModuleCreateInfo moduleInfo{VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO};
-    moduleInfo.codeSize = sizeof(kEcho);
-    moduleInfo.pCode = kEcho;
-    VkShaderModule module{};
-    ASSERT_EQ(vkCreateShaderModule(device.device, &moduleInfo, nullptr, &module), VK_SUCCESS);
-    VkComputePipelineCreateInfo info{VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO};
-    info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
-    info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
-    info.stage.module = module;
-    info.stage.pName = "main";
-    info.layout = layout;
-    VkPipeline pipeline{};
-    ASSERT_EQ(vkCreateComputePipelines(device.device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline), VK_SUCCESS);
-    const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2};
-    VkDescriptorPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
-    poolInfo.maxSets = 1;
-    poolInfo.poolSizeCount = 1;
-    poolInfo.pPoolSizes = &size;
-    VkDescriptorPool pool{};
-    ASSERT_EQ(vkCreateDescriptorPool(device.device, &poolInfo, nullptr, &pool), VK_SUCCESS);
-    VkDescriptorSetAllocateInfo setAllocate{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO};
-    setAllocate.descriptorPool = pool;
-    setAllocate.descriptorSetCount = 1;
-    setAllocate.pSetLayouts = &setLayout;
-    VkDescriptorSet set{};
-    ASSERT_EQ(vkAllocateDescriptorSets(device.device, &setAllocate, &set), VK_SUCCESS);
-    for (uint32_t i = 0; i < 2; ++i) {
-        const VkDescriptorBufferInfo buffer{(i == 0 ? *in : *out).handle(), 0, VK_WHOLE_SIZE};
-        const VkWriteDescriptorSet write{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET, nullptr, set,     i,      0, 1,
-                                         VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,      nullptr, &buffer, nullptr};
-        vkUpdateDescriptorSets(device.device, 1, &write, 0, nullptr);
-    }
-    VkCommandPoolCreateInfo commandPoolInfo{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
-    commandPoolInfo.queueFamilyIndex = device.queueFamily;
-    VkCommandPool commandPool{};
-    ASSERT_EQ(vkCreateCommandPool(device.device, &commandPoolInfo, nullptr, &commandPool), VK_SUCCESS);
-    VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
-    allocate.commandPool = commandPool;
-    allocate.commandBufferCount = 1;
-    VkCommandBuffer commands{};
-    ASSERT_EQ(vkAllocateCommandBuffers(device.device, &allocate, &commands), VK_SUCCESS);
-    const VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
-    vkBeginCommandBuffer(commands, &begin);
-    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
-    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout, 0, 1, &set, 0, nullptr);
-    vkCmdDispatch(commands, 1, 1, 1);
-    vkEndCommandBuffer(commands);
-    VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO};
-    submit.commandBufferCount = 1;
-    submit.pCommandBuffers = &commands;
-    ASSERT_EQ(vkQueueSubmit(device.queue, 1, &submit, VK_NULL_HANDLE), VK_SUCCESS);
-    vkDeviceWaitIdle(device.device);
-
+    Echo(device, *in, *out).run();
     const auto* got = static_cast<const uint32_t*>(out->mapped());
     const auto* expected = static_cast<const uint32_t*>(in->mapped());
     for (size_t i = 0; i < words; ++i) EXPECT_EQ(got[i], expected[i]) << "word " << i;
     EXPECT_EQ(got[words], 0u) << "the shader knows a field that C++ does not";
     for (const std::string& message : device.messages()) ADD_FAILURE() << message;
-    vkDestroyCommandPool(device.device, commandPool, nullptr);
-    vkDestroyDescriptorPool(device.device, pool, nullptr);
-    vkDestroyPipeline(device.device, pipeline, nullptr);
-    vkDestroyShaderModule(device.device, module, nullptr);
-    vkDestroyPipelineLayout(device.device, layout, nullptr);
-    vkDestroyDescriptorSetLayout(device.device, setLayout, nullptr);
 }
 
 }  // namespace

@@ -1,0 +1,161 @@
+#include "engine/gpu/frame_buffers.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "shaders/shared/surface.h"
+#include "shaders/shared/wide_disc.h"
+
+namespace stipple::gpu {
+namespace {
+
+using namespace shared;
+
+constexpr VkBufferUsageFlags kStorage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
+                             kFilled = kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                             kCopied = kStorage | VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
+
+bool has(const render::RenderRequest& request, render::Pass pass) {
+    return std::find(request.passes.begin(), request.passes.end(), pass) != request.passes.end();
+}
+
+}  // namespace
+
+/// Grows `buffer` to at least `bytes`; descriptors are written again where it changes.
+Result<void> FrameBuffers::ensure(Buffer& buffer, uint64_t bytes, VkBufferUsageFlags usage, bool hostVisible,
+                                  const char* name) {
+    bytes = std::max<uint64_t>(bytes, 256);
+    if (buffer.bytes() >= bytes) return {};
+    STIPPLE_ASSIGN(const uint64_t room, roomFor(device_.limits, bytes, usage, name, device_.deviceName));
+    STIPPLE_ASSIGN(buffer, Buffer::create(device_, room, usage, hostVisible, name));
+    descriptorsChanged_ = true;
+    return {};
+}
+
+Result<void> FrameBuffers::prepare(const render::RenderRequest& request, const Residents& residents) {
+    const render::DrawList& draws = *request.draws;
+    STIPPLE_TRY(preparePlanes(draws, request.wantDepthAndNormal));
+    fillDraws(draws, residents);
+    STIPPLE_TRY(prepareLists(request));
+    if (!draws.triangles().isEmpty()) STIPPLE_TRY(prepareMeshes(draws, residents));
+    if (!draws.lights.empty()) STIPPLE_TRY(fill(kLightsBinding, draws.lights.data(), draws.lights.size(), "lights"));
+    if (draws.environment)
+        STIPPLE_TRY(
+            fill(kEnvironmentBinding, draws.environment->table.data(), draws.environment->table.size(), "environment"));
+    if (descriptorsChanged_) writeDescriptors();
+    return {};
+}
+
+Result<void> FrameBuffers::prepareStaging(uint64_t bytes) {
+    return ensure(staging_, bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, true, "staging");
+}
+
+/// Levels of the pyramid, and buffers that every frame needs.
+Result<void> FrameBuffers::preparePlanes(const render::DrawList& draws, bool wantAll) {
+    const uint32_t w = draws.frame.width, h = draws.frame.height;
+    levels_.clear();
+    uint64_t words = 0;
+    for (uint32_t lw = w, lh = h;; lw = (lw + 1) / 2, lh = (lh + 1) / 2) {
+        levels_.push_back({lw, lh, static_cast<uint32_t>(words)});
+        words += uint64_t{kTexelWords} * lw * lh;
+        if (lw == 1 && lh == 1) break;
+    }
+    const uint64_t pixels = uint64_t{w} * h, extra = wantAll ? pixels * kExtraFloats : 0;
+    const uint64_t nodes = draws.points().nodes.size() + draws.curves().nodes.size(),
+                   blocks = draws.points().blocks.size() + draws.curves().blocks.size();
+    STIPPLE_TRY(ensure(nothing_, 0, kStorage, false, "nothing"));
+    STIPPLE_TRY(ensure(bound_[kFrameBinding], sizeof(FrameConstants), kStorage, true, "frame constants"));
+    STIPPLE_TRY(ensure(bound_[kNodesBinding], gpu::bytesOf(kNodesBinding, nodes), kStorage, true, "draw nodes"));
+    STIPPLE_TRY(ensure(bound_[kBlocksBinding], gpu::bytesOf(kBlocksBinding, blocks), kStorage, true, "draw blocks"));
+    STIPPLE_TRY(
+        ensure(bound_[kVisibilityBinding], gpu::bytesOf(kVisibilityBinding, pixels), kFilled, false, "visibility"));
+    STIPPLE_TRY(ensure(bound_[kTexelsBinding], gpu::bytesOf(kTexelsBinding, words), kFilled, false, "texels"));
+    STIPPLE_TRY(ensure(bound_[kStatsBinding], 256, kFilled, false, "stats"));
+    STIPPLE_TRY(
+        ensure(bound_[kSurfaceBinding], gpu::bytesOf(kSurfaceBinding, pixels), kStorage, false, "surface buffer"));
+    STIPPLE_TRY(ensure(bound_[kImageBinding], gpu::bytesOf(kImageBinding, pixels), kCopied, false, "image"));
+    STIPPLE_TRY(ensure(bound_[kExtraBinding], gpu::bytesOf(kExtraBinding, extra), kCopied, false, "depth and normals"));
+    return ensure(readback_, gpu::bytesOf(kImageBinding, pixels) + gpu::bytesOf(kExtraBinding, extra),
+                  VK_BUFFER_USAGE_TRANSFER_DST_BIT, true, "readback");
+}
+
+/// Of what covers many pixels.
+Result<void> FrameBuffers::prepareLists(const render::RenderRequest& request) {
+    if (has(request, render::Pass::strands))
+        STIPPLE_TRY(
+            ensure(bound_[kWideBinding], gpu::bytesOf(kWideBinding, kWideCapacity), kFilled, false, "wide strands"));
+    if (has(request, render::Pass::discs) || has(request, render::Pass::splat))
+        STIPPLE_TRY(
+            ensure(bound_[kDiscsBinding], gpu::bytesOf(kDiscsBinding, kDiscCapacity), kFilled, false, "wide discs"));
+    return {};
+}
+
+/// Frame constants, nodes and blocks of points, then those of curves.
+void FrameBuffers::fillDraws(const render::DrawList& draws, const Residents& residents) {
+    std::memcpy(bound_[kFrameBinding].mapped(), &draws.frame, sizeof(draws.frame));
+    auto* nodes = static_cast<DrawNode*>(bound_[kNodesBinding].mapped());
+    for (const render::DrawBatch* batch : {&draws.points(), &draws.curves()})
+        for (size_t i = 0; i < batch->nodes.size(); ++i) {
+            DrawNode node = batch->nodes[i];
+            const VkDeviceAddress address = residents.addressOf(batch->keys[i]);
+            node.addressLow = static_cast<uint32_t>(address);
+            node.addressHigh = static_cast<uint32_t>(address >> 32);
+            std::memcpy(nodes++, &node, sizeof(node));
+        }
+    auto* blocks = static_cast<DrawBlock*>(bound_[kBlocksBinding].mapped());
+    if (!draws.points().blocks.empty())
+        std::memcpy(blocks, draws.points().blocks.data(), draws.points().blocks.size() * sizeof(DrawBlock));
+    for (size_t i = 0; i < draws.curves().blocks.size(); ++i) {
+        DrawBlock block = draws.curves().blocks[i];
+        block.node += static_cast<uint32_t>(draws.points().nodes.size());
+        std::memcpy(blocks + draws.points().blocks.size() + i, &block, sizeof(block));
+    }
+}
+
+template <typename T>
+Result<void> FrameBuffers::fill(uint32_t binding, const T* data, size_t count, const char* name) {
+    Buffer& buffer = bound_.at(binding);
+    STIPPLE_TRY(ensure(buffer, gpu::bytesOf(binding, count), kStorage, true, name));
+    if (count > 0) std::memcpy(buffer.mapped(), data, count * sizeof(T));
+    return {};
+}
+
+/// What only triangles need.
+Result<void> FrameBuffers::prepareMeshes(const render::DrawList& draws, const Residents& residents) {
+    meshFrame_.fill(draws, residents.meshOf, residents.tileOf);
+    STIPPLE_TRY(fill(kMeshesBinding, draws.meshes.data(), draws.meshes.size(), "draw meshes"));
+    STIPPLE_TRY(fill(kClustersBinding, meshFrame_.clusters.data(), meshFrame_.clusters.size(), "draw clusters"));
+    STIPPLE_TRY(fill(kMaterialsBinding, draws.materials.data(), draws.materials.size(), "materials"));
+    STIPPLE_TRY(fill(kTexturesBinding, meshFrame_.textures.data(), meshFrame_.textures.size(), "textures"));
+    STIPPLE_TRY(fill(kTilesBinding, meshFrame_.tiles.data(), meshFrame_.tiles.size(), "texture tiles"));
+    const uint64_t pixels = uint64_t{draws.frame.width} * draws.frame.height;
+    STIPPLE_TRY(ensure(bound_[kTriangleWordsBinding], gpu::bytesOf(kTriangleWordsBinding, pixels * kTriangleWords),
+                       kStorage, false, "triangle pixels"));
+    return ensure(bound_[kLargeBinding], gpu::bytesOf(kLargeBinding, kLargeCapacity), kFilled, false,
+                  "large triangles");
+}
+
+void FrameBuffers::writeDescriptors() {
+    std::array<VkDescriptorBufferInfo, kBindings> infos{};
+    std::array<VkWriteDescriptorSet, kBindings> writes{};
+    for (uint32_t i = 0; i < kBindings; ++i) {
+        infos.at(i) = {bound(i).handle(), 0, VK_WHOLE_SIZE};
+        writes.at(i) = {VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET, nullptr, set_,         i,      0, 1,
+                        VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,      nullptr, &infos.at(i), nullptr};
+    }
+    vkUpdateDescriptorSets(device_.device, kBindings, writes.data(), 0, nullptr);
+    descriptorsChanged_ = false;
+}
+
+uint64_t FrameBuffers::residentTiles() const {
+    return static_cast<uint64_t>(std::count_if(meshFrame_.tiles.begin(), meshFrame_.tiles.end(),
+                                               [](const TileAddress& t) { return t.low != 0 || t.high != 0; }));
+}
+
+uint64_t FrameBuffers::bytesOf(std::initializer_list<uint32_t> bindings) const {
+    uint64_t sum = 0;
+    for (const uint32_t b : bindings) sum += bound_.at(b).bytes();
+    return sum;
+}
+
+}  // namespace stipple::gpu

@@ -1,0 +1,66 @@
+// The buffers of a frame in flight. They grow to what frames call for: what no frame has called for has no bytes.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <vector>
+
+#include "engine/gpu/device.h"
+#include "engine/gpu/mesh_frame.h"
+#include "engine/gpu/shader_table.h"
+#include "engine/render/backend.h"
+
+namespace stipple::gpu {
+
+/// A level of the pyramid; `offset` in words.
+struct Level {
+    uint32_t width, height, offset;
+};
+
+/// Where on the device resident chunks are.
+struct Residents {
+    std::function<VkDeviceAddress(streaming::ChunkKey key)> addressOf;
+    std::function<const MeshChunk&(streaming::ChunkKey key)> meshOf;
+    std::function<VkDeviceAddress(uint32_t source, uint32_t chunk)> tileOf;  ///< 0: not resident
+};
+
+class FrameBuffers {
+  public:
+    FrameBuffers(const Device& device, VkDescriptorSet set) : device_(device), set_(set) {}
+
+    /// All that the frame's passes read from the host, and room for what they write; not while the device uses them.
+    Result<void> prepare(const render::RenderRequest& request, const Residents& residents);
+    /// For `bytes` of chunks on their way to the device.
+    Result<void> prepareStaging(uint64_t bytes);
+
+    const Buffer& at(uint32_t binding) const { return bound_.at(binding); }
+    /// What a shader finds there: where no frame has called for it, a few bytes that nobody asks for.
+    const Buffer& bound(uint32_t binding) const { return at(binding).bytes() > 0 ? at(binding) : nothing_; }
+    const Buffer& readback() const { return readback_; }
+    const Buffer& staging() const { return staging_; }
+    const std::vector<Level>& levels() const { return levels_; }
+    uint32_t clusters() const { return static_cast<uint32_t>(meshFrame_.clusters.size()); }
+    uint64_t residentTiles() const;
+    /// Of some bindings.
+    uint64_t bytesOf(std::initializer_list<uint32_t> bindings) const;
+
+  private:
+    Result<void> ensure(Buffer& buffer, uint64_t bytes, VkBufferUsageFlags usage, bool hostVisible, const char* name);
+    Result<void> preparePlanes(const render::DrawList& draws, bool wantAll);
+    Result<void> prepareLists(const render::RenderRequest& request);
+    Result<void> prepareMeshes(const render::DrawList& draws, const Residents& residents);
+    void fillDraws(const render::DrawList& draws, const Residents& residents);
+    template <typename T>
+    Result<void> fill(uint32_t binding, const T* data, size_t count, const char* name);
+    void writeDescriptors();
+
+    const Device& device_;
+    VkDescriptorSet set_;
+    std::array<Buffer, shared::kBindings> bound_;
+    Buffer readback_, staging_, nothing_; 
+    std::vector<Level> levels_;
+    MeshFrame meshFrame_;
+    bool descriptorsChanged_ = true;
+};
+
+}  // namespace stipple::gpu

@@ -1,0 +1,172 @@
+#include "engine/gpu/frame_slot.h"
+
+#include <algorithm>
+#include <cstring>
+
+namespace stipple::gpu {
+
+using shared::kExtraBinding;
+using shared::kExtraFloats;
+using shared::kImageBinding;
+
+Result<std::unique_ptr<FrameSlot>> FrameSlot::create(const Device& device, Pipelines& pipelines) {
+    STIPPLE_ASSIGN(const VkDescriptorSet set, pipelines.makeSet());
+    std::unique_ptr<FrameSlot> slot(new FrameSlot(device, pipelines, set));
+    STIPPLE_TRY(slot->createCommandObjects());
+    return slot;
+}
+
+FrameSlot::~FrameSlot() {
+    if (isInFlight_) vkWaitForFences(device_.device, 1, &fence_, VK_TRUE, ~uint64_t{0});
+    vkDestroyQueryPool(device_.device, queries_, nullptr);
+    vkDestroyFence(device_.device, fence_, nullptr);
+    vkDestroyCommandPool(device_.device, commandPool_, nullptr);
+}
+
+Result<void> FrameSlot::createCommandObjects() {
+    VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
+    pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
+    pool.queueFamilyIndex = device_.queueFamily;
+    if (const VkResult r = vkCreateCommandPool(device_.device, &pool, nullptr, &commandPool_); r != VK_SUCCESS)
+        return vulkanError(r, "no command pool");
+    VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
+    allocate.commandPool = commandPool_;
+    allocate.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
+    allocate.commandBufferCount = 1;
+    if (const VkResult r = vkAllocateCommandBuffers(device_.device, &allocate, &commands_); r != VK_SUCCESS)
+        return vulkanError(r, "no command buffer");
+    VkFenceCreateInfo fence{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
+    if (const VkResult r = vkCreateFence(device_.device, &fence, nullptr, &fence_); r != VK_SUCCESS)
+        return vulkanError(r, "no fence");
+    VkQueryPoolCreateInfo query{VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO};
+    query.queryType = VK_QUERY_TYPE_TIMESTAMP;
+    query.queryCount = PassList::kMaxPasses * 2;
+    if (const VkResult r = vkCreateQueryPool(device_.device, &query, nullptr, &queries_); r != VK_SUCCESS)
+        return vulkanError(r, "no query pool");
+    return {};
+}
+
+Result<void> FrameSlot::submit(const render::RenderRequest& request, const Residents& residents,
+                               std::vector<PendingUpload>& uploads, uint64_t number) {
+    hasPicture_ = false;
+    STIPPLE_TRY(buffers_.prepare(request, residents));
+    STIPPLE_TRY(record(request, uploads));
+    VkCommandBufferSubmitInfo buffer{VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO};
+    buffer.commandBuffer = commands_;
+    VkSubmitInfo2 info{VK_STRUCTURE_TYPE_SUBMIT_INFO_2};
+    info.commandBufferInfoCount = 1;
+    info.pCommandBufferInfos = &buffer;
+    if (const VkResult r = vkQueueSubmit2(device_.queue, 1, &info, fence_); r != VK_SUCCESS)
+        return vulkanError(r, "cannot submit");
+    uploads.clear();
+    isInFlight_ = true;
+    hasPicture_ = true;
+    number_ = number;
+    return {};
+}
+
+Result<void> FrameSlot::record(const render::RenderRequest& request, std::vector<PendingUpload>& uploads) {
+    VkCommandBufferBeginInfo info{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
+    info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
+    if (const VkResult r = vkBeginCommandBuffer(commands_, &info); r != VK_SUCCESS)
+        return vulkanError(r, "cannot record");
+    vkResetQueryPool(device_.device, queries_, 0, PassList::kMaxPasses * 2);
+    pipelines_.bind(commands_, set_);
+    PassList list(device_, commands_, queries_);
+    wantsAll_ = request.wantDepthAndNormal;
+    if (!uploads.empty()) STIPPLE_TRY(recordUploads(list, uploads));
+    STIPPLE_TRY(Recording(list, pipelines_, commands_, buffers_, request).recordPasses());
+    recordReadback(list);
+    if (const VkResult r = vkEndCommandBuffer(commands_); r != VK_SUCCESS)
+        return vulkanError(r, "cannot end recording");
+    labels_ = list.names();
+    return {};
+}
+
+Result<void> FrameSlot::recordUploads(PassList& list, std::vector<PendingUpload>& uploads) {
+    uint64_t bytes = 0;
+    for (const PendingUpload& p : uploads) bytes += p.bytes.size();
+    STIPPLE_TRY(buffers_.prepareStaging(bytes));
+    list.beginUpload();
+    uint64_t at = 0;
+    for (const PendingUpload& p : uploads) {
+        const uint64_t size = p.bytes.size();
+        std::memcpy(static_cast<char*>(buffers_.staging().mapped()) + at, p.bytes.data(), size);
+        const VkBufferCopy region{at, p.offset, size};
+        vkCmdCopyBuffer(commands_, buffers_.staging().handle(), p.page, 1, &region);
+        at += size;
+    }
+    list.end();
+    return {};
+}
+
+void FrameSlot::recordReadback(PassList& list) {
+    const uint64_t pixels = uint64_t{buffers_.levels()[0].width} * buffers_.levels()[0].height;
+    const VkBuffer image = buffers_.at(kImageBinding).handle(), extra = buffers_.at(kExtraBinding).handle(),
+                   to = buffers_.readback().handle();
+    list.begin("readback", {{image, false}, {extra, false}, {to, true}}, true);
+    VkBufferCopy region{0, 0, bytesOf(kImageBinding, pixels)};
+    vkCmdCopyBuffer(commands_, image, to, 1, &region);
+    if (wantsAll_) {
+        region = {0, region.size, bytesOf(kExtraBinding, pixels * kExtraFloats)};
+        vkCmdCopyBuffer(commands_, extra, to, 1, &region);
+    }
+    list.end();
+    list.toHost(to);
+}
+
+bool FrameSlot::isDone() const { return !isInFlight_ || vkGetFenceStatus(device_.device, fence_) == VK_SUCCESS; }
+
+Result<void> FrameSlot::wait() {
+    if (!isInFlight_) return {};
+    if (const VkResult r = vkWaitForFences(device_.device, 1, &fence_, VK_TRUE, ~uint64_t{0}); r != VK_SUCCESS)
+        return vulkanError(r, "the device was lost");
+    vkResetFences(device_.device, 1, &fence_);
+    isInFlight_ = false;
+    return {};
+}
+
+Result<void> FrameSlot::read(render::Image& image, std::vector<render::PassTime>& times) {
+    STIPPLE_TRY(wait());
+    takeTimes(times);
+    takeImage(image);
+    hasPicture_ = false;
+    return {};
+}
+
+void FrameSlot::takeTimes(std::vector<render::PassTime>& times) const {
+    std::vector<uint64_t> stamps(labels_.size() * 2);
+    times.clear();
+    if (stamps.empty() ||
+        vkGetQueryPoolResults(device_.device, queries_, 0, static_cast<uint32_t>(stamps.size()), stamps.size() * 8,
+                              stamps.data(), 8, VK_QUERY_RESULT_64_BIT) != VK_SUCCESS)
+        return;
+    for (size_t i = 0; i < labels_.size(); ++i) {
+        const double ms = static_cast<double>(stamps[2 * i + 1] - stamps[2 * i]) *
+                          static_cast<double>(device_.timestampPeriodNs) * 1e-6;
+        if (!times.empty() && times.back().name == labels_[i])
+            times.back().ms += ms;  // the levels of pull and push
+        else
+            times.push_back({labels_[i], ms});
+    }
+}
+
+void FrameSlot::takeImage(render::Image& image) const {
+    image.width = buffers_.levels()[0].width;
+    image.height = buffers_.levels()[0].height;
+    const size_t pixels = size_t{image.width} * image.height;
+    image.rgba.resize(pixels);
+    std::memcpy(image.rgba.data(), buffers_.readback().mapped(), pixels * 4);
+    image.depth.resize(wantsAll_ ? pixels : 0);
+    image.normal.resize(wantsAll_ ? pixels * 3 : 0);
+    image.linear.resize(wantsAll_ ? pixels * 3 : 0);
+    const auto* extra = reinterpret_cast<const float*>(static_cast<const char*>(buffers_.readback().mapped()) +
+                                                       bytesOf(kImageBinding, pixels));
+    for (size_t i = 0; wantsAll_ && i < pixels; ++i) {
+        image.depth[i] = extra[kExtraFloats * i];
+        std::copy_n(extra + kExtraFloats * i + 1, 3, image.normal.begin() + static_cast<std::ptrdiff_t>(3 * i));
+        std::copy_n(extra + kExtraFloats * i + 4, 3, image.linear.begin() + static_cast<std::ptrdiff_t>(3 * i));
+    }
+}
+
+}  // namespace stipple::gpu

@@ -1,0 +1,63 @@
+// A frame in flight: its buffers, its commands, and what it leaves.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "engine/gpu/frame_buffers.h"
+#include "engine/gpu/record.h"
+
+namespace stipple::gpu {
+
+/// Copies of bytes into pages, before a frame's passes.
+struct PendingUpload {
+    VkBuffer page;
+    uint64_t offset;
+    std::vector<uint8_t> bytes;
+};
+
+class FrameSlot {
+  public:
+    static Result<std::unique_ptr<FrameSlot>> create(const Device& device, Pipelines& pipelines);
+    ~FrameSlot();
+    FrameSlot(const FrameSlot&) = delete;
+    FrameSlot& operator=(const FrameSlot&) = delete;
+
+    /// Records and sends a frame; not while one is in flight. `uploads` are emptied.
+    Result<void> submit(const render::RenderRequest& request, const Residents& residents,
+                        std::vector<PendingUpload>& uploads, uint64_t number);
+    /// Has the device finished it?
+    bool isDone() const;
+    Result<void> wait();
+    /// Waits and hands over; once.
+    Result<void> read(render::Image& image, std::vector<render::PassTime>& times);
+
+    bool isInFlight() const { return isInFlight_; }
+    uint64_t number() const { return number_; }      ///< of its last frame
+    bool hasPicture() const { return hasPicture_; }  ///< that nobody has read
+    const FrameBuffers& buffers() const { return buffers_; }
+
+  private:
+    FrameSlot(const Device& device, Pipelines& pipelines, VkDescriptorSet set)
+        : device_(device), pipelines_(pipelines), set_(set), buffers_(device, set) {}
+    Result<void> createCommandObjects();
+    Result<void> record(const render::RenderRequest& request, std::vector<PendingUpload>& uploads);
+    Result<void> recordUploads(PassList& list, std::vector<PendingUpload>& uploads);
+    void recordReadback(PassList& list);
+    void takeTimes(std::vector<render::PassTime>& times) const;
+    void takeImage(render::Image& image) const;
+
+    const Device& device_;
+    Pipelines& pipelines_;
+    VkDescriptorSet set_;
+    FrameBuffers buffers_;
+    VkCommandPool commandPool_ = VK_NULL_HANDLE;
+    VkCommandBuffer commands_ = VK_NULL_HANDLE;
+    VkFence fence_ = VK_NULL_HANDLE;
+    VkQueryPool queries_ = VK_NULL_HANDLE;
+    std::vector<std::string> labels_;  ///< of the passes that were recorded
+    uint64_t number_ = 0;
+    bool isInFlight_ = false, hasPicture_ = false, wantsAll_ = false;
+};
+
+}  // namespace stipple::gpu

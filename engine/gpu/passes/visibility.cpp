@@ -1,0 +1,38 @@
+// Points, curves and triangles into the visibility buffer.
+#include "engine/gpu/passes/passes.h"
+
+namespace stipple::gpu {
+
+constinit const GpuPass clearPass{[](Recording& f) {
+    f.fill("clear", {{shared::kVisibilityBinding, 0xffffffffu}, {shared::kStatsBinding, 0u}});
+}};
+
+constinit const GpuPass projectPass{[](Recording& f) {
+    if (f.has(render::Pass::discs)) f.emptyList("disc list", shared::kDiscsBinding);
+    f.overBlocks("project", f.draws().points().blocks.size());
+}};
+
+constinit const GpuPass discsPass{[](Recording& f) {
+    f.once("disc order", "disc_order");
+    f.overBands("discs", "discs", f.draws().frame.firstBlock.discs);
+}};
+
+constinit const GpuPass splatPass{[](Recording& f) {
+    f.emptyList("disc list", shared::kDiscsBinding);
+    f.overBlocks("splat", f.draws().points().blocks.size());
+    f.overBands("discs", "discs");
+}};
+
+constinit const GpuPass strandsPass{[](Recording& f) {
+    f.emptyList("wide list", shared::kWideBinding);
+    f.overBlocks("strands", f.draws().curves().blocks.size());
+    f.overBands("wide strands", "strands_wide");
+}};
+
+constinit const GpuPass rasterisePass{[](Recording& f) {
+    f.emptyList("large list", shared::kLargeBinding);
+    f.overBlocks("rasterise", f.buffers().clusters());
+    f.overBands("rasterise large", "rasterise_large");
+}};
+
+}  // namespace stipple::gpu

@@ -1,0 +1,61 @@
+// Which buffer is bound where, what a dispatch is told, and how large what passes share is: for GLSL and for C++.
+#ifndef STIPPLE_SHARED_BINDINGS_H
+#define STIPPLE_SHARED_BINDINGS_H
+#include "types.h"
+SHARED_BEGIN
+
+const uint kFrameBinding = 0u;
+const uint kNodesBinding = 1u;
+const uint kBlocksBinding = 2u;
+const uint kVisibilityBinding = 3u;
+const uint kTexelsBinding = 4u;
+const uint kStatsBinding = 5u;
+const uint kImageBinding = 6u;
+const uint kExtraBinding = 7u;
+const uint kMeshesBinding = 8u;
+const uint kClustersBinding = 9u;
+const uint kMaterialsBinding = 10u;
+const uint kTexturesBinding = 11u;
+const uint kTilesBinding = 12u;
+const uint kLightsBinding = 13u;
+const uint kTriangleWordsBinding = 14u;
+const uint kLargeBinding = 15u;
+const uint kEnvironmentBinding = 16u;
+const uint kWideBinding = 17u;
+const uint kDiscsBinding = 18u;
+const uint kSurfaceBinding = 19u;
+const uint kBindings = 20u;
+
+// Per pixel:
+const uint kTexelWords = 5u;     // planes of a packed texel
+const uint kTriangleWords = 2u;  // material, emission
+const uint kExtraFloats = 7u;    // depth, normal xyz, linear rgb
+
+// Lists of what covers so many pixels that all threads fill it, and how: each workgroup a band of rows.
+const uint kLargeCapacity = 65536u;  // triangles
+const uint kWideCapacity = 65536u;   // curves
+const uint kBandRows = 16u;
+const uint kBandGroups = 64u;             // beside each other, one after another through the list
+const uint kGroupsPerDimension = 65535u;  // of blocks: the others are in the next row
+
+// `fine` and `coarse` are word offsets of the planes of two levels of the pyramid.
+struct Step {
+    uint fine;
+    uint fineWidth;
+    uint fineHeight;
+    uint coarse;
+    uint coarseWidth;
+    uint coarseHeight;
+    uint level;         // of the fine side
+    uint wantExtra;     // write depth, normals and linear colour
+    uint hasPyramid;    // levels above the first are of this frame
+    uint hasTubes;      // texels may be of tubes
+    uint hasTriangles;  // pixels may be of triangles
+    uint hasWideDiscs;  // there is a list of them
+    uint exactPoints;   // points are what their pixels show, at the depth of the visibility buffer
+    uint count;         // of clusters or blocks
+    uint firstBlock;    // of the ids that are drawn
+};
+
+SHARED_END
+#endif

@@ -1,0 +1,362 @@
+// The kernels of every instruction set against the scalar formulas of shaders/shared, value by value. Where a kernel
+// calls the formula itself nothing may differ; where it writes it out again (GCC turns only that into SIMD), units in
+// the last place.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <memory>
+
+#include "engine/base/rng.h"
+#include "engine/cpu/kernels.h"
+#include "shaders/shared/pack.h"
+#include "shaders/shared/pyramid.h"
+#include "shaders/shared/shade.h"
+#include "shaders/shared/splat_disc.h"
+#include "shaders/shared/splat_size.h"
+
+namespace stipple {
+namespace {
+
+using namespace shared;
+
+/// Floats between two of them; those of different sign are as far apart as both are from 0.
+double ulpsBetween(float a, float b) {
+    const auto place = [](float v) {
+        const auto bits = std::bit_cast<int32_t>(v);
+        return static_cast<double>(bits < 0 ? std::numeric_limits<int32_t>::min() - bits : bits);
+    };
+    return std::abs(place(a) - place(b));
+}
+float uniform(Rng& rng, double low, double high) { return static_cast<float>(rng.uniform(low, high)); }
+
+FrameConstants frameOf(bool orthographic) {
+    FrameConstants f{};
+    f.focal = orthographic ? 90.0f : 700.0f;
+    f.centre = {320, 240};
+    f.width = 640;
+    f.height = 480;
+    f.nearPlane = 0.01f;
+    f.supportScale = 1;
+    f.minimumRadius = 1;
+    f.orthographic = orthographic ? 1 : 0;
+    f.viewX = {1, 0, 0};
+    f.viewY = {0, 1, 0};
+    f.viewZ = {0, 0, 1};
+    return f;
+}
+
+/// A node with axes of any direction, evenly scaled, before the eye.
+DrawNode randomNode(Rng& rng) {
+    const glm::dvec3 x = glm::normalize(glm::dvec3(rng.normal(), rng.normal(), rng.normal()));
+    const glm::dvec3 y = glm::normalize(glm::cross(x, glm::dvec3(rng.normal(), rng.normal(), rng.normal())));
+    const glm::dvec3 z = glm::cross(x, y);
+    const double step = std::exp2(rng.uniform(-22, -14));
+    DrawNode node{};
+    node.axisX = glm::vec3(step * x);
+    node.axisY = glm::vec3(step * y);
+    node.axisZ = glm::vec3(step * z);
+    node.base = {uniform(rng, -2, 2), uniform(rng, -2, 2), uniform(rng, 4, 9)};
+    node.edge = static_cast<float>(65536 * step);
+    node.errorCode = static_cast<uint32_t>(rng.below(256));
+    node.octantMask = static_cast<uint32_t>(rng.below(256)) | kNodeTurned;
+    node.count = kRecordsPerBlock;
+    return node;
+}
+PointRecord randomRecord(Rng& rng) {
+    const auto word = [&] { return static_cast<uint32_t>(rng.below(uint64_t{1} << 32)); };
+    PointRecord r{word(), word(), word(), word()};
+    r.normal = std::min(r.normal & 0xffffu, 65534u) | std::min(r.normal >> 16, 65534u) << 16;
+    return r;
+}
+Texel randomTexel(Rng& rng, bool mayBeEmpty) {
+    Texel t;
+    t.depth = mayBeEmpty && rng.uniform(0, 1) < 0.3 ? 0.0f : uniform(rng, 5, 6);
+    t.radius = uniform(rng, 0.5, 9);
+    t.thickness = t.radius * uniform(rng, 0.05, 1.2);
+    t.offset = {uniform(rng, -1, 1), uniform(rng, -1, 1)};
+    t.normalPerp = {uniform(rng, -0.7, 0.7), uniform(rng, -0.7, 0.7)};
+    t.colour = {uniform(rng, 0, 1), uniform(rng, 0, 1), uniform(rng, 0, 1)};
+    t.isRound = 0;
+    t.axis = {0, 0};
+    return t;
+}
+void put(cpu::TexelRow& row, size_t i, const Texel& t) {
+    row.depth[i] = t.depth;
+    row.radius[i] = t.radius;
+    row.thickness[i] = t.thickness;
+    row.x[i] = t.offset.x;
+    row.y[i] = t.offset.y;
+    row.perpX[i] = t.normalPerp.x;
+    row.perpY[i] = t.normalPerp.y;
+    row.red[i] = t.colour.x;
+    row.green[i] = t.colour.y;
+    row.blue[i] = t.colour.z;
+}
+double farthest(const cpu::TexelRow& row, size_t i, const Texel& t) {
+    if (row.depth[i] == 0 && t.depth == 0) return 0;
+    double worst = 0;
+    for (const auto& [a, b] : {std::pair{row.depth[i], t.depth},
+                               {row.radius[i], t.radius},
+                               {row.thickness[i], t.thickness},
+                               {row.x[i], t.offset.x},
+                               {row.y[i], t.offset.y},
+                               {row.perpX[i], t.normalPerp.x},
+                               {row.perpY[i], t.normalPerp.y},
+                               {row.red[i], t.colour.x},
+                               {row.green[i], t.colour.y},
+                               {row.blue[i], t.colour.z}})
+        worst = std::max(worst, ulpsBetween(a, b));
+    return worst;
+}
+
+/// Calls use(kernels, frame) for every instruction set of this machine and both kinds of view.
+template <typename Use>
+void forKernels(const Use& use) {
+    size_t count = 0;
+    const cpu::Kernels* const* const all = cpu::availableKernels(count);
+    for (size_t k = 0; k < count; ++k)
+        for (const bool orthographic : {false, true}) {
+            SCOPED_TRACE(testing::Message() << all[k]->name << (orthographic ? ", orthographic" : ""));
+            use(orthographic ? *all[k]->orthographic : *all[k], frameOf(orthographic));
+        }
+}
+
+TEST(KernelFormulas, DiscsAreThoseOfSplatDisc) {
+    forKernels([](const cpu::Kernels& k, const FrameConstants& f) {
+        Rng rng(1);
+        const auto block = std::make_unique<cpu::SplatBlock>();
+        std::vector<PointRecord> records(kRecordsPerBlock);
+        const Lens lens = frameLens(f);
+        const float scattered = largestSplat(kFlagScattered, f.focal, f.height);
+        double worst = 0;
+        size_t drawn = 0, refused = 0;
+        for (int round = 0; round < 200; ++round) {
+            const DrawNode node = randomNode(rng);
+            for (PointRecord& r : records) r = randomRecord(rng);
+            k.placeSplats(f, node, records.data(), kRecordsPerBlock, *block);
+            for (uint32_t i = 0; i < kRecordsPerBlock; ++i) {
+                const WideDisc d = splatDisc(node, records[i], f.supportScale, scattered, i, lens);
+                // Sums of four terms: units in the last place of the largest of them.
+                const double size = std::max(
+                    {1.0, std::abs(double{node.base.x}), std::abs(double{node.base.y}), std::abs(double{node.base.z})});
+                const auto off = [&](float a, float b) { return std::abs(double{a} - double{b}) / size / 0x1p-23; };
+                worst = std::max({worst, off(block->cx[i], d.centre.x), off(block->cy[i], d.centre.y),
+                                  off(block->cz[i], d.centre.z), off(block->nx[i], d.normal.x) * size,
+                                  off(block->ny[i], d.normal.y) * size, off(block->nz[i], d.normal.z) * size,
+                                  ulpsBetween(block->radius[i], d.radius)});
+                // What the formulas draw, the kernel keeps, and the pixels that it may cover.
+                const float edgeOn = std::abs(dot(d.normal, sightTo(lens, d.centre)));
+                if (edgeOn < 1e-4f * std::sqrt(dot(sightTo(lens, d.centre), sightTo(lens, d.centre)))) continue;
+                const bool isSeen = isSplatSeen(node, records[i], d, f.nearPlane, lens) > 0.5f;
+                if (!isSeen) {
+                    EXPECT_EQ(block->keep[i], 0u);
+                    ++refused;
+                    continue;
+                }
+                const CentrePixel c = centrePixel(d, f);
+                const DiscBox box = discBox(d, f);
+                const bool hasBox = box.x.last >= box.x.first && box.y.last >= box.y.first;
+                if (c.x < 0 && !(hasBox && reachesPicture(d, f) > 0.5f)) continue;
+                ++drawn;
+                ASSERT_NE(block->keep[i], 0u);
+                if (!hasBox) continue;
+                EXPECT_LE(block->firstX[i], box.x.first);
+                EXPECT_GE(block->lastX[i], box.x.last);
+                EXPECT_LE(block->firstY[i], box.y.first);
+                EXPECT_GE(block->lastY[i], box.y.last);
+            }
+        }
+        EXPECT_LE(worst, 4);
+        EXPECT_GT(drawn, 500u);
+        EXPECT_GT(refused, 500u);
+        RecordProperty("worst ulps of " + std::string(k.name), std::to_string(worst));
+    });
+}
+
+TEST(KernelFormulas, PixelsAreThoseOfProjection) {
+    forKernels([](const cpu::Kernels& k, const FrameConstants& f) {
+        Rng rng(2);
+        std::vector<PointRecord> records(kRecordsPerBlock);
+        std::vector<uint32_t> pixel(kRecordsPerBlock), depth(kRecordsPerBlock);
+        const Lens lens = frameLens(f);
+        size_t drawn = 0, apart = 0;
+        for (int round = 0; round < 200; ++round) {
+            const DrawNode node = randomNode(rng);
+            for (PointRecord& r : records) r = randomRecord(rng);
+            k.projectBlock(f, node, records.data(), kRecordsPerBlock, false, pixel.data(), depth.data());
+            for (uint32_t i = 0; i < kRecordsPerBlock; ++i) {
+                const PointRecord r = records[i];
+                const vec3 c = recordPlace(node, r);
+                const float scale = f.focal / lensDepth(lens, c.z);
+                const float x = c.x * scale + f.centre.x, y = c.y * scale + f.centre.y;
+                const bool isFine =
+                    recordErrorCode(r) <= node.errorCode || (node.octantMask >> recordOctant(r) & 1u) != 0u;
+                const bool isIn = c.z > f.nearPlane && x >= 0 && y >= 0 && x < 640 && y < 480;
+                const bool isSeen = (recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) != 0u ||
+                                    dot(nodeDirection(node, octDirection(r.normal)), sightTo(lens, c)) < 0.0f;
+                const uint32_t expected =
+                    isFine && isIn && isSeen ? uint32_t(int(y)) * f.width + uint32_t(int(x)) : ~0u;
+                apart += pixel[i] != expected;
+                if (pixel[i] == ~0u || expected == ~0u) continue;
+                ++drawn;
+                EXPECT_LE(ulpsBetween(std::bit_cast<float>(depth[i]), c.z), 2);
+            }
+        }
+        EXPECT_GT(drawn, 1000u);
+        EXPECT_LE(apart, drawn / 2000) << "at the edges of pixels and seen edge-on one rounding decides";
+    });
+}
+
+TEST(KernelFormulas, TexelsArePackedAndUnpackedAsOne) {
+    forKernels([](const cpu::Kernels& k, const FrameConstants&) {
+        Rng rng(3);
+        constexpr uint32_t n = cpu::kTile;
+        const auto row = std::make_unique<cpu::TexelRow>(), back = std::make_unique<cpu::TexelRow>();
+        row->hasTubes = back->hasTubes = false;
+        std::vector<float> depth(n);
+        std::vector<uint32_t> size(n), offset(n), normal(n), colour(n);
+        const cpu::Planes planes{depth.data(), size.data(), offset.data(), normal.data(), colour.data()};
+        for (int round = 0; round < 100; ++round) {
+            std::vector<Texel> texels;
+            for (uint32_t i = 0; i < n; ++i) put(*row, cpu::kPad + i, texels.emplace_back(randomTexel(rng, true)));
+            k.packRow(*row, n, planes);
+            k.unpackRow(planes, cpu::kPad, n, *back);
+            for (uint32_t i = 0; i < n; ++i) {
+                const PackedTexel p = packTexel(texels[i]);
+                ASSERT_EQ(p.size, size[i]);
+                ASSERT_EQ(p.offset, offset[i]);
+                ASSERT_EQ(p.normal, normal[i]);
+                ASSERT_EQ(p.colour, colour[i]);
+                EXPECT_LE(farthest(*back, cpu::kPad + i, unpackTexel(p)), 1);
+            }
+        }
+    });
+}
+
+TEST(KernelFormulas, PulledAndPushedTexelsAreThoseOfTheFormulas) {
+    forKernels([](const cpu::Kernels& k, const FrameConstants& f) {
+        Rng rng(4);
+        constexpr uint32_t n = cpu::kTile / 2;
+        const Lens lens = frameLens(f);
+        const auto upper = std::make_unique<cpu::TexelRow>(), lower = std::make_unique<cpu::TexelRow>(),
+                   out = std::make_unique<cpu::TexelRow>();
+        double worstPull = 0, worstPush = 0;
+        size_t pulled = 0, pushed = 0;
+        for (int round = 0; round < 100; ++round) {
+            *upper = *lower = *out = {};
+            std::vector<Texel> a, b;
+            for (uint32_t i = 0; i < 2 * n; ++i) {
+                put(*upper, cpu::kPad + i, a.emplace_back(randomTexel(rng, true)));
+                put(*lower, cpu::kPad + i, b.emplace_back(randomTexel(rng, true)));
+            }
+            k.pullRow(*upper, *lower, n, 1, f.focal, *out);
+            for (uint32_t i = 0; i < n; ++i) {
+                const Texel t = pullTexels(a[2 * i], a[2 * i + 1], b[2 * i], b[2 * i + 1], 1, lens);
+                worstPull = std::max(worstPull, farthest(*out, cpu::kPad + i, t));
+                pulled += t.depth > 0;
+            }
+            // The push: `upper` is the fine row, two coarse rows around it.
+            const auto nearRow = std::make_unique<cpu::ExpandedRow>(), farRow = std::make_unique<cpu::ExpandedRow>();
+            const auto coarse = std::make_unique<cpu::TexelRow>();
+            std::array<std::vector<Texel>, 2> rows;
+            const float x = -100.5f, y = 37.5f, size = 2;
+            for (size_t r = 0; r < 2; ++r) {
+                *coarse = {};
+                for (uint32_t i = 0; i < n + 2; ++i) {
+                    Texel t = randomTexel(rng, true);
+                    t.radius *= 2;
+                    put(*coarse, cpu::kPad - 1 + i, rows.at(r).emplace_back(t));
+                }
+                auto& to = r == 0 ? *nearRow : *farRow;
+                k.expandRow(*coarse, 2 * n, x + 0.5f, y + (r == 0 ? 0.5f : 2.5f), size, f.focal, to.nearest, to.beside);
+            }
+            k.pushRow(*upper, *nearRow, *farRow, 1, x, y, 2 * n, 1, f.focal, *out);
+            for (uint32_t i = 0; i < 2 * n; ++i) {
+                const uint32_t at = i / 2 + 1, side = i % 2 == 0 ? at - 1 : at + 1;
+                const float sx = i % 2 == 0 ? -1.0f : 1.0f;
+                const auto disc = [&](size_t r, uint32_t c) {
+                    return coarseDisc(rows.at(r)[c], x + 0.5f + (float(int(c)) - 1.0f) * size,
+                                      y + (r == 0 ? 0.5f : 2.5f), lens);
+                };
+                const Texel t =
+                    pushTexel(a[i], rows[0][at], rows[0][side], rows[1][at], rows[1][side], disc(0, at), disc(0, side),
+                              disc(1, at), disc(1, side), sx, 1, x + float(int(i)), y, 1, lens);
+                worstPush = std::max(worstPush, farthest(*out, cpu::kPad + i, t));
+                pushed += t.depth > 0;
+            }
+        }
+        EXPECT_EQ(worstPull, 0) << "the formula itself, without fused multiplications";
+        EXPECT_EQ(worstPush, 0);
+        EXPECT_GT(pulled, 1000u);
+        EXPECT_GT(pushed, 1000u);
+    });
+}
+
+TEST(KernelFormulas, OutputIsTheNearestByte) {
+    const cpu::Tables tables = cpu::makeTables();
+    forKernels([&](const cpu::Kernels& k, const FrameConstants& f) {
+        Rng rng(5);
+        const auto row = std::make_unique<cpu::SurfaceRow>();
+        std::vector<uint32_t> rgba(cpu::kTile);
+        int worst = 0;
+        for (int round = 0; round < 400; ++round) {
+            for (size_t i = 0; i < cpu::kTile; ++i) {
+                row->depth[i] = 1;
+                row->red[i] = uniform(rng, -0.1, 1.1);
+                row->green[i] = uniform(rng, 0, 0.01);
+                row->blue[i] = uniform(rng, 0, 1);
+            }
+            k.outputRow(f, tables, cpu::kTile, *row, {rgba.data(), nullptr, nullptr, nullptr});
+            for (size_t i = 0; i < cpu::kTile; ++i)
+                for (const auto& [value, shift] :
+                     {std::pair{row->red[i], 0u}, {row->green[i], 8u}, {row->blue[i], 16u}}) {
+                    const float clamped = std::clamp(value, 0.0f, 1.0f);
+                    const int exact = static_cast<int>(srgbFromLinear(clamped) * 255.0f + 0.5f);
+                    worst = std::max(worst, std::abs(exact - static_cast<int>(rgba[i] >> shift & 255u)));
+                }
+        }
+        EXPECT_LE(worst, 1) << "of a table of 2,048 roots";
+    });
+}
+
+TEST(KernelFormulas, LightIsThatOfTheFormulas) {
+    forKernels([](const cpu::Kernels& k, FrameConstants f) {
+        Rng rng(6);
+        f.shade = kShadeLit;
+        f.sunDirection = glm::normalize(glm::vec3(-0.45f, -0.55f, -0.7f));
+        f.skyDirection = {0, -1, 0};
+        const auto row = std::make_unique<cpu::SurfaceRow>();
+        row->hasTriangles = row->hasEmission = false;
+        double worst = 0;
+        for (int round = 0; round < 100; ++round) {
+            std::vector<vec3> expected;
+            for (size_t i = 0; i < cpu::kTile; ++i) {
+                const glm::vec3 n =
+                    glm::normalize(glm::vec3(uniform(rng, -1, 1), uniform(rng, -1, 1), uniform(rng, -1, -0.1)));
+                row->depth[i] = 5;
+                row->nx[i] = n.x;
+                row->ny[i] = n.y;
+                row->nz[i] = n.z;
+                row->leaf[i] = rng.below(2) == 0 ? 0.0f : 1.0f;
+                row->material[i] = kPlainSurface;
+                const vec3 c(uniform(rng, 0, 1), uniform(rng, 0, 1), uniform(rng, 0, 1));
+                row->red[i] = c.x;
+                row->green[i] = c.y;
+                row->blue[i] = c.z;
+                const float light = irradiance(n, f.sunDirection, f.skyDirection, row->leaf[i]);
+                expected.emplace_back(c.x * light, c.y * light, c.z * light);
+            }
+            k.lightRow(f, {nullptr, nullptr}, 0, 3, cpu::kTile, *row);
+            for (size_t i = 0; i < cpu::kTile; ++i)
+                worst = std::max({worst, ulpsBetween(row->red[i], expected[i].x),
+                                  ulpsBetween(row->green[i], expected[i].y), ulpsBetween(row->blue[i], expected[i].z)});
+        }
+        // 1 + share (light - 1): a light of little is rounded at the size of 1.
+        EXPECT_LE(worst, 16);
+    });
+}
+
+}  // namespace
+}  // namespace stipple
