@@ -8,12 +8,14 @@ struct alignas(64) LitPixels {
     uint32_t words[kTile];
 };
 
-/// Where `mask` says so. (offX, offY): the first pixel's centre, px from the principal point.
-void lightSurfaces(const FrameConstants& f, const LightInput& input, const uint32_t* __restrict mask, float offX,
-                   float offY, uint32_t pixels, SurfaceRow& __restrict row) {
-    const float focal = f.focal, inverseFocal = 1.0f / focal, vy = offY * inverseFocal;
-    const Lens lens = lensHere(focal);
-    LitPixels p;
+/// What the pixels send to the eye.
+struct alignas(64) Sent {
+    float r[kTile], g[kTile], b[kTile];
+};
+
+/// Where `mask` says so.
+[[gnu::always_inline]] inline size_t takeLit(const SurfaceRow& row, const uint32_t* __restrict mask, float offX,
+                                             uint32_t pixels, LitPixels& p) {
     size_t n = 0;
     for (uint32_t i = 0; i < pixels; ++i) {
         if (mask[i] == 0) continue;
@@ -29,11 +31,26 @@ void lightSurfaces(const FrameConstants& f, const LightInput& input, const uint3
         p.blue[n] = row.blue[i];
         p.words[n++] = row.material[i];
     }
-    alignas(64) float r[kTile], g[kTile], b[kTile];
-    const float *const px = p.x, *const depth = p.depth, *const nx = p.nx, *const ny = p.ny, *const nz = p.nz,
-                       *const leaf = p.leaf, *const pr = p.red, *const pg = p.green, *const pb = p.blue;
-    const uint32_t* const word = p.words;
-    const auto surfaceAt = [=](size_t i) {
+    return n;
+}
+
+/// The surfaces of the pixels; plain pointers, or loops over them do not become SIMD. vy: of the row, over the focal
+/// length.
+struct LitSurfaces {
+    LitSurfaces(const LitPixels& p, const Lens& of, float inverse, float y)
+        : px(p.x),
+          nx(p.nx),
+          ny(p.ny),
+          nz(p.nz),
+          leaf(p.leaf),
+          pr(p.red),
+          pg(p.green),
+          pb(p.blue),
+          word(p.words),
+          lens(of),
+          inverseFocal(inverse),
+          vy(y) {}
+    [[gnu::always_inline]] Surface operator()(size_t i) const {
         const vec3 e = rayDirection(pixelRay(lens, px[i] * inverseFocal, vy));
         const float inverse = 1.0f / std::sqrt(e.x * e.x + e.y * e.y + 1.0f);
         const vec3 ray = vec3(e.x * inverse, e.y * inverse, inverse);
@@ -46,7 +63,17 @@ void lightSurfaces(const FrameConstants& f, const LightInput& input, const uint3
         s.occlusion = float(int(word[i] >> 16 & 255u)) * (1.0f / 255.0f);
         s.leaf = leaf[i];
         return s;
-    };
+    }
+    const float *px, *nx, *ny, *nz, *leaf, *pr, *pg, *pb;
+    const uint32_t* word;
+    Lens lens;
+    float inverseFocal, vy;
+};
+
+/// Of the sky or the environment, and of the sun where there are no other lights.
+[[gnu::always_inline]] inline void addSurroundings(const FrameConstants& f, const LightInput& input,
+                                                   const LitSurfaces surfaceAt, size_t n, float* __restrict r,
+                                                   float* __restrict g, float* __restrict b) {
     const float ambient = f.ambient;
     const vec3 up = f.skyDirection;
     if (input.environment != nullptr) {
@@ -76,30 +103,49 @@ void lightSurfaces(const FrameConstants& f, const LightInput& input, const uint3
             b[i] += c.z;
         }
     }
-    for (uint32_t k = 0; k < f.lightCount; ++k) {
-        const LightSource light = input.lights[k];
-        const bool isFar = light.kind == kLightDirectional;
+}
+
+[[gnu::always_inline]] inline void addLight(const LightSource& of, const float* __restrict depth,
+                                            const LitSurfaces surfaceAt, size_t n, float* __restrict r,
+                                            float* __restrict g, float* __restrict b) {
+    const LightSource light = of;
+    const float* const px = surfaceAt.px;
+    const Lens lens = surfaceAt.lens;
+    const float inverseFocal = surfaceAt.inverseFocal, vy = surfaceAt.vy;
+    const bool isFar = light.kind == kLightDirectional;
 #pragma GCC ivdep
-        for (size_t i = 0; i < n; ++i) {
-            const float z = depth[i];
-            const vec3 point = alongRay(pixelRay(lens, px[i] * inverseFocal, vy), z);
-            vec3 l = vec3(light.position.x - (isFar ? 0.0f : point.x), light.position.y - (isFar ? 0.0f : point.y),
-                          light.position.z - (isFar ? 0.0f : point.z));
-            const float inverse = 1.0f / std::sqrt(max(l.x * l.x + l.y * l.y + l.z * l.z, 1.0e-12f));
-            l = vec3(l.x * inverse, l.y * inverse, l.z * inverse);
-            const float share = lightAt(light, point, z);
-            const vec3 c = reflectLight(surfaceAt(i), l,
-                                        vec3(light.colour.x * share, light.colour.y * share, light.colour.z * share));
-            r[i] += c.x;
-            g[i] += c.y;
-            b[i] += c.z;
-        }
+    for (size_t i = 0; i < n; ++i) {
+        const float z = depth[i];
+        const vec3 point = alongRay(pixelRay(lens, px[i] * inverseFocal, vy), z);
+        vec3 l = vec3(light.position.x - (isFar ? 0.0f : point.x), light.position.y - (isFar ? 0.0f : point.y),
+                      light.position.z - (isFar ? 0.0f : point.z));
+        const float inverse = 1.0f / std::sqrt(max(l.x * l.x + l.y * l.y + l.z * l.z, 1.0e-12f));
+        l = vec3(l.x * inverse, l.y * inverse, l.z * inverse);
+        const float share = lightAt(light, point, z);
+        const vec3 c =
+            reflectLight(surfaceAt(i), l, vec3(light.colour.x * share, light.colour.y * share, light.colour.z * share));
+        r[i] += c.x;
+        g[i] += c.y;
+        b[i] += c.z;
     }
+}
+
+/// Where `mask` says so. (offX, offY): the first pixel's centre, px from the principal point.
+void lightSurfaces(const FrameConstants& f, const LightInput& input, const uint32_t* __restrict mask, float offX,
+                   float offY, uint32_t pixels, SurfaceRow& __restrict row) {
+    const float inverseFocal = 1.0f / f.focal;
+    LitPixels p;
+    Sent sent;
+    const size_t n = takeLit(row, mask, offX, pixels, p);
+    const LitSurfaces surfaceAt(p, lensHere(f.focal), inverseFocal, offY * inverseFocal);
+    addSurroundings(f, input, surfaceAt, n, sent.r, sent.g, sent.b);
+    for (uint32_t k = 0; k < f.lightCount; ++k)
+        addLight(input.lights[k], p.depth, surfaceAt, n, sent.r, sent.g, sent.b);
     for (size_t i = 0; i < n; ++i) {
         const uint32_t at = p.at[i];
-        row.red[at] = r[i];
-        row.green[at] = g[i];
-        row.blue[at] = b[i];
+        row.red[at] = sent.r[i];
+        row.green[at] = sent.g[i];
+        row.blue[at] = sent.b[i];
         if (!row.hasEmission) continue;
         row.red[at] += unpackRed(row.emission[at]);
         row.green[at] += unpackGreen(row.emission[at]);

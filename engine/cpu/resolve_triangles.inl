@@ -115,15 +115,31 @@ void applyMaterial(const MaterialRun& run, const Corners& c, const UvRow& uv, bo
         }
 }
 
-void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, uint32_t x0, uint32_t y,
-                      TexelRow& __restrict row, const SurfacePlanes& planes) {
-    Corners c;
-    MaterialRow s;
+/// What is known of the pixels of a row that show triangles.
+struct TriangleRow {
+    Corners corners;
+    MaterialRow material;
     UvRow uv;
-    alignas(64) float wb[kTile], wc[kTile];
-    alignas(64) uint32_t surface[kTile];
-    uint32_t anyTextured = 0;
+    alignas(64) float wb[kTile], wc[kTile];  ///< weights of the second and third corner
+    alignas(64) uint32_t surface[kTile];     ///< flags and material
+    alignas(64) float perpX[kTile], perpY[kTile];
+    alignas(64) uint32_t word[kTile], shine[kTile];
+};
+
+/// Rays of the pixels of a row.
+struct RowRays {
+    Lens lens;
+    float inverseFocal, centreX, rayY;
+    [[gnu::always_inline]] PixelRay at(uint32_t pixel) const {
+        return pixelRay(lens, (float(int(pixel)) - centreX) * inverseFocal, rayY);
+    }
+};
+
+/// Follows the pointers; is any of them textured?
+[[gnu::always_inline]] inline bool gatherCorners(const ResolveInput& in, const WinningPixels& p, Corners& c,
+                                                 uint32_t* __restrict surface) {
     const size_t n = p.count;
+    uint32_t anyTextured = 0;
     for (size_t i = 0; i < n; ++i) {
         const MeshBlock& block = in.meshBlocks[p.id[i] / kClusterTriangles];
         const uint32_t t = block.triangles[p.id[i] % kClusterTriangles];
@@ -141,12 +157,15 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
         surface[i] = block.vertices[t & 255u].surface;
         anyTextured |= surface[i] & kSurfaceTextured;
     }
-    const float inverseFocal = 1.0f / f.focal;
-    const Lens lens = lensHere(f.focal);
-    const float centreX = f.centre.x - float(int(x0)) - 0.5f, rayY = (float(int(y)) + 0.5f - f.centre.y) * inverseFocal;
+    return anyTextured != 0;
+}
+
+[[gnu::always_inline]] inline void weighCorners(const WinningPixels& p, const RowRays& rays, const Corners& c,
+                                                MaterialRow& s, UvRow& uv, float* __restrict wb, float* __restrict wc) {
+    const size_t n = p.count;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
-        const PixelRay ray = pixelRay(lens, (float(int(p.pixel[i])) - centreX) * inverseFocal, rayY);
+        const PixelRay ray = rays.at(p.pixel[i]);
         const vec3 a = vec3(c.x[0][i], c.y[0][i], c.z[0][i]);
         const vec2 w =
             triangleWeights(rayDirection(ray), fromRay(ray, a), fromRay(ray, vec3(c.x[1][i], c.y[1][i], c.z[1][i])),
@@ -166,18 +185,28 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
         s.faceY[i] = e1.z * e2.x - e1.x * e2.z;
         s.faceZ[i] = e1.x * e2.y - e1.y * e2.x;
     }
-    if (anyTextured != 0) {
+}
+
+[[gnu::always_inline]] inline void measureFootprints(const WinningPixels& p, const RowRays& rays, const Corners& c,
+                                                     UvRow& uv) {
+    const size_t n = p.count;
 #pragma GCC ivdep
-        for (size_t i = 0; i < n; ++i) {
-            const PixelRay ray = pixelRay(lens, (float(int(p.pixel[i])) - centreX) * inverseFocal, rayY);
-            const vec3 corner = vec3(c.x[0][i], c.y[0][i], c.z[0][i]);
-            const vec3 e1 = vec3(c.x[1][i] - corner.x, c.y[1][i] - corner.y, c.z[1][i] - corner.z);
-            const vec3 e2 = vec3(c.x[2][i] - corner.x, c.y[2][i] - corner.y, c.z[2][i] - corner.z);
-            uv.footprint[i] =
-                uvFootprint(ray, inverseFocal, corner, e1, e2, vec2(c.u[1][i] - c.u[0][i], c.v[1][i] - c.v[0][i]),
-                            vec2(c.u[2][i] - c.u[0][i], c.v[2][i] - c.v[0][i]));
-        }
+    for (size_t i = 0; i < n; ++i) {
+        const PixelRay ray = rays.at(p.pixel[i]);
+        const vec3 corner = vec3(c.x[0][i], c.y[0][i], c.z[0][i]);
+        const vec3 e1 = vec3(c.x[1][i] - corner.x, c.y[1][i] - corner.y, c.z[1][i] - corner.z);
+        const vec3 e2 = vec3(c.x[2][i] - corner.x, c.y[2][i] - corner.y, c.z[2][i] - corner.z);
+        uv.footprint[i] =
+            uvFootprint(ray, rays.inverseFocal, corner, e1, e2, vec2(c.u[1][i] - c.u[0][i], c.v[1][i] - c.v[0][i]),
+                        vec2(c.u[2][i] - c.u[0][i], c.v[2][i] - c.v[0][i]));
     }
+}
+
+/// Material by material.
+[[gnu::always_inline]] inline void applyMaterials(const ResolveInput& in, const WinningPixels& p, bool hasEmission,
+                                                  TriangleRow& row) {
+    const size_t n = p.count;
+    const uint32_t* const surface = row.surface;
     for (size_t first = 0; first < n;) {
         const MeshBlock& block = in.meshBlocks[p.id[first] / kClusterTriangles];
         size_t end = first + 1;
@@ -186,14 +215,19 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
             ++end;
         applyMaterial({block.mesh, &in.materials[block.mesh->firstMaterial + (surface[first] & kSurfaceMaterialMask)],
                        block.textures, surface[first], first, end - first},
-                      c, uv, planes.emissive != nullptr, s);
+                      row.corners, row.uv, hasEmission, row.material);
         first = end;
     }
-    alignas(64) float perpX[kTile], perpY[kTile];
-    alignas(64) uint32_t word[kTile], shine[kTile];
+}
+
+/// Normals and surface words.
+[[gnu::always_inline]] inline void packSurfaces(const WinningPixels& p, const RowRays& rays, const MaterialRow& s,
+                                                float* __restrict perpX, float* __restrict perpY,
+                                                uint32_t* __restrict word) {
+    const size_t n = p.count;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
-        const vec3 ray = rayDirection(pixelRay(lens, (float(int(p.pixel[i])) - centreX) * inverseFocal, rayY));
+        const vec3 ray = rayDirection(rays.at(p.pixel[i]));
         const vec3 normal =
             surfaceNormal(vec3(s.nx[i], s.ny[i], s.nz[i]), vec3(s.faceX[i], s.faceY[i], s.faceZ[i]), ray);
         const float inverseRay = 1.0f / std::sqrt(ray.x * ray.x + ray.y * ray.y + 1.0f);
@@ -203,6 +237,13 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
         const auto byte = [](float value) { return uint32_t(int(min(max(0.0f, value), 1.0f) * 255.0f + 0.5f)); };
         word[i] = s.flags[i] | byte(s.metallic[i]) | byte(s.roughness[i]) << 8 | byte(s.occlusion[i]) << 16;
     }
+}
+
+/// Colours of the corners, mixed; or those of a debug view.
+[[gnu::always_inline]] inline void mixColours(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p,
+                                              const Corners& c, const float* __restrict wb, const float* __restrict wc,
+                                              MaterialRow& s) {
+    const size_t n = p.count;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const auto mix = [&](uint32_t shift) {
@@ -224,6 +265,23 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
             s.green[i] = d.y;
             s.blue[i] = d.z;
         }
+}
+
+void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, uint32_t x0, uint32_t y,
+                      TexelRow& __restrict row, const SurfacePlanes& planes) {
+    TriangleRow t;
+    const Corners& c = t.corners;
+    MaterialRow& s = t.material;
+    const size_t n = p.count;
+    const float inverseFocal = 1.0f / f.focal;
+    const RowRays rays{lensHere(f.focal), inverseFocal, f.centre.x - float(int(x0)) - 0.5f,
+                       (float(int(y)) + 0.5f - f.centre.y) * inverseFocal};
+    const bool anyTextured = gatherCorners(in, p, t.corners, t.surface);
+    weighCorners(p, rays, c, s, t.uv, t.wb, t.wc);
+    if (anyTextured) measureFootprints(p, rays, c, t.uv);
+    applyMaterials(in, p, planes.emissive != nullptr, t);
+    packSurfaces(p, rays, s, t.perpX, t.perpY, t.word);
+    mixColours(f, in, p, c, t.wb, t.wc, s);
     for (size_t i = 0; i < n; ++i) {
         const size_t at = kPad + p.pixel[i];
         row.depth[at] = p.depth[i];
@@ -231,15 +289,15 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
         row.thickness[at] = kTriangleRadius;
         row.x[at] = 0;
         row.y[at] = 0;
-        row.perpX[at] = perpX[i];
-        row.perpY[at] = perpY[i];
+        row.perpX[at] = t.perpX[i];
+        row.perpY[at] = t.perpY[i];
         row.red[at] = s.red[i];
         row.green[at] = s.green[i];
         row.blue[at] = s.blue[i];
-        planes.surface[p.pixel[i]] = word[i];
+        planes.surface[p.pixel[i]] = t.word[i];
     }
     if (planes.emissive == nullptr) return;
 #pragma GCC ivdep
-    for (size_t i = 0; i < n; ++i) shine[i] = packColour(s.shineR[i], s.shineG[i], s.shineB[i]);
-    for (size_t i = 0; i < n; ++i) planes.emissive[p.pixel[i]] = shine[i];
+    for (size_t i = 0; i < n; ++i) t.shine[i] = packColour(s.shineR[i], s.shineG[i], s.shineB[i]);
+    for (size_t i = 0; i < n; ++i) planes.emissive[p.pixel[i]] = t.shine[i];
 }

@@ -157,13 +157,10 @@ void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pix
     }
 }
 
-void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_t count, uint32_t firstPlace,
-                  const WideSink& wide, const Visibility& visibility) {
-    const FrameConstants f = frame;
-    const DrawNode node = *block.node;
-    const uint32_t* __restrict const words = &block.segments->a.positionXY;
+/// Segments on the image.
+[[gnu::always_inline]] inline void placeSegments(const FrameConstants& f, const DrawNode& node,
+                                                 const uint32_t* __restrict words, size_t count, Lines& lines) {
     const Lens lens = lensHere(f.focal);
-    Lines lines;
 #pragma GCC ivdep
     for (size_t i = 0; i < count; ++i) {
         const StrandSegment s = segmentAt(words, i);
@@ -195,36 +192,50 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
             strandReaches(c, lens, f.centre.x, f.centre.y, float(int(f.width)), float(int(f.height)), f.nearPlane);
         lines.keep[i] = (isFine & (max(p.isThere, reaches) > 0.5f)) ? 1u : 0u;
     }
-    layLines(f, lines, count);
+}
+
+/// A filled segment: its pixels here, or, of one that covers much of the image, by all threads.
+void drawFilled(const FrameConstants& f, const CameraSegment& c, bool isRound, uint64_t id, const WideSink& wide,
+                const Visibility& visibility) {
     const float width = float(f.width), height = float(f.height);
+    const WideStrand s = isRound ? wideTube(f, c, id) : wideRibbon(f, c, id);
+    float left, right, top, bottom;
+    if (isRound) {
+        left = min(s.left[0], s.left[1]);
+        right = max(s.right[0], s.right[1]);
+        top = min(s.top[0], s.top[1]);
+        bottom = max(s.bottom[0], s.bottom[1]);
+        if (left >= width || top >= height) return;
+    } else {
+        left = min(min(s.x[0], s.x[1]), min(s.x[2], s.x[3]));
+        right = max(max(s.x[0], s.x[1]), max(s.x[2], s.x[3]));
+        top = min(min(s.y[0], s.y[1]), min(s.y[2], s.y[3]));
+        bottom = max(max(s.y[0], s.y[1]), max(s.y[2], s.y[3]));
+        if (left > width || top > height) return;
+    }
+    if (right < 0.0f || bottom < 0.0f) return;
+    if (min(bottom - top, height) * min(right - left, width) > float(kLargePixels))
+        wide.keep(wide.context, s);
+    else
+        fillStrand(f, s, 0, int(f.height) - 1, visibility);
+}
+
+void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_t count, uint32_t firstPlace,
+                  const WideSink& wide, const Visibility& visibility) {
+    const FrameConstants f = frame;
+    const DrawNode node = *block.node;
+    const uint32_t* __restrict const words = &block.segments->a.positionXY;
+    const Lens lens = lensHere(f.focal);
+    Lines lines;
+    placeSegments(f, node, words, count, lines);
+    layLines(f, lines, count);
     LinePixels pixels;
     size_t collected = 0;
     for (size_t i = 0; i < count; ++i) {
         if (lines.keep[i] == 0) continue;
         const uint64_t id = drawId(f.firstBlock.curves, firstPlace + uint32_t(i));
-        // One that covers much of the image is work for all threads.
-        const auto fill = [&](const WideStrand& s, float columns, float rows) {
-            if (min(rows, height) * min(columns, width) > float(kLargePixels))
-                wide.keep(wide.context, s);
-            else
-                fillStrand(f, s, 0, int(f.height) - 1, visibility);
-        };
-        if (lines.isFilled[i] * lines.isRound[i] > 0.5f) {
-            const WideStrand s = wideTube(f, cameraSegment(node, segmentAt(words, i)), id);
-            const float left = min(s.left[0], s.left[1]), right = max(s.right[0], s.right[1]);
-            const float top = min(s.top[0], s.top[1]), bottom = max(s.bottom[0], s.bottom[1]);
-            if (right < 0.0f || bottom < 0.0f || left >= width || top >= height) continue;
-            fill(s, right - left, bottom - top);
-            continue;
-        }
         if (lines.isFilled[i] > 0.5f) {
-            const WideStrand s = wideRibbon(f, cameraSegment(node, segmentAt(words, i)), id);
-            const float left = min(min(s.x[0], s.x[1]), min(s.x[2], s.x[3])),
-                        right = max(max(s.x[0], s.x[1]), max(s.x[2], s.x[3]));
-            const float top = min(min(s.y[0], s.y[1]), min(s.y[2], s.y[3])),
-                        bottom = max(max(s.y[0], s.y[1]), max(s.y[2], s.y[3]));
-            if (right < 0.0f || bottom < 0.0f || left > width || top > height) continue;
-            fill(s, right - left, bottom - top);
+            drawFilled(f, cameraSegment(node, segmentAt(words, i)), lines.isRound[i] > 0.5f, id, wide, visibility);
             continue;
         }
         for (int k = 0; k < lines.count[i]; ++k) {
@@ -337,11 +348,9 @@ void resolveFilled(const FrameConstants& f, const StrandPixels& e, const Winning
     }
 }
 
-/// Texels of the pixels that show strands; is any of them a tube to be reconstructed?
-bool resolveStrands(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, uint32_t x0, uint32_t y,
-                    TexelRow& __restrict row, float& largestRadius) {
-    StrandPixels e;
-    StrandTexels o;
+/// Follows the pointers.
+[[gnu::always_inline]] inline void gatherStrands(const FrameConstants& f, const ResolveInput& in,
+                                                 const WinningPixels& p, StrandPixels& e) {
     const size_t n = p.count;
     constexpr size_t kAhead = 10;  // pixels: segments lie anywhere in memory
     for (size_t i = 0; i < n; ++i) {
@@ -366,9 +375,14 @@ bool resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
             e.words[3][i] = e.words[7][i] = byte(d.x) | byte(d.y) << 8 | byte(d.z) << 16;
         }
     }
-    const float focal = f.focal, cx = f.centre.x - float(int(x0)) - 0.5f, cy = f.centre.y - float(int(y)) - 0.5f;
+}
+
+/// (cx, cy): the principal point from the row's first pixel's centre on.
+[[gnu::always_inline]] inline void reconstructStrands(const FrameConstants& f, const StrandPixels& e,
+                                                      const WinningPixels& p, float cx, float cy, StrandTexels& o) {
+    const size_t n = p.count;
     const float nearPlane = f.nearPlane, support = f.supportScale;
-    const Lens lens = lensHere(focal);
+    const Lens lens = lensHere(f.focal);
     const vec3 sun = f.sunDirection;
     const float exactStrands = f.exactStrands;
 #pragma GCC ivdep
@@ -397,6 +411,17 @@ bool resolveStrands(const FrameConstants& f, const ResolveInput& in, const Winni
         o.green[i] = mixedColour(packed, 8, place);
         o.blue[i] = mixedColour(packed, 16, place);
     }
+}
+
+/// Texels of the pixels that show strands; is any of them a tube to be reconstructed?
+bool resolveStrands(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, uint32_t x0, uint32_t y,
+                    TexelRow& __restrict row, float& largestRadius) {
+    StrandPixels e;
+    StrandTexels o;
+    const size_t n = p.count;
+    gatherStrands(f, in, p, e);
+    const float focal = f.focal, cx = f.centre.x - float(int(x0)) - 0.5f, cy = f.centre.y - float(int(y)) - 0.5f;
+    reconstructStrands(f, e, p, cx, cy, o);
     const float ex0 = -cx / focal, ey = -cy / focal;
     resolveFilled<kFilledTube>(f, e, p, ex0, ey, o);
     resolveFilled<kFilledRibbon>(f, e, p, ex0, ey, o);

@@ -198,6 +198,41 @@ const float kBorderReach2 = 4.0f;
 const float kBorderTexel = 8.0f;
 const float kSurrounding = 4.0f;  // coarse texels of one surface that make a fine texel lie inside it
 
+// How much whatever is nearest of four coarse texels counts for a fine one that none of them reaches (`missed`): an
+// empty texel between four filled ones is not left open, within reason (large discs that only share a coarse texel are
+// not one surface). What lies outside the image (depth < 0) may be filled or not and does not keep a gap open. Between
+// leaves it stays open. So does what lies behind all four (`hindmost`): a point of the far side that shines through
+// between the near ones.
+SHARED_FN float gapBetween(float fineDepth, Texel q0, Texel q1, Texel q2, Texel q3, float missed, float least,
+                           float hindmost, float fineSize) {
+    const float leaves = max(max(q0.depth > 0.0f ? isLeaf(q0.thickness, q0.radius) : 0.0f,
+                                 q1.depth > 0.0f ? isLeaf(q1.thickness, q1.radius) : 0.0f),
+                             max(q2.depth > 0.0f ? isLeaf(q2.thickness, q2.radius) : 0.0f,
+                                 q3.depth > 0.0f ? isLeaf(q3.thickness, q3.radius) : 0.0f));
+    const float isSolid = 1.0f - leaves;
+    const float noneEmpty =
+        min(min(abs(q0.depth), abs(q1.depth)), min(abs(q2.depth), abs(q3.depth))) > 0.0f ? missed * isSolid : 0.0f;
+    const float isBorder = min(min(q0.depth, q1.depth), min(q2.depth, q3.depth)) < 0.0f ? 1.0f : 0.0f;
+    const float isLarge = fineSize > kBorderTexel ? 1.0f : 0.0f;
+    const float farthest = isBorder * isLarge > 0.5f ? kBorderReach2 : kGapReach2;
+    const float oneFilled = least < farthest ? noneEmpty : 0.0f;
+    const float shines = fineDepth > hindmost ? missed * isSolid : 0.0f;
+    return fineDepth <= 0.0f ? oneFilled : shines;
+}
+
+SHARED_FN Texel chosenTexel(bool first, Texel a, Texel b) {
+    Texel t;
+    t.depth = first ? a.depth : b.depth;
+    t.radius = first ? a.radius : b.radius;
+    t.thickness = first ? a.thickness : b.thickness;
+    t.offset = vec2(first ? a.offset.x : b.offset.x, first ? a.offset.y : b.offset.y);
+    t.normalPerp = vec2(first ? a.normalPerp.x : b.normalPerp.x, first ? a.normalPerp.y : b.normalPerp.y);
+    t.colour = vec3(first ? a.colour.x : b.colour.x, first ? a.colour.y : b.colour.y, first ? a.colour.z : b.colour.z);
+    t.isRound = first ? a.isRound : b.isRound;
+    t.axis = vec2(first ? a.axis.x : b.axis.x, first ? a.axis.y : b.axis.y);
+    return t;
+}
+
 // Refines one fine texel from the four coarse texels around it. q0 is its parent, q1 the neighbour in x, q2 in y, q3 in
 // both; (sx, sy) = -1 or +1 say on which side of the parent's centre the fine texel lies. `fineSize`: its edge, pixels.
 // The fine texel is replaced iff it is empty or lies behind what the coarse ones say is in front of it (F13). Where no
@@ -245,25 +280,8 @@ SHARED_FN Texel pushTexel(Texel own, Texel q0, Texel q1, Texel q2, Texel q3, Coa
     // Conditions as numbers: branches would keep compilers from turning loops over this function into SIMD.
     const float inside = together >= kSurrounding ? 1.0f : 0.0f;
     const float scale = missed * inside > 0.5f ? 0.25f : 1.0f;
-    // An empty texel between four filled ones is not left open: whatever is nearest counts, within reason (large discs
-    // that only share a coarse texel are not one surface). What lies outside the image (depth < 0) may be filled or not
-    // and does not keep a gap open.
-    // Between leaves it stays open.
-    const float leaves = max(max(n0 < kFarAway ? isLeaf(q0.thickness, q0.radius) : 0.0f,
-                                 n1 < kFarAway ? isLeaf(q1.thickness, q1.radius) : 0.0f),
-                             max(n2 < kFarAway ? isLeaf(q2.thickness, q2.radius) : 0.0f,
-                                 n3 < kFarAway ? isLeaf(q3.thickness, q3.radius) : 0.0f));
-    const float isSolid = 1.0f - leaves;
-    const float noneEmpty =
-        min(min(abs(q0.depth), abs(q1.depth)), min(abs(q2.depth), abs(q3.depth))) > 0.0f ? missed * isSolid : 0.0f;
-    const float isBorder = min(min(q0.depth, q1.depth), min(q2.depth, q3.depth)) < 0.0f ? 1.0f : 0.0f;
-    const float isLarge = fineSize > kBorderTexel ? 1.0f : 0.0f;
-    const float farthest = isBorder * isLarge > 0.5f ? kBorderReach2 : kGapReach2;
-    const float oneFilled = least < farthest ? noneEmpty : 0.0f;
-    // So does what lies behind all four: a point of the far side that shines through between the near ones.
     const float hindmost = max(max(n0 + t0, n1 + t1), max(n2 + t2, n3 + t3));
-    const float shines = fine.depth > hindmost ? missed * isSolid : 0.0f;
-    const float between = fine.depth <= 0.0f ? oneFilled : shines;
+    const float between = gapBetween(fine.depth, q0, q1, q2, q3, missed, least, hindmost, fineSize);
     const float k0 = max(kernelWeight(r0 * scale), between * gapWeight(r0, least));
     const float k1 = max(kernelWeight(r1 * scale), between * gapWeight(r1, least));
     const float k2 = max(kernelWeight(r2 * scale), between * gapWeight(r2, least));
@@ -295,19 +313,7 @@ SHARED_FN Texel pushTexel(Texel own, Texel q0, Texel q1, Texel q2, Texel q3, Coa
         max(fine.radius * fine.radius, fineSize * fineSize);  // (of others the centre lies in the texel)
     const float isMissed = off2 > least2 ? 1.0f : 0.0f;
     const bool replace = hasBlend * (isBehind + isEmpty + isMissed) > 0.5f;
-    const Texel blended = texelFromBlend(b, isRound, lens);
-    Texel t;
-    t.depth = replace ? blended.depth : fine.depth;
-    t.radius = replace ? blended.radius : fine.radius;
-    t.thickness = replace ? blended.thickness : fine.thickness;
-    t.offset = vec2(replace ? blended.offset.x : fine.offset.x, replace ? blended.offset.y : fine.offset.y);
-    t.normalPerp =
-        vec2(replace ? blended.normalPerp.x : fine.normalPerp.x, replace ? blended.normalPerp.y : fine.normalPerp.y);
-    t.colour = vec3(replace ? blended.colour.x : fine.colour.x, replace ? blended.colour.y : fine.colour.y,
-                    replace ? blended.colour.z : fine.colour.z);
-    t.isRound = replace ? blended.isRound : fine.isRound;
-    t.axis = vec2(replace ? blended.axis.x : fine.axis.x, replace ? blended.axis.y : fine.axis.y);
-    return t;
+    return chosenTexel(replace, texelFromBlend(b, isRound, lens), fine);
 }
 
 SHARED_END
