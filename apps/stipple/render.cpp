@@ -7,6 +7,7 @@
 
 #include "apps/stipple/camera_options.h"
 #include "apps/stipple/common.h"
+#include "apps/stipple/effect_options.h"
 #include "apps/stipple/legend.h"
 #include "apps/stipple/outputs.h"
 #include "apps/stipple/render_frames.h"
@@ -25,7 +26,7 @@ namespace stipple::app {
 namespace {
 
 struct Options {
-    std::vector<std::string> inputs;
+    std::vector<std::string> inputs, effects;
     std::string output, size = "1280x720", mode = "pullpush", device = "auto", shade = "auto",
                         background = fmt::format("{}", fmt::join(render::kBackground, ","));
     std::string debug = "none", resident = "1G";
@@ -88,6 +89,7 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     s.draw.lit = isLit(o.shade, d, colour);
     s.draw.worldUp = shot.worldUp;
     s.draw.exactStrands = static_cast<float>(o.strandExact);
+    s.draw.effects = o.effects;
     s.draw.wind = {o.wind, o.seconds, render::windAcross(shot.worldUp)};
     STIPPLE_ASSIGN(const glm::dvec3 background, backgroundOf(o));
     for (int c = 0; c < 3; ++c)
@@ -289,6 +291,35 @@ Error toldOf(Error error, const Options& o, const Written& written) {
     return error;
 }
 
+/// How inputs that are not built yet are built.
+void addReading(CLI::App& sub, Options& o) {
+    addUpOption(sub, o.build.up);
+    sub.add_option("--memory", o.build.memory, "memory that the build may use, bytes (stipple help budgets)")
+        ->check(bytes())
+        ->type_name("SIZE")
+        ->capture_default_str();
+    sub.add_option("--temp", o.build.temp,
+                   "folder for temporary files of a build that does not fit in memory (default: the cache)")
+        ->type_name("FOLDER");
+    sub.add_option("--attributes", o.build.attributes, "attributes that must be there; all are kept")
+        ->type_name("NAMES")
+        ->capture_default_str();
+    o.build.addCacheTo(sub);
+    o.build.addOutliersTo(sub);
+    sub.add_option("--surfels", o.build.surfels, "turn meshes into that many samples, e.g. 1M; 0: keep triangles")
+        ->transform(within(uint64_t{0}, uint64_t{200'000'000}))
+        ->capture_default_str();
+    sub.add_option("--strand-radius", o.build.strandRadius,
+                   "radius of strands that have none, file units (0: a 4000th of the extent)")
+        ->transform(within(0.0, 1e300));
+    sub.add_flag("--only-points", o.build.onlyPoints, "of a PLY mesh take the vertices, as points");
+    addSceneFileOptions(sub, o.build.allowOutside, o.build.repair);
+    sub.add_flag("--skip-bad", o.build.skipBad, "go on past corrupt chunks and files, and say what was lost");
+    sub.add_option("--threads", o.build.threads, "threads (0: all cores)")
+        ->transform(within(0, 1024))
+        ->capture_default_str();
+}
+
 }  // namespace
 
 void setupRender(CLI::App& app, int& status) {
@@ -358,34 +389,8 @@ void setupRender(CLI::App& app, int& status) {
     o->build.addProgressTo(*sub);
     o->colour.addTo(*sub);
     o->environment.addTo(*sub);
-    CLI::App* group = sub;  // for inputs that are not built yet
-    addUpOption(*group, o->build.up);
-    group->add_option("--memory", o->build.memory, "memory that the build may use, bytes (stipple help budgets)")
-        ->check(bytes())
-        ->type_name("SIZE")
-        ->capture_default_str();
-    group
-        ->add_option("--temp", o->build.temp,
-                     "folder for temporary files of a build that does not fit in memory (default: the cache)")
-        ->type_name("FOLDER");
-    group->add_option("--attributes", o->build.attributes, "attributes that must be there; all are kept")
-        ->type_name("NAMES")
-        ->capture_default_str();
-    o->build.addCacheTo(*group);
-    o->build.addOutliersTo(*group);
-    group->add_option("--surfels", o->build.surfels, "turn meshes into that many samples, e.g. 1M; 0: keep triangles")
-        ->transform(within(uint64_t{0}, uint64_t{200'000'000}))
-        ->capture_default_str();
-    group
-        ->add_option("--strand-radius", o->build.strandRadius,
-                     "radius of strands that have none, file units (0: a 4000th of the extent)")
-        ->transform(within(0.0, 1e300));
-    group->add_flag("--only-points", o->build.onlyPoints, "of a PLY mesh take the vertices, as points");
-    addSceneFileOptions(*sub, o->build.allowOutside, o->build.repair);
-    group->add_flag("--skip-bad", o->build.skipBad, "go on past corrupt chunks and files, and say what was lost");
-    group->add_option("--threads", o->build.threads, "threads (0: all cores)")
-        ->transform(within(0, 1024))
-        ->capture_default_str();
+    addEffects(*sub, o->effects);
+    addReading(*sub, *o);
     sub->callback([o, &status] {
         Written written;
         if (const auto result = run(*o, written); !result) status = report(toldOf(result.error(), *o, written));

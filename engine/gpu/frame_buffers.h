@@ -57,7 +57,7 @@ class FrameBuffers {
     const Device& device_;
     VkDescriptorSet set_;
     std::array<Buffer, shared::kBindings> bound_;
-    Buffer readback_, staging_, nothing_; 
+    Buffer readback_, staging_, nothing_;
     std::vector<Level> levels_;
     MeshFrame meshFrame_;
     bool descriptorsChanged_ = true;

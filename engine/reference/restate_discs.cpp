@@ -59,7 +59,7 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
         const lod::Hierarchy& h = *draws.hierarchies[instance.hierarchy];
         const lod::Node& node = h.nodes[cut.node];
         if (h.payload(cut.chunk).kind != lod::Kind::points) continue;
-        const auto& records = chunks.at(uint64_t{instance.source} << 32 | cut.chunk).records;
+        const auto& records = chunks.at(uint64_t{draws.firstSource + instance.source} << 32 | cut.chunk).records;
         const bool few = areFew(h, node, records);
         for (uint32_t i = 0; i < cut.count; ++i) {
             Disc disc = decodeDisc(h, node, records[i]);

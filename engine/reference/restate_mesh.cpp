@@ -24,7 +24,7 @@ class MeshProjector {
             const lod::CutMeshDraw& cut = draws_.meshCut[i];
             const lod::Instance& instance = draws_.instances[cut.instance];
             const lod::Hierarchy& h = *draws_.hierarchies[instance.hierarchy];
-            const lod::Chunk& chunk = chunks_.at(uint64_t{instance.source} << 32 | cut.chunk);
+            const lod::Chunk& chunk = chunks_.at(uint64_t{draws_.firstSource + instance.source} << 32 | cut.chunk);
             const TextureReader textures{draws_.meshTextures[draws_.meshDraws[i].mesh], chunks_};
             const uint32_t firstMaterial = draws_.firstMaterial[instance.hierarchy];
             for (uint32_t c = cut.firstCluster; c < cut.firstCluster + cut.clusters; ++c) {

@@ -313,7 +313,7 @@ void projectStrands(const render::DrawList& draws, const Chunks& chunks, Level& 
         if (h.payload(cut.chunk).kind != lod::Kind::curves) continue;
         const render::Bend bend = draws.bends.empty() ? render::Bend{} : draws.bends[d];
         const lod::Node& node = h.nodes[cut.node];
-        const lod::Chunk& chunk = chunks.at(uint64_t{instance.source} << 32 | cut.chunk);
+        const lod::Chunk& chunk = chunks.at(uint64_t{draws.firstSource + instance.source} << 32 | cut.chunk);
         const shared::FrameConstants& f = draws.frame;
         const bool isDebug = f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError;
         const dvec3 colour = isDebug ? debugColour(f, node, cut) : dvec3(0);

@@ -3,8 +3,8 @@
 // for each of them (engine/cpu/passes, engine/gpu/passes: `namePass`), which the linker asks for.
 STIPPLE_PASS(clear, (Planes{}), (Planes{visibility, discList}), false)
 STIPPLE_PASS(project, (Planes{}), (Planes{visibility, discList}), false)
-STIPPLE_PASS(discs, (Planes{discList}), (Planes{visibility}), false)
-STIPPLE_PASS(splat, (Planes{}), (Planes{visibility}), false)
+STIPPLE_PASS(discs, (Planes{discList}), (Planes{visibility, discList}), false)
+STIPPLE_PASS(splat, (Planes{}), (Planes{visibility, discList}), false)
 STIPPLE_PASS(strands, (Planes{}), (Planes{visibility}), false)
 STIPPLE_PASS(rasterise, (Planes{}), (Planes{visibility}), false)
 STIPPLE_PASS(resolve, (Planes{visibility, discList}), (Planes{texels}), false)

@@ -383,9 +383,7 @@ TEST(Shaders, TouchThePlanesThatTheirPassesDeclare) {
                 const auto planes = planesOf.find(use.binding);
                 if (planes == planesOf.end()) continue;
                 ++compared;
-                // What is drawn into by atomic minimum reads its own past; lists within a pass are the pass's own.
-                const uint32_t own =
-                    info.writes.bits | (pass == Pass::splat ? render::Planes{Plane::discList}.bits : 0);
+                const uint32_t own = info.writes.bits;  // what is drawn into by atomic minimum reads its own past
                 if (use.writes)
                     EXPECT_NE(planes->second.bits & own, 0u) << info.name << ": " << name << " writes " << use.binding;
                 if (use.reads)

@@ -21,11 +21,8 @@ struct Tree {
     std::vector<std::vector<Record>> records;  ///< by node, in file order
 };
 
-/// A random tree with the shape that a build gives: nested spheres, monotone codes, records sorted by parent's code.
-Tree randomTree(Rng& rng, uint32_t levels) {
-    Tree t;
-    t.h.errors.smallest = 1e-3;
-    t.h.rootLog2 = 20;
+/// Nested spheres.
+void growNodes(Rng& rng, uint32_t levels, Tree& t) {
     struct Todo {
         uint32_t node;
         glm::dvec3 corner;
@@ -52,7 +49,10 @@ Tree randomTree(Rng& rng, uint32_t levels) {
             t.h.nodes.push_back(child);
         }
     }
-    // Records: leaves get some; each inner record stands for one to four records of one child.
+}
+
+/// Leaves get some; each inner record stands for one to four records of one child.
+void fillRecords(Rng& rng, Tree& t) {
     t.records.resize(t.h.nodes.size());
     for (size_t i = t.h.nodes.size(); i-- > 0;) {
         Node& n = t.h.nodes[i];
@@ -78,9 +78,12 @@ Tree randomTree(Rng& rng, uint32_t levels) {
             ++child;
         }
     }
+}
+
+/// File order; the children's parent indices follow. With the tables of counts.
+void sortRecords(Tree& t) {
     for (size_t i = 0; i < t.h.nodes.size(); ++i) {
         auto& r = t.records[i];
-        // File order; the children's parent indices follow.
         std::vector<uint32_t> order(r.size());
         for (uint32_t k = 0; k < order.size(); ++k) order[k] = k;
         std::stable_sort(order.begin(), order.end(),
@@ -110,6 +113,16 @@ Tree randomTree(Rng& rng, uint32_t levels) {
         }
         for (const auto& x : r) n.errorCode = std::max(n.errorCode, static_cast<uint8_t>(x.own));
     }
+}
+
+/// A random tree with the shape that a build gives: nested spheres, monotone codes, records sorted by parent's code.
+Tree randomTree(Rng& rng, uint32_t levels) {
+    Tree t;
+    t.h.errors.smallest = 1e-3;
+    t.h.rootLog2 = 20;
+    growNodes(rng, levels, t);
+    fillRecords(rng, t);
+    sortRecords(t);
     return t;
 }
 

@@ -9,12 +9,7 @@ long=$(wc -l $files | awk '$1 > 600 && $2 != "total"')
 wc -l $files | awk '$1 > 500 && $2 != "total" { print "note: above 500 lines: " $2 ", " $1 }'
 # The functions that are to be cut yet; what is cut is struck from the list, and nothing is added to it. (renderFrame
 # and buildStore are the two that may be long.)
-known='apps/stipple/render.cpp:setupRender engine/cpu/kernels.inl:resolveRow
-    engine/cpu/light.inl:lightSurfaces engine/cpu/resolve_triangles.inl:resolveTriangles
-    engine/cpu/strands.inl:drawSegments engine/cpu/strands.inl:resolveStrands engine/gpu/device.cpp:create
-    shaders/echo/echo.comp:main
-    shaders/shared/pyramid.h:pushTexel shaders/strands/strands.comp:main tests/gpu/layout_test.cpp:TEST
-    tests/property/cut_test.cpp:randomTree'
+known=''
 count_functions() { awk -f tests/unit/function_lines.awk "$@"; }
 [ "$(count_functions tests/unit/function_lines_sample.txt | tr '\n' ';')" = "$(head -1 tests/unit/function_lines_sample.txt | sed 's/^# //')" ] ||
     { echo "function_lines.awk does not count what it should:"; count_functions tests/unit/function_lines_sample.txt; status=1; }
