@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "tests/support/crafted_store.h"
 #include "tests/support/runs.h"
 #include "tests/support/support.h"
 
@@ -32,8 +31,9 @@ class Complete : public testing::Test {
     /// A byte of every leaf's chunk changed.
     void breakLeaves() const {
         std::string file = test::slurp(folder_ / "a.stipple");
-        for (const auto& n : test::CraftedStore::read(folder_ / "a.stipple").nodes)
-            if (n.childMask == 0) file[n.chunkOffset + n.chunkBytes / 2] ^= 1;
+        const auto store = lod::openStore(folder_ / "a.stipple");
+        for (const lod::Node& n : store->hierarchy.nodes)
+            if (n.isLeaf()) file[n.chunkOffset + n.chunkBytes / 2] ^= 1;
         test::spit(folder_ / "bad.stipple", file);
     }
     int run(const std::string& arguments) {
