@@ -8,11 +8,14 @@ namespace {
 using glm::dvec2;
 using glm::dvec3;
 
-/// Do discs of a node reach only a few of each other's spacings? Where they reach farther none is filled exactly.
-bool areFew(const lod::Hierarchy& h, const lod::Node& node, const std::vector<shared::PointRecord>& records) {
+/// Do discs of a node reach only a few of each other's spacings? Where they reach farther none is filled exactly, but
+/// in parallel views those that no texel holds.
+bool mayBeWide(const lod::Hierarchy& h, const lod::Node& node, const std::vector<shared::PointRecord>& records,
+               const lod::View& view, double scale) {
     double most = 0;
     for (const shared::PointRecord& r : records) most = std::max(most, decodeDisc(h, node, r).radius);
-    return most * std::sqrt(static_cast<double>(records.size())) <= 4 * h.unit * h.cellSize(node);
+    if (most * std::sqrt(static_cast<double>(records.size())) <= 4 * h.unit * h.cellSize(node)) return true;
+    return view.isOrthographic && scale * most * view.focalPixels > 8192;
 }
 
 /// Of the plane of a disc where wind has moved it: three points of it, `reach` apart, moved one by one.
@@ -60,7 +63,7 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
         const lod::Node& node = h.nodes[cut.node];
         if (h.payload(cut.chunk).kind != lod::Kind::points) continue;
         const auto& records = chunks.at(uint64_t{draws.firstSource + instance.source} << 32 | cut.chunk).records;
-        const bool few = areFew(h, node, records);
+        const bool few = mayBeWide(h, node, records, v, instance.scale * f.supportScale);
         for (uint32_t i = 0; i < cut.count; ++i) {
             Disc disc = decodeDisc(h, node, records[i]);
             disc.radius *= cut.radiusScale;

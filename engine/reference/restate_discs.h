@@ -15,7 +15,7 @@ struct PlacedDisc {
     double radius;              ///< world units, as stored
     glm::dvec3 colour;
     uint32_t flags;
-    bool mayBeWide;  ///< discs of its node reach only a few of each other's spacings
+    bool mayBeWide;  ///< discs of its node reach few of each other's spacings, or are too large for texels
 };
 std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks& chunks);
 

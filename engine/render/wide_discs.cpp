@@ -12,11 +12,11 @@ Result<void> GreatestRadii::upload(streaming::ChunkKey key, const lod::Chunk& ch
     uint32_t code = 0;
     for (const shared::PointRecord& r : chunk.records) code = std::max(code, shared::recordRadiusCode(r) + 1);
     const auto points = static_cast<float>(chunk.records.size());
-    if (code > 0 && shared::radiusFraction(code - 1) * std::sqrt(points) > kMostSpacings) code = 0;
-    if (codes_.size() <= key.source) codes_.resize(key.source + 1);
-    auto& codes = codes_[key.source];
-    if (codes.size() <= key.chunk) codes.resize(key.chunk + 1);
-    codes[key.chunk] = static_cast<uint8_t>(std::min(code, 255u));
+    const bool isDense = code > 0 && shared::radiusFraction(code - 1) * std::sqrt(points) > kMostSpacings;
+    if (greatest_.size() <= key.source) greatest_.resize(key.source + 1);
+    auto& of = greatest_[key.source];
+    if (of.size() <= key.chunk) of.resize(key.chunk + 1);
+    of[key.chunk] = {static_cast<uint8_t>(std::min(code, 255u)), isDense};
     return backend_.upload(keyOfBackend(key), chunk);
 }
 
@@ -29,11 +29,11 @@ streaming::ChunkKey GreatestRadii::keyOfBackend(streaming::ChunkKey key) const {
     return key;
 }
 
-float GreatestRadii::shareOf(streaming::ChunkKey key) const {
+GreatestRadii::Share GreatestRadii::shareOf(streaming::ChunkKey key) const {
     key.source -= first_;
-    if (key.source >= codes_.size() || key.chunk >= codes_[key.source].size()) return 0;
-    const uint32_t code = codes_[key.source][key.chunk];
-    return code == 0 ? 0 : code == 255 ? 1 : shared::radiusFraction(code - 1);
+    if (key.source >= greatest_.size() || key.chunk >= greatest_[key.source].size()) return {};
+    const auto [code, isDense] = greatest_[key.source][key.chunk];
+    return {code == 0 ? 0 : code == 255 ? 1 : shared::radiusFraction(code - 1u), isDense};
 }
 
 void markWideDiscs(const GreatestRadii& radii, DrawList& draws) {
@@ -45,8 +45,15 @@ void markWideDiscs(const GreatestRadii& radii, DrawList& draws) {
         shared::DrawNode& d = points.nodes[i];
         const auto least = [](float step) { return 65536 * std::min(0.0, double{step}); };
         const double nearest = double{d.base.z} + least(d.axisX.z) + least(d.axisY.z) + least(d.axisZ.z);
-        const double radius = 1.01 * double{d.edge} * double{f.supportScale * radii.shareOf(points.keys[i])};  // (fp32)
-        if (!(radius > perFocal * (f.orthographic != 0 ? 1 : nearest))) continue;
+        const GreatestRadii::Share share = radii.shareOf(points.keys[i]);
+        const double radius = 1.01 * double{d.edge} * double{f.supportScale * share.ofEdge};  // (fp32)
+        if (share.isDense) {
+            // Those around the eye (perspective), and what no texel can hold (orthographic).
+            const bool isWide = f.orthographic != 0 ? radius * double{f.focal} > kMostTexelPixels : nearest < 0;
+            if (!isWide) continue;
+        } else if (!(radius > perFocal * (f.orthographic != 0 ? 1 : nearest))) {
+            continue;
+        }
         d.octantMask |= shared::kNodeWide;
         draws.hasWideDiscs = true;
     }

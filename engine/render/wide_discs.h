@@ -12,6 +12,9 @@ namespace stipple::render {
 /// that a disc reaches. Where they are more (many copies of the points, or given radii that are very large), ellipses a
 /// texel are as good, and what is drawn exactly would cost pixels times thousands of discs.
 constexpr float kMostSpacings = 4.0f;
+/// Half of the radius that a texel can hold, px. Beyond it they are drawn exactly, too, wherever they would be lost:
+/// the picture lies within few spacings then.
+constexpr double kMostTexelPixels = 8192;
 
 /// Hands chunks on to a backend and keeps in mind how large the largest radius of each is.
 class GreatestRadii final : public streaming::ChunkSink {
@@ -21,17 +24,24 @@ class GreatestRadii final : public streaming::ChunkSink {
     void setFirstSource(uint32_t first) { first_ = first; }
     Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override;
     void evict(streaming::ChunkKey key) override;
-    /// Over the edge of the node's cell; 0 of what has no points, or beyond kMostSpacings. `key`: as the backend has
-    /// it.
-    float shareOf(streaming::ChunkKey key) const;
+    struct Share {
+        float ofEdge = 0;      ///< over the edge of the node's cell; 0 of what has no points
+        bool isDense = false;  ///< beyond kMostSpacings
+    };
+    /// `key`: as the backend has it.
+    Share shareOf(streaming::ChunkKey key) const;
 
   private:
+    struct Greatest {
+        uint8_t code = 0;  ///< of the radius, + 1 (at most 255); 0: no points
+        bool isDense = false;
+    };
     streaming::ChunkKey keyOfBackend(streaming::ChunkKey key) const;
 
     Backend& backend_;
     std::weak_ptr<const void> life_;  ///< of the backend: what is gone needs nothing back
     uint32_t first_ = 0;
-    std::vector<std::vector<uint8_t>> codes_;  ///< radius code + 1 (at most 255) by source and node; 0: no points
+    std::vector<std::vector<Greatest>> greatest_;  ///< by source and node
 };
 
 /// Sets kNodeWide and DrawList::hasWideDiscs.
