@@ -8,6 +8,7 @@ struct Span {
 };
 
 double unionOf(std::vector<Span>& spans) {
+    if (spans.size() < 2) return spans.empty() ? 0 : std::max(0.0, spans[0].to - spans[0].from);
     std::sort(spans.begin(), spans.end(), [](const Span& a, const Span& b) { return a.from < b.from; });
     double sum = 0, reached = -1e300;
     for (const Span& s : spans) {
@@ -17,36 +18,77 @@ double unionOf(std::vector<Span>& spans) {
     return sum;
 }
 
+/// Corners of triangles, coordinate by coordinate, and what of them is above a direction: long loops over plain arrays.
+struct Corners {
+    std::array<std::array<std::vector<double>, 3>, 3> at;  ///< by corner and coordinate
+    std::array<std::vector<double>, 3> height;             ///< by corner
+    bool areTwoSided = true;                               ///< all of them
+
+    void take(const std::vector<CoverTriangle>& triangles) {
+        areTwoSided = true;
+        for (size_t k = 0; k < 3; ++k) {
+            for (size_t c = 0; c < 3; ++c) at.at(k).at(c).resize(triangles.size());
+            height.at(k).resize(triangles.size());
+        }
+        for (size_t i = 0; i < triangles.size(); ++i) {
+            areTwoSided = areTwoSided && triangles[i].isTwoSided;
+            for (size_t k = 0; k < 3; ++k)
+                for (size_t c = 0; c < 3; ++c)
+                    at.at(k).at(c)[i] = triangles[i].corners.at(k)[static_cast<glm::length_t>(c)];
+        }
+    }
+    /// Sets heights along `up`; the least and the greatest of them.
+    std::pair<double, double> measure(const glm::dvec3& up) {
+        double low = 1e300, high = -1e300;
+        for (size_t k = 0; k < 3; ++k) {
+            const size_t n = height[k].size();
+            const double *const x = at[k][0].data(), *const y = at[k][1].data(), *const z = at[k][2].data();
+            double* const h = height[k].data();
+            for (size_t i = 0; i < n; ++i) h[i] = x[i] * up.x + y[i] * up.y + z[i] * up.z;
+            for (size_t i = 0; i < n; ++i) {
+                low = h[i] < low ? h[i] : low;
+                high = h[i] > high ? h[i] : high;
+            }
+        }
+        return {low, high};
+    }
+    /// Heights as rows.
+    void toRows(double low, double step) {
+        for (auto& of : height) {
+            double* const h = of.data();
+            const size_t n = of.size();
+            for (size_t i = 0; i < n; ++i) h[i] = (h[i] - low) / step;
+        }
+    }
+};
+
+/// (What fits into an int; the library's function is a call.)
+int ceiling(double v) {
+    const int whole = static_cast<int>(v);
+    return whole + (v > whole ? 1 : 0);
+}
+
 /// Of one direction and the opposite one.
-double coverAlong(const std::vector<CoverTriangle>& triangles, const glm::dvec3& direction, const glm::dvec3& axis,
-                  int count, double offset) {
+double coverAlong(const std::vector<CoverTriangle>& triangles, Corners& corners, const glm::dvec3& direction,
+                  const glm::dvec3& axis, int count, double offset) {
     glm::dvec3 up = axis - glm::dot(axis, direction) * direction;
     const glm::dvec3 other = std::abs(direction.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
     up = glm::normalize(glm::length(up) > 1e-3 ? up : glm::cross(direction, other));
     const glm::dvec3 right = glm::cross(up, direction);
-    double low = 1e300, high = -1e300;
-    thread_local std::vector<glm::dvec3> heights;  // of the corners of each
-    heights.clear();
-    for (const CoverTriangle& t : triangles) {
-        const glm::dvec3 h(glm::dot(t.corners[0], up), glm::dot(t.corners[1], up), glm::dot(t.corners[2], up));
-        low = std::min({low, h.x, h.y, h.z});
-        high = std::max({high, h.x, h.y, h.z});
-        heights.push_back(h);
-    }
+    const auto [low, high] = corners.measure(up);
     const double step = (high - low) / count;
     if (!(step > 0)) return 0;
+    corners.toRows(low, step);
     // Seen from the front, from behind; both are the same where all is drawn from both sides.
     thread_local std::vector<std::array<std::vector<Span>, 2>> rows;
     rows.resize(std::max(rows.size(), static_cast<size_t>(count)));
-    bool isSame = true;
-    for (const CoverTriangle& t : triangles) isSame = isSame && t.isTwoSided;
+    const bool isSame = corners.areTwoSided;
     for (size_t i = 0; i < triangles.size(); ++i) {
-        const CoverTriangle& t = triangles[i];
-        const glm::dvec3 y = (heights[i] - low) / step;
-        const auto [bottom, top] = std::minmax({y.x, y.y, y.z});
-        const int first = std::max(0, static_cast<int>(std::ceil(bottom - offset))),
-                  last = std::min(count - 1, static_cast<int>(std::ceil(top - offset)) - 1);
+        const glm::dvec3 y(corners.height[0][i], corners.height[1][i], corners.height[2][i]);
+        const double bottom = std::min(std::min(y.x, y.y), y.z), top = std::max(std::max(y.x, y.y), y.z);
+        const int first = std::max(0, ceiling(bottom - offset)), last = std::min(count - 1, ceiling(top - offset) - 1);
         if (first > last) continue;  // between two rows
+        const CoverTriangle& t = triangles[i];
         const std::array<glm::dvec2, 3> p{{{glm::dot(t.corners[0], right), y.x},
                                            {glm::dot(t.corners[1], right), y.y},
                                            {glm::dot(t.corners[2], right), y.z}}};
@@ -105,10 +147,13 @@ const std::array<CoverDirection, kCoverDirections>& coverDirections() {
 
 double coverOf(const std::vector<CoverTriangle>& triangles, const glm::dvec3& axis, int rows) {
     double sum = 0;
+    thread_local Corners corners;
+    corners.take(triangles);
     // Rows of different directions lie at different places, so that shapes that all parts share are not all missed.
     for (size_t d = 0; d < kCoverDirections; ++d) {
         const double offset = (static_cast<double>(d * 7 % kCoverDirections) + 0.5) / kCoverDirections;
-        sum += coverDirections().at(d).share * coverAlong(triangles, coverDirections().at(d).to, axis, rows, offset);
+        sum += coverDirections().at(d).share *
+               coverAlong(triangles, corners, coverDirections().at(d).to, axis, rows, offset);
     }
     return sum;
 }

@@ -38,22 +38,44 @@ Alone aloneOf(const std::vector<uint32_t>& part, const LocalMesh& local) {
 /// Largest distance of corners and centres of `from` from `to`; some of them where there are many.
 float distanceOf(const Alone& mesh, const std::vector<uint32_t>& from, const std::vector<uint32_t>& to, float enough) {
     float worst = 0;
+    // Around each triangle, with room for rounding: what is farther than the nearest so far is not looked at.
+    float far2 = 0;
+    for (const glm::vec3& p : mesh.position) far2 = std::max(far2, glm::dot(p, p));
+    const float slack = 1e-5f * std::sqrt(far2);
+    thread_local std::vector<glm::vec4> balls;
+    balls.clear();
+    for (size_t i = 0; i < to.size(); i += 3) {
+        const glm::vec3 &a = mesh.position[to[i]], &b = mesh.position[to[i + 1]], &c = mesh.position[to[i + 2]];
+        const glm::vec3 m = (a + b + c) * (1.0f / 3);
+        const glm::vec3 da = a - m, db = b - m, dc = c - m;
+        balls.emplace_back(
+            m, slack + 1.001f * std::sqrt(std::max({glm::dot(da, da), glm::dot(db, db), glm::dot(dc, dc)})));
+    }
     const auto look = [&](const glm::vec3& p) {
-        float best = 3e38f;
+        float best = 3e38f, reach = 1e19f;
         for (size_t i = 0; i < to.size() && best > worst * worst; i += 3) {
+            const glm::vec3 off = p - glm::vec3(balls[i / 3]);
+            const float within = reach + balls[i / 3].w;
+            if (glm::dot(off, off) > within * within) continue;
             const glm::vec3 &a = mesh.position[to[i]], &b = mesh.position[to[i + 1]], &c = mesh.position[to[i + 2]];
             const glm::vec2 w = closestWeights(p, a, b, c);
             const glm::vec3 d = p - (a + w.x * (b - a) + w.y * (c - a));
-            best = std::min(best, glm::dot(d, d));
+            if (glm::dot(d, d) >= best) continue;
+            best = glm::dot(d, d);
+            reach = 1.001f * std::sqrt(best);
         }
         worst = std::max(worst, std::sqrt(best));
     };
+    thread_local std::vector<uint8_t> seen;  // corners are those of several triangles
+    seen.assign(mesh.position.size(), 0);
     const size_t triangles = from.size() / 3, step = triangles / kMostProbes + 1;
     for (size_t t = 0; t < triangles && worst <= enough; t += step) {
         glm::vec3 sum(0);
         for (size_t k = 0; k < 3; ++k) {
-            look(mesh.position[from[3 * t + k]]);
-            sum += mesh.position[from[3 * t + k]];
+            const uint32_t v = from[3 * t + k];
+            if (seen[v] == 0) look(mesh.position[v]);
+            seen[v] = 1;
+            sum += mesh.position[v];
         }
         look(sum * (1.0f / 3));
     }
