@@ -146,8 +146,10 @@ size_t longOnesLast(const WeldedMesh& mesh, std::vector<uint32_t>& indices);
 double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& coarse,
                         double unimportant, bool isBorderKept);
 
-/// Writes all levels of all textures and fills the tables of `h`.
-Result<void> writeTextures(const std::vector<TextureImage>& images, StoreWriter& writer, Hierarchy& h,
-                           Executor& executor);
+/// Of each texture the alpha below which materials do not show it; 0: they show all of it.
+std::vector<float> cutoffsOf(const std::vector<shared::SurfaceMaterial>& materials, size_t textures);
+/// Writes all levels of all textures and fills the tables of `h`. Of what has a cutoff all levels show the same share.
+Result<void> writeTextures(const std::vector<TextureImage>& images, const std::vector<float>& cutoffs,
+                           StoreWriter& writer, Hierarchy& h, Executor& executor);
 
 }  // namespace stipple::lod

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "engine/base/numbers.h"
 #include "lod/builder/mesh/mesh_work.h"
@@ -57,6 +58,40 @@ Image halved(const Image& fine, Executor& executor) {
     return out;
 }
 
+bool isSeen(uint32_t texel, float cutoff) { return static_cast<float>(texel >> 24) / 255.0f >= cutoff; }
+
+/// Share of the texels that `cutoff` lets be seen.
+double seenShare(const Image& image, float cutoff) {
+    const auto seen =
+        std::count_if(image.rgba.begin(), image.rgba.end(), [&](uint32_t c) { return isSeen(c, cutoff); });
+    return static_cast<double>(seen) / static_cast<double>(image.rgba.size());
+}
+
+/// A coarse level of which as much is seen as of the finest one: means of what is thin would all be below the cutoff
+/// (Castano 2010). Those texels are seen whose alpha is largest; of equal ones, which a scale could not tell apart,
+/// some.
+Image withSeenShare(Image level, float cutoff, double share) {
+    const auto count = toWhole<size_t>(std::round(share * static_cast<double>(level.rgba.size())));
+    std::vector<std::pair<uint32_t, uint32_t>> order;  // alpha and a number of the texel's own, its place
+    for (uint32_t i = 0; i < level.rgba.size(); ++i) {
+        constexpr uint32_t kAbout = 12;  // of 255: so near are they equal
+        uint32_t h = (i + 1) * 0x9e3779b1u;
+        h = (h ^ h >> 15) * 0x85ebca6bu;
+        order.emplace_back((level.rgba[i] >> 24 << 8) + (h >> 16) * kAbout / 256, i);
+    }
+    const auto middle = order.begin() + static_cast<std::ptrdiff_t>(std::min(count, order.size()));
+    std::nth_element(order.begin(), middle, order.end(), std::greater<>());
+    const auto below = static_cast<uint32_t>(std::max(std::ceil(255.0f * cutoff) - 1, 0.0f));
+    for (auto at = order.begin(); at != order.end(); ++at) {
+        uint32_t& c = level.rgba[at->second];
+        if (at < middle && !isSeen(c, cutoff))
+            c |= 0xff000000u;
+        else if (at >= middle && isSeen(c, cutoff))
+            c = (c & 0xffffffu) | below << 24;
+    }
+    return level;
+}
+
 uint32_t wrapped(int64_t i, uint32_t size, uint32_t wrap) {
     const auto n = static_cast<int64_t>(size);
     if (wrap == shared::kWrapClamp) return static_cast<uint32_t>(std::clamp<int64_t>(i, 0, n - 1));
@@ -67,9 +102,22 @@ uint32_t wrapped(int64_t i, uint32_t size, uint32_t wrap) {
 
 }  // namespace
 
-Result<void> writeTextures(const std::vector<TextureImage>& images, StoreWriter& writer, Hierarchy& h,
-                           Executor& executor) {
-    for (const Image& image : images) {
+std::vector<float> cutoffsOf(const std::vector<shared::SurfaceMaterial>& materials, size_t textures) {
+    std::vector<float> cutoffs(textures, 0);
+    for (const shared::SurfaceMaterial& m : materials) {
+        const uint32_t texture = m.baseTexture.texture;
+        if (!(m.alphaCutoff > 0) || !(m.alpha > 0) || texture == 0 || texture > textures) continue;
+        float& cutoff = cutoffs[texture - 1];
+        cutoff = std::max(cutoff, std::min(m.alphaCutoff / m.alpha, 1.0f));
+    }
+    return cutoffs;
+}
+
+Result<void> writeTextures(const std::vector<TextureImage>& images, const std::vector<float>& cutoffs,
+                           StoreWriter& writer, Hierarchy& h, Executor& executor) {
+    for (size_t i = 0; i < images.size(); ++i) {
+        const Image& image = images[i];
+        const float cutoff = cutoffs[i];
         shared::TextureInfo info{};
         const bool isEmpty = image.width == 0 || image.height == 0;
         Image level = image;
@@ -77,6 +125,8 @@ Result<void> writeTextures(const std::vector<TextureImage>& images, StoreWriter&
             level.width = level.height = 1;
             level.rgba = {image.kind == TextureKind::normal ? 0xffff8080u : ~0u};
         }
+        const double share = cutoff > 0 ? seenShare(level, cutoff) : 1;
+        Image mean = cutoff > 0 ? level : Image{};  // of which coarser levels are made
         info.width = level.width;
         info.height = level.height;
         info.wrapU = image.wrapU;
@@ -107,7 +157,12 @@ Result<void> writeTextures(const std::vector<TextureImage>& images, StoreWriter&
             }
             if (level.width <= 1 && level.height <= 1) break;
             if (across == 1 && down == 1 && level.width <= 8 && level.height <= 8) break;  // small enough to stop
-            level = halved(level, executor);
+            if (cutoff > 0) {
+                mean = halved(mean, executor);
+                level = withSeenShare(mean, cutoff, share);
+            } else {
+                level = halved(level, executor);
+            }
         }
         h.textures.push_back(info);
     }
