@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <tuple>
 
 #include "engine/base/words.h"
 #include "lod/attributes.h"
@@ -89,6 +90,16 @@ std::string attributeBehind(const std::string& what) {
     return what;
 }
 
+std::optional<std::pair<double, double>> parseRange(const std::string& text) {
+    std::istringstream in(text);
+    double low = 0, high = 0;
+    char comma = 0;
+    if (!(in >> low >> comma >> high) || comma != ',' || !(in >> std::ws).eof() || !std::isfinite(low) ||
+        !std::isfinite(high) || !std::isfinite(high - low) || !(low < high))
+        return {};
+    return std::pair(low, high);
+}
+
 Result<ColourBy> parseColourBy(const std::string& what, const std::string& map, const std::string& range,
                                const StoreDescription& description) {
     ColourBy by;
@@ -147,13 +158,13 @@ Result<ColourBy> parseColourBy(const std::string& what, const std::string& map, 
         by.map = static_cast<ColourMap>(known - kColourMapNames.begin());
     }
     if (!range.empty()) {
-        std::istringstream in(range);
-        char comma = 0;
-        if (!(in >> by.low >> comma >> by.high) || comma != ',' || !(in >> std::ws).eof() || !std::isfinite(by.low) ||
-            !std::isfinite(by.high) || !std::isfinite(by.high - by.low) || by.low == by.high)
+        const auto ends = parseRange(range);
+        if (!ends)
             return fail(ErrorKind::usage, fmt::format("'{}' is not a range", range), "--colour-range", "e.g. 0,255");
+        std::tie(by.low, by.high) = *ends;
     }
-    if (by.low == by.high) by.high = by.low + 1;
+    by.isConstant = by.low == by.high;
+    if (by.isConstant) by.high = by.low + 1;
     return by;
 }
 

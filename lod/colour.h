@@ -2,7 +2,9 @@
 // decoded, so backends and shaders know nothing of it, and a change of colours is a change of chunks.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "lod/store.h"
@@ -21,9 +23,13 @@ struct ColourBy {
     double low = 0, high = 1;   ///< values at the ends of the map; beyond them it stays at its ends
     glm::dvec3 up{0, 0, 1};     ///< heights are along it
     bool isChosenHere = false;  ///< nobody asked for it: a scan without colours is easier to read
+    bool isConstant = false;    ///< all values are `low`; `high` only keeps the map a map
     std::string title;          ///< for the legend
     bool needsAttributes() const { return mode == ColourMode::attribute; }
 };
+
+/// "LOW,HIGH": finite, the lower one first; nothing where it is none.
+std::optional<std::pair<double, double>> parseRange(const std::string& text);
 
 /// What a person asks for: auto (own colours, or of points without any the height), plain (own colours, or grey), rgb,
 /// intensity, class, return, height, normal or the name of an attribute; `map` a name or empty; `range` "LOW,HIGH" or

@@ -28,6 +28,13 @@ Error interruptedAt(Error error, const Options& o) {
 }
 
 /// `isSilent`: another rank says what there is to say.
+/// On the input, and on what coarse levels are.
+std::vector<std::string> allNotes(const lod::BuildReport& report) {
+    std::vector<std::string> notes = report.notes;
+    notes.insert(notes.end(), report.coarseNotes.begin(), report.coarseNotes.end());
+    return notes;
+}
+
 Result<void> run(const Options& o, bool& isSilent) {
     catchStopSignals();
     MpiJob job;
@@ -68,14 +75,14 @@ Result<void> run(const Options& o, bool& isSilent) {
                                   {"bytes_out", r.bytesOut},
                                   {"nodes", r.nodes},
                                   {"records", r.records},
-                                  {"notes", r.notes},
+                                  {"notes", allNotes(r)},
                                   {"temporary_bytes", r.temporaryBytes},
                                   {"resumed", r.isResumed},
                                   {"content_hash", hexDigits(r.contentHash)}};
         printJson("build", j);
         return {};
     }
-    for (const std::string& note : r.notes) fmt::print(stderr, "note: {}\n", printable(note));
+    for (const std::string& note : allNotes(r)) fmt::print(stderr, "note: {}\n", printable(note));
     const std::string& what = r.primitive;
     const bool isMesh = what == "triangle";
     fmt::print("{}: {} in {}, {} ({:.1f} bytes a {}), {:.2f} s, {:.2f} M {}s/s, peak memory {}\n", o.output,

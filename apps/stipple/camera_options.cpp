@@ -37,7 +37,7 @@ void CameraOptions::addTo(CLI::App& app) {
     for (auto* const place : {eyeOption, targetOption, upOption})
         place->excludes(sceneOption)->excludes(pathOption)->excludes(orbitOption);
     fovOption->excludes(sceneOption)->excludes(pathOption);
-    orthoOption->excludes(sceneOption)->excludes(fovOption);
+    orthoOption->excludes(sceneOption)->excludes(fovOption)->excludes(pathOption);
     sceneOption->excludes(pathOption)->excludes(orbitOption);
     pathOption->excludes(orbitOption);
 }
@@ -114,9 +114,7 @@ Result<std::optional<scene::CameraPath>> makePath(const CameraOptions& o, const 
     const lod::StoreDescription& d = opened.description;
     if (!o.path.empty()) {
         STIPPLE_ASSIGN(scene::CameraPath path, scene::readCameraPath(o.path, d.up));
-        if (o.ortho > 0)
-            for (scene::CameraKey& key : path.keys) key.camera.orthoWidth = o.ortho;
-        return std::optional(std::move(path));
+        return std::optional(std::move(path));  // what its keys say of their widths holds
     }
     if (o.orbit > 0) {
         scene::CameraPath path = scene::makeOrbit(opened.outline, d.up, aspect, o.orbit, o.fov);
@@ -133,6 +131,20 @@ double nearPlaneOf(const OpenedScene& opened) {
     return std::max(1e-300, 1e-15 * glm::length(opened.description.boundsMax - opened.description.boundsMin));
 }
 
+namespace {
+
+/// The far plane of an orthographic camera cuts nothing off.
+std::string beyondFarPlane(const scene::Camera& camera, int number, std::span<const glm::dvec3> outline) {
+    const glm::dvec3 forward = glm::normalize(camera.target - camera.eye);
+    double farthest = 0;
+    for (const glm::dvec3& p : outline) farthest = std::max(farthest, glm::dot(p - camera.eye, forward));
+    if (!(camera.orthoFar > 0) || farthest <= camera.orthoFar) return "";
+    return fmt::format("--scene-camera {}: what lies beyond its far plane ({:g} units away) is drawn all the same",
+                       number, camera.orthoFar);
+}
+
+}  // namespace
+
 Result<Shot> makeShot(const CameraOptions& o, int frames, const OpenedScene& opened, const glm::uvec2& size) {
     Shot shot;
     shot.worldUp = opened.description.up;
@@ -141,6 +153,7 @@ Result<Shot> makeShot(const CameraOptions& o, int frames, const OpenedScene& ope
     if (!path) {
         STIPPLE_ASSIGN(const scene::Camera camera, makeCamera(o, opened, aspect));
         shot.views.push_back(scene::makeView(camera, size.x, size.y, nearPlane));
+        shot.note = beyondFarPlane(camera, o.sceneCamera, opened.outline);
         return shot;
     }
     if (o.orbit > 0)

@@ -23,6 +23,7 @@ struct Shot {
     std::vector<lod::View> views;
     std::vector<double> seconds;  ///< of each view, from the first on; empty: one moment
     glm::dvec3 worldUp{0, 0, 1};
+    std::string note;  ///< what a camera asks for that is not done
 };
 
 /// The one camera that is asked for: by place, of the scene, or one that sees all of it.

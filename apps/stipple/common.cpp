@@ -121,6 +121,12 @@ void ColourOptions::addTo(CLI::App& app) {
         ->type_name("MAP");
     app.add_option("--colour-range,--color-range", range,
                    "values at the ends of the map (default: 2nd to 98th percentile of what has data)")
+        ->check(CLI::Validator(
+            [](std::string& text) {
+                return lod::parseRange(text) ? std::string()
+                                             : fmt::format("'{}' is not a range; give e.g. 0,255", text);
+            },
+            ""))
         ->type_name("LOW,HIGH");
     app.add_flag("--legend", legend, "draw what the colours stand for into the picture");
 }

@@ -94,6 +94,17 @@ Result<void> addLas(const std::string& path, bool skipBad, nlohmann::json& j, st
     return {};
 }
 
+/// Along which axes what the header says is no range: not finite, or the greatest before the least.
+std::string whyNoBox(const lod::SourceInfo& i) {
+    std::vector<std::string> axes;
+    for (int a = 0; a < 3; ++a) {
+        const double least = i.declaredMin[a], greatest = i.declaredMax[a];
+        if (!std::isfinite(least) || !std::isfinite(greatest) || least > greatest)
+            axes.push_back(fmt::format("{} from {:.15g} to {:.15g}", "xyz"[a], least, greatest));
+    }
+    return fmt::format("{}", fmt::join(axes, ", "));
+}
+
 /// How the header's box differs from that of the points, along each axis where it does by more than headers are rounded
 /// by. Points outside of it are a problem; a larger one is allowed (octrees give each node its cell) and said.
 void compareBounds(const lod::SourceInfo& i, const lod::Survey& s, nlohmann::json& j,
@@ -103,6 +114,11 @@ void compareBounds(const lod::SourceInfo& i, const lod::Survey& s, nlohmann::jso
     if (i.declaredMin == glm::dvec3(0) && i.declaredMax == glm::dvec3(0) && s.least != s.greatest) {
         j["header_box"] = "absent";
         j["notes"].push_back("the header has no box: all of it is 0");
+        return;
+    }
+    if (const std::string none = whyNoBox(i); !none.empty()) {
+        j["header_box"] = "none";
+        problems.push_back("the header's box is none: " + none);
         return;
     }
     for (int a = 0; a < 3; ++a) {

@@ -117,6 +117,12 @@ Legend makeLegend(const lod::ColourBy& by, const lod::StoreDescription& d) {
         legend.title += ", " + d.attributes.at(by.attribute).description;
     if (by.mode == lod::ColourMode::attribute && d.attributes.at(by.attribute).withoutData > 0)
         legend.noData = {lod::kNoDataColour, "no data"};
+    // Where no point has data there is no range, where all have the same value no bar.
+    if (by.mode == lod::ColourMode::attribute && d.attributes.at(by.attribute).withoutData >= d.points) return legend;
+    if (by.isConstant) {
+        legend.entries = {{lod::colourOf(by, by.low), number(by.low, std::max(std::abs(by.low), 1.0))}};
+        return legend;
+    }
     for (int j = 0; j < kBar; ++j)
         legend.bar.push_back(lod::colourOf(by, by.low + (by.high - by.low) * (j + 0.5) / kBar));
     for (size_t i = 0; i < kTicks; ++i) {
@@ -127,7 +133,7 @@ Legend makeLegend(const lod::ColourBy& by, const lod::StoreDescription& d) {
 }
 
 void drawLegend(const Legend& legend, render::Image& image) {
-    if (legend.entries.empty() || image.rgba.empty()) return;
+    if ((legend.entries.empty() && legend.noData.label.empty()) || image.rgba.empty()) return;
     const bool isBar = !legend.bar.empty();
     const Font font;
     const int line = font.lineHeight();

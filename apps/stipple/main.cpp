@@ -75,6 +75,7 @@ int run(std::vector<std::string> arguments) {
     }
     if (const auto complete = app::completeCommand(app, arguments); !complete) return app::report(complete.error());
     app::setReporting(app::commandOf(app, arguments), has("--json"));
+    if (const auto values = app::checkValues(arguments); !values) return app::report(values.error());
     try {
         std::reverse(arguments.begin(), arguments.end());  // (as the parser takes them)
         app.parse(std::move(arguments));

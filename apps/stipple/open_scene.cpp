@@ -290,6 +290,8 @@ std::vector<scene::Camera> camerasOf(const scene::Scene& scene) {
             // What it shows is as large as its node makes it.
             camera.orthoWidth = from.width * glm::length(glm::dvec3(world[n][0]));
             camera.orthoHeight = from.height * glm::length(glm::dvec3(world[n][1]));
+            camera.orthoNear = from.nearPlane * glm::length(glm::dvec3(world[n][2]));
+            camera.orthoFar = from.farPlane * glm::length(glm::dvec3(world[n][2]));
         }
         cameras.push_back(camera);
     }
@@ -416,16 +418,21 @@ Result<lod::MeshBuildSettings> plySettings(const BuildOptions& build) {
 
 namespace {
 
-/// Scene files are read as a whole: is there memory for that?
+/// Scene files are read as a whole: is there memory for that? What is asked for suffices for the build that follows.
 Result<void> checkSceneMemory(const std::string& path, uint64_t memoryBytes) {
-    constexpr uint64_t kTimes = 4;  // the file, its arrays, and a copy of either on the way (measured: 3.9)
+    constexpr uint64_t kTimes = 4;      // the file, its arrays, and a copy of either on the way (measured: 3.9)
+    constexpr uint64_t kOfJson = 8;     // a scene's JSON, parsed, and what it names
+    constexpr uint64_t kOfBuild = 180;  // MiB: what a build of triangles takes however few they are
+    const auto enough = [](uint64_t bytes) { return fmt::format("give --memory {}M", (bytes >> 20) + 1 + kOfBuild); };
     std::error_code error;
     uint64_t bytes = fs::file_size(path, error);
     if (error) return {};  // whoever opens it says why
     if (fs::path(path).extension() == ".gltf") {
-        STIPPLE_ASSIGN(const scene::gltf::Container c, scene::gltf::readContainer(path, memoryBytes));
+        auto c = scene::gltf::readContainer(path, memoryBytes);
+        if (!c && c.error().kind == ErrorKind::budget) c.error().hint = enough(kOfJson * bytes);
+        if (!c) return tl::unexpected(c.error());
         const nlohmann::json none = nlohmann::json::array();
-        const nlohmann::json& buffers = c.json.contains("buffers") ? c.json["buffers"] : none;
+        const nlohmann::json& buffers = c->json.contains("buffers") ? c->json["buffers"] : none;
         for (const auto& buffer : buffers)
             if (buffer.is_object() && buffer.contains("byteLength") && buffer["byteLength"].is_number_unsigned())
                 bytes += std::min(buffer["byteLength"].get<uint64_t>(), uint64_t{1} << 40);
@@ -434,8 +441,7 @@ Result<void> checkSceneMemory(const std::string& path, uint64_t memoryBytes) {
     return fail(ErrorKind::budget,
                 fmt::format("a scene file is read as a whole, which takes about {}, but --memory allows {}",
                             humanBytes(kTimes * bytes), humanBytes(memoryBytes)),
-                path,
-                fmt::format("give --memory {}M, or triangles as PLY, which need not fit", (kTimes * bytes >> 20) + 1));
+                path, enough(kTimes * bytes) + ", or triangles as PLY, which need not fit");
 }
 
 /// By this rank: what is wrong with them otherwise, all ranks find alike.

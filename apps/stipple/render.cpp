@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <numeric>
 
 #include "apps/stipple/camera_options.h"
 #include "apps/stipple/common.h"
@@ -13,6 +14,7 @@
 #include "apps/stipple/render_frames.h"
 #include "engine/base/file.h"
 #include "engine/base/process.h"
+#include "engine/base/text.h"
 #include "engine/base/units.h"
 #include "engine/base/words.h"
 #include "engine/image/coverage.h"
@@ -171,23 +173,43 @@ std::string errorText(const Verdict& verdict, const std::string& mode) {
 Result<void> runTraced(const Options& o, const OpenedScene& scene, const Shot& shot,
                        const render::FrameSettings& settings, const Legend& legend, Executor& executor,
                        Written& written) {
-    const double start = nowSeconds();
     const reference::TraceSettings trace{static_cast<uint32_t>(o.samples), settings.draw};
-    const auto nameOf = [&](size_t i) { return shot.views.size() > 1 ? numbered(o.output, i) : o.output; };
+    const auto rays = static_cast<uint64_t>(o.samples) * static_cast<uint64_t>(o.samples);
+    nlohmann::json pictures = nlohmann::json::array();
+    std::vector<double> frames;
+    size_t empty = 0;
     for (size_t i = 0; i < shot.views.size(); ++i) {
+        const std::string name = shot.views.size() > 1 ? numbered(o.output, i) : o.output;
+        const double start = nowSeconds();
         STIPPLE_ASSIGN(render::Image traced, reference::trace(scene.placed, shot.views[i], trace, executor));
+        const double seconds = nowSeconds() - start;
+        const bool isEmpty = showsNothing(traced);
+        empty += isEmpty ? 1 : 0;
         drawLegend(legend, traced);
-        STIPPLE_TRY(image::writePicture(nameOf(i), traced, o.alpha));
+        STIPPLE_TRY(image::writePicture(name, traced, o.alpha));
         ++written.pictures;
+        frames.push_back(1e3 * seconds);
+        pictures.push_back({{"path", name}, {"seconds", seconds}, {"shows_nothing", isEmpty}});
         if (!o.quiet && !o.json)
-            fmt::print("{}: full detail, traced with {} a pixel, {:.1f} s\n", nameOf(i),
-                       counted(static_cast<uint64_t>(o.samples) * static_cast<uint64_t>(o.samples), "ray"),
-                       nowSeconds() - start);
+            fmt::print("{}: full detail, traced with {} a pixel, {:.1f} s\n", name, counted(rays, "ray"), seconds);
     }
     if (o.json)
-        printJson(
-            "render",
-            {{"backend", "trace"}, {"samples_per_pixel", o.samples * o.samples}, {"seconds", nowSeconds() - start}});
+        printJson("render", {{"backend", "trace"},
+                             {"device", "fp64 rays against the full detail"},
+                             {"mode", o.mode},
+                             {"width", shot.views.front().width},
+                             {"height", shot.views.front().height},
+                             {"samples_per_pixel", rays},
+                             {"frames", frames.size()},
+                             {"frame_ms", {{"median", quantile(frames, 0.5)}, {"p95", quantile(frames, 0.95)}}},
+                             {"seconds", std::accumulate(frames.begin(), frames.end(), 0.0) / 1e3},
+                             {"tau_eff_px", 0},
+                             {"complete", true},
+                             {"incomplete_pictures", 0},
+                             {"empty_pictures", empty},
+                             {"pictures", pictures},
+                             {"peak_rss_bytes", peakRssBytes()}});
+    if (!o.quiet) sayEmpty(empty, shot.views.size(), o.output);
     return {};
 }
 
@@ -219,6 +241,7 @@ void tell(const Options& o, const render::FrameState& state, const Verdict& verd
               {"discs", verdict.lots.discs}}},
             {"complete", verdict.isComplete()},
             {"incomplete_pictures", verdict.incomplete},
+            {"empty_pictures", verdict.empty},
             {"worst_picture", verdict.worst},
             {"worst_picture_path", views > 1 ? numbered(o.output, verdict.worst) : o.output},
             {"bytes_streamed", c.bytesStreamed},
@@ -254,6 +277,7 @@ Result<void> run(const Options& o, Written& written) {
     const lod::StoreDescription& description = scene.description;
     STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
     written.of = shot.views.size();
+    if (!shot.note.empty() && !o.quiet) fmt::print(stderr, "note: {}\n", printable(shot.note));
     STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
     STIPPLE_ASSIGN(render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
     STIPPLE_ASSIGN(settings.draw.environment,
@@ -276,6 +300,7 @@ Result<void> run(const Options& o, Written& written) {
         STIPPLE_TRY(image::writePicture(o.output, state->image, o.alpha));
     }
     tell(o, *state, verdict, timings, size, shot.views.size());
+    if (!o.quiet) sayEmpty(verdict.empty, shot.views.size(), o.output);
     if (o.budget > 0) sayIfUseless(plan, settings, *state, verdict);
     return checkVerdict(plan, verdict);
 }

@@ -48,10 +48,21 @@ MissingChunks missingOf(const render::FrameState& state) {
 
 }  // namespace
 
+bool showsNothing(const render::Image& image) {
+    return std::none_of(image.rgba.begin(), image.rgba.end(), [](uint32_t c) { return c >> 24 != 0; });
+}
+
+void sayEmpty(size_t empty, size_t pictures, const std::string& output) {
+    if (empty == 0) return;
+    fmt::print(stderr, "note: {}: {} nothing of the scene (where is the camera? --eye, --target)\n", output,
+               pictures == 1 ? "the view shows" : fmt::format("{} of {} views show", empty, pictures));
+}
+
 void Verdict::judge(const render::FrameState& state, const lod::View* view) {
     const size_t number = pictures++;
-    const bool misses = !state.cut.wanted.empty(), worstMisses = incomplete > 0;
+    const bool misses = !state.cut.wanted.empty() || state.cut.truncated, worstMisses = incomplete > 0;
     incomplete += misses ? 1 : 0;
+    empty += !misses && showsNothing(state.image) ? 1 : 0;
     const double error = state.cut.truncated ? std::numeric_limits<double>::infinity() : state.cut.tauEffective;
     isTruncated = isTruncated || state.cut.truncated;
     if (number > 0 && (misses != worstMisses ? worstMisses : error <= tauEffectivePixels)) return;
@@ -187,9 +198,14 @@ Result<void> checkVerdict(const FramesPlan& plan, const Verdict& verdict) {
     if (plan.noWait) return {};
     if (verdict.isTruncated)
         return fail(ErrorKind::budget,
-                    "the picture is written, but holds only a part of the scene: its coarsest level has more records "
-                    "than --budget-points allows",
-                    plan.output,
+                    fmt::format("{} only a part of the scene: {} coarsest level has more records than --budget-points "
+                                "allows",
+                                verdict.pictures == 1
+                                    ? "the picture is written, but holds"
+                                    : fmt::format("{} of {} pictures hold (all are written; this is the worst)",
+                                                  verdict.incomplete, verdict.pictures),
+                                verdict.pictures == 1 ? "its" : "the"),
+                    verdict.pictures == 1 ? plan.output : numbered(plan.output, verdict.worst),
                     fmt::format("give more: {} would bring it to the error asked for; --no-wait permits it",
                                 counted(verdict.recordsWanted, "record")));
     if (verdict.isComplete()) return {};

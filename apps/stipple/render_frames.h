@@ -40,6 +40,7 @@ struct MissingChunks {
 /// How far the pictures fall short of what was asked for: of many, the worst one.
 struct Verdict {
     size_t pictures = 0, incomplete = 0;
+    size_t empty = 0;               ///< complete ones that show nothing of the scene
     size_t worst = 0;               ///< its number
     bool isTruncated = false;       ///< of one even the coarsest level exceeds the budget
     double tauEffectivePixels = 0;  ///< of the worst, as all that follows; infinite where records are left out
@@ -58,6 +59,11 @@ struct Written {
 
 /// out.png -> out_0007.png
 std::string numbered(const std::string& path, size_t index);
+
+/// Is no pixel covered by anything?
+bool showsNothing(const render::Image& image);
+/// One line where some pictures show nothing.
+void sayEmpty(size_t empty, size_t pictures, const std::string& output);
 
 /// Draws all views; writes a picture of each if there are several, leaves that of a single one in `state`.
 Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& settings, render::FrameState& state,

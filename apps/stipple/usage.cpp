@@ -86,10 +86,20 @@ bool is(const CLI::ParseError& error) {
     return dynamic_cast<const T*>(&error) != nullptr;
 }
 
+/// How many values an option was given, of a command or of its groups.
+size_t valuesOf(const CLI::App& app, const std::string& name) {
+    if (const CLI::Option* option = app.get_option_no_throw(name)) return option->results().size();
+    return 0;
+}
+
 Error valueMissing(const CLI::App& at, const std::string& message) {
     for (const std::string& name : optionsOf(at)) {
-        if (message.find(name) == std::string::npos) continue;
-        const bool isTwice = message.find("exactly 1") != std::string::npos;
+        // (Not --ortho where it is --ortho-width.)
+        const size_t found = message.find(name);
+        if (found == std::string::npos || std::isalnum(static_cast<unsigned char>(message[found + name.size()])) ||
+            message[found + name.size()] == '-')
+            continue;
+        const bool isTwice = valuesOf(at, name) > 1;
         if (isTwice || message.find("issing") != std::string::npos || message.find("equired") != std::string::npos)
             return {ErrorKind::usage, isTwice ? "is given more than once" : "needs a value", name, ""};
         return {ErrorKind::usage, "takes no value", name, ""};
@@ -114,6 +124,15 @@ std::string meantAsOutput(const CLI::App& at) {
 }
 
 }  // namespace
+
+Result<void> checkValues(const std::vector<std::string>& arguments) {
+    for (const std::string& argument : arguments) {
+        if (argument == "--") break;
+        if (argument.rfind("--", 0) == 0 && argument.find('=') == argument.size() - 1)
+            return fail(ErrorKind::usage, "needs a value", argument.substr(0, argument.size() - 1));
+    }
+    return {};
+}
 
 std::string commandOf(const CLI::App& app, const std::vector<std::string>& arguments) {
     const CLI::App* at = &app;

@@ -15,6 +15,9 @@ std::string commandOf(const CLI::App& app, const std::vector<std::string>& argum
 /// A first argument that is a file is viewed: `stipple scan.las`. What is neither file nor command is an error.
 Result<void> completeCommand(const CLI::App& app, std::vector<std::string>& arguments);
 
+/// "--ortho=" has no value, and must not take the next word for one.
+Result<void> checkValues(const std::vector<std::string>& arguments);
+
 /// What is wrong with the arguments that `app` refused, with the likely word where one is misspelt.
 Error usageError(const CLI::App& app, const CLI::ParseError& error);
 

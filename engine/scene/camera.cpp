@@ -278,7 +278,7 @@ lod::View makeView(const Camera& camera, uint32_t width, uint32_t height, double
     view.focalPixels = 0.5 * height / std::tan(0.5 * camera.fovDegrees * kPi / 180);
     view.isOrthographic = camera.isOrthographic();
     if (view.isOrthographic) view.focalPixels = 1 / std::max(camera.orthoWidth / width, camera.orthoHeight / height);
-    view.nearPlane = nearPlane;
+    view.nearPlane = view.isOrthographic ? std::max(nearPlane, camera.orthoNear) : nearPlane;
     return view;
 }
 

@@ -17,6 +17,8 @@ struct Camera {
     double fovDegrees = 50;  ///< vertical
     /// Orthographic, if either is above 0: at least so much of the world is seen across and along the picture.
     double orthoWidth = 0, orthoHeight = 0;
+    /// Orthographic: what is nearer to the eye than this is cut off; what is farther than that should be (0: nothing).
+    double orthoNear = 0, orthoFar = 0;
     bool isOrthographic() const { return orthoWidth > 0 || orthoHeight > 0; }
 };
 

@@ -81,6 +81,7 @@ struct SceneCamera {
     double fovDegrees = 50, nearPlane = 0.1;
     bool isOrthographic = false;
     double width = 1, height = 1;  ///< of an orthographic view, world units
+    double farPlane = 0;           ///< of an orthographic view; 0: not known
 };
 
 struct Node {

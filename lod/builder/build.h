@@ -58,6 +58,7 @@ struct BuildReport {
     std::map<std::string, uint64_t> added;    ///< likewise: pointsIn + added = pointsOut + dropped
     uint64_t skippedFiles = 0;                ///< inputs that could not be opened (only with skipBad)
     std::vector<std::string> notes;           ///< what was odd about the input
+    std::vector<std::string> coarseNotes;     ///< what coarse levels are: of pictures, each says what it shows of them
     uint64_t nodes = 0, records = 0, bytesOut = 0, contentHash = 0;
     double seconds = 0;
     std::map<std::string, double> stageSeconds;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "engine/image/image_io.h"
@@ -70,6 +71,26 @@ TEST(HeaderBox, ThatIsTooSmallIsAFaultOfTheFile) {
     EXPECT_EQ(runProgram(folder, "info none.las --verify").code, 0) << "some writers leave it empty";
     EXPECT_EQ(runProgram(folder, "info a.las --skip-bad").code, 0) << "it permits that";
     EXPECT_EQ(runProgram(folder, "build a.las -o a.stipple --quiet").code, 0) << "it can be drawn all the same";
+}
+
+TEST(HeaderBox, ThatIsNoneIsOneLineWhateverIsWrongWithIt) {
+    const TempFolder folder;
+    constexpr double kInfinite = std::numeric_limits<double>::infinity();
+    for (const auto& [greatestX, leastY] : {std::pair{std::nan(""), 0.0},
+                                            {kInfinite, 0.0},
+                                            {400.0, 0.0},
+                                            {520.1, -kInfinite},
+                                            {std::nan(""), std::nan("")},
+                                            {-kInfinite, 1e300}}) {
+        writeBoxed(folder / "a.las", greatestX, leastY);
+        const Outcome r = runProgram(folder, "info a.las");
+        EXPECT_EQ(r.code, 3) << greatestX << " " << leastY;
+        EXPECT_EQ(timesSaid(r.out, "problem"), 1u) << r.out;
+        EXPECT_EQ(timesSaid(r.out, "the header's box is none: "), 1u) << r.out;
+        EXPECT_FALSE(says(r.out, "farther out")) << r.out;
+        EXPECT_EQ(nlohmann::json::parse(runProgram(folder, "info a.las --json").out)["header_box"], "none");
+        EXPECT_EQ(runProgram(folder, "build a.las -o a.stipple --quiet --force").code, 0) << "it can be drawn";
+    }
 }
 
 TEST(Transparency, ThatIsNotDrawnIsSaidOnceAFile) {

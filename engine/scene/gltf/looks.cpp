@@ -149,6 +149,7 @@ void readLightsAndCameras(const json& root, Scene& scene) {
         if (camera.isOrthographic) {  // (negative ones would mirror, which glTF advises against)
             camera.width = 2 * std::abs(of["xmag"].get<double>());
             camera.height = 2 * std::abs(of["ymag"].get<double>());
+            camera.farPlane = of.value("zfar", 0.0);
         } else {
             camera.fovDegrees = glm::degrees(of["yfov"].get<double>());
         }

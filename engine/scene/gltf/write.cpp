@@ -229,7 +229,7 @@ class Writer {
         out.orthographic.xmag = 0.5 * c.width;
         out.orthographic.ymag = 0.5 * c.height;
         out.orthographic.znear = c.nearPlane;
-        out.orthographic.zfar = 1e6;
+        out.orthographic.zfar = c.farPlane > c.nearPlane ? c.farPlane : 1e6;
         model_.cameras.push_back(out);
     }
     void addLight(const Light& l) {

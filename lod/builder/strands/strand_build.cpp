@@ -329,7 +329,7 @@ class StrandBuild : public CellContent {
         report.dropped = description.dropped = dropped_;
         report.added = description.added = added_;
         if (fewestKept_ < 1)
-            report.notes.push_back(fmt::format(
+            report.coarseNotes.push_back(fmt::format(
                 "from afar thin strands are drawn by lot: at the coarsest level 1 in {:.0f}, wider by as much; where "
                 "the others were is left to chance and not part of the stated error",
                 1 / fewestKept_));

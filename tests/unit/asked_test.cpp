@@ -1,0 +1,239 @@
+// What is asked for is done, or it is said in one line that it is not: options, pictures that show little or nothing,
+// cameras, legends.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "engine/image/image_io.h"
+#include "engine/scene/scene.h"
+#include "tests/support/program.h"
+
+namespace stipple {
+namespace {
+
+using test::expectOneLine;
+using test::Outcome;
+using test::runProgram;
+
+bool says(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+class Asked : public testing::Test {
+  protected:
+    static void SetUpTestSuite() {
+        folder_ = new test::TempFolder;
+        const auto executor = makeTbbExecutor(1);
+        test::writePly(folder() / "a.ply", test::bumpySphere(2000, 1));
+        test::build({folder() / "a.ply"}, folder() / "a.stipple", *executor);
+    }
+    static void TearDownTestSuite() { delete folder_; }
+    static const test::TempFolder& folder() { return *folder_; }
+    static Outcome render(const std::string& options, const std::string& input = "a.stipple") {
+        return runProgram(folder(), fmt::format("render {} -o p.png --force --size 64x48 {}", input, options));
+    }
+    static nlohmann::json jsonOf(const Outcome& r) { return nlohmann::json::parse(r.out, nullptr, false); }
+    static std::string path(const std::string& name) { return folder() / name; }
+
+  private:
+    inline static test::TempFolder* folder_ = nullptr;
+};
+
+TEST_F(Asked, OptionsGivenTwiceOrWithoutAValueAreNamedAsSuch) {
+    expectOneLine(render("--eye 0,0,5 --eye 0,0,6"), 2, {"--eye", "is given more than once"});
+    expectOneLine(render("--fov 30 --fov 30"), 2, {"--fov", "is given more than once"});
+    expectOneLine(render("--ortho= --fov 30"), 2, {"--ortho", "needs a value"});
+    expectOneLine(render("--eye="), 2, {"--eye", "needs a value"});
+    expectOneLine(render("--eye"), 2, {"--eye", "needs a value"});
+    EXPECT_EQ(render("--eye=0,0,5 --target=0,0,0").code, 0);
+}
+
+TEST_F(Asked, RangesOfColoursAreLookedAtBeforeAnythingIsBuilt) {
+    for (const char* range : {"10,5", "5,5", "1", "a,b", "0,inf", "nan,1"}) {
+        const Outcome r = render(fmt::format("--colour height --colour-range {}", range), "a.ply");
+        expectOneLine(r, 2, {"--colour-range", "is not a range"});
+    }
+    EXPECT_EQ(render("--colour height --colour-range=-1,1").code, 0);
+}
+
+TEST_F(Asked, ABudgetBelowTheCoarsestLevelNamesPicturesThatThereAre) {
+    const Outcome r = render("--orbit 3 --budget-points 1 --json --quiet");
+    EXPECT_EQ(r.code, 6);
+    EXPECT_TRUE(says(r.err, "p_000")) << r.err;
+    EXPECT_FALSE(says(r.err, "p.png")) << r.err;
+    EXPECT_TRUE(says(r.err, "3 of 3 pictures hold")) << r.err;
+    const auto j = jsonOf(r);
+    EXPECT_EQ(j["complete"], false);
+    EXPECT_EQ(j["incomplete_pictures"], 3);
+    const Outcome one = render("--budget-points 1 --json --quiet");
+    EXPECT_EQ(one.code, 6);
+    EXPECT_TRUE(says(one.err, "p.png: the picture is written, but holds only a part")) << one.err;
+    EXPECT_EQ(jsonOf(one)["incomplete_pictures"], 1);
+}
+
+TEST_F(Asked, AWidthBesideAPathIsRefused) {
+    test::spit(path("p.json"), R"({"keys": [{"t": 0, "eye": [0,0,9], "target": [0,0,0], "ortho": 4}]})");
+    expectOneLine(render("--camera-path p.json --ortho 2"), 2, {"--ortho", "--camera-path", "together"});
+    EXPECT_EQ(render("--camera-path p.json").code, 0);
+}
+
+TEST_F(Asked, AViewOfNothingSaysSo) {
+    for (const char* mode : {"pullpush", "splat", "reference"}) {
+        const std::string off = fmt::format("--mode {} --samples 1 --eye 0,0,50 --target 0,0,90", mode);
+        const Outcome r = render(off);
+        EXPECT_EQ(r.code, 0);
+        EXPECT_TRUE(says(r.err, "note: p.png: the view shows nothing of the scene")) << r.err;
+        EXPECT_EQ(render(off + " --quiet").err, "");
+        EXPECT_EQ(jsonOf(render(off + " --json"))["empty_pictures"], 1);
+        const Outcome seen = render(fmt::format("--mode {} --samples 1", mode));
+        EXPECT_FALSE(says(seen.err, "nothing")) << seen.err;
+    }
+    test::spit(path("p.json"), R"({"fps": 1, "keys": [{"t": 0, "eye": [0,0,9], "target": [0,0,0]},
+                                                     {"t": 1, "eye": [0,0,9], "target": [0,0,20]}]})");
+    const Outcome r = render("--camera-path p.json --frames 2");
+    EXPECT_TRUE(says(r.err, "p.png: 1 of 2 views show nothing")) << r.err;
+}
+
+TEST_F(Asked, TracedPicturesAreReportedLikeOthers) {
+    const auto j = jsonOf(render("--mode reference --samples 2 --orbit 3 --json"));
+    EXPECT_EQ(j["schema"], "stipple.render/1");
+    EXPECT_EQ(j["mode"], "reference");
+    EXPECT_EQ(j["width"], 64);
+    EXPECT_EQ(j["height"], 48);
+    EXPECT_EQ(j["samples_per_pixel"], 4);
+    EXPECT_EQ(j["complete"], true);
+    ASSERT_EQ(j["pictures"].size(), 3u);
+    double sum = 0, last = 0;
+    for (size_t i = 0; i < 3; ++i) {
+        EXPECT_EQ(j["pictures"][i]["path"], fmt::format("p_{:04}.png", i));
+        sum += last = j["pictures"][i]["seconds"].get<double>();
+    }
+    // Each says its own time, not the time since the first began.
+    EXPECT_NEAR(sum, j["seconds"].get<double>(), 1e-6);
+    EXPECT_LT(last, 0.9 * j["seconds"].get<double>());
+}
+
+TEST_F(Asked, WhatIsLeftToChanceIsSaidOfTheStoreOnceAndOfPicturesBesideTheirError) {
+    const auto note = [](const Outcome& r) { return says(r.err, "thin strands are drawn by lot"); };
+    ASSERT_EQ(runProgram(folder(), "grow tree -o tree.glb --leaves 20k").code, 0);
+    const Outcome built = runProgram(folder(), "build tree.glb -o tree.stipple");
+    EXPECT_TRUE(note(built)) << built.err;
+    EXPECT_TRUE(says(runProgram(folder(), "build tree.glb -o t2.stipple --json").out, "drawn by lot"));
+    for (const char* mode : {"pullpush", "reference", "pullpush"})
+        EXPECT_FALSE(note(render(fmt::format("--samples 1 --mode {}", mode), "tree.glb"))) << mode;
+    EXPECT_TRUE(says(render("", "tree.glb").out, "by lot")) << "beside the error";
+}
+
+TEST_F(Asked, TheMemoryThatASceneIsToldToAskForSuffices) {
+    ASSERT_EQ(runProgram(folder(), "grow rock -o rock.glb --triangles 30k").code, 0);
+    ASSERT_EQ(runProgram(folder(), "grow building -o house.gltf --triangles 3k").code, 0);
+    for (const char* scene : {"rock.glb", "house.gltf"}) {
+        const Outcome refused = runProgram(folder(), fmt::format("build {} -o m.stipple --force --memory 1M", scene));
+        EXPECT_EQ(refused.code, 6) << refused.err;
+        const std::string words = "give --memory ";
+        const size_t at = refused.err.find(words);
+        ASSERT_NE(at, std::string::npos) << refused.err;
+        const std::string size =
+            refused.err.substr(at + words.size(), refused.err.find('M', at + words.size()) + 1 - at - words.size());
+        const Outcome built =
+            runProgram(folder(), fmt::format("build {} -o m.stipple --force --memory {}", scene, size));
+        EXPECT_EQ(built.code, 0) << scene << " " << size << " " << built.err;
+    }
+}
+
+/// A square of points with an attribute.
+void writeWithQuality(const std::string& path, float quality) {
+    std::string file =
+        "ply\nformat binary_little_endian 1.0\nelement vertex 400\nproperty float x\nproperty float y\n"
+        "property float z\nproperty float quality\nend_header\n";
+    for (int i = 0; i < 400; ++i)
+        for (const float value : {float(i % 20), float(i / 20), 0.0f, quality}) {
+            file.resize(file.size() + 4);
+            std::memcpy(file.data() + file.size() - 4, &value, 4);
+        }
+    test::spit(path, file);
+}
+
+TEST_F(Asked, LegendsHaveNoScaleWhereThereIsNoRange) {
+    // Saturated colours in the legend's column, left of what is drawn.
+    const auto colours = [&](float quality) {
+        writeWithQuality(path("q.ply"), quality);
+        const Outcome r = runProgram(folder(),
+                                     "render q.ply -o q.png --force --size 900x300 --colour quality --legend --quiet "
+                                     "--eye 10,10,400 --target 10,10,0 --shade unlit");
+        EXPECT_EQ(r.code, 0) << r.err;
+        const auto image = image::readImage(path("q.png"));
+        std::set<uint32_t> seen;
+        size_t bright = 0;
+        for (uint32_t y = 0; image && y < image->height; ++y)
+            for (uint32_t x = 0; x < 200; ++x) {
+                const uint32_t c = image->rgba[size_t{y} * image->width + x];
+                const auto [low, high] = std::minmax({c & 255u, c >> 8 & 255u, c >> 16 & 255u});
+                if (high - low > 50) seen.insert(c);
+                bright += low > 200;
+            }
+        EXPECT_GT(bright, 20u) << "its words";
+        return seen.size();
+    };
+    EXPECT_EQ(colours(7), 1u);
+    EXPECT_EQ(colours(std::numeric_limits<float>::quiet_NaN()), 0u);
+}
+
+TEST_F(Asked, OrthographicCamerasOfScenesBeginAtTheirNearPlane) {
+    const auto shownWith = [&](double near, double far) {
+        scene::Scene s;
+        scene::SceneCamera camera;
+        camera.isOrthographic = true;
+        camera.width = camera.height = 3;
+        camera.nearPlane = near;
+        camera.farPlane = far;
+        s.cameras.push_back(camera);
+        scene::Node store, eye;
+        store.store = "a.stipple";
+        eye.camera = 0;
+        eye.local[3] = {0, 0, 10, 1};
+        s.nodes = {store, eye};
+        EXPECT_TRUE(scene::writeGltf(s, path("s.gltf")));
+        return render("--scene-camera 1 --alpha --colour plain", "s.gltf");
+    };
+    const auto covered = [&] {
+        const auto image = image::readImage(path("p.png"));
+        size_t count = 0;
+        for (const uint32_t c : image->rgba) count += c >> 24 != 0;
+        return count;
+    };
+    EXPECT_EQ(shownWith(0.1, 100).code, 0);
+    const size_t whole = covered();
+    EXPECT_GT(whole, 500u);
+    shownWith(10.9, 100);  // of the ball of radius 1 around the origin a cap behind the middle is left
+    EXPECT_LT(covered(), whole / 2);
+    EXPECT_FALSE(says(shownWith(0.1, 100).err, "far plane"));
+    EXPECT_TRUE(says(shownWith(0.1, 10).err, "beyond its far plane (10 units away) is drawn all the same"));
+}
+
+TEST_F(Asked, DiscsLargerThanTexelsAreSeenInNarrowParallelViews) {
+    // Far larger than their spacing, so that they are not drawn exactly where texels hold them.
+    std::vector<test::TestPoint> points;
+    Rng rng(1);
+    for (int i = 0; i < 20'000; ++i)
+        points.push_back({{rng.uniform(-100, 100), rng.uniform(-100, 100), 0}, {0, 0, 1}, 0x4080c0, 10});
+    test::writePly(path("dense.ply"), points, true, true);
+    ASSERT_EQ(runProgram(folder(), "build dense.ply -o dense.stipple --force --quiet").code, 0);
+    for (const char* device : {"cpu", "reference"})
+        for (const char* width : {"1", "0.01", "0.001", "0.0001"}) {
+            ASSERT_EQ(runProgram(folder(), fmt::format("render dense.stipple -o p.png --force --size 24x24 --alpha "
+                                                       "--quiet --ortho {} --device {}",
+                                                       width, device))
+                          .code,
+                      0);
+            const auto image = image::readImage(path("p.png"));
+            ASSERT_TRUE(image);
+            for (const uint32_t c : image->rgba) ASSERT_EQ(c >> 24, 255u) << width << " " << device;
+        }
+}
+
+}  // namespace
+}  // namespace stipple
