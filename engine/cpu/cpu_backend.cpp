@@ -54,12 +54,30 @@ class CpuBackend final : public render::Backend {
         return r;
     }
 
+    Result<void> render(const render::RenderRequest& request, render::Image& image) override {
+        draw(request, image);
+        return {};
+    }
     Result<render::Ticket> submit(const render::RenderRequest& request) override {
+        draw(request, image_);
+        isRead_ = false;
+        return render::Ticket{++submitted_};
+    }
+    bool isDone(render::Ticket) const override { return true; }
+    Result<void> read(render::Ticket ticket, render::Image& image) override {
+        if (ticket.number != submitted_ || isRead_) return render::noSuchPicture(ticket);
+        std::swap(image, image_);
+        isRead_ = true;
+        return {};
+    }
+
+  private:
+    void draw(const render::RenderRequest& request, render::Image& image) {
         frame_.draws = request.draws;
         frame_.mode = &render::reconstructionOf(request.mode);
         frame_.constants = request.draws->frame;
         frame_.k = frame_.constants.orthographic != 0 ? *frame_.kernels.orthographic : frame_.kernels;
-        frame_.image = &image_;
+        frame_.image = &image;
         frame_.wantAll = request.wantDepthAndNormal;
         frame_.hasPyramid =
             std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
@@ -79,18 +97,8 @@ class CpuBackend final : public render::Backend {
             times_.push_back({name, (nowSeconds() - start) * 1e3});
             p = next;
         }
-        isRead_ = false;
-        return render::Ticket{++submitted_};
-    }
-    bool isDone(render::Ticket) const override { return true; }
-    Result<void> read(render::Ticket ticket, render::Image& image) override {
-        if (ticket.number != submitted_ || isRead_) return render::noSuchPicture(ticket);
-        std::swap(image, image_);
-        isRead_ = true;
-        return {};
     }
 
-  private:
     Chunks chunks_;
     Frame frame_;
     render::Image image_;  ///< of the last frame, until it is read

@@ -63,8 +63,8 @@ class Backend : public streaming::ChunkSink {
     virtual bool isDone(Ticket ticket) const = 0;
     /// Waits for a frame and hands over its picture, once, into `image`, whose storage is reused.
     virtual Result<void> read(Ticket ticket, Image& image) = 0;
-    /// Both.
-    Result<void> render(const RenderRequest& request, Image& image) {
+    /// Both; where nothing is gained by waiting, straight into `image`.
+    virtual Result<void> render(const RenderRequest& request, Image& image) {
         STIPPLE_ASSIGN(const Ticket ticket, submit(request));
         return read(ticket, image);
     }
