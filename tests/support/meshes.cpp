@@ -184,7 +184,7 @@ std::vector<lod::CutMeshDraw> evenCut(const lod::Hierarchy& h, uint32_t code) {
         for (uint32_t r = 0; r < h.groups[n].runs; ++r) {
             const lod::MeshRun& run = h.runs[h.groups[n].firstRun + r];
             if (run.producer != lod::MeshRun::kOriginal && h.nodes[run.producer].errorCode > code) continue;
-            draws.push_back({0, n, run.firstCluster, run.clusters, run.triangles, 0});
+            draws.push_back({0, n, n, run.firstCluster, run.clusters, run.triangles, 0});
         }
     }
     return draws;
