@@ -67,8 +67,14 @@ struct Frame {
 
     // Of discs drawn exactly (passes/splat.cpp); kept for their memory only.
     std::vector<PlacedSplat> placedSplats;
+    std::vector<uint32_t> placedColours;  ///< only where discs are blended
     std::vector<TileRange> splatTiles;
     std::vector<uint32_t> tilePlaces, tileEnds;
+
+    // Plane::filtered, and its coverage, of 255; only where discs are blended.
+    HugeBuffer<shared::FilteredPixel> filtered;
+    HugeBuffer<uint8_t> coverage;
+    size_t filteredPixels = 0;
 
     Pyramid pyramid;  ///< Plane::texels and Plane::coarse
     // Of the pixels of triangles, beside their texels.
@@ -77,6 +83,8 @@ struct Frame {
     HugeBuffer<shared::SurfaceWords> surfaceWords;  ///< Plane::surface, only where rows are kept between passes
     size_t surfaceWordPixels = 0;
 
+    /// Are there blended discs?
+    bool isBlended() const { return mode->blendsSplats && !blocks.empty(); }
     Visibility visible() { return {visibility.data(), runs.data()}; }
     /// May any of these pixels show something?
     bool isSeen(size_t first, uint32_t n) const {
@@ -86,7 +94,8 @@ struct Frame {
         return any;
     }
     SurfacePlanes planesAt(size_t pixel) {
-        return {hasTriangles ? surface.data() + pixel : nullptr, hasEmissive ? emissive.data() + pixel : nullptr};
+        return {hasTriangles ? surface.data() + pixel : nullptr, hasEmissive ? emissive.data() + pixel : nullptr,
+                isBlended() ? coverage.data() + pixel : nullptr};
     }
     /// Rows of the image for all threads: what covers much of it must not be the work of one.
     template <typename Use>

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 
+#include "shaders/shared/ewa.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
 #include "shaders/shared/mesh.h"
@@ -65,12 +66,18 @@ struct PlacedSplat {
     float cx, cy, cz, nx, ny, nz, radius;
     uint32_t id;  ///< of the visibility buffer
 };
+/// How large discs count: at least so many of their node's spacings, boxes around so many of these radii and `margin`
+/// px.
+struct SplatReach {
+    float leastSpacings = 0, radii = 1, margin = 0;
+};
 /// The discs of one block, and boxes of pixels that hold them.
 struct SplatBlock {
     static constexpr uint32_t kSize = shared::kRecordsPerBlock;
     alignas(64) float cx[kSize], cy[kSize], cz[kSize], nx[kSize], ny[kSize], nz[kSize], radius[kSize];
     alignas(64) int firstX[kSize], lastX[kSize], firstY[kSize], lastY[kSize];
-    alignas(64) uint32_t keep[kSize];  ///< 0: not to be drawn
+    alignas(64) uint32_t colour[kSize];  ///< and flags, of the records
+    alignas(64) uint32_t keep[kSize];    ///< 0: not to be drawn
 };
 
 struct BlockSource {
@@ -130,7 +137,8 @@ struct LargeSink {
 /// Planes over the whole image, only where triangles are drawn; `emissive` only where a material shines.
 struct SurfacePlanes {
     uint32_t* surface;
-    uint32_t* emissive;  ///< packColour
+    uint32_t* emissive;       ///< packColour
+    const uint8_t* coverage;  ///< of silhouettes, of 255; null: all or nothing
 };
 
 /// Look-up tables that the kernels share.
@@ -152,6 +160,7 @@ struct ResolveInput {
     const shared::DiscBox* discBoxes;  ///< of each
     size_t discCount;
     bool exactPoints;  ///< points are what their pixels show, at the depth of the visibility buffer
+    const shared::FilteredPixel* filtered;  ///< of the image: what they show there; null: that of their records
 };
 
 struct LightInput {
@@ -169,7 +178,8 @@ struct SurfaceRow {
     alignas(64) uint32_t material[kTile];                     ///< metallic 8 | roughness 8 | occlusion 8 | flags
     alignas(64) uint32_t emission[kTile];                     ///< packColour; only if hasEmission
     alignas(64) float ownDepth[kTile];                        ///< before reconstruction; only if wanted
-    bool hasTriangles, hasEmission;
+    alignas(64) float coverage[kTile];                        ///< only if hasCoverage
+    bool hasTriangles, hasEmission, hasCoverage;
 };
 /// What of a surface is needed beyond whether there is one, and its colour.
 struct SurfaceWants {
@@ -238,10 +248,18 @@ struct Kernels {
                       size_t count, uint32_t firstRow, uint32_t lastRow, const Visibility& visibility);
     /// Up to 256 records as discs in camera space.
     void (*placeSplats)(const shared::FrameConstants& f, const shared::DrawNode& node,
-                        const shared::PointRecord* records, uint32_t count, SplatBlock& out);
+                        const shared::PointRecord* records, uint32_t count, const SplatReach& reach, SplatBlock& out);
     /// Draws some discs into the pixels of one tile, which is nobody else's meanwhile.
     void (*splatTile)(const shared::FrameConstants& f, const PlacedSplat* splats, const uint32_t* places, size_t count,
                       const SplatTile& tile, const Visibility& visibility);
+    /// Blends some discs at the pixels of one tile, which is nobody else's meanwhile; `filtered` is of the whole image.
+    /// `colours`: of each disc, as records have them, with their flags.
+    void (*filterTile)(const shared::FrameConstants& f, const Tables& tables, const BlockSource* blocks,
+                       const PlacedSplat* splats, const uint32_t* colours, const uint32_t* places, size_t count,
+                       const SplatTile& tile, const Visibility& visibility, shared::FilteredPixel* filtered);
+    /// 1 for each pixel of a row that no opaque surface is seen at.
+    void (*openRow)(const shared::FrameConstants& f, const uint64_t* keys, const shared::FilteredPixel* filtered,
+                    uint32_t n, uint8_t* open);
 };
 
 /// The best kernels that this processor runs; STIPPLE_SIMD=sse|avx2|avx512 asks for fewer.

@@ -5,6 +5,7 @@
 
 #include "engine/cpu/kernels.h"
 #include "shaders/shared/environment.h"
+#include "shaders/shared/ewa.h"
 #include "shaders/shared/lens.h"
 #include "shaders/shared/pack.h"
 #include "shaders/shared/pyramid.h"
@@ -12,6 +13,7 @@
 #include "shaders/shared/splat_disc.h"
 #include "shaders/shared/splat_size.h"
 #include "shaders/shared/strand.h"
+#include "shaders/shared/surface.h"
 #include "shaders/shared/wide_disc.h"
 
 namespace stipple::cpu {
@@ -136,6 +138,8 @@ void projectBlock(const FrameConstants& f, const DrawNode& node, const PointReco
 #include "engine/cpu/strands.inl"
 
 #include "engine/cpu/splat.inl"
+
+#include "engine/cpu/ewa.inl"
 
 #include "engine/cpu/resolve_points.inl"
 
@@ -329,6 +333,8 @@ const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
                               fillWide,
                               fillDiscs,
                               placeSplats,
-                              splatTile};
+                              splatTile,
+                              filterTile,
+                              openRow};
 
 }  // namespace stipple::cpu

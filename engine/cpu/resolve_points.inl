@@ -175,6 +175,21 @@ void gatherRow(const FrameConstants& f, const Tables& tables, const BlockSource*
     }
 }
 
+/// What points were blended to takes the place of their records.
+void gatherFiltered(const FilteredPixel* __restrict filtered, uint32_t n, Gathered& g) {
+    for (size_t i = 0; i < n; ++i) {
+        if (!(g.front[i] > 0.0f)) continue;
+        const FilteredPixel shown = filtered[i];
+        const vec3 d = octDecode(shown.normal);
+        g.turned[i] = 1;
+        g.nx[i] = d.x;
+        g.ny[i] = d.y;
+        g.nz[i] = d.z;
+        g.flags[i] = (shown.cover & kFilteredLeaf) != 0 ? kFlagLoose : 0u;
+        g.colour[i] = shown.colour;
+    }
+}
+
 /// Texels of what is not points; tubes of the row are none before.
 void resolveOthers(const FrameConstants& f, const Tables& tables, const ResolveInput& in, const OtherPixels& others,
                    uint32_t x0, uint32_t y, uint32_t n, TexelRow& __restrict row, float& largestRadius,
@@ -196,6 +211,10 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
     OtherPixels others;
     bool any = false, anyTurned = false;
     gatherRow(f, tables, in.blocks, visibility, n, g, others, any, anyTurned);
+    if (in.filtered != nullptr && any) {
+        gatherFiltered(in.filtered + size_t{y} * f.width + x0, n, g);
+        anyTurned = true;
+    }
     if (surface != nullptr)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) surface[i] = 0;

@@ -12,7 +12,7 @@ inline void makeUnit(size_t count, float* __restrict x, float* __restrict y, flo
 }
 
 void placeSplats(const FrameConstants& frame, const DrawNode& drawNode, const PointRecord* records, uint32_t count,
-                 SplatBlock& out) {
+                 const SplatReach& reach, SplatBlock& out) {
     const FrameConstants f = frame;
     const DrawNode node = drawNode;
     const float focal = f.focal, nearPlane = f.nearPlane, midX = f.centre.x, midY = f.centre.y;
@@ -21,6 +21,7 @@ void placeSplats(const FrameConstants& frame, const DrawNode& drawNode, const Po
                 az = node.axisX.z, bbx = node.axisY.x, bby = node.axisY.y, bbz = node.axisY.z, ccx = node.axisZ.x,
                 ccy = node.axisZ.y, ccz = node.axisZ.z;
     const NormalAxes m = normalAxes(node);
+    const float least = node.spacing * reach.leastSpacings, radii = reach.radii, margin = reach.margin;
     const float edge = node.edge * f.supportScale, scattered = largestSplat(kFlagScattered, focal, f.height);
     const uint32_t errorCode = node.errorCode, octantMask = node.octantMask;
     const Lens lens = lensHere(focal);
@@ -41,7 +42,8 @@ void placeSplats(const FrameConstants& frame, const DrawNode& drawNode, const Po
         const float nz = isFree ? sight.z * away : (m.x.z * d.x + m.y.z * d.y + m.z.z * d.z) * m.scale;
         const float cap =
             (recordFlags(r) & kFlagScattered) != 0u ? max(lensDepth(lens, cz), 0.0f) * scattered : 3.0e38f;
-        const float radius = min(edge * radiusFractionFast(recordRadiusCode(r)), cap);
+        const float stored = edge * radiusFractionFast(recordRadiusCode(r));
+        const float radius = min(max(stored, min(least, kOpaqueRadii * stored)), cap);
         out.cx[i] = cx;
         out.cy[i] = cy;
         out.cz[i] = cz;
@@ -49,20 +51,22 @@ void placeSplats(const FrameConstants& frame, const DrawNode& drawNode, const Po
         out.ny[i] = ny;
         out.nz[i] = nz;
         out.radius[i] = radius;
+        out.colour[i] = r.colour;
         const float drawnHere = float(int(octantMask >> recordOctant(r) & 1u));  // a bool would keep GCC from SIMD
         const bool fine = (recordErrorCode(r) <= errorCode) | (drawnHere > 0.5f);
         const bool seen = ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) != 0u) |
                           (nx * sight.x + ny * sight.y + nz * sight.z < 0.0f);
         const bool faces = !isFree | (cz > nearPlane);
         // The box of the disc's sphere, where that lies wholly before the eye; else whatever box it has (isNear).
-        const float front = cz - radius, back = cz + radius;
+        const float around = radius * radii;
+        const float front = cz - around, back = cz + around;
         const bool isNear = !kOrthographic & !(front > 0.05f * cz);
         const float toFront = focal / lensDepth(lens, front), toBack = focal / lensDepth(lens, back);
-        const float left = cx - radius, right = cx + radius, top = cy - radius, bottom = cy + radius;
-        const float x0 = left * (left < 0.0f ? toFront : toBack) + midX,
-                    x1 = right * (right > 0.0f ? toFront : toBack) + midX;
-        const float y0 = top * (top < 0.0f ? toFront : toBack) + midY,
-                    y1 = bottom * (bottom > 0.0f ? toFront : toBack) + midY;
+        const float left = cx - around, right = cx + around, top = cy - around, bottom = cy + around;
+        const float x0 = left * (left < 0.0f ? toFront : toBack) + (midX - margin),
+                    x1 = right * (right > 0.0f ? toFront : toBack) + (midX + margin);
+        const float y0 = top * (top < 0.0f ? toFront : toBack) + (midY - margin),
+                    y1 = bottom * (bottom > 0.0f ? toFront : toBack) + (midY + margin);
         const bool isInside = isNear | ((x1 >= 0.0f) & (x0 < lastX + 1.0f) & (y1 >= 0.0f) & (y0 < lastY + 1.0f));
         const bool keep = fine & seen & faces & (back > nearPlane) & isInside;
         out.firstX[i] = int(min(max(x0, 0.0f), lastX));
@@ -75,7 +79,8 @@ void placeSplats(const FrameConstants& frame, const DrawNode& drawNode, const Po
     // Those about the eye, one by one.
     for (size_t i = 0; i < count; ++i) {
         if (out.keep[i] != 2u) continue;
-        const WideDisc d{{out.cx[i], out.cy[i], out.cz[i]}, {out.nx[i], out.ny[i], out.nz[i]}, out.radius[i], 0u};
+        const WideDisc d{
+            {out.cx[i], out.cy[i], out.cz[i]}, {out.nx[i], out.ny[i], out.nz[i]}, out.radius[i] * radii, 0u};
         const CentrePixel c = centrePixel(d, f);
         const DiscBox box = discBox(d, f);
         const bool isEmpty = box.x.last < box.x.first || box.y.last < box.y.first || reachesPicture(d, f) < 0.5f;
@@ -163,6 +168,12 @@ struct TileFront {
 
 /// Eight pixels of a row, of which a few may lie beside the disc.
 constexpr int kSplatLanes = 8;
+/// Where they begin for a disc, so that as few as possible of them reach all it may cover, and all are of the tile.
+[[gnu::always_inline]] inline int firstLane(int firstX, int lastX) {
+    const int first = firstX > 0 ? firstX : 0;
+    const int last = int(SplatTile::kWidth) - (lastX - first + kSplatLanes) / kSplatLanes * kSplatLanes;
+    return first < last ? first : last;
+}
 
 void drawSplat(const SplatBatch& b, size_t i, uint32_t id, const SplatTile& tile, const FrameConstants& f,
                TileFront& __restrict front) {
@@ -170,8 +181,8 @@ void drawSplat(const SplatBatch& b, size_t i, uint32_t id, const SplatTile& tile
     const float cx = b.cx[i], cy = b.cy[i], cz = b.cz[i], nx = b.nx[i], ny = b.ny[i], nz = b.nz[i], ahead = b.ahead[i],
                 radius2 = b.radius2[i];
     const float shift = float(int(tile.x0)) + 0.5f - f.centre.x, shiftY = float(int(tile.y0)) + 0.5f - f.centre.y;
-    const int x0 = b.firstX[i] > 0 ? b.firstX[i] / kSplatLanes * kSplatLanes : 0;
     const int x1 = b.lastX[i] < int(tile.width) ? b.lastX[i] : int(tile.width) - 1;
+    const int x0 = firstLane(b.firstX[i], x1);
     const int y0 = b.firstY[i] > 0 ? b.firstY[i] : 0;
     const int y1 = b.lastY[i] < int(tile.height) ? b.lastY[i] : int(tile.height) - 1;
     for (int y = y0; y <= y1; ++y) {

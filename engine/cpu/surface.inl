@@ -35,6 +35,9 @@ void surfaceRow(const FrameConstants& frame, const TexelRow& __restrict own, con
     const uint32_t* const triangles = planes.surface;
     out.hasTriangles = triangles != nullptr;
     out.hasEmission = triangles != nullptr && planes.emissive != nullptr;
+    out.hasCoverage = planes.coverage != nullptr;
+    for (size_t i = 0; out.hasCoverage && i < n; ++i)
+        out.coverage[i] = float(int(planes.coverage[i])) * (1.0f / 255.0f);
     if (triangles == nullptr)
         for (size_t i = 0; i < n; ++i) out.material[i] = kPlainSurface;
     else
@@ -97,6 +100,13 @@ void outputRow(const FrameConstants& frame, const Tables& tables, uint32_t n, co
             green[i] = row.green[i];
             blue[i] = row.blue[i];
         }
+    if (row.hasCoverage)
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            red[i] = f.background.x + row.coverage[i] * (red[i] - f.background.x);
+            green[i] = f.background.y + row.coverage[i] * (green[i] - f.background.y);
+            blue[i] = f.background.z + row.coverage[i] * (blue[i] - f.background.z);
+        }
         // max(0, v) of what is no number is 0: these index a table.
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
@@ -115,6 +125,11 @@ void outputRow(const FrameConstants& frame, const Tables& tables, uint32_t n, co
         const uint32_t alpha = row.depth[i] > 0.0f ? 0xff000000u : 0u;
         rgba[i] = byteOf[ir[i]] | byteOf[ig[i]] << 8 | byteOf[ib[i]] << 16 | alpha;
     }
+    if (row.hasCoverage)
+        for (size_t i = 0; i < n; ++i) {
+            const auto alpha = uint32_t(row.depth[i] > 0.0f ? row.coverage[i] * 255.0f + 0.5f : 0.0f);
+            rgba[i] = (rgba[i] & 0xffffffu) | alpha << 24;
+        }
     if (out.normal != nullptr)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {

@@ -200,6 +200,7 @@ class ReferenceBackend final : public render::Backend {
         Level level0 = projectAll(draws, mode);
         projectStrands(draws, chunks_, level0);
         projectMeshes(draws, chunks_, level0);
+        if (mode.blendsSplats) blendDiscs(draws, placedDiscs(draws, chunks_), level0);
         const Level own = level0;
         if (mode.hasPyramid) reconstruct(level0, draws.view);
         finishTubes(draws.view, level0);
@@ -221,6 +222,7 @@ class ReferenceBackend final : public render::Backend {
         const lod::View& v = draws.view;
         Level level{static_cast<int>(v.width), static_cast<int>(v.height), {}};
         level.samples.resize(size_t{v.width} * v.height);
+        if (mode.blendsSplats) return level;
         const std::vector<PlacedDisc> discs = placedDiscs(draws, chunks_);
         if (mode.fillsSplats) {
             showSplats(draws, discs, level);
@@ -325,11 +327,12 @@ class ReferenceBackend final : public render::Backend {
                             image.normal[i * 3 + static_cast<size_t>(c)] = static_cast<float>(world[c]);
                     }
                 }
+                colour = glm::mix(dvec3(f.background), colour, s.coverage);
                 if (wantAll)
                     for (int c = 0; c < 3; ++c)
                         image.linear[i * 3 + static_cast<size_t>(c)] = static_cast<float>(colour[c]);
                 image.rgba[i] = encodeSrgb(colour.x) | encodeSrgb(colour.y) << 8 | encodeSrgb(colour.z) << 16 |
-                                (s.valid ? 0xff000000u : 0u);
+                                (s.valid ? static_cast<uint32_t>(std::lround(255 * s.coverage)) << 24 : 0u);
             }
         });
     }

@@ -18,6 +18,7 @@ struct Sample {
     glm::dvec2 centre{0};                         ///< of the splat, pixels of the full-size image
     glm::dvec2 perp{0};
     glm::dvec3 colour{0};
+    double coverage = 1;  ///< of the pixel, where what is behind is the background
     // Of a tube: `perp` is t_v t_perp, with t its unit tangent, `axis` (tx^2 - ty^2, 2 tx ty).
     bool isRound = false;
     glm::dvec2 axis{0};

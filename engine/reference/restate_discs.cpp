@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "lod/record_spacing.h"
+
 namespace stipple::reference {
 namespace {
 
@@ -34,7 +36,10 @@ std::pair<double, double> meet(const PlacedDisc& d, const ViewRay& ray, double n
     return depth > nearPlane && rho2 <= 1 ? std::pair(depth, rho2) : std::pair(HUGE_VAL, HUGE_VAL);
 }
 
-/// A pixel that shows a disc, and no ellipse. `n`: unit, towards the eye.
+bool isLeaf(const PlacedDisc& d) { return (d.flags & shared::kFlagLoose) != 0; }
+
+}  // namespace
+
 Sample shownPixel(const lod::View& view, const dvec2& at, double depth, const dvec3& n, const dvec3& colour,
                   bool isLeaf) {
     Sample s;
@@ -48,10 +53,6 @@ Sample shownPixel(const lod::View& view, const dvec2& at, double depth, const dv
     return s;
 }
 
-bool isLeaf(const PlacedDisc& d) { return (d.flags & shared::kFlagLoose) != 0; }
-
-}  // namespace
-
 std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks& chunks) {
     const lod::View& v = draws.view;
     const shared::FrameConstants& f = draws.frame;
@@ -64,6 +65,9 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
         if (h.payload(cut.chunk).kind != lod::Kind::points) continue;
         const auto& records = chunks.at(uint64_t{draws.firstSource + instance.source} << 32 | cut.chunk).records;
         const bool few = mayBeWide(h, node, records, v, instance.scale * f.supportScale);
+        const double step = h.cellSize(node) / 65536;
+        const double spacing =
+            h.isProgressive ? 0 : instance.scale * h.unit * step * double{lod::recordSpacing(records)};
         for (uint32_t i = 0; i < cut.count; ++i) {
             Disc disc = decodeDisc(h, node, records[i]);
             disc.radius *= cut.radiusScale;
@@ -83,7 +87,7 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
             if ((disc.flags & shared::kFlagNoNormal) != 0) n = -sightOf(v, c);
             const bool isDebug = f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError;
             out.push_back({c, n, instance.scale * disc.radius * f.supportScale,
-                           isDebug ? debugColour(f, node, cut) : disc.colour, disc.flags, few});
+                           isDebug ? debugColour(f, node, cut) : disc.colour, disc.flags, spacing, few});
         }
     }
     return out;

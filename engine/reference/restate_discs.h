@@ -15,6 +15,7 @@ struct PlacedDisc {
     double radius;              ///< world units, as stored
     glm::dvec3 colour;
     uint32_t flags;
+    double spacing;  ///< of its node, world units; 0: not known
     bool mayBeWide;  ///< discs of its node reach few of each other's spacings, or are too large for texels
 };
 std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks& chunks);
@@ -25,5 +26,12 @@ bool isWide(const lod::View& view, const PlacedDisc& disc);
 void showWide(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level);
 /// Every pixel whose ray meets a disc, and that of each disc's centre: the nearest.
 void showSplats(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level);
+
+/// Before the level's exact pixels, and in the place of what is not there: discs blended by their kernels.
+void blendDiscs(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level);
+
+/// A pixel that shows a disc, and no ellipse. `n`: unit, towards the eye.
+Sample shownPixel(const lod::View& view, const glm::dvec2& at, double depth, const glm::dvec3& n,
+                  const glm::dvec3& colour, bool isLeaf);
 
 }  // namespace stipple::reference

@@ -10,10 +10,10 @@
 namespace stipple::render {
 
 static_assert(sizeof(shared::PointRecord) == 16);
-static_assert(sizeof(shared::DrawNode) == 80);
+static_assert(sizeof(shared::DrawNode) == 84);
 static_assert(sizeof(shared::DrawBlock) == 8);
 static_assert(sizeof(shared::StrandSegment) == 32);
-static_assert(sizeof(shared::FrameConstants) == 184);
+static_assert(sizeof(shared::FrameConstants) == 192);
 static_assert(sizeof(shared::MeshVertex) == 32);
 static_assert(sizeof(shared::MeshCluster) == 12);
 static_assert(sizeof(shared::DrawMesh) == 120);
@@ -188,6 +188,8 @@ shared::DrawNode makeDrawNode(const lod::CutDraw& draw, const Bend& bend, const 
                    (instance.rotation != glm::dmat3(1) ? shared::kNodeTurned : 0u);
     d.count = draw.count;
     d.level = node.level;
+    // Times what disc_sizes.h knows. Discs among which any beginning shows the whole have none.
+    d.spacing = h.isProgressive ? 0.0f : static_cast<float>(worldPerStep);
     d.errorPixels = draw.errorPixels;
     return d;
 }
@@ -239,6 +241,8 @@ void setView(const lod::Cut& cut, const lod::View& view, const DrawSettings& set
     f.minimumRadius = settings.minimumRadius;
     f.exactStrands = settings.exactStrands;
     f.coverageSeed = settings.coverageSeed;
+    f.lowPass = settings.lowPass;
+    f.kernelSupport = settings.kernelSupport;
     f.shade = (settings.lit ? shared::kShadeLit : shared::kShadeUnlit) |
               (settings.unlitTriangles ? 0u : shared::kShadeTriangles);
     f.debugView = settings.debugView;

@@ -105,6 +105,8 @@ struct DrawSettings {
     std::vector<WorldLight> lights;    ///< none: a sun over the viewer's shoulder
     float supportScale = 1.0f;         ///< splat radius of the reconstruction / stored radius
     float minimumRadius = 1.0f;        ///< pixels
+    float lowPass = 0.5f;              ///< of blended discs: variance, px^2
+    float kernelSupport = 2;           ///< of blended discs: where kernels end, in sigmas (2 or 3)
     float exactStrands = 2.0f;         ///< pixels of half-width from which strands are filled, not reconstructed
     Wind wind;                         ///< moves what setSway was told of
     uint32_t coverageSeed = 0;         ///< of strands narrower than a pixel

@@ -132,15 +132,15 @@ std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& place
     auto state = std::make_unique<FrameState>();
     state->backend = &backend;
     state->backendLife = backend.life();
-    state->radii = std::make_unique<GreatestRadii>(backend);
-    state->streamer = std::make_unique<streaming::Streamer>(executor, *state->radii, settings);
+    state->discSizes = std::make_unique<DiscSizes>(backend);
+    state->streamer = std::make_unique<streaming::Streamer>(executor, *state->discSizes, settings);
     Placer placer(*state);
     std::vector<uint32_t> numbers;
     numbers.reserve(placed.size());
     for (const PlacedStore& p : placed) numbers.push_back(placer.addWithStandIns(p));
     for (const PlacedCrowd& crowd : crowds) placer.addCrowd(crowd, numbers);
     state->draws.firstSource = backend.claimSources(placer.sources());
-    state->radii->setFirstSource(state->draws.firstSource);
+    state->discSizes->setFirstSource(state->draws.firstSource);
     state->draws.materials = state->materials;
     state->draws.effectsOfScene = effectsOfScene({state->hierarchies, state->instances});
     return state;
@@ -163,7 +163,7 @@ Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettin
     DrawSettings settingsOfMode = settings.draw;
     settingsOfMode.exactStrands = std::min(settings.draw.exactStrands, reconstructionOf(settings.mode).exactCurves);
     makeDrawList(state.cut, state.hierarchies, state.instances, view, settingsOfMode, state.draws);
-    markWideDiscs(*state.radii, state.draws);
+    markDiscSizes(*state.discSizes, state.draws);
     RenderRequest request;
     request.draws = &state.draws;
     request.mode = settings.mode;

@@ -7,7 +7,7 @@
 
 #include "engine/base/counters.h"
 #include "engine/render/backend.h"
-#include "engine/render/wide_discs.h"
+#include "engine/render/disc_sizes.h"
 #include "lod/colour.h"
 #include "lod/store.h"
 #include "streaming/streamer.h"
@@ -28,7 +28,7 @@ struct FrameState {
     std::vector<lod::Instance> instances;
     std::vector<lod::Crowd> crowds;
     std::vector<shared::SurfaceMaterial> materials;  ///< of all stores, one after another
-    std::unique_ptr<GreatestRadii> radii;            ///< between streamer and backend
+    std::unique_ptr<DiscSizes> discSizes;            ///< between streamer and backend
     std::unique_ptr<streaming::Streamer> streamer;   // evicts at its end
     Backend* backend = nullptr;
     std::weak_ptr<const void> backendLife;

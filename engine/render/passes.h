@@ -17,6 +17,7 @@ enum class Pass : uint8_t {
 enum class Plane : uint8_t {
     visibility,  ///< the nearest of each pixel: depth and draw id
     discList,    ///< wide discs that reach the picture
+    filtered,    ///< of pixels that discs were blended at: what they add up to
     texels,      ///< level 0: the winner of each pixel as a splat; of exact pixels, what the pixel shows
     coarse,      ///< the levels above
     surface,     ///< what is seen at each pixel, whoever filled it

@@ -67,6 +67,8 @@ void putFrame() {
     put(frame.environmentY);
     put(frame.environmentZ);
     put(frame.orthographic);
+    put(frame.lowPass);
+    put(frame.kernelSupport);
 }
 
 void putNode() {
@@ -82,6 +84,7 @@ void putNode() {
     put(node.addressHigh);
     put(node.level);
     put(node.errorPixels);
+    put(node.spacing);
 }
 
 void putBlock() {

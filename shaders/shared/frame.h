@@ -22,6 +22,7 @@ struct DrawNode {
     uint addressHigh;
     uint level;         // depth in the octree, for the debug view
     float errorPixels;  // screen-space error delivered by this node, for the debug view
+    float spacing;      // of its records on their surface, world units; 0: not known
 };
 
 const uint kNodeTurned = 256u;  // the store's own axes are not those of the world
@@ -130,6 +131,8 @@ struct FrameConstants {
     vec3 environmentY;
     vec3 environmentZ;
     uint orthographic;  // 1: rays are parallel (lens.h)
+    float lowPass;        // mode ewa: variance, px^2
+    float kernelSupport;  // mode ewa: where kernels end, in sigmas
 };
 SHARED_FN Lens frameLens(FrameConstants f) { return lensOf(f.focal, f.orthographic != 0u); }
 

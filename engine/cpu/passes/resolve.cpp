@@ -29,9 +29,10 @@ void resolve(Frame& frame) {
     frame.pyramid.beginFrame(frame.constants, frame.hasStrands);
     const Planes finePlanes = fine.planes();
     preparePlanes(frame, size_t{fine.width} * fine.height);
-    const ResolveInput input{frame.blocks.data(),       frame.meshBlocks.data(), frame.draws->materials.data(),
-                             frame.strandBlocks.data(), frame.discs.data(),      frame.discBoxes.data(),
-                             frame.discs.size(),        frame.mode->fillsSplats};
+    const ResolveInput input{
+        frame.blocks.data(),       frame.meshBlocks.data(), frame.draws->materials.data(),
+        frame.strandBlocks.data(), frame.discs.data(),      frame.discBoxes.data(),
+        frame.discs.size(),        frame.mode->fillsSplats, frame.isBlended() ? frame.filtered.data() : nullptr};
     std::atomic<float> largestRadius{0};
     frame.pyramid.forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
         TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite

@@ -1,136 +1,16 @@
-// Discs drawn exactly, by tiles: discs in camera space, lists of them by tile in the order of their ids, then the
-// tiles, each by one thread and without atomics.
+// Discs drawn exactly: the nearest of each pixel.
 #include "engine/cpu/passes/passes.h"
+#include "engine/cpu/passes/tile_lists.h"
 
 namespace stipple::cpu {
 namespace {
 
-constexpr uint32_t kBlocksPerChunk = 16;              ///< whose discs are kept, and counted, together
-constexpr uint64_t kMostEntries = uint64_t{1} << 26;  ///< of the lists at a time, 4 bytes each
-
-class TileLists {
-  public:
-    explicit TileLists(Frame& frame)
-        : frame_(frame),
-          columns_((frame.constants.width + SplatTile::kWidth - 1) / SplatTile::kWidth),
-          rows_((frame.constants.height + SplatTile::kHeight - 1) / SplatTile::kHeight),
-          chunks_((static_cast<uint32_t>(frame.blocks.size()) + kBlocksPerChunk - 1) / kBlocksPerChunk),
-          splats_(frame.placedSplats),
-          ranges_(frame.splatTiles) {}
-
-    void place() {
-        splats_.resize(frame_.blocks.size() * shared::kRecordsPerBlock);
-        ranges_.resize(splats_.size());
-        counts_.assign(chunks_, 0);
-        entries_.assign(chunks_, 0);
-        frame_.executor.parallelFor(chunks_, 1, [&](size_t begin, size_t end) {
-            SplatBlock placed;
-            for (size_t c = begin; c < end; ++c) {
-                const size_t first = c * kBlocksPerChunk,
-                             last = std::min(first + kBlocksPerChunk, frame_.blocks.size());
-                for (size_t b = first; b < last; ++b) {
-                    const BlockSource& block = frame_.blocks[b];
-                    const uint32_t count =
-                        std::min(shared::kRecordsPerBlock, block.node->count - frame_.draws->points().blocks[b].first);
-                    frame_.k.placeSplats(frame_.constants, *block.node, block.records, count, placed);
-                    keep(placed, count, c, static_cast<uint32_t>(b * shared::kRecordsPerBlock));
-                }
-            }
-        });
-    }
-
-    /// Draws all discs, as many at a time as the lists may hold.
-    void draw() {
-        for (uint32_t first = 0; first < chunks_;) {
-            uint64_t sum = entries_[first];
-            uint32_t last = first + 1;
-            while (last < chunks_ && sum + entries_[last] <= kMostEntries) sum += entries_[last++];
-            if (sum > 0) drawChunks(first, last, sum);
-            first = last;
-        }
-    }
-
-  private:
-    void keep(const SplatBlock& b, uint32_t count, size_t chunk, uint32_t firstId) {
-        const auto tile = [](int pixel, uint32_t size) {
-            return static_cast<uint16_t>(static_cast<uint32_t>(pixel) / size);
-        };
-        size_t at = chunk * kBlocksPerChunk * shared::kRecordsPerBlock + counts_[chunk];
-        for (uint32_t i = 0; i < count; ++i) {
-            if (b.keep[i] == 0) continue;
-            splats_[at] = {b.cx[i], b.cy[i], b.cz[i], b.nx[i], b.ny[i], b.nz[i], b.radius[i], firstId + i};
-            const TileRange range{tile(b.firstX[i], SplatTile::kWidth), tile(b.firstY[i], SplatTile::kHeight),
-                                  tile(b.lastX[i], SplatTile::kWidth), tile(b.lastY[i], SplatTile::kHeight)};
-            ranges_[at++] = range;
-            entries_[chunk] += range.tiles();
-            ++counts_[chunk];
-        }
-    }
-
-    /// Calls use(tile, place of the disc) for each disc of a chunk and each tile that it reaches.
-    template <typename Use>
-    void forEntries(size_t chunk, const Use& use) const {
-        const size_t first = chunk * kBlocksPerChunk * shared::kRecordsPerBlock;
-        for (size_t at = first; at < first + counts_[chunk]; ++at) {
-            const TileRange r = ranges_[at];
-            for (uint32_t y = r.firstY; y <= r.lastY; ++y)
-                for (uint32_t x = r.firstX; x <= r.lastX; ++x) use(size_t{y} * columns_ + x, static_cast<uint32_t>(at));
-        }
-    }
-
-    void drawChunks(uint32_t first, uint32_t last, uint64_t sum) {
-        const size_t tiles = size_t{columns_} * rows_, chunks = last - first;
-        std::vector<uint32_t>& ends = frame_.tileEnds;  // of each chunk and tile: how many, then where they end
-        ends.assign(chunks * tiles, 0);
-        frame_.executor.parallelFor(chunks, 1, [&](size_t begin, size_t end) {
-            for (size_t c = begin; c < end; ++c)
-                forEntries(first + c, [&](size_t tile, uint32_t) { ++ends[c * tiles + tile]; });
-        });
-        std::vector<uint32_t> starts(tiles + 1, 0);
-        for (size_t c = 0; c < chunks; ++c)
-            for (size_t t = 0; t < tiles; ++t) starts[t + 1] += ends[c * tiles + t];
-        for (size_t t = 0; t < tiles; ++t) starts[t + 1] += starts[t];
-        std::vector<uint32_t> next(starts.begin(), starts.end() - 1);
-        for (size_t c = 0; c < chunks; ++c)
-            for (size_t t = 0; t < tiles; ++t) {
-                const uint32_t count = ends[c * tiles + t];
-                ends[c * tiles + t] = next[t];
-                next[t] += count;
-            }
-        std::vector<uint32_t>& places = frame_.tilePlaces;
-        places.resize(std::max(places.size(), static_cast<size_t>(sum)));
-        frame_.executor.parallelFor(chunks, 1, [&](size_t begin, size_t end) {
-            for (size_t c = begin; c < end; ++c)
-                forEntries(first + c, [&](size_t tile, uint32_t at) { places[ends[c * tiles + tile]++] = at; });
-        });
-        frame_.executor.parallelFor(tiles, 4, [&](size_t begin, size_t end) {
-            for (size_t t = begin; t < end; ++t)
-                if (starts[t] != starts[t + 1])
-                    frame_.k.splatTile(frame_.constants, splats_.data(), places.data() + starts[t],
-                                       starts[t + 1] - starts[t], tileAt(t), frame_.visible());
-        });
-    }
-
-    SplatTile tileAt(size_t tile) const {
-        const uint32_t x0 = static_cast<uint32_t>(tile % columns_) * SplatTile::kWidth,
-                       y0 = static_cast<uint32_t>(tile / columns_) * SplatTile::kHeight;
-        return {x0, y0, std::min(SplatTile::kWidth, frame_.constants.width - x0),
-                std::min(SplatTile::kHeight, frame_.constants.height - y0)};
-    }
-
-    Frame& frame_;
-    uint32_t columns_, rows_, chunks_;
-    std::vector<PlacedSplat>& splats_;  ///< of each chunk, closed up
-    std::vector<TileRange>& ranges_;    ///< of each of them
-    std::vector<uint32_t> counts_;      ///< of each chunk: discs
-    std::vector<uint64_t> entries_;     ///< of each chunk: sum of their tiles
-};
-
-/// Every disc exactly: tile by tile, in front of what is there.
 void splat(Frame& frame) {
-    TileLists lists(frame);
+    TileLists lists(frame, {});
     lists.place();
-    lists.draw();
+    lists.draw([&](const PlacedSplat* splats, const uint32_t* places, size_t count, const SplatTile& tile) {
+        frame.k.splatTile(frame.constants, splats, places, count, tile, frame.visible());
+    });
 }
 
 }  // namespace

@@ -8,11 +8,14 @@ namespace {
 
 constexpr float kAsSet = std::numeric_limits<float>::infinity();
 
-constexpr std::array<Reconstruction, 3> kReconstructions{{
-    {Mode::pullpush, "pullpush", "gaps between points are closed by pull and push", true, true, false, Pass::project,
-     false, kAsSet},
-    {Mode::splat, "splat", "every disc exactly, the nearest wins", false, true, true, Pass::splat, true, 0.5f},
-    {Mode::points, "points", "a pixel a record: surfaces stay open", false, false, false, Pass::project, false, kAsSet},
+constexpr std::array<Reconstruction, 4> kReconstructions{{
+    {Mode::pullpush, "pullpush", "gaps between points are closed by pull and push", true, true, false, false,
+     Pass::project, false, kAsSet},
+    {Mode::splat, "splat", "every disc exactly, the nearest wins", false, true, true, false, Pass::splat, true, 0.5f},
+    {Mode::ewa, "ewa", "discs blended by Gaussian kernels, with a low-pass", false, true, true, true, Pass::ewa, true,
+     0.5f},
+    {Mode::points, "points", "a pixel a record: surfaces stay open", false, false, false, false, Pass::project, false,
+     kAsSet},
 }};
 
 }  // namespace

@@ -10,7 +10,7 @@
 
 namespace stipple::render {
 
-enum class Mode : uint8_t { pullpush, points, splat };
+enum class Mode : uint8_t { pullpush, points, splat, ewa };
 
 struct Reconstruction {
     Mode mode;
@@ -19,6 +19,7 @@ struct Reconstruction {
     bool hasPyramid;      ///< gaps between splats are closed by pull and push
     bool closesGaps;      ///< surfaces have no gaps between their records
     bool fillsSplats;     ///< every pixel that a disc covers is its own
+    bool blendsSplats;    ///< of such: what lies on one surface is blended, silhouettes have coverage
     Pass points;          ///< what draws points into the visibility buffer
     bool pointsAreLast;   ///< ... after all other kinds: its tiles are nobody else's meanwhile
     /// From which half-width on, px, curves have exact pixels at the latest (DrawSettings::exactStrands may ask for

@@ -1,5 +1,6 @@
-// Which nodes of a draw list may hold wide discs (shaders/shared/wide_disc.h): frames without any have no pass for
-// them.
+// What is known of the discs of each node once its chunk has arrived: the largest radius, by which frames without wide
+// discs (shaders/shared/wide_disc.h) have no pass for them, and the spacing, by which the kernels of coarse levels are
+// closed (shaders/shared/ewa.h).
 #pragma once
 
 #include <vector>
@@ -16,10 +17,10 @@ constexpr float kMostSpacings = 4.0f;
 /// the picture lies within few spacings then.
 constexpr double kMostTexelPixels = 8192;
 
-/// Hands chunks on to a backend and keeps in mind how large the largest radius of each is.
-class GreatestRadii final : public streaming::ChunkSink {
+/// Hands chunks on to a backend and keeps in mind how large the discs of each are, and how far apart.
+class DiscSizes final : public streaming::ChunkSink {
   public:
-    explicit GreatestRadii(Backend& backend) : backend_(backend), life_(backend.life()) {}
+    explicit DiscSizes(Backend& backend) : backend_(backend), life_(backend.life()) {}
     /// What the backend calls source 0.
     void setFirstSource(uint32_t first) { first_ = first; }
     Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override;
@@ -30,21 +31,25 @@ class GreatestRadii final : public streaming::ChunkSink {
     };
     /// `key`: as the backend has it.
     Share shareOf(streaming::ChunkKey key) const;
+    /// Steps of the node's lattice; 0: not known.
+    float spacingOf(streaming::ChunkKey key) const;
 
   private:
-    struct Greatest {
-        uint8_t code = 0;  ///< of the radius, + 1 (at most 255); 0: no points
+    struct Size {
+        uint8_t code = 0;  ///< of the largest radius, + 1 (at most 255); 0: no points
         bool isDense = false;
+        float spacing = 0;
     };
+    Size sizeOf(streaming::ChunkKey key) const;
     streaming::ChunkKey keyOfBackend(streaming::ChunkKey key) const;
 
     Backend& backend_;
     std::weak_ptr<const void> life_;  ///< of the backend: what is gone needs nothing back
     uint32_t first_ = 0;
-    std::vector<std::vector<Greatest>> greatest_;  ///< by source and node
+    std::vector<std::vector<Size>> sizes_;  ///< by source and node
 };
 
-/// Sets kNodeWide and DrawList::hasWideDiscs.
-void markWideDiscs(const GreatestRadii& radii, DrawList& draws);
+/// Sets kNodeWide, DrawList::hasWideDiscs, and spacings of nodes.
+void markDiscSizes(const DiscSizes& sizes, DrawList& draws);
 
 }  // namespace stipple::render

@@ -1,51 +1,59 @@
-#include "engine/render/wide_discs.h"
+#include "engine/render/disc_sizes.h"
 
 #include <algorithm>
 #include <cmath>
 
+#include "lod/record_spacing.h"
 #include "shaders/shared/wide_disc.h"
 
 namespace stipple::render {
 
-Result<void> GreatestRadii::upload(streaming::ChunkKey key, const lod::Chunk& chunk) {
+Result<void> DiscSizes::upload(streaming::ChunkKey key, const lod::Chunk& chunk) {
     if (life_.expired()) return fail(ErrorKind::device, "what draws the scene is gone");
     uint32_t code = 0;
     for (const shared::PointRecord& r : chunk.records) code = std::max(code, shared::recordRadiusCode(r) + 1);
     const auto points = static_cast<float>(chunk.records.size());
     const bool isDense = code > 0 && shared::radiusFraction(code - 1) * std::sqrt(points) > kMostSpacings;
-    if (greatest_.size() <= key.source) greatest_.resize(key.source + 1);
-    auto& of = greatest_[key.source];
+    if (sizes_.size() <= key.source) sizes_.resize(key.source + 1);
+    auto& of = sizes_[key.source];
     if (of.size() <= key.chunk) of.resize(key.chunk + 1);
-    of[key.chunk] = {static_cast<uint8_t>(std::min(code, 255u)), isDense};
+    of[key.chunk] = {static_cast<uint8_t>(std::min(code, 255u)), isDense, lod::recordSpacing(chunk.records)};
     return backend_.upload(keyOfBackend(key), chunk);
 }
 
-void GreatestRadii::evict(streaming::ChunkKey key) {
+void DiscSizes::evict(streaming::ChunkKey key) {
     if (!life_.expired()) backend_.evict(keyOfBackend(key));
 }
 
-streaming::ChunkKey GreatestRadii::keyOfBackend(streaming::ChunkKey key) const {
+streaming::ChunkKey DiscSizes::keyOfBackend(streaming::ChunkKey key) const {
     key.source += first_;
     return key;
 }
 
-GreatestRadii::Share GreatestRadii::shareOf(streaming::ChunkKey key) const {
+DiscSizes::Size DiscSizes::sizeOf(streaming::ChunkKey key) const {
     key.source -= first_;
-    if (key.source >= greatest_.size() || key.chunk >= greatest_[key.source].size()) return {};
-    const auto [code, isDense] = greatest_[key.source][key.chunk];
-    return {code == 0 ? 0 : code == 255 ? 1 : shared::radiusFraction(code - 1u), isDense};
+    return key.source >= sizes_.size() || key.chunk >= sizes_[key.source].size() ? Size{}
+                                                                                 : sizes_[key.source][key.chunk];
 }
 
-void markWideDiscs(const GreatestRadii& radii, DrawList& draws) {
+float DiscSizes::spacingOf(streaming::ChunkKey key) const { return sizeOf(key).spacing; }
+
+DiscSizes::Share DiscSizes::shareOf(streaming::ChunkKey key) const {
+    const Size size = sizeOf(key);
+    return {size.code == 0 ? 0 : size.code == 255 ? 1 : shared::radiusFraction(size.code - 1u), size.isDense};
+}
+
+void markDiscSizes(const DiscSizes& sizes, DrawList& draws) {
     const shared::FrameConstants& f = draws.frame;
     const double perFocal = double{shared::wideRadius(f.width, f.height)} / double{f.focal};
     draws.hasWideDiscs = false;
     DrawBatch& points = draws.of(lod::Kind::points);
     for (size_t i = 0; i < points.nodes.size(); ++i) {
         shared::DrawNode& d = points.nodes[i];
+        d.spacing *= sizes.spacingOf(points.keys[i]);
         const auto least = [](float step) { return 65536 * std::min(0.0, double{step}); };
         const double nearest = double{d.base.z} + least(d.axisX.z) + least(d.axisY.z) + least(d.axisZ.z);
-        const GreatestRadii::Share share = radii.shareOf(points.keys[i]);
+        const DiscSizes::Share share = sizes.shareOf(points.keys[i]);
         const double radius = 1.01 * double{d.edge} * double{f.supportScale * share.ofEdge};  // (fp32)
         if (share.isDense) {
             // Those around the eye (perspective), and what no texel can hold (orthographic).

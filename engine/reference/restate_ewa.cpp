@@ -1,0 +1,255 @@
+// Mode ewa once more, in fp64: every disc against every pixel that it may reach. The image of the circle is found from
+// the homography between image and disc, not from the closed form that the backends use.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "engine/reference/restate_discs.h"
+#include "shaders/shared/surface.h"
+
+namespace stipple::reference {
+namespace {
+
+using glm::dmat2;
+using glm::dvec2;
+using glm::dvec3;
+
+constexpr double kNone = std::numeric_limits<double>::infinity();
+
+/// An ellipse on the image: variances about its middle, px.
+struct Ellipse {
+    bool isThere = false;
+    dvec2 middle{0};
+    dmat2 variance{0};
+};
+
+/// The image of the circle of `radius` about a disc's centre, as that of a Gaussian that ends there at `support`
+/// sigmas.
+Ellipse imageOfCircle(const lod::View& view, const PlacedDisc& d, double radius, double support) {
+    const dvec3 aside = std::abs(d.normal.x) < 0.7 ? dvec3(1, 0, 0) : dvec3(0, 1, 0);
+    const dvec3 s = glm::normalize(glm::cross(d.normal, aside)), t = glm::cross(d.normal, s);
+    // Where the ray of an image point meets the disc's plane, from the centre along s and t, times the third: all
+    // three are linear in the point.
+    const dvec2 principal = 0.5 * dvec2(view.width, view.height);
+    const auto onDisc = [&](const dvec2& point) {
+        const ViewRay ray = viewRay(view, principal + point);
+        const double facing = glm::dot(d.normal, ray.direction);
+        const dvec3 off = facing * (ray.origin - d.centre) + ray.direction * glm::dot(d.normal, d.centre - ray.origin);
+        return dvec3(glm::dot(off, s), glm::dot(off, t), facing);
+    };
+    const dvec3 h0 = onDisc({0, 0}), hx = onDisc({1, 0}) - h0, hy = onDisc({0, 1}) - h0;
+    const auto form = [&](const dvec3& a, const dvec3& b) {
+        return a.x * b.x + a.y * b.y - radius * radius * a.z * b.z;
+    };
+    const dmat2 m(form(hx, hx), form(hx, hy), form(hx, hy), form(hy, hy));
+    const dvec2 b(form(h0, hx), form(h0, hy));
+    const double det = glm::determinant(m);
+    Ellipse e;
+    if (!(det > 0) || !(m[0][0] > 0)) return e;
+    e.middle = -(glm::inverse(m) * b);
+    const double size = -(form(h0, h0) + glm::dot(b, e.middle));
+    if (!(size > 0)) return e;
+    e.isThere = true;
+    e.variance = glm::inverse(m) * (size / (support * support));
+    return e;
+}
+
+/// What a pixel has gathered.
+struct Gathered {
+    double limit = kNone;  ///< what lies beyond is no part of the surface in front
+    const PlacedDisc* front = nullptr;
+    double frontDepth = 0;
+    const PlacedDisc* first = nullptr;  ///< of those whose kernels reach it
+    double weight = 0, linear = 0;
+    dvec3 colour{0}, normal{0};
+    bool hasBehind = false;
+};
+
+class Filter {
+  public:
+    Filter(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level)
+        : view_(draws.view),
+          support_(double{draws.frame.kernelSupport}),
+          lowPass_(double{draws.frame.lowPass}),
+          level_(level),
+          pixels_(level.samples.size()) {
+        for (const PlacedDisc& d : discs) {
+            PlacedDisc sized = d;
+            if ((d.flags & shared::kFlagNoNormal) != 0 && !(d.centre.z > view_.nearPlane)) continue;
+            sized.radius = std::max(d.radius, std::min(1.0275 * d.spacing, 1.5 * d.radius));
+            if ((d.flags & shared::kFlagScattered) != 0)
+                sized.radius = std::min(
+                    sized.radius, std::max(view_.height / 128.0, 4.0) / pixelsAt(view_, std::max(d.centre.z, 1e-300)));
+            discs_.push_back(sized);
+        }
+    }
+
+    void run() {
+        for (const PlacedDisc& d : discs_) findFronts(d);
+        for (const PlacedDisc& d : discs_) add(d);
+        show();
+    }
+
+  private:
+    bool isOnImage(int x, int y) const { return x >= 0 && y >= 0 && x < level_.width && y < level_.height; }
+    Gathered& pixel(int x, int y) {
+        return pixels_[static_cast<size_t>(y) * static_cast<size_t>(level_.width) + static_cast<size_t>(x)];
+    }
+    static double roughness(const PlacedDisc& d) {
+        return d.radius * ((d.flags & shared::kFlagLoose) != 0 ? 1.0 / 12 : 4.0 / 3);
+    }
+    double depthOnPlane(const PlacedDisc& d, const ViewRay& ray) const {
+        return glm::dot(d.normal, d.centre - ray.origin) / glm::dot(d.normal, ray.direction);
+    }
+    bool isMet(const PlacedDisc& d, const ViewRay& ray, double depth) const {
+        const dvec3 off = ray.at(depth) - d.centre;
+        return depth > view_.nearPlane && glm::dot(off, off) <= d.radius * d.radius;
+    }
+    /// Pixels that a sphere about the disc may reach; all where it is not before the eye.
+    template <typename Use>
+    void forPixels(const PlacedDisc& d, double radius, double margin, const Use& use) {
+        int x0 = 0, y0 = 0, x1 = level_.width - 1, y1 = level_.height - 1;
+        if (view_.isOrthographic || d.centre.z > 1.2 * radius) {
+            const double nearest = view_.isOrthographic ? 1 : d.centre.z - radius;
+            const double most =
+                margin + 2 +
+                pixelsAt(view_, nearest) * radius * (view_.isOrthographic ? 1 : glm::length(d.centre) / d.centre.z);
+            const dvec2 p = imageOf(view_, d.centre);
+            const auto clamp = [](double v, int last) { return static_cast<int>(std::clamp(v, -1.0, last + 1.0)); };
+            x0 = std::max(0, clamp(p.x - most, x1));
+            y0 = std::max(0, clamp(p.y - most, y1));
+            x1 = std::min(x1, clamp(p.x + most, x1));
+            y1 = std::min(y1, clamp(p.y + most, y1));
+        }
+        for (int y = y0; y <= y1; ++y)
+            for (int x = x0; x <= x1; ++x) use(x, y, viewRay(view_, dvec2(x + 0.5, y + 0.5)));
+    }
+
+    /// Between which depths the plane of a disc counts: as far as its kernel and the low-pass reach on it.
+    struct Range {
+        double nearest, farthest;
+    };
+    Range rangeOf(const PlacedDisc& d) const {
+        const double facing = std::abs(glm::dot(d.normal, sightOf(view_, d.centre)));
+        const double pixelSize = d.centre.z > 0 || view_.isOrthographic ? 1 / pixelsAt(view_, d.centre.z) : 0;
+        const double reach = support_ * (d.radius / 1.5 + std::sqrt(lowPass_) * pixelSize / std::max(facing, 1.0 / 32));
+        const double slab = reach * std::sqrt(std::max(0.0, 1 - d.normal.z * d.normal.z));
+        const double nearest = std::max(d.centre.z - slab, 1e-3 * std::abs(d.centre.z) + 1e-30);
+        return {nearest, std::max(d.centre.z + slab, nearest)};
+    }
+    /// Beyond the horizon of its plane (behind the eye) it is as far as it gets.
+    double depthWithin(const Range& range, const PlacedDisc& d, const ViewRay& ray) const {
+        const double plane = depthOnPlane(d, ray);
+        return plane > 0 ? std::clamp(plane, range.nearest, range.farthest) : range.farthest;
+    }
+
+    void offerFront(int x, int y, const PlacedDisc& d, const ViewRay& ray, double depth) {
+        Gathered& p = pixel(x, y);
+        const double limit = depth + roughness(d) / glm::length(ray.direction);
+        if (limit >= p.limit) return;
+        p.limit = limit;
+        p.front = &d;
+        p.frontDepth = depth;
+    }
+    void findFronts(const PlacedDisc& d) {
+        forPixels(d, d.radius, 0, [&](int x, int y, const ViewRay& ray) {
+            const double depth = depthOnPlane(d, ray);
+            if (isMet(d, ray, depth)) offerFront(x, y, d, ray, depth);
+        });
+        if (!(d.centre.z > view_.nearPlane)) return;
+        const dvec2 c = imageOf(view_, d.centre);
+        if (!(c.x >= 0 && c.y >= 0 && c.x < level_.width && c.y < level_.height)) return;
+        const int x = static_cast<int>(c.x), y = static_cast<int>(c.y);
+        const ViewRay ray = viewRay(view_, dvec2(x + 0.5, y + 0.5));
+        if (!isMet(d, ray, depthOnPlane(d, ray))) offerFront(x, y, d, ray, depthWithin(rangeOf(d), d, ray));
+    }
+
+    void add(const PlacedDisc& d) {
+        const double sigma = d.radius / 1.5, radius = support_ * sigma, end = std::exp(-0.5 * support_ * support_);
+        const double lean2 = std::max(0.0, 1 - d.normal.z * d.normal.z);
+        const Range range = rangeOf(d);
+        const bool isNear =
+            !view_.isOrthographic && !(d.centre.z > 0 && lean2 * radius * radius < 0.95 * d.centre.z * d.centre.z);
+        const Ellipse e = isNear ? Ellipse{} : imageOfCircle(view_, d, radius, support_);
+        if (!isNear && !e.isThere) return;  // edge-on: it has no area
+        const dmat2 wide = e.variance + dmat2(lowPass_);
+        const double amplitude = isNear ? 1 : std::sqrt(glm::determinant(e.variance) / glm::determinant(wide));
+        const dmat2 inverse = isNear ? dmat2(1) : glm::inverse(wide);
+        const dvec2 principal = 0.5 * dvec2(view_.width, view_.height);
+        forPixels(d, radius, support_ * std::sqrt(lowPass_), [&](int x, int y, const ViewRay& ray) {
+            const dvec2 off = dvec2(x + 0.5, y + 0.5) - principal - e.middle;
+            const double plane = depthOnPlane(d, ray);
+            const dvec3 onPlane = ray.at(plane) - d.centre;
+            double rho2 = glm::dot(off, inverse * off);
+            if (isNear) rho2 = plane > view_.nearPlane ? glm::dot(onPlane, onPlane) / (sigma * sigma) : kNone;
+            const double depth = depthWithin(range, d, ray);
+            Gathered& p = pixel(x, y);
+            if (depth > p.limit) {
+                p.hasBehind = p.hasBehind || isMet(d, ray, plane);
+                return;
+            }
+            if (!(rho2 < support_ * support_)) return;
+            const double w = amplitude * (std::exp(-0.5 * rho2) - end) / (1 - end);
+            if (!(w > 0)) return;
+            if (!p.first) p.first = &d;
+            p.weight += w;
+            p.linear += view_.isOrthographic ? w * depth : w / depth;
+            p.colour += w * d.colour;
+            p.normal += w * (glm::dot(d.normal, sightOf(view_, d.centre)) > 0 ? -d.normal : d.normal);
+        });
+    }
+
+    /// Has the pixel, or one of its eight neighbours, nothing opaque?
+    bool isAtGap(int x, int y) {
+        for (int j = y - 1; j <= y + 1; ++j)
+            for (int i = x - 1; i <= x + 1; ++i)
+                if (isOnImage(i, j) && !exact_[index(i, j)] && pixel(i, j).front == nullptr) return true;
+        return false;
+    }
+    size_t index(int x, int y) const {
+        return static_cast<size_t>(y) * static_cast<size_t>(level_.width) + static_cast<size_t>(x);
+    }
+
+    void show() {
+        // What the weights of a square grid add up to, whose sigma is 0.685 of its spacing.
+        const double end = std::exp(-0.5 * support_ * support_);
+        const double kept = 1 - 0.5 * support_ * support_ * end / (1 - end);
+        const double grid = 2 * 3.14159265358979 * 0.685 * 0.685 * kept;
+        exact_.resize(pixels_.size());
+        for (size_t i = 0; i < pixels_.size(); ++i) exact_[i] = level_.samples[i].valid;
+        for (int y = 0; y < level_.height; ++y)
+            for (int x = 0; x < level_.width; ++x) {
+                const Gathered& p = pixel(x, y);
+                Sample& s = level_.ref(x, y);
+                const double covered = std::min(1.0, p.weight / grid);
+                const bool wins = p.front ? !s.valid || p.limit < s.key : !s.valid && p.first && covered >= 0.5 / 255;
+                if (!wins) continue;
+                const PlacedDisc& d = p.front ? *p.front : *p.first;
+                const bool isBefore = p.front && (p.hasBehind || s.valid);
+                const dvec2 at(x + 0.5, y + 0.5);
+                if (p.weight > 1.0 / 1024) {
+                    s = shownPixel(view_, at, view_.isOrthographic ? p.linear / p.weight : p.weight / p.linear,
+                                   glm::normalize(p.normal), p.colour / p.weight, (d.flags & shared::kFlagLoose) != 0);
+                } else {
+                    const dvec3 n = glm::dot(d.normal, sightOf(view_, d.centre)) > 0 ? -d.normal : d.normal;
+                    s = shownPixel(view_, at, p.frontDepth, n, d.colour, (d.flags & shared::kFlagLoose) != 0);
+                }
+                if (!isBefore && isAtGap(x, y)) s.coverage = covered;
+            }
+    }
+
+    const lod::View& view_;
+    double support_, lowPass_;
+    Level& level_;
+    std::vector<Gathered> pixels_;
+    std::vector<PlacedDisc> discs_;
+    std::vector<bool> exact_;
+};
+
+}  // namespace
+
+void blendDiscs(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level) {
+    Filter(draws, discs, level).run();
+}
+
+}  // namespace stipple::reference

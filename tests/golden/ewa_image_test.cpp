@@ -1,0 +1,391 @@
+// Mode ewa: against the brute force of the fp64 restatement, and against what it is for: constant colours stay
+// constant, surfaces closed, textures filtered, silhouettes without what is behind them.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/cpu/cpu_backend.h"
+#include "engine/reference/reference.h"
+#include "tests/support/drawn_discs.h"
+#include "tests/support/drawn_shapes.h"
+#include "tests/support/support.h"
+
+namespace stipple {
+namespace {
+
+using glm::dvec2;
+using glm::dvec3;
+
+render::FrameSettings blended(render::Mode mode = render::Mode::ewa) {
+    render::FrameSettings settings;
+    settings.mode = mode;
+    settings.budgets.errorPixels = 1e-4;
+    settings.wantDepthAndNormal = true;
+    settings.draw.lit = false;
+    return settings;
+}
+
+/// Discs of any size and direction in a cube of edge 2.
+std::vector<test::TestPoint> anyDiscs(size_t count, uint64_t seed) {
+    Rng rng(seed);
+    std::vector<test::TestPoint> points;
+    while (points.size() < count) {
+        const auto any = [&] { return rng.uniform(-1, 1); };
+        const dvec3 n = glm::normalize(dvec3(any(), any(), any()));
+        points.push_back({{any(), any(), any()},
+                          glm::vec3(n),
+                          static_cast<uint32_t>(rng.below(1u << 24)),
+                          static_cast<float>(0.01 * std::exp2(rng.uniform(0, 4)))});
+    }
+    return points;
+}
+
+double coverageOf(const render::Image& image, size_t pixel) { return (image.rgba[pixel] >> 24) / 255.0; }
+double channel(const render::Image& image, size_t pixel, int c) {
+    return static_cast<double>(image.linear[3 * pixel + static_cast<size_t>(c)]);
+}
+
+/// Pixels that are not alike: of what is there, coverage, depth, normals, colours.
+struct Apart {
+    size_t drawn = 0, coverage = 0, depth = 0, normal = 0, colour = 0;
+};
+Apart compare(const render::Image& a, const render::Image& b) {
+    Apart out;
+    for (size_t i = 0; i < a.rgba.size(); ++i) {
+        const bool isDrawn = b.depth[i] > 0;
+        out.drawn += isDrawn;
+        out.coverage += std::abs(coverageOf(a, i) - coverageOf(b, i)) > 2.5 / 255;
+        for (int c = 0; c < 3; ++c)
+            if (std::abs(static_cast<int>(a.rgba[i] >> (8 * c) & 255) - static_cast<int>(b.rgba[i] >> (8 * c) & 255)) >
+                4) {
+                ++out.colour;
+                break;
+            }
+        if (!isDrawn || a.depth[i] <= 0) continue;
+        out.depth += std::abs(a.depth[i] / b.depth[i] - 1) > 1e-3f;
+        const auto normal = [&](const render::Image& image) {
+            return glm::vec3(image.normal[3 * i], image.normal[3 * i + 1], image.normal[3 * i + 2]);
+        };
+        out.normal += glm::dot(normal(a), normal(b)) < 0.9998f;
+    }
+    return out;
+}
+
+TEST(Ewa, IsWhatTheBruteForceSays) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    const auto oracle = reference::makeReferenceBackend(*executor);
+    test::writePly(folder / "a.ply", anyDiscs(3000, 5), true, true);
+    test::writePly(folder / "b.ply", test::samplesOf(test::Shape::statue, 20'000, 3));
+    struct Look {
+        dvec3 eye;
+        double focal;
+        bool isOrthographic = false;
+    };
+    for (const char* name : {"a", "b"}) {
+        const auto store = test::buildAndOpen(folder / (std::string(name) + ".ply"),
+                                              folder / (std::string(name) + ".stipple"), *executor);
+        for (const Look& look : {Look{{0.2, 0.1, 3.5}, 300},
+                                 {{0.1, 0.05, name == std::string("a") ? 0.3 : 1.35}, 120},
+                                 {{-0.6, 0.9, 1.6}, 60},
+                                 {{0, 0.1, 60}, 4000},
+                                 {{0.1, 0.1, 3}, 80, true}})
+            for (const double tau : {1e-4, 4.0}) {
+                lod::View view = test::viewFromAbove({0, 0, 0});
+                view.eye = look.eye;
+                view.focalPixels = look.focal;
+                view.isOrthographic = look.isOrthographic;
+                view.width = 201;
+                view.height = 151;
+                view.nearPlane = 1e-6;
+                render::FrameSettings settings = blended();
+                settings.budgets.errorPixels = tau;
+                const render::Image truth = test::renderView(store, *oracle, *executor, view, settings);
+                for (auto& [backendName, backend] : test::cpuBackendsAndOracle(*executor)) {
+                    if (backendName == "fp64") continue;
+                    SCOPED_TRACE(testing::Message()
+                                 << name << " " << backendName << " from " << look.eye.z << ", tau " << tau);
+                    const render::Image image = test::renderView(store, *backend, *executor, view, settings);
+                    const Apart apart = compare(image, truth);
+                    const size_t few = apart.drawn / 1000;
+                    EXPECT_GT(apart.drawn, 1'000u);
+                    EXPECT_LE(apart.coverage, few);
+                    EXPECT_LE(apart.depth, few);
+                    EXPECT_LE(apart.normal, few);
+                    EXPECT_LE(apart.colour, few);
+                    EXPECT_GE(test::drawnPsnr(image, truth), 50);
+                    // The control: another mode is another picture.
+                    const render::Image other =
+                        test::renderView(store, *backend, *executor, view, blended(render::Mode::splat));
+                    if (name == std::string("a")) EXPECT_GT(compare(other, truth).colour, apart.drawn / 20);
+                }
+            }
+    }
+}
+
+/// A plane of square cells, seen from (0, 0, 3) or aslant; colours by `colourAt`.
+template <typename ColourAt>
+std::vector<test::TestPoint> plane(int half, double step, double jitter, const ColourAt& colourAt) {
+    Rng rng(9);
+    std::vector<test::TestPoint> points;
+    for (int y = -half; y <= half; ++y)
+        for (int x = -half; x <= half; ++x) {
+            const double px = (x + 0.5 + rng.uniform(-jitter, jitter)) * step,
+                         py = (y + 0.5 + rng.uniform(-jitter, jitter)) * step;
+            points.push_back({{px, py, 0}, {0, 0, 1}, colourAt(px, py)});
+        }
+    return points;
+}
+
+TEST(Ewa, OneColourStaysOneColour) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    for (const double jitter : {0.0, 0.3, 0.5}) {
+        test::writePly(folder / "a.ply", plane(80, 0.0125, jitter, [](double, double) { return 0x4080c0u; }));
+        const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+        for (const double distance : {1.0, 3.0, 12.0})
+            for (auto& [name, backend] : test::cpuBackendsAndOracle(*executor)) {
+                lod::View view = test::viewFromAbove({0, 0, 0});
+                view.eye.z = distance;
+                view.width = view.height = 120;
+                const render::Image image = test::renderView(store, *backend, *executor, view, blended());
+                size_t off = 0, inside = 0;
+                for (size_t i = 0; i < image.rgba.size(); ++i) {
+                    const double x = distance * (double(i % 120) - 59.5) / view.focalPixels,
+                                 y = distance * (double(i / 120) - 59.5) / view.focalPixels;
+                    if (std::max(std::abs(x), std::abs(y)) > 0.95) continue;
+                    ++inside;
+                    for (int c = 0; c < 3; ++c)
+                        off += std::abs(static_cast<int>(image.rgba[i] >> (8 * c) & 255) -
+                                        static_cast<int>(0x4080c0u >> (8 * c) & 255)) > 1 ||
+                               std::abs(double{image.depth[i]} - distance) > 1e-4 * distance;
+                }
+                EXPECT_GT(inside, 100u);
+                EXPECT_EQ(off, 0u) << name << ", jitter " << jitter << ", from " << distance;
+            }
+    }
+}
+
+TEST(Ewa, LeavesNoHolesInClosedSurfaces) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    const auto backend = cpu::makeCpuBackend(*executor);
+    test::writePly(folder / "a.ply", test::samplesOf(test::Shape::torus, 20'000, 3));
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    Rng rng(8);
+    size_t holes = 0, clear = 0, looked = 0;
+    for (int pose = 0; pose < 60; ++pose) {
+        const lod::View view =
+            test::lookAt(*store, rng.uniform(0, 360), rng.uniform(-80, 80), std::exp2(rng.uniform(-0.7, 2)), 128);
+        render::FrameSettings settings = blended();
+        settings.budgets.errorPixels = pose % 2 == 0 ? 1 : 1e-4;
+        const render::Image image = test::renderView(store, *backend, *executor, view, settings);
+        for (uint32_t y = 2; y + 2 < view.height; ++y)
+            for (uint32_t x = 2; x + 2 < view.width; ++x) {
+                bool isInside = true;
+                for (int k = 0; k < 9 && isInside; ++k)
+                    isInside =
+                        test::meetsShape(test::Shape::torus, view.eye,
+                                         test::rayThrough(view, x + 0.5 + 2 * (k % 3 - 1), y + 0.5 + 2 * (k / 3 - 1)));
+                if (!isInside) continue;
+                ++looked;
+                holes += image.rgba[size_t{y} * view.width + x] >> 24 == 0;
+                clear += image.rgba[size_t{y} * view.width + x] >> 24 < 255;
+            }
+    }
+    std::printf("%zu pixels inside outlines: %zu holes, %zu not covered wholly\n", looked, holes, clear);
+    EXPECT_GT(looked, 50'000u);
+    EXPECT_EQ(holes, 0u);
+    EXPECT_LE(clear, looked / 20'000);  // two pixels from the outline a dent of the samples' own may be
+}
+
+/// A red leaf before a green wall, both before a blue sky: inside the outline of the wall nothing of the sky is seen,
+/// neither along the leaf's rim nor where that crosses the wall's.
+TEST(Ewa, NoSkyShinesThroughTheRimOfALeafBeforeAWall) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    std::vector<test::TestPoint> points;
+    for (int y = -100; y <= 100; ++y)
+        for (int x = -100; x <= 100; ++x) {
+            if (x <= 0) points.push_back({{0.01 * x, 0.01 * y, 0}, {0, 0, 1}, 0x00ff00u});
+            if (x * x + y * y <= 1600) points.push_back({{0.01 * x, 0.01 * y, 0.5}, {0, 0, 1}, 0x0000ffu});
+        }
+    test::writePly(folder / "a.ply", points);
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    lod::View view = test::viewFromAbove({0, 0, 0});
+    view.focalPixels = 420;
+    render::FrameSettings settings = blended();
+    settings.draw.background = {0, 0, 1};
+    for (auto& [name, backend] : test::cpuBackendsAndOracle(*executor)) {
+        const render::Image image = test::renderView(store, *backend, *executor, view, settings);
+        size_t blue = 0, inside = 0, soft = 0;
+        for (size_t i = 0; i < image.rgba.size(); ++i) {
+            soft += coverageOf(image, i) > 0.05 && coverageOf(image, i) < 0.95;
+            const dvec3 ray = test::rayThrough(view, double(i % 400) + 0.5, double(i / 400) + 0.5);
+            const dvec3 wall = view.eye + 3.0 * ray, leaf = view.eye + 2.5 * ray;
+            // Three pixels within the outline of both together.
+            const bool onLeaf = glm::length(dvec2(leaf)) < 0.38;
+            const bool onWall = wall.x < -0.02 && wall.x > -0.98 && std::abs(wall.y) < 0.98;
+            if (!onLeaf && !onWall) continue;
+            ++inside;
+            blue += channel(image, i, 2) > 1e-6;
+        }
+        EXPECT_GT(inside, 40'000u);
+        EXPECT_GT(soft, 200u) << name;  // outlines against the sky are soft
+        EXPECT_EQ(blue, 0u) << name;
+    }
+}
+
+/// A checker seen aslant, to its horizon: against what a Gaussian of the pixel and of the samples sees of it.
+TEST(Ewa, FiltersACheckerPlane) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    constexpr double kStep = 0.01, kCell = 0.16;
+    const auto isWhite = [&](double x, double y) {
+        return (static_cast<long>(std::floor(x / kCell)) + static_cast<long>(std::floor(y / kCell))) % 2 == 0;
+    };
+    test::writePly(folder / "a.ply",
+                   plane(300, kStep, 0, [&](double x, double y) { return isWhite(x, y) ? 0xffffffu : 0u; }));
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    lod::View view = test::viewFromAbove({0, 0, 0});
+    view.eye = {0, -3.2, 0.8};
+    view.forward = glm::normalize(dvec3(0, 1, -0.35));
+    view.right = {1, 0, 0};
+    view.down = glm::cross(view.forward, view.right);
+    view.width = 160;
+    view.height = 120;
+    view.focalPixels = 150;
+    // The truth: rays about each pixel by the low-pass, places about their hits by the samples' own kernel.
+    const double sigma = 0.685 * kStep;
+    std::vector<double> truth(size_t{160} * 120, -1);
+    std::vector<double> nodes, few;
+    for (int k = -7; k < 7; ++k) nodes.push_back(0.4 * (k + 0.5));
+    for (int k = -3; k < 3; ++k) few.push_back(0.9 * (k + 0.5));
+    for (size_t i = 0; i < truth.size(); ++i) {
+        double sum = 0, weights = 0;
+        bool isAll = true;
+        for (const double u : nodes)
+            for (const double v : nodes) {
+                const double w = std::exp(-0.5 * (u * u + v * v));
+                const dvec3 ray = test::rayThrough(view, double(i % 160) + 0.5 + std::sqrt(0.5) * u,
+                                                   double(i / 160) + 0.5 + std::sqrt(0.5) * v);
+                const double t = -view.eye.z / ray.z;
+                const dvec3 at = view.eye + t * ray;
+                if (!(t > 0) || std::max(std::abs(at.x), std::abs(at.y)) > 2.8) {
+                    isAll = false;
+                    continue;
+                }
+                for (const double a : few)
+                    for (const double b : few) {
+                        const double k = w * std::exp(-0.5 * (a * a + b * b));
+                        sum += isWhite(at.x + sigma * a, at.y + sigma * b) ? k : 0;
+                        weights += k;
+                    }
+            }
+        if (isAll) truth[i] = sum / weights;
+    }
+    const auto error = [&](render::Mode mode, render::Backend& backend) {
+        render::FrameSettings settings = blended(mode);
+        settings.draw.kernelSupport = 3;
+        const render::Image image = test::renderView(store, backend, *executor, view, settings);
+        double squared = 0;
+        size_t n = 0;
+        for (size_t i = 0; i < truth.size(); ++i) {
+            if (truth[i] < 0) continue;
+            const double off = channel(image, i, 1) - truth[i];
+            squared += off * off;
+            ++n;
+        }
+        EXPECT_GT(n, 8'000u);
+        return -10 * std::log10(squared / static_cast<double>(n));
+    };
+    const auto backend = cpu::makeCpuBackend(*executor);
+    const double ewa = error(render::Mode::ewa, *backend), splat = error(render::Mode::splat, *backend),
+                 pullpush = error(render::Mode::pullpush, *backend);
+    std::printf("checker: ewa %.1f dB, splat %.1f dB, pullpush %.1f dB\n", ewa, splat, pullpush);
+    EXPECT_GE(ewa, 35);
+    EXPECT_LT(splat, 30);
+}
+
+/// Pans by a sixteenth of a pixel: how much pixels inside the plane change.
+TEST(Ewa, FlickersLessThanSplat) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    const auto backend = cpu::makeCpuBackend(*executor);
+    Rng rng(11);
+    test::writePly(folder / "a.ply", plane(150, 0.01, 0.3, [&](double, double) {
+                       return static_cast<uint32_t>(rng.below(256)) * 0x010101u;
+                   }));
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    const auto flicker = [&](render::Mode mode) {
+        render::Image before;
+        double sum = 0;
+        for (int k = 0; k < 9; ++k) {
+            lod::View view = test::viewFromAbove({0, 0, 0});
+            view.width = view.height = 100;
+            view.focalPixels = 300;  // a spacing a pixel
+            view.eye.x = k * 3.0 / 300 / 16;
+            render::Image image = test::renderView(store, *backend, *executor, view, blended(mode));
+            for (size_t i = 0; k > 0 && i < image.rgba.size(); ++i) {
+                const double off = channel(image, i, 1) - channel(before, i, 1);
+                sum += off * off;
+            }
+            before = std::move(image);
+        }
+        return std::sqrt(sum / (8 * 10'000));
+    };
+    const double ewa = flicker(render::Mode::ewa), splat = flicker(render::Mode::splat);
+    std::printf("change by a pan of 1/16 px: ewa %.4f, splat %.4f\n", ewa, splat);
+    EXPECT_LE(ewa, splat / 4);
+}
+
+TEST(Ewa, IsTheSameBytesForAnyThreads) {
+    const test::TempFolder folder;
+    const auto one = makeTbbExecutor(1), four = makeTbbExecutor(4);
+    test::writePly(folder / "a.ply", anyDiscs(30'000, 6), true, true);
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *four);
+    lod::View view = test::viewFromAbove({0, 0, 0});
+    view.width = 333;
+    const auto of = [&](Executor& executor) {
+        render::Image image;
+        for (auto& [name, backend] : test::cpuBackendsAndOracle(executor)) {
+            if (name == "fp64") continue;
+            const render::Image drawn = test::renderView(store, *backend, executor, view, blended());
+            if (!image.rgba.empty()) EXPECT_TRUE(image.rgba == drawn.rgba && image.depth == drawn.depth) << name;
+            image = drawn;
+        }
+        return image;
+    };
+    const render::Image a = of(*one), b = of(*four);
+    EXPECT_TRUE(a.rgba == b.rgba && a.depth == b.depth && a.normal == b.normal);
+}
+
+TEST(Ewa, ThousandsAtOnePixelAreAsOne) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    Rng rng(4);
+    std::vector<test::TestPoint> points;
+    for (int i = 0; i < 10'000; ++i)
+        points.push_back({{rng.uniform(-0.5, 0.5), rng.uniform(-0.5, 0.5), 0}, {0, 0, 1}, 0x303030u, 0.3f});
+    test::writePly(folder / "a.ply", points, true, true);
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor, 16384);
+    lod::View view = test::viewFromAbove({0, 0, 0});
+    view.width = view.height = 100;
+    view.focalPixels = 300;
+    for (auto& [name, backend] : test::cpuBackendsAndOracle(*executor)) {
+        const render::Image image = test::renderView(store, *backend, *executor, view, blended());
+        size_t wrong = 0;
+        for (size_t i = 0; i < image.rgba.size(); ++i) {
+            const double x = (double(i % 100) - 49.5) / 100, y = (double(i / 100) - 49.5) / 100;
+            if (std::max(std::abs(x), std::abs(y)) > 0.45) continue;
+            const auto grey = static_cast<int>(image.rgba[i] & 255);
+            wrong +=
+                std::abs(grey - 0x30) > 1 || std::abs(double{image.depth[i]} - 3) > 1e-3 || image.rgba[i] >> 24 != 255;
+        }
+        EXPECT_EQ(wrong, 0u) << name;
+    }
+}
+
+}  // namespace
+}  // namespace stipple
