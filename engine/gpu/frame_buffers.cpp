@@ -84,9 +84,19 @@ Result<void> FrameBuffers::prepareLists(const render::RenderRequest& request) {
     if (has(request, render::Pass::strands))
         STIPPLE_TRY(
             ensure(bound_[kWideBinding], gpu::bytesOf(kWideBinding, kWideCapacity), kFilled, false, "wide strands"));
-    if (has(request, render::Pass::discs) || has(request, render::Pass::splat))
+    if (has(request, render::Pass::discs) || has(request, render::Pass::splat) ||
+        has(request, render::Pass::ewa))
         STIPPLE_TRY(
             ensure(bound_[kDiscsBinding], gpu::bytesOf(kDiscsBinding, kDiscCapacity), kFilled, false, "wide discs"));
+    if (has(request, render::Pass::ewa)) {
+        const uint64_t pixels = uint64_t{request.draws->frame.width} * request.draws->frame.height;
+        STIPPLE_TRY(ensure(bound_[kFrontsBinding], gpu::bytesOf(kFrontsBinding, pixels), kFilled, false, "fronts"));
+        STIPPLE_TRY(ensure(bound_[kSumsBinding], gpu::bytesOf(kSumsBinding, pixels), kStorage, false, "sums"));
+        STIPPLE_TRY(
+            ensure(bound_[kFilteredBinding], gpu::bytesOf(kFilteredBinding, pixels), kStorage, false, "blended discs"));
+        STIPPLE_TRY(
+            ensure(bound_[kCoverageBinding], gpu::bytesOf(kCoverageBinding, pixels), kStorage, false, "coverage"));
+    }
     return {};
 }
 

@@ -56,6 +56,7 @@ shared::Step Recording::stepAt(size_t level) const {
     step.hasTriangles = hasTriangles() ? 1 : 0;
     step.hasWideDiscs = has(render::Pass::discs) ? 1 : 0;
     step.exactPoints = render::reconstructionOf(request_.mode).fillsSplats ? 1 : 0;
+    step.hasFiltered = has(render::Pass::ewa) ? 1 : 0;
     return step;
 }
 

@@ -4,6 +4,7 @@
 
 #include "engine/base/check.h"
 #include "engine/gpu/mesh_frame.h"
+#include "shaders/shared/ewa.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
 #include "shaders/shared/surface.h"
@@ -51,6 +52,10 @@ static_assert(isLaidOut(shared::kLightsBinding, sizeof(shared::LightSource)));
 static_assert(isLaidOut(shared::kTriangleWordsBinding, sizeof(uint32_t)));
 static_assert(isLaidOut(shared::kEnvironmentBinding, sizeof(float)));
 static_assert(isLaidOut(shared::kDiscsBinding, sizeof(shared::WideDisc)));
+static_assert(isLaidOut(shared::kFrontsBinding, sizeof(shared::FilteredFront)));
+static_assert(isLaidOut(shared::kSumsBinding, sizeof(shared::FilteredSums)));
+static_assert(isLaidOut(shared::kFilteredBinding, sizeof(shared::FilteredPixel)));
+static_assert(isLaidOut(shared::kCoverageBinding, sizeof(uint32_t)));
 static_assert(isLaidOut(shared::kSurfaceBinding, sizeof(shared::SurfaceWords)));
 
 }  // namespace

@@ -4,6 +4,7 @@
 #else
 #include "../surface.glsl"
 #endif
+layout(set = 0, binding = kCoverageBinding, scalar) readonly buffer CoverageBlock { uint coverage[]; };
 layout(local_size_x = 64) in;
 
 void main() {
@@ -21,9 +22,14 @@ void main() {
         colour = litColour(s, colour, n, pixel);
 #endif
     }
+    float share = valid ? 1.0 : 0.0;
+    if (valid && stepInfo.hasFiltered != 0u) {
+        share = float(coverage[at]) / 255.0;
+        colour = frame.background + share * (colour - frame.background);
+    }
     const vec3 c = clamp(colour, 0.0, 1.0);
     const uvec3 bytes = uvec3(vec3(srgbFromLinear(c.x), srgbFromLinear(c.y), srgbFromLinear(c.z)) * 255.0 + 0.5);
-    image[at] = bytes.x | bytes.y << 8 | bytes.z << 16 | (valid ? 0xff000000u : 0u);
+    image[at] = bytes.x | bytes.y << 8 | bytes.z << 16 | uint(share * 255.0 + 0.5) << 24;
     if (stepInfo.wantExtra == 0u) return;
     const vec3 world = frame.viewX * n.x + frame.viewY * n.y + frame.viewZ * n.z;
     extra[7u * at] = s.depth;

@@ -2,8 +2,10 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../bindings.glsl"
+#include "../shared/ewa.h"
 #include "../shared/splat_size.h"
 #include "../shared/wide_disc.h"
+layout(set = 0, binding = kFilteredBinding, scalar) readonly buffer FilteredBlock { FilteredPixel filtered[]; };
 layout(local_size_x = 64) in;
 
 void main() {
@@ -35,6 +37,12 @@ void main() {
             t.thickness = (recordFlags(r) & kFlagLoose) != 0u ? kLeafThickness * kExactRadius : kExactRadius;
             t.normalPerp = perpFromNormal(dot(n, v) > 0.0 ? -n : n, v);
             t.colour = pointColour(node, r);
+            if (stepInfo.hasFiltered != 0u) {
+                const FilteredPixel p = filtered[pixel.y * frame.width + pixel.x];
+                t.normalPerp = perpFromNormal(octDecode(p.normal), v);
+                t.thickness = (p.cover & kFilteredLeaf) != 0u ? kLeafThickness * kExactRadius : kExactRadius;
+                t.colour = vec3(unpackRed(p.colour), unpackGreen(p.colour), unpackBlue(p.colour));
+            }
             storeTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, pixel, t);
             return;
         }

@@ -24,7 +24,11 @@ const uint kEnvironmentBinding = 16u;
 const uint kWideBinding = 17u;
 const uint kDiscsBinding = 18u;
 const uint kSurfaceBinding = 19u;
-const uint kBindings = 20u;
+const uint kFrontsBinding = 20u;
+const uint kSumsBinding = 21u;
+const uint kFilteredBinding = 22u;
+const uint kCoverageBinding = 23u;
+const uint kBindings = 24u;
 
 // Per pixel:
 const uint kTexelWords = 5u;     // planes of a packed texel
@@ -53,6 +57,7 @@ struct Step {
     uint hasTriangles;  // pixels may be of triangles
     uint hasWideDiscs;  // there is a list of them
     uint exactPoints;   // points are what their pixels show, at the depth of the visibility buffer
+    uint hasFiltered;   // ... of what discs were blended to
     uint count;         // of clusters or blocks
     uint firstBlock;    // of the ids that are drawn
 };

@@ -5,6 +5,7 @@
 #define STIPPLE_SHARED_EWA_H
 #include "pyramid.h"
 #include "splat_disc.h"
+#include "visibility.h"
 SHARED_BEGIN
 
 // The opaque part of a disc closes the surface: what its radius covers, and, where a coarse record's radius is less
@@ -137,6 +138,26 @@ struct FilteredPixel {
     uint normal;  // octahedral, camera space, towards the eye
     uint colour;  // packColour
     uint cover;   // what weights add up to, of 255 | flags
+};
+// On the gpu, a pixel's front and sums.
+struct FilteredFront {
+    uint64_t key;  // of the front disc, its depth moved back
+    uint first;    // least id of those whose kernels reach the pixel
+    uint nearest;  // bits of the least of their depths
+};
+// Weights in 2^17ths: 10,000 discs at a pixel add up to a third of what 32 bits hold.
+const float kSumUnit = 131072.0f;
+struct FilteredSums {
+    int weight;
+    int depth;
+    int red;
+    int green;
+    int blue;
+    int nx;
+    int ny;
+    int nz;
+    uint behind;      // 1: something is opaque behind the front
+    float reference;  // depth, which others are told against
 };
 const uint kFilteredFront = 256u;  // opaque: else a rim that only coverage shows
 const uint kFilteredLeaf = 512u;

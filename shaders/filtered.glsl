@@ -1,0 +1,109 @@
+// Discs blended by their kernels: fronts, sums and what pixels show of them. Sums are integers (kSumUnit): they are the
+// same whatever the order in which threads come.
+#extension GL_GOOGLE_include_directive : require
+#include "discs.glsl"
+#include "shared/ewa.h"
+
+layout(set = 0, binding = kFrontsBinding, scalar) buffer FrontBlock { FilteredFront fronts[]; };
+layout(set = 0, binding = kSumsBinding, scalar) buffer SumBlock { FilteredSums sums[]; };
+layout(set = 0, binding = kFilteredBinding, scalar) buffer FilteredBlock { FilteredPixel filtered[]; };
+layout(set = 0, binding = kCoverageBinding, scalar) buffer CoverageBlock { uint coverage[]; };
+
+PointRecord recordOf(uint id, out DrawNode node) {
+    const DrawBlock source = blocks[id / kBlockLanes];
+    node = nodes[source.node];
+    return Records(uvec2(node.addressLow, node.addressHigh)).records[source.first + id % kBlockLanes];
+}
+
+// A disc with its opaque radius.
+WideDisc opaqueDisc(DrawNode node, PointRecord r, uint id) {
+    WideDisc d = wideDisc(node, r, frame.supportScale, id, frameLensHere());
+    const float cap = (recordFlags(r) & kFlagScattered) != 0u ? max(lensDepth(frameLensHere(), d.centre.z), 0.0) * largestSplat(kFlagScattered, frame.focal, frame.height) : 3.0e38;
+    d.radius = min(opaqueRadius(d.radius, node.spacing), cap);
+    return d;
+}
+float roughness(WideDisc d, PointRecord r) { return d.radius * ((recordFlags(r) & kFlagLoose) != 0u ? kLeafShare : kSurfaceShare); }
+vec3 towardsEye(WideDisc d) { return dot(d.normal, sightTo(frameLensHere(), d.centre)) > 0.0 ? -d.normal : d.normal; }
+
+// The pixels that a disc may matter at: those of its opaque part, its kernel and its centre.
+struct PixelBox {
+    ivec2 first;
+    ivec2 last;
+};
+PixelBox boxOf(WideDisc d, EwaKernel k) {
+    const ivec2 most = ivec2(frame.width, frame.height) - 1;
+    PixelBox b;
+    b.first = ivec2(0);
+    b.last = most;
+    if (k.isNear < 0.5) {
+        const vec2 middle = vec2(k.x, k.y) + frame.centre;
+        const vec2 reach = vec2(k.halfX, k.halfY) + 1.0;
+        b.first = ivec2(clamp(floor(middle - reach), vec2(0.0), vec2(most) + 1.0));
+        b.last = ivec2(clamp(floor(middle + reach), vec2(-1.0), vec2(most)));
+    }
+    return b;
+}
+
+struct RayOnDisc {
+    float depth;   // of the plane, within its range
+    float isMet;   // 1: the opaque part is
+    float rho2;    // of the kernel
+    float along;   // depth per length along the ray
+};
+RayOnDisc rayOnDisc(WideDisc d, EwaKernel k, DepthRange range, ivec2 pixel) {
+    const vec2 at = vec2(pixel) + 0.5 - frame.centre;
+    const PixelRay ray = pixelRay(frameLensHere(), at.x / frame.focal, at.y / frame.focal);
+    const vec3 direction = rayDirection(ray);
+    const DiscHit hit = discHit(d, ray, frame.nearPlane);
+    RayOnDisc r;
+    r.depth = depthWithin(range, dot(d.normal, fromRay(ray, d.centre)), dot(d.normal, direction));
+    r.isMet = hit.depth < kNoDisc ? 1.0 : 0.0;
+    const float onDisc = hit.rho2 < kNoDisc ? hit.rho2 * kOpaqueSigmas * kOpaqueSigmas : kNoDisc;
+    r.rho2 = k.isNear > 0.5 ? onDisc : ewaRho2(k, at.x, at.y);
+    r.along = 1.0 / length(direction);
+    return r;
+}
+
+// Offers a disc to the front of a pixel.
+void offerFront(WideDisc d, float rough, EwaKernel k, DepthRange range, ivec2 pixel, bool isCentre) {
+    const RayOnDisc r = rayOnDisc(d, k, range, pixel);
+    const uint at = uint(pixel.y) * frame.width + uint(pixel.x);
+    if (r.isMet > 0.5 || isCentre) atomicMin(fronts[at].key, visibilityKey(floatBitsToUint(r.depth + rough * r.along), drawId(0u, d.id)));
+    if (r.rho2 < frame.kernelSupport * frame.kernelSupport && k.amplitude > 0.0) {
+        atomicMin(fronts[at].first, d.id);
+        atomicMin(fronts[at].nearest, floatBitsToUint(r.depth));
+    }
+}
+
+int unitsOf(float v) { return int(floor(v * kSumUnit + 0.5)); }
+// How much deeper than the reference, from -1 to 1: in perspective of its inverse, orthographic in 64ths of its pixels.
+float relativeDepth(float depth, float reference) {
+    const float far = frame.orthographic != 0u ? (depth - reference) * frame.focal * 0.015625 : reference / depth - 1.0;
+    return clamp(far, -1.0, 1.0);
+}
+float absoluteDepth(float relative, float reference) {
+    return frame.orthographic != 0u ? reference + relative * 64.0 / frame.focal : reference / (1.0 + relative);
+}
+
+// Adds a disc to a pixel.
+void addKernel(WideDisc d, vec3 colour, EwaKernel k, DepthRange range, ivec2 pixel) {
+    const RayOnDisc r = rayOnDisc(d, k, range, pixel);
+    const uint at = uint(pixel.y) * frame.width + uint(pixel.x);
+    const FilteredFront front = fronts[at];
+    if (front.key != kNoKey && r.depth > keyDepth(front.key)) {
+        if (r.isMet > 0.5) atomicOr(sums[at].behind, 1u);
+        return;
+    }
+    const float support = frame.kernelSupport;
+    if (!(r.rho2 < support * support)) return;
+    const float w = k.amplitude * kernelAt(r.rho2, kernelEnd(support));
+    const vec3 n = towardsEye(d);
+    atomicAdd(sums[at].weight, unitsOf(w));
+    atomicAdd(sums[at].depth, unitsOf(w * relativeDepth(r.depth, sums[at].reference)));
+    atomicAdd(sums[at].red, unitsOf(w * colour.x));
+    atomicAdd(sums[at].green, unitsOf(w * colour.y));
+    atomicAdd(sums[at].blue, unitsOf(w * colour.z));
+    atomicAdd(sums[at].nx, unitsOf(w * n.x));
+    atomicAdd(sums[at].ny, unitsOf(w * n.y));
+    atomicAdd(sums[at].nz, unitsOf(w * n.z));
+}
