@@ -32,7 +32,7 @@ struct Options {
     std::string output, size = "1280x720", mode = "pullpush", device = "auto", shade = "auto",
                         background = fmt::format("{}", fmt::join(render::kBackground, ","));
     std::string debug = "none", resident = "1G";
-    double error = 1, strandExact = 2, wind = 0, seconds = 0;
+    double error = 1, strandExact = 2, wind = 0, seconds = 0, lowPass = 0.5, kernel = 2;
     int frames = 1, samples = 4, accumulate = 1;
     uint64_t budget = 0;
     bool noWait = false, json = false, quiet = false, force = false, alpha = false;
@@ -92,6 +92,8 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     s.draw.worldUp = shot.worldUp;
     s.draw.exactStrands = static_cast<float>(o.strandExact);
     s.draw.effects = o.effects;
+    s.draw.lowPass = static_cast<float>(o.lowPass);
+    s.draw.kernelSupport = static_cast<float>(o.kernel);
     s.draw.wind = {o.wind, o.seconds, render::windAcross(shot.worldUp)};
     STIPPLE_ASSIGN(const glm::dvec3 background, backgroundOf(o));
     for (int c = 0; c < 3; ++c)
@@ -395,6 +397,15 @@ void setupRender(CLI::App& app, int& status) {
         ->capture_default_str();
     sub->add_option("--time", o->seconds, "of the wind, seconds; a path adds its own")
         ->transform(within(-1e9, 1e9))
+        ->capture_default_str();
+    sub->add_option("--lowpass", o->lowPass,
+                    "of mode ewa: variance of the pixel's Gaussian, px^2 (0.25 is sharper, and flickers more)")
+        ->transform(within(0.25, 4.0))
+        ->capture_default_str();
+    sub->add_option(
+           "--kernel", o->kernel,
+           "of mode ewa: where the discs' Gaussians end, in standard deviations: 2, or 3 (even smoother, slower)")
+        ->check(CLI::IsMember({2.0, 3.0}))
         ->capture_default_str();
     sub->add_option("--strand-exact", o->strandExact,
                     "half-width in pixels from which ribbons and tubes are filled exactly instead of reconstructed")

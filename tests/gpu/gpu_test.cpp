@@ -47,7 +47,8 @@ class Gpu : public testing::Test {
 TEST_F(Gpu, DrawsAsTheOracleDrawsAndValidationIsSilent) {
     const auto gpu = make();
     const auto oracle = reference::makeReferenceBackend(*executor_);
-    for (const render::Mode mode : {render::Mode::pullpush, render::Mode::splat, render::Mode::points})
+    for (const render::Mode mode :
+         {render::Mode::pullpush, render::Mode::splat, render::Mode::ewa, render::Mode::points})
         for (const double tau : {0.25, 2.0, 32.0})
             for (const uint32_t debug : {shared::kDebugNone, shared::kDebugLevel, shared::kDebugError,
                                          shared::kDebugHoles, shared::kDebugNormals}) {
@@ -97,6 +98,41 @@ TEST_F(Gpu, DepthNormalsAndCoverageOfPointsAreTheOracles) {
         expectSameSurface(test::renderView(store_, *gpu, *executor_, view, settings),
                           test::renderView(store_, *oracle, *executor_, view, settings), view, 0.05);
     }
+    for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
+}
+
+TEST_F(Gpu, BlendedDiscsAreTheOraclesFromAfarFromNearAndOrthographic) {
+    const auto gpu = make();
+    const auto oracle = reference::makeReferenceBackend(*executor_);
+    render::FrameSettings settings;
+    settings.mode = render::Mode::ewa;
+    settings.wantDepthAndNormal = true;
+    const lod::View whole = test::fitView(*store_, 400, 300);
+    const double away = glm::length(whole.eye);
+    lod::View flat = whole, near = whole;
+    flat.isOrthographic = true;
+    flat.focalPixels /= away;
+    const double middle = double{test::renderView(store_, *oracle, *executor_, whole, settings).depth[150 * 400 + 200]};
+    near.eye += near.forward * (0.99 * middle);  // discs of hundreds of pixels
+    for (const lod::View& view : {whole, flat, near})
+        for (const double tau : {0.25, 4.0})
+            for (const float support : {2.0f, 3.0f}) {
+                settings.budgets.errorPixels = tau;
+                settings.draw.kernelSupport = support;
+                const render::Image a = test::renderView(store_, *gpu, *executor_, view, settings),
+                                    b = test::renderView(store_, *oracle, *executor_, view, settings);
+                SCOPED_TRACE(testing::Message() << view.isOrthographic << ", tau " << tau << ", support " << support);
+                lod::View pixels = view;  // depths are compared in pixels at where they are
+                if (view.isOrthographic) pixels.focalPixels *= away;
+                expectSameSurface(a, b, pixels, 0.1);
+                EXPECT_GE(test::drawnPsnr(a, b), 50);
+                size_t coverage = 0;
+                for (size_t i = 0; i < a.rgba.size(); ++i)
+                    coverage += std::abs(static_cast<int>(a.rgba[i] >> 24) - static_cast<int>(b.rgba[i] >> 24)) > 2;
+                EXPECT_LE(coverage, a.rgba.size() / 1000);
+                const render::Image again = test::renderView(store_, *gpu, *executor_, view, settings);
+                EXPECT_TRUE(a.rgba == again.rgba && a.depth == again.depth) << "whatever the order of threads";
+            }
     for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
 }
 
@@ -316,7 +352,7 @@ TEST_F(Gpu, FramesInFlightAreThoseOfEachAlone) {
     for (const lod::View* view : std::initializer_list<const lod::View*>{&near, &aside, &near}) {
         lod::selectCut(state->scene(), state->streamer->residency(), *view, {}, state->scratch, state->cut);
         render::makeDrawList(state->cut, state->hierarchies, state->instances, *view, {}, state->draws);
-        render::markWideDiscs(*state->radii, state->draws);
+        render::markDiscSizes(*state->discSizes, state->draws);
         render::RenderRequest request;
         request.draws = &state->draws;
         request.passes = render::passesOf(request.mode, render::contentOf(state->draws), state->draws.effects);
@@ -360,6 +396,7 @@ TEST(Shaders, TouchThePlanesThatTheirPassesDeclare) {
         {Pass::project, {"project"}},
         {Pass::discs, {"disc_order", "discs"}},
         {Pass::splat, {"splat", "discs"}},
+        {Pass::ewa, {"ewa_front", "ewa_front_wide", "ewa_begin", "ewa_sum", "ewa_sum_wide", "ewa_show", "ewa_cover"}},
         {Pass::strands, {"strands", "strands_wide"}},
         {Pass::rasterise, {"rasterise", "rasterise_large"}},
         {Pass::resolve, {"resolve", "disc_texels", "strand_texels", "triangle_texels"}},
@@ -369,6 +406,10 @@ TEST(Shaders, TouchThePlanesThatTheirPassesDeclare) {
         {Pass::output, {"output"}}};
     const std::map<uint32_t, render::Planes> planesOf{{shared::kVisibilityBinding, {Plane::visibility}},
                                                       {shared::kDiscsBinding, {Plane::discList}},
+                                                      {shared::kFrontsBinding, {Plane::filtered}},
+                                                      {shared::kSumsBinding, {Plane::filtered}},
+                                                      {shared::kFilteredBinding, {Plane::filtered}},
+                                                      {shared::kCoverageBinding, {Plane::filtered}},
                                                       {shared::kTexelsBinding, {Plane::texels, Plane::coarse}},
                                                       {shared::kTriangleWordsBinding, {Plane::texels}},
                                                       {shared::kSurfaceBinding, {Plane::surface}},

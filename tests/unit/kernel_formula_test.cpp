@@ -135,7 +135,7 @@ TEST(KernelFormulas, DiscsAreThoseOfSplatDisc) {
         for (int round = 0; round < 200; ++round) {
             const DrawNode node = randomNode(rng);
             for (PointRecord& r : records) r = randomRecord(rng);
-            k.placeSplats(f, node, records.data(), kRecordsPerBlock, *block);
+            k.placeSplats(f, node, records.data(), kRecordsPerBlock, {}, *block);
             for (uint32_t i = 0; i < kRecordsPerBlock; ++i) {
                 const WideDisc d = splatDisc(node, records[i], f.supportScale, scattered, i, lens);
                 // Sums of four terms: units in the last place of the largest of them.

@@ -55,13 +55,14 @@ TEST(Passes, AreThereOnlyWhereTheFrameCallsForThem) {
             EXPECT_EQ(std::set<Pass>(passes.begin(), passes.end()).size(), passes.size());
             EXPECT_EQ(has(passes, Pass::rasterise), c.hasTriangles);
             EXPECT_EQ(has(passes, Pass::strands), c.hasStrands);
-            EXPECT_EQ(has(passes, Pass::project) || has(passes, Pass::splat), c.hasPoints);
+            EXPECT_EQ(has(passes, r.points), c.hasPoints);
             EXPECT_EQ(has(passes, Pass::push), r.hasPyramid && (c.hasPoints || c.hasStrands));
             EXPECT_EQ(passes.back(), Pass::output);
             // Tiles of discs are nobody else's while they are drawn: all other visibility is there before.
             const auto at = [&](Pass pass) { return std::find(passes.begin(), passes.end(), pass) - passes.begin(); };
             for (const Pass before : {Pass::strands, Pass::rasterise})
-                if (has(passes, Pass::splat) && has(passes, before)) EXPECT_LT(at(before), at(Pass::splat));
+                for (const Pass tiles : {Pass::splat, Pass::ewa})
+                    if (has(passes, tiles) && has(passes, before)) EXPECT_LT(at(before), at(tiles));
         }
 }
 
