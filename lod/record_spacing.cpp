@@ -9,7 +9,7 @@ namespace stipple::lod {
 namespace {
 
 constexpr size_t kNeighbours = 6;
-constexpr size_t kProbes = 24;  // an odd share of them decides: the median moves by less than a tenth
+constexpr size_t kProbes = 24;  // their median is within a tenth of that of all
 constexpr float kPi = 3.14159265f;
 
 }  // namespace

@@ -76,13 +76,13 @@ void offerFront(WideDisc d, float rough, EwaKernel k, DepthRange range, ivec2 pi
 }
 
 int unitsOf(float v) { return int(floor(v * kSumUnit + 0.5)); }
-// How much deeper than the reference, from -1 to 1: in perspective of its inverse, orthographic in 64ths of its pixels.
+// How much deeper than the reference, from -1 to 1: in perspective of its inverse, orthographic in 512ths of its pixels.
 float relativeDepth(float depth, float reference) {
-    const float far = frame.orthographic != 0u ? (depth - reference) * frame.focal * 0.015625 : reference / depth - 1.0;
+    const float far = frame.orthographic != 0u ? (depth - reference) * frame.focal * 0.001953125 : reference / depth - 1.0;
     return clamp(far, -1.0, 1.0);
 }
 float absoluteDepth(float relative, float reference) {
-    return frame.orthographic != 0u ? reference + relative * 64.0 / frame.focal : reference / (1.0 + relative);
+    return frame.orthographic != 0u ? reference + relative * 512.0 / frame.focal : reference / (1.0 + relative);
 }
 
 // Adds a disc to a pixel.

@@ -189,10 +189,10 @@ void addKernel(const SplatBatch& b, const FilterBatch& k, size_t i, uint32_t id,
                 const float off2 = plane > nearPlane ? ox * ox + oy * oy + oz * oz : kNoDisc;
                 const float rho2 = isNear ? off2 * sigma2 : farRho2;
                 const bool isFront = depth <= uintBitsToFloat(front[l]);
-                const bool isThere = (rho2 < support2) & isFront;
+                const bool isThere = (rho2 < support2) & isFront & (linear == linear);
                 const float w = isThere ? max(gaussian(rho2) - end, 0.0f) * scale : 0.0f;
                 sumW[l] += w;
-                sumLinear[l] += w * linear;
+                sumLinear[l] += isThere ? w * linear : 0.0f;
                 sumR[l] += w * red;
                 sumG[l] += w * green;
                 sumB[l] += w * blue;

@@ -222,7 +222,8 @@ class Filter {
                 const Gathered& p = pixel(x, y);
                 Sample& s = level_.ref(x, y);
                 const double covered = std::min(1.0, p.weight / grid);
-                const bool wins = p.front ? !s.valid || p.limit < s.key : !s.valid && p.first && covered >= 0.5 / 255;
+                const bool wins = p.front ? !s.valid || p.limit < (s.isTriangle ? s.depth : s.key)
+                                          : !s.valid && p.first && covered >= 0.5 / 255;
                 if (!wins) continue;
                 const PlacedDisc& d = p.front ? *p.front : *p.first;
                 const bool isBefore = p.front && (p.hasBehind || s.valid);

@@ -190,7 +190,7 @@ class Tracer {
             }
         }
         tree_ = BoxTree(boxes);
-        render::makeDrawList({}, {}, {}, view_, settings_.draw, draws_);
+        render::makeRayList(view_, settings_.draw, draws_);
         return {};
     }
 

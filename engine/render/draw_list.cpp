@@ -316,4 +316,12 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     setBlocks(out);
 }
 
+void makeRayList(const lod::View& view, const DrawSettings& settings, DrawList& out) {
+    makeDrawList({}, {}, {}, view, settings, out);
+    const glm::dmat3 cameraFromWorld = glm::transpose(glm::dmat3(out.view.right, out.view.down, out.view.forward));
+    const EffectSet requested = requestedEffects(allEffects(), settings);
+    for (size_t e = 0; e < effects().size(); ++e)
+        if (requested.has(e) && effects()[e]->fill != nullptr) effects()[e]->fill(settings, cameraFromWorld, out);
+}
+
 }  // namespace stipple::render

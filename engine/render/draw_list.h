@@ -116,6 +116,10 @@ struct DrawSettings {
 /// What a frame of these draws calls for.
 FrameContent contentOf(const DrawList& draws);
 
+/// Of a scene that is looked at by rays, whatever of it they meet: frame constants, and the tables of all effects that
+/// are requested.
+void makeRayList(const lod::View& view, const DrawSettings& settings, DrawList& out);
+
 void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,
                   std::span<const lod::Instance> instances, const lod::View& view, const DrawSettings& settings,
                   DrawList& out);

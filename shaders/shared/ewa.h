@@ -13,7 +13,9 @@ SHARED_BEGIN
 // the kernels of a square grid add up to the same everywhere but for 5 % (support of 2 sigma) or 0.3 % (3).
 const float kOpaqueSpacings = 1.0275f;
 const float kOpaqueSigmas = 1.5f;
-// What lies so far behind the front disc still belongs to its surface, in opaque radii (along the ray).
+// (Of discs of one side only that face the eye are drawn; of two-sided ones a side means nothing: what is nearer than
+// this is one surface.) What lies so far behind the front disc still belongs to its surface, in opaque radii (along the
+// ray).
 const float kSurfaceShare = 1.3333333f;
 // Leaves among leaves are no surface: nothing but what is next to it.
 const float kLeafShare = 0.0833333f;
@@ -75,7 +77,7 @@ SHARED_FN EwaKernel ewaKernel(WideDisc d, float sigma, float support, float lowP
     const float step = support * sigma * inverse;  // the circle's radius at depth 1
     const float step2 = step * step;
     const float ahead = 1.0f - step2 * zz;
-    k.isNear = d.centre.z > 0.0f && ahead > 0.05f ? 0.0f : 1.0f;
+    k.isNear = lens.isOrthographic || (d.centre.z > 0.0f && ahead > 0.05f) ? 0.0f : 1.0f;
     const float den = max(ahead, 0.05f);
     const float scale = lens.focal * step;
     const float gx = lens.focal * step2 * (xz - a * zz);
@@ -126,8 +128,8 @@ SHARED_FN DepthRange depthRange(WideDisc d, float sigma, float support, float lo
     return r;
 }
 
-// Depth of a disc's plane on a ray, within its range. `rest`: normal . ray direction; `ahead`: normal . (centre from the
-// ray's origin). Beyond the horizon of its plane it is as far as it gets.
+// Depth of a disc's plane on a ray, within its range. `rest`: normal . ray direction; `ahead`: normal . (centre from
+// the ray's origin). Beyond the horizon of its plane it is as far as it gets.
 SHARED_FN float depthWithin(DepthRange range, float ahead, float rest) {
     const float plane = ahead / (abs(rest) > 1.0e-30f ? rest : 1.0e-30f);
     return min(max(plane > 0.0f ? plane : range.farthest, range.nearest), range.farthest);
@@ -145,7 +147,7 @@ struct FilteredFront {
     uint first;    // least id of those whose kernels reach the pixel
     uint nearest;  // bits of the least of their depths
 };
-// Weights in 2^17ths: 10,000 discs at a pixel add up to a third of what 32 bits hold.
+// Weights in 2^17ths: up to 16,000 discs at a pixel fit (of one store, a leaf and those above it).
 const float kSumUnit = 131072.0f;
 struct FilteredSums {
     int weight;

@@ -9,6 +9,7 @@
 #include "engine/reference/reference.h"
 #include "tests/support/drawn_discs.h"
 #include "tests/support/drawn_shapes.h"
+#include "tests/support/meshes.h"
 #include "tests/support/support.h"
 
 namespace stipple {
@@ -116,11 +117,56 @@ TEST(Ewa, IsWhatTheBruteForceSays) {
                     EXPECT_LE(apart.colour, few);
                     EXPECT_GE(test::drawnPsnr(image, truth), 50);
                     // The control: another mode is another picture.
-                    const render::Image other =
-                        test::renderView(store, *backend, *executor, view, blended(render::Mode::splat));
+                    settings.mode = render::Mode::splat;
+                    const render::Image other = test::renderView(store, *backend, *executor, view, settings);
+                    settings.mode = render::Mode::ewa;
                     if (name == std::string("a")) EXPECT_GT(compare(other, truth).colour, apart.drawn / 20);
                 }
             }
+    }
+}
+
+/// Discs before, behind and in a mesh: what is in front is there, on every backend.
+TEST(Ewa, StandsBeforeAndBehindTriangles) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    test::MeshRecipe rock;
+    rock.grow.kind = "rock";
+    rock.grow.triangles = 5'000;
+    rock.isTextured = false;
+    const auto mesh = test::growMeshStore(rock, folder / "m.stipple", *executor);
+    const dvec3 middle = 0.5 * (mesh->description.boundsMin + mesh->description.boundsMax);
+    const double size = glm::length(mesh->description.boundsMax - mesh->description.boundsMin);
+    std::vector<test::TestPoint> points;
+    for (int y = -60; y <= 60; ++y)
+        for (int x = -60; x <= 60; ++x)
+            points.push_back(
+                {middle + 0.006 * size * dvec3(x, y, 0.5 * x), glm::normalize(glm::vec3(-0.5, 0, 1)), 0x0000ffu});
+    test::writePly(folder / "a.ply", points);
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    const lod::View view = test::fitView(*mesh, 240, 200);
+    const auto oracle = reference::makeReferenceBackend(*executor);
+    const auto draw = [&](render::Backend& backend, std::vector<render::PlacedStore> placed) {
+        const auto state = render::makeFrameState(placed, backend, *executor, {});
+        EXPECT_TRUE(render::renderUntilComplete(*state, view, blended()));
+        return state->image;
+    };
+    const render::Image truth = draw(*oracle, {{mesh, {}, {}}, {store, {}, {}}}),
+                        alone = draw(*oracle, {{mesh, {}, {}}});
+    // Both kinds are seen: the plane cuts the rock.
+    size_t before = 0, rock_ = 0;
+    for (size_t i = 0; i < truth.depth.size(); ++i) {
+        before += truth.depth[i] > 0 && alone.depth[i] > 0 && truth.depth[i] < 0.999f * alone.depth[i];
+        rock_ += truth.depth[i] > 0 && truth.depth[i] == alone.depth[i];
+    }
+    EXPECT_GT(before, 1'000u);
+    EXPECT_GT(rock_, 1'000u);
+    for (auto& [name, backend] : test::cpuBackendsAndOracle(*executor)) {
+        if (name == "fp64") continue;
+        const Apart apart = compare(draw(*backend, {{mesh, {}, {}}, {store, {}, {}}}), truth);
+        EXPECT_LE(apart.coverage, apart.drawn / 500) << name;
+        EXPECT_LE(apart.depth, apart.drawn / 500) << name;
+        EXPECT_LE(apart.colour, apart.drawn / 500) << name;
     }
 }
 

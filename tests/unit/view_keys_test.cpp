@@ -65,6 +65,8 @@ TEST(Keys, EachChangesWhatItSays) {
     EXPECT_FALSE(s.frame.draw.lit);
     EXPECT_TRUE(s.frame.draw.unlitTriangles);
     applyKeys("M5", s);
+    EXPECT_EQ(s.frame.mode, render::Mode::ewa);
+    applyKeys("M", s);
     EXPECT_EQ(s.frame.mode, render::Mode::points);
     applyKeys("M", s);
     EXPECT_EQ(s.frame.mode, render::Mode::pullpush) << "around";

@@ -45,15 +45,26 @@ class TileLists {
         });
     }
 
-    /// Calls drawTile(splats, places, count, tile) for each tile that discs reach, all of them once, those of a tile in
-    /// the order of their ids; or, where the lists may not hold all at a time, several times.
+    /// Calls drawTile(splats, places, count, tile) once for each tile that discs reach, with all of them, in the order
+    /// of their ids. Where the lists may not hold all tiles at a time, some rows of tiles after others (one row at
+    /// least).
     template <typename DrawTile>
-    void draw(const DrawTile& drawTile) {
-        for (uint32_t first = 0; first < chunks_;) {
-            uint64_t sum = entries_[first];
+    void draw(const DrawTile& drawTile, uint64_t mostEntries = kMostEntries) {
+        uint64_t all = 0;
+        for (const uint64_t entries : entries_) all += entries;
+        if (all == 0) return;
+        if (all <= mostEntries) return drawRows(0, rows_, all, drawTile);
+        std::vector<uint64_t> ofRow(rows_, 0);
+        for (uint32_t c = 0; c < chunks_; ++c)
+            forDiscs(c, [&](size_t at) {
+                const TileRange r = ranges_[at];
+                for (uint32_t y = r.firstY; y <= r.lastY; ++y) ofRow[y] += r.lastX - r.firstX + 1u;
+            });
+        for (uint32_t first = 0; first < rows_;) {
+            uint64_t sum = ofRow[first];
             uint32_t last = first + 1;
-            while (last < chunks_ && sum + entries_[last] <= kMostEntries) sum += entries_[last++];
-            if (sum > 0) drawChunks(first, last, sum, drawTile);
+            while (last < rows_ && sum + ofRow[last] <= mostEntries) sum += ofRow[last++];
+            if (sum > 0) drawRows(first, last, sum, drawTile);
             first = last;
         }
     }
@@ -76,25 +87,33 @@ class TileLists {
         }
     }
 
-    /// Calls use(tile, place of the disc) for each disc of a chunk and each tile that it reaches.
     template <typename Use>
-    void forEntries(size_t chunk, const Use& use) const {
+    void forDiscs(size_t chunk, const Use& use) const {
         const size_t first = chunk * kBlocksPerChunk * shared::kRecordsPerBlock;
-        for (size_t at = first; at < first + counts_[chunk]; ++at) {
+        for (size_t at = first; at < first + counts_[chunk]; ++at) use(at);
+    }
+    /// Calls use(tile, place of the disc) for each disc of a chunk and each tile of these rows that it reaches; tiles
+    /// are counted from the first of the rows on.
+    template <typename Use>
+    void forEntries(size_t chunk, uint32_t firstRow, uint32_t lastRow, const Use& use) const {
+        forDiscs(chunk, [&](size_t at) {
             const TileRange r = ranges_[at];
-            for (uint32_t y = r.firstY; y <= r.lastY; ++y)
-                for (uint32_t x = r.firstX; x <= r.lastX; ++x) use(size_t{y} * columns_ + x, static_cast<uint32_t>(at));
-        }
+            const uint32_t last = std::min<uint32_t>(r.lastY + 1u, lastRow);
+            for (uint32_t y = std::max<uint32_t>(r.firstY, firstRow); y < last; ++y)
+                for (uint32_t x = r.firstX; x <= r.lastX; ++x)
+                    use(size_t{y - firstRow} * columns_ + x, static_cast<uint32_t>(at));
+        });
     }
 
+    /// Rows [firstRow, lastRow) of tiles, of which `sum` is the length of the lists.
     template <typename DrawTile>
-    void drawChunks(uint32_t first, uint32_t last, uint64_t sum, const DrawTile& drawTile) {
-        const size_t tiles = size_t{columns_} * rows_, chunks = last - first;
+    void drawRows(uint32_t firstRow, uint32_t lastRow, uint64_t sum, const DrawTile& drawTile) {
+        const size_t tiles = size_t{columns_} * (lastRow - firstRow), chunks = chunks_;
         std::vector<uint32_t>& ends = frame_.tileEnds;  // of each chunk and tile: how many, then where they end
         ends.assign(chunks * tiles, 0);
         frame_.executor.parallelFor(chunks, 1, [&](size_t begin, size_t end) {
             for (size_t c = begin; c < end; ++c)
-                forEntries(first + c, [&](size_t tile, uint32_t) { ++ends[c * tiles + tile]; });
+                forEntries(c, firstRow, lastRow, [&](size_t tile, uint32_t) { ++ends[c * tiles + tile]; });
         });
         std::vector<uint32_t> starts(tiles + 1, 0);
         for (size_t c = 0; c < chunks; ++c)
@@ -111,12 +130,14 @@ class TileLists {
         places.resize(std::max(places.size(), static_cast<size_t>(sum)));
         frame_.executor.parallelFor(chunks, 1, [&](size_t begin, size_t end) {
             for (size_t c = begin; c < end; ++c)
-                forEntries(first + c, [&](size_t tile, uint32_t at) { places[ends[c * tiles + tile]++] = at; });
+                forEntries(c, firstRow, lastRow,
+                           [&](size_t tile, uint32_t at) { places[ends[c * tiles + tile]++] = at; });
         });
         frame_.executor.parallelFor(tiles, 4, [&](size_t begin, size_t end) {
             for (size_t t = begin; t < end; ++t)
                 if (starts[t] != starts[t + 1])
-                    drawTile(splats_.data(), places.data() + starts[t], starts[t + 1] - starts[t], tileAt(t));
+                    drawTile(splats_.data(), places.data() + starts[t], starts[t + 1] - starts[t],
+                             tileAt(t + size_t{firstRow} * columns_));
         });
     }
 
