@@ -349,6 +349,23 @@ void addReading(CLI::App& sub, Options& o) {
 
 }  // namespace
 
+namespace {
+
+/// Of mode ewa.
+void addKernelOptions(CLI::App& sub, Options& o) {
+    sub.add_option("--lowpass", o.lowPass,
+                   "of mode ewa: variance of the pixel's Gaussian, px^2 (0.25 is sharper, and flickers more)")
+        ->transform(within(0.25, 4.0))
+        ->capture_default_str();
+    sub.add_option(
+           "--kernel", o.kernel,
+           "of mode ewa: where the discs' Gaussians end, in standard deviations: 2, or 3 (even smoother, slower)")
+        ->check(CLI::IsMember({2.0, 3.0}))
+        ->capture_default_str();
+}
+
+}  // namespace
+
 void setupRender(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
     CLI::App* sub = app.add_subcommand("render", "draw pictures without a window");
@@ -398,15 +415,7 @@ void setupRender(CLI::App& app, int& status) {
     sub->add_option("--time", o->seconds, "of the wind, seconds; a path adds its own")
         ->transform(within(-1e9, 1e9))
         ->capture_default_str();
-    sub->add_option("--lowpass", o->lowPass,
-                    "of mode ewa: variance of the pixel's Gaussian, px^2 (0.25 is sharper, and flickers more)")
-        ->transform(within(0.25, 4.0))
-        ->capture_default_str();
-    sub->add_option(
-           "--kernel", o->kernel,
-           "of mode ewa: where the discs' Gaussians end, in standard deviations: 2, or 3 (even smoother, slower)")
-        ->check(CLI::IsMember({2.0, 3.0}))
-        ->capture_default_str();
+    addKernelOptions(*sub, *o);
     sub->add_option("--strand-exact", o->strandExact,
                     "half-width in pixels from which ribbons and tubes are filled exactly instead of reconstructed")
         ->transform(within(0.5, 1e9))

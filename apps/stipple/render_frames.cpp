@@ -121,7 +121,8 @@ Result<void> accumulate(const FramesPlan& plan, render::FrameSettings settings, 
         settings.draw.coverageSeed = static_cast<uint32_t>(f);
         STIPPLE_TRY(again(plan, settings, state));
         for (size_t i = 0; i < sum.size(); ++i) sum[i] += std::clamp(state.image.linear[i], 0.0f, 1.0f);
-        for (size_t i = 0; i < coverage.size(); ++i) coverage[i] += static_cast<float>(state.image.rgba[i] >> 24) / 255.0f;
+        for (size_t i = 0; i < coverage.size(); ++i)
+            coverage[i] += static_cast<float>(state.image.rgba[i] >> 24) / 255.0f;
     }
     const float share = 1.0f / static_cast<float>(count);
     for (size_t i = 0; i < coverage.size(); ++i) {

@@ -84,8 +84,7 @@ Result<void> FrameBuffers::prepareLists(const render::RenderRequest& request) {
     if (has(request, render::Pass::strands))
         STIPPLE_TRY(
             ensure(bound_[kWideBinding], gpu::bytesOf(kWideBinding, kWideCapacity), kFilled, false, "wide strands"));
-    if (has(request, render::Pass::discs) || has(request, render::Pass::splat) ||
-        has(request, render::Pass::ewa))
+    if (has(request, render::Pass::discs) || has(request, render::Pass::splat) || has(request, render::Pass::ewa))
         STIPPLE_TRY(
             ensure(bound_[kDiscsBinding], gpu::bytesOf(kDiscsBinding, kDiscCapacity), kFilled, false, "wide discs"));
     if (has(request, render::Pass::ewa)) {

@@ -130,7 +130,7 @@ struct FrameConstants {
     vec3 environmentX;   // rows of the rotation from camera space to the environment's (y up)
     vec3 environmentY;
     vec3 environmentZ;
-    uint orthographic;  // 1: rays are parallel (lens.h)
+    uint orthographic;    // 1: rays are parallel (lens.h)
     float lowPass;        // mode ewa: variance, px^2
     float kernelSupport;  // mode ewa: where kernels end, in sigmas
 };

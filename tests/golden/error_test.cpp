@@ -79,10 +79,10 @@ TEST_F(Errors, OddSizesAreDrawnAsWell) {
             // (In one row or column all splats of pull-push beside the picture share its few pixels: of nearly equal
             // ones any may win, so that colours of one pixel tell nothing, and of seven five are the same.)
             const bool isLine = r.hasPyramid && std::min(w, h) == 1;
-            // (Blended discs count at a pixel or do not, by their depths: one in ten thousand, but one of the few here.)
+            // (Blended discs count at a pixel or do not, by their depths: one in ten thousand, but one of the few
+            // here.)
             const double few = std::max(r.blendsSplats ? 1.0 : 0.0, 1e-4 * w * h);
-            EXPECT_LE(differing, (isLine ? std::min(2u, w * h) : few) + 1e-9)
-                << r.name << ", " << w << " x " << h;
+            EXPECT_LE(differing, (isLine ? std::min(2u, w * h) : few) + 1e-9) << r.name << ", " << w << " x " << h;
         }
     }
 }
