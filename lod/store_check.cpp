@@ -44,7 +44,8 @@ bool isPossibleSpace(const Hierarchy& h, const StoreDescription& d) {
 
 bool isPossiblePlace(const Node& n) {
     return isWithin(n.centre, kFarthestSteps) && n.radius >= 0 && n.radius <= kFarthestSteps &&
-           std::abs(n.normalConeCosine) <= 1;
+           // (Up to build version 8, all directions might be a little less than -1.)
+           n.normalConeCosine >= -1.00001f && n.normalConeCosine <= 1;
 }
 
 /// Does a payload lie in the file, and can its bytes hold its records?

@@ -112,6 +112,22 @@ Hierarchy withConesOfOthers(const Store& store) {
     return h;
 }
 
+/// A plate: normals of one side are exactly opposite to the axis of the cone.
+TEST(Plates, HaveAConeOfAllDirections) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    std::vector<test::TestPoint> points;
+    for (int y = 0; y < 30; ++y)
+        for (int x = 0; x < 30; ++x) {
+            points.push_back({{x, y, 0.1}, {0, 0, 1}});
+            if (x < 20) points.push_back({{x, y, 0}, {0, 0, -1}});
+        }
+    test::writePly(folder / "a.ply", points);
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    ASSERT_TRUE(store);
+    for (const Node& n : store->hierarchy.nodes) EXPECT_EQ(n.normalConeCosine, -1.0f);
+}
+
 TEST_F(Cones, WhatFacesAwayIsNotVisitedAndWhatDoesNotIs) {
     const auto store = built(test::bumpySphere(40'000, 1));
     const Hierarchy turned = withConesOfOthers(*store);

@@ -58,6 +58,7 @@ void leafCone(const Points& points, Node& node) {
     for (const uint32_t n : points.normal)
         node.normalConeCosine =
             std::min(node.normalConeCosine, glm::dot(axis, glm::vec3(shared::octDecode(n))) - 1e-6f);
+    node.normalConeCosine = std::max(node.normalConeCosine, -1.0f);  // all directions
 }
 
 void innerCone(std::span<const PendingNode> children, Node& node) {
@@ -78,7 +79,7 @@ void innerCone(std::span<const PendingNode> children, Node& node) {
     }
     if (widest >= 3.14) return;
     node.normalCone = cone;
-    node.normalConeCosine = static_cast<float>(std::cos(widest)) - 1e-6f;
+    node.normalConeCosine = std::max(static_cast<float>(std::cos(widest)) - 1e-6f, -1.0f);
 }
 
 // ---- chunks ----
