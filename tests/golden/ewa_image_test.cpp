@@ -27,21 +27,6 @@ render::FrameSettings blended(render::Mode mode = render::Mode::ewa) {
     return settings;
 }
 
-/// Discs of any size and direction in a cube of edge 2.
-std::vector<test::TestPoint> anyDiscs(size_t count, uint64_t seed) {
-    Rng rng(seed);
-    std::vector<test::TestPoint> points;
-    while (points.size() < count) {
-        const auto any = [&] { return rng.uniform(-1, 1); };
-        const dvec3 n = glm::normalize(dvec3(any(), any(), any()));
-        points.push_back({{any(), any(), any()},
-                          glm::vec3(n),
-                          static_cast<uint32_t>(rng.below(1u << 24)),
-                          static_cast<float>(0.01 * std::exp2(rng.uniform(0, 4)))});
-    }
-    return points;
-}
-
 double coverageOf(const render::Image& image, size_t pixel) { return (image.rgba[pixel] >> 24) / 255.0; }
 double channel(const render::Image& image, size_t pixel, int c) {
     return static_cast<double>(image.linear[3 * pixel + static_cast<size_t>(c)]);
@@ -77,7 +62,7 @@ TEST(Ewa, IsWhatTheBruteForceSays) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);
     const auto oracle = reference::makeReferenceBackend(*executor);
-    test::writePly(folder / "a.ply", anyDiscs(3000, 5), true, true);
+    test::writePly(folder / "a.ply", test::anyDiscs(3000, 5), true, true);
     test::writePly(folder / "b.ply", test::samplesOf(test::Shape::statue, 20'000, 3));
     struct Look {
         dvec3 eye;
@@ -389,7 +374,7 @@ TEST(Ewa, FlickersLessThanSplat) {
 TEST(Ewa, IsTheSameBytesForAnyThreads) {
     const test::TempFolder folder;
     const auto one = makeTbbExecutor(1), four = makeTbbExecutor(4);
-    test::writePly(folder / "a.ply", anyDiscs(30'000, 6), true, true);
+    test::writePly(folder / "a.ply", test::anyDiscs(30'000, 6), true, true);
     const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *four);
     lod::View view = test::viewFromAbove({0, 0, 0});
     view.width = 333;

@@ -24,21 +24,6 @@ render::FrameSettings splats() {
     return settings;
 }
 
-/// Discs of any size and direction in a cube of edge 2, some of one side, of two, without a normal.
-std::vector<test::TestPoint> anyDiscs(size_t count, uint64_t seed) {
-    Rng rng(seed);
-    std::vector<test::TestPoint> points;
-    while (points.size() < count) {
-        const auto any = [&] { return rng.uniform(-1, 1); };
-        const dvec3 n = glm::normalize(dvec3(any(), any(), any()));
-        points.push_back({{any(), any(), any()},
-                          glm::vec3(n),
-                          static_cast<uint32_t>(rng.below(1u << 24)),
-                          static_cast<float>(0.01 * std::exp2(rng.uniform(0, 4)))});
-    }
-    return points;
-}
-
 /// Pixels that hold the centre of a disc.
 std::vector<bool> centresOf(const std::vector<reference::Disc>& discs, const lod::View& view) {
     std::vector<bool> out(size_t{view.width} * view.height);
@@ -100,7 +85,7 @@ Wrong compare(const render::Image& image, const std::vector<double>& truth, cons
 TEST(Splats, CoverWhatRaysMeetAtItsDepth) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);
-    test::writePly(folder / "a.ply", anyDiscs(2000, 5), true, true);
+    test::writePly(folder / "a.ply", test::anyDiscs(2000, 5), true, true);
     const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
     const auto discs = test::leafDiscs(*store);
     // From outside, from between the discs (some reach behind the eye), through a wide lens, far away.
@@ -228,7 +213,7 @@ TEST(Splats, LeaveNoHolesInClosedSurfaces) {
 TEST(Splats, AreTheSameBytesForAnyThreads) {
     const test::TempFolder folder;
     const auto one = makeTbbExecutor(1), four = makeTbbExecutor(4);
-    test::writePly(folder / "a.ply", anyDiscs(30'000, 6), true, true);
+    test::writePly(folder / "a.ply", test::anyDiscs(30'000, 6), true, true);
     const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *four);
     lod::View view = test::viewFromAbove({0, 0, 0});
     view.width = 333;

@@ -19,6 +19,20 @@ lod::Chunk chunkOf(const lod::Store& store, uint32_t node) {
 
 }  // namespace
 
+std::vector<TestPoint> anyDiscs(size_t count, uint64_t seed) {
+    Rng rng(seed);
+    std::vector<TestPoint> points;
+    while (points.size() < count) {
+        const auto any = [&] { return rng.uniform(-1, 1); };
+        const glm::dvec3 n = glm::normalize(glm::dvec3(any(), any(), any()));
+        points.push_back({{any(), any(), any()},
+                          glm::vec3(n),
+                          static_cast<uint32_t>(rng.below(1u << 24)),
+                          static_cast<float>(0.01 * std::exp2(rng.uniform(0, 4)))});
+    }
+    return points;
+}
+
 std::vector<Disc> leafDiscs(const lod::Store& store) {
     std::vector<Disc> discs;
     const lod::Hierarchy& h = store.hierarchy;

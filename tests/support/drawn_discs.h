@@ -10,8 +10,12 @@
 #include "engine/reference/decode.h"
 #include "engine/render/frame.h"
 #include "lod/store.h"
+#include "tests/support/support.h"
 
 namespace stipple::test {
+
+/// Discs of any size and direction in a cube of edge 2, of any colours.
+std::vector<TestPoint> anyDiscs(size_t count, uint64_t seed);
 
 /// All leaf records of a store.
 std::vector<reference::Disc> leafDiscs(const lod::Store& store);
