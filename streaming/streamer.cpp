@@ -10,7 +10,7 @@
 #include "engine/base/check.h"
 #include "engine/base/hash.h"
 #include "lod/primitives/kinds.h"
-#include "lod/store.h"
+#include "lod/store/store.h"
 
 namespace stipple::streaming {
 namespace {

@@ -15,9 +15,9 @@
 
 #include "engine/base/executor.h"
 #include "engine/base/queue.h"
-#include "lod/chunk.h"
-#include "lod/cut.h"
-#include "lod/resident.h"
+#include "lod/cut/cut.h"
+#include "lod/cut/resident.h"
+#include "lod/store/chunk.h"
 #include "streaming/byte_source.h"
 
 namespace stipple::streaming {

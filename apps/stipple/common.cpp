@@ -16,9 +16,9 @@
 #include "engine/cpu/cpu_backend.h"
 #include "engine/image/image_io.h"
 #include "engine/reference/reference.h"
-#include "lod/colour.h"
-#include "lod/file_kind.h"
 #include "lod/import/import.h"
+#include "lod/store/colour.h"
+#include "lod/store/file_kind.h"
 #ifdef STIPPLE_WITH_GPU
 #include "engine/gpu/gpu_backend.h"
 #endif

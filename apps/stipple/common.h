@@ -16,7 +16,7 @@
 #include "engine/scene/camera.h"
 #include "engine/scene/surfels.h"
 #include "lod/builder/build.h"
-#include "lod/store.h"
+#include "lod/store/store.h"
 
 namespace stipple::app {
 

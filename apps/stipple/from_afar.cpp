@@ -9,7 +9,7 @@
 #include "apps/stipple/cache.h"
 #include "lod/builder/progressive/progressive_build.h"
 #include "lod/builder/strands/strand_coverage.h"
-#include "lod/nearest.h"
+#include "lod/store/nearest.h"
 
 namespace stipple::app {
 Result<StandIns> meshFromAfar(const scene::Scene& scene, const std::vector<scene::Placement>& of,

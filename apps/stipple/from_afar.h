@@ -8,7 +8,7 @@
 #include "apps/stipple/common.h"
 #include "engine/scene/triangles.h"
 #include "lod/builder/progressive/progressive_build.h"
-#include "lod/strands.h"
+#include "lod/primitives/strands.h"
 
 namespace stipple::app {
 

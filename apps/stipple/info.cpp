@@ -9,11 +9,11 @@
 #include "engine/base/hash.h"
 #include "engine/base/process.h"
 #include "engine/base/units.h"
-#include "lod/file_kind.h"
-#include "lod/lots.h"
-#include "lod/nearest.h"
 #include "lod/primitives/codecs.h"
 #include "lod/primitives/kinds.h"
+#include "lod/store/file_kind.h"
+#include "lod/store/lots.h"
+#include "lod/store/nearest.h"
 
 namespace stipple::app {
 namespace {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "engine/render/backend.h"
-#include "lod/colour.h"
+#include "lod/store/colour.h"
 
 namespace stipple::app {
 

@@ -24,11 +24,11 @@
 #include "engine/scene/triangles.h"
 #include "lod/builder/mesh/mesh_build.h"
 #include "lod/builder/strands/strand_build.h"
-#include "lod/colour.h"
-#include "lod/file_kind.h"
 #include "lod/import/import.h"
 #include "lod/import/strands/strand_readers.h"
-#include "lod/nearest.h"
+#include "lod/store/colour.h"
+#include "lod/store/file_kind.h"
+#include "lod/store/nearest.h"
 
 namespace stipple::app {
 namespace fs = std::filesystem;

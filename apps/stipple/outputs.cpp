@@ -13,8 +13,8 @@
 #include "engine/base/file.h"
 #include "engine/scene/gltf/container.h"
 #include "engine/scene/scene_files.h"
-#include "lod/file_kind.h"
 #include "lod/import/import.h"
+#include "lod/store/file_kind.h"
 
 namespace stipple::app {
 namespace fs = std::filesystem;

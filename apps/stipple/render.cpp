@@ -22,7 +22,7 @@
 #include "engine/reference/reference.h"
 #include "engine/render/frame.h"
 #include "engine/scene/camera.h"
-#include "lod/file_kind.h"
+#include "lod/store/file_kind.h"
 
 namespace stipple::app {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "engine/render/draw_list.h"
-#include "lod/chunk.h"
+#include "lod/store/chunk.h"
 #include "shaders/shared/mesh.h"
 
 namespace stipple::gpu {

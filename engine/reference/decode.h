@@ -5,8 +5,8 @@
 #include <cmath>
 #include <glm/glm.hpp>
 
-#include "lod/cut.h"
-#include "lod/hierarchy.h"
+#include "lod/cut/cut.h"
+#include "lod/store/hierarchy.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/record.h"
 

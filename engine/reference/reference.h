@@ -8,7 +8,7 @@
 
 #include "engine/base/executor.h"
 #include "engine/render/frame.h"
-#include "lod/store.h"
+#include "lod/store/store.h"
 
 namespace stipple::reference {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/render/draw_list.h"
-#include "lod/chunk.h"
+#include "lod/store/chunk.h"
 
 namespace stipple::reference {
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "lod/record_spacing.h"
+#include "lod/primitives/record_spacing.h"
 
 namespace stipple::reference {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "engine/reference/decode.h"
 #include "engine/reference/surface.h"
-#include "lod/mesh_place.h"
+#include "lod/store/mesh_place.h"
 
 namespace stipple::reference {
 namespace {

@@ -11,8 +11,8 @@
 #include "engine/reference/reference.h"
 #include "engine/reference/strand_rays.h"
 #include "engine/reference/surface.h"
-#include "lod/colour.h"
-#include "lod/mesh_place.h"
+#include "lod/store/colour.h"
+#include "lod/store/mesh_place.h"
 
 namespace stipple::reference {
 namespace {

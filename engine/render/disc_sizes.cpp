@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "lod/record_spacing.h"
+#include "lod/primitives/record_spacing.h"
 #include "shaders/shared/wide_disc.h"
 
 namespace stipple::render {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "engine/base/check.h"
-#include "lod/mesh_place.h"
+#include "lod/store/mesh_place.h"
 #include "shaders/shared/visibility.h"
 
 namespace stipple::render {

@@ -12,7 +12,7 @@
 #include "engine/render/content.h"
 #include "engine/render/effects/table.h"
 #include "engine/render/environment.h"
-#include "lod/cut.h"
+#include "lod/cut/cut.h"
 #include "lod/primitives/kinds.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"

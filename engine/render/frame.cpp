@@ -11,9 +11,9 @@
 #include "engine/base/process.h"
 #include "engine/render/frame_passes.h"
 #include "engine/render/views.h"
-#include "lod/attributes.h"
-#include "lod/octahedral.h"
-#include "lod/store_check.h"
+#include "lod/primitives/octahedral.h"
+#include "lod/store/attributes.h"
+#include "lod/store/check.h"
 
 namespace stipple::render {
 

@@ -8,8 +8,8 @@
 #include "engine/base/counters.h"
 #include "engine/render/backend.h"
 #include "engine/render/disc_sizes.h"
-#include "lod/colour.h"
-#include "lod/store.h"
+#include "lod/store/colour.h"
+#include "lod/store/store.h"
 #include "streaming/streamer.h"
 
 namespace stipple::render {

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "lod/chunk.h"
-#include "lod/cut_view.h"
-#include "lod/lots.h"
+#include "lod/cut/view.h"
 #include "lod/primitives/kinds.h"
-#include "lod/store.h"
+#include "lod/store/chunk.h"
+#include "lod/store/lots.h"
+#include "lod/store/store.h"
 
 namespace stipple::render {
 namespace {

@@ -1,4 +1,4 @@
-// Several views of one scene in one frame (lod/cut_views.h): two eyes, or a camera and the lights that cast shadows.
+// Several views of one scene in one frame (lod/cut/views.h): two eyes, or a camera and the lights that cast shadows.
 // What is resident, and the budgets, are theirs together.
 #pragma once
 
@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "engine/render/frame.h"
-#include "lod/cut_views.h"
+#include "lod/cut/views.h"
 
 namespace stipple::render {
 

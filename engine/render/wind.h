@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <span>
 
-#include "lod/cut.h"
+#include "lod/cut/cut.h"
 
 namespace stipple::render {
 

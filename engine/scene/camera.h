@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "engine/base/result.h"
-#include "lod/cut.h"
-#include "lod/primitives.h"
+#include "lod/cut/cut.h"
+#include "lod/primitives/primitives.h"
 
 namespace stipple::scene {
 

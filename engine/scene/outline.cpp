@@ -5,7 +5,7 @@
 #include <map>
 
 #include "engine/scene/camera.h"
-#include "lod/mesh_place.h"
+#include "lod/store/mesh_place.h"
 
 namespace stipple::scene {
 namespace {

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "lod/store.h"
+#include "lod/store/store.h"
 
 namespace stipple::scene {
 

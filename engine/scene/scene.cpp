@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "lod/file_kind.h"
+#include "lod/store/file_kind.h"
 
 namespace stipple::scene {
 

@@ -9,7 +9,7 @@
 
 #include "engine/scene/gltf/container.h"
 #include "engine/scene/read_settings.h"
-#include "lod/file_kind.h"
+#include "lod/store/file_kind.h"
 
 namespace stipple::scene {
 namespace fs = std::filesystem;

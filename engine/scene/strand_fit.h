@@ -4,7 +4,7 @@
 
 #include "engine/base/executor.h"
 #include "engine/scene/surfels.h"
-#include "lod/strands.h"
+#include "lod/primitives/strands.h"
 
 namespace stipple::scene {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "engine/scene/triangles.h"
-#include "lod/strand_source.h"
+#include "lod/primitives/strand_source.h"
 
 namespace stipple::scene {
 

@@ -7,7 +7,7 @@
 
 #include "engine/base/numbers.h"
 #include "engine/scene/borders.h"
-#include "lod/in_memory.h"
+#include "lod/primitives/in_memory.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::scene {

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "engine/scene/scene.h"
-#include "lod/primitives.h"
+#include "lod/primitives/primitives.h"
 
 namespace stipple::scene {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "engine/scene/scene.h"
-#include "lod/mesh_source.h"
+#include "lod/primitives/mesh_source.h"
 
 namespace stipple::scene {
 

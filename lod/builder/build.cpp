@@ -15,7 +15,7 @@
 #include "lod/builder/points/distribution.h"
 #include "lod/builder/points/estimate.h"
 #include "lod/builder/points/exchange.h"
-#include "lod/store.h"
+#include "lod/store/store.h"
 
 namespace stipple::lod {
 namespace {

@@ -11,7 +11,7 @@
 #include "engine/base/process.h"
 #include "engine/base/progress.h"
 #include "engine/base/ranks.h"
-#include "lod/primitives.h"
+#include "lod/primitives/primitives.h"
 
 namespace stipple::lod {
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "lod/hierarchy.h"
+#include "lod/store/hierarchy.h"
 
 namespace stipple::lod {
 

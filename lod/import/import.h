@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "lod/primitives.h"
+#include "lod/primitives/primitives.h"
 
 namespace stipple::lod {
 

@@ -7,7 +7,7 @@
 
 #include "engine/base/numbers.h"
 #include "engine/base/process.h"
-#include "lod/attributes.h"
+#include "lod/store/attributes.h"
 
 namespace stipple::lod {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "engine/base/executor.h"
 #include "engine/base/progress.h"
-#include "lod/primitives.h"
+#include "lod/primitives/primitives.h"
 
 namespace stipple::lod {
 

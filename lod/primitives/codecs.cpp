@@ -2,8 +2,8 @@
 
 #include <array>
 
-#include "lod/mesh_place.h"
-#include "lod/store_check.h"
+#include "lod/store/check.h"
+#include "lod/store/mesh_place.h"
 
 namespace stipple::lod {
 namespace {
@@ -39,7 +39,7 @@ uint64_t fewestOfTriangles(const Hierarchy& h, uint32_t chunk) {
            uint64_t{g.clusters} * sizeof(shared::MeshCluster);
 }
 
-// The vertex codec of meshoptimizer under zstd (lod/chunk.h).
+// The vertex codec of meshoptimizer under zstd (lod/store/chunk.h).
 constexpr std::array<CodecTraits, kCodecs> kTraits{
     CodecTraits{"meshopt-points", Kind::points, decodePoints, fewestOfPoints},
     CodecTraits{"meshopt-curves", Kind::curves, decodeCurves, fewestOfCurves},

@@ -6,8 +6,8 @@
 #include <string_view>
 
 #include "engine/base/result.h"
-#include "lod/chunk.h"
-#include "lod/hierarchy.h"
+#include "lod/store/chunk.h"
+#include "lod/store/hierarchy.h"
 
 namespace stipple::lod {
 

@@ -2,10 +2,10 @@
 
 #include <array>
 
-#include "lod/cut_frame.h"
-#include "lod/store_check.h"
-#include "lod/verify_errors.h"
-#include "lod/verify_nodes.h"
+#include "lod/cut/frame.h"
+#include "lod/store/check.h"
+#include "lod/verify/errors.h"
+#include "lod/verify/nodes.h"
 
 namespace stipple::lod {
 namespace {

@@ -6,8 +6,8 @@
 #include <span>
 #include <string>
 
-#include "lod/cut.h"
-#include "lod/store.h"
+#include "lod/cut/cut.h"
+#include "lod/store/store.h"
 
 namespace stipple::lod {
 

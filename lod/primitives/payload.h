@@ -21,7 +21,7 @@ inline constexpr uint32_t kMostPayloads = 4;
 /// What a stream of a payload holds. Ids that a reader does not know are none of its business.
 enum class StreamId : uint16_t {
     records = 1,     ///< what the codec decodes
-    attributes = 2,  ///< values of every record (lod/attributes.h)
+    attributes = 2,  ///< values of every record (lod/store/attributes.h)
     // Kept for what is to come:
     normals = 3,
     surfelWeights = 4,

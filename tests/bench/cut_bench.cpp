@@ -6,7 +6,7 @@
 #include <new>
 
 #include "engine/base/rng.h"
-#include "lod/cut.h"
+#include "lod/cut/cut.h"
 
 namespace {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "lod/chunk.h"
+#include "lod/store/chunk.h"
 #include "tests/support/crafted_store.h"
 #include "tests/support/support.h"
 

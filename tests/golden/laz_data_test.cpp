@@ -10,7 +10,7 @@
 #include "engine/scene/camera.h"
 #include "lod/import/import.h"
 #include "lod/import/survey.h"
-#include "lod/nearest.h"
+#include "lod/store/nearest.h"
 #include "tests/support/support.h"
 
 namespace stipple {

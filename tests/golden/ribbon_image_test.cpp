@@ -15,7 +15,7 @@
 #include "engine/reference/decode.h"
 #include "engine/reference/reference.h"
 #include "engine/scene/camera.h"
-#include "lod/store.h"
+#include "lod/store/store.h"
 #include "tests/support/meshes.h"
 #include "tests/support/strands.h"
 

@@ -9,7 +9,7 @@
 #include <unordered_map>
 
 #include "engine/reference/decode.h"
-#include "lod/verify_errors.h"
+#include "lod/verify/errors.h"
 #include "tests/support/support.h"
 
 namespace stipple::lod {

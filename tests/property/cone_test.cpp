@@ -1,5 +1,5 @@
 // Nodes of which every disc faces away are not visited, and nothing that could be seen is among them: by their cones of
-// normals (facesAway in lod/cut_view.h), held against every disc that a cut without cones would draw.
+// normals (facesAway in lod/cut/view.h), held against every disc that a cut without cones would draw.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -11,7 +11,7 @@
 #include "engine/reference/reference.h"
 #include "engine/scene/scene.h"
 #include "engine/scene/triangles.h"
-#include "lod/chunk.h"
+#include "lod/store/chunk.h"
 #include "tests/support/meshes.h"
 #include "tests/support/strands.h"
 

@@ -13,7 +13,7 @@
 #include "engine/reference/decode.h"
 #include "engine/scene/scene.h"
 #include "engine/scene/triangles.h"
-#include "lod/chunk.h"
+#include "lod/store/chunk.h"
 #include "tests/support/meshes.h"
 #include "tests/support/strands.h"
 

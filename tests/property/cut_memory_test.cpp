@@ -9,7 +9,7 @@
 
 #include "engine/cpu/cpu_backend.h"
 #include "engine/scene/camera.h"
-#include "lod/cut_frame.h"
+#include "lod/cut/frame.h"
 #include "tests/support/forests.h"
 #include "tests/support/meshes.h"
 #include "tests/support/support.h"

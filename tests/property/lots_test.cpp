@@ -3,7 +3,7 @@
 
 #include "engine/cpu/cpu_backend.h"
 #include "engine/render/lots.h"
-#include "lod/lots.h"
+#include "lod/store/lots.h"
 #include "tests/support/strands.h"
 
 namespace stipple {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "lod/store.h"
-#include "lod/store_layout.h"
+#include "lod/store/layout.h"
+#include "lod/store/store.h"
 
 namespace stipple::test {
 
@@ -54,8 +54,8 @@ using Dice = std::function<uint64_t(uint64_t below)>;
 std::string mutate(CraftedStore& crafted, const lod::Store& store, const Dice& dice);
 
 /// Small stores of every kind in `folder`: points with an attribute, triangles with a texture, strands, progressive,
-/// triangles of which some lie so far away that their groups have origins and pairs (lod/mesh_place.h), nodes with
-/// several payloads (mixed_store.h).
+/// triangles of which some lie so far away that their groups have origins and pairs (lod/store/mesh_place.h), nodes
+/// with several payloads (mixed_store.h).
 std::vector<std::string> smallStores(const std::string& folder);
 
 /// Opens a store, draws it from everywhere on both backends at a small size, and verifies it; whether it was opened.

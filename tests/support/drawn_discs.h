@@ -9,7 +9,7 @@
 
 #include "engine/reference/decode.h"
 #include "engine/render/frame.h"
-#include "lod/store.h"
+#include "lod/store/store.h"
 #include "tests/support/support.h"
 
 namespace stipple::test {

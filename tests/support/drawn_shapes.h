@@ -6,8 +6,8 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "lod/cut.h"
-#include "lod/store.h"
+#include "lod/cut/cut.h"
+#include "lod/store/store.h"
 #include "tests/support/support.h"
 
 namespace stipple::test {

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "engine/scene/triangles.h"
-#include "lod/mesh_place.h"
+#include "lod/store/mesh_place.h"
 
 namespace stipple::test {
 

@@ -3,7 +3,7 @@
 
 #include "apps/grow/meshes.h"
 #include "lod/builder/mesh/mesh_build.h"
-#include "lod/store.h"
+#include "lod/store/store.h"
 #include "tests/support/support.h"
 
 namespace stipple::test {

@@ -4,7 +4,7 @@
 #include <stdexcept>
 
 #include "lod/builder/counts.h"
-#include "lod/octahedral.h"
+#include "lod/primitives/octahedral.h"
 
 namespace stipple::test {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "lod/store.h"
+#include "lod/store/store.h"
 
 namespace stipple::test {
 

@@ -1,7 +1,7 @@
 // Hashes of what a store holds once it is decoded, wherever it lies in the file.
 #pragma once
 
-#include "lod/store.h"
+#include "lod/store/store.h"
 
 namespace stipple::test {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "lod/builder/strands/strand_build.h"
-#include "lod/strands.h"
+#include "lod/primitives/strands.h"
 #include "tests/support/support.h"
 
 namespace stipple::test {

@@ -11,7 +11,7 @@
 #include "engine/base/rng.h"
 #include "engine/render/frame.h"
 #include "lod/builder/build.h"
-#include "lod/store.h"
+#include "lod/store/store.h"
 
 namespace stipple::test {
 

@@ -9,12 +9,12 @@
 
 #include "engine/cpu/cpu_backend.h"
 #include "engine/scene/camera.h"
-#include "lod/attributes.h"
 #include "lod/builder/points/rising_values.h"
-#include "lod/colour.h"
 #include "lod/import/import.h"
 #include "lod/import/las/header.h"
-#include "lod/nearest.h"
+#include "lod/store/attributes.h"
+#include "lod/store/colour.h"
+#include "lod/store/nearest.h"
 #include "tests/support/laz_encoder.h"
 #include "tests/support/support.h"
 

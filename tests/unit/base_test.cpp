@@ -7,7 +7,7 @@
 #include "engine/base/file.h"
 #include "engine/base/process.h"
 #include "engine/base/units.h"
-#include "lod/hierarchy.h"
+#include "lod/store/hierarchy.h"
 #include "tests/support/support.h"
 
 namespace stipple {

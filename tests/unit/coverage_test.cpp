@@ -6,7 +6,7 @@
 
 #include "engine/base/process.h"
 #include "lod/builder/strands/strand_coverage.h"
-#include "lod/strands.h"
+#include "lod/primitives/strands.h"
 #include "tests/support/runs.h"
 #include "tests/support/strands.h"
 

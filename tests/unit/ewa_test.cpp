@@ -6,7 +6,7 @@
 #include <cstdio>
 
 #include "engine/base/rng.h"
-#include "lod/record_spacing.h"
+#include "lod/primitives/record_spacing.h"
 #include "shaders/shared/ewa.h"
 
 namespace stipple {

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/image/image_io.h"
-#include "lod/store.h"
+#include "lod/store/store.h"
 #include "tests/support/laz_encoder.h"
 #include "tests/support/program.h"
 

@@ -8,7 +8,7 @@
 #include <glm/glm.hpp>
 
 #include "engine/base/rng.h"
-#include "lod/octahedral.h"
+#include "lod/primitives/octahedral.h"
 #include "shaders/shared/mesh.h"
 #include "shaders/shared/pack.h"
 #include "tests/support/support.h"

@@ -9,7 +9,7 @@
 
 #include "engine/cpu/cpu_backend.h"
 #include "engine/reference/reference.h"
-#include "lod/cut_frame.h"
+#include "lod/cut/frame.h"
 #include "lod/primitives/codecs.h"
 #include "lod/primitives/kinds.h"
 #include "streaming/streamer.h"

@@ -8,7 +8,7 @@
 #include "engine/cpu/cpu_backend.h"
 #include "lod/import/import.h"
 #include "lod/import/ply/mesh.h"
-#include "lod/octahedral.h"
+#include "lod/primitives/octahedral.h"
 #include "tests/support/meshes.h"
 #include "tests/support/support.h"
 

@@ -5,8 +5,8 @@
 #include <set>
 
 #include "engine/cpu/cpu_backend.h"
+#include "lod/cut/resident.h"
 #include "lod/primitives/kinds.h"
-#include "lod/resident.h"
 #include "tests/support/meshes.h"
 #include "tests/support/strands.h"
 #include "tests/support/support.h"

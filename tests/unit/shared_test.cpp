@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "engine/reference/decode.h"
-#include "lod/octahedral.h"
+#include "lod/primitives/octahedral.h"
 #include "shaders/shared/pack.h"
 #include "shaders/shared/pyramid.h"
 #include "shaders/shared/shade.h"

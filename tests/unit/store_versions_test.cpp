@@ -6,7 +6,7 @@
 #include <set>
 
 #include "lod/primitives/kinds.h"
-#include "lod/store_layout.h"
+#include "lod/store/layout.h"
 #include "tests/support/store_hash.h"
 #include "tests/support/support.h"
 

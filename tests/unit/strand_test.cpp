@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "lod/import/strands/strand_readers.h"
-#include "lod/strands.h"
+#include "lod/primitives/strands.h"
 #include "shaders/shared/pack.h"
 #include "shaders/shared/strand.h"
 #include "tests/support/strands.h"

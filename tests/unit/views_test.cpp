@@ -9,7 +9,7 @@
 #include "engine/base/hash.h"
 #include "engine/cpu/cpu_backend.h"
 #include "engine/render/views.h"
-#include "lod/cut_views.h"
+#include "lod/cut/views.h"
 #include "lod/primitives/kinds.h"
 #include "tests/support/support.h"
 

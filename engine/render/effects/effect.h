@@ -9,7 +9,7 @@
 #include "engine/render/content.h"
 #include "engine/render/passes.h"
 #include "engine/render/wind.h"
-#include "lod/cut.h"
+#include "lod/cut/cut.h"
 
 namespace stipple::render {
 

@@ -11,7 +11,7 @@
 #include <cstring>
 
 #include "lod/builder/mesh/mesh_work.h"
-#include "lod/triangle.h"
+#include "lod/primitives/triangle.h"
 
 namespace stipple::lod {
 namespace {

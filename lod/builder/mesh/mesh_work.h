@@ -8,9 +8,9 @@
 #include "engine/base/executor.h"
 #include "lod/builder/octree/bytes.h"
 #include "lod/builder/octree/cells.h"
-#include "lod/mesh_place.h"
-#include "lod/mesh_source.h"
-#include "lod/store.h"
+#include "lod/primitives/mesh_source.h"
+#include "lod/store/mesh_place.h"
+#include "lod/store/store.h"
 
 namespace stipple::lod {
 

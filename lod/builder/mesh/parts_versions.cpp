@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "lod/triangle.h"
+#include "lod/primitives/triangle.h"
 
 namespace stipple::lod {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "engine/base/numbers.h"
 #include "lod/builder/mesh/mesh_work.h"
-#include "lod/store.h"
+#include "lod/store/store.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::lod {

@@ -8,7 +8,7 @@
 #include "engine/base/numbers.h"
 #include "lod/builder/mesh/mesh_work.h"
 #include "lod/builder/morton.h"
-#include "lod/octahedral.h"
+#include "lod/primitives/octahedral.h"
 
 namespace stipple::lod {
 namespace {

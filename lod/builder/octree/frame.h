@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "lod/builder/morton.h"
-#include "lod/hierarchy.h"
+#include "lod/store/hierarchy.h"
 
 namespace stipple::lod {
 

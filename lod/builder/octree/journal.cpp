@@ -15,7 +15,7 @@
 #include <thread>
 
 #include "engine/base/hash.h"
-#include "lod/file_kind.h"
+#include "lod/store/file_kind.h"
 
 namespace stipple::lod {
 namespace fs = std::filesystem;

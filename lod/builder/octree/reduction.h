@@ -12,7 +12,7 @@
 #include <optional>
 
 #include "lod/builder/octree/inputs.h"
-#include "lod/store.h"
+#include "lod/store/store.h"
 
 namespace stipple::lod {
 

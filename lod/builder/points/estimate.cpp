@@ -24,7 +24,7 @@
 #include "lod/builder/points/seen.h"
 #include "lod/builder/points/select.h"
 #include "lod/builder/points/surface_fit.h"
-#include "lod/octahedral.h"
+#include "lod/primitives/octahedral.h"
 
 namespace stipple::lod {
 namespace {

@@ -7,7 +7,7 @@
 #include "engine/base/queue.h"
 #include "lod/builder/points/input.h"
 #include "lod/builder/points/input_colours.h"
-#include "lod/octahedral.h"
+#include "lod/primitives/octahedral.h"
 
 namespace stipple::lod {
 PointInput::Range PointInput::nextRange(const Range& range, uint64_t wanted) const {

@@ -7,12 +7,12 @@
 
 #include "engine/base/check.h"
 #include "engine/base/hash.h"
-#include "lod/attributes.h"
 #include "lod/builder/points/covered.h"
 #include "lod/builder/points/rising.h"
 #include "lod/builder/points/rising_values.h"
-#include "lod/chunk.h"
-#include "lod/octahedral.h"
+#include "lod/primitives/octahedral.h"
+#include "lod/store/attributes.h"
+#include "lod/store/chunk.h"
 
 namespace stipple::lod {
 namespace {

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "lod/builder/octree/bytes.h"
-#include "lod/primitives.h"
+#include "lod/primitives/primitives.h"
 
 namespace stipple::lod {
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "lod/attributes.h"
+#include "lod/store/attributes.h"
 
 namespace stipple::lod {
 namespace {

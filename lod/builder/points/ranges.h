@@ -6,7 +6,7 @@
 #include "lod/builder/octree/bytes.h"
 #include "lod/builder/points/outliers.h"
 #include "lod/builder/points/points.h"
-#include "lod/description.h"
+#include "lod/store/description.h"
 
 namespace stipple::lod {
 

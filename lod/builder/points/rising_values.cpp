@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "lod/attributes.h"
+#include "lod/store/attributes.h"
 
 namespace stipple::lod {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "engine/base/check.h"
 #include "lod/builder/counts.h"
-#include "lod/octahedral.h"
+#include "lod/primitives/octahedral.h"
 
 namespace stipple::lod {
 namespace {

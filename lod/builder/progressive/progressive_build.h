@@ -6,8 +6,8 @@
 
 #include "lod/builder/build.h"
 #include "lod/builder/strands/strand_samples.h"
-#include "lod/cut.h"
-#include "lod/store.h"
+#include "lod/cut/cut.h"
+#include "lod/store/store.h"
 
 namespace stipple::lod {
 

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "engine/base/numbers.h"
-#include "lod/strand_source.h"
+#include "lod/primitives/strand_source.h"
 
 namespace stipple::lod {
 namespace {

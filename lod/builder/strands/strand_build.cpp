@@ -15,7 +15,7 @@
 #include "lod/builder/octree/cell_build.h"
 #include "lod/builder/points/spacing.h"
 #include "lod/builder/strands/strand_cell.h"
-#include "lod/mesh_source.h"
+#include "lod/primitives/mesh_source.h"
 
 namespace stipple::lod {
 namespace {

@@ -4,8 +4,8 @@
 #include <string>
 
 #include "lod/builder/build.h"
-#include "lod/store.h"
-#include "lod/strand_source.h"
+#include "lod/primitives/strand_source.h"
+#include "lod/store/store.h"
 
 namespace stipple::lod {
 

@@ -5,7 +5,7 @@
 #include "engine/base/numbers.h"
 #include "lod/builder/octree/packed.h"
 #include "lod/builder/strands/strand_work.h"
-#include "lod/octahedral.h"
+#include "lod/primitives/octahedral.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::lod {

@@ -7,9 +7,9 @@
 #include "engine/base/check.h"
 #include "engine/base/hash.h"
 #include "lod/builder/octree/packed.h"
-#include "lod/chunk.h"
-#include "lod/lots.h"
-#include "lod/octahedral.h"
+#include "lod/primitives/octahedral.h"
+#include "lod/store/chunk.h"
+#include "lod/store/lots.h"
 
 namespace stipple::lod {
 namespace {

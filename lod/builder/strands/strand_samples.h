@@ -2,8 +2,8 @@
 // error may be a matter of chance, as long as area and mean colour stay).
 #pragma once
 
-#include "lod/primitives.h"
-#include "lod/strands.h"
+#include "lod/primitives/primitives.h"
+#include "lod/primitives/strands.h"
 
 namespace stipple::lod {
 

@@ -8,7 +8,7 @@
 
 #include "lod/builder/octree/bytes.h"
 #include "lod/builder/octree/frame.h"
-#include "lod/strands.h"
+#include "lod/primitives/strands.h"
 
 namespace stipple::lod {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "lod/import/las/laz.h"
-#include "lod/primitives.h"
+#include "lod/primitives/primitives.h"
 
 namespace stipple::las {
 

@@ -5,10 +5,10 @@
 
 #include "engine/base/numbers.h"
 #include "engine/base/paged_array.h"
-#include "lod/file_kind.h"
 #include "lod/import/import.h"
 #include "lod/import/ply/rows.h"
-#include "lod/octahedral.h"
+#include "lod/primitives/octahedral.h"
+#include "lod/store/file_kind.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::lod {

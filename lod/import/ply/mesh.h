@@ -5,7 +5,7 @@
 #include <string>
 
 #include "engine/base/result.h"
-#include "lod/mesh_source.h"
+#include "lod/primitives/mesh_source.h"
 
 namespace stipple::lod {
 

@@ -7,7 +7,7 @@
 
 #include "engine/base/cursor.h"
 #include "lod/import/ply/header.h"
-#include "lod/primitives.h"
+#include "lod/primitives/primitives.h"
 
 namespace stipple::lod {
 

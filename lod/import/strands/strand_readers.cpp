@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "engine/base/file.h"
-#include "lod/file_kind.h"
+#include "lod/store/file_kind.h"
 
 namespace stipple::lod {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "engine/base/cursor.h"
 #include "engine/base/result.h"
-#include "lod/strand_source.h"
+#include "lod/primitives/strand_source.h"
 
 namespace stipple::lod {
 

@@ -1,0 +1,55 @@
+// A decoded chunk (the records of one node) and its encoding on disk: meshoptimizer's vertex codec (byte-wise deltas)
+// under zstd. Where a leaf's position step is coarser than the lattice, the low bits travel in a stream of their own,
+// so that scanner integers come back exactly.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "engine/base/result.h"
+#include "lod/primitives/mesh.h"
+#include "shaders/shared/record.h"
+#include "shaders/shared/strand.h"
+
+namespace stipple::lod {
+
+struct Chunk {
+    std::vector<shared::PointRecord> records;
+    /// 3 per record (x, y, z), each below 2^stepShift; empty where the step is one lattice unit or the node is no leaf.
+    std::vector<uint32_t> lowBits;
+    // Of a mesh store instead of records:
+    std::vector<shared::MeshVertex> vertices;
+    std::vector<uint32_t> triangles;
+    std::vector<shared::MeshCluster> clusters;
+    std::vector<shared::StrandSegment> segments;  ///< of a strand store
+    std::vector<uint32_t> texels;                 ///< of a texture's tile, kTileEdge x kTileEdge
+    uint64_t sizeBytes() const {
+        return records.size() * sizeof(shared::PointRecord) + segments.size() * sizeof(shared::StrandSegment) +
+               vertices.size() * sizeof(shared::MeshVertex) + (triangles.size() + texels.size()) * sizeof(uint32_t) +
+               clusters.size() * sizeof(shared::MeshCluster);
+    }
+};
+
+std::vector<uint8_t> encodeChunk(const Chunk& chunk);
+
+/// Decodes a chunk of `records` records. `where` names the place in errors. Allocates no more than `records` justifies.
+Result<Chunk> decodeChunk(const uint8_t* bytes, size_t count, uint32_t records, const std::string& where,
+                          bool wantLowBits);
+
+/// The same for a chunk of a strand store.
+std::vector<uint8_t> encodeStrandChunk(const Chunk& chunk);
+Result<Chunk> decodeStrandChunk(const uint8_t* bytes, size_t count, uint32_t segments, const std::string& where);
+
+/// A texture tile, kTileEdge x kTileEdge texels.
+std::vector<uint8_t> encodeTile(const std::vector<uint32_t>& texels);
+Result<Chunk> decodeTile(const uint8_t* bytes, size_t count, const std::string& where);
+
+/// How the coordinates of a mesh's vertices are kept, see mesh_place.h.
+enum class MeshVertices : uint8_t { shortOnes, counted, pairs };
+
+/// The same for a chunk of a mesh store.
+std::vector<uint8_t> encodeMeshChunk(const Chunk& chunk);
+Result<Chunk> decodeMeshChunk(const uint8_t* bytes, size_t count, uint32_t triangles, const MeshGroup& group,
+                              MeshVertices vertices, const std::string& where);
+
+}  // namespace stipple::lod

@@ -1,0 +1,279 @@
+#include "lod/store/store.h"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <cstring>
+#include <type_traits>
+
+#include "engine/base/hash.h"
+#include "lod/primitives/codecs.h"
+#include "lod/store/attributes.h"
+#include "lod/store/check.h"
+#include "lod/store/description.h"
+#include "lod/store/layout.h"
+#include "lod/store/mesh_place.h"
+#include "lod/store/tables.h"
+#include "lod/store/zstd_memory.h"
+
+namespace stipple::lod {
+namespace {
+
+using namespace layout;
+
+constexpr uint64_t kMostText = uint64_t{128} << 20;  // of a description
+
+std::vector<uint8_t> packed(const void* bytes, size_t count) {
+    std::vector<uint8_t> out(ZSTD_compressBound(count));
+    out.resize(written(ZSTD_compress(out.data(), out.size(), bytes, count, 3)));
+    return out;
+}
+
+}  // namespace
+
+Result<StoreWriter> StoreWriter::create(const std::string& path) {
+    STIPPLE_ASSIGN(OutputFile file, OutputFile::create(path));
+    const Head empty{};
+    STIPPLE_TRY(file.append(&empty, sizeof(empty)));
+    return StoreWriter(std::move(file));
+}
+
+Result<StoreWriter> StoreWriter::resume(const std::string& path, const std::string& temporaryPath, uint64_t bytes) {
+    STIPPLE_ASSIGN(OutputFile file, OutputFile::resume(path, temporaryPath, bytes));
+    const Head empty{};
+    if (bytes == 0) STIPPLE_TRY(file.append(&empty, sizeof(empty)));
+    return StoreWriter(std::move(file));
+}
+
+Result<uint64_t> StoreWriter::appendEncoded(const std::vector<uint8_t>& bytes) {
+    const uint64_t at = file_.position();
+    STIPPLE_TRY(file_.append(bytes.data(), bytes.size()));
+    return at;
+}
+
+Result<void> StoreWriter::appendChunk(const std::vector<uint8_t>& bytes, const std::vector<uint8_t>& attributes,
+                                      Payload& p) {
+    p.chunkOffset = file_.position();
+    p.chunkBytes = static_cast<uint32_t>(bytes.size());
+    p.chunkHash = hashBytes(bytes.data(), bytes.size());
+    p.attributeBytes = static_cast<uint32_t>(attributes.size());
+    p.attributeHash = hashBytes(attributes.data(), attributes.size());
+    STIPPLE_TRY(file_.append(bytes.data(), bytes.size()));
+    return attributes.empty() ? Result<void>() : file_.append(attributes.data(), attributes.size());
+}
+
+Result<Stream> StoreWriter::appendStream(StreamId id, const std::vector<uint8_t>& bytes) {
+    const Stream stream{file_.position(), hashBytes(bytes.data(), bytes.size()), static_cast<uint32_t>(bytes.size()),
+                        id};
+    STIPPLE_TRY(file_.append(bytes.data(), bytes.size()));
+    return stream;
+}
+
+Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& description) {
+    STIPPLE_TRY(checkSpace(h, description));
+    const TableBytes tables = tablesOf(h);
+    const std::string text = describeAsText(description);
+    Head head{};
+    auto write = [&](const void* raw, size_t count, Section& section) -> Result<void> {
+        const std::vector<uint8_t> bytes = packed(raw, count);
+        section = {file_.position(), bytes.size(), count, hashBytes(bytes.data(), bytes.size())};
+        return file_.append(bytes.data(), bytes.size());
+    };
+    STIPPLE_TRY(write(tables.nodes.data(), tables.nodes.size(), head.nodes));
+    STIPPLE_TRY(write(tables.counts.data(), tables.counts.size(), head.counts));
+    STIPPLE_TRY(write(text.data(), text.size(), head.description));
+    const std::vector<uint8_t> mesh = meshBytes(h);
+    STIPPLE_TRY(write(mesh.data(), mesh.size(), head.mesh));
+    STIPPLE_TRY(write(tables.payloads.data(), tables.payloads.size(), head.payloads));
+    head.magic = kMagic;
+    head.version = kStoreVersion;
+    moveHead(h, head, kToDisk);
+    head.nodeCount = h.nodes.size();
+    head.fileBytes = file_.position() + sizeof(Foot);
+    // The table of payloads holds the hash of every stream, so these stand for the whole content.
+    // Names of files are no content.
+    StoreDescription nameless = description;
+    nameless.source.clear();
+    const std::string content = describeAsText(nameless);
+    const std::array<uint64_t, 8> parts{head.nodes.hash,
+                                        head.counts.hash,
+                                        hashBytes(content.data(), content.size()),
+                                        head.mesh.hash,
+                                        head.payloads.hash,
+                                        head.rootLog2,
+                                        std::bit_cast<uint64_t>(head.unit),
+                                        hashBytes(head.origin.data(), sizeof(head.origin))};
+    head.contentHash = contentHash_ = hashBytes(parts.data(), sizeof(parts));
+    head.hash = hashBytes(&head, offsetof(Head, hash));
+    const Foot foot{head.hash, kFootMagic};
+    STIPPLE_TRY(file_.append(&foot, sizeof(foot)));
+    STIPPLE_TRY(file_.writeAt(0, &head, sizeof(head)));
+    return file_.flush();
+}
+
+namespace {
+
+/// The head, with its hash and the foot's checked; of old versions what they do not have is empty.
+Result<Head> readHead(const InputFile& file) {
+    const std::string& path = file.path();
+    Head head{};
+    if (file.sizeBytes() < kOldHeadBytes + sizeof(Foot))
+        return fail(ErrorKind::input, fmt::format("has {} bytes, too few for a store", file.sizeBytes()), path,
+                    "build it with: stipple build INPUT -o SCENE.stipple");
+    STIPPLE_TRY(file.readAt(0, &head, kOldHeadBytes));
+    if (head.magic != kMagic)
+        return fail(ErrorKind::input, "is not a stipple store", path,
+                    "build one with: stipple build INPUT -o SCENE.stipple");
+    const bool isOld = head.version == kOldVersion || head.version == kOldWideMeshVersion;
+    if (head.version != kStoreVersion && !isOld)
+        return fail(ErrorKind::input,
+                    fmt::format("has store version {}; this program reads version {}", head.version, kStoreVersion),
+                    path, "build it again with this program");
+    const auto damaged = [&](const std::string& what) { return tl::unexpected(damagedStore(path, what)); };
+    if (isOld) {  // the hash stands where others have more
+        std::memcpy(&head.hash, &head.payloads, sizeof(head.hash));
+        head.payloads = {};
+    } else {
+        if (file.sizeBytes() < sizeof(Head) + sizeof(Foot)) return damaged("the head is damaged");
+        STIPPLE_TRY(file.readAt(0, &head, sizeof(head)));
+    }
+    if (head.hash != hashBytes(&head, isOld ? offsetof(Head, payloads) : offsetof(Head, hash)))
+        return damaged("the head is damaged");
+    if (head.fileBytes != file.sizeBytes())
+        return damaged(fmt::format("has {} bytes instead of {}", file.sizeBytes(), head.fileBytes));
+    Foot foot{};
+    STIPPLE_TRY(file.readAt(file.sizeBytes() - sizeof(foot), &foot, sizeof(foot)));
+    if (foot.magic != kFootMagic || foot.headHash != head.hash) return damaged("the foot is damaged");
+    const uint64_t nodeBytes = isOld ? sizeof(OldNodeOnDisk) : sizeof(NodeOnDisk);
+    if (!(head.unit > 0) || !std::isfinite(head.unit) || !(head.smallestError > 0) || head.rootLog2 > 62 ||
+        head.nodeCount == 0 || head.nodeCount > file.sizeBytes() / kFewestChunkBytes ||
+        head.nodes.rawBytes != head.nodeCount * nodeBytes || head.isGraph > 1)
+        return damaged("the head holds values that are not possible");
+    return head;
+}
+
+/// The tables of nodes and payloads, and the description.
+Result<void> readTables(const InputFile& file, const Head& head, Store& store) {
+    Hierarchy& h = store.hierarchy;
+    moveHead(h, head, kFromDisk);
+    const bool isOld = head.version != kStoreVersion;
+    bool hasCounts = true;
+    if (isOld) {
+        STIPPLE_ASSIGN(hasCounts, readOldNodes(file, head, h));
+    } else {
+        STIPPLE_TRY(readNodes(file, head, h));
+    }
+    STIPPLE_ASSIGN(const std::vector<uint8_t> text, readSection(file, head.description, kMostText, "description"));
+    // Every group, run and parent stands for triangles, every tile for bytes of the file.
+    uint64_t triangles = 0;
+    for (uint32_t n = 0; n < h.nodes.size(); ++n)
+        h.forEachPayload(n, [&](uint32_t chunk) { triangles += h.payload(chunk).records; });
+    const uint64_t payloads = h.nodes.size() + h.further.size();
+    const uint64_t mostMesh =
+        sizeof(MeshHead) + payloads * sizeof(MeshGroup) + triangles * (sizeof(MeshRun) + 8) +
+        file.sizeBytes() / kFewestChunkBytes * (sizeof(TextureTile) + sizeof(shared::TextureInfo));
+    STIPPLE_ASSIGN(const std::vector<uint8_t> mesh, readSection(file, head.mesh, mostMesh, "mesh groups"));
+    try {
+        store.description = descriptionFromText({text.begin(), text.end()});
+    } catch (const std::exception& e) {
+        return tl::unexpected(damagedStore(store.path, fmt::format("the description cannot be read: {}", e.what())));
+    }
+    STIPPLE_TRY(readMesh(mesh, store.path, h));
+    if (!isOld) return {};
+    h.isGraph = !h.groups.empty();
+    if (h.isGraph && store.description.isStrands)
+        return tl::unexpected(damagedStore(store.path, "holds strands and groups of triangles"));
+    setKindOfAll(h, h.isGraph ? Kind::triangles : store.description.isStrands ? Kind::curves : Kind::points);
+    if ((head.version == kOldWideMeshVersion) != (h.isGraph && h.rootLog2 > kShortMeshBits))
+        return tl::unexpected(damagedStore(store.path, "its version is not that of its coordinates"));
+    if (hasCounts == h.isGraph) return tl::unexpected(damagedStore(store.path, "the code counts are not possible"));
+    return {};
+}
+
+}  // namespace
+
+Result<Store> openStore(const std::string& path) {
+    STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
+    Store store;
+    store.path = path;
+    store.file = std::make_shared<const InputFile>(std::move(opened));
+    STIPPLE_ASSIGN(const Head head, readHead(*store.file));
+    STIPPLE_TRY(readTables(*store.file, head, store));
+    Hierarchy& h = store.hierarchy;
+    h.isRigid = store.description.isRigid;
+    h.isProgressive = store.description.isProgressive;
+    for (const Node& n : h.nodes)
+        if (n.isLeaf()) h.finestCode = std::max(h.finestCode, n.errorCode);
+    h.discFactors = store.description.discFactors;
+    h.smallestDisc = store.description.smallestDisc / h.unit;
+    store.contentHash = head.contentHash;
+    store.fileBytes = head.fileBytes;
+    STIPPLE_TRY(checkTables(store, head.nodes.offset));
+    if (!h.groups.empty() && store.description.materials.empty()) {  // it is drawn with a plain one
+        shared::SurfaceMaterial& plain = store.description.materials.emplace_back();
+        plain.baseColour = {1, 1, 1};
+        plain.alpha = plain.roughness = plain.normalScale = 1;
+    }
+    return store;
+}
+
+Result<Chunk> readChunk(const Store& store, uint32_t index, bool wantLowBits) {
+    const ChunkPlace place = chunkPlace(store.hierarchy, index);
+    thread_local std::vector<uint8_t> bytes;
+    bytes.resize(place.bytes);
+    STIPPLE_TRY(store.file->readAt(place.offset, bytes.data(), bytes.size()));
+    const std::string where = fmt::format("{}: chunk {} at offset {}", store.path, index, place.offset);
+    if (hashBytes(bytes.data(), bytes.size()) != place.hash)
+        return tl::unexpected(damagedStore(where, "the hash does not match"));
+    STIPPLE_ASSIGN(Chunk chunk, decodeStored(store.hierarchy, index, bytes.data(), bytes.size(), where, wantLowBits));
+    STIPPLE_TRY(checkMaterials(store, chunk, where));
+    return chunk;
+}
+
+ChunkPlace chunkPlace(const Hierarchy& h, uint32_t index) {
+    if (!h.isTile(index)) {
+        const Payload& p = h.payload(index);
+        return {p.chunkOffset, p.chunkHash, p.chunkBytes};
+    }
+    const TextureTile& t = h.tiles[index - h.nodes.size()];
+    return {t.offset, t.hash, t.bytes};
+}
+
+Result<Chunk> decodeStored(const Hierarchy& h, uint32_t index, const uint8_t* bytes, size_t count,
+                           const std::string& where, bool wantLowBits) {
+    if (h.isTile(index)) return decodeTile(bytes, count, where);
+    return traitsOf(h.payload(index).codec).decode(h, index, bytes, count, where, wantLowBits);
+}
+
+std::optional<Stream> findStream(const Hierarchy& h, uint32_t chunk, StreamId id) {
+    const Payload& p = h.payload(chunk);
+    if (id == StreamId::records) return Stream{p.chunkOffset, p.chunkHash, p.chunkBytes, id};
+    if (id == StreamId::attributes && p.attributeBytes > 0)
+        return Stream{p.chunkOffset + p.chunkBytes, p.attributeHash, p.attributeBytes, id};
+    for (uint32_t k = p.firstStream; k < p.firstStream + p.streams; ++k)
+        if (h.streams[k].id == id) return h.streams[k];
+    return {};
+}
+
+Result<std::vector<uint8_t>> readStream(const Store& store, uint32_t chunk, const Stream& stream) {
+    std::vector<uint8_t> bytes(stream.bytes);
+    STIPPLE_TRY(store.file->readAt(stream.offset, bytes.data(), bytes.size()));
+    if (hashBytes(bytes.data(), bytes.size()) != stream.hash)
+        return tl::unexpected(damagedStore(fmt::format("{}: stream {} of chunk {} at offset {}", store.path,
+                                                       static_cast<int>(stream.id), chunk, stream.offset),
+                                           "the hash does not match"));
+    return bytes;
+}
+
+Result<std::vector<uint8_t>> readAttribute(const Store& store, uint32_t index, size_t attribute) {
+    const Payload& p = store.hierarchy.payload(index);
+    std::vector<uint8_t> bytes(p.attributeBytes);
+    const uint64_t offset = p.chunkOffset + p.chunkBytes;
+    STIPPLE_TRY(store.file->readAt(offset, bytes.data(), bytes.size()));
+    const std::string where = fmt::format("{}: attributes of chunk {} at offset {}", store.path, index, offset);
+    if (hashBytes(bytes.data(), bytes.size()) != p.attributeHash)
+        return tl::unexpected(damagedStore(where, "the hash does not match"));
+    return decodeAttribute(bytes.data(), bytes.size(), store.description.attributes, attribute, p.records, where);
+}
+
+}  // namespace stipple::lod

@@ -1,0 +1,84 @@
+// verifyStore: everything that the cut relies on, checked on the finished file, through the reader that users run.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <limits>
+#include <mutex>
+
+#include "engine/base/process.h"
+#include "engine/base/queue.h"
+#include "lod/primitives/kinds.h"
+#include "lod/store/store.h"
+#include "lod/verify/errors.h"
+
+namespace stipple::lod {
+
+namespace {
+
+struct Counts {
+    std::atomic<uint64_t> nodes{0}, payloads{0}, records{0}, leafRecords{0}, measured{0};
+};
+
+/// Reads one payload and all of its streams. `discs`: see measure.
+Result<void> verifyPayload(const Store& store, uint32_t index, uint64_t discs, Counts& counts) {
+    const Hierarchy& h = store.hierarchy;
+    const Payload& payload = h.payload(index);
+    const KindTraits& kind = traitsOf(payload.kind);
+    STIPPLE_ASSIGN(const Chunk chunk, readChunk(store, index, true));
+    if (std::string text = kind.check(h, index, chunk); !text.empty())
+        return fail(ErrorKind::input, std::move(text), fmt::format("{}: node {}", store.path, h.nodeOf(index)),
+                    "this is a fault of the build; please report it with the input");
+    if (!h.isProgressive && !h.isMixed) {
+        STIPPLE_ASSIGN(const uint64_t measured, kind.measure(store, index, chunk, discs));
+        counts.measured += measured;
+    }
+    STIPPLE_TRY(checkDrawnPlaces(store, index, chunk));
+    const bool hasAttributes = payload.attributeBytes > 0 || !h.isMixed;
+    for (size_t a = 0; hasAttributes && a < store.description.attributes.size(); ++a)
+        STIPPLE_TRY(readAttribute(store, index, a));
+    for (uint32_t k = payload.firstStream; k < payload.firstStream + payload.streams; ++k)
+        STIPPLE_TRY(readStream(store, index, h.streams[k]));
+    ++counts.payloads;
+    counts.records += payload.records;
+    counts.leafRecords += kind.leafRecords(h, index);
+    return {};
+}
+
+}  // namespace
+
+Result<VerifyReport> verifyStore(const Store& store, Executor& executor, uint64_t nodes) {
+    const Hierarchy& h = store.hierarchy;
+    // Of a sample of nodes a sample of their discs is held against the leaves.
+    const uint64_t discs = nodes == 0 ? std::numeric_limits<uint64_t>::max() : 64;
+    const size_t stride = nodes == 0 ? 1 : h.nodes.size() / nodes + 1;
+    Counts counts;
+    CompletionQueue<std::pair<size_t, Error>> problems;
+    executor.parallelFor((h.nodes.size() + stride - 1) / stride, 1, [&](size_t begin, size_t end) {
+        for (size_t i = begin * stride; i < end * stride && i < h.nodes.size() && !isStopRequested(); i += stride) {
+            ++counts.nodes;
+            h.forEachPayload(static_cast<uint32_t>(i), [&](uint32_t chunk) {
+                if (const auto right = verifyPayload(store, chunk, discs, counts); !right)
+                    problems.push({i, right.error()});
+            });
+        }
+    });
+    executor.parallelFor(h.tiles.size(), 1, [&](size_t begin, size_t end) {
+        for (size_t t = begin; t < end && !isStopRequested(); ++t)
+            if (const auto tile = readChunk(store, static_cast<uint32_t>(h.nodes.size() + t)); !tile)
+                problems.push({h.nodes.size() + t, tile.error()});
+    });
+    if (isStopRequested()) return fail(ErrorKind::interrupted, "interrupted; not all of it was checked", store.path);
+    auto found = problems.takeAll();
+    if (!found.empty())
+        return tl::unexpected(std::min_element(found.begin(), found.end(), [](const auto& a, const auto& b) {
+                                  return a.first < b.first;
+                              })->second);
+    if (stride == 1 && counts.leafRecords != store.description.points)
+        return fail(ErrorKind::input,
+                    fmt::format("{} leaf records, but {} points", counts.leafRecords.load(), store.description.points),
+                    store.path);
+    return VerifyReport{counts.nodes, counts.payloads, counts.records, counts.leafRecords, counts.measured};
+}
+
+}  // namespace stipple::lod
