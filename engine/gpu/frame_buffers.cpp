@@ -18,6 +18,13 @@ constexpr VkBufferUsageFlags kStorage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
 bool has(const render::RenderRequest& request, render::Pass pass) {
     return std::find(request.passes.begin(), request.passes.end(), pass) != request.passes.end();
 }
+/// Does any pass make a list of wide discs? (Projection does only where their own pass follows.)
+bool listsDiscs(const render::RenderRequest& request) {
+    return std::any_of(request.passes.begin(), request.passes.end(), [](render::Pass pass) {
+        const bool isOther = pass != render::Pass::clear && pass != render::Pass::project;
+        return isOther && render::passInfo(pass).writes.has(render::Plane::discList);
+    });
+}
 
 }  // namespace
 
@@ -84,7 +91,7 @@ Result<void> FrameBuffers::prepareLists(const render::RenderRequest& request) {
     if (has(request, render::Pass::strands))
         STIPPLE_TRY(
             ensure(bound_[kWideBinding], gpu::bytesOf(kWideBinding, kWideCapacity), kFilled, false, "wide strands"));
-    if (has(request, render::Pass::discs) || has(request, render::Pass::splat) || has(request, render::Pass::ewa))
+    if (listsDiscs(request))
         STIPPLE_TRY(
             ensure(bound_[kDiscsBinding], gpu::bytesOf(kDiscsBinding, kDiscCapacity), kFilled, false, "wide discs"));
     if (has(request, render::Pass::ewa)) {

@@ -69,6 +69,22 @@ class TileLists {
         }
     }
 
+    /// Discs are kept by chunks of blocks, which threads may share out.
+    uint32_t chunks() const { return chunks_; }
+    /// Calls use(place) for each disc of a chunk: where it is in Frame::placedSplats and Frame::splatTiles.
+    template <typename Use>
+    void forDiscs(size_t chunk, const Use& use) const {
+        const size_t first = chunk * kBlocksPerChunk * shared::kRecordsPerBlock;
+        for (size_t at = first; at < first + counts_[chunk]; ++at) use(at);
+    }
+    /// Calls use(tile) for each tile of the picture, shared out among threads.
+    template <typename Use>
+    void forTiles(const Use& use) const {
+        frame_.executor.parallelFor(size_t{columns_} * rows_, 4, [&](size_t begin, size_t end) {
+            for (size_t t = begin; t < end; ++t) use(tileAt(t));
+        });
+    }
+
   private:
     void keep(const SplatBlock& b, uint32_t count, size_t chunk, uint32_t firstId) {
         const auto tile = [](int pixel, uint32_t size) {
@@ -87,11 +103,6 @@ class TileLists {
         }
     }
 
-    template <typename Use>
-    void forDiscs(size_t chunk, const Use& use) const {
-        const size_t first = chunk * kBlocksPerChunk * shared::kRecordsPerBlock;
-        for (size_t at = first; at < first + counts_[chunk]; ++at) use(at);
-    }
     /// Calls use(tile, place of the disc) for each disc of a chunk and each tile of these rows that it reaches; tiles
     /// are counted from the first of the rows on.
     template <typename Use>
