@@ -47,8 +47,8 @@ class Gpu : public testing::Test {
 TEST_F(Gpu, DrawsAsTheOracleDrawsAndValidationIsSilent) {
     const auto gpu = make();
     const auto oracle = reference::makeReferenceBackend(*executor_);
-    for (const render::Mode mode :
-         {render::Mode::pullpush, render::Mode::splat, render::Mode::ewa, render::Mode::points})
+    for (const render::Mode mode : {render::Mode::pullpush, render::Mode::splat, render::Mode::ewa,
+                                    render::Mode::points, render::Mode::pullpushExact})
         for (const double tau : {0.25, 2.0, 32.0})
             for (const uint32_t debug : {shared::kDebugNone, shared::kDebugLevel, shared::kDebugError,
                                          shared::kDebugHoles, shared::kDebugNormals}) {
@@ -398,6 +398,7 @@ TEST(Shaders, TouchThePlanesThatTheirPassesDeclare) {
         {Pass::project, {"project"}},
         {Pass::discs, {"disc_order", "discs"}},
         {Pass::splat, {"splat", "discs"}},
+        {Pass::exact, {"exact_depths", "exact_ids", "exact_rest", "discs", "exact_gather"}},
         {Pass::ewa, {"ewa_front", "ewa_front_wide", "ewa_begin", "ewa_sum", "ewa_sum_wide", "ewa_show", "ewa_cover"}},
         {Pass::strands, {"strands", "strands_wide"}},
         {Pass::rasterise, {"rasterise", "rasterise_large"}},

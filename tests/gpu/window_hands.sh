@@ -211,9 +211,12 @@ keys_follow_the_layout() {
     local blended=$shot
     xdotool key m
     await 10 differs "$blended" || fail "the third M does nothing"
+    local points=$shot
+    xdotool key m
+    await 10 differs "$points" || fail "the fourth M does nothing"
     xdotool key m
     settle
-    cmp -s "$plain" "$shot" || fail "M four times, once round the modes, is not what was before"
+    cmp -s "$plain" "$shot" || fail "M five times, once round the modes, is not what was before"
     # Keycode 25 is W on a US keyboard and Z on a French one.
     xdotool key f
     xdotool keydown 25

@@ -62,7 +62,7 @@ TEST(Passes, AreThereOnlyWhereTheFrameCallsForThem) {
             // Tiles of discs are nobody else's while they are drawn: all other visibility is there before.
             const auto at = [&](Pass pass) { return std::find(passes.begin(), passes.end(), pass) - passes.begin(); };
             for (const Pass before : {Pass::strands, Pass::rasterise})
-                for (const Pass tiles : {Pass::splat, Pass::ewa})
+                for (const Pass tiles : {Pass::splat, Pass::ewa, Pass::exact})
                     if (has(passes, tiles) && has(passes, before)) EXPECT_LT(at(before), at(tiles));
         }
 }

@@ -69,6 +69,8 @@ TEST(Keys, EachChangesWhatItSays) {
     applyKeys("M", s);
     EXPECT_EQ(s.frame.mode, render::Mode::points);
     applyKeys("M", s);
+    EXPECT_EQ(s.frame.mode, render::Mode::pullpushExact);
+    applyKeys("M", s);
     EXPECT_EQ(s.frame.mode, render::Mode::pullpush) << "around";
     EXPECT_EQ(s.frame.budgets.errorPixels, 4);
     const KeyRequests asked = applyKeys("FCUP ", s);

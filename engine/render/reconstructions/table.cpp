@@ -8,7 +8,7 @@ namespace {
 
 constexpr float kAsSet = std::numeric_limits<float>::infinity();
 
-constexpr std::array<Reconstruction, 4> kReconstructions{{
+constexpr std::array<Reconstruction, 5> kReconstructions{{
     {Mode::pullpush, "pullpush", "gaps between points are closed by pull and push", true, true, false, false,
      Pass::project, false, kAsSet},
     {Mode::splat, "splat", "every disc exactly, the nearest wins", false, true, true, false, Pass::splat, true, 0.5f},
@@ -16,6 +16,9 @@ constexpr std::array<Reconstruction, 4> kReconstructions{{
      0.5f},
     {Mode::points, "points", "a pixel a record: surfaces stay open", false, false, false, false, Pass::project, false,
      kAsSet},
+    {Mode::pullpushExact, "pullpush-exact",
+     "discs kept by a pyramid's texels, drawn exactly: slower, the same as splat", false, true, true, false,
+     Pass::exact, true, 0.5f},
 }};
 
 }  // namespace

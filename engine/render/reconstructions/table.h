@@ -10,7 +10,7 @@
 
 namespace stipple::render {
 
-enum class Mode : uint8_t { pullpush, points, splat, ewa };
+enum class Mode : uint8_t { pullpush, pullpushExact, points, splat, ewa };
 
 struct Reconstruction {
     Mode mode;

@@ -1,0 +1,13 @@
+// Of the discs of a texel's least depth, the least id.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "exact.glsl"
+layout(local_size_x = 256) in;
+
+void main() {
+    WideDisc d;
+    LevelPlane at;
+    uint texel;
+    if (!discHere(d) || !texelOf(d, at, texel)) return;
+    if (texels[plane(at, 0u) + texel] == floatBitsToUint(d.centre.z)) atomicMin(texels[plane(at, 1u) + texel], d.id);
+}
