@@ -100,7 +100,7 @@ Sample blend(std::vector<Contribution>& list, double& back, const lod::View& vie
     return sum;
 }
 
-Level pullLevel(const Level& fine, double childSize, const lod::View& view) {
+Level pullLevel(const Level& fine, double childSize, const lod::View& view, bool containedOnly) {
     Level coarse{(fine.width + 1) / 2, (fine.height + 1) / 2, {}};
     coarse.samples.resize(static_cast<size_t>(coarse.width) * static_cast<size_t>(coarse.height));
     for (int y = 0; y < coarse.height; ++y)
@@ -108,7 +108,9 @@ Level pullLevel(const Level& fine, double childSize, const lod::View& view) {
             std::vector<Contribution> list;
             for (int k = 0; k < 4; ++k) {
                 const Sample* s = fine.at(2 * x + k % 2, 2 * y + k / 2);
-                if (s && s->valid && s->radius >= 0.5 * childSize) list.push_back({s, s->radius * s->radius});
+                if (!s || !s->valid || !(s->radius >= 0.5 * childSize)) continue;
+                if (containedOnly && rhoSquared(*s, dvec2(2 * x + 1, 2 * y + 1) * childSize, view) > 1) continue;
+                list.push_back({s, s->radius * s->radius});
             }
             if (list.empty()) continue;
             double back = 0, front = 1e300, deepest = 0, thickest = 0;
@@ -128,7 +130,7 @@ Level pullLevel(const Level& fine, double childSize, const lod::View& view) {
     return coarse;
 }
 
-void pushLevel(Level& fine, const Level& coarse, double fineSize, const lod::View& view) {
+void pushLevel(Level& fine, const Level& coarse, double fineSize, const lod::View& view, double (*kernel)(double)) {
     for (int y = 0; y < fine.height; ++y)
         for (int x = 0; x < fine.width; ++x) {
             const dvec2 centre = (dvec2(x, y) + 0.5) * fineSize;
@@ -157,7 +159,8 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize, const lod::Vie
             const bool widen = least >= 1 && together >= 4;
             std::vector<Contribution> list;
             for (const auto& [s, rho2] : around) {
-                const double rest = std::max(0.0, 1 - (widen ? rho2 / 4 : rho2));
+                const double widened = widen ? rho2 / 4 : rho2, rest = std::max(0.0, 1 - widened);
+                const double reached = !kernel ? rest * rest : widened < 1 ? kernel(widened) : 0;
                 // An empty texel between four filled ones takes whatever is nearest, within five radii; at the border
                 // of the image within two, where texels are large.
                 const double farthest = outside > 0 && fineSize > 8 ? 4 : 25;
@@ -169,7 +172,7 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize, const lod::Vie
                     return !a.first->isLeaf(pixelsAt(view, a.first->depth));
                 });
                 const bool between = least >= 1 && isSolid && (gap || shines);
-                const double weight = std::max(rest * rest, between && rho2 <= least ? 0.01 : 0.0);
+                const double weight = std::max(reached, between && rho2 <= least ? 0.01 : 0.0);
                 if (weight > 0) list.push_back({s, weight});
             }
             if (list.empty()) continue;
@@ -183,7 +186,7 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize, const lod::Vie
 
 class ReferenceBackend final : public render::Backend {
   public:
-    explicit ReferenceBackend(Executor& executor) : executor_(executor) {}
+    ReferenceBackend(Executor& executor, const Variation& variation) : executor_(executor), variation_(variation) {}
     std::string name() const override { return "reference"; }
     std::string device() const override { return "fp64 reference, scalar"; }
     Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override {
@@ -200,7 +203,7 @@ class ReferenceBackend final : public render::Backend {
         Level level0 = projectAll(draws, mode);
         projectStrands(draws, chunks_, level0);
         projectMeshes(draws, chunks_, level0);
-        if (mode.blendsSplats) blendDiscs(draws, placedDiscs(draws, chunks_), level0);
+        if (mode.blendsSplats && !variation_.showDiscs) blendDiscs(draws, placedDiscs(draws, chunks_), level0);
         const Level own = level0;
         if (mode.hasPyramid) reconstruct(level0, draws.view);
         finishTubes(draws.view, level0);
@@ -222,8 +225,16 @@ class ReferenceBackend final : public render::Backend {
         const lod::View& v = draws.view;
         Level level{static_cast<int>(v.width), static_cast<int>(v.height), {}};
         level.samples.resize(size_t{v.width} * v.height);
-        if (mode.blendsSplats) return level;
-        const std::vector<PlacedDisc> discs = placedDiscs(draws, chunks_);
+        if (mode.blendsSplats && !variation_.showDiscs) return level;
+        std::vector<PlacedDisc> discs = placedDiscs(draws, chunks_);
+        for (PlacedDisc& d : discs) {
+            if (!variation_.hasColours) d.colour = dvec3(0.6);
+            if (variation_.lightsPoints) d.colour *= lightOn(towardsEye(d, v), draws.frame, false);
+        }
+        if (variation_.showDiscs) {
+            variation_.showDiscs(draws, discs, level);
+            return level;
+        }
         if (mode.fillsSplats) {
             showSplats(draws, discs, level);
             return level;
@@ -237,6 +248,10 @@ class ReferenceBackend final : public render::Backend {
         }
         showWide(draws, wide, level);
         return level;
+    }
+
+    static dvec3 towardsEye(const PlacedDisc& d, const lod::View& v) {
+        return glm::dot(d.normal, sightOf(v, d.centre)) > 0 ? -d.normal : d.normal;
     }
 
     /// A disc to the pixel of its centre, or, where `besideToo` and it reaches in, to one at the border.
@@ -271,15 +286,16 @@ class ReferenceBackend final : public render::Backend {
         s.colour = d.colour;
     }
 
-    static void reconstruct(Level& level0, const lod::View& view) {
+    void reconstruct(Level& level0, const lod::View& view) const {
         double largest = 0;
         for (const Sample& s : level0.samples) largest = std::max(largest, s.valid ? s.radius : 0.0);
         const int count = 1 + toWhole<int>(std::ceil(std::log2(std::max(2.0, 2 * largest))));
         std::vector<Level> pyramid{level0};
         while (static_cast<int>(pyramid.size()) < count && (pyramid.back().width > 1 || pyramid.back().height > 1))
-            pyramid.push_back(pullLevel(pyramid.back(), std::ldexp(1.0, static_cast<int>(pyramid.size()) - 1), view));
+            pyramid.push_back(pullLevel(pyramid.back(), std::ldexp(1.0, static_cast<int>(pyramid.size()) - 1), view,
+                                        variation_.pullsContained));
         for (size_t l = pyramid.size() - 1; l-- > 0;)
-            pushLevel(pyramid[l], pyramid[l + 1], std::ldexp(1.0, static_cast<int>(l)), view);
+            pushLevel(pyramid[l], pyramid[l + 1], std::ldexp(1.0, static_cast<int>(l)), view, variation_.kernel);
         level0 = std::move(pyramid[0]);
     }
 
@@ -314,10 +330,9 @@ class ReferenceBackend final : public render::Backend {
                     } else if (f.debugView == shared::kDebugNormals) {
                         colour = 0.5 + 0.5 * dvec3(n.x, -n.y, -n.z);
                     } else if (f.debugView == shared::kDebugNone &&
-                               (s.isTriangle ||
-                                ((f.shade & shared::kShadeLit) != 0 && (!draws.lights.empty() || draws.environment)))) {
+                               (s.isTriangle || (isLit(f) && (!draws.lights.empty() || draws.environment)))) {
                         colour = shadeTriangle(s, n, viewRay(v, p).at(depth), draws);
-                    } else if ((f.shade & shared::kShadeLit) != 0 && f.debugView == shared::kDebugNone) {
+                    } else if (isLit(f) && f.debugView == shared::kDebugNone) {
                         colour *= lightOn(n, f, s.letsLightThrough(pixelsAt(v, s.depth)));
                     }
                     if (wantAll) {
@@ -337,7 +352,12 @@ class ReferenceBackend final : public render::Backend {
         });
     }
 
+    bool isLit(const shared::FrameConstants& f) const {
+        return (f.shade & shared::kShadeLit) != 0 && !variation_.lightsPoints;
+    }
+
     Executor& executor_;
+    const Variation variation_;
     Chunks chunks_;
     render::Image image_;  ///< of the last frame, until it is read
     bool isRead_ = true;
@@ -363,7 +383,11 @@ dvec3 debugColour(const shared::FrameConstants& f, const lod::Node& node, const 
 }
 
 std::unique_ptr<render::Backend> makeReferenceBackend(Executor& executor) {
-    return std::make_unique<ReferenceBackend>(executor);
+    return std::make_unique<ReferenceBackend>(executor, Variation{});
+}
+
+std::unique_ptr<render::Backend> makeReferenceBackend(Executor& executor, const Variation& variation) {
+    return std::make_unique<ReferenceBackend>(executor, variation);
 }
 
 }  // namespace stipple::reference

@@ -3,9 +3,12 @@
 
 #include <algorithm>
 #include <glm/glm.hpp>
+#include <memory>
 #include <unordered_map>
 #include <vector>
 
+#include "engine/base/executor.h"
+#include "engine/render/backend.h"
 #include "engine/render/draw_list.h"
 #include "lod/store/chunk.h"
 
@@ -52,7 +55,22 @@ struct Level {
     }
 };
 
+struct PlacedDisc;
+/// How a comparison variant (variants/) departs from its mode; as it is here: not at all.
+struct Variation {
+    /// Instead of the mode's own points.
+    void (*showDiscs)(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level) = nullptr;
+    /// Weight of a splat in the push at rho^2 < 1, instead of (1 - rho^2)^2.
+    double (*kernel)(double rho2) = nullptr;
+    bool pullsContained = false;  ///< only those children whose ellipses contain their parent's centre
+    bool lightsPoints = false;    ///< before they are blended, each by its own normal
+    bool hasColours = true;
+};
+
 using Chunks = std::unordered_map<uint64_t, lod::Chunk>;  ///< by source << 32 | chunk
+
+/// The restating backend, but for how it varies.
+std::unique_ptr<render::Backend> makeReferenceBackend(Executor& executor, const Variation& variation);
 
 /// The rotation that takes the unit vector v to z the shortest way (Rodrigues).
 glm::dmat3 rotationToZ(const glm::dvec3& v);

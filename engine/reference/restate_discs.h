@@ -27,8 +27,14 @@ void showWide(const render::DrawList& draws, const std::vector<PlacedDisc>& disc
 /// Every pixel whose ray meets a disc, and that of each disc's centre: the nearest.
 void showSplats(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level);
 
+/// What comparison variants leave out of blending.
+struct BlendVariation {
+    bool movesDiscsAway = false;  ///< fronts are those of discs farther along the axis, not along each ray
+    bool isNormalised = true;     ///< sums count as they are, as if every pixel had that of a grid
+};
 /// Before the level's exact pixels, and in the place of what is not there: discs blended by their kernels.
-void blendDiscs(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level);
+void blendDiscs(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level,
+                const BlendVariation& variation = {});
 
 /// A pixel that shows a disc, and no ellipse. `n`: unit, towards the eye.
 Sample shownPixel(const lod::View& view, const glm::dvec2& at, double depth, const glm::dvec3& n,

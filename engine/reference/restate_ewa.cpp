@@ -67,8 +67,10 @@ struct Gathered {
 
 class Filter {
   public:
-    Filter(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level)
+    Filter(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level,
+           const BlendVariation& variation)
         : view_(draws.view),
+          variation_(variation),
           support_(double{draws.frame.kernelSupport}),
           lowPass_(double{draws.frame.lowPass}),
           level_(level),
@@ -145,23 +147,25 @@ class Filter {
 
     void offerFront(int x, int y, const PlacedDisc& d, const ViewRay& ray, double depth) {
         Gathered& p = pixel(x, y);
-        const double limit = depth + roughness(d) / glm::length(ray.direction);
+        const double limit = depth + (variation_.movesDiscsAway ? 0 : roughness(d) / glm::length(ray.direction));
         if (limit >= p.limit) return;
         p.limit = limit;
         p.front = &d;
         p.frontDepth = depth;
     }
-    void findFronts(const PlacedDisc& d) {
+    void findFronts(const PlacedDisc& disc) {
+        PlacedDisc d = disc;
+        if (variation_.movesDiscsAway) d.centre.z += roughness(d);
         forPixels(d, d.radius, 0, [&](int x, int y, const ViewRay& ray) {
             const double depth = depthOnPlane(d, ray);
-            if (isMet(d, ray, depth)) offerFront(x, y, d, ray, depth);
+            if (isMet(d, ray, depth)) offerFront(x, y, disc, ray, depth);
         });
         if (!(d.centre.z > view_.nearPlane)) return;
         const dvec2 c = imageOf(view_, d.centre);
         if (!(c.x >= 0 && c.y >= 0 && c.x < level_.width && c.y < level_.height)) return;
         const int x = static_cast<int>(c.x), y = static_cast<int>(c.y);
         const ViewRay ray = viewRay(view_, dvec2(x + 0.5, y + 0.5));
-        if (!isMet(d, ray, depthOnPlane(d, ray))) offerFront(x, y, d, ray, depthWithin(rangeOf(d), d, ray));
+        if (!isMet(d, ray, depthOnPlane(d, ray))) offerFront(x, y, disc, ray, depthWithin(rangeOf(d), d, ray));
     }
 
     void add(const PlacedDisc& d) {
@@ -230,7 +234,8 @@ class Filter {
                 const dvec2 at(x + 0.5, y + 0.5);
                 if (p.weight > 1.0 / 1024) {
                     s = shownPixel(view_, at, view_.isOrthographic ? p.linear / p.weight : p.weight / p.linear,
-                                   glm::normalize(p.normal), p.colour / p.weight, (d.flags & shared::kFlagLoose) != 0);
+                                   glm::normalize(p.normal), p.colour / (variation_.isNormalised ? p.weight : grid),
+                                   (d.flags & shared::kFlagLoose) != 0);
                 } else {
                     const dvec3 n = glm::dot(d.normal, sightOf(view_, d.centre)) > 0 ? -d.normal : d.normal;
                     s = shownPixel(view_, at, p.frontDepth, n, d.colour, (d.flags & shared::kFlagLoose) != 0);
@@ -240,6 +245,7 @@ class Filter {
     }
 
     const lod::View& view_;
+    BlendVariation variation_;
     double support_, lowPass_;
     Level& level_;
     std::vector<Gathered> pixels_;
@@ -249,8 +255,9 @@ class Filter {
 
 }  // namespace
 
-void blendDiscs(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level) {
-    Filter(draws, discs, level).run();
+void blendDiscs(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level,
+                const BlendVariation& variation) {
+    Filter(draws, discs, level, variation).run();
 }
 
 }  // namespace stipple::reference
