@@ -120,5 +120,6 @@ void setupView(CLI::App& app, int& status);
 void setupCompare(CLI::App& app, int& status);
 void setupGrow(CLI::App& app, int& status);
 void setupConvert(CLI::App& app, int& status);
+void setupStudy(CLI::App& app, int& status);
 
 }  // namespace stipple::app
