@@ -371,10 +371,21 @@ void appendTriangles(const Node& node, const Chunk& chunk, uint32_t firstCluster
 double farthestCorner(const std::vector<Corners>& from, const std::vector<Corners>& to) {
     constexpr size_t kCorners = 24;
     double worst = 0;
+    // Balls around the triangles: what is farther than the nearest so far is not looked at.
+    std::vector<glm::dvec4> balls;
+    balls.reserve(to.size());
+    for (const auto& [a, b, c] : to) {
+        const glm::dvec3 m = (a + b + c) * (1.0 / 3);
+        balls.emplace_back(m, 1.000001 * std::max({glm::length(a - m), glm::length(b - m), glm::length(c - m)}));
+    }
     for (size_t k = 0; k < kCorners; ++k) {
         const glm::dvec3& p = from[k * from.size() / kCorners].at(k % 3);
         double nearest = 1e300;
-        for (const auto& [a, b, c] : to) {
+        for (size_t i = 0; i < to.size(); ++i) {
+            const glm::dvec3 off = p - glm::dvec3(balls[i]);
+            const double reach = nearest + balls[i].w;
+            if (glm::dot(off, off) > reach * reach) continue;
+            const auto& [a, b, c] = to[i];
             const glm::dvec2 w = closestWeights(p, a, b, c);
             nearest = std::min(nearest, glm::length(p - (a + w.x * (b - a) + w.y * (c - a))));
         }

@@ -2,6 +2,7 @@
 #include "lod/builder/mesh/parts.h"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 #include <numeric>
 
@@ -148,16 +149,20 @@ bool PartFinder::place(PlacedBlock& placed, size_t block) const {
 
 uint32_t partsOf(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& indices,
                  std::vector<uint32_t>& ofTriangle) {
-    // Vertices of one position are one: sorted by position, each refers to the first.
-    std::vector<uint32_t> order(local.global.size()), parent(local.global.size());
-    std::iota(order.begin(), order.end(), 0u);
-    const auto positionOf = [&](uint32_t v) { return mesh.position[local.global[local.beforeMove(v)]]; };
-    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
-        return positionOf(a) != positionOf(b) ? positionOf(a) < positionOf(b) : a < b;
-    });
+    // Vertices of one position are one: each refers to the first of its position, found by hash.
+    std::vector<uint32_t> parent(local.global.size());
     std::iota(parent.begin(), parent.end(), 0u);
-    for (size_t i = 1; i < order.size(); ++i)
-        if (positionOf(order[i]) == positionOf(order[i - 1])) unite(parent, order[i - 1], order[i]);
+    const auto positionOf = [&](uint32_t v) { return mesh.position[local.global[local.beforeMove(v)]]; };
+    std::vector<uint32_t> first(std::bit_ceil(2 * local.global.size() + 1), kNone);
+    for (uint32_t v = 0; v < local.global.size(); ++v) {
+        const uint32_t position = positionOf(v);
+        size_t at = position * 0x9e3779b97f4a7c15ull >> 32 & (first.size() - 1);
+        while (first[at] != kNone && positionOf(first[at]) != position) at = (at + 1) & (first.size() - 1);
+        if (first[at] == kNone)
+            first[at] = v;
+        else
+            unite(parent, first[at], v);
+    }
     for (size_t i = 0; i < indices.size(); i += 3) {
         unite(parent, indices[i], indices[i + 1]);
         unite(parent, indices[i], indices[i + 2]);

@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "engine/base/numbers.h"
 #include "lod/builder/mesh/parts.h"
@@ -26,11 +25,13 @@ constexpr double kFewestOf = 0.02;                 ///< of what it covered: less
 constexpr int kRowsOfPart = 6, kRowsOfGroup = 24;  ///< see coverOf
 constexpr double kCloseEnough = 1e-3;
 
-using Field = std::function<glm::dvec3(uint32_t vertex)>;
+/// By number of vertex in a part: where it may move, or how far along.
+using Places = std::vector<glm::dvec3>;
 
 /// One part of a group while it is simplified; indices into `at`.
 struct Part {
     std::vector<uint32_t> fine, coarse;  ///< local vertices, 3 a triangle
+    PartShape shape;                     ///< of `fine`
     double wanted = 0, reached = 0;      ///< mean projected area
     bool isCoarser = false;
 };
@@ -40,30 +41,38 @@ struct Part {
 class Coverage {
   public:
     Coverage(const WeldedMesh& mesh, const LocalMesh& local) : mesh_(mesh), local_(local) {}
+    /// `at(i)`: where the i-th corner is.
     template <typename At>
     double of(const std::vector<uint32_t>& indices, const At& at) const {
         std::array<double, kCoverDirections> front{}, back{};
         double oneSided = 0;
+        bool isAnyTwoSided = false;
         for (size_t i = 0; i < indices.size(); i += 3) {
-            const glm::dvec3 a = at(indices[i]), n = 0.5 * glm::cross(at(indices[i + 1]) - a, at(indices[i + 2]) - a);
+            const glm::dvec3 a = at(i), n = 0.5 * glm::cross(at(i + 1) - a, at(i + 2) - a);
             if ((mesh_.vertices.low[local_.global[indices[i]]].surface & shared::kSurfaceTwoSided) == 0) {
                 oneSided += 0.25 * glm::length(n);
                 continue;
             }
+            isAnyTwoSided = true;
             for (size_t d = 0; d < kCoverDirections; ++d) {
-                const double share = glm::dot(n, coverDirections().at(d).to);
+                const double share = glm::dot(n, directions_.at(d).to);
                 (share > 0 ? front : back).at(d) += std::abs(share);
             }
         }
+        if (!isAnyTwoSided) return oneSided;
         double sum = 0;
         for (size_t d = 0; d < kCoverDirections; ++d)
-            sum += coverDirections().at(d).share * std::max(front.at(d), back.at(d));
+            sum += directions_.at(d).share * std::max(front.at(d), back.at(d));
         return sum + oneSided;
+    }
+    double of(const std::vector<uint32_t>& indices) const {
+        return of(indices, [&](size_t i) { return glm::dvec3(local_.position[indices[i]]); });
     }
 
   private:
     const WeldedMesh& mesh_;
     const LocalMesh& local_;
+    const std::array<CoverDirection, kCoverDirections>& directions_ = coverDirections();
 };
 
 /// The line that a part bends round: its longest axis, bent by a polynomial of as high a degree as its vertices tell.
@@ -126,9 +135,9 @@ class Widening {
 
     /// Where the vertices of `part` are to be so that it covers what is wanted, as far as that goes: by vertex.
     void widen(Part& part, std::vector<glm::dvec3>& to) {
-        const PartShape shape = shapeOf(part.fine, local_);
+        const PartShape& shape = part.shape;
         collect(part);
-        const double now = coverage_.of(part.coarse, [&](uint32_t v) { return at(v); });
+        const double now = coverage_.of(part.coarse);
         part.reached = now;
         if (now < kFewestOf * part.wanted || part.wanted <= 0) return;
         if (shape.thickness > kThickPart) {
@@ -136,23 +145,24 @@ class Widening {
             return;
         }
         const Bend bend(part.fine, local_, shape);
-        const auto across = [&](uint32_t v) { return bend.across(at(v)); };
-        const auto along = [&](uint32_t v) { return normal_[slot(v)]; };
-        const auto straight = [&](uint32_t v) { return bend.straight(at(v)); };
-        Move best = solve(part, now, part.wanted / now - 1, kMostWiden - 1, across);
-        Field field = across;
-        const auto tryAlso = [&](const Move& move, const Field& by) {
+        across_.clear();
+        for (const glm::dvec3& p : at_) across_.push_back(bend.across(p));
+        Move best = solve(part, now, part.wanted / now - 1, kMostWiden - 1, across_);
+        const Places* field = &across_;
+        const auto tryAlso = [&](const Move& move, const Places& by) {
             if (!move.isBetterThan(best, part.wanted)) return;
             best = move;
-            field = by;
+            field = &by;
         };
         if (part.wanted > now) {
-            const double reach = typical(part, across);
-            tryAlso(solve(part, now, reach * (part.wanted / now - 1), reach * kMostWiden, along), along);
+            const double reach = typical(across_);
+            tryAlso(solve(part, now, reach * (part.wanted / now - 1), reach * kMostWiden, normal_), normal_);
         } else {
-            tryAlso(solve(part, now, part.wanted / now - 1, kMostWiden - 1, straight), straight);
+            straight_.clear();
+            for (const glm::dvec3& p : at_) straight_.push_back(bend.straight(p));
+            tryAlso(solve(part, now, part.wanted / now - 1, kMostWiden - 1, straight_), straight_);
         }
-        for (const uint32_t v : vertices_) to[v] = at(v) + best.by * field(v);
+        for (size_t k = 0; k < vertices_.size(); ++k) to[vertices_[k]] = at_[k] + best.by * (*field)[k];
         part.reached = best.covers;
     }
 
@@ -167,10 +177,6 @@ class Widening {
         }
     };
 
-    glm::dvec3 at(uint32_t v) const { return glm::dvec3(local_.position[v]); }
-    size_t slot(uint32_t v) const {
-        return static_cast<size_t>(std::lower_bound(vertices_.begin(), vertices_.end(), v) - vertices_.begin());
-    }
     uint32_t positionOf(uint32_t v) const { return mesh_.position[local_.global[v]]; }
 
     /// The vertices that are left and their normals, one for all of a position.
@@ -178,41 +184,48 @@ class Widening {
         vertices_ = part.coarse;
         std::sort(vertices_.begin(), vertices_.end());
         vertices_.erase(std::unique(vertices_.begin(), vertices_.end()), vertices_.end());
-        std::vector<std::pair<uint32_t, uint32_t>> byPosition;
-        for (uint32_t k = 0; k < vertices_.size(); ++k) byPosition.emplace_back(positionOf(vertices_[k]), k);
-        std::sort(byPosition.begin(), byPosition.end());
+        at_.clear();
+        for (const uint32_t v : vertices_) at_.emplace_back(local_.position[v]);
+        corner_.clear();
+        for (const uint32_t v : part.coarse)
+            corner_.push_back(
+                static_cast<uint32_t>(std::lower_bound(vertices_.begin(), vertices_.end(), v) - vertices_.begin()));
+        byPosition_.clear();
+        for (uint32_t k = 0; k < vertices_.size(); ++k) byPosition_.emplace_back(positionOf(vertices_[k]), k);
+        std::sort(byPosition_.begin(), byPosition_.end());
         normal_.assign(vertices_.size(), glm::dvec3(0));
-        for (size_t i = 0; i < part.coarse.size(); i += 3) {
-            const glm::dvec3 a = at(part.coarse[i]);
-            const glm::dvec3 n = glm::cross(at(part.coarse[i + 1]) - a, at(part.coarse[i + 2]) - a);
-            for (size_t k = 0; k < 3; ++k) normal_[slot(part.coarse[i + k])] += n;
+        for (size_t i = 0; i < corner_.size(); i += 3) {
+            const glm::dvec3& a = at_[corner_[i]];
+            const glm::dvec3 n = glm::cross(at_[corner_[i + 1]] - a, at_[corner_[i + 2]] - a);
+            for (size_t k = 0; k < 3; ++k) normal_[corner_[i + k]] += n;
         }
-        for (size_t i = 0; i < byPosition.size();) {
+        for (size_t i = 0; i < byPosition_.size();) {
             size_t j = i;
             glm::dvec3 sum(0);
-            for (; j < byPosition.size() && byPosition[j].first == byPosition[i].first; ++j)
-                sum += normal_[byPosition[j].second];
+            for (; j < byPosition_.size() && byPosition_[j].first == byPosition_[i].first; ++j)
+                sum += normal_[byPosition_[j].second];
             const double length = glm::length(sum);
-            for (; i < j; ++i) normal_[byPosition[i].second] = length > 0 ? sum / length : glm::dvec3(0);
+            for (; i < j; ++i) normal_[byPosition_[i].second] = length > 0 ? sum / length : glm::dvec3(0);
         }
     }
 
-    template <typename Displacement>
-    double typical(const Part& part, const Displacement& field) const {
+    /// Mean over the corners.
+    double typical(const Places& field) const {
         double sum = 0;
-        for (const uint32_t v : part.coarse) sum += glm::length(field(v));
-        return sum / static_cast<double>(part.coarse.size());
+        for (const uint32_t k : corner_) sum += glm::length(field[k]);
+        return sum / static_cast<double>(corner_.size());
     }
 
     /// How much of `field` makes the part cover what is wanted: secants, from a guess, up to `most`.
-    template <typename Displacement>
-    Move solve(const Part& part, double now, double guess, double most, const Displacement& field) const {
+    Move solve(const Part& part, double now, double guess, double most, const Places& field) {
         double low = 0, lowCovers = now;
         Move move{std::clamp(guess, -kMostNarrow, most), 0, 0};
         constexpr int kSteps = 8;
         Move best{0, now, 0};
         for (int k = 0; k < kSteps; ++k) {
-            move.covers = coverage_.of(part.coarse, [&](uint32_t v) { return at(v) + move.by * field(v); });
+            moved_.clear();
+            for (size_t i = 0; i < at_.size(); ++i) moved_.push_back(at_[i] + move.by * field[i]);
+            move.covers = coverage_.of(part.coarse, [&](size_t i) { return moved_[corner_[i]]; });
             if (std::abs(move.covers - part.wanted) < std::abs(best.covers - part.wanted)) best = move;
             if (std::abs(move.covers - part.wanted) <= kCloseEnough * part.wanted) break;
             const double slope = (move.covers - lowCovers) / (move.by - low);
@@ -223,16 +236,18 @@ class Widening {
             move.by = std::clamp(next, -kMostNarrow, most);
             if (move.by == low) break;
         }
-        for (const uint32_t v : vertices_)
-            best.farthest = std::max(best.farthest, std::abs(best.by) * glm::length(field(v)));
+        for (const glm::dvec3& by : field) best.farthest = std::max(best.farthest, std::abs(best.by) * glm::length(by));
         return best;
     }
 
     const WeldedMesh& mesh_;
     const LocalMesh& local_;
     const Coverage& coverage_;
-    std::vector<uint32_t> vertices_;  ///< of the part, ascending
-    std::vector<glm::dvec3> normal_;  ///< of each
+    std::vector<uint32_t> vertices_;    ///< of the part, ascending
+    std::vector<uint32_t> corner_;      ///< of each corner its vertex's number in these
+    Places at_, normal_;                ///< of each vertex
+    Places across_, straight_, moved_;  ///< of each, while a part is widened
+    std::vector<std::pair<uint32_t, uint32_t>> byPosition_;
 };
 
 /// Vertices that moved, as new ones.
@@ -289,9 +304,10 @@ class PartGroup {
     void simplify(size_t target) {
         std::vector<std::vector<PartVersion>> versions;
         versions.reserve(parts_.size());
-        for (const Part& part : parts_) {
+        for (Part& part : parts_) {
+            part.shape = shapeOf(part.fine, local_);
             const uint32_t surface = mesh_.vertices.low[local_.global[part.fine[0]]].surface;
-            versions.push_back(versionsOf(part.fine, local_, (surface & shared::kSurfaceTwoSided) != 0));
+            versions.push_back(versionsOf(part.fine, part.shape, local_, (surface & shared::kSurfaceTwoSided) != 0));
         }
         const std::vector<uint32_t> chosen = chooseVersions(versions, target);
         for (size_t k = 0; k < parts_.size(); ++k) {
@@ -304,7 +320,7 @@ class PartGroup {
     void widenParts() {
         double covered = 0, able = 0;
         for (Part& part : parts_) {
-            part.wanted = part.reached = coverage_.of(part.fine, from());
+            part.wanted = part.reached = coverage_.of(part.fine);
             if (part.isCoarser) {
                 part.wanted *= hiddenMore(part);
                 widening_.widen(part, to_);
@@ -349,10 +365,10 @@ class PartGroup {
     double hiddenMore(const Part& part) const {
         // Of leaves, of which both sides count, Coverage knows it well enough.
         if ((mesh_.vertices.low[local_.global[part.fine[0]]].surface & shared::kSurfaceTwoSided) != 0) return 1;
-        const glm::dvec3 axis = shapeOf(part.fine, local_).axis;
+        const glm::dvec3& axis = part.shape.axis;
         const double coarse = coverOf(trianglesOf(mesh_, local_, part.coarse, from()), axis, kRowsOfPart),
                      fine = coverOf(trianglesOf(mesh_, local_, part.fine, from()), axis, kRowsOfPart);
-        const double ofArea = fine * coverage_.of(part.coarse, from()), area = coarse * coverage_.of(part.fine, from());
+        const double ofArea = fine * coverage_.of(part.coarse), area = coarse * coverage_.of(part.fine);
         return area > 0 ? std::clamp(ofArea / area, 0.5, 2.0) : 1;
     }
 

@@ -35,6 +35,27 @@ Alone aloneOf(const std::vector<uint32_t>& part, const LocalMesh& local) {
     return out;
 }
 
+/// All vertices lie at edges with one triangle, so that nothing can go while those stay: of most leaves. (False where
+/// it would take long to say.)
+bool isBorderOnly(const Alone& mesh) {
+    constexpr size_t kFew = 64;
+    const size_t vertices = mesh.position.size(), corners = mesh.indices.size();
+    if (vertices > kFew || corners > 3 * kFew) return false;
+    // Vertices of one position are a seam, which is no border.
+    for (size_t v = 0; v < vertices; ++v)
+        for (size_t w = 0; w < v; ++w)
+            if (mesh.position[v] == mesh.position[w]) return false;
+    uint64_t onBorder = 0;
+    for (size_t i = 0; i < corners; ++i) {
+        const uint32_t a = mesh.indices[i], b = mesh.indices[i % 3 == 2 ? i - 2 : i + 1];
+        bool isOpen = true;
+        for (size_t j = 0; j < corners && isOpen; ++j)
+            isOpen = mesh.indices[j] != b || mesh.indices[j % 3 == 2 ? j - 2 : j + 1] != a;
+        if (isOpen) onBorder |= uint64_t{1} << a | uint64_t{1} << b;
+    }
+    return onBorder == ~uint64_t{0} >> (kFew - vertices);
+}
+
 /// Largest distance of corners and centres of `from` from `to`; some of them where there are many.
 float distanceOf(const Alone& mesh, const std::vector<uint32_t>& from, const std::vector<uint32_t>& to, float enough) {
     float worst = 0;
@@ -187,11 +208,14 @@ PartShape shapeOf(const std::vector<uint32_t>& indices, const LocalMesh& local) 
     return shape;
 }
 
-std::vector<PartVersion> versionsOf(const std::vector<uint32_t>& part, const LocalMesh& local, bool isTwoSided) {
+std::vector<PartVersion> versionsOf(const std::vector<uint32_t>& part, const PartShape& shape, const LocalMesh& local,
+                                    bool isTwoSided) {
     const Alone mesh = aloneOf(part, local);
     std::vector<std::vector<uint32_t>> candidates;
     const size_t triangles = part.size() / 3;
-    for (const unsigned options : {unsigned{meshopt_SimplifyLockBorder}, 0u})
+    const bool isAllBorder = isBorderOnly(mesh);
+    for (const unsigned options : {unsigned{meshopt_SimplifyLockBorder}, 0u}) {
+        if (options != 0 && isAllBorder) continue;
         for (const size_t share : {size_t{2}, size_t{4}}) {
             if (triangles / share < 2) continue;
             std::vector<uint32_t> coarse(part.size());
@@ -200,9 +224,9 @@ std::vector<PartVersion> versionsOf(const std::vector<uint32_t>& part, const Loc
                                            options, nullptr));
             if (!coarse.empty() && coarse.size() < part.size()) candidates.push_back(std::move(coarse));
         }
+    }
     constexpr size_t kMostForStrip = 64;
-    if (const PartShape shape = shapeOf(part, local); triangles <= kMostForStrip && shape.thickness <= kThickPart)
-        addStrips(mesh, shape, isTwoSided, candidates);
+    if (triangles <= kMostForStrip && shape.thickness <= kThickPart) addStrips(mesh, shape, isTwoSided, candidates);
     // What bends may be far too wide if it is cut short.
     const float most = kMostArea * areaOf(mesh, mesh.indices);
     std::erase_if(candidates, [&](const auto& c) { return c.size() >= part.size() || areaOf(mesh, c) > most; });

@@ -21,7 +21,9 @@ struct PartVersion {
     float cost = 0;                 ///< lattice units: about how far it is from the part, both ways
 };
 /// From fine to coarse, each dearer than the one before; the part itself is the first.
-std::vector<PartVersion> versionsOf(const std::vector<uint32_t>& part, const LocalMesh& local, bool isTwoSided);
+/// `shape`: shapeOf(part).
+std::vector<PartVersion> versionsOf(const std::vector<uint32_t>& part, const PartShape& shape, const LocalMesh& local,
+                                    bool isTwoSided);
 
 /// For each part the version to take, so that all have about `target` indices or fewer at the least largest cost.
 std::vector<uint32_t> chooseVersions(const std::vector<std::vector<PartVersion>>& parts, size_t target);
