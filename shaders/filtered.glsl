@@ -1,4 +1,4 @@
-// Discs blended by their kernels: fronts, sums and what pixels show of them. Sums are integers (kSumUnit): they are the
+// Discs blended by their kernels: fronts, sums and what pixels show of them. Sums are integers (sumUnit): they are the
 // same whatever the order in which threads come.
 #extension GL_GOOGLE_include_directive : require
 #include "discs.glsl"
@@ -72,10 +72,11 @@ void offerFront(WideDisc d, float rough, EwaKernel k, DepthRange range, ivec2 pi
     if (r.rho2 < frame.kernelSupport * frame.kernelSupport && k.amplitude > 0.0) {
         atomicMin(fronts[at].first, d.id);
         atomicMin(fronts[at].nearest, floatBitsToUint(r.depth));
+        if (!isCentre) atomicAdd(fronts[at].count, 1u);
     }
 }
 
-int unitsOf(float v) { return int(floor(v * kSumUnit + 0.5)); }
+int unitsOf(float v) { return int(floor(v + 0.5)); }
 // How much deeper than the reference, from -1 to 1: in perspective of its inverse, orthographic in 512ths of its pixels.
 float relativeDepth(float depth, float reference) {
     const float far = frame.orthographic != 0u ? (depth - reference) * frame.focal * 0.001953125 : reference / depth - 1.0;
@@ -96,7 +97,7 @@ void addKernel(WideDisc d, vec3 colour, EwaKernel k, DepthRange range, ivec2 pix
     }
     const float support = frame.kernelSupport;
     if (!(r.rho2 < support * support)) return;
-    const float w = k.amplitude * kernelAt(r.rho2, kernelEnd(support));
+    const float w = k.amplitude * kernelAt(r.rho2, kernelEnd(support)) * sumUnit(front);
     const vec3 n = towardsEye(d);
     atomicAdd(sums[at].weight, unitsOf(w));
     atomicAdd(sums[at].depth, unitsOf(w * relativeDepth(r.depth, sums[at].reference)));

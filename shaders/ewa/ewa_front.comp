@@ -2,11 +2,12 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../filtered.glsl"
+#include "../left_discs.glsl"
 layout(local_size_x = 256) in;
 
 const int kMostPixels = 1024;
 
-void main() {
+void offerOwn() {
     const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * kGroupsPerDimension;
     if (block >= frame.firstBlock.curves) return;
     const DrawBlock source = blocks[block];
@@ -33,9 +34,30 @@ void main() {
         const uint place = atomicAdd(discCount, 1u);
         if (place < kDiscCapacity) {
             discs[place] = d;
-            return;
+        } else {
+            leave(id);
         }
+        return;
     }
     for (int y = box.first.y; y <= box.last.y; ++y)
         for (int x = box.first.x; x <= box.last.x; ++x) offerFront(d, rough, k, range, ivec2(x, y), false);
+}
+
+void main() {
+    leaveNone();
+    offerOwn();
+    barrier();
+    for (uint i = 0u; i < leftCount; ++i) {
+        DrawNode node;
+        const PointRecord r = recordOf(leftIds[i], node);
+        const Lens lens = frameLensHere();
+        const WideDisc d = opaqueDisc(node, r, leftIds[i]);
+        const float sigma = d.radius / kOpaqueSigmas;
+        const EwaKernel k = ewaKernel(d, sigma, frame.kernelSupport, frame.lowPass, lens);
+        const DepthRange range = depthRange(d, sigma, frame.kernelSupport, frame.lowPass, lens);
+        const PixelBox box = boxOf(d, k);
+        const int pixels = pixelsOf(box.first, box.last);
+        for (int p = int(gl_LocalInvocationID.x); p < pixels; p += 256)
+            offerFront(d, roughness(d, r), k, range, pixelOf(p, box.first, box.last), false);
+    }
 }

@@ -146,9 +146,17 @@ struct FilteredFront {
     uint64_t key;  // of the front disc, its depth moved back
     uint first;    // least id of those whose kernels reach the pixel
     uint nearest;  // bits of the least of their depths
+    uint count;    // of them, less one: ~0 is none
+    uint unused;
 };
-// Weights in 2^17ths: up to 16,000 discs at a pixel fit (of one store, a leaf and those above it).
-const float kSumUnit = 131072.0f;
+// The gpu's sums are whole numbers. What 1 is in them: 2^24 where at most 64 kernels reach the pixel, less where more
+// do, so that no sum exceeds 2^30 and a half for each of 2^30 kernels that are rounded up.
+SHARED_FN float sumUnit(FilteredFront front) {
+    const uint count = front.count + 1u;
+    float unit = 16777216.0f;
+    for (uint most = 64u; most < count && unit > 1.0f; most += most) unit *= 0.5f;
+    return unit;
+}
 struct FilteredSums {
     int weight;
     int depth;

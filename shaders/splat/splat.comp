@@ -3,6 +3,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../discs.glsl"
+#include "../left_discs.glsl"
 #include "../shared/splat_disc.h"
 layout(local_size_x = 256) in;
 
@@ -12,20 +13,33 @@ void offer(int x, int y, float depth, uint id) {
     atomicMin(visibility[uint(y) * frame.width + uint(x)], visibilityKey(floatBitsToUint(depth), drawId(0u, id)));
 }
 
-void main() {
-    const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * kGroupsPerDimension;
-    if (block >= frame.firstBlock.curves) return;
+// The disc of a lane of this block; radius -1: it is not drawn.
+WideDisc discOf(uint block, uint lane) {
+    WideDisc d;
+    d.centre = d.normal = vec3(0.0);
+    d.radius = -1.0;
+    d.id = 0u;
     const DrawBlock source = blocks[block];
     const DrawNode node = nodes[source.node];
-    const uint index = source.first + gl_LocalInvocationID.x;
-    if (index >= node.count) return;
-    const PointRecord r = Records(uvec2(node.addressLow, node.addressHigh)).records[index];
-    const WideDisc d = splatDisc(node, r, frame.supportScale, largestSplat(kFlagScattered, frame.focal, frame.height), block * kRecordsPerBlock + gl_LocalInvocationID.x, frameLensHere());
-    if (isSplatSeen(node, r, d, frame.nearPlane, frameLensHere()) * reachesPicture(d, frame) < 0.5) return;
-    const float inverseFocal = 1.0 / frame.focal;
+    if (source.first + lane >= node.count) return d;
+    const PointRecord r = Records(uvec2(node.addressLow, node.addressHigh)).records[source.first + lane];
+    d = splatDisc(node, r, frame.supportScale, largestSplat(kFlagScattered, frame.focal, frame.height), block * kRecordsPerBlock + lane, frameLensHere());
+    if (isSplatSeen(node, r, d, frame.nearPlane, frameLensHere()) * reachesPicture(d, frame) < 0.5) d.radius = -1.0;
+    return d;
+}
+
+void offerMet(WideDisc d, ivec2 pixel) {
+    const vec2 ray = (vec2(pixel) + 0.5 - frame.centre) * (1.0 / frame.focal);
+    const float depth = discHit(d, pixelRay(frameLensHere(), ray.x, ray.y), frame.nearPlane).depth;
+    if (depth < kNoDisc) offer(pixel.x, pixel.y, depth, d.id);
+}
+
+void offerOwn(uint block) {
+    const WideDisc d = discOf(block, gl_LocalInvocationID.x);
+    if (d.radius < 0.0) return;
     const CentrePixel c = centrePixel(d, frame);
     if (c.x >= 0) {
-        const vec2 ray = (vec2(c.x, c.y) + 0.5 - frame.centre) * inverseFocal;
+        const vec2 ray = (vec2(c.x, c.y) + 0.5 - frame.centre) * (1.0 / frame.focal);
         if (!(discHit(d, pixelRay(frameLensHere(), ray.x, ray.y), frame.nearPlane).depth < kNoDisc)) offer(c.x, c.y, d.centre.z, d.id);
     }
     const DiscBox box = discBox(d, frame);
@@ -36,13 +50,25 @@ void main() {
         const uint place = atomicAdd(discCount, 1u);
         if (place < kDiscCapacity) {
             discs[place] = d;
-            return;
+        } else {
+            leave(gl_LocalInvocationID.x);
         }
+        return;
     }
     for (int y = box.y.first; y <= box.y.last; ++y)
-        for (int x = box.x.first; x <= box.x.last; ++x) {
-            const vec2 ray = (vec2(x, y) + 0.5 - frame.centre) * inverseFocal;
-            const float depth = discHit(d, pixelRay(frameLensHere(), ray.x, ray.y), frame.nearPlane).depth;
-            if (depth < kNoDisc) offer(x, y, depth, d.id);
-        }
+        for (int x = box.x.first; x <= box.x.last; ++x) offerMet(d, ivec2(x, y));
+}
+
+void main() {
+    const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * kGroupsPerDimension;
+    leaveNone();
+    if (block < frame.firstBlock.curves) offerOwn(block);
+    barrier();
+    for (uint i = 0u; i < leftCount; ++i) {
+        const WideDisc d = discOf(block, leftIds[i]);
+        const DiscBox box = discBox(d, frame);
+        const ivec2 first = ivec2(box.x.first, box.y.first), last = ivec2(box.x.last, box.y.last);
+        const int pixels = pixelsOf(first, last);
+        for (int p = int(gl_LocalInvocationID.x); p < pixels; p += 256) offerMet(d, pixelOf(p, first, last));
+    }
 }

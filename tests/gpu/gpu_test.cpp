@@ -124,9 +124,7 @@ TEST_F(Gpu, BlendedDiscsAreTheOraclesFromAfarFromNearAndOrthographic) {
             SCOPED_TRACE(testing::Message() << view.isOrthographic << ", tau " << tau << ", support " << support);
             lod::View pixels = view;  // depths are compared in pixels at where they are
             if (view.isOrthographic) pixels.focalPixels *= away;
-            // (Orthographic depths are summed in 2^17ths of 512 px; 0.16 px is reached, which that alone does not
-            // explain.)
-            expectSameSurface(a, b, pixels, view.isOrthographic ? 0.25 : 0.1);
+            expectSameSurface(a, b, pixels, 0.1);
             EXPECT_GE(test::drawnPsnr(a, b), 50);
             size_t coverage = 0;
             for (size_t i = 0; i < a.rgba.size(); ++i)
