@@ -64,16 +64,24 @@ RayOnDisc rayOnDisc(WideDisc d, EwaKernel k, DepthRange range, ivec2 pixel) {
     return r;
 }
 
+// A kernel does not reach a pixel, and then nor does the opaque part, whose circle is the smaller one.
+bool isBeyond(EwaKernel k, ivec2 pixel) {
+    const vec2 at = vec2(pixel) + 0.5 - frame.centre;
+    return k.isNear < 0.5 && ewaRho2(k, at.x, at.y) >= frame.kernelSupport * frame.kernelSupport;
+}
+
 // Offers a disc to the front of a pixel.
 void offerFront(WideDisc d, float rough, EwaKernel k, DepthRange range, ivec2 pixel, bool isCentre) {
+    if (!isCentre && isBeyond(k, pixel)) return;
     const RayOnDisc r = rayOnDisc(d, k, range, pixel);
     const uint at = uint(pixel.y) * frame.width + uint(pixel.x);
-    if (r.isMet > 0.5 || isCentre) atomicMin(fronts[at].key, visibilityKey(floatBitsToUint(r.depth + rough * r.along), drawId(0u, d.id)));
-    if (r.rho2 < frame.kernelSupport * frame.kernelSupport && k.amplitude > 0.0) {
-        atomicMin(fronts[at].first, d.id);
-        atomicMin(fronts[at].nearest, floatBitsToUint(r.depth));
-        if (!isCentre) atomicAdd(fronts[at].count, 1u);
-    }
+    const bool isOpaque = r.isMet > 0.5 || isCentre;
+    if (isOpaque) atomicMin(fronts[at].key, visibilityKey(floatBitsToUint(r.depth + rough * r.along), drawId(0u, d.id)));
+    if (isCentre || !(r.rho2 < frame.kernelSupport * frame.kernelSupport && k.amplitude > 0.0)) return;
+    atomicAdd(fronts[at].count, 1u);
+    if (isOpaque) return;
+    atomicMin(fronts[at].first, d.id);
+    atomicMin(fronts[at].nearest, floatBitsToUint(r.depth));
 }
 
 int unitsOf(float v) { return int(floor(v + 0.5)); }
@@ -88,6 +96,7 @@ float absoluteDepth(float relative, float reference) {
 
 // Adds a disc to a pixel.
 void addKernel(WideDisc d, vec3 colour, EwaKernel k, DepthRange range, ivec2 pixel) {
+    if (isBeyond(k, pixel)) return;
     const RayOnDisc r = rayOnDisc(d, k, range, pixel);
     const uint at = uint(pixel.y) * frame.width + uint(pixel.x);
     const FilteredFront front = fronts[at];
@@ -97,7 +106,7 @@ void addKernel(WideDisc d, vec3 colour, EwaKernel k, DepthRange range, ivec2 pix
     }
     const float support = frame.kernelSupport;
     if (!(r.rho2 < support * support)) return;
-    const float w = k.amplitude * kernelAt(r.rho2, kernelEnd(support)) * sumUnit(front);
+    const float w = k.amplitude * kernelAt(r.rho2, kernelEnd(support)) * sums[at].unit;
     const vec3 n = towardsEye(d);
     atomicAdd(sums[at].weight, unitsOf(w));
     atomicAdd(sums[at].depth, unitsOf(w * relativeDepth(r.depth, sums[at].reference)));

@@ -13,6 +13,7 @@ void main() {
     s.weight = s.depth = s.red = s.green = s.blue = s.nx = s.ny = s.nz = 0;
     s.behind = 0u;
     s.reference = uintBitsToFloat(front.nearest);
+    s.unit = sumUnit(front);
     if (front.key != kNoKey) {
         DrawNode node;
         const uint id = keyPlace(front.key, 0u);

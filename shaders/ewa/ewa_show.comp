@@ -14,7 +14,7 @@ void main() {
     const uint64_t exact = visibility[at];
     const bool hasFront = front.key != kNoKey;
     const bool hasExact = exact != kNoKey;
-    const float weight = float(s.weight) / sumUnit(front);
+    const float weight = float(s.weight) / s.unit;
     const uint code = uint(min(weight * gridWeight(frame.kernelSupport), 1.0) * 255.0 + 0.5);
     FilteredPixel p;
     p.normal = p.colour = p.cover = 0u;

@@ -144,9 +144,9 @@ struct FilteredPixel {
 // On the gpu, a pixel's front and sums.
 struct FilteredFront {
     uint64_t key;  // of the front disc, its depth moved back
-    uint first;    // least id of those whose kernels reach the pixel
-    uint nearest;  // bits of the least of their depths
-    uint count;    // of them, less one: ~0 is none
+    uint count;    // of those whose kernels reach the pixel, less one: ~0 is none
+    uint first;    // where there is no front: least id of them
+    uint nearest;  // and bits of the least of their depths
     uint unused;
 };
 // The gpu's sums are whole numbers. What 1 is in them: 2^24 where at most 64 kernels reach the pixel, less where more
@@ -168,6 +168,7 @@ struct FilteredSums {
     int nz;
     uint behind;      // 1: something is opaque behind the front
     float reference;  // depth, which others are told against
+    float unit;       // what 1 is (sumUnit)
 };
 const uint kFilteredFront = 256u;  // opaque: else a rim that only coverage shows
 const uint kFilteredLeaf = 512u;
