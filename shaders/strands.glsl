@@ -41,9 +41,9 @@ void offerWide(WideStrand s, Ribbon ribbon, int x, int y) {
     const PixelRay ray = pixelRay(frameLensHere(), (float(x) + 0.5 - frame.centre.x) * (1.0 / frame.focal), (float(y) + 0.5 - frame.centre.y) * (1.0 / frame.focal));
     if (s.isRound != 0u) {
         const TubeHit hit = tubeHit(tubeOf(s.a, s.b, s.radiusA, s.radiusB), ray, frame.nearPlane, false);
-        if (hit.depth < kNoDepth) offer(x, y, imageLinear(frameLensHere(), hit.depth), drawId(frame.firstBlock.curves, s.id));
+        if (hit.depth < kNoDepth) offer(x, y, imageLinear(frameLensHere(), hit.depth), drawId(frame.firstBlock.of[kKindCurves], s.id));
         return;
     }
     const RibbonHit hit = ribbonHit(ribbon, ray, frame.nearPlane, kRibbonSlack);
-    if (hit.depth < kNoRibbon) offer(x, y, imageLinear(frameLensHere(), hit.depth), drawId(frame.firstBlock.curves, s.id));
+    if (hit.depth < kNoRibbon) offer(x, y, imageLinear(frameLensHere(), hit.depth), drawId(frame.firstBlock.of[kKindCurves], s.id));
 }

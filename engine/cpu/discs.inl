@@ -9,7 +9,7 @@ void fillDiscs(const FrameConstants& frame, const WideDisc* discs, const DiscBox
     alignas(64) float depth[kTile];
     for (size_t k = 0; k < count; ++k) {
         const WideDisc d = discs[k];
-        const uint64_t id = drawId(f.firstBlock.discs, d.id);
+        const uint64_t id = drawId(f.firstBlock.of[kKindDiscs], d.id);
         const DiscBox& box = boxes[k];
         const int y0 = box.y.first < int(firstRow) ? int(firstRow) : box.y.first;
         const int y1 = box.y.last > int(lastRow) ? int(lastRow) : box.y.last;

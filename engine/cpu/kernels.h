@@ -150,6 +150,17 @@ struct Tables {
 
 Tables makeTables();
 
+/// The pixels of a row that show one kind of primitive.
+struct WinningPixels {
+    uint32_t count;
+    alignas(64) uint32_t pixel[kTile], id[kTile];  ///< id: the place within its kind (visibility.h)
+    alignas(64) float depth[kTile];
+};
+
+struct Frame;
+/// Texels of pixels of one kind; none of its row has anything yet.
+using ResolveKind = void (*)(const Frame& frame, const WinningPixels& pixels, uint32_t x0, uint32_t y, TexelRow& row);
+
 /// What the passes after coverage read of the frame beside records.
 struct ResolveInput {
     const BlockSource* blocks;
@@ -161,6 +172,8 @@ struct ResolveInput {
     size_t discCount;
     bool exactPoints;  ///< points are what their pixels show, at the depth of the visibility buffer
     const shared::FilteredPixel* filtered;  ///< of the image: what they show there; null: that of their records
+    const Frame* frame;                     ///< for ...
+    const ResolveKind* ofKind;              ///< ... kinds that are resolved without kernels; null: a kernel does
 };
 
 struct LightInput {

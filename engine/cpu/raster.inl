@@ -287,7 +287,7 @@ void rasterCluster(const FrameConstants& frame, const SurfaceMaterial* materials
         const uint32_t a = t & 255u, b = t >> 8 & 255u, c = t >> 16 & 255u;
         const uint32_t surface = vertices[a].surface;
         MaskInput mask;
-        Candidate of{drawId(f.firstBlock.triangles, firstPlace + k), (surface & kSurfaceTwoSided) != 0, nullptr};
+        Candidate of{drawId(f.firstBlock.of[kKindTriangles], firstPlace + k), (surface & kSurfaceTwoSided) != 0, nullptr};
         if ((surface & kSurfaceMasked) != 0) {
             mask = {block.textures,
                     &materials[m.firstMaterial + (surface & kSurfaceMaterialMask)],

@@ -93,8 +93,12 @@ void resolvePoints(const FrameConstants& f, const ResolveInput& in, const Gather
 
 /// The pixels of a row that show other kinds than points.
 struct OtherPixels {
-    WinningPixels triangles, curves, discs;
-    bool any() const { return triangles.count + curves.count + discs.count > 0; }
+    WinningPixels of[kKindNothing];  // by kind; none of points
+    bool any() const {
+        uint32_t sum = 0;
+        for (const WinningPixels& p : of) sum += p.count;
+        return sum > 0;
+    }
 };
 
 /// A pixel that shows no point.
@@ -145,10 +149,9 @@ struct OtherPixels {
 [[gnu::always_inline]] inline void gatherOther(uint64_t key, const BlockRanges& firstBlock, size_t i,
                                                OtherPixels& others) {
     const uint32_t kind = keyKind(key, firstBlock);
-    const bool isTriangle = kind == kKindTriangles, isCurve = kind == kKindCurves;
-    WinningPixels& to = isTriangle ? others.triangles : isCurve ? others.curves : others.discs;
+    WinningPixels& to = others.of[kind];
     to.pixel[to.count] = static_cast<uint32_t>(i);
-    to.id[to.count] = keyPlace(key, isTriangle ? firstBlock.triangles : isCurve ? firstBlock.curves : firstBlock.discs);
+    to.id[to.count] = keyPlace(key, firstBlock.of[kind]);
     to.depth[to.count++] = keyDepth(key);
 }
 
@@ -157,7 +160,7 @@ void gatherRow(const FrameConstants& f, const Tables& tables, const BlockSource*
                uint32_t n, Gathered& g, OtherPixels& others, bool& any, bool& anyTurned) {
     constexpr size_t kPrefetch = 12;  // pixels ahead: records lie anywhere in memory
     const BlockRanges firstBlock = f.firstBlock;
-    others.triangles.count = others.curves.count = others.discs.count = 0;
+    for (WinningPixels& p : others.of) p.count = 0;
     for (size_t i = 0; i < n; ++i) {
         if (i + kPrefetch < n && isPointKey(visibility[i + kPrefetch], firstBlock)) {
             const uint64_t ahead = visibility[i + kPrefetch];
@@ -197,9 +200,13 @@ void resolveOthers(const FrameConstants& f, const Tables& tables, const ResolveI
     if (row.hasTubes)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) row.isRound[kPad + i] = row.axisX[kPad + i] = 0;
-    if (others.discs.count > 0) resolveDiscs(f, tables, in, others.discs, x0, y, row);
-    if (others.triangles.count > 0) resolveTriangles(f, in, others.triangles, x0, y, row, planes);
-    row.hasTubes = others.curves.count > 0 && resolveStrands(f, in, others.curves, x0, y, row, largestRadius);
+    const WinningPixels &discs = others.of[kKindDiscs], &triangles = others.of[kKindTriangles],
+                        &curves = others.of[kKindCurves];
+    if (discs.count > 0) resolveDiscs(f, tables, in, discs, x0, y, row);
+    if (triangles.count > 0) resolveTriangles(f, in, triangles, x0, y, row, planes);
+    for (uint32_t k = 0; k < kKindNothing; ++k)
+        if (others.of[k].count > 0 && in.ofKind[k] != nullptr) in.ofKind[k](*in.frame, others.of[k], x0, y, row);
+    row.hasTubes = curves.count > 0 && resolveStrands(f, in, curves, x0, y, row, largestRadius);
 }
 
 bool resolveRow(const FrameConstants& frame, const Tables& tables, const ResolveInput& in, uint64_t* visibility,

@@ -3,13 +3,6 @@
 // Everything but following pointers is a loop over the row's pixels that becomes SIMD; materials and textures are
 // looked at once for every run of pixels that share them.
 
-/// The pixels of a row that show one kind of primitive.
-struct WinningPixels {
-    uint32_t count;
-    alignas(64) uint32_t pixel[kTile], id[kTile];  ///< id: the place within its kind (visibility.h)
-    alignas(64) float depth[kTile];
-};
-
 /// What the weights mix, corner by corner.
 struct Corners {
     alignas(64) float x[3][kTile], y[3][kTile], z[3][kTile];

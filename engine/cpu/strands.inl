@@ -147,7 +147,7 @@ void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pix
             floatBitsToUint(lineDepth(lens, inverse[i] + u * dInverse[i], nearer[i] + u * dNearer[i], nearPlane));
         pixel[k] = taken > 0.5f ? where : ~0u;
     }
-    const uint64_t first = drawId(f.firstBlock.curves, firstPlace);
+    const uint64_t first = drawId(f.firstBlock.of[kKindCurves], firstPlace);
     constexpr size_t kAhead = 24;  // their cache lines come meanwhile
     for (size_t k = 0; k < count; ++k) {
         if (k + kAhead < count && pixels.pixel[k + kAhead] != ~0u)
@@ -233,7 +233,7 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
     size_t collected = 0;
     for (size_t i = 0; i < count; ++i) {
         if (lines.keep[i] == 0) continue;
-        const uint64_t id = drawId(f.firstBlock.curves, firstPlace + uint32_t(i));
+        const uint64_t id = drawId(f.firstBlock.of[kKindCurves], firstPlace + uint32_t(i));
         if (lines.isFilled[i] > 0.5f) {
             drawFilled(f, cameraSegment(node, segmentAt(words, i)), lines.isRound[i] > 0.5f, id, wide, visibility);
             continue;

@@ -68,8 +68,9 @@ Result<void> FrameBuffers::preparePlanes(const render::DrawList& draws, bool wan
         if (lw == 1 && lh == 1) break;
     }
     const uint64_t pixels = uint64_t{w} * h, extra = wantAll ? pixels * kExtraFloats : 0;
-    const uint64_t nodes = draws.points().nodes.size() + draws.curves().nodes.size(),
-                   blocks = draws.points().blocks.size() + draws.curves().blocks.size();
+    uint64_t nodes = 0;
+    for (const render::DrawBatch& batch : draws.batches) nodes += batch.nodes.size();
+    const uint64_t blocks = draws.frame.firstBlock.of[kKindDiscs];
     STIPPLE_TRY(ensure(nothing_, 0, kStorage, false, "nothing"));
     STIPPLE_TRY(ensure(bound_[kFrameBinding], sizeof(FrameConstants), kStorage, true, "frame constants"));
     STIPPLE_TRY(ensure(bound_[kNodesBinding], gpu::bytesOf(kNodesBinding, nodes), kStorage, true, "draw nodes"));
@@ -106,25 +107,28 @@ Result<void> FrameBuffers::prepareLists(const render::RenderRequest& request) {
     return {};
 }
 
-/// Frame constants, nodes and blocks of points, then those of curves.
+/// Frame constants; nodes of all kinds, one after another; blocks at their places in the frame (visibility.h). Kinds
+/// without nodes have tables of their own.
 void FrameBuffers::fillDraws(const render::DrawList& draws, const Residents& residents) {
     std::memcpy(bound_[kFrameBinding].mapped(), &draws.frame, sizeof(draws.frame));
     auto* nodes = static_cast<DrawNode*>(bound_[kNodesBinding].mapped());
-    for (const render::DrawBatch* batch : {&draws.points(), &draws.curves()})
-        for (size_t i = 0; i < batch->nodes.size(); ++i) {
-            DrawNode node = batch->nodes[i];
-            const VkDeviceAddress address = residents.addressOf(batch->keys[i]);
+    auto* const blocks = static_cast<DrawBlock*>(bound_[kBlocksBinding].mapped());
+    uint32_t firstNode = 0;
+    for (const render::DrawBatch& batch : draws.batches) {
+        for (size_t i = 0; i < batch.nodes.size(); ++i) {
+            DrawNode node = batch.nodes[i];
+            const VkDeviceAddress address = residents.addressOf(batch.keys[i]);
             node.addressLow = static_cast<uint32_t>(address);
             node.addressHigh = static_cast<uint32_t>(address >> 32);
             std::memcpy(nodes++, &node, sizeof(node));
         }
-    auto* blocks = static_cast<DrawBlock*>(bound_[kBlocksBinding].mapped());
-    if (!draws.points().blocks.empty())
-        std::memcpy(blocks, draws.points().blocks.data(), draws.points().blocks.size() * sizeof(DrawBlock));
-    for (size_t i = 0; i < draws.curves().blocks.size(); ++i) {
-        DrawBlock block = draws.curves().blocks[i];
-        block.node += static_cast<uint32_t>(draws.points().nodes.size());
-        std::memcpy(blocks + draws.points().blocks.size() + i, &block, sizeof(block));
+        const uint32_t firstBlock = draws.frame.firstBlock.of[static_cast<size_t>(batch.kind)];
+        for (size_t i = 0; i < batch.blocks.size() && !batch.nodes.empty(); ++i) {
+            DrawBlock block = batch.blocks[i];
+            block.node += firstNode;
+            std::memcpy(blocks + firstBlock + i, &block, sizeof(block));
+        }
+        firstNode += static_cast<uint32_t>(batch.nodes.size());
     }
 }
 

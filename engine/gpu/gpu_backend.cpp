@@ -15,15 +15,10 @@ uint64_t chunkId(streaming::ChunkKey key) { return uint64_t{key.source} << 32 | 
 
 std::vector<uint8_t> bytesOfChunk(const lod::Chunk& chunk) {
     std::vector<uint8_t> bytes;
-    const auto append = [&](const auto& values) {
+    chunk.forEachArray([&](const auto& values) {
         const auto* from = reinterpret_cast<const uint8_t*>(values.data());
         bytes.insert(bytes.end(), from, from + values.size() * sizeof(values[0]));
-    };
-    append(chunk.records);
-    append(chunk.segments);
-    append(chunk.vertices);
-    append(chunk.triangles);
-    append(chunk.texels);
+    });
     return bytes;
 }
 

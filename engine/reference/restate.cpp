@@ -7,6 +7,7 @@
 #include "engine/base/check.h"
 #include "engine/base/numbers.h"
 #include "engine/base/process.h"
+#include "engine/reference/kinds.h"
 #include "engine/reference/reference.h"
 #include "engine/reference/restate_discs.h"
 #include "engine/reference/surface.h"
@@ -201,8 +202,7 @@ class ReferenceBackend final : public render::Backend {
         const render::DrawList& draws = *request.draws;
         const render::Reconstruction& mode = render::reconstructionOf(request.mode);
         Level level0 = projectAll(draws, mode);
-        projectStrands(draws, chunks_, level0);
-        projectMeshes(draws, chunks_, level0);
+        projectOtherKinds(draws, chunks_, level0);
         if (mode.blendsSplats && !variation_.showDiscs) blendDiscs(draws, placedDiscs(draws, chunks_), level0);
         const Level own = level0;
         if (mode.hasPyramid) reconstruct(level0, draws.view);

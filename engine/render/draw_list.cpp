@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "engine/base/check.h"
-#include "lod/store/mesh_place.h"
+#include "engine/render/kinds/kind.h"
 #include "shaders/shared/visibility.h"
 
 namespace stipple::render {
@@ -13,86 +13,13 @@ static_assert(sizeof(shared::PointRecord) == 16);
 static_assert(sizeof(shared::DrawNode) == 84);
 static_assert(sizeof(shared::DrawBlock) == 8);
 static_assert(sizeof(shared::StrandSegment) == 32);
-static_assert(sizeof(shared::FrameConstants) == 192);
+static_assert(sizeof(shared::FrameConstants) == 180 + sizeof(shared::BlockRanges));
 static_assert(sizeof(shared::MeshVertex) == 32);
 static_assert(sizeof(shared::MeshCluster) == 12);
 static_assert(sizeof(shared::DrawMesh) == 120);
 static_assert(sizeof(shared::SurfaceMaterial) == 188);
 
 namespace {
-
-/// One instance of a mesh in camera space, composed in fp64. `eyeStep`: the lattice point nearest to the eye.
-shared::DrawMesh makeDrawMesh(const lod::Hierarchy& h, const lod::Instance& instance, const lod::View& view,
-                              const glm::dmat3& cameraFromWorld, lod::MeshPlace& eyeStep) {
-    shared::DrawMesh m{};
-    const glm::dmat3 axes = cameraFromWorld * instance.rotation;
-    const double worldPerStep = instance.scale * h.unit;
-    const glm::dvec3 eye =
-        (glm::transpose(instance.rotation) * (view.eye - instance.translation) / instance.scale - h.origin) / h.unit;
-    // max(low, v) of what is no number is low: cameras may be anywhere.
-    const bool isWide = h.rootLog2 > lod::kShortMeshBits;
-    const double low = isWide ? -0x1p61 : 0.0, high = isWide ? 0x1p61 : 0x1p30;
-    const auto onLattice = [&](double v) { return std::floor(std::max(low, std::min(v, high))); };
-    const glm::dvec3 nearest(onLattice(eye.x), onLattice(eye.y), onLattice(eye.z));
-    m.axisX = glm::vec3(axes[0] * worldPerStep);
-    m.axisY = glm::vec3(axes[1] * worldPerStep);
-    m.axisZ = glm::vec3(axes[2] * worldPerStep);
-    m.base = glm::vec3(cameraFromWorld * (instance.translation - view.eye +
-                                          instance.rotation * (instance.scale * (h.origin + h.unit * nearest))));
-    m.normalX = glm::vec3(axes[0]);
-    m.normalY = glm::vec3(axes[1]);
-    m.normalZ = glm::vec3(axes[2]);
-    eyeStep = {static_cast<int64_t>(nearest.x), static_cast<int64_t>(nearest.y), static_cast<int64_t>(nearest.z)};
-    m.mirror = 1;
-    return m;
-}
-
-/// `m` for the vertices of one group.
-shared::DrawMesh countedFrom(const lod::Node& group, const lod::MeshPlace& eyeStep, shared::DrawMesh m) {
-    const lod::MeshPlace origin = lod::meshOrigin(group);
-    const std::array<int*, 3> low{&m.eyeX, &m.eyeY, &m.eyeZ}, high{&m.eyeHighX, &m.eyeHighY, &m.eyeHighZ};
-    bool isShort = true;
-    for (size_t a = 0; a < 3; ++a) {
-        const int64_t eye = eyeStep.at(a) - origin.at(a);
-        *low.at(a) = static_cast<int>(static_cast<uint32_t>(eye));
-        *high.at(a) = static_cast<int>(eye >> 32);
-        // Vertices reach to 2^30, so that no difference overflows.
-        isShort = isShort && eye >= -(int64_t{1} << 29) && eye <= int64_t{1} << 30;
-    }
-    m.places = lod::hasPairs(group) ? shared::kPlacesPaired : isShort ? shared::kPlacesShort : shared::kPlacesFar;
-    return m;
-}
-
-void addMeshes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, DrawList& out) {
-    uint32_t last = ~0u;
-    lod::MeshPlace eyeStep{}, origin{};
-    bool isPaired = false;
-    shared::DrawMesh mesh{};
-    for (const lod::CutMeshDraw& draw : cut.meshDraw) {
-        const lod::Instance& instance = out.instances[draw.instance];
-        const lod::Hierarchy& h = *out.hierarchies[instance.hierarchy];
-        const lod::Node& group = lod::meshNode(h, draw.node);
-        const bool isNew = draw.instance != last;
-        if (isNew) {
-            mesh = makeDrawMesh(h, instance, out.view, cameraFromWorld, eyeStep);
-            mesh.firstMaterial = out.firstMaterial[instance.hierarchy];
-        }
-        if (isNew || lod::meshOrigin(group) != origin || lod::hasPairs(group) != isPaired) {
-            origin = lod::meshOrigin(group);
-            isPaired = lod::hasPairs(group);
-            out.meshes.push_back(countedFrom(group, eyeStep, mesh));
-            out.meshTextures.push_back({h.textures, out.firstSource + instance.source,
-                                        static_cast<uint32_t>(h.nodes.size()), static_cast<uint32_t>(h.tiles.size())});
-            last = draw.instance;
-        }
-        const auto run = static_cast<uint32_t>(out.meshDraws.size());
-        out.meshDraws.push_back({static_cast<uint32_t>(out.meshes.size() - 1), draw.firstCluster, draw.clusters,
-                                 h.nodes[draw.node].level, draw.errorPixels});
-        DrawBatch& batch = out.of(lod::Kind::triangles);
-        batch.keys.push_back({out.firstSource + instance.source, draw.chunk});
-        for (uint32_t c = 0; c < draw.clusters; ++c) batch.blocks.push_back({run, draw.firstCluster + c});
-    }
-}
 
 /// Nearer than this nothing of the cut can be: by the nearest bounding sphere; of a node that holds the eye, a step of
 /// its lattice, nearer than which nothing of it can be told apart. (Depth is linear: a small distance costs nothing.)
@@ -265,18 +192,19 @@ void addEffects(EffectSet requested, std::span<const uint64_t> fed, const glm::d
 }
 
 void setBlocks(DrawList& out) {
-    shared::FrameConstants& f = out.frame;
-    // Blocks by kind (visibility.h): what is equally deep goes to points, then curves, then triangles.
+    // Blocks by kind (visibility.h): what is equally deep goes to them in their order. The last are those of wide
+    // discs.
     static_assert(shared::kRecordsPerBlock == shared::kBlockLanes && shared::kSegmentsPerBlock == shared::kBlockLanes &&
                   shared::kClusterTriangles == shared::kBlockLanes);
-    const size_t points = out.points().blocks.size(), curves = out.curves().blocks.size(),
-                 triangles = out.triangles().blocks.size();
-    STIPPLE_CHECK(2 * points + curves + triangles < shared::kMostBlocks &&
-                      std::max({points, curves, triangles}) < shared::kMostBlocksOfKind,
+    size_t blocks = 0, most = 0;
+    forEachKind([&](lod::Kind kind) {
+        out.frame.firstBlock.of[static_cast<size_t>(kind)] = static_cast<uint32_t>(blocks);
+        blocks += out.of(kind).blocks.size();
+        most = std::max(most, out.of(kind).blocks.size());
+    });
+    out.frame.firstBlock.of[shared::kKindDiscs] = static_cast<uint32_t>(blocks);
+    STIPPLE_CHECK(blocks + out.points().blocks.size() < shared::kMostBlocks && most < shared::kMostBlocksOfKind,
                   "blocks of a frame");
-    f.firstBlock.curves = static_cast<uint32_t>(points);
-    f.firstBlock.triangles = f.firstBlock.curves + static_cast<uint32_t>(curves);
-    f.firstBlock.discs = f.firstBlock.triangles + static_cast<uint32_t>(triangles);
 }
 
 }  // namespace
@@ -288,9 +216,9 @@ glm::vec3 linearBackground() {
 
 FrameContent contentOf(const DrawList& draws) {
     FrameContent content;
-    content.hasPoints = !draws.points().isEmpty();
-    content.hasTriangles = !draws.triangles().isEmpty();
-    content.hasStrands = !draws.curves().isEmpty();
+    forEachKind([&](lod::Kind kind) {
+        if (!draws.of(kind).isEmpty()) content.add(kind);
+    });
     content.hasWideDiscs = draws.hasWideDiscs;
     return content;
 }
@@ -310,7 +238,9 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     const EffectSet requested = requestedEffects(out.effectsOfScene, settings);
     std::vector<uint64_t> fed(effects().size());
     addNodes(cut, cameraFromWorld, settings, requested, fed, out);
-    addMeshes(cut, cameraFromWorld, out);
+    forEachKind([&](lod::Kind kind) {
+        if (drawnKind(kind).add != nullptr) drawnKind(kind).add(cut, cameraFromWorld, out);
+    });
     setView(cut, view, settings, out);
     addEffects(requested, fed, cameraFromWorld, settings, out);
     setBlocks(out);

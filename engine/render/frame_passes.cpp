@@ -1,24 +1,31 @@
 #include "engine/render/frame_passes.h"
 
 #include "engine/render/effects/table.h"
+#include "engine/render/kinds/kind.h"
 
 namespace stipple::render {
 
 std::vector<Pass> passesOf(Mode mode, const FrameContent& content, EffectSet ofFrame) {
     const Reconstruction& r = reconstructionOf(mode);
     std::vector<Pass> passes{Pass::clear};
+    bool isReconstructed = false;
     const auto addPoints = [&] {
-        if (!content.hasPoints) return;
         passes.push_back(r.points);
         if (content.hasWideDiscs && r.hasPyramid) passes.push_back(Pass::discs);
     };
-    if (!r.pointsAreLast) addPoints();
-    if (content.hasStrands) passes.push_back(Pass::strands);
-    if (content.hasTriangles) passes.push_back(Pass::rasterise);
-    if (r.pointsAreLast) addPoints();
+    forEachKind([&](lod::Kind kind) {
+        if (!content.has(kind)) return;
+        const DrawnKind& drawn = drawnKind(kind);
+        isReconstructed = isReconstructed || drawn.isReconstructed;
+        if (drawn.pass)
+            passes.push_back(*drawn.pass);
+        else if (!r.pointsAreLast)
+            addPoints();
+    });
+    if (r.pointsAreLast && content.has(lod::Kind::points)) addPoints();
     passes.push_back(Pass::resolve);
-    // Triangles keep their exact pixels: only splats are reconstructed.
-    if (r.hasPyramid && (content.hasPoints || content.hasStrands)) {
+    // Other kinds keep their exact pixels.
+    if (r.hasPyramid && isReconstructed) {
         passes.push_back(Pass::pull);
         passes.push_back(Pass::push);
     }

@@ -21,6 +21,10 @@ struct CodecTraits {
     uint64_t (*fewestBytes)(const Hierarchy& h, uint32_t chunk);
 };
 
+#define STIPPLE_KIND(name) extern const CodecTraits name##Codec;
+#include "lod/primitives/kinds.inl"
+#undef STIPPLE_KIND
+
 const CodecTraits& traitsOf(Codec codec);
 
 }  // namespace stipple::lod

@@ -53,6 +53,10 @@ struct KindTraits {
     void (*cutEmit)(const CutFrame& frame, uint32_t instance, uint32_t chunk, const Asked& asked, Cut& cut);
 };
 
+#define STIPPLE_KIND(name) extern const KindTraits name##Kind;
+#include "lod/primitives/kinds.inl"
+#undef STIPPLE_KIND
+
 const KindTraits& traitsOf(Kind kind);
 inline Kind kindOf(const Hierarchy& h, uint32_t chunk) { return h.payload(chunk).kind; }
 

@@ -2,19 +2,29 @@
 // fits; each has its own errors, its own codec and its own streams, which are found by their ids.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 namespace stipple::lod {
 
+#define STIPPLE_KIND(name) name,
 /// Kinds of primitives; what is known of each stands in the table of kinds.h. Files name them: the numbers are those of
 /// this program.
-enum class Kind : uint8_t { points, curves, triangles };
-inline constexpr size_t kKinds = 3;
-
-/// How records are coded; a source may bring its own. What is known of each stands in the table of codecs.h, and files
-/// name them, too.
-enum class Codec : uint8_t { points, curves, triangles };
-inline constexpr size_t kCodecs = 3;
+enum class Kind : uint8_t {
+#include "lod/primitives/kinds.inl"
+};
+/// How records are coded: each kind has a codec of its own, and a source may bring others, which come after them. What
+/// is known of each stands in the table of codecs.h, and files name them, too.
+enum class Codec : uint8_t {
+#include "lod/primitives/kinds.inl"
+};
+#undef STIPPLE_KIND
+#define STIPPLE_KIND(name) +1
+inline constexpr size_t kKinds = 0
+#include "lod/primitives/kinds.inl"
+    ;
+#undef STIPPLE_KIND
+inline constexpr size_t kCodecs = kKinds;
 
 inline constexpr uint32_t kMostPayloads = 4;
 

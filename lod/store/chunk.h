@@ -23,10 +23,19 @@ struct Chunk {
     std::vector<shared::MeshCluster> clusters;
     std::vector<shared::StrandSegment> segments;  ///< of a strand store
     std::vector<uint32_t> texels;                 ///< of a texture's tile, kTileEdge x kTileEdge
+    /// Calls use(array) for all that backends draw from, in the order in which it lies on a device.
+    template <typename Use>
+    void forEachArray(const Use& use) const {
+        use(records);
+        use(segments);
+        use(vertices);
+        use(triangles);
+        use(texels);
+    }
     uint64_t sizeBytes() const {
-        return records.size() * sizeof(shared::PointRecord) + segments.size() * sizeof(shared::StrandSegment) +
-               vertices.size() * sizeof(shared::MeshVertex) + (triangles.size() + texels.size()) * sizeof(uint32_t) +
-               clusters.size() * sizeof(shared::MeshCluster);
+        uint64_t bytes = clusters.size() * sizeof(shared::MeshCluster);
+        forEachArray([&](const auto& array) { bytes += array.size() * sizeof(array[0]); });
+        return bytes;
     }
 };
 

@@ -32,7 +32,7 @@ void main() {
     float apart = 0.0;
     PointRecord front;
     if (isDisc) {
-        const uint frontId = keyPlace(key, frame.firstBlock.discs);
+        const uint frontId = keyPlace(key, frame.firstBlock.of[kKindDiscs]);
         front = recordOf(frontId, node);
         apart = depthShared(wideDisc(node, front, frame.supportScale, frontId, lens), ray);
     }

@@ -2,6 +2,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #include "../shared/frame.h"
 #include "../shared/material.h"
 #include "../shared/mesh.h"
@@ -55,9 +56,7 @@ void putFrame() {
     put(frame.sunDirection);
     put(frame.skyDirection);
     put(frame.background);
-    put(frame.firstBlock.curves);
-    put(frame.firstBlock.triangles);
-    put(frame.firstBlock.discs);
+    for (uint k = 0u; k < kKindNothing; ++k) put(frame.firstBlock.of[k]);
     put(frame.lightCount);
     put(frame.ambient);
     put(frame.hasEnvironment);

@@ -9,7 +9,7 @@ const int kMostPixels = 1024;
 
 void addOwn() {
     const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * kGroupsPerDimension;
-    if (block >= frame.firstBlock.curves) return;
+    if (block >= frame.firstBlock.of[kKindCurves]) return;
     const DrawBlock source = blocks[block];
     if (source.first + gl_LocalInvocationID.x >= nodes[source.node].count) return;
     DrawNode node;

@@ -7,7 +7,7 @@ layout(local_size_x = 256) in;
 
 void main() {
     const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * kGroupsPerDimension;
-    if (block >= frame.firstBlock.curves) return;
+    if (block >= frame.firstBlock.of[kKindCurves]) return;
     const DrawBlock source = blocks[block];
     const DrawNode node = nodes[source.node];
     const uint index = source.first + gl_LocalInvocationID.x;

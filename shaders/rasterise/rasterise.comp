@@ -50,7 +50,7 @@ void takeTriangle(LargeTriangle t, DrawCluster c, uint surface, uint corners) {
         for (int x = x0; x <= x1; ++x) {
             float inverseDepth;
             if (isCovered(t, x, y, inverseDepth) && (!isMasked || isKept(c, corners, uvec2(x, y))))
-                offer(x, y, inverseDepth, drawId(frame.firstBlock.triangles, t.id));
+                offer(x, y, inverseDepth, drawId(frame.firstBlock.of[kKindTriangles], t.id));
         }
 }
 

@@ -5,6 +5,7 @@
 #ifndef STIPPLE_SHARED_FRAME_H
 #define STIPPLE_SHARED_FRAME_H
 #include "lens.h"
+#include "visibility.h"
 SHARED_BEGIN
 
 // One node of the cut. Position of record (x, y, z) in camera space: base + axisX*x + axisY*y + axisZ*z; the
@@ -88,13 +89,6 @@ struct DrawBlock {
     uint first;  // first record of this block within the node's chunk
 };
 
-// The first block of each kind of primitive but points, whose blocks begin at 0 (visibility.h).
-struct BlockRanges {
-    uint curves;
-    uint triangles;
-    uint discs;
-};
-
 const uint kShadeUnlit = 0u;
 const uint kShadeLit = 1u;        // points
 const uint kShadeTriangles = 2u;  // a bit of its own
@@ -118,12 +112,12 @@ struct FrameConstants {
     float minimumRadius;  // pixels: smallest splat radius in the reconstruction
     uint shade;
     uint debugView;
-    vec3 sunDirection;  // camera space, towards the sun
-    vec3 skyDirection;  // camera space, up
-    vec3 background;    // linear
-    BlockRanges firstBlock;
-    uint lightCount;  // 0: the sun above, else these instead
-    float ambient;    // share of the sky's light
+    vec3 sunDirection;       // camera space, towards the sun
+    vec3 skyDirection;       // camera space, up
+    vec3 background;         // linear
+    BlockRanges firstBlock;  // of each kind
+    uint lightCount;         // 0: the sun above, else these instead
+    float ambient;           // share of the sky's light
     uint hasEnvironment;
     float exactStrands;  // px: half-width from which a strand keeps exact pixels instead of being reconstructed
     uint coverageSeed;   // of strands narrower than a pixel: another one for each frame of a series that is averaged

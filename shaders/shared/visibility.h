@@ -3,11 +3,12 @@
 //   depth 31 | draw id 33 = 256 * block + lane
 //
 // depth: the bits of a linear depth in fp32, whose sign is always 0 (so that they sort like integers). Blocks are those
-// of the frame, sorted by kind: all of points, all of curves, all of triangles, then the points' once more, for those
-// that are wide discs (wide_disc.h). What is equally deep goes to the kinds in that order. This file alone knows bits.
+// of the frame, sorted by kind (lod/primitives/kinds.inl): all of points, all of curves, all of triangles, then the
+// points' once more, for those that are wide discs (wide_disc.h). What is equally deep goes to the kinds in that order.
+// This file alone knows bits.
 #ifndef STIPPLE_SHARED_VISIBILITY_H
 #define STIPPLE_SHARED_VISIBILITY_H
-#include "frame.h"
+#include "types.h"
 SHARED_BEGIN
 
 const uint kKindPoints = 0u;
@@ -15,6 +16,11 @@ const uint kKindCurves = 1u;
 const uint kKindTriangles = 2u;
 const uint kKindDiscs = 3u;
 const uint kKindNothing = 4u;
+
+// The first block of each kind of a frame.
+struct BlockRanges {
+    uint of[kKindNothing];
+};
 
 const uint kBlockLanes = 256u;  // draw ids of a block
 const uint kLaneBits = 8u;
@@ -32,11 +38,12 @@ SHARED_FN float keyDepth(uint64_t key) { return uintBitsToFloat(keyDepthBits(key
 SHARED_FN uint keyBlock(uint64_t key) { return uint((key & kDrawIdMask) >> kLaneBits); }
 SHARED_FN uint keyLane(uint64_t key) { return uint(key) % kBlockLanes; }
 SHARED_FN uint keyPlace(uint64_t key, uint firstBlock) { return uint((key & kDrawIdMask) - drawId(firstBlock, 0u)); }
-SHARED_FN bool isPointKey(uint64_t key, BlockRanges first) { return keyBlock(key) < first.curves; }
+SHARED_FN bool isPointKey(uint64_t key, BlockRanges first) { return keyBlock(key) < first.of[kKindPoints + 1u]; }
 SHARED_FN uint keyKind(uint64_t key, BlockRanges first) {
     const uint block = keyBlock(key);
-    const uint solid = block < first.triangles ? kKindCurves : block < first.discs ? kKindTriangles : kKindDiscs;
-    return key == kNoKey ? kKindNothing : block < first.curves ? kKindPoints : solid;
+    uint kind = kKindPoints;
+    for (uint k = kKindPoints + 1u; k < kKindNothing; ++k) kind += block < first.of[k] ? 0u : 1u;
+    return key == kNoKey ? kKindNothing : kind;
 }
 
 SHARED_END

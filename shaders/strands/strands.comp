@@ -44,7 +44,7 @@ void drawLine(WideStrand s) {
         const vec4 here = atA + u * (atB - atA);
         if (here.y < kNarrow && coverageThreshold(uint(y) * frame.width + uint(x), lot, frame.coverageSeed) >= 2.0 * here.y * longer)
             continue;
-        offer(x, y, lineLinear(here.x, here.z), drawId(frame.firstBlock.curves, s.id));
+        offer(x, y, lineLinear(here.x, here.z), drawId(frame.firstBlock.of[kKindCurves], s.id));
     }
 }
 
@@ -53,7 +53,7 @@ void drawEnd(float x, float y, float inverseDepth, float halfWidth, float nearer
     const uint pixel = uint(y) * frame.width + uint(x);
     const float share = 3.14159265 * halfWidth * halfWidth * (1.0 - across / max(2.0 * halfWidth, 1.0e-6));
     if (halfWidth < kNarrow && coverageThreshold(pixel, ~lot, frame.coverageSeed) >= share) return;
-    offer(int(x), int(y), lineLinear(inverseDepth, nearer), drawId(frame.firstBlock.curves, id));
+    offer(int(x), int(y), lineLinear(inverseDepth, nearer), drawId(frame.firstBlock.of[kKindCurves], id));
 }
 
 // The pixels that a segment may cover, from lo to hi. False: none, as it lies before the near plane.
@@ -87,7 +87,7 @@ bool coverOf(WideStrand s, CameraSegment c, ScreenSegment p, Ribbon ribbon, bool
 void main() {
     const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * kGroupsPerDimension;
     if (block >= stepInfo.count) return;
-    const DrawBlock source = blocks[frame.firstBlock.curves + block];
+    const DrawBlock source = blocks[frame.firstBlock.of[kKindCurves] + block];
     const DrawNode node = nodes[source.node];
     const uint index = source.first + gl_LocalInvocationID.x;
     if (index >= node.count) return;

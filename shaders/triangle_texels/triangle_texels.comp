@@ -17,7 +17,7 @@ void main() {
         triangleWords[2u * place] = 0u;
         return;
     }
-    const uint id = keyPlace(key, frame.firstBlock.triangles);
+    const uint id = keyPlace(key, frame.firstBlock.of[kKindTriangles]);
     const DrawCluster c = clusters[id / kClusterTriangles];
     const DrawMesh m = meshes[c.mesh];
     const uint word = Words(uvec2(c.trianglesLow, c.trianglesHigh)).words[id % kClusterTriangles];

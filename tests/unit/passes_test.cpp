@@ -12,8 +12,8 @@ namespace {
 
 std::vector<FrameContent> allContents() {
     std::vector<FrameContent> out;
-    for (unsigned bits = 0; bits < 16; ++bits)
-        out.push_back({(bits & 1) != 0, (bits & 2) != 0, (bits & 4) != 0, (bits & 8) != 0});
+    for (uint32_t kinds = 0; kinds < 1u << lod::kKinds; ++kinds)
+        for (const bool hasWideDiscs : {false, true}) out.push_back({kinds, hasWideDiscs});
     return out;
 }
 /// Every choice of effects.
@@ -54,10 +54,12 @@ TEST(Passes, AreThereOnlyWhereTheFrameCallsForThem) {
         for (const FrameContent& c : allContents()) {
             const std::vector<Pass> passes = passesOf(r.mode, c, {});
             EXPECT_EQ(std::set<Pass>(passes.begin(), passes.end()).size(), passes.size());
-            EXPECT_EQ(has(passes, Pass::rasterise), c.hasTriangles);
-            EXPECT_EQ(has(passes, Pass::strands), c.hasStrands);
-            EXPECT_EQ(has(passes, r.points), c.hasPoints);
-            EXPECT_EQ(has(passes, Pass::push), r.hasPyramid && (c.hasPoints || c.hasStrands));
+            const bool hasPoints = c.has(lod::Kind::points), hasCurves = c.has(lod::Kind::curves);
+            EXPECT_EQ(has(passes, Pass::rasterise), c.has(lod::Kind::triangles));
+            EXPECT_EQ(has(passes, Pass::strands), hasCurves);
+            EXPECT_EQ(has(passes, r.points), hasPoints);
+            EXPECT_EQ(has(passes, Pass::push), r.hasPyramid && (hasPoints || hasCurves));
+            EXPECT_EQ(has(passes, Pass::discs), r.hasPyramid && hasPoints && c.hasWideDiscs);
             EXPECT_EQ(passes.back(), Pass::output);
             // Tiles of discs are nobody else's while they are drawn: all other visibility is there before.
             const auto at = [&](Pass pass) { return std::find(passes.begin(), passes.end(), pass) - passes.begin(); };

@@ -21,7 +21,9 @@ struct Shown {
 
 struct Case {
     std::array<uint32_t, 3> blocks;  ///< points, curves, triangles
-    shared::BlockRanges first() const { return {blocks[0], blocks[0] + blocks[1], blocks[0] + blocks[1] + blocks[2]}; }
+    shared::BlockRanges first() const {
+        return {{0, blocks[0], blocks[0] + blocks[1], blocks[0] + blocks[1] + blocks[2]}};
+    }
     uint32_t firstOf(uint32_t kind) const {
         uint32_t sum = 0;
         for (uint32_t k = 0; k < std::min(kind, 3u); ++k) sum += blocks.at(k);

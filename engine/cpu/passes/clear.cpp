@@ -1,5 +1,6 @@
 // What every frame begins with: block tables and image of the frame; the planes grow to its size.
 #include "engine/cpu/passes/passes.h"
+#include "engine/render/kinds/kind.h"
 
 namespace stipple::cpu {
 namespace {
@@ -22,18 +23,9 @@ void resize(Frame& frame) {
 
 void clear(Frame& frame) {
     resize(frame);
-    frame.blocks.resize(frame.draws->points().blocks.size());
-    for (size_t b = 0; b < frame.blocks.size(); ++b) {
-        const shared::DrawBlock& block = frame.draws->points().blocks[b];
-        frame.blocks[b] = {frame.chunks.at(frame.draws->points().keys[block.node]).records.data() + block.first,
-                           &frame.draws->points().nodes[block.node]};
-    }
-    frame.strandBlocks.clear();
-    for (const shared::DrawBlock& block : frame.draws->curves().blocks)
-        frame.strandBlocks.push_back(
-            {frame.chunks.at(frame.draws->curves().keys[block.node]).segments.data() + block.first,
-             &frame.draws->curves().nodes[block.node]});
-    frame.hasStrands = !frame.strandBlocks.empty();
+    render::forEachKind([&](lod::Kind kind) {
+        if (cpuKind(kind).prepare != nullptr) cpuKind(kind).prepare(frame);
+    });
 }
 
 }  // namespace

@@ -26,8 +26,18 @@ void drawCurves(Frame& frame) {
         });
 }
 
+void findBlocks(Frame& frame) {
+    const render::DrawBatch& curves = frame.draws->curves();
+    frame.strandBlocks.clear();
+    for (const shared::DrawBlock& block : curves.blocks)
+        frame.strandBlocks.push_back(
+            {frame.chunks.at(curves.keys[block.node]).segments.data() + block.first, &curves.nodes[block.node]});
+    frame.hasStrands = !frame.strandBlocks.empty();
+}
+
 }  // namespace
 
+constinit const CpuKind curvesOnCpu{.prepare = findBlocks};
 constinit const CpuPass strandsPass{.run = drawCurves};
 
 }  // namespace stipple::cpu

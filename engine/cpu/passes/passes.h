@@ -34,6 +34,19 @@ struct CpuPass {
 
 const CpuPass& cpuPassOf(render::Pass pass);
 
+/// What the backend knows of a kind beside the pass that draws it.
+struct CpuKind {
+    /// Tables of its blocks, before any pass of a frame. Null: none, or the pass makes them.
+    void (*prepare)(Frame& frame) = nullptr;
+    /// Null: a kernel does it (resolveRow).
+    ResolveKind resolve = nullptr;
+};
+#define STIPPLE_KIND(name) extern const CpuKind name##OnCpu;
+#include "lod/primitives/kinds.inl"
+#undef STIPPLE_KIND
+
+const CpuKind& cpuKind(lod::Kind kind);
+
 /// Runs passes of rows back to back: the first is surface, or reads what an earlier run left; what the last one leaves
 /// is kept for later passes, unless it is the picture.
 void runRows(Frame& frame, std::span<const render::Pass> passes);

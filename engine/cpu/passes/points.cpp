@@ -77,8 +77,19 @@ void fillDiscs(Frame& frame) {
         });
 }
 
+void findBlocks(Frame& frame) {
+    const render::DrawBatch& points = frame.draws->points();
+    frame.blocks.resize(points.blocks.size());
+    for (size_t b = 0; b < frame.blocks.size(); ++b) {
+        const shared::DrawBlock& block = points.blocks[b];
+        frame.blocks[b] = {frame.chunks.at(points.keys[block.node]).records.data() + block.first,
+                           &points.nodes[block.node]};
+    }
+}
+
 }  // namespace
 
+constinit const CpuKind pointsOnCpu{.prepare = findBlocks};
 constinit const CpuPass projectPass{.run = project};
 constinit const CpuPass discsPass{.run = fillDiscs};
 

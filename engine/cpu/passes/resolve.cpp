@@ -1,7 +1,9 @@
 // From the visibility buffer to the texels of level 0.
+#include <array>
 #include <atomic>
 
 #include "engine/cpu/passes/passes.h"
+#include "engine/render/kinds/kind.h"
 
 namespace stipple::cpu {
 namespace {
@@ -29,10 +31,19 @@ void resolve(Frame& frame) {
     frame.pyramid.beginFrame(frame.constants, frame.hasStrands);
     const Planes finePlanes = fine.planes();
     preparePlanes(frame, size_t{fine.width} * fine.height);
-    const ResolveInput input{
-        frame.blocks.data(),       frame.meshBlocks.data(), frame.draws->materials.data(),
-        frame.strandBlocks.data(), frame.discs.data(),      frame.discBoxes.data(),
-        frame.discs.size(),        frame.mode->fillsSplats, frame.isBlended() ? frame.filtered.data() : nullptr};
+    std::array<ResolveKind, shared::kKindNothing> ofKind{};
+    render::forEachKind([&](lod::Kind kind) { ofKind.at(static_cast<size_t>(kind)) = cpuKind(kind).resolve; });
+    const ResolveInput input{.blocks = frame.blocks.data(),
+                             .meshBlocks = frame.meshBlocks.data(),
+                             .materials = frame.draws->materials.data(),
+                             .strandBlocks = frame.strandBlocks.data(),
+                             .discs = frame.discs.data(),
+                             .discBoxes = frame.discBoxes.data(),
+                             .discCount = frame.discs.size(),
+                             .exactPoints = frame.mode->fillsSplats,
+                             .filtered = frame.isBlended() ? frame.filtered.data() : nullptr,
+                             .frame = &frame,
+                             .ofKind = ofKind.data()};
     std::atomic<float> largestRadius{0};
     frame.pyramid.forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
         TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite

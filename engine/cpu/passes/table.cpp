@@ -1,4 +1,4 @@
-// The table of passes.
+// The tables of passes and of kinds.
 #include <array>
 
 #include "engine/cpu/passes/passes.h"
@@ -12,6 +12,15 @@ const CpuPass& cpuPassOf(render::Pass pass) {
 #undef STIPPLE_PASS
     };
     return *kTable.at(static_cast<size_t>(pass));
+}
+
+const CpuKind& cpuKind(lod::Kind kind) {
+    static constexpr std::array kTable{
+#define STIPPLE_KIND(name) &name##OnCpu,
+#include "lod/primitives/kinds.inl"
+#undef STIPPLE_KIND
+    };
+    return *kTable.at(static_cast<size_t>(kind));
 }
 
 }  // namespace stipple::cpu

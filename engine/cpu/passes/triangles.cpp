@@ -48,6 +48,7 @@ void rasterise(Frame& frame) {
 
 }  // namespace
 
+constinit const CpuKind trianglesOnCpu{};
 constinit const CpuPass rasterisePass{.run = rasterise};
 
 }  // namespace stipple::cpu

@@ -14,6 +14,17 @@ struct GpuPass {
 
 const GpuPass& gpuPassOf(render::Pass pass);
 
+/// What the backend knows of a kind beside the pass that draws it.
+struct GpuKind {
+    /// From its pixels of the visibility buffer to texels; after the dispatch that has emptied all others.
+    void (*resolve)(Recording& frame) = nullptr;
+};
+#define STIPPLE_KIND(name) extern const GpuKind name##OnGpu;
+#include "lod/primitives/kinds.inl"
+#undef STIPPLE_KIND
+
+const GpuKind& gpuKind(lod::Kind kind);
+
 /// The shader of the pass's own name, a thread a pixel: all that most passes on the surface buffer are.
 inline void overEveryPixel(Recording& frame) { frame.overPixels(frame.label(), frame.shader()); }
 

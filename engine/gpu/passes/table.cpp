@@ -1,4 +1,4 @@
-// The table of passes, and those that are one dispatch over the picture.
+// The tables of passes and of kinds, and those that are one dispatch over the picture.
 #include <array>
 
 #include "engine/gpu/passes/passes.h"
@@ -12,6 +12,15 @@ const GpuPass& gpuPassOf(render::Pass pass) {
 #undef STIPPLE_PASS
     };
     return *kTable.at(static_cast<size_t>(pass));
+}
+
+const GpuKind& gpuKind(lod::Kind kind) {
+    static constexpr std::array kTable{
+#define STIPPLE_KIND(name) &name##OnGpu,
+#include "lod/primitives/kinds.inl"
+#undef STIPPLE_KIND
+    };
+    return *kTable.at(static_cast<size_t>(kind));
 }
 
 constinit const GpuPass surfacePass{overEveryPixel};

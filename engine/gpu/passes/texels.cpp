@@ -1,13 +1,15 @@
 // From the visibility buffer to texels, and over the levels of the pyramid.
 #include "engine/gpu/passes/passes.h"
+#include "engine/render/kinds/kind.h"
 
 namespace stipple::gpu {
 
 constinit const GpuPass resolvePass{[](Recording& f) {
     f.overPixels("resolve", "resolve");
     if (f.has(render::Pass::discs)) f.overPixels("disc texels", "disc_texels");
-    if (f.hasCurves()) f.overPixels("strand texels", "strand_texels");
-    if (f.hasTriangles()) f.overPixels("triangle texels", "triangle_texels");
+    render::forEachKind([&](lod::Kind kind) {
+        if (gpuKind(kind).resolve != nullptr && !f.draws().of(kind).isEmpty()) gpuKind(kind).resolve(f);
+    });
 }};
 
 constinit const GpuPass pullPass{[](Recording& f) {

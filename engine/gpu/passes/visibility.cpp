@@ -3,6 +3,10 @@
 
 namespace stipple::gpu {
 
+constinit const GpuKind pointsOnGpu{};  // the dispatch over all pixels resolves them
+constinit const GpuKind curvesOnGpu{[](Recording& f) { f.overPixels("strand texels", "strand_texels"); }};
+constinit const GpuKind trianglesOnGpu{[](Recording& f) { f.overPixels("triangle texels", "triangle_texels"); }};
+
 constinit const GpuPass clearPass{[](Recording& f) {
     f.fill("clear", {{shared::kVisibilityBinding, 0xffffffffu}, {shared::kStatsBinding, 0u}});
 }};
@@ -14,7 +18,7 @@ constinit const GpuPass projectPass{[](Recording& f) {
 
 constinit const GpuPass discsPass{[](Recording& f) {
     f.once("disc order", "disc_order");
-    f.overBands("discs", "discs", f.draws().frame.firstBlock.discs);
+    f.overBands("discs", "discs", f.draws().frame.firstBlock.of[shared::kKindDiscs]);
 }};
 
 constinit const GpuPass splatPass{[](Recording& f) {

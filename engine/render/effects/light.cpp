@@ -4,6 +4,7 @@
 
 #include "engine/render/draw_list.h"
 #include "engine/render/effects/effect.h"
+#include "engine/render/kinds/kind.h"
 
 namespace stipple::render {
 namespace {
@@ -34,9 +35,9 @@ void fill(const DrawSettings& settings, const glm::dmat3& cameraFromWorld, DrawL
 
 bool isLit(const EffectFrame& frame) {
     const DrawSettings& s = frame.settings;
-    const bool litTriangles = frame.content.hasTriangles && !s.unlitTriangles;
-    const bool litOthers = (frame.content.hasPoints || frame.content.hasStrands) && s.lit;
-    return s.debugView == shared::kDebugNone && (litTriangles || litOthers);
+    bool isAnyLit = false;
+    forEachKind([&](lod::Kind kind) { isAnyLit = isAnyLit || (frame.content.has(kind) && drawnKind(kind).isLit(s)); });
+    return s.debugView == shared::kDebugNone && isAnyLit;
 }
 
 extern const Effect kLight;
