@@ -14,12 +14,12 @@
 #include "apps/stipple/common.h"
 #include "apps/stipple/from_afar.h"
 #include "apps/stipple/ply_meshes.h"
+#include "apps/stipple/scene_facts.h"
 #include "engine/base/process.h"
 #include "engine/base/text.h"
 #include "engine/base/units.h"
 #include "engine/image/image_io.h"
 #include "engine/scene/gltf/container.h"
-#include "engine/scene/outline.h"
 #include "engine/scene/strands.h"
 #include "engine/scene/triangles.h"
 #include "lod/builder/mesh/mesh_build.h"
@@ -249,55 +249,6 @@ Result<void> placeStrands(const scene::Scene& scene, const BuildOptions& build, 
     return {};
 }
 
-std::vector<render::WorldLight> lightsOf(const scene::Scene& scene) {
-    std::vector<render::WorldLight> lights;
-    const std::vector<glm::dmat4> world = scene.worldTransforms();
-    const std::vector<bool> visible = scene.visibility();
-    for (size_t n = 0; n < scene.nodes.size(); ++n) {
-        if (scene.nodes[n].light < 0 || !visible[n]) continue;
-        const scene::Light& light = scene.lights[static_cast<size_t>(scene.nodes[n].light)];
-        render::WorldLight out;
-        out.kind = light.kind == scene::LightKind::directional ? shared::kLightDirectional
-                   : light.kind == scene::LightKind::point     ? shared::kLightPoint
-                                                               : shared::kLightSpot;
-        out.position = glm::dvec3(world[n][3]);
-        const glm::dvec3 axis = -glm::dvec3(world[n][2]);
-        out.direction = glm::length(axis) > 0 ? glm::normalize(axis) : glm::dvec3(0, -1, 0);
-        out.colour = light.colour * light.intensity;
-        out.range = light.range;
-        out.innerCone = light.innerCone;
-        out.outerCone = light.outerCone;
-        lights.push_back(out);
-    }
-    return lights;
-}
-
-/// A camera looks along -z of its node, y up.
-std::vector<scene::Camera> camerasOf(const scene::Scene& scene) {
-    std::vector<scene::Camera> cameras;
-    const std::vector<glm::dmat4> world = scene.worldTransforms();
-    for (size_t n = 0; n < scene.nodes.size(); ++n) {
-        if (scene.nodes[n].camera < 0) continue;
-        const scene::SceneCamera& from = scene.cameras[static_cast<size_t>(scene.nodes[n].camera)];
-        if (!(glm::length(glm::dvec3(world[n][2])) > 0)) continue;
-        if (from.isOrthographic && !(from.width > 0 || from.height > 0)) continue;
-        scene::Camera camera;
-        camera.eye = glm::dvec3(world[n][3]);
-        camera.target = camera.eye - glm::normalize(glm::dvec3(world[n][2]));
-        camera.up = glm::dvec3(world[n][1]);
-        camera.fovDegrees = from.fovDegrees;
-        if (from.isOrthographic) {
-            // What it shows is as large as its node makes it.
-            camera.orthoWidth = from.width * glm::length(glm::dvec3(world[n][0]));
-            camera.orthoHeight = from.height * glm::length(glm::dvec3(world[n][1]));
-            camera.orthoNear = from.nearPlane * glm::length(glm::dvec3(world[n][2]));
-            camera.orthoFar = from.farPlane * glm::length(glm::dvec3(world[n][2]));
-        }
-        cameras.push_back(camera);
-    }
-    return cameras;
-}
-
 /// Vertices of a kind in those places.
 double workOf(const scene::Scene& scene, const std::vector<scene::Placement>& of, scene::PrimitiveKind kind) {
     double work = 1;
@@ -370,53 +321,11 @@ Result<void> openSceneFile(const std::string& path, const BuildOptions& options,
     return {};
 }
 
-/// One description for all: the only store's own, or the union with y up, as glTF has it.
-lod::StoreDescription describe(const std::vector<render::PlacedStore>& placed) {
-    lod::StoreDescription all = placed.front().store->description;
-    if (placed.size() == 1 && placed[0].place.rotation == glm::dmat3(1) && placed[0].place.scale == 1 &&
-        placed[0].place.translation == glm::dvec3(0))
-        return all;
-    all.up = {0, 1, 0};
-    all.boundsMin = all.focusMin = glm::dvec3(1e300);
-    all.boundsMax = all.focusMax = glm::dvec3(-1e300);
-    all.points = 0;
-    all.isReflectance = std::any_of(placed.begin(), placed.end(), [](const auto& p) { return p.standIns != nullptr; });
-    for (const render::PlacedStore& p : placed) {
-        const lod::StoreDescription& d = p.store->description;
-        for (int corner = 0; corner < 8; ++corner) {
-            const auto pick = [&](const glm::dvec3& lo, const glm::dvec3& hi) {
-                const glm::dvec3 at((corner & 1) != 0 ? hi.x : lo.x, (corner & 2) != 0 ? hi.y : lo.y,
-                                    (corner & 4) != 0 ? hi.z : lo.z);
-                return p.place.translation + p.place.rotation * (p.place.scale * at);
-            };
-            all.boundsMin = glm::min(all.boundsMin, pick(d.boundsMin, d.boundsMax));
-            all.boundsMax = glm::max(all.boundsMax, pick(d.boundsMin, d.boundsMax));
-            all.focusMin = glm::min(all.focusMin, pick(d.focusMin, d.focusMax));
-            all.focusMax = glm::max(all.focusMax, pick(d.focusMin, d.focusMax));
-        }
-        all.points += d.points;
-        all.hasColour = true;  // what is not, is in isReflectance
-        all.hasNormals = all.hasNormals || d.hasNormals;
-        // Points are lit if any of them need it; triangles always are.
-        if (!p.store->hierarchy.isMesh()) all.isReflectance = all.isReflectance || isShaded(d);
-        if (all.attributes.empty()) all.attributes = d.attributes;
-    }
-    return all;
-}
-
-}  // namespace
-
-namespace {
-
 /// Of PLY files with faces; their paths are made by whoever builds them.
 Result<lod::MeshBuildSettings> plySettings(const BuildOptions& build) {
     scene::Scene plain;
     return meshSettings(plain, build);
 }
-
-}  // namespace
-
-namespace {
 
 /// Scene files are read as a whole: is there memory for that? What is asked for suffices for the build that follows.
 Result<void> checkSceneMemory(const std::string& path, uint64_t memoryBytes) {
@@ -450,10 +359,6 @@ Result<void> areSeen(const std::vector<std::string>& inputs) {
         if (std::error_code error; fs::is_regular_file(input, error)) STIPPLE_TRY(InputFile::open(input));
     return {};
 }
-
-}  // namespace
-
-namespace {
 
 /// Scans, or PLY files that all have faces.
 Result<lod::BuildReport> buildFiles(const std::vector<std::string>& inputs, const std::string& output,
@@ -532,25 +437,6 @@ Result<std::shared_ptr<const lod::Store>> openFiles(const std::vector<std::strin
                           });
     if (const std::string note = meshes.note(); !note.empty() && showProgress) fmt::print(stderr, "note: {}\n", note);
     return openBuilt(inputs, build, executor, showProgress);
-}
-
-/// What a camera must see: points on the outside of all stores, in world space.
-std::vector<glm::dvec3> outlineOf(const std::vector<render::PlacedStore>& placed) {
-    constexpr size_t kMostRead = 64, kMostPlaced = 4000;
-    std::map<const lod::Store*, std::vector<glm::dvec3>> known;
-    std::vector<glm::dvec3> all;
-    const size_t stride = placed.size() / kMostPlaced + 1;
-    for (size_t i = 0; i < placed.size(); i += stride) {
-        const render::PlacedStore& p = placed[i];
-        auto& own = known[p.store.get()];
-        if (own.empty() && placed.size() <= kMostRead) own = scene::outlineOf(*p.store);
-        if (own.empty() || placed.size() > kMostRead) {
-            const auto corners = scene::cornersOf(p.store->description.focusMin, p.store->description.focusMax);
-            own.assign(corners.begin(), corners.end());
-        }
-        for (const glm::dvec3& at : own) all.push_back(p.place.translation + p.place.rotation * (p.place.scale * at));
-    }
-    return scene::outermost(all);
 }
 
 }  // namespace

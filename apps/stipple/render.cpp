@@ -295,7 +295,7 @@ Result<void> run(const Options& o, Written& written) {
                           o.noWait,   o.build.skipBad, o.quiet,  !o.quiet && !o.json, o.alpha,  &legend};
     Timings timings;
     Verdict verdict;
-    STIPPLE_TRY(runFrames(plan, settings, *state, *executor, timings, written, verdict));
+    STIPPLE_TRY(runFrames(plan, settings, *state, timings, written, verdict));
     if (shot.views.size() == 1) {
         STIPPLE_TRY(checkStopped(o.output));
         drawLegend(legend, state->image);

@@ -139,7 +139,7 @@ Result<void> accumulate(const FramesPlan& plan, render::FrameSettings settings, 
 }  // namespace
 
 Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& settings, render::FrameState& state,
-                       Executor& executor, Timings& timings, Written& written, Verdict& verdict) {
+                       Timings& timings, Written& written, Verdict& verdict) {
     // The first image: as soon as the root is there, whatever is missing.
     STIPPLE_TRY(awaitRoot(plan, settings, state));
     const lod::View& first = plan.views.front();
@@ -150,7 +150,7 @@ Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& sett
         render::FrameSettings frame = settings;
         if (!plan.seconds.empty()) frame.draw.wind.seconds += plan.seconds[i];
         if (!plan.noWait)
-            STIPPLE_TRY(render::renderUntilComplete(state, plan.views[i], frame, executor));
+            STIPPLE_TRY(render::renderUntilComplete(state, plan.views[i], frame));
         else if (i > 0)
             STIPPLE_TRY(render::renderFrame(state, plan.views[i], frame));
         if (i == 0) timings.completeMs = millisecondsSinceProcessStart();

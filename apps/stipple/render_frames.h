@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "apps/stipple/legend.h"
-#include "engine/base/executor.h"
 #include "engine/render/frame.h"
 #include "engine/render/lots.h"
 
@@ -67,7 +66,7 @@ void sayEmpty(size_t empty, size_t pictures, const std::string& output);
 
 /// Draws all views; writes a picture of each if there are several, leaves that of a single one in `state`.
 Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& settings, render::FrameState& state,
-                       Executor& executor, Timings& timings, Written& written, Verdict& verdict);
+                       Timings& timings, Written& written, Verdict& verdict);
 
 /// Where the budget leaves an error that says nothing: how many records the asked one takes, and a note.
 void sayIfUseless(const FramesPlan& plan, const render::FrameSettings& settings, const render::FrameState& state,

@@ -35,13 +35,12 @@ std::string freePictureName(int& number) {
 
 class Viewer {
   public:
-    Viewer(const ViewOptions& o, gpu::Window& window, ViewSession& session, ViewSettings& settings, Executor& executor,
+    Viewer(const ViewOptions& o, gpu::Window& window, ViewSession& session, ViewSettings& settings,
            Navigation navigation, PathPlayer player)
         : o_(o),
           window_(window),
           session_(session),
           settings_(settings),
-          executor_(executor),
           opener_(o.build),
           navigation_(navigation),
           player_(std::move(player)) {}
@@ -239,7 +238,7 @@ class Viewer {
 
     /// With --frames: complete, and as it is shown.
     Result<void> drawLast(const gpu::Input& input) {
-        STIPPLE_TRY(render::renderUntilComplete(session_.state(), view(), settings_.frame, executor_));
+        STIPPLE_TRY(render::renderUntilComplete(session_.state(), view(), settings_.frame));
         render::Image shot;
         for (int tries = 0; tries < 50 && shot.rgba.empty(); ++tries)
             STIPPLE_TRY(present(input, o_.screenshot.empty() ? nullptr : &shot));
@@ -284,7 +283,6 @@ class Viewer {
     gpu::Window& window_;
     ViewSession& session_;
     ViewSettings& settings_;
-    Executor& executor_;
     SceneOpener opener_;
     Navigation navigation_;
     PathPlayer player_;
@@ -353,7 +351,7 @@ Result<void> run(const ViewOptions& o) {
     STIPPLE_ASSIGN(const std::unique_ptr<gpu::Window> window,
                    gpu::Window::create("Stipple: " + session.scene().description.source, size.x, size.y,
                                        std::getenv("STIPPLE_VALIDATION") != nullptr));
-    const auto result = Viewer(o, *window, session, settings, *executor, navigation, std::move(player)).run();
+    const auto result = Viewer(o, *window, session, settings, navigation, std::move(player)).run();
     for (const std::string& message : window->validationMessages()) fmt::print(stderr, "validation: {}\n", message);
     STIPPLE_TRY(result);
     if (!window->validationMessages().empty())

@@ -78,9 +78,5 @@ Result<void> renderResident(FrameState& state, const lod::View& view, const Fram
 /// Waits for what planResident says of the view and draws it; true if nothing that the view wants is missing. The
 /// picture is the same whatever was drawn before and however long reading took.
 Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const FrameSettings& settings);
-inline Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const FrameSettings& settings,
-                                        Executor&) {
-    return renderUntilComplete(state, view, settings);
-}
 
 }  // namespace stipple::render

@@ -103,9 +103,9 @@ TEST_F(Errors, EqualCutsGiveEqualIdsWhateverElseIsResident) {
     coarse.budgets.errorPixels = 4;
     auto fresh = render::makeFrameState({store_}, *backend, *executor_, {});
     auto used = render::makeFrameState({store_}, *other, *executor_, {});
-    ASSERT_TRUE(render::renderUntilComplete(*used, view, fine, *executor_));
-    ASSERT_TRUE(render::renderUntilComplete(*used, view, coarse, *executor_));
-    ASSERT_TRUE(render::renderUntilComplete(*fresh, view, coarse, *executor_));
+    ASSERT_TRUE(render::renderUntilComplete(*used, view, fine));
+    ASSERT_TRUE(render::renderUntilComplete(*used, view, coarse));
+    ASSERT_TRUE(render::renderUntilComplete(*fresh, view, coarse));
     ASSERT_NE(fresh->counters.residentBytes, used->counters.residentBytes) << "the residency must differ";
     ASSERT_EQ(fresh->draws.points().blocks.size(), used->draws.points().blocks.size());
     for (size_t b = 0; b < fresh->draws.points().blocks.size(); ++b) {

@@ -53,7 +53,7 @@ TEST_F(Forests, AreThoseOfTheOracleOnEveryInstructionSet) {
     const auto oracle = reference::makeReferenceBackend(*executor_);
     const auto image = [&](render::Backend& backend, const lod::View& view, double tau) {
         auto state = render::makeFrameState(forest.placed, backend, *executor_, {}, forest.crowds);
-        EXPECT_TRUE(render::renderUntilComplete(*state, view, lit(tau), *executor_));
+        EXPECT_TRUE(render::renderUntilComplete(*state, view, lit(tau)));
         return state->image;
     };
     // Among the trees, over them, and from so far that only their points are seen.
@@ -89,14 +89,14 @@ TEST_F(Forests, DiscsCoverAsMuchAsTheStrandsThatTheyStandFor) {
     for (uint32_t k = 0; k < kFrames; ++k) {
         render::FrameSettings exact = lit(0.05);
         exact.draw.coverageSeed = k;
-        EXPECT_TRUE(render::renderUntilComplete(*state, view, exact, *executor_));
+        EXPECT_TRUE(render::renderUntilComplete(*state, view, exact));
         covered += coverOf(state->image).first / kFrames;
     }
     auto far = render::makeFrameState(forest.placed, *backend, *executor_, {}, forest.crowds);
-    EXPECT_TRUE(render::renderUntilComplete(*far, view, lit(1), *executor_));
+    EXPECT_TRUE(render::renderUntilComplete(*far, view, lit(1)));
     EXPECT_GT(far->counters.standIns + far->counters.crowdMembers, 0u);
     EXPECT_NEAR(coverOf(far->image).first / covered, 1, 0.08);
-    EXPECT_TRUE(render::renderUntilComplete(*far, view, lit(2), *executor_));
+    EXPECT_TRUE(render::renderUntilComplete(*far, view, lit(2)));
     EXPECT_NEAR(coverOf(far->image).first / covered, 1, 0.15);
 }
 
@@ -154,7 +154,7 @@ TEST_F(Forests, SwayInTheWind) {
                            FrameCounters* counters = nullptr) {
         auto state = render::makeFrameState(forest.placed, backend, *executor_, {}, forest.crowds);
         render::setSway(settings.draw.wind, state->hierarchies, state->instances);
-        EXPECT_TRUE(render::renderUntilComplete(*state, view, settings, *executor_));
+        EXPECT_TRUE(render::renderUntilComplete(*state, view, settings));
         if (counters) *counters = state->counters;
         return state->image;
     };
@@ -255,7 +255,7 @@ TEST_F(Forests, APathFromFarAwayOntoALeafDoesNotPop) {
     const glm::dvec3 leaf(36, 9, 36), from(36 + 300, 120, 36 + 900);
     const auto frameAt = [&](double distance, double tau) {
         const glm::dvec3 eye = leaf + distance * glm::normalize(from - leaf);
-        EXPECT_TRUE(render::renderUntilComplete(*coarse, viewFrom(eye, leaf, 320, 240), lit(tau), *executor_));
+        EXPECT_TRUE(render::renderUntilComplete(*coarse, viewFrom(eye, leaf, 320, 240), lit(tau)));
         return coarse->image;
     };
     // What the cut's decisions alone change: the same view at an error of one step more (1/32 octave, as a move nearer

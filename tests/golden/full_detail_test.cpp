@@ -68,7 +68,7 @@ Beyond measure(const std::shared_ptr<const lod::Store>& store, const test::DiscF
     settings.budgets.errorPixels = tau;
     settings.wantDepthAndNormal = true;
     settings.mode = mode;
-    EXPECT_TRUE(render::renderUntilComplete(*state, view, settings, executor).value_or(false));
+    EXPECT_TRUE(render::renderUntilComplete(*state, view, settings).value_or(false));
     const render::Image& image = state->image;
     const test::RayHits hits = test::hitDiscs(test::discsOfCut(*store, *state), view);
     Beyond b;

@@ -18,6 +18,7 @@ struct Case {
     uint32_t debugView;
     render::Mode mode;
     double tau;
+    friend void PrintTo(const Case& c, std::ostream* to) { *to << c.name; }
 };
 
 class Golden : public testing::TestWithParam<Case> {};

@@ -418,12 +418,12 @@ TEST_F(Orthographic, CutsAreAsNearAsTheirPixelsSay) {
             render::FrameSettings settings;
             settings.budgets.errorPixels = tau;
             auto state = render::makeFrameState({mesh}, *backend, *executor_, {});
-            ASSERT_TRUE(*render::renderUntilComplete(*state, view, settings, *executor_));
+            ASSERT_TRUE(*render::renderUntilComplete(*state, view, settings));
             const auto drawn = test::drawnTriangles(*mesh, state->cut.meshDraw);
             coarser += drawn.size() < leaves.size() ? 1 : 0;
             EXPECT_LE(test::largestDistance(drawn, leaves, 3000, 1), tau * pixel) << tau;
             state = render::makeFrameState({points}, *backend, *executor_, {});
-            ASSERT_TRUE(*render::renderUntilComplete(*state, view, settings, *executor_));
+            ASSERT_TRUE(*render::renderUntilComplete(*state, view, settings));
             double most = 0;
             for (const reference::Disc& disc : test::discsOfCut(*points, *state))
                 most = std::max(most, field.distance(disc.position, 10));

@@ -27,7 +27,7 @@ class Placement : public testing::Test {
         settings.draw.lit = true;
         settings.draw.worldUp = camera.up;
         const lod::View view = scene::makeView(camera, 320, 240, nearPlane);
-        EXPECT_TRUE(render::renderUntilComplete(*state, view, settings, *executor_));
+        EXPECT_TRUE(render::renderUntilComplete(*state, view, settings));
         return state->image;
     }
     const test::TempFolder folder_;

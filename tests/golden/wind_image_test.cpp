@@ -66,7 +66,7 @@ class Gale : public testing::Test {
         placed.place.translation = {0.5, 0, -0.25};
         auto state = render::makeFrameState(std::vector{placed}, backend, *executor_, {});
         render::setSway(settings.draw.wind, state->hierarchies, state->instances);
-        EXPECT_TRUE(render::renderUntilComplete(*state, view, settings, *executor_).value_or(false));
+        EXPECT_TRUE(render::renderUntilComplete(*state, view, settings).value_or(false));
         return state;
     }
     /// (A backend serves one state at a time.)

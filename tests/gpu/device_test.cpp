@@ -60,8 +60,7 @@ TEST(Device, A4KPictureIsDrawnOrRefusedAndValidationIsSilent) {
     ASSERT_TRUE(backend) << backend.error().line();
     const std::vector<render::PlacedStore> placed{{store, {}, {}}};
     const auto state = render::makeFrameState(placed, **backend, *executor, {});
-    const auto drawn =
-        render::renderUntilComplete(*state, test::fitView(*store, 3840, 2160), render::FrameSettings{}, *executor);
+    const auto drawn = render::renderUntilComplete(*state, test::fitView(*store, 3840, 2160), render::FrameSettings{});
     constexpr uint64_t kPyramid = uint64_t{3840} * 2160 * 5 * 4 * 4 / 3;
     if ((*device)->limits.storageRange >= kPyramid + (1 << 20)) {
         ASSERT_TRUE(drawn) << drawn.error().line();
@@ -71,8 +70,7 @@ TEST(Device, A4KPictureIsDrawnOrRefusedAndValidationIsSilent) {
         EXPECT_EQ(drawn.error().kind, ErrorKind::device);
         EXPECT_NE(drawn.error().line().find("maxStorageBufferRange"), std::string::npos) << drawn.error().line();
     }
-    const auto small =
-        render::renderUntilComplete(*state, test::fitView(*store, 320, 240), render::FrameSettings{}, *executor);
+    const auto small = render::renderUntilComplete(*state, test::fitView(*store, 320, 240), render::FrameSettings{});
     EXPECT_TRUE(small) << small.error().line();
     for (const std::string& message : validationMessages(**backend)) ADD_FAILURE() << message;
 }

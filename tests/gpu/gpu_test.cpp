@@ -187,7 +187,7 @@ TEST_F(Gpu, DrawsMeshesAndHybridScenesAsTheOracleDoesAndOnlyThenHasWhatTheyNeed)
                 if (hasLights) settings.draw.lights = {{shared::kLightPoint, {2, 2, 2}, {0, -1, 0}, glm::vec3(20)}};
                 const auto image = [&](render::Backend& backend) {
                     auto state = render::makeFrameState(placed, backend, *executor_, {});
-                    EXPECT_TRUE(render::renderUntilComplete(*state, view, settings, *executor_));
+                    EXPECT_TRUE(render::renderUntilComplete(*state, view, settings));
                     return state->image;
                 };
                 const auto d = reference::compareImages(image(*gpu), image(*oracle), 4, nullptr);
@@ -225,7 +225,7 @@ TEST_F(Gpu, DrawsRibbonsAndTubesAmongPointsAsTheOracleDoes) {
                 settings.wantDepthAndNormal = exact > 3;
                 const auto image = [&](render::Backend& backend) {
                     auto state = render::makeFrameState(placed, backend, *executor_, {});
-                    EXPECT_TRUE(render::renderUntilComplete(*state, view, settings, *executor_));
+                    EXPECT_TRUE(render::renderUntilComplete(*state, view, settings));
                     return state->image;
                 };
                 const auto d = reference::compareImages(image(*gpu), image(*oracle), 4, nullptr);
@@ -247,7 +247,7 @@ TEST_F(Gpu, DrawsRibbonsAndTubesAmongPointsAsTheOracleDoes) {
         settings.budgets.errorPixels = 2;
         const auto image = [&](render::Backend& backend) {
             auto state = render::makeFrameState(forest.placed, backend, *executor_, {}, forest.crowds);
-            EXPECT_TRUE(render::renderUntilComplete(*state, view, settings, *executor_));
+            EXPECT_TRUE(render::renderUntilComplete(*state, view, settings));
             return state->image;
         };
         const auto d = reference::compareImages(image(*gpu), image(*oracle), 4, nullptr);

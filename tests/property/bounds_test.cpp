@@ -195,6 +195,7 @@ struct Case {
     uint32_t leafRecords = 400;
     bool hasHoles = true;  ///< hulls are a poor bound
     bool isFound = true;   ///< by more than what codes of errors round up
+    friend void PrintTo(const Case& c, std::ostream* to) { *to << c.name; }
 };
 
 class Bounds : public ::testing::TestWithParam<Case> {

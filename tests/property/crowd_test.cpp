@@ -200,11 +200,11 @@ TEST_F(Crowds, StayWithinABudgetAndAskForWhatTheyNeed) {
     const lod::View view = viewFrom({44, 40, 130}, {44, 5, 44});
     render::FrameSettings settings;
     settings.budgets = {0.5, 20'000};
-    EXPECT_TRUE(render::renderUntilComplete(*state, view, settings, *executor_));
+    EXPECT_TRUE(render::renderUntilComplete(*state, view, settings));
     EXPECT_LE(state->counters.recordsDrawn, 20'000u);
     EXPECT_GT(state->counters.tauEffectivePixels, 0.5);
     settings.budgets.records = std::numeric_limits<uint64_t>::max();
-    EXPECT_TRUE(render::renderUntilComplete(*state, view, settings, *executor_));
+    EXPECT_TRUE(render::renderUntilComplete(*state, view, settings));
     EXPECT_DOUBLE_EQ(state->counters.tauEffectivePixels, 0.5);
     EXPECT_GT(state->counters.crowdMembers, 0u);
 }

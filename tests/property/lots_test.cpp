@@ -18,7 +18,7 @@ class Lots : public testing::Test {
         auto state = render::makeFrameState({store_}, *backend, *executor_, {});
         render::FrameSettings settings;
         settings.budgets.errorPixels = tau;
-        EXPECT_TRUE(render::renderUntilComplete(*state, view, settings, *executor_));
+        EXPECT_TRUE(render::renderUntilComplete(*state, view, settings));
         const auto lots = render::measureLots(*state, view);
         EXPECT_TRUE(lots);
         state->streamer.reset();

@@ -340,7 +340,7 @@ bool tryEverything(const std::string& path) {
             settings.wantDepthAndNormal = true;
             settings.draw.worldUp = store->description.up;
             settings.budgets.records = 200'000;
-            (void)render::renderUntilComplete(*state, view, settings, *executor);
+            (void)render::renderUntilComplete(*state, view, settings);
         }
     }
     (void)lod::verifyStore(*store, *executor);

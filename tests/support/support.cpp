@@ -111,7 +111,7 @@ std::shared_ptr<const lod::Store> buildAndOpen(const std::string& input, const s
 render::Image draw(const std::vector<render::PlacedStore>& placed, render::Backend& backend, Executor& executor,
                    const lod::View& view, const render::FrameSettings& settings, FrameCounters* counters) {
     auto state = render::makeFrameState(placed, backend, executor, {});
-    const auto complete = render::renderUntilComplete(*state, view, settings, executor);
+    const auto complete = render::renderUntilComplete(*state, view, settings);
     if (!complete) fatal(complete.error());
     EXPECT_TRUE(*complete);
     if (counters) *counters = state->counters;

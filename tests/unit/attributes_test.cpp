@@ -188,7 +188,7 @@ TEST(Attributes, PicturesHaveTheColoursOfTheLegend) {
         render::FrameSettings frame;
         frame.draw.lit = false;
         const lod::View view = scene::makeView(camera, 200, 200, 1e-3);
-        EXPECT_TRUE(render::renderUntilComplete(*state, view, frame, *executor));
+        EXPECT_TRUE(render::renderUntilComplete(*state, view, frame));
         return state->image.rgba[100 * 200 + static_cast<size_t>(50 + 100 * fraction)] & 0xffffffu;
     };
     const auto by = parseColourBy("class", "", "", store->description);

@@ -43,7 +43,7 @@ class Effects : public testing::Test {
         lod::View view = test::fitView(*store, 200, 150);
         const glm::dvec3 middle = 0.5 * (store->description.boundsMin + store->description.boundsMax);
         view.eye = middle + fartherTimes * (view.eye - middle);
-        EXPECT_TRUE(renderUntilComplete(*state, view, settings, *executor_));
+        EXPECT_TRUE(renderUntilComplete(*state, view, settings));
         return state;
     }
     test::TempFolder folder_;

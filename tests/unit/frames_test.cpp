@@ -55,7 +55,7 @@ TEST(Frames, ShowNothingOfThoseBefore) {
         const auto fresh = cpu::makeCpuBackend(*executor);
         const auto freshState = render::makeFrameState(placed, *fresh, *executor, {});
         for (render::FrameState* state : {keptState.get(), freshState.get()})
-            ASSERT_TRUE(render::renderUntilComplete(*state, view, settings, *executor));
+            ASSERT_TRUE(render::renderUntilComplete(*state, view, settings));
         const render::Image &a = keptState->image, &b = freshState->image;
         SCOPED_TRACE(testing::Message() << "frame " << frame);
         EXPECT_TRUE(a.rgba == b.rgba);

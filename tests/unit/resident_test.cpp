@@ -90,7 +90,7 @@ class Resident : public testing::Test {
             executor.some(rng.below(6));
         }
         if (isPlanned) {
-            EXPECT_TRUE(render::renderUntilComplete(*state, view, settings, executor));
+            EXPECT_TRUE(render::renderUntilComplete(*state, view, settings));
             EXPECT_LE(state->counters.residentBytes, budget);
         } else {  // as the window streams
             for (int k = 0; k < 40; ++k) {

@@ -56,7 +56,7 @@ TEST(Threads, SeveralStreamAndDrawWhatOneDraws) {
             view.focalPixels *= 120.0 / 400;
             for (int k = 0; k < 4; ++k)  // as an impatient window does
                 EXPECT_TRUE(render::renderFrame(*state, view, settings));
-            EXPECT_TRUE(render::renderUntilComplete(*state, view, settings, executor));
+            EXPECT_TRUE(render::renderUntilComplete(*state, view, settings));
             pictures.push_back(state->image);
         }
         return pictures;

@@ -1,0 +1,24 @@
+// What is known of a scene beside its stores: lights, cameras, one description for all, what a camera must see.
+#pragma once
+
+#include <vector>
+
+#include "engine/render/frame.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/scene.h"
+
+namespace stipple::app {
+
+/// Of visible nodes, in world space.
+std::vector<render::WorldLight> lightsOf(const scene::Scene& scene);
+
+/// A camera looks along -z of its node, y up.
+std::vector<scene::Camera> camerasOf(const scene::Scene& scene);
+
+/// One description for all: the only store's own, or the union with y up, as glTF has it.
+lod::StoreDescription describe(const std::vector<render::PlacedStore>& placed);
+
+/// What a camera must see: points on the outside of all stores, in world space.
+std::vector<glm::dvec3> outlineOf(const std::vector<render::PlacedStore>& placed);
+
+}  // namespace stipple::app
