@@ -36,7 +36,7 @@ WideDisc discOf(uint id, out DrawNode node, out PointRecord r) {
 // Is it this thread's to draw a disc, and which?
 bool discHere(out WideDisc d) {
     const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * kGroupsPerDimension;
-    if (block >= frame.firstBlock.curves) return false;
+    if (block >= frame.firstBlock.of[kKindCurves]) return false;
     const DrawBlock source = blocks[block];
     if (source.first + gl_LocalInvocationID.x >= nodes[source.node].count) return false;
     DrawNode node;

@@ -62,7 +62,7 @@ void offerOwn(uint block) {
 void main() {
     const uint block = gl_WorkGroupID.x + gl_WorkGroupID.y * kGroupsPerDimension;
     leaveNone();
-    if (block < frame.firstBlock.curves) offerOwn(block);
+    if (block < frame.firstBlock.of[kKindCurves]) offerOwn(block);
     barrier();
     for (uint i = 0u; i < leftCount; ++i) {
         const WideDisc d = discOf(block, leftIds[i]);

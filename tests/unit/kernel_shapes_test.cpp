@@ -1,0 +1,356 @@
+// The kernels of curves and triangles of every instruction set against the scalar formulas of shaders/shared, value by
+// value (see kernel_formula_test.cpp).
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "shaders/shared/pack.h"
+#include "tests/unit/kernel_formulas.h"
+
+namespace stipple {
+namespace {
+
+using namespace shared;
+using namespace test;
+
+uint32_t wordOf(Rng& rng) { return static_cast<uint32_t>(rng.below(uint64_t{1} << 32)); }
+/// Octahedral, of any direction.
+uint32_t directionOf(Rng& rng) {
+    return static_cast<uint32_t>(rng.below(65535)) | static_cast<uint32_t>(rng.below(65535)) << 16;
+}
+
+vec3 scaled(const vec3& v, float by) { return {v.x * by, v.y * by, v.z * by}; }
+vec3 plus(const vec3& a, const vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+vec3 minus(const vec3& a, const vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+
+/// Blocks of all kinds have their ids in places of their own, so that a wrong range is seen.
+FrameConstants withRanges(FrameConstants f) {
+    f.firstBlock.of[kKindCurves] = 3;
+    f.firstBlock.of[kKindTriangles] = 5;
+    f.firstBlock.of[kKindDiscs] = 9;
+    f.sunDirection = glm::normalize(glm::vec3(-0.45f, -0.55f, -0.7f));
+    f.exactStrands = 2;
+    return f;
+}
+
+/// A row of pixels of one kind, resolved.
+struct Resolved {
+    std::vector<uint64_t> keys;
+    std::vector<uint32_t> surface = std::vector<uint32_t>(cpu::kTile);
+    std::unique_ptr<cpu::TexelRow> row = std::make_unique<cpu::TexelRow>();
+
+    void resolve(const cpu::Kernels& k, const FrameConstants& f, cpu::ResolveInput in, uint32_t x0, uint32_t y) {
+        const cpu::Tables tables = cpu::makeTables();
+        const std::array<cpu::ResolveKind, kKindNothing> none{};
+        in.ofKind = none.data();
+        row->hasTubes = true;
+        float largest = 0;
+        ASSERT_TRUE(k.resolveRow(f, tables, in, keys.data(), x0, y, static_cast<uint32_t>(keys.size()), *row, largest,
+                                 {surface.data(), nullptr, nullptr}));
+    }
+};
+
+StrandSegment randomSegment(Rng& rng) {
+    StrandSegment s;
+    for (StrandVertex* v : {&s.a, &s.b}) {
+        v->positionXY = wordOf(rng);
+        v->positionZ = (wordOf(rng) & 0xffffu) | strandRadiusCode(uniform(rng, 0, 1) * uniform(rng, 0, 0.05)) << 16;
+        v->direction = directionOf(rng);
+        v->colour = wordOf(rng) & 0xffffffu;
+    }
+    s.a.positionZ |= static_cast<uint32_t>(rng.below(2)) << 31;
+    return s;
+}
+CameraSegment placed(const DrawNode& node, const StrandSegment& s) {
+    const auto place = [&](const StrandVertex& v) {
+        const auto x = static_cast<float>(v.positionXY & 0xffffu), y = static_cast<float>(v.positionXY >> 16),
+                   z = static_cast<float>(v.positionZ & 0xffffu);
+        return plus(plus(plus(node.base, scaled(node.axisX, x)), scaled(node.axisY, y)), scaled(node.axisZ, z));
+    };
+    return {place(s.a),
+            place(s.b),
+            strandRadius(s.a, node.edge),
+            strandRadius(s.b, node.edge),
+            nodeDirection(node, octDecode(s.a.direction)),
+            nodeDirection(node, octDecode(s.b.direction)),
+            isTube(s) ? 1.0f : 0.0f};
+}
+/// What a pixel shows of a segment. `filled`: is it filled there, and does its ray meet it?
+Texel texelOf(const FrameConstants& f, const DrawNode& node, const StrandSegment& packed, uint32_t x, uint32_t y,
+              bool& isFilledHere, bool& isMet) {
+    const Lens lens = frameLens(f);
+    const CameraSegment s = placed(node, packed);
+    const float cx = f.centre.x - float(x) - 0.5f, cy = f.centre.y - float(y) - 0.5f;
+    const ScreenSegment on = projectSegment(s.a, s.b, lens, cx, cy, f.nearPlane);
+    const StrandPixel seen = strandPixel(s, on, f.supportScale, lens, cx, cy, f.nearPlane, f.sunDirection);
+    Texel t = seen.texel;
+    float place = seen.place;
+    isFilledHere = isFilled(s, on, lens, f.exactStrands) > 0.5f;
+    isMet = false;
+    if (isFilledHere) {
+        const PixelRay ray = pixelRay(lens, -cx / f.focal, -cy / f.focal);
+        const FilledPixel hit = isTube(packed) ? tubePixel(s, ray, f.nearPlane) : ribbonPixel(s, ray, f.nearPlane);
+        isMet = hit.depth < kNoDepth;
+        place = hit.place;
+        t.depth = isMet ? hit.depth : t.depth;
+        t.radius = 0.25f;
+        t.thickness = isTube(packed) ? 0.25f : kLeafThickness * 0.25f;
+        t.offset = {0, 0};
+        t.normalPerp = isMet ? hit.normalPerp : vec2(0.0f, 0.0f);
+        t.isRound = 0;
+        t.axis = {0, 0};
+    }
+    const auto mixed = [&](uint32_t shift) {
+        const float a = linearFromByte(float(packed.a.colour >> shift & 255u) * (1.0f / 255.0f)),
+                    b = linearFromByte(float(packed.b.colour >> shift & 255u) * (1.0f / 255.0f));
+        return a + place * (b - a);
+    };
+    t.colour = {mixed(0), mixed(8), mixed(16)};
+    return t;
+}
+
+TEST(KernelFormulas, TexelsOfCurvesAreThoseOfTheFormulas) {
+    forKernels([](const cpu::Kernels& k, const FrameConstants& plain) {
+        const FrameConstants f = withRanges(plain);
+        Rng rng(7);
+        std::vector<StrandSegment> segments(kSegmentsPerBlock);
+        double worst = 0;
+        std::array<size_t, 4> seen{};  // lines, filled and met, each of ribbons and tubes
+        for (int round = 0; round < 150; ++round) {
+            const DrawNode node = randomNode(rng);
+            for (StrandSegment& s : segments) s = randomSegment(rng);
+            // A segment is resolved where it is seen; elsewhere formulas are extended beyond what they were made for.
+            Resolved r;
+            std::vector<StrandSegment> shown;
+            const uint32_t y = static_cast<uint32_t>(rng.below(f.height)),
+                           x0 = 128 * static_cast<uint32_t>(rng.below(4));
+            for (uint32_t i = 0; i < cpu::kTile; ++i) {
+                const auto lane = static_cast<uint32_t>(rng.below(kSegmentsPerBlock));
+                shown.push_back(segments[lane]);
+                r.keys.push_back(visibilityKey(floatBitsToUint(5.0f), drawId(f.firstBlock.of[kKindCurves], lane)));
+            }
+            const cpu::StrandBlock block{segments.data(), &node};
+            cpu::ResolveInput in{};
+            in.strandBlocks = &block;
+            r.resolve(k, f, in, x0, y);
+            for (uint32_t i = 0; i < cpu::kTile; ++i) {
+                bool isFilledHere = false, isMet = false;
+                const Texel t = texelOf(f, node, shown[i], x0 + i, y, isFilledHere, isMet);
+                const size_t at = cpu::kPad + i;
+                if (isFilledHere && !isMet) continue;  // where the ray passes by
+                seen.at((isTube(shown[i]) ? 2u : 0u) + (isFilledHere ? 1u : 0u))++;
+                worst = std::max({worst, farthest(*r.row, at, t), ulpsBetween(r.row->isRound[at], t.isRound),
+                                  ulpsBetween(r.row->axisX[at], t.axis.x), ulpsBetween(r.row->axisY[at], t.axis.y)});
+            }
+        }
+        EXPECT_EQ(worst, 0) << "the formulas themselves, without fused multiplications";
+        for (const size_t n : seen) EXPECT_GT(n, 20u);
+    });
+}
+
+/// A cluster of triangles of any shape, some of which turn away, before the eye.
+struct Cluster {
+    std::vector<MeshVertex> vertices;
+    std::vector<uint32_t> triangles;
+    DrawMesh mesh{};
+    cpu::MeshBlock block() const {
+        return {vertices.data(),
+                triangles.data(),
+                &mesh,
+                nullptr,
+                static_cast<uint32_t>(vertices.size() | triangles.size() << 16),
+                0,
+                0};
+    }
+};
+Cluster randomCluster(Rng& rng) {
+    const auto unit = [](const vec3& v) { return vec3(glm::normalize(glm::vec3(v.x, v.y, v.z))); };
+    Cluster c;
+    const DrawNode node = randomNode(rng);
+    c.mesh.axisX = node.axisX;
+    c.mesh.axisY = node.axisY;
+    c.mesh.axisZ = node.axisZ;
+    c.mesh.normalX = unit(node.axisX);
+    c.mesh.normalY = unit(node.axisY);
+    c.mesh.normalZ = unit(node.axisZ);
+    c.mesh.base = node.base;
+    c.mesh.eyeX = c.mesh.eyeY = c.mesh.eyeZ = 32768;
+    c.mesh.mirror = 1;
+    const uint32_t surface = (rng.below(2) == 0 ? kSurfaceTwoSided : 0u) | (rng.below(2) == 0 ? kSurfaceFlat : 0u) |
+                             (rng.below(2) == 0 ? kSurfaceUnlit : 0u);
+    for (uint32_t v = 0; v < kClusterVertices; ++v) {
+        const auto place = [&] { return static_cast<int>(rng.below(65536)); };
+        c.vertices.push_back({place(), place(), place(), directionOf(rng), wordOf(rng), 0, 0, surface});
+    }
+    for (uint32_t t = 0; t < kClusterTriangles; ++t)
+        c.triangles.push_back(static_cast<uint32_t>(rng.below(kClusterVertices) | rng.below(kClusterVertices) << 8 |
+                                                    rng.below(kClusterVertices) << 16));
+    return c;
+}
+vec3 placeOf(const Cluster& c, uint32_t vertex) {
+    const MeshVertex& v = c.vertices[vertex];
+    return meshPosition(v.x, v.y, v.z, c.mesh);
+}
+
+TEST(KernelFormulas, PixelsOfTrianglesAreThoseOfExactEdges) {
+    forKernels([](const cpu::Kernels& k, FrameConstants f) {
+        f = withRanges(f);
+        const Lens lens = frameLens(f);
+        Rng rng(8);
+        const size_t pixels = size_t{f.width} * f.height;
+        std::vector<uint64_t> keys(pixels), expected(pixels);
+        std::vector<uint8_t> runs(pixels / cpu::Visibility::kRun + 1);
+        std::vector<cpu::LargeTriangle> large;
+        const cpu::LargeSink sink{&large, [](void* to, const cpu::LargeTriangle& t) {
+                                      static_cast<std::vector<cpu::LargeTriangle>*>(to)->push_back(t);
+                                  }};
+        double worst = 0;
+        size_t covered = 0, away = 0, other = 0;
+        for (int round = 0; round < 6; ++round) {
+            const Cluster c = randomCluster(rng);
+            std::fill(keys.begin(), keys.end(), kNoKey);
+            std::fill(expected.begin(), expected.end(), kNoKey);
+            large.clear();
+            const cpu::Visibility visibility{keys.data(), runs.data()};
+            k.rasterCluster(f, nullptr, c.block(), 256, sink, visibility);
+            k.rasterLarge(f, large.data(), large.size(), 0, f.height - 1, visibility);
+            for (uint32_t t = 0; t < c.triangles.size(); ++t) {
+                const std::array<uint32_t, 3> corner{c.triangles[t] & 255u, c.triangles[t] >> 8 & 255u,
+                                                     c.triangles[t] >> 16 & 255u};
+                std::array<int64_t, 3> x{}, y{};
+                std::array<double, 3> linear{};
+                for (size_t v = 0; v < 3; ++v) {
+                    const vec3 p = placeOf(c, corner.at(v));
+                    ASSERT_GT(p.z, f.nearPlane);
+                    const float scale = f.focal / lensDepth(lens, p.z);
+                    x.at(v) = snapPixel(p.x * scale + f.centre.x);
+                    y.at(v) = snapPixel(p.y * scale + f.centre.y);
+                    linear.at(v) = imageLinear(lens, p.z);
+                }
+                const auto edge = [&](size_t a, size_t b, int64_t px, int64_t py) {
+                    return (x.at(b) - x.at(a)) * (py - y.at(a)) - (y.at(b) - y.at(a)) * (px - x.at(a));
+                };
+                int64_t area = edge(0, 1, x[2], y[2]);
+                if (area > 0 && (c.vertices[corner[0]].surface & kSurfaceTwoSided) == 0u) ++away;
+                if (area == 0 || (area > 0 && (c.vertices[corner[0]].surface & kSurfaceTwoSided) == 0u)) continue;
+                if (area < 0) {
+                    std::swap(x[1], x[2]);
+                    std::swap(y[1], y[2]);
+                    std::swap(linear[1], linear[2]);
+                    area = -area;
+                }
+                const auto inside = [&](size_t a, size_t b, int64_t w) {
+                    return w > 0 || (w == 0 && isTopLeft(static_cast<int>(x.at(b) - x.at(a)),
+                                                         static_cast<int>(y.at(b) - y.at(a))));
+                };
+                for (int64_t py = 0; py < f.height; ++py)
+                    for (int64_t px = 0; px < f.width; ++px) {
+                        const int64_t w0 = edge(1, 2, 256 * px + 128, 256 * py + 128),
+                                      w1 = edge(2, 0, 256 * px + 128, 256 * py + 128), w2 = area - w0 - w1;
+                        if (!inside(1, 2, w0) || !inside(2, 0, w1) || !inside(0, 1, w2)) continue;
+                        const double at = (double(w0) * linear[0] + double(w1) * linear[1] + double(w2) * linear[2]) /
+                                          static_cast<double>(area);
+                        const auto depth = static_cast<float>(f.orthographic != 0 ? at : 1 / at);
+                        uint64_t& key = expected[static_cast<size_t>(py) * f.width + static_cast<size_t>(px)];
+                        key = std::min(key, visibilityKey(floatBitsToUint(depth),
+                                                          drawId(f.firstBlock.of[kKindTriangles], 256 + t)));
+                    }
+            }
+            for (size_t p = 0; p < pixels; ++p) {
+                // Coverage is whole numbers: equal to the last pixel. Of equally near ones rounding picks one.
+                ASSERT_EQ(keys[p] == kNoKey, expected[p] == kNoKey) << p % f.width << ", " << p / f.width;
+                if (keys[p] == kNoKey) continue;
+                ++covered;
+                other += (keys[p] & kDrawIdMask) != (expected[p] & kDrawIdMask);
+                worst = std::max(worst, ulpsBetween(keyDepth(keys[p]), keyDepth(expected[p])));
+            }
+        }
+        EXPECT_LE(worst, 8) << "three products and their sum, against fp64";
+        EXPECT_LE(other, covered / 2000);
+        EXPECT_GT(covered, 10'000u);
+        EXPECT_GT(away, 20u);
+        RecordProperty("worst ulps of " + std::string(k.name), std::to_string(worst));
+    });
+}
+
+TEST(KernelFormulas, TexelsOfTrianglesAreThoseOfTheFormulas) {
+    forKernels([](const cpu::Kernels& k, FrameConstants f) {
+        f = withRanges(f);
+        const Lens lens = frameLens(f);
+        Rng rng(9);
+        double worst = 0;
+        size_t seen = 0, flat = 0;
+        for (int round = 0; round < 100; ++round) {
+            const Cluster c = randomCluster(rng);
+            SurfaceMaterial material{};
+            material.baseColour = {uniform(rng, 0, 1), uniform(rng, 0, 1), uniform(rng, 0, 1)};
+            material.metallic = uniform(rng, 0, 1);
+            material.roughness = uniform(rng, 0, 1);
+            Resolved r;
+            std::vector<uint32_t> shown;
+            const uint32_t y = static_cast<uint32_t>(rng.below(f.height)),
+                           x0 = 128 * static_cast<uint32_t>(rng.below(4));
+            for (uint32_t i = 0; i < cpu::kTile; ++i) {
+                shown.push_back(static_cast<uint32_t>(rng.below(kClusterTriangles)));
+                r.keys.push_back(
+                    visibilityKey(floatBitsToUint(6.0f + float(i)), drawId(f.firstBlock.of[kKindTriangles], shown[i])));
+            }
+            const cpu::MeshBlock block = c.block();
+            cpu::ResolveInput in{};
+            in.meshBlocks = &block;
+            in.materials = &material;
+            r.resolve(k, f, in, x0, y);
+            for (uint32_t i = 0; i < cpu::kTile; ++i) {
+                const uint32_t t = c.triangles[shown[i]];
+                const std::array<uint32_t, 3> at{t & 255u, t >> 8 & 255u, t >> 16 & 255u};
+                const vec3 a = placeOf(c, at[0]), e1 = minus(placeOf(c, at[1]), a), e2 = minus(placeOf(c, at[2]), a);
+                const float inverse = 1.0f / f.focal;
+                const PixelRay ray = pixelRay(lens, (float(i) - (f.centre.x - float(x0) - 0.5f)) * inverse,
+                                              (float(y) + 0.5f - f.centre.y) * inverse);
+                const vec2 w = triangleWeights(rayDirection(ray), fromRay(ray, a), fromRay(ray, placeOf(c, at[1])),
+                                               fromRay(ray, placeOf(c, at[2])));
+                const float first = 1.0f - w.x - w.y;
+                const std::array<float, 3> weight{first, w.x, w.y};
+                vec3 n(0.0f, 0.0f, 0.0f), colour(0.0f, 0.0f, 0.0f);
+                for (size_t v = 0; v < 3; ++v) {
+                    const MeshVertex& vertex = c.vertices[at.at(v)];
+                    const vec3 own = octDecode(vertex.normal);
+                    const auto linear = [&](uint32_t shift) {
+                        return weight.at(v) * linearFromByte(float(vertex.colour >> shift & 255u) * (1.0f / 255.0f));
+                    };
+                    n = v == 0 ? scaled(own, weight.at(v)) : plus(n, scaled(own, weight.at(v)));
+                    const vec3 part(linear(0), linear(8), linear(16));
+                    colour = v == 0 ? part : plus(colour, part);
+                }
+                const vec3 face(e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x);
+                const bool isFlat = (c.vertices[at[0]].surface & kSurfaceFlat) != 0u;
+                const DrawMesh& m = c.mesh;
+                const vec3 world = plus(plus(scaled(m.normalX, n.x), scaled(m.normalY, n.y)), scaled(m.normalZ, n.z));
+                const vec3 normal = surfaceNormal(isFlat ? face : world, face, rayDirection(ray));
+                const vec3 d = rayDirection(ray);
+                const float inverseRay = 1.0f / std::sqrt(d.x * d.x + d.y * d.y + 1.0f);
+                Texel expected{};
+                expected.depth = 6.0f + float(i);
+                expected.radius = expected.thickness = kTriangleRadius;
+                expected.normalPerp = perpFromNormal(normal, vec3(d.x * inverseRay, d.y * inverseRay, inverseRay));
+                const vec3 base = material.baseColour;
+                expected.colour = {base.x * colour.x, base.y * colour.y, base.z * colour.z};
+                worst = std::max(worst, farthest(*r.row, cpu::kPad + i, expected));
+                const auto byte = [](float v) { return static_cast<uint32_t>(v * 255.0f + 0.5f); };
+                const uint32_t word = kPixelTriangle |
+                                      ((c.vertices[at[0]].surface & kSurfaceUnlit) != 0u ? kPixelUnlit : 0u) |
+                                      byte(material.metallic) | byte(material.roughness) << 8 | 255u << 16;
+                ASSERT_EQ(r.surface[i], word);
+                ++seen;
+                flat += isFlat ? 1 : 0;
+            }
+        }
+        EXPECT_EQ(worst, 0) << "the formulas themselves, without fused multiplications";
+        EXPECT_GT(seen, 10'000u);
+        EXPECT_GT(flat, 1000u);
+        RecordProperty("worst ulps of " + std::string(k.name), std::to_string(worst));
+    });
+}
+
+}  // namespace
+}  // namespace stipple
