@@ -82,7 +82,7 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
 /// What a command draws: stores and where they stand.
 struct OpenedScene {
     std::vector<render::PlacedStore> placed;
-    std::vector<render::PlacedCrowd> crowds;
+    std::vector<render::PlacedGroup> groups;
     lod::StoreDescription description;  ///< of all together: bounds, up, what colours can be asked for
     std::vector<render::WorldLight> lights;
     std::vector<scene::Camera> cameras;  ///< of the scene's visible nodes, in their order

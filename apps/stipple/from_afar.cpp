@@ -121,14 +121,14 @@ Result<StandIns> strandsFromAfar(const SharedModel& model, const lod::Store& of,
     return std::make_shared<const std::vector<render::StandIn>>(std::vector{standIn});
 }
 
-void CrowdBuilder::add(const SharedModel& model, uint32_t first, uint32_t count) {
+void GroupBuilder::add(const SharedModel& model, uint32_t first, uint32_t count) {
     models_.push_back({model, first, count});
 }
 
-Result<void> CrowdBuilder::finish(const std::string& input, const BuildOptions& build, Executor& executor,
+Result<void> GroupBuilder::finish(const std::string& input, const BuildOptions& build, Executor& executor,
                                   bool showProgress, OpenedScene& scene) {
     constexpr uint64_t kFew = 64, kMostPoints = 12'000'000;
-    constexpr uint32_t kCrowdNode = 2048;  // small nodes: all of one is drawn as finely as its nearest part asks for
+    constexpr uint32_t kGroupNode = 2048;  // small nodes: all of one is drawn as finely as its nearest part asks for
     uint64_t count = 0;
     for (const Model& m : models_) count += m.count;
     if (count < kFew) return {};
@@ -155,13 +155,13 @@ Result<void> CrowdBuilder::finish(const std::string& input, const BuildOptions& 
             }
         }
         lod::ProgressiveSettings settings = progressiveSettings(input);
-        settings.nodeRecords = kCrowdNode;
+        settings.nodeRecords = kGroupNode;
         lod::describeDiscs(factors, settings.description);
         return lod::buildProgressiveStore(items, path, settings, executor, progress);
     };
-    render::PlacedCrowd crowd;
-    STIPPLE_ASSIGN(crowd.points, openCached({input}, build, "crowd", showProgress, make));
-    const lod::Hierarchy& h = crowd.points->hierarchy;
+    render::PlacedGroup group;
+    STIPPLE_ASSIGN(group.points, openCached({input}, build, "instance group", showProgress, make));
+    const lod::Hierarchy& h = group.points->hierarchy;
     std::vector<std::vector<uint32_t>> members(h.nodes.size());
     for (const Model& m : models_)
         for (uint32_t k = m.first; k < m.first + m.count; ++k) {
@@ -171,12 +171,12 @@ Result<void> CrowdBuilder::finish(const std::string& input, const BuildOptions& 
             const glm::dvec3 centre = own.origin + own.unit * own.nodes[0].centre;
             members[lod::leafOf(h, p.place.translation + p.place.rotation * (p.place.scale * centre))].push_back(k);
         }
-    crowd.first.push_back(0);
+    group.first.push_back(0);
     for (const auto& some : members) {
-        crowd.members.insert(crowd.members.end(), some.begin(), some.end());
-        crowd.first.push_back(static_cast<uint32_t>(crowd.members.size()));
+        group.members.insert(group.members.end(), some.begin(), some.end());
+        group.first.push_back(static_cast<uint32_t>(group.members.size()));
     }
-    scene.crowds.push_back(std::move(crowd));
+    scene.groups.push_back(std::move(group));
     return {};
 }
 

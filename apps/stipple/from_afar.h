@@ -1,4 +1,4 @@
-// What is seen of things from afar: points in place of meshes and strands, and crowds of them.
+// What is seen of things from afar: points in place of meshes and strands, and instance groups of them.
 #pragma once
 
 #include <functional>
@@ -45,11 +45,11 @@ Result<StandIns> strandsFromAfar(const SharedModel& model, const lod::Store& of,
                                  bool showProgress);
 
 /// Collects what stands in many places, and makes one progressive store of all of it.
-class CrowdBuilder {
+class GroupBuilder {
   public:
     /// Placed stores [first, first + count) show `model`.
     void add(const SharedModel& model, uint32_t first, uint32_t count);
-    /// Adds a crowd to the scene, if there is enough of one.
+    /// Adds an instance group to the scene, if there is enough of one.
     Result<void> finish(const std::string& input, const BuildOptions& build, Executor& executor, bool showProgress,
                         OpenedScene& scene);
 

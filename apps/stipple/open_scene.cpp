@@ -207,7 +207,7 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
 }
 
 /// The ribbons and tubes of a scene. What stands in many places also gets what is seen of it from afar, and all those
-/// together a crowd.
+/// together an instance group.
 Result<void> placeStrands(const scene::Scene& scene, const BuildOptions& build, Executor& executor, bool showProgress,
                           OpenedScene& opened) {
     const auto open = [&](const SharedModel& model, const std::string& part) {
@@ -227,7 +227,7 @@ Result<void> placeStrands(const scene::Scene& scene, const BuildOptions& build, 
             executor);
     };
     const SharedPlaces places = sharePlaces(scene, scene::PrimitiveKind::lines);
-    CrowdBuilder crowd;
+    GroupBuilder group;
     for (const auto& [mesh, instances] : places.shared) {
         const SharedModel model = modelOf({{mesh, glm::dmat4(1)}});
         const std::string part = fmt::format("strands of mesh {}", mesh);
@@ -240,9 +240,9 @@ Result<void> placeStrands(const scene::Scene& scene, const BuildOptions& build, 
             one.place = instance;
             opened.placed.push_back(one);
         }
-        crowd.add(model, first, static_cast<uint32_t>(instances.size()));
+        group.add(model, first, static_cast<uint32_t>(instances.size()));
     }
-    STIPPLE_TRY(crowd.finish(scene.path, build, executor, showProgress, opened));
+    STIPPLE_TRY(group.finish(scene.path, build, executor, showProgress, opened));
     if (places.once.empty()) return {};
     STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store, open(modelOf(places.once), "strands"));
     opened.placed.push_back({std::move(store), {}, {}});

@@ -117,7 +117,7 @@ nlohmann::json countersJson(const FrameCounters& c) {
             {"nodes_missing", c.nodesMissing},
             {"records_tested", c.recordsTested},
             {"stand_ins", c.standIns},
-            {"crowd_members", c.crowdMembers},
+            {"group_members", c.groupMembers},
             {"nodes_swaying", c.nodesSwaying},
             {"cut_evaluations", c.cutEvaluations},
             {"passes", c.passes},
@@ -289,7 +289,7 @@ Result<void> run(const Options& o, Written& written) {
     streaming::StreamSettings stream;
     stream.residentBytes = parseBytes(o.resident);
     settings.wantDepthAndNormal = settings.wantDepthAndNormal || o.accumulate > 1;
-    auto state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.crowds);
+    auto state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.groups);
     render::setSway(settings.draw.wind, state->hierarchies, state->instances);
     const FramesPlan plan{shot.views, shot.seconds,    o.output, o.resident,          o.frames, o.accumulate,
                           o.noWait,   o.build.skipBad, o.quiet,  !o.quiet && !o.json, o.alpha,  &legend};

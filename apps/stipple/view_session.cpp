@@ -20,7 +20,7 @@ void ViewSession::restart(render::FrameSettings& settings) {
     state_.reset();
     streaming::StreamSettings stream;
     stream.residentBytes = parseBytes(options_.resident);
-    state_ = render::makeFrameState(scene_.placed, backend_, executor_, stream, scene_.crowds);
+    state_ = render::makeFrameState(scene_.placed, backend_, executor_, stream, scene_.groups);
     settings.draw.lights = scene_.lights;
     settings.draw.worldUp = d.up;
     settings.draw.wind.towards = render::windAcross(d.up);

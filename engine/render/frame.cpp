@@ -78,21 +78,21 @@ class Placer {
     uint32_t sources() const { return sources_; }
 
     /// `numbers`: instances of the placed stores.
-    void addCrowd(const PlacedCrowd& from, const std::vector<uint32_t>& numbers) {
-        lod::Crowd crowd;
-        crowd.points = add({from.points, {}, {}});
-        lod::Instance& points = state_.instances[crowd.points];
-        points.crowd = static_cast<uint32_t>(state_.crowds.size());
-        crowd.first = from.first;
-        crowd.members.reserve(from.members.size());
+    void addGroup(const PlacedGroup& from, const std::vector<uint32_t>& numbers) {
+        lod::InstanceGroup group;
+        group.points = add({from.points, {}, {}});
+        lod::Instance& points = state_.instances[group.points];
+        points.group = static_cast<uint32_t>(state_.groups.size());
+        group.first = from.first;
+        group.members.reserve(from.members.size());
         std::set<uint32_t> sources;
         for (const uint32_t m : from.members) {
-            crowd.members.push_back(numbers[m]);
+            group.members.push_back(numbers[m]);
             for (uint32_t i = numbers[m]; i != lod::Instance::kNone; i = state_.instances[i].standIn)
                 sources.insert(state_.instances[i].source);
         }
-        crowd.sources.assign(sources.begin(), sources.end());
-        state_.crowds.push_back(std::move(crowd));
+        group.sources.assign(sources.begin(), sources.end());
+        state_.groups.push_back(std::move(group));
     }
 
   private:
@@ -128,7 +128,7 @@ class Placer {
 
 std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& placed, Backend& backend, Executor& executor,
                                            const streaming::StreamSettings& settings,
-                                           const std::vector<PlacedCrowd>& crowds) {
+                                           const std::vector<PlacedGroup>& groups) {
     auto state = std::make_unique<FrameState>();
     state->backend = &backend;
     state->backendLife = backend.life();
@@ -138,7 +138,7 @@ std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& place
     std::vector<uint32_t> numbers;
     numbers.reserve(placed.size());
     for (const PlacedStore& p : placed) numbers.push_back(placer.addWithStandIns(p));
-    for (const PlacedCrowd& crowd : crowds) placer.addCrowd(crowd, numbers);
+    for (const PlacedGroup& group : groups) placer.addGroup(group, numbers);
     state->draws.firstSource = backend.claimSources(placer.sources());
     state->discSizes->setFirstSource(state->draws.firstSource);
     state->draws.materials = state->materials;
@@ -186,7 +186,7 @@ Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettin
     c.recordsTested = cut.recordsTested;
     c.trianglesDrawn = cut.trianglesDrawn;
     c.standIns = cut.standIns;
-    c.crowdMembers = cut.crowdMembers;
+    c.groupMembers = cut.groupMembers;
     c.nodesSwaying = state.draws.swaying;
     c.cutEvaluations = cut.evaluations;
     c.budgetTruncated = state.cut.truncated;

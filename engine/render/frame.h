@@ -26,7 +26,7 @@ struct FrameState {
     std::vector<std::shared_ptr<const lod::Store>> stores;
     std::vector<const lod::Hierarchy*> hierarchies;
     std::vector<lod::Instance> instances;
-    std::vector<lod::Crowd> crowds;
+    std::vector<lod::InstanceGroup> groups;
     std::vector<shared::SurfaceMaterial> materials;  ///< of all stores, one after another
     std::unique_ptr<DiscSizes> discSizes;            ///< between streamer and backend
     std::unique_ptr<streaming::Streamer> streamer;   // evicts at its end
@@ -39,7 +39,7 @@ struct FrameState {
     Image image;
     FrameCounters counters;
 
-    lod::CutScene scene() const { return {hierarchies, instances, crowds}; }
+    lod::CutScene scene() const { return {hierarchies, instances, groups}; }
 };
 
 /// Points that may be drawn in another store's stead, and how far they are from it (store units; of a progressive
@@ -54,17 +54,17 @@ struct PlacedStore {
     lod::Instance place;  ///< its `hierarchy` is set by makeFrameState
     lod::ColourBy colour;
     std::shared_ptr<const std::vector<StandIn>> standIns = nullptr;  ///< finer ones first
-    bool isMember = false;                                           ///< of a crowd
+    bool isMember = false;                                           ///< of an instance group
 };
-/// Many placed stores that are seen as one from afar, see lod::Crowd.
-struct PlacedCrowd {
+/// Many placed stores that are seen as one from afar, see lod::InstanceGroup.
+struct PlacedGroup {
     std::shared_ptr<const lod::Store> points;  ///< progressive, world coordinates
     std::vector<uint32_t> first, members;      ///< of the nodes of `points`; members count the placed stores
 };
 /// The same store may be placed many times.
 std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& placed, Backend& backend, Executor& executor,
                                            const streaming::StreamSettings& settings,
-                                           const std::vector<PlacedCrowd>& crowds = {});
+                                           const std::vector<PlacedGroup>& groups = {});
 /// One instance of each store, at its own place, coloured by `colour`.
 std::unique_ptr<FrameState> makeFrameState(std::vector<std::shared_ptr<const lod::Store>> stores, Backend& backend,
                                            Executor& executor, const streaming::StreamSettings& settings,

@@ -39,7 +39,7 @@ inline glm::dvec3 windAcross(const glm::dvec3& up) {
 }
 
 /// Could wind move it? Strands and what is seen of them from afar, unless their store says that they are no plants; but
-/// not crowds (where those are drawn, the error allowed is larger than the motion of a tree).
+/// not instance groups (where those are drawn, the error allowed is larger than the motion of a tree).
 bool mayBend(const lod::Hierarchy& h, const lod::Instance& instance);
 
 /// Sets Instance::sway of what wind could move.

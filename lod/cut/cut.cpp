@@ -49,7 +49,7 @@ void findDrivers(const CutFrame& frame) {
 }
 
 /// Can the members of an instance group be drawn?
-bool isReady(const CutFrame& frame, const Crowd& group) {
+bool isReady(const CutFrame& frame, const InstanceGroup& group) {
     return std::all_of(group.sources.begin(), group.sources.end(),
                        [&](uint32_t source) { return frame.residency.drawable[source][0] != 0; });
 }
@@ -95,7 +95,7 @@ CutCost costOfBest(const CutFrame& frame, uint32_t i, int step, uint64_t most, C
                    ActiveMembers& members) {
     const Choice choice = chooseFor(frame, i, step);
     uint32_t best = choice.instance;
-    if (counted == Counted::all && choice.isCounted && frame.instance(best).crowd == Instance::kNone)
+    if (counted == Counted::all && choice.isCounted && frame.instance(best).group == Instance::kNone)
         return choice.cost;
     if (counted == Counted::drawable && best != i && !frame.drawableOf(best)[0]) best = i;
     return costOf(frame, best, step, most, counted, &members);
@@ -132,7 +132,7 @@ void emitBest(const CutFrame& frame, uint32_t i, int step, ActiveMembers& member
 
 /// Members of instance groups are drawn from one moment to the next: the roots of their stores are always wanted.
 void wantRoots(const CutFrame& frame, Cut& cut) {
-    for (const Crowd& group : frame.scene.crowds)
+    for (const InstanceGroup& group : frame.scene.groups)
         for (const uint32_t source : group.sources)
             if (frame.residency.drawable[source][0])
                 cut.keep.emplace_back(source, 0u);
@@ -146,7 +146,7 @@ void emitCut(const CutFrame& frame, int step, Cut& cut) {
     members.clear();
     for (const uint32_t i : frame.scratch.drivers) emitBest(frame, i, step, members, cut);
     auto& active = members.of.active;
-    cut.counters.crowdMembers = active.size();
+    cut.counters.groupMembers = active.size();
     std::sort(active.begin(), active.end());
     for (const uint32_t i : active) emitBest(frame, i, step, members, cut);
 }
@@ -190,7 +190,7 @@ void beginCut(const CutFrame& frame, Cut& cut) {
     scratch.allowedUsed = 0;
     if (scratch.slotOf.size() != frame.scene.instances.size()) findDrivers(frame);
     scratch.isReady.clear();
-    for (const Crowd& group : frame.scene.crowds) scratch.isReady.push_back(isReady(frame, group) ? 1 : 0);
+    for (const InstanceGroup& group : frame.scene.groups) scratch.isReady.push_back(isReady(frame, group) ? 1 : 0);
 }
 
 void emitCutAt(const CutFrame& frame, const PlannedStep& step, const Target& target, uint64_t budget, Cut& cut) {

@@ -45,13 +45,13 @@ struct Instance {
     /// Another instance, of points, that is drawn instead where that is good enough and cheaper (the classic hybrid).
     static constexpr uint32_t kNone = ~0u;
     uint32_t standIn = kNone;
-    bool isDriven = false;   ///< drawn only in another's stead, or as a member of a crowd
-    uint32_t crowd = kNone;  ///< whose points these are
+    bool isDriven = false;   ///< drawn only in another's stead, or as a member of an instance group
+    uint32_t group = kNone;  ///< whose points these are
 };
 
 /// Instances that share coarse nodes: from afar one progressive store (instance `points`) shows all of them, and a leaf
 /// of it that is not good enough gives way to the instances that it stands for.
-struct Crowd {
+struct InstanceGroup {
     uint32_t points = 0;
     std::vector<uint32_t> first;    ///< of each node of the points, and the end: where its members begin
     std::vector<uint32_t> members;  ///< instances
@@ -62,7 +62,7 @@ struct Crowd {
 struct CutScene {
     std::span<const Hierarchy* const> hierarchies;  ///< by Instance::hierarchy
     std::span<const Instance> instances;
-    std::span<const Crowd> crowds;  ///< by Instance::crowd
+    std::span<const InstanceGroup> groups;  ///< by Instance::instance group
 };
 
 /// One byte per chunk of each source's hierarchy: 1 where it can be drawn.
@@ -101,7 +101,7 @@ struct CutWanted {
 
 struct CutCounters {
     uint64_t nodesVisited = 0, nodesDrawn = 0, nodesCulled = 0, nodesMissing = 0, recordsDrawn = 0, recordsTested = 0,
-             trianglesDrawn = 0, standIns = 0, crowdMembers = 0, evaluations = 0;
+             trianglesDrawn = 0, standIns = 0, groupMembers = 0, evaluations = 0;
 };
 
 struct Cut {
@@ -144,7 +144,7 @@ struct CutScratch {
         int32_t epsilon = 0;
         uint32_t frame = 0;
     };
-    /// Members of crowds that are drawn themselves, and the evaluation in which each was last found to be.
+    /// Members of instance groups that are drawn themselves, and the evaluation in which each was last found to be.
     struct Members {
         std::vector<uint32_t> stamp, active;
         uint32_t evaluation = 0;
@@ -155,7 +155,7 @@ struct CutScratch {
     size_t allowedUsed = 0;
     std::vector<std::pair<uint32_t, uint32_t>> slotOf;  ///< by instance: frame and slot
     std::vector<uint32_t> drivers;                      ///< instances that are not driven by others
-    std::vector<uint8_t> isReady;                       ///< of each crowd: can its members be drawn?
+    std::vector<uint8_t> isReady;                       ///< of each instance group: can its members be drawn?
     Members members;
     std::vector<uint32_t> stack;
     std::vector<uint8_t> groupState, tileSeen;

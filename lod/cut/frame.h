@@ -35,7 +35,7 @@ struct ActiveMembers {
         of.active.clear();
     }
     /// Those that a leaf of the group's points stands for.
-    void activate(const Crowd& group, uint32_t leaf) {
+    void activate(const InstanceGroup& group, uint32_t leaf) {
         for (uint32_t k = group.first[leaf]; k < group.first[leaf + 1]; ++k) {
             const uint32_t member = group.members[k];
             if (of.stamp[member] == of.evaluation) continue;

@@ -20,7 +20,7 @@ Progress progressOf(const CutFrame& frame, uint32_t i, const CutScratch::Slot& s
     const int32_t parentEpsilon = index == 0 ? kInside : epsilonAt(frame, slot, node.parent);
     const int32_t epsilon = epsilonOf(frame, h, slot, index, parentEpsilon);
     if (epsilon == kCulled) return {};
-    const uint32_t group = frame.instance(i).crowd;
+    const uint32_t group = frame.instance(i).group;
     const double radius = std::exp2(node.errorCode / 8.0), allowed = allowedAt(epsilon, step);
     Progress p;
     if (allowed >= radius) {  // the area of n discs of radius r stays the same: n r^2 = records * radius^2
@@ -90,7 +90,7 @@ CutCost costOfProgressive(const CutFrame& frame, uint32_t i, int step, uint64_t 
     walkProgressive(frame, i, step, [&](uint32_t index, const Progress& p) {
         if (p.kind == Progress::Kind::unseen) return Next::beside;
         if (p.kind == Progress::Kind::members) {
-            if (members) members->activate(frame.scene.crowds[frame.instance(i).crowd], index);
+            if (members) members->activate(frame.scene.groups[frame.instance(i).group], index);
             return Next::beside;
         }
         cost.isWhole = cost.isWhole && drawable[index] != 0;
@@ -137,7 +137,7 @@ void emitProgressive(const CutFrame& frame, uint32_t i, int step, ActiveMembers&
             return Next::beside;
         }
         if (p.kind == Progress::Kind::members) {
-            members.activate(frame.scene.crowds[frame.instance(i).crowd], index);
+            members.activate(frame.scene.groups[frame.instance(i).group], index);
             return Next::beside;
         }
         if (!drawable[index]) {  // only the root comes here: of children it is known before

@@ -29,7 +29,7 @@ uint64_t hashOf(const lod::Cut& cut) {
     for (const auto& [source, node] : cut.keep) addFields(hash, source, node);
     const lod::CutCounters& c = cut.counters;
     addFields(hash, cut.tauTarget, cut.tauEffective, cut.truncated, c.nodesDrawn, c.nodesMissing, c.recordsDrawn,
-              c.recordsTested, c.trianglesDrawn, c.standIns, c.crowdMembers);
+              c.recordsTested, c.trianglesDrawn, c.standIns, c.groupMembers);
     return hash;
 }
 
@@ -129,7 +129,7 @@ void dumpAll(const std::vector<std::string>& paths) {
     dumpProxies("proxies of curves", forest.strands->hierarchy, {&points->hierarchy, &forest.afar->hierarchy}, 1e-4,
                 300);
     const auto backend = cpu::makeCpuBackend(*executor);
-    const auto state = render::makeFrameState(forest.placed, *backend, *executor, {}, forest.crowds);
+    const auto state = render::makeFrameState(forest.placed, *backend, *executor, {}, forest.groups);
     dump("forest", state->scene(), {{44, 8, 44}, 60}, 600);
     for (const std::string& path : paths) {
         const auto store = lod::openStore(path);

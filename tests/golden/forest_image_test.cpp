@@ -52,7 +52,7 @@ TEST_F(Forests, AreThoseOfTheOracleOnEveryInstructionSet) {
     const test::Forest forest = test::plantForest(folder_.path(), 8, *executor_);
     const auto oracle = reference::makeReferenceBackend(*executor_);
     const auto image = [&](render::Backend& backend, const lod::View& view, double tau) {
-        auto state = render::makeFrameState(forest.placed, backend, *executor_, {}, forest.crowds);
+        auto state = render::makeFrameState(forest.placed, backend, *executor_, {}, forest.groups);
         EXPECT_TRUE(render::renderUntilComplete(*state, view, lit(tau)));
         return state->image;
     };
@@ -92,9 +92,9 @@ TEST_F(Forests, DiscsCoverAsMuchAsTheStrandsThatTheyStandFor) {
         EXPECT_TRUE(render::renderUntilComplete(*state, view, exact));
         covered += coverOf(state->image).first / kFrames;
     }
-    auto far = render::makeFrameState(forest.placed, *backend, *executor_, {}, forest.crowds);
+    auto far = render::makeFrameState(forest.placed, *backend, *executor_, {}, forest.groups);
     EXPECT_TRUE(render::renderUntilComplete(*far, view, lit(1)));
-    EXPECT_GT(far->counters.standIns + far->counters.crowdMembers, 0u);
+    EXPECT_GT(far->counters.standIns + far->counters.groupMembers, 0u);
     EXPECT_NEAR(coverOf(far->image).first / covered, 1, 0.08);
     EXPECT_TRUE(render::renderUntilComplete(*far, view, lit(2)));
     EXPECT_NEAR(coverOf(far->image).first / covered, 1, 0.15);
@@ -152,7 +152,7 @@ TEST_F(Forests, SwayInTheWind) {
     windy.draw.wind = {0.03, 0, {1, 0, 0}};
     const auto image = [&](render::Backend& backend, const lod::View& view, const render::FrameSettings& settings,
                            FrameCounters* counters = nullptr) {
-        auto state = render::makeFrameState(forest.placed, backend, *executor_, {}, forest.crowds);
+        auto state = render::makeFrameState(forest.placed, backend, *executor_, {}, forest.groups);
         render::setSway(settings.draw.wind, state->hierarchies, state->instances);
         EXPECT_TRUE(render::renderUntilComplete(*state, view, settings));
         if (counters) *counters = state->counters;
@@ -173,7 +173,7 @@ TEST_F(Forests, SwayInTheWind) {
         EXPECT_GE(d->psnr, 38) << seconds;
     }
     // No vertex moves farther than the spheres grew, at any time.
-    auto state = render::makeFrameState(forest.placed, *cpu, *executor_, {}, forest.crowds);
+    auto state = render::makeFrameState(forest.placed, *cpu, *executor_, {}, forest.groups);
     render::setSway(windy.draw.wind, state->hierarchies, state->instances);
     Rng rng(2);
     double farthest = 0;
@@ -251,7 +251,7 @@ TEST_F(Forests, AConvertedPlantCoversWhatItsTrianglesCover) {
 TEST_F(Forests, APathFromFarAwayOntoALeafDoesNotPop) {
     const test::Forest forest = test::plantForest(folder_.path(), 10, *executor_);
     const auto backend = cpu::makeCpuBackend(*executor_);
-    auto coarse = render::makeFrameState(forest.placed, *backend, *executor_, {}, forest.crowds);
+    auto coarse = render::makeFrameState(forest.placed, *backend, *executor_, {}, forest.groups);
     const glm::dvec3 leaf(36, 9, 36), from(36 + 300, 120, 36 + 900);
     const auto frameAt = [&](double distance, double tau) {
         const glm::dvec3 eye = leaf + distance * glm::normalize(from - leaf);
@@ -277,13 +277,13 @@ TEST_F(Forests, APathFromFarAwayOntoALeafDoesNotPop) {
         return pop;
     };
     double worstControl = 0, worstControlP99 = 0;
-    size_t steps = 0, hadCrowd = 0, hadMembers = 0, hadStrands = 0;
+    size_t steps = 0, hadGroup = 0, hadMembers = 0, hadStrands = 0;
     for (double distance = 1000; distance > 0.1; distance *= 0.9, ++steps) {
         const render::Image a = frameAt(distance, 1);
         const FrameCounters& c = coarse->counters;
-        hadCrowd += c.crowdMembers < forest.placed.size() ? 1 : 0;
+        hadGroup += c.groupMembers < forest.placed.size() ? 1 : 0;
         hadMembers += c.standIns > 0 ? 1 : 0;
-        hadStrands += c.crowdMembers > c.standIns ? 1 : 0;
+        hadStrands += c.groupMembers > c.standIns ? 1 : 0;
         const Pop pop = popOf(a, frameAt(distance, std::exp2(1.5 / 32)));
         const Pop control = popOf(a, frameAt(distance, 8));
         EXPECT_LT(pop.mean, distance > 70 ? 0.4 : 1.5) << distance;  // stated tolerance; found 0.3 and 1.1
@@ -295,7 +295,7 @@ TEST_F(Forests, APathFromFarAwayOntoALeafDoesNotPop) {
     }
     EXPECT_GT(worstControl, 10) << "a switch to eight times the error must show";
     EXPECT_GT(worstControlP99, 55) << "and so in the worst pixels; found 68";
-    EXPECT_GT(hadCrowd, 3u);
+    EXPECT_GT(hadGroup, 3u);
     EXPECT_GT(hadMembers, 10u);
     EXPECT_GT(hadStrands, 10u);
 }

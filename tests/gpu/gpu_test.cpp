@@ -246,7 +246,7 @@ TEST_F(Gpu, DrawsRibbonsAndTubesAmongPointsAsTheOracleDoes) {
         settings.draw.exactStrands = 2;
         settings.budgets.errorPixels = 2;
         const auto image = [&](render::Backend& backend) {
-            auto state = render::makeFrameState(forest.placed, backend, *executor_, {}, forest.crowds);
+            auto state = render::makeFrameState(forest.placed, backend, *executor_, {}, forest.groups);
             EXPECT_TRUE(render::renderUntilComplete(*state, view, settings));
             return state->image;
         };

@@ -1,5 +1,5 @@
-// A cut allocates nothing once its scratch is warm, with crowds and budgets too, and what it asks on the way about
-// costs leaves no trace in what it reports.
+// A cut allocates nothing once its scratch is warm, with instance groups and budgets too, and what it asks on the way
+// about costs leaves no trace in what it reports.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -84,7 +84,7 @@ Laps fly(const lod::CutScene& scene, const std::vector<lod::View>& views) {
                     *count += allocations - before;
                     laps.bound += cut.tauTarget > 1 ? 1 : 0;
                     laps.partly += cut.wanted.empty() ? 0 : 1;
-                    laps.mixed += cut.counters.crowdMembers > 0 ? 1 : 0;
+                    laps.mixed += cut.counters.groupMembers > 0 ? 1 : 0;
                 }
     return laps;
 }
@@ -110,12 +110,12 @@ TEST(CutMemory, NothingIsAllocatedOnceWarm) {
     EXPECT_GT(laps.partly, 40u);
 }
 
-TEST(CutMemory, NothingIsAllocatedOnceWarmWithCrowds) {
+TEST(CutMemory, NothingIsAllocatedOnceWarmWithInstanceGroups) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);
     const test::Forest forest = test::plantForest(folder.path(), 12, *executor);
     const auto backend = cpu::makeCpuBackend(*executor);
-    const auto state = render::makeFrameState(forest.placed, *backend, *executor, {}, forest.crowds);
+    const auto state = render::makeFrameState(forest.placed, *backend, *executor, {}, forest.groups);
     const Laps laps = fly(state->scene(), viewsOf({44, 8, 44}, 60));
     EXPECT_GT(laps.first, 0u);
     EXPECT_EQ(laps.second, 0u);

@@ -33,7 +33,7 @@ Forest plantForest(const std::string& folder, uint32_t side, Executor& executor)
     item.centre = h.origin + h.unit * h.nodes[0].centre;
     item.reach = h.unit * h.nodes[0].radius;
     Progress progress(false);
-    const std::string afar = folder + "/afar.stipple", crowd = folder + "/crowd.stipple";
+    const std::string afar = folder + "/afar.stipple", group = folder + "/group.stipple";
     EXPECT_TRUE(lod::buildProgressiveStore({item}, afar, settings, executor, progress));
     f.afar = std::make_shared<const lod::Store>(*lod::openStore(afar));
     const auto standIns = std::make_shared<const std::vector<render::StandIn>>(std::vector{render::StandIn{f.afar, 0}});
@@ -53,9 +53,9 @@ Forest plantForest(const std::string& folder, uint32_t side, Executor& executor)
         f.placed.push_back(tree);
     }
     settings.nodeRecords = 1024;
-    EXPECT_TRUE(lod::buildProgressiveStore(items, crowd, settings, executor, progress));
-    render::PlacedCrowd c;
-    c.points = std::make_shared<const lod::Store>(*lod::openStore(crowd));
+    EXPECT_TRUE(lod::buildProgressiveStore(items, group, settings, executor, progress));
+    render::PlacedGroup c;
+    c.points = std::make_shared<const lod::Store>(*lod::openStore(group));
     std::vector<std::vector<uint32_t>> members(c.points->hierarchy.nodes.size());
     for (uint32_t k = 0; k < items.size(); ++k) {
         const lod::Instance& p = items[k].place;
@@ -66,7 +66,7 @@ Forest plantForest(const std::string& folder, uint32_t side, Executor& executor)
         c.members.insert(c.members.end(), some.begin(), some.end());
         c.first.push_back(static_cast<uint32_t>(c.members.size()));
     }
-    f.crowds.push_back(std::move(c));
+    f.groups.push_back(std::move(c));
     return f;
 }
 

@@ -12,8 +12,8 @@ lod::StrandSet oak(uint64_t leaves, uint64_t seed = 1);
 struct Forest {
     lod::StrandSet tree;
     lod::StrandSamples samples;
-    std::vector<render::PlacedStore> placed;  ///< all of them members of the crowd
-    std::vector<render::PlacedCrowd> crowds;
+    std::vector<render::PlacedStore> placed;  ///< all of them members of the instance group
+    std::vector<render::PlacedGroup> groups;
     std::shared_ptr<const lod::Store> strands, afar;
 };
 /// `side` x `side` trees, turned and scaled, 8 m apart, on a slope.

@@ -129,7 +129,7 @@ std::vector<Sample> sample(const std::vector<Triangle>& surface, size_t count, u
     }
     return all;
 }
-/// The same without crowds: places that come too near to an earlier one are left out.
+/// The same without instance groups: places that come too near to an earlier one are left out.
 std::vector<Sample> sampleEvenly(const std::vector<Triangle>& surface, size_t count, uint64_t seed) {
     const double least = 0.8 * std::sqrt(areaOf(surface) / static_cast<double>(count));
     std::map<std::array<int64_t, 3>, std::vector<glm::dvec3>> cells;
@@ -356,7 +356,7 @@ TEST(LeafDiscs, CloseTheSurfaceHoweverThePointsAreSpread) {
     spreads[2] = {"thirteen copies of each", 1e-4, {}};
     for (const glm::dvec3& p : spreads[0].places)
         for (int copy = 0; copy < 13; ++copy) spreads[2].places.push_back(p);
-    spreads[3] = {"crowds of twenty", 5e-3, {}};
+    spreads[3] = {"groups of twenty", 5e-3, {}};
     for (const glm::dvec3& p : spreads[0].places)
         for (int k = 0; k < 20; ++k)
             spreads[3].places.push_back(bent(p.x + 0.02 * rng.uniform(-1, 1), p.y + 0.02 * rng.uniform(-1, 1)));

@@ -275,9 +275,9 @@ scene::Scene sceneOfEverything() {
     light.innerCone = 0.1f;
     light.outerCone = 0.3f;
     scene.lights.push_back(light);
-    scene::Node crowd;
-    crowd.name = "crowd";
-    crowd.mesh = 0;
+    scene::Node group;
+    group.name = "instance group";
+    group.mesh = 0;
     for (int k = 0; k < 5; ++k) {
         glm::dmat4 m(1);
         const double c = std::cos(k * 1.3), s = std::sin(k * 1.3), scale = 1 + 0.5 * k;
@@ -285,9 +285,9 @@ scene::Scene sceneOfEverything() {
         m[1] = glm::dvec4(0, scale, 0, 0);
         m[2] = glm::dvec4(s * scale, 0, c * scale, 0);
         m[3] = glm::dvec4(10.0 * k, -k, 3, 1);
-        crowd.instances.push_back(m);
+        group.instances.push_back(m);
     }
-    scene.nodes.push_back(crowd);
+    scene.nodes.push_back(group);
     scene::Node scan;
     scan.name = "scan";
     scan.store = "grove.stipple";

@@ -1,5 +1,5 @@
-// Progressive stores and crowds attacked: any beginning stands for the whole, every member is drawn exactly once
-// whatever is resident, discs are no larger than the error allows.
+// Progressive stores and instance groups attacked: any beginning stands for the whole, every member is drawn exactly
+// once whatever is resident, discs are no larger than the error allows.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -97,7 +97,7 @@ TEST(StrandHierarchy, MergedPartsKeepTheArea) {
         EXPECT_NEAR(areaAt(store->hierarchy.errors.encodeUp(error / store->hierarchy.unit)) / whole, 1, 0.1) << error;
 }
 
-class Crowds : public testing::Test {
+class Instance groups : public testing::Test {
   protected:
     lod::View viewFrom(const glm::dvec3& eye, const glm::dvec3& target) const {
         scene::Camera camera;
@@ -112,17 +112,18 @@ class Crowds : public testing::Test {
     test::Forest forest_ = test::plantForest(folder_.path(), 12, *executor_);
 };
 
-/// What draws each member: itself (or what stands in for it), or the nodes of the crowd's points above its leaf.
+/// What draws each member: itself (or what stands in for it), or the nodes of the instance group's points above its
+/// leaf.
 std::string whatIsWrong(const lod::CutScene& scene, const lod::Cut& cut) {
     std::map<uint32_t, int> times;  // by member
-    const lod::Crowd& crowd = scene.crowds[0];
+    const lod::InstanceGroup& group = scene.groups[0];
     std::map<uint32_t, uint32_t> memberOf;
-    for (const uint32_t m : crowd.members)
+    for (const uint32_t m : group.members)
         for (uint32_t i = m; i != lod::Instance::kNone; i = scene.instances[i].standIn) memberOf[i] = m;
-    const lod::Hierarchy& h = *scene.hierarchies[scene.instances[crowd.points].hierarchy];
+    const lod::Hierarchy& h = *scene.hierarchies[scene.instances[group.points].hierarchy];
     std::map<uint32_t, bool> own;
     for (const lod::CutDraw& d : cut.draw) {
-        if (d.instance != crowd.points) {
+        if (d.instance != group.points) {
             own[memberOf.at(d.instance)] = true;  // several nodes of one store are one drawing
             continue;
         }
@@ -133,20 +134,20 @@ std::string whatIsWrong(const lod::CutScene& scene, const lod::Cut& cut) {
                 isBelow = isBelow || n == d.node;
                 if (n == 0) break;
             }
-            for (uint32_t k = crowd.first[leaf]; isBelow && k < crowd.first[leaf + 1]; ++k) ++times[crowd.members[k]];
+            for (uint32_t k = group.first[leaf]; isBelow && k < group.first[leaf + 1]; ++k) ++times[group.members[k]];
         }
     }
     for (const auto& [m, is] : own) times[m] += is ? 1 : 0;
-    for (const uint32_t m : crowd.members)
+    for (const uint32_t m : group.members)
         if (times[m] != 1) return "member " + std::to_string(m) + " is drawn " + std::to_string(times[m]) + " times";
     return {};
 }
 
-TEST_F(Crowds, DrawEveryMemberOnceWhateverIsResident) {
+TEST_F(InstanceGroups, DrawEveryMemberOnceWhateverIsResident) {
     const auto backend = cpu::makeCpuBackend(*executor_);
-    const auto state = render::makeFrameState(forest_.placed, *backend, *executor_, {}, forest_.crowds);
+    const auto state = render::makeFrameState(forest_.placed, *backend, *executor_, {}, forest_.groups);
     const lod::CutScene scene = state->scene();
-    const lod::Crowd& crowd = scene.crowds[0];
+    const lod::InstanceGroup& group = scene.groups[0];
     std::vector<std::vector<uint8_t>> drawable;
     const auto resize = [&](const lod::Instance& i) {
         if (drawable.size() <= i.source) drawable.resize(i.source + 1);
@@ -173,7 +174,7 @@ TEST_F(Crowds, DrawEveryMemberOnceWhateverIsResident) {
         ASSERT_EQ(whatIsWrong(scene, cut), "") << "round " << round << ", distance " << distance << ", tau " << tau;
         for (const lod::CutDraw& d : cut.draw)
             if (isWhole) ASSERT_LE(d.errorPixels, tau * 1.0001) << "node " << d.node << " of " << d.instance;
-        mixed += cut.counters.crowdMembers > 0 && cut.counters.crowdMembers < crowd.members.size() ? 1 : 0;
+        mixed += cut.counters.groupMembers > 0 && cut.counters.groupMembers < group.members.size() ? 1 : 0;
         // The same again is the same to the last record.
         lod::Cut again;
         lod::CutScratch fresh;
@@ -188,15 +189,15 @@ TEST_F(Crowds, DrawEveryMemberOnceWhateverIsResident) {
         lod::Cut holed = cut;
         const uint32_t first = holed.draw.front().instance, node = holed.draw.front().node;
         std::erase_if(holed.draw,
-                      [&](const auto& d) { return d.instance == first && (first != crowd.points || d.node == node); });
+                      [&](const auto& d) { return d.instance == first && (first != group.points || d.node == node); });
         ASSERT_NE(whatIsWrong(scene, holed), "");
     }
     EXPECT_GT(mixed, 20u) << "some views must have both";
 }
 
-TEST_F(Crowds, StayWithinABudgetAndAskForWhatTheyNeed) {
+TEST_F(InstanceGroups, StayWithinABudgetAndAskForWhatTheyNeed) {
     const auto backend = cpu::makeCpuBackend(*executor_);
-    const auto state = render::makeFrameState(forest_.placed, *backend, *executor_, {}, forest_.crowds);
+    const auto state = render::makeFrameState(forest_.placed, *backend, *executor_, {}, forest_.groups);
     const lod::View view = viewFrom({44, 40, 130}, {44, 5, 44});
     render::FrameSettings settings;
     settings.budgets = {0.5, 20'000};
@@ -206,14 +207,14 @@ TEST_F(Crowds, StayWithinABudgetAndAskForWhatTheyNeed) {
     settings.budgets.records = std::numeric_limits<uint64_t>::max();
     EXPECT_TRUE(render::renderUntilComplete(*state, view, settings));
     EXPECT_DOUBLE_EQ(state->counters.tauEffectivePixels, 0.5);
-    EXPECT_GT(state->counters.crowdMembers, 0u);
+    EXPECT_GT(state->counters.groupMembers, 0u);
 }
 
-TEST_F(Crowds, StoresAreTheSameForAnyNumberOfThreads) {
+TEST_F(InstanceGroups, StoresAreTheSameForAnyNumberOfThreads) {
     const test::TempFolder other;
     const auto one = makeTbbExecutor(1);
     test::plantForest(other.path(), 12, *one);
-    for (const char* name : {"/afar.stipple", "/crowd.stipple", "/tree.stipple"})
+    for (const char* name : {"/afar.stipple", "/group.stipple", "/tree.stipple"})
         EXPECT_EQ(test::slurp(folder_.path() + name), test::slurp(other.path() + name)) << name;
 }
 
