@@ -12,8 +12,8 @@
 #include "apps/stipple/builds_of_scene.h"
 #include "apps/stipple/cache.h"
 #include "apps/stipple/common.h"
-#include "apps/stipple/from_afar.h"
 #include "apps/stipple/ply_meshes.h"
+#include "apps/stipple/proxies.h"
 #include "apps/stipple/scene_facts.h"
 #include "engine/base/process.h"
 #include "engine/base/text.h"
@@ -188,9 +188,9 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
         STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store,
                        openCached({scene.path}, build, fmt::format("mesh {}", mesh), showProgress, make(own)));
         render::PlacedStore one{store, {}, {}};
-        STIPPLE_ASSIGN(one.standIns,
-                       meshFromAfar(scene, own, *store, fmt::format("mesh {}", mesh), build, executor, showProgress));
-        build.together->settle(fmt::format("mesh {}, from afar", mesh));  // what is small has none
+        STIPPLE_ASSIGN(one.proxies,
+                       meshProxies(scene, own, *store, fmt::format("mesh {}", mesh), build, executor, showProgress));
+        build.together->settle(fmt::format("mesh {}, proxy", mesh));  // what is small has none
         for (const lod::Instance& instance : instances) {
             one.place = instance;
             placed.push_back(one);
@@ -200,13 +200,13 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
     STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store,
                    openCached({scene.path}, build, "triangles", showProgress, make(places.once)));
     render::PlacedStore one{store, {}, {}};
-    STIPPLE_ASSIGN(one.standIns, meshFromAfar(scene, places.once, *store, "triangles", build, executor, showProgress));
-    build.together->settle("triangles, from afar");
+    STIPPLE_ASSIGN(one.proxies, meshProxies(scene, places.once, *store, "triangles", build, executor, showProgress));
+    build.together->settle("triangles, proxy");
     placed.push_back(std::move(one));
     return {};
 }
 
-/// The ribbons and tubes of a scene. What stands in many places also gets what is seen of it from afar, and all those
+/// The ribbons and tubes of a scene. What stands in many places also gets proxies of it, and all those
 /// together an instance group.
 Result<void> placeStrands(const scene::Scene& scene, const BuildOptions& build, Executor& executor, bool showProgress,
                           OpenedScene& opened) {
@@ -233,8 +233,8 @@ Result<void> placeStrands(const scene::Scene& scene, const BuildOptions& build, 
         const std::string part = fmt::format("strands of mesh {}", mesh);
         STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store, open(model, part));
         render::PlacedStore one{store, {}, {}};
-        STIPPLE_ASSIGN(one.standIns, strandsFromAfar(model, *store, scene.path, part, build, executor, showProgress));
-        build.together->settle(part + ", from afar");
+        STIPPLE_ASSIGN(one.proxies, strandProxies(model, *store, scene.path, part, build, executor, showProgress));
+        build.together->settle(part + ", proxy");
         const auto first = static_cast<uint32_t>(opened.placed.size());
         for (const lod::Instance& instance : instances) {
             one.place = instance;
@@ -258,20 +258,20 @@ double workOf(const scene::Scene& scene, const std::vector<scene::Placement>& of
     return work;
 }
 
-/// What may have to be built of a scene. (Stand-ins for afar take about as long as what they stand for.)
+/// What may have to be built of a scene. (Proxies for afar take about as long as what they stand for.)
 std::shared_ptr<BuildsOfScene> expectedBuilds(const scene::Scene& scene, bool areTriangles, ProgressStyle style) {
     std::vector<std::string> notes;
     for (const std::string& note : scene.notes) notes.push_back(fmt::format("{}: {}", scene.path, note));
     auto builds = std::make_shared<BuildsOfScene>(style, std::move(notes));
-    const auto expect = [&](const std::string& part, double work, bool hasStandIn) {
+    const auto expect = [&](const std::string& part, double work, bool hasProxy) {
         builds->expect(part, work);
-        if (hasStandIn) builds->expect(part + ", from afar", work);
+        if (hasProxy) builds->expect(part + ", proxy", work);
     };
-    const auto expectKind = [&](scene::PrimitiveKind kind, const char* shared, const char* once, bool hasStandIn) {
+    const auto expectKind = [&](scene::PrimitiveKind kind, const char* shared, const char* once, bool hasProxy) {
         const SharedPlaces places = sharePlaces(scene, kind);
         for (const auto& [mesh, instances] : places.shared)
             expect(fmt::format("{} {}", shared, mesh), workOf(scene, {{mesh, glm::dmat4(1)}}, kind), true);
-        if (!places.once.empty()) expect(once, workOf(scene, places.once, kind), hasStandIn);
+        if (!places.once.empty()) expect(once, workOf(scene, places.once, kind), hasProxy);
     };
     if (areTriangles) expectKind(scene::PrimitiveKind::triangles, "mesh", "triangles", true);
     expectKind(scene::PrimitiveKind::lines, "strands of mesh", "strands", false);
@@ -469,7 +469,7 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
     };
     const auto any = [&](const auto& is) { return std::any_of(scene.placed.begin(), scene.placed.end(), is); };
     if (any(isOf(false)) && !any(isOf(true)))
-        for (render::PlacedStore& p : scene.placed) p.standIns = nullptr;
+        for (render::PlacedStore& p : scene.placed) p.proxies = nullptr;
     scene.description = describe(scene.placed);
     scene.outline = outlineOf(scene.placed);
     if (!given.up.empty())

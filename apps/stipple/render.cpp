@@ -116,7 +116,7 @@ nlohmann::json countersJson(const FrameCounters& c) {
             {"nodes_culled", c.nodesCulled},
             {"nodes_missing", c.nodesMissing},
             {"records_tested", c.recordsTested},
-            {"stand_ins", c.standIns},
+            {"proxies", c.proxies},
             {"group_members", c.groupMembers},
             {"nodes_swaying", c.nodesSwaying},
             {"cut_evaluations", c.cutEvaluations},
@@ -160,7 +160,7 @@ std::string lotText(const render::LotShares& lots) {
     };
     addShare(lots.narrowShare(), "narrower than a pixel");
     addShare(lots.thinnedShare(), "wider for others left out");
-    if (lots.discs > 0) parts.push_back(fmt::format("{} discs of plants from afar", lots.discs));
+    if (lots.discs > 0) parts.push_back(fmt::format("{} discs of proxies of plants", lots.discs));
     return parts.empty() ? "" : fmt::format(" (beside it, by lot: {})", fmt::join(parts, ", "));
 }
 

@@ -64,7 +64,7 @@ lod::StoreDescription describe(const std::vector<render::PlacedStore>& placed) {
     all.boundsMin = all.focusMin = glm::dvec3(1e300);
     all.boundsMax = all.focusMax = glm::dvec3(-1e300);
     all.points = 0;
-    all.isReflectance = std::any_of(placed.begin(), placed.end(), [](const auto& p) { return p.standIns != nullptr; });
+    all.isReflectance = std::any_of(placed.begin(), placed.end(), [](const auto& p) { return p.proxies != nullptr; });
     for (const render::PlacedStore& p : placed) {
         const lod::StoreDescription& d = p.store->description;
         for (int corner = 0; corner < 8; ++corner) {

@@ -12,7 +12,7 @@ struct ModelRow {
     const char* model;            ///< theirs
     uint64_t points;              ///< theirs; ours are as many
     const char* file;             ///< below the data folder; empty: a checker plane
-    const char* standIn;          ///< ours, in words
+    const char* proxy;            ///< ours, in words
     const char* theirs;           ///< their fps, in words
     std::vector<uint32_t> sizes;  ///< px, square
 };

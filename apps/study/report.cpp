@@ -40,7 +40,7 @@ void describeTimes(const SeedsReport& report, std::string& out) {
                 paper, modeHeads(), rule(5 + modes));
         }
         for (const SizeMeasure& s : m.sizes) {
-            out += fmt::format("| {} | {} | {} | {}, {} | {}, {} |", row.model, row.points, row.theirs, row.standIn,
+            out += fmt::format("| {} | {} | {} | {}, {} | {}, {} |", row.model, row.points, row.theirs, row.proxy,
                                m.points, s.device, s.size);
             for (const ModeMeasure& t : s.modes)
                 out += fmt::format(" {:.1f} ({:.1f}) / {:.1f} |", t.leaves.fps(), t.leaves.millionRecords(),
@@ -150,7 +150,7 @@ nlohmann::json jsonOfSeeds(const SeedsReport& report) {
                           {"model", row.model},
                           {"their_points", row.points},
                           {"their_fps", row.theirs},
-                          {"stand_in", row.standIn},
+                          {"stand_in", row.proxy},
                           {"points", m.points},
                           {"sizes", sizes},
                           {"errors", errors}});

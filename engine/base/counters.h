@@ -8,7 +8,7 @@ namespace stipple {
 struct FrameCounters {
     uint64_t nodesVisited = 0, nodesDrawn = 0, nodesCulled = 0, nodesMissing = 0;
     uint64_t recordsDrawn = 0, recordsTested = 0, trianglesDrawn = 0;
-    uint64_t standIns = 0;      ///< instances of which points were drawn
+    uint64_t proxies = 0;       ///< instances of which points were drawn
     uint64_t groupMembers = 0;  ///< instances of instance groups that were looked at one by one
     uint64_t nodesSwaying = 0;  ///< moved by wind, by a tenth of a pixel at least
     uint64_t cutEvaluations = 0, passes = 0, blocks = 0;

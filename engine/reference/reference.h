@@ -23,7 +23,7 @@ struct TraceSettings {
 /// front disc, colours and normals of the discs within the front thickness are blended with the kernel (1 - rho^2)^2.
 /// Samples are averaged in linear light, alpha is coverage; depth (linear, along the view axis) and normal (world
 /// space, towards the eye) are those of the ray through the pixel's centre, not averaged. Points have the colours of
-/// PlacedStore::colour, stray ones are as small as in other modes; stand-ins are not looked at.
+/// PlacedStore::colour, stray ones are as small as in other modes; proxies are not looked at.
 Result<render::Image> trace(const std::vector<render::PlacedStore>& placed, const lod::View& view,
                             const TraceSettings& settings, Executor& executor);
 

@@ -60,15 +60,15 @@ class Placer {
         return static_cast<uint32_t>(state_.instances.size() - 1);
     }
 
-    /// Number of the instance itself; those of its stand-ins follow.
-    uint32_t addWithStandIns(const PlacedStore& p) {
+    /// Number of the instance itself; those of its proxies follow.
+    uint32_t addWithProxies(const PlacedStore& p) {
         const uint32_t own = add(p);
         uint32_t last = own;
-        for (size_t k = 0; p.standIns && k < p.standIns->size(); ++k) {
-            const StandIn& standIn = (*p.standIns)[k];
-            const uint32_t points = add({standIn.store, p.place, {}});
-            state_.instances[last].standIn = points;
-            state_.instances[points].inputError = standIn.error * p.place.scale;
+        for (size_t k = 0; p.proxies && k < p.proxies->size(); ++k) {
+            const Proxy& proxy = (*p.proxies)[k];
+            const uint32_t points = add({proxy.store, p.place, {}});
+            state_.instances[last].proxy = points;
+            state_.instances[points].inputError = proxy.error * p.place.scale;
             state_.instances[points].isDriven = true;
             last = points;
         }
@@ -88,7 +88,7 @@ class Placer {
         std::set<uint32_t> sources;
         for (const uint32_t m : from.members) {
             group.members.push_back(numbers[m]);
-            for (uint32_t i = numbers[m]; i != lod::Instance::kNone; i = state_.instances[i].standIn)
+            for (uint32_t i = numbers[m]; i != lod::Instance::kNone; i = state_.instances[i].proxy)
                 sources.insert(state_.instances[i].source);
         }
         group.sources.assign(sources.begin(), sources.end());
@@ -137,7 +137,7 @@ std::unique_ptr<FrameState> makeFrameState(const std::vector<PlacedStore>& place
     Placer placer(*state);
     std::vector<uint32_t> numbers;
     numbers.reserve(placed.size());
-    for (const PlacedStore& p : placed) numbers.push_back(placer.addWithStandIns(p));
+    for (const PlacedStore& p : placed) numbers.push_back(placer.addWithProxies(p));
     for (const PlacedGroup& group : groups) placer.addGroup(group, numbers);
     state->draws.firstSource = backend.claimSources(placer.sources());
     state->discSizes->setFirstSource(state->draws.firstSource);
@@ -185,7 +185,7 @@ Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettin
     c.recordsDrawn = cut.recordsDrawn;
     c.recordsTested = cut.recordsTested;
     c.trianglesDrawn = cut.trianglesDrawn;
-    c.standIns = cut.standIns;
+    c.proxies = cut.proxies;
     c.groupMembers = cut.groupMembers;
     c.nodesSwaying = state.draws.swaying;
     c.cutEvaluations = cut.evaluations;

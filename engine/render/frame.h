@@ -44,7 +44,7 @@ struct FrameState {
 
 /// Points that may be drawn in another store's stead, and how far they are from it (store units; of a progressive
 /// store: 0, it says so itself).
-struct StandIn {
+struct Proxy {
     std::shared_ptr<const lod::Store> store;
     double error = 0;
 };
@@ -53,8 +53,8 @@ struct PlacedStore {
     std::shared_ptr<const lod::Store> store;
     lod::Instance place;  ///< its `hierarchy` is set by makeFrameState
     lod::ColourBy colour;
-    std::shared_ptr<const std::vector<StandIn>> standIns = nullptr;  ///< finer ones first
-    bool isMember = false;                                           ///< of an instance group
+    std::shared_ptr<const std::vector<Proxy>> proxies = nullptr;  ///< finer ones first
+    bool isMember = false;                                        ///< of an instance group
 };
 /// Many placed stores that are seen as one from afar, see lod::InstanceGroup.
 struct PlacedGroup {

@@ -53,7 +53,7 @@ void setSway(const Wind& wind, std::span<const lod::Hierarchy* const> hierarchie
     // What stands in for something rigid is as rigid.
     for (const lod::Instance& i : instances) {
         if (!hierarchies[i.hierarchy]->isRigid) continue;
-        for (uint32_t k = i.standIn; k != lod::Instance::kNone; k = instances[k].standIn) instances[k].sway = 0;
+        for (uint32_t k = i.proxy; k != lod::Instance::kNone; k = instances[k].proxy) instances[k].sway = 0;
     }
 }
 

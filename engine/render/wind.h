@@ -38,7 +38,7 @@ inline glm::dvec3 windAcross(const glm::dvec3& up) {
     return glm::normalize(aside - up * glm::dot(aside, up));
 }
 
-/// Could wind move it? Strands and what is seen of them from afar, unless their store says that they are no plants; but
+/// Could wind move it? Strands and proxies of them, unless their store says that they are no plants; but
 /// not instance groups (where those are drawn, the error allowed is larger than the motion of a tree).
 bool mayBend(const lod::Hierarchy& h, const lod::Instance& instance);
 

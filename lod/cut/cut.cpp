@@ -73,8 +73,8 @@ struct Choice {
 /// The coarsest of an instance's proxies that is good enough, if it has fewer records than i itself; else i.
 Choice chooseFor(const CutFrame& frame, uint32_t i, int step) {
     uint32_t best = i;
-    for (uint32_t next = frame.instance(i).standIn; next != Instance::kNone && isGoodEnough(frame, next, step);
-         next = frame.instance(next).standIn)
+    for (uint32_t next = frame.instance(i).proxy; next != Instance::kNone && isGoodEnough(frame, next, step);
+         next = frame.instance(next).proxy)
         best = next;
     if (best == i) return {i, {}, false};
     const Hierarchy& h = frame.hierarchyOf(i);
@@ -126,7 +126,7 @@ void emitBest(const CutFrame& frame, uint32_t i, int step, ActiveMembers& member
         cut.wanted.push_back({frame.instance(best).source, 0, 1e9f});
         best = i;
     }
-    cut.counters.standIns += best != i ? 1 : 0;
+    cut.counters.proxies += best != i ? 1 : 0;
     shapeOf(frame.hierarchyOf(best)).cutEmit(frame, best, step, members, cut);
 }
 

@@ -44,7 +44,7 @@ struct Instance {
     double sway = 0;  ///< how far wind moves it at most, world units: its spheres are larger by that
     /// Another instance, of points, that is drawn instead where that is good enough and cheaper (the classic hybrid).
     static constexpr uint32_t kNone = ~0u;
-    uint32_t standIn = kNone;
+    uint32_t proxy = kNone;
     bool isDriven = false;   ///< drawn only in another's stead, or as a member of an instance group
     uint32_t group = kNone;  ///< whose points these are
 };
@@ -55,7 +55,7 @@ struct InstanceGroup {
     uint32_t points = 0;
     std::vector<uint32_t> first;    ///< of each node of the points, and the end: where its members begin
     std::vector<uint32_t> members;  ///< instances
-    std::vector<uint32_t> sources;  ///< of all members and their stand-ins, each once
+    std::vector<uint32_t> sources;  ///< of all members and their proxies, each once
 };
 
 /// All that is placed in a scene.
@@ -101,7 +101,7 @@ struct CutWanted {
 
 struct CutCounters {
     uint64_t nodesVisited = 0, nodesDrawn = 0, nodesCulled = 0, nodesMissing = 0, recordsDrawn = 0, recordsTested = 0,
-             trianglesDrawn = 0, standIns = 0, groupMembers = 0, evaluations = 0;
+             trianglesDrawn = 0, proxies = 0, groupMembers = 0, evaluations = 0;
 };
 
 struct Cut {

@@ -29,7 +29,7 @@ uint64_t hashOf(const lod::Cut& cut) {
     for (const auto& [source, node] : cut.keep) addFields(hash, source, node);
     const lod::CutCounters& c = cut.counters;
     addFields(hash, cut.tauTarget, cut.tauEffective, cut.truncated, c.nodesDrawn, c.nodesMissing, c.recordsDrawn,
-              c.recordsTested, c.trianglesDrawn, c.standIns, c.groupMembers);
+              c.recordsTested, c.trianglesDrawn, c.proxies, c.groupMembers);
     return hash;
 }
 
@@ -98,7 +98,7 @@ void dumpProxies(const std::string& name, const lod::Hierarchy& fine, const std:
     std::vector<const lod::Hierarchy*> hierarchies{&fine};
     std::vector<lod::Instance> instances(1);
     for (const lod::Hierarchy* h : coarse) {
-        instances.back().standIn = static_cast<uint32_t>(instances.size());
+        instances.back().proxy = static_cast<uint32_t>(instances.size());
         lod::Instance next;
         next.hierarchy = next.source = static_cast<uint32_t>(hierarchies.size());
         next.inputError = error * static_cast<double>(instances.size());

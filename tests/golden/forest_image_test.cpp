@@ -79,7 +79,7 @@ TEST_F(Forests, DiscsCoverAsMuchAsTheStrandsThatTheyStandFor) {
     const lod::View view = viewFrom({28, 20, 230}, {28, 8, 28}, 960, 540);
     std::vector<render::PlacedStore> plain = forest.placed;
     for (render::PlacedStore& p : plain) {
-        p.standIns = nullptr;
+        p.proxies = nullptr;
         p.isMember = false;
     }
     // Strands narrower than a pixel are covered by chance: the mean of many frames.
@@ -94,7 +94,7 @@ TEST_F(Forests, DiscsCoverAsMuchAsTheStrandsThatTheyStandFor) {
     }
     auto far = render::makeFrameState(forest.placed, *backend, *executor_, {}, forest.groups);
     EXPECT_TRUE(render::renderUntilComplete(*far, view, lit(1)));
-    EXPECT_GT(far->counters.standIns + far->counters.groupMembers, 0u);
+    EXPECT_GT(far->counters.proxies + far->counters.groupMembers, 0u);
     EXPECT_NEAR(coverOf(far->image).first / covered, 1, 0.08);
     EXPECT_TRUE(render::renderUntilComplete(*far, view, lit(2)));
     EXPECT_NEAR(coverOf(far->image).first / covered, 1, 0.15);
@@ -282,8 +282,8 @@ TEST_F(Forests, APathFromFarAwayOntoALeafDoesNotPop) {
         const render::Image a = frameAt(distance, 1);
         const FrameCounters& c = coarse->counters;
         hadGroup += c.groupMembers < forest.placed.size() ? 1 : 0;
-        hadMembers += c.standIns > 0 ? 1 : 0;
-        hadStrands += c.groupMembers > c.standIns ? 1 : 0;
+        hadMembers += c.proxies > 0 ? 1 : 0;
+        hadStrands += c.groupMembers > c.proxies ? 1 : 0;
         const Pop pop = popOf(a, frameAt(distance, std::exp2(1.5 / 32)));
         const Pop control = popOf(a, frameAt(distance, 8));
         EXPECT_LT(pop.mean, distance > 70 ? 0.4 : 1.5) << distance;  // stated tolerance; found 0.3 and 1.1

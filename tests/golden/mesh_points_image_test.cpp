@@ -178,8 +178,7 @@ TEST(MeshImages, WhatCannotBeSimplifiedIsPointsFromAfar) {
     ASSERT_TRUE(error);
     EXPECT_GT(*error, 0.005);
     EXPECT_LT(*error, 0.2);
-    const auto standIns =
-        std::make_shared<const std::vector<render::StandIn>>(std::vector{render::StandIn{afar, *error}});
+    const auto proxies = std::make_shared<const std::vector<render::Proxy>>(std::vector{render::Proxy{afar, *error}});
     const auto backend = cpu::makeCpuBackend(*executor);
     scene::Camera camera;
     camera.up = {0, 1, 0};
@@ -189,14 +188,14 @@ TEST(MeshImages, WhatCannotBeSimplifiedIsPointsFromAfar) {
         FrameCounters with, without;
         render::FrameSettings frame;
         frame.draw.lit = true;
-        const render::Image a = draw({{mesh, {}, {}, standIns}}, *backend, *executor, view, frame, &with);
+        const render::Image a = draw({{mesh, {}, {}, proxies}}, *backend, *executor, view, frame, &with);
         const render::Image b = draw({{mesh, {}, {}}}, *backend, *executor, view, frame, &without);
         EXPECT_EQ(without.trianglesDrawn, 40'000u);
         if (distance < 10) {
-            EXPECT_EQ(with.standIns, 0u);
+            EXPECT_EQ(with.proxies, 0u);
             EXPECT_EQ(a.rgba, b.rgba);
         } else {
-            EXPECT_EQ(with.standIns, 1u);
+            EXPECT_EQ(with.proxies, 1u);
             EXPECT_EQ(with.trianglesDrawn, 0u);
             EXPECT_GT(with.recordsDrawn, 0u);
             EXPECT_LT(with.recordsDrawn, 40'000u);

@@ -131,7 +131,7 @@ TEST(CutMemory, QuestionsAboutCostsAreNotCounted) {
     const auto [points, mesh] = ballAndTerrain(folder, 2'000, 30'000, *executor);
     const std::vector<const lod::Hierarchy*> hierarchies{&mesh->hierarchy, &points->hierarchy};
     std::vector<lod::Instance> pair(2);
-    pair[0].standIn = 1;
+    pair[0].proxy = 1;
     pair[1].hierarchy = pair[1].source = 1;
     pair[1].isDriven = true;
     std::vector<lod::Instance> alone(1);
@@ -146,7 +146,7 @@ TEST(CutMemory, QuestionsAboutCostsAreNotCounted) {
         lod::Cut with, without;
         lod::selectCut({hierarchies, pair, {}}, {drawable}, view, {0.25, kNoLimit}, a, with);
         lod::selectCut({hierarchies, alone, {}}, {drawable}, view, {0.25, kNoLimit}, b, without);
-        if (with.counters.standIns == 0) continue;
+        if (with.counters.proxies == 0) continue;
         ++drawn;
         ASSERT_EQ(with.counters.nodesVisited, without.counters.nodesVisited);
         ASSERT_EQ(with.counters.nodesCulled, without.counters.nodesCulled);

@@ -119,7 +119,7 @@ std::string whatIsWrong(const lod::CutScene& scene, const lod::Cut& cut) {
     const lod::InstanceGroup& group = scene.groups[0];
     std::map<uint32_t, uint32_t> memberOf;
     for (const uint32_t m : group.members)
-        for (uint32_t i = m; i != lod::Instance::kNone; i = scene.instances[i].standIn) memberOf[i] = m;
+        for (uint32_t i = m; i != lod::Instance::kNone; i = scene.instances[i].proxy) memberOf[i] = m;
     const lod::Hierarchy& h = *scene.hierarchies[scene.instances[group.points].hierarchy];
     std::map<uint32_t, bool> own;
     for (const lod::CutDraw& d : cut.draw) {

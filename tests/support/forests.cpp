@@ -36,7 +36,7 @@ Forest plantForest(const std::string& folder, uint32_t side, Executor& executor)
     const std::string afar = folder + "/afar.stipple", group = folder + "/group.stipple";
     EXPECT_TRUE(lod::buildProgressiveStore({item}, afar, settings, executor, progress));
     f.afar = std::make_shared<const lod::Store>(*lod::openStore(afar));
-    const auto standIns = std::make_shared<const std::vector<render::StandIn>>(std::vector{render::StandIn{f.afar, 0}});
+    const auto proxies = std::make_shared<const std::vector<render::Proxy>>(std::vector{render::Proxy{f.afar, 0}});
     Rng rng(11);
     std::vector<lod::ProgressiveItem> items;
     item.count = 128;
@@ -48,7 +48,7 @@ Forest plantForest(const std::string& folder, uint32_t side, Executor& executor)
         item.place.scale = rng.uniform(0.8, 1.25);
         items.push_back(item);
         render::PlacedStore tree{f.strands, item.place, {}};
-        tree.standIns = standIns;
+        tree.proxies = proxies;
         tree.isMember = true;
         f.placed.push_back(tree);
     }

@@ -1,4 +1,4 @@
-// A small forest for the tests: one tree that stands in many places, with what is seen of it from afar.
+// A small forest for the tests: one tree that stands in many places, with proxies of it.
 #pragma once
 
 #include "lod/builder/progressive/progressive_build.h"

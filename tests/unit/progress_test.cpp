@@ -47,11 +47,11 @@ TEST(JobPlan, SeveralJobsOfOneSceneAreOneJob) {
 TEST(BuildsOfScene, ShareOneBar) {
     app::BuildsOfScene builds(ProgressStyle::silent, {"a.glb: a note"});
     builds.expect("mesh 0", 10);
-    builds.expect("mesh 0, from afar", 10);
+    builds.expect("mesh 0, proxy", 10);
     builds.expect("strands", 20);
     Progress* const first = &builds.begin("mesh 0");
     builds.settle("mesh 0");
-    builds.settle("mesh 0, from afar");  // found
+    builds.settle("mesh 0, proxy");  // found
     EXPECT_EQ(&builds.begin("strands"), first);
     builds.settle("strands");
     EXPECT_EQ(&builds.begin("what nobody expected"), first);

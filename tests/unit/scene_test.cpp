@@ -183,7 +183,7 @@ TEST(Gltf, SparseQuantisedAndCompressedDataAreUnpacked) {
     while (d.bytes.size() % 4 != 0) d.bytes.push_back(0);
     Draft copy = d;
     copy.write(folder / "a.glb");
-    // The second buffer is the stand-in for readers without the extension.
+    // The second buffer is the proxy for readers without the extension.
     d.root["buffers"] = {{{"byteLength", d.bytes.size()}},
                          {{"byteLength", 40}, {"extensions", {{"EXT_meshopt_compression", {{"fallback", true}}}}}}};
     const std::vector<uint8_t> bytes = std::exchange(d.bytes, {});

@@ -120,7 +120,7 @@ Result<void> Buffers::load() {
                 STIPPLE_TRY(claim(container_.binary.size(), "the buffers"));
                 buffers_[0] = container_.binary;
             }
-            continue;  // otherwise the empty stand-in of a compressed one
+            continue;  // otherwise the empty proxy of a compressed one
         }
         STIPPLE_ASSIGN(buffers_[i], fetch(container_, buffers[i]["uri"].get<std::string>(), where, settings_));
         STIPPLE_TRY(claim(buffers_[i].size(), "the buffers"));

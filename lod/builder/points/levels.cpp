@@ -227,7 +227,7 @@ PendingNode makeLeaf(const Frame& frame, SortedPoints& from, size_t begin, size_
 }
 
 /// One record for the records of a cell; two, where those lie in two cones of normals and one disc would be a poor
-/// stand-in for both (an edge between two walls), so that flat parts get large discs and edges keep small errors.
+/// proxy for both (an edge between two walls), so that flat parts get large discs and edges keep small errors.
 class ConeMerger {
   public:
     template <typename CodeOf>

@@ -1,4 +1,4 @@
-#include "apps/stipple/from_afar.h"
+#include "apps/stipple/proxies.h"
 
 #include <fmt/format.h>
 
@@ -12,14 +12,13 @@
 #include "lod/store/nearest.h"
 
 namespace stipple::app {
-Result<StandIns> meshFromAfar(const scene::Scene& scene, const std::vector<scene::Placement>& of,
-                              const lod::Store& mesh, const std::string& part, const BuildOptions& build,
-                              Executor& executor, bool showProgress) {
+Result<Proxies> meshProxies(const scene::Scene& scene, const std::vector<scene::Placement>& of, const lod::Store& mesh,
+                            const std::string& part, const BuildOptions& build, Executor& executor, bool showProgress) {
     constexpr uint64_t kManyTriangles = 2000, kSurfels = 200'000;
     const lod::Hierarchy& h = mesh.hierarchy;
     uint64_t coarsest = 0;
     for (size_t i = 0; i < h.nodes.size(); ++i) coarsest += h.groups[i].parents == 0 ? h.nodes[i].records : 0;
-    if (coarsest < kManyTriangles) return StandIns();
+    if (coarsest < kManyTriangles) return Proxies();
     const auto make = [&](const std::string& path, Progress& progress) -> Result<lod::BuildReport> {
         scene::Scene only = scene;
         only.nodes.clear();
@@ -39,10 +38,10 @@ Result<StandIns> meshFromAfar(const scene::Scene& scene, const std::vector<scene
         };
         return lod::buildStore({scene.path}, path, settings, executor, progress);
     };
-    render::StandIn points;
-    STIPPLE_ASSIGN(points.store, openCached({scene.path}, build, part + ", from afar", showProgress, make));
+    render::Proxy points;
+    STIPPLE_ASSIGN(points.store, openCached({scene.path}, build, part + ", proxy", showProgress, make));
     STIPPLE_ASSIGN(points.error, lod::largestLeafRadius(*points.store));
-    return std::make_shared<const std::vector<render::StandIn>>(std::vector{points});
+    return std::make_shared<const std::vector<render::Proxy>>(std::vector{points});
 }
 
 namespace {
@@ -100,12 +99,12 @@ const lod::DiscFactors& StrandModel::factors() {
     return *factors_;
 }
 
-Result<StandIns> strandsFromAfar(const SharedModel& model, const lod::Store& of, const std::string& input,
-                                 const std::string& part, const BuildOptions& build, Executor& executor,
-                                 bool showProgress) {
+Result<Proxies> strandProxies(const SharedModel& model, const lod::Store& of, const std::string& input,
+                              const std::string& part, const BuildOptions& build, Executor& executor,
+                              bool showProgress) {
     constexpr uint64_t kFewSegments = 2000;
     const uint64_t segments = of.description.points;
-    if (segments < kFewSegments) return StandIns();
+    if (segments < kFewSegments) return Proxies();
     const auto make = [&](const std::string& path, Progress& progress) -> Result<lod::BuildReport> {
         lod::ProgressiveSettings settings = progressiveSettings(input);
         lod::describeDiscs({model->factors()}, settings.description);
@@ -116,9 +115,9 @@ Result<StandIns> strandsFromAfar(const SharedModel& model, const lod::Store& of,
         for (const lod::StrandSamples& cube : parts) items.push_back(itemAlone(cube));
         return lod::buildProgressiveStore(items, path, settings, executor, progress);
     };
-    render::StandIn standIn;
-    STIPPLE_ASSIGN(standIn.store, openCached({input}, build, part + ", from afar", showProgress, make));
-    return std::make_shared<const std::vector<render::StandIn>>(std::vector{standIn});
+    render::Proxy proxy;
+    STIPPLE_ASSIGN(proxy.store, openCached({input}, build, part + ", proxy", showProgress, make));
+    return std::make_shared<const std::vector<render::Proxy>>(std::vector{proxy});
 }
 
 void GroupBuilder::add(const SharedModel& model, uint32_t first, uint32_t count) {

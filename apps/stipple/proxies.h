@@ -1,4 +1,4 @@
-// What is seen of things from afar: points in place of meshes and strands, and instance groups of them.
+// Proxies, what is seen of things from afar: points in place of meshes and strands, and instance groups of them.
 #pragma once
 
 #include <functional>
@@ -12,13 +12,12 @@
 
 namespace stipple::app {
 
-using StandIns = std::shared_ptr<const std::vector<render::StandIn>>;
+using Proxies = std::shared_ptr<const std::vector<render::Proxy>>;
 
 /// Of a mesh whose coarsest level still has many triangles: what is made of many small separate parts cannot be
 /// simplified as a surface. Null where it can.
-Result<StandIns> meshFromAfar(const scene::Scene& scene, const std::vector<scene::Placement>& of,
-                              const lod::Store& mesh, const std::string& part, const BuildOptions& build,
-                              Executor& executor, bool showProgress);
+Result<Proxies> meshProxies(const scene::Scene& scene, const std::vector<scene::Placement>& of, const lod::Store& mesh,
+                            const std::string& part, const BuildOptions& build, Executor& executor, bool showProgress);
 
 /// Clean strands and their samples, made when they are needed: what is in the cache does not need them.
 class StrandModel {
@@ -40,9 +39,9 @@ using SharedModel = std::shared_ptr<StrandModel>;
 
 /// Of strands, which `of` holds: discs, as few as the view allows (lod/builder/progressive). Null where there are few
 /// strands.
-Result<StandIns> strandsFromAfar(const SharedModel& model, const lod::Store& of, const std::string& input,
-                                 const std::string& part, const BuildOptions& build, Executor& executor,
-                                 bool showProgress);
+Result<Proxies> strandProxies(const SharedModel& model, const lod::Store& of, const std::string& input,
+                              const std::string& part, const BuildOptions& build, Executor& executor,
+                              bool showProgress);
 
 /// Collects what stands in many places, and makes one progressive store of all of it.
 class GroupBuilder {
