@@ -9,7 +9,7 @@
 
 #include "engine/cpu/cpu_backend.h"
 #include "engine/scene/camera.h"
-#include "lod/builder/points/rising_values.h"
+#include "lod/builder/points/aggregate_values.h"
 #include "lod/import/import.h"
 #include "lod/import/las/header.h"
 #include "lod/store/attributes.h"
@@ -105,7 +105,7 @@ TEST(Attributes, MeansAreOfWhatHasData) {
     info.type = ScalarType::i16;
     info.noData = 0;
     const auto meanOf = [&](const std::vector<int16_t>& values) {
-        std::vector<RisingValue> leaves;
+        std::vector<AggregateValue> leaves;
         for (const int16_t v : values) leaves.push_back(leafValue(info, reinterpret_cast<const uint8_t*>(&v)));
         int16_t stored = 0;
         storeValue(info, mergeValues(info, leaves), static_cast<uint32_t>(values.size()),
@@ -128,9 +128,9 @@ TEST(Attributes, MeanModeAndNoneAreWhatTheySay) {
     // In one step, and in two: coarse records are made from finer ones.
     const auto of = [&](Aggregate how, size_t begin, size_t end, size_t split = 0) {
         info.aggregate = how;
-        std::vector<RisingValue> parts;
+        std::vector<AggregateValue> parts;
         const auto merged = [&](size_t from, size_t to) {
-            std::vector<RisingValue> leaves;
+            std::vector<AggregateValue> leaves;
             for (size_t i = from; i < to; ++i)
                 leaves.push_back(leafValue(info, reinterpret_cast<const uint8_t*>(&values.at(i))));
             return mergeValues(info, leaves);

@@ -32,7 +32,7 @@ struct DiscPlane {
     glm::dvec3 place;
     glm::vec3 n, t1, t2;
     float radius;
-    explicit DiscPlane(const Rising& r) : place(r.place), n(r.normal), radius(r.radius) {
+    explicit DiscPlane(const AggregateRecord& r) : place(r.place), n(r.normal), radius(r.radius) {
         t1 = glm::normalize(std::abs(n.x) < 0.7f ? glm::vec3(0, -n.z, n.y) : glm::vec3(-n.z, 0, n.x));
         t2 = glm::cross(n, t1);
     }
@@ -94,7 +94,7 @@ void addLeaves(const Around& around, const DiscPlane& plane, size_t begin, size_
 /// Of a part of a node whose leaves are not at hand: its disc as far as its core.
 struct Patch {
     float u, v, w, core, rise, below, hole;
-    Patch(const DiscPlane& plane, const Rising& part) {
+    Patch(const DiscPlane& plane, const AggregateRecord& part) {
         const glm::vec3 d(part.place - plane.place);
         u = glm::dot(d, plane.t1);
         v = glm::dot(d, plane.t2);
@@ -226,9 +226,10 @@ Around::Around(const RecordGrid& g, Key key, uint32_t keyBits, const Leaves* fro
         std::vector<Key> keys;
         for (const PendingNode& child : children) {
             parts.insert(parts.end(), child.records.begin(), child.records.end());
-            for (size_t k = 0; k < child.leaf.size(); ++k) parts.push_back(risingLeaf(child.leaf, k, child.leafKey[k]));
+            for (size_t k = 0; k < child.leaf.size(); ++k)
+                parts.push_back(aggregateOfLeaf(child.leaf, k, child.leafKey[k]));
         }
-        for (const Rising& p : parts) keys.push_back(p.key);
+        for (const AggregateRecord& p : parts) keys.push_back(p.key);
         number(keys);
         return;
     }
@@ -307,7 +308,7 @@ namespace {
 /// What a record's disc is held by at one error.
 class Holding {
   public:
-    Holding(const Rising& record, const Around& around) : around_(around), plane_(record), key_(record.key) {}
+    Holding(const AggregateRecord& record, const Around& around) : around_(around), plane_(record), key_(record.key) {}
     /// `error`, or one that is enough: circles widen at least as fast as it.
     float heldWith(float error) {
         constexpr size_t kMostOwn = 64;
@@ -392,7 +393,7 @@ struct Ball {
 /// How far a place of the record's ball is from the next of those leaves whose means are within `distance` of the
 /// record, at most: on its side of their common mean there is one.
 template <typename BallAt>
-double farthestOfBall(const Rising& record, double distance, size_t count, const BallAt& ballAt) {
+double farthestOfBall(const AggregateRecord& record, double distance, size_t count, const BallAt& ballAt) {
     glm::dvec3 sum(0);
     double weight = 0, reach = 0, least = 1e300;
     const auto forThose = [&](const auto& use) {
@@ -412,7 +413,7 @@ double farthestOfBall(const Rising& record, double distance, size_t count, const
 
 }  // namespace
 
-uint32_t coveringCode(const Rising& record, const Around& around, uint32_t code) {
+uint32_t coveringCode(const AggregateRecord& record, const Around& around, uint32_t code) {
     if ((record.flags & shared::kFlagNoNormal) != 0) return code;
     thread_local std::optional<Holding> holding;
     holding.emplace(record, around);
@@ -430,7 +431,8 @@ uint32_t coveringCode(const Rising& record, const Around& around, uint32_t code)
     return code;
 }
 
-double coveringErrorOfBall(const Rising& record, std::span<const Rising> parts, const Leaves* leaves) {
+double coveringErrorOfBall(const AggregateRecord& record, std::span<const AggregateRecord> parts,
+                           const Leaves* leaves) {
     const auto radius = static_cast<double>(record.radius);
     double error = 1e300;
     for (const double share : {0.25, 0.5, 1.0}) {
@@ -443,7 +445,7 @@ double coveringErrorOfBall(const Rising& record, std::span<const Rising> parts, 
                                                    return Ball{leaves->points.at(at), 1, 0, own};
                                                })
                               : farthestOfBall(record, distance, parts.size(), [&](size_t i) {
-                                    const Rising& p = parts[i];
+                                    const AggregateRecord& p = parts[i];
                                     const double around = glm::length(p.mean - p.place) + static_cast<double>(p.radius);
                                     return Ball{p.mean, static_cast<double>(p.count), p.count == 1 ? 0.0 : around, 0};
                                 });
@@ -452,7 +454,7 @@ double coveringErrorOfBall(const Rising& record, std::span<const Rising> parts, 
     return std::max(error, radius);
 }
 
-void measureCore(Rising& record, const Around& around, bool isAll) {
+void measureCore(AggregateRecord& record, const Around& around, bool isAll) {
     constexpr int kFinest = 3;  ///< holes of 2^-k radii are looked for first
     constexpr size_t kMost = 96;
     const auto error = static_cast<float>(around.grid.errors.decode(record.code));

@@ -14,7 +14,7 @@
 // circle after the other holds both rays. That errs towards larger errors only.
 #pragma once
 
-#include "lod/builder/points/rising.h"
+#include "lod/builder/points/aggregate.h"
 
 namespace stipple::lod {
 
@@ -41,7 +41,7 @@ class Around {
 
     RecordGrid grid;
     const Leaves* leaves = nullptr;
-    std::vector<Rising> parts;  ///< without leaves
+    std::vector<AggregateRecord> parts;  ///< without leaves
     // Otherwise of the leaves, beside the node's corner: place, normal (zero: none), radius.
     std::vector<float> x, y, z, nx, ny, nz, radius;
     glm::dvec3 corner{0};
@@ -54,11 +54,11 @@ class Around {
 
 /// Code of an error not below that of `code` which all places of the record's disc keep to the nearest leaf of its
 /// node. Of a record without a normal: `code`.
-uint32_t coveringCode(const Rising& record, const Around& around, uint32_t code);
+uint32_t coveringCode(const AggregateRecord& record, const Around& around, uint32_t code);
 /// The same of records without a normal, which are balls: lattice units, at least the radius. `parts` as in
-/// mergeRising.
-double coveringErrorOfBall(const Rising& record, std::span<const Rising> parts, const Leaves* leaves);
+/// mergeAggregates.
+double coveringErrorOfBall(const AggregateRecord& record, std::span<const AggregateRecord> parts, const Leaves* leaves);
 /// Sets `core` and `hole` of a record. `isAll`: no other record stands for leaves in its cell.
-void measureCore(Rising& record, const Around& around, bool isAll);
+void measureCore(AggregateRecord& record, const Around& around, bool isAll);
 
 }  // namespace stipple::lod

@@ -7,9 +7,9 @@
 
 #include "engine/base/check.h"
 #include "engine/base/hash.h"
+#include "lod/builder/points/aggregate.h"
+#include "lod/builder/points/aggregate_values.h"
 #include "lod/builder/points/covered.h"
-#include "lod/builder/points/rising.h"
-#include "lod/builder/points/rising_values.h"
 #include "lod/primitives/octahedral.h"
 #include "lod/store/attributes.h"
 #include "lod/store/chunk.h"
@@ -177,7 +177,7 @@ void innerSphere(const Frame& frame, std::span<const PendingNode> children, Pend
     node.centre = box.centre();
     for (const PendingNode& c : children)
         node.radius = std::max(node.radius, glm::length(c.node.centre - node.centre) + c.node.radius);
-    for (const Rising& r : parent.records) {
+    for (const AggregateRecord& r : parent.records) {
         const double reach = radiusOf(recordRadiusCode(r.packed), frame.cellSize(node.level));
         node.radius = std::max(node.radius, glm::length(r.place - node.centre) + reach);
     }
@@ -231,10 +231,10 @@ PendingNode makeLeaf(const Frame& frame, SortedPoints& from, size_t begin, size_
 class ConeMerger {
   public:
     template <typename CodeOf>
-    void merge(const Frame& frame, std::span<const Rising> parts, std::span<const RisingValue> values,
+    void merge(const Frame& frame, std::span<const AggregateRecord> parts, std::span<const AggregateValue> values,
                const Around& around, const CodeOf& codeOf, PendingNode& out) {
         const RecordGrid& grid = around.grid;
-        const Rising one = mergeRising(grid, parts, around.leaves, around);
+        const AggregateRecord one = mergeAggregates(grid, parts, around.leaves, around);
         if (!isSplit(grid, parts, one, around)) {
             out.records.push_back(one);
             for (size_t k = 0; k < parts.size(); ++k) codeOf(k) = one.code;
@@ -258,18 +258,19 @@ class ConeMerger {
     static constexpr int kWorthwhile = 8;       ///< codes of error (1/8 octaves) that two records must gain
     static constexpr double kGoodAsItIs = 0.5;  ///< radii: a disc with a smaller error is not split
 
-    bool isSplit(const RecordGrid& grid, std::span<const Rising> parts, const Rising& one, const Around& around) {
+    bool isSplit(const RecordGrid& grid, std::span<const AggregateRecord> parts, const AggregateRecord& one,
+                 const Around& around) {
         if (grid.errors.decode(one.code) < kGoodAsItIs * static_cast<double>(one.radius)) return false;
         if (!splitByNormals(parts, side_)) return false;
         for (auto& m : members_) m.clear();
         for (size_t k = 0; k < parts.size(); ++k) members_.at(side_[k]).push_back(parts[k]);
         for (size_t g = 0; g < 2; ++g) {
-            of_.at(g) = mergeRising(grid, members_.at(g), nullptr, around);
+            of_.at(g) = mergeAggregates(grid, members_.at(g), nullptr, around);
             if (of_.at(g).code + kWorthwhile > one.code) return false;
         }
         return true;
     }
-    void mergeAttributes(const Frame& frame, size_t parts, std::span<const RisingValue> values, PendingNode& out) {
+    void mergeAttributes(const Frame& frame, size_t parts, std::span<const AggregateValue> values, PendingNode& out) {
         const size_t kinds = frame.attributes.size();
         for (size_t a = 0; a < kinds; ++a) {
             column_.clear();
@@ -279,9 +280,9 @@ class ConeMerger {
     }
 
     std::vector<uint8_t> side_;
-    std::array<std::vector<Rising>, 2> members_;
-    std::array<Rising, 2> of_;
-    std::vector<RisingValue> values_, column_;
+    std::array<std::vector<AggregateRecord>, 2> members_;
+    std::array<AggregateRecord, 2> of_;
+    std::vector<AggregateValue> values_, column_;
 };
 
 RecordGrid gridOf(const Frame& frame, const Node& node) {
@@ -298,7 +299,7 @@ RecordGrid gridOf(const Frame& frame, const Node& node) {
 }
 
 /// What those above want to know of a node's records, whose leaves are not at hand there.
-void measureCores(std::span<Rising> records, const Around& around) {
+void measureCores(std::span<AggregateRecord> records, const Around& around) {
     const uint32_t shift = around.grid.clusterShift;
     for (size_t first = 0, last = 0; first < records.size(); first = last) {
         for (last = first + 1; last < records.size(); ++last)
@@ -318,8 +319,8 @@ PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, Node
     const Around around(gridOf(frame, out.node), out.key, frame.shiftOf(level), leaves, children);
     const RecordGrid& grid = around.grid;
     const size_t kinds = frame.attributes.size();
-    thread_local std::vector<Rising> points;
-    thread_local std::vector<RisingValue> leafValues;
+    thread_local std::vector<AggregateRecord> points;
+    thread_local std::vector<AggregateValue> leafValues;
     thread_local ConeMerger cones;
     for (PendingNode& child : children) {
         const bool isLeaf = child.node.isLeaf();
@@ -330,13 +331,13 @@ PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, Node
         for (size_t begin = 0, end = 0; begin < count; begin = end) {
             const Key cell = keyAt(begin) >> grid.clusterShift;
             for (end = begin + 1; end < count && keyAt(end) >> grid.clusterShift == cell;) ++end;
-            std::span<const Rising> parts;
-            std::span<const RisingValue> values;
+            std::span<const AggregateRecord> parts;
+            std::span<const AggregateValue> values;
             if (isLeaf) {
                 points.clear();
                 leafValues.clear();
                 for (size_t k = begin; k < end; ++k) {
-                    points.push_back(risingLeaf(child.leaf, k, child.leafKey[k]));
+                    points.push_back(aggregateOfLeaf(child.leaf, k, child.leafKey[k]));
                     points.back().first += child.firstPoint;
                     for (size_t a = 0; a < kinds; ++a)
                         leafValues.push_back(leafValue(frame.attributes[a], child.leaf.attributes[a].data() +
@@ -356,7 +357,7 @@ PendingNode makeParent(const Frame& frame, std::span<PendingNode> children, Node
     }
     if (leaves == nullptr) measureCores(out.records, around);
     out.node.records = static_cast<uint32_t>(out.records.size());
-    for (const Rising& r : out.records) out.node.errorCode = std::max(out.node.errorCode, r.code);
+    for (const AggregateRecord& r : out.records) out.node.errorCode = std::max(out.node.errorCode, r.code);
     innerSphere(frame, children, out);
     innerCone(children, out.node);
     for (PendingNode& child : children) encodeNode(frame, child, batch);

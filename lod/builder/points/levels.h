@@ -23,7 +23,7 @@
 namespace stipple::lod {
 
 /// A record on its way up.
-struct Rising {
+struct AggregateRecord {
     Key key = 0;                                 ///< of the first point below
     uint32_t first = 0;                          ///< of the points below, where those are at hand
     uint32_t count = 0;                          ///< points below
@@ -41,7 +41,7 @@ struct Rising {
     shared::PointRecord packed{};
 };
 /// What a coarse record says of an attribute: a mean, or a stored value and how many points below have it.
-struct RisingValue {
+struct AggregateValue {
     double mean = 0;
     uint64_t stored = 0;
     uint64_t votes = 0;
@@ -50,11 +50,11 @@ struct RisingValue {
 /// A node whose records are known and whose chunk is not yet written, as its order needs the parent's codes.
 struct PendingNode {
     Node node;
-    Key key = 0;                      ///< of its cell: Morton code of `keyLevels` levels
-    std::vector<Rising> records;      ///< of an inner node
-    std::vector<RisingValue> values;  ///< records x attributes
-    Points leaf;                      ///< of a leaf
-    uint32_t firstPoint = 0;          ///< of a leaf, where its points are at hand
+    Key key = 0;                           ///< of its cell: Morton code of `keyLevels` levels
+    std::vector<AggregateRecord> records;  ///< of an inner node
+    std::vector<AggregateValue> values;    ///< records x attributes
+    Points leaf;                           ///< of a leaf
+    uint32_t firstPoint = 0;               ///< of a leaf, where its points are at hand
     std::vector<Key> leafKey;
     std::vector<uint8_t> leafParentCode;
 };

@@ -23,12 +23,13 @@ uint32_t radiusCodeUp(double radius, double edge);
 double radiusOf(uint32_t code, double edge);
 
 /// Point i as a record that stands for itself.
-Rising risingLeaf(const Points& points, size_t i, Key key);
+AggregateRecord aggregateOfLeaf(const Points& points, size_t i, Key key);
 /// Records in one cell whose normals lie in two cones, apart by more than 35 degrees: `side` says which one each
 /// belongs to. False if there is one cone, or a record without a normal.
-bool splitByNormals(std::span<const Rising> parts, std::vector<uint8_t>& side);
+bool splitByNormals(std::span<const AggregateRecord> parts, std::vector<uint8_t>& side);
 /// `parts`: records in one cluster's cell, in order. `leaves`: the points below them, where they are at hand and all
 /// points of the cell are meant. `around`: what the disc is held against.
-Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const Leaves* leaves, const Around& around);
+AggregateRecord mergeAggregates(const RecordGrid& grid, std::span<const AggregateRecord> parts, const Leaves* leaves,
+                                const Around& around);
 
 }  // namespace stipple::lod

@@ -1,5 +1,5 @@
 // One coarse record from the finer ones in its cell.
-#include "lod/builder/points/rising.h"
+#include "lod/builder/points/aggregate.h"
 
 #include <algorithm>
 #include <array>
@@ -55,10 +55,10 @@ struct SixteenthTable {
 const SixteenthTable kSixteenths;
 uint32_t byteOf(float srgb) { return unitToByte(srgb); }
 
-bool hasNormal(const Rising& r) { return (r.flags & shared::kFlagNoNormal) == 0; }
+bool hasNormal(const AggregateRecord& r) { return (r.flags & shared::kFlagNoNormal) == 0; }
 
 /// Means, ranges and flags of the parts.
-void addUp(std::span<const Rising> parts, Rising& out) {
+void addUp(std::span<const AggregateRecord> parts, AggregateRecord& out) {
     double count = 0;
     glm::dvec3 sum(0);
     glm::vec3 colour(0), normal(0), reference(0);
@@ -66,7 +66,7 @@ void addUp(std::span<const Rising> parts, Rising& out) {
     out.first = parts[0].first;
     out.least = parts[0].least;
     out.greatest = parts[0].greatest;
-    for (const Rising& p : parts) {
+    for (const AggregateRecord& p : parts) {
         const double weight = p.count;
         const auto w = static_cast<float>(p.count);
         count += weight;
@@ -91,7 +91,7 @@ void addUp(std::span<const Rising> parts, Rising& out) {
     // What most of the leaves are.
     for (const uint32_t flag : {shared::kFlagLoose, shared::kFlagScattered}) {
         double such = 0;
-        for (const Rising& p : parts) such += (p.flags & flag) != 0 ? p.count : 0;
+        for (const AggregateRecord& p : parts) such += (p.flags & flag) != 0 ? p.count : 0;
         if (2 * such > count) out.flags = static_cast<uint8_t>(out.flags | flag);
     }
     out.key = parts[0].key;
@@ -106,7 +106,7 @@ void addUp(std::span<const Rising> parts, Rising& out) {
 }
 
 /// Largest difference of a leaf's channel from the mean; both sRGB.
-float colourSpread(const Rising& r, const glm::vec3& mean) {
+float colourSpread(const AggregateRecord& r, const glm::vec3& mean) {
     float spread = 0;
     for (int k = 0; k < 3; ++k) {
         const auto at = static_cast<size_t>(k);
@@ -124,7 +124,7 @@ struct Extent {
 struct Plane {
     glm::vec3 n, t1, t2;
     bool none;
-    explicit Plane(const Rising& out) : none(!hasNormal(out)) {
+    explicit Plane(const AggregateRecord& out) : none(!hasNormal(out)) {
         n = none ? glm::vec3(0, 0, 1) : out.normal;
         t1 = glm::normalize(std::abs(n.x) < 0.7f ? glm::vec3(0, -n.z, n.y) : glm::vec3(-n.z, 0, n.x));
         t2 = glm::cross(n, t1);
@@ -132,7 +132,7 @@ struct Plane {
 };
 
 /// Of the leaves themselves.
-Extent extentOfLeaves(const Leaves& leaves, size_t begin, size_t end, const Rising& out) {
+Extent extentOfLeaves(const Leaves& leaves, size_t begin, size_t end, const AggregateRecord& out) {
     const Plane plane(out);
     const glm::vec3 n = plane.n, t1 = plane.t1, t2 = plane.t2;
     const bool none = plane.none;
@@ -169,7 +169,7 @@ Extent extentOfLeaves(const Leaves& leaves, size_t begin, size_t end, const Risi
 }
 
 /// Of the leaves of all parts, against the disc's plane through out.place.
-Extent extentOf(std::span<const Rising> parts, const Rising& out) {
+Extent extentOf(std::span<const AggregateRecord> parts, const AggregateRecord& out) {
     const Plane plane(out);
     const glm::vec3 n = plane.n, t1 = plane.t1, t2 = plane.t2;
     const bool none = plane.none;
@@ -177,7 +177,7 @@ Extent extentOf(std::span<const Rising> parts, const Rising& out) {
     extent.fill(-1e30f);
     Extent e;
     e.above = e.below = -1e30f;
-    for (const Rising& p : parts) {
+    for (const AggregateRecord& p : parts) {
         const glm::vec3 d(p.place - out.place);
         const float u = glm::dot(d, t1), v = glm::dot(d, t2), w = none ? 0.0f : glm::dot(d, n);
         const float along = hasNormal(p) ? glm::dot(n, p.normal) : 0.0f;
@@ -213,8 +213,8 @@ uint32_t radiusCodeUp(double radius, double edge) {
 }
 double radiusOf(uint32_t code, double edge) { return kRadii.of.at(code) * edge; }
 
-Rising risingLeaf(const Points& points, size_t i, Key key) {
-    Rising r;
+AggregateRecord aggregateOfLeaf(const Points& points, size_t i, Key key) {
+    AggregateRecord r;
     r.first = static_cast<uint32_t>(i);
     r.key = key;
     r.count = 1;
@@ -231,8 +231,9 @@ Rising risingLeaf(const Points& points, size_t i, Key key) {
     return r;
 }
 
-Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const Leaves* leaves, const Around& around) {
-    Rising out;
+AggregateRecord mergeAggregates(const RecordGrid& grid, std::span<const AggregateRecord> parts, const Leaves* leaves,
+                                const Around& around) {
+    AggregateRecord out;
     addUp(parts, out);
     const uint32_t normalCode = hasNormal(out) ? roundedNormal(out.normal) : 0;
     if (hasNormal(out)) out.normal = shared::octDecode(normalCode);
@@ -277,12 +278,12 @@ Rising mergeRising(const RecordGrid& grid, std::span<const Rising> parts, const 
     return out;
 }
 
-bool splitByNormals(std::span<const Rising> parts, std::vector<uint8_t>& side) {
+bool splitByNormals(std::span<const AggregateRecord> parts, std::vector<uint8_t>& side) {
     constexpr float kOneCone = 0.82f;  // cosine of 35 degrees
     constexpr int kRounds = 2;
     if (parts.size() < 2) return false;
     // How well a normal agrees with an axis; a two-sided one has no sign.
-    const auto agrees = [](const Rising& p, const glm::vec3& axis) {
+    const auto agrees = [](const AggregateRecord& p, const glm::vec3& axis) {
         const float d = glm::dot(p.normal, axis);
         return (p.flags & shared::kFlagTwoSided) != 0 ? std::abs(d) : d;
     };

@@ -1,4 +1,4 @@
-#include "lod/builder/points/rising_values.h"
+#include "lod/builder/points/aggregate_values.h"
 
 #include <algorithm>
 #include <cstring>
@@ -16,20 +16,21 @@ uint64_t storedBits(const AttributeInfo& info, const uint8_t* from) {
 
 }  // namespace
 
-RisingValue leafValue(const AttributeInfo& info, const uint8_t* from) {
+AggregateValue leafValue(const AttributeInfo& info, const uint8_t* from) {
     if (info.aggregate != Aggregate::mean) return {0, storedBits(info, from), 1};
     if (isNoData(info, from)) return {0, storedBits(info, from), 0};
     return {attributeValue(info, from), storedBits(info, from), 1};
 }
 
-RisingValue mergeValues(const AttributeInfo& info, std::span<const RisingValue> parts) {
-    RisingValue out = parts[0];
+AggregateValue mergeValues(const AttributeInfo& info, std::span<const AggregateValue> parts) {
+    AggregateValue out = parts[0];
     if (info.aggregate == Aggregate::mean) {
         // Of what has data; against the first value, so that large offsets cost no digits.
-        const auto first = std::find_if(parts.begin(), parts.end(), [](const RisingValue& p) { return p.votes > 0; });
+        const auto first =
+            std::find_if(parts.begin(), parts.end(), [](const AggregateValue& p) { return p.votes > 0; });
         if (first == parts.end()) return out;
         double sum = 0, count = 0;
-        for (const RisingValue& p : parts) {
+        for (const AggregateValue& p : parts) {
             if (p.votes == 0) continue;
             sum += static_cast<double>(p.votes) * (p.mean - first->mean);
             count += static_cast<double>(p.votes);
@@ -43,7 +44,7 @@ RisingValue mergeValues(const AttributeInfo& info, std::span<const RisingValue> 
     // winner among all points.)
     thread_local std::vector<std::pair<uint64_t, uint64_t>> votes;
     votes.clear();
-    for (const RisingValue& p : parts) votes.emplace_back(p.stored, p.votes);
+    for (const AggregateValue& p : parts) votes.emplace_back(p.stored, p.votes);
     std::sort(votes.begin(), votes.end());
     out.votes = 0;
     for (size_t i = 0; i < votes.size();) {
@@ -56,7 +57,7 @@ RisingValue mergeValues(const AttributeInfo& info, std::span<const RisingValue> 
     return out;
 }
 
-void storeValue(const AttributeInfo& info, const RisingValue& value, uint32_t count, uint8_t* to) {
+void storeValue(const AttributeInfo& info, const AggregateValue& value, uint32_t count, uint8_t* to) {
     if (info.aggregate != Aggregate::mean || count == 1 || value.votes == 0) {
         std::memcpy(to, &value.stored, bytesOf(info.type));
         return;
