@@ -22,7 +22,7 @@ WideDisc opaqueDisc(DrawNode node, PointRecord r, uint id) {
     d.radius = min(opaqueRadius(d.radius, node.spacing), cap);
     return d;
 }
-float roughness(WideDisc d, PointRecord r) { return d.radius * ((recordFlags(r) & kFlagLoose) != 0u ? kLeafShare : kSurfaceShare); }
+float roughness(WideDisc d, PointRecord r) { return d.radius * ((recordFlags(r) & kFlagLeaf) != 0u ? kLeafShare : kSurfaceShare); }
 vec3 towardsEye(WideDisc d) { return dot(d.normal, sightTo(frameLensHere(), d.centre)) > 0.0 ? -d.normal : d.normal; }
 
 // The pixels that a disc may matter at: those of its opaque part, its kernel and its centre.

@@ -83,7 +83,7 @@ void resolveDiscs(const FrameConstants& f, const Tables& tables, const ResolveIn
             last = p.id[i];
             const PointRecord r = recordOf(last);
             front = wideDisc(nodeOf(last), r, f.supportScale, last, lens);
-            thickness = (recordFlags(r) & kFlagLoose) != 0u ? kLeafThickness * kExactRadius : kExactRadius;
+            thickness = (recordFlags(r) & kFlagLeaf) != 0u ? kLeafThickness * kExactRadius : kExactRadius;
         }
         s.ex[i] = (float(x0 + p.pixel[i]) + 0.5f - f.centre.x) * inverseFocal;
         s.front[i] = p.depth[i];

@@ -43,7 +43,7 @@ struct FilterBatch {
 }
 /// How far behind a disc its surface may be, world units. `colour`: its record's.
 [[gnu::always_inline]] inline float roughness(float radius, uint32_t colour) {
-    return radius * ((colour >> 24 & kFlagLoose) != 0u ? kLeafShare : kSurfaceShare);
+    return radius * ((colour >> 24 & kFlagLeaf) != 0u ? kLeafShare : kSurfaceShare);
 }
 
 void prepareKernels(const FrameConstants& frame, const Tables& tables, const BlockSource* blocks,
@@ -261,7 +261,7 @@ struct Filtered {
     }
     const bool isBefore = hasFront && (t.behind[i] != 0u || hasExact);
     out.pixel.cover = (isBefore ? 255u : code) | (hasFront ? kFilteredFront : 0u) |
-                      ((recordFlags(r) & kFlagLoose) != 0u ? kFilteredLeaf : 0u);
+                      ((recordFlags(r) & kFlagLeaf) != 0u ? kFilteredLeaf : 0u);
     out.key = visibilityKey(floatBitsToUint(depth), drawId(0u, id));
     return out;
 }

@@ -52,7 +52,7 @@ template <bool anyTurned>
         t.offset = vec2(c.x * scale + centreX - float(int(i)), c.y * scale + centreY);
         t.depth = valid ? t.depth : 0.0f;
         t.radius = valid ? t.radius : 0.0f;
-        t.thickness = (g.flags[i] & kFlagLoose) != 0u ? kLeafThickness * t.radius : t.thickness;
+        t.thickness = (g.flags[i] & kFlagLeaf) != 0u ? kLeafThickness * t.radius : t.thickness;
         t.colour = vec3(unpackRed(g.colour[i]), unpackGreen(g.colour[i]), unpackBlue(g.colour[i]));
         setTexel<false>(row, kPad + i, t);
     }
@@ -74,7 +74,7 @@ template <bool anyTurned>
         Texel t;
         t.depth = valid ? g.front[i] : 0.0f;
         t.radius = valid ? kExactRadius : 0.0f;
-        t.thickness = (g.flags[i] & kFlagLoose) != 0u ? kLeafThickness * t.radius : t.radius;
+        t.thickness = (g.flags[i] & kFlagLeaf) != 0u ? kLeafThickness * t.radius : t.radius;
         t.offset = vec2(0.0f, 0.0f);
         t.normalPerp = vec2(perp.x * flip, perp.y * flip);
         t.colour = vec3(unpackRed(g.colour[i]), unpackGreen(g.colour[i]), unpackBlue(g.colour[i]));
@@ -188,7 +188,7 @@ void gatherFiltered(const FilteredPixel* __restrict filtered, uint32_t n, Gather
         g.nx[i] = d.x;
         g.ny[i] = d.y;
         g.nz[i] = d.z;
-        g.flags[i] = (shown.cover & kFilteredLeaf) != 0 ? kFlagLoose : 0u;
+        g.flags[i] = (shown.cover & kFilteredLeaf) != 0 ? kFlagLeaf : 0u;
         g.colour[i] = shown.colour;
     }
 }

@@ -281,7 +281,7 @@ class ReferenceBackend final : public render::Backend {
         s.centre = p;
         s.radius = radius;
         s.thickness = s.radius / pixels * (0.25 + std::sqrt(std::max(0.0, 1 - facing * facing)));
-        if ((d.flags & shared::kFlagLoose) != 0) s.thickness = kLeafThickness * s.radius / pixels;
+        if ((d.flags & shared::kFlagLeaf) != 0) s.thickness = kLeafThickness * s.radius / pixels;
         s.perp = dvec2(rotationToZ(toPoint) * (facing > 0 ? -d.normal : d.normal));
         s.colour = d.colour;
     }

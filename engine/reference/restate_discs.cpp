@@ -36,7 +36,7 @@ std::pair<double, double> meet(const PlacedDisc& d, const ViewRay& ray, double n
     return depth > nearPlane && rho2 <= 1 ? std::pair(depth, rho2) : std::pair(HUGE_VAL, HUGE_VAL);
 }
 
-bool isLeaf(const PlacedDisc& d) { return (d.flags & shared::kFlagLoose) != 0; }
+bool isLeaf(const PlacedDisc& d) { return (d.flags & shared::kFlagLeaf) != 0; }
 
 }  // namespace
 

@@ -98,7 +98,7 @@ class Filter {
         return pixels_[static_cast<size_t>(y) * static_cast<size_t>(level_.width) + static_cast<size_t>(x)];
     }
     static double roughness(const PlacedDisc& d) {
-        return d.radius * ((d.flags & shared::kFlagLoose) != 0 ? 1.0 / 12 : 4.0 / 3);
+        return d.radius * ((d.flags & shared::kFlagLeaf) != 0 ? 1.0 / 12 : 4.0 / 3);
     }
     double depthOnPlane(const PlacedDisc& d, const ViewRay& ray) const {
         return glm::dot(d.normal, d.centre - ray.origin) / glm::dot(d.normal, ray.direction);
@@ -235,10 +235,10 @@ class Filter {
                 if (p.weight > 1.0 / 1024) {
                     s = shownPixel(view_, at, view_.isOrthographic ? p.linear / p.weight : p.weight / p.linear,
                                    glm::normalize(p.normal), p.colour / (variation_.isNormalised ? p.weight : grid),
-                                   (d.flags & shared::kFlagLoose) != 0);
+                                   (d.flags & shared::kFlagLeaf) != 0);
                 } else {
                     const dvec3 n = glm::dot(d.normal, sightOf(view_, d.centre)) > 0 ? -d.normal : d.normal;
-                    s = shownPixel(view_, at, p.frontDepth, n, d.colour, (d.flags & shared::kFlagLoose) != 0);
+                    s = shownPixel(view_, at, p.frontDepth, n, d.colour, (d.flags & shared::kFlagLeaf) != 0);
                 }
                 if (!isBefore && isAtGap(x, y)) s.coverage = covered;
             }

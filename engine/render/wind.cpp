@@ -42,7 +42,7 @@ Bend bendOf(const Wind& wind, const lod::Hierarchy& h, const lod::Instance& inst
 }
 
 bool mayBend(const lod::Hierarchy& h, const lod::Instance& instance) {
-    return h.isLoose() && !h.isRigid && instance.group == lod::Instance::kNone && !h.nodes.empty();
+    return h.hasOverlappingCells() && !h.isRigid && instance.group == lod::Instance::kNone && !h.nodes.empty();
 }
 
 void setSway(const Wind& wind, std::span<const lod::Hierarchy* const> hierarchies, std::span<lod::Instance> instances) {

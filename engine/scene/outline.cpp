@@ -50,7 +50,7 @@ void addPositions(const lod::Hierarchy& h, uint32_t index, const lod::Chunk& chu
     const lod::Node &node = h.nodes[h.nodeOf(index)], &group = lod::meshNode(h, h.nodeOf(index));
     const lod::Payload& payload = h.payload(index);
     const glm::dvec3 base = h.recordOrigin(node, payload);
-    const double step = h.isLoose() ? h.cellSize(node) / 32768 : std::exp2(payload.stepShift);
+    const double step = h.hasOverlappingCells() ? h.cellSize(node) / 32768 : std::exp2(payload.stepShift);
     const auto add = [&](uint32_t xy, uint32_t z) {
         to.push_back(h.origin + h.unit * (base + step * glm::dvec3(xy & 0xffffu, xy >> 16, z & 0xffffu)));
     };

@@ -84,7 +84,7 @@ inline int32_t allowedError(const Hierarchy& h, const Node& node, const LocalVie
     if (depth + r < view.nearPlane) return kCulled;
     if (view.isBeside(d, r)) return kCulled;
     if (view.isOrthographic) {
-        if (!h.isLoose() && facesAlong(node, view.forward)) return kCulled;
+        if (!h.hasOverlappingCells() && facesAlong(node, view.forward)) return kCulled;
         const double code = std::floor(kStepsPerOctave * std::log2(1 / (view.focal * stretch * h.errors.smallest)));
         return std::isnan(code) ? kInside : static_cast<int32_t>(std::clamp(code, -900'000.0, 900'000.0));
     }
@@ -92,7 +92,7 @@ inline int32_t allowedError(const Hierarchy& h, const Node& node, const LocalVie
     const double nearest = distance - r;
     if (!(nearest > 0)) return kInside;
     // (Of strands the field of the cone holds another number.)
-    if (!h.isLoose() && facesAway(node, d, distance, r)) return kCulled;
+    if (!h.hasOverlappingCells() && facesAway(node, d, distance, r)) return kCulled;
     // cos(alpha + beta), alpha: axis to centre, beta: angular radius.
     const double cosAlpha = depth / distance, sinAlpha = std::sqrt(std::max(0.0, 1 - cosAlpha * cosAlpha));
     const double sinBeta = r / distance, cosBeta = std::sqrt(std::max(0.0, 1 - sinBeta * sinBeta));

@@ -102,7 +102,7 @@ struct Hierarchy {
         return discFactors[k] + u * (discFactors[std::min(k + 1, discFactors.size() - 1)] - discFactors[k]);
     }
     /// Cells of records reach beyond those of nodes: by half a cell on each side.
-    bool isLoose() const { return isStrands || isProgressive; }
+    bool hasOverlappingCells() const { return isStrands || isProgressive; }
     bool isMesh() const { return isGraph; }
 
     // A CHUNK is what is loaded at once: of node n its first payload is chunk n; then come the tiles of textures, then
@@ -144,7 +144,7 @@ struct Hierarchy {
     /// first position step holds.
     glm::dvec3 recordOrigin(const Node& n) const { return recordOrigin(n, n); }
     glm::dvec3 recordOrigin(const Node& n, const Payload& p) const {
-        if (isLoose() || (isMixed && p.stepShift == static_cast<int>(rootLog2) - n.level - 15))
+        if (hasOverlappingCells() || (isMixed && p.stepShift == static_cast<int>(rootLog2) - n.level - 15))
             return (glm::dvec3(n.cell[0], n.cell[1], n.cell[2]) - double{shared::kStrandMargin}) * cellSize(n);
         const double size = cellSize(n), half = p.stepShift > 0 ? 0.5 * (std::exp2(p.stepShift) - 1) : 0.0;
         return glm::dvec3(n.cell[0], n.cell[1], n.cell[2]) * size + glm::dvec3(half);

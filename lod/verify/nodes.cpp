@@ -69,7 +69,7 @@ std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
         if (!h.isProgressive && r.code > 0 && node.childMask != 0 && (r.octants & ~uint32_t{node.childMask}) != 0)
             return "a record has an error but its octant has no child";
     }
-    if (!h.isLoose() && node.normalConeCosine > 0) {  // see facesAway
+    if (!h.hasOverlappingCells() && node.normalConeCosine > 0) {  // see facesAway
         const glm::dvec3 axis = coneAxis(node);
         const double widest = coneAngle(node) + kConeMargin;
         for (const shared::PointRecord& r : chunk.records) {
@@ -92,7 +92,8 @@ std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
     const Node& parent = h.nodes[node.parent];
     if (glm::length(node.centre - parent.centre) + node.radius > parent.radius * (1 + 1e-9) + 1e-6)
         return "the bounding sphere is not inside the parent's";
-    if (!h.isLoose() && !isConeInside(node, parent)) return "the cone of normals is not inside the parent's";
+    if (!h.hasOverlappingCells() && !isConeInside(node, parent))
+        return "the cone of normals is not inside the parent's";
     if (payload.errorCode > h.errorCodeOf(node.parent)) return "the error is larger than the parent's";
     // Monotone along every chain: sorted by the parent's code, so the own code must not exceed it.
     uint32_t position = 0;

@@ -35,7 +35,7 @@ void main() {
             p.normal = octEncode(towardsEye(opaqueDisc(node, r, id)));
         }
         const bool isBefore = hasFront && (s.behind != 0u || hasExact);
-        p.cover = (isBefore ? 255u : code) | (hasFront ? kFilteredFront : 0u) | ((recordFlags(r) & kFlagLoose) != 0u ? kFilteredLeaf : 0u);
+        p.cover = (isBefore ? 255u : code) | (hasFront ? kFilteredFront : 0u) | ((recordFlags(r) & kFlagLeaf) != 0u ? kFilteredLeaf : 0u);
         visibility[at] = visibilityKey(floatBitsToUint(depth), drawId(0u, id));
     }
     filtered[at] = p;

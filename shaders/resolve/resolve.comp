@@ -34,7 +34,7 @@ void main() {
             const vec3 v = viewDirection(float(pixel.x) + 0.5 - frame.centre.x, float(pixel.y) + 0.5 - frame.centre.y, lens);
             t.depth = keyDepth(key);
             t.radius = kExactRadius;
-            t.thickness = (recordFlags(r) & kFlagLoose) != 0u ? kLeafThickness * kExactRadius : kExactRadius;
+            t.thickness = (recordFlags(r) & kFlagLeaf) != 0u ? kLeafThickness * kExactRadius : kExactRadius;
             t.normalPerp = perpFromNormal(dot(n, v) > 0.0 ? -n : n, v);
             t.colour = pointColour(node, r);
             if (stepInfo.hasFiltered != 0u) {
@@ -47,7 +47,7 @@ void main() {
             return;
         }
         t = texelFromSplat(c, n, radius, lens, frame.minimumRadius);
-        if ((recordFlags(r) & kFlagLoose) != 0u) t.thickness = kLeafThickness * t.radius;
+        if ((recordFlags(r) & kFlagLeaf) != 0u) t.thickness = kLeafThickness * t.radius;
         const float scale = frame.focal / lensDepth(lens, c.z);
         t.offset = vec2(c.x * scale + (frame.centre.x - 0.5) - float(pixel.x), c.y * scale + (frame.centre.y - 0.5) - float(pixel.y));
         t.colour = pointColour(node, r);

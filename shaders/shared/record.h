@@ -19,7 +19,7 @@ struct PointRecord {
 const uint kFlagTwoSided = 1u;         // the normal's sign is not known: draw both sides, shade with |n.v|
 const uint kFlagEstimatedNormal = 2u;  // the normal was not in the file
 const uint kFlagNoNormal = 4u;         // no normal at all: faces the viewer
-const uint kFlagLoose = 8u;  // a leaf among leaves, no part of a surface: not merged with others, gaps stay open
+const uint kFlagLeaf = 8u;  // a leaf among leaves, no part of a surface: not merged with others, gaps stay open
 
 const uint kFlagScattered = 16u;  // no surface joins it to others: drawn small
 

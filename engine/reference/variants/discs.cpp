@@ -12,7 +12,7 @@ using glm::dvec3;
 dvec3 towardsEye(const PlacedDisc& d, const lod::View& v) {
     return glm::dot(d.normal, sightOf(v, d.centre)) > 0 ? -d.normal : d.normal;
 }
-bool isLeaf(const PlacedDisc& d) { return (d.flags & shared::kFlagLoose) != 0; }
+bool isLeaf(const PlacedDisc& d) { return (d.flags & shared::kFlagLeaf) != 0; }
 
 /// Calls use(x, y, off) for the pixels within `reach` px of the disc's centre along each axis; `off` leads from there.
 template <typename Use>

@@ -144,13 +144,13 @@ class MeshBuild : public CellContent {
         const uint64_t wanted = std::max<uint64_t>(to.bufferBytes() / atoms.size(), 8192);
         const auto flush = [&](size_t a) {
             Soup& soup = buffers[a];
-            const bool isLoose = isScattered(soup);
-            if (isLoose || isCrowded(atoms[a])) gather(soup, isCrowded(atoms[a]));
+            const bool isSpread = isScattered(soup);
+            if (isSpread || isCrowded(atoms[a])) gather(soup, isCrowded(atoms[a]));
             ByteWriter bytes;
             putSoup(soup, bytes);
             const uint64_t triangles = soup.indices.size() / 3;
             soup = {};
-            return to.append(a, bytes.bytes(), triangles, isLoose);
+            return to.append(a, bytes.bytes(), triangles, isSpread);
         };
         const auto flushAll = [&]() -> Result<void> {
             for (size_t a = 0; a < buffers.size(); ++a)

@@ -29,8 +29,8 @@ CellSender::CellSender(Workspace& workspace, CellInputs& inputs, const CellConte
         for (uint32_t c = 0; c < all[a].cells; ++c) ofCell_[all[a].firstCell + c] = a;
 }
 
-Result<void> CellSender::append(size_t atom, const std::vector<uint8_t>& bytes, uint64_t units, bool isLoose) {
-    return inputs_.append(atom, bytes, units, isLoose);
+Result<void> CellSender::append(size_t atom, const std::vector<uint8_t>& bytes, uint64_t units, bool isSpread) {
+    return inputs_.append(atom, bytes, units, isSpread);
 }
 
 Result<void> CellSender::ends(uint64_t unitsOfBlock, uint64_t unitsOfAll, const std::function<Result<void>()>& flush) {
@@ -46,7 +46,7 @@ Result<void> CellSender::ends(uint64_t unitsOfBlock, uint64_t unitsOfAll, const 
         noted_ = done_;
         STIPPLE_TRY(agree(workspace_.ranks(), flush()));
         STIPPLE_TRY(note(Journal::What::sent));
-        STIPPLE_TRY(gatherLoose());
+        STIPPLE_TRY(gatherSpread());
     }
     const uint64_t bytes = inputs_.bytes();
     most_ = std::max<uint64_t>(most_, bytes);
@@ -76,15 +76,15 @@ Result<void> CellSender::note(Journal::What what) {
 }
 
 /// Atoms whose input takes more room than it must; what they replace goes when the journal knows of it.
-Result<void> CellSender::gatherLoose() {
+Result<void> CellSender::gatherSpread() {
     const uint64_t atOnce = std::max<uint64_t>(uint64_t{1} << 18, inputs_.bytes() / 32);
-    std::vector<size_t> loose;
+    std::vector<size_t> spread;
     for (size_t a = 0; a < atoms().size(); ++a)
-        if (isOwn(a) && inputs_.isLoose(a)) loose.push_back(a);
+        if (isOwn(a) && inputs_.isSpread(a)) spread.push_back(a);
     for (size_t next = 0;;) {
         const auto gatherSome = [&]() -> Result<void> {
-            for (uint64_t bytes = 0; next < loose.size() && bytes < atOnce; ++next) {
-                const size_t a = loose[next];
+            for (uint64_t bytes = 0; next < spread.size() && bytes < atOnce; ++next) {
+                const size_t a = spread[next];
                 STIPPLE_TRY(workspace_.checkStopped());
                 STIPPLE_ASSIGN(const std::vector<uint8_t> input, inputs_.all(a));
                 uint64_t units = 0;
@@ -98,7 +98,7 @@ Result<void> CellSender::gatherLoose() {
         most_ = std::max<uint64_t>(most_, inputs_.bytes());
         STIPPLE_TRY(note(Journal::What::sent));
         inputs_.dropOld();
-        uint64_t isMore = next < loose.size() ? 1 : 0;
+        uint64_t isMore = next < spread.size() ? 1 : 0;
         if (workspace_.ranks() != nullptr) {
             std::vector<uint32_t> sum{static_cast<uint32_t>(isMore)};
             workspace_.ranks()->addUp(sum);

@@ -36,7 +36,7 @@ class CellSender {
     /// For each block of the input: was it sent by an earlier run? Then it is only to be counted.
     bool begins() { return block_++ < blocksSent_; }
     /// See CellInputs.
-    Result<void> append(size_t atom, const std::vector<uint8_t>& bytes, uint64_t units, bool isLoose = false);
+    Result<void> append(size_t atom, const std::vector<uint8_t>& bytes, uint64_t units, bool isSpread = false);
     /// After each block. `flush` sends what waits.
     Result<void> ends(uint64_t unitsOfBlock, uint64_t unitsOfAll, const std::function<Result<void>()>& flush);
     uint64_t mostTemporaryBytes() const { return most_; }
@@ -44,7 +44,7 @@ class CellSender {
     Result<void> note(Journal::What what);
 
   private:
-    Result<void> gatherLoose();
+    Result<void> gatherSpread();
 
     Workspace& workspace_;
     CellInputs& inputs_;

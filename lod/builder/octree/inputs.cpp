@@ -18,18 +18,18 @@ void CellInputs::plan(std::vector<Atom> atoms) {
     for (size_t a = 0; a < atoms_.size(); ++a) inputs_[a].spill = spillOf(a, 0);
 }
 
-Result<void> CellInputs::append(size_t atom, const std::vector<uint8_t>& bytes, uint64_t units, bool isLoose) {
+Result<void> CellInputs::append(size_t atom, const std::vector<uint8_t>& bytes, uint64_t units, bool isSpread) {
     Input& input = inputs_[atom];
     STIPPLE_TRY(input.spill->append(bytes));
     input.units += units;
-    if (isLoose) input.looseBytes += bytes.size();
+    if (isSpread) input.spreadBytes += bytes.size();
     return {};
 }
 
-bool CellInputs::isLoose(size_t atom) const {
+bool CellInputs::isSpread(size_t atom) const {
     constexpr uint64_t kWorthIt = uint64_t{64} << 10;
     const Input& input = inputs_[atom];
-    return input.looseBytes >= std::max(kWorthIt, (input.spill->bytes() - input.looseBytes) / 2);
+    return input.spreadBytes >= std::max(kWorthIt, (input.spill->bytes() - input.spreadBytes) / 2);
 }
 
 Result<std::vector<uint8_t>> CellInputs::all(size_t atom) const {
@@ -44,7 +44,7 @@ Result<void> CellInputs::replace(size_t atom, const std::vector<uint8_t>& bytes,
     old_.push_back(std::exchange(input.spill, std::move(fresh)));
     ++input.generation;
     input.units = units;
-    input.looseBytes = 0;
+    input.spreadBytes = 0;
     return {};
 }
 
@@ -73,7 +73,7 @@ void CellInputs::save(ByteWriter& to) const {
         to.put(uint64_t{a});
         to.put(input.generation);
         to.put(input.units);
-        to.put(input.looseBytes);
+        to.put(input.spreadBytes);
         to.put(input.spill->segments());
     }
 }
@@ -88,7 +88,7 @@ bool CellInputs::load(const std::vector<uint8_t>& saved) {
         std::vector<Spill::Segment> segments;
         from.get(input.generation);
         from.get(input.units);
-        from.get(input.looseBytes);
+        from.get(input.spreadBytes);
         from.get(segments);
         if (from.isBroken()) return false;
         if (input.generation > 0) spillOf(atom, input.generation - 1)->remove();

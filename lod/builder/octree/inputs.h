@@ -15,10 +15,10 @@ class CellInputs {
     const std::vector<Atom>& atoms() const { return atoms_; }
 
     // While it is brought; each atom by the rank that owns it, from several threads, but no atom from two at once:
-    /// `units`: of content. `isLoose`: takes more room than it would if it were gathered with the rest of the atom.
-    Result<void> append(size_t atom, const std::vector<uint8_t>& bytes, uint64_t units, bool isLoose);
-    /// Is enough of it loose to be worth gathering?
-    bool isLoose(size_t atom) const;
+    /// `units`: of content. `isSpread`: takes more room than it would if it were gathered with the rest of the atom.
+    Result<void> append(size_t atom, const std::vector<uint8_t>& bytes, uint64_t units, bool isSpread);
+    /// Is enough of it spread to be worth gathering?
+    bool isSpread(size_t atom) const;
     Result<std::vector<uint8_t>> all(size_t atom) const;
     /// Instead of what is there, which on disk stays until dropOld().
     Result<void> replace(size_t atom, const std::vector<uint8_t>& bytes, uint64_t units);
@@ -43,7 +43,7 @@ class CellInputs {
     struct Input {
         std::unique_ptr<Spill> spill;
         uint32_t generation = 0;
-        uint64_t units = 0, looseBytes = 0;
+        uint64_t units = 0, spreadBytes = 0;
     };
     std::unique_ptr<Spill> spillOf(size_t atom, uint32_t generation) const;
     const Workspace& workspace_;

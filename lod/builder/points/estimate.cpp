@@ -384,9 +384,9 @@ class Estimator : Surroundings<K> {
             window.spread.isThick(kThick) || (window.spread.isThick(kThickish) && near.isThick(kThick));
         // Round bodies of few points bend their windows, not what is around a point.
         const bool isLeafy = near.isThick(kThickish) && (window.spread.isThick(kThickish) || window.across == 0);
-        const bool isLoose = radius > (isVolume ? 1.0f : kAcrossBend) * others;
+        const bool isLeafLike = radius > (isVolume ? 1.0f : kAcrossBend) * others;
         radius = std::min(radius, (isVolume ? kAmongLeaves : kAcrossBend) * others);
-        return (isLeafy || isLoose ? shared::kFlagScattered : 0u) | (isLoose ? shared::kFlagLoose : 0u);
+        return (isLeafy || isLeafLike ? shared::kFlagScattered : 0u) | (isLeafLike ? shared::kFlagLeaf : 0u);
     }
     /// Of a point whose squared distances to the hood are in squared_: are fewer than three others near it?
     bool isAlone(size_t n, float squaredReach) const {

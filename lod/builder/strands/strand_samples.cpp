@@ -107,7 +107,7 @@ StrandSamples sampleStrands(const StrandSet& strands, uint64_t count) {
             out.points.normal.emplace_back(isRibbon ? n : out_);
             const bool isSolid = !isRibbon && std::min(strands.radius[i], strands.radius[i + 1]) > solidRadius;
             // Kept where the colour comes later.
-            out.points.colour.push_back((shared::kFlagTwoSided | (isSolid ? 0u : shared::kFlagLoose)) << 24);
+            out.points.colour.push_back((shared::kFlagTwoSided | (isSolid ? 0u : shared::kFlagLeaf)) << 24);
             ++wanted;
             wanted = std::floor(wanted) + rng.uniform();
         }
