@@ -12,8 +12,8 @@
 #include "lod/primitives/codecs.h"
 #include "lod/primitives/kinds.h"
 #include "lod/store/file_kind.h"
-#include "lod/store/lots.h"
 #include "lod/store/nearest.h"
+#include "lod/store/pruning.h"
 
 namespace stipple::app {
 namespace {
@@ -80,8 +80,7 @@ nlohmann::json storeInfo(const lod::Store& store) {
     nlohmann::json levels = nlohmann::json::array();
     for (const lod::Node& n : h.nodes) {
         while (levels.size() <= n.level)
-            levels.push_back(
-                {{"nodes", 0}, {"records", 0}, {"bytes", 0}, {"largest_error", 0.0}, {"kept_by_lot", 1.0}});
+            levels.push_back({{"nodes", 0}, {"records", 0}, {"bytes", 0}, {"largest_error", 0.0}, {"kept_share", 1.0}});
         nlohmann::json& l = levels[n.level];
         l["nodes"] = l["nodes"].get<uint64_t>() + 1;
         const auto number = static_cast<uint32_t>(&n - h.nodes.data());
@@ -93,7 +92,7 @@ nlohmann::json storeInfo(const lod::Store& store) {
         const uint32_t code = h.errorCodeOf(number);
         const double error = code == lod::ErrorScale::kNoParent ? 0 : h.unit * h.errors.decode(code);
         l["largest_error"] = std::max(l["largest_error"].get<double>(), error);
-        if (h.isStrands) l["kept_by_lot"] = std::min(l["kept_by_lot"].get<double>(), lod::keptByLot(n));
+        if (h.isStrands) l["kept_share"] = std::min(l["kept_share"].get<double>(), lod::keptShare(n));
     }
     nlohmann::json attributes = nlohmann::json::array();
     for (const lod::AttributeInfo& a : d.attributes)
@@ -196,9 +195,9 @@ void printStore(const nlohmann::json& j) {
     }
     if (j["primitive"] != "segments") return;
     double kept = 1;
-    for (const auto& level : j["levels"]) kept = std::min(kept, level["kept_by_lot"].get<double>());
+    for (const auto& level : j["levels"]) kept = std::min(kept, level["kept_share"].get<double>());
     fmt::print(
-        "  by lot, beside the errors: pixels of strands narrower than a pixel{}\n",
+        "  stochastically, beside the errors: pixels of strands narrower than a pixel{}\n",
         kept < 1 ? fmt::format("; of thin strands at the coarsest level 1 in {:.0f}, as much wider", 1 / kept) : "");
 }
 

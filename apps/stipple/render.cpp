@@ -152,16 +152,16 @@ Result<void> checkModule(const Options& o) {
     return image::checkModule(isLong || !lod::isStoreFile(o.inputs.front()));
 }
 
-/// What goes beside the error because it is not in it; nothing where nothing is left to chance.
-std::string lotText(const render::LotShares& lots) {
+/// What goes beside the error because it is not in it; nothing where nothing is stochastic.
+std::string pruningText(const render::PrunedShares& pruned) {
     std::vector<std::string> parts;
     const auto addShare = [&](double share, const char* of) {
         if (share > 0) parts.push_back(fmt::format("{:.3g} % of the strands' area ({})", 100 * share, of));
     };
-    addShare(lots.narrowShare(), "narrower than a pixel");
-    addShare(lots.thinnedShare(), "wider for others left out");
-    if (lots.discs > 0) parts.push_back(fmt::format("{} discs of proxies of plants", lots.discs));
-    return parts.empty() ? "" : fmt::format(" (beside it, by lot: {})", fmt::join(parts, ", "));
+    addShare(pruned.narrowShare(), "narrower than a pixel");
+    addShare(pruned.thinnedShare(), "wider for others left out");
+    if (pruned.discs > 0) parts.push_back(fmt::format("{} discs of proxies of plants", pruned.discs));
+    return parts.empty() ? "" : fmt::format(" (beside it, stochastically: {})", fmt::join(parts, ", "));
 }
 
 /// The delivered error, in words.
@@ -237,10 +237,10 @@ void tell(const Options& o, const render::FrameState& state, const Verdict& verd
             {"nodes_drawn", c.nodesDrawn},
             {"closes_gaps", closesGaps(o.mode)},
             {"tau_eff_px", jsonNumber(verdict.tauEffectivePixels)},
-            {"by_lot",
-             {{"narrow_strands", verdict.lots.narrowShare()},
-              {"thinned_strands", verdict.lots.thinnedShare()},
-              {"discs", verdict.lots.discs}}},
+            {"pruned",
+             {{"narrow_strands", verdict.pruned.narrowShare()},
+              {"thinned_strands", verdict.pruned.thinnedShare()},
+              {"discs", verdict.pruned.discs}}},
             {"complete", verdict.isComplete()},
             {"incomplete_pictures", verdict.incomplete},
             {"empty_pictures", verdict.empty},
@@ -255,7 +255,7 @@ void tell(const Options& o, const render::FrameState& state, const Verdict& verd
         printJson("render", j);
     } else if (!o.quiet && views > 1) {
         fmt::print("{} pictures; the worst is {}: {}{}, {:.1f} ms a frame on {}\n", views,
-                   numbered(o.output, verdict.worst), errorText(verdict, o.mode), lotText(verdict.lots),
+                   numbered(o.output, verdict.worst), errorText(verdict, o.mode), pruningText(verdict.pruned),
                    quantile(timings.frames, 0.5), state.backend->device());
     } else if (!o.quiet) {
         const std::string drawn = c.trianglesDrawn == 0 ? fmt::format("{} records", c.recordsDrawn)
@@ -263,7 +263,7 @@ void tell(const Options& o, const render::FrameState& state, const Verdict& verd
                                       ? fmt::format("{} triangles", c.trianglesDrawn)
                                       : fmt::format("{} records, {} triangles", c.recordsDrawn, c.trianglesDrawn);
         fmt::print("{}: {}, {}{}, {:.1f} ms a frame on {}\n", o.output, drawn, errorText(verdict, o.mode),
-                   lotText(verdict.lots), quantile(timings.frames, 0.5), state.backend->device());
+                   pruningText(verdict.pruned), quantile(timings.frames, 0.5), state.backend->device());
     }
 }
 

@@ -71,7 +71,7 @@ void Verdict::judge(const render::FrameState& state, const lod::View* view) {
     missing = missingOf(state);
     // A chunk that cannot be read any more is told of where it is missed.
     if (view == nullptr) return;
-    if (const auto measured = render::measureLots(state, *view)) lots = *measured;
+    if (const auto measured = render::measurePruning(state, *view)) pruned = *measured;
 }
 
 std::string numbered(const std::string& path, size_t index) {

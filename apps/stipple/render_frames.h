@@ -7,7 +7,7 @@
 
 #include "apps/stipple/legend.h"
 #include "engine/render/frame.h"
-#include "engine/render/lots.h"
+#include "engine/render/pruning.h"
 
 namespace stipple::app {
 
@@ -44,10 +44,10 @@ struct Verdict {
     bool isTruncated = false;       ///< of one even the coarsest level exceeds the budget
     double tauEffectivePixels = 0;  ///< of the worst, as all that follows; infinite where records are left out
     MissingChunks missing;
-    render::LotShares lots;      ///< what the error does not speak of
-    uint64_t recordsWanted = 0;  ///< by the error asked for; 0: not looked for
+    render::PrunedShares pruned;  ///< what the error does not speak of
+    uint64_t recordsWanted = 0;   ///< by the error asked for; 0: not looked for
     bool isComplete() const { return incomplete == 0 && !isTruncated; }
-    /// `view`: of the lots; null: they are not wanted.
+    /// `view`: of what is pruned; null: they are not wanted.
     void judge(const render::FrameState& state, const lod::View* view);
 };
 

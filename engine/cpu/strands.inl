@@ -43,7 +43,7 @@ struct alignas(64) Lines {
     float halfA[kSegmentsPerBlock], halfB[kSegmentsPerBlock];        ///< seen half-widths, px
     float nearerA[kSegmentsPerBlock], nearerB[kSegmentsPerBlock];    ///< surfaceStep
     float isRound[kSegmentsPerBlock], isFilled[kSegmentsPerBlock];
-    uint32_t lot[kSegmentsPerBlock];  ///< strandLot
+    uint32_t rank[kSegmentsPerBlock];  ///< strandRank
     uint32_t keep[kSegmentsPerBlock];
     // As one-pixel lines: along u, the axis along which they are longer, from `first` on; values at u = start, and
     // their slopes.
@@ -109,7 +109,7 @@ void layLines(const FrameConstants& frame, Lines& lines, size_t count) {
                 uint32_t(int(inside > 0.5f ? y : 0.0f)) * f.width + uint32_t(int(inside > 0.5f ? x : 0.0f));
             const float dot_ = 3.14159265f * half * half * (1.0f - max(dx, dy) / max(2.0f * half, 1.0e-6f));
             const float share = half < kNarrow ? dot_ : 2.0f;
-            const float isSeen = coverageThreshold(pixel, ~lines.lot[i], f.coverageSeed) < share ? inside : 0.0f;
+            const float isSeen = coverageThreshold(pixel, ~lines.rank[i], f.coverageSeed) < share ? inside : 0.0f;
             return isSeen > 0.5f ? pixel : ~0u;
         };
         lines.pixelA[i] = point(xa, ya, lines.halfA[i]);
@@ -128,7 +128,7 @@ void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pix
                        *const dHalf = lines.dHalf, *const longer = lines.longer, *const nearer = lines.nearer,
                        *const dNearer = lines.dNearer, *const inverse = lines.inverse, *const dInverse = lines.dInverse,
                        *const steep = lines.isSteep;
-    const uint32_t* const lot = lines.lot;
+    const uint32_t* const rank = lines.rank;
     uint32_t* __restrict const depth = pixels.depth, * __restrict const pixel = pixels.pixel;
     const Lens lens = lensHere(f.focal);
     const float nearPlane = f.nearPlane;
@@ -142,7 +142,7 @@ void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pix
         const uint32_t row = uint32_t(int(inside > 0.5f ? v : 0.0f)), column = uint32_t(at[k]);
         const uint32_t where = isSteep ? column * f.width + row : row * f.width + column;
         const float covered = 2.0f * half * longer[i], share = half < kNarrow ? covered : 2.0f;
-        const float taken = coverageThreshold(where, lot[i], f.coverageSeed) < share ? inside : 0.0f;
+        const float taken = coverageThreshold(where, rank[i], f.coverageSeed) < share ? inside : 0.0f;
         depth[k] =
             floatBitsToUint(lineDepth(lens, inverse[i] + u * dInverse[i], nearer[i] + u * dNearer[i], nearPlane));
         pixel[k] = taken > 0.5f ? where : ~0u;
@@ -184,7 +184,7 @@ void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pix
         lines.halfB[i] = endHalfWidth(c, p.to, c.directionB, lens, f.nearPlane);
         lines.nearerA[i] = surfaceStep(lens, a, t, ra, c.isRound);
         lines.nearerB[i] = surfaceStep(lens, b, t, rb, c.isRound);
-        lines.lot[i] = strandLot(s);
+        lines.rank[i] = strandRank(s);
         lines.isRound[i] = c.isRound;
         lines.isFilled[i] = isFilled(c, p, lens, f.exactStrands);
         const bool isFine = (segmentErrorCode(s) <= node.errorCode) | ((segmentOctants(s) & node.octantMask) != 0u);

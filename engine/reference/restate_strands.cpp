@@ -57,9 +57,9 @@ class StrandProjector {
   public:
     StrandProjector(const render::DrawList& draws, Level& level) : level_(level), view_(draws.view), f_(draws.frame) {}
 
-    void segment(const Segment& world, const lod::Instance& instance, const render::Bend& bend, uint32_t lot,
+    void segment(const Segment& world, const lod::Instance& instance, const render::Bend& bend, uint32_t rank,
                  const dvec3* debugColour) {
-        lot_ = lot;
+        rank_ = rank;
         s_ = world;
         debugColour_ = debugColour;
         const auto toCamera = [&](const dvec3& w) {
@@ -157,11 +157,11 @@ class StrandProjector {
         for (int m = pixelIn(std::ceil(lo - 0.5), size); m < size && m + 0.5 < hi; ++m) {
             const double u = (m + 0.5 - pa_[major]) / d[major], other = pa_[minor] + u * d[minor];
             const double half = halfA_ + u * (halfB_ - halfA_);
-            offer(major == 0 ? dvec2(m, other) : dvec2(other, m), u, half, lot_, 2 * half * longer);
+            offer(major == 0 ? dvec2(m, other) : dvec2(other, m), u, half, rank_, 2 * half * longer);
         }
         const double length = std::max(std::abs(d.x), std::abs(d.y));
         for (const auto& [p, u, half] : {std::tuple{pa_, 0.0, halfA_}, std::tuple{pb_, 1.0, halfB_}})
-            offer(p, u, half, ~lot_, 3.14159265 * half * half * (1 - length / std::max(2 * half, 1e-6)));
+            offer(p, u, half, ~rank_, 3.14159265 * half * half * (1 - length / std::max(2 * half, 1e-6)));
     }
 
     void offer(const dvec2& p, double u, double half, uint32_t id, double share) {
@@ -294,7 +294,7 @@ class StrandProjector {
     const lod::View& view_;
     const shared::FrameConstants& f_;
     Segment s_;
-    uint32_t lot_ = 0;
+    uint32_t rank_ = 0;
     const dvec3* debugColour_ = nullptr;
     dvec3 a_{0}, b_{0}, tangent_{0};
     double from_ = 0, to_ = 1, halfA_ = 0, halfB_ = 0;
@@ -322,9 +322,9 @@ void projectStrands(const render::DrawList& draws, const Chunks& chunks, Level& 
             if (s.errorCode > cut.errorCode && (s.octants & cut.octantMask) == 0) continue;
             // The same in every cut.
             const shared::StrandVertex &va = chunk.segments[i].a, &vb = chunk.segments[i].b;
-            const uint32_t lot = va.positionXY * 0x9e3779b1u ^ vb.positionXY * 0x85ebca6bu ^
-                                 va.positionZ % 65536 * 0xc2b2ae35u ^ vb.positionZ % 65536 * 0x27d4eb2fu;
-            projector.segment(s, instance, bend, lot, isDebug ? &colour : nullptr);
+            const uint32_t rank = va.positionXY * 0x9e3779b1u ^ vb.positionXY * 0x85ebca6bu ^
+                                  va.positionZ % 65536 * 0xc2b2ae35u ^ vb.positionZ % 65536 * 0x27d4eb2fu;
+            projector.segment(s, instance, bend, rank, isDebug ? &colour : nullptr);
         }
     }
 }

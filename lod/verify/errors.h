@@ -26,7 +26,7 @@ Result<uint64_t> measureGroup(const Store& store, uint32_t group, const Chunk& c
 
 /// Measures segments of an inner strand node, all whose children are leaves, against the leaves' segments, at a few
 /// dozen places: the ball that each place stands for has to be within the segment's error of one of theirs. (The other
-/// way is not in the file where thin strands were drawn by lot.) An error if one is not; else how many segments were
+/// way is not in the file where thin strands were pruned.) An error if one is not; else how many segments were
 /// measured.
 Result<uint64_t> measureStrands(const Store& store, uint32_t node, const Chunk& chunk);
 

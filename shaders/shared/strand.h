@@ -256,14 +256,14 @@ SHARED_FN Texel texelFromStrand(CameraSegment s, float place, float support, Len
 
 // A number of a segment's own, the same in every cut: which pixels a narrow strand takes must not change when others
 // come or go.
-SHARED_FN uint strandLot(StrandSegment s) {
+SHARED_FN uint strandRank(StrandSegment s) {
     return s.a.positionXY * 0x9e3779b1u ^ s.b.positionXY * 0x85ebca6bu ^ (s.a.positionZ & 0xffffu) * 0xc2b2ae35u ^
            (s.b.positionZ & 0xffffu) * 0x27d4eb2fu;
 }
 
 // Does a strand narrower than a pixel take this one? A number in [0, 1) for each pixel, strand and frame of a series.
-SHARED_FN float coverageThreshold(uint pixel, uint lot, uint seed) {
-    uint h = pixel * 0x9e3779b1u ^ lot * 0x85ebca6bu ^ seed * 0xc2b2ae35u;
+SHARED_FN float coverageThreshold(uint pixel, uint rank, uint seed) {
+    uint h = pixel * 0x9e3779b1u ^ rank * 0x85ebca6bu ^ seed * 0xc2b2ae35u;
     h ^= h >> 16;
     h *= 0x7feb352du;
     h ^= h >> 15;

@@ -4,7 +4,7 @@
 #include "../strands.glsl"
 layout(local_size_x = 256) in;
 
-uint lot;  // of this segment, see strandLot
+uint rank;  // of this segment, see strandRank
 
 const int kMostPixels = 4096;
 
@@ -42,7 +42,7 @@ void drawLine(WideStrand s) {
         const int x = isSteep ? int(other) : m;
         const int y = isSteep ? m : int(other);
         const vec4 here = atA + u * (atB - atA);
-        if (here.y < kNarrow && coverageThreshold(uint(y) * frame.width + uint(x), lot, frame.coverageSeed) >= 2.0 * here.y * longer)
+        if (here.y < kNarrow && coverageThreshold(uint(y) * frame.width + uint(x), rank, frame.coverageSeed) >= 2.0 * here.y * longer)
             continue;
         offer(x, y, lineLinear(here.x, here.z), drawId(frame.firstBlock.of[kKindCurves], s.id));
     }
@@ -52,7 +52,7 @@ void drawEnd(float x, float y, float inverseDepth, float halfWidth, float nearer
     if (!(x >= 0.0 && y >= 0.0 && x < float(frame.width) && y < float(frame.height))) return;
     const uint pixel = uint(y) * frame.width + uint(x);
     const float share = 3.14159265 * halfWidth * halfWidth * (1.0 - across / max(2.0 * halfWidth, 1.0e-6));
-    if (halfWidth < kNarrow && coverageThreshold(pixel, ~lot, frame.coverageSeed) >= share) return;
+    if (halfWidth < kNarrow && coverageThreshold(pixel, ~rank, frame.coverageSeed) >= share) return;
     offer(int(x), int(y), lineLinear(inverseDepth, nearer), drawId(frame.firstBlock.of[kKindCurves], id));
 }
 
@@ -93,7 +93,7 @@ void main() {
     if (index >= node.count) return;
     const StrandSegment segment = Segments(uvec2(node.addressLow, node.addressHigh)).segments[index];
     if (segmentErrorCode(segment) > node.errorCode && (segmentOctants(segment) & node.octantMask) == 0u) return;
-    lot = strandLot(segment);
+    rank = strandRank(segment);
     const CameraSegment c = cameraSegment(node, segment);
     const Lens lens = frameLensHere();
     const ScreenSegment p = projectSegment(c.a, c.b, lens, frame.centre.x, frame.centre.y, frame.nearPlane);

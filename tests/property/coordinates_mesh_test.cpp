@@ -322,7 +322,7 @@ TEST(CoordinatesOfCurves, AStrandFarAwayChangesNothing) {
             return test::buildStrands(set, folder / "far", *executor, 8192);
         };
         // Any other strand, too, lets the cells lie elsewhere, and with them the steps of a 30,000th of a cell: at
-        // outlines, which are not smoothed, a pixel turns here and there, and thin strands cover others by lot.
+        // outlines, which are not smoothed, a pixel turns here and there, and thin strands cover others stochastically.
         double usual = 99;
         for (const glm::dvec3& near : {glm::dvec3(0.3, 0.1, 4.5), glm::dvec3(0, -0.4, 5), glm::dvec3(0.2, 0, 6)})
             usual = std::min(usual, test::drawnPsnr(pictureOf(withOne(near), *executor, view), without));

@@ -111,7 +111,7 @@ TEST(StrandHierarchy, EverythingIsDrawnOnceAtAnyError) {
     }
 }
 
-TEST(StrandHierarchy, LotsKeepTheArea) {
+TEST(StrandHierarchy, PruningKeepsTheArea) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);
     test::CurlRecipe recipe;

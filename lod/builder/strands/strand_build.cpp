@@ -330,8 +330,8 @@ class StrandBuild : public CellContent {
         report.added = description.added = added_;
         if (fewestKept_ < 1)
             report.coarseNotes.push_back(fmt::format(
-                "from afar thin strands are drawn by lot: at the coarsest level 1 in {:.0f}, wider by as much; where "
-                "the others were is left to chance and not part of the stated error",
+                "from afar thin strands are pruned: at the coarsest level 1 in {:.0f}, wider by as much; where "
+                "the others were is stochastic and not part of the stated error",
                 1 / fewestKept_));
         return hierarchy;
     }

@@ -9,13 +9,13 @@
 #include "lod/builder/octree/packed.h"
 #include "lod/primitives/octahedral.h"
 #include "lod/store/chunk.h"
-#include "lod/store/lots.h"
+#include "lod/store/pruning.h"
 
 namespace stipple::lod {
 namespace {
 
 constexpr double kStepsPerTolerance = 64;  ///< a node's tolerance is its cell / this
-constexpr size_t kMostFactor = 4;          ///< parts of a node before lots are drawn / those of a leaf
+constexpr size_t kMostFactor = 4;          ///< parts of a node before it is pruned / those of a leaf
 
 struct StrandNode {
     Node node;
@@ -323,7 +323,7 @@ class StrandCell {
             const auto common = static_cast<uint8_t>(frame_.errors.encodeUp(merge.commonError));
             for (size_t i = 0; i < from.size(); ++i)
                 partOf(from[i]).parentCode =
-                    merge.standsFor[i] == kDrawnByLot ? common : merge.parts[merge.standsFor[i]].ownCode;
+                    merge.standsFor[i] == kPruned ? common : merge.parts[merge.standsFor[i]].ownCode;
             node.parts = std::move(merge.parts);
             node.kept = 1;
             for (uint32_t c = out.firstChild; c < out.firstChild + children; ++c)

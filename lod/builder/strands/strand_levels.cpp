@@ -5,7 +5,7 @@
 // the swept balls, and what a ribbon's edge moves by turning is added. Both radii are changed by as much as keeps the
 // area (a leaf is thin at both ends). Errors add up level by level.
 //
-// Drawing by lot (Cook et al. 2007): where strands are thinner than the error and still too many, those with the
+// Stochastic pruning (Cook et al. 2007): where strands are thinner than the error and still too many, those with the
 // smallest hash survive, wider by what went (so that the area stays) and with less contrast (a mean of n colours varies
 // by 1/sqrt(n)). What wider strands are too wide by is part of the bound; where the lost ones were is a matter of
 // chance.
@@ -124,7 +124,7 @@ class Merger {
 };
 
 /// Number of a strand in the order in which strands are left out; has nothing to do with where they are.
-uint32_t lotOf(uint32_t strand) {
+uint32_t rankOf(uint32_t strand) {
     uint32_t h = strand * 0x9e3779b1u;
     h ^= h >> 16;
     h *= 0x7feb352du;
@@ -137,11 +137,11 @@ void drawLots(const std::vector<StrandPoint>& points, const StrandLevel& level, 
     std::vector<StrandPart>& parts = merge.parts;
     const auto radiusOf = [](const StrandPart& p) { return double{std::max(p.radiusA, p.radiusB)}; };
     std::vector<uint8_t> isThin(parts.size());
-    std::vector<uint32_t> lots(parts.size()), order;
+    std::vector<uint32_t> ranks(parts.size()), order;
     for (size_t i = 0; i < parts.size(); ++i) {
         isThin[i] = radiusOf(parts[i]) <= level.thin ? 1 : 0;
-        lots[i] = lotOf(points[parts[i].a].strand);
-        if (isThin[i] != 0) order.push_back(lots[i]);
+        ranks[i] = rankOf(points[parts[i].a].strand);
+        if (isThin[i] != 0) order.push_back(ranks[i]);
     }
     const size_t thick = parts.size() - order.size();
     const auto wanted =
@@ -157,7 +157,7 @@ void drawLots(const std::vector<StrandPoint>& points, const StrandLevel& level, 
         const StrandPart& p = parts[i];
         const double area = glm::length(points[p.b].p - points[p.a].p) * (double{p.radiusA} + double{p.radiusB});
         areaBefore += area;
-        areaAfter += lots[i] < limit ? area : 0;
+        areaAfter += ranks[i] < limit ? area : 0;
         for (int c = 0; c < 3; ++c) sum[c] += area * (p.colourA >> (8 * c) & 255u);
     }
     if (!(areaAfter > 0)) return;
@@ -173,11 +173,11 @@ void drawLots(const std::vector<StrandPoint>& points, const StrandLevel& level, 
     };
     // All thin parts change at once: the survivors grow when the others go.
     std::vector<StrandPart> kept;
-    std::vector<uint32_t> place(parts.size(), kDrawnByLot);
+    std::vector<uint32_t> place(parts.size(), kPruned);
     for (size_t i = 0; i < parts.size(); ++i) {
         StrandPart p = parts[i];
         if (isThin[i] != 0) merge.commonError = std::max(merge.commonError, p.error);
-        if (isThin[i] != 0 && lots[i] >= limit) continue;
+        if (isThin[i] != 0 && ranks[i] >= limit) continue;
         if (isThin[i] != 0) {
             merge.commonError = std::max(merge.commonError, p.error + radiusOf(p) * (double{wider} - 1));
             p.radiusA *= wider;
@@ -189,7 +189,7 @@ void drawLots(const std::vector<StrandPoint>& points, const StrandLevel& level, 
         kept.push_back(p);
     }
     for (size_t i = 0; i < parts.size(); ++i)
-        if (isThin[i] != 0 && place[i] != kDrawnByLot) kept[place[i]].error = merge.commonError;
+        if (isThin[i] != 0 && place[i] != kPruned) kept[place[i]].error = merge.commonError;
     for (uint32_t& s : merge.standsFor) s = place[s];
     merge.kept = areaAfter / areaBefore;
     parts = std::move(kept);

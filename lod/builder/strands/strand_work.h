@@ -38,12 +38,12 @@ struct StrandLevel {
     double tolerance = 0;  ///< error that merging may add
     double rounding = 0;   ///< of positions
     double thin = 0;       ///< radius of strands that are, at most
-    size_t mostParts = 0;  ///< beyond that, thin strands are drawn by lot
+    size_t mostParts = 0;  ///< beyond that, thin strands are pruned
 };
 
 /// One node's parts from its children's, sorted along the strands. `standsFor[i]`: the part that child part i became,
-/// kDrawnByLot where others stand for it.
-inline constexpr uint32_t kDrawnByLot = ~0u;
+/// kPruned where others stand for it.
+inline constexpr uint32_t kPruned = ~0u;
 struct StrandMerge {
     std::vector<StrandPart> parts;
     std::vector<uint32_t> standsFor;

@@ -1,4 +1,4 @@
-#include "engine/render/lots.h"
+#include "engine/render/pruning.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,23 +6,23 @@
 #include "lod/cut/view.h"
 #include "lod/primitives/kinds.h"
 #include "lod/store/chunk.h"
-#include "lod/store/lots.h"
+#include "lod/store/pruning.h"
 #include "lod/store/store.h"
 
 namespace stipple::render {
 namespace {
 
 /// Adds the segments that a draw shows.
-class StrandLots {
+class StrandPruning {
   public:
-    StrandLots(const lod::Hierarchy& h, const lod::Instance& instance, const lod::View& view, LotShares& shares)
+    StrandPruning(const lod::Hierarchy& h, const lod::Instance& instance, const lod::View& view, PrunedShares& shares)
         : h_(h), view_(lod::makeLocalView(h, instance, view)), shares_(shares) {}
 
     void add(const lod::CutDraw& draw, const lod::Chunk& chunk) {
         const lod::Node& node = h_.nodes[draw.node];
         const lod::Payload& payload = h_.payload(draw.chunk);
         const double step = std::exp2(payload.stepShift), edge = h_.cellSize(node),
-                     kept = h_.isStrands ? lod::keptByLot(node) : 1;
+                     kept = h_.isStrands ? lod::keptShare(node) : 1;
         // What the build may have thinned out, and made wider by what went.
         const double thin = kept < 1 ? lod::kThinStrand * edge / kept : 0;
         const glm::dvec3 base = h_.recordOrigin(node, payload);
@@ -62,20 +62,20 @@ class StrandLots {
   private:
     const lod::Hierarchy& h_;
     lod::LocalView view_;
-    LotShares& shares_;
+    PrunedShares& shares_;
 };
 
 }  // namespace
 
-Result<LotShares> measureLots(const FrameState& state, const lod::View& view) {
-    LotShares shares;
+Result<PrunedShares> measurePruning(const FrameState& state, const lod::View& view) {
+    PrunedShares shares;
     for (const lod::CutDraw& draw : state.cut.draw) {
         const lod::Instance& instance = state.instances[draw.instance];
         const lod::Hierarchy& h = *state.hierarchies[instance.hierarchy];
         if (h.isProgressive) shares.discs += draw.count;
         if (lod::kindOf(h, draw.chunk) != lod::Kind::curves) continue;
         STIPPLE_ASSIGN(const lod::Chunk chunk, lod::readChunk(*state.stores[instance.hierarchy], draw.chunk));
-        StrandLots(h, instance, view, shares).add(draw, chunk);
+        StrandPruning(h, instance, view, shares).add(draw, chunk);
     }
     return shares;
 }

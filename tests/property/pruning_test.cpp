@@ -1,28 +1,28 @@
-// What of strands is left to chance is stated beside the error, by its share of the area that is seen.
+// What of strands is stochastic is stated beside the error, by its share of the area that is seen.
 #include <gtest/gtest.h>
 
 #include "engine/cpu/cpu_backend.h"
-#include "engine/render/lots.h"
-#include "lod/store/lots.h"
+#include "engine/render/pruning.h"
+#include "lod/store/pruning.h"
 #include "tests/support/strands.h"
 
 namespace stipple {
 namespace {
 
-class Lots : public testing::Test {
+class Pruning : public testing::Test {
   protected:
-    render::LotShares lotsOf(const lod::StrandSet& set, const lod::View& view, double tau,
-                             uint32_t leafSegments = 256) {
+    render::PrunedShares prunedOf(const lod::StrandSet& set, const lod::View& view, double tau,
+                                  uint32_t leafSegments = 256) {
         store_ = test::buildStrands(set, folder_ / "a.stipple", *executor_, leafSegments);
         const auto backend = cpu::makeCpuBackend(*executor_);
         auto state = render::makeFrameState({store_}, *backend, *executor_, {});
         render::FrameSettings settings;
         settings.budgets.errorPixels = tau;
         EXPECT_TRUE(render::renderUntilComplete(*state, view, settings));
-        const auto lots = render::measureLots(*state, view);
-        EXPECT_TRUE(lots);
+        const auto pruned = render::measurePruning(*state, view);
+        EXPECT_TRUE(pruned);
         state->streamer.reset();
-        return lots ? *lots : render::LotShares{};
+        return pruned ? *pruned : render::PrunedShares{};
     }
     /// Along z, at a distance at which a world unit is 100 pixels.
     static lod::View straightAt() {
@@ -40,7 +40,7 @@ class Lots : public testing::Test {
     std::shared_ptr<const lod::Store> store_;
 };
 
-TEST_F(Lots, NarrowStrandsAreCountedByTheirAreaAndWideOnesAreNot) {
+TEST_F(Pruning, NarrowStrandsAreCountedByTheirAreaAndWideOnesAreNot) {
     // Lines across the picture: one of 0.4 pixels, one of 3; and one behind the eye and one beside it.
     lod::StrandSet set;
     const auto add = [&](double y, double z, float radius) {
@@ -57,25 +57,25 @@ TEST_F(Lots, NarrowStrandsAreCountedByTheirAreaAndWideOnesAreNot) {
     add(-0.5, 0, 0.015f);
     add(0, 20, 0.002f);
     add(30, 0, 0.002f);
-    const render::LotShares lots = lotsOf(set, straightAt(), 0.01);
-    EXPECT_NEAR(lots.strandArea, 400 * (0.4 + 3), 0.02 * 400 * 3.4);
-    EXPECT_NEAR(lots.narrowShare(), 0.4 / 3.4, 0.01);
-    EXPECT_EQ(lots.thinnedArea, 0);
-    EXPECT_EQ(lots.discs, 0u);
+    const render::PrunedShares pruned = prunedOf(set, straightAt(), 0.01);
+    EXPECT_NEAR(pruned.strandArea, 400 * (0.4 + 3), 0.02 * 400 * 3.4);
+    EXPECT_NEAR(pruned.narrowShare(), 0.4 / 3.4, 0.01);
+    EXPECT_EQ(pruned.thinnedArea, 0);
+    EXPECT_EQ(pruned.discs, 0u);
 }
 
-TEST_F(Lots, ARibbonIsAsWideAsItIsSeen) {
+TEST_F(Pruning, ARibbonIsAsWideAsItIsSeen) {
     for (const double degrees : {0.0, 85.0}) {  // 2 pixels wide from the front, 0.17 from the side
         const double a = degrees * M_PI / 180;
         const glm::vec3 n(0, std::sin(a), std::cos(a));
         const lod::StrandSet set = test::oneStrand({{-1, 0, 0}, {1, 0, 0}}, 0.01f, {n, n});
-        const render::LotShares lots = lotsOf(set, straightAt(), 0.01);
-        EXPECT_NEAR(lots.strandArea, 200 * 2 * std::cos(a), 0.05 * 400 * std::cos(a) + 1) << degrees;
-        EXPECT_EQ(lots.narrowShare(), degrees > 80 ? 1 : 0) << degrees;
+        const render::PrunedShares pruned = prunedOf(set, straightAt(), 0.01);
+        EXPECT_NEAR(pruned.strandArea, 200 * 2 * std::cos(a), 0.05 * 400 * std::cos(a) + 1) << degrees;
+        EXPECT_EQ(pruned.narrowShare(), degrees > 80 ? 1 : 0) << degrees;
     }
 }
 
-TEST_F(Lots, StrandsThatStandForOthersAreCounted) {
+TEST_F(Pruning, StrandsThatStandForOthersAreCounted) {
     test::CurlRecipe recipe;
     recipe.count = 3000;
     recipe.radius = 0.004f;
@@ -83,15 +83,15 @@ TEST_F(Lots, StrandsThatStandForOthersAreCounted) {
     lod::View view = straightAt();
     view.focalPixels = 4000;  // 1.6 pixels of half-width: nothing is narrow
     const lod::StrandSet set = test::curls(recipe);
-    const render::LotShares fine = lotsOf(set, view, 0.01, 64);
+    const render::PrunedShares fine = prunedOf(set, view, 0.01, 64);
     EXPECT_EQ(fine.thinnedArea, 0) << "all of them are drawn";
-    const render::LotShares coarse = lotsOf(set, view, 60, 64);
+    const render::PrunedShares coarse = prunedOf(set, view, 60, 64);
     EXPECT_GT(coarse.thinnedShare() + coarse.narrowShare(), 0.5);
     EXPECT_GT(coarse.thinnedArea, 0);
-    EXPECT_LT(lod::keptByLot(store_->hierarchy.nodes[0]), 0.5);
-    EXPECT_GT(lod::keptByLot(store_->hierarchy.nodes[0]), 0);
+    EXPECT_LT(lod::keptShare(store_->hierarchy.nodes[0]), 0.5);
+    EXPECT_GT(lod::keptShare(store_->hierarchy.nodes[0]), 0);
     for (const lod::Node& n : store_->hierarchy.nodes)
-        if (n.isLeaf()) EXPECT_EQ(lod::keptByLot(n), 1);
+        if (n.isLeaf()) EXPECT_EQ(lod::keptShare(n), 1);
 }
 
 }  // namespace

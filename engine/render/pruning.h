@@ -1,4 +1,4 @@
-// How much of a picture is left to chance: what the stated error does not speak of.
+// How much of a picture is stochastic: what the stated error does not speak of.
 #pragma once
 
 #include "engine/render/frame.h"
@@ -6,16 +6,16 @@
 namespace stipple::render {
 
 /// Of what a cut draws in view, whether or not something is in front of it. Areas as they are seen, px.
-struct LotShares {
+struct PrunedShares {
     double strandArea = 0;   ///< of all strands
-    double narrowArea = 0;   ///< of those narrower than a pixel: each of their pixels is drawn by lot
-    double thinnedArea = 0;  ///< of wider ones that stand, as wide as needed, for others which are left out by lot
-    uint64_t discs = 0;      ///< of plants from afar: their places are lots
+    double narrowArea = 0;   ///< of those narrower than a pixel: each of their pixels is pruned
+    double thinnedArea = 0;  ///< of wider ones that stand, as wide as needed, for others which are pruned
+    uint64_t discs = 0;      ///< of plants from afar: their places are stochastic
     double narrowShare() const { return strandArea > 0 ? narrowArea / strandArea : 0; }
     double thinnedShare() const { return strandArea > 0 ? thinnedArea / strandArea : 0; }
 };
 
 /// Of the state's last cut. Reads the chunks of strands again. Error: one that cannot be read.
-Result<LotShares> measureLots(const FrameState& state, const lod::View& view);
+Result<PrunedShares> measurePruning(const FrameState& state, const lod::View& view);
 
 }  // namespace stipple::render
