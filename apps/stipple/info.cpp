@@ -243,7 +243,7 @@ Result<void> run(const Options& o) {
             const auto executor = makeTbbExecutor(0);
             STIPPLE_TRY(lod::verifyStore(store, *executor));
             j["verified"] = true;
-            j["errors_measured"] = !isMixed && !store.hierarchy.isProgressive;
+            j["errors_measured"] = !isMixed && !store.hierarchy.isStochastic;
         }
         if (o.json) {
             printJson("info", j);

@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "apps/stipple/cache.h"
-#include "lod/builder/progressive/progressive_build.h"
+#include "lod/builder/stochastic/stochastic_build.h"
 #include "lod/builder/strands/strand_coverage.h"
 #include "lod/store/nearest.h"
 
@@ -48,16 +48,16 @@ namespace {
 
 constexpr uint64_t kMostSamples = 1048576;
 
-lod::ProgressiveSettings progressiveSettings(const std::string& input) {
-    lod::ProgressiveSettings settings;
+lod::StochasticSettings stochasticSettings(const std::string& input) {
+    lod::StochasticSettings settings;
     settings.description.source = std::filesystem::path(input).filename().string();
     settings.description.up = {0, 1, 0};
     return settings;
 }
 
 /// The whole of some samples, where they are. `of`: the store that they show.
-lod::ProgressiveItem itemOf(const lod::StrandSamples& samples, const lod::Store& of) {
-    lod::ProgressiveItem item;
+lod::StochasticItem itemOf(const lod::StrandSamples& samples, const lod::Store& of) {
+    lod::StochasticItem item;
     item.samples = &samples;
     item.count = static_cast<uint32_t>(samples.points.position.size());
     const lod::Hierarchy& h = of.hierarchy;
@@ -67,8 +67,8 @@ lod::ProgressiveItem itemOf(const lod::StrandSamples& samples, const lod::Store&
 }
 
 /// The same, with a sphere of its own.
-lod::ProgressiveItem itemAlone(const lod::StrandSamples& samples) {
-    lod::ProgressiveItem item;
+lod::StochasticItem itemAlone(const lod::StrandSamples& samples) {
+    lod::StochasticItem item;
     item.samples = &samples;
     item.count = static_cast<uint32_t>(samples.points.position.size());
     glm::dvec3 lo(1e300), hi(-1e300);
@@ -106,14 +106,14 @@ Result<Proxies> strandProxies(const SharedModel& model, const lod::Store& of, co
     const uint64_t segments = of.description.points;
     if (segments < kFewSegments) return Proxies();
     const auto make = [&](const std::string& path, Progress& progress) -> Result<lod::BuildReport> {
-        lod::ProgressiveSettings settings = progressiveSettings(input);
+        lod::StochasticSettings settings = stochasticSettings(input);
         lod::describeDiscs({model->factors()}, settings.description);
         constexpr uint32_t kMostInNode = 8192;
         const std::vector<lod::StrandSamples> parts = lod::splitSamples(model->samples(), kMostInNode);
-        std::vector<lod::ProgressiveItem> items;
+        std::vector<lod::StochasticItem> items;
         items.reserve(parts.size());
         for (const lod::StrandSamples& cube : parts) items.push_back(itemAlone(cube));
-        return lod::buildProgressiveStore(items, path, settings, executor, progress);
+        return lod::buildStochasticStore(items, path, settings, executor, progress);
     };
     render::Proxy proxy;
     STIPPLE_ASSIGN(proxy.store, openCached({input}, build, part + ", proxy", showProgress, make));
@@ -140,10 +140,10 @@ Result<void> GroupBuilder::finish(const std::string& input, const BuildOptions& 
         double area = 0;
         for (const Model& m : models_) area += areaOf(m) * m.count;
         const double aim = static_cast<double>(std::clamp<uint64_t>(kMostPoints / count, 16, 512) * count);
-        std::vector<lod::ProgressiveItem> items;
+        std::vector<lod::StochasticItem> items;
         std::vector<lod::DiscFactors> factors;
         for (const Model& m : models_) {
-            lod::ProgressiveItem item = itemOf(m.model->samples(), *scene.placed[m.first].store);
+            lod::StochasticItem item = itemOf(m.model->samples(), *scene.placed[m.first].store);
             const double share = std::ceil(areaOf(m) * aim / area);
             item.count = static_cast<uint32_t>(std::clamp(share, 1.0, static_cast<double>(item.count)));
             factors.push_back(m.model->factors());
@@ -153,10 +153,10 @@ Result<void> GroupBuilder::finish(const std::string& input, const BuildOptions& 
                 items.push_back(item);
             }
         }
-        lod::ProgressiveSettings settings = progressiveSettings(input);
+        lod::StochasticSettings settings = stochasticSettings(input);
         settings.nodeRecords = kGroupNode;
         lod::describeDiscs(factors, settings.description);
-        return lod::buildProgressiveStore(items, path, settings, executor, progress);
+        return lod::buildStochasticStore(items, path, settings, executor, progress);
     };
     render::PlacedGroup group;
     STIPPLE_ASSIGN(group.points, openCached({input}, build, "instance group", showProgress, make));

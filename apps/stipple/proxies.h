@@ -7,7 +7,7 @@
 
 #include "apps/stipple/common.h"
 #include "engine/scene/triangles.h"
-#include "lod/builder/progressive/progressive_build.h"
+#include "lod/builder/stochastic/stochastic_build.h"
 #include "lod/primitives/strands.h"
 
 namespace stipple::app {
@@ -37,13 +37,13 @@ class StrandModel {
 };
 using SharedModel = std::shared_ptr<StrandModel>;
 
-/// Of strands, which `of` holds: discs, as few as the view allows (lod/builder/progressive). Null where there are few
+/// Of strands, which `of` holds: discs, as few as the view allows (lod/builder/stochastic). Null where there are few
 /// strands.
 Result<Proxies> strandProxies(const SharedModel& model, const lod::Store& of, const std::string& input,
                               const std::string& part, const BuildOptions& build, Executor& executor,
                               bool showProgress);
 
-/// Collects what stands in many places, and makes one progressive store of all of it.
+/// Collects what stands in many places, and makes one stochastic store of all of it.
 class GroupBuilder {
   public:
     /// Placed stores [first, first + count) show `model`.

@@ -65,10 +65,10 @@ inline glm::dvec3 decodeDirection(uint32_t code) {
 inline Disc decodeDisc(const lod::Hierarchy& h, const lod::Node& node, const shared::PointRecord& r) {
     Disc d;
     const double cell = std::ldexp(1.0, static_cast<int>(h.rootLog2) - node.level);
-    const double step = cell / (h.isProgressive ? 32768 : 65536), margin = h.isProgressive ? 0.5 : 0;
+    const double step = cell / (h.isStochastic ? 32768 : 65536), margin = h.isStochastic ? 0.5 : 0;
     const glm::dvec3 q(r.positionXY % 65536, static_cast<double>(r.positionXY / 65536), r.positionZRadiusError % 65536);
     glm::dvec3 lattice = (glm::dvec3(node.cell[0], node.cell[1], node.cell[2]) - margin) * cell + q * step;
-    if (step > 1 && !h.isProgressive) lattice += glm::dvec3((step - 1) / 2);
+    if (step > 1 && !h.isStochastic) lattice += glm::dvec3((step - 1) / 2);
     d.position = h.origin + h.unit * lattice;
     const uint32_t radiusCode = r.positionZRadiusError / 65536 % 256;
     d.errorCode = r.positionZRadiusError / 16777216;

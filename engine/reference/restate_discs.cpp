@@ -67,7 +67,7 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
         const bool few = mayBeWide(h, node, records, v, instance.scale * f.supportScale);
         const double step = h.cellSize(node) / 65536;
         const double spacing =
-            h.isProgressive ? 0 : instance.scale * h.unit * step * double{lod::recordSpacing(records)};
+            h.isStochastic ? 0 : instance.scale * h.unit * step * double{lod::recordSpacing(records)};
         for (uint32_t i = 0; i < cut.count; ++i) {
             Disc disc = decodeDisc(h, node, records[i]);
             disc.radius *= cut.radiusScale;

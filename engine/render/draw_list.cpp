@@ -116,7 +116,7 @@ shared::DrawNode makeDrawNode(const lod::CutDraw& draw, const Bend& bend, const 
     d.count = draw.count;
     d.level = node.level;
     // Times what disc_sizes.h knows. Discs among which any beginning shows the whole have none.
-    d.spacing = h.isProgressive ? 0.0f : static_cast<float>(worldPerStep);
+    d.spacing = h.isStochastic ? 0.0f : static_cast<float>(worldPerStep);
     d.errorPixels = draw.errorPixels;
     return d;
 }

@@ -42,7 +42,7 @@ struct FrameState {
     lod::CutScene scene() const { return {hierarchies, instances, groups}; }
 };
 
-/// Points that may be drawn in another store's stead, and how far they are from it (store units; of a progressive
+/// Points that may be drawn in another store's stead, and how far they are from it (store units; of a stochastic
 /// store: 0, it says so itself).
 struct Proxy {
     std::shared_ptr<const lod::Store> store;
@@ -58,7 +58,7 @@ struct PlacedStore {
 };
 /// Many placed stores that are seen as one from afar, see lod::InstanceGroup.
 struct PlacedGroup {
-    std::shared_ptr<const lod::Store> points;  ///< progressive, world coordinates
+    std::shared_ptr<const lod::Store> points;  ///< stochastic, world coordinates
     std::vector<uint32_t> first, members;      ///< of the nodes of `points`; members count the placed stores
 };
 /// The same store may be placed many times.

@@ -72,7 +72,7 @@ Result<PrunedShares> measurePruning(const FrameState& state, const lod::View& vi
     for (const lod::CutDraw& draw : state.cut.draw) {
         const lod::Instance& instance = state.instances[draw.instance];
         const lod::Hierarchy& h = *state.hierarchies[instance.hierarchy];
-        if (h.isProgressive) shares.discs += draw.count;
+        if (h.isStochastic) shares.discs += draw.count;
         if (lod::kindOf(h, draw.chunk) != lod::Kind::curves) continue;
         STIPPLE_ASSIGN(const lod::Chunk chunk, lod::readChunk(*state.stores[instance.hierarchy], draw.chunk));
         StrandPruning(h, instance, view, shares).add(draw, chunk);

@@ -60,7 +60,7 @@ bool isGoodEnough(const CutFrame& frame, uint32_t proxy, int step) {
     const Hierarchy& h = frame.hierarchyOf(proxy);
     const int32_t epsilon = epsilonOf(frame, h, slot, 0, kInside);
     if (epsilon == kCulled || epsilon == kInside) return false;
-    return allowedAt(epsilon, step) >= (h.isProgressive ? std::exp2(h.finestCode / 8.0) : slot.inputError);
+    return allowedAt(epsilon, step) >= (h.isStochastic ? std::exp2(h.finestCode / 8.0) : slot.inputError);
 }
 
 /// What is drawn for an instance, and what the full cut of that costs, where it was worked out.

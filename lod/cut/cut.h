@@ -49,7 +49,7 @@ struct Instance {
     uint32_t group = kNone;  ///< whose points these are
 };
 
-/// Instances that share coarse nodes: from afar one progressive store (instance `points`) shows all of them, and a leaf
+/// Instances that share coarse nodes: from afar one stochastic store (instance `points`) shows all of them, and a leaf
 /// of it that is not good enough gives way to the instances that it stands for.
 struct InstanceGroup {
     uint32_t points = 0;
@@ -83,7 +83,7 @@ struct CutDraw {
     uint32_t errorCode = 0;   ///< draw records with own error <= this ...
     uint32_t octantMask = 0;  ///< ... and all records of these octants
     float errorPixels = 0;    ///< largest screen-space error among what this node draws
-    float radiusScale = 1;    ///< of a progressive store: discs drawn are larger than stored
+    float radiusScale = 1;    ///< of a stochastic store: discs drawn are larger than stored
 };
 
 /// Clusters of triangles: one run of one group.

@@ -172,9 +172,9 @@ void emitClusters(const CutFrame& frame, uint32_t instance, uint32_t chunk, cons
 CutCost costOfTree(const CutFrame& frame, uint32_t instance, int step, uint64_t most, Counted counted,
                    ActiveMembers* members);
 void emitTree(const CutFrame& frame, uint32_t instance, int step, ActiveMembers& members, Cut& cut);
-CutCost costOfProgressive(const CutFrame& frame, uint32_t instance, int step, uint64_t most, Counted counted,
-                          ActiveMembers* members);
-void emitProgressive(const CutFrame& frame, uint32_t instance, int step, ActiveMembers& members, Cut& cut);
+CutCost costOfStochastic(const CutFrame& frame, uint32_t instance, int step, uint64_t most, Counted counted,
+                         ActiveMembers* members);
+void emitStochastic(const CutFrame& frame, uint32_t instance, int step, ActiveMembers& members, Cut& cut);
 CutCost costOfGraph(const CutFrame& frame, uint32_t instance, int step, uint64_t most, Counted counted,
                     ActiveMembers* members);
 void emitGraph(const CutFrame& frame, uint32_t instance, int step, ActiveMembers& members, Cut& cut);

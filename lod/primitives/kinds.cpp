@@ -18,7 +18,7 @@ std::span<const uint32_t> parentsOfGroup(const Hierarchy& h, uint32_t node) {
 }
 
 constexpr ShapeTraits kTree{"octree", parentOf, costOfTree, emitTree},
-    kProgressive{"progressive", parentOf, costOfProgressive, emitProgressive},
+    kStochastic{"stochastic", parentOf, costOfStochastic, emitStochastic},
     kGraph{"graph", parentsOfGroup, costOfGraph, emitGraph};
 
 }  // namespace
@@ -32,7 +32,7 @@ const KindTraits& traitsOf(Kind kind) {
     return *kTraits.at(static_cast<size_t>(kind));
 }
 
-const ShapeTraits& shapeOf(const Hierarchy& h) { return h.isGraph ? kGraph : h.isProgressive ? kProgressive : kTree; }
+const ShapeTraits& shapeOf(const Hierarchy& h) { return h.isGraph ? kGraph : h.isStochastic ? kStochastic : kTree; }
 
 uint64_t decodedBytes(const Hierarchy& h, uint32_t chunk) {
     if (h.isTile(chunk)) return uint64_t{shared::kTileEdge} * shared::kTileEdge * sizeof(uint32_t);

@@ -1,5 +1,5 @@
 // What kinds of primitives there are: one record each of all that stores, cuts and checks have to know of a kind.
-// Everything else asks this table. (Progressive stores hold points in another order.)
+// Everything else asks this table. (Stochastic stores hold points in another order.)
 #pragma once
 
 #include <limits>
@@ -60,7 +60,7 @@ struct KindTraits {
 const KindTraits& traitsOf(Kind kind);
 inline Kind kindOf(const Hierarchy& h, uint32_t chunk) { return h.payload(chunk).kind; }
 
-/// How the nodes of a store hang together: an octree, an octree of progressive points, a graph of groups.
+/// How the nodes of a store hang together: an octree, an octree of stochastic points, a graph of groups.
 struct ShapeTraits {
     const char* name;
     /// The nodes that must be there before this one is of use.

@@ -169,7 +169,7 @@ Result<void> checkNodes(const Store& store, uint64_t chunksEnd) {
         h.forEachPayload(static_cast<uint32_t>(i), [&](uint32_t chunk) {
             const Payload& p = h.payload(chunk);
             const KindTraits& kind = traitsOf(p.kind);
-            const int bits = h.isProgressive ? 15 : static_cast<int>(kind.cellBits);
+            const int bits = h.isStochastic ? 15 : static_cast<int>(kind.cellBits);
             const int shift = bits == 0 ? 0 : static_cast<int>(h.rootLog2) - n.level - bits;
             fits = fits && p.stepShift == shift && kind.isPossible(h, chunk) && isPossiblePayload(h, chunk, chunksEnd);
         });
@@ -214,7 +214,7 @@ Result<void> checkTables(const Store& store, uint64_t chunksEnd) {
     if (!isPossibleSpace(store.hierarchy, store.description)) return bad("its coordinates are not possible");
     if (h.isStrands != store.description.isStrands) return bad("is not of the kind that it says it is");
     const bool isPoints = !h.isMixed && h.nodes[0].kind == Kind::points;
-    if (h.isProgressive && !isPoints) return bad("holds progressive points and something else");
+    if (h.isStochastic && !isPoints) return bad("holds stochastic points and something else");
     if (h.isGraph && (h.isMixed || h.groups.size() != h.nodes.size()))
         return bad("the groups of the mesh are not possible");
     uint64_t groups = 0;

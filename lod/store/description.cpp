@@ -115,7 +115,7 @@ json toJson(const StoreDescription& d) {
                 {"has_colour", d.hasColour},
                 {"is_reflectance", d.isReflectance},
                 {"is_strands", d.isStrands},
-                {"is_progressive", d.isProgressive},
+                {"is_progressive", d.isStochastic},
                 {"disc_factors", d.discFactors},
                 {"smallest_disc", d.smallestDisc},
                 {"has_normals", d.hasNormals},
@@ -179,7 +179,7 @@ StoreDescription fromJson(const json& j) {
     d.isReflectance = j.at("is_reflectance").get<bool>();
     d.isStrands = j.at("is_strands").get<bool>();
     d.isRigid = j.value("is_rigid", false);
-    d.isProgressive = j.at("is_progressive").get<bool>();
+    d.isStochastic = j.at("is_progressive").get<bool>();
     for (const json& factor : j.at("disc_factors")) d.discFactors.push_back(real(factor));
     d.smallestDisc = j.at("smallest_disc").get<double>();
     d.hasNormals = j.at("has_normals").get<bool>();

@@ -27,8 +27,8 @@ struct StoreDescription {
     bool isReflectance = false;             ///< those are of the material, to be lit
     bool isStrands = false;                 ///< ribbons and tubes: points count segments
     bool isRigid = false;                   ///< wind does not bend it: curves of what is no plant
-    bool isProgressive = false;             ///< see Hierarchy::isProgressive
-    std::vector<float> discFactors;         ///< of a progressive store, see Hierarchy
+    bool isStochastic = false;              ///< see Hierarchy::isStochastic
+    std::vector<float> discFactors;         ///< of a stochastic store, see Hierarchy
     double smallestDisc = 0;                ///< world units
     bool hasNormals = false;                ///< from the file or estimated
     std::vector<shared::SurfaceMaterial> materials;  ///< of a mesh store

@@ -87,7 +87,7 @@ struct Hierarchy {
     bool isRigid = false;    ///< such that wind does not bend
     /// Records of a node are discs of one size, in an order in which any beginning shows the whole: n of them stand for
     /// all, sqrt(records / n) times as large. Error codes are those of the radius.
-    bool isProgressive = false;
+    bool isStochastic = false;
     uint8_t finestCode = 0;  ///< largest error code of a leaf of such a store
     /// Of such a store: discs of nominal radius smallestDisc * 2^(k/2) are drawn discFactors[k] times as large (so that
     /// they cover as much as what they stand for); between and beyond, the nearest do.
@@ -102,7 +102,7 @@ struct Hierarchy {
         return discFactors[k] + u * (discFactors[std::min(k + 1, discFactors.size() - 1)] - discFactors[k]);
     }
     /// Cells of records reach beyond those of nodes: by half a cell on each side.
-    bool hasOverlappingCells() const { return isStrands || isProgressive; }
+    bool hasOverlappingCells() const { return isStrands || isStochastic; }
     bool isMesh() const { return isGraph; }
 
     // A CHUNK is what is loaded at once: of node n its first payload is chunk n; then come the tiles of textures, then

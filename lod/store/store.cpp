@@ -201,7 +201,7 @@ Result<Store> openStore(const std::string& path) {
     STIPPLE_TRY(readTables(*store.file, head, store));
     Hierarchy& h = store.hierarchy;
     h.isRigid = store.description.isRigid;
-    h.isProgressive = store.description.isProgressive;
+    h.isStochastic = store.description.isStochastic;
     for (const Node& n : h.nodes)
         if (n.isLeaf()) h.finestCode = std::max(h.finestCode, n.errorCode);
     h.discFactors = store.description.discFactors;

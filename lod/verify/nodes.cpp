@@ -66,7 +66,7 @@ std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
             if (!(glm::length(r.places.at(k) - node.centre) + r.radii.at(k) <= node.radius * (1 + 1e-9) + 1e-6))
                 return "a record reaches out of the bounding sphere";
         // Only exact records may stand in an octant without a child.
-        if (!h.isProgressive && r.code > 0 && node.childMask != 0 && (r.octants & ~uint32_t{node.childMask}) != 0)
+        if (!h.isStochastic && r.code > 0 && node.childMask != 0 && (r.octants & ~uint32_t{node.childMask}) != 0)
             return "a record has an error but its octant has no child";
     }
     if (!h.hasOverlappingCells() && node.normalConeCosine > 0) {  // see facesAway
@@ -80,7 +80,7 @@ std::string checkNode(const Hierarchy& h, uint32_t index, const Chunk& chunk) {
                 return "a normal is outside the node's cone";
         }
     }
-    if (!h.isProgressive && node.isLeaf() && largest != 0) return "a leaf record has an error";
+    if (!h.isStochastic && node.isLeaf() && largest != 0) return "a leaf record has an error";
     if (largest != payload.errorCode) return "the largest error is not the one in the node table";
     uint32_t left = payload.records;
     for (uint32_t code = 0; code < 256; ++code) {

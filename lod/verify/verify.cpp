@@ -29,7 +29,7 @@ Result<void> verifyPayload(const Store& store, uint32_t index, uint64_t discs, C
     if (std::string text = kind.check(h, index, chunk); !text.empty())
         return fail(ErrorKind::input, std::move(text), fmt::format("{}: node {}", store.path, h.nodeOf(index)),
                     "this is a fault of the build; please report it with the input");
-    if (!h.isProgressive && !h.isMixed) {
+    if (!h.isStochastic && !h.isMixed) {
         STIPPLE_ASSIGN(const uint64_t measured, kind.measure(store, index, chunk, discs));
         counts.measured += measured;
     }

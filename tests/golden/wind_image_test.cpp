@@ -238,7 +238,7 @@ TEST_F(Gale, StaysWithinWhatIsStatedOfIt) {
                     // An error of the calm tree is longer in the wind, and still what was asked for.
                     const double step = instance.scale * h.unit;
                     double error = step * h.errors.decode(std::min(draw.errorCode, lod::ErrorScale::kLargest));
-                    if (h.isProgressive) {  // of discs their radius; those of a node drawn whole are what there is
+                    if (h.isStochastic) {  // of discs their radius; those of a node drawn whole are what there is
                         const lod::Node& node = h.nodes[draw.node];
                         if (draw.count == node.records) continue;
                         error = step * h.errors.smallest * std::exp2(node.errorCode / 8.0) *

@@ -1,4 +1,4 @@
-// Progressive stores and instance groups attacked: any beginning stands for the whole, every member is drawn exactly
+// Stochastic stores and instance groups attacked: any beginning stands for the whole, every member is drawn exactly
 // once whatever is resident, discs are no larger than the error allows.
 #include <gtest/gtest.h>
 

@@ -23,22 +23,22 @@ Forest plantForest(const std::string& folder, uint32_t side, Executor& executor)
     f.tree = oak(3000);
     f.strands = buildStrands(f.tree, folder + "/tree.stipple", executor, 512);
     f.samples = lod::sampleStrands(f.tree, 8192);
-    lod::ProgressiveSettings settings;
+    lod::StochasticSettings settings;
     settings.description.up = {0, 1, 0};
     lod::describeDiscs({{lod::coverageFactors(f.tree, f.samples, executor), f.samples.radius}}, settings.description);
     const lod::Hierarchy& h = f.strands->hierarchy;
-    lod::ProgressiveItem item;
+    lod::StochasticItem item;
     item.samples = &f.samples;
     item.count = static_cast<uint32_t>(f.samples.points.position.size());
     item.centre = h.origin + h.unit * h.nodes[0].centre;
     item.reach = h.unit * h.nodes[0].radius;
     Progress progress(false);
     const std::string afar = folder + "/afar.stipple", group = folder + "/group.stipple";
-    EXPECT_TRUE(lod::buildProgressiveStore({item}, afar, settings, executor, progress));
+    EXPECT_TRUE(lod::buildStochasticStore({item}, afar, settings, executor, progress));
     f.afar = std::make_shared<const lod::Store>(*lod::openStore(afar));
     const auto proxies = std::make_shared<const std::vector<render::Proxy>>(std::vector{render::Proxy{f.afar, 0}});
     Rng rng(11);
-    std::vector<lod::ProgressiveItem> items;
+    std::vector<lod::StochasticItem> items;
     item.count = 128;
     for (uint32_t k = 0; k < side * side; ++k) {
         const double x = 8.0 * (k % side + rng.uniform(-0.2, 0.2)),
@@ -53,7 +53,7 @@ Forest plantForest(const std::string& folder, uint32_t side, Executor& executor)
         f.placed.push_back(tree);
     }
     settings.nodeRecords = 1024;
-    EXPECT_TRUE(lod::buildProgressiveStore(items, group, settings, executor, progress));
+    EXPECT_TRUE(lod::buildStochasticStore(items, group, settings, executor, progress));
     render::PlacedGroup c;
     c.points = std::make_shared<const lod::Store>(*lod::openStore(group));
     std::vector<std::vector<uint32_t>> members(c.points->hierarchy.nodes.size());

@@ -1,7 +1,7 @@
 // A small forest for the tests: one tree that stands in many places, with proxies of it.
 #pragma once
 
-#include "lod/builder/progressive/progressive_build.h"
+#include "lod/builder/stochastic/stochastic_build.h"
 #include "tests/support/strands.h"
 
 namespace stipple::test {

@@ -1,6 +1,6 @@
 #include <stdexcept>
 
-#include "lod/builder/progressive/progressive_build.h"
+#include "lod/builder/stochastic/stochastic_build.h"
 #include "tests/support/crafted_store.h"
 #include "tests/support/meshes.h"
 #include "tests/support/mixed_store.h"
@@ -54,15 +54,15 @@ std::vector<std::string> smallStores(const std::string& folder) {
     const lod::StrandSet set = curls({.count = 60, .vertices = 30});
     buildStrands(set, strands, *executor, 64);
     const lod::StrandSamples samples = lod::sampleStrands(set, 2000);
-    lod::ProgressiveSettings far;
+    lod::StochasticSettings far;
     far.nodeRecords = 64;
-    std::vector<lod::ProgressiveItem> items;
+    std::vector<lod::StochasticItem> items;
     for (int k = 0; k < 27; ++k) {
-        lod::ProgressiveItem item{&samples, 300, {}, glm::dvec3(0), 2};
+        lod::StochasticItem item{&samples, 300, {}, glm::dvec3(0), 2};
         item.place.translation = glm::dvec3(5 * (k % 3), 5 * (k / 3 % 3), 5 * (k / 9));
         items.push_back(item);
     }
-    if (const auto built = lod::buildProgressiveStore(items, afar, far, *executor, silent); !built)
+    if (const auto built = lod::buildStochasticStore(items, afar, far, *executor, silent); !built)
         throw std::runtime_error(built.error().line());
     writeMixedStore(folder + "/mixed.stipple");
     return {points, mesh, strands, afar, wide, folder + "/mixed.stipple"};

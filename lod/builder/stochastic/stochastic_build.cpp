@@ -1,5 +1,5 @@
-// A progressive build as a straight line.
-#include "lod/builder/progressive/progressive_build.h"
+// A stochastic build as a straight line.
+#include "lod/builder/stochastic/stochastic_build.h"
 
 #include <algorithm>
 #include <cmath>
@@ -35,13 +35,13 @@ uint32_t octantOf(const glm::dvec3& lattice, uint32_t level) {
     return octant;
 }
 
-class ProgressiveBuilder {
+class StochasticBuilder {
   public:
-    ProgressiveBuilder(const std::vector<ProgressiveItem>& items, const ProgressiveSettings& settings)
+    StochasticBuilder(const std::vector<StochasticItem>& items, const StochasticSettings& settings)
         : items_(items), settings_(settings) {
         glm::dvec3 lo(1e300), hi(-1e300);
         double reach = 0;
-        for (const ProgressiveItem& item : items) {
+        for (const StochasticItem& item : items) {
             const glm::dvec3 c = placed(item.place, item.centre);
             lo = glm::min(lo, c);
             hi = glm::max(hi, c);
@@ -50,7 +50,7 @@ class ProgressiveBuilder {
         boundsMin = lo - reach;
         boundsMax = hi + reach;
         const double extent = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z, 2.02 * reach, 1e-30});
-        h.isProgressive = true;
+        h.isStochastic = true;
         h.rootLog2 = kRootLog2;
         h.unit = std::exp2(std::floor(std::log2(extent)) + 1 - kRootLog2);
         h.origin = lo;
@@ -165,7 +165,7 @@ class ProgressiveBuilder {
             for (uint32_t r = 0; r < items_[k].count; ++r) at.push_back({(r + 0.5) / items_[k].count, k, r});
         std::stable_sort(at.begin(), at.end(), [](const At& a, const At& b) { return a.share < b.share; });
         for (const At& a : at) {
-            const ProgressiveItem& item = items_[a.item];
+            const StochasticItem& item = items_[a.item];
             const PointBlock& from = item.samples->points;
             const double all = static_cast<double>(from.position.size());
             out.push_back({(placed(item.place, from.position[a.rank]) - h.origin) / h.unit,
@@ -232,8 +232,8 @@ class ProgressiveBuilder {
         return encodeChunk(chunk);
     }
 
-    const std::vector<ProgressiveItem>& items_;
-    const ProgressiveSettings& settings_;
+    const std::vector<StochasticItem>& items_;
+    const StochasticSettings& settings_;
     std::vector<std::vector<uint32_t>> of_;  ///< items of each leaf
     double smallestCell_ = 0;
 };
@@ -274,22 +274,22 @@ uint32_t leafOf(const Hierarchy& h, const glm::dvec3& centre) {
     return index;
 }
 
-Result<BuildReport> buildProgressiveStore(const std::vector<ProgressiveItem>& items, const std::string& output,
-                                          const ProgressiveSettings& settings, Executor& executor, Progress& progress) {
+Result<BuildReport> buildStochasticStore(const std::vector<StochasticItem>& items, const std::string& output,
+                                         const StochasticSettings& settings, Executor& executor, Progress& progress) {
     BuildReport report;
     StageClock clock(report);
     if (items.empty()) return fail(ErrorKind::input, "holds nothing to sample", settings.description.source);
     STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output));
-    for (const ProgressiveItem& item : items) report.pointsIn += item.count;
+    for (const StochasticItem& item : items) report.pointsIn += item.count;
     progress.update("samples", 0, report.pointsIn);
-    ProgressiveBuilder builder(items, settings);
+    StochasticBuilder builder(items, settings);
     builder.partition();
     Samples root;
     STIPPLE_TRY(builder.write(0, writer, root));
     builder.count();
     clock.ends("samples");
     StoreDescription description = settings.description;
-    description.isProgressive = description.hasColour = description.hasNormals = description.isReflectance = true;
+    description.isStochastic = description.hasColour = description.hasNormals = description.isReflectance = true;
     description.points = report.pointsOut = builder.leafRecords;
     description.records = report.records = builder.records;
     description.boundsMin = description.focusMin = builder.boundsMin;

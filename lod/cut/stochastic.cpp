@@ -1,4 +1,4 @@
-// The cut of progressive points: the first records of a node, as many as their discs have to be small. A node that is
+// The cut of stochastic points: the first records of a node, as many as their discs have to be small. A node that is
 // too coarse even with all of them gives way to its children, a leaf that shows an instance group to its members.
 #include <algorithm>
 
@@ -7,7 +7,7 @@
 namespace stipple::lod {
 namespace {
 
-/// What to do with a node of a progressive store.
+/// What to do with a node of a stochastic store.
 struct Progress {
     enum class Kind { unseen, drawn, members, children } kind = Kind::unseen;
     uint32_t count = 0;  ///< drawn: first records
@@ -62,7 +62,7 @@ enum class Next { inside, beside, end };
 
 /// Calls use(index, progress) for every node that is looked at, parents first.
 template <typename Use>
-void walkProgressive(const CutFrame& frame, uint32_t i, int step, const Use& use) {
+void walkStochastic(const CutFrame& frame, uint32_t i, int step, const Use& use) {
     const Hierarchy& h = frame.hierarchyOf(i);
     const CutScratch::Slot& slot = slotOf(frame, i);
     auto& stack = frame.scratch.stack;
@@ -81,13 +81,13 @@ void walkProgressive(const CutFrame& frame, uint32_t i, int step, const Use& use
 
 }  // namespace
 
-CutCost costOfProgressive(const CutFrame& frame, uint32_t i, int step, uint64_t most, Counted counted,
-                          ActiveMembers* members) {
+CutCost costOfStochastic(const CutFrame& frame, uint32_t i, int step, uint64_t most, Counted counted,
+                         ActiveMembers* members) {
     const Hierarchy& h = frame.hierarchyOf(i);
     const std::vector<uint8_t>& drawable = frame.drawableOf(i);
     const CutScratch::Slot& slot = slotOf(frame, i);
     CutCost cost;
-    walkProgressive(frame, i, step, [&](uint32_t index, const Progress& p) {
+    walkStochastic(frame, i, step, [&](uint32_t index, const Progress& p) {
         if (p.kind == Progress::Kind::unseen) return Next::beside;
         if (p.kind == Progress::Kind::members) {
             if (members) members->activate(frame.scene.groups[frame.instance(i).group], index);
@@ -109,7 +109,7 @@ CutCost costOfProgressive(const CutFrame& frame, uint32_t i, int step, uint64_t 
     return cost;
 }
 
-void emitProgressive(const CutFrame& frame, uint32_t i, int step, ActiveMembers& members, Cut& cut) {
+void emitStochastic(const CutFrame& frame, uint32_t i, int step, ActiveMembers& members, Cut& cut) {
     const Hierarchy& h = frame.hierarchyOf(i);
     const CutScratch::Slot& slot = slotOf(frame, i);
     const uint32_t source = frame.instance(i).source;
@@ -130,7 +130,7 @@ void emitProgressive(const CutFrame& frame, uint32_t i, int step, ActiveMembers&
         // Of a node that is drawn whole and too coarse all the same.
         if (count == h.nodes[index].records) cut.tauEffective = std::max(cut.tauEffective, pixels);
     };
-    walkProgressive(frame, i, step, [&](uint32_t index, const Progress& p) {
+    walkStochastic(frame, i, step, [&](uint32_t index, const Progress& p) {
         ++cut.counters.nodesVisited;
         if (p.kind == Progress::Kind::unseen) {
             ++cut.counters.nodesCulled;

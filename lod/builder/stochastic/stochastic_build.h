@@ -1,4 +1,4 @@
-// One build of a progressive store: from samples that stand in many places to a verified file.
+// One build of a stochastic store: from samples that stand in many places to a verified file.
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@ namespace stipple::lod {
 
 /// The first `count` of some samples (larger discs then), in some place. `centre` and `reach`: a sphere round all of
 /// them, before they are placed.
-struct ProgressiveItem {
+struct StochasticItem {
     const StrandSamples* samples = nullptr;
     uint32_t count = 0;
     Instance place;
@@ -21,7 +21,7 @@ struct ProgressiveItem {
     double reach = 0;
 };
 
-struct ProgressiveSettings {
+struct StochasticSettings {
     uint32_t nodeRecords = 8192;  ///< of a node that shows several items
     StoreDescription description;
 };
@@ -36,10 +36,10 @@ void describeDiscs(const std::vector<DiscFactors>& models, StoreDescription& des
 
 /// Writes `output` (whole or not at all): an octree of the items' centres, whose leaves hold the samples of their items
 /// and whose inner nodes a share of those of their children, larger. The same input gives the same bytes.
-Result<BuildReport> buildProgressiveStore(const std::vector<ProgressiveItem>& items, const std::string& output,
-                                          const ProgressiveSettings& settings, Executor& executor, Progress& progress);
+Result<BuildReport> buildStochasticStore(const std::vector<StochasticItem>& items, const std::string& output,
+                                         const StochasticSettings& settings, Executor& executor, Progress& progress);
 
-/// The leaf of a progressive store that shows an item with this centre (placed, world units).
+/// The leaf of a stochastic store that shows an item with this centre (placed, world units).
 uint32_t leafOf(const Hierarchy& h, const glm::dvec3& centre);
 
 }  // namespace stipple::lod
