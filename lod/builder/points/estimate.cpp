@@ -159,7 +159,7 @@ class Estimator : Surroundings<K> {
             const K key = keys_[placeBegin_[j]] >> windowShift;
             size_t next = j + 1;
             while (next < n && keys_[placeBegin_[next]] >> windowShift == key) ++next;
-            seen_.gather(seen_[j].cell, across, kMostInThree, hood_);
+            seen_.gather(seen_[j].cell, across, kMostInThree, neighbourhood_);
             places_.clear();
             for (size_t k = j; k < next; ++k) places_.push_back(seen_[k].at);
             Window at;
@@ -169,7 +169,7 @@ class Estimator : Surroundings<K> {
             at.across = across;
             at.widestGap = isClustered ? kCrowdsGap : 0.0f;
             measure(at);
-            if (window > coarsestWindow() && (hood_.count <= kNeighbours || at.isLine))
+            if (window > coarsestWindow() && (neighbourhood_.count <= kNeighbours || at.isLine))
                 largerWindow(j, next, window, at);
             give(j, next, at);
             j = next;
@@ -180,29 +180,29 @@ class Estimator : Surroundings<K> {
     /// Are the first `n` places seen, a block's own, a sheet as a whole? Then it may be noise that makes windows thick.
     bool isSheet(size_t n) {
         if (n < kEnoughOfSheet) return false;
-        hood_.count = 0;
-        for (size_t j = 0; j < n; ++j) hood_.add(seen_[j].at);
-        return !spreadOfHood(seen_[0].at).isThick(kSheet);
+        neighbourhood_.count = 0;
+        for (size_t j = 0; j < n; ++j) neighbourhood_.add(seen_[j].at);
+        return !spreadOfNeighbourhood(seen_[0].at).isThick(kSheet);
     }
 
-    /// Where a hood came from, and how it is spread.
+    /// Where a neighbourhood came from, and how it is spread.
     struct Window {
-        float edge = 1;           ///< lattice units; all lengths in hoods are in units of it
+        float edge = 1;           ///< lattice units; all lengths in neighbourhoods are in units of it
         bool mayBeAlone = false;  ///< its points
         size_t cell = 0;
-        uint32_t across = 0;  ///< 0: a larger window, of which the hood is all there is
+        uint32_t across = 0;  ///< 0: a larger window, of which the neighbourhood is all there is
         Spread spread;
         bool isLine = false, isFlat = false, isBent = false;
         float widestGap = 0;  ///< between its neighbours, if they are not spread evenly; 0: they are
     };
-    /// Of all in the hood. `p`: one of them.
-    Spread spreadOfHood(const glm::vec3& p) {
-        squared_.assign((hood_.count + kSelectLanes) / kSelectLanes * kSelectLanes, kNothing);
-        std::fill_n(squared_.begin(), hood_.count, 0);
-        return spreadOf(hood_.neighbours(), {p.x, p.y, p.z}, squared_.data(), 0);
+    /// Of all in the neighbourhood. `p`: one of them.
+    Spread spreadOfNeighbourhood(const glm::vec3& p) {
+        squared_.assign((neighbourhood_.count + kSelectLanes) / kSelectLanes * kSelectLanes, kNothing);
+        std::fill_n(squared_.begin(), neighbourhood_.count, 0);
+        return spreadOf(neighbourhood_.neighbours(), {p.x, p.y, p.z}, squared_.data(), 0);
     }
     void measure(Window& window) {
-        window.spread = spreadOfHood(places_.front());
+        window.spread = spreadOfNeighbourhood(places_.front());
         window.isLine = window.spread.isLine(roundingIn(window.edge), kSlim);
         window.isFlat = window.spread.least < kFlat * window.spread.middle;
         window.isBent = !(window.spread.least < kBent * window.spread.middle);
@@ -226,19 +226,21 @@ class Estimator : Surroundings<K> {
         bool isKept = false;
         const auto keep = [&] {  // a line, if nothing lies beside it
             isKept = true;
-            std::swap(hood_, lineHood_);
+            std::swap(neighbourhood_, lineNeighbourhood_);
             std::swap(places_, linePlaces_);
             lineWindow_ = window;
         };
-        if (hood_.count > kNeighbours) keep();
-        hood_.count = 0;
-        for (uint32_t across = 0; level > coarsestWindow() && (hood_.count <= kNeighbours || across < kAcrossLines);) {
+        if (neighbourhood_.count > kNeighbours) keep();
+        neighbourhood_.count = 0;
+        for (uint32_t across = 0;
+             level > coarsestWindow() && (neighbourhood_.count <= kNeighbours || across < kAcrossLines);) {
             --level;
             size = static_cast<int64_t>(frame_.cellSize(level));
             box = boxOf(keys_[first], level);
-            hood_.count = 0;
-            forNeighbourhood(keys_[first], level, size, true,
-                             OncePerPlace{[&](int64_t x, int64_t y, int64_t z) { hood_.add(localOf(x, y, z)); }});
+            neighbourhood_.count = 0;
+            forNeighbourhood(keys_[first], level, size, true, OncePerPlace{[&](int64_t x, int64_t y, int64_t z) {
+                                 neighbourhood_.add(localOf(x, y, z));
+                             }});
             places_.clear();
             for (size_t j = begin; j < end; ++j) {
                 const size_t i = placeBegin_[j];
@@ -246,13 +248,13 @@ class Estimator : Surroundings<K> {
             }
             window.edge = static_cast<float>(size);
             measure(window);
-            if (hood_.count <= kNeighbours) continue;
+            if (neighbourhood_.count <= kNeighbours) continue;
             if (!window.isLine) break;
             if (!isKept) keep();
             ++across;
         }
         if (window.isLine && isKept) {
-            std::swap(hood_, lineHood_);
+            std::swap(neighbourhood_, lineNeighbourhood_);
             std::swap(places_, linePlaces_);
             window = lineWindow_;
             return;
@@ -261,10 +263,10 @@ class Estimator : Surroundings<K> {
         window.across = 0;
     }
 
-    /// Places [begin, end), whose coordinates are in places_, from the hood.
+    /// Places [begin, end), whose coordinates are in places_, from the neighbourhood.
     void give(size_t begin, size_t end, const Window& window) {
-        const size_t n = hood_.count, rank = std::min(kNeighbours, n - 1);  // the point itself comes first
-        const Neighbours all = hood_.neighbours();
+        const size_t n = neighbourhood_.count, rank = std::min(kNeighbours, n - 1);  // the point itself comes first
+        const Neighbours all = neighbourhood_.neighbours();
         const bool hasOwnNormals = settings_.isFine || window.isBent, isEach = hasOwnNormals || window.mayBeAlone;
         squared_.resize(n + kSelectLanes);
         // Of a rectangle's points that are spread evenly: variances are 1/12 of its sides squared.
@@ -351,9 +353,9 @@ class Estimator : Surroundings<K> {
         glm::vec3 first = axis, second = across;
         if (isUneven) {
             // The cells are narrow: the directions have to fit them.
-            squaredDistances(hood_.x.data(), hood_.y.data(), hood_.z.data(), hood_.count, {p.x, p.y, p.z},
-                             squared_.data());
-            const Spread near = spreadOf(hood_.neighbours(), {p.x, p.y, p.z}, squared_.data(), squaredReach);
+            squaredDistances(neighbourhood_.x.data(), neighbourhood_.y.data(), neighbourhood_.z.data(),
+                             neighbourhood_.count, {p.x, p.y, p.z}, squared_.data());
+            const Spread near = spreadOf(neighbourhood_.neighbours(), {p.x, p.y, p.z}, squared_.data(), squaredReach);
             const glm::vec3& along = near.along;
             isUneven = near.middle < kSlimOfFew * near.most || evenly > 2 * nearer;
             const glm::vec3 flat = glm::dot(along, axis) * axis + glm::dot(along, across) * across;
@@ -364,21 +366,23 @@ class Estimator : Surroundings<K> {
         }
         if (isUneven) most = std::max(most, std::min(kAcrossGap * evenly, kAcrossMost));
         std::array<float, kDirections> inverse =
-            inverseExtents(hood_.neighbours(), {p.x, p.y, p.z}, first, second, most);
+            inverseExtents(neighbourhood_.neighbours(), {p.x, p.y, p.z}, first, second, most);
         if (isLine)  // only the two along it count
             for (size_t k = 0; k < kDirections; ++k)
                 if (k % (kDirections / 2) != 0) inverse.at(k) = 3.4e38f;
         float radius = kOverlap * farthestCorner(inverse, most, isUneven || isLine || window.widestGap > 0);
         if (!(radius > 0)) radius = kPlain * spacing;
-        isStray_ =
-            window.mayBeAlone && settings_.limitStrays && rank == kNeighbours && isAlone(hood_.count, squaredReach);
+        isStray_ = window.mayBeAlone && settings_.limitStrays && rank == kNeighbours &&
+                   isAlone(neighbourhood_.count, squaredReach);
         if (isStray_) radius = std::min(radius, kAloneSpacings * kSpacings * spacingOfOthers(window, squaredReach));
         return radius * window.edge;
     }
-    /// Of a point whose squared distances to the hood are in squared_ and which may be no part of a surface: `radius`
-    /// (lattice units) as far as the next few others are. Returns flags. `near`: how the twelve nearest are spread.
+    /// Of a point whose squared distances to the neighbourhood are in squared_ and which may be no part of a surface:
+    /// `radius` (lattice units) as far as the next few others are. Returns flags. `near`: how the twelve nearest are
+    /// spread.
     uint32_t limitToNearest(float& radius, float squaredReach, const Window& window, const Spread& near) const {
-        const float squared = smallestAtRank(squared_.data(), hood_.count, kFewNearest, kFewOfReach * squaredReach);
+        const float squared =
+            smallestAtRank(squared_.data(), neighbourhood_.count, kFewNearest, kFewOfReach * squaredReach);
         const float others = std::sqrt(squared) * window.edge;
         const bool isVolume =
             window.spread.isThick(kThick) || (window.spread.isThick(kThickish) && near.isThick(kThick));
@@ -388,23 +392,23 @@ class Estimator : Surroundings<K> {
         radius = std::min(radius, (isVolume ? kAmongLeaves : kAcrossBend) * others);
         return (isLeafy || isLeafLike ? shared::kFlagScattered : 0u) | (isLeafLike ? shared::kFlagLeaf : 0u);
     }
-    /// Of a point whose squared distances to the hood are in squared_: are fewer than three others near it?
+    /// Of a point whose squared distances to the neighbourhood are in squared_: are fewer than three others near it?
     bool isAlone(size_t n, float squaredReach) const {
         return smallestAtRank(squared_.data(), n, kCompanions, kNear2 * squaredReach) > kNear2 * squaredReach;
     }
-    /// The median spacing of such a point's neighbours, in the hood's units: pi d^2 holds four of them. (The hood
-    /// itself may hold only some of many points, see gather.)
+    /// The median spacing of such a point's neighbours, in the neighbourhood's units: pi d^2 holds four of them. (The
+    /// neighbourhood itself may hold only some of many points, see gather.)
     float spacingOfOthers(const Window& window, float squaredReach) {
         if (window.across > 0) seen_.gather(window.cell, window.across, ~0u, others_);
-        const Hood& all = window.across > 0 ? others_ : hood_;
+        const Neighbourhood& all = window.across > 0 ? others_ : neighbourhood_;
         const size_t n = all.count;
         squaredOfOther_.resize(n + kSelectLanes);
         spacings_.clear();
-        for (size_t k = 0; k < hood_.count; ++k) {
+        for (size_t k = 0; k < neighbourhood_.count; ++k) {
             const float squared = std::bit_cast<float>(squared_[k]);
             if (!(squared > 0) || squared > squaredReach) continue;
-            squaredDistances(all.x.data(), all.y.data(), all.z.data(), n, {hood_.x[k], hood_.y[k], hood_.z[k]},
-                             squaredOfOther_.data());
+            squaredDistances(all.x.data(), all.y.data(), all.z.data(), n,
+                             {neighbourhood_.x[k], neighbourhood_.y[k], neighbourhood_.z[k]}, squaredOfOther_.data());
             spacings_.push_back(smallestAtRank(squaredOfOther_.data(), n, kOfOthers, 0));
         }
         if (spacings_.empty()) return 3.4e38f;
@@ -417,7 +421,7 @@ class Estimator : Surroundings<K> {
     bool isSheet_ = false;  ///< the block
     bool isStray_ = false;  ///< the point that radiusAt saw last
     Seen seen_;             ///< by the block: its own points first
-    Hood hood_, others_, lineHood_;
+    Neighbourhood neighbourhood_, others_, lineNeighbourhood_;
     std::vector<int32_t> squared_, squaredOfOther_;  ///< bits of floats
     std::vector<float> spacings_;
     std::vector<size_t> placeBegin_;  ///< of the block's own places, the first point of each, and the end

@@ -53,7 +53,7 @@ class Seen {
     }
 
     /// The places of a cell and its neighbours; of more than `most` in three cells only some.
-    void gather(size_t cell, uint32_t across, uint32_t most, Hood& to) const {
+    void gather(size_t cell, uint32_t across, uint32_t most, Neighbourhood& to) const {
         std::array<std::pair<uint32_t, uint32_t>, 9> runs;
         size_t all = 0;
         for (size_t row = 0; row < 9; ++row) {  // three cells in x lie side by side

@@ -27,7 +27,7 @@ constexpr double kThin = 0.02;    ///< second variance over the first: a line, w
 constexpr double kRound = 12.0;   ///< second variance over the third, of a line with noise at most
 constexpr double kRoundings = 4;  ///< second variance over that of rounding
 
-constexpr size_t kNearest = 3;  ///< vectors of a hood, after which hardly anything comes nearer
+constexpr size_t kNearest = 3;  ///< vectors of a neighbourhood, after which hardly anything comes nearer
 constexpr float kSteep = 0.5f;
 constexpr float kSteepest = 1.5867f;
 
@@ -86,7 +86,7 @@ STIPPLE_WIDE static void addUp(const Neighbours& all, const float (&from)[3], co
 }
 
 /// Neighbours that cannot raise the least value above `floor` are left out, which most cannot once the nearest ones
-/// are in: those lie in the middle of a hood.
+/// are in: those lie in the middle of a neighbourhood.
 STIPPLE_WIDE static void supports(const Neighbours& all, const float (&from)[3], const float (&axis)[3],
                                   const float (&across)[3], float floor, int32_t* out) {
     // The first half of the directions; the others are opposite.

@@ -12,14 +12,14 @@
 
 namespace stipple::lod {
 
-/// Hood of neighbours, parallel; each with room for whole vectors of kSelectLanes.
+/// Neighbourhood of neighbours, parallel; each with room for whole vectors of kSelectLanes.
 struct Neighbours {
     const float *x, *y, *z;
     size_t count;
 };
 
 /// Neighbours as they are found.
-struct Hood {
+struct Neighbourhood {
     std::vector<float> x, y, z;  ///< whole vectors
     size_t count = 0;
     void resize(size_t n) {
