@@ -147,7 +147,7 @@ class PointBuild {
         constexpr uint64_t kFixed = uint64_t{72} << 20, kReader = uint64_t{12} << 20;
         const auto fixedFor = [&](uint64_t threads) { return kFixed + threads * kReader; };
         const auto leastFor = [&](uint64_t threads) {
-            return fixedFor(threads) + (threads + 1) * kAtomPoints * pointBytes() + input_.declared() / 2;
+            return fixedFor(threads) + (threads + 1) * kSubtreePoints * pointBytes() + input_.declared() / 2;
         };
         // Fewer threads rather than more memory.
         while (workers_ > 1 && leastFor(static_cast<uint64_t>(workers_)) > settings_.memoryBytes) --workers_;
@@ -166,13 +166,13 @@ class PointBuild {
             return std::min<uint64_t>(bytes / ((workers + 1) * pointBytes()), uint64_t{1} << 20);
         };
         // (Half of the memory at most: what neighbours see, buffers and the allocator's own losses come on top.)
-        memory_.isOnDisk = 2 * all + (workers + 1) * kAtomPoints * pointBytes() > room && small > room + fixed;
+        memory_.isOnDisk = 2 * all + (workers + 1) * kSubtreePoints * pointBytes() > room && small > room + fixed;
         memory_.bufferBytes = std::min<uint64_t>(room / 8, uint64_t{64} << 20);
         memory_.bucketPoints = bucketOf(memory_.isOnDisk ? room / 2 : room / 4);
-        // Enough of them for all threads, but none smaller than an atom.
+        // Enough of them for all threads, but none smaller than a subtree.
         const uint64_t ranks = settings_.ranks == nullptr ? 1 : static_cast<uint64_t>(settings_.ranks->count());
         memory_.bucketPoints =
-            std::max<uint64_t>(std::min<uint64_t>(memory_.bucketPoints, n / (6 * workers * ranks)), kAtomPoints);
+            std::max<uint64_t>(std::min<uint64_t>(memory_.bucketPoints, n / (6 * workers * ranks)), kSubtreePoints);
         memory_.isOnDisk = memory_.isOnDisk || settings_.ranks != nullptr;
         return {};
     }
@@ -292,15 +292,15 @@ class PointBuild {
         uint64_t number = bucket.firstPoint;
         const std::vector<Key>& keys = sorted.sorted.key;
         size_t begin = 0;
-        for (const Atom& atom : bucket.atoms) {
-            const uint32_t shift = frame().shiftOf(atom.level);
+        for (const Subtree& subtree : bucket.subtrees) {
+            const uint32_t shift = frame().shiftOf(subtree.level);
             size_t end = begin;
-            while (end < keys.size() && keys[end] >> shift == atom.key >> shift) ++end;
+            while (end < keys.size() && keys[end] >> shift == subtree.key >> shift) ++end;
             out.ranges.add(frame(), sorted.sorted.points, begin, end, number);
-            BuiltAtom built;
-            built.root = makeSubtree(frame(), sorted.sorted, begin, end, atom.level, built.batch);
-            out.atoms.push_back(std::move(built));
-            number += atom.count;
+            BuiltSubtree built;
+            built.root = makeSubtree(frame(), sorted.sorted, begin, end, subtree.level, built.batch);
+            out.subtrees.push_back(std::move(built));
+            number += subtree.count;
             begin = end;
         }
         ends("threads: levels, encode");
@@ -325,11 +325,11 @@ class PointBuild {
         const double begun = nowSeconds();
         for (const auto& [what, seconds] : built.seconds) report_.stageSeconds[what] += seconds;
         NodeBatch all, between;
-        for (BuiltAtom& atom : built.atoms) {
-            upper_->closeBefore(atom.root.key, between);
+        for (BuiltSubtree& subtree : built.subtrees) {
+            upper_->closeBefore(subtree.root.key, between);
             STIPPLE_TRY(append(between, all));
-            STIPPLE_TRY(append(atom.batch, all));
-            upper_->add(std::move(atom.root));
+            STIPPLE_TRY(append(subtree.batch, all));
+            upper_->add(std::move(subtree.root));
         }
         merged_ += built.merged;
         tooMany_ += built.tooMany;

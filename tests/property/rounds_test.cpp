@@ -234,7 +234,7 @@ TEST(Rounds, CarryOnFromTheJournalAndNotFromTheStart) {
         }
         EXPECT_GT(run, 4) << kind.name;
         EXPECT_TRUE(test::slurp(folder / "a.stipple") == test::slurp(folder / "whole.stipple")) << kind.name;
-        // What somebody changed is not built from: chunks, what waits for a cell, the input of an atom.
+        // What somebody changed is not built from: chunks, what waits for a cell, the input of a subtree.
         const auto interrupt = [&](int at) {
             fs::remove(folder / "a.stipple");
             fs::remove(partial);

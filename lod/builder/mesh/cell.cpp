@@ -385,7 +385,7 @@ Result<CellProduct> reduceMeshCell(const WorkCell& cell, const std::vector<uint8
                                    const std::vector<FromBelow>& below, const Frame& frame, const Lattice& lattice,
                                    const MeshBuildSettings& settings, Executor& executor) {
     CellReducer reducer(frame, lattice, settings, executor);
-    if (cell.atom != WorkCell::kNone) {
+    if (cell.subtree != WorkCell::kNone) {
         STIPPLE_TRY(reducer.takeInput(input));
     } else {
         STIPPLE_TRY(reducer.takeBelow(below));

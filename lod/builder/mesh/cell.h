@@ -7,8 +7,9 @@
 
 namespace stipple::lod {
 
-/// Welds and simplifies what is in a cell: the input of an atom or what came up from below, until few enough triangles
-/// are left to go up. Of the last cell nothing goes up; neither does what cannot be simplified and is too much.
+/// Welds and simplifies what is in a cell: the input of a subtree or what came up from below, until few enough
+/// triangles are left to go up. Of the last cell nothing goes up; neither does what cannot be simplified and is too
+/// much.
 Result<CellProduct> reduceMeshCell(const WorkCell& cell, const std::vector<uint8_t>& input,
                                    const std::vector<FromBelow>& below, const Frame& frame, const Lattice& lattice,
                                    const MeshBuildSettings& settings, Executor& executor);

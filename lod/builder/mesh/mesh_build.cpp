@@ -123,8 +123,8 @@ class MeshBuild : public CellContent {
         facts_.bad = source_.badTriangles ? source_.badTriangles() : 0;
         return {};
     }
-    Result<void> check(const std::vector<Atom>& atoms) const override {
-        if (!atoms.empty()) return {};
+    Result<void> check(const std::vector<Subtree>& subtrees) const override {
+        if (!subtrees.empty()) return {};
         // Scans are written with faces, too, which may all be empty.
         const bool isPly = source().find(".ply") != std::string::npos;
         return fail(ErrorKind::input, "holds no triangle with an area", source(),
@@ -135,17 +135,17 @@ class MeshBuild : public CellContent {
         return std::max(each * source_.surveyBytes, facts_.triangles * kMostSpillBytes + each * source_.readBytes);
     }
 
-    /// Each triangle to the atom that holds its centre.
+    /// Each triangle to the subtree that holds its centre.
     Result<void> send(CellSender& to) override {
         const Frame frame = frameOf(facts_.lattice);
-        const std::vector<Atom>& atoms = to.atoms();
-        std::vector<Soup> buffers(atoms.size());
+        const std::vector<Subtree>& subtrees = to.subtrees();
+        std::vector<Soup> buffers(subtrees.size());
         size_t number = 0;
-        const uint64_t wanted = std::max<uint64_t>(to.bufferBytes() / atoms.size(), 8192);
+        const uint64_t wanted = std::max<uint64_t>(to.bufferBytes() / subtrees.size(), 8192);
         const auto flush = [&](size_t a) {
             Soup& soup = buffers[a];
             const bool isSpread = isScattered(soup);
-            if (isSpread || isCrowded(atoms[a])) gather(soup, isCrowded(atoms[a]));
+            if (isSpread || isCrowded(subtrees[a])) gather(soup, isCrowded(subtrees[a]));
             ByteWriter bytes;
             putSoup(soup, bytes);
             const uint64_t triangles = soup.indices.size() / 3;
@@ -166,10 +166,10 @@ class MeshBuild : public CellContent {
             facts_.degenerate += placed.degenerate;
             facts_.notFinite += placed.notFinite;
             facts_.rounding = std::max(facts_.rounding, placed.rounding);
-            std::vector<uint64_t> order(placed.x.size());  // atom, triangle
+            std::vector<uint64_t> order(placed.x.size());  // subtree, triangle
             executor_.parallelFor(order.size(), 4096, [&](size_t begin, size_t end) {
                 for (size_t t = begin; t < end; ++t)
-                    order[t] = uint64_t{to.atomOf(frame.keyOf(placed.centres().at(t)))} << 32 | t;
+                    order[t] = uint64_t{to.subtreeOf(frame.keyOf(placed.centres().at(t)))} << 32 | t;
             });
             std::erase_if(order, [&](uint64_t o) { return !to.isOwn(o >> 32); });
             std::sort(order.begin(), order.end());
@@ -206,19 +206,19 @@ class MeshBuild : public CellContent {
         return flushAll();
     }
 
-    Result<std::vector<uint8_t>> gathered(const std::vector<uint8_t>& input, const Atom& atom,
+    Result<std::vector<uint8_t>> gathered(const std::vector<uint8_t>& input, const Subtree& subtree,
                                           uint64_t& units) const override {
         Soup soup;
         ByteReader from(input);
         while (!from.isWhole()) {
             if (!getSoup(from, soup)) return fail(ErrorKind::input, "a temporary file is damaged", source());
             // What no cell can divide may be one triangle many times.
-            if (isCrowded(atom) && soup.indices.size() / 3 > 2 * kMostOfAtom) {
+            if (isCrowded(subtree) && soup.indices.size() / 3 > 2 * kMostOfSubtree) {
                 gather(soup, true);
-                if (soup.indices.size() / 3 > kMostOfAtom) return tooMany(soup.indices.size() / 3);
+                if (soup.indices.size() / 3 > kMostOfSubtree) return tooMany(soup.indices.size() / 3);
             }
         }
-        gather(soup, isCrowded(atom));
+        gather(soup, isCrowded(subtree));
         units = soup.indices.size() / 3;
         ByteWriter to;
         putSoup(soup, to);
@@ -227,12 +227,12 @@ class MeshBuild : public CellContent {
 
     Result<void> complete(const CellInputs& inputs) override {
         uint64_t sent = 0, most = 0;
-        for (size_t a = 0; a < inputs.atoms().size(); ++a) {
+        for (size_t a = 0; a < inputs.subtrees().size(); ++a) {
             sent += inputs.units(a);
             most = std::max(most, inputs.units(a));
         }
         facts_.duplicate = facts_.triangles - facts_.degenerate - facts_.notFinite - sent;
-        return most > kMostOfAtom ? Result<void>(tooMany(most)) : Result<void>();
+        return most > kMostOfSubtree ? Result<void>(tooMany(most)) : Result<void>();
     }
 
     void save(ByteWriter& to) const override { to.put(facts_); }
@@ -314,7 +314,7 @@ class MeshBuild : public CellContent {
     static constexpr uint64_t kSpillBytes = 24;      ///< of a triangle, between the steps
     static constexpr uint64_t kMostSpillBytes = 32;  ///< the same at most (measured: 7 to 27)
     static constexpr uint64_t kTableBytes = 2;       ///< of a triangle, of the table of groups, which stays in memory
-    static constexpr uint64_t kMostOfAtom = 2 * kAtomPoints;
+    static constexpr uint64_t kMostOfSubtree = 2 * kSubtreePoints;
 
     /// A PLY file says how many faces it has, which may have four corners: twice that is declared.
     bool mayHaveParts() const { return source_.triangles <= 2 * PartFinder::kMostTriangles; }
@@ -348,7 +348,7 @@ class MeshBuild : public CellContent {
     /// Triangles in any order share few vertices with those beside them.
     static bool isScattered(const Soup& soup) { return soup.vertices.size() * 3 > 4 * (soup.indices.size() / 3); }
     /// More have their centre in one place than a cell holds.
-    static bool isCrowded(const Atom& atom) { return atom.count > kAtomPoints; }
+    static bool isCrowded(const Subtree& subtree) { return subtree.count > kSubtreePoints; }
     tl::unexpected<Error> changed() const {
         return fail(ErrorKind::input, "changed while it was read", source(), "build again when it is complete");
     }

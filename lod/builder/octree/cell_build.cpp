@@ -24,13 +24,13 @@ CellSender::CellSender(Workspace& workspace, CellInputs& inputs, const CellConte
       bufferBytes_(bufferBytes),
       ofCell_(tree.cells().size()),
       blocksSent_(blocksSent) {
-    const std::vector<Atom>& all = inputs.atoms();
+    const std::vector<Subtree>& all = inputs.subtrees();
     for (uint32_t a = 0; a < all.size(); ++a)
         for (uint32_t c = 0; c < all[a].cells; ++c) ofCell_[all[a].firstCell + c] = a;
 }
 
-Result<void> CellSender::append(size_t atom, const std::vector<uint8_t>& bytes, uint64_t units, bool isSpread) {
-    return inputs_.append(atom, bytes, units, isSpread);
+Result<void> CellSender::append(size_t subtree, const std::vector<uint8_t>& bytes, uint64_t units, bool isSpread) {
+    return inputs_.append(subtree, bytes, units, isSpread);
 }
 
 Result<void> CellSender::ends(uint64_t unitsOfBlock, uint64_t unitsOfAll, const std::function<Result<void>()>& flush) {
@@ -75,11 +75,11 @@ Result<void> CellSender::note(Journal::What what) {
     return agree(workspace_.ranks(), workspace_.note(what, all.bytes()));
 }
 
-/// Atoms whose input takes more room than it must; what they replace goes when the journal knows of it.
+/// Subtrees whose input takes more room than it must; what they replace goes when the journal knows of it.
 Result<void> CellSender::gatherSpread() {
     const uint64_t atOnce = std::max<uint64_t>(uint64_t{1} << 18, inputs_.bytes() / 32);
     std::vector<size_t> spread;
-    for (size_t a = 0; a < atoms().size(); ++a)
+    for (size_t a = 0; a < subtrees().size(); ++a)
         if (isOwn(a) && inputs_.isSpread(a)) spread.push_back(a);
     for (size_t next = 0;;) {
         const auto gatherSome = [&]() -> Result<void> {
@@ -88,7 +88,7 @@ Result<void> CellSender::gatherSpread() {
                 STIPPLE_TRY(workspace_.checkStopped());
                 STIPPLE_ASSIGN(const std::vector<uint8_t> input, inputs_.all(a));
                 uint64_t units = 0;
-                STIPPLE_ASSIGN(const std::vector<uint8_t> fresh, content_.gathered(input, atoms()[a], units));
+                STIPPLE_ASSIGN(const std::vector<uint8_t> fresh, content_.gathered(input, subtrees()[a], units));
                 bytes += fresh.size();
                 STIPPLE_TRY(inputs_.replace(a, fresh, units));
             }
@@ -209,7 +209,7 @@ class CellBuild {
             }
         if (!report_.isResumed) return {};
         if (!tree_) return tl::unexpected(workspace_->damaged());
-        inputs_->plan(tree_->atoms());
+        inputs_->plan(tree_->subtrees());
         if (!sent.empty()) {
             std::vector<uint8_t> facts, inputs;
             ByteReader from(sent);
@@ -223,7 +223,7 @@ class CellBuild {
         }
         progress_.say(isReady_
                           ? fmt::format("going on with the interrupted build: {} cells are done, {} have their input",
-                                        done_.size(), inputs_->atoms().size())
+                                        done_.size(), inputs_->subtrees().size())
                           : fmt::format("going on with the interrupted build: {} of its input are in their places",
                                         humanBytes(inputs_->bytes())));
         return {};
@@ -268,8 +268,8 @@ class CellBuild {
         } while (tree_->split());
         tree_->finish();
         clock_.ends("count");
-        STIPPLE_TRY(content_.check(tree_->atoms()));
-        inputs_->plan(tree_->atoms());
+        STIPPLE_TRY(content_.check(tree_->subtrees()));
+        inputs_->plan(tree_->subtrees());
         ByteWriter to;
         content_.save(to);
         tree_->save(to);

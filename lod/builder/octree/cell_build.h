@@ -23,20 +23,20 @@ struct MemoryNeeds {
 
 class CellContent;
 
-/// Brings content to the atoms that hold it.
+/// Brings content to the subtrees that hold it.
 class CellSender {
   public:
     CellSender(Workspace& workspace, CellInputs& inputs, const CellContent& content, Executor& executor,
                Progress& progress, const CellTree& tree, uint64_t bufferBytes, uint64_t blocksSent);
-    const std::vector<Atom>& atoms() const { return inputs_.atoms(); }
-    /// That may wait for being sent, of all atoms.
+    const std::vector<Subtree>& subtrees() const { return inputs_.subtrees(); }
+    /// That may wait for being sent, of all subtrees.
     uint64_t bufferBytes() const { return bufferBytes_; }
-    uint32_t atomOf(Key key) const { return ofCell_[tree_.cellOf(key)]; }
-    bool isOwn(size_t atom) const { return workspace_.isOwn(atom); }
+    uint32_t subtreeOf(Key key) const { return ofCell_[tree_.cellOf(key)]; }
+    bool isOwn(size_t subtree) const { return workspace_.isOwn(subtree); }
     /// For each block of the input: was it sent by an earlier run? Then it is only to be counted.
     bool begins() { return block_++ < blocksSent_; }
     /// See CellInputs.
-    Result<void> append(size_t atom, const std::vector<uint8_t>& bytes, uint64_t units, bool isSpread = false);
+    Result<void> append(size_t subtree, const std::vector<uint8_t>& bytes, uint64_t units, bool isSpread = false);
     /// After each block. `flush` sends what waits.
     Result<void> ends(uint64_t unitsOfBlock, uint64_t unitsOfAll, const std::function<Result<void>()>& flush);
     uint64_t mostTemporaryBytes() const { return most_; }
@@ -74,11 +74,11 @@ class CellContent {
     using Places = std::function<Result<void>(const Coordinates& places, uint64_t of)>;
     virtual uint64_t declared() const = 0;  ///< about how much places() gives
     virtual Result<void> places(const Places& take) = 0;
-    virtual Result<void> check(const std::vector<Atom>& atoms) const = 0;
+    virtual Result<void> check(const std::vector<Subtree>& subtrees) const = 0;
     virtual uint64_t temporaryBytes(int ranks) const = 0;  ///< at most
     virtual Result<void> send(CellSender& to) = 0;
-    /// An atom's input in fewer bytes, and how many units it holds.
-    virtual Result<std::vector<uint8_t>> gathered(const std::vector<uint8_t>& input, const Atom& atom,
+    /// A subtree's input in fewer bytes, and how many units it holds.
+    virtual Result<std::vector<uint8_t>> gathered(const std::vector<uint8_t>& input, const Subtree& subtree,
                                                   uint64_t& units) const = 0;
     /// What is known so far, for a resumed build.
     virtual void save(ByteWriter& to) const = 0;

@@ -91,7 +91,7 @@ void CellTree::addUp(const std::function<void(std::vector<uint32_t>&)>& sum) {
 
 void CellTree::expect(const Coordinates& sample, uint64_t share) {
     do count(sample);
-    while (split(kAtomPoints / share));
+    while (split(kSubtreePoints / share));
     for (uint32_t& e : entries_)
         if ((e & kBlock) == 0) e = 0;
 }
@@ -106,7 +106,7 @@ uint64_t CellTree::collapse(size_t first, uint32_t entries, uint32_t level) {
             continue;
         }
         const uint64_t below = collapse(entries_[place] & ~kBlock, 1u << (3 * steps), level + steps);
-        if (below <= kAtomPoints) entries_[place] = static_cast<uint32_t>(below);
+        if (below <= kSubtreePoints) entries_[place] = static_cast<uint32_t>(below);
         sum += below;
     }
     return sum;
@@ -130,14 +130,14 @@ void CellTree::finish() {
     }
 }
 
-void CellTree::findAtoms(size_t begin, size_t end, uint32_t level, std::vector<Atom>& atoms) const {
+void CellTree::findSubtrees(size_t begin, size_t end, uint32_t level, std::vector<Subtree>& subtrees) const {
     uint64_t count = 0;
-    for (size_t i = begin; i < end && count <= kAtomPoints; ++i) count += cells_[i].count;
-    if (count <= kAtomPoints || cells_[begin].level == level) {
-        if (count > kAtomPoints) count = cells_[begin].count;
+    for (size_t i = begin; i < end && count <= kSubtreePoints; ++i) count += cells_[i].count;
+    if (count <= kSubtreePoints || cells_[begin].level == level) {
+        if (count > kSubtreePoints) count = cells_[begin].count;
         const uint32_t shift = frame_.shiftOf(level);
-        atoms.push_back({cells_[begin].key >> shift << shift, count, static_cast<uint8_t>(level),
-                         static_cast<uint32_t>(begin), static_cast<uint32_t>(end - begin)});
+        subtrees.push_back({cells_[begin].key >> shift << shift, count, static_cast<uint8_t>(level),
+                            static_cast<uint32_t>(begin), static_cast<uint32_t>(end - begin)});
         return;
     }
     const uint32_t shift = frame_.shiftOf(level + 1);
@@ -145,15 +145,15 @@ void CellTree::findAtoms(size_t begin, size_t end, uint32_t level, std::vector<A
         const Key child = cells_[begin].key >> shift;
         size_t next = begin;
         while (next < end && cells_[next].key >> shift == child) ++next;
-        findAtoms(begin, next, level + 1, atoms);
+        findSubtrees(begin, next, level + 1, subtrees);
         begin = next;
     }
 }
 
-std::vector<Atom> CellTree::atoms() const {
-    std::vector<Atom> atoms;
-    if (!cells_.empty()) findAtoms(0, cells_.size(), 0, atoms);
-    return atoms;
+std::vector<Subtree> CellTree::subtrees() const {
+    std::vector<Subtree> subtrees;
+    if (!cells_.empty()) findSubtrees(0, cells_.size(), 0, subtrees);
+    return subtrees;
 }
 
 void CellTree::save(ByteWriter& to) const {

@@ -1,4 +1,4 @@
-// How the points are spread, found by counting: octree cells of at most kAtomPoints points, whatever the density.
+// How the points are spread, found by counting: octree cells of at most kSubtreePoints points, whatever the density.
 #pragma once
 
 #include <functional>
@@ -10,7 +10,7 @@
 namespace stipple::lod {
 
 /// Subtrees of at most that many points are built as one. (A constant: what the file holds must not depend on memory.)
-constexpr uint64_t kAtomPoints = 131072;
+constexpr uint64_t kSubtreePoints = 131072;
 
 /// A counted cell.
 struct Cell {
@@ -20,7 +20,7 @@ struct Cell {
 };
 
 /// Of the largest octree node that is built as one.
-struct Atom {
+struct Subtree {
     Key key = 0;
     uint64_t count = 0;
     uint8_t level = 0;
@@ -35,7 +35,7 @@ struct Coordinates {
     Place at(size_t i) const { return placeOf(x[i], y[i], z[i], high.empty() ? 0 : high[i]); }
 };
 
-/// The root's cell split evenly into cells of a first level; where those hold more than kAtomPoints, they are split
+/// The root's cell split evenly into cells of a first level; where those hold more than kSubtreePoints, they are split
 /// again. Counted again after each split, until nothing is left to split.
 class CellTree {
   public:
@@ -50,14 +50,14 @@ class CellTree {
     /// Of several processes that counted apart: `sum` adds up what all of them have.
     void addUp(const std::function<void(std::vector<uint32_t>&)>& sum);
     /// Splits what is too full; true if so: count everything once more. Cells of the deepest level stay.
-    bool split() { return split(kAtomPoints); }
+    bool split() { return split(kSubtreePoints); }
     /// Nothing more to count: numbers the cells that hold points along the Morton curve.
     void finish();
 
     const std::vector<Cell>& cells() const { return cells_; }
-    /// Along the curve: octree nodes of at most kAtomPoints points whose parents hold more (and cells of the deepest
+    /// Along the curve: octree nodes of at most kSubtreePoints points whose parents hold more (and cells of the deepest
     /// level, whatever they hold).
-    std::vector<Atom> atoms() const;
+    std::vector<Subtree> subtrees() const;
     /// Number of the cell that holds `key`; kNone where there are no points.
     static constexpr uint32_t kNone = 0x7fffffffu;
     uint32_t cellOf(Key key) const {
@@ -74,7 +74,7 @@ class CellTree {
     static constexpr uint32_t kBlock = 0x80000000u, kSplitLevels = 3;
     bool split(uint64_t most);
     uint64_t collapse(size_t first, uint32_t entries, uint32_t level);
-    void findAtoms(size_t begin, size_t end, uint32_t level, std::vector<Atom>& atoms) const;
+    void findSubtrees(size_t begin, size_t end, uint32_t level, std::vector<Subtree>& subtrees) const;
     /// `load(i)`: entry i.
     template <typename Load>
     size_t placeOf(Key key, const Load& load) const {
@@ -95,7 +95,7 @@ class CellTree {
     std::vector<uint32_t> entries_;  ///< a count (later a cell's number), or kBlock and where its block begins
     std::vector<Cell> cells_;
     bool wasSplit_ = false;
-    uint64_t most_ = kAtomPoints;  ///< of a cell, while splitting
+    uint64_t most_ = kSubtreePoints;  ///< of a cell, while splitting
     double largeSpacing_ = 0;
 };
 

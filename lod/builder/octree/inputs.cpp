@@ -8,37 +8,38 @@
 
 namespace stipple::lod {
 
-std::unique_ptr<Spill> CellInputs::spillOf(size_t atom, uint32_t generation) const {
-    return workspace_.spill(generation == 0 ? fmt::format("in-{}", atom) : fmt::format("in-{}.{}", atom, generation));
+std::unique_ptr<Spill> CellInputs::spillOf(size_t subtree, uint32_t generation) const {
+    return workspace_.spill(generation == 0 ? fmt::format("in-{}", subtree)
+                                            : fmt::format("in-{}.{}", subtree, generation));
 }
 
-void CellInputs::plan(std::vector<Atom> atoms) {
-    atoms_ = std::move(atoms);
-    inputs_.resize(atoms_.size());
-    for (size_t a = 0; a < atoms_.size(); ++a) inputs_[a].spill = spillOf(a, 0);
+void CellInputs::plan(std::vector<Subtree> subtrees) {
+    subtrees_ = std::move(subtrees);
+    inputs_.resize(subtrees_.size());
+    for (size_t a = 0; a < subtrees_.size(); ++a) inputs_[a].spill = spillOf(a, 0);
 }
 
-Result<void> CellInputs::append(size_t atom, const std::vector<uint8_t>& bytes, uint64_t units, bool isSpread) {
-    Input& input = inputs_[atom];
+Result<void> CellInputs::append(size_t subtree, const std::vector<uint8_t>& bytes, uint64_t units, bool isSpread) {
+    Input& input = inputs_[subtree];
     STIPPLE_TRY(input.spill->append(bytes));
     input.units += units;
     if (isSpread) input.spreadBytes += bytes.size();
     return {};
 }
 
-bool CellInputs::isSpread(size_t atom) const {
+bool CellInputs::isSpread(size_t subtree) const {
     constexpr uint64_t kWorthIt = uint64_t{64} << 10;
-    const Input& input = inputs_[atom];
+    const Input& input = inputs_[subtree];
     return input.spreadBytes >= std::max(kWorthIt, (input.spill->bytes() - input.spreadBytes) / 2);
 }
 
-Result<std::vector<uint8_t>> CellInputs::all(size_t atom) const {
-    return inputs_[atom].spill->part(0, inputs_[atom].spill->bytes());
+Result<std::vector<uint8_t>> CellInputs::all(size_t subtree) const {
+    return inputs_[subtree].spill->part(0, inputs_[subtree].spill->bytes());
 }
 
-Result<void> CellInputs::replace(size_t atom, const std::vector<uint8_t>& bytes, uint64_t units) {
-    Input& input = inputs_[atom];
-    std::unique_ptr<Spill> fresh = spillOf(atom, input.generation + 1);
+Result<void> CellInputs::replace(size_t subtree, const std::vector<uint8_t>& bytes, uint64_t units) {
+    Input& input = inputs_[subtree];
+    std::unique_ptr<Spill> fresh = spillOf(subtree, input.generation + 1);
     STIPPLE_TRY(fresh->append(bytes));
     STIPPLE_TRY(fresh->seal());
     old_.push_back(std::exchange(input.spill, std::move(fresh)));
@@ -81,18 +82,18 @@ void CellInputs::save(ByteWriter& to) const {
 bool CellInputs::load(const std::vector<uint8_t>& saved) {
     ByteReader from(saved);
     while (!from.isWhole()) {
-        uint64_t atom = 0;
-        from.get(atom);
-        if (from.isBroken() || atom >= inputs_.size()) return false;
-        Input& input = inputs_[atom];
+        uint64_t subtree = 0;
+        from.get(subtree);
+        if (from.isBroken() || subtree >= inputs_.size()) return false;
+        Input& input = inputs_[subtree];
         std::vector<Spill::Segment> segments;
         from.get(input.generation);
         from.get(input.units);
         from.get(input.spreadBytes);
         from.get(segments);
         if (from.isBroken()) return false;
-        if (input.generation > 0) spillOf(atom, input.generation - 1)->remove();
-        input.spill = spillOf(atom, input.generation);
+        if (input.generation > 0) spillOf(subtree, input.generation - 1)->remove();
+        input.spill = spillOf(subtree, input.generation);
         input.spill->restore(std::move(segments));
     }
     return true;
@@ -105,8 +106,8 @@ uint64_t CellInputs::bytes() const {
     return sum;
 }
 
-uint64_t CellInputs::remove(size_t atom) {
-    const std::unique_ptr<Spill> used = std::move(inputs_[atom].spill);
+uint64_t CellInputs::remove(size_t subtree) {
+    const std::unique_ptr<Spill> used = std::move(inputs_[subtree].spill);
     const uint64_t bytes = used->bytes();
     used->remove();
     return bytes;

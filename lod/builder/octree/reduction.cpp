@@ -117,10 +117,10 @@ std::unique_ptr<Spill> Reduction::upSpill(int level, Key key) const {
 
 Reduction::LevelCells Reduction::takeLevel(int level) {
     LevelCells out;
-    const std::vector<Atom>& atoms = inputs_.atoms();
-    for (uint32_t a = 0; a < atoms.size(); ++a)
-        if (atoms[a].level == level) {
-            out.cells.push_back({level, atoms[a].key, a, false});
+    const std::vector<Subtree>& subtrees = inputs_.subtrees();
+    for (uint32_t a = 0; a < subtrees.size(); ++a)
+        if (subtrees[a].level == level) {
+            out.cells.push_back({level, subtrees[a].key, a, false});
             out.waiting.emplace_back();
         }
     for (auto& [key, waiting] : above_) {
@@ -128,7 +128,8 @@ Reduction::LevelCells Reduction::takeLevel(int level) {
         out.waiting.push_back(std::move(waiting));
     }
     above_.clear();
-    const bool isMore = std::any_of(atoms.begin(), atoms.end(), [&](const Atom& a) { return a.level < level; });
+    const bool isMore =
+        std::any_of(subtrees.begin(), subtrees.end(), [&](const Subtree& a) { return a.level < level; });
     if (out.cells.size() == 1) out.cells[0].isLast = !isMore;
     return out;
 }
@@ -151,8 +152,8 @@ Result<CellProduct> Reduction::makeCell(const LevelCells& level, size_t i, const
     STIPPLE_TRY(workspace_.checkStopped());
     std::vector<uint8_t> input;
     std::vector<FromBelow> below;
-    if (level.cells[i].atom != WorkCell::kNone) {
-        STIPPLE_ASSIGN(input, inputs_.take(level.cells[i].atom));
+    if (level.cells[i].subtree != WorkCell::kNone) {
+        STIPPLE_ASSIGN(input, inputs_.take(level.cells[i].subtree));
     } else {
         STIPPLE_ASSIGN(below, readBelow(level.waiting[i]));
     }
@@ -186,14 +187,14 @@ Result<void> Reduction::hand(LevelCells& level, size_t i, CellProduct product, c
 }
 
 void Reduction::finishCell(const WorkCell& cell, Waiting& waiting) {
-    if (cell.atom == WorkCell::kNone) {
+    if (cell.subtree == WorkCell::kNone) {
         temporary_ -= waiting.spill->bytes();
         waiting.spill->remove();
         waiting = {};
         return;
     }
-    doneInput_ += inputs_.atoms()[cell.atom].count;
-    temporary_ -= inputs_.remove(cell.atom);
+    doneInput_ += inputs_.subtrees()[cell.subtree].count;
+    temporary_ -= inputs_.remove(cell.subtree);
 }
 
 /// What an earlier run finished of a level; returns how many of its cells.
@@ -288,16 +289,17 @@ void Reduction::tellAbove(int level) {
 Result<void> Reduction::run(Executor& executor, int workers, const Make& make, const Take& take, Progress& progress) {
     STIPPLE_TRY(agree(workspace_.ranks(), openWriter(executor)));
     temporary_ = mostTemporary_ = inputs_.bytes();
-    const std::vector<Atom>& atoms = inputs_.atoms();
+    const std::vector<Subtree>& subtrees = inputs_.subtrees();
     int deepest = 0;
-    for (const Atom& a : atoms) {
+    for (const Subtree& a : subtrees) {
         deepest = std::max<int>(deepest, a.level);
         allInput_ += a.count;
     }
     for (int at = deepest; at > -2; --at) {
         LevelCells level = takeLevel(at);
         STIPPLE_TRY(runLevel(level, executor, workers, make, take, progress));
-        const bool isMore = std::any_of(atoms.begin(), atoms.end(), [&](const Atom& a) { return a.level < at; });
+        const bool isMore =
+            std::any_of(subtrees.begin(), subtrees.end(), [&](const Subtree& a) { return a.level < at; });
         if (above_.empty() && !isMore) break;
     }
     return {};

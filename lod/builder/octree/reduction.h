@@ -1,6 +1,6 @@
-// Work from the deepest cells of an octree upwards, in bounded memory. What is worked on at a level: the atoms of that
-// level (cells.h), each with its input, and the cells to which work one level deeper has sent something. Each gives
-// chunks for the file, something for the tables at its end, and something that goes up. What waits lies in the
+// Work from the deepest cells of an octree upwards, in bounded memory. What is worked on at a level: the subtrees of
+// that level (cells.h), each with its input, and the cells to which work one level deeper has sent something. Each
+// gives chunks for the file, something for the tables at its end, and something that goes up. What waits lies in the
 // workspace, and a killed build goes on after the last finished cell.
 //
 // The cells of one level are worked on in parallel, by all ranks, and handed on in order by the first one: the file
@@ -20,8 +20,8 @@ struct WorkCell {
     static constexpr uint32_t kNone = ~0u;
     int level = 0;
     Key key = 0;
-    uint32_t atom = kNone;  ///< number of the atom that it is
-    bool isLast = false;    ///< nothing is left to do but this
+    uint32_t subtree = kNone;  ///< number of the subtree that it is
+    bool isLast = false;       ///< nothing is left to do but this
 };
 
 /// For a cell one level up; `key` is the caller's name for it.
@@ -46,7 +46,7 @@ class Reduction {
     Reduction(Workspace& workspace, CellInputs& inputs, std::vector<Journal::Entry> done)
         : workspace_(workspace), inputs_(inputs), done_(std::move(done)) {}
 
-    /// Any thread; `input` of an atom, `below` of another cell, in the order of those that sent it.
+    /// Any thread; `input` of a subtree, `below` of another cell, in the order of those that sent it.
     using Make = std::function<Result<CellProduct>(const WorkCell& cell, const std::vector<uint8_t>& input,
                                                    const std::vector<FromBelow>& below)>;
     /// In order, also for what an earlier run finished: chunks begin at `at` in the file. Returns the cell's label. On
@@ -69,7 +69,7 @@ class Reduction {
     };
     struct LevelCells {
         std::vector<WorkCell> cells;
-        std::vector<Waiting> waiting;  ///< of each; empty of atoms
+        std::vector<Waiting> waiting;  ///< of each; empty of subtrees
     };
     LevelCells takeLevel(int level);
     std::unique_ptr<Spill> upSpill(int level, Key key) const;

@@ -34,19 +34,19 @@ BucketPlan planBuckets(const Frame& frame, const CellTree& tree, uint64_t most) 
     const std::vector<Cell>& cells = tree.cells();
     plan.ofCell.resize(cells.size());
     uint64_t points = 0;
-    for (const Atom& atom : tree.atoms()) {
-        if (plan.buckets.empty() || plan.buckets.back().points + atom.count > most) {
+    for (const Subtree& subtree : tree.subtrees()) {
+        if (plan.buckets.empty() || plan.buckets.back().points + subtree.count > most) {
             plan.buckets.emplace_back();
             plan.buckets.back().firstPoint = points;
-            plan.buckets.back().firstCell = atom.firstCell;
+            plan.buckets.back().firstCell = subtree.firstCell;
         }
         BucketPlan::Bucket& bucket = plan.buckets.back();
-        bucket.atoms.push_back(atom);
-        bucket.points += atom.count;
-        points += atom.count;
-        bucket.cells += atom.cells;
-        for (uint32_t c = 0; c < atom.cells; ++c)
-            plan.ofCell[atom.firstCell + c] = static_cast<uint32_t>(plan.buckets.size() - 1);
+        bucket.subtrees.push_back(subtree);
+        bucket.points += subtree.count;
+        points += subtree.count;
+        bucket.cells += subtree.cells;
+        for (uint32_t c = 0; c < subtree.cells; ++c)
+            plan.ofCell[subtree.firstCell + c] = static_cast<uint32_t>(plan.buckets.size() - 1);
     }
     // Beside which cells does another bucket begin? Buckets are runs of cells, so the first and the last cell of a
     // neighbouring place of the same size tell.

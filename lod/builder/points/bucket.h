@@ -9,10 +9,10 @@
 
 namespace stipple::lod {
 
-/// Atoms along the Morton curve, and which bucket each counted cell belongs to.
+/// Subtrees along the Morton curve, and which bucket each counted cell belongs to.
 struct BucketPlan {
     struct Bucket {
-        std::vector<Atom> atoms;
+        std::vector<Subtree> subtrees;
         uint64_t points = 0, firstPoint = 0;  ///< firstPoint: of the whole order
         uint32_t firstCell = 0, cells = 0;    ///< counted cells
     };

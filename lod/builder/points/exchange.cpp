@@ -21,12 +21,12 @@ bool isBuilt(const std::string& folder, size_t bucket) { return fs::exists(built
 
 Result<void> saveBuilt(const std::string& folder, size_t bucket, const BuiltBucket& built) {
     ByteWriter to;
-    to.put(uint64_t{built.atoms.size()});
-    for (const BuiltAtom& atom : built.atoms) {
-        putPending(atom.root, to);
-        to.put(atom.batch.nodes);
-        to.put(atom.batch.counts);
-        to.put(atom.batch.bytes);
+    to.put(uint64_t{built.subtrees.size()});
+    for (const BuiltSubtree& subtree : built.subtrees) {
+        putPending(subtree.root, to);
+        to.put(subtree.batch.nodes);
+        to.put(subtree.batch.counts);
+        to.put(subtree.batch.bytes);
     }
     built.ranges.save(to);
     to.put(built.merged);
@@ -62,14 +62,14 @@ Result<BuiltBucket> loadBuilt(const std::string& folder, size_t bucket, const Va
     uint64_t hash = 0;
     from.get(hash);
     BuiltBucket out;
-    uint64_t atoms = 0, stages = 0;
-    from.get(atoms);
-    for (uint64_t a = 0; a < atoms && a <= bytes.size(); ++a) {
-        BuiltAtom& atom = out.atoms.emplace_back();
-        getPending(from, atom.root);
-        from.get(atom.batch.nodes);
-        from.get(atom.batch.counts);
-        from.get(atom.batch.bytes);
+    uint64_t subtrees = 0, stages = 0;
+    from.get(subtrees);
+    for (uint64_t a = 0; a < subtrees && a <= bytes.size(); ++a) {
+        BuiltSubtree& subtree = out.subtrees.emplace_back();
+        getPending(from, subtree.root);
+        from.get(subtree.batch.nodes);
+        from.get(subtree.batch.counts);
+        from.get(subtree.batch.bytes);
     }
     out.ranges = empty;
     out.ranges.load(from);

@@ -9,7 +9,7 @@ namespace stipple::lod {
 
 /// What one bucket gives, until it is its turn to be written.
 struct BuiltBucket {
-    std::vector<BuiltAtom> atoms;
+    std::vector<BuiltSubtree> subtrees;
     ValueRanges ranges;
     uint64_t merged = 0, tooMany = 0;
     std::map<std::string, double> seconds;  ///< of the thread

@@ -6,7 +6,7 @@
 namespace stipple::lod {
 
 /// More points than that at one lattice place tell nothing, and no leaf could hold them.
-constexpr size_t kMostAtOnePlace = kAtomPoints;
+constexpr size_t kMostAtOnePlace = kSubtreePoints;
 
 struct SortResult {
     SortedPoints sorted;

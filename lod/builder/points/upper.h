@@ -1,4 +1,4 @@
-// The tree above the atoms: their subtrees come in Morton order, and a node is made as soon as its last child is there.
+// The tree above the subtrees, which come in Morton order, and a node is made as soon as its last child is there.
 #pragma once
 
 #include "lod/builder/octree/bytes.h"
@@ -6,8 +6,8 @@
 
 namespace stipple::lod {
 
-/// One atom's subtree: all chunks but that of its root, whose order its parent gives.
-struct BuiltAtom {
+/// One subtree: all chunks but that of its root, whose order its parent gives.
+struct BuiltSubtree {
     PendingNode root;
     NodeBatch batch;
 };
@@ -20,8 +20,8 @@ class UpperTree {
     explicit UpperTree(const Frame& frame) : frame_(frame) {}
     /// Nodes that end before `key` are made and their children's chunks appended to `batch`.
     void closeBefore(Key key, NodeBatch& batch);
-    void add(PendingNode atom) { open_.push_back(std::move(atom)); }
-    /// The root, once all atoms are there.
+    void add(PendingNode subtree) { open_.push_back(std::move(subtree)); }
+    /// The root, once all subtrees are there.
     void finish(NodeBatch& batch);
     /// Since the last call: how many open nodes stayed, and after them come new ones.
     void saveChanges(ByteWriter& to);

@@ -26,7 +26,7 @@ constexpr double kFar = 16;                          ///< times what most vertic
 constexpr double kFineSteps = 64;                    ///< in what is visible of a segment, where strands lie far apart
 constexpr double kMorePieces = 1 << 18;              ///< that all may be divided into where cells are too large
 constexpr uint64_t kCellBytes = uint64_t{64} << 20;  ///< that one cell of the work needs at most
-constexpr uint64_t kRunSegments = 64;                ///< of one atom that are kept until they are sent
+constexpr uint64_t kRunSegments = 64;                ///< of one subtree that are kept until they are sent
 
 class StrandBuild : public CellContent {
   public:
@@ -171,20 +171,20 @@ class StrandBuild : public CellContent {
             return take({x, y, z, high}, facts_.segments);
         });
     }
-    Result<void> check(const std::vector<Atom>& atoms) const override {
-        for (const Atom& atom : atoms)
-            if (atom.count > 4 * kAtomPoints)
-                return fail(ErrorKind::budget, fmt::format("{} segments lie within the length of one", atom.count),
+    Result<void> check(const std::vector<Subtree>& subtrees) const override {
+        for (const Subtree& subtree : subtrees)
+            if (subtree.count > 4 * kSubtreePoints)
+                return fail(ErrorKind::budget, fmt::format("{} segments lie within the length of one", subtree.count),
                             source(), "are the strands what they should be?");
         return {};
     }
     uint64_t temporaryBytes(int) const override { return facts_.segments * kSpillBytes; }
 
-    /// Each segment to the atoms that hold the middles of its pieces; those of a strand that stay together travel as
+    /// Each segment to the subtrees that hold the middles of its pieces; those of a strand that stay together travel as
     /// one run.
     Result<void> send(CellSender& to) override {
         const Frame on = frame();
-        std::vector<StrandRuns> buffers(to.atoms().size());
+        std::vector<StrandRuns> buffers(to.subtrees().size());
         const uint64_t most = std::max<uint64_t>(
             to.bufferBytes() / std::max<size_t>(buffers.size(), 1) / sizeof(TravellingPoint), kRunSegments);
         const auto flush = [&](size_t a) {
@@ -201,7 +201,7 @@ class StrandBuild : public CellContent {
         };
         uint32_t strand = 0;
         std::vector<TravellingPoint> ends;
-        std::vector<uint32_t> atoms;
+        std::vector<uint32_t> subtrees;
         // Strand and vertex of a run's end.
         std::vector<std::pair<uint32_t, uint32_t>> nextOf(buffers.size(), {~0u, 0});
         const Result<void> read = source_.read([&](const StrandSet& block) -> Result<void> {
@@ -216,24 +216,24 @@ class StrandBuild : public CellContent {
                 uint32_t number = 0;
                 for (size_t i = 1; i < points.size(); ++i) {
                     division_.divide(points[i - 1], points[i], ends);
-                    atoms.clear();
+                    subtrees.clear();
                     const TravellingPoint* before = &points[i - 1];
                     for (const TravellingPoint& end : ends) {
-                        const uint32_t atom = to.atomOf(on.keyOf(TravellingPoint::middle(*before, end)));
-                        if (to.isOwn(atom) && std::find(atoms.begin(), atoms.end(), atom) == atoms.end())
-                            atoms.push_back(atom);
+                        const uint32_t subtree = to.subtreeOf(on.keyOf(TravellingPoint::middle(*before, end)));
+                        if (to.isOwn(subtree) && std::find(subtrees.begin(), subtrees.end(), subtree) == subtrees.end())
+                            subtrees.push_back(subtree);
                         before = &end;
                     }
-                    for (const uint32_t atom : atoms) {
-                        StrandRuns& runs = buffers[atom];
-                        if (runs.runs.empty() || nextOf[atom] != std::pair(strand, static_cast<uint32_t>(i - 1))) {
+                    for (const uint32_t subtree : subtrees) {
+                        StrandRuns& runs = buffers[subtree];
+                        if (runs.runs.empty() || nextOf[subtree] != std::pair(strand, static_cast<uint32_t>(i - 1))) {
                             runs.runs.push_back({strand, number, 1, block.isRibbon[s] != 0 ? 1u : 0u});
                             runs.points.push_back(points[i - 1]);
                         }
-                        nextOf[atom] = {strand, static_cast<uint32_t>(i)};
+                        nextOf[subtree] = {strand, static_cast<uint32_t>(i)};
                         runs.points.push_back(points[i]);
                         ++runs.runs.back().points;
-                        if (runs.points.size() >= most) STIPPLE_TRY(flush(atom));
+                        if (runs.points.size() >= most) STIPPLE_TRY(flush(subtree));
                     }
                     number += static_cast<uint32_t>(ends.size());
                 }
@@ -243,7 +243,7 @@ class StrandBuild : public CellContent {
         return read ? flushAll() : read;
     }
     /// (Runs take no more room than they must.)
-    Result<std::vector<uint8_t>> gathered(const std::vector<uint8_t>& input, const Atom&, uint64_t&) const override {
+    Result<std::vector<uint8_t>> gathered(const std::vector<uint8_t>& input, const Subtree&, uint64_t&) const override {
         return input;
     }
     Result<void> complete(const CellInputs&) override { return {}; }

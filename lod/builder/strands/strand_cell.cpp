@@ -408,7 +408,7 @@ class StrandCell {
     const Fineness fineness_;
     const StrandDivision& division_;
     std::vector<StrandPoint> points_;
-    std::vector<Place> places_;      ///< of an atom's points, as they travelled
+    std::vector<Place> places_;      ///< of a subtree's points, as they travelled
     std::vector<StrandNode> nodes_;  ///< the first one is the cell's own
     std::vector<TravellingPoint> ends_;
     size_t firstOwn_ = 0;  ///< 0: all nodes are to be made
@@ -420,7 +420,7 @@ Result<CellProduct> buildStrandCell(const WorkCell& cell, const std::vector<uint
                                     const std::vector<FromBelow>& below, const Frame& frame, uint32_t leafSegments,
                                     const Fineness& fineness, const StrandDivision& division) {
     StrandCell work(cell, frame, leafSegments, fineness, division);
-    if (cell.atom != WorkCell::kNone) {
+    if (cell.subtree != WorkCell::kNone) {
         STIPPLE_TRY(work.takeInput(input));
     } else {
         STIPPLE_TRY(work.takeBelow(below));

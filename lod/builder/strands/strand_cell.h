@@ -15,7 +15,7 @@ struct Fineness {
     bool isCoarse(double step, double detail) const { return stepsInDetail * step > detail || step > mostStep; }
 };
 
-/// Builds the subtree of an atom, or joins those that came up from the octants of a cell. All nodes but the topmost are
+/// Builds a subtree, or joins those that came up from the octants of a cell. All nodes but the topmost are
 /// encoded: that waits for its parent, as its order needs the parent's codes. `leafSegments`: cells with more are
 /// divided, down to `frame.keyLevels`, and so are those that are too coarse for `fineness`.
 Result<CellProduct> buildStrandCell(const WorkCell& cell, const std::vector<uint8_t>& input,
