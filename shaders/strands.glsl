@@ -3,7 +3,7 @@
 #include "mesh.glsl"
 
 // A strand so wide that its pixels are filled, as the cpu backend has it.
-struct WideStrand {
+struct FilledCurve {
     float xa, ya, xb, yb;
     float inverseA, inverseB;
     float halfA, halfB;
@@ -17,7 +17,7 @@ struct WideStrand {
 };
 layout(set = 0, binding = kWideBinding, scalar) buffer WideBlock {
     uint wideCount;
-    WideStrand wide[];
+    FilledCurve wide[];
 };
 
 CameraSegment cameraSegment(DrawNode node, StrandSegment s) {
@@ -34,10 +34,10 @@ CameraSegment cameraSegment(DrawNode node, StrandSegment s) {
     return c;
 }
 
-Ribbon ribbonOfWide(WideStrand s) { return ribbonOf(s.a, s.b, s.acrossA, s.acrossB, s.radiusA, s.radiusB); }
+Ribbon ribbonOfWide(FilledCurve s) { return ribbonOf(s.a, s.b, s.acrossA, s.acrossB, s.radiusA, s.radiusB); }
 
-// Offers one pixel of a wide strand if its ray meets the strand. `ribbon`: what ribbonOfWide says, once for all pixels.
-void offerWide(WideStrand s, Ribbon ribbon, int x, int y) {
+// Offers one pixel of a filled curve if its ray meets the strand. `ribbon`: what ribbonOfWide says, once for all pixels.
+void offerWide(FilledCurve s, Ribbon ribbon, int x, int y) {
     const PixelRay ray = pixelRay(frameLensHere(), (float(x) + 0.5 - frame.centre.x) * (1.0 / frame.focal), (float(y) + 0.5 - frame.centre.y) * (1.0 / frame.focal));
     if (s.isRound != 0u) {
         const TubeHit hit = tubeHit(tubeOf(s.a, s.b, s.radiusA, s.radiusB), ray, frame.nearPlane, false);

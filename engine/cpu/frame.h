@@ -61,7 +61,7 @@ struct Frame {
 
     // What covers so many pixels that its rows are shared out.
     std::vector<LargeTriangle> large;
-    std::vector<WideStrand> wide;
+    std::vector<FilledCurve> wide;
     std::vector<shared::WideDisc> discs;     ///< Plane::discList
     std::vector<shared::DiscBox> discBoxes;  ///< of each
 

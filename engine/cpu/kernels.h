@@ -115,7 +115,7 @@ struct LargeTriangle {
     uint64_t id;            ///< drawId
 };
 /// A strand so wide that its pixels are filled, and so large that its rows are shared out among threads.
-struct WideStrand {
+struct FilledCurve {
     bool isRound;
     uint64_t id;              ///< drawId
     shared::Tube tube;        ///< what a tube's rays meet
@@ -126,7 +126,7 @@ struct WideStrand {
 };
 struct WideSink {
     void* context;
-    void (*keep)(void* context, const WideStrand& strand);
+    void (*keep)(void* context, const FilledCurve& strand);
 };
 
 struct LargeSink {
@@ -254,7 +254,7 @@ struct Kernels {
     void (*drawSegments)(const shared::FrameConstants& f, const StrandBlock& block, uint32_t count, uint32_t firstPlace,
                          const WideSink& wide, const Visibility& visibility);
     /// Rows [firstRow, lastRow] of the strands that were kept.
-    void (*fillWide)(const shared::FrameConstants& f, const WideStrand* strands, size_t count, uint32_t firstRow,
+    void (*fillWide)(const shared::FrameConstants& f, const FilledCurve* strands, size_t count, uint32_t firstRow,
                      uint32_t lastRow, const Visibility& visibility);
     /// Rows [firstRow, lastRow] of wide discs.
     void (*fillDiscs)(const shared::FrameConstants& f, const shared::WideDisc* discs, const shared::DiscBox* boxes,

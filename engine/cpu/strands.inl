@@ -1,6 +1,6 @@
 // Ribbons and tubes of the cpu backend: segments as lines into the visibility buffer, and texels back out of it.
 // Included by kernels.inl.
-#include "engine/cpu/wide_strands.inl"
+#include "engine/cpu/filled_curves.inl"
 
 [[gnu::always_inline]] inline CameraSegment cameraSegment(const DrawNode& node, const StrandSegment& s) {
     const auto place = [&](const StrandVertex& v) {
@@ -198,7 +198,7 @@ void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pix
 void drawFilled(const FrameConstants& f, const CameraSegment& c, bool isRound, uint64_t id, const WideSink& wide,
                 const Visibility& visibility) {
     const float width = float(f.width), height = float(f.height);
-    const WideStrand s = isRound ? wideTube(f, c, id) : wideRibbon(f, c, id);
+    const FilledCurve s = isRound ? wideTube(f, c, id) : wideRibbon(f, c, id);
     float left, right, top, bottom;
     if (isRound) {
         left = min(s.left[0], s.left[1]);
@@ -255,7 +255,7 @@ void drawSegments(const FrameConstants& frame, const StrandBlock& block, uint32_
     drawPixels(f, lines, pixels, collected, firstPlace, visibility);
 }
 
-void fillWide(const FrameConstants& frame, const WideStrand* strands, size_t count, uint32_t firstRow, uint32_t lastRow,
+void fillWide(const FrameConstants& frame, const FilledCurve* strands, size_t count, uint32_t firstRow, uint32_t lastRow,
               const Visibility& visibility) {
     const FrameConstants f = frame;
     for (size_t i = 0; i < count; ++i) fillStrand(f, strands[i], int(firstRow), int(lastRow), visibility);

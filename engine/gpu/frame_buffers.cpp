@@ -91,7 +91,7 @@ Result<void> FrameBuffers::preparePlanes(const render::DrawList& draws, bool wan
 Result<void> FrameBuffers::prepareLists(const render::RenderRequest& request) {
     if (has(request, render::Pass::strands))
         STIPPLE_TRY(
-            ensure(bound_[kWideBinding], gpu::bytesOf(kWideBinding, kWideCapacity), kFilled, false, "wide strands"));
+            ensure(bound_[kWideBinding], gpu::bytesOf(kWideBinding, kWideCapacity), kFilled, false, "filled curves"));
     if (listsDiscs(request))
         STIPPLE_TRY(
             ensure(bound_[kDiscsBinding], gpu::bytesOf(kDiscsBinding, kDiscCapacity), kFilled, false, "wide discs"));

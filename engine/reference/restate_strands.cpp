@@ -177,7 +177,7 @@ class StrandProjector {
         return view_.isOrthographic ? za + u * (zb - za) : 1 / (1 / za + u * (1 / zb - 1 / za));
     }
 
-    /// A wide strand: every pixel whose ray meets it.
+    /// A filled curve: every pixel whose ray meets it.
     void meet() {
         Segment own = s_;
         own.a = a_;

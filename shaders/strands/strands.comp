@@ -13,7 +13,7 @@ float lineLinear(float linear, float surface) {
     return frame.orthographic != 0u ? lineDepth(frameLensHere(), linear, surface, frame.nearPlane) : linear / surface;
 }
 
-void drawLine(WideStrand s) {
+void drawLine(FilledCurve s) {
     const bool isSteep = abs(s.xb - s.xa) < abs(s.yb - s.ya);
     vec2 a = isSteep ? vec2(s.ya, s.xa) : vec2(s.xa, s.ya);
     vec2 b = isSteep ? vec2(s.yb, s.xb) : vec2(s.xb, s.yb);
@@ -57,7 +57,7 @@ void drawEnd(float x, float y, float inverseDepth, float halfWidth, float nearer
 }
 
 // The pixels that a segment may cover, from lo to hi. False: none, as it lies before the near plane.
-bool coverOf(WideStrand s, CameraSegment c, ScreenSegment p, Ribbon ribbon, bool isWide, float reaches, out vec2 lo, out vec2 hi) {
+bool coverOf(FilledCurve s, CameraSegment c, ScreenSegment p, Ribbon ribbon, bool isWide, float reaches, out vec2 lo, out vec2 hi) {
     const Lens lens = frameLensHere();
     lo = min(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) - 1.0;
     hi = max(vec2(p.xa, p.ya), vec2(p.xb, p.yb)) + 1.0;
@@ -106,7 +106,7 @@ void main() {
     vec3 b = c.a + p.to * (c.b - c.a);
     a.z = max(a.z, frame.nearPlane);
     b.z = max(b.z, frame.nearPlane);
-    WideStrand s;
+    FilledCurve s;
     s.xa = p.xa;
     s.ya = p.ya;
     s.xb = p.xb;

@@ -1,4 +1,4 @@
-// Workgroup (x, y) fills the rows of band y of every 64th wide strand: one over the whole image is work for all.
+// Workgroup (x, y) fills the rows of band y of every 64th filled curve: one over the whole image is work for all.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../strands.glsl"
@@ -8,7 +8,7 @@ void main() {
     const uint count = min(wideCount, kWideCapacity);
     const int firstRow = int(gl_WorkGroupID.y) * int(kBandRows);
     for (uint i = gl_WorkGroupID.x; i < count; i += gl_NumWorkGroups.x) {
-        const WideStrand s = wide[i];
+        const FilledCurve s = wide[i];
         const int x0 = s.box.x;
         const int x1 = s.box.z;
         const int y0 = max(s.box.y, firstRow);

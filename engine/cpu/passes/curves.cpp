@@ -6,12 +6,12 @@ namespace stipple::cpu {
 namespace {
 
 void drawCurves(Frame& frame) {
-    CompletionQueue<std::vector<WideStrand>> found;
+    CompletionQueue<std::vector<FilledCurve>> found;
     frame.wide.clear();
     frame.executor.parallelFor(frame.strandBlocks.size(), 4, [&](size_t begin, size_t end) {
-        std::vector<WideStrand> mine;
+        std::vector<FilledCurve> mine;
         const WideSink sink{
-            &mine, [](void* to, const WideStrand& s) { static_cast<std::vector<WideStrand>*>(to)->push_back(s); }};
+            &mine, [](void* to, const FilledCurve& s) { static_cast<std::vector<FilledCurve>*>(to)->push_back(s); }};
         for (size_t b = begin; b < end; ++b) {
             const uint32_t left = frame.strandBlocks[b].node->count - frame.draws->curves().blocks[b].first;
             frame.k.drawSegments(frame.constants, frame.strandBlocks[b], std::min(left, shared::kSegmentsPerBlock),

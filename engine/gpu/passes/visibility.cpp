@@ -30,7 +30,7 @@ constinit const GpuPass splatPass{[](Recording& f) {
 constinit const GpuPass strandsPass{[](Recording& f) {
     f.emptyList("wide list", shared::kWideBinding);
     f.overBlocks("strands", f.draws().curves().blocks.size());
-    f.overBands("wide strands", "strands_wide");
+    f.overBands("filled curves", "strands_wide");
 }};
 
 constinit const GpuPass rasterisePass{[](Recording& f) {

@@ -11,7 +11,7 @@ constexpr float kHullMargin = 0.02f;  ///< px: by how much corners of ribbons ar
 struct HullLines {
     float top[6], bottom[6], x[6], slope[6], least[6], most[6];
 };
-HullLines hullLines(const WideStrand& s) {
+HullLines hullLines(const FilledCurve& s) {
     constexpr size_t kFrom[6] = {0, 0, 0, 1, 1, 2}, kTo[6] = {1, 2, 3, 2, 3, 3};
     HullLines h;
     for (size_t k = 0; k < 6; ++k) {
@@ -40,7 +40,7 @@ void hullColumns(const HullLines& h, float top, float bottom, float& from, float
 }
 
 /// Rows [firstRow, lastRow] of a wide ribbon: every pixel whose ray meets it.
-void fillRibbon(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, const Visibility& visibility) {
+void fillRibbon(const FrameConstants& f, const FilledCurve& s, int firstRow, int lastRow, const Visibility& visibility) {
     constexpr int kRibbonStretch = 8;  // most ribbons are a few pixels wide
     const int first = pixelWithin(std::ceil(min(min(s.y[0], s.y[1]), min(s.y[2], s.y[3])) - 0.5f - kHullMargin),
                                   float(firstRow), float(lastRow) + 1.0f),
@@ -76,7 +76,7 @@ void fillRibbon(const FrameConstants& f, const WideStrand& s, int firstRow, int 
 
 /// Rows [firstRow, lastRow] of a wide tube: every pixel whose ray meets it.
 template <bool isPlain>
-void fillTubeRows(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow,
+void fillTubeRows(const FrameConstants& f, const FilledCurve& s, int firstRow, int lastRow,
                   const Visibility& visibility) {
     constexpr int kTubeStretch = 8;  // most tubes are a few pixels wide
     const int first = pixelWithin(std::ceil(min(s.top[0], s.top[1])), float(firstRow), float(lastRow) + 1.0f),
@@ -119,14 +119,14 @@ void fillTubeRows(const FrameConstants& f, const WideStrand& s, int firstRow, in
     }
 }
 
-void fillTube(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, const Visibility& visibility) {
+void fillTube(const FrameConstants& f, const FilledCurve& s, int firstRow, int lastRow, const Visibility& visibility) {
     if (isBeforeEye(s.tube, f.nearPlane) && isShort(s.tube))
         fillTubeRows<true>(f, s, firstRow, lastRow, visibility);
     else
         fillTubeRows<false>(f, s, firstRow, lastRow, visibility);
 }
 
-void fillStrand(const FrameConstants& f, const WideStrand& s, int firstRow, int lastRow, const Visibility& visibility) {
+void fillStrand(const FrameConstants& f, const FilledCurve& s, int firstRow, int lastRow, const Visibility& visibility) {
     if (s.isRound)
         fillTube(f, s, firstRow, lastRow, visibility);
     else
@@ -134,8 +134,8 @@ void fillStrand(const FrameConstants& f, const WideStrand& s, int firstRow, int 
 }
 
 /// A tube that is to be filled, and the pixels around its ends. One that reaches beside the eye has one box.
-WideStrand wideTube(const FrameConstants& f, const CameraSegment& c, uint64_t id) {
-    WideStrand w{};
+FilledCurve wideTube(const FrameConstants& f, const CameraSegment& c, uint64_t id) {
+    FilledCurve w{};
     w.isRound = true;
     w.id = id;
     w.tube = tubeOf(c.a, c.b, c.radiusA, c.radiusB);
@@ -159,8 +159,8 @@ WideStrand wideTube(const FrameConstants& f, const CameraSegment& c, uint64_t id
 }
 
 /// A ribbon that is to be filled, and its corners: those of the picture where one of its own has no place on it.
-WideStrand wideRibbon(const FrameConstants& f, const CameraSegment& c, uint64_t id) {
-    WideStrand w{};
+FilledCurve wideRibbon(const FrameConstants& f, const CameraSegment& c, uint64_t id) {
+    FilledCurve w{};
     w.id = id;
     w.ribbon = ribbonOf(c.a, c.b, c.directionA, c.directionB, c.radiusA, c.radiusB);
     const Lens lens = lensHere(f.focal);
