@@ -134,7 +134,7 @@ struct LargeSink {
     void (*keep)(void* context, const LargeTriangle& triangle);
 };
 
-/// Planes over the whole image, only where triangles are drawn; `emissive` only where a material shines.
+/// Planes over the whole image, only where triangles are drawn; `emissive` only where a material emits.
 struct SurfacePlanes {
     uint32_t* surface;
     uint32_t* emissive;       ///< packColour

@@ -15,7 +15,7 @@ struct MaterialRow {
     alignas(64) float nx[kTile], ny[kTile], nz[kTile], faceX[kTile], faceY[kTile], faceZ[kTile];
     alignas(64) float red[kTile], green[kTile], blue[kTile];
     alignas(64) float metallic[kTile], roughness[kTile], occlusion[kTile];
-    alignas(64) float shineR[kTile], shineG[kTile], shineB[kTile];
+    alignas(64) float emissionR[kTile], emissionG[kTile], emissionB[kTile];
     alignas(64) uint32_t flags[kTile];
 };
 
@@ -34,7 +34,7 @@ void applyMaterial(const MaterialRun& run, const Corners& c, const UvRow& uv, bo
     const SurfaceMaterial& material = *run.material;
     const size_t end = run.first + run.n;
     const bool isFlat = (run.surface & kSurfaceFlat) != 0;
-    const vec3 base = material.baseColour, shine = material.emissive;
+    const vec3 base = material.baseColour, emission = material.emissive;
     const float metallic = material.metallic, roughness = material.roughness;
     const uint32_t flags = kPixelTriangle | ((run.surface & kSurfaceUnlit) != 0 ? kPixelUnlit : 0u);
 #pragma GCC ivdep
@@ -57,9 +57,9 @@ void applyMaterial(const MaterialRun& run, const Corners& c, const UvRow& uv, bo
     if (hasEmission)
 #pragma GCC ivdep
         for (size_t i = run.first; i < end; ++i) {
-            s.shineR[i] = shine.x;
-            s.shineG[i] = shine.y;
-            s.shineB[i] = shine.z;
+            s.emissionR[i] = emission.x;
+            s.emissionG[i] = emission.y;
+            s.emissionB[i] = emission.z;
         }
     if ((run.surface & kSurfaceTextured) == 0) return;
     SampledRow t;
@@ -88,9 +88,9 @@ void applyMaterial(const MaterialRun& run, const Corners& c, const UvRow& uv, bo
     if (hasEmission && sample(material.emissiveTexture))
 #pragma GCC ivdep
         for (size_t i = run.first; i < end; ++i) {
-            s.shineR[i] *= t.isThere[i] != 0 ? t.r[i] : 1.0f;
-            s.shineG[i] *= t.isThere[i] != 0 ? t.g[i] : 1.0f;
-            s.shineB[i] *= t.isThere[i] != 0 ? t.b[i] : 1.0f;
+            s.emissionR[i] *= t.isThere[i] != 0 ? t.r[i] : 1.0f;
+            s.emissionG[i] *= t.isThere[i] != 0 ? t.g[i] : 1.0f;
+            s.emissionB[i] *= t.isThere[i] != 0 ? t.b[i] : 1.0f;
         }
     const float bend = material.normalScale;
     if (sample(material.normalTexture))
@@ -116,7 +116,7 @@ struct TriangleRow {
     alignas(64) float wb[kTile], wc[kTile];  ///< weights of the second and third corner
     alignas(64) uint32_t surface[kTile];     ///< flags and material
     alignas(64) float perpX[kTile], perpY[kTile];
-    alignas(64) uint32_t word[kTile], shine[kTile];
+    alignas(64) uint32_t word[kTile], emission[kTile];
 };
 
 /// Rays of the pixels of a row.
@@ -291,6 +291,6 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
     }
     if (planes.emissive == nullptr) return;
 #pragma GCC ivdep
-    for (size_t i = 0; i < n; ++i) t.shine[i] = packColour(s.shineR[i], s.shineG[i], s.shineB[i]);
-    for (size_t i = 0; i < n; ++i) planes.emissive[p.pixel[i]] = t.shine[i];
+    for (size_t i = 0; i < n; ++i) t.emission[i] = packColour(s.emissionR[i], s.emissionG[i], s.emissionB[i]);
+    for (size_t i = 0; i < n; ++i) planes.emissive[p.pixel[i]] = t.emission[i];
 }

@@ -39,7 +39,7 @@ struct RenderRequest {
 struct BackendResources {
     uint64_t meshPipelines = 0;    ///< compiled for triangles
     uint64_t meshBytes = 0;        ///< per-pixel and per-frame buffers for triangles
-    uint64_t emissiveBytes = 0;    ///< per-pixel buffer for shining materials
+    uint64_t emissiveBytes = 0;    ///< per-pixel buffer for emissive materials
     uint64_t textureTiles = 0;     ///< resident
     uint64_t strandPipelines = 0;  ///< compiled for ribbons and tubes
     uint64_t strandBytes = 0;      ///< per-frame buffers for them

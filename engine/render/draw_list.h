@@ -26,7 +26,7 @@ namespace stipple::render {
 /// A light in world space, as KHR_lights_punctual has it.
 struct WorldLight {
     uint32_t kind = shared::kLightPoint;
-    glm::dvec3 position{0}, direction{0, 0, -1};  ///< direction: where it shines
+    glm::dvec3 position{0}, direction{0, 0, -1};  ///< direction: where its light goes
     glm::vec3 colour{1};                          ///< linear, times candela or lux
     float range = 0, innerCone = 0, outerCone = 0.785f;
 };

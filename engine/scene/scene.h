@@ -68,7 +68,7 @@ struct Mesh {
 };
 
 enum class LightKind : uint8_t { directional, point, spot };
-/// KHR_lights_punctual: shines along -z of its node.
+/// KHR_lights_punctual: its light goes along -z of its node.
 struct Light {
     LightKind kind = LightKind::point;
     glm::vec3 colour{1};  ///< linear

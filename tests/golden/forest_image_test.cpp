@@ -115,9 +115,9 @@ TEST_F(Forests, LeavesLetLightThrough) {
             leaves.endStrand(true);
         }
         const auto store = test::buildStrands(leaves, folder_ / "leaf.stipple", *executor_);
-        const auto greenUnder = [&](const glm::dvec3& shinesTo) {
+        const auto greenUnder = [&](const glm::dvec3& lightTo) {
             render::FrameSettings settings = lit(0.1);
-            settings.draw.lights = {{shared::kLightDirectional, {}, shinesTo, glm::vec3(2)}};
+            settings.draw.lights = {{shared::kLightDirectional, {}, lightTo, glm::vec3(2)}};
             const render::Image image = test::draw({{store, {}, {}}}, *backend, *executor_, view, settings);
             const auto d = reference::compareImages(
                 image, test::draw({{store, {}, {}}}, *oracle, *executor_, view, settings), 4, nullptr);
@@ -133,9 +133,9 @@ TEST_F(Forests, LeavesLetLightThrough) {
         const auto tube = test::buildStrands(
             test::oneStrand({{-0.5, 0, 0}, {0.5, 0.01, 0}}, static_cast<float>(pixels * 2 / view.focalPixels)),
             folder_ / "tube.stipple", *executor_);
-        const auto greenUnder = [&](const glm::dvec3& shinesTo) {
+        const auto greenUnder = [&](const glm::dvec3& lightTo) {
             render::FrameSettings settings = lit(0.1);
-            settings.draw.lights = {{shared::kLightDirectional, {}, shinesTo, glm::vec3(2)}};
+            settings.draw.lights = {{shared::kLightDirectional, {}, lightTo, glm::vec3(2)}};
             return coverOf(test::draw({{tube, {}, {}}}, *backend, *executor_, view, settings)).second;
         };
         EXPECT_LT(greenUnder({0, 0, 1}), 0.6 * greenUnder({0, 0, -1})) << pixels;

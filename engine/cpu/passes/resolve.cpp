@@ -8,7 +8,7 @@
 namespace stipple::cpu {
 namespace {
 
-/// Planes that only triangles need, and only those with a shining material.
+/// Planes that only triangles need, and only those with an emissive material.
 void preparePlanes(Frame& frame, size_t pixels) {
     const auto fit = [&](HugeBuffer<uint32_t>& plane, size_t& size, bool isNeeded) {
         if (isNeeded && size != pixels) {
