@@ -103,7 +103,7 @@ void setupBuild(CLI::App& app, int& status) {
     CLI::App* sub = app.add_subcommand(
         "build",
         "build the hierarchy of scans (.ply, .las, .laz), of a mesh (.ply with faces, .gltf, .glb, .obj) or of "
-        "strands (.swc, .trk, .hair, cylinder models)");
+        "curves (.swc, .trk, .hair, cylinder models)");
     sub->add_option("INPUT", o->inputs,
                     "scans that together make the scene: files, folders, patterns, ept.json, cloud.js")
         ->required();

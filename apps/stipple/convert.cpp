@@ -84,7 +84,7 @@ struct Beside {
 Result<void> run(const Options& o) {
     if (!o.strands)
         return fail(ErrorKind::usage, "says nothing of what to convert to", "stipple convert",
-                    "give --strands: polygon plants become ribbons and tubes");
+                    "give --curves: polygon plants become ribbons and tubes");
     if (!isSceneFile(o.input))
         return fail(ErrorKind::usage, "is not read by convert, which takes polygon plants as .gltf, .glb or .obj",
                     o.input, "other files are drawn as they are: stipple render, stipple view");
@@ -149,7 +149,7 @@ Result<void> run(const Options& o) {
                fit.trianglesIn, fit.ribbons, fit.tubes, fit.strands.position.size() - fit.strands.strands(),
                fit.trianglesLeft);
     fmt::print(
-        "  from the mesh to its strands: {:.3g} on average, {:.3g} for 95 %, {:.3g} at most (units of the file)\n",
+        "  from the mesh to its curves: {:.3g} on average, {:.3g} for 95 %, {:.3g} at most (units of the file)\n",
         fit.meanDeviation, fit.p95Deviation, fit.largestDeviation);
     for (const std::string& path : written) fmt::print("  {}\n", path);
     return {};
@@ -167,11 +167,12 @@ void setupConvert(CLI::App& app, int& status) {
         ->type_name("FILE")
         ->required();
     addForce(*sub, o->force);
-    sub->add_flag("--strands", o->strands, "leaves and blades become ribbons, branches tubes; what is neither is kept");
-    sub->add_option("--tolerance", o->fit.tolerance, "how far a part may be from its strand, share of its own width")
+    sub->add_flag("--strands", o->strands)->group("");  // its old name
+    sub->add_flag("--curves", o->strands, "leaves and blades become ribbons, branches tubes; what is neither is kept");
+    sub->add_option("--tolerance", o->fit.tolerance, "how far a part may be from its curve, share of its own width")
         ->transform(within(0.01, 2.0))
         ->capture_default_str();
-    sub->add_option("--joints", o->fit.joints, "segments of a strand at most")
+    sub->add_option("--joints", o->fit.joints, "segments of a curve at most")
         ->transform(within(2, 1000))
         ->capture_default_str();
     sub->add_option("--memory", o->build.memory, "memory that reading the plant may use, bytes: 512M, 4G")

@@ -102,7 +102,7 @@ void addMesh(CLI::App& parent, const char* kind, const char* what, int& status) 
 }
 
 struct PlantRun {
-    std::string output, as = "strands";
+    std::string output, as = "curves";
     grow::PlantOptions plant;
     bool json = false, force = false;
 };
@@ -141,8 +141,9 @@ void addPlant(CLI::App& parent, const char* name, const char* what, uint32_t row
     sub->add_option("--leaves", o->plant.leaves, "leaves of a tree, about, e.g. 200k")
         ->transform(within(uint64_t{1}, uint64_t{1'000'000'000}))
         ->default_str("50k");
-    sub->add_option("--as", o->as, "strands: tubes and ribbons; triangles: the same shape")
-        ->check(oneOf({"strands", "triangles"}))
+    sub->add_option("--as", o->as, "curves: tubes and ribbons; triangles: the same shape")
+        ->transform(oldName("strands", "curves"))
+        ->check(oneOf({"curves", "triangles"}))
         ->capture_default_str();
     if (rows > 1)
         sub->add_option("--rows", o->plant.rows, "rows x rows trees")
@@ -159,7 +160,7 @@ void addPlant(CLI::App& parent, const char* name, const char* what, uint32_t row
 }
 
 struct LandscapeRun {
-    std::string kind, output, as = "strands";
+    std::string kind, output, as = "curves";
     grow::LandscapeOptions landscape;
     uint64_t scanPoints = 2'000'000;
     bool json = false, force = false;
@@ -256,8 +257,9 @@ void addLandscape(CLI::App& parent, const char* kind, const char* what, int& sta
         sub->add_option("--variants", o->landscape.variants, "trees that are grown of each of the three species")
             ->transform(within(1, 16))
             ->capture_default_str();
-        sub->add_option("--as", o->as, "strands: tubes and ribbons; triangles: the same shapes")
-            ->check(oneOf({"strands", "triangles"}))
+        sub->add_option("--as", o->as, "curves: tubes and ribbons; triangles: the same shapes")
+            ->transform(oldName("strands", "curves"))
+            ->check(oneOf({"curves", "triangles"}))
             ->capture_default_str();
     }
     if (isDemo)

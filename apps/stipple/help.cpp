@@ -139,13 +139,13 @@ void arrangeOptions(CLI::App& command) {
     group("Camera", {"--eye", "--target", "--camera-up", "--fov", "--ortho", "--scene-camera", "--camera-path",
                      "--orbit", "--frames"});
     group("Accuracy and budgets (stipple help budgets)",
-          {"--error", "--budget-points", "--resident", "--no-wait", "--strand-exact", "--accumulate", "--samples"});
+          {"--error", "--budget-points", "--resident", "--no-wait", "--curve-exact", "--accumulate", "--samples"});
     group("Picture", {"--size", "--mode", "--lowpass", "--kernel", "--shade", "--background", "--alpha", "--colour",
                       "--colour-map", "--colour-range", "--legend", "--environment", "--environment-scale", "--wind",
                       "--time", "--debug"});
     group("Inputs that are not built yet",
           {"--memory", "--temp", "--duplicates", "--threads", "--normals", "--radii", "--up", "--attributes",
-           "--surfels", "--strand-radius", "--only-points", "--skip-bad", "--drop-outliers", "--allow-outside",
+           "--surfels", "--curve-radius", "--only-points", "--skip-bad", "--drop-outliers", "--allow-outside",
            "--cache-limit", "--progress"});
 }
 

@@ -197,8 +197,8 @@ void printStore(const nlohmann::json& j) {
     double kept = 1;
     for (const auto& level : j["levels"]) kept = std::min(kept, level["kept_share"].get<double>());
     fmt::print(
-        "  stochastically, beside the errors: pixels of strands narrower than a pixel{}\n",
-        kept < 1 ? fmt::format("; of thin strands at the coarsest level 1 in {:.0f}, as much wider", 1 / kept) : "");
+        "  stochastic, beside the errors: pixels of curves narrower than a pixel{}\n",
+        kept < 1 ? fmt::format("; of thin curves at the coarsest level 1 in {:.0f}, as much wider", 1 / kept) : "");
 }
 
 Result<void> showNearest(const lod::Store& store, const Options& o) {
@@ -267,7 +267,7 @@ Result<void> run(const Options& o) {
 void setupInfo(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
     CLI::App* sub = app.add_subcommand("info", "what a scene or an input file holds");
-    sub->add_option("SCENE", o->input, "a .stipple scene, a scan, mesh, scene or strand file, or a folder of scans")
+    sub->add_option("SCENE", o->input, "a .stipple scene, a scan, mesh, scene or curve file, or a folder of scans")
         ->required();
     sub->add_flag("--verify", o->verify, "read everything and check it; a fault ends with 3");
     sub->add_option("--at", o->at, "file coordinates: the input point of a built scene that is nearest to them")

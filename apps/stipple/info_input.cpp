@@ -407,9 +407,9 @@ Result<void> showStrands(const InputInfoOptions& o) {
     const lod::StrandSet clean = lod::cleanStrands(std::move(set), 0);
     scene::Box box;
     for (const glm::dvec3& p : clean.position) box.add(p);
-    nlohmann::json j = {{"kind", "strands"},
+    nlohmann::json j = {{"kind", "curves"},
                         {"path", o.input},
-                        {"strands", strands},
+                        {"curves", strands},
                         {"vertices", vertices},
                         {"drawn", clean.strands()},
                         {"has_radii", hasRadii},
@@ -424,11 +424,11 @@ Result<void> showStrands(const InputInfoOptions& o) {
         printJson("info", j);
         return {};
     }
-    fmt::print("{}: {} of {}\n", printable(o.input), counted(strands, "strand"),
+    fmt::print("{}: {} of {}\n", printable(o.input), counted(strands, "curve"),
                counted(vertices, "vertex", "vertices"));
     printVector(j, "min", "least");
     printVector(j, "max", "greatest");
-    fmt::print("  {:15} {}\n  {:15} {}\n", "radii", hasRadii ? "yes" : "no: see --strand-radius", "colours",
+    fmt::print("  {:15} {}\n  {:15} {}\n", "radii", hasRadii ? "yes" : "no: see --curve-radius", "colours",
                clean.hasColour ? "yes" : "no");
     for (const auto& [what, count] : clean.dropped) fmt::print("  {:15} {} segments {}\n", "left out", count, what);
     for (const auto& [what, count] : clean.mended) fmt::print("  {:15} {} {}\n", "mended", count, what);

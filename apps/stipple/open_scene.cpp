@@ -206,8 +206,8 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
     return {};
 }
 
-/// The ribbons and tubes of a scene. What stands in many places also gets proxies of it, and all those
-/// together an instance group.
+/// The ribbons and tubes of a scene. What stands in many places also gets a proxy, and all those
+/// together are an instance group.
 Result<void> placeStrands(const scene::Scene& scene, const BuildOptions& build, Executor& executor, bool showProgress,
                           OpenedScene& opened) {
     const auto open = [&](const SharedModel& model, const std::string& part) {
@@ -230,7 +230,7 @@ Result<void> placeStrands(const scene::Scene& scene, const BuildOptions& build, 
     GroupBuilder group;
     for (const auto& [mesh, instances] : places.shared) {
         const SharedModel model = modelOf({{mesh, glm::dmat4(1)}});
-        const std::string part = fmt::format("strands of mesh {}", mesh);
+        const std::string part = fmt::format("curves of mesh {}", mesh);
         STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store, open(model, part));
         render::PlacedStore one{store, {}, {}};
         STIPPLE_ASSIGN(one.proxies, strandProxies(model, *store, scene.path, part, build, executor, showProgress));
@@ -244,7 +244,7 @@ Result<void> placeStrands(const scene::Scene& scene, const BuildOptions& build, 
     }
     STIPPLE_TRY(group.finish(scene.path, build, executor, showProgress, opened));
     if (places.once.empty()) return {};
-    STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store, open(modelOf(places.once), "strands"));
+    STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> store, open(modelOf(places.once), "curves"));
     opened.placed.push_back({std::move(store), {}, {}});
     return {};
 }
@@ -258,7 +258,7 @@ double workOf(const scene::Scene& scene, const std::vector<scene::Placement>& of
     return work;
 }
 
-/// What may have to be built of a scene. (Proxies for afar take about as long as what they stand for.)
+/// What may have to be built of a scene. (Proxies take about as long as what they stand for.)
 std::shared_ptr<BuildsOfScene> expectedBuilds(const scene::Scene& scene, bool areTriangles, ProgressStyle style) {
     std::vector<std::string> notes;
     for (const std::string& note : scene.notes) notes.push_back(fmt::format("{}: {}", scene.path, note));
@@ -274,7 +274,7 @@ std::shared_ptr<BuildsOfScene> expectedBuilds(const scene::Scene& scene, bool ar
         if (!places.once.empty()) expect(once, workOf(scene, places.once, kind), hasProxy);
     };
     if (areTriangles) expectKind(scene::PrimitiveKind::triangles, "mesh", "triangles", true);
-    expectKind(scene::PrimitiveKind::lines, "strands of mesh", "strands", false);
+    expectKind(scene::PrimitiveKind::lines, "curves of mesh", "curves", false);
     const double points = workOf(scene, scene::placements(scene), scene::PrimitiveKind::points);
     if (points > 1) builds->expect("points", points);
     return builds;
@@ -425,7 +425,7 @@ Result<std::shared_ptr<const lod::Store>> openFiles(const std::vector<std::strin
                                                     Executor& executor, bool showProgress) {
     if (lod::isStoreFile(inputs.front())) return openStoreFile(inputs.front());
     if (inputs.size() == 1 && lod::isStrandFile(inputs[0]))
-        return openCached(inputs, build, "strands", showProgress, [&](const std::string& path, Progress& progress) {
+        return openCached(inputs, build, "curves", showProgress, [&](const std::string& path, Progress& progress) {
             return buildStrandFile(inputs[0], path, build, executor, progress);
         });
     STIPPLE_ASSIGN(const PlyMeshes meshes, findPlyMeshes(inputs, build));

@@ -14,6 +14,15 @@ namespace stipple::app {
 /// One of these words; for another, the nearest is proposed. `->check(oneOf({...}))`.
 CLI::Validator oneOf(std::vector<std::string> words);
 
+/// Takes the old name of a word for the word. `->transform(oldName("strands", "curves"))`.
+inline CLI::Validator oldName(const std::string& old, const std::string& word) {
+    return {[old, word](std::string& given) {
+                if (given == old) given = word;
+                return std::string();
+            },
+            ""};
+}
+
 CLI::Validator withinWhole(int64_t least, int64_t most);
 CLI::Validator withinReal(double least, double most);
 /// A number from `least` to `most`: of a whole-number type "500k", "1.5M" and "2G" too. Decimal, finite.

@@ -156,12 +156,12 @@ Result<void> checkModule(const Options& o) {
 std::string pruningText(const render::PrunedShares& pruned) {
     std::vector<std::string> parts;
     const auto addShare = [&](double share, const char* of) {
-        if (share > 0) parts.push_back(fmt::format("{:.3g} % of the strands' area ({})", 100 * share, of));
+        if (share > 0) parts.push_back(fmt::format("{:.3g} % of the curves' area ({})", 100 * share, of));
     };
     addShare(pruned.narrowShare(), "narrower than a pixel");
     addShare(pruned.thinnedShare(), "wider for others left out");
     if (pruned.discs > 0) parts.push_back(fmt::format("{} discs of proxies of plants", pruned.discs));
-    return parts.empty() ? "" : fmt::format(" (beside it, stochastically: {})", fmt::join(parts, ", "));
+    return parts.empty() ? "" : fmt::format(" (beside it, stochastic: {})", fmt::join(parts, ", "));
 }
 
 /// The delivered error, in words.
@@ -237,9 +237,9 @@ void tell(const Options& o, const render::FrameState& state, const Verdict& verd
             {"nodes_drawn", c.nodesDrawn},
             {"closes_gaps", closesGaps(o.mode)},
             {"tau_eff_px", jsonNumber(verdict.tauEffectivePixels)},
-            {"pruned",
-             {{"narrow_strands", verdict.pruned.narrowShare()},
-              {"thinned_strands", verdict.pruned.thinnedShare()},
+            {"stochastic",
+             {{"narrow_curves", verdict.pruned.narrowShare()},
+              {"thinned_curves", verdict.pruned.thinnedShare()},
               {"discs", verdict.pruned.discs}}},
             {"complete", verdict.isComplete()},
             {"incomplete_pictures", verdict.incomplete},
@@ -336,9 +336,10 @@ void addReading(CLI::App& sub, Options& o) {
     sub.add_option("--surfels", o.build.surfels, "turn meshes into that many samples, e.g. 1M; 0: keep triangles")
         ->transform(within(uint64_t{0}, uint64_t{200'000'000}))
         ->capture_default_str();
-    sub.add_option("--strand-radius", o.build.strandRadius,
-                   "radius of strands that have none, file units (0: a 4000th of the extent)")
+    sub.add_option("--curve-radius", o.build.strandRadius,
+                   "radius of curves that have none, file units (0: a 4000th of the extent)")
         ->transform(within(0.0, 1e300));
+    sub.add_option("--strand-radius", o.build.strandRadius)->transform(within(0.0, 1e300))->group("");  // its old name
     sub.add_flag("--only-points", o.build.onlyPoints, "of a PLY mesh take the vertices, as points");
     addSceneFileOptions(sub, o.build.allowOutside, o.build.repair);
     sub.add_flag("--skip-bad", o.build.skipBad, "go on past corrupt chunks and files, and say what was lost");
@@ -369,7 +370,7 @@ void addKernelOptions(CLI::App& sub, Options& o) {
 void setupRender(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
     CLI::App* sub = app.add_subcommand("render", "draw pictures without a window");
-    sub->add_option("SCENE", o->inputs, "a .stipple scene, or scans, meshes, strands (built into the cache first)")
+    sub->add_option("SCENE", o->inputs, "a .stipple scene, or scans, meshes, curves (built into the cache first)")
         ->required();
     sub->add_option("-o,--output", o->output, "the picture (.png, .exr); several views give NAME_0000.png ...")
         ->type_name("PICTURE")
@@ -416,12 +417,13 @@ void setupRender(CLI::App& app, int& status) {
         ->transform(within(-1e9, 1e9))
         ->capture_default_str();
     addKernelOptions(*sub, *o);
-    sub->add_option("--strand-exact", o->strandExact,
+    sub->add_option("--curve-exact", o->strandExact,
                     "half-width in pixels from which ribbons and tubes are filled exactly instead of reconstructed")
         ->transform(within(0.5, 1e9))
         ->capture_default_str();
+    sub->add_option("--strand-exact", o->strandExact)->transform(within(0.5, 1e9))->group("");  // its old name
     sub->add_option("--accumulate", o->accumulate,
-                    "the mean of N frames: smooth coverage of strands narrower than a pixel")
+                    "the mean of N frames: smooth coverage of curves narrower than a pixel")
         ->transform(within(1, 4096))
         ->capture_default_str();
     sub->add_option("--samples", o->samples, "mode reference: rays per pixel along each axis")

@@ -364,7 +364,7 @@ Result<void> run(const ViewOptions& o) {
 void setupView(CLI::App& app, int& status) {
     auto o = std::make_shared<ViewOptions>();
     CLI::App* sub = app.add_subcommand("view", "walk through a scene in a window");
-    sub->add_option("SCENE", o->inputs, "a .stipple scene, or scans, meshes, strands (built into the cache first)")
+    sub->add_option("SCENE", o->inputs, "a .stipple scene, or scans, meshes, curves (built into the cache first)")
         ->required();
     sub->add_option("--size", o->size, "of the window, pixels")->type_name("WxH")->capture_default_str();
     sub->add_option("--error", o->error, "tolerated screen-space error, pixels")

@@ -8,9 +8,9 @@ namespace stipple::render {
 /// Of what a cut draws in view, whether or not something is in front of it. Areas as they are seen, px.
 struct PrunedShares {
     double strandArea = 0;   ///< of all strands
-    double narrowArea = 0;   ///< of those narrower than a pixel: each of their pixels is pruned
+    double narrowArea = 0;   ///< of those narrower than a pixel: each of their pixels is drawn or not
     double thinnedArea = 0;  ///< of wider ones that stand, as wide as needed, for others which are pruned
-    uint64_t discs = 0;      ///< of plants from afar: their places are stochastic
+    uint64_t discs = 0;      ///< of proxies of plants: their places are stochastic
     double narrowShare() const { return strandArea > 0 ? narrowArea / strandArea : 0; }
     double thinnedShare() const { return strandArea > 0 ? thinnedArea / strandArea : 0; }
 };

@@ -62,7 +62,7 @@ struct InstanceGroup {
 struct CutScene {
     std::span<const Hierarchy* const> hierarchies;  ///< by Instance::hierarchy
     std::span<const Instance> instances;
-    std::span<const InstanceGroup> groups;  ///< by Instance::instance group
+    std::span<const InstanceGroup> groups;  ///< by Instance::group
 };
 
 /// One byte per chunk of each source's hierarchy: 1 where it can be drawn.

@@ -182,7 +182,7 @@ Result<void> readTables(const InputFile& file, const Head& head, Store& store) {
     if (!isOld) return {};
     h.isGraph = !h.groups.empty();
     if (h.isGraph && store.description.isStrands)
-        return tl::unexpected(damagedStore(store.path, "holds strands and groups of triangles"));
+        return tl::unexpected(damagedStore(store.path, "holds curves and groups of triangles"));
     setKindOfAll(h, h.isGraph ? Kind::triangles : store.description.isStrands ? Kind::curves : Kind::points);
     if ((head.version == kOldWideMeshVersion) != (h.isGraph && h.rootLog2 > kShortMeshBits))
         return tl::unexpected(damagedStore(store.path, "its version is not that of its coordinates"));

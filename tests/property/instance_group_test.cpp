@@ -97,7 +97,7 @@ TEST(StrandHierarchy, MergedPartsKeepTheArea) {
         EXPECT_NEAR(areaAt(store->hierarchy.errors.encodeUp(error / store->hierarchy.unit)) / whole, 1, 0.1) << error;
 }
 
-class Instance groups : public testing::Test {
+class InstanceGroups : public testing::Test {
   protected:
     lod::View viewFrom(const glm::dvec3& eye, const glm::dvec3& target) const {
         scene::Camera camera;

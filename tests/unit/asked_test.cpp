@@ -117,14 +117,14 @@ TEST_F(Asked, TracedPicturesAreReportedLikeOthers) {
 }
 
 TEST_F(Asked, WhatIsLeftToChanceIsSaidOfTheStoreOnceAndOfPicturesBesideTheirError) {
-    const auto note = [](const Outcome& r) { return says(r.err, "thin strands are pruned"); };
+    const auto note = [](const Outcome& r) { return says(r.err, "thin curves are pruned"); };
     ASSERT_EQ(runProgram(folder(), "grow tree -o tree.glb --leaves 20k").code, 0);
     const Outcome built = runProgram(folder(), "build tree.glb -o tree.stipple");
     EXPECT_TRUE(note(built)) << built.err;
     EXPECT_TRUE(says(runProgram(folder(), "build tree.glb -o t2.stipple --json").out, "pruned"));
     for (const char* mode : {"pullpush", "reference", "pullpush"})
         EXPECT_FALSE(note(render(fmt::format("--samples 1 --mode {}", mode), "tree.glb"))) << mode;
-    EXPECT_TRUE(says(render("", "tree.glb").out, "stochastically")) << "beside the error";
+    EXPECT_TRUE(says(render("", "tree.glb").out, "stochastic:")) << "beside the error";
 }
 
 TEST_F(Asked, TheMemoryThatASceneIsToldToAskForSuffices) {

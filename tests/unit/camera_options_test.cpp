@@ -29,7 +29,7 @@ TEST_F(CameraOptionsTest, WhatCannotBeLookedAtIsRefused) {
     for (const char* bad :
          {"--eye 1,2,3 --target 1,2,3", "--eye 1e308,0,0 --target=-1e308,0,0", "--eye 1e300,0,0", "--camera-up 0,0,0",
           "--camera-up 0,0,1e200", "--up 0,0,1e200", "--eye nan,0,0", "--target 0,inf,0", "--fov nan", "--fov 0",
-          "--fov 180", "--time nan", "--time inf", "--wind nan", "--strand-exact nan"}) {
+          "--fov 180", "--time nan", "--time inf", "--wind nan", "--curve-exact nan"}) {
         EXPECT_EQ(render(bad), 2) << bad << ": " << said_;
         const std::string option = std::string(bad).substr(0, std::string(bad).find_first_of(" ="));
         EXPECT_NE(said_.find(option), std::string::npos) << bad << ": " << said_;

@@ -155,7 +155,7 @@ TEST(Program, GrowsForestsMeadowsAndConvertsPlants) {
     EXPECT_EQ(c["written"].size(), 3u);
     EXPECT_EQ(runProgram(folder, "info t.stipple --verify").code, 0);
     EXPECT_EQ(runProgram(folder, "render t.scene.glb -o t.png --size 160x120 --device cpu").code, 0);
-    expectOneLine(runProgram(folder, "convert t.glb -o x.stipple"), 2, {"--strands"});
+    expectOneLine(runProgram(folder, "convert t.glb -o x.stipple"), 2, {"--curves"});
     expectOneLine(runProgram(folder, "convert missing.glb --strands -o x.stipple"), 3, {"missing.glb"});
     expectOneLine(runProgram(folder, "convert t.glb --strands -o x.txt"), 2, {"x.txt"});
     expectOneLine(runProgram(folder, "grow forest -o f.glb --trees none"), 2, {"--trees"});

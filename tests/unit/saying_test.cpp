@@ -206,7 +206,7 @@ TEST(Plain, OtherKindsOfFileAreNamedByConvert) {
                "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
                "float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n"
                "1 0 0\n0 1 0\n3 0 1 2\n");
-    const Outcome r = runProgram(folder, "convert a.ply --strands -o a.stipple");
+    const Outcome r = runProgram(folder, "convert a.ply --curves -o a.stipple");
     expectOneLine(r, 2, {"a.ply", "convert", ".glb or .obj"});
     EXPECT_FALSE(says(r.err, "is not a mesh")) << "it is one";
 }

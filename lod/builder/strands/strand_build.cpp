@@ -87,7 +87,7 @@ class StrandBuild : public CellContent {
         notes_.assign(notes.begin(), notes.end());
         for (const auto& [what, count] : mended) notes_.push_back(fmt::format("{} {}", count, what));
         facts_.given = given > 0 ? given : facts_.segments;
-        if (facts_.segments == 0) return fail(ErrorKind::input, "holds no strand that can be drawn", source());
+        if (facts_.segments == 0) return fail(ErrorKind::input, "holds no curve that can be drawn", source());
         facts_.lo = bounds.lo;
         facts_.hi = bounds.hi;
         const glm::dvec3 size = facts_.hi - facts_.lo;
@@ -175,7 +175,7 @@ class StrandBuild : public CellContent {
         for (const Subtree& subtree : subtrees)
             if (subtree.count > 4 * kSubtreePoints)
                 return fail(ErrorKind::budget, fmt::format("{} segments lie within the length of one", subtree.count),
-                            source(), "are the strands what they should be?");
+                            source(), "are the curves what they should be?");
         return {};
     }
     uint64_t temporaryBytes(int) const override { return facts_.segments * kSpillBytes; }
@@ -330,7 +330,7 @@ class StrandBuild : public CellContent {
         report.added = description.added = added_;
         if (fewestKept_ < 1)
             report.coarseNotes.push_back(fmt::format(
-                "from afar thin strands are pruned: at the coarsest level 1 in {:.0f}, wider by as much; where "
+                "from afar thin curves are pruned: at the coarsest level 1 in {:.0f}, wider by as much; where "
                 "the others were is stochastic and not part of the stated error",
                 1 / fewestKept_));
         return hierarchy;

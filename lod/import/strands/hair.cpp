@@ -36,7 +36,7 @@ Result<void> readHair(const std::function<Cursor(uint64_t)>& open, const std::st
     if ((head.arrays & kPoints) == 0) return fail(ErrorKind::input, "holds no points", path);
     if (size < needed)
         return fail(ErrorKind::input,
-                    fmt::format("{} strands of {} points need {} bytes; the file has {}", head.strands, head.points,
+                    fmt::format("{} curves of {} points need {} bytes; the file has {}", head.strands, head.points,
                                 needed, size),
                     path, "it is not whole");
     uint64_t at = sizeof(head);
@@ -65,7 +65,7 @@ Result<void> readHair(const std::function<Cursor(uint64_t)>& open, const std::st
         if (hasSegments) STIPPLE_TRY(segments.take(count));
         if (next + count + 1 > head.points)
             return fail(ErrorKind::input,
-                        fmt::format("strand {} of {} needs more than the {} points there are", s + 1, head.strands,
+                        fmt::format("curve {} of {} needs more than the {} points there are", s + 1, head.strands,
                                     head.points),
                         path);
         for (uint32_t k = 0; k <= count; ++k, ++next) {  // (the size of the file was checked: all of it is there)
