@@ -10,6 +10,7 @@
 #include "engine/reference/decode.h"
 #include "engine/render/frame.h"
 #include "lod/store/store.h"
+#include "tests/support/nearest_field.h"
 #include "tests/support/support.h"
 
 namespace stipple::test {
@@ -35,24 +36,19 @@ struct RayHits {
 /// picture's height (4 pixels); a disc of one side only from there; without a normal it faces the eye.
 RayHits hitDiscs(const std::vector<reference::Disc>& discs, const lod::View& view, double leastPixels = 1);
 
-/// Distances from the nearest of many discs.
-class DiscField {
-  public:
-    explicit DiscField(std::vector<reference::Disc> discs);
-    /// World units; `limit` where none is nearer.
-    double distance(const glm::dvec3& place, double limit) const;
-
-  private:
-    struct Node {
-        glm::dvec3 lo{0}, hi{0};
-        uint32_t begin = 0, end = 0, left = 0;  ///< left: 0 at leaves; the other child follows it
-    };
-    void split(uint32_t node);
-
-    std::vector<reference::Disc> discs_;
-    std::vector<Node> nodes_;
-};
 /// Distance of a place from one disc; without a normal it is a ball.
 double distanceTo(const reference::Disc& disc, const glm::dvec3& place);
+
+/// Distances from the nearest of many discs.
+struct OfDiscs {
+    using Item = reference::Disc;
+    static void grow(const reference::Disc& d, glm::dvec3& lo, glm::dvec3& hi) {
+        lo = glm::min(lo, d.position - d.radius);
+        hi = glm::max(hi, d.position + d.radius);
+    }
+    static double along(const reference::Disc& d, int axis) { return d.position[axis]; }
+    static double distance(const reference::Disc& d, const glm::dvec3& place) { return distanceTo(d, place); }
+};
+using DiscField = NearestField<OfDiscs>;
 
 }  // namespace stipple::test

@@ -2,24 +2,23 @@
 #pragma once
 
 #include "tests/support/meshes.h"
+#include "tests/support/nearest_field.h"
 
 namespace stipple::test {
 
-class TriangleField {
-  public:
-    explicit TriangleField(std::vector<Triangle> triangles);
-    /// World units; `limit` where none is nearer.
-    double distance(const glm::dvec3& place, double limit) const;
-
-  private:
-    struct Node {
-        glm::dvec3 lo{0}, hi{0};
-        uint32_t begin = 0, end = 0, left = 0;  ///< left: 0 at leaves; the other child follows it
-    };
-    void split(uint32_t node);
-
-    std::vector<Triangle> triangles_;
-    std::vector<Node> nodes_;
+struct OfTriangles {
+    using Item = Triangle;
+    static void grow(const Triangle& t, glm::dvec3& lo, glm::dvec3& hi) {
+        for (const glm::dvec3& corner : t) {
+            lo = glm::min(lo, corner);
+            hi = glm::max(hi, corner);
+        }
+    }
+    static double along(const Triangle& t, int axis) { return t[0][axis] + t[1][axis] + t[2][axis]; }
+    static double distance(const Triangle& t, const glm::dvec3& place) {
+        return glm::length(place - closestPlace(t, place));
+    }
 };
+using TriangleField = NearestField<OfTriangles>;
 
 }  // namespace stipple::test
