@@ -20,6 +20,7 @@
 #include "engine/base/units.h"
 #include "engine/image/image_io.h"
 #include "engine/scene/gltf/container.h"
+#include "engine/scene/outline.h"
 #include "engine/scene/strands.h"
 #include "engine/scene/triangles.h"
 #include "lod/builder/mesh/mesh_build.h"

@@ -12,7 +12,6 @@
 #include "engine/scene/camera.h"
 #include "engine/scene/surfels.h"
 #include "engine/scene/triangles.h"
-#include "lod/store/nearest.h"
 #include "shaders/shared/environment.h"
 #include "tests/support/meshes.h"
 

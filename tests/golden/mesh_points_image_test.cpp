@@ -8,6 +8,7 @@
 #include "engine/scene/camera.h"
 #include "engine/scene/surfels.h"
 #include "engine/scene/triangles.h"
+#include "lod/store/nearest.h"
 #include "tests/support/meshes.h"
 
 namespace stipple {

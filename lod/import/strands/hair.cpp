@@ -64,10 +64,10 @@ Result<void> readHair(const std::function<Cursor(uint64_t)>& open, const std::st
         uint16_t count = static_cast<uint16_t>(std::min(head.segments, 65535u));
         if (hasSegments) STIPPLE_TRY(segments.take(count));
         if (next + count + 1 > head.points)
-            return fail(ErrorKind::input,
-                        fmt::format("curve {} of {} needs more than the {} points there are", s + 1, head.strands,
-                                    head.points),
-                        path);
+            return fail(
+                ErrorKind::input,
+                fmt::format("curve {} of {} needs more than the {} points there are", s + 1, head.strands, head.points),
+                path);
         for (uint32_t k = 0; k <= count; ++k, ++next) {  // (the size of the file was checked: all of it is there)
             std::array<float, 3> p{}, c{};
             float wide = head.thickness;
