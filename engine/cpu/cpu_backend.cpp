@@ -18,7 +18,10 @@ namespace {
 
 class CpuBackend final : public render::Backend {
   public:
-    CpuBackend(Executor& executor, const Kernels& kernels) : frame_(executor, kernels, chunks_) {}
+    CpuBackend(Executor& executor, const Kernels& kernels, uint64_t mostTileEntries)
+        : frame_(executor, kernels, chunks_) {
+        frame_.mostTileEntries = mostTileEntries;
+    }
 
     std::string name() const override { return "cpu"; }
     std::string device() const override {
@@ -83,6 +86,7 @@ class CpuBackend final : public render::Backend {
             std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
         times_.clear();
         const std::span<const render::Pass> passes(request.passes);
+        frame_.wantsNormals = wantsNormals(frame_, passes);
         for (size_t p = 0; p < passes.size();) {
             const double start = nowSeconds();
             std::string name = render::passName(passes[p]);
@@ -109,8 +113,8 @@ class CpuBackend final : public render::Backend {
 
 }  // namespace
 
-std::unique_ptr<render::Backend> makeCpuBackend(Executor& executor, const Kernels* kernels) {
-    return std::make_unique<CpuBackend>(executor, kernels ? *kernels : bestKernels());
+std::unique_ptr<render::Backend> makeCpuBackend(Executor& executor, const Kernels* kernels, uint64_t mostTileEntries) {
+    return std::make_unique<CpuBackend>(executor, kernels ? *kernels : bestKernels(), mostTileEntries);
 }
 
 }  // namespace stipple::cpu

@@ -9,7 +9,12 @@
 
 namespace stipple::cpu {
 
+/// What lists of discs by tile may hold at a time, 4 bytes each. Where they would hold more, tiles are drawn some rows
+/// after others.
+constexpr uint64_t kMostTileEntries = uint64_t{1} << 26;
+
 /// `kernels`: nullptr for the best ones.
-std::unique_ptr<render::Backend> makeCpuBackend(Executor& executor, const Kernels* kernels = nullptr);
+std::unique_ptr<render::Backend> makeCpuBackend(Executor& executor, const Kernels* kernels = nullptr,
+                                                uint64_t mostTileEntries = kMostTileEntries);
 
 }  // namespace stipple::cpu

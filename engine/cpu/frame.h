@@ -45,7 +45,8 @@ struct Frame {
     shared::FrameConstants constants{};
     render::Image* image = nullptr;
     bool wantAll = false;
-    bool hasPyramid = false;  ///< the levels above the first are of this frame: push runs
+    bool hasPyramid = false;    ///< the levels above the first are of this frame: push runs
+    bool wantsNormals = false;  ///< some pass reads the surface's
 
     // Plane::visibility. It is clear between frames: resolve resets each entry that it has read.
     HugeBuffer<uint64_t> visibility;
@@ -70,6 +71,7 @@ struct Frame {
     std::vector<uint32_t> placedColours;  ///< only where discs are blended
     std::vector<TileRange> splatTiles;
     std::vector<uint32_t> tilePlaces, tileEnds;
+    uint64_t mostTileEntries = 0;  ///< of those lists, at a time
 
     // Plane::filtered, and its coverage, of 255; only where discs are blended.
     HugeBuffer<shared::FilteredPixel> filtered;

@@ -66,10 +66,10 @@ struct PlacedSplat {
     float cx, cy, cz, nx, ny, nz, radius;
     uint32_t id;  ///< of the visibility buffer
 };
-/// How large discs count: at least so many of their node's spacings, boxes around so many of these radii and `margin`
-/// px.
+/// How large discs count: at least so many of their node's spacings. What is drawn of them ends `support` sigmas of
+/// `sigmas` radii each from their centres, widened by a low-pass (variance, px^2).
 struct SplatReach {
-    float leastSpacings = 0, radii = 1, margin = 0;
+    float leastSpacings = 0, sigmas = 1, support = 1, lowPass = 0;
 };
 /// The discs of one block, and boxes of pixels that hold them.
 struct SplatBlock {
@@ -266,10 +266,11 @@ struct Kernels {
     void (*splatTile)(const shared::FrameConstants& f, const PlacedSplat* splats, const uint32_t* places, size_t count,
                       const SplatTile& tile, const Visibility& visibility);
     /// Blends some discs at the pixels of one tile, which is nobody else's meanwhile; `filtered` is of the whole image.
-    /// `colours`: of each disc, as records have them, with their flags.
+    /// `colours`: of each disc, as records have them, with their flags. `wantsNormals`: else those of pixels are any.
     void (*filterTile)(const shared::FrameConstants& f, const Tables& tables, const BlockSource* blocks,
                        const PlacedSplat* splats, const uint32_t* colours, const uint32_t* places, size_t count,
-                       const SplatTile& tile, const Visibility& visibility, shared::FilteredPixel* filtered);
+                       const SplatTile& tile, bool wantsNormals, const Visibility& visibility,
+                       shared::FilteredPixel* filtered);
     /// 1 for each pixel of a row that no opaque surface is seen at.
     void (*openRow)(const shared::FrameConstants& f, const uint64_t* keys, const shared::FilteredPixel* filtered,
                     uint32_t n, uint8_t* open);

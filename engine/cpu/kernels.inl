@@ -137,6 +137,10 @@ void projectBlock(const FrameConstants& f, const DrawNode& node, const PointReco
 
 #include "engine/cpu/strands.inl"
 
+#include "engine/cpu/place_discs.inl"
+
+#include "engine/cpu/disc_batch.inl"
+
 #include "engine/cpu/splat.inl"
 
 #include "engine/cpu/ewa.inl"

@@ -155,14 +155,29 @@ struct OtherPixels {
     to.depth[to.count++] = keyDepth(key);
 }
 
-/// Empties the row's entries of the visibility buffer.
-void gatherRow(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, uint64_t* visibility,
-               uint32_t n, Gathered& g, OtherPixels& others, bool& any, bool& anyTurned) {
+/// What a pixel's points were blended to.
+[[gnu::always_inline]] inline void gatherBlended(const FilteredPixel& shown, uint64_t key, Gathered& g, size_t i) {
+    const vec3 d = octDecode(shown.normal);
+    g.x[i] = g.y[i] = 0;
+    g.z[i] = 1;
+    g.front[i] = keyDepth(key);
+    g.turned[i] = 1;
+    g.nx[i] = d.x;
+    g.ny[i] = d.y;
+    g.nz[i] = d.z;
+    g.flags[i] = (shown.cover & kFilteredLeaf) != 0 ? kFlagLeaf : 0u;
+    g.colour[i] = shown.colour;
+}
+
+/// Empties the row's entries of the visibility buffer. `filtered`: of the row, or null: its points are their records.
+void gatherRow(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const FilteredPixel* filtered,
+               uint64_t* visibility, uint32_t n, Gathered& g, OtherPixels& others, bool& any, bool& anyTurned) {
     constexpr size_t kPrefetch = 12;  // pixels ahead: records lie anywhere in memory
     const BlockRanges firstBlock = f.firstBlock;
     for (WinningPixels& p : others.of) p.count = 0;
+    anyTurned = filtered != nullptr;
     for (size_t i = 0; i < n; ++i) {
-        if (i + kPrefetch < n && isPointKey(visibility[i + kPrefetch], firstBlock)) {
+        if (filtered == nullptr && i + kPrefetch < n && isPointKey(visibility[i + kPrefetch], firstBlock)) {
             const uint64_t ahead = visibility[i + kPrefetch];
             __builtin_prefetch(blocks[keyBlock(ahead)].records + keyLane(ahead));
         }
@@ -170,26 +185,14 @@ void gatherRow(const FrameConstants& f, const Tables& tables, const BlockSource*
         if (key != kNoKey) visibility[i] = kNoKey;
         if (isPointKey(key, firstBlock)) {
             any = true;
-            anyTurned = gatherPoint(f, tables, blocks[keyBlock(key)], key, g, i) || anyTurned;
+            if (filtered != nullptr)
+                gatherBlended(filtered[i], key, g, i);
+            else
+                anyTurned = gatherPoint(f, tables, blocks[keyBlock(key)], key, g, i) || anyTurned;
             continue;
         }
         if (key != kNoKey) gatherOther(key, firstBlock, i, others);
         gatherNothing(g, i);
-    }
-}
-
-/// What points were blended to takes the place of their records.
-void gatherFiltered(const FilteredPixel* __restrict filtered, uint32_t n, Gathered& g) {
-    for (size_t i = 0; i < n; ++i) {
-        if (!(g.front[i] > 0.0f)) continue;
-        const FilteredPixel shown = filtered[i];
-        const vec3 d = octDecode(shown.normal);
-        g.turned[i] = 1;
-        g.nx[i] = d.x;
-        g.ny[i] = d.y;
-        g.nz[i] = d.z;
-        g.flags[i] = (shown.cover & kFilteredLeaf) != 0 ? kFlagLeaf : 0u;
-        g.colour[i] = shown.colour;
     }
 }
 
@@ -217,11 +220,8 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
     Gathered g;
     OtherPixels others;
     bool any = false, anyTurned = false;
-    gatherRow(f, tables, in.blocks, visibility, n, g, others, any, anyTurned);
-    if (in.filtered != nullptr && any) {
-        gatherFiltered(in.filtered + size_t{y} * f.width + x0, n, g);
-        anyTurned = true;
-    }
+    const FilteredPixel* const filtered = in.filtered != nullptr ? in.filtered + size_t{y} * f.width + x0 : nullptr;
+    gatherRow(f, tables, in.blocks, filtered, visibility, n, g, others, any, anyTurned);
     if (surface != nullptr)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) surface[i] = 0;

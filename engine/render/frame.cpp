@@ -155,11 +155,26 @@ std::unique_ptr<FrameState> makeFrameState(std::vector<std::shared_ptr<const lod
     return makeFrameState(placed, backend, executor, settings);
 }
 
+namespace {
+
+/// Gaussians are known as far as shaders/shared/ewa.h has them.
+Result<void> checkFilter(const DrawSettings& s) {
+    if (!(s.kernelSupport >= 1 && s.kernelSupport <= 4))
+        return fail(ErrorKind::usage, "kernels end between 1 and 4 standard deviations", "kernelSupport",
+                    "take 2 or 3");
+    if (!(s.lowPass >= 0 && s.lowPass <= 64))
+        return fail(ErrorKind::usage, "the low-pass is between 0 and 64 px^2", "lowPass", "take 0.5");
+    return {};
+}
+
+}  // namespace
+
 Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettings& settings, double start,
                      double cutMs) {
     if (state.backendLife.expired())
         return fail(ErrorKind::device, "what draws the scene is gone", "the frame",
                     "keep the backend while it is used");
+    STIPPLE_TRY(checkFilter(settings.draw));
     DrawSettings settingsOfMode = settings.draw;
     settingsOfMode.exactStrands = std::min(settings.draw.exactStrands, reconstructionOf(settings.mode).exactCurves);
     makeDrawList(state.cut, state.hierarchies, state.instances, view, settingsOfMode, state.draws);

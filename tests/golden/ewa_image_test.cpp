@@ -236,28 +236,39 @@ TEST(Ewa, LeavesNoHolesInClosedSurfaces) {
 TEST(Ewa, NoSkyShinesThroughTheRimOfALeafBeforeAWall) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);
-    std::vector<test::TestPoint> points;
+    std::vector<test::TestPoint> points, leaf;
     for (int y = -100; y <= 100; ++y)
         for (int x = -100; x <= 100; ++x) {
             if (x <= 0) points.push_back({{0.01 * x, 0.01 * y, 0}, {0, 0, 1}, 0x00ff00u});
-            if (x * x + y * y <= 1600) points.push_back({{0.01 * x, 0.01 * y, 0.5}, {0, 0, 1}, 0x0000ffu});
+            if (x * x + y * y > 1600) continue;
+            points.push_back({{0.01 * x, 0.01 * y, 0.5}, {0, 0, 1}, 0x0000ffu});
+            leaf.push_back(points.back());
         }
     test::writePly(folder / "a.ply", points);
+    test::writePly(folder / "b.ply", leaf);
     const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    const auto leafAlone = test::buildAndOpen(folder / "b.ply", folder / "b.stipple", *executor);
     lod::View view = test::viewFromAbove({0, 0, 0});
     view.focalPixels = 420;
     render::FrameSettings settings = blended();
     settings.draw.background = {0, 0, 1};
     for (auto& [name, backend] : test::cpuBackendsAndOracle(*executor)) {
         const render::Image image = test::renderView(store, *backend, *executor, view, settings);
-        size_t blue = 0, inside = 0, soft = 0;
+        // The control: without the wall the sky is seen through the same rim.
+        const render::Image alone = test::renderView(leafAlone, *backend, *executor, view, settings);
+        size_t blue = 0, inside = 0, soft = 0, rim = 0, blueRim = 0, blueRimAlone = 0;
         for (size_t i = 0; i < image.rgba.size(); ++i) {
             soft += coverageOf(image, i) > 0.05 && coverageOf(image, i) < 0.95;
             const dvec3 ray = test::rayThrough(view, double(i % 400) + 0.5, double(i / 400) + 0.5);
-            const dvec3 wall = view.eye + 3.0 * ray, leaf = view.eye + 2.5 * ray;
+            const dvec3 wall = view.eye + 3.0 * ray, onPlane = view.eye + 2.5 * ray;
             // Three pixels within the outline of both together.
-            const bool onLeaf = glm::length(dvec2(leaf)) < 0.38;
+            const bool onLeaf = glm::length(dvec2(onPlane)) < 0.38;
             const bool onWall = wall.x < -0.02 && wall.x > -0.98 && std::abs(wall.y) < 0.98;
+            if (onWall && std::abs(glm::length(dvec2(onPlane)) - 0.405) < 0.015) {
+                ++rim;
+                blueRim += channel(image, i, 2) > 1e-6;
+                blueRimAlone += channel(alone, i, 2) > 0.05 && channel(alone, i, 0) > 0.05;
+            }
             if (!onLeaf && !onWall) continue;
             ++inside;
             blue += channel(image, i, 2) > 1e-6;
@@ -265,6 +276,9 @@ TEST(Ewa, NoSkyShinesThroughTheRimOfALeafBeforeAWall) {
         EXPECT_GT(inside, 40'000u);
         EXPECT_GT(soft, 200u) << name;  // outlines against the sky are soft
         EXPECT_EQ(blue, 0u) << name;
+        EXPECT_GT(rim, 500u);
+        EXPECT_EQ(blueRim, 0u) << name;
+        EXPECT_GT(blueRimAlone, 100u) << name;
     }
 }
 
@@ -390,6 +404,78 @@ TEST(Ewa, IsTheSameBytesForAnyThreads) {
     };
     const render::Image a = of(*one), b = of(*four);
     EXPECT_TRUE(a.rgba == b.rgba && a.depth == b.depth && a.normal == b.normal);
+}
+
+/// Lists that do not fit at once are drawn some rows of tiles after others: the same bytes.
+TEST(Ewa, TilesInBandsAreTheSameBytes) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    test::writePly(folder / "a.ply", test::samplesOf(test::Shape::statue, 20'000, 3));
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    lod::View view = test::viewFromAbove({0, 0, 0});
+    view.eye = {0.1, 0.05, 2};
+    view.width = 230;
+    view.height = 190;
+    const auto whole = cpu::makeCpuBackend(*executor);
+    for (const render::Mode mode : {render::Mode::ewa, render::Mode::splat}) {
+        const render::Image truth = test::renderView(store, *whole, *executor, view, blended(mode));
+        size_t drawn = 0;
+        for (const float depth : truth.depth) drawn += depth > 0;
+        EXPECT_GT(drawn, 10'000u);
+        // One row of tiles after the other; some at a time. Each of 20,000 discs is in one list at least.
+        for (const uint64_t most : {1u, 3'000u}) {
+            const auto bands = cpu::makeCpuBackend(*executor, nullptr, most);
+            const render::Image image = test::renderView(store, *bands, *executor, view, blended(mode));
+            EXPECT_EQ(image.rgba, truth.rgba) << most;
+            EXPECT_EQ(image.depth, truth.depth) << most;
+            EXPECT_EQ(image.normal, truth.normal) << most;
+        }
+    }
+}
+
+/// Normals are blended only where somebody reads them: the picture is the same.
+TEST(Ewa, PicturesDoNotDependOnWhatElseIsAskedFor) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    test::writePly(folder / "a.ply", test::samplesOf(test::Shape::statue, 20'000, 3));
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    lod::View view = test::viewFromAbove({0, 0, 0});
+    view.eye = {0.1, 0.05, 2};
+    for (auto& [name, backend] : test::cpuBackendsAndOracle(*executor))
+        for (const bool isLit : {false, true})
+            for (const uint32_t debug : {shared::kDebugNone, shared::kDebugNormals}) {
+                render::FrameSettings settings = blended();
+                settings.draw.lit = isLit;
+                settings.draw.debugView = debug;
+                const render::Image all = test::renderView(store, *backend, *executor, view, settings);
+                settings.wantDepthAndNormal = false;
+                const render::Image picture = test::renderView(store, *backend, *executor, view, settings);
+                EXPECT_EQ(picture.rgba, all.rgba) << name << (isLit ? ", lit" : "") << ", debug view " << debug;
+                settings.draw.debugView = shared::kDebugNormals;
+                settings.draw.lit = false;
+                const render::Image other = test::renderView(store, *backend, *executor, view, settings);
+                EXPECT_EQ(other.rgba == all.rgba, debug == shared::kDebugNormals) << name;
+            }
+}
+
+/// What no kernel can be is refused.
+TEST(Ewa, RefusesFiltersThatAreNone) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    const auto backend = cpu::makeCpuBackend(*executor);
+    test::writePly(folder / "a.ply", test::samplesOf(test::Shape::statue, 500, 3));
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    const auto state = render::makeFrameState({store}, *backend, *executor, {});
+    const lod::View view = test::viewFromAbove({0, 0, 0});
+    for (const float bad : {-1.0f, std::nanf(""), 1e9f, HUGE_VALF}) {
+        render::FrameSettings settings = blended();
+        settings.draw.lowPass = bad;
+        EXPECT_FALSE(render::renderUntilComplete(*state, view, settings)) << bad;
+        settings = blended();
+        settings.draw.kernelSupport = bad;
+        EXPECT_FALSE(render::renderUntilComplete(*state, view, settings)) << bad;
+    }
+    EXPECT_TRUE(render::renderUntilComplete(*state, view, blended()));
 }
 
 TEST(Ewa, ThousandsAtOnePixelAreAsOne) {

@@ -15,21 +15,19 @@ void blendDiscs(Frame& frame) {
         frame.coverage.assign(pixels, 0);
         frame.filteredPixels = pixels;
     }
-    // Kernels reach as many sigmas as they have support; the low-pass of that many px adds to it.
-    const float support = frame.constants.kernelSupport;
-    TileLists lists(frame, {shared::kOpaqueSpacings, support / shared::kOpaqueSigmas,
-                            support * std::sqrt(frame.constants.lowPass) + 0.5f});
+    TileLists lists(frame, {shared::kOpaqueSpacings, 1 / shared::kOpaqueSigmas, frame.constants.kernelSupport,
+                            frame.constants.lowPass});
     lists.place();
     lists.draw([&](const PlacedSplat* splats, const uint32_t* places, size_t count, const SplatTile& tile) {
         frame.k.filterTile(frame.constants, frame.tables, frame.blocks.data(), splats, frame.placedColours.data(),
-                           places, count, tile, frame.visible(), frame.filtered.data());
+                           places, count, tile, frame.wantsNormals, frame.visible(), frame.filtered.data());
     });
 }
 
-/// Which pixels of a row are open, or have an open neighbour beside them; the rows above and below the picture are not.
+/// Which pixels of a row are open, or have an open neighbour; the rows above and below the picture are not.
 class OpenRows {
   public:
-    explicit OpenRows(Frame& frame) : frame_(frame) {
+    explicit OpenRows(Frame& frame) : frame_(frame), near_(frame.constants.width) {
         for (auto& row : rows_) row.resize(frame.constants.width + 2);
     }
     void load(int64_t y) {
@@ -40,15 +38,19 @@ class OpenRows {
         frame_.k.openRow(frame_.constants, frame_.visibility.data() + at, frame_.filtered.data() + at,
                          frame_.constants.width, row.data() + 1);
     }
-    bool isNear(size_t x) const {
-        bool any = false;
-        for (const auto& row : rows_) any = any || row[x] != 0 || row[x + 1] != 0 || row[x + 2] != 0;
-        return any;
+    /// Of the middle one of the rows that were loaded last: 1 where one of nine pixels is open.
+    const std::vector<uint8_t>& near() {
+        const uint8_t *const a = rows_[0].data(), *const b = rows_[1].data(), *const c = rows_[2].data();
+        for (size_t x = 0; x < near_.size(); ++x)
+            near_[x] = static_cast<uint8_t>(a[x] | a[x + 1] | a[x + 2] | b[x] | b[x + 1] | b[x + 2] | c[x] | c[x + 1] |
+                                            c[x + 2]);
+        return near_;
     }
 
   private:
     Frame& frame_;
     std::array<std::vector<uint8_t>, 3> rows_;
+    std::vector<uint8_t> near_;
 };
 
 /// How far silhouettes cover their pixels.
@@ -62,11 +64,12 @@ void cover(Frame& frame) {
             open.load(int64_t{y} + 1);
             const size_t at = size_t{y} * f.width;
             if (!frame.isSeen(at, f.width)) continue;
-            for (size_t x = 0; x < f.width; ++x) {
-                const bool isBlended = shared::isPointKey(frame.visibility[at + x], f.firstBlock);
-                frame.coverage[at + x] =
-                    isBlended && open.isNear(x) ? static_cast<uint8_t>(frame.filtered[at + x].cover & 255u) : 255;
-            }
+            uint8_t* const coverage = frame.coverage.data() + at;
+            std::fill_n(coverage, f.width, uint8_t{255});
+            const std::vector<uint8_t>& near = open.near();
+            for (size_t x = 0; x < f.width; ++x)
+                if (near[x] != 0 && shared::isPointKey(frame.visibility[at + x], f.firstBlock))
+                    coverage[x] = static_cast<uint8_t>(frame.filtered[at + x].cover & 255u);
         }
     });
 }

@@ -2,6 +2,7 @@
 // nearest of the discs whose centres it holds, and a pixel takes the nearest of those about it, over all levels. What a
 // texel does not keep is drawn by lists of tiles, so that nothing is lost whatever shares a texel: the picture is that
 // of mode splat.
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <limits>
@@ -120,6 +121,7 @@ void exact(Frame& frame) {
             const TileRange& r = frame.splatTiles[at];
             if (r.firstX <= column && column <= r.lastX && r.firstY <= row && row <= r.lastY) found.push_back(at);
         });
+        std::sort(found.begin(), found.end());  // as ids are: of what is equally deep the first is drawn
         if (!found.empty()) draw(frame.placedSplats.data(), found.data(), found.size(), tile);
     });
     frame.executor.parallelFor(lists.chunks(), 1, [&](size_t begin, size_t end) {

@@ -51,4 +51,7 @@ const CpuKind& cpuKind(lod::Kind kind);
 /// is kept for later passes, unless it is the picture.
 void runRows(Frame& frame, std::span<const render::Pass> passes);
 
+/// Does any of the passes read normals of the surface?
+bool wantsNormals(const Frame& frame, std::span<const render::Pass> passes);
+
 }  // namespace stipple::cpu

@@ -170,6 +170,21 @@ void runRows(Frame& frame, std::span<const render::Pass> passes) {
     });
 }
 
+bool wantsNormals(const Frame& frame, std::span<const render::Pass> passes) {
+    SurfaceWants wants{};
+    uint32_t any = 0;
+    SurfacePlanes planes{};
+    if (!frame.draws->triangles().isEmpty()) planes.surface = &any;
+    const auto surface = std::find(passes.begin(), passes.end(), render::Pass::surface);
+    for (auto pass = surface; pass != passes.end(); ++pass) {
+        if (*pass == render::Pass::surface) continue;
+        const CpuPass& p = cpuPassOf(*pass);
+        if (p.run != nullptr) return true;  // over the frame: rows are kept for it, with all that they have
+        if (p.row.concerns == nullptr || p.row.concerns(frame, planes)) p.row.wants(frame, wants);
+    }
+    return wants.normal;
+}
+
 /// Its rows are made by RowProgram::run.
 constinit const CpuPass surfacePass{};
 

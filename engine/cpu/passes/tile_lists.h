@@ -11,15 +11,15 @@ namespace stipple::cpu {
 
 class TileLists {
   public:
-    static constexpr uint32_t kBlocksPerChunk = 16;              ///< whose discs are kept, and counted, together
-    static constexpr uint64_t kMostEntries = uint64_t{1} << 26;  ///< of the lists at a time, 4 bytes each
+    static constexpr uint32_t kMostChunks = 128;  ///< whose discs are kept, and counted, together
 
     TileLists(Frame& frame, const SplatReach& reach)
         : frame_(frame),
           reach_(reach),
           columns_((frame.constants.width + SplatTile::kWidth - 1) / SplatTile::kWidth),
           rows_((frame.constants.height + SplatTile::kHeight - 1) / SplatTile::kHeight),
-          chunks_((static_cast<uint32_t>(frame.blocks.size()) + kBlocksPerChunk - 1) / kBlocksPerChunk),
+          blocksPerChunk_(std::max(4u, (static_cast<uint32_t>(frame.blocks.size()) + kMostChunks - 1) / kMostChunks)),
+          chunks_((static_cast<uint32_t>(frame.blocks.size()) + blocksPerChunk_ - 1) / blocksPerChunk_),
           splats_(frame.placedSplats),
           ranges_(frame.splatTiles) {}
 
@@ -32,8 +32,8 @@ class TileLists {
         frame_.executor.parallelFor(chunks_, 1, [&](size_t begin, size_t end) {
             SplatBlock placed;
             for (size_t c = begin; c < end; ++c) {
-                const size_t first = c * kBlocksPerChunk,
-                             last = std::min(first + kBlocksPerChunk, frame_.blocks.size());
+                const size_t first = c * blocksPerChunk_,
+                             last = std::min(first + blocksPerChunk_, frame_.blocks.size());
                 for (size_t b = first; b < last; ++b) {
                     const BlockSource& block = frame_.blocks[b];
                     const uint32_t count =
@@ -49,7 +49,8 @@ class TileLists {
     /// of their ids. Where the lists may not hold all tiles at a time, some rows of tiles after others (one row at
     /// least).
     template <typename DrawTile>
-    void draw(const DrawTile& drawTile, uint64_t mostEntries = kMostEntries) {
+    void draw(const DrawTile& drawTile) {
+        const uint64_t mostEntries = frame_.mostTileEntries;
         uint64_t all = 0;
         for (const uint64_t entries : entries_) all += entries;
         if (all == 0) return;
@@ -74,7 +75,7 @@ class TileLists {
     /// Calls use(place) for each disc of a chunk: where it is in Frame::placedSplats and Frame::splatTiles.
     template <typename Use>
     void forDiscs(size_t chunk, const Use& use) const {
-        const size_t first = chunk * kBlocksPerChunk * shared::kRecordsPerBlock;
+        const size_t first = chunk * blocksPerChunk_ * shared::kRecordsPerBlock;
         for (size_t at = first; at < first + counts_[chunk]; ++at) use(at);
     }
     /// Calls use(tile) for each tile of the picture, shared out among threads.
@@ -90,7 +91,7 @@ class TileLists {
         const auto tile = [](int pixel, uint32_t size) {
             return static_cast<uint16_t>(static_cast<uint32_t>(pixel) / size);
         };
-        size_t at = chunk * kBlocksPerChunk * shared::kRecordsPerBlock + counts_[chunk];
+        size_t at = chunk * blocksPerChunk_ * shared::kRecordsPerBlock + counts_[chunk];
         for (uint32_t i = 0; i < count; ++i) {
             if (b.keep[i] == 0) continue;
             if (frame_.isBlended()) frame_.placedColours[at] = b.colour[i];
@@ -161,7 +162,7 @@ class TileLists {
 
     Frame& frame_;
     const SplatReach reach_;
-    uint32_t columns_, rows_, chunks_;
+    uint32_t columns_, rows_, blocksPerChunk_, chunks_;
     std::vector<PlacedSplat>& splats_;  ///< of each chunk, closed up
     std::vector<TileRange>& ranges_;    ///< of each of them
     std::vector<uint32_t> counts_;      ///< of each chunk: discs

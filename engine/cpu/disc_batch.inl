@@ -1,0 +1,204 @@
+// Discs of a tile, ready to be drawn: what drawing them exactly (splat.inl) and blending them (ewa.inl) share. Included
+// by kernels.inl, once per instruction set.
+//
+// The image of a disc is an ellipse, exactly (EwaKernel without a low-pass), and what is linear on the image of its
+// plane is imageLinear of its depth, so that a pixel of it costs one division. Discs that are not wholly before the eye
+// have no such image; they meet each pixel's ray.
+
+/// Planes of a tile: pairs of rows, column by column, so that kGroup entries are eight columns of both rows.
+constexpr int kGroupColumns = 8, kGroup = 16, kPairPitch = 2 * int(SplatTile::kWidth);
+constexpr size_t kTilePixels = size_t{SplatTile::kWidth} * SplatTile::kHeight;
+[[gnu::always_inline]] inline int tileEntry(int x, int y) { return (y >> 1) * kPairPitch + 2 * x + (y & 1); }
+
+/// Where the pixels of a tile are, px from the principal point.
+struct TileGrid {
+    alignas(64) float x[kPairPitch];  ///< of a pair of rows
+    alignas(64) float odd[kGroup];    ///< 1: of the lower row
+    float top;                        ///< of the first row
+};
+[[gnu::always_inline]] inline TileGrid tileGrid(const FrameConstants& f, const SplatTile& tile) {
+    TileGrid g;
+    for (int i = 0; i < kPairPitch; ++i) g.x[i] = float(i >> 1) + (float(int(tile.x0)) + 0.5f - f.centre.x);
+    for (int i = 0; i < kGroup; ++i) g.odd[i] = float(i & 1);
+    g.top = float(int(tile.y0)) + 0.5f - f.centre.y;
+    return g;
+}
+
+/// The pixels of a tile that may lie between two places, px from the principal point. `first`: the tile's.
+struct TilePixels {
+    int first, last;
+};
+[[gnu::always_inline]] inline TilePixels tilePixels(float from, float to, float centre, uint32_t first, uint32_t size) {
+    const float shift = centre - 0.5f - float(int(first)), most = float(int(size)) - 1.0f;
+    // A hundredth is for rounding.
+    return {int(std::ceil(min(max(from + shift - 0.01f, 0.0f), most + 1.0f))),
+            int(std::floor(min(max(to + shift + 0.01f, -1.0f), most)))};
+}
+/// Where groups begin for a disc, so that as few as possible of them reach all it may cover, and all are of the tile.
+[[gnu::always_inline]] inline int firstColumn(int first, int last) {
+    const int most = int(SplatTile::kWidth) - (last - first + kGroupColumns) / kGroupColumns * kGroupColumns;
+    return first < most ? first : most;
+}
+
+/// Some discs of a tile in camera space, and their images: rho^2 (of radii) and what is linear on the image at
+/// (dx, dy) from (x, y): dx^2 alongX + (dy - skew dx)^2 alongY; linear + slopeX dx + slopeY dy.
+struct DiscBatch {
+    static constexpr size_t kSize = 64;
+    alignas(64) float cx[kSize], cy[kSize], cz[kSize], nx[kSize], ny[kSize], nz[kSize], radius[kSize];
+    alignas(64) float x[kSize], y[kSize], alongX[kSize], skew[kSize], alongY[kSize], linear[kSize], slopeX[kSize],
+        slopeY[kSize], least[kSize], most[kSize], isNear[kSize];
+    alignas(64) int firstX[kSize], lastX[kSize], firstY[kSize], lastY[kSize];  ///< px of the tile
+    alignas(64) int missed[kSize];  ///< entry of the pixel that holds the centre, but whose ray misses; else -1
+    alignas(64) uint32_t id[kSize];
+    WideDisc disc(size_t i) const { return {vec3(cx[i], cy[i], cz[i]), vec3(nx[i], ny[i], nz[i]), radius[i], 0u}; }
+};
+
+/// What is linear on the image of a plane: at the disc's centre, and its slopes a px.
+struct PlaneImage {
+    float slopeX, slopeY;
+};
+[[gnu::always_inline]] inline PlaneImage planeImage(const WideDisc& d, float inverseFocal) {
+    const float ahead = kOrthographic ? -d.normal.z : dot(d.normal, d.centre);
+    const float over = inverseFocal / (abs(ahead) > 1.0e-30f ? ahead : 1.0e-30f);
+    return {d.normal.x * over, d.normal.y * over};
+}
+
+/// In perspective, discs about the eye have the principal point for their (x, y): what is linear on the image there.
+[[gnu::always_inline]] inline float planeAtAxis(const WideDisc& d) {
+    const float ahead = dot(d.normal, d.centre);
+    return d.normal.z / (abs(ahead) > 1.0e-30f ? ahead : 1.0e-30f);
+}
+
+/// Where the ray of a pixel meets the plane, and rho^2. (dx, dy): from the disc's (x, y).
+struct DiscAt {
+    float linear, rho2;
+};
+struct DiscForm {
+    vec3 centre;
+    float over2, inverseFocal, nearPlane;  // over2: one over its radius squared
+    float alongX, skew, alongY, linear, slopeX, slopeY;
+};
+/// `byRay`: where the ray meets the plane, not by the ellipse: of discs about the eye, and in orthographic views, where
+/// it costs no division and thin ellipses lose nothing to rounding.
+template <bool byRay>
+[[gnu::always_inline]] inline DiscAt discAt(const DiscForm& d, float dx, float dy) {
+    const float linear = d.linear + (d.slopeX * dx + d.slopeY * dy);
+    if (byRay) {
+        const float plane = kOrthographic ? linear : 1.0f / linear, ex = dx * d.inverseFocal, ey = dy * d.inverseFocal;
+        const float ox = kOrthographic ? ex : plane * ex - d.centre.x,
+                    oy = kOrthographic ? ey : plane * ey - d.centre.y, oz = plane - d.centre.z;
+        return {linear, plane > d.nearPlane ? (ox * ox + oy * oy + oz * oz) * d.over2 : kNoDisc};
+    }
+    const float across = dy - d.skew * dx;
+    return {linear, dx * dx * d.alongX + across * across * d.alongY};
+}
+[[gnu::always_inline]] inline DiscForm formOf(const DiscBatch& b, size_t i, const FrameConstants& f) {
+    return {vec3(b.cx[i], b.cy[i], b.cz[i]),
+            1.0f / (b.radius[i] * b.radius[i]),
+            1.0f / f.focal,
+            f.nearPlane,
+            b.alongX[i],
+            b.skew[i],
+            b.alongY[i],
+            b.linear[i],
+            b.slopeX[i],
+            b.slopeY[i]};
+}
+
+/// Of discs about the eye, one by one.
+void prepareNear(const FrameConstants& f, size_t count, const SplatTile& tile, DiscBatch& b) {
+    const float far = 1.0e6f, inverseFocal = 1.0f / f.focal;
+    const Lens lens = lensHere(f.focal);
+    for (size_t i = 0; i < count; ++i) {
+        if (!(b.isNear[i] > 0.5f)) continue;
+        const WideDisc d = b.disc(i);
+        if (!kOrthographic) {
+            b.x[i] = b.y[i] = 0.0f;
+            b.linear[i] = planeAtAxis(d);
+        }
+        b.least[i] = 0.0f;
+        b.most[i] = 3.0e38f;
+        const vec2 across = discSlopes(lens, d.centre.x, d.centre.z, d.normal.x, d.normal.z, d.radius);
+        const vec2 down = discSlopes(lens, d.centre.y, d.centre.z, d.normal.y, d.normal.z, d.radius);
+        const auto px = [&](float slope) { return min(max(slope * f.focal, -far), far); };
+        const TilePixels columns = tilePixels(px(across.x), px(across.y), f.centre.x, tile.x0, tile.width),
+                         rows = tilePixels(px(down.x), px(down.y), f.centre.y, tile.y0, tile.height);
+        b.firstX[i] = columns.first;
+        b.lastX[i] = columns.last;
+        b.firstY[i] = rows.first;
+        b.lastY[i] = rows.last;
+        const CentrePixel c = centrePixel(d, f);
+        const int atX = c.x - int(tile.x0), atY = c.y - int(tile.y0);
+        const bool isHere = c.x >= 0 && atX >= 0 && atX < int(tile.width) && atY >= 0 && atY < int(tile.height);
+        const DiscHit hit = discHit(d,
+                                    pixelRay(lens, (float(c.x) + 0.5f - f.centre.x) * inverseFocal,
+                                             (float(c.y) + 0.5f - f.centre.y) * inverseFocal),
+                                    f.nearPlane);
+        b.missed[i] = isHere && !(hit.rho2 <= 1.0f) ? tileEntry(atX, atY) : -1;
+    }
+}
+
+/// Discs of a tile lie here and there in memory: those of the next batch are asked for while one is drawn.
+[[gnu::always_inline]] inline void prefetchDiscs(const PlacedSplat* splats, const uint32_t* places, size_t count) {
+    const size_t n = count < DiscBatch::kSize ? count : DiscBatch::kSize;
+    for (size_t i = 0; i < n; ++i) __builtin_prefetch(&splats[places[i]]);
+}
+
+void prepareDiscs(const FrameConstants& frame, const PlacedSplat* splats, const uint32_t* places, size_t count,
+                  const SplatTile& tile, DiscBatch& __restrict b) {
+    const FrameConstants f = frame;
+    for (size_t i = 0; i < count; ++i) {
+        const PlacedSplat& s = splats[places[i]];
+        b.id[i] = s.id;
+        b.cx[i] = s.cx;
+        b.cy[i] = s.cy;
+        b.cz[i] = s.cz;
+        b.nx[i] = s.nx;
+        b.ny[i] = s.ny;
+        b.nz[i] = s.nz;
+        b.radius[i] = s.radius;
+    }
+    const float left = float(int(tile.x0)), top = float(int(tile.y0)), lastX = float(int(tile.width)) - 1.0f,
+                lastY = float(int(tile.height)) - 1.0f;
+    const float focal = f.focal, inverseFocal = 1.0f / focal, nearPlane = f.nearPlane;
+    const Lens lens = lensHere(focal);
+#pragma GCC ivdep
+    for (size_t i = 0; i < count; ++i) {
+        const vec3 centre(b.cx[i], b.cy[i], b.cz[i]);
+        const WideDisc d{centre, vec3(b.nx[i], b.ny[i], b.nz[i]), b.radius[i], 0u};
+        const EwaKernel k = ewaKernel(d, d.radius, 1.0f, 0.0f, lens);
+        const PlaneImage plane = planeImage(d, inverseFocal);
+        const float toImage = focal / lensDepth(lens, centre.z);
+        const float midX = centre.x * toImage, midY = centre.y * toImage;
+        // No farther than the disc's rim, whatever rounding makes of planes that are seen edge-on.
+        // (Not of 1 - n.z^2, of which nothing is left of planes that face the eye.)
+        const float slab = 1.0001f * d.radius * std::sqrt(d.normal.x * d.normal.x + d.normal.y * d.normal.y);
+        const float nearest = centre.z - slab, farthest = centre.z + slab;
+        b.x[i] = k.x;
+        b.y[i] = k.y;
+        b.alongX[i] = k.alongX;
+        b.skew[i] = k.skew;
+        b.alongY[i] = k.alongY;
+        b.linear[i] = imageLinear(lens, centre.z) + (plane.slopeX * (k.x - midX) + plane.slopeY * (k.y - midY));
+        b.slopeX[i] = plane.slopeX;
+        b.slopeY[i] = plane.slopeY;
+        b.least[i] = kOrthographic ? nearest : 1.0f / farthest;
+        b.most[i] = kOrthographic ? farthest : 1.0f / nearest;
+        b.isNear[i] = max(k.isNear, nearest > nearPlane ? 0.0f : 1.0f);
+        const TilePixels columns = tilePixels(k.x - k.halfX, k.x + k.halfX, f.centre.x, tile.x0, tile.width);
+        const TilePixels rows = tilePixels(k.y - k.halfY, k.y + k.halfY, f.centre.y, tile.y0, tile.height);
+        b.firstX[i] = columns.first;
+        b.lastX[i] = columns.last;
+        b.firstY[i] = rows.first;
+        b.lastY[i] = rows.last;
+        // Where the ray of the centre's pixel misses the disc, that pixel shows it all the same.
+        const float atX = std::floor(midX + f.centre.x) - left, atY = std::floor(midY + f.centre.y) - top;
+        const float dx = atX + (left + 0.5f - f.centre.x - k.x),
+                    across = atY + (top + 0.5f - f.centre.y - k.y) - k.skew * dx;
+        const float within = min(min(atX, lastX - atX), min(atY, lastY - atY));
+        const float misses = dx * dx * k.alongX + across * across * k.alongY <= 1.0f ? -1.0f : within;
+        const int entry = tileEntry(int(min(max(atX, 0.0f), lastX)), int(min(max(atY, 0.0f), lastY)));
+        b.missed[i] = misses >= 0.0f ? entry : -1;
+    }
+    prepareNear(f, count, tile, b);
+}

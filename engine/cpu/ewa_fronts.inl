@@ -1,0 +1,84 @@
+// The fronts of a tile: of each pixel the nearest disc, moved back, behind which nothing is blended. Included by
+// ewa.inl.
+
+/// Depths at which the pixels that hold centres, but whose rays miss, show their discs: their planes', so that the
+/// surface agrees with them.
+void missedDepths(const FrameConstants& frame, size_t count, const DiscBatch& b, float* __restrict depth) {
+    const FrameConstants f = frame;
+    const Lens lens = lensHere(f.focal);
+    const float inverseFocal = 1.0f / f.focal;
+#pragma GCC ivdep
+    for (size_t i = 0; i < count; ++i) {
+        const WideDisc d = b.disc(i);
+        const DepthRange range = depthRange(d, d.radius * (1.0f / kOpaqueSigmas), f.kernelSupport, f.lowPass, lens);
+        const CentrePixel c = centrePixel(d, f);
+        const PixelRay ray = pixelRay(lens, (float(c.x) + 0.5f - f.centre.x) * inverseFocal,
+                                      (float(c.y) + 0.5f - f.centre.y) * inverseFocal);
+        depth[i] = depthWithin(range, dot(d.normal, fromRay(ray, d.centre)), dot(d.normal, rayDirection(ray)));
+    }
+}
+
+/// The front of each pixel: of the opaque parts of discs, moved back by `shift` along the ray. Discs come in the order
+/// of their ids: of what is equally deep the first stays.
+template <bool isNear>
+void drawFront(const DiscBatch& b, size_t i, float shift, float missedDepth, const FrameConstants& f,
+               TileFilter& __restrict t) {
+    const uint32_t id = b.id[i];
+    const DiscForm d = formOf(b, i, f);
+    const float midX = b.x[i], midY = b.y[i], least = b.least[i], most = b.most[i];
+    const int x1 = b.lastX[i], x0 = firstColumn(b.firstX[i], x1);
+    for (int pair = b.firstY[i] >> 1; pair <= b.lastY[i] >> 1; ++pair) {
+        const float dy = float(2 * pair) + t.grid.top - midY;
+        for (int x = x0; x <= x1; x += kGroupColumns) {
+            const int first = pair * kPairPitch + 2 * x;
+            float *const front = t.front + first, *const own = t.own + first, *const farthest = t.farthest + first;
+            uint32_t* const owner = t.id + first;
+            const float *const px = t.grid.x + 2 * x, *const along = t.along + first;
+#pragma GCC ivdep
+            for (int l = 0; l < kGroup; ++l) {
+                const DiscAt at = discAt < isNear || kOrthographic > (d, px[l] - midX, dy + t.grid.odd[l]);
+                const float linear = min(max(at.linear, least), most);
+                const float depth = kOrthographic ? linear : 1.0f / linear;
+                const bool isHit = at.rho2 <= 1.0f;
+                const float moved = depth + shift * along[l];
+                const bool isFront = isHit & (moved < front[l]);
+                front[l] = isFront ? moved : front[l];
+                owner[l] = isFront ? id : owner[l];
+                own[l] = isFront ? depth : own[l];
+                farthest[l] = isHit & (depth > farthest[l]) ? depth : farthest[l];
+            }
+        }
+    }
+    if (b.missed[i] < 0) return;
+    const auto at = size_t(b.missed[i]);
+    const float moved = missedDepth + shift * t.along[at];
+    if (!(moved < t.front[at])) return;
+    t.front[at] = moved;
+    t.id[at] = id;
+    t.own[at] = missedDepth;
+}
+
+/// Where fronts end, by pixels and by blocks.
+void closeFronts(const SplatTile& tile, const Lens& lens, TileFilter& __restrict t, TileBlocks& __restrict blocks) {
+    for (size_t i = 0; i < kTilePixels; ++i)
+        t.limit[i] = t.id[i] != TileFilter::kOther ? imageLinear(lens, t.front[i]) : kFarthest;
+    float least[TileBlocks::kRows * kPairPitch];
+    constexpr int kPairs = TileBlocks::kEdge / 2;
+    for (int r = 0; r < TileBlocks::kRows; ++r)
+        for (int i = 0; i < kPairPitch; ++i) {
+            const float *const upper = t.limit + r * kPairs * kPairPitch, *const lower = upper + kPairPitch;
+            static_assert(kPairs == 2);
+            least[r * kPairPitch + i] = isNearer(upper[i], lower[i]) ? lower[i] : upper[i];
+        }
+    for (int b = 0; b < TileBlocks::kColumns * TileBlocks::kRows; ++b) {
+        const float* const from = least + b * 2 * TileBlocks::kEdge;
+        float limit = from[0];
+        for (int i = 1; i < 2 * TileBlocks::kEdge; ++i) limit = isNearer(limit, from[i]) ? from[i] : limit;
+        blocks.limit[b] = limit;
+    }
+    bool hasGaps = false;
+    for (uint32_t y = 0; y < tile.height; ++y)
+        for (uint32_t x = 0; x < tile.width; ++x)
+            hasGaps = hasGaps | (t.id[tileEntry(int(x), int(y))] == TileFilter::kOther);
+    t.hasGaps = hasGaps;
+}

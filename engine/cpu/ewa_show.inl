@@ -1,0 +1,83 @@
+// What pixels show of the discs that were blended there. Included by ewa.inl.
+
+/// What pixels without any weight show: their front disc itself.
+void showOwn(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, uint32_t id,
+             FilteredPixel& pixel) {
+    const PointRecord& r = recordOf(blocks, id);
+    const Lens lens = lensHere(f.focal);
+    const WideDisc d = wideDisc(*blocks[id / kBlockLanes].node, r, 1.0f, id, lens);
+    const float towards = dot(d.normal, sightTo(lens, d.centre)) > 0.0f ? -1.0f : 1.0f;
+    pixel.colour = colourOf(f, tables, blocks, id, r.colour);
+    pixel.normal = octEncode(vec3(d.normal.x * towards, d.normal.y * towards, d.normal.z * towards));
+}
+
+/// What a pair of rows of a tile shows of what was added up there; nothing where it is less than half a code of
+/// coverage.
+struct ShownPair {
+    static constexpr int kEntries = kPairPitch;
+    alignas(64) float exact[kEntries];       ///< depth of other kinds; kNoDisc: none
+    alignas(64) uint32_t isThere[kEntries];  ///< 1: by what was added up; 2: by its front disc alone
+    alignas(64) uint32_t colour[kEntries], normal[kEntries], cover[kEntries], id[kEntries], depth[kEntries];
+};
+template <bool wantsNormals>
+void showPair(float gridShare, int pair, const TileFilter& __restrict t, ShownPair& __restrict s) {
+    const size_t first = size_t(pair) * kPairPitch;
+#pragma GCC ivdep
+    for (size_t k = 0; k < size_t(kPairPitch); ++k) {
+        const size_t i = first + k;
+        const float weight = t.weight[i], front = t.front[i], exact = s.exact[k];
+        const uint32_t code = uint32_t(int(min(weight * gridShare, 1.0f) * 255.0f + 0.5f));
+        // Other kinds win within what the surface may be rough; rims do not show before them.
+        const uint32_t isRim = exact < kNoDisc || t.rim[i] == TileFilter::kOther ? 0u : (code + 255u) >> 8;
+        const uint32_t isBefore = front < exact ? 1u : 0u;
+        const bool hasFront = t.id[i] != TileFilter::kOther, isBlended = weight > kLeastWeight;
+        s.isThere[k] = (hasFront ? isBefore : isRim) * (isBlended ? 1u : 2u);
+        const float over = 1.0f / (isBlended ? weight : 1.0f), linear = t.linear[i] * over;
+        const float mean = kOrthographic ? linear : 1.0f / linear;
+        s.depth[k] = floatBitsToUint(isBlended ? mean : t.own[i]);
+        s.colour[k] = packColour(t.red[i] * over, t.green[i] * over, t.blue[i] * over);
+        s.normal[k] = wantsNormals ? octEncode(vec3(t.nx[i], t.ny[i], t.nz[i])) : 0u;
+        const float behind = min(max(t.farthest[i], exact < kNoDisc ? kNoDisc : 0.0f), kNoDisc);
+        const uint32_t closed = behind > front ? 255u : code;
+        s.cover[k] = hasFront ? closed | kFilteredFront : code;
+        s.id[k] = hasFront ? t.id[i] : t.rim[i];
+    }
+}
+template <bool wantsNormals>
+void showTile(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const SplatTile& tile,
+              bool hasLeaves, const TileFilter& t, const Visibility& visibility, FilteredPixel* filtered) {
+    const float gridShare = gridWeight(f.kernelSupport);
+    ShownPair s;
+    for (float& exact : s.exact) exact = kNoDisc;
+    for (uint32_t y = 0; y < tile.height; y += 2) {
+        const uint32_t rows = tile.height - y < 2 ? 1 : 2;
+        const size_t first = size_t{tile.y0 + y} * f.width + tile.x0;
+        for (uint32_t r = 0; r < rows; ++r)
+            for (size_t x = 0; x < tile.width; ++x) {
+                const uint64_t key = visibility.keys[first + r * f.width + x];
+                s.exact[2 * x + r] = key != kNoKey ? keyDepth(key) : kNoDisc;
+            }
+        showPair<wantsNormals>(gridShare, int(y / 2), t, s);
+        for (uint32_t r = 0; r < rows; ++r)
+            for (size_t x = 0; x < tile.width; ++x) {
+                const size_t k = 2 * x + r, to = first + r * f.width + x;
+                if (s.isThere[k] == 0u) continue;
+                FilteredPixel pixel{s.normal[k], s.colour[k], s.cover[k]};
+                if (s.isThere[k] == 2u) showOwn(f, tables, blocks, s.id[k], pixel);
+                if (hasLeaves && (recordFlags(recordOf(blocks, s.id[k])) & kFlagLeaf) != 0u)
+                    pixel.cover |= kFilteredLeaf;
+                filtered[to] = pixel;
+                visibility.keys[to] = visibilityKey(s.depth[k], drawId(0u, s.id[k]));
+            }
+    }
+}
+
+/// 1 where no opaque surface is: those of a row and their neighbours make silhouettes.
+void openRow(const FrameConstants& frame, const uint64_t* keys, const FilteredPixel* filtered, uint32_t n,
+             uint8_t* open) {
+    const BlockRanges first = frame.firstBlock;
+    for (size_t i = 0; i < n; ++i) {
+        const bool isRim = isPointKey(keys[i], first) & ((filtered[i].cover & kFilteredFront) == 0u);
+        open[i] = (keys[i] == kNoKey) | isRim ? 1 : 0;
+    }
+}
