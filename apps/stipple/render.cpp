@@ -290,7 +290,7 @@ Result<void> run(const Options& o, Written& written) {
     stream.residentBytes = parseBytes(o.resident);
     settings.wantDepthAndNormal = settings.wantDepthAndNormal || o.accumulate > 1;
     auto state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.groups);
-    render::setSway(settings.draw.wind, state->hierarchies, state->instances);
+    render::setSway(settings.draw.wind, state->hierarchies, state->instances, state->groups);
     const FramesPlan plan{shot.views, shot.seconds,    o.output, o.resident,          o.frames, o.accumulate,
                           o.noWait,   o.build.skipBad, o.quiet,  !o.quiet && !o.json, o.alpha,  &legend};
     Timings timings;

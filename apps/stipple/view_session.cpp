@@ -25,7 +25,7 @@ void ViewSession::restart(render::FrameSettings& settings) {
     settings.draw.worldUp = d.up;
     settings.draw.wind.towards = render::windAcross(d.up);
     settings.draw.lit = isLit(options_.shade, d, colour_);
-    render::setSway(settings.draw.wind, state_->hierarchies, state_->instances);
+    render::setSway(settings.draw.wind, state_->hierarchies, state_->instances, state_->groups);
     legend_ = makeLegend(colour_, d);
 }
 

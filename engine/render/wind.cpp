@@ -21,7 +21,7 @@ double gust(const Wind& wind, const glm::dvec3& foot, double height) {
 
 Bend bendOf(const Wind& wind, const lod::Hierarchy& h, const lod::Instance& instance, uint32_t node,
             const lod::View& view, const glm::dvec3& up) {
-    if (!(instance.sway > 0)) return {};
+    if (!(instance.sway > 0) || instance.group != lod::Instance::kNone) return {};
     const auto world = [&](const glm::dvec3& lattice) {
         return instance.translation + instance.rotation * (instance.scale * (h.origin + h.unit * lattice));
     };
@@ -45,7 +45,8 @@ bool mayBend(const lod::Hierarchy& h, const lod::Instance& instance) {
     return h.hasOverlappingCells() && !h.isRigid && instance.group == lod::Instance::kNone && !h.nodes.empty();
 }
 
-void setSway(const Wind& wind, std::span<const lod::Hierarchy* const> hierarchies, std::span<lod::Instance> instances) {
+void setSway(const Wind& wind, std::span<const lod::Hierarchy* const> hierarchies, std::span<lod::Instance> instances,
+             std::span<const lod::InstanceGroup> groups) {
     for (lod::Instance& i : instances) {
         const lod::Hierarchy& h = *hierarchies[i.hierarchy];
         i.sway = mayBend(h, i) ? wind.strength * 2 * i.scale * h.unit * h.nodes[0].radius : 0;
@@ -54,6 +55,11 @@ void setSway(const Wind& wind, std::span<const lod::Hierarchy* const> hierarchie
     for (const lod::Instance& i : instances) {
         if (!hierarchies[i.hierarchy]->isRigid) continue;
         for (uint32_t k = i.proxy; k != lod::Instance::kNone; k = instances[k].proxy) instances[k].sway = 0;
+    }
+    for (const lod::InstanceGroup& group : groups) {
+        double sway = 0;
+        for (const uint32_t m : group.members) sway = std::max(sway, instances[m].sway);
+        instances[group.points].sway = instances[group.points].inputError = sway;
     }
 }
 

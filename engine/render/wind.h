@@ -38,11 +38,13 @@ inline glm::dvec3 windAcross(const glm::dvec3& up) {
     return glm::normalize(aside - up * glm::dot(aside, up));
 }
 
-/// Could wind move it? Strands and proxies of them, unless their store says that they are no plants; but
-/// not instance groups (where those are drawn, the error allowed is larger than the motion of a tree).
+/// Could wind move it? Strands and what is seen of them from afar, unless their store says that they are no plants; but
+/// not the points of instance groups: those stay where they are, and are drawn only where that is within the error.
 bool mayBend(const lod::Hierarchy& h, const lod::Instance& instance);
 
-/// Sets Instance::sway of what wind could move.
-void setSway(const Wind& wind, std::span<const lod::Hierarchy* const> hierarchies, std::span<lod::Instance> instances);
+/// Sets Instance::sway of what wind could move; of the points of an instance group also Instance::inputError, as far as
+/// the member that moves most goes without them.
+void setSway(const Wind& wind, std::span<const lod::Hierarchy* const> hierarchies, std::span<lod::Instance> instances,
+             std::span<const lod::InstanceGroup> groups);
 
 }  // namespace stipple::render

@@ -70,9 +70,9 @@ inline double allowedAt(int32_t epsilon, int step) {
     return epsilon == kInside ? 0.0 : std::exp2(static_cast<double>(epsilon + step) / kStepsPerOctave);
 }
 
-/// Screen-space error, px, of error code `code` at a node with allowed error `epsilon`.
-inline double pixelsOf(const CutScratch::Slot& slot, uint32_t code, int32_t epsilon) {
-    const double error = (code == 0 ? 0 : std::exp2(code / 8.0)) + slot.inputError;
+/// Screen-space error, px, of error code `code`, times `larger`, at a node with allowed error `epsilon`.
+inline double pixelsOf(const CutScratch::Slot& slot, uint32_t code, int32_t epsilon, double larger = 1) {
+    const double error = (code == 0 ? 0 : larger * std::exp2(code / 8.0)) + slot.inputError;
     if (error == 0) return 0;
     return epsilon == kInside ? 1e6 : error * std::exp2(-static_cast<double>(epsilon) / kStepsPerOctave);
 }

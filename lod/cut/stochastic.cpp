@@ -21,7 +21,8 @@ Progress progressOf(const CutFrame& frame, uint32_t i, const CutScratch::Slot& s
     const int32_t epsilon = epsilonOf(frame, h, slot, index, parentEpsilon);
     if (epsilon == kCulled) return {};
     const uint32_t group = frame.instance(i).group;
-    const double radius = std::exp2(node.errorCode / 8.0), allowed = allowedAt(epsilon, step);
+    // What all of them are off by leaves the rest to the size of the discs.
+    const double radius = std::exp2(node.errorCode / 8.0), allowed = allowedAt(epsilon, step) - slot.inputError;
     Progress p;
     if (allowed >= radius) {  // the area of n discs of radius r stays the same: n r^2 = records * radius^2
         const double count = std::ceil(node.records * (radius / allowed) * (radius / allowed));
@@ -36,7 +37,8 @@ Progress progressOf(const CutFrame& frame, uint32_t i, const CutScratch::Slot& s
         p.count = node.records;
     }
     p.kind = Progress::Kind::drawn;
-    p.pixels = pixelsOf(slot, node.errorCode, epsilon) * std::sqrt(static_cast<double>(node.records) / p.count);
+    const double larger = std::sqrt(static_cast<double>(node.records) / p.count);
+    p.pixels = pixelsOf(slot, node.errorCode, epsilon, larger);
     return p;
 }
 

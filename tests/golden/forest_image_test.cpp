@@ -153,7 +153,7 @@ TEST_F(Forests, SwayInTheWind) {
     const auto image = [&](render::Backend& backend, const lod::View& view, const render::FrameSettings& settings,
                            FrameCounters* counters = nullptr) {
         auto state = render::makeFrameState(forest.placed, backend, *executor_, {}, forest.groups);
-        render::setSway(settings.draw.wind, state->hierarchies, state->instances);
+        render::setSway(settings.draw.wind, state->hierarchies, state->instances, state->groups);
         EXPECT_TRUE(render::renderUntilComplete(*state, view, settings));
         if (counters) *counters = state->counters;
         return state->image;
@@ -174,7 +174,7 @@ TEST_F(Forests, SwayInTheWind) {
     }
     // No vertex moves farther than the spheres grew, at any time.
     auto state = render::makeFrameState(forest.placed, *cpu, *executor_, {}, forest.groups);
-    render::setSway(windy.draw.wind, state->hierarchies, state->instances);
+    render::setSway(windy.draw.wind, state->hierarchies, state->instances, state->groups);
     Rng rng(2);
     double farthest = 0;
     for (int k = 0; k < 20'000; ++k) {

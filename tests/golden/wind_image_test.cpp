@@ -65,7 +65,7 @@ class Gale : public testing::Test {
         render::PlacedStore placed{store, {}, {}};
         placed.place.translation = {0.5, 0, -0.25};
         auto state = render::makeFrameState(std::vector{placed}, backend, *executor_, {});
-        render::setSway(settings.draw.wind, state->hierarchies, state->instances);
+        render::setSway(settings.draw.wind, state->hierarchies, state->instances, state->groups);
         EXPECT_TRUE(render::renderUntilComplete(*state, view, settings).value_or(false));
         return state;
     }

@@ -195,6 +195,63 @@ TEST_F(InstanceGroups, DrawEveryMemberOnceWhateverIsResident) {
     EXPECT_GT(mixed, 20u) << "some views must have both";
 }
 
+TEST_F(InstanceGroups, AreNotDrawnWhereTheirMembersWouldSwayFartherThanTheError) {
+    const auto backend = cpu::makeCpuBackend(*executor_);
+    const auto state = render::makeFrameState(forest_.placed, *backend, *executor_, {}, forest_.groups);
+    const lod::CutScene scene = state->scene();
+    const lod::InstanceGroup& group = scene.groups[0];
+    std::vector<std::vector<uint8_t>> drawable;
+    for (const lod::Instance& i : scene.instances) {
+        if (drawable.size() <= i.source) drawable.resize(i.source + 1);
+        drawable[i.source].assign(scene.hierarchies[i.hierarchy]->nodes.size(), 1);
+    }
+    /// Of 40 views: draws of the group whose stated error is less than what one of its trees moves at the far end of
+    /// the node; draws of it in all; members that are drawn themselves.
+    struct Found {
+        size_t wrong = 0, drawn = 0, members = 0;
+    };
+    const auto found = [&](double strength, bool isTold) {
+        render::setSway(
+            {strength, 1.3, {1, 0, 0}}, state->hierarchies, state->instances,
+            isTold ? std::span<const lod::InstanceGroup>(state->groups) : std::span<const lod::InstanceGroup>());
+        if (!isTold) state->instances[group.points].sway = state->instances[group.points].inputError = 0;
+        double sway = 0;
+        for (const uint32_t m : group.members) sway = std::max(sway, state->instances[m].sway);
+        Found of;
+        Rng rng(7);
+        lod::CutScratch scratch;
+        lod::Cut cut;
+        for (int round = 0; round < 40; ++round) {
+            const glm::dvec3 middle(44, 8, 44);
+            const double distance = std::exp2(rng.uniform(6.6, 13)), a = rng.uniform(0, 6.28);
+            const lod::View view =
+                viewFrom(middle + distance * glm::dvec3(std::cos(a), rng.uniform(0.1, 1), std::sin(a)), middle);
+            const double tau = std::exp2(rng.uniform(0, 4));
+            lod::selectCut(scene, {drawable}, view, {tau, std::numeric_limits<uint64_t>::max()}, scratch, cut);
+            EXPECT_EQ(whatIsWrong(scene, cut), "") << "round " << round;
+            EXPECT_LE(cut.tauEffective, tau * 1.0001);
+            of.members += cut.counters.groupMembers;
+            for (const lod::CutDraw& d : cut.draw) {
+                if (d.instance != group.points) continue;
+                const lod::Instance& place = scene.instances[d.instance];
+                const lod::Hierarchy& h = *scene.hierarchies[place.hierarchy];
+                const lod::Node& node = h.nodes[d.node];
+                const glm::dvec3 centre =
+                    place.translation + place.rotation * (place.scale * (h.origin + h.unit * node.centre));
+                const double farthest = glm::length(centre - view.eye) + place.scale * h.unit * node.radius;
+                of.wrong += sway * view.focalPixels / farthest > d.errorPixels ? 1 : 0;
+                ++of.drawn;
+            }
+        }
+        return of;
+    };
+    const Found calm = found(0, true), gale = found(0.5, true), untold = found(0.5, false);
+    EXPECT_EQ(gale.wrong, 0u);
+    EXPECT_GT(gale.drawn, 0u) << "from far enough away the group is as good";
+    EXPECT_GT(gale.members, calm.members);
+    EXPECT_GT(untold.wrong, 20u) << "negative control: nobody tells the group";
+}
+
 TEST_F(InstanceGroups, StayWithinABudgetAndAskForWhatTheyNeed) {
     const auto backend = cpu::makeCpuBackend(*executor_);
     const auto state = render::makeFrameState(forest_.placed, *backend, *executor_, {}, forest_.groups);

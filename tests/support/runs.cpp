@@ -13,7 +13,8 @@
 
 namespace stipple::test {
 
-bool runAndKill(const std::vector<std::string>& arguments, int milliseconds, int signal) {
+bool runAndKill(const std::vector<std::string>& arguments, int milliseconds, int signal,
+                const std::function<bool()>& isUnderWay) {
     const pid_t child = ::fork();
     if (child == 0) {
         std::vector<char*> argv;
@@ -25,10 +26,16 @@ bool runAndKill(const std::vector<std::string>& arguments, int milliseconds, int
         ::execv(argv[0], argv.data());
         ::_exit(127);
     }
-    const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(milliseconds);
+    using Clock = std::chrono::steady_clock;
+    bool isCounting = !isUnderWay;
+    auto until = Clock::now() + std::chrono::milliseconds(milliseconds);
     int status = 0;
-    while (std::chrono::steady_clock::now() < until) {
+    while (!isCounting || Clock::now() < until) {
         if (::waitpid(child, &status, WNOHANG) == child) return true;
+        if (!isCounting && isUnderWay()) {
+            isCounting = true;
+            until = Clock::now() + std::chrono::milliseconds(milliseconds);
+        }
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     ::kill(child, signal);

@@ -1,6 +1,7 @@
 // The program as a process of its own.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -14,8 +15,10 @@ inline constexpr bool isSanitized = false;
 inline constexpr double kSlower = 1;
 #endif
 
-/// Runs the program and kills it after a while; true if it ended well before.
-bool runAndKill(const std::vector<std::string>& arguments, int milliseconds, int signal);
+/// Runs the program and kills it after a while, counted from when `isUnderWay` is true (none: from the start); true if
+/// it ended before.
+bool runAndKill(const std::vector<std::string>& arguments, int milliseconds, int signal,
+                const std::function<bool()>& isUnderWay = {});
 /// Kills every process that has this among its arguments, and waits until they are gone.
 void killAllWith(const std::string& argument);
 /// Runs it in a shell under `limits`; its exit code. What it says is in `folder`/out and /err.

@@ -39,7 +39,7 @@ class Effects : public testing::Test {
     std::unique_ptr<FrameState> drawn(const std::shared_ptr<const lod::Store>& store, const FrameSettings& settings,
                                       double fartherTimes = 1) {
         auto state = makeFrameState({store}, *backend_, *executor_, {});
-        setSway(settings.draw.wind, state->hierarchies, state->instances);
+        setSway(settings.draw.wind, state->hierarchies, state->instances, {});
         lod::View view = test::fitView(*store, 200, 150);
         const glm::dvec3 middle = 0.5 * (store->description.boundsMin + store->description.boundsMax);
         view.eye = middle + fartherTimes * (view.eye - middle);
