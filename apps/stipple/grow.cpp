@@ -177,18 +177,19 @@ struct DemoFolder {
     std::string scan, store, scene;
 };
 
-std::vector<Output> outputsOf(const LandscapeRun& o) {
-    if (o.kind != "demo") return {{o.output}};
-    const DemoFolder demo(o.output);
-    return {{demo.scan}, {demo.store, OutputKind::store}, {demo.scene}};
-}
-
-/// The folder of a demo: a scan, built, and the scene that places it.
-Result<std::string> growDemoFolder(const LandscapeRun& o, scene::Scene& scene) {
+/// Makes the folder of a demo, which is an output itself.
+Result<std::vector<Output>> outputsOf(const LandscapeRun& o) {
+    if (o.kind != "demo") return std::vector<Output>{{o.output}};
     std::error_code error;
     fs::create_directories(o.output, error);
     if (error)
         return fail(ErrorKind::output, "cannot be created: " + error.message(), o.output, "name a folder to write");
+    const DemoFolder demo(o.output);
+    return std::vector<Output>{{demo.scan}, {demo.store, OutputKind::store}, {demo.scene}};
+}
+
+/// The folder of a demo: a scan, built, and the scene that places it.
+Result<std::string> growDemoFolder(const LandscapeRun& o, scene::Scene& scene) {
     const DemoFolder demo(o.output);
     grow::ScanOptions options;
     options.points = o.scanPoints;
@@ -207,7 +208,8 @@ Result<std::string> growDemoFolder(const LandscapeRun& o, scene::Scene& scene) {
 
 Result<void> runLandscape(LandscapeRun& o) {
     o.landscape.asTriangles = o.as == "triangles";
-    STIPPLE_TRY(checkOutputs(outputsOf(o), {}, o.force));
+    STIPPLE_ASSIGN(const std::vector<Output> outputs, outputsOf(o));
+    STIPPLE_TRY(checkOutputs(outputs, {}, o.force));
     catchStopSignals();
     const double start = nowSeconds();
     scene::Scene scene;

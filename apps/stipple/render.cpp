@@ -10,6 +10,7 @@
 #include "apps/stipple/common.h"
 #include "apps/stipple/effect_options.h"
 #include "apps/stipple/legend.h"
+#include "apps/stipple/mode_options.h"
 #include "apps/stipple/outputs.h"
 #include "apps/stipple/render_frames.h"
 #include "engine/base/file.h"
@@ -355,7 +356,7 @@ namespace {
 /// Of mode ewa.
 void addKernelOptions(CLI::App& sub, Options& o) {
     sub.add_option("--lowpass", o.lowPass,
-                   "of mode ewa: variance of the pixel's Gaussian, px^2 (0.25 is sharper, and flickers more)")
+                   "of mode ewa: variance of the pixel's Gaussian, 0.25 to 4 px^2 (0.25 is sharper, and flickers more)")
         ->transform(within(0.25, 4.0))
         ->capture_default_str();
     sub.add_option(
@@ -438,9 +439,11 @@ void setupRender(CLI::App& app, int& status) {
     o->environment.addTo(*sub);
     addEffects(*sub, o->effects);
     addReading(*sub, *o);
-    sub->callback([o, &status] {
+    sub->callback([o, sub, &status] {
         Written written;
-        if (const auto result = run(*o, written); !result) status = report(toldOf(result.error(), *o, written));
+        auto result = checkOfMode(*sub, o->mode);
+        if (result) result = run(*o, written);
+        if (!result) status = report(toldOf(result.error(), *o, written));
     });
 }
 

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -80,15 +81,37 @@ TEST_F(Asked, AWidthBesideAPathIsRefused) {
     EXPECT_EQ(render("--camera-path p.json").code, 0);
 }
 
+/// `--mode` with as few rays as there can be.
+std::string modeFast(const std::string& mode) { return "--mode " + mode + (mode == "reference" ? " --samples 1" : ""); }
+
+TEST_F(Asked, WhatAModeWouldIgnoreIsRefused) {
+    for (const char* of : {"pullpush", "points", "splat"}) {
+        const std::string mode = fmt::format("--mode {} ", of);
+        expectOneLine(render(mode + "--lowpass 1"), 2, {"--lowpass", "mode ewa", of});
+        expectOneLine(render(mode + "--kernel 3"), 2, {"--kernel", "mode ewa", of});
+        expectOneLine(render(mode + "--samples 2"), 2, {"--samples", "mode reference", of});
+        EXPECT_EQ(render(mode + "--wind 0.1 --error 2").code, 0);
+    }
+    EXPECT_EQ(render("--mode ewa --lowpass 1 --kernel 3").code, 0);
+    for (const char* of : {"--wind 0.1", "--error 2", "--debug level", "--accumulate 2", "--budget-points 10"})
+        expectOneLine(render(fmt::format("--mode reference --samples 1 {}", of)), 2, {"reference traces full detail"});
+}
+
+TEST_F(Asked, ADemoMakesItsFolder) {
+    const Outcome r = runProgram(folder(), "grow demo -o new/demo --points 5k --leaves 1k");
+    EXPECT_EQ(r.code, 0) << r.err;
+    EXPECT_TRUE(std::filesystem::exists(path("new/demo/demo.glb")));
+}
+
 TEST_F(Asked, AViewOfNothingSaysSo) {
     for (const char* mode : {"pullpush", "splat", "reference"}) {
-        const std::string off = fmt::format("--mode {} --samples 1 --eye 0,0,50 --target 0,0,90", mode);
+        const std::string of = modeFast(mode), off = of + " --eye 0,0,50 --target 0,0,90";
         const Outcome r = render(off);
         EXPECT_EQ(r.code, 0);
         EXPECT_TRUE(says(r.err, "note: p.png: the view shows nothing of the scene")) << r.err;
         EXPECT_EQ(render(off + " --quiet").err, "");
         EXPECT_EQ(jsonOf(render(off + " --json"))["empty_pictures"], 1);
-        const Outcome seen = render(fmt::format("--mode {} --samples 1", mode));
+        const Outcome seen = render(of);
         EXPECT_FALSE(says(seen.err, "nothing")) << seen.err;
     }
     test::spit(path("p.json"), R"({"fps": 1, "keys": [{"t": 0, "eye": [0,0,9], "target": [0,0,0]},
@@ -123,7 +146,7 @@ TEST_F(Asked, WhatIsLeftToChanceIsSaidOfTheStoreOnceAndOfPicturesBesideTheirErro
     EXPECT_TRUE(note(built)) << built.err;
     EXPECT_TRUE(says(runProgram(folder(), "build tree.glb -o t2.stipple --json").out, "pruned"));
     for (const char* mode : {"pullpush", "reference", "pullpush"})
-        EXPECT_FALSE(note(render(fmt::format("--samples 1 --mode {}", mode), "tree.glb"))) << mode;
+        EXPECT_FALSE(note(render(modeFast(mode), "tree.glb"))) << mode;
     EXPECT_TRUE(says(render("", "tree.glb").out, "stochastic:")) << "beside the error";
 }
 
