@@ -48,10 +48,19 @@ std::string errorText(const FrameCounters& c) {
                              : fmt::format("error {:.2f} px", c.tauEffectivePixels);
 }
 
+/// What a frame takes. Where its picture stays on the device, handing it in takes less than drawing it, which is known
+/// of one or two frames before.
+double frameMs(const render::FrameState& state) {
+    double onDevice = 0;
+    for (const render::PassTime& p : state.backend->passTimes()) onDevice += p.ms;
+    return state.onDevice ? std::max(state.counters.frameMs, onDevice) : state.counters.frameMs;
+}
+
 void drawBrief(const OverlayFacts& f) {
     const FrameCounters& c = f.state.counters;
     ImGui::TextUnformatted(
-        fmt::format("{:.1f} ms   {}   {}   {}   H: keys", c.frameMs, errorText(c), drawnText(c), f.hands).c_str());
+        fmt::format("{:.1f} ms   {}   {}   {}   H: keys", frameMs(f.state), errorText(c), drawnText(c), f.hands)
+            .c_str());
 }
 
 void drawFull(const OverlayFacts& f) {
@@ -59,7 +68,11 @@ void drawFull(const OverlayFacts& f) {
     const lod::Budgets& budgets = f.settings.frame.budgets;
     const auto line = [](const std::string& text) { ImGui::TextUnformatted(text.c_str()); };
     line(fmt::format("{}: {}", f.state.backend->name(), f.state.backend->device()));
-    line(fmt::format("{:.1f} ms a frame, {:.1f} ms with the window   {}", c.frameMs, f.windowMs, f.hands));
+    if (f.state.onDevice)
+        line(fmt::format("{:.1f} ms a frame, {:.1f} ms to hand it in and show it   {}", frameMs(f.state), f.windowMs,
+                         f.hands));
+    else
+        line(fmt::format("{:.1f} ms a frame, {:.1f} ms with the window   {}", c.frameMs, f.windowMs, f.hands));
     for (const render::PassTime& p : f.state.backend->passTimes())
         line(fmt::format("  {:<8} {:6.2f} ms", p.name, p.ms));
     line(fmt::format("delivered {} (asked for {:.2f} px)", errorText(c), budgets.errorPixels));

@@ -16,6 +16,7 @@
 #include "engine/base/process.h"
 #include "engine/base/text.h"
 #include "engine/base/units.h"
+#include "engine/gpu/gpu_backend.h"
 #include "engine/image/image_io.h"
 
 namespace stipple::app {
@@ -143,6 +144,7 @@ class Viewer {
         if (!navigation_.isFlying()) return navigation_.fly();
         render::FrameSettings withDepth = settings_.frame;
         withDepth.wantDepthAndNormal = true;
+        withDepth.staysOnDevice = false;
         std::optional<double> depth;
         if (render(withDepth)) depth = depthInTheMiddle(session_.state().image);
         navigation_.orbit(depth, session_.focus());
@@ -194,8 +196,11 @@ class Viewer {
     Result<bool> present(const gpu::Input& input, render::Image* capture) {
         shownOpening_ = openingText();
         const char* const hands = player_.isPlaying() ? "path" : navigation_.isFlying() ? "fly" : "orbit";
+        const render::FrameState& state = session_.state();
+        const gpu::Shown shown = state.onDevice ? gpu::Shown{nullptr, state.backend, *state.onDevice}
+                                                : gpu::Shown{&state.image, nullptr, {}};
         return window_.present(
-            session_.state().image,
+            shown,
             [&] {
                 drawOverlay({session_.state(), settings_, session_.legend(), notices_, shownOpening_, hands, shownMs_,
                              input.names});
@@ -223,7 +228,7 @@ class Viewer {
             // Other colours, another scene: what was shown stays until the first of it is there.
             isEmpty_ = state.counters.nodesDrawn == 0 && !state.streamer->isIdle();
         }
-        if (isEmpty_ || state.image.rgba.empty()) {
+        if (isEmpty_ || (!state.onDevice && state.image.rgba.empty())) {
             isStale_ = false;
             return {};
         }
@@ -269,6 +274,11 @@ class Viewer {
 
     void takePicture() {
         const render::FrameState& state = session_.state();
+        if (state.onDevice) {  // once more, for the host
+            render::FrameSettings readable = settings_.frame;
+            readable.staysOnDevice = false;
+            if (auto drawn = render(readable); !drawn) return tell(drawn.error());
+        }
         render::Image picture = state.image;
         for (uint32_t& pixel : picture.rgba) pixel |= 0xff000000u;
         const std::string path = freePictureName(pictures_);
@@ -315,6 +325,35 @@ Result<Navigation> makeNavigation(const ViewOptions& o, const ViewSession& sessi
                       session.diagonal());
 }
 
+/// A window and what draws for it: on one device if that can do both, so that pictures need not leave it.
+struct Stage {
+    std::unique_ptr<gpu::Window> window;
+    std::unique_ptr<render::Backend> backend;  // ends first
+    bool isShared = false;
+};
+Result<Stage> setStage(const ViewOptions& o, const std::string& title, const glm::uvec2& size, Executor& executor) {
+    const std::string name = o.device.starts_with("gpu:") ? o.device.substr(4) : "";
+    const bool isGpu = o.device == "gpu" || !name.empty() || (o.device == "auto" && gpu::hasHardwareDevice());
+    gpu::WindowSettings settings{title, size.x, size.y, isGpu ? name : "",
+                                 std::getenv("STIPPLE_VALIDATION") != nullptr};
+    Stage stage;
+    auto window = gpu::Window::create(settings);
+    if (window && isGpu) {
+        stage.window = std::move(*window);
+        STIPPLE_ASSIGN(stage.backend, gpu::makeGpuBackendOn(stage.window->device()));
+        stage.isShared = true;
+        return stage;
+    }
+    if (!window && !name.empty()) {  // that device may draw and not show
+        settings.deviceName.clear();
+        window = gpu::Window::create(settings);
+    }
+    if (!window) return tl::unexpected<Error>(window.error());
+    stage.window = std::move(*window);
+    STIPPLE_ASSIGN(stage.backend, makeBackend(o.device, executor));
+    return stage;
+}
+
 /// Before any work.
 Result<void> checkScreenshot(const ViewOptions& o) {
     if (o.screenshot.empty()) return {};
@@ -335,22 +374,21 @@ Result<void> run(const ViewOptions& o) {
     catchStopSignals();
     const auto executor = makeTbbExecutor(o.build.threads);
     STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, true));
-    STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
+    STIPPLE_ASSIGN(const Stage stage, setStage(o, "Stipple: " + scene.description.source, size, *executor));
+    gpu::Window* const window = stage.window.get();
     ViewSettings settings;
     render::FrameSettings& frame = settings.frame;
     frame.budgets = {o.error, o.budget};
     frame.draw.unlitTriangles = o.shade == "unlit";
     frame.draw.wind.strength = o.wind;
+    frame.staysOnDevice = stage.isShared;
     STIPPLE_ASSIGN(frame.draw.environment,
                    openEnvironment(o.environment.path, o.environment.scale, o.build.reading().memoryBytes, *executor));
-    ViewSession session(o, *backend, *executor);
+    ViewSession session(o, *stage.backend, *executor);
     STIPPLE_TRY(session.show(std::move(scene), o.colour, frame));
     const double aspect = static_cast<double>(size.x) / size.y;
     STIPPLE_ASSIGN(Navigation navigation, makeNavigation(o, session, aspect));
     STIPPLE_ASSIGN(PathPlayer player, makePlayer(o, session.scene(), aspect));
-    STIPPLE_ASSIGN(const std::unique_ptr<gpu::Window> window,
-                   gpu::Window::create("Stipple: " + session.scene().description.source, size.x, size.y,
-                                       std::getenv("STIPPLE_VALIDATION") != nullptr));
     const auto result = Viewer(o, *window, session, settings, navigation, std::move(player)).run();
     for (const std::string& message : window->validationMessages()) fmt::print(stderr, "validation: {}\n", message);
     STIPPLE_TRY(result);

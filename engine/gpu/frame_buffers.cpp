@@ -34,6 +34,7 @@ Result<void> FrameBuffers::ensure(Buffer& buffer, uint64_t bytes, VkBufferUsageF
     bytes = std::max<uint64_t>(bytes, 256);
     if (buffer.bytes() >= bytes) return {};
     STIPPLE_ASSIGN(const uint64_t room, roomFor(device_.limits, bytes, usage, name, device_.deviceName));
+    if (buffer.bytes() > 0) vkDeviceWaitIdle(device_.device);  // a window may still copy from it
     STIPPLE_ASSIGN(buffer, Buffer::create(device_, room, usage, hostVisible, name));
     descriptorsChanged_ = true;
     return {};

@@ -74,9 +74,11 @@ Result<void> FrameSlot::record(const render::RenderRequest& request, std::vector
     pipelines_.bind(commands_, set_);
     PassList list(device_, commands_, queries_);
     wantsAll_ = request.wantDepthAndNormal;
+    if (staysOnDevice_) list.wasCopied(buffers_.at(kImageBinding).handle());  // a window may be about it still
+    staysOnDevice_ = request.staysOnDevice;
     if (!uploads.empty()) STIPPLE_TRY(recordUploads(list, uploads));
     STIPPLE_TRY(Recording(list, pipelines_, commands_, buffers_, request).recordPasses());
-    recordReadback(list);
+    if (!staysOnDevice_) recordReadback(list);
     if (const VkResult r = vkEndCommandBuffer(commands_); r != VK_SUCCESS)
         return vulkanError(r, "cannot end recording");
     labels_ = list.names();
@@ -123,6 +125,12 @@ Result<void> FrameSlot::wait() {
         return vulkanError(r, "the device was lost");
     vkResetFences(device_.device, 1, &fence_);
     isInFlight_ = false;
+    return {};
+}
+
+Result<void> FrameSlot::finish(std::vector<render::PassTime>& times) {
+    STIPPLE_TRY(wait());
+    takeTimes(times);
     return {};
 }
 

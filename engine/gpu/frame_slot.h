@@ -32,9 +32,13 @@ class FrameSlot {
     /// Waits and hands over; once.
     Result<void> read(render::Image& image, std::vector<render::PassTime>& times);
 
+    /// Waits, without handing over.
+    Result<void> finish(std::vector<render::PassTime>& times);
+
     bool isInFlight() const { return isInFlight_; }
     uint64_t number() const { return number_; }      ///< of its last frame
-    bool hasPicture() const { return hasPicture_; }  ///< that nobody has read
+    bool hasPicture() const { return hasPicture_; }        ///< that nobody has read
+    bool staysOnDevice() const { return staysOnDevice_; }  ///< nobody can read it
     const FrameBuffers& buffers() const { return buffers_; }
 
   private:
@@ -57,7 +61,7 @@ class FrameSlot {
     VkQueryPool queries_ = VK_NULL_HANDLE;
     std::vector<std::string> labels_;  ///< of the passes that were recorded
     uint64_t number_ = 0;
-    bool isInFlight_ = false, hasPicture_ = false, wantsAll_ = false;
+    bool isInFlight_ = false, hasPicture_ = false, wantsAll_ = false, staysOnDevice_ = false;
 };
 
 }  // namespace stipple::gpu

@@ -24,9 +24,7 @@ std::vector<uint8_t> bytesOfChunk(const lod::Chunk& chunk) {
 
 class GpuBackend final : public render::Backend {
   public:
-    static Result<std::unique_ptr<render::Backend>> create(const GpuSettings& settings) {
-        STIPPLE_ASSIGN(std::unique_ptr<Device> device,
-                       Device::create({settings.deviceName, settings.validation, {}, {}}));
+    static Result<std::unique_ptr<render::Backend>> create(std::shared_ptr<Device> device) {
         std::unique_ptr<GpuBackend> b(new GpuBackend(std::move(device)));
         STIPPLE_ASSIGN(b->pipelines_, Pipelines::create(*b->device_));
         STIPPLE_TRY(b->addSlot());
@@ -99,12 +97,23 @@ class GpuBackend final : public render::Backend {
     }
     Result<void> read(render::Ticket ticket, render::Image& image) override {
         FrameSlot* const slot = slotOf(ticket);
-        if (slot == nullptr || !slot->hasPicture()) return render::noSuchPicture(ticket);
+        if (slot == nullptr || !slot->hasPicture() || slot->staysOnDevice()) return render::noSuchPicture(ticket);
         return slot->read(image, times_);
+    }
+    Result<void> finish(render::Ticket ticket) override {
+        FrameSlot* const slot = slotOf(ticket);
+        return slot == nullptr ? Result<void>() : slot->finish(times_);
+    }
+    std::optional<DevicePicture> picture(render::Ticket ticket) const {
+        const FrameSlot* const slot = slotOf(ticket);
+        if (slot == nullptr || !slot->hasPicture() || !slot->staysOnDevice()) return {};
+        const Level& size = slot->buffers().levels()[0];
+        return DevicePicture{device_.get(), slot->buffers().at(shared::kImageBinding).handle(), size.width,
+                             size.height};
     }
 
   private:
-    explicit GpuBackend(std::unique_ptr<Device> device) : device_(std::move(device)), pages_(*device_) {}
+    explicit GpuBackend(std::shared_ptr<Device> device) : device_(std::move(device)), pages_(*device_) {}
 
     Result<FrameSlot*> addSlot() {
         STIPPLE_ASSIGN(auto slot, FrameSlot::create(*device_, *pipelines_));
@@ -118,7 +127,7 @@ class GpuBackend final : public render::Backend {
         if (slots_.size() < kMostInFlight) return addSlot();
         const auto oldest = std::min_element(slots_.begin(), slots_.end(),
                                              [](const auto& a, const auto& b) { return a->number() < b->number(); });
-        STIPPLE_TRY((*oldest)->wait());
+        STIPPLE_TRY((*oldest)->finish(times_));
         return oldest->get();
     }
     FrameSlot* slotOf(render::Ticket ticket) const {
@@ -127,7 +136,7 @@ class GpuBackend final : public render::Backend {
         return nullptr;
     }
 
-    std::unique_ptr<Device> device_;  // first: everything below is destroyed before it
+    std::shared_ptr<Device> device_;  // first: everything below is destroyed before it
     std::unique_ptr<Pipelines> pipelines_;
     PageStore pages_;
     std::unordered_map<uint64_t, PageStore::Place> places_;
@@ -141,7 +150,17 @@ class GpuBackend final : public render::Backend {
 }  // namespace
 
 Result<std::unique_ptr<render::Backend>> makeGpuBackend(const GpuSettings& settings) {
-    return GpuBackend::create(settings);
+    STIPPLE_ASSIGN(std::shared_ptr<Device> device, Device::create({settings.deviceName, settings.validation, {}, {}}));
+    return GpuBackend::create(std::move(device));
+}
+
+Result<std::unique_ptr<render::Backend>> makeGpuBackendOn(std::shared_ptr<Device> device) {
+    return GpuBackend::create(std::move(device));
+}
+
+std::optional<DevicePicture> pictureOf(const render::Backend& backend, render::Ticket ticket) {
+    const auto* gpu = dynamic_cast<const GpuBackend*>(&backend);
+    return gpu ? gpu->picture(ticket) : std::nullopt;
 }
 
 std::vector<std::string> validationMessages(const render::Backend& backend) {

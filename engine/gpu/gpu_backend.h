@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,19 @@ struct GpuSettings {
 };
 
 Result<std::unique_ptr<render::Backend>> makeGpuBackend(const GpuSettings& settings);
+/// On a device that others use as well: a window that shows what it draws.
+Result<std::unique_ptr<render::Backend>> makeGpuBackendOn(std::shared_ptr<Device> device);
+
+/// A frame that stays on its device (RenderRequest::staysOnDevice): rows of pixels as in render::Image, written by
+/// compute shaders. Valid until the second frame after it is handed in.
+struct DevicePicture {
+    const Device* device = nullptr;
+    VkBuffer pixels = VK_NULL_HANDLE;
+    uint32_t width = 0, height = 0;
+};
+/// None where the ticket is of another backend or too old.
+std::optional<DevicePicture> pictureOf(const render::Backend& backend, render::Ticket ticket);
+
 /// What the validation layers have said to a backend made by makeGpuBackend.
 std::vector<std::string> validationMessages(const render::Backend& backend);
 

@@ -56,6 +56,10 @@ void PassList::beginUpload() {
     uploaded_ = true;
 }
 
+void PassList::wasCopied(VkBuffer buffer) {
+    last_[buffer] = {VK_PIPELINE_STAGE_2_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_READ_BIT, false};
+}
+
 void PassList::end() { stamp(static_cast<uint32_t>(names_.size()) * 2 - 1); }
 
 void PassList::stamp(uint32_t query) {

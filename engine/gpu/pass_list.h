@@ -22,6 +22,8 @@ class PassList {
         : device_(device), commands_(commands), queries_(queries) {}
     /// Copies into pages, of which frames before may still read other parts, or those of chunks that are gone.
     void beginUpload();
+    /// Of a buffer that a frame before may still be copied from.
+    void wasCopied(VkBuffer buffer);
     /// `isTransfer`: fills and copies instead of a dispatch.
     void begin(const std::string& name, const std::vector<BufferUse>& uses, bool isTransfer);
     void end();

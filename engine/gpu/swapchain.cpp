@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <utility>
 
 namespace stipple::gpu {
 namespace {
@@ -215,6 +216,7 @@ Result<void> Swapchain::begin() {
 }
 
 Result<void> Swapchain::runOnce(const std::function<void(VkCommandBuffer)>& record) {
+    STIPPLE_TRY(waitForLast());
     STIPPLE_TRY(begin());
     record(commands_);
     vkEndCommandBuffer(commands_);
@@ -230,16 +232,46 @@ Result<void> Swapchain::runOnce(const std::function<void(VkCommandBuffer)>& reco
     return {};
 }
 
-void Swapchain::recordFrame(const std::function<void(VkCommandBuffer)>& overlay, bool capture, uint32_t imageIndex) {
+Result<void> Swapchain::waitForLast() {
+    if (!std::exchange(isInFlight_, false)) return {};
+    if (const VkResult r = vkWaitForFences(device_.device, 1, &fence_, VK_TRUE, ~uint64_t{0}); r != VK_SUCCESS)
+        return vulkanError(r, "the device was lost");
+    vkResetFences(device_.device, 1, &fence_);
+    return {};
+}
+
+/// Into the canvas.
+void Swapchain::recordPixels(const ShownPixels& pixels) {
     const auto transfer = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
-    const auto output = VK_PIPELINE_STAGE_2_COLOR_ATTACHMENT_OUTPUT_BIT;
-    const VkAccessFlags2 attachment = VK_ACCESS_2_COLOR_ATTACHMENT_READ_BIT | VK_ACCESS_2_COLOR_ATTACHMENT_WRITE_BIT;
+    if (pixels.device != VK_NULL_HANDLE) {
+        VkBufferMemoryBarrier2 drawn{VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER_2};
+        drawn.srcStageMask = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
+        drawn.srcAccessMask = VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT;
+        drawn.dstStageMask = transfer;
+        drawn.dstAccessMask = VK_ACCESS_2_TRANSFER_READ_BIT;
+        drawn.srcQueueFamilyIndex = drawn.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+        drawn.buffer = pixels.device;
+        drawn.size = VK_WHOLE_SIZE;
+        VkDependencyInfo info{VK_STRUCTURE_TYPE_DEPENDENCY_INFO};
+        info.bufferMemoryBarrierCount = 1;
+        info.pBufferMemoryBarriers = &drawn;
+        vkCmdPipelineBarrier2(commands_, &info);
+    }
     recordBarrier(commands_, imageBarrier(canvas_, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
                                           transfer, 0, transfer, VK_ACCESS_2_TRANSFER_WRITE_BIT));
     VkBufferImageCopy copy{};
     copy.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
     copy.imageExtent = {canvasWidth_, canvasHeight_, 1};
-    vkCmdCopyBufferToImage(commands_, staging_.handle(), canvas_, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &copy);
+    vkCmdCopyBufferToImage(commands_, pixels.device != VK_NULL_HANDLE ? pixels.device : staging_.handle(), canvas_,
+                           VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &copy);
+}
+
+void Swapchain::recordFrame(const ShownPixels& pixels, const std::function<void(VkCommandBuffer)>& overlay,
+                            bool capture, uint32_t imageIndex) {
+    const auto transfer = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
+    const auto output = VK_PIPELINE_STAGE_2_COLOR_ATTACHMENT_OUTPUT_BIT;
+    const VkAccessFlags2 attachment = VK_ACCESS_2_COLOR_ATTACHMENT_READ_BIT | VK_ACCESS_2_COLOR_ATTACHMENT_WRITE_BIT;
+    recordPixels(pixels);
     recordBarrier(commands_,
                   imageBarrier(canvas_, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL,
                                transfer, VK_ACCESS_2_TRANSFER_WRITE_BIT, output, attachment));
@@ -253,6 +285,9 @@ void Swapchain::recordFrame(const std::function<void(VkCommandBuffer)>& overlay,
     recordBarrier(commands_,
                   imageBarrier(canvas_, VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL,
                                output, attachment, transfer, VK_ACCESS_2_TRANSFER_READ_BIT));
+    VkBufferImageCopy copy{};
+    copy.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
+    copy.imageExtent = {canvasWidth_, canvasHeight_, 1};
     if (capture)
         vkCmdCopyImageToBuffer(commands_, canvas_, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, readback_.handle(), 1, &copy);
     VkImage target = images_[imageIndex];
@@ -285,15 +320,13 @@ VkResult Swapchain::submitAndShow(uint32_t imageIndex) {
     info.pSignalSemaphoreInfos = &signal;
     info.pCommandBufferInfos = &buffer;
     if (const VkResult r = vkQueueSubmit2(device_.queue, 1, &info, fence_); r != VK_SUCCESS) return r;
+    isInFlight_ = true;
     VkPresentInfoKHR present{VK_STRUCTURE_TYPE_PRESENT_INFO_KHR};
     present.waitSemaphoreCount = present.swapchainCount = 1;
     present.pWaitSemaphores = &rendered_[imageIndex];
     present.pSwapchains = &swapchain_;
     present.pImageIndices = &imageIndex;
-    const VkResult shown = vkQueuePresentKHR(device_.queue, &present);
-    const VkResult waited = vkWaitForFences(device_.device, 1, &fence_, VK_TRUE, ~uint64_t{0});
-    vkResetFences(device_.device, 1, &fence_);
-    return waited != VK_SUCCESS ? waited : shown;
+    return vkQueuePresentKHR(device_.queue, &present);
 }
 
 void Swapchain::takeCapture(render::Image& capture) const {
@@ -304,30 +337,35 @@ void Swapchain::takeCapture(render::Image& capture) const {
     for (uint32_t& p : capture.rgba) p |= 0xff000000u;
 }
 
-Result<bool> Swapchain::present(const render::Image& image, const std::function<void(VkCommandBuffer)>& overlay,
+Result<bool> Swapchain::present(const ShownPixels& pixels, const std::function<void(VkCommandBuffer)>& overlay,
                                 render::Image* capture) {
+    STIPPLE_TRY(waitForLast());
     // Drivers need not say that the window has another size by now, so it is not left to them.
-    if (image.width != extent_.width || image.height != extent_.height) STIPPLE_TRY(resize(image.width, image.height));
+    if (pixels.width != extent_.width || pixels.height != extent_.height)
+        STIPPLE_TRY(resize(pixels.width, pixels.height));
     if (extent_.width == 0 || extent_.height == 0) return false;  // minimised
-    if (image.width != canvasWidth_ || image.height != canvasHeight_)
-        STIPPLE_TRY(createCanvas(image.width, image.height));
-    std::memcpy(staging_.mapped(), image.rgba.data(), image.rgba.size() * 4);
+    if (pixels.width != canvasWidth_ || pixels.height != canvasHeight_)
+        STIPPLE_TRY(createCanvas(pixels.width, pixels.height));
+    if (pixels.host != nullptr) std::memcpy(staging_.mapped(), pixels.host, size_t{pixels.width} * pixels.height * 4);
     constexpr uint64_t kPatienceNs = 200'000'000;  // a window that is not seen may give no image for ever
     uint32_t index = 0;
     VkResult r = vkAcquireNextImageKHR(device_.device, swapchain_, kPatienceNs, acquired_, VK_NULL_HANDLE, &index);
     if (r == VK_TIMEOUT || r == VK_NOT_READY) return false;
     if (r == VK_ERROR_OUT_OF_DATE_KHR) {
-        STIPPLE_TRY(resize(image.width, image.height));
+        STIPPLE_TRY(resize(pixels.width, pixels.height));
         return false;
     }
     if (r != VK_SUCCESS && r != VK_SUBOPTIMAL_KHR) return vulkanError(r, "no image from the swapchain");
     STIPPLE_TRY(begin());
-    recordFrame(overlay, capture != nullptr, index);
+    recordFrame(pixels, overlay, capture != nullptr, index);
     vkEndCommandBuffer(commands_);
     r = submitAndShow(index);
-    if (capture) takeCapture(*capture);
+    if (capture) {
+        STIPPLE_TRY(waitForLast());
+        takeCapture(*capture);
+    }
     if (r == VK_ERROR_OUT_OF_DATE_KHR || r == VK_SUBOPTIMAL_KHR) {
-        STIPPLE_TRY(resize(image.width, image.height));
+        STIPPLE_TRY(resize(pixels.width, pixels.height));
         return r == VK_SUBOPTIMAL_KHR;
     }
     if (r != VK_SUCCESS) return vulkanError(r, "cannot present");

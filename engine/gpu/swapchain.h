@@ -11,6 +11,13 @@
 
 namespace stipple::gpu {
 
+/// What is to be shown: pixels of the host, or a buffer of this device that compute shaders have written.
+struct ShownPixels {
+    const uint32_t* host = nullptr;
+    VkBuffer device = VK_NULL_HANDLE;
+    uint32_t width = 0, height = 0;
+};
+
 class Swapchain {
   public:
     static Result<std::unique_ptr<Swapchain>> create(const Device& device, VkSurfaceKHR surface);
@@ -19,8 +26,9 @@ class Swapchain {
     Swapchain& operator=(const Swapchain&) = delete;
     Result<void> resize(uint32_t width, uint32_t height);
     VkRenderPass renderPass() const { return renderPass_; }
-    /// A swapchain of another size than the image is made anew first. False if it could not be shown now.
-    Result<bool> present(const render::Image& image, const std::function<void(VkCommandBuffer)>& overlay,
+    /// A swapchain of another size than the image is made anew first. False if it could not be shown now. It does not
+    /// wait for the device, but the next one waits for this.
+    Result<bool> present(const ShownPixels& pixels, const std::function<void(VkCommandBuffer)>& overlay,
                          render::Image* capture);
     /// Records and runs commands at once.
     Result<void> runOnce(const std::function<void(VkCommandBuffer)>& record);
@@ -30,7 +38,10 @@ class Swapchain {
     Result<void> createCanvas(uint32_t width, uint32_t height);
     void destroyCanvas();
     Result<void> createRenderPass();
-    void recordFrame(const std::function<void(VkCommandBuffer)>& overlay, bool capture, uint32_t imageIndex);
+    void recordFrame(const ShownPixels& pixels, const std::function<void(VkCommandBuffer)>& overlay, bool capture,
+                     uint32_t imageIndex);
+    void recordPixels(const ShownPixels& pixels);
+    Result<void> waitForLast();
     Result<void> begin();
     VkResult submitAndShow(uint32_t imageIndex);
     void takeCapture(render::Image& capture) const;
@@ -51,6 +62,7 @@ class Swapchain {
     VkCommandPool pool_ = VK_NULL_HANDLE;
     VkCommandBuffer commands_ = VK_NULL_HANDLE;
     VkFence fence_ = VK_NULL_HANDLE;
+    bool isInFlight_ = false;
     VkSemaphore acquired_ = VK_NULL_HANDLE;
 };
 

@@ -20,6 +20,7 @@
 
 #include "engine/base/process.h"
 #include "engine/gpu/device.h"
+#include "engine/gpu/gpu_backend.h"
 #include "engine/gpu/swapchain.h"
 
 namespace stipple::gpu {
@@ -112,12 +113,13 @@ class WindowImpl final : public Window {
         glfwTerminate();
     }
 
-    Result<void> open(const std::string& title, uint32_t width, uint32_t height, bool validation) {
+    Result<void> open(const WindowSettings& settings) {
         if (!glfwInit())
             return fail(ErrorKind::device, "no window can be opened: " + lastGlfwError(), "display",
                         "use stipple render, or run under a display (xvfb-run)");
         glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
-        window_ = glfwCreateWindow(static_cast<int>(width), static_cast<int>(height), title.c_str(), nullptr, nullptr);
+        window_ = glfwCreateWindow(static_cast<int>(settings.width), static_cast<int>(settings.height),
+                                   settings.title.c_str(), nullptr, nullptr);
         if (!window_)
             return fail(ErrorKind::device, "no window can be opened: " + lastGlfwError(), "display",
                         "use stipple render");
@@ -137,13 +139,14 @@ class WindowImpl final : public Window {
         if (!extensions)
             return fail(ErrorKind::device, "Vulkan cannot present here: " + lastGlfwError(), "display",
                         "apt-get install mesa-vulkan-drivers");
-        STIPPLE_ASSIGN(
-            device_,
-            Device::create({"", validation, {extensions, extensions + count}, {VK_KHR_SWAPCHAIN_EXTENSION_NAME}}));
+        STIPPLE_ASSIGN(device_, Device::create({settings.deviceName,
+                                                settings.validation,
+                                                {extensions, extensions + count},
+                                                {VK_KHR_SWAPCHAIN_EXTENSION_NAME}}));
         if (const VkResult r = glfwCreateWindowSurface(device_->instance, window_, nullptr, &surface_); r != VK_SUCCESS)
             return vulkanError(r, "no surface");
         STIPPLE_ASSIGN(swapchain_, Swapchain::create(*device_, surface_));
-        STIPPLE_TRY(swapchain_->resize(width, height));
+        STIPPLE_TRY(swapchain_->resize(settings.width, settings.height));
         return setupImgui();
     }
 
@@ -172,9 +175,12 @@ class WindowImpl final : public Window {
         return in;
     }
 
-    Result<bool> present(const render::Image& image, const std::function<void()>& drawOverlay,
+    std::shared_ptr<Device> device() const override { return device_; }
+
+    Result<bool> present(const Shown& shown, const std::function<void()>& drawOverlay,
                          render::Image* capture) override {
-        fitImgui(image);
+        STIPPLE_ASSIGN(const ShownPixels pixels, pixelsOf(shown));
+        fitImgui(pixels);
         ImGui_ImplVulkan_NewFrame();
         ImGui_ImplGlfw_NewFrame();
         // Twice: the first time finds how large the text is, and what is new is not shown yet. With frames drawn only
@@ -187,7 +193,7 @@ class WindowImpl final : public Window {
         drawOverlay();
         ImGui::Render();
         return swapchain_->present(
-            image, [](VkCommandBuffer c) { ImGui_ImplVulkan_RenderDrawData(ImGui::GetDrawData(), c); }, capture);
+            pixels, [](VkCommandBuffer c) { ImGui_ImplVulkan_RenderDrawData(ImGui::GetDrawData(), c); }, capture);
     }
 
     void setTitle(const std::string& title) override { glfwSetWindowTitle(window_, title.c_str()); }
@@ -195,6 +201,14 @@ class WindowImpl final : public Window {
     std::vector<std::string> validationMessages() const override { return device_->messages(); }
 
   private:
+    Result<ShownPixels> pixelsOf(const Shown& shown) const {
+        if (shown.backend == nullptr)
+            return ShownPixels{shown.image->rgba.data(), VK_NULL_HANDLE, shown.image->width, shown.image->height};
+        const std::optional<DevicePicture> drawn = pictureOf(*shown.backend, shown.ticket);
+        if (!drawn || drawn->device != device_.get()) return render::noSuchPicture(shown.ticket);
+        return ShownPixels{nullptr, drawn->pixels, drawn->width, drawn->height};
+    }
+
     /// Pixels of the framebuffer for one unit of the window's coordinates: not 1 where the system scales windows.
     glm::dvec2 pixelsPerUnit(int framebufferWidth, int framebufferHeight) const {
         int w = 0, h = 0;
@@ -245,11 +259,11 @@ class WindowImpl final : public Window {
     }
 
     /// Smaller letters where the window is too small for what they say, but never below those of a plain screen.
-    void fitImgui(const render::Image& image) {
-        const float fits = std::min(static_cast<float>(image.width) / 640, static_cast<float>(image.height) / 400);
+    void fitImgui(const ShownPixels& shown) {
+        const float fits = std::min(static_cast<float>(shown.width) / 640, static_cast<float>(shown.height) / 400);
         const float wanted = std::clamp(fits, std::min(1.0f, contentScale_), contentScale_);
         const auto pixels =
-            static_cast<float>(pixelsPerUnit(static_cast<int>(image.width), static_cast<int>(image.height)).x);
+            static_cast<float>(pixelsPerUnit(static_cast<int>(shown.width), static_cast<int>(shown.height)).x);
         ImGui::GetIO().FontGlobalScale = wanted / contentScale_ / pixels;
     }
 
@@ -284,7 +298,7 @@ class WindowImpl final : public Window {
     }
 
     GLFWwindow* window_ = nullptr;
-    std::unique_ptr<Device> device_;
+    std::shared_ptr<Device> device_;
     VkSurfaceKHR surface_ = VK_NULL_HANDLE;
     std::unique_ptr<Swapchain> swapchain_;
     VkDescriptorPool imguiPool_ = VK_NULL_HANDLE;
@@ -296,10 +310,9 @@ class WindowImpl final : public Window {
 
 }  // namespace
 
-Result<std::unique_ptr<Window>> Window::create(const std::string& title, uint32_t width, uint32_t height,
-                                               bool validation) {
+Result<std::unique_ptr<Window>> Window::create(const WindowSettings& settings) {
     auto window = std::make_unique<WindowImpl>();
-    STIPPLE_TRY(window->open(title, width, height, validation));
+    STIPPLE_TRY(window->open(settings));
     return window;
 }
 

@@ -1,4 +1,5 @@
-// A window: a Vulkan swapchain that shows a backend's image with an overlay (Dear ImGui) on top. GLFW for input.
+// A window: a Vulkan swapchain that shows what a backend drew with an overlay (Dear ImGui) on top: from where it lies if
+// the window's own device has drawn it, else copied there. GLFW for input.
 #pragma once
 
 #include <array>
@@ -33,16 +34,34 @@ struct Input {
     std::vector<std::string> dropped;  ///< files
 };
 
+class Device;
+
+struct WindowSettings {
+    std::string title;
+    uint32_t width = 0, height = 0;
+    std::string deviceName;   ///< part of a name; empty: the first device, real ones before software
+    bool validation = false;  ///< core and synchronization validation; messages are kept
+};
+
+/// What a window shows: a picture in memory, or a frame that the window's device has been told to draw and keep
+/// (RenderRequest::staysOnDevice).
+struct Shown {
+    const render::Image* image = nullptr;
+    const render::Backend* backend = nullptr;  ///< null: the image
+    render::Ticket ticket;
+};
+
 class Window {
   public:
-    static Result<std::unique_ptr<Window>> create(const std::string& title, uint32_t width, uint32_t height,
-                                                  bool validation);
+    static Result<std::unique_ptr<Window>> create(const WindowSettings& settings);
     virtual ~Window() = default;
+    /// What shows; a backend on it need not copy what it draws. It outlives the window where others hold it.
+    virtual std::shared_ptr<Device> device() const = 0;
     /// Waits for something to happen, `waitSeconds` at most (0: not at all).
     virtual Input poll(double waitSeconds) = 0;
-    /// Shows `image` with what `drawOverlay` draws by ImGui calls. `capture`, if not null, receives the finished
+    /// Shows `shown` with what `drawOverlay` draws by ImGui calls. `capture`, if not null, receives the finished
     /// picture. False if it could not be shown now: draw again.
-    virtual Result<bool> present(const render::Image& image, const std::function<void()>& drawOverlay,
+    virtual Result<bool> present(const Shown& shown, const std::function<void()>& drawOverlay,
                                  render::Image* capture) = 0;
     virtual void setTitle(const std::string& title) = 0;
     virtual std::vector<std::string> validationMessages() const = 0;

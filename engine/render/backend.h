@@ -33,6 +33,9 @@ struct RenderRequest {
     Mode mode = Mode::pullpush;
     std::vector<Pass> passes;  ///< of the mode, for what the draw list calls for
     bool wantDepthAndNormal = false;
+    /// The picture is to be shown by the device that draws it (gpu::Window): where there is such a device it is not
+    /// copied to the host, and read has none.
+    bool staysOnDevice = false;
 };
 
 /// What a backend holds beyond what every frame needs: 0 for what no scene has called for yet.
@@ -68,8 +71,10 @@ class Backend : public streaming::ChunkSink {
         STIPPLE_ASSIGN(const Ticket ticket, submit(request));
         return read(ticket, image);
     }
+    /// Waits until a frame is drawn, whose picture stays where it is.
+    virtual Result<void> finish(Ticket) { return {}; }
     virtual BackendResources resources() const { return {}; }
-    /// Of the frame that was read last.
+    /// Of the frame that was read or finished last.
     virtual const std::vector<PassTime>& passTimes() const = 0;
 
     /// Numbers of `count` sources of chunks that nobody else has who draws with this backend: the first of them.

@@ -167,6 +167,20 @@ Result<void> checkFilter(const DrawSettings& s) {
     return {};
 }
 
+Result<void> drawPicture(FrameState& state, const RenderRequest& request) {
+    state.onDevice.reset();
+    if (request.staysOnDevice) {
+        STIPPLE_ASSIGN(state.onDevice, state.backend->submit(request));
+        return {};
+    }
+    STIPPLE_TRY(state.backend->render(request, state.image));
+    // Depths count from the eye that was asked for.
+    if (state.draws.eyeAdvanced != 0)
+        for (float& depth : state.image.depth)
+            depth = depth > 0 ? static_cast<float>(double{depth} + state.draws.eyeAdvanced) : depth;
+    return {};
+}
+
 }  // namespace
 
 Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettings& settings, double start,
@@ -184,11 +198,8 @@ Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettin
     request.mode = settings.mode;
     request.passes = passesOf(settings.mode, contentOf(state.draws), state.draws.effects);
     request.wantDepthAndNormal = settings.wantDepthAndNormal;
-    STIPPLE_TRY(state.backend->render(request, state.image));
-    // Depths count from the eye that was asked for.
-    if (state.draws.eyeAdvanced != 0)
-        for (float& depth : state.image.depth)
-            depth = depth > 0 ? static_cast<float>(double{depth} + state.draws.eyeAdvanced) : depth;
+    request.staysOnDevice = settings.staysOnDevice;
+    STIPPLE_TRY(drawPicture(state, request));
 
     FrameCounters& c = state.counters;
     const lod::CutCounters& cut = state.cut.counters;

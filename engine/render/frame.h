@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@ struct FrameSettings {
     Mode mode = Mode::pullpush;
     DrawSettings draw;
     bool wantDepthAndNormal = false;
+    bool staysOnDevice = false;  ///< see RenderRequest: FrameState::onDevice, and no image
 };
 
 /// Everything a frame walks through, owned in one place.
@@ -37,6 +39,7 @@ struct FrameState {
     lod::ResidentPlan plan;
     DrawList draws;
     Image image;
+    std::optional<Ticket> onDevice;  ///< of the last frame, if its picture stays there
     FrameCounters counters;
 
     lod::CutScene scene() const { return {hierarchies, instances, groups}; }

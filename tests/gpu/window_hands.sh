@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# window_hands.sh PROGRAM DROP_FILES CASE: what a user does to a real window, under Xvfb with a window manager, the
+# [WINDOW_DEVICE=cpu|gpu] window_hands.sh PROGRAM DROP_FILES CASE: what a user does to a real window, under Xvfb with a window manager, the
 # validation layers on. Keys and mouse come from xdotool; pictures that the program takes and pixels of the screen say
 # what came of it. Runs itself again inside Xvfb.
 set -u
@@ -54,7 +54,7 @@ view() {
     for _ in 1 2 3; do
         : >"$folder/out" && : >"$folder/err"
         window=
-        "$program" view --device cpu --size "$size" "$@" >>"$folder/out" 2>>"$folder/err" &
+        "$program" view --device "${WINDOW_DEVICE:-cpu}" --size "$size" "$@" >>"$folder/out" 2>>"$folder/err" &
         viewer=$!
         await 15 findWindow && break
         echo "no window: once more" && kill -9 "$viewer" && wait "$viewer" 2>/dev/null

@@ -1,0 +1,107 @@
+// Frames whose pictures stay on the device that draws them, for a window to show from there.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+
+#include "engine/gpu/gpu_backend.h"
+#include "tests/support/support.h"
+
+namespace stipple::gpu {
+namespace {
+
+/// The pixels of a picture that stays on its device, copied by hand.
+std::vector<uint32_t> copied(const DevicePicture& picture) {
+    const Device& device = *picture.device;
+    const uint64_t bytes = uint64_t{picture.width} * picture.height * 4;
+    auto host = Buffer::create(device, bytes, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true, "copy");
+    EXPECT_TRUE(host);
+    VkCommandPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
+    poolInfo.queueFamilyIndex = device.queueFamily;
+    VkCommandPool pool{};
+    EXPECT_EQ(vkCreateCommandPool(device.device, &poolInfo, nullptr, &pool), VK_SUCCESS);
+    VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
+    allocate.commandPool = pool;
+    allocate.commandBufferCount = 1;
+    VkCommandBuffer commands{};
+    EXPECT_EQ(vkAllocateCommandBuffers(device.device, &allocate, &commands), VK_SUCCESS);
+    const VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
+    vkBeginCommandBuffer(commands, &begin);
+    VkMemoryBarrier2 memory{VK_STRUCTURE_TYPE_MEMORY_BARRIER_2};
+    memory.srcStageMask = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
+    memory.srcAccessMask = VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT;
+    memory.dstStageMask = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
+    memory.dstAccessMask = VK_ACCESS_2_TRANSFER_READ_BIT;
+    VkDependencyInfo dependency{VK_STRUCTURE_TYPE_DEPENDENCY_INFO};
+    dependency.memoryBarrierCount = 1;
+    dependency.pMemoryBarriers = &memory;
+    vkCmdPipelineBarrier2(commands, &dependency);
+    const VkBufferCopy region{0, 0, bytes};
+    vkCmdCopyBuffer(commands, picture.pixels, host->handle(), 1, &region);
+    vkEndCommandBuffer(commands);
+    VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO};
+    submit.commandBufferCount = 1;
+    submit.pCommandBuffers = &commands;
+    EXPECT_EQ(vkQueueSubmit(device.queue, 1, &submit, VK_NULL_HANDLE), VK_SUCCESS);
+    vkDeviceWaitIdle(device.device);
+    vkDestroyCommandPool(device.device, pool, nullptr);
+    const auto* from = static_cast<const uint32_t*>(host->mapped());
+    return {from, from + bytes / 4};
+}
+
+TEST(OnDevice, PicturesAreTheSameAndAreNotCopied) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    test::writePly(folder / "a.ply", test::bumpySphere(30'000, 1));
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor, 1024);
+    auto made = Device::create({"", true, {}, {}});
+    ASSERT_TRUE(made);
+    const std::shared_ptr<Device> device = std::move(*made);
+    auto backend = makeGpuBackendOn(device);
+    ASSERT_TRUE(backend);
+    render::Backend& gpu = **backend;
+    auto state = render::makeFrameState({store}, gpu, *executor, {});
+    const lod::View near = test::fitView(*store, 320, 240);
+    lod::View aside = near;
+    aside.eye += 0.3 * near.right;
+    const auto isCopied = [&] {
+        return std::any_of(gpu.passTimes().begin(), gpu.passTimes().end(),
+                           [](const render::PassTime& p) { return p.name == "readback"; });
+    };
+    std::map<const lod::View*, std::vector<uint32_t>> read;
+    for (const lod::View* view : std::initializer_list<const lod::View*>{&near, &aside}) {
+        ASSERT_TRUE(render::renderUntilComplete(*state, *view, {}));
+        EXPECT_FALSE(state->onDevice);
+        EXPECT_TRUE(isCopied());
+        read[view] = state->image.rgba;
+    }
+    render::FrameSettings stays;
+    stays.staysOnDevice = true;
+    for (const lod::View* view : std::initializer_list<const lod::View*>{&near, &aside, &near, &near, &aside}) {
+        ASSERT_TRUE(render::renderResident(*state, *view, stays));
+        ASSERT_TRUE(state->onDevice);
+        const auto picture = pictureOf(gpu, *state->onDevice);
+        ASSERT_TRUE(picture);
+        EXPECT_TRUE(copied(*picture) == read[view]);
+        ASSERT_TRUE(gpu.finish(*state->onDevice));
+        EXPECT_FALSE(gpu.passTimes().empty());
+        EXPECT_FALSE(isCopied());
+        render::Image image;
+        EXPECT_FALSE(gpu.read(*state->onDevice, image)) << "there is nothing to read";
+    }
+    // A frame that is read in between leaves the last one that stays.
+    const render::Ticket last = *state->onDevice;
+    ASSERT_TRUE(render::renderResident(*state, near, {}));
+    EXPECT_TRUE(state->image.rgba == read[&near]);
+    ASSERT_TRUE(pictureOf(gpu, last));
+    EXPECT_TRUE(copied(*pictureOf(gpu, last)) == read[&aside]);
+    // Other sizes, and frames that nobody waits for.
+    for (int k = 0; k < 6; ++k)
+        ASSERT_TRUE(render::renderResident(*state, test::fitView(*store, 200 + 90 * k % 400, 150), stays));
+    EXPECT_FALSE(pictureOf(gpu, last)) << "too old";
+    ASSERT_TRUE(gpu.finish(*state->onDevice));
+    for (const std::string& message : device->messages()) ADD_FAILURE() << message;
+}
+
+}  // namespace
+}  // namespace stipple::gpu
