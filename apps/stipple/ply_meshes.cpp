@@ -31,6 +31,10 @@ Result<PlyMeshes> findPlyMeshes(const std::vector<std::string>& inputs, const Bu
         else
             ++out.others;
     }
+    if (build.surfels > 0 && !out.files.empty())
+        return fail(ErrorKind::usage, "samples meshes of glTF and OBJ files, and this is a PLY file with faces",
+                    "--surfels with " + out.files.front(),
+                    "leave it out to draw triangles, or give --only-points for the vertices");
     return out;
 }
 

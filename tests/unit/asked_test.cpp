@@ -97,6 +97,15 @@ TEST_F(Asked, WhatAModeWouldIgnoreIsRefused) {
         expectOneLine(render(fmt::format("--mode reference --samples 1 {}", of)), 2, {"reference traces full detail"});
 }
 
+TEST_F(Asked, SamplesOfPlyMeshesAreRefusedAndNotForgotten) {
+    test::spit(path("m.ply"),
+               "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+               "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+    expectOneLine(render("--surfels 1000", "m.ply"), 2, {"--surfels", "m.ply", "--only-points"});
+    EXPECT_EQ(render("", "m.ply").code, 0);
+    expectOneLine(runProgram(folder(), "build m.ply -o m.stipple --surfels 1000"), 2, {"--surfels"});
+}
+
 TEST_F(Asked, ADemoMakesItsFolder) {
     const Outcome r = runProgram(folder(), "grow demo -o new/demo --points 5k --leaves 1k");
     EXPECT_EQ(r.code, 0) << r.err;
