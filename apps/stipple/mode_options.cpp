@@ -19,20 +19,19 @@ bool blends(const std::string& mode) {
 struct OnlyOf {
     const char* option;
     bool (*uses)(const std::string& mode);
-    const char* modes;  ///< in words
+    const char* why;  ///< not
 };
-constexpr const char* kDrawn = "modes that draw a cut; the reference traces full detail as it stands";
+constexpr const char* kOfEwa = "it belongs to mode ewa";
+constexpr const char* kDrawn = "the reference traces full detail as it stands";
 constexpr std::array kOnlyOf{
-    OnlyOf{"--lowpass", blends, "mode ewa"},
-    OnlyOf{"--kernel", blends, "mode ewa"},
-    OnlyOf{"--samples", isTraced, "mode reference"},
-    OnlyOf{"--error", isDrawn, kDrawn},
+    OnlyOf{"--lowpass", blends, kOfEwa},
+    OnlyOf{"--kernel", blends, kOfEwa},
+    OnlyOf{"--samples", isTraced, "it belongs to mode reference"},
     OnlyOf{"--budget-points", isDrawn, kDrawn},
-    OnlyOf{"--curve-exact", isDrawn, kDrawn},
     OnlyOf{"--wind", isDrawn, kDrawn},
+    OnlyOf{"--time", isDrawn, kDrawn},
     OnlyOf{"--accumulate", isDrawn, kDrawn},
     OnlyOf{"--debug", isDrawn, kDrawn},
-    OnlyOf{"--no-wait", isDrawn, kDrawn},
 };
 
 }  // namespace
@@ -41,7 +40,7 @@ Result<void> checkOfMode(const CLI::App& sub, const std::string& mode) {
     for (const OnlyOf& row : kOnlyOf) {
         const CLI::Option* const option = sub.get_option_no_throw(row.option);
         if (option == nullptr || option->count() == 0 || row.uses(mode)) continue;
-        return fail(ErrorKind::usage, fmt::format("is of {}, and this is mode {}", row.modes, mode), row.option,
+        return fail(ErrorKind::usage, fmt::format("does nothing in mode {}: {}", mode, row.why), row.option,
                     fmt::format("leave {} out, or choose another --mode", row.option));
     }
     return {};

@@ -12,7 +12,7 @@
 namespace stipple::app {
 namespace {
 
-constexpr int kSchemaVersion = 1;
+constexpr int kSchemaVersion = 2;
 
 struct Reporting {
     std::string command = "stipple";

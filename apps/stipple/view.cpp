@@ -260,7 +260,6 @@ class Viewer {
         return checkVerdict(plan, verdict);
     }
 
-    /// Of what is drawn, without what lies over it.
     /// Behind the first frame, so that the first picture need not wait for the 260 libraries.
     void loadPictures() {
         if (pictureLoader_.joinable()) return;
@@ -272,6 +271,7 @@ class Viewer {
         });
     }
 
+    /// Of what is drawn, without what lies over it.
     void takePicture() {
         const render::FrameState& state = session_.state();
         if (state.onDevice) {  // once more, for the host
@@ -340,8 +340,11 @@ Result<Stage> setStage(const ViewOptions& o, const std::string& title, const glm
     auto window = gpu::Window::create(settings);
     if (window && isGpu) {
         stage.window = std::move(*window);
-        STIPPLE_ASSIGN(stage.backend, gpu::makeGpuBackendOn(stage.window->device()));
-        stage.isShared = true;
+        auto backend = gpu::makeGpuBackendOn(stage.window->device());
+        stage.isShared = backend.has_value();
+        if (!backend && o.device == "auto") backend = makeBackend("cpu", executor);
+        if (!backend) return tl::unexpected<Error>(backend.error());
+        stage.backend = std::move(*backend);
         return stage;
     }
     if (!window && !name.empty()) {  // that device may draw and not show
@@ -357,6 +360,7 @@ Result<Stage> setStage(const ViewOptions& o, const std::string& title, const glm
 /// Before any work.
 Result<void> checkScreenshot(const ViewOptions& o) {
     if (o.screenshot.empty()) return {};
+    if (o.frames == 0) return fail(ErrorKind::usage, "is taken of the last of --frames N", "--screenshot", "give both");
     STIPPLE_TRY(image::checkImagePath(o.screenshot));
     STIPPLE_TRY(image::checkModule(true));
     std::vector<std::string> inputs = o.inputs;

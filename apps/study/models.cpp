@@ -29,6 +29,7 @@ std::string quoted(const std::string& path) {
 Result<std::string> unpacked(const std::string& path, const std::string& folder) {
     const fs::path p(path);
     if (p.extension() != ".gz") return path;
+    if (!fs::exists(path)) return fail(ErrorKind::input, "No such file or directory", path);
     const std::string out = (fs::path(folder) / p.stem()).string();
     if (fs::exists(out)) return out;
     const std::string command = fmt::format("gzip -dc {} > {}.part", quoted(path), quoted(out));

@@ -51,6 +51,7 @@ Result<Pinholes> countPinholes(Drawer& sphere, uint32_t poses, uint32_t size) {
             out.open[r.mode] += open;
         }
     }
+    if (isStopRequested()) return fail(ErrorKind::interrupted, "interrupted", "the study");
     return out;
 }
 

@@ -150,7 +150,7 @@ nlohmann::json jsonOfSeeds(const SeedsReport& report) {
                           {"model", row.model},
                           {"their_points", row.points},
                           {"their_fps", row.theirs},
-                          {"stand_in", row.proxy},
+                          {"ours", row.proxy},
                           {"points", m.points},
                           {"sizes", sizes},
                           {"errors", errors}});

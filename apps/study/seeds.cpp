@@ -8,6 +8,7 @@
 #include "apps/study/study.h"
 #include "engine/base/process.h"
 #include "engine/reference/reference.h"
+#include "lod/builder/build_version.h"
 
 namespace stipple::study {
 namespace {
@@ -123,10 +124,14 @@ Result<SeedsReport> studySeeds(const SeedsSettings& settings, const Host& host) 
     const double start = nowSeconds();
     SeedsReport report;
     report.settings = settings;
-    const std::string folder = settings.output + "/models";
     std::error_code error;
+    if (!settings.dataFolder.empty() && !fs::is_directory(settings.dataFolder, error))
+        return fail(ErrorKind::input, "is no folder", settings.dataFolder,
+                    "name the folder of the models, or leave --data out");
+    // What an older build has made is not measured as if it were this one's.
+    const std::string folder = fmt::format("{}/models/{}", settings.output, lod::kBuildVersion);
     fs::create_directories(folder, error);
-    if (error) return fail(ErrorKind::output, error.message(), folder);
+    if (error) return fail(ErrorKind::output, "cannot be made: " + error.message(), folder, "choose another --output");
     STIPPLE_ASSIGN(report.devices, devicesOf(host));
     const size_t rows = modelRows().size(), steps = rows + 11;
     for (size_t i = 0; i < rows; ++i) {

@@ -94,7 +94,7 @@ void prepareKernels(const FrameConstants& frame, const SplatTile& tile, size_t c
         const float sigma = d.radius * (1.0f / kOpaqueSigmas);
         const EwaKernel k = ewaKernel(d, sigma, support, lowPass, lens);
         const DepthRange range = depthRange(d, sigma, support, lowPass, lens);
-        const bool isNear = max(k.isNear, s.isNear[i]) > 0.5f;
+        const bool isNear = k.isNear > 0.5f;  // (a kernel is not cut off at the near plane, as its disc is)
         const bool atAxis = !kOrthographic & isNear;
         b.isNear[i] = isNear ? 1.0f : 0.0f;
         b.x[i] = atAxis ? 0.0f : k.x;

@@ -36,7 +36,7 @@ class FrameSlot {
     Result<void> finish(std::vector<render::PassTime>& times);
 
     bool isInFlight() const { return isInFlight_; }
-    uint64_t number() const { return number_; }      ///< of its last frame
+    uint64_t number() const { return number_; }            ///< of its last frame
     bool hasPicture() const { return hasPicture_; }        ///< that nobody has read
     bool staysOnDevice() const { return staysOnDevice_; }  ///< nobody can read it
     const FrameBuffers& buffers() const { return buffers_; }

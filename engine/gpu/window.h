@@ -1,5 +1,5 @@
-// A window: a Vulkan swapchain that shows what a backend drew with an overlay (Dear ImGui) on top: from where it lies if
-// the window's own device has drawn it, else copied there. GLFW for input.
+// A window: a Vulkan swapchain that shows what a backend drew with an overlay (Dear ImGui) on top: from where it lies
+// if the window's own device has drawn it, else copied there. GLFW for input.
 #pragma once
 
 #include <array>

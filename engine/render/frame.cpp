@@ -168,12 +168,12 @@ Result<void> checkFilter(const DrawSettings& s) {
 }
 
 Result<void> drawPicture(FrameState& state, const RenderRequest& request) {
-    state.onDevice.reset();
-    if (request.staysOnDevice) {
+    if (request.staysOnDevice) {  // where that fails, what was there before is
         STIPPLE_ASSIGN(state.onDevice, state.backend->submit(request));
         return {};
     }
     STIPPLE_TRY(state.backend->render(request, state.image));
+    state.onDevice.reset();
     // Depths count from the eye that was asked for.
     if (state.draws.eyeAdvanced != 0)
         for (float& depth : state.image.depth)

@@ -58,7 +58,9 @@ void setSway(const Wind& wind, std::span<const lod::Hierarchy* const> hierarchie
     }
     for (const lod::InstanceGroup& group : groups) {
         double sway = 0;
-        for (const uint32_t m : group.members) sway = std::max(sway, instances[m].sway);
+        for (const uint32_t m : group.members)
+            for (uint32_t k = m; k != lod::Instance::kNone; k = instances[k].proxy)
+                sway = std::max(sway, instances[k].sway);
         instances[group.points].sway = instances[group.points].inputError = sway;
     }
 }

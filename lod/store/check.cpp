@@ -64,10 +64,10 @@ Result<void> checkOverlaps(const Store& store) {
     const Hierarchy& h = store.hierarchy;
     std::vector<std::pair<uint64_t, uint64_t>> ranges;
     ranges.reserve(h.nodes.size() + h.further.size() + h.streams.size());
-    bool isAggregate = true;
+    bool isAscending = true;
     const auto add = [&](uint64_t offset, uint64_t bytes) {
         if (bytes == 0) return;
-        isAggregate = isAggregate && (ranges.empty() || ranges.back().second <= offset);
+        isAscending = isAscending && (ranges.empty() || ranges.back().second <= offset);
         ranges.emplace_back(offset, offset + bytes);
     };
     for (uint32_t n = 0; n < h.nodes.size(); ++n)
@@ -76,7 +76,7 @@ Result<void> checkOverlaps(const Store& store) {
             add(p.chunkOffset, uint64_t{p.chunkBytes} + p.attributeBytes);
         });
     for (const Stream& s : h.streams) add(s.offset, s.bytes);
-    if (isAggregate) return {};
+    if (isAscending) return {};
     std::sort(ranges.begin(), ranges.end());
     for (size_t i = 1; i < ranges.size(); ++i)
         if (ranges[i].first < ranges[i - 1].second)

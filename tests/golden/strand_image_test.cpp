@@ -83,7 +83,7 @@ TEST_F(Strands, AreThoseOfTheOracleOnEveryInstructionSet) {
                         // pixel, and silhouettes are many. That is all of it: with an oracle that rounds the radii of
                         // its levels in the same way 31.2 dB become 43.7 (with plain instead of area weights in the
                         // pull, which squares no radii, 34.7 dB without it). Measured: there 31.2 dB and 0.9 % of the
-                        // pixels, elsewhere 41.6 and 0.09 at worst, 42.9 where filled curves are filled.
+                        // pixels, elsewhere 41.6 and 0.09 at worst, 42.9 where wide curves are filled.
                         const bool isAll = exact > 1e6f,
                                    isWidest = isAll && radius > 0.03f && view.eye != fit.eye && place.scale == 1;
                         EXPECT_GE(d.psnr, isWidest ? 31

@@ -216,7 +216,9 @@ TEST_F(InstanceGroups, AreNotDrawnWhereTheirMembersWouldSwayFartherThanTheError)
             isTold ? std::span<const lod::InstanceGroup>(state->groups) : std::span<const lod::InstanceGroup>());
         if (!isTold) state->instances[group.points].sway = state->instances[group.points].inputError = 0;
         double sway = 0;
-        for (const uint32_t m : group.members) sway = std::max(sway, state->instances[m].sway);
+        for (const uint32_t m : group.members)
+            for (uint32_t k = m; k != lod::Instance::kNone; k = state->instances[k].proxy)
+                sway = std::max(sway, state->instances[k].sway);
         Found of;
         Rng rng(7);
         lod::CutScratch scratch;

@@ -93,7 +93,9 @@ TEST_F(Asked, WhatAModeWouldIgnoreIsRefused) {
         EXPECT_EQ(render(mode + "--wind 0.1 --error 2").code, 0);
     }
     EXPECT_EQ(render("--mode ewa --lowpass 1 --kernel 3").code, 0);
-    for (const char* of : {"--wind 0.1", "--error 2", "--debug level", "--accumulate 2", "--budget-points 10"})
+    // (Any error is met by the full detail.)
+    EXPECT_EQ(render("--mode reference --samples 1 --error 2 --no-wait").code, 0);
+    for (const char* of : {"--wind 0.1", "--debug level", "--accumulate 2", "--budget-points 10"})
         expectOneLine(render(fmt::format("--mode reference --samples 1 {}", of)), 2, {"reference traces full detail"});
 }
 
@@ -131,7 +133,7 @@ TEST_F(Asked, AViewOfNothingSaysSo) {
 
 TEST_F(Asked, TracedPicturesAreReportedLikeOthers) {
     const auto j = jsonOf(render("--mode reference --samples 2 --orbit 3 --json"));
-    EXPECT_EQ(j["schema"], "stipple.render/1");
+    EXPECT_EQ(j["schema"], "stipple.render/2");
     EXPECT_EQ(j["mode"], "reference");
     EXPECT_EQ(j["width"], 64);
     EXPECT_EQ(j["height"], 48);

@@ -191,7 +191,7 @@ TEST(MemoryHint, OfPlyMeshesSuffices) {
 TEST(Plain, OneIsNoPlural) {
     const TempFolder folder;
     test::spit(folder / "a.swc", "1 2 0 0 0 0.1 -1\n2 2 1 0 0 0.1 1\n");
-    EXPECT_TRUE(says(runProgram(folder, "info a.swc").out, "1 strand of 2 vertices"))
+    EXPECT_TRUE(says(runProgram(folder, "info a.swc").out, "1 curve of 2 vertices"))
         << runProgram(folder, "info a.swc").out;
     EXPECT_TRUE(says(runProgram(folder, "build a.swc -o a.stipple").out, "2 segments in 1 node, "));
     test::writeLas(folder / "a.las", {{0, 0, 0}}, 0.01, glm::dvec3(0));

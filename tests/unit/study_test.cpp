@@ -105,7 +105,7 @@ TEST(Study, OutlinesOfASphereAreWhatTheyAre) {
     EXPECT_EQ(rows->back().discNormal, 0);
 }
 
-TEST(Study, EveryRowOfThePapersHasAStandInAndFigures) {
+TEST(Study, EveryRowOfThePapersHasAModelAndFigures) {
     EXPECT_EQ(study::modelRows().size(), 18u);
     for (const study::ModelRow& r : study::modelRows()) {
         EXPECT_GT(r.points, 50'000u);
@@ -120,7 +120,7 @@ TEST(Study, SeedsWithoutDataNameWhatIsMissing) {
     ASSERT_EQ(r.code, 0) << r.err;
     const nlohmann::json j = nlohmann::json::parse(r.out, nullptr, false);
     ASSERT_TRUE(j.is_object());
-    EXPECT_EQ(j["schema"], "stipple.study/1");
+    EXPECT_EQ(j["schema"], "stipple.study/2");
     ASSERT_EQ(j["models"].size(), 1u) << "the checker plane";
     EXPECT_GE(j["not_made"].size(), 10u);
     const auto& errors = j["models"][0]["errors"];

@@ -144,7 +144,7 @@ TEST(Words, TopicsExplainWhatConcernsSeveralCommands) {
         EXPECT_NE(budgets.out.find(option), std::string::npos) << budgets.out;
     EXPECT_NE(runProgram(folder, "help exit-codes").out.find("7  interrupted"), std::string::npos);
     EXPECT_NE(runProgram(folder, "help formats").out.find(".laz"), std::string::npos);
-    EXPECT_NE(runProgram(folder, "help json").out.find("stipple.error/1"), std::string::npos);
+    EXPECT_NE(runProgram(folder, "help json").out.find("stipple.error/2"), std::string::npos);
     expectOneLine(runProgram(folder, "help xyzzy"), 2, {"topics: budgets, exit-codes, formats, json"});
 }
 
@@ -154,7 +154,7 @@ TEST(Words, ErrorsAreJsonWhereThatIsAskedFor) {
         const Outcome r = runProgram(folder, arguments);
         EXPECT_EQ(r.code, code) << arguments << r.err;
         const auto j = nlohmann::json::parse(r.out, nullptr, false);
-        EXPECT_EQ(j.value("schema", ""), "stipple.error/1") << arguments << r.out;
+        EXPECT_EQ(j.value("schema", ""), "stipple.error/2") << arguments << r.out;
         EXPECT_EQ(j["error"]["exit"], code) << r.out;
         for (const char* key : {"kind", "what", "where", "hint"}) EXPECT_TRUE(j["error"][key].is_string()) << key;
         return j["error"];
@@ -189,13 +189,13 @@ TEST(Words, ResultsSayWhichSchemaTheyHave) {
         EXPECT_EQ(r.code, 0) << arguments << r.err;
         return nlohmann::json::parse(r.out, nullptr, false).value("schema", "");
     };
-    EXPECT_EQ(schemaOf("grow scan -o a.las --points 1k"), "stipple.grow/1");
-    EXPECT_EQ(schemaOf("build a.las -o a.stipple"), "stipple.build/1");
-    EXPECT_EQ(schemaOf("info a.las"), "stipple.info/1");
-    EXPECT_EQ(schemaOf("info a.stipple"), "stipple.info/1");
-    EXPECT_EQ(schemaOf("info a.stipple --at 0,0,0"), "stipple.info/1");
-    EXPECT_EQ(schemaOf("render a.stipple -o a.png --size 64x48 --device cpu"), "stipple.render/1");
-    EXPECT_EQ(schemaOf("compare a.png a.png"), "stipple.compare/1");
+    EXPECT_EQ(schemaOf("grow scan -o a.las --points 1k"), "stipple.grow/2");
+    EXPECT_EQ(schemaOf("build a.las -o a.stipple"), "stipple.build/2");
+    EXPECT_EQ(schemaOf("info a.las"), "stipple.info/2");
+    EXPECT_EQ(schemaOf("info a.stipple"), "stipple.info/2");
+    EXPECT_EQ(schemaOf("info a.stipple --at 0,0,0"), "stipple.info/2");
+    EXPECT_EQ(schemaOf("render a.stipple -o a.png --size 64x48 --device cpu"), "stipple.render/2");
+    EXPECT_EQ(schemaOf("compare a.png a.png"), "stipple.compare/2");
 }
 
 TEST(Words, PipedProgressIsSilentUnlessJsonIsAskedFor) {
@@ -210,7 +210,7 @@ TEST(Words, PipedProgressIsSilentUnlessJsonIsAskedFor) {
     std::istringstream lines(onDisk.err);
     int found = 0;
     for (std::string line; std::getline(lines, line); ++found)
-        EXPECT_EQ(nlohmann::json::parse(line, nullptr, false).value("schema", ""), "stipple.progress/1") << line;
+        EXPECT_EQ(nlohmann::json::parse(line, nullptr, false).value("schema", ""), "stipple.progress/2") << line;
     EXPECT_GT(found, 0) << "the note on temporary files at least";
     const Outcome cached = runProgram(folder, "render a.las -o a.png --size 64x48");
     EXPECT_EQ(cached.code, 0);
