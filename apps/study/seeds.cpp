@@ -129,7 +129,7 @@ Result<SeedsReport> studySeeds(const SeedsSettings& settings, const Host& host) 
         return fail(ErrorKind::input, "is no folder", settings.dataFolder,
                     "name the folder of the models, or leave --data out");
     // What an older build has made is not measured as if it were this one's.
-    const std::string folder = fmt::format("{}/models/{}", settings.output, lod::kBuildVersion);
+    const std::string folder = fmt::format("{}/models-{}", settings.output, lod::kBuildVersion);
     fs::create_directories(folder, error);
     if (error) return fail(ErrorKind::output, "cannot be made: " + error.message(), folder, "choose another --output");
     STIPPLE_ASSIGN(report.devices, devicesOf(host));

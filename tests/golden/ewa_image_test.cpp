@@ -458,26 +458,6 @@ TEST(Ewa, PicturesDoNotDependOnWhatElseIsAskedFor) {
             }
 }
 
-/// What no kernel can be is refused.
-TEST(Ewa, RefusesFiltersThatAreNone) {
-    const test::TempFolder folder;
-    const auto executor = makeTbbExecutor(0);
-    const auto backend = cpu::makeCpuBackend(*executor);
-    test::writePly(folder / "a.ply", test::samplesOf(test::Shape::statue, 500, 3));
-    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
-    const auto state = render::makeFrameState({store}, *backend, *executor, {});
-    const lod::View view = test::viewFromAbove({0, 0, 0});
-    for (const float bad : {-1.0f, std::nanf(""), 1e9f, HUGE_VALF}) {
-        render::FrameSettings settings = blended();
-        settings.draw.lowPass = bad;
-        EXPECT_FALSE(render::renderUntilComplete(*state, view, settings)) << bad;
-        settings = blended();
-        settings.draw.kernelSupport = bad;
-        EXPECT_FALSE(render::renderUntilComplete(*state, view, settings)) << bad;
-    }
-    EXPECT_TRUE(render::renderUntilComplete(*state, view, blended()));
-}
-
 TEST(Ewa, ThousandsAtOnePixelAreAsOne) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);

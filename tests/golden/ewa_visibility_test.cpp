@@ -9,6 +9,7 @@
 
 #include "engine/cpu/cpu_backend.h"
 #include "tests/support/drawn_discs.h"
+#include "tests/support/drawn_shapes.h"
 #include "tests/support/support.h"
 
 namespace stipple {
@@ -321,7 +322,7 @@ TEST(EwaVisibility, IsTheSameBytesForAnyOrderAndResidency) {
     test::writePly(folder / "b.ply", points, true, true);
     const auto a = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *some),
                b = test::buildAndOpen(folder / "b.ply", folder / "b.stipple", *many);
-    lod::View view = test::viewFromAbove({0, 0, 0});
+    lod::View view = viewAhead(32, 40);
     view.width = 333;
     render::FrameSettings settings = blended();
     settings.budgets.errorPixels = 2;
@@ -345,6 +346,26 @@ TEST(EwaVisibility, IsTheSameBytesForAnyOrderAndResidency) {
     EXPECT_TRUE(isSame(draw(a, *some, &close))) << "more is resident";
     settings.draw.lowPass *= 1.01f;
     EXPECT_FALSE(isSame(draw(a, *some, nullptr))) << "control";
+}
+
+/// What no kernel can be is refused.
+TEST(Ewa, RefusesFiltersThatAreNone) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    const auto backend = cpu::makeCpuBackend(*executor);
+    test::writePly(folder / "a.ply", test::samplesOf(test::Shape::statue, 500, 3));
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    const auto state = render::makeFrameState({store}, *backend, *executor, {});
+    const lod::View view = viewAhead(32, 40);
+    for (const float bad : {-1.0f, std::nanf(""), 1e9f, HUGE_VALF}) {
+        render::FrameSettings settings = blended();
+        settings.draw.lowPass = bad;
+        EXPECT_FALSE(render::renderUntilComplete(*state, view, settings)) << bad;
+        settings = blended();
+        settings.draw.kernelSupport = bad;
+        EXPECT_FALSE(render::renderUntilComplete(*state, view, settings)) << bad;
+    }
+    EXPECT_TRUE(render::renderUntilComplete(*state, view, blended()));
 }
 
 }  // namespace

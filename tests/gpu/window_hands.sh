@@ -324,7 +324,13 @@ cat >"$folder/openbox.xml" <<'XML'
   <applications><application class="*"><decor>no</decor></application></applications>
 </openbox_config>
 XML
-openbox --config-file "$folder/openbox.xml" >/dev/null 2>&1 &
-manager=$!
-await 20 eval 'wmctrl -m >/dev/null 2>&1' || { echo "no window manager"; exit 1; }
+# On a crowded machine it sometimes starts before the display takes it, and ends: it is started again.
+hasManager() { wmctrl -m >/dev/null 2>&1; }
+for _ in 1 2 3; do
+    openbox --config-file "$folder/openbox.xml" >"$folder/openbox.err" 2>&1 &
+    manager=$!
+    await 15 hasManager && break
+    kill -9 "$manager" 2>/dev/null
+done
+hasManager || { echo "no window manager"; cat "$folder/openbox.err"; exit 1; }
 "$case"

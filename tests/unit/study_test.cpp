@@ -116,10 +116,15 @@ TEST(Study, EveryRowOfThePapersHasAModelAndFigures) {
 
 TEST(Study, SeedsWithoutDataNameWhatIsMissing) {
     const test::TempFolder folder;
-    const test::Outcome r = test::runProgram(folder, "study --seeds --quick --rounds 1 -o s --data nowhere --json");
+    test::expectOneLine(test::runProgram(folder, "study --seeds --quick -o s --data nowhere --quiet"), 3,
+                        {"nowhere", "--data"});
+    EXPECT_FALSE(fs::exists(folder / "s"));
+    fs::create_directory(folder / "empty");
+    const test::Outcome r = test::runProgram(folder, "study --seeds --quick --rounds 1 -o s --data empty --json");
     ASSERT_EQ(r.code, 0) << r.err;
     const nlohmann::json j = nlohmann::json::parse(r.out, nullptr, false);
     ASSERT_TRUE(j.is_object());
+    EXPECT_EQ(r.err.find("gzip"), std::string::npos) << r.err;
     EXPECT_EQ(j["schema"], "stipple.study/2");
     ASSERT_EQ(j["models"].size(), 1u) << "the checker plane";
     EXPECT_GE(j["not_made"].size(), 10u);

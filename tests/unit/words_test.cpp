@@ -210,7 +210,7 @@ TEST(Words, PipedProgressIsSilentUnlessJsonIsAskedFor) {
     std::istringstream lines(onDisk.err);
     int found = 0;
     for (std::string line; std::getline(lines, line); ++found)
-        EXPECT_EQ(nlohmann::json::parse(line, nullptr, false).value("schema", ""), "stipple.progress/2") << line;
+        EXPECT_EQ(nlohmann::json::parse(line, nullptr, false).value("schema", ""), "stipple.progress/1") << line;
     EXPECT_GT(found, 0) << "the note on temporary files at least";
     const Outcome cached = runProgram(folder, "render a.las -o a.png --size 64x48");
     EXPECT_EQ(cached.code, 0);
