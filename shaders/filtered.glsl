@@ -77,7 +77,7 @@ void offerFront(WideDisc d, float rough, EwaKernel k, DepthRange range, ivec2 pi
     const uint at = uint(pixel.y) * frame.width + uint(pixel.x);
     const bool isOpaque = r.isMet > 0.5 || isCentre;
     if (isOpaque) atomicMin(fronts[at].key, visibilityKey(floatBitsToUint(r.depth + rough * r.along), drawId(0u, d.id)));
-    if (isCentre || !(r.rho2 < frame.kernelSupport * frame.kernelSupport && k.amplitude > 0.0)) return;
+    if (isCentre || !(r.rho2 < frame.kernelSupport * frame.kernelSupport && blendedAmplitude(d, k, frame.nearPlane) > 0.0)) return;
     atomicAdd(fronts[at].count, 1u);
     if (isOpaque) return;
     atomicMin(fronts[at].first, d.id);
@@ -106,7 +106,7 @@ void addKernel(WideDisc d, vec3 colour, EwaKernel k, DepthRange range, ivec2 pix
     }
     const float support = frame.kernelSupport;
     if (!(r.rho2 < support * support)) return;
-    const float w = k.amplitude * kernelAt(r.rho2, kernelEnd(support)) * sums[at].unit;
+    const float w = blendedAmplitude(d, k, frame.nearPlane) * kernelAt(r.rho2, kernelEnd(support)) * sums[at].unit;
     const vec3 n = towardsEye(d);
     atomicAdd(sums[at].weight, unitsOf(w));
     atomicAdd(sums[at].depth, unitsOf(w * relativeDepth(r.depth, sums[at].reference)));

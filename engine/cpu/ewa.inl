@@ -102,7 +102,7 @@ void prepareKernels(const FrameConstants& frame, const SplatTile& tile, size_t c
         b.alongX[i] = k.alongX;
         b.skew[i] = k.skew;
         b.alongY[i] = k.alongY;
-        b.amplitude[i] = isNear ? 1.0f : k.amplitude;
+        b.amplitude[i] = blendedAmplitude(d, k, f.nearPlane);
         b.linear[i] =
             atAxis ? planeAtAxis(d) : s.linear[i] + (s.slopeX[i] * (k.x - s.x[i]) + s.slopeY[i] * (k.y - s.y[i]));
         b.least[i] = kOrthographic ? range.nearest : 1.0f / range.farthest;

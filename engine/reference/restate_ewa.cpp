@@ -176,8 +176,11 @@ class Filter {
             !view_.isOrthographic && !(d.centre.z > 0 && lean2 * radius * radius < 0.95 * d.centre.z * d.centre.z);
         const Ellipse e = isNear ? Ellipse{} : imageOfCircle(view_, d, radius, support_);
         if (!isNear && !e.isThere) return;  // edge-on: it has no area
+        const bool isBlended = isNear || d.centre.z > view_.nearPlane;
         const dmat2 wide = e.variance + dmat2(lowPass_);
-        const double amplitude = isNear ? 1 : std::sqrt(glm::determinant(e.variance) / glm::determinant(wide));
+        const double amplitude = isNear       ? 1
+                                 : !isBlended ? 0
+                                              : std::sqrt(glm::determinant(e.variance) / glm::determinant(wide));
         const dmat2 inverse = isNear ? dmat2(1) : glm::inverse(wide);
         const dvec2 principal = 0.5 * dvec2(view_.width, view_.height);
         forPixels(d, radius, support_ * std::sqrt(lowPass_), [&](int x, int y, const ViewRay& ray) {

@@ -110,6 +110,12 @@ SHARED_FN float ewaRho2(EwaKernel k, float x, float y) {
     return dx * dx * k.alongX + dy * dy * k.alongY;
 }
 
+// The amplitude with which a disc is blended: none where its centre lies before the near plane, unless it is about the
+// eye, where each pixel decides.
+SHARED_FN float blendedAmplitude(WideDisc d, EwaKernel k, float nearPlane) {
+    return k.isNear > 0.5f ? 1.0f : (d.centre.z > nearPlane ? k.amplitude : 0.0f);
+}
+
 // Between which depths a disc's plane counts: as far as its kernel and the low-pass reach on it. (Planes that face the
 // eye by less than kGrazing count as if they did by that.)
 struct DepthRange {

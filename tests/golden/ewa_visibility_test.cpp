@@ -8,6 +8,7 @@
 #include <cstdio>
 
 #include "engine/cpu/cpu_backend.h"
+#include "engine/reference/reference.h"
 #include "tests/support/drawn_discs.h"
 #include "tests/support/drawn_shapes.h"
 #include "tests/support/support.h"
@@ -269,6 +270,44 @@ TEST(EwaVisibility, ADiscBesideThePictureReachesIn) {
                 EXPECT_EQ(there > 500, beside < 0.4);
                 EXPECT_EQ(wrong, 0u) << name << ", mode " << static_cast<int>(mode) << ", " << beside << " beside";
             }
+    }
+}
+
+/// Discs of a floor that the near plane cuts: fronts are cut where it is, kernels with their centres; on all backends
+/// alike. Without the plane there is more of the floor.
+TEST(EwaVisibility, DiscsThatTheNearPlaneCutsAreThoseOfTheOracle) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    Rng rng(6);
+    Grid floor;
+    floor.centre = {0, 0.5, 2};
+    floor.lean = 1.3;
+    floor.spacing = 0.05;
+    floor.radius = 0.07;
+    floor.half = 20;
+    test::writePly(folder / "a.ply", floor.points(rng), true, true);
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    const auto oracle = reference::makeReferenceBackend(*executor);
+    const auto covered = [](const render::Image& image) {
+        return std::count_if(image.depth.begin(), image.depth.end(), [](float z) { return z > 0; });
+    };
+    lod::View view = viewAhead(160, 250);
+    const auto whole = covered(test::renderView(store, *oracle, *executor, view, blended()));
+    for (const double nearPlane : {1.4, 1.8, 2.2}) {
+        view.nearPlane = nearPlane;
+        const render::Image expected = test::renderView(store, *oracle, *executor, view, blended());
+        EXPECT_GT(covered(expected), 100);
+        EXPECT_LT(covered(expected), whole - 300);
+        for (auto& [name, backend] : test::cpuBackendsAndOracle(*executor)) {
+            const render::Image image = test::renderView(store, *backend, *executor, view, blended());
+            const auto d = reference::compareImages(image, expected, 4, nullptr).value();
+            EXPECT_GE(d.psnr, 50) << name << ", near plane " << nearPlane;
+            EXPECT_LE(d.differingFraction, 0.001) << name << ", near plane " << nearPlane;
+            size_t deeper = 0;
+            for (size_t i = 0; i < image.depth.size(); ++i)
+                deeper += std::abs(image.depth[i] - expected.depth[i]) > 1e-3f * expected.depth[i] ? 1 : 0;
+            EXPECT_LE(deeper, 3u) << name << ", near plane " << nearPlane;
+        }
     }
 }
 
