@@ -12,7 +12,7 @@
 #include "shared/pyramid.h"
 #include "shared/record.h"
 #include "shared/shade.h"
-#include "shared/strand.h"
+#include "shared/curve.h"
 #include "shared/visibility.h"
 
 layout(set = 0, binding = kFrameBinding, scalar) readonly buffer FrameBlock { FrameConstants frame; };
@@ -25,7 +25,7 @@ layout(set = 0, binding = kImageBinding, scalar) writeonly buffer ImageBlock { u
 layout(set = 0, binding = kExtraBinding, scalar) writeonly buffer ExtraBlock { float extra[]; };  // depth, normal xyz, linear rgb
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Records { PointRecord records[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Segments { StrandSegment segments[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Segments { CurveSegment segments[]; };
 
 layout(push_constant, scalar) uniform StepBlock { Step stepInfo; };
 

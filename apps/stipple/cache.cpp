@@ -28,12 +28,12 @@ namespace {
 /// the bytes?
 std::string settingsText(const BuildOptions& build) {
     const auto& [memory, normals, radii, up, attributes, temp, duplicates, cacheLimit, threads, skipBad, onlyPoints,
-                 allowOutside, dropOutliers, repair, strandRadius, surfels, progress, ranks, together, leftovers] =
+                 allowOutside, dropOutliers, repair, curveRadius, surfels, progress, ranks, together, leftovers] =
         build;
     // Not memory, temp, threads, ranks, together, leftovers: any give the same. Not attributes: what is cached has all
     // of them.
     return fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}", normals, radii, up, duplicates, skipBad, onlyPoints,
-                       allowOutside, dropOutliers, strandRadius, surfels);
+                       allowOutside, dropOutliers, curveRadius, surfels);
 }
 
 /// Path, size and the times of the last change of content and of place: a copy that keeps its time is another file.

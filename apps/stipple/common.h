@@ -28,7 +28,7 @@ struct BuildOptions {
     int threads = 0;
     bool skipBad = false, onlyPoints = false, allowOutside = false, dropOutliers = false;
     bool repair = false;  ///< of former versions: what it did is always done
-    double strandRadius = 0;
+    double curveRadius = 0;
     uint64_t surfels = 0;
     std::string progress = "auto";
     Ranks* ranks = nullptr;                   ///< of an MPI job

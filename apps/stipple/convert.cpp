@@ -5,10 +5,10 @@
 #include "apps/stipple/common.h"
 #include "apps/stipple/outputs.h"
 #include "engine/base/process.h"
-#include "engine/scene/strand_fit.h"
+#include "engine/scene/curve_fit.h"
 #include "engine/scene/triangles.h"
+#include "lod/builder/curves/curve_build.h"
 #include "lod/builder/mesh/mesh_build.h"
-#include "lod/builder/strands/strand_build.h"
 
 namespace stipple::app {
 namespace {
@@ -16,40 +16,40 @@ namespace fs = std::filesystem;
 
 struct Options {
     std::string input, output;
-    bool strands = false, json = false, force = false;
+    bool curves = false, json = false, force = false;
     BuildOptions build;  ///< of which reading the input uses some
-    scene::StrandFitSettings fit;
+    scene::CurveFitSettings fit;
 };
 
-/// The strands as lines with radii (and normals: ribbons), beside what is left of the scene.
-void addLines(const lod::StrandSet& strands, scene::Scene& scene) {
+/// The curves as lines with radii (and normals: ribbons), beside what is left of the scene.
+void addLines(const lod::CurveSet& curves, scene::Scene& scene) {
     scene::Mesh mesh;
-    mesh.name = "strands";
+    mesh.name = "curves";
     mesh.primitives.resize(2);  // tubes, ribbons
     for (scene::Primitive& p : mesh.primitives) {
         p.kind = scene::PrimitiveKind::lines;
         p.material = -1;
     }
-    for (size_t s = 0; s < strands.strands(); ++s) {
-        const bool isRibbon = strands.isRibbon[s] != 0;
+    for (size_t s = 0; s < curves.curves(); ++s) {
+        const bool isRibbon = curves.isRibbon[s] != 0;
         scene::Primitive& p = mesh.primitives[isRibbon ? 1 : 0];
-        for (uint32_t i = strands.first[s]; i < strands.first[s + 1]; ++i) {
+        for (uint32_t i = curves.first[s]; i < curves.first[s + 1]; ++i) {
             const auto at = static_cast<uint32_t>(p.position.size());
-            p.position.emplace_back(strands.position[i]);
-            p.radius.push_back(strands.radius[i]);
-            if (isRibbon) p.normal.push_back(glm::normalize(strands.normal[i]));
+            p.position.emplace_back(curves.position[i]);
+            p.radius.push_back(curves.radius[i]);
+            if (isRibbon) p.normal.push_back(glm::normalize(curves.normal[i]));
             const auto channel = [&](uint32_t shift) {
-                return shared::linearFromSrgb(static_cast<float>(strands.colour[i] >> shift & 255u) / 255.0f);
+                return shared::linearFromSrgb(static_cast<float>(curves.colour[i] >> shift & 255u) / 255.0f);
             };
             p.colour.emplace_back(channel(0), channel(8), channel(16), 1);
-            if (i > strands.first[s]) p.indices.insert(p.indices.end(), {at - 1, at});
+            if (i > curves.first[s]) p.indices.insert(p.indices.end(), {at - 1, at});
         }
     }
     std::erase_if(mesh.primitives, [](const scene::Primitive& p) { return p.indices.empty(); });
     if (mesh.primitives.empty()) return;
     scene.meshes.push_back(std::move(mesh));
     scene::Node node;
-    node.name = "strands";
+    node.name = "curves";
     node.mesh = static_cast<int>(scene.meshes.size()) - 1;
     scene.nodes.push_back(std::move(node));
 }
@@ -82,7 +82,7 @@ struct Beside {
 };
 
 Result<void> run(const Options& o) {
-    if (!o.strands)
+    if (!o.curves)
         return fail(ErrorKind::usage, "says nothing of what to convert to", "stipple convert",
                     "give --curves: polygon plants become ribbons and tubes");
     if (!isSceneFile(o.input))
@@ -101,30 +101,30 @@ Result<void> run(const Options& o) {
     const auto executor = makeTbbExecutor(0);
     STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(o.input, o.build.reading()));
     STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images, decodeImages(scene, o.build.reading().memoryBytes));
-    scene::StrandFit fit = scene::fitStrands(scene, images, o.fit, *executor);
+    scene::CurveFit fit = scene::fitCurves(scene, images, o.fit, *executor);
     STIPPLE_TRY(checkStopped(o.output));
     if (fit.trianglesIn == 0) return fail(ErrorKind::input, "holds no triangles", o.input);
     tidy(fit.rest);
-    const bool hasStrands = fit.strands.strands() > 0;
+    const bool hasCurves = fit.curves.curves() > 0;
     std::vector<std::string> written;
     if (!isStore) {
-        addLines(fit.strands, fit.rest);
+        addLines(fit.curves, fit.rest);
         STIPPLE_TRY(scene::writeGltf(fit.rest, o.output));
         written.push_back(o.output);
     } else {
-        if (!hasStrands) return fail(ErrorKind::input, "has no part that looks like a ribbon or a tube", o.input);
+        if (!hasCurves) return fail(ErrorKind::input, "has no part that looks like a ribbon or a tube", o.input);
         Progress progress(true);
-        lod::StrandBuildSettings settings;
+        lod::CurveBuildSettings settings;
         settings.description.source = fs::path(o.input).filename().string();
         settings.limits.isStopped = isStopRequested;
-        STIPPLE_TRY(lod::buildStrandStore(lod::sourceOf(lod::cleanStrands(fit.strands, 0)), o.output, settings,
-                                          *executor, progress));
+        STIPPLE_TRY(lod::buildCurveStore(lod::sourceOf(lod::cleanCurves(fit.curves, 0)), o.output, settings, *executor,
+                                         progress));
         written.push_back(o.output);
         if (fit.trianglesLeft > 0) {
             STIPPLE_TRY(scene::writeGltf(fit.rest, beside.rest));
             scene::Scene all = fit.rest;
             scene::Node node;
-            node.name = "strands";
+            node.name = "curves";
             node.store = fs::path(o.output).filename().string();
             all.nodes.push_back(node);
             STIPPLE_TRY(scene::writeGltf(all, beside.scene));
@@ -139,14 +139,14 @@ Result<void> run(const Options& o) {
              {"triangles_left", fit.trianglesLeft},
              {"ribbons", fit.ribbons},
              {"tubes", fit.tubes},
-             {"segments", fit.strands.position.size() - fit.strands.strands()},
+             {"segments", fit.curves.position.size() - fit.curves.curves()},
              {"deviation", {{"mean", fit.meanDeviation}, {"p95", fit.p95Deviation}, {"largest", fit.largestDeviation}}},
              {"written", written},
              {"seconds", nowSeconds() - start}});
         return {};
     }
     fmt::print("{}: {} triangles became {} ribbons and {} tubes ({} segments); {} triangles are left\n", o.input,
-               fit.trianglesIn, fit.ribbons, fit.tubes, fit.strands.position.size() - fit.strands.strands(),
+               fit.trianglesIn, fit.ribbons, fit.tubes, fit.curves.position.size() - fit.curves.curves(),
                fit.trianglesLeft);
     fmt::print(
         "  from the mesh to its curves: {:.3g} on average, {:.3g} for 95 %, {:.3g} at most (units of the file)\n",
@@ -167,8 +167,8 @@ void setupConvert(CLI::App& app, int& status) {
         ->type_name("FILE")
         ->required();
     addForce(*sub, o->force);
-    sub->add_flag("--strands", o->strands)->group("");  // its old name
-    sub->add_flag("--curves", o->strands, "leaves and blades become ribbons, branches tubes; what is neither is kept");
+    sub->add_flag("--strands", o->curves)->group("");  // its old name
+    sub->add_flag("--curves", o->curves, "leaves and blades become ribbons, branches tubes; what is neither is kept");
     sub->add_option("--tolerance", o->fit.tolerance, "how far a part may be from its curve, share of its own width")
         ->transform(within(0.01, 2.0))
         ->capture_default_str();

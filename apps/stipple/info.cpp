@@ -92,7 +92,7 @@ nlohmann::json storeInfo(const lod::Store& store) {
         const uint32_t code = h.errorCodeOf(number);
         const double error = code == lod::ErrorScale::kNoParent ? 0 : h.unit * h.errors.decode(code);
         l["largest_error"] = std::max(l["largest_error"].get<double>(), error);
-        if (h.isStrands) l["kept_share"] = std::min(l["kept_share"].get<double>(), lod::keptShare(n));
+        if (h.isCurves) l["kept_share"] = std::min(l["kept_share"].get<double>(), lod::keptShare(n));
     }
     nlohmann::json attributes = nlohmann::json::array();
     for (const lod::AttributeInfo& a : d.attributes)

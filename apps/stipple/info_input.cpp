@@ -14,10 +14,10 @@
 #include "engine/base/units.h"
 #include "engine/base/words.h"
 #include "engine/scene/scene.h"
+#include "lod/import/curves/curve_readers.h"
 #include "lod/import/import.h"
 #include "lod/import/las/header.h"
 #include "lod/import/ply/mesh.h"
-#include "lod/import/strands/strand_readers.h"
 #include "lod/import/survey.h"
 
 namespace stipple::app {
@@ -399,19 +399,19 @@ Result<void> showScene(const InputInfoOptions& o) {
     return {};
 }
 
-Result<void> showStrands(const InputInfoOptions& o) {
-    STIPPLE_ASSIGN(const lod::StrandSource source, lod::openStrands(o.input));
-    STIPPLE_ASSIGN(lod::StrandSet set, lod::collect(source));
+Result<void> showCurves(const InputInfoOptions& o) {
+    STIPPLE_ASSIGN(const lod::CurveSource source, lod::openCurves(o.input));
+    STIPPLE_ASSIGN(lod::CurveSet set, lod::collect(source));
     const bool hasRadii = std::any_of(set.radius.begin(), set.radius.end(), [](float r) { return r > 0; });
-    const uint64_t vertices = set.position.size(), strands = set.strands();
-    const lod::StrandSet clean = lod::cleanStrands(std::move(set), 0);
+    const uint64_t vertices = set.position.size(), curves = set.curves();
+    const lod::CurveSet clean = lod::cleanCurves(std::move(set), 0);
     scene::Box box;
     for (const glm::dvec3& p : clean.position) box.add(p);
     nlohmann::json j = {{"kind", "curves"},
                         {"path", o.input},
-                        {"curves", strands},
+                        {"curves", curves},
                         {"vertices", vertices},
-                        {"drawn", clean.strands()},
+                        {"drawn", clean.curves()},
                         {"has_radii", hasRadii},
                         {"has_colour", clean.hasColour},
                         {"dropped", clean.dropped},
@@ -424,8 +424,7 @@ Result<void> showStrands(const InputInfoOptions& o) {
         printJson("info", j);
         return {};
     }
-    fmt::print("{}: {} of {}\n", printable(o.input), counted(strands, "curve"),
-               counted(vertices, "vertex", "vertices"));
+    fmt::print("{}: {} of {}\n", printable(o.input), counted(curves, "curve"), counted(vertices, "vertex", "vertices"));
     printVector(j, "min", "least");
     printVector(j, "max", "greatest");
     fmt::print("  {:15} {}\n  {:15} {}\n", "radii", hasRadii ? "yes" : "no: see --curve-radius", "colours",
@@ -439,7 +438,7 @@ Result<void> showStrands(const InputInfoOptions& o) {
 
 Result<void> showInputInfo(const InputInfoOptions& o, Executor& executor) {
     if (isSceneFile(o.input)) return showScene(o);
-    if (lod::isStrandFile(o.input)) return showStrands(o);
+    if (lod::isCurveFile(o.input)) return showCurves(o);
     STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs({o.input}));
     if (files.size() != 1) return showFolder(o, files, executor);
     STIPPLE_ASSIGN(const nlohmann::json j, fileInfo(o, files.front(), executor));

@@ -19,14 +19,14 @@
 #include "engine/base/text.h"
 #include "engine/base/units.h"
 #include "engine/image/image_io.h"
+#include "engine/scene/curves.h"
 #include "engine/scene/gltf/container.h"
 #include "engine/scene/outline.h"
-#include "engine/scene/strands.h"
 #include "engine/scene/triangles.h"
+#include "lod/builder/curves/curve_build.h"
 #include "lod/builder/mesh/mesh_build.h"
-#include "lod/builder/strands/strand_build.h"
+#include "lod/import/curves/curve_readers.h"
 #include "lod/import/import.h"
-#include "lod/import/strands/strand_readers.h"
 #include "lod/store/colour.h"
 #include "lod/store/file_kind.h"
 #include "lod/store/nearest.h"
@@ -117,33 +117,33 @@ bool holds(const scene::Scene& scene, const scene::Placement& placed, scene::Pri
     return std::any_of(primitives.begin(), primitives.end(), [&](const auto& p) { return p.kind == kind; });
 }
 
-lod::StrandBuildSettings strandSettings(const std::string& input) {
-    lod::StrandBuildSettings settings;
+lod::CurveBuildSettings curveSettings(const std::string& input) {
+    lod::CurveBuildSettings settings;
     settings.description.source = fs::path(input).filename().string();
     return settings;
 }
 
 /// Ribbons and tubes.
-Result<lod::BuildReport> buildStrands(const lod::StrandSource& raw, const std::string& input, const std::string& output,
-                                      const BuildOptions& build, Executor& executor, Progress& progress) {
-    lod::StrandBuildSettings settings = strandSettings(input);
+Result<lod::BuildReport> buildCurves(const lod::CurveSource& raw, const std::string& input, const std::string& output,
+                                     const BuildOptions& build, Executor& executor, Progress& progress) {
+    lod::CurveBuildSettings settings = curveSettings(input);
     STIPPLE_ASSIGN(settings.limits, build.settings());
     settings.description.isRigid = !raw.isPlant;
-    lod::StrandSource turned = raw;
+    lod::CurveSource turned = raw;
     if (!build.up.empty())
-        turned.read = [&raw, up = lod::axisVector(axisNamed(build.up))](const lod::StrandSource::Take& take) {
-            return raw.read([&](lod::StrandSet block) {
+        turned.read = [&raw, up = lod::axisVector(axisNamed(build.up))](const lod::CurveSource::Take& take) {
+            return raw.read([&](lod::CurveSet block) {
                 block.up = up;
                 return take(block);
             });
         };
-    return lod::buildStrandStore(lod::cleanSource(turned, build.strandRadius), output, settings, executor, progress);
+    return lod::buildCurveStore(lod::cleanSource(turned, build.curveRadius), output, settings, executor, progress);
 }
 
-Result<lod::BuildReport> buildStrandFile(const std::string& input, const std::string& output, const BuildOptions& build,
-                                         Executor& executor, Progress& progress) {
-    STIPPLE_ASSIGN(const lod::StrandSource strands, lod::openStrands(input));
-    return buildStrands(strands, input, output, build, executor, progress);
+Result<lod::BuildReport> buildCurveFile(const std::string& input, const std::string& output, const BuildOptions& build,
+                                        Executor& executor, Progress& progress) {
+    STIPPLE_ASSIGN(const lod::CurveSource curves, lod::openCurves(input));
+    return buildCurves(curves, input, output, build, executor, progress);
 }
 
 /// Meshes with primitives of a kind: one that stands in several places is to be built once and placed, all others as
@@ -209,21 +209,21 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
 
 /// The ribbons and tubes of a scene. What stands in many places also gets a proxy, and all those
 /// together are an instance group.
-Result<void> placeStrands(const scene::Scene& scene, const BuildOptions& build, Executor& executor, bool showProgress,
-                          OpenedScene& opened) {
+Result<void> placeCurves(const scene::Scene& scene, const BuildOptions& build, Executor& executor, bool showProgress,
+                         OpenedScene& opened) {
     const auto open = [&](const SharedModel& model, const std::string& part) {
         return openCached({scene.path}, build, part, showProgress,
                           [&](const std::string& to, Progress& progress) -> Result<lod::BuildReport> {
-                              lod::StrandBuildSettings settings = strandSettings(scene.path);
+                              lod::CurveBuildSettings settings = curveSettings(scene.path);
                               STIPPLE_ASSIGN(settings.limits, build.settings());
-                              return lod::buildStrandStore(lod::sourceOf(model->strands()), to, settings, executor,
-                                                           progress);
+                              return lod::buildCurveStore(lod::sourceOf(model->curves()), to, settings, executor,
+                                                          progress);
                           });
     };
     const auto modelOf = [&](const std::vector<scene::Placement>& of) {
-        return std::make_shared<StrandModel>(
-            [of, &scene, radius = build.strandRadius] {
-                return lod::cleanStrands(scene::flattenStrands(scene, of), radius);
+        return std::make_shared<CurveModel>(
+            [of, &scene, radius = build.curveRadius] {
+                return lod::cleanCurves(scene::flattenCurves(scene, of), radius);
             },
             executor);
     };
@@ -234,7 +234,7 @@ Result<void> placeStrands(const scene::Scene& scene, const BuildOptions& build, 
         const std::string part = fmt::format("curves of mesh {}", mesh);
         STIPPLE_ASSIGN(const std::shared_ptr<const lod::Store> store, open(model, part));
         render::PlacedStore one{store, {}, {}};
-        STIPPLE_ASSIGN(one.proxies, strandProxies(model, *store, scene.path, part, build, executor, showProgress));
+        STIPPLE_ASSIGN(one.proxies, curveProxies(model, *store, scene.path, part, build, executor, showProgress));
         build.together->settle(part + ", proxy");
         const auto first = static_cast<uint32_t>(opened.placed.size());
         for (const lod::Instance& instance : instances) {
@@ -312,7 +312,7 @@ Result<void> openSceneFile(const std::string& path, const BuildOptions& options,
         return std::any_of(meshes.begin(), meshes.end(), [&](const auto& p) { return holds(scene, p, kind); });
     };
     if (build.surfels == 0) STIPPLE_TRY(placeTriangles(scene, build, executor, showProgress, placed));
-    STIPPLE_TRY(placeStrands(scene, build, executor, showProgress, opened));
+    STIPPLE_TRY(placeCurves(scene, build, executor, showProgress, opened));
     if (build.surfels > 0 || anyHolds(scene::PrimitiveKind::points) || placed.empty()) {
         STIPPLE_ASSIGN(std::shared_ptr<const lod::Store> points, openBuilt({path}, build, executor, showProgress));
         placed.push_back({std::move(points), {}, {}});
@@ -387,8 +387,8 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
     for (const std::string& input : inputs)
         if (lod::fileKindOf(input) == lod::FileKind::store)
             return fail(ErrorKind::usage, "is built already", input, "render or view it");
-    if (inputs.size() == 1 && lod::isStrandFile(inputs[0]))
-        return buildStrandFile(inputs[0], output, build, executor, progress);
+    if (inputs.size() == 1 && lod::isCurveFile(inputs[0]))
+        return buildCurveFile(inputs[0], output, build, executor, progress);
     if (!isSceneFile(inputs.front())) return buildFiles(inputs, output, build, executor, progress);
     if (build.surfels > 0) return lod::buildStore(inputs, output, settings, executor, progress);
     if (inputs.size() > 1)
@@ -405,8 +405,8 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
     };
     const uint64_t lines = counted(scene::PrimitiveKind::lines) / 2, points = counted(scene::PrimitiveKind::points);
     if (triangles.triangles == 0 && points == 0 && lines > 0)
-        return buildStrands(scene::strandSource(scene, scene::placements(scene)), inputs.front(), output, build,
-                            executor, progress);
+        return buildCurves(scene::curveSource(scene, scene::placements(scene)), inputs.front(), output, build, executor,
+                           progress);
     if (triangles.triangles == 0) return lod::buildStore(inputs, output, settings, executor, progress);
     if (lines + points > 0)
         scene.notes.push_back(fmt::format(
@@ -425,9 +425,9 @@ namespace {
 Result<std::shared_ptr<const lod::Store>> openFiles(const std::vector<std::string>& inputs, const BuildOptions& build,
                                                     Executor& executor, bool showProgress) {
     if (lod::isStoreFile(inputs.front())) return openStoreFile(inputs.front());
-    if (inputs.size() == 1 && lod::isStrandFile(inputs[0]))
+    if (inputs.size() == 1 && lod::isCurveFile(inputs[0]))
         return openCached(inputs, build, "curves", showProgress, [&](const std::string& path, Progress& progress) {
-            return buildStrandFile(inputs[0], path, build, executor, progress);
+            return buildCurveFile(inputs[0], path, build, executor, progress);
         });
     STIPPLE_ASSIGN(const PlyMeshes meshes, findPlyMeshes(inputs, build));
     if (meshes.areAll())
@@ -462,7 +462,7 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
         scene.placed.push_back({std::move(store), {}, {}});
     }
     // Points that stand in for meshes are lit. Beside scans that keep their photographed colours they would not be,
-    // unless strands have all of them lit.
+    // unless curves have all of them lit.
     const auto isOf = [](bool shaded) {
         return [shaded](const render::PlacedStore& p) {
             return !p.store->hierarchy.isMesh() && isShaded(p.store->description) == shaded;

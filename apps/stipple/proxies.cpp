@@ -7,8 +7,8 @@
 #include <filesystem>
 
 #include "apps/stipple/cache.h"
+#include "lod/builder/curves/curve_coverage.h"
 #include "lod/builder/stochastic/stochastic_build.h"
-#include "lod/builder/strands/strand_coverage.h"
 #include "lod/store/nearest.h"
 
 namespace stipple::app {
@@ -56,7 +56,7 @@ lod::StochasticSettings stochasticSettings(const std::string& input) {
 }
 
 /// The whole of some samples, where they are. `of`: the store that they show.
-lod::StochasticItem itemOf(const lod::StrandSamples& samples, const lod::Store& of) {
+lod::StochasticItem itemOf(const lod::CurveSamples& samples, const lod::Store& of) {
     lod::StochasticItem item;
     item.samples = &samples;
     item.count = static_cast<uint32_t>(samples.points.position.size());
@@ -67,7 +67,7 @@ lod::StochasticItem itemOf(const lod::StrandSamples& samples, const lod::Store& 
 }
 
 /// The same, with a sphere of its own.
-lod::StochasticItem itemAlone(const lod::StrandSamples& samples) {
+lod::StochasticItem itemAlone(const lod::CurveSamples& samples) {
     lod::StochasticItem item;
     item.samples = &samples;
     item.count = static_cast<uint32_t>(samples.points.position.size());
@@ -83,25 +83,25 @@ lod::StochasticItem itemAlone(const lod::StrandSamples& samples) {
 
 }  // namespace
 
-const lod::StrandSet& StrandModel::strands() {
-    if (!strands_) strands_ = make_();
-    return *strands_;
+const lod::CurveSet& CurveModel::curves() {
+    if (!curves_) curves_ = make_();
+    return *curves_;
 }
-const lod::StrandSamples& StrandModel::samples() {
+const lod::CurveSamples& CurveModel::samples() {
     if (!samples_) {
-        const uint64_t segments = strands().position.size() - strands().strands();
-        samples_ = lod::sampleStrands(strands(), std::min(kMostSamples, std::max<uint64_t>(2 * segments, 64)));
+        const uint64_t segments = curves().position.size() - curves().curves();
+        samples_ = lod::sampleCurves(curves(), std::min(kMostSamples, std::max<uint64_t>(2 * segments, 64)));
     }
     return *samples_;
 }
-const lod::DiscFactors& StrandModel::factors() {
-    if (!factors_) factors_ = {lod::coverageFactors(strands(), samples(), executor_), samples().radius};
+const lod::DiscFactors& CurveModel::factors() {
+    if (!factors_) factors_ = {lod::coverageFactors(curves(), samples(), executor_), samples().radius};
     return *factors_;
 }
 
-Result<Proxies> strandProxies(const SharedModel& model, const lod::Store& of, const std::string& input,
-                              const std::string& part, const BuildOptions& build, Executor& executor,
-                              bool showProgress) {
+Result<Proxies> curveProxies(const SharedModel& model, const lod::Store& of, const std::string& input,
+                             const std::string& part, const BuildOptions& build, Executor& executor,
+                             bool showProgress) {
     constexpr uint64_t kFewSegments = 2000;
     const uint64_t segments = of.description.points;
     if (segments < kFewSegments) return Proxies();
@@ -109,10 +109,10 @@ Result<Proxies> strandProxies(const SharedModel& model, const lod::Store& of, co
         lod::StochasticSettings settings = stochasticSettings(input);
         lod::describeDiscs({model->factors()}, settings.description);
         constexpr uint32_t kMostInNode = 8192;
-        const std::vector<lod::StrandSamples> parts = lod::splitSamples(model->samples(), kMostInNode);
+        const std::vector<lod::CurveSamples> parts = lod::splitSamples(model->samples(), kMostInNode);
         std::vector<lod::StochasticItem> items;
         items.reserve(parts.size());
-        for (const lod::StrandSamples& cube : parts) items.push_back(itemAlone(cube));
+        for (const lod::CurveSamples& cube : parts) items.push_back(itemAlone(cube));
         return lod::buildStochasticStore(items, path, settings, executor, progress);
     };
     render::Proxy proxy;
@@ -134,7 +134,7 @@ Result<void> GroupBuilder::finish(const std::string& input, const BuildOptions& 
     const auto make = [&](const std::string& path, Progress& progress) -> Result<lod::BuildReport> {
         // Discs of one size for all: as many of each model as its area asks for.
         const auto areaOf = [](const Model& m) {  // n r^2
-            const lod::StrandSamples& samples = m.model->samples();
+            const lod::CurveSamples& samples = m.model->samples();
             return samples.radius * samples.radius * static_cast<double>(samples.points.position.size());
         };
         double area = 0;

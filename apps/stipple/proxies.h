@@ -1,4 +1,4 @@
-// Proxies, what is seen of things from afar: points in place of meshes and strands, and instance groups of them.
+// Proxies, what is seen of things from afar: points in place of meshes and curves, and instance groups of them.
 #pragma once
 
 #include <functional>
@@ -8,7 +8,7 @@
 #include "apps/stipple/common.h"
 #include "engine/scene/triangles.h"
 #include "lod/builder/stochastic/stochastic_build.h"
-#include "lod/primitives/strands.h"
+#include "lod/primitives/curves.h"
 
 namespace stipple::app {
 
@@ -19,29 +19,27 @@ using Proxies = std::shared_ptr<const std::vector<render::Proxy>>;
 Result<Proxies> meshProxies(const scene::Scene& scene, const std::vector<scene::Placement>& of, const lod::Store& mesh,
                             const std::string& part, const BuildOptions& build, Executor& executor, bool showProgress);
 
-/// Clean strands and their samples, made when they are needed: what is in the cache does not need them.
-class StrandModel {
+/// Clean curves and their samples, made when they are needed: what is in the cache does not need them.
+class CurveModel {
   public:
-    StrandModel(std::function<lod::StrandSet()> make, Executor& executor)
-        : make_(std::move(make)), executor_(executor) {}
-    const lod::StrandSet& strands();
-    const lod::StrandSamples& samples();
+    CurveModel(std::function<lod::CurveSet()> make, Executor& executor) : make_(std::move(make)), executor_(executor) {}
+    const lod::CurveSet& curves();
+    const lod::CurveSamples& samples();
     const lod::DiscFactors& factors();
 
   private:
-    std::function<lod::StrandSet()> make_;
+    std::function<lod::CurveSet()> make_;
     Executor& executor_;
-    std::optional<lod::StrandSet> strands_;
-    std::optional<lod::StrandSamples> samples_;
+    std::optional<lod::CurveSet> curves_;
+    std::optional<lod::CurveSamples> samples_;
     std::optional<lod::DiscFactors> factors_;
 };
-using SharedModel = std::shared_ptr<StrandModel>;
+using SharedModel = std::shared_ptr<CurveModel>;
 
-/// Of strands, which `of` holds: discs, as few as the view allows (lod/builder/stochastic). Null where there are few
-/// strands.
-Result<Proxies> strandProxies(const SharedModel& model, const lod::Store& of, const std::string& input,
-                              const std::string& part, const BuildOptions& build, Executor& executor,
-                              bool showProgress);
+/// Of curves, which `of` holds: discs, as few as the view allows (lod/builder/stochastic). Null where there are few
+/// curves.
+Result<Proxies> curveProxies(const SharedModel& model, const lod::Store& of, const std::string& input,
+                             const std::string& part, const BuildOptions& build, Executor& executor, bool showProgress);
 
 /// Collects what stands in many places, and makes one stochastic store of all of it.
 class GroupBuilder {

@@ -33,7 +33,7 @@ struct Options {
     std::string output, size = "1280x720", mode = "pullpush", device = "auto", shade = "auto",
                         background = fmt::format("{}", fmt::join(render::kBackground, ","));
     std::string debug = "none", resident = "1G";
-    double error = 1, strandExact = 2, wind = 0, seconds = 0, lowPass = 0.5, kernel = 2;
+    double error = 1, curveExact = 2, wind = 0, seconds = 0, lowPass = 0.5, kernel = 2;
     int frames = 1, samples = 4, accumulate = 1;
     uint64_t budget = 0;
     bool noWait = false, json = false, quiet = false, force = false, alpha = false;
@@ -91,7 +91,7 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     s.draw.unlitTriangles = o.shade == "unlit";
     s.draw.lit = isLit(o.shade, d, colour);
     s.draw.worldUp = shot.worldUp;
-    s.draw.exactStrands = static_cast<float>(o.strandExact);
+    s.draw.exactCurves = static_cast<float>(o.curveExact);
     s.draw.effects = o.effects;
     s.draw.lowPass = static_cast<float>(o.lowPass);
     s.draw.kernelSupport = static_cast<float>(o.kernel);
@@ -337,10 +337,10 @@ void addReading(CLI::App& sub, Options& o) {
     sub.add_option("--surfels", o.build.surfels, "turn meshes into that many samples, e.g. 1M; 0: keep triangles")
         ->transform(within(uint64_t{0}, uint64_t{200'000'000}))
         ->capture_default_str();
-    sub.add_option("--curve-radius", o.build.strandRadius,
+    sub.add_option("--curve-radius", o.build.curveRadius,
                    "radius of curves that have none, file units (0: a 4000th of the extent)")
         ->transform(within(0.0, 1e300));
-    sub.add_option("--strand-radius", o.build.strandRadius)->transform(within(0.0, 1e300))->group("");  // its old name
+    sub.add_option("--strand-radius", o.build.curveRadius)->transform(within(0.0, 1e300))->group("");  // its old name
     sub.add_flag("--only-points", o.build.onlyPoints, "of a PLY mesh take the vertices, as points");
     addSceneFileOptions(sub, o.build.allowOutside, o.build.repair);
     sub.add_flag("--skip-bad", o.build.skipBad, "go on past corrupt chunks and files, and say what was lost");
@@ -418,11 +418,11 @@ void setupRender(CLI::App& app, int& status) {
         ->transform(within(-1e9, 1e9))
         ->capture_default_str();
     addKernelOptions(*sub, *o);
-    sub->add_option("--curve-exact", o->strandExact,
+    sub->add_option("--curve-exact", o->curveExact,
                     "half-width in pixels from which ribbons and tubes are filled exactly instead of reconstructed")
         ->transform(within(0.5, 1e9))
         ->capture_default_str();
-    sub->add_option("--strand-exact", o->strandExact)->transform(within(0.5, 1e9))->group("");  // its old name
+    sub->add_option("--strand-exact", o->curveExact)->transform(within(0.5, 1e9))->group("");  // its old name
     sub->add_option("--accumulate", o->accumulate,
                     "the mean of N frames: smooth coverage of curves narrower than a pixel")
         ->transform(within(1, 4096))

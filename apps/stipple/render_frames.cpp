@@ -111,7 +111,7 @@ Result<void> again(const FramesPlan& plan, const render::FrameSettings& settings
                        : render::renderResident(state, plan.views.front(), settings);
 }
 
-/// The mean of frames whose strands narrower than a pixel take other pixels each time.
+/// The mean of frames whose curves narrower than a pixel take other pixels each time.
 Result<void> accumulate(const FramesPlan& plan, render::FrameSettings settings, render::FrameState& state) {
     const int count = plan.accumulate;
     if (count <= 1) return {};

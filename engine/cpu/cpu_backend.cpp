@@ -48,8 +48,8 @@ class CpuBackend final : public render::Backend {
         render::BackendResources r;
         r.meshBytes = frame_.surfacePixels * 4 + frame_.meshBlocks.size() * sizeof(MeshBlock);
         r.emissiveBytes = frame_.emissivePixels * 4;
-        r.strandBytes =
-            frame_.strandBlocks.capacity() * sizeof(StrandBlock) + frame_.wide.capacity() * sizeof(FilledCurve);
+        r.curveBytes =
+            frame_.curveBlocks.capacity() * sizeof(CurveBlock) + frame_.wide.capacity() * sizeof(FilledCurve);
         r.effectBytes = frame_.surfaceWordPixels * sizeof(shared::SurfaceWords);
         for (const auto& tiles : chunks_.tiles)
             r.textureTiles += static_cast<uint64_t>(

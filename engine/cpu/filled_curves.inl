@@ -1,4 +1,4 @@
-// Wide ribbons and tubes of the cpu backend: every pixel whose ray meets them. Included by strands.inl.
+// Wide ribbons and tubes of the cpu backend: every pixel whose ray meets them. Included by curves.inl.
 
 constexpr float kHullMargin = 0.02f;  ///< px: by how much corners of ribbons are off
 
@@ -40,7 +40,8 @@ void hullColumns(const HullLines& h, float top, float bottom, float& from, float
 }
 
 /// Rows [firstRow, lastRow] of a wide ribbon: every pixel whose ray meets it.
-void fillRibbon(const FrameConstants& f, const FilledCurve& s, int firstRow, int lastRow, const Visibility& visibility) {
+void fillRibbon(const FrameConstants& f, const FilledCurve& s, int firstRow, int lastRow,
+                const Visibility& visibility) {
     constexpr int kRibbonStretch = 8;  // most ribbons are a few pixels wide
     const int first = pixelWithin(std::ceil(min(min(s.y[0], s.y[1]), min(s.y[2], s.y[3])) - 0.5f - kHullMargin),
                                   float(firstRow), float(lastRow) + 1.0f),
@@ -126,7 +127,7 @@ void fillTube(const FrameConstants& f, const FilledCurve& s, int firstRow, int l
         fillTubeRows<false>(f, s, firstRow, lastRow, visibility);
 }
 
-void fillStrand(const FrameConstants& f, const FilledCurve& s, int firstRow, int lastRow, const Visibility& visibility) {
+void fillCurve(const FrameConstants& f, const FilledCurve& s, int firstRow, int lastRow, const Visibility& visibility) {
     if (s.isRound)
         fillTube(f, s, firstRow, lastRow, visibility);
     else
@@ -170,11 +171,11 @@ FilledCurve wideRibbon(const FrameConstants& f, const CameraSegment& c, uint64_t
         const float scale = f.focal / lensDepth(lens, max(corner.z, f.nearPlane));
         w.x[k] = corner.x * scale + f.centre.x;
         w.y[k] = corner.y * scale + f.centre.y;
-        isBefore = isBefore && (kOrthographic || corner.z > f.nearPlane) && std::fabs(w.x[k]) < kStrandGuard &&
-                   std::fabs(w.y[k]) < kStrandGuard;
+        isBefore = isBefore && (kOrthographic || corner.z > f.nearPlane) && std::fabs(w.x[k]) < kCurveGuard &&
+                   std::fabs(w.y[k]) < kCurveGuard;
     }
     const float width = float(int(f.width)), height = float(int(f.height));
-    const float reaches = strandReaches(c, lens, f.centre.x, f.centre.y, width, height, f.nearPlane);
+    const float reaches = curveReaches(c, lens, f.centre.x, f.centre.y, width, height, f.nearPlane);
     for (size_t k = 0; k < 4 && !isBefore; ++k) {
         w.x[k] = k % 2 == 0 ? 0.0f : width;
         w.y[k] = k < 2 || reaches < 0.5f ? 0.0f : height;

@@ -55,10 +55,10 @@ struct Frame {
 
     // Where the draws' records are.
     std::vector<BlockSource> blocks;
-    std::vector<StrandBlock> strandBlocks;
+    std::vector<CurveBlock> curveBlocks;
     std::vector<MeshBlock> meshBlocks;
     std::vector<TextureSet> textureSets;
-    bool hasTriangles = false, hasEmissive = false, hasStrands = false;
+    bool hasTriangles = false, hasEmissive = false, hasCurves = false;
 
     // What covers so many pixels that its rows are shared out.
     std::vector<LargeTriangle> large;

@@ -5,12 +5,12 @@
 #include <array>
 #include <cstdint>
 
+#include "shaders/shared/curve.h"
 #include "shaders/shared/ewa.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
 #include "shaders/shared/mesh.h"
 #include "shaders/shared/record.h"
-#include "shaders/shared/strand.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/texture.h"
 #include "shaders/shared/visibility.h"
@@ -85,9 +85,9 @@ struct BlockSource {
     const shared::DrawNode* node;
 };
 
-/// One block of segments of strands.
-struct StrandBlock {
-    const shared::StrandSegment* segments;  ///< first of the block
+/// One block of segments of curves.
+struct CurveBlock {
+    const shared::CurveSegment* segments;  ///< first of the block
     const shared::DrawNode* node;
 };
 
@@ -114,7 +114,7 @@ struct LargeTriangle {
     float inverseDepth[3];  ///< imageLinear
     uint64_t id;            ///< drawId
 };
-/// A strand so wide that its pixels are filled, and so large that its rows are shared out among threads.
+/// A curve so wide that its pixels are filled, and so large that its rows are shared out among threads.
 struct FilledCurve {
     bool isRound;
     uint64_t id;              ///< drawId
@@ -126,7 +126,7 @@ struct FilledCurve {
 };
 struct WideSink {
     void* context;
-    void (*keep)(void* context, const FilledCurve& strand);
+    void (*keep)(void* context, const FilledCurve& curve);
 };
 
 struct LargeSink {
@@ -166,7 +166,7 @@ struct ResolveInput {
     const BlockSource* blocks;
     const MeshBlock* meshBlocks;
     const shared::SurfaceMaterial* materials;
-    const StrandBlock* strandBlocks;
+    const CurveBlock* curveBlocks;
     const shared::WideDisc* discs;
     const shared::DiscBox* discBoxes;  ///< of each
     size_t discCount;
@@ -250,11 +250,11 @@ struct Kernels {
     /// Rows [firstRow, lastRow] of the triangles that were kept.
     void (*rasterLarge)(const shared::FrameConstants& f, const LargeTriangle* large, size_t count, uint32_t firstRow,
                         uint32_t lastRow, const Visibility& visibility);
-    /// Offers up to 256 segments of strands (places from firstPlace on) to the visibility buffer.
-    void (*drawSegments)(const shared::FrameConstants& f, const StrandBlock& block, uint32_t count, uint32_t firstPlace,
+    /// Offers up to 256 segments of curves (places from firstPlace on) to the visibility buffer.
+    void (*drawSegments)(const shared::FrameConstants& f, const CurveBlock& block, uint32_t count, uint32_t firstPlace,
                          const WideSink& wide, const Visibility& visibility);
-    /// Rows [firstRow, lastRow] of the strands that were kept.
-    void (*fillWide)(const shared::FrameConstants& f, const FilledCurve* strands, size_t count, uint32_t firstRow,
+    /// Rows [firstRow, lastRow] of the curves that were kept.
+    void (*fillWide)(const shared::FrameConstants& f, const FilledCurve* curves, size_t count, uint32_t firstRow,
                      uint32_t lastRow, const Visibility& visibility);
     /// Rows [firstRow, lastRow] of wide discs.
     void (*fillDiscs)(const shared::FrameConstants& f, const shared::WideDisc* discs, const shared::DiscBox* boxes,

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "engine/cpu/kernels.h"
+#include "shaders/shared/curve.h"
 #include "shaders/shared/environment.h"
 #include "shaders/shared/ewa.h"
 #include "shaders/shared/lens.h"
@@ -12,7 +13,6 @@
 #include "shaders/shared/shade.h"
 #include "shaders/shared/splat_disc.h"
 #include "shaders/shared/splat_size.h"
-#include "shaders/shared/strand.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/wide_disc.h"
 
@@ -135,7 +135,7 @@ void projectBlock(const FrameConstants& f, const DrawNode& node, const PointReco
 
 #include "engine/cpu/discs.inl"
 
-#include "engine/cpu/strands.inl"
+#include "engine/cpu/curves.inl"
 
 #include "engine/cpu/place_discs.inl"
 

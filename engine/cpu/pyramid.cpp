@@ -36,7 +36,7 @@ void Pyramid::pull() {
         const Planes from = fine.planes();
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
             TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
-            upper.hasTubes = lower.hasTubes = out.hasTubes = hasStrands_;
+            upper.hasTubes = lower.hasTubes = out.hasTubes = hasCurves_;
             for (uint32_t y = row0; y < row1; y += 2) {
                 bool any = false;
                 for (TexelRow* row : {&upper, &lower}) {
@@ -60,12 +60,12 @@ bool Pyramid::loadRow(const Level& level, const Planes& planes, uint32_t y, uint
         any |= at.depth[i] > 0;
         signs |= at.depth[i] > 0 ? at.size[i] : 0u;
     }
-    row.hasTubes = hasStrands_ && (signs & 0x80008000u) != 0;
+    row.hasTubes = hasCurves_ && (signs & 0x80008000u) != 0;
     if (any)
         k_.unpackRow(at, first, n, row);
     else
         std::fill_n(row.depth + first, n, 0.0f);
-    if (hasStrands_ && !row.hasTubes) {  // others beside it may have some
+    if (hasCurves_ && !row.hasTubes) {  // others beside it may have some
         std::fill_n(row.isRound + first, n, 0.0f);
         std::fill_n(row.axisX + first, n, 0.0f);
     }
@@ -84,7 +84,7 @@ bool Pyramid::loadCoarse(const Level& level, const Planes& planes, float size, i
     k_.expandRow(scratch, n, (static_cast<float>(c0) + 0.5f) * size - frame_.centre.x,
                  (static_cast<float>(y) + 0.5f) * size - frame_.centre.y, size, frame_.focal, out.nearest, out.beside);
     out.nearest.hasTubes = scratch.hasTubes;
-    if (hasStrands_ && !scratch.hasTubes)
+    if (hasCurves_ && !scratch.hasTubes)
         for (TexelRow* row : {&out.nearest, &out.beside}) clearTubes(*row);
     return true;
 }

@@ -22,10 +22,10 @@ class Pyramid {
     void resize(uint32_t width, uint32_t height);
     size_t levels() const { return levels_.size(); }
     Level& level(size_t l) { return levels_[l]; }
-    /// `hasStrands`: texels may be of tubes.
-    void beginFrame(const shared::FrameConstants& frame, bool hasStrands) {
+    /// `hasCurves`: texels may be of tubes.
+    void beginFrame(const shared::FrameConstants& frame, bool hasCurves) {
         frame_ = frame;
-        hasStrands_ = hasStrands;
+        hasCurves_ = hasCurves;
     }
     /// Levels whose texels are larger than the largest splat hold nothing. Once level 0 and 1 are filled.
     void setLargestRadius(float radius);
@@ -70,7 +70,7 @@ class Pyramid {
         const Planes finePlanes = fine.planes(), coarsePlanes = coarse.planes();
         thread_local TexelRow scratch{}, own{}, out{};
         thread_local std::array<ExpandedRow, 3> ring{};
-        scratch.hasTubes = own.hasTubes = out.hasTubes = hasStrands_;
+        scratch.hasTubes = own.hasTubes = out.hasTubes = hasCurves_;
         std::array<bool, 3> has{};
         const int c0 = static_cast<int>(row0 / 2);
         for (int c = c0 - 1; c <= c0; ++c)
@@ -112,7 +112,7 @@ class Pyramid {
     std::vector<Level> levels_;
     size_t levelCount_ = 0;
     shared::FrameConstants frame_{};
-    bool hasStrands_ = false;
+    bool hasCurves_ = false;
 };
 
 }  // namespace stipple::cpu

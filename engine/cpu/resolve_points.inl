@@ -209,7 +209,7 @@ void resolveOthers(const FrameConstants& f, const Tables& tables, const ResolveI
     if (triangles.count > 0) resolveTriangles(f, in, triangles, x0, y, row, planes);
     for (uint32_t k = 0; k < kKindNothing; ++k)
         if (others.of[k].count > 0 && in.ofKind[k] != nullptr) in.ofKind[k](*in.frame, others.of[k], x0, y, row);
-    row.hasTubes = curves.count > 0 && resolveStrands(f, in, curves, x0, y, row, largestRadius);
+    row.hasTubes = curves.count > 0 && resolveCurves(f, in, curves, x0, y, row, largestRadius);
 }
 
 bool resolveRow(const FrameConstants& frame, const Tables& tables, const ResolveInput& in, uint64_t* visibility,

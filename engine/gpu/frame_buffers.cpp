@@ -90,7 +90,7 @@ Result<void> FrameBuffers::preparePlanes(const render::DrawList& draws, bool wan
 
 /// Of what covers many pixels.
 Result<void> FrameBuffers::prepareLists(const render::RenderRequest& request) {
-    if (has(request, render::Pass::strands))
+    if (has(request, render::Pass::curves))
         STIPPLE_TRY(
             ensure(bound_[kWideBinding], gpu::bytesOf(kWideBinding, kWideCapacity), kFilled, false, "filled curves"));
     if (listsDiscs(request))

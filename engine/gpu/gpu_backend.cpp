@@ -44,12 +44,12 @@ class GpuBackend final : public render::Backend {
             return static_cast<uint64_t>(
                 std::count_if(names.begin(), names.end(), [&](const char* n) { return pipelines_->isCompiled(n); }));
         };
-        r.strandPipelines = compiled({"strands", "strands_wide", "strand_texels"});
+        r.curvePipelines = compiled({"curves", "curves_wide", "curve_texels"});
         r.meshPipelines = compiled({"rasterise", "rasterise_large", "triangle_texels"});
         r.lightPipelines = compiled({"light_output"});
         for (const auto& slot : slots_) {
             const FrameBuffers& b = slot->buffers();
-            r.strandBytes += b.bytesOf({kWideBinding});
+            r.curveBytes += b.bytesOf({kWideBinding});
             r.effectBytes += b.bytesOf({kLightsBinding, kEnvironmentBinding});
             r.meshBytes += b.bytesOf({kMeshesBinding, kClustersBinding, kMaterialsBinding, kTexturesBinding,
                                       kTilesBinding, kTriangleWordsBinding, kLargeBinding});

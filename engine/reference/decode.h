@@ -92,19 +92,19 @@ struct Segment {
     uint32_t errorCode = 0, octants = 0;
 };
 
-inline Segment decodeSegment(const lod::Hierarchy& h, const lod::Node& node, const shared::StrandSegment& from) {
+inline Segment decodeSegment(const lod::Hierarchy& h, const lod::Node& node, const shared::CurveSegment& from) {
     const double cell = std::ldexp(1.0, static_cast<int>(h.rootLog2) - node.level), step = cell / 32768;
-    const auto place = [&](const shared::StrandVertex& v) {
+    const auto place = [&](const shared::CurveVertex& v) {
         const glm::dvec3 q(v.positionXY % 65536, static_cast<double>(v.positionXY / 65536), v.positionZ % 65536);
         return h.origin + h.unit * ((glm::dvec3(node.cell[0], node.cell[1], node.cell[2]) - 0.5) * cell + q * step);
     };
-    const auto radius = [&](const shared::StrandVertex& v) {  // the upper 15 bits of an fp32 without sign
+    const auto radius = [&](const shared::CurveVertex& v) {  // the upper 15 bits of an fp32 without sign
         const uint32_t code = v.positionZ / 65536 % 32768;
         const auto exponent = static_cast<int>(code / 128);
         const double mantissa = exponent == 0 ? code % 128 / 128.0 : 1 + code % 128 / 128.0;
         return h.unit * cell * std::ldexp(mantissa, std::max(exponent, 1) - 127);
     };
-    const auto colour = [](const shared::StrandVertex& v) {
+    const auto colour = [](const shared::CurveVertex& v) {
         return glm::dvec3(decodeSrgb(v.colour % 256), decodeSrgb(v.colour / 256 % 256),
                           decodeSrgb(v.colour / 65536 % 256));
     };

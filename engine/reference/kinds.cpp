@@ -4,7 +4,7 @@
 namespace stipple::reference {
 
 constinit const RestatedKind pointsRestated{};
-constinit const RestatedKind curvesRestated{projectStrands};
+constinit const RestatedKind curvesRestated{projectCurves};
 constinit const RestatedKind trianglesRestated{projectMeshes};
 
 void projectOtherKinds(const render::DrawList& draws, const Chunks& chunks, Level& level) {

@@ -16,7 +16,7 @@ namespace stipple::reference {
 
 struct Sample {
     bool valid = false;
-    double key = 0;                               ///< depth by which strands are ordered
+    double key = 0;                               ///< depth by which curves are ordered
     double depth = 0, radius = 0, thickness = 0;  ///< thickness in world units
     glm::dvec2 centre{0};                         ///< of the splat, pixels of the full-size image
     glm::dvec2 perp{0};
@@ -79,7 +79,7 @@ glm::dmat3 rotationToZ(const glm::dvec3& v);
 glm::dvec3 debugColour(const shared::FrameConstants& f, const lod::Node& node, const lod::CutDraw& cut);
 
 /// Ribbons and tubes of the cut into the level.
-void projectStrands(const render::DrawList& draws, const Chunks& chunks, Level& level);
+void projectCurves(const render::DrawList& draws, const Chunks& chunks, Level& level);
 
 /// What tubes look like pixel by pixel, once the level is reconstructed: normals round their axes, depths of the
 /// surface.

@@ -1,4 +1,4 @@
-// Rays against the full detail of a scene: discs, triangles and strands of all leaves, in one hierarchy of boxes per
+// Rays against the full detail of a scene: discs, triangles and curves of all leaves, in one hierarchy of boxes per
 // store and one over the places where the stores stand.
 #include <cmath>
 #include <limits>
@@ -7,9 +7,9 @@
 #include "engine/base/process.h"
 #include "engine/base/queue.h"
 #include "engine/reference/box_tree.h"
+#include "engine/reference/curve_rays.h"
 #include "engine/reference/decode.h"
 #include "engine/reference/reference.h"
-#include "engine/reference/strand_rays.h"
 #include "engine/reference/surface.h"
 #include "lod/store/colour.h"
 #include "lod/store/mesh_place.h"
@@ -77,7 +77,7 @@ Result<void> readLeaf(uint32_t index, TracedStore& t) {
         STIPPLE_ASSIGN(values, lod::readAttribute(*t.store, index, t.colour.attribute));
     }
     lod::recolour(t.colour, *t.store, index, chunk, values);
-    for (const shared::StrandSegment& s : chunk.segments) t.segments.push_back(decodeSegment(h, node, s));
+    for (const shared::CurveSegment& s : chunk.segments) t.segments.push_back(decodeSegment(h, node, s));
     for (const shared::PointRecord& r : chunk.records) t.discs.push_back(decodeDisc(h, node, r));
     addClusters(chunk, number, 0, static_cast<uint32_t>(chunk.clusters.size()), addVertices(chunk, t), t);
     return {};
@@ -212,7 +212,7 @@ class Tracer {
             return true;
         }
         Sample s = hit.sample;
-        const dvec3 n = hit.isStrand ? hit.normal : blendDiscs(ray, hit, s.colour);
+        const dvec3 n = hit.isCurve ? hit.normal : blendDiscs(ray, hit, s.colour);
         const shared::FrameConstants& f = draws_.frame;
         colour = s.colour;
         if ((f.shade & shared::kShadeLit) == 0) return true;
@@ -228,7 +228,7 @@ class Tracer {
     struct Hit {
         uint32_t place = kNone;
         double t = kNever, thickness = 0;
-        bool isTriangle = false, isStrand = false;
+        bool isTriangle = false, isCurve = false;
         Sample sample;
         dvec3 normal{0};  ///< camera space, towards the eye
     };
@@ -275,7 +275,7 @@ class Tracer {
                     const double m = std::abs(glm::dot(place.rotation * normal, toWorld(ray.direction))) / length;
                     best.place = p;
                     best.t = t;
-                    best.isTriangle = best.isStrand = false;
+                    best.isTriangle = best.isCurve = false;
                     best.sample.thickness = 1;
                     best.normal = toCamera(place.rotation * normal);
                     best.thickness = place.scale * drawnRadius(store.discs[item], place) *
@@ -287,12 +287,12 @@ class Tracer {
     }
 
     void hitSegment(const Segment& s, const lod::Instance& place, const LocalRay& local, uint32_t p, Hit& best) const {
-        StrandHit hit;
+        CurveHit hit;
         if (!meetsSegment(s, local, view_.nearPlane, hit) || hit.t >= best.t) return;
         best = {};
         best.place = p;
         best.t = hit.t;
-        best.isStrand = true;
+        best.isCurve = true;
         best.sample.colour = glm::mix(s.colourA, s.colourB, hit.place);
         best.sample.thickness = s.isTube ? 1e30 : 0;  // a ribbon is a leaf, in all units
         best.sample.radius = best.sample.depth = 1;
@@ -322,7 +322,7 @@ class Tracer {
         best.place = p;
         best.t = t;
         best.isTriangle = true;
-        best.isStrand = false;
+        best.isCurve = false;
         best.sample = sample;
         best.sample.thickness = 1;
         best.normal = n;

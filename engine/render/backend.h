@@ -40,14 +40,14 @@ struct RenderRequest {
 
 /// What a backend holds beyond what every frame needs: 0 for what no scene has called for yet.
 struct BackendResources {
-    uint64_t meshPipelines = 0;    ///< compiled for triangles
-    uint64_t meshBytes = 0;        ///< per-pixel and per-frame buffers for triangles
-    uint64_t emissiveBytes = 0;    ///< per-pixel buffer for emissive materials
-    uint64_t textureTiles = 0;     ///< resident
-    uint64_t strandPipelines = 0;  ///< compiled for ribbons and tubes
-    uint64_t strandBytes = 0;      ///< per-frame buffers for them
-    uint64_t lightPipelines = 0;   ///< compiled for light
-    uint64_t effectBytes = 0;      ///< tables and planes that only effects need
+    uint64_t meshPipelines = 0;   ///< compiled for triangles
+    uint64_t meshBytes = 0;       ///< per-pixel and per-frame buffers for triangles
+    uint64_t emissiveBytes = 0;   ///< per-pixel buffer for emissive materials
+    uint64_t textureTiles = 0;    ///< resident
+    uint64_t curvePipelines = 0;  ///< compiled for ribbons and tubes
+    uint64_t curveBytes = 0;      ///< per-frame buffers for them
+    uint64_t lightPipelines = 0;  ///< compiled for light
+    uint64_t effectBytes = 0;     ///< tables and planes that only effects need
 };
 
 /// A frame that was handed in; numbers rise.

@@ -12,7 +12,7 @@ namespace stipple::render {
 static_assert(sizeof(shared::PointRecord) == 16);
 static_assert(sizeof(shared::DrawNode) == 84);
 static_assert(sizeof(shared::DrawBlock) == 8);
-static_assert(sizeof(shared::StrandSegment) == 32);
+static_assert(sizeof(shared::CurveSegment) == 32);
 static_assert(sizeof(shared::FrameConstants) == 180 + sizeof(shared::BlockRanges));
 static_assert(sizeof(shared::MeshVertex) == 32);
 static_assert(sizeof(shared::MeshCluster) == 12);
@@ -166,7 +166,7 @@ void setView(const lod::Cut& cut, const lod::View& view, const DrawSettings& set
     f.nearPlane = static_cast<float>(out.view.nearPlane);
     f.supportScale = settings.supportScale;
     f.minimumRadius = settings.minimumRadius;
-    f.exactStrands = settings.exactStrands;
+    f.exactCurves = settings.exactCurves;
     f.coverageSeed = settings.coverageSeed;
     f.lowPass = settings.lowPass;
     f.kernelSupport = settings.kernelSupport;

@@ -14,11 +14,11 @@
 #include "engine/render/environment.h"
 #include "lod/cut/cut.h"
 #include "lod/primitives/kinds.h"
+#include "shaders/shared/curve.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
 #include "shaders/shared/mesh.h"
 #include "shaders/shared/record.h"
-#include "shaders/shared/strand.h"
 #include "streaming/streamer.h"
 
 namespace stipple::render {
@@ -107,9 +107,9 @@ struct DrawSettings {
     float minimumRadius = 1.0f;        ///< pixels
     float lowPass = 0.5f;              ///< of blended discs: variance, px^2
     float kernelSupport = 2;           ///< of blended discs: where kernels end, in sigmas (2 or 3)
-    float exactStrands = 2.0f;         ///< pixels of half-width from which strands are filled, not reconstructed
+    float exactCurves = 2.0f;          ///< pixels of half-width from which curves are filled, not reconstructed
     Wind wind;                         ///< moves what setSway was told of
-    uint32_t coverageSeed = 0;         ///< of strands narrower than a pixel
+    uint32_t coverageSeed = 0;         ///< of curves narrower than a pixel
     std::vector<std::string> effects;  ///< that are asked for by their names
 };
 

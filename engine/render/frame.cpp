@@ -190,7 +190,7 @@ Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettin
                     "keep the backend while it is used");
     STIPPLE_TRY(checkFilter(settings.draw));
     DrawSettings settingsOfMode = settings.draw;
-    settingsOfMode.exactStrands = std::min(settings.draw.exactStrands, reconstructionOf(settings.mode).exactCurves);
+    settingsOfMode.exactCurves = std::min(settings.draw.exactCurves, reconstructionOf(settings.mode).exactCurves);
     makeDrawList(state.cut, state.hierarchies, state.instances, view, settingsOfMode, state.draws);
     markDiscSizes(*state.discSizes, state.draws);
     RenderRequest request;

@@ -13,29 +13,29 @@ namespace stipple::render {
 namespace {
 
 /// Adds the segments that a draw shows.
-class StrandPruning {
+class CurvePruning {
   public:
-    StrandPruning(const lod::Hierarchy& h, const lod::Instance& instance, const lod::View& view, PrunedShares& shares)
+    CurvePruning(const lod::Hierarchy& h, const lod::Instance& instance, const lod::View& view, PrunedShares& shares)
         : h_(h), view_(lod::makeLocalView(h, instance, view)), shares_(shares) {}
 
     void add(const lod::CutDraw& draw, const lod::Chunk& chunk) {
         const lod::Node& node = h_.nodes[draw.node];
         const lod::Payload& payload = h_.payload(draw.chunk);
         const double step = std::exp2(payload.stepShift), edge = h_.cellSize(node),
-                     kept = h_.isStrands ? lod::keptShare(node) : 1;
+                     kept = h_.isCurves ? lod::keptShare(node) : 1;
         // What the build may have thinned out, and made wider by what went.
-        const double thin = kept < 1 ? lod::kThinStrand * edge / kept : 0;
+        const double thin = kept < 1 ? lod::kThinCurve * edge / kept : 0;
         const glm::dvec3 base = h_.recordOrigin(node, payload);
-        const auto placeOf = [&](const shared::StrandVertex& v) {
+        const auto placeOf = [&](const shared::CurveVertex& v) {
             return base + step * glm::dvec3(v.positionXY & 0xffffu, v.positionXY >> 16, v.positionZ & 0xffffu);
         };
         for (size_t i = 0; i < std::min<size_t>(draw.count, chunk.segments.size()); ++i) {
-            const shared::StrandSegment& s = chunk.segments[i];
+            const shared::CurveSegment& s = chunk.segments[i];
             if (shared::segmentErrorCode(s) > draw.errorCode && (shared::segmentOctants(s) & draw.octantMask) == 0)
                 continue;
             const glm::dvec3 a = placeOf(s.a), b = placeOf(s.b), middle = 0.5 * (a + b) - view_.eye;
             const double radius =
-                0.5 * edge * (double{shared::strandRadius(s.a, 1.0f)} + double{shared::strandRadius(s.b, 1.0f)});
+                0.5 * edge * (double{shared::curveRadius(s.a, 1.0f)} + double{shared::curveRadius(s.b, 1.0f)});
             const double depth = glm::dot(middle, view_.forward);
             if (!(depth > view_.nearPlane) || view_.isBeside(middle, radius)) continue;
             const glm::dvec3 sight = view_.isOrthographic ? view_.forward : glm::normalize(middle), along = b - a;
@@ -51,7 +51,7 @@ class StrandPruning {
                 half *= size > 0 ? std::min(std::abs(glm::dot(n, sight)) / (size * std::max(sine, 1e-3)), 1.0) : 1.0;
             }
             const double area = 2 * half * length * sine * perPixel;
-            shares_.strandArea += area;
+            shares_.curveArea += area;
             if (half < double{shared::kNarrow})
                 shares_.narrowArea += area;
             else if (radius <= thin)
@@ -75,7 +75,7 @@ Result<PrunedShares> measurePruning(const FrameState& state, const lod::View& vi
         if (h.isStochastic) shares.discs += draw.count;
         if (lod::kindOf(h, draw.chunk) != lod::Kind::curves) continue;
         STIPPLE_ASSIGN(const lod::Chunk chunk, lod::readChunk(*state.stores[instance.hierarchy], draw.chunk));
-        StrandPruning(h, instance, view, shares).add(draw, chunk);
+        CurvePruning(h, instance, view, shares).add(draw, chunk);
     }
     return shares;
 }

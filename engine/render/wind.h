@@ -38,7 +38,7 @@ inline glm::dvec3 windAcross(const glm::dvec3& up) {
     return glm::normalize(aside - up * glm::dot(aside, up));
 }
 
-/// Could wind move it? Strands and what is seen of them from afar, unless their store says that they are no plants; but
+/// Could wind move it? Curves and what is seen of them from afar, unless their store says that they are no plants; but
 /// not the points of instance groups: those stay where they are, and are drawn only where that is within the error.
 bool mayBend(const lod::Hierarchy& h, const lod::Instance& instance);
 

@@ -55,7 +55,7 @@ void addPositions(const lod::Hierarchy& h, uint32_t index, const lod::Chunk& chu
         to.push_back(h.origin + h.unit * (base + step * glm::dvec3(xy & 0xffffu, xy >> 16, z & 0xffffu)));
     };
     for (const shared::PointRecord& r : chunk.records) add(r.positionXY, r.positionZRadiusError);
-    for (const shared::StrandSegment& s : chunk.segments) {
+    for (const shared::CurveSegment& s : chunk.segments) {
         add(s.a.positionXY, s.a.positionZ);
         add(s.b.positionXY, s.b.positionZ);
     }
@@ -72,8 +72,8 @@ bool holdsInput(const lod::Hierarchy& h, uint32_t node) {
                        [](const lod::MeshRun& r) { return r.producer == lod::MeshRun::kOriginal; });
 }
 
-/// Of a mesh or strands: the vertices of those nodes of the input's own triangles or segments that reach farthest, in
-/// every few directions. (Coarse nodes would do for less, but finer ones reach farther out, and of strands coarse ones
+/// Of a mesh or curves: the vertices of those nodes of the input's own triangles or segments that reach farthest, in
+/// every few directions. (Coarse nodes would do for less, but finer ones reach farther out, and of curves coarse ones
 /// leave most out: of a tree the foot of its trunk.) Empty where too many must be read.
 std::vector<glm::dvec3> outlineOfInput(const lod::Store& store) {
     constexpr size_t kMostRead = 256, kStride = 4;
@@ -136,9 +136,9 @@ std::vector<glm::dvec3> outlineOf(const lod::Store& store) {
     const auto corners = cornersOf(d.focusMin, d.focusMax);
     const std::vector<glm::dvec3> box(corners.begin(), corners.end());
     std::vector<glm::dvec3> all;
-    // (Where some strands are stray, the nodes that reach farthest are theirs.)
+    // (Where some curves are stray, the nodes that reach farthest are theirs.)
     const bool hasStrays = d.focusMin != d.boundsMin || d.focusMax != d.boundsMax;
-    if (h.isMesh() || (h.isStrands && !hasStrays)) {
+    if (h.isMesh() || (h.isCurves && !hasStrays)) {
         all = outlineOfInput(store);
     } else {
         bool isRead = true;

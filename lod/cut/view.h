@@ -91,7 +91,7 @@ inline int32_t allowedError(const Hierarchy& h, const Node& node, const LocalVie
     const double distance = glm::length(d);
     const double nearest = distance - r;
     if (!(nearest > 0)) return kInside;
-    // (Of strands the field of the cone holds another number.)
+    // (Of curves the field of the cone holds another number.)
     if (!h.hasOverlappingCells() && facesAway(node, d, distance, r)) return kCulled;
     // cos(alpha + beta), alpha: axis to centre, beta: angular radius.
     const double cosAlpha = depth / distance, sinAlpha = std::sqrt(std::max(0.0, 1 - cosAlpha * cosAlpha));

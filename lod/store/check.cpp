@@ -212,7 +212,7 @@ Result<void> checkTables(const Store& store, uint64_t chunksEnd) {
         return bad("the size of its discs is not possible");
     if (!(std::abs(glm::length(store.description.up) - 1) < 1e-6)) return bad("the up direction has not the length 1");
     if (!isPossibleSpace(store.hierarchy, store.description)) return bad("its coordinates are not possible");
-    if (h.isStrands != store.description.isStrands) return bad("is not of the kind that it says it is");
+    if (h.isCurves != store.description.isCurves) return bad("is not of the kind that it says it is");
     const bool isPoints = !h.isMixed && h.nodes[0].kind == Kind::points;
     if (h.isStochastic && !isPoints) return bad("holds stochastic points and something else");
     if (h.isGraph && (h.isMixed || h.groups.size() != h.nodes.size()))

@@ -101,21 +101,21 @@ Result<Chunk> decodeChunk(const uint8_t* bytes, size_t count, uint32_t records, 
     return chunk;
 }
 
-std::vector<uint8_t> encodeStrandChunk(const Chunk& chunk) {
-    constexpr size_t stride = sizeof(shared::StrandSegment);
+std::vector<uint8_t> encodeCurveChunk(const Chunk& chunk) {
+    constexpr size_t stride = sizeof(shared::CurveSegment);
     std::vector<uint8_t> vertex(meshopt_encodeVertexBufferBound(chunk.segments.size(), stride));
     vertex.resize(
         meshopt_encodeVertexBuffer(vertex.data(), vertex.size(), chunk.segments.data(), chunk.segments.size(), stride));
     return compress(vertex);
 }
 
-Result<Chunk> decodeStrandChunk(const uint8_t* bytes, size_t count, uint32_t segments, const std::string& where) {
+Result<Chunk> decodeCurveChunk(const uint8_t* bytes, size_t count, uint32_t segments, const std::string& where) {
     Chunk chunk;
     STIPPLE_ASSIGN(chunk.segments,
-                   decodeRecords<shared::StrandSegment>(bytes, count, segments, where, "the segments of a chunk"));
+                   decodeRecords<shared::CurveSegment>(bytes, count, segments, where, "the segments of a chunk"));
     // Radii are the upper half of an fp32: an exponent of all ones is no number.
     uint32_t bad = 0;
-    for (const shared::StrandSegment& s : chunk.segments)
+    for (const shared::CurveSegment& s : chunk.segments)
         for (const uint32_t word : {s.a.positionZ, s.b.positionZ}) bad |= (word & kNotFinite) == kNotFinite ? 1u : 0u;
     if (bad != 0) return fail(ErrorKind::input, "a segment has a radius that is no number", where, "build it again");
     return chunk;

@@ -8,8 +8,8 @@
 
 #include "engine/base/result.h"
 #include "lod/primitives/mesh.h"
+#include "shaders/shared/curve.h"
 #include "shaders/shared/record.h"
-#include "shaders/shared/strand.h"
 
 namespace stipple::lod {
 
@@ -21,8 +21,8 @@ struct Chunk {
     std::vector<shared::MeshVertex> vertices;
     std::vector<uint32_t> triangles;
     std::vector<shared::MeshCluster> clusters;
-    std::vector<shared::StrandSegment> segments;  ///< of a strand store
-    std::vector<uint32_t> texels;                 ///< of a texture's tile, kTileEdge x kTileEdge
+    std::vector<shared::CurveSegment> segments;  ///< of a curve store
+    std::vector<uint32_t> texels;                ///< of a texture's tile, kTileEdge x kTileEdge
     /// Calls use(array) for all that backends draw from, in the order in which it lies on a device.
     template <typename Use>
     void forEachArray(const Use& use) const {
@@ -45,9 +45,9 @@ std::vector<uint8_t> encodeChunk(const Chunk& chunk);
 Result<Chunk> decodeChunk(const uint8_t* bytes, size_t count, uint32_t records, const std::string& where,
                           bool wantLowBits);
 
-/// The same for a chunk of a strand store.
-std::vector<uint8_t> encodeStrandChunk(const Chunk& chunk);
-Result<Chunk> decodeStrandChunk(const uint8_t* bytes, size_t count, uint32_t segments, const std::string& where);
+/// The same for a chunk of a curve store.
+std::vector<uint8_t> encodeCurveChunk(const Chunk& chunk);
+Result<Chunk> decodeCurveChunk(const uint8_t* bytes, size_t count, uint32_t segments, const std::string& where);
 
 /// A texture tile, kTileEdge x kTileEdge texels.
 std::vector<uint8_t> encodeTile(const std::vector<uint32_t>& texels);

@@ -114,7 +114,7 @@ json toJson(const StoreDescription& d) {
                 {"focus_max", {d.focusMax.x, d.focusMax.y, d.focusMax.z}},
                 {"has_colour", d.hasColour},
                 {"is_reflectance", d.isReflectance},
-                {"is_strands", d.isStrands},
+                {"is_strands", d.isCurves},  // as files have named it from the first
                 {"is_progressive", d.isStochastic},
                 {"disc_factors", d.discFactors},
                 {"smallest_disc", d.smallestDisc},
@@ -177,7 +177,7 @@ StoreDescription fromJson(const json& j) {
     }
     d.hasColour = j.at("has_colour").get<bool>();
     d.isReflectance = j.at("is_reflectance").get<bool>();
-    d.isStrands = j.at("is_strands").get<bool>();
+    d.isCurves = j.at("is_strands").get<bool>();
     d.isRigid = j.value("is_rigid", false);
     d.isStochastic = j.at("is_progressive").get<bool>();
     for (const json& factor : j.at("disc_factors")) d.discFactors.push_back(real(factor));

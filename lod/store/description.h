@@ -25,7 +25,7 @@ struct StoreDescription {
     glm::dvec3 focusMin{0}, focusMax{0};    ///< the same without stray points: what a camera looks at first
     bool hasColour = false;                 ///< the points have colours of their own
     bool isReflectance = false;             ///< those are of the material, to be lit
-    bool isStrands = false;                 ///< ribbons and tubes: points count segments
+    bool isCurves = false;                  ///< ribbons and tubes: points count segments
     bool isRigid = false;                   ///< wind does not bend it: curves of what is no plant
     bool isStochastic = false;              ///< see Hierarchy::isStochastic
     std::vector<float> discFactors;         ///< of a stochastic store, see Hierarchy

@@ -12,7 +12,7 @@
 #include "lod/primitives/mesh.h"
 #include "lod/primitives/payload.h"
 #include "lod/primitives/primitives.h"
-#include "shaders/shared/strand.h"
+#include "shaders/shared/curve.h"
 
 namespace stipple::lod {
 
@@ -83,8 +83,8 @@ struct Hierarchy {
     std::vector<uint32_t> groupTextures;  ///< see MeshGroup
     std::vector<shared::TextureInfo> textures;
     std::vector<TextureTile> tiles;
-    bool isStrands = false;  ///< all records are segments of ribbons and tubes
-    bool isRigid = false;    ///< such that wind does not bend
+    bool isCurves = false;  ///< all records are segments of ribbons and tubes
+    bool isRigid = false;   ///< such that wind does not bend
     /// Records of a node are discs of one size, in an order in which any beginning shows the whole: n of them stand for
     /// all, sqrt(records / n) times as large. Error codes are those of the radius.
     bool isStochastic = false;
@@ -102,7 +102,7 @@ struct Hierarchy {
         return discFactors[k] + u * (discFactors[std::min(k + 1, discFactors.size() - 1)] - discFactors[k]);
     }
     /// Cells of records reach beyond those of nodes: by half a cell on each side.
-    bool hasOverlappingCells() const { return isStrands || isStochastic; }
+    bool hasOverlappingCells() const { return isCurves || isStochastic; }
     bool isMesh() const { return isGraph; }
 
     // A CHUNK is what is loaded at once: of node n its first payload is chunk n; then come the tiles of textures, then
@@ -145,7 +145,7 @@ struct Hierarchy {
     glm::dvec3 recordOrigin(const Node& n) const { return recordOrigin(n, n); }
     glm::dvec3 recordOrigin(const Node& n, const Payload& p) const {
         if (hasOverlappingCells() || (isMixed && p.stepShift == static_cast<int>(rootLog2) - n.level - 15))
-            return (glm::dvec3(n.cell[0], n.cell[1], n.cell[2]) - double{shared::kStrandMargin}) * cellSize(n);
+            return (glm::dvec3(n.cell[0], n.cell[1], n.cell[2]) - double{shared::kCurveMargin}) * cellSize(n);
         const double size = cellSize(n), half = p.stepShift > 0 ? 0.5 * (std::exp2(p.stepShift) - 1) : 0.0;
         return glm::dvec3(n.cell[0], n.cell[1], n.cell[2]) * size + glm::dvec3(half);
     }

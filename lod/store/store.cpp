@@ -181,9 +181,9 @@ Result<void> readTables(const InputFile& file, const Head& head, Store& store) {
     STIPPLE_TRY(readMesh(mesh, store.path, h));
     if (!isOld) return {};
     h.isGraph = !h.groups.empty();
-    if (h.isGraph && store.description.isStrands)
+    if (h.isGraph && store.description.isCurves)
         return tl::unexpected(damagedStore(store.path, "holds curves and groups of triangles"));
-    setKindOfAll(h, h.isGraph ? Kind::triangles : store.description.isStrands ? Kind::curves : Kind::points);
+    setKindOfAll(h, h.isGraph ? Kind::triangles : store.description.isCurves ? Kind::curves : Kind::points);
     if ((head.version == kOldWideMeshVersion) != (h.isGraph && h.rootLog2 > kShortMeshBits))
         return tl::unexpected(damagedStore(store.path, "its version is not that of its coordinates"));
     if (hasCounts == h.isGraph) return tl::unexpected(damagedStore(store.path, "the code counts are not possible"));

@@ -82,7 +82,7 @@ struct VerifyReport {
     uint64_t errorsMeasured = 0;  ///< records (segments, triangles) whose error was measured again
 };
 /// Reads every chunk and checks all that the cut relies on: hashes, counts per code, order, codes monotone, spheres
-/// nested, positions inside their cells; the errors of points and strands are measured again against the leaves, those
+/// nested, positions inside their cells; the errors of points and curves are measured again against the leaves, those
 /// of simplifications against their triangles. `nodes`: of about that many nodes only, evenly spread (0: all).
 Result<VerifyReport> verifyStore(const Store& store, Executor& executor, uint64_t nodes = 0);
 

@@ -222,7 +222,7 @@ void describeKinds(Hierarchy& h) {
     bool isOne = h.further.empty();
     for (const Node& n : h.nodes) isOne = isOne && n.kind == h.nodes[0].kind;
     h.isMixed = !isOne;
-    h.isStrands = isOne && h.nodes[0].kind == Kind::curves;
+    h.isCurves = isOne && h.nodes[0].kind == Kind::curves;
     uint32_t groups = 0;
     for (uint32_t n = 0; n < h.nodes.size(); ++n) {
         Node& node = h.nodes[n];

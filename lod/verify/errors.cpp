@@ -423,27 +423,27 @@ Result<uint64_t> measureGroup(const Store& store, uint32_t index, const Chunk& c
 
 namespace {
 
-struct Strand {
+struct Curve {
     glm::dvec3 a, b;
     double radiusA = 0, radiusB = 0;
     uint32_t code = 0;
 };
-std::vector<Strand> strandsOf(const Hierarchy& h, const Node& node, const Chunk& chunk) {
+std::vector<Curve> curvesOf(const Hierarchy& h, const Node& node, const Chunk& chunk) {
     const double step = std::exp2(node.stepShift);
     const auto edge = static_cast<float>(h.cellSize(node));
-    const auto placeOf = [&](const shared::StrandVertex& v) {
+    const auto placeOf = [&](const shared::CurveVertex& v) {
         return h.recordOrigin(node) +
                step * glm::dvec3(v.positionXY & 0xffffu, v.positionXY >> 16, v.positionZ & 0xffffu);
     };
-    std::vector<Strand> out;
-    for (const shared::StrandSegment& s : chunk.segments)
-        out.push_back({placeOf(s.a), placeOf(s.b), double{shared::strandRadius(s.a, edge)},
-                       double{shared::strandRadius(s.b, edge)}, shared::segmentErrorCode(s)});
+    std::vector<Curve> out;
+    for (const shared::CurveSegment& s : chunk.segments)
+        out.push_back({placeOf(s.a), placeOf(s.b), double{shared::curveRadius(s.a, edge)},
+                       double{shared::curveRadius(s.b, edge)}, shared::segmentErrorCode(s)});
     return out;
 }
 
 /// How far the ball at p is from the nearest ball of a segment, at most.
-double distanceOf(const Strand& s, const glm::dvec3& p, double radius) {
+double distanceOf(const Curve& s, const glm::dvec3& p, double radius) {
     const glm::dvec3 d = s.b - s.a;
     const double u = std::clamp(glm::dot(p - s.a, d) / std::max(glm::dot(d, d), 1e-300), 0.0, 1.0);
     return glm::length(p - s.a - u * d) + std::abs(radius - (s.radiusA + u * (s.radiusB - s.radiusA)));
@@ -451,30 +451,30 @@ double distanceOf(const Strand& s, const glm::dvec3& p, double radius) {
 
 }  // namespace
 
-Result<uint64_t> measureStrands(const Store& store, uint32_t index, const Chunk& chunk) {
+Result<uint64_t> measureCurves(const Store& store, uint32_t index, const Chunk& chunk) {
     constexpr size_t kMeasured = 48;
     const Hierarchy& h = store.hierarchy;
     const Node& node = h.nodes[index];
     const auto children = static_cast<uint32_t>(__builtin_popcount(node.childMask));
     if (!isAboveLeaves(h, node)) return 0;
-    std::vector<Strand> leaves;
+    std::vector<Curve> leaves;
     double steps = std::exp2(node.stepShift);
     for (uint32_t c = node.firstChild; c < node.firstChild + children; ++c) {
         STIPPLE_ASSIGN(const Chunk below, readChunk(store, c));
-        const std::vector<Strand> more = strandsOf(h, h.nodes[c], below);
+        const std::vector<Curve> more = curvesOf(h, h.nodes[c], below);
         leaves.insert(leaves.end(), more.begin(), more.end());
         if (c == node.firstChild) steps += std::exp2(h.nodes[c].stepShift);
     }
-    const std::vector<Strand> strands = strandsOf(h, node, chunk);
-    const size_t stride = strands.size() / kMeasured + 1;
+    const std::vector<Curve> curves = curvesOf(h, node, chunk);
+    const size_t stride = curves.size() / kMeasured + 1;
     uint64_t measured = 0;
-    for (size_t i = 0; i < strands.size(); i += stride, ++measured) {
-        const Strand& s = strands[i];
+    for (size_t i = 0; i < curves.size(); i += stride, ++measured) {
+        const Curve& s = curves[i];
         for (const double u : {0.0, 0.5, 1.0}) {
             const glm::dvec3 p = glm::mix(s.a, s.b, u);
             const double radius = glm::mix(s.radiusA, s.radiusB, u);
             double off = 1e300;
-            for (const Strand& leaf : leaves) off = std::min(off, distanceOf(leaf, p, radius));
+            for (const Curve& leaf : leaves) off = std::min(off, distanceOf(leaf, p, radius));
             // Places are rounded to steps and radii to a 256th, in both.
             const double rounding = 0.5 * std::sqrt(3.0) * steps + radius / 64, error = h.errors.decode(s.code);
             if (off <= error * (1 + 1e-5) + rounding) continue;

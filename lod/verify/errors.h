@@ -24,10 +24,10 @@ Result<void> checkDrawnPlaces(const Store& store, uint32_t index, const Chunk& c
 /// that is not simplified).
 Result<uint64_t> measureGroup(const Store& store, uint32_t group, const Chunk& chunk);
 
-/// Measures segments of an inner strand node, all whose children are leaves, against the leaves' segments, at a few
+/// Measures segments of an inner curve node, all whose children are leaves, against the leaves' segments, at a few
 /// dozen places: the ball that each place stands for has to be within the segment's error of one of theirs. (The other
-/// way is not in the file where thin strands were pruned.) An error if one is not; else how many segments were
+/// way is not in the file where thin curves were pruned.) An error if one is not; else how many segments were
 /// measured.
-Result<uint64_t> measureStrands(const Store& store, uint32_t node, const Chunk& chunk);
+Result<uint64_t> measureCurves(const Store& store, uint32_t node, const Chunk& chunk);
 
 }  // namespace stipple::lod

@@ -27,13 +27,13 @@ RecordFacts factsOf(const Hierarchy& h, const Node& node, const Payload& payload
         const double radius = edge * static_cast<double>(shared::radiusFraction(shared::recordRadiusCode(r)));
         return {shared::recordErrorCode(r), 1u << shared::recordOctant(r), {p, p}, {radius, radius}};
     }
-    const shared::StrandSegment& s = chunk.segments[i];
+    const shared::CurveSegment& s = chunk.segments[i];
     RecordFacts facts{shared::segmentErrorCode(s), shared::segmentOctants(s), {}, {}};
     for (size_t k = 0; k < 2; ++k) {
-        const shared::StrandVertex& v = k == 0 ? s.a : s.b;
+        const shared::CurveVertex& v = k == 0 ? s.a : s.b;
         facts.places.at(k) =
             base + step * glm::dvec3(v.positionXY & 0xffffu, v.positionXY >> 16, v.positionZ & 0xffffu);
-        facts.radii.at(k) = edge * static_cast<double>(shared::strandRadius(v, 1.0f));
+        facts.radii.at(k) = edge * static_cast<double>(shared::curveRadius(v, 1.0f));
     }
     return facts;
 }

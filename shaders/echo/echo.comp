@@ -7,7 +7,7 @@
 #include "../shared/material.h"
 #include "../shared/mesh.h"
 #include "../shared/record.h"
-#include "../shared/strand.h"
+#include "../shared/curve.h"
 #include "../shared/texture.h"
 layout(local_size_x = 1) in;
 layout(set = 0, binding = 0, scalar) readonly buffer In {
@@ -21,7 +21,7 @@ layout(set = 0, binding = 0, scalar) readonly buffer In {
     DrawMesh mesh;
     DrawCluster drawCluster;
     SurfaceMaterial material;
-    StrandSegment segment;
+    CurveSegment segment;
     TextureInfo textureInfo;
 };
 layout(set = 0, binding = 1, scalar) writeonly buffer Out { uint words[]; };
@@ -60,7 +60,7 @@ void putFrame() {
     put(frame.lightCount);
     put(frame.ambient);
     put(frame.hasEnvironment);
-    put(frame.exactStrands);
+    put(frame.exactCurves);
     put(frame.coverageSeed);
     put(frame.environmentX);
     put(frame.environmentY);

@@ -119,9 +119,9 @@ struct FrameConstants {
     uint lightCount;         // 0: the sun above, else these instead
     float ambient;           // share of the sky's light
     uint hasEnvironment;
-    float exactStrands;  // px: half-width from which a strand keeps exact pixels instead of being reconstructed
-    uint coverageSeed;   // of strands narrower than a pixel: another one for each frame of a series that is averaged
-    vec3 environmentX;   // rows of the rotation from camera space to the environment's (y up)
+    float exactCurves;  // px: half-width from which a curve keeps exact pixels instead of being reconstructed
+    uint coverageSeed;  // of curves narrower than a pixel: another one for each frame of a series that is averaged
+    vec3 environmentX;  // rows of the rotation from camera space to the environment's (y up)
     vec3 environmentY;
     vec3 environmentZ;
     uint orthographic;    // 1: rays are parallel (lens.h)

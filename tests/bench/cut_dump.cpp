@@ -122,11 +122,11 @@ void dumpAll(const std::vector<std::string>& paths) {
     const auto mesh = growMeshStore(recipe, folder / "b.stipple", *executor);
     dumpRow("triangles", {&mesh->hierarchy}, 400);
     const Forest forest = plantForest(folder.path(), 12, *executor);
-    dumpRow("curves", {&forest.strands->hierarchy}, 400);
+    dumpRow("curves", {&forest.curves->hierarchy}, 400);
     dumpRow("progressive", {&forest.afar->hierarchy}, 400);
-    dumpRow("row", {&mesh->hierarchy, &points->hierarchy, &forest.strands->hierarchy, &forest.afar->hierarchy}, 400);
+    dumpRow("row", {&mesh->hierarchy, &points->hierarchy, &forest.curves->hierarchy, &forest.afar->hierarchy}, 400);
     dumpProxies("proxies of a mesh", mesh->hierarchy, {&points->hierarchy}, 0.5, 300);
-    dumpProxies("proxies of curves", forest.strands->hierarchy, {&points->hierarchy, &forest.afar->hierarchy}, 1e-4,
+    dumpProxies("proxies of curves", forest.curves->hierarchy, {&points->hierarchy, &forest.afar->hierarchy}, 1e-4,
                 300);
     const auto backend = cpu::makeCpuBackend(*executor);
     const auto state = render::makeFrameState(forest.placed, *backend, *executor, {}, forest.groups);

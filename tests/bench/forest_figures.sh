@@ -54,9 +54,9 @@ over_the_crowns --eye=0,30,200 --target=0,10,0 --fov=60
 in_the_clearing --eye=0,1.8,14 --target=0,6,-40 --fov=60
 VIEWS
 done
-for as in triangles strands; do "$program" grow tree -o $as.glb --leaves 50k --as $as >/dev/null; done
-"$program" convert triangles.glb --strands -o converted.glb --json >convert.json
-row "a polygon oak of 566k triangles to strands" "$(value convert.json '"%.1f s; %d ribbons, %d tubes, %d triangles left; %.1f mm off on average, %.1f mm for 95 %%" % (d["seconds"], d["ribbons"], d["tubes"], d["triangles_left"], 1e3*d["deviation"]["mean"], 1e3*d["deviation"]["p95"])')" "stipple grow tree -o t.glb --leaves 50k --as triangles; stipple convert t.glb --strands -o c.glb --json"
+for as in triangles curves; do "$program" grow tree -o $as.glb --leaves 50k --as $as >/dev/null; done
+"$program" convert triangles.glb --curves -o converted.glb --json >convert.json
+row "a polygon oak of 566k triangles to curves" "$(value convert.json '"%.1f s; %d ribbons, %d tubes, %d triangles left; %.1f mm off on average, %.1f mm for 95 %%" % (d["seconds"], d["ribbons"], d["tubes"], d["triangles_left"], 1e3*d["deviation"]["mean"], 1e3*d["deviation"]["p95"])')" "stipple grow tree -o t.glb --leaves 50k --as triangles; stipple convert t.glb --curves -o c.glb --json"
 for distance in 6 40; do
     where="--size 1920x1080 --eye=0,5,$distance --target=0,5,0"
     "$program" render triangles.glb -o truth.png --alpha $where --mode reference --samples 3 --quiet

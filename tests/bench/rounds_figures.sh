@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# tests/bench/rounds_figures.sh [PROGRAM]: the figures of out-of-core builds of triangles and strands, and of builds by several
+# tests/bench/rounds_figures.sh [PROGRAM]: the figures of out-of-core builds of triangles and curves, and of builds by several
 # MPI ranks, as Markdown with the command of each. Needs an idle machine, ten minutes and 8 GB of disk. SCANS: see build_figures.sh.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 cd "$work"
 report="\"%.1f s, peak %.0f MB, %.1f bytes each with all levels, %.2f GB of temporary files; seconds: \" % (d['seconds'], d['peak_rss_bytes']/1e6, d['bytes_out']/d['points_out'], d['temporary_bytes']/1e9) + \", \".join('%s %.1f' % (k, v) for k, v in d['stage_seconds'].items())"
 cat >make.py <<'P'
-# make.py ground EDGE OUT | scattered EDGE OUT | lawn STRANDS OUT: a wavy ground as PLY (scattered: no face beside the one
+# make.py ground EDGE OUT | scattered EDGE OUT | lawn CURVES OUT: a wavy ground as PLY (scattered: no face beside the one
 # before), blades of 20 segments as hair.
 import array, math, random, struct, sys
 kind, n, out = sys.argv[1], int(sys.argv[2]), open(sys.argv[3], 'wb')
@@ -42,7 +42,7 @@ else:
             blade.extend((x + sn * t * t, 2 * length * t, z + cs * t * t))
         blade.tofile(out)
 P
-echo "# Figures of out-of-core builds of triangles and strands, and of several ranks, $(date +%F)"
+echo "# Figures of out-of-core builds of triangles and curves, and of several ranks, $(date +%F)"
 echo
 echo "Machine: $(machine). Warm page cache, output not synced."
 echo
@@ -64,13 +64,13 @@ for memory in 300M 2G; do
     row "10M triangles, no face beside the one before, at $memory" "$(value build.json "$report")" "tests/bench/rounds_figures.sh; stipple build ground.ply -o s.stipple --memory $memory --json"
 done
 rm ground.ply s.stipple
-for strands in 500000 2500000; do
-    python3 make.py lawn $strands lawn.hair
+for curves in 500000 2500000; do
+    python3 make.py lawn $curves lawn.hair
     size=$(($(stat -c %s lawn.hair) / 1000000))
     for memory in 512M 4G; do
-        [ $strands = 500000 ] || [ $memory = 512M ] || continue
+        [ $curves = 500000 ] || [ $memory = 512M ] || continue
         json build build lawn.hair -o s.stipple --memory $memory --quiet
-        row "$((strands / 50000))M segments (hair, $size MB) at $memory" "$(value build.json "$report")" "tests/bench/rounds_figures.sh; stipple build lawn.hair -o s.stipple --memory $memory --json"
+        row "$((curves / 50000))M segments (hair, $size MB) at $memory" "$(value build.json "$report")" "tests/bench/rounds_figures.sh; stipple build lawn.hair -o s.stipple --memory $memory --json"
     done
     rm lawn.hair s.stipple
 done

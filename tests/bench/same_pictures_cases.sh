@@ -54,7 +54,7 @@ store thin @05_tubes/swc_NeuroM/Neuron_small_radius.swc --strand-radius 0.5
 store fur @05_tubes/hair/fur.hair
 store stroke @05_tubes/streamlines_niivue/stroke.trk.gz --memory 512M
 store qsm @05_tubes/qsm/Tree_1_TreeQSM.txt
-converted birch_strands {birch.glb} --strands
+converted birch_curves {birch.glb} --strands
 placed hybrid %ball 1,0,0,0 %rock 0.5,1.2,0,0.3 %oak 0.25,-0.9,-1,0.2
 placed pair %ball 1,0,0,0 %rock 1,1.5,0,0
 
@@ -117,7 +117,7 @@ picture thin %thin --size 240x180 --strand-exact 0.5
 picture fur %fur --size 480x360 --accumulate 2
 picture stroke %stroke --size 480x360
 picture qsm.exr %qsm --size 201x301 --alpha
-picture birch_strands %birch_strands --size 300x400
+picture birch_curves %birch_curves --size 300x400
 picture orchard {orchard.glb} --size 640x360
 picture forest {forest.glb} --size 640x360 --error 2
 picture forest_wind {forest.glb} --size 640x360 --error 2 --wind 0.03 --time 2.25

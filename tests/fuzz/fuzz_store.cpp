@@ -39,7 +39,7 @@ void decodeAsItIs(const uint8_t* data, size_t size) {
     group.clusters = 1 + data[0] / 64u;
     for (const auto kind : {lod::MeshVertices::shortOnes, lod::MeshVertices::counted, lod::MeshVertices::pairs})
         (void)lod::decodeMeshChunk(data + 1, size - 1, data[0] * 2u, group, kind, "fuzz");
-    (void)lod::decodeStrandChunk(data + 1, size - 1, data[0] + 1u, "fuzz");
+    (void)lod::decodeCurveChunk(data + 1, size - 1, data[0] + 1u, "fuzz");
     (void)lod::decodeTile(data + 1, size - 1, "fuzz");
 }
 

@@ -1,4 +1,4 @@
-// Forests as pictures: every backend against the oracle, discs against the strands that they stand for, a path from a
+// Forests as pictures: every backend against the oracle, discs against the curves that they stand for, a path from a
 // kilometre to a leaf.
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include "engine/cpu/kernels.h"
 #include "engine/reference/reference.h"
 #include "engine/scene/camera.h"
-#include "engine/scene/strand_fit.h"
+#include "engine/scene/curve_fit.h"
 #include "engine/scene/triangles.h"
 #include "lod/builder/mesh/mesh_build.h"
 #include "tests/support/forests.h"
@@ -73,7 +73,7 @@ TEST_F(Forests, AreThoseOfTheOracleOnEveryInstructionSet) {
     }
 }
 
-TEST_F(Forests, DiscsCoverAsMuchAsTheStrandsThatTheyStandFor) {
+TEST_F(Forests, DiscsCoverAsMuchAsTheCurvesThatTheyStandFor) {
     const test::Forest forest = test::plantForest(folder_.path(), 8, *executor_);
     const auto backend = cpu::makeCpuBackend(*executor_);
     const lod::View view = viewFrom({28, 20, 230}, {28, 8, 28}, 960, 540);
@@ -82,7 +82,7 @@ TEST_F(Forests, DiscsCoverAsMuchAsTheStrandsThatTheyStandFor) {
         p.proxies = nullptr;
         p.isMember = false;
     }
-    // Strands narrower than a pixel are covered by chance: the mean of many frames.
+    // Curves narrower than a pixel are covered by chance: the mean of many frames.
     double covered = 0;
     auto state = render::makeFrameState(plain, *backend, *executor_, {});
     constexpr uint32_t kFrames = 16;
@@ -107,14 +107,14 @@ TEST_F(Forests, LeavesLetLightThrough) {
     const lod::View view = viewFrom({0, 0, 2}, {0, 0, 0}, 200, 150);
     for (const double pixels : {40.0, 1.4, 0.4}) {  // half-width
         const double radius = pixels * 2 / view.focalPixels;
-        lod::StrandSet leaves;
+        lod::CurveSet leaves;
         for (int k = 0; k < (pixels > 10 ? 1 : 12); ++k) {
             const double y = pixels > 10 ? 0 : 0.06 * (k - 6);
             for (const double x : {-0.5, 0.5})
                 leaves.addVertex({x, y + 0.01 * x, 0}, static_cast<float>(radius), {0, 0, 1}, 0xffc8c8c8u);
-            leaves.endStrand(true);
+            leaves.endCurve(true);
         }
-        const auto store = test::buildStrands(leaves, folder_ / "leaf.stipple", *executor_);
+        const auto store = test::buildCurves(leaves, folder_ / "leaf.stipple", *executor_);
         const auto greenUnder = [&](const glm::dvec3& lightTo) {
             render::FrameSettings settings = lit(0.1);
             settings.draw.lights = {{shared::kLightDirectional, {}, lightTo, glm::vec3(2)}};
@@ -130,8 +130,8 @@ TEST_F(Forests, LeavesLetLightThrough) {
     }
     // A tube is no leaf, however narrow.
     for (const double pixels : {1.4, 0.4}) {
-        const auto tube = test::buildStrands(
-            test::oneStrand({{-0.5, 0, 0}, {0.5, 0.01, 0}}, static_cast<float>(pixels * 2 / view.focalPixels)),
+        const auto tube = test::buildCurves(
+            test::oneCurve({{-0.5, 0, 0}, {0.5, 0.01, 0}}, static_cast<float>(pixels * 2 / view.focalPixels)),
             folder_ / "tube.stipple", *executor_);
         const auto greenUnder = [&](const glm::dvec3& lightTo) {
             render::FrameSettings settings = lit(0.1);
@@ -197,18 +197,18 @@ TEST_F(Forests, SwayInTheWind) {
     EXPECT_EQ(counters.nodesSwaying, 0u);
 }
 
-/// The triangles of a grown tree become strands that look like them.
+/// The triangles of a grown tree become curves that look like them.
 TEST_F(Forests, AConvertedPlantCoversWhatItsTrianglesCover) {
     grow::PlantOptions plant;
     plant.leaves = 6000;
     plant.asTriangles = true;
     const scene::Scene scene = grow::growPlant(plant);
-    scene::StrandFit fit = scene::fitStrands(scene, {}, {}, *executor_);
+    scene::CurveFit fit = scene::fitCurves(scene, {}, {}, *executor_);
     EXPECT_NEAR(static_cast<double>(fit.ribbons), 6000, 60);
     EXPECT_GT(fit.tubes, 5000u);
     EXPECT_LT(static_cast<double>(fit.trianglesLeft), 0.05 * static_cast<double>(fit.trianglesIn));
     EXPECT_LT(fit.meanDeviation, 0.01);
-    const auto strands = test::buildStrands(lod::cleanStrands(fit.strands, 0), folder_ / "strands.stipple", *executor_);
+    const auto curves = test::buildCurves(lod::cleanCurves(fit.curves, 0), folder_ / "curves.stipple", *executor_);
     lod::MeshBuildSettings settings;
     settings.description.materials = scene::surfaceMaterials(scene);
     settings.description.up = {0, 1, 0};
@@ -232,13 +232,13 @@ TEST_F(Forests, AConvertedPlantCoversWhatItsTrianglesCover) {
             return image ? coverOf(*image).first : 0;
         };
         const double truth = traced({{whole, {}, {}}});
-        EXPECT_NEAR(traced({{strands, {}, {}}, {rest, {}, {}}}) / truth, 1, 0.03) << distance;
+        EXPECT_NEAR(traced({{curves, {}, {}}, {rest, {}, {}}}) / truth, 1, 0.03) << distance;
         double drawn = 0;
         constexpr uint32_t kFrames = 8;
         for (uint32_t k = 0; k < kFrames; ++k) {
             render::FrameSettings frame = lit(0.2);
             frame.draw.coverageSeed = k;
-            drawn += coverOf(test::draw({{strands, {}, {}}, {rest, {}, {}}}, *backend, *executor_, view, frame)).first /
+            drawn += coverOf(test::draw({{curves, {}, {}}, {rest, {}, {}}}, *backend, *executor_, view, frame)).first /
                      kFrames;
         }
         // Drawn, lines of one to four pixels cover a little less than they should.
@@ -277,13 +277,13 @@ TEST_F(Forests, APathFromFarAwayOntoALeafDoesNotPop) {
         return pop;
     };
     double worstControl = 0, worstControlP99 = 0;
-    size_t steps = 0, hadGroup = 0, hadMembers = 0, hadStrands = 0;
+    size_t steps = 0, hadGroup = 0, hadMembers = 0, hadCurves = 0;
     for (double distance = 1000; distance > 0.1; distance *= 0.9, ++steps) {
         const render::Image a = frameAt(distance, 1);
         const FrameCounters& c = coarse->counters;
         hadGroup += c.groupMembers < forest.placed.size() ? 1 : 0;
         hadMembers += c.proxies > 0 ? 1 : 0;
-        hadStrands += c.groupMembers > c.proxies ? 1 : 0;
+        hadCurves += c.groupMembers > c.proxies ? 1 : 0;
         const Pop pop = popOf(a, frameAt(distance, std::exp2(1.5 / 32)));
         const Pop control = popOf(a, frameAt(distance, 8));
         EXPECT_LT(pop.mean, distance > 70 ? 0.4 : 1.5) << distance;  // stated tolerance; found 0.3 and 1.1
@@ -297,7 +297,7 @@ TEST_F(Forests, APathFromFarAwayOntoALeafDoesNotPop) {
     EXPECT_GT(worstControlP99, 55) << "and so in the worst pixels; found 68";
     EXPECT_GT(hadGroup, 3u);
     EXPECT_GT(hadMembers, 10u);
-    EXPECT_GT(hadStrands, 10u);
+    EXPECT_GT(hadCurves, 10u);
 }
 
 }  // namespace

@@ -229,7 +229,7 @@ TEST_F(Hybrid, WhatASceneDoesNotCallForDoesNotExist) {
     EXPECT_EQ(untextured->hierarchy.tiles.size(), 0u);
     draw({{untextured, {}, {}}}, *backend, *executor_, view_, settings_, &counters);  // no textures, no points
     EXPECT_TRUE(had(*backend, "rasterise"));
-    for (const char* pass : {"project", "strands", "pull", "push"}) EXPECT_FALSE(had(*backend, pass)) << pass;
+    for (const char* pass : {"project", "curves", "pull", "push"}) EXPECT_FALSE(had(*backend, pass)) << pass;
     EXPECT_EQ(counters.recordsDrawn, 0u);
     EXPECT_GT(backend->resources().meshBytes, 0u);
     EXPECT_EQ(backend->resources().emissiveBytes, 0u);
@@ -240,7 +240,7 @@ TEST_F(Hybrid, WhatASceneDoesNotCallForDoesNotExist) {
     draw(placed_, *backend, *executor_, view_, settings_, &counters);
     for (const char* pass : {"project", "rasterise", "resolve", "pull", "push", "surface+light+output"})
         EXPECT_TRUE(had(*backend, pass)) << pass;
-    EXPECT_FALSE(had(*backend, "strands"));
+    EXPECT_FALSE(had(*backend, "curves"));
 }
 
 TEST_F(Hybrid, LightsAndAnEnvironmentShineOnPointsAndTrianglesAsTheOracleSays) {

@@ -1,5 +1,5 @@
 // Orthographic views of every kind on every backend, against parallel rays o + t d in fp64 by brute force: every disc,
-// ball, triangle and strip of a ribbon that is stored, without projections, slopes and quadratics of strands. And what
+// ball, triangle and strip of a ribbon that is stored, without projections, slopes and quadratics of curves. And what
 // they mean for cuts, and for eyes that are far away.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -15,9 +15,9 @@
 #include "engine/reference/decode.h"
 #include "engine/reference/reference.h"
 #include "engine/scene/camera.h"
+#include "tests/support/curves.h"
 #include "tests/support/drawn_discs.h"
 #include "tests/support/meshes.h"
-#include "tests/support/strands.h"
 
 namespace stipple {
 namespace {
@@ -58,7 +58,7 @@ std::vector<reference::Segment> segmentsOf(const lod::Store& store) {
 }
 
 /// Tubes as many balls, ribbons as narrow strips of two triangles.
-Meet rayThroughStrands(const std::vector<reference::Segment>& segments) {
+Meet rayThroughCurves(const std::vector<reference::Segment>& segments) {
     constexpr int kParts = 120;
     const auto edge = [](const reference::Segment& s, double u, double side) {
         return glm::mix(s.a, s.b, u) + side * glm::mix(s.radiusA * s.directionA, s.radiusB * s.directionB, u);
@@ -209,7 +209,7 @@ class Orthographic : public ::testing::Test {
         settings.wantDepthAndNormal = true;
         settings.draw.lit = true;
         settings.draw.worldUp = {0, 1, 0};
-        settings.draw.exactStrands = 0.5f;
+        settings.draw.exactCurves = 0.5f;
         const std::vector<Hit> truth = cast(view, width, meet);
         reference::TraceSettings trace;
         trace.samplesPerAxis = 1;
@@ -293,8 +293,8 @@ TEST_F(Orthographic, FilledTubesAndRibbonsAreWhatRaysMeet) {
         recipe.ribbons = ribbons;
         recipe.twist = 1;
         const auto store =
-            test::buildStrands(test::curls(recipe), folder_ / fmt::format("{}.stipple", ribbons), *executor_);
-        const Meet meet = rayThroughStrands(segmentsOf(*store));
+            test::buildCurves(test::curls(recipe), folder_ / fmt::format("{}.stipple", ribbons), *executor_);
+        const Meet meet = rayThroughCurves(segmentsOf(*store));
         // (Balls have no bent normals: theirs are off by what a segment turns.)
         for (const double azimuth : {0.0, 1.1, 2.5})
             expectTrue(store, look(azimuth, 0.4, 3), 3, meet, {0.002, 0.005, 0.02, ribbons > 0 ? 0.5 : 5, 40},
@@ -302,17 +302,17 @@ TEST_F(Orthographic, FilledTubesAndRibbonsAreWhatRaysMeet) {
     }
 }
 
-TEST_F(Orthographic, ReconstructedStrandsAreThoseOfTheOracle) {
+TEST_F(Orthographic, ReconstructedCurvesAreThoseOfTheOracle) {
     test::CurlRecipe recipe;
     recipe.count = 60;
     recipe.radius = 0.02f;
-    const auto store = test::buildStrands(test::curls(recipe), folder_ / "curls.stipple", *executor_);
+    const auto store = test::buildCurves(test::curls(recipe), folder_ / "curls.stipple", *executor_);
     const auto oracle = reference::makeReferenceBackend(*executor_);
     render::FrameSettings settings;
     settings.wantDepthAndNormal = true;
     settings.draw.lit = true;
     for (const float exact : {2.0f, 100.0f}) {
-        settings.draw.exactStrands = exact;
+        settings.draw.exactCurves = exact;
         const lod::View view = look(0.4, 0.3, 3);
         const auto truth = test::draw({{store, {}, {}}}, *oracle, *executor_, view, settings);
         for (const auto& [name, backend] : backends_) {
@@ -364,7 +364,7 @@ TEST_F(Orthographic, FarAwayIsAsNear) {
     test::CurlRecipe recipe;
     recipe.count = 30;
     recipe.radius = 0.06f;
-    const auto strands = test::buildStrands(test::curls(recipe), folder_ / "far.stipple", *executor_);
+    const auto curves = test::buildCurves(test::curls(recipe), folder_ / "far.stipple", *executor_);
     test::MeshRecipe rock;
     rock.grow.triangles = 2000;
     rock.isTextured = false;
@@ -378,7 +378,7 @@ TEST_F(Orthographic, FarAwayIsAsNear) {
         view.eye -= view.forward * back;
         lod::Instance instance;
         instance.translation = place;
-        return test::draw({{points, instance, {}}, {strands, instance, {}}, {mesh, instance, {}}}, backend, *executor_,
+        return test::draw({{points, instance, {}}, {curves, instance, {}}, {mesh, instance, {}}}, backend, *executor_,
                           view, settings);
     };
     for (const auto& [name, backend] : backends_) {

@@ -16,8 +16,8 @@
 #include "engine/reference/reference.h"
 #include "engine/scene/camera.h"
 #include "lod/store/store.h"
+#include "tests/support/curves.h"
 #include "tests/support/meshes.h"
-#include "tests/support/strands.h"
 
 namespace stipple {
 namespace {
@@ -83,16 +83,16 @@ class Ribbons : public testing::Test {
   protected:
     struct Case {
         const char* name;
-        lod::StrandSet set;
+        lod::CurveSet set;
         dvec3 eye, target;
     };
-    static lod::StrandSet strip(const std::vector<dvec3>& places, float radius, double startTwist, double twist) {
+    static lod::CurveSet strip(const std::vector<dvec3>& places, float radius, double startTwist, double twist) {
         std::vector<glm::vec3> normals;
         for (size_t i = 0; i < places.size(); ++i) {
             const double t = startTwist + twist * static_cast<double>(i) / static_cast<double>(places.size() - 1);
             normals.emplace_back(std::sin(t), std::cos(t), 0);
         }
-        return test::oneStrand(places, radius, normals);
+        return test::oneCurve(places, radius, normals);
     }
     static std::vector<Case> cases() {
         std::vector<Case> all;
@@ -178,11 +178,11 @@ class Ribbons : public testing::Test {
         render::FrameSettings settings;
         settings.draw.lit = true;
         settings.draw.worldUp = {0, 1, 0};
-        settings.draw.exactStrands = 0.5f;
+        settings.draw.exactCurves = 0.5f;
         settings.budgets.errorPixels = 1e-4;
         settings.wantDepthAndNormal = true;
         for (Case& c : cases()) {
-            const auto store = test::buildStrands(c.set, folder_ / "ribbons.stipple", *executor_);
+            const auto store = test::buildCurves(c.set, folder_ / "ribbons.stipple", *executor_);
             ASSERT_TRUE(store);
             std::vector<Segment> segments;
             for (uint32_t i = 0; i < store->hierarchy.nodes.size(); ++i) {
@@ -190,7 +190,7 @@ class Ribbons : public testing::Test {
                 if (!node.isLeaf()) continue;
                 const auto chunk = lod::readChunk(*store, i);
                 ASSERT_TRUE(chunk);
-                for (const shared::StrandSegment& s : chunk->segments)
+                for (const shared::CurveSegment& s : chunk->segments)
                     segments.push_back(reference::decodeSegment(store->hierarchy, node, s));
             }
             scene::Camera camera;

@@ -16,8 +16,8 @@
 #include "engine/reference/reference.h"
 #include "engine/scene/camera.h"
 #include "lod/store/store.h"
+#include "tests/support/curves.h"
 #include "tests/support/meshes.h"
-#include "tests/support/strands.h"
 
 namespace stipple {
 namespace {
@@ -36,8 +36,7 @@ std::vector<Segment> leafSegments(const lod::Store& store) {
         if (!h.nodes[i].isLeaf()) continue;
         const auto chunk = lod::readChunk(store, i);
         EXPECT_TRUE(chunk);
-        for (const shared::StrandSegment& s : chunk->segments)
-            out.push_back(reference::decodeSegment(h, h.nodes[i], s));
+        for (const shared::CurveSegment& s : chunk->segments) out.push_back(reference::decodeSegment(h, h.nodes[i], s));
     }
     return out;
 }
@@ -179,11 +178,11 @@ class Tubes : public testing::Test {
         return all;
     }
     std::shared_ptr<const lod::Store> build(const Case& c) {
-        lod::StrandSet set;
+        lod::CurveSet set;
         for (size_t i = 0; i < c.places.size(); ++i) set.addVertex(c.places[i], c.radii[i], glm::vec3(0), 0x60a0d0);
-        set.endStrand(false);
-        return test::buildStrands(lod::cleanStrands(std::move(set), 0), folder_ / (std::string(c.name) + ".stipple"),
-                                  *executor_);
+        set.endCurve(false);
+        return test::buildCurves(lod::cleanCurves(std::move(set), 0), folder_ / (std::string(c.name) + ".stipple"),
+                                 *executor_);
     }
     /// Looks at the origin from `degrees` off the axis; `aside`: how far from the picture's middle it is seen.
     static lod::View look(double degrees, double distance, double fov, const dvec2& aside) {
@@ -210,7 +209,7 @@ class Tubes : public testing::Test {
         render::FrameSettings settings;
         settings.draw.lit = true;
         settings.draw.worldUp = {0, 1, 0};
-        settings.draw.exactStrands = 0.5f;
+        settings.draw.exactCurves = 0.5f;
         settings.budgets.errorPixels = 1e-4;
         settings.wantDepthAndNormal = true;
         std::map<std::string, Figures> worst;
@@ -266,7 +265,7 @@ TEST_F(Tubes, OfTheCpuBackendAndTheOracleAreWhatRaysMeetFromEverySide) {
 }
 
 TEST_F(Tubes, KeepTheirOutlineAndTheirCoverageInWidePictures) {
-    // 120 degrees: what is seen beside the middle is stretched by the picture, narrow strands alike.
+    // 120 degrees: what is seen beside the middle is stretched by the picture, narrow curves alike.
     const auto backend = cpu::makeCpuBackend(*executor_);
     scene::Camera camera;
     camera.eye = {0, 0, 1.3};
@@ -291,8 +290,8 @@ TEST_F(Tubes, KeepTheirOutlineAndTheirCoverageInWidePictures) {
         recipe.count = 12;
         recipe.radius = 0.1f;
         recipe.ribbons = ribbons;
-        const auto store = test::buildStrands(test::curls(recipe), folder_ / "wide.stipple", *executor_);
-        settings.draw.exactStrands = 0.5f;
+        const auto store = test::buildCurves(test::curls(recipe), folder_ / "wide.stipple", *executor_);
+        settings.draw.exactCurves = 0.5f;
         const auto d = reference::compareImages(test::draw({{store, {}, {}}}, *backend, *executor_, view, settings),
                                                 traced(store, 1), 4, nullptr);
         ASSERT_TRUE(d);
@@ -306,7 +305,7 @@ TEST_F(Tubes, KeepTheirOutlineAndTheirCoverageInWidePictures) {
     recipe.radius = 0.0008f;
     for (const double ribbons : {0.0, 1.0}) {
         recipe.ribbons = ribbons;
-        const auto store = test::buildStrands(test::curls(recipe), folder_ / "narrow.stipple", *executor_);
+        const auto store = test::buildCurves(test::curls(recipe), folder_ / "narrow.stipple", *executor_);
         double expected = 0, got = 0;
         for (const uint32_t c : traced(store, 12).rgba) expected += (c >> 24) / 255.0;
         constexpr uint32_t kFrames = 32;

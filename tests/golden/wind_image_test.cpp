@@ -151,7 +151,7 @@ TEST_F(Gale, BendsDiscsAndTheirNormalsAlikeEverywhere) {
 }
 
 TEST_F(Gale, BendsRibbonsAndTubesAlikeEverywhere) {
-    const auto store = test::buildStrands(test::oak(3000), folder_ / "oak.stipple", *executor_, 512);
+    const auto store = test::buildCurves(test::oak(3000), folder_ / "oak.stipple", *executor_, 512);
     expectAlike("curves from afar", store, viewFrom({60, 30, 60}, {0, 4, 0}, 12), 4);
     expectAlike("curves near by", store, viewFrom({9, 5, 9}, {0, 5, 0}, 12), 1);
 }
@@ -209,7 +209,7 @@ TEST(BentNodes, HaveNormalsThatStandOnWhatIsBent) {
 TEST_F(Gale, StaysWithinWhatIsStatedOfIt) {
     const test::Forest forest = test::plantForest(folder_.path(), 1, *executor_);
     const auto cpu = cpu::makeCpuBackend(*executor_);
-    for (const auto& store : {forest.strands, forest.afar})
+    for (const auto& store : {forest.curves, forest.afar})
         for (const double strength : {0.03, kGale}) {
             // Orthographic: what is allowed is the same everywhere.
             lod::View view = viewFrom({60, 30, 60}, {0, 4, 0}, 12);

@@ -14,9 +14,9 @@
 #include "engine/reference/reference.h"
 #include "engine/render/frame_passes.h"
 #include "engine/scene/camera.h"
+#include "tests/support/curves.h"
 #include "tests/support/forests.h"
 #include "tests/support/meshes.h"
-#include "tests/support/strands.h"
 #include "tests/support/support.h"
 
 namespace stipple::gpu {
@@ -208,20 +208,20 @@ TEST_F(Gpu, DrawsRibbonsAndTubesAmongPointsAsTheOracleDoes) {
     render::FrameSettings settings;
     settings.draw.lit = true;
     draw(*gpu, settings);  // points alone
-    EXPECT_EQ(gpu->resources().strandPipelines, 0u);
-    EXPECT_EQ(gpu->resources().strandBytes, 0u);
+    EXPECT_EQ(gpu->resources().curvePipelines, 0u);
+    EXPECT_EQ(gpu->resources().curveBytes, 0u);
     for (const float radius : {0.002f, 0.01f, 0.05f}) {
         test::CurlRecipe recipe;
         recipe.radius = radius;
-        const auto strands = test::buildStrands(test::curls(recipe), folder_ / "c.stipple", *executor_);
+        const auto curves = test::buildCurves(test::curls(recipe), folder_ / "c.stipple", *executor_);
         lod::Instance turned;
         turned.rotation = glm::dmat3(glm::dvec3(0, 0, -1), glm::dvec3(0, 1, 0), glm::dvec3(1, 0, 0));
-        const std::vector<render::PlacedStore> placed{{store_, {}, {}}, {strands, turned, {}}};
+        const std::vector<render::PlacedStore> placed{{store_, {}, {}}, {curves, turned, {}}};
         lod::View view = test::fitView(*store_, 400, 300);
         for (const double closer : {0.0, 2.2})
             for (const float exact : {2.0f, 1e9f}) {
                 view.eye += closer * view.forward;
-                settings.draw.exactStrands = exact;
+                settings.draw.exactCurves = exact;
                 settings.wantDepthAndNormal = exact > 3;
                 const auto image = [&](render::Backend& backend) {
                     auto state = render::makeFrameState(placed, backend, *executor_, {});
@@ -235,7 +235,7 @@ TEST_F(Gpu, DrawsRibbonsAndTubesAmongPointsAsTheOracleDoes) {
                 view.eye -= closer * view.forward;
             }
     }
-    // Trees from near and far: discs of leaves beside strands.
+    // Trees from near and far: discs of leaves beside curves.
     const test::Forest forest = test::plantForest(folder_.path(), 6, *executor_);
     for (const glm::dvec3& eye : {glm::dvec3(20, 4, 60), glm::dvec3(20, 60, 400)}) {
         scene::Camera camera;
@@ -243,7 +243,7 @@ TEST_F(Gpu, DrawsRibbonsAndTubesAmongPointsAsTheOracleDoes) {
         camera.target = {20, 6, 20};
         camera.up = {0, 1, 0};
         const lod::View view = scene::makeView(camera, 400, 300, 0.05);
-        settings.draw.exactStrands = 2;
+        settings.draw.exactCurves = 2;
         settings.budgets.errorPixels = 2;
         const auto image = [&](render::Backend& backend) {
             auto state = render::makeFrameState(forest.placed, backend, *executor_, {}, forest.groups);
@@ -255,9 +255,9 @@ TEST_F(Gpu, DrawsRibbonsAndTubesAmongPointsAsTheOracleDoes) {
         EXPECT_GE(d->psnr, 38) << eye.y;
         EXPECT_LE(d->differingFraction, 0.01) << eye.y;
     }
-    EXPECT_EQ(gpu->resources().strandPipelines, 3u);
-    EXPECT_GT(gpu->resources().strandBytes, 0u);
-    EXPECT_EQ(gpu->resources().meshPipelines, 0u) << "strands call for no pipeline of triangles";
+    EXPECT_EQ(gpu->resources().curvePipelines, 3u);
+    EXPECT_GT(gpu->resources().curveBytes, 0u);
+    EXPECT_EQ(gpu->resources().meshPipelines, 0u) << "curves call for no pipeline of triangles";
     for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
 }
 
@@ -398,9 +398,9 @@ TEST(Shaders, TouchThePlanesThatTheirPassesDeclare) {
         {Pass::splat, {"splat", "discs"}},
         {Pass::exact, {"exact_depths", "exact_ids", "exact_rest", "discs", "exact_gather"}},
         {Pass::ewa, {"ewa_front", "ewa_front_wide", "ewa_begin", "ewa_sum", "ewa_sum_wide", "ewa_show", "ewa_cover"}},
-        {Pass::strands, {"strands", "strands_wide"}},
+        {Pass::curves, {"curves", "curves_wide"}},
         {Pass::rasterise, {"rasterise", "rasterise_large"}},
-        {Pass::resolve, {"resolve", "disc_texels", "strand_texels", "triangle_texels"}},
+        {Pass::resolve, {"resolve", "disc_texels", "curve_texels", "triangle_texels"}},
         {Pass::pull, {"pull"}},
         {Pass::push, {"push"}},
         {Pass::surface, {"surface"}},

@@ -7,11 +7,11 @@
 
 #include "engine/gpu/device.h"
 #include "engine/gpu/shader_table.h"
+#include "shaders/shared/curve.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
 #include "shaders/shared/mesh.h"
 #include "shaders/shared/record.h"
-#include "shaders/shared/strand.h"
 #include "shaders/shared/texture.h"
 
 namespace stipple::gpu {
@@ -31,7 +31,7 @@ struct Shared {
     shared::DrawMesh mesh;
     shared::DrawCluster drawCluster;
     shared::SurfaceMaterial material;
-    shared::StrandSegment segment;
+    shared::CurveSegment segment;
     shared::TextureInfo textureInfo;
 };
 // Words of four bytes throughout: no padding, in whatever order.
@@ -39,7 +39,7 @@ static_assert(sizeof(Shared) ==
               sizeof(shared::FrameConstants) + sizeof(shared::DrawNode) + sizeof(shared::DrawBlock) +
                   sizeof(shared::PointRecord) + sizeof(shared::LightSource) + sizeof(shared::MeshVertex) +
                   sizeof(shared::MeshCluster) + sizeof(shared::DrawMesh) + sizeof(shared::DrawCluster) +
-                  sizeof(shared::SurfaceMaterial) + sizeof(shared::StrandSegment) + sizeof(shared::TextureInfo));
+                  sizeof(shared::SurfaceMaterial) + sizeof(shared::CurveSegment) + sizeof(shared::TextureInfo));
 
 /// One dispatch of the echo shader.
 class Echo {

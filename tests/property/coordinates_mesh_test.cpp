@@ -12,8 +12,8 @@
 #include "engine/scene/scene.h"
 #include "engine/scene/triangles.h"
 #include "lod/store/chunk.h"
+#include "tests/support/curves.h"
 #include "tests/support/meshes.h"
-#include "tests/support/strands.h"
 
 namespace stipple::lod {
 namespace {
@@ -102,7 +102,7 @@ render::Image pictureOf(const std::shared_ptr<const Store>& store, Executor& exe
     const auto backend = cpu::makeCpuBackend(executor);
     render::FrameSettings settings;
     settings.budgets.errorPixels = 0.1;
-    settings.draw.exactStrands = 0;
+    settings.draw.exactCurves = 0;
     return test::renderView(store, *backend, executor, view, settings);
 }
 
@@ -297,8 +297,8 @@ std::vector<glm::dvec3> endsOf(const Store& store) {
         if (!node.isLeaf()) continue;
         const Chunk chunk = *readChunk(store, n);
         const double cell = std::ldexp(1.0, static_cast<int>(h.rootLog2) - node.level);
-        for (const shared::StrandSegment& s : chunk.segments)
-            for (const shared::StrandVertex& v : {s.a, s.b}) {
+        for (const shared::CurveSegment& s : chunk.segments)
+            for (const shared::CurveVertex& v : {s.a, s.b}) {
                 const glm::dvec3 at(v.positionXY & 0xffffu, v.positionXY >> 16, v.positionZ & 0xffffu);
                 const glm::dvec3 corner(node.cell[0], node.cell[1], node.cell[2]);
                 ends.push_back(h.origin + h.unit * (cell * (corner - 0.5) + cell / 32768 * at));
@@ -307,22 +307,22 @@ std::vector<glm::dvec3> endsOf(const Store& store) {
     return ends;
 }
 
-TEST(CoordinatesOfCurves, AStrandFarAwayChangesNothing) {
+TEST(CoordinatesOfCurves, ACurveFarAwayChangesNothing) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);
     for (const float radius : {0.01f, 0.06f}) {
-        const StrandSet alone = test::curls({.count = 60, .vertices = 40, .radius = radius});
+        const CurveSet alone = test::curls({.count = 60, .vertices = 40, .radius = radius});
         const View view = test::viewFromAbove(glm::dvec3(0, 0, 1));
         const render::Image without =
-            pictureOf(test::buildStrands(alone, folder / "alone", *executor, 8192), *executor, view);
+            pictureOf(test::buildCurves(alone, folder / "alone", *executor, 8192), *executor, view);
         const auto withOne = [&](const glm::dvec3& place) {
-            StrandSet set = alone;
+            CurveSet set = alone;
             for (const double y : {0.0, 1.0}) set.addVertex(place + glm::dvec3(0, y, 0), 0.01f, glm::vec3(0), 0);
-            set.endStrand(false);
-            return test::buildStrands(set, folder / "far", *executor, 8192);
+            set.endCurve(false);
+            return test::buildCurves(set, folder / "far", *executor, 8192);
         };
-        // Any other strand, too, lets the cells lie elsewhere, and with them the steps of a 30,000th of a cell: at
-        // outlines, which are not smoothed, a pixel turns here and there, and thin strands cover others stochastically.
+        // Any other curve, too, lets the cells lie elsewhere, and with them the steps of a 30,000th of a cell: at
+        // outlines, which are not smoothed, a pixel turns here and there, and thin curves cover others stochastically.
         double usual = 99;
         for (const glm::dvec3& near : {glm::dvec3(0.3, 0.1, 4.5), glm::dvec3(0, -0.4, 5), glm::dvec3(0.2, 0, 6)})
             usual = std::min(usual, test::drawnPsnr(pictureOf(withOne(near), *executor, view), without));
@@ -343,17 +343,17 @@ TEST(CoordinatesOfCurves, ObjectsFarApartAreDrawnWhereTheyAre) {
     const auto executor = makeTbbExecutor(0);
     for (const double extent : {1e5, 1e9}) {
         Rng rng(7);
-        const StrandSet one = test::curls({.count = 20, .vertices = 30});
-        StrandSet set;
+        const CurveSet one = test::curls({.count = 20, .vertices = 30});
+        CurveSet set;
         for (int k = 0; k < 40; ++k) {
             const glm::dvec3 place(extent * rng.uniform(), extent * rng.uniform(), 0.1 * extent * rng.uniform());
-            for (size_t s = 0; s < one.strands(); ++s) {
+            for (size_t s = 0; s < one.curves(); ++s) {
                 for (uint32_t i = one.first[s]; i < one.first[s + 1]; ++i)
                     set.addVertex(place + one.position[i], one.radius[i], one.normal[i], one.colour[i]);
-                set.endStrand(one.isRibbon[s] != 0);
+                set.endCurve(one.isRibbon[s] != 0);
             }
         }
-        const auto store = test::buildStrands(set, folder / "s", *executor, 8192);
+        const auto store = test::buildCurves(set, folder / "s", *executor, 8192);
         const double ofDoubles = 4 * extent * 0x1p-53;
         EXPECT_LE(farthest(set.position, endsOf(*store), 0.05), kTenthOfAPixel + ofDoubles) << extent;
         EXPECT_TRUE(verifyStore(*store, *executor, 0)) << extent;
@@ -363,15 +363,15 @@ TEST(CoordinatesOfCurves, ObjectsFarApartAreDrawnWhereTheyAre) {
 TEST(CoordinatesOfCurves, OneThatReachesFarAwayLeavesTheOthersWhereTheyAre) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);
-    const StrandSet alone = test::curls({.count = 60, .vertices = 40, .radius = 0.01f});
+    const CurveSet alone = test::curls({.count = 60, .vertices = 40, .radius = 0.01f});
     for (const glm::dvec3& far : farPlaces()) {
         // From among the others; through them, from far to far.
         for (const glm::dvec3& from : {glm::dvec3(0.3, 0.1, 0.2), -far}) {
-            StrandSet set = alone;
+            CurveSet set = alone;
             set.addVertex(from, 0.01f, glm::vec3(0), 0);
             set.addVertex(far, 0.01f, glm::vec3(0), 0);
-            set.endStrand(false);
-            const auto store = test::buildStrands(set, folder / "far", *executor, 8192);
+            set.endCurve(false);
+            const auto store = test::buildCurves(set, folder / "far", *executor, 8192);
             const std::vector<glm::dvec3> ends = endsOf(*store);
             const double ofDoubles = glm::length(far - from) * 0x1p-52;
             EXPECT_LE(farthest(alone.position, ends, 0.05), kTenthOfAPixel + ofDoubles) << far.x << " " << far.z;
@@ -402,13 +402,13 @@ TEST(CoordinatesOfCurves, OneThatReachesFarAwayLeavesTheOthersWhereTheyAre) {
 TEST(CoordinatesOfCurves, ShortSegmentsAreNoRepeatsHoweverFarAnotherLies) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);
-    StrandSet set;  // as readers give it
+    CurveSet set;  // as readers give it
     for (uint32_t i = 0; i < 200; ++i) set.addVertex({0.3 * i, 0.2 * (i % 2), 0}, 0.05f, glm::vec3(0), 0);
-    set.endStrand(false);
+    set.endCurve(false);
     const std::vector<glm::dvec3> truth = set.position;
     for (const double y : {0.0, 1.0}) set.addVertex({1e12, y, 0}, 0.05f, glm::vec3(0), 0);
-    set.endStrand(false);
-    const auto store = test::buildStrands(cleanStrands(set, 0), folder / "far", *executor, 8192);
+    set.endCurve(false);
+    const auto store = test::buildCurves(cleanCurves(set, 0), folder / "far", *executor, 8192);
     EXPECT_TRUE(store->description.dropped.empty());
     const double ofDoubles = 1e12 * 0x1p-52;
     EXPECT_LE(farthest(truth, endsOf(*store), 0.5), store->description.roundingUnits + ofDoubles);

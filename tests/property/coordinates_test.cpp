@@ -14,8 +14,8 @@
 #include "engine/scene/scene.h"
 #include "engine/scene/triangles.h"
 #include "lod/store/chunk.h"
+#include "tests/support/curves.h"
 #include "tests/support/meshes.h"
-#include "tests/support/strands.h"
 
 namespace stipple::lod {
 namespace {
@@ -360,22 +360,22 @@ TEST(Coordinates, ObjHasTheDigitsOfMapCoordinates) {
     EXPECT_GT(single, 0.1) << "fp32 has not";
 }
 
-TEST(Coordinates, AStrandFarAwayMovesNoOthers) {
+TEST(Coordinates, ACurveFarAwayMovesNoOthers) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);
-    StrandSet set = test::curls({.count = 100, .vertices = 40});
+    CurveSet set = test::curls({.count = 100, .vertices = 40});
     std::vector<glm::dvec3> truth = set.position;
     for (const glm::dvec3& p : {glm::dvec3(1e4, 0, 0), glm::dvec3(1e4, 1, 0)}) set.addVertex(p, 0.01f, glm::vec3(0), 0);
-    set.endStrand(false);
-    const auto store = test::buildStrands(set, folder / "s", *executor, 8192);
+    set.endCurve(false);
+    const auto store = test::buildCurves(set, folder / "s", *executor, 8192);
     const Hierarchy& h = store->hierarchy;
     std::vector<glm::dvec3> ends;
     for (uint32_t n = 0; n < h.nodes.size(); ++n) {
         if (!h.nodes[n].isLeaf()) continue;
         const double step = h.unit * std::exp2(h.nodes[n].stepShift);
         const Chunk chunk = *readChunk(*store, n);
-        for (const shared::StrandSegment& s : chunk.segments)
-            for (const shared::StrandVertex& v : {s.a, s.b})
+        for (const shared::CurveSegment& s : chunk.segments)
+            for (const shared::CurveVertex& v : {s.a, s.b})
                 ends.push_back(h.origin + h.unit * h.recordOrigin(h.nodes[n]) +
                                step * glm::dvec3(v.positionXY & 0xffffu, v.positionXY >> 16, v.positionZ & 0xffffu));
     }

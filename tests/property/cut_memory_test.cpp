@@ -163,7 +163,7 @@ TEST(CutMemory, WhatIsCountedIsWhatIsDrawn) {
     const test::Forest forest = test::plantForest(folder.path(), 4, *executor);
     Rng rng(9);
     size_t partly = 0;
-    for (const lod::Store* store : {points.get(), mesh.get(), forest.strands.get(), forest.afar.get()}) {
+    for (const lod::Store* store : {points.get(), mesh.get(), forest.curves.get(), forest.afar.get()}) {
         const lod::Hierarchy& h = store->hierarchy;
         const std::vector<const lod::Hierarchy*> hierarchies{&h};
         const std::vector<lod::Instance> instances(1);

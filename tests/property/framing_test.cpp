@@ -6,9 +6,9 @@
 
 #include "engine/image/image_io.h"
 #include "engine/scene/camera.h"
+#include "engine/scene/curves.h"
 #include "engine/scene/outline.h"
 #include "engine/scene/scene.h"
-#include "engine/scene/strands.h"
 #include "tests/support/runs.h"
 #include "tests/support/support.h"
 
@@ -159,7 +159,7 @@ TEST(Framing, ARoundSceneFillsThePictureToo) {
 std::vector<glm::dvec3> verticesOf(const std::string& path) {
     const auto tree = readScene(path, {});
     if (!tree) return {};
-    return flattenStrands(*tree, placements(*tree)).position;
+    return flattenCurves(*tree, placements(*tree)).position;
 }
 
 TEST(Framing, AGrownTreeIsWholeFromItsFootToItsTop) {

@@ -8,7 +8,7 @@
 #include "engine/cpu/cpu_backend.h"
 #include "engine/reference/decode.h"
 #include "engine/scene/camera.h"
-#include "lod/builder/strands/strand_coverage.h"
+#include "lod/builder/curves/curve_coverage.h"
 #include "tests/support/forests.h"
 
 namespace stipple {
@@ -29,9 +29,9 @@ double unevenness(const std::vector<glm::dvec3>& position, size_t count, const g
     return worst;
 }
 
-TEST(StrandSamples, AnyBeginningIsSpreadOverTheWhole) {
-    const lod::StrandSet tree = test::oak(5000);
-    const lod::StrandSamples samples = lod::sampleStrands(tree, 10'000);
+TEST(CurveSamples, AnyBeginningIsSpreadOverTheWhole) {
+    const lod::CurveSet tree = test::oak(5000);
+    const lod::CurveSamples samples = lod::sampleCurves(tree, 10'000);
     const std::vector<glm::dvec3>& p = samples.points.position;
     ASSERT_NEAR(static_cast<double>(p.size()), 10'000, 2);
     glm::dvec3 middle(0);
@@ -41,16 +41,16 @@ TEST(StrandSamples, AnyBeginningIsSpreadOverTheWhole) {
         const double byChance = 3 * std::sqrt(0.11 / static_cast<double>(count));
         EXPECT_LE(unevenness(p, count, middle), byChance) << count;
     }
-    // Negative control: the order of the strands themselves is not spread.
+    // Negative control: the order of the curves themselves is not spread.
     std::vector<glm::dvec3> sorted = p;
     std::sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) { return a.y < b.y; });
     EXPECT_GT(unevenness(sorted, 1000, middle), 3 * std::sqrt(0.11 / 1000));
 }
 
-TEST(StrandSamples, CoverWhatTheStrandsCover) {
+TEST(CurveSamples, CoverWhatTheCurvesCover) {
     const auto executor = makeTbbExecutor(0);
     // Far apart: ribbons do not hide each other, so areas are all there is, and few discs need no correction.
-    lod::StrandSet apart;
+    lod::CurveSet apart;
     Rng rng(3);
     for (int k = 0; k < 400; ++k) {
         const glm::dvec3 at(rng.uniform(0, 100), rng.uniform(0, 100), rng.uniform(0, 100));
@@ -58,25 +58,25 @@ TEST(StrandSamples, CoverWhatTheStrandsCover) {
         const glm::vec3 n(glm::normalize(glm::cross(d, glm::dvec3(rng.normal(), rng.normal(), rng.normal()))));
         apart.addVertex(at, 0.3f, n, 0x30a030u);
         apart.addVertex(at + glm::normalize(d), 0.3f, n, 0x30a030u);
-        apart.endStrand(true);
+        apart.endCurve(true);
     }
-    apart = lod::cleanStrands(std::move(apart), 0);
-    const std::vector<float> far = lod::coverageFactors(apart, lod::sampleStrands(apart, 4000), *executor);
+    apart = lod::cleanCurves(std::move(apart), 0);
+    const std::vector<float> far = lod::coverageFactors(apart, lod::sampleCurves(apart, 4000), *executor);
     ASSERT_GE(far.size(), 6u);
     EXPECT_GT(far[0], 1.05f);                                                  // ten discs on one ribbon overlap
     for (size_t k = 4; k < far.size(); ++k) EXPECT_NEAR(far[k], 1, 0.1) << k;  // one, or none
     // A tree's leaves hide each other: fewer, larger discs hide each other less, so they are drawn smaller.
-    const lod::StrandSet tree = test::oak(20'000);
-    const std::vector<float> factors = lod::coverageFactors(tree, lod::sampleStrands(tree, 16'384), *executor);
+    const lod::CurveSet tree = test::oak(20'000);
+    const std::vector<float> factors = lod::coverageFactors(tree, lod::sampleCurves(tree, 16'384), *executor);
     ASSERT_GE(factors.size(), 8u);
     EXPECT_LT(factors.back(), 0.9f * factors.front());
     for (const float factor : factors) EXPECT_GT(factor, 0.3f);
 }
 
-TEST(StrandHierarchy, MergedPartsKeepTheArea) {
+TEST(CurveHierarchy, MergedPartsKeepTheArea) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);
-    const auto store = test::buildStrands(test::oak(4000), folder / "a.stipple", *executor, 512);
+    const auto store = test::buildCurves(test::oak(4000), folder / "a.stipple", *executor, 512);
     const auto areaAt = [&](uint32_t code) {
         double area = 0;
         const lod::Hierarchy& h = store->hierarchy;

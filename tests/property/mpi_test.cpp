@@ -122,7 +122,7 @@ std::vector<Kind> kinds(const test::TempFolder& folder) {
     return out;
 }
 
-TEST_F(Mpi, TrianglesAndStrandsAreThoseOfOneProcessToo) {
+TEST_F(Mpi, TrianglesAndCurvesAreThoseOfOneProcessToo) {
     const test::TempFolder folder;
     const std::string one = folder / "one.stipple", many = folder / "many.stipple";
     for (const Kind& kind : kinds(folder)) {

@@ -6,10 +6,10 @@
 #include <filesystem>
 
 #include "lod/builder/build.h"
+#include "lod/builder/curves/curve_build.h"
 #include "lod/builder/mesh/mesh_build.h"
-#include "lod/builder/strands/strand_build.h"
+#include "lod/import/curves/curve_readers.h"
 #include "lod/import/ply/mesh.h"
-#include "lod/import/strands/strand_readers.h"
 #include "tests/support/big_inputs.h"
 #include "tests/support/support.h"
 
@@ -54,10 +54,10 @@ Result<BuildReport> build(const std::string& input, const std::string& output, c
         STIPPLE_ASSIGN(const MeshSource source, openPlyMesh(input, 1 << 20, fs::path(output).parent_path().string()));
         return buildMeshStore(source, output, settings, *executor, silent);
     }
-    StrandBuildSettings settings;
+    CurveBuildSettings settings;
     settings.limits = limits;
-    STIPPLE_ASSIGN(const StrandSource source, openStrands(input));
-    return buildStrandStore(cleanSource(source, 0), output, settings, *executor, silent);
+    STIPPLE_ASSIGN(const CurveSource source, openCurves(input));
+    return buildCurveStore(cleanSource(source, 0), output, settings, *executor, silent);
 }
 
 class Resume : public ::testing::Test {

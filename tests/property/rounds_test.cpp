@@ -1,4 +1,4 @@
-// Meshes and strands out of core: little memory, kills and odd orders of the input do not show in the file.
+// Meshes and curves out of core: little memory, kills and odd orders of the input do not show in the file.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -9,10 +9,10 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/base/process.h"
+#include "lod/builder/curves/curve_build.h"
 #include "lod/builder/mesh/mesh_build.h"
-#include "lod/builder/strands/strand_build.h"
+#include "lod/import/curves/curve_readers.h"
 #include "lod/import/ply/mesh.h"
-#include "lod/import/strands/strand_readers.h"
 #include "tests/support/big_inputs.h"
 #include "tests/support/runs.h"
 #include "tests/support/support.h"
@@ -31,7 +31,7 @@ std::vector<Kind> kinds(const test::TempFolder& folder) {
     test::writeGround(folder / "ground.ply", 500, 0);  // 498,002 triangles
     test::writeLawn(folder / "lawn.hair", 25'000);     // 500,000 segments
     return {{"mesh", folder / "ground.ply", uint64_t{190} << 20, uint64_t{80} << 20},
-            {"strands", folder / "lawn.hair", uint64_t{170} << 20, uint64_t{64} << 20}};
+            {"curves", folder / "lawn.hair", uint64_t{170} << 20, uint64_t{64} << 20}};
 }
 
 Result<BuildReport> build(const std::string& input, const std::string& output, Executor& executor,
@@ -45,10 +45,10 @@ Result<BuildReport> build(const std::string& input, const std::string& output, E
                        openPlyMesh(input, vertexBytes, fs::path(output).parent_path().string()));
         return buildMeshStore(source, output, settings, executor, silent);
     }
-    StrandBuildSettings settings;
+    CurveBuildSettings settings;
     settings.limits = limits;
-    STIPPLE_ASSIGN(const StrandSource source, openStrands(input));
-    return buildStrandStore(cleanSource(source, 0), output, settings, executor, silent);
+    STIPPLE_ASSIGN(const CurveSource source, openCurves(input));
+    return buildCurveStore(cleanSource(source, 0), output, settings, executor, silent);
 }
 
 /// Nothing is lost without a word: in the report and in the file.
@@ -80,14 +80,14 @@ TEST(Rounds, WhatIsLeftOutAndWhatIsAddedIsCounted) {
     EXPECT_EQ(mesh->pointsOut, 3u);
     EXPECT_EQ(mesh->dropped.size(), 4u);
     expectBalance(*mesh, *openStore(folder / "a.stipple"));
-    // Strands with vertices twice, not finite, alone; a ribbon that twists, and a segment many times as long as others.
-    StrandSet set;
+    // Curves with vertices twice, not finite, alone; a ribbon that twists, and a segment many times as long as others.
+    CurveSet set;
     const double nan = std::nan("");
     const auto add = [&](std::initializer_list<glm::dvec3> places, bool ribbon) {
         int i = 0;
         for (const glm::dvec3& p : places)
             set.addVertex(p, 0.1f, i++ % 2 == 0 ? glm::vec3(0, 1, 0) : glm::vec3(0, -1, 0.01f), 0);
-        set.endStrand(ribbon);
+        set.endCurve(ribbon);
     };
     add({{0, 0, 0}, {1, 0, 0}, {1, 0, 0}, {2, nan, 0}, {3, 0, 0}}, false);
     add({{5, 0, 0}}, false);
@@ -97,18 +97,18 @@ TEST(Rounds, WhatIsLeftOutAndWhatIsAddedIsCounted) {
     for (int i = 0; i < 200; ++i) add({{0.01 * i, 3, 0}, {0.01 * i + 0.005, 3, 0.001}}, false);
     add({{0, 4, 0}, {2000, 4, 0}}, false);
     Progress silent(false);
-    const auto strands = buildStrandStore(cleanSource(sourceOf(set), 0), folder / "b.stipple", {}, *executor, silent);
-    ASSERT_TRUE(strands) << strands.error().line();
-    EXPECT_EQ(strands->pointsIn, 4u + 0 + 1 + 2 + 2 + 200 + 1);
-    EXPECT_EQ(strands->dropped.at("at vertices that repeat the one before"), 2u);
-    EXPECT_EQ(strands->dropped.at("at vertices that are not finite"), 3u);
-    EXPECT_GT(strands->added.at("where ribbons twist"), 0u);
-    EXPECT_GT(strands->added.at("by dividing long ones"), 0u);
+    const auto curves = buildCurveStore(cleanSource(sourceOf(set), 0), folder / "b.stipple", {}, *executor, silent);
+    ASSERT_TRUE(curves) << curves.error().line();
+    EXPECT_EQ(curves->pointsIn, 4u + 0 + 1 + 2 + 2 + 200 + 1);
+    EXPECT_EQ(curves->dropped.at("at vertices that repeat the one before"), 2u);
+    EXPECT_EQ(curves->dropped.at("at vertices that are not finite"), 3u);
+    EXPECT_GT(curves->added.at("where ribbons twist"), 0u);
+    EXPECT_GT(curves->added.at("by dividing long ones"), 0u);
     const auto areOutliers = [](const std::string& note) { return note.find("OUTLIERS") != std::string::npos; };
-    EXPECT_EQ(strands->notes.size(), 3u) << "strands without length and of one vertex, and the vertex far away";
-    EXPECT_EQ(std::count_if(strands->notes.begin(), strands->notes.end(), areOutliers), 1);
+    EXPECT_EQ(curves->notes.size(), 3u) << "curves without length and of one vertex, and the vertex far away";
+    EXPECT_EQ(std::count_if(curves->notes.begin(), curves->notes.end(), areOutliers), 1);
     const Store store = *openStore(folder / "b.stipple");
-    expectBalance(*strands, store);
+    expectBalance(*curves, store);
     ASSERT_TRUE(verifyStore(store, *executor));
 }
 

@@ -49,17 +49,17 @@ void writeGround(const std::string& path, int edge, unsigned seed, bool withNorm
     spit(path, text);
 }
 
-void writeLawn(const std::string& path, uint32_t strands) {
+void writeLawn(const std::string& path, uint32_t curves) {
     constexpr uint32_t kSegments = 20;
     std::string text = "HAIR";
-    put(text, strands);
-    put(text, strands * (kSegments + 1));
+    put(text, curves);
+    put(text, curves * (kSegments + 1));
     put(text, uint32_t{2});
     put(text, kSegments);
     put(text, std::array<float, 5>{0.004f, 0, 0.3f, 0.5f, 0.2f});
     text.resize(128);
     Rng rng(11);
-    for (uint32_t s = 0; s < strands; ++s) {
+    for (uint32_t s = 0; s < curves; ++s) {
         const double size = s % 2 == 0 ? 50 : 2, x = size * rng.uniform(), z = size * rng.uniform();
         const double turn = rng.uniform(0, 6.28), length = rng.uniform(0.3, 1);
         for (uint32_t k = 0; k <= kSegments; ++k) {

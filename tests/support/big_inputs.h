@@ -8,7 +8,7 @@ namespace stipple::test {
 
 /// A wavy ground as PLY of edge x edge vertices, finer by far in one corner; `seed` not 0: faces in random order.
 void writeGround(const std::string& path, int edge, unsigned seed, bool withNormals = true);
-/// A lawn (.hair) of `strands` blades of 20 segments, half of them around one place.
-void writeLawn(const std::string& path, uint32_t strands);
+/// A lawn (.hair) of `curves` blades of 20 segments, half of them around one place.
+void writeLawn(const std::string& path, uint32_t curves);
 
 }  // namespace stipple::test

@@ -154,7 +154,7 @@ MeshHead CraftedStore::meshHead() const {
 
 std::vector<uint8_t> encodeAgain(const lod::Chunk& chunk) {
     return !chunk.clusters.empty()   ? lod::encodeMeshChunk(chunk)
-           : !chunk.segments.empty() ? lod::encodeStrandChunk(chunk)
+           : !chunk.segments.empty() ? lod::encodeCurveChunk(chunk)
                                      : lod::encodeChunk(chunk);
 }
 

@@ -53,7 +53,7 @@ using Dice = std::function<uint64_t(uint64_t below)>;
 /// records. Says what.
 std::string mutate(CraftedStore& crafted, const lod::Store& store, const Dice& dice);
 
-/// Small stores of every kind in `folder`: points with an attribute, triangles with a texture, strands, stochastic,
+/// Small stores of every kind in `folder`: points with an attribute, triangles with a texture, curves, stochastic,
 /// triangles of which some lie so far away that their groups have origins and pairs (lod/store/mesh_place.h), nodes
 /// with several payloads (mixed_store.h).
 std::vector<std::string> smallStores(const std::string& folder);

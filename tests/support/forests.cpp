@@ -5,28 +5,28 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "apps/grow/plants.h"
-#include "engine/scene/strands.h"
-#include "lod/builder/strands/strand_coverage.h"
+#include "engine/scene/curves.h"
+#include "lod/builder/curves/curve_coverage.h"
 
 namespace stipple::test {
 
-lod::StrandSet oak(uint64_t leaves, uint64_t seed) {
+lod::CurveSet oak(uint64_t leaves, uint64_t seed) {
     grow::PlantOptions plant;
     plant.leaves = leaves;
     plant.seed = seed;
     const scene::Scene scene = grow::growPlant(plant);
-    return lod::cleanStrands(scene::flattenStrands(scene, scene::placements(scene)), 0);
+    return lod::cleanCurves(scene::flattenCurves(scene, scene::placements(scene)), 0);
 }
 
 Forest plantForest(const std::string& folder, uint32_t side, Executor& executor) {
     Forest f;
     f.tree = oak(3000);
-    f.strands = buildStrands(f.tree, folder + "/tree.stipple", executor, 512);
-    f.samples = lod::sampleStrands(f.tree, 8192);
+    f.curves = buildCurves(f.tree, folder + "/tree.stipple", executor, 512);
+    f.samples = lod::sampleCurves(f.tree, 8192);
     lod::StochasticSettings settings;
     settings.description.up = {0, 1, 0};
     lod::describeDiscs({{lod::coverageFactors(f.tree, f.samples, executor), f.samples.radius}}, settings.description);
-    const lod::Hierarchy& h = f.strands->hierarchy;
+    const lod::Hierarchy& h = f.curves->hierarchy;
     lod::StochasticItem item;
     item.samples = &f.samples;
     item.count = static_cast<uint32_t>(f.samples.points.position.size());
@@ -47,7 +47,7 @@ Forest plantForest(const std::string& folder, uint32_t side, Executor& executor)
         item.place.rotation = glm::dmat3(glm::rotate(glm::dmat4(1), rng.uniform(0, 6.28), glm::dvec3(0, 1, 0)));
         item.place.scale = rng.uniform(0.8, 1.25);
         items.push_back(item);
-        render::PlacedStore tree{f.strands, item.place, {}};
+        render::PlacedStore tree{f.curves, item.place, {}};
         tree.proxies = proxies;
         tree.isMember = true;
         f.placed.push_back(tree);

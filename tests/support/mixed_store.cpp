@@ -69,7 +69,7 @@ class MixedWriter {
         d.boundsMax = d.focusMax = glm::dvec3(1, 1, 0.5);
         d.highHeight = 0.5;
         d.source = "by hand";
-        d.isStrands = parts_ == kMixedCurves;
+        d.isCurves = parts_ == kMixedCurves;
         d.records = records_;
         d.points = d.pointsIn = leafRecords_;
         if (const auto done = writer.finish(h_, d); !done) throw std::runtime_error(done.error().line());
@@ -137,7 +137,7 @@ class MixedWriter {
         records_ += p.records;
         if (n > 0) leafRecords_ += p.records;
         const auto bytes = kind == Kind::points   ? lod::encodeChunk(chunk)
-                           : kind == Kind::curves ? lod::encodeStrandChunk(chunk)
+                           : kind == Kind::curves ? lod::encodeCurveChunk(chunk)
                                                   : lod::encodeMeshChunk(chunk);
         if (const auto done = writer.appendChunk(bytes, {}, p); !done) throw std::runtime_error(done.error().line());
         return p;
@@ -165,11 +165,11 @@ class MixedWriter {
         const auto vertex = [&](const glm::dvec3& at, uint32_t high) {
             const auto q = [&](int a) {
                 const double cells = (at[a] - low[a]) / size;
-                return static_cast<uint32_t>(std::floor((cells + double{shared::kStrandMargin}) * 32768));
+                return static_cast<uint32_t>(std::floor((cells + double{shared::kCurveMargin}) * 32768));
             };
-            const uint32_t radius = shared::strandRadiusCode(static_cast<float>(0.012 / size));
-            return shared::StrandVertex{q(0) | q(1) << 16, q(2) | radius << 16 | 1u << 31, lod::octEncode({1, 0, 0}),
-                                        0x30a050u | high << 24};
+            const uint32_t radius = shared::curveRadiusCode(static_cast<float>(0.012 / size));
+            return shared::CurveVertex{q(0) | q(1) << 16, q(2) | radius << 16 | 1u << 31, lod::octEncode({1, 0, 0}),
+                                       0x30a050u | high << 24};
         };
         for (int k = 0; k < 3; ++k) {
             const glm::dvec3 from = low + glm::dvec3(0.06, 0.12 + 0.12 * k, 0.4);

@@ -2,9 +2,9 @@
 
 #include "lod/builder/stochastic/stochastic_build.h"
 #include "tests/support/crafted_store.h"
+#include "tests/support/curves.h"
 #include "tests/support/meshes.h"
 #include "tests/support/mixed_store.h"
-#include "tests/support/strands.h"
 
 namespace stipple::test {
 namespace {
@@ -39,7 +39,7 @@ std::vector<std::string> smallStores(const std::string& folder) {
     const auto executor = makeSerialExecutor();
     Progress silent(false);
     const std::string points = folder + "/points.stipple", mesh = folder + "/mesh.stipple",
-                      strands = folder + "/strands.stipple", afar = folder + "/afar.stipple",
+                      curves = folder + "/curves.stipple", afar = folder + "/afar.stipple",
                       wide = folder + "/wide.stipple";
     writePly(folder + "/points.ply", bumpySphere(1500, 1));
     lod::BuildSettings settings;
@@ -51,9 +51,9 @@ std::vector<std::string> smallStores(const std::string& folder) {
     recipe.grow.textureSize = 64;
     growMeshStore(recipe, mesh, *executor);
     buildWideMesh(recipe, wide, *executor);
-    const lod::StrandSet set = curls({.count = 60, .vertices = 30});
-    buildStrands(set, strands, *executor, 64);
-    const lod::StrandSamples samples = lod::sampleStrands(set, 2000);
+    const lod::CurveSet set = curls({.count = 60, .vertices = 30});
+    buildCurves(set, curves, *executor, 64);
+    const lod::CurveSamples samples = lod::sampleCurves(set, 2000);
     lod::StochasticSettings far;
     far.nodeRecords = 64;
     std::vector<lod::StochasticItem> items;
@@ -65,7 +65,7 @@ std::vector<std::string> smallStores(const std::string& folder) {
     if (const auto built = lod::buildStochasticStore(items, afar, far, *executor, silent); !built)
         throw std::runtime_error(built.error().line());
     writeMixedStore(folder + "/mixed.stipple");
-    return {points, mesh, strands, afar, wide, folder + "/mixed.stipple"};
+    return {points, mesh, curves, afar, wide, folder + "/mixed.stipple"};
 }
 
 }  // namespace stipple::test

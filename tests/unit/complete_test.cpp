@@ -137,7 +137,7 @@ TEST_F(Complete, OneThreadIsEnoughForEveryCommand) {
     }
     for (const std::string arguments :
          {"grow tree -o t.glb --leaves 500 --as triangles", "build t.glb -o t.stipple", "info t.stipple --verify",
-          "render t.stipple -o p.png --size 64x64", "convert t.glb --strands -o s.stipple"}) {
+          "render t.stipple -o p.png --size 64x64", "convert t.glb --curves -o s.stipple"}) {
         const std::string line = "cd " + folder_.path() + " && XDG_CACHE_HOME=" + folder_.path() +
                                  "/cache timeout -s KILL 100 taskset -c 0 " + STIPPLE_PROGRAM + " " + arguments +
                                  " >/dev/null 2>err";

@@ -266,7 +266,7 @@ TEST_F(CraftedPayloads, WhatIsFalseOfOnePayloadIsFound) {
     const auto store = lod::openStore(folder_ / "mixed.stipple");
     const uint32_t tubes = store->hierarchy.chunkOfFurther(static_cast<uint32_t>(store->hierarchy.further.size()) - 1);
     auto chunk = lod::readChunk(*store, tubes);
-    for (shared::StrandSegment& s : chunk->segments) s.a.positionZ |= 0x4000u << 16;  // radii of 2^65
+    for (shared::CurveSegment& s : chunk->segments) s.a.positionZ |= 0x4000u << 16;  // radii of 2^65
     c = take();
     c.replaceChunk(lastTubes, test::encodeAgain(*chunk));
     expectFound(c, "reaches out of the bounding sphere");

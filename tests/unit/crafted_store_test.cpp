@@ -21,7 +21,7 @@ using test::CraftedStore;
 
 class Crafted : public testing::Test {
   protected:
-    enum Kind { points, mesh, strands, afar, wide, mixed };
+    enum Kind { points, mesh, curves, afar, wide, mixed };
     static void SetUpTestSuite() {
         folder_ = new test::TempFolder;
         paths_ = test::smallStores(folder_->path());
@@ -83,7 +83,7 @@ test::TempFolder* Crafted::folder_ = nullptr;
 std::vector<std::string> Crafted::paths_;
 
 TEST_F(Crafted, WhatIsOnlyWrittenAgainIsFine) {
-    for (const Kind kind : {points, mesh, strands, afar, wide, mixed}) {
+    for (const Kind kind : {points, mesh, curves, afar, wide, mixed}) {
         CraftedStore c = take(kind);
         const lod::Store store = open(kind);
         c.replaceChunk(0, test::encodeAgain(*lod::readChunk(store, 0, true)));
@@ -96,7 +96,7 @@ TEST_F(Crafted, WhatIsOnlyWrittenAgainIsFine) {
 }
 
 TEST_F(Crafted, NodesThatShareChildrenAreRefused) {
-    for (const Kind kind : {points, strands, afar}) {
+    for (const Kind kind : {points, curves, afar}) {
         CraftedStore c = take(kind);
         const size_t inner = innerNode(c);
         const auto children = static_cast<uint32_t>(__builtin_popcount(c.nodes[inner].childMask));
@@ -114,7 +114,7 @@ TEST_F(Crafted, NodesThatShareChildrenAreRefused) {
 }
 
 TEST_F(Crafted, RecordsThatTheBytesCannotHoldAreRefusedBeforeMemoryIsTaken) {
-    for (const Kind kind : {points, strands, afar, mesh, wide}) {
+    for (const Kind kind : {points, curves, afar, mesh, wide}) {
         CraftedStore c = take(kind);
         const uint32_t most = ~0u;
         size_t used = 0;
@@ -265,9 +265,9 @@ TEST_F(Crafted, TextureCoordinatesThatAreHugeDoNoHarm) {
 }
 
 TEST_F(Crafted, RadiiOfSegmentsAreNumbers) {
-    expectFound(withChunk(strands, 0,
+    expectFound(withChunk(curves, 0,
                           [](lod::Chunk& chunk) {
-                              for (shared::StrandSegment& s : chunk.segments) s.a.positionZ |= 0x7fffu << 16;
+                              for (shared::CurveSegment& s : chunk.segments) s.a.positionZ |= 0x7fffu << 16;
                           }),
                 "a radius that is no number");
 }
@@ -298,7 +298,7 @@ TEST_F(Crafted, RunsOfGroupsAreTheirOwn) {
 /// Any fields of any store, seeded. What is opened is drawn by both backends, and verified, at once and without harm.
 TEST_F(Crafted, AnyChangedFieldIsRefusedOrDrawnInTime) {
     int opened = 0;
-    for (const Kind kind : {points, mesh, strands, afar, wide, mixed}) {
+    for (const Kind kind : {points, mesh, curves, afar, wide, mixed}) {
         const CraftedStore whole = take(kind);
         const lod::Store store = open(kind);
         for (uint64_t seed = 0; seed < 150; ++seed) {

@@ -7,8 +7,8 @@
 #include "engine/cpu/cpu_backend.h"
 #include "engine/render/effects/table.h"
 #include "engine/render/frame_passes.h"
+#include "tests/support/curves.h"
 #include "tests/support/meshes.h"
-#include "tests/support/strands.h"
 
 namespace stipple::render {
 namespace {
@@ -27,7 +27,7 @@ class Effects : public testing::Test {
         return test::buildAndOpen(folder_ / "a.ply", folder_ / "a.stipple", *executor_);
     }
     std::shared_ptr<const lod::Store> plants() {
-        return test::buildStrands(test::curls({}), folder_ / "b.stipple", *executor_);
+        return test::buildCurves(test::curls({}), folder_ / "b.stipple", *executor_);
     }
     std::shared_ptr<const lod::Store> building() {
         test::MeshRecipe recipe;

@@ -65,7 +65,7 @@ TEST_F(Exhaustion, BuildsOfPointsEndByThemselves) {
     sweep("build a.las -o a.stipple --quiet --threads 4");
 }
 
-TEST_F(Exhaustion, BuildsOfStrandsEndByThemselves) {
+TEST_F(Exhaustion, BuildsOfCurvesEndByThemselves) {
     std::string text;
     Rng rng(1);
     for (int i = 1; i <= 12'000; ++i)

@@ -7,8 +7,8 @@
 
 #include "engine/base/text.h"
 #include "engine/image/image_io.h"
+#include "lod/import/curves/curve_readers.h"
 #include "lod/import/import.h"
-#include "lod/import/strands/strand_readers.h"
 #include "tests/support/runs.h"
 #include "tests/support/support.h"
 
@@ -172,7 +172,7 @@ TEST(ForeignTables, CylinderModelsWithALineOfNamesAreRead) {
         "\"1\",0,2,0,0,0,0,0,1,2,0.5\n\"2\",1,0,0,0,2,0,0,1,3,0.25\n",
         "a.csv");
     ASSERT_TRUE(named) << named.error().line();
-    EXPECT_EQ(named->strands(), 1u);
+    EXPECT_EQ(named->curves(), 1u);
     ASSERT_EQ(named->position.size(), 3u);
     EXPECT_EQ(named->position[2], glm::dvec3(0, 0, 5));
     EXPECT_EQ(named->radius[0], 0.5f);
@@ -191,7 +191,7 @@ TEST(ForeignTables, CylinderModelsWithALineOfNamesAreRead) {
         "7,-1,0,0,0,0,0,2,1,2,0.5\n8,7,0,0,2,0,0,5,1,3,0.25\n9,7,0,0,2,1,0,2,1,1,0.1\n",
         "a.csv");
     ASSERT_TRUE(ends) << ends.error().line();
-    EXPECT_EQ(ends->strands(), 2u);
+    EXPECT_EQ(ends->curves(), 2u);
     EXPECT_EQ(ends->position.at(2), glm::dvec3(0, 0, 5));
 }
 
@@ -207,9 +207,9 @@ TEST(ForeignTables, PointsAsTextSayWhatIsRead) {
     }
     for (const char* name : {"a.txt", "a.csv"}) {
         spit(folder / name, text);
-        const auto strands = lod::openStrands(folder / name);
-        ASSERT_FALSE(strands);
-        EXPECT_NE(strands.error().line().find(".laz and .ply"), std::string::npos) << strands.error().line();
+        const auto curves = lod::openCurves(folder / name);
+        ASSERT_FALSE(curves);
+        EXPECT_NE(curves.error().line().find(".laz and .ply"), std::string::npos) << curves.error().line();
     }
 }
 

@@ -4,8 +4,8 @@
 
 #include "engine/base/rng.h"
 #include "engine/cpu/cpu_backend.h"
+#include "tests/support/curves.h"
 #include "tests/support/meshes.h"
-#include "tests/support/strands.h"
 #include "tests/support/support.h"
 
 namespace stipple {
@@ -22,7 +22,7 @@ TEST(Frames, ShowNothingOfThoseBefore) {
     std::vector<std::shared_ptr<const lod::Store>> stores{
         test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor),
         test::growMeshStore(textured, folder / "b.stipple", *executor),
-        test::buildStrands(test::curls({}), folder / "c.stipple", *executor)};
+        test::buildCurves(test::curls({}), folder / "c.stipple", *executor)};
     // Side by side along x, each a unit wide and 2 apart.
     std::vector<render::PlacedStore> placed;
     for (size_t k = 0; k < stores.size(); ++k) {

@@ -109,7 +109,7 @@ TEST(Interrupt, GrowingStops) {
 TEST(Interrupt, ConvertingStops) {
     const TempFolder folder;
     ASSERT_EQ(runProgram(folder, "grow tree -o t.glb --leaves 200k --as triangles").code, 0);
-    RunningProgram convert(folder, {"convert", "t.glb", "--strands", "-o", "s.stipple"});
+    RunningProgram convert(folder, {"convert", "t.glb", "--curves", "-o", "s.stipple"});
     ASSERT_TRUE(convert.await([&] { return isAtWork(convert); }));
     convert.signal(SIGINT);
     expectInterrupted(convert.end(), "nothing ");

@@ -29,7 +29,7 @@ FrameConstants withRanges(FrameConstants f) {
     f.firstBlock.of[kKindTriangles] = 5;
     f.firstBlock.of[kKindDiscs] = 9;
     f.sunDirection = glm::normalize(glm::vec3(-0.45f, -0.55f, -0.7f));
-    f.exactStrands = 2;
+    f.exactCurves = 2;
     return f;
 }
 
@@ -50,27 +50,27 @@ struct Resolved {
     }
 };
 
-StrandSegment randomSegment(Rng& rng) {
-    StrandSegment s;
-    for (StrandVertex* v : {&s.a, &s.b}) {
+CurveSegment randomSegment(Rng& rng) {
+    CurveSegment s;
+    for (CurveVertex* v : {&s.a, &s.b}) {
         v->positionXY = wordOf(rng);
-        v->positionZ = (wordOf(rng) & 0xffffu) | strandRadiusCode(uniform(rng, 0, 1) * uniform(rng, 0, 0.05)) << 16;
+        v->positionZ = (wordOf(rng) & 0xffffu) | curveRadiusCode(uniform(rng, 0, 1) * uniform(rng, 0, 0.05)) << 16;
         v->direction = directionOf(rng);
         v->colour = wordOf(rng) & 0xffffffu;
     }
     s.a.positionZ |= static_cast<uint32_t>(rng.below(2)) << 31;
     return s;
 }
-CameraSegment placed(const DrawNode& node, const StrandSegment& s) {
-    const auto place = [&](const StrandVertex& v) {
+CameraSegment placed(const DrawNode& node, const CurveSegment& s) {
+    const auto place = [&](const CurveVertex& v) {
         const auto x = static_cast<float>(v.positionXY & 0xffffu), y = static_cast<float>(v.positionXY >> 16),
                    z = static_cast<float>(v.positionZ & 0xffffu);
         return plus(plus(plus(node.base, scaled(node.axisX, x)), scaled(node.axisY, y)), scaled(node.axisZ, z));
     };
     return {place(s.a),
             place(s.b),
-            strandRadius(s.a, node.edge),
-            strandRadius(s.b, node.edge),
+            curveRadius(s.a, node.edge),
+            curveRadius(s.b, node.edge),
             nodeDirection(node, octDecode(s.a.direction)),
             nodeDirection(node, octDecode(s.b.direction)),
             isTube(s) ? 1.0f : 0.0f};
@@ -85,16 +85,16 @@ bool isSeenAt(const FrameConstants& f, const CameraSegment& s, uint32_t x, uint3
            std::abs(on.xa + t * (on.xb - on.xa) - static_cast<float>(x) - 0.5f) <= wide;
 }
 /// What a pixel of the row from x0 on shows of a segment. `isFilledHere`: is it filled, `isMet`: does its ray meet it?
-Texel texelOf(const FrameConstants& f, const DrawNode& node, const StrandSegment& packed, uint32_t x0, uint32_t i,
+Texel texelOf(const FrameConstants& f, const DrawNode& node, const CurveSegment& packed, uint32_t x0, uint32_t i,
               uint32_t y, bool& isFilledHere, bool& isMet) {
     const Lens lens = frameLens(f);
     const CameraSegment s = placed(node, packed);
     const float first = f.centre.x - float(x0) - 0.5f, cx = first - float(i), cy = f.centre.y - float(y) - 0.5f;
     const ScreenSegment on = projectSegment(s.a, s.b, lens, cx, cy, f.nearPlane);
-    const StrandPixel seen = strandPixel(s, on, f.supportScale, lens, cx, cy, f.nearPlane, f.sunDirection);
+    const CurvePixel seen = curvePixel(s, on, f.supportScale, lens, cx, cy, f.nearPlane, f.sunDirection);
     Texel t = seen.texel;
     float place = seen.place;
-    isFilledHere = isFilled(s, on, lens, f.exactStrands) > 0.5f;
+    isFilledHere = isFilled(s, on, lens, f.exactCurves) > 0.5f;
     isMet = false;
     if (isFilledHere) {
         const PixelRay ray = pixelRay(lens, -first / f.focal + float(i) * (1.0f / f.focal), -cy / f.focal);
@@ -122,15 +122,15 @@ TEST(KernelFormulas, TexelsOfCurvesAreThoseOfTheFormulas) {
     forKernels([](const cpu::Kernels& k, const FrameConstants& plain) {
         const FrameConstants f = withRanges(plain);
         Rng rng(7);
-        std::vector<StrandSegment> segments(kSegmentsPerBlock);
+        std::vector<CurveSegment> segments(kSegmentsPerBlock);
         double worst = 0;
         std::array<size_t, 4> seen{};  // lines, filled and met, each of ribbons and tubes
         for (int round = 0; round < 300; ++round) {
             const DrawNode node = randomNode(rng);
-            for (StrandSegment& s : segments) s = randomSegment(rng);
+            for (CurveSegment& s : segments) s = randomSegment(rng);
             // A segment is resolved where it is seen; elsewhere formulas are extended beyond what they were made for.
             Resolved r;
-            std::vector<StrandSegment> shown;
+            std::vector<CurveSegment> shown;
             const uint32_t y = static_cast<uint32_t>(rng.below(f.height)),
                            x0 = 128 * static_cast<uint32_t>(rng.below(4));
             for (uint32_t i = 0; i < cpu::kTile; ++i) {
@@ -146,9 +146,9 @@ TEST(KernelFormulas, TexelsOfCurvesAreThoseOfTheFormulas) {
             }
             const std::vector<uint64_t> keys = r.keys;
             if (std::all_of(keys.begin(), keys.end(), [](uint64_t key) { return key == kNoKey; })) continue;
-            const cpu::StrandBlock block{segments.data(), &node};
+            const cpu::CurveBlock block{segments.data(), &node};
             cpu::ResolveInput in{};
-            in.strandBlocks = &block;
+            in.curveBlocks = &block;
             r.resolve(k, f, in, x0, y);
             for (uint32_t i = 0; i < cpu::kTile; ++i) {
                 if (keys[i] == kNoKey) continue;

@@ -5,8 +5,8 @@
 
 #include "engine/cpu/cpu_backend.h"
 #include "engine/cpu/kernels.h"
+#include "tests/support/curves.h"
 #include "tests/support/meshes.h"
-#include "tests/support/strands.h"
 #include "tests/support/support.h"
 
 namespace stipple {
@@ -34,7 +34,7 @@ TEST_P(InstructionSets, DrawTheBytesThatSseDraws) {
         test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor),
         test::growMeshStore(textured, folder / "b.stipple", *executor),
         test::growMeshStore(plain, folder / "c.stipple", *executor),
-        test::buildStrands(test::curls({}), folder / "d.stipple", *executor)};
+        test::buildCurves(test::curls({}), folder / "d.stipple", *executor)};
     size_t compared = 0, drawn = 0;
     for (const auto& store : stores)
         for (const render::Mode mode : {render::Mode::pullpush, render::Mode::splat, render::Mode::ewa,

@@ -68,13 +68,13 @@ void writeSky(const std::string& path) {
 
 /// A few hundred bent hairs, as Cem Yuksel's format has them.
 void writeHair(const std::string& path) {
-    constexpr uint32_t kStrands = 300, kSegments = 8, kPointsBit = 2;
+    constexpr uint32_t kCurves = 300, kSegments = 8, kPointsBit = 2;
     std::string bytes = "HAIR";
-    for (const uint32_t v : {kStrands, kStrands * (kSegments + 1), kPointsBit, kSegments}) put(bytes, v);
+    for (const uint32_t v : {kCurves, kCurves * (kSegments + 1), kPointsBit, kSegments}) put(bytes, v);
     for (const float v : {0.01f, 0.0f, 0.4f, 0.3f, 0.2f}) put(bytes, v);
     bytes.resize(128);
-    for (uint32_t s = 0; s < kStrands; ++s) {
-        const float angle = 2.399963f * static_cast<float>(s), out = std::sqrt(static_cast<float>(s) / kStrands);
+    for (uint32_t s = 0; s < kCurves; ++s) {
+        const float angle = 2.399963f * static_cast<float>(s), out = std::sqrt(static_cast<float>(s) / kCurves);
         for (uint32_t i = 0; i <= kSegments; ++i) {
             const float u = static_cast<float>(i) / kSegments, r = out * (1 + 0.4f * u * u);
             for (const float v : {r * std::cos(angle), r * std::sin(angle), u}) put(bytes, v);

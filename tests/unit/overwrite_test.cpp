@@ -84,7 +84,7 @@ TEST(Overwrite, NoTextureByAnOrbitOfOnePicture) {
     writePlant(folder / "plant.glb");
     spit(folder / "b.rest.glb", "");
     fs::create_symlink("b.rest.glb", folder / "b.stipple");
-    expectOneLine(runProgram(folder, "convert plant.glb --strands -o b.stipple --force"), 4, {"another output"});
+    expectOneLine(runProgram(folder, "convert plant.glb --curves -o b.stipple --force"), 4, {"another output"});
 }
 
 TEST(Overwrite, NoPictureThatIsCompared) {
@@ -130,14 +130,14 @@ TEST(Overwrite, ConvertedPlantsKeepTheirInput) {
     const test::TempFolder folder;
     writePlant(folder / "plant.glb");
     const std::string plant = slurp(folder / "plant.glb");
-    ASSERT_EQ(runProgram(folder, "convert plant.glb --strands -o plant.stipple --json").code, 0);
+    ASSERT_EQ(runProgram(folder, "convert plant.glb --curves -o plant.stipple --json").code, 0);
     EXPECT_TRUE(slurp(folder / "plant.glb") == plant) << "the README's example";
     EXPECT_TRUE(fs::exists(folder / "plant.scene.glb"));
     EXPECT_TRUE(fs::exists(folder / "plant.rest.glb"));
     EXPECT_EQ(runProgram(folder, "render plant.scene.glb -o a.png --size 32x32 --quiet").code, 0);
-    expectOneLine(runProgram(folder, "convert plant.glb --strands -o plant.glb --force"), 4, {kIsInput});
+    expectOneLine(runProgram(folder, "convert plant.glb --curves -o plant.glb --force"), 4, {kIsInput});
     fs::copy_file(folder / "plant.glb", folder / "tree.rest.glb");
-    expectOneLine(runProgram(folder, "convert tree.rest.glb --strands -o tree.stipple --force"), 4,
+    expectOneLine(runProgram(folder, "convert tree.rest.glb --curves -o tree.stipple --force"), 4,
                   {"tree.rest.glb", kIsInput});
     EXPECT_FALSE(fs::exists(folder / "tree.stipple")) << "before any work";
     EXPECT_TRUE(slurp(folder / "plant.glb") == plant);

@@ -56,14 +56,14 @@ TEST(Passes, AreThereOnlyWhereTheFrameCallsForThem) {
             EXPECT_EQ(std::set<Pass>(passes.begin(), passes.end()).size(), passes.size());
             const bool hasPoints = c.has(lod::Kind::points), hasCurves = c.has(lod::Kind::curves);
             EXPECT_EQ(has(passes, Pass::rasterise), c.has(lod::Kind::triangles));
-            EXPECT_EQ(has(passes, Pass::strands), hasCurves);
+            EXPECT_EQ(has(passes, Pass::curves), hasCurves);
             EXPECT_EQ(has(passes, r.points), hasPoints);
             EXPECT_EQ(has(passes, Pass::push), r.hasPyramid && (hasPoints || hasCurves));
             EXPECT_EQ(has(passes, Pass::discs), r.hasPyramid && hasPoints && c.hasWideDiscs);
             EXPECT_EQ(passes.back(), Pass::output);
             // Tiles of discs are nobody else's while they are drawn: all other visibility is there before.
             const auto at = [&](Pass pass) { return std::find(passes.begin(), passes.end(), pass) - passes.begin(); };
-            for (const Pass before : {Pass::strands, Pass::rasterise})
+            for (const Pass before : {Pass::curves, Pass::rasterise})
                 for (const Pass tiles : {Pass::splat, Pass::ewa, Pass::exact})
                     if (has(passes, tiles) && has(passes, before)) EXPECT_LT(at(before), at(tiles));
         }

@@ -65,7 +65,7 @@ TEST_F(Payloads, AStoreOfSeveralIsTrueAndSaysWhatItHas) {
     const auto kinds = test::mixedKinds();
     ASSERT_EQ(h.nodes.size(), kinds.size());
     EXPECT_TRUE(h.isMixed);
-    EXPECT_FALSE(h.isGraph || h.isStrands);
+    EXPECT_FALSE(h.isGraph || h.isCurves);
     for (uint32_t n = 0; n < h.nodes.size(); ++n) {
         std::vector<Kind> found;
         h.forEachPayload(n, [&](uint32_t chunk) {

@@ -112,7 +112,7 @@ TEST(Program, ATruncatedSceneIsRefused) {
     EXPECT_FALSE(std::filesystem::exists(folder / "b.png"));
 }
 
-TEST(Program, StrandsAreDrawnAndWhatTheyCannotDoIsSaid) {
+TEST(Program, CurvesAreDrawnAndWhatTheyCannotDoIsSaid) {
     const test::TempFolder folder;
     ASSERT_EQ(runProgram(folder, "grow tree -o a.glb --leaves 500 --species birch").code, 0);
     ASSERT_EQ(runProgram(folder, "build a.glb -o a.stipple --quiet").code, 0);
@@ -147,7 +147,7 @@ TEST(Program, GrowsForestsMeadowsAndConvertsPlants) {
     EXPECT_EQ(runProgram(folder, "grow meadow -o m.glb --size 6").code, 0);
     EXPECT_EQ(runProgram(folder, "render m.glb -o m.png --size 160x120 --device cpu").code, 0);
     ASSERT_EQ(runProgram(folder, "grow tree -o t.glb --leaves 500 --as triangles").code, 0);
-    const Outcome converted = runProgram(folder, "convert t.glb --strands -o t.stipple --json");
+    const Outcome converted = runProgram(folder, "convert t.glb --curves -o t.stipple --json");
     ASSERT_EQ(converted.code, 0) << converted.err;
     const auto c = nlohmann::json::parse(converted.out);
     EXPECT_NEAR(c["ribbons"].get<double>(), 500, 10);
@@ -156,8 +156,8 @@ TEST(Program, GrowsForestsMeadowsAndConvertsPlants) {
     EXPECT_EQ(runProgram(folder, "info t.stipple --verify").code, 0);
     EXPECT_EQ(runProgram(folder, "render t.scene.glb -o t.png --size 160x120 --device cpu").code, 0);
     expectOneLine(runProgram(folder, "convert t.glb -o x.stipple"), 2, {"--curves"});
-    expectOneLine(runProgram(folder, "convert missing.glb --strands -o x.stipple"), 3, {"missing.glb"});
-    expectOneLine(runProgram(folder, "convert t.glb --strands -o x.txt"), 2, {"x.txt"});
+    expectOneLine(runProgram(folder, "convert missing.glb --curves -o x.stipple"), 3, {"missing.glb"});
+    expectOneLine(runProgram(folder, "convert t.glb --curves -o x.txt"), 2, {"x.txt"});
     expectOneLine(runProgram(folder, "grow forest -o f.glb --trees none"), 2, {"--trees"});
     expectOneLine(runProgram(folder, "grow forest -o no/such/f.glb --trees 1 --leaves 100 --variants 1"), 4,
                   {"no/such"});

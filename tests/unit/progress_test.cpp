@@ -48,12 +48,12 @@ TEST(BuildsOfScene, ShareOneBar) {
     app::BuildsOfScene builds(ProgressStyle::silent, {"a.glb: a note"});
     builds.expect("mesh 0", 10);
     builds.expect("mesh 0, proxy", 10);
-    builds.expect("strands", 20);
+    builds.expect("curves", 20);
     Progress* const first = &builds.begin("mesh 0");
     builds.settle("mesh 0");
     builds.settle("mesh 0, proxy");  // found
-    EXPECT_EQ(&builds.begin("strands"), first);
-    builds.settle("strands");
+    EXPECT_EQ(&builds.begin("curves"), first);
+    builds.settle("curves");
     EXPECT_EQ(&builds.begin("what nobody expected"), first);
     EXPECT_TRUE(builds.says("a.glb: a note"));
     EXPECT_FALSE(builds.says("another"));

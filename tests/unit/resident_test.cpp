@@ -7,8 +7,8 @@
 #include "engine/cpu/cpu_backend.h"
 #include "lod/cut/resident.h"
 #include "lod/primitives/kinds.h"
+#include "tests/support/curves.h"
 #include "tests/support/meshes.h"
-#include "tests/support/strands.h"
 #include "tests/support/support.h"
 
 namespace stipple {
@@ -48,7 +48,7 @@ class Resident : public testing::Test {
         recipe.grow.triangles = 60'000;
         recipe.grow.textureSize = 512;
         stores_.push_back(test::growMeshStore(recipe, folder_ / "b.stipple", *executor_));
-        stores_.push_back(test::buildStrands(test::curls({}), folder_ / "c.stipple", *executor_));
+        stores_.push_back(test::buildCurves(test::curls({}), folder_ / "c.stipple", *executor_));
     }
     uint64_t bytesOf(const lod::Store& store) const {
         uint64_t sum = 0;

@@ -239,7 +239,7 @@ TEST(Plain, PicturesThatAreNoneAreOneLineWithoutLibraries) {
     expectOneLine(runProgram(folder, "info bad.obj"), 3, {"bad.obj", "line 4"});
 }
 
-TEST(Strays, OfStrandsAreSaidLoudly) {
+TEST(Strays, OfCurvesAreSaidLoudly) {
     const TempFolder folder;
     std::string swc;
     auto neurite = [&, next = 1](double x) mutable {

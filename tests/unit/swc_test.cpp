@@ -4,7 +4,7 @@
 
 #include <chrono>
 
-#include "lod/import/strands/strand_readers.h"
+#include "lod/import/curves/curve_readers.h"
 #include "tests/support/runs.h"
 
 namespace stipple::lod {
@@ -18,7 +18,7 @@ TEST(Swc, AStarIsReadInOneGo) {
     const auto star = readSwc(text, "star.swc");
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     ASSERT_TRUE(star);
-    EXPECT_EQ(star->strands(), kArms + 1u) << "and the ball in the middle";
+    EXPECT_EQ(star->curves(), kArms + 1u) << "and the ball in the middle";
     EXPECT_EQ(star->position.size(), 2 * (kArms + 1u));
     EXPECT_FLOAT_EQ(star->radius[2], 0.1f) << "arms do not begin with the radius of the middle";
     EXPECT_LT(seconds.count(), 5 * test::kSlower) << "each arm looks at all others";

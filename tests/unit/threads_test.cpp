@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "engine/cpu/cpu_backend.h"
+#include "tests/support/curves.h"
 #include "tests/support/meshes.h"
-#include "tests/support/strands.h"
 
 namespace stipple {
 namespace {
@@ -21,8 +21,8 @@ std::vector<std::string> storesBuiltBy(Executor& executor, const test::TempFolde
     recipe.grow.triangles = 6000;
     recipe.grow.textureSize = 64;
     test::growMeshStore(recipe, folder / "mesh.stipple", executor);
-    test::buildStrands(test::curls({.count = 80, .vertices = 30}), folder / "strands.stipple", executor, 64);
-    return {folder / "points.stipple", folder / "mesh.stipple", folder / "strands.stipple"};
+    test::buildCurves(test::curls({.count = 80, .vertices = 30}), folder / "curves.stipple", executor, 64);
+    return {folder / "points.stipple", folder / "mesh.stipple", folder / "curves.stipple"};
 }
 
 TEST(Threads, SeveralBuildWhatOneBuilds) {

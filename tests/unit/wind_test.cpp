@@ -10,17 +10,17 @@ namespace {
 
 /// One lock of hair, upright, in the format of cyHair: a head of 128 bytes, then three floats a point.
 std::string hair() {
-    constexpr uint32_t kStrands = 4, kPoints = 9;
+    constexpr uint32_t kCurves = 4, kPoints = 9;
     std::string file(128, '\0');
     const auto put = [&](size_t at, auto value) { std::memcpy(file.data() + at, &value, sizeof(value)); };
     std::memcpy(file.data(), "HAIR", 4);
-    put(4, kStrands);
-    put(8, kStrands * kPoints);
+    put(4, kCurves);
+    put(8, kCurves * kPoints);
     put(12, 2u);  // points are all that there is
     put(16, kPoints - 1);
     put(20, 0.1f);
     for (const size_t channel : {28u, 32u, 36u}) put(channel, 0.5f);
-    for (uint32_t s = 0; s < kStrands; ++s)
+    for (uint32_t s = 0; s < kCurves; ++s)
         for (uint32_t k = 0; k < kPoints; ++k)
             for (const float value : {float(s), float(k), 0.2f * float(s)}) {
                 file.resize(file.size() + 4);

@@ -8,13 +8,13 @@ namespace {
 void drawCurves(Frame& frame) {
     CompletionQueue<std::vector<FilledCurve>> found;
     frame.wide.clear();
-    frame.executor.parallelFor(frame.strandBlocks.size(), 4, [&](size_t begin, size_t end) {
+    frame.executor.parallelFor(frame.curveBlocks.size(), 4, [&](size_t begin, size_t end) {
         std::vector<FilledCurve> mine;
         const WideSink sink{
             &mine, [](void* to, const FilledCurve& s) { static_cast<std::vector<FilledCurve>*>(to)->push_back(s); }};
         for (size_t b = begin; b < end; ++b) {
-            const uint32_t left = frame.strandBlocks[b].node->count - frame.draws->curves().blocks[b].first;
-            frame.k.drawSegments(frame.constants, frame.strandBlocks[b], std::min(left, shared::kSegmentsPerBlock),
+            const uint32_t left = frame.curveBlocks[b].node->count - frame.draws->curves().blocks[b].first;
+            frame.k.drawSegments(frame.constants, frame.curveBlocks[b], std::min(left, shared::kSegmentsPerBlock),
                                  static_cast<uint32_t>(b * shared::kSegmentsPerBlock), sink, frame.visible());
         }
         if (!mine.empty()) found.push(std::move(mine));
@@ -28,16 +28,16 @@ void drawCurves(Frame& frame) {
 
 void findBlocks(Frame& frame) {
     const render::DrawBatch& curves = frame.draws->curves();
-    frame.strandBlocks.clear();
+    frame.curveBlocks.clear();
     for (const shared::DrawBlock& block : curves.blocks)
-        frame.strandBlocks.push_back(
+        frame.curveBlocks.push_back(
             {frame.chunks.at(curves.keys[block.node]).segments.data() + block.first, &curves.nodes[block.node]});
-    frame.hasStrands = !frame.strandBlocks.empty();
+    frame.hasCurves = !frame.curveBlocks.empty();
 }
 
 }  // namespace
 
 constinit const CpuKind curvesOnCpu{.prepare = findBlocks};
-constinit const CpuPass strandsPass{.run = drawCurves};
+constinit const CpuPass curvesPass{.run = drawCurves};
 
 }  // namespace stipple::cpu

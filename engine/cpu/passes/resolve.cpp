@@ -28,7 +28,7 @@ void preparePlanes(Frame& frame, size_t pixels) {
 void resolve(Frame& frame) {
     Level& fine = frame.pyramid.level(0);
     Level* coarse = frame.hasPyramid && frame.pyramid.levels() > 1 ? &frame.pyramid.level(1) : nullptr;
-    frame.pyramid.beginFrame(frame.constants, frame.hasStrands);
+    frame.pyramid.beginFrame(frame.constants, frame.hasCurves);
     const Planes finePlanes = fine.planes();
     preparePlanes(frame, size_t{fine.width} * fine.height);
     std::array<ResolveKind, shared::kKindNothing> ofKind{};
@@ -36,7 +36,7 @@ void resolve(Frame& frame) {
     const ResolveInput input{.blocks = frame.blocks.data(),
                              .meshBlocks = frame.meshBlocks.data(),
                              .materials = frame.draws->materials.data(),
-                             .strandBlocks = frame.strandBlocks.data(),
+                             .curveBlocks = frame.curveBlocks.data(),
                              .discs = frame.discs.data(),
                              .discBoxes = frame.discBoxes.data(),
                              .discCount = frame.discs.size(),
@@ -47,7 +47,7 @@ void resolve(Frame& frame) {
     std::atomic<float> largestRadius{0};
     frame.pyramid.forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
         TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
-        upper.hasTubes = lower.hasTubes = out.hasTubes = frame.hasStrands;
+        upper.hasTubes = lower.hasTubes = out.hasTubes = frame.hasCurves;
         float largest = 0;
         for (uint32_t y = row0; y < row1; y += 2) {
             bool any = false;
@@ -58,11 +58,11 @@ void resolve(Frame& frame) {
                 if (yy >= row1 || !frame.isSeen(at, n)) {
                     row->hasTubes = false;
                     std::fill_n(row->depth + kPad, n, 0.0f);
-                    if (frame.hasStrands) Pyramid::clearTubes(*row);
+                    if (frame.hasCurves) Pyramid::clearTubes(*row);
                     if (yy < row1) fine.empty(yy, x0, n);
                     continue;
                 }
-                row->hasTubes = frame.hasStrands;  // may have; the kernel says whether it does
+                row->hasTubes = frame.hasCurves;  // may have; the kernel says whether it does
                 const bool has = frame.k.resolveRow(frame.constants, frame.tables, input, frame.visibility.data() + at,
                                                     x0, yy, n, *row, largest, frame.planesAt(at));
                 if (has) {

@@ -162,7 +162,7 @@ void runRows(Frame& frame, std::span<const render::Pass> passes) {
             return;
         }
         thread_local TexelRow row{};
-        row.hasTubes = frame.hasStrands;
+        row.hasTubes = frame.hasCurves;
         for (uint32_t y = row0; y < row1; ++y) {
             const bool any = frame.pyramid.loadRow(fine, planes, y, x0, n, kPad, row);
             program.run(x0, n, y, row, row, any);

@@ -4,7 +4,7 @@
 namespace stipple::gpu {
 
 constinit const GpuKind pointsOnGpu{};  // the dispatch over all pixels resolves them
-constinit const GpuKind curvesOnGpu{[](Recording& f) { f.overPixels("strand texels", "strand_texels"); }};
+constinit const GpuKind curvesOnGpu{[](Recording& f) { f.overPixels("curve texels", "curve_texels"); }};
 constinit const GpuKind trianglesOnGpu{[](Recording& f) { f.overPixels("triangle texels", "triangle_texels"); }};
 
 constinit const GpuPass clearPass{[](Recording& f) {
@@ -27,10 +27,10 @@ constinit const GpuPass splatPass{[](Recording& f) {
     f.overBands("discs", "discs");
 }};
 
-constinit const GpuPass strandsPass{[](Recording& f) {
+constinit const GpuPass curvesPass{[](Recording& f) {
     f.emptyList("wide list", shared::kWideBinding);
-    f.overBlocks("strands", f.draws().curves().blocks.size());
-    f.overBands("filled curves", "strands_wide");
+    f.overBlocks("curves", f.draws().curves().blocks.size());
+    f.overBands("filled curves", "curves_wide");
 }};
 
 constinit const GpuPass rasterisePass{[](Recording& f) {

@@ -6,7 +6,7 @@ namespace stipple::render {
 
 static_assert(static_cast<uint32_t>(lod::Kind::curves) == shared::kKindCurves);
 
-constinit const DrawnKind curvesDrawn{.pass = Pass::strands,
+constinit const DrawnKind curvesDrawn{.pass = Pass::curves,
                                       .isReconstructed = true,
                                       .isLit = [](const DrawSettings& s) { return s.lit; },
                                       .add = nullptr};

@@ -22,7 +22,7 @@ struct Reconstruction {
     bool blendsSplats;    ///< of such: what lies on one surface is blended, silhouettes have coverage
     Pass points;          ///< what draws points into the visibility buffer
     bool pointsAreLast;   ///< ... after all other kinds: its tiles are nobody else's meanwhile
-    /// From which half-width on, px, curves have exact pixels at the latest (DrawSettings::exactStrands may ask for
+    /// From which half-width on, px, curves have exact pixels at the latest (DrawSettings::exactCurves may ask for
     /// more): those below are left to the reconstruction.
     float exactCurves;
 };

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "lod/builder/build.h"
-#include "lod/builder/strands/strand_samples.h"
+#include "lod/builder/curves/curve_samples.h"
 #include "lod/cut/cut.h"
 #include "lod/store/store.h"
 
@@ -14,7 +14,7 @@ namespace stipple::lod {
 /// The first `count` of some samples (larger discs then), in some place. `centre` and `reach`: a sphere round all of
 /// them, before they are placed.
 struct StochasticItem {
-    const StrandSamples* samples = nullptr;
+    const CurveSamples* samples = nullptr;
     uint32_t count = 0;
     Instance place;
     glm::dvec3 centre{0};

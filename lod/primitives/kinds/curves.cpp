@@ -10,23 +10,23 @@ namespace {
 
 Result<Chunk> decode(const Hierarchy& h, uint32_t chunk, const uint8_t* bytes, size_t count, const std::string& where,
                      bool /*wantLowBits*/) {
-    return decodeStrandChunk(bytes, count, h.payload(chunk).records, where);
+    return decodeCurveChunk(bytes, count, h.payload(chunk).records, where);
 }
 uint64_t fewestBytes(const Hierarchy& h, uint32_t chunk) {
-    return fewestEncodedBytes(h.payload(chunk).records, sizeof(shared::StrandSegment));
+    return fewestEncodedBytes(h.payload(chunk).records, sizeof(shared::CurveSegment));
 }
 
 Result<uint64_t> measure(const Store& store, uint32_t chunk, const Chunk& decoded, uint64_t /*discs*/) {
-    return measureStrands(store, chunk, decoded);
+    return measureCurves(store, chunk, decoded);
 }
 
 }  // namespace
 
 constinit const KindTraits curvesKind{.name = "curves",
                                       .records = "segments",
-                                      .recordBytes = sizeof(shared::StrandSegment),
+                                      .recordBytes = sizeof(shared::CurveSegment),
                                       .cellBits = 15,
-                                      .decodedBytes = bytesOfRecords<shared::StrandSegment>,
+                                      .decodedBytes = bytesOfRecords<shared::CurveSegment>,
                                       .isPossible = isAnything,
                                       .check = checkNode,
                                       .measure = measure,
