@@ -66,8 +66,10 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
         const auto& records = chunks.at(uint64_t{draws.firstSource + instance.source} << 32 | cut.chunk).records;
         const bool few = mayBeWide(h, node, records, v, instance.scale * f.supportScale);
         const double step = h.cellSize(node) / 65536;
-        const double spacing =
-            h.isStochastic ? 0 : instance.scale * h.unit * step * double{lod::recordSpacing(records)};
+        // What the store tells is in eighths of octaves; what it does not tell is measured.
+        const uint8_t code = h.payload(cut.chunk).spacingCode;
+        const double steps = code > 0 ? std::exp2((code - 1) / 8.0) : double{lod::recordSpacing(records)};
+        const double spacing = h.isStochastic ? 0 : instance.scale * h.unit * step * steps;
         for (uint32_t i = 0; i < cut.count; ++i) {
             Disc disc = decodeDisc(h, node, records[i]);
             disc.radius *= cut.radiusScale;

@@ -7,6 +7,15 @@
 #include "shaders/shared/wide_disc.h"
 
 namespace stipple::render {
+namespace {
+
+/// Has the store the spacing of this payload, or is none asked for?
+bool isSpacingTold(const lod::Hierarchy& h, uint32_t chunk) {
+    const bool isTile = chunk >= h.nodes.size() && chunk < h.nodes.size() + h.tiles.size();
+    return h.isStochastic || isTile || h.payload(chunk).spacingCode != 0;
+}
+
+}  // namespace
 
 Result<void> DiscSizes::upload(streaming::ChunkKey key, const lod::Chunk& chunk) {
     if (life_.expired()) return fail(ErrorKind::device, "what draws the scene is gone");
@@ -17,7 +26,9 @@ Result<void> DiscSizes::upload(streaming::ChunkKey key, const lod::Chunk& chunk)
     if (sizes_.size() <= key.source) sizes_.resize(key.source + 1);
     auto& of = sizes_[key.source];
     if (of.size() <= key.chunk) of.resize(key.chunk + 1);
-    of[key.chunk] = {static_cast<uint8_t>(std::min(code, 255u)), isDense, lod::recordSpacing(chunk.records)};
+    const bool isTold = key.source < hierarchies_.size() && isSpacingTold(*hierarchies_[key.source], key.chunk);
+    of[key.chunk] = {static_cast<uint8_t>(std::min(code, 255u)), isDense,
+                     isTold ? 0 : lod::recordSpacing(chunk.records)};
     return backend_.upload(keyOfBackend(key), chunk);
 }
 
@@ -50,7 +61,7 @@ void markDiscSizes(const DiscSizes& sizes, DrawList& draws) {
     DrawBatch& points = draws.of(lod::Kind::points);
     for (size_t i = 0; i < points.nodes.size(); ++i) {
         shared::DrawNode& d = points.nodes[i];
-        d.spacing *= sizes.spacingOf(points.keys[i]);
+        if (d.spacing < 0) d.spacing *= -sizes.spacingOf(points.keys[i]);
         const auto least = [](float step) { return 65536 * std::min(0.0, double{step}); };
         const double nearest = double{d.base.z} + least(d.axisX.z) + least(d.axisY.z) + least(d.axisZ.z);
         const DiscSizes::Share share = sizes.shareOf(points.keys[i]);

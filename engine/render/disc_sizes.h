@@ -1,6 +1,6 @@
 // What is known of the discs of each node once its chunk has arrived: the largest radius, by which frames without wide
-// discs (shaders/shared/wide_disc.h) have no pass for them, and the spacing, by which the kernels of coarse levels are
-// closed (shaders/shared/ewa.h).
+// discs (shaders/shared/wide_disc.h) have no pass for them, and of older stores the spacing, by which the kernels of
+// coarse levels are closed (shaders/shared/ewa.h); others tell it.
 #pragma once
 
 #include <vector>
@@ -23,6 +23,8 @@ class DiscSizes final : public streaming::ChunkSink {
     explicit DiscSizes(Backend& backend) : backend_(backend), life_(backend.life()) {}
     /// What the backend calls source 0.
     void setFirstSource(uint32_t first) { first_ = first; }
+    /// Sources come in the order of their numbers. What the store tells of spacings is not measured again.
+    void addSource(const lod::Hierarchy& h) { hierarchies_.push_back(&h); }
     Result<void> upload(streaming::ChunkKey key, const lod::Chunk& chunk) override;
     void evict(streaming::ChunkKey key) override;
     struct Share {
@@ -31,7 +33,7 @@ class DiscSizes final : public streaming::ChunkSink {
     };
     /// `key`: as the backend has it.
     Share shareOf(streaming::ChunkKey key) const;
-    /// Steps of the node's lattice; 0: not known.
+    /// Of stores that do not tell it: steps of the node's lattice; 0: not known.
     float spacingOf(streaming::ChunkKey key) const;
 
   private:
@@ -46,10 +48,11 @@ class DiscSizes final : public streaming::ChunkSink {
     Backend& backend_;
     std::weak_ptr<const void> life_;  ///< of the backend: what is gone needs nothing back
     uint32_t first_ = 0;
-    std::vector<std::vector<Size>> sizes_;  ///< by source and node
+    std::vector<std::vector<Size>> sizes_;            ///< by source and node
+    std::vector<const lod::Hierarchy*> hierarchies_;  ///< by source
 };
 
-/// Sets kNodeWide, DrawList::hasWideDiscs, and spacings of nodes.
+/// Sets kNodeWide, DrawList::hasWideDiscs, and the spacings of nodes that stores do not tell.
 void markDiscSizes(const DiscSizes& sizes, DrawList& draws);
 
 }  // namespace stipple::render

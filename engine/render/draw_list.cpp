@@ -5,6 +5,7 @@
 
 #include "engine/base/check.h"
 #include "engine/render/kinds/kind.h"
+#include "lod/primitives/record_spacing.h"
 #include "shaders/shared/visibility.h"
 
 namespace stipple::render {
@@ -115,8 +116,11 @@ shared::DrawNode makeDrawNode(const lod::CutDraw& draw, const Bend& bend, const 
                    (instance.rotation != glm::dmat3(1) ? shared::kNodeTurned : 0u);
     d.count = draw.count;
     d.level = node.level;
-    // Times what disc_sizes.h knows. Discs among which any beginning shows the whole have none.
-    d.spacing = h.isStochastic ? 0.0f : static_cast<float>(worldPerStep);
+    // Discs among which any beginning shows the whole have none. Of stores that do not tell it: minus a step, which
+    // markDiscSizes takes times what was measured.
+    const float steps = payload.spacingCode == 0 ? -1.0f : lod::spacingOfCode(payload.spacingCode);
+    const bool isSpaced = payload.kind == lod::Kind::points && !h.isStochastic;
+    d.spacing = isSpaced ? steps * static_cast<float>(worldPerStep) : 0.0f;
     d.errorPixels = draw.errorPixels;
     return d;
 }

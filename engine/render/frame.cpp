@@ -114,6 +114,7 @@ class Placer {
                 return known->second;
         const uint32_t number = sources_++;
         if (isPlain) plainSources_[p.store.get()] = number;
+        state_.discSizes->addSource(p.store->hierarchy);
         state_.streamer->addSource(p.store->hierarchy, streaming::makeFileSource(p.store->file), p.store->path,
                                    finishOf(p));
         return number;

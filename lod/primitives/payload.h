@@ -36,7 +36,7 @@ enum class StreamId : uint16_t {
     normals = 3,
     surfelWeights = 4,
     material = 5,
-    spacingCode = 6,
+    spacingCode = 6,  ///< of each record, should they ever need one each; else Payload::spacingCode
 };
 
 /// Bytes of the file.
@@ -63,8 +63,9 @@ struct Payload {
     uint32_t group = 0;                     ///< of triangles: into Hierarchy::groups
     Kind kind = Kind::points;
     Codec codec = Codec::points;
-    uint8_t errorCode = 0;  ///< largest own error among the records
-    int8_t stepShift = 0;   ///< position step of the records: 2^stepShift lattice units
+    uint8_t errorCode = 0;    ///< largest own error among the records
+    int8_t stepShift = 0;     ///< position step of the records: 2^stepShift lattice units
+    uint8_t spacingCode = 0;  ///< of points: how far records lie apart (record_spacing.h); 0: not known
 };
 
 /// `kind` as this program codes it.

@@ -41,4 +41,19 @@ float recordSpacing(std::span<const shared::PointRecord> records) {
     return std::sqrt(kPi * static_cast<float>(*middle) / (kNeighbours + 0.5f));
 }
 
+uint8_t spacingCodeUp(float steps) {
+    if (!(steps > 0)) return 0;
+    uint8_t code = 1;
+    while (code < 255 && spacingOfCode(code) < steps) ++code;
+    return code;
+}
+
+float spacingOfCode(uint8_t code) {
+    // 2^(k / 8), as literals: the same on every machine.
+    constexpr std::array<float, 8> kEighths{1.0f,        1.09050773f, 1.18920712f, 1.29683955f,
+                                            1.41421356f, 1.54221083f, 1.68179283f, 1.83400809f};
+    if (code == 0) return 0;
+    return std::ldexp(kEighths.at((code - 1u) % 8), (code - 1) / 8);
+}
+
 }  // namespace stipple::lod

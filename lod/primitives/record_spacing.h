@@ -13,4 +13,9 @@ namespace stipple::lod {
 /// where most lie on top of each other. Within a tenth of the true one on even samples (RecordSpacing tests).
 float recordSpacing(std::span<const shared::PointRecord> records);
 
+/// As a store keeps it: eighths of octaves from one step on, rounded up; 0: not known.
+uint8_t spacingCodeUp(float steps);
+/// Steps; 0: not known.
+float spacingOfCode(uint8_t code);
+
 }  // namespace stipple::lod

@@ -77,7 +77,8 @@ struct PayloadOnDisk {
     uint8_t kind, codec;                      // into the names
     uint8_t errorCode;
     int8_t stepShift;
-    uint32_t streams;
+    uint16_t streams;
+    uint8_t spacingCode, reserved;
 };
 static_assert(sizeof(PayloadOnDisk) == 20);
 
@@ -149,6 +150,8 @@ void movePayload(Payload& p, OnDisk& d, const Move& move) {
         move(p.chunkBytes, d.chunkBytes);
         move(p.attributeHash, d.attributeHash);
         move(p.attributeBytes, d.attributeBytes);
+    } else {
+        move(p.spacingCode, d.spacingCode);
     }
 }
 

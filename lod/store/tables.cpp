@@ -329,7 +329,7 @@ TableBytes tablesOf(const Hierarchy& h) {
         if (p.attributeBytes > 0)
             stream({p.chunkOffset + p.chunkBytes, p.attributeHash, p.attributeBytes, StreamId::attributes});
         for (uint32_t k = 0; k < p.streams; ++k) stream(h.streams[p.firstStream + k]);
-        d.streams = static_cast<uint32_t>(streams.size() - before);
+        d.streams = static_cast<uint16_t>(streams.size() - before);
         if (h.isGraph) return;
         appendPairs(h, p.parentCounts, p.records, pairs, d.parentCodes);
         appendPairs(h, p.ownCounts, p.records, pairs, d.ownCodes);

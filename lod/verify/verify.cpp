@@ -9,6 +9,7 @@
 #include "engine/base/process.h"
 #include "engine/base/queue.h"
 #include "lod/primitives/kinds.h"
+#include "lod/primitives/record_spacing.h"
 #include "lod/store/store.h"
 #include "lod/verify/errors.h"
 
@@ -28,6 +29,12 @@ Result<void> verifyPayload(const Store& store, uint32_t index, uint64_t discs, C
     STIPPLE_ASSIGN(const Chunk chunk, readChunk(store, index, true));
     if (std::string text = kind.check(h, index, chunk); !text.empty())
         return fail(ErrorKind::input, std::move(text), fmt::format("{}: node {}", store.path, h.nodeOf(index)),
+                    "this is a fault of the build; please report it with the input");
+    if (payload.spacingCode != 0 && spacingCodeUp(recordSpacing(chunk.records)) != payload.spacingCode)
+        return fail(ErrorKind::input,
+                    fmt::format("its records lie {:.1f} steps apart, not {:.1f} as its table says",
+                                recordSpacing(chunk.records), spacingOfCode(payload.spacingCode)),
+                    fmt::format("{}: node {}", store.path, h.nodeOf(index)),
                     "this is a fault of the build; please report it with the input");
     if (!h.isStochastic && !h.isMixed) {
         STIPPLE_ASSIGN(const uint64_t measured, kind.measure(store, index, chunk, discs));

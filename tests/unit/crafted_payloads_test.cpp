@@ -83,6 +83,14 @@ TEST_F(CraftedPayloads, PlacesOutsideOfTheFileAreRefused) {
     expectRefused(c, "not possible");
 }
 
+TEST_F(CraftedPayloads, SpacingsThatAreNotThoseOfTheRecordsAreFound) {
+    for (const size_t place : {size_t{rootPoints}, size_t{roof}}) {
+        CraftedStore c = take();
+        c.payloads[place].spacingCode = 255;
+        expectFound(c, "steps apart");
+    }
+}
+
 TEST_F(CraftedPayloads, KindsAndCodecsThatAreNotKnownAreNamed) {
     CraftedStore c = take();
     c.kinds[1] = {'v', 'o', 'x', 'e', 'l', 's'};
@@ -167,7 +175,7 @@ TEST_F(CraftedPayloads, CountsThatClaimGigabytesAreRefusedBeforeMemoryIsTaken) {
             EXPECT_FALSE(lod::openStore(path)) << value;
         }
     CraftedStore c = take();
-    c.payloads[roof].streams = ~0u;
+    c.payloads[roof].streams = uint16_t{0xffff};
     expectRefused(c, "not possible");
     // Names: 400 MB of them in some kilobytes.
     c = take();

@@ -6,8 +6,12 @@
 #include <cstdio>
 
 #include "engine/base/rng.h"
+#include "engine/cpu/cpu_backend.h"
+#include "engine/render/frame.h"
 #include "lod/primitives/record_spacing.h"
 #include "shaders/shared/ewa.h"
+#include "tests/support/drawn_shapes.h"
+#include "tests/support/support.h"
 
 namespace stipple {
 namespace {
@@ -179,6 +183,53 @@ TEST(RecordSpacing, IsThatOfTheGrid) {
     EXPECT_EQ(lod::recordSpacing({}), 0.0f);
     EXPECT_EQ(lod::recordSpacing(std::vector<PointRecord>(6)), 0.0f);
     EXPECT_EQ(lod::recordSpacing(std::vector<PointRecord>(50)), 0.0f);  // all at one place
+}
+
+/// Eighths of octaves, rounded up: never less, and less than a tenth more.
+TEST(RecordSpacing, CodesRoundUp) {
+    EXPECT_EQ(lod::spacingCodeUp(0), 0u);
+    EXPECT_EQ(lod::spacingCodeUp(std::nanf("")), 0u);
+    EXPECT_EQ(lod::spacingOfCode(0), 0.0f);
+    EXPECT_EQ(lod::spacingCodeUp(0.7f), 1u);  // one step is the least
+    Rng rng(6);
+    for (int i = 0; i < 20'000; ++i) {
+        const auto steps = static_cast<float>(std::exp2(rng.uniform(0, 17)));
+        const uint8_t code = lod::spacingCodeUp(steps);
+        EXPECT_GE(lod::spacingOfCode(code), steps);
+        EXPECT_LT(lod::spacingOfCode(code), 1.0906f * steps);
+        EXPECT_NEAR(double{lod::spacingOfCode(code)}, std::exp2((code - 1) / 8.0), 1e-6 * double{steps});
+        EXPECT_EQ(lod::spacingCodeUp(lod::spacingOfCode(code)), code);
+    }
+}
+
+/// What a build writes is what is drawn; of older stores it is measured once their chunks arrive.
+TEST(RecordSpacing, IsToldByStoresAndMeasuredOfOlderOnes) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    const auto backend = cpu::makeCpuBackend(*executor);
+    test::writePly(folder / "a.ply", test::samplesOf(test::Shape::statue, 20'000, 3));
+    const auto built = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    auto older = std::make_shared<lod::Store>(*built);
+    for (lod::Node& n : older->hierarchy.nodes) {
+        EXPECT_GT(n.spacingCode, 0u);
+        n.spacingCode = 0;
+    }
+    const lod::View view = test::viewFromAbove({0, 0, 0});
+    const auto spacings = [&](const std::shared_ptr<const lod::Store>& store) {
+        const auto state = render::makeFrameState({store}, *backend, *executor, {});
+        EXPECT_TRUE(render::renderUntilComplete(*state, view, {}));
+        std::vector<float> out;
+        for (const DrawNode& d : state->draws.of(lod::Kind::points).nodes) out.push_back(d.spacing);
+        return out;
+    };
+    const std::vector<float> told = spacings(built), measured = spacings(older);
+    ASSERT_EQ(told.size(), measured.size());
+    ASSERT_GT(told.size(), 3u);
+    for (size_t i = 0; i < told.size(); ++i) {
+        EXPECT_GT(measured[i], 0.0f);
+        EXPECT_GE(told[i], measured[i] * 0.99999f);
+        EXPECT_LT(told[i], measured[i] * 1.0907f);
+    }
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "lod/builder/points/aggregate_values.h"
 #include "lod/builder/points/covered.h"
 #include "lod/primitives/octahedral.h"
+#include "lod/primitives/record_spacing.h"
 #include "lod/store/attributes.h"
 #include "lod/store/chunk.h"
 
@@ -155,6 +156,7 @@ void encodeNode(const Frame& frame, PendingNode& pending, NodeBatch& batch) {
         for (size_t a = 0; a < 3; ++a) chunk.lowBits[at * 3 + a] = static_cast<uint32_t>(place.at(a) & mask);
     }
     const std::vector<uint8_t> bytes = encodeChunk(chunk), attributes = encodeAttributes(frame.attributes, streams);
+    node.spacingCode = spacingCodeUp(recordSpacing(chunk.records));
     node.chunkOffset = batch.bytes.size();
     node.chunkBytes = static_cast<uint32_t>(bytes.size());
     node.chunkHash = hashBytes(bytes.data(), bytes.size());
