@@ -1,5 +1,5 @@
-// A build of points as a straight line: survey, count, distribute, then bucket by bucket estimate, build, write;
-// verify.
+// The stages of a build of points (octree/course.h): survey, count, distribute, then bucket by bucket estimate, build,
+// write.
 #include "lod/builder/build.h"
 
 #include <fmt/format.h>
@@ -12,6 +12,7 @@
 #include "engine/base/queue.h"
 #include "lod/builder/build_version.h"
 #include "lod/builder/octree/assemble.h"
+#include "lod/builder/octree/course.h"
 #include "lod/builder/points/distribution.h"
 #include "lod/builder/points/estimate.h"
 #include "lod/builder/points/exchange.h"
@@ -19,8 +20,6 @@
 
 namespace stipple::lod {
 namespace {
-
-constexpr uint64_t kVerifiedNodes = 512;  ///< at the end of a build; `info --verify` checks all
 
 /// The axis of the format or of the settings; away from the Earth's centre for coordinates that are relative to it.
 glm::dvec3 upOf(const PointInput& input, const BuildSettings& settings, const StoreDescription& description) {
@@ -35,66 +34,54 @@ glm::dvec3 upOf(const PointInput& input, const BuildSettings& settings, const St
     return axisVector(input.up);
 }
 
-/// How the memory is shared out.
-struct MemoryPlan {
-    uint64_t bucketPoints = 0, bufferBytes = 0;
-    bool isOnDisk = false;
-};
-
-class PointBuild {
+class PointStages final : public BuildStages {
   public:
-    PointBuild(std::string output, const BuildSettings& settings, Executor& executor, Progress& progress,
-               PointInput input, BuildReport report)
-        : output_(std::move(output)),
+    PointStages(Course& course, const BuildSettings& settings, PointInput input)
+        : course_(course),
           settings_(settings),
-          executor_(executor),
-          progress_(progress),
           input_(std::move(input)),
-          report_(std::move(report)),
-          clock_(report_),
-          workers_(std::max(executor.threads(), 1)),
           layout_(input_.hasColour, input_.hasNormal, input_.hasRadius, input_.attributes()) {}
 
-    Result<BuildReport> run() {
-        STIPPLE_TRY(agree(settings_.ranks, planMemory()));
+    Result<Planned> planMemory() override;
+    uint64_t identity() const override;
+    Result<Distributed> distribute(Workspace& workspace, const Planned&, std::vector<Journal::Entry> left) override {
+        workspace_ = &workspace;
         // Enough buckets for all, and the same ones whatever each machine has.
-        memory_.bucketPoints = leastOf(memory_.bucketPoints);
-        STIPPLE_ASSIGN(Workspace opened, Workspace::open(output_, settings_, identity(), memory_.isOnDisk));
-        workspace_.emplace(std::move(opened));
-        std::vector<Journal::Entry> entries = workspace_->takeEntries();
-        report_.isResumed = !entries.empty();
         spread_.emplace(input_, settings_, layout_,
-                        Distribution::Plan{workers_, memory_.bufferBytes, memory_.bucketPoints, wantsEstimates()},
-                        *workspace_, executor_, progress_);
-        STIPPLE_TRY(agree(settings_.ranks, spread_->run(entries, report_, clock_)));
-        std::erase_if(entries, [](const Journal::Entry& e) { return e.what != Journal::What::done; });
-        description_ = describe();
+                        Distribution::Plan{course_.workers, bufferBytes_, leastOf(bucketPoints_), wantsEstimates()},
+                        workspace, course_.executor, course_.progress);
+        STIPPLE_TRY(agree(settings_.ranks, spread_->run(left, course_.report, course_.clock)));
+        std::erase_if(left, [](const Journal::Entry& e) { return e.what != Journal::What::done; });
+        return Distributed{std::move(left)};
+    }
+    Result<Built> build(Workspace&, Distributed distributed) override {
+        description_ = describeInput();
         ranges_ = ValueRanges(frame(), input_.points, description_.up);
         upper_.emplace(frame());
-        STIPPLE_TRY(settings_.ranks != nullptr ? buildTogether() : buildAlone(entries));
-        report_.seconds = clock_.seconds();
-        return std::move(report_);
+        STIPPLE_TRY(settings_.ranks != nullptr ? buildTogether() : buildAlone(std::move(distributed.done)));
+        return Built{writer_ ? &*writer_ : nullptr};
     }
+    Result<Described> describe(const Built&) override;
+    uint64_t verifiedNodes() const override { return 512; }
 
   private:
-    Result<void> buildAlone(std::vector<Journal::Entry>& entries) {
+    Result<void> buildAlone(std::vector<Journal::Entry> entries) {
         STIPPLE_TRY(openWriter(entries));
         entries = {};
         const size_t first = batches_.size();
         for (size_t b = 0; b < first; ++b) done_ += plan().buckets[b].points;
         Result<void> built = inOrder<BuiltBucket>(
-            executor_, workers_, first, plan().buckets.size(),
+            course_.executor, course_.workers, first, plan().buckets.size(),
             [&](size_t index) -> Result<BuiltBucket> {
                 STIPPLE_TRY(workspace_->checkStopped());
                 return buildBucket(index);
             },
             [&](size_t index, BuiltBucket bucket) {
-                progress_.update("build", done_ += plan().buckets[index].points, input_.points);
+                course_.progress.update("build", done_ += plan().buckets[index].points, input_.points);
                 return commit(index, std::move(bucket));
             });
-        if (!built) return built;
-        clock_.ends("build");
-        return finish();
+        if (built) course_.clock.ends("build");
+        return built;
     }
 
     /// With others: each builds its share of the buckets, the first one puts them together. What was built stays until
@@ -105,23 +92,23 @@ class PointBuild {
         for (size_t b = 0; b < plan().buckets.size(); ++b)
             if (workspace_->isOwn(b) && !isBuilt(workspace_->folder(), b)) own.push_back(b);
         const Result<void> made = inOrder<BuiltBucket>(
-            executor_, workers_, 0, own.size(),
+            course_.executor, course_.workers, 0, own.size(),
             [&](size_t k) -> Result<BuiltBucket> {
                 STIPPLE_TRY(workspace_->checkStopped());
                 return buildBucket(own[k]);
             },
             [&](size_t k, const BuiltBucket& built) -> Result<void> {
-                progress_.update("build", done_ += plan().buckets[own[k]].points, input_.points);
+                course_.progress.update("build", done_ += plan().buckets[own[k]].points, input_.points);
                 STIPPLE_TRY(saveBuilt(workspace_->folder(), own[k], built));
                 removeBucket(own[k]);
                 return {};
             });
         STIPPLE_TRY(agree(&ranks, made));
-        clock_.ends("build");
+        course_.clock.ends("build");
         return agree(&ranks, workspace_->isFirst() ? putTogether() : Result<void>());
     }
     Result<void> putTogether() {
-        STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output_));
+        STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(course_.output));
         writer_.emplace(std::move(writer));
         const ValueRanges empty = ranges_;
         for (size_t b = 0; b < plan().buckets.size(); ++b) {
@@ -129,8 +116,8 @@ class PointBuild {
             STIPPLE_ASSIGN(BuiltBucket built, loadBuilt(workspace_->folder(), b, empty));
             STIPPLE_TRY(commit(b, std::move(built)));
         }
-        clock_.ends("put together");
-        return finish();
+        course_.clock.ends("put together");
+        return {};
     }
     void removeBucket(size_t index) {
         spread_->buckets()[index]->points.remove();
@@ -143,50 +130,6 @@ class PointBuild {
         return bytes;
     }
 
-    Result<void> planMemory() {
-        constexpr uint64_t kFixed = uint64_t{72} << 20, kReader = uint64_t{12} << 20;
-        const auto fixedFor = [&](uint64_t threads) { return kFixed + threads * kReader; };
-        const auto leastFor = [&](uint64_t threads) {
-            return fixedFor(threads) + (threads + 1) * kSubtreePoints * pointBytes() + input_.declared() / 2;
-        };
-        // Fewer threads rather than more memory.
-        while (workers_ > 1 && leastFor(static_cast<uint64_t>(workers_)) > settings_.memoryBytes) --workers_;
-        const auto workers = static_cast<uint64_t>(workers_);
-        const uint64_t fixed = fixedFor(workers), least = leastFor(workers);
-        const uint64_t n = input_.declared(), all = n * layout_.bytes();
-        // What is small needs no more than its own points.
-        const uint64_t small = fixed + all + 2 * n * pointBytes();
-        if (settings_.memoryBytes < std::min(least, small))
-            return fail(ErrorKind::budget,
-                        fmt::format("building {} points needs {} MiB, but --memory allows {} MiB", n,
-                                    (std::min(least, small) >> 20) + 1, settings_.memoryBytes >> 20),
-                        input_.firstPath(), fmt::format("give --memory {}M", (std::min(least, small) >> 20) + 1));
-        const uint64_t room = settings_.memoryBytes - fixed;
-        const auto bucketOf = [&](uint64_t bytes) {
-            return std::min<uint64_t>(bytes / ((workers + 1) * pointBytes()), uint64_t{1} << 20);
-        };
-        // (Half of the memory at most: what neighbours see, buffers and the allocator's own losses come on top.)
-        memory_.isOnDisk = 2 * all + (workers + 1) * kSubtreePoints * pointBytes() > room && small > room + fixed;
-        memory_.bufferBytes = std::min<uint64_t>(room / 8, uint64_t{64} << 20);
-        memory_.bucketPoints = bucketOf(memory_.isOnDisk ? room / 2 : room / 4);
-        // Enough of them for all threads, but none smaller than a subtree.
-        const uint64_t ranks = settings_.ranks == nullptr ? 1 : static_cast<uint64_t>(settings_.ranks->count());
-        memory_.bucketPoints =
-            std::max<uint64_t>(std::min<uint64_t>(memory_.bucketPoints, n / (6 * workers * ranks)), kSubtreePoints);
-        memory_.isOnDisk = memory_.isOnDisk || settings_.ranks != nullptr;
-        return {};
-    }
-
-    uint64_t identity() const {
-        std::string text =
-            fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}|{}", kStoreVersion, kBuildVersion, input_.identity(),
-                        static_cast<int>(settings_.normals), settings_.estimateRadii,
-                        settings_.up ? static_cast<int>(*settings_.up) : -1, settings_.leafRecords, settings_.skipBad,
-                        settings_.fineNormals, settings_.mergeDuplicates, settings_.dropOutliers);
-        for (const AttributeInfo& a : input_.attributes()) text.append("|").append(a.name);
-        text.append("|").append(std::filesystem::absolute(output_).lexically_normal().string());
-        return hashBytes(text.data(), text.size());
-    }
     bool wantsEstimates() const { return settings_.estimateRadii || settings_.normals == NormalsMode::automatic; }
     uint64_t leastOf(uint64_t value) const {
         if (settings_.ranks == nullptr) return value;
@@ -206,7 +149,7 @@ class PointBuild {
 
     Result<void> openWriter(const std::vector<Journal::Entry>& entries) {
         if (!workspace_->isOnDisk()) {
-            STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(output_));
+            STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(course_.output));
             writer_.emplace(std::move(writer));
             return {};
         }
@@ -230,10 +173,10 @@ class PointBuild {
             batches_.push_back(std::move(batch));
         }
         if (!entries.empty())
-            progress_.say(fmt::format("going on with the interrupted build: {} of {} buckets are done", entries.size(),
-                                      plan().buckets.size()));
+            course_.progress.say(fmt::format("going on with the interrupted build: {} of {} buckets are done",
+                                             entries.size(), plan().buckets.size()));
         STIPPLE_TRY(checkWritten());
-        STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::resume(output_, workspace_->partialPath(), written));
+        STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::resume(course_.output, workspace_->partialPath(), written));
         writer_.emplace(std::move(writer));
         return {};
     }
@@ -243,7 +186,7 @@ class PointBuild {
         if (batches_.empty()) return {};
         STIPPLE_ASSIGN(const InputFile file, InputFile::open(workspace_->partialPath()));
         CompletionQueue<Error> errors;
-        executor_.parallelFor(batches_.size(), 1, [&](size_t begin, size_t end) {
+        course_.executor.parallelFor(batches_.size(), 1, [&](size_t begin, size_t end) {
             std::vector<uint8_t> bytes;
             for (size_t b = begin; b < end; ++b)
                 for (const NodeBatch::Written& w : batches_[b].nodes) {
@@ -323,7 +266,7 @@ class PointBuild {
     /// In the order of the buckets.
     Result<void> commit(size_t index, BuiltBucket built) {
         const double begun = nowSeconds();
-        for (const auto& [what, seconds] : built.seconds) report_.stageSeconds[what] += seconds;
+        for (const auto& [what, seconds] : built.seconds) course_.report.stageSeconds[what] += seconds;
         NodeBatch all, between;
         for (BuiltSubtree& subtree : built.subtrees) {
             upper_->closeBefore(subtree.root.key, between);
@@ -347,13 +290,13 @@ class PointBuild {
             removeBucket(index);
         }
         batches_.push_back(std::move(all));
-        report_.stageSeconds["threads: append"] += nowSeconds() - begun;
+        course_.report.stageSeconds["threads: append"] += nowSeconds() - begun;
         return {};
     }
 
     // ---- the end ----
 
-    StoreDescription describe() const {
+    StoreDescription describeInput() const {
         StoreDescription d;
         d.crs = input_.crs;
         d.metresPerUnit = input_.crs.metresPerUnit;
@@ -369,48 +312,12 @@ class PointBuild {
         return d;
     }
 
-    Result<void> finish() {
-        NodeBatch last, all;
-        upper_->finish(last);
-        STIPPLE_TRY(append(last, all));
-        batches_.push_back(std::move(all));
-        Hierarchy hierarchy = assemble(frame(), batches_);
-        batches_ = {};
-        if (merged_ > 0) report_.dropped["duplicate"] += merged_;
-        if (tooMany_ > 0) report_.dropped[fmt::format("beyond {} at one place", kMostAtOnePlace)] += tooMany_;
-        description_.points = input_.points - merged_ - tooMany_;
-        description_.pointsIn = report_.pointsIn;
-        description_.dropped = report_.dropped;
-        for (const Node& node : hierarchy.nodes) description_.records += node.records;
-        ranges_.describe(frame(), input_.withoutOutliers(), description_);
-        STIPPLE_TRY(writer_->finish(hierarchy, description_));
-        clock_.ends("write");
-        report_.nodes = hierarchy.nodes.size();
-        hierarchy = {};  // its memory is needed
-        progress_.update("verify", 0, 1);
-        STIPPLE_ASSIGN(const Store store, openStore(writer_->temporaryPath()));
-        STIPPLE_TRY(verifyStore(store, executor_, kVerifiedNodes));
-        clock_.ends("verify");
-        report_.bytesOut = writer_->bytes();
-        STIPPLE_TRY(writer_->commit());
-        workspace_->remove();
-        report_.pointsOut = description_.points;
-        report_.records = description_.records;
-        report_.contentHash = writer_->contentHash();
-        return {};
-    }
-
-    const std::string output_;
+    Course& course_;
     const BuildSettings& settings_;
-    Executor& executor_;
-    Progress& progress_;
     PointInput input_;
-    BuildReport report_;
-    StageClock clock_;  ///< what is not "threads: ..." adds up to the whole
-    int workers_;
     RecordLayout layout_;
-    MemoryPlan memory_;
-    std::optional<Workspace> workspace_;
+    uint64_t bucketPoints_ = 0, bufferBytes_ = 0;  ///< as the memory allows
+    Workspace* workspace_ = nullptr;
     std::optional<Distribution> spread_;
     StoreDescription description_;
     ValueRanges ranges_;
@@ -420,23 +327,77 @@ class PointBuild {
     uint64_t done_ = 0, merged_ = 0, tooMany_ = 0;
 };
 
+Result<Planned> PointStages::planMemory() {
+    constexpr uint64_t kFixed = uint64_t{72} << 20, kReader = uint64_t{12} << 20;
+    const auto fixedFor = [&](uint64_t threads) { return kFixed + threads * kReader; };
+    const auto leastFor = [&](uint64_t threads) {
+        return fixedFor(threads) + (threads + 1) * kSubtreePoints * pointBytes() + input_.declared() / 2;
+    };
+    // Fewer threads rather than more memory.
+    while (course_.workers > 1 && leastFor(static_cast<uint64_t>(course_.workers)) > settings_.memoryBytes)
+        --course_.workers;
+    const auto workers = static_cast<uint64_t>(course_.workers);
+    const uint64_t fixed = fixedFor(workers), least = leastFor(workers);
+    const uint64_t n = input_.declared(), all = n * layout_.bytes();
+    // What is small needs no more than its own points.
+    const uint64_t small = fixed + all + 2 * n * pointBytes();
+    if (settings_.memoryBytes < std::min(least, small))
+        return fail(ErrorKind::budget,
+                    fmt::format("building {} points needs {} MiB, but --memory allows {} MiB", n,
+                                (std::min(least, small) >> 20) + 1, settings_.memoryBytes >> 20),
+                    input_.firstPath(), fmt::format("give --memory {}M", (std::min(least, small) >> 20) + 1));
+    const uint64_t room = settings_.memoryBytes - fixed;
+    const auto bucketOf = [&](uint64_t bytes) {
+        return std::min<uint64_t>(bytes / ((workers + 1) * pointBytes()), uint64_t{1} << 20);
+    };
+    // (Half of the memory at most: what neighbours see, buffers and the allocator's own losses come on top.)
+    const bool isOnDisk = 2 * all + (workers + 1) * kSubtreePoints * pointBytes() > room && small > room + fixed;
+    bufferBytes_ = std::min<uint64_t>(room / 8, uint64_t{64} << 20);
+    bucketPoints_ = bucketOf(isOnDisk ? room / 2 : room / 4);
+    // Enough of them for all threads, but none smaller than a subtree.
+    const uint64_t ranks = settings_.ranks == nullptr ? 1 : static_cast<uint64_t>(settings_.ranks->count());
+    bucketPoints_ = std::max<uint64_t>(std::min<uint64_t>(bucketPoints_, n / (6 * workers * ranks)), kSubtreePoints);
+    return Planned{isOnDisk || settings_.ranks != nullptr};
+}
+
+uint64_t PointStages::identity() const {
+    std::string text =
+        fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}|{}", kStoreVersion, kBuildVersion, input_.identity(),
+                    static_cast<int>(settings_.normals), settings_.estimateRadii,
+                    settings_.up ? static_cast<int>(*settings_.up) : -1, settings_.leafRecords, settings_.skipBad,
+                    settings_.fineNormals, settings_.mergeDuplicates, settings_.dropOutliers);
+    for (const AttributeInfo& a : input_.attributes()) text.append("|").append(a.name);
+    text.append("|").append(std::filesystem::absolute(course_.output).lexically_normal().string());
+    return hashBytes(text.data(), text.size());
+}
+Result<Described> PointStages::describe(const Built&) {
+    NodeBatch last, all;
+    upper_->finish(last);
+    STIPPLE_TRY(append(last, all));
+    batches_.push_back(std::move(all));
+    Described out{assemble(frame(), batches_), std::move(description_)};
+    batches_ = {};
+    BuildReport& report = course_.report;
+    if (merged_ > 0) report.dropped["duplicate"] += merged_;
+    if (tooMany_ > 0) report.dropped[fmt::format("beyond {} at one place", kMostAtOnePlace)] += tooMany_;
+    out.description.points = report.pointsOut = input_.points - merged_ - tooMany_;
+    out.description.pointsIn = report.pointsIn;
+    out.description.dropped = report.dropped;
+    ranges_.describe(frame(), input_.withoutOutliers(), out.description);
+    return out;
+}
+
 }  // namespace
 
 Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std::string& output,
                                const BuildSettings& settings, Executor& executor, Progress& progress) {
-    BuildReport report;
-    const auto tryOutput = [&]() -> Result<void> {  // an unwritable output is found first
-        if (settings.ranks != nullptr && settings.ranks->rank() > 0) return {};
-        STIPPLE_ASSIGN(const StoreWriter writer, StoreWriter::create(output));
-        return {};
-    };
-    STIPPLE_TRY(agree(settings.ranks, tryOutput()));
     // (Shares as measured with 2M points, normals and radii estimated.)
-    progress.plan({{"survey", 2}, {"count", 3}, {"distribute", 16}, {"build", 70}, {"verify", 9}});
-    Result<PointInput> opened = PointInput::open(inputs, settings, report);
-    STIPPLE_TRY(agree(settings.ranks, opened ? Result<void>() : Result<void>(tl::unexpected(opened.error()))));
-    PointInput input = std::move(*opened);
-    return PointBuild(output, settings, executor, progress, std::move(input), std::move(report)).run();
+    return runCourse(output, settings, executor, progress,
+                     {{"survey", 2}, {"count", 3}, {"distribute", 16}, {"build", 70}, {"verify", 9}},
+                     [&](Course& course) -> Result<std::unique_ptr<BuildStages>> {
+                         STIPPLE_ASSIGN(PointInput input, PointInput::open(inputs, settings, course.report));
+                         return std::make_unique<PointStages>(course, settings, std::move(input));
+                     });
 }
 
 }  // namespace stipple::lod

@@ -110,64 +110,20 @@ Result<void> CellSender::gatherSpread() {
 
 namespace {
 
-constexpr uint64_t kVerifiedNodes = 2048;  ///< at the end of a build; `info --verify` checks all
-
-class CellBuild {
+class CellStages final : public BuildStages {
   public:
-    CellBuild(CellContent& content, std::string output, const BuildLimits& limits, Executor& executor,
-              Progress& progress)
-        : content_(content),
-          output_(std::move(output)),
-          limits_(limits),
-          executor_(executor),
-          progress_(progress),
-          clock_(report_),
-          workers_(std::max(executor.threads(), 1)) {}
-
-    Result<BuildReport> run() {
-        report_.primitive = content_.primitive();
-        STIPPLE_TRY(agree(limits_.ranks, tryOutput()));
-        STIPPLE_TRY(agree(limits_.ranks, planMemory()));
-        identity_ = content_.inputIdentity();
-        const std::string settings = fmt::format("{}|{}|{}", kStoreVersion, identity_, content_.settingsAsText());
-        STIPPLE_ASSIGN(Workspace opened,
-                       Workspace::open(output_, limits_, hashBytes(settings.data(), settings.size()), isOnDisk_));
-        workspace_.emplace(std::move(opened));
-        inputs_.emplace(*workspace_);
-        // (Shares as measured with 300k triangles and 1.2M segments.)
-        progress_.plan({{"survey", 3}, {"count", 5}, {"distribute", 7}, {"build", 60}, {"verify", 25}});
-        STIPPLE_TRY(agree(limits_.ranks, restore()));
-        STIPPLE_TRY(distribute());
-        Reduction work(*workspace_, *inputs_, std::move(done_));
-        STIPPLE_TRY(work.run(
-            executor_, workers_,
-            [&](const WorkCell& cell, const std::vector<uint8_t>& input, const std::vector<FromBelow>& below) {
-                return content_.make(cell, input, below);
-            },
-            [&](uint64_t at, const std::vector<uint8_t>& table) { return content_.take(at, table); }, progress_));
-        clock_.ends("build");
-        report_.temporaryBytes =
-            std::max(report_.temporaryBytes, workspace_->isOnDisk() ? work.mostTemporaryBytes() : 0);
-        STIPPLE_TRY(agree(limits_.ranks, workspace_->isFirst() ? finish(work.writer()) : Result<void>()));
-        report_.seconds = clock_.seconds();
-        return std::move(report_);
+    CellStages(CellContent& content, Course& course) : content_(content), course_(course) {
+        course.report.primitive = content.primitive();
     }
 
-  private:
-    Result<void> tryOutput() const {
-        if (limits_.ranks != nullptr && limits_.ranks->rank() > 0) return {};
-        STIPPLE_ASSIGN(const StoreWriter writer, StoreWriter::create(output_));
-        return {};
-    }
-
-    Result<void> planMemory() {
+    Result<Planned> planMemory() override {
         const MemoryNeeds needs = content_.memory();
         const auto leastFor = [&](int workers) {
             return needs.fixed + std::max(needs.tables + static_cast<uint64_t>(workers) * needs.aWorker, needs.survey);
         };
-        const uint64_t memory = limits_.memoryBytes, small = needs.fixed + needs.whole;
-        while (workers_ > 1 && leastFor(workers_) > memory) --workers_;
-        const uint64_t least = std::min(leastFor(workers_), small);
+        const uint64_t memory = course_.limits.memoryBytes, small = needs.fixed + needs.whole;
+        while (course_.workers > 1 && leastFor(course_.workers) > memory) --course_.workers;
+        const uint64_t least = std::min(leastFor(course_.workers), small);
         if (least > memory) {
             const auto asked = [&](uint64_t bytes) {  // on the command line, in MiB
                 return static_cast<double>(bytes) / (1 - needs.readerShare) / (uint64_t{1} << 20);
@@ -178,18 +134,55 @@ class CellBuild {
                                     toWhole<uint64_t>(std::round(asked(memory)))),
                         content_.source(), fmt::format("give --memory {}M", wanted));
         }
-        const uint64_t room = memory > leastFor(workers_) ? memory - leastFor(workers_) : 0;
-        isOnDisk_ = limits_.ranks != nullptr || (small > memory && needs.between > room / 2);
+        const uint64_t room = memory > leastFor(course_.workers) ? memory - leastFor(course_.workers) : 0;
+        const bool isOnDisk = course_.limits.ranks != nullptr || (small > memory && needs.between > room / 2);
         bufferBytes_ = std::clamp<uint64_t>(room / 4, uint64_t{4} << 20, uint64_t{64} << 20);
-        return {};
+        identity_ = content_.inputIdentity();
+        return Planned{isOnDisk};
     }
+    uint64_t identity() const override {
+        const std::string settings = fmt::format("{}|{}|{}", kStoreVersion, identity_, content_.settingsAsText());
+        return hashBytes(settings.data(), settings.size());
+    }
+    Result<Distributed> distribute(Workspace& workspace, const Planned&, std::vector<Journal::Entry> left) override {
+        workspace_ = &workspace;
+        inputs_.emplace(workspace);
+        Distributed out;
+        STIPPLE_TRY(agree(ranks(), restore(std::move(left), out.done)));
+        if (isReady_)
+            STIPPLE_TRY(content_.complete(*inputs_));
+        else
+            STIPPLE_TRY(send());
+        return out;
+    }
+    Result<Built> build(Workspace& workspace, Distributed distributed) override {
+        work_.emplace(workspace, *inputs_, std::move(distributed.done));
+        STIPPLE_TRY(work_->run(
+            course_.executor, course_.workers,
+            [&](const WorkCell& cell, const std::vector<uint8_t>& input, const std::vector<FromBelow>& below) {
+                return content_.make(cell, input, below);
+            },
+            [&](uint64_t at, const std::vector<uint8_t>& table) { return content_.take(at, table); },
+            course_.progress));
+        course_.clock.ends("build");
+        course_.report.temporaryBytes =
+            std::max(course_.report.temporaryBytes, workspace.isOnDisk() ? work_->mostTemporaryBytes() : 0);
+        return Built{workspace.isFirst() ? &work_->writer() : nullptr};
+    }
+    Result<Described> describe(const Built& built) override {
+        Described out;
+        STIPPLE_ASSIGN(out.hierarchy, content_.describe(*built.writer, out.description, course_.report));
+        return out;
+    }
+    uint64_t verifiedNodes() const override { return 2048; }
+
+  private:
+    Ranks* ranks() const { return course_.limits.ranks; }
 
     /// What an earlier run left.
-    Result<void> restore() {
-        std::vector<Journal::Entry> entries = workspace_->takeEntries();
-        report_.isResumed = !entries.empty();
+    Result<void> restore(std::vector<Journal::Entry> left, std::vector<Journal::Entry>& done) {
         std::vector<uint8_t> sent;
-        for (Journal::Entry& e : entries) switch (e.what) {
+        for (Journal::Entry& e : left) switch (e.what) {
                 case Journal::What::counted: {
                     ByteReader from(e.payload);
                     content_.load(from);
@@ -204,10 +197,10 @@ class CellBuild {
                     sent = std::move(e.payload);
                     break;
                 case Journal::What::done:
-                    done_.push_back(std::move(e));
+                    done.push_back(std::move(e));
                     break;
             }
-        if (!report_.isResumed) return {};
+        if (left.empty()) return {};
         if (!tree_) return tl::unexpected(workspace_->damaged());
         inputs_->plan(tree_->subtrees());
         if (!sent.empty()) {
@@ -221,37 +214,37 @@ class CellBuild {
             if (!from.isWhole() || !of.isWhole() || !inputs_->load(inputs))
                 return tl::unexpected(workspace_->damaged());
         }
-        progress_.say(isReady_
-                          ? fmt::format("going on with the interrupted build: {} cells are done, {} have their input",
-                                        done_.size(), inputs_->subtrees().size())
-                          : fmt::format("going on with the interrupted build: {} of its input are in their places",
-                                        humanBytes(inputs_->bytes())));
+        course_.progress.say(
+            isReady_ ? fmt::format("going on with the interrupted build: {} cells are done, {} have their input",
+                                   done.size(), inputs_->subtrees().size())
+                     : fmt::format("going on with the interrupted build: {} of its input are in their places",
+                                   humanBytes(inputs_->bytes())));
         return {};
     }
 
-    Result<void> distribute() {
-        if (isReady_) return content_.complete(*inputs_);
+    Result<void> send() {
         const bool isCounted = tree_.has_value();
-        STIPPLE_TRY(agree(limits_.ranks, content_.survey(*workspace_, progress_, isCounted)));
-        clock_.ends("survey");
-        if (!isCounted) STIPPLE_TRY(agree(limits_.ranks, count()));
+        STIPPLE_TRY(agree(ranks(), content_.survey(*workspace_, course_.progress, isCounted)));
+        course_.clock.ends("survey");
+        if (!isCounted) STIPPLE_TRY(agree(ranks(), count()));
         if (workspace_->isOnDisk())
-            STIPPLE_TRY(workspace_->announce(
-                content_.temporaryBytes(limits_.ranks != nullptr ? limits_.ranks->count() : 1), progress_));
-        CellSender sender(*workspace_, *inputs_, content_, executor_, progress_, *tree_, bufferBytes_, blocksSent_);
-        const auto send = [&]() -> Result<void> {
+            STIPPLE_TRY(workspace_->announce(content_.temporaryBytes(ranks() != nullptr ? ranks()->count() : 1),
+                                             course_.progress));
+        CellSender sender(*workspace_, *inputs_, content_, course_.executor, course_.progress, *tree_, bufferBytes_,
+                          blocksSent_);
+        const auto sendAll = [&]() -> Result<void> {
             STIPPLE_TRY(content_.send(sender));
             if (content_.inputIdentity() != identity_)
                 return fail(ErrorKind::input, "changed while it was read", content_.source(),
                             "build again when it is complete");
             return {};
         };
-        STIPPLE_TRY(agree(limits_.ranks, send()));
+        STIPPLE_TRY(agree(ranks(), sendAll()));
         STIPPLE_TRY(sender.note(Journal::What::ready));
-        STIPPLE_TRY(agree(limits_.ranks, content_.complete(*inputs_)));
-        report_.temporaryBytes = sender.mostTemporaryBytes();
+        STIPPLE_TRY(agree(ranks(), content_.complete(*inputs_)));
+        course_.report.temporaryBytes = sender.mostTemporaryBytes();
         tree_.reset();
-        clock_.ends("distribute");
+        course_.clock.ends("distribute");
         return {};
     }
 
@@ -262,12 +255,12 @@ class CellBuild {
             STIPPLE_TRY(content_.places([&](const Coordinates& places, uint64_t of) -> Result<void> {
                 tree_->count(places);
                 done += places.size();
-                progress_.update("count", std::min(done, of), of);
+                course_.progress.update("count", std::min(done, of), of);
                 return workspace_->checkStopped();
             }));
         } while (tree_->split());
         tree_->finish();
-        clock_.ends("count");
+        course_.clock.ends("count");
         STIPPLE_TRY(content_.check(tree_->subtrees()));
         inputs_->plan(tree_->subtrees());
         ByteWriter to;
@@ -276,48 +269,26 @@ class CellBuild {
         return workspace_->note(Journal::What::counted, to.bytes());
     }
 
-    Result<void> finish(StoreWriter& writer) {
-        StoreDescription description;
-        STIPPLE_ASSIGN(Hierarchy hierarchy, content_.describe(writer, description, report_));
-        clock_.ends("tables");
-        for (const Node& node : hierarchy.nodes) description.records += node.records;
-        report_.nodes = hierarchy.nodes.size();
-        report_.records = description.records;
-        STIPPLE_TRY(writer.finish(hierarchy, description));
-        clock_.ends("finish");
-        hierarchy = {};  // its memory is needed
-        progress_.update("verify", 0, 1);
-        STIPPLE_ASSIGN(const Store store, openStore(writer.temporaryPath()));
-        STIPPLE_TRY(verifyStore(store, executor_, report_.nodes > kVerifiedNodes ? kVerifiedNodes : 0));
-        clock_.ends("verify");
-        report_.bytesOut = writer.bytes();
-        STIPPLE_TRY(writer.commit());
-        workspace_->remove();
-        report_.contentHash = writer.contentHash();
-        return {};
-    }
-
     CellContent& content_;
-    const std::string output_;
-    const BuildLimits& limits_;
-    Executor& executor_;
-    Progress& progress_;
-    BuildReport report_;
-    StageClock clock_;
-    int workers_;
-    bool isOnDisk_ = false, isReady_ = false;
+    Course& course_;
+    bool isReady_ = false;
     uint64_t bufferBytes_ = 0, identity_ = 0, blocksSent_ = 0;
-    std::optional<Workspace> workspace_;
+    Workspace* workspace_ = nullptr;
     std::optional<CellInputs> inputs_;
     std::optional<CellTree> tree_;
-    std::vector<Journal::Entry> done_;
+    std::optional<Reduction> work_;
 };
 
 }  // namespace
 
 Result<BuildReport> buildCells(CellContent& content, const std::string& output, const BuildLimits& limits,
                                Executor& executor, Progress& progress) {
-    return CellBuild(content, output, limits, executor, progress).run();
+    // (Shares as measured with 300k triangles and 1.2M segments.)
+    return runCourse(output, limits, executor, progress,
+                     {{"survey", 3}, {"count", 5}, {"distribute", 7}, {"build", 60}, {"verify", 25}},
+                     [&](Course& course) -> Result<std::unique_ptr<BuildStages>> {
+                         return std::make_unique<CellStages>(content, course);
+                     });
 }
 
 }  // namespace stipple::lod

@@ -1,10 +1,11 @@
-// The course of a build whose content is worked on cell by cell (reduction.h): survey, count, distribute, work, finish,
-// verify. What differs between kinds of content, they say of themselves.
+// The stages (course.h) of a build whose content is worked on cell by cell (reduction.h). What differs between kinds of
+// content, they say of themselves.
 #pragma once
 
 #include <memory>
 #include <string>
 
+#include "lod/builder/octree/course.h"
 #include "lod/builder/octree/reduction.h"
 
 namespace stipple::lod {
