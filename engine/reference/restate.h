@@ -67,6 +67,9 @@ struct Variation {
     bool hasColours = true;
 };
 
+/// Depth of a sample's plane at an image point; see planeDepth (shaders/shared) for what is capped.
+double depthAt(const Sample& s, const glm::dvec2& point, const lod::View& view);
+
 using Chunks = std::unordered_map<uint64_t, lod::Chunk>;  ///< by source << 32 | chunk
 
 /// The restating backend, but for how it varies.

@@ -27,17 +27,17 @@ void fill(const DrawSettings& settings, const glm::dmat3& cameraFromWorld, DrawL
 
 }  // namespace
 
-extern const Effect kEnvironment;
-constinit const Effect kEnvironment{.name = "environment",
-                                    .summary = "light and reflections of an HDR picture",
-                                    .isRequested = [](const DrawSettings& s) { return s.environment != nullptr; },
-                                    .ofScene = [](const EffectScene& scene) { return !scene.instances.empty(); },
-                                    .ofFrame = isLit,
-                                    .ofNode = nullptr,
-                                    .fill = fill,
-                                    .stage = Stage::light,
-                                    .passes = {},
-                                    .tolerancePixels = 0,
-                                    .toleranceSteps = 0};
+extern const Effect environmentEffect;
+constinit const Effect environmentEffect{.name = "environment",
+                                         .summary = "light and reflections of an HDR picture",
+                                         .isRequested = [](const DrawSettings& s) { return s.environment != nullptr; },
+                                         .ofScene = [](const EffectScene& scene) { return !scene.instances.empty(); },
+                                         .ofFrame = isLit,
+                                         .ofNode = nullptr,
+                                         .fill = fill,
+                                         .stage = Stage::light,
+                                         .passes = {},
+                                         .tolerancePixels = 0,
+                                         .toleranceSteps = 0};
 
 }  // namespace stipple::render

@@ -40,17 +40,17 @@ bool isLit(const EffectFrame& frame) {
     return s.debugView == shared::kDebugNone && isAnyLit;
 }
 
-extern const Effect kLight;
-constinit const Effect kLight{.name = "light",
-                              .summary = "a sun, or the scene's own lights",
-                              .isRequested = [](const DrawSettings& s) { return s.lit || !s.unlitTriangles; },
-                              .ofScene = [](const EffectScene& scene) { return !scene.instances.empty(); },
-                              .ofFrame = isLit,
-                              .ofNode = nullptr,
-                              .fill = fill,
-                              .stage = Stage::light,
-                              .passes = kPasses,
-                              .tolerancePixels = 0,
-                              .toleranceSteps = 0};
+extern const Effect lightEffect;
+constinit const Effect lightEffect{.name = "light",
+                                   .summary = "a sun, or the scene's own lights",
+                                   .isRequested = [](const DrawSettings& s) { return s.lit || !s.unlitTriangles; },
+                                   .ofScene = [](const EffectScene& scene) { return !scene.instances.empty(); },
+                                   .ofFrame = isLit,
+                                   .ofNode = nullptr,
+                                   .fill = fill,
+                                   .stage = Stage::light,
+                                   .passes = kPasses,
+                                   .tolerancePixels = 0,
+                                   .toleranceSteps = 0};
 
 }  // namespace stipple::render

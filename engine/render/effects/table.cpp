@@ -7,11 +7,17 @@
 
 namespace stipple::render {
 
-extern const Effect kWind, kLight, kEnvironment;
+#define STIPPLE_EFFECT(name) extern const Effect name##Effect;
+#include "engine/render/effects/effects.inl"
+#undef STIPPLE_EFFECT
 
 namespace {
 
-constexpr std::array kEffects{&kWind, &kLight, &kEnvironment};
+constexpr std::array kEffects{
+#define STIPPLE_EFFECT(name) &name##Effect,
+#include "engine/render/effects/effects.inl"
+#undef STIPPLE_EFFECT
+};
 static_assert(kEffects.size() <= 32, "EffectSet");
 
 template <typename Holds>

@@ -6,8 +6,8 @@
 
 namespace stipple::render {
 
-extern const Effect kWind;
-constinit const Effect kWind{
+extern const Effect windEffect;
+constinit const Effect windEffect{
     .name = "wind",
     .summary = "plants bend in gusts",
     .isRequested = [](const DrawSettings& s) { return s.wind.strength > 0; },

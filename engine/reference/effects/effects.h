@@ -1,0 +1,20 @@
+// What the restating backend knows of effects.
+#pragma once
+
+#include "engine/reference/restate.h"
+#include "engine/render/effects/effect.h"
+
+namespace stipple::reference {
+
+struct RestatedEffect {
+    /// On reconstructed surfaces, before light (Stage::surface). Null: nothing there.
+    void (*onSurface)(const render::DrawList& draws, Level& level) = nullptr;
+};
+#define STIPPLE_EFFECT(name) extern const RestatedEffect name##Restated;
+#include "engine/render/effects/effects.inl"
+#undef STIPPLE_EFFECT
+
+/// Those of the frame, in their order.
+void applyOnSurface(const render::DrawList& draws, Level& level);
+
+}  // namespace stipple::reference
