@@ -57,10 +57,9 @@ void BuildOptions::addTo(CLI::App& app) {
         ->transform(within(uint64_t{0}, uint64_t{200'000'000}))
         ->capture_default_str();
     addSceneFileOptions(app, allowOutside, repair);
-    app.add_option("--curve-radius", curveRadius,
+    app.add_option("--curve-radius,--strand-radius", curveRadius,
                    "radius of curves that have none, file units (0: a 4000th of the extent)")
         ->transform(within(0.0, 1e300));
-    app.add_option("--strand-radius", curveRadius)->transform(within(0.0, 1e300))->group("");  // its old name
     addOutliersTo(app);
     app.add_flag("--only-points", onlyPoints, "of a PLY mesh take the vertices, as points");
     app.add_flag("--skip-bad", skipBad, "go on past corrupt chunks and files, and say what was lost");

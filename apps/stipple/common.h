@@ -91,6 +91,9 @@ struct OpenedScene {
 /// Another up axis than the files': of heights, light and cameras.
 void turnUp(OpenedScene& scene, lod::UpAxis up);
 
+/// Could these be one scene, and are they there? Nothing is read.
+Result<void> checkInputs(const std::vector<std::string>& inputs);
+
 /// A .stipple file is opened; a .gltf or .glb scene is opened with the stores that its nodes refer to; anything else,
 /// and the meshes of a scene, are built into the cache first (and found there the next time), with all attributes.
 Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build, Executor& executor,

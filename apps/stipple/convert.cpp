@@ -167,8 +167,8 @@ void setupConvert(CLI::App& app, int& status) {
         ->type_name("FILE")
         ->required();
     addForce(*sub, o->force);
-    sub->add_flag("--strands", o->curves)->group("");  // its old name
-    sub->add_flag("--curves", o->curves, "leaves and blades become ribbons, branches tubes; what is neither is kept");
+    sub->add_flag("--curves,--strands", o->curves,
+                  "leaves and blades become ribbons, branches tubes; what is neither is kept");
     sub->add_option("--tolerance", o->fit.tolerance, "how far a part may be from its curve, share of its own width")
         ->transform(within(0.01, 2.0))
         ->capture_default_str();

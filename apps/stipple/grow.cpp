@@ -32,7 +32,7 @@ Result<void> run(Options& o) {
     STIPPLE_TRY(checkStopped(o.output));
     STIPPLE_TRY(grow::writeScan(o.output, points, o.scan));
     if (o.json)
-        printJson("grow", {{"points", points.size()}, {"seconds", nowSeconds() - start}});
+        printJson("grow", {{"output", o.output}, {"points", points.size()}, {"seconds", nowSeconds() - start}});
     else
         fmt::print("{}: {} points, {:.1f} s\n", o.output, points.size(), nowSeconds() - start);
     return {};
@@ -73,7 +73,7 @@ Result<void> runMesh(const MeshRun& o) {
     STIPPLE_TRY(checkStopped(o.output));
     STIPPLE_TRY(scene::writeGltf(scene, o.output));
     if (o.json)
-        printJson("grow", {{"triangles", triangles}, {"seconds", nowSeconds() - start}});
+        printJson("grow", {{"output", o.output}, {"triangles", triangles}, {"seconds", nowSeconds() - start}});
     else
         fmt::print("{}: {} triangles, {:.1f} s\n", o.output, triangles, nowSeconds() - start);
     return {};
@@ -120,9 +120,11 @@ Result<void> runPlant(PlantRun& o) {
     STIPPLE_TRY(checkStopped(o.output));
     STIPPLE_TRY(scene::writeGltf(scene, o.output));
     if (o.json)
-        printJson(
-            "grow",
-            {{"segments", segments}, {"triangles", triangles}, {"trees", trees}, {"seconds", nowSeconds() - start}});
+        printJson("grow", {{"output", o.output},
+                           {"segments", segments},
+                           {"triangles", triangles},
+                           {"trees", trees},
+                           {"seconds", nowSeconds() - start}});
     else
         fmt::print("{}: {} {} a tree, {} trees, {:.1f} s\n", o.output, segments + triangles,
                    o.plant.asTriangles ? "triangles" : "segments", trees, nowSeconds() - start);
@@ -235,8 +237,8 @@ Result<void> runLandscape(LandscapeRun& o) {
                            {"primitives_placed", placed},
                            {"seconds", nowSeconds() - start}});
     else
-        fmt::print("{}: {} plants and stones, {:.4g} segments and triangles, {:.1f} s\n", output, instances,
-                   static_cast<double>(placed), nowSeconds() - start);
+        fmt::print("{}: {} plants and stones, {} segments and triangles, {:.1f} s\n", output, instances, placed,
+                   nowSeconds() - start);
     return {};
 }
 

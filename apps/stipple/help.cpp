@@ -90,7 +90,7 @@ class HelpFormatter final : public CLI::Formatter {
     }
 
   private:
-    /// "-o, --output PICTURE"; of several long names the first.
+    /// "-o, --output PICTURE"; of several long names the first: the others are old ones.
     static std::string leftOf(const CLI::Option* option, bool isUsage) {
         const auto& shorts = option->get_snames();
         const auto& longs = option->get_lnames();

@@ -387,6 +387,7 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
     for (const std::string& input : inputs)
         if (lod::fileKindOf(input) == lod::FileKind::store)
             return fail(ErrorKind::usage, "is built already", input, "render or view it");
+    if (inputs.size() == 1 && lod::isCurveFile(inputs[0]) && build.surfels > 0) return nothingToSample(inputs[0]);
     if (inputs.size() == 1 && lod::isCurveFile(inputs[0]))
         return buildCurveFile(inputs[0], output, build, executor, progress);
     if (!isSceneFile(inputs.front())) return buildFiles(inputs, output, build, executor, progress);
@@ -425,6 +426,7 @@ namespace {
 Result<std::shared_ptr<const lod::Store>> openFiles(const std::vector<std::string>& inputs, const BuildOptions& build,
                                                     Executor& executor, bool showProgress) {
     if (lod::isStoreFile(inputs.front())) return openStoreFile(inputs.front());
+    if (inputs.size() == 1 && lod::isCurveFile(inputs[0]) && build.surfels > 0) return nothingToSample(inputs[0]);
     if (inputs.size() == 1 && lod::isCurveFile(inputs[0]))
         return openCached(inputs, build, "curves", showProgress, [&](const std::string& path, Progress& progress) {
             return buildCurveFile(inputs[0], path, build, executor, progress);
@@ -444,17 +446,27 @@ Result<std::shared_ptr<const lod::Store>> openFiles(const std::vector<std::strin
 
 void turnUp(OpenedScene& scene, lod::UpAxis up) { scene.description.up = lod::axisVector(up); }
 
+Result<void> checkInputs(const std::vector<std::string>& inputs) {
+    for (const std::string& input : inputs)
+        if (inputs.size() > 1 && (lod::isStoreFile(input) || isSceneFile(input)))
+            return fail(ErrorKind::usage, "a built scene and other inputs cannot be mixed", input,
+                        "name one scene, or only raw inputs; a .gltf scene can place several stores");
+    STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs(inputs, nullptr));
+    for (const std::string& file : files)
+        if (std::error_code error; !fs::exists(file, error) && !error)
+            return fail(ErrorKind::input, std::make_error_code(std::errc::no_such_file_or_directory).message(), file,
+                        "check the path and its permissions");
+    return {};
+}
+
 Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& given, Executor& executor,
                               bool showProgress) {
+    STIPPLE_TRY(checkInputs(inputs));
     OpenedScene scene;
     // The axis is of the picture: what is in the cache serves any.
     BuildOptions build = given;
     build.up.clear();
     build.leftovers = lod::Leftovers::goOnOrReplace;
-    for (const std::string& input : inputs)
-        if (inputs.size() > 1 && (lod::isStoreFile(input) || isSceneFile(input)))
-            return fail(ErrorKind::usage, "a built scene and other inputs cannot be mixed", input,
-                        "name one scene, or only raw inputs; a .gltf scene can place several stores");
     if (isSceneFile(inputs.front())) {
         STIPPLE_TRY(openSceneFile(inputs.front(), build, executor, showProgress, scene));
     } else {

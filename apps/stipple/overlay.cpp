@@ -8,6 +8,7 @@
 
 #include "engine/base/process.h"
 #include "engine/base/units.h"
+#include "engine/render/content.h"
 
 namespace stipple::app {
 namespace {
@@ -36,10 +37,16 @@ std::string counted(uint64_t count) {
                                : fmt::format("{:.2f} M", value * 1e-6);
 }
 
-std::string drawnText(const FrameCounters& c) {
-    if (c.trianglesDrawn == 0) return counted(c.recordsDrawn) + " points";
-    if (c.recordsDrawn == 0) return counted(c.trianglesDrawn) + " triangles";
-    return counted(c.recordsDrawn) + " points, " + counted(c.trianglesDrawn) + " triangles";
+/// What the records of a frame are.
+std::string drawnText(const render::FrameState& state) {
+    const FrameCounters& c = state.counters;
+    const render::FrameContent content = render::contentOf(state.draws);
+    const bool hasCurves = content.has(lod::Kind::curves), hasPoints = content.has(lod::Kind::points);
+    const std::string records = counted(c.recordsDrawn) + (!hasCurves   ? " points"
+                                                           : !hasPoints ? " segments"
+                                                                        : " points and segments"),
+                      triangles = counted(c.trianglesDrawn) + " triangles";
+    return c.trianglesDrawn == 0 ? records : c.recordsDrawn == 0 ? triangles : records + ", " + triangles;
 }
 
 /// Where even the coarsest level exceeds the budget, there is no error to state.
@@ -59,7 +66,7 @@ double frameMs(const render::FrameState& state) {
 void drawBrief(const OverlayFacts& f) {
     const FrameCounters& c = f.state.counters;
     ImGui::TextUnformatted(
-        fmt::format("{:.1f} ms   {}   {}   {}   H: keys", frameMs(f.state), errorText(c), drawnText(c), f.hands)
+        fmt::format("{:.1f} ms   {}   {}   {}   H: keys", frameMs(f.state), errorText(c), drawnText(f.state), f.hands)
             .c_str());
 }
 
@@ -79,9 +86,7 @@ void drawFull(const OverlayFacts& f) {
     line(fmt::format("{} nodes, {} missing, {} chunks on their way", c.nodesDrawn, c.nodesMissing, c.requestsInFlight));
     ImGui::ProgressBar(static_cast<float>(c.recordsDrawn + c.trianglesDrawn) / static_cast<float>(budgets.records),
                        ImVec2(300 * unit(), 0),
-                       fmt::format("{} points, {} triangles of {}", counted(c.recordsDrawn), counted(c.trianglesDrawn),
-                                   counted(budgets.records))
-                           .c_str());
+                       fmt::format("{} of {}", drawnText(f.state), counted(budgets.records)).c_str());
     line(fmt::format("resident {}", humanBytes(c.residentBytes)));
     line(fmt::format("debug view: {}   H: keys", kDebugNames.at(f.settings.frame.draw.debugView)));
 }

@@ -19,6 +19,11 @@ std::string PlyMeshes::note() const {
         others, others == 1 ? "" : "s");
 }
 
+tl::unexpected<Error> nothingToSample(const std::string& input) {
+    return fail(ErrorKind::usage, "samples meshes of glTF and OBJ files, and this has none", "--surfels with " + input,
+                "leave it out: points and curves are drawn as they are");
+}
+
 Result<PlyMeshes> findPlyMeshes(const std::vector<std::string>& inputs, const BuildOptions& build) {
     PlyMeshes out;
     if (build.onlyPoints) return out;
@@ -35,6 +40,7 @@ Result<PlyMeshes> findPlyMeshes(const std::vector<std::string>& inputs, const Bu
         return fail(ErrorKind::usage, "samples meshes of glTF and OBJ files, and this is a PLY file with faces",
                     "--surfels with " + out.files.front(),
                     "leave it out to draw triangles, or give --only-points for the vertices");
+    if (build.surfels > 0) return nothingToSample(inputs.front());
     return out;
 }
 

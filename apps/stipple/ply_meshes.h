@@ -19,6 +19,8 @@ struct PlyMeshes {
     /// What is lost where they are built as points, beside files that have nothing else; empty: nothing.
     std::string note() const;
 };
+/// What --surfels is told where there are no meshes.
+tl::unexpected<Error> nothingToSample(const std::string& input);
 Result<PlyMeshes> findPlyMeshes(const std::vector<std::string>& inputs, const BuildOptions& build);
 
 /// The triangles of all `files` in one store. `settings`: without limits and source.

@@ -337,10 +337,9 @@ void addReading(CLI::App& sub, Options& o) {
     sub.add_option("--surfels", o.build.surfels, "turn meshes into that many samples, e.g. 1M; 0: keep triangles")
         ->transform(within(uint64_t{0}, uint64_t{200'000'000}))
         ->capture_default_str();
-    sub.add_option("--curve-radius", o.build.curveRadius,
+    sub.add_option("--curve-radius,--strand-radius", o.build.curveRadius,
                    "radius of curves that have none, file units (0: a 4000th of the extent)")
         ->transform(within(0.0, 1e300));
-    sub.add_option("--strand-radius", o.build.curveRadius)->transform(within(0.0, 1e300))->group("");  // its old name
     sub.add_flag("--only-points", o.build.onlyPoints, "of a PLY mesh take the vertices, as points");
     addSceneFileOptions(sub, o.build.allowOutside, o.build.repair);
     sub.add_flag("--skip-bad", o.build.skipBad, "go on past corrupt chunks and files, and say what was lost");
@@ -362,7 +361,11 @@ void addKernelOptions(CLI::App& sub, Options& o) {
     sub.add_option(
            "--kernel", o.kernel,
            "of mode ewa: where the discs' Gaussians end, in standard deviations: 2, or 3 (even smoother, slower)")
-        ->check(CLI::IsMember({2.0, 3.0}))
+        ->check(CLI::Validator(
+            [](const std::string& text) {
+                return text == "2" || text == "3" ? std::string() : fmt::format("'{}' is neither 2 nor 3", text);
+            },
+            "2|3"))
         ->capture_default_str();
 }
 
@@ -415,14 +418,14 @@ void setupRender(CLI::App& app, int& status) {
         ->transform(within(0.0, 0.5))
         ->capture_default_str();
     sub->add_option("--time", o->seconds, "of the wind, seconds; a path adds its own")
+        ->needs(sub->get_option("--wind"))
         ->transform(within(-1e9, 1e9))
         ->capture_default_str();
     addKernelOptions(*sub, *o);
-    sub->add_option("--curve-exact", o->curveExact,
+    sub->add_option("--curve-exact,--strand-exact", o->curveExact,
                     "half-width in pixels from which ribbons and tubes are filled exactly instead of reconstructed")
         ->transform(within(0.5, 1e9))
         ->capture_default_str();
-    sub->add_option("--strand-exact", o->curveExact)->transform(within(0.5, 1e9))->group("");  // its old name
     sub->add_option("--accumulate", o->accumulate,
                     "the mean of N frames: smooth coverage of curves narrower than a pixel")
         ->transform(within(1, 4096))

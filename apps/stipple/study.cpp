@@ -19,7 +19,7 @@ struct Options {
 
 Result<void> run(const Options& o) {
     if (!o.seeds)
-        return fail(ErrorKind::usage, "only the tables and figures of the papers can be studied so far", "study",
+        return fail(ErrorKind::usage, "says what is to be studied, and is missing", "--seeds",
                     "stipple study --seeds -o FOLDER");
     catchStopSignals();
     STIPPLE_TRY(image::checkModule(true));

@@ -372,6 +372,7 @@ Result<void> run(const ViewOptions& o) {
     STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
     STIPPLE_TRY(o.camera.check());
     STIPPLE_TRY(checkScreenshot(o));
+    STIPPLE_TRY(checkInputs(o.inputs));
     if (!gpu::hasDisplay())
         return fail(ErrorKind::device, "there is no display", "stipple view",
                     "use stipple render, or xvfb-run stipple view");

@@ -113,8 +113,9 @@ void describeFigures(const SeedsReport& report, std::string& out) {
 std::string describeSeeds(const SeedsReport& report) {
     std::string out = fmt::format(
         "# The papers' tables and figures once more\n\n`stipple study --seeds{}`, {:.0f} s; medians of {} frames, the "
-        "modes in turn.\n\n## Tables\n",
-        report.settings.isQuick ? " --quick" : "", report.seconds, report.settings.rounds);
+        "modes in turn. {}.\n\n## Tables\n",
+        report.settings.isQuick ? " --quick" : "", report.seconds, report.settings.rounds,
+        describeMachine(report.machine));
     describeTimes(report, out);
     describeErrors(report, out);
     describeOutlines(report, out);
@@ -169,6 +170,11 @@ nlohmann::json jsonOfSeeds(const SeedsReport& report) {
         figures.push_back({{"file", f.file}, {"source", f.source}, {"title", f.title}, {"panels", f.panels}});
     return {{"quick", report.settings.isQuick},
             {"seconds", report.seconds},
+            {"machine",
+             {{"processor", report.machine.processor},
+              {"threads", report.machine.threads},
+              {"load", report.machine.load},
+              {"date", report.machine.date}}},
             {"models", models},
             {"outlines", outlines},
             {"pinholes", {{"poses", report.pinholePoses}, {"pixels", report.pinholes.looked}, {"open", open}}},

@@ -124,6 +124,7 @@ Result<SeedsReport> studySeeds(const SeedsSettings& settings, const Host& host) 
     const double start = nowSeconds();
     SeedsReport report;
     report.settings = settings;
+    report.machine = machineNow(host.executor.threads());
     std::error_code error;
     if (!settings.dataFolder.empty() && !fs::is_directory(settings.dataFolder, error))
         return fail(ErrorKind::input, "is no folder", settings.dataFolder,

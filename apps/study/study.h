@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/study/figures.h"
+#include "apps/study/machine.h"
 #include "apps/study/measure.h"
 #include "apps/study/outlines.h"
 #include "apps/study/pinholes.h"
@@ -45,6 +46,7 @@ struct ModelMeasure {
 };
 struct SeedsReport {
     SeedsSettings settings;
+    Machine machine;  ///< before the first frame
     std::vector<std::string> devices;
     std::vector<ModelMeasure> models;
     std::vector<OutlineRow> outlines;

@@ -52,6 +52,24 @@ TEST_F(Asked, OptionsGivenTwiceOrWithoutAValueAreNamedAsSuch) {
     EXPECT_EQ(render("--eye=0,0,5 --target=0,0,0").code, 0);
 }
 
+TEST_F(Asked, WhatWouldBeIgnoredIsRefused) {
+    expectOneLine(render("--time 3"), 2, {"--time", "needs --wind as well"});
+    EXPECT_EQ(render("--time 3 --wind 0.1").code, 0);
+    expectOneLine(render("--mode ewa --kernel 2.5"), 2, {"--kernel: '2.5' is neither 2 nor 3"});
+    expectOneLine(render("--surfels 300", "a.ply"), 2, {"--surfels with a.ply", "has none"});
+    expectOneLine(runProgram(folder(), "build a.ply -o b.stipple --surfels 300"), 2, {"--surfels with a.ply"});
+}
+
+TEST_F(Asked, OldNamesOfOptionsDoWhatTheNewOnesDo) {
+    EXPECT_EQ(render("--strand-exact 1").code, 0);
+    EXPECT_EQ(render("--strand-radius 0.5", "a.ply").code, render("--curve-radius 0.5", "a.ply").code);
+    EXPECT_EQ(runProgram(folder(), "convert a.stipple --strands -o c.glb").err,
+              runProgram(folder(), "convert a.stipple --curves -o c.glb").err);
+    expectOneLine(render("--strand-radius x", "a.ply"), 2, {"--curve-radius: 'x' is not a number"});
+    for (const char* command : {"render", "convert", "build"})
+        EXPECT_FALSE(says(runProgram(folder(), std::string(command) + " --help").out, "strand")) << "they are hidden";
+}
+
 TEST_F(Asked, RangesOfColoursAreLookedAtBeforeAnythingIsBuilt) {
     for (const char* range : {"10,5", "5,5", "1", "a,b", "0,inf", "nan,1"}) {
         const Outcome r = render(fmt::format("--colour height --colour-range {}", range), "a.ply");

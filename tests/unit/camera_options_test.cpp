@@ -34,7 +34,7 @@ TEST_F(CameraOptionsTest, WhatCannotBeLookedAtIsRefused) {
         const std::string option = std::string(bad).substr(0, std::string(bad).find_first_of(" ="));
         EXPECT_NE(said_.find(option), std::string::npos) << bad << ": " << said_;
     }
-    EXPECT_EQ(render("--eye 0,0,5 --target 0,0,0 --camera-up 0,1,0 --fov 30 --time 2"), 0) << said_;
+    EXPECT_EQ(render("--eye 0,0,5 --target 0,0,0 --camera-up 0,1,0 --fov 30 --time 2 --wind 0.1"), 0) << said_;
 }
 
 TEST_F(CameraOptionsTest, ASizeThatIsNoneIsRefusedByViewAsByRender) {

@@ -144,6 +144,9 @@ TEST(Study, SeedsWithoutDataNameWhatIsMissing) {
     EXPECT_NE(index.find("![A checker plane to the horizon](checkers.png)"), std::string::npos);
     EXPECT_TRUE(fs::exists(folder / "s/checkers.png"));
     EXPECT_EQ(nlohmann::json::parse(test::slurp(folder / "s/seeds.json"))["pinholes"], j["pinholes"]);
+    EXPECT_GE(j["machine"]["threads"], 1);
+    EXPECT_EQ(j["machine"]["date"].get<std::string>().size(), 10u);
+    EXPECT_NE(test::slurp(folder / "s/index.md").find(j["machine"]["processor"].get<std::string>()), std::string::npos);
     test::expectOneLine(test::runProgram(folder, "study -o t"), 2, {"--seeds"});
 }
 
