@@ -19,6 +19,19 @@ void put(std::vector<uint8_t>& bytes, size_t at, T value) {
     std::memcpy(bytes.data() + at, &value, sizeof(value));
 }
 
+/// Records of `record` bytes: `putPoint(bytes, at, point)` writes one at its place.
+template <typename PutPoint>
+Result<void> writeRecords(OutputFile& file, const std::vector<ScanPoint>& points, size_t record, PutPoint putPoint) {
+    std::vector<uint8_t> bytes;
+    for (size_t first = 0; first < points.size(); first += kBatch) {
+        const size_t count = std::min(kBatch, points.size() - first);
+        bytes.assign(count * record, 0);
+        for (size_t i = 0; i < count; ++i) putPoint(bytes, i * record, points[first + i]);
+        STIPPLE_TRY(file.append(bytes.data(), bytes.size()));
+    }
+    return {};
+}
+
 Result<void> writeLas(OutputFile& file, const std::vector<ScanPoint>& points, const ScanOptions& options) {
     constexpr size_t kRecord = 26, kHeader = 227;
     std::vector<uint8_t> header(kHeader);
@@ -48,21 +61,13 @@ Result<void> writeLas(OutputFile& file, const std::vector<ScanPoint>& points, co
         put(header, 187 + 16 * a, origin + std::round(lo / kScale) * kScale);
     }
     STIPPLE_TRY(file.append(header.data(), header.size()));
-    std::vector<uint8_t> bytes;
-    for (size_t first = 0; first < points.size(); first += kBatch) {
-        const size_t count = std::min(kBatch, points.size() - first);
-        bytes.assign(count * kRecord, 0);
-        for (size_t i = 0; i < count; ++i) {
-            const ScanPoint& p = points[first + i];
-            for (size_t a = 0; a < 3; ++a) {
-                put(bytes, i * kRecord + 4 * a, static_cast<int32_t>(std::lround(p.position.at(a) / kScale)));
-                put(bytes, i * kRecord + 20 + 2 * a, static_cast<uint16_t>(p.colour.at(a) * 257));
-            }
-            put<uint8_t>(bytes, i * kRecord + 14, 0x09);  // return 1 of 1
+    return writeRecords(file, points, kRecord, [](std::vector<uint8_t>& bytes, size_t at, const ScanPoint& p) {
+        for (size_t a = 0; a < 3; ++a) {
+            put(bytes, at + 4 * a, static_cast<int32_t>(std::lround(p.position.at(a) / kScale)));
+            put(bytes, at + 20 + 2 * a, static_cast<uint16_t>(p.colour.at(a) * 257));
         }
-        STIPPLE_TRY(file.append(bytes.data(), bytes.size()));
-    }
-    return {};
+        put<uint8_t>(bytes, at + 14, 0x09);  // return 1 of 1
+    });
 }
 
 Result<void> writePly(OutputFile& file, const std::vector<ScanPoint>& points, const ScanOptions& options) {
@@ -72,21 +77,12 @@ Result<void> writePly(OutputFile& file, const std::vector<ScanPoint>& points, co
         "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
         options.seed, points.size());
     STIPPLE_TRY(file.append(header.data(), header.size()));
-    constexpr size_t kRecord = 27;
-    std::vector<uint8_t> bytes;
-    for (size_t first = 0; first < points.size(); first += kBatch) {
-        const size_t count = std::min(kBatch, points.size() - first);
-        bytes.assign(count * kRecord, 0);
-        for (size_t i = 0; i < count; ++i) {
-            const ScanPoint& p = points[first + i];
-            for (size_t a = 0; a < 3; ++a) {
-                put(bytes, i * kRecord + 8 * a, p.position.at(a) + options.origin.at(a));
-                bytes[i * kRecord + 24 + a] = p.colour.at(a);
-            }
+    return writeRecords(file, points, 27, [&](std::vector<uint8_t>& bytes, size_t at, const ScanPoint& p) {
+        for (size_t a = 0; a < 3; ++a) {
+            put(bytes, at + 8 * a, p.position.at(a) + options.origin.at(a));
+            bytes[at + 24 + a] = p.colour.at(a);
         }
-        STIPPLE_TRY(file.append(bytes.data(), bytes.size()));
-    }
-    return {};
+    });
 }
 
 }  // namespace

@@ -39,6 +39,14 @@ class Panel {
                 return by(reference::makeVariantBackend(name, tools_.executor), v.mode);
         return fail(ErrorKind::usage, "there is no such variant", name);
     }
+    Panels variants(std::initializer_list<const char*> names) const {
+        std::vector<Image> out;
+        for (const char* name : names) {
+            STIPPLE_ASSIGN(Image image, variant(name));
+            out.push_back(std::move(image));
+        }
+        return out;
+    }
     Result<Image> traced() const { return traceStore(store_, view_, isLit_, 4, tools_.executor); }
     const lod::View& view() const { return view_; }
 
@@ -69,11 +77,7 @@ lod::View nearView(const lod::Store& store, double share, uint32_t size) {
 Panels shapes(const FigureTools& tools) {
     STIPPLE_ASSIGN(const StorePtr store, modelOf(tools, kBunny, 20'000));
     const Panel panel(tools, store, nearView(*store, 2.5, 380), true);
-    std::vector<Image> out;
-    for (const char* name : {"squares", "size-only"}) {
-        STIPPLE_ASSIGN(Image image, panel.variant(name));
-        out.push_back(std::move(image));
-    }
+    STIPPLE_ASSIGN(std::vector<Image> out, panel.variants({"squares", "size-only"}));
     STIPPLE_ASSIGN(Image exact, panel.mode(render::Mode::splat));
     out.push_back(std::move(exact));
     STIPPLE_ASSIGN(Image reduced, panel.variant("reduced-radii"));
@@ -143,11 +147,7 @@ Panels blending(const FigureTools& tools) {
 Panels kernels(const FigureTools& tools) {
     STIPPLE_ASSIGN(const StorePtr store, modelOf(tools, kBunny, 10'000));
     const Panel panel(tools, store, nearView(*store, 2.5, 380), true);
-    std::vector<Image> out;
-    for (const char* name : {"box-kernel", "gaussian-kernel"}) {
-        STIPPLE_ASSIGN(Image image, panel.variant(name));
-        out.push_back(std::move(image));
-    }
+    STIPPLE_ASSIGN(std::vector<Image> out, panel.variants({"box-kernel", "gaussian-kernel"}));
     STIPPLE_ASSIGN(Image own, panel.mode(render::Mode::pullpush));
     out.push_back(std::move(own));
     STIPPLE_ASSIGN(Image centre, panel.variant("centre-test"));

@@ -23,6 +23,23 @@ render::Image blank(uint32_t width, uint32_t height) {
     return out;
 }
 
+/// One after the other along x (1, 0) or y (0, 1), with a gap between them.
+render::Image joined(const std::vector<render::Image>& images, uint32_t alongX, uint32_t alongY) {
+    uint32_t width = 0, height = 0;
+    for (const render::Image& i : images) {
+        width = std::max(width, alongX * (width + (width > 0 ? kGap : 0)) + i.width);
+        height = std::max(height, alongY * (height + (height > 0 ? kGap : 0)) + i.height);
+    }
+    render::Image out = blank(width, height);
+    uint32_t x = 0, y = 0;
+    for (const render::Image& i : images) {
+        paste(i, x, y, out);
+        x += alongX * (i.width + kGap);
+        y += alongY * (i.height + kGap);
+    }
+    return out;
+}
+
 }  // namespace
 
 render::Image cropped(const render::Image& image, uint32_t x, uint32_t y, uint32_t width, uint32_t height,
@@ -35,34 +52,8 @@ render::Image cropped(const render::Image& image, uint32_t x, uint32_t y, uint32
     return out;
 }
 
-render::Image sideBySide(const std::vector<render::Image>& images) {
-    uint32_t width = 0, height = 0;
-    for (const render::Image& i : images) {
-        width += i.width + (width > 0 ? kGap : 0);
-        height = std::max(height, i.height);
-    }
-    render::Image out = blank(width, height);
-    uint32_t x = 0;
-    for (const render::Image& i : images) {
-        paste(i, x, 0, out);
-        x += i.width + kGap;
-    }
-    return out;
-}
+render::Image sideBySide(const std::vector<render::Image>& images) { return joined(images, 1, 0); }
 
-render::Image stacked(const std::vector<render::Image>& images) {
-    uint32_t width = 0, height = 0;
-    for (const render::Image& i : images) {
-        height += i.height + (height > 0 ? kGap : 0);
-        width = std::max(width, i.width);
-    }
-    render::Image out = blank(width, height);
-    uint32_t y = 0;
-    for (const render::Image& i : images) {
-        paste(i, 0, y, out);
-        y += i.height + kGap;
-    }
-    return out;
-}
+render::Image stacked(const std::vector<render::Image>& images) { return joined(images, 0, 1); }
 
 }  // namespace stipple::study

@@ -16,7 +16,7 @@
 namespace stipple::cpu {
 namespace {
 
-class CpuBackend final : public render::Backend {
+class CpuBackend final : public render::DrawsAtOnce {
   public:
     CpuBackend(Executor& executor, const Kernels& kernels, uint64_t mostTileEntries)
         : frame_(executor, kernels, chunks_) {
@@ -42,7 +42,6 @@ class CpuBackend final : public render::Backend {
             chunks_.tiles[key.source][key.chunk] = nullptr;
         chunks_.chunks.erase(Chunks::idOf(key));
     }
-    const std::vector<render::PassTime>& passTimes() const override { return times_; }
 
     render::BackendResources resources() const override {
         render::BackendResources r;
@@ -57,25 +56,8 @@ class CpuBackend final : public render::Backend {
         return r;
     }
 
-    Result<void> render(const render::RenderRequest& request, render::Image& image) override {
-        draw(request, image);
-        return {};
-    }
-    Result<render::Ticket> submit(const render::RenderRequest& request) override {
-        draw(request, image_);
-        isRead_ = false;
-        return render::Ticket{++submitted_};
-    }
-    bool isDone(render::Ticket) const override { return true; }
-    Result<void> read(render::Ticket ticket, render::Image& image) override {
-        if (ticket.number != submitted_ || isRead_) return render::noSuchPicture(ticket);
-        std::swap(image, image_);
-        isRead_ = true;
-        return {};
-    }
-
   private:
-    void draw(const render::RenderRequest& request, render::Image& image) {
+    void draw(const render::RenderRequest& request, render::Image& image) override {
         frame_.draws = request.draws;
         frame_.mode = &render::reconstructionOf(request.mode);
         frame_.constants = request.draws->frame;
@@ -105,10 +87,6 @@ class CpuBackend final : public render::Backend {
 
     Chunks chunks_;
     Frame frame_;
-    render::Image image_;  ///< of the last frame, until it is read
-    bool isRead_ = true;
-    uint64_t submitted_ = 0;
-    std::vector<render::PassTime> times_;
 };
 
 }  // namespace

@@ -92,6 +92,40 @@ tl::unexpected<Error> vulkanError(VkResult result, const std::string& what) {
     return fail(kind, fmt::format("{} (VkResult {})", what, static_cast<int>(result)), "Vulkan", "try --device cpu");
 }
 
+Result<void> submitCommands(const Device& device, VkCommandBuffer commands, VkFence fence) {
+    VkCommandBufferSubmitInfo buffer{VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO};
+    buffer.commandBuffer = commands;
+    VkSubmitInfo2 info{VK_STRUCTURE_TYPE_SUBMIT_INFO_2};
+    info.commandBufferInfoCount = 1;
+    info.pCommandBufferInfos = &buffer;
+    if (const VkResult r = vkQueueSubmit2(device.queue, 1, &info, fence); r != VK_SUCCESS)
+        return vulkanError(r, "cannot submit");
+    return {};
+}
+
+VkBufferMemoryBarrier2 bufferBarrier(VkBuffer buffer, BufferTouch before, BufferTouch after) {
+    VkBufferMemoryBarrier2 b{VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER_2};
+    b.srcStageMask = before.stage;
+    b.srcAccessMask = before.access;
+    b.dstStageMask = after.stage;
+    b.dstAccessMask = after.access;
+    b.srcQueueFamilyIndex = b.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    b.buffer = buffer;
+    b.size = VK_WHOLE_SIZE;
+    return b;
+}
+
+void recordBarriers(VkCommandBuffer commands, std::span<const VkBufferMemoryBarrier2> buffers,
+                    const VkMemoryBarrier2* memory) {
+    if (buffers.empty() && memory == nullptr) return;
+    VkDependencyInfo info{VK_STRUCTURE_TYPE_DEPENDENCY_INFO};
+    info.memoryBarrierCount = memory != nullptr ? 1 : 0;
+    info.pMemoryBarriers = memory;
+    info.bufferMemoryBarrierCount = static_cast<uint32_t>(buffers.size());
+    info.pBufferMemoryBarriers = buffers.data();
+    vkCmdPipelineBarrier2(commands, &info);
+}
+
 Result<uint64_t> roomFor(const DeviceLimits& limits, uint64_t bytes, VkBufferUsageFlags usage, const std::string& name,
                          const std::string& deviceName) {
     const bool isBound = (usage & VK_BUFFER_USAGE_STORAGE_BUFFER_BIT) != 0;

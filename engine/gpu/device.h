@@ -77,6 +77,20 @@ class Device {
 /// "what: VK_ERROR_..." as a device error.
 tl::unexpected<Error> vulkanError(VkResult result, const std::string& what);
 
+/// Hands recorded commands to the device's queue; `fence` is signalled when they have run.
+Result<void> submitCommands(const Device& device, VkCommandBuffer commands, VkFence fence);
+
+/// When a buffer was last used, or is used next.
+struct BufferTouch {
+    VkPipelineStageFlags2 stage;
+    VkAccessFlags2 access;
+};
+/// Of the whole buffer, within one queue family.
+VkBufferMemoryBarrier2 bufferBarrier(VkBuffer buffer, BufferTouch before, BufferTouch after);
+/// Any mix of barriers of buffers, and one of all memory (null: none).
+void recordBarriers(VkCommandBuffer commands, std::span<const VkBufferMemoryBarrier2> buffers,
+                    const VkMemoryBarrier2* memory = nullptr);
+
 class Buffer {
   public:
     Buffer() = default;

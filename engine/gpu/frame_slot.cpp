@@ -51,13 +51,7 @@ Result<void> FrameSlot::submit(const render::RenderRequest& request, const Resid
     hasPicture_ = false;
     STIPPLE_TRY(buffers_.prepare(request, residents));
     STIPPLE_TRY(record(request, uploads));
-    VkCommandBufferSubmitInfo buffer{VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO};
-    buffer.commandBuffer = commands_;
-    VkSubmitInfo2 info{VK_STRUCTURE_TYPE_SUBMIT_INFO_2};
-    info.commandBufferInfoCount = 1;
-    info.pCommandBufferInfos = &buffer;
-    if (const VkResult r = vkQueueSubmit2(device_.queue, 1, &info, fence_); r != VK_SUCCESS)
-        return vulkanError(r, "cannot submit");
+    STIPPLE_TRY(submitCommands(device_, commands_, fence_));
     uploads.clear();
     isInFlight_ = true;
     hasPicture_ = true;

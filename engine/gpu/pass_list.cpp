@@ -13,15 +13,8 @@ void PassList::begin(const std::string& name, const std::vector<BufferUse>& uses
         if (!isTransfer && use.writes) access |= VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT;
         const auto found = last_.find(use.buffer);
         if (found != last_.end() && (found->second.wrote || use.writes)) {
-            VkBufferMemoryBarrier2 b{VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER_2};
-            b.srcStageMask = found->second.stage;
-            b.srcAccessMask = found->second.wrote ? found->second.access : VK_ACCESS_2_NONE;
-            b.dstStageMask = stage;
-            b.dstAccessMask = access;
-            b.srcQueueFamilyIndex = b.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-            b.buffer = use.buffer;
-            b.size = VK_WHOLE_SIZE;
-            barriers.push_back(b);
+            const VkAccessFlags2 before = found->second.wrote ? found->second.access : VK_ACCESS_2_NONE;
+            barriers.push_back(bufferBarrier(use.buffer, {found->second.stage, before}, {stage, access}));
         }
         last_[use.buffer] = {stage, access, use.writes};
     }
@@ -31,13 +24,9 @@ void PassList::begin(const std::string& name, const std::vector<BufferUse>& uses
     memory.srcAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT;
     memory.dstStageMask = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
     memory.dstAccessMask = VK_ACCESS_2_SHADER_STORAGE_READ_BIT;
-    VkDependencyInfo info{VK_STRUCTURE_TYPE_DEPENDENCY_INFO};
-    info.memoryBarrierCount = uploaded_ && !isTransfer ? 1 : 0;
-    info.pMemoryBarriers = &memory;
-    info.bufferMemoryBarrierCount = static_cast<uint32_t>(barriers.size());
-    info.pBufferMemoryBarriers = barriers.data();
-    if (info.memoryBarrierCount || info.bufferMemoryBarrierCount) vkCmdPipelineBarrier2(commands_, &info);
-    if (info.memoryBarrierCount) uploaded_ = false;
+    const bool readsUploads = uploaded_ && !isTransfer;
+    recordBarriers(commands_, barriers, readsUploads ? &memory : nullptr);
+    if (readsUploads) uploaded_ = false;
     stamp(static_cast<uint32_t>(names_.size()) * 2);
     names_.push_back(name);
 }
@@ -48,10 +37,7 @@ void PassList::beginUpload() {
     memory.srcAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT;
     memory.dstStageMask = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
     memory.dstAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT;
-    VkDependencyInfo info{VK_STRUCTURE_TYPE_DEPENDENCY_INFO};
-    info.memoryBarrierCount = 1;
-    info.pMemoryBarriers = &memory;
-    vkCmdPipelineBarrier2(commands_, &info);
+    recordBarriers(commands_, {}, &memory);
     begin("upload", {}, true);
     uploaded_ = true;
 }
@@ -68,18 +54,9 @@ void PassList::stamp(uint32_t query) {
 }
 
 void PassList::toHost(VkBuffer buffer) {
-    VkBufferMemoryBarrier2 b{VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER_2};
-    b.srcStageMask = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
-    b.srcAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT;
-    b.dstStageMask = VK_PIPELINE_STAGE_2_HOST_BIT;
-    b.dstAccessMask = VK_ACCESS_2_HOST_READ_BIT;
-    b.srcQueueFamilyIndex = b.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-    b.buffer = buffer;
-    b.size = VK_WHOLE_SIZE;
-    VkDependencyInfo info{VK_STRUCTURE_TYPE_DEPENDENCY_INFO};
-    info.bufferMemoryBarrierCount = 1;
-    info.pBufferMemoryBarriers = &b;
-    vkCmdPipelineBarrier2(commands_, &info);
+    const auto copied = bufferBarrier(buffer, {VK_PIPELINE_STAGE_2_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_WRITE_BIT},
+                                      {VK_PIPELINE_STAGE_2_HOST_BIT, VK_ACCESS_2_HOST_READ_BIT});
+    recordBarriers(commands_, {&copied, 1});
 }
 
 }  // namespace stipple::gpu

@@ -220,13 +220,7 @@ Result<void> Swapchain::runOnce(const std::function<void(VkCommandBuffer)>& reco
     STIPPLE_TRY(begin());
     record(commands_);
     vkEndCommandBuffer(commands_);
-    VkCommandBufferSubmitInfo buffer{VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO};
-    buffer.commandBuffer = commands_;
-    VkSubmitInfo2 info{VK_STRUCTURE_TYPE_SUBMIT_INFO_2};
-    info.commandBufferInfoCount = 1;
-    info.pCommandBufferInfos = &buffer;
-    if (const VkResult r = vkQueueSubmit2(device_.queue, 1, &info, fence_); r != VK_SUCCESS)
-        return vulkanError(r, "cannot submit");
+    STIPPLE_TRY(submitCommands(device_, commands_, fence_));
     vkWaitForFences(device_.device, 1, &fence_, VK_TRUE, ~uint64_t{0});
     vkResetFences(device_.device, 1, &fence_);
     return {};
@@ -244,18 +238,10 @@ Result<void> Swapchain::waitForLast() {
 void Swapchain::recordPixels(const ShownPixels& pixels) {
     const auto transfer = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
     if (pixels.device != VK_NULL_HANDLE) {
-        VkBufferMemoryBarrier2 drawn{VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER_2};
-        drawn.srcStageMask = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
-        drawn.srcAccessMask = VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT;
-        drawn.dstStageMask = transfer;
-        drawn.dstAccessMask = VK_ACCESS_2_TRANSFER_READ_BIT;
-        drawn.srcQueueFamilyIndex = drawn.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-        drawn.buffer = pixels.device;
-        drawn.size = VK_WHOLE_SIZE;
-        VkDependencyInfo info{VK_STRUCTURE_TYPE_DEPENDENCY_INFO};
-        info.bufferMemoryBarrierCount = 1;
-        info.pBufferMemoryBarriers = &drawn;
-        vkCmdPipelineBarrier2(commands_, &info);
+        const auto drawn =
+            bufferBarrier(pixels.device, {VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT, VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT},
+                          {transfer, VK_ACCESS_2_TRANSFER_READ_BIT});
+        recordBarriers(commands_, {&drawn, 1});
     }
     recordBarrier(commands_, imageBarrier(canvas_, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
                                           transfer, 0, transfer, VK_ACCESS_2_TRANSFER_WRITE_BIT));

@@ -7,6 +7,7 @@
 #include "engine/base/check.h"
 #include "engine/base/numbers.h"
 #include "engine/base/process.h"
+#include "engine/reference/effects/effects.h"
 #include "engine/reference/kinds.h"
 #include "engine/reference/reference.h"
 #include "engine/reference/restate_discs.h"
@@ -42,7 +43,8 @@ double rhoSquared(const Sample& s, const dvec2& point, const lod::View& view) {
     return glm::dot(off, off) * view.focalPixels * view.focalPixels / (s.radius * s.radius);
 }
 
-/// Depth of a sample's plane at an image point; see planeDepth for what is capped.
+}  // namespace
+
 double depthAt(const Sample& s, const dvec2& point, const lod::View& view) {
     if (s.isRound) return s.depth;
     const double facing = std::max(std::sqrt(std::max(0.0, 1 - glm::dot(s.perp, s.perp))), 1.0 / 32);
@@ -57,6 +59,8 @@ double depthAt(const Sample& s, const dvec2& point, const lod::View& view) {
     const double reach = std::min(across, 0.5);
     return s.depth / std::clamp(nearer, 1 - reach, 1 + reach);
 }
+
+namespace {
 
 struct Contribution {
     const Sample* sample;
@@ -185,7 +189,7 @@ void pushLevel(Level& fine, const Level& coarse, double fineSize, const lod::Vie
         }
 }
 
-class ReferenceBackend final : public render::Backend {
+class ReferenceBackend final : public render::DrawsAtOnce {
   public:
     ReferenceBackend(Executor& executor, const Variation& variation) : executor_(executor), variation_(variation) {}
     std::string name() const override { return "reference"; }
@@ -195,9 +199,9 @@ class ReferenceBackend final : public render::Backend {
         return {};
     }
     void evict(streaming::ChunkKey key) override { chunks_.erase(uint64_t{key.source} << 32 | key.chunk); }
-    const std::vector<render::PassTime>& passTimes() const override { return times_; }
 
-    Result<render::Ticket> submit(const render::RenderRequest& request) override {
+  private:
+    void draw(const render::RenderRequest& request, render::Image& image) override {
         const double start = nowSeconds();
         const render::DrawList& draws = *request.draws;
         const render::Reconstruction& mode = render::reconstructionOf(request.mode);
@@ -207,20 +211,10 @@ class ReferenceBackend final : public render::Backend {
         const Level own = level0;
         if (mode.hasPyramid) reconstruct(level0, draws.view);
         finishTubes(draws.view, level0);
-        shade(draws, own, level0, request.wantDepthAndNormal, image_);
+        applyOnSurface(draws, level0);
+        shade(draws, own, level0, request.wantDepthAndNormal, image);
         times_ = {{"reference", (nowSeconds() - start) * 1e3}};
-        isRead_ = false;
-        return render::Ticket{++submitted_};
     }
-    bool isDone(render::Ticket) const override { return true; }
-    Result<void> read(render::Ticket ticket, render::Image& image) override {
-        if (ticket.number != submitted_ || isRead_) return render::noSuchPicture(ticket);
-        std::swap(image, image_);
-        isRead_ = true;
-        return {};
-    }
-
-  private:
     Level projectAll(const render::DrawList& draws, const render::Reconstruction& mode) {
         const lod::View& v = draws.view;
         Level level{static_cast<int>(v.width), static_cast<int>(v.height), {}};
@@ -359,10 +353,6 @@ class ReferenceBackend final : public render::Backend {
     Executor& executor_;
     const Variation variation_;
     Chunks chunks_;
-    render::Image image_;  ///< of the last frame, until it is read
-    bool isRead_ = true;
-    uint64_t submitted_ = 0;
-    std::vector<render::PassTime> times_;
 };
 
 }  // namespace

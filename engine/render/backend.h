@@ -90,6 +90,25 @@ class Backend : public streaming::ChunkSink {
     std::shared_ptr<const int> life_ = std::make_shared<const int>(0);
 };
 
+/// A backend that draws where a frame is handed in: nothing is in flight.
+class DrawsAtOnce : public Backend {
+  public:
+    Result<Ticket> submit(const RenderRequest& request) final;
+    bool isDone(Ticket) const final { return true; }
+    Result<void> read(Ticket ticket, Image& image) final;
+    Result<void> render(const RenderRequest& request, Image& image) final;
+    const std::vector<PassTime>& passTimes() const final { return times_; }
+
+  protected:
+    virtual void draw(const RenderRequest& request, Image& image) = 0;
+    std::vector<PassTime> times_;  ///< of draw
+
+  private:
+    Image image_;  ///< of the last frame, until it is read
+    bool isRead_ = true;
+    uint64_t submitted_ = 0;
+};
+
 /// What read says of a picture that was read or given up.
 tl::unexpected<Error> noSuchPicture(Ticket ticket);
 

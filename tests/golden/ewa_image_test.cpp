@@ -10,6 +10,7 @@
 #include "tests/support/drawn_discs.h"
 #include "tests/support/drawn_shapes.h"
 #include "tests/support/meshes.h"
+#include "tests/support/mode_checks.h"
 #include "tests/support/support.h"
 
 namespace stipple {
@@ -18,14 +19,7 @@ namespace {
 using glm::dvec2;
 using glm::dvec3;
 
-render::FrameSettings blended(render::Mode mode = render::Mode::ewa) {
-    render::FrameSettings settings;
-    settings.mode = mode;
-    settings.budgets.errorPixels = 1e-4;
-    settings.wantDepthAndNormal = true;
-    settings.draw.lit = false;
-    return settings;
-}
+render::FrameSettings blended(render::Mode mode = render::Mode::ewa) { return test::drawnAs(mode, 1e-4, false); }
 
 double coverageOf(const render::Image& image, size_t pixel) { return (image.rgba[pixel] >> 24) / 255.0; }
 double channel(const render::Image& image, size_t pixel, int c) {
@@ -199,32 +193,15 @@ TEST(Ewa, OneColourStaysOneColour) {
 }
 
 TEST(Ewa, LeavesNoHolesInClosedSurfaces) {
-    const test::TempFolder folder;
-    const auto executor = makeTbbExecutor(0);
-    const auto backend = cpu::makeCpuBackend(*executor);
-    test::writePly(folder / "a.ply", test::samplesOf(test::Shape::torus, 20'000, 3));
-    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
-    Rng rng(8);
     size_t holes = 0, clear = 0, looked = 0;
-    for (int pose = 0; pose < 60; ++pose) {
-        const lod::View view =
-            test::lookAt(*store, rng.uniform(0, 360), rng.uniform(-80, 80), std::exp2(rng.uniform(-0.7, 2)), 128);
-        render::FrameSettings settings = blended();
-        settings.budgets.errorPixels = pose % 2 == 0 ? 1 : 1e-4;
-        const render::Image image = test::renderView(store, *backend, *executor, view, settings);
-        for (uint32_t y = 2; y + 2 < view.height; ++y)
-            for (uint32_t x = 2; x + 2 < view.width; ++x) {
-                bool isInside = true;
-                for (int k = 0; k < 9 && isInside; ++k)
-                    isInside =
-                        test::meetsShape(test::Shape::torus, view.eye,
-                                         test::rayThrough(view, x + 0.5 + 2 * (k % 3 - 1), y + 0.5 + 2 * (k / 3 - 1)));
-                if (!isInside) continue;
-                ++looked;
-                holes += image.rgba[size_t{y} * view.width + x] >> 24 == 0;
-                clear += image.rgba[size_t{y} * view.width + x] >> 24 < 255;
-            }
-    }
+    test::forViewsOfAClosedSurface(60, 128, -0.7, [&](const test::InsideView& v) {
+        const render::Image image = v.draw(test::drawnAs(render::Mode::ewa, v.errorPixels, false));
+        for (const size_t i : v.pixels) {
+            holes += image.rgba[i] >> 24 == 0;
+            clear += image.rgba[i] >> 24 < 255;
+        }
+        looked += v.pixels.size();
+    });
     std::printf("%zu pixels inside outlines: %zu holes, %zu not covered wholly\n", looked, holes, clear);
     EXPECT_GT(looked, 50'000u);
     EXPECT_EQ(holes, 0u);
@@ -385,26 +362,7 @@ TEST(Ewa, FlickersLessThanSplat) {
     EXPECT_LE(ewa, splat / 4);
 }
 
-TEST(Ewa, IsTheSameBytesForAnyThreads) {
-    const test::TempFolder folder;
-    const auto one = makeTbbExecutor(1), four = makeTbbExecutor(4);
-    test::writePly(folder / "a.ply", test::anyDiscs(30'000, 6), true, true);
-    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *four);
-    lod::View view = test::viewFromAbove({0, 0, 0});
-    view.width = 333;
-    const auto of = [&](Executor& executor) {
-        render::Image image;
-        for (auto& [name, backend] : test::cpuBackendsAndOracle(executor)) {
-            if (name == "fp64") continue;
-            const render::Image drawn = test::renderView(store, *backend, executor, view, blended());
-            if (!image.rgba.empty()) EXPECT_TRUE(image.rgba == drawn.rgba && image.depth == drawn.depth) << name;
-            image = drawn;
-        }
-        return image;
-    };
-    const render::Image a = of(*one), b = of(*four);
-    EXPECT_TRUE(a.rgba == b.rgba && a.depth == b.depth && a.normal == b.normal);
-}
+TEST(Ewa, IsTheSameBytesForAnyThreads) { test::expectSameForAnyThreads(blended()); }
 
 /// Lists that do not fit at once are drawn some rows of tiles after others: the same bytes.
 TEST(Ewa, TilesInBandsAreTheSameBytes) {

@@ -19,14 +19,7 @@ namespace {
 using glm::dvec2;
 using glm::dvec3;
 
-render::FrameSettings blended(render::Mode mode = render::Mode::ewa) {
-    render::FrameSettings settings;
-    settings.mode = mode;
-    settings.budgets.errorPixels = 1e-4;
-    settings.wantDepthAndNormal = true;
-    settings.draw.lit = false;
-    return settings;
-}
+render::FrameSettings blended(render::Mode mode = render::Mode::ewa) { return test::drawnAs(mode, 1e-4, false); }
 
 int grey(const render::Image& image, size_t pixel) { return static_cast<int>(image.rgba[pixel] >> 8 & 255); }
 int coverage(const render::Image& image, size_t pixel) { return static_cast<int>(image.rgba[pixel] >> 24); }

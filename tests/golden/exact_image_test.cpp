@@ -10,18 +10,11 @@
 #include "shaders/shared/disc_level.h"
 #include "tests/support/drawn_discs.h"
 #include "tests/support/drawn_shapes.h"
+#include "tests/support/mode_checks.h"
 #include "tests/support/support.h"
 
 namespace stipple {
 namespace {
-
-render::FrameSettings drawnAs(render::Mode mode, double tau) {
-    render::FrameSettings settings;
-    settings.mode = mode;
-    settings.budgets.errorPixels = tau;
-    settings.wantDepthAndNormal = true;
-    return settings;
-}
 
 TEST(ExactLevels, AreWhatModeSplatDraws) {
     const test::TempFolder folder;
@@ -43,7 +36,7 @@ TEST(ExactLevels, AreWhatModeSplatDraws) {
                 for (const double tau : {1e-4, 3.0})
                     for (auto& [backendName, backend] : test::cpuBackendsAndOracle(*executor)) {
                         const auto draw = [&](render::Mode mode) {
-                            return test::renderView(store, *backend, *executor, view, drawnAs(mode, tau));
+                            return test::renderView(store, *backend, *executor, view, test::drawnAs(mode, tau));
                         };
                         const render::Image exact = draw(render::Mode::pullpushExact),
                                             splat = draw(render::Mode::splat);
@@ -110,34 +103,12 @@ TEST(ExactLevels, HoldEveryDiscWithinTheirTaps) {
 }
 
 TEST(ExactLevels, LeaveNoHolesInClosedSurfaces) {
-    const test::TempFolder folder;
-    const auto executor = makeTbbExecutor(0);
-    const auto backend = cpu::makeCpuBackend(*executor);
-    test::writePly(folder / "a.ply", test::samplesOf(test::Shape::torus, 20'000, 3));
-    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
-    Rng rng(11);
     size_t looked = 0, holes = 0, ofPoints = 0;
-    for (int pose = 0; pose < 60; ++pose) {
-        const lod::View view =
-            test::lookAt(*store, rng.uniform(0, 360), rng.uniform(-80, 80), std::exp2(rng.uniform(-1.5, 2)), 96);
-        const double tau = pose % 2 == 0 ? 1 : 1e-4;
-        const auto draw = [&](render::Mode mode) {
-            return test::renderView(store, *backend, *executor, view, drawnAs(mode, tau));
-        };
-        const render::Image exact = draw(render::Mode::pullpushExact), points = draw(render::Mode::points);
-        for (uint32_t y = 2; y + 2 < view.height; ++y)
-            for (uint32_t x = 2; x + 2 < view.width; ++x) {
-                bool isInside = true;  // well inside the outline
-                for (int k = 0; k < 9 && isInside; ++k)
-                    isInside =
-                        test::meetsShape(test::Shape::torus, view.eye,
-                                         test::rayThrough(view, x + 0.5 + 2 * (k % 3 - 1), y + 0.5 + 2 * (k / 3 - 1)));
-                if (!isInside) continue;
-                ++looked;
-                holes += exact.depth[size_t{y} * view.width + x] <= 0;
-                ofPoints += points.depth[size_t{y} * view.width + x] <= 0;
-            }
-    }
+    test::forViewsOfAClosedSurface(60, 96, -1.5, [&](const test::InsideView& v) {
+        holes += v.openIn(test::drawnAs(render::Mode::pullpushExact, v.errorPixels));
+        ofPoints += v.openIn(test::drawnAs(render::Mode::points, v.errorPixels));
+        looked += v.pixels.size();
+    });
     EXPECT_GT(looked, 100'000u);
     EXPECT_EQ(holes, 0u);
     EXPECT_GT(ofPoints, looked / 20) << "the control";

@@ -6,9 +6,7 @@
 #include <cmath>
 
 #include "engine/cpu/cpu_backend.h"
-#ifdef STIPPLE_ON_GPU
-#include "engine/gpu/gpu_backend.h"
-#endif
+#include "tests/support/backends_here.h"
 #include "tests/support/drawn_discs.h"
 #include "tests/support/drawn_shapes.h"
 #include "tests/support/program.h"
@@ -23,20 +21,8 @@ constexpr uint32_t kSize = 200;  // a software device is slow
 constexpr uint32_t kSize = 400;
 #endif
 
-class FullMesh : public testing::Test {
+class FullMesh : public test::BackendsHere {
   protected:
-    void SetUp() override {
-#ifdef STIPPLE_ON_GPU
-        gpu::GpuSettings settings;
-        settings.validation = true;
-        auto backend = gpu::makeGpuBackend(settings);
-        ASSERT_TRUE(backend) << backend.error().line();
-        backend_ = std::move(*backend);
-#else
-        backend_ = cpu::makeCpuBackend(*executor_);
-#endif
-    }
-
     struct Beyond {
         size_t drawn = 0, beyond = 0;
         double worst = 0;  ///< px, of all
@@ -49,7 +35,7 @@ class FullMesh : public testing::Test {
         settings.budgets.errorPixels = drawnWith > 0 ? drawnWith : tau;
         settings.wantDepthAndNormal = true;
         FrameCounters counters;
-        const render::Image image = test::renderView(store, *backend_, *executor_, view, settings, &counters);
+        const render::Image image = test::renderView(store, usual(), *executor_, view, settings, &counters);
         Beyond b;
         b.triangles = counters.trianglesDrawn;
         for (size_t i = 0; i < image.depth.size(); ++i) {
@@ -96,10 +82,6 @@ class FullMesh : public testing::Test {
         const Beyond coarse = measure(store, full, test::lookAt(*store, 30, 35, 0.9, kSize), 0.5, 64);
         EXPECT_GT(coarse.beyond, coarse.drawn / 200) << name;
     }
-
-    test::TempFolder folder_;
-    std::unique_ptr<Executor> executor_ = makeTbbExecutor(2);
-    std::unique_ptr<render::Backend> backend_;
 };
 
 TEST_F(FullMesh, OfGrownOnesIsWhereThePictureSays) {

@@ -9,12 +9,10 @@
 #include <map>
 
 #include "engine/cpu/cpu_backend.h"
-#ifdef STIPPLE_ON_GPU
-#include "engine/gpu/gpu_backend.h"
-#endif
 #include "engine/reference/decode.h"
 #include "engine/reference/reference.h"
 #include "engine/scene/camera.h"
+#include "tests/support/backends_here.h"
 #include "tests/support/curves.h"
 #include "tests/support/drawn_discs.h"
 #include "tests/support/meshes.h"
@@ -134,7 +132,7 @@ struct Figures {
     double degrees = 0;             ///< between normals, of every second pixel (at joints two surfaces are one)
 };
 
-class Orthographic : public ::testing::Test {
+class Orthographic : public test::BackendsHere {
   protected:
     static constexpr uint32_t kWidth = 121, kHeight = 90;
 
@@ -236,18 +234,6 @@ class Orthographic : public ::testing::Test {
             judge(test::draw({{store, {}, {}}}, *backend, *executor_, view, settings), name, false);
     }
 
-    void SetUp() override {
-#ifdef STIPPLE_ON_GPU
-        gpu::GpuSettings settings;
-        settings.validation = true;
-        auto backend = gpu::makeGpuBackend(settings);
-        ASSERT_TRUE(backend) << backend.error().line();
-        backends_["gpu"] = std::move(*backend);
-#else
-        backends_ = test::cpuBackendsAndOracle(*executor_);
-#endif
-    }
-
     /// Discs on a square of edge 2 in the plane z = 0 that overlap.
     std::shared_ptr<const lod::Store> sheet() {
         std::vector<test::TestPoint> points;
@@ -261,10 +247,6 @@ class Orthographic : public ::testing::Test {
         test::writePly(folder_ / "sheet.ply", points, true, true);
         return test::buildAndOpen(folder_ / "sheet.ply", folder_ / "sheet.stipple", *executor_, 8192);
     }
-
-    test::TempFolder folder_;
-    std::unique_ptr<Executor> executor_ = makeTbbExecutor(0);
-    std::map<std::string, std::unique_ptr<render::Backend>> backends_;
 };
 
 TEST_F(Orthographic, DiscsLieInTheirPlane) {

@@ -9,13 +9,11 @@
 
 #include "engine/cpu/cpu_backend.h"
 #include "engine/cpu/kernels.h"
-#ifdef STIPPLE_ON_GPU
-#include "engine/gpu/gpu_backend.h"
-#endif
 #include "engine/reference/decode.h"
 #include "engine/reference/reference.h"
 #include "engine/scene/camera.h"
 #include "lod/store/store.h"
+#include "tests/support/backends_here.h"
 #include "tests/support/curves.h"
 #include "tests/support/meshes.h"
 
@@ -79,7 +77,7 @@ struct Figures {
     double iou = 1, depthPixels = 0, degrees = 0;
 };
 
-class Ribbons : public testing::Test {
+class Ribbons : public test::BackendsHere {
   protected:
     struct Case {
         const char* name;
@@ -174,7 +172,7 @@ class Ribbons : public testing::Test {
         if (!angles.empty()) f.degrees = angles[angles.size() - 1 - angles.size() / 1000];
         return f;
     }
-    void expectTrue(const std::map<std::string, render::Backend*>& backends) {
+    void expectTrue() {
         render::FrameSettings settings;
         settings.draw.lit = true;
         settings.draw.worldUp = {0, 1, 0};
@@ -200,7 +198,7 @@ class Ribbons : public testing::Test {
             camera.fovDegrees = 120;
             const lod::View view = scene::makeView(camera, 240, 180, 1e-3);
             const std::vector<RayPicture> truth = rays(segments, view);
-            for (const auto& [name, backend] : backends) {
+            for (const auto& [name, backend] : backends_) {
                 const Figures f =
                     compare(test::draw({{store, {}, {}}}, *backend, *executor_, view, settings), view, truth);
                 SCOPED_TRACE(fmt::format("{}, {}", name, c.name));
@@ -214,27 +212,9 @@ class Ribbons : public testing::Test {
             }
         }
     }
-    test::TempFolder folder_;
-    std::unique_ptr<Executor> executor_ = makeTbbExecutor(0);
 };
 
-#ifndef STIPPLE_ON_GPU
-TEST_F(Ribbons, OfTheCpuBackendAndTheOracleAreWhatRaysMeetInWidePictures) {
-    const auto backends = test::cpuBackendsAndOracle(*executor_);
-    std::map<std::string, render::Backend*> named;
-    for (const auto& [name, backend] : backends) named[name] = backend.get();
-    expectTrue(named);
-}
-#else
-TEST_F(Ribbons, OfTheGpuBackendAreWhatRaysMeetInWidePictures) {
-    gpu::GpuSettings settings;
-    settings.validation = true;
-    auto backend = gpu::makeGpuBackend(settings);
-    ASSERT_TRUE(backend) << backend.error().line();
-    expectTrue({{"gpu", backend->get()}});
-    for (const std::string& message : gpu::validationMessages(**backend)) ADD_FAILURE() << message;
-}
-#endif
+TEST_F(Ribbons, AreWhatRaysMeetInWidePictures) { expectTrue(); }
 
 }  // namespace
 }  // namespace stipple

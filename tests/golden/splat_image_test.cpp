@@ -9,6 +9,7 @@
 #include "engine/reference/reference.h"
 #include "tests/support/drawn_discs.h"
 #include "tests/support/drawn_shapes.h"
+#include "tests/support/mode_checks.h"
 #include "tests/support/support.h"
 
 namespace stipple {
@@ -16,13 +17,7 @@ namespace {
 
 using glm::dvec3;
 
-render::FrameSettings splats() {
-    render::FrameSettings settings;
-    settings.mode = render::Mode::splat;
-    settings.budgets.errorPixels = 1e-4;
-    settings.wantDepthAndNormal = true;
-    return settings;
-}
+render::FrameSettings splats() { return test::drawnAs(render::Mode::splat); }
 
 /// Pixels that hold the centre of a disc.
 std::vector<bool> centresOf(const std::vector<reference::Disc>& discs, const lod::View& view) {
@@ -174,66 +169,19 @@ TEST(Splats, ShowTheColoursAndNormalsOfTheDiscInFront) {
 }
 
 TEST(Splats, LeaveNoHolesInClosedSurfaces) {
-    const test::TempFolder folder;
-    const auto executor = makeTbbExecutor(0);
-    const auto backend = cpu::makeCpuBackend(*executor);
-    test::writePly(folder / "a.ply", test::samplesOf(test::Shape::torus, 20'000, 3));
-    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
-    Rng rng(8);
     size_t holes = 0, looked = 0, ofPoints = 0;
-    for (int pose = 0; pose < 60; ++pose) {
-        const lod::View view =
-            test::lookAt(*store, rng.uniform(0, 360), rng.uniform(-80, 80), std::exp2(rng.uniform(-0.7, 2)), 128);
-        for (const render::Mode mode : {render::Mode::splat, render::Mode::points}) {
-            render::FrameSettings settings = splats();
-            settings.mode = mode;
-            settings.budgets.errorPixels = pose % 2 == 0 ? 1 : 1e-4;
-            const render::Image image = test::renderView(store, *backend, *executor, view, settings);
-            for (uint32_t y = 2; y + 2 < view.height; ++y)
-                for (uint32_t x = 2; x + 2 < view.width; ++x) {
-                    // Well inside the outline: the rays all around meet the torus.
-                    bool isInside = true;
-                    for (int k = 0; k < 9 && isInside; ++k)
-                        isInside = test::meetsShape(
-                            test::Shape::torus, view.eye,
-                            test::rayThrough(view, x + 0.5 + 2 * (k % 3 - 1), y + 0.5 + 2 * (k / 3 - 1)));
-                    if (!isInside) continue;
-                    const bool isOpen = image.depth[size_t{y} * view.width + x] <= 0;
-                    if (mode == render::Mode::splat) {
-                        ++looked;
-                        holes += isOpen;
-                    } else {
-                        ofPoints += isOpen;
-                    }
-                }
-        }
-    }
+    test::forViewsOfAClosedSurface(60, 128, -0.7, [&](const test::InsideView& v) {
+        holes += v.openIn(test::drawnAs(render::Mode::splat, v.errorPixels));
+        ofPoints += v.openIn(test::drawnAs(render::Mode::points, v.errorPixels));
+        looked += v.pixels.size();
+    });
     std::printf("%zu pixels inside outlines: %zu holes, of points %zu\n", looked, holes, ofPoints);
     EXPECT_GT(looked, 50'000u);
     EXPECT_EQ(holes, 0u);
     EXPECT_GT(ofPoints, looked / 10);
 }
 
-TEST(Splats, AreTheSameBytesForAnyThreads) {
-    const test::TempFolder folder;
-    const auto one = makeTbbExecutor(1), four = makeTbbExecutor(4);
-    test::writePly(folder / "a.ply", test::anyDiscs(30'000, 6), true, true);
-    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *four);
-    lod::View view = test::viewFromAbove({0, 0, 0});
-    view.width = 333;
-    const auto of = [&](Executor& executor) {
-        render::Image image;
-        for (auto& [name, backend] : test::cpuBackendsAndOracle(executor)) {
-            if (name == "fp64") continue;
-            const render::Image drawn = test::renderView(store, *backend, executor, view, splats());
-            if (!image.rgba.empty()) EXPECT_TRUE(image.rgba == drawn.rgba && image.depth == drawn.depth) << name;
-            image = drawn;
-        }
-        return image;
-    };
-    const render::Image a = of(*one), b = of(*four);
-    EXPECT_TRUE(a.rgba == b.rgba && a.depth == b.depth && a.normal == b.normal);
-}
+TEST(Splats, AreTheSameBytesForAnyThreads) { test::expectSameForAnyThreads(splats()); }
 
 TEST(Splats, ThousandsAtOnePixelAreAsOne) {
     const test::TempFolder folder;

@@ -9,13 +9,11 @@
 
 #include "engine/cpu/cpu_backend.h"
 #include "engine/cpu/kernels.h"
-#ifdef STIPPLE_ON_GPU
-#include "engine/gpu/gpu_backend.h"
-#endif
 #include "engine/reference/decode.h"
 #include "engine/reference/reference.h"
 #include "engine/scene/camera.h"
 #include "lod/store/store.h"
+#include "tests/support/backends_here.h"
 #include "tests/support/curves.h"
 #include "tests/support/meshes.h"
 
@@ -158,7 +156,7 @@ Figures compare(const render::Image& image, const lod::View& view, const std::ve
     return f;
 }
 
-class Tubes : public testing::Test {
+class Tubes : public test::BackendsHere {
   protected:
     struct Case {
         const char* name;
@@ -205,7 +203,7 @@ class Tubes : public testing::Test {
                        double(pixel / view.width) + 0.5 - 0.5 * view.height);
         return view.forward + (view.right * at.x + view.down * at.y) / view.focalPixels;
     }
-    void expectTrue(const std::map<std::string, render::Backend*>& backends) {
+    void expectTrue() {
         render::FrameSettings settings;
         settings.draw.lit = true;
         settings.draw.worldUp = {0, 1, 0};
@@ -229,7 +227,7 @@ class Tubes : public testing::Test {
                     });
                     render::DrawList draws;
                     render::makeDrawList({}, {}, {}, view, settings.draw, draws);
-                    for (const auto& [name, backend] : backends) {
+                    for (const auto& [name, backend] : backends_) {
                         const render::Image image = test::draw({{store, {}, {}}}, *backend, *executor_, view, settings);
                         const Figures f = compare(image, view, truth, segments[0].colourA, draws.frame);
                         SCOPED_TRACE(fmt::format("{}, {} at {} degrees, fov {}, aside {}, {}", name, c.name, degrees,
@@ -252,18 +250,11 @@ class Tubes : public testing::Test {
             printf("%s: %.1f dB, depth %.4f px, normals %.3f degrees, %zu pixels of wrong coverage at worst\n",
                    name.c_str(), w.psnr, w.depthPixels, w.degrees, w.wrongCoverage);
     }
-    test::TempFolder folder_;
-    std::unique_ptr<Executor> executor_ = makeTbbExecutor(0);
 };
 
-#ifndef STIPPLE_ON_GPU
-TEST_F(Tubes, OfTheCpuBackendAndTheOracleAreWhatRaysMeetFromEverySide) {
-    const auto backends = test::cpuBackendsAndOracle(*executor_);
-    std::map<std::string, render::Backend*> named;
-    for (const auto& [name, backend] : backends) named[name] = backend.get();
-    expectTrue(named);
-}
+TEST_F(Tubes, AreWhatRaysMeetFromEverySide) { expectTrue(); }
 
+#ifndef STIPPLE_ON_GPU
 TEST_F(Tubes, KeepTheirOutlineAndTheirCoverageInWidePictures) {
     // 120 degrees: what is seen beside the middle is stretched by the picture, narrow curves alike.
     const auto backend = cpu::makeCpuBackend(*executor_);
@@ -319,15 +310,6 @@ TEST_F(Tubes, KeepTheirOutlineAndTheirCoverageInWidePictures) {
     }
 }
 
-#else
-TEST_F(Tubes, OfTheGpuBackendAreWhatRaysMeetFromEverySide) {
-    gpu::GpuSettings settings;
-    settings.validation = true;
-    auto backend = gpu::makeGpuBackend(settings);
-    ASSERT_TRUE(backend) << backend.error().line();
-    expectTrue({{"gpu", backend->get()}});
-    for (const std::string& message : gpu::validationMessages(**backend)) ADD_FAILURE() << message;
-}
 #endif
 
 }  // namespace

@@ -7,11 +7,9 @@
 #include <map>
 
 #include "engine/cpu/cpu_backend.h"
-#ifdef STIPPLE_ON_GPU
-#include "engine/gpu/gpu_backend.h"
-#endif
 #include "engine/reference/reference.h"
 #include "engine/scene/camera.h"
+#include "tests/support/backends_here.h"
 #include "tests/support/forests.h"
 #include "tests/support/meshes.h"
 
@@ -22,26 +20,12 @@ using glm::dvec3;
 
 constexpr double kGale = 0.5;  // the most that --wind takes
 
-class Gale : public testing::Test {
+class Gale : public test::BackendsHere {
   protected:
     void SetUp() override {
-#ifdef STIPPLE_ON_GPU
-        gpu::GpuSettings settings;
-        settings.validation = true;
-        auto backend = gpu::makeGpuBackend(settings);
-        ASSERT_TRUE(backend) << backend.error().line();
-        backends_["gpu"] = std::move(*backend);
-#else
-        backends_ = test::cpuBackendsAndOracle(*executor_);
+        BackendsHere::SetUp();
         backends_.erase("fp64");
-#endif
     }
-
-#ifdef STIPPLE_ON_GPU
-    void TearDown() override {
-        for (const std::string& message : gpu::validationMessages(*backends_.at("gpu"))) ADD_FAILURE() << message;
-    }
-#endif
 
     static lod::View viewFrom(const dvec3& eye, const dvec3& target, double fov) {
         scene::Camera camera;
@@ -137,10 +121,6 @@ class Gale : public testing::Test {
             }
         }
     }
-
-    test::TempFolder folder_;
-    std::unique_ptr<Executor> executor_ = makeTbbExecutor(0);
-    std::map<std::string, std::unique_ptr<render::Backend>> backends_;
 };
 
 TEST_F(Gale, BendsDiscsAndTheirNormalsAlikeEverywhere) {

@@ -14,6 +14,7 @@
 #include "engine/reference/reference.h"
 #include "engine/render/frame_passes.h"
 #include "engine/scene/camera.h"
+#include "tests/gpu/one_time_commands.h"
 #include "tests/support/curves.h"
 #include "tests/support/forests.h"
 #include "tests/support/meshes.h"
@@ -300,35 +301,24 @@ TEST(Validation, ADeliberateHazardIsReported) {
         const Device& device = **made;
         auto buffer = Buffer::create(device, 4096, VK_BUFFER_USAGE_TRANSFER_DST_BIT, false, "filled twice");
         EXPECT_TRUE(buffer);
-        VkCommandPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
-        poolInfo.queueFamilyIndex = device.queueFamily;
-        VkCommandPool pool{};
-        EXPECT_EQ(vkCreateCommandPool(device.device, &poolInfo, nullptr, &pool), VK_SUCCESS);
-        VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
-        allocate.commandPool = pool;
-        allocate.commandBufferCount = 1;
-        VkCommandBuffer commands{};
-        EXPECT_EQ(vkAllocateCommandBuffers(device.device, &allocate, &commands), VK_SUCCESS);
+        OneTimeCommands commands(device);
         VkQueryPoolCreateInfo query{VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO};
         query.queryType = VK_QUERY_TYPE_TIMESTAMP;
         query.queryCount = 4;
         VkQueryPool queries{};
         EXPECT_EQ(vkCreateQueryPool(device.device, &query, nullptr, &queries), VK_SUCCESS);
         vkResetQueryPool(device.device, queries, 0, 4);
-        const VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
-        vkBeginCommandBuffer(commands, &begin);
-        PassList list(device, commands, queries);
+        PassList list(device, commands.handle(), queries);
         for (const bool isSecond : {false, true}) {
             std::vector<BufferUse> uses;
             if (!isSecond || saysSo) uses.push_back({buffer->handle(), true});
             list.begin(isSecond ? "second" : "first", uses, true);
-            vkCmdFillBuffer(commands, buffer->handle(), 0, VK_WHOLE_SIZE, isSecond ? 2 : 1);
+            vkCmdFillBuffer(commands.handle(), buffer->handle(), 0, VK_WHOLE_SIZE, isSecond ? 2 : 1);
             list.end();
         }
-        vkEndCommandBuffer(commands);
+        commands.end();
         const std::vector<std::string> messages = device.messages();
         vkDestroyQueryPool(device.device, queries, nullptr);
-        vkDestroyCommandPool(device.device, pool, nullptr);
         return std::count_if(messages.begin(), messages.end(),
                              [](const std::string& m) { return m.find("SYNC-HAZARD") != std::string::npos; });
     };

@@ -13,6 +13,7 @@
 #include "shaders/shared/mesh.h"
 #include "shaders/shared/record.h"
 #include "shaders/shared/texture.h"
+#include "tests/gpu/one_time_commands.h"
 
 namespace stipple::gpu {
 namespace {
@@ -46,7 +47,6 @@ class Echo {
   public:
     Echo(const Device& of, const Buffer& in, const Buffer& out) : device(of) { createPipeline(in, out); }
     ~Echo() {
-        vkDestroyCommandPool(device.device, commandPool, nullptr);
         vkDestroyDescriptorPool(device.device, pool, nullptr);
         vkDestroyPipeline(device.device, pipeline, nullptr);
         vkDestroyShaderModule(device.device, module, nullptr);
@@ -56,25 +56,11 @@ class Echo {
     Echo(const Echo&) = delete;
     Echo& operator=(const Echo&) = delete;
     void run() {
-        VkCommandPoolCreateInfo commandPoolInfo{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
-        commandPoolInfo.queueFamilyIndex = device.queueFamily;
-        ASSERT_EQ(vkCreateCommandPool(device.device, &commandPoolInfo, nullptr, &commandPool), VK_SUCCESS);
-        VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
-        allocate.commandPool = commandPool;
-        allocate.commandBufferCount = 1;
-        VkCommandBuffer commands{};
-        ASSERT_EQ(vkAllocateCommandBuffers(device.device, &allocate, &commands), VK_SUCCESS);
-        const VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
-        vkBeginCommandBuffer(commands, &begin);
-        vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
-        vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout, 0, 1, &set, 0, nullptr);
-        vkCmdDispatch(commands, 1, 1, 1);
-        vkEndCommandBuffer(commands);
-        VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO};
-        submit.commandBufferCount = 1;
-        submit.pCommandBuffers = &commands;
-        ASSERT_EQ(vkQueueSubmit(device.queue, 1, &submit, VK_NULL_HANDLE), VK_SUCCESS);
-        vkDeviceWaitIdle(device.device);
+        OneTimeCommands commands(device);
+        vkCmdBindPipeline(commands.handle(), VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
+        vkCmdBindDescriptorSets(commands.handle(), VK_PIPELINE_BIND_POINT_COMPUTE, layout, 0, 1, &set, 0, nullptr);
+        vkCmdDispatch(commands.handle(), 1, 1, 1);
+        commands.run();
     }
 
   private:
@@ -127,7 +113,6 @@ class Echo {
     VkPipeline pipeline{};
     VkDescriptorPool pool{};
     VkDescriptorSet set{};
-    VkCommandPool commandPool{};
 };
 
 TEST(SharedStructs, EveryFieldComesBackFromTheGpu) {

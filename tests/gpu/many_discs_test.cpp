@@ -6,25 +6,23 @@
 #include <cstdio>
 
 #include "engine/cpu/cpu_backend.h"
-#include "engine/gpu/gpu_backend.h"
 #include "engine/reference/decode.h"
 #include "shaders/shared/ewa.h"
 #include "shaders/shared/wide_disc.h"
+#include "tests/support/backends_here.h"
 #include "tests/support/support.h"
 
 namespace stipple {
 namespace {
 
-render::FrameSettings whole(render::Mode mode) {
-    render::FrameSettings settings;
-    settings.mode = mode;
-    settings.budgets.errorPixels = 1e-4;
-    settings.wantDepthAndNormal = true;
-    settings.draw.lit = false;
-    return settings;
-}
+class ManyDiscs : public test::BackendsHere {
+  protected:
+    static render::FrameSettings whole(render::Mode mode) { return test::drawnAs(mode, 1e-4, false); }
+    render::Backend& gpu() { return usual(); }
+    std::unique_ptr<render::Backend> cpu_ = cpu::makeCpuBackend(*executor_);
+};
 
-TEST(ManyDiscs, UnitsOfSumsHoldAsManyAsThereAre) {
+TEST_F(ManyDiscs, UnitsOfSumsHoldAsManyAsThereAre) {
     shared::FilteredFront front{};
     for (const uint32_t count : {0u, 1u, 64u, 65u, 16'384u, 16'385u, 1'000'000u, 1u << 30}) {
         front.count = count - 1;
@@ -36,12 +34,7 @@ TEST(ManyDiscs, UnitsOfSumsHoldAsManyAsThereAre) {
 
 /// 10,000 and 40,000 discs in one plane, all about one pixel, each place in two colours: their mean within 1 LSB, on
 /// cpu and gpu. (With weights in 2^17ths the gpu's sums pass 2^31, and its pixels show one of the colours.)
-TEST(ManyDiscs, AboutOnePixelAddUp) {
-    const test::TempFolder folder;
-    const auto executor = makeTbbExecutor(0);
-    const auto cpu = cpu::makeCpuBackend(*executor);
-    auto gpu = gpu::makeGpuBackend({});
-    if (!gpu) GTEST_SKIP() << gpu.error().line();
+TEST_F(ManyDiscs, AboutOnePixelAddUp) {
     constexpr uint32_t kOne = 0x3070c0, kOther = 0xe01020;
     for (const int count : {10'000, 40'000}) {
         Rng rng(4);
@@ -52,13 +45,13 @@ TEST(ManyDiscs, AboutOnePixelAddUp) {
             points[i].position = points[i + 1].position = {rng.uniform(-0.005, 0.005), rng.uniform(-0.005, 0.005), 0};
         // (No radius is larger than its cell: two far ones make that wide enough.)
         for (const double x : {-0.15, 0.15}) points.push_back({{x, x, 0}, {0, 0, 1}, kOne, 0.001f});
-        test::writePly(folder / "a.ply", points, true, true);
-        const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor, 65536);
+        test::writePly(folder_ / "a.ply", points, true, true);
+        const auto store = test::buildAndOpen(folder_ / "a.ply", folder_ / "a.stipple", *executor_, 65536);
         lod::View view = test::viewFromAbove({0, 0, 0});
         view.width = view.height = 40;
         view.focalPixels = 300;
-        for (render::Backend* backend : {cpu.get(), gpu->get()}) {
-            const render::Image image = test::renderView(store, *backend, *executor, view, whole(render::Mode::ewa));
+        for (render::Backend* backend : {cpu_.get(), &gpu()}) {
+            const render::Image image = test::renderView(store, *backend, *executor_, view, whole(render::Mode::ewa));
             size_t wrong = 0, looked = 0;
             for (size_t i = 0; i < image.rgba.size(); ++i) {
                 if (std::hypot(double(i % 40) - 19.5, double(i / 40) - 19.5) > 1.5) continue;
@@ -77,12 +70,7 @@ TEST(ManyDiscs, AboutOnePixelAddUp) {
 }
 
 /// More wide discs than the list holds, in both modes: the picture is that of the cpu.
-TEST(ManyDiscs, BeyondTheListAreThere) {
-    const test::TempFolder folder;
-    const auto executor = makeTbbExecutor(0);
-    const auto cpu = cpu::makeCpuBackend(*executor);
-    auto gpu = gpu::makeGpuBackend({});
-    if (!gpu) GTEST_SKIP() << gpu.error().line();
+TEST_F(ManyDiscs, BeyondTheListAreThere) {
     Rng rng(5);
     std::vector<test::TestPoint> points;
     constexpr size_t kCount = size_t{shared::kDiscCapacity} + 1'000;
@@ -92,14 +80,14 @@ TEST(ManyDiscs, BeyondTheListAreThere) {
                           static_cast<uint32_t>(rng.below(1u << 24)),
                           0.135f});
     for (const double x : {-0.15, 0.15}) points.push_back({{x, x, 0}, {0, 0, 1}, 0x3070c0u, 0.001f});
-    test::writePly(folder / "a.ply", points, true, true);
-    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor, 131072);
+    test::writePly(folder_ / "a.ply", points, true, true);
+    const auto store = test::buildAndOpen(folder_ / "a.ply", folder_ / "a.stipple", *executor_, 131072);
     lod::View view = test::viewFromAbove({0, 0, 0});
     view.width = view.height = 36;  // each disc covers more than 1,024 pixels of it
     view.focalPixels = 400;
     for (const render::Mode mode : {render::Mode::splat, render::Mode::ewa}) {
-        const render::Image a = test::renderView(store, **gpu, *executor, view, whole(mode)),
-                            b = test::renderView(store, *cpu, *executor, view, whole(mode));
+        const render::Image a = test::renderView(store, gpu(), *executor_, view, whole(mode)),
+                            b = test::renderView(store, *cpu_, *executor_, view, whole(mode));
         EXPECT_GE(test::drawnPsnr(a, b), 50) << static_cast<int>(mode);
         size_t off = 0;
         for (size_t i = 0; i < a.depth.size(); ++i) off += std::abs(a.depth[i] - b.depth[i]) > 1e-3f * b.depth[i];

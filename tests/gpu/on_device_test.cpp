@@ -5,6 +5,7 @@
 #include <map>
 
 #include "engine/gpu/gpu_backend.h"
+#include "tests/gpu/one_time_commands.h"
 #include "tests/support/support.h"
 
 namespace stipple::gpu {
@@ -16,35 +17,14 @@ std::vector<uint32_t> copied(const DevicePicture& picture) {
     const uint64_t bytes = uint64_t{picture.width} * picture.height * 4;
     auto host = Buffer::create(device, bytes, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true, "copy");
     EXPECT_TRUE(host);
-    VkCommandPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
-    poolInfo.queueFamilyIndex = device.queueFamily;
-    VkCommandPool pool{};
-    EXPECT_EQ(vkCreateCommandPool(device.device, &poolInfo, nullptr, &pool), VK_SUCCESS);
-    VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
-    allocate.commandPool = pool;
-    allocate.commandBufferCount = 1;
-    VkCommandBuffer commands{};
-    EXPECT_EQ(vkAllocateCommandBuffers(device.device, &allocate, &commands), VK_SUCCESS);
-    const VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
-    vkBeginCommandBuffer(commands, &begin);
-    VkMemoryBarrier2 memory{VK_STRUCTURE_TYPE_MEMORY_BARRIER_2};
-    memory.srcStageMask = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
-    memory.srcAccessMask = VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT;
-    memory.dstStageMask = VK_PIPELINE_STAGE_2_TRANSFER_BIT;
-    memory.dstAccessMask = VK_ACCESS_2_TRANSFER_READ_BIT;
-    VkDependencyInfo dependency{VK_STRUCTURE_TYPE_DEPENDENCY_INFO};
-    dependency.memoryBarrierCount = 1;
-    dependency.pMemoryBarriers = &memory;
-    vkCmdPipelineBarrier2(commands, &dependency);
+    OneTimeCommands commands(device);
+    const auto drawn =
+        bufferBarrier(picture.pixels, {VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT, VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT},
+                      {VK_PIPELINE_STAGE_2_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_READ_BIT});
+    recordBarriers(commands.handle(), {&drawn, 1});
     const VkBufferCopy region{0, 0, bytes};
-    vkCmdCopyBuffer(commands, picture.pixels, host->handle(), 1, &region);
-    vkEndCommandBuffer(commands);
-    VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO};
-    submit.commandBufferCount = 1;
-    submit.pCommandBuffers = &commands;
-    EXPECT_EQ(vkQueueSubmit(device.queue, 1, &submit, VK_NULL_HANDLE), VK_SUCCESS);
-    vkDeviceWaitIdle(device.device);
-    vkDestroyCommandPool(device.device, pool, nullptr);
+    vkCmdCopyBuffer(commands.handle(), picture.pixels, host->handle(), 1, &region);
+    commands.run();
     const auto* from = static_cast<const uint32_t*>(host->mapped());
     return {from, from + bytes / 4};
 }

@@ -227,6 +227,15 @@ lod::View viewFromAbove(const glm::dvec3& centre) {
     return view;
 }
 
+render::FrameSettings drawnAs(render::Mode mode, double errorPixels, bool isLit) {
+    render::FrameSettings settings;
+    settings.mode = mode;
+    settings.budgets.errorPixels = errorPixels;
+    settings.wantDepthAndNormal = true;
+    settings.draw.lit = isLit;
+    return settings;
+}
+
 std::map<std::string, std::unique_ptr<render::Backend>> cpuBackendsAndOracle(Executor& executor) {
     std::map<std::string, std::unique_ptr<render::Backend>> out;
     size_t count = 0;

@@ -60,6 +60,8 @@ render::Image draw(const std::vector<render::PlacedStore>& placed, render::Backe
 render::Image renderView(std::shared_ptr<const lod::Store> store, render::Backend& backend, Executor& executor,
                          const lod::View& view, const render::FrameSettings& settings,
                          FrameCounters* counters = nullptr);
+/// For a frame of a mode with depth and normals; the default error is met by leaves alone.
+render::FrameSettings drawnAs(render::Mode mode, double errorPixels = 1e-4, bool isLit = true);
 /// The cpu backend on every instruction set that this machine has, and the fp64 restatement.
 std::map<std::string, std::unique_ptr<render::Backend>> cpuBackendsAndOracle(Executor& executor);
 /// Of what is drawn in either picture, dB.

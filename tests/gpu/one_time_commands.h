@@ -1,0 +1,43 @@
+// A command buffer of a test's own: recorded, run once, waited for.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include "engine/gpu/device.h"
+
+namespace stipple::gpu {
+
+class OneTimeCommands {
+  public:
+    /// Recording begins.
+    explicit OneTimeCommands(const Device& device) : device_(device) {
+        VkCommandPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO};
+        poolInfo.queueFamilyIndex = device.queueFamily;
+        EXPECT_EQ(vkCreateCommandPool(device.device, &poolInfo, nullptr, &pool_), VK_SUCCESS);
+        VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO};
+        allocate.commandPool = pool_;
+        allocate.commandBufferCount = 1;
+        EXPECT_EQ(vkAllocateCommandBuffers(device.device, &allocate, &commands_), VK_SUCCESS);
+        const VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
+        EXPECT_EQ(vkBeginCommandBuffer(commands_, &begin), VK_SUCCESS);
+    }
+    ~OneTimeCommands() { vkDestroyCommandPool(device_.device, pool_, nullptr); }
+    OneTimeCommands(const OneTimeCommands&) = delete;
+    OneTimeCommands& operator=(const OneTimeCommands&) = delete;
+
+    VkCommandBuffer handle() const { return commands_; }
+    void end() { EXPECT_EQ(vkEndCommandBuffer(commands_), VK_SUCCESS); }
+    /// Ends recording; has run when it returns.
+    void run() {
+        end();
+        EXPECT_TRUE(submitCommands(device_, commands_, VK_NULL_HANDLE));
+        EXPECT_EQ(vkDeviceWaitIdle(device_.device), VK_SUCCESS);
+    }
+
+  private:
+    const Device& device_;
+    VkCommandPool pool_ = VK_NULL_HANDLE;
+    VkCommandBuffer commands_ = VK_NULL_HANDLE;
+};
+
+}  // namespace stipple::gpu
