@@ -102,13 +102,22 @@ class SideThread {
     std::thread thread_;
 };
 
+/// Where more threads than cores are asked for, TBB's market must be told so, or an arena never gets them. Of several
+/// controls the smallest counts, for the whole process: there is one, of the most that was ever asked for.
+void allowThreads(size_t threads) {
+    static std::mutex mutex;
+    static tbb::global_control* control = nullptr;  // until the process ends
+    constexpr auto kMost = tbb::global_control::max_allowed_parallelism;
+    const std::lock_guard lock(mutex);
+    if (threads <= tbb::global_control::active_value(kMost)) return;
+    delete control;
+    control = new tbb::global_control(kMost, threads);
+}
+
 class TbbExecutor final : public Executor {
   public:
     explicit TbbExecutor(int threads) : arena_(threads > 0 ? threads : tbb::task_arena::automatic) {
-        // More threads than cores were asked for: TBB's market must be told so, or the arena never gets them.
-        if (threads > 0)
-            limit_ = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
-                                                           static_cast<size_t>(threads));
+        if (threads > 0) allowThreads(static_cast<size_t>(threads));
         arena_.initialize();
     }
     ~TbbExecutor() noexcept override { TbbExecutor::wait(); }
@@ -135,7 +144,6 @@ class TbbExecutor final : public Executor {
     int threads() const override { return arena_.max_concurrency(); }
 
   private:
-    std::unique_ptr<tbb::global_control> limit_;
     tbb::task_arena arena_;
     tbb::task_group group_;
     SideThread side_;

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cmath>
 #include <filesystem>
+#include <thread>
 
 #include "engine/base/file.h"
 #include "engine/base/process.h"
@@ -70,6 +71,28 @@ TEST(ErrorScale, RoundsUpOverManyDecades) {
     }
     for (uint32_t code = 1; code <= lod::ErrorScale::kLargest; ++code)
         ASSERT_EQ(scale.encodeUp(scale.decode(code)), code);
+}
+
+/// However many others there are: an executor of one thread must not take those of the whole process.
+TEST(Executor, HasItsThreadsBesideOthers) {
+    const auto one = makeTbbExecutor(1), four = makeTbbExecutor(4), two = makeTbbExecutor(2);
+    for (const auto* executor : {&four, &two}) {
+        const auto count = static_cast<size_t>((*executor)->threads());
+        std::atomic<size_t> together{0};
+        const double start = nowSeconds();
+        (*executor)->parallelFor(count, 1, [&](size_t, size_t) {
+            ++together;  // each waits for all
+            while (together < count && nowSeconds() < start + 20) std::this_thread::yield();
+        });
+        EXPECT_EQ(together, count);
+        EXPECT_LT(nowSeconds(), start + 20) << count << " threads were never there at once";
+    }
+    std::atomic<int> inside{0}, most{0};
+    one->parallelFor(1000, 1, [&](size_t, size_t) {
+        most = std::max(most.load(), ++inside);
+        --inside;
+    });
+    EXPECT_EQ(most, 1);
 }
 
 TEST(Executor, RunsEverythingOnceWhateverTheThreads) {
