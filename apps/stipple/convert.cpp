@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "apps/stipple/common.h"
+#include "apps/stipple/convert_patches.h"
 #include "apps/stipple/outputs.h"
 #include "engine/base/process.h"
 #include "engine/scene/curve_fit.h"
@@ -16,7 +17,8 @@ namespace fs = std::filesystem;
 
 struct Options {
     std::string input, output;
-    bool curves = false, json = false, force = false;
+    bool curves = false, patches = false, json = false, force = false;
+    PatchConversion asPatches;
     BuildOptions build;  ///< of which reading the input uses some
     scene::CurveFitSettings fit;
 };
@@ -81,10 +83,23 @@ struct Beside {
     std::string rest, scene;
 };
 
+/// What belongs to the one is of no use to the other.
+Result<void> checkAsked(const Options& o, const CLI::App& sub) {
+    if (o.curves == o.patches)
+        return fail(ErrorKind::usage, o.curves ? "are two things to convert to" : "says nothing of what to convert to",
+                    o.curves ? "--curves and --patches" : "stipple convert",
+                    "give --curves: polygon plants become ribbons and tubes, or --patches: a scan or a mesh becomes "
+                    "elevation patches");
+    const std::vector<const char*> others =
+        o.curves ? std::vector{"--cone", "--fill-gaps", "--overlap", "--patch-samples", "--only-points", "--threads"}
+                 : std::vector{"--tolerance", "--joints"};
+    for (const char* name : others)
+        if (sub.count(name) > 0)
+            return fail(ErrorKind::usage, o.curves ? "belongs to --patches" : "belongs to --curves", name);
+    return {};
+}
+
 Result<void> run(const Options& o) {
-    if (!o.curves)
-        return fail(ErrorKind::usage, "says nothing of what to convert to", "stipple convert",
-                    "give --curves: polygon plants become ribbons and tubes");
     if (!isSceneFile(o.input))
         return fail(ErrorKind::usage, "is not read by convert, which takes polygon plants as .gltf, .glb or .obj",
                     o.input, "other files are drawn as they are: stipple render, stipple view");
@@ -159,8 +174,10 @@ Result<void> run(const Options& o) {
 
 void setupConvert(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
-    CLI::App* sub = app.add_subcommand("convert", "polygon plants to ribbons and tubes");
-    sub->add_option("INPUT", o->input, "the plant (.gltf, .glb, .obj)")->required();
+    CLI::App* sub = app.add_subcommand("convert", "polygon plants to ribbons and tubes, scans and meshes to patches");
+    sub->add_option("INPUT", o->input,
+                    "the plant (.gltf, .glb, .obj); of patches: a scan or a mesh (.ply, .las, .laz too)")
+        ->required();
     sub->add_option("-o,--output", o->output,
                     "the file to write (.stipple: what is neither ribbon nor tube goes to NAME.rest.glb beside it, and "
                     "NAME.scene.glb shows both; .glb or .gltf: lines with radii)")
@@ -175,14 +192,28 @@ void setupConvert(CLI::App& app, int& status) {
     sub->add_option("--joints", o->fit.joints, "segments of a curve at most")
         ->transform(within(2, 1000))
         ->capture_default_str();
-    sub->add_option("--memory", o->build.memory, "memory that reading the plant may use, bytes: 512M, 4G")
+    addPatchOptions(*sub, o->patches, o->asPatches);
+    sub->add_option("--memory", o->build.memory, "memory that reading the input may use, bytes: 512M, 4G")
         ->check(bytes())
         ->type_name("SIZE")
         ->capture_default_str();
     addSceneFileOptions(*sub, o->build.allowOutside, o->build.repair);
     sub->add_flag("--json", o->json, "print what became of it as JSON (stipple help json)");
-    sub->callback([o, &status] {
-        if (const auto result = run(*o); !result) status = report(result.error());
+    sub->callback([o, sub, &status] {
+        Result<void> result = checkAsked(*o, *sub);
+        if (result && o->patches) {
+            PatchConversion& p = o->asPatches;
+            p.input = o->input;
+            p.output = o->output;
+            p.json = o->json;
+            p.force = o->force;
+            p.build.memory = o->build.memory;
+            p.build.allowOutside = o->build.allowOutside;
+            result = convertToPatches(p);
+        } else if (result) {
+            result = run(*o);
+        }
+        if (!result) status = report(result.error());
     });
 }
 

@@ -1,0 +1,310 @@
+#include "apps/stipple/convert_patches.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "apps/stipple/outputs.h"
+#include "apps/stipple/ply_meshes.h"
+#include "engine/base/process.h"
+#include "engine/base/words.h"
+#include "engine/scene/triangles.h"
+#include "lod/import/import.h"
+#include "lod/import/ply/mesh.h"
+#include "lod/primitives/octahedral.h"
+#include "lod/store/patch_bytes.h"
+
+namespace stipple::app {
+namespace {
+namespace fs = std::filesystem;
+
+/// What is made patches of: the one or the other.
+struct Source {
+    lod::TriangleMesh mesh;
+    lod::PointBlock points;
+    bool isMesh = false, isTwoSided = false;
+};
+
+Error interruptedAt(const std::string& output) {
+    return {ErrorKind::interrupted, "interrupted; nothing is written", output, ""};
+}
+
+Result<lod::TriangleMesh> collect(const lod::MeshSource& source, const std::string& output) {
+    lod::TriangleMesh all;
+    const auto goOn = [&]() -> Result<void> {
+        if (isStopRequested()) return tl::unexpected(interruptedAt(output));
+        return {};
+    };
+    if (source.survey) STIPPLE_TRY(source.survey([&](uint64_t, uint64_t) { return goOn(); }));
+    const auto take = [&](const lod::TriangleMesh& block) -> Result<void> {
+        STIPPLE_TRY(goOn());
+        const auto first = static_cast<uint32_t>(all.position.size());
+        const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+        append(all.position, block.position);
+        append(all.normal, block.normal);
+        append(all.uv, block.uv);
+        append(all.colour, block.colour);
+        append(all.surface, block.surface);
+        for (const uint32_t i : block.indices) all.indices.push_back(first + i);
+        return {};
+    };
+    STIPPLE_TRY(source.read(take));
+    return all;
+}
+
+/// Colours of vertices times those of their materials (textures are left out).
+void bakeMaterials(const scene::Scene& scene, lod::TriangleMesh& mesh) {
+    for (size_t v = 0; v < mesh.colour.size(); ++v) {
+        const size_t m = mesh.surface[v] & shared::kSurfaceMaterialMask;
+        if (m >= scene.materials.size()) continue;
+        uint32_t out = mesh.colour[v] & 0xff000000u;
+        for (int k = 0; k < 3; ++k) {
+            const float linear = shared::linearFromSrgb(static_cast<float>(mesh.colour[v] >> (8 * k) & 255u) / 255.0f);
+            out |= unitToByte(shared::srgbFromLinear(linear * scene.materials[m].baseColour[k])) << (8 * k);
+        }
+        mesh.colour[v] = out;
+    }
+}
+
+bool hasTextures(const scene::Scene& scene) {
+    for (const scene::Material& m : scene.materials)
+        if (m.baseColourTexture.texture >= 0) return true;
+    return false;
+}
+
+Result<Source> readSource(const PatchConversion& o, std::vector<std::string>& notes) {
+    Source out;
+    if (isSceneFile(o.input)) {
+        STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(o.input, o.build.reading()));
+        STIPPLE_ASSIGN(out.mesh, collect(scene::triangleSource(scene, scene::placements(scene)), o.output));
+        out.isMesh = !out.mesh.indices.empty();
+        bakeMaterials(scene, out.mesh);
+        if (out.isMesh && hasTextures(scene))
+            notes.emplace_back("textures are left out: patches have colours at their samples");
+        if (out.isMesh) return out;
+    } else if (const auto faces = lod::plyFaces(o.input); faces && faces->any() && !o.build.onlyPoints) {
+        STIPPLE_ASSIGN(const lod::MeshSource source,
+                       lod::openPlyMesh(o.input, o.build.reading().memoryBytes, fs::temp_directory_path().string()));
+        STIPPLE_ASSIGN(out.mesh, collect(source, o.output));
+        out.isMesh = true;
+        return out;
+    }
+    STIPPLE_ASSIGN(const lod::PointSource source, openInput(o.input, {}, 0, o.build.reading()));
+    out.isTwoSided = source.info.isTwoSided;
+    lod::PointBlock& all = out.points;
+    bool hasColour = true, hasNormal = true;
+    STIPPLE_TRY(lod::readPoints(source, [&](const lod::PointBlock& block) -> Result<void> {
+        if (isStopRequested()) return tl::unexpected(interruptedAt(o.output));
+        const size_t n = std::max(block.position.size(), block.lattice.size());
+        for (size_t i = 0; i < n; ++i)
+            all.position.push_back(block.lattice.empty()
+                                       ? block.position[i]
+                                       : glm::dvec3(block.lattice[i]) * source.info.scale + source.info.offset);
+        hasColour = hasColour && block.colour.size() == n;
+        hasNormal = hasNormal && block.normal.size() == n;
+        all.colour.insert(all.colour.end(), block.colour.begin(), block.colour.end());
+        all.normal.insert(all.normal.end(), block.normal.begin(), block.normal.end());
+        return {};
+    }));
+    if (!hasColour) all.colour.clear();
+    if (!hasNormal) all.normal.clear();
+    return out;
+}
+
+glm::vec4 linearColour(uint32_t srgb) {
+    const auto channel = [&](uint32_t shift) {
+        return shared::linearFromSrgb(static_cast<float>(srgb >> shift & 255u) / 255.0f);
+    };
+    return {channel(0), channel(8), channel(16), 1};
+}
+
+/// The samples of all patches as vertices, their cells and the gaps between them as triangles.
+scene::Primitive trianglesOf(const lod::PatchSet& set) {
+    scene::Primitive p;
+    p.kind = scene::PrimitiveKind::triangles;
+    p.material = 0;
+    std::vector<std::vector<uint32_t>> vertices(set.patches.size());
+    for (size_t k = 0; k < set.patches.size(); ++k) {
+        const lod::Patch& patch = set.patches[k];
+        const lod::PatchSurface surface(patch);
+        vertices[k].assign(patch.heights.size(), 0);
+        for (size_t s = 0; s < patch.heights.size(); ++s) {
+            if (patch.heights[s] == 0) continue;
+            vertices[k][s] = static_cast<uint32_t>(p.position.size());
+            p.position.emplace_back(surface.position(s));
+            p.normal.push_back(
+                glm::normalize(glm::vec3(surface.frame() * glm::dvec3(shared::octDecode(patch.normals[s])))));
+            p.colour.push_back(linearColour(patch.colours[s]));
+        }
+        surface.triangles([&](size_t a, size_t b, size_t c) {
+            for (const size_t s : {a, b, c}) p.indices.push_back(vertices[k][s]);
+        });
+    }
+    for (const auto& gap : set.gaps)
+        for (const lod::PatchCorner& c : gap) p.indices.push_back(vertices[c.patch][c.sample]);
+    return p;
+}
+
+scene::Primitive pointsOf(const lod::PointBlock& left) {
+    scene::Primitive p;
+    p.kind = scene::PrimitiveKind::points;
+    p.material = 0;
+    for (size_t i = 0; i < left.position.size(); ++i) {
+        p.position.emplace_back(left.position[i]);
+        if (!left.colour.empty()) p.colour.push_back(linearColour(left.colour[i]));
+        if (!left.normal.empty())
+            p.normal.push_back(hasDirection(left.normal[i]) ? glm::normalize(withoutScale(left.normal[i]))
+                                                            : glm::vec3(0, 0, 1));
+        p.indices.push_back(static_cast<uint32_t>(i));
+    }
+    return p;
+}
+
+scene::Scene sceneOf(const lod::PatchSet& set) {
+    scene::Scene scene;
+    scene::Material material;
+    material.name = "patches";
+    material.metallic = 0;
+    material.isDoubleSided = set.isTwoSided;
+    scene.materials.push_back(material);
+    scene::Mesh mesh;
+    mesh.name = "patches";
+    if (!set.patches.empty()) mesh.primitives.push_back(trianglesOf(set));
+    if (!set.left.position.empty()) mesh.primitives.push_back(pointsOf(set.left));
+    scene.meshes.push_back(std::move(mesh));
+    scene::Node node;
+    node.name = "patches";
+    node.mesh = 0;
+    node.local[3] = glm::dvec4(set.middle, 1);
+    scene.nodes.push_back(node);
+    return scene;
+}
+
+struct Report {
+    double seconds = 0, geometryBytes = 0, allBytes = 0;  ///< bytes a sample
+    uint64_t bytes = 0;
+};
+
+Report reportOf(const lod::PatchSet& set, double seconds) {
+    Report r;
+    r.seconds = seconds;
+    const lod::PatchBytes encoded = lod::encodePatches(set.patches);
+    const auto samples = static_cast<double>(std::max<uint64_t>(set.samples, 1));
+    r.bytes = encoded.bytes.size();
+    r.geometryBytes = static_cast<double>(encoded.geometry) / samples;
+    r.allBytes = static_cast<double>(encoded.bytes.size()) / samples;
+    return r;
+}
+
+void printAsJson(const PatchConversion& o, const lod::PatchSet& set, const Report& r,
+                 const std::vector<std::string>& notes) {
+    printJson("convert", {{"points", set.pointsIn},
+                          {"triangles", set.trianglesIn},
+                          {"dropped", set.dropped},
+                          {"patches", set.patches.size()},
+                          {"samples", set.samples},
+                          {"patch_triangles", set.triangles},
+                          {"gap_triangles", set.gaps.size()},
+                          {"open_edges", set.openEdges},
+                          {"points_left", set.pointsLeft},
+                          {"bytes", r.bytes},
+                          {"bytes_a_sample", {{"geometry", r.geometryBytes}, {"all", r.allBytes}}},
+                          {"to_source", {{"bound", set.toSource.bound}, {"rms", set.toSource.rms}}},
+                          {"from_source", {{"bound", set.fromSource.bound}, {"rms", set.fromSource.rms}}},
+                          {"notes", notes},
+                          {"written", {o.output}},
+                          {"seconds", r.seconds},
+                          {"peak_rss_bytes", peakRssBytes()}});
+}
+
+void printAsText(const PatchConversion& o, const lod::PatchSet& set, const Report& r, bool isMesh) {
+    const uint64_t in = isMesh ? set.trianglesIn : set.pointsIn;
+    fmt::print("{}: {} became {} with {} and {}; {} {} points\n", o.input, counted(in, isMesh ? "triangle" : "point"),
+               counted(set.patches.size(), "patch", "patches"), counted(set.samples, "sample"),
+               counted(set.triangles, "triangle"), counted(set.pointsLeft, "point"),
+               isMesh                ? "of vertices are left as"
+               : set.pointsLeft == 1 ? "stays one of the"
+                                     : "stay");
+    fmt::print("  bytes a sample: {:.2f} geometry, {:.2f} with normals and colours ({} in all)\n", r.geometryBytes,
+               r.allBytes, humanBytes(r.bytes));
+    fmt::print(
+        "  from patches to the source: {:.3g} at most, {:.3g} rms; from the source to patches: {:.3g} at most, "
+        "{:.3g} rms (units of the file)\n",
+        set.toSource.bound, set.toSource.rms, set.fromSource.bound, set.fromSource.rms);
+    if (o.fillGaps)
+        fmt::print("  {} between patches, {} left open\n", counted(set.gaps.size(), "triangle"),
+                   counted(set.openEdges, "edge"));
+    for (const auto& [reason, count] : set.dropped) fmt::print("  dropped {}: {}\n", count, reason);
+    fmt::print("  {:.2f} s, {:.2f} M {}s/s, peak memory {}\n  {}\n", r.seconds,
+               static_cast<double>(in) / r.seconds * 1e-6, isMesh ? "triangle" : "point", humanBytes(peakRssBytes()),
+               o.output);
+}
+
+}  // namespace
+
+void addPatchOptions(CLI::App& app, bool& patches, PatchConversion& o) {
+    app.add_flag("--patches", patches,
+                 "elevation patches: heights over tilted planes, written as triangles, with the points that no patch "
+                 "fits as points; says how large they are and how far off");
+    app.add_option("--cone", o.settings.coneDegrees, "of patches: half the cone of a patch's normals, degrees")
+        ->transform(within(5.0, 75.0))
+        ->capture_default_str();
+    app.add_flag("--overlap", o.overlap, "of patches: each reaches over its neighbours (the default)");
+    app.add_flag("--fill-gaps", o.fillGaps, "of patches: they do not overlap, triangles fill the gaps between them");
+    app.add_flag("--leave-gaps", o.open)->group("");
+    app.add_option("--patch-samples", o.settings.samples,
+                   "of patches: samples aimed at (default: as many as points or vertices, of a mesh 20,000 at least)")
+        ->transform(within<uint64_t>(1, 1'000'000'000))
+        ->type_name("N");
+    app.add_flag("--only-points", o.build.onlyPoints, "of patches: the vertices of a PLY file with faces");
+    app.add_option("--threads", o.build.threads, "of patches: threads (0: all cores)")
+        ->transform(within(0, 1024))
+        ->capture_default_str();
+    o.build.addProgressTo(app);
+}
+
+Result<void> convertToPatches(const PatchConversion& given) {
+    PatchConversion o = given;
+    o.settings.closing = o.fillGaps ? lod::PatchClosing::gaps
+                         : o.open   ? lod::PatchClosing::open
+                                    : lod::PatchClosing::overlap;
+    o.settings.isStopped = isStopRequested;
+    const std::string extension = fs::path(o.output).extension().string();
+    if (extension != ".glb" && extension != ".gltf")
+        return fail(ErrorKind::usage, "is no scene: patches are written as triangles", o.output,
+                    "write to .glb or .gltf");
+    if (o.fillGaps && o.overlap)
+        return fail(ErrorKind::usage, "are two ways to close what is between patches", "--fill-gaps and --overlap",
+                    "give one of them");
+    STIPPLE_TRY(checkOutputs({{o.output}}, {o.input}, o.force));
+    catchStopSignals();
+    const double start = nowSeconds();
+    const auto executor = makeTbbExecutor(o.build.threads);
+    std::vector<std::string> notes;
+    lod::PatchSet set;
+    bool isMesh = false;
+    {
+        Progress progress(o.build.progressStyle(false));
+        STIPPLE_ASSIGN(Source source, readSource(o, notes));
+        isMesh = source.isMesh;
+        o.settings.isTwoSided = source.isTwoSided;
+        if (!isMesh && source.points.position.empty()) return fail(ErrorKind::input, "holds no points", o.input);
+        progress.plan(isMesh ? std::vector<JobPlan::Stage>{{"patches", 1}}
+                             : std::vector<JobPlan::Stage>{{"normals", 0.4}, {"patches", 0.6}});
+        set = isMesh ? lod::patchesOfMesh(std::move(source.mesh), o.settings, *executor, progress)
+                     : lod::patchesOfPoints(std::move(source.points), o.settings, *executor, progress);
+        STIPPLE_TRY(checkStopped(o.output));
+        for (const std::string& note : notes) progress.say(note);
+    }
+    if (set.patches.empty() && set.left.position.empty())
+        return fail(ErrorKind::input, "holds nothing that could be a patch or a point", o.input);
+    const Report report = reportOf(set, nowSeconds() - start);
+    STIPPLE_TRY(scene::writeGltf(sceneOf(set), o.output));
+    if (o.json)
+        printAsJson(o, set, report, notes);
+    else
+        printAsText(o, set, report, isMesh);
+    return {};
+}
+
+}  // namespace stipple::app

@@ -1,0 +1,177 @@
+#include "lod/builder/patches/deviation.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stipple::lod {
+namespace {
+
+constexpr int kMostDivisions = 2;      ///< of a triangle beyond the segment
+constexpr int kLookAround = 4;         ///< cells, from one that is not drawn to a sample
+constexpr double kBesideSteps = 1e-9;  ///< of places on lines between cells, samples
+
+class Measure {
+  public:
+    Measure(const OwnSurface& own, const Patch& patch, const OverPatch& over)
+        : own_(own), s_(own.surface), patch_(patch), heights_(patch), surface_(patch), over_(over) {
+        isDoubtful_.assign(patch.cells.size(), 0);
+    }
+
+    Deviation run() {
+        d_.overOwn = 0.5 * patch_.quantum();  // at the samples themselves
+        for (const uint32_t t : own_.segment) {
+            for (size_t k = 0; k < 3; ++k) {
+                const uint32_t other = s_.across[t][k];
+                const bool isShared = other != MeshSurface::kNobody && own_.owner[other] == own_.self;
+                if (!isShared || t < other) alongEdge(s_.at(t, k), s_.at(t, (k + 1) % 3));
+            }
+            atMiddle(t);
+        }
+        d_.toSource = d_.overOwn;
+        isOwn_ = false;
+        for (const uint32_t t : own_.beyond)
+            for (size_t k = 0; k < 3; ++k) alongEdge(s_.at(t, k), s_.at(t, (k + 1) % 3));
+        d_.fromSource = d_.overOwn;
+        d_.fromSource = std::max(d_.fromSource, undrawn_);
+        for (uint32_t j = 0; j + 1 < patch_.height; ++j)
+            for (uint32_t i = 0; i + 1 < patch_.width; ++i) {
+                if (!patch_.hasCell(i, j)) continue;
+                const bool isInside = over_.isInside(i, j) && isDoubtful_[size_t{j} * (patch_.width - 1) + i] == 0;
+                if (!isInside)
+                    surface_.trianglesOf(i, j, [&](size_t a, size_t b, size_t c) {
+                        beyond(surface_.position(a), surface_.position(b), surface_.position(c), over_.triangle(a), 0);
+                    });
+                if (!isInside || (i + 2 * j) % 4 == 0) atCentre(i, j, isInside ? 4 : 1);
+            }
+        return d_;
+    }
+
+  private:
+    /// The difference of heights along an edge of the source is linear between the lines of the grid and diagonals.
+    void alongEdge(const glm::dvec3& p, const glm::dvec3& q) {
+        const glm::dvec3 a = heights_.local(p), b = heights_.local(q);
+        at_.assign({0, 1});
+        for (int axis = 0; axis < 2; ++axis) {
+            const double from = std::min(a[axis], b[axis]), to = std::max(a[axis], b[axis]);
+            for (double line = std::ceil(from); line <= to && to > from; ++line)
+                at_.push_back(std::clamp((line - a[axis]) / (b[axis] - a[axis]), 0.0, 1.0));
+        }
+        std::sort(at_.begin(), at_.end());
+        for (size_t k = 0; k + 1 < at_.size(); ++k) piece(a, b, at_[k], at_[k + 1]);
+    }
+    void piece(const glm::dvec3& a, const glm::dvec3& b, double from, double to) {
+        const glm::dvec3 p = a + from * (b - a), q = a + to * (b - a), m = 0.5 * (p + q);
+        const double fi = std::floor(m.x), fj = std::floor(m.y);
+        if (!(fi >= 0 && fj >= 0 && fi + 1 < patch_.width && fj + 1 < patch_.height) ||
+            !patch_.hasCell(static_cast<uint32_t>(fi), static_cast<uint32_t>(fj))) {
+            if (isOwn_) undrawn(p, q);
+            return;
+        }
+        const auto i = static_cast<uint32_t>(fi), j = static_cast<uint32_t>(fj);
+        if (!isOwn_ && !over_.isInside(i, j)) return;
+        double most = 0;
+        const auto compare = [&](const glm::dvec3& at) {
+            const double x = std::clamp(at.x, fi + kBesideSteps, fi + 1 - kBesideSteps),
+                         y = std::clamp(at.y, fj + kBesideSteps, fj + 1 - kBesideSteps);
+            most = std::max(most, std::abs(heights_.at(x, y) - at.z));
+        };
+        compare(p);
+        compare(q);
+        const size_t s = patch_.at(i, j);
+        const auto& h = patch_.heights;
+        const bool rises = cellTriangles(h[s], h[s + 1], h[s + patch_.width], h[s + patch_.width + 1])[2] == 3;
+        // Which side of the diagonal each end is on.
+        const auto side = [&](const glm::dvec3& at) {
+            return rises ? (at.x - fi) - (at.y - fj) : (at.x - fi) + (at.y - fj) - 1;
+        };
+        const double u = side(p), v = side(q);
+        if ((u < 0) != (v < 0) && u != v) compare(p + (u / (u - v)) * (q - p));
+        if (isOwn_)
+            d_.overOwn = std::max(d_.overOwn, most);
+        else if (most > double{patch_.step})  // of another sheet, maybe
+            isDoubtful_[size_t{j} * (patch_.width - 1) + i] = 1;
+        else
+            d_.toSource = std::max(d_.toSource, most);
+    }
+    /// From what no cell is drawn over, in modes that leave the border open: to the nearest sample, and as the source
+    /// between edges may lie anywhere in the cell, a cell's diagonal more.
+    void undrawn(const glm::dvec3& p, const glm::dvec3& q) {
+        double least = 1e300;
+        const auto i = static_cast<int>(std::floor(p.x)), j = static_cast<int>(std::floor(p.y));
+        for (int y = j - kLookAround; y <= j + kLookAround + 1; ++y)
+            for (int x = i - kLookAround; x <= i + kLookAround + 1; ++x) {
+                if (x < 0 || y < 0 || x >= static_cast<int>(patch_.width) || y >= static_cast<int>(patch_.height))
+                    continue;
+                const uint16_t code = patch_.heights[patch_.at(static_cast<uint32_t>(x), static_cast<uint32_t>(y))];
+                if (code == 0) continue;
+                const auto distance = [&](const glm::dvec3& at) {
+                    return glm::length(glm::dvec3((at.x - x) * double{patch_.step}, (at.y - y) * double{patch_.step},
+                                                  at.z - code * patch_.quantum()));
+                };
+                least = std::min(least, std::max(distance(p), distance(q)));
+            }
+        if (least == 1e300) least = kLookAround * double{patch_.step};
+        undrawn_ = std::max(undrawn_, least + std::sqrt(2.0) * double{patch_.step});
+    }
+
+    void atMiddle(uint32_t t) {
+        const glm::dvec3 q = heights_.local(s_.elements.centre[t]);
+        const double height = heights_.at(q.x, q.y);
+        if (!(height == height)) return;
+        const double facing = glm::dot(glm::dvec3(s_.elements.normal[t]), surface_.frame()[2]);
+        const double d = (height - q.z) * facing;
+        d_.fromSourceSquares += s_.elements.area[t] * d * d;
+        d_.fromSourceWeight += s_.elements.area[t];
+    }
+
+    void atCentre(uint32_t i, uint32_t j, double weight) {
+        const size_t s = patch_.at(i, j);
+        const glm::dvec3 middle = 0.5 * (surface_.position(s) + surface_.position(s + patch_.width + 1));
+        const double d = s_.nearest(middle, over_.triangle(s)).first;
+        const double area = double{patch_.step} * double{patch_.step} * weight;
+        d_.toSourceSquares += area * d * d;
+        d_.toSourceWeight += area;
+    }
+
+    void beyond(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, size_t hint, int divided) {
+        const auto fromOne = [&](size_t t) {
+            return std::max({s_.distance(a, t), s_.distance(b, t), s_.distance(c, t)});
+        };
+        if (fromOne(hint) <= d_.toSource) return;
+        const glm::dvec3 middle = (a + b + c) / 3.0;
+        const double around = std::max({glm::distance(a, middle), glm::distance(b, middle), glm::distance(c, middle)});
+        const auto [distance, nearest] = s_.nearest(middle, hint);
+        double most = distance + around;
+        if (most > d_.toSource) most = std::min(most, fromOne(nearest));
+        if (most <= d_.toSource) return;
+        if (divided == kMostDivisions) {
+            d_.toSource = most;
+            return;
+        }
+        const glm::dvec3 ab = 0.5 * (a + b), bc = 0.5 * (b + c), ca = 0.5 * (c + a);
+        beyond(ab, bc, ca, nearest, divided + 1);
+        beyond(a, ab, ca, nearest, divided + 1);
+        beyond(ab, b, bc, nearest, divided + 1);
+        beyond(ca, bc, c, nearest, divided + 1);
+    }
+
+    const OwnSurface& own_;
+    const MeshSurface& s_;
+    const Patch& patch_;
+    PatchHeights heights_;
+    PatchSurface surface_;
+    const OverPatch& over_;
+    std::vector<uint8_t> isDoubtful_;  ///< cells
+    bool isOwn_ = true;                ///< the triangles that are looked at
+    Deviation d_;
+    double undrawn_ = 0;
+    std::vector<double> at_;
+};
+
+}  // namespace
+
+Deviation deviationOf(const OwnSurface& own, const Patch& patch, const OverPatch& over) {
+    return Measure(own, patch, over).run();
+}
+
+}  // namespace stipple::lod

@@ -1,0 +1,50 @@
+// A mesh as patches are made of it: welded, in an order of its own, every triangle with its neighbours.
+#pragma once
+
+#include <array>
+#include <map>
+#include <string>
+
+#include "engine/base/executor.h"
+#include "lod/builder/patches/elements.h"
+#include "lod/builder/patches/run_tree.h"
+#include "lod/primitives/mesh.h"
+
+namespace stipple::lod {
+
+/// A place on a triangle: its height and what is there.
+struct SurfaceLook {
+    glm::vec3 normal{0};  ///< unit, on the triangle's front side
+    uint32_t colour = 0;  ///< sRGB
+};
+
+struct MeshSurface {
+    static constexpr uint32_t kNobody = ~0u;
+    TriangleMesh source;                            ///< attributes
+    glm::dvec3 middle{0};                           ///< of the source's box: what all places are relative to
+    std::vector<glm::dvec3> position;               ///< each once
+    std::vector<std::array<uint32_t, 3>> corners;   ///< into `position`, the least first
+    std::vector<std::array<uint32_t, 3>> vertices;  ///< the same corners, into `source`
+    std::vector<std::array<uint32_t, 3>> across;    ///< the triangle beyond the edge from a corner to the next; kNobody
+                                                    ///< where there is none, or more than one
+    SurfaceElements elements;                       ///< triangles
+    RunTree tree;
+    bool isTwoSided = false;                  ///< some triangles are, or they do not agree on a side
+    uint64_t triangles = 0;                   ///< of the source
+    std::map<std::string, uint64_t> dropped;  ///< by reason
+
+    size_t size() const { return corners.size(); }
+    glm::dvec3 at(size_t triangle, size_t corner) const { return position[corners[triangle][corner]]; }
+    /// `b`, `c`: weights of the second and the third corner.
+    SurfaceLook look(size_t triangle, double b, double c) const;
+    /// The nearest triangle and its distance (scene units); `hint`: one that may be near.
+    std::pair<double, size_t> nearest(const glm::dvec3& p, size_t hint) const;
+    /// To one triangle.
+    double distance(const glm::dvec3& p, size_t triangle) const;
+};
+
+/// Triangles that are not finite, have no area or are there twice are dropped and counted. Where neighbours disagree on
+/// their front side, all of a component are turned to that of most of its area.
+MeshSurface meshSurface(TriangleMesh mesh, Executor& executor);
+
+}  // namespace stipple::lod

@@ -1,0 +1,122 @@
+#include "lod/builder/patches/near_points.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace stipple::lod {
+namespace {
+
+#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(__clang__)
+#define STIPPLE_WIDE __attribute__((target_clones("avx2", "default")))  // (the values are the same)
+#else
+#define STIPPLE_WIDE
+#endif
+
+using Lanes = float __attribute__((vector_size(32), aligned(4), may_alias));
+using Mask = int32_t __attribute__((vector_size(32), aligned(4), may_alias));
+constexpr float kFar = std::numeric_limits<float>::max();
+constexpr size_t kDeepest = 12, kWaiting = 8 * kDeepest;
+
+const Lanes& lanes(const float* p) { return *reinterpret_cast<const Lanes*>(p); }
+
+/// Keeps the order by (distance, index).
+void insert(NearPoints::Found& f, size_t most, float squared, uint32_t index) {
+    size_t at = f.count < most ? f.count++ : most - 1;
+    for (; at > 0; --at) {
+        const float before = f.squared[at - 1];
+        if (before < squared || (before == squared && f.index[at - 1] < index)) break;
+        f.squared[at] = before;
+        f.index[at] = f.index[at - 1];
+    }
+    f.squared[at] = squared;
+    f.index[at] = index;
+}
+
+}  // namespace
+
+NearPoints::NearPoints(const std::vector<glm::dvec3>& points) : count_(points.size()) {
+    leaves_.resize((count_ + 7) / 8);
+    for (Leaf& leaf : leaves_)
+        for (auto& axis : leaf.at) std::fill(std::begin(axis), std::end(axis), kFar);
+    for (size_t i = 0; i < count_; ++i)
+        for (int a = 0; a < 3; ++a) leaves_[i / 8].at[a][i % 8] = static_cast<float>(points[i][a]);
+    struct Box {
+        std::array<float, 3> lo{kFar, kFar, kFar}, hi{-kFar, -kFar, -kFar};
+    };
+    std::vector<Box> boxes(leaves_.size());
+    for (size_t i = 0; i < count_; ++i)
+        for (size_t a = 0; a < 3; ++a) {
+            const float v = leaves_[i / 8].at[a][i % 8];
+            boxes[i / 8].lo.at(a) = std::min(boxes[i / 8].lo.at(a), v);
+            boxes[i / 8].hi.at(a) = std::max(boxes[i / 8].hi.at(a), v);
+        }
+    do {
+        std::vector<Node> level((boxes.size() + 7) / 8);
+        std::vector<Box> up(level.size());
+        for (size_t k = 0; k < level.size() * 8; ++k)
+            for (size_t a = 0; a < 3; ++a) {
+                const Box box = k < boxes.size() ? boxes[k] : Box{};
+                level[k / 8].lo[a][k % 8] = box.lo.at(a);
+                level[k / 8].hi[a][k % 8] = box.hi.at(a);
+                up[k / 8].lo.at(a) = std::min(up[k / 8].lo.at(a), box.lo.at(a));
+                up[k / 8].hi.at(a) = std::max(up[k / 8].hi.at(a), box.hi.at(a));
+            }
+        levels_.push_back(std::move(level));
+        boxes = std::move(up);
+    } while (boxes.size() > 1);
+}
+
+STIPPLE_WIDE void NearPoints::search(const NearPoints& tree, const float (&p)[3], size_t most, float limit,
+                                     Found& found) {
+    struct Waiting {
+        float squared;
+        uint32_t level, node;  ///< level 0: a leaf
+    };
+    Waiting stack[kWaiting];  // NOLINT: set as far as it is read
+    size_t depth = 0;
+    stack[depth++] = {0, static_cast<uint32_t>(tree.levels_.size()), 0};
+    float out[8];  // NOLINT
+    while (depth > 0) {
+        const Waiting here = stack[--depth];
+        if (here.squared > limit) continue;
+        if (here.level == 0) {
+            const Leaf& leaf = tree.leaves_[here.node];
+            const Lanes x = lanes(leaf.at[0]) - p[0], y = lanes(leaf.at[1]) - p[1], z = lanes(leaf.at[2]) - p[2];
+            reinterpret_cast<Lanes&>(out) = x * x + y * y + z * z;
+            for (uint32_t k = 0; k < 8; ++k) {
+                if (!(out[k] <= limit)) continue;
+                if (found.count == most && out[k] == found.squared[most - 1] &&
+                    found.index[most - 1] < 8 * here.node + k)
+                    continue;
+                insert(found, most, out[k], 8 * here.node + k);
+                if (found.count == most) limit = found.squared[most - 1];
+            }
+            continue;
+        }
+        const Node& node = tree.levels_[here.level - 1][here.node];
+        Lanes sum{};
+        for (int a = 0; a < 3; ++a) {
+            const Lanes below = lanes(node.lo[a]) - p[a], above = p[a] - lanes(node.hi[a]);
+            Lanes d = below > above ? below : above;
+            d = d > 0.0f ? d : Lanes{};
+            sum += d * d;
+        }
+        reinterpret_cast<Lanes&>(out) = sum;
+        const size_t first = depth;
+        for (uint32_t k = 0; k < 8; ++k) {
+            if (!(out[k] <= limit)) continue;
+            size_t at = depth++;  // the nearest on top
+            for (; at > first && stack[at - 1].squared < out[k]; --at) stack[at] = stack[at - 1];
+            stack[at] = {out[k], here.level - 1, 8 * here.node + k};
+        }
+    }
+}
+
+void NearPoints::find(const glm::dvec3& p, size_t most, float limit, Found& found) const {
+    found.count = 0;
+    if (count_ == 0 || most == 0) return;
+    const float at[3] = {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
+    search(*this, at, std::min(most, kMost), std::min(limit, kFar), found);
+}
+
+}  // namespace stipple::lod

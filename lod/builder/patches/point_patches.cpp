@@ -1,0 +1,132 @@
+// Points to patches: segments of what lies on a surface, then a patch of each; what folds is halved and tried again.
+// Points beside all surfaces, and those that no patch fits, stay points.
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "lod/builder/patches/gaps.h"
+#include "lod/builder/patches/point_patch.h"
+#include "lod/builder/patches/segments.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr size_t kFewestPoints = 24;  ///< of a segment that may become a patch
+
+class PointPatches {
+  public:
+    PointPatches(const PointSurface& surface, const PatchSettings& settings, Executor& executor, Progress& progress)
+        : s_(surface), settings_(settings), executor_(executor), progress_(progress) {
+        if (settings.samples > 0)
+            samplesAPoint_ =
+                static_cast<double>(settings.samples) / static_cast<double>(std::max<size_t>(s_.size(), 1));
+    }
+
+    PatchSet run() {
+        PatchSet out;
+        out.pointsIn = s_.points;
+        out.dropped = s_.dropped;
+        out.middle = s_.middle;
+        out.isTwoSided = settings_.isTwoSided || s_.given.empty();
+        SegmentSettings how;
+        how.coneCosine = std::cos(settings_.coneDegrees * 3.14159265358979323846 / 180);
+        how.isStopped = settings_.isStopped;
+        std::vector<Segment> segments = worthIt(connectedComponents(s_.elements));
+        segments = splitByCone(s_.elements, std::move(segments), how, executor_);
+        segments = mergeByNormals(s_.elements, std::move(segments), how);
+        sample(worthIt(std::move(segments)));
+        if (settings_.isStopped && settings_.isStopped()) return {};
+        finish(out);
+        return out;
+    }
+
+  private:
+    struct Made {
+        uint32_t first;  ///< point
+        PointPatch patch;
+    };
+
+    /// The others' points are left.
+    std::vector<Segment> worthIt(std::vector<Segment> segments) {
+        std::erase_if(segments, [&](const Segment& s) {
+            if (s.size() >= kFewestPoints) return false;
+            left_.insert(left_.end(), s.begin(), s.end());
+            return true;
+        });
+        return segments;
+    }
+
+    void sample(std::vector<Segment> segments) {
+        std::atomic<uint64_t> done{0};
+        while (!segments.empty()) {
+            std::vector<PointPatch> made(segments.size());
+            executor_.parallelFor(segments.size(), 1, [&](size_t begin, size_t end) {
+                for (size_t k = begin; k < end; ++k) {
+                    if (settings_.isStopped && settings_.isStopped()) return;
+                    made[k] =
+                        patchOfPoints(s_, segments[k], stepOf(s_, segments[k], samplesAPoint_), settings_.closing);
+                    if (!made[k].isFolded) progress_.update("patches", done += segments[k].size(), s_.size());
+                }
+            });
+            if (settings_.isStopped && settings_.isStopped()) return;
+            std::vector<Segment> again;
+            for (size_t k = 0; k < segments.size(); ++k) {
+                if (made[k].isFolded) {
+                    auto [a, b] = halves(s_.elements, segments[k]);
+                    again.push_back(std::move(a));
+                    again.push_back(std::move(b));
+                    continue;
+                }
+                left_.insert(left_.end(), made[k].left.begin(), made[k].left.end());
+                if (made[k].patch.width > 0) made_.push_back({segments[k].front(), std::move(made[k])});
+            }
+            segments = worthIt(std::move(again));
+        }
+    }
+
+    void finish(PatchSet& out) {
+        std::sort(made_.begin(), made_.end(), [](const Made& a, const Made& b) { return a.first < b.first; });
+        double to = 0, from = 0;
+        uint64_t represented = 0;
+        for (Made& m : made_) {
+            Patch& p = m.patch.patch;
+            out.toSource.bound = std::max(out.toSource.bound, p.errorToSource);
+            out.fromSource.bound = std::max(out.fromSource.bound, p.errorFromSource);
+            to += m.patch.toSource;
+            from += m.patch.fromSource;
+            represented += m.patch.represented;
+            out.samples += p.samples();
+            out.triangles += 2 * p.drawnCells();
+            out.patches.push_back(std::move(p));
+        }
+        const double all = static_cast<double>(std::max<uint64_t>(represented, 1));
+        out.toSource.rms = std::sqrt(to / all);
+        out.fromSource.rms = std::sqrt(from / all);
+        if (settings_.closing == PatchClosing::gaps) fillGaps(out);
+        std::sort(left_.begin(), left_.end());
+        for (const uint32_t i : left_) {
+            out.left.position.push_back(s_.elements.centre[i]);
+            out.left.colour.push_back(s_.colour.empty() ? kPlainColour : s_.colour[i]);
+            if (!s_.given.empty()) out.left.normal.push_back(s_.given[i]);
+        }
+        out.pointsLeft = left_.size();
+    }
+
+    const PointSurface& s_;
+    const PatchSettings& settings_;
+    Executor& executor_;
+    Progress& progress_;
+    double samplesAPoint_ = 1;
+    std::vector<Made> made_;
+    std::vector<uint32_t> left_;
+};
+
+}  // namespace
+
+PatchSet patchesOfPoints(PointBlock points, const PatchSettings& settings, Executor& executor, Progress& progress) {
+    const PointSurface surface = pointSurface(std::move(points), settings.isStopped, executor, progress);
+    if (settings.isStopped && settings.isStopped()) return {};
+    return PointPatches(surface, settings, executor, progress).run();
+}
+
+}  // namespace stipple::lod

@@ -1,0 +1,40 @@
+#include "lod/primitives/patch.h"
+
+#include <algorithm>
+
+#include "engine/base/numbers.h"
+
+namespace stipple::lod {
+
+size_t Patch::samples() const {
+    return heights.size() - static_cast<size_t>(std::count(heights.begin(), heights.end(), uint16_t{0}));
+}
+
+size_t Patch::drawnCells() const {
+    return cells.size() - static_cast<size_t>(std::count(cells.begin(), cells.end(), uint8_t{0}));
+}
+
+std::string patchFault(const Patch& p) {
+    if (p.width < 2 || p.height < 2 || p.width > Patch::kMostSide || p.height > Patch::kMostSide)
+        return "has sides of none, one or too many samples";
+    const size_t samples = size_t{p.width} * p.height, cells = size_t{p.width - 1} * (p.height - 1);
+    if (p.heights.size() != samples || p.normals.size() != samples || p.colours.size() != samples ||
+        p.cells.size() != cells)
+        return "has arrays of other sizes than its sides say";
+    const float length = glm::dot(p.turn, p.turn);
+    if (!isFinite(p.origin) || !(length > 0.99f && length < 1.01f) || !(p.step > 0) || !std::isfinite(p.step) ||
+        p.quantumExponent < -1000 || p.quantumExponent > 1000)
+        return "has a plane that is none";
+    if (!(p.errorToSource >= 0) || !(p.errorFromSource >= 0) || !std::isfinite(p.errorToSource + p.errorFromSource))
+        return "has errors that are none";
+    std::vector<uint8_t> used(samples, 0);
+    for (uint32_t j = 0; j + 1 < p.height; ++j)
+        for (uint32_t i = 0; i + 1 < p.width; ++i)
+            if (p.hasCell(i, j))
+                for (const size_t s : {p.at(i, j), p.at(i + 1, j), p.at(i, j + 1), p.at(i + 1, j + 1)}) used[s] = 1;
+    for (size_t s = 0; s < samples; ++s)
+        if ((p.heights[s] != 0) != (used[s] != 0)) return "has a sample without a cell, or a cell without a sample";
+    return "";
+}
+
+}  // namespace stipple::lod

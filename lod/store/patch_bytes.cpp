@@ -1,0 +1,334 @@
+#include "lod/store/patch_bytes.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <functional>
+#include <optional>
+
+#include "lod/primitives/octahedral.h"
+#include "lod/store/check.h"
+#include "lod/store/zstd_memory.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr int kZstdLevel = 9;
+constexpr uint32_t kNormalStep = 32, kMostSteps = 2048;  ///< of roundedNormal: codes 0, 31, 63 ... 65503, 65534
+constexpr uint32_t kNoNormal = 32767u | 32767u << 16;    ///< up: what a first one is compared with
+enum class NormalFrom : uint8_t { neighbour, slope };
+
+struct Head {
+    double origin[3];  // NOLINT: as it lies in the bytes
+    double errorToSource, errorFromSource;
+    float turn[4];  // NOLINT: x y z w
+    float step;
+    int32_t quantumExponent;
+    uint32_t width, height;
+};
+static_assert(sizeof(Head) == 72);
+
+/// Sizes of the streams that follow, packed and not.
+struct Sizes {
+    uint32_t patches;
+    NormalFrom normalFrom;
+    uint8_t reserved[3];             // NOLINT
+    std::array<uint32_t, 5> packed;  ///< heads, cells, heights, normals, colours
+    std::array<uint32_t, 5> plain;
+};
+static_assert(sizeof(Sizes) == 48);
+
+using Bytes = std::vector<uint8_t>;
+
+Bytes compress(const Bytes& raw) {
+    Bytes out(ZSTD_compressBound(raw.size()));
+    ZSTD_CCtx& context = zstdContext(ZSTD_createCCtx, ZSTD_freeCCtx);
+    out.resize(written(ZSTD_compressCCtx(&context, out.data(), out.size(), raw.data(), raw.size(), kZstdLevel)));
+    return out;
+}
+
+std::optional<Bytes> decompress(std::span<const uint8_t> packed, size_t plain) {
+    if (!isPossibleGain(packed.size(), plain)) return {};
+    Bytes out(plain);
+    ZSTD_DCtx& context = zstdContext(ZSTD_createDCtx, ZSTD_freeDCtx);
+    const size_t got =
+        unlessOutOfMemory(ZSTD_decompressDCtx(&context, out.data(), out.size(), packed.data(), packed.size()));
+    if (ZSTD_isError(got) || got != plain) return {};
+    return out;
+}
+
+uint16_t zigzag(uint16_t difference) {
+    const auto v = static_cast<int16_t>(difference);
+    return static_cast<uint16_t>((static_cast<uint32_t>(v) << 1) ^ static_cast<uint32_t>(v >> 15));
+}
+uint16_t unzigzag(uint16_t z) { return static_cast<uint16_t>((z >> 1) ^ (0u - (z & 1u))); }
+
+/// Values of 16 bits: low bytes, then high bytes.
+Bytes planes(const std::vector<uint16_t>& values) {
+    Bytes out(2 * values.size());
+    for (size_t k = 0; k < values.size(); ++k) {
+        out[k] = static_cast<uint8_t>(values[k]);
+        out[values.size() + k] = static_cast<uint8_t>(values[k] >> 8);
+    }
+    return out;
+}
+uint16_t fromPlanes(const Bytes& bytes, size_t k) {
+    return static_cast<uint16_t>(bytes[k] | bytes[bytes.size() / 2 + k] << 8);
+}
+
+/// What is known of a sample from those before it. `value` in use: those whose height is not 0.
+uint16_t predictedHeight(const Patch& p, uint32_t i, uint32_t j, uint16_t last) {
+    const size_t s = p.at(i, j);
+    const uint16_t left = i > 0 ? p.heights[s - 1] : uint16_t{0}, below = j > 0 ? p.heights[s - p.width] : uint16_t{0};
+    const uint16_t corner = i > 0 && j > 0 ? p.heights[s - p.width - 1] : uint16_t{0};
+    if (left != 0 && below != 0 && corner != 0) return static_cast<uint16_t>(left + below - corner);
+    return left != 0 ? left : below != 0 ? below : last;
+}
+
+/// Octahedral steps, x and y.
+std::array<uint32_t, 2> stepsOf(uint32_t code) {
+    constexpr uint32_t kRound = 1 + kNormalStep / 2;
+    return {((code & 0xffffu) + kRound) / kNormalStep, ((code >> 16) + kRound) / kNormalStep};
+}
+uint32_t codeOf(uint32_t x, uint32_t y) {
+    const auto code = [](uint32_t step) { return step == 0 ? 0 : std::min(step * kNormalStep - 1, 65534u); };
+    return code(x) | code(y) << 16;
+}
+
+uint32_t neighbour(const Patch& p, const std::vector<uint32_t>& values, uint32_t i, uint32_t j, uint32_t last) {
+    const size_t s = p.at(i, j);
+    if (i > 0 && p.heights[s - 1] != 0) return values[s - 1];
+    if (j > 0 && p.heights[s - p.width] != 0) return values[s - p.width];
+    return last;
+}
+
+uint32_t normalOfSlope(const Patch& p, uint32_t i, uint32_t j) {
+    const size_t s = p.at(i, j);
+    const auto slope = [&](bool hasLow, bool hasHigh, size_t stride) {
+        const int here = p.heights[s];
+        const int low = hasLow && p.heights[s - stride] != 0 ? p.heights[s - stride] : -1;
+        const int high = hasHigh && p.heights[s + stride] != 0 ? p.heights[s + stride] : -1;
+        if (low < 0 && high < 0) return 0.0f;
+        const int rise = (high < 0 ? here : high) - (low < 0 ? here : low);
+        return static_cast<float>(rise) / (low < 0 || high < 0 ? 1.0f : 2.0f);
+    };
+    const auto quanta = static_cast<float>(double{p.step} / p.quantum());
+    const float x = slope(i > 0, i + 1 < p.width, 1), y = slope(j > 0, j + 1 < p.height, p.width);
+    return roundedNormal({-x, -y, std::clamp(quanta, 1e-6f, 1e9f)});
+}
+
+uint32_t predictedNormal(const Patch& p, uint32_t i, uint32_t j, uint32_t last, NormalFrom from) {
+    return from == NormalFrom::slope ? normalOfSlope(p, i, j) : neighbour(p, p.normals, i, j, last);
+}
+
+template <typename Use>
+void forEachSample(const Patch& p, const Use& use) {
+    for (uint32_t j = 0; j < p.height; ++j)
+        for (uint32_t i = 0; i < p.width; ++i)
+            if (p.heights[p.at(i, j)] != 0) use(i, j);
+}
+
+Bytes normalBytes(std::span<const Patch> patches, NormalFrom from) {
+    std::vector<uint16_t> x, y;
+    for (const Patch& p : patches) {
+        uint32_t last = kNoNormal;
+        forEachSample(p, [&](uint32_t i, uint32_t j) {
+            const auto predicted = stepsOf(predictedNormal(p, i, j, last, from));
+            last = p.normals[p.at(i, j)];
+            const auto steps = stepsOf(last);
+            x.push_back(zigzag(static_cast<uint16_t>(steps[0] - predicted[0])));
+            y.push_back(zigzag(static_cast<uint16_t>(steps[1] - predicted[1])));
+        });
+    }
+    x.insert(x.end(), y.begin(), y.end());
+    return planes(x);
+}
+
+uint32_t channel(uint32_t colour, int k) { return colour >> (8 * k) & 255u; }
+
+Bytes colourBytes(std::span<const Patch> patches) {
+    std::array<Bytes, 3> out;
+    for (const Patch& p : patches) {
+        uint32_t last = 0;
+        forEachSample(p, [&](uint32_t i, uint32_t j) {
+            const uint32_t before = neighbour(p, p.colours, i, j, last);
+            last = p.colours[p.at(i, j)];
+            const uint32_t green = channel(last, 1) - channel(before, 1);
+            out[0].push_back(static_cast<uint8_t>(green));
+            out[1].push_back(static_cast<uint8_t>(channel(last, 0) - channel(before, 0) - green));
+            out[2].push_back(static_cast<uint8_t>(channel(last, 2) - channel(before, 2) - green));
+        });
+    }
+    for (size_t k = 1; k < 3; ++k) out[0].insert(out[0].end(), out.at(k).begin(), out.at(k).end());
+    return out[0];
+}
+
+}  // namespace
+
+PatchBytes encodePatches(std::span<const Patch> patches) {
+    Bytes heads, cells;
+    std::vector<uint16_t> heights;
+    for (const Patch& p : patches) {
+        Head h{};
+        for (int k = 0; k < 3; ++k) h.origin[k] = p.origin[k];
+        for (int k = 0; k < 4; ++k) h.turn[k] = p.turn[k];
+        h.step = p.step;
+        h.quantumExponent = p.quantumExponent;
+        h.width = p.width;
+        h.height = p.height;
+        h.errorToSource = p.errorToSource;
+        h.errorFromSource = p.errorFromSource;
+        heads.resize(heads.size() + sizeof(h));
+        std::memcpy(heads.data() + heads.size() - sizeof(h), &h, sizeof(h));
+        const size_t first = cells.size();
+        cells.resize(first + (p.cells.size() + 7) / 8);
+        for (size_t c = 0; c < p.cells.size(); ++c)
+            if (p.cells[c] != 0) cells[first + c / 8] |= static_cast<uint8_t>(1u << (c % 8));
+        uint16_t last = 0;
+        forEachSample(p, [&](uint32_t i, uint32_t j) {
+            const uint16_t code = p.heights[p.at(i, j)];
+            heights.push_back(zigzag(static_cast<uint16_t>(code - predictedHeight(p, i, j, last))));
+            last = code;
+        });
+    }
+    const Bytes fromNeighbour = normalBytes(patches, NormalFrom::neighbour),
+                fromSlope = normalBytes(patches, NormalFrom::slope);
+    const Bytes packedNeighbour = compress(fromNeighbour), packedSlope = compress(fromSlope);
+    const bool bySlope = packedSlope.size() < packedNeighbour.size();
+    const Bytes plainHeights = planes(heights), colours = colourBytes(patches);
+    const std::array<Bytes, 5> packed{compress(heads), compress(cells), compress(plainHeights),
+                                      bySlope ? packedSlope : packedNeighbour, compress(colours)};
+    Sizes sizes{};
+    sizes.patches = static_cast<uint32_t>(patches.size());
+    sizes.normalFrom = bySlope ? NormalFrom::slope : NormalFrom::neighbour;
+    for (size_t k = 0; k < 5; ++k) sizes.packed.at(k) = static_cast<uint32_t>(packed.at(k).size());
+    sizes.plain = {static_cast<uint32_t>(heads.size()), static_cast<uint32_t>(cells.size()),
+                   static_cast<uint32_t>(plainHeights.size()), static_cast<uint32_t>(fromSlope.size()),
+                   static_cast<uint32_t>(colours.size())};
+    PatchBytes out;
+    out.bytes.resize(sizeof(sizes));
+    std::memcpy(out.bytes.data(), &sizes, sizeof(sizes));
+    for (const Bytes& b : packed) out.bytes.insert(out.bytes.end(), b.begin(), b.end());
+    out.geometry = sizeof(sizes) + packed[0].size() + packed[1].size() + packed[2].size();
+    out.normals = packed[3].size();
+    out.colours = packed[4].size();
+    return out;
+}
+
+namespace {
+
+/// Bounds of what a file may say of itself.
+constexpr uint64_t kMostSamples = uint64_t{1} << 28;
+
+bool readHead(const Bytes& heads, size_t k, Patch& p) {
+    Head h{};
+    std::memcpy(&h, heads.data() + k * sizeof(h), sizeof(h));
+    if (h.width < 2 || h.height < 2 || h.width > Patch::kMostSide || h.height > Patch::kMostSide) return false;
+    for (int a = 0; a < 3; ++a) p.origin[a] = h.origin[a];
+    for (int a = 0; a < 4; ++a) p.turn[a] = h.turn[a];
+    p.step = h.step;
+    p.quantumExponent = h.quantumExponent;
+    p.width = h.width;
+    p.height = h.height;
+    p.errorToSource = h.errorToSource;
+    p.errorFromSource = h.errorFromSource;
+    return true;
+}
+
+/// Marks the samples beside cells with 1; returns their number.
+size_t markSamples(Patch& p) {
+    p.heights.assign(size_t{p.width} * p.height, 0);
+    for (uint32_t j = 0; j + 1 < p.height; ++j)
+        for (uint32_t i = 0; i + 1 < p.width; ++i)
+            if (p.hasCell(i, j))
+                for (const size_t s : {p.at(i, j), p.at(i + 1, j), p.at(i, j + 1), p.at(i + 1, j + 1)})
+                    p.heights[s] = 1;
+    return p.samples();
+}
+
+/// Values in the order of samples, over all patches.
+struct Plain {
+    Bytes heads, cells, heights, normals, colours;
+    size_t samples = 0, next = 0;
+};
+
+/// False where a code is 0, which says "no sample".
+bool readSamples(Patch& p, Plain& plain, NormalFrom from) {
+    const size_t first = plain.next;
+    uint16_t last = 0;
+    std::vector<uint16_t> marks = std::move(p.heights);
+    p.heights.assign(marks.size(), 0);
+    const auto forEachMark = [&](const auto& use) {
+        plain.next = first;
+        for (uint32_t j = 0; j < p.height; ++j)
+            for (uint32_t i = 0; i < p.width; ++i)
+                if (marks[p.at(i, j)] != 0) use(i, j, plain.next++);
+    };
+    bool isWhole = true;
+    forEachMark([&](uint32_t i, uint32_t j, size_t k) {
+        last = static_cast<uint16_t>(predictedHeight(p, i, j, last) + unzigzag(fromPlanes(plain.heights, k)));
+        p.heights[p.at(i, j)] = last;
+        isWhole = isWhole && last != 0;
+    });
+    if (!isWhole) return false;
+    p.normals.assign(marks.size(), 0);
+    p.colours.assign(marks.size(), 0);
+    uint32_t normal = kNoNormal, colour = 0;
+    forEachMark([&](uint32_t i, uint32_t j, size_t k) {
+        const auto predicted = stepsOf(predictedNormal(p, i, j, normal, from));
+        const auto step = [&](size_t axis) {
+            const uint16_t difference = unzigzag(fromPlanes(plain.normals, axis * plain.samples + k));
+            return std::min((predicted.at(axis) + difference) & 0xffffu, kMostSteps);
+        };
+        p.normals[p.at(i, j)] = normal = codeOf(step(0), step(1));
+        const uint32_t before = neighbour(p, p.colours, i, j, colour), green = plain.colours[k];
+        const auto value = [&](int c, size_t plane, uint32_t more) {
+            return ((channel(before, c) + plain.colours[plane * plain.samples + k] + more) & 255u) << (8 * c);
+        };
+        p.colours[p.at(i, j)] = colour = value(1, 0, 0) | value(0, 1, green) | value(2, 2, green);
+    });
+    return true;
+}
+
+}  // namespace
+
+Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const std::string& where) {
+    const auto damaged = [&] { return fail(ErrorKind::input, "patches are damaged", where, "build it again"); };
+    Sizes sizes{};
+    if (bytes.size() < sizeof(sizes)) return damaged();
+    std::memcpy(&sizes, bytes.data(), sizeof(sizes));
+    uint64_t end = sizeof(sizes);
+    for (const uint32_t size : sizes.packed) end += size;
+    if (end != bytes.size() || sizes.plain[0] != uint64_t{sizes.patches} * sizeof(Head)) return damaged();
+    Plain plain;
+    std::array<Bytes*, 5> streams{&plain.heads, &plain.cells, &plain.heights, &plain.normals, &plain.colours};
+    size_t at = sizeof(sizes);
+    for (size_t k = 0; k < 5; ++k) {
+        auto stream = decompress(bytes.subspan(at, sizes.packed.at(k)), sizes.plain.at(k));
+        if (!stream) return damaged();
+        *streams.at(k) = std::move(*stream);
+        at += sizes.packed.at(k);
+    }
+    std::vector<Patch> out(sizes.patches);
+    size_t cell = 0;
+    uint64_t grid = 0;
+    for (size_t k = 0; k < out.size(); ++k) {
+        Patch& p = out[k];
+        if (!readHead(plain.heads, k, p)) return damaged();
+        const size_t cells = size_t{p.width - 1} * (p.height - 1);
+        grid += size_t{p.width} * p.height;
+        if ((cells + 7) / 8 > plain.cells.size() - cell || grid > kMostSamples) return damaged();
+        p.cells.resize(cells);
+        for (size_t c = 0; c < cells; ++c) p.cells[c] = plain.cells[cell + c / 8] >> (c % 8) & 1u;
+        cell += (cells + 7) / 8;
+        plain.samples += markSamples(p);
+    }
+    if (cell != plain.cells.size() || plain.heights.size() != 2 * plain.samples ||
+        plain.normals.size() != 4 * plain.samples || plain.colours.size() != 3 * plain.samples)
+        return damaged();
+    for (Patch& p : out)
+        if (!readSamples(p, plain, sizes.normalFrom) || !patchFault(p).empty()) return damaged();
+    return out;
+}
+
+}  // namespace stipple::lod

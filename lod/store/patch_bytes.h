@@ -1,0 +1,32 @@
+// Patches as bytes: what is smooth is predicted, what is left lies in planes of bytes under zstd.
+//
+//   head      sides, plane, errors, a patch after the other
+//   cells     a bit each
+//   heights   of samples in use: codes minus left + below - lower left (or what there is of them), zigzag
+//   normals   octahedral steps (11 bits each way) minus the neighbour's, or minus the normal of the heights' own slope:
+//             whichever takes less room
+//   colours   minus the neighbour's; red and blue also minus green's
+//
+// Everything is exact: decoding gives the patches again.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/base/result.h"
+#include "lod/primitives/patch.h"
+
+namespace stipple::lod {
+
+struct PatchBytes {
+    std::vector<uint8_t> bytes;
+    /// Of `bytes`: heads, cells and heights; normals; colours.
+    uint64_t geometry = 0, normals = 0, colours = 0;
+};
+
+PatchBytes encodePatches(std::span<const Patch> patches);
+/// Of any bytes. `where` for errors. No array is made before the bytes are there that can fill it.
+Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const std::string& where);
+
+}  // namespace stipple::lod
