@@ -103,6 +103,10 @@ TEST(ConvertPatches, ReportsWhatIsThere) {
     const auto more = nlohmann::json::parse(
         runProgram(folder, "convert ball.ply --patches --patch-samples 40k -o more.glb --json").out);
     EXPECT_GT(more["samples"].get<double>(), 2.5 * j["samples"].get<double>());
+    const auto gaps =
+        nlohmann::json::parse(runProgram(folder, "convert ball.ply --patches --fill-gaps -o gaps.glb --json").out);
+    EXPECT_GT(gaps["gap_triangles"].get<int>(), 100);
+    EXPECT_LT(gaps["samples"].get<double>(), j["samples"].get<double>());
     const std::string text = runProgram(folder, "convert ball.ply --patches -o text.glb").out;
     EXPECT_NE(text.find("bytes a sample"), std::string::npos) << text;
     EXPECT_NE(text.find("9000 points became"), std::string::npos) << text;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 
 #include "lod/builder/patches/cone.h"
 #include "lod/builder/patches/moving_least_squares.h"
@@ -80,7 +81,7 @@ void expectBounds(const lod::TriangleMesh& mesh, const lod::PatchSet& set, size_
         EXPECT_LE(most, patch.errorToSource * (1 + 1e-9) + 1e-12);
         measured = std::max(measured, most);
     }
-    EXPECT_GT(measured, 0.2 * set.toSource.bound) << "a bound that says too little";
+    if (set.gaps.empty()) EXPECT_GT(measured, 0.2 * set.toSource.bound) << "a bound that says too little";
     double back = 0;
     for (size_t k = 0; k < samples; ++k)
         back = std::max(back, distance(all, somewhereOn(source[rng.below(source.size())], rng)));
@@ -250,6 +251,83 @@ TEST(Patches, KeepTwoSheetsApart) {
     }
     EXPECT_GT(samples, 4000u);
     EXPECT_LT(set.pointsLeft, 500u);
+}
+
+/// Directed edges without their other side, among the triangles of patches and gaps; `twice`: those that are there
+/// more than once.
+size_t openEdges(const lod::PatchSet& set, size_t& twice) {
+    std::map<std::pair<lod::PatchCorner, lod::PatchCorner>, int> edges;
+    const auto add = [&](const std::array<lod::PatchCorner, 3>& t) {
+        for (size_t k = 0; k < 3; ++k) ++edges[{t.at(k), t.at((k + 1) % 3)}];
+    };
+    for (uint32_t p = 0; p < set.patches.size(); ++p)
+        lod::PatchSurface(set.patches[p]).triangles([&](size_t a, size_t b, size_t c) {
+            add({lod::PatchCorner{p, uint32_t(a)}, {p, uint32_t(b)}, {p, uint32_t(c)}});
+        });
+    for (const auto& gap : set.gaps) add(gap);
+    size_t open = 0;
+    twice = 0;
+    for (const auto& [edge, count] : edges) {
+        twice += count > 1 ? 1 : 0;
+        open += edges.contains({edge.second, edge.first}) ? 0 : 1;
+    }
+    return open;
+}
+
+TEST(PatchGaps, AreClosedByWhatNeitherFoldsNorCovers) {
+    const lod::TriangleMesh mesh = test::torusMesh(120, 50);
+    lod::PatchSettings settings;
+    settings.samples = 12000;
+    size_t twice = 0;
+    settings.closing = lod::PatchClosing::open;
+    EXPECT_GT(openEdges(patchesOf(mesh, settings), twice), 500u) << "the control: they are open";
+    settings.closing = lod::PatchClosing::gaps;
+    const lod::PatchSet set = patchesOf(mesh, settings);
+    EXPECT_EQ(openEdges(set, twice), 0u);
+    EXPECT_EQ(twice, 0u);
+    EXPECT_EQ(set.openEdges, 0u);
+    EXPECT_GT(set.gaps.size(), 500u);
+    // What lies over others, or through the body, has area and volume of its own.
+    double area = 0, volume = 0, sourceArea = 0, sourceVolume = 0;
+    const auto addUp = [](const std::vector<Triangle>& all, double& itsArea, double& itsVolume) {
+        for (const Triangle& t : all) {
+            itsArea += 0.5 * glm::length(glm::cross(t[1] - t[0], t[2] - t[0]));
+            itsVolume += glm::dot(t[0], glm::cross(t[1], t[2])) / 6;
+        }
+    };
+    addUp(test::trianglesOf(set), area, volume);
+    addUp(test::trianglesOf(mesh), sourceArea, sourceVolume);
+    EXPECT_NEAR(area, sourceArea, 0.003 * sourceArea);
+    EXPECT_NEAR(volume, sourceVolume, 0.003 * sourceVolume);
+    settings.closing = lod::PatchClosing::overlap;  // the control of that
+    double overlapArea = 0, overlapVolume = 0;
+    addUp(test::trianglesOf(patchesOf(mesh, settings)), overlapArea, overlapVolume);
+    EXPECT_GT(overlapArea, 1.02 * sourceArea);
+    expectBounds(mesh, set, 1500);
+    const std::vector<Triangle> source = test::trianglesOf(mesh), all = test::trianglesOf(set);
+    Rng rng(8);
+    for (size_t k = 0; k < 300; ++k)  // gaps stand last
+        EXPECT_LE(distance(source, somewhereOn(all[all.size() - 1 - rng.below(set.gaps.size())], rng)),
+                  set.toSource.bound);
+}
+
+TEST(PatchGaps, StayOpenWhereTheSourceEnds) {
+    const lod::TriangleMesh mesh = test::sheet(60, 60, [](double u, double v) {
+        const double a = 2.6 * u;
+        return glm::dvec3(std::cos(a), v, std::sin(a));
+    });
+    lod::PatchSettings settings;
+    settings.samples = 4000;
+    settings.closing = lod::PatchClosing::gaps;
+    const lod::PatchSet set = patchesOf(mesh, settings);
+    ASSERT_GE(set.patches.size(), 2u);
+    size_t twice = 0;
+    const size_t open = openEdges(set, twice);
+    EXPECT_EQ(open, set.openEdges);
+    EXPECT_EQ(twice, 0u);
+    // Its outline, 2 * (2.6 + 1) long; cells along it are about 1/63 wide.
+    EXPECT_GT(open, 200u);
+    EXPECT_LT(open, 700u);
 }
 
 TEST(PatchBytes, ComeBackExactly) {

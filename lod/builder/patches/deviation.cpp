@@ -10,6 +10,30 @@ constexpr int kMostDivisions = 2;      ///< of a triangle beyond the segment
 constexpr int kLookAround = 4;         ///< cells, from one that is not drawn to a sample
 constexpr double kBesideSteps = 1e-9;  ///< of places on lines between cells, samples
 
+/// Raises `bound` where a triangle needs it.
+void divide(const MeshSurface& s, const std::array<glm::dvec3, 3>& t, size_t hint, int divided, double& bound) {
+    const auto fromOne = [&](size_t one) {
+        return std::max({s.distance(t[0], one), s.distance(t[1], one), s.distance(t[2], one)});
+    };
+    if (fromOne(hint) <= bound) return;
+    const glm::dvec3 middle = (t[0] + t[1] + t[2]) / 3.0;
+    const double around =
+        std::max({glm::distance(t[0], middle), glm::distance(t[1], middle), glm::distance(t[2], middle)});
+    const auto [distance, nearest] = s.nearest(middle, hint);
+    double most = distance + around;
+    if (most > bound) most = std::min(most, fromOne(nearest));
+    if (most <= bound) return;
+    if (divided == kMostDivisions) {
+        bound = most;
+        return;
+    }
+    const glm::dvec3 ab = 0.5 * (t[0] + t[1]), bc = 0.5 * (t[1] + t[2]), ca = 0.5 * (t[2] + t[0]);
+    divide(s, {ab, bc, ca}, nearest, divided + 1, bound);
+    divide(s, {t[0], ab, ca}, nearest, divided + 1, bound);
+    divide(s, {ab, t[1], bc}, nearest, divided + 1, bound);
+    divide(s, {ca, bc, t[2]}, nearest, divided + 1, bound);
+}
+
 class Measure {
   public:
     Measure(const OwnSurface& own, const Patch& patch, const OverPatch& over)
@@ -39,7 +63,9 @@ class Measure {
                 const bool isInside = over_.isInside(i, j) && isDoubtful_[size_t{j} * (patch_.width - 1) + i] == 0;
                 if (!isInside)
                     surface_.trianglesOf(i, j, [&](size_t a, size_t b, size_t c) {
-                        beyond(surface_.position(a), surface_.position(b), surface_.position(c), over_.triangle(a), 0);
+                        d_.toSource =
+                            boundToSource(s_, {surface_.position(a), surface_.position(b), surface_.position(c)},
+                                          over_.triangle(a), d_.toSource);
                     });
                 if (!isInside || (i + 2 * j) % 4 == 0) atCentre(i, j, isInside ? 4 : 1);
             }
@@ -133,28 +159,6 @@ class Measure {
         d_.toSourceWeight += area;
     }
 
-    void beyond(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, size_t hint, int divided) {
-        const auto fromOne = [&](size_t t) {
-            return std::max({s_.distance(a, t), s_.distance(b, t), s_.distance(c, t)});
-        };
-        if (fromOne(hint) <= d_.toSource) return;
-        const glm::dvec3 middle = (a + b + c) / 3.0;
-        const double around = std::max({glm::distance(a, middle), glm::distance(b, middle), glm::distance(c, middle)});
-        const auto [distance, nearest] = s_.nearest(middle, hint);
-        double most = distance + around;
-        if (most > d_.toSource) most = std::min(most, fromOne(nearest));
-        if (most <= d_.toSource) return;
-        if (divided == kMostDivisions) {
-            d_.toSource = most;
-            return;
-        }
-        const glm::dvec3 ab = 0.5 * (a + b), bc = 0.5 * (b + c), ca = 0.5 * (c + a);
-        beyond(ab, bc, ca, nearest, divided + 1);
-        beyond(a, ab, ca, nearest, divided + 1);
-        beyond(ab, b, bc, nearest, divided + 1);
-        beyond(ca, bc, c, nearest, divided + 1);
-    }
-
     const OwnSurface& own_;
     const MeshSurface& s_;
     const Patch& patch_;
@@ -169,6 +173,12 @@ class Measure {
 };
 
 }  // namespace
+
+double boundToSource(const MeshSurface& surface, const std::array<glm::dvec3, 3>& triangle, size_t hint,
+                     double atLeast) {
+    divide(surface, triangle, hint, 0, atLeast);
+    return atLeast;
+}
 
 Deviation deviationOf(const OwnSurface& own, const Patch& patch, const OverPatch& over) {
     return Measure(own, patch, over).run();

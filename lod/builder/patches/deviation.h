@@ -28,6 +28,10 @@ struct Deviation {
     double toSourceSquares = 0, toSourceWeight = 0, fromSourceSquares = 0, fromSourceWeight = 0;
 };
 
+/// No place of a triangle is farther from the surface than that; not less than `atLeast`. `hint`: a triangle near by.
+double boundToSource(const MeshSurface& surface, const std::array<glm::dvec3, 3>& triangle, size_t hint,
+                     double atLeast);
+
 /// What is known of the patch's cells and samples.
 struct OverPatch {
     std::function<bool(uint32_t i, uint32_t j)> isInside;

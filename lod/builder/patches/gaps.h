@@ -8,4 +8,6 @@ namespace stipple::lod {
 /// Adds `set.gaps`, counts them in `set.triangles`, and what stays open in `set.openEdges`.
 void fillGaps(PatchSet& set);
 
+std::array<glm::dvec3, 3> placesOf(const PatchSet& set, const std::array<PatchCorner, 3>& gap);
+
 }  // namespace stipple::lod

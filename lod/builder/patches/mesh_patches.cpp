@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "lod/builder/patches/deviation.h"
 #include "lod/builder/patches/gaps.h"
 #include "lod/builder/patches/mesh_patch.h"
 #include "lod/builder/patches/segments.h"
@@ -125,7 +126,14 @@ class MeshPatches {
         }
         out.toSource.rms = toWeight > 0 ? std::sqrt(to / toWeight) : 0;
         out.fromSource.rms = fromWeight > 0 ? std::sqrt(from / fromWeight) : 0;
-        if (settings_.closing == PatchClosing::gaps) fillGaps(out);
+        if (settings_.closing == PatchClosing::gaps) {
+            fillGaps(out);
+            for (const auto& gap : out.gaps) {
+                const auto places = placesOf(out, gap);
+                const size_t near = s_.nearest(places[0], 0).second;
+                out.toSource.bound = boundToSource(s_, places, near, out.toSource.bound);
+            }
+        }
         leavePoints(out);
     }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 
 #include "lod/builder/patches/gaps.h"
 #include "lod/builder/patches/point_patch.h"
@@ -102,7 +103,11 @@ class PointPatches {
         const double all = static_cast<double>(std::max<uint64_t>(represented, 1));
         out.toSource.rms = std::sqrt(to / all);
         out.fromSource.rms = std::sqrt(from / all);
-        if (settings_.closing == PatchClosing::gaps) fillGaps(out);
+        if (settings_.closing == PatchClosing::gaps) {
+            fillGaps(out);
+            for (const auto& gap : out.gaps)
+                out.toSource.bound = std::max(out.toSource.bound, boundToPoints(placesOf(out, gap)));
+        }
         std::sort(left_.begin(), left_.end());
         for (const uint32_t i : left_) {
             out.left.position.push_back(s_.elements.centre[i]);
@@ -110,6 +115,18 @@ class PointPatches {
             if (!s_.given.empty()) out.left.normal.push_back(s_.given[i]);
         }
         out.pointsLeft = left_.size();
+    }
+
+    /// From any place of a triangle: by way of a corner, to the point nearest to that.
+    double boundToPoints(const std::array<glm::dvec3, 3>& t) const {
+        double most = 0, longest = 0;
+        for (size_t k = 0; k < 3; ++k) {
+            NearPoints::Found near;
+            s_.near.find(t.at(k), 1, std::numeric_limits<float>::max(), near);
+            most = std::max(most, glm::distance(t.at(k), s_.elements.centre[near.index[0]]));
+            longest = std::max(longest, glm::distance(t.at(k), t.at((k + 1) % 3)));
+        }
+        return most + longest / std::sqrt(3.0);
     }
 
     const PointSurface& s_;
