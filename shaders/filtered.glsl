@@ -2,7 +2,7 @@
 // same whatever the order in which threads come.
 #extension GL_GOOGLE_include_directive : require
 #include "discs.glsl"
-#include "shared/ewa.h"
+#include "shared/surfel_weight.h"
 
 layout(set = 0, binding = kFrontsBinding, scalar) buffer FrontBlock { FilteredFront fronts[]; };
 layout(set = 0, binding = kSumsBinding, scalar) buffer SumBlock { FilteredSums sums[]; };
@@ -13,6 +13,18 @@ PointRecord recordOf(uint id, out DrawNode node) {
     const DrawBlock source = blocks[id / kBlockLanes];
     node = nodes[source.node];
     return Records(uvec2(node.addressLow, node.addressHigh)).records[source.first + id % kBlockLanes];
+}
+
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer WeightWords { uint words[]; };
+// By how much a surfel counts.
+float scaleOf(uint id, DrawNode node) {
+    if (frame.perSurfel == 0u) return 1.0;
+    uint code = 0u;
+    if (node.weights != 0u) {
+        const uint at = node.weights * 16u + blocks[id / kBlockLanes].first + id % kBlockLanes;  // bytes, behind the records
+        code = WeightWords(uvec2(node.addressLow, node.addressHigh)).words[at >> 2] >> (at & 3u) * 8u & 255u;
+    }
+    return surfelScale(code, frame.kernelSupport);
 }
 
 // A disc with its opaque radius.
@@ -94,8 +106,8 @@ float absoluteDepth(float relative, float reference) {
     return frame.orthographic != 0u ? reference + relative * 512.0 / frame.focal : reference / (1.0 + relative);
 }
 
-// Adds a disc to a pixel.
-void addKernel(WideDisc d, vec3 colour, EwaKernel k, DepthRange range, ivec2 pixel) {
+// Adds a disc to a pixel. `scale`: see scaleOf.
+void addKernel(WideDisc d, vec3 colour, float scale, EwaKernel k, DepthRange range, ivec2 pixel) {
     if (isBeyond(k, pixel)) return;
     const RayOnDisc r = rayOnDisc(d, k, range, pixel);
     const uint at = uint(pixel.y) * frame.width + uint(pixel.x);
@@ -106,7 +118,7 @@ void addKernel(WideDisc d, vec3 colour, EwaKernel k, DepthRange range, ivec2 pix
     }
     const float support = frame.kernelSupport;
     if (!(r.rho2 < support * support)) return;
-    const float w = blendedAmplitude(d, k, frame.nearPlane) * kernelAt(r.rho2, kernelEnd(support)) * sums[at].unit;
+    const float w = scale * blendedAmplitude(d, k, frame.nearPlane) * kernelAt(r.rho2, kernelEnd(support)) * sums[at].unit;
     const vec3 n = towardsEye(d);
     atomicAdd(sums[at].weight, unitsOf(w));
     atomicAdd(sums[at].depth, unitsOf(w * relativeDepth(r.depth, sums[at].reference)));

@@ -11,6 +11,7 @@
 #include "engine/base/hash.h"
 #include "lod/primitives/kinds.h"
 #include "lod/store/store.h"
+#include "lod/store/surfel_weights.h"
 
 namespace stipple::streaming {
 namespace {
@@ -42,6 +43,14 @@ Result<lod::Chunk> fetch(const ByteSource& source, const lod::Hierarchy& h, uint
                     "the store is damaged; build it again");
     STIPPLE_ASSIGN(lod::Chunk chunk, lod::decodeStored(h, index, bytes.data(), place.bytes, where, false));
     if (finish.apply) STIPPLE_TRY(finish.apply(index, chunk, attributes, attributeBytes));
+    if (const lod::Stream* weights = h.isTile(index) ? nullptr : lod::weightsOf(h, index)) {
+        bytes.resize(weights->bytes);
+        STIPPLE_TRY(source.read(weights->offset, bytes.data(), bytes.size()));
+        if (hashBytes(bytes.data(), bytes.size()) != weights->hash)
+            return fail(ErrorKind::input, "the hash of the weights of a chunk does not match", where,
+                        "the store is damaged; build it again");
+        STIPPLE_ASSIGN(chunk.weights, lod::decodeWeights(bytes.data(), bytes.size(), h.payload(index).records, where));
+    }
     return chunk;
 }
 

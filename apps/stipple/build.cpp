@@ -10,6 +10,7 @@
 #include "engine/base/process.h"
 #include "engine/base/text.h"
 #include "engine/base/words.h"
+#include "lod/builder/weights/add.h"
 
 namespace stipple::app {
 namespace {
@@ -18,13 +19,24 @@ struct Options {
     std::vector<std::string> inputs;
     std::string output;
     BuildOptions build;
-    bool json = false, quiet = false, mpi = false, force = false, restart = false;
+    bool json = false, quiet = false, mpi = false, force = false, restart = false, surfelWeights = false;
 };
 
 /// Of the output, also where its temporary file was being checked.
 Error interruptedAt(Error error, const Options& o) {
     if (error.where.find(".partial") == std::string::npos) return error;
     return {ErrorKind::interrupted, "interrupted; nothing is written", o.output, ""};
+}
+
+/// Of the store that was built.
+Result<void> addWeights(const Options& o, Executor& executor, lod::BuildReport& report) {
+    Progress progress(o.build.progressStyle(o.quiet));
+    STIPPLE_ASSIGN(const lod::WeightReport added, lod::addSurfelWeights(o.output, executor, progress));
+    report.stageSeconds["weights of surfels"] = added.seconds;
+    report.seconds += added.seconds;
+    report.bytesOut = added.fileBytes;
+    report.contentHash = added.contentHash;
+    return {};
 }
 
 /// `isSilent`: another rank says what there is to say.
@@ -60,6 +72,7 @@ Result<void> run(const Options& o, bool& isSilent) {
     if (!built && built.error().kind == ErrorKind::interrupted) built = tl::unexpected(interruptedAt(built.error(), o));
     if (!built) return tl::unexpected(built.error());
     if (isSilent) return {};
+    if (o.surfelWeights) STIPPLE_TRY(addWeights(o, *executor, *built));
     const lod::BuildReport& r = *built;
     if (o.json) {
         const nlohmann::json j = {{"primitive", r.primitive + "s"},
@@ -110,6 +123,9 @@ void setupBuild(CLI::App& app, int& status) {
     sub->add_option("-o,--output", o->output, "the scene to write (.stipple)")->type_name("STORE")->required();
     o->build.addTo(*sub);
     addForce(*sub, o->force);
+    sub->add_flag("--surfel-weights", o->surfelWeights,
+                  "of points: measure by how much each counts where discs are blended (render --mode ewa --normalise "
+                  "surfel), and keep it in the scene");
     sub->add_flag("--restart", o->restart,
                   "begin anew where an interrupted build of other input or with other settings is in the way");
     sub->add_flag("--json", o->json, "print the report as JSON (stipple help json)");

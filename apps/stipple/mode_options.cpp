@@ -24,13 +24,10 @@ struct OnlyOf {
 constexpr const char* kOfEwa = "it belongs to mode ewa";
 constexpr const char* kDrawn = "the reference traces full detail as it stands";
 constexpr std::array kOnlyOf{
-    OnlyOf{"--lowpass", blends, kOfEwa},
-    OnlyOf{"--kernel", blends, kOfEwa},
-    OnlyOf{"--samples", isTraced, "it belongs to mode reference"},
-    OnlyOf{"--budget-points", isDrawn, kDrawn},
-    OnlyOf{"--wind", isDrawn, kDrawn},
-    OnlyOf{"--time", isDrawn, kDrawn},
-    OnlyOf{"--accumulate", isDrawn, kDrawn},
+    OnlyOf{"--lowpass", blends, kOfEwa},        OnlyOf{"--kernel", blends, kOfEwa},
+    OnlyOf{"--normalise", blends, kOfEwa},      OnlyOf{"--samples", isTraced, "it belongs to mode reference"},
+    OnlyOf{"--budget-points", isDrawn, kDrawn}, OnlyOf{"--wind", isDrawn, kDrawn},
+    OnlyOf{"--time", isDrawn, kDrawn},          OnlyOf{"--accumulate", isDrawn, kDrawn},
     OnlyOf{"--debug", isDrawn, kDrawn},
 };
 

@@ -13,6 +13,7 @@
 #include "apps/stipple/mode_options.h"
 #include "apps/stipple/outputs.h"
 #include "apps/stipple/render_frames.h"
+#include "apps/stipple/scene_facts.h"
 #include "engine/base/file.h"
 #include "engine/base/process.h"
 #include "engine/base/text.h"
@@ -34,6 +35,7 @@ struct Options {
                         background = fmt::format("{}", fmt::join(render::kBackground, ","));
     std::string debug = "none", resident = "1G";
     double error = 1, curveExact = 2, wind = 0, seconds = 0, lowPass = 0.5, kernel = 2;
+    std::string normalise = "pixel";
     int frames = 1, samples = 4, accumulate = 1;
     uint64_t budget = 0;
     bool noWait = false, json = false, quiet = false, force = false, alpha = false;
@@ -95,6 +97,7 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     s.draw.effects = o.effects;
     s.draw.lowPass = static_cast<float>(o.lowPass);
     s.draw.kernelSupport = static_cast<float>(o.kernel);
+    s.draw.perSurfel = o.normalise == "surfel";
     s.draw.wind = {o.wind, o.seconds, render::windAcross(shot.worldUp)};
     STIPPLE_ASSIGN(const glm::dvec3 background, backgroundOf(o));
     for (int c = 0; c < 3; ++c)
@@ -268,6 +271,12 @@ void tell(const Options& o, const render::FrameState& state, const Verdict& verd
     }
 }
 
+Result<void> checkWeights(const Options& o, const OpenedScene& scene) {
+    if (o.normalise != "surfel" || hasSurfelWeights(scene.placed)) return {};
+    return fail(ErrorKind::usage, "no store of the scene has weights of surfels", "--normalise surfel",
+                "build it with: stipple build --surfel-weights, or take --normalise pixel");
+}
+
 Result<void> run(const Options& o, Written& written) {
     catchStopSignals();
     STIPPLE_TRY(checkPictures(o));
@@ -277,6 +286,7 @@ Result<void> run(const Options& o, Written& written) {
     STIPPLE_ASSIGN(const std::unique_ptr<render::Backend> backend, makeBackend(o.device, *executor));
     STIPPLE_TRY(checkModule(o));
     STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, !o.quiet));
+    STIPPLE_TRY(checkWeights(o, scene));
     const lod::StoreDescription& description = scene.description;
     STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
     written.of = shot.views.size();
@@ -366,6 +376,11 @@ void addKernelOptions(CLI::App& sub, Options& o) {
                 return text == "2" || text == "3" ? std::string() : fmt::format("'{}' is neither 2 nor 3", text);
             },
             "2|3"))
+        ->capture_default_str();
+    sub.add_option("--normalise", o.normalise,
+                   "of mode ewa: pixel (each is divided by what its weights add up to) or surfel (by weights of "
+                   "surfels: stipple build --surfel-weights)")
+        ->check(oneOf({"pixel", "surfel"}))
         ->capture_default_str();
 }
 

@@ -4,6 +4,7 @@
 
 #include "apps/stipple/common.h"
 #include "engine/scene/outline.h"
+#include "lod/store/surfel_weights.h"
 
 namespace stipple::app {
 
@@ -104,6 +105,11 @@ std::vector<glm::dvec3> outlineOf(const std::vector<render::PlacedStore>& placed
         for (const glm::dvec3& at : own) all.push_back(p.place.translation + p.place.rotation * (p.place.scale * at));
     }
     return scene::outermost(all);
+}
+
+bool hasSurfelWeights(const std::vector<render::PlacedStore>& placed) {
+    return std::any_of(placed.begin(), placed.end(),
+                       [](const render::PlacedStore& p) { return lod::hasWeights(p.store->hierarchy); });
 }
 
 }  // namespace stipple::app

@@ -21,4 +21,7 @@ lod::StoreDescription describe(const std::vector<render::PlacedStore>& placed);
 /// What a camera must see: points on the outside of all stores, in world space.
 std::vector<glm::dvec3> outlineOf(const std::vector<render::PlacedStore>& placed);
 
+/// Have any surfels weights of their own (stipple build --surfel-weights)?
+bool hasSurfelWeights(const std::vector<render::PlacedStore>& placed);
+
 }  // namespace stipple::app

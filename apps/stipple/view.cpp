@@ -11,6 +11,7 @@
 #include "apps/stipple/outputs.h"
 #include "apps/stipple/overlay.h"
 #include "apps/stipple/render_frames.h"
+#include "apps/stipple/scene_facts.h"
 #include "apps/stipple/scene_opener.h"
 #include "apps/stipple/view_session.h"
 #include "engine/base/process.h"
@@ -116,7 +117,10 @@ class Viewer {
         a.isOpening = opener_.isBusy();
         a.untilNotice = notices_.untilNext(nowSeconds());
         a.hasChanged = a.hasChanged || (a.isOpening && openingText() != shownOpening_);
-        hasChanged_ = hasChanged_ || a.isMoving || a.hasArrived;
+        const bool isAtRest = !a.hasChanged && !a.isMoving && !a.hasArrived;
+        isResting_ = refinement_.isDue(isAtRest);
+        a.hasChanged = a.hasChanged || isResting_;
+        hasChanged_ = hasChanged_ || a.isMoving || a.hasArrived || isResting_;
         return a;
     }
 
@@ -221,6 +225,9 @@ class Viewer {
     Result<void> drawNext(const gpu::Input& input) {
         render::FrameState& state = session_.state();
         if (std::exchange(hasChanged_, false)) {
+            const bool canWeigh = render::reconstructionOf(settings_.frame.mode).blendsSplats &&
+                                  hasSurfelWeights(session_.scene().placed);
+            settings_.frame.draw.perSurfel = refinement_.isQuick(canWeigh, !isResting_);
             if (auto drawn = render(settings_.frame); !drawn) {
                 if (drawn.error().kind == ErrorKind::device) return drawn;
                 tell(drawn.error());
@@ -243,6 +250,7 @@ class Viewer {
 
     /// With --frames: complete, and as it is shown.
     Result<void> drawLast(const gpu::Input& input) {
+        settings_.frame.draw.perSurfel = false;
         STIPPLE_TRY(render::renderUntilComplete(session_.state(), view(), settings_.frame));
         render::Image shot;
         for (int tries = 0; tries < 50 && shot.rgba.empty(); ++tries)
@@ -297,6 +305,8 @@ class Viewer {
     Navigation navigation_;
     PathPlayer player_;
     Notices notices_;
+    Refinement refinement_;   ///< discs that are blended: by their weights while they move
+    bool isResting_ = false;  ///< it is due
     std::string shownOpening_;
     uint32_t width_ = 0, height_ = 0;
     double shownMs_ = 0;  ///< what the last frame took, with showing it

@@ -32,6 +32,26 @@ inline Pace paceOf(const Activity& a) {
     return {draws, std::clamp(a.untilNotice, 1e-3, wait)};
 }
 
+/// A picture that is drawn in a quicker way while something moves, and once more when it rests.
+class Refinement {
+  public:
+    /// Before a picture is drawn; `canBeQuick`: it has such a way. True: draw it that way.
+    bool isQuick(bool canBeQuick, bool moves) {
+        isOwed_ = canBeQuick && moves;
+        return isOwed_;
+    }
+    /// Has nothing changed for so long that it is to be drawn once more? `isAtRest`: at this look.
+    bool isDue(bool isAtRest) {
+        looks_ = isAtRest ? looks_ + 1 : 0;
+        return isOwed_ && looks_ >= kLooks;
+    }
+    static constexpr int kLooks = 2;
+
+  private:
+    bool isOwed_ = false;
+    int looks_ = 0;
+};
+
 /// Lines on the screen that go after a while.
 class Notices {
   public:

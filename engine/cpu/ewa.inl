@@ -120,6 +120,15 @@ void prepareKernels(const FrameConstants& frame, const SplatTile& tile, size_t c
     }
 }
 
+/// By how much the surfels of a batch that are seen count.
+void weighSurfels(const FrameConstants& f, const BlockSource* blocks, const DiscBatch& d, FilterBatch& b) {
+    for (size_t s = 0; s < b.count; ++s) {
+        const uint32_t id = d.id[b.of[s]];
+        const uint8_t* const weights = blocks[id / kBlockLanes].weights;
+        b.amplitude[b.of[s]] *= surfelScale(weights == nullptr ? 0u : weights[id % kBlockLanes], f.kernelSupport);
+    }
+}
+
 /// The colours of those that are seen.
 void takeSeen(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const DiscBatch& d,
               const uint32_t* colours, const uint32_t* places, size_t count, FilterBatch& __restrict b) {
@@ -252,6 +261,7 @@ void addKernels(const FrameConstants& f, const Tables& tables, const BlockSource
         prepareKernels(f, tile, n, batch, kernels);
         markSeen(fronts, n, kernels);
         takeSeen(f, tables, blocks, batch, discs.colours, places, n, kernels);
+        if (f.perSurfel != 0u) weighSurfels(f, blocks, batch, kernels);
         for (size_t s = 0; s < kernels.count; ++s) {
             if (kernels.isNear[kernels.of[s]] > 0.5f)
                 addKernel<true, wantsNormals, hasGaps>(batch, kernels, s, f, end, t);

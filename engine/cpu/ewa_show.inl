@@ -19,14 +19,15 @@ struct ShownPair {
     alignas(64) uint32_t isThere[kEntries];  ///< 1: by what was added up; 2: by its front disc alone
     alignas(64) uint32_t colour[kEntries], normal[kEntries], cover[kEntries], id[kEntries], depth[kEntries];
 };
+/// `covered`: what a weight of 1 covers; `mostDivided`: by more than that colours are not divided.
 template <bool wantsNormals>
-void showPair(float gridShare, int pair, const TileFilter& __restrict t, ShownPair& __restrict s) {
+void showPair(float covered, float mostDivided, int pair, const TileFilter& __restrict t, ShownPair& __restrict s) {
     const size_t first = size_t(pair) * kPairPitch;
 #pragma GCC ivdep
     for (size_t k = 0; k < size_t(kPairPitch); ++k) {
         const size_t i = first + k;
         const float weight = t.weight[i], front = t.front[i], exact = s.exact[k];
-        const uint32_t code = uint32_t(int(min(weight * gridShare, 1.0f) * 255.0f + 0.5f));
+        const uint32_t code = uint32_t(int(min(weight * covered, 1.0f) * 255.0f + 0.5f));
         // Other kinds win within what the surface may be rough; rims do not show before them.
         const uint32_t isRim = exact < kNoDisc || t.rim[i] == TileFilter::kOther ? 0u : (code + 255u) >> 8;
         const uint32_t isBefore = front < exact ? 1u : 0u;
@@ -35,7 +36,8 @@ void showPair(float gridShare, int pair, const TileFilter& __restrict t, ShownPa
         const float over = 1.0f / (isBlended ? weight : 1.0f), linear = t.linear[i] * over;
         const float mean = kOrthographic ? linear : 1.0f / linear;
         s.depth[k] = floatBitsToUint(isBlended ? mean : t.own[i]);
-        s.colour[k] = packColour(t.red[i] * over, t.green[i] * over, t.blue[i] * over);
+        const float ofColour = 1.0f / (isBlended ? min(weight, mostDivided) : 1.0f);
+        s.colour[k] = packColour(t.red[i] * ofColour, t.green[i] * ofColour, t.blue[i] * ofColour);
         s.normal[k] = wantsNormals ? octEncode(vec3(t.nx[i], t.ny[i], t.nz[i])) : 0u;
         const float behind = min(max(t.farthest[i], exact < kNoDisc ? kNoDisc : 0.0f), kNoDisc);
         const uint32_t closed = behind > front ? 255u : code;
@@ -46,7 +48,9 @@ void showPair(float gridShare, int pair, const TileFilter& __restrict t, ShownPa
 template <bool wantsNormals>
 void showTile(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const SplatTile& tile,
               bool hasLeaves, const TileFilter& t, const Visibility& visibility, FilteredPixel* filtered) {
-    const float gridShare = gridWeight(f.kernelSupport);
+    // Weights of surfels add up to what is covered; where that is all of a pixel, to one.
+    const bool perSurfel = f.perSurfel != 0u;
+    const float covered = perSurfel ? 1.0f : gridWeight(f.kernelSupport), mostDivided = perSurfel ? 1.0f : 3.0e38f;
     ShownPair s;
     for (float& exact : s.exact) exact = kNoDisc;
     for (uint32_t y = 0; y < tile.height; y += 2) {
@@ -57,7 +61,7 @@ void showTile(const FrameConstants& f, const Tables& tables, const BlockSource* 
                 const uint64_t key = visibility.keys[first + r * f.width + x];
                 s.exact[2 * x + r] = key != kNoKey ? keyDepth(key) : kNoDisc;
             }
-        showPair<wantsNormals>(gridShare, int(y / 2), t, s);
+        showPair<wantsNormals>(covered, mostDivided, int(y / 2), t, s);
         for (uint32_t r = 0; r < rows; ++r)
             for (size_t x = 0; x < tile.width; ++x) {
                 const size_t k = 2 * x + r, to = first + r * f.width + x;

@@ -83,6 +83,7 @@ struct SplatBlock {
 struct BlockSource {
     const shared::PointRecord* records;  ///< first record of the block
     const shared::DrawNode* node;
+    const uint8_t* weights;  ///< of surfels, of the same records; null: there are none
 };
 
 /// One block of segments of curves.

@@ -6,7 +6,6 @@
 #include "engine/cpu/kernels.h"
 #include "shaders/shared/curve.h"
 #include "shaders/shared/environment.h"
-#include "shaders/shared/ewa.h"
 #include "shaders/shared/lens.h"
 #include "shaders/shared/pack.h"
 #include "shaders/shared/pyramid.h"
@@ -14,6 +13,7 @@
 #include "shaders/shared/splat_disc.h"
 #include "shaders/shared/splat_size.h"
 #include "shaders/shared/surface.h"
+#include "shaders/shared/surfel_weight.h"
 #include "shaders/shared/wide_disc.h"
 
 namespace stipple::cpu {

@@ -63,7 +63,8 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
         const lod::Hierarchy& h = *draws.hierarchies[instance.hierarchy];
         const lod::Node& node = h.nodes[cut.node];
         if (h.payload(cut.chunk).kind != lod::Kind::points) continue;
-        const auto& records = chunks.at(uint64_t{draws.firstSource + instance.source} << 32 | cut.chunk).records;
+        const lod::Chunk& chunk = chunks.at(uint64_t{draws.firstSource + instance.source} << 32 | cut.chunk);
+        const auto& records = chunk.records;
         const bool few = mayBeWide(h, node, records, v, instance.scale * f.supportScale);
         const double step = h.cellSize(node) / 65536;
         // What the store tells is in eighths of octaves; what it does not tell is measured.
@@ -88,8 +89,10 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
             if (oneSided && glm::dot(n, sightOf(v, c)) >= 0) continue;
             if ((disc.flags & shared::kFlagNoNormal) != 0) n = -sightOf(v, c);
             const bool isDebug = f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError;
+            // Squares of 255ths.
+            const double weight = chunk.weights.empty() ? 0 : std::pow(chunk.weights[i] / 255.0, 2);
             out.push_back({c, n, instance.scale * disc.radius * f.supportScale,
-                           isDebug ? debugColour(f, node, cut) : disc.colour, disc.flags, spacing, few});
+                           isDebug ? debugColour(f, node, cut) : disc.colour, disc.flags, spacing, weight, few});
         }
     }
     return out;

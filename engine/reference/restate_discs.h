@@ -16,6 +16,7 @@ struct PlacedDisc {
     glm::dvec3 colour;
     uint32_t flags;
     double spacing;  ///< of its node, world units; 0: not known
+    double weight;   ///< of the surfel; 0: it has none
     bool mayBeWide;  ///< discs of its node reach few of each other's spacings, or are too large for texels
 };
 std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks& chunks);

@@ -73,6 +73,7 @@ class Filter {
           variation_(variation),
           support_(double{draws.frame.kernelSupport}),
           lowPass_(double{draws.frame.lowPass}),
+          isPerSurfel_(draws.frame.perSurfel != 0),
           level_(level),
           pixels_(level.samples.size()) {
         for (const PlacedDisc& d : discs) {
@@ -181,6 +182,10 @@ class Filter {
         const double amplitude = isNear       ? 1
                                  : !isBlended ? 0
                                               : std::sqrt(glm::determinant(e.variance) / glm::determinant(wide));
+        // Weights were measured for kernels of two sigmas.
+        const double scale = !isPerSurfel_  ? 1
+                             : d.weight > 0 ? d.weight * onGrid(2) / onGrid(support_)
+                                            : 1 / onGrid(support_);
         const dmat2 inverse = isNear ? dmat2(1) : glm::inverse(wide);
         const dvec2 principal = 0.5 * dvec2(view_.width, view_.height);
         forPixels(d, radius, support_ * std::sqrt(lowPass_), [&](int x, int y, const ViewRay& ray) {
@@ -196,7 +201,7 @@ class Filter {
                 return;
             }
             if (!(rho2 < support_ * support_)) return;
-            const double w = amplitude * (std::exp(-0.5 * rho2) - end) / (1 - end);
+            const double w = scale * amplitude * (std::exp(-0.5 * rho2) - end) / (1 - end);
             if (!(w > 0)) return;
             if (!p.first) p.first = &d;
             p.weight += w;
@@ -217,11 +222,19 @@ class Filter {
         return static_cast<size_t>(y) * static_cast<size_t>(level_.width) + static_cast<size_t>(x);
     }
 
+    /// What kernels of a square grid add up to, whose sigma is 0.685 of its spacing.
+    static double onGrid(double support) {
+        const double end = std::exp(-0.5 * support * support);
+        const double kept = 1 - 0.5 * support * support * end / (1 - end);
+        return 2 * 3.14159265358979 * 0.685 * 0.685 * kept;
+    }
+    double dividedBy(double weight, double grid) const {
+        if (!variation_.isNormalised) return grid;
+        return isPerSurfel_ ? std::min(weight, 1.0) : weight;
+    }
+
     void show() {
-        // What the weights of a square grid add up to, whose sigma is 0.685 of its spacing.
-        const double end = std::exp(-0.5 * support_ * support_);
-        const double kept = 1 - 0.5 * support_ * support_ * end / (1 - end);
-        const double grid = 2 * 3.14159265358979 * 0.685 * 0.685 * kept;
+        const double grid = isPerSurfel_ ? 1 : onGrid(support_);
         exact_.resize(pixels_.size());
         for (size_t i = 0; i < pixels_.size(); ++i) exact_[i] = level_.samples[i].valid;
         for (int y = 0; y < level_.height; ++y)
@@ -237,7 +250,7 @@ class Filter {
                 const dvec2 at(x + 0.5, y + 0.5);
                 if (p.weight > 1.0 / 1024) {
                     s = shownPixel(view_, at, view_.isOrthographic ? p.linear / p.weight : p.weight / p.linear,
-                                   glm::normalize(p.normal), p.colour / (variation_.isNormalised ? p.weight : grid),
+                                   glm::normalize(p.normal), p.colour / dividedBy(p.weight, grid),
                                    (d.flags & shared::kFlagLeaf) != 0);
                 } else {
                     const dvec3 n = glm::dot(d.normal, sightOf(view_, d.centre)) > 0 ? -d.normal : d.normal;
@@ -250,6 +263,7 @@ class Filter {
     const lod::View& view_;
     BlendVariation variation_;
     double support_, lowPass_;
+    bool isPerSurfel_;
     Level& level_;
     std::vector<Gathered> pixels_;
     std::vector<PlacedDisc> discs_;

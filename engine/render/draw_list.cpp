@@ -6,15 +6,16 @@
 #include "engine/base/check.h"
 #include "engine/render/kinds/kind.h"
 #include "lod/primitives/record_spacing.h"
+#include "lod/store/surfel_weights.h"
 #include "shaders/shared/visibility.h"
 
 namespace stipple::render {
 
 static_assert(sizeof(shared::PointRecord) == 16);
-static_assert(sizeof(shared::DrawNode) == 84);
+static_assert(sizeof(shared::DrawNode) == 88);
 static_assert(sizeof(shared::DrawBlock) == 8);
 static_assert(sizeof(shared::CurveSegment) == 32);
-static_assert(sizeof(shared::FrameConstants) == 180 + sizeof(shared::BlockRanges));
+static_assert(sizeof(shared::FrameConstants) == 184 + sizeof(shared::BlockRanges));
 static_assert(sizeof(shared::MeshVertex) == 32);
 static_assert(sizeof(shared::MeshCluster) == 12);
 static_assert(sizeof(shared::DrawMesh) == 120);
@@ -121,6 +122,7 @@ shared::DrawNode makeDrawNode(const lod::CutDraw& draw, const Bend& bend, const 
     const float steps = payload.spacingCode == 0 ? -1.0f : lod::spacingOfCode(payload.spacingCode);
     const bool isSpaced = payload.kind == lod::Kind::points && !h.isStochastic;
     d.spacing = isSpaced ? steps * static_cast<float>(worldPerStep) : 0.0f;
+    d.weights = lod::weightsOf(h, draw.chunk) != nullptr ? payload.records : 0u;
     d.errorPixels = draw.errorPixels;
     return d;
 }
@@ -174,6 +176,7 @@ void setView(const lod::Cut& cut, const lod::View& view, const DrawSettings& set
     f.coverageSeed = settings.coverageSeed;
     f.lowPass = settings.lowPass;
     f.kernelSupport = settings.kernelSupport;
+    f.perSurfel = settings.perSurfel ? 1 : 0;
     f.shade = (settings.lit ? shared::kShadeLit : shared::kShadeUnlit) |
               (settings.unlitTriangles ? 0u : shared::kShadeTriangles);
     f.debugView = settings.debugView;

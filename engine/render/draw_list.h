@@ -107,6 +107,7 @@ struct DrawSettings {
     float minimumRadius = 1.0f;        ///< pixels
     float lowPass = 0.5f;              ///< of blended discs: variance, px^2
     float kernelSupport = 2;           ///< of blended discs: where kernels end, in sigmas (2 or 3)
+    bool perSurfel = false;            ///< blended discs have weights of their own; pixels are not divided by theirs
     float exactCurves = 2.0f;          ///< pixels of half-width from which curves are filled, not reconstructed
     Wind wind;                         ///< moves what setSway was told of
     uint32_t coverageSeed = 0;         ///< of curves narrower than a pixel

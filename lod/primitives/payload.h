@@ -30,11 +30,11 @@ inline constexpr uint32_t kMostPayloads = 4;
 
 /// What a stream of a payload holds. Ids that a reader does not know are none of its business.
 enum class StreamId : uint16_t {
-    records = 1,     ///< what the codec decodes
-    attributes = 2,  ///< values of every record (lod/store/attributes.h)
+    records = 1,        ///< what the codec decodes
+    attributes = 2,     ///< values of every record (lod/store/attributes.h)
+    surfelWeights = 4,  ///< a byte of every record (lod/store/surfel_weights.h)
     // Kept for what is to come:
     normals = 3,
-    surfelWeights = 4,
     material = 5,
     spacingCode = 6,  ///< of each record, should they ever need one each; else Payload::spacingCode
 };

@@ -15,6 +15,7 @@ namespace stipple::lod {
 
 struct Chunk {
     std::vector<shared::PointRecord> records;
+    std::vector<uint8_t> weights;  ///< of surfels, where the store has them (surfel_weights.h)
     /// 3 per record (x, y, z), each below 2^stepShift; empty where the step is one lattice unit or the node is no leaf.
     std::vector<uint32_t> lowBits;
     // Of a mesh store instead of records:
@@ -27,6 +28,7 @@ struct Chunk {
     template <typename Use>
     void forEachArray(const Use& use) const {
         use(records);
+        use(weights);
         use(segments);
         use(vertices);
         use(triangles);

@@ -11,6 +11,7 @@
 #include "lod/primitives/kinds.h"
 #include "lod/primitives/record_spacing.h"
 #include "lod/store/store.h"
+#include "lod/store/surfel_weights.h"
 #include "lod/verify/errors.h"
 
 namespace stipple::lod {
@@ -44,8 +45,12 @@ Result<void> verifyPayload(const Store& store, uint32_t index, uint64_t discs, C
     const bool hasAttributes = payload.attributeBytes > 0 || !h.isMixed;
     for (size_t a = 0; hasAttributes && a < store.description.attributes.size(); ++a)
         STIPPLE_TRY(readAttribute(store, index, a));
-    for (uint32_t k = payload.firstStream; k < payload.firstStream + payload.streams; ++k)
-        STIPPLE_TRY(readStream(store, index, h.streams[k]));
+    for (uint32_t k = payload.firstStream; k < payload.firstStream + payload.streams; ++k) {
+        STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, readStream(store, index, h.streams[k]));
+        if (h.streams[k].id == StreamId::surfelWeights)
+            STIPPLE_TRY(decodeWeights(bytes.data(), bytes.size(), payload.records,
+                                      fmt::format("{}: node {}", store.path, h.nodeOf(index))));
+    }
     ++counts.payloads;
     counts.records += payload.records;
     counts.leafRecords += kind.leafRecords(h, index);

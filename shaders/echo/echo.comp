@@ -68,6 +68,7 @@ void putFrame() {
     put(frame.orthographic);
     put(frame.lowPass);
     put(frame.kernelSupport);
+    put(frame.perSurfel);
 }
 
 void putNode() {
@@ -84,6 +85,7 @@ void putNode() {
     put(node.level);
     put(node.errorPixels);
     put(node.spacing);
+    put(node.weights);
 }
 
 void putBlock() {

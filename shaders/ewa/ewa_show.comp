@@ -15,7 +15,9 @@ void main() {
     const bool hasFront = front.key != kNoKey;
     const bool hasExact = exact != kNoKey;
     const float weight = float(s.weight) / s.unit;
-    const uint code = uint(min(weight * gridWeight(frame.kernelSupport), 1.0) * 255.0 + 0.5);
+    const bool perSurfel = frame.perSurfel != 0u;
+    const float covered = weight * (perSurfel ? 1.0 : gridWeight(frame.kernelSupport));
+    const uint code = uint(min(covered, 1.0) * 255.0 + 0.5);
     FilteredPixel p;
     p.normal = p.colour = p.cover = 0u;
     const bool isThere = hasFront ? !hasExact || keyDepth(front.key) < keyDepth(exact) : !hasExact && code > 0u;
@@ -27,7 +29,8 @@ void main() {
         if (weight > kLeastWeight) {
             const float over = 1.0 / float(s.weight);
             depth = absoluteDepth(float(s.depth) * over, s.reference);
-            p.colour = packColour(float(s.red) * over, float(s.green) * over, float(s.blue) * over);
+            const float ofColour = perSurfel ? 1.0 / min(float(s.weight), s.unit) : over;
+            p.colour = packColour(float(s.red) * ofColour, float(s.green) * ofColour, float(s.blue) * ofColour);
             p.normal = octEncode(vec3(s.nx, s.ny, s.nz) * over);
         } else {
             const vec3 c = pointColour(node, r);

@@ -24,6 +24,7 @@ struct DrawNode {
     uint level;         // depth in the octree, for the debug view
     float errorPixels;  // screen-space error delivered by this node, for the debug view
     float spacing;      // of its records on their surface, world units; 0: not known
+    uint weights;       // records of its chunk, where weights of surfels lie behind them; 0: there are none
 };
 
 const uint kNodeTurned = 256u;  // the store's own axes are not those of the world
@@ -127,6 +128,7 @@ struct FrameConstants {
     uint orthographic;    // 1: rays are parallel (lens.h)
     float lowPass;        // mode ewa: variance, px^2
     float kernelSupport;  // mode ewa: where kernels end, in sigmas
+    uint perSurfel;       // mode ewa: 1: surfels have weights (surfel_weight.h), and pixels are not divided by them
 };
 SHARED_FN Lens frameLens(FrameConstants f) { return lensOf(f.focal, f.orthographic != 0u); }
 

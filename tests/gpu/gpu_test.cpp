@@ -14,6 +14,7 @@
 #include "engine/reference/reference.h"
 #include "engine/render/frame_passes.h"
 #include "engine/scene/camera.h"
+#include "lod/builder/weights/add.h"
 #include "tests/gpu/one_time_commands.h"
 #include "tests/support/curves.h"
 #include "tests/support/forests.h"
@@ -133,6 +134,37 @@ TEST_F(Gpu, BlendedDiscsAreTheOraclesFromAfarFromNearAndOrthographic) {
             EXPECT_LE(coverage, a.rgba.size() / 1000);
             const render::Image again = test::renderView(store_, *gpu, *executor_, view, settings);
             EXPECT_TRUE(a.rgba == again.rgba && a.depth == again.depth) << "whatever the order of threads";
+        }
+    for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
+}
+
+/// With weights of surfels behind the records of each chunk; some discs are so wide that workgroups share them out.
+TEST_F(Gpu, SurfelsThatAreWeighedAreTheOracles) {
+    const auto gpu = make();
+    const auto oracle = reference::makeReferenceBackend(*executor_);
+    test::writePly(folder_ / "w.ply", test::bumpySphere(9'000, 7));
+    test::build({folder_ / "w.ply"}, folder_ / "w.stipple", *executor_);
+    Progress silent(false);
+    ASSERT_TRUE(lod::addSurfelWeights(folder_ / "w.stipple", *executor_, silent));
+    const auto store = std::make_shared<const lod::Store>(std::move(*lod::openStore(folder_ / "w.stipple")));
+    render::FrameSettings settings;
+    settings.mode = render::Mode::ewa;
+    settings.wantDepthAndNormal = true;
+    const lod::View whole = test::fitView(*store, 400, 300);
+    lod::View near = whole;
+    near.eye += near.forward * (0.7 * glm::length(whole.eye));
+    for (const lod::View& view : {whole, near})
+        for (const double tau : {0.25, 4.0}) {
+            SCOPED_TRACE(testing::Message() << "tau " << tau);
+            settings.budgets.errorPixels = tau;
+            settings.draw.kernelSupport = tau < 1 ? 3 : 2;
+            settings.draw.perSurfel = true;
+            const render::Image a = test::renderView(store, *gpu, *executor_, view, settings),
+                                b = test::renderView(store, *oracle, *executor_, view, settings);
+            expectSameSurface(a, b, view, 0.1);
+            EXPECT_GE(test::drawnPsnr(a, b), 50);
+            settings.draw.perSurfel = false;
+            EXPECT_LT(test::drawnPsnr(test::renderView(store, *gpu, *executor_, view, settings), b), 50);
         }
     for (const std::string& message : validationMessages(*gpu)) ADD_FAILURE() << message;
 }

@@ -82,8 +82,9 @@ void findBlocks(Frame& frame) {
     frame.blocks.resize(points.blocks.size());
     for (size_t b = 0; b < frame.blocks.size(); ++b) {
         const shared::DrawBlock& block = points.blocks[b];
-        frame.blocks[b] = {frame.chunks.at(points.keys[block.node]).records.data() + block.first,
-                           &points.nodes[block.node]};
+        const lod::Chunk& chunk = frame.chunks.at(points.keys[block.node]);
+        frame.blocks[b] = {chunk.records.data() + block.first, &points.nodes[block.node],
+                           chunk.weights.empty() ? nullptr : chunk.weights.data() + block.first};
     }
 }
 
