@@ -5,21 +5,25 @@
 // plane is imageLinear of its depth, so that a pixel of it costs one division. Discs that are not wholly before the eye
 // have no such image; they meet each pixel's ray.
 
-/// Planes of a tile: pairs of rows, column by column, so that kGroup entries are eight columns of both rows.
-constexpr int kGroupColumns = 8, kGroup = 16, kPairPitch = 2 * int(SplatTile::kWidth);
+/// Planes of a tile: bands of rows, column by column, so that kGroup entries are a block of pixels. Groups are such
+/// blocks and never parts of two: what one disc wrote there the next one reads at once.
+constexpr int kGroup = 16, kRowBits = 2, kGroupRows = 1 << kRowBits, kGroupColumns = kGroup / kGroupRows;
+constexpr int kBandPitch = kGroupRows * int(SplatTile::kWidth), kBands = int(SplatTile::kHeight) / kGroupRows;
 constexpr size_t kTilePixels = size_t{SplatTile::kWidth} * SplatTile::kHeight;
-[[gnu::always_inline]] inline int tileEntry(int x, int y) { return (y >> 1) * kPairPitch + 2 * x + (y & 1); }
+[[gnu::always_inline]] inline int tileEntry(int x, int y) {
+    return (y >> kRowBits) * kBandPitch + kGroupRows * x + (y & (kGroupRows - 1));
+}
 
 /// Where the pixels of a tile are, px from the principal point.
 struct TileGrid {
-    alignas(64) float x[kPairPitch];  ///< of a pair of rows
-    alignas(64) float odd[kGroup];    ///< 1: of the lower row
+    alignas(64) float x[kBandPitch];  ///< of a band
+    alignas(64) float row[kGroup];    ///< of a band
     float top;                        ///< of the first row
 };
 [[gnu::always_inline]] inline TileGrid tileGrid(const FrameConstants& f, const SplatTile& tile) {
     TileGrid g;
-    for (int i = 0; i < kPairPitch; ++i) g.x[i] = float(i >> 1) + (float(int(tile.x0)) + 0.5f - f.centre.x);
-    for (int i = 0; i < kGroup; ++i) g.odd[i] = float(i & 1);
+    for (int i = 0; i < kBandPitch; ++i) g.x[i] = float(i / kGroupRows) + (float(int(tile.x0)) + 0.5f - f.centre.x);
+    for (int i = 0; i < kGroup; ++i) g.row[i] = float(i % kGroupRows);
     g.top = float(int(tile.y0)) + 0.5f - f.centre.y;
     return g;
 }
@@ -34,12 +38,6 @@ struct TilePixels {
     return {int(std::ceil(min(max(from + shift - 0.01f, 0.0f), most + 1.0f))),
             int(std::floor(min(max(to + shift + 0.01f, -1.0f), most)))};
 }
-/// Where groups begin for a disc, so that as few as possible of them reach all it may cover, and all are of the tile.
-[[gnu::always_inline]] inline int firstColumn(int first, int last) {
-    const int most = int(SplatTile::kWidth) - (last - first + kGroupColumns) / kGroupColumns * kGroupColumns;
-    return first < most ? first : most;
-}
-
 /// Some discs of a tile in camera space, and their images: rho^2 (of radii) and what is linear on the image at
 /// (dx, dy) from (x, y): dx^2 alongX + (dy - skew dx)^2 alongY; linear + slopeX dx + slopeY dy.
 struct DiscBatch {

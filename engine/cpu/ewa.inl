@@ -67,18 +67,25 @@ struct TileBlocks {
 
 /// Which discs reach a block whose fronts do not hide them.
 void markSeen(const TileBlocks& blocks, size_t count, FilterBatch& __restrict b) {
-    for (size_t i = 0; i < count; ++i) b.isSeen[i] = 0u;
-    for (int k = 0; k < TileBlocks::kColumns * TileBlocks::kRows; ++k) {
-        const int x = k % TileBlocks::kColumns * TileBlocks::kEdge, y = k / TileBlocks::kColumns * TileBlocks::kEdge;
-        const float limit = blocks.limit[k];
+    static_assert(TileBlocks::kColumns == 8 && TileBlocks::kRows == 4 && TileBlocks::kEdge == 4);
+    float limit[TileBlocks::kColumns * TileBlocks::kRows];
+    for (int k = 0; k < TileBlocks::kColumns * TileBlocks::kRows; ++k) limit[k] = blocks.limit[k];
 #pragma GCC ivdep
-        for (size_t i = 0; i < count; ++i) {
-            const bool isHere = (b.firstX[i] < x + TileBlocks::kEdge) & (b.lastX[i] >= x) &
-                                (b.firstY[i] < y + TileBlocks::kEdge) & (b.lastY[i] >= y);
-            // The nearest that its plane counts as.
-            const bool isBefore = !isNearer(limit, kOrthographic ? b.least[i] : b.most[i]);
-            b.isSeen[i] |= isHere & isBefore ? 1u : 0u;
-        }
+    for (size_t i = 0; i < count; ++i) {
+        // A bit for each block that it reaches: those of its columns, in each of its rows.
+        const uint32_t left = uint32_t(b.firstX[i]) >> 2, right = uint32_t(b.lastX[i] + 4) >> 2,
+                       top = uint32_t(b.firstY[i]) >> 2, bottom = uint32_t(b.lastY[i] + 4) >> 2;
+        const uint32_t columns = (1u << right) - (1u << left);
+        const uint32_t ofRow = (top <= 0u && bottom > 0u ? 0xffu : 0u) | (top <= 1u && bottom > 1u ? 0xff00u : 0u) |
+                               (top <= 2u && bottom > 2u ? 0xff0000u : 0u) |
+                               (top <= 3u && bottom > 3u ? 0xff000000u : 0u);
+        const uint32_t reached = right > left ? (columns & 0xffu) * 0x01010101u & ofRow : 0u;
+        const float nearest = kOrthographic ? b.least[i] : b.most[i];  // that its plane counts as
+        uint32_t seen = 0u;
+#pragma GCC unroll 32
+        for (int k = 0; k < TileBlocks::kColumns * TileBlocks::kRows; ++k)
+            seen |= isNearer(limit[k], nearest) ? 0u : reached & 1u << k;
+        b.isSeen[i] = seen != 0u ? 1u : 0u;
     }
 }
 
@@ -163,19 +170,19 @@ void addKernel(const DiscBatch& b, const FilterBatch& k, size_t s, const FrameCo
     const float midX = k.x[i], midY = k.y[i], least = k.least[i], most = k.most[i];
     const float support2 = f.kernelSupport * f.kernelSupport, scale = k.amplitude[i] / (1.0f - end);
     const float red = k.red[s], green = k.green[s], blue = k.blue[s], nx = k.nx[i], ny = k.ny[i], nz = k.nz[i];
-    const int x1 = k.lastX[i], x0 = firstColumn(k.firstX[i], x1);
-    for (int pair = k.firstY[i] >> 1; pair <= k.lastY[i] >> 1; ++pair) {
-        const float dy = float(2 * pair) + t.grid.top - midY;
+    const int x1 = k.lastX[i], x0 = k.firstX[i] & ~(kGroupColumns - 1);
+    for (int band = k.firstY[i] >> kRowBits; band <= k.lastY[i] >> kRowBits; ++band) {
+        const float dy = float(kGroupRows * band) + t.grid.top - midY;
         for (int x = x0; x <= x1; x += kGroupColumns) {
-            const int first = pair * kPairPitch + 2 * x;
-            const float *const px = t.grid.x + 2 * x, *const limit = t.limit + first;
+            const int first = band * kBandPitch + kGroupRows * x;
+            const float *const px = t.grid.x + kGroupRows * x, *const limit = t.limit + first;
             float *const sumW = t.weight + first, *const sumLinear = t.linear + first, *const sumR = t.red + first,
                          *const sumG = t.green + first, *const sumB = t.blue + first, *const sumX = t.nx + first,
                          *const sumY = t.ny + first, *const sumZ = t.nz + first;
             uint32_t* const rim = t.rim + first;
 #pragma GCC ivdep
             for (int l = 0; l < kGroup; ++l) {
-                const DiscAt at = discAt<isNear>(d, px[l] - midX, dy + t.grid.odd[l]);
+                const DiscAt at = discAt<isNear>(d, px[l] - midX, dy + t.grid.row[l]);
                 // No farther than it counts; beyond its horizon a plane is as far as it gets.
                 const float linear = min(max(at.linear, least), most);
                 const bool isThere = (at.rho2 < support2) & !isNearer(limit[l], linear);
@@ -202,10 +209,11 @@ void addKernel(const DiscBatch& b, const FilterBatch& k, size_t s, const FrameCo
 void beginFilter(const FrameConstants& f, const SplatTile& tile, TileFilter& __restrict t) {
     t.grid = tileGrid(f, tile);
     const float inverseFocal = 1.0f / f.focal;
-    for (int pair = 0; pair < int(SplatTile::kHeight) / 2; ++pair)
-        for (int i = 0; i < kPairPitch; ++i) {
-            const float ex = t.grid.x[i] * inverseFocal, ey = (float(2 * pair + (i & 1)) + t.grid.top) * inverseFocal;
-            t.along[pair * kPairPitch + i] = kOrthographic ? 1.0f : 1.0f / std::sqrt(ex * ex + ey * ey + 1.0f);
+    for (int band = 0; band < kBands; ++band)
+        for (int i = 0; i < kBandPitch; ++i) {
+            const float ex = t.grid.x[i] * inverseFocal,
+                        ey = (float(kGroupRows * band + i % kGroupRows) + t.grid.top) * inverseFocal;
+            t.along[band * kBandPitch + i] = kOrthographic ? 1.0f : 1.0f / std::sqrt(ex * ex + ey * ey + 1.0f);
         }
     for (size_t i = 0; i < kTilePixels; ++i) {
         t.front[i] = t.own[i] = kNoDisc;
@@ -217,21 +225,29 @@ void beginFilter(const FrameConstants& f, const SplatTile& tile, TileFilter& __r
 
 #include "engine/cpu/ewa_show.inl"
 
-/// The discs of a tile, in batches.
+/// The discs of a tile, in batches. Those of the first batches are kept from the fronts to the sums, in a cache's
+/// second level (154 KB); further ones are prepared twice.
 struct TileDiscs {
+    static constexpr size_t kKept = 24;
     const PlacedSplat* splats;
     const uint32_t *colours, *places;
     size_t count;
+    DiscBatch* batches;  ///< kKept, and one more
+    size_t batchesInAll() const { return (count + DiscBatch::kSize - 1) / DiscBatch::kSize; }
+    size_t sizeOf(size_t b) const {
+        const size_t left = count - b * DiscBatch::kSize;
+        return left < DiscBatch::kSize ? left : DiscBatch::kSize;
+    }
+    DiscBatch& batch(size_t b) const { return batches[b < kKept ? b : kKept]; }
 };
 
 /// True if some of the discs are leaves.
-bool drawFronts(const FrameConstants& f, const TileDiscs& discs, const SplatTile& tile, DiscBatch& batch,
-                TileFilter& t) {
+bool drawFronts(const FrameConstants& f, const TileDiscs& discs, const SplatTile& tile, TileFilter& t) {
     alignas(64) float missed[DiscBatch::kSize];
     uint32_t flags = 0;
-    for (size_t first = 0; first < discs.count; first += DiscBatch::kSize) {
-        const size_t n = discs.count - first < DiscBatch::kSize ? discs.count - first : DiscBatch::kSize;
-        const size_t next = first + n;
+    for (size_t k = 0; k < discs.batchesInAll(); ++k) {
+        const size_t first = k * DiscBatch::kSize, n = discs.sizeOf(k), next = first + n;
+        DiscBatch& batch = discs.batch(k);
         prefetchDiscs(discs.splats, discs.places + next, discs.count - next);
         for (size_t i = 0; i < n; ++i) __builtin_prefetch(&discs.colours[discs.places[first + i]]);
         prepareDiscs(f, discs.splats, discs.places + first, n, tile, batch);
@@ -251,13 +267,14 @@ bool drawFronts(const FrameConstants& f, const TileDiscs& discs, const SplatTile
 
 template <bool wantsNormals, bool hasGaps>
 void addKernels(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const TileDiscs& discs,
-                const SplatTile& tile, const TileBlocks& fronts, DiscBatch& batch, TileFilter& t) {
+                const SplatTile& tile, const TileBlocks& fronts, TileFilter& t) {
     FilterBatch kernels;
     const float end = kernelEnd(f.kernelSupport);
-    for (size_t first = 0; first < discs.count; first += DiscBatch::kSize) {
-        const size_t n = discs.count - first < DiscBatch::kSize ? discs.count - first : DiscBatch::kSize;
-        const uint32_t* const places = discs.places + first;
-        if (discs.count > DiscBatch::kSize) prepareDiscs(f, discs.splats, places, n, tile, batch);
+    for (size_t k = 0; k < discs.batchesInAll(); ++k) {
+        const size_t n = discs.sizeOf(k);
+        const uint32_t* const places = discs.places + k * DiscBatch::kSize;
+        DiscBatch& batch = discs.batch(k);
+        if (k >= TileDiscs::kKept) prepareDiscs(f, discs.splats, places, n, tile, batch);
         prepareKernels(f, tile, n, batch, kernels);
         markSeen(fronts, n, kernels);
         takeSeen(f, tables, blocks, batch, discs.colours, places, n, kernels);
@@ -275,17 +292,17 @@ void filterTile(const FrameConstants& frame, const Tables& tables, const BlockSo
                 const uint32_t* colours, const uint32_t* places, size_t count, const SplatTile& tile, bool wantsNormals,
                 const Visibility& visibility, FilteredPixel* filtered) {
     const FrameConstants f = frame;
-    const TileDiscs discs{splats, colours, places, count};
+    static thread_local DiscBatch batches[TileDiscs::kKept + 1];
+    const TileDiscs discs{splats, colours, places, count, batches};
     prefetchDiscs(splats, places, count);
     TileFilter t;
     beginFilter(f, tile, t);
-    DiscBatch batch;
-    const bool hasLeaves = drawFronts(f, discs, tile, batch, t);
+    const bool hasLeaves = drawFronts(f, discs, tile, t);
     TileBlocks fronts;
     closeFronts(tile, lensHere(f.focal), t, fronts);
     const auto add = wantsNormals ? (t.hasGaps ? addKernels<true, true> : addKernels<true, false>)
                                   : (t.hasGaps ? addKernels<false, true> : addKernels<false, false>);
-    add(f, tables, blocks, discs, tile, fronts, batch, t);
+    add(f, tables, blocks, discs, tile, fronts, t);
     const auto show = wantsNormals ? showTile<true> : showTile<false>;
     show(f, tables, blocks, tile, hasLeaves, t, visibility, filtered);
     for (size_t y = 0; y < tile.height; ++y) {

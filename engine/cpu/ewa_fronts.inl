@@ -26,17 +26,17 @@ void drawFront(const DiscBatch& b, size_t i, float shift, float missedDepth, con
     const uint32_t id = b.id[i];
     const DiscForm d = formOf(b, i, f);
     const float midX = b.x[i], midY = b.y[i], least = b.least[i], most = b.most[i];
-    const int x1 = b.lastX[i], x0 = firstColumn(b.firstX[i], x1);
-    for (int pair = b.firstY[i] >> 1; pair <= b.lastY[i] >> 1; ++pair) {
-        const float dy = float(2 * pair) + t.grid.top - midY;
+    const int x1 = b.lastX[i], x0 = b.firstX[i] & ~(kGroupColumns - 1);
+    for (int band = b.firstY[i] >> kRowBits; band <= b.lastY[i] >> kRowBits; ++band) {
+        const float dy = float(kGroupRows * band) + t.grid.top - midY;
         for (int x = x0; x <= x1; x += kGroupColumns) {
-            const int first = pair * kPairPitch + 2 * x;
+            const int first = band * kBandPitch + kGroupRows * x;
             float *const front = t.front + first, *const own = t.own + first, *const farthest = t.farthest + first;
             uint32_t* const owner = t.id + first;
-            const float *const px = t.grid.x + 2 * x, *const along = t.along + first;
+            const float *const px = t.grid.x + kGroupRows * x, *const along = t.along + first;
 #pragma GCC ivdep
             for (int l = 0; l < kGroup; ++l) {
-                const DiscAt at = discAt < isNear || kOrthographic > (d, px[l] - midX, dy + t.grid.odd[l]);
+                const DiscAt at = discAt < isNear || kOrthographic > (d, px[l] - midX, dy + t.grid.row[l]);
                 const float linear = min(max(at.linear, least), most);
                 const float depth = kOrthographic ? linear : 1.0f / linear;
                 const bool isHit = at.rho2 <= 1.0f;
@@ -62,18 +62,11 @@ void drawFront(const DiscBatch& b, size_t i, float shift, float missedDepth, con
 void closeFronts(const SplatTile& tile, const Lens& lens, TileFilter& __restrict t, TileBlocks& __restrict blocks) {
     for (size_t i = 0; i < kTilePixels; ++i)
         t.limit[i] = t.id[i] != TileFilter::kOther ? imageLinear(lens, t.front[i]) : kFarthest;
-    float least[TileBlocks::kRows * kPairPitch];
-    constexpr int kPairs = TileBlocks::kEdge / 2;
-    for (int r = 0; r < TileBlocks::kRows; ++r)
-        for (int i = 0; i < kPairPitch; ++i) {
-            const float *const upper = t.limit + r * kPairs * kPairPitch, *const lower = upper + kPairPitch;
-            static_assert(kPairs == 2);
-            least[r * kPairPitch + i] = isNearer(upper[i], lower[i]) ? lower[i] : upper[i];
-        }
+    static_assert(TileBlocks::kEdge == kGroupRows && TileBlocks::kEdge == kGroupColumns);
     for (int b = 0; b < TileBlocks::kColumns * TileBlocks::kRows; ++b) {
-        const float* const from = least + b * 2 * TileBlocks::kEdge;
+        const float* const from = t.limit + b * kGroup;
         float limit = from[0];
-        for (int i = 1; i < 2 * TileBlocks::kEdge; ++i) limit = isNearer(limit, from[i]) ? from[i] : limit;
+        for (int i = 1; i < kGroup; ++i) limit = isNearer(limit, from[i]) ? from[i] : limit;
         blocks.limit[b] = limit;
     }
     bool hasGaps = false;

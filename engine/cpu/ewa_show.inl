@@ -11,20 +11,20 @@ void showOwn(const FrameConstants& f, const Tables& tables, const BlockSource* b
     pixel.normal = octEncode(vec3(d.normal.x * towards, d.normal.y * towards, d.normal.z * towards));
 }
 
-/// What a pair of rows of a tile shows of what was added up there; nothing where it is less than half a code of
+/// What a band of a tile shows of what was added up there; nothing where it is less than half a code of
 /// coverage.
-struct ShownPair {
-    static constexpr int kEntries = kPairPitch;
+struct ShownBand {
+    static constexpr int kEntries = kBandPitch;
     alignas(64) float exact[kEntries];       ///< depth of other kinds; kNoDisc: none
     alignas(64) uint32_t isThere[kEntries];  ///< 1: by what was added up; 2: by its front disc alone
     alignas(64) uint32_t colour[kEntries], normal[kEntries], cover[kEntries], id[kEntries], depth[kEntries];
 };
 /// `covered`: what a weight of 1 covers; `mostDivided`: by more than that colours are not divided.
 template <bool wantsNormals>
-void showPair(float covered, float mostDivided, int pair, const TileFilter& __restrict t, ShownPair& __restrict s) {
-    const size_t first = size_t(pair) * kPairPitch;
+void showBand(float covered, float mostDivided, int band, const TileFilter& __restrict t, ShownBand& __restrict s) {
+    const size_t first = size_t(band) * kBandPitch;
 #pragma GCC ivdep
-    for (size_t k = 0; k < size_t(kPairPitch); ++k) {
+    for (size_t k = 0; k < size_t(kBandPitch); ++k) {
         const size_t i = first + k;
         const float weight = t.weight[i], front = t.front[i], exact = s.exact[k];
         const uint32_t code = uint32_t(int(min(weight * covered, 1.0f) * 255.0f + 0.5f));
@@ -51,20 +51,22 @@ void showTile(const FrameConstants& f, const Tables& tables, const BlockSource* 
     // Weights of surfels add up to what is covered; where that is all of a pixel, to one.
     const bool perSurfel = f.perSurfel != 0u;
     const float covered = perSurfel ? 1.0f : gridWeight(f.kernelSupport), mostDivided = perSurfel ? 1.0f : 3.0e38f;
-    ShownPair s;
+    ShownBand s;
     for (float& exact : s.exact) exact = kNoDisc;
-    for (uint32_t y = 0; y < tile.height; y += 2) {
-        const uint32_t rows = tile.height - y < 2 ? 1 : 2;
+    // (Keys of points come from here; other kinds were drawn before.)
+    const bool hasOthers = f.firstBlock.of[kKindCurves] != f.firstBlock.of[kKindDiscs];
+    for (uint32_t y = 0; y < tile.height; y += uint32_t(kGroupRows)) {
+        const uint32_t rows = tile.height - y < uint32_t(kGroupRows) ? tile.height - y : uint32_t(kGroupRows);
         const size_t first = size_t{tile.y0 + y} * f.width + tile.x0;
-        for (uint32_t r = 0; r < rows; ++r)
+        for (uint32_t r = 0; r < rows && hasOthers; ++r)
             for (size_t x = 0; x < tile.width; ++x) {
                 const uint64_t key = visibility.keys[first + r * f.width + x];
-                s.exact[2 * x + r] = key != kNoKey ? keyDepth(key) : kNoDisc;
+                s.exact[size_t(kGroupRows) * x + r] = key != kNoKey ? keyDepth(key) : kNoDisc;
             }
-        showPair<wantsNormals>(covered, mostDivided, int(y / 2), t, s);
+        showBand<wantsNormals>(covered, mostDivided, int(y) / kGroupRows, t, s);
         for (uint32_t r = 0; r < rows; ++r)
             for (size_t x = 0; x < tile.width; ++x) {
-                const size_t k = 2 * x + r, to = first + r * f.width + x;
+                const size_t k = size_t(kGroupRows) * x + r, to = first + r * f.width + x;
                 if (s.isThere[k] == 0u) continue;
                 FilteredPixel pixel{s.normal[k], s.colour[k], s.cover[k]};
                 if (s.isThere[k] == 2u) showOwn(f, tables, blocks, s.id[k], pixel);

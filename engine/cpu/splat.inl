@@ -15,16 +15,16 @@ void drawSplat(const DiscBatch& b, size_t i, const TileGrid& grid, const FrameCo
     const uint32_t id = b.id[i];
     const DiscForm d = formOf(b, i, f);
     const float midX = b.x[i], midY = b.y[i], least = b.least[i], most = b.most[i];
-    const int x1 = b.lastX[i], x0 = firstColumn(b.firstX[i], x1);
-    for (int pair = b.firstY[i] >> 1; pair <= b.lastY[i] >> 1; ++pair) {
-        const float dy = float(2 * pair) + grid.top - midY;
+    const int x1 = b.lastX[i], x0 = b.firstX[i] & ~(kGroupColumns - 1);
+    for (int band = b.firstY[i] >> kRowBits; band <= b.lastY[i] >> kRowBits; ++band) {
+        const float dy = float(kGroupRows * band) + grid.top - midY;
         for (int x = x0; x <= x1; x += kGroupColumns) {
-            float* const nearest = front.depth + pair * kPairPitch + 2 * x;
-            uint32_t* const owner = front.id + pair * kPairPitch + 2 * x;
-            const float* const px = grid.x + 2 * x;
+            float* const nearest = front.depth + band * kBandPitch + kGroupRows * x;
+            uint32_t* const owner = front.id + band * kBandPitch + kGroupRows * x;
+            const float* const px = grid.x + kGroupRows * x;
 #pragma GCC ivdep
             for (int l = 0; l < kGroup; ++l) {
-                const DiscAt at = discAt < isNear || kOrthographic > (d, px[l] - midX, dy + grid.odd[l]);
+                const DiscAt at = discAt < isNear || kOrthographic > (d, px[l] - midX, dy + grid.row[l]);
                 const float linear = min(max(at.linear, least), most);
                 const float depth = kOrthographic ? linear : 1.0f / linear;
                 const bool isFront = (at.rho2 <= 1.0f) & (depth < nearest[l]);
@@ -68,8 +68,8 @@ void splatTile(const FrameConstants& frame, const PlacedSplat* splats, const uin
         const int row = tileEntry(0, int(y));
 #pragma GCC ivdep
         for (uint32_t x = 0; x < tile.width; ++x) {
-            const uint32_t id = front.id[row + 2 * int(x)];
-            const uint64_t key = visibilityKey(floatBitsToUint(front.depth[row + 2 * int(x)]), drawId(0u, id));
+            const uint32_t id = front.id[row + kGroupRows * int(x)];
+            const uint64_t key = visibilityKey(floatBitsToUint(front.depth[row + kGroupRows * int(x)]), drawId(0u, id));
             keys[x] = id != TileFront::kOther && key < keys[x] ? key : keys[x];
         }
         for (size_t r = first >> Visibility::kRunBits; r <= (first + tile.width - 1) >> Visibility::kRunBits; ++r)

@@ -1,5 +1,6 @@
 // Discs blended by their kernels (shaders/shared/ewa.h), and how far they cover the pixels of silhouettes.
 #include <array>
+#include <cstring>
 
 #include "engine/cpu/passes/passes.h"
 #include "engine/cpu/passes/tile_lists.h"
@@ -17,7 +18,7 @@ void blendDiscs(Frame& frame) {
     }
     TileLists lists(frame, {shared::kOpaqueSpacings, 1 / shared::kOpaqueSigmas, frame.constants.kernelSupport,
                             frame.constants.lowPass});
-    lists.place();
+    lists.place(true);
     lists.draw([&](const PlacedSplat* splats, const uint32_t* places, size_t count, const SplatTile& tile) {
         frame.k.filterTile(frame.constants, frame.tables, frame.blocks.data(), splats, frame.placedColours.data(),
                            places, count, tile, frame.wantsNormals, frame.visible(), frame.filtered.data());
@@ -53,6 +54,17 @@ class OpenRows {
     std::vector<uint8_t> near_;
 };
 
+/// The next that is not 0, from `x` on.
+size_t nextNear(const std::vector<uint8_t>& near, size_t x) {
+    uint64_t eight = 0;
+    for (; x + sizeof(eight) <= near.size(); x += sizeof(eight)) {
+        std::memcpy(&eight, near.data() + x, sizeof(eight));
+        if (eight != 0) break;
+    }
+    while (x < near.size() && near[x] == 0) ++x;
+    return x;
+}
+
 /// How far silhouettes cover their pixels.
 void cover(Frame& frame) {
     const shared::FrameConstants& f = frame.constants;
@@ -67,9 +79,14 @@ void cover(Frame& frame) {
             uint8_t* const coverage = frame.coverage.data() + at;
             std::fill_n(coverage, f.width, uint8_t{255});
             const std::vector<uint8_t>& near = open.near();
-            for (size_t x = 0; x < f.width; ++x)
-                if (near[x] != 0 && shared::isPointKey(frame.visibility[at + x], f.firstBlock))
+            for (size_t x = 0; x < f.width; ++x) {
+                if (near[x] == 0) {
+                    x = nextNear(near, x) - 1;
+                    continue;
+                }
+                if (shared::isPointKey(frame.visibility[at + x], f.firstBlock))
                     coverage[x] = static_cast<uint8_t>(frame.filtered[at + x].cover & 255u);
+            }
         }
     });
 }

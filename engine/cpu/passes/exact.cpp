@@ -108,7 +108,7 @@ class DiscLevels {
 
 void exact(Frame& frame) {
     TileLists lists(frame, {});
-    lists.place();
+    lists.place(false);  // some are taken away before they are drawn
     DiscLevels levels(frame, lists);
     levels.fill();
     const auto draw = [&](const PlacedSplat* splats, const uint32_t* places, size_t count, const SplatTile& tile) {

@@ -7,7 +7,7 @@ namespace {
 
 void splat(Frame& frame) {
     TileLists lists(frame, {});
-    lists.place();
+    lists.place(true);
     lists.draw([&](const PlacedSplat* splats, const uint32_t* places, size_t count, const SplatTile& tile) {
         frame.k.splatTile(frame.constants, splats, places, count, tile, frame.visible());
     });

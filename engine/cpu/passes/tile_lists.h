@@ -23,12 +23,15 @@ class TileLists {
           splats_(frame.placedSplats),
           ranges_(frame.splatTiles) {}
 
-    void place() {
+    /// `countsTiles`: draw() follows, of all that is placed.
+    void place(bool countsTiles) {
+        isCounted_ = countsTiles;
         splats_.resize(frame_.blocks.size() * shared::kRecordsPerBlock);
         if (frame_.isBlended()) frame_.placedColours.resize(splats_.size());
         ranges_.resize(splats_.size());
         counts_.assign(chunks_, 0);
         entries_.assign(chunks_, 0);
+        if (countsTiles) frame_.tileEnds.assign(size_t{chunks_} * columns_ * rows_, 0);
         frame_.executor.parallelFor(chunks_, 1, [&](size_t begin, size_t end) {
             SplatBlock placed;
             for (size_t c = begin; c < end; ++c) {
@@ -39,7 +42,7 @@ class TileLists {
                     const uint32_t count =
                         std::min(shared::kRecordsPerBlock, block.node->count - frame_.draws->points().blocks[b].first);
                     frame_.k.placeSplats(frame_.constants, *block.node, block.records, count, reach_, placed);
-                    keep(placed, count, c, static_cast<uint32_t>(b * shared::kRecordsPerBlock));
+                    keep(placed, count, c, static_cast<uint32_t>(b * shared::kRecordsPerBlock), countsTiles);
                 }
             }
         });
@@ -87,7 +90,7 @@ class TileLists {
     }
 
   private:
-    void keep(const SplatBlock& b, uint32_t count, size_t chunk, uint32_t firstId) {
+    void keep(const SplatBlock& b, uint32_t count, size_t chunk, uint32_t firstId, bool countsTiles) {
         const auto tile = [](int pixel, uint32_t size) {
             return static_cast<uint16_t>(static_cast<uint32_t>(pixel) / size);
         };
@@ -100,6 +103,10 @@ class TileLists {
                                   tile(b.lastX[i], SplatTile::kWidth), tile(b.lastY[i], SplatTile::kHeight)};
             ranges_[at++] = range;
             entries_[chunk] += range.tiles();
+            if (countsTiles)
+                for (uint32_t y = range.firstY; y <= range.lastY; ++y)
+                    for (uint32_t x = range.firstX; x <= range.lastX; ++x)
+                        ++frame_.tileEnds[(chunk * rows_ + y) * columns_ + x];
             ++counts_[chunk];
         }
     }
@@ -122,11 +129,13 @@ class TileLists {
     void drawRows(uint32_t firstRow, uint32_t lastRow, uint64_t sum, const DrawTile& drawTile) {
         const size_t tiles = size_t{columns_} * (lastRow - firstRow), chunks = chunks_;
         std::vector<uint32_t>& ends = frame_.tileEnds;  // of each chunk and tile: how many, then where they end
-        ends.assign(chunks * tiles, 0);
-        frame_.executor.parallelFor(chunks, 1, [&](size_t begin, size_t end) {
-            for (size_t c = begin; c < end; ++c)
-                forEntries(c, firstRow, lastRow, [&](size_t tile, uint32_t) { ++ends[c * tiles + tile]; });
-        });
+        if (!isCounted_ || lastRow - firstRow < rows_) {
+            ends.assign(chunks * tiles, 0);
+            frame_.executor.parallelFor(chunks, 1, [&](size_t begin, size_t end) {
+                for (size_t c = begin; c < end; ++c)
+                    forEntries(c, firstRow, lastRow, [&](size_t tile, uint32_t) { ++ends[c * tiles + tile]; });
+            });
+        }
         std::vector<uint32_t> starts(tiles + 1, 0);
         for (size_t c = 0; c < chunks; ++c)
             for (size_t t = 0; t < tiles; ++t) starts[t + 1] += ends[c * tiles + t];
@@ -167,6 +176,7 @@ class TileLists {
     std::vector<TileRange>& ranges_;    ///< of each of them
     std::vector<uint32_t> counts_;      ///< of each chunk: discs
     std::vector<uint64_t> entries_;     ///< of each chunk: sum of their tiles
+    bool isCounted_ = false;            ///< Frame::tileEnds: how many of each chunk and tile there are
 };
 
 }  // namespace stipple::cpu
