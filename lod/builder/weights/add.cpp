@@ -63,9 +63,9 @@ class Weigher {
         const Chunk& own = chunks.at(node);
         std::vector<Surfel> surfels;
         const glm::dvec3 origin = h_.recordOrigin(h_.nodes[node]);
-        append(node, own, origin, surfels);
+        append(node, own, origin, glm::vec3(-HUGE_VALF), glm::vec3(HUGE_VALF), surfels);
         // Three rounds look as far as three kernels reach.
-        constexpr float kReaches = 3, kMostMeans = 3;
+        constexpr float kReaches = 3, kMostMeans = 1.5f;
         float reach = 0, largest = 0;
         glm::vec3 lo(1e30f), hi(-1e30f);
         for (const Surfel& s : surfels) {
@@ -80,14 +80,7 @@ class Weigher {
         for (const uint32_t other : nodesAbout(h_, node)) {
             if (other == node) continue;
             STIPPLE_TRY(take(other, chunks));
-            const size_t first = surfels.size();
-            append(other, chunks.at(other), origin, surfels);
-            const auto isFar = [&](const Surfel& s) {
-                return glm::any(glm::lessThan(s.place, lo - margin)) ||
-                       glm::any(glm::greaterThan(s.place, hi + margin));
-            };
-            surfels.erase(std::remove_if(surfels.begin() + static_cast<ptrdiff_t>(first), surfels.end(), isFar),
-                          surfels.end());
+            append(other, chunks.at(other), origin, lo - margin, hi + margin, surfels);
         }
         const std::vector<float> weights = surfelWeights(surfels);
         std::vector<uint8_t> codes(ofNode);
@@ -102,8 +95,9 @@ class Weigher {
         chunks[node] = std::move(chunk);
         return {};
     }
-    /// Discs as mode ewa draws them; places in lattice units from `origin`.
-    void append(uint32_t node, const Chunk& chunk, const glm::dvec3& origin, std::vector<Surfel>& to) const {
+    /// Discs as mode ewa draws them; places in lattice units from `origin`. Those from `lo` to `hi`.
+    void append(uint32_t node, const Chunk& chunk, const glm::dvec3& origin, const glm::vec3& lo, const glm::vec3& hi,
+                std::vector<Surfel>& to) const {
         const Node& n = h_.nodes[node];
         const double step = std::exp2(n.stepShift);
         const glm::dvec3 base = h_.recordOrigin(n) - origin;
@@ -114,6 +108,7 @@ class Weigher {
             const uint32_t flags = shared::recordFlags(r);
             Surfel s;
             s.place = glm::vec3(base + step * glm::dvec3(shared::recordX(r), shared::recordY(r), shared::recordZ(r)));
+            if (glm::any(glm::lessThan(s.place, lo)) || glm::any(glm::greaterThan(s.place, hi))) continue;
             if ((flags & shared::kFlagNoNormal) == 0) s.normal = glm::vec3(shared::octDecode(r.normal));
             s.radius = shared::opaqueRadius(edge * shared::radiusFractionFast(shared::recordRadiusCode(r)), spacing);
             s.isTwoSided = (flags & shared::kFlagTwoSided) != 0;

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <map>
+#include <utility>
 
 #include "shaders/shared/surfel_weight.h"
 
@@ -11,42 +12,28 @@ namespace {
 
 constexpr float kSupport = 2;
 constexpr int kRounds = 3;
-constexpr float kAlike = 0.5f;      // cosine between normals of one surface
-constexpr int64_t kMostCells = 16;  // along a disc's reach; of larger discs every surfel is asked
+constexpr float kAlike = 0.5f;  // cosine between normals of one surface
 
 float reachOf(const Surfel& s) { return s.radius * (kSupport / shared::kOpaqueSigmas); }
 
-/// Surfels by cells of a cubic grid.
+/// Surfels by cells of a cubic grid whose cells are so large.
 class Cells {
   public:
-    explicit Cells(std::span<const Surfel> surfels) : surfels_(surfels), keys_(surfels.size()), order_(surfels.size()) {
-        std::vector<float> reach;
-        for (const Surfel& s : surfels) reach.push_back(reachOf(s));
-        const auto middle = reach.begin() + static_cast<ptrdiff_t>(reach.size() / 2);
-        std::nth_element(reach.begin(), middle, reach.end());
-        size_ = std::max(*middle, 1e-30f);
-        for (size_t i = 0; i < surfels.size(); ++i) keys_[i] = keyOf(cellOf(surfels[i].place));
-        std::iota(order_.begin(), order_.end(), 0u);
-        std::sort(order_.begin(), order_.end(),
-                  [&](uint32_t a, uint32_t b) { return keys_[a] != keys_[b] ? keys_[a] < keys_[b] : a < b; });
-        sorted_.reserve(order_.size());
-        for (const uint32_t i : order_) sorted_.push_back(keys_[i]);
+    Cells(std::span<const Surfel> surfels, float size) : size_(size) {
+        keys_.reserve(surfels.size());
+        for (uint32_t i = 0; i < surfels.size(); ++i) keys_.emplace_back(keyOf(cellOf(surfels[i].place)), i);
+        std::sort(keys_.begin(), keys_.end());
     }
     /// Calls use(i) for all that may lie within `reach` of `place`.
     template <typename Use>
     void forNear(const glm::vec3& place, float reach, const Use& use) const {
         const glm::i64vec3 first = cellOf(place - reach), last = cellOf(place + reach);
-        if (last.x - first.x > kMostCells) {
-            for (uint32_t i = 0; i < surfels_.size(); ++i) use(i);
-            return;
-        }
         // Cells of a row lie next to each other.
         for (int64_t z = first.z; z <= last.z; ++z)
             for (int64_t y = first.y; y <= last.y; ++y) {
-                const auto begin = std::lower_bound(sorted_.begin(), sorted_.end(), keyOf({first.x, y, z}));
                 const uint64_t end = keyOf({last.x, y, z});
-                for (auto at = begin; at != sorted_.end() && *at <= end; ++at)
-                    use(order_[static_cast<size_t>(at - sorted_.begin())]);
+                auto at = std::lower_bound(keys_.begin(), keys_.end(), std::pair(keyOf({first.x, y, z}), 0u));
+                for (; at != keys_.end() && at->first <= end; ++at) use(at->second);
             }
     }
 
@@ -60,10 +47,25 @@ class Cells {
         const auto bits = [](int64_t v) { return static_cast<uint64_t>(v + 1048576); };
         return bits(c.z) << 42 | bits(c.y) << 21 | bits(c.x);
     }
+    std::vector<std::pair<uint64_t, uint32_t>> keys_;
+    float size_;
+};
+
+/// Grids for all reaches: each surfel looks in that whose cells are about as large as what it reaches.
+class Grids {
+  public:
+    explicit Grids(std::span<const Surfel> surfels) : surfels_(surfels) {}
+    const Cells& of(float reach) {
+        int octave = 0;
+        std::frexp(std::max(reach, 1e-30f), &octave);
+        const auto known = grids_.find(octave);
+        if (known != grids_.end()) return known->second;
+        return grids_.try_emplace(octave, surfels_, std::ldexp(1.0f, octave)).first->second;
+    }
+
+  private:
     std::span<const Surfel> surfels_;
-    std::vector<uint64_t> keys_, sorted_;
-    std::vector<uint32_t> order_;
-    float size_ = 1;
+    std::map<int, Cells> grids_;
 };
 
 /// The kernel of `of` at the centre of `at`; 0 where that is no part of its surface.
@@ -101,13 +103,15 @@ std::vector<float> surfelWeights(std::span<const Surfel> surfels) {
         uint32_t of;
         float kernel;
     };
-    const Cells cells(surfels);
+    Grids grids(surfels);
     const float end = shared::kernelEnd(kSupport);
     std::vector<std::vector<Pair>> at(surfels.size());
-    for (uint32_t of = 0; of < surfels.size(); ++of)
-        cells.forNear(surfels[of].place, reachOf(surfels[of]), [&](uint32_t i) {
+    for (uint32_t of = 0; of < surfels.size(); ++of) {
+        const float reach = reachOf(surfels[of]);
+        grids.of(reach).forNear(surfels[of].place, reach, [&](uint32_t i) {
             if (const float k = kernelBetween(surfels[of], surfels[i], end); k > 0) at[i].push_back({of, k});
         });
+    }
     const float wanted = gridCentre();
     std::vector<float> weights(surfels.size(), 1.0f), sums(surfels.size());
     for (int round = 0; round < kRounds; ++round) {
