@@ -243,7 +243,6 @@ struct TileDiscs {
 
 /// True if some of the discs are leaves.
 bool drawFronts(const FrameConstants& f, const TileDiscs& discs, const SplatTile& tile, TileFilter& t) {
-    alignas(64) float missed[DiscBatch::kSize];
     uint32_t flags = 0;
     for (size_t k = 0; k < discs.batchesInAll(); ++k) {
         const size_t first = k * DiscBatch::kSize, n = discs.sizeOf(k), next = first + n;
@@ -251,15 +250,14 @@ bool drawFronts(const FrameConstants& f, const TileDiscs& discs, const SplatTile
         prefetchDiscs(discs.splats, discs.places + next, discs.count - next);
         for (size_t i = 0; i < n; ++i) __builtin_prefetch(&discs.colours[discs.places[first + i]]);
         prepareDiscs(f, discs.splats, discs.places + first, n, tile, batch);
-        missedDepths(f, n, batch, missed);
         for (size_t i = 0; i < n; ++i) {
             const uint32_t colour = discs.colours[discs.places[first + i]];
             flags |= colour >> 24;
             const float shift = roughness(batch.radius[i], colour);
             if (batch.isNear[i] > 0.5f)
-                drawFront<true>(batch, i, shift, missed[i], f, t);
+                drawFront<true>(batch, i, shift, f, t);
             else
-                drawFront<false>(batch, i, shift, missed[i], f, t);
+                drawFront<false>(batch, i, shift, f, t);
         }
     }
     return (flags & kFlagLeaf) != 0u;

@@ -1,28 +1,23 @@
 // The fronts of a tile: of each pixel the nearest disc, moved back, behind which nothing is blended. Included by
 // ewa.inl.
 
-/// Depths at which the pixels that hold centres, but whose rays miss, show their discs: their planes', so that the
-/// surface agrees with them.
-void missedDepths(const FrameConstants& frame, size_t count, const DiscBatch& b, float* __restrict depth) {
-    const FrameConstants f = frame;
+/// The depth at which the pixel that holds the i-th centre, but whose ray misses, shows its disc: the plane's, so that
+/// the surface agrees with it.
+float missedDepth(const FrameConstants& f, const DiscBatch& b, size_t i) {
     const Lens lens = lensHere(f.focal);
     const float inverseFocal = 1.0f / f.focal;
-#pragma GCC ivdep
-    for (size_t i = 0; i < count; ++i) {
-        const WideDisc d = b.disc(i);
-        const DepthRange range = depthRange(d, d.radius * (1.0f / kOpaqueSigmas), f.kernelSupport, f.lowPass, lens);
-        const CentrePixel c = centrePixel(d, f);
-        const PixelRay ray = pixelRay(lens, (float(c.x) + 0.5f - f.centre.x) * inverseFocal,
-                                      (float(c.y) + 0.5f - f.centre.y) * inverseFocal);
-        depth[i] = depthWithin(range, dot(d.normal, fromRay(ray, d.centre)), dot(d.normal, rayDirection(ray)));
-    }
+    const WideDisc d = b.disc(i);
+    const DepthRange range = depthRange(d, d.radius * (1.0f / kOpaqueSigmas), f.kernelSupport, f.lowPass, lens);
+    const CentrePixel c = centrePixel(d, f);
+    const PixelRay ray = pixelRay(lens, (float(c.x) + 0.5f - f.centre.x) * inverseFocal,
+                                  (float(c.y) + 0.5f - f.centre.y) * inverseFocal);
+    return depthWithin(range, dot(d.normal, fromRay(ray, d.centre)), dot(d.normal, rayDirection(ray)));
 }
 
 /// The front of each pixel: of the opaque parts of discs, moved back by `shift` along the ray. Discs come in the order
 /// of their ids: of what is equally deep the first stays.
 template <bool isNear>
-void drawFront(const DiscBatch& b, size_t i, float shift, float missedDepth, const FrameConstants& f,
-               TileFilter& __restrict t) {
+void drawFront(const DiscBatch& b, size_t i, float shift, const FrameConstants& f, TileFilter& __restrict t) {
     const uint32_t id = b.id[i];
     const DiscForm d = formOf(b, i, f);
     const float midX = b.x[i], midY = b.y[i], least = b.least[i], most = b.most[i];
@@ -51,11 +46,11 @@ void drawFront(const DiscBatch& b, size_t i, float shift, float missedDepth, con
     }
     if (b.missed[i] < 0) return;
     const auto at = size_t(b.missed[i]);
-    const float moved = missedDepth + shift * t.along[at];
+    const float depth = missedDepth(f, b, i), moved = depth + shift * t.along[at];
     if (!(moved < t.front[at])) return;
     t.front[at] = moved;
     t.id[at] = id;
-    t.own[at] = missedDepth;
+    t.own[at] = depth;
 }
 
 /// Where fronts end, by pixels and by blocks.
@@ -70,7 +65,9 @@ void closeFronts(const SplatTile& tile, const Lens& lens, TileFilter& __restrict
         blocks.limit[b] = limit;
     }
     bool hasGaps = false;
-    for (uint32_t y = 0; y < tile.height; ++y)
+    if (tile.width * tile.height == kTilePixels)
+        for (size_t i = 0; i < kTilePixels; ++i) hasGaps = hasGaps | (t.id[i] == TileFilter::kOther);
+    for (uint32_t y = 0; y < tile.height && tile.width * tile.height < kTilePixels; ++y)
         for (uint32_t x = 0; x < tile.width; ++x)
             hasGaps = hasGaps | (t.id[tileEntry(int(x), int(y))] == TileFilter::kOther);
     t.hasGaps = hasGaps;
