@@ -14,7 +14,8 @@
 namespace stipple::lod {
 namespace {
 
-constexpr double kSliver = 0.05;  ///< height over longest edge, below which a triangle's own normal says little
+constexpr double kCrease = 0.866;  ///< cosine between a triangle and its corners, of noise: 30 degrees
+constexpr double kSliver = 0.05;   ///< height over longest edge, below which a triangle's own normal says little
 
 /// Which vertices are at one place; sets `position`, none twice, in order.
 std::vector<uint32_t> weldVertices(MeshSurface& s) {
@@ -192,19 +193,27 @@ void linkTriangles(MeshSurface& s) {
     setLinks(std::move(pairs), s.elements);
 }
 
-/// Slivers have the normals of their neighbours: their own hang on the rounding of their corners.
-void smoothSlivers(MeshSurface& s) {
-    std::vector<std::pair<uint32_t, glm::vec3>> better;
-    for (uint32_t t = 0; t < s.size(); ++t) {
+/// The mean of those at the corners (of all triangles there, by area), as the surface's own and not the noise of one
+/// triangle; but at creases, which are none, only of slivers: their own hang on the rounding of their corners.
+void smoothNormals(MeshSurface& s) {
+    std::vector<glm::dvec3> sum(s.position.size(), glm::dvec3(0));
+    for (size_t t = 0; t < s.size(); ++t)
+        for (const uint32_t v : s.corners[t]) sum[v] += s.elements.area[t] * glm::dvec3(s.elements.normal[t]);
+    for (glm::dvec3& n : sum)
+        if (hasDirection(n)) n = glm::normalize(withoutScale(n));
+    for (size_t t = 0; t < s.size(); ++t) {
         double longest = 0;
-        for (size_t k = 0; k < 3; ++k) longest = std::max(longest, glm::distance(s.at(t, k), s.at(t, (k + 1) % 3)));
-        if (s.elements.area[t] > 0.5 * kSliver * longest * longest) continue;
-        glm::dvec3 sum(0);
-        for (const uint32_t k : s.elements.links(t)) sum += s.elements.area[k] * glm::dvec3(s.elements.normal[k]);
-        if (const double length = glm::length(sum); length > 0 && std::isfinite(length))
-            better.emplace_back(t, glm::vec3(sum / length));
+        glm::dvec3 mean(0);
+        for (size_t k = 0; k < 3; ++k) {
+            longest = std::max(longest, glm::distance(s.at(t, k), s.at(t, (k + 1) % 3)));
+            mean += sum[s.corners[t][k]];
+        }
+        const double length = glm::length(mean);
+        const bool isSliver = s.elements.area[t] <= 0.5 * kSliver * longest * longest;
+        if (!(length > 1e-3)) continue;
+        if (isSliver || glm::dot(mean / length, glm::dvec3(s.elements.normal[t])) > kCrease)
+            s.elements.normal[t] = glm::vec3(mean / length);
     }
-    for (const auto& [t, normal] : better) s.elements.normal[t] = normal;
 }
 
 }  // namespace
@@ -268,7 +277,7 @@ MeshSurface meshSurface(TriangleMesh mesh, Executor& executor) {
         e.area[t] = areaOf(s, t);
     }
     linkTriangles(s);
-    smoothSlivers(s);
+    smoothNormals(s);
     s.tree = RunTree(
         s.size(),
         [&](size_t t) {

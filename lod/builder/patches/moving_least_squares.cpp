@@ -10,8 +10,8 @@
 namespace stipple::lod {
 namespace {
 
-constexpr size_t kNeighbours = 20, kFewest = 5, kForQuadratic = 10;
-constexpr double kUsualReach = 2.7, kReach = 4;  ///< spacings, of neighbours; the farther where there are few
+constexpr size_t kNeighbours = 16, kFewest = 5, kForQuadratic = 10;
+constexpr double kUsualReach = 2.5, kReach = 4;  ///< spacings, of neighbours; the farther where there are few
 constexpr double kSupport = 1.5;                 ///< h, spacings
 constexpr double kSameSide = 0.3;                ///< cosine between normals of one sheet
 constexpr double kSheet = 0.75;                  ///< h, from the plane of the guide
