@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "apps/stipple/outputs.h"
@@ -9,6 +10,7 @@
 #include "engine/base/process.h"
 #include "engine/base/words.h"
 #include "engine/scene/triangles.h"
+#include "lod/builder/points/input_colours.h"
 #include "lod/import/import.h"
 #include "lod/import/ply/mesh.h"
 #include "lod/primitives/octahedral.h"
@@ -22,7 +24,7 @@ namespace fs = std::filesystem;
 struct Source {
     lod::TriangleMesh mesh;
     lod::PointBlock points;
-    bool isMesh = false, isTwoSided = false;
+    bool isMesh = false, isTwoSided = false, isUnlit = false;
 };
 
 Error interruptedAt(const std::string& output) {
@@ -72,6 +74,20 @@ bool hasTextures(const scene::Scene& scene) {
     return false;
 }
 
+/// To 8 bits: of files that have 16, unless no value needs them.
+void narrowColours(lod::PointBlock& block) {
+    if (block.colour16.empty()) return;
+    uint64_t any = 0;
+    for (const uint64_t c : block.colour16) any |= c;
+    const bool isWide = ((any | any >> 16 | any >> 32) & 0xff00u) != 0;
+    for (const uint64_t c : block.colour16) block.colour.push_back(lod::narrowed(c, isWide));
+    block.colour16 = {};
+}
+/// Files that declare colours and have none.
+bool isBlack(const std::vector<uint32_t>& colours) {
+    return std::all_of(colours.begin(), colours.end(), [](uint32_t c) { return (c & 0xffffffu) == 0; });
+}
+
 Result<Source> readSource(const PatchConversion& o, std::vector<std::string>& notes) {
     Source out;
     if (isSceneFile(o.input)) {
@@ -100,13 +116,16 @@ Result<Source> readSource(const PatchConversion& o, std::vector<std::string>& no
             all.position.push_back(block.lattice.empty()
                                        ? block.position[i]
                                        : glm::dvec3(block.lattice[i]) * source.info.scale + source.info.offset);
-        hasColour = hasColour && block.colour.size() == n;
+        hasColour = hasColour && block.colour.size() + block.colour16.size() == n;
         hasNormal = hasNormal && block.normal.size() == n;
         all.colour.insert(all.colour.end(), block.colour.begin(), block.colour.end());
+        all.colour16.insert(all.colour16.end(), block.colour16.begin(), block.colour16.end());
         all.normal.insert(all.normal.end(), block.normal.begin(), block.normal.end());
         return {};
     }));
-    if (!hasColour) all.colour.clear();
+    narrowColours(all);
+    if (!hasColour || isBlack(all.colour)) all.colour.clear();
+    out.isUnlit = !all.colour.empty() && !source.info.isReflectance;  // light is in them
     if (!hasNormal) all.normal.clear();
     return out;
 }
@@ -160,12 +179,13 @@ scene::Primitive pointsOf(const lod::PointBlock& left) {
     return p;
 }
 
-scene::Scene sceneOf(const lod::PatchSet& set) {
+scene::Scene sceneOf(const lod::PatchSet& set, bool isUnlit) {
     scene::Scene scene;
     scene::Material material;
     material.name = "patches";
     material.metallic = 0;
     material.isDoubleSided = set.isTwoSided;
+    material.isUnlit = isUnlit;
     scene.materials.push_back(material);
     scene::Mesh mesh;
     mesh.name = "patches";
@@ -282,11 +302,12 @@ Result<void> convertToPatches(const PatchConversion& given) {
     const auto executor = makeTbbExecutor(o.build.threads);
     std::vector<std::string> notes;
     lod::PatchSet set;
-    bool isMesh = false;
+    bool isMesh = false, isUnlit = false;
     {
         Progress progress(o.build.progressStyle(false));
         STIPPLE_ASSIGN(Source source, readSource(o, notes));
         isMesh = source.isMesh;
+        isUnlit = source.isUnlit;
         o.settings.isTwoSided = source.isTwoSided;
         if (!isMesh && source.points.position.empty()) return fail(ErrorKind::input, "holds no points", o.input);
         progress.plan(isMesh ? std::vector<JobPlan::Stage>{{"patches", 1}}
@@ -299,7 +320,7 @@ Result<void> convertToPatches(const PatchConversion& given) {
     if (set.patches.empty() && set.left.position.empty())
         return fail(ErrorKind::input, "holds nothing that could be a patch or a point", o.input);
     const Report report = reportOf(set, nowSeconds() - start);
-    STIPPLE_TRY(scene::writeGltf(sceneOf(set), o.output));
+    STIPPLE_TRY(scene::writeGltf(sceneOf(set, isUnlit), o.output));
     if (o.json)
         printAsJson(o, set, report, notes);
     else

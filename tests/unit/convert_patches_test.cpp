@@ -112,6 +112,29 @@ TEST(ConvertPatches, ReportsWhatIsThere) {
     EXPECT_NE(text.find("9000 points became"), std::string::npos) << text;
 }
 
+TEST(ConvertPatches, KeepsColours) {
+    // A red ball: bytes of a PLY, and what a .las has of it (16 bits that hold 8).
+    const TempFolder folder;
+    std::vector<test::TestPoint> points = test::bumpySphere(4000, 1);
+    for (test::TestPoint& p : points) p.colour = 0x0000c0;
+    test::writePly(folder / "red.ply", points, false);
+    ASSERT_EQ(runProgram(folder, "grow scan -o grove.las --points 30k").code, 0);
+    for (const std::string name : {"red.ply", "grove.las"}) {
+        SCOPED_TRACE(name);
+        ASSERT_EQ(runProgram(folder, "convert " + name + " --patches -o c.glb --force").code, 0);
+        ASSERT_EQ(runProgram(folder, "render c.glb -o c.png --force --quiet --size 160x120").code, 0);
+        const auto image = image::readImage(folder / "c.png");
+        ASSERT_TRUE(image);
+        size_t coloured = 0;
+        for (const uint32_t p : image->rgba) {
+            const int r = int(p & 255u), g = int(p >> 8 & 255u), b = int(p >> 16 & 255u);
+            coloured +=
+                name == "red.ply" ? (r > 150 && g < 30 && b < 30) : std::max({r, g, b}) - std::min({r, g, b}) > 40;
+        }
+        EXPECT_GT(coloured, 1000u);
+    }
+}
+
 TEST(ConvertPatches, TakesNothingOdd) {
     const TempFolder folder;
     test::writePly(folder / "a.ply", test::bumpySphere(300, 1));

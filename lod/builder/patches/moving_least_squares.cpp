@@ -196,8 +196,12 @@ bool leastSquaresAt(const PointSurface& s, const glm::dvec3& place, const glm::d
     }
     if (c[1] * c[1] + c[2] * c[2] > kSteepest * kSteepest || looseness(f, c) > kLoose) return false;
     double closest = 1e300;
-    for (size_t k = 0; k < f.n; ++k)
-        closest = std::min(closest, glm::length(glm::dvec3(f.x[k], f.y[k], f.z[k] - height)));
+    for (size_t k = 0; k < f.n; ++k) {
+        const double distance = glm::length(glm::dvec3(f.x[k], f.y[k], f.z[k] - height));
+        if (distance >= closest) continue;
+        closest = distance;
+        sample.nearestPoint = f.index[k];
+    }
     if (isBorder && closest * h > kBesideBorder * spacing) return false;
     sample.height = height * h;
     sample.slope = {c[1], c[2]};

@@ -12,10 +12,11 @@
 namespace stipple::lod {
 
 struct LeastSquaresSample {
-    double height = 0;    ///< along the axis, from the place that was asked about; scene units
-    glm::dvec2 slope{0};  ///< of the height, along U and V
-    double nearest = 0;   ///< distance of the nearest of the points that were used from the place, scene units
-    glm::vec3 colour{0};  ///< linear
+    double height = 0;          ///< along the axis, from the place that was asked about; scene units
+    glm::dvec2 slope{0};        ///< of the height, along U and V
+    double nearest = 0;         ///< distance of the nearest of the points that were used from the place, scene units
+    uint32_t nearestPoint = 0;  ///< which that is
+    glm::vec3 colour{0};        ///< linear
 };
 
 /// At `place`, along the third column of `frame`; `guide`: the point whose sheet it is. False: no result.

@@ -101,7 +101,6 @@ class Sampler {
             double reach =
                 std::min(kReach * std::max(1.0, static_cast<double>(s_.spacing[i]) / grid_.step), kMostReach);
             if (closing_ == PatchClosing::overlap) reach += 1;
-            if (closing_ != PatchClosing::overlap) reach = 0.7072;
             const auto from = [](double v) { return static_cast<uint32_t>(std::max(0.0, std::ceil(v))); };
             const auto to = [](double v, uint32_t n) {
                 return static_cast<uint32_t>(std::clamp(std::floor(v), -1.0, static_cast<double>(n) - 1) + 1);
@@ -134,6 +133,10 @@ class Sampler {
                 grid_.origin + grid_.frame * glm::dvec3(at.x * grid_.step, at.y * grid_.step, start);
             LeastSquaresSample sample;
             if (!leastSquaresAt(s_, place, grid_.frame, i, sample)) continue;
+            // Without overlap, what is nearest to another segment's points is that one's.
+            if (closing_ != PatchClosing::overlap &&
+                !std::binary_search(segment_.begin(), segment_.end(), sample.nearestPoint))
+                continue;
             grid_.heights[s] = start + sample.height;
             slopes_[s] = sample.slope;
             nearest_[s] = sample.nearest;
@@ -174,7 +177,14 @@ class Sampler {
             glm::dvec2 slope(0);
             const double off = std::abs(heights.at(q.x, q.y, &slope) - q.z);
             if (!(off <= grid_.step)) {
-                out.left.push_back(i);
+                const double beside = closing_ == PatchClosing::overlap ? 1e300 : toSamples(p, q);
+                if (beside <= kBeside * grid_.step) {
+                    ++out.represented;
+                    p.errorFromSource = std::max(p.errorFromSource, beside);
+                    out.fromSource += beside * beside;
+                } else {
+                    out.left.push_back(i);
+                }
                 continue;
             }
             ++out.represented;
@@ -183,6 +193,20 @@ class Sampler {
             out.fromSource += squared;
         }
         measureSamples(axis, out);
+    }
+    /// From a place (as PatchHeights has it) to the nearest of the samples around it.
+    static double toSamples(const Patch& p, const glm::dvec3& q) {
+        double least = 1e300;
+        const auto i = static_cast<int>(std::floor(q.x)), j = static_cast<int>(std::floor(q.y));
+        for (int y = std::max(j - 1, 0); y <= std::min(j + 2, static_cast<int>(p.height) - 1); ++y)
+            for (int x = std::max(i - 1, 0); x <= std::min(i + 2, static_cast<int>(p.width) - 1); ++x) {
+                const uint16_t code = p.heights[p.at(static_cast<uint32_t>(x), static_cast<uint32_t>(y))];
+                if (code == 0) continue;
+                const double step = p.step;
+                least = std::min(least,
+                                 glm::length(glm::dvec3((q.x - x) * step, (q.y - y) * step, q.z - code * p.quantum())));
+            }
+        return least;
     }
     /// Of any place of a triangle: as far as one of its corners is from a point, and the way there more, which is at
     /// most the longest side over sqrt(3).
@@ -211,6 +235,7 @@ class Sampler {
         out.toSource = samples > 0 ? sum / static_cast<double>(samples) * static_cast<double>(out.represented) : 0;
     }
 
+    static constexpr double kBeside = 1.5;       ///< steps: of points where patches end before their border
     static constexpr double kFlatness = 0.05;    ///< steps: of what is flat and without noise
     static constexpr double kLeastFacing = 0.2;  ///< cosine between a guide's normal and the axis
 
