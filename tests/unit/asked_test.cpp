@@ -107,6 +107,7 @@ TEST_F(Asked, WhatAModeWouldIgnoreIsRefused) {
         const std::string mode = fmt::format("--mode {} ", of);
         expectOneLine(render(mode + "--lowpass 1"), 2, {"--lowpass", "mode ewa", of});
         expectOneLine(render(mode + "--kernel 3"), 2, {"--kernel", "mode ewa", of});
+        expectOneLine(render(mode + "--normalise pixel"), 2, {"--normalise", "mode ewa", of});
         expectOneLine(render(mode + "--samples 2"), 2, {"--samples", "mode reference", of});
         EXPECT_EQ(render(mode + "--wind 0.1 --error 2").code, 0);
     }
