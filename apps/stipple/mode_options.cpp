@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "apps/stipple/options.h"
 #include "engine/render/reconstructions/table.h"
 
 namespace stipple::app {
@@ -32,6 +33,48 @@ constexpr std::array kOnlyOf{
 };
 
 }  // namespace
+
+void ModeOptions::addTo(CLI::App& sub, bool hasReference) {
+    std::vector<std::string> names;
+    std::string help;
+    for (const render::Reconstruction& r : render::reconstructions()) {
+        names.emplace_back(r.name);
+        help += fmt::format("{}{} ({})", help.empty() ? "" : ", ", r.name, r.summary);
+    }
+    if (hasReference) {
+        names.emplace_back("reference");
+        help += ", or reference (traced full detail)";
+    }
+    sub.add_option("--mode", mode, help)->check(oneOf(names))->capture_default_str();
+    sub.add_option("--lowpass", lowPass,
+                   "of mode ewa: variance of the pixel's Gaussian, 0.25 to 4 px^2 (0.25 is sharper, and flickers more)")
+        ->transform(within(0.25, 4.0))
+        ->capture_default_str();
+    sub.add_option(
+           "--kernel", kernel,
+           "of mode ewa: where the discs' Gaussians end, in standard deviations: 2, or 3 (even smoother, slower)")
+        ->check(CLI::Validator(
+            [](const std::string& text) {
+                return text == "2" || text == "3" ? std::string() : fmt::format("'{}' is neither 2 nor 3", text);
+            },
+            "2|3"))
+        ->capture_default_str();
+}
+
+void ModeOptions::addNormaliseTo(CLI::App& sub) {
+    sub.add_option("--normalise", normalise,
+                   "of mode ewa: pixel (each is divided by what its weights add up to) or surfel (by weights of "
+                   "surfels: stipple build --surfel-weights)")
+        ->check(oneOf({"pixel", "surfel"}))
+        ->capture_default_str();
+}
+
+void ModeOptions::applyTo(render::FrameSettings& settings) const {
+    if (const render::Reconstruction* of = render::reconstructionNamed(mode)) settings.mode = of->mode;
+    settings.draw.lowPass = static_cast<float>(lowPass);
+    settings.draw.kernelSupport = static_cast<float>(kernel);
+    settings.draw.perSurfel = normalise == "surfel";
+}
 
 Result<void> checkOfMode(const CLI::App& sub, const std::string& mode) {
     for (const OnlyOf& row : kOnlyOf) {

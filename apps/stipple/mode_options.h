@@ -1,12 +1,25 @@
-// Options of `render` that only some of the modes use.
+// How points become a picture, on the command line, and the options that only some of the modes use.
 #pragma once
 
 #include <CLI/CLI.hpp>
 #include <string>
 
 #include "engine/base/result.h"
+#include "engine/render/frame.h"
 
 namespace stipple::app {
+
+struct ModeOptions {
+    std::string mode = "pullpush", normalise = "pixel";
+    double lowPass = 0.5;  ///< variance of the pixel's Gaussian, px^2
+    double kernel = 2;     ///< standard deviations
+
+    /// `hasReference`: the traced full detail is one of them.
+    void addTo(CLI::App& sub, bool hasReference);
+    /// Where it is the user's choice: the window is quick while something moves, exact at rest.
+    void addNormaliseTo(CLI::App& sub);
+    void applyTo(render::FrameSettings& settings) const;
+};
 
 /// Refuses what was asked for and would be ignored: an option that mode `mode` does not use.
 Result<void> checkOfMode(const CLI::App& sub, const std::string& mode);

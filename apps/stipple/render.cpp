@@ -31,11 +31,11 @@ namespace {
 
 struct Options {
     std::vector<std::string> inputs, effects;
-    std::string output, size = "1280x720", mode = "pullpush", device = "auto", shade = "auto",
+    std::string output, size = "1280x720", device = "auto", shade = "auto",
                         background = fmt::format("{}", fmt::join(render::kBackground, ","));
     std::string debug = "none", resident = "1G";
-    double error = 1, curveExact = 2, wind = 0, seconds = 0, lowPass = 0.5, kernel = 2;
-    std::string normalise = "pixel";
+    double error = 1, curveExact = 2, wind = 0, seconds = 0;
+    ModeOptions drawn;
     int frames = 1, samples = 4, accumulate = 1;
     uint64_t budget = 0;
     bool noWait = false, json = false, quiet = false, force = false, alpha = false;
@@ -48,19 +48,6 @@ struct Options {
 bool closesGaps(const std::string& mode) {
     const render::Reconstruction* of = render::reconstructionNamed(mode);
     return !of || of->closesGaps;
-}
-
-std::vector<std::string> modeNames() {
-    std::vector<std::string> names;
-    for (const render::Reconstruction& r : render::reconstructions()) names.emplace_back(r.name);
-    names.emplace_back("reference");
-    return names;
-}
-std::string modeHelp() {
-    std::string help;
-    for (const render::Reconstruction& r : render::reconstructions())
-        help += fmt::format("{} ({}), ", r.name, r.summary);
-    return help + "or reference (traced full detail)";
 }
 
 Result<glm::dvec3> backgroundOf(const Options& o) {
@@ -87,7 +74,7 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
                                            const lod::ColourBy& colour, const std::vector<render::WorldLight>& lights) {
     render::FrameSettings s;
     s.draw.lights = lights;
-    if (const render::Reconstruction* mode = render::reconstructionNamed(o.mode)) s.mode = mode->mode;
+    o.drawn.applyTo(s);
     s.budgets.errorPixels = o.error;
     if (o.budget > 0) s.budgets.records = o.budget;
     s.draw.unlitTriangles = o.shade == "unlit";
@@ -95,9 +82,6 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     s.draw.worldUp = shot.worldUp;
     s.draw.exactCurves = static_cast<float>(o.curveExact);
     s.draw.effects = o.effects;
-    s.draw.lowPass = static_cast<float>(o.lowPass);
-    s.draw.kernelSupport = static_cast<float>(o.kernel);
-    s.draw.perSurfel = o.normalise == "surfel";
     s.draw.wind = {o.wind, o.seconds, render::windAcross(shot.worldUp)};
     STIPPLE_ASSIGN(const glm::dvec3 background, backgroundOf(o));
     for (int c = 0; c < 3; ++c)
@@ -152,7 +136,7 @@ Result<void> checkPictures(const Options& o) {
 
 /// Before any work. (It takes longer to load than a built scene takes to draw: then only whether it is there.)
 Result<void> checkModule(const Options& o) {
-    const bool isLong = !o.camera.path.empty() || o.camera.orbit > 0 || o.accumulate > 1 || o.mode == "reference";
+    const bool isLong = !o.camera.path.empty() || o.camera.orbit > 0 || o.accumulate > 1 || o.drawn.mode == "reference";
     return image::checkModule(isLong || !lod::isStoreFile(o.inputs.front()));
 }
 
@@ -202,7 +186,7 @@ Result<void> runTraced(const Options& o, const OpenedScene& scene, const Shot& s
     if (o.json)
         printJson("render", {{"backend", "trace"},
                              {"device", "fp64 rays against the full detail"},
-                             {"mode", o.mode},
+                             {"mode", o.drawn.mode},
                              {"width", shot.views.front().width},
                              {"height", shot.views.front().height},
                              {"samples_per_pixel", rays},
@@ -230,7 +214,7 @@ void tell(const Options& o, const render::FrameState& state, const Verdict& verd
         const nlohmann::json j = {
             {"backend", state.backend->name()},
             {"device", state.backend->device()},
-            {"mode", o.mode},
+            {"mode", o.drawn.mode},
             {"width", size.x},
             {"height", size.y},
             {"frames", timings.frames.size()},
@@ -239,7 +223,7 @@ void tell(const Options& o, const render::FrameState& state, const Verdict& verd
             {"records_drawn", c.recordsDrawn},
             {"triangles_drawn", c.trianglesDrawn},
             {"nodes_drawn", c.nodesDrawn},
-            {"closes_gaps", closesGaps(o.mode)},
+            {"closes_gaps", closesGaps(o.drawn.mode)},
             {"tau_eff_px", jsonNumber(verdict.tauEffectivePixels)},
             {"stochastic",
              {{"narrow_curves", verdict.pruned.narrowShare()},
@@ -259,20 +243,20 @@ void tell(const Options& o, const render::FrameState& state, const Verdict& verd
         printJson("render", j);
     } else if (!o.quiet && views > 1) {
         fmt::print("{} pictures; the worst is {}: {}{}, {:.1f} ms a frame on {}\n", views,
-                   numbered(o.output, verdict.worst), errorText(verdict, o.mode), pruningText(verdict.pruned),
+                   numbered(o.output, verdict.worst), errorText(verdict, o.drawn.mode), pruningText(verdict.pruned),
                    quantile(timings.frames, 0.5), state.backend->device());
     } else if (!o.quiet) {
         const std::string drawn = c.trianglesDrawn == 0 ? fmt::format("{} records", c.recordsDrawn)
                                   : c.recordsDrawn == 0
                                       ? fmt::format("{} triangles", c.trianglesDrawn)
                                       : fmt::format("{} records, {} triangles", c.recordsDrawn, c.trianglesDrawn);
-        fmt::print("{}: {}, {}{}, {:.1f} ms a frame on {}\n", o.output, drawn, errorText(verdict, o.mode),
+        fmt::print("{}: {}, {}{}, {:.1f} ms a frame on {}\n", o.output, drawn, errorText(verdict, o.drawn.mode),
                    pruningText(verdict.pruned), quantile(timings.frames, 0.5), state.backend->device());
     }
 }
 
 Result<void> checkWeights(const Options& o, const OpenedScene& scene) {
-    if (o.normalise != "surfel" || hasSurfelWeights(scene.placed)) return {};
+    if (o.drawn.normalise != "surfel" || hasSurfelWeights(scene.placed)) return {};
     return fail(ErrorKind::usage, "no store of the scene has weights of surfels", "--normalise surfel",
                 "build it with: stipple build --surfel-weights, or take --normalise pixel");
 }
@@ -296,7 +280,7 @@ Result<void> run(const Options& o, Written& written) {
     STIPPLE_ASSIGN(settings.draw.environment,
                    openEnvironment(o.environment.path, o.environment.scale, o.build.reading().memoryBytes, *executor));
     const Legend legend = o.colour.legend ? makeLegend(colour, description) : Legend{};
-    if (o.mode == "reference") return runTraced(o, scene, shot, settings, legend, *executor, written);
+    if (o.drawn.mode == "reference") return runTraced(o, scene, shot, settings, legend, *executor, written);
     streaming::StreamSettings stream;
     stream.residentBytes = parseBytes(o.resident);
     settings.wantDepthAndNormal = settings.wantDepthAndNormal || o.accumulate > 1;
@@ -360,32 +344,6 @@ void addReading(CLI::App& sub, Options& o) {
 
 }  // namespace
 
-namespace {
-
-/// Of mode ewa.
-void addKernelOptions(CLI::App& sub, Options& o) {
-    sub.add_option("--lowpass", o.lowPass,
-                   "of mode ewa: variance of the pixel's Gaussian, 0.25 to 4 px^2 (0.25 is sharper, and flickers more)")
-        ->transform(within(0.25, 4.0))
-        ->capture_default_str();
-    sub.add_option(
-           "--kernel", o.kernel,
-           "of mode ewa: where the discs' Gaussians end, in standard deviations: 2, or 3 (even smoother, slower)")
-        ->check(CLI::Validator(
-            [](const std::string& text) {
-                return text == "2" || text == "3" ? std::string() : fmt::format("'{}' is neither 2 nor 3", text);
-            },
-            "2|3"))
-        ->capture_default_str();
-    sub.add_option("--normalise", o.normalise,
-                   "of mode ewa: pixel (each is divided by what its weights add up to) or surfel (by weights of "
-                   "surfels: stipple build --surfel-weights)")
-        ->check(oneOf({"pixel", "surfel"}))
-        ->capture_default_str();
-}
-
-}  // namespace
-
 void setupRender(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
     CLI::App* sub = app.add_subcommand("render", "draw pictures without a window");
@@ -400,7 +358,7 @@ void setupRender(CLI::App& app, int& status) {
         ->transform(within(1, 1000000))
         ->excludes("--orbit")
         ->capture_default_str();
-    sub->add_option("--mode", o->mode, modeHelp())->check(oneOf(modeNames()))->capture_default_str();
+    o->drawn.addTo(*sub, true);
     sub->add_option("--error", o->error, "tolerated screen-space error, pixels")
         ->transform(positive())
         ->capture_default_str();
@@ -436,7 +394,7 @@ void setupRender(CLI::App& app, int& status) {
         ->needs(sub->get_option("--wind"))
         ->transform(within(-1e9, 1e9))
         ->capture_default_str();
-    addKernelOptions(*sub, *o);
+    o->drawn.addNormaliseTo(*sub);
     sub->add_option("--curve-exact,--strand-exact", o->curveExact,
                     "half-width in pixels from which ribbons and tubes are filled exactly instead of reconstructed")
         ->transform(within(0.5, 1e9))
@@ -459,7 +417,7 @@ void setupRender(CLI::App& app, int& status) {
     addReading(*sub, *o);
     sub->callback([o, sub, &status] {
         Written written;
-        auto result = checkOfMode(*sub, o->mode);
+        auto result = checkOfMode(*sub, o->drawn.mode);
         if (result) result = run(*o, written);
         if (!result) status = report(toldOf(result.error(), *o, written));
     });

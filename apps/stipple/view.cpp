@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <thread>
 
+#include "apps/stipple/effect_options.h"
 #include "apps/stipple/outputs.h"
 #include "apps/stipple/overlay.h"
 #include "apps/stipple/render_frames.h"
@@ -393,6 +394,8 @@ Result<void> run(const ViewOptions& o) {
     gpu::Window* const window = stage.window.get();
     ViewSettings settings;
     render::FrameSettings& frame = settings.frame;
+    o.drawn.applyTo(frame);
+    frame.draw.effects = o.effects;
     frame.budgets = {o.error, o.budget};
     frame.draw.unlitTriangles = o.shade == "unlit";
     frame.draw.wind.strength = o.wind;
@@ -420,6 +423,8 @@ void setupView(CLI::App& app, int& status) {
     sub->add_option("SCENE", o->inputs, "a .stipple scene, or scans, meshes, curves (built into the cache first)")
         ->required();
     sub->add_option("--size", o->size, "of the window, pixels")->type_name("WxH")->capture_default_str();
+    o->drawn.addTo(*sub, false);  // (any key M may come to ewa: its options stand for when it does)
+    addEffects(*sub, o->effects);
     sub->add_option("--error", o->error, "tolerated screen-space error, pixels")
         ->transform(positive())
         ->capture_default_str();

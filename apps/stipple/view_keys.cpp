@@ -27,7 +27,7 @@ std::vector<KeyHelp> keyHelp(const std::array<char, gpu::kSteerCount>& names) {
              "fly ahead, left, back, right (Shift: faster)"},
             {pick({gpu::kSteerDown, gpu::kSteerUp}, "or page down, up"), "fly down, up"},
             {"1 to 9", "tolerated error, 0.25 to 64 pixels"},
-            {"M", "filled surfaces, or points only"},
+            {"M", "the next mode (--mode)"},
             {"C", "next colours"},
             {"L", "light on, off"},
             {"U", "another axis is up: z or y, x, back"},

@@ -4,6 +4,7 @@
 #include "apps/stipple/camera_options.h"
 #include "apps/stipple/common.h"
 #include "apps/stipple/legend.h"
+#include "apps/stipple/mode_options.h"
 #include "apps/stipple/view_keys.h"
 
 namespace stipple::app {
@@ -15,6 +16,8 @@ struct ViewOptions {
     uint64_t budget = 2'000'000;
     int frames = 0;
     bool force = false;
+    std::vector<std::string> effects;
+    ModeOptions drawn;
     CameraOptions camera;
     BuildOptions build;
     ColourOptions colour;

@@ -21,3 +21,9 @@ likeness() { "$program" compare "$1" "$folder/scene.png" --json | sed -n 's/.*"p
 shown=$(likeness "$folder/a.png") black=$(likeness "$folder/black.png") empty=$(likeness "$folder/empty.png")
 echo "PSNR of the window against the scene $shown dB; of black $black dB, of an empty window $empty dB"
 python3 -c "import sys; shown, black, empty = map(float, sys.argv[1:]); sys.exit(not shown > 6 + max(black, empty))" "$shown" "$black" "$empty"
+# In another mode it is the picture of that mode, and no longer that of the first.
+STIPPLE_VALIDATION=1 xvfb-run -a -s '-screen 0 800x600x24' "$program" view "$folder/a.las" --mode points --size 640x480 --frames 5 --screenshot "$folder/points.png"
+"$program" render "$folder/a.las" -o "$folder/scene.png" --force --mode points --size 640x480 --budget-points 2M >/dev/null
+points=$(likeness "$folder/points.png") other=$(likeness "$folder/a.png")
+echo "PSNR of the window in mode points against that of render $points dB, in its usual mode $other dB"
+python3 -c "import sys; points, other = map(float, sys.argv[1:]); sys.exit(not points > 6 + other)" "$points" "$other"

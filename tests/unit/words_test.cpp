@@ -79,7 +79,9 @@ TEST(Words, CountsAndSizesAreWrittenAlike) {
                           {option, bad});
     for (const char* bad : {"0x10", "nan", "inf", "-1", "0"})
         expectOneLine(runProgram(folder, fmt::format("render a.las -o a.png --error {}", bad)), 2, {"--error", bad});
-    EXPECT_EQ(runProgram(folder, "build a.las -o a.stipple --surfels 1k --quiet").code, 0);
+    EXPECT_EQ(runProgram(folder, "grow rock -o a.glb --triangles 1k").code, 0);
+    EXPECT_EQ(runProgram(folder, "build a.glb -o b.stipple --surfels 1k --quiet").code, 0);
+    EXPECT_EQ(runProgram(folder, "build a.las -o a.stipple --quiet").code, 0);
     EXPECT_EQ(runProgram(folder, "render a.stipple -o a.png --size 64x48 --budget-points 0.1M --quiet").code, 0);
 }
 
