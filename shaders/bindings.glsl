@@ -8,6 +8,7 @@
 #extension GL_EXT_shader_atomic_int64 : require
 #include "shared/bindings.h"
 #include "shared/frame.h"
+#include "shared/material.h"
 #include "shared/pack.h"
 #include "shared/pyramid.h"
 #include "shared/record.h"
@@ -25,6 +26,7 @@ layout(set = 0, binding = kImageBinding, scalar) writeonly buffer ImageBlock { u
 layout(set = 0, binding = kExtraBinding, scalar) writeonly buffer ExtraBlock { float extra[]; };  // depth, normal xyz, linear rgb
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Records { PointRecord records[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer RecordWords { uint words[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Segments { CurveSegment segments[]; };
 
 layout(push_constant, scalar) uniform StepBlock { Step stepInfo; };
@@ -33,6 +35,14 @@ Lens frameLensHere() { return lensOf(frame.focal, frame.orthographic != 0u); }
 // The ray through a pixel's centre.
 PixelRay pixelRayHere(uvec2 pixel) {
     return pixelRay(frameLensHere(), (float(pixel.x) + 0.5 - frame.centre.x) / frame.focal, (float(pixel.y) + 0.5 - frame.centre.y) / frame.focal);
+}
+
+// Of a point, number `record` of its chunk (material.h).
+uint materialOf(DrawNode node, uint record) {
+    if (node.materials == 0u || (node.material & kOnlyMaterial) != 0u) return node.material & ~kOnlyMaterial;
+    const uint first = 4u * node.materials + (node.weights + 3u) / 4u;
+    const uint pair = RecordWords(uvec2(node.addressLow, node.addressHigh)).words[first + record / 2u];
+    return (record & 1u) != 0u ? pair >> 16 : pair & 0xffffu;
 }
 
 // Levels whose texels are larger than the largest splat hold nothing; the resolve pass has measured it.
@@ -48,6 +58,7 @@ Texel loadTexel(uint offset, uint width, uint height, int x, int y) {
     p.offset = 0x80008000u;
     p.normal = 0x80008000u;
     p.colour = 0u;
+    uint surface = 0u;
     if (x >= 0 && y >= 0 && x < int(width) && y < int(height)) {
         const uint plane = width * height;
         const uint at = offset + uint(y) * width + uint(x);
@@ -57,10 +68,13 @@ Texel loadTexel(uint offset, uint width, uint height, int x, int y) {
             p.offset = texels[at + 2u * plane];
             p.normal = texels[at + 3u * plane];
             p.colour = texels[at + 4u * plane];
+            if (frame.hasMaterials != 0u) surface = texels[at + 5u * plane];
         }
     }
-    if (stepInfo.hasTubes != 0u) return unpackAnyTexel(p);
-    return unpackTexel(p);
+    Texel t = unpackTexel(p);
+    if (stepInfo.hasTubes != 0u) t = unpackAnyTexel(p);
+    if (frame.hasMaterials != 0u) t.surface = unpackSurface(surface);
+    return t;
 }
 
 vec3 pointColour(DrawNode node, PointRecord r) {
@@ -100,6 +114,7 @@ void storeTexel(uint offset, uint width, uint height, uvec2 pixel, Texel t) {
     texels[at + 2u * plane] = p.offset;
     texels[at + 3u * plane] = p.normal;
     texels[at + 4u * plane] = p.colour;
+    if (frame.hasMaterials != 0u) texels[at + 5u * plane] = packSurface(t.surface);
 }
 
 Texel pushedTexel(ivec2 pixel, Texel own) {

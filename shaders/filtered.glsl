@@ -6,6 +6,7 @@
 
 layout(set = 0, binding = kFrontsBinding, scalar) buffer FrontBlock { FilteredFront fronts[]; };
 layout(set = 0, binding = kSumsBinding, scalar) buffer SumBlock { FilteredSums sums[]; };
+layout(set = 0, binding = kMaterialSumsBinding, scalar) buffer MaterialBlock { MaterialSums materialSums[]; };
 layout(set = 0, binding = kFilteredBinding, scalar) buffer FilteredBlock { FilteredPixel filtered[]; };
 layout(set = 0, binding = kCoverageBinding, scalar) buffer CoverageBlock { uint coverage[]; };
 
@@ -25,6 +26,10 @@ float scaleOf(uint id, DrawNode node) {
         code = WeightWords(uvec2(node.addressLow, node.addressHigh)).words[at >> 2] >> (at & 3u) * 8u & 255u;
     }
     return surfelScale(code, frame.kernelSupport);
+}
+
+TexelSurface surfaceOf(uint id, DrawNode node) {
+    return surfaceOfPoint(frame.hasMaterials != 0u ? materialOf(node, blocks[id / kBlockLanes].first + id % kBlockLanes) : kPlainPoint);
 }
 
 // A disc with its opaque radius.
@@ -107,7 +112,7 @@ float absoluteDepth(float relative, float reference) {
 }
 
 // Adds a disc to a pixel. `scale`: see scaleOf.
-void addKernel(WideDisc d, vec3 colour, float scale, EwaKernel k, DepthRange range, ivec2 pixel) {
+void addKernel(WideDisc d, vec3 colour, TexelSurface surface, float scale, EwaKernel k, DepthRange range, ivec2 pixel) {
     if (isBeyond(k, pixel)) return;
     const RayOnDisc r = rayOnDisc(d, k, range, pixel);
     const uint at = uint(pixel.y) * frame.width + uint(pixel.x);
@@ -128,4 +133,8 @@ void addKernel(WideDisc d, vec3 colour, float scale, EwaKernel k, DepthRange ran
     atomicAdd(sums[at].nx, unitsOf(w * n.x));
     atomicAdd(sums[at].ny, unitsOf(w * n.y));
     atomicAdd(sums[at].nz, unitsOf(w * n.z));
+    if (frame.hasMaterials == 0u) return;
+    atomicAdd(materialSums[at].share, unitsOf(w * surface.share));
+    atomicAdd(materialSums[at].metallic, unitsOf(w * surface.metallic));
+    atomicAdd(materialSums[at].roughness, unitsOf(w * surface.roughness));
 }

@@ -26,8 +26,9 @@ vec3 litColour(SurfaceWords words, vec3 colour, vec3 normal, uvec2 pixel) {
     const bool isTriangle = (words.material & kPixelTriangle) != 0u;
     const float leaf = (words.material & kPixelLeaf) != 0u ? 1.0 : 0.0;
     if (isTriangle ? (words.material & kPixelUnlit) != 0u || (frame.shade & kShadeTriangles) == 0u : (frame.shade & kShadeLit) == 0u) return colour;
-    // Points under lights of the scene's own are surfaces like any other; else theirs is one formula.
-    if (!isTriangle && frame.lightCount == 0u && frame.hasEnvironment == 0u)
+    // Points with a material, or under lights of the scene's own, are surfaces like any other; else theirs is one formula.
+    const bool isSurface = isTriangle || (words.material & kPixelMaterial) != 0u;
+    if (!isSurface && frame.lightCount == 0u && frame.hasEnvironment == 0u)
         return colour * irradiance(normal, frame.sunDirection, frame.skyDirection, leaf);
     const PixelRay ray = pixelRayHere(pixel);
     Surface s;

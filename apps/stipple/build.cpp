@@ -20,6 +20,7 @@ struct Options {
     std::string output;
     BuildOptions build;
     bool json = false, quiet = false, mpi = false, force = false, restart = false, surfelWeights = false;
+    MaterialOptions material;
 };
 
 /// Of the output, also where its temporary file was being checked.
@@ -51,6 +52,7 @@ Result<void> run(const Options& o, bool& isSilent) {
     catchStopSignals();
     MpiJob job;
     BuildOptions build = o.build;
+    build.material = o.material.material();
     if (o.mpi) {
         STIPPLE_ASSIGN(job, joinMpi());
         build.ranks = job.ranks.get();
@@ -122,6 +124,7 @@ void setupBuild(CLI::App& app, int& status) {
         ->required();
     sub->add_option("-o,--output", o->output, "the scene to write (.stipple)")->type_name("STORE")->required();
     o->build.addTo(*sub);
+    o->material.addTo(*sub, "points (without: what the input says)");
     addForce(*sub, o->force);
     sub->add_flag("--surfel-weights", o->surfelWeights,
                   "of points: measure by how much each counts where discs are blended (render --mode ewa --normalise "

@@ -65,6 +65,23 @@ void BuildOptions::addTo(CLI::App& app) {
     app.add_flag("--skip-bad", skipBad, "go on past corrupt chunks and files, and say what was lost");
 }
 
+void MaterialOptions::addTo(CLI::App& app, const char* of) {
+    app.add_option("--material", name, fmt::format("material of {}: {}", of, lod::kMaterialNames))
+        ->check(oneOf({"matte", "plastic", "metal"}))
+        ->type_name("NAME");
+    app.add_option("--roughness", roughness, fmt::format("roughness of {}, 0 (mirror) to 1", of))
+        ->transform(within(0.0, 1.0));
+    app.add_option("--metallic", metallic, fmt::format("how metallic {} are, 0 to 1", of))->transform(within(0.0, 1.0));
+}
+
+std::optional<lod::PointMaterial> MaterialOptions::material() const {
+    if (name.empty() && !roughness && !metallic) return {};
+    lod::PointMaterial m = name.empty() ? lod::PointMaterial{} : *lod::materialNamed(name);
+    if (roughness) m.roughness = static_cast<float>(*roughness);
+    if (metallic) m.metallic = static_cast<float>(*metallic);
+    return m;
+}
+
 void addSceneFileOptions(CLI::App& app, bool& allowOutside, bool& repair) {
     app.add_flag("--allow-outside", allowOutside,
                  "of a scene (.gltf, .glb, .obj) also read the files that it names outside its own folder");
@@ -152,6 +169,7 @@ bool isSceneFile(const std::string& path) {
 
 Result<lod::BuildSettings> BuildOptions::settings() const {
     lod::BuildSettings s;
+    s.material = material;
     s.memoryBytes = parseBytes(memory);
     if (s.memoryBytes == 0)
         return fail(ErrorKind::usage, fmt::format("'{}' is not a size", memory), "--memory", "e.g. 2G");

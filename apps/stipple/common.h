@@ -31,8 +31,9 @@ struct BuildOptions {
     double curveRadius = 0;
     uint64_t surfels = 0;
     std::string progress = "auto";
-    Ranks* ranks = nullptr;                   ///< of an MPI job
-    std::shared_ptr<BuildsOfScene> together;  ///< of the scene that is opened: its builds show one progress
+    Ranks* ranks = nullptr;                      ///< of an MPI job
+    std::optional<lod::PointMaterial> material;  ///< of `stipple build`: stores of points have it
+    std::shared_ptr<BuildsOfScene> together;     ///< of the scene that is opened: its builds show one progress
     lod::Leftovers leftovers = lod::Leftovers::goOn;
     void addTo(CLI::App& app);
     void addProgressTo(CLI::App& app);
@@ -43,6 +44,15 @@ struct BuildOptions {
     Result<lod::BuildSettings> settings() const;
     /// How scene files are read.
     scene::ReadSettings reading() const;
+};
+/// The material of points.
+struct MaterialOptions {
+    std::string name;
+    std::optional<double> roughness, metallic;
+    /// `of`: what they are, in the help.
+    void addTo(CLI::App& app, const char* of);
+    /// Nothing where none was asked for. Of a name, what is given beside it is instead of its own.
+    std::optional<lod::PointMaterial> material() const;
 };
 /// --allow-outside, and what former versions had for scene files.
 void addSceneFileOptions(CLI::App& app, bool& allowOutside, bool& repair);

@@ -12,6 +12,7 @@
 #include "lod/primitives/codecs.h"
 #include "lod/primitives/kinds.h"
 #include "lod/store/file_kind.h"
+#include "lod/store/materials.h"
 #include "lod/store/nearest.h"
 #include "lod/store/pruning.h"
 
@@ -102,6 +103,14 @@ nlohmann::json storeInfo(const lod::Store& store) {
                               {"least", a.least},
                               {"greatest", a.greatest},
                               {"points_without_data", a.withoutData}});
+    nlohmann::json materials = nlohmann::json::array();
+    for (const lod::PointMaterial& m : d.pointMaterials)
+        materials.push_back({{"roughness", m.roughness}, {"metallic", m.metallic}, {"points", d.points}});
+    if (const auto index = lod::materialAttribute(d)) {
+        for (nlohmann::json& m : materials) m["points"] = 0;
+        for (const auto& [value, count] : d.attributes[*index].counts)
+            if (const auto at = static_cast<size_t>(value); at < materials.size()) materials[at]["points"] = count;
+    }
     nlohmann::json textures = nlohmann::json::array();
     for (const shared::TextureInfo& t : h.textures)
         textures.push_back({{"width", t.width}, {"height", t.height}, {"levels", t.levels}});
@@ -111,6 +120,7 @@ nlohmann::json storeInfo(const lod::Store& store) {
             {"primitive", h.isMixed ? "records" : lod::traitsOf(h.nodes[0].kind).records},
             {"payloads", payloadInfo(h)},
             {"materials", d.materials.size()},
+            {"point_materials", materials},
             {"textures", textures},
             {"texture_tiles", h.tiles.size()},
             {"texture_bytes", tileBytes},
@@ -171,6 +181,10 @@ void printStore(const nlohmann::json& j) {
                    ? isMesh || j["primitive"] == "segments" ? "yes" : "yes, stored to 0.12 degrees"
                    : "no");
     if (!j["crs"].get<std::string>().empty()) fmt::print("  crs           {}\n", j["crs"].get<std::string>());
+    for (const auto& m : j["point_materials"])
+        if (m["points"] != 0)
+            fmt::print("  material      roughness {:.2g}, metallic {:.2g}: {} points\n", m["roughness"].get<double>(),
+                       m["metallic"].get<double>(), m["points"].get<uint64_t>());
     for (const auto& a : j["attributes"])
         fmt::print("  attribute     {} ({}, coarse levels: {}), {:.15g} .. {:.15g}{}\n", a["name"].get<std::string>(),
                    a["type"].get<std::string>(), a["aggregate"].get<std::string>(), a["least"].get<double>(),

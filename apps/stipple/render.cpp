@@ -25,6 +25,7 @@
 #include "engine/render/frame.h"
 #include "engine/scene/camera.h"
 #include "lod/store/file_kind.h"
+#include "lod/store/materials.h"
 
 namespace stipple::app {
 namespace {
@@ -43,6 +44,7 @@ struct Options {
     BuildOptions build;
     ColourOptions colour;
     EnvironmentOptions environment;
+    MaterialOptions material;
 };
 
 bool closesGaps(const std::string& mode) {
@@ -61,6 +63,9 @@ Result<glm::dvec3> backgroundOf(const Options& o) {
 /// What can be found out before a scene is built, which may take hours.
 Result<void> checkArguments(const Options& o) {
     STIPPLE_TRY(o.camera.check());
+    if (o.material.material() && o.shade == "unlit")
+        return fail(ErrorKind::usage, "is not seen where nothing is lit", "--material, --roughness, --metallic",
+                    "leave --shade unlit out");
     if (!(o.error > 0)) return fail(ErrorKind::usage, "must be larger than 0", "--error");
     STIPPLE_TRY(backgroundOf(o));
     if (parseBytes(o.resident) == 0)
@@ -79,6 +84,10 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     if (o.budget > 0) s.budgets.records = o.budget;
     s.draw.unlitTriangles = o.shade == "unlit";
     s.draw.lit = isLit(o.shade, d, colour);
+    if (const auto material = o.material.material()) {
+        s.draw.pointMaterial = lod::packed(*material);
+        s.draw.lit = true;
+    }
     s.draw.worldUp = shot.worldUp;
     s.draw.exactCurves = static_cast<float>(o.curveExact);
     s.draw.effects = o.effects;
@@ -412,6 +421,7 @@ void setupRender(CLI::App& app, int& status) {
     addForce(*sub, o->force);
     o->build.addProgressTo(*sub);
     o->colour.addTo(*sub);
+    o->material.addTo(*sub, "all points, instead of their own");
     o->environment.addTo(*sub);
     addEffects(*sub, o->effects);
     addReading(*sub, *o);

@@ -43,11 +43,14 @@ struct DiscSums {
     alignas(64) float ex[kTile], front[kTile], apart[kTile], thickness[kTile];
     alignas(64) float weight[kTile],
         inverseDepth[kTile], nx[kTile], ny[kTile], nz[kTile], red[kTile], green[kTile], blue[kTile];
+    alignas(64) float share[kTile], metallic[kTile], roughness[kTile];
 };
 
-void addDisc(const WideDisc& disc, const vec3& colour, float ey, float nearPlane, size_t n, DiscSums& __restrict s) {
+void addDisc(const WideDisc& disc, const vec3& colour, const TexelSurface& surface, float ey, float nearPlane, size_t n,
+             DiscSums& __restrict s) {
     const WideDisc d = disc;
     const float r = colour.x, g = colour.y, b = colour.z;
+    const float share = surface.share, metallic = surface.metallic, roughness = surface.roughness;
     // Towards the eye, all over the picture: the eye lies on one side of the plane.
     const Lens lens = lensHere(1.0f);
     const float flip = dot(d.normal, sightTo(lens, d.centre)) > 0.0f ? -1.0f : 1.0f;
@@ -64,6 +67,9 @@ void addDisc(const WideDisc& disc, const vec3& colour, float ey, float nearPlane
         s.red[i] += w * r;
         s.green[i] += w * g;
         s.blue[i] += w * b;
+        s.share[i] += w * share;
+        s.metallic[i] += w * metallic;
+        s.roughness[i] += w * roughness;
     }
 }
 
@@ -90,13 +96,15 @@ void resolveDiscs(const FrameConstants& f, const Tables& tables, const ResolveIn
         s.apart[i] = depthShared(front, pixelRay(lens, s.ex[i], ey));
         s.thickness[i] = thickness;
         s.weight[i] = s.inverseDepth[i] = s.nx[i] = s.ny[i] = s.nz[i] = s.red[i] = s.green[i] = s.blue[i] = 0.0f;
+        s.share[i] = s.metallic[i] = s.roughness[i] = 0.0f;
     }
     for (size_t k = 0; k < in.discCount; ++k) {
         const uint32_t id = in.discs[k].id;
         const DiscBox& box = in.discBoxes[k];
         if (int(y) < box.y.first || int(y) > box.y.last || int(x0) > box.x.last || int(x0 + kTile) <= box.x.first)
             continue;
-        addDisc(in.discs[k], pointColour(f, tables, nodeOf(id), recordOf(id)), ey, f.nearPlane, p.count, s);
+        const TexelSurface surface = surfaceOfPoint(in.blocks[id / kRecordsPerBlock].materialOf(id % kRecordsPerBlock));
+        addDisc(in.discs[k], pointColour(f, tables, nodeOf(id), recordOf(id)), surface, ey, f.nearPlane, p.count, s);
     }
     for (size_t i = 0; i < p.count; ++i) {
         const size_t at = kPad + p.pixel[i];
@@ -114,5 +122,9 @@ void resolveDiscs(const FrameConstants& f, const Tables& tables, const ResolveIn
         row.red[at] = s.red[i] * inverse;
         row.green[at] = s.green[i] * inverse;
         row.blue[at] = s.blue[i] * inverse;
+        if (!row.hasMaterials) continue;
+        row.share[at] = s.share[i] * inverse;
+        row.metallic[at] = s.metallic[i] * inverse;
+        row.roughness[at] = s.roughness[i] * inverse;
     }
 }

@@ -19,8 +19,12 @@ struct TileFilter {
     alignas(64) float weight[kTilePixels], linear[kTilePixels];  ///< sums; linear: imageLinear of depths
     alignas(64) float red[kTilePixels], green[kTilePixels], blue[kTilePixels];
     alignas(64) float nx[kTilePixels], ny[kTilePixels], nz[kTilePixels];  ///< only if wanted
+    alignas(64) float share[kTilePixels], metallic[kTilePixels], roughness[kTilePixels];  ///< likewise
     bool hasGaps;                                                         ///< pixels without a front
 };
+
+/// What of a pixel is wanted beside its colour and depth.
+enum class Wants { nothing, normals, materials };  // materials: normals, too
 
 /// Some discs of a tile, with their kernels; those of DiscBatch that reach before the fronts.
 struct FilterBatch {
@@ -31,6 +35,7 @@ struct FilterBatch {
         least[kSize], most[kSize], isNear[kSize];
     alignas(64) int firstX[kSize], lastX[kSize], firstY[kSize], lastY[kSize];
     alignas(64) float red[kSize], green[kSize], blue[kSize], nx[kSize], ny[kSize], nz[kSize];
+    alignas(64) float share[kSize], metallic[kSize], roughness[kSize];
     alignas(64) uint32_t colour[kSize], isSeen[kSize];
 };
 
@@ -145,7 +150,13 @@ void takeSeen(const FrameConstants& f, const Tables& tables, const BlockSource* 
         b.count += b.isSeen[i];
     }
     for (size_t s = 0; s < b.count; ++s) {
-        b.colour[s] = colourOf(f, tables, blocks, d.id[b.of[s]], colours[places[b.of[s]]]);
+        const uint32_t id = d.id[b.of[s]];
+        b.colour[s] = colourOf(f, tables, blocks, id, colours[places[b.of[s]]]);
+        if (f.hasMaterials == 0u) continue;
+        const TexelSurface surface = surfaceOfPoint(blocks[id / kBlockLanes].materialOf(id % kBlockLanes));
+        b.share[s] = surface.share;
+        b.metallic[s] = surface.metallic;
+        b.roughness[s] = surface.roughness;
     }
 #pragma GCC ivdep
     for (size_t s = 0; s < b.count; ++s) {
@@ -156,7 +167,7 @@ void takeSeen(const FrameConstants& f, const Tables& tables, const BlockSource* 
 }
 
 /// Adds the s-th that is seen to what is in front of the fronts. `isNear`: the disc is not wholly before the eye.
-template <bool isNear, bool wantsNormals, bool hasGaps>
+template <bool isNear, Wants wants, bool hasGaps>
 void addKernel(const DiscBatch& b, const FilterBatch& k, size_t s, const FrameConstants& f, float end,
                TileFilter& __restrict t) {
     const size_t i = k.of[s];
@@ -170,6 +181,9 @@ void addKernel(const DiscBatch& b, const FilterBatch& k, size_t s, const FrameCo
     const float midX = k.x[i], midY = k.y[i], least = k.least[i], most = k.most[i];
     const float support2 = f.kernelSupport * f.kernelSupport, scale = k.amplitude[i] / (1.0f - end);
     const float red = k.red[s], green = k.green[s], blue = k.blue[s], nx = k.nx[i], ny = k.ny[i], nz = k.nz[i];
+    constexpr bool hasMaterials = wants == Wants::materials;
+    const float share = hasMaterials ? k.share[s] : 0.0f, metallic = hasMaterials ? k.metallic[s] : 0.0f,
+                roughness = hasMaterials ? k.roughness[s] : 0.0f;
     const int x1 = k.lastX[i], x0 = k.firstX[i] & ~(kGroupColumns - 1);
     for (int band = k.firstY[i] >> kRowBits; band <= k.lastY[i] >> kRowBits; ++band) {
         const float dy = float(kGroupRows * band) + t.grid.top - midY;
@@ -178,7 +192,8 @@ void addKernel(const DiscBatch& b, const FilterBatch& k, size_t s, const FrameCo
             const float *const px = t.grid.x + kGroupRows * x, *const limit = t.limit + first;
             float *const sumW = t.weight + first, *const sumLinear = t.linear + first, *const sumR = t.red + first,
                          *const sumG = t.green + first, *const sumB = t.blue + first, *const sumX = t.nx + first,
-                         *const sumY = t.ny + first, *const sumZ = t.nz + first;
+                         *const sumY = t.ny + first, *const sumZ = t.nz + first, *const sumShare = t.share + first,
+                         *const sumMetallic = t.metallic + first, *const sumRoughness = t.roughness + first;
             uint32_t* const rim = t.rim + first;
 #pragma GCC ivdep
             for (int l = 0; l < kGroup; ++l) {
@@ -192,10 +207,15 @@ void addKernel(const DiscBatch& b, const FilterBatch& k, size_t s, const FrameCo
                 sumR[l] += w * red;
                 sumG[l] += w * green;
                 sumB[l] += w * blue;
-                if (wantsNormals) {
+                if (wants != Wants::nothing) {
                     sumX[l] += w * nx;
                     sumY[l] += w * ny;
                     sumZ[l] += w * nz;
+                }
+                if (hasMaterials) {
+                    sumShare[l] += w * share;
+                    sumMetallic[l] += w * metallic;
+                    sumRoughness[l] += w * roughness;
                 }
                 if (hasGaps) {
                     const uint32_t mine = w > 0.0f ? id : TileFilter::kOther;
@@ -220,6 +240,7 @@ void beginFilter(const FrameConstants& f, const SplatTile& tile, TileFilter& __r
         t.id[i] = t.rim[i] = TileFilter::kOther;
         t.farthest[i] = 0.0f;
         t.weight[i] = t.linear[i] = t.red[i] = t.green[i] = t.blue[i] = t.nx[i] = t.ny[i] = t.nz[i] = 0.0f;
+        t.share[i] = t.metallic[i] = t.roughness[i] = 0.0f;
     }
 }
 
@@ -263,7 +284,7 @@ bool drawFronts(const FrameConstants& f, const TileDiscs& discs, const SplatTile
     return (flags & kFlagLeaf) != 0u;
 }
 
-template <bool wantsNormals, bool hasGaps>
+template <Wants wants, bool hasGaps>
 void addKernels(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const TileDiscs& discs,
                 const SplatTile& tile, const TileBlocks& fronts, TileFilter& t) {
     FilterBatch kernels;
@@ -279,11 +300,27 @@ void addKernels(const FrameConstants& f, const Tables& tables, const BlockSource
         if (f.perSurfel != 0u) weighSurfels(f, blocks, batch, kernels);
         for (size_t s = 0; s < kernels.count; ++s) {
             if (kernels.isNear[kernels.of[s]] > 0.5f)
-                addKernel<true, wantsNormals, hasGaps>(batch, kernels, s, f, end, t);
+                addKernel<true, wants, hasGaps>(batch, kernels, s, f, end, t);
             else
-                addKernel<false, wantsNormals, hasGaps>(batch, kernels, s, f, end, t);
+                addKernel<false, wants, hasGaps>(batch, kernels, s, f, end, t);
         }
     }
+}
+
+/// The discs of a tile to what its pixels show.
+template <Wants wants>
+void filterDiscs(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const TileDiscs& discs,
+                 const SplatTile& tile, const Visibility& visibility, FilteredPixel* filtered) {
+    TileFilter t;
+    beginFilter(f, tile, t);
+    const bool hasLeaves = drawFronts(f, discs, tile, t);
+    TileBlocks fronts;
+    closeFronts(tile, lensHere(f.focal), t, fronts);
+    if (t.hasGaps)
+        addKernels<wants, true>(f, tables, blocks, discs, tile, fronts, t);
+    else
+        addKernels<wants, false>(f, tables, blocks, discs, tile, fronts, t);
+    showTile<wants>(f, tables, blocks, tile, hasLeaves, t, visibility, filtered);
 }
 
 void filterTile(const FrameConstants& frame, const Tables& tables, const BlockSource* blocks, const PlacedSplat* splats,
@@ -293,16 +330,10 @@ void filterTile(const FrameConstants& frame, const Tables& tables, const BlockSo
     static thread_local DiscBatch batches[TileDiscs::kKept + 1];
     const TileDiscs discs{splats, colours, places, count, batches};
     prefetchDiscs(splats, places, count);
-    TileFilter t;
-    beginFilter(f, tile, t);
-    const bool hasLeaves = drawFronts(f, discs, tile, t);
-    TileBlocks fronts;
-    closeFronts(tile, lensHere(f.focal), t, fronts);
-    const auto add = wantsNormals ? (t.hasGaps ? addKernels<true, true> : addKernels<true, false>)
-                                  : (t.hasGaps ? addKernels<false, true> : addKernels<false, false>);
-    add(f, tables, blocks, discs, tile, fronts, t);
-    const auto show = wantsNormals ? showTile<true> : showTile<false>;
-    show(f, tables, blocks, tile, hasLeaves, t, visibility, filtered);
+    const auto filter = !wantsNormals         ? filterDiscs<Wants::nothing>
+                        : f.hasMaterials == 0 ? filterDiscs<Wants::normals>
+                                              : filterDiscs<Wants::materials>;
+    filter(f, tables, blocks, discs, tile, visibility, filtered);
     for (size_t y = 0; y < tile.height; ++y) {
         const size_t first = (tile.y0 + y) * f.width + tile.x0;
         for (size_t r = first >> Visibility::kRunBits; r <= (first + tile.width - 1) >> Visibility::kRunBits; ++r)

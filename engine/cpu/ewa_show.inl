@@ -9,6 +9,9 @@ void showOwn(const FrameConstants& f, const Tables& tables, const BlockSource* b
     const float towards = dot(d.normal, sightTo(lens, d.centre)) > 0.0f ? -1.0f : 1.0f;
     pixel.colour = colourOf(f, tables, blocks, id, r.colour);
     pixel.normal = octEncode(vec3(d.normal.x * towards, d.normal.y * towards, d.normal.z * towards));
+    if (f.hasMaterials == 0u) return;
+    const uint32_t material = blocks[id / kBlockLanes].materialOf(id % kBlockLanes);
+    pixel.cover = (pixel.cover & (kFilteredMaterial - 1u)) | coverOfMaterial(surfaceOfPoint(material));
 }
 
 /// What a band of a tile shows of what was added up there; nothing where it is less than half a code of
@@ -20,7 +23,7 @@ struct ShownBand {
     alignas(64) uint32_t colour[kEntries], normal[kEntries], cover[kEntries], id[kEntries], depth[kEntries];
 };
 /// `covered`: what a weight of 1 covers; `mostDivided`: by more than that colours are not divided.
-template <bool wantsNormals>
+template <Wants wants>
 void showBand(float covered, float mostDivided, int band, const TileFilter& __restrict t, ShownBand& __restrict s) {
     const size_t first = size_t(band) * kBandPitch;
 #pragma GCC ivdep
@@ -38,14 +41,16 @@ void showBand(float covered, float mostDivided, int band, const TileFilter& __re
         s.depth[k] = floatBitsToUint(isBlended ? mean : t.own[i]);
         const float ofColour = 1.0f / (isBlended ? min(weight, mostDivided) : 1.0f);
         s.colour[k] = packColour(t.red[i] * ofColour, t.green[i] * ofColour, t.blue[i] * ofColour);
-        s.normal[k] = wantsNormals ? octEncode(vec3(t.nx[i], t.ny[i], t.nz[i])) : 0u;
+        s.normal[k] = wants != Wants::nothing ? octEncode(vec3(t.nx[i], t.ny[i], t.nz[i])) : 0u;
         const float behind = min(max(t.farthest[i], exact < kNoDisc ? kNoDisc : 0.0f), kNoDisc);
         const uint32_t closed = behind > front ? 255u : code;
         s.cover[k] = hasFront ? closed | kFilteredFront : code;
+        if (wants == Wants::materials)
+            s.cover[k] |= coverOfMaterial(TexelSurface{t.share[i] * over, t.metallic[i] * over, t.roughness[i] * over});
         s.id[k] = hasFront ? t.id[i] : t.rim[i];
     }
 }
-template <bool wantsNormals>
+template <Wants wants>
 void showTile(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const SplatTile& tile,
               bool hasLeaves, const TileFilter& t, const Visibility& visibility, FilteredPixel* filtered) {
     // Weights of surfels add up to what is covered; where that is all of a pixel, to one.
@@ -63,7 +68,7 @@ void showTile(const FrameConstants& f, const Tables& tables, const BlockSource* 
                 const uint64_t key = visibility.keys[first + r * f.width + x];
                 s.exact[size_t(kGroupRows) * x + r] = key != kNoKey ? keyDepth(key) : kNoDisc;
             }
-        showBand<wantsNormals>(covered, mostDivided, int(y) / kGroupRows, t, s);
+        showBand<wants>(covered, mostDivided, int(y) / kGroupRows, t, s);
         for (uint32_t r = 0; r < rows; ++r)
             for (size_t x = 0; x < tile.width; ++x) {
                 const size_t k = size_t(kGroupRows) * x + r, to = first + r * f.width + x;

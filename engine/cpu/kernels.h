@@ -31,9 +31,12 @@ struct TexelRow {
         red[kSize], green[kSize], blue[kSize];
     // Only of frames with tubes:
     alignas(64) float isRound[kSize], axisX[kSize], axisY[kSize];
+    // Only of frames with materials of points (TexelSurface):
+    alignas(64) float share[kSize], metallic[kSize], roughness[kSize];
     // Only of coarse rows that are pushed from (coarseDisc):
     alignas(64) float slopeX[kSize], slopeY[kSize], inverseDepth[kSize];
     bool hasTubes;  ///< or narrow ribbons
+    bool hasMaterials;
 };
 
 /// A coarse row at the resolution of the fine one: for each fine texel its parent, and the parent's neighbour on the
@@ -42,11 +45,14 @@ struct ExpandedRow {
     TexelRow nearest, beside;
 };
 
-/// One level of the pyramid: five planes of packed texels.
+/// One level of the pyramid: five planes of packed texels, and a sixth in frames with materials of points.
 struct Planes {
     float* depth;
     uint32_t *size, *offset, *normal, *colour;
-    Planes at(size_t i) const { return {depth + i, size + i, offset + i, normal + i, colour + i}; }
+    uint32_t* surface;  ///< or null
+    Planes at(size_t i) const {
+        return {depth + i, size + i, offset + i, normal + i, colour + i, surface == nullptr ? nullptr : surface + i};
+    }
 };
 
 /// The nearest of each pixel, and which runs of kRun pixels hold any: the others cost nothing in later passes.
@@ -83,7 +89,11 @@ struct SplatBlock {
 struct BlockSource {
     const shared::PointRecord* records;  ///< first record of the block
     const shared::DrawNode* node;
-    const uint8_t* weights;  ///< of surfels, of the same records; null: there are none
+    const uint8_t* weights = nullptr;     ///< of surfels, of the same records; null: there are none
+    const uint16_t* materials = nullptr;  ///< of the first record; null: all have that of the node
+    uint32_t materialOf(uint32_t lane) const {
+        return materials == nullptr ? node->material & ~shared::kOnlyMaterial : materials[lane];
+    }
 };
 
 /// One block of segments of curves.
@@ -193,7 +203,7 @@ struct SurfaceRow {
     alignas(64) uint32_t emission[kTile];                     ///< packColour; only if hasEmission
     alignas(64) float ownDepth[kTile];                        ///< before reconstruction; only if wanted
     alignas(64) float coverage[kTile];                        ///< only if hasCoverage
-    bool hasTriangles, hasEmission, hasCoverage;
+    bool hasTriangles, hasEmission, hasCoverage, hasMaterials;
 };
 /// What of a surface is needed beyond whether there is one, and its colour.
 struct SurfaceWants {
@@ -267,7 +277,8 @@ struct Kernels {
     void (*splatTile)(const shared::FrameConstants& f, const PlacedSplat* splats, const uint32_t* places, size_t count,
                       const SplatTile& tile, const Visibility& visibility);
     /// Blends some discs at the pixels of one tile, which is nobody else's meanwhile; `filtered` is of the whole image.
-    /// `colours`: of each disc, as records have them, with their flags. `wantsNormals`: else those of pixels are any.
+    /// `colours`: of each disc, as records have them, with their flags. `wantsNormals`: else those of pixels (and their
+    /// materials) are any.
     void (*filterTile)(const shared::FrameConstants& f, const Tables& tables, const BlockSource* blocks,
                        const PlacedSplat* splats, const uint32_t* colours, const uint32_t* places, size_t count,
                        const SplatTile& tile, bool wantsNormals, const Visibility& visibility,

@@ -24,8 +24,9 @@ using namespace stipple::shared;
 constexpr bool kOrthographic = STIPPLE_ORTHOGRAPHIC;
 [[gnu::always_inline]] inline Lens lensHere(float focal) { return lensOf(focal, kOrthographic); }
 
-/// `hasTubes`: of frames that may hold tubes; others do not pay for them.
-template <bool hasTubes>
+/// `hasTubes`: of frames that may hold tubes, `hasMaterials`: of those with materials of points; others do not pay for
+/// them.
+template <bool hasTubes, bool hasMaterials>
 [[gnu::always_inline]] inline Texel texelAt(const TexelRow& row, size_t i) {
     Texel t;
     t.depth = row.depth[i];
@@ -36,9 +37,15 @@ template <bool hasTubes>
     t.colour = vec3(row.red[i], row.green[i], row.blue[i]);
     t.isRound = hasTubes ? row.isRound[i] : 0.0f;
     t.axis = hasTubes ? vec2(row.axisX[i], row.axisY[i]) : vec2(0.0f, 0.0f);
+    t.surface = noSurface();
+    if (hasMaterials) {
+        t.surface.share = row.share[i];
+        t.surface.metallic = row.metallic[i];
+        t.surface.roughness = row.roughness[i];
+    }
     return t;
 }
-template <bool hasTubes>
+template <bool hasTubes, bool hasMaterials>
 [[gnu::always_inline]] inline void setTexel(TexelRow& row, size_t i, const Texel& t) {
     row.depth[i] = t.depth;
     row.radius[i] = t.radius;
@@ -50,6 +57,11 @@ template <bool hasTubes>
     row.red[i] = t.colour.x;
     row.green[i] = t.colour.y;
     row.blue[i] = t.colour.z;
+    if (hasMaterials) {
+        row.share[i] = t.surface.share;
+        row.metallic[i] = t.surface.metallic;
+        row.roughness[i] = t.surface.roughness;
+    }
     if (!hasTubes) return;
     row.isRound[i] = t.isRound;
     row.axisX[i] = t.axis.x;
@@ -147,14 +159,28 @@ void projectBlock(const FrameConstants& f, const DrawNode& node, const PointReco
 
 #include "engine/cpu/resolve_points.inl"
 
-template <bool hasTubes>
+/// Calls use<hasTubes, hasMaterials>().
+template <typename Use>
+[[gnu::always_inline]] inline void forRow(bool hasTubes, bool hasMaterials, const Use& use) {
+    if (hasTubes && hasMaterials)
+        use.template operator()<true, true>();
+    else if (hasMaterials)
+        use.template operator()<false, true>();
+    else if (hasTubes)
+        use.template operator()<true, false>();
+    else
+        use.template operator()<false, false>();
+}
+
+template <bool hasTubes, bool hasMaterials>
 [[gnu::always_inline]] inline void packTexels(const TexelRow& __restrict row, uint32_t n, const Planes& planes) {
     float* __restrict const depth = planes.depth;
     uint32_t *__restrict const size = planes.size, *__restrict const offset = planes.offset, *__restrict const normal = planes.normal,
-             *__restrict const colour = planes.colour;
+             *__restrict const colour = planes.colour, *__restrict const surface = planes.surface;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
-        const Texel t = texelAt<hasTubes>(row, kPad + i);
+        const Texel t = texelAt<hasTubes, hasMaterials>(row, kPad + i);
+        if (hasMaterials) surface[i] = packSurface(t.surface);
         const PackedTexel p = hasTubes ? packAnyTexel(t) : packTexel(t);
         depth[i] = p.depth;
         size[i] = p.size;
@@ -164,18 +190,17 @@ template <bool hasTubes>
     }
 }
 void packRow(const TexelRow& row, uint32_t n, const Planes& planes) {
-    if (row.hasTubes)
-        packTexels<true>(row, n, planes);
-    else
-        packTexels<false>(row, n, planes);
+    forRow(row.hasTubes, row.hasMaterials,
+           [&]<bool hasTubes, bool hasMaterials>() { packTexels<hasTubes, hasMaterials>(row, n, planes); });
 }
 
-template <bool hasTubes>
+template <bool hasTubes, bool hasMaterials>
 [[gnu::always_inline]] inline void unpackTexels(const Planes& planes, uint32_t first, uint32_t n,
                                                 TexelRow& __restrict row) {
     const float* __restrict const depth = planes.depth;
     const uint32_t *__restrict const size = planes.size, *__restrict const offset = planes.offset,
-                   *__restrict const normal = planes.normal, *__restrict const colour = planes.colour;
+                   *__restrict const normal = planes.normal, *__restrict const colour = planes.colour,
+                   *__restrict const surface = planes.surface;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         PackedTexel p;
@@ -184,33 +209,32 @@ template <bool hasTubes>
         p.offset = offset[i];
         p.normal = normal[i];
         p.colour = colour[i];
-        setTexel<hasTubes>(row, first + i, hasTubes ? unpackAnyTexel(p) : unpackTexel(p));
+        Texel t = hasTubes ? unpackAnyTexel(p) : unpackTexel(p);
+        if (hasMaterials) t.surface = unpackSurface(surface[i]);
+        setTexel<hasTubes, hasMaterials>(row, first + i, t);
     }
 }
 void unpackRow(const Planes& planes, uint32_t first, uint32_t n, TexelRow& row) {
-    if (row.hasTubes)
-        unpackTexels<true>(planes, first, n, row);
-    else
-        unpackTexels<false>(planes, first, n, row);
+    forRow(row.hasTubes, row.hasMaterials,
+           [&]<bool hasTubes, bool hasMaterials>() { unpackTexels<hasTubes, hasMaterials>(planes, first, n, row); });
 }
 
-template <bool hasTubes>
+template <bool hasTubes, bool hasMaterials>
 [[gnu::always_inline]] inline void pullTexelRow(const TexelRow& __restrict upper, const TexelRow& __restrict lower,
                                                 uint32_t n, float childSize, float focal, TexelRow& __restrict out) {
     const Lens lens = lensHere(focal);
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const size_t a = kPad + 2 * i, b = a + 1;
-        setTexel<hasTubes>(out, kPad + i,
-                           pullTexels(texelAt<hasTubes>(upper, a), texelAt<hasTubes>(upper, b),
-                                      texelAt<hasTubes>(lower, a), texelAt<hasTubes>(lower, b), childSize, lens));
+        const auto at = [](const TexelRow& row, size_t k) { return texelAt<hasTubes, hasMaterials>(row, k); };
+        setTexel<hasTubes, hasMaterials>(
+            out, kPad + i, pullTexels(at(upper, a), at(upper, b), at(lower, a), at(lower, b), childSize, lens));
     }
 }
 void pullRow(const TexelRow& upper, const TexelRow& lower, uint32_t n, float childSize, float focal, TexelRow& out) {
-    if (out.hasTubes)
-        pullTexelRow<true>(upper, lower, n, childSize, focal, out);
-    else
-        pullTexelRow<false>(upper, lower, n, childSize, focal, out);
+    forRow(out.hasTubes, out.hasMaterials, [&]<bool hasTubes, bool hasMaterials>() {
+        pullTexelRow<hasTubes, hasMaterials>(upper, lower, n, childSize, focal, out);
+    });
 }
 
 void expandRow(TexelRow& __restrict coarse, uint32_t n, float x, float y, float size, float focal, TexelRow& nearest,
@@ -258,6 +282,11 @@ void expandRow(TexelRow& __restrict coarse, uint32_t n, float x, float y, float 
     expand(coarse.slopeX, nearest.slopeX, beside.slopeX);
     expand(coarse.slopeY, nearest.slopeY, beside.slopeY);
     expand(coarse.inverseDepth, nearest.inverseDepth, beside.inverseDepth);
+    if (coarse.hasMaterials) {
+        expand(coarse.share, nearest.share, beside.share);
+        expand(coarse.metallic, nearest.metallic, beside.metallic);
+        expand(coarse.roughness, nearest.roughness, beside.roughness);
+    }
     if (!coarse.hasTubes) return;
     expand(coarse.isRound, nearest.isRound, beside.isRound);
     expand(coarse.axisX, nearest.axisX, beside.axisX);
@@ -271,7 +300,7 @@ void expandRow(TexelRow& __restrict coarse, uint32_t n, float x, float y, float 
     return d;
 }
 
-template <bool hasTubes>
+template <bool hasTubes, bool hasMaterials>
 [[gnu::always_inline]] inline void pushTexelRow(const TexelRow& __restrict fine, const ExpandedRow& __restrict nearRow,
                                                 const ExpandedRow& __restrict farRow, float sy, float x, float y,
                                                 uint32_t n, float fineSize, float focal, TexelRow& __restrict out) {
@@ -280,20 +309,19 @@ template <bool hasTubes>
     for (size_t i = 0; i < n; ++i) {
         const size_t at = kPad + i;
         const float sx = float(int(i & 1u) * 2 - 1);
-        setTexel<hasTubes>(out, at,
-                           pushTexel(texelAt<hasTubes>(fine, at), texelAt<hasTubes>(nearRow.nearest, at),
-                                     texelAt<hasTubes>(nearRow.beside, at), texelAt<hasTubes>(farRow.nearest, at),
-                                     texelAt<hasTubes>(farRow.beside, at), discAt(nearRow.nearest, at),
-                                     discAt(nearRow.beside, at), discAt(farRow.nearest, at), discAt(farRow.beside, at),
-                                     sx, sy, x + float(int(i)) * fineSize, y, fineSize, lens));
+        const auto of = [at](const TexelRow& row) { return texelAt<hasTubes, hasMaterials>(row, at); };
+        setTexel<hasTubes, hasMaterials>(
+            out, at,
+            pushTexel(of(fine), of(nearRow.nearest), of(nearRow.beside), of(farRow.nearest), of(farRow.beside),
+                      discAt(nearRow.nearest, at), discAt(nearRow.beside, at), discAt(farRow.nearest, at),
+                      discAt(farRow.beside, at), sx, sy, x + float(int(i)) * fineSize, y, fineSize, lens));
     }
 }
 void pushRow(const TexelRow& fine, const ExpandedRow& nearRow, const ExpandedRow& farRow, float sy, float x, float y,
              uint32_t n, float fineSize, float focal, TexelRow& out) {
-    if (out.hasTubes)
-        pushTexelRow<true>(fine, nearRow, farRow, sy, x, y, n, fineSize, focal, out);
-    else
-        pushTexelRow<false>(fine, nearRow, farRow, sy, x, y, n, fineSize, focal, out);
+    forRow(out.hasTubes, out.hasMaterials, [&]<bool hasTubes, bool hasMaterials>() {
+        pushTexelRow<hasTubes, hasMaterials>(fine, nearRow, farRow, sy, x, y, n, fineSize, focal, out);
+    });
 }
 
 /// What tubes look like at each pixel: normals round their axes.
@@ -302,7 +330,7 @@ void finishRow(float focal, uint32_t n, TexelRow& __restrict row) {
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const size_t at = kPad + i;
-        const Texel t = texelAt<true>(row, at);
+        const Texel t = texelAt<true, false>(row, at);
         const TubeSurface s = tubeSurface(t, lens);
         const bool isTubeHere = t.isRound > 0.5f;
         row.perpX[at] = isTubeHere ? s.normalPerp.x : t.normalPerp.x;

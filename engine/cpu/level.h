@@ -1,4 +1,4 @@
-// One level of the pyramid in memory: five planes of packed texels, and which parts of its rows hold any.
+// One level of the pyramid in memory: the planes of packed texels, and which parts of its rows hold any.
 #pragma once
 
 #include <algorithm>
@@ -15,17 +15,19 @@ class Level {
   public:
     uint32_t width = 0, height = 0;
 
-    void resize(uint32_t w, uint32_t h) {
+    void resize(uint32_t w, uint32_t h, bool hasMaterials) {
         width = w;
         height = h;
-        words_.assign(size_t{5} * w * h, 0);
+        hasMaterials_ = hasMaterials;
+        words_.assign((hasMaterials ? size_t{6} : size_t{5}) * w * h, 0);
         perRow_ = (w + kSegment - 1) / kSegment;
         filled_.assign(size_t{perRow_} * h, 0);
     }
     Planes planes() {
         const size_t n = size_t{width} * height;
         uint32_t* p = words_.data();
-        return {reinterpret_cast<float*>(p), p + n, p + 2 * n, p + 3 * n, p + 4 * n};
+        return {reinterpret_cast<float*>(p),        p + n, p + 2 * n, p + 3 * n, p + 4 * n,
+                hasMaterials_ ? p + 5 * n : nullptr};
     }
     /// May any of these texels of a row be there? If not, all their depths are 0 in memory.
     bool mayHold(uint32_t y, uint32_t x, uint32_t n) const {
@@ -52,6 +54,7 @@ class Level {
     }
     HugeBuffer<uint32_t> words_;
     uint32_t perRow_ = 0;
+    bool hasMaterials_ = false;
     std::vector<uint8_t> filled_;
 };
 

@@ -157,7 +157,8 @@ void lightRow(const FrameConstants& frame, const LightInput& light, uint32_t x0,
               SurfaceRow& __restrict row) {
     const FrameConstants f = frame;
     const bool litPoints = (f.shade & kShadeLit) != 0, litTriangles = (f.shade & kShadeTriangles) != 0;
-    // Points under lights of the scene's own are surfaces like any other; else theirs is one formula.
+    // Points with a material, or under lights of the scene's own, are surfaces like any other; else theirs is one
+    // formula.
     const bool hasLights = f.lightCount > 0 || f.hasEnvironment != 0;
     alignas(64) float share[kTile];    // of that formula: 0 where a pixel keeps its colour
     alignas(64) uint32_t mask[kTile];  // pixels that are lit as surfaces
@@ -168,13 +169,15 @@ void lightRow(const FrameConstants& frame, const LightInput& light, uint32_t x0,
         mask[i] = pointMask;
     }
     uint32_t anyMask = pointMask;
-    if (row.hasTriangles)
+    const uint32_t materialMask = litPoints ? 1u : 0u;
+    if (row.hasTriangles || row.hasMaterials)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
             const bool isTriangle = (row.material[i] & kPixelTriangle) != 0;
+            const bool hasMaterial = (row.material[i] & kPixelMaterial) != 0;
             const uint32_t isLit = (row.material[i] & kPixelUnlit) == 0 ? triangleMask : 0u;
-            share[i] = isTriangle ? 0.0f : share[i];
-            mask[i] = isTriangle ? isLit : pointMask;
+            share[i] = isTriangle | hasMaterial ? 0.0f : share[i];
+            mask[i] = isTriangle ? isLit : hasMaterial ? materialMask : pointMask;
             anyMask |= mask[i];
         }
     if (litPoints) {

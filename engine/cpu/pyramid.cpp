@@ -4,12 +4,14 @@
 
 namespace stipple::cpu {
 
-void Pyramid::resize(uint32_t width, uint32_t height) {
-    if (!levels_.empty() && levels_[0].width == width && levels_[0].height == height) return;
+void Pyramid::resize(uint32_t width, uint32_t height, bool hasMaterials) {
+    const bool isSame = hasMaterials == hasMaterials_;
+    if (isSame && !levels_.empty() && levels_[0].width == width && levels_[0].height == height) return;
+    hasMaterials_ = hasMaterials;
     levels_.clear();
     for (uint32_t w = width, h = height;; w = (w + 1) / 2, h = (h + 1) / 2) {
         levels_.emplace_back();
-        levels_.back().resize(w, h);
+        levels_.back().resize(w, h, hasMaterials);
         if (w == 1 && h == 1) break;
     }
 }
@@ -37,6 +39,7 @@ void Pyramid::pull() {
         forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
             TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
             upper.hasTubes = lower.hasTubes = out.hasTubes = hasCurves_;
+            upper.hasMaterials = lower.hasMaterials = out.hasMaterials = hasMaterials_;
             for (uint32_t y = row0; y < row1; y += 2) {
                 bool any = false;
                 for (TexelRow* row : {&upper, &lower}) {

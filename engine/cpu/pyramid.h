@@ -19,7 +19,7 @@ class Pyramid {
   public:
     Pyramid(Executor& executor, const Kernels& kernels) : executor_(executor), k_(kernels) {}
 
-    void resize(uint32_t width, uint32_t height);
+    void resize(uint32_t width, uint32_t height, bool hasMaterials);
     size_t levels() const { return levels_.size(); }
     Level& level(size_t l) { return levels_[l]; }
     /// `hasCurves`: texels may be of tubes.
@@ -71,6 +71,7 @@ class Pyramid {
         thread_local TexelRow scratch{}, own{}, out{};
         thread_local std::array<ExpandedRow, 3> ring{};
         scratch.hasTubes = own.hasTubes = out.hasTubes = hasCurves_;
+        scratch.hasMaterials = own.hasMaterials = out.hasMaterials = hasMaterials_;
         std::array<bool, 3> has{};
         const int c0 = static_cast<int>(row0 / 2);
         for (int c = c0 - 1; c <= c0; ++c)
@@ -112,7 +113,7 @@ class Pyramid {
     std::vector<Level> levels_;
     size_t levelCount_ = 0;
     shared::FrameConstants frame_{};
-    bool hasCurves_ = false;
+    bool hasCurves_ = false, hasMaterials_ = false;
 };
 
 }  // namespace stipple::cpu

@@ -4,6 +4,7 @@
 struct Gathered {
     alignas(64) float x[kTile], y[kTile], z[kTile], radius[kTile];
     alignas(64) uint32_t normal[kTile], colour[kTile], flags[kTile];
+    alignas(64) uint32_t material[kTile];  // only of frames with materials
     // Of turned instances: normals in camera space.
     alignas(64) float turned[kTile], nx[kTile], ny[kTile], nz[kTile];
     alignas(64) float front[kTile];  // depth by which each was the nearest
@@ -54,7 +55,7 @@ template <bool anyTurned>
         t.radius = valid ? t.radius : 0.0f;
         t.thickness = (g.flags[i] & kFlagLeaf) != 0u ? kLeafThickness * t.radius : t.thickness;
         t.colour = vec3(unpackRed(g.colour[i]), unpackGreen(g.colour[i]), unpackBlue(g.colour[i]));
-        setTexel<false>(row, kPad + i, t);
+        setTexel<false, false>(row, kPad + i, t);
     }
 }
 
@@ -78,7 +79,7 @@ template <bool anyTurned>
         t.offset = vec2(0.0f, 0.0f);
         t.normalPerp = vec2(perp.x * flip, perp.y * flip);
         t.colour = vec3(unpackRed(g.colour[i]), unpackGreen(g.colour[i]), unpackBlue(g.colour[i]));
-        setTexel<false>(row, kPad + i, t);
+        setTexel<false, false>(row, kPad + i, t);
     }
 }
 
@@ -89,6 +90,14 @@ void resolvePoints(const FrameConstants& f, const ResolveInput& in, const Gather
         resolveExact<anyTurned>(f, g, x0, y, n, row);
     else
         resolveSplats<anyTurned>(f, g, x0, y, n, row);
+    if (row.hasMaterials)
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            const TexelSurface s = surfaceOfPoint(g.material[i]);
+            row.share[kPad + i] = s.share;
+            row.metallic[kPad + i] = s.metallic;
+            row.roughness[kPad + i] = s.roughness;
+        }
 }
 
 /// The pixels of a row that show other kinds than points.
@@ -111,6 +120,7 @@ struct OtherPixels {
     g.normal[i] = 0;
     g.colour[i] = 0;
     g.flags[i] = kFlagNoNormal;
+    g.material[i] = kPlainPoint;
     g.turned[i] = 0;
 }
 
@@ -126,6 +136,7 @@ struct OtherPixels {
     g.radius[i] = node.edge * tables.radiusFraction[recordRadiusCode(r)];
     g.normal[i] = r.normal;
     g.flags[i] = recordFlags(r);
+    if (f.hasMaterials != 0u) g.material[i] = block.materialOf(keyLane(key));
     g.front[i] = keyDepth(key);
     g.turned[i] = 0;
     const bool isTurned = (node.octantMask & kNodeTurned) != 0;
@@ -167,6 +178,7 @@ struct OtherPixels {
     g.nz[i] = d.z;
     g.flags[i] = (shown.cover & kFilteredLeaf) != 0 ? kFlagLeaf : 0u;
     g.colour[i] = shown.colour;
+    g.material[i] = (shown.cover & kFilteredMaterial) != 0 ? shown.cover >> 16 : kPlainPoint;
 }
 
 /// Empties the row's entries of the visibility buffer. `filtered`: of the row, or null: its points are their records.
@@ -228,6 +240,9 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
     if (!any) {
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) row.depth[kPad + i] = 0;
+        if (row.hasMaterials)
+            for (size_t i = 0; i < n; ++i)
+                row.share[kPad + i] = row.metallic[kPad + i] = row.roughness[kPad + i] = 0.0f;
         resolveOthers(f, tables, in, others, x0, y, n, row, largestRadius, planes);
         return others.any();
     }

@@ -34,22 +34,29 @@ void surfaceRow(const FrameConstants& frame, const TexelRow& __restrict own, con
     }
     const uint32_t* const triangles = planes.surface;
     out.hasTriangles = triangles != nullptr;
+    out.hasMaterials = row.hasMaterials;
     out.hasEmission = triangles != nullptr && planes.emissive != nullptr;
     out.hasCoverage = planes.coverage != nullptr;
     for (size_t i = 0; out.hasCoverage && i < n; ++i)
         out.coverage[i] = float(int(planes.coverage[i])) * (1.0f / 255.0f);
-    if (triangles == nullptr)
-        for (size_t i = 0; i < n; ++i) out.material[i] = kPlainSurface;
+    if (row.hasMaterials)
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            const TexelSurface s{row.share[kPad + i], row.metallic[kPad + i], row.roughness[kPad + i]};
+            out.material[i] = surfaceWord(s);
+        }
     else
+        for (size_t i = 0; i < n; ++i) out.material[i] = kPlainSurface;
+    if (triangles != nullptr)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
             // A triangle's pixel that no splat stands in front of.
             const uint32_t drawn = triangles[i];
             const uint32_t inFront = row.depth[kPad + i] == own.depth[kPad + i] ? drawn : 0u;
-            out.material[i] = inFront != 0 ? inFront : kPlainSurface;
+            out.material[i] = inFront != 0 ? inFront : out.material[i];
         }
     for (size_t i = 0; out.hasEmission && i < n; ++i)
-        out.emission[i] = out.material[i] != kPlainSurface ? planes.emissive[i] : 0u;
+        out.emission[i] = (out.material[i] & kPixelTriangle) != 0 ? planes.emissive[i] : 0u;
     if (wants.normal) surfaceNormals(row, flat, x, py, focal, n, out);
     if (wants.depth)
 #pragma GCC ivdep

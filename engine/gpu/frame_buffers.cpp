@@ -65,7 +65,7 @@ Result<void> FrameBuffers::preparePlanes(const render::DrawList& draws, bool wan
     uint64_t words = 0;
     for (uint32_t lw = w, lh = h;; lw = (lw + 1) / 2, lh = (lh + 1) / 2) {
         levels_.push_back({lw, lh, static_cast<uint32_t>(words)});
-        words += uint64_t{kTexelWords} * lw * lh;
+        words += (uint64_t{kTexelWords} + (draws.frame.hasMaterials != 0 ? 1 : 0)) * lw * lh;
         if (lw == 1 && lh == 1) break;
     }
     const uint64_t pixels = uint64_t{w} * h, extra = wantAll ? pixels * kExtraFloats : 0;
@@ -104,6 +104,9 @@ Result<void> FrameBuffers::prepareLists(const render::RenderRequest& request) {
             ensure(bound_[kFilteredBinding], gpu::bytesOf(kFilteredBinding, pixels), kStorage, false, "blended discs"));
         STIPPLE_TRY(
             ensure(bound_[kCoverageBinding], gpu::bytesOf(kCoverageBinding, pixels), kStorage, false, "coverage"));
+        if (request.draws->frame.hasMaterials != 0)
+            STIPPLE_TRY(ensure(bound_[kMaterialSumsBinding], gpu::bytesOf(kMaterialSumsBinding, pixels), kStorage,
+                               false, "material sums"));
     }
     return {};
 }

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/glm.hpp>
+#include <optional>
 
 #include "lod/cut/cut.h"
+#include "lod/primitives/point_material.h"
 #include "lod/store/hierarchy.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/record.h"
@@ -42,6 +44,7 @@ struct Disc {
     double radius = 0;       ///< world
     glm::dvec3 colour{0};    ///< linear
     uint32_t flags = 0, errorCode = 0, octant = 0;
+    std::optional<lod::PointMaterial> material;  ///< only where it was read
 };
 
 inline double decodeSrgb(uint32_t byte) {

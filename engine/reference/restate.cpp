@@ -74,7 +74,7 @@ Sample blend(std::vector<Contribution>& list, double& back, const lod::View& vie
     back = 1e300;
     for (const Contribution& c : list) back = std::min(back, c.sample->depth + c.sample->thickness);
     Sample sum;
-    double weight = 0;
+    double weight = 0, metallic = 0, roughness = 0;
     for (const Contribution& c : list)
         if (c.sample->depth + c.sample->thickness <= back) {
             sum.isRound = c.sample->isRound;
@@ -92,7 +92,15 @@ Sample blend(std::vector<Contribution>& list, double& back, const lod::View& vie
         sum.perp += w * s->perp;
         sum.axis += w * s->axis;
         sum.colour += w * s->colour;
+        sum.materialShare += w * s->materialShare;
+        metallic += w * s->materialShare * s->metallic;
+        roughness += w * s->materialShare * s->roughness;
     }
+    if (sum.materialShare > 0) {
+        sum.metallic = metallic / sum.materialShare;
+        sum.roughness = roughness / sum.materialShare;
+    }
+    sum.materialShare /= weight;
     sum.valid = true;
     sum.depth = view.isOrthographic ? sum.depth / weight : weight / sum.depth;
     sum.radius /= weight;
@@ -278,6 +286,7 @@ class ReferenceBackend final : public render::DrawsAtOnce {
         if ((d.flags & shared::kFlagLeaf) != 0) s.thickness = kLeafThickness * s.radius / pixels;
         s.perp = dvec2(rotationToZ(toPoint) * (facing > 0 ? -d.normal : d.normal));
         s.colour = d.colour;
+        setMaterial(s, d.material);
     }
 
     void reconstruct(Level& level0, const lod::View& view) const {
@@ -324,7 +333,8 @@ class ReferenceBackend final : public render::DrawsAtOnce {
                     } else if (f.debugView == shared::kDebugNormals) {
                         colour = 0.5 + 0.5 * dvec3(n.x, -n.y, -n.z);
                     } else if (f.debugView == shared::kDebugNone &&
-                               (s.isTriangle || (isLit(f) && (!draws.lights.empty() || draws.environment)))) {
+                               (s.isTriangle ||
+                                (isLit(f) && (s.hasMaterial() || !draws.lights.empty() || draws.environment)))) {
                         colour = shadeTriangle(s, n, viewRay(v, p).at(depth), draws);
                     } else if (isLit(f) && f.debugView == shared::kDebugNone) {
                         colour *= lightOn(n, f, s.letsLightThrough(pixelsAt(v, s.depth)));

@@ -28,6 +28,9 @@ struct Sample {
     // Of a triangle's pixel:
     bool isTriangle = false, isUnlit = false;
     double metallic = 0, roughness = 1, occlusion = 1;
+    /// Of points: how much of what was merged has a material, which is of that part; else lit by one formula.
+    double materialShare = 0;
+    bool hasMaterial() const { return materialShare > 0.5; }
     glm::dvec3 emissive{0};
     /// No surface, and lets light through: hardly any thickness. `pixels`: of a world unit at its depth.
     bool isLeaf(double pixels) const { return thickness * pixels < 0.125 * radius; }

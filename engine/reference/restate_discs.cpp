@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "lod/primitives/record_spacing.h"
+#include "shaders/shared/material.h"
 
 namespace stipple::reference {
 namespace {
@@ -36,9 +37,29 @@ std::pair<double, double> meet(const PlacedDisc& d, const ViewRay& ray, double n
     return depth > nearPlane && rho2 <= 1 ? std::pair(depth, rho2) : std::pair(HUGE_VAL, HUGE_VAL);
 }
 
+/// The material of a record: that of the whole picture, its own, or its store's.
+std::optional<lod::PointMaterial> materialOf(const render::DrawList& draws, uint32_t hierarchy,
+                                             const std::vector<uint16_t>& own, uint32_t record) {
+    uint32_t packed = shared::kPlainPoint;
+    if (draws.onlyMaterial)
+        packed = *draws.onlyMaterial;
+    else if (!own.empty())
+        packed = own[record];
+    else if (hierarchy < draws.pointMaterial.size())
+        packed = draws.pointMaterial[hierarchy];
+    if (packed == shared::kPlainPoint) return {};
+    return lod::PointMaterial{static_cast<float>(packed >> 8) / 255, static_cast<float>(packed & 255u) / 255};
+}
+
 bool isLeaf(const PlacedDisc& d) { return (d.flags & shared::kFlagLeaf) != 0; }
 
 }  // namespace
+
+void setMaterial(Sample& s, const std::optional<lod::PointMaterial>& material) {
+    s.materialShare = material ? 1 : 0;
+    s.metallic = material ? double{material->metallic} : 0;
+    s.roughness = material ? double{material->roughness} : 1;
+}
 
 Sample shownPixel(const lod::View& view, const dvec2& at, double depth, const dvec3& n, const dvec3& colour,
                   bool isLeaf) {
@@ -92,7 +113,8 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
             // Squares of 255ths.
             const double weight = chunk.weights.empty() ? 0 : std::pow(chunk.weights[i] / 255.0, 2);
             out.push_back({c, n, instance.scale * disc.radius * f.supportScale,
-                           isDebug ? debugColour(f, node, cut) : disc.colour, disc.flags, spacing, weight, few});
+                           isDebug ? debugColour(f, node, cut) : disc.colour, disc.flags, spacing, weight, few,
+                           materialOf(draws, instance.hierarchy, chunk.materials, i)});
         }
     }
     return out;
@@ -125,7 +147,7 @@ void showWide(const render::DrawList& draws, const std::vector<PlacedDisc>& disc
             const double length = glm::length(ray.direction);
             const double facing = std::abs(glm::dot(front->normal, ray.direction)) / length;
             const double apart = 0.25 * front->radius / length / std::max(facing, 0.125);
-            double weight = 0, linear = 0;
+            double weight = 0, linear = 0, share = 0, metallic = 0, roughness = 0;
             dvec3 n(0), colour(0);
             for (const PlacedDisc& d : discs) {
                 const auto [z, rho2] = meet(d, ray, nearPlane);
@@ -135,9 +157,17 @@ void showWide(const render::DrawList& draws, const std::vector<PlacedDisc>& disc
                 linear += view.isOrthographic ? k * z : k / z;
                 n += (glm::dot(d.normal, ray.direction) > 0 ? -k : k) * d.normal;
                 colour += k * d.colour;
+                if (!d.material) continue;
+                share += k;
+                metallic += k * double{d.material->metallic};
+                roughness += k * double{d.material->roughness};
             }
             s = shownPixel(view, at, view.isOrthographic ? linear / weight : weight / linear, glm::normalize(n),
                            colour / weight, isLeaf(*front));
+            if (share > 0)
+                setMaterial(
+                    s, lod::PointMaterial{static_cast<float>(roughness / share), static_cast<float>(metallic / share)});
+            s.materialShare = share / weight;
         }
 }
 
@@ -152,6 +182,7 @@ void showSplats(const render::DrawList& draws, const std::vector<PlacedDisc>& di
         if (depth == HUGE_VAL || (s.valid && s.key <= depth)) return;
         const dvec3 n = glm::dot(d.normal, ray.direction) > 0 ? -d.normal : d.normal;
         s = shownPixel(v, at, depth, n, d.colour, isLeaf(d));
+        setMaterial(s, d.material);
     };
     for (PlacedDisc d : discs) {
         const bool isAhead = d.centre.z > v.nearPlane;

@@ -2,10 +2,12 @@
 // splat.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "engine/reference/decode.h"
 #include "engine/reference/restate.h"
+#include "lod/primitives/point_material.h"
 
 namespace stipple::reference {
 
@@ -18,6 +20,7 @@ struct PlacedDisc {
     double spacing;  ///< of its node, world units; 0: not known
     double weight;   ///< of the surfel; 0: it has none
     bool mayBeWide;  ///< discs of its node reach few of each other's spacings, or are too large for texels
+    std::optional<lod::PointMaterial> material = {};
 };
 std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks& chunks);
 
@@ -36,6 +39,9 @@ struct BlendVariation {
 /// Before the level's exact pixels, and in the place of what is not there: discs blended by their kernels.
 void blendDiscs(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level,
                 const BlendVariation& variation = {});
+
+/// That of a point.
+void setMaterial(Sample& s, const std::optional<lod::PointMaterial>& material);
 
 /// A pixel that shows a disc, and no ellipse. `n`: unit, towards the eye.
 Sample shownPixel(const lod::View& view, const glm::dvec2& at, double depth, const glm::dvec3& n,

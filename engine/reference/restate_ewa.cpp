@@ -62,6 +62,7 @@ struct Gathered {
     const PlacedDisc* first = nullptr;  ///< of those whose kernels reach it
     double weight = 0, linear = 0;
     dvec3 colour{0}, normal{0};
+    double share = 0, metallic = 0, roughness = 0;  ///< of materials
     bool hasBehind = false;
 };
 
@@ -207,6 +208,11 @@ class Filter {
             p.weight += w;
             p.linear += view_.isOrthographic ? w * depth : w / depth;
             p.colour += w * d.colour;
+            if (d.material) {
+                p.share += w;
+                p.metallic += w * double{d.material->metallic};
+                p.roughness += w * double{d.material->roughness};
+            }
             p.normal += w * (glm::dot(d.normal, sightOf(view_, d.centre)) > 0 ? -d.normal : d.normal);
         });
     }
@@ -252,9 +258,15 @@ class Filter {
                     s = shownPixel(view_, at, view_.isOrthographic ? p.linear / p.weight : p.weight / p.linear,
                                    glm::normalize(p.normal), p.colour / dividedBy(p.weight, grid),
                                    (d.flags & shared::kFlagLeaf) != 0);
+                    s.materialShare = p.share / p.weight;
+                    if (p.share > 0) {
+                        s.metallic = p.metallic / p.share;
+                        s.roughness = p.roughness / p.share;
+                    }
                 } else {
                     const dvec3 n = glm::dot(d.normal, sightOf(view_, d.centre)) > 0 ? -d.normal : d.normal;
                     s = shownPixel(view_, at, p.frontDepth, n, d.colour, (d.flags & shared::kFlagLeaf) != 0);
+                    setMaterial(s, d.material);
                 }
                 if (!isBefore && isAtGap(x, y)) s.coverage = covered;
             }

@@ -12,6 +12,7 @@
 #include "engine/reference/reference.h"
 #include "engine/reference/surface.h"
 #include "lod/store/colour.h"
+#include "lod/store/materials.h"
 #include "lod/store/mesh_place.h"
 
 namespace stipple::reference {
@@ -78,7 +79,16 @@ Result<void> readLeaf(uint32_t index, TracedStore& t) {
     }
     lod::recolour(t.colour, *t.store, index, chunk, values);
     for (const shared::CurveSegment& s : chunk.segments) t.segments.push_back(decodeSegment(h, node, s));
-    for (const shared::PointRecord& r : chunk.records) t.discs.push_back(decodeDisc(h, node, r));
+    STIPPLE_TRY(lod::addMaterials(*t.store, index, chunk));
+    const std::vector<lod::PointMaterial>& materials = t.store->description.pointMaterials;
+    for (size_t i = 0; i < chunk.records.size(); ++i) {
+        Disc& d = t.discs.emplace_back(decodeDisc(h, node, chunk.records[i]));
+        if (!chunk.materials.empty())
+            d.material = lod::PointMaterial{static_cast<float>(chunk.materials[i] >> 8) / 255,
+                                            static_cast<float>(chunk.materials[i] & 255) / 255};
+        else if (!materials.empty())
+            d.material = materials.front();
+    }
     addClusters(chunk, number, 0, static_cast<uint32_t>(chunk.clusters.size()), addVertices(chunk, t), t);
     return {};
 }
@@ -212,11 +222,11 @@ class Tracer {
             return true;
         }
         Sample s = hit.sample;
-        const dvec3 n = hit.isCurve ? hit.normal : blendDiscs(ray, hit, s.colour);
+        const dvec3 n = hit.isCurve ? hit.normal : blendDiscs(ray, hit, s);
         const shared::FrameConstants& f = draws_.frame;
         colour = s.colour;
         if ((f.shade & shared::kShadeLit) == 0) return true;
-        if (draws_.lights.empty() && !draws_.environment)
+        if (draws_.lights.empty() && !draws_.environment && !s.hasMaterial())
             colour *= lightOn(n, f, s.isLeaf(pixelsAt(view_, s.depth)));
         else
             colour = shadeTriangle(s, n, point, draws_);
@@ -328,12 +338,18 @@ class Tracer {
         best.normal = n;
     }
 
-    /// Mean colour of the discs within the front thickness, weighted by (1 - rho^2)^2; returns their normal.
-    dvec3 blendDiscs(const ViewRay& ray, const Hit& front, dvec3& colour) const {
+    std::optional<lod::PointMaterial> materialOf(const Disc& d) const {
+        const std::optional<uint32_t>& only = settings_.draw.pointMaterial;
+        if (!only) return d.material;
+        return lod::PointMaterial{static_cast<float>(*only >> 8) / 255, static_cast<float>(*only & 255u) / 255};
+    }
+
+    /// Mean colour and material of the discs within the front thickness, weighted by (1 - rho^2)^2; returns their
+    /// normal.
+    dvec3 blendDiscs(const ViewRay& ray, const Hit& front, Sample& out) const {
         const double limit = front.t + front.thickness;
-        double weights = 0;
-        dvec3 normals(0);
-        colour = dvec3(0);
+        double weights = 0, share = 0, metallic = 0, roughness = 0;
+        dvec3 normals(0), colour(0);
         tree_.visit(toWorld(ray.origin), toWorld(ray.direction), view_.nearPlane, limit, [&](uint32_t p) {
             const TracedStore& store = *places_[p];
             const LocalRay local = localRay(placed_[p].place, ray);
@@ -348,10 +364,18 @@ class Tracer {
                 const double w = (1 - rho2) * (1 - rho2) + 1e-9;
                 weights += w;
                 colour += w * store.discs[item].colour;
+                if (const auto material = materialOf(d)) {
+                    share += w;
+                    metallic += w * double{material->metallic};
+                    roughness += w * double{material->roughness};
+                }
                 normals += w * (placed_[p].place.rotation * normal);
             });
         });
-        colour /= weights;
+        out.colour = colour / weights;
+        out.materialShare = share / weights;
+        out.metallic = share > 0 ? metallic / share : 0;
+        out.roughness = share > 0 ? roughness / share : 1;
         return glm::normalize(toCamera(normals));
     }
 

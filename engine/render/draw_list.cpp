@@ -7,15 +7,16 @@
 #include "engine/render/kinds/kind.h"
 #include "lod/primitives/record_spacing.h"
 #include "lod/store/surfel_weights.h"
+#include "shaders/shared/material.h"
 #include "shaders/shared/visibility.h"
 
 namespace stipple::render {
 
 static_assert(sizeof(shared::PointRecord) == 16);
-static_assert(sizeof(shared::DrawNode) == 88);
+static_assert(sizeof(shared::DrawNode) == 96);
 static_assert(sizeof(shared::DrawBlock) == 8);
 static_assert(sizeof(shared::CurveSegment) == 32);
-static_assert(sizeof(shared::FrameConstants) == 184 + sizeof(shared::BlockRanges));
+static_assert(sizeof(shared::FrameConstants) == 188 + sizeof(shared::BlockRanges));
 static_assert(sizeof(shared::MeshVertex) == 32);
 static_assert(sizeof(shared::MeshCluster) == 12);
 static_assert(sizeof(shared::DrawMesh) == 120);
@@ -124,6 +125,14 @@ shared::DrawNode makeDrawNode(const lod::CutDraw& draw, const Bend& bend, const 
     d.spacing = isSpaced ? steps * static_cast<float>(worldPerStep) : 0.0f;
     d.weights = lod::weightsOf(h, draw.chunk) != nullptr ? payload.records : 0u;
     d.errorPixels = draw.errorPixels;
+    if (payload.kind != lod::Kind::points) {
+        d.material = shared::kPlainPoint;
+        return d;
+    }
+    const bool hasDefault = instance.hierarchy < list.pointMaterial.size();
+    d.material = list.onlyMaterial.value_or(hasDefault ? list.pointMaterial[instance.hierarchy] : shared::kPlainPoint);
+    if (list.onlyMaterial) d.material |= shared::kOnlyMaterial;
+    d.materials = h.hasMaterials && payload.attributeBytes > 0 ? payload.records : 0;
     return d;
 }
 
@@ -150,6 +159,9 @@ void addNodes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, const Draw
         for (uint32_t first = 0; first < draw.count; first += shared::kBlockLanes)
             batch.blocks.push_back({index, first});
         batch.nodes.push_back(makeDrawNode(draw, bend, cameraFromWorld, out));
+        const shared::DrawNode& node = batch.nodes.back();
+        const bool hasMaterial = node.materials > 0 || node.material != shared::kPlainPoint;
+        if (hasMaterial && settings.lit) out.frame.hasMaterials = 1;
         batch.keys.push_back({out.firstSource + instance.source, draw.chunk});
     }
     if (out.swaying == 0) out.bends.clear();
@@ -241,6 +253,8 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     out.meshCut.assign(cut.meshDraw.begin(), cut.meshDraw.end());
     out.hierarchies = hierarchies;
     out.instances = instances;
+    out.onlyMaterial = settings.pointMaterial;
+    out.frame.hasMaterials = 0;
     const glm::dmat3 cameraFromWorld = glm::transpose(glm::dmat3(view.right, view.down, view.forward));
     const EffectSet requested = requestedEffects(out.effectsOfScene, settings);
     std::vector<uint64_t> fed(effects().size());

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -86,6 +87,10 @@ struct DrawList {
     std::vector<Bend> bends;  ///< of each of `cut`; empty where nothing is moved
     std::vector<lod::CutMeshDraw> meshCut;
     std::vector<uint32_t> firstMaterial;  ///< of each hierarchy
+    /// Of each hierarchy: that of points that have none of their own, packed (shaders/shared/material.h), or
+    /// kPlainPoint.
+    std::vector<uint32_t> pointMaterial;
+    std::optional<uint32_t> onlyMaterial;  ///< of all points instead
     std::span<const lod::Hierarchy* const> hierarchies;
     std::span<const lod::Instance> instances;
 };
@@ -98,6 +103,7 @@ glm::vec3 linearBackground();
 struct DrawSettings {
     bool lit = false;  ///< points; triangles are, unless their material says otherwise
     bool unlitTriangles = false;
+    std::optional<uint32_t> pointMaterial;  ///< of all points instead of their own, packed as DrawList has it
     uint32_t debugView = shared::kDebugNone;
     glm::vec3 background = linearBackground();  ///< linear
     glm::dvec3 worldUp{0, 0, 1};

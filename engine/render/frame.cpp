@@ -14,20 +14,22 @@
 #include "lod/primitives/octahedral.h"
 #include "lod/store/attributes.h"
 #include "lod/store/check.h"
+#include "lod/store/materials.h"
 
 namespace stipple::render {
 
 namespace {
 
-/// The last steps of a chunk's decoding: other colours than its own; of triangles, that their materials are there.
+/// The last steps of a chunk's decoding: other colours than its own, materials; of triangles, that theirs are there.
 streaming::ChunkFinish finishOf(const PlacedStore& placed) {
     const lod::ColourBy by = placed.colour;
     const bool hasTriangles = !placed.store->hierarchy.groups.empty();
-    if (placed.store->hierarchy.isGraph || (hasTriangles && by.mode == lod::ColourMode::own))
+    const bool hasMaterials = placed.store->hierarchy.hasMaterials;
+    if (placed.store->hierarchy.isGraph || (hasTriangles && by.mode == lod::ColourMode::own && !hasMaterials))
         return {false, [store = placed.store](uint32_t index, lod::Chunk& chunk, const uint8_t*, size_t) {
                     return lod::checkMaterials(*store, chunk, fmt::format("{}: chunk {}", store->path, index));
                 }};
-    if (by.mode == lod::ColourMode::own) return {};
+    if (by.mode == lod::ColourMode::own && !hasMaterials) return {};
     const auto apply = [by, store = placed.store](uint32_t index, lod::Chunk& chunk, const uint8_t* bytes,
                                                   size_t count) -> Result<void> {
         if (!chunk.vertices.empty())
@@ -40,9 +42,9 @@ streaming::ChunkFinish finishOf(const PlacedStore& placed) {
                                                         fmt::format("{}: chunk {}", store->path, index)));
         }
         lod::recolour(by, *store, index, chunk, values);
-        return {};
+        return lod::addMaterials(*store, index, bytes, count, chunk);
     };
-    return {by.needsAttributes(), apply};
+    return {by.needsAttributes() || hasMaterials, apply};
 }
 
 /// Adds placed stores to a state: each store once, and one source of chunks for all that look alike.
@@ -102,6 +104,7 @@ class Placer {
         state_.stores.push_back(store);
         state_.hierarchies.push_back(&store->hierarchy);
         state_.draws.firstMaterial.push_back(static_cast<uint32_t>(state_.materials.size()));
+        state_.draws.pointMaterial.push_back(lod::defaultMaterial(store->description));
         state_.materials.insert(state_.materials.end(), store->description.materials.begin(),
                                 store->description.materials.end());
         return known->second;

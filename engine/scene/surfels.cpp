@@ -39,8 +39,9 @@ int64_t wrapped(int64_t i, int64_t size, Wrap wrap) {
     return m < size ? m : period - 1 - m;
 }
 
-/// Linear colour and alpha at uv; bilinear, averaged over `footprint` texels.
-glm::vec4 lookup(const DecodedImage& image, const Texture& texture, glm::vec2 uv, float footprint) {
+/// Linear colour and alpha at uv; bilinear, averaged over `footprint` texels. `isColour`: else texels are numbers.
+glm::vec4 lookup(const DecodedImage& image, const Texture& texture, glm::vec2 uv, float footprint,
+                 bool isColour = true) {
     if (image.rgba.empty() || !std::isfinite(uv.x + uv.y)) return glm::vec4(1);
     const int taps = std::clamp(toWhole<int>(std::ceil(footprint)), 1, kMostTaps);
     const auto w = static_cast<int64_t>(image.width), h = static_cast<int64_t>(image.height);
@@ -56,7 +57,10 @@ glm::vec4 lookup(const DecodedImage& image, const Texture& texture, glm::vec2 uv
                 const int64_t py = wrapped(texelOf(y) + (k >> 1), h, texture.wrapV);
                 const uint32_t c = image.rgba[static_cast<size_t>(py * w + px)];
                 const float weight = ((k & 1) != 0 ? fx : 1 - fx) * (k > 1 ? fy : 1 - fy);
-                sum += weight * glm::vec4(linearOf(c & 255u), linearOf(c >> 8 & 255u), linearOf(c >> 16 & 255u),
+                const auto channel = [&](uint32_t byte) {
+                    return isColour ? linearOf(byte) : static_cast<float>(byte) / 255.0f;
+                };
+                sum += weight * glm::vec4(channel(c & 255u), channel(c >> 8 & 255u), channel(c >> 16 & 255u),
                                           static_cast<float>(c >> 24) / 255.0f);
             }
         }
@@ -75,13 +79,17 @@ struct Surfels {
     std::vector<glm::dvec3> position;
     std::vector<glm::vec3> normal;
     std::vector<uint32_t> colour;
+    std::vector<uint8_t> material;  ///< into `materials`
+    std::vector<lod::PointMaterial> materials;
     uint64_t cutOut = 0;  ///< samples that an alpha mask leaves out
 };
 
 class Sampler {
   public:
     Sampler(const Scene& scene, const std::vector<DecodedImage>& images, const SurfelSettings& settings)
-        : scene_(scene), images_(images), settings_(settings) {}
+        : scene_(scene), images_(images), settings_(settings) {
+        chooseList();
+    }
 
     Result<Surfels> run() {
         const std::vector<glm::dmat4> world = scene_.worldTransforms();
@@ -115,6 +123,10 @@ class Sampler {
             if (p.kind == PrimitiveKind::triangles && settings_.count > 0) sampleTriangles(p, m);
         });
         if (settings_.count == 0) takeBorders(each);
+        if (!hasMaterials_) {
+            out_.material.clear();
+            out_.materials.clear();
+        }
         return std::move(out_);
     }
 
@@ -174,6 +186,7 @@ class Sampler {
         out_.position.push_back(b.x * c[0] + b.y * c[1] + b.z * c[2]);
         out_.normal.emplace_back(n);
         out_.colour.push_back(byteOf(colour.r) | byteOf(colour.g) << 8 | byteOf(colour.b) << 16);
+        out_.material.push_back(numberOf(surfaceAt(p, i, glm::vec3(b), footprint)));
     }
 
     /// Where triangles end beside points, points that join both.
@@ -202,12 +215,45 @@ class Sampler {
     }
 
     void takePoints(const Primitive& p, const glm::dmat4& m) {
+        const uint8_t material = numberOf(surfaceOf(p));
         for (const uint32_t i : p.indices) {
             out_.position.emplace_back(m * glm::dvec4(p.at(i), 1));
             out_.normal.push_back(p.normal.empty() ? glm::vec3(0) : glm::vec3(glm::dmat3(m) * glm::dvec3(p.normal[i])));
             const glm::vec4 c = p.colour.empty() ? glm::vec4(1) : p.colour[i];
             out_.colour.push_back(byteOf(c.r) | byteOf(c.g) << 8 | byteOf(c.b) << 16);
+            out_.material.push_back(material);
         }
+    }
+
+    /// The number of a material in the list: each once, or the grid where textures say what materials are.
+    uint8_t numberOf(const lod::PointMaterial& m) {
+        if (isGrid_) return lod::gridIndex(double{m.roughness}, double{m.metallic});
+        const auto known = std::find(out_.materials.begin(), out_.materials.end(), m);
+        const auto number = static_cast<uint8_t>(known - out_.materials.begin());
+        if (known == out_.materials.end()) out_.materials.push_back(m);
+        return number;
+    }
+    void chooseList() {
+        isGrid_ = scene_.materials.size() + 2 > lod::kMostPointMaterials;
+        for (const Material& m : scene_.materials) isGrid_ = isGrid_ || m.metallicRoughnessTexture.texture >= 0;
+        if (isGrid_) out_.materials = lod::materialGrid();
+    }
+    /// The material of a sample; see colourAt.
+    lod::PointMaterial surfaceAt(const Primitive& p, size_t i, const glm::vec3& b, float footprint) {
+        const Material& m = materialOf(p);
+        hasMaterials_ = hasMaterials_ || p.material >= 0;
+        const TextureUse& use = m.metallicRoughnessTexture;
+        const DecodedImage* image = imageOf(use);
+        if (!image || static_cast<size_t>(use.uvSet) >= p.uv.size()) return {m.roughness, m.metallic};
+        const glm::vec4 texel =
+            lookup(*image, scene_.textures[static_cast<size_t>(use.texture)], uvAt(p, use, i, b), footprint, false);
+        return {m.roughness * texel.g, m.metallic * texel.b};
+    }
+    /// Of points: without any they are matte. (The format's own, which is metal, would be black.)
+    lod::PointMaterial surfaceOf(const Primitive& p) {
+        hasMaterials_ = hasMaterials_ || p.material >= 0;
+        const Material& m = materialOf(p);
+        return p.material < 0 ? lod::PointMaterial{} : lod::PointMaterial{m.roughness, m.metallic};
     }
 
     const Material& materialOf(const Primitive& p) const {
@@ -261,6 +307,7 @@ class Sampler {
     SurfelSettings settings_;
     double perArea_ = 0, spacing_ = 0, carry_ = 0.5;
     uint32_t triangle_ = 0;
+    bool isGrid_ = false, hasMaterials_ = false;  ///< the list is the grid; some primitive names a material
     Surfels out_;
 };
 
@@ -274,6 +321,7 @@ Result<lod::PointSource> sampleSurfels(const Scene& scene, const std::vector<Dec
     info.path = scene.path;
     info.format = "meshes, sampled";
     info.isReflectance = true;
+    info.materials = std::move(sampled.materials);
     info.up = lod::UpAxis::y;
     info.notes = scene.notes;
     if (sampled.cutOut > 0)
@@ -282,6 +330,7 @@ Result<lod::PointSource> sampleSurfels(const Scene& scene, const std::vector<Dec
     points.position = std::move(sampled.position);
     points.normal = std::move(sampled.normal);
     points.colour = std::move(sampled.colour);
+    points.material = std::move(sampled.material);
     return lod::pointsInMemory(std::move(info), std::move(points));
 }
 

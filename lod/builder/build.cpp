@@ -16,6 +16,7 @@
 #include "lod/builder/points/distribution.h"
 #include "lod/builder/points/estimate.h"
 #include "lod/builder/points/exchange.h"
+#include "lod/store/materials.h"
 #include "lod/store/store.h"
 
 namespace stipple::lod {
@@ -303,6 +304,7 @@ class PointStages final : public BuildStages {
         d.roundingUnits = spread_->rounding();
         d.hasColour = input_.hasColour;
         d.isReflectance = input_.isReflectance;
+        d.pointMaterials = input_.materials;
         d.hasNormals = input_.hasNormal || settings_.normals == NormalsMode::automatic;
         d.source = input_.source;
         const auto& g = input_.greatest;
@@ -367,6 +369,7 @@ uint64_t PointStages::identity() const {
                     settings_.up ? static_cast<int>(*settings_.up) : -1, settings_.leafRecords, settings_.skipBad,
                     settings_.fineNormals, settings_.mergeDuplicates, settings_.dropOutliers);
     for (const AttributeInfo& a : input_.attributes()) text.append("|").append(a.name);
+    for (const PointMaterial& m : input_.materials) text += fmt::format("|{},{}", m.roughness, m.metallic);
     text.append("|").append(std::filesystem::absolute(course_.output).lexically_normal().string());
     return hashBytes(text.data(), text.size());
 }
@@ -384,6 +387,8 @@ Result<Described> PointStages::describe(const Built&) {
     out.description.pointsIn = report.pointsIn;
     out.description.dropped = report.dropped;
     ranges_.describe(frame(), input_.withoutOutliers(), out.description);
+    if (const auto index = materialAttribute(out.description))  // those beyond the last that is used
+        out.description.pointMaterials.resize(static_cast<size_t>(out.description.attributes[*index].greatest) + 1);
     return out;
 }
 

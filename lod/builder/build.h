@@ -45,10 +45,11 @@ struct BuildSettings : BuildLimits {
     bool leaveOutUnlike = false;          ///< of those: what files store in different ways is left out, with a note
     /// Opens one input; empty: openPointSource. For inputs that this library does not know (scenes with meshes).
     std::function<Result<PointSource>(const std::string& path, const ReadOptions& options)> open;
-    bool skipBad = false;          ///< go on past corrupt chunks and files, and count what is lost
-    bool fineNormals = false;      ///< of points: each from its own twelve nearest, at three times the time
-    bool mergeDuplicates = false;  ///< of points at one place keep one
-    bool dropOutliers = false;     ///< of points: leave out what points/outliers.h finds
+    bool skipBad = false;                   ///< go on past corrupt chunks and files, and count what is lost
+    std::optional<PointMaterial> material;  ///< of all points, instead of what the input says
+    bool fineNormals = false;               ///< of points: each from its own twelve nearest, at three times the time
+    bool mergeDuplicates = false;           ///< of points at one place keep one
+    bool dropOutliers = false;              ///< of points: leave out what points/outliers.h finds
 };
 
 struct BuildReport {

@@ -26,6 +26,7 @@ PointSource pointsInMemory(SourceInfo info, PointBlock points) {
             copy(all->normal, block.normal);
             copy(all->colour, block.colour);
             copy(all->radius, block.radius);
+            copy(all->material, block.material);
             next += count;
             return count;
         });

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/base/result.h"
+#include "lod/primitives/point_material.h"
 
 namespace stipple::lod {
 
@@ -52,6 +53,7 @@ struct PointBlock {
     std::vector<uint32_t> colour;      ///< r | g << 8 | b << 16, each 8 bit as stored in the file (see colourMax)
     std::vector<glm::vec3> normal;     ///< any length; zero where the file has none
     std::vector<float> radius;         ///< file units
+    std::vector<uint8_t> material;     ///< into SourceInfo::materials; empty: all have the first
     uint32_t colourMax = 0;            ///< largest channel value before the 16 to 8 bit reduction (16-bit files)
     std::vector<uint64_t> colour16;    ///< r | g << 16 | b << 32, instead of `colour`, where the file has 16 bits
     /// Stored values of the attributes that were asked for, in the order of ReadOptions::attributes; an attribute that
@@ -65,6 +67,7 @@ struct PointBlock {
         normal.clear();
         radius.clear();
         colour16.clear();
+        material.clear();
         for (auto& values : attributes) values.clear();
         colourMax = 0;
     }
@@ -98,6 +101,7 @@ struct SourceInfo {
     Crs crs;
     std::vector<AttributeInfo> attributes;  ///< that can be asked for
     std::vector<std::string> notes;         ///< what is odd about the file, for a person
+    std::vector<PointMaterial> materials;   ///< of its points: PointBlock::material counts them
 };
 
 struct ReadOptions {

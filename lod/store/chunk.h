@@ -15,6 +15,9 @@ namespace stipple::lod {
 
 struct Chunk {
     std::vector<shared::PointRecord> records;
+    /// Of each record, packed (shaders/shared/material.h); empty: all have the store's. In a stream of their own in the
+    /// file: readers add them (lod/store/materials.h).
+    std::vector<uint16_t> materials;
     std::vector<uint8_t> weights;  ///< of surfels, where the store has them (surfel_weights.h)
     /// 3 per record (x, y, z), each below 2^stepShift; empty where the step is one lattice unit or the node is no leaf.
     std::vector<uint32_t> lowBits;
@@ -29,6 +32,7 @@ struct Chunk {
     void forEachArray(const Use& use) const {
         use(records);
         use(weights);
+        use(materials);
         use(segments);
         use(vertices);
         use(triangles);

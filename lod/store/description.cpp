@@ -26,6 +26,11 @@ float real(const json& j) {
     if (!(std::abs(value) <= std::numeric_limits<float>::max())) throw std::runtime_error("a number is too large");
     return static_cast<float>(value);
 }
+float share(const json& j) {
+    const float value = real(j);
+    if (!(value >= 0 && value <= 1)) throw std::runtime_error("a share is not between 0 and 1");
+    return value;
+}
 std::map<std::string, uint64_t> countsFromJson(const json& j, const char* name) {
     std::map<std::string, uint64_t> out;
     if (j.contains(name))
@@ -125,6 +130,7 @@ json toJson(const StoreDescription& d) {
                 {"added", d.added},
                 {"source", toUtf8(d.source)}};
     if (d.isRigid) out["is_rigid"] = true;
+    for (const PointMaterial& m : d.pointMaterials) out["point_materials"].push_back({m.roughness, m.metallic});
     return out;
 }
 
@@ -188,6 +194,9 @@ StoreDescription fromJson(const json& j) {
     d.dropped = countsFromJson(j, "dropped");
     d.added = countsFromJson(j, "added");
     for (const json& m : j.at("materials")) d.materials.push_back(materialFromJson(m));
+    if (j.contains("point_materials"))
+        for (const json& m : j.at("point_materials")) d.pointMaterials.push_back({share(m.at(0)), share(m.at(1))});
+    if (d.pointMaterials.size() > kMostPointMaterials) throw std::runtime_error("it has too many materials of points");
     return d;
 }
 

@@ -83,8 +83,9 @@ struct Hierarchy {
     std::vector<uint32_t> groupTextures;  ///< see MeshGroup
     std::vector<shared::TextureInfo> textures;
     std::vector<TextureTile> tiles;
-    bool isCurves = false;  ///< all records are segments of ribbons and tubes
-    bool isRigid = false;   ///< such that wind does not bend
+    bool hasMaterials = false;  ///< payloads of points with attributes have an index of materials (materials.h)
+    bool isCurves = false;      ///< all records are segments of ribbons and tubes
+    bool isRigid = false;       ///< such that wind does not bend
     /// Records of a node are discs of one size, in an order in which any beginning shows the whole: n of them stand for
     /// all, sqrt(records / n) times as large. Error codes are those of the radius.
     bool isStochastic = false;

@@ -12,6 +12,7 @@
 #include "lod/store/check.h"
 #include "lod/store/description.h"
 #include "lod/store/layout.h"
+#include "lod/store/materials.h"
 #include "lod/store/mesh_place.h"
 #include "lod/store/tables.h"
 #include "lod/store/zstd_memory.h"
@@ -202,6 +203,7 @@ Result<Store> openStore(const std::string& path) {
     Hierarchy& h = store.hierarchy;
     h.isRigid = store.description.isRigid;
     h.isStochastic = store.description.isStochastic;
+    h.hasMaterials = materialAttribute(store.description).has_value();
     for (const Node& n : h.nodes)
         if (n.isLeaf()) h.finestCode = std::max(h.finestCode, n.errorCode);
     h.discFactors = store.description.discFactors;

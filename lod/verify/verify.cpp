@@ -10,6 +10,7 @@
 #include "engine/base/queue.h"
 #include "lod/primitives/kinds.h"
 #include "lod/primitives/record_spacing.h"
+#include "lod/store/materials.h"
 #include "lod/store/store.h"
 #include "lod/store/surfel_weights.h"
 #include "lod/verify/errors.h"
@@ -43,8 +44,11 @@ Result<void> verifyPayload(const Store& store, uint32_t index, uint64_t discs, C
     }
     STIPPLE_TRY(checkDrawnPlaces(store, index, chunk));
     const bool hasAttributes = payload.attributeBytes > 0 || !h.isMixed;
-    for (size_t a = 0; hasAttributes && a < store.description.attributes.size(); ++a)
-        STIPPLE_TRY(readAttribute(store, index, a));
+    for (size_t a = 0; hasAttributes && a < store.description.attributes.size(); ++a) {
+        STIPPLE_ASSIGN(const std::vector<uint8_t> values, readAttribute(store, index, a));
+        if (payload.kind == Kind::points && materialAttribute(store.description) == a)
+            STIPPLE_TRY(checkMaterialIndices(store, index, values));
+    }
     for (uint32_t k = payload.firstStream; k < payload.firstStream + payload.streams; ++k) {
         STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, readStream(store, index, h.streams[k]));
         if (h.streams[k].id == StreamId::surfelWeights)

@@ -40,6 +40,7 @@ void main() {
     float inverseDepth = 0.0;
     vec3 n = vec3(0.0);
     vec3 colour = vec3(0.0);
+    TexelSurface surface = noSurface();
     const uint count = min(discCount, kDiscCapacity);
     const int firstX = int(gl_WorkGroupID.x * 64u);
     for (uint first = 0u; first < count; first += 64u) {
@@ -61,6 +62,12 @@ void main() {
             inverseDepth += lens.isOrthographic ? w * hit.depth : w / hit.depth;
             n += d.normal * (dot(d.normal, sightTo(lens, d.centre)) > 0.0 ? -w : w);
             colour += w * pointColour(node, r);
+            if (frame.hasMaterials == 0u) continue;
+            const DrawBlock source = blocks[d.id / kRecordsPerBlock];
+            const TexelSurface s = surfaceOfPoint(materialOf(node, source.first + d.id % kRecordsPerBlock));
+            surface.share += w * s.share;
+            surface.metallic += w * s.metallic;
+            surface.roughness += w * s.roughness;
         }
         barrier();
     }
@@ -74,5 +81,9 @@ void main() {
     t.colour = colour / weight;
     t.isRound = 0.0;
     t.axis = vec2(0.0);
+    t.surface = surface;
+    t.surface.share /= weight;
+    t.surface.metallic /= weight;
+    t.surface.roughness /= weight;
     storeTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, pixel, t);
 }

@@ -69,6 +69,7 @@ void putFrame() {
     put(frame.lowPass);
     put(frame.kernelSupport);
     put(frame.perSurfel);
+    put(frame.hasMaterials);
 }
 
 void putNode() {
@@ -86,6 +87,8 @@ void putNode() {
     put(node.errorPixels);
     put(node.spacing);
     put(node.weights);
+    put(node.material);
+    put(node.materials);
 }
 
 void putBlock() {

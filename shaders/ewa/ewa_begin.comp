@@ -25,4 +25,5 @@ void main() {
         s.reference = rayOnDisc(d, k, range, ivec2(pixel)).depth;
     }
     sums[at] = s;
+    if (frame.hasMaterials != 0u) materialSums[at] = MaterialSums(0, 0, 0);
 }

@@ -32,13 +32,18 @@ void main() {
             const float ofColour = perSurfel ? 1.0 / min(float(s.weight), s.unit) : over;
             p.colour = packColour(float(s.red) * ofColour, float(s.green) * ofColour, float(s.blue) * ofColour);
             p.normal = octEncode(vec3(s.nx, s.ny, s.nz) * over);
+            if (frame.hasMaterials != 0u) {
+                const MaterialSums m = materialSums[at];
+                p.cover = coverOfMaterial(TexelSurface(float(m.share) * over, float(m.metallic) * over, float(m.roughness) * over));
+            }
         } else {
             const vec3 c = pointColour(node, r);
             p.colour = packColour(c.x, c.y, c.z);
             p.normal = octEncode(towardsEye(opaqueDisc(node, r, id)));
+            if (frame.hasMaterials != 0u) p.cover = coverOfMaterial(surfaceOf(id, node));
         }
         const bool isBefore = hasFront && (s.behind != 0u || hasExact);
-        p.cover = (isBefore ? 255u : code) | (hasFront ? kFilteredFront : 0u) | ((recordFlags(r) & kFlagLeaf) != 0u ? kFilteredLeaf : 0u);
+        p.cover |= (isBefore ? 255u : code) | (hasFront ? kFilteredFront : 0u) | ((recordFlags(r) & kFlagLeaf) != 0u ? kFilteredLeaf : 0u);
         visibility[at] = visibilityKey(floatBitsToUint(depth), drawId(0u, id));
     }
     filtered[at] = p;

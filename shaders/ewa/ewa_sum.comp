@@ -33,8 +33,9 @@ void addOwn() {
     }
     const vec3 colour = pointColour(node, r);
     const float scale = scaleOf(id, node);
+    const TexelSurface surface = surfaceOf(id, node);
     for (int y = box.first.y; y <= box.last.y; ++y)
-        for (int x = box.first.x; x <= box.last.x; ++x) addKernel(d, colour, scale, k, range, ivec2(x, y));
+        for (int x = box.first.x; x <= box.last.x; ++x) addKernel(d, colour, surface, scale, k, range, ivec2(x, y));
 }
 
 void main() {
@@ -51,9 +52,10 @@ void main() {
         const DepthRange range = depthRange(d, sigma, frame.kernelSupport, frame.lowPass, lens);
         const vec3 colour = pointColour(node, r);
         const float scale = scaleOf(leftIds[i], node);
+        const TexelSurface surface = surfaceOf(leftIds[i], node);
         const PixelBox box = boxOf(d, k);
         const int pixels = pixelsOf(box.first, box.last);
         for (int p = int(gl_LocalInvocationID.x); p < pixels; p += 256)
-            addKernel(d, colour, scale, k, range, pixelOf(p, box.first, box.last));
+            addKernel(d, colour, surface, scale, k, range, pixelOf(p, box.first, box.last));
     }
 }

@@ -22,7 +22,7 @@ void main() {
         const int pixels = width * (rows.y - rows.x + 1);
         for (int p = int(gl_LocalInvocationID.x); p < pixels; p += 256) {
             const ivec2 at = ivec2(box.first.x + p % width, rows.x + p / width);
-            addKernel(d, pointColour(node, r), scaleOf(d.id, node), k, range, at);
+            addKernel(d, pointColour(node, r), surfaceOf(d.id, node), scaleOf(d.id, node), k, range, at);
         }
     }
 }

@@ -20,6 +20,7 @@ void main() {
     t.colour = vec3(0.0);
     t.isRound = 0.0;
     t.axis = vec2(0.0);
+    t.surface = noSurface();
     const uint64_t key = visibility[pixel.y * frame.width + pixel.x];
     if (isPointKey(key, frame.firstBlock)) {  // other kinds come later
         const DrawBlock source = blocks[keyBlock(key)];
@@ -29,6 +30,7 @@ void main() {
         const Lens lens = frameLensHere();
         vec3 n = -normalize(sightTo(lens, c));
         if ((recordFlags(r) & kFlagNoNormal) == 0u) n = nodeUnitNormal(node, octDecode(r.normal));
+        const TexelSurface surface = surfaceOfPoint(frame.hasMaterials != 0u ? materialOf(node, source.first + keyLane(key)) : kPlainPoint);
         const float radius = min(node.edge * radiusFraction(recordRadiusCode(r)) * frame.supportScale, lensDepth(lens, c.z) * largestSplat(recordFlags(r), frame.focal, frame.height));
         if (stepInfo.exactPoints != 0u) {  // no splat, but what the pixel shows
             const vec3 v = viewDirection(float(pixel.x) + 0.5 - frame.centre.x, float(pixel.y) + 0.5 - frame.centre.y, lens);
@@ -37,11 +39,13 @@ void main() {
             t.thickness = (recordFlags(r) & kFlagLeaf) != 0u ? kLeafThickness * kExactRadius : kExactRadius;
             t.normalPerp = perpFromNormal(dot(n, v) > 0.0 ? -n : n, v);
             t.colour = pointColour(node, r);
+            t.surface = surface;
             if (stepInfo.hasFiltered != 0u) {
                 const FilteredPixel p = filtered[pixel.y * frame.width + pixel.x];
                 t.normalPerp = perpFromNormal(octDecode(p.normal), v);
                 t.thickness = (p.cover & kFilteredLeaf) != 0u ? kLeafThickness * kExactRadius : kExactRadius;
                 t.colour = vec3(unpackRed(p.colour), unpackGreen(p.colour), unpackBlue(p.colour));
+                t.surface = surfaceOfPoint((p.cover & kFilteredMaterial) != 0u ? p.cover >> 16 : kPlainPoint);
             }
             storeTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, pixel, t);
             return;
@@ -51,6 +55,7 @@ void main() {
         const float scale = frame.focal / lensDepth(lens, c.z);
         t.offset = vec2(c.x * scale + (frame.centre.x - 0.5) - float(pixel.x), c.y * scale + (frame.centre.y - 0.5) - float(pixel.y));
         t.colour = pointColour(node, r);
+        t.surface = surface;
         atomicMax(largestRadiusBits, floatBitsToUint(t.radius));
     }
     storeTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, pixel, t);

@@ -28,10 +28,11 @@ const uint kFrontsBinding = 20u;
 const uint kSumsBinding = 21u;
 const uint kFilteredBinding = 22u;
 const uint kCoverageBinding = 23u;
-const uint kBindings = 24u;
+const uint kMaterialSumsBinding = 24u;
+const uint kBindings = 25u;
 
 // Per pixel:
-const uint kTexelWords = 5u;     // planes of a packed texel
+const uint kTexelWords = 5u;     // planes of a packed texel; in frames with materials of points one more
 const uint kTriangleWords = 2u;  // material, emission
 const uint kExtraFloats = 7u;    // depth, normal xyz, linear rgb
 

@@ -5,6 +5,7 @@
 #define STIPPLE_SHARED_EWA_H
 #include "pyramid.h"
 #include "splat_disc.h"
+#include "surface.h"
 #include "visibility.h"
 SHARED_BEGIN
 
@@ -176,8 +177,19 @@ struct FilteredSums {
     float reference;  // depth, which others are told against
     float unit;       // what 1 is (sumUnit)
 };
+// The same of materials, only in frames that have them.
+struct MaterialSums {
+    int share;
+    int metallic;
+    int roughness;
+};
 const uint kFilteredFront = 256u;  // opaque: else a rim that only coverage shows
 const uint kFilteredLeaf = 512u;
+const uint kFilteredMaterial = 1024u;  // of a material, which is the upper half
+SHARED_FN uint coverOfMaterial(TexelSurface s) {
+    const uint word = surfaceWord(s);
+    return (word & kPixelMaterial) != 0u ? kFilteredMaterial | (word & 0xffffu) << 16 : 0u;
+}
 
 SHARED_END
 #endif

@@ -25,6 +25,9 @@ struct DrawNode {
     float errorPixels;  // screen-space error delivered by this node, for the debug view
     float spacing;      // of its records on their surface, world units; 0: not known
     uint weights;       // records of its chunk, where weights of surfels lie behind them; 0: there are none
+    uint material;      // of points without materials of their own (material.h): packed, or kPlainPoint
+    uint
+        materials;  // of points: behind so many records (and weights) lie materials, two a word; 0: all have `material`
 };
 
 const uint kNodeTurned = 256u;  // the store's own axes are not those of the world
@@ -129,6 +132,7 @@ struct FrameConstants {
     float lowPass;        // mode ewa: variance, px^2
     float kernelSupport;  // mode ewa: where kernels end, in sigmas
     uint perSurfel;       // mode ewa: 1: surfels have weights (surfel_weight.h), and pixels are not divided by them
+    uint hasMaterials;    // some points have materials
 };
 SHARED_FN Lens frameLens(FrameConstants f) { return lensOf(f.focal, f.orthographic != 0u); }
 

@@ -27,5 +27,13 @@ struct SurfaceMaterial {
     TextureSlot emissiveTexture;
 };
 
+// The material of a point, packed: metallic 8 | roughness 8. (Its base colour is its own.)
+SHARED_FN uint packPointMaterial(float roughness, float metallic) {
+    return uint(int(min(max(0.0f, metallic), 1.0f) * 255.0f + 0.5f)) |
+           uint(int(min(max(0.0f, roughness), 1.0f) * 255.0f + 0.5f)) << 8;
+}
+const uint kPlainPoint = 0x10000u;    // in its place: no material
+const uint kOnlyMaterial = 0x20000u;  // of a node's: instead of those of its records
+
 SHARED_END
 #endif

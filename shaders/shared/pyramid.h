@@ -24,6 +24,7 @@ struct Blend {
     float blue;
     float axisX;
     float axisY;
+    TexelSurface surface;
 };
 
 SHARED_FN Blend emptyBlend() {
@@ -41,6 +42,7 @@ SHARED_FN Blend emptyBlend() {
     b.blue = 0.0f;
     b.axisX = 0.0f;
     b.axisY = 0.0f;
+    b.surface = noSurface();
     return b;
 }
 
@@ -60,6 +62,9 @@ SHARED_FN Blend addToBlend(Blend b, Texel t, float inverseDepth, float x, float 
     b.blue += weight * t.colour.z;
     b.axisX += weight * t.axis.x;
     b.axisY += weight * t.axis.y;
+    b.surface.share += weight * t.surface.share;
+    b.surface.metallic += weight * t.surface.metallic;
+    b.surface.roughness += weight * t.surface.roughness;
     return b;
 }
 
@@ -75,6 +80,9 @@ SHARED_FN Texel texelFromBlend(Blend b, float isRound, Lens lens) {
     t.colour = vec3(b.red * s, b.green * s, b.blue * s);
     t.isRound = isRound;
     t.axis = vec2(b.axisX * s, b.axisY * s);
+    t.surface.share = b.surface.share * s;
+    t.surface.metallic = b.surface.metallic * s;
+    t.surface.roughness = b.surface.roughness * s;
     return t;
 }
 
@@ -230,6 +238,9 @@ SHARED_FN Texel chosenTexel(bool first, Texel a, Texel b) {
     t.colour = vec3(first ? a.colour.x : b.colour.x, first ? a.colour.y : b.colour.y, first ? a.colour.z : b.colour.z);
     t.isRound = first ? a.isRound : b.isRound;
     t.axis = vec2(first ? a.axis.x : b.axis.x, first ? a.axis.y : b.axis.y);
+    t.surface.share = first ? a.surface.share : b.surface.share;
+    t.surface.metallic = first ? a.surface.metallic : b.surface.metallic;
+    t.surface.roughness = first ? a.surface.roughness : b.surface.roughness;
     return t;
 }
 

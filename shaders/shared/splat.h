@@ -10,6 +10,28 @@
 #include "lens.h"
 SHARED_BEGIN
 
+// What lights a texel beside its normal and colour. All 0 where it has no material: then it is lit by one formula.
+struct TexelSurface {
+    float share;     // of what was merged that has a material
+    float metallic;  // times share, as roughness is
+    float roughness;
+};
+SHARED_FN TexelSurface noSurface() {
+    TexelSurface s;
+    s.share = 0.0f;
+    s.metallic = 0.0f;
+    s.roughness = 0.0f;
+    return s;
+}
+// `material`: of a point (material.h).
+SHARED_FN TexelSurface surfaceOfPoint(uint material) {
+    TexelSurface s;
+    s.share = material < 0x10000u ? 1.0f : 0.0f;
+    s.metallic = s.share * float(int(material & 255u)) * (1.0f / 255.0f);
+    s.roughness = s.share * float(int(material >> 8 & 255u)) * (1.0f / 255.0f);
+    return s;
+}
+
 struct Texel {
     float depth;      // linear, world units; 0: empty; < 0: outside the image
     float radius;     // pixels of the full-size image
@@ -20,8 +42,9 @@ struct Texel {
     // Of a tube (ALGORITHMS 1.4, lines): its disc faces the eye, `normalPerp` says how the tube leans instead: t_v
     // t_perp, with t the unit tangent, t_v along the view and t_perp across; `axis` is (tx^2 - ty^2, 2 tx ty), which
     // does not care which way the tangent points. Thickness equals the radius.
-    float isRound;  // 1 or 0
-    vec2 axis;      // of all else axis.x is 1 where only parts of narrow ribbons were merged
+    float isRound;         // 1 or 0
+    vec2 axis;             // of all else axis.x is 1 where only parts of narrow ribbons were merged
+    TexelSurface surface;  // only of frames with materials of points
 };
 
 const float kThicknessRadii = 0.25f;  // kappa of ALGORITHMS 1.4
@@ -134,6 +157,7 @@ SHARED_FN Texel texelFromSplat(vec3 c, vec3 n, float radiusWorld, Lens lens, flo
     t.colour = vec3(0.0f, 0.0f, 0.0f);
     t.isRound = 0.0f;
     t.axis = vec2(0.0f, 0.0f);
+    t.surface = noSurface();
     return t;
 }
 

@@ -2,7 +2,7 @@
 // nothing else (but the emission of triangles, which lies beside it).
 #ifndef STIPPLE_SHARED_SURFACE_H
 #define STIPPLE_SHARED_SURFACE_H
-#include "types.h"
+#include "splat.h"
 SHARED_BEGIN
 
 struct SurfaceWords {
@@ -13,8 +13,17 @@ struct SurfaceWords {
 };
 const uint kPixelTriangle = 0x80000000u;
 const uint kPixelUnlit = 0x40000000u;
-const uint kPixelLeaf = 0x20000000u;     // lets light through
-const uint kPlainSurface = 0x00ffff00u;  // what points are: not metallic, rough, not occluded
+const uint kPixelLeaf = 0x20000000u;      // lets light through
+const uint kPixelMaterial = 0x10000000u;  // of points that have a material: lit as triangles are
+const uint kPlainSurface = 0x00ffff00u;   // what points are: not metallic, rough, not occluded
+
+// The material word of what splats were merged to: plain where most of it is.
+SHARED_FN uint surfaceWord(TexelSurface s) {
+    const float inverse = 255.0f / max(s.share, 1.0e-3f);
+    const uint metallic = uint(int(min(max(0.0f, s.metallic * inverse), 255.0f) + 0.5f));
+    const uint roughness = uint(int(min(max(0.0f, s.roughness * inverse), 255.0f) + 0.5f));
+    return s.share > 0.5f ? kPixelMaterial | 0x00ff0000u | metallic | roughness << 8 : kPlainSurface;
+}
 
 // The nearest code of a unit vector: see octDirection.
 SHARED_FN uint octEncode(vec3 n) {

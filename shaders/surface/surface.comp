@@ -15,7 +15,7 @@ void main() {
     if (stepInfo.hasPyramid != 0u) t = pushedTexel(ivec2(pixel), own);
     SurfaceWords s;
     s.material = stepInfo.hasTriangles != 0u ? triangleWords[2u * place] : 0u;
-    if (t.depth != own.depth || s.material == 0u) s.material = kPlainSurface;  // no triangle, or a splat in front
+    if (t.depth != own.depth || s.material == 0u) s.material = surfaceWord(t.surface);  // no triangle, or a splat in front
     t = finished(t);
     s.depth = t.depth > 0.0 ? depthAt(t, pixel) : t.depth;
     s.normal = 0u;

@@ -69,6 +69,7 @@ void main() {
     t.offset = vec2(0.0);
     t.normalPerp = perpFromNormal(normal, normalize(ray));
     t.colour = colour;
+    t.surface = noSurface();
     if (frame.debugView == kDebugLevel) t.colour = debugLevelColour(c.level);
     if (frame.debugView == kDebugError) t.colour = debugErrorColour(c.errorPixels);
     storeTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, pixel, t);

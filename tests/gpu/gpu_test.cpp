@@ -431,6 +431,7 @@ TEST(Shaders, TouchThePlanesThatTheirPassesDeclare) {
                                                       {shared::kDiscsBinding, {Plane::discList}},
                                                       {shared::kFrontsBinding, {Plane::filtered}},
                                                       {shared::kSumsBinding, {Plane::filtered}},
+                                                      {shared::kMaterialSumsBinding, {Plane::filtered}},
                                                       {shared::kFilteredBinding, {Plane::filtered}},
                                                       {shared::kCoverageBinding, {Plane::filtered}},
                                                       {shared::kTexelsBinding, {Plane::texels, Plane::coarse}},

@@ -149,7 +149,7 @@ TEST(KernelFormulas, TexelsArePackedAndUnpackedAsOne) {
         row->hasTubes = back->hasTubes = false;
         std::vector<float> depth(n);
         std::vector<uint32_t> size(n), offset(n), normal(n), colour(n);
-        const cpu::Planes planes{depth.data(), size.data(), offset.data(), normal.data(), colour.data()};
+        const cpu::Planes planes{depth.data(), size.data(), offset.data(), normal.data(), colour.data(), nullptr};
         for (int round = 0; round < 100; ++round) {
             std::vector<Texel> texels;
             for (uint32_t i = 0; i < n; ++i) put(*row, cpu::kPad + i, texels.emplace_back(randomTexel(rng, true)));

@@ -83,8 +83,12 @@ void findBlocks(Frame& frame) {
     for (size_t b = 0; b < frame.blocks.size(); ++b) {
         const shared::DrawBlock& block = points.blocks[b];
         const lod::Chunk& chunk = frame.chunks.at(points.keys[block.node]);
-        frame.blocks[b] = {chunk.records.data() + block.first, &points.nodes[block.node],
-                           chunk.weights.empty() ? nullptr : chunk.weights.data() + block.first};
+        const shared::DrawNode& node = points.nodes[block.node];
+        const bool hasOwn =
+            node.materials > 0 && (node.material & shared::kOnlyMaterial) == 0 && !chunk.materials.empty();
+        frame.blocks[b] = {chunk.records.data() + block.first, &node,
+                           chunk.weights.empty() ? nullptr : chunk.weights.data() + block.first,
+                           hasOwn ? chunk.materials.data() + block.first : nullptr};
     }
 }
 

@@ -48,6 +48,7 @@ void resolve(Frame& frame) {
     frame.pyramid.forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
         TexelRow upper{}, lower{}, out{};  // what is empty is multiplied by 0, so it must be finite
         upper.hasTubes = lower.hasTubes = out.hasTubes = frame.hasCurves;
+        upper.hasMaterials = lower.hasMaterials = out.hasMaterials = frame.constants.hasMaterials != 0;
         float largest = 0;
         for (uint32_t y = row0; y < row1; y += 2) {
             bool any = false;

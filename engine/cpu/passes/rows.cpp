@@ -51,6 +51,7 @@ bool takeRow(const RowPlace& at, const SurfacePlanes& planes, SurfaceRow& row) {
     const shared::SurfaceWords* const words = at.frame.surfaceWords.data() + at.first;
     row.hasTriangles = planes.surface != nullptr;
     row.hasEmission = planes.surface != nullptr && planes.emissive != nullptr;
+    row.hasMaterials = at.frame.constants.hasMaterials != 0;
     bool any = false;
     for (size_t i = 0; i < at.n; ++i) {
         const shared::SurfaceWords& w = words[i];
@@ -163,6 +164,7 @@ void runRows(Frame& frame, std::span<const render::Pass> passes) {
         }
         thread_local TexelRow row{};
         row.hasTubes = frame.hasCurves;
+        row.hasMaterials = frame.constants.hasMaterials != 0;
         for (uint32_t y = row0; y < row1; ++y) {
             const bool any = frame.pyramid.loadRow(fine, planes, y, x0, n, kPad, row);
             program.run(x0, n, y, row, row, any);

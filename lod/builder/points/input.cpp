@@ -59,6 +59,7 @@ Result<void> PointInput::openAll(const std::vector<std::string>& inputs, const B
             return fail(ErrorKind::usage, fmt::format("has no attribute '{}'", options.attributes[k]), firstPath(),
                         known.empty() ? "it has none" : "it has " + known);
         }
+    findMaterials();
     if (allLattice_) {
         std::vector<SourceInfo> infos;
         for (const PointSource& s : sources_) infos.push_back(s.info);
@@ -68,6 +69,36 @@ Result<void> PointInput::openAll(const std::vector<std::string>& inputs, const B
     source = std::filesystem::path(firstPath()).filename().string();
     if (sources_.size() > 1) source += fmt::format(" and {} more", sources_.size() - 1);
     return {};
+}
+
+/// One list for all sources: theirs where it is the same, else the grid. A source without materials is matte among
+/// others that have some.
+void PointInput::findMaterials() {
+    const std::vector<PointMaterial> none{PointMaterial{}};
+    const auto listOf = [&](const PointSource& s) { return s.info.materials.empty() ? none : s.info.materials; };
+    const bool hasAny =
+        std::any_of(sources_.begin(), sources_.end(), [](const auto& s) { return !s.info.materials.empty(); });
+    if (settings_.material) {
+        materials = {*settings_.material};
+    } else if (hasAny) {
+        materials = listOf(sources_.front());
+        for (const PointSource& s : sources_)
+            if (listOf(s) != materials) materials = materialGrid();
+    }
+    isReflectance = isReflectance || !materials.empty();
+    if (materials.size() < 2) return;
+    for (const PointSource& s : sources_) {
+        const std::vector<PointMaterial> own = listOf(s);
+        std::vector<uint8_t>& numbers = materialOf_.emplace_back();
+        for (size_t i = 0; i < own.size(); ++i)
+            numbers.push_back(own == materials ? static_cast<uint8_t>(i)
+                                               : gridIndex(double{own[i].roughness}, double{own[i].metallic}));
+    }
+    AttributeInfo index;
+    index.name = kMaterialAttribute;
+    index.aggregate = Aggregate::mode;
+    index.description = "number in the list of materials";
+    attributes_.push_back(index);
 }
 
 Result<PointSource> PointInput::openInput(const std::string& path, const ReadOptions& options) const {

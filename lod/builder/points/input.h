@@ -51,6 +51,7 @@ class PointInput {
     uint64_t points = 0;                 ///< that can be used
     Points sample;                       ///< places of every sampleShare-th point, about
     uint64_t sampleShare = 1;
+    std::vector<PointMaterial> materials;  ///< of all; several: the last of attributes() counts them
     bool hasColour = false, hasNormal = false, hasRadius = false, isReflectance = false;
     UpAxis up = UpAxis::z;
     Crs crs;
@@ -93,6 +94,7 @@ class PointInput {
     Result<PointSource> openInput(const std::string& path, const ReadOptions& options) const;
     Result<void> collectNames(const std::vector<std::string>& files, ReadOptions& options, BuildReport& report) const;
     Result<void> adopt(PointSource source, const ReadOptions& options, std::vector<bool>& found, BuildReport& report);
+    void findMaterials();
     bool isOwnPart(size_t part) const;
     void exchangeParts();
     void putPart(size_t i, ByteWriter& to);
@@ -128,12 +130,14 @@ class PointInput {
     void placeEach(const Part& part, const PointBlock& block, size_t count, Points& out, const Put& put) const;
     bool isWithin(const Points& block) const;
     void fill(const Part& part, const PointBlock& block, Points& out) const;
+    void fillMaterials(const Part& part, const PointBlock& block, size_t count, std::vector<uint8_t>& out) const;
 
     BuildSettings settings_;
     std::vector<PointSource> sources_;
     std::vector<Part> parts_;
     std::vector<AttributeInfo> attributes_;
-    CommonLattice lattice_;  ///< where all sources are lattices
+    std::vector<std::vector<uint8_t>> materialOf_;  ///< of each source: its materials' numbers in `materials`
+    CommonLattice lattice_;                         ///< where all sources are lattices
     Outliers outliers_;
     std::vector<bool> isWide_;  ///< colours of a source have 16 bits
     std::vector<uint32_t> sourceColourMax_;

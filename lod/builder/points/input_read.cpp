@@ -137,9 +137,20 @@ size_t PointInput::leaveOut(const Part& part, PointBlock& block, size_t count, u
     keepOnly(block.colour16, kept);
     keepOnly(block.normal, kept);
     keepOnly(block.radius, kept);
+    keepOnly(block.material, kept);
     for (size_t k = 0; k < block.attributes.size(); ++k)
         keepOnly(block.attributes[k], kept, bytesOf(attributes_[k].type));
     return kept.size();
+}
+
+void PointInput::fillMaterials(const Part& part, const PointBlock& block, size_t count,
+                               std::vector<uint8_t>& out) const {
+    const std::vector<uint8_t>& numbers = materialOf_[part.source];
+    out.resize(count);
+    for (size_t i = 0; i < count; ++i) {
+        const size_t own = block.material.empty() ? 0 : block.material[i];
+        out[i] = numbers[own < numbers.size() ? own : 0];
+    }
 }
 
 /// Everything but the positions.
@@ -169,7 +180,9 @@ void PointInput::fill(const Part& part, const PointBlock& block, Points& out) co
         out.radius[i] = std::isfinite(block.radius[i]) && block.radius[i] > 0 ? block.radius[i] * perUnit : 0.0f;
     out.attributes.resize(attributes_.size());
     for (size_t k = 0; k < attributes_.size(); ++k) {
-        if (k < block.attributes.size() && !block.attributes[k].empty())
+        if (!materialOf_.empty() && k + 1 == attributes_.size())
+            fillMaterials(part, block, count, out.attributes[k]);
+        else if (k < block.attributes.size() && !block.attributes[k].empty())
             out.attributes[k] = block.attributes[k];
         else
             out.attributes[k].assign(count * bytesOf(attributes_[k].type), 0);

@@ -30,7 +30,7 @@ bool parseType(const std::string& name, PlyType& type) {
 }
 
 PlyRole parseRole(const std::string& name) {
-    static const std::array<std::pair<const char*, PlyRole>, 20> names{{{"x", PlyRole::x},
+    static const std::array<std::pair<const char*, PlyRole>, 23> names{{{"x", PlyRole::x},
                                                                         {"y", PlyRole::y},
                                                                         {"z", PlyRole::z},
                                                                         {"nx", PlyRole::nx},
@@ -49,7 +49,10 @@ PlyRole parseRole(const std::string& name) {
                                                                         {"diffuse_green", PlyRole::green},
                                                                         {"diffuse_blue", PlyRole::blue},
                                                                         {"radius", PlyRole::radius},
-                                                                        {"value", PlyRole::none}}};
+                                                                        {"value", PlyRole::none},
+                                                                        {"roughness", PlyRole::roughness},
+                                                                        {"metallic", PlyRole::metallic},
+                                                                        {"metalness", PlyRole::metallic}}};
     for (const auto& [text, role] : names)
         if (name == text) return role;
     return PlyRole::none;

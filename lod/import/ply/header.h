@@ -13,8 +13,8 @@ namespace stipple::lod {
 
 enum class PlyType : uint8_t { i8, u8, i16, u16, i32, u32, f32, f64 };
 constexpr std::array<uint8_t, 8> kPlyTypeBytes{1, 1, 2, 2, 4, 4, 4, 8};
-enum class PlyRole : int8_t { none = -1, x, y, z, nx, ny, nz, red, green, blue, radius };
-constexpr size_t kPlyRoles = 10;
+enum class PlyRole : int8_t { none = -1, x, y, z, nx, ny, nz, red, green, blue, radius, roughness, metallic };
+constexpr size_t kPlyRoles = 12;
 constexpr size_t kMostAttributes = 64;
 
 struct PlyProperty {

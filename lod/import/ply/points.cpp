@@ -66,6 +66,10 @@ Result<PointSource> openPly(const std::string& path, const ReadOptions& options)
     info.hasNormal = (roles >> 3 & 7u) == 7u;
     info.hasColour = (roles >> 6 & 7u) == 7u;
     info.hasRadius = (roles >> 9 & 1u) != 0;
+    if ((roles >> 10 & 3u) != 0) {
+        info.materials = materialGrid();
+        info.isReflectance = true;
+    }
     info.up = UpAxis::y;
     source.parts = {info.points};
     // Read once, whoever reads first.

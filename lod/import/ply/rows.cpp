@@ -62,6 +62,12 @@ std::optional<PlyType> colourTypeOf(const PlyHeader& header) {
     return channels == 3 ? widest : std::nullopt;
 }
 
+/// What stands for 1 where a property is a share.
+double largestOf(PlyType type) {
+    if (type >= PlyType::f32) return 1;
+    return type < PlyType::i16 ? 255 : type < PlyType::i32 ? 65535 : 4294967295.0;
+}
+
 /// Lengths of normals do not matter: what is no float keeps its direction.
 glm::vec3 normalOf(const glm::dvec3& n) {
     const double largest = std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)});
@@ -125,8 +131,13 @@ Result<size_t> PlyReader::read(PointBlock& block, size_t limit) {
     STIPPLE_TRY(begin());
     const auto count = static_cast<size_t>(std::min<uint64_t>({limit, vertex_->count - next_, 65536}));
     std::array<bool, kPlyRoles> has{};
+    std::array<double, kPlyRoles> most{};
+    most.fill(1);
     for (const PlyProperty& p : vertex_->properties)
-        if (p.role != PlyRole::none) has.at(static_cast<size_t>(p.role)) = true;
+        if (p.role != PlyRole::none) {
+            has.at(static_cast<size_t>(p.role)) = true;
+            most.at(static_cast<size_t>(p.role)) = largestOf(p.type);
+        }
     block.position.reserve(count);
     block.attributes.resize(wanted_);
     for (size_t i = 0; i < count; ++i) {
@@ -141,6 +152,7 @@ Result<size_t> PlyReader::read(PointBlock& block, size_t limit) {
             block.colour.push_back(channel(v[6]) | channel(v[7]) << 8 | channel(v[8]) << 16);
         }
         if (has[9]) block.radius.push_back(toFloat(v[9]));
+        if (has[10] || has[11]) block.material.push_back(gridIndex(has[10] ? v[10] / most[10] : 1, v[11] / most[11]));
         for (const auto& [slot, wide] : attributes_) {
             auto& values = block.attributes[slot - kPlyRoles];
             const float narrow = toFloat(v.at(slot));

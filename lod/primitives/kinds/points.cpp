@@ -15,7 +15,9 @@ Result<Chunk> decode(const Hierarchy& h, uint32_t chunk, const uint8_t* bytes, s
 }
 uint64_t decodedBytesOfPoints(const Hierarchy& h, uint32_t chunk) {
     const uint64_t records = h.payload(chunk).records;
-    return records * sizeof(shared::PointRecord) + (weightsOf(h, chunk) != nullptr ? weightBytes(records) : 0);
+    const bool hasMaterials = h.hasMaterials && h.payload(chunk).attributeBytes > 0;
+    return records * (sizeof(shared::PointRecord) + (hasMaterials ? sizeof(uint16_t) : 0)) +
+           (weightsOf(h, chunk) != nullptr ? weightBytes(records) : 0);
 }
 uint64_t fewestBytes(const Hierarchy& h, uint32_t chunk) {
     return fewestEncodedBytes(h.payload(chunk).records, sizeof(shared::PointRecord));

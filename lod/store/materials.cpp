@@ -1,0 +1,68 @@
+#include "lod/store/materials.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "lod/store/attributes.h"
+#include "lod/store/check.h"
+#include "shaders/shared/material.h"
+
+namespace stipple::lod {
+namespace {
+
+bool hasIndex(const Store& store, uint32_t chunk) {
+    return store.hierarchy.hasMaterials && !store.hierarchy.isTile(chunk) &&
+           store.hierarchy.payload(chunk).kind == Kind::points && store.hierarchy.payload(chunk).attributeBytes > 0;
+}
+
+void give(const Store& store, const std::vector<uint8_t>& indices, Chunk& to) {
+    const std::vector<PointMaterial>& list = store.description.pointMaterials;
+    to.materials.resize(indices.size());
+    for (size_t i = 0; i < indices.size(); ++i)
+        to.materials[i] = packed(list[indices[i] < list.size() ? indices[i] : 0]);
+}
+
+}  // namespace
+
+uint16_t packed(const PointMaterial& m) {
+    return static_cast<uint16_t>(shared::packPointMaterial(m.roughness, m.metallic));
+}
+
+uint32_t defaultMaterial(const StoreDescription& d) {
+    return d.pointMaterials.empty() ? shared::kPlainPoint : packed(d.pointMaterials.front());
+}
+
+std::optional<size_t> materialAttribute(const StoreDescription& d) {
+    for (size_t a = d.attributes.size(); a-- > 0 && !d.pointMaterials.empty();)  // the build puts it last
+        if (d.attributes[a].name == kMaterialAttribute && d.attributes[a].type == ScalarType::u8) return a;
+    return {};
+}
+
+Result<void> addMaterials(const Store& store, uint32_t chunk, const uint8_t* attributes, size_t bytes, Chunk& to) {
+    if (!hasIndex(store, chunk)) return {};
+    const std::string where = fmt::format("{}: chunk {}", store.path, chunk);
+    STIPPLE_ASSIGN(const std::vector<uint8_t> indices, decodeAttribute(attributes, bytes, store.description.attributes,
+                                                                       *materialAttribute(store.description),
+                                                                       store.hierarchy.payload(chunk).records, where));
+    give(store, indices, to);
+    return {};
+}
+
+Result<void> addMaterials(const Store& store, uint32_t chunk, Chunk& to) {
+    if (!hasIndex(store, chunk)) return {};
+    STIPPLE_ASSIGN(const std::vector<uint8_t> indices,
+                   readAttribute(store, chunk, *materialAttribute(store.description)));
+    give(store, indices, to);
+    return {};
+}
+
+Result<void> checkMaterialIndices(const Store& store, uint32_t chunk, const std::vector<uint8_t>& indices) {
+    const size_t count = store.description.pointMaterials.size();
+    const auto beyond = std::find_if(indices.begin(), indices.end(), [&](uint8_t i) { return i >= count; });
+    if (beyond == indices.end()) return {};
+    return tl::unexpected(damagedStore(fmt::format("{}: chunk {}", store.path, chunk),
+                                       fmt::format("a record names material {}, which there is not", *beyond)));
+}
+
+}  // namespace stipple::lod
