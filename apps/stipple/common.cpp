@@ -69,9 +69,13 @@ void MaterialOptions::addTo(CLI::App& app, const char* of) {
     app.add_option("--material", name, fmt::format("material of {}: {}", of, lod::kMaterialNames))
         ->check(oneOf({"matte", "plastic", "metal"}))
         ->type_name("NAME");
-    app.add_option("--roughness", roughness, fmt::format("roughness of {}, 0 (mirror) to 1", of))
+    app.add_option(
+           "--roughness", roughness,
+           fmt::format("roughness, 0 (mirror) to 1, of {}; what --metallic and --material leave open is matte", of))
         ->transform(within(0.0, 1.0));
-    app.add_option("--metallic", metallic, fmt::format("how metallic {} are, 0 to 1", of))->transform(within(0.0, 1.0));
+    app.add_option("--metallic", metallic,
+                   fmt::format("0 to 1 (metal), of {}; what --roughness and --material leave open is matte", of))
+        ->transform(within(0.0, 1.0));
 }
 
 std::optional<lod::PointMaterial> MaterialOptions::material() const {

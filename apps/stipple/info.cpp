@@ -148,6 +148,19 @@ nlohmann::json storeInfo(const lod::Store& store) {
             {"has_normals", d.hasNormals}};
 }
 
+/// Those that most points have.
+void printMaterials(const nlohmann::json& all) {
+    constexpr size_t kMost = 8;
+    std::vector<nlohmann::json> used;
+    for (const auto& m : all)
+        if (m["points"] != 0) used.push_back(m);
+    std::stable_sort(used.begin(), used.end(), [](const auto& a, const auto& b) { return a["points"] > b["points"]; });
+    for (size_t i = 0; i < std::min(used.size(), kMost); ++i)
+        fmt::print("  material      roughness {:.2g}, metallic {:.2g}: {} points\n", used[i]["roughness"].get<double>(),
+                   used[i]["metallic"].get<double>(), used[i]["points"].get<uint64_t>());
+    if (used.size() > kMost) fmt::print("  material      and {} more\n", used.size() - kMost);
+}
+
 void printStore(const nlohmann::json& j) {
     const auto vec = [](const nlohmann::json& v) {
         return fmt::format("{:.10g} {:.10g} {:.10g}", v[0].get<double>(), v[1].get<double>(), v[2].get<double>());
@@ -181,10 +194,7 @@ void printStore(const nlohmann::json& j) {
                    ? isMesh || j["primitive"] == "segments" ? "yes" : "yes, stored to 0.12 degrees"
                    : "no");
     if (!j["crs"].get<std::string>().empty()) fmt::print("  crs           {}\n", j["crs"].get<std::string>());
-    for (const auto& m : j["point_materials"])
-        if (m["points"] != 0)
-            fmt::print("  material      roughness {:.2g}, metallic {:.2g}: {} points\n", m["roughness"].get<double>(),
-                       m["metallic"].get<double>(), m["points"].get<uint64_t>());
+    printMaterials(j["point_materials"]);
     for (const auto& a : j["attributes"])
         fmt::print("  attribute     {} ({}, coarse levels: {}), {:.15g} .. {:.15g}{}\n", a["name"].get<std::string>(),
                    a["type"].get<std::string>(), a["aggregate"].get<std::string>(), a["least"].get<double>(),

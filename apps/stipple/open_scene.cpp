@@ -366,6 +366,7 @@ Result<lod::BuildReport> buildFiles(const std::vector<std::string>& inputs, cons
                                     const BuildOptions& build, Executor& executor, Progress& progress) {
     STIPPLE_ASSIGN(const PlyMeshes meshes, findPlyMeshes(inputs, build));
     if (meshes.areAll()) {
+        if (build.material) return noPointsToLight(inputs.front());
         STIPPLE_ASSIGN(lod::MeshBuildSettings settings, plySettings(build));
         STIPPLE_ASSIGN(lod::BuildReport report,
                        buildPlyMeshes(meshes.files, output, build, std::move(settings), executor, progress));
@@ -389,7 +390,8 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
             return fail(ErrorKind::usage, "is built already", input, "render or view it");
     if (inputs.size() == 1 && lod::isCurveFile(inputs[0]) && build.surfels > 0) return nothingToSample(inputs[0]);
     if (inputs.size() == 1 && lod::isCurveFile(inputs[0]))
-        return buildCurveFile(inputs[0], output, build, executor, progress);
+        return build.material ? noPointsToLight(inputs[0])
+                              : buildCurveFile(inputs[0], output, build, executor, progress);
     if (!isSceneFile(inputs.front())) return buildFiles(inputs, output, build, executor, progress);
     if (build.surfels > 0) return lod::buildStore(inputs, output, settings, executor, progress);
     if (inputs.size() > 1)
@@ -405,6 +407,7 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
         return sum;
     };
     const uint64_t lines = counted(scene::PrimitiveKind::lines) / 2, points = counted(scene::PrimitiveKind::points);
+    if (build.material && (triangles.triangles > 0 || points == 0)) return noPointsToLight(inputs.front());
     if (triangles.triangles == 0 && points == 0 && lines > 0)
         return buildCurves(scene::curveSource(scene, scene::placements(scene)), inputs.front(), output, build, executor,
                            progress);

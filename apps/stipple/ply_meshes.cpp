@@ -24,6 +24,12 @@ tl::unexpected<Error> nothingToSample(const std::string& input) {
                 "leave it out: points and curves are drawn as they are");
 }
 
+tl::unexpected<Error> noPointsToLight(const std::string& input) {
+    return fail(ErrorKind::usage, "are of points, and this has none",
+                "--material, --roughness, --metallic with " + input,
+                "leave them out: triangles and curves have their own");
+}
+
 Result<PlyMeshes> findPlyMeshes(const std::vector<std::string>& inputs, const BuildOptions& build) {
     PlyMeshes out;
     if (build.onlyPoints) return out;

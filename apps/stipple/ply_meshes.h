@@ -21,6 +21,8 @@ struct PlyMeshes {
 };
 /// What --surfels is told where there are no meshes.
 tl::unexpected<Error> nothingToSample(const std::string& input);
+/// What --material is told where there are no points.
+tl::unexpected<Error> noPointsToLight(const std::string& input);
 Result<PlyMeshes> findPlyMeshes(const std::vector<std::string>& inputs, const BuildOptions& build);
 
 /// The triangles of all `files` in one store. `settings`: without limits and source.

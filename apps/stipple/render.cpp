@@ -12,6 +12,7 @@
 #include "apps/stipple/legend.h"
 #include "apps/stipple/mode_options.h"
 #include "apps/stipple/outputs.h"
+#include "apps/stipple/ply_meshes.h"
 #include "apps/stipple/render_frames.h"
 #include "apps/stipple/scene_facts.h"
 #include "engine/base/file.h"
@@ -280,6 +281,7 @@ Result<void> run(const Options& o, Written& written) {
     STIPPLE_TRY(checkModule(o));
     STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, !o.quiet));
     STIPPLE_TRY(checkWeights(o, scene));
+    if (o.material.material() && !hasPoints(scene.placed)) return noPointsToLight(o.inputs.front());
     const lod::StoreDescription& description = scene.description;
     STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
     written.of = shot.views.size();

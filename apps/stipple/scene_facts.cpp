@@ -107,6 +107,12 @@ std::vector<glm::dvec3> outlineOf(const std::vector<render::PlacedStore>& placed
     return scene::outermost(all);
 }
 
+bool hasPoints(const std::vector<render::PlacedStore>& placed) {
+    return std::any_of(placed.begin(), placed.end(), [](const render::PlacedStore& p) {
+        return !p.store->hierarchy.isMesh() && !p.store->hierarchy.isCurves;
+    });
+}
+
 bool hasSurfelWeights(const std::vector<render::PlacedStore>& placed) {
     return std::any_of(placed.begin(), placed.end(),
                        [](const render::PlacedStore& p) { return lod::hasWeights(p.store->hierarchy); });

@@ -21,6 +21,8 @@ lod::StoreDescription describe(const std::vector<render::PlacedStore>& placed);
 /// What a camera must see: points on the outside of all stores, in world space.
 std::vector<glm::dvec3> outlineOf(const std::vector<render::PlacedStore>& placed);
 
+/// Are there points, and not only as proxies?
+bool hasPoints(const std::vector<render::PlacedStore>& placed);
 /// Have any surfels weights of their own (stipple build --surfel-weights)?
 bool hasSurfelWeights(const std::vector<render::PlacedStore>& placed);
 

@@ -238,10 +238,11 @@ class Sampler {
         for (const Material& m : scene_.materials) isGrid_ = isGrid_ || m.metallicRoughnessTexture.texture >= 0;
         if (isGrid_) out_.materials = lod::materialGrid();
     }
-    /// The material of a sample; see colourAt.
+    /// The material of a sample; see colourAt. Without any it is what triangles have: not metallic (triangles.cpp).
     lod::PointMaterial surfaceAt(const Primitive& p, size_t i, const glm::vec3& b, float footprint) {
+        if (p.material < 0) return {};
+        hasMaterials_ = true;
         const Material& m = materialOf(p);
-        hasMaterials_ = hasMaterials_ || p.material >= 0;
         const TextureUse& use = m.metallicRoughnessTexture;
         const DecodedImage* image = imageOf(use);
         if (!image || static_cast<size_t>(use.uvSet) >= p.uv.size()) return {m.roughness, m.metallic};

@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "engine/base/hash.h"
+#include "engine/base/numbers.h"
 #include "engine/base/ordered.h"
 #include "engine/base/queue.h"
 #include "lod/builder/build_version.h"
@@ -388,7 +389,8 @@ Result<Described> PointStages::describe(const Built&) {
     out.description.dropped = report.dropped;
     ranges_.describe(frame(), input_.withoutOutliers(), out.description);
     if (const auto index = materialAttribute(out.description))  // those beyond the last that is used
-        out.description.pointMaterials.resize(static_cast<size_t>(out.description.attributes[*index].greatest) + 1);
+        out.description.pointMaterials.resize(std::min(
+            out.description.pointMaterials.size(), toWhole<size_t>(out.description.attributes[*index].greatest) + 1));
     return out;
 }
 

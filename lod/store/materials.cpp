@@ -34,9 +34,11 @@ uint32_t defaultMaterial(const StoreDescription& d) {
 }
 
 std::optional<size_t> materialAttribute(const StoreDescription& d) {
-    for (size_t a = d.attributes.size(); a-- > 0 && !d.pointMaterials.empty();)  // the build puts it last
-        if (d.attributes[a].name == kMaterialAttribute && d.attributes[a].type == ScalarType::u8) return a;
-    return {};
+    // The build puts it last; of one material there is no index, and an attribute of that name is the user's.
+    if (d.pointMaterials.size() < 2 || d.attributes.empty()) return {};
+    const AttributeInfo& last = d.attributes.back();
+    if (last.type != ScalarType::u8 || !last.name.starts_with(kMaterialAttribute)) return {};
+    return d.attributes.size() - 1;
 }
 
 Result<void> addMaterials(const Store& store, uint32_t chunk, const uint8_t* attributes, size_t bytes, Chunk& to) {

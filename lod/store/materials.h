@@ -14,7 +14,7 @@ namespace stipple::lod {
 uint16_t packed(const PointMaterial& material);
 /// What lights the records of a store that have no index; kPlainPoint where it has no materials.
 uint32_t defaultMaterial(const StoreDescription& description);
-/// Which of the attributes the index is, if there is a list for it.
+/// Which of the attributes the index is: the last, if there are several materials.
 std::optional<size_t> materialAttribute(const StoreDescription& description);
 
 /// Gives the records of a payload their materials; nothing where the store has no index. `attributes`: the payload's

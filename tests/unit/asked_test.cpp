@@ -60,6 +60,15 @@ TEST_F(Asked, WhatWouldBeIgnoredIsRefused) {
     expectOneLine(runProgram(folder(), "build a.ply -o b.stipple --surfels 300"), 2, {"--surfels with a.ply"});
 }
 
+TEST_F(Asked, MaterialsOfPointsWhereThereAreNoneAreRefused) {
+    ASSERT_EQ(runProgram(folder(), "grow rock -o pebble.glb --triangles 1k").code, 0);
+    expectOneLine(runProgram(folder(), "build pebble.glb -o r.stipple --material metal"), 2,
+                  {"pebble.glb", "has none"});
+    ASSERT_EQ(runProgram(folder(), "build pebble.glb -o pebble.stipple --quiet").code, 0);
+    expectOneLine(render("--material metal", "pebble.stipple"), 2, {"pebble.stipple", "has none"});
+    EXPECT_EQ(render("--material metal").code, 0);
+}
+
 TEST_F(Asked, OldNamesOfOptionsDoWhatTheNewOnesDo) {
     EXPECT_EQ(render("--strand-exact 1").code, 0);
     EXPECT_EQ(render("--strand-radius 0.5", "a.ply").code, render("--curve-radius 0.5", "a.ply").code);

@@ -198,6 +198,68 @@ scene::Scene twoSquares() {
     return scene;
 }
 
+TEST(PointMaterials, WithoutOneSurfelsAreNotMetallicAsTriangles) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    scene::Scene scene = twoSquares();
+    scene.meshes[0].primitives[1].material = -1;
+    BuildSettings settings;
+    settings.open = [&](const std::string&, const ReadOptions&) { return scene::sampleSurfels(scene, {}, {2'000}); };
+    test::spit(folder / "scene", "x");
+    test::build({folder / "scene"}, folder / "a.stipple", *executor, settings);
+    const std::vector<PointMaterial> list = openStore(folder / "a.stipple")->description.pointMaterials;
+    for (const PointMaterial& m : {PointMaterial{0.25f, 1}, PointMaterial{1, 0}})
+        EXPECT_EQ(std::count(list.begin(), list.end(), m), 1) << m.roughness;
+    EXPECT_EQ(list.size(), 2u);
+}
+
+/// Of scans "roughness" is that of the ground, in any unit: a material says both.
+TEST(PointMaterials, RoughnessAloneIsAnAttribute) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    std::ofstream out(folder / "a.ply", std::ios::binary);
+    out << "ply\nformat ascii 1.0\nelement vertex 300\nproperty float x\nproperty float y\nproperty float z\n"
+           "property float roughness\nend_header\n";
+    for (int i = 0; i < 300; ++i) out << i % 20 << " " << i / 20 << " 0 " << i % 12 << "\n";
+    out.close();
+    BuildSettings settings;
+    settings.attributes = {"roughness"};
+    test::build({folder / "a.ply"}, folder / "a.stipple", *executor, settings);
+    const StoreDescription d = openStore(folder / "a.stipple")->description;
+    EXPECT_TRUE(d.pointMaterials.empty());
+    EXPECT_FALSE(d.isReflectance);
+    ASSERT_EQ(d.attributes.size(), 1u);
+    EXPECT_EQ(d.attributes[0].name, "roughness");
+    EXPECT_EQ(d.attributes[0].greatest, 11);
+}
+
+TEST(PointMaterials, AnAttributeOfThatNameIsTheUsers) {
+    StoreDescription d;
+    AttributeInfo own;
+    own.name = kMaterialAttribute;
+    own.type = ScalarType::u8;
+    d.attributes = {own};
+    d.pointMaterials = {PointMaterial{0.3f, 1}};
+    EXPECT_FALSE(materialAttribute(d)) << "of one material there is no index";
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    std::ofstream out(folder / "a.ply", std::ios::binary);
+    out << "ply\nformat ascii 1.0\nelement vertex 300\nproperty float x\nproperty float y\nproperty float z\n"
+           "property float material\nproperty float roughness\nproperty float metallic\nend_header\n";
+    for (int i = 0; i < 300; ++i) out << i % 20 << " " << i / 20 << " 0 " << i % 7 << " " << i % 2 << " 0\n";
+    out.close();
+    BuildSettings settings;
+    settings.attributes = {"material"};
+    test::build({folder / "a.ply"}, folder / "a.stipple", *executor, settings);
+    const StoreDescription both = openStore(folder / "a.stipple")->description;
+    ASSERT_EQ(both.attributes.size(), 2u);
+    EXPECT_EQ(both.attributes[0].name, "material");
+    EXPECT_EQ(both.attributes[1].name, "material_index");
+    EXPECT_EQ(materialAttribute(both), std::optional<size_t>(1));
+    const auto verified = openStore(folder / "a.stipple");
+    EXPECT_TRUE(verifyStore(*verified, *executor));
+}
+
 TEST(PointMaterials, OfMeshesAreThoseOfTheirTriangles) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);

@@ -96,6 +96,8 @@ void PointInput::findMaterials() {
     }
     AttributeInfo index;
     index.name = kMaterialAttribute;
+    const auto isTaken = [&](const AttributeInfo& a) { return a.name == index.name; };
+    while (std::any_of(attributes_.begin(), attributes_.end(), isTaken)) index.name += "_index";
     index.aggregate = Aggregate::mode;
     index.description = "number in the list of materials";
     attributes_.push_back(index);
