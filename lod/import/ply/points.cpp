@@ -9,6 +9,24 @@
 
 namespace stipple::lod {
 
+namespace {
+
+/// Materials say both. One alone is an attribute: of scans "roughness" is that of the ground, in its units.
+void keepWholeMaterials(PlyElement& vertex) {
+    const auto has = [&](PlyRole role) {
+        return std::any_of(vertex.properties.begin(), vertex.properties.end(),
+                           [&](const PlyProperty& p) { return p.role == role; });
+    };
+    if (has(PlyRole::roughness) && has(PlyRole::metallic)) return;
+    for (PlyProperty& p : vertex.properties)
+        if (p.role == PlyRole::roughness || p.role == PlyRole::metallic) {
+            p.role = PlyRole::none;
+            p.slot = -1;
+        }
+}
+
+}  // namespace
+
 Result<PointSource> openPly(const std::string& path, const ReadOptions& options) {
     STIPPLE_ASSIGN(InputFile opened, InputFile::open(path));
     auto file = std::make_shared<const InputFile>(std::move(opened));
@@ -21,17 +39,7 @@ Result<PointSource> openPly(const std::string& path, const ReadOptions& options)
     SourceInfo& info = source.info;
     unsigned roles = 0;
     const size_t wanted = std::min(options.attributes.size(), kMostAttributes);
-    // Materials say both. One alone is an attribute: of scans "roughness" is that of the ground, in its units.
-    const auto has = [&](PlyRole role) {
-        return std::any_of(vertex->properties.begin(), vertex->properties.end(),
-                           [&](const PlyProperty& p) { return p.role == role; });
-    };
-    if (!has(PlyRole::roughness) || !has(PlyRole::metallic))
-        for (PlyProperty& p : vertex->properties)
-            if (p.role == PlyRole::roughness || p.role == PlyRole::metallic) {
-                p.role = PlyRole::none;
-                p.slot = -1;
-            }
+    keepWholeMaterials(*vertex);
     for (PlyProperty& p : vertex->properties) {
         if (!p.isList && p.role == PlyRole::none) {
             AttributeInfo attribute;
