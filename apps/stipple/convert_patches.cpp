@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <limits>
 
 #include "apps/stipple/outputs.h"
 #include "apps/stipple/ply_meshes.h"
@@ -200,6 +202,22 @@ scene::Scene sceneOf(const lod::PatchSet& set, bool isUnlit) {
     return scene;
 }
 
+/// The most that a place is moved by becoming fp32 about the middle; infinite where that holds one not at all.
+double roundingOf(const lod::PatchSet& set) {
+    double most = 0;
+    const auto add = [&](const glm::dvec3& p) {
+        const double moved = glm::distance(glm::dvec3(glm::vec3(p)), p);
+        most = moved <= most ? most : std::isfinite(moved) ? moved : std::numeric_limits<double>::infinity();
+    };
+    for (const lod::Patch& patch : set.patches) {
+        const lod::PatchSurface surface(patch);
+        for (size_t s = 0; s < patch.heights.size(); ++s)
+            if (patch.heights[s] != 0) add(surface.position(s));
+    }
+    for (const glm::dvec3& p : set.left.position) add(p);
+    return most;
+}
+
 struct Report {
     double seconds = 0, geometryBytes = 0, allBytes = 0;  ///< bytes a sample
     uint64_t bytes = 0;
@@ -319,6 +337,12 @@ Result<void> convertToPatches(const PatchConversion& given) {
     }
     if (set.patches.empty() && set.left.position.empty())
         return fail(ErrorKind::input, "holds nothing that could be a patch or a point", o.input);
+    const double rounding = roundingOf(set);
+    if (!std::isfinite(rounding) || !std::isfinite(set.toSource.bound) || !std::isfinite(set.fromSource.bound))
+        return fail(ErrorKind::input, "is too large: fp32 does not hold its places", o.input,
+                    "scale it to smaller units");
+    set.toSource.bound += rounding;  // triangles between moved corners move no farther
+    set.fromSource.bound += rounding;
     const Report report = reportOf(set, nowSeconds() - start);
     STIPPLE_TRY(scene::writeGltf(sceneOf(set, isUnlit), o.output));
     if (o.json)

@@ -1,12 +1,15 @@
 // `stipple convert --patches` as a person runs it: closed models stay closed, the report is true, nothing odd is taken.
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
 #include <signal.h>
 
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "engine/image/image_io.h"
+#include "engine/scene/scene.h"
 #include "tests/support/patch_shapes.h"
 #include "tests/support/program.h"
 
@@ -110,6 +113,66 @@ TEST(ConvertPatches, ReportsWhatIsThere) {
     const std::string text = runProgram(folder, "convert ball.ply --patches -o text.glb").out;
     EXPECT_NE(text.find("bytes a sample"), std::string::npos) << text;
     EXPECT_NE(text.find("9000 points became"), std::string::npos) << text;
+}
+
+/// Places of a file's triangles, as they are drawn.
+std::vector<test::Triangle> readBack(const std::string& path) {
+    std::vector<test::Triangle> out;
+    const auto scene = scene::readScene(path);
+    if (!scene) return out;
+    for (const scene::Node& node : scene->nodes)
+        for (const scene::Primitive& p : scene->meshes.at(static_cast<size_t>(node.mesh)).primitives)
+            for (size_t k = 0; p.kind == scene::PrimitiveKind::triangles && k + 2 < p.indices.size(); k += 3) {
+                test::Triangle t;
+                for (size_t c = 0; c < 3; ++c)
+                    t.at(c) = glm::dvec3(node.local * glm::dvec4(glm::dvec3(p.position[p.indices[k + c]]), 1));
+                out.push_back(t);
+            }
+    return out;
+}
+
+TEST(ConvertPatches, BoundsAreThoseOfTheFile) {
+    // Two sheets ten million apart: fp32 about their middle has steps of a half.
+    const TempFolder folder;
+    lod::TriangleMesh mesh;
+    for (const double x : {-1e7, 1e7}) {
+        const lod::TriangleMesh sheet = test::sheet(
+            30, 30, [&](double u, double v) { return glm::dvec3(x + 2 * u, 2 * v, 0.1 * std::sin(6 * u)); });
+        for (const uint32_t i : sheet.indices) mesh.indices.push_back(i + static_cast<uint32_t>(mesh.position.size()));
+        mesh.position.insert(mesh.position.end(), sheet.position.begin(), sheet.position.end());
+    }
+    test::writeObj(folder / "far.obj", mesh);
+    const Outcome r = runProgram(folder, "convert far.obj --patches -o far.glb --json");
+    ASSERT_EQ(r.code, 0) << r.err;
+    const auto j = nlohmann::json::parse(r.out);
+    const double to = j["to_source"]["bound"], from = j["from_source"]["bound"];
+    const std::vector<test::Triangle> source = test::trianglesOf(mesh), patches = readBack(folder / "far.glb");
+    ASSERT_GT(patches.size(), 1000u);
+    const auto farthest = [](const std::vector<test::Triangle>& of, const std::vector<test::Triangle>& all) {
+        double most = 0;
+        for (size_t k = 0; k < of.size(); k += of.size() / 300 + 1)
+            for (const glm::dvec3& at : {of[k][0], (of[k][0] + of[k][1] + of[k][2]) / 3.0}) {
+                double least = 1e300;
+                for (const test::Triangle& t : all)
+                    least = std::min(least, glm::distance(at, test::closestPlace(t, at)));
+                most = std::max(most, least);
+            }
+        return most;
+    };
+    EXPECT_LE(farthest(patches, source), to);
+    EXPECT_LE(farthest(source, patches), from);
+    EXPECT_LT(to, 2);
+}
+
+TEST(ConvertPatches, WhatSinglesDoNotHoldIsRefused) {
+    const TempFolder folder;
+    std::string text =
+        "ply\nformat ascii 1.0\nelement vertex 100\nproperty double x\nproperty double y\nproperty double z\n"
+        "end_header\n";
+    for (int k = 0; k < 100; ++k) text += fmt::format("{}e299 {}e299 0\n", k % 10, k / 10);
+    test::spit(folder / "huge.ply", text);
+    test::expectOneLine(runProgram(folder, "convert huge.ply --patches -o huge.glb"), 3, {"huge.ply", "fp32"});
+    EXPECT_FALSE(fs::exists(folder / "huge.glb"));
 }
 
 TEST(ConvertPatches, KeepsColours) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "lod/builder/patches/deviation.h"
 #include "tests/support/patch_shapes.h"
 
 namespace stipple {
@@ -22,8 +23,11 @@ double nearest(const std::vector<Triangle>& to, const glm::dvec3& p) {
 }
 
 /// Every finite place is among those left, or no farther from a patch than it says; patches are near the points.
-void expectKept(const lod::PointBlock& points) {
-    const lod::PatchSet set = patchesOf(points);
+void expectKept(const lod::PointBlock& points, lod::PatchClosing closing) {
+    lod::PatchSettings settings;
+    settings.closing = closing;
+    SCOPED_TRACE(static_cast<int>(closing));
+    const lod::PatchSet set = patchesOf(points, settings);
     const std::vector<Triangle> all = test::trianglesOf(set);
     for (const lod::Patch& p : set.patches) EXPECT_EQ(lod::patchFault(p), "");
     std::vector<std::array<double, 3>> left;
@@ -50,6 +54,11 @@ void expectKept(const lod::PointBlock& points) {
             EXPECT_LE(least, patch.errorToSource);
         }
     }
+}
+
+constexpr std::array kClosings{lod::PatchClosing::overlap, lod::PatchClosing::gaps, lod::PatchClosing::open};
+void expectKept(const lod::PointBlock& points) {
+    for (const lod::PatchClosing closing : kClosings) expectKept(points, closing);
 }
 
 lod::PointBlock block(std::vector<glm::dvec3> places) {
@@ -117,6 +126,18 @@ TEST(PatchesOfAnything, SheetsAHairApartAndWithoutASide) {
     expectKept(sides);
 }
 
+TEST(PatchesOfAnything, BeyondWhatSinglesHold) {
+    Rng rng(6);
+    std::vector<glm::dvec3> places;
+    for (int k = 0; k < 500; ++k) places.emplace_back(1e300 * rng.uniform(), 1e300 * rng.uniform(), 0);
+    for (const lod::PatchClosing closing : kClosings) {
+        lod::PatchSettings settings;
+        settings.closing = closing;
+        const lod::PatchSet set = patchesOf(block(places), settings);
+        EXPECT_EQ(set.pointsLeft, 500u);
+    }
+}
+
 TEST(PatchesOfAnything, FarAndLarge) {
     Rng rng(4);
     for (const double scale : {1e-12, 1.0, 1e9}) {
@@ -130,9 +151,11 @@ TEST(PatchesOfAnything, FarAndLarge) {
 }
 
 /// Of a mesh: what patches say of themselves holds, and every triangle is near one, or its corners are left.
-void expectKept(const lod::TriangleMesh& mesh, size_t samples = 400) {
+void expectKept(const lod::TriangleMesh& mesh, lod::PatchClosing closing, uint64_t aimed, size_t samples) {
     lod::PatchSettings settings;
-    settings.samples = 1500;
+    settings.samples = aimed;
+    settings.closing = closing;
+    SCOPED_TRACE(static_cast<int>(closing));
     const lod::PatchSet set = patchesOf(mesh, settings);
     const std::vector<Triangle> all = test::trianglesOf(set);
     std::vector<Triangle> source;
@@ -150,12 +173,91 @@ void expectKept(const lod::TriangleMesh& mesh, size_t samples = 400) {
     Rng rng(5);
     for (size_t k = 0; k < samples && !source.empty(); ++k) {
         const Triangle& t = source[rng.below(source.size())];
-        const glm::dvec3 p = 0.5 * t[0] + 0.3 * t[1] + 0.2 * t[2];
+        const double u = rng.uniform(), v = (1 - u) * rng.uniform();
+        const glm::dvec3 p = t[0] + u * (t[1] - t[0]) + v * (t[2] - t[0]);
         double least = nearest(all, p);
         if (least <= set.fromSource.bound * (1 + 1e-6)) continue;
         for (const glm::dvec3& q : set.left.position)
             if (glm::distance(q + set.middle, t[0]) < 1e-9) least = 0;
         EXPECT_EQ(least, 0) << "neither near a patch nor left as a point";
+    }
+}
+
+void expectKept(const lod::TriangleMesh& mesh, uint64_t aimed = 1500, size_t samples = 400) {
+    for (const lod::PatchClosing closing : kClosings) expectKept(mesh, closing, aimed, samples);
+}
+
+void add(lod::TriangleMesh& mesh, const std::array<glm::dvec3, 3>& corners) {
+    for (const glm::dvec3& p : corners) {
+        mesh.indices.push_back(static_cast<uint32_t>(mesh.position.size()));
+        mesh.position.push_back(p);
+    }
+}
+
+TEST(PatchesOfAnything, LinesAlongAnEdgeAreThoseOfTheGrid) {
+    std::vector<double> at;
+    for (const double far : {1e2, 1e7, 1e18, 1e300}) {
+        lod::linesAlong({3.5, 2.5}, {far, 0.25 * far}, 20, 10, at);
+        EXPECT_LE(at.size(), 32u);
+        EXPECT_GE(at.size(), 16u + 2u) << "4 to 19 lie on the way";
+        EXPECT_TRUE(std::is_sorted(at.begin(), at.end()));
+        lod::linesAlong({-far, -far}, {-3, -2}, 20, 10, at);
+        EXPECT_EQ(at.size(), 2u) << "beside the grid";
+    }
+    // What lies between two neighbours lies in one cell.
+    Rng rng(7);
+    for (int k = 0; k < 200; ++k) {
+        const glm::dvec2 a(rng.uniform(-40, 60), rng.uniform(-40, 60)), b(rng.uniform(-40, 60), rng.uniform(-40, 60));
+        lod::linesAlong(a, b, 20, 10, at);
+        for (size_t i = 0; i + 1 < at.size(); ++i) {
+            const double gap = at[i + 1] - at[i];
+            if (gap < 1e-9) continue;
+            const glm::dvec2 p = a + (at[i] + 1e-3 * gap) * (b - a), q = a + (at[i + 1] - 1e-3 * gap) * (b - a);
+            const glm::dvec2 m = 0.5 * (p + q);
+            if (m.x < 0 || m.y < 0 || m.x > 19 || m.y > 9) continue;
+            EXPECT_EQ(glm::floor(p), glm::floor(q));
+        }
+    }
+}
+
+TEST(PatchesOfAnything, FineDetailBesideLargeTriangles) {
+    lod::TriangleMesh mesh = test::sheet(20, 20, [](double u, double v) {
+        return glm::dvec3(1e-8 * u, 1e-8 * v, 1e-10 * std::sin(40 * u) * std::sin(30 * v));
+    });
+    for (size_t k = 0; k < 20; ++k)  // from one border
+        add(mesh, {mesh.position[k + 1], mesh.position[k], glm::dvec3(double(k), -100, 0)});
+    expectKept(mesh);  // it would take days, line by line
+}
+
+TEST(PatchesOfAnything, SpikesBeyondTheBorder) {
+    lod::TriangleMesh mesh = test::sheet(30, 30, [](double u, double v) { return glm::dvec3(u, v, 0); });
+    add(mesh, {mesh.position[930], mesh.position[929], glm::dvec3(1, 5, 0)});
+    add(mesh, {mesh.position[0], mesh.position[1], glm::dvec3(0, -0.5, 3)});
+    expectKept(mesh, 1500, 40000);
+    lod::TriangleMesh leaning;  // a row of needles that hang together
+    for (int k = 0; k < 60; ++k)
+        add(leaning, {glm::dvec3(k, 0, 0), glm::dvec3(k + 1, 0, 0), glm::dvec3(k + 0.5, 8, 20 + k % 3)});
+    for (int k = 0; k < 60; ++k)
+        add(leaning, {glm::dvec3(k + 1, 0, 0), glm::dvec3(k, 0, 0), glm::dvec3(k + 0.5, -4, -10)});
+    expectKept(leaning, 300, 3000);
+}
+
+TEST(PatchesOfAnything, SheetsLessThanAStepApart) {
+    for (const double turn : {0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.5}) {
+        const double level = turn < 2.5 ? -0.07 : 0.07;  // which one the patch follows hangs on the order
+        const auto at = [&](double r, double k, double z) {
+            const double a = turn + 2 * k * 3.14159265358979 / 3;
+            return glm::dvec3(r * std::cos(a), r * std::sin(a), z);
+        };
+        lod::TriangleMesh mesh;  // a plateau on a plate, in a rim: three triangles at each edge, so no side is turned
+        add(mesh, {at(1, 0, 0), at(1, 1, 0), at(1, 2, 0)});
+        add(mesh, {at(0.75, 0, level), at(0.75, 1, level), at(0.75, 2, level)});
+        for (int k = 0; k < 3; ++k) {
+            add(mesh, {at(1, k, 0), at(1, k + 1, 0), at(0.75, k, level)});
+            add(mesh, {at(0.75, k, level), at(1, k + 1, 0), at(0.75, k + 1, level)});
+            add(mesh, {at(1, k + 1, 0), at(1, k, 0), at(1.2, k + 0.5, 0)});
+        }
+        expectKept(mesh, 350, 2000);
     }
 }
 

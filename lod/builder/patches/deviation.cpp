@@ -7,7 +7,7 @@ namespace stipple::lod {
 namespace {
 
 constexpr int kMostDivisions = 2;      ///< of a triangle beyond the segment
-constexpr int kLookAround = 4;         ///< cells, from one that is not drawn to a sample
+constexpr int kLookAround = 4;         ///< cells, from one that is not drawn to samples; one farther off, if none
 constexpr double kBesideSteps = 1e-9;  ///< of places on lines between cells, samples
 
 /// Raises `bound` where a triangle needs it.
@@ -34,6 +34,30 @@ void divide(const MeshSurface& s, const std::array<glm::dvec3, 3>& t, size_t hin
     divide(s, {ca, bc, t[2]}, nearest, divided + 1, bound);
 }
 
+/// For each place of the grid a sample not far from it, found row by row and column by column.
+std::vector<uint32_t> samplesNear(const Patch& patch) {
+    constexpr uint32_t kNone = ~0u;
+    std::vector<uint32_t> near(patch.heights.size(), kNone);
+    const auto squared = [&](uint32_t of, size_t to) {
+        const double x = static_cast<double>(of % patch.width) - static_cast<double>(to % patch.width),
+                     y = static_cast<double>(of / patch.width) - static_cast<double>(to / patch.width);
+        return of == kNone ? 1e300 : x * x + y * y;
+    };
+    const auto take = [&](size_t to, size_t from) {
+        if (squared(near[from], to) < squared(near[to], to)) near[to] = near[from];
+    };
+    for (size_t s = 0; s < near.size(); ++s)
+        if (patch.heights[s] != 0) near[s] = static_cast<uint32_t>(s);
+    const size_t w = patch.width, n = near.size();
+    for (size_t s = 1; s < n; ++s)
+        if (s % w != 0) take(s, s - 1);
+    for (size_t s = n - 1; s-- > 0;)
+        if ((s + 1) % w != 0) take(s, s + 1);
+    for (size_t s = w; s < n; ++s) take(s, s - w);
+    for (size_t s = n - w; s-- > 0;) take(s, s + w);
+    return near;
+}
+
 class Measure {
   public:
     Measure(const OwnSurface& own, const Patch& patch, const OverPatch& over)
@@ -42,7 +66,7 @@ class Measure {
     }
 
     Deviation run() {
-        d_.overOwn = 0.5 * patch_.quantum();  // at the samples themselves
+        d_.overOwn = 0.5 * patch_.quantum() + over_.apart;  // at the samples themselves
         for (const uint32_t t : own_.segment) {
             for (size_t k = 0; k < 3; ++k) {
                 const uint32_t other = s_.across[t][k];
@@ -50,6 +74,7 @@ class Measure {
                 if (!isShared || t < other) alongEdge(s_.at(t, k), s_.at(t, (k + 1) % 3));
             }
             atMiddle(t);
+            if (over_.isOpen) undrawn(t);
         }
         d_.toSource = d_.overOwn;
         isOwn_ = false;
@@ -75,24 +100,17 @@ class Measure {
   private:
     /// The difference of heights along an edge of the source is linear between the lines of the grid and diagonals.
     void alongEdge(const glm::dvec3& p, const glm::dvec3& q) {
-        const glm::dvec3 a = heights_.local(p), b = heights_.local(q);
-        at_.assign({0, 1});
-        for (int axis = 0; axis < 2; ++axis) {
-            const double from = std::min(a[axis], b[axis]), to = std::max(a[axis], b[axis]);
-            for (double line = std::ceil(from); line <= to && to > from; ++line)
-                at_.push_back(std::clamp((line - a[axis]) / (b[axis] - a[axis]), 0.0, 1.0));
-        }
-        std::sort(at_.begin(), at_.end());
+        glm::dvec3 a = heights_.local(p), b = heights_.local(q);
+        if (glm::dot(b, b) < glm::dot(a, a)) std::swap(a, b);  // the far end rounds, the near one does not
+        linesAlong(a, b, patch_.width, patch_.height, at_);
         for (size_t k = 0; k + 1 < at_.size(); ++k) piece(a, b, at_[k], at_[k + 1]);
     }
     void piece(const glm::dvec3& a, const glm::dvec3& b, double from, double to) {
         const glm::dvec3 p = a + from * (b - a), q = a + to * (b - a), m = 0.5 * (p + q);
         const double fi = std::floor(m.x), fj = std::floor(m.y);
         if (!(fi >= 0 && fj >= 0 && fi + 1 < patch_.width && fj + 1 < patch_.height) ||
-            !patch_.hasCell(static_cast<uint32_t>(fi), static_cast<uint32_t>(fj))) {
-            if (isOwn_) undrawn(p, q);
+            !patch_.hasCell(static_cast<uint32_t>(fi), static_cast<uint32_t>(fj)))
             return;
-        }
         const auto i = static_cast<uint32_t>(fi), j = static_cast<uint32_t>(fj);
         if (!isOwn_ && !over_.isInside(i, j)) return;
         double most = 0;
@@ -119,25 +137,70 @@ class Measure {
         else
             d_.toSource = std::max(d_.toSource, most);
     }
-    /// From what no cell is drawn over, in modes that leave the border open: to the nearest sample, and as the source
-    /// between edges may lie anywhere in the cell, a cell's diagonal more.
-    void undrawn(const glm::dvec3& p, const glm::dvec3& q) {
-        double least = 1e300;
-        const auto i = static_cast<int>(std::floor(p.x)), j = static_cast<int>(std::floor(p.y));
-        for (int y = j - kLookAround; y <= j + kLookAround + 1; ++y)
-            for (int x = i - kLookAround; x <= i + kLookAround + 1; ++x) {
-                if (x < 0 || y < 0 || x >= static_cast<int>(patch_.width) || y >= static_cast<int>(patch_.height))
-                    continue;
-                const uint16_t code = patch_.heights[patch_.at(static_cast<uint32_t>(x), static_cast<uint32_t>(y))];
-                if (code == 0) continue;
-                const auto distance = [&](const glm::dvec3& at) {
-                    return glm::length(glm::dvec3((at.x - x) * double{patch_.step}, (at.y - y) * double{patch_.step},
-                                                  at.z - code * patch_.quantum()));
-                };
-                least = std::min(least, std::max(distance(p), distance(q)));
+    /// What no cell is drawn over, in modes that leave the border open: the part of a triangle over a cell is convex,
+    /// so none of it is farther from a sample than its farthest corner is.
+    void undrawn(uint32_t t) {
+        const std::array<glm::dvec3, 3> q{heights_.local(s_.at(t, 0)), heights_.local(s_.at(t, 1)),
+                                          heights_.local(s_.at(t, 2))};
+        const auto whole = [](double v) { return static_cast<int>(std::floor(v)); };
+        const auto isDrawn = [&](int i, int j) {
+            return i >= 0 && j >= 0 && i + 1 < static_cast<int>(patch_.width) &&
+                   j + 1 < static_cast<int>(patch_.height) &&
+                   patch_.hasCell(static_cast<uint32_t>(i), static_cast<uint32_t>(j));
+        };
+        const auto [low, high] = std::minmax({q[0].y, q[1].y, q[2].y});
+        for (int j = whole(low); j <= whole(high); ++j) {
+            row_.assign(q.begin(), q.end());
+            cut(row_, 1, j);
+            if (row_.empty()) continue;
+            const auto byX = [](const glm::dvec3& a, const glm::dvec3& b) { return a.x < b.x; };
+            const auto [left, right] = std::minmax_element(row_.begin(), row_.end(), byX);
+            const int last = whole(right->x);
+            for (int i = whole(left->x); i <= last; ++i) {
+                if (isDrawn(i, j)) continue;
+                part_ = row_;
+                cut(part_, 0, i);
+                if (!part_.empty()) undrawn_ = std::max(undrawn_, toSamples(i, j));
             }
-        if (least == 1e300) least = kLookAround * double{patch_.step};
-        undrawn_ = std::max(undrawn_, least + std::sqrt(2.0) * double{patch_.step});
+        }
+    }
+    /// A convex polygon to what lies in [at, at + 1] along an axis.
+    void cut(std::vector<glm::dvec3>& polygon, int axis, double at) {
+        for (const double side : {1.0, -1.0}) {
+            const double line = side > 0 ? at : at + 1;
+            const auto inside = [&](const glm::dvec3& p) { return side * (p[axis] - line); };
+            cut_.clear();
+            for (size_t k = 0; k < polygon.size(); ++k) {
+                const glm::dvec3 &p = polygon[k], &q = polygon[(k + 1) % polygon.size()];
+                const double u = inside(p), v = inside(q);
+                if (u >= 0) cut_.push_back(p);
+                if ((u < 0 && v > 0) || (u > 0 && v < 0)) cut_.push_back(p + (u / (u - v)) * (q - p));
+            }
+            polygon.swap(cut_);
+        }
+    }
+    /// From the part over a cell to the sample that is nearest to all of it.
+    double toSamples(int i, int j) {
+        double least = 1e300;
+        const auto offer = [&](int x, int y) {
+            const uint16_t code = patch_.heights[patch_.at(static_cast<uint32_t>(x), static_cast<uint32_t>(y))];
+            if (code == 0) return;
+            double most = 0;
+            for (const glm::dvec3& p : part_)
+                most = std::max(most,
+                                glm::length(glm::dvec3((p.x - x) * double{patch_.step}, (p.y - y) * double{patch_.step},
+                                                       p.z - code * patch_.quantum())));
+            least = std::min(least, most);
+        };
+        const int w = static_cast<int>(patch_.width), h = static_cast<int>(patch_.height);
+        for (int y = std::max(0, j - kLookAround); y <= std::min(h - 1, j + kLookAround + 1); ++y)
+            for (int x = std::max(0, i - kLookAround); x <= std::min(w - 1, i + kLookAround + 1); ++x) offer(x, y);
+        if (least < 1e300) return least;
+        if (near_.empty()) near_ = samplesNear(patch_);
+        const uint32_t far = near_[patch_.at(static_cast<uint32_t>(std::clamp(i, 0, w - 1)),
+                                             static_cast<uint32_t>(std::clamp(j, 0, h - 1)))];
+        offer(static_cast<int>(far % patch_.width), static_cast<int>(far / patch_.width));
+        return least;
     }
 
     void atMiddle(uint32_t t) {
@@ -170,9 +233,24 @@ class Measure {
     Deviation d_;
     double undrawn_ = 0;
     std::vector<double> at_;
+    std::vector<glm::dvec3> row_, part_, cut_;  ///< polygons
+    std::vector<uint32_t> near_;                ///< of `samplesNear`, once one is asked for
 };
 
 }  // namespace
+
+void linesAlong(const glm::dvec2& a, const glm::dvec2& b, uint32_t width, uint32_t height, std::vector<double>& at) {
+    at.assign({0, 1});
+    for (int axis = 0; axis < 2; ++axis) {
+        const double last = static_cast<double>(axis == 0 ? width : height) - 1;
+        const double from = std::max(std::ceil(std::min(a[axis], b[axis])), 0.0),
+                     to = std::min(std::max(a[axis], b[axis]), last);
+        if (a[axis] == b[axis]) continue;
+        for (double line = from; line <= to; ++line)
+            at.push_back(std::clamp((line - a[axis]) / (b[axis] - a[axis]), 0.0, 1.0));
+    }
+    std::sort(at.begin(), at.end());
+}
 
 double boundToSource(const MeshSurface& surface, const std::array<glm::dvec3, 3>& triangle, size_t hint,
                      double atLeast) {

@@ -32,10 +32,16 @@ struct Deviation {
 double boundToSource(const MeshSurface& surface, const std::array<glm::dvec3, 3>& triangle, size_t hint,
                      double atLeast);
 
+/// Where an edge from a to b (samples) meets the lines of a grid of so many samples: parts of the way, ascending, with
+/// its ends; no more than lines and two, however far the edge goes on beside the grid.
+void linesAlong(const glm::dvec2& a, const glm::dvec2& b, uint32_t width, uint32_t height, std::vector<double>& at);
+
 /// What is known of the patch's cells and samples.
 struct OverPatch {
     std::function<bool(uint32_t i, uint32_t j)> isInside;
     std::function<uint32_t(size_t sample)> triangle;  ///< one near by
+    double apart = 0;     ///< most between the segment's triangles over one sample, scene units
+    bool isOpen = false;  ///< cells that the segment's triangles touch may be left out
 };
 Deviation deviationOf(const OwnSurface& own, const Patch& patch, const OverPatch& over);
 

@@ -159,7 +159,7 @@ class Patcher {
         const Projected p = project(t);
         forSamples(p, [&](size_t sample, const glm::dvec2& w) {
             const double height = heightAt(p, w);
-            if (isOwn) isFolded_ |= grid_.has(sample) && std::abs(grid_.heights[sample] - height) > allowed_;
+            if (isOwn && grid_.has(sample)) apart_ = std::max(apart_, std::abs(grid_.heights[sample] - height));
             if (hit_[sample] != kNobody) return;
             hit_[sample] = t;
             grid_.heights[sample] = height;
@@ -195,7 +195,7 @@ class Patcher {
     bool isFolded() const {
         const double sine = std::sqrt(std::max(0.0, 1 - cone_.cosine * cone_.cosine));
         const double most = std::sqrt(2.0) * grid_.step * sine / cone_.cosine + allowed_;
-        bool isTooFar = isFolded_;
+        bool isTooFar = apart_ > allowed_;
         for (size_t c = 0; c < lowest_.size(); ++c) isTooFar |= highest_[c] - lowest_[c] > most;
         return isTooFar;
     }
@@ -357,6 +357,8 @@ class Patcher {
                        j = static_cast<uint32_t>(sample / out.patch.width);
             return hit_[grid_.at(i + i0, j + j0)];
         };
+        over.apart = apart_;
+        over.isOpen = closing_ != PatchClosing::overlap;
         const Deviation d = deviationOf({s_, segment_, owner_, self_, beyond_}, out.patch, over);
         out.patch.errorToSource = d.toSource;
         out.patch.errorFromSource = d.fromSource;
@@ -376,7 +378,8 @@ class Patcher {
     double allowed_;  ///< scene units: one step
     NormalCone cone_;
     HeightGrid grid_;
-    bool isPlanned_ = false, isFolded_ = false;
+    bool isPlanned_ = false;
+    double apart_ = 0;               ///< most between the segment's triangles over one sample
     std::vector<uint32_t> hit_;      ///< the triangle over a sample, or whose plane it lies on
     std::vector<uint8_t> isBeside_;  ///< samples: nothing lies over them
     std::vector<uint32_t> beyond_;   ///< triangles of others that the patch may go on over, ascending

@@ -123,6 +123,7 @@ class PointPatches {
         for (size_t k = 0; k < 3; ++k) {
             NearPoints::Found near;
             s_.near.find(t.at(k), 1, std::numeric_limits<float>::max(), near);
+            if (near.count == 0) return std::numeric_limits<double>::infinity();
             most = std::max(most, glm::distance(t.at(k), s_.elements.centre[near.index[0]]));
             longest = std::max(longest, glm::distance(t.at(k), t.at((k + 1) % 3)));
         }

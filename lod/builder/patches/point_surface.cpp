@@ -68,7 +68,7 @@ void orderPoints(PointBlock& from, PointSurface& s) {
 
 /// Normal, spacing and noise of a point (`near`: of it, itself the first); is it one of a surface?
 bool describe(const NearPoints::Found& near, size_t i, PointSurface& s) {
-    const size_t n = near.count, last = std::min(n, kLinks + 1) - 1;
+    const size_t n = near.count, last = n == 0 ? 0 : std::min(n, kLinks + 1) - 1;
     const double area =
         last > 0 ? 3.14159265358979323846 * static_cast<double>(near.squared[last]) / static_cast<double>(last) : 0;
     s.elements.area[i] = area;
