@@ -98,7 +98,7 @@ Result<Source> readSource(const PatchConversion& o, std::vector<std::string>& no
         out.isMesh = !out.mesh.indices.empty();
         bakeMaterials(scene, out.mesh);
         if (out.isMesh && hasTextures(scene))
-            notes.emplace_back("textures are left out: patches have colours at their samples");
+            notes.emplace_back("textures are left out: patches have the colours of vertices and materials alone");
         if (out.isMesh) return out;
     } else if (const auto faces = lod::plyFaces(o.input); faces && faces->any() && !o.build.onlyPoints) {
         STIPPLE_ASSIGN(const lod::MeshSource source,
@@ -109,6 +109,8 @@ Result<Source> readSource(const PatchConversion& o, std::vector<std::string>& no
     }
     STIPPLE_ASSIGN(const lod::PointSource source, openInput(o.input, {}, 0, o.build.reading()));
     out.isTwoSided = source.info.isTwoSided;
+    if (source.info.up == lod::UpAxis::z)
+        notes.emplace_back("z is up in this file, and y in glTF: coordinates stay as they are, draw them with --up z");
     lod::PointBlock& all = out.points;
     bool hasColour = true, hasNormal = true;
     STIPPLE_TRY(lod::readPoints(source, [&](const lod::PointBlock& block) -> Result<void> {
@@ -220,7 +222,7 @@ double roundingOf(const lod::PatchSet& set) {
 
 struct Report {
     double seconds = 0, geometryBytes = 0, allBytes = 0;  ///< bytes a sample
-    uint64_t bytes = 0;
+    uint64_t bytes = 0, fileBytes = 0;                    ///< as patches, and as the triangles that are written
 };
 
 Report reportOf(const lod::PatchSet& set, double seconds) {
@@ -245,7 +247,8 @@ void printAsJson(const PatchConversion& o, const lod::PatchSet& set, const Repor
                           {"gap_triangles", set.gaps.size()},
                           {"open_edges", set.openEdges},
                           {"points_left", set.pointsLeft},
-                          {"bytes", r.bytes},
+                          {"coded_bytes", r.bytes},
+                          {"file_bytes", r.fileBytes},
                           {"bytes_a_sample", {{"geometry", r.geometryBytes}, {"all", r.allBytes}}},
                           {"to_source", {{"bound", set.toSource.bound}, {"rms", set.toSource.rms}}},
                           {"from_source", {{"bound", set.fromSource.bound}, {"rms", set.fromSource.rms}}},
@@ -263,8 +266,10 @@ void printAsText(const PatchConversion& o, const lod::PatchSet& set, const Repor
                isMesh                ? "of vertices are left as"
                : set.pointsLeft == 1 ? "stays one of the"
                                      : "stay");
-    fmt::print("  bytes a sample: {:.2f} geometry, {:.2f} with normals and colours ({} in all)\n", r.geometryBytes,
-               r.allBytes, humanBytes(r.bytes));
+    fmt::print(
+        "  bytes a sample as patches: {:.2f} geometry, {:.2f} with normals and colours ({} in all); as triangles, "
+        "which this file has, {}\n",
+        r.geometryBytes, r.allBytes, humanBytes(r.bytes), humanBytes(r.fileBytes));
     fmt::print(
         "  from patches to the source: {:.3g} at most, {:.3g} rms; from the source to patches: {:.3g} at most, "
         "{:.3g} rms (units of the file)\n",
@@ -343,8 +348,11 @@ Result<void> convertToPatches(const PatchConversion& given) {
                     "scale it to smaller units");
     set.toSource.bound += rounding;  // triangles between moved corners move no farther
     set.fromSource.bound += rounding;
-    const Report report = reportOf(set, nowSeconds() - start);
+    Report report = reportOf(set, nowSeconds() - start);
     STIPPLE_TRY(scene::writeGltf(sceneOf(set, isUnlit), o.output));
+    for (const fs::path& path : {fs::path(o.output), fs::path(o.output).replace_extension(".bin")})
+        if (std::error_code error; (extension == ".gltf" || path == fs::path(o.output)) && fs::exists(path, error))
+            report.fileBytes += fs::file_size(path, error);
     if (o.json)
         printAsJson(o, set, report, notes);
     else
