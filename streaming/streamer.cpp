@@ -135,7 +135,7 @@ void Streamer::upload() {
     size_t taken = 0;
     for (; taken < arrived_.size(); ++taken) {
         const Arrival& arrival = arrived_[taken];
-        const uint64_t bytes = arrival.chunk->sizeBytes();
+        const uint64_t bytes = lod::decodedBytes(*sources_[arrival.key.source].hierarchy, arrival.key.chunk);
         if (uploaded > 0 && uploaded + bytes > settings_.uploadBytesPerFrame) break;
         if (!makeRoom(bytes)) {
             setState(arrival.key, ChunkState::absent);

@@ -10,7 +10,6 @@
 #include "engine/base/process.h"
 #include "engine/base/text.h"
 #include "engine/base/words.h"
-#include "lod/builder/weights/add.h"
 
 namespace stipple::app {
 namespace {
@@ -19,7 +18,7 @@ struct Options {
     std::vector<std::string> inputs;
     std::string output;
     BuildOptions build;
-    bool json = false, quiet = false, mpi = false, force = false, restart = false, surfelWeights = false;
+    bool json = false, quiet = false, mpi = false, force = false, restart = false;
     MaterialOptions material;
 };
 
@@ -27,17 +26,6 @@ struct Options {
 Error interruptedAt(Error error, const Options& o) {
     if (error.where.find(".partial") == std::string::npos) return error;
     return {ErrorKind::interrupted, "interrupted; nothing is written", o.output, ""};
-}
-
-/// Of the store that was built.
-Result<void> addWeights(const Options& o, Executor& executor, lod::BuildReport& report) {
-    Progress progress(o.build.progressStyle(o.quiet));
-    STIPPLE_ASSIGN(const lod::WeightReport added, lod::addSurfelWeights(o.output, executor, progress));
-    report.stageSeconds["weights of surfels"] = added.seconds;
-    report.seconds += added.seconds;
-    report.bytesOut = added.fileBytes;
-    report.contentHash = added.contentHash;
-    return {};
 }
 
 /// `isSilent`: another rank says what there is to say.
@@ -74,7 +62,6 @@ Result<void> run(const Options& o, bool& isSilent) {
     if (!built && built.error().kind == ErrorKind::interrupted) built = tl::unexpected(interruptedAt(built.error(), o));
     if (!built) return tl::unexpected(built.error());
     if (isSilent) return {};
-    if (o.surfelWeights) STIPPLE_TRY(addWeights(o, *executor, *built));
     const lod::BuildReport& r = *built;
     if (o.json) {
         const nlohmann::json j = {{"primitive", r.primitive + "s"},
@@ -126,7 +113,7 @@ void setupBuild(CLI::App& app, int& status) {
     o->build.addTo(*sub);
     o->material.addTo(*sub, "points (without: what the input says)");
     addForce(*sub, o->force);
-    sub->add_flag("--surfel-weights", o->surfelWeights,
+    sub->add_flag("--surfel-weights", o->build.surfelWeights,
                   "of points: measure by how much each counts where discs are blended (render --mode ewa --normalise "
                   "surfel), and keep it in the scene");
     sub->add_flag("--restart", o->restart,

@@ -28,13 +28,13 @@ namespace {
 /// the bytes?
 std::string settingsText(const BuildOptions& build) {
     const auto& [memory, normals, radii, up, attributes, temp, duplicates, cacheLimit, threads, skipBad, onlyPoints,
-                 allowOutside, dropOutliers, repair, curveRadius, surfels, progress, ranks, material, together,
-                 leftovers] = build;
+                 allowOutside, dropOutliers, surfelWeights, repair, curveRadius, surfels, progress, ranks, material,
+                 together, leftovers] = build;
     // Not memory, temp, threads, ranks, together, leftovers: any give the same. Not attributes: what is cached has all
     // of them.
     const std::string of = material ? fmt::format("|{},{}", material->roughness, material->metallic) : "";
-    return fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}{}", normals, radii, up, duplicates, skipBad, onlyPoints,
-                       allowOutside, dropOutliers, curveRadius, surfels, of);
+    return fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}{}{}", normals, radii, up, duplicates, skipBad, onlyPoints,
+                       allowOutside, dropOutliers, curveRadius, surfels, of, surfelWeights ? "|weights" : "");
 }
 
 /// Path, size and the times of the last change of content and of place: a copy that keeps its time is another file.

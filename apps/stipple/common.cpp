@@ -174,6 +174,7 @@ bool isSceneFile(const std::string& path) {
 Result<lod::BuildSettings> BuildOptions::settings() const {
     lod::BuildSettings s;
     s.material = material;
+    s.surfelWeights = surfelWeights;
     s.memoryBytes = parseBytes(memory);
     if (s.memoryBytes == 0)
         return fail(ErrorKind::usage, fmt::format("'{}' is not a size", memory), "--memory", "e.g. 2G");

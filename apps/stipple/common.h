@@ -27,7 +27,8 @@ struct BuildOptions {
     std::string cacheLimit;  ///< of the cache of built scenes; empty: its default
     int threads = 0;
     bool skipBad = false, onlyPoints = false, allowOutside = false, dropOutliers = false;
-    bool repair = false;  ///< of former versions: what it did is always done
+    bool surfelWeights = false;  ///< of `stipple build`
+    bool repair = false;         ///< of former versions: what it did is always done
     double curveRadius = 0;
     uint64_t surfels = 0;
     std::string progress = "auto";

@@ -7,6 +7,7 @@
 #include "apps/stipple/common.h"
 #include "apps/stipple/info_input.h"
 #include "engine/base/hash.h"
+#include "engine/base/numbers.h"
 #include "engine/base/process.h"
 #include "engine/base/units.h"
 #include "lod/primitives/codecs.h"
@@ -109,7 +110,8 @@ nlohmann::json storeInfo(const lod::Store& store) {
     if (const auto index = lod::materialAttribute(d)) {
         for (nlohmann::json& m : materials) m["points"] = 0;
         for (const auto& [value, count] : d.attributes[*index].counts)
-            if (const auto at = static_cast<size_t>(value); at < materials.size()) materials[at]["points"] = count;
+            if (value >= 0 && value < static_cast<double>(materials.size()))
+                materials[toWhole<size_t>(value)]["points"] = count;
     }
     nlohmann::json textures = nlohmann::json::array();
     for (const shared::TextureInfo& t : h.textures)

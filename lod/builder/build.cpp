@@ -65,6 +65,7 @@ class PointStages final : public BuildStages {
     }
     Result<Described> describe(const Built&) override;
     uint64_t verifiedNodes() const override { return 512; }
+    bool areSurfels() const override { return true; }
 
   private:
     Result<void> buildAlone(std::vector<Journal::Entry> entries) {
@@ -399,8 +400,9 @@ Result<Described> PointStages::describe(const Built&) {
 Result<BuildReport> buildStore(const std::vector<std::string>& inputs, const std::string& output,
                                const BuildSettings& settings, Executor& executor, Progress& progress) {
     // (Shares as measured with 2M points, normals and radii estimated.)
-    return runCourse(output, settings, executor, progress,
-                     {{"survey", 2}, {"count", 3}, {"distribute", 16}, {"build", 70}, {"verify", 9}},
+    StageShares shares{{"survey", 2}, {"count", 3}, {"distribute", 16}, {"build", 70}, {"verify", 9}};
+    if (settings.surfelWeights) shares.push_back({"weights of surfels", 80});
+    return runCourse(output, settings, executor, progress, shares,
                      [&](Course& course) -> Result<std::unique_ptr<BuildStages>> {
                          STIPPLE_ASSIGN(PointInput input, PointInput::open(inputs, settings, course.report));
                          return std::make_unique<PointStages>(course, settings, std::move(input));

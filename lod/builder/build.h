@@ -33,6 +33,8 @@ struct BuildLimits {
     /// Others that build the same with the same settings; each builds its share, the first one writes. What they have
     /// for each other lies in `tempFolder`, which all must see.
     Ranks* ranks = nullptr;
+    bool surfelWeights =
+        false;  ///< measured and kept with the points (weights/add.h); refused for what has other records
 };
 
 struct BuildSettings : BuildLimits {

@@ -55,7 +55,8 @@ bool isPossiblePayload(const Hierarchy& h, uint32_t chunk, uint64_t chunksEnd) {
     bool fits = p.chunkOffset <= chunksEnd && uint64_t{p.chunkBytes} + p.attributeBytes <= chunksEnd - p.chunkOffset &&
                 p.chunkBytes >= kFewestChunkBytes && p.records > 0 && codec.kind == p.kind;
     for (uint32_t k = p.firstStream; k < p.firstStream + p.streams; ++k)
-        fits = fits && h.streams[k].offset <= chunksEnd && h.streams[k].bytes <= chunksEnd - h.streams[k].offset;
+        fits = fits && h.streams[k].offset <= chunksEnd && h.streams[k].bytes <= chunksEnd - h.streams[k].offset &&
+               (h.streams[k].id != StreamId::surfelWeights || p.kind == Kind::points);
     return fits && isPossibleGain(p.chunkBytes, codec.fewestBytes(h, chunk));
 }
 

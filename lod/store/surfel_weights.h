@@ -20,7 +20,8 @@ bool hasWeights(const Hierarchy& h);
 constexpr uint64_t weightBytes(uint64_t records) { return (records + 3) / 4 * 4; }
 
 std::vector<uint8_t> encodeWeights(const std::vector<uint8_t>& codes);
-/// As Chunk::weights has them: weightBytes(records), the last ones zero. `where` names the place in errors.
+/// As Chunk::weights has them: weightBytes(records), the last ones zero. Code 0 is drawn as no weight at all, and never
+/// written (weightCode). `where` names the place in errors.
 Result<std::vector<uint8_t>> decodeWeights(const uint8_t* bytes, size_t count, uint32_t records,
                                            const std::string& where);
 

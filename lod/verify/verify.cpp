@@ -10,6 +10,7 @@
 #include "engine/base/queue.h"
 #include "lod/primitives/kinds.h"
 #include "lod/primitives/record_spacing.h"
+#include "lod/store/check.h"
 #include "lod/store/materials.h"
 #include "lod/store/store.h"
 #include "lod/store/surfel_weights.h"
@@ -22,6 +23,15 @@ namespace {
 struct Counts {
     std::atomic<uint64_t> nodes{0}, payloads{0}, records{0}, leafRecords{0}, measured{0};
 };
+
+/// Every record has one: code 0, which stands for none, is never written.
+Result<void> checkWeights(const Store& store, uint32_t index, const std::vector<uint8_t>& bytes) {
+    const uint32_t records = store.hierarchy.payload(index).records;
+    const std::string where = fmt::format("{}: node {}", store.path, store.hierarchy.nodeOf(index));
+    STIPPLE_ASSIGN(const std::vector<uint8_t> codes, decodeWeights(bytes.data(), bytes.size(), records, where));
+    if (std::find(codes.begin(), codes.begin() + records, 0) == codes.begin() + records) return {};
+    return tl::unexpected(damagedStore(where, "a surfel has no weight"));
+}
 
 /// Reads one payload and all of its streams. `discs`: see measure.
 Result<void> verifyPayload(const Store& store, uint32_t index, uint64_t discs, Counts& counts) {
@@ -51,9 +61,7 @@ Result<void> verifyPayload(const Store& store, uint32_t index, uint64_t discs, C
     }
     for (uint32_t k = payload.firstStream; k < payload.firstStream + payload.streams; ++k) {
         STIPPLE_ASSIGN(const std::vector<uint8_t> bytes, readStream(store, index, h.streams[k]));
-        if (h.streams[k].id == StreamId::surfelWeights)
-            STIPPLE_TRY(decodeWeights(bytes.data(), bytes.size(), payload.records,
-                                      fmt::format("{}: node {}", store.path, h.nodeOf(index))));
+        if (h.streams[k].id == StreamId::surfelWeights) STIPPLE_TRY(checkWeights(store, index, bytes));
     }
     ++counts.payloads;
     counts.records += payload.records;

@@ -126,6 +126,27 @@ TEST_F(CraftedPayloads, KindsAndCodecsThatAreNotKnownAreNamed) {
     expectRefused(c, "not possible");
 }
 
+/// Backends find vertices, segments and texels behind weights only where there are none.
+TEST_F(CraftedPayloads, WeightsOfOtherThanPointsAreRefused) {
+    CraftedStore c = take();
+    c.streams[1].id = static_cast<uint16_t>(lod::StreamId::surfelWeights);
+    c.write(folder_ / "weighed.stipple");
+    EXPECT_TRUE(lod::openStore(folder_ / "weighed.stipple")) << "the control: points may have them";
+    --c.payloads[rootPoints].streams;
+    ++c.payloads[roof].streams;
+    std::swap(c.streams[1], c.streams[2]);
+    ASSERT_EQ(c.streams[1].id, static_cast<uint16_t>(lod::StreamId::records));
+    expectRefused(c, "not possible");
+}
+
+TEST_F(CraftedPayloads, ReservedBytesAreZero) {
+    for (const size_t place : {size_t{rootPoints}, size_t{roof}, size_t{lastTubes}}) {
+        CraftedStore c = take();
+        c.payloads[place].reserved = 1;
+        expectRefused(c, "the payloads are not possible");
+    }
+}
+
 TEST_F(CraftedPayloads, StreamsThatAreThereTwiceOrShareBytesAreRefused) {
     CraftedStore c = take();
     c.streams[1].id = static_cast<uint16_t>(lod::StreamId::records);

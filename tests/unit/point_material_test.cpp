@@ -14,6 +14,7 @@
 #include "lod/primitives/kinds.h"
 #include "lod/store/attributes.h"
 #include "lod/store/materials.h"
+#include "tests/support/crafted_store.h"
 #include "tests/support/meshes.h"
 #include "tests/support/program.h"
 #include "tests/support/support.h"
@@ -89,6 +90,26 @@ TEST(PointMaterials, OfPlyFilesAreKeptToATwentiethAndMergeByMajority) {
     EXPECT_EQ(leaves, 60'000u);
     EXPECT_LE(worst, 1.0 / 30 + 0.003);  // and half a byte
     EXPECT_GT(worst, 1.0 / 40) << "the bound is no larger than it must be";
+}
+
+/// Whole numbers are shares of the largest of their type.
+TEST(PointMaterials, OfSignedTypesReachOneAtTheirLargest) {
+    const test::TempFolder folder;
+    for (const auto& [type, largest] :
+         {std::pair{"char", "127"}, std::pair{"uchar", "255"}, std::pair{"short", "32767"},
+          std::pair{"ushort", "65535"}, std::pair{"int", "2147483647"}}) {
+        SCOPED_TRACE(type);
+        std::ofstream out(folder / "a.ply");
+        out << "ply\nformat ascii 1.0\nelement vertex 64\nproperty float x\nproperty float y\nproperty float z\n"
+            << "property " << type << " roughness\nproperty " << type << " metallic\nend_header\n";
+        for (int i = 0; i < 64; ++i) out << i % 8 << " " << i / 8 << " 0 " << largest << " " << largest << "\n";
+        out.close();
+        const auto store = built({folder / "a.ply"}, folder / "a.stipple");
+        forEachChunk(*store, [&](uint32_t, const Chunk& chunk) {
+            ASSERT_FALSE(chunk.materials.empty());
+            for (const uint16_t m : chunk.materials) ASSERT_EQ(m, 0xffff);
+        });
+    }
 }
 
 TEST(PointMaterials, CoarseRecordsHaveThatOfMostBelowThem) {
@@ -303,6 +324,19 @@ TEST(PointMaterials, AreSaidByInfo) {
     const test::Outcome text = test::runProgram(folder, "info a.stipple");
     EXPECT_NE(text.out.find("roughness 0.2, metallic 0: 1000 points"), std::string::npos) << text.out;
     EXPECT_NE(text.out.find("roughness 1, metallic 0: 2000 points"), std::string::npos) << text.out;
+    // What no material has is not counted to one, whatever the table says.
+    auto crafted = test::CraftedStore::read(folder / "a.stipple");
+    const size_t at = crafted.description.find(",1000]");
+    ASSERT_NE(at, std::string::npos) << crafted.description;
+    const size_t begin = crafted.description.rfind('[', at) + 1;
+    for (const char* value : {"-0.5", "-1e300", "1e300"}) {
+        auto c = crafted;
+        c.description.replace(begin, at - begin, value);
+        c.write(folder / "b.stipple");
+        const test::Outcome odd = test::runProgram(folder, "info b.stipple");
+        EXPECT_EQ(odd.code, 0) << odd.err;
+        EXPECT_EQ(odd.out.find("1000 points"), std::string::npos) << odd.out;
+    }
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include "lod/primitives/kinds.h"
 #include "lod/store/layout.h"
+#include "lod/store/surfel_weights.h"
 #include "tests/support/store_hash.h"
 #include "tests/support/support.h"
 
@@ -60,6 +61,27 @@ TEST(StoreVersions, OldBytesOpenAndHoldWhatTheyHeld) {
     }
     // A new version comes with its own bytes.
     EXPECT_EQ(versions, (std::set<uint32_t>{kOldVersion, kOldWideMeshVersion, kStoreVersion}));
+}
+
+// Of build version 11: records know how far apart they lie, have weights, and name materials.
+TEST(StoreVersions, WeightsAndMaterialsOfPointsStillOpen) {
+    const auto store = openStore(std::string(STIPPLE_SOURCE_DIR) + "/tests/golden/stores/weighted_8.stipple");
+    ASSERT_TRUE(store) << store.error().line();
+    const auto executor = makeSerialExecutor();
+    const auto report = verifyStore(*store, *executor);
+    EXPECT_TRUE(report) << report.error().line();
+    EXPECT_EQ(store->description.points, 300u);
+    ASSERT_EQ(store->description.pointMaterials.size(), 244u) << "up to the last that is used";
+    EXPECT_NEAR(double{store->description.pointMaterials[12].roughness}, 0.2, 1e-6);
+    EXPECT_NEAR(double{store->description.pointMaterials[243].roughness}, 0.8, 1e-6);
+    EXPECT_NE(store->hierarchy.nodes[0].spacingCode, 0);
+    const Stream* const stream = weightsOf(store->hierarchy, 0);
+    ASSERT_NE(stream, nullptr);
+    const uint32_t records = store->hierarchy.nodes[0].records;
+    const auto bytes = readStream(*store, 0, *stream);
+    const auto weights = decodeWeights(bytes->data(), bytes->size(), records, "here");
+    ASSERT_TRUE(weights);
+    EXPECT_EQ(weights->size(), weightBytes(records));
 }
 
 // Negative control: the hashes see one changed record.

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "lod/primitives/kinds.h"
 #include "streaming/streamer.h"
 #include "tests/support/support.h"
 
@@ -81,6 +82,27 @@ TEST_F(StreamerTest, FillsUpAndThenRests) {
         EXPECT_EQ(streamer.counters().requests, before) << "a static view must not stream";
         EXPECT_EQ(streamer.counters().evictions, 0u);
     }
+}
+
+/// What came is what goes, also where chunks come without what their tables promise.
+TEST_F(StreamerTest, ResidentBytesEndAtNone) {
+    CountingSink sink;
+    lod::Hierarchy h = store_->hierarchy;
+    h.hasMaterials = true;
+    for (lod::Node& n : h.nodes) n.attributeBytes = 1;
+    hierarchies_ = {&h};
+    StreamSettings settings;
+    settings.residentBytes = 400'000;
+    Streamer streamer(*executor_, sink, settings);
+    streamer.addSource(h, makeFileSource(store_->file), "a");
+    const lod::View view = test::fitView(*store_, 640, 480);
+    for (int i = 0; i < 200; ++i) {
+        step(streamer, view, i % 20 < 10 ? 0.5 : 30);
+        uint64_t resident = 0;
+        for (const auto& [source, chunk] : sink.alive) resident += lod::decodedBytes(h, chunk);
+        ASSERT_EQ(streamer.counters().residentBytes, resident);
+    }
+    EXPECT_GT(streamer.counters().uploads, 10u);
 }
 
 TEST_F(StreamerTest, TheByteBudgetIsNeverExceededWhateverTheViews) {

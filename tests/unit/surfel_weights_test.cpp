@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 
+#include "engine/base/hash.h"
 #include "engine/base/rng.h"
 #include "lod/builder/weights/add.h"
 #include "lod/builder/weights/measure.h"
@@ -13,6 +15,7 @@
 #include "shaders/shared/surfel_weight.h"
 #include "tests/support/crafted_store.h"
 #include "tests/support/drawn_shapes.h"
+#include "tests/support/program.h"
 #include "tests/support/support.h"
 
 namespace stipple {
@@ -245,6 +248,103 @@ TEST_F(WeighedStore, DamagedWeightsAreFound) {
     const auto verified = lod::verifyStore(*store, *executor);
     ASSERT_FALSE(verified);
     EXPECT_NE(verified.error().line().find("weights of surfels"), std::string::npos) << verified.error().line();
+}
+
+TEST_F(WeighedStore, RecordsWithoutAWeightAreFound) {
+    const auto right = lod::openStore(path("a.stipple"));
+    ASSERT_TRUE(right);
+    const lod::Stream& first = *lod::weightsOf(right->hierarchy, 0);
+    const uint32_t records = right->hierarchy.nodes[0].records;
+    const auto bytes = lod::readStream(*right, 0, first);
+    auto codes = lod::decodeWeights(bytes->data(), bytes->size(), records, "here");
+    ASSERT_TRUE(codes);
+    codes->resize(records);
+    const auto executor = makeSerialExecutor();
+    for (const bool isDamaged : {false, true}) {
+        if (isDamaged) codes->front() = 0;
+        const std::vector<uint8_t> encoded = lod::encodeWeights(*codes);
+        auto crafted = test::CraftedStore::read(path("a.stipple"));
+        const auto stream = std::find_if(crafted.streams.begin(), crafted.streams.end(),
+                                         [&](const auto& s) { return s.offset == first.offset; });
+        ASSERT_NE(stream, crafted.streams.end());
+        stream->offset = sizeof(lod::layout::Head) + crafted.body.size();
+        stream->bytes = static_cast<uint32_t>(encoded.size());
+        stream->hash = hashBytes(encoded.data(), encoded.size());
+        crafted.body.insert(crafted.body.end(), encoded.begin(), encoded.end());
+        crafted.write(path("d.stipple"));
+        const auto store = lod::openStore(path("d.stipple"));
+        ASSERT_TRUE(store) << store.error().line();
+        const auto verified = lod::verifyStore(*store, *executor);
+        EXPECT_EQ(verified.has_value(), !isDamaged);
+        if (!verified) EXPECT_NE(verified.error().line().find("no weight"), std::string::npos);
+    }
+}
+
+/// A build with weights gives what adding them gives. Stopped while it measures them, it leaves no store; where its
+/// points lie on the disk, the same build goes on from there.
+TEST_F(WeighedStore, ABuildStoppedBeforeItsWeightsLeavesNoStoreAndGoesOn) {
+    namespace fs = std::filesystem;
+    const auto executor = makeSerialExecutor();
+    test::writePly(path("much.ply"), test::bumpySphere(400'000, 1), false);
+    const std::string output = path("e.stipple");
+    for (const bool isOnDisk : {false, true}) {
+        const std::string input = path(isOnDisk ? "much.ply" : "a.ply");
+        lod::BuildSettings settings;
+        settings.leafRecords = isOnDisk ? 8192 : 500;
+        if (isOnDisk) settings.memoryBytes = uint64_t{120} << 20;
+        int asked = 0, most = 0;
+        settings.isStopped = [&] { return ++asked > most && most > 0; };
+        Progress silent(false);
+        const auto build = [&] {
+            asked = 0;
+            return lod::buildStore({input}, output, settings, *executor, silent);
+        };
+        ASSERT_TRUE(build());
+        EXPECT_FALSE(lod::hasWeights(lod::openStore(output)->hierarchy));
+        fs::remove(output);
+        const int without = asked;
+        settings.surfelWeights = true;
+        const auto whole = build();
+        ASSERT_TRUE(whole) << whole.error().line();
+        ASSERT_GT(asked, without + 4) << "asked while weights are measured";
+        const std::string bytes = test::slurp(output);
+        EXPECT_EQ(whole->bytesOut, bytes.size());
+        EXPECT_EQ(whole->contentHash, lod::openStore(output)->contentHash);
+        if (!isOnDisk) EXPECT_TRUE(bytes == test::slurp(path("a.stipple")));
+        fs::remove(output);
+        most = without + 3;
+        const auto stopped = build();
+        ASSERT_FALSE(stopped);
+        EXPECT_EQ(stopped.error().kind, ErrorKind::interrupted) << stopped.error().line();
+        EXPECT_FALSE(fs::exists(output));
+        most = 0;
+        const auto again = build();
+        ASSERT_TRUE(again) << again.error().line();
+        EXPECT_EQ(again->isResumed, isOnDisk);
+        EXPECT_TRUE(test::slurp(output) == bytes);
+        for (const auto& entry : fs::directory_iterator(fs::path(output).parent_path()))
+            EXPECT_EQ(entry.path().filename().string().find("e.stipple."), std::string::npos) << entry.path();
+        fs::remove(output);
+    }
+}
+
+/// What has no points alone is refused before anything is built, and what stood there stays.
+TEST(SurfelWeights, OfMeshesAndCurvesAreRefusedBeforeTheyAreBuilt) {
+    const test::TempFolder folder;
+    ASSERT_EQ(test::runProgram(folder, "grow rock -o mesh.glb --triangles 1k").code, 0);
+    test::spit(folder / "c.swc", "1 2 0 0 0 1 -1\n2 2 1 0 0 1 1\n3 2 2 0 0 1 2\n");
+    for (const std::string input : {"mesh.glb", "c.swc"}) {
+        SCOPED_TRACE(input);
+        test::expectOneLine(test::runProgram(folder, "build " + input + " -o a.stipple --quiet --surfel-weights"), 2,
+                            {"no weights of surfels"});
+        EXPECT_FALSE(std::filesystem::exists(folder / "a.stipple"));
+    }
+    ASSERT_EQ(test::runProgram(folder, "build c.swc -o a.stipple --quiet").code, 0);
+    const std::string before = test::slurp(folder / "a.stipple");
+    EXPECT_EQ(test::runProgram(folder, "build mesh.glb -o a.stipple --quiet --surfel-weights").code, 2);
+    EXPECT_TRUE(test::slurp(folder / "a.stipple") == before);
+    EXPECT_EQ(test::runProgram(folder, "build mesh.glb -o a.stipple --quiet --surfels 2k --surfel-weights").code, 0);
+    EXPECT_TRUE(lod::hasWeights(lod::openStore(folder / "a.stipple")->hierarchy));
 }
 
 }  // namespace

@@ -1,7 +1,10 @@
 #include "lod/builder/octree/course.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <optional>
+
+#include "lod/builder/weights/add.h"
 
 namespace stipple::lod {
 namespace {
@@ -16,6 +19,30 @@ Result<void> tryOutput(const Course& course) {
 template <typename T>
 Result<void> verdict(const Result<T>& result) {
     return result ? Result<void>() : Result<void>(tl::unexpected(result.error()));
+}
+
+/// Found before any work, and before anything is written.
+Result<void> checkWeights(const Course& course, const BuildStages& stages) {
+    if (!course.limits.surfelWeights || stages.areSurfels()) return {};
+    return fail(ErrorKind::usage, "gets no weights of surfels: what is built has no points alone", course.output,
+                "leave out --surfel-weights");
+}
+
+/// With weights the store is written once more, to its place; without them the file that was verified goes there. So
+/// a store that lacks its weights stands nowhere, and an interrupted build goes on from its journal.
+Result<void> putInPlace(Course& course, StoreWriter& writer) {
+    BuildReport& report = course.report;
+    report.bytesOut = writer.bytes();
+    report.contentHash = writer.contentHash();
+    if (!course.limits.surfelWeights) return writer.commit();
+    STIPPLE_ASSIGN(const WeightReport added, addSurfelWeights(writer.temporaryPath(), course.executor, course.progress,
+                                                              course.output, course.limits.isStopped));
+    std::error_code error;
+    std::filesystem::remove(writer.temporaryPath(), error);
+    report.bytesOut = added.fileBytes;
+    report.contentHash = added.contentHash;
+    course.clock.ends("weights of surfels");
+    return {};
 }
 
 /// On the first rank alone.
@@ -35,10 +62,8 @@ Result<void> finish(Course& course, BuildStages& stages, Workspace& workspace, c
     STIPPLE_TRY(
         verifyStore(store, course.executor, report.nodes > stages.verifiedNodes() ? stages.verifiedNodes() : 0));
     course.clock.ends("verify");
-    report.bytesOut = writer.bytes();
-    STIPPLE_TRY(writer.commit());
+    STIPPLE_TRY(putInPlace(course, writer));
     workspace.remove();
-    report.contentHash = writer.contentHash();
     return {};
 }
 
@@ -62,6 +87,7 @@ Result<BuildReport> runCourse(const std::string& output, const BuildLimits& limi
     auto opened = open(course);
     STIPPLE_TRY(agree(limits.ranks, verdict(opened)));
     BuildStages& stages = **opened;
+    STIPPLE_TRY(agree(limits.ranks, checkWeights(course, stages)));
     const Result<Planned> planned = stages.planMemory();
     STIPPLE_TRY(agree(limits.ranks, verdict(planned)));
     STIPPLE_ASSIGN(Workspace found, Workspace::open(output, limits, stages.identity(), planned->isOnDisk));

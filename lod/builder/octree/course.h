@@ -63,6 +63,8 @@ class BuildStages {
     virtual Result<Described> describe(const Built& built) = 0;
     /// How many nodes are looked at again at the end; `info --verify` looks at all.
     virtual uint64_t verifiedNodes() const = 0;
+    /// Are all its records points of an octree, so that they can have weights?
+    virtual bool areSurfels() const { return false; }
 };
 
 /// Shares of the stages in the time, for the progress.

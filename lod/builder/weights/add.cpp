@@ -5,7 +5,6 @@
 #include <cmath>
 #include <map>
 
-#include "engine/base/process.h"
 #include "engine/base/queue.h"
 #include "lod/builder/weights/measure.h"
 #include "lod/primitives/record_spacing.h"
@@ -130,15 +129,18 @@ std::vector<uint32_t> firstOfSiblings(const Hierarchy& h) {
     return first;
 }
 
-Result<std::vector<std::vector<uint8_t>>> weighAll(const Store& store, Executor& executor, Progress& progress) {
+Result<std::vector<std::vector<uint8_t>>> weighAll(const Store& store, Executor& executor, Progress& progress,
+                                                   const std::function<bool()>& isStopped) {
     const Hierarchy& h = store.hierarchy;
     std::vector<std::vector<uint8_t>> codes(h.nodes.size());
     const std::vector<uint32_t> first = firstOfSiblings(h);
     CompletionQueue<Error> errors;
     std::atomic<uint64_t> done{0};
     const Weigher weigher(store);
+    std::atomic<bool> stops{false};
     executor.parallelFor(first.size() - 1, 1, [&](size_t begin, size_t end) {
-        for (size_t k = begin; k < end && !isStopRequested(); ++k) {
+        for (size_t k = begin; k < end && !stops; ++k) {
+            if (isStopped && isStopped()) stops = true;
             Chunks chunks;
             for (uint32_t n = first[k]; n < first[k + 1]; ++n) {
                 Result<std::vector<uint8_t>> of = weigher.weigh(n, chunks);
@@ -148,7 +150,7 @@ Result<std::vector<std::vector<uint8_t>>> weighAll(const Store& store, Executor&
             progress.update("weights of surfels", done += first[k + 1] - first[k], h.nodes.size());
         }
     });
-    if (isStopRequested()) return fail(ErrorKind::interrupted, "interrupted; it has no weights", store.path);
+    if (stops) return fail(ErrorKind::interrupted, "interrupted; it has no weights", store.path);
     if (const auto found = errors.takeAll(); !found.empty()) return tl::unexpected(found.front());
     return codes;
 }
@@ -172,7 +174,8 @@ Result<void> copyStreams(const Store& store, StoreWriter& writer) {
 
 }  // namespace
 
-Result<WeightReport> addSurfelWeights(const std::string& path, Executor& executor, Progress& progress) {
+Result<WeightReport> addSurfelWeights(const std::string& path, Executor& executor, Progress& progress,
+                                      const std::string& to, const std::function<bool()>& isStopped) {
     const double start = nowSeconds();
     STIPPLE_ASSIGN(const Store store, openStore(path));
     const Hierarchy& h = store.hierarchy;
@@ -181,8 +184,8 @@ Result<WeightReport> addSurfelWeights(const std::string& path, Executor& executo
         return fail(ErrorKind::usage, "has no surfels alone, so that they get no weights", path,
                     "leave out --surfel-weights");
     if (hasWeights(h)) return fail(ErrorKind::usage, "has weights of surfels already", path);
-    STIPPLE_ASSIGN(const std::vector<std::vector<uint8_t>> codes, weighAll(store, executor, progress));
-    STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(path));
+    STIPPLE_ASSIGN(const std::vector<std::vector<uint8_t>> codes, weighAll(store, executor, progress, isStopped));
+    STIPPLE_ASSIGN(StoreWriter writer, StoreWriter::create(to.empty() ? path : to));
     STIPPLE_TRY(copyStreams(store, writer));
     Hierarchy with = h;
     with.streams.clear();

@@ -64,8 +64,22 @@ std::optional<PlyType> colourTypeOf(const PlyHeader& header) {
 
 /// What stands for 1 where a property is a share.
 double largestOf(PlyType type) {
-    if (type >= PlyType::f32) return 1;
-    return type < PlyType::i16 ? 255 : type < PlyType::i32 ? 65535 : 4294967295.0;
+    switch (type) {
+        case PlyType::i8:
+            return 127;
+        case PlyType::u8:
+            return 255;
+        case PlyType::i16:
+            return 32767;
+        case PlyType::u16:
+            return 65535;
+        case PlyType::i32:
+            return 2147483647;
+        case PlyType::u32:
+            return 4294967295.0;
+        default:
+            return 1;
+    }
 }
 
 /// Lengths of normals do not matter: what is no float keeps its direction.
