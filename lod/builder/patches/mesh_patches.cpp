@@ -113,16 +113,11 @@ class MeshPatches {
         std::sort(made_.begin(), made_.end(), [](const Made& a, const Made& b) { return a.first < b.first; });
         double to = 0, toWeight = 0, from = 0, fromWeight = 0;
         for (Made& m : made_) {
-            Patch& p = m.patch.patch;
-            out.toSource.bound = std::max(out.toSource.bound, p.errorToSource);
-            out.fromSource.bound = std::max(out.fromSource.bound, p.errorFromSource);
             to += m.patch.toSource;
             toWeight += m.patch.toSourceWeight;
             from += m.patch.fromSource;
             fromWeight += m.patch.fromSourceWeight;
-            out.samples += p.samples();
-            out.triangles += 2 * p.drawnCells();
-            out.patches.push_back(std::move(p));
+            out.add(std::move(m.patch.patch));
         }
         out.toSource.rms = toWeight > 0 ? std::sqrt(to / toWeight) : 0;
         out.fromSource.rms = fromWeight > 0 ? std::sqrt(from / fromWeight) : 0;

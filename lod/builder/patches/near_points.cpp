@@ -3,14 +3,10 @@
 #include <algorithm>
 #include <limits>
 
+#include "engine/base/wide.h"
+
 namespace stipple::lod {
 namespace {
-
-#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(__clang__)
-#define STIPPLE_WIDE __attribute__((target_clones("avx2", "default")))  // (the values are the same)
-#else
-#define STIPPLE_WIDE
-#endif
 
 using Lanes = float __attribute__((vector_size(32), aligned(4), may_alias));
 using Mask = int32_t __attribute__((vector_size(32), aligned(4), may_alias));

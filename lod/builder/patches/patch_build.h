@@ -1,6 +1,7 @@
 // Elevation patches of what fits in memory, from a mesh or from points.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <string>
@@ -53,6 +54,15 @@ struct PatchSet {
     uint64_t pointsLeft = 0;                  ///< points of the source, or vertices of triangles, among `left`
     std::map<std::string, uint64_t> dropped;  ///< of the source, by reason
     PatchDistance toSource, fromSource;
+
+    /// One patch more, with its bounds.
+    void add(Patch patch) {
+        toSource.bound = std::max(toSource.bound, patch.errorToSource);
+        fromSource.bound = std::max(fromSource.bound, patch.errorFromSource);
+        samples += patch.samples();
+        triangles += 2 * patch.drawnCells();
+        patches.push_back(std::move(patch));
+    }
 };
 
 /// The same bytes for any order of triangles and any number of threads. An empty result where it was stopped.

@@ -90,15 +90,10 @@ class PointPatches {
         double to = 0, from = 0;
         uint64_t represented = 0;
         for (Made& m : made_) {
-            Patch& p = m.patch.patch;
-            out.toSource.bound = std::max(out.toSource.bound, p.errorToSource);
-            out.fromSource.bound = std::max(out.fromSource.bound, p.errorFromSource);
             to += m.patch.toSource;
             from += m.patch.fromSource;
             represented += m.patch.represented;
-            out.samples += p.samples();
-            out.triangles += 2 * p.drawnCells();
-            out.patches.push_back(std::move(p));
+            out.add(std::move(m.patch.patch));
         }
         const double all = static_cast<double>(std::max<uint64_t>(represented, 1));
         out.toSource.rms = std::sqrt(to / all);

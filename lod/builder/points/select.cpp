@@ -3,15 +3,10 @@
 #include <algorithm>
 #include <bit>
 
+#include "engine/base/wide.h"
+
 namespace stipple::lod {
 namespace {
-
-/// Of functions worth twice the SIMD where the machine has it; the values are the same.
-#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(__clang__)
-#define STIPPLE_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define STIPPLE_WIDE
-#endif
 
 using Lanes = int32_t __attribute__((vector_size(4 * kSelectLanes), aligned(4), may_alias));
 

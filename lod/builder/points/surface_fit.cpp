@@ -6,16 +6,11 @@
 #include <cmath>
 #include <cstring>
 
+#include "engine/base/wide.h"
 #include "lod/builder/points/select.h"
 
 namespace stipple::lod {
 namespace {
-
-#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(__clang__)
-#define STIPPLE_WIDE __attribute__((target_clones("avx2", "default")))  // (the values are the same)
-#else
-#define STIPPLE_WIDE
-#endif
 
 using Lanes = int32_t __attribute__((vector_size(4 * kSelectLanes), aligned(4), may_alias));
 using Pairs = int64_t __attribute__((vector_size(4 * kSelectLanes), aligned(4), may_alias));
