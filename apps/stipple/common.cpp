@@ -86,6 +86,13 @@ std::optional<lod::PointMaterial> MaterialOptions::material() const {
     return m;
 }
 
+Result<void> MaterialOptions::check(const std::string& shade) const {
+    if (material() && shade == "unlit")
+        return fail(ErrorKind::usage, "is not seen where nothing is lit", "--material, --roughness, --metallic",
+                    "leave --shade unlit out");
+    return {};
+}
+
 void addSceneFileOptions(CLI::App& app, bool& allowOutside, bool& repair) {
     app.add_flag("--allow-outside", allowOutside,
                  "of a scene (.gltf, .glb, .obj) also read the files that it names outside its own folder");

@@ -54,6 +54,8 @@ struct MaterialOptions {
     void addTo(CLI::App& app, const char* of);
     /// Nothing where none was asked for. Of a name, what is given beside it is instead of its own.
     std::optional<lod::PointMaterial> material() const;
+    /// An error where it would not be seen.
+    Result<void> check(const std::string& shade) const;
 };
 /// --allow-outside, and what former versions had for scene files.
 void addSceneFileOptions(CLI::App& app, bool& allowOutside, bool& repair);

@@ -118,9 +118,13 @@ nlohmann::json storeInfo(const lod::Store& store) {
         textures.push_back({{"width", t.width}, {"height", t.height}, {"levels", t.levels}});
     uint64_t tileBytes = 0;
     for (const lod::TextureTile& t : h.tiles) tileBytes += t.bytes;
+    uint64_t weightBytes = 0;
+    for (const lod::Stream& s : h.streams)
+        if (s.id == lod::StreamId::surfelWeights) weightBytes += s.bytes;
     return {{"kind", "stipple store"},
             {"primitive", h.isMixed ? "records" : lod::traitsOf(h.nodes[0].kind).records},
             {"payloads", payloadInfo(h)},
+            {"surfel_weight_bytes", weightBytes},
             {"materials", d.materials.size()},
             {"point_materials", materials},
             {"textures", textures},
@@ -204,6 +208,8 @@ void printStore(const nlohmann::json& j) {
                    a["points_without_data"] == 0
                        ? ""
                        : fmt::format("; {} points without data", a["points_without_data"].get<uint64_t>()));
+    if (const uint64_t bytes = j["surfel_weight_bytes"]; bytes > 0)
+        fmt::print("  weights       of surfels, for --normalise surfel: {}\n", humanBytes(bytes));
     // (Of one kind the table below says all.)
     if (j["payloads"].size() > 1)
         for (const auto& p : j["payloads"])

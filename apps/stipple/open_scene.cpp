@@ -456,9 +456,12 @@ Result<void> checkInputs(const std::vector<std::string>& inputs) {
                         "name one scene, or only raw inputs; a .gltf scene can place several stores");
     STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs(inputs, nullptr));
     for (const std::string& file : files)
-        if (std::error_code error; !fs::exists(file, error) && !error)
-            return fail(ErrorKind::input, std::make_error_code(std::errc::no_such_file_or_directory).message(), file,
-                        "check the path and its permissions");
+        if (std::error_code error; !fs::is_directory(file, error)) {
+            STIPPLE_ASSIGN(const InputFile opened, InputFile::open(file));
+            // (One of many may be passed over.)
+            if (files.size() == 1 && opened.sizeBytes() == 0)
+                return fail(ErrorKind::input, "is empty", file, "is the download complete?");
+        }
     return {};
 }
 

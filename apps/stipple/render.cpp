@@ -64,9 +64,7 @@ Result<glm::dvec3> backgroundOf(const Options& o) {
 /// What can be found out before a scene is built, which may take hours.
 Result<void> checkArguments(const Options& o) {
     STIPPLE_TRY(o.camera.check());
-    if (o.material.material() && o.shade == "unlit")
-        return fail(ErrorKind::usage, "is not seen where nothing is lit", "--material, --roughness, --metallic",
-                    "leave --shade unlit out");
+    STIPPLE_TRY(o.material.check(o.shade));
     if (!(o.error > 0)) return fail(ErrorKind::usage, "must be larger than 0", "--error");
     STIPPLE_TRY(backgroundOf(o));
     if (parseBytes(o.resident) == 0)
@@ -213,6 +211,12 @@ Result<void> runTraced(const Options& o, const OpenedScene& scene, const Shot& s
     return {};
 }
 
+nlohmann::json materialJson(const MaterialOptions& of) {
+    const auto material = of.material();
+    if (!material) return {};
+    return {{"roughness", material->roughness}, {"metallic", material->metallic}};
+}
+
 /// The result, as text or JSON.
 void tell(const Options& o, const render::FrameState& state, const Verdict& verdict, const Timings& timings,
           const glm::uvec2& size, size_t views) {
@@ -225,6 +229,8 @@ void tell(const Options& o, const render::FrameState& state, const Verdict& verd
             {"backend", state.backend->name()},
             {"device", state.backend->device()},
             {"mode", o.drawn.mode},
+            {"normalise", o.drawn.mode == "ewa" ? nlohmann::json(o.drawn.normalise) : nlohmann::json()},
+            {"point_material", materialJson(o.material)},
             {"width", size.x},
             {"height", size.y},
             {"frames", timings.frames.size()},

@@ -11,6 +11,7 @@
 #include "apps/stipple/effect_options.h"
 #include "apps/stipple/outputs.h"
 #include "apps/stipple/overlay.h"
+#include "apps/stipple/ply_meshes.h"
 #include "apps/stipple/render_frames.h"
 #include "apps/stipple/scene_facts.h"
 #include "apps/stipple/scene_opener.h"
@@ -382,6 +383,7 @@ Result<void> checkScreenshot(const ViewOptions& o) {
 Result<void> run(const ViewOptions& o) {
     STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
     STIPPLE_TRY(o.camera.check());
+    STIPPLE_TRY(o.material.check(o.shade));
     STIPPLE_TRY(checkScreenshot(o));
     STIPPLE_TRY(checkInputs(o.inputs));
     if (!gpu::hasDisplay())
@@ -390,6 +392,7 @@ Result<void> run(const ViewOptions& o) {
     catchStopSignals();
     const auto executor = makeTbbExecutor(o.build.threads);
     STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, true));
+    if (o.material.material() && !hasPoints(scene.placed)) return noPointsToLight(o.inputs.front());
     STIPPLE_ASSIGN(const Stage stage, setStage(o, "Stipple: " + scene.description.source, size, *executor));
     gpu::Window* const window = stage.window.get();
     ViewSettings settings;
@@ -454,6 +457,7 @@ void setupView(CLI::App& app, int& status) {
     o->camera.addTo(*sub);
     o->colour.addTo(*sub);
     o->environment.addTo(*sub);
+    o->material.addTo(*sub, "all points, instead of their own");
     o->build.addTo(*sub);
     o->build.addCacheTo(*sub);
     sub->footer(keyHelpText());

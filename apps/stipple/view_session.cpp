@@ -6,6 +6,7 @@
 #include "engine/base/process.h"
 #include "engine/base/units.h"
 #include "engine/render/wind.h"
+#include "lod/store/materials.h"
 
 namespace stipple::app {
 
@@ -25,6 +26,10 @@ void ViewSession::restart(render::FrameSettings& settings) {
     settings.draw.worldUp = d.up;
     settings.draw.wind.towards = render::windAcross(d.up);
     settings.draw.lit = isLit(options_.shade, d, colour_);
+    if (const auto material = options_.material.material()) {
+        settings.draw.pointMaterial = lod::packed(*material);
+        settings.draw.lit = true;
+    }
     render::setSway(settings.draw.wind, state_->hierarchies, state_->instances, state_->groups);
     legend_ = makeLegend(colour_, d);
 }

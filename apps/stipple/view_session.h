@@ -22,6 +22,7 @@ struct ViewOptions {
     BuildOptions build;
     ColourOptions colour;
     EnvironmentOptions environment;
+    MaterialOptions material;
 };
 
 class ViewSession {

@@ -9,6 +9,7 @@
 //
 // Versions 6 and 7 (meshes whose coordinates have more than 30 bits) have one payload a node, which stands in the node
 // itself, and no section of payloads: their kind follows from the description and from whether there are groups.
+// Version 8 left the spacing of records 0.
 #pragma once
 
 #include <array>

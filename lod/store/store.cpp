@@ -114,6 +114,8 @@ Result<void> StoreWriter::finish(const Hierarchy& h, const StoreDescription& des
 
 namespace {
 
+bool hasPayloadsInNodes(const Head& head) { return head.version == kOldVersion || head.version == kOldWideMeshVersion; }
+
 /// The head, with its hash and the foot's checked; of old versions what they do not have is empty.
 Result<Head> readHead(const InputFile& file) {
     const std::string& path = file.path();
@@ -125,8 +127,8 @@ Result<Head> readHead(const InputFile& file) {
     if (head.magic != kMagic)
         return fail(ErrorKind::input, "is not a stipple store", path,
                     "build one with: stipple build INPUT -o SCENE.stipple");
-    const bool isOld = head.version == kOldVersion || head.version == kOldWideMeshVersion;
-    if (head.version != kStoreVersion && !isOld)
+    const bool isOld = hasPayloadsInNodes(head);
+    if (head.version != kStoreVersion && head.version != kVersionBefore && !isOld)
         return fail(ErrorKind::input,
                     fmt::format("has store version {}; this program reads version {}", head.version, kStoreVersion),
                     path, "build it again with this program");
@@ -157,7 +159,7 @@ Result<Head> readHead(const InputFile& file) {
 Result<void> readTables(const InputFile& file, const Head& head, Store& store) {
     Hierarchy& h = store.hierarchy;
     moveHead(h, head, kFromDisk);
-    const bool isOld = head.version != kStoreVersion;
+    const bool isOld = hasPayloadsInNodes(head);
     bool hasCounts = true;
     if (isOld) {
         STIPPLE_ASSIGN(hasCounts, readOldNodes(file, head, h));

@@ -17,9 +17,10 @@
 namespace stipple::lod {
 
 /// Of the file format; a store of another version must be built again.
-inline constexpr uint32_t kStoreVersion = 8;
-/// Still read: with one payload a node; and such meshes whose coordinates have more than 30 bits.
-inline constexpr uint32_t kOldVersion = 6, kOldWideMeshVersion = 7;
+inline constexpr uint32_t kStoreVersion = 9;
+/// Still read: with one payload a node; such meshes whose coordinates have more than 30 bits; without spacings of
+/// records (or with them, and taken for damaged by programs of then).
+inline constexpr uint32_t kOldVersion = 6, kOldWideMeshVersion = 7, kVersionBefore = 8;
 
 /// An opened store. Reading chunks is safe from several threads.
 struct Store {
