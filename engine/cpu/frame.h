@@ -57,7 +57,10 @@ struct Frame {
     std::vector<BlockSource> blocks;
     std::vector<CurveBlock> curveBlocks;
     std::vector<MeshBlock> meshBlocks;
+    std::vector<PatchSource> patchBlocks;
+    std::vector<shared::DrawMesh> patches;  ///< placed
     std::vector<TextureSet> textureSets;
+    /// Are there triangles or patches?
     bool hasTriangles = false, hasEmissive = false, hasCurves = false;
 
     // What covers so many pixels that its rows are shared out.

@@ -10,6 +10,7 @@
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
 #include "shaders/shared/mesh.h"
+#include "shaders/shared/patch.h"
 #include "shaders/shared/record.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/texture.h"
@@ -119,6 +120,14 @@ struct MeshBlock {
     float errorPixels;
 };
 
+/// One block of a patch.
+struct PatchSource {
+    const shared::PatchBlock* block;
+    const shared::DrawMesh* mesh;  ///< its patch
+    uint32_t level;
+    float errorPixels;
+};
+
 /// A triangle that covers so many pixels that its rows are shared out among threads.
 struct LargeTriangle {
     int32_t x[3], y[3];
@@ -177,6 +186,7 @@ struct ResolveInput {
     const BlockSource* blocks;
     const MeshBlock* meshBlocks;
     const shared::SurfaceMaterial* materials;
+    const PatchSource* patchBlocks;
     const CurveBlock* curveBlocks;
     const shared::WideDisc* discs;
     const shared::DiscBox* discBoxes;  ///< of each
@@ -261,6 +271,9 @@ struct Kernels {
     /// Rows [firstRow, lastRow] of the triangles that were kept.
     void (*rasterLarge)(const shared::FrameConstants& f, const LargeTriangle* large, size_t count, uint32_t firstRow,
                         uint32_t lastRow, const Visibility& visibility);
+    /// Offers the triangles of one block of a patch (places from firstPlace on) to the visibility buffer.
+    void (*rasterPatch)(const shared::FrameConstants& f, const PatchSource& of, uint32_t firstPlace,
+                        const LargeSink& large, const Visibility& visibility);
     /// Offers up to 256 segments of curves (places from firstPlace on) to the visibility buffer.
     void (*drawSegments)(const shared::FrameConstants& f, const CurveBlock& block, uint32_t count, uint32_t firstPlace,
                          const WideSink& wide, const Visibility& visibility);

@@ -145,6 +145,8 @@ void projectBlock(const FrameConstants& f, const DrawNode& node, const PointReco
 
 #include "engine/cpu/resolve_triangles.inl"
 
+#include "engine/cpu/patches.inl"
+
 #include "engine/cpu/discs.inl"
 
 #include "engine/cpu/curves.inl"
@@ -361,6 +363,7 @@ const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
                               outputRow,
                               rasterCluster,
                               rasterLarge,
+                              rasterPatch,
                               drawSegments,
                               fillWide,
                               fillDiscs,

@@ -256,6 +256,50 @@ void placeWide(const MeshBlock& block, float* x, float* y, float* z) {
     }
 }
 
+/// Corners of a block's triangles: places in camera space, and where they are seen in 1/256 px.
+struct PlacedCorners {
+    alignas(64) float x[256], y[256], z[256], inverse[256];
+    alignas(64) int32_t px[256], py[256], clip[256];
+};
+
+[[gnu::always_inline]] inline void projectCorners(const FrameConstants& f, size_t count,
+                                                  PlacedCorners& __restrict p) {
+    const Lens lens = lensHere(f.focal);
+#pragma GCC ivdep
+    for (size_t i = 0; i < count; ++i) {
+        const vec3 c = vec3(p.x[i], p.y[i], p.z[i]);
+        const float scale = f.focal / lensDepth(lens, c.z);
+        const float sx = c.x * scale + f.centre.x, sy = c.y * scale + f.centre.y;
+        const bool isIn = (c.z >= f.nearPlane) & (abs(sx) < kGuardPixels) & (abs(sy) < kGuardPixels);
+        p.inverse[i] = imageLinear(lens, c.z);
+        p.px[i] = isIn ? int(floor(sx * kSubpixel + 0.5f)) : 0;
+        p.py[i] = isIn ? int(floor(sy * kSubpixel + 0.5f)) : 0;
+        p.clip[i] = isIn ? 0 : 1;
+    }
+}
+
+/// Offers one triangle of those corners.
+[[gnu::always_inline]] inline void offerTriangle(const FrameConstants& f, const PlacedCorners& p, uint32_t a,
+                                                 uint32_t b, uint32_t c, const Candidate& of, const LargeSink& large,
+                                                 const Visibility& visibility) {
+    if ((p.clip[a] | p.clip[b] | p.clip[c]) != 0) {
+        const vec3 corners[3] = {{p.x[a], p.y[a], p.z[a]}, {p.x[b], p.y[b], p.z[b]}, {p.x[c], p.y[c], p.z[c]}};
+        clipTriangle(f, corners, of, large, visibility);
+        return;
+    }
+    // Most triangles of a dense mesh contain no pixel's centre, or lie outside.
+    const int right = static_cast<int>(f.width) * 256, bottom = static_cast<int>(f.height) * 256;
+    const int x0 = p.px[a], x1 = p.px[b], x2 = p.px[c], y0 = p.py[a], y1 = p.py[b], y2 = p.py[c];
+    const int minX = x0 < x1 ? (x0 < x2 ? x0 : x2) : (x1 < x2 ? x1 : x2);
+    const int maxX = x0 > x1 ? (x0 > x2 ? x0 : x2) : (x1 > x2 ? x1 : x2);
+    const int minY = y0 < y1 ? (y0 < y2 ? y0 : y2) : (y1 < y2 ? y1 : y2);
+    const int maxY = y0 > y1 ? (y0 > y2 ? y0 : y2) : (y1 > y2 ? y1 : y2);
+    if (((minX + 127) >> 8) > ((maxX - 128) >> 8) || ((minY + 127) >> 8) > ((maxY - 128) >> 8)) return;
+    if (maxX < 0 || maxY < 0 || minX >= right || minY >= bottom) return;
+    Fixed fixed{{x0, x1, x2}, {y0, y1, y2}, {p.inverse[a], p.inverse[b], p.inverse[c]}, of.id};
+    takeTriangle(f, fixed, of, large, visibility);
+}
+
 void rasterCluster(const FrameConstants& frame, const SurfaceMaterial* materials, const MeshBlock& block,
                    uint32_t firstPlace, const LargeSink& large, const Visibility& visibility) {
     const MeshVertex* const vertices = block.vertices;
@@ -263,53 +307,27 @@ void rasterCluster(const FrameConstants& frame, const SurfaceMaterial* materials
     const uint32_t vertexCount = block.counts & 0xffffu, triangleCount = block.counts >> 16;
     const FrameConstants f = frame;
     const DrawMesh m = *block.mesh;
-    const Lens lens = lensHere(f.focal);
-    alignas(64) float x[256], y[256], z[256], inverse[256];
-    alignas(64) int32_t px[256], py[256], clip[256];
+    PlacedCorners p;
     if (m.places == kPlacesShort)
-        placeShort(m, &vertices->x, vertexCount, x, y, z);
+        placeShort(m, &vertices->x, vertexCount, p.x, p.y, p.z);
     else
-        placeWide(block, x, y, z);
-#pragma GCC ivdep
-    for (size_t i = 0; i < vertexCount; ++i) {
-        const vec3 c = vec3(x[i], y[i], z[i]);
-        const float scale = f.focal / lensDepth(lens, c.z);
-        const float sx = c.x * scale + f.centre.x, sy = c.y * scale + f.centre.y;
-        const bool isIn = (c.z >= f.nearPlane) & (abs(sx) < kGuardPixels) & (abs(sy) < kGuardPixels);
-        inverse[i] = imageLinear(lens, c.z);
-        px[i] = isIn ? int(floor(sx * kSubpixel + 0.5f)) : 0;
-        py[i] = isIn ? int(floor(sy * kSubpixel + 0.5f)) : 0;
-        clip[i] = isIn ? 0 : 1;
-    }
-    const int right = static_cast<int>(f.width) * 256, bottom = static_cast<int>(f.height) * 256;
+        placeWide(block, p.x, p.y, p.z);
+    projectCorners(f, vertexCount, p);
     for (uint32_t k = 0; k < triangleCount; ++k) {
         const uint32_t t = triangles[k];
         const uint32_t a = t & 255u, b = t >> 8 & 255u, c = t >> 16 & 255u;
         const uint32_t surface = vertices[a].surface;
         MaskInput mask;
-        Candidate of{drawId(f.firstBlock.of[kKindTriangles], firstPlace + k), (surface & kSurfaceTwoSided) != 0, nullptr};
+        Candidate of{drawId(f.firstBlock.of[kKindTriangles], firstPlace + k), (surface & kSurfaceTwoSided) != 0,
+                     nullptr};
         if ((surface & kSurfaceMasked) != 0) {
             mask = {block.textures,
                     &materials[m.firstMaterial + (surface & kSurfaceMaterialMask)],
                     {&vertices[a], &vertices[b], &vertices[c]},
-                    {{x[a], y[a], z[a]}, {x[b], y[b], z[b]}, {x[c], y[c], z[c]}}};
+                    {{p.x[a], p.y[a], p.z[a]}, {p.x[b], p.y[b], p.z[b]}, {p.x[c], p.y[c], p.z[c]}}};
             of.mask = &mask;
         }
-        if ((clip[a] | clip[b] | clip[c]) != 0) {
-            const vec3 corners[3] = {{x[a], y[a], z[a]}, {x[b], y[b], z[b]}, {x[c], y[c], z[c]}};
-            clipTriangle(f, corners, of, large, visibility);
-            continue;
-        }
-        // Most triangles of a dense mesh contain no pixel's centre, or lie outside.
-        const int x0 = px[a], x1 = px[b], x2 = px[c], y0 = py[a], y1 = py[b], y2 = py[c];
-        const int minX = x0 < x1 ? (x0 < x2 ? x0 : x2) : (x1 < x2 ? x1 : x2);
-        const int maxX = x0 > x1 ? (x0 > x2 ? x0 : x2) : (x1 > x2 ? x1 : x2);
-        const int minY = y0 < y1 ? (y0 < y2 ? y0 : y2) : (y1 < y2 ? y1 : y2);
-        const int maxY = y0 > y1 ? (y0 > y2 ? y0 : y2) : (y1 > y2 ? y1 : y2);
-        if (((minX + 127) >> 8) > ((maxX - 128) >> 8) || ((minY + 127) >> 8) > ((maxY - 128) >> 8)) continue;
-        if (maxX < 0 || maxY < 0 || minX >= right || minY >= bottom) continue;
-        Fixed fixed{{x0, x1, x2}, {y0, y1, y2}, {inverse[a], inverse[b], inverse[c]}, of.id};
-        takeTriangle(f, fixed, of, large, visibility);
+        offerTriangle(f, p, a, b, c, of, large, visibility);
     }
 }
 

@@ -216,9 +216,10 @@ void resolveOthers(const FrameConstants& f, const Tables& tables, const ResolveI
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) row.isRound[kPad + i] = row.axisX[kPad + i] = 0;
     const WinningPixels &discs = others.of[kKindDiscs], &triangles = others.of[kKindTriangles],
-                        &curves = others.of[kKindCurves];
+                        &curves = others.of[kKindCurves], &patches = others.of[kKindPatches];
     if (discs.count > 0) resolveDiscs(f, tables, in, discs, x0, y, row);
     if (triangles.count > 0) resolveTriangles(f, in, triangles, x0, y, row, planes);
+    if (patches.count > 0) resolvePatches(f, in, patches, x0, y, row, planes);
     for (uint32_t k = 0; k < kKindNothing; ++k)
         if (others.of[k].count > 0 && in.ofKind[k] != nullptr) in.ofKind[k](*in.frame, others.of[k], x0, y, row);
     row.hasTubes = curves.count > 0 && resolveCurves(f, in, curves, x0, y, row, largestRadius);

@@ -232,8 +232,9 @@ struct RowRays {
     }
 }
 
-/// Colours of the corners, mixed; or those of a debug view.
-[[gnu::always_inline]] inline void mixColours(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p,
+/// Colours of the corners, mixed; or those of a debug view. `blocks`: of the kind.
+template <typename Block>
+[[gnu::always_inline]] inline void mixColours(const FrameConstants& f, const Block* blocks, const WinningPixels& p,
                                               const Corners& c, const float* __restrict wb, const float* __restrict wc,
                                               MaterialRow& s) {
     const size_t n = p.count;
@@ -251,7 +252,7 @@ struct RowRays {
     }
     if (f.debugView == kDebugLevel || f.debugView == kDebugError)
         for (size_t i = 0; i < n; ++i) {
-            const MeshBlock& block = in.meshBlocks[p.id[i] / kClusterTriangles];
+            const Block& block = blocks[p.id[i] / kBlockLanes];
             const vec3 d =
                 f.debugView == kDebugLevel ? debugLevelColour(block.level) : debugErrorColour(block.errorPixels);
             s.red[i] = d.x;
@@ -260,21 +261,17 @@ struct RowRays {
         }
 }
 
-void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, uint32_t x0, uint32_t y,
-                      TexelRow& __restrict row, const SurfacePlanes& planes) {
-    TriangleRow t;
-    const Corners& c = t.corners;
-    MaterialRow& s = t.material;
-    const size_t n = p.count;
+/// Rays of the pixels from (x0, y) on.
+[[gnu::always_inline]] inline RowRays rowRays(const FrameConstants& f, uint32_t x0, uint32_t y) {
     const float inverseFocal = 1.0f / f.focal;
-    const RowRays rays{lensHere(f.focal), inverseFocal, f.centre.x - float(int(x0)) - 0.5f,
-                       (float(int(y)) + 0.5f - f.centre.y) * inverseFocal};
-    const bool anyTextured = gatherCorners(in, p, t.corners, t.surface);
-    weighCorners(p, rays, c, s, t.uv, t.wb, t.wc);
-    if (anyTextured) measureFootprints(p, rays, c, t.uv);
-    applyMaterials(in, p, planes.emissive != nullptr, t);
-    packSurfaces(p, rays, s, t.perpX, t.perpY, t.word);
-    mixColours(f, in, p, c, t.wb, t.wc, s);
+    return {lensHere(f.focal), inverseFocal, f.centre.x - float(int(x0)) - 0.5f,
+            (float(int(y)) + 0.5f - f.centre.y) * inverseFocal};
+}
+
+/// Into the row's texels and the planes beside them.
+void storeTriangles(const WinningPixels& p, TriangleRow& t, TexelRow& __restrict row, const SurfacePlanes& planes) {
+    const MaterialRow& s = t.material;
+    const size_t n = p.count;
     for (size_t i = 0; i < n; ++i) {
         const size_t at = kPad + p.pixel[i];
         row.depth[at] = p.depth[i];
@@ -293,4 +290,17 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) t.emission[i] = packColour(s.emissionR[i], s.emissionG[i], s.emissionB[i]);
     for (size_t i = 0; i < n; ++i) planes.emissive[p.pixel[i]] = t.emission[i];
+}
+
+void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, uint32_t x0, uint32_t y,
+                      TexelRow& __restrict row, const SurfacePlanes& planes) {
+    TriangleRow t;
+    const RowRays rays = rowRays(f, x0, y);
+    const bool anyTextured = gatherCorners(in, p, t.corners, t.surface);
+    weighCorners(p, rays, t.corners, t.material, t.uv, t.wb, t.wc);
+    if (anyTextured) measureFootprints(p, rays, t.corners, t.uv);
+    applyMaterials(in, p, planes.emissive != nullptr, t);
+    packSurfaces(p, rays, t.material, t.perpX, t.perpY, t.word);
+    mixColours(f, in.meshBlocks, p, t.corners, t.wb, t.wc, t.material);
+    storeTriangles(p, t, row, planes);
 }

@@ -43,9 +43,10 @@ Result<void> FrameBuffers::ensure(Buffer& buffer, uint64_t bytes, VkBufferUsageF
 Result<void> FrameBuffers::prepare(const render::RenderRequest& request, const Residents& residents) {
     const render::DrawList& draws = *request.draws;
     STIPPLE_TRY(preparePlanes(draws, request.wantDepthAndNormal));
+    render::placePatches(draws, residents.patchesOf, patches_, firstPatch_);
     fillDraws(draws, residents);
     STIPPLE_TRY(prepareLists(request));
-    if (!draws.triangles().isEmpty()) STIPPLE_TRY(prepareMeshes(draws, residents));
+    if (draws.hasSurfaces()) STIPPLE_TRY(prepareMeshes(draws, residents));
     if (!draws.lights.empty()) STIPPLE_TRY(fill(kLightsBinding, draws.lights.data(), draws.lights.size(), "lights"));
     if (draws.environment)
         STIPPLE_TRY(
@@ -124,6 +125,8 @@ void FrameBuffers::fillDraws(const render::DrawList& draws, const Residents& res
             const VkDeviceAddress address = residents.addressOf(batch.keys[i]);
             node.addressLow = static_cast<uint32_t>(address);
             node.addressHigh = static_cast<uint32_t>(address >> 32);
+            if (batch.kind == lod::Kind::patches)
+                node.weights = static_cast<uint32_t>(draws.meshes.size()) + firstPatch_[i];
             std::memcpy(nodes++, &node, sizeof(node));
         }
         const uint32_t firstBlock = draws.frame.firstBlock.of[static_cast<size_t>(batch.kind)];
@@ -144,10 +147,12 @@ Result<void> FrameBuffers::fill(uint32_t binding, const T* data, size_t count, c
     return {};
 }
 
-/// What only triangles need.
+/// What only triangles and patches need.
 Result<void> FrameBuffers::prepareMeshes(const render::DrawList& draws, const Residents& residents) {
     meshFrame_.fill(draws, residents.meshOf, residents.tileOf);
-    STIPPLE_TRY(fill(kMeshesBinding, draws.meshes.data(), draws.meshes.size(), "draw meshes"));
+    meshes_.assign(draws.meshes.begin(), draws.meshes.end());
+    meshes_.insert(meshes_.end(), patches_.begin(), patches_.end());
+    STIPPLE_TRY(fill(kMeshesBinding, meshes_.data(), meshes_.size(), "draw meshes"));
     STIPPLE_TRY(fill(kClustersBinding, meshFrame_.clusters.data(), meshFrame_.clusters.size(), "draw clusters"));
     STIPPLE_TRY(fill(kMaterialsBinding, draws.materials.data(), draws.materials.size(), "materials"));
     STIPPLE_TRY(fill(kTexturesBinding, meshFrame_.textures.data(), meshFrame_.textures.size(), "textures"));

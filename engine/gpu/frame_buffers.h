@@ -9,6 +9,7 @@
 #include "engine/gpu/mesh_frame.h"
 #include "engine/gpu/shader_table.h"
 #include "engine/render/backend.h"
+#include "engine/render/patch_planes.h"
 
 namespace stipple::gpu {
 
@@ -21,6 +22,7 @@ struct Level {
 struct Residents {
     std::function<VkDeviceAddress(streaming::ChunkKey key)> addressOf;
     std::function<const MeshChunk&(streaming::ChunkKey key)> meshOf;
+    std::function<const std::vector<lod::PatchPlane>&(streaming::ChunkKey key)> patchesOf;
     std::function<VkDeviceAddress(uint32_t source, uint32_t chunk)> tileOf;  ///< 0: not resident
 };
 
@@ -60,6 +62,8 @@ class FrameBuffers {
     Buffer readback_, staging_, nothing_;
     std::vector<Level> levels_;
     MeshFrame meshFrame_;
+    std::vector<shared::DrawMesh> meshes_, patches_;  ///< of both; of patches
+    std::vector<uint32_t> firstPatch_;                ///< of each of their nodes
     bool descriptorsChanged_ = true;
 };
 

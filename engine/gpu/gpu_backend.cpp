@@ -62,6 +62,8 @@ class GpuBackend final : public render::Backend {
         STIPPLE_ASSIGN(const PageStore::Place place, pages_.allocate(chunk.sizeBytes()));
         places_[chunkId(key)] = place;
         pending_.push_back({pages_.buffer(place), place.offset, bytesOfChunk(chunk)});
+        if (!chunk.patchBlocks.empty())
+            patchChunks_[chunkId(key)] = lod::planesOfPatches(chunk.patchBlocks, chunk.patchPlanes);
         if (!chunk.clusters.empty()) {
             const VkDeviceAddress address = pages_.address(place);
             meshChunks_[chunkId(key)] = {address, address + chunk.vertices.size() * sizeof(shared::MeshVertex),
@@ -77,6 +79,7 @@ class GpuBackend final : public render::Backend {
         pages_.release(found->second);
         places_.erase(found);
         meshChunks_.erase(chunkId(key));
+        patchChunks_.erase(chunkId(key));
     }
 
     Result<render::Ticket> submit(const render::RenderRequest& request) override {
@@ -84,6 +87,9 @@ class GpuBackend final : public render::Backend {
         const Residents residents{
             [&](streaming::ChunkKey key) { return pages_.address(places_.at(chunkId(key))); },
             [&](streaming::ChunkKey key) -> const MeshChunk& { return meshChunks_.at(chunkId(key)); },
+            [&](streaming::ChunkKey key) -> const std::vector<lod::PatchPlane>& {
+                return patchChunks_.at(chunkId(key));
+            },
             [&](uint32_t source, uint32_t chunk) -> VkDeviceAddress {
                 const auto found = places_.find(chunkId({source, chunk}));
                 return found == places_.end() ? 0 : pages_.address(found->second);
@@ -141,6 +147,7 @@ class GpuBackend final : public render::Backend {
     PageStore pages_;
     std::unordered_map<uint64_t, PageStore::Place> places_;
     std::unordered_map<uint64_t, MeshChunk> meshChunks_;
+    std::unordered_map<uint64_t, std::vector<lod::PatchPlane>> patchChunks_;  ///< of each patch
     std::vector<PendingUpload> pending_;
     std::vector<std::unique_ptr<FrameSlot>> slots_;
     std::vector<render::PassTime> times_;

@@ -23,7 +23,7 @@ class Recording {
     const FrameBuffers& buffers() const { return buffers_; }
     bool has(render::Pass pass) const;
     bool hasCurves() const { return !draws().curves().isEmpty(); }
-    bool hasTriangles() const { return !draws().triangles().isEmpty(); }
+    bool hasTriangles() const { return draws().hasSurfaces(); }
     /// Of the pass at hand, or of it and its neighbour where they have a common one.
     const std::string& shader() const { return shader_; }
     const std::string& label() const { return label_; }

@@ -1,23 +1,19 @@
-// Triangles once more, in fp64, from the definitions: clipping at the near plane, coverage by the top-left rule on
-// corners snapped to 1/256 pixel, attributes where the ray through the pixel meets the triangle's plane.
+// Triangles of meshes once more, in fp64.
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "engine/reference/decode.h"
-#include "engine/reference/surface.h"
+#include "engine/reference/restate_triangles.h"
 #include "lod/store/mesh_place.h"
 
 namespace stipple::reference {
 namespace {
 
-using glm::dvec2;
-using glm::dvec3;
-
 class MeshProjector {
   public:
     MeshProjector(const render::DrawList& draws, const Chunks& chunks, Level& level)
-        : draws_(draws), chunks_(chunks), level_(level), view_(draws.view) {}
+        : draws_(draws), chunks_(chunks), view_(draws.view), projector_(draws, level) {}
 
     void run() {
         for (size_t i = 0; i < draws_.meshCut.size(); ++i) {
@@ -41,93 +37,18 @@ class MeshProjector {
                             lod::vertexPlace(lod::meshNode(h, cut.node), chunk, cluster, (word >> (8 * k)) % 256),
                             view_);
                     const uint32_t surface = vertex(0).surface;
-                    triangle(corners, surface, draws_.materials[firstMaterial + surface % 65536], textures, cut,
-                             h.nodes[cut.node].level);
+                    projector_.triangle(corners, surface, draws_.materials[firstMaterial + surface % 65536], textures,
+                                        {cut.errorPixels, h.nodes[cut.node].level});
                 }
             }
         }
     }
 
   private:
-    void triangle(const Corners& c, uint32_t surface, const shared::SurfaceMaterial& material,
-                  const TextureReader& textures, const lod::CutMeshDraw& cut, uint32_t treeLevel) {
-        const dvec3 face = glm::cross(c[1].at - c[0].at, c[2].at - c[0].at);
-        const double facing = view_.isOrthographic ? face.z : glm::dot(face, c[0].at);
-        if (facing == 0 || (facing > 0 && (surface & shared::kSurfaceTwoSided) == 0)) return;
-        // What is in front of the near plane, as a polygon on the screen.
-        std::vector<dvec3> polygon;
-        for (size_t k = 0; k < 3; ++k) {
-            const dvec3 &a = c.at(k).at, &b = c.at((k + 1) % 3).at;
-            if (a.z >= view_.nearPlane) polygon.push_back(a);
-            if ((a.z >= view_.nearPlane) != (b.z >= view_.nearPlane))
-                polygon.push_back(a + (b - a) * ((view_.nearPlane - a.z) / (b.z - a.z)));
-        }
-        if (polygon.size() < 3) return;
-        std::vector<dvec2> snapped;  // in 1/256 pixel, whole
-        snapped.reserve(polygon.size());
-        for (const dvec3& p : polygon) snapped.push_back(glm::floor(imageOf(view_, p) * 256.0 + 0.5));
-        for (size_t k = 1; k + 1 < polygon.size(); ++k)
-            cover({snapped[0], snapped[k], snapped[k + 1]},
-                  [&](int x, int y) { pixel(x, y, c, face, surface, material, textures, cut, treeLevel); });
-    }
-
-    template <typename Use>
-    void cover(std::array<dvec2, 3> p, const Use& use) const {
-        const auto cross = [](const dvec2& a, const dvec2& b) { return a.x * b.y - a.y * b.x; };
-        const double area = cross(p[1] - p[0], p[2] - p[0]);
-        if (area == 0) return;
-        if (area < 0) std::swap(p[1], p[2]);
-        const dvec2 lo = glm::min(p[0], glm::min(p[1], p[2])), hi = glm::max(p[0], glm::max(p[1], p[2]));
-        const int right = static_cast<int>(view_.width) - 1, bottom = static_cast<int>(view_.height) - 1;
-        if (!(hi.x >= 0 && hi.y >= 0)) return;
-        const int x0 = pixelIn(lo.x / 256, right + 1), x1 = pixelIn(hi.x / 256, right),
-                  y0 = pixelIn(lo.y / 256, bottom + 1), y1 = pixelIn(hi.y / 256, bottom);
-        for (int y = y0; y <= y1; ++y)
-            for (int x = x0; x <= x1; ++x) {
-                const dvec2 centre(x * 256 + 128, y * 256 + 128);
-                bool isIn = true;
-                for (size_t k = 0; k < 3; ++k) {
-                    const dvec2 edge = p.at((k + 1) % 3) - p.at(k);
-                    const double side = cross(edge, centre - p.at(k));
-                    const bool isTopLeftEdge = edge.y < 0 || (edge.y == 0 && edge.x > 0);
-                    isIn = isIn && (side > 0 || (side == 0 && isTopLeftEdge));
-                }
-                if (isIn) use(x, y);
-            }
-    }
-
-    void pixel(int x, int y, const Corners& c, const dvec3& face, uint32_t surface, const shared::SurfaceMaterial& m,
-               const TextureReader& textures, const lod::CutMeshDraw& cut, uint32_t treeLevel) {
-        const ViewRay ray = viewRay(view_, dvec2(x + 0.5, y + 0.5));
-        const dvec2 exact = weightsOn(ray, c, face);
-        const double wb = std::clamp(exact.x, 0.0, 1.0), wc = std::clamp(exact.y, 0.0, 1.0 - wb), wa = 1 - wb - wc;
-        const double depth = (wa * c[0].at + wb * c[1].at + wc * c[2].at).z;
-        Sample& s = level_.ref(x, y);
-        if (s.valid && s.depth <= depth) return;
-        Sample hit;
-        dvec3 n;
-        const double footprint = footprintOn(ray, view_.isOrthographic, 1 / view_.focalPixels, c, face);
-        if (!surfaceOn(ray.direction, {wb, wc}, footprint, c, face, surface, m, textures, hit, n)) return;
-        s = hit;
-        s.valid = true;
-        s.depth = depth;
-        s.radius = 0.25;
-        s.thickness = 0.25 / pixelsAt(view_, depth);
-        s.centre = dvec2(x + 0.5, y + 0.5);
-        s.perp = dvec2(rotationToZ(ray.sight()) * n);
-        const shared::FrameConstants& f = draws_.frame;
-        const double t = f.debugView == shared::kDebugLevel
-                             ? (treeLevel % 8) / 7.0
-                             : std::clamp((std::log2(std::max(1e-6, double(cut.errorPixels))) + 3) / 6, 0.0, 1.0);
-        const auto hat = [&](double middle) { return std::clamp(1.5 - std::abs(4 * t - middle), 0.0, 1.0); };
-        if (f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError)
-            s.colour = {hat(3), hat(2), hat(1)};
-    }
-
     const render::DrawList& draws_;
     const Chunks& chunks_;
-    Level& level_;
     const lod::View& view_;
+    TriangleProjector projector_;
 };
 
 }  // namespace

@@ -9,8 +9,10 @@
 #include "engine/reference/box_tree.h"
 #include "engine/reference/curve_rays.h"
 #include "engine/reference/decode.h"
+#include "engine/reference/decode_patch.h"
 #include "engine/reference/reference.h"
 #include "engine/reference/surface.h"
+#include "lod/primitives/octahedral.h"
 #include "lod/store/colour.h"
 #include "lod/store/materials.h"
 #include "lod/store/mesh_place.h"
@@ -36,6 +38,11 @@ struct TracedStore {
     render::MeshTextures textures;
     BoxTree tree;  ///< items: discs, then triangles, then segments (a store has one kind)
 
+    /// Of a vertex; patches of stores without any are plain.
+    const shared::SurfaceMaterial& materialOf(uint32_t surface) const {
+        const auto& all = store->description.materials;
+        return all.empty() ? kPlainMaterial : all.at(surface & shared::kSurfaceMaterialMask);
+    }
     dvec3 positionOf(uint32_t vertex) const { return store->hierarchy.origin + store->hierarchy.unit * places[vertex]; }
 };
 
@@ -68,6 +75,27 @@ void addClusters(const lod::Chunk& chunk, uint32_t node, uint32_t begin, uint32_
     }
 }
 
+/// The lifted triangles of a chunk's patches, seen from both sides.
+void addPatches(const lod::Chunk& chunk, uint32_t node, TracedStore& t) {
+    const lod::Hierarchy& h = t.store->hierarchy;
+    for (size_t b = 0; b < chunk.patchBlocks.size(); ++b) {
+        const PatchBlockReader block(h, h.nodes[node], chunk.patchBlocks[b], chunk.patchPlanes[b]);
+        const auto base = static_cast<uint32_t>(t.vertices.size());
+        for (uint32_t s = 0; s < shared::kPatchSamples; ++s) {
+            const PatchCorner corner = block.sample(s);
+            shared::MeshVertex v{};
+            v.normal = lod::octEncode(glm::vec3(corner.normal));
+            v.colour = chunk.patchBlocks[b].colours[s] | 0xff000000u;
+            v.surface = shared::kSurfaceTwoSided;
+            t.vertices.push_back(v);
+            t.places.push_back(corner.place);
+        }
+        block.forEachTriangle([&](uint32_t a, uint32_t c, uint32_t d) {
+            t.triangles.push_back({base + a, base + c, base + d});
+        });
+    }
+}
+
 Result<void> readLeaf(uint32_t index, TracedStore& t) {
     const lod::Hierarchy& h = t.store->hierarchy;
     const uint32_t number = h.nodeOf(index);
@@ -90,6 +118,7 @@ Result<void> readLeaf(uint32_t index, TracedStore& t) {
             d.material = materials.front();
     }
     addClusters(chunk, number, 0, static_cast<uint32_t>(chunk.clusters.size()), addVertices(chunk, t), t);
+    addPatches(chunk, number, t);
     return {};
 }
 
@@ -326,8 +355,7 @@ class Tracer {
         Sample sample;
         dvec3 n;
         if (!surfaceOn(ray.direction, w, footprintOn(ray, view_.isOrthographic, step, c, face), c, face, surface,
-                       store.store->description.materials.at(surface & shared::kSurfaceMaterialMask),
-                       {store.textures, store.tiles}, sample, n))
+                       store.materialOf(surface), {store.textures, store.tiles}, sample, n))
             return;
         best.place = p;
         best.t = t;

@@ -16,7 +16,7 @@ static_assert(sizeof(shared::PointRecord) == 16);
 static_assert(sizeof(shared::DrawNode) == 96);
 static_assert(sizeof(shared::DrawBlock) == 8);
 static_assert(sizeof(shared::CurveSegment) == 32);
-static_assert(sizeof(shared::FrameConstants) == 188 + sizeof(shared::BlockRanges));
+static_assert(sizeof(shared::FrameConstants) == 192 + sizeof(shared::BlockRanges));
 static_assert(sizeof(shared::MeshVertex) == 32);
 static_assert(sizeof(shared::MeshCluster) == 12);
 static_assert(sizeof(shared::DrawMesh) == 120);
@@ -154,9 +154,10 @@ void addNodes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, const Draw
         }
         if (!asked.empty()) out.bends.push_back(bend);
         out.swaying += bend.isStill() ? 0 : 1;
-        DrawBatch& batch = out.of(lod::kindOf(h, draw.chunk));
+        const lod::Kind kind = lod::kindOf(h, draw.chunk);
+        DrawBatch& batch = out.of(kind);
         const auto index = static_cast<uint32_t>(batch.nodes.size());
-        for (uint32_t first = 0; first < draw.count; first += shared::kBlockLanes)
+        for (uint32_t first = 0; first < draw.count; first += drawnKind(kind).recordsPerBlock)
             batch.blocks.push_back({index, first});
         batch.nodes.push_back(makeDrawNode(draw, bend, cameraFromWorld, out));
         const shared::DrawNode& node = batch.nodes.back();
@@ -189,6 +190,7 @@ void setView(const lod::Cut& cut, const lod::View& view, const DrawSettings& set
     f.lowPass = settings.lowPass;
     f.kernelSupport = settings.kernelSupport;
     f.perSurfel = settings.perSurfel ? 1 : 0;
+    f.patchAs = settings.patchAs;
     f.shade = (settings.lit ? shared::kShadeLit : shared::kShadeUnlit) |
               (settings.unlitTriangles ? 0u : shared::kShadeTriangles);
     f.debugView = settings.debugView;

@@ -69,6 +69,9 @@ struct DrawList {
     const DrawBatch& points() const { return of(lod::Kind::points); }
     const DrawBatch& curves() const { return of(lod::Kind::curves); }
     const DrawBatch& triangles() const { return of(lod::Kind::triangles); }
+    const DrawBatch& patches() const { return of(lod::Kind::patches); }
+    /// Are there pixels with words of their own for what lights them: of triangles and patches?
+    bool hasSurfaces() const { return !triangles().isEmpty() || !patches().isEmpty(); }
     bool hasWideDiscs = false;               ///< some nodes of points may hold some (kNodeWide)
     std::vector<shared::DrawMesh> meshes;    ///< instances of mesh stores that are in view
     std::vector<MeshTextures> meshTextures;  ///< of each of `meshes`
@@ -108,12 +111,13 @@ struct DrawSettings {
     glm::vec3 background = linearBackground();  ///< linear
     glm::dvec3 worldUp{0, 0, 1};
     std::shared_ptr<const Environment> environment;
-    std::vector<WorldLight> lights;    ///< none: a sun over the viewer's shoulder
-    float supportScale = 1.0f;         ///< splat radius of the reconstruction / stored radius
-    float minimumRadius = 1.0f;        ///< pixels
-    float lowPass = 0.5f;              ///< of blended discs: variance, px^2
-    float kernelSupport = 2;           ///< of blended discs: where kernels end, in sigmas (2 or 3)
-    bool perSurfel = false;            ///< blended discs have weights of their own; pixels are not divided by theirs
+    std::vector<WorldLight> lights;  ///< none: a sun over the viewer's shoulder
+    float supportScale = 1.0f;       ///< splat radius of the reconstruction / stored radius
+    float minimumRadius = 1.0f;      ///< pixels
+    float lowPass = 0.5f;            ///< of blended discs: variance, px^2
+    float kernelSupport = 2;         ///< of blended discs: where kernels end, in sigmas (2 or 3)
+    bool perSurfel = false;          ///< blended discs have weights of their own; pixels are not divided by theirs
+    uint32_t patchAs = shared::kPatchStrips;
     float exactCurves = 2.0f;          ///< pixels of half-width from which curves are filled, not reconstructed
     Wind wind;                         ///< moves what setSway was told of
     uint32_t coverageSeed = 0;         ///< of curves narrower than a pixel

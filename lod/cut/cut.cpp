@@ -154,14 +154,16 @@ void emitCut(const CutFrame& frame, int step, Cut& cut) {
 /// Even the coarsest cut is too large: leave out records, finest first, and say so.
 void truncate(uint64_t budget, Cut& cut) {
     cut.truncated = true;
-    uint64_t left = budget;
+    uint64_t left = budget, triangles = 0;
     for (CutDraw& draw : cut.draw) {
-        draw.count = static_cast<uint32_t>(std::min<uint64_t>(draw.count, left));
-        left -= draw.count;
+        const uint64_t each = std::max(draw.triangles, 1u);
+        draw.count = static_cast<uint32_t>(std::min<uint64_t>(draw.count, left / each));
+        left -= draw.count * each;
+        triangles += uint64_t{draw.count} * draw.triangles;
     }
     std::erase_if(cut.draw, [](const CutDraw& d) { return d.count == 0; });
-    cut.counters.recordsDrawn = budget - left;
-    uint64_t triangles = 0;
+    cut.counters.recordsDrawn = budget - left - triangles;
+    left += triangles;  // those of meshes are counted with them
     std::erase_if(cut.meshDraw, [&](const CutMeshDraw& d) {
         const bool isLeftOut = triangles + d.triangles > left;
         if (!isLeftOut) triangles += d.triangles;

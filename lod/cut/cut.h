@@ -84,6 +84,7 @@ struct CutDraw {
     uint32_t octantMask = 0;  ///< ... and all records of these octants
     float errorPixels = 0;    ///< largest screen-space error among what this node draws
     float radiusScale = 1;    ///< of a stochastic store: discs drawn are larger than stored
+    uint32_t triangles = 0;   ///< that a record is at most (a block of patches); 0: it is none
 };
 
 /// Clusters of triangles: one run of one group.

@@ -6,3 +6,4 @@
 STIPPLE_KIND(points)
 STIPPLE_KIND(curves)
 STIPPLE_KIND(triangles)
+STIPPLE_KIND(patches)

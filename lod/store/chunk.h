@@ -8,6 +8,7 @@
 
 #include "engine/base/result.h"
 #include "lod/primitives/mesh.h"
+#include "lod/primitives/patch_blocks.h"
 #include "shaders/shared/curve.h"
 #include "shaders/shared/record.h"
 
@@ -27,6 +28,8 @@ struct Chunk {
     std::vector<shared::MeshCluster> clusters;
     std::vector<shared::CurveSegment> segments;  ///< of a curve store
     std::vector<uint32_t> texels;                ///< of a texture's tile, kTileEdge x kTileEdge
+    std::vector<shared::PatchBlock> patchBlocks;
+    std::vector<PatchPlane> patchPlanes;  ///< of each block
     /// Calls use(array) for all that backends draw from, in the order in which it lies on a device.
     template <typename Use>
     void forEachArray(const Use& use) const {
@@ -37,9 +40,10 @@ struct Chunk {
         use(vertices);
         use(triangles);
         use(texels);
+        use(patchBlocks);
     }
     uint64_t sizeBytes() const {
-        uint64_t bytes = clusters.size() * sizeof(shared::MeshCluster);
+        uint64_t bytes = clusters.size() * sizeof(shared::MeshCluster) + patchPlanes.size() * sizeof(PatchPlane);
         forEachArray([&](const auto& array) { bytes += array.size() * sizeof(array[0]); });
         return bytes;
     }

@@ -6,6 +6,7 @@
 #include "../shared/frame.h"
 #include "../shared/material.h"
 #include "../shared/mesh.h"
+#include "../shared/patch.h"
 #include "../shared/record.h"
 #include "../shared/curve.h"
 #include "../shared/texture.h"
@@ -23,6 +24,7 @@ layout(set = 0, binding = 0, scalar) readonly buffer In {
     SurfaceMaterial material;
     CurveSegment segment;
     TextureInfo textureInfo;
+    PatchBlock patchBlock;
 };
 layout(set = 0, binding = 1, scalar) writeonly buffer Out { uint words[]; };
 
@@ -70,6 +72,7 @@ void putFrame() {
     put(frame.kernelSupport);
     put(frame.perSurfel);
     put(frame.hasMaterials);
+    put(frame.patchAs);
 }
 
 void putNode() {
@@ -209,6 +212,15 @@ void putTextureInfo() {
     for (uint i = 0u; i < kTextureLevels; ++i) put(textureInfo.firstTile[i]);
 }
 
+void putPatchBlock() {
+    put(patchBlock.number);
+    put(patchBlock.place);
+    for (uint k = 0u; k < 4u; ++k) put(patchBlock.cells[k]);
+    for (uint k = 0u; k < kPatchSamples; ++k) put(patchBlock.normals[k]);
+    for (uint k = 0u; k < kPatchSamples; ++k) put(patchBlock.colours[k]);
+    for (uint k = 0u; k < (kPatchSamples + 1u) / 2u; ++k) put(patchBlock.heights[k]);
+}
+
 void main() {
     putFrame();
     putNode();
@@ -222,4 +234,5 @@ void main() {
     putMaterial();
     putSegment();
     putTextureInfo();
+    putPatchBlock();
 }

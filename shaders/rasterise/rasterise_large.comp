@@ -19,7 +19,7 @@ void main() {
         for (int p = int(gl_LocalInvocationID.x); p < pixels; p += 256) {
             const int x = x0 + p % width, y = y0 + p / width;
             float inverseDepth;
-            if (isCovered(t, x, y, inverseDepth)) offer(x, y, inverseDepth, drawId(frame.firstBlock.of[kKindTriangles], t.id));
+            if (isCovered(t, x, y, inverseDepth)) offer(x, y, inverseDepth, drawId(stepInfo.firstBlock, t.id));
         }
     }
 }

@@ -55,7 +55,7 @@ struct Step {
     uint wantExtra;     // write depth, normals and linear colour
     uint hasPyramid;    // levels above the first are of this frame
     uint hasTubes;      // texels may be of tubes
-    uint hasTriangles;  // pixels may be of triangles
+    uint hasTriangles;  // pixels may be of triangles or patches
     uint hasWideDiscs;  // there is a list of them
     uint exactPoints;   // points are what their pixels show, at the depth of the visibility buffer
     uint hasFiltered;   // ... of what discs were blended to

@@ -24,7 +24,8 @@ struct DrawNode {
     uint level;         // depth in the octree, for the debug view
     float errorPixels;  // screen-space error delivered by this node, for the debug view
     float spacing;      // of its records on their surface, world units; 0: not known
-    uint weights;       // records of its chunk, where weights of surfels lie behind them; 0: there are none
+    uint weights;       // records of its chunk, where weights of surfels lie behind them; 0: there are none. Of
+                        // patches (gpu backend): the first of theirs among the frame's DrawMesh
     uint material;      // of points without materials of their own (material.h): packed, or kPlainPoint
     uint
         materials;  // of points: behind so many records (and weights) lie materials, two a word; 0: all have `material`
@@ -97,6 +98,12 @@ const uint kShadeUnlit = 0u;
 const uint kShadeLit = 1u;        // points
 const uint kShadeTriangles = 2u;  // a bit of its own
 
+// What elevation patches are drawn as: triangles that are rasterised; splats, one a cell, whose pixels' rays meet the
+// two triangles of the cell; or splats that rays meet where they meet the plane of the cell's first sample.
+const uint kPatchStrips = 0u;
+const uint kPatchSplats = 1u;
+const uint kPatchDirect = 2u;
+
 const uint kDebugNone = 0u;
 const uint kDebugLevel = 1u;
 const uint kDebugError = 2u;
@@ -133,6 +140,7 @@ struct FrameConstants {
     float kernelSupport;  // mode ewa: where kernels end, in sigmas
     uint perSurfel;       // mode ewa: 1: surfels have weights (surfel_weight.h), and pixels are not divided by them
     uint hasMaterials;    // some points have materials
+    uint patchAs;         // kPatch...
 };
 SHARED_FN Lens frameLens(FrameConstants f) { return lensOf(f.focal, f.orthographic != 0u); }
 

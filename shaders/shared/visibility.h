@@ -3,7 +3,7 @@
 //   depth 31 | draw id 33 = 256 * block + lane
 //
 // depth: the bits of a linear depth in fp32, whose sign is always 0 (so that they sort like integers). Blocks are those
-// of the frame, sorted by kind (lod/primitives/kinds.inl): all of points, all of curves, all of triangles, then the
+// of the frame, sorted by kind (lod/primitives/kinds.inl): all of points, of curves, of triangles, of patches, then the
 // points' once more, for those that are wide discs (wide_disc.h). What is equally deep goes to the kinds in that order.
 // This file alone knows bits.
 #ifndef STIPPLE_SHARED_VISIBILITY_H
@@ -14,8 +14,9 @@ SHARED_BEGIN
 const uint kKindPoints = 0u;
 const uint kKindCurves = 1u;
 const uint kKindTriangles = 2u;
-const uint kKindDiscs = 3u;
-const uint kKindNothing = 4u;
+const uint kKindPatches = 3u;
+const uint kKindDiscs = 4u;
+const uint kKindNothing = 5u;
 
 // The first block of each kind of a frame.
 struct BlockRanges {

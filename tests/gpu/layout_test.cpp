@@ -11,6 +11,7 @@
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
 #include "shaders/shared/mesh.h"
+#include "shaders/shared/patch.h"
 #include "shaders/shared/record.h"
 #include "shaders/shared/texture.h"
 #include "tests/gpu/one_time_commands.h"
@@ -34,13 +35,15 @@ struct Shared {
     shared::SurfaceMaterial material;
     shared::CurveSegment segment;
     shared::TextureInfo textureInfo;
+    shared::PatchBlock patchBlock;
 };
 // Words of four bytes throughout: no padding, in whatever order.
-static_assert(sizeof(Shared) ==
-              sizeof(shared::FrameConstants) + sizeof(shared::DrawNode) + sizeof(shared::DrawBlock) +
-                  sizeof(shared::PointRecord) + sizeof(shared::LightSource) + sizeof(shared::MeshVertex) +
-                  sizeof(shared::MeshCluster) + sizeof(shared::DrawMesh) + sizeof(shared::DrawCluster) +
-                  sizeof(shared::SurfaceMaterial) + sizeof(shared::CurveSegment) + sizeof(shared::TextureInfo));
+static_assert(sizeof(Shared) == sizeof(shared::FrameConstants) + sizeof(shared::DrawNode) + sizeof(shared::DrawBlock) +
+                                    sizeof(shared::PointRecord) + sizeof(shared::LightSource) +
+                                    sizeof(shared::MeshVertex) + sizeof(shared::MeshCluster) +
+                                    sizeof(shared::DrawMesh) + sizeof(shared::DrawCluster) +
+                                    sizeof(shared::SurfaceMaterial) + sizeof(shared::CurveSegment) +
+                                    sizeof(shared::TextureInfo) + sizeof(shared::PatchBlock));
 
 /// One dispatch of the echo shader.
 class Echo {

@@ -364,7 +364,7 @@ TEST_F(Payloads, InfoSaysWhatAStoreHas) {
         const auto streams = p.at("streams").get<std::vector<int>>();
         EXPECT_EQ(streams, p.at("kind") == "points" ? (std::vector{1, 6}) : std::vector{1});
     }
-    EXPECT_EQ(kinds, (std::set<std::string>{"points", "curves", "triangles"}));
+    EXPECT_EQ(kinds, (std::set<std::string>{"points", "curves", "triangles", "patches"}));
     EXPECT_EQ(payloads, h.chunks());
     EXPECT_EQ(records, json.at("records").get<uint64_t>());
     const auto text = test::runProgram(folder_, "info mixed.stipple --verify");
@@ -384,14 +384,14 @@ TEST_F(Payloads, InfoSaysWhatAStoreHas) {
 TEST(PayloadNames, AreDistinctAndFit) {
     std::set<std::string> names;
     for (size_t k = 0; k < lod::kKinds; ++k) names.insert(traitsOf(static_cast<Kind>(k)).name);
-    EXPECT_EQ(names, (std::set<std::string>{"points", "curves", "triangles"}));
+    EXPECT_EQ(names, (std::set<std::string>{"points", "curves", "triangles", "patches"}));
     std::set<std::string> codecs;
     for (size_t c = 0; c < lod::kCodecs; ++c) {
         const std::string name = traitsOf(static_cast<lod::Codec>(c)).name;
         EXPECT_LT(name.size(), 24u);
         codecs.insert(name);
     }
-    EXPECT_EQ(codecs, (std::set<std::string>{"meshopt-points", "meshopt-curves", "meshopt-triangles"}));
+    EXPECT_EQ(codecs, (std::set<std::string>{"meshopt-points", "meshopt-curves", "meshopt-triangles", "patches"}));
 }
 
 }  // namespace

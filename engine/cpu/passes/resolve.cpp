@@ -8,7 +8,7 @@
 namespace stipple::cpu {
 namespace {
 
-/// Planes that only triangles need, and only those with an emissive material.
+/// Planes that only triangles and patches need, and only those with an emissive material.
 void preparePlanes(Frame& frame, size_t pixels) {
     const auto fit = [&](HugeBuffer<uint32_t>& plane, size_t& size, bool isNeeded) {
         if (isNeeded && size != pixels) {
@@ -16,10 +16,11 @@ void preparePlanes(Frame& frame, size_t pixels) {
             size = pixels;
         }
     };
-    frame.hasTriangles = !frame.draws->triangles().isEmpty();
+    frame.hasTriangles = frame.draws->hasSurfaces();
     frame.hasEmissive = false;
     for (const shared::SurfaceMaterial& m : frame.draws->materials)
-        frame.hasEmissive = frame.hasEmissive || (frame.hasTriangles && m.emissive.x + m.emissive.y + m.emissive.z > 0);
+        frame.hasEmissive = frame.hasEmissive ||
+                            (!frame.draws->triangles().isEmpty() && m.emissive.x + m.emissive.y + m.emissive.z > 0);
     fit(frame.surface, frame.surfacePixels, frame.hasTriangles);
     fit(frame.emissive, frame.emissivePixels, frame.hasEmissive);
 }
@@ -36,6 +37,7 @@ void resolve(Frame& frame) {
     const ResolveInput input{.blocks = frame.blocks.data(),
                              .meshBlocks = frame.meshBlocks.data(),
                              .materials = frame.draws->materials.data(),
+                             .patchBlocks = frame.patchBlocks.data(),
                              .curveBlocks = frame.curveBlocks.data(),
                              .discs = frame.discs.data(),
                              .discBoxes = frame.discBoxes.data(),

@@ -176,7 +176,7 @@ bool wantsNormals(const Frame& frame, std::span<const render::Pass> passes) {
     SurfaceWants wants{};
     uint32_t any = 0;
     SurfacePlanes planes{};
-    if (!frame.draws->triangles().isEmpty()) planes.surface = &any;
+    if (frame.draws->hasSurfaces()) planes.surface = &any;
     const auto surface = std::find(passes.begin(), passes.end(), render::Pass::surface);
     for (auto pass = surface; pass != passes.end(); ++pass) {
         if (*pass == render::Pass::surface) continue;

@@ -36,7 +36,7 @@ constinit const GpuPass curvesPass{[](Recording& f) {
 constinit const GpuPass rasterisePass{[](Recording& f) {
     f.emptyList("large list", shared::kLargeBinding);
     f.overBlocks("rasterise", f.buffers().clusters());
-    f.overBands("rasterise large", "rasterise_large");
+    f.overBands("rasterise large", "rasterise_large", f.draws().frame.firstBlock.of[shared::kKindTriangles]);
 }};
 
 }  // namespace stipple::gpu

@@ -20,6 +20,7 @@ struct DrawnKind {
     bool (*isLit)(const DrawSettings& settings);
     /// Adds what the cut has of it beyond nodes of records (Cut::draw), which all kinds share. Null: nothing.
     void (*add)(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, DrawList& out);
+    uint32_t recordsPerBlock = 256;  ///< of 256 draw ids
 };
 #define STIPPLE_KIND(name) extern const DrawnKind name##Drawn;
 #include "lod/primitives/kinds.inl"

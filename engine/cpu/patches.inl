@@ -1,0 +1,106 @@
+// Elevation patches of the cpu backend: blocks of cells as triangles, coverage and attributes. Included by kernels.inl.
+
+/// Codes of a block's samples.
+[[gnu::always_inline]] inline void patchHeights(const PatchBlock& block, int32_t* __restrict heights) {
+    for (size_t k = 0; k < (kPatchSamples + 1) / 2; ++k) {
+        heights[2 * k] = static_cast<int32_t>(block.heights[k] & 0xffffu);
+        heights[2 * k + 1] = static_cast<int32_t>(block.heights[k] >> 16);
+    }
+}
+[[gnu::always_inline]] inline int32_t patchHeight(const PatchBlock& block, uint32_t sample) {
+    return static_cast<int32_t>(block.heights[sample / 2] >> (16 * (sample % 2)) & 0xffffu);
+}
+
+/// Places of all samples of a block; those that are not there lie on the plane.
+[[gnu::always_inline]] inline void placeSamples(const PatchBlock& block, const DrawMesh& m,
+                                                const int32_t* __restrict heights, PlacedCorners& __restrict p) {
+    const int i0 = static_cast<int>(block.place & 0xffffu), j0 = static_cast<int>(block.place >> 16);
+    for (int j = 0; j <= static_cast<int>(kPatchCellsUp); ++j) {
+        const size_t first = static_cast<size_t>(j) * kPatchStride;
+#pragma GCC ivdep
+        for (size_t i = 0; i < kPatchStride; ++i) {
+            const vec3 c = meshPosition(i0 + static_cast<int>(i), j0 + j, heights[first + i], m);
+            p.x[first + i] = c.x;
+            p.y[first + i] = c.y;
+            p.z[first + i] = c.z;
+        }
+    }
+}
+
+void rasterPatch(const FrameConstants& frame, const PatchSource& source, uint32_t firstPlace, const LargeSink& large,
+                 const Visibility& visibility) {
+    const FrameConstants f = frame;
+    const PatchBlock& block = *source.block;
+    alignas(64) int32_t heights[kPatchSamples + 1];
+    PlacedCorners p;
+    patchHeights(block, heights);
+    placeSamples(block, *source.mesh, heights, p);
+    projectCorners(f, kPatchSamples, p);
+    const uint64_t firstId = drawId(f.firstBlock.of[kKindPatches], firstPlace);
+    for (uint32_t word = 0; word < 4; ++word)
+        for (uint32_t left = block.cells[word]; left != 0; left &= left - 1) {
+            const uint32_t cell = 32 * word + static_cast<uint32_t>(__builtin_ctz(left));
+            const uint32_t at = kPatchStride * (cell / kPatchCellsAcross) + cell % kPatchCellsAcross;
+            for (uint32_t k = 0; k < 2; ++k) {
+                const uint32_t t = patchTriangle(at, heights[at], heights[at + 1], heights[at + kPatchStride],
+                                                 heights[at + kPatchStride + 1], k);
+                offerTriangle(f, p, t & 255u, t >> 8 & 255u, t >> 16, {firstId + 2 * cell + k, true, nullptr}, large,
+                              visibility);
+            }
+        }
+}
+
+/// Follows the pointers.
+[[gnu::always_inline]] inline void gatherPatches(const PatchSource* blocks, const WinningPixels& p, Corners& c) {
+    const size_t n = p.count;
+    for (size_t i = 0; i < n; ++i) {
+        const PatchSource& source = blocks[p.id[i] / kBlockLanes];
+        const PatchBlock& block = *source.block;
+        const uint32_t cell = p.id[i] % kBlockLanes / 2;
+        const uint32_t at = kPatchStride * (cell / kPatchCellsAcross) + cell % kPatchCellsAcross;
+        const uint32_t t =
+            patchTriangle(at, patchHeight(block, at), patchHeight(block, at + 1), patchHeight(block, at + kPatchStride),
+                          patchHeight(block, at + kPatchStride + 1), p.id[i] & 1u);
+        const int i0 = static_cast<int>(block.place & 0xffffu), j0 = static_cast<int>(block.place >> 16);
+        for (uint32_t k = 0; k < 3; ++k) {
+            const uint32_t s = t >> (8 * k) & 255u;
+            const vec3 place = meshPosition(i0 + static_cast<int>(s % kPatchStride),
+                                            j0 + static_cast<int>(s / kPatchStride), patchHeight(block, s), *source.mesh);
+            c.x[k][i] = place.x;
+            c.y[k][i] = place.y;
+            c.z[k][i] = place.z;
+            c.normal[k][i] = block.normals[s];
+            c.colour[k][i] = block.colours[s];
+            c.u[k][i] = c.v[k][i] = 0;
+        }
+    }
+}
+
+/// From the directions of patches to those of the camera; a surface that is rough and sends no light of its own.
+[[gnu::always_inline]] inline void turnPatches(const PatchSource* blocks, const WinningPixels& p, bool hasEmission,
+                                               MaterialRow& __restrict s) {
+    for (size_t i = 0; i < p.count; ++i) {
+        const DrawMesh& m = *blocks[p.id[i] / kBlockLanes].mesh;
+        const float x = s.nx[i], y = s.ny[i], z = s.nz[i];
+        s.nx[i] = m.normalX.x * x + m.normalY.x * y + m.normalZ.x * z;
+        s.ny[i] = m.normalX.y * x + m.normalY.y * y + m.normalZ.y * z;
+        s.nz[i] = m.normalX.z * x + m.normalY.z * y + m.normalZ.z * z;
+        s.red[i] = s.green[i] = s.blue[i] = 1;
+        s.metallic[i] = 0;
+        s.roughness[i] = s.occlusion[i] = 1;
+        s.flags[i] = kPixelTriangle;
+        if (hasEmission) s.emissionR[i] = s.emissionG[i] = s.emissionB[i] = 0;
+    }
+}
+
+void resolvePatches(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, uint32_t x0, uint32_t y,
+                    TexelRow& __restrict row, const SurfacePlanes& planes) {
+    TriangleRow t;
+    const RowRays rays = rowRays(f, x0, y);
+    gatherPatches(in.patchBlocks, p, t.corners);
+    weighCorners(p, rays, t.corners, t.material, t.uv, t.wb, t.wc);
+    turnPatches(in.patchBlocks, p, planes.emissive != nullptr, t.material);
+    packSurfaces(p, rays, t.material, t.perpX, t.perpY, t.word);
+    mixColours(f, in.patchBlocks, p, t.corners, t.wb, t.wc, t.material);
+    storeTriangles(p, t, row, planes);
+}

@@ -1,0 +1,68 @@
+// Blocks of elevation patches in fp64, from the description of the format alone: samples over a plane, two triangles a
+// cell.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <glm/gtc/quaternion.hpp>
+
+#include "engine/reference/decode.h"
+#include "lod/primitives/patch_blocks.h"
+#include "shaders/shared/material.h"
+
+namespace stipple::reference {
+
+struct PatchCorner {
+    glm::dvec3 place{0};   ///< lattice steps
+    glm::dvec3 normal{0};  ///< the store's axes
+    glm::dvec3 colour{0};  ///< linear
+};
+
+class PatchBlockReader {
+  public:
+    PatchBlockReader(const lod::Hierarchy& h, const lod::Node& node, const shared::PatchBlock& block,
+                     const lod::PatchPlane& plane)
+        : block_(block), plane_(plane), frame_(glm::mat3_cast(glm::normalize(glm::dquat(plane.turn)))) {
+        const double cell = std::ldexp(1.0, static_cast<int>(h.rootLog2) - node.level);
+        origin_ = glm::dvec3(node.cell[0], node.cell[1], node.cell[2]) * cell + plane.origin;
+    }
+    /// Sample 17 v + u of the block.
+    PatchCorner sample(uint32_t s) const {
+        const double step = plane_.step;
+        const glm::dvec3 onPlane(step * (block_.place % 65536 + s % 17), step * (block_.place / 65536 + s / 17),
+                                 std::ldexp(code(s), plane_.quantumExponent));
+        const uint32_t colour = block_.colours[s];
+        return {origin_ + frame_ * onPlane, frame_ * decodeDirection(block_.normals[s]),
+                glm::dvec3(decodeSrgb(colour % 256), decodeSrgb(colour / 256 % 256), decodeSrgb(colour / 65536 % 256))};
+    }
+    /// Calls use(a, b, c) with samples.
+    template <typename Use>
+    void forEachTriangle(const Use& use) const {
+        for (uint32_t cell = 0; cell < 128; ++cell) {
+            if ((block_.cells[cell / 32] >> (cell % 32) & 1u) == 0) continue;
+            const uint32_t s = 17 * (cell / 16) + cell % 16;
+            const std::array<uint8_t, 6>& t = lod::cellTriangles(code(s), code(s + 1), code(s + 17), code(s + 18));
+            const auto corner = [&](size_t k) { return s + t.at(k) % 2 + 17 * (t.at(k) / 2u); };
+            use(corner(0), corner(1), corner(2));
+            use(corner(3), corner(4), corner(5));
+        }
+    }
+
+  private:
+    int code(uint32_t s) const { return static_cast<int>(block_.heights[s / 2] / (s % 2 == 0 ? 1u : 65536u) % 65536); }
+
+    const shared::PatchBlock& block_;
+    const lod::PatchPlane& plane_;
+    glm::dmat3 frame_;
+    glm::dvec3 origin_{0};
+};
+
+/// What patches are made of: rough, and nothing but their colours.
+inline const shared::SurfaceMaterial kPlainMaterial = [] {
+    shared::SurfaceMaterial m{};
+    m.baseColour = {1, 1, 1};
+    m.roughness = m.alpha = 1;
+    return m;
+}();
+
+}  // namespace stipple::reference

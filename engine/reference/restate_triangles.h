@@ -1,0 +1,34 @@
+// Triangles in fp64, from the definitions: clipping at the near plane, coverage by the top-left rule on corners snapped
+// to 1/256 pixel, attributes where the ray through the pixel meets the triangle's plane.
+#pragma once
+
+#include "engine/reference/surface.h"
+
+namespace stipple::reference {
+
+/// What a triangle is a part of, for debug views.
+struct Whole {
+    double errorPixels = 0;
+    uint32_t level = 0;
+};
+
+class TriangleProjector {
+  public:
+    TriangleProjector(const render::DrawList& draws, Level& level) : draws_(draws), level_(level), view_(draws.view) {}
+
+    /// Into the level where nothing nearer is. `surface`: flags of shaders/shared/mesh.h.
+    void triangle(const Corners& c, uint32_t surface, const shared::SurfaceMaterial& material,
+                  const TextureReader& textures, const Whole& of);
+
+  private:
+    template <typename Use>
+    void cover(std::array<glm::dvec2, 3> p, const Use& use) const;
+    void pixel(int x, int y, const Corners& c, const glm::dvec3& face, uint32_t surface,
+               const shared::SurfaceMaterial& m, const TextureReader& textures, const Whole& of);
+
+    const render::DrawList& draws_;
+    Level& level_;
+    const lod::View& view_;
+};
+
+}  // namespace stipple::reference

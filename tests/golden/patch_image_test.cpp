@@ -1,0 +1,275 @@
+// Elevation patches in pictures: what rays meet of the lifted triangles, as the fp64 restatement draws them, and the
+// same bytes whoever draws.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/reference/reference.h"
+#include "tests/support/backends_here.h"
+#include "tests/support/patch_scene.h"
+#include "tests/support/patch_shapes.h"
+
+namespace stipple {
+namespace {
+
+using test::PatchScene;
+
+double waves(double x, double y) { return 0.15 * std::sin(5 * x) * std::cos(4 * y + x); }
+
+lod::View viewFrom(const glm::dvec3& eye, const glm::dvec3& at, bool isOrthographic, uint32_t width = 160) {
+    lod::View view;
+    view.eye = eye;
+    view.forward = glm::normalize(at - eye);
+    view.right = glm::normalize(glm::cross(view.forward, glm::dvec3(0.1, 0.9, 0.2)));
+    view.down = glm::cross(view.forward, view.right);
+    view.width = width;
+    view.height = width * 3 / 4;
+    view.focalPixels = isOrthographic ? 0.4 * width : 1.1 * width;
+    view.nearPlane = 1e-3;
+    view.isOrthographic = isOrthographic;
+    return view;
+}
+
+struct RayHit {
+    double depth = HUGE_VAL, slope = 0;  ///< slope: depth a pixel changes at most
+};
+
+/// Triangles in camera space, and where their corners are seen.
+class Lifted {
+  public:
+    Lifted(const std::vector<test::Triangle>& triangles, const lod::View& view) : view_(view) {
+        for (const test::Triangle& t : triangles) {
+            std::array<glm::dvec3, 3> c{};
+            for (size_t k = 0; k < 3; ++k) {
+                const glm::dvec3 d = t.at(k) - view.eye;
+                c.at(k) = {glm::dot(d, view.right), glm::dot(d, view.down), glm::dot(d, view.forward)};
+            }
+            camera_.push_back(c);
+        }
+        for (uint32_t y = 0; y < view.height; ++y)
+            for (uint32_t x = 0; x < view.width; ++x) hits.push_back(meet({x + 0.5, y + 0.5}));
+    }
+    std::vector<RayHit> hits;  ///< of the pixels
+
+    /// Brute force: the nearest triangle that the ray through an image point meets, solved as three linear equations.
+    RayHit meet(const glm::dvec2& pixel) const {
+        const glm::dvec2 off = (pixel - 0.5 * glm::dvec2(view_.width, view_.height)) / view_.focalPixels;
+        const glm::dvec3 o = view_.isOrthographic ? glm::dvec3(off, 0) : glm::dvec3(0),
+                         d = view_.isOrthographic ? glm::dvec3(0, 0, 1) : glm::dvec3(off, 1);
+        RayHit hit;
+        for (size_t k = 0; k < camera_.size(); ++k) {
+            const auto& [a, b, c] = camera_[k];
+            const glm::dmat3 m(b - a, c - a, -d);
+            const double det = glm::determinant(m);
+            if (det == 0) continue;
+            const glm::dvec3 x = glm::inverse(m) * (o - a);
+            if (x.x < 0 || x.y < 0 || x.x + x.y > 1 || x.z < view_.nearPlane || x.z >= hit.depth) continue;
+            const glm::dvec3 n = glm::normalize(glm::cross(b - a, c - a));
+            // The depth of the plane along the image.
+            const double scale = view_.isOrthographic ? 1 / view_.focalPixels : x.z / view_.focalPixels;
+            hit = {x.z, std::hypot(n.x, n.y) / std::abs(glm::dot(n, d)) * scale};
+        }
+        return hit;
+    }
+    /// Pixels to the nearest edge of any triangle.
+    double toEdge(const glm::dvec2& pixel) const {
+        double nearest = HUGE_VAL;
+        for (const auto& c : camera_)
+            for (size_t k = 0; k < 3; ++k) {
+                const glm::dvec3 &p = c.at(k), &q = c.at((k + 1) % 3);
+                if (p.z < view_.nearPlane || q.z < view_.nearPlane) continue;
+                const glm::dvec2 a = at(p), b = at(q), e = b - a;
+                const double along = std::clamp(glm::dot(pixel - a, e) / std::max(glm::dot(e, e), 1e-30), 0.0, 1.0);
+                nearest = std::min(nearest, glm::length(a + along * e - pixel));
+            }
+        return nearest;
+    }
+
+  private:
+    glm::dvec2 at(const glm::dvec3& p) const {
+        return glm::dvec2(p) * (view_.focalPixels / (view_.isOrthographic ? 1 : p.z)) +
+               0.5 * glm::dvec2(view_.width, view_.height);
+    }
+    const lod::View view_;
+    std::vector<std::array<glm::dvec3, 3>> camera_;
+};
+
+/// Pixels of the picture that are not what rays meet, though no edge is within 1/256 px; of how many seen.
+struct Against {
+    size_t seen = 0, wrong = 0, nearEdges = 0;
+};
+Against compareWithRays(const render::Image& image, const Lifted& truth) {
+    Against a;
+    for (uint32_t y = 0; y < image.height; ++y)
+        for (uint32_t x = 0; x < image.width; ++x) {
+            const size_t i = size_t{y} * image.width + x;
+            const RayHit& hit = truth.hits[i];
+            const bool isSeen = image.rgba[i] >> 24 != 0 && image.depth[i] > 0, isThere = hit.depth < HUGE_VAL;
+            a.seen += isThere ? 1 : 0;
+            // Corners lie on 1/256 px: the plane through them is off by what it falls in sqrt(1/2) of that.
+            const double bound = std::ldexp(hit.depth, -20) + hit.slope * std::sqrt(0.5) / 256;
+            if (isSeen == isThere && (!isThere || std::abs(double{image.depth[i]} - hit.depth) <= bound)) continue;
+            const bool isNearEdge = truth.toEdge({x + 0.5, y + 0.5}) <= 1.0 / 256;
+            ++(isNearEdge ? a.nearEdges : a.wrong);
+        }
+    return a;
+}
+
+/// Pixels that two pictures both show, and those where they do not agree.
+struct Geometry {
+    size_t both = 0, oneSided = 0, depths = 0, normals = 0;
+};
+Geometry compareGeometry(const render::Image& a, const render::Image& b) {
+    Geometry g;
+    for (size_t i = 0; i < a.rgba.size(); ++i) {
+        g.oneSided += (a.depth[i] > 0) != (b.depth[i] > 0) ? 1 : 0;
+        if (!(a.depth[i] > 0 && b.depth[i] > 0)) continue;
+        ++g.both;
+        g.depths += std::abs(a.depth[i] - b.depth[i]) > 1e-3f * std::max(b.depth[i], 0.5f) ? 1 : 0;
+        double along = 0;
+        for (size_t k = 0; k < 3; ++k) along += double{a.normal[3 * i + k]} * b.normal[3 * i + k];
+        g.normals += along < std::cos(3.14159 / 180) ? 1 : 0;
+    }
+    return g;
+}
+
+std::vector<lod::Patch> closedTorus() {
+    lod::PatchSettings settings;
+    settings.samples = 3000;
+    lod::PatchSet set = test::patchesOf(test::torusMesh(80, 30), settings);
+    for (lod::Patch& p : set.patches) p.origin += set.middle;
+    return set.patches;
+}
+std::vector<test::Triangle> lifted(const std::vector<lod::Patch>& patches) {
+    std::vector<test::Triangle> all;
+    for (const lod::Patch& p : patches) {
+        const auto own = test::trianglesOf(p, glm::dvec3(0));
+        all.insert(all.end(), own.begin(), own.end());
+    }
+    return all;
+}
+/// Shrunk into [-1, 1]^3 by a power of two.
+std::vector<lod::Patch> within(std::vector<lod::Patch> patches) {
+    double most = 0;
+    for (const test::Triangle& t : lifted(patches))
+        for (const glm::dvec3& p : t) most = std::max({most, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+    const int down = std::max(0, static_cast<int>(std::ceil(std::log2(most))));
+    for (lod::Patch& p : patches) {
+        p.origin =
+            glm::dvec3(std::ldexp(p.origin.x, -down), std::ldexp(p.origin.y, -down), std::ldexp(p.origin.z, -down));
+        p.step = std::ldexp(p.step, -down);
+        p.quantumExponent -= down;
+    }
+    return patches;
+}
+
+class PatchImages : public test::BackendsHere {
+  protected:
+    /// Every backend against the fp64 restatement. Where patches cross each other either may be the nearer one: no more
+    /// than one pixel of `share` in depth and normals.
+    void expectRestated(PatchScene& scene, render::Mode mode, const lod::View& view,
+                        const render::DrawSettings& settings, const lod::Instance& place, size_t share) {
+        const auto oracle = reference::makeReferenceBackend(*executor_);
+        const render::Image expected = scene.draw(*oracle, view, mode, settings, place);
+        for (const auto& [name, backend] : backends_) {
+            const std::string what =
+                name + ", " + render::reconstructionOf(mode).name + (view.isOrthographic ? ", orthographic" : "");
+            const render::Image image = scene.draw(*backend, view, mode, settings, place);
+            const auto d = reference::compareImages(image, expected, 4, nullptr);
+            ASSERT_TRUE(d);
+            EXPECT_GE(d->psnr, 50) << what;
+            EXPECT_LE(d->differingFraction, 0.001) << what;
+            const Geometry g = compareGeometry(image, expected);
+            EXPECT_GT(g.both, 2000u) << what;
+            EXPECT_LE(g.oneSided + g.depths + g.normals, g.both / share)
+                << what << ": " << g.oneSided << " + " << g.depths << " + " << g.normals << " of " << g.both;
+        }
+    }
+};
+
+TEST_F(PatchImages, ShowWhatRaysMeetOfTheLiftedTriangles) {
+    const glm::dquat turn = glm::normalize(glm::dquat(0.8, 0.3, -0.4, 0.2));
+    const std::vector<std::vector<lod::Patch>> scenes{{test::patchOfHeights(41, 37, waves, 0.1, turn)},
+                                                      within(closedTorus())};
+    for (size_t s = 0; s < scenes.size(); ++s) {
+        PatchScene scene(scenes[s]);
+        for (const bool isOrthographic : {false, true}) {
+            const lod::View view = viewFrom({0.5, 1.4, 1.9}, {0.05, 0, 0}, isOrthographic);
+            const Lifted truth(lifted(scenes[s]), view);
+            for (const auto& [name, backend] : backends_) {
+                const Against a = compareWithRays(scene.draw(*backend, view), truth);
+                EXPECT_GT(a.seen, 2000u) << name;
+                EXPECT_EQ(a.wrong, 0u) << name << ", scene " << s << ", " << isOrthographic;
+                EXPECT_LE(a.nearEdges, a.seen / 100) << name;
+            }
+        }
+    }
+}
+
+// What the test above would say of a surface that is off by a quarter of a pixel.
+TEST_F(PatchImages, OfASurfaceAQuarterOfAPixelAwayAreNotWhatRaysMeet) {
+    std::vector<lod::Patch> patches{test::patchOfHeights(41, 37, waves)};
+    PatchScene scene(patches);
+    const lod::View view = viewFrom({0.5, 1.4, 1.9}, {0.05, 0, 0}, false);
+    patches[0].origin.z += 0.25 * 2.4 / view.focalPixels;
+    EXPECT_GT(compareWithRays(scene.draw(usual(), view), Lifted(lifted(patches), view)).wrong, 1000u);
+}
+
+TEST_F(PatchImages, AreThoseOfTheRestatementInEveryMode) {
+    PatchScene torus(within(closedTorus())), one({test::patchOfHeights(41, 37, waves, 0.1)});
+    render::DrawSettings settings;
+    settings.lit = true;
+    lod::Instance place;
+    place.rotation = glm::mat3_cast(glm::normalize(glm::dquat(0.9, 0.1, 0.4, -0.2)));
+    place.translation = {0.1, -0.2, 0.05};
+    place.scale = 0.9;
+    for (PatchScene* scene : {&torus, &one})
+        for (const render::Reconstruction& mode : render::reconstructions())
+            for (const bool isOrthographic : {false, true})
+                for (const glm::dvec3& eye :
+                     {glm::dvec3(0.5, 1.4, 1.9), glm::dvec3(0.3, 0.25, 0.5)})  // the latter: inside
+                    expectRestated(*scene, mode.mode, viewFrom(eye, {0.05, 0, 0}, isOrthographic, 240), settings, place,
+                                   scene == &torus ? 300 : 1000);
+}
+
+TEST_F(PatchImages, OfOneCellAndOfAPlaneAtHeightZeroAreWhole) {
+    for (const uint32_t side : {2u, 18u}) {
+        PatchScene scene({test::patchOfHeights(side, side, [](double, double) { return std::ldexp(1.0, -15) - 1; })});
+        lod::View view = viewFrom({0, 0, 3}, {0, 0, -1}, true, 100);
+        view.focalPixels = 30;
+        const render::Image image = scene.draw(usual(), view);
+        const double edge = scene.chunk().patchPlanes[0].step * std::ldexp(1.0, -20) * (side - 1) * view.focalPixels;
+        size_t seen = 0;
+        for (size_t i = 0; i < image.rgba.size(); ++i) {
+            if (image.rgba[i] >> 24 == 0) continue;
+            ++seen;
+            EXPECT_NEAR(image.depth[i], 4 - std::ldexp(1.0, -15), 1e-6);
+        }
+        EXPECT_NEAR(static_cast<double>(seen), edge * edge, 4 * edge * 0.5 + 1) << side;
+    }
+}
+
+TEST_F(PatchImages, TheNearerOfTwoSheetsIsSeenFromBothSides) {
+    for (const double apart : {1e-3, 2e-4}) {
+        lod::Patch low = test::patchOfHeights(30, 30, waves), high = low;
+        high.origin.z += apart;
+        for (uint32_t& c : low.colours) c = 0x0000ff;
+        for (uint32_t& c : high.colours) c = 0x00ff00;
+        PatchScene scene({low, high});
+        for (const double side : {1.0, -1.0}) {
+            const render::Image image = scene.draw(usual(), viewFrom({0.1, 0.2, side * 2.5}, {0, 0, 0}, false));
+            size_t nearer = 0, farther = 0;
+            for (const uint32_t c : image.rgba) {
+                if (c >> 24 == 0) continue;
+                const bool isHigh = (c >> 8 & 255u) > (c & 255u);
+                ++(isHigh == (side > 0) ? nearer : farther);
+            }
+            EXPECT_GT(nearer, 5000u);
+            EXPECT_LE(farther, nearer / 100) << "at silhouettes alone";
+        }
+    }
+}
+
+}  // namespace
+}  // namespace stipple

@@ -1,0 +1,95 @@
+#include "tests/support/patch_scene.h"
+
+#include <stdexcept>
+
+#include "engine/base/rng.h"
+#include "lod/primitives/codecs.h"
+#include "lod/primitives/octahedral.h"
+#include "lod/store/patch_bytes.h"
+
+namespace stipple::test {
+namespace {
+
+constexpr int kUnitLog2 = 20;  // lattice steps of a unit
+
+}  // namespace
+
+PatchScene::PatchScene(const std::vector<lod::Patch>& patches) {
+    hierarchy_.unit = std::ldexp(1.0, -kUnitLog2);
+    hierarchy_.rootLog2 = kUnitLog2 + 1;
+    hierarchy_.origin = glm::dvec3(-1);
+    hierarchy_.nodes.resize(1);
+    setKind(hierarchy_.nodes[0], lod::Kind::patches);
+    hierarchy_.nodes[0].centre = glm::dvec3(std::ldexp(1.0, kUnitLog2));
+    hierarchy_.nodes[0].radius = std::ldexp(2.0, kUnitLog2);
+    std::vector<lod::Patch> onLattice = patches;
+    for (lod::Patch& p : onLattice) {
+        p.origin = (p.origin + 1.0) / hierarchy_.unit;
+        p.step = std::ldexp(p.step, kUnitLog2);
+        p.quantumExponent += kUnitLog2;
+        hierarchy_.nodes[0].records += lod::countBlocks(p);
+    }
+    const std::vector<uint8_t> bytes = lod::encodePatches(onLattice).bytes;
+    auto decoded = lod::traitsOf(lod::Codec::patches).decode(hierarchy_, 0, bytes.data(), bytes.size(), "test", false);
+    if (!decoded) throw std::runtime_error(decoded.error().line());
+    chunk_ = std::move(*decoded);
+    all_ = &hierarchy_;
+}
+
+const render::DrawList& PatchScene::drawsOf(const lod::View& view, const render::DrawSettings& settings,
+                                            const lod::Instance& place) {
+    place_ = place;
+    lod::Cut cut;
+    cut.draw.push_back({0, 0, 0, hierarchy_.nodes[0].records, 255, 0, 1, 1});
+    render::makeDrawList(cut, std::span(&all_, 1), std::span(&place_, 1), view, settings, draws_);
+    return draws_;
+}
+
+render::Image PatchScene::draw(render::Backend& backend, const lod::View& view, render::Mode mode,
+                               const render::DrawSettings& settings, const lod::Instance& place) {
+    const render::DrawList& draws = drawsOf(view, settings, place);
+    render::Image image;
+    const render::RenderRequest request{&draws, mode, render::passesOf(mode, render::contentOf(draws), draws.effects),
+                                        true};
+    auto status = backend.upload({0, 0}, chunk_);
+    if (status) status = backend.render(request, image);
+    backend.evict({0, 0});
+    if (!status) throw std::runtime_error(status.error().line());
+    for (float& depth : image.depth)  // orthographic: counted from the eye that was asked for
+        if (depth > 0) depth = static_cast<float>(depth + draws.eyeAdvanced);
+    return image;
+}
+
+lod::Patch patchOfHeights(uint32_t width, uint32_t height, const std::function<double(double, double)>& f, double holes,
+                          const glm::dquat& turn) {
+    lod::Patch p;
+    p.width = width;
+    p.height = height;
+    p.turn = glm::quat(turn);
+    p.step = static_cast<float>(std::ldexp(1.0, -10) * std::floor(std::ldexp(2.0 / (std::max(width, height) - 1), 10)));
+    p.quantumExponent = -15;
+    const size_t samples = size_t{width} * height;
+    p.heights.assign(samples, 0);
+    p.normals.assign(samples, 0);
+    p.colours.assign(samples, 0);
+    p.cells.assign(size_t{width - 1} * (height - 1), 1);
+    Rng rng(width * 1000 + height);
+    for (uint8_t& cell : p.cells) cell = rng.uniform() < holes ? 0 : 1;
+    if (p.drawnCells() == 0) p.cells[0] = 1;
+    const double halfX = 0.5 * p.step * (width - 1), halfY = 0.5 * p.step * (height - 1);
+    p.origin = p.frame() * glm::dvec3(-halfX, -halfY, -1);
+    for (uint32_t j = 0; j + 1 < height; ++j)
+        for (uint32_t i = 0; i + 1 < width; ++i)
+            for (uint32_t k = 0; k < 4 && p.hasCell(i, j); ++k) {
+                const uint32_t u = i + k % 2, v = j + k / 2;
+                const double x = u * double{p.step} - halfX, y = v * double{p.step} - halfY, d = 1e-4;
+                const size_t s = p.at(u, v);
+                p.heights[s] = static_cast<uint16_t>(std::lround((f(x, y) + 1) / p.quantum()));
+                p.normals[s] = lod::roundedNormal(
+                    glm::vec3(glm::normalize(glm::dvec3(f(x - d, y) - f(x + d, y), f(x, y - d) - f(x, y + d), 2 * d))));
+                p.colours[s] = static_cast<uint32_t>(rng.below(1u << 24));
+            }
+    return p;
+}
+
+}  // namespace stipple::test
