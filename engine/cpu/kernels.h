@@ -11,6 +11,7 @@
 #include "shaders/shared/material.h"
 #include "shaders/shared/mesh.h"
 #include "shaders/shared/patch.h"
+#include "shaders/shared/patch_splat.h"
 #include "shaders/shared/record.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/texture.h"
@@ -126,6 +127,16 @@ struct PatchSource {
     const shared::DrawMesh* mesh;  ///< its patch
     uint32_t level;
     float errorPixels;
+};
+
+/// A splat of a patch that covers so many pixels that its rows are shared out among threads.
+struct LargeSplat {
+    const PatchSource* source;
+    uint32_t firstPlace, lane;  ///< draw ids: of its block; its own
+};
+struct LargeSplatSink {
+    void* context;
+    void (*keep)(void* context, const LargeSplat& splat);
 };
 
 /// A triangle that covers so many pixels that its rows are shared out among threads.
@@ -274,6 +285,12 @@ struct Kernels {
     /// Offers the triangles of one block of a patch (places from firstPlace on) to the visibility buffer.
     void (*rasterPatch)(const shared::FrameConstants& f, const PatchSource& of, uint32_t firstPlace,
                         const LargeSink& large, const Visibility& visibility);
+    /// The same as splats (shaders/shared/patch_splat.h); frame constants say of which kind.
+    void (*splatPatch)(const shared::FrameConstants& f, const PatchSource& of, uint32_t firstPlace,
+                       const LargeSplatSink& large, const Visibility& visibility);
+    /// Rows [firstRow, lastRow] of the splats that were kept: those of a block one after another, by lane.
+    void (*splatLarge)(const shared::FrameConstants& f, const LargeSplat* splats, size_t count, uint32_t firstRow,
+                       uint32_t lastRow, const Visibility& visibility);
     /// Offers up to 256 segments of curves (places from firstPlace on) to the visibility buffer.
     void (*drawSegments)(const shared::FrameConstants& f, const CurveBlock& block, uint32_t count, uint32_t firstPlace,
                          const WideSink& wide, const Visibility& visibility);

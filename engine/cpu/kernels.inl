@@ -147,6 +147,10 @@ void projectBlock(const FrameConstants& f, const DrawNode& node, const PointReco
 
 #include "engine/cpu/patches.inl"
 
+#include "engine/cpu/patch_splats.inl"
+
+#include "engine/cpu/resolve_patches.inl"
+
 #include "engine/cpu/discs.inl"
 
 #include "engine/cpu/curves.inl"
@@ -364,6 +368,8 @@ const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
                               rasterCluster,
                               rasterLarge,
                               rasterPatch,
+                              splatPatch,
+                              splatLarge,
                               drawSegments,
                               fillWide,
                               fillDiscs,

@@ -1,4 +1,4 @@
-// Elevation patches of the cpu backend: blocks of cells as triangles, coverage and attributes. Included by kernels.inl.
+// Elevation patches of the cpu backend: blocks of cells as triangles. Included by kernels.inl.
 
 /// Codes of a block's samples.
 [[gnu::always_inline]] inline void patchHeights(const PatchBlock& block, int32_t* __restrict heights) {
@@ -48,59 +48,4 @@ void rasterPatch(const FrameConstants& frame, const PatchSource& source, uint32_
                               visibility);
             }
         }
-}
-
-/// Follows the pointers.
-[[gnu::always_inline]] inline void gatherPatches(const PatchSource* blocks, const WinningPixels& p, Corners& c) {
-    const size_t n = p.count;
-    for (size_t i = 0; i < n; ++i) {
-        const PatchSource& source = blocks[p.id[i] / kBlockLanes];
-        const PatchBlock& block = *source.block;
-        const uint32_t cell = p.id[i] % kBlockLanes / 2;
-        const uint32_t at = kPatchStride * (cell / kPatchCellsAcross) + cell % kPatchCellsAcross;
-        const uint32_t t =
-            patchTriangle(at, patchHeight(block, at), patchHeight(block, at + 1), patchHeight(block, at + kPatchStride),
-                          patchHeight(block, at + kPatchStride + 1), p.id[i] & 1u);
-        const int i0 = static_cast<int>(block.place & 0xffffu), j0 = static_cast<int>(block.place >> 16);
-        for (uint32_t k = 0; k < 3; ++k) {
-            const uint32_t s = t >> (8 * k) & 255u;
-            const vec3 place = meshPosition(i0 + static_cast<int>(s % kPatchStride),
-                                            j0 + static_cast<int>(s / kPatchStride), patchHeight(block, s), *source.mesh);
-            c.x[k][i] = place.x;
-            c.y[k][i] = place.y;
-            c.z[k][i] = place.z;
-            c.normal[k][i] = block.normals[s];
-            c.colour[k][i] = block.colours[s];
-            c.u[k][i] = c.v[k][i] = 0;
-        }
-    }
-}
-
-/// From the directions of patches to those of the camera; a surface that is rough and sends no light of its own.
-[[gnu::always_inline]] inline void turnPatches(const PatchSource* blocks, const WinningPixels& p, bool hasEmission,
-                                               MaterialRow& __restrict s) {
-    for (size_t i = 0; i < p.count; ++i) {
-        const DrawMesh& m = *blocks[p.id[i] / kBlockLanes].mesh;
-        const float x = s.nx[i], y = s.ny[i], z = s.nz[i];
-        s.nx[i] = m.normalX.x * x + m.normalY.x * y + m.normalZ.x * z;
-        s.ny[i] = m.normalX.y * x + m.normalY.y * y + m.normalZ.y * z;
-        s.nz[i] = m.normalX.z * x + m.normalY.z * y + m.normalZ.z * z;
-        s.red[i] = s.green[i] = s.blue[i] = 1;
-        s.metallic[i] = 0;
-        s.roughness[i] = s.occlusion[i] = 1;
-        s.flags[i] = kPixelTriangle;
-        if (hasEmission) s.emissionR[i] = s.emissionG[i] = s.emissionB[i] = 0;
-    }
-}
-
-void resolvePatches(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, uint32_t x0, uint32_t y,
-                    TexelRow& __restrict row, const SurfacePlanes& planes) {
-    TriangleRow t;
-    const RowRays rays = rowRays(f, x0, y);
-    gatherPatches(in.patchBlocks, p, t.corners);
-    weighCorners(p, rays, t.corners, t.material, t.uv, t.wb, t.wc);
-    turnPatches(in.patchBlocks, p, planes.emissive != nullptr, t.material);
-    packSurfaces(p, rays, t.material, t.perpX, t.perpY, t.word);
-    mixColours(f, in.patchBlocks, p, t.corners, t.wb, t.wc, t.material);
-    storeTriangles(p, t, row, planes);
 }

@@ -232,11 +232,9 @@ struct RowRays {
     }
 }
 
-/// Colours of the corners, mixed; or those of a debug view. `blocks`: of the kind.
-template <typename Block>
-[[gnu::always_inline]] inline void mixColours(const FrameConstants& f, const Block* blocks, const WinningPixels& p,
-                                              const Corners& c, const float* __restrict wb, const float* __restrict wc,
-                                              MaterialRow& s) {
+/// Times the colours of the corners, mixed.
+[[gnu::always_inline]] inline void mixColours(const WinningPixels& p, const Corners& c, const float* __restrict wb,
+                                              const float* __restrict wc, MaterialRow& s) {
     const size_t n = p.count;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
@@ -250,15 +248,20 @@ template <typename Block>
         s.green[i] *= mix(8);
         s.blue[i] *= mix(16);
     }
-    if (f.debugView == kDebugLevel || f.debugView == kDebugError)
-        for (size_t i = 0; i < n; ++i) {
-            const Block& block = blocks[p.id[i] / kBlockLanes];
-            const vec3 d =
-                f.debugView == kDebugLevel ? debugLevelColour(block.level) : debugErrorColour(block.errorPixels);
-            s.red[i] = d.x;
-            s.green[i] = d.y;
-            s.blue[i] = d.z;
-        }
+}
+
+/// Those of a debug view instead. `blocks`: of the kind.
+template <typename Block>
+[[gnu::always_inline]] inline void debugColours(const FrameConstants& f, const Block* blocks, const WinningPixels& p,
+                                                MaterialRow& s) {
+    if (f.debugView != kDebugLevel && f.debugView != kDebugError) return;
+    for (size_t i = 0; i < p.count; ++i) {
+        const Block& block = blocks[p.id[i] / kBlockLanes];
+        const vec3 d = f.debugView == kDebugLevel ? debugLevelColour(block.level) : debugErrorColour(block.errorPixels);
+        s.red[i] = d.x;
+        s.green[i] = d.y;
+        s.blue[i] = d.z;
+    }
 }
 
 /// Rays of the pixels from (x0, y) on.
@@ -301,6 +304,7 @@ void resolveTriangles(const FrameConstants& f, const ResolveInput& in, const Win
     if (anyTextured) measureFootprints(p, rays, t.corners, t.uv);
     applyMaterials(in, p, planes.emissive != nullptr, t);
     packSurfaces(p, rays, t.material, t.perpX, t.perpY, t.word);
-    mixColours(f, in.meshBlocks, p, t.corners, t.wb, t.wc, t.material);
+    mixColours(p, t.corners, t.wb, t.wc, t.material);
+    debugColours(f, in.meshBlocks, p, t.material);
     storeTriangles(p, t, row, planes);
 }

@@ -20,7 +20,7 @@ class PatchProjector {
           instance_(draws.instances[cut_.instance]),
           h_(*draws.hierarchies[instance_.hierarchy]),
           bend_(draws.bends.empty() ? render::Bend{} : draws.bends[number]),
-          projector_(draws, level) {}
+          projector_(draws, level, draws.frame.patchAs == shared::kPatchStrips) {}
 
     void run() {
         const lod::Chunk& chunk = chunks_.at(uint64_t{draws_.firstSource + instance_.source} << 32 | cut_.chunk);

@@ -49,9 +49,12 @@ void TriangleProjector::triangle(const Corners& c, uint32_t surface, const share
             polygon.push_back(a + (b - a) * ((view_.nearPlane - a.z) / (b.z - a.z)));
     }
     if (polygon.size() < 3) return;
-    std::vector<dvec2> snapped;  // in 1/256 pixel, whole
+    std::vector<dvec2> snapped;  // in 1/256 pixel
     snapped.reserve(polygon.size());
-    for (const dvec3& p : polygon) snapped.push_back(glm::floor(imageOf(view_, p) * 256.0 + 0.5));
+    for (const dvec3& p : polygon) {
+        const dvec2 at = imageOf(view_, p) * 256.0;
+        snapped.push_back(isSnapped_ ? glm::floor(at + 0.5) : at);
+    }
     for (size_t k = 1; k + 1 < polygon.size(); ++k)
         cover({snapped[0], snapped[k], snapped[k + 1]},
               [&](int x, int y) { pixel(x, y, c, face, surface, material, textures, of); });

@@ -14,7 +14,9 @@ struct Whole {
 
 class TriangleProjector {
   public:
-    TriangleProjector(const render::DrawList& draws, Level& level) : draws_(draws), level_(level), view_(draws.view) {}
+    /// `isSnapped`: else pixels are those whose rays meet a triangle.
+    TriangleProjector(const render::DrawList& draws, Level& level, bool isSnapped = true)
+        : draws_(draws), level_(level), view_(draws.view), isSnapped_(isSnapped) {}
 
     /// Into the level where nothing nearer is. `surface`: flags of shaders/shared/mesh.h.
     void triangle(const Corners& c, uint32_t surface, const shared::SurfaceMaterial& material,
@@ -29,6 +31,7 @@ class TriangleProjector {
     const render::DrawList& draws_;
     Level& level_;
     const lod::View& view_;
+    bool isSnapped_;
 };
 
 }  // namespace stipple::reference

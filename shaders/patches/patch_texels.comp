@@ -2,8 +2,53 @@
 // words. Where no triangles are drawn, all other pixels get surface words of 0.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "../patch.glsl"
+#include "../patch_splats.glsl"
 layout(local_size_x = 64) in;
+
+struct PatchSurface {
+    vec3 normal;  // of the patch's directions, any length
+    vec3 face;    // camera space
+    vec3 colour;
+};
+
+vec3 colourOf(PatchBlocks of, uint block, uint s) { return decodeTexel(of.blocks[block].colours[s], true).xyz; }
+
+// Where a ray meets a triangle, from its corners.
+PatchSurface onTriangle(PatchBlocks of, uint block, DrawMesh m, uint lane, PixelRay ray) {
+    const uint corners = patchCorners(of, block, lane);
+    const uint a = corners & 255u, b = corners >> 8 & 255u, c = corners >> 16;
+    const vec3 p0 = patchPlace(of, block, m, a);
+    const vec3 p1 = patchPlace(of, block, m, b);
+    const vec3 p2 = patchPlace(of, block, m, c);
+    const vec2 w = triangleWeights(rayDirection(ray), fromRay(ray, p0), fromRay(ray, p1), fromRay(ray, p2));
+    const float first = 1.0 - w.x - w.y;
+    PatchSurface s;
+    s.normal = first * octDecode(of.blocks[block].normals[a]) + w.x * octDecode(of.blocks[block].normals[b]) + w.y * octDecode(of.blocks[block].normals[c]);
+    s.face = cross(p1 - p0, p2 - p0);
+    s.colour = first * colourOf(of, block, a) + w.x * colourOf(of, block, b) + w.y * colourOf(of, block, c);
+    return s;
+}
+
+// Direct interpolation: below the place where a ray meets a disc, from the four samples around it.
+PatchSurface belowDisc(PatchBlocks of, uint block, DrawMesh m, uint lane, PixelRay ray) {
+    const PatchDisc disc = discOf(of, block, m, lane);
+    const PatchMix mixed = patchMix(patchDiscHit(disc, m, ray, frame.nearPlane));
+    PatchSurface s;
+    s.normal = vec3(0.0);
+    s.colour = vec3(0.0);
+    s.face = disc.normal;
+    float sum = 0.0;
+    for (uint c = 0u; c < 4u; ++c) {
+        const uint at = mixed.first + c % 2u + kPatchStride * (c / 2u);
+        const float w = patchHeight(of, block, at) != 0 ? mixed.weight[c] : 0.0;
+        sum += w;
+        s.normal += w * octDecode(of.blocks[block].normals[at]);
+        s.colour += w * colourOf(of, block, at);
+    }
+    s.colour = sum > 0.0 ? s.colour / sum : vec3(0.0);
+    if (!(sum > 0.0)) s.normal = vec3(0.0, 0.0, 1.0);
+    return s;
+}
 
 void main() {
     const uvec2 pixel = gl_GlobalInvocationID.xy;
@@ -20,25 +65,22 @@ void main() {
     PatchBlocks of = patchBlocksOf(node);
     const uint block = source.first;
     const DrawMesh m = meshes[node.weights + of.blocks[block].number];
-    const uint corners = patchCorners(of, block, keyLane(key));
-    const uint a = corners & 255u, b = corners >> 8 & 255u, c = corners >> 16;
     const PixelRay pixelsRay = pixelRayHere(pixel);
     const vec3 ray = rayDirection(pixelsRay);
-    const vec3 p0 = patchPlace(of, block, m, a);
-    const vec3 p1 = patchPlace(of, block, m, b);
-    const vec3 p2 = patchPlace(of, block, m, c);
-    const vec2 w = triangleWeights(ray, fromRay(pixelsRay, p0), fromRay(pixelsRay, p1), fromRay(pixelsRay, p2));
-    const float first = 1.0 - w.x - w.y;
-    const vec3 n = first * octDecode(of.blocks[block].normals[a]) + w.x * octDecode(of.blocks[block].normals[b]) + w.y * octDecode(of.blocks[block].normals[c]);
-    const vec3 normal = surfaceNormal(m.normalX * n.x + m.normalY * n.y + m.normalZ * n.z, cross(p1 - p0, p2 - p0), ray);
+    PatchSurface seen;
+    if (frame.patchAs == kPatchDirect)
+        seen = belowDisc(of, block, m, keyLane(key), pixelsRay);
+    else
+        seen = onTriangle(of, block, m, keyLane(key), pixelsRay);
+    const vec3 n = seen.normal;
+    const vec3 normal = surfaceNormal(m.normalX * n.x + m.normalY * n.y + m.normalZ * n.z, seen.face, ray);
     Texel t;
     t.depth = keyDepth(key);
     t.radius = kTriangleRadius;
     t.thickness = kTriangleRadius;
     t.offset = vec2(0.0);
     t.normalPerp = perpFromNormal(normal, normalize(ray));
-    t.colour = first * decodeTexel(of.blocks[block].colours[a], true).xyz + w.x * decodeTexel(of.blocks[block].colours[b], true).xyz +
-               w.y * decodeTexel(of.blocks[block].colours[c], true).xyz;
+    t.colour = seen.colour;
     t.surface = noSurface();
     if (frame.debugView == kDebugLevel) t.colour = debugLevelColour(node.level);
     if (frame.debugView == kDebugError) t.colour = debugErrorColour(node.errorPixels);

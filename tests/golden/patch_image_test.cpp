@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/reference/reference.h"
+#include "lod/primitives/octahedral.h"
 #include "tests/support/backends_here.h"
 #include "tests/support/patch_scene.h"
 #include "tests/support/patch_shapes.h"
@@ -95,11 +96,11 @@ class Lifted {
     std::vector<std::array<glm::dvec3, 3>> camera_;
 };
 
-/// Pixels of the picture that are not what rays meet, though no edge is within 1/256 px; of how many seen.
+/// Pixels of the picture that are not what rays meet, though no edge is within `snap` px; of how many seen.
 struct Against {
     size_t seen = 0, wrong = 0, nearEdges = 0;
 };
-Against compareWithRays(const render::Image& image, const Lifted& truth) {
+Against compareWithRays(const render::Image& image, const Lifted& truth, double snap = 1.0 / 256) {
     Against a;
     for (uint32_t y = 0; y < image.height; ++y)
         for (uint32_t x = 0; x < image.width; ++x) {
@@ -107,10 +108,10 @@ Against compareWithRays(const render::Image& image, const Lifted& truth) {
             const RayHit& hit = truth.hits[i];
             const bool isSeen = image.rgba[i] >> 24 != 0 && image.depth[i] > 0, isThere = hit.depth < HUGE_VAL;
             a.seen += isThere ? 1 : 0;
-            // Corners lie on 1/256 px: the plane through them is off by what it falls in sqrt(1/2) of that.
-            const double bound = std::ldexp(hit.depth, -20) + hit.slope * std::sqrt(0.5) / 256;
+            // Corners lie on steps of `snap` px: the plane through them is off by what it falls in sqrt(1/2) of that.
+            const double bound = std::ldexp(hit.depth, -20) + hit.slope * std::sqrt(0.5) * snap;
             if (isSeen == isThere && (!isThere || std::abs(double{image.depth[i]} - hit.depth) <= bound)) continue;
-            const bool isNearEdge = truth.toEdge({x + 0.5, y + 0.5}) <= 1.0 / 256;
+            const bool isNearEdge = truth.toEdge({x + 0.5, y + 0.5}) <= snap;
             ++(isNearEdge ? a.nearEdges : a.wrong);
         }
     return a;
@@ -207,7 +208,102 @@ TEST_F(PatchImages, ShowWhatRaysMeetOfTheLiftedTriangles) {
     }
 }
 
-// What the test above would say of a surface that is off by a quarter of a pixel.
+render::DrawSettings as(uint32_t what) {
+    render::DrawSettings settings;
+    settings.patchAs = what;
+    return settings;
+}
+
+// Splats know no steps: a 4096th of a pixel is what fp32 leaves of places.
+TEST_F(PatchImages, AsSplatsShowWhatRaysMeetToFloats) {
+    const glm::dquat turn = glm::normalize(glm::dquat(0.8, 0.3, -0.4, 0.2));
+    const std::vector<lod::Patch> patches{test::patchOfHeights(41, 37, waves, 0.1, turn)};
+    PatchScene scene(patches);
+    for (const bool isOrthographic : {false, true}) {
+        const lod::View view = viewFrom({0.5, 1.4, 1.9}, {0.05, 0, 0}, isOrthographic);
+        const Lifted truth(lifted(patches), view);
+        for (const auto& [name, backend] : backends_) {
+            if (name == "fp64") continue;  // it writes floats, too, but shows nothing at corners alone
+            const Against a = compareWithRays(
+                scene.draw(*backend, view, render::Mode::pullpush, as(shared::kPatchSplats)), truth, 1.0 / 4096);
+            EXPECT_GT(a.seen, 2000u) << name;
+            EXPECT_EQ(a.wrong, 0u) << name << ", " << isOrthographic;
+            EXPECT_LE(a.nearEdges, a.seen / 1000) << name;
+            // Triangles on steps of 1/256 px do not stand that test.
+            const Against strips = compareWithRays(scene.draw(*backend, view), truth, 1.0 / 4096);
+            EXPECT_GT(strips.wrong, 10u) << name;
+        }
+    }
+}
+
+TEST_F(PatchImages, AsSplatsAreThoseOfTheRestatement) {
+    PatchScene torus(within(closedTorus())), few({test::patchOfHeights(4, 3, waves)});
+    render::DrawSettings settings = as(shared::kPatchSplats);
+    settings.lit = true;
+    for (PatchScene* scene : {&torus, &few})
+        for (const bool isOrthographic : {false, true})
+            for (const glm::dvec3& eye : {glm::dvec3(0.5, 1.4, 1.9), glm::dvec3(0.3, 0.25, 0.5)})  // the latter: inside
+                expectRestated(*scene, render::Mode::splat, viewFrom(eye, {0.05, 0, 0}, isOrthographic, 240), settings,
+                               {}, scene == &torus ? 300 : 1000);
+}
+
+/// Nine samples of one height whose normals turn outwards (Ochotta, Hiller & Saupe 2006, Fig 5).
+lod::Patch nineSplats() {
+    lod::Patch p = test::patchOfHeights(3, 3, [](double, double) { return 0; });
+    for (uint32_t s = 0; s < 9; ++s)
+        p.normals[s] = lod::roundedNormal(
+            glm::vec3(0.5f * (static_cast<float>(s % 3) - 1), 0.5f * (static_cast<float>(s / 3) - 1), 1));
+    return p;
+}
+/// The largest angle between normals of pixels beside each other, degrees.
+double largestJump(const render::Image& image) {
+    double jump = 0;
+    for (uint32_t y = 0; y + 1 < image.height; ++y)
+        for (uint32_t x = 0; x + 1 < image.width; ++x)
+            for (const size_t step : {size_t{1}, size_t{image.width}}) {
+                const size_t i = size_t{y} * image.width + x, j = i + step;
+                if (!(image.depth[i] > 0 && image.depth[j] > 0)) continue;
+                double along = 0;
+                for (size_t k = 0; k < 3; ++k) along += double{image.normal[3 * i + k]} * image.normal[3 * j + k];
+                jump = std::max(jump, std::acos(std::min(along, 1.0)) * 180 / 3.14159265);
+            }
+    return jump;
+}
+
+TEST_F(PatchImages, OfNineSplatsTurnSmoothlyWhereInterpolatedCorrectlyAndJumpWhereDirectly) {
+    PatchScene scene({nineSplats()});
+    lod::View view = viewFrom({0.3, -1.2, 1.6}, {0, 0, 0}, false, 240);
+    // Across a cell, 1 unit, normals turn by atan(1/2) at most, along its diagonal by atan(sqrt(1/2)); a pixel is
+    // |depth| / focal units across, and 1 / cosine of the slant longer.
+    const double unitsPerPixel = 2.6 / view.focalPixels / 0.6, gradient = 35.3 * unitsPerPixel;
+    for (const auto& [name, backend] : backends_) {
+        const auto jumpOf = [&](uint32_t what) {
+            return largestJump(scene.draw(*backend, view, render::Mode::pullpush, as(what)));
+        };
+        EXPECT_LE(jumpOf(shared::kPatchSplats), 1.5 * gradient) << name;
+        EXPECT_LE(jumpOf(shared::kPatchStrips), 1.5 * gradient) << name;
+        if (name != "fp64") EXPECT_GE(jumpOf(shared::kPatchDirect), 4 * gradient) << name;  // it restates correct ones
+    }
+}
+
+TEST_F(PatchImages, AreTheSameBytesOnEveryInstructionSetAndForAnyThreads) {
+    PatchScene scene(within(closedTorus()));
+    const lod::View view = viewFrom({0.5, 1.4, 1.9}, {0.05, 0, 0}, false, 200);
+    const auto one = makeSerialExecutor();
+    for (const uint32_t what : {shared::kPatchStrips, shared::kPatchSplats, shared::kPatchDirect}) {
+        const auto serial = cpu::makeCpuBackend(*one);
+        const render::Image expected = scene.draw(*serial, view, render::Mode::pullpush, as(what));
+        for (const auto& [name, backend] : backends_) {
+            if (backend->name() != "cpu") continue;
+            const render::Image image = scene.draw(*backend, view, render::Mode::pullpush, as(what));
+            EXPECT_EQ(image.rgba, expected.rgba) << name << what;
+            EXPECT_EQ(image.depth, expected.depth) << name << what;
+            EXPECT_EQ(image.normal, expected.normal) << name << what;
+        }
+    }
+}
+
+// What the test of strips would say of a surface that is off by a quarter of a pixel.
 TEST_F(PatchImages, OfASurfaceAQuarterOfAPixelAwayAreNotWhatRaysMeet) {
     std::vector<lod::Patch> patches{test::patchOfHeights(41, 37, waves)};
     PatchScene scene(patches);

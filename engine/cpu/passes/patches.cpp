@@ -23,24 +23,48 @@ void findBlocks(Frame& frame) {
     }
 }
 
-void draw(Frame& frame) {
-    CompletionQueue<std::vector<LargeTriangle>> found;
-    frame.large.clear();
+/// Calls drawBlock(block number, sink) for all blocks; what the sinks are given, in any order.
+template <typename Large, typename Sink, typename DrawBlock>
+std::vector<Large> drawBlocks(Frame& frame, const DrawBlock& drawBlock) {
+    CompletionQueue<std::vector<Large>> found;
     frame.executor.parallelFor(frame.patchBlocks.size(), 8, [&](size_t begin, size_t end) {
-        std::vector<LargeTriangle> mine;
-        const LargeSink sink{&mine, [](void* to, const LargeTriangle& t) {
-                                 static_cast<std::vector<LargeTriangle>*>(to)->push_back(t);
-                             }};
-        for (size_t b = begin; b < end; ++b)
-            frame.k.rasterPatch(frame.constants, frame.patchBlocks[b], static_cast<uint32_t>(b * shared::kBlockLanes),
-                                sink, frame.visible());
+        std::vector<Large> mine;
+        const Sink sink{&mine, [](void* to, const Large& t) { static_cast<std::vector<Large>*>(to)->push_back(t); }};
+        for (size_t b = begin; b < end; ++b) drawBlock(b, sink);
         if (!mine.empty()) found.push(std::move(mine));
     });
-    for (const auto& some : found.takeAll()) frame.large.insert(frame.large.end(), some.begin(), some.end());
+    std::vector<Large> all;
+    for (const auto& some : found.takeAll()) all.insert(all.end(), some.begin(), some.end());
+    return all;
+}
+
+void drawStrips(Frame& frame) {
+    frame.large = drawBlocks<LargeTriangle, LargeSink>(frame, [&](size_t b, const LargeSink& sink) {
+        frame.k.rasterPatch(frame.constants, frame.patchBlocks[b], static_cast<uint32_t>(b * shared::kBlockLanes), sink,
+                            frame.visible());
+    });
     if (frame.large.empty()) return;
     frame.forBands([&](uint32_t first, uint32_t last) {
         frame.k.rasterLarge(frame.constants, frame.large.data(), frame.large.size(), first, last, frame.visible());
     });
+}
+
+void drawSplats(Frame& frame) {
+    const auto large = drawBlocks<LargeSplat, LargeSplatSink>(frame, [&](size_t b, const LargeSplatSink& sink) {
+        frame.k.splatPatch(frame.constants, frame.patchBlocks[b], static_cast<uint32_t>(b * shared::kBlockLanes), sink,
+                           frame.visible());
+    });
+    if (large.empty()) return;
+    frame.forBands([&](uint32_t first, uint32_t last) {
+        frame.k.splatLarge(frame.constants, large.data(), large.size(), first, last, frame.visible());
+    });
+}
+
+void draw(Frame& frame) {
+    if (frame.constants.patchAs == shared::kPatchStrips)
+        drawStrips(frame);
+    else
+        drawSplats(frame);
 }
 
 }  // namespace

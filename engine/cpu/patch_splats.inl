@@ -1,0 +1,187 @@
+// Elevation patches of the cpu backend as splats: the pixels of a box, each by its ray. Included by kernels.inl.
+
+constexpr int kSplatStretch = 8;             ///< most splats are a few pixels wide
+constexpr int64_t kLargeSplatPixels = 4096;  ///< from this many pixels on a splat's rows are shared out
+
+/// Pixels whose rays may meet a splat; none where last < first.
+struct PixelBox {
+    int fromX, toX, fromY, toY;
+    bool isEmpty() const { return toX < fromX || toY < fromY; }
+};
+
+/// Offers the pixels of rows [firstRow, lastRow] whose rays meet something: hit(ray, more) gives a depth and, in
+/// `more`, what is added to the id.
+template <typename Hit>
+[[gnu::always_inline]] inline void fillBox(const FrameConstants& f, const PixelBox& box, int firstRow, int lastRow,
+                                           uint64_t id, const Visibility& visibility, const Hit& hit) {
+    const float inverseFocal = 1.0f / f.focal;
+    const Lens lens = lensHere(f.focal);
+    const int fromY = box.fromY < firstRow ? firstRow : box.fromY, toY = box.toY > lastRow ? lastRow : box.toY;
+    for (int y = fromY; y <= toY; ++y) {
+        const float ey = (float(y) + 0.5f - f.centre.y) * inverseFocal;
+        for (int x0 = box.fromX; x0 <= box.toX; x0 += kSplatStretch) {
+            alignas(64) uint32_t depth[kSplatStretch], more[kSplatStretch];
+            const int count = box.toX - x0 + 1 < kSplatStretch ? box.toX - x0 + 1 : kSplatStretch;
+            const float ex0 = float(x0) + 0.5f - f.centre.x;
+#pragma GCC ivdep
+            for (size_t k = 0; k < kSplatStretch; ++k)
+                depth[k] =
+                    floatBitsToUint(hit(pixelRay(lens, (ex0 + float(int(k))) * inverseFocal, ey), more[k]));
+            const size_t first = size_t(y) * f.width + size_t(x0);
+            const uint32_t none = floatBitsToUint(kNoPatch);
+            for (int k = 0; k < count; ++k)
+                if (depth[k] < none) offerKey(visibility, first + size_t(k), visibilityKey(depth[k], id + more[k]));
+        }
+    }
+}
+
+/// A cell, or a disc.
+struct PatchSplat {
+    bool isDisc;
+    vec3 a[3], b[3];  ///< corners of both triangles
+    PatchDisc disc;
+    const DrawMesh* mesh;
+};
+
+/// Rows [firstRow, lastRow] of one splat.
+void fillSplat(const FrameConstants& f, const PatchSplat& s, const PixelBox& box, int firstRow, int lastRow,
+               uint64_t id, const Visibility& visibility) {
+    const float nearPlane = f.nearPlane;
+    if (s.isDisc) {
+        const PatchDisc disc = s.disc;
+        const DrawMesh mesh = *s.mesh;
+        fillBox(f, box, firstRow, lastRow, id, visibility, [&](const PixelRay& ray, uint32_t& more) {
+            more = 0;
+            return patchDiscHit(disc, mesh, ray, nearPlane).x;
+        });
+        return;
+    }
+    const vec3 a0 = s.a[0], a1 = s.a[1], a2 = s.a[2], b0 = s.b[0], b1 = s.b[1], b2 = s.b[2];
+    fillBox(f, box, firstRow, lastRow, id, visibility, [&](const PixelRay& ray, uint32_t& more) {
+        const float first = patchTriangleDepth(ray, a0, a1, a2, nearPlane),
+                    second = patchTriangleDepth(ray, b0, b1, b2, nearPlane);
+        more = second < first ? 1u : 0u;
+        return second < first ? second : first;
+    });
+}
+
+[[gnu::always_inline]] inline uint32_t cellCorner(uint32_t cell) {
+    return kPatchStride * (cell / kPatchCellsAcross) + cell % kPatchCellsAcross;
+}
+
+/// Pixels around the four corners of a cell; all of the picture where one of them lies before the near plane.
+[[gnu::always_inline]] inline PixelBox boxOfCell(const FrameConstants& f, const PlacedCorners& p, uint32_t at) {
+    const uint32_t c[4] = {at, at + 1, at + kPatchStride, at + kPatchStride + 1};
+    const int right = static_cast<int>(f.width) - 1, bottom = static_cast<int>(f.height) - 1;
+    int minX = p.px[c[0]], maxX = minX, minY = p.py[c[0]], maxY = minY, clip = p.clip[c[0]];
+    for (size_t k = 1; k < 4; ++k) {
+        const int x = p.px[c[k]], y = p.py[c[k]];
+        minX = x < minX ? x : minX;
+        maxX = x > maxX ? x : maxX;
+        minY = y < minY ? y : minY;
+        maxY = y > maxY ? y : maxY;
+        clip |= p.clip[c[k]];
+    }
+    if (clip != 0) return {0, right, 0, bottom};
+    constexpr int kMargin = 4;  // 1/64 px: corners are rounded
+    const int fromX = (minX - kMargin + 127) >> 8, toX = (maxX + kMargin - 128) >> 8;
+    const int fromY = (minY - kMargin + 127) >> 8, toY = (maxY + kMargin - 128) >> 8;
+    return {fromX < 0 ? 0 : fromX, toX > right ? right : toX, fromY < 0 ? 0 : fromY, toY > bottom ? bottom : toY};
+}
+
+/// Pixels around a sphere that holds a disc.
+[[gnu::always_inline]] inline PixelBox boxOfDisc(const FrameConstants& f, const PatchDisc& d) {
+    const float width = float(int(f.width)), height = float(int(f.height));
+    const Lens lens = lensHere(f.focal);
+    const float nearest = lensDepth(lens, d.centre.z - d.radius), z = lensDepth(lens, d.centre.z);
+    if (d.centre.z + d.radius < f.nearPlane) return {0, -1, 0, -1};
+    if (!kOrthographic && !(nearest > f.nearPlane)) return {0, int(width) - 1, 0, int(height) - 1};
+    const float reach = 1.001f * d.radius / nearest + 1.0f / f.focal;
+    const auto range = [&](float at, float centre, float most, int& from, int& to) {
+        const float p = at / z, more = kOrthographic ? reach : reach * (1.0f + std::fabs(p));
+        from = int(min(max(0.0f, (p - more) * f.focal + centre), most));
+        to = int(min(max(-1.0f, (p + more) * f.focal + centre), most - 1.0f));
+    };
+    PixelBox box{};
+    range(d.centre.x, f.centre.x, width, box.fromX, box.toX);
+    range(d.centre.y, f.centre.y, height, box.fromY, box.toY);
+    return box;
+}
+
+[[gnu::always_inline]] inline PatchSplat cellSplat(const PlacedCorners& p, const int32_t* heights, uint32_t at,
+                                                   const DrawMesh* mesh) {
+    PatchSplat s{};
+    s.mesh = mesh;
+    const auto place = [&](uint32_t corner) { return vec3(p.x[corner], p.y[corner], p.z[corner]); };
+    for (uint32_t k = 0; k < 2; ++k) {
+        const uint32_t t = patchTriangle(at, heights[at], heights[at + 1], heights[at + kPatchStride],
+                                         heights[at + kPatchStride + 1], k);
+        for (uint32_t c = 0; c < 3; ++c) (k == 0 ? s.a : s.b)[c] = place(t >> (8 * c) & 255u);
+    }
+    return s;
+}
+[[gnu::always_inline]] inline PatchSplat discSplat(const PatchBlock& block, const vec3& place, uint32_t sample,
+                                                   const DrawMesh* mesh) {
+    PatchSplat s{};
+    s.mesh = mesh;
+    s.isDisc = true;
+    s.disc = patchDisc(place, octDecode(block.normals[sample]), float(int(sample % kPatchStride)),
+                       float(int(sample / kPatchStride)), *mesh);
+    return s;
+}
+
+/// Splats of a block: cells, or, direct, samples. `use(splat, box, lane)`.
+template <typename Use>
+[[gnu::always_inline]] inline void forSplats(const FrameConstants& f, const PatchSource& source, const Use& use) {
+    const PatchBlock& block = *source.block;
+    alignas(64) int32_t heights[kPatchSamples + 1];
+    PlacedCorners p;
+    patchHeights(block, heights);
+    placeSamples(block, *source.mesh, heights, p);
+    if (f.patchAs == kPatchDirect) {
+        for (uint32_t s = 0; s < kPatchSamples; ++s) {
+            if (heights[s] == 0) continue;
+            const PatchSplat splat = discSplat(block, vec3(p.x[s], p.y[s], p.z[s]), s, source.mesh);
+            const PixelBox box = boxOfDisc(f, splat.disc);
+            if (!box.isEmpty()) use(splat, box, s);
+        }
+        return;
+    }
+    projectCorners(f, kPatchSamples, p);
+    for (uint32_t word = 0; word < 4; ++word)
+        for (uint32_t left = block.cells[word]; left != 0; left &= left - 1) {
+            const uint32_t cell = 32 * word + static_cast<uint32_t>(__builtin_ctz(left)), at = cellCorner(cell);
+            const PixelBox box = boxOfCell(f, p, at);
+            if (!box.isEmpty()) use(cellSplat(p, heights, at, source.mesh), box, 2 * cell);
+        }
+}
+
+void splatPatch(const FrameConstants& frame, const PatchSource& source, uint32_t firstPlace, const LargeSplatSink& large,
+                const Visibility& visibility) {
+    const FrameConstants f = frame;
+    const uint64_t firstId = drawId(f.firstBlock.of[kKindPatches], firstPlace);
+    const int last = static_cast<int>(f.height) - 1;
+    forSplats(f, source, [&](const PatchSplat& s, const PixelBox& box, uint32_t lane) {
+        if (int64_t{box.toX - box.fromX + 1} * (box.toY - box.fromY + 1) > kLargeSplatPixels)
+            large.keep(large.context, {&source, firstPlace, lane});
+        else
+            fillSplat(f, s, box, 0, last, firstId + lane, visibility);
+    });
+}
+
+void splatLarge(const FrameConstants& frame, const LargeSplat* splats, size_t count, uint32_t firstRow,
+                uint32_t lastRow, const Visibility& visibility) {
+    const FrameConstants f = frame;
+    for (size_t i = 0; i < count;) {
+        const LargeSplat& of = splats[i];
+        const uint64_t firstId = drawId(f.firstBlock.of[kKindPatches], of.firstPlace);
+        size_t next = i;  // those of a block follow each other, in the order of lanes
+        forSplats(f, *of.source, [&](const PatchSplat& s, const PixelBox& box, uint32_t lane) {
+            if (next < count && splats[next].source == of.source && splats[next].lane == lane) {
+                fillSplat(f, s, box, static_cast<int>(firstRow), static_cast<int>(lastRow), firstId + lane, visibility);
+                ++next;
+            }
+        });
+        i = next;
+    }
+}

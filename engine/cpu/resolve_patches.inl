@@ -1,0 +1,100 @@
+// The pixels of a tile's row that show elevation patches: normal and colour. Included by kernels.inl.
+
+/// Follows the pointers.
+[[gnu::always_inline]] inline void gatherPatches(const PatchSource* blocks, const WinningPixels& p, Corners& c) {
+    const size_t n = p.count;
+    for (size_t i = 0; i < n; ++i) {
+        const PatchSource& source = blocks[p.id[i] / kBlockLanes];
+        const PatchBlock& block = *source.block;
+        const uint32_t cell = p.id[i] % kBlockLanes / 2;
+        const uint32_t at = kPatchStride * (cell / kPatchCellsAcross) + cell % kPatchCellsAcross;
+        const uint32_t t =
+            patchTriangle(at, patchHeight(block, at), patchHeight(block, at + 1), patchHeight(block, at + kPatchStride),
+                          patchHeight(block, at + kPatchStride + 1), p.id[i] & 1u);
+        const int i0 = static_cast<int>(block.place & 0xffffu), j0 = static_cast<int>(block.place >> 16);
+        for (uint32_t k = 0; k < 3; ++k) {
+            const uint32_t s = t >> (8 * k) & 255u;
+            const vec3 place = meshPosition(i0 + static_cast<int>(s % kPatchStride),
+                                            j0 + static_cast<int>(s / kPatchStride), patchHeight(block, s), *source.mesh);
+            c.x[k][i] = place.x;
+            c.y[k][i] = place.y;
+            c.z[k][i] = place.z;
+            c.normal[k][i] = block.normals[s];
+            c.colour[k][i] = block.colours[s];
+            c.u[k][i] = c.v[k][i] = 0;
+        }
+    }
+}
+
+/// From the directions of patches to those of the camera; a surface that is rough and sends no light of its own.
+[[gnu::always_inline]] inline void turnPatches(const PatchSource* blocks, const WinningPixels& p, bool hasEmission,
+                                               MaterialRow& __restrict s) {
+    for (size_t i = 0; i < p.count; ++i) {
+        const DrawMesh& m = *blocks[p.id[i] / kBlockLanes].mesh;
+        const float x = s.nx[i], y = s.ny[i], z = s.nz[i];
+        s.nx[i] = m.normalX.x * x + m.normalY.x * y + m.normalZ.x * z;
+        s.ny[i] = m.normalX.y * x + m.normalY.y * y + m.normalZ.y * z;
+        s.nz[i] = m.normalX.z * x + m.normalY.z * y + m.normalZ.z * z;
+        s.metallic[i] = 0;
+        s.roughness[i] = s.occlusion[i] = 1;
+        s.flags[i] = kPixelTriangle;
+        if (hasEmission) s.emissionR[i] = s.emissionG[i] = s.emissionB[i] = 0;
+    }
+}
+
+/// Direct interpolation: attributes below the place where a ray meets a disc, from the four samples around it.
+void mixDirect(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, const RowRays& rays,
+               MaterialRow& out) {
+    for (size_t k = 0; k < p.count; ++k) {
+        const PatchSource& source = in.patchBlocks[p.id[k] / kBlockLanes];
+        const PatchBlock& block = *source.block;
+        const DrawMesh& m = *source.mesh;
+        const uint32_t s = p.id[k] % kBlockLanes;
+        const int i0 = static_cast<int>(block.place & 0xffffu), j0 = static_cast<int>(block.place >> 16);
+        const vec3 place = meshPosition(i0 + static_cast<int>(s % kPatchStride),
+                                        j0 + static_cast<int>(s / kPatchStride), patchHeight(block, s), m);
+        const PatchDisc disc = discSplat(block, place, s, &m).disc;
+        const PatchMix mix = patchMix(patchDiscHit(disc, m, rays.at(p.pixel[k]), f.nearPlane));
+        vec3 normal = vec3(0, 0, 0), colour = vec3(0, 0, 0);
+        float sum = 0;
+        for (uint32_t c = 0; c < 4; ++c) {
+            const uint32_t at = mix.first + c % 2 + kPatchStride * (c / 2);
+            const float w = patchHeight(block, at) != 0 ? mix.weight[c] : 0.0f;
+            const vec3 n = octDecode(block.normals[at]);
+            const auto linear = [&](uint32_t shift) {
+                return linearFromByte(float(int(block.colours[at] >> shift & 255u)) * (1.0f / 255.0f));
+            };
+            sum += w;
+            normal = vec3(normal.x + w * n.x, normal.y + w * n.y, normal.z + w * n.z);
+            colour = vec3(colour.x + w * linear(0), colour.y + w * linear(8), colour.z + w * linear(16));
+        }
+        const float inverse = sum > 0.0f ? 1.0f / sum : 0.0f;
+        out.nx[k] = sum > 0.0f ? normal.x : 0.0f;
+        out.ny[k] = sum > 0.0f ? normal.y : 0.0f;
+        out.nz[k] = sum > 0.0f ? normal.z : 1.0f;
+        out.faceX[k] = disc.normal.x;
+        out.faceY[k] = disc.normal.y;
+        out.faceZ[k] = disc.normal.z;
+        out.red[k] = colour.x * inverse;
+        out.green[k] = colour.y * inverse;
+        out.blue[k] = colour.z * inverse;
+    }
+}
+
+void resolvePatches(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, uint32_t x0, uint32_t y,
+                    TexelRow& __restrict row, const SurfacePlanes& planes) {
+    TriangleRow t;
+    const RowRays rays = rowRays(f, x0, y);
+    if (f.patchAs == kPatchDirect) {
+        mixDirect(f, in, p, rays, t.material);
+    } else {
+        gatherPatches(in.patchBlocks, p, t.corners);
+        weighCorners(p, rays, t.corners, t.material, t.uv, t.wb, t.wc);
+        for (size_t i = 0; i < p.count; ++i) t.material.red[i] = t.material.green[i] = t.material.blue[i] = 1;
+        mixColours(p, t.corners, t.wb, t.wc, t.material);
+    }
+    turnPatches(in.patchBlocks, p, planes.emissive != nullptr, t.material);
+    packSurfaces(p, rays, t.material, t.perpX, t.perpY, t.word);
+    debugColours(f, in.patchBlocks, p, t.material);
+    storeTriangles(p, t, row, planes);
+}
