@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <thread>
 
+#include "apps/stipple/build_patches.h"
 #include "apps/stipple/common.h"
 #include "apps/stipple/mpi_ranks.h"
 #include "apps/stipple/outputs.h"
@@ -57,6 +58,7 @@ Result<void> run(const Options& o, bool& isSilent) {
     const auto executor = makeTbbExecutor(build.threads);
     Result<lod::BuildReport> built = [&] {
         Progress progress(build.progressStyle(o.quiet || isSilent));
+        if (build.patches.isAsked) return buildPatches(o.inputs, o.output, build, *executor, progress);
         return buildAny(o.inputs, o.output, build, *executor, progress);
     }();
     if (!built && built.error().kind == ErrorKind::interrupted) built = tl::unexpected(interruptedAt(built.error(), o));
@@ -112,6 +114,7 @@ void setupBuild(CLI::App& app, int& status) {
     sub->add_option("-o,--output", o->output, "the scene to write (.stipple)")->type_name("STORE")->required();
     o->build.addTo(*sub);
     o->material.addTo(*sub, "points (without: what the input says)");
+    addPatchBuildOptions(*sub, o->build.patches);
     addForce(*sub, o->force);
     sub->add_flag("--surfel-weights", o->build.surfelWeights,
                   "of points: measure by how much each counts where discs are blended (render --mode ewa --normalise "

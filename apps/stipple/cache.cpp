@@ -28,10 +28,10 @@ namespace {
 /// the bytes?
 std::string settingsText(const BuildOptions& build) {
     const auto& [memory, normals, radii, up, attributes, temp, duplicates, cacheLimit, threads, skipBad, onlyPoints,
-                 allowOutside, dropOutliers, surfelWeights, repair, curveRadius, surfels, progress, ranks, material,
-                 together, leftovers] = build;
-    // Not memory, temp, threads, ranks, together, leftovers: any give the same. Not attributes: what is cached has all
-    // of them.
+                 allowOutside, dropOutliers, surfelWeights, patches, repair, curveRadius, surfels, progress, ranks,
+                 material, together, leftovers] = build;
+    // Not patches, which are of `stipple build` alone. Not memory, temp, threads, ranks, together, leftovers: any give
+    // the same. Not attributes: what is cached has all of them.
     const std::string of = material ? fmt::format("|{},{}", material->roughness, material->metallic) : "";
     return fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}{}{}", normals, radii, up, duplicates, skipBad, onlyPoints,
                        allowOutside, dropOutliers, curveRadius, surfels, of, surfelWeights ? "|weights" : "");

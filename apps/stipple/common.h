@@ -22,12 +22,20 @@ namespace stipple::app {
 
 class BuildsOfScene;
 
+/// Of `stipple build --patches`.
+struct PatchBuildOptions {
+    bool isAsked = false, fillGaps = false, overlap = false;
+    double coneDegrees = 50;
+    uint64_t samples = 0;  ///< 0: as many as there are vertices
+};
+
 struct BuildOptions {
     std::string memory = "2G", normals = "auto", radii = "auto", up, attributes = "none", temp, duplicates = "keep";
     std::string cacheLimit;  ///< of the cache of built scenes; empty: its default
     int threads = 0;
     bool skipBad = false, onlyPoints = false, allowOutside = false, dropOutliers = false;
     bool surfelWeights = false;  ///< of `stipple build`
+    PatchBuildOptions patches;   ///< likewise
     bool repair = false;         ///< of former versions: what it did is always done
     double curveRadius = 0;
     uint64_t surfels = 0;

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <limits>
 
+#include "apps/stipple/build_patches.h"
 #include "apps/stipple/outputs.h"
 #include "apps/stipple/ply_meshes.h"
 #include "engine/base/process.h"
@@ -54,26 +55,6 @@ Result<lod::TriangleMesh> collect(const lod::MeshSource& source, const std::stri
     };
     STIPPLE_TRY(source.read(take));
     return all;
-}
-
-/// Colours of vertices times those of their materials (textures are left out).
-void bakeMaterials(const scene::Scene& scene, lod::TriangleMesh& mesh) {
-    for (size_t v = 0; v < mesh.colour.size(); ++v) {
-        const size_t m = mesh.surface[v] & shared::kSurfaceMaterialMask;
-        if (m >= scene.materials.size()) continue;
-        uint32_t out = mesh.colour[v] & 0xff000000u;
-        for (int k = 0; k < 3; ++k) {
-            const float linear = shared::linearFromSrgb(static_cast<float>(mesh.colour[v] >> (8 * k) & 255u) / 255.0f);
-            out |= unitToByte(shared::srgbFromLinear(linear * scene.materials[m].baseColour[k])) << (8 * k);
-        }
-        mesh.colour[v] = out;
-    }
-}
-
-bool hasTextures(const scene::Scene& scene) {
-    for (const scene::Material& m : scene.materials)
-        if (m.baseColourTexture.texture >= 0) return true;
-    return false;
 }
 
 /// To 8 bits: of files that have 16, unless no value needs them.

@@ -1,15 +1,18 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
 
+#include "apps/stipple/build_patches.h"
 #include "apps/stipple/common.h"
 #include "apps/stipple/info_input.h"
 #include "engine/base/hash.h"
 #include "engine/base/numbers.h"
 #include "engine/base/process.h"
 #include "engine/base/units.h"
+#include "lod/builder/patch_store/against.h"
 #include "lod/primitives/codecs.h"
 #include "lod/primitives/kinds.h"
 #include "lod/store/file_kind.h"
@@ -21,7 +24,7 @@ namespace stipple::app {
 namespace {
 
 struct Options {
-    std::string input, at;
+    std::string input, at, against;
     bool verify = false, json = false, skipBad = false;
     BuildOptions build;  ///< of which reading scene files uses some
 };
@@ -264,8 +267,35 @@ Result<void> showNearest(const lod::Store& store, const Options& o) {
     return {};
 }
 
+bool hasPatches(const lod::Store& store) {
+    return std::any_of(store.hierarchy.nodes.begin(), store.hierarchy.nodes.end(),
+                       [](const lod::Node& n) { return n.kind == lod::Kind::patches; });
+}
+
+/// The finest patches against what they were made of.
+Result<void> measureAgainstSource(const lod::Store& store, const Options& o, Executor& executor, nlohmann::json& j) {
+    constexpr uint64_t kPlaces = 200'000;
+    STIPPLE_ASSIGN(lod::TriangleMesh source, readTriangles(o.against, o.build.reading()));
+    STIPPLE_ASSIGN(const lod::AgainstSource r, lod::measureAgainst(store, std::move(source), kPlaces, executor));
+    if (r.far > 0)
+        return fail(
+            ErrorKind::input,
+            fmt::format("{} of {} places lie farther from each other than the {:.4g} that it says, up to {:.4g}", r.far,
+                        r.placesOfStore + r.placesOfSource, r.stated, std::max(r.toSource, r.fromSource)),
+            fmt::format("{} against {}", store.path, o.against), "is it what it was built from?");
+    j["against"] = {{"places_of_store", r.placesOfStore},
+                    {"places_of_source", r.placesOfSource},
+                    {"to_source", r.toSource},
+                    {"from_source", r.fromSource},
+                    {"stated", r.stated}};
+    return {};
+}
+
 Result<void> run(const Options& o) {
     catchStopSignals();
+    if (!o.against.empty() && !(o.verify && lod::isStoreFile(o.input)))
+        return fail(ErrorKind::usage, "is of built scenes of patches that are verified", "--against",
+                    "give --verify and a .stipple scene");
     if (lod::isStoreFile(o.input)) {
         STIPPLE_ASSIGN(const lod::Store store, lod::openStore(o.input));
         if (!o.at.empty()) return showNearest(store, o);
@@ -275,7 +305,8 @@ Result<void> run(const Options& o) {
             const auto executor = makeTbbExecutor(0);
             STIPPLE_TRY(lod::verifyStore(store, *executor));
             j["verified"] = true;
-            j["errors_measured"] = !isMixed && !store.hierarchy.isStochastic;
+            j["errors_measured"] = (!isMixed || hasPatches(store)) && !store.hierarchy.isStochastic;
+            if (!o.against.empty()) STIPPLE_TRY(measureAgainstSource(store, o, *executor, j));
         }
         if (o.json) {
             printJson("info", j);
@@ -284,7 +315,14 @@ Result<void> run(const Options& o) {
         printStore(j);
         if (o.verify)
             fmt::print("  verified: hashes, counts, order, {} and spheres are right\n",
-                       isMixed ? "codes (errors across kinds are not measured)" : "errors");
+                       isMixed && !hasPatches(store) ? "codes (errors across kinds are not measured)" : "errors");
+        if (j.contains("against"))
+            fmt::print(
+                "  against       {}: {} places of the store at most {:.4g} away, {} of the source {:.4g}; stated "
+                "{:.4g}\n",
+                o.against, j["against"]["places_of_store"].get<uint64_t>(), j["against"]["to_source"].get<double>(),
+                j["against"]["places_of_source"].get<uint64_t>(), j["against"]["from_source"].get<double>(),
+                j["against"]["stated"].get<double>());
         return {};
     }
     if (!o.at.empty())
@@ -302,6 +340,9 @@ void setupInfo(CLI::App& app, int& status) {
     sub->add_option("SCENE", o->input, "a .stipple scene, a scan, mesh, scene or curve file, or a folder of scans")
         ->required();
     sub->add_flag("--verify", o->verify, "read everything and check it; a fault ends with 3");
+    sub->add_option("--against", o->against,
+                    "with --verify, of a scene of patches: measure how far they are from this mesh, both ways")
+        ->type_name("SOURCE");
     sub->add_option("--at", o->at, "file coordinates: the input point of a built scene that is nearest to them")
         ->type_name("X,Y,Z");
     sub->add_flag("--skip-bad", o->skipBad, "go on past what is corrupt");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstring>
 #include <functional>
 #include <optional>
@@ -219,6 +220,8 @@ namespace {
 
 /// Bounds of what a file may say of itself.
 constexpr uint64_t kMostSamples = uint64_t{1} << 28;
+/// Cells of a patch at most: so many, and so many more for each that is drawn (builds make far fewer).
+constexpr uint64_t kMostCells = uint64_t{1} << 16, kCellsADrawn = 256;
 
 bool readHead(const Bytes& heads, size_t k, Patch& p) {
     Head h{};
@@ -318,6 +321,10 @@ Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const s
         const size_t cells = size_t{p.width - 1} * (p.height - 1);
         grid += size_t{p.width} * p.height;
         if ((cells + 7) / 8 > plain.cells.size() - cell || grid > kMostSamples) return damaged();
+        uint64_t drawn = 0;
+        for (size_t byte = 0; byte < (cells + 7) / 8; ++byte)
+            drawn += static_cast<uint64_t>(std::popcount(plain.cells[cell + byte]));
+        if (cells > kMostCells + kCellsADrawn * drawn) return damaged();
         p.cells.resize(cells);
         for (size_t c = 0; c < cells; ++c) p.cells[c] = plain.cells[cell + c / 8] >> (c % 8) & 1u;
         cell += (cells + 7) / 8;

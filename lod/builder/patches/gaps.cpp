@@ -46,10 +46,22 @@ class Cubes {
   public:
     explicit Cubes(double size) : size_(size) {}
     void add(const glm::dvec3& lo, const glm::dvec3& hi, uint32_t item) {
-        forCubes(lo, hi, [&](uint64_t cube) { items_[cube].push_back(item); });
+        if (!areFew(lo, hi))
+            large_.push_back(item);
+        else
+            forCubes(lo, hi, [&](uint64_t cube) { items_[cube].push_back(item); });
     }
     template <typename Use>
     void visit(const glm::dvec3& lo, const glm::dvec3& hi, const Use& use) const {
+        for (const uint32_t item : large_) use(item);
+        if (!areFew(lo, hi)) {
+            std::vector<uint32_t> all;
+            for (const auto& [cube, items] : items_) all.insert(all.end(), items.begin(), items.end());
+            std::sort(all.begin(), all.end());
+            all.erase(std::unique(all.begin(), all.end()), all.end());
+            for (const uint32_t item : all) use(item);
+            return;
+        }
         forCubes(lo, hi, [&](uint64_t cube) {
             if (const auto found = items_.find(cube); found != items_.end())
                 for (const uint32_t item : found->second) use(item);
@@ -57,6 +69,11 @@ class Cubes {
     }
 
   private:
+    static constexpr double kMostCubes = 65'536;  ///< that are walked; of what is larger, all is looked at
+    bool areFew(const glm::dvec3& lo, const glm::dvec3& hi) const {
+        const glm::dvec3 n = glm::floor(hi / size_) - glm::floor(lo / size_) + 1.0;
+        return n.x * n.y * n.z <= kMostCubes;
+    }
     template <typename Use>
     void forCubes(const glm::dvec3& lo, const glm::dvec3& hi, const Use& use) const {
         const auto low = glm::floor(lo / size_), high = glm::floor(hi / size_);
@@ -70,6 +87,7 @@ class Cubes {
     }
     double size_;
     std::unordered_map<uint64_t, std::vector<uint32_t>> items_;
+    std::vector<uint32_t> large_;
 };
 
 double distanceToSegment(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b) {

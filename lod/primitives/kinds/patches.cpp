@@ -1,4 +1,5 @@
 // Elevation patches: heights over planes. Records are blocks of cells; a payload is drawn whole or not at all.
+#include "lod/verify/patches.h"
 #include "lod/cut/frame.h"
 #include "lod/primitives/kinds/records.h"
 #include "lod/primitives/patch_blocks.h"
@@ -61,11 +62,17 @@ std::string checkPatches(const Hierarchy& h, uint32_t index, const Chunk& chunk)
                 return "a sample lies out of the bounding sphere";
         }
     }
+    if (h.nodeOf(index) == 0) return "";
+    const Node& parent = h.nodes[node.parent];
+    if (payload.parentCounts.hi != h.errorCodeOf(node.parent)) return "its parent has another error";
+    if (payload.errorCode > payload.parentCounts.hi) return "the error is larger than the parent's";
+    if (glm::length(node.centre - parent.centre) + node.radius > parent.radius * (1 + 1e-9) + 1e-6)
+        return "the bounding sphere is not inside the parent's";
     return "";
 }
 
-Result<uint64_t> measure(const Store& /*store*/, uint32_t /*chunk*/, const Chunk& /*decoded*/, uint64_t /*discs*/) {
-    return uint64_t{0};
+Result<uint64_t> measure(const Store& store, uint32_t chunk, const Chunk& /*decoded*/, uint64_t discs) {
+    return measurePatches(store, chunk, discs);
 }
 
 bool isAsked(const Hierarchy& h, const Payload& p, const Asked& asked) {

@@ -1,0 +1,162 @@
+#include "apps/stipple/build_patches.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "apps/stipple/ply_meshes.h"
+#include "engine/base/words.h"
+#include "engine/scene/triangles.h"
+#include "lod/builder/patch_store/patch_store_build.h"
+#include "lod/import/ply/mesh.h"
+
+namespace stipple::app {
+namespace fs = std::filesystem;
+
+void bakeMaterials(const scene::Scene& scene, lod::TriangleMesh& mesh) {
+    for (size_t v = 0; v < mesh.colour.size(); ++v) {
+        const size_t m = mesh.surface[v] & shared::kSurfaceMaterialMask;
+        if (m >= scene.materials.size()) continue;
+        uint32_t out = mesh.colour[v] & 0xff000000u;
+        for (int k = 0; k < 3; ++k) {
+            const float linear = shared::linearFromSrgb(static_cast<float>(mesh.colour[v] >> (8 * k) & 255u) / 255.0f);
+            out |= unitToByte(shared::srgbFromLinear(linear * scene.materials[m].baseColour[k])) << (8 * k);
+        }
+        mesh.colour[v] = out;
+    }
+}
+
+bool hasTextures(const scene::Scene& scene) {
+    for (const scene::Material& m : scene.materials)
+        if (m.baseColourTexture.texture >= 0) return true;
+    return false;
+}
+
+namespace {
+
+tl::unexpected<Error> noTriangles(const std::string& input) {
+    return fail(ErrorKind::input, "holds no triangles", input,
+                "patches of a store are made of triangles; convert --patches makes some of a scan that fits in memory");
+}
+
+Result<lod::PatchBuildSettings> settingsOf(const BuildOptions& build) {
+    lod::PatchBuildSettings settings;
+    STIPPLE_ASSIGN(settings.limits, build.settings());
+    settings.coneDegrees = build.patches.coneDegrees;
+    settings.samples = build.patches.samples;
+    settings.description.up =
+        lod::axisVector(build.up.empty() ? lod::UpAxis::y : static_cast<lod::UpAxis>(build.up[0] - 'x'));
+    settings.description.materials.resize(1);
+    return settings;
+}
+
+Result<lod::BuildReport> ofPly(const std::vector<std::string>& files, const std::string& output,
+                               const BuildOptions& build, Executor& executor, Progress& progress) {
+    STIPPLE_ASSIGN(lod::PatchBuildSettings settings, settingsOf(build));
+    const std::string& temp = settings.limits.tempFolder;
+    const std::string folder = temp.empty() ? fs::absolute(output).parent_path().string() : temp;
+    settings.readerShare = 0.25;
+    const auto forVertices =
+        static_cast<uint64_t>(settings.readerShare * static_cast<double>(settings.limits.memoryBytes));
+    std::vector<lod::MeshSource> sources;
+    for (const std::string& file : files) {
+        STIPPLE_ASSIGN(lod::MeshSource source, lod::openPlyMesh(file, forVertices / files.size(), folder));
+        sources.push_back(std::move(source));
+    }
+    settings.description.source = fs::path(files.front()).filename().string();
+    if (files.size() > 1) settings.description.source += fmt::format(" and {} more", files.size() - 1);
+    settings.limits.memoryBytes -= forVertices;
+    return lod::buildPatchStore(sources.size() == 1 ? sources.front() : lod::joined(std::move(sources)), output,
+                                settings, executor, progress);
+}
+
+Result<lod::BuildReport> ofScene(const std::string& input, const std::string& output, const BuildOptions& build,
+                                 Executor& executor, Progress& progress) {
+    STIPPLE_ASSIGN(lod::PatchBuildSettings settings, settingsOf(build));
+    STIPPLE_ASSIGN(scene::Scene scene, scene::readScene(input, build.reading()));
+    lod::MeshSource source = scene::triangleSource(scene, scene::placements(scene));
+    if (source.triangles == 0) return noTriangles(input);
+    settings.description.source = fs::path(input).filename().string();
+    source.read = [plain = source.read, &scene](const lod::MeshSource::Take& take) {
+        return plain([&](const lod::TriangleMesh& block) {
+            lod::TriangleMesh baked = block;
+            bakeMaterials(scene, baked);
+            for (uint32_t& surface : baked.surface) surface &= ~shared::kSurfaceMaterialMask;
+            return take(baked);
+        });
+    };
+    STIPPLE_ASSIGN(lod::BuildReport report, lod::buildPatchStore(source, output, settings, executor, progress));
+    if (hasTextures(scene))
+        report.notes.emplace_back("textures are left out: patches have the colours of vertices and materials alone");
+    report.notes.insert(report.notes.begin(), scene.notes.begin(), scene.notes.end());
+    return report;
+}
+
+Result<lod::TriangleMesh> collect(const lod::MeshSource& source) {
+    lod::TriangleMesh all;
+    if (source.survey) STIPPLE_TRY(source.survey([](uint64_t, uint64_t) { return Result<void>(); }));
+    STIPPLE_TRY(source.read([&](const lod::TriangleMesh& block) -> Result<void> {
+        const auto first = static_cast<uint32_t>(all.position.size());
+        all.position.insert(all.position.end(), block.position.begin(), block.position.end());
+        for (const uint32_t i : block.indices) all.indices.push_back(first + i);
+        return {};
+    }));
+    return all;
+}
+
+}  // namespace
+
+Result<lod::TriangleMesh> readTriangles(const std::string& input, const scene::ReadSettings& reading) {
+    lod::MeshSource source;
+    scene::Scene scene;
+    if (isSceneFile(input)) {
+        STIPPLE_ASSIGN(scene, scene::readScene(input, reading));
+        source = scene::triangleSource(scene, scene::placements(scene));
+    } else {
+        STIPPLE_ASSIGN(source, lod::openPlyMesh(input, reading.memoryBytes, fs::temp_directory_path().string()));
+    }
+    STIPPLE_ASSIGN(lod::TriangleMesh all, collect(source));
+    if (all.indices.empty()) return noTriangles(input);
+    return all;
+}
+
+void addPatchBuildOptions(CLI::App& app, PatchBuildOptions& o) {
+    app.add_flag("--patches", o.isAsked,
+                 "of meshes: elevation patches, heights over tilted planes, in a few bytes a sample; triangles that no "
+                 "patch fits become discs");
+    app.add_option("--cone", o.coneDegrees, "of patches: half the cone of a patch's normals, degrees")
+        ->transform(within(5.0, 75.0))
+        ->capture_default_str();
+    app.add_flag("--overlap", o.overlap, "of patches: each reaches over its neighbours (the default)");
+    app.add_flag("--fill-gaps", o.fillGaps)->group("");  // (said why not)
+    app.add_option("--patch-samples", o.samples,
+                   "of patches: samples of the finest level, about (default: as many as vertices)")
+        ->transform(within<uint64_t>(1, 100'000'000'000))
+        ->type_name("N");
+}
+
+Result<lod::BuildReport> buildPatches(const std::vector<std::string>& inputs, const std::string& output,
+                                      const BuildOptions& build, Executor& executor, Progress& progress) {
+    if (build.patches.fillGaps)
+        return fail(ErrorKind::usage, "is not for stores, whose levels only an overlap closes", "--fill-gaps",
+                    "leave it out; convert --patches --fill-gaps writes a scene");
+    if (build.ranks != nullptr)
+        return fail(ErrorKind::usage, "does not go with --mpi", "--patches", "build it in one process");
+    if (build.surfels > 0 || build.onlyPoints || build.material || build.surfelWeights)
+        return fail(ErrorKind::usage, "is of triangles",
+                    "--patches with --surfels, --only-points, --surfel-weights or a material of points",
+                    "leave one of them out");
+    if (isSceneFile(inputs.front())) {
+        if (inputs.size() > 1)
+            return fail(ErrorKind::usage, "only one scene with meshes can be built at a time", inputs[1]);
+        return ofScene(inputs.front(), output, build, executor, progress);
+    }
+    STIPPLE_ASSIGN(const PlyMeshes meshes, findPlyMeshes(inputs, build));
+    if (!meshes.areAll()) return noTriangles(inputs.front());
+    STIPPLE_ASSIGN(lod::BuildReport report, ofPly(meshes.files, output, build, executor, progress));
+    report.notes.insert(report.notes.begin(), meshes.notes.begin(), meshes.notes.end());
+    return report;
+}
+
+}  // namespace stipple::app

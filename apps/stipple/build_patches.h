@@ -1,0 +1,26 @@
+// `stipple build --patches`: stores of elevation patches.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/stipple/common.h"
+#include "lod/primitives/mesh.h"
+
+namespace stipple::app {
+
+/// Colours of vertices times those of their materials (textures are left out).
+void bakeMaterials(const scene::Scene& scene, lod::TriangleMesh& mesh);
+bool hasTextures(const scene::Scene& scene);
+
+/// All triangles of a PLY file with faces or of a scene. Error: there are none.
+Result<lod::TriangleMesh> readTriangles(const std::string& input, const scene::ReadSettings& reading);
+
+/// Adds --patches and what belongs to it.
+void addPatchBuildOptions(CLI::App& app, PatchBuildOptions& o);
+
+/// Of meshes: PLY files that all have faces, or one scene.
+Result<lod::BuildReport> buildPatches(const std::vector<std::string>& inputs, const std::string& output,
+                                      const BuildOptions& build, Executor& executor, Progress& progress);
+
+}  // namespace stipple::app

@@ -1,0 +1,133 @@
+#include "lod/builder/patch_store/against.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "engine/base/queue.h"
+#include "lod/builder/patches/mesh_surface.h"
+#include "lod/verify/patches.h"
+
+namespace stipple::lod {
+namespace {
+
+/// Places of the source, in lattice units: of each chosen triangle its middle, and one near a corner.
+std::vector<glm::dvec3> placesOf(const Hierarchy& h, const MeshSurface& s, uint64_t most) {
+    const size_t stride = s.size() / std::max<uint64_t>(most / 2, 1) + 1;
+    std::vector<glm::dvec3> out;
+    for (size_t t = stride / 2; t < s.size(); t += stride) {
+        const glm::dvec3 middle = s.elements.centre[t];
+        for (const glm::dvec3& p : {middle, 0.1 * middle + 0.9 * s.at(t, t % 3)})
+            out.push_back((s.middle + p - h.origin) / h.unit);
+    }
+    return out;
+}
+
+/// Leaves whose spheres come within `reach` of a place.
+std::vector<uint32_t> leavesNear(const Hierarchy& h, const glm::dvec3& p, double reach) {
+    std::vector<uint32_t> out, stack{0};
+    while (!stack.empty()) {
+        const uint32_t n = stack.back();
+        stack.pop_back();
+        const Node& node = h.nodes[n];
+        if (glm::distance(node.centre, p) > node.radius + reach) continue;
+        if (node.isLeaf()) out.push_back(n);
+        for (int c = 0; c < __builtin_popcount(node.childMask); ++c)
+            stack.push_back(node.firstChild + static_cast<uint32_t>(c));
+    }
+    return out;
+}
+
+class Measuring {
+  public:
+    Measuring(const Store& store, const MeshSurface& source, uint64_t places)
+        : store_(store), h_(store.hierarchy), s_(source), places_(placesOf(h_, source, places)), wanted_(places) {
+        out_.stated = store.description.roundingUnits;
+        stated_ = out_.stated / h_.unit * (1 + 1e-9);
+        // What is farther is told as that far at least.
+        reach_ = 64 * stated_ + 1;
+        nearest_.assign(places_.size(), reach_);
+        placesNear_.resize(h_.nodes.size());
+        made_.resize(h_.nodes.size());
+        for (uint32_t k = 0; k < places_.size(); ++k)
+            for (const uint32_t n : leavesNear(h_, places_[k], reach_)) placesNear_[n].push_back(k);
+        for (const Node& n : h_.nodes) leaves_ += n.isLeaf() ? 1 : 0;
+    }
+
+    Result<AgainstSource> run(Executor& executor) {
+        CompletionQueue<Error> errors;
+        executor.parallelFor(h_.nodes.size(), 1, [&](size_t begin, size_t end) {
+            for (size_t n = begin; n < end; ++n)
+                if (h_.nodes[n].isLeaf())
+                    if (const auto done = leaf(static_cast<uint32_t>(n)); !done) errors.push(done.error());
+        });
+        if (const auto found = errors.takeAll(); !found.empty()) return tl::unexpected(found.front());
+        for (uint32_t n = 0; n < made_.size(); ++n) {
+            const OfLeaf& leaf = made_[n];
+            for (size_t i = 0; i < leaf.found.size(); ++i) {
+                double& nearest = nearest_[placesNear_[n][i]];
+                nearest = std::min(nearest, leaf.found[i]);
+            }
+            out_.toSource = std::max(out_.toSource, leaf.most);
+            out_.placesOfStore += leaf.count;
+            out_.far += leaf.far;
+        }
+        out_.placesOfSource = places_.size();
+        for (const double d : nearest_) {
+            out_.fromSource = std::max(out_.fromSource, d * h_.unit);
+            out_.far += d > stated_ ? 1 : 0;
+        }
+        return out_;
+    }
+
+  private:
+    Result<void> leaf(uint32_t n) {
+        STIPPLE_ASSIGN(const NodeSurface surface, NodeSurface::read(store_, n));
+        double most = 0;
+        uint64_t count = 0, far = 0;
+        size_t hint = 0;
+        surface.forPlaces(wanted_ / leaves_ + 1, [&](const glm::dvec3& p) {
+            const auto [distance, triangle] = s_.nearest(h_.origin + h_.unit * p - s_.middle, hint);
+            hint = triangle;
+            most = std::max(most, distance);
+            far += distance > out_.stated * (1 + 1e-9) ? 1 : 0;
+            ++count;
+        });
+        std::vector<double> found;
+        for (const uint32_t k : placesNear_[n]) found.push_back(surface.distance(places_[k], reach_));
+        made_[n] = {most, count, far, std::move(found)};
+        return {};
+    }
+
+    const Store& store_;
+    const Hierarchy& h_;
+    const MeshSurface& s_;
+    std::vector<glm::dvec3> places_;
+    uint64_t wanted_, leaves_ = 0;
+    double stated_ = 0, reach_ = 0;  ///< lattice units
+    std::vector<double> nearest_;    ///< of each place
+    std::vector<std::vector<uint32_t>> placesNear_;
+    /// What a leaf has measured.
+    struct OfLeaf {
+        double most = 0;
+        uint64_t count = 0, far = 0;
+        std::vector<double> found;  ///< of `placesNear_`
+    };
+    std::vector<OfLeaf> made_;
+    AgainstSource out_;
+};
+
+}  // namespace
+
+Result<AgainstSource> measureAgainst(const Store& store, TriangleMesh source, uint64_t places, Executor& executor) {
+    bool hasPatches = false;
+    for (const Node& n : store.hierarchy.nodes) hasPatches = hasPatches || n.kind == Kind::patches;
+    if (!hasPatches)
+        return fail(ErrorKind::usage, "holds no patches: what it holds is measured without its source", store.path,
+                    "leave --against out");
+    const MeshSurface surface = meshSurface(std::move(source), executor);
+    if (surface.size() == 0) return fail(ErrorKind::input, "the source holds no triangle with an area", store.path);
+    return Measuring(store, surface, places).run(executor);
+}
+
+}  // namespace stipple::lod

@@ -1,0 +1,23 @@
+// A store of patches against what it was built from.
+#pragma once
+
+#include "engine/base/executor.h"
+#include "lod/primitives/mesh.h"
+#include "lod/store/store.h"
+
+namespace stipple::lod {
+
+/// Distances in units of the file.
+struct AgainstSource {
+    double stated = 0;                    ///< bound that the store says, of its leaves
+    double toSource = 0, fromSource = 0;  ///< largest of places of the leaves' patches, and of the source
+    uint64_t placesOfStore = 0, placesOfSource = 0;
+    uint64_t far = 0;  ///< of both: farther than stated
+};
+
+/// Measures about `places` places each way, evenly spread over triangles and cells, against all of the other surface.
+/// `source` has to be in the store's coordinates, and fits in memory. Error: a chunk cannot be read, or the store holds
+/// no patches.
+Result<AgainstSource> measureAgainst(const Store& store, TriangleMesh source, uint64_t places, Executor& executor);
+
+}  // namespace stipple::lod

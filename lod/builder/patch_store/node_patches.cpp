@@ -1,0 +1,190 @@
+#include "lod/builder/patch_store/node_patches.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+#include "lod/builder/patch_store/division.h"
+#include "lod/builder/patches/sample_segments.h"
+#include "lod/builder/patches/segments.h"
+#include "shaders/shared/record.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr double kFinest = 0.25, kCoarsest = 1.5;  ///< steps of leaves, in those of their level
+constexpr double kUnited = 0.5;                    ///< cells of discs of inner nodes, in steps
+
+void addTo(TriangleMesh& mesh, const Soup& soup, const glm::dvec3& corner) {
+    const auto first = static_cast<uint32_t>(mesh.position.size());
+    for (size_t v = 0; v < soup.vertices.size(); ++v) {
+        const shared::MeshVertex& from = soup.vertices.low[v];
+        mesh.position.push_back(glm::dvec3(soup.vertices.at(v)) - corner);
+        mesh.normal.emplace_back(glm::vec3(shared::octDecode(from.normal)));
+        mesh.colour.push_back(from.colour & 0xffffffu);
+        mesh.surface.push_back(from.surface);
+    }
+    for (const uint32_t i : soup.indices) mesh.indices.push_back(first + i);
+}
+
+class NodePatcher {
+  public:
+    NodePatcher(const Soup& own, const AroundNode& around, const glm::dvec3& corner, Executor& executor)
+        : corner_(corner), executor_(executor) {
+        TriangleMesh mesh;
+        addTo(mesh, own, corner);
+        ownVertices_ = mesh.position.size();
+        addTo(mesh, around.within, corner);
+        segmentVertices_ = mesh.position.size();
+        addTo(mesh, around.beyond, corner);
+        s_ = meshSurface(std::move(mesh), executor);
+    }
+
+    NodePatches run(const NodeSettings& settings) {
+        NodePatches out;
+        SegmentSettings how;
+        how.coneCosine = std::cos(settings.coneDegrees * 3.14159265358979323846 / 180);
+        const SurfaceElements elements = inSegments();
+        std::vector<Segment> segments = connectedComponents(elements);
+        std::erase_if(segments, [&](const Segment& s) { return !isInSegment(s.front()); });
+        segments = mergeByNormals(elements, splitByCone(elements, std::move(segments), how, executor_), how);
+        SampleSettings sampling;
+        const double step = settings.samplesATriangle > 0 ? leafStep(settings) : settings.step;
+        sampling.step = [step](const Segment&) { return step; };
+        SampledSegments sampled = sampleSegments(s_, std::move(segments), sampling, executor_);
+        for (SegmentPatch& made : sampled.patches) {
+            Patch& p = made.patch.patch;
+            p.origin += s_.middle;
+            out.error = std::max({out.error, p.errorToSource, p.errorFromSource});
+            out.patches.push_back(std::move(p));
+        }
+        for (const uint32_t t : sampled.left) {
+            if (s_.vertices[t][0] >= ownVertices_) continue;  // another node's
+            ++out.trianglesLeft;
+            cover({s_.at(t, 0), s_.at(t, 1), s_.at(t, 2)}, {glm::dvec2(0), glm::dvec2(1, 0), glm::dvec2(0, 1)}, t, step,
+                  out.left);
+        }
+        for (const LeftDisc& d : out.left) out.error = std::max(out.error, double{d.radius});
+        if (settings.samplesATriangle == 0) unite(out, kUnited * settings.step);
+        return out;
+    }
+
+  private:
+    /// With which the node has as many samples as it is to have.
+    double leafStep(const NodeSettings& settings) const {
+        double area = 0, triangles = 0;
+        for (size_t t = 0; t < s_.size(); ++t) {
+            if (s_.vertices[t][0] >= ownVertices_) continue;
+            area += s_.elements.area[t];
+            ++triangles;
+        }
+        const double wanted = std::sqrt(area / std::max(settings.samplesATriangle * triangles, 1.0));
+        return std::clamp(wanted, settings.step * kFinest, settings.step * kCoarsest);
+    }
+
+    bool isInSegment(uint32_t t) const { return s_.vertices[t][0] < segmentVertices_; }
+
+    /// What is farther around has no neighbours: it becomes no part of a segment.
+    SurfaceElements inSegments() const {
+        SurfaceElements e;
+        e.centre = s_.elements.centre;
+        e.normal = s_.elements.normal;
+        e.area = s_.elements.area;
+        e.firstLink.push_back(0);
+        for (uint32_t t = 0; t < s_.size(); ++t) {
+            if (isInSegment(t))
+                for (const uint32_t other : s_.elements.links(t))
+                    if (isInSegment(other)) e.link.push_back(other);
+            e.firstLink.push_back(static_cast<uint32_t>(e.link.size()));
+        }
+        return e;
+    }
+
+    /// A disc about the middle, and of large triangles one of each quarter. `weights`: of the second and third corner.
+    void cover(const std::array<glm::dvec3, 3>& t, const std::array<glm::dvec2, 3>& weights, uint32_t triangle,
+               double step, std::vector<LeftDisc>& out) const {
+        const glm::dvec3 middle = (t[0] + t[1] + t[2]) / 3.0;
+        double radius = 0, longest = 0;
+        for (size_t k = 0; k < 3; ++k) {
+            radius = std::max(radius, glm::distance(middle, t.at(k)));
+            longest = std::max(longest, glm::distance(t.at(k), t.at((k + 1) % 3)));
+        }
+        if (longest > step) {
+            const auto half = [](const auto& a, const auto& b) { return 0.5 * (a + b); };
+            const glm::dvec3 ab = half(t[0], t[1]), bc = half(t[1], t[2]), ca = half(t[2], t[0]);
+            const auto& w = weights;
+            const glm::dvec2 wab = half(w[0], w[1]), wbc = half(w[1], w[2]), wca = half(w[2], w[0]);
+            cover({t[0], ab, ca}, {w[0], wab, wca}, triangle, step, out);
+            cover({ab, t[1], bc}, {wab, w[1], wbc}, triangle, step, out);
+            cover({ca, bc, t[2]}, {wca, wbc, w[2]}, triangle, step, out);
+            cover({ab, bc, ca}, {wab, wbc, wca}, triangle, step, out);
+            return;
+        }
+        const glm::dvec2 w = (weights[0] + weights[1] + weights[2]) / 3.0;
+        const SurfaceLook look = s_.look(triangle, w.x, w.y);
+        out.push_back(
+            {corner_ + s_.middle + middle, look.normal, static_cast<float>(radius * (1 + 1e-6)), look.colour});
+    }
+
+    /// One disc about the mean of those in a cell, that reaches around all of them.
+    static void unite(NodePatches& out, double edge) {
+        std::map<std::array<int64_t, 3>, std::vector<LeftDisc>> cells;
+        for (const LeftDisc& d : out.left) {
+            const glm::dvec3 c = glm::floor(d.place / edge);
+            cells[{static_cast<int64_t>(c.z), static_cast<int64_t>(c.y), static_cast<int64_t>(c.x)}].push_back(d);
+        }
+        out.left.clear();
+        for (const auto& [key, discs] : cells) {
+            LeftDisc one;
+            glm::dvec3 place(0), normal(0), colour(0);
+            double weight = 0;
+            for (const LeftDisc& d : discs) {
+                const double area = double{d.radius} * double{d.radius};
+                weight += area;
+                place += area * d.place;
+                normal += area * glm::dvec3(d.normal);
+                for (int a = 0; a < 3; ++a) colour[a] += area * static_cast<double>(d.colour >> (8 * a) & 255u);
+            }
+            one.place = place / weight;
+            const double length = glm::length(normal);
+            one.normal = length > 1e-6 * weight ? glm::vec3(normal / length) : discs.front().normal;
+            double reach = 0;
+            for (const LeftDisc& d : discs)
+                reach = std::max(reach, glm::distance(d.place, one.place) + double{d.radius});
+            one.radius = static_cast<float>(reach * (1 + 1e-6));
+            for (int a = 0; a < 3; ++a)
+                one.colour |= static_cast<uint32_t>(std::clamp(colour[a] / weight + 0.5, 0.0, 255.0)) << (8 * a);
+            out.error = std::max(out.error, double{one.radius});
+            out.left.push_back(one);
+        }
+    }
+
+    glm::dvec3 corner_;
+    Executor& executor_;
+    MeshSurface s_;
+    size_t ownVertices_ = 0, segmentVertices_ = 0;
+};
+
+}  // namespace
+
+void AroundNode::add(const Soup& from, const glm::dvec3& lo, double cell) {
+    const double step = cell / kPatchCells;
+    SoupPart toWithin(from, within), toBeyond(from, beyond);
+    for (size_t t = 0; t < from.indices.size() / 3; ++t) {
+        const glm::dvec3 p(middleOf(from, t));
+        const glm::dvec3 off = glm::max(glm::max(lo - p, p - (lo + cell)), glm::dvec3(0));
+        const double far = std::max({off.x, off.y, off.z});
+        if (far <= kPatchReach * step)
+            toWithin.add(t);
+        else if (far <= kPatchAround * step)
+            toBeyond.add(t);
+    }
+}
+
+NodePatches patchesOfNode(const Soup& own, const AroundNode& around, const glm::dvec3& corner,
+                          const NodeSettings& settings, Executor& executor) {
+    return NodePatcher(own, around, corner, executor).run(settings);
+}
+
+}  // namespace stipple::lod

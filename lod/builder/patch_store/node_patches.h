@@ -1,0 +1,50 @@
+// One node: its triangles, and those around it, to patches on the grid of its level.
+#pragma once
+
+#include "lod/builder/octree/frame.h"
+#include "lod/builder/patch_store/level_mesh.h"
+#include "lod/builder/patches/patch_build.h"
+
+namespace stipple::lod {
+
+/// Cells of the grid along an edge of a node's cell.
+constexpr uint32_t kPatchCells = 64;
+/// How far a node's patches reach beyond its cell, cells of its grid: 1.5 of the next coarser level. Up to there they
+/// are made of what is around the node as of what is in it; they go on over what is around, that far, at most.
+constexpr double kPatchReach = 3, kPatchAround = 8;
+
+inline double patchStep(const Frame& frame, uint32_t level) { return frame.cellSize(level) / kPatchCells; }
+
+/// Triangles beside a node, by how far their middles are from its cell.
+struct AroundNode {
+    Soup within, beyond;  ///< kPatchReach, kPatchAround
+    /// `lo`: corner of the node's cell.
+    void add(const Soup& from, const glm::dvec3& lo, double cell);
+};
+
+/// A place that no patch stands for.
+struct LeftDisc {
+    glm::dvec3 place{0};  ///< lattice units
+    glm::vec3 normal{0};
+    float radius = 0;  ///< lattice units
+    uint32_t colour = 0;
+};
+
+struct NodePatches {
+    std::vector<Patch> patches;  ///< lengths in lattice units; origins relative to the lower corner of the node's cell
+    std::vector<LeftDisc> left;  ///< discs that cover the triangles of the node that are in no patch
+    uint64_t trianglesLeft = 0;
+    double error = 0;  ///< bound of the distance between `own` and all that, both ways, lattice units
+};
+
+struct NodeSettings {
+    double step = 1;          ///< of the level's grid, lattice units
+    double coneDegrees = 50;  ///< half the cone of a patch's normals
+    /// Samples aimed at for each of its triangles, of a leaf: its grid may be up to four times as fine as the level's,
+    /// and a little coarser. 0: of an inner node, whose discs are united in cells of half a step.
+    double samplesATriangle = 0;
+};
+NodePatches patchesOfNode(const Soup& own, const AroundNode& around, const glm::dvec3& corner,
+                          const NodeSettings& settings, Executor& executor);
+
+}  // namespace stipple::lod

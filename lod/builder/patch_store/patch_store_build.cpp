@@ -1,0 +1,367 @@
+// Triangles as content of a build (octree/cell_build.h) whose nodes hold patches: each travels to the octree cell of
+// its middle, and to those near it; cell by cell from the deepest up, patches are made of them.
+#include "lod/builder/patch_store/patch_store_build.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "engine/base/check.h"
+#include "engine/base/hash.h"
+#include "lod/builder/build_version.h"
+#include "lod/builder/counts.h"
+#include "lod/builder/octree/cell_build.h"
+#include "lod/builder/patch_store/division.h"
+#include "lod/builder/patch_store/patch_cell.h"
+#include "lod/builder/patch_store/subtree_margins.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr uint64_t kCellBytes = uint64_t{160} << 20;  ///< that one cell of the work needs at most
+constexpr uint32_t kFewestOfLeaf = 64;                ///< triangles, however many samples are wanted
+constexpr double kFewPieces = 1 << 14;                ///< that dividing may add to small meshes ...
+constexpr double kMorePieces = 1.25;                  ///< ... and to large ones, times
+constexpr int kPiecesACell = 2;                       ///< log2: an edge is a fourth of the smallest cell's at most
+
+class PatchBuild : public CellContent {
+  public:
+    PatchBuild(const MeshSource& source, const PatchBuildSettings& settings, Executor& executor)
+        : source_(source), settings_(settings), executor_(executor) {
+        cell_.coneDegrees = settings.coneDegrees;
+        cell_.leafTriangles = settings.leafTriangles;
+        if (settings.samples == 0) return;
+        const double usual = 0.5 * static_cast<double>(source.triangles);  // vertices
+        const double times = std::max(usual, 1.0) / static_cast<double>(settings.samples);
+        cell_.samplesATriangle /= times;
+        cell_.leafTriangles = static_cast<uint32_t>(
+            std::clamp(times * cell_.leafTriangles, double{kFewestOfLeaf}, double{kSubtreePoints}));
+    }
+
+    const char* primitive() const override { return "triangle"; }
+    std::string source() const override { return settings_.description.source; }
+    uint64_t declared() const override { return source_.triangles; }
+    uint64_t inputIdentity() const override { return source_.identity(); }
+    MemoryNeeds memory() const override {
+        MemoryNeeds needs;
+        needs.content = fmt::format("patches of {} triangles", source_.triangles);
+        needs.fixed = uint64_t{96} << 20;
+        needs.aWorker = kCellBytes;
+        needs.tables = source_.triangles * kTableBytes;
+        needs.between = source_.triangles * kSpillBytes;
+        needs.whole = source_.triangles * 2000;
+        needs.readerShare = settings_.readerShare;
+        return needs;
+    }
+    std::string settingsAsText() const override {
+        return fmt::format("patches|{}|{}|{}|{}|{}|{}", kBuildVersion, settings_.coneDegrees, settings_.samples,
+                           settings_.leafTriangles, kPatchCells, describeAsText(settings_.description));
+    }
+
+    // ---- survey, count, distribute ----
+
+    Result<void> survey(const Workspace& workspace, Progress& progress, bool isKnown) override {
+        const auto tell = [&](uint64_t done, uint64_t all) {
+            progress.update("survey", std::min(done, all), all);
+            return workspace.checkStopped();
+        };
+        STIPPLE_ASSIGN(const MeshSource::Bounds bounds, source_.survey(tell));
+        if (isKnown) return {};
+        facts_.lattice = latticeOf(bounds);
+        if (facts_.lattice.isWide())
+            return fail(ErrorKind::input, "some of its places lie too far from all others for patches", source(),
+                        "leave them out, or build it without --patches");
+        facts_.keyLevels = plainFrame().keyLevels;
+        EdgeLengths lengths;
+        uint64_t triangles = 0;
+        STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
+            lengths.add(placeBlock(block, facts_.lattice, executor_).soup);
+            triangles += block.indices.size() / 3;
+            return tell(triangles, source_.triangles);
+        }));
+        const double most = kMorePieces * static_cast<double>(triangles) + kFewPieces;
+        while (facts_.keyLevels > 0 && lengths.pieces(longestLog2()) > most) --facts_.keyLevels;
+        return {};
+    }
+    Frame frame() const override {
+        Frame f = plainFrame();
+        f.keyLevels = facts_.keyLevels;
+        return f;
+    }
+    Result<void> places(const Places& take) override {
+        facts_.triangles = facts_.pieces = 0;
+        std::vector<uint32_t> x, y, z;
+        STIPPLE_TRY(source_.read([&](const TriangleMesh& block) -> Result<void> {
+            facts_.triangles += block.indices.size() / 3;
+            const PlacedBlock placed = divided(block);
+            const size_t count = placed.soup.indices.size() / 3;
+            facts_.pieces += count;
+            x.clear();
+            y.clear();
+            z.clear();
+            for (size_t t = 0; t < count; ++t) {
+                const Steps p = middleOf(placed.soup, t);
+                x.push_back(static_cast<uint32_t>(p.x));
+                y.push_back(static_cast<uint32_t>(p.y));
+                z.push_back(static_cast<uint32_t>(p.z));
+            }
+            return take({x, y, z}, source_.triangles);
+        }));
+        facts_.bad = source_.badTriangles ? source_.badTriangles() : 0;
+        return {};
+    }
+    Result<void> check(const std::vector<Subtree>& subtrees) const override {
+        if (subtrees.empty()) return fail(ErrorKind::input, "holds no triangle with an area", source());
+        for (const Subtree& a : subtrees)
+            if (a.count > 4 * kSubtreePoints)
+                return fail(ErrorKind::budget,
+                            fmt::format("{} triangles lie within the length of a few others", a.count), source(),
+                            "divide the long triangles, or build it without --patches");
+        return {};
+    }
+    uint64_t temporaryBytes(int ranks) const override {
+        const auto each = static_cast<uint64_t>(ranks);
+        return std::max(each * source_.surveyBytes, facts_.pieces * kSpillBytes + each * source_.readBytes);
+    }
+
+    /// Each triangle to the subtree that holds its middle, and to those that it lies near.
+    Result<void> send(CellSender& to) override {
+        const Frame on = frame();
+        const SubtreeMargins margins(on, to.subtrees(), kPatchMargin);
+        std::vector<Soup> buffers(to.subtrees().size());
+        const uint64_t wanted = std::max<uint64_t>(to.bufferBytes() / std::max<size_t>(buffers.size(), 1), 8192);
+        const auto flush = [&](size_t a) {
+            ByteWriter bytes;
+            putSoup(buffers[a], bytes);
+            const uint64_t triangles = buffers[a].indices.size() / 3;
+            buffers[a] = {};
+            return to.append(a, bytes.bytes(), triangles);
+        };
+        const auto flushAll = [&]() -> Result<void> {
+            for (size_t a = 0; a < buffers.size(); ++a)
+                if (!buffers[a].indices.empty()) STIPPLE_TRY(flush(a));
+            return {};
+        };
+        const Result<void> read = source_.read([&](const TriangleMesh& block) -> Result<void> {
+            const uint64_t triangles = block.indices.size() / 3;
+            if (to.begins()) return to.ends(triangles, facts_.triangles, flushAll);
+            const PlacedBlock placed = divided(block);
+            facts_.degenerate += placed.degenerate;
+            facts_.notFinite += placed.notFinite;
+            facts_.rounding = std::max(facts_.rounding, placed.rounding);
+            std::vector<std::pair<uint32_t, uint32_t>> order;  // subtree, triangle
+            for (uint32_t t = 0; t < placed.soup.indices.size() / 3; ++t) {
+                const Steps p = middleOf(placed.soup, t);
+                const glm::u64vec3 at(p);
+                const uint32_t own = to.subtreeOf(on.keyOf(at.x, at.y, at.z));
+                if (to.isOwn(own)) order.emplace_back(own, t);
+                margins.forEachNear(own, glm::dvec3(p), [&](uint32_t near) {
+                    if (to.isOwn(near)) order.emplace_back(near, t);
+                });
+            }
+            std::sort(order.begin(), order.end());
+            for (size_t first = 0, last = 0; first < order.size(); first = last) {
+                const uint32_t a = order[first].first;
+                SoupPart part(placed.soup, buffers[a]);
+                for (last = first; last < order.size() && order[last].first == a; ++last) part.add(order[last].second);
+                const Soup& soup = buffers[a];
+                if (soup.vertices.size() * sizeof(shared::MeshVertex) + soup.indices.size() * 4 >= wanted)
+                    STIPPLE_TRY(flush(a));
+            }
+            return to.ends(triangles, facts_.triangles, flushAll);
+        });
+        return read ? flushAll() : read;
+    }
+    Result<std::vector<uint8_t>> gathered(const std::vector<uint8_t>& input, const Subtree&, uint64_t&) const override {
+        return input;
+    }
+    Result<void> complete(const CellInputs& inputs) override {
+        subtrees_ = inputs.subtrees();
+        return {};
+    }
+    void save(ByteWriter& to) const override { to.put(facts_); }
+    void load(ByteReader& from) override { from.get(facts_); }
+
+    // ---- the work ----
+
+    Result<CellProduct> make(const WorkCell& cell, const std::vector<uint8_t>& input,
+                             const std::vector<FromBelow>& below) const override {
+        return buildPatchCell(cell, input, below, frame(), subtrees_, cell_, executor_);
+    }
+
+    uint64_t take(uint64_t at, const std::vector<uint8_t>& bytes) override {
+        PatchTable table;
+        ByteReader from(bytes);
+        STIPPLE_CHECK(table.get(from), "the table of a cell");
+        for (NodeBatch::Written& w : table.batch.nodes) w.node.chunkOffset += at;
+        for (PatchTable::Points& p : table.points) p.offset += at;
+        if (table.triangles > 0) {
+            lo_ = glm::min(lo_, table.lo);
+            hi_ = glm::max(hi_, table.hi);
+        }
+        kept_ += table.triangles;
+        duplicate_ += table.duplicate;
+        left_ += table.left;
+        samples_ += table.samples;
+        discs_ += table.discs;
+        residual_ = std::max(residual_, table.residual);
+        tables_.push_back(std::move(table));
+        return tables_.size();
+    }
+
+    // ---- the end ----
+
+    Result<Hierarchy> describe(StoreWriter&, StoreDescription& description, BuildReport& report) override {
+        Hierarchy h = hierarchy();
+        for (const auto& [reason, count] :
+             {std::pair{"degenerate triangles", facts_.degenerate}, std::pair{"duplicate triangles", duplicate_},
+              std::pair{"triangles that are not finite", facts_.notFinite},
+              std::pair{"triangles with a corner that is no vertex", facts_.bad}})
+            if (count > 0) report.dropped[reason] = count;
+        const double world = facts_.lattice.unit;
+        report.pointsIn = facts_.triangles + facts_.bad;
+        report.pointsOut = kept_;
+        const uint64_t whole = facts_.triangles - facts_.degenerate - facts_.notFinite;
+        if (facts_.pieces > whole) report.added["by dividing long ones"] = facts_.pieces - whole;
+        // (Middles are rounded: a piece may have no area.)
+        if (whole > facts_.pieces) report.dropped["degenerate triangles"] += whole - facts_.pieces;
+        report.temporaryBytes = std::max(report.temporaryBytes + source_.readBytes, source_.surveyBytes);
+        report.notes.push_back(
+            fmt::format("{} samples in patches, {:.3g} units from the surface at most", samples_, residual_ * world));
+        if (left_ > 0)
+            report.notes.push_back(fmt::format("{} triangles fit no patch: {} discs stand for them", left_, discs_));
+        description = settings_.description;
+        for (uint32_t n = 0; n < h.nodes.size(); ++n)
+            if (h.nodes[n].isLeaf())
+                h.forEachPayload(n, [&](uint32_t chunk) { description.points += h.payload(chunk).records; });
+        description.pointsIn = report.pointsIn;
+        description.dropped = report.dropped;
+        description.added = report.added;
+        description.roundingUnits = facts_.rounding + residual_ * world;
+        description.boundsMin = description.focusMin = facts_.lattice.origin + world * glm::dvec3(lo_);
+        description.boundsMax = description.focusMax = facts_.lattice.origin + world * glm::dvec3(hi_);
+        description.hasColour = description.hasNormals = description.isReflectance = true;
+        return h;
+    }
+
+  private:
+    static constexpr uint64_t kSpillBytes = 48;  ///< of a triangle, between the steps, with its copies
+    static constexpr uint64_t kTableBytes = 1;   ///< of a triangle, of the node table, which stays in memory
+
+    /// What a resumed build has to know.
+    struct Facts {
+        Lattice lattice;
+        uint64_t triangles = 0, pieces = 0, degenerate = 0, notFinite = 0, bad = 0;
+        double rounding = 0;
+        uint32_t keyLevels = 0;
+    };
+
+    Frame plainFrame() const {
+        constexpr double kNear = 16;  // steps, see mesh_build
+        return makeFrame(facts_.lattice.origin, facts_.lattice.unit, facts_.lattice.largestKey, 0,
+                         facts_.lattice.bits > 24 ? kNear : 0);
+    }
+    /// Of an edge.
+    int longestLog2() const {
+        return static_cast<int>(plainFrame().rootLog2) - static_cast<int>(facts_.keyLevels) - kPiecesACell;
+    }
+    PlacedBlock divided(const TriangleMesh& block) const {
+        PlacedBlock placed = placeBlock(block, facts_.lattice, executor_);
+        divideLong(placed.soup, std::max(std::exp2(longestLog2()), 2.0));
+        return placed;
+    }
+
+    /// The tree of all nodes; parents' codes are known now.
+    Hierarchy hierarchy() {
+        const Frame on = frame();
+        std::map<std::pair<uint32_t, Key>, uint8_t> codes;  // by level and key
+        for (const PatchTable& table : tables_)
+            for (const NodeBatch::Written& w : table.batch.nodes) codes[{w.node.level, w.key}] = w.node.errorCode;
+        std::map<std::pair<uint32_t, Key>, PatchTable::Points> points;
+        std::vector<NodeBatch> batches;
+        for (PatchTable& table : tables_) {
+            for (NodeBatch::Written& w : table.batch.nodes) {
+                const uint32_t level = w.node.level;
+                uint32_t above = ErrorScale::kNoParent;
+                if (level > 0) {
+                    const uint32_t shift = on.shiftOf(level - 1);
+                    above = codes.at({level - 1, w.key >> shift << shift});
+                }
+                w.firstCount = static_cast<uint32_t>(table.batch.counts.size());
+                w.parentCodes = w.ownCodes = 1;
+                table.batch.addCount(above, w.node.records);
+                table.batch.addCount(w.node.errorCode, w.node.records);
+            }
+            for (const PatchTable::Points& p : table.points) {
+                const NodeBatch::Written& w = table.batch.nodes[p.node];
+                points[{w.node.level, w.key}] = p;
+            }
+            batches.push_back(std::move(table.batch));
+        }
+        tables_ = {};
+        Hierarchy h = assemble(on, batches);
+        addPoints(on, points, h);
+        return h;
+    }
+    /// Discs are the second payload of nodes that have patches, and the only one of others.
+    static void addPoints(const Frame& on, const std::map<std::pair<uint32_t, Key>, PatchTable::Points>& points,
+                          Hierarchy& h) {
+        for (uint32_t n = 0; n < h.nodes.size(); ++n) {
+            Node& node = h.nodes[n];
+            setKind(node, Kind::patches);
+            const Key key = mortonCode(node.cell[0], node.cell[1], node.cell[2]) << on.shiftOf(node.level);
+            const auto found = points.find({node.level, key});
+            if (found == points.end()) continue;
+            const uint32_t above = n == 0 ? uint32_t{ErrorScale::kNoParent} : h.nodes[node.parent].errorCode;
+            const bool isFirst = found->second.isAlone != 0;
+            FurtherPayload further;
+            Payload& p = isFirst ? static_cast<Payload&>(node) : further;
+            const uint8_t code = node.errorCode;
+            p.errorCode = code;
+            p.records = found->second.records;
+            p.chunkBytes = found->second.bytes;
+            p.chunkOffset = found->second.offset;
+            p.chunkHash = found->second.hash;
+            p.attributeHash = hashBytes(nullptr, 0);
+            setKind(p, Kind::points);
+            p.stepShift = static_cast<int8_t>(static_cast<int>(h.rootLog2) - node.level - 16);
+            std::vector<uint32_t> histogram(256, 0);
+            for (const auto& [of, counts] :
+                 {std::pair{above, &p.parentCounts}, std::pair{uint32_t{code}, &p.ownCounts}}) {
+                std::fill(histogram.begin(), histogram.end(), 0);
+                histogram.at(of) = p.records;
+                *counts = makeCodeCounts(histogram, p.records, h.greaterThan);
+            }
+            h.isMixed = true;
+            if (isFirst) continue;
+            further.node = n;
+            node.firstFurther = static_cast<uint32_t>(h.further.size());
+            node.furtherPayloads = 1;
+            h.further.push_back(further);
+        }
+    }
+
+    const MeshSource& source_;
+    const PatchBuildSettings& settings_;
+    Executor& executor_;
+    PatchCellSettings cell_;
+    Facts facts_;
+    std::vector<Subtree> subtrees_;
+    std::vector<PatchTable> tables_;
+    uint64_t kept_ = 0, duplicate_ = 0, left_ = 0, samples_ = 0, discs_ = 0;
+    double residual_ = 0;
+    Steps lo_{std::numeric_limits<int64_t>::max()}, hi_{std::numeric_limits<int64_t>::min()};
+};
+
+}  // namespace
+
+Result<BuildReport> buildPatchStore(const MeshSource& source, const std::string& output,
+                                    const PatchBuildSettings& settings, Executor& executor, Progress& progress) {
+    PatchBuild content(source, settings, executor);
+    return buildCells(content, output, settings.limits, executor, progress);
+}
+
+}  // namespace stipple::lod

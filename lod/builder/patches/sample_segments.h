@@ -1,0 +1,33 @@
+// Segments of a mesh to patches, each at the step that it is given.
+#pragma once
+
+#include <functional>
+
+#include "engine/base/executor.h"
+#include "lod/builder/patches/mesh_patch.h"
+
+namespace stipple::lod {
+
+struct SampleSettings {
+    PatchClosing closing = PatchClosing::overlap;
+    std::function<double(const Segment&)> step;  ///< scene units, to begin with
+    std::function<bool()> isStopped;             ///< what is there then is of no use
+    std::function<void(uint64_t done)> tell;     ///< so many elements have their patches; may be empty
+};
+
+struct SegmentPatch {
+    uint32_t first = 0;  ///< element of its segment
+    MeshPatch patch;
+};
+
+struct SampledSegments {
+    std::vector<SegmentPatch> patches;  ///< in the order of their first elements
+    std::vector<uint32_t> left;         ///< elements that no patch stands for, ascending
+};
+
+/// A segment that folds is halved and tried again, one that is thin is sampled up to eight times as densely, and what
+/// stays thin is left. Elements in no segment are only gone on over.
+SampledSegments sampleSegments(const MeshSurface& surface, std::vector<Segment> segments,
+                               const SampleSettings& settings, Executor& executor);
+
+}  // namespace stipple::lod
