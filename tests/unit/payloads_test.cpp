@@ -364,7 +364,7 @@ TEST_F(Payloads, InfoSaysWhatAStoreHas) {
         const auto streams = p.at("streams").get<std::vector<int>>();
         EXPECT_EQ(streams, p.at("kind") == "points" ? (std::vector{1, 6}) : std::vector{1});
     }
-    EXPECT_EQ(kinds, (std::set<std::string>{"points", "curves", "triangles", "patches"}));
+    EXPECT_EQ(kinds, (std::set<std::string>{"points", "curves", "triangles"}));
     EXPECT_EQ(payloads, h.chunks());
     EXPECT_EQ(records, json.at("records").get<uint64_t>());
     const auto text = test::runProgram(folder_, "info mixed.stipple --verify");
