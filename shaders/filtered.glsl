@@ -8,7 +8,8 @@ layout(set = 0, binding = kFrontsBinding, scalar) buffer FrontBlock { FilteredFr
 layout(set = 0, binding = kSumsBinding, scalar) buffer SumBlock { FilteredSums sums[]; };
 layout(set = 0, binding = kMaterialSumsBinding, scalar) buffer MaterialBlock { MaterialSums materialSums[]; };
 layout(set = 0, binding = kFilteredBinding, scalar) buffer FilteredBlock { FilteredPixel filtered[]; };
-layout(set = 0, binding = kCoverageBinding, scalar) buffer CoverageBlock { uint coverage[]; };
+layout(set = 0, binding = kCoverageBinding, scalar) buffer CoverageBlock { uint coverage[]; };  // and which kind of second surface
+layout(set = 0, binding = kSecondsBinding, scalar) buffer SecondBlock { uint hasSeconds; uint unusedSeconds; SecondSurface seconds[]; };
 
 PointRecord recordOf(uint id, out DrawNode node) {
     const DrawBlock source = blocks[id / kBlockLanes];
@@ -111,6 +112,46 @@ float absoluteDepth(float relative, float reference) {
     return frame.orthographic != 0u ? reference + relative * 512.0 / frame.focal : reference / (1.0 + relative);
 }
 
+// Adds a weight to the sums of a pixel.
+void addSums(uint at, float w, float depth, vec3 colour, vec3 n, TexelSurface surface) {
+    atomicAdd(sums[at].weight, unitsOf(w));
+    atomicAdd(sums[at].depth, unitsOf(w * relativeDepth(depth, sums[at].reference)));
+    atomicAdd(sums[at].red, unitsOf(w * colour.x));
+    atomicAdd(sums[at].green, unitsOf(w * colour.y));
+    atomicAdd(sums[at].blue, unitsOf(w * colour.z));
+    atomicAdd(sums[at].nx, unitsOf(w * n.x));
+    atomicAdd(sums[at].ny, unitsOf(w * n.y));
+    atomicAdd(sums[at].nz, unitsOf(w * n.z));
+    if (frame.hasMaterials == 0u) return;
+    atomicAdd(materialSums[at].share, unitsOf(w * surface.share));
+    atomicAdd(materialSums[at].metallic, unitsOf(w * surface.metallic));
+    atomicAdd(materialSums[at].roughness, unitsOf(w * surface.roughness));
+}
+// What a pixel shows of its sums: colours, normals and materials; its depth is the answer.
+float shownOf(uint at, FilteredSums s, out FilteredPixel p) {
+    const float over = 1.0 / float(s.weight);
+    const float ofColour = frame.perSurfel != 0u ? 1.0 / min(float(s.weight), s.unit) : over;
+    p.colour = packColour(float(s.red) * ofColour, float(s.green) * ofColour, float(s.blue) * ofColour);
+    p.normal = octEncode(vec3(s.nx, s.ny, s.nz) * over);
+    p.cover = 0u;
+    if (frame.hasMaterials != 0u) {
+        const MaterialSums m = materialSums[at];
+        p.cover = coverOfMaterial(TexelSurface(float(m.share) * over, float(m.metallic) * over, float(m.roughness) * over));
+    }
+    return absoluteDepth(float(s.depth) * over, s.reference);
+}
+// Those of a disc on its own.
+FilteredPixel ownOf(uint id, DrawNode node, PointRecord r) {
+    FilteredPixel p;
+    const vec3 c = pointColour(node, r);
+    p.colour = packColour(c.x, c.y, c.z);
+    p.normal = octEncode(towardsEye(opaqueDisc(node, r, id)));
+    p.cover = frame.hasMaterials != 0u ? coverOfMaterial(surfaceOf(id, node)) : 0u;
+    return p;
+}
+float coveredBy(int weight, float unit) { return float(weight) / unit * (frame.perSurfel != 0u ? 1.0 : gridWeight(frame.kernelSupport)); }
+uint secondKind(uint at) { return coverage[at] >> kSecondShift; }
+
 // Adds a disc to a pixel. `scale`: see scaleOf.
 void addKernel(WideDisc d, vec3 colour, TexelSurface surface, float scale, EwaKernel k, DepthRange range, ivec2 pixel) {
     if (isBeyond(k, pixel)) return;
@@ -124,17 +165,33 @@ void addKernel(WideDisc d, vec3 colour, TexelSurface surface, float scale, EwaKe
     const float support = frame.kernelSupport;
     if (!(r.rho2 < support * support)) return;
     const float w = scale * blendedAmplitude(d, k, frame.nearPlane) * kernelAt(r.rho2, kernelEnd(support)) * sums[at].unit;
-    const vec3 n = towardsEye(d);
-    atomicAdd(sums[at].weight, unitsOf(w));
-    atomicAdd(sums[at].depth, unitsOf(w * relativeDepth(r.depth, sums[at].reference)));
-    atomicAdd(sums[at].red, unitsOf(w * colour.x));
-    atomicAdd(sums[at].green, unitsOf(w * colour.y));
-    atomicAdd(sums[at].blue, unitsOf(w * colour.z));
-    atomicAdd(sums[at].nx, unitsOf(w * n.x));
-    atomicAdd(sums[at].ny, unitsOf(w * n.y));
-    atomicAdd(sums[at].nz, unitsOf(w * n.z));
-    if (frame.hasMaterials == 0u) return;
-    atomicAdd(materialSums[at].share, unitsOf(w * surface.share));
-    atomicAdd(materialSums[at].metallic, unitsOf(w * surface.metallic));
-    atomicAdd(materialSums[at].roughness, unitsOf(w * surface.roughness));
+    if (r.depth < sums[at].nearest)
+        atomicAdd(sums[at].rims, unitsOf(w));
+    else
+        addSums(at, w, r.depth, colour, towardsEye(d), surface);
+}
+// The same for the pixel's second surface. `rough`: with its side (roughSide).
+void addSecond(WideDisc d, float rough, vec3 colour, TexelSurface surface, float scale, EwaKernel k, DepthRange range, ivec2 pixel) {
+    const uint at = uint(pixel.y) * frame.width + uint(pixel.x);
+    const uint kind = secondKind(at);
+    if (kind != kSecondBefore && kind != kSecondBehind) return;
+    if (isBeyond(k, pixel)) return;
+    const RayOnDisc r = rayOnDisc(d, k, range, pixel);
+    const float support = frame.kernelSupport;
+    if (!(r.rho2 < support * support)) return;
+    const uint64_t front = fronts[at].key;
+    if (kind == kSecondBehind ? r.depth <= seconds[at].limit || r.depth > keyDepth(front)
+        : front != kNoKey     ? r.depth >= sums[at].nearest
+                              : r.depth + rough * r.along >= keyDepth(seconds[at].other)) return;
+    if (kind == kSecondBefore) atomicMin(fronts[at].first, d.id);
+    const float w = scale * blendedAmplitude(d, k, frame.nearPlane) * kernelAt(r.rho2, kernelEnd(support)) * sums[at].unit;
+    addSums(at, w, r.depth, colour, towardsEye(d), surface);
+}
+// Offers a disc to the pixel's second front.
+void offerBehind(WideDisc d, float rough, EwaKernel k, DepthRange range, ivec2 pixel) {
+    const uint at = uint(pixel.y) * frame.width + uint(pixel.x);
+    if (secondKind(at) != kSecondBehind) return;
+    const RayOnDisc r = rayOnDisc(d, k, range, pixel);
+    if (r.isMet > 0.5 && r.depth > seconds[at].limit)
+        atomicMin(fronts[at].key, visibilityKey(floatBitsToUint(r.depth + rough * r.along), drawId(0u, d.id)));
 }

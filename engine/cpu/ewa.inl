@@ -15,12 +15,16 @@ struct TileFilter {
     alignas(64) float farthest[kTilePixels];  ///< of what is opaque there; 0: nothing
     alignas(64) float along[kTilePixels];     ///< depth per length along the ray
     alignas(64) float limit[kTilePixels];     ///< imageLinear of `front`
+    alignas(64) float nearest[kTilePixels];   ///< likewise: what is before that is another surface
+    alignas(64) float rims[kTilePixels];      ///< weights of those
+    alignas(64) float beyond[kTilePixels];    ///< of a second front: depth behind which it lies
+    alignas(64) float bound[kTilePixels];     ///< of rims before other kinds: depth before which they lie, or kNoDisc
     alignas(64) uint32_t rim[kTilePixels];    ///< the first disc that counts there, or kOther; only if there are gaps
     alignas(64) float weight[kTilePixels], linear[kTilePixels];  ///< sums; linear: imageLinear of depths
     alignas(64) float red[kTilePixels], green[kTilePixels], blue[kTilePixels];
-    alignas(64) float nx[kTilePixels], ny[kTilePixels], nz[kTilePixels];  ///< only if wanted
+    alignas(64) float nx[kTilePixels], ny[kTilePixels], nz[kTilePixels];                  ///< only if wanted
     alignas(64) float share[kTilePixels], metallic[kTilePixels], roughness[kTilePixels];  ///< likewise
-    bool hasGaps;                                                         ///< pixels without a front
+    bool hasGaps;                                                                         ///< pixels without a front
 };
 
 /// What of a pixel is wanted beside its colour and depth.
@@ -32,7 +36,7 @@ struct FilterBatch {
     size_t count;
     alignas(64) uint32_t of[kSize];  ///< into DiscBatch
     alignas(64) float x[kSize], y[kSize], alongX[kSize], skew[kSize], alongY[kSize], amplitude[kSize], linear[kSize],
-        least[kSize], most[kSize], isNear[kSize];
+        least[kSize], most[kSize], isNear[kSize], rough[kSize];
     alignas(64) int firstX[kSize], lastX[kSize], firstY[kSize], lastY[kSize];
     alignas(64) float red[kSize], green[kSize], blue[kSize], nx[kSize], ny[kSize], nz[kSize];
     alignas(64) float share[kSize], metallic[kSize], roughness[kSize];
@@ -41,7 +45,7 @@ struct FilterBatch {
 
 /// Of two values that are linear on the image.
 [[gnu::always_inline]] inline bool isNearer(float a, float b) { return kOrthographic ? a < b : a > b; }
-constexpr float kFarthest = kOrthographic ? 3.0e38f : 0.0f;
+constexpr float kFarthest = kOrthographic ? 3.0e38f : 0.0f, kNearest = kOrthographic ? -3.0e38f : 3.0e38f;
 
 /// Least of the limits of blocks of 4 x 4 pixels: what is farther is hidden there.
 struct TileBlocks {
@@ -150,8 +154,9 @@ void takeSeen(const FrameConstants& f, const Tables& tables, const BlockSource* 
         b.count += b.isSeen[i];
     }
     for (size_t s = 0; s < b.count; ++s) {
-        const uint32_t id = d.id[b.of[s]];
-        b.colour[s] = colourOf(f, tables, blocks, id, colours[places[b.of[s]]]);
+        const uint32_t id = d.id[b.of[s]], colour = colours[places[b.of[s]]];
+        b.colour[s] = colourOf(f, tables, blocks, id, colour);
+        b.rough[s] = roughSide(colour >> 24) * roughness(d.radius[b.of[s]], colour);
         if (f.hasMaterials == 0u) continue;
         const TexelSurface surface = surfaceOfPoint(blocks[id / kBlockLanes].materialOf(id % kBlockLanes));
         b.share[s] = surface.share;
@@ -167,7 +172,8 @@ void takeSeen(const FrameConstants& f, const Tables& tables, const BlockSource* 
 }
 
 /// Adds the s-th that is seen to what is in front of the fronts. `isNear`: the disc is not wholly before the eye.
-template <bool isNear, Wants wants, bool hasGaps>
+/// `isBound`: only what is before TileFilter::bound by more than its surface is rough, or of its border.
+template <bool isNear, Wants wants, bool hasGaps, bool isBound>
 void addKernel(const DiscBatch& b, const FilterBatch& k, size_t s, const FrameConstants& f, float end,
                TileFilter& __restrict t) {
     const size_t i = k.of[s];
@@ -184,12 +190,16 @@ void addKernel(const DiscBatch& b, const FilterBatch& k, size_t s, const FrameCo
     constexpr bool hasMaterials = wants == Wants::materials;
     const float share = hasMaterials ? k.share[s] : 0.0f, metallic = hasMaterials ? k.metallic[s] : 0.0f,
                 roughness = hasMaterials ? k.roughness[s] : 0.0f;
+    const float rough = k.rough[s];
     const int x1 = k.lastX[i], x0 = k.firstX[i] & ~(kGroupColumns - 1);
     for (int band = k.firstY[i] >> kRowBits; band <= k.lastY[i] >> kRowBits; ++band) {
         const float dy = float(kGroupRows * band) + t.grid.top - midY;
         for (int x = x0; x <= x1; x += kGroupColumns) {
             const int first = band * kBandPitch + kGroupRows * x;
-            const float *const px = t.grid.x + kGroupRows * x, *const limit = t.limit + first;
+            const float *const px = t.grid.x + kGroupRows * x, *const limit = t.limit + first,
+                               *const nearest = t.nearest + first, *const bound = t.bound + first,
+                               *const along = t.along + first;
+            float* const rims = t.rims + first;
             float *const sumW = t.weight + first, *const sumLinear = t.linear + first, *const sumR = t.red + first,
                          *const sumG = t.green + first, *const sumB = t.blue + first, *const sumX = t.nx + first,
                          *const sumY = t.ny + first, *const sumZ = t.nz + first, *const sumShare = t.share + first,
@@ -200,8 +210,12 @@ void addKernel(const DiscBatch& b, const FilterBatch& k, size_t s, const FrameCo
                 const DiscAt at = discAt<isNear>(d, px[l] - midX, dy + t.grid.row[l]);
                 // No farther than it counts; beyond its horizon a plane is as far as it gets.
                 const float linear = min(max(at.linear, least), most);
-                const bool isThere = (at.rho2 < support2) & !isNearer(limit[l], linear);
-                const float w = isThere ? max(gaussian(at.rho2) - end, 0.0f) * scale : 0.0f;
+                bool isThere = (at.rho2 < support2) & !isNearer(limit[l], linear);
+                if (isBound)
+                    isThere = isThere & ((kOrthographic ? linear : 1.0f / linear) + rough * along[l] < bound[l]);
+                const float any = isThere ? max(gaussian(at.rho2) - end, 0.0f) * scale : 0.0f;
+                const float ofRim = isNearer(linear, nearest[l]) ? any : 0.0f, w = any - ofRim;
+                rims[l] += ofRim;
                 sumW[l] += w;
                 sumLinear[l] += w * linear;
                 sumR[l] += w * red;
@@ -239,6 +253,9 @@ void beginFilter(const FrameConstants& f, const SplatTile& tile, TileFilter& __r
         t.front[i] = t.own[i] = kNoDisc;
         t.id[i] = t.rim[i] = TileFilter::kOther;
         t.farthest[i] = 0.0f;
+        t.nearest[i] = kNearest;
+        t.beyond[i] = t.bound[i] = kNoDisc;
+        t.rims[i] = 0.0f;
         t.weight[i] = t.linear[i] = t.red[i] = t.green[i] = t.blue[i] = t.nx[i] = t.ny[i] = t.nz[i] = 0.0f;
         t.share[i] = t.metallic[i] = t.roughness[i] = 0.0f;
     }
@@ -262,29 +279,45 @@ struct TileDiscs {
     DiscBatch& batch(size_t b) const { return batches[b < kKept ? b : kKept]; }
 };
 
-/// True if some of the discs are leaves.
-bool drawFronts(const FrameConstants& f, const TileDiscs& discs, const SplatTile& tile, TileFilter& t) {
+/// The blocks of 4 x 4 pixels that the box of a disc reaches, a bit each.
+[[gnu::always_inline]] inline uint32_t blocksOf(const DiscBatch& b, size_t i) {
+    if (b.lastX[i] < b.firstX[i] || b.lastY[i] < b.firstY[i]) return 0u;
+    const uint32_t left = uint32_t(b.firstX[i]) >> 2, right = uint32_t(b.lastX[i]) >> 2,
+                   top = uint32_t(b.firstY[i]) >> 2, bottom = uint32_t(b.lastY[i]) >> 2;
+    const uint32_t columns = (2u << right) - (1u << left);
+    const uint32_t rows = 0x01010101u << 8u * top & 0x01010101u >> 8u * (3u - bottom);
+    return columns * rows;
+}
+
+/// True if some of the discs are leaves. `isSecond`: those behind TileFilter::beyond, after those before it, and of
+/// some blocks only.
+template <bool isSecond>
+bool drawFronts(const FrameConstants& f, const TileDiscs& discs, const SplatTile& tile, TileFilter& t,
+                uint32_t wanted = ~0u) {
     uint32_t flags = 0;
     for (size_t k = 0; k < discs.batchesInAll(); ++k) {
         const size_t first = k * DiscBatch::kSize, n = discs.sizeOf(k), next = first + n;
         DiscBatch& batch = discs.batch(k);
-        prefetchDiscs(discs.splats, discs.places + next, discs.count - next);
-        for (size_t i = 0; i < n; ++i) __builtin_prefetch(&discs.colours[discs.places[first + i]]);
-        prepareDiscs(f, discs.splats, discs.places + first, n, tile, batch);
+        if (!isSecond) {
+            prefetchDiscs(discs.splats, discs.places + next, discs.count - next);
+            for (size_t i = 0; i < n; ++i) __builtin_prefetch(&discs.colours[discs.places[first + i]]);
+        }
+        if (!isSecond || k >= TileDiscs::kKept) prepareDiscs(f, discs.splats, discs.places + first, n, tile, batch);
         for (size_t i = 0; i < n; ++i) {
+            if (isSecond && batch.isNear[i] < 0.5f && (blocksOf(batch, i) & wanted) == 0u) continue;
             const uint32_t colour = discs.colours[discs.places[first + i]];
             flags |= colour >> 24;
             const float shift = roughness(batch.radius[i], colour);
             if (batch.isNear[i] > 0.5f)
-                drawFront<true>(batch, i, shift, f, t);
+                drawFront<true, isSecond>(batch, i, shift, f, t);
             else
-                drawFront<false>(batch, i, shift, f, t);
+                drawFront<false, isSecond>(batch, i, shift, f, t);
         }
     }
     return (flags & kFlagLeaf) != 0u;
 }
 
-template <Wants wants, bool hasGaps>
+template <Wants wants, bool hasGaps, bool isBound>
 void addKernels(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const TileDiscs& discs,
                 const SplatTile& tile, const TileBlocks& fronts, TileFilter& t) {
     FilterBatch kernels;
@@ -300,32 +333,39 @@ void addKernels(const FrameConstants& f, const Tables& tables, const BlockSource
         if (f.perSurfel != 0u) weighSurfels(f, blocks, batch, kernels);
         for (size_t s = 0; s < kernels.count; ++s) {
             if (kernels.isNear[kernels.of[s]] > 0.5f)
-                addKernel<true, wants, hasGaps>(batch, kernels, s, f, end, t);
+                addKernel<true, wants, hasGaps, isBound>(batch, kernels, s, f, end, t);
             else
-                addKernel<false, wants, hasGaps>(batch, kernels, s, f, end, t);
+                addKernel<false, wants, hasGaps, isBound>(batch, kernels, s, f, end, t);
         }
     }
 }
 
+#include "engine/cpu/ewa_second.inl"
+
 /// The discs of a tile to what its pixels show.
 template <Wants wants>
 void filterDiscs(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const TileDiscs& discs,
-                 const SplatTile& tile, const Visibility& visibility, FilteredPixel* filtered) {
+                 const SplatTile& tile, const Visibility& visibility, FilteredPixel* filtered,
+                 const SecondPixels& seconds) {
     TileFilter t;
     beginFilter(f, tile, t);
-    const bool hasLeaves = drawFronts(f, discs, tile, t);
+    const bool hasLeaves = drawFronts<false>(f, discs, tile, t);
     TileBlocks fronts;
     closeFronts(tile, lensHere(f.focal), t, fronts);
+    if (hasLeaves) closeLeaves(blocks, t);
     if (t.hasGaps)
-        addKernels<wants, true>(f, tables, blocks, discs, tile, fronts, t);
+        addKernels<wants, true, false>(f, tables, blocks, discs, tile, fronts, t);
     else
-        addKernels<wants, false>(f, tables, blocks, discs, tile, fronts, t);
-    showTile<wants>(f, tables, blocks, tile, hasLeaves, t, visibility, filtered);
+        addKernels<wants, false, false>(f, tables, blocks, discs, tile, fronts, t);
+    TileOthers others;
+    showTile<wants>(f, tables, blocks, tile, hasLeaves, t, visibility, filtered, others);
+    if (seconds.pixels != nullptr)
+        showSeconds<wants>(f, tables, blocks, discs, tile, t, others, visibility, filtered, seconds);
 }
 
 void filterTile(const FrameConstants& frame, const Tables& tables, const BlockSource* blocks, const PlacedSplat* splats,
                 const uint32_t* colours, const uint32_t* places, size_t count, const SplatTile& tile, bool wantsNormals,
-                const Visibility& visibility, FilteredPixel* filtered) {
+                const Visibility& visibility, FilteredPixel* filtered, const SecondPixels& seconds) {
     const FrameConstants f = frame;
     static thread_local DiscBatch batches[TileDiscs::kKept + 1];
     const TileDiscs discs{splats, colours, places, count, batches};
@@ -333,7 +373,7 @@ void filterTile(const FrameConstants& frame, const Tables& tables, const BlockSo
     const auto filter = !wantsNormals         ? filterDiscs<Wants::nothing>
                         : f.hasMaterials == 0 ? filterDiscs<Wants::normals>
                                               : filterDiscs<Wants::materials>;
-    filter(f, tables, blocks, discs, tile, visibility, filtered);
+    filter(f, tables, blocks, discs, tile, visibility, filtered, seconds);
     for (size_t y = 0; y < tile.height; ++y) {
         const size_t first = (tile.y0 + y) * f.width + tile.x0;
         for (size_t r = first >> Visibility::kRunBits; r <= (first + tile.width - 1) >> Visibility::kRunBits; ++r)

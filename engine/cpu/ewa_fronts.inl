@@ -15,8 +15,8 @@ float missedDepth(const FrameConstants& f, const DiscBatch& b, size_t i) {
 }
 
 /// The front of each pixel: of the opaque parts of discs, moved back by `shift` along the ray. Discs come in the order
-/// of their ids: of what is equally deep the first stays.
-template <bool isNear>
+/// of their ids: of what is equally deep the first stays. `isSecond`: of those behind TileFilter::beyond.
+template <bool isNear, bool isSecond>
 void drawFront(const DiscBatch& b, size_t i, float shift, const FrameConstants& f, TileFilter& __restrict t) {
     const uint32_t id = b.id[i];
     const DiscForm d = formOf(b, i, f);
@@ -28,13 +28,14 @@ void drawFront(const DiscBatch& b, size_t i, float shift, const FrameConstants& 
             const int first = band * kBandPitch + kGroupRows * x;
             float *const front = t.front + first, *const own = t.own + first, *const farthest = t.farthest + first;
             uint32_t* const owner = t.id + first;
-            const float *const px = t.grid.x + kGroupRows * x, *const along = t.along + first;
+            const float *const px = t.grid.x + kGroupRows * x, *const along = t.along + first,
+                               *const beyond = t.beyond + first;
 #pragma GCC ivdep
             for (int l = 0; l < kGroup; ++l) {
                 const DiscAt at = discAt < isNear || kOrthographic > (d, px[l] - midX, dy + t.grid.row[l]);
                 const float linear = min(max(at.linear, least), most);
                 const float depth = kOrthographic ? linear : 1.0f / linear;
-                const bool isHit = at.rho2 <= 1.0f;
+                const bool isHit = isSecond ? (at.rho2 <= 1.0f) & (depth > beyond[l]) : at.rho2 <= 1.0f;
                 const float moved = depth + shift * along[l];
                 const bool isFront = isHit & (moved < front[l]);
                 front[l] = isFront ? moved : front[l];
@@ -44,7 +45,7 @@ void drawFront(const DiscBatch& b, size_t i, float shift, const FrameConstants& 
             }
         }
     }
-    if (b.missed[i] < 0) return;
+    if (isSecond || b.missed[i] < 0) return;
     const auto at = size_t(b.missed[i]);
     const float depth = missedDepth(f, b, i), moved = depth + shift * t.along[at];
     if (!(moved < t.front[at])) return;
@@ -53,10 +54,8 @@ void drawFront(const DiscBatch& b, size_t i, float shift, const FrameConstants& 
     t.own[at] = depth;
 }
 
-/// Where fronts end, by pixels and by blocks.
-void closeFronts(const SplatTile& tile, const Lens& lens, TileFilter& __restrict t, TileBlocks& __restrict blocks) {
-    for (size_t i = 0; i < kTilePixels; ++i)
-        t.limit[i] = t.id[i] != TileFilter::kOther ? imageLinear(lens, t.front[i]) : kFarthest;
+/// The farthest of the limits of each block.
+void closeBlocks(const TileFilter& __restrict t, TileBlocks& __restrict blocks) {
     static_assert(TileBlocks::kEdge == kGroupRows && TileBlocks::kEdge == kGroupColumns);
     for (int b = 0; b < TileBlocks::kColumns * TileBlocks::kRows; ++b) {
         const float* const from = t.limit + b * kGroup;
@@ -64,6 +63,19 @@ void closeFronts(const SplatTile& tile, const Lens& lens, TileFilter& __restrict
         for (int i = 1; i < kGroup; ++i) limit = isNearer(limit, from[i]) ? from[i] : limit;
         blocks.limit[b] = limit;
     }
+}
+
+/// Where fronts end, by pixels and by blocks, and what is before them.
+void closeFronts(const SplatTile& tile, const Lens& lens, TileFilter& __restrict t, TileBlocks& __restrict blocks) {
+#pragma GCC ivdep
+    for (size_t i = 0; i < kTilePixels; ++i) {
+        const bool hasFront = t.id[i] != TileFilter::kOther;
+        t.limit[i] = hasFront ? imageLinear(lens, t.front[i]) : kFarthest;
+        const float nearest = t.own[i] - (t.front[i] - t.own[i]);  // as far before the front as it ends behind it
+        const bool isThere = hasFront & (kOrthographic | (nearest > 0.0f));
+        t.nearest[i] = isThere ? imageLinear(lens, isThere ? nearest : 1.0f) : kNearest;
+    }
+    closeBlocks(t, blocks);
     bool hasGaps = false;
     if (tile.width * tile.height == kTilePixels)
         for (size_t i = 0; i < kTilePixels; ++i) hasGaps = hasGaps | (t.id[i] == TileFilter::kOther);
@@ -71,4 +83,11 @@ void closeFronts(const SplatTile& tile, const Lens& lens, TileFilter& __restrict
         for (uint32_t x = 0; x < tile.width; ++x)
             hasGaps = hasGaps | (t.id[tileEntry(int(x), int(y))] == TileFilter::kOther);
     t.hasGaps = hasGaps;
+}
+
+/// Leaves are no surface: nothing before one is told from it.
+void closeLeaves(const BlockSource* blocks, TileFilter& t) {
+    for (size_t i = 0; i < kTilePixels; ++i)
+        if (t.id[i] != TileFilter::kOther && (recordFlags(recordOf(blocks, t.id[i])) & kFlagLeaf) != 0u)
+            t.nearest[i] = kNearest;
 }

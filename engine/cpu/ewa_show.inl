@@ -14,6 +14,13 @@ void showOwn(const FrameConstants& f, const Tables& tables, const BlockSource* b
     pixel.cover = (pixel.cover & (kFilteredMaterial - 1u)) | coverOfMaterial(surfaceOfPoint(material));
 }
 
+/// Other kinds at the pixels of a tile, before discs were drawn.
+struct TileOthers {
+    bool hasAny;
+    alignas(64) float depth[kTilePixels];  ///< kNoDisc: none; only if there are any
+    uint64_t keys[kTilePixels];
+};
+
 /// What a band of a tile shows of what was added up there; nothing where it is less than half a code of
 /// coverage.
 struct ShownBand {
@@ -30,7 +37,7 @@ void showBand(float covered, float mostDivided, int band, const TileFilter& __re
     for (size_t k = 0; k < size_t(kBandPitch); ++k) {
         const size_t i = first + k;
         const float weight = t.weight[i], front = t.front[i], exact = s.exact[k];
-        const uint32_t code = uint32_t(int(min(weight * covered, 1.0f) * 255.0f + 0.5f));
+        const uint32_t code = uint32_t(int(min((weight + t.rims[i]) * covered, 1.0f) * 255.0f + 0.5f));
         // Other kinds win within what the surface may be rough; rims do not show before them.
         const uint32_t isRim = exact < kNoDisc || t.rim[i] == TileFilter::kOther ? 0u : (code + 255u) >> 8;
         const uint32_t isBefore = front < exact ? 1u : 0u;
@@ -52,7 +59,8 @@ void showBand(float covered, float mostDivided, int band, const TileFilter& __re
 }
 template <Wants wants>
 void showTile(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const SplatTile& tile,
-              bool hasLeaves, const TileFilter& t, const Visibility& visibility, FilteredPixel* filtered) {
+              bool hasLeaves, const TileFilter& t, const Visibility& visibility, FilteredPixel* filtered,
+              TileOthers& others) {
     // Weights of surfels add up to what is covered; where that is all of a pixel, to one.
     const bool perSurfel = f.perSurfel != 0u;
     const float covered = perSurfel ? 1.0f : gridWeight(f.kernelSupport), mostDivided = perSurfel ? 1.0f : 3.0e38f;
@@ -60,13 +68,17 @@ void showTile(const FrameConstants& f, const Tables& tables, const BlockSource* 
     for (float& exact : s.exact) exact = kNoDisc;
     // (Keys of points come from here; other kinds were drawn before.)
     const bool hasOthers = f.firstBlock.of[kKindCurves] != f.firstBlock.of[kKindDiscs];
+    others.hasAny = hasOthers;
+    for (float& depth : others.depth) depth = kNoDisc;
     for (uint32_t y = 0; y < tile.height; y += uint32_t(kGroupRows)) {
         const uint32_t rows = tile.height - y < uint32_t(kGroupRows) ? tile.height - y : uint32_t(kGroupRows);
         const size_t first = size_t{tile.y0 + y} * f.width + tile.x0;
         for (uint32_t r = 0; r < rows && hasOthers; ++r)
             for (size_t x = 0; x < tile.width; ++x) {
                 const uint64_t key = visibility.keys[first + r * f.width + x];
-                s.exact[size_t(kGroupRows) * x + r] = key != kNoKey ? keyDepth(key) : kNoDisc;
+                const size_t at = size_t(kGroupRows) * x + r, of = size_t(kBandPitch) * (y / uint32_t(kGroupRows)) + at;
+                s.exact[at] = others.depth[of] = key != kNoKey ? keyDepth(key) : kNoDisc;
+                others.keys[of] = key;
             }
         showBand<wants>(covered, mostDivided, int(y) / kGroupRows, t, s);
         for (uint32_t r = 0; r < rows; ++r)

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdlib>
+#include <memory>
 #include <unordered_map>
 #include <vector>
 
@@ -80,6 +82,9 @@ struct Frame {
     HugeBuffer<shared::FilteredPixel> filtered;
     HugeBuffer<uint8_t> coverage;
     size_t filteredPixels = 0;
+    // Second surfaces there, written where there are some only; of which kind they are, and runs that have any.
+    std::unique_ptr<SecondPixel, void (*)(void*)> secondPixels{nullptr, std::free};
+    std::vector<uint8_t> secondKinds, secondRuns;
 
     Pyramid pyramid;  ///< Plane::texels and Plane::coarse
     // Of the pixels of triangles, beside their texels.
@@ -90,6 +95,10 @@ struct Frame {
 
     /// Are there blended discs?
     bool isBlended() const { return mode->blendsSplats && !blocks.empty(); }
+    SecondPixels seconds() {
+        return isBlended() ? SecondPixels{secondPixels.get(), secondKinds.data(), secondRuns.data()}
+                           : SecondPixels{nullptr, nullptr, nullptr};
+    }
     Visibility visible() { return {visibility.data(), runs.data()}; }
     /// May any of these pixels show something?
     bool isSeen(size_t first, uint32_t n) const {

@@ -188,6 +188,32 @@ struct WinningPixels {
     alignas(64) float depth[kTile];
 };
 
+/// A second surface at a pixel that shows blended discs, or that they reach into (shaders/shared/ewa.h).
+struct SecondPixel {
+    shared::FilteredPixel shown;
+    float depth;   ///< linear
+    float limit;   ///< depth behind which a pixel beside this one shows that the front ends here
+    float share;   ///< of the pixel, in its place
+    uint64_t key;  ///< kSecondFront: of what is behind
+};
+/// Those of an image.
+struct SecondPixels {
+    SecondPixel* pixels;  ///< null: there are none
+    uint8_t* kinds;       ///< kSecond... of each
+    uint8_t* runs;        ///< as Visibility::runs
+    const SecondPixel* at(size_t pixel) const {
+        return pixels != nullptr && kinds[pixel] != shared::kSecondNone ? pixels + pixel : nullptr;
+    }
+    /// May any of these have one?
+    bool mayHave(size_t first, size_t n) const {
+        bool any = false;
+        for (size_t r = first >> Visibility::kRunBits;
+             pixels != nullptr && r <= (first + n - 1) >> Visibility::kRunBits; ++r)
+            any = any || __atomic_load_n(&runs[r], __ATOMIC_RELAXED) != 0;
+        return any;
+    }
+};
+
 struct Frame;
 /// Texels of pixels of one kind; none of its row has anything yet.
 using ResolveKind = void (*)(const Frame& frame, const WinningPixels& pixels, uint32_t x0, uint32_t y, TexelRow& row);
@@ -204,8 +230,9 @@ struct ResolveInput {
     size_t discCount;
     bool exactPoints;  ///< points are what their pixels show, at the depth of the visibility buffer
     const shared::FilteredPixel* filtered;  ///< of the image: what they show there; null: that of their records
-    const Frame* frame;                     ///< for ...
-    const ResolveKind* ofKind;              ///< ... kinds that are resolved without kernels; null: a kernel does
+    SecondPixels seconds;
+    const Frame* frame;         ///< for ...
+    const ResolveKind* ofKind;  ///< ... kinds that are resolved without kernels; null: a kernel does
 };
 
 struct LightInput {
@@ -312,7 +339,10 @@ struct Kernels {
     void (*filterTile)(const shared::FrameConstants& f, const Tables& tables, const BlockSource* blocks,
                        const PlacedSplat* splats, const uint32_t* colours, const uint32_t* places, size_t count,
                        const SplatTile& tile, bool wantsNormals, const Visibility& visibility,
-                       shared::FilteredPixel* filtered);
+                       shared::FilteredPixel* filtered, const SecondPixels& seconds);
+    /// Does one of nine pixels about (x, y) show nothing opaque, or what is deeper than `limit`?
+    bool (*isAtJump)(const shared::FrameConstants& f, const uint64_t* keys, const shared::FilteredPixel* filtered,
+                     uint32_t x, uint32_t y, float limit);
     /// 1 for each pixel of a row that no opaque surface is seen at.
     void (*openRow)(const shared::FrameConstants& f, const uint64_t* keys, const shared::FilteredPixel* filtered,
                     uint32_t n, uint8_t* open);

@@ -376,6 +376,7 @@ const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
                               placeSplats,
                               splatTile,
                               filterTile,
+                              isAtJump,
                               openRow};
 
 }  // namespace stipple::cpu

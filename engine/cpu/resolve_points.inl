@@ -182,8 +182,10 @@ struct OtherPixels {
 }
 
 /// Empties the row's entries of the visibility buffer. `filtered`: of the row, or null: its points are their records.
+/// `seconds`: of the row; before some of its points other kinds are shown.
 void gatherRow(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const FilteredPixel* filtered,
-               uint64_t* visibility, uint32_t n, Gathered& g, OtherPixels& others, bool& any, bool& anyTurned) {
+               const SecondPixels& seconds, uint64_t* visibility, uint32_t n, Gathered& g, OtherPixels& others,
+               bool& any, bool& anyTurned) {
     constexpr size_t kPrefetch = 12;  // pixels ahead: records lie anywhere in memory
     const BlockRanges firstBlock = f.firstBlock;
     for (WinningPixels& p : others.of) p.count = 0;
@@ -193,8 +195,9 @@ void gatherRow(const FrameConstants& f, const Tables& tables, const BlockSource*
             const uint64_t ahead = visibility[i + kPrefetch];
             __builtin_prefetch(blocks[keyBlock(ahead)].records + keyLane(ahead));
         }
-        const uint64_t key = visibility[i];
+        uint64_t key = visibility[i];
         if (key != kNoKey) visibility[i] = kNoKey;
+        if (seconds.pixels != nullptr && seconds.kinds[i] == kSecondFront) key = seconds.pixels[i].key;
         if (isPointKey(key, firstBlock)) {
             any = true;
             if (filtered != nullptr)
@@ -234,7 +237,11 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
     OtherPixels others;
     bool any = false, anyTurned = false;
     const FilteredPixel* const filtered = in.filtered != nullptr ? in.filtered + size_t{y} * f.width + x0 : nullptr;
-    gatherRow(f, tables, in.blocks, filtered, visibility, n, g, others, any, anyTurned);
+    const size_t first = size_t{y} * f.width + x0;
+    SecondPixels seconds = in.seconds;
+    seconds.pixels = in.seconds.mayHave(first, n) ? in.seconds.pixels + first : nullptr;
+    seconds.kinds += seconds.pixels != nullptr ? first : 0;
+    gatherRow(f, tables, in.blocks, filtered, seconds, visibility, n, g, others, any, anyTurned);
     if (surface != nullptr)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) surface[i] = 0;

@@ -56,6 +56,7 @@ static_assert(isLaidOut(shared::kFrontsBinding, sizeof(shared::FilteredFront)));
 static_assert(isLaidOut(shared::kSumsBinding, sizeof(shared::FilteredSums)));
 static_assert(isLaidOut(shared::kFilteredBinding, sizeof(shared::FilteredPixel)));
 static_assert(isLaidOut(shared::kMaterialSumsBinding, sizeof(shared::MaterialSums)));
+static_assert(isLaidOut(shared::kSecondsBinding, sizeof(shared::SecondSurface)));
 static_assert(isLaidOut(shared::kCoverageBinding, sizeof(uint32_t)));
 static_assert(isLaidOut(shared::kSurfaceBinding, sizeof(shared::SurfaceWords)));
 

@@ -114,7 +114,7 @@ Sample blend(std::vector<Contribution>& list, double& back, const lod::View& vie
 }
 
 Level pullLevel(const Level& fine, double childSize, const lod::View& view, bool containedOnly) {
-    Level coarse{(fine.width + 1) / 2, (fine.height + 1) / 2, {}};
+    Level coarse{(fine.width + 1) / 2, (fine.height + 1) / 2, {}, {}};
     coarse.samples.resize(static_cast<size_t>(coarse.width) * static_cast<size_t>(coarse.height));
     for (int y = 0; y < coarse.height; ++y)
         for (int x = 0; x < coarse.width; ++x) {
@@ -225,7 +225,7 @@ class ReferenceBackend final : public render::DrawsAtOnce {
     }
     Level projectAll(const render::DrawList& draws, const render::Reconstruction& mode) {
         const lod::View& v = draws.view;
-        Level level{static_cast<int>(v.width), static_cast<int>(v.height), {}};
+        Level level{static_cast<int>(v.width), static_cast<int>(v.height), {}, {}};
         level.samples.resize(size_t{v.width} * v.height);
         if (mode.blendsSplats && !variation_.showDiscs) return level;
         std::vector<PlacedDisc> discs = placedDiscs(draws, chunks_);
@@ -316,37 +316,27 @@ class ReferenceBackend final : public render::DrawsAtOnce {
         executor_.parallelFor(pixels, 4096, [&](size_t begin, size_t end) {
             for (size_t i = begin; i < end; ++i) {
                 const Sample& s = level.samples[i];
-                dvec3 colour(f.background);
+                Seen seen{dvec3(f.background), dvec3(0), 0};
                 if (s.valid) {
-                    const dvec2 p(double(i % v.width) + 0.5, double(i / v.width) + 0.5);
-                    // A disc's normal is that at its centre, a tube's that at the pixel.
-                    Sample at = s;
-                    if (s.isRound) at.centre = p;
-                    const dvec3 n = discNormal(at, s.perp, std::sqrt(std::max(0.0, 1 - glm::dot(s.perp, s.perp))), v);
-                    const double depth = depthAt(s, p, v);
-                    colour = s.colour;
-                    if (f.debugView == shared::kDebugHoles) {
-                        const Sample& o = own.samples[i];
-                        colour = !o.valid             ? dvec3(1, 0.3, 0.02)
-                                 : o.depth != s.depth ? dvec3(0.02, 0.1, 0.9)
-                                                      : dvec3(0.2);
-                    } else if (f.debugView == shared::kDebugNormals) {
-                        colour = 0.5 + 0.5 * dvec3(n.x, -n.y, -n.z);
-                    } else if (f.debugView == shared::kDebugNone &&
-                               (s.isTriangle ||
-                                (isLit(f) && (s.hasMaterial() || !draws.lights.empty() || draws.environment)))) {
-                        colour = shadeTriangle(s, n, viewRay(v, p).at(depth), draws);
-                    } else if (isLit(f) && f.debugView == shared::kDebugNone) {
-                        colour *= lightOn(n, f, s.letsLightThrough(pixelsAt(v, s.depth)));
+                    seen = seenOf(draws, own.samples[i], s, i);
+                    const auto second = level.seconds.find(i);
+                    if (second != level.seconds.end()) {
+                        const Sample& beside = second->second.sample;
+                        const Seen other = seenOf(draws, beside, beside, i);
+                        const dvec3 mixed = glm::mix(seen.colour, other.colour, second->second.share);
+                        if (second->second.isFront) seen = other;
+                        const bool isOfGeometry =
+                            f.debugView == shared::kDebugHoles || f.debugView == shared::kDebugNormals;
+                        if (!isOfGeometry) seen.colour = mixed;
                     }
                     if (wantAll) {
-                        image.depth[i] = static_cast<float>(depth);
-                        const dvec3 world = v.right * n.x + v.down * n.y + v.forward * n.z;
+                        image.depth[i] = static_cast<float>(seen.depth);
+                        const dvec3 n = seen.normal, world = v.right * n.x + v.down * n.y + v.forward * n.z;
                         for (int c = 0; c < 3; ++c)
                             image.normal[i * 3 + static_cast<size_t>(c)] = static_cast<float>(world[c]);
                     }
                 }
-                colour = glm::mix(dvec3(f.background), colour, s.coverage);
+                const dvec3 colour = glm::mix(dvec3(f.background), seen.colour, s.coverage);
                 if (wantAll)
                     for (int c = 0; c < 3; ++c)
                         image.linear[i * 3 + static_cast<size_t>(c)] = static_cast<float>(colour[c]);
@@ -354,6 +344,34 @@ class ReferenceBackend final : public render::DrawsAtOnce {
                                 (s.valid ? static_cast<uint32_t>(std::lround(255 * s.coverage)) << 24 : 0u);
             }
         });
+    }
+
+    struct Seen {
+        dvec3 colour, normal;
+        double depth;
+    };
+    /// What a surface at pixel `i` sends to the eye. `o`: before reconstruction.
+    Seen seenOf(const render::DrawList& draws, const Sample& o, const Sample& s, size_t i) const {
+        const lod::View& v = draws.view;
+        const shared::FrameConstants& f = draws.frame;
+        const dvec2 p(double(i % v.width) + 0.5, double(i / v.width) + 0.5);
+        // A disc's normal is that at its centre, a tube's that at the pixel.
+        Sample at = s;
+        if (s.isRound) at.centre = p;
+        const dvec3 n = discNormal(at, s.perp, std::sqrt(std::max(0.0, 1 - glm::dot(s.perp, s.perp))), v);
+        const double depth = depthAt(s, p, v);
+        dvec3 colour = s.colour;
+        if (f.debugView == shared::kDebugHoles) {
+            colour = !o.valid ? dvec3(1, 0.3, 0.02) : o.depth != s.depth ? dvec3(0.02, 0.1, 0.9) : dvec3(0.2);
+        } else if (f.debugView == shared::kDebugNormals) {
+            colour = 0.5 + 0.5 * dvec3(n.x, -n.y, -n.z);
+        } else if (f.debugView == shared::kDebugNone &&
+                   (s.isTriangle || (isLit(f) && (s.hasMaterial() || !draws.lights.empty() || draws.environment)))) {
+            colour = shadeTriangle(s, n, viewRay(v, p).at(depth), draws);
+        } else if (isLit(f) && f.debugView == shared::kDebugNone) {
+            colour *= lightOn(n, f, s.letsLightThrough(pixelsAt(v, s.depth)));
+        }
+        return {colour, n, depth};
     }
 
     bool isLit(const shared::FrameConstants& f) const {

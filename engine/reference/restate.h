@@ -45,9 +45,17 @@ inline int pixelIn(double coordinate, int most) {
 /// Thickness of leaves, over their radius.
 constexpr double kLeafThickness = 1.0 / 16;
 
+/// A second surface at a pixel: it is lit on its own, and has its share of the pixel.
+struct SecondSample {
+    Sample sample;
+    double share = 0;
+    bool isFront = false;  ///< depth and normal of the pixel are its own
+};
+
 struct Level {
     int width = 0, height = 0;
     std::vector<Sample> samples;
+    std::unordered_map<size_t, SecondSample> seconds;  ///< by pixel
     const Sample* at(int x, int y) const {
         return x < 0 || y < 0 || x >= width || y >= height
                    ? nullptr

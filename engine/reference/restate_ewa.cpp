@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "engine/reference/restate_discs.h"
+#include "shaders/shared/border.h"
 #include "shaders/shared/surface.h"
 
 namespace stipple::reference {
@@ -54,15 +55,27 @@ Ellipse imageOfCircle(const lod::View& view, const PlacedDisc& d, double radius,
     return e;
 }
 
-/// What a pixel has gathered.
-struct Gathered {
-    double limit = kNone;  ///< what lies beyond is no part of the surface in front
-    const PlacedDisc* front = nullptr;
-    double frontDepth = 0;
-    const PlacedDisc* first = nullptr;  ///< of those whose kernels reach it
+/// Kernels of one surface at a pixel.
+struct Sums {
+    const PlacedDisc* first = nullptr;  ///< of those that reach it
     double weight = 0, linear = 0;
     dvec3 colour{0}, normal{0};
     double share = 0, metallic = 0, roughness = 0;  ///< of materials
+};
+/// A surface at a pixel that is opaque there.
+struct Front {
+    double limit = kNone;  ///< what lies beyond is no part of it
+    const PlacedDisc* disc = nullptr;
+    double depth = 0;
+    bool isSurface() const { return disc != nullptr && (disc->flags & shared::kFlagLeaf) == 0; }
+    /// What lies before that is no part of it, either. (Leaves are no surface.)
+    double begin() const { return isSurface() ? depth - (limit - depth) : -kNone; }
+};
+/// What a pixel has gathered.
+struct Gathered {
+    Front front, second;  ///< the second begins behind the first
+    Sums ofFront, before, behind;
+    Sums beforeOther;  ///< before another kind's surface
     bool hasBehind = false;
 };
 
@@ -89,9 +102,12 @@ class Filter {
     }
 
     void run() {
+        others_ = level_.samples;
         for (const PlacedDisc& d : discs_) findFronts(d);
+        for (const PlacedDisc& d : discs_) findSeconds(d);
         for (const PlacedDisc& d : discs_) add(d);
         show();
+        showSeconds();
     }
 
   private:
@@ -148,12 +164,20 @@ class Filter {
     }
 
     void offerFront(int x, int y, const PlacedDisc& d, const ViewRay& ray, double depth) {
-        Gathered& p = pixel(x, y);
+        offer(pixel(x, y).front, d, ray, depth);
+    }
+    void offer(Front& front, const PlacedDisc& d, const ViewRay& ray, double depth) const {
         const double limit = depth + (variation_.movesDiscsAway ? 0 : roughness(d) / glm::length(ray.direction));
-        if (limit >= p.limit) return;
-        p.limit = limit;
-        p.front = &d;
-        p.frontDepth = depth;
+        if (limit < front.limit) front = {limit, &d, depth};
+    }
+    void findSeconds(const PlacedDisc& d) {
+        forPixels(d, d.radius, 0, [&](int x, int y, const ViewRay& ray) {
+            Gathered& p = pixel(x, y);
+            const double depth = depthOnPlane(d, ray);
+            if (!isMet(d, ray, depth) || !(depth > p.front.limit)) return;
+            p.hasBehind = true;
+            offer(p.second, d, ray, depth);
+        });
     }
     void findFronts(const PlacedDisc& disc) {
         PlacedDisc d = disc;
@@ -196,33 +220,53 @@ class Filter {
             double rho2 = glm::dot(off, inverse * off);
             if (isNear) rho2 = plane > view_.nearPlane ? glm::dot(onPlane, onPlane) / (sigma * sigma) : kNone;
             const double depth = depthWithin(range, d, ray);
-            Gathered& p = pixel(x, y);
-            if (depth > p.limit) {
-                p.hasBehind = p.hasBehind || isMet(d, ray, plane);
-                return;
-            }
             if (!(rho2 < support_ * support_)) return;
             const double w = scale * amplitude * (std::exp(-0.5 * rho2) - end) / (1 - end);
             if (!(w > 0)) return;
-            if (!p.first) p.first = &d;
-            p.weight += w;
-            p.linear += view_.isOrthographic ? w * depth : w / depth;
-            p.colour += w * d.colour;
-            if (d.material) {
-                p.share += w;
-                p.metallic += w * double{d.material->metallic};
-                p.roughness += w * double{d.material->roughness};
-            }
-            p.normal += w * (glm::dot(d.normal, sightOf(view_, d.centre)) > 0 ? -d.normal : d.normal);
+            Gathered& p = pixel(x, y);
+            if (depth < p.front.begin())
+                addTo(p.before, d, w, depth);
+            else if (depth <= p.front.limit)
+                addTo(p.ofFront, d, w, depth);
+            else if (depth <= p.second.limit)
+                addTo(p.behind, d, w, depth);
+            // Those of its border are part of what they border on.
+            const double margin = roughness(d) / glm::length(ray.direction);
+            const bool isBorder = (d.flags & shared::kFlagBorder) != 0;
+            if (depth + (isBorder ? -margin : margin) < depthOfOther(index(x, y))) addTo(p.beforeOther, d, w, depth);
         });
+    }
+    void addTo(Sums& p, const PlacedDisc& d, double w, double depth) const {
+        if (!p.first) p.first = &d;
+        p.weight += w;
+        p.linear += view_.isOrthographic ? w * depth : w / depth;
+        p.colour += w * d.colour;
+        if (d.material) {
+            p.share += w;
+            p.metallic += w * double{d.material->metallic};
+            p.roughness += w * double{d.material->roughness};
+        }
+        p.normal += w * (glm::dot(d.normal, sightOf(view_, d.centre)) > 0 ? -d.normal : d.normal);
+    }
+    /// Of another kind's surface at a pixel.
+    double depthOfOther(size_t i) const {
+        const Sample& s = others_[i];
+        return !s.valid ? kNone : s.isTriangle ? s.depth : s.key;
     }
 
     /// Has the pixel, or one of its eight neighbours, nothing opaque?
     bool isAtGap(int x, int y) {
         for (int j = y - 1; j <= y + 1; ++j)
             for (int i = x - 1; i <= x + 1; ++i)
-                if (isOnImage(i, j) && !exact_[index(i, j)] && pixel(i, j).front == nullptr) return true;
+                if (isOnImage(i, j) && !others_[index(i, j)].valid && pixel(i, j).front.disc == nullptr) return true;
         return false;
+    }
+    /// Or is one of them deeper than that?
+    bool isAtJump(int x, int y, double limit) {
+        for (int j = y - 1; j <= y + 1; ++j)
+            for (int i = x - 1; i <= x + 1; ++i)
+                if (isOnImage(i, j) && shown_[index(i, j)] > limit) return true;
+        return isAtGap(x, y);
     }
     size_t index(int x, int y) const {
         return static_cast<size_t>(y) * static_cast<size_t>(level_.width) + static_cast<size_t>(x);
@@ -239,36 +283,70 @@ class Filter {
         return isPerSurfel_ ? std::min(weight, 1.0) : weight;
     }
 
+    double grid() const { return isPerSurfel_ ? 1 : onGrid(support_); }
+    double coveredBy(const Sums& sums) const { return std::min(1.0, sums.weight / grid()); }
+    /// Does the front stand before what other kinds have there?
+    bool wins(size_t i) const { return pixels_[i].front.disc && pixels_[i].front.limit < depthOfOther(i); }
+
+    Sample shownBy(int x, int y, const Sums& p, const Front& front) const {
+        const PlacedDisc& d = front.disc ? *front.disc : *p.first;
+        const dvec2 at(x + 0.5, y + 0.5);
+        const bool isLeaf = (d.flags & shared::kFlagLeaf) != 0;
+        if (!(p.weight > 1.0 / 1024)) {
+            const dvec3 n = glm::dot(d.normal, sightOf(view_, d.centre)) > 0 ? -d.normal : d.normal;
+            Sample s = shownPixel(view_, at, front.depth, n, d.colour, isLeaf);
+            setMaterial(s, d.material);
+            return s;
+        }
+        Sample s = shownPixel(view_, at, view_.isOrthographic ? p.linear / p.weight : p.weight / p.linear,
+                              glm::normalize(p.normal), p.colour / dividedBy(p.weight, grid()), isLeaf);
+        s.materialShare = p.share / p.weight;
+        if (p.share > 0) {
+            s.metallic = p.metallic / p.share;
+            s.roughness = p.roughness / p.share;
+        }
+        return s;
+    }
+
     void show() {
-        const double grid = isPerSurfel_ ? 1 : onGrid(support_);
-        exact_.resize(pixels_.size());
-        for (size_t i = 0; i < pixels_.size(); ++i) exact_[i] = level_.samples[i].valid;
+        shown_.assign(pixels_.size(), kNone);
         for (int y = 0; y < level_.height; ++y)
             for (int x = 0; x < level_.width; ++x) {
-                const Gathered& p = pixel(x, y);
+                const size_t i = index(x, y);
+                const Gathered& p = pixels_[i];
+                const bool isOther = others_[i].valid, isFront = wins(i);
+                shown_[i] = depthOfOther(i);
+                const double covered = std::min(1.0, (p.ofFront.weight + p.before.weight) / grid());
+                if (!isFront && (p.front.disc || isOther || !p.ofFront.first || covered < 0.5 / 255)) continue;
                 Sample& s = level_.ref(x, y);
-                const double covered = std::min(1.0, p.weight / grid);
-                const bool wins = p.front ? !s.valid || p.limit < (s.isTriangle ? s.depth : s.key)
-                                          : !s.valid && p.first && covered >= 0.5 / 255;
-                if (!wins) continue;
-                const PlacedDisc& d = p.front ? *p.front : *p.first;
-                const bool isBefore = p.front && (p.hasBehind || s.valid);
-                const dvec2 at(x + 0.5, y + 0.5);
-                if (p.weight > 1.0 / 1024) {
-                    s = shownPixel(view_, at, view_.isOrthographic ? p.linear / p.weight : p.weight / p.linear,
-                                   glm::normalize(p.normal), p.colour / dividedBy(p.weight, grid),
-                                   (d.flags & shared::kFlagLeaf) != 0);
-                    s.materialShare = p.share / p.weight;
-                    if (p.share > 0) {
-                        s.metallic = p.metallic / p.share;
-                        s.roughness = p.roughness / p.share;
-                    }
-                } else {
-                    const dvec3 n = glm::dot(d.normal, sightOf(view_, d.centre)) > 0 ? -d.normal : d.normal;
-                    s = shownPixel(view_, at, p.frontDepth, n, d.colour, (d.flags & shared::kFlagLeaf) != 0);
-                    setMaterial(s, d.material);
-                }
+                s = shownBy(x, y, p.ofFront, p.front);
+                shown_[i] = s.depth;
+                const bool isBefore = isFront && (p.hasBehind || isOther);
                 if (!isBefore && isAtGap(x, y)) s.coverage = covered;
+            }
+    }
+
+    /// Where fronts end: what is behind them; before what is shown: rims that are not opaque.
+    void showSeconds() {
+        for (int y = 0; y < level_.height; ++y)
+            for (int x = 0; x < level_.width; ++x) {
+                const size_t i = index(x, y);
+                const Gathered& p = pixels_[i];
+                const bool isFront = wins(i);
+                if (!isFront && !others_[i].valid) continue;
+                const Sums& before = isFront ? p.before : p.beforeOther;
+                const double covered = coveredBy(p.ofFront), rims = coveredBy(before);
+                // Whichever is more of the pixel: there is one.
+                const bool isOpen =
+                    isFront && (p.hasBehind || others_[i].valid) && 1 - covered >= std::max(rims, 1.0 / 64);
+                if (!isOpen && rims >= 1.0 / 64) level_.seconds[i] = {shownBy(x, y, before, {}), rims, false};
+                if (!isOpen || !p.front.isSurface() || !isAtJump(x, y, p.front.limit)) continue;
+                if (p.second.disc && p.second.limit < depthOfOther(i)) {
+                    level_.seconds[i] = {shownBy(x, y, p.behind, p.second), 1 - covered, false};
+                } else if (others_[i].valid) {
+                    level_.seconds[i] = {level_.samples[i], covered, true};
+                    level_.samples[i] = others_[i];
+                }
             }
     }
 
@@ -279,7 +357,8 @@ class Filter {
     Level& level_;
     std::vector<Gathered> pixels_;
     std::vector<PlacedDisc> discs_;
-    std::vector<bool> exact_;
+    std::vector<Sample> others_;  ///< of other kinds
+    std::vector<double> shown_;   ///< depths
 };
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "engine/base/numbers.h"
 #include "engine/scene/borders.h"
 #include "lod/primitives/in_memory.h"
+#include "shaders/shared/border.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::scene {
@@ -210,19 +211,57 @@ class Sampler {
         });
         for (const BorderSample& s : borderSamples(all, out_.position)) {
             const Triangle& t = triangles[s.triangle];
+            const size_t before = out_.colour.size();
             takeSample(*t.primitive, t.world, t.first, s.weight, 1);
+            if (out_.colour.size() > before) out_.colour.back() |= shared::kFlagBorder << 24;
         }
     }
 
     void takePoints(const Primitive& p, const glm::dmat4& m) {
-        const uint8_t material = numberOf(surfaceOf(p));
-        for (const uint32_t i : p.indices) {
+        const float footprint = pointFootprint(p);
+        for (size_t k = 0; k < p.indices.size(); ++k) {
+            const uint32_t i = p.indices[k];
+            glm::vec3 c(1);
+            if (!colourAt(p, k, {1, 0, 0}, footprint, c)) {
+                ++out_.cutOut;
+                continue;
+            }
             out_.position.emplace_back(m * glm::dvec4(p.at(i), 1));
             out_.normal.push_back(p.normal.empty() ? glm::vec3(0) : glm::vec3(glm::dmat3(m) * glm::dvec3(p.normal[i])));
-            const glm::vec4 c = p.colour.empty() ? glm::vec4(1) : p.colour[i];
             out_.colour.push_back(byteOf(c.r) | byteOf(c.g) << 8 | byteOf(c.b) << 16);
-            out_.material.push_back(material);
+            out_.material.push_back(numberOf(surfaceAt(p, k, {1, 0, 0}, footprint)));
         }
+    }
+    /// Texels between neighbours, were the primitive's points spread evenly over what they occupy of the texture (cells
+    /// of about four points each); charts that lie over each other count as one, so that theirs is too small.
+    float pointFootprint(const Primitive& p) const {
+        const TextureUse& use = materialOf(p).baseColourTexture;
+        const DecodedImage* image = imageOf(use);
+        if (!image || image->rgba.empty() || static_cast<size_t>(use.uvSet) >= p.uv.size()) return 1;
+        const double w = image->width, h = image->height;
+        std::vector<glm::dvec2> texels;
+        glm::dvec2 least(1e300), most(-1e300);
+        for (size_t k = 0; k < p.indices.size(); ++k) {
+            const glm::dvec2 at = glm::dvec2(uvAt(p, use, k, {1, 0, 0})) * glm::dvec2(w, h);
+            if (!std::isfinite(at.x + at.y)) continue;
+            texels.push_back(at);
+            least = glm::min(least, at);
+            most = glm::max(most, at);
+        }
+        if (texels.size() < 2) return 1;
+        const auto count = static_cast<double>(texels.size());
+        const glm::dvec2 size = glm::max(most - least, glm::dvec2(1));
+        const double cell = std::sqrt(4 * size.x * size.y / count);
+        std::vector<uint64_t> cells;
+        for (const glm::dvec2& at : texels) {
+            const glm::dvec2 in = glm::min((at - least) / cell, glm::dvec2(4e9));
+            cells.push_back(static_cast<uint64_t>(in.x) << 32 | static_cast<uint64_t>(in.y));
+        }
+        std::sort(cells.begin(), cells.end());
+        const auto occupied = static_cast<double>(std::unique(cells.begin(), cells.end()) - cells.begin());
+        // (Cells reach beyond the outermost points: a texel and a quarter is one.)
+        const double between = cell * std::sqrt(occupied / count);
+        return static_cast<float>(between < 1.25 ? 1 : std::min(between, 1024.0));
     }
 
     /// The number of a material in the list: each once, or the grid where textures say what materials are.
@@ -238,7 +277,8 @@ class Sampler {
         for (const Material& m : scene_.materials) isGrid_ = isGrid_ || m.metallicRoughnessTexture.texture >= 0;
         if (isGrid_) out_.materials = lod::materialGrid();
     }
-    /// The material of a sample; see colourAt. Without any it is what triangles have: not metallic (triangles.cpp).
+    /// The material of a sample; see colourAt. Without any it is matte. (The format's own, which is metal, would be
+    /// black.)
     lod::PointMaterial surfaceAt(const Primitive& p, size_t i, const glm::vec3& b, float footprint) {
         if (p.material < 0) return {};
         hasMaterials_ = true;
@@ -250,12 +290,6 @@ class Sampler {
             lookup(*image, scene_.textures[static_cast<size_t>(use.texture)], uvAt(p, use, i, b), footprint, false);
         return {m.roughness * texel.g, m.metallic * texel.b};
     }
-    /// Of points: without any they are matte. (The format's own, which is metal, would be black.)
-    lod::PointMaterial surfaceOf(const Primitive& p) {
-        hasMaterials_ = hasMaterials_ || p.material >= 0;
-        const Material& m = materialOf(p);
-        return p.material < 0 ? lod::PointMaterial{} : lod::PointMaterial{m.roughness, m.metallic};
-    }
 
     const Material& materialOf(const Primitive& p) const {
         static const Material plain;
@@ -266,9 +300,14 @@ class Sampler {
         const int image = scene_.textures[static_cast<size_t>(use.texture)].image;
         return image < 0 ? nullptr : &images_[static_cast<size_t>(image)];
     }
+    /// At a place of a triangle, or at a point.
+    template <typename T>
+    static T valueAt(const Primitive& p, const std::vector<T>& of, size_t i, const glm::vec3& b) {
+        if (p.kind == PrimitiveKind::points) return of[p.indices[i]];
+        return b.x * of[p.indices[i]] + b.y * of[p.indices[i + 1]] + b.z * of[p.indices[i + 2]];
+    }
     static glm::vec2 uvAt(const Primitive& p, const TextureUse& use, size_t i, const glm::vec3& b) {
-        const auto& uv = p.uv[static_cast<size_t>(use.uvSet)];
-        const glm::vec2 at = b.x * uv[p.indices[i]] + b.y * uv[p.indices[i + 1]] + b.z * uv[p.indices[i + 2]];
+        const glm::vec2 at = valueAt(p, p.uv[static_cast<size_t>(use.uvSet)], i, b);
         return glm::vec2(use.transform * glm::vec3(at, 1));
     }
 
@@ -288,8 +327,7 @@ class Sampler {
     bool colourAt(const Primitive& p, size_t i, const glm::vec3& b, float footprint, glm::vec3& colour) const {
         const Material& m = materialOf(p);
         glm::vec4 c = m.baseColour;
-        if (!p.colour.empty())
-            c *= b.x * p.colour[p.indices[i]] + b.y * p.colour[p.indices[i + 1]] + b.z * p.colour[p.indices[i + 2]];
+        if (!p.colour.empty()) c *= valueAt(p, p.colour, i, b);
         const auto texel = [&](const TextureUse& use) {
             const DecodedImage* image = imageOf(use);
             if (!image || static_cast<size_t>(use.uvSet) >= p.uv.size()) return glm::vec4(1);

@@ -10,7 +10,8 @@ void main() {
     const uint at = pixel.y * frame.width + pixel.x;
     const FilteredFront front = fronts[at];
     FilteredSums s;
-    s.weight = s.depth = s.red = s.green = s.blue = s.nx = s.ny = s.nz = 0;
+    s.weight = s.depth = s.red = s.green = s.blue = s.nx = s.ny = s.nz = s.rims = 0;
+    s.nearest = -kNoDisc;
     s.behind = 0u;
     s.reference = uintBitsToFloat(front.nearest);
     s.unit = sumUnit(front);
@@ -23,6 +24,8 @@ void main() {
         const EwaKernel k = ewaKernel(d, sigma, frame.kernelSupport, frame.lowPass, frameLensHere());
         const DepthRange range = depthRange(d, sigma, frame.kernelSupport, frame.lowPass, frameLensHere());
         s.reference = rayOnDisc(d, k, range, ivec2(pixel)).depth;
+        // As far before the front as it ends behind it; leaves are no surface.
+        if ((recordFlags(r) & kFlagLeaf) == 0u) s.nearest = s.reference - (keyDepth(front.key) - s.reference);
     }
     sums[at] = s;
     if (frame.hasMaterials != 0u) materialSums[at] = MaterialSums(0, 0, 0);

@@ -14,37 +14,40 @@ void main() {
     const uint64_t exact = visibility[at];
     const bool hasFront = front.key != kNoKey;
     const bool hasExact = exact != kNoKey;
-    const float weight = float(s.weight) / s.unit;
-    const bool perSurfel = frame.perSurfel != 0u;
-    const float covered = weight * (perSurfel ? 1.0 : gridWeight(frame.kernelSupport));
-    const uint code = uint(min(covered, 1.0) * 255.0 + 0.5);
+    const bool isBlended = float(s.weight) / s.unit > kLeastWeight;
+    const uint code = uint(min(coveredBy(s.weight + s.rims, s.unit), 1.0) * 255.0 + 0.5);
     FilteredPixel p;
     p.normal = p.colour = p.cover = 0u;
     const bool isThere = hasFront ? !hasExact || keyDepth(front.key) < keyDepth(exact) : !hasExact && code > 0u;
+    bool isLeaf = false;
     if (isThere) {
         const uint id = hasFront ? keyPlace(front.key, 0u) : front.first;
         DrawNode node;
         const PointRecord r = recordOf(id, node);
+        isLeaf = (recordFlags(r) & kFlagLeaf) != 0u;
         float depth = s.reference;
-        if (weight > kLeastWeight) {
-            const float over = 1.0 / float(s.weight);
-            depth = absoluteDepth(float(s.depth) * over, s.reference);
-            const float ofColour = perSurfel ? 1.0 / min(float(s.weight), s.unit) : over;
-            p.colour = packColour(float(s.red) * ofColour, float(s.green) * ofColour, float(s.blue) * ofColour);
-            p.normal = octEncode(vec3(s.nx, s.ny, s.nz) * over);
-            if (frame.hasMaterials != 0u) {
-                const MaterialSums m = materialSums[at];
-                p.cover = coverOfMaterial(TexelSurface(float(m.share) * over, float(m.metallic) * over, float(m.roughness) * over));
-            }
-        } else {
-            const vec3 c = pointColour(node, r);
-            p.colour = packColour(c.x, c.y, c.z);
-            p.normal = octEncode(towardsEye(opaqueDisc(node, r, id)));
-            if (frame.hasMaterials != 0u) p.cover = coverOfMaterial(surfaceOf(id, node));
-        }
+        if (isBlended)
+            depth = shownOf(at, s, p);
+        else
+            p = ownOf(id, node, r);
         const bool isBefore = hasFront && (s.behind != 0u || hasExact);
-        p.cover |= (isBefore ? 255u : code) | (hasFront ? kFilteredFront : 0u) | ((recordFlags(r) & kFlagLeaf) != 0u ? kFilteredLeaf : 0u);
+        p.cover |= (isBefore ? 255u : code) | (hasFront ? kFilteredFront : 0u) | (isLeaf ? kFilteredLeaf : 0u);
         visibility[at] = visibilityKey(floatBitsToUint(depth), drawId(0u, id));
     }
     filtered[at] = p;
+    // Which second surface there may be.
+    const bool isShown = hasFront && isThere;
+    const float before = isShown ? coveredBy(s.rims, s.unit) : hasExact ? coveredBy(s.rims + s.weight, s.unit) : 0.0;
+    const float covered = coveredBy(s.weight, s.unit);
+    const bool ends = isShown && (s.behind != 0u || hasExact) && 1.0 - covered >= max(kLeastShare, before);
+    const uint kind = ends ? (isLeaf ? kSecondNone : kSecondBehind) : before >= kLeastShare ? kSecondBefore : kSecondNone;
+    coverage[at] = kind << kSecondShift;
+    if (kind == kSecondNone) return;
+    SecondSurface second;
+    second.other = exact;
+    second.shown = SurfaceWords(0.0, 0u, 0u, 0u);
+    second.share = min(covered, 1.0);
+    second.limit = hasFront ? keyDepth(front.key) : 0.0;
+    seconds[at] = second;
+    if (!isShown) fronts[at].key = kNoKey;  // its rims are those before the other kind
 }

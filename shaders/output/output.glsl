@@ -4,14 +4,31 @@
 #else
 #include "../surface.glsl"
 #endif
+#include "../shared/ewa.h"
 layout(set = 0, binding = kCoverageBinding, scalar) readonly buffer CoverageBlock { uint coverage[]; };
+layout(set = 0, binding = kSecondsBinding, scalar) readonly buffer SecondBlock { uint hasSeconds; uint unusedSeconds; SecondSurface seconds[]; };
 layout(local_size_x = 64) in;
+
+// A second surface is lit on its own, and has its share of what the pixel sends; where it is the front, depth and normal
+// are its own.
+void mixSecond(uint kind, SecondSurface second, uvec2 pixel, inout SurfaceWords s, inout vec3 colour, inout vec3 normal) {
+    const vec3 n = octDecode(second.shown.normal);
+    vec3 c = vec3(unpackRed(second.shown.albedo), unpackGreen(second.shown.albedo), unpackBlue(second.shown.albedo));
+#ifdef LIT
+    c = litColour(second.shown, c, n, pixel);
+#endif
+    if (frame.debugView != kDebugHoles && frame.debugView != kDebugNormals) colour += second.share * (c - colour);
+    if (kind != kSecondFront) return;
+    s.depth = second.shown.depth;
+    normal = n;
+    if (frame.debugView == kDebugNormals) colour = vec3(0.5 + 0.5 * n.x, 0.5 - 0.5 * n.y, 0.5 - 0.5 * n.z);
+}
 
 void main() {
     const uvec2 pixel = gl_GlobalInvocationID.xy;
     if (pixel.x >= frame.width || pixel.y >= frame.height) return;
     const uint at = pixel.y * frame.width + pixel.x;
-    const SurfaceWords s = surfaceBuffer[at];
+    SurfaceWords s = surfaceBuffer[at];
     const bool valid = s.depth > 0.0;
     vec3 colour = frame.background;
     vec3 n = vec3(0.0);
@@ -24,7 +41,9 @@ void main() {
     }
     float share = valid ? 1.0 : 0.0;
     if (valid && stepInfo.hasFiltered != 0u) {
-        share = float(coverage[at]) / 255.0;
+        const uint kind = coverage[at] >> kSecondShift;
+        if (kind != kSecondNone) mixSecond(kind, seconds[at], pixel, s, colour, n);
+        share = float(coverage[at] & 255u) / 255.0;
         colour = frame.background + share * (colour - frame.background);
     }
     const vec3 c = clamp(colour, 0.0, 1.0);

@@ -29,7 +29,8 @@ const uint kSumsBinding = 21u;
 const uint kFilteredBinding = 22u;
 const uint kCoverageBinding = 23u;
 const uint kMaterialSumsBinding = 24u;
-const uint kBindings = 25u;
+const uint kSecondsBinding = 25u;
+const uint kBindings = 26u;
 
 // Per pixel:
 const uint kTexelWords = 5u;     // planes of a packed texel; in frames with materials of points one more

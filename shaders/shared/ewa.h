@@ -3,6 +3,7 @@
 // Gaussian with that ellipse is taken for the image of the Gaussian, and the low-pass adds to its variances.
 #ifndef STIPPLE_SHARED_EWA_H
 #define STIPPLE_SHARED_EWA_H
+#include "border.h"
 #include "pyramid.h"
 #include "splat_disc.h"
 #include "surface.h"
@@ -18,6 +19,9 @@ const float kOpaqueSigmas = 1.5f;
 // this is one surface.) What lies so far behind the front disc still belongs to its surface, in opaque radii (along the
 // ray).
 const float kSurfaceShare = 1.3333333f;
+// Of a disc before another kind's surface: by how much its own must be before that, in what it is rough. Those of a
+// border blend with it, too, and do not lose to it.
+SHARED_FN float roughSide(uint flags) { return (flags & kFlagBorder) != 0u ? -1.0f : 1.0f; }
 // Leaves among leaves are no surface: nothing but what is next to it.
 const float kLeafShare = 0.0833333f;
 // Weights that add up to less say nothing: the front disc's own attributes are taken.
@@ -173,6 +177,8 @@ struct FilteredSums {
     int nx;
     int ny;
     int nz;
+    int rims;         // weights of what is before the front, as another surface
+    float nearest;    // depth that it is before of
     uint behind;      // 1: something is opaque behind the front
     float reference;  // depth, which others are told against
     float unit;       // what 1 is (sumUnit)
@@ -185,6 +191,21 @@ struct MaterialSums {
 };
 const uint kFilteredFront = 256u;  // opaque: else a rim that only coverage shows
 const uint kFilteredLeaf = 512u;
+// A pixel may show a second surface beside what its key says; both are lit, then mixed.
+const uint kSecondNone = 0u;
+const uint kSecondBefore = 1u;  // rims of discs before it that are not opaque there
+const uint kSecondBehind = 2u;  // discs behind its front, which ends there
+const uint kSecondFront = 3u;   // its front itself, which ends there: another kind is behind, and has the key
+// On the gpu, one a pixel, where coverage says which kind it is.
+struct SecondSurface {
+    uint64_t other;  // key of another kind there; kNoKey: none
+    SurfaceWords shown;
+    float share;  // of the pixel; before it is known: what the front covers
+    float limit;  // depth behind which the front ends
+};
+const uint kSecondShift = 8u;  // of coverage
+// One that is less of a pixel than this is left out: at most a 64th of the contrast.
+const float kLeastShare = 0.015625f;
 const uint kFilteredMaterial = 1024u;  // of a material, which is the upper half
 SHARED_FN uint coverOfMaterial(TexelSurface s) {
     const uint word = surfaceWord(s);

@@ -299,6 +299,35 @@ cameras_and_paths() {
 
 trap 'kill $viewer $manager 2>/dev/null' EXIT
 viewer=
+surfels_are_weighed_while_it_moves() { # mode ewa: per surfel while something changes, per pixel when it rests
+    scan
+    "$program" build "$folder/a.las" -o "$folder/a.stipple" --surfel-weights >/dev/null 2>&1 || fail "build"
+    # Two looks at rest: a second apart at most. (Keys are no rest.)
+    rested() { sleep 2 && shoot; }
+    view "$folder/a.stipple" --mode ewa
+    settle
+    rested
+    local rest=$shot before moved
+    # 3 asks for the error of a pixel that there is already: a change that leaves everything as it was. The picture is
+    # taken before two looks at rest.
+    before=$(lines "$folder/out")
+    xdotool keydown --delay 0 3 keydown --delay 0 p keyup 3 keyup p
+    await 20 hasLines "$folder/out" $((before + 1)) || fail "no picture"
+    moved=$(tail -n 1 "$folder/out")
+    ! cmp -s "$rest" "$moved" || fail "while something changes the picture is that of rest"
+    rested
+    cmp -s "$rest" "$shot" || fail "at rest it is another picture than before"
+    # Which is which, by pictures that are asked for by name.
+    for way in pixel surfel; do
+        "$program" render "$folder/a.stipple" --mode ewa --normalise $way --size 640x480 -o "$folder/$way.png" >/dev/null ||
+            fail "render --normalise $way"
+    done
+    ! cmp -s "$folder/pixel.png" "$folder/surfel.png" || fail "the control: both ways are alike"
+    cmp -s "$rest" "$folder/pixel.png" || fail "at rest it is not per pixel"
+    cmp -s "$moved" "$folder/surfel.png" || fail "while it moves it is not per surfel"
+    finish
+}
+
 letters_follow_the_desktop() {
     scan
     below() { geometry; pixel $((X + 30)) $((Y + 45)); } # under a line of figures of plain letters, in one of large ones

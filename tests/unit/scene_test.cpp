@@ -333,6 +333,53 @@ TEST(Surfels, ACoarseSamplingSeesTheMeanOfTheTexture) {
         for (const uint32_t c : block.colour) ASSERT_NEAR(static_cast<double>(c & 255u), 188, 25);
 }
 
+/// `side`^2 points over a texture, each in the middle of its share.
+Scene texturedPoints(uint32_t side) {
+    Scene scene = squares();
+    Primitive p;
+    p.kind = PrimitiveKind::points;
+    p.material = 0;
+    p.uv.resize(1);
+    for (uint32_t y = 0; y < side; ++y)
+        for (uint32_t x = 0; x < side; ++x) {
+            const glm::vec2 uv = (glm::vec2(x, y) + 0.5f) / static_cast<float>(side);
+            p.indices.push_back(static_cast<uint32_t>(p.position.size()));
+            p.position.emplace_back(uv, 0);
+            p.normal.emplace_back(0, 0, 1);
+            p.uv[0].push_back(uv);
+        }
+    scene.meshes[0].primitives = {p};
+    scene.nodes[0].instances.clear();
+    return scene;
+}
+
+/// Points take their colours from textures: texels where they lie as densely, means of what lies between them where
+/// they do not; times their own colour and the material's.
+TEST(Surfels, PointsHaveTheColoursOfTheirTextures) {
+    DecodedImage image{64, 64, {}};
+    for (uint32_t i = 0; i < 64 * 64; ++i) image.rgba.push_back((i % 64 + i / 64) % 2 == 0 ? 0xffffffffu : 0xff000000u);
+    const auto coloursOf = [&](const Scene& scene) {
+        std::vector<uint32_t> colours;
+        const auto source = sampleSurfels(scene, {image}, {0});
+        EXPECT_TRUE(source);
+        for (const auto& block : take(*source)) colours.insert(colours.end(), block.colour.begin(), block.colour.end());
+        return colours;
+    };
+    Scene fine = texturedPoints(64);
+    const std::vector<uint32_t> texels = coloursOf(fine);
+    ASSERT_EQ(texels.size(), 4096u);
+    for (size_t i = 0; i < texels.size(); ++i) EXPECT_EQ(texels[i] & 0xffffffu, image.rgba[i] & 0xffffffu);
+    // Every sixth texel or so, by itself, would be black or white.
+    for (const uint32_t c : coloursOf(texturedPoints(11))) EXPECT_NEAR(static_cast<double>(c & 255u), 188, 25);
+    fine.materials[0].baseColour = {1, 0, 0, 1};
+    fine.meshes[0].primitives[0].colour.assign(4096, {0.5f, 1, 1, 1});
+    const std::vector<uint32_t> tinted = coloursOf(fine);
+    EXPECT_EQ(tinted[0] & 0xffffffu, 188u);
+    EXPECT_EQ(tinted[1] & 0xffffffu, 0u);
+    fine.meshes[0].primitives[0].uv.clear();  // the control
+    EXPECT_EQ(coloursOf(fine)[1] & 0xffffffu, 188u);
+}
+
 TEST(Surfels, MaskedPlacesAreLeftOutAndEmptyMeshesRefused) {
     Scene scene = squares();
     scene.materials[0].alphaMode = AlphaMode::mask;

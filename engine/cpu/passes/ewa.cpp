@@ -1,6 +1,7 @@
 // Discs blended by their kernels (shaders/shared/ewa.h), and how far they cover the pixels of silhouettes.
 #include <array>
 #include <cstring>
+#include <utility>
 
 #include "engine/cpu/passes/passes.h"
 #include "engine/cpu/passes/tile_lists.h"
@@ -15,13 +16,22 @@ void blendDiscs(Frame& frame) {
         frame.filtered.assign(pixels, {});
         frame.coverage.assign(pixels, 0);
         frame.filteredPixels = pixels;
+        // All 0, and no page of it is there before it is written.
+        frame.secondPixels.reset(static_cast<SecondPixel*>(std::calloc(pixels, sizeof(SecondPixel))));
+        if (!frame.secondPixels) throw std::bad_alloc();
+        frame.secondKinds.assign(pixels + Visibility::kRun, 0);
+        frame.secondRuns.assign((pixels >> Visibility::kRunBits) + 1, 0);
     }
+    for (size_t r = 0; r < frame.secondRuns.size(); ++r)
+        if (std::exchange(frame.secondRuns[r], uint8_t{0}) != 0)
+            std::fill_n(frame.secondKinds.data() + (r << Visibility::kRunBits), Visibility::kRun, uint8_t{0});
     TileLists lists(frame, {shared::kOpaqueSpacings, 1 / shared::kOpaqueSigmas, frame.constants.kernelSupport,
                             frame.constants.lowPass});
     lists.place(true);
     lists.draw([&](const PlacedSplat* splats, const uint32_t* places, size_t count, const SplatTile& tile) {
         frame.k.filterTile(frame.constants, frame.tables, frame.blocks.data(), splats, frame.placedColours.data(),
-                           places, count, tile, frame.wantsNormals, frame.visible(), frame.filtered.data());
+                           places, count, tile, frame.wantsNormals, frame.visible(), frame.filtered.data(),
+                           frame.seconds());
     });
 }
 
@@ -91,9 +101,28 @@ void cover(Frame& frame) {
     });
 }
 
+/// Second surfaces behind fronts that end nowhere near are none: there kernels add up to less than 1 because samples
+/// are not regular.
+void closeSeconds(Frame& frame) {
+    const shared::FrameConstants& f = frame.constants;
+    const SecondPixels seconds = frame.seconds();
+    frame.forBands([&](uint32_t first, uint32_t last) {
+        for (uint32_t y = first; y <= last; ++y) {
+            const size_t at = size_t{y} * f.width;
+            for (size_t x = 0; seconds.mayHave(at, f.width) && x < f.width; ++x) {
+                if (seconds.kinds[at + x] <= shared::kSecondBefore) continue;  // or none
+                if (!frame.k.isAtJump(f, frame.visibility.data(), frame.filtered.data(), static_cast<uint32_t>(x), y,
+                                      seconds.pixels[at + x].limit))
+                    seconds.kinds[at + x] = shared::kSecondNone;
+            }
+        }
+    });
+}
+
 void ewa(Frame& frame) {
     blendDiscs(frame);
     cover(frame);
+    closeSeconds(frame);
 }
 
 }  // namespace

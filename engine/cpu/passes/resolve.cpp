@@ -44,6 +44,7 @@ void resolve(Frame& frame) {
                              .discCount = frame.discs.size(),
                              .exactPoints = frame.mode->fillsSplats,
                              .filtered = frame.isBlended() ? frame.filtered.data() : nullptr,
+                             .seconds = frame.seconds(),
                              .frame = &frame,
                              .ofKind = ofKind.data()};
     std::atomic<float> largestRadius{0};

@@ -3,6 +3,7 @@
 #include <array>
 
 #include "engine/cpu/passes/passes.h"
+#include "engine/cpu/passes/seconds.h"
 #include "shaders/shared/pack.h"
 
 namespace stipple::cpu {
@@ -124,9 +125,20 @@ class RowProgram {
     bool concerns(const RowPass& step, const SurfacePlanes& planes) const {
         return step.concerns == nullptr || step.concerns(frame_, planes);
     }
+    /// Second surfaces are lit as the first ones are, and mixed with them after that (without light: before output).
     void finish(const RowPlace& at, const SurfacePlanes& planes, SurfaceRow& surface) const {
-        for (const RowPass* step : steps_)
-            if (concerns(*step, planes)) step->run(at, surface);
+        thread_local SurfaceRow second{};
+        const RowPass* const light = &cpuPassOf(render::Pass::light).row;
+        const RowPass* const mixedAfter = concerns(*light, planes) ? light : nullptr;
+        for (const RowPass* step : steps_) {
+            if (!concerns(*step, planes)) continue;
+            const bool isMixed = step == light || (!mixedAfter && step == &cpuPassOf(render::Pass::output).row);
+            const bool hasSeconds = isMixed && takeSeconds(at, surface, second);
+            if (hasSeconds && step == light) step->run(at, second);
+            if (hasSeconds && step != light) mixSeconds(at, second, surface);
+            step->run(at, surface);
+            if (hasSeconds && step == light) mixSeconds(at, second, surface);
+        }
         if (isKept_) keepRow(at, surface);
     }
     void finishEmpty(const RowPlace& at) const {

@@ -9,6 +9,7 @@
 #include "engine/base/numbers.h"
 #include "lod/builder/points/covered.h"
 #include "lod/primitives/octahedral.h"
+#include "shaders/shared/border.h"
 
 namespace stipple::lod {
 namespace {
@@ -89,7 +90,7 @@ void addUp(std::span<const AggregateRecord> parts, AggregateRecord& out) {
         normal += flip ? -w * p.meanNormal : w * p.meanNormal;
     }
     // What most of the leaves are.
-    for (const uint32_t flag : {shared::kFlagLeaf, shared::kFlagScattered}) {
+    for (const uint32_t flag : {shared::kFlagLeaf, shared::kFlagScattered, shared::kFlagBorder}) {
         double such = 0;
         for (const AggregateRecord& p : parts) such += (p.flags & flag) != 0 ? p.count : 0;
         if (2 * such > count) out.flags = static_cast<uint8_t>(out.flags | flag);

@@ -8,6 +8,7 @@
 #include "lod/builder/points/input.h"
 #include "lod/builder/points/input_colours.h"
 #include "lod/primitives/octahedral.h"
+#include "shaders/shared/border.h"
 
 namespace stipple::lod {
 PointInput::Range PointInput::nextRange(const Range& range, uint64_t wanted) const {
@@ -159,10 +160,11 @@ void PointInput::fill(const Part& part, const PointBlock& block, Points& out) co
     const size_t count = std::max(block.position.size(), block.lattice.size());
     const bool wide = isWide_[part.source];
     out.colour.resize(count);
+    const uint32_t kept = 0xffffffu | (info.isReflectance ? shared::kFlagBorder << 24 : 0u);
     for (size_t i = 0; i < count; ++i)
         out.colour[i] = isBlack_                  ? kPlainColour
                         : !block.colour16.empty() ? narrowed(block.colour16[i], wide)
-                        : !block.colour.empty()   ? block.colour[i] & 0xffffffu
+                        : !block.colour.empty()   ? block.colour[i] & kept
                                                   : kPlainColour;
     out.normal.resize(hasNormal ? count : 0);
     for (size_t i = 0; hasNormal && i < count; ++i) {

@@ -1,0 +1,41 @@
+// Second surfaces of pixels, and how much of them they are.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "../filtered.glsl"
+layout(local_size_x = 64) in;
+
+void main() {
+    const uvec2 pixel = gl_GlobalInvocationID.xy;
+    if (hasSeconds == 0u || pixel.x >= frame.width || pixel.y >= frame.height) return;
+    const uint at = pixel.y * frame.width + pixel.x;
+    const uint kind = secondKind(at);
+    if (kind == kSecondNone) return;
+    FilteredPixel p;
+    float depth;
+    if (kind == kSecondFront) {
+        p = filtered[at];
+        depth = keyDepth(visibility[at]);
+        visibility[at] = seconds[at].other;
+    } else {
+        const FilteredSums s = sums[at];
+        const float covered = min(coveredBy(s.weight, s.unit), 1.0);
+        if (kind == kSecondBefore && covered < kLeastShare) {
+            coverage[at] &= 255u;
+            return;
+        }
+        DrawNode node;
+        const uint id = kind == kSecondBefore ? fronts[at].first : keyPlace(fronts[at].key, 0u);
+        const PointRecord r = recordOf(id, node);
+        depth = s.reference;
+        if (float(s.weight) / s.unit > kLeastWeight)
+            depth = shownOf(at, s, p);
+        else
+            p = ownOf(id, node, r);
+        p.cover |= (recordFlags(r) & kFlagLeaf) != 0u ? kFilteredLeaf : 0u;
+        seconds[at].share = kind == kSecondBefore ? covered : 1.0 - seconds[at].share;
+    }
+    uint material = kPlainSurface;
+    if (frame.hasMaterials != 0u && (p.cover & kFilteredMaterial) != 0u) material = surfaceWord(surfaceOfPoint(p.cover >> 16));
+    if ((p.cover & kFilteredLeaf) != 0u) material |= kPixelLeaf;
+    seconds[at].shown = SurfaceWords(depth, p.normal, p.colour, material);
+}
