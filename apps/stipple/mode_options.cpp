@@ -6,6 +6,7 @@
 
 #include "apps/stipple/options.h"
 #include "engine/render/reconstructions/table.h"
+#include "lod/primitives/patch_samples.h"
 
 namespace stipple::app {
 namespace {
@@ -29,7 +30,8 @@ constexpr std::array kOnlyOf{
     OnlyOf{"--normalise", blends, kOfEwa},      OnlyOf{"--samples", isTraced, "it belongs to mode reference"},
     OnlyOf{"--budget-points", isDrawn, kDrawn}, OnlyOf{"--wind", isDrawn, kDrawn},
     OnlyOf{"--time", isDrawn, kDrawn},          OnlyOf{"--accumulate", isDrawn, kDrawn},
-    OnlyOf{"--debug", isDrawn, kDrawn},
+    OnlyOf{"--debug", isDrawn, kDrawn},         OnlyOf{"--patch-as", isDrawn, kDrawn},
+    OnlyOf{"--interpolate", isDrawn, kDrawn},
 };
 
 }  // namespace
@@ -59,6 +61,16 @@ void ModeOptions::addTo(CLI::App& sub, bool hasReference) {
             },
             "2|3"))
         ->capture_default_str();
+    sub.add_option("--patch-as", patchAs,
+                   "elevation patches as strips (triangles), splats (cells that rays meet), samples (points of the "
+                   "mode), or auto: strips, which are the fastest")
+        ->check(oneOf({"strips", "splats", "samples", "auto"}))
+        ->capture_default_str();
+    sub.add_option("--interpolate", interpolate,
+                   "of patches as splats: correct (on the cell's triangles), or direct (below the discs of samples, "
+                   "which jumps where they meet)")
+        ->check(oneOf({"correct", "direct"}))
+        ->capture_default_str();
 }
 
 void ModeOptions::addNormaliseTo(CLI::App& sub) {
@@ -74,6 +86,14 @@ void ModeOptions::applyTo(render::FrameSettings& settings) const {
     settings.draw.lowPass = static_cast<float>(lowPass);
     settings.draw.kernelSupport = static_cast<float>(kernel);
     settings.draw.perSurfel = normalise == "surfel";
+    settings.draw.patchAs = patchAs == "samples"      ? lod::kPatchesAsSamples
+                            : patchAs != "splats"     ? shared::kPatchStrips
+                            : interpolate == "direct" ? shared::kPatchDirect
+                                                      : shared::kPatchSplats;
+}
+
+void ModeOptions::applyTo(std::vector<render::PlacedStore>& placed) const {
+    for (render::PlacedStore& p : placed) p.patchesAreSamples = patchAs == "samples";
 }
 
 Result<void> checkOfMode(const CLI::App& sub, const std::string& mode) {

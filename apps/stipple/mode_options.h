@@ -11,6 +11,7 @@ namespace stipple::app {
 
 struct ModeOptions {
     std::string mode = "pullpush", normalise = "pixel";
+    std::string patchAs = "auto", interpolate = "correct";
     double lowPass = 0.5;  ///< variance of the pixel's Gaussian, px^2
     double kernel = 2;     ///< standard deviations
 
@@ -19,6 +20,8 @@ struct ModeOptions {
     /// Where it is the user's choice: the window is quick while something moves, exact at rest.
     void addNormaliseTo(CLI::App& sub);
     void applyTo(render::FrameSettings& settings) const;
+    /// Says of placed stores what applyTo says of frames.
+    void applyTo(std::vector<render::PlacedStore>& placed) const;
 };
 
 /// Refuses what was asked for and would be ignored: an option that mode `mode` does not use.

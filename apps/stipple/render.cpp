@@ -301,6 +301,7 @@ Result<void> run(const Options& o, Written& written) {
     streaming::StreamSettings stream;
     stream.residentBytes = parseBytes(o.resident);
     settings.wantDepthAndNormal = settings.wantDepthAndNormal || o.accumulate > 1;
+    o.drawn.applyTo(scene.placed);
     auto state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.groups);
     render::setSway(settings.draw.wind, state->hierarchies, state->instances, state->groups);
     const FramesPlan plan{shot.views, shot.seconds,    o.output, o.resident,          o.frames, o.accumulate,

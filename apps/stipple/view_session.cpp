@@ -21,6 +21,7 @@ void ViewSession::restart(render::FrameSettings& settings) {
     state_.reset();
     streaming::StreamSettings stream;
     stream.residentBytes = parseBytes(options_.resident);
+    options_.drawn.applyTo(scene_.placed);
     state_ = render::makeFrameState(scene_.placed, backend_, executor_, stream, scene_.groups);
     settings.draw.lights = scene_.lights;
     settings.draw.worldUp = d.up;

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "lod/primitives/patch_samples.h"
 #include "lod/primitives/record_spacing.h"
 #include "shaders/shared/material.h"
 
@@ -83,14 +84,15 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
         const lod::Instance& instance = draws.instances[cut.instance];
         const lod::Hierarchy& h = *draws.hierarchies[instance.hierarchy];
         const lod::Node& node = h.nodes[cut.node];
-        if (h.payload(cut.chunk).kind != lod::Kind::points) continue;
         const lod::Chunk& chunk = chunks.at(uint64_t{draws.firstSource + instance.source} << 32 | cut.chunk);
         const auto& records = chunk.records;
+        if (records.empty()) continue;  // of another kind
         const bool few = mayBeWide(h, node, records, v, instance.scale * f.supportScale);
         const double step = h.cellSize(node) / 65536;
         // What the store tells is in eighths of octaves; what it does not tell is measured.
         const uint8_t code = h.payload(cut.chunk).spacingCode;
-        const double steps = code > 0 ? std::exp2((code - 1) / 8.0) : double{lod::recordSpacing(records)};
+        const double steps =
+            code > 0 ? std::exp2((code - 1) / 8.0) : double{lod::recordSpacing(lod::withoutEmpty(records))};
         const double spacing = h.isStochastic ? 0 : instance.scale * h.unit * step * steps;
         for (uint32_t i = 0; i < cut.count; ++i) {
             Disc disc = decodeDisc(h, node, records[i]);

@@ -4,6 +4,7 @@
 #include "engine/reference/decode_patch.h"
 #include "engine/reference/kinds.h"
 #include "engine/reference/restate_triangles.h"
+#include "lod/primitives/patch_samples.h"
 
 namespace stipple::reference {
 namespace {
@@ -65,7 +66,9 @@ class PatchProjector {
 void project(const render::DrawList& draws, const Chunks& chunks, Level& level) {
     for (size_t i = 0; i < draws.cut.size(); ++i) {
         const lod::Hierarchy& h = *draws.hierarchies[draws.instances[draws.cut[i].instance].hierarchy];
-        if (lod::kindOf(h, draws.cut[i].chunk) == lod::Kind::patches) PatchProjector(draws, chunks, level, i).run();
+        const bool areSamples = draws.frame.patchAs == lod::kPatchesAsSamples;  // points
+        if (!areSamples && lod::kindOf(h, draws.cut[i].chunk) == lod::Kind::patches)
+            PatchProjector(draws, chunks, level, i).run();
     }
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lod/primitives/patch_samples.h"
 #include "lod/primitives/record_spacing.h"
 #include "shaders/shared/wide_disc.h"
 
@@ -20,15 +21,15 @@ bool isSpacingTold(const lod::Hierarchy& h, uint32_t chunk) {
 Result<void> DiscSizes::upload(streaming::ChunkKey key, const lod::Chunk& chunk) {
     if (life_.expired()) return fail(ErrorKind::device, "what draws the scene is gone");
     uint32_t code = 0;
-    for (const shared::PointRecord& r : chunk.records) code = std::max(code, shared::recordRadiusCode(r) + 1);
-    const auto points = static_cast<float>(chunk.records.size());
+    const auto records = lod::withoutEmpty(chunk.records);
+    for (const shared::PointRecord& r : records) code = std::max(code, shared::recordRadiusCode(r) + 1);
+    const auto points = static_cast<float>(records.size());
     const bool isDense = code > 0 && shared::radiusFraction(code - 1) * std::sqrt(points) > kMostSpacings;
     if (sizes_.size() <= key.source) sizes_.resize(key.source + 1);
     auto& of = sizes_[key.source];
     if (of.size() <= key.chunk) of.resize(key.chunk + 1);
     const bool isTold = key.source < hierarchies_.size() && isSpacingTold(*hierarchies_[key.source], key.chunk);
-    of[key.chunk] = {static_cast<uint8_t>(std::min(code, 255u)), isDense,
-                     isTold ? 0 : lod::recordSpacing(chunk.records)};
+    of[key.chunk] = {static_cast<uint8_t>(std::min(code, 255u)), isDense, isTold ? 0 : lod::recordSpacing(records)};
     return backend_.upload(keyOfBackend(key), chunk);
 }
 

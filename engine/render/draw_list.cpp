@@ -5,6 +5,7 @@
 
 #include "engine/base/check.h"
 #include "engine/render/kinds/kind.h"
+#include "lod/primitives/patch_samples.h"
 #include "lod/primitives/record_spacing.h"
 #include "lod/store/surfel_weights.h"
 #include "shaders/shared/material.h"
@@ -90,13 +91,12 @@ void clear(DrawList& out) {
 }
 
 /// A node of points or curves in camera space.
-shared::DrawNode makeDrawNode(const lod::CutDraw& draw, const Bend& bend, const glm::dmat3& cameraFromWorld,
-                              const DrawList& list) {
+shared::DrawNode makeDrawNode(const lod::CutDraw& draw, const lod::Payload& payload, const Bend& bend,
+                              const glm::dmat3& cameraFromWorld, const DrawList& list) {
     const lod::View& view = list.view;
     const lod::Instance& instance = list.instances[draw.instance];
     const lod::Hierarchy& h = *list.hierarchies[instance.hierarchy];
     const lod::Node& node = h.nodes[draw.node];
-    const lod::Payload& payload = h.payload(draw.chunk);
     // Composed in fp64 relative to the eye, rounded once (hard cases 1 and 2).
     const double worldPerStep = instance.scale * h.unit * std::exp2(payload.stepShift);
     const glm::dmat3 axes = cameraFromWorld * instance.rotation;
@@ -136,13 +136,25 @@ shared::DrawNode makeDrawNode(const lod::CutDraw& draw, const Bend& bend, const 
     return d;
 }
 
+/// What is drawn of a chunk: patches as they are, or their samples.
+lod::Payload payloadOf(const lod::Hierarchy& h, uint32_t chunk, const DrawSettings& settings) {
+    const bool areSamples = settings.patchAs == lod::kPatchesAsSamples && lod::kindOf(h, chunk) == lod::Kind::patches;
+    return areSamples ? lod::payloadOfSamples(h, chunk) : h.payload(chunk);
+}
+/// All samples of the blocks, whatever octants they lie in.
+void drawsSamples(lod::CutDraw& draw) {
+    draw.count = static_cast<uint32_t>(lod::recordsOfSamples(draw.count));
+    draw.errorCode = lod::kNoSample - 1;
+    draw.octantMask = 0;
+}
+
 /// Counts the nodes that feed each of the effects, which may move them.
-void addNodes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, const DrawSettings& settings, EffectSet requested,
+void addNodes(const glm::dmat3& cameraFromWorld, const DrawSettings& settings, EffectSet requested,
               std::span<uint64_t> fed, DrawList& out) {
     std::vector<size_t> asked;  // mostly none
     for (size_t e = 0; e < effects().size(); ++e)
         if (requested.has(e) && effects()[e]->ofNode != nullptr) asked.push_back(e);
-    for (const lod::CutDraw& draw : cut.draw) {
+    for (lod::CutDraw& draw : out.cut) {
         const lod::Instance& instance = out.instances[draw.instance];
         const lod::Hierarchy& h = *out.hierarchies[instance.hierarchy];
         Bend bend;
@@ -154,12 +166,14 @@ void addNodes(const lod::Cut& cut, const glm::dmat3& cameraFromWorld, const Draw
         }
         if (!asked.empty()) out.bends.push_back(bend);
         out.swaying += bend.isStill() ? 0 : 1;
-        const lod::Kind kind = lod::kindOf(h, draw.chunk);
+        const lod::Payload payload = payloadOf(h, draw.chunk, settings);
+        const lod::Kind kind = payload.kind;
+        if (kind != lod::kindOf(h, draw.chunk)) drawsSamples(draw);
         DrawBatch& batch = out.of(kind);
         const auto index = static_cast<uint32_t>(batch.nodes.size());
         for (uint32_t first = 0; first < draw.count; first += drawnKind(kind).recordsPerBlock)
             batch.blocks.push_back({index, first});
-        batch.nodes.push_back(makeDrawNode(draw, bend, cameraFromWorld, out));
+        batch.nodes.push_back(makeDrawNode(draw, payload, bend, cameraFromWorld, out));
         const shared::DrawNode& node = batch.nodes.back();
         const bool hasMaterial = node.materials > 0 || node.material != shared::kPlainPoint;
         if (hasMaterial && settings.lit) out.frame.hasMaterials = 1;
@@ -260,7 +274,7 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     const glm::dmat3 cameraFromWorld = glm::transpose(glm::dmat3(view.right, view.down, view.forward));
     const EffectSet requested = requestedEffects(out.effectsOfScene, settings);
     std::vector<uint64_t> fed(effects().size());
-    addNodes(cut, cameraFromWorld, settings, requested, fed, out);
+    addNodes(cameraFromWorld, settings, requested, fed, out);
     forEachKind([&](lod::Kind kind) {
         if (drawnKind(kind).add != nullptr) drawnKind(kind).add(cut, cameraFromWorld, out);
     });

@@ -12,6 +12,7 @@
 #include "engine/render/frame_passes.h"
 #include "engine/render/views.h"
 #include "lod/primitives/octahedral.h"
+#include "lod/primitives/patch_samples.h"
 #include "lod/store/attributes.h"
 #include "lod/store/check.h"
 #include "lod/store/materials.h"
@@ -32,7 +33,7 @@ streaming::ChunkFinish finishOf(const PlacedStore& placed) {
     if (by.mode == lod::ColourMode::own && !hasMaterials) return {};
     const auto apply = [by, store = placed.store](uint32_t index, lod::Chunk& chunk, const uint8_t* bytes,
                                                   size_t count) -> Result<void> {
-        if (!chunk.vertices.empty())
+        if (!chunk.vertices.empty() || !chunk.patchBlocks.empty())
             return lod::checkMaterials(*store, chunk, fmt::format("{}: chunk {}", store->path, index));
         std::vector<uint8_t> values;
         if (by.needsAttributes()) {
@@ -45,6 +46,17 @@ streaming::ChunkFinish finishOf(const PlacedStore& placed) {
         return lod::addMaterials(*store, index, bytes, count, chunk);
     };
     return {by.needsAttributes() || hasMaterials, apply};
+}
+
+/// Patches become points, once all else is done with them.
+streaming::ChunkFinish withSamples(streaming::ChunkFinish of, const PlacedStore& placed) {
+    return {of.wantsAttributes,
+            [of, store = placed.store](uint32_t index, lod::Chunk& chunk, const uint8_t* bytes,
+                                       size_t count) -> Result<void> {
+                if (of.apply) STIPPLE_TRY(of.apply(index, chunk, bytes, count));
+                lod::samplesAsPoints(store->hierarchy, index, chunk);
+                return {};
+            }};
 }
 
 /// Adds placed stores to a state: each store once, and one source of chunks for all that look alike.
@@ -119,7 +131,7 @@ class Placer {
         if (isPlain) plainSources_[p.store.get()] = number;
         state_.discSizes->addSource(p.store->hierarchy);
         state_.streamer->addSource(p.store->hierarchy, streaming::makeFileSource(p.store->file), p.store->path,
-                                   finishOf(p));
+                                   p.patchesAreSamples ? withSamples(finishOf(p), p) : finishOf(p));
         return number;
     }
 

@@ -58,6 +58,9 @@ struct PlacedStore {
     lod::ColourBy colour;
     std::shared_ptr<const std::vector<Proxy>> proxies = nullptr;  ///< finer ones first
     bool isMember = false;                                        ///< of an instance group
+    /// Its patches are points, as DrawSettings::patchAs has to say too (lod::kPatchesAsSamples). All stores of a scene,
+    /// or none.
+    bool patchesAreSamples = false;
 };
 /// Many placed stores that are seen as one from afar, see lod::InstanceGroup.
 struct PlacedGroup {

@@ -7,6 +7,7 @@
 
 #include "engine/reference/reference.h"
 #include "lod/primitives/octahedral.h"
+#include "lod/primitives/patch_samples.h"
 #include "tests/support/backends_here.h"
 #include "tests/support/patch_scene.h"
 #include "tests/support/patch_shapes.h"
@@ -300,6 +301,62 @@ TEST_F(PatchImages, AreTheSameBytesOnEveryInstructionSetAndForAnyThreads) {
             EXPECT_EQ(image.depth, expected.depth) << name << what;
             EXPECT_EQ(image.normal, expected.normal) << name << what;
         }
+    }
+}
+
+TEST_F(PatchImages, AsSamplesArePointsOfEveryMode) {
+    lod::Patch patch = test::patchOfHeights(61, 57, waves);
+    for (uint32_t s = 0; s < patch.colours.size(); ++s)
+        patch.colours[s] = 4 * (s % 61) | (4 * (s / 61)) << 8 | 0x400000;
+    PatchScene scene({patch});
+    const lod::View view = viewFrom({0.5, 1.4, 1.9}, {0.05, 0, 0}, false, 200);
+    const render::Image strips = scene.draw(usual(), view);
+    render::DrawSettings settings = as(lod::kPatchesAsSamples);
+    settings.lit = true;
+    const auto oracle = reference::makeReferenceBackend(*executor_);
+    for (const render::Reconstruction& mode : render::reconstructions()) {
+        const render::Image expected = scene.draw(*oracle, view, mode.mode, settings);
+        for (const auto& [name, backend] : backends_) {
+            const render::Image image = scene.draw(*backend, view, mode.mode, settings);
+            const auto d = reference::compareImages(image, expected, 4, nullptr);
+            ASSERT_TRUE(d);
+            EXPECT_GE(d->psnr, 50) << name << ", " << mode.name;
+            // Closed, and within half a cell of the surface, where the mode closes surfaces.
+            size_t open = 0, off = 0, seen = 0;
+            for (size_t i = 0; i < image.depth.size(); ++i) {
+                if (!(strips.depth[i] > 0)) continue;
+                ++seen;
+                open += image.depth[i] > 0 ? 0 : 1;
+                off += image.depth[i] > 0 && std::abs(image.depth[i] - strips.depth[i]) > 0.02f ? 1 : 0;
+            }
+            EXPECT_GT(seen, 5000u);
+            if (mode.mode == render::Mode::points)
+                EXPECT_GT(open, seen / 4) << "a pixel a sample";
+            else
+                EXPECT_LE(open, seen / 500) << name << ", " << mode.name << ": at the border alone";
+            EXPECT_LE(off, seen / 50) << name << ", " << mode.name;
+        }
+    }
+}
+
+TEST(PatchSamples, AreEachOnceAndInTheirCell) {
+    const lod::Patch patch = test::patchOfHeights(50, 23, waves, 0.4);
+    PatchScene scene({patch});
+    lod::Chunk chunk = scene.chunk();
+    const size_t blocks = chunk.patchBlocks.size();
+    lod::samplesAsPoints(scene.hierarchy(), 0, chunk);
+    EXPECT_EQ(chunk.records.size(), lod::recordsOfSamples(blocks));
+    EXPECT_TRUE(chunk.patchBlocks.empty() && chunk.patchPlanes.empty());
+    const auto records = lod::withoutEmpty(chunk.records);
+    EXPECT_EQ(records.size(), patch.samples());
+    for (const shared::PointRecord& r : records) {
+        EXPECT_EQ(shared::recordErrorCode(r), 0u);
+        const glm::dvec3 q = glm::dvec3(shared::recordX(r), shared::recordY(r), shared::recordZ(r)) / 32768.0 - 1.0;
+        double nearest = HUGE_VAL;
+        const lod::PatchSurface surface(patch);
+        for (size_t s = 0; s < patch.heights.size(); ++s)
+            if (patch.heights[s] != 0) nearest = std::min(nearest, glm::length(surface.position(s) - q));
+        EXPECT_LE(nearest, std::sqrt(3.0) / 65536 + 1.0 / 65536) << "half a step each way, and the step's middle";
     }
 }
 

@@ -3,8 +3,10 @@
 #include <stdexcept>
 
 #include "engine/base/rng.h"
+#include "engine/render/disc_sizes.h"
 #include "lod/primitives/codecs.h"
 #include "lod/primitives/octahedral.h"
+#include "lod/primitives/patch_samples.h"
 #include "lod/store/patch_bytes.h"
 
 namespace stipple::test {
@@ -48,12 +50,17 @@ const render::DrawList& PatchScene::drawsOf(const lod::View& view, const render:
 render::Image PatchScene::draw(render::Backend& backend, const lod::View& view, render::Mode mode,
                                const render::DrawSettings& settings, const lod::Instance& place) {
     const render::DrawList& draws = drawsOf(view, settings, place);
+    render::DiscSizes sizes(backend);
+    sizes.addSource(hierarchy_);
+    lod::Chunk chunk = chunk_;
+    if (settings.patchAs == lod::kPatchesAsSamples) lod::samplesAsPoints(hierarchy_, 0, chunk);
     render::Image image;
     const render::RenderRequest request{&draws, mode, render::passesOf(mode, render::contentOf(draws), draws.effects),
                                         true};
-    auto status = backend.upload({0, 0}, chunk_);
+    auto status = sizes.upload({0, 0}, chunk);
+    render::markDiscSizes(sizes, draws_);
     if (status) status = backend.render(request, image);
-    backend.evict({0, 0});
+    sizes.evict({0, 0});
     if (!status) throw std::runtime_error(status.error().line());
     for (float& depth : image.depth)  // orthographic: counted from the eye that was asked for
         if (depth > 0) depth = static_cast<float>(depth + draws.eyeAdvanced);
