@@ -19,10 +19,18 @@ PatchDisc discOf(PatchBlocks of, uint block, DrawMesh m, uint s) {
 ivec4 wholePicture() { return ivec4(0, 0, int(frame.width) - 1, int(frame.height) - 1); }
 ivec4 withinPicture(ivec4 box) { return ivec4(max(box.xy, ivec2(0)), min(box.zw, wholePicture().zw)); }
 
+// Which sides is a place beyond? Before the near plane, or beside the picture.
+uint sidesOf(vec3 p) {
+    const float w = lensDepth(frameLensHere(), p.z);
+    const vec2 at = p.xy * frame.focal, low = -(frame.centre + 1.0) * w, high = (vec2(frame.width, frame.height) + 1.0 - frame.centre) * w;
+    return (p.z < frame.nearPlane ? 1u : 0u) | (at.x < low.x ? 2u : 0u) | (at.x > high.x ? 4u : 0u) | (at.y < low.y ? 8u : 0u) |
+           (at.y > high.y ? 16u : 0u);
+}
+
 ivec4 boxOfCorners(vec3 a, vec3 b, vec3 c) {
     ivec2 p, q, r;
     const bool isIn = snapCorner(a, p) && snapCorner(b, q) && snapCorner(c, r);
-    if (!isIn) return wholePicture();
+    if (!isIn) return (sidesOf(a) & sidesOf(b) & sidesOf(c)) != 0u ? ivec4(0, 0, -1, -1) : wholePicture();
     const int margin = 4;  // 1/64 px: corners are rounded
     const ivec2 least = min(p, min(q, r)) - margin, most = max(p, max(q, r)) + margin;
     return withinPicture(ivec4((least + 127) >> 8, (most - 128) >> 8));

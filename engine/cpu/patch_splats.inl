@@ -3,12 +3,6 @@
 constexpr int kSplatStretch = 8;             ///< most splats are a few pixels wide
 constexpr int64_t kLargeSplatPixels = 4096;  ///< from this many pixels on a splat's rows are shared out
 
-/// Pixels whose rays may meet a splat; none where last < first.
-struct PixelBox {
-    int fromX, toX, fromY, toY;
-    bool isEmpty() const { return toX < fromX || toY < fromY; }
-};
-
 /// Offers the pixels of rows [firstRow, lastRow] whose rays meet something: hit(ray, more) gives a depth and, in
 /// `more`, what is added to the id.
 template <typename Hit>
@@ -35,58 +29,36 @@ template <typename Hit>
     }
 }
 
-/// A cell, or a disc.
-struct PatchSplat {
-    bool isDisc;
-    vec3 a[3], b[3];  ///< corners of both triangles
+/// The two triangles of a cell, corner by corner.
+struct CellSplat {
+    vec3 a0, a1, a2, b0, b1, b2;
+};
+/// The disc of a sample.
+struct DiscSplat {
     PatchDisc disc;
-    const DrawMesh* mesh;
+    DrawMesh mesh;
 };
 
 /// Rows [firstRow, lastRow] of one splat.
-void fillSplat(const FrameConstants& f, const PatchSplat& s, const PixelBox& box, int firstRow, int lastRow,
-               uint64_t id, const Visibility& visibility) {
+void fillSplat(const FrameConstants& f, const CellSplat& s, const PixelBox& box, int firstRow, int lastRow, uint64_t id,
+               const Visibility& visibility) {
     const float nearPlane = f.nearPlane;
-    if (s.isDisc) {
-        const PatchDisc disc = s.disc;
-        const DrawMesh mesh = *s.mesh;
-        fillBox(f, box, firstRow, lastRow, id, visibility, [&](const PixelRay& ray, uint32_t& more) {
-            more = 0;
-            return patchDiscHit(disc, mesh, ray, nearPlane).x;
-        });
-        return;
-    }
-    const vec3 a0 = s.a[0], a1 = s.a[1], a2 = s.a[2], b0 = s.b[0], b1 = s.b[1], b2 = s.b[2];
+    const CellSplat c = s;
     fillBox(f, box, firstRow, lastRow, id, visibility, [&](const PixelRay& ray, uint32_t& more) {
-        const float first = patchTriangleDepth(ray, a0, a1, a2, nearPlane),
-                    second = patchTriangleDepth(ray, b0, b1, b2, nearPlane);
+        const float first = patchTriangleDepth(ray, c.a0, c.a1, c.a2, nearPlane),
+                    second = patchTriangleDepth(ray, c.b0, c.b1, c.b2, nearPlane);
         more = second < first ? 1u : 0u;
         return second < first ? second : first;
     });
 }
-
-[[gnu::always_inline]] inline uint32_t cellCorner(uint32_t cell) {
-    return kPatchStride * (cell / kPatchCellsAcross) + cell % kPatchCellsAcross;
-}
-
-/// Pixels around the four corners of a cell; all of the picture where one of them lies before the near plane.
-[[gnu::always_inline]] inline PixelBox boxOfCell(const FrameConstants& f, const PlacedCorners& p, uint32_t at) {
-    const uint32_t c[4] = {at, at + 1, at + kPatchStride, at + kPatchStride + 1};
-    const int right = static_cast<int>(f.width) - 1, bottom = static_cast<int>(f.height) - 1;
-    int minX = p.px[c[0]], maxX = minX, minY = p.py[c[0]], maxY = minY, clip = p.clip[c[0]];
-    for (size_t k = 1; k < 4; ++k) {
-        const int x = p.px[c[k]], y = p.py[c[k]];
-        minX = x < minX ? x : minX;
-        maxX = x > maxX ? x : maxX;
-        minY = y < minY ? y : minY;
-        maxY = y > maxY ? y : maxY;
-        clip |= p.clip[c[k]];
-    }
-    if (clip != 0) return {0, right, 0, bottom};
-    constexpr int kMargin = 4;  // 1/64 px: corners are rounded
-    const int fromX = (minX - kMargin + 127) >> 8, toX = (maxX + kMargin - 128) >> 8;
-    const int fromY = (minY - kMargin + 127) >> 8, toY = (maxY + kMargin - 128) >> 8;
-    return {fromX < 0 ? 0 : fromX, toX > right ? right : toX, fromY < 0 ? 0 : fromY, toY > bottom ? bottom : toY};
+void fillSplat(const FrameConstants& f, const DiscSplat& s, const PixelBox& box, int firstRow, int lastRow, uint64_t id,
+               const Visibility& visibility) {
+    const float nearPlane = f.nearPlane;
+    const DiscSplat d = s;
+    fillBox(f, box, firstRow, lastRow, id, visibility, [&](const PixelRay& ray, uint32_t& more) {
+        more = 0;
+        return patchDiscHit(d.disc, d.mesh, ray, nearPlane).x;
+    });
 }
 
 /// Pixels around a sphere that holds a disc.
@@ -108,26 +80,21 @@ void fillSplat(const FrameConstants& f, const PatchSplat& s, const PixelBox& box
     return box;
 }
 
-[[gnu::always_inline]] inline PatchSplat cellSplat(const PlacedCorners& p, const int32_t* heights, uint32_t at,
-                                                   const DrawMesh* mesh) {
-    PatchSplat s{};
-    s.mesh = mesh;
+[[gnu::always_inline]] inline CellSplat cellSplat(const PlacedCorners& p, const int32_t* heights, uint32_t at) {
+    const auto corners = [&](uint32_t k) {
+        return patchTriangle(at, heights[at], heights[at + 1], heights[at + kPatchStride],
+                             heights[at + kPatchStride + 1], k);
+    };
     const auto place = [&](uint32_t corner) { return vec3(p.x[corner], p.y[corner], p.z[corner]); };
-    for (uint32_t k = 0; k < 2; ++k) {
-        const uint32_t t = patchTriangle(at, heights[at], heights[at + 1], heights[at + kPatchStride],
-                                         heights[at + kPatchStride + 1], k);
-        for (uint32_t c = 0; c < 3; ++c) (k == 0 ? s.a : s.b)[c] = place(t >> (8 * c) & 255u);
-    }
-    return s;
+    const uint32_t a = corners(0), b = corners(1);
+    return {place(a & 255u), place(a >> 8 & 255u), place(a >> 16),
+            place(b & 255u), place(b >> 8 & 255u), place(b >> 16)};
 }
-[[gnu::always_inline]] inline PatchSplat discSplat(const PatchBlock& block, const vec3& place, uint32_t sample,
-                                                   const DrawMesh* mesh) {
-    PatchSplat s{};
-    s.mesh = mesh;
-    s.isDisc = true;
-    s.disc = patchDisc(place, octDecode(block.normals[sample]), float(int(sample % kPatchStride)),
-                       float(int(sample / kPatchStride)), *mesh);
-    return s;
+[[gnu::always_inline]] inline DiscSplat discSplat(const PatchBlock& block, const vec3& place, uint32_t sample,
+                                                  const DrawMesh& mesh) {
+    return {patchDisc(place, octDecode(block.normals[sample]), float(int(sample % kPatchStride)),
+                      float(int(sample / kPatchStride)), mesh),
+            mesh};
 }
 
 /// Splats of a block: cells, or, direct, samples. `use(splat, box, lane)`.
@@ -141,7 +108,7 @@ template <typename Use>
     if (f.patchAs == kPatchDirect) {
         for (uint32_t s = 0; s < kPatchSamples; ++s) {
             if (heights[s] == 0) continue;
-            const PatchSplat splat = discSplat(block, vec3(p.x[s], p.y[s], p.z[s]), s, source.mesh);
+            const DiscSplat splat = discSplat(block, vec3(p.x[s], p.y[s], p.z[s]), s, *source.mesh);
             const PixelBox box = boxOfDisc(f, splat.disc);
             if (!box.isEmpty()) use(splat, box, s);
         }
@@ -152,7 +119,7 @@ template <typename Use>
         for (uint32_t left = block.cells[word]; left != 0; left &= left - 1) {
             const uint32_t cell = 32 * word + static_cast<uint32_t>(__builtin_ctz(left)), at = cellCorner(cell);
             const PixelBox box = boxOfCell(f, p, at);
-            if (!box.isEmpty()) use(cellSplat(p, heights, at, source.mesh), box, 2 * cell);
+            if (!box.isEmpty()) use(cellSplat(p, heights, at), box, 2 * cell);
         }
 }
 
@@ -161,7 +128,7 @@ void splatPatch(const FrameConstants& frame, const PatchSource& source, uint32_t
     const FrameConstants f = frame;
     const uint64_t firstId = drawId(f.firstBlock.of[kKindPatches], firstPlace);
     const int last = static_cast<int>(f.height) - 1;
-    forSplats(f, source, [&](const PatchSplat& s, const PixelBox& box, uint32_t lane) {
+    forSplats(f, source, [&](const auto& s, const PixelBox& box, uint32_t lane) {
         if (int64_t{box.toX - box.fromX + 1} * (box.toY - box.fromY + 1) > kLargeSplatPixels)
             large.keep(large.context, {&source, firstPlace, lane});
         else
@@ -176,7 +143,7 @@ void splatLarge(const FrameConstants& frame, const LargeSplat* splats, size_t co
         const LargeSplat& of = splats[i];
         const uint64_t firstId = drawId(f.firstBlock.of[kKindPatches], of.firstPlace);
         size_t next = i;  // those of a block follow each other, in the order of lanes
-        forSplats(f, *of.source, [&](const PatchSplat& s, const PixelBox& box, uint32_t lane) {
+        forSplats(f, *of.source, [&](const auto& s, const PixelBox& box, uint32_t lane) {
             if (next < count && splats[next].source == of.source && splats[next].lane == lane) {
                 fillSplat(f, s, box, static_cast<int>(firstRow), static_cast<int>(lastRow), firstId + lane, visibility);
                 ++next;

@@ -27,6 +27,50 @@
     }
 }
 
+/// Pixels whose rays may meet something; none where last < first.
+struct PixelBox {
+    int fromX, toX, fromY, toY;
+    bool isEmpty() const { return toX < fromX || toY < fromY; }
+};
+
+[[gnu::always_inline]] inline uint32_t cellCorner(uint32_t cell) {
+    return kPatchStride * (cell / kPatchCellsAcross) + cell % kPatchCellsAcross;
+}
+
+/// Do all four lie before the near plane, or beyond one side of the picture?
+bool isBeside(const FrameConstants& f, const PlacedCorners& p, const uint32_t* c) {
+    const Lens lens = lensHere(f.focal);
+    const float width = float(int(f.width)), height = float(int(f.height));
+    uint32_t out = 31;
+    for (size_t k = 0; k < 4; ++k) {
+        const float x = p.x[c[k]] * f.focal, y = p.y[c[k]] * f.focal, z = p.z[c[k]], w = lensDepth(lens, z);
+        out &= (z < f.nearPlane ? 1u : 0u) | (x < -(f.centre.x + 1.0f) * w ? 2u : 0u) |
+               (x > (width + 1.0f - f.centre.x) * w ? 4u : 0u) | (y < -(f.centre.y + 1.0f) * w ? 8u : 0u) |
+               (y > (height + 1.0f - f.centre.y) * w ? 16u : 0u);
+    }
+    return out != 0;
+}
+
+/// Pixels around the four corners of a cell; all of the picture where some of them lie before the near plane.
+[[gnu::always_inline]] inline PixelBox boxOfCell(const FrameConstants& f, const PlacedCorners& p, uint32_t at) {
+    const uint32_t c[4] = {at, at + 1, at + kPatchStride, at + kPatchStride + 1};
+    const int right = static_cast<int>(f.width) - 1, bottom = static_cast<int>(f.height) - 1;
+    int minX = p.px[c[0]], maxX = minX, minY = p.py[c[0]], maxY = minY, clip = p.clip[c[0]];
+    for (size_t k = 1; k < 4; ++k) {
+        const int x = p.px[c[k]], y = p.py[c[k]];
+        minX = x < minX ? x : minX;
+        maxX = x > maxX ? x : maxX;
+        minY = y < minY ? y : minY;
+        maxY = y > maxY ? y : maxY;
+        clip |= p.clip[c[k]];
+    }
+    if (clip != 0) return isBeside(f, p, c) ? PixelBox{0, -1, 0, -1} : PixelBox{0, right, 0, bottom};
+    constexpr int kMargin = 4;  // 1/64 px: corners are rounded
+    const int fromX = (minX - kMargin + 127) >> 8, toX = (maxX + kMargin - 128) >> 8;
+    const int fromY = (minY - kMargin + 127) >> 8, toY = (maxY + kMargin - 128) >> 8;
+    return {fromX < 0 ? 0 : fromX, toX > right ? right : toX, fromY < 0 ? 0 : fromY, toY > bottom ? bottom : toY};
+}
+
 void rasterPatch(const FrameConstants& frame, const PatchSource& source, uint32_t firstPlace, const LargeSink& large,
                  const Visibility& visibility) {
     const FrameConstants f = frame;
@@ -39,8 +83,8 @@ void rasterPatch(const FrameConstants& frame, const PatchSource& source, uint32_
     const uint64_t firstId = drawId(f.firstBlock.of[kKindPatches], firstPlace);
     for (uint32_t word = 0; word < 4; ++word)
         for (uint32_t left = block.cells[word]; left != 0; left &= left - 1) {
-            const uint32_t cell = 32 * word + static_cast<uint32_t>(__builtin_ctz(left));
-            const uint32_t at = kPatchStride * (cell / kPatchCellsAcross) + cell % kPatchCellsAcross;
+            const uint32_t cell = 32 * word + static_cast<uint32_t>(__builtin_ctz(left)), at = cellCorner(cell);
+            if (boxOfCell(f, p, at).isEmpty()) continue;  // most cells that are less than a pixel
             for (uint32_t k = 0; k < 2; ++k) {
                 const uint32_t t = patchTriangle(at, heights[at], heights[at + 1], heights[at + kPatchStride],
                                                  heights[at + kPatchStride + 1], k);

@@ -7,7 +7,7 @@
         const PatchSource& source = blocks[p.id[i] / kBlockLanes];
         const PatchBlock& block = *source.block;
         const uint32_t cell = p.id[i] % kBlockLanes / 2;
-        const uint32_t at = kPatchStride * (cell / kPatchCellsAcross) + cell % kPatchCellsAcross;
+        const uint32_t at = cellCorner(cell);
         const uint32_t t =
             patchTriangle(at, patchHeight(block, at), patchHeight(block, at + 1), patchHeight(block, at + kPatchStride),
                           patchHeight(block, at + kPatchStride + 1), p.id[i] & 1u);
@@ -53,7 +53,7 @@ void mixDirect(const FrameConstants& f, const ResolveInput& in, const WinningPix
         const int i0 = static_cast<int>(block.place & 0xffffu), j0 = static_cast<int>(block.place >> 16);
         const vec3 place = meshPosition(i0 + static_cast<int>(s % kPatchStride),
                                         j0 + static_cast<int>(s / kPatchStride), patchHeight(block, s), m);
-        const PatchDisc disc = discSplat(block, place, s, &m).disc;
+        const PatchDisc disc = discSplat(block, place, s, m).disc;
         const PatchMix mix = patchMix(patchDiscHit(disc, m, rays.at(p.pixel[k]), f.nearPlane));
         vec3 normal = vec3(0, 0, 0), colour = vec3(0, 0, 0);
         float sum = 0;
