@@ -88,7 +88,7 @@ Result<void> run(const Options& o, bool& isSilent) {
     }
     for (const std::string& note : allNotes(r)) fmt::print(stderr, "note: {}\n", printable(note));
     const std::string& what = r.primitive;
-    const bool isMesh = what == "triangle";
+    const bool isMesh = what == "triangle" && !o.build.patches.isAsked;
     fmt::print("{}: {} in {}, {} ({:.1f} bytes a {}), {:.2f} s, {:.2f} M {}s/s, peak memory {}\n", o.output,
                counted(r.pointsOut, what), counted(r.nodes, isMesh ? "group" : "node"), humanBytes(r.bytesOut),
                static_cast<double>(r.bytesOut) / static_cast<double>(r.pointsOut), what, r.seconds,

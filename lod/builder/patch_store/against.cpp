@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "engine/base/process.h"
 #include "engine/base/queue.h"
 #include "lod/builder/patches/mesh_surface.h"
 #include "lod/verify/patches.h"
@@ -45,7 +46,7 @@ class Measuring {
         out_.stated = store.description.roundingUnits;
         stated_ = out_.stated / h_.unit * (1 + 1e-9);
         // What is farther is told as that far at least.
-        reach_ = 64 * stated_ + 1;
+        reach_ = 2 * stated_;
         nearest_.assign(places_.size(), reach_);
         placesNear_.resize(h_.nodes.size());
         made_.resize(h_.nodes.size());
@@ -58,10 +59,12 @@ class Measuring {
         CompletionQueue<Error> errors;
         executor.parallelFor(h_.nodes.size(), 1, [&](size_t begin, size_t end) {
             for (size_t n = begin; n < end; ++n)
-                if (h_.nodes[n].isLeaf())
+                if (h_.nodes[n].isLeaf() && !isStopRequested())
                     if (const auto done = leaf(static_cast<uint32_t>(n)); !done) errors.push(done.error());
         });
         if (const auto found = errors.takeAll(); !found.empty()) return tl::unexpected(found.front());
+        if (isStopRequested())
+            return fail(ErrorKind::interrupted, "interrupted; not all of it was measured", store_.path);
         for (uint32_t n = 0; n < made_.size(); ++n) {
             const OfLeaf& leaf = made_[n];
             for (size_t i = 0; i < leaf.found.size(); ++i) {
