@@ -63,7 +63,7 @@ void ModeOptions::addTo(CLI::App& sub, bool hasReference) {
         ->capture_default_str();
     sub.add_option("--patch-as", patchAs,
                    "elevation patches as strips (triangles), splats (cells that rays meet), samples (points of the "
-                   "mode), or auto: strips, which are the fastest")
+                   "mode), or auto: strips")
         ->check(oneOf({"strips", "splats", "samples", "auto"}))
         ->capture_default_str();
     sub.add_option("--interpolate", interpolate,
