@@ -12,6 +12,7 @@
 #include "apps/stipple/ply_meshes.h"
 #include "engine/base/process.h"
 #include "engine/base/words.h"
+#include "engine/scene/place_looks.h"
 #include "engine/scene/triangles.h"
 #include "lod/builder/points/input_colours.h"
 #include "lod/import/import.h"
@@ -26,6 +27,9 @@ namespace fs = std::filesystem;
 /// What is made patches of: the one or the other.
 struct Source {
     lod::TriangleMesh mesh;
+    lod::PlaceLooks looks;  ///< of the mesh, from `scene` and `images`
+    std::unique_ptr<scene::Scene> scene;
+    std::vector<scene::DecodedImage> images;
     lod::PointBlock points;
     bool isMesh = false, isTwoSided = false, isUnlit = false;
 };
@@ -74,13 +78,18 @@ bool isBlack(const std::vector<uint32_t>& colours) {
 Result<Source> readSource(const PatchConversion& o, std::vector<std::string>& notes) {
     Source out;
     if (isSceneFile(o.input)) {
-        STIPPLE_ASSIGN(const scene::Scene scene, scene::readScene(o.input, o.build.reading()));
+        STIPPLE_ASSIGN(scene::Scene scene, scene::readScene(o.input, o.build.reading()));
         STIPPLE_ASSIGN(out.mesh, collect(scene::triangleSource(scene, scene::placements(scene)), o.output));
         out.isMesh = !out.mesh.indices.empty();
-        bakeMaterials(scene, out.mesh);
-        if (out.isMesh && hasTextures(scene))
-            notes.emplace_back("textures are left out: patches have the colours of vertices and materials alone");
-        if (out.isMesh) return out;
+        if (out.isMesh) {
+            STIPPLE_ASSIGN(out.images, decodeImages(scene, o.build.reading().memoryBytes));
+            out.scene = std::make_unique<scene::Scene>(std::move(scene));
+            out.looks = scene::placeLooks(*out.scene, out.images);
+            if (scene::hasTextures(*out.scene))
+                notes.emplace_back(
+                    "textures become colours and normals of samples; --patch-samples N for more of them");
+            return out;
+        }
     } else if (const auto faces = lod::plyFaces(o.input); faces && faces->any() && !o.build.onlyPoints) {
         STIPPLE_ASSIGN(const lod::MeshSource source,
                        lod::openPlyMesh(o.input, o.build.reading().memoryBytes, fs::temp_directory_path().string()));
@@ -313,11 +322,13 @@ Result<void> convertToPatches(const PatchConversion& given) {
         isMesh = source.isMesh;
         isUnlit = source.isUnlit;
         o.settings.isTwoSided = source.isTwoSided;
+        o.settings.looks = source.looks;
         if (!isMesh && source.points.position.empty()) return fail(ErrorKind::input, "holds no points", o.input);
         progress.plan(isMesh ? std::vector<JobPlan::Stage>{{"patches", 1}}
                              : std::vector<JobPlan::Stage>{{"normals", 0.4}, {"patches", 0.6}});
         set = isMesh ? lod::patchesOfMesh(std::move(source.mesh), o.settings, *executor, progress)
                      : lod::patchesOfPoints(std::move(source.points), o.settings, *executor, progress);
+        o.settings.looks = nullptr;  // they are of `source`
         STIPPLE_TRY(checkStopped(o.output));
         for (const std::string& note : notes) progress.say(note);
     }

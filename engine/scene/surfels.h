@@ -5,15 +5,10 @@
 #include <memory>
 
 #include "engine/scene/scene.h"
+#include "engine/scene/texture_lookup.h"
 #include "lod/primitives/primitives.h"
 
 namespace stipple::scene {
-
-/// 8-bit RGBA, sRGB.
-struct DecodedImage {
-    uint32_t width = 0, height = 0;
-    std::vector<uint32_t> rgba;
-};
 
 struct SurfelSettings {
     uint64_t count = 2'000'000;  ///< aimed at, over all visible meshes; 0: only points that are there

@@ -13,12 +13,29 @@
 namespace stipple::scene {
 namespace {
 
+const std::array<TextureUse Material::*, 5> kUses{&Material::baseColourTexture, &Material::normalTexture,
+                                                  &Material::metallicRoughnessTexture, &Material::emissiveTexture,
+                                                  &Material::occlusionTexture};
+
+}  // namespace
+
+TextureUse leadingUse(const Material& m) {
+    for (const auto use : kUses)
+        if ((m.*use).texture >= 0) return m.*use;
+    return {};
+}
+
+bool isOnLeading(const Scene& scene, const TextureUse& use, const TextureUse& leading) {
+    return use.texture >= 0 && use.uvSet == leading.uvSet &&
+           scene.textures[static_cast<size_t>(use.texture)].image >= 0;
+}
+
+namespace {
+
 /// The last material stands for "none": white, not metallic.
 uint32_t materialIndex(const Scene& scene, const Primitive& p) {
     return p.material < 0 ? static_cast<uint32_t>(scene.materials.size()) : static_cast<uint32_t>(p.material);
 }
-
-TextureUse leadingUse(const Material& m);
 
 uint32_t surfaceOf(const Scene& scene, const Primitive& p) {
     uint32_t surface = materialIndex(scene, p);
@@ -41,23 +58,11 @@ uint32_t packedColour(const glm::vec4& c) {
     return byte(c.r) | byte(c.g) << 8 | byte(c.b) << 16 | unitToByte(c.a) << 24;
 }
 
-const std::array<TextureUse Material::*, 5> kUses{&Material::baseColourTexture, &Material::normalTexture,
-                                                  &Material::metallicRoughnessTexture, &Material::emissiveTexture,
-                                                  &Material::occlusionTexture};
-
-/// Vertices have one set of coordinates: that of the first texture in the order above, with its transform applied.
-TextureUse leadingUse(const Material& m) {
-    for (const auto use : kUses)
-        if ((m.*use).texture >= 0) return m.*use;
-    return {};
-}
-
 shared::TextureSlot slotOf(const Scene& scene, const TextureUse& use, const TextureUse& leading) {
     shared::TextureSlot slot{};
     slot.rowU = {1, 0, 0};
     slot.rowV = {0, 1, 0};
-    if (use.texture < 0 || use.uvSet != leading.uvSet || scene.textures[static_cast<size_t>(use.texture)].image < 0)
-        return slot;
+    if (!isOnLeading(scene, use, leading)) return slot;
     slot.texture = static_cast<uint32_t>(use.texture) + 1;
     if (use.transform == leading.transform || glm::determinant(leading.transform) == 0) return slot;
     const glm::mat3 t = use.transform * glm::inverse(leading.transform);

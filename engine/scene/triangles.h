@@ -18,6 +18,12 @@ std::vector<Placement> placements(const Scene& scene);
 /// source reads `scene`, which must stay.
 lod::MeshSource triangleSource(const Scene& scene, std::vector<Placement> placed);
 
+/// Vertices have one set of coordinates: that of the first texture of the material (colour, normal, metal and
+/// roughness, emission, occlusion), with its transform applied.
+TextureUse leadingUse(const Material& m);
+/// Is there a picture, on the same set of coordinates as the leading one?
+bool isOnLeading(const Scene& scene, const TextureUse& use, const TextureUse& leading);
+
 std::vector<shared::SurfaceMaterial> surfaceMaterials(const Scene& scene);
 
 /// What each texture of the scene is used for, with its wrap modes; pixels are not set.

@@ -335,7 +335,7 @@ class Patcher {
                 w = glm::clamp(weights(p, {static_cast<double>(s % grid_.width), static_cast<double>(s / grid_.width)}),
                                0.0, 1.0);
             if (const double sum = w.x + w.y; sum > 1) w /= sum;
-            const SurfaceLook l = s_.look(hit_[s], w.x, w.y);
+            const SurfaceLook l = s_.look(hit_[s], w.x, w.y, grid_.step);
             grid_.normals[s] = l.normal;
             grid_.colours[s] = l.colour;
         }

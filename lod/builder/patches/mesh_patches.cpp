@@ -104,7 +104,8 @@ class MeshPatches {
 }  // namespace
 
 PatchSet patchesOfMesh(TriangleMesh mesh, const PatchSettings& settings, Executor& executor, Progress& progress) {
-    const MeshSurface surface = meshSurface(std::move(mesh), executor);
+    MeshSurface surface = meshSurface(std::move(mesh), executor);
+    surface.looks = settings.looks;
     return MeshPatches(surface, settings, executor, progress).run();
 }
 

@@ -218,9 +218,39 @@ void smoothNormals(MeshSurface& s) {
 
 }  // namespace
 
-SurfaceLook MeshSurface::look(size_t t, double b, double c) const {
-    const auto weights = std::array{1 - b - c, b, c};
-    const glm::dvec3 face = glm::normalize(glm::cross(at(t, 1) - at(t, 0), at(t, 2) - at(t, 0)));
+namespace {
+
+using Weights = std::array<double, 3>;
+
+/// sRGB of vertices times a linear factor.
+uint32_t litColour(const glm::dvec3& srgb, const glm::vec3& factor) {
+    uint32_t out = 0;
+    for (int a = 0; a < 3; ++a) {
+        const float linear = shared::linearFromSrgb(static_cast<float>(srgb[a] / 255)) * factor[a];
+        out |= unitToByte(shared::srgbFromLinear(std::clamp(linear, 0.0f, 1.0f))) << (8 * a);
+    }
+    return out;
+}
+
+/// Of the triangle's texture coordinates: where a place lies in them, and how far they go in a step of `side`.
+struct PlaceInTexture {
+    glm::vec2 uv{0}, d1{0}, d2{0};
+    float side = 0;
+
+    PlaceInTexture(const std::array<glm::vec2, 3>& of, const Weights& w, double area2, double side_)
+        : d1(of[1] - of[0]), d2(of[2] - of[0]) {
+        uv = glm::vec2(w[0] * glm::dvec2(of[0]) + w[1] * glm::dvec2(of[1]) + w[2] * glm::dvec2(of[2]));
+        const double uvArea2 = std::abs(double{d1.x} * d2.y - double{d1.y} * d2.x);
+        if (area2 > 0) side = static_cast<float>(std::min(std::sqrt(uvArea2 / area2) * side_, 1e6));
+    }
+};
+
+}  // namespace
+
+SurfaceLook MeshSurface::look(size_t t, double b, double c, double side) const {
+    const Weights weights{1 - b - c, b, c};
+    const glm::dvec3 e1 = at(t, 1) - at(t, 0), e2 = at(t, 2) - at(t, 0), across2 = glm::cross(e1, e2);
+    const glm::dvec3 face = glm::normalize(across2);
     glm::dvec3 normal(0), colour(0);
     for (size_t k = 0; k < 3; ++k) {
         const uint32_t v = vertices[t][k];
@@ -237,7 +267,20 @@ SurfaceLook MeshSurface::look(size_t t, double b, double c) const {
     SurfaceLook out;
     const double length = glm::length(normal);
     out.normal = glm::vec3(length > 1e-6 ? normal / length : face);
-    for (int a = 0; a < 3; ++a) out.colour |= toWhole<uint32_t>(std::clamp(colour[a] + 0.5, 0.0, 255.0)) << (8 * a);
+    if (!looks || source.surface.empty() || source.uv.empty()) {
+        for (int a = 0; a < 3; ++a) out.colour |= toWhole<uint32_t>(std::clamp(colour[a] + 0.5, 0.0, 255.0)) << (8 * a);
+        return out;
+    }
+    const auto& v = vertices[t];
+    const PlaceInTexture place({source.uv[v[0]], source.uv[v[1]], source.uv[v[2]]}, weights, glm::length(across2),
+                               side);
+    const PlaceLook look = looks(source.surface[v[0]], place.uv, place.side);
+    out.colour = litColour(colour, look.colour);
+    if (look.normal == glm::vec3(0, 0, 1)) return out;
+    const glm::vec3 bumped = shared::bumpedNormal(out.normal, glm::vec3(e1), glm::vec3(e2), {place.d1.x, place.d1.y},
+                                                  {place.d2.x, place.d2.y}, look.normal);
+    if (const float n = glm::length(bumped); n > 1e-6f && glm::dot(bumped, glm::vec3(face)) > 0)
+        out.normal = bumped / n;
     return out;
 }
 

@@ -9,6 +9,7 @@
 #include "lod/builder/patches/elements.h"
 #include "lod/builder/patches/run_tree.h"
 #include "lod/primitives/mesh.h"
+#include "lod/primitives/place_look.h"
 
 namespace stipple::lod {
 
@@ -29,14 +30,15 @@ struct MeshSurface {
                                                     ///< where there is none, or more than one
     SurfaceElements elements;                       ///< triangles
     RunTree tree;
+    PlaceLooks looks;                         ///< of materials; empty: vertices say all
     bool isTwoSided = false;                  ///< some triangles are, or they do not agree on a side
     uint64_t triangles = 0;                   ///< of the source
     std::map<std::string, uint64_t> dropped;  ///< by reason
 
     size_t size() const { return corners.size(); }
     glm::dvec3 at(size_t triangle, size_t corner) const { return position[corners[triangle][corner]]; }
-    /// `b`, `c`: weights of the second and the third corner.
-    SurfaceLook look(size_t triangle, double b, double c) const;
+    /// `b`, `c`: weights of the second and the third corner; `side`: of the square that it stands for, scene units.
+    SurfaceLook look(size_t triangle, double b, double c, double side = 0) const;
     /// The nearest triangle and its distance (scene units); `hint`: one that may be near.
     std::pair<double, size_t> nearest(const glm::dvec3& p, size_t hint) const;
     /// To one triangle.

@@ -11,6 +11,7 @@
 #include "engine/base/progress.h"
 #include "lod/primitives/mesh.h"
 #include "lod/primitives/patch.h"
+#include "lod/primitives/place_look.h"
 #include "lod/primitives/primitives.h"
 
 namespace stipple::lod {
@@ -27,6 +28,7 @@ struct PatchSettings {
     PatchClosing closing = PatchClosing::overlap;
     uint64_t samples = 0;  ///< aimed at; 0: as many as there are points or vertices (of a mesh kFewestSamples at least)
     bool isTwoSided = false;  ///< points are seen from both sides (those without normals always are)
+    PlaceLooks looks;         ///< of a mesh: colours and normals that are not of its vertices
     std::function<bool()> isStopped;
 };
 constexpr uint64_t kFewestSamples = 20'000;

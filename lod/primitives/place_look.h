@@ -1,0 +1,19 @@
+// What the materials of a mesh say of a place between its vertices: for what is made of the mesh and keeps no textures.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <glm/glm.hpp>
+
+namespace stipple::lod {
+
+struct PlaceLook {
+    glm::vec3 colour{1};        ///< linear; times that of the vertices
+    glm::vec3 normal{0, 0, 1};  ///< in the triangle's tangents: x along u, y against v
+};
+
+/// `surface`: of the triangle's vertices; `uv`: of the place; `side`: of the square that is averaged over, in texture
+/// coordinates.
+using PlaceLooks = std::function<PlaceLook(uint32_t surface, const glm::vec2& uv, float side)>;
+
+}  // namespace stipple::lod
