@@ -20,13 +20,11 @@ struct Shown {
 };
 
 struct Case {
-    std::array<uint32_t, 3> blocks;  ///< points, curves, triangles
-    shared::BlockRanges first() const {
-        return {{0, blocks[0], blocks[0] + blocks[1], blocks[0] + blocks[1] + blocks[2]}};
-    }
+    std::array<uint32_t, 4> blocks;  ///< points, curves, triangles, patches
+    shared::BlockRanges first() const { return {{0, firstOf(1), firstOf(2), firstOf(3), firstOf(4)}}; }
     uint32_t firstOf(uint32_t kind) const {
         uint32_t sum = 0;
-        for (uint32_t k = 0; k < std::min(kind, 3u); ++k) sum += blocks.at(k);
+        for (uint32_t k = 0; k < std::min(kind, 4u); ++k) sum += blocks.at(k);
         return sum;
     }
     uint64_t keyOf(const Shown& s) const {
@@ -36,20 +34,21 @@ struct Case {
 };
 
 // Frames of one kind, of all, and as many blocks as there may be: their ids need all 33 bits.
-const std::vector<Case> kCases{{{5, 0, 0}},
-                               {{0, 3, 0}},
-                               {{0, 0, 7}},
-                               {{3, 1, 2}},
-                               {{1000, 2000, 3000}},
-                               {{1u << 23, 1u << 22, (1u << 24) - (1u << 22) - 1}},
-                               {{0, (1u << 24) - 1, (1u << 24) - 1}}};
+const std::vector<Case> kCases{{{5, 0, 0, 0}},
+                               {{0, 3, 0, 0}},
+                               {{0, 0, 7, 0}},
+                               {{0, 0, 0, 4}},
+                               {{3, 1, 2, 5}},
+                               {{1000, 2000, 3000, 4000}},
+                               {{1u << 23, 1u << 22, 1u << 22, (1u << 23) - 1}},
+                               {{0, 0, (1u << 24) - 1, (1u << 24) - 1}}};
 
 std::vector<Shown> someOf(const Case& c, Rng& rng) {
     std::vector<Shown> all;
     const std::array<float, 7> depths{
         std::numeric_limits<float>::denorm_min(), 1e-30f, 1.0f, std::nextafter(1.0f, 2.0f), 7.5f, 3e38f,
         std::numeric_limits<float>::infinity()};
-    for (uint32_t kind = 0; kind < 4; ++kind) {
+    for (uint32_t kind = 0; kind < 5; ++kind) {
         const uint32_t blocks = c.blocks.at(kind == shared::kKindDiscs ? 0 : kind);
         for (int k = 0; k < 60 && blocks > 0; ++k) {
             const uint32_t block = k == 0 ? 0 : k == 1 ? blocks - 1 : static_cast<uint32_t>(rng.next() % blocks);
