@@ -6,12 +6,8 @@ layout(set = 0, binding = kTriangleWordsBinding, scalar) readonly buffer Triangl
 layout(set = 0, binding = kEnvironmentBinding, scalar) readonly buffer EnvironmentBlock { float environment[]; };
 #include "shared/environment.h"
 
-vec3 lightOf(Surface s, vec3 point) {
-    vec3 colour;
-    if (frame.hasEnvironment != 0u)
-        colour = frame.ambient * reflectEnvironment(s, frame.environmentX, frame.environmentY, frame.environmentZ);
-    else
-        colour = frame.ambient * reflectSky(s, frame.skyDirection);
+// `colour`, and what lights of the scene's own, or the sun, send back.
+vec3 withLights(vec3 colour, Surface s, vec3 point) {
     if (frame.lightCount == 0u && frame.hasEnvironment == 0u) colour += reflectLight(s, frame.sunDirection, vec3(0.75));
     for (uint k = 0u; k < frame.lightCount; ++k) {
         const LightSource light = lights[k];
@@ -19,6 +15,15 @@ vec3 lightOf(Surface s, vec3 point) {
         colour += reflectLight(s, normalize(l), light.colour * lightAt(light, point, point.z));
     }
     return colour;
+}
+
+vec3 lightOf(Surface s, vec3 point) {
+    vec3 colour;
+    if (frame.hasEnvironment != 0u)
+        colour = frame.ambient * reflectEnvironment(s, frame.environmentX, frame.environmentY, frame.environmentZ, frame.environmentSharp);
+    else
+        colour = frame.ambient * reflectSky(s, frame.skyDirection);
+    return withLights(colour, s, point);
 }
 
 // `colour`, `normal`: of the words.
@@ -39,6 +44,7 @@ vec3 litColour(SurfaceWords words, vec3 colour, vec3 normal, uvec2 pixel) {
     s.roughness = float(words.material >> 8 & 255u) / 255.0;
     s.occlusion = float(words.material >> 16 & 255u) / 255.0;
     s.leaf = leaf;
+    s.dielectric = vec3(kDielectric);
     vec3 lit = lightOf(s, alongRay(ray, words.depth));
     if (isTriangle) {
         const uint e = triangleWords[2u * (pixel.y * frame.width + pixel.x) + 1u];

@@ -265,6 +265,51 @@ scene::Scene growMeadow(const LandscapeOptions& o) {
     return s;
 }
 
+namespace {
+
+/// A ball of radius 1 that stands on the ground.
+scene::Mesh growBall(const char* name, int material) {
+    constexpr uint32_t kAround = 128, kUp = kAround / 2;
+    constexpr double kPi = 3.14159265358979323846;
+    scene::Primitive p;
+    for (uint32_t j = 0; j <= kUp; ++j)
+        for (uint32_t i = 0; i <= kAround; ++i) {
+            const double a = 2 * kPi * i / kAround, b = kPi * j / kUp;
+            p.normal.emplace_back(std::cos(a) * std::sin(b), std::cos(b), std::sin(a) * std::sin(b));
+            p.position.push_back(p.normal.back() + glm::vec3(0, 1, 0));
+            if (i == 0 || j == 0) continue;
+            const auto d = static_cast<uint32_t>(p.position.size() - 1), c = d - 1, upper = d - (kAround + 1),
+                       left = upper - 1;
+            p.indices.insert(p.indices.end(), {left, upper, d, left, d, c});
+        }
+    p.material = material;
+    scene::Mesh mesh;
+    mesh.name = name;
+    mesh.primitives.push_back(std::move(p));
+    return mesh;
+}
+
+/// Two balls of glass and two mirrors in the grass.
+void addBalls(scene::Scene& s, const Ground& ground) {
+    scene::Material glass, mirror;
+    glass.name = "glass";
+    glass.metallic = glass.roughness = 0;
+    glass.optics = *lod::opticsNamed("glass");
+    glass.optics.thickness = 2;
+    glass.optics.attenuationDistance = 3;
+    glass.optics.attenuationColour = {0.8f, 0.95f, 0.9f};
+    mirror.name = "mirror";
+    mirror.baseColour = {0.95f, 0.93f, 0.88f, 1};
+    mirror.roughness = 0;
+    for (const auto& [material, x] : {std::pair{&glass, -6.0}, {&mirror, 6.0}}) {
+        s.materials.push_back(*material);
+        const int mesh = addMesh(s, growBall(material->name.c_str(), static_cast<int>(s.materials.size()) - 1));
+        addNode(s, material->name.c_str(), mesh, {ground.place(x, 24, 0, 2), ground.place(0.6 * x, 29, 0, 1.2)});
+    }
+}
+
+}  // namespace
+
 scene::Scene growDemo(const LandscapeOptions& o, const std::string& store) {
     constexpr double kScan = 16;  ///< metres round the middle that the scan covers
     scene::Scene s;
@@ -300,6 +345,7 @@ scene::Scene growDemo(const LandscapeOptions& o, const std::string& store) {
     for (scene::Primitive& p : boulder.meshes.at(0).primitives) p.material = static_cast<int>(s.materials.size()) - 1;
     const int mesh = addMesh(s, std::move(boulder.meshes.at(0)));
     addNode(s, "boulder", mesh, {ground.place(-14, 24, 0.4, 1.6), ground.place(-19, 27, 2.1, 0.9)});
+    addBalls(s, ground);
     scene::Node scan;
     scan.name = "scan";
     scan.store = store;

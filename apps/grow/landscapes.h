@@ -25,7 +25,8 @@ scene::Scene growForest(const LandscapeOptions& options);
 /// Grass and flowers: a few patches of blades and stalks, instanced over a square of gentle ground.
 scene::Scene growMeadow(const LandscapeOptions& options);
 
-/// Gentle ground with a meadow, a small orchard and a boulder; the file `store` (a scan) stands beside them.
+/// Gentle ground with a meadow, a small orchard, a boulder, balls of glass and mirrors; the file `store` (a scan)
+/// stands beside them.
 scene::Scene growDemo(const LandscapeOptions& options, const std::string& store);
 
 }  // namespace stipple::grow

@@ -32,7 +32,7 @@ std::string settingsText(const BuildOptions& build) {
                  material, together, leftovers] = build;
     // Not patches, which are of `stipple build` alone. Not memory, temp, threads, ranks, together, leftovers: any give
     // the same. Not attributes: what is cached has all of them.
-    const std::string of = material ? fmt::format("|{},{}", material->roughness, material->metallic) : "";
+    const std::string of = material ? "|" + lod::identityOf(*material) : std::string();
     return fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}|{}{}{}", normals, radii, up, duplicates, skipBad, onlyPoints,
                        allowOutside, dropOutliers, curveRadius, surfels, of, surfelWeights ? "|weights" : "");
 }

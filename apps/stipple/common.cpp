@@ -67,7 +67,7 @@ void BuildOptions::addTo(CLI::App& app) {
 
 void MaterialOptions::addTo(CLI::App& app, const char* of) {
     app.add_option("--material", name, fmt::format("material of {}: {}", of, lod::kMaterialNames))
-        ->check(oneOf({"matte", "plastic", "metal"}))
+        ->check(oneOf({"matte", "plastic", "metal", "mirror", "glass", "water"}))
         ->type_name("NAME");
     app.add_option(
            "--roughness", roughness,
@@ -273,12 +273,13 @@ void EnvironmentOptions::addTo(CLI::App& app) {
         ->capture_default_str();
 }
 
-Result<std::shared_ptr<const render::Environment>> openEnvironment(const std::string& path, double scale,
-                                                                   uint64_t memoryBytes, Executor& executor) {
-    if (path.empty()) return std::shared_ptr<const render::Environment>();
-    STIPPLE_ASSIGN(const render::HdrImage image, image::readHdr(path, memoryBytes));
+Result<std::shared_ptr<const render::Environment>> openEnvironment(const EnvironmentOptions& options,
+                                                                   uint64_t memoryBytes, Executor& executor,
+                                                                   bool hasMirrors) {
+    if (options.path.empty()) return std::shared_ptr<const render::Environment>();
+    STIPPLE_ASSIGN(const render::HdrImage image, image::readHdr(options.path, memoryBytes));
     return std::make_shared<const render::Environment>(
-        render::makeEnvironment(image, static_cast<float>(scale), executor));
+        render::makeEnvironment(image, static_cast<float>(options.scale), executor, hasMirrors));
 }
 
 Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, Executor& executor) {

@@ -125,9 +125,10 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
 Result<lod::ColourBy> applyColours(OpenedScene& scene, const std::string& what, const std::string& map,
                                    const std::string& range);
 
-/// An HDR picture as light; null for an empty path.
-Result<std::shared_ptr<const render::Environment>> openEnvironment(const std::string& path, double scale,
-                                                                   uint64_t memoryBytes, Executor& executor);
+/// An HDR picture as light; null for an empty path. `hasMirrors`: the scene has something smooth.
+Result<std::shared_ptr<const render::Environment>> openEnvironment(const EnvironmentOptions& options,
+                                                                   uint64_t memoryBytes, Executor& executor,
+                                                                   bool hasMirrors);
 
 Result<std::unique_ptr<render::Backend>> makeBackend(const std::string& device, Executor& executor);
 /// Every backend and device, one per line.

@@ -319,7 +319,7 @@ void setupGrow(CLI::App& app, int& status) {
     addPlant(*sub, "orchard", "one tree in rows, each turned and scaled", 4, status);
     addLandscape(*sub, "forest", "trees of three species on hills, each instanced many times", status);
     addLandscape(*sub, "meadow", "grass and flowers", status);
-    addLandscape(*sub, "demo", "a scan, an orchard, a meadow and a boulder on one ground", status);
+    addLandscape(*sub, "demo", "a scan, an orchard, a meadow, a boulder, glass and mirrors on one ground", status);
     scan->add_flag("--json", o->json, "print what was made as JSON (stipple help json)");
     addForce(*scan, o->force);
     scan->callback([o, &status] {

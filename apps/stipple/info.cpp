@@ -109,7 +109,10 @@ nlohmann::json storeInfo(const lod::Store& store) {
                               {"points_without_data", a.withoutData}});
     nlohmann::json materials = nlohmann::json::array();
     for (const lod::PointMaterial& m : d.pointMaterials)
-        materials.push_back({{"roughness", m.roughness}, {"metallic", m.metallic}, {"points", d.points}});
+        materials.push_back({{"roughness", m.roughness},
+                             {"metallic", m.metallic},
+                             {"transmission", m.optics.transmission},
+                             {"points", d.points}});
     if (const auto index = lod::materialAttribute(d)) {
         for (nlohmann::json& m : materials) m["points"] = 0;
         for (const auto& [value, count] : d.attributes[*index].counts)

@@ -71,6 +71,12 @@ void ModeOptions::addTo(CLI::App& sub, bool hasReference) {
                    "which jumps where they meet)")
         ->check(oneOf({"correct", "direct"}))
         ->capture_default_str();
+    sub.add_option(
+           "--refract", refract,
+           "what is seen through glass: environment (what is all around), screen (also what is behind it on the "
+           "picture), object (bent twice; where that cannot be: screen)")
+        ->check(oneOf({"environment", "screen", "object"}))
+        ->capture_default_str();
 }
 
 void ModeOptions::addNormaliseTo(CLI::App& sub) {
@@ -85,6 +91,9 @@ void ModeOptions::applyTo(render::FrameSettings& settings) const {
     if (const render::Reconstruction* of = render::reconstructionNamed(mode)) settings.mode = of->mode;
     settings.draw.lowPass = static_cast<float>(lowPass);
     settings.draw.kernelSupport = static_cast<float>(kernel);
+    settings.draw.refract = refract == "object"   ? shared::kRefractObject
+                            : refract == "screen" ? shared::kRefractScreen
+                                                  : shared::kRefractEnvironment;
     settings.draw.perSurfel = normalise == "surfel";
     settings.draw.patchAs = patchAs == "samples"      ? lod::kPatchesAsSamples
                             : patchAs != "splats"     ? shared::kPatchStrips

@@ -12,6 +12,7 @@ namespace stipple::app {
 struct ModeOptions {
     std::string mode = "pullpush", normalise = "pixel";
     std::string patchAs = "auto", interpolate = "correct";
+    std::string refract = "object";
     double lowPass = 0.5;  ///< variance of the pixel's Gaussian, px^2
     double kernel = 2;     ///< standard deviations
 

@@ -92,11 +92,14 @@ glm::dvec3 meshUp(const BuildOptions& build) {
     return lod::axisVector(build.up.empty() ? lod::UpAxis::y : axisNamed(build.up));
 }
 
-Result<lod::MeshBuildSettings> meshSettings(const scene::Scene& scene, const BuildOptions& build) {
+/// Of the placed meshes of a scene.
+Result<lod::MeshBuildSettings> meshSettings(const scene::Scene& scene, const std::vector<scene::Placement>& placed,
+                                            const BuildOptions& build) {
     lod::MeshBuildSettings settings;
     settings.description.source = fs::path(scene.path).filename().string();
     settings.description.up = meshUp(build);
     settings.description.materials = scene::surfaceMaterials(scene);
+    settings.description.optics = scene::surfaceOptics(scene, placed);
     settings.textures = scene::textureImages(scene);
     STIPPLE_ASSIGN(std::vector<scene::DecodedImage> images, decodeImages(scene, build.reading().memoryBytes));
     std::vector<size_t> last(images.size());  // texture that uses an image last, and may have it
@@ -178,7 +181,7 @@ Result<void> placeTriangles(const scene::Scene& scene, const BuildOptions& build
                             std::vector<render::PlacedStore>& placed) {
     const auto make = [&](const std::vector<scene::Placement>& of) {
         return [&](const std::string& path, Progress& progress) -> Result<lod::BuildReport> {
-            STIPPLE_ASSIGN(lod::MeshBuildSettings settings, meshSettings(scene, build));
+            STIPPLE_ASSIGN(lod::MeshBuildSettings settings, meshSettings(scene, of, build));
             STIPPLE_ASSIGN(settings.limits, build.settings());
             return lod::buildMeshStore(scene::triangleSource(scene, of), path, settings, executor, progress);
         };
@@ -325,7 +328,7 @@ Result<void> openSceneFile(const std::string& path, const BuildOptions& options,
 /// Of PLY files with faces; their paths are made by whoever builds them.
 Result<lod::MeshBuildSettings> plySettings(const BuildOptions& build) {
     scene::Scene plain;
-    return meshSettings(plain, build);
+    return meshSettings(plain, {}, build);
 }
 
 /// Scene files are read as a whole: is there memory for that? What is asked for suffices for the build that follows.
@@ -416,7 +419,7 @@ Result<lod::BuildReport> buildAny(const std::vector<std::string>& inputs, const 
         scene.notes.push_back(fmt::format(
             "a store holds one kind of primitive: {} lines and {} points are left out; view the scene file to see all",
             lines, points));
-    STIPPLE_ASSIGN(lod::MeshBuildSettings mesh, meshSettings(scene, build));
+    STIPPLE_ASSIGN(lod::MeshBuildSettings mesh, meshSettings(scene, scene::placements(scene), build));
     mesh.limits = settings;
     STIPPLE_ASSIGN(lod::BuildReport report, lod::buildMeshStore(triangles, output, mesh, executor, progress));
     report.notes.insert(report.notes.begin(), scene.notes.begin(), scene.notes.end());

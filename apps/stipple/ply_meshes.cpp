@@ -25,9 +25,8 @@ tl::unexpected<Error> nothingToSample(const std::string& input) {
 }
 
 tl::unexpected<Error> noPointsToLight(const std::string& input) {
-    return fail(ErrorKind::usage, "are of points, and this has none",
-                "--material, --roughness, --metallic with " + input,
-                "leave them out: triangles and curves have their own");
+    return fail(ErrorKind::usage, "are of what has no materials, and of that this has none",
+                "--material, --roughness, --metallic with " + input, "leave them out: its triangles have their own");
 }
 
 Result<PlyMeshes> findPlyMeshes(const std::vector<std::string>& inputs, const BuildOptions& build) {

@@ -85,6 +85,7 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     s.draw.lit = isLit(o.shade, d, colour);
     if (const auto material = o.material.material()) {
         s.draw.pointMaterial = lod::packed(*material);
+        s.draw.optics = material->optics;
         s.draw.lit = true;
     }
     s.draw.worldUp = shot.worldUp;
@@ -287,15 +288,15 @@ Result<void> run(const Options& o, Written& written) {
     STIPPLE_TRY(checkModule(o));
     STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, !o.quiet));
     STIPPLE_TRY(checkWeights(o, scene));
-    if (o.material.material() && !hasPoints(scene.placed)) return noPointsToLight(o.inputs.front());
+    if (o.material.material() && !takesMaterial(scene.placed)) return noPointsToLight(o.inputs.front());
     const lod::StoreDescription& description = scene.description;
     STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
     written.of = shot.views.size();
     if (!shot.note.empty() && !o.quiet) fmt::print(stderr, "note: {}\n", printable(shot.note));
     STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
     STIPPLE_ASSIGN(render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
-    STIPPLE_ASSIGN(settings.draw.environment,
-                   openEnvironment(o.environment.path, o.environment.scale, o.build.reading().memoryBytes, *executor));
+    STIPPLE_ASSIGN(settings.draw.environment, openEnvironment(o.environment, o.build.reading().memoryBytes, *executor,
+                                                              hasMirrors(scene.placed, o.material.material())));
     const Legend legend = o.colour.legend ? makeLegend(colour, description) : Legend{};
     if (o.drawn.mode == "reference") return runTraced(o, scene, shot, settings, legend, *executor, written);
     streaming::StreamSettings stream;

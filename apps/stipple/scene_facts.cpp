@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "apps/stipple/common.h"
+#include "engine/render/layers.h"
 #include "engine/scene/outline.h"
 #include "lod/store/surfel_weights.h"
 
@@ -111,6 +112,18 @@ bool hasPoints(const std::vector<render::PlacedStore>& placed) {
     return std::any_of(placed.begin(), placed.end(), [](const render::PlacedStore& p) {
         return !p.store->hierarchy.isMesh() && !p.store->hierarchy.isCurves;
     });
+}
+
+bool takesMaterial(const std::vector<render::PlacedStore>& placed) {
+    return std::any_of(placed.begin(), placed.end(), [](const render::PlacedStore& p) {
+        return p.store->description.materials.empty() || render::isPlainMesh(p.store->description);
+    });
+}
+
+bool hasMirrors(const std::vector<render::PlacedStore>& placed, const std::optional<lod::PointMaterial>& given) {
+    return (given && given->roughness < render::kMirrorRoughness) ||
+           std::any_of(placed.begin(), placed.end(),
+                       [](const render::PlacedStore& p) { return render::hasMirrors(p.store->description); });
 }
 
 bool hasSurfelWeights(const std::vector<render::PlacedStore>& placed) {

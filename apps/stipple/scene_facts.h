@@ -1,11 +1,13 @@
 // What is known of a scene beside its stores: lights, cameras, one description for all, what a camera must see.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "engine/render/frame.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/scene.h"
+#include "lod/primitives/point_material.h"
 
 namespace stipple::app {
 
@@ -23,6 +25,10 @@ std::vector<glm::dvec3> outlineOf(const std::vector<render::PlacedStore>& placed
 
 /// Are there points, and not only as proxies?
 bool hasPoints(const std::vector<render::PlacedStore>& placed);
+/// Is any of it points, curves or triangles without materials, which --material is told of?
+bool takesMaterial(const std::vector<render::PlacedStore>& placed);
+/// Is any of it, or what --material says, so smooth that the environment is seen in it?
+bool hasMirrors(const std::vector<render::PlacedStore>& placed, const std::optional<lod::PointMaterial>& given);
 /// Have any surfels weights of their own (stipple build --surfel-weights)?
 bool hasSurfelWeights(const std::vector<render::PlacedStore>& placed);
 

@@ -392,7 +392,7 @@ Result<void> run(const ViewOptions& o) {
     catchStopSignals();
     const auto executor = makeTbbExecutor(o.build.threads);
     STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, true));
-    if (o.material.material() && !hasPoints(scene.placed)) return noPointsToLight(o.inputs.front());
+    if (o.material.material() && !takesMaterial(scene.placed)) return noPointsToLight(o.inputs.front());
     STIPPLE_ASSIGN(const Stage stage, setStage(o, "Stipple: " + scene.description.source, size, *executor));
     gpu::Window* const window = stage.window.get();
     ViewSettings settings;
@@ -403,8 +403,8 @@ Result<void> run(const ViewOptions& o) {
     frame.draw.unlitTriangles = o.shade == "unlit";
     frame.draw.wind.strength = o.wind;
     frame.staysOnDevice = stage.isShared;
-    STIPPLE_ASSIGN(frame.draw.environment,
-                   openEnvironment(o.environment.path, o.environment.scale, o.build.reading().memoryBytes, *executor));
+    STIPPLE_ASSIGN(frame.draw.environment, openEnvironment(o.environment, o.build.reading().memoryBytes, *executor,
+                                                           hasMirrors(scene.placed, o.material.material())));
     ViewSession session(o, *stage.backend, *executor);
     STIPPLE_TRY(session.show(std::move(scene), o.colour, frame));
     const double aspect = static_cast<double>(size.x) / size.y;

@@ -29,6 +29,7 @@ void ViewSession::restart(render::FrameSettings& settings) {
     settings.draw.lit = isLit(options_.shade, d, colour_);
     if (const auto material = options_.material.material()) {
         settings.draw.pointMaterial = lod::packed(*material);
+        settings.draw.optics = material->optics;
         settings.draw.lit = true;
     }
     render::setSway(settings.draw.wind, state_->hierarchies, state_->instances, state_->groups);

@@ -62,6 +62,7 @@ struct LitSurfaces {
         s.roughness = float(int(word[i] >> 8 & 255u)) * (1.0f / 255.0f);
         s.occlusion = float(int(word[i] >> 16 & 255u)) * (1.0f / 255.0f);
         s.leaf = leaf[i];
+        s.dielectric = vec3(kDielectric, kDielectric, kDielectric);
         return s;
     }
     const float *px, *nx, *ny, *nz, *leaf, *pr, *pg, *pb;
@@ -78,8 +79,8 @@ struct LitSurfaces {
     const vec3 up = f.skyDirection;
     if (input.environment != nullptr) {
         for (size_t i = 0; i < n; ++i) {
-            const vec3 c =
-                reflectEnvironment(input.environment, surfaceAt(i), f.environmentX, f.environmentY, f.environmentZ);
+            const vec3 c = reflectEnvironment(input.environment, surfaceAt(i), f.environmentX, f.environmentY,
+                                              f.environmentZ, f.environmentSharp);
             r[i] = ambient * c.x;
             g[i] = ambient * c.y;
             b[i] = ambient * c.z;

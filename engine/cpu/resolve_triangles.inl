@@ -36,7 +36,7 @@ void applyMaterial(const MaterialRun& run, const Corners& c, const UvRow& uv, bo
     const bool isFlat = (run.surface & kSurfaceFlat) != 0;
     const vec3 base = material.baseColour, emission = material.emissive;
     const float metallic = material.metallic, roughness = material.roughness;
-    const uint32_t flags = kPixelTriangle | ((run.surface & kSurfaceUnlit) != 0 ? kPixelUnlit : 0u);
+    const uint32_t flags = kPixelTriangle | ((run.surface & kSurfaceUnlit) != 0 ? kPixelUnlit : 0u) | material.optics;
 #pragma GCC ivdep
     for (size_t i = run.first; i < end; ++i) {
         const float x = s.nx[i], y = s.ny[i], z = s.nz[i];

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "engine/render/layers.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/wide_disc.h"
 
@@ -48,9 +49,8 @@ Result<void> FrameBuffers::prepare(const render::RenderRequest& request, const R
     STIPPLE_TRY(prepareLists(request));
     if (draws.hasSurfaces()) STIPPLE_TRY(prepareMeshes(draws, residents));
     if (!draws.lights.empty()) STIPPLE_TRY(fill(kLightsBinding, draws.lights.data(), draws.lights.size(), "lights"));
-    if (draws.environment)
-        STIPPLE_TRY(
-            fill(kEnvironmentBinding, draws.environment->table.data(), draws.environment->table.size(), "environment"));
+    STIPPLE_TRY(prepareEnvironment(draws.environment));
+    if (draws.glass) STIPPLE_TRY(prepareLayer(*draws.glass));
     if (descriptorsChanged_) writeDescriptors();
     return {};
 }
@@ -147,6 +147,23 @@ Result<void> FrameBuffers::fill(uint32_t binding, const T* data, size_t count, c
     STIPPLE_TRY(ensure(buffer, gpu::bytesOf(binding, count), kStorage, true, name));
     if (count > 0) std::memcpy(buffer.mapped(), data, count * sizeof(T));
     return {};
+}
+
+/// Copied where it is another one than that of the last frame.
+Result<void> FrameBuffers::prepareEnvironment(const std::shared_ptr<const render::Environment>& environment) {
+    if (!environment || environment == environment_) return {};
+    const std::vector<float>& table = environment->table;
+    STIPPLE_TRY(fill(kEnvironmentBinding, table.data(), table.size(), "environment"));
+    environment_ = environment;
+    return {};
+}
+
+/// What only layers of glass need.
+Result<void> FrameBuffers::prepareLayer(const render::LayerTables& layer) {
+    STIPPLE_TRY(fill(kLayerBinding, &layer.constants, 1, "layer"));
+    STIPPLE_TRY(fill(kOpticsBinding, layer.optics.data(), layer.optics.size(), "optics"));
+    STIPPLE_TRY(fill(kBehindBinding, layer.behind.data(), layer.behind.size(), "behind the layer"));
+    return fill(kBackBinding, layer.back.data(), layer.back.size(), "back of the layer");
 }
 
 /// What only triangles and patches need.

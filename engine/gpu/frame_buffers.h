@@ -51,6 +51,8 @@ class FrameBuffers {
     Result<void> preparePlanes(const render::DrawList& draws, bool wantAll);
     Result<void> prepareLists(const render::RenderRequest& request);
     Result<void> prepareMeshes(const render::DrawList& draws, const Residents& residents);
+    Result<void> prepareEnvironment(const std::shared_ptr<const render::Environment>& environment);
+    Result<void> prepareLayer(const render::LayerTables& layer);
     void fillDraws(const render::DrawList& draws, const Residents& residents);
     template <typename T>
     Result<void> fill(uint32_t binding, const T* data, size_t count, const char* name);
@@ -59,6 +61,7 @@ class FrameBuffers {
     const Device& device_;
     VkDescriptorSet set_;
     std::array<Buffer, shared::kBindings> bound_;
+    std::shared_ptr<const render::Environment> environment_;  ///< that is in its buffer
     Buffer readback_, staging_, nothing_;
     std::vector<Level> levels_;
     MeshFrame meshFrame_;

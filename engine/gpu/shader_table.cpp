@@ -7,6 +7,7 @@
 #include "shaders/shared/ewa.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
+#include "shaders/shared/optics.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/texture.h"
 #include "shaders/shared/wide_disc.h"
@@ -58,6 +59,10 @@ static_assert(isLaidOut(shared::kFilteredBinding, sizeof(shared::FilteredPixel))
 static_assert(isLaidOut(shared::kMaterialSumsBinding, sizeof(shared::MaterialSums)));
 static_assert(isLaidOut(shared::kSecondsBinding, sizeof(shared::SecondSurface)));
 static_assert(isLaidOut(shared::kCoverageBinding, sizeof(uint32_t)));
+static_assert(isLaidOut(shared::kLayerBinding, sizeof(shared::LayerConstants)));
+static_assert(isLaidOut(shared::kOpticsBinding, sizeof(shared::Optic)));
+static_assert(isLaidOut(shared::kBehindBinding, sizeof(float)));
+static_assert(isLaidOut(shared::kBackBinding, sizeof(float)));
 static_assert(isLaidOut(shared::kSurfaceBinding, sizeof(shared::SurfaceWords)));
 
 }  // namespace

@@ -60,6 +60,12 @@ double depthAt(const Sample& s, const dvec2& point, const lod::View& view) {
     return s.depth / std::clamp(nearer, 1 - reach, 1 + reach);
 }
 
+dvec3 normalAt(const Sample& s, const dvec2& point, const lod::View& view) {
+    Sample at = s;
+    if (s.isRound) at.centre = point;
+    return discNormal(at, s.perp, std::sqrt(std::max(0.0, 1 - glm::dot(s.perp, s.perp))), view);
+}
+
 namespace {
 
 struct Contribution {
@@ -355,10 +361,7 @@ class ReferenceBackend final : public render::DrawsAtOnce {
         const lod::View& v = draws.view;
         const shared::FrameConstants& f = draws.frame;
         const dvec2 p(double(i % v.width) + 0.5, double(i / v.width) + 0.5);
-        // A disc's normal is that at its centre, a tube's that at the pixel.
-        Sample at = s;
-        if (s.isRound) at.centre = p;
-        const dvec3 n = discNormal(at, s.perp, std::sqrt(std::max(0.0, 1 - glm::dot(s.perp, s.perp))), v);
+        const dvec3 n = normalAt(s, p, v);
         const double depth = depthAt(s, p, v);
         dvec3 colour = s.colour;
         if (f.debugView == shared::kDebugHoles) {

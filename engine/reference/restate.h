@@ -27,6 +27,7 @@ struct Sample {
     glm::dvec2 axis{0};
     // Of a triangle's pixel:
     bool isTriangle = false, isUnlit = false;
+    uint32_t optic = 0;  ///< which of a layer's optics
     double metallic = 0, roughness = 1, occlusion = 1;
     /// Of points: how much of what was merged has a material, which is of that part; else lit by one formula.
     double materialShare = 0;
@@ -80,6 +81,9 @@ struct Variation {
 
 /// Depth of a sample's plane at an image point; see planeDepth (shaders/shared) for what is capped.
 double depthAt(const Sample& s, const glm::dvec2& point, const lod::View& view);
+
+/// Normal of a sample at an image point, camera space: a disc's is that at its centre, a tube's that at the pixel.
+glm::dvec3 normalAt(const Sample& s, const glm::dvec2& point, const lod::View& view);
 
 using Chunks = std::unordered_map<uint64_t, lod::Chunk>;  ///< by source << 32 | chunk
 

@@ -30,7 +30,8 @@ dvec3 bump(const dvec3& normal, const Corners& c, const dvec3& texel, double sca
 }
 
 /// Times pi, as a light's colour is what a white diffuse surface sends back.
-dvec3 reflected(const Sample& s, const dvec3& n, const dvec3& v, const dvec3& l, const dvec3& light, double pixels) {
+dvec3 reflected(const Sample& s, const dvec3& n, const dvec3& v, const dvec3& l, const dvec3& light,
+                const dvec3& dielectric, double pixels) {
     const double nl = glm::dot(n, l), nv = std::max(glm::dot(n, v), 1e-3);
     if (!(nl > 0))
         return !s.letsLightThrough(pixels) ? dvec3(0) : light * s.colour * (1 - s.metallic) * (kThroughLeaf * -nl);
@@ -40,7 +41,7 @@ dvec3 reflected(const Sample& s, const dvec3& n, const dvec3& v, const dvec3& l,
     const double ggx = alpha2 / (kPi * std::pow(nh * nh * (alpha2 - 1) + 1, 2));
     const double visible =
         0.5 / (nl * std::sqrt(nv * nv * (1 - alpha2) + alpha2) + nv * std::sqrt(nl * nl * (1 - alpha2) + alpha2));
-    const dvec3 f0 = glm::mix(dvec3(0.04), s.colour, s.metallic);
+    const dvec3 f0 = glm::mix(dielectric, s.colour, s.metallic);
     const dvec3 fresnel = f0 + (1.0 - f0) * std::pow(1 - vh, 5);
     const dvec3 diffuse = s.colour * (1 - s.metallic) / kPi;
     return light * nl * kPi * (diffuse * (1.0 - fresnel) + fresnel * ggx * visible);
@@ -55,28 +56,43 @@ dvec3 irradianceAround(const std::vector<float>& t, const dvec3& n) {
     return glm::max(sum, dvec3(0));
 }
 
-/// The octahedral maps, between two of the five roughnesses.
-dvec3 mirrored(const std::vector<float>& t, const dvec3& direction, double roughness) {
+/// An octahedral map of `edge` texels that begins at float `first`, bilinear.
+dvec3 lookUp(const std::vector<float>& t, const dvec3& direction, size_t first, size_t edge) {
     const dvec3 d = direction / (std::abs(direction.x) + std::abs(direction.y) + std::abs(direction.z));
     dvec2 p(d.x, d.z);
     if (d.y < 0) p = {(1 - std::abs(d.z)) * (d.x >= 0 ? 1 : -1), (1 - std::abs(d.x)) * (d.z >= 0 ? 1 : -1)};
-    p = glm::clamp((p * 0.5 + 0.5) * 128.0 - 0.5, dvec2(0), dvec2(126.999));
-    const auto at = [&](size_t level, size_t x, size_t y) {
-        const size_t i = 27 + ((level * 128 + y) * 128 + x) * 3;
+    const auto size = static_cast<double>(edge);
+    p = glm::clamp((p * 0.5 + 0.5) * size - 0.5, dvec2(0), dvec2(size - 1.001));
+    const auto at = [&](size_t x, size_t y) {
+        const size_t i = first + (y * edge + x) * 3;
         return dvec3(t[i], t[i + 1], t[i + 2]);
     };
-    const auto look = [&](size_t level) {
-        const auto x = static_cast<size_t>(p.x), y = static_cast<size_t>(p.y);
-        const dvec2 part = p - glm::floor(p);
-        return glm::mix(glm::mix(at(level, x, y), at(level, x + 1, y), part.x),
-                        glm::mix(at(level, x, y + 1), at(level, x + 1, y + 1), part.x), part.y);
-    };
-    const double l = std::clamp(roughness, 0.0, 1.0) * 4;
-    const auto level = static_cast<size_t>(std::min(l, 3.999));
-    return glm::mix(look(level), look(level + 1), l - static_cast<double>(level));
+    const auto x = static_cast<size_t>(p.x), y = static_cast<size_t>(p.y);
+    const dvec2 part = p - glm::floor(p);
+    return glm::mix(glm::mix(at(x, y), at(x + 1, y), part.x), glm::mix(at(x, y + 1), at(x + 1, y + 1), part.x), part.y);
 }
 
 }  // namespace
+
+dvec3 mirrored(const render::Environment& environment, const dvec3& direction, double roughness) {
+    const std::vector<float>& t = environment.table;
+    constexpr size_t kEdge = 128, kHarmonics = 27, kMap = kEdge * kEdge * 3;
+    const auto usual = [&](size_t level) { return lookUp(t, direction, kHarmonics + level * kMap, kEdge); };
+    if (environment.sharpEdge == 0 || roughness >= 0.25) {
+        const double l = std::clamp(roughness, 0.0, 1.0) * 4;
+        const auto level = static_cast<size_t>(std::min(l, 3.999));
+        return glm::mix(usual(level), usual(level + 1), l - static_cast<double>(level));
+    }
+    // Maps for roughness 0, 1/16, 1/8, 3/16, each half as large as the last, and the usual one for 1/4.
+    const auto sharp = [&](size_t level) {
+        size_t first = kHarmonics + 5 * kMap, edge = environment.sharpEdge;
+        for (size_t l = 0; l < level; ++l, edge /= 2) first += edge * edge * 3;
+        return level < 4 ? lookUp(t, direction, first, edge) : usual(1);
+    };
+    const double l = std::max(roughness, 0.0) * 16;
+    const auto level = static_cast<size_t>(std::min(l, 3.999));
+    return glm::mix(sharp(level), sharp(level + 1), l - static_cast<double>(level));
+}
 
 Corner cornerOf(const lod::Hierarchy& h, const lod::Instance& instance, const shared::MeshVertex& v, const dvec3& place,
                 const lod::View& view) {
@@ -177,6 +193,7 @@ bool surfaceOn(const dvec3& ray, const dvec2& weights, double footprint, const C
         return false;
     s.isTriangle = true;
     s.isUnlit = (surface & shared::kSurfaceUnlit) != 0;
+    s.optic = m.optics >> 24;
     s.colour = dvec3(m.baseColour) * dvec3(own) * (hasBase ? dvec3(texel) : dvec3(1));
     s.metallic = m.metallic;
     s.roughness = m.roughness;
@@ -197,31 +214,18 @@ bool surfaceOn(const dvec3& ray, const dvec2& weights, double footprint, const C
     return true;
 }
 
-dvec3 shadeTriangle(const Sample& s, const dvec3& n, const dvec3& point, const render::DrawList& draws) {
+dvec3 lightsOn(const Sample& s, const dvec3& n, const dvec3& point, const dvec3& dielectric,
+               const render::DrawList& draws) {
     const shared::FrameConstants& f = draws.frame;
-    if (s.isTriangle && (s.isUnlit || (f.shade & shared::kShadeTriangles) == 0)) return s.colour;
-    const dvec3 v = -sightOf(draws.view, point), up(f.skyDirection);
-    const double nv = std::max(glm::dot(n, v), 1e-3), pixels = pixelsAt(draws.view, s.depth);
-    const dvec3 mirror = 2 * nv * n - v;
-    // The environment's share of a microfacet mirror (Karis 2013, fit by Lazarov).
-    const dvec4 r = s.roughness * dvec4(-1, -0.0275, -0.572, 0.022) + dvec4(1, 0.0425, 1.04, -0.04);
-    const double a004 = std::min(r.x * r.x, std::exp2(-9.28 * nv)) * r.x + r.y;
-    const dvec2 ab = dvec2(-1.04, 1.04) * a004 + dvec2(r.z, r.w);
-    const dvec3 f0 = glm::mix(dvec3(0.04), s.colour, s.metallic);
-    dvec3 blurred(0.25 + 0.15 * glm::dot(glm::mix(mirror, n, s.roughness), up)), around(0.25 + 0.15 * glm::dot(n, up));
-    if (draws.environment) {
-        const glm::dmat3 toMap =
-            glm::transpose(glm::dmat3(dvec3(f.environmentX), dvec3(f.environmentY), dvec3(f.environmentZ)));
-        around = irradianceAround(draws.environment->table, toMap * n);
-        blurred = mirrored(draws.environment->table, toMap * mirror, s.roughness);
-    }
-    dvec3 sum = double(f.ambient) * s.occlusion * (s.colour * (1 - s.metallic) * around + (f0 * ab.x + ab.y) * blurred);
+    const dvec3 v = -sightOf(draws.view, point);
+    const double pixels = pixelsAt(draws.view, s.depth);
+    dvec3 sum(0);
     if (draws.lights.empty() && !draws.environment)
-        sum += reflected(s, n, v, dvec3(f.sunDirection), dvec3(0.75), pixels);
+        return reflected(s, n, v, dvec3(f.sunDirection), dvec3(0.75), dielectric, pixels);
     for (const shared::LightSource& light : draws.lights) {
         const dvec3 colour(light.colour);
         if (light.kind == shared::kLightDirectional) {
-            sum += reflected(s, n, v, dvec3(light.position), colour, pixels);
+            sum += reflected(s, n, v, dvec3(light.position), colour, dielectric, pixels);
             continue;
         }
         const dvec3 to = dvec3(light.position) - point;
@@ -233,9 +237,35 @@ dvec3 shadeTriangle(const Sample& s, const dvec3& n, const dvec3& point, const r
             share *= std::pow(
                 std::clamp((along - light.cosOuter) / std::max(1e-4f, light.cosInner - light.cosOuter), 0.0, 1.0), 2);
         }
-        sum += reflected(s, n, v, to / distance, colour * share, pixels);
+        sum += reflected(s, n, v, to / distance, colour * share, dielectric, pixels);
     }
-    return sum + s.emissive;
+    return sum;
+}
+
+dvec3 irradianceOf(const render::Environment& environment, const dvec3& n) {
+    return irradianceAround(environment.table, n);
+}
+
+dvec3 shadeTriangle(const Sample& s, const dvec3& n, const dvec3& point, const render::DrawList& draws) {
+    const shared::FrameConstants& f = draws.frame;
+    if (s.isTriangle && (s.isUnlit || (f.shade & shared::kShadeTriangles) == 0)) return s.colour;
+    const dvec3 v = -sightOf(draws.view, point), up(f.skyDirection);
+    const double nv = std::max(glm::dot(n, v), 1e-3);
+    const dvec3 mirror = 2 * nv * n - v;
+    // The environment's share of a microfacet mirror (Karis 2013, fit by Lazarov).
+    const dvec4 r = s.roughness * dvec4(-1, -0.0275, -0.572, 0.022) + dvec4(1, 0.0425, 1.04, -0.04);
+    const double a004 = std::min(r.x * r.x, std::exp2(-9.28 * nv)) * r.x + r.y;
+    const dvec2 ab = dvec2(-1.04, 1.04) * a004 + dvec2(r.z, r.w);
+    const dvec3 f0 = glm::mix(dvec3(0.04), s.colour, s.metallic);
+    dvec3 blurred(0.25 + 0.15 * glm::dot(glm::mix(mirror, n, s.roughness), up)), around(0.25 + 0.15 * glm::dot(n, up));
+    if (draws.environment) {
+        const glm::dmat3 toMap =
+            glm::transpose(glm::dmat3(dvec3(f.environmentX), dvec3(f.environmentY), dvec3(f.environmentZ)));
+        around = irradianceAround(draws.environment->table, toMap * n);
+        blurred = mirrored(*draws.environment, toMap * mirror, s.roughness);
+    }
+    dvec3 sum = double(f.ambient) * s.occlusion * (s.colour * (1 - s.metallic) * around + (f0 * ab.x + ab.y) * blurred);
+    return sum + lightsOn(s, n, point, dvec3(0.04), draws) + s.emissive;
 }
 
 }  // namespace stipple::reference

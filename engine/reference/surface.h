@@ -46,6 +46,16 @@ bool surfaceOn(const glm::dvec3& ray, const glm::dvec2& weights, double footprin
                const glm::dvec3& face, uint32_t surface, const shared::SurfaceMaterial& m,
                const TextureReader& textures, Sample& s, glm::dvec3& n);
 
+/// What a mirror of that roughness sees of the environment in a direction of its map.
+glm::dvec3 mirrored(const render::Environment& environment, const glm::dvec3& direction, double roughness);
+
+/// What a white diffuse surface sends back of it, by its normal there.
+glm::dvec3 irradianceOf(const render::Environment& environment, const glm::dvec3& n);
+/// What lights of the scene's own, or the sun, send back. `dielectric`: what is reflected straight on by what is no
+/// metal.
+glm::dvec3 lightsOn(const Sample& s, const glm::dvec3& n, const glm::dvec3& point, const glm::dvec3& dielectric,
+                    const render::DrawList& draws);
+
 /// Light from a triangle's pixel to the eye. `n`: towards the eye; `point`: camera space.
 glm::dvec3 shadeTriangle(const Sample& s, const glm::dvec3& n, const glm::dvec3& point, const render::DrawList& draws);
 

@@ -17,11 +17,11 @@ static_assert(sizeof(shared::PointRecord) == 16);
 static_assert(sizeof(shared::DrawNode) == 96);
 static_assert(sizeof(shared::DrawBlock) == 8);
 static_assert(sizeof(shared::CurveSegment) == 32);
-static_assert(sizeof(shared::FrameConstants) == 192 + sizeof(shared::BlockRanges));
+static_assert(sizeof(shared::FrameConstants) == 196 + sizeof(shared::BlockRanges));
 static_assert(sizeof(shared::MeshVertex) == 32);
 static_assert(sizeof(shared::MeshCluster) == 12);
 static_assert(sizeof(shared::DrawMesh) == 120);
-static_assert(sizeof(shared::SurfaceMaterial) == 188);
+static_assert(sizeof(shared::SurfaceMaterial) == 192);
 
 namespace {
 
@@ -85,6 +85,8 @@ void clear(DrawList& out) {
     out.meshDraws.clear();
     out.lights.clear();
     out.environment.reset();
+    out.layer = nullptr;
+    out.glass.reset();
     out.bends.clear();
     out.swaying = 0;
     out.hasWideDiscs = false;
@@ -220,6 +222,7 @@ void addEffects(EffectSet requested, std::span<const uint64_t> fed, const glm::d
     f.skyDirection = glm::vec3(cameraFromWorld * settings.worldUp);
     f.lightCount = 0;
     f.hasEnvironment = 0;
+    f.environmentSharp = 0;
     f.ambient = 1;
     out.effects = effectsOfFrame(requested, contentOf(out), settings, fed);
     for (size_t e = 0; e < effects().size(); ++e)

@@ -15,14 +15,19 @@
 #include "engine/render/environment.h"
 #include "lod/cut/cut.h"
 #include "lod/primitives/kinds.h"
+#include "lod/primitives/optics.h"
 #include "shaders/shared/curve.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
 #include "shaders/shared/mesh.h"
+#include "shaders/shared/optics.h"
 #include "shaders/shared/record.h"
 #include "streaming/streamer.h"
 
 namespace stipple::render {
+
+struct LayerInput;
+struct LayerTables;
 
 /// A light in world space, as KHR_lights_punctual has it.
 struct WorldLight {
@@ -83,6 +88,8 @@ struct DrawList {
     EffectSet effectsOfScene = allEffects();         ///< what it could show; set before the list is made
     EffectSet effects;                               ///< what the frame shows
     std::span<const shared::SurfaceMaterial> materials;
+    const LayerInput* layer = nullptr;         ///< of a layer of glass (layers.h), where this is one ...
+    std::shared_ptr<const LayerTables> glass;  ///< ... and what its passes read
     // What the fp32 numbers above were made from: the reference starts from these.
     lod::View view;          ///< orthographic: its eye stands before what is drawn ...
     double eyeAdvanced = 0;  ///< ... so far before the eye that was asked for
@@ -106,7 +113,12 @@ glm::vec3 linearBackground();
 struct DrawSettings {
     bool lit = false;  ///< points; triangles are, unless their material says otherwise
     bool unlitTriangles = false;
-    std::optional<uint32_t> pointMaterial;  ///< of all points instead of their own, packed as DrawList has it
+    /// Of all points instead of their own, packed as DrawList has it, and of meshes without materials.
+    std::optional<uint32_t> pointMaterial;
+    /// Of all points, curves and meshes without materials; none: what their stores say.
+    std::optional<lod::Optics> optics;
+    uint32_t refract = shared::kRefractObject;  ///< how what is behind glass is found, where the body allows it
+    const LayerInput* layer = nullptr;          ///< set by the frame for each layer (layers.h)
     uint32_t debugView = shared::kDebugNone;
     glm::vec3 background = linearBackground();  ///< linear
     glm::dvec3 worldUp{0, 0, 1};

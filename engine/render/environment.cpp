@@ -67,8 +67,8 @@ void addHarmonics(const std::vector<Sample>& samples, std::vector<float>& table)
         for (int k = 0; k < 3; ++k) table.push_back(static_cast<float>(v[k]));
 }
 
-glm::vec3 directionOfTexel(uint32_t x, uint32_t y) {
-    const float edge = shared::kEnvironmentEdge;
+glm::vec3 directionOfTexel(uint32_t x, uint32_t y, uint32_t edgeTexels) {
+    const auto edge = static_cast<float>(edgeTexels);
     glm::vec3 d(2 * (static_cast<float>(x) + 0.5f) / edge - 1, 0, 2 * (static_cast<float>(y) + 0.5f) / edge - 1);
     d.y = 1 - std::abs(d.x) - std::abs(d.z);
     if (d.y < 0) {
@@ -79,9 +79,57 @@ glm::vec3 directionOfTexel(uint32_t x, uint32_t y) {
     return glm::normalize(d);
 }
 
+glm::vec3 plainLook(const HdrImage& image, const glm::vec3& d) {
+    const double u = 0.5 + std::atan2(double(d.x), -double(d.z)) / (2 * kPi),
+                 v = 0.5 - std::asin(std::clamp(double(d.y), -1.0, 1.0)) / kPi;
+    const double px = u * image.width - 0.5, py = std::clamp(v * image.height - 0.5, 0.0, image.height - 1.0);
+    const double left = std::floor(px), top = std::floor(py);
+    const auto x0 = static_cast<uint32_t>((static_cast<int64_t>(left) + image.width) % image.width),
+               x1 = (x0 + 1) % image.width, y0 = static_cast<uint32_t>(top), y1 = std::min(y0 + 1, image.height - 1);
+    const auto at = [&](uint32_t x, uint32_t y) {
+        glm::dvec3 c(0);
+        for (int k = 0; k < 3; ++k) {
+            const float v0 = image.rgb[(size_t{y} * image.width + x) * 3 + static_cast<size_t>(k)];
+            c[k] = std::isfinite(v0) ? std::clamp(v0, 0.0f, 6e4f) : 0;
+        }
+        return c;
+    };
+    return glm::vec3(
+        glm::mix(glm::mix(at(x0, y0), at(x1, y0), px - left), glm::mix(at(x0, y1), at(x1, y1), px - left), py - top));
+}
+
+/// What mirrors see: twice as many texels around as the picture has, up to kMostEdge, and three maps of half the edge
+/// each, the means of four.
+void addSharpMaps(const HdrImage& image, float scale, Executor& executor, Environment& out) {
+    constexpr uint32_t kLeastEdge = 256, kMostEdge = 2048;
+    uint32_t edge = kLeastEdge;
+    while (edge < kMostEdge && edge < 2 * image.width) edge *= 2;
+    out.sharpEdge = edge;
+    out.table.resize(shared::environmentSharp(edge, shared::kEnvironmentSharp));
+    executor.parallelFor(edge, 16, [&](size_t begin, size_t end) {
+        for (auto y = static_cast<uint32_t>(begin); y < end; ++y)
+            for (uint32_t x = 0; x < edge; ++x) {
+                const glm::vec3 c = scale * plainLook(image, directionOfTexel(x, y, edge));
+                float* const to = &out.table[shared::kEnvironmentFloats + (size_t{y} * edge + x) * 3];
+                for (int k = 0; k < 3; ++k) to[k] = c[k];
+            }
+    });
+    for (uint32_t l = 1; l < shared::kEnvironmentSharp; ++l) {
+        const float* const from = &out.table[shared::environmentSharp(edge, l - 1)];
+        float* const to = &out.table[shared::environmentSharp(edge, l)];
+        const size_t half = edge >> l, row = size_t{6} * half;
+        for (size_t y = 0; y < half; ++y)
+            for (size_t x = 0; x < half; ++x)
+                for (size_t k = 0; k < 3; ++k) {
+                    const float* const at = from + 2 * y * row + 6 * x + k;
+                    to[(y * half + x) * 3 + k] = 0.25f * (at[0] + at[3] + at[row] + at[row + 3]);
+                }
+    }
+}
+
 }  // namespace
 
-Environment makeEnvironment(const HdrImage& image, float scale, Executor& executor) {
+Environment makeEnvironment(const HdrImage& image, float scale, Executor& executor, bool hasMirrors) {
     Environment out;
     const std::vector<Sample> fine = reduce(image, scale, 256, 128), coarse = reduce(image, scale, 64, 32);
     addHarmonics(coarse, out.table);
@@ -92,7 +140,7 @@ Environment makeEnvironment(const HdrImage& image, float scale, Executor& execut
     executor.parallelFor(kEdge, 2, [&](size_t begin, size_t end) {
         for (auto y = static_cast<uint32_t>(begin); y < end; ++y)
             for (uint32_t x = 0; x < kEdge; ++x) {
-                const glm::vec3 d = directionOfTexel(x, y);
+                const glm::vec3 d = directionOfTexel(x, y, kEdge);
                 for (uint32_t l = 0; l < shared::kEnvironmentLevels; ++l) {
                     glm::vec3 sum(0);
                     float weights = 0;
@@ -118,6 +166,7 @@ Environment makeEnvironment(const HdrImage& image, float scale, Executor& execut
                 }
             }
     });
+    if (hasMirrors) addSharpMaps(image, scale, executor, out);
     return out;
 }
 

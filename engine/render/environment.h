@@ -16,11 +16,17 @@ struct HdrImage {
 };
 
 struct Environment {
-    std::vector<float> table;  ///< kEnvironmentFloats
+    std::vector<float> table;  ///< kEnvironmentFloats, and the sharp maps where there are any
+    uint32_t sharpEdge = 0;    ///< texels across the sharpest; 0: there are none
 };
 
+/// Below this roughness the sharp maps are seen.
+inline constexpr float kMirrorRoughness = 0.25f;
+
 /// `scale` multiplies the picture. Mirror levels are cosine lobes as wide as the roughness' (a power of two as
-/// exponent); the sharpest is 128 texels across the octahedron, so perfect mirrors are slightly blurred.
-Environment makeEnvironment(const HdrImage& image, float scale, Executor& executor);
+/// exponent); the sharpest is 128 texels across the octahedron (1.6 degrees a texel), so perfect mirrors are blurred,
+/// unless `hasMirrors`: then maps of up to 2048 texels across (at most 0.17 degrees a texel; a cube of 640^2 a face has
+/// 0.18), 67 MB of them, are seen by what is smoother than kMirrorRoughness.
+Environment makeEnvironment(const HdrImage& image, float scale, Executor& executor, bool hasMirrors = false);
 
 }  // namespace stipple::render

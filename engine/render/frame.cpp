@@ -10,6 +10,7 @@
 
 #include "engine/base/process.h"
 #include "engine/render/frame_passes.h"
+#include "engine/render/layered_frame.h"
 #include "engine/render/views.h"
 #include "lod/primitives/octahedral.h"
 #include "lod/primitives/patch_samples.h"
@@ -199,15 +200,11 @@ Result<void> drawPicture(FrameState& state, const RenderRequest& request) {
 
 }  // namespace
 
-Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettings& settings, double start,
-                     double cutMs) {
-    if (state.backendLife.expired())
-        return fail(ErrorKind::device, "what draws the scene is gone", "the frame",
-                    "keep the backend while it is used");
-    STIPPLE_TRY(checkFilter(settings.draw));
+Result<uint64_t> drawNodes(FrameState& state, const lod::Cut& cut, const lod::View& view,
+                           const FrameSettings& settings) {
     DrawSettings settingsOfMode = settings.draw;
     settingsOfMode.exactCurves = std::min(settings.draw.exactCurves, reconstructionOf(settings.mode).exactCurves);
-    makeDrawList(state.cut, state.hierarchies, state.instances, view, settingsOfMode, state.draws);
+    makeDrawList(cut, state.hierarchies, state.instances, view, settingsOfMode, state.draws);
     markDiscSizes(*state.discSizes, state.draws);
     RenderRequest request;
     request.draws = &state.draws;
@@ -216,6 +213,21 @@ Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettin
     request.wantDepthAndNormal = settings.wantDepthAndNormal;
     request.staysOnDevice = settings.staysOnDevice;
     STIPPLE_TRY(drawPicture(state, request));
+    return request.passes.size();
+}
+
+Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettings& settings, double start,
+                     double cutMs) {
+    if (state.backendLife.expired())
+        return fail(ErrorKind::device, "what draws the scene is gone", "the frame",
+                    "keep the backend while it is used");
+    STIPPLE_TRY(checkFilter(settings.draw));
+    uint64_t passes = 0;
+    if (hasLayers(state, view, settings)) {
+        STIPPLE_ASSIGN(passes, drawLayered(state, view, settings));
+    } else {
+        STIPPLE_ASSIGN(passes, drawNodes(state, state.cut, view, settings));
+    }
 
     FrameCounters& c = state.counters;
     const lod::CutCounters& cut = state.cut.counters;
@@ -234,7 +246,7 @@ Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettin
     c.budgetTruncated = state.cut.truncated;
     c.tauTargetPixels = state.cut.tauTarget;
     c.tauEffectivePixels = state.cut.tauEffective;
-    c.passes = request.passes.size();
+    c.passes = passes;
     c.blocks = state.draws.points().blocks.size();
     c.bytesStreamed = stream.bytesStreamed;
     c.residentBytes = stream.residentBytes;
@@ -256,6 +268,7 @@ Result<void> draw(FrameState& state, const lod::View& view, const FrameSettings&
     streaming::Streamer& streamer = *state.streamer;
     const double cutStart = nowSeconds();
     lod::selectCut(state.scene(), streamer.residency(), view, settings.budgets, state.scratch, state.cut);
+    addViewsFromBehind(state, view, settings);
     const double cutEnd = nowSeconds();
     if (asks) streamer.request(state.cut);
     return drawCut(state, view, settings, start, (cutEnd - cutStart) * 1e3);
@@ -300,6 +313,7 @@ Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const
     for (;;) {
         lod::planResident(state.scene(), view, settings.budgets, streamer.residentLimit(), barred, state.scratch,
                           state.cut, state.plan);
+        planViewsFromBehind(state, view, settings, barred);
         const uint64_t failures = streamer.counters().failures;
         STIPPLE_TRY(await(state.plan, streamer));
         if (streamer.counters().failures == failures) break;

@@ -15,6 +15,8 @@
 
 namespace stipple::render {
 
+struct LayeredFrame;
+
 struct FrameSettings {
     lod::Budgets budgets;
     Mode mode = Mode::pullpush;
@@ -39,7 +41,8 @@ struct FrameState {
     lod::ResidentPlan plan;
     DrawList draws;
     Image image;
-    std::optional<Ticket> onDevice;  ///< of the last frame, if its picture stays there
+    std::shared_ptr<LayeredFrame> layered;  ///< of scenes with glass, from the first such frame on (layered_frame.h)
+    std::optional<Ticket> onDevice;         ///< of the last frame, if its picture stays there
     FrameCounters counters;
 
     lod::CutScene scene() const { return {hierarchies, instances, groups}; }

@@ -9,6 +9,7 @@
 
 #include "engine/base/result.h"
 #include "engine/scene/read_settings.h"
+#include "lod/primitives/optics.h"
 
 namespace stipple::scene {
 
@@ -28,6 +29,7 @@ struct Material {
     glm::vec3 emissive{0};
     float metallic = 1, roughness = 1, normalScale = 1, occlusionStrength = 1, alphaCutoff = 0.5f;
     TextureUse baseColourTexture, metallicRoughnessTexture, normalTexture, occlusionTexture, emissiveTexture;
+    lod::Optics optics;  ///< in units of the scene
     AlphaMode alphaMode = AlphaMode::opaque;
     bool isDoubleSided = false, isUnlit = false;
 };
@@ -122,7 +124,8 @@ struct Box {
 Box meshBounds(const Scene& scene);
 
 /// glTF 2.0 (.gltf, .glb) with KHR_lights_punctual, KHR_texture_transform, EXT_mesh_gpu_instancing,
-/// KHR_mesh_quantization, EXT_meshopt_compression, KHR_materials_unlit, and STIPPLE_store (README). What cannot be
+/// KHR_mesh_quantization, EXT_meshopt_compression, KHR_materials_unlit, _transmission, _ior, _volume and _specular (but
+/// for their textures), and STIPPLE_store (README). What cannot be
 /// drawn is refused with the place; other faults of the file, and images that are missing, are counted in the notes.
 Result<Scene> readGltf(const std::string& path, const ReadSettings& settings = {});
 

@@ -43,7 +43,8 @@ uint32_t surfaceOf(const Scene& scene, const Primitive& p) {
     if (p.material < 0) return surface;
     const Material& m = scene.materials[static_cast<size_t>(p.material)];
     if (m.isDoubleSided) surface |= shared::kSurfaceTwoSided;
-    if (m.alphaMode != AlphaMode::opaque) surface |= shared::kSurfaceMasked;
+    // What is drawn as a layer of its own (engine/render/layers.h) is cut out of what lies behind it.
+    if (m.alphaMode != AlphaMode::opaque || !m.optics.isPlain()) surface |= shared::kSurfaceMasked;
     if (m.isUnlit) surface |= shared::kSurfaceUnlit;
     for (const TextureUse* use :
          {&m.baseColourTexture, &m.metallicRoughnessTexture, &m.normalTexture, &m.occlusionTexture, &m.emissiveTexture})
@@ -205,6 +206,23 @@ std::vector<shared::SurfaceMaterial> surfaceMaterials(const Scene& scene) {
     plain.baseTexture = plain.surfaceTexture = plain.normalTexture = plain.occlusionTexture = plain.emissiveTexture =
         slotOf(scene, {}, {});
     out.push_back(plain);
+    return out;
+}
+
+std::vector<lod::Optics> surfaceOptics(const Scene& scene, const std::vector<Placement>& placed) {
+    std::vector<bool> isUsed(scene.materials.size() + 1);
+    for (const Placement& at : placed)
+        for (const Primitive& p : scene.meshes[static_cast<size_t>(at.mesh)].primitives)
+            if (p.kind == PrimitiveKind::triangles) isUsed[materialIndex(scene, p)] = true;
+    const auto of = [&](size_t m) { return m < scene.materials.size() ? scene.materials[m].optics : lod::Optics{}; };
+    const auto first = static_cast<size_t>(std::find(isUsed.begin(), isUsed.end(), true) - isUsed.begin());
+    std::vector<lod::Optics> out;
+    bool isPlain = true;
+    for (size_t m = 0; m < isUsed.size(); ++m) {
+        out.push_back(of(isUsed[m] || first == isUsed.size() ? m : first));
+        isPlain = isPlain && out.back() == lod::Optics{};
+    }
+    if (isPlain) out.clear();
     return out;
 }
 

@@ -26,6 +26,10 @@ bool isOnLeading(const Scene& scene, const TextureUse& use, const TextureUse& le
 
 std::vector<shared::SurfaceMaterial> surfaceMaterials(const Scene& scene);
 
+/// Of each of them, as `placed` has it: those of materials that none of it has are those of one that some has, so that
+/// what is glass all over has nothing else. Empty where none lets light through, nor reflects more or less than most.
+std::vector<lod::Optics> surfaceOptics(const Scene& scene, const std::vector<Placement>& placed);
+
 /// What each texture of the scene is used for, with its wrap modes; pixels are not set.
 std::vector<lod::TextureImage> textureImages(const Scene& scene);
 

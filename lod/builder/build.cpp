@@ -371,7 +371,7 @@ uint64_t PointStages::identity() const {
                     settings_.up ? static_cast<int>(*settings_.up) : -1, settings_.leafRecords, settings_.skipBad,
                     settings_.fineNormals, settings_.mergeDuplicates, settings_.dropOutliers);
     for (const AttributeInfo& a : input_.attributes()) text.append("|").append(a.name);
-    for (const PointMaterial& m : input_.materials) text += fmt::format("|{},{}", m.roughness, m.metallic);
+    for (const PointMaterial& m : input_.materials) text.append("|").append(identityOf(m));
     text.append("|").append(std::filesystem::absolute(course_.output).lexically_normal().string());
     return hashBytes(text.data(), text.size());
 }

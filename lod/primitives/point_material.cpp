@@ -1,5 +1,7 @@
 #include "lod/primitives/point_material.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -18,7 +20,16 @@ std::optional<PointMaterial> materialNamed(const std::string& name) {
     if (name == "matte") return PointMaterial{1, 0};
     if (name == "plastic") return PointMaterial{0.35f, 0};
     if (name == "metal") return PointMaterial{0.3f, 1};
+    if (name == "mirror") return PointMaterial{0, 1};
+    if (const auto optics = opticsNamed(name)) return PointMaterial{0, 0, *optics};
     return {};
+}
+
+std::string identityOf(const PointMaterial& m) {
+    const Optics& o = m.optics;
+    return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}", m.roughness, m.metallic, o.transmission, o.ior,
+                       o.thickness, o.attenuationDistance, o.attenuationColour.x, o.attenuationColour.y,
+                       o.attenuationColour.z, o.specular, o.specularColour.x, o.specularColour.y, o.specularColour.z);
 }
 
 std::vector<PointMaterial> materialGrid() {

@@ -47,6 +47,29 @@ shared::TextureSlot slotFromJson(const json& j) {
     return {whole<uint32_t>(j.at("texture")), vectorFromJson(j.at("u")), vectorFromJson(j.at("v"))};
 }
 
+json opticsToJson(const Optics& o) {
+    return {{"transmission", o.transmission},
+            {"ior", o.ior},
+            {"thickness", o.thickness},
+            {"attenuation_distance", o.attenuationDistance},
+            {"attenuation_colour", toJson(o.attenuationColour)},
+            {"specular", o.specular},
+            {"specular_colour", toJson(o.specularColour)}};
+}
+
+Optics opticsFromJson(const json& j) {
+    Optics o;
+    o.transmission = real(j.at("transmission"));
+    o.ior = real(j.at("ior"));
+    o.thickness = real(j.at("thickness"));
+    o.attenuationDistance = real(j.at("attenuation_distance"));
+    o.attenuationColour = vectorFromJson(j.at("attenuation_colour"));
+    o.specular = real(j.at("specular"));
+    o.specularColour = vectorFromJson(j.at("specular_colour"));
+    if (!o.isPossible()) throw std::runtime_error("optics of a material are not possible");
+    return o;
+}
+
 json materialToJson(const shared::SurfaceMaterial& m) {
     return {{"base_colour", toJson(m.baseColour)},
             {"alpha", m.alpha},
@@ -130,7 +153,12 @@ json toJson(const StoreDescription& d) {
                 {"added", d.added},
                 {"source", toUtf8(d.source)}};
     if (d.isRigid) out["is_rigid"] = true;
-    for (const PointMaterial& m : d.pointMaterials) out["point_materials"].push_back({m.roughness, m.metallic});
+    for (const Optics& o : d.optics) out["optics"].push_back(opticsToJson(o));
+    for (const PointMaterial& m : d.pointMaterials) {
+        json material = {m.roughness, m.metallic};
+        if (m.optics != Optics{}) material.push_back(opticsToJson(m.optics));
+        out["point_materials"].push_back(std::move(material));
+    }
     return out;
 }
 
@@ -194,8 +222,14 @@ StoreDescription fromJson(const json& j) {
     d.dropped = countsFromJson(j, "dropped");
     d.added = countsFromJson(j, "added");
     for (const json& m : j.at("materials")) d.materials.push_back(materialFromJson(m));
+    if (j.contains("optics"))
+        for (const json& o : j.at("optics")) d.optics.push_back(opticsFromJson(o));
+    if (!d.optics.empty() && d.optics.size() != d.materials.size())
+        throw std::runtime_error("not every material has optics");
     if (j.contains("point_materials"))
-        for (const json& m : j.at("point_materials")) d.pointMaterials.push_back({share(m.at(0)), share(m.at(1))});
+        for (const json& m : j.at("point_materials"))
+            d.pointMaterials.push_back(
+                {share(m.at(0)), share(m.at(1)), m.size() > 2 ? opticsFromJson(m.at(2)) : Optics{}});
     if (d.pointMaterials.size() > kMostPointMaterials) throw std::runtime_error("it has too many materials of points");
     return d;
 }

@@ -32,6 +32,7 @@ struct StoreDescription {
     double smallestDisc = 0;                ///< world units
     bool hasNormals = false;                ///< from the file or estimated
     std::vector<shared::SurfaceMaterial> materials;  ///< of a mesh store
+    std::vector<Optics> optics;                      ///< of each of `materials`; empty: all are plain
     std::vector<PointMaterial> pointMaterials;       ///< see materials.h
     uint64_t pointsIn = 0;                           ///< that the input declares; 0: not told
     std::map<std::string, uint64_t> dropped, added;  ///< reason -> points: pointsIn + added = points + dropped

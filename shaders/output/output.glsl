@@ -1,6 +1,9 @@
-// The picture's pixels, over the background. LIT: with the light on them, which reads nothing but its own pixel.
-#ifdef LIT
+// The picture's pixels, over the background. LIT: with the light on them, which reads nothing but its own pixel;
+// REFRACTED: with that of a layer of glass.
+#if defined(LIT)
 #include "../light.glsl"
+#elif defined(REFRACTED)
+#include "../glass.glsl"
 #else
 #include "../surface.glsl"
 #endif
@@ -16,6 +19,9 @@ void mixSecond(uint kind, SecondSurface second, uvec2 pixel, inout SurfaceWords 
     vec3 c = vec3(unpackRed(second.shown.albedo), unpackGreen(second.shown.albedo), unpackBlue(second.shown.albedo));
 #ifdef LIT
     c = litColour(second.shown, c, n, pixel);
+#endif
+#ifdef REFRACTED
+    c = glassColour(second.shown, c, n, pixel);
 #endif
     if (frame.debugView != kDebugHoles && frame.debugView != kDebugNormals) colour += second.share * (c - colour);
     if (kind != kSecondFront) return;
@@ -37,6 +43,9 @@ void main() {
         colour = vec3(unpackRed(s.albedo), unpackGreen(s.albedo), unpackBlue(s.albedo));
 #ifdef LIT
         colour = litColour(s, colour, n, pixel);
+#endif
+#ifdef REFRACTED
+        colour = glassColour(s, colour, n, pixel);
 #endif
     }
     float share = valid ? 1.0 : 0.0;

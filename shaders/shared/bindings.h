@@ -30,7 +30,11 @@ const uint kFilteredBinding = 22u;
 const uint kCoverageBinding = 23u;
 const uint kMaterialSumsBinding = 24u;
 const uint kSecondsBinding = 25u;
-const uint kBindings = 26u;
+const uint kLayerBinding = 26u;
+const uint kOpticsBinding = 27u;
+const uint kBehindBinding = 28u;
+const uint kBackBinding = 29u;
+const uint kBindings = 30u;
 
 // Per pixel:
 const uint kTexelWords = 5u;     // planes of a packed texel; in frames with materials of points one more

@@ -135,12 +135,13 @@ struct FrameConstants {
     vec3 environmentX;  // rows of the rotation from camera space to the environment's (y up)
     vec3 environmentY;
     vec3 environmentZ;
-    uint orthographic;    // 1: rays are parallel (lens.h)
-    float lowPass;        // mode ewa: variance, px^2
-    float kernelSupport;  // mode ewa: where kernels end, in sigmas
-    uint perSurfel;       // mode ewa: 1: surfels have weights (surfel_weight.h), and pixels are not divided by them
-    uint hasMaterials;    // some points have materials
-    uint patchAs;         // kPatch...
+    uint orthographic;      // 1: rays are parallel (lens.h)
+    float lowPass;          // mode ewa: variance, px^2
+    float kernelSupport;    // mode ewa: where kernels end, in sigmas
+    uint perSurfel;         // mode ewa: 1: surfels have weights (surfel_weight.h), and pixels are not divided by them
+    uint hasMaterials;      // some points have materials
+    uint patchAs;           // kPatch...
+    uint environmentSharp;  // edge of the sharpest map of the environment (environment.h); 0: none
 };
 SHARED_FN Lens frameLens(FrameConstants f) { return lensOf(f.focal, f.orthographic != 0u); }
 

@@ -25,6 +25,7 @@ struct SurfaceMaterial {
     TextureSlot normalTexture;
     TextureSlot occlusionTexture;
     TextureSlot emissiveTexture;
+    uint optics;  // bits of the surface's material word (optics.h): which of the frame's; not in files
 };
 
 // The material of a point, packed: metallic 8 | roughness 8. (Its base colour is its own.)

@@ -23,8 +23,16 @@ struct Surface {
     float metallic;
     float roughness;
     float occlusion;
-    float leaf;  // 1: lets light through
+    float leaf;       // 1: lets light through
+    vec3 dielectric;  // what it reflects straight on where it is no metal; most: kDielectric
 };
+const float kDielectric = 0.04f;
+
+SHARED_FN vec3 straightOn(Surface s) {
+    return vec3(s.dielectric.x + (s.colour.x - s.dielectric.x) * s.metallic,
+                s.dielectric.y + (s.colour.y - s.dielectric.y) * s.metallic,
+                s.dielectric.z + (s.colour.z - s.dielectric.z) * s.metallic);
+}
 
 // Light that comes back from one direction `l`, times what a white diffuse surface would send there.
 SHARED_FN vec3 reflectLight(Surface s, vec3 l, vec3 light) {
@@ -45,8 +53,7 @@ SHARED_FN vec3 reflectLight(Surface s, vec3 l, vec3 light) {
     const float k = 1.0f - vh;
     const float k5 = k * k * k * k * k;
     const float diffuse = 1.0f - s.metallic;
-    const vec3 f0 = vec3(0.04f + (s.colour.x - 0.04f) * s.metallic, 0.04f + (s.colour.y - 0.04f) * s.metallic,
-                         0.04f + (s.colour.z - 0.04f) * s.metallic);
+    const vec3 f0 = straightOn(s);
     const vec3 f = vec3(f0.x + (1.0f - f0.x) * k5, f0.y + (1.0f - f0.y) * k5, f0.z + (1.0f - f0.z) * k5);
     const float through = s.leaf * kLeafGlow * diffuse * max(-towards, 0.0f);
     return vec3(light.x * (nl * (s.colour.x * diffuse * (1.0f - f.x) + f.x * specular) + through * s.colour.x),
@@ -78,8 +85,7 @@ SHARED_FN vec3 reflectAround(Surface s, float nv, vec3 around, vec3 mirror) {
     const float scale = -1.04f * a004 + 1.04f - 0.572f * s.roughness;
     const float bias = 1.04f * a004 - 0.04f + 0.022f * s.roughness;
     const float diffuse = 1.0f - s.metallic;
-    const vec3 f0 = vec3(0.04f + (s.colour.x - 0.04f) * s.metallic, 0.04f + (s.colour.y - 0.04f) * s.metallic,
-                         0.04f + (s.colour.z - 0.04f) * s.metallic);
+    const vec3 f0 = straightOn(s);
     return vec3(s.occlusion * (s.colour.x * diffuse * around.x + (f0.x * scale + bias) * mirror.x),
                 s.occlusion * (s.colour.y * diffuse * around.y + (f0.y * scale + bias) * mirror.y),
                 s.occlusion * (s.colour.z * diffuse * around.z + (f0.z * scale + bias) * mirror.z));

@@ -15,7 +15,9 @@ const uint kPixelTriangle = 0x80000000u;
 const uint kPixelUnlit = 0x40000000u;
 const uint kPixelLeaf = 0x20000000u;      // lets light through
 const uint kPixelMaterial = 0x10000000u;  // of points that have a material: lit as triangles are
-const uint kPlainSurface = 0x00ffff00u;   // what points are: not metallic, rough, not occluded
+const uint kPixelOptics = 0x0f000000u;    // of triangles: which of the layer's optics (optics.h); 0: none
+const uint kPixelOpticsShift = 24u;
+const uint kPlainSurface = 0x00ffff00u;  // what points are: not metallic, rough, not occluded
 
 // The material word of what splats were merged to: plain where most of it is.
 SHARED_FN uint surfaceWord(TexelSurface s) {

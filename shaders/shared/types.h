@@ -41,9 +41,25 @@ SHARED_END
 // A table of floats that GLSL reads from a buffer and C++ from its first argument.
 #define SHARED_TABLE const float *environment,
 #define SHARED_TABLE_USE environment,
+// The same of what a layer of glass sees (optics.h): the environment, what lies behind it, its own back.
+SHARED_BEGIN
+struct SeenTables {
+    const float *environment, *behind, *back;
+};
+SHARED_END
+#define SHARED_SEEN const SeenTables &seen,
+#define SHARED_SEEN_USE seen,
+#define SHARED_SEEN_ENVIRONMENT seen.environment,
+#define SHARED_SEEN_BEHIND(at) seen.behind[at]
+#define SHARED_SEEN_BACK(at) seen.back[at]
 #else
 #define SHARED_TABLE
 #define SHARED_TABLE_USE
+#define SHARED_SEEN
+#define SHARED_SEEN_USE
+#define SHARED_SEEN_ENVIRONMENT
+#define SHARED_SEEN_BEHIND(at) behind[at]
+#define SHARED_SEEN_BACK(at) back[at]
 #define SHARED_BEGIN
 #define SHARED_END
 #define SHARED_FN

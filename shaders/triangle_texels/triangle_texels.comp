@@ -73,7 +73,7 @@ void main() {
     if (frame.debugView == kDebugLevel) t.colour = debugLevelColour(c.level);
     if (frame.debugView == kDebugError) t.colour = debugErrorColour(c.errorPixels);
     storeTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, pixel, t);
-    triangleWords[2u * place] = kPixelTriangle | ((va.surface & kSurfaceUnlit) != 0u ? kPixelUnlit : 0u) | byteOf(metallic) |
+    triangleWords[2u * place] = kPixelTriangle | material.optics | ((va.surface & kSurfaceUnlit) != 0u ? kPixelUnlit : 0u) | byteOf(metallic) |
                            byteOf(roughness) << 8 | byteOf(occlusion) << 16;
     triangleWords[2u * place + 1u] = packColour(emissive.x, emissive.y, emissive.z);
 }

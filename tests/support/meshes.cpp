@@ -39,6 +39,7 @@ lod::TriangleMesh growTriangles(const MeshRecipe& recipe, lod::MeshBuildSettings
     settings.description.source = recipe.grow.kind;
     settings.description.up = {0, 1, 0};
     settings.description.materials = scene::surfaceMaterials(scene);
+    settings.description.optics = scene::surfaceOptics(scene, scene::placements(scene));
     settings.textures = scene::textureImages(scene);
     if (recipe.isTextured) {
         const grow::Textures t = grow::growTextures(recipe.grow);

@@ -1,5 +1,6 @@
 // Rows of tiles: from reconstructed texels (or from what an earlier run left) through passes that read their own pixel
 // to the picture (or to what a later pass reads).
+#include <algorithm>
 #include <array>
 
 #include "engine/cpu/passes/passes.h"
@@ -128,16 +129,21 @@ class RowProgram {
     /// Second surfaces are lit as the first ones are, and mixed with them after that (without light: before output).
     void finish(const RowPlace& at, const SurfacePlanes& planes, SurfaceRow& surface) const {
         thread_local SurfaceRow second{};
-        const RowPass* const light = &cpuPassOf(render::Pass::light).row;
-        const RowPass* const mixedAfter = concerns(*light, planes) ? light : nullptr;
+        const auto lights = [&](const RowPass* step) {
+            const bool isOne =
+                step == &cpuPassOf(render::Pass::light).row || step == &cpuPassOf(render::Pass::refract).row;
+            return isOne && concerns(*step, planes);
+        };
+        const bool isLit = std::any_of(steps_.begin(), steps_.end(), lights);
         for (const RowPass* step : steps_) {
             if (!concerns(*step, planes)) continue;
-            const bool isMixed = step == light || (!mixedAfter && step == &cpuPassOf(render::Pass::output).row);
+            const bool isLight = lights(step);
+            const bool isMixed = isLight || (!isLit && step == &cpuPassOf(render::Pass::output).row);
             const bool hasSeconds = isMixed && takeSeconds(at, surface, second);
-            if (hasSeconds && step == light) step->run(at, second);
-            if (hasSeconds && step != light) mixSeconds(at, second, surface);
+            if (hasSeconds && isLight) step->run(at, second);
+            if (hasSeconds && !isLight) mixSeconds(at, second, surface);
             step->run(at, surface);
-            if (hasSeconds && step == light) mixSeconds(at, second, surface);
+            if (hasSeconds && isLight) mixSeconds(at, second, surface);
         }
         if (isKept_) keepRow(at, surface);
     }

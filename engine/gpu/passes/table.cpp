@@ -25,6 +25,7 @@ const GpuKind& gpuKind(lod::Kind kind) {
 
 constinit const GpuPass surfacePass{overEveryPixel};
 constinit const GpuPass lightPass{overEveryPixel};
+constinit const GpuPass refractPass{overEveryPixel};
 constinit const GpuPass outputPass{overEveryPixel};
 
 }  // namespace stipple::gpu

@@ -4,3 +4,4 @@
 STIPPLE_EFFECT(wind)
 STIPPLE_EFFECT(light)
 STIPPLE_EFFECT(environment)
+STIPPLE_EFFECT(refraction)

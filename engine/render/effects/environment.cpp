@@ -21,6 +21,7 @@ void fill(const DrawSettings& settings, const glm::dmat3& cameraFromWorld, DrawL
     f.environmentY = glm::vec3(cameraFromWorld * up);
     f.environmentZ = glm::vec3(cameraFromWorld * back);
     f.hasEnvironment = 1;
+    f.environmentSharp = settings.environment->sharpEdge;
     f.ambient = 1;
     out.environment = settings.environment;
 }

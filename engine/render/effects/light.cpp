@@ -37,7 +37,7 @@ bool isLit(const EffectFrame& frame) {
     const DrawSettings& s = frame.settings;
     bool isAnyLit = false;
     forEachKind([&](lod::Kind kind) { isAnyLit = isAnyLit || (frame.content.has(kind) && drawnKind(kind).isLit(s)); });
-    return s.debugView == shared::kDebugNone && isAnyLit;
+    return s.debugView == shared::kDebugNone && s.layer == nullptr && isAnyLit;
 }
 
 extern const Effect lightEffect;

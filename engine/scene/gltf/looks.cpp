@@ -32,6 +32,43 @@ TextureUse textureUse(const json& parent, const char* name) {
     return use;
 }
 
+/// KHR_materials_transmission, _ior, _volume, _specular.
+lod::Optics opticsOf(const json& material) {
+    const auto number = [&](const char* extension, const char* name, float without) {
+        const json& of = extensionOf(material, extension);
+        const float value = of.is_object() ? of.value(name, without) : without;
+        return std::isfinite(value) ? value : without;
+    };
+    const auto colour = [&](const char* extension, const char* name) {
+        const json& of = extensionOf(material, extension);
+        return of.is_object() && of.contains(name) ? vectorOf<glm::vec3>(of[name]) : glm::vec3(1);
+    };
+    lod::Optics o;
+    o.transmission = number("KHR_materials_transmission", "transmissionFactor", 0);
+    o.ior = number("KHR_materials_ior", "ior", 1.5f);
+    o.thickness = number("KHR_materials_volume", "thicknessFactor", 0);
+    o.attenuationDistance = number("KHR_materials_volume", "attenuationDistance", 0);
+    o.attenuationColour = colour("KHR_materials_volume", "attenuationColor");
+    o.specular = number("KHR_materials_specular", "specularFactor", 1);
+    o.specularColour = colour("KHR_materials_specular", "specularColorFactor");
+    return o.isPossible() ? o : lod::Optics{};
+}
+
+/// What of these extensions is not drawn.
+void noteOpticalTextures(const json& root, Scene& scene) {
+    size_t textured = 0;
+    for (const json& j : arrayOf(root, "materials"))
+        for (const auto& [extension, texture] : {std::pair{"KHR_materials_transmission", "transmissionTexture"},
+                                                 {"KHR_materials_volume", "thicknessTexture"},
+                                                 {"KHR_materials_specular", "specularTexture"},
+                                                 {"KHR_materials_specular", "specularColorTexture"}})
+            textured += extensionOf(j, extension).is_object() && extensionOf(j, extension).contains(texture) ? 1 : 0;
+    if (textured > 0)
+        scene.notes.push_back(fmt::format(
+            "{} of transmission, thickness or specular light {} left out: what they vary is even",
+            textured == 1 ? "a texture" : fmt::format("{} textures", textured), textured == 1 ? "is" : "are"));
+}
+
 void readMaterials(const json& root, Scene& scene) {
     for (const json& j : arrayOf(root, "materials")) {
         Material m;
@@ -57,8 +94,10 @@ void readMaterials(const json& root, Scene& scene) {
         m.alphaCutoff = j.value("alphaCutoff", 0.5f);
         m.isDoubleSided = j.value("doubleSided", false);
         m.isUnlit = extensionOf(j, "KHR_materials_unlit").is_object();
+        m.optics = opticsOf(j);
         scene.materials.push_back(std::move(m));
     }
+    noteOpticalTextures(root, scene);
     const auto blended = std::count_if(scene.materials.begin(), scene.materials.end(),
                                        [](const Material& m) { return m.alphaMode == AlphaMode::blend; });
     if (blended > 0)

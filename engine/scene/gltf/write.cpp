@@ -151,7 +151,31 @@ class Writer {
             use("KHR_materials_unlit");
             out.extensions["KHR_materials_unlit"] = Value(Value::Object{});
         }
+        addOptics(m.optics, out);
         model_.materials.push_back(out);
+    }
+    /// As extensions, where they are not those of every material.
+    void addOptics(const lod::Optics& o, tinygltf::Material& out) {
+        const lod::Optics usual;
+        const auto list = [](const glm::vec3& v) {
+            return Value(Value::Array{Value(double{v.x}), Value(double{v.y}), Value(double{v.z})});
+        };
+        const auto add = [&](const char* name, Value::Object values) {
+            use(name);
+            out.extensions[name] = Value(std::move(values));
+        };
+        if (o.transmission > 0)
+            add("KHR_materials_transmission", {{"transmissionFactor", Value(double{o.transmission})}});
+        if (o.ior != usual.ior) add("KHR_materials_ior", {{"ior", Value(double{o.ior})}});
+        if (o.thickness > 0) {
+            Value::Object volume{{"thicknessFactor", Value(double{o.thickness})},
+                                 {"attenuationColor", list(o.attenuationColour)}};
+            if (o.attenuationDistance > 0) volume["attenuationDistance"] = Value(double{o.attenuationDistance});
+            add("KHR_materials_volume", std::move(volume));
+        }
+        if (o.specular != usual.specular || o.specularColour != usual.specularColour)
+            add("KHR_materials_specular",
+                {{"specularFactor", Value(double{o.specular})}, {"specularColorFactor", list(o.specularColour)}});
     }
     /// Vertices are floats in the file, and the matrices of nodes doubles: meshes that have more digits than floats are
     /// written around zero, below nodes that move them back. (Instances are floats, too: their meshes stay.)

@@ -1,0 +1,41 @@
+// Refraction: a layer of glass (layers.h) is lit by what it reflects and by what is seen through it. Only frames of
+// such layers have it; theirs is the light of the frame, so that no other effect of light runs in them.
+#include <array>
+
+#include "engine/render/draw_list.h"
+#include "engine/render/effects/effect.h"
+#include "engine/render/layers.h"
+
+namespace stipple::render {
+
+extern const Effect lightEffect, environmentEffect;
+
+namespace {
+
+constexpr std::array kPasses{Pass::refract};
+
+void fill(const DrawSettings& settings, const glm::dmat3& cameraFromWorld, DrawList& out) {
+    lightEffect.fill(settings, cameraFromWorld, out);
+    if (settings.environment) environmentEffect.fill(settings, cameraFromWorld, out);
+    auto tables = std::make_shared<LayerTables>();
+    fillLayer(*settings.layer, out, *tables);
+    out.glass = std::move(tables);
+    out.layer = settings.layer;
+}
+
+}  // namespace
+
+extern const Effect refractionEffect;
+constinit const Effect refractionEffect{.name = "refraction",
+                                        .summary = "glass and water: what is behind them, bent",
+                                        .isRequested = [](const DrawSettings& s) { return s.layer != nullptr; },
+                                        .ofScene = [](const EffectScene& scene) { return !scene.instances.empty(); },
+                                        .ofFrame = [](const EffectFrame& frame) { return !frame.content.isEmpty(); },
+                                        .ofNode = nullptr,
+                                        .fill = fill,
+                                        .stage = Stage::light,
+                                        .passes = kPasses,
+                                        .tolerancePixels = 0,
+                                        .toleranceSteps = 0};
+
+}  // namespace stipple::render

@@ -1,0 +1,196 @@
+#include "engine/render/layers.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "engine/render/draw_list.h"
+#include "lod/store/materials.h"
+#include "shaders/shared/surface.h"
+
+namespace stipple::render {
+namespace {
+
+/// The list of a frame's optics: each different one once.
+class OpticsList {
+  public:
+    OpticsList() : list_(1) {}
+    uint32_t numberOf(const lod::Optics& o) {
+        if (o.isPlain()) return 0;
+        const auto known = std::find(list_.begin() + 1, list_.end(), o);
+        if (known != list_.end()) return static_cast<uint32_t>(known - list_.begin());
+        if (list_.size() <= shared::kMostOptics) {
+            list_.push_back(o);
+            return static_cast<uint32_t>(list_.size() - 1);
+        }
+        const auto off = [&](const lod::Optics& other) {
+            return std::abs(o.transmission - other.transmission) + std::abs(o.ior - other.ior) +
+                   glm::length(o.attenuationColour - other.attenuationColour);
+        };
+        const auto nearest = std::min_element(list_.begin() + 1, list_.end(),
+                                              [&](const auto& a, const auto& b) { return off(a) < off(b); });
+        return static_cast<uint32_t>(nearest - list_.begin());
+    }
+    std::vector<lod::Optics> take() { return std::move(list_); }
+
+  private:
+    std::vector<lod::Optics> list_;
+};
+
+/// Of points: those of the store's list, if all of it has the same.
+lod::Optics opticsOfPoints(const lod::StoreDescription& d) {
+    const auto& list = d.pointMaterials;
+    const bool areAlike = std::all_of(list.begin(), list.end(),
+                                      [&](const lod::PointMaterial& m) { return m.optics == list.front().optics; });
+    return list.empty() || !areAlike ? lod::Optics{} : list.front().optics;
+}
+
+void addTo(OpticsOf& of, const lod::Optics& o, uint32_t number) {
+    of.hasAny = of.hasAny || number != 0;
+    of.transmits = of.transmits || (number != 0 && o.transmission > 0);
+    of.isWhole = of.isWhole && number != 0 && o.transmission > 0;
+    of.isSolid = of.isSolid && o.thickness != 0;
+}
+
+OpticsOf appearanceOf(const lod::Store& store, const DrawSettings& settings, OpticsList& list,
+                      std::span<shared::SurfaceMaterial> materials) {
+    const lod::StoreDescription& d = store.description;
+    OpticsOf of;
+    of.isWhole = of.isSolid = true;
+    if (materials.empty()) {
+        const lod::Optics o = settings.optics.value_or(opticsOfPoints(d));
+        of.points = list.numberOf(o);
+        addTo(of, o, of.points);
+        return of;
+    }
+    of.isPlainMesh = isPlainMesh(d);
+    for (size_t m = 0; m < materials.size(); ++m) {
+        lod::Optics o = d.optics.empty() ? lod::Optics{} : d.optics[m];
+        if (of.isPlainMesh && settings.pointMaterial) {
+            materials[m].metallic = static_cast<float>(*settings.pointMaterial & 255u) / 255;
+            materials[m].roughness = static_cast<float>(*settings.pointMaterial >> 8 & 255u) / 255;
+            o = settings.optics.value_or(o);
+        }
+        const uint32_t number = list.numberOf(o);
+        materials[m].optics = number << shared::kPixelOpticsShift;
+        addTo(of, o, number);
+    }
+    return of;
+}
+
+}  // namespace
+
+Appearance makeAppearance(std::span<const std::shared_ptr<const lod::Store>> stores,
+                          const std::vector<shared::SurfaceMaterial>& materials, const DrawSettings& settings) {
+    Appearance a;
+    a.pointMaterial = settings.pointMaterial;
+    a.given = settings.optics;
+    a.shown = materials;
+    OpticsList list;
+    size_t first = 0;
+    for (const auto& store : stores) {
+        const size_t count = store->description.materials.size();
+        a.hierarchies.push_back(appearanceOf(*store, settings, list, std::span(a.shown).subspan(first, count)));
+        a.hasLayers = a.hasLayers || a.hierarchies.back().hasAny;
+        first += count;
+    }
+    a.optics = list.take();
+    if (!a.hasLayers) return a;
+    a.cutOut = a.shown;
+    for (shared::SurfaceMaterial& m : a.cutOut)
+        if (m.optics != 0) m.alphaCutoff = std::numeric_limits<float>::infinity();
+    return a;
+}
+
+Body bodyOf(const lod::StoreDescription& d, const lod::Instance& instance) {
+    const glm::dvec3 edges = instance.scale * (d.boundsMax - d.boundsMin);
+    Body body;
+    body.centre = instance.translation + instance.rotation * (instance.scale * 0.5 * (d.boundsMin + d.boundsMax));
+    body.radius = 0.51 * glm::length(edges) + instance.sway;
+    const double longest = std::max({edges.x, edges.y, edges.z});
+    body.thinnest = std::max(std::min({edges.x, edges.y, edges.z}), 0.02 * longest);
+    return body;
+}
+
+std::vector<LayerDraw> layersOf(const lod::Cut& cut, std::span<const lod::Instance> instances,
+                                std::span<const std::shared_ptr<const lod::Store>> stores, const Appearance& appearance,
+                                const lod::View& view, const DrawSettings& settings) {
+    std::vector<uint32_t> drawn;
+    const auto add = [&](uint32_t i, bool isLit) {
+        if (isLit && appearance.hierarchies[instances[i].hierarchy].hasAny && (drawn.empty() || drawn.back() != i))
+            drawn.push_back(i);
+    };
+    for (const lod::CutDraw& d : cut.draw) add(d.instance, settings.lit);
+    for (const lod::CutMeshDraw& d : cut.meshDraw) add(d.instance, !settings.unlitTriangles);
+    std::sort(drawn.begin(), drawn.end());
+    drawn.erase(std::unique(drawn.begin(), drawn.end()), drawn.end());
+    LayerDraw opaque;
+    std::vector<LayerDraw> bodies;
+    for (const uint32_t i : drawn) {
+        const OpticsOf& of = appearance.hierarchies[instances[i].hierarchy];
+        if (!of.transmits) {
+            opaque.instances.push_back(i);
+            continue;
+        }
+        const Body body = bodyOf(stores[instances[i].hierarchy]->description, instances[i]);
+        const glm::dvec3 to = body.centre - view.eye;
+        LayerDraw layer;
+        layer.instances = {i};
+        layer.isSeenTwice = settings.refract == shared::kRefractObject && of.isWhole && of.isSolid;
+        layer.distance = view.isOrthographic ? glm::dot(to, view.forward) : glm::length(to);
+        bodies.push_back(std::move(layer));
+    }
+    std::stable_sort(bodies.begin(), bodies.end(),
+                     [](const LayerDraw& a, const LayerDraw& b) { return a.distance > b.distance; });
+    while (bodies.size() > kMostBodies) {  // the farthest two are one
+        LayerDraw& next = bodies[1];
+        next.instances.insert(next.instances.end(), bodies[0].instances.begin(), bodies[0].instances.end());
+        next.isSeenTwice = false;
+        bodies.erase(bodies.begin());
+    }
+    for (LayerDraw& body : bodies) std::sort(body.instances.begin(), body.instances.end());
+    if (!opaque.instances.empty()) bodies.insert(bodies.begin(), std::move(opaque));
+    return bodies;
+}
+
+lod::View viewFromBehind(const Body& body, const lod::View& view) {
+    constexpr double kMargin = 1.02;
+    constexpr double kLeast = 64, kMost = 1024;
+    const glm::dvec3 to = body.centre - view.eye;
+    const double distance = glm::length(to);
+    lod::View back;
+    back.isOrthographic = true;
+    back.forward = view.isOrthographic || !(distance > 0) ? -view.forward : -to / distance;
+    back.right = glm::normalize(
+        glm::cross(std::abs(glm::dot(back.forward, view.down)) < 0.9 ? view.down : view.right, back.forward));
+    back.down = glm::cross(back.forward, back.right);
+    back.eye = body.centre - 2 * body.radius * back.forward;
+    const double pixels = view.isOrthographic ? view.focalPixels : view.focalPixels / std::max(distance, body.radius);
+    const double edge = std::clamp(std::ceil(2 * kMargin * body.radius * pixels), kLeast, kMost);
+    back.width = back.height = static_cast<uint32_t>(edge);
+    back.focalPixels = edge / (2 * kMargin * body.radius);
+    back.nearPlane = 1e-3 * body.radius;
+    return back;
+}
+
+bool isPlainMesh(const lod::StoreDescription& d) {
+    if (d.materials.size() != 1) return false;
+    const shared::SurfaceMaterial& m = d.materials.front();
+    const bool isWhite = m.baseColour.x == 1 && m.baseColour.y == 1 && m.baseColour.z == 1;
+    const uint32_t textures = m.baseTexture.texture | m.surfaceTexture.texture | m.normalTexture.texture |
+                              m.occlusionTexture.texture | m.emissiveTexture.texture;
+    return isWhite && m.metallic == 0 && textures == 0;
+}
+
+bool hasMirrors(const lod::StoreDescription& d) {
+    const auto isSmooth = [](float roughness) { return roughness < kMirrorRoughness; };
+    // Where a texture says how rough it is the factor is the most it can be.
+    const auto is = [&](const shared::SurfaceMaterial& m) {
+        return isSmooth(m.roughness) || m.surfaceTexture.texture != 0;
+    };
+    return std::any_of(d.materials.begin(), d.materials.end(), is) ||
+           std::any_of(d.pointMaterials.begin(), d.pointMaterials.end(),
+                       [&](const lod::PointMaterial& m) { return isSmooth(m.roughness); });
+}
+
+}  // namespace stipple::render
