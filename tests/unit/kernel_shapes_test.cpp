@@ -27,6 +27,7 @@ vec3 minus(const vec3& a, const vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b
 FrameConstants withRanges(FrameConstants f) {
     f.firstBlock.of[kKindCurves] = 3;
     f.firstBlock.of[kKindTriangles] = 5;
+    f.firstBlock.of[kKindPatches] = 9;  // none
     f.firstBlock.of[kKindDiscs] = 9;
     f.sunDirection = glm::normalize(glm::vec3(-0.45f, -0.55f, -0.7f));
     f.exactCurves = 2;
