@@ -139,7 +139,7 @@ Result<uint64_t> drawLayered(FrameState& state, const lod::View& view, const Fra
             std::swap(state.image, l.back);
             in.back = &l.back;
         }
-        if (in.way != shared::kRefractEnvironment) in.behind = &l.behind;
+        if (layer.transmits && in.way != shared::kRefractEnvironment) in.behind = &l.behind;
         takeNodes(state.cut, l.cut,
                   [&](uint32_t i) { return std::binary_search(layer.instances.begin(), layer.instances.end(), i); });
         FrameSettings lit = plain;

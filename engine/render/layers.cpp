@@ -1,7 +1,9 @@
 #include "engine/render/layers.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "engine/render/draw_list.h"
@@ -124,12 +126,14 @@ std::vector<LayerDraw> layersOf(const lod::Cut& cut, std::span<const lod::Instan
     for (const lod::CutMeshDraw& d : cut.meshDraw) add(d.instance, !settings.unlitTriangles);
     std::sort(drawn.begin(), drawn.end());
     drawn.erase(std::unique(drawn.begin(), drawn.end()), drawn.end());
-    LayerDraw opaque;
+    // What is told of points is told of all of a layer: theirs is another than that of the rest.
+    std::array<LayerDraw, 2> opaque;
+    const auto isOfPoints = [&](uint32_t i) { return appearance.hierarchies[instances[i].hierarchy].points != 0; };
     std::vector<LayerDraw> bodies;
     for (const uint32_t i : drawn) {
         const OpticsOf& of = appearance.hierarchies[instances[i].hierarchy];
         if (!of.transmits) {
-            opaque.instances.push_back(i);
+            opaque.at(isOfPoints(i) ? 1 : 0).instances.push_back(i);
             continue;
         }
         const Body body = bodyOf(stores[instances[i].hierarchy]->description, instances[i]);
@@ -142,15 +146,22 @@ std::vector<LayerDraw> layersOf(const lod::Cut& cut, std::span<const lod::Instan
     }
     std::stable_sort(bodies.begin(), bodies.end(),
                      [](const LayerDraw& a, const LayerDraw& b) { return a.distance > b.distance; });
-    while (bodies.size() > kMostBodies) {  // the farthest two are one
-        LayerDraw& next = bodies[1];
-        next.instances.insert(next.instances.end(), bodies[0].instances.begin(), bodies[0].instances.end());
-        next.isSeenTwice = false;
-        bodies.erase(bodies.begin());
+    std::array<LayerDraw, 2> far;
+    if (bodies.size() > kMostBodies) {  // the farthest are one
+        const auto nearest = bodies.end() - static_cast<ptrdiff_t>(kMostBodies - 1);
+        for (auto body = bodies.begin(); body != nearest; ++body)
+            far.at(isOfPoints(body->instances.front()) ? 1 : 0).instances.push_back(body->instances.front());
+        bodies.erase(bodies.begin(), nearest);
     }
-    for (LayerDraw& body : bodies) std::sort(body.instances.begin(), body.instances.end());
-    if (!opaque.instances.empty()) bodies.insert(bodies.begin(), std::move(opaque));
-    return bodies;
+    std::vector<LayerDraw> all;
+    for (std::array<LayerDraw, 2>* const of : {&opaque, &far})
+        for (LayerDraw& layer : *of) {
+            layer.transmits = of == &far;
+            std::sort(layer.instances.begin(), layer.instances.end());
+            if (!layer.instances.empty()) all.push_back(std::move(layer));
+        }
+    std::move(bodies.begin(), bodies.end(), std::back_inserter(all));
+    return all;
 }
 
 lod::View viewFromBehind(const Body& body, const lod::View& view) {

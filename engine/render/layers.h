@@ -79,11 +79,12 @@ Body bodyOf(const lod::StoreDescription& description, const lod::Instance& insta
 
 /// One layer of a cut.
 struct LayerDraw {
-    std::vector<uint32_t> instances;  ///< ascending; one, if it lets light through
+    std::vector<uint32_t> instances;  ///< ascending; one, unless there are too many; points and others never together
     bool isSeenTwice = false;         ///< by kRefractObject
+    bool transmits = true;            ///< light goes through some of it
     double distance = 0;
 };
-inline constexpr size_t kMostBodies = 8;  ///< nearer ones; those beyond are one layer
+inline constexpr size_t kMostBodies = 8;  ///< nearer ones; those beyond are one layer, and one of points
 /// What of a cut is drawn in layers, the farthest first; what only reflects otherwise than most is the first of them.
 std::vector<LayerDraw> layersOf(const lod::Cut& cut, std::span<const lod::Instance> instances,
                                 std::span<const std::shared_ptr<const lod::Store>> stores, const Appearance& appearance,

@@ -19,7 +19,7 @@ struct Optics {
     glm::vec3 specularColour{1};
 
     bool operator==(const Optics&) const = default;
-    /// The thickness of a solid body that says none: minus the radius of a sphere around it.
+    /// The thickness of a solid body that says none: minus the shortest edge of its box.
     static constexpr float kOfItsSize = -1;
     /// What a dielectric reflects straight on: ((n - 1) / (n + 1))^2, coloured.
     glm::vec3 straightOn() const;

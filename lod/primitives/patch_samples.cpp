@@ -82,8 +82,8 @@ void samplesAsPoints(const Hierarchy& h, uint32_t chunk, Chunk& of) {
             if (const auto record = samples.at(b, s)) records.push_back(*record);
     records.resize(places, kEmpty);
     if (places > 0) of.records = std::move(records);
-    of.patchBlocks.clear();
-    of.patchPlanes.clear();
+    of.patchBlocks = {};  // with their memory
+    of.patchPlanes = {};
 }
 
 std::span<const shared::PointRecord> withoutEmpty(std::span<const shared::PointRecord> records) {

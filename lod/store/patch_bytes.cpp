@@ -221,7 +221,7 @@ namespace {
 /// Bounds of what a file may say of itself.
 constexpr uint64_t kMostSamples = uint64_t{1} << 28;
 /// Cells of a patch at most: so many, and so many more for each that is drawn (builds make far fewer).
-constexpr uint64_t kMostCells = uint64_t{1} << 16, kCellsADrawn = 256;
+constexpr uint64_t kMostCells = uint64_t{1} << 16, kCellsADrawn = 256, kCellsADrawnOfAll = 1024;
 
 bool readHead(const Bytes& heads, size_t k, Patch& p) {
     Head h{};
@@ -314,7 +314,7 @@ Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const s
     }
     std::vector<Patch> out(sizes.patches);
     size_t cell = 0;
-    uint64_t grid = 0;
+    uint64_t grid = 0, allCells = 0, allDrawn = 0;
     for (size_t k = 0; k < out.size(); ++k) {
         Patch& p = out[k];
         if (!readHead(plain.heads, k, p)) return damaged();
@@ -324,7 +324,11 @@ Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const s
         uint64_t drawn = 0;
         for (size_t byte = 0; byte < (cells + 7) / 8; ++byte)
             drawn += static_cast<uint64_t>(std::popcount(plain.cells[cell + byte]));
-        if (cells > kMostCells + kCellsADrawn * drawn) return damaged();
+        // Of each, and of all together: no memory is taken for what draws next to nothing.
+        allCells += cells;
+        allDrawn += drawn;
+        if (cells > kMostCells + kCellsADrawn * drawn || allCells > kMostCells + kCellsADrawnOfAll * allDrawn)
+            return damaged();
         p.cells.resize(cells);
         for (size_t c = 0; c < cells; ++c) p.cells[c] = plain.cells[cell + c / 8] >> (c % 8) & 1u;
         cell += (cells + 7) / 8;

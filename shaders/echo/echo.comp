@@ -73,6 +73,7 @@ void putFrame() {
     put(frame.perSurfel);
     put(frame.hasMaterials);
     put(frame.patchAs);
+    put(frame.environmentSharp);
 }
 
 void putNode() {
@@ -189,6 +190,7 @@ void putMaterial() {
     put(material.emissiveTexture.texture);
     put(material.emissiveTexture.rowU);
     put(material.emissiveTexture.rowV);
+    put(material.optics);
 }
 
 void putSegment() {

@@ -40,7 +40,7 @@ class Glass : public test::BackendsHere {
     std::shared_ptr<const lod::Store> clear_, rough_, board_, points_;
 };
 
-/// Share of pixels whose bytes differ by more than one step.
+/// Share of pixels whose bytes differ by more than three of 255.
 double differing(const render::Image& a, const render::Image& b) {
     size_t count = 0;
     for (size_t i = 0; i < a.rgba.size(); ++i) {

@@ -278,7 +278,7 @@ TEST_F(Hybrid, LightsAndAnEnvironmentShineOnPointsAndTrianglesAsTheOracleSays) {
     std::fill(sky.rgb.begin(), sky.rgb.end(), 0.5f);
     const render::Environment even = render::makeEnvironment(sky, 1.0f, *executor_);
     const auto e = shared::environmentDiffuse(even.table.data(), shared::vec3(0.6f, 0.0f, 0.8f));
-    const auto m = shared::environmentMirror(even.table.data(), shared::vec3(0, -1, 0), 0.4f);
+    const auto m = shared::environmentMirror(even.table.data(), shared::vec3(0, -1, 0), 0.4f, 0);
     EXPECT_NEAR(e.x, 0.5, 0.005);
     EXPECT_NEAR(m.y, 0.5, 0.005);
 }

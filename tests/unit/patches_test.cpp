@@ -375,7 +375,7 @@ TEST(PatchBytes, AreRefusedWhereTheyAreDamaged) {
 
 TEST(PatchBytes, OfMuchRoomForLittleAreRefused) {
     // A head takes 72 bytes and may name 16 million samples: nothing is made for those that nobody draws.
-    const auto ofSide = [](uint32_t side) {
+    const auto ofSide = [](uint32_t side, size_t patches = 1) {
         lod::Patch p;
         p.width = p.height = side;
         p.cells.assign(size_t{side - 1} * (side - 1), 0);
@@ -384,10 +384,12 @@ TEST(PatchBytes, OfMuchRoomForLittleAreRefused) {
         p.colours.assign(p.heights.size(), 0);
         p.cells[0] = 1;
         for (const size_t s : {p.at(0, 0), p.at(1, 0), p.at(0, 1), p.at(1, 1)}) p.heights[s] = 7;
-        return lod::encodePatches(std::vector<lod::Patch>{p}).bytes;
+        return lod::encodePatches(std::vector<lod::Patch>(patches, p)).bytes;
     };
     EXPECT_TRUE(lod::decodePatches(ofSide(200), "here"));
     EXPECT_FALSE(lod::decodePatches(ofSide(2000), "here"));
+    // Nor for many that are just small enough each.
+    EXPECT_FALSE(lod::decodePatches(ofSide(200, 100), "here"));
 }
 
 }  // namespace

@@ -45,8 +45,11 @@ class Measuring {
         : store_(store), h_(store.hierarchy), s_(source), places_(placesOf(h_, source, places)), wanted_(places) {
         out_.stated = store.description.roundingUnits;
         stated_ = out_.stated / h_.unit * (1 + 1e-9);
-        // What is farther is told as that far at least.
-        reach_ = 2 * stated_;
+        // What is farther is told as that far at least. (A store that states nothing has a reach all the same.)
+        double edge = 0;
+        for (const Node& n : h_.nodes)
+            if (n.isLeaf()) edge = std::max(edge, n.radius);
+        reach_ = std::max(2 * stated_, edge / 1024);
         nearest_.assign(places_.size(), reach_);
         placesNear_.resize(h_.nodes.size());
         made_.resize(h_.nodes.size());
