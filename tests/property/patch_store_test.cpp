@@ -163,6 +163,20 @@ TEST(PatchStore, EveryLevelIsWithinItsErrorOfTheSourceAndTheLeaves) {
     }
 }
 
+TEST(PatchStore, ALevelOfCreasedSurfacesComesInAtAboutItsStep) {
+    const test::TempFolder folder;
+    TriangleMesh mesh = test::torusMesh(200, 80);
+    for (glm::dvec3& p : mesh.position) p *= 1 + 0.1 * std::abs(std::sin(7 * p.x) * std::sin(5 * p.y));
+    const Hierarchy h = build(mesh, folder / "a.stipple").store.hierarchy;
+    size_t inner = 0;
+    for (const Node& n : h.nodes) {
+        if (n.isLeaf()) continue;
+        ++inner;
+        EXPECT_LE(h.errors.decode(n.errorCode), 1.25 * h.cellSize(n) / 64) << "level " << int{n.level};
+    }
+    EXPECT_GE(inner, 5u);
+}
+
 TEST(PatchStore, IsClosedAtAnyCut) {
     const test::TempFolder folder;
     const Built built = build(wavyTorus(200, 80), folder / "a.stipple");

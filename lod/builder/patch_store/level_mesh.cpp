@@ -16,7 +16,10 @@ namespace {
 
 constexpr double kShare = 0.25;        ///< of the triangles that a level keeps
 constexpr double kUnimportant = 0.05;  ///< share of the wanted error that nobody looks closer at
-constexpr size_t kFewest = 64;         ///< triangles that are not worth simplifying
+constexpr double kMostMissed = 2;      ///< distance measured, in wanted errors: quadrics do not bound it
+constexpr double kNextTry = 0.3;       ///< error asked for then, in that of the try before
+constexpr int kMostTries = 3;
+constexpr size_t kFewest = 64;  ///< triangles that are not worth simplifying
 
 /// A look that can be added up: colours are squared, which is nearly linear light.
 struct LookSum {
@@ -70,6 +73,24 @@ void dropUnused(Soup& soup) {
     Soup used;
     appendSoup(soup, used);
     soup = std::move(used);
+}
+
+/// To a quarter, edge by edge; `error`: in parts of the extent.
+std::vector<uint32_t> collapsed(const LocalMesh& local, double error) {
+    std::vector<uint32_t> out(local.indices.size());
+    const auto target = static_cast<size_t>(kShare * static_cast<double>(local.indices.size() / 3)) * 3;
+    out.resize(meshopt_simplify(out.data(), local.indices.data(), local.indices.size(), &local.position[0].x,
+                                local.position.size(), sizeof(glm::vec3), target, static_cast<float>(error),
+                                meshopt_SimplifyLockBorder, nullptr));
+    return out;
+}
+
+/// To so many triangles, cell by cell.
+std::vector<uint32_t> united(const LocalMesh& local, size_t most) {
+    std::vector<uint32_t> out(local.indices.size());
+    out.resize(meshopt_simplifySloppy(out.data(), local.indices.data(), local.indices.size(), &local.position[0].x,
+                                      local.position.size(), sizeof(glm::vec3), 3 * most, 1e9f, nullptr));
+    return out;
 }
 
 double distanceTo(const WeldedMesh& mesh, const LocalMesh& local, const std::vector<uint32_t>& coarse, double wanted,
@@ -145,22 +166,21 @@ double simplify(Soup& soup, double wanted, size_t most) {
     all.indices = soup.indices;
     const LocalMesh local = makeLocal(mesh, {&all});
     const float scale = meshopt_simplifyScale(&local.position[0].x, local.position.size(), sizeof(glm::vec3));
-    std::vector<uint32_t> coarse(local.indices.size());
-    const auto target = static_cast<size_t>(kShare * static_cast<double>(local.indices.size() / 3)) * 3;
-    coarse.resize(meshopt_simplify(coarse.data(), local.indices.data(), local.indices.size(), &local.position[0].x,
-                                   local.position.size(), sizeof(glm::vec3), target,
-                                   static_cast<float>(wanted / std::max(double{scale}, 1e-30)),
-                                   meshopt_SimplifyLockBorder, nullptr));
-    bool isBorderKept = true;
-    if (coarse.size() / 3 > most) {
-        isBorderKept = false;
-        coarse.resize(local.indices.size());
-        coarse.resize(meshopt_simplifySloppy(coarse.data(), local.indices.data(), local.indices.size(),
-                                             &local.position[0].x, local.position.size(), sizeof(glm::vec3), 3 * most,
-                                             1e9f, nullptr));
+    std::vector<uint32_t> coarse;
+    double error = 0, said = wanted;
+    for (int tries = 0; tries < kMostTries; ++tries, said *= kNextTry) {
+        std::vector<uint32_t> made = collapsed(local, said / std::max(double{scale}, 1e-30));
+        const bool isBorderKept = made.size() / 3 <= most;
+        if (!isBorderKept && tries > 0) break;
+        if (!isBorderKept) made = united(local, most);
+        if (made.empty() || made.size() == local.indices.size()) return 0;
+        const double now = distanceTo(mesh, local, made, wanted, isBorderKept);
+        if (tries == 0 || now < error) {
+            error = now;
+            coarse = std::move(made);
+        }
+        if (error <= kMostMissed * wanted || !isBorderKept) break;
     }
-    if (coarse.empty() || coarse.size() == local.indices.size()) return 0;
-    const double error = distanceTo(mesh, local, coarse, wanted, isBorderKept);
     soup.indices.clear();
     for (const uint32_t v : coarse) soup.indices.push_back(local.global[v]);
     dropUnused(soup);

@@ -13,8 +13,10 @@
 namespace stipple::lod {
 namespace {
 
-constexpr double kFinest = 0.25, kCoarsest = 1.5;  ///< steps of leaves, in those of their level
-constexpr double kUnited = 0.5;                    ///< cells of discs of inner nodes, in steps
+constexpr double kFinest = 0.25, kCoarsest = 1.5;     ///< steps of leaves, in those of their level
+constexpr double kUnited = 0.25;                      ///< cells of discs of inner nodes, in steps
+constexpr double kMostDisc = 0.5;                     ///< edges of what a disc covers, in steps
+constexpr double kWanted = 0.5, kWantedOfLeaf = 0.6;  ///< bounds of patches that are good enough, in steps
 
 void addTo(TriangleMesh& mesh, const Soup& soup, const glm::dvec3& corner) {
     const auto first = static_cast<uint32_t>(mesh.position.size());
@@ -52,6 +54,7 @@ class NodePatcher {
         SampleSettings sampling;
         const double step = settings.samplesATriangle > 0 ? leafStep(settings) : settings.step;
         sampling.step = [step](const Segment&) { return step; };
+        sampling.wanted = (settings.samplesATriangle > 0 ? kWantedOfLeaf : kWanted) * step;
         SampledSegments sampled = sampleSegments(s_, std::move(segments), sampling, executor_);
         for (SegmentPatch& made : sampled.patches) {
             Patch& p = made.patch.patch;
@@ -62,8 +65,8 @@ class NodePatcher {
         for (const uint32_t t : sampled.left) {
             if (s_.vertices[t][0] >= ownVertices_) continue;  // another node's
             ++out.trianglesLeft;
-            cover({s_.at(t, 0), s_.at(t, 1), s_.at(t, 2)}, {glm::dvec2(0), glm::dvec2(1, 0), glm::dvec2(0, 1)}, t, step,
-                  out.left);
+            cover({s_.at(t, 0), s_.at(t, 1), s_.at(t, 2)}, {glm::dvec2(0), glm::dvec2(1, 0), glm::dvec2(0, 1)}, t,
+                  kMostDisc * step, out.left);
         }
         for (const LeftDisc& d : out.left) out.error = std::max(out.error, double{d.radius});
         if (settings.samplesATriangle == 0) unite(out, kUnited * settings.step);

@@ -11,7 +11,7 @@
 namespace stipple::lod {
 namespace {
 
-constexpr double kWanted = 0.25;      ///< error that a simplification may add, in steps of its level
+constexpr double kWanted = 0.1;       ///< error that a simplification may add, in steps of its level
 constexpr size_t kMostKept = 65'536;  ///< triangles that go up from a node
 
 struct PatchNode {

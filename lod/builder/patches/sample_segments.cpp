@@ -8,7 +8,9 @@
 namespace stipple::lod {
 namespace {
 
-constexpr int kMostDenser = 3;  ///< times that a thin segment is sampled twice as densely
+constexpr int kMostDenser = 3;           ///< times that a thin segment is sampled twice as densely
+constexpr int kMostFiner = 2;            ///< times that one farther off than wanted is
+constexpr uint64_t kWorthHalving = 128;  ///< samples of a patch, so that it is halved before that
 
 /// A segment on its way to a patch.
 struct Job {
@@ -68,10 +70,21 @@ class Sampler {
         }
     }
 
+    /// (Halved, what is far off is a small part of what stays as it is.)
+    bool isTooFar(const Job& job, const Patch& p) const {
+        return std::max(p.errorToSource, p.errorFromSource) > settings_.wanted && job.denser < kMostFiner;
+    }
+    static bool isWorthHalving(const Job& job, const Patch& p) {
+        return job.segment.size() > 1 && p.samples() > kWorthHalving;
+    }
+
     void settle(Job& job, MeshPatch& made, std::vector<Job>& again) {
-        if (made.fit == PatchFit::good) {
+        const bool isGood = made.fit == PatchFit::good, isFar = isGood && isTooFar(job, made.patch);
+        const bool isHalved = isFar ? job.denser == 0 && isWorthHalving(job, made.patch)
+                                    : made.fit == PatchFit::folded && job.segment.size() > 1;
+        if (isGood && !isFar) {
             out_.patches.push_back({job.segment.front(), std::move(made)});
-        } else if (made.fit == PatchFit::folded && job.segment.size() > 1) {
+        } else if (isHalved) {
             auto [a, b] = halves(s_.elements, job.segment);
             add(std::move(a), again);
             add(std::move(b), again);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 
 #include "engine/base/executor.h"
 #include "lod/builder/patches/mesh_patch.h"
@@ -11,8 +12,10 @@ namespace stipple::lod {
 struct SampleSettings {
     PatchClosing closing = PatchClosing::overlap;
     std::function<double(const Segment&)> step;  ///< scene units, to begin with
-    std::function<bool()> isStopped;             ///< what is there then is of no use
-    std::function<void(uint64_t done)> tell;     ///< so many elements have their patches; may be empty
+    /// Bound of the distance, either way, that is worth more patches and samples; scene units. No patch is left for it.
+    double wanted = std::numeric_limits<double>::infinity();
+    std::function<bool()> isStopped;          ///< what is there then is of no use
+    std::function<void(uint64_t done)> tell;  ///< so many elements have their patches; may be empty
 };
 
 struct SegmentPatch {
