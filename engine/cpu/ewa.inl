@@ -18,6 +18,7 @@ struct TileFilter {
     alignas(64) float nearest[kTilePixels];   ///< likewise: what is before that is another surface
     alignas(64) float rims[kTilePixels];      ///< weights of those
     alignas(64) float beyond[kTilePixels];    ///< of a second front: depth behind which it lies
+    float blockBeyond[kTilePixels / kGroup];  ///< the least of it, of blocks of 4 x 4 pixels
     alignas(64) float bound[kTilePixels];     ///< of rims before other kinds: depth before which they lie, or kNoDisc
     alignas(64) uint32_t rim[kTilePixels];    ///< the first disc that counts there, or kOther; only if there are gaps
     alignas(64) float weight[kTilePixels], linear[kTilePixels];  ///< sums; linear: imageLinear of depths
@@ -30,6 +31,11 @@ struct TileFilter {
 /// What of a pixel is wanted beside its colour and depth.
 enum class Wants { nothing, normals, materials };  // materials: normals, too
 
+/// What is added up of a tile: what is before its fronts, with or without gaps between them, or its second surfaces.
+/// Of bound ones only what is before TileFilter::bound by more than its surface is rough, or of its border.
+enum class Sum { closed, gaps, second, secondBound };
+constexpr bool isOfSecond(Sum sum) { return sum == Sum::second || sum == Sum::secondBound; }
+
 /// Some discs of a tile, with their kernels; those of DiscBatch that reach before the fronts.
 struct FilterBatch {
     static constexpr size_t kSize = DiscBatch::kSize;
@@ -40,17 +46,20 @@ struct FilterBatch {
     alignas(64) int firstX[kSize], lastX[kSize], firstY[kSize], lastY[kSize];
     alignas(64) float red[kSize], green[kSize], blue[kSize], nx[kSize], ny[kSize], nz[kSize];
     alignas(64) float share[kSize], metallic[kSize], roughness[kSize];
-    alignas(64) uint32_t colour[kSize], isSeen[kSize];
+    alignas(64) uint32_t colour[kSize];
+    alignas(64) uint32_t seen[kSize];  ///< the blocks where it is not hidden, a bit each
 };
 
 /// Of two values that are linear on the image.
 [[gnu::always_inline]] inline bool isNearer(float a, float b) { return kOrthographic ? a < b : a > b; }
 constexpr float kFarthest = kOrthographic ? 3.0e38f : 0.0f, kNearest = kOrthographic ? -3.0e38f : 3.0e38f;
 
-/// Least of the limits of blocks of 4 x 4 pixels: what is farther is hidden there.
+/// Of blocks of 4 x 4 pixels the least of the limits: what is farther is hidden there. Of second surfaces also where
+/// they begin: what is wholly nearer is none of them.
 struct TileBlocks {
     static constexpr int kEdge = 4, kColumns = int(SplatTile::kWidth) / kEdge, kRows = int(SplatTile::kHeight) / kEdge;
     alignas(64) float limit[kColumns * kRows];
+    alignas(64) float begin[kColumns * kRows];  ///< only of second surfaces
 };
 
 [[gnu::always_inline]] inline const PointRecord& recordOf(const BlockSource* blocks, uint32_t id) {
@@ -72,29 +81,40 @@ struct TileBlocks {
     return radius * ((colour >> 24 & kFlagLeaf) != 0u ? kLeafShare : kSurfaceShare);
 }
 
+/// The blocks of 4 x 4 pixels that a box reaches, a bit each: those of its columns, in each of its rows. Of an empty
+/// box, none.
+[[gnu::always_inline]] inline uint32_t blocksOf(int firstX, int lastX, int firstY, int lastY) {
+    static_assert(TileBlocks::kColumns == 8 && TileBlocks::kRows == 4 && TileBlocks::kEdge == 4);
+    const uint32_t left = uint32_t(firstX) >> 2, right = uint32_t(lastX + 4) >> 2, top = uint32_t(firstY) >> 2,
+                   bottom = uint32_t(lastY + 4) >> 2;
+    const uint32_t columns = (1u << right) - (1u << left);
+    const uint32_t ofRow = (top <= 0u && bottom > 0u ? 0xffu : 0u) | (top <= 1u && bottom > 1u ? 0xff00u : 0u) |
+                           (top <= 2u && bottom > 2u ? 0xff0000u : 0u) | (top <= 3u && bottom > 3u ? 0xff000000u : 0u);
+    return right > left ? (columns & 0xffu) * 0x01010101u & ofRow : 0u;
+}
+
 #include "engine/cpu/ewa_fronts.inl"
 
 /// Which discs reach a block whose fronts do not hide them.
+template <Sum sum>
 void markSeen(const TileBlocks& blocks, size_t count, FilterBatch& __restrict b) {
-    static_assert(TileBlocks::kColumns == 8 && TileBlocks::kRows == 4 && TileBlocks::kEdge == 4);
-    float limit[TileBlocks::kColumns * TileBlocks::kRows];
-    for (int k = 0; k < TileBlocks::kColumns * TileBlocks::kRows; ++k) limit[k] = blocks.limit[k];
+    float limit[TileBlocks::kColumns * TileBlocks::kRows], begin[TileBlocks::kColumns * TileBlocks::kRows];
+    for (int k = 0; k < TileBlocks::kColumns * TileBlocks::kRows; ++k) {
+        limit[k] = blocks.limit[k];
+        begin[k] = isOfSecond(sum) ? blocks.begin[k] : kNearest;
+    }
 #pragma GCC ivdep
     for (size_t i = 0; i < count; ++i) {
-        // A bit for each block that it reaches: those of its columns, in each of its rows.
-        const uint32_t left = uint32_t(b.firstX[i]) >> 2, right = uint32_t(b.lastX[i] + 4) >> 2,
-                       top = uint32_t(b.firstY[i]) >> 2, bottom = uint32_t(b.lastY[i] + 4) >> 2;
-        const uint32_t columns = (1u << right) - (1u << left);
-        const uint32_t ofRow = (top <= 0u && bottom > 0u ? 0xffu : 0u) | (top <= 1u && bottom > 1u ? 0xff00u : 0u) |
-                               (top <= 2u && bottom > 2u ? 0xff0000u : 0u) |
-                               (top <= 3u && bottom > 3u ? 0xff000000u : 0u);
-        const uint32_t reached = right > left ? (columns & 0xffu) * 0x01010101u & ofRow : 0u;
+        const uint32_t reached = blocksOf(b.firstX[i], b.lastX[i], b.firstY[i], b.lastY[i]);
         const float nearest = kOrthographic ? b.least[i] : b.most[i];  // that its plane counts as
+        const float farthest = kOrthographic ? b.most[i] : b.least[i];
         uint32_t seen = 0u;
 #pragma GCC unroll 32
         for (int k = 0; k < TileBlocks::kColumns * TileBlocks::kRows; ++k)
-            seen |= isNearer(limit[k], nearest) ? 0u : reached & 1u << k;
-        b.isSeen[i] = seen != 0u ? 1u : 0u;
+            seen |= isNearer(limit[k], nearest) || (isOfSecond(sum) && isNearer(farthest, begin[k]))
+                        ? 0u
+                        : reached & 1u << k;
+        b.seen[i] = seen;
     }
 }
 
@@ -146,17 +166,18 @@ void weighSurfels(const FrameConstants& f, const BlockSource* blocks, const Disc
 }
 
 /// The colours of those that are seen.
+template <Sum sum>
 void takeSeen(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const DiscBatch& d,
               const uint32_t* colours, const uint32_t* places, size_t count, FilterBatch& __restrict b) {
     b.count = 0;
     for (size_t i = 0; i < count; ++i) {
         b.of[b.count] = uint32_t(i);
-        b.count += b.isSeen[i];
+        b.count += b.seen[i] != 0u ? 1u : 0u;
     }
     for (size_t s = 0; s < b.count; ++s) {
         const uint32_t id = d.id[b.of[s]], colour = colours[places[b.of[s]]];
         b.colour[s] = colourOf(f, tables, blocks, id, colour);
-        b.rough[s] = roughSide(colour >> 24) * roughness(d.radius[b.of[s]], colour);
+        if (sum == Sum::secondBound) b.rough[s] = roughSide(colour >> 24) * roughness(d.radius[b.of[s]], colour);
         if (f.hasMaterials == 0u) continue;
         const TexelSurface surface = surfaceOfPoint(blocks[id / kBlockLanes].materialOf(id % kBlockLanes));
         b.share[s] = surface.share;
@@ -172,8 +193,7 @@ void takeSeen(const FrameConstants& f, const Tables& tables, const BlockSource* 
 }
 
 /// Adds the s-th that is seen to what is in front of the fronts. `isNear`: the disc is not wholly before the eye.
-/// `isBound`: only what is before TileFilter::bound by more than its surface is rough, or of its border.
-template <bool isNear, Wants wants, bool hasGaps, bool isBound>
+template <bool isNear, Wants wants, Sum sum>
 void addKernel(const DiscBatch& b, const FilterBatch& k, size_t s, const FrameConstants& f, float end,
                TileFilter& __restrict t) {
     const size_t i = k.of[s];
@@ -190,12 +210,14 @@ void addKernel(const DiscBatch& b, const FilterBatch& k, size_t s, const FrameCo
     constexpr bool hasMaterials = wants == Wants::materials;
     const float share = hasMaterials ? k.share[s] : 0.0f, metallic = hasMaterials ? k.metallic[s] : 0.0f,
                 roughness = hasMaterials ? k.roughness[s] : 0.0f;
-    const float rough = k.rough[s];
+    const float rough = sum == Sum::secondBound ? k.rough[s] : 0.0f;
+    const uint32_t seen = k.seen[i];
     const int x1 = k.lastX[i], x0 = k.firstX[i] & ~(kGroupColumns - 1);
     for (int band = k.firstY[i] >> kRowBits; band <= k.lastY[i] >> kRowBits; ++band) {
         const float dy = float(kGroupRows * band) + t.grid.top - midY;
         for (int x = x0; x <= x1; x += kGroupColumns) {
             const int first = band * kBandPitch + kGroupRows * x;
+            if (isOfSecond(sum) && (seen >> (first / kGroup) & 1u) == 0u) continue;
             const float *const px = t.grid.x + kGroupRows * x, *const limit = t.limit + first,
                                *const nearest = t.nearest + first, *const bound = t.bound + first,
                                *const along = t.along + first;
@@ -211,11 +233,11 @@ void addKernel(const DiscBatch& b, const FilterBatch& k, size_t s, const FrameCo
                 // No farther than it counts; beyond its horizon a plane is as far as it gets.
                 const float linear = min(max(at.linear, least), most);
                 bool isThere = (at.rho2 < support2) & !isNearer(limit[l], linear);
-                if (isBound)
+                if (sum == Sum::secondBound)
                     isThere = isThere & ((kOrthographic ? linear : 1.0f / linear) + rough * along[l] < bound[l]);
                 const float any = isThere ? max(gaussian(at.rho2) - end, 0.0f) * scale : 0.0f;
                 const float ofRim = isNearer(linear, nearest[l]) ? any : 0.0f, w = any - ofRim;
-                rims[l] += ofRim;
+                if (!isOfSecond(sum)) rims[l] += ofRim;
                 sumW[l] += w;
                 sumLinear[l] += w * linear;
                 sumR[l] += w * red;
@@ -231,7 +253,7 @@ void addKernel(const DiscBatch& b, const FilterBatch& k, size_t s, const FrameCo
                     sumMetallic[l] += w * metallic;
                     sumRoughness[l] += w * roughness;
                 }
-                if (hasGaps) {
+                if (sum != Sum::closed) {
                     const uint32_t mine = w > 0.0f ? id : TileFilter::kOther;
                     rim[l] = mine < rim[l] ? mine : rim[l];
                 }
@@ -279,45 +301,48 @@ struct TileDiscs {
     DiscBatch& batch(size_t b) const { return batches[b < kKept ? b : kKept]; }
 };
 
-/// The blocks of 4 x 4 pixels that the box of a disc reaches, a bit each.
-[[gnu::always_inline]] inline uint32_t blocksOf(const DiscBatch& b, size_t i) {
-    if (b.lastX[i] < b.firstX[i] || b.lastY[i] < b.firstY[i]) return 0u;
-    const uint32_t left = uint32_t(b.firstX[i]) >> 2, right = uint32_t(b.lastX[i]) >> 2,
-                   top = uint32_t(b.firstY[i]) >> 2, bottom = uint32_t(b.lastY[i]) >> 2;
-    const uint32_t columns = (2u << right) - (1u << left);
-    const uint32_t rows = 0x01010101u << 8u * top & 0x01010101u >> 8u * (3u - bottom);
-    return columns * rows;
-}
-
-/// True if some of the discs are leaves. `isSecond`: those behind TileFilter::beyond, after those before it, and of
-/// some blocks only.
-template <bool isSecond>
-bool drawFronts(const FrameConstants& f, const TileDiscs& discs, const SplatTile& tile, TileFilter& t,
-                uint32_t wanted = ~0u) {
+/// True if some of the discs are leaves.
+bool drawFronts(const FrameConstants& f, const TileDiscs& discs, const SplatTile& tile, TileFilter& t) {
     uint32_t flags = 0;
     for (size_t k = 0; k < discs.batchesInAll(); ++k) {
         const size_t first = k * DiscBatch::kSize, n = discs.sizeOf(k), next = first + n;
         DiscBatch& batch = discs.batch(k);
-        if (!isSecond) {
-            prefetchDiscs(discs.splats, discs.places + next, discs.count - next);
-            for (size_t i = 0; i < n; ++i) __builtin_prefetch(&discs.colours[discs.places[first + i]]);
-        }
-        if (!isSecond || k >= TileDiscs::kKept) prepareDiscs(f, discs.splats, discs.places + first, n, tile, batch);
+        prefetchDiscs(discs.splats, discs.places + next, discs.count - next);
+        for (size_t i = 0; i < n; ++i) __builtin_prefetch(&discs.colours[discs.places[first + i]]);
+        prepareDiscs(f, discs.splats, discs.places + first, n, tile, batch);
         for (size_t i = 0; i < n; ++i) {
-            if (isSecond && batch.isNear[i] < 0.5f && (blocksOf(batch, i) & wanted) == 0u) continue;
             const uint32_t colour = discs.colours[discs.places[first + i]];
             flags |= colour >> 24;
             const float shift = roughness(batch.radius[i], colour);
             if (batch.isNear[i] > 0.5f)
-                drawFront<true, isSecond>(batch, i, shift, f, t);
+                drawFront<true, false>(batch, i, shift, f, t);
             else
-                drawFront<false, isSecond>(batch, i, shift, f, t);
+                drawFront<false, false>(batch, i, shift, f, t);
         }
     }
     return (flags & kFlagLeaf) != 0u;
 }
 
-template <Wants wants, bool hasGaps, bool isBound>
+/// The fronts behind TileFilter::beyond, after those before it.
+void drawSecondFronts(const FrameConstants& f, const TileDiscs& discs, const SplatTile& tile, TileFilter& t) {
+    alignas(64) uint32_t reached[DiscBatch::kSize];
+    for (size_t k = 0; k < discs.batchesInAll(); ++k) {
+        const size_t first = k * DiscBatch::kSize, n = discs.sizeOf(k);
+        DiscBatch& batch = discs.batch(k);
+        if (k >= TileDiscs::kKept) prepareDiscs(f, discs.splats, discs.places + first, n, tile, batch);
+        markBehind(t, n, batch, reached);
+        for (size_t i = 0; i < n; ++i) {
+            if (reached[i] == 0u) continue;
+            const float shift = roughness(batch.radius[i], discs.colours[discs.places[first + i]]);
+            if (batch.isNear[i] > 0.5f)
+                drawFront<true, true>(batch, i, shift, f, t, reached[i]);
+            else
+                drawFront<false, true>(batch, i, shift, f, t, reached[i]);
+        }
+    }
+}
+
+template <Wants wants, Sum sum>
 void addKernels(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const TileDiscs& discs,
                 const SplatTile& tile, const TileBlocks& fronts, TileFilter& t) {
     FilterBatch kernels;
@@ -328,14 +353,14 @@ void addKernels(const FrameConstants& f, const Tables& tables, const BlockSource
         DiscBatch& batch = discs.batch(k);
         if (k >= TileDiscs::kKept) prepareDiscs(f, discs.splats, places, n, tile, batch);
         prepareKernels(f, tile, n, batch, kernels);
-        markSeen(fronts, n, kernels);
-        takeSeen(f, tables, blocks, batch, discs.colours, places, n, kernels);
+        markSeen<sum>(fronts, n, kernels);
+        takeSeen<sum>(f, tables, blocks, batch, discs.colours, places, n, kernels);
         if (f.perSurfel != 0u) weighSurfels(f, blocks, batch, kernels);
         for (size_t s = 0; s < kernels.count; ++s) {
             if (kernels.isNear[kernels.of[s]] > 0.5f)
-                addKernel<true, wants, hasGaps, isBound>(batch, kernels, s, f, end, t);
+                addKernel<true, wants, sum>(batch, kernels, s, f, end, t);
             else
-                addKernel<false, wants, hasGaps, isBound>(batch, kernels, s, f, end, t);
+                addKernel<false, wants, sum>(batch, kernels, s, f, end, t);
         }
     }
 }
@@ -349,14 +374,14 @@ void filterDiscs(const FrameConstants& f, const Tables& tables, const BlockSourc
                  const SecondPixels& seconds) {
     TileFilter t;
     beginFilter(f, tile, t);
-    const bool hasLeaves = drawFronts<false>(f, discs, tile, t);
+    const bool hasLeaves = drawFronts(f, discs, tile, t);
     TileBlocks fronts;
     closeFronts(tile, lensHere(f.focal), t, fronts);
     if (hasLeaves) closeLeaves(blocks, t);
     if (t.hasGaps)
-        addKernels<wants, true, false>(f, tables, blocks, discs, tile, fronts, t);
+        addKernels<wants, Sum::gaps>(f, tables, blocks, discs, tile, fronts, t);
     else
-        addKernels<wants, false, false>(f, tables, blocks, discs, tile, fronts, t);
+        addKernels<wants, Sum::closed>(f, tables, blocks, discs, tile, fronts, t);
     TileOthers others;
     showTile<wants>(f, tables, blocks, tile, hasLeaves, t, visibility, filtered, others);
     if (seconds.pixels != nullptr)

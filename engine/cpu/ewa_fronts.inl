@@ -15,9 +15,11 @@ float missedDepth(const FrameConstants& f, const DiscBatch& b, size_t i) {
 }
 
 /// The front of each pixel: of the opaque parts of discs, moved back by `shift` along the ray. Discs come in the order
-/// of their ids: of what is equally deep the first stays. `isSecond`: of those behind TileFilter::beyond.
+/// of their ids: of what is equally deep the first stays. `isSecond`: of those behind TileFilter::beyond, in
+/// the blocks of `reached`.
 template <bool isNear, bool isSecond>
-void drawFront(const DiscBatch& b, size_t i, float shift, const FrameConstants& f, TileFilter& __restrict t) {
+void drawFront(const DiscBatch& b, size_t i, float shift, const FrameConstants& f, TileFilter& __restrict t,
+               uint32_t reached = ~0u) {
     const uint32_t id = b.id[i];
     const DiscForm d = formOf(b, i, f);
     const float midX = b.x[i], midY = b.y[i], least = b.least[i], most = b.most[i];
@@ -26,6 +28,7 @@ void drawFront(const DiscBatch& b, size_t i, float shift, const FrameConstants& 
         const float dy = float(kGroupRows * band) + t.grid.top - midY;
         for (int x = x0; x <= x1; x += kGroupColumns) {
             const int first = band * kBandPitch + kGroupRows * x;
+            if (isSecond && (reached >> (first / kGroup) & 1u) == 0u) continue;
             float *const front = t.front + first, *const own = t.own + first, *const farthest = t.farthest + first;
             uint32_t* const owner = t.id + first;
             const float *const px = t.grid.x + kGroupRows * x, *const along = t.along + first,
@@ -65,6 +68,16 @@ void closeBlocks(const TileFilter& __restrict t, TileBlocks& __restrict blocks) 
     }
 }
 
+/// Of blocks of second surfaces, which of them begins nearest.
+void beginBlocks(const TileFilter& __restrict t, TileBlocks& __restrict blocks) {
+    for (int b = 0; b < TileBlocks::kColumns * TileBlocks::kRows; ++b) {
+        float begin = kFarthest;
+        for (int i = b * kGroup; i < (b + 1) * kGroup; ++i)
+            begin = t.limit[i] != kNearest && isNearer(t.nearest[i], begin) ? t.nearest[i] : begin;
+        blocks.begin[b] = begin;
+    }
+}
+
 /// Where fronts end, by pixels and by blocks, and what is before them.
 void closeFronts(const SplatTile& tile, const Lens& lens, TileFilter& __restrict t, TileBlocks& __restrict blocks) {
 #pragma GCC ivdep
@@ -90,4 +103,20 @@ void closeLeaves(const BlockSource* blocks, TileFilter& t) {
     for (size_t i = 0; i < kTilePixels; ++i)
         if (t.id[i] != TileFilter::kOther && (recordFlags(recordOf(blocks, t.id[i])) & kFlagLeaf) != 0u)
             t.nearest[i] = kNearest;
+}
+
+/// Which blocks discs reach where they lie behind some pixel's TileFilter::beyond.
+void markBehind(const TileFilter& t, size_t count, const DiscBatch& b, uint32_t* __restrict reached) {
+    constexpr int kBlocks = TileBlocks::kColumns * TileBlocks::kRows;
+    float beyond[kBlocks];
+    for (int k = 0; k < kBlocks; ++k) beyond[k] = t.blockBeyond[k];
+#pragma GCC ivdep
+    for (size_t i = 0; i < count; ++i) {
+        const uint32_t box = blocksOf(b.firstX[i], b.lastX[i], b.firstY[i], b.lastY[i]);
+        const float deepest = kOrthographic ? b.most[i] : 1.0f / b.least[i];
+        uint32_t behind = 0u;
+#pragma GCC unroll 32
+        for (int k = 0; k < kBlocks; ++k) behind |= deepest > beyond[k] ? box & 1u << k : 0u;
+        reached[i] = behind;
+    }
 }

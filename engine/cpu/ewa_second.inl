@@ -68,15 +68,17 @@ void listSeconds(const FrameConstants& f, const BlockSource* blocks, const Splat
 /// to be added up.
 bool limitSeconds(const FrameConstants& f, const TileDiscs& discs, const SplatTile& tile, const TileFilter& t,
                   const TileOthers& others, TileSeconds& seconds, TileFilter& second) {
-    uint32_t behind = 0;  // blocks with any
+    bool anyBehind = false;
+    for (float& beyond : second.blockBeyond) beyond = kNoDisc;
     bool anyAdded = false;
     for (size_t s = 0; s < seconds.count; ++s) {
         const size_t i = seconds.of[s].entry;
         if (seconds.of[s].kind != kSecondBehind || !(t.farthest[i] > t.front[i])) continue;
         second.beyond[i] = t.front[i];
-        behind |= 1u << (i / kGroup);
+        second.blockBeyond[i / kGroup] = min(second.blockBeyond[i / kGroup], t.front[i]);
+        anyBehind = true;
     }
-    if (behind != 0u) drawFronts<true>(f, discs, tile, second, behind);
+    if (anyBehind) drawSecondFronts(f, discs, tile, second);
     for (float& limit : second.limit) limit = kNearest;
     const Lens lens = lensHere(f.focal);
     for (size_t s = 0; s < seconds.count; ++s) {
@@ -137,7 +139,11 @@ void showSeconds(const FrameConstants& f, const Tables& tables, const BlockSourc
     if (limitSeconds(f, discs, tile, t, others, seconds, second)) {
         TileBlocks limits;
         closeBlocks(second, limits);
-        addKernels<wants, true, true>(f, tables, blocks, discs, tile, limits, second);
+        beginBlocks(second, limits);
+        if (others.hasAny)
+            addKernels<wants, Sum::secondBound>(f, tables, blocks, discs, tile, limits, second);
+        else
+            addKernels<wants, Sum::second>(f, tables, blocks, discs, tile, limits, second);
     }
     for (size_t s = 0; s < seconds.count; ++s) {
         const TileSeconds::Pixel& pixel = seconds.of[s];

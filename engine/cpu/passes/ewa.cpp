@@ -101,8 +101,16 @@ void cover(Frame& frame) {
     });
 }
 
+/// Is the pixel at the edge of its tile?
+bool isAtTileEdge(const shared::FrameConstants& f, size_t x, uint32_t y) {
+    const auto isAt = [](size_t i, size_t edge, size_t size) {
+        return i % edge == 0 || (i + 1) % edge == 0 || i + 1 == size;
+    };
+    return isAt(x, SplatTile::kWidth, f.width) || isAt(y, SplatTile::kHeight, f.height);
+}
+
 /// Second surfaces behind fronts that end nowhere near are none: there kernels add up to less than 1 because samples
-/// are not regular.
+/// are not regular. (Within tiles, filterTile left those out.)
 void closeSeconds(Frame& frame) {
     const shared::FrameConstants& f = frame.constants;
     const SecondPixels seconds = frame.seconds();
@@ -110,7 +118,7 @@ void closeSeconds(Frame& frame) {
         for (uint32_t y = first; y <= last; ++y) {
             const size_t at = size_t{y} * f.width;
             for (size_t x = 0; seconds.mayHave(at, f.width) && x < f.width; ++x) {
-                if (seconds.kinds[at + x] <= shared::kSecondBefore) continue;  // or none
+                if (seconds.kinds[at + x] <= shared::kSecondBefore || !isAtTileEdge(f, x, y)) continue;
                 if (!frame.k.isAtJump(f, frame.visibility.data(), frame.filtered.data(), static_cast<uint32_t>(x), y,
                                       seconds.pixels[at + x].limit))
                     seconds.kinds[at + x] = shared::kSecondNone;

@@ -13,13 +13,12 @@ bool takeSeconds(const RowPlace& at, const SurfaceRow& first, SurfaceRow& second
     if (!std::any_of(seconds.kinds + at.first, seconds.kinds + at.first + at.n, isOne)) return false;
     second.hasTriangles = second.hasEmission = second.hasCoverage = false;
     second.hasMaterials = first.hasMaterials;
+    for (float* const plane : {second.depth, second.nx, second.ny, second.red, second.green, second.blue, second.leaf})
+        std::fill_n(plane, at.n, 0.0F);
+    std::fill_n(second.nz, at.n, -1.0F);
+    std::fill_n(second.material, at.n, shared::kPlainSurface);
     for (size_t i = 0; i < at.n; ++i) {
         const SecondPixel* const s = seconds.at(at.first + i);
-        second.depth[i] = 0;
-        second.nx[i] = second.ny[i] = 0;
-        second.nz[i] = -1;
-        second.red[i] = second.green[i] = second.blue[i] = second.leaf[i] = 0;
-        second.material[i] = shared::kPlainSurface;
         if (s == nullptr) continue;
         const shared::vec3 n = shared::octDecode(s->shown.normal);
         second.depth[i] = s->depth;
