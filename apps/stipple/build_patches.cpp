@@ -47,7 +47,6 @@ Result<lod::PatchBuildSettings> settingsOf(const BuildOptions& build) {
     settings.samples = build.patches.samples;
     settings.description.up =
         lod::axisVector(build.up.empty() ? lod::UpAxis::y : static_cast<lod::UpAxis>(build.up[0] - 'x'));
-    settings.description.materials.resize(1);
     return settings;
 }
 

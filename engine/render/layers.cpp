@@ -199,9 +199,18 @@ bool hasMirrors(const lod::StoreDescription& d) {
     const auto is = [&](const shared::SurfaceMaterial& m) {
         return isSmooth(m.roughness) || m.surfaceTexture.texture != 0;
     };
-    return std::any_of(d.materials.begin(), d.materials.end(), is) ||
-           std::any_of(d.pointMaterials.begin(), d.pointMaterials.end(),
-                       [&](const lod::PointMaterial& m) { return isSmooth(m.roughness); });
+    if (std::any_of(d.materials.begin(), d.materials.end(), is)) return true;
+    // The list may be a grid, of which some point has to have a smooth one.
+    const auto index = lod::materialAttribute(d);
+    const auto isUsed = [&](size_t k) {
+        if (!index || d.attributes[*index].counts.empty()) return true;  // not known
+        const auto& counts = d.attributes[*index].counts;
+        return std::any_of(counts.begin(), counts.end(),
+                           [&](const auto& c) { return c.first == static_cast<double>(k); });
+    };
+    for (size_t k = 0; k < d.pointMaterials.size(); ++k)
+        if (isSmooth(d.pointMaterials[k].roughness) && isUsed(k)) return true;
+    return false;
 }
 
 }  // namespace stipple::render
