@@ -112,6 +112,12 @@ Result<void> checkOfMode(const CLI::App& sub, const std::string& mode) {
         return fail(ErrorKind::usage, fmt::format("does nothing in mode {}: {}", mode, row.why), row.option,
                     fmt::format("leave {} out, or choose another --mode", row.option));
     }
+    const CLI::Option *const interpolated = sub.get_option_no_throw("--interpolate"), *const drawnAs =
+                                                                                          sub.get_option_no_throw(
+                                                                                              "--patch-as");
+    if (interpolated != nullptr && interpolated->count() > 0 && drawnAs->as<std::string>() != "splats")
+        return fail(ErrorKind::usage, "is of patches that are drawn as splats", "--interpolate",
+                    "give --patch-as splats, too");
     return {};
 }
 

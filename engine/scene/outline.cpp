@@ -46,6 +46,27 @@ std::vector<uint32_t> coarseNodes(const lod::Hierarchy& h) {
     return front;
 }
 
+/// Samples of patches, as far as they are in [lo, hi]: coarse ones reach beyond what they stand for.
+void addSamples(const lod::Hierarchy& h, uint32_t index, const lod::Chunk& chunk, const glm::dvec3& lo,
+                const glm::dvec3& hi, std::vector<glm::dvec3>& to) {
+    const lod::Node& node = h.nodes[h.nodeOf(index)];
+    const glm::dvec3 corner = glm::dvec3(node.cell[0], node.cell[1], node.cell[2]) * h.cellSize(node);
+    for (size_t b = 0; b < chunk.patchBlocks.size(); ++b) {
+        const shared::PatchBlock& block = chunk.patchBlocks[b];
+        const lod::PatchPlane& plane = chunk.patchPlanes[b];
+        const glm::dmat3 frame = glm::mat3_cast(glm::normalize(glm::dquat(plane.turn)));
+        for (uint32_t s = 0; s < shared::kPatchSamples; ++s) {
+            const uint32_t code = block.heights[s / 2] >> (16 * (s % 2)) & 0xffffu;
+            if (code == 0) continue;
+            const double i = block.place % 65536 + s % shared::kPatchStride;
+            const double j = block.place / 65536 + s / shared::kPatchStride;
+            const glm::dvec3 local(i * double{plane.step}, j * double{plane.step},
+                                   std::ldexp(code, plane.quantumExponent));
+            to.push_back(glm::clamp(h.origin + h.unit * (corner + plane.origin + frame * local), lo, hi));
+        }
+    }
+}
+
 void addPositions(const lod::Hierarchy& h, uint32_t index, const lod::Chunk& chunk, std::vector<glm::dvec3>& to) {
     const lod::Node &node = h.nodes[h.nodeOf(index)], &group = lod::meshNode(h, h.nodeOf(index));
     const lod::Payload& payload = h.payload(index);
@@ -147,6 +168,7 @@ std::vector<glm::dvec3> outlineOf(const lod::Store& store) {
                 const auto chunk = lod::readChunk(store, index);
                 isRead = isRead && chunk;
                 if (chunk) addPositions(h, index, *chunk, all);
+                if (chunk) addSamples(h, index, *chunk, d.focusMin, d.focusMax, all);
             });
         if (!isRead) return box;  // whoever draws it says why
     }
