@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -53,6 +54,32 @@ TEST(BuildPatches, ClosedModelsStayClosed) {
             EXPECT_EQ(holes, 0u) << view << " at " << error << " px";
         }
     }
+}
+
+// Also where some discs stand beside the patches: a spike that no patch fits.
+TEST(BuildPatches, FillThePictureAsTheirSourceDoes) {
+    const TempFolder folder;
+    lod::TriangleMesh mesh = test::torusMesh(120, 50);
+    const auto first = static_cast<uint32_t>(mesh.position.size());
+    for (const glm::dvec3& p : {glm::dvec3(0, 0, 0), {1e-4, 0, 0}, {0, 0, 0.2}}) mesh.position.push_back(p);
+    mesh.indices.insert(mesh.indices.end(), {first, first + 1, first + 2});
+    test::writeObj(folder / "torus.obj", mesh);
+    ASSERT_EQ(runProgram(folder, "build torus.obj --patches -o t.stipple --quiet").code, 0);
+    const auto width = [](const std::vector<bool>& picture) {
+        size_t least = kAcross, greatest = 0;
+        for (size_t i = 0; i < picture.size(); ++i)
+            if (picture[i]) {
+                least = std::min(least, i % kAcross);
+                greatest = std::max(greatest, i % kAcross);
+            }
+        return static_cast<double>(greatest) - static_cast<double>(least);
+    };
+    const double wanted = width(covered(folder, "torus.obj", ""));
+    EXPECT_GT(wanted, 100);
+    EXPECT_NEAR(width(covered(folder, "t.stipple", "")), wanted, 0.04 * wanted);
+    const Outcome odd = runProgram(folder, "render t.stipple -o odd.png --interpolate direct");
+    EXPECT_EQ(odd.code, 2);
+    EXPECT_NE(odd.err.find("--patch-as splats"), std::string::npos) << odd.err;
 }
 
 TEST(BuildPatches, AreVerifiedAgainstTheirSource) {
