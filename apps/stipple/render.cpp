@@ -288,6 +288,9 @@ Result<void> run(const Options& o, Written& written) {
     STIPPLE_TRY(checkModule(o));
     STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, !o.quiet));
     STIPPLE_TRY(checkWeights(o, scene));
+    if (const double distance = patchDistance(scene.placed); distance > 0 && !o.quiet)
+        fmt::print(stderr, "note: patches are up to {:.3g} units from what they were built from, beside the error\n",
+                   distance);
     if (o.material.material() && !takesMaterial(scene.placed)) return noPointsToLight(o.inputs.front());
     const lod::StoreDescription& description = scene.description;
     STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
