@@ -19,8 +19,7 @@ template <typename Hit>
             const float ex0 = float(x0) + 0.5f - f.centre.x;
 #pragma GCC ivdep
             for (size_t k = 0; k < kSplatStretch; ++k)
-                depth[k] =
-                    floatBitsToUint(hit(pixelRay(lens, (ex0 + float(int(k))) * inverseFocal, ey), more[k]));
+                depth[k] = floatBitsToUint(hit(pixelRay(lens, (ex0 + float(int(k))) * inverseFocal, ey), more[k]));
             const size_t first = size_t(y) * f.width + size_t(x0);
             const uint32_t none = floatBitsToUint(kNoPatch);
             for (int k = 0; k < count; ++k)
@@ -123,8 +122,8 @@ template <typename Use>
         }
 }
 
-void splatPatch(const FrameConstants& frame, const PatchSource& source, uint32_t firstPlace, const LargeSplatSink& large,
-                const Visibility& visibility) {
+void splatPatch(const FrameConstants& frame, const PatchSource& source, uint32_t firstPlace,
+                const LargeSplatSink& large, const Visibility& visibility) {
     const FrameConstants f = frame;
     const uint64_t firstId = drawId(f.firstBlock.of[kKindPatches], firstPlace);
     const int last = static_cast<int>(f.height) - 1;

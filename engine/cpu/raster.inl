@@ -262,8 +262,7 @@ struct PlacedCorners {
     alignas(64) int32_t px[256], py[256], clip[256];
 };
 
-[[gnu::always_inline]] inline void projectCorners(const FrameConstants& f, size_t count,
-                                                  PlacedCorners& __restrict p) {
+[[gnu::always_inline]] inline void projectCorners(const FrameConstants& f, size_t count, PlacedCorners& __restrict p) {
     const Lens lens = lensHere(f.focal);
 #pragma GCC ivdep
     for (size_t i = 0; i < count; ++i) {

@@ -14,8 +14,9 @@
         const int i0 = static_cast<int>(block.place & 0xffffu), j0 = static_cast<int>(block.place >> 16);
         for (uint32_t k = 0; k < 3; ++k) {
             const uint32_t s = t >> (8 * k) & 255u;
-            const vec3 place = meshPosition(i0 + static_cast<int>(s % kPatchStride),
-                                            j0 + static_cast<int>(s / kPatchStride), patchHeight(block, s), *source.mesh);
+            const vec3 place =
+                meshPosition(i0 + static_cast<int>(s % kPatchStride), j0 + static_cast<int>(s / kPatchStride),
+                             patchHeight(block, s), *source.mesh);
             c.x[k][i] = place.x;
             c.y[k][i] = place.y;
             c.z[k][i] = place.z;
