@@ -47,14 +47,7 @@ Result<lod::TriangleMesh> collect(const lod::MeshSource& source, const std::stri
     if (source.survey) STIPPLE_TRY(source.survey([&](uint64_t, uint64_t) { return goOn(); }));
     const auto take = [&](const lod::TriangleMesh& block) -> Result<void> {
         STIPPLE_TRY(goOn());
-        const auto first = static_cast<uint32_t>(all.position.size());
-        const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
-        append(all.position, block.position);
-        append(all.normal, block.normal);
-        append(all.uv, block.uv);
-        append(all.colour, block.colour);
-        append(all.surface, block.surface);
-        for (const uint32_t i : block.indices) all.indices.push_back(first + i);
+        lod::append(all, block);
         return {};
     };
     STIPPLE_TRY(source.read(take));

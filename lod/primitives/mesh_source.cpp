@@ -148,4 +148,15 @@ MeshSource joined(std::vector<MeshSource> given) {
     return all;
 }
 
+void append(TriangleMesh& to, const TriangleMesh& block) {
+    const auto first = static_cast<uint32_t>(to.position.size());
+    const auto add = [](auto& all, const auto& more) { all.insert(all.end(), more.begin(), more.end()); };
+    add(to.position, block.position);
+    add(to.normal, block.normal);
+    add(to.uv, block.uv);
+    add(to.colour, block.colour);
+    add(to.surface, block.surface);
+    for (const uint32_t i : block.indices) to.indices.push_back(first + i);
+}
+
 }  // namespace stipple::lod

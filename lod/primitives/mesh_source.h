@@ -60,4 +60,7 @@ class BlockMaker {
     std::vector<uint64_t> table_;  ///< open addressing: vertex + 1 << 24 | its number in the block
 };
 
+/// `block` after `to`, with its indices moved. Both have the same arrays.
+void append(TriangleMesh& to, const TriangleMesh& block);
+
 }  // namespace stipple::lod

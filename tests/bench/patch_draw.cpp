@@ -36,14 +36,7 @@ lod::TriangleMesh readMesh(const std::string& path) {
     lod::TriangleMesh mesh;
     if (source.survey) valueOf(source.survey([](uint64_t, uint64_t) { return Result<void>(); }));
     const auto read = source.read([&](const lod::TriangleMesh& block) -> Result<void> {
-        const auto base = static_cast<uint32_t>(mesh.position.size());
-        const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
-        append(mesh.position, block.position);
-        append(mesh.normal, block.normal);
-        append(mesh.uv, block.uv);
-        append(mesh.colour, block.colour);
-        append(mesh.surface, block.surface);
-        for (const uint32_t i : block.indices) mesh.indices.push_back(base + i);
+        lod::append(mesh, block);
         return {};
     });
     if (!read) throw std::runtime_error(read.error().line());

@@ -15,14 +15,7 @@ lod::TriangleMesh collect(const lod::MeshSource& source) {
     EXPECT_TRUE(source.survey(tellNobody));
     lod::TriangleMesh out;
     EXPECT_TRUE(source.read([&](const lod::TriangleMesh& block) -> Result<void> {
-        const auto base = static_cast<uint32_t>(out.position.size());
-        const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
-        append(out.position, block.position);
-        append(out.normal, block.normal);
-        append(out.uv, block.uv);
-        append(out.colour, block.colour);
-        append(out.surface, block.surface);
-        for (const uint32_t i : block.indices) out.indices.push_back(base + i);
+        lod::append(out, block);
         return {};
     }));
     return out;
