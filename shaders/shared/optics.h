@@ -361,12 +361,15 @@ SHARED_FN vec3 throughLight(SHARED_SEEN FrameConstants f, LayerConstants l, Opti
 
 // The whole of a pixel but for lights (`lights`: what they send back, of opaqueShare(s, o)).
 SHARED_FN float throughShare(Surface s, Optic o) { return o.transmission * (1.0f - s.metallic); }
-// What of it stays that is not transparent; with the optics' reflectance.
+// What of it is diffuse: of what is no metal, what does not go through (glTF, KHR_materials_transmission).
+SHARED_FN float diffuseShare(Surface s, Optic o) { return (1.0f - s.metallic) * (1.0f - o.transmission); }
+// As lights see it: that share is its colour, and what it reflects straight on, as metal and as dielectric, stays.
 SHARED_FN Surface opaqueShare(Surface s, Optic o) {
     Surface opaque = s;
-    const float left = 1.0f - throughShare(s, o);
-    opaque.colour = scaled(s.colour, left);
     opaque.dielectric = o.straightOn;
+    opaque.dielectric = straightOn(opaque);
+    opaque.colour = scaled(s.colour, diffuseShare(s, o));
+    opaque.metallic = 0.0f;
     return opaque;
 }
 SHARED_FN vec3 opticLight(SHARED_SEEN FrameConstants f, LayerConstants l, Optic o, Surface s, vec3 p, vec3 lights) {
@@ -392,7 +395,7 @@ SHARED_FN vec3 opticLight(SHARED_SEEN FrameConstants f, LayerConstants l, Optic 
         around = vec3(light, light, light);
     }
     const float through = throughShare(s, o);
-    const float diffuse = (1.0f - s.metallic) * (1.0f - through) * s.occlusion * f.ambient;
+    const float diffuse = diffuseShare(s, o) * s.occlusion * f.ambient;
     const float seen_ = s.occlusion * f.ambient;
     vec3 sum = vec3(lights.x + diffuse * s.colour.x * around.x + seen_ * share.x * reflected.x,
                     lights.y + diffuse * s.colour.y * around.y + seen_ * share.y * reflected.y,

@@ -84,6 +84,27 @@ TEST(Optics, GlassReflectsAllBeyondTheCriticalAngleAndNearlyAllBefore) {
     }
 }
 
+// mix(mix(diffuse, through, transmission), metal, metallic), as the format says: the shares of all light add up to one
+// but for what is reflected, whatever is half a metal.
+TEST(Optics, SharesOfWhatIsPartlyMetalAreThoseOfTheFormat) {
+    for (const float metallic : {0.0f, 0.25f, 0.5f, 1.0f})
+        for (const float transmission : {0.0f, 0.4f, 1.0f}) {
+            shared::Surface s{};
+            s.colour = shared::vec3(0.9f, 0.5f, 0.2f);
+            s.metallic = metallic;
+            shared::Optic o{};
+            o.transmission = transmission;
+            o.straightOn = shared::vec3(0.05f, 0.05f, 0.05f);
+            const shared::Surface opaque = shared::opaqueShare(s, o);
+            const dvec3 diffuse = wide(opaque.colour) * (1.0 - double{opaque.metallic});
+            const dvec3 mirror = wide(shared::straightOn(opaque)), colour = wide(s.colour);
+            const double dielectric = 1 - double{metallic};
+            EXPECT_LT(glm::length(diffuse - dielectric * (1.0 - transmission) * colour), 1e-6);
+            EXPECT_LT(glm::length(mirror - (dielectric * dvec3(0.05) + double{metallic} * colour)), 1e-6);
+            EXPECT_NEAR(double{shared::throughShare(s, o)}, dielectric * transmission, 1e-6);
+        }
+}
+
 TEST(Optics, AreKeptInStoresAndRefusedWhereImpossible) {
     lod::StoreDescription d;
     d.materials.resize(2);

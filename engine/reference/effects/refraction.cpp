@@ -88,11 +88,12 @@ class Glass {
         }
         Sample opaque = s;
         opaque.roughness = rough;
-        opaque.colour *= 1 - through;
+        opaque.colour *= (1 - s.metallic) - through;
+        opaque.metallic = 0;
         opaque.thickness = 1e30;  // no leaf
         opaque.isRound = true;
-        dvec3 sum = lightsOn(opaque, n, point, o.straightOn, draws_) +
-                    double(f.ambient) * s.occlusion * (opaque.colour * (1 - s.metallic) * around + share * seen);
+        dvec3 sum = lightsOn(opaque, n, point, straight, draws_) +
+                    double(f.ambient) * s.occlusion * (opaque.colour * around + share * seen);
         if (through > 0) sum += through * (1.0 - share) * s.colour * comesThrough(o, point, d, n, c, rough);
         return sum + s.emissive;
     }
