@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <csignal>
@@ -97,10 +98,18 @@ int run(std::vector<std::string> arguments) {
 int main(int argc, char** argv) {
     stipple::app::exitWhereNothingCatches();
     std::signal(SIGXFSZ, SIG_IGN);  // a write beyond ulimit -f fails and is reported, instead of ending the program
+    constexpr int kBudget = static_cast<int>(stipple::ErrorKind::budget);
+    int status = kBudget;
     try {
-        return run({argv + 1, argv + argc});
+        status = run({argv + 1, argv + argc});
     } catch (...) {  // what even printing the error could throw
         std::fputs("stipple: out of memory\n", stderr);
-        return static_cast<int>(stipple::ErrorKind::budget);
     }
+    // Where memory ran out, threads of TBB may still be on their way to a task; the destructors of statics, TBB's own
+    // among them, would pull the ground from under them ("pure virtual method called", once in a thousand times).
+    if (status == kBudget) {
+        std::fflush(nullptr);
+        ::_exit(status);
+    }
+    return status;
 }
