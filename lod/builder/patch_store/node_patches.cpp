@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 
+#include "lod/builder/patch_store/discs.h"
 #include "lod/builder/patch_store/division.h"
 #include "lod/builder/patches/sample_segments.h"
 #include "lod/builder/patches/segments.h"
@@ -69,7 +69,8 @@ class NodePatcher {
                   kMostDisc * step, out.left);
         }
         for (const LeftDisc& d : out.left) out.error = std::max(out.error, double{d.radius});
-        if (settings.samplesATriangle == 0) unite(out, kUnited * settings.step);
+        if (settings.samplesATriangle == 0)
+            out.error = std::max(out.error, uniteDiscs(out.left, kUnited * settings.step));
         return out;
     }
 
@@ -128,39 +129,6 @@ class NodePatcher {
         const SurfaceLook look = s_.look(triangle, w.x, w.y);
         out.push_back(
             {corner_ + s_.middle + middle, look.normal, static_cast<float>(radius * (1 + 1e-6)), look.colour});
-    }
-
-    /// One disc about the mean of those in a cell, that reaches around all of them.
-    static void unite(NodePatches& out, double edge) {
-        std::map<std::array<int64_t, 3>, std::vector<LeftDisc>> cells;
-        for (const LeftDisc& d : out.left) {
-            const glm::dvec3 c = glm::floor(d.place / edge);
-            cells[{static_cast<int64_t>(c.z), static_cast<int64_t>(c.y), static_cast<int64_t>(c.x)}].push_back(d);
-        }
-        out.left.clear();
-        for (const auto& [key, discs] : cells) {
-            LeftDisc one;
-            glm::dvec3 place(0), normal(0), colour(0);
-            double weight = 0;
-            for (const LeftDisc& d : discs) {
-                const double area = double{d.radius} * double{d.radius};
-                weight += area;
-                place += area * d.place;
-                normal += area * glm::dvec3(d.normal);
-                for (int a = 0; a < 3; ++a) colour[a] += area * static_cast<double>(d.colour >> (8 * a) & 255u);
-            }
-            one.place = place / weight;
-            const double length = glm::length(normal);
-            one.normal = length > 1e-6 * weight ? glm::vec3(normal / length) : discs.front().normal;
-            double reach = 0;
-            for (const LeftDisc& d : discs)
-                reach = std::max(reach, glm::distance(d.place, one.place) + double{d.radius});
-            one.radius = static_cast<float>(reach * (1 + 1e-6));
-            for (int a = 0; a < 3; ++a)
-                one.colour |= static_cast<uint32_t>(std::clamp(colour[a] / weight + 0.5, 0.0, 255.0)) << (8 * a);
-            out.error = std::max(out.error, double{one.radius});
-            out.left.push_back(one);
-        }
     }
 
     glm::dvec3 corner_;

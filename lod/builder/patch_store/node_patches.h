@@ -2,6 +2,7 @@
 #pragma once
 
 #include "lod/builder/octree/frame.h"
+#include "lod/builder/patch_store/discs.h"
 #include "lod/builder/patch_store/level_mesh.h"
 #include "lod/builder/patches/patch_build.h"
 
@@ -20,14 +21,6 @@ struct AroundNode {
     Soup within, beyond;  ///< kPatchReach, kPatchAround
     /// `lo`: corner of the node's cell.
     void add(const Soup& from, const glm::dvec3& lo, double cell);
-};
-
-/// A place that no patch stands for.
-struct LeftDisc {
-    glm::dvec3 place{0};  ///< lattice units
-    glm::vec3 normal{0};
-    float radius = 0;  ///< lattice units
-    uint32_t colour = 0;
 };
 
 struct NodePatches {

@@ -3,10 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/base/hash.h"
 #include "lod/builder/patch_store/division.h"
-#include "lod/builder/patch_store/node_payload.h"
-#include "lod/store/patch_bytes.h"
 
 namespace stipple::lod {
 namespace {
@@ -14,19 +11,8 @@ namespace {
 constexpr double kWanted = 0.1;       ///< error that a simplification may add, in steps of its level
 constexpr size_t kMostKept = 65'536;  ///< triangles that go up from a node
 
-struct PatchNode {
-    Node node;
-    Key key = 0;
-    Soup surface;             ///< its triangles; once it is done, what is left of them for its parent
-    double surfaceError = 0;  ///< of those, bound of the distance from the source, lattice units
-    double residual = 0;      ///< of the leaves below: of their patches from the source
-    double error = 0;         ///< of its patches: bound of the distance from those of the leaves
-};
-/// The same without its triangles, as it goes up.
-struct PatchNodeHead {
-    Node node;
-    Key key = 0;
-    double surfaceError = 0, residual = 0, error = 0;
+struct SurfaceNode : PatchNode {
+    Soup surface;  ///< its triangles; once it is done, what is left of them for its parent
 };
 
 enum class Sent : uint8_t {
@@ -39,7 +25,7 @@ class PatchCell {
     PatchCell(const WorkCell& cell, const Frame& frame, const std::vector<Subtree>& subtrees,
               const PatchCellSettings& settings, Executor& executor)
         : frame_(frame), subtrees_(subtrees), settings_(settings), executor_(executor) {
-        nodes_.push_back(nodeAt(static_cast<uint32_t>(cell.level), cell.key));
+        nodes_.push_back({patchNodeAt(frame, static_cast<uint32_t>(cell.level), cell.key), {}});
     }
 
     Result<void> takeInput(const std::vector<uint8_t>& bytes) {
@@ -57,8 +43,8 @@ class PatchCell {
         WeldedMesh mesh = weld(all);
         sortTriangles(mesh, all.indices);
         all.vertices = std::move(mesh.vertices);
-        table_.triangles = countOwn();
-        table_.duplicate = before - table_.triangles;
+        table_.elements = countOwn();
+        table_.duplicate = before - table_.elements;
         SoupPart own(all, nodes_[0].surface), others(all, around_);
         for (size_t t = 0; t < all.indices.size() / 3; ++t) (isOwn(t) ? own : others).add(t);
         const LatticeVertices& v = nodes_[0].surface.vertices;
@@ -66,8 +52,8 @@ class PatchCell {
             table_.lo = i == 0 ? v.at(i) : glm::min(table_.lo, v.at(i));
             table_.hi = i == 0 ? v.at(i) : glm::max(table_.hi, v.at(i));
         }
-        if (table_.triangles > 0) partition();
-        isMade_ = table_.triangles > 0;
+        if (table_.elements > 0) partition();
+        isMade_ = table_.elements > 0;
         return {};
     }
 
@@ -77,17 +63,16 @@ class PatchCell {
             Sent what{};
             from.get(what);
             if (what == Sent::child) {
-                PatchNodeHead head;
+                PatchNode head;  // (whole: what derives from it may begin in its last bytes)
                 from.get(head);
-                PatchNode node{head.node, head.key, {}, head.surfaceError, head.residual, head.error};
-                if (!getSoup(from, node.surface)) return damaged();
-                nodes_.push_back(std::move(node));
+                nodes_.push_back({head, {}});
+                if (!getSoup(from, nodes_.back().surface)) return damaged();
             }
             if (!getSoup(from, around_) || !from.isWhole()) return damaged();
         }
         // In octant order.
         std::sort(nodes_.begin() + 1, nodes_.end(),
-                  [](const PatchNode& a, const PatchNode& b) { return a.key < b.key; });
+                  [](const SurfaceNode& a, const SurfaceNode& b) { return a.key < b.key; });
         nodes_[0].node.firstChild = 1;
         for (size_t c = 1; c < nodes_.size(); ++c) nodes_[0].node.childMask |= octantOf(nodes_[c].node);
         isMade_ = nodes_.size() > 1;
@@ -106,7 +91,7 @@ class PatchCell {
         }
         uint32_t deepest = nodes_[0].node.level;
         if (firstOwn_ == 0)
-            for (const PatchNode& n : nodes_) deepest = std::max<uint32_t>(deepest, n.node.level);
+            for (const SurfaceNode& n : nodes_) deepest = std::max<uint32_t>(deepest, n.node.level);
         for (uint32_t level = deepest + 1; level-- > nodes_[0].node.level;) makeLevel(level, isLast);
         out.chunks = std::move(table_.batch.bytes);
         table_.batch.bytes = {};
@@ -120,28 +105,12 @@ class PatchCell {
     static tl::unexpected<Error> damaged() {
         return fail(ErrorKind::input, "a temporary file is not what was written", "", "build again");
     }
-    static uint8_t octantOf(const Node& n) {
-        return static_cast<uint8_t>(1u << ((n.cell[0] & 1u) | (n.cell[1] & 1u) << 1 | (n.cell[2] & 1u) << 2));
-    }
     Key keyOfTriangle(const Soup& soup, size_t t) const {
         const glm::u64vec3 p(middleOf(soup, t));
         return frame_.keyOf(p.x, p.y, p.z);
     }
     /// `up`: levels above that of the cell.
     Key levelKey(Key key, uint32_t up) const { return key >> (frame_.shiftOf(nodes_[0].node.level) + 3 * up); }
-    glm::dvec3 cornerOf(const Node& n) const {
-        return glm::dvec3(n.cell[0], n.cell[1], n.cell[2]) * frame_.cellSize(n.level);
-    }
-
-    PatchNode nodeAt(uint32_t level, Key key) const {
-        PatchNode n;
-        n.key = key;
-        n.node.level = static_cast<uint8_t>(level);
-        const Key cell = key >> frame_.shiftOf(level);
-        n.node.cell = {compactBits(cell), compactBits(cell >> 1), compactBits(cell >> 2)};
-        return n;
-    }
-
     /// An octree of the triangles' middles, breadth first.
     void partition() {
         for (size_t i = 0; i < nodes_.size(); ++i) {
@@ -159,9 +128,9 @@ class PatchCell {
             for (uint64_t octant = 0; octant < 8; ++octant) {
                 if (parts.at(octant).indices.empty()) continue;
                 nodes_[i].node.childMask |= static_cast<uint8_t>(1u << octant);
-                PatchNode child = nodeAt(level + 1, nodes_[i].key | Key{octant} << frame_.shiftOf(level + 1));
-                child.surface = std::move(parts.at(octant));
-                nodes_.push_back(std::move(child));
+                nodes_.push_back(
+                    {patchNodeAt(frame_, level + 1, nodes_[i].key | Key{octant} << frame_.shiftOf(level + 1)),
+                     std::move(parts.at(octant))});
             }
         }
     }
@@ -184,23 +153,23 @@ class PatchCell {
         std::vector<NodePatches> made(here.size());
         executor_.parallelFor(here.size(), 1, [&](size_t begin, size_t end) {
             for (size_t k = begin; k < end; ++k) {
-                const PatchNode& n = nodes_[here[k]];
+                const SurfaceNode& n = nodes_[here[k]];
                 const NodeSettings how{patchStep(frame_, level), settings_.coneDegrees,
                                        n.node.isLeaf() ? settings_.samplesATriangle : 0.0};
-                made[k] = patchesOfNode(n.surface, aroundOf(here[k]), cornerOf(n.node), how, executor_);
+                made[k] = patchesOfNode(n.surface, aroundOf(here[k]), cornerOf(frame_, n.node), how, executor_);
             }
         });
         for (size_t k = 0; k < here.size(); ++k) write(nodes_[here[k]], made[k]);
         if (level == nodes_[0].node.level && isLast) return;
         executor_.parallelFor(here.size(), 1, [&](size_t begin, size_t end) {
             for (size_t k = begin; k < end; ++k) {
-                PatchNode& n = nodes_[here[k]];
+                SurfaceNode& n = nodes_[here[k]];
                 n.surfaceError += simplify(n.surface, kWanted * patchStep(frame_, level), kMostKept);
             }
         });
     }
 
-    void joinChildren(PatchNode& n) {
+    void joinChildren(SurfaceNode& n) {
         const auto children = static_cast<uint32_t>(__builtin_popcount(n.node.childMask));
         for (uint32_t c = n.node.firstChild; c < n.node.firstChild + children; ++c) {
             appendSoup(nodes_[c].surface, n.surface);
@@ -217,9 +186,9 @@ class PatchCell {
         AroundNode out;
         const Node& n = nodes_[i].node;
         const double cell = frame_.cellSize(n.level);
-        const glm::dvec3 lo = cornerOf(n);
+        const glm::dvec3 lo = cornerOf(frame_, n);
         for (size_t k = 0; k < nodes_.size(); ++k) {
-            const PatchNode& other = nodes_[k];
+            const SurfaceNode& other = nodes_[k];
             if (k == i || other.surface.indices.empty() || !isNear(other.node, lo, cell)) continue;
             out.add(other.surface, lo, cell);
         }
@@ -229,15 +198,14 @@ class PatchCell {
     /// (What was simplified may lie a little beside its cell.)
     bool isNear(const Node& other, const glm::dvec3& lo, double cell) const {
         const double edge = frame_.cellSize(other.level), reach = kPatchMargin * cell + 0.5 * edge;
-        const glm::dvec3 from = cornerOf(other) - reach, to = cornerOf(other) + edge + reach;
+        const glm::dvec3 from = cornerOf(frame_, other) - reach, to = cornerOf(frame_, other) + edge + reach;
         return glm::all(glm::lessThanEqual(from, lo + cell)) && glm::all(glm::lessThanEqual(lo, to));
     }
 
     // ---- to the file
 
-    void write(PatchNode& n, NodePatches& made) {
-        Node& out = n.node;
-        const glm::dvec3 corner = cornerOf(out);
+    void write(SurfaceNode& n, NodePatches& made) {
+        const Node& out = n.node;
         // Of the leaves from each other: by way of the source.
         if (out.isLeaf()) {
             n.residual = made.error;
@@ -247,76 +215,20 @@ class PatchCell {
         } else {
             n.error = std::max(n.error, n.surfaceError + made.error + n.residual);
         }
-        uint32_t code = frame_.errors.encodeUp(out.isLeaf() ? 0.0 : n.error);
-        DiscPayload discs;
-        if (!made.left.empty()) {
-            std::vector<LeftDisc> asMade = made.left;
-            discs = encodeDiscs(made.left, frame_, out, code);
-            if (out.isLeaf()) {
-                n.residual += discs.moved;
-            } else if (discs.moved > 0) {  // their error is told in them
-                n.error += discs.moved;
-                code = frame_.errors.encodeUp(n.error);
-                discs = encodeDiscs(asMade, frame_, out, code);
-            }
-        }
-        if (out.isLeaf()) table_.residual = std::max(table_.residual, n.residual);
-        out.errorCode = static_cast<uint8_t>(code);
-        makeSphere(n, made, corner);
-        appendPayloads(n, encodePatches(made.patches).bytes, blocksIn(made.patches), discs.bytes,
-                       static_cast<uint32_t>(made.left.size()));
+        writePatchNode(frame_, children(n.node), made, n, table_);
     }
-
-    void makeSphere(PatchNode& n, const NodePatches& made, const glm::dvec3& corner) const {
-        Node& out = n.node;
-        glm::dvec3 lo(1e300), hi(-1e300);
-        const auto children = static_cast<uint32_t>(__builtin_popcount(out.childMask));
-        for (uint32_t c = out.firstChild; c < out.firstChild + children; ++c) {
-            lo = glm::min(lo, nodes_[c].node.centre - nodes_[c].node.radius);
-            hi = glm::max(hi, nodes_[c].node.centre + nodes_[c].node.radius);
-        }
-        addSamples(made.patches, corner, lo, hi);
-        for (const LeftDisc& d : made.left) {
-            lo = glm::min(lo, d.place - double{d.radius});
-            hi = glm::max(hi, d.place + double{d.radius});
-        }
-        out.centre = 0.5 * (lo + hi);
-        out.radius = farthestSample(made.patches, corner, out.centre);
-        for (uint32_t c = out.firstChild; c < out.firstChild + children; ++c)
-            out.radius = std::max(out.radius, glm::length(nodes_[c].node.centre - out.centre) + nodes_[c].node.radius);
-        for (const LeftDisc& d : made.left)
-            out.radius = std::max(out.radius, glm::distance(d.place, out.centre) + double{d.radius});
-        out.radius *= 1 + 1e-6;
-    }
-
-    /// A node's payloads; the patches', if there are any, are the node's own.
-    void appendPayloads(const PatchNode& n, const std::vector<uint8_t>& patches, uint32_t blocks,
-                        const std::vector<uint8_t>& discs, uint32_t records) {
-        NodeBatch& batch = table_.batch;
-        NodeBatch::Written w;
-        w.node = n.node;
-        w.key = n.key;
-        w.node.records = blocks > 0 ? blocks : records;
-        w.node.chunkOffset = batch.bytes.size();
-        w.node.attributeHash = hashBytes(nullptr, 0);
-        if (blocks > 0) {
-            w.node.chunkBytes = static_cast<uint32_t>(patches.size());
-            w.node.chunkHash = hashBytes(patches.data(), patches.size());
-            batch.bytes.insert(batch.bytes.end(), patches.begin(), patches.end());
-        }
-        if (records > 0) {
-            table_.points.push_back({static_cast<uint32_t>(batch.nodes.size()), blocks == 0 ? 1u : 0u, records,
-                                     static_cast<uint32_t>(discs.size()), batch.bytes.size(),
-                                     hashBytes(discs.data(), discs.size())});
-            batch.bytes.insert(batch.bytes.end(), discs.begin(), discs.end());
-        }
-        batch.nodes.push_back(w);
+    /// Nodes stand side by side.
+    std::vector<Node> children(const Node& n) const {
+        std::vector<Node> out;
+        for (uint32_t c = 0; c < static_cast<uint32_t>(__builtin_popcount(n.childMask)); ++c)
+            out.push_back(nodes_[n.firstChild + c].node);
+        return out;
     }
 
     // ---- upwards
 
     std::vector<GoingUp> goingUp() const {
-        const PatchNode& own = nodes_[0];
+        const SurfaceNode& own = nodes_[0];
         const uint32_t above = own.node.level - 1u, shift = frame_.shiftOf(above);
         const double cell = frame_.cellSize(above);
         const std::array<int64_t, 3> parent{static_cast<int64_t>(own.node.cell[0] >> 1),
@@ -346,10 +258,10 @@ class PatchCell {
     }
 
     std::vector<uint8_t> child(const glm::dvec3& lo, double cell) const {
-        const PatchNode& own = nodes_[0];
+        const SurfaceNode& own = nodes_[0];
         ByteWriter to;
         to.put(Sent::child);
-        to.put(PatchNodeHead{own.node, own.key, own.surfaceError, own.residual, own.error});
+        to.put(PatchNode(own));
         putSoup(own.surface, to);
         // Of subtrees that are worked on no earlier than the parent: they send nothing before.
         Soup carried;
@@ -388,8 +300,8 @@ class PatchCell {
     const std::vector<Subtree>& subtrees_;
     const PatchCellSettings& settings_;
     Executor& executor_;
-    std::vector<PatchNode> nodes_;  ///< the first one is the cell's own
-    Soup around_;                   ///< triangles of other cells
+    std::vector<SurfaceNode> nodes_;  ///< the first one is the cell's own
+    Soup around_;                     ///< triangles of other cells
     PatchTable table_;
     size_t firstOwn_ = 0;  ///< 0: all nodes are to be made
     bool isMade_ = false;
@@ -408,32 +320,6 @@ Result<CellProduct> buildPatchCell(const WorkCell& cell, const std::vector<uint8
         STIPPLE_TRY(work.takeBelow(below));
     }
     return work.run(cell.level == 0);
-}
-
-void PatchTable::put(ByteWriter& to) const {
-    to.put(batch.nodes);
-    to.put(points);
-    to.put(triangles);
-    to.put(duplicate);
-    to.put(left);
-    to.put(samples);
-    to.put(discs);
-    to.put(residual);
-    to.put(lo);
-    to.put(hi);
-}
-bool PatchTable::get(ByteReader& from) {
-    from.get(batch.nodes);
-    from.get(points);
-    from.get(triangles);
-    from.get(duplicate);
-    from.get(left);
-    from.get(samples);
-    from.get(discs);
-    from.get(residual);
-    from.get(lo);
-    from.get(hi);
-    return from.isWhole();
 }
 
 }  // namespace stipple::lod

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <optional>
 
 #include "engine/base/check.h"
@@ -198,11 +197,11 @@ class PatchBuild : public CellContent {
         STIPPLE_CHECK(table.get(from), "the table of a cell");
         for (NodeBatch::Written& w : table.batch.nodes) w.node.chunkOffset += at;
         for (PatchTable::Points& p : table.points) p.offset += at;
-        if (table.triangles > 0) {
+        if (table.elements > 0) {
             lo_ = glm::min(lo_, table.lo);
             hi_ = glm::max(hi_, table.hi);
         }
-        kept_ += table.triangles;
+        kept_ += table.elements;
         duplicate_ += table.duplicate;
         left_ += table.left;
         samples_ += table.samples;
@@ -215,7 +214,8 @@ class PatchBuild : public CellContent {
     // ---- the end ----
 
     Result<Hierarchy> describe(StoreWriter&, StoreDescription& description, BuildReport& report) override {
-        Hierarchy h = hierarchy();
+        Hierarchy h = hierarchyOf(frame(), std::move(tables_));
+        tables_.clear();
         for (const auto& [reason, count] :
              {std::pair{"degenerate triangles", facts_.degenerate}, std::pair{"duplicate triangles", duplicate_},
               std::pair{"triangles that are not finite", facts_.notFinite},
@@ -272,76 +272,6 @@ class PatchBuild : public CellContent {
         PlacedBlock placed = placeBlock(block, facts_.lattice, executor_);
         divideLong(placed.soup, std::max(std::exp2(longestLog2()), 2.0));
         return placed;
-    }
-
-    /// The tree of all nodes; parents' codes are known now.
-    Hierarchy hierarchy() {
-        const Frame on = frame();
-        std::map<std::pair<uint32_t, Key>, uint8_t> codes;  // by level and key
-        for (const PatchTable& table : tables_)
-            for (const NodeBatch::Written& w : table.batch.nodes) codes[{w.node.level, w.key}] = w.node.errorCode;
-        std::map<std::pair<uint32_t, Key>, PatchTable::Points> points;
-        std::vector<NodeBatch> batches;
-        for (PatchTable& table : tables_) {
-            for (NodeBatch::Written& w : table.batch.nodes) {
-                const uint32_t level = w.node.level;
-                uint32_t above = ErrorScale::kNoParent;
-                if (level > 0) {
-                    const uint32_t shift = on.shiftOf(level - 1);
-                    above = codes.at({level - 1, w.key >> shift << shift});
-                }
-                w.firstCount = static_cast<uint32_t>(table.batch.counts.size());
-                w.parentCodes = w.ownCodes = 1;
-                table.batch.addCount(above, w.node.records);
-                table.batch.addCount(w.node.errorCode, w.node.records);
-            }
-            for (const PatchTable::Points& p : table.points) {
-                const NodeBatch::Written& w = table.batch.nodes[p.node];
-                points[{w.node.level, w.key}] = p;
-            }
-            batches.push_back(std::move(table.batch));
-        }
-        tables_ = {};
-        Hierarchy h = assemble(on, batches);
-        addPoints(on, points, h);
-        return h;
-    }
-    /// Discs are the second payload of nodes that have patches, and the only one of others.
-    static void addPoints(const Frame& on, const std::map<std::pair<uint32_t, Key>, PatchTable::Points>& points,
-                          Hierarchy& h) {
-        for (uint32_t n = 0; n < h.nodes.size(); ++n) {
-            Node& node = h.nodes[n];
-            setKind(node, Kind::patches);
-            const Key key = mortonCode(node.cell[0], node.cell[1], node.cell[2]) << on.shiftOf(node.level);
-            const auto found = points.find({node.level, key});
-            if (found == points.end()) continue;
-            const uint32_t above = n == 0 ? uint32_t{ErrorScale::kNoParent} : h.nodes[node.parent].errorCode;
-            const bool isFirst = found->second.isAlone != 0;
-            FurtherPayload further;
-            Payload& p = isFirst ? static_cast<Payload&>(node) : further;
-            const uint8_t code = node.errorCode;
-            p.errorCode = code;
-            p.records = found->second.records;
-            p.chunkBytes = found->second.bytes;
-            p.chunkOffset = found->second.offset;
-            p.chunkHash = found->second.hash;
-            p.attributeHash = hashBytes(nullptr, 0);
-            setKind(p, Kind::points);
-            p.stepShift = static_cast<int8_t>(static_cast<int>(h.rootLog2) - node.level - 16);
-            std::vector<uint32_t> histogram(256, 0);
-            for (const auto& [of, counts] :
-                 {std::pair{above, &p.parentCounts}, std::pair{uint32_t{code}, &p.ownCounts}}) {
-                std::fill(histogram.begin(), histogram.end(), 0);
-                histogram.at(of) = p.records;
-                *counts = makeCodeCounts(histogram, p.records, h.greaterThan);
-            }
-            h.isMixed = true;
-            if (isFirst) continue;
-            further.node = n;
-            node.firstFurther = static_cast<uint32_t>(h.further.size());
-            node.furtherPayloads = 1;
-            h.further.push_back(further);
-        }
     }
 
     const MeshSource& source_;

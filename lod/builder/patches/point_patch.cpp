@@ -120,6 +120,7 @@ class Sampler {
     void sampleAll() {
         slopes_.assign(grid_.heights.size(), glm::dvec2(0));
         nearest_.assign(grid_.heights.size(), 0);
+        nearestPoint_.assign(grid_.heights.size(), PointPatch::kNoPoint);
         for (size_t s = 0; s < guide_.size(); ++s) {
             if (guide_[s] == kNobody) continue;
             const uint32_t i = guide_[s];
@@ -140,6 +141,7 @@ class Sampler {
             grid_.heights[s] = start + sample.height;
             slopes_[s] = sample.slope;
             nearest_[s] = sample.nearest;
+            nearestPoint_[s] = sample.nearestPoint;
             grid_.normals[s] = glm::vec3(grid_.frame * glm::normalize(glm::dvec3(-sample.slope, 1)));
             grid_.colours[s] = s_.colour.empty() ? kPlainColour : packed(sample.colour);
         }
@@ -215,16 +217,19 @@ class Sampler {
         const glm::dvec3 shift = grid_.local(p.origin + axis * (0.5 * p.quantum()));
         const auto i0 = static_cast<uint32_t>(std::lround(shift.x)), j0 = static_cast<uint32_t>(std::lround(shift.y));
         const PatchSurface surface(p);
-        const auto nearest = [&](size_t sample) {
+        const auto inGrid = [&](size_t sample) {
             const auto i = static_cast<uint32_t>(sample % p.width), j = static_cast<uint32_t>(sample / p.width);
-            return nearest_[grid_.at(i + i0, j + j0)] + 0.5 * p.quantum();
+            return grid_.at(i + i0, j + j0);
         };
+        const auto nearest = [&](size_t sample) { return nearest_[inGrid(sample)] + 0.5 * p.quantum(); };
         double sum = 0;
         uint64_t samples = 0;
+        out.nearest.assign(p.heights.size(), PointPatch::kNoPoint);
         for (size_t s = 0; s < p.heights.size(); ++s)
             if (p.heights[s] != 0) {
                 sum += nearest(s) * nearest(s);
                 ++samples;
+                out.nearest[s] = nearestPoint_[inGrid(s)];
             }
         surface.triangles([&](size_t a, size_t b, size_t c) {
             const glm::dvec3 x = surface.position(a), y = surface.position(b), z = surface.position(c);
@@ -250,6 +255,7 @@ class Sampler {
     std::vector<uint32_t> guide_;  ///< of samples
     std::vector<glm::dvec2> slopes_;
     std::vector<double> nearest_;
+    std::vector<uint32_t> nearestPoint_;
 };
 
 }  // namespace

@@ -10,6 +10,9 @@ struct PointPatch {
     bool isFolded = false;       ///< no height field: to be split
     Patch patch;                 ///< without samples: it stands for no point
     std::vector<uint32_t> left;  ///< points of the segment that it does not stand for
+    /// Of each sample of `patch` the nearest of the points that it was made of; kNoPoint where there is no sample.
+    std::vector<uint32_t> nearest;
+    static constexpr uint32_t kNoPoint = ~0u;
     // Sums for the root mean squares, each of as many.
     double toSource = 0, fromSource = 0;
     uint64_t represented = 0;

@@ -1,18 +1,15 @@
 // Points to patches: segments of what lies on a surface, then a patch of each; what folds is halved and tried again.
 // Points beside all surfaces, and those that no patch fits, stay points.
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 
 #include "lod/builder/patches/gaps.h"
-#include "lod/builder/patches/point_patch.h"
+#include "lod/builder/patches/point_segments.h"
 #include "lod/builder/patches/segments.h"
 
 namespace stipple::lod {
 namespace {
-
-constexpr size_t kFewestPoints = 24;  ///< of a segment that may become a patch
 
 class PointPatches {
   public:
@@ -42,11 +39,6 @@ class PointPatches {
     }
 
   private:
-    struct Made {
-        uint32_t first;  ///< point
-        PointPatch patch;
-    };
-
     /// The others' points are left.
     std::vector<Segment> worthIt(std::vector<Segment> segments) {
         std::erase_if(segments, [&](const Segment& s) {
@@ -58,38 +50,20 @@ class PointPatches {
     }
 
     void sample(std::vector<Segment> segments) {
-        std::atomic<uint64_t> done{0};
-        while (!segments.empty()) {
-            std::vector<PointPatch> made(segments.size());
-            executor_.parallelFor(segments.size(), 1, [&](size_t begin, size_t end) {
-                for (size_t k = begin; k < end; ++k) {
-                    if (settings_.isStopped && settings_.isStopped()) return;
-                    made[k] =
-                        patchOfPoints(s_, segments[k], stepOf(s_, segments[k], samplesAPoint_), settings_.closing);
-                    if (!made[k].isFolded) progress_.update("patches", done += segments[k].size(), s_.size());
-                }
-            });
-            if (settings_.isStopped && settings_.isStopped()) return;
-            std::vector<Segment> again;
-            for (size_t k = 0; k < segments.size(); ++k) {
-                if (made[k].isFolded) {
-                    auto [a, b] = halves(s_.elements, segments[k]);
-                    again.push_back(std::move(a));
-                    again.push_back(std::move(b));
-                    continue;
-                }
-                left_.insert(left_.end(), made[k].left.begin(), made[k].left.end());
-                if (made[k].patch.width > 0) made_.push_back({segments[k].front(), std::move(made[k])});
-            }
-            segments = worthIt(std::move(again));
-        }
+        PointSampling how;
+        how.closing = settings_.closing;
+        how.step = [this](const Segment& s) { return stepOf(s_, s, samplesAPoint_); };
+        how.isStopped = settings_.isStopped;
+        how.tell = [this](uint64_t done) { progress_.update("patches", done, s_.size()); };
+        SampledPoints sampled = samplePoints(s_, std::move(segments), how, executor_);
+        made_ = std::move(sampled.patches);
+        left_.insert(left_.end(), sampled.left.begin(), sampled.left.end());
     }
 
     void finish(PatchSet& out) {
-        std::sort(made_.begin(), made_.end(), [](const Made& a, const Made& b) { return a.first < b.first; });
         double to = 0, from = 0;
         uint64_t represented = 0;
-        for (Made& m : made_) {
+        for (SampledPoints::Made& m : made_) {
             to += m.patch.toSource;
             from += m.patch.fromSource;
             represented += m.patch.represented;
@@ -130,7 +104,7 @@ class PointPatches {
     Executor& executor_;
     Progress& progress_;
     double samplesAPoint_ = 1;
-    std::vector<Made> made_;
+    std::vector<SampledPoints::Made> made_;
     std::vector<uint32_t> left_;
 };
 

@@ -1,0 +1,58 @@
+// Nodes of a store of patches on their way to the file, and the tables that say what was written.
+#pragma once
+
+#include <map>
+#include <span>
+
+#include "lod/builder/octree/assemble.h"
+#include "lod/builder/patch_store/node_patches.h"
+
+namespace stipple::lod {
+
+/// What a product's table holds.
+struct PatchTable {
+    struct Points {            ///< of a node: what no patch stands for
+        uint32_t node = 0;     ///< into the batch
+        uint32_t isAlone = 0;  ///< the node has no patches
+        uint32_t records = 0, bytes = 0;
+        uint64_t offset = 0, hash = 0;
+    };
+    NodeBatch batch;                                 ///< parents' codes are not known
+    std::vector<Points> points;                      ///< ascending
+    uint64_t elements = 0, duplicate = 0, left = 0;  ///< triangles or points of the leaves
+    uint64_t samples = 0, discs = 0;                 ///< of the leaves: of patches, and of what fits none
+    double residual = 0;                             ///< of the leaves: see PatchNode, lattice units
+    double beside = 0;   ///< of the leaves of scans: farthest that a place of a patch is from a point, lattice units
+    Steps lo{0}, hi{0};  ///< of vertices or points, where there are elements
+    void put(ByteWriter& to) const;
+    bool get(ByteReader& from);
+};
+
+/// A node; what its patches are made of goes with it or not.
+struct PatchNode {
+    Node node;
+    Key key = 0;
+    double surfaceError = 0;  ///< of what its patches are made of, bound of the distance from the source, lattice units
+    double residual = 0;      ///< of the leaves below: of their patches from the source
+    double error = 0;         ///< of its patches: bound of the distance from those of the leaves
+};
+
+PatchNode patchNodeAt(const Frame& frame, uint32_t level, Key key);
+inline glm::dvec3 cornerOf(const Frame& frame, const Node& n) {
+    return glm::dvec3(n.cell[0], n.cell[1], n.cell[2]) * frame.cellSize(n.level);
+}
+/// As a bit of a mask of children.
+inline uint8_t octantOf(const Node& n) {
+    return static_cast<uint8_t>(1u << ((n.cell[0] & 1u) | (n.cell[1] & 1u) << 1 | (n.cell[2] & 1u) << 2));
+}
+
+/// Completes a node whose residual and error are those of `made`: its code and sphere. Appends it and its payloads to
+/// the table. Changes `made.left` to what the file says of it; what that moves is added to the residual of leaves and
+/// to the error of others. `children`: the nodes that are its children.
+void writePatchNode(const Frame& frame, std::span<const Node> children, NodePatches& made, PatchNode& n,
+                    PatchTable& table, std::vector<uint8_t>* patchBytes = nullptr);
+
+/// The tree of all nodes of all tables, whose offsets are of the file: parents' codes are known then.
+Hierarchy hierarchyOf(const Frame& frame, std::vector<PatchTable> tables);
+
+}  // namespace stipple::lod
