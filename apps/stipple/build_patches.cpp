@@ -9,6 +9,7 @@
 #include "engine/base/words.h"
 #include "engine/scene/triangles.h"
 #include "lod/builder/patch_store/patch_store_build.h"
+#include "lod/builder/scan_store/scan_store_build.h"
 #include "lod/import/ply/mesh.h"
 
 namespace stipple::app {
@@ -48,6 +49,15 @@ Result<lod::PatchBuildSettings> settingsOf(const BuildOptions& build) {
     settings.description.up =
         lod::axisVector(build.up.empty() ? lod::UpAxis::y : static_cast<lod::UpAxis>(build.up[0] - 'x'));
     return settings;
+}
+
+Result<lod::BuildReport> ofScans(const std::vector<std::string>& inputs, const std::string& output,
+                                 const BuildOptions& build, Executor& executor, Progress& progress) {
+    lod::ScanBuildSettings settings;
+    STIPPLE_ASSIGN(settings.points, build.settings());
+    settings.coneDegrees = build.patches.coneDegrees;
+    settings.samples = build.patches.samples;
+    return lod::buildScanStore(inputs, output, settings, executor, progress);
 }
 
 Result<lod::BuildReport> ofPly(const std::vector<std::string>& files, const std::string& output,
@@ -142,17 +152,16 @@ Result<lod::BuildReport> buildPatches(const std::vector<std::string>& inputs, co
                     "leave it out; convert --patches --fill-gaps writes a scene");
     if (build.ranks != nullptr)
         return fail(ErrorKind::usage, "does not go with --mpi", "--patches", "build it in one process");
-    if (build.surfels > 0 || build.onlyPoints || build.material || build.surfelWeights)
-        return fail(ErrorKind::usage, "is of triangles",
-                    "--patches with --surfels, --only-points, --surfel-weights or a material of points",
-                    "leave one of them out");
+    if (build.surfels > 0 || build.material || build.surfelWeights)
+        return fail(ErrorKind::usage, "is of surfaces",
+                    "--patches with --surfels, --surfel-weights or a material of points", "leave one of them out");
     if (isSceneFile(inputs.front())) {
         if (inputs.size() > 1)
             return fail(ErrorKind::usage, "only one scene with meshes can be built at a time", inputs[1]);
         return ofScene(inputs.front(), output, build, executor, progress);
     }
     STIPPLE_ASSIGN(const PlyMeshes meshes, findPlyMeshes(inputs, build));
-    if (!meshes.areAll()) return noTriangles(inputs.front());
+    if (!meshes.areAll()) return ofScans(inputs, output, build, executor, progress);
     STIPPLE_ASSIGN(lod::BuildReport report, ofPly(meshes.files, output, build, executor, progress));
     report.notes.insert(report.notes.begin(), meshes.notes.begin(), meshes.notes.end());
     return report;

@@ -14,6 +14,7 @@
 #include "lod/builder/build_version.h"
 #include "lod/builder/octree/assemble.h"
 #include "lod/builder/octree/course.h"
+#include "lod/builder/points/describe_input.h"
 #include "lod/builder/points/distribution.h"
 #include "lod/builder/points/estimate.h"
 #include "lod/builder/points/exchange.h"
@@ -22,19 +23,6 @@
 
 namespace stipple::lod {
 namespace {
-
-/// The axis of the format or of the settings; away from the Earth's centre for coordinates that are relative to it.
-glm::dvec3 upOf(const PointInput& input, const BuildSettings& settings, const StoreDescription& description) {
-    constexpr double kLeastRadius = 6.33e6, kGreatestRadius = 6.40e6;  // metres, sea floor to mountain tops
-    const glm::dvec3 centre = 0.5 * (description.boundsMin + description.boundsMax);
-    const double radius = glm::length(centre) * description.metresPerUnit;
-    const double extent = glm::length(description.boundsMax - description.boundsMin) * description.metresPerUnit;
-    const bool isGeocentric =
-        radius > kLeastRadius && radius < kGreatestRadius && extent < 1e5 && std::abs(centre.z) > 1e5;
-    if (!settings.up && isGeocentric && !input.crs.isDegrees && (input.crs.isGeocentric || input.crs.label().empty()))
-        return glm::normalize(centre);
-    return axisVector(input.up);
-}
 
 class PointStages final : public BuildStages {
   public:
@@ -57,7 +45,7 @@ class PointStages final : public BuildStages {
         return Distributed{std::move(left)};
     }
     Result<Built> build(Workspace&, Distributed distributed) override {
-        description_ = describeInput();
+        description_ = describePoints();
         ranges_ = ValueRanges(frame(), input_.points, description_.up);
         upper_.emplace(frame());
         STIPPLE_TRY(settings_.ranks != nullptr ? buildTogether() : buildAlone(std::move(distributed.done)));
@@ -299,20 +287,10 @@ class PointStages final : public BuildStages {
 
     // ---- the end ----
 
-    StoreDescription describeInput() const {
-        StoreDescription d;
-        d.crs = input_.crs;
-        d.metresPerUnit = input_.crs.metresPerUnit;
+    StoreDescription describePoints() const {
+        StoreDescription d = describeInput(input_, settings_);
         d.roundingUnits = spread_->rounding();
-        d.hasColour = input_.hasColour;
-        d.isReflectance = input_.isReflectance;
-        d.pointMaterials = input_.materials;
         d.hasNormals = input_.hasNormal || settings_.normals == NormalsMode::automatic;
-        d.source = input_.source;
-        const auto& g = input_.greatest;
-        d.boundsMin = input_.origin;
-        d.boundsMax = input_.origin + input_.unit * glm::dvec3(g[0], g[1], g[2]);
-        d.up = upOf(input_, settings_, d);
         return d;
     }
 

@@ -251,11 +251,10 @@ class CellStages final : public BuildStages {
     Result<void> count() {
         tree_.emplace(content_.frame(), content_.declared());
         do {
-            uint64_t done = 0;
+            std::atomic<uint64_t> done{0};
             STIPPLE_TRY(content_.places([&](const Coordinates& places, uint64_t of) -> Result<void> {
                 tree_->count(places);
-                done += places.size();
-                course_.progress.update("count", std::min(done, of), of);
+                course_.progress.update("count", std::min(done += places.size(), of), of);
                 return workspace_->checkStopped();
             }));
         } while (tree_->split());

@@ -71,7 +71,7 @@ class CellContent {
     /// Whatever has to be known before reading; `isKnown`: load was called with what an earlier run found.
     virtual Result<void> survey(const Workspace& workspace, Progress& progress, bool isKnown) = 0;
     virtual Frame frame() const = 0;
-    /// Lattice coordinates of everything, block by block.
+    /// Lattice coordinates of everything, block by block; from several threads at once.
     using Places = std::function<Result<void>(const Coordinates& places, uint64_t of)>;
     virtual uint64_t declared() const = 0;  ///< about how much places() gives
     virtual Result<void> places(const Places& take) = 0;

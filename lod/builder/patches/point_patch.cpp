@@ -44,6 +44,7 @@ class Sampler {
         if (out.patch.width > 0) measure(out);
         out.left.insert(out.left.end(), steep_.begin(), steep_.end());
         const bool isWorthIt = static_cast<double>(out.represented) >= kFewestShare * static_cast<double>(all_.size());
+        out.segment = std::move(segment_);
         if (out.represented > 0 && isWorthIt) return out;
         out = {};
         out.left = all_;

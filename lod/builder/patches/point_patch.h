@@ -1,6 +1,8 @@
 // One segment of points to one patch.
 #pragma once
 
+#include <algorithm>
+
 #include "lod/builder/patches/patch_build.h"
 #include "lod/builder/patches/point_surface.h"
 
@@ -13,6 +15,8 @@ struct PointPatch {
     /// Of each sample of `patch` the nearest of the points that it was made of; kNoPoint where there is no sample.
     std::vector<uint32_t> nearest;
     static constexpr uint32_t kNoPoint = ~0u;
+    std::vector<uint32_t> segment;  ///< points that it was made for, ascending: without those that are too steep
+    bool isOfSegment(uint32_t point) const { return std::binary_search(segment.begin(), segment.end(), point); }
     // Sums for the root mean squares, each of as many.
     double toSource = 0, fromSource = 0;
     uint64_t represented = 0;

@@ -1,0 +1,23 @@
+// One cell of a build of patches from points: an octree of its points, patches of every node from the leaves up, and
+// what goes up from the last one.
+#pragma once
+
+#include "lod/builder/octree/reduction.h"
+#include "lod/builder/patch_store/patch_nodes.h"
+
+namespace stipple::lod {
+
+struct ScanCellSettings {
+    uint32_t leafPoints = 8192;
+    double coneDegrees = 50;
+    double samplesAPoint = 1;  ///< of the leaves
+    bool hasNormals = false;   ///< the source has, of all points
+};
+
+/// `input`: ScanPoints of what lies in the cell and around it; `subtrees`: of all of the build.
+Result<CellProduct> buildScanCell(const WorkCell& cell, const std::vector<uint8_t>& input,
+                                  const std::vector<FromBelow>& below, const Frame& frame,
+                                  const std::vector<Subtree>& subtrees, const ScanCellSettings& settings,
+                                  Executor& executor);
+
+}  // namespace stipple::lod

@@ -1,0 +1,284 @@
+// Points as content of a build (octree/cell_build.h) whose nodes hold patches: each travels to the octree cell that it
+// lies in, and to those near it; cell by cell from the deepest up, patches are made of them.
+#include "lod/builder/scan_store/scan_store_build.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "engine/base/check.h"
+#include "lod/builder/build_version.h"
+#include "lod/builder/octree/cell_build.h"
+#include "lod/builder/patch_store/patch_cell.h"
+#include "lod/builder/patch_store/subtree_margins.h"
+#include "lod/builder/points/describe_input.h"
+#include "lod/builder/scan_store/scan_cell.h"
+#include "lod/builder/scan_store/scan_points.h"
+
+namespace stipple::lod {
+namespace {
+
+constexpr uint64_t kCellBytes = uint64_t{128} << 20;  ///< that one cell of the work needs at most
+constexpr uint32_t kFewestOfLeaf = 64;                ///< points, however many samples are wanted
+constexpr uint64_t kAtOnce = uint64_t{1} << 20;       ///< points between two steps of the distribution
+
+class ScanBuild : public CellContent {
+  public:
+    ScanBuild(PointInput input, BuildReport found, const ScanBuildSettings& settings, Executor& executor)
+        : input_(std::move(input)), found_(std::move(found)), settings_(settings), executor_(executor) {
+        cell_.coneDegrees = settings.coneDegrees;
+        cell_.leafPoints = settings.leafPoints;
+        workers_ = std::max(executor.threads(), 1);
+        if (settings.samples == 0) return;
+        const double times =
+            std::max(static_cast<double>(input_.declared()), 1.0) / static_cast<double>(settings.samples);
+        cell_.samplesAPoint /= times;
+        cell_.leafPoints =
+            static_cast<uint32_t>(std::clamp(times * cell_.leafPoints, double{kFewestOfLeaf}, double{kSubtreePoints}));
+    }
+
+    const char* primitive() const override { return "point"; }
+    std::string source() const override { return input_.source; }
+    uint64_t declared() const override { return input_.declared(); }
+    uint64_t inputIdentity() const override { return input_.identity(); }
+    MemoryNeeds memory() const override {
+        const uint64_t n = input_.declared();
+        MemoryNeeds needs;
+        needs.content = fmt::format("patches of {} points", n);
+        needs.fixed = (uint64_t{96} << 20) + static_cast<uint64_t>(workers_) * kReaderBytes + kAtOnce * kSpillBytes;
+        needs.aWorker = kCellBytes;
+        needs.tables = n * kTableBytes;
+        needs.between = n * kSpillBytes;
+        needs.whole = n * 1000;
+        return needs;
+    }
+    std::string settingsAsText() const override {
+        const BuildSettings& p = settings_.points;
+        return fmt::format("scan patches|{}|{}|{}|{}|{}|{}|{}|{}", kBuildVersion, settings_.coneDegrees,
+                           settings_.samples, settings_.leafPoints, kPatchCells, p.up ? static_cast<int>(*p.up) : -1,
+                           p.skipBad, p.dropOutliers);
+    }
+
+    // ---- survey, count, distribute ----
+
+    Result<void> survey(const Workspace& workspace, Progress& progress, bool isKnown) override {
+        if (isKnown) return {};
+        STIPPLE_TRY(input_.survey(found_, executor_, progress));
+        STIPPLE_TRY(workspace.checkStopped());
+        if (std::max({input_.greatest[0], input_.greatest[1], input_.greatest[2]}) >> 32 != 0)
+            return fail(ErrorKind::input, "some of its points lie too far from all others for patches", source(),
+                        "leave them out (--drop-outliers), or build it without --patches");
+        input_.sample = {};
+        far_ = input_.farCubes(workers_);
+        return {};
+    }
+    Frame frame() const override {
+        const auto& g = input_.greatest;
+        return makeFrame(input_.origin, input_.unit, std::max({g[0], g[1], g[2]}), 0, input_.resolution);
+    }
+    Result<void> places(const Places& take) override {
+        Progress silent(false);
+        STIPPLE_ASSIGN(rounding_,
+                       input_.read(
+                           executor_, workers_, silent, "count", {},
+                           [&](int, const Points& block) { return take(block.coordinates(), input_.points); }, &far_));
+        if (!far_.empty()) input_.concludeOutliers(std::exchange(far_, {}), found_);
+        ByteWriter to;
+        input_.save(to);
+        surveyed_ = to.bytes();
+        return {};
+    }
+    Result<void> check(const std::vector<Subtree>& subtrees) const override {
+        if (subtrees.empty()) return fail(ErrorKind::input, "holds no points", source());
+        for (const Subtree& a : subtrees)
+            if (a.count > 4 * kSubtreePoints)
+                return fail(ErrorKind::budget, fmt::format("{} points lie nearly at one place", a.count), source(),
+                            "build it without --patches");
+        return {};
+    }
+    uint64_t temporaryBytes(int) const override { return input_.points * kSpillBytes; }
+
+    /// Each point to the subtree that holds it, and to those that it lies near.
+    Result<void> send(CellSender& to) override {
+        cell_.hasNormals = input_.hasNormal;
+        const Frame on = frame();
+        const SubtreeMargins margins(on, to.subtrees(), kPatchMargin);
+        Progress silent(false);
+        const auto flush = []() { return Result<void>(); };  // nothing waits
+        PointInput::Range range{0, 0, 0};
+        while (range.end < input_.parts()) {
+            range = input_.nextRange(range, kAtOnce);
+            const uint64_t after = input_.nextRange(range, 0).before;
+            if (to.begins()) {
+                STIPPLE_TRY(to.ends(after - range.before, input_.points, flush));
+                continue;
+            }
+            std::vector<std::vector<Sent>> sent(static_cast<size_t>(workers_));
+            STIPPLE_TRY(input_.read(executor_, workers_, silent, "distribute", range,
+                                    [&](int worker, const Points& block) -> Result<void> {
+                                        share(block, on, margins, to, sent[static_cast<size_t>(worker)]);
+                                        return {};
+                                    }));
+            STIPPLE_TRY(appendAll(sent, to));
+            STIPPLE_TRY(to.ends(after - range.before, input_.points, flush));
+        }
+        return {};
+    }
+    Result<std::vector<uint8_t>> gathered(const std::vector<uint8_t>& input, const Subtree&, uint64_t&) const override {
+        return input;
+    }
+    Result<void> complete(const CellInputs& inputs) override {
+        if (isBroken_)
+            return fail(ErrorKind::input, "what an interrupted build left is damaged", source(),
+                        "begin anew with --restart");
+        subtrees_ = inputs.subtrees();
+        cell_.hasNormals = input_.hasNormal;
+        return {};
+    }
+    void save(ByteWriter& to) const override {
+        to.put(rounding_);
+        to.put(surveyed_);
+    }
+    void load(ByteReader& from) override {
+        from.get(rounding_);
+        from.get(surveyed_);
+        ByteReader input(surveyed_);
+        found_.pointsIn = 0;  // (what was found is found again)
+        found_.dropped.clear();
+        found_.notes = foundAtOpening_;
+        isBroken_ = !input_.load(input, found_);
+    }
+
+    // ---- the work ----
+
+    Result<CellProduct> make(const WorkCell& cell, const std::vector<uint8_t>& input,
+                             const std::vector<FromBelow>& below) const override {
+        return buildScanCell(cell, input, below, frame(), subtrees_, cell_, executor_);
+    }
+
+    uint64_t take(uint64_t at, const std::vector<uint8_t>& bytes) override {
+        PatchTable table;
+        ByteReader from(bytes);
+        STIPPLE_CHECK(table.get(from), "the table of a cell");
+        for (NodeBatch::Written& w : table.batch.nodes) w.node.chunkOffset += at;
+        for (PatchTable::Points& p : table.points) p.offset += at;
+        if (table.elements > 0) {
+            lo_ = glm::min(lo_, table.lo);
+            hi_ = glm::max(hi_, table.hi);
+        }
+        kept_ += table.elements;
+        duplicate_ += table.duplicate;
+        left_ += table.left;
+        samples_ += table.samples;
+        residual_ = std::max(residual_, table.residual);
+        beside_ = std::max(beside_, table.beside);
+        tables_.push_back(std::move(table));
+        return tables_.size();
+    }
+
+    // ---- the end ----
+
+    Result<Hierarchy> describe(StoreWriter&, StoreDescription& description, BuildReport& report) override {
+        Hierarchy h = hierarchyOf(frame(), std::move(tables_));
+        tables_.clear();
+        report.pointsIn = found_.pointsIn;
+        report.dropped = found_.dropped;
+        report.notes.insert(report.notes.end(), found_.notes.begin(), found_.notes.end());
+        report.skippedFiles = found_.skippedFiles;
+        if (duplicate_ > 0) report.dropped["at the place of another"] = duplicate_;
+        report.pointsOut = kept_;
+        const double world = input_.unit;
+        report.notes.push_back(
+            fmt::format("{} points became {} samples in patches, at most {:.3g} units from them; no "
+                        "place of a patch is farther than {:.3g} from a point",
+                        kept_ - left_, samples_, residual_ * world, beside_ * world));
+        if (left_ > 0) report.notes.push_back(fmt::format("{} points fit no patch and stay points", left_));
+        description = describeInput(input_, settings_.points);
+        for (uint32_t n = 0; n < h.nodes.size(); ++n)
+            if (h.nodes[n].isLeaf())
+                h.forEachPayload(n, [&](uint32_t chunk) { description.points += h.payload(chunk).records; });
+        description.pointsIn = report.pointsIn;
+        description.dropped = report.dropped;
+        description.roundingUnits = rounding_ + residual_ * world;
+        description.hasNormals = true;
+        if (!description.hasColour) description.hasColour = description.isReflectance = true;  // all are plain
+        const Bounds near = input_.withoutOutliers();
+        description.boundsMin = input_.origin + world * glm::dvec3(lo_);
+        description.boundsMax = input_.origin + world * glm::dvec3(hi_);
+        description.focusMin = input_.origin + world * glm::max(glm::dvec3(lo_), near.least);
+        description.focusMax = input_.origin + world * glm::min(glm::dvec3(hi_), near.greatest);
+        description.pointMaterials = {};
+        return h;
+    }
+
+  private:
+    static constexpr uint64_t kSpillBytes = 28;  ///< of a point, between the steps, with its copies
+    static constexpr uint64_t kTableBytes = 1;   ///< of a point, of the node table, which stays in memory
+    static constexpr uint64_t kReaderBytes = uint64_t{12} << 20;
+
+    struct Sent {
+        uint32_t subtree;
+        ScanPoint point;
+    };
+    void share(const Points& block, const Frame& on, const SubtreeMargins& margins, const CellSender& to,
+               std::vector<Sent>& out) const {
+        for (size_t i = 0; i < block.size(); ++i) {
+            const ScanPoint p{block.x[i], block.y[i], block.z[i], block.colour[i],
+                              block.normal.empty() ? 0 : block.normal[i]};
+            const uint32_t own = to.subtreeOf(on.keyOf(p.x, p.y, p.z));
+            out.push_back({own, p});
+            margins.forEachNear(own, glm::dvec3(p.x, p.y, p.z), [&](uint32_t near) { out.push_back({near, p}); });
+        }
+    }
+    static Result<void> appendAll(const std::vector<std::vector<Sent>>& sent, CellSender& to) {
+        std::vector<uint64_t> first(to.subtrees().size() + 1, 0);
+        for (const auto& some : sent)
+            for (const Sent& s : some) ++first[s.subtree + 1];
+        for (size_t a = 1; a < first.size(); ++a) first[a] += first[a - 1];
+        std::vector<ScanPoint> points(first.back());
+        std::vector<uint64_t> next(first.begin(), first.end() - 1);
+        for (const auto& some : sent)
+            for (const Sent& s : some) points[next[s.subtree]++] = s.point;
+        std::vector<uint8_t> bytes;
+        for (size_t a = 0; a + 1 < first.size(); ++a) {
+            const uint64_t count = first[a + 1] - first[a];
+            if (count == 0) continue;
+            bytes.resize(count * sizeof(ScanPoint));
+            std::memcpy(bytes.data(), points.data() + first[a], bytes.size());
+            STIPPLE_TRY(to.append(a, bytes, count));
+        }
+        return {};
+    }
+
+    PointInput input_;
+    BuildReport found_;  ///< of the input
+    const ScanBuildSettings& settings_;
+    Executor& executor_;
+    int workers_ = 1;
+    std::vector<std::string> foundAtOpening_ = found_.notes;
+    ScanCellSettings cell_;
+    std::vector<FarCubes> far_;
+    std::vector<uint8_t> surveyed_;
+    double rounding_ = 0;
+    bool isBroken_ = false;
+    std::vector<Subtree> subtrees_;
+    std::vector<PatchTable> tables_;
+    uint64_t kept_ = 0, duplicate_ = 0, left_ = 0, samples_ = 0;
+    double residual_ = 0, beside_ = 0;
+    Steps lo_{std::numeric_limits<int64_t>::max()}, hi_{std::numeric_limits<int64_t>::min()};
+};
+
+}  // namespace
+
+Result<BuildReport> buildScanStore(const std::vector<std::string>& inputs, const std::string& output,
+                                   const ScanBuildSettings& settings, Executor& executor, Progress& progress) {
+    BuildReport found;
+    STIPPLE_ASSIGN(PointInput input, PointInput::open(inputs, settings.points, found));
+    ScanBuild content(std::move(input), std::move(found), settings, executor);
+    return buildCells(content, output, settings.points, executor, progress);
+}
+
+}  // namespace stipple::lod
