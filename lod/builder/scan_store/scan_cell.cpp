@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "engine/base/numbers.h"
-#include "lod/builder/patch_store/patch_cell.h"
 #include "lod/builder/scan_store/scan_levels.h"
 #include "lod/builder/scan_store/scan_points.h"
 #include "lod/store/patch_bytes.h"
@@ -13,12 +12,12 @@
 namespace stipple::lod {
 namespace {
 
-constexpr double kFinest = 0.25;    ///< steps of leaves, in those of their level
-constexpr double kUnited = 0.5;     ///< cells of discs of inner nodes, in steps
-constexpr double kReach = 3;        ///< of points beside a node, in spacings of its own
-constexpr double kMostReach = 6;    ///< steps of its level
-constexpr double kDisc = 0.75;      ///< radius of a point that stays one, in spacings
-constexpr double kLargestDisc = 1;  ///< steps of its level
+constexpr double kFinest = 0.25;      ///< steps of leaves, in those of their level
+constexpr double kUnited = 0.5;       ///< cells of discs of inner nodes, in steps
+constexpr double kReach = 3;          ///< of points beside a node, in spacings of its own
+constexpr double kMostReach = 6;      ///< steps of its level
+constexpr double kDisc = 0.75;        ///< radius of a point that stays one, in spacings
+constexpr double kLargestDisc = 0.5;  ///< steps of its level
 
 struct ScanNode : PatchNode {
     size_t begin = 0, end = 0;   ///< of its points, in order
@@ -163,7 +162,7 @@ class ScanCell {
                 ScanNode& n = nodes_[here[k]];
                 made[k] = n.node.isLeaf() ? leaf(n) : inner(n);
                 if (level > 0)
-                    n.up = samplesFor(made[k].patches, cornerOf(frame_, n.node), patchStep(frame_, level - 1));
+                    n.up = samplesFor(made[k].patches, cornerOf(frame_, n.node), scanStep(frame_, level - 1));
                 if (!settings_.hasNormals) n.up.normal.clear();
             }
         });
@@ -188,7 +187,7 @@ class ScanCell {
         return out;
     }
     double reachOf(const Node& n, std::vector<float> spacings) const {
-        const double step = patchStep(frame_, n.level);
+        const double step = scanStep(frame_, n.level);
         if (spacings.empty()) return kPatchReach * step;
         const auto middle = spacings.begin() + static_cast<ptrdiff_t>(spacings.size() / 2);
         std::nth_element(spacings.begin(), middle, spacings.end());
@@ -200,7 +199,7 @@ class ScanCell {
         std::vector<float> spacings;
         for (size_t k = n.begin; k < n.end; ++k)
             if (const uint32_t i = order_[k].second; s_.isSurface[i] != 0) spacings.push_back(s_.spacing[i]);
-        const double step = patchStep(frame_, n.node.level);
+        const double step = scanStep(frame_, n.node.level);
         const ScanSettings how{settings_.coneDegrees, kFinest * step, settings_.samplesAPoint};
         out.patches = patchesOfScan(s_, liesOf(s_, n.node, reachOf(n.node, std::move(spacings))),
                                     cornerOf(frame_, n.node), how, executor_);
@@ -214,7 +213,7 @@ class ScanCell {
 
     MadeNode inner(const ScanNode& n) const {
         MadeNode out;
-        const double step = patchStep(frame_, n.node.level);
+        const double step = scanStep(frame_, n.node.level);
         PointBlock points;
         std::vector<ChildPatches> children;
         double error = 0;
@@ -241,7 +240,7 @@ class ScanCell {
 
     /// What lies around an inner node, about as dense as the samples in it.
     void addAround(const Node& n, PointBlock& points) const {
-        const double edge = frame_.cellSize(n.level), step = patchStep(frame_, n.level), reach = kPatchAround * step;
+        const double edge = frame_.cellSize(n.level), step = scanStep(frame_, n.level), reach = kPatchAround * step;
         const glm::dvec3 lo = cornerOf(frame_, n);
         const auto isAround = [&](const glm::dvec3& at) {
             const glm::dvec3 p = at - lo;
@@ -337,7 +336,7 @@ class ScanCell {
         const auto isCarried = [&](const glm::dvec3& p) {
             return isNear(p, lo, edge) && levelOfOwner(keyOfPlace(frame_, p)) < own.node.level;
         };
-        putBlock(thinned(pointsWhere(isCarried), patchStep(frame_, own.node.level - 1u)), to);
+        putBlock(thinned(pointsWhere(isCarried), scanStep(frame_, own.node.level - 1u)), to);
         return to.bytes();
     }
 
@@ -353,7 +352,7 @@ class ScanCell {
         return to.bytes();
     }
     static bool isNear(const glm::dvec3& p, const glm::dvec3& lo, double edge) {
-        const glm::dvec3 reach(kPatchMargin * edge);
+        const glm::dvec3 reach(kScanMargin * edge);
         return glm::all(glm::lessThanEqual(lo - reach, p)) && glm::all(glm::lessThanEqual(p, lo + edge + reach));
     }
 

@@ -7,8 +7,14 @@
 
 namespace stipple::lod {
 
+/// Cells of the grid along an edge of a node's cell.
+constexpr uint32_t kScanCells = 128;
+inline double scanStep(const Frame& frame, uint32_t level) { return frame.cellSize(level) / kScanCells; }
+/// How far around a cell points are needed, in parts of its edge.
+constexpr double kScanMargin = kPatchAround / kScanCells;
+
 struct ScanCellSettings {
-    uint32_t leafPoints = 8192;
+    uint32_t leafPoints = 16'384;
     double coneDegrees = 50;
     double samplesAPoint = 1;  ///< of the leaves
     bool hasNormals = false;   ///< the source has, of all points

@@ -10,22 +10,21 @@ namespace {
 
 constexpr double kUnimportant = 0.1;  ///< steps: below that nobody looks closer
 
-/// Calls use(i, j, triangle) for both triangles of the drawn cells whose middles lie in a cube.
+/// Calls use(i, j, sample, triangle) for those triangles of the drawn cells whose middles lie in a cube.
 template <typename Use>
 void forTriangles(const Patch& p, const glm::dvec3& corner, const glm::dvec3& lo, double edge, const Use& use) {
     const PatchSurface surface(p);
+    const double slack = 1e-9 * edge;  // sums in another order round otherwise
     for (uint32_t j = 0; j + 1 < p.height; ++j)
         for (uint32_t i = 0; i + 1 < p.width; ++i) {
             if (!p.hasCell(i, j)) continue;
-            const size_t at = p.at(i, j);
-            const glm::dvec3 middle = corner + 0.5 * (surface.position(at + 1) + surface.position(at + p.width)) - lo;
-            if (glm::any(glm::lessThan(middle, glm::dvec3(0))) ||
-                glm::any(glm::greaterThanEqual(middle, glm::dvec3(edge))))
-                continue;
             surface.trianglesOf(i, j, [&](size_t a, size_t b, size_t c) {
-                use(i, j, a,
-                    PatchGround::Triangle{corner + surface.position(a), corner + surface.position(b),
-                                          corner + surface.position(c)});
+                const PatchGround::Triangle t{corner + surface.position(a), corner + surface.position(b),
+                                              corner + surface.position(c)};
+                const glm::dvec3 middle = (t[0] + t[1] + t[2]) / 3.0 - lo;
+                if (glm::all(glm::greaterThanEqual(middle, glm::dvec3(-slack))) &&
+                    glm::all(glm::lessThanEqual(middle, glm::dvec3(edge + slack))))
+                    use(i, j, a, t);
             });
         }
 }

@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -12,7 +14,6 @@
 #include "engine/base/check.h"
 #include "lod/builder/build_version.h"
 #include "lod/builder/octree/cell_build.h"
-#include "lod/builder/patch_store/patch_cell.h"
 #include "lod/builder/patch_store/subtree_margins.h"
 #include "lod/builder/points/describe_input.h"
 #include "lod/builder/scan_store/scan_cell.h"
@@ -23,6 +24,8 @@ namespace {
 
 constexpr uint64_t kCellBytes = uint64_t{128} << 20;  ///< that one cell of the work needs at most
 constexpr uint32_t kFewestOfLeaf = 64;                ///< points, however many samples are wanted
+constexpr double kCoarsest = 1.0 / 16;                ///< steps of the build, in the spacing of dense points
+constexpr uint32_t kRecordsABlock = 100;              ///< samples of a block of patches, about
 constexpr uint64_t kAtOnce = uint64_t{1} << 20;       ///< points between two steps of the distribution
 
 class ScanBuild : public CellContent {
@@ -58,7 +61,7 @@ class ScanBuild : public CellContent {
     std::string settingsAsText() const override {
         const BuildSettings& p = settings_.points;
         return fmt::format("scan patches|{}|{}|{}|{}|{}|{}|{}|{}", kBuildVersion, settings_.coneDegrees,
-                           settings_.samples, settings_.leafPoints, kPatchCells, p.up ? static_cast<int>(*p.up) : -1,
+                           settings_.samples, settings_.leafPoints, kScanCells, p.up ? static_cast<int>(*p.up) : -1,
                            p.skipBad, p.dropOutliers);
     }
 
@@ -68,7 +71,9 @@ class ScanBuild : public CellContent {
         if (isKnown) return {};
         STIPPLE_TRY(input_.survey(found_, executor_, progress));
         STIPPLE_TRY(workspace.checkStopped());
-        if (std::max({input_.greatest[0], input_.greatest[1], input_.greatest[2]}) >> 32 != 0)
+        // Of steps that are so fine that 32 bits are too few, the last bits say nothing, or some points lie far out.
+        const double coarse = std::exp2(coarser());
+        if (coarser() > 0 && (!(input_.resolution > 0) || coarse > kCoarsest * input_.resolution))
             return fail(ErrorKind::input, "some of its points lie too far from all others for patches", source(),
                         "leave them out (--drop-outliers), or build it without --patches");
         input_.sample = {};
@@ -77,14 +82,23 @@ class ScanBuild : public CellContent {
     }
     Frame frame() const override {
         const auto& g = input_.greatest;
-        return makeFrame(input_.origin, input_.unit, std::max({g[0], g[1], g[2]}), 0, input_.resolution);
+        const int k = coarser();
+        return makeFrame(input_.origin, unit(), std::max({g[0], g[1], g[2]}) >> k, 0,
+                         std::ldexp(input_.resolution, -k));
     }
     Result<void> places(const Places& take) override {
         Progress silent(false);
-        STIPPLE_ASSIGN(rounding_,
-                       input_.read(
-                           executor_, workers_, silent, "count", {},
-                           [&](int, const Points& block) { return take(block.coordinates(), input_.points); }, &far_));
+        STIPPLE_ASSIGN(rounding_, input_.read(
+                                      executor_, workers_, silent, "count", {},
+                                      [&](int, const Points& block) {
+                                          if (coarser() == 0) return take(block.coordinates(), input_.points);
+                                          std::array<std::vector<uint32_t>, 3> at;
+                                          for (size_t i = 0; i < block.size(); ++i)
+                                              for (size_t a = 0; a < 3; ++a)
+                                                  at.at(a).push_back(placeAt(block, i).at(a));
+                                          return take({at[0], at[1], at[2]}, input_.points);
+                                      },
+                                      &far_));
         if (!far_.empty()) input_.concludeOutliers(std::exchange(far_, {}), found_);
         ByteWriter to;
         input_.save(to);
@@ -105,7 +119,7 @@ class ScanBuild : public CellContent {
     Result<void> send(CellSender& to) override {
         cell_.hasNormals = input_.hasNormal;
         const Frame on = frame();
-        const SubtreeMargins margins(on, to.subtrees(), kPatchMargin);
+        const SubtreeMargins margins(on, to.subtrees(), kScanMargin);
         Progress silent(false);
         const auto flush = []() { return Result<void>(); };  // nothing waits
         PointInput::Range range{0, 0, 0};
@@ -190,7 +204,7 @@ class ScanBuild : public CellContent {
         report.skippedFiles = found_.skippedFiles;
         if (duplicate_ > 0) report.dropped["at the place of another"] = duplicate_;
         report.pointsOut = kept_;
-        const double world = input_.unit;
+        const double world = unit();
         report.notes.push_back(
             fmt::format("{} points became {} samples in patches, at most {:.3g} units from them; no "
                         "place of a patch is farther than {:.3g} from a point",
@@ -202,14 +216,14 @@ class ScanBuild : public CellContent {
                 h.forEachPayload(n, [&](uint32_t chunk) { description.points += h.payload(chunk).records; });
         description.pointsIn = report.pointsIn;
         description.dropped = report.dropped;
-        description.roundingUnits = rounding_ + residual_ * world;
+        // (A corner of a step stands for all of it.)
+        const double coarse = coarser() > 0 ? std::sqrt(3.0) * world : 0;
+        description.roundingUnits = rounding_ + residual_ * world + coarse;
         description.hasNormals = true;
         if (!description.hasColour) description.hasColour = description.isReflectance = true;  // all are plain
-        const Bounds near = input_.withoutOutliers();
         description.boundsMin = input_.origin + world * glm::dvec3(lo_);
         description.boundsMax = input_.origin + world * glm::dvec3(hi_);
-        description.focusMin = input_.origin + world * glm::max(glm::dvec3(lo_), near.least);
-        description.focusMax = input_.origin + world * glm::min(glm::dvec3(hi_), near.greatest);
+        setFocus(h, description);
         description.pointMaterials = {};
         return h;
     }
@@ -219,6 +233,47 @@ class ScanBuild : public CellContent {
     static constexpr uint64_t kTableBytes = 1;   ///< of a point, of the node table, which stays in memory
     static constexpr uint64_t kReaderBytes = uint64_t{12} << 20;
 
+    /// Bits by which the steps of the build are coarser than those of the input.
+    int coarser() const {
+        const auto bits = std::bit_width(std::max({input_.greatest[0], input_.greatest[1], input_.greatest[2]}));
+        return std::max(static_cast<int>(bits) - 32, 0);
+    }
+    double unit() const { return std::ldexp(input_.unit, coarser()); }
+    std::array<uint32_t, 3> placeAt(const Points& block, size_t i) const {
+        const Place p = block.place(i);
+        const auto k = static_cast<uint32_t>(coarser());
+        return {static_cast<uint32_t>(p[0] >> k), static_cast<uint32_t>(p[1] >> k), static_cast<uint32_t>(p[2] >> k)};
+    }
+
+    /// One record in 200 lies beyond each edge; what a tenth of the extent more does not reach is stray.
+    void setFocus(const Hierarchy& h, StoreDescription& description) const {
+        for (int a = 0; a < 3; ++a) {
+            std::vector<std::pair<double, uint64_t>> along;  // place, records
+            uint64_t all = 0, sum = 0;
+            for (uint32_t n = 0; n < h.nodes.size(); ++n) {
+                if (!h.nodes[n].isLeaf()) continue;
+                uint64_t records = 0;
+                h.forEachPayload(n, [&](uint32_t chunk) {
+                    const Payload& p = h.payload(chunk);
+                    records += p.kind == Kind::patches ? uint64_t{kRecordsABlock} * p.records : p.records;
+                });
+                for (const double side : {-1.0, 0.0, 1.0})
+                    along.emplace_back(h.nodes[n].centre[a] + side * 0.8 * h.nodes[n].radius, records);
+                all += 3 * records;
+            }
+            std::sort(along.begin(), along.end());
+            double low = 1e300, high = -1e300;
+            for (const auto& [at, records] : along) {
+                if (sum + records > all / 200) low = std::min(low, at);
+                if (sum < all - all / 200) high = std::max(high, at);
+                sum += records;
+            }
+            const double margin = 0.1 * (high - low), first = description.boundsMin[a], last = description.boundsMax[a];
+            description.focusMin[a] = std::clamp(h.origin[a] + h.unit * (low - margin), first, last);
+            description.focusMax[a] = std::clamp(h.origin[a] + h.unit * (high + margin), first, last);
+        }
+    }
+
     struct Sent {
         uint32_t subtree;
         ScanPoint point;
@@ -226,8 +281,8 @@ class ScanBuild : public CellContent {
     void share(const Points& block, const Frame& on, const SubtreeMargins& margins, const CellSender& to,
                std::vector<Sent>& out) const {
         for (size_t i = 0; i < block.size(); ++i) {
-            const ScanPoint p{block.x[i], block.y[i], block.z[i], block.colour[i],
-                              block.normal.empty() ? 0 : block.normal[i]};
+            const auto at = placeAt(block, i);
+            const ScanPoint p{at[0], at[1], at[2], block.colour[i], block.normal.empty() ? 0 : block.normal[i]};
             const uint32_t own = to.subtreeOf(on.keyOf(p.x, p.y, p.z));
             out.push_back({own, p});
             margins.forEachNear(own, glm::dvec3(p.x, p.y, p.z), [&](uint32_t near) { out.push_back({near, p}); });

@@ -9,10 +9,10 @@
 namespace stipple::lod {
 
 struct ScanBuildSettings {
-    BuildSettings points;        ///< how the input is read; its limits are those of the build
-    double coneDegrees = 50;     ///< half the cone of a patch's normals
-    uint64_t samples = 0;        ///< of the finest level, about; 0: as many as there are points
-    uint32_t leafPoints = 8192;  ///< that a leaf has at most, where there are as many samples as points
+    BuildSettings points;          ///< how the input is read; its limits are those of the build
+    double coneDegrees = 50;       ///< half the cone of a patch's normals
+    uint64_t samples = 0;          ///< of the finest level, about; 0: as many as there are points
+    uint32_t leafPoints = 16'384;  ///< that a leaf has at most, where there are as many samples as points
 };
 
 /// Writes `output` (whole or not at all). Points that no patch stands for stay points beside the patches, with a disc
