@@ -104,7 +104,18 @@ Result<NodeSurface> NodeSurface::read(const Store& store, uint32_t node) {
                      edge * static_cast<double>(shared::radiusFraction(shared::recordRadiusCode(r)))});
         }
     }
+    std::sort(out.discs_.begin(), out.discs_.end(), [](const Disc& a, const Disc& b) { return a.place.x < b.place.x; });
+    for (const Disc& d : out.discs_) out.largestDisc_ = std::max(out.largestDisc_, d.radius);
     return out;
+}
+
+std::span<const NodeSurface::Disc> NodeSurface::discsNear(double x, double distance) const {
+    const double reach = (distance + largestDisc_) * (1 + 1e-9);
+    const auto first = std::lower_bound(discs_.begin(), discs_.end(), x - reach,
+                                        [](const Disc& d, double at) { return d.place.x < at; });
+    const auto last =
+        std::upper_bound(first, discs_.end(), x + reach, [](double at, const Disc& d) { return at < d.place.x; });
+    return {first, last};
 }
 
 bool NodeSurface::isWithin(const glm::dvec3& p, double distance) const {
@@ -112,14 +123,15 @@ bool NodeSurface::isWithin(const glm::dvec3& p, double distance) const {
     const double limit = distance * (1 + 1e-12) + 1e-300;
     for (const Patch& patch : patches_)
         if (distanceTo(patch, p - corner_, limit, distance) <= distance) return true;
-    for (const Disc& d : discs_)
+    for (const Disc& d : discsNear(p.x, distance))
         if (glm::distance(p, d.place) <= distance + d.radius) return true;
     return false;
 }
 
 double NodeSurface::distance(const glm::dvec3& p, double limit) const {
     for (const Patch& patch : patches_) limit = distanceTo(patch, p - corner_, limit, 0);
-    for (const Disc& d : discs_) limit = std::min(limit, std::max(0.0, glm::distance(p, d.place) - d.radius));
+    for (const Disc& d : discsNear(p.x, limit))
+        limit = std::min(limit, std::max(0.0, glm::distance(p, d.place) - d.radius));
     return limit;
 }
 

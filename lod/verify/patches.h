@@ -1,6 +1,7 @@
 // The errors of patches, measured again from what the file holds.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "lod/primitives/patch.h"
@@ -44,9 +45,13 @@ class NodeSurface {
         glm::dvec3 place;
         double radius;
     };
+    /// Those that may be that near to a place, by its x alone.
+    std::span<const Disc> discsNear(double x, double distance) const;
+
     glm::dvec3 corner_{0};
     std::vector<Patch> patches_;
-    std::vector<Disc> discs_;
+    std::vector<Disc> discs_;  ///< by x
+    double largestDisc_ = 0;   ///< radius
 };
 
 /// Measures an inner node all of whose children are leaves against the leaves around it, both ways, at about `most`

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
+#include <span>
 
 namespace stipple::lod {
 namespace {
 
-LeftDisc united(const std::vector<LeftDisc>& discs) {
+LeftDisc united(std::span<const LeftDisc> discs) {
     LeftDisc one;
     glm::dvec3 place(0), normal(0), colour(0);
     double weight = 0;
@@ -30,20 +30,44 @@ LeftDisc united(const std::vector<LeftDisc>& discs) {
     return one;
 }
 
+struct InCell {
+    std::array<int64_t, 3> cell;
+    uint32_t disc;
+};
+/// By cells, in each in their order.
+std::vector<InCell> byCell(const std::vector<LeftDisc>& discs, double edge) {
+    std::vector<InCell> out;
+    out.reserve(discs.size());
+    for (uint32_t k = 0; k < discs.size(); ++k) {
+        const glm::dvec3 c = glm::floor(discs[k].place / edge);
+        out.push_back({{static_cast<int64_t>(c.z), static_cast<int64_t>(c.y), static_cast<int64_t>(c.x)}, k});
+    }
+    std::sort(out.begin(), out.end(),
+              [](const InCell& a, const InCell& b) { return a.cell != b.cell ? a.cell < b.cell : a.disc < b.disc; });
+    return out;
+}
+size_t countCells(const std::vector<InCell>& order) {
+    size_t cells = 0;
+    for (size_t k = 0; k < order.size(); ++k) cells += k == 0 || order[k].cell != order[k - 1].cell ? 1 : 0;
+    return cells;
+}
+
 }  // namespace
 
-double uniteDiscs(std::vector<LeftDisc>& discs, double edge) {
-    std::map<std::array<int64_t, 3>, std::vector<LeftDisc>> cells;
-    for (const LeftDisc& d : discs) {
-        const glm::dvec3 c = glm::floor(d.place / edge);
-        cells[{static_cast<int64_t>(c.z), static_cast<int64_t>(c.y), static_cast<int64_t>(c.x)}].push_back(d);
-    }
-    discs.clear();
+double uniteDiscs(std::vector<LeftDisc>& discs, double edge, size_t most) {
+    constexpr double kCoarser = 1.25;
+    std::vector<InCell> order = byCell(discs, edge);
+    while (discs.size() > most && countCells(order) > most) order = byCell(discs, edge *= kCoarser);
+    std::vector<LeftDisc> out, in;
     double largest = 0;
-    for (const auto& [key, in] : cells) {
-        discs.push_back(united(in));
-        largest = std::max(largest, double{discs.back().radius});
+    for (size_t first = 0, end = 0; first < order.size(); first = end) {
+        in.clear();
+        for (end = first; end < order.size() && order[end].cell == order[first].cell; ++end)
+            in.push_back(discs[order[end].disc]);
+        out.push_back(united(in));
+        largest = std::max(largest, double{out.back().radius});
     }
+    discs = std::move(out);
     return largest;
 }
 

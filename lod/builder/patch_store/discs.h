@@ -15,8 +15,8 @@ struct LeftDisc {
     uint32_t colour = 0;
 };
 
-/// One disc about the mean of those in a cubic cell of that edge, that reaches around all of them; in the order of the
-/// cells. Returns the largest radius.
-double uniteDiscs(std::vector<LeftDisc>& discs, double edge);
+/// One disc about the mean of those in a cubic cell of that edge, or of larger ones where that leaves more than `most`;
+/// each reaches around all that it stands for. In the order of the cells. Returns the largest radius.
+double uniteDiscs(std::vector<LeftDisc>& discs, double edge, size_t most = ~size_t{0});
 
 }  // namespace stipple::lod

@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kFinest = 0.25;      ///< steps of leaves, in those of their level
 constexpr double kUnited = 0.5;       ///< cells of discs of inner nodes, in steps
+constexpr size_t kManyDiscs = 8192;   ///< of a node: of more, each level has a fourth
 constexpr double kReach = 3;          ///< of points beside a node, in spacings of its own
 constexpr double kMostReach = 6;      ///< steps of its level
 constexpr double kDisc = 0.75;        ///< radius of a point that stays one, in spacings
@@ -230,7 +231,8 @@ class ScanCell {
         out.patches = patchesOfScan(surface, liesOf(surface, n.node, kPatchReach * step), corner, how, executor_);
         const LevelSettings level{corner, frame_.cellSize(n.node.level), step};
         out.error = agreeWithChildren(children, level, out.patches, out.left);
-        out.error = error + std::max(out.error, uniteDiscs(out.left, kUnited * step));
+        const size_t most = std::max(kManyDiscs, out.left.size() / 4);
+        out.error = error + std::max(out.error, uniteDiscs(out.left, kUnited * step, most));
         return out;
     }
     std::span<const ScanNode> childrenOf(const ScanNode& n) const {
