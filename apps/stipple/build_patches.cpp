@@ -10,6 +10,7 @@
 #include "engine/scene/triangles.h"
 #include "lod/builder/patch_store/patch_store_build.h"
 #include "lod/builder/scan_store/scan_store_build.h"
+#include "lod/import/import.h"
 #include "lod/import/ply/mesh.h"
 
 namespace stipple::app {
@@ -37,8 +38,7 @@ bool hasTextures(const scene::Scene& scene) {
 namespace {
 
 tl::unexpected<Error> noTriangles(const std::string& input) {
-    return fail(ErrorKind::input, "holds no triangles", input,
-                "patches of a store are made of triangles; convert --patches makes some of a scan that fits in memory");
+    return fail(ErrorKind::input, "holds no triangles", input, "patches are made of triangles or points");
 }
 
 Result<lod::PatchBuildSettings> settingsOf(const BuildOptions& build) {
@@ -130,17 +130,39 @@ Result<lod::TriangleMesh> readTriangles(const std::string& input, const scene::R
     return all;
 }
 
+bool hasTriangles(const std::string& input) {
+    if (isSceneFile(input)) return true;
+    const auto faces = lod::plyFaces(input);
+    return faces && faces->any();
+}
+
+Result<std::vector<glm::dvec3>> readPlaces(const std::string& input, const scene::ReadSettings& reading) {
+    std::vector<glm::dvec3> all;
+    STIPPLE_ASSIGN(const std::vector<std::string> files, lod::expandInputs({input}, nullptr));
+    for (const std::string& file : files) {
+        STIPPLE_ASSIGN(const lod::PointSource source, openInput(file, {}, 0, reading));
+        STIPPLE_TRY(lod::readPoints(source, [&](const lod::PointBlock& block) -> Result<void> {
+            all.insert(all.end(), block.position.begin(), block.position.end());
+            for (const glm::ivec3& p : block.lattice)
+                all.push_back(glm::dvec3(p) * source.info.scale + source.info.offset);
+            return {};
+        }));
+    }
+    return all;
+}
+
 void addPatchBuildOptions(CLI::App& app, PatchBuildOptions& o) {
-    app.add_flag("--patches", o.isAsked,
-                 "of meshes: elevation patches, heights over tilted planes, in a few bytes a sample; triangles that no "
-                 "patch fits become discs");
+    app.add_flag(
+        "--patches", o.isAsked,
+        "of meshes and scans: elevation patches, heights over tilted planes, in a few bytes a sample; triangles "
+        "that no patch fits become discs, points stay points");
     app.add_option("--cone", o.coneDegrees, "of patches: half the cone of a patch's normals, degrees")
         ->transform(within(5.0, 75.0))
         ->capture_default_str();
     app.add_flag("--overlap", o.overlap, "of patches: each reaches over its neighbours (the default)");
     app.add_flag("--fill-gaps", o.fillGaps)->group("");  // (said why not)
     app.add_option("--patch-samples", o.samples,
-                   "of patches: samples of the finest level, about (default: as many as vertices)")
+                   "of patches: samples of the finest level, about (default: as many as vertices or points)")
         ->transform(within<uint64_t>(1, 100'000'000'000))
         ->type_name("N");
 }

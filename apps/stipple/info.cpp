@@ -278,8 +278,14 @@ bool hasPatches(const lod::Store& store) {
 /// The finest patches against what they were made of.
 Result<void> measureAgainstSource(const lod::Store& store, const Options& o, Executor& executor, nlohmann::json& j) {
     constexpr uint64_t kPlaces = 200'000;
-    STIPPLE_ASSIGN(lod::TriangleMesh source, readTriangles(o.against, o.build.reading()));
-    STIPPLE_ASSIGN(const lod::AgainstSource r, lod::measureAgainst(store, std::move(source), kPlaces, executor));
+    STIPPLE_ASSIGN(const lod::AgainstSource r, [&]() -> Result<lod::AgainstSource> {
+        if (o.build.onlyPoints || !hasTriangles(o.against)) {
+            STIPPLE_ASSIGN(std::vector<glm::dvec3> points, readPlaces(o.against, o.build.reading()));
+            return lod::measureAgainst(store, std::move(points), kPlaces, executor);
+        }
+        STIPPLE_ASSIGN(lod::TriangleMesh source, readTriangles(o.against, o.build.reading()));
+        return lod::measureAgainst(store, std::move(source), kPlaces, executor);
+    }());
     if (r.far > 0)
         return fail(
             ErrorKind::input,
@@ -344,8 +350,9 @@ void setupInfo(CLI::App& app, int& status) {
         ->required();
     sub->add_flag("--verify", o->verify, "read everything and check it; a fault ends with 3");
     sub->add_option("--against", o->against,
-                    "with --verify, of a scene of patches: measure how far they are from this mesh, both ways")
+                    "with --verify, of a scene of patches: measure how far they are from this mesh or scan, both ways")
         ->type_name("SOURCE");
+    sub->add_flag("--only-points", o->build.onlyPoints, "with --against: the vertices of a PLY file with faces");
     sub->add_option("--at", o->at, "file coordinates: the input point of a built scene that is nearest to them")
         ->type_name("X,Y,Z");
     sub->add_flag("--skip-bad", o->skipBad, "go on past what is corrupt");

@@ -10,13 +10,20 @@
 
 #include "lod/builder/patch_store/patch_store_build.h"
 #include "lod/verify/patches.h"
+#include "tests/support/patch_cuts.h"
 #include "tests/support/patch_shapes.h"
 
 namespace stipple::lod {
 namespace {
 
 namespace fs = std::filesystem;
+using test::append;
+using test::cutOf;
+using test::escaping;
+using test::insideTorus;
 using test::Triangle;
+using test::trianglesOfAll;
+using test::wavyTorus;
 
 struct Built {
     BuildReport report;
@@ -48,85 +55,6 @@ Built build(const TriangleMesh& mesh, const std::string& path, const PatchBuildS
     EXPECT_TRUE(store);
     out.store = std::move(*store);
     out.bytes = test::slurp(path);
-    return out;
-}
-
-/// A torus with waves, so that no level is exact.
-TriangleMesh wavyTorus(uint32_t around, uint32_t across) {
-    TriangleMesh mesh = test::torusMesh(around, across);
-    for (glm::dvec3& p : mesh.position) p *= 1 + 0.01 * std::sin(23 * p.x) * std::sin(19 * p.y) * std::sin(17 * p.z);
-    return mesh;
-}
-
-std::vector<Triangle> trianglesOf(const Store& store, uint32_t node) {
-    const Hierarchy& h = store.hierarchy;
-    std::vector<Triangle> out;
-    h.forEachPayload(node, [&](uint32_t chunk) {
-        if (kindOf(h, chunk) != Kind::patches) return;
-        const auto patches = readPatches(store, chunk);
-        ASSERT_TRUE(patches);
-        const Node& n = h.nodes[node];
-        const glm::dvec3 corner = glm::dvec3(n.cell[0], n.cell[1], n.cell[2]) * h.cellSize(n);
-        for (const Patch& patch : *patches)
-            for (Triangle t : test::trianglesOf(patch, corner)) {
-                for (glm::dvec3& p : t) p = h.origin + h.unit * p;
-                out.push_back(t);
-            }
-    });
-    return out;
-}
-std::vector<std::vector<Triangle>> trianglesOfAll(const Store& store) {
-    std::vector<std::vector<Triangle>> out;
-    for (uint32_t n = 0; n < store.hierarchy.nodes.size(); ++n) out.push_back(trianglesOf(store, n));
-    return out;
-}
-void append(const std::vector<Triangle>& from, std::vector<Triangle>& to) {
-    to.insert(to.end(), from.begin(), from.end());
-}
-
-/// Nodes of a cut: refined where `isRefined` says so.
-template <typename IsRefined>
-std::vector<uint32_t> cutOf(const Hierarchy& h, const IsRefined& isRefined) {
-    std::vector<uint32_t> cut, stack{0};
-    while (!stack.empty()) {
-        const uint32_t n = stack.back();
-        stack.pop_back();
-        const Node& node = h.nodes[n];
-        if (node.isLeaf() || !isRefined(n)) {
-            cut.push_back(n);
-            continue;
-        }
-        for (int c = 0; c < __builtin_popcount(node.childMask); ++c)
-            stack.push_back(node.firstChild + static_cast<uint32_t>(c));
-    }
-    return cut;
-}
-
-bool meets(const Triangle& t, const glm::dvec3& from, const glm::dvec3& way) {
-    const glm::dvec3 e = t[1] - t[0], f = t[2] - t[0], p = glm::cross(way, f);
-    const double det = glm::dot(e, p);
-    if (det == 0) return false;
-    const glm::dvec3 s = from - t[0], q = glm::cross(s, e);
-    const double u = glm::dot(s, p) / det, v = glm::dot(way, q) / det;
-    return u >= 0 && v >= 0 && u + v <= 1 && glm::dot(f, q) / det > 0;
-}
-/// Of rays from inside, how many meet nothing.
-size_t escaping(const std::vector<Triangle>& all, const std::vector<glm::dvec3>& inside, size_t rays, Rng& rng) {
-    size_t out = 0;
-    for (size_t k = 0; k < rays; ++k) {
-        const glm::dvec3 from = inside[rng.below(inside.size())];
-        const glm::dvec3 way = glm::normalize(glm::dvec3(rng.normal(), rng.normal(), rng.normal()));
-        out += std::none_of(all.begin(), all.end(), [&](const Triangle& t) { return meets(t, from, way); }) ? 1u : 0u;
-    }
-    return out;
-}
-/// Along the middle of the torus' tube.
-std::vector<glm::dvec3> insideTorus() {
-    std::vector<glm::dvec3> out;
-    for (int k = 0; k < 64; ++k) {
-        const double a = 0.0981747704246810 * k;
-        out.emplace_back(std::cos(a), std::sin(a), 0);
-    }
     return out;
 }
 

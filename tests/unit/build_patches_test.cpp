@@ -31,29 +31,58 @@ std::vector<bool> covered(const TempFolder& folder, const std::string& file, con
     return out;
 }
 
+/// Pixels in the middle of where `source` is drawn that `patches` leave empty; `inside`: all of those in the middle.
+size_t holesIn(const std::vector<bool>& patches, const std::vector<bool>& source, size_t& inside) {
+    size_t holes = 0;
+    inside = 0;
+    for (size_t y = 8; y < kDown - 8; ++y)
+        for (size_t x = 8; x < kAcross - 8; ++x) {
+            bool isInside = true;
+            for (size_t j = y - 8; j <= y + 8; ++j)
+                for (size_t i = x - 8; i <= x + 8; ++i) isInside = isInside && source[j * kAcross + i];
+            inside += isInside ? 1 : 0;
+            holes += isInside && !patches[y * kAcross + x] ? 1 : 0;
+        }
+    return holes;
+}
+void expectClosed(const TempFolder& folder, const std::string& source, const std::string& store,
+                  const std::vector<std::string>& views) {
+    for (const std::string& view : views) {
+        const std::vector<bool> whole = covered(folder, source, "--error 0.1 " + view);
+        for (const std::string error : {"0.1", "1", "4"}) {
+            size_t inside = 0;
+            EXPECT_EQ(holesIn(covered(folder, store, "--error " + error + " " + view), whole, inside), 0u)
+                << view << " at " << error << " px";
+            EXPECT_GT(inside, 1000u);
+        }
+    }
+}
+
 TEST(BuildPatches, ClosedModelsStayClosed) {
     const TempFolder folder;
     test::writeObj(folder / "torus.obj", test::torusMesh(260, 100));
     const Outcome built = runProgram(folder, "build torus.obj --patches --patch-samples 200k -o t.stipple --json");
     ASSERT_EQ(built.code, 0) << built.err;
     EXPECT_GE(nlohmann::json::parse(built.out)["nodes"].get<uint64_t>(), 9u);
-    for (const std::string view : {"--eye 2,2,2 --target 0,0,0", "--eye 0,-3,0.6 --target 0,0,0"}) {
-        const std::vector<bool> source = covered(folder, "torus.obj", "--error 0.1 " + view);
-        for (const std::string error : {"0.1", "1", "4"}) {
-            const std::vector<bool> patches = covered(folder, "t.stipple", "--error " + error + " " + view);
-            size_t inside = 0, holes = 0;
-            for (size_t y = 8; y < kDown - 8; ++y)
-                for (size_t x = 8; x < kAcross - 8; ++x) {
-                    bool isInside = true;
-                    for (size_t j = y - 8; j <= y + 8; ++j)
-                        for (size_t i = x - 8; i <= x + 8; ++i) isInside = isInside && source[j * kAcross + i];
-                    inside += isInside ? 1 : 0;
-                    holes += isInside && !patches[y * kAcross + x] ? 1 : 0;
-                }
-            EXPECT_GT(inside, 1000u);
-            EXPECT_EQ(holes, 0u) << view << " at " << error << " px";
-        }
-    }
+    expectClosed(folder, "torus.obj", "t.stipple", {"--eye 2,2,2 --target 0,0,0", "--eye 0,-3,0.6 --target 0,0,0"});
+}
+
+TEST(BuildPatches, ClosedModelsAsPointsStayClosed) {
+    const std::string igea = test::dataFile("01_meshes/misc/igea.ply");
+    if (igea.empty()) GTEST_SKIP();
+    const TempFolder folder;
+    const Outcome built = runProgram(folder, "build " + igea + " --only-points --patches -o t.stipple --json");
+    ASSERT_EQ(built.code, 0) << built.err;
+    const auto j = nlohmann::json::parse(built.out);
+    EXPECT_EQ(j["points_in"].get<uint64_t>(), 134'345u);
+    EXPECT_GE(j["nodes"].get<uint64_t>(), 9u);
+    expectClosed(folder, igea, "t.stipple",
+                 {"--eye 0.1,0.07,0.12 --target 0,0,0", "--eye -0.14,0.03,0.09 --target 0,0,0"});
+    const Outcome right = runProgram(folder, "info t.stipple --verify --only-points --against " + igea + " --json");
+    ASSERT_EQ(right.code, 0) << right.err;
+    const auto against = nlohmann::json::parse(right.out)["against"];
+    EXPECT_LE(against["from_source"].get<double>(), against["stated"].get<double>());
+    EXPECT_GT(against["places_of_source"].get<uint64_t>(), 100'000u);
 }
 
 // Also where some discs stand beside the patches: a spike that no patch fits.
@@ -100,6 +129,29 @@ TEST(BuildPatches, AreVerifiedAgainstTheirSource) {
     EXPECT_EQ(runProgram(folder, "info t.stipple --against torus.obj").code, 2);
 }
 
+TEST(BuildPatches, OfScansAreVerifiedAgainstThem) {
+    const TempFolder folder;
+    ASSERT_EQ(runProgram(folder, "grow scan -o scan.ply --points 30k").code, 0);
+    ASSERT_EQ(runProgram(folder, "grow scan -o other.ply --points 3k --seed 9").code, 0);
+    const Outcome built = runProgram(folder, "build scan.ply --patches -o t.stipple --json");
+    ASSERT_EQ(built.code, 0) << built.err;
+    const Outcome fewer = runProgram(folder, "build scan.ply --patches --patch-samples 5k -o f.stipple --json");
+    ASSERT_EQ(fewer.code, 0) << fewer.err;
+    EXPECT_LT(nlohmann::json::parse(fewer.out)["bytes_out"].get<double>(),
+              0.8 * nlohmann::json::parse(built.out)["bytes_out"].get<double>());
+    EXPECT_NE(built.out.find("samples in patches"), std::string::npos) << built.out;
+    const Outcome right = runProgram(folder, "info t.stipple --verify --against scan.ply --json");
+    ASSERT_EQ(right.code, 0) << right.err;
+    const auto j = nlohmann::json::parse(right.out);
+    EXPECT_TRUE(j["errors_measured"].get<bool>());
+    EXPECT_LE(j["against"]["from_source"].get<double>(), j["against"]["stated"].get<double>());
+    EXPECT_GT(j["against"]["places_of_source"].get<uint64_t>(), 10'000u);
+    // The control.
+    const Outcome wrong = runProgram(folder, "info t.stipple --verify --against other.ply");
+    EXPECT_EQ(wrong.code, 3);
+    EXPECT_NE(wrong.err.find("farther from each other"), std::string::npos) << wrong.err;
+}
+
 TEST(BuildPatches, WhatIsOddIsRefused) {
     const TempFolder folder;
     test::writeObj(folder / "torus.obj", test::torusMesh(20, 9));
@@ -113,7 +165,8 @@ TEST(BuildPatches, WhatIsOddIsRefused) {
     refused("torus.obj --patches --cone 80", 2, "--cone");
     refused("torus.obj --patches --surfels 1000", 2, "--surfels");
     ASSERT_EQ(runProgram(folder, "grow scan -o scan.ply --points 1k").code, 0);
-    refused("scan.ply --patches", 3, "holds no triangles");
+    refused("scan.ply --patches --surfel-weights", 2, "--surfel-weights");
+    refused("scan.ply --patches --fill-gaps", 2, "overlap");
 }
 
 }  // namespace

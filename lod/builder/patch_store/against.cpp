@@ -3,14 +3,21 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <limits>
 
+#include "engine/base/numbers.h"
 #include "engine/base/process.h"
 #include "engine/base/queue.h"
+#include "lod/builder/morton.h"
 #include "lod/builder/patches/mesh_surface.h"
+#include "lod/builder/patches/near_points.h"
 #include "lod/verify/patches.h"
 
 namespace stipple::lod {
 namespace {
+
+constexpr double kMostSpacings = 6;  ///< that a place of a patch may be from the nearest point, beyond what is stated
 
 /// Places of the source, in lattice units: of each chosen triangle its middle, and one near a corner.
 std::vector<glm::dvec3> placesOf(const Hierarchy& h, const MeshSurface& s, uint64_t most) {
@@ -39,10 +46,21 @@ std::vector<uint32_t> leavesNear(const Hierarchy& h, const glm::dvec3& p, double
     return out;
 }
 
+/// From a place (world units) to the source; `hint`: what was near to the place before.
+struct Off {
+    double distance = 0, allowed = 0;  ///< allowed: beyond what is stated
+};
+using ToSource = std::function<Off(const glm::dvec3& p, size_t& hint)>;
+
 class Measuring {
   public:
-    Measuring(const Store& store, const MeshSurface& source, uint64_t places)
-        : store_(store), h_(store.hierarchy), s_(source), places_(placesOf(h_, source, places)), wanted_(places) {
+    /// `places`: of the source, lattice units.
+    Measuring(const Store& store, ToSource toSource, std::vector<glm::dvec3> places, uint64_t wanted)
+        : store_(store),
+          h_(store.hierarchy),
+          toSource_(std::move(toSource)),
+          places_(std::move(places)),
+          wanted_(wanted) {
         out_.stated = store.description.roundingUnits;
         stated_ = out_.stated / h_.unit * (1 + 1e-9);
         // What is farther is told as that far at least. (A store that states nothing has a reach all the same.)
@@ -93,10 +111,9 @@ class Measuring {
         uint64_t count = 0, far = 0;
         size_t hint = 0;
         surface.forPlaces(wanted_ / leaves_ + 1, [&](const glm::dvec3& p) {
-            const auto [distance, triangle] = s_.nearest(h_.origin + h_.unit * p - s_.middle, hint);
-            hint = triangle;
-            most = std::max(most, distance);
-            far += distance > out_.stated * (1 + 1e-9) ? 1 : 0;
+            const Off off = toSource_(h_.origin + h_.unit * p, hint);
+            most = std::max(most, off.distance);
+            far += off.distance > (out_.stated + off.allowed) * (1 + 1e-9) ? 1 : 0;
             ++count;
         });
         std::vector<double> found;
@@ -107,7 +124,7 @@ class Measuring {
 
     const Store& store_;
     const Hierarchy& h_;
-    const MeshSurface& s_;
+    ToSource toSource_;
     std::vector<glm::dvec3> places_;
     uint64_t wanted_, leaves_ = 0;
     double stated_ = 0, reach_ = 0;  ///< lattice units
@@ -125,15 +142,69 @@ class Measuring {
 
 }  // namespace
 
+namespace {
+
+Result<void> checkPatches(const Store& store) {
+    for (const Node& n : store.hierarchy.nodes)
+        if (n.kind == Kind::patches) return {};
+    return fail(ErrorKind::usage, "holds no patches: what it holds is measured without its source", store.path,
+                "leave --against out");
+}
+
+/// As far apart as the eight nearest say.
+double spacingOf(const NearPoints::Found& near) {
+    return near.count < 2 ? 0
+                          : std::sqrt(3.14159265358979323846 * static_cast<double>(near.squared[near.count - 1]) /
+                                      static_cast<double>(near.count - 1));
+}
+
+}  // namespace
+
 Result<AgainstSource> measureAgainst(const Store& store, TriangleMesh source, uint64_t places, Executor& executor) {
-    bool hasPatches = false;
-    for (const Node& n : store.hierarchy.nodes) hasPatches = hasPatches || n.kind == Kind::patches;
-    if (!hasPatches)
-        return fail(ErrorKind::usage, "holds no patches: what it holds is measured without its source", store.path,
-                    "leave --against out");
+    STIPPLE_TRY(checkPatches(store));
     const MeshSurface surface = meshSurface(std::move(source), executor);
     if (surface.size() == 0) return fail(ErrorKind::input, "the source holds no triangle with an area", store.path);
-    return Measuring(store, surface, places).run(executor);
+    const ToSource toSource = [&](const glm::dvec3& p, size_t& hint) {
+        const auto [distance, triangle] = surface.nearest(p - surface.middle, hint);
+        hint = triangle;
+        return Off{distance, 0};
+    };
+    return Measuring(store, toSource, placesOf(store.hierarchy, surface, places), places).run(executor);
+}
+
+Result<AgainstSource> measureAgainst(const Store& store, std::vector<glm::dvec3> points, uint64_t places,
+                                     Executor& executor) {
+    constexpr size_t kNeighbours = 8;
+    STIPPLE_TRY(checkPatches(store));
+    std::erase_if(points, [](const glm::dvec3& p) { return !isFinite(p); });
+    if (points.empty()) return fail(ErrorKind::input, "the source holds no points", store.path);
+    const Hierarchy& h = store.hierarchy;
+    std::vector<glm::dvec3> chosen;
+    for (size_t stride = points.size() / std::max<uint64_t>(places, 1) + 1, i = stride / 2; i < points.size();
+         i += stride)
+        chosen.push_back((points[i] - h.origin) / h.unit);
+    const glm::dvec3 middle = 0.5 * (store.description.boundsMin + store.description.boundsMax);
+    // In Morton order, as the search wants them.
+    const double scale = std::exp2(21.0 - h.rootLog2) / h.unit;
+    std::vector<std::pair<uint64_t, uint32_t>> order;
+    for (uint32_t i = 0; i < points.size(); ++i) {
+        const glm::dvec3 q = glm::clamp((points[i] - h.origin) * scale, glm::dvec3(0), glm::dvec3(2097151));
+        order.emplace_back(
+            shortMortonCode(static_cast<uint64_t>(q.x), static_cast<uint64_t>(q.y), static_cast<uint64_t>(q.z)), i);
+    }
+    std::sort(order.begin(), order.end());
+    std::vector<glm::dvec3> sorted;
+    for (const auto& [code, i] : order) sorted.push_back(points[i] - middle);
+    const NearPoints near(sorted);
+    const ToSource toSource = [&](const glm::dvec3& p, size_t&) {
+        NearPoints::Found found;
+        near.find(p - middle, 1, std::numeric_limits<float>::max(), found);
+        const glm::dvec3 q = sorted[found.index[0]];
+        const double distance = glm::distance(p - middle, q);
+        near.find(q, kNeighbours + 1, std::numeric_limits<float>::max(), found);
+        return Off{distance, kMostSpacings * spacingOf(found)};
+    };
+    return Measuring(store, toSource, std::move(chosen), places).run(executor);
 }
 
 }  // namespace stipple::lod

@@ -1,6 +1,8 @@
 // A store of patches against what it was built from.
 #pragma once
 
+#include <vector>
+
 #include "engine/base/executor.h"
 #include "lod/primitives/mesh.h"
 #include "lod/store/store.h"
@@ -19,5 +21,10 @@ struct AgainstSource {
 /// `source` has to be in the store's coordinates, and fits in memory. Error: a chunk cannot be read, or the store holds
 /// no patches.
 Result<AgainstSource> measureAgainst(const Store& store, TriangleMesh source, uint64_t places, Executor& executor);
+
+/// Likewise of a scan, whose points need no order: all of them lie within what is stated of the leaves. Back, a place
+/// is told as far only where the nearest point is farther than that and six spacings of its own: a scan says no more.
+Result<AgainstSource> measureAgainst(const Store& store, std::vector<glm::dvec3> points, uint64_t places,
+                                     Executor& executor);
 
 }  // namespace stipple::lod

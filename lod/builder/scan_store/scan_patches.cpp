@@ -12,6 +12,8 @@
 namespace stipple::lod {
 namespace {
 
+constexpr double kRounding = 1e-4;  ///< steps
+
 /// The points within and beside the node as elements of their own, links among them.
 struct Members {
     std::vector<uint32_t> points;  ///< ascending
@@ -73,7 +75,8 @@ ScanPatches patchesOfScan(const PointSurface& s, const std::vector<Lies>& lies, 
     for (SampledPoints::Made& made : sampled.patches) {
         Patch& p = made.patch.patch;
         out.toPoints = std::max(out.toPoints, p.errorToSource);
-        out.fromPoints = std::max(out.fromPoints, p.errorFromSource);
+        // (The file has steps and turns in fp32.)
+        out.fromPoints = std::max(out.fromPoints, p.errorFromSource + kRounding * double{p.step});
         std::vector<uint8_t> isOwn(p.heights.size(), 0);
         for (size_t k = 0; k < isOwn.size(); ++k) {
             const uint32_t near = made.patch.nearest[k];
