@@ -14,6 +14,23 @@ constexpr size_t kTilePixels = size_t{SplatTile::kWidth} * SplatTile::kHeight;
     return (y >> kRowBits) * kBandPitch + kGroupRows * x + (y & (kGroupRows - 1));
 }
 
+/// Blocks of 4 x 4 pixels of a tile, a group of entries each. Discs are drawn block by block: what a block holds stays
+/// in registers while the discs of a batch that meet it are drawn there.
+constexpr int kBlockEdge = kGroupRows, kBlockColumns = int(SplatTile::kWidth) / kBlockEdge,
+              kTileBlocks = kBlockColumns * (int(SplatTile::kHeight) / kBlockEdge);
+
+/// The blocks that a box of pixels reaches, a bit each: those of its columns, in each of its rows. Of an empty box,
+/// none.
+[[gnu::always_inline]] inline uint32_t blocksOf(int firstX, int lastX, int firstY, int lastY) {
+    static_assert(kBlockColumns == 8 && kTileBlocks == 32 && kBlockEdge == 4 && kGroupColumns == kBlockEdge);
+    const uint32_t left = uint32_t(firstX) >> 2, right = uint32_t(lastX + 4) >> 2, top = uint32_t(firstY) >> 2,
+                   bottom = uint32_t(lastY + 4) >> 2;
+    const uint32_t columns = (1u << right) - (1u << left);
+    const uint32_t ofRow = (top <= 0u && bottom > 0u ? 0xffu : 0u) | (top <= 1u && bottom > 1u ? 0xff00u : 0u) |
+                           (top <= 2u && bottom > 2u ? 0xff0000u : 0u) | (top <= 3u && bottom > 3u ? 0xff000000u : 0u);
+    return right > left ? (columns & 0xffu) * 0x01010101u & ofRow : 0u;
+}
+
 /// Where the pixels of a tile are, px from the principal point.
 struct TileGrid {
     alignas(64) float x[kBandPitch];  ///< of a band
@@ -45,11 +62,66 @@ struct DiscBatch {
     alignas(64) float cx[kSize], cy[kSize], cz[kSize], nx[kSize], ny[kSize], nz[kSize], radius[kSize];
     alignas(64) float x[kSize], y[kSize], alongX[kSize], skew[kSize], alongY[kSize], linear[kSize], slopeX[kSize],
         slopeY[kSize], least[kSize], most[kSize], isNear[kSize];
-    alignas(64) int firstX[kSize], lastX[kSize], firstY[kSize], lastY[kSize];  ///< px of the tile
-    alignas(64) int missed[kSize];  ///< entry of the pixel that holds the centre, but whose ray misses; else -1
+    alignas(64) uint32_t reached[kSize];  ///< blocks that it may meet; none of what is beyond the batch's end
+    alignas(64) int missed[kSize];        ///< entry of the pixel that holds the centre, but whose ray misses; else -1
     alignas(64) uint32_t id[kSize];
+    bool hasNear;  ///< some are not wholly before the eye
     WideDisc disc(size_t i) const { return {vec3(cx[i], cy[i], cz[i]), vec3(nx[i], ny[i], nz[i]), radius[i], 0u}; }
 };
+
+/// Boxes of pixels of a tile.
+struct BatchBoxes {
+    alignas(64) int firstX[DiscBatch::kSize], lastX[DiscBatch::kSize], firstY[DiscBatch::kSize],
+        lastY[DiscBatch::kSize];
+    void set(size_t i, const TilePixels& columns, const TilePixels& rows) {
+        firstX[i] = columns.first;
+        lastX[i] = columns.last;
+        firstY[i] = rows.first;
+        lastY[i] = rows.last;
+    }
+};
+void reachBlocks(const BatchBoxes& boxes, size_t count, uint32_t* __restrict reached) {
+#pragma GCC ivdep
+    for (size_t i = 0; i < count; ++i)
+        reached[i] = blocksOf(boxes.firstX[i], boxes.lastX[i], boxes.firstY[i], boxes.lastY[i]);
+    for (size_t i = count; i < DiscBatch::kSize; ++i) reached[i] = 0u;
+}
+
+/// Of each block of a tile, which discs of a batch are drawn there, a bit each.
+struct BlockDiscs {
+    alignas(64) uint64_t of[kTileBlocks];
+};
+/// Changes the bits of words that are `apart` from each other: those of the lower ones whose index has that bit,
+/// against those of the higher ones whose index has not.
+template <int apart>
+[[gnu::always_inline]] inline void exchangeBits(uint64_t* words) {
+    constexpr uint64_t lower = ~uint64_t{0} / ((uint64_t{1} << apart) + 1u);
+    for (int first = 0; first < kTileBlocks; first += 2 * apart)
+        for (int k = first; k < first + apart; ++k) {
+            const uint64_t changed = ((words[k] >> apart) ^ words[k + apart]) & lower;
+            words[k + apart] ^= changed;
+            words[k] ^= changed << apart;
+        }
+}
+/// Turns bits of blocks, a word a disc, into bits of discs, a word a block.
+void turnBits(const uint32_t* reached, BlockDiscs& __restrict out) {
+    static_assert(DiscBatch::kSize == 64 && kTileBlocks == 32);
+    for (int i = 0; i < kTileBlocks; ++i) out.of[i] = reached[i] | uint64_t{reached[i + kTileBlocks]} << 32;
+    exchangeBits<16>(out.of);
+    exchangeBits<8>(out.of);
+    exchangeBits<4>(out.of);
+    exchangeBits<2>(out.of);
+    exchangeBits<1>(out.of);
+}
+/// Calls use(i) for each bit, the lowest first.
+template <typename Use>
+[[gnu::always_inline]] inline void forBits(uint64_t bits, const Use& use) {
+    for (; bits != 0u; bits &= bits - 1u) use(size_t(__builtin_ctzll(bits)));
+}
+template <typename T>
+[[gnu::always_inline]] inline void copyGroup(const T* from, T* __restrict to) {
+    for (int l = 0; l < kGroup; ++l) to[l] = from[l];
+}
 
 /// What is linear on the image of a plane: at the disc's centre, and its slopes a px.
 struct PlaneImage {
@@ -104,11 +176,13 @@ template <bool byRay>
 }
 
 /// Of discs about the eye, one by one.
-void prepareNear(const FrameConstants& f, size_t count, const SplatTile& tile, DiscBatch& b) {
+void prepareNear(const FrameConstants& f, size_t count, const SplatTile& tile, DiscBatch& b, BatchBoxes& boxes) {
     const float far = 1.0e6f, inverseFocal = 1.0f / f.focal;
     const Lens lens = lensHere(f.focal);
+    b.hasNear = false;
     for (size_t i = 0; i < count; ++i) {
         if (!(b.isNear[i] > 0.5f)) continue;
+        b.hasNear = true;
         const WideDisc d = b.disc(i);
         if (!kOrthographic) {
             b.x[i] = b.y[i] = 0.0f;
@@ -121,10 +195,7 @@ void prepareNear(const FrameConstants& f, size_t count, const SplatTile& tile, D
         const auto px = [&](float slope) { return min(max(slope * f.focal, -far), far); };
         const TilePixels columns = tilePixels(px(across.x), px(across.y), f.centre.x, tile.x0, tile.width),
                          rows = tilePixels(px(down.x), px(down.y), f.centre.y, tile.y0, tile.height);
-        b.firstX[i] = columns.first;
-        b.lastX[i] = columns.last;
-        b.firstY[i] = rows.first;
-        b.lastY[i] = rows.last;
+        boxes.set(i, columns, rows);
         const CentrePixel c = centrePixel(d, f);
         const int atX = c.x - int(tile.x0), atY = c.y - int(tile.y0);
         const bool isHere = c.x >= 0 && atX >= 0 && atX < int(tile.width) && atY >= 0 && atY < int(tile.height);
@@ -160,6 +231,7 @@ void prepareDiscs(const FrameConstants& frame, const PlacedSplat* splats, const 
                 lastY = float(int(tile.height)) - 1.0f;
     const float focal = f.focal, inverseFocal = 1.0f / focal, nearPlane = f.nearPlane;
     const Lens lens = lensHere(focal);
+    BatchBoxes boxes;
 #pragma GCC ivdep
     for (size_t i = 0; i < count; ++i) {
         const vec3 centre(b.cx[i], b.cy[i], b.cz[i]);
@@ -185,10 +257,7 @@ void prepareDiscs(const FrameConstants& frame, const PlacedSplat* splats, const 
         b.isNear[i] = max(k.isNear, nearest > nearPlane ? 0.0f : 1.0f);
         const TilePixels columns = tilePixels(k.x - k.halfX, k.x + k.halfX, f.centre.x, tile.x0, tile.width);
         const TilePixels rows = tilePixels(k.y - k.halfY, k.y + k.halfY, f.centre.y, tile.y0, tile.height);
-        b.firstX[i] = columns.first;
-        b.lastX[i] = columns.last;
-        b.firstY[i] = rows.first;
-        b.lastY[i] = rows.last;
+        boxes.set(i, columns, rows);
         // Where the ray of the centre's pixel misses the disc, that pixel shows it all the same.
         const float atX = std::floor(midX + f.centre.x) - left, atY = std::floor(midY + f.centre.y) - top;
         const float dx = atX + (left + 0.5f - f.centre.x - k.x),
@@ -198,5 +267,6 @@ void prepareDiscs(const FrameConstants& frame, const PlacedSplat* splats, const 
         const int entry = tileEntry(int(min(max(atX, 0.0f), lastX)), int(min(max(atY, 0.0f), lastY)));
         b.missed[i] = misses >= 0.0f ? entry : -1;
     }
-    prepareNear(f, count, tile, b);
+    prepareNear(f, count, tile, b, boxes);
+    reachBlocks(boxes, count, b.reached);
 }

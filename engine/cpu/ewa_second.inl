@@ -47,9 +47,8 @@ bool findSeconds(float covered, const TileFilter& __restrict t, const TileOthers
 }
 
 /// Those of the tile whose fronts may end there; of leaves none do. (Beside the tile they may.)
-void listSeconds(const FrameConstants& f, const BlockSource* blocks, const SplatTile& tile, const TileFilter& t,
-                 const TileOthers& others, const uint64_t* keys, const FilteredPixel* filtered, const uint32_t* kind,
-                 TileSeconds& out) {
+void listSeconds(const FrameConstants& f, const SplatTile& tile, const TileFilter& t, const TileOthers& others,
+                 const uint64_t* keys, const FilteredPixel* filtered, const uint32_t* kind, TileSeconds& out) {
     for (uint32_t y = 0; y < tile.height; ++y)
         for (uint32_t x = 0; x < tile.width; ++x) {
             const auto i = size_t(tileEntry(int(x), int(y)));
@@ -57,46 +56,73 @@ void listSeconds(const FrameConstants& f, const BlockSource* blocks, const Splat
             if (kind[i] == kSecondBehind) {
                 const bool isAtEdge = x == 0 || y == 0 || x + 1 == tile.width || y + 1 == tile.height;
                 if (!isAtEdge && !isAtJump(f, keys, filtered, tile.x0 + x, tile.y0 + y, t.front[i])) continue;
-                if ((recordFlags(recordOf(blocks, t.id[i])) & kFlagLeaf) != 0u) continue;
+                if (t.isLeaf[i] != 0u) continue;
             }
             const bool isShown = t.id[i] != TileFilter::kOther && (!others.hasAny || t.front[i] < others.depth[i]);
             out.of[out.count++] = {uint16_t(i), uint8_t(x), uint8_t(y), uint8_t(kind[i]), isShown};
         }
 }
 
-/// Between which depths second surfaces are added up; those that are fronts of their own get theirs. False: nothing is
-/// to be added up.
-bool limitSeconds(const FrameConstants& f, const TileDiscs& discs, const SplatTile& tile, const TileFilter& t,
-                  const TileOthers& others, TileSeconds& seconds, TileFilter& second) {
+/// Begins the blocks that show second surfaces, and no others.
+void beginSeconds(const TileFilter& t, const TileSeconds& seconds, TileFilter& second) {
+    second.grid = t.grid;
+    uint32_t begun = 0u;
+    for (size_t s = 0; s < seconds.count; ++s) {
+        const int block = seconds.of[s].entry / kGroup;
+        if ((begun >> block & 1u) != 0u) continue;
+        begun |= 1u << block;
+        clearBlock(block, second);
+        copyGroup(t.along + block * kGroup, second.along + block * kGroup);
+    }
+}
+
+/// The fronts of second surfaces behind fronts.
+void findSecondFronts(const FrameConstants& f, const TileDiscs& discs, const SplatTile& tile, const TileFilter& t,
+                      const TileSeconds& seconds, TileFilter& second) {
     bool anyBehind = false;
-    for (float& beyond : second.blockBeyond) beyond = kNoDisc;
-    bool anyAdded = false;
+    float beyond[kTileBlocks];
+    for (float& of : beyond) of = kNoDisc;
     for (size_t s = 0; s < seconds.count; ++s) {
         const size_t i = seconds.of[s].entry;
         if (seconds.of[s].kind != kSecondBehind || !(t.farthest[i] > t.front[i])) continue;
         second.beyond[i] = t.front[i];
-        second.blockBeyond[i / kGroup] = min(second.blockBeyond[i / kGroup], t.front[i]);
+        beyond[i / kGroup] = min(beyond[i / kGroup], t.front[i]);
         anyBehind = true;
     }
-    if (anyBehind) drawSecondFronts(f, discs, tile, second);
-    for (float& limit : second.limit) limit = kNearest;
+    if (anyBehind) drawSecondFronts(f, discs, tile, beyond, second);
+}
+
+/// Between which depths second surfaces are added up; those that are fronts of their own get theirs. False: nothing is
+/// to be added up.
+bool limitSeconds(const FrameConstants& f, const TileFilter& t, const TileOthers& others, TileSeconds& seconds,
+                  TileFilter& second, BlockLimits& limits) {
+    for (int block = 0; block < kTileBlocks; ++block) {
+        limits.limit[block] = limits.before[block] = kNearest;
+        limits.begin[block] = kFarthest;
+    }
+    limits.used = 0u;
+    const auto extend = [](float& limit, float to) { limit = isNearer(limit, to) ? to : limit; };
     const Lens lens = lensHere(f.focal);
     for (size_t s = 0; s < seconds.count; ++s) {
         TileSeconds::Pixel& pixel = seconds.of[s];
-        const size_t i = pixel.entry;
+        const size_t i = pixel.entry, block = i / kGroup;
         const float exact = others.hasAny ? others.depth[i] : kNoDisc;
         if (pixel.kind == kSecondBefore) {
             second.limit[i] = pixel.isShown ? t.nearest[i] : kFarthest;
             if (!pixel.isShown) second.bound[i] = exact;
+            extend(limits.before[block], second.limit[i]);
         } else if (second.id[i] != TileFilter::kOther && second.front[i] < exact) {
             second.limit[i] = imageLinear(lens, second.front[i]);
             second.nearest[i] = t.limit[i];
+            extend(limits.limit[block], second.limit[i]);
+            if (isNearer(second.nearest[i], limits.begin[block])) limits.begin[block] = second.nearest[i];
         } else {
             pixel.kind = exact < kNoDisc ? kSecondFront : kSecondNone;
+            continue;
         }
-        anyAdded = anyAdded || pixel.kind == kSecondBefore || pixel.kind == kSecondBehind;
+        limits.used |= 1u << block;
     }
-    return anyAdded;
+    return limits.used != 0u;
 }
 
 /// What was added up at an entry, but for how much of the pixel it is.
@@ -118,7 +144,8 @@ SecondPixel secondOf(const FrameConstants& f, const Tables& tables, const BlockS
         out.depth = t.own[i];
         showOwn(f, tables, blocks, id, out.shown);
     }
-    if ((recordFlags(recordOf(blocks, id)) & kFlagLeaf) != 0u) out.shown.cover |= kFilteredLeaf;
+    const bool isLeaf = t.id[i] != TileFilter::kOther ? t.isLeaf[i] != 0u : isLeafRecord(blocks, id);
+    if (isLeaf) out.shown.cover |= kFilteredLeaf;
     return out;
 }
 
@@ -132,14 +159,13 @@ void showSeconds(const FrameConstants& f, const Tables& tables, const BlockSourc
     alignas(64) uint32_t kind[kTilePixels];
     if (!findSeconds(covered, t, others, kind)) return;
     TileSeconds seconds;
-    listSeconds(f, blocks, tile, t, others, visibility.keys, filtered, kind, seconds);
+    listSeconds(f, tile, t, others, visibility.keys, filtered, kind, seconds);
     if (seconds.count == 0) return;
     TileFilter second;
-    beginFilter(f, tile, second);
-    if (limitSeconds(f, discs, tile, t, others, seconds, second)) {
-        TileBlocks limits;
-        closeBlocks(second, limits);
-        beginBlocks(second, limits);
+    beginSeconds(t, seconds, second);
+    findSecondFronts(f, discs, tile, t, seconds, second);
+    BlockLimits limits;
+    if (limitSeconds(f, t, others, seconds, second, limits)) {
         if (others.hasAny)
             addKernels<wants, Sum::secondBound>(f, tables, blocks, discs, tile, limits, second);
         else

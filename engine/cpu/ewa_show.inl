@@ -27,7 +27,8 @@ struct ShownBand {
     static constexpr int kEntries = kBandPitch;
     alignas(64) float exact[kEntries];       ///< depth of other kinds; kNoDisc: none
     alignas(64) uint32_t isThere[kEntries];  ///< 1: by what was added up; 2: by its front disc alone
-    alignas(64) uint32_t colour[kEntries], normal[kEntries], cover[kEntries], id[kEntries], depth[kEntries];
+    alignas(64) uint32_t colour[kEntries], normal[kEntries], cover[kEntries], id[kEntries], isLeaf[kEntries],
+        depth[kEntries];
 };
 /// `covered`: what a weight of 1 covers; `mostDivided`: by more than that colours are not divided.
 template <Wants wants>
@@ -55,6 +56,7 @@ void showBand(float covered, float mostDivided, int band, const TileFilter& __re
         if (wants == Wants::materials)
             s.cover[k] |= coverOfMaterial(TexelSurface{t.share[i] * over, t.metallic[i] * over, t.roughness[i] * over});
         s.id[k] = hasFront ? t.id[i] : t.rim[i];
+        s.isLeaf[k] = hasFront ? t.isLeaf[i] : 2u;
     }
 }
 template <Wants wants>
@@ -87,7 +89,7 @@ void showTile(const FrameConstants& f, const Tables& tables, const BlockSource* 
                 if (s.isThere[k] == 0u) continue;
                 FilteredPixel pixel{s.normal[k], s.colour[k], s.cover[k]};
                 if (s.isThere[k] == 2u) showOwn(f, tables, blocks, s.id[k], pixel);
-                if (hasLeaves && (recordFlags(recordOf(blocks, s.id[k])) & kFlagLeaf) != 0u)
+                if (hasLeaves && (s.isLeaf[k] == 2u ? isLeafRecord(blocks, s.id[k]) : s.isLeaf[k] != 0u))
                     pixel.cover |= kFilteredLeaf;
                 filtered[to] = pixel;
                 visibility.keys[to] = visibilityKey(s.depth[k], drawId(0u, s.id[k]));

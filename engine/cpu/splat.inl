@@ -8,36 +8,60 @@ struct TileFront {
     alignas(64) uint32_t id[kTilePixels];
 };
 
-/// Discs come in the order of their ids: of what is equally deep the first stays.
+/// The disc at the pixels of a block. Discs come in the order of their ids: of what is equally deep the first stays.
 template <bool isNear>
-void drawSplat(const DiscBatch& b, size_t i, const TileGrid& grid, const FrameConstants& f,
-               TileFront& __restrict front) {
+[[gnu::always_inline]] inline void offerSplat(const DiscBatch& b, size_t i, const float* px, float top,
+                                              const TileGrid& grid, const FrameConstants& f, float* __restrict nearest,
+                                              uint32_t* __restrict owner) {
     const uint32_t id = b.id[i];
     const DiscForm d = formOf(b, i, f);
-    const float midX = b.x[i], midY = b.y[i], least = b.least[i], most = b.most[i];
-    const int x1 = b.lastX[i], x0 = b.firstX[i] & ~(kGroupColumns - 1);
-    for (int band = b.firstY[i] >> kRowBits; band <= b.lastY[i] >> kRowBits; ++band) {
-        const float dy = float(kGroupRows * band) + grid.top - midY;
-        for (int x = x0; x <= x1; x += kGroupColumns) {
-            float* const nearest = front.depth + band * kBandPitch + kGroupRows * x;
-            uint32_t* const owner = front.id + band * kBandPitch + kGroupRows * x;
-            const float* const px = grid.x + kGroupRows * x;
+    const float midX = b.x[i], dy = top - b.y[i], least = b.least[i], most = b.most[i];
 #pragma GCC ivdep
-            for (int l = 0; l < kGroup; ++l) {
-                const DiscAt at = discAt < isNear || kOrthographic > (d, px[l] - midX, dy + grid.row[l]);
-                const float linear = min(max(at.linear, least), most);
-                const float depth = kOrthographic ? linear : 1.0f / linear;
-                const bool isFront = (at.rho2 <= 1.0f) & (depth < nearest[l]);
-                nearest[l] = isFront ? depth : nearest[l];
-                owner[l] = isFront ? id : owner[l];
-            }
-        }
+    for (int l = 0; l < kGroup; ++l) {
+        const DiscAt at = discAt < isNear || kOrthographic > (d, px[l] - midX, dy + grid.row[l]);
+        const float linear = min(max(at.linear, least), most);
+        const float depth = kOrthographic ? linear : 1.0f / linear;
+        const bool isFront = (at.rho2 <= 1.0f) & (depth < nearest[l]);
+        nearest[l] = isFront ? depth : nearest[l];
+        owner[l] = isFront ? id : owner[l];
     }
-    if (b.missed[i] < 0) return;
-    const auto at = size_t(b.missed[i]);
-    if (!(b.cz[i] < front.depth[at])) return;
-    front.depth[at] = b.cz[i];
-    front.id[at] = id;
+}
+template <bool hasNear>
+void splatBlock(const DiscBatch& b, uint64_t discs, int block, const TileGrid& grid, const FrameConstants& f,
+                TileFront& __restrict front) {
+    const int first = block * kGroup;
+    const float* const px = grid.x + block % kBlockColumns * kGroup;
+    const float top = float(kGroupRows * (block / kBlockColumns)) + grid.top;
+    alignas(64) float nearest[kGroup];
+    alignas(64) uint32_t owner[kGroup];
+    copyGroup(front.depth + first, nearest);
+    copyGroup(front.id + first, owner);
+    forBits(
+        discs, [&](size_t i) __attribute__((always_inline)) {
+            if (hasNear && b.isNear[i] > 0.5f)
+                offerSplat<true>(b, i, px, top, grid, f, nearest, owner);
+            else
+                offerSplat<false>(b, i, px, top, grid, f, nearest, owner);
+        });
+    copyGroup(nearest, front.depth + first);
+    copyGroup(owner, front.id + first);
+}
+
+/// The discs of a batch, block by block; then the pixels that hold a centre, but whose rays miss.
+template <bool hasNear>
+void splatBatch(const DiscBatch& b, size_t count, const TileGrid& grid, const FrameConstants& f, TileFront& front) {
+    BlockDiscs discs;
+    turnBits(b.reached, discs);
+    for (int block = 0; block < kTileBlocks; ++block)
+        if (discs.of[block] != 0u) splatBlock<hasNear>(b, discs.of[block], block, grid, f, front);
+    for (size_t i = 0; i < count; ++i) {
+        if (b.missed[i] < 0) continue;
+        const auto at = size_t(b.missed[i]);
+        const float depth = b.cz[i];
+        if (!(depth < front.depth[at] || (depth == front.depth[at] && b.id[i] < front.id[at]))) continue;
+        front.depth[at] = depth;
+        front.id[at] = b.id[i];
+    }
 }
 
 void splatTile(const FrameConstants& frame, const PlacedSplat* splats, const uint32_t* places, size_t count,
@@ -55,12 +79,10 @@ void splatTile(const FrameConstants& frame, const PlacedSplat* splats, const uin
         const size_t n = count - first < DiscBatch::kSize ? count - first : DiscBatch::kSize;
         prefetchDiscs(splats, places + first + n, count - first - n);
         prepareDiscs(f, splats, places + first, n, tile, batch);
-        for (size_t i = 0; i < n; ++i) {
-            if (batch.isNear[i] > 0.5f)
-                drawSplat<true>(batch, i, grid, f, front);
-            else
-                drawSplat<false>(batch, i, grid, f, front);
-        }
+        if (batch.hasNear)
+            splatBatch<true>(batch, n, grid, f, front);
+        else
+            splatBatch<false>(batch, n, grid, f, front);
     }
     for (uint32_t y = 0; y < tile.height; ++y) {
         const size_t first = (tile.y0 + y) * f.width + tile.x0;

@@ -1,4 +1,5 @@
 // Discs blended by their kernels (shaders/shared/ewa.h), and how far they cover the pixels of silhouettes.
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <utility>
@@ -101,27 +102,25 @@ void cover(Frame& frame) {
     });
 }
 
-/// Is the pixel at the edge of its tile?
-bool isAtTileEdge(const shared::FrameConstants& f, size_t x, uint32_t y) {
-    const auto isAt = [](size_t i, size_t edge, size_t size) {
-        return i % edge == 0 || (i + 1) % edge == 0 || i + 1 == size;
-    };
-    return isAt(x, SplatTile::kWidth, f.width) || isAt(y, SplatTile::kHeight, f.height);
-}
-
 /// Second surfaces behind fronts that end nowhere near are none: there kernels add up to less than 1 because samples
-/// are not regular. (Within tiles, filterTile left those out.)
+/// are not regular. (Within tiles, filterTile left those out: what is left are the edges of tiles.)
 void closeSeconds(Frame& frame) {
     const shared::FrameConstants& f = frame.constants;
     const SecondPixels seconds = frame.seconds();
+    const auto close = [&](size_t x, uint32_t y) {
+        const size_t at = size_t{y} * f.width + x;
+        if (seconds.kinds[at] <= shared::kSecondBefore) return;
+        if (!frame.k.isAtJump(f, frame.visibility.data(), frame.filtered.data(), static_cast<uint32_t>(x), y,
+                              seconds.pixels[at].limit))
+            seconds.kinds[at] = shared::kSecondNone;
+    };
     frame.forBands([&](uint32_t first, uint32_t last) {
         for (uint32_t y = first; y <= last; ++y) {
-            const size_t at = size_t{y} * f.width;
-            for (size_t x = 0; seconds.mayHave(at, f.width) && x < f.width; ++x) {
-                if (seconds.kinds[at + x] <= shared::kSecondBefore || !isAtTileEdge(f, x, y)) continue;
-                if (!frame.k.isAtJump(f, frame.visibility.data(), frame.filtered.data(), static_cast<uint32_t>(x), y,
-                                      seconds.pixels[at + x].limit))
-                    seconds.kinds[at + x] = shared::kSecondNone;
+            if (!seconds.mayHave(size_t{y} * f.width, f.width)) continue;
+            const bool isEdge = y % SplatTile::kHeight == 0 || (y + 1) % SplatTile::kHeight == 0 || y + 1 == f.height;
+            for (size_t x = 0; x < f.width; x += isEdge ? 1 : SplatTile::kWidth) {
+                close(x, y);
+                if (!isEdge) close(std::min(x + SplatTile::kWidth, size_t{f.width}) - 1, y);
             }
         }
     });
