@@ -79,6 +79,7 @@ Result<void> run(const Options& o, bool& isSilent) {
                                   {"bytes_out", r.bytesOut},
                                   {"nodes", r.nodes},
                                   {"records", r.records},
+                                  {"patches", patchCountsJson(r.patches)},
                                   {"notes", allNotes(r)},
                                   {"temporary_bytes", r.temporaryBytes},
                                   {"resumed", r.isResumed},
@@ -93,8 +94,7 @@ Result<void> run(const Options& o, bool& isSilent) {
                counted(r.pointsOut, what), counted(r.nodes, isMesh ? "group" : "node"), humanBytes(r.bytesOut),
                static_cast<double>(r.bytesOut) / static_cast<double>(r.pointsOut), what, r.seconds,
                static_cast<double>(r.pointsIn) / r.seconds * 1e-6, what, humanBytes(peakRssBytes()));
-    for (const auto& [reason, count] : r.added)
-        fmt::print("added {}: {} {}\n", count == 1 ? what : what + "s", count, reason);
+    for (const auto& [reason, count] : r.added) fmt::print("added {} {}\n", counted(count, what), reason);
     for (const auto& [reason, count] : r.dropped)
         fmt::print("dropped {}: {}\n", what == "point" ? counted(count, "point") : fmt::format("{}", count), reason);
     return {};

@@ -29,6 +29,11 @@ void bakeMaterials(const scene::Scene& scene, lod::TriangleMesh& mesh) {
     }
 }
 
+nlohmann::json patchCountsJson(const lod::PatchCounts& of) {
+    if (of.patches + of.discs == 0) return {};
+    return {{"patches", of.patches}, {"samples", of.samples}, {"left", of.left}, {"discs", of.discs}};
+}
+
 bool hasTextures(const scene::Scene& scene) {
     for (const scene::Material& m : scene.materials)
         if (m.baseColourTexture.texture >= 0) return true;

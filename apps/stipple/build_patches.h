@@ -6,6 +6,7 @@
 
 #include "apps/stipple/common.h"
 #include "lod/primitives/mesh.h"
+#include "lod/store/description.h"
 
 namespace stipple::app {
 
@@ -20,6 +21,9 @@ bool hasTriangles(const std::string& input);
 
 /// All triangles of a PLY file with faces or of a scene. Error: there are none.
 Result<lod::TriangleMesh> readTriangles(const std::string& input, const scene::ReadSettings& reading);
+
+/// For --json; null where there are none.
+nlohmann::json patchCountsJson(const lod::PatchCounts& of);
 
 /// Adds --patches and what belongs to it.
 void addPatchBuildOptions(CLI::App& app, PatchBuildOptions& o);

@@ -12,9 +12,11 @@
 #include "engine/base/numbers.h"
 #include "engine/base/process.h"
 #include "engine/base/units.h"
+#include "engine/base/words.h"
 #include "lod/builder/patch_store/against.h"
 #include "lod/primitives/codecs.h"
 #include "lod/primitives/kinds.h"
+#include "lod/primitives/patch_samples.h"
 #include "lod/store/file_kind.h"
 #include "lod/store/materials.h"
 #include "lod/store/nearest.h"
@@ -128,7 +130,9 @@ nlohmann::json storeInfo(const lod::Store& store) {
     for (const lod::Stream& s : h.streams)
         if (s.id == lod::StreamId::surfelWeights) weightBytes += s.bytes;
     return {{"kind", "stipple store"},
-            {"primitive", h.isMixed ? "records" : lod::traitsOf(h.nodes[0].kind).records},
+            {"primitive", d.patches.patches > 0 ? "blocks of patches"
+                          : h.isMixed           ? "records"
+                                                : lod::traitsOf(h.nodes[0].kind).records},
             {"payloads", payloadInfo(h)},
             {"surfel_weight_bytes", weightBytes},
             {"materials", d.materials.size()},
@@ -144,6 +148,7 @@ nlohmann::json storeInfo(const lod::Store& store) {
             {"points_in", d.pointsIn},
             {"dropped", d.dropped},
             {"added", d.added},
+            {"patches", patchCountsJson(d.patches)},
             {"records", d.records},
             {"nodes", h.nodes.size()},
             {"levels", levels},
@@ -179,6 +184,12 @@ void printStore(const nlohmann::json& j) {
     };
     const auto place = [&](const char* key) { return placeText(j[key], j["lattice_unit"], j["origin"]); };
     const bool isMesh = j["primitive"] == "triangles";
+    const nlohmann::json& patches = j["patches"];
+    if (!patches.is_null())
+        fmt::print("{}: {} in {}, {} of what no patch fits\n", j["path"].get<std::string>(),
+                   counted(patches["samples"].get<uint64_t>(), "sample"),
+                   counted(patches["patches"].get<uint64_t>(), "patch", "patches"),
+                   counted(patches["discs"].get<uint64_t>(), "disc"));
     fmt::print("{}: {} {} from {}, {} with all levels in {} {}, {}\n", j["path"].get<std::string>(),
                j["points"].get<uint64_t>(), j["primitive"].get<std::string>(), j["source"].get<std::string>(),
                j["records"].get<uint64_t>(), j["nodes"].get<uint64_t>(), isMesh ? "groups" : "nodes",
@@ -188,7 +199,8 @@ void printStore(const nlohmann::json& j) {
                    j["textures"].size(), j["texture_tiles"].get<uint64_t>(),
                    humanBytes(j["texture_bytes"].get<uint64_t>()));
     if (j["points_in"].get<uint64_t>() > 0) {
-        fmt::print("  {:<14}{}", j["primitive"].get<std::string>() + " in", j["points_in"].get<uint64_t>());
+        fmt::print("  {:<14}{}", patches.is_null() ? j["primitive"].get<std::string>() + " in" : "built from",
+                   j["points_in"].get<uint64_t>());
         for (const auto& [reason, count] : j["dropped"].items())
             fmt::print(", dropped {}: {}", count.get<uint64_t>(), reason);
         for (const auto& [reason, count] : j["added"].items())
@@ -270,11 +282,6 @@ Result<void> showNearest(const lod::Store& store, const Options& o) {
     return {};
 }
 
-bool hasPatches(const lod::Store& store) {
-    return std::any_of(store.hierarchy.nodes.begin(), store.hierarchy.nodes.end(),
-                       [](const lod::Node& n) { return n.kind == lod::Kind::patches; });
-}
-
 /// The finest patches against what they were made of.
 Result<void> measureAgainstSource(const lod::Store& store, const Options& o, Executor& executor, nlohmann::json& j) {
     constexpr uint64_t kPlaces = 200'000;
@@ -314,7 +321,7 @@ Result<void> run(const Options& o) {
             const auto executor = makeTbbExecutor(0);
             STIPPLE_TRY(lod::verifyStore(store, *executor));
             j["verified"] = true;
-            j["errors_measured"] = (!isMixed || hasPatches(store)) && !store.hierarchy.isStochastic;
+            j["errors_measured"] = (!isMixed || lod::hasPatches(store.hierarchy)) && !store.hierarchy.isStochastic;
             if (!o.against.empty()) STIPPLE_TRY(measureAgainstSource(store, o, *executor, j));
         }
         if (o.json) {
@@ -324,7 +331,8 @@ Result<void> run(const Options& o) {
         printStore(j);
         if (o.verify)
             fmt::print("  verified: hashes, counts, order, {} and spheres are right\n",
-                       isMixed && !hasPatches(store) ? "codes (errors across kinds are not measured)" : "errors");
+                       isMixed && !lod::hasPatches(store.hierarchy) ? "codes (errors across kinds are not measured)"
+                                                                    : "errors");
         if (j.contains("against"))
             fmt::print(
                 "  against       {}: {} places of the store at most {:.4g} away, {} of the source {:.4g}; stated "

@@ -242,6 +242,7 @@ void tell(const Options& o, const render::FrameState& state, const Verdict& verd
             {"nodes_drawn", c.nodesDrawn},
             {"closes_gaps", closesGaps(o.drawn.mode)},
             {"tau_eff_px", jsonNumber(verdict.tauEffectivePixels)},
+            {"nodes_around_eye", verdict.leavesAround},
             {"stochastic",
              {{"narrow_curves", verdict.pruned.narrowShare()},
               {"thinned_curves", verdict.pruned.thinnedShare()},
@@ -263,10 +264,10 @@ void tell(const Options& o, const render::FrameState& state, const Verdict& verd
                    numbered(o.output, verdict.worst), errorText(verdict, o.drawn.mode), pruningText(verdict.pruned),
                    quantile(timings.frames, 0.5), state.backend->device());
     } else if (!o.quiet) {
-        const std::string drawn = c.trianglesDrawn == 0 ? fmt::format("{} records", c.recordsDrawn)
-                                  : c.recordsDrawn == 0
-                                      ? fmt::format("{} triangles", c.trianglesDrawn)
-                                      : fmt::format("{} records, {} triangles", c.recordsDrawn, c.trianglesDrawn);
+        const std::string drawn =
+            c.trianglesDrawn == 0 ? counted(c.recordsDrawn, "record")
+            : c.recordsDrawn == 0 ? counted(c.trianglesDrawn, "triangle")
+                                  : counted(c.recordsDrawn, "record") + ", " + counted(c.trianglesDrawn, "triangle");
         fmt::print("{}: {}, {}{}, {:.1f} ms a frame on {}\n", o.output, drawn, errorText(verdict, o.drawn.mode),
                    pruningText(verdict.pruned), quantile(timings.frames, 0.5), state.backend->device());
     }
@@ -288,9 +289,6 @@ Result<void> run(const Options& o, Written& written) {
     STIPPLE_TRY(checkModule(o));
     STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, !o.quiet));
     STIPPLE_TRY(checkWeights(o, scene));
-    if (const double distance = patchDistance(scene.placed); distance > 0 && !o.quiet)
-        fmt::print(stderr, "note: patches are up to {:.3g} units from what they were built from, beside the error\n",
-                   distance);
     if (o.material.material() && !takesMaterial(scene.placed)) return noPointsToLight(o.inputs.front());
     const lod::StoreDescription& description = scene.description;
     STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
@@ -320,6 +318,11 @@ Result<void> run(const Options& o, Written& written) {
     }
     tell(o, *state, verdict, timings, size, shot.views.size());
     if (!o.quiet) sayEmpty(verdict.empty, shot.views.size(), o.output);
+    if (!o.quiet && verdict.leavesAround > 0)
+        fmt::print(stderr,
+                   "note: the eye is within what {} of patches cover{}: how far those are from what they were "
+                   "built from is not in the error\n",
+                   counted(verdict.leavesAround, "node"), verdict.leavesAround == 1 ? "s" : "");
     if (o.budget > 0) sayIfUseless(plan, settings, *state, verdict);
     return checkVerdict(plan, verdict);
 }

@@ -68,6 +68,7 @@ void Verdict::judge(const render::FrameState& state, const lod::View* view) {
     if (number > 0 && (misses != worstMisses ? worstMisses : error <= tauEffectivePixels)) return;
     worst = number;
     tauEffectivePixels = error;
+    leavesAround = state.cut.counters.leavesAround;
     missing = missingOf(state);
     // A chunk that cannot be read any more is told of where it is missed.
     if (view == nullptr) return;

@@ -43,6 +43,7 @@ struct Verdict {
     size_t worst = 0;               ///< its number
     bool isTruncated = false;       ///< of one even the coarsest level exceeds the budget
     double tauEffectivePixels = 0;  ///< of the worst, as all that follows; infinite where records are left out
+    uint64_t leavesAround = 0;      ///< leaves of patches around the eye, whose distance from the source no error says
     MissingChunks missing;
     render::PrunedShares pruned;  ///< what the error does not speak of
     uint64_t recordsWanted = 0;   ///< by the error asked for; 0: not looked for

@@ -126,17 +126,6 @@ bool hasMirrors(const std::vector<render::PlacedStore>& placed, const std::optio
                        [](const render::PlacedStore& p) { return render::hasMirrors(p.store->description); });
 }
 
-double patchDistance(const std::vector<render::PlacedStore>& placed) {
-    double most = 0;
-    for (const render::PlacedStore& p : placed) {
-        const lod::Hierarchy& h = p.store->hierarchy;
-        bool has = false;
-        h.forEachPayload(0, [&](uint32_t chunk) { has = has || h.payload(chunk).kind == lod::Kind::patches; });
-        if (has) most = std::max(most, p.place.scale * p.store->description.roundingUnits);
-    }
-    return most;
-}
-
 bool hasSurfelWeights(const std::vector<render::PlacedStore>& placed) {
     return std::any_of(placed.begin(), placed.end(),
                        [](const render::PlacedStore& p) { return lod::hasWeights(p.store->hierarchy); });

@@ -29,9 +29,6 @@ bool hasPoints(const std::vector<render::PlacedStore>& placed);
 bool takesMaterial(const std::vector<render::PlacedStore>& placed);
 /// Is any of it, or what --material says, so smooth that the environment is seen in it?
 bool hasMirrors(const std::vector<render::PlacedStore>& placed, const std::optional<lod::PointMaterial>& given);
-/// How far the finest patches may be from what they were built from, scene units: no part of a picture's error. 0:
-/// there are none.
-double patchDistance(const std::vector<render::PlacedStore>& placed);
 /// Have any surfels weights of their own (stipple build --surfel-weights)?
 bool hasSurfelWeights(const std::vector<render::PlacedStore>& placed);
 

@@ -12,6 +12,7 @@
 #include "engine/base/progress.h"
 #include "engine/base/ranks.h"
 #include "lod/primitives/primitives.h"
+#include "lod/store/description.h"
 
 namespace stipple::lod {
 
@@ -63,6 +64,7 @@ struct BuildReport {
     std::vector<std::string> notes;           ///< what was odd about the input
     std::vector<std::string> coarseNotes;     ///< what coarse levels are: of pictures, each says what it shows of them
     uint64_t nodes = 0, records = 0, bytesOut = 0, contentHash = 0;
+    PatchCounts patches;
     double seconds = 0;
     std::map<std::string, double> stageSeconds;
     uint64_t temporaryBytes = 0;  ///< on disk, at most

@@ -150,6 +150,16 @@ inline double deliveredPixels(const CutScratch::Slot& slot, uint32_t errorCode, 
     return pixelsOf(slot, drawn, drawn > asked.largestCode ? kInside : asked.epsilon);
 }
 
+/// Tells the cut of what is drawn of a leaf that is not exact.
+inline void tellLeafError(const CutScratch::Slot& slot, const Node& node, int32_t epsilon, Cut& cut) {
+    if (slot.leafError == 0 || !node.isLeaf()) return;
+    if (epsilon == kInside)
+        ++cut.counters.leavesAround;
+    else
+        cut.tauEffective =
+            std::max(cut.tauEffective, slot.leafError * std::exp2(-static_cast<double>(epsilon) / kStepsPerOctave));
+}
+
 /// emitRecords, of a payload whose node and frame are at hand.
 inline void appendRecords(const CutScratch::Slot& slot, const Hierarchy& h, uint32_t instance, uint32_t node,
                           uint32_t chunk, const Payload& p, const Asked& asked, Cut& cut) {
@@ -159,6 +169,7 @@ inline void appendRecords(const CutScratch::Slot& slot, const Hierarchy& h, uint
     cut.counters.recordsTested += count;
     const double delivered = deliveredPixels(slot, p.errorCode, asked);
     if (asked.octantMask) cut.tauEffective = std::max(cut.tauEffective, delivered);
+    tellLeafError(slot, h.nodes[node], asked.epsilon, cut);
     if (count > tooCoarse)
         cut.draw.push_back({instance, node, chunk, count, asked.code, asked.octantMask, static_cast<float>(delivered)});
 }

@@ -22,9 +22,14 @@ std::string patchFault(const Patch& p) {
         p.cells.size() != cells)
         return "has arrays of other sizes than its sides say";
     const float length = glm::dot(p.turn, p.turn);
-    if (!isFinite(p.origin) || !(length > 0.99f && length < 1.01f) || !(p.step > 0) || !std::isfinite(p.step) ||
-        p.quantumExponent < -1000 || p.quantumExponent > 1000)
-        return "has a plane that is none";
+    if (!isFinite(p.origin) || !(length > 0.99f && length < 1.01f)) return "has a plane that is none";
+    // Squares of lengths are finite and none of them vanishes, in fp32.
+    constexpr double kMostOrigin = 1e18;
+    constexpr float kLeastStep = 1e-15f, kMostStep = 1e15f;
+    constexpr int32_t kLeastExponent = -60, kMostExponent = 40;
+    if (glm::length(p.origin) > kMostOrigin || !(p.step >= kLeastStep) || p.step > kMostStep ||
+        p.quantumExponent < kLeastExponent || p.quantumExponent > kMostExponent)
+        return "has a step that is too small or too large";
     if (!(p.errorToSource >= 0) || !(p.errorFromSource >= 0) || !std::isfinite(p.errorToSource + p.errorFromSource))
         return "has errors that are none";
     std::vector<uint8_t> used(samples, 0);

@@ -86,6 +86,11 @@ void samplesAsPoints(const Hierarchy& h, uint32_t chunk, Chunk& of) {
     of.patchPlanes = {};
 }
 
+bool hasPatches(const Hierarchy& h) {
+    const auto isOne = [](const Payload& p) { return p.kind == Kind::patches; };
+    return std::any_of(h.nodes.begin(), h.nodes.end(), isOne) || std::any_of(h.further.begin(), h.further.end(), isOne);
+}
+
 std::span<const shared::PointRecord> withoutEmpty(std::span<const shared::PointRecord> records) {
     const auto isEmpty = [](const shared::PointRecord& r) {
         return r.positionXY == 0 && r.positionZRadiusError == kEmpty.positionZRadiusError && r.normal == 0 &&

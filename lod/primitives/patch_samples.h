@@ -23,6 +23,9 @@ constexpr uint32_t kNoSample = 255;
 /// half of one. Patches reach over the borders of the cell; their samples there are left to the neighbour.
 void samplesAsPoints(const Hierarchy& h, uint32_t chunk, Chunk& of);
 
+/// Is any payload one of patches?
+bool hasPatches(const Hierarchy& h);
+
 /// Records of points, without those at the end that stand for no sample.
 std::span<const shared::PointRecord> withoutEmpty(std::span<const shared::PointRecord> records);
 

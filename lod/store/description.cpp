@@ -153,6 +153,8 @@ json toJson(const StoreDescription& d) {
                 {"added", d.added},
                 {"source", toUtf8(d.source)}};
     if (d.isRigid) out["is_rigid"] = true;
+    if (const PatchCounts& p = d.patches; p.patches + p.discs > 0)
+        out["patches"] = {{"patches", p.patches}, {"samples", p.samples}, {"left", p.left}, {"discs", p.discs}};
     for (const Optics& o : d.optics) out["optics"].push_back(opticsToJson(o));
     for (const PointMaterial& m : d.pointMaterials) {
         json material = {m.roughness, m.metallic};
@@ -213,6 +215,11 @@ StoreDescription fromJson(const json& j) {
     d.isReflectance = j.at("is_reflectance").get<bool>();
     d.isCurves = j.at("is_strands").get<bool>();
     d.isRigid = j.value("is_rigid", false);
+    if (j.contains("patches")) {
+        const json& p = j["patches"];
+        d.patches = {whole<uint64_t>(p.at("patches")), whole<uint64_t>(p.at("samples")), whole<uint64_t>(p.at("left")),
+                     whole<uint64_t>(p.at("discs"))};
+    }
     d.isStochastic = j.at("is_progressive").get<bool>();
     for (const json& factor : j.at("disc_factors")) d.discFactors.push_back(real(factor));
     d.smallestDisc = j.at("smallest_disc").get<double>();

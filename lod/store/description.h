@@ -12,6 +12,12 @@
 
 namespace stipple::lod {
 
+/// What a store of patches holds at its finest level.
+struct PatchCounts {
+    uint64_t patches = 0, samples = 0;
+    uint64_t left = 0, discs = 0;  ///< of the input, what no patch stands for, and what is drawn for that
+};
+
 struct StoreDescription {
     double metresPerUnit = 1;
     glm::dvec3 up{0, 0, 1};  ///< unit length
@@ -36,7 +42,8 @@ struct StoreDescription {
     std::vector<PointMaterial> pointMaterials;       ///< see materials.h
     uint64_t pointsIn = 0;                           ///< that the input declares; 0: not told
     std::map<std::string, uint64_t> dropped, added;  ///< reason -> points: pointsIn + added = points + dropped
-    std::string source;                              ///< file names of the input, without folders
+    PatchCounts patches;
+    std::string source;  ///< file names of the input, without folders
 };
 
 std::string describeAsText(const StoreDescription& description);

@@ -295,13 +295,19 @@ bool readSamples(Patch& p, Plain& plain, NormalFrom from) {
 
 }  // namespace
 
-Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const std::string& where) {
+Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const std::string& where,
+                                         uint64_t mostBlocks) {
     const auto damaged = [&] { return fail(ErrorKind::input, "patches are damaged", where, "build it again"); };
     Sizes sizes{};
     if (bytes.size() < sizeof(sizes)) return damaged();
     std::memcpy(&sizes, bytes.data(), sizeof(sizes));
     uint64_t end = sizeof(sizes);
     for (const uint32_t size : sizes.packed) end += size;
+    constexpr uint64_t kSamplesABlock = 17 * 9, kHeight = 2, kNormal = 4, kColour = 3;
+    const uint64_t most = mostBlocks * kSamplesABlock;
+    if (sizes.patches > mostBlocks || sizes.plain[2] > kHeight * most || sizes.plain[3] > kNormal * most ||
+        sizes.plain[4] > kColour * most)
+        return damaged();
     if (end != bytes.size() || sizes.plain[0] != uint64_t{sizes.patches} * sizeof(Head)) return damaged();
     Plain plain;
     std::array<Bytes*, 5> streams{&plain.heads, &plain.cells, &plain.heights, &plain.normals, &plain.colours};

@@ -26,7 +26,9 @@ struct PatchBytes {
 };
 
 PatchBytes encodePatches(std::span<const Patch> patches);
-/// Of any bytes. `where` for errors. No array is made before the bytes are there that can fill it.
-Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const std::string& where);
+/// Of any bytes. `where` for errors. No array is made before the bytes are there that can fill it, nor what so many
+/// blocks of 16 x 8 cells at most cannot hold.
+Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const std::string& where,
+                                         uint64_t mostBlocks = ~uint64_t{0} >> 16);
 
 }  // namespace stipple::lod

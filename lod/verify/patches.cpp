@@ -81,7 +81,8 @@ Result<std::vector<Patch>> readPatches(const Store& store, uint32_t chunk) {
     const ChunkPlace place = chunkPlace(store.hierarchy, chunk);
     std::vector<uint8_t> bytes(place.bytes);
     STIPPLE_TRY(store.file->readAt(place.offset, bytes.data(), bytes.size()));
-    return decodePatches(bytes, fmt::format("{}: node {}", store.path, store.hierarchy.nodeOf(chunk)));
+    return decodePatches(bytes, fmt::format("{}: node {}", store.path, store.hierarchy.nodeOf(chunk)),
+                         store.hierarchy.payload(chunk).records);
 }
 
 Result<NodeSurface> NodeSurface::read(const Store& store, uint32_t node) {
@@ -144,7 +145,9 @@ Result<uint64_t> measurePatches(const Store& store, uint32_t chunk, uint64_t mos
     for (uint32_t c = 0; c < children; ++c)
         if (!h.nodes[node.firstChild + c].isLeaf()) return 0;
     const uint64_t places = std::min(most, kMostPlaces);
-    const double error = h.errors.decode(node.errorCode) * (1 + 1e-9) + 1e-6;
+    // (Of both from what they were made of.)
+    const double error =
+        (h.errors.decode(node.errorCode) + store.description.roundingUnits / h.unit) * (1 + 1e-9) + 1e-6;
     const std::vector<uint32_t> leaves = nodesAround(h, number, [&](uint32_t n) { return h.nodes[n].isLeaf(); });
     const std::vector<uint32_t> level = nodesAround(h, number, [&](uint32_t n) {
         return h.nodes[n].level == node.level || (h.nodes[n].isLeaf() && h.nodes[n].level < node.level);
@@ -166,11 +169,12 @@ Result<uint64_t> measurePatches(const Store& store, uint32_t chunk, uint64_t mos
     for (size_t k = 0; k < leaves.size(); ++k)
         if (h.nodes[leaves[k]].parent == number) check(fine[k], coarse, cornerOf(h, leaves[k]), sizeOf(h, leaves[k]));
     if (far == 0) return measured;
-    return fail(ErrorKind::input,
-                fmt::format("{} of {} places lie farther from the leaves than the error of {:.3g} units says", far,
-                            measured, error * h.unit),
-                fmt::format("{}: node {}", store.path, number),
-                "this is a fault of the build; please report it with the input");
+    return fail(
+        ErrorKind::input,
+        fmt::format("{} of {} places lie farther from the leaves than the error and the rounding of {:.3g} units say",
+                    far, measured, error * h.unit),
+        fmt::format("{}: node {}", store.path, number),
+        "this is a fault of the build; please report it with the input");
 }
 
 }  // namespace stipple::lod

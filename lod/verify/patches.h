@@ -55,9 +55,9 @@ class NodeSurface {
 };
 
 /// Measures an inner node all of whose children are leaves against the leaves around it, both ways, at about `most`
-/// places each: every place of its patches in its cell lies within its error of a leaf, and every place of a child's
-/// patches in the child's cell within that of a node of its level, or of a leaf above. An error if one does not; else
-/// how many were measured (0: of other nodes).
+/// places each: every place of its patches in its cell lies within its error and the leaves' rounding of a leaf, and
+/// every place of a child's patches in the child's cell within that of a node of its level, or of a leaf above. An
+/// error if one does not; else how many were measured (0: of other nodes).
 Result<uint64_t> measurePatches(const Store& store, uint32_t chunk, uint64_t most);
 
 }  // namespace stipple::lod

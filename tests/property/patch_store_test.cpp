@@ -12,6 +12,7 @@
 #include "lod/verify/patches.h"
 #include "tests/support/patch_cuts.h"
 #include "tests/support/patch_shapes.h"
+#include "tests/support/triangle_field.h"
 
 namespace stipple::lod {
 namespace {
@@ -88,6 +89,54 @@ TEST(PatchStore, EveryLevelIsWithinItsErrorOfTheSourceAndTheLeaves) {
         EXPECT_LE(there, error) << "level " << level;
         EXPECT_LE(back, error) << "level " << level;
         EXPECT_GT(std::max(there, back), 0.02 * error) << "an error that says too little, level " << level;
+    }
+}
+
+/// A torus, one half of many triangles with spikes that no coarse level keeps, the other smooth, of few: shallow leaves
+/// beside deep ones.
+TriangleMesh halfRoughTorus(double height, uint32_t fine, uint32_t few, uint32_t across) {
+    const uint32_t all = fine + few;
+    return test::sheet(all, across, [&](double u, double v) {
+        const auto i = static_cast<uint32_t>(std::lround(u * all)) % all,
+                   j = static_cast<uint32_t>(std::lround(v * across)) % across;
+        const double turn = i < fine ? 0.5 * i / fine : 0.5 + 0.5 * (i - fine) / few;
+        const double a = 6.283185307179586 * turn, b = 6.283185307179586 * j / across;
+        const bool isSpike = i > 0 && i < fine && i % 4 == 2 && j % 4 == 2;
+        const double tube = 0.4 + (isSpike ? height : 0), r = 1 + tube * std::cos(b);
+        return glm::dvec3(r * std::cos(a), r * std::sin(a), tube * std::sin(b));
+    });
+}
+
+/// Places of nodes beyond their cells, which stand for neighbours' triangles: what a neighbour was simplified by before
+/// its strips came is a part of the error.
+TEST(PatchStore, WhatNeighboursWereSimplifiedByIsInTheError) {
+    const test::TempFolder folder;
+    for (const double height : {0.002, 0.006}) {
+        const TriangleMesh mesh = halfRoughTorus(height, 240, 60, 100);
+        PatchBuildSettings settings = finely();
+        settings.leafTriangles = 3000;
+        const Built built = build(mesh, folder / "a.stipple", settings);
+        const Hierarchy& h = built.store.hierarchy;
+        uint32_t shallowest = 100, deepest = 0;
+        const test::TriangleField source(test::trianglesOf(mesh));
+        for (uint32_t n = 0; n < h.nodes.size(); ++n) {
+            const Node& node = h.nodes[n];
+            if (node.isLeaf()) {
+                shallowest = std::min<uint32_t>(shallowest, node.level);
+                deepest = std::max<uint32_t>(deepest, node.level);
+            }
+            const double most =
+                node.isLeaf() ? built.store.description.roundingUnits : h.unit * h.errors.decode(node.errorCode);
+            double far = 0;
+            const glm::dvec3 cell(node.cell[0], node.cell[1], node.cell[2]);
+            for (const Triangle& t : trianglesOf(built.store, n)) {
+                const glm::dvec3 p = (t[0] + t[1] + t[2]) / 3.0;
+                const bool isOwn = glm::floor((p - h.origin) / (h.unit * h.cellSize(node))) == cell;
+                if (!isOwn) far = std::max(far, source.distance(p, 4 * most));
+            }
+            EXPECT_LE(far, most) << "node " << n << ", level " << int{node.level} << (node.isLeaf() ? ", a leaf" : "");
+        }
+        EXPECT_GT(deepest, shallowest);
     }
 }
 

@@ -12,6 +12,7 @@
 #include "lod/builder/morton.h"
 #include "lod/builder/patches/mesh_surface.h"
 #include "lod/builder/patches/near_points.h"
+#include "lod/primitives/patch_samples.h"
 #include "lod/verify/patches.h"
 
 namespace stipple::lod {
@@ -145,8 +146,7 @@ class Measuring {
 namespace {
 
 Result<void> checkPatches(const Store& store) {
-    for (const Node& n : store.hierarchy.nodes)
-        if (n.kind == Kind::patches) return {};
+    if (hasPatches(store.hierarchy)) return {};
     return fail(ErrorKind::usage, "holds no patches: what it holds is measured without its source", store.path,
                 "leave --against out");
 }

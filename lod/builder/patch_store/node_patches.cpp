@@ -139,17 +139,16 @@ class NodePatcher {
 
 }  // namespace
 
-void AroundNode::add(const Soup& from, const glm::dvec3& lo, double cell) {
+void AroundNode::add(const Soup& from, double error, const glm::dvec3& lo, double cell) {
     const double step = cell / kPatchCells;
     SoupPart toWithin(from, within), toBeyond(from, beyond);
     for (size_t t = 0; t < from.indices.size() / 3; ++t) {
         const glm::dvec3 p(middleOf(from, t));
         const glm::dvec3 off = glm::max(glm::max(lo - p, p - (lo + cell)), glm::dvec3(0));
         const double far = std::max({off.x, off.y, off.z});
-        if (far <= kPatchReach * step)
-            toWithin.add(t);
-        else if (far <= kPatchAround * step)
-            toBeyond.add(t);
+        if (far > kPatchAround * step) continue;
+        (far <= kPatchReach * step ? toWithin : toBeyond).add(t);
+        surfaceError = std::max(surfaceError, error);
     }
 }
 

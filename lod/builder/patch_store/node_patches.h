@@ -18,16 +18,17 @@ inline double patchStep(const Frame& frame, uint32_t level) { return frame.cellS
 
 /// Triangles beside a node, by how far their middles are from its cell.
 struct AroundNode {
-    Soup within, beyond;  ///< kPatchReach, kPatchAround
-    /// `lo`: corner of the node's cell.
-    void add(const Soup& from, const glm::dvec3& lo, double cell);
+    Soup within, beyond;      ///< kPatchReach, kPatchAround
+    double surfaceError = 0;  ///< of those: bound of the distance from the source, lattice units
+    /// `lo`: corner of the node's cell; `error`: of all of `from`.
+    void add(const Soup& from, double error, const glm::dvec3& lo, double cell);
 };
 
 struct NodePatches {
     std::vector<Patch> patches;  ///< lengths in lattice units; origins relative to the lower corner of the node's cell
     std::vector<LeftDisc> left;  ///< discs that cover the triangles of the node that are in no patch
     uint64_t trianglesLeft = 0;
-    double error = 0;  ///< bound of the distance between `own` and all that, both ways, lattice units
+    double error = 0;  ///< bound of the distance between the triangles and all that, both ways, lattice units
 };
 
 struct NodeSettings {

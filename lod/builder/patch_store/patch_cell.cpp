@@ -68,6 +68,9 @@ class PatchCell {
                 nodes_.push_back({head, {}});
                 if (!getSoup(from, nodes_.back().surface)) return damaged();
             }
+            double error = 0;
+            from.get(error);
+            aroundError_ = std::max(aroundError_, error);
             if (!getSoup(from, around_) || !from.isWhole()) return damaged();
         }
         // In octant order.
@@ -154,9 +157,11 @@ class PatchCell {
         executor_.parallelFor(here.size(), 1, [&](size_t begin, size_t end) {
             for (size_t k = begin; k < end; ++k) {
                 const SurfaceNode& n = nodes_[here[k]];
+                const AroundNode around = aroundOf(here[k]);
                 const NodeSettings how{patchStep(frame_, level), settings_.coneDegrees,
                                        n.node.isLeaf() ? settings_.samplesATriangle : 0.0};
-                made[k] = patchesOfNode(n.surface, aroundOf(here[k]), cornerOf(frame_, n.node), how, executor_);
+                made[k] = patchesOfNode(n.surface, around, cornerOf(frame_, n.node), how, executor_);
+                made[k].error += std::max(n.surfaceError, around.surfaceError);
             }
         });
         for (size_t k = 0; k < here.size(); ++k) write(nodes_[here[k]], made[k]);
@@ -175,8 +180,7 @@ class PatchCell {
             appendSoup(nodes_[c].surface, n.surface);
             nodes_[c].surface = {};
             n.surfaceError = std::max(n.surfaceError, nodes_[c].surfaceError);
-            n.residual = std::max(n.residual, nodes_[c].residual);
-            n.error = std::max(n.error, nodes_[c].error);
+            n.error = std::max({n.error, nodes_[c].error, nodes_[c].residual});
         }
         if (children > 0) uniteByPlace(n.surface);
     }
@@ -190,9 +194,9 @@ class PatchCell {
         for (size_t k = 0; k < nodes_.size(); ++k) {
             const SurfaceNode& other = nodes_[k];
             if (k == i || other.surface.indices.empty() || !isNear(other.node, lo, cell)) continue;
-            out.add(other.surface, lo, cell);
+            out.add(other.surface, other.surfaceError, lo, cell);
         }
-        out.add(around_, lo, cell);
+        out.add(around_, aroundError_, lo, cell);
         return out;
     }
     /// (What was simplified may lie a little beside its cell.)
@@ -206,14 +210,12 @@ class PatchCell {
 
     void write(SurfaceNode& n, NodePatches& made) {
         const Node& out = n.node;
-        // Of the leaves from each other: by way of the source.
+        (out.isLeaf() ? n.residual : n.error) = std::max(n.error, made.error);
         if (out.isLeaf()) {
-            n.residual = made.error;
             table_.left += made.trianglesLeft;
+            table_.patches += made.patches.size();
             for (const Patch& p : made.patches) table_.samples += p.samples();
             table_.discs += made.left.size();
-        } else {
-            n.error = std::max(n.error, n.surfaceError + made.error + n.residual);
         }
         writePatchNode(frame_, children(n.node), made, n, table_);
     }
@@ -268,6 +270,7 @@ class PatchCell {
         SoupPart part(around_, carried);
         for (size_t t = 0; t < around_.indices.size() / 3; ++t)
             if (isWithin(around_, t, lo, cell) && levelOfOwner(keyOfTriangle(around_, t)) < own.node.level) part.add(t);
+        to.put(aroundError_);
         putSoup(carried, to);
         return to.bytes();
     }
@@ -281,6 +284,7 @@ class PatchCell {
         if (out.indices.empty()) return {};
         ByteWriter to;
         to.put(Sent::strip);
+        to.put(nodes_[0].surfaceError);
         putSoup(out, to);
         return to.bytes();
     }
@@ -302,6 +306,7 @@ class PatchCell {
     Executor& executor_;
     std::vector<SurfaceNode> nodes_;  ///< the first one is the cell's own
     Soup around_;                     ///< triangles of other cells
+    double aroundError_ = 0;          ///< of those: bound of the distance from the source
     PatchTable table_;
     size_t firstOwn_ = 0;  ///< 0: all nodes are to be made
     bool isMade_ = false;

@@ -167,6 +167,7 @@ void PatchTable::put(ByteWriter& to) const {
     to.put(elements);
     to.put(duplicate);
     to.put(left);
+    to.put(patches);
     to.put(samples);
     to.put(discs);
     to.put(residual);
@@ -180,6 +181,7 @@ bool PatchTable::get(ByteReader& from) {
     from.get(elements);
     from.get(duplicate);
     from.get(left);
+    from.get(patches);
     from.get(samples);
     from.get(discs);
     from.get(residual);

@@ -20,7 +20,7 @@ struct PatchTable {
     NodeBatch batch;                                 ///< parents' codes are not known
     std::vector<Points> points;                      ///< ascending
     uint64_t elements = 0, duplicate = 0, left = 0;  ///< triangles or points of the leaves
-    uint64_t samples = 0, discs = 0;                 ///< of the leaves: of patches, and of what fits none
+    uint64_t patches = 0, samples = 0, discs = 0;    ///< of the leaves; discs of what fits no patch
     double residual = 0;                             ///< of the leaves: see PatchNode, lattice units
     double beside = 0;   ///< of the leaves of scans: farthest that a place of a patch is from a point, lattice units
     Steps lo{0}, hi{0};  ///< of vertices or points, where there are elements
@@ -33,8 +33,10 @@ struct PatchNode {
     Node node;
     Key key = 0;
     double surfaceError = 0;  ///< of what its patches are made of, bound of the distance from the source, lattice units
-    double residual = 0;      ///< of the leaves below: of their patches from the source
-    double error = 0;         ///< of its patches: bound of the distance from those of the leaves
+    double residual = 0;      ///< of a leaf: of its patches from the source
+    /// Of others: bound of the distance of their patches from the source, or from the leaves (scans); no less than any
+    /// below.
+    double error = 0;
 };
 
 PatchNode patchNodeAt(const Frame& frame, uint32_t level, Key key);

@@ -10,6 +10,7 @@
 
 #include "engine/base/check.h"
 #include "engine/base/hash.h"
+#include "engine/base/words.h"
 #include "lod/builder/build_version.h"
 #include "lod/builder/counts.h"
 #include "lod/builder/octree/cell_build.h"
@@ -203,9 +204,10 @@ class PatchBuild : public CellContent {
         }
         kept_ += table.elements;
         duplicate_ += table.duplicate;
-        left_ += table.left;
-        samples_ += table.samples;
-        discs_ += table.discs;
+        counts_.patches += table.patches;
+        counts_.samples += table.samples;
+        counts_.left += table.left;
+        counts_.discs += table.discs;
         residual_ = std::max(residual_, table.residual);
         tables_.push_back(std::move(table));
         return tables_.size();
@@ -229,14 +231,19 @@ class PatchBuild : public CellContent {
         // (Middles are rounded: a piece may have no area.)
         if (whole > facts_.pieces) report.dropped["degenerate triangles"] += whole - facts_.pieces;
         report.temporaryBytes = std::max(report.temporaryBytes + source_.readBytes, source_.surveyBytes);
-        report.notes.push_back(
-            fmt::format("{} samples in patches, {:.3g} units from the surface at most", samples_, residual_ * world));
-        if (left_ > 0)
-            report.notes.push_back(fmt::format("{} triangles fit no patch: {} discs stand for them", left_, discs_));
+        report.patches = counts_;
+        report.notes.push_back(fmt::format("{} in {}, {:.3g} units from the surface at most",
+                                           counted(counts_.samples, "sample"),
+                                           counted(counts_.patches, "patch", "patches"), residual_ * world));
+        if (counts_.left > 0)
+            report.notes.push_back(
+                fmt::format("{} no patch: {} for {}", counted(counts_.left, "triangle fits", "triangles fit"),
+                            counted(counts_.discs, "disc stands", "discs stand"), counts_.left == 1 ? "it" : "them"));
         description = settings_.description;
         for (uint32_t n = 0; n < h.nodes.size(); ++n)
             if (h.nodes[n].isLeaf())
                 h.forEachPayload(n, [&](uint32_t chunk) { description.points += h.payload(chunk).records; });
+        description.patches = counts_;
         description.pointsIn = report.pointsIn;
         description.dropped = report.dropped;
         description.added = report.added;
@@ -281,7 +288,8 @@ class PatchBuild : public CellContent {
     Facts facts_;
     std::vector<Subtree> subtrees_;
     std::vector<PatchTable> tables_;
-    uint64_t kept_ = 0, duplicate_ = 0, left_ = 0, samples_ = 0, discs_ = 0;
+    uint64_t kept_ = 0, duplicate_ = 0;
+    PatchCounts counts_;
     double residual_ = 0;
     Steps lo_{std::numeric_limits<int64_t>::max()}, hi_{std::numeric_limits<int64_t>::min()};
 };

@@ -6,7 +6,7 @@
 namespace stipple::lod {
 namespace {
 
-constexpr int kMostDivisions = 2;      ///< of a triangle beyond the segment
+constexpr int kMostDivisions = 3;      ///< of a triangle beyond the segment
 constexpr int kLookAround = 4;         ///< cells, from one that is not drawn to samples; one farther off, if none
 constexpr double kBesideSteps = 1e-9;  ///< of places on lines between cells, samples
 
@@ -62,7 +62,7 @@ class Measure {
   public:
     Measure(const OwnSurface& own, const Patch& patch, const OverPatch& over)
         : own_(own), s_(own.surface), patch_(patch), heights_(patch), surface_(patch), over_(over) {
-        isDoubtful_.assign(patch.cells.size(), 0);
+        above_.assign(patch.cells.size(), 0);
     }
 
     Deviation run() {
@@ -85,13 +85,13 @@ class Measure {
         for (uint32_t j = 0; j + 1 < patch_.height; ++j)
             for (uint32_t i = 0; i + 1 < patch_.width; ++i) {
                 if (!patch_.hasCell(i, j)) continue;
-                const bool isInside = over_.isInside(i, j) && isDoubtful_[size_t{j} * (patch_.width - 1) + i] == 0;
-                if (!isInside)
-                    surface_.trianglesOf(i, j, [&](size_t a, size_t b, size_t c) {
-                        d_.toSource =
-                            boundToSource(s_, {surface_.position(a), surface_.position(b), surface_.position(c)},
-                                          over_.triangle(a), d_.toSource);
-                    });
+                const double above = above_[size_t{j} * (patch_.width - 1) + i];
+                // (A step off is another sheet, maybe.)
+                const bool isInside = over_.isInside(i, j) && above <= double{patch_.step};
+                if (!isInside || above > d_.toSource) {
+                    const double bound = divided(i, j);
+                    d_.toSource = std::max(d_.toSource, isInside ? std::min(above, bound) : bound);
+                }
                 if (!isInside || (i + 2 * j) % 4 == 0) atCentre(i, j, isInside ? 4 : 1);
             }
         return d_;
@@ -132,10 +132,17 @@ class Measure {
         if ((u < 0) != (v < 0) && u != v) compare(p + (u / (u - v)) * (q - p));
         if (isOwn_)
             d_.overOwn = std::max(d_.overOwn, most);
-        else if (most > double{patch_.step})  // of another sheet, maybe
-            isDoubtful_[size_t{j} * (patch_.width - 1) + i] = 1;
         else
-            d_.toSource = std::max(d_.toSource, most);
+            above_[size_t{j} * (patch_.width - 1) + i] = std::max(above_[size_t{j} * (patch_.width - 1) + i], most);
+    }
+    /// What a cell's triangles need, and no less than is known.
+    double divided(uint32_t i, uint32_t j) const {
+        double bound = d_.toSource;
+        surface_.trianglesOf(i, j, [&](size_t a, size_t b, size_t c) {
+            bound = boundToSource(s_, {surface_.position(a), surface_.position(b), surface_.position(c)},
+                                  over_.triangle(a), bound);
+        });
+        return bound;
     }
     /// What no cell is drawn over, in modes that leave the border open: the part of a triangle over a cell is convex,
     /// so none of it is farther from a sample than its farthest corner is.
@@ -228,8 +235,8 @@ class Measure {
     PatchHeights heights_;
     PatchSurface surface_;
     const OverPatch& over_;
-    std::vector<uint8_t> isDoubtful_;  ///< cells
-    bool isOwn_ = true;                ///< the triangles that are looked at
+    std::vector<double> above_;  ///< of cells: the most that heights differ from what is beyond the segment
+    bool isOwn_ = true;          ///< the triangles that are looked at
     Deviation d_;
     double undrawn_ = 0;
     std::vector<double> at_;

@@ -278,6 +278,7 @@ class ScanCell {
             table_.beside = std::max(table_.beside, made.patches.toPoints);
             table_.left += made.left.size();
             table_.discs += made.left.size();
+            table_.patches += made.patches.patches.size();
             for (const Patch& p : made.patches.patches) table_.samples += p.samples();
         } else {
             n.error = made.error;

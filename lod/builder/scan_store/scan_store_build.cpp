@@ -185,8 +185,10 @@ class ScanBuild : public CellContent {
         }
         kept_ += table.elements;
         duplicate_ += table.duplicate;
-        left_ += table.left;
-        samples_ += table.samples;
+        counts_.patches += table.patches;
+        counts_.samples += table.samples;
+        counts_.left += table.left;
+        counts_.discs += table.discs;
         residual_ = std::max(residual_, table.residual);
         beside_ = std::max(beside_, table.beside);
         tables_.push_back(std::move(table));
@@ -208,13 +210,16 @@ class ScanBuild : public CellContent {
         report.notes.push_back(
             fmt::format("{} points became {} samples in patches, at most {:.3g} units from them; no "
                         "place of a patch is farther than {:.3g} from a point",
-                        kept_ - left_, samples_, residual_ * world, beside_ * world));
-        if (left_ > 0) report.notes.push_back(fmt::format("{} points fit no patch and stay points", left_));
+                        kept_ - counts_.left, counts_.samples, residual_ * world, beside_ * world));
+        if (counts_.left > 0)
+            report.notes.push_back(
+                counted(counts_.left, "point fits no patch and stays a point", "points fit no patch and stay points"));
         description = describeInput(input_, settings_.points);
         for (uint32_t n = 0; n < h.nodes.size(); ++n)
             if (h.nodes[n].isLeaf())
                 h.forEachPayload(n, [&](uint32_t chunk) { description.points += h.payload(chunk).records; });
         description.pointsIn = report.pointsIn;
+        description.patches = report.patches = counts_;
         description.dropped = report.dropped;
         // (A corner of a step stands for all of it.)
         const double coarse = coarser() > 0 ? std::sqrt(3.0) * world : 0;
@@ -321,7 +326,8 @@ class ScanBuild : public CellContent {
     bool isBroken_ = false;
     std::vector<Subtree> subtrees_;
     std::vector<PatchTable> tables_;
-    uint64_t kept_ = 0, duplicate_ = 0, left_ = 0, samples_ = 0;
+    uint64_t kept_ = 0, duplicate_ = 0;
+    PatchCounts counts_;
     double residual_ = 0, beside_ = 0;
     Steps lo_{std::numeric_limits<int64_t>::max()}, hi_{std::numeric_limits<int64_t>::min()};
 };

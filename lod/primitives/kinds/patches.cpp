@@ -11,7 +11,7 @@ namespace {
 
 Result<Chunk> decode(const Hierarchy& h, uint32_t chunk, const uint8_t* bytes, size_t count, const std::string& where,
                      bool /*wantLowBits*/) {
-    STIPPLE_ASSIGN(const std::vector<Patch> patches, decodePatches({bytes, count}, where));
+    STIPPLE_ASSIGN(const std::vector<Patch> patches, decodePatches({bytes, count}, where, h.payload(chunk).records));
     uint64_t blocks = 0;
     for (const Patch& p : patches) {
         if (const std::string fault = patchFault(p); !fault.empty())
@@ -92,6 +92,7 @@ void emitPatches(const CutFrame& frame, uint32_t i, uint32_t chunk, const Asked&
     if (!isAsked(h, p, asked)) return;
     const double delivered = deliveredPixels(slotOf(frame, i), p.errorCode, asked);
     if (asked.octantMask) cut.tauEffective = std::max(cut.tauEffective, delivered);
+    tellLeafError(slotOf(frame, i), h.nodes[h.nodeOf(chunk)], asked.epsilon, cut);
     cut.draw.push_back({i, h.nodeOf(chunk), chunk, p.records, asked.code, asked.octantMask,
                         static_cast<float>(delivered), 1, shared::kPatchTriangles});
     cut.counters.trianglesDrawn += costOfPatches(h, chunk, asked);
