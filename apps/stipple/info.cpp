@@ -81,6 +81,12 @@ nlohmann::json payloadInfo(const lod::Hierarchy& h) {
     return out;
 }
 
+/// What its records are.
+std::string recordsOf(const lod::Store& store) {
+    if (store.description.patches.patches > 0) return "blocks of patches";
+    return store.hierarchy.isMixed ? "records" : lod::traitsOf(store.hierarchy.nodes[0].kind).records;
+}
+
 nlohmann::json storeInfo(const lod::Store& store) {
     const lod::Hierarchy& h = store.hierarchy;
     const lod::StoreDescription& d = store.description;
@@ -130,9 +136,7 @@ nlohmann::json storeInfo(const lod::Store& store) {
     for (const lod::Stream& s : h.streams)
         if (s.id == lod::StreamId::surfelWeights) weightBytes += s.bytes;
     return {{"kind", "stipple store"},
-            {"primitive", d.patches.patches > 0 ? "blocks of patches"
-                          : h.isMixed           ? "records"
-                                                : lod::traitsOf(h.nodes[0].kind).records},
+            {"primitive", recordsOf(store)},
             {"payloads", payloadInfo(h)},
             {"surfel_weight_bytes", weightBytes},
             {"materials", d.materials.size()},

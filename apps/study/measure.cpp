@@ -11,6 +11,10 @@ Drawer::Drawer(StorePtr store, std::unique_ptr<render::Backend> backend, Executo
     : backend_(std::move(backend)),
       state_(render::makeFrameState(std::vector<StorePtr>{std::move(store)}, *backend_, executor, {})) {}
 
+Drawer::Drawer(const std::vector<render::PlacedStore>& placed, std::unique_ptr<render::Backend> backend,
+               Executor& executor)
+    : backend_(std::move(backend)), state_(render::makeFrameState(placed, *backend_, executor, {})) {}
+
 Result<render::Image> Drawer::draw(const lod::View& view, const render::FrameSettings& settings) {
     STIPPLE_ASSIGN(const bool isComplete, render::renderUntilComplete(*state_, view, settings));
     if (!isComplete) return fail(ErrorKind::budget, "the model does not fit into the memory for what is drawn");

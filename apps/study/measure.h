@@ -18,6 +18,8 @@ using StorePtr = std::shared_ptr<const lod::Store>;
 class Drawer {
   public:
     Drawer(StorePtr store, std::unique_ptr<render::Backend> backend, Executor& executor);
+    Drawer(const std::vector<render::PlacedStore>& placed, std::unique_ptr<render::Backend> backend,
+           Executor& executor);
     Result<render::Image> draw(const lod::View& view, const render::FrameSettings& settings);
     /// Milliseconds of one more frame of what was drawn last; everything is resident.
     Result<double> again(const lod::View& view, const render::FrameSettings& settings);

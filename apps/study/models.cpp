@@ -10,6 +10,7 @@
 #include "engine/scene/camera.h"
 #include "lod/builder/build.h"
 #include "lod/builder/mesh/mesh_build.h"
+#include "lod/builder/patch_store/patch_store_build.h"
 #include "lod/import/ply/mesh.h"
 #include "lod/primitives/in_memory.h"
 
@@ -130,10 +131,9 @@ Result<std::shared_ptr<const lod::Store>> surfelStore(const Surface& surface, ui
     return built(source, path, executor);
 }
 
-Result<std::shared_ptr<const lod::Store>> triangleStore(const Surface& surface, const std::string& path,
-                                                        Executor& executor) {
-    if (fs::exists(path))
-        if (auto store = opened(path); store) return store;
+namespace {
+
+lod::TriangleMesh meshOf(const Surface& surface) {
     lod::TriangleMesh mesh;
     for (const scene::Mesh& m : surface.scene.meshes)
         for (const scene::Primitive& p : m.primitives) {
@@ -147,12 +147,33 @@ Result<std::shared_ptr<const lod::Store>> triangleStore(const Surface& surface, 
             }
             for (const uint32_t i : p.indices) mesh.indices.push_back(first + i);
         }
+    return mesh;
+}
+
+}  // namespace
+
+Result<std::shared_ptr<const lod::Store>> triangleStore(const Surface& surface, const std::string& path,
+                                                        Executor& executor) {
+    if (fs::exists(path))
+        if (auto store = opened(path); store) return store;
     lod::MeshBuildSettings settings;
     settings.limits.leftovers = lod::Leftovers::replace;
     settings.description.up = {0, 1, 0};
     settings.description.materials.emplace_back();
     Progress silent(false);
-    STIPPLE_TRY(lod::buildMeshStore(lod::sourceOf(std::move(mesh)), path, settings, executor, silent));
+    STIPPLE_TRY(lod::buildMeshStore(lod::sourceOf(meshOf(surface)), path, settings, executor, silent));
+    return opened(path);
+}
+
+Result<std::shared_ptr<const lod::Store>> patchStore(const Surface& surface, const std::string& path,
+                                                     Executor& executor) {
+    if (fs::exists(path))
+        if (auto store = opened(path); store) return store;
+    lod::PatchBuildSettings settings;
+    settings.limits.leftovers = lod::Leftovers::replace;
+    settings.description.up = {0, 1, 0};
+    Progress silent(false);
+    STIPPLE_TRY(lod::buildPatchStore(lod::sourceOf(meshOf(surface)), path, settings, executor, silent));
     return opened(path);
 }
 

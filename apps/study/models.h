@@ -30,6 +30,10 @@ Result<std::shared_ptr<const lod::Store>> surfelStore(const Surface& surface, ui
 Result<std::shared_ptr<const lod::Store>> triangleStore(const Surface& surface, const std::string& path,
                                                         Executor& executor);
 
+/// Elevation patches of them.
+Result<std::shared_ptr<const lod::Store>> patchStore(const Surface& surface, const std::string& path,
+                                                     Executor& executor);
+
 /// A scan as it is.
 Result<std::shared_ptr<const lod::Store>> scanStore(const std::string& file, const std::string& path,
                                                     Executor& executor);

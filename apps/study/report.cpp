@@ -120,6 +120,7 @@ std::string describeSeeds(const SeedsReport& report) {
     describeErrors(report, out);
     describeOutlines(report, out);
     describePinholes(report, out);
+    out += describePatches(report.patches);
     describeFigures(report, out);
     if (!report.missing.empty()) {
         out += "\n## Not made\n\n";
@@ -178,6 +179,7 @@ nlohmann::json jsonOfSeeds(const SeedsReport& report) {
             {"models", models},
             {"outlines", outlines},
             {"pinholes", {{"poses", report.pinholePoses}, {"pixels", report.pinholes.looked}, {"open", open}}},
+            {"patches", jsonOfPatches(report.patches)},
             {"figures", figures},
             {"not_made", report.missing}};
 }

@@ -134,7 +134,7 @@ Result<SeedsReport> studySeeds(const SeedsSettings& settings, const Host& host) 
     fs::create_directories(folder, error);
     if (error) return fail(ErrorKind::output, "cannot be made: " + error.message(), folder, "choose another --output");
     STIPPLE_ASSIGN(report.devices, devicesOf(host));
-    const size_t rows = modelRows().size(), steps = rows + 11;
+    const size_t rows = modelRows().size(), steps = rows + 11 + patchRows().size();
     for (size_t i = 0; i < rows; ++i) {
         STIPPLE_TRY(host.say(modelRows()[i].model, i, steps));
         if (settings.isQuick && modelRows()[i].points > kQuickPoints) continue;
@@ -154,6 +154,14 @@ Result<SeedsReport> studySeeds(const SeedsSettings& settings, const Host& host) 
                             [&] { return host.backend("cpu"); },
                             [&](const std::string& what) { return host.say(what, step++, steps); }};
     STIPPLE_ASSIGN(report.figures, drawFigures(tools, report.missing));
+    const PatchTools patches{settings.dataFolder,
+                             folder,
+                             settings.isQuick,
+                             settings.rounds,
+                             host.executor,
+                             [&] { return host.backend("cpu"); },
+                             [&](const std::string& what) { return host.say(what, step++, steps); }};
+    STIPPLE_ASSIGN(report.patches, measurePatches(patches, report.missing));
     STIPPLE_TRY(host.say("outlines", steps - 2, steps));
     STIPPLE_TRY(measureStatue(folder, host, report));
     STIPPLE_TRY(host.say("pinholes", steps - 1, steps));

@@ -11,6 +11,7 @@
 #include "apps/study/machine.h"
 #include "apps/study/measure.h"
 #include "apps/study/outlines.h"
+#include "apps/study/patch_rows.h"
 #include "apps/study/pinholes.h"
 
 namespace stipple::study {
@@ -53,6 +54,7 @@ struct SeedsReport {
     uint32_t outlineSize = 0;
     Pinholes pinholes;
     uint32_t pinholePoses = 0;
+    std::vector<PatchMeasure> patches;
     std::vector<Figure> figures;
     std::vector<std::string> missing;  ///< rows and figures that could not be made, and why
     double seconds = 0;
