@@ -81,6 +81,12 @@ nlohmann::json payloadInfo(const lod::Hierarchy& h) {
     return out;
 }
 
+uint64_t bytesOfTiles(const lod::Hierarchy& h) {
+    uint64_t bytes = 0;
+    for (const lod::TextureTile& t : h.tiles) bytes += t.bytes;
+    return bytes;
+}
+
 /// What its records are.
 std::string recordsOf(const lod::Store& store) {
     if (store.description.patches.patches > 0) return "blocks of patches";
@@ -130,8 +136,6 @@ nlohmann::json storeInfo(const lod::Store& store) {
     nlohmann::json textures = nlohmann::json::array();
     for (const shared::TextureInfo& t : h.textures)
         textures.push_back({{"width", t.width}, {"height", t.height}, {"levels", t.levels}});
-    uint64_t tileBytes = 0;
-    for (const lod::TextureTile& t : h.tiles) tileBytes += t.bytes;
     uint64_t weightBytes = 0;
     for (const lod::Stream& s : h.streams)
         if (s.id == lod::StreamId::surfelWeights) weightBytes += s.bytes;
@@ -143,7 +147,7 @@ nlohmann::json storeInfo(const lod::Store& store) {
             {"point_materials", materials},
             {"textures", textures},
             {"texture_tiles", h.tiles.size()},
-            {"texture_bytes", tileBytes},
+            {"texture_bytes", bytesOfTiles(h)},
             {"path", store.path},
             {"bytes", store.fileBytes},
             {"content_hash", hexDigits(store.contentHash)},

@@ -129,7 +129,7 @@ TEST(PatchStore, WhatNeighboursWereSimplifiedByIsInTheError) {
                 node.isLeaf() ? built.store.description.roundingUnits : h.unit * h.errors.decode(node.errorCode);
             double far = 0;
             const glm::dvec3 cell(node.cell[0], node.cell[1], node.cell[2]);
-            for (const Triangle& t : trianglesOf(built.store, n)) {
+            for (const Triangle& t : test::trianglesOf(built.store, n)) {
                 const glm::dvec3 p = (t[0] + t[1] + t[2]) / 3.0;
                 const bool isOwn = glm::floor((p - h.origin) / (h.unit * h.cellSize(node))) == cell;
                 if (!isOwn) far = std::max(far, source.distance(p, 4 * most));

@@ -348,6 +348,7 @@ TEST(ScanStore, DamageIsFoundByMeasuring) {
     EXPECT_GT(right->errorsMeasured, 500u);
     // The control: the errors that it says, a 32nd as large.
     built.store.hierarchy.errors.smallest /= 32;
+    built.store.description.roundingUnits /= 32;
     const auto wrong = verifyStore(built.store, *executor);
     ASSERT_FALSE(wrong);
     EXPECT_NE(wrong.error().line().find("farther from the leaves"), std::string::npos) << wrong.error().line();

@@ -12,6 +12,7 @@
 #include <limits>
 
 #include "engine/base/check.h"
+#include "engine/base/words.h"
 #include "lod/builder/build_version.h"
 #include "lod/builder/octree/cell_build.h"
 #include "lod/builder/patch_store/subtree_margins.h"
