@@ -152,6 +152,23 @@ TEST(BuildPatches, OfScansAreVerifiedAgainstThem) {
     EXPECT_NE(wrong.err.find("farther from each other"), std::string::npos) << wrong.err;
 }
 
+// The colours of a scanner hold the light in them, as points and as patches.
+TEST(BuildPatches, OfColouredScansAreNotLitAgain) {
+    const std::string scan = test::dataFile("02_scans/outcrop_rgb_cloudcompare/example_data.laz");
+    if (scan.empty()) GTEST_SKIP();
+    const TempFolder folder;
+    ASSERT_EQ(runProgram(folder, "build " + scan + " --patches -o t.stipple --quiet").code, 0);
+    const auto picture = [&](const std::string& shade) {
+        const Outcome r = runProgram(
+            folder, "render t.stipple -o p.png --force --quiet --device cpu --size 160x120 --error 8 " + shade);
+        EXPECT_EQ(r.code, 0) << r.err;
+        const auto image = image::readImage(folder / "p.png");
+        return image ? image->rgba : std::vector<uint32_t>();
+    };
+    EXPECT_EQ(picture(""), picture("--shade unlit"));
+    EXPECT_NE(picture(""), picture("--shade lit")) << "the control";
+}
+
 TEST(BuildPatches, WhatIsOddIsRefused) {
     const TempFolder folder;
     test::writeObj(folder / "torus.obj", test::torusMesh(20, 9));

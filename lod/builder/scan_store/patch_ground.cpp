@@ -1,5 +1,5 @@
 // A triangle is no farther from the ground than its middle is, and the way from there to its corners more; nor than its
-// corners are from one facet, which is convex. It is quartered, twice at most, until that says enough.
+// corners are from one facet, which is convex. It is quartered until that says enough, or is small itself.
 #include "lod/builder/scan_store/patch_ground.h"
 
 #include <algorithm>
@@ -11,7 +11,8 @@
 namespace stipple::lod {
 namespace {
 
-constexpr int kDeepest = 2;
+constexpr int kDeepest = 5;
+constexpr double kSmall = 0.25;  ///< way from the middle, in limits, that is not divided
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 double distanceTo(const glm::dvec3& p, const PatchGround::Triangle& t) {
@@ -49,11 +50,13 @@ double PatchGround::bound(const Triangle& t, double limit, double enough, int de
         corners = std::max(corners, distanceTo(p, facet.at));
     }
     const double most = std::min(facet.distance + way, corners);
-    if (most <= enough || depth == 0) return most;
+    if (most <= enough || depth == 0 || way <= kSmall * limit) return most;
     const glm::dvec3 ab = 0.5 * (t[0] + t[1]), bc = 0.5 * (t[1] + t[2]), ca = 0.5 * (t[2] + t[0]);
     double worst = 0;
-    for (const Triangle& part : {Triangle{ab, bc, ca}, {t[0], ab, ca}, {ab, t[1], bc}, {ca, bc, t[2]}})
+    for (const Triangle& part : {Triangle{ab, bc, ca}, {t[0], ab, ca}, {ab, t[1], bc}, {ca, bc, t[2]}}) {
         worst = std::max(worst, bound(part, limit, std::max(enough, worst), depth - 1, hint));
+        if (!std::isfinite(worst)) return worst;
+    }
     return std::min(most, worst);
 }
 

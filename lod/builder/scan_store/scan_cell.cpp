@@ -12,13 +12,14 @@
 namespace stipple::lod {
 namespace {
 
-constexpr double kFinest = 0.25;      ///< steps of leaves, in those of their level
-constexpr double kUnited = 0.5;       ///< cells of discs of inner nodes, in steps
-constexpr size_t kManyDiscs = 8192;   ///< of a node: of more, each level has a fourth
-constexpr double kReach = 3;          ///< of points beside a node, in spacings of its own
-constexpr double kMostReach = 6;      ///< steps of its level
-constexpr double kDisc = 0.75;        ///< radius of a point that stays one, in spacings
-constexpr double kLargestDisc = 0.5;  ///< steps of its level
+constexpr double kFinest = 0.25;     ///< steps of leaves, in those of their level
+constexpr double kFar = 0.5;         ///< steps, of patches from those of the children
+constexpr double kUnited = 0.25;     ///< cells of discs of inner nodes, in steps
+constexpr size_t kManyDiscs = 8192;  ///< of a node: of more, each level has a fourth
+constexpr double kReach = 3;         ///< of points beside a node, in spacings of its own
+constexpr double kMostReach = 6;     ///< steps of its level
+constexpr double kDisc = 0.75;       ///< radius of a point that stays one, in spacings
+constexpr double kLargestDisc = 1;   ///< steps of its level
 
 struct ScanNode : PatchNode {
     size_t begin = 0, end = 0;   ///< of its points, in order
@@ -229,7 +230,7 @@ class ScanCell {
         const ScanSettings how{settings_.coneDegrees, step, 1};
         const glm::dvec3 corner = cornerOf(frame_, n.node);
         out.patches = patchesOfScan(surface, liesOf(surface, n.node, kPatchReach * step), corner, how, executor_);
-        const LevelSettings level{corner, frame_.cellSize(n.node.level), step};
+        const LevelSettings level{corner, frame_.cellSize(n.node.level), kFar * step};
         out.error = agreeWithChildren(children, level, out.patches, out.left);
         const size_t most = std::max(kManyDiscs, out.left.size() / 4);
         out.error = error + std::max(out.error, uniteDiscs(out.left, kUnited * step, most));

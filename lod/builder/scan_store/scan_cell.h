@@ -8,7 +8,7 @@
 namespace stipple::lod {
 
 /// Cells of the grid along an edge of a node's cell.
-constexpr uint32_t kScanCells = 128;
+constexpr uint32_t kScanCells = 80;
 inline double scanStep(const Frame& frame, uint32_t level) { return frame.cellSize(level) / kScanCells; }
 /// How far around a cell points are needed, in parts of its edge.
 constexpr double kScanMargin = kPatchAround / kScanCells;

@@ -14,7 +14,7 @@ struct ChildPatches {
 struct LevelSettings {
     glm::dvec3 corner{0};  ///< of the node's cell
     double edge = 0;       ///< of that
-    double step = 1;       ///< how far from each other the two surfaces may be
+    double step = 1;       ///< how far from each other the two surfaces may be, below called a step
 };
 
 /// Takes away those cells of `made` in the node's cell that lie farther than a step from all of the children's patches,
