@@ -89,6 +89,13 @@ Sample blend(std::vector<Contribution>& list, double& back, const lod::View& vie
     std::erase_if(list, [&](const Contribution& c) {
         return c.sample->depth - c.sample->thickness > back || c.sample->isRound != sum.isRound;
     });
+    // Which way normals point is not known; discs on both sides of an outline, turned to the eye, would cancel out.
+    const auto facing = [](const Sample& s) { return std::sqrt(std::max(0.0, 1 - glm::dot(s.perp, s.perp))); };
+    dvec3 direction(0);
+    for (const auto& [s, w] : list) {
+        const dvec3 n(s->perp, -facing(*s)), first(list.front().sample->perp, -facing(*list.front().sample));
+        direction += (sum.isRound || glm::dot(n, first) >= 0 ? w : -w) * n;
+    }
     for (const auto& [s, w] : list) {
         weight += w;
         sum.depth += view.isOrthographic ? w * s->depth : w / s->depth;  // what is linear on the image
@@ -112,7 +119,8 @@ Sample blend(std::vector<Contribution>& list, double& back, const lod::View& vie
     sum.radius /= weight;
     sum.thickness = sum.thickness / weight / pixelsAt(view, sum.depth);
     sum.centre /= weight;
-    sum.perp /= weight;
+    sum.perp =
+        sum.isRound ? sum.perp / weight : dvec2(direction) / glm::length(direction) * (direction.z > 0 ? -1.0 : 1.0);
     sum.axis /= weight;
     sum.colour /= weight;
     if (sum.isRound) sum.thickness = sum.radius / pixelsAt(view, sum.depth);

@@ -17,8 +17,7 @@ struct Blend {
     float thickness;
     float x;
     float y;
-    float perpX;
-    float perpY;
+    vec3 normal;  // across the view and along it, all to the side of the first; of tubes the first two are normalPerp
     float red;
     float green;
     float blue;
@@ -35,8 +34,7 @@ SHARED_FN Blend emptyBlend() {
     b.thickness = 0.0f;
     b.x = 0.0f;
     b.y = 0.0f;
-    b.perpX = 0.0f;
-    b.perpY = 0.0f;
+    b.normal = vec3(0.0f, 0.0f, 0.0f);
     b.red = 0.0f;
     b.green = 0.0f;
     b.blue = 0.0f;
@@ -46,17 +44,32 @@ SHARED_FN Blend emptyBlend() {
     return b;
 }
 
+// Across the view of its centre and along it.
+SHARED_FN vec3 texelNormal(Texel t) {
+    const vec2 p = t.normalPerp;
+    return vec3(p.x, p.y, -sqrt(max(1.0f - p.x * p.x - p.y * p.y, 0.0f)));
+}
+// Normals are turned to the eye, since nobody knows which way they point. Of discs before an outline and behind it
+// these are opposite across the view: their mean would be a disc that faces the eye and stands out of the outline, a
+// knob. So they are added up to the side of the first one. (Tubes: as they are.)
+SHARED_FN vec3 besideFirst(Texel t, vec3 first, float isRound, float weight) {
+    const vec3 n = texelNormal(t);
+    const float along = n.x * first.x + n.y * first.y + n.z * first.z;
+    const float signed_ = along < 0.0f && isRound < 0.5f ? -weight : weight;
+    return vec3(signed_ * n.x, signed_ * n.y, signed_ * n.z);
+}
+
 // `x`, `y`: centre of the splat relative to the texel being made, pixels. Of texels in one plane, 1 / depth and place
 // are averaged to a point of that plane: 1 / depth is linear on the image. (Orthographic: the depth, imageLinear.)
-SHARED_FN Blend addToBlend(Blend b, Texel t, float inverseDepth, float x, float y, float weight) {
+// `normal`: besideFirst, times the weight.
+SHARED_FN Blend addToBlend(Blend b, Texel t, float inverseDepth, float x, float y, vec3 normal, float weight) {
     b.weight += weight;
     b.inverseDepth += weight * inverseDepth;
     b.radius += weight * t.radius;
     b.thickness += weight * t.thickness;
     b.x += weight * x;
     b.y += weight * y;
-    b.perpX += weight * t.normalPerp.x;
-    b.perpY += weight * t.normalPerp.y;
+    b.normal = vec3(b.normal.x + normal.x, b.normal.y + normal.y, b.normal.z + normal.z);
     b.red += weight * t.colour.x;
     b.green += weight * t.colour.y;
     b.blue += weight * t.colour.z;
@@ -68,6 +81,20 @@ SHARED_FN Blend addToBlend(Blend b, Texel t, float inverseDepth, float x, float 
     return b;
 }
 
+// Of the first of four texels that counts.
+SHARED_FN vec3 firstNormal(Texel t0, Texel t1, Texel t2, Texel t3, float w0, float w1, float w2) {
+    Texel first = t3;
+    first.normalPerp = vec2(w0 > 0.0f   ? t0.normalPerp.x
+                            : w1 > 0.0f ? t1.normalPerp.x
+                            : w2 > 0.0f ? t2.normalPerp.x
+                                        : t3.normalPerp.x,
+                            w0 > 0.0f   ? t0.normalPerp.y
+                            : w1 > 0.0f ? t1.normalPerp.y
+                            : w2 > 0.0f ? t2.normalPerp.y
+                                        : t3.normalPerp.y);
+    return texelNormal(first);
+}
+
 SHARED_FN Texel texelFromBlend(Blend b, float isRound, Lens lens) {
     Texel t;
     const float s = b.weight > 0.0f ? 1.0f / b.weight : 0.0f;
@@ -76,7 +103,11 @@ SHARED_FN Texel texelFromBlend(Blend b, float isRound, Lens lens) {
     t.radius = b.radius * s;
     t.thickness = b.thickness * s;
     t.offset = vec2(b.x * s, b.y * s);
-    t.normalPerp = vec2(b.perpX * s, b.perpY * s);
+    const vec3 n = b.normal;
+    const float unit = 1.0f / sqrt(max(n.x * n.x + n.y * n.y + n.z * n.z, 1.0e-30f));
+    const float toEye = n.z > 0.0f ? -unit : unit;
+    const float across = isRound > 0.5f ? s : toEye;
+    t.normalPerp = vec2(n.x * across, n.y * across);
     t.colour = vec3(b.red * s, b.green * s, b.blue * s);
     t.isRound = isRound;
     t.axis = vec2(b.axisX * s, b.axisY * s);
@@ -139,11 +170,20 @@ SHARED_FN Texel pullTexels(Texel c0, Texel c1, Texel c2, Texel c3, float childSi
     const float w1 = d1 < kFarAway && d1 - t1 <= back ? isLike(c1, isRound) : 0.0f;
     const float w2 = d2 < kFarAway && d2 - t2 <= back ? isLike(c2, isRound) : 0.0f;
     const float w3 = d3 < kFarAway && d3 - t3 <= back ? isLike(c3, isRound) : 0.0f;
+    const float a0 = w0 * (c0.radius * c0.radius);
+    const float a1 = w1 * (c1.radius * c1.radius);
+    const float a2 = w2 * (c2.radius * c2.radius);
+    const float a3 = w3 * (c3.radius * c3.radius);
+    const vec3 first = firstNormal(c0, c1, c2, c3, w0, w1, w2);
     Blend b = emptyBlend();
-    b = addToBlend(b, c0, imageLinear(lens, max(c0.depth, kLeastDepth)), x0, y0, w0 * (c0.radius * c0.radius));
-    b = addToBlend(b, c1, imageLinear(lens, max(c1.depth, kLeastDepth)), x1, y1, w1 * (c1.radius * c1.radius));
-    b = addToBlend(b, c2, imageLinear(lens, max(c2.depth, kLeastDepth)), x2, y2, w2 * (c2.radius * c2.radius));
-    b = addToBlend(b, c3, imageLinear(lens, max(c3.depth, kLeastDepth)), x3, y3, w3 * (c3.radius * c3.radius));
+    b = addToBlend(b, c0, imageLinear(lens, max(c0.depth, kLeastDepth)), x0, y0, besideFirst(c0, first, isRound, a0),
+                   a0);
+    b = addToBlend(b, c1, imageLinear(lens, max(c1.depth, kLeastDepth)), x1, y1, besideFirst(c1, first, isRound, a1),
+                   a1);
+    b = addToBlend(b, c2, imageLinear(lens, max(c2.depth, kLeastDepth)), x2, y2, besideFirst(c2, first, isRound, a2),
+                   a2);
+    b = addToBlend(b, c3, imageLinear(lens, max(c3.depth, kLeastDepth)), x3, y3, besideFirst(c3, first, isRound, a3),
+                   a3);
     Texel t = texelFromBlend(b, isRound, lens);
     const float deepest = max(max(w0 * c0.depth, w1 * c1.depth), max(w2 * c2.depth, w3 * c3.depth));
     const float thickest = max(max(w0 * t0, w1 * t1), max(w2 * t2, w3 * t3));
@@ -310,11 +350,12 @@ SHARED_FN Texel pushTexel(Texel own, Texel q0, Texel q1, Texel q2, Texel q3, Coa
     const float w1 = d1 < kFarAway && d1 - t1 <= back ? k1 * isLike(q1, isRound) : 0.0f;
     const float w2 = d2 < kFarAway && d2 - t2 <= back ? k2 * isLike(q2, isRound) : 0.0f;
     const float w3 = d3 < kFarAway && d3 - t3 <= back ? k3 * isLike(q3, isRound) : 0.0f;
+    const vec3 first = firstNormal(q0, q1, q2, q3, w0, w1, w2);
     Blend b = emptyBlend();
-    b = addToBlend(b, q0, e0.inverseDepth, x0, y0, w0);
-    b = addToBlend(b, q1, e1.inverseDepth, x1, y1, w1);
-    b = addToBlend(b, q2, e2.inverseDepth, x2, y2, w2);
-    b = addToBlend(b, q3, e3.inverseDepth, x3, y3, w3);
+    b = addToBlend(b, q0, e0.inverseDepth, x0, y0, besideFirst(q0, first, isRound, w0), w0);
+    b = addToBlend(b, q1, e1.inverseDepth, x1, y1, besideFirst(q1, first, isRound, w1), w1);
+    b = addToBlend(b, q2, e2.inverseDepth, x2, y2, besideFirst(q2, first, isRound, w2), w2);
+    b = addToBlend(b, q3, e3.inverseDepth, x3, y3, besideFirst(q3, first, isRound, w3), w3);
     const float hasBlend = b.weight > 0.0f ? 1.0f : 0.0f;
     const float isBehind = fine.depth > back ? 1.0f : 0.0f;
     const float isEmpty = fine.depth <= 0.0f ? 1.0f : 0.0f;
