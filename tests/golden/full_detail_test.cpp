@@ -150,15 +150,15 @@ TEST(FullDetail, OfScansIsWhereThePictureSays) {
     const test::TempFolder folder;
     if (const std::string path = test::dataFile("01_meshes/misc/lucy.ply"); !path.empty())
         expectWithin("lucy", test::buildAndOpen(path, folder / "a.stipple", *executor, 2048),
-                     {{"overview", 35, 0.9, 1.2, 1, 0.3, 0.3},
-                      {"close", 25, 0.5, 1.2, 4, 0.5, 0.6},
-                      {"grazing", -5, 0.7, 2, 4, 1, 1}},
+                     {{"overview", 35, 0.9, 0.6, 0.55, 0.2, 0.2},
+                      {"close", 25, 0.5, 0.25, 1.3, 0.1, 0.25},
+                      {"grazing", -5, 0.7, 0.6, 1.4, 0.3, 0.65}},
                      *executor);
     if (const std::string path = test::dataFile("02_scans/als_ahn3_delft/ahn3_cropped_2.laz"); !path.empty())
         expectWithin("als", test::buildAndOpen(path, folder / "b.stipple", *executor, 2048),
-                     {{"overview", 35, 0.9, 0.8, 2.6, 0.3, 0.6},
-                      {"close", 25, 0.25, 0.8, 4, 0.3, 0.6},
-                      {"grazing", 4, 0.7, 1.8, 5, 0.8, 2.2}},
+                     {{"overview", 35, 0.9, 0.8, 2.6, 0.25, 0.6},
+                      {"close", 25, 0.25, 0.5, 2.3, 0.15, 0.35},
+                      {"grazing", 4, 0.7, 1.6, 4.5, 0.75, 2.5}},
                      *executor);
 }
 

@@ -118,7 +118,7 @@ TEST(Silhouettes, OfAScanAreThoseOfItsDiscs) {
     struct Case {
         double distance, overlap;
     };
-    for (const Case& c : {Case{1.8, 0.97}, {0.9, 0.965}, {0.35, 0.965}}) {
+    for (const Case& c : {Case{1.8, 0.975}, {0.9, 0.983}, {0.35, 0.985}}) {
         const lod::View view = test::lookAt(*store, 30, 10, c.distance, 512);
         const render::Image image = test::renderView(store, *backend, *executor, view, fullDetail());
         Outlines o;

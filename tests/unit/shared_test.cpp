@@ -131,6 +131,23 @@ TEST(Pull, ConstantInGivesConstantOut) {
     EXPECT_NEAR(t.offset.x, 0, 1e-6);
 }
 
+// Normals are turned to the eye: those of the surface before an outline and behind it are opposite across the view, and
+// their mean faced the eye.
+TEST(Pull, DiscsOnBothSidesOfAnOutlineStayEdgeOn) {
+    shared::Texel before = plainTexel(10, 3), behind = plainTexel(10, 3);
+    before.normalPerp = {0.96f, 0.1f};
+    behind.normalPerp = {-0.98f, 0.05f};
+    const shared::Lens lens = shared::lensOf(1000, false);
+    for (const auto& [a, b] : {std::pair{before, behind}, {behind, before}}) {
+        const shared::Texel t = shared::pullTexels(a, b, a, b, 1, lens);
+        EXPECT_GT(std::abs(t.normalPerp.x), 0.96f);
+    }
+    // What is seen from its front alone keeps its mean.
+    before.normalPerp = {0.5f, 0.0f};
+    behind.normalPerp = {-0.5f, 0.0f};
+    EXPECT_NEAR(shared::pullTexels(before, behind, before, behind, 1, lens).normalPerp.x, 0, 1e-6f);
+}
+
 TEST(Pull, ManyThinLayersDoNotChain) {
     // A staircase 0.9 thickness apart: only what touches the front layer may be merged (hard case 42).
     const float inverseFocal = 0.001f;
