@@ -12,6 +12,13 @@ int patchHeight(PatchBlocks of, uint block, uint s) {
 bool patchHasCell(PatchBlocks of, uint block, uint cell) {
     return (of.blocks[block].cells[cell / 32u] >> cell % 32u & 1u) != 0u;
 }
+// Metallic and roughness of sample s: behind the blocks, unless all have the same.
+vec2 patchFinishOf(DrawNode node, uint block, uint s) {
+    if (node.materials == 0u || (node.material & kOnlyMaterial) != 0u) return patchFinish(node.material & ~kOnlyMaterial);
+    const uint number = block * kPatchSamples + s;
+    const uint pair = RecordWords(uvec2(node.addressLow, node.addressHigh)).words[kPatchBlockWords * node.materials + number / 2u];
+    return patchFinish((number & 1u) != 0u ? pair >> 16 : pair & 0xffffu);
+}
 // Of sample s, in camera space.
 vec3 patchPlace(PatchBlocks of, uint block, DrawMesh m, uint s) {
     const uint place = of.blocks[block].place;

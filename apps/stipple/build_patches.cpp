@@ -6,7 +6,9 @@
 #include <filesystem>
 
 #include "apps/stipple/ply_meshes.h"
+#include "engine/base/hash.h"
 #include "engine/base/words.h"
+#include "engine/scene/place_looks.h"
 #include "engine/scene/triangles.h"
 #include "lod/builder/patch_store/patch_store_build.h"
 #include "lod/builder/scan_store/scan_store_build.h"
@@ -34,12 +36,6 @@ nlohmann::json patchCountsJson(const lod::PatchCounts& of) {
     return {{"patches", of.patches}, {"samples", of.samples}, {"left", of.left}, {"discs", of.discs}};
 }
 
-bool hasTextures(const scene::Scene& scene) {
-    for (const scene::Material& m : scene.materials)
-        if (m.baseColourTexture.texture >= 0) return true;
-    return false;
-}
-
 namespace {
 
 tl::unexpected<Error> noTriangles(const std::string& input) {
@@ -51,6 +47,7 @@ Result<lod::PatchBuildSettings> settingsOf(const BuildOptions& build) {
     STIPPLE_ASSIGN(settings.limits, build.settings());
     settings.coneDegrees = build.patches.coneDegrees;
     settings.samples = build.patches.samples;
+    if (build.material) settings.description.pointMaterials = {*build.material};
     settings.description.up =
         lod::axisVector(build.up.empty() ? lod::UpAxis::y : static_cast<lod::UpAxis>(build.up[0] - 'x'));
     return settings;
@@ -58,6 +55,9 @@ Result<lod::PatchBuildSettings> settingsOf(const BuildOptions& build) {
 
 Result<lod::BuildReport> ofScans(const std::vector<std::string>& inputs, const std::string& output,
                                  const BuildOptions& build, Executor& executor, Progress& progress) {
+    if (build.material)
+        return fail(ErrorKind::usage, "is of meshes", "--patches of a scan with a material",
+                    "leave it out here, and give it when drawing");
     lod::ScanBuildSettings settings;
     STIPPLE_ASSIGN(settings.points, build.settings());
     settings.coneDegrees = build.patches.coneDegrees;
@@ -85,6 +85,28 @@ Result<lod::BuildReport> ofPly(const std::vector<std::string>& files, const std:
                                 settings, executor, progress);
 }
 
+/// What a scene's materials and textures say, in memory as long as the build.
+struct Looks {
+    std::vector<scene::DecodedImage> images;
+    uint64_t imageBytes = 0, identity = 0;
+    lod::PlaceLooks looks;  ///< empty: all has one material, and no textures
+};
+
+Result<Looks> looksOf(const scene::Scene& scene, const scene::MaterialList& materials, uint64_t memoryBytes) {
+    Looks out;
+    if (!scene::hasTextures(scene) && materials.list.size() < 2) return out;
+    STIPPLE_ASSIGN(out.images, decodeImages(scene, memoryBytes));
+    for (const scene::DecodedImage& image : out.images) {
+        const uint64_t bytes = image.rgba.size() * sizeof(uint32_t);
+        out.imageBytes += bytes;
+        out.identity = out.identity * 31 + hashBytes(image.rgba.data(), bytes);
+    }
+    for (const lod::PointMaterial& m : materials.list)
+        for (const char c : lod::identityOf(m)) out.identity = out.identity * 31 + static_cast<unsigned char>(c);
+    out.looks = scene::placeLooks(scene, out.images);
+    return out;
+}
+
 Result<lod::BuildReport> ofScene(const std::string& input, const std::string& output, const BuildOptions& build,
                                  Executor& executor, Progress& progress) {
     STIPPLE_ASSIGN(lod::PatchBuildSettings settings, settingsOf(build));
@@ -92,17 +114,26 @@ Result<lod::BuildReport> ofScene(const std::string& input, const std::string& ou
     lod::MeshSource source = scene::triangleSource(scene, scene::placements(scene));
     if (source.triangles == 0) return noTriangles(input);
     settings.description.source = fs::path(input).filename().string();
-    source.read = [plain = source.read, &scene](const lod::MeshSource::Take& take) {
-        return plain([&](const lod::TriangleMesh& block) {
-            lod::TriangleMesh baked = block;
-            bakeMaterials(scene, baked);
-            for (uint32_t& surface : baked.surface) surface &= ~shared::kSurfaceMaterialMask;
-            return take(baked);
-        });
-    };
+    const scene::MaterialList materials = scene::materialList(scene);
+    STIPPLE_ASSIGN(const Looks looks, looksOf(scene, materials, settings.limits.memoryBytes));
+    settings.looks = looks.looks;
+    settings.looksIdentity = looks.identity;
+    settings.readerShare = static_cast<double>(looks.imageBytes) / static_cast<double>(settings.limits.memoryBytes);
+    settings.limits.memoryBytes -= looks.imageBytes;
+    if (!build.material && !(materials.list.size() == 1 && materials.list.front() == lod::PointMaterial{}))
+        settings.description.pointMaterials = materials.list;
+    if (!settings.looks)
+        source.read = [plain = source.read, &scene](const lod::MeshSource::Take& take) {
+            return plain([&](const lod::TriangleMesh& block) {
+                lod::TriangleMesh baked = block;
+                bakeMaterials(scene, baked);
+                for (uint32_t& surface : baked.surface) surface &= ~shared::kSurfaceMaterialMask;
+                return take(baked);
+            });
+        };
     STIPPLE_ASSIGN(lod::BuildReport report, lod::buildPatchStore(source, output, settings, executor, progress));
-    if (hasTextures(scene))
-        report.notes.emplace_back("textures are left out: patches have the colours of vertices and materials alone");
+    if (!build.material && materials.hasMixedOptics())
+        report.notes.emplace_back("some of it is glass and some is not: patches of one store are opaque then");
     report.notes.insert(report.notes.begin(), scene.notes.begin(), scene.notes.end());
     return report;
 }
@@ -179,9 +210,9 @@ Result<lod::BuildReport> buildPatches(const std::vector<std::string>& inputs, co
                     "leave it out; convert --patches --fill-gaps writes a scene");
     if (build.ranks != nullptr)
         return fail(ErrorKind::usage, "does not go with --mpi", "--patches", "build it in one process");
-    if (build.surfels > 0 || build.material || build.surfelWeights)
-        return fail(ErrorKind::usage, "is of surfaces",
-                    "--patches with --surfels, --surfel-weights or a material of points", "leave one of them out");
+    if (build.surfels > 0 || build.surfelWeights)
+        return fail(ErrorKind::usage, "is of surfaces", "--patches with --surfels or --surfel-weights",
+                    "leave one of them out");
     if (isSceneFile(inputs.front())) {
         if (inputs.size() > 1)
             return fail(ErrorKind::usage, "only one scene with meshes can be built at a time", inputs[1]);

@@ -10,9 +10,8 @@
 
 namespace stipple::app {
 
-/// Colours of vertices times those of their materials (textures are left out).
+/// Colours of vertices times those of their materials.
 void bakeMaterials(const scene::Scene& scene, lod::TriangleMesh& mesh);
-bool hasTextures(const scene::Scene& scene);
 
 /// Places of all points of what can be opened as a scan.
 Result<std::vector<glm::dvec3>> readPlaces(const std::string& input, const scene::ReadSettings& reading);

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <map>
+#include <set>
 
 #include "apps/stipple/build_patches.h"
 #include "apps/stipple/outputs.h"
@@ -30,6 +32,7 @@ struct Source {
     lod::PlaceLooks looks;  ///< of the mesh, from `scene` and `images`
     std::unique_ptr<scene::Scene> scene;
     std::vector<scene::DecodedImage> images;
+    std::vector<lod::PointMaterial> materials;  ///< what patches' numbers mean; empty: rough
     lod::PointBlock points;
     bool isMesh = false, isTwoSided = false, isUnlit = false;
 };
@@ -78,6 +81,7 @@ Result<Source> readSource(const PatchConversion& o, std::vector<std::string>& no
             STIPPLE_ASSIGN(out.images, decodeImages(scene, o.build.reading().memoryBytes));
             out.scene = std::make_unique<scene::Scene>(std::move(scene));
             out.looks = scene::placeLooks(*out.scene, out.images);
+            out.materials = scene::materialList(*out.scene).list;
             if (scene::hasTextures(*out.scene))
                 notes.emplace_back(
                     "textures become colours and normals of samples; --patch-samples N for more of them");
@@ -124,60 +128,102 @@ glm::vec4 linearColour(uint32_t srgb) {
     return {channel(0), channel(8), channel(16), 1};
 }
 
-/// The samples of all patches as vertices, their cells and the gaps between them as triangles.
-scene::Primitive trianglesOf(const lod::PatchSet& set) {
-    scene::Primitive p;
-    p.kind = scene::PrimitiveKind::triangles;
-    p.material = 0;
-    std::vector<std::vector<uint32_t>> vertices(set.patches.size());
-    for (size_t k = 0; k < set.patches.size(); ++k) {
-        const lod::Patch& patch = set.patches[k];
-        const lod::PatchSurface surface(patch);
-        vertices[k].assign(patch.heights.size(), 0);
-        for (size_t s = 0; s < patch.heights.size(); ++s) {
-            if (patch.heights[s] == 0) continue;
-            vertices[k][s] = static_cast<uint32_t>(p.position.size());
-            p.position.emplace_back(surface.position(s));
-            p.normal.push_back(
-                glm::normalize(glm::vec3(surface.frame() * glm::dvec3(shared::octDecode(patch.normals[s])))));
-            p.colour.push_back(linearColour(patch.colours[s]));
-        }
-        surface.triangles([&](size_t a, size_t b, size_t c) {
-            for (const size_t s : {a, b, c}) p.indices.push_back(vertices[k][s]);
-        });
+/// Primitives of a kind, one for each material.
+class ByMaterial {
+  public:
+    explicit ByMaterial(scene::PrimitiveKind kind) : kind_(kind) {}
+    scene::Primitive& of(uint8_t material) {
+        auto& [primitive, vertices] = made_[material];
+        primitive.kind = kind_;
+        primitive.material = material;
+        return primitive;
     }
-    for (const auto& gap : set.gaps)
-        for (const lod::PatchCorner& c : gap) p.indices.push_back(vertices[c.patch][c.sample]);
-    return p;
+    /// The vertex of a sample in the primitive of a material: made where it is not there yet.
+    uint32_t vertexOf(uint8_t material, const lod::PatchCorner& corner, const std::vector<lod::Patch>& patches) {
+        scene::Primitive& p = of(material);
+        const lod::Patch& patch = patches[corner.patch];
+        std::vector<std::vector<uint32_t>>& ofPatches = made_[material].vertices;
+        ofPatches.resize(patches.size());
+        std::vector<uint32_t>& vertices = ofPatches[corner.patch];
+        if (vertices.empty()) vertices.assign(patch.heights.size(), ~0u);
+        uint32_t& vertex = vertices[corner.sample];
+        if (vertex != ~0u) return vertex;
+        vertex = static_cast<uint32_t>(p.position.size());
+        const lod::PatchSurface surface(patch);
+        p.position.emplace_back(surface.position(corner.sample));
+        p.normal.push_back(
+            glm::normalize(glm::vec3(surface.frame() * glm::dvec3(shared::octDecode(patch.normals[corner.sample])))));
+        p.colour.push_back(linearColour(patch.colours[corner.sample]));
+        return vertex;
+    }
+    void moveTo(std::vector<scene::Primitive>& to) {
+        for (auto& [material, made] : made_) to.push_back(std::move(made.primitive));
+    }
+
+  private:
+    struct Made {
+        scene::Primitive primitive;
+        std::vector<std::vector<uint32_t>> vertices;  ///< of the samples of each patch; ~0: not there
+    };
+    scene::PrimitiveKind kind_;
+    std::map<uint8_t, Made> made_;
+};
+
+/// The samples of all patches as vertices, their cells and the gaps between them as triangles, each with the material
+/// of its first corner.
+void addTriangles(const lod::PatchSet& set, std::vector<scene::Primitive>& to) {
+    ByMaterial made(scene::PrimitiveKind::triangles);
+    const auto add = [&](const std::array<lod::PatchCorner, 3>& t) {
+        const std::vector<uint8_t>& materials = set.patches[t[0].patch].materials;
+        const uint8_t material = materials.empty() ? uint8_t{0} : materials[t[0].sample];
+        for (const lod::PatchCorner& c : t)
+            made.of(material).indices.push_back(made.vertexOf(material, c, set.patches));
+    };
+    for (uint32_t k = 0; k < set.patches.size(); ++k)
+        lod::PatchSurface(set.patches[k]).triangles([&](size_t a, size_t b, size_t c) {
+            const auto corner = [&](size_t s) { return lod::PatchCorner{k, static_cast<uint32_t>(s)}; };
+            add({corner(a), corner(b), corner(c)});
+        });
+    for (const auto& gap : set.gaps) add(gap);
+    made.moveTo(to);
 }
 
-scene::Primitive pointsOf(const lod::PointBlock& left) {
-    scene::Primitive p;
-    p.kind = scene::PrimitiveKind::points;
-    p.material = 0;
+void addPoints(const lod::PointBlock& left, std::vector<scene::Primitive>& to) {
+    ByMaterial made(scene::PrimitiveKind::points);
     for (size_t i = 0; i < left.position.size(); ++i) {
+        scene::Primitive& p = made.of(left.material.empty() ? uint8_t{0} : left.material[i]);
+        p.indices.push_back(static_cast<uint32_t>(p.position.size()));
         p.position.emplace_back(left.position[i]);
         if (!left.colour.empty()) p.colour.push_back(linearColour(left.colour[i]));
         if (!left.normal.empty())
             p.normal.push_back(hasDirection(left.normal[i]) ? glm::normalize(withoutScale(left.normal[i]))
                                                             : glm::vec3(0, 0, 1));
-        p.indices.push_back(static_cast<uint32_t>(i));
     }
-    return p;
+    made.moveTo(to);
 }
 
-scene::Scene sceneOf(const lod::PatchSet& set, bool isUnlit) {
+scene::Scene sceneOf(const lod::PatchSet& set, const std::vector<lod::PointMaterial>& materials, bool isUnlit) {
     scene::Scene scene;
-    scene::Material material;
-    material.name = "patches";
-    material.metallic = 0;
-    material.isDoubleSided = set.isTwoSided;
-    material.isUnlit = isUnlit;
-    scene.materials.push_back(material);
     scene::Mesh mesh;
     mesh.name = "patches";
-    if (!set.patches.empty()) mesh.primitives.push_back(trianglesOf(set));
-    if (!set.left.position.empty()) mesh.primitives.push_back(pointsOf(set.left));
+    addTriangles(set, mesh.primitives);
+    addPoints(set.left, mesh.primitives);
+    std::set<int> used;  // of a grid most are not
+    for (const scene::Primitive& p : mesh.primitives) used.insert(p.material);
+    for (scene::Primitive& p : mesh.primitives)
+        p.material = static_cast<int>(std::distance(used.begin(), used.find(p.material)));
+    for (const int number : used) {
+        const auto k = static_cast<size_t>(number);
+        const lod::PointMaterial from = k < materials.size() ? materials[k] : lod::PointMaterial{};
+        scene::Material material;
+        material.name = used.size() > 1 ? fmt::format("patches {}", k) : "patches";
+        material.metallic = from.metallic;
+        material.roughness = from.roughness;
+        material.optics = from.optics;
+        material.isDoubleSided = set.isTwoSided;
+        material.isUnlit = isUnlit;
+        scene.materials.push_back(material);
+    }
     scene.meshes.push_back(std::move(mesh));
     scene::Node node;
     node.name = "patches";
@@ -308,6 +354,7 @@ Result<void> convertToPatches(const PatchConversion& given) {
     const auto executor = makeTbbExecutor(o.build.threads);
     std::vector<std::string> notes;
     lod::PatchSet set;
+    std::vector<lod::PointMaterial> materials;
     bool isMesh = false, isUnlit = false;
     {
         Progress progress(o.build.progressStyle(false));
@@ -316,6 +363,8 @@ Result<void> convertToPatches(const PatchConversion& given) {
         isUnlit = source.isUnlit;
         o.settings.isTwoSided = source.isTwoSided;
         o.settings.looks = source.looks;
+        materials = source.materials;
+        o.settings.hasFineNormals = lod::hasMirrors(materials);
         if (!isMesh && source.points.position.empty()) return fail(ErrorKind::input, "holds no points", o.input);
         progress.plan(isMesh ? std::vector<JobPlan::Stage>{{"patches", 1}}
                              : std::vector<JobPlan::Stage>{{"normals", 0.4}, {"patches", 0.6}});
@@ -334,7 +383,7 @@ Result<void> convertToPatches(const PatchConversion& given) {
     set.toSource.bound += rounding;  // triangles between moved corners move no farther
     set.fromSource.bound += rounding;
     Report report = reportOf(set, nowSeconds() - start);
-    STIPPLE_TRY(scene::writeGltf(sceneOf(set, isUnlit), o.output));
+    STIPPLE_TRY(scene::writeGltf(sceneOf(set, materials, isUnlit), o.output));
     for (const fs::path& path : {fs::path(o.output), fs::path(o.output).replace_extension(".bin")})
         if (std::error_code error; (extension == ".gltf" || path == fs::path(o.output)) && fs::exists(path, error))
             report.fileBytes += fs::file_size(path, error);

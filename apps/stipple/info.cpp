@@ -127,6 +127,8 @@ nlohmann::json storeInfo(const lod::Store& store) {
                              {"metallic", m.metallic},
                              {"transmission", m.optics.transmission},
                              {"points", d.points}});
+    if (d.pointMaterials.size() > 1 && h.nodes[0].kind == lod::Kind::patches)  // samples are not counted
+        for (nlohmann::json& m : materials) m.erase("points");
     if (const auto index = lod::materialAttribute(d)) {
         for (nlohmann::json& m : materials) m["points"] = 0;
         for (const auto& [value, count] : d.attributes[*index].counts)
@@ -177,12 +179,14 @@ nlohmann::json storeInfo(const lod::Store& store) {
 void printMaterials(const nlohmann::json& all) {
     constexpr size_t kMost = 8;
     std::vector<nlohmann::json> used;
+    const auto pointsOf = [](const nlohmann::json& m) { return m.value("points", uint64_t{1}); };
     for (const auto& m : all)
-        if (m["points"] != 0) used.push_back(m);
-    std::stable_sort(used.begin(), used.end(), [](const auto& a, const auto& b) { return a["points"] > b["points"]; });
+        if (pointsOf(m) != 0) used.push_back(m);
+    std::stable_sort(used.begin(), used.end(), [&](const auto& a, const auto& b) { return pointsOf(a) > pointsOf(b); });
     for (size_t i = 0; i < std::min(used.size(), kMost); ++i)
-        fmt::print("  material      roughness {:.2g}, metallic {:.2g}: {} points\n", used[i]["roughness"].get<double>(),
-                   used[i]["metallic"].get<double>(), used[i]["points"].get<uint64_t>());
+        fmt::print("  material      roughness {:.2g}, metallic {:.2g}{}\n", used[i]["roughness"].get<double>(),
+                   used[i]["metallic"].get<double>(),
+                   used[i].contains("points") ? fmt::format(": {} points", used[i]["points"].get<uint64_t>()) : "");
     if (used.size() > kMost) fmt::print("  material      and {} more\n", used.size() - kMost);
 }
 

@@ -127,6 +127,9 @@ struct PatchSource {
     const shared::DrawMesh* mesh;  ///< its patch
     uint32_t level;
     float errorPixels;
+    uint32_t material = shared::kPlainPoint;  ///< of all samples, packed, unless ...
+    const uint16_t* materials = nullptr;      ///< ... each has its own
+    uint32_t materialOf(uint32_t sample) const { return materials == nullptr ? material : materials[sample]; }
 };
 
 /// A splat of a patch that covers so many pixels that its rows are shared out among threads.

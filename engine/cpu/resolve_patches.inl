@@ -22,22 +22,26 @@
             c.z[k][i] = place.z;
             c.normal[k][i] = block.normals[s];
             c.colour[k][i] = block.colours[s];
-            c.u[k][i] = c.v[k][i] = 0;
+            const vec2 finish = patchFinish(source.materialOf(s));  // mixed as texture coordinates are
+            c.u[k][i] = finish.x;
+            c.v[k][i] = finish.y;
         }
     }
 }
 
-/// From the directions of patches to those of the camera; a surface that is rough and sends no light of its own.
-[[gnu::always_inline]] inline void turnPatches(const PatchSource* blocks, const WinningPixels& p, bool hasEmission,
-                                               MaterialRow& __restrict s) {
+/// From the directions of patches to those of the camera; a surface that sends no light of its own. `finish`: metallic
+/// and roughness.
+[[gnu::always_inline]] inline void turnPatches(const PatchSource* blocks, const WinningPixels& p, const UvRow& finish,
+                                               bool hasEmission, MaterialRow& __restrict s) {
     for (size_t i = 0; i < p.count; ++i) {
         const DrawMesh& m = *blocks[p.id[i] / kBlockLanes].mesh;
         const float x = s.nx[i], y = s.ny[i], z = s.nz[i];
         s.nx[i] = m.normalX.x * x + m.normalY.x * y + m.normalZ.x * z;
         s.ny[i] = m.normalX.y * x + m.normalY.y * y + m.normalZ.y * z;
         s.nz[i] = m.normalX.z * x + m.normalY.z * y + m.normalZ.z * z;
-        s.metallic[i] = 0;
-        s.roughness[i] = s.occlusion[i] = 1;
+        s.metallic[i] = finish.u[i];
+        s.roughness[i] = finish.v[i];
+        s.occlusion[i] = 1;
         s.flags[i] = kPixelTriangle;
         if (hasEmission) s.emissionR[i] = s.emissionG[i] = s.emissionB[i] = 0;
     }
@@ -45,7 +49,7 @@
 
 /// Direct interpolation: attributes below the place where a ray meets a disc, from the four samples around it.
 void mixDirect(const FrameConstants& f, const ResolveInput& in, const WinningPixels& p, const RowRays& rays,
-               MaterialRow& out) {
+               MaterialRow& out, UvRow& finish) {
     for (size_t k = 0; k < p.count; ++k) {
         const PatchSource& source = in.patchBlocks[p.id[k] / kBlockLanes];
         const PatchBlock& block = *source.block;
@@ -57,7 +61,7 @@ void mixDirect(const FrameConstants& f, const ResolveInput& in, const WinningPix
         const PatchDisc disc = discSplat(block, place, s, m).disc;
         const PatchMix mix = patchMix(patchDiscHit(disc, m, rays.at(p.pixel[k]), f.nearPlane));
         vec3 normal = vec3(0, 0, 0), colour = vec3(0, 0, 0);
-        float sum = 0;
+        float sum = 0, metallic = 0, roughness = 0;
         for (uint32_t c = 0; c < 4; ++c) {
             const uint32_t at = mix.first + c % 2 + kPatchStride * (c / 2);
             const float w = patchHeight(block, at) != 0 ? mix.weight[c] : 0.0f;
@@ -65,7 +69,10 @@ void mixDirect(const FrameConstants& f, const ResolveInput& in, const WinningPix
             const auto linear = [&](uint32_t shift) {
                 return linearFromByte(float(int(block.colours[at] >> shift & 255u)) * (1.0f / 255.0f));
             };
+            const vec2 of = patchFinish(source.materialOf(at));
             sum += w;
+            metallic += w * of.x;
+            roughness += w * of.y;
             normal = vec3(normal.x + w * n.x, normal.y + w * n.y, normal.z + w * n.z);
             colour = vec3(colour.x + w * linear(0), colour.y + w * linear(8), colour.z + w * linear(16));
         }
@@ -79,6 +86,8 @@ void mixDirect(const FrameConstants& f, const ResolveInput& in, const WinningPix
         out.red[k] = colour.x * inverse;
         out.green[k] = colour.y * inverse;
         out.blue[k] = colour.z * inverse;
+        finish.u[k] = metallic * inverse;
+        finish.v[k] = sum > 0.0f ? roughness * inverse : 1.0f;
     }
 }
 
@@ -87,14 +96,14 @@ void resolvePatches(const FrameConstants& f, const ResolveInput& in, const Winni
     TriangleRow t;
     const RowRays rays = rowRays(f, x0, y);
     if (f.patchAs == kPatchDirect) {
-        mixDirect(f, in, p, rays, t.material);
+        mixDirect(f, in, p, rays, t.material, t.uv);
     } else {
         gatherPatches(in.patchBlocks, p, t.corners);
         weighCorners(p, rays, t.corners, t.material, t.uv, t.wb, t.wc);
         for (size_t i = 0; i < p.count; ++i) t.material.red[i] = t.material.green[i] = t.material.blue[i] = 1;
         mixColours(p, t.corners, t.wb, t.wc, t.material);
     }
-    turnPatches(in.patchBlocks, p, planes.emissive != nullptr, t.material);
+    turnPatches(in.patchBlocks, p, t.uv, planes.emissive != nullptr, t.material);
     packSurfaces(p, rays, t.material, t.perpX, t.perpY, t.word);
     debugColours(f, in.patchBlocks, p, t.material);
     storeTriangles(p, t, row, planes);

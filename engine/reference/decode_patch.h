@@ -12,6 +12,12 @@
 
 namespace stipple::reference {
 
+/// Metallic and roughness: a byte each, low and high; of what has no material, 0 and 1.
+inline glm::dvec2 finishOf(uint32_t material) {
+    if (material >= 65536) return {0, 1};
+    return glm::dvec2(material % 256, material / 256) / 255.0;
+}
+
 struct PatchCorner {
     glm::dvec3 place{0};   ///< lattice steps
     glm::dvec3 normal{0};  ///< the store's axes
@@ -57,11 +63,11 @@ class PatchBlockReader {
     glm::dvec3 origin_{0};
 };
 
-/// What patches are made of: rough, and nothing but their colours.
-inline const shared::SurfaceMaterial kPlainMaterial = [] {
+/// What patches are made of: nothing but what their corners say.
+inline const shared::SurfaceMaterial kPatchMaterial = [] {
     shared::SurfaceMaterial m{};
     m.baseColour = {1, 1, 1};
-    m.roughness = m.alpha = 1;
+    m.metallic = m.roughness = m.alpha = 1;
     return m;
 }();
 

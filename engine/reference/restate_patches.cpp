@@ -28,15 +28,25 @@ class PatchProjector {
         const Whole whole{cut_.errorPixels, h_.nodes[cut_.node].level};
         for (uint32_t b = 0; b < cut_.count; ++b) {
             const PatchBlockReader block(h_, h_.nodes[cut_.node], chunk.patchBlocks.at(b), chunk.patchPlanes.at(b));
+            const auto corner = [&](uint32_t s) {
+                Corner made = cornerOfSample(block.sample(s));
+                made.finish = finishOf(materialOf(chunk, 153 * b + s));
+                return made;
+            };
             block.forEachTriangle([&](uint32_t a, uint32_t c, uint32_t d) {
-                projector_.triangle(
-                    {cornerOfSample(block.sample(a)), cornerOfSample(block.sample(c)), cornerOfSample(block.sample(d))},
-                    shared::kSurfaceTwoSided, kPlainMaterial, {kNoTextures, chunks_}, whole);
+                projector_.triangle({corner(a), corner(c), corner(d)}, shared::kSurfaceTwoSided, kPatchMaterial,
+                                    {kNoTextures, chunks_}, whole);
             });
         }
     }
 
   private:
+    /// Of the whole picture, the sample's own, or its store's.
+    uint32_t materialOf(const lod::Chunk& chunk, uint32_t sample) const {
+        if (draws_.onlyMaterial) return *draws_.onlyMaterial;
+        if (!chunk.materials.empty()) return chunk.materials.at(sample);
+        return instance_.hierarchy < draws_.pointMaterial.size() ? draws_.pointMaterial[instance_.hierarchy] : ~0u;
+    }
     Corner cornerOfSample(const PatchCorner& of) const {
         const dvec3 world =
             instance_.translation + instance_.rotation * (instance_.scale * (h_.origin + h_.unit * of.place));

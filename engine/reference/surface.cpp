@@ -195,8 +195,9 @@ bool surfaceOn(const dvec3& ray, const dvec2& weights, double footprint, const C
     s.isUnlit = (surface & shared::kSurfaceUnlit) != 0;
     s.optic = m.optics >> 24;
     s.colour = dvec3(m.baseColour) * dvec3(own) * (hasBase ? dvec3(texel) : dvec3(1));
-    s.metallic = m.metallic;
-    s.roughness = m.roughness;
+    const dvec2 finish = wa * c[0].finish + wb * c[1].finish + wc * c[2].finish;
+    s.metallic = m.metallic * finish.x;
+    s.roughness = m.roughness * finish.y;
     s.emissive = dvec3(m.emissive);
     if (textures.sample(m.surfaceTexture, uv, footprint, texel)) {
         s.roughness *= texel.y;

@@ -14,6 +14,7 @@ struct Corner {
     glm::dvec3 at{0}, normal{0};  ///< camera space
     glm::dvec4 colour{1};         ///< linear
     glm::dvec2 uv{0};
+    glm::dvec2 finish{1};  ///< metallic and roughness, times those of the material
 };
 using Corners = std::array<Corner, 3>;
 

@@ -24,6 +24,7 @@ using glm::dvec2;
 using glm::dvec3;
 
 constexpr double kNever = std::numeric_limits<double>::max();
+constexpr uint32_t kRough = 255u << 8;  ///< packed: not metallic
 
 /// Everything that a store draws in full detail, in its own coordinates.
 struct TracedStore {
@@ -38,10 +39,10 @@ struct TracedStore {
     render::MeshTextures textures;
     BoxTree tree;  ///< items: discs, then triangles, then segments (a store has one kind)
 
-    /// Of a vertex; patches of stores without any are plain.
+    /// Of a vertex; those of patches say it themselves.
     const shared::SurfaceMaterial& materialOf(uint32_t surface) const {
-        const auto& all = store->description.materials;
-        return all.empty() ? kPlainMaterial : all.at(surface & shared::kSurfaceMaterialMask);
+        if (store->hierarchy.groups.empty()) return kPatchMaterial;
+        return store->description.materials.at(surface & shared::kSurfaceMaterialMask);
     }
     dvec3 positionOf(uint32_t vertex) const { return store->hierarchy.origin + store->hierarchy.unit * places[vertex]; }
 };
@@ -75,7 +76,8 @@ void addClusters(const lod::Chunk& chunk, uint32_t node, uint32_t begin, uint32_
     }
 }
 
-/// The lifted triangles of a chunk's patches, seen from both sides.
+/// The lifted triangles of a chunk's patches, seen from both sides; their surface has the packed material instead of a
+/// number.
 void addPatches(const lod::Chunk& chunk, uint32_t node, TracedStore& t) {
     const lod::Hierarchy& h = t.store->hierarchy;
     for (size_t b = 0; b < chunk.patchBlocks.size(); ++b) {
@@ -86,7 +88,11 @@ void addPatches(const lod::Chunk& chunk, uint32_t node, TracedStore& t) {
             shared::MeshVertex v{};
             v.normal = lod::octEncode(glm::vec3(corner.normal));
             v.colour = chunk.patchBlocks[b].colours[s] | 0xff000000u;
-            v.surface = shared::kSurfaceTwoSided;
+            v.surface = shared::kSurfaceTwoSided | kRough;
+            if (!chunk.materials.empty())
+                v.surface = shared::kSurfaceTwoSided | chunk.materials[153 * b + s];
+            else if (!t.store->description.pointMaterials.empty())
+                v.surface = shared::kSurfaceTwoSided | lod::packed(t.store->description.pointMaterials.front());
             t.vertices.push_back(v);
             t.places.push_back(corner.place);
         }
@@ -350,6 +356,10 @@ class Tracer {
         for (size_t k = 0; k < 3; ++k)
             c.at(k) = cornerOf(store.store->hierarchy, place, store.vertices[corners.at(k)],
                                store.places[corners.at(k)], view_);
+        if (store.store->hierarchy.groups.empty())  // a patch
+            for (size_t k = 0; k < 3; ++k)
+                c.at(k).finish = finishOf(settings_.draw.pointMaterial.value_or(store.vertices[corners.at(k)].surface &
+                                                                                shared::kSurfaceMaterialMask));
         const dvec3 face = glm::cross(c[1].at - c[0].at, c[2].at - c[0].at);
         const dvec2 w = glm::clamp(weightsOn(ray, c, face), dvec2(0), dvec2(1));
         Sample sample;

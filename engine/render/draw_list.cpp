@@ -127,14 +127,17 @@ shared::DrawNode makeDrawNode(const lod::CutDraw& draw, const lod::Payload& payl
     d.spacing = isSpaced ? steps * static_cast<float>(worldPerStep) : 0.0f;
     d.weights = lod::weightsOf(h, draw.chunk) != nullptr ? payload.records : 0u;
     d.errorPixels = draw.errorPixels;
-    if (payload.kind != lod::Kind::points) {
+    const bool isOfPatches = lod::kindOf(h, draw.chunk) == lod::Kind::patches;
+    if (payload.kind != lod::Kind::points && !isOfPatches) {
         d.material = shared::kPlainPoint;
         return d;
     }
     const bool hasDefault = instance.hierarchy < list.pointMaterial.size();
     d.material = list.onlyMaterial.value_or(hasDefault ? list.pointMaterial[instance.hierarchy] : shared::kPlainPoint);
     if (list.onlyMaterial) d.material |= shared::kOnlyMaterial;
-    d.materials = h.hasMaterials && payload.attributeBytes > 0 ? payload.records : 0;
+    const bool areSamples = isOfPatches && payload.kind == lod::Kind::points;
+    const auto records = areSamples ? static_cast<uint32_t>(lod::recordsOfSamples(payload.records)) : payload.records;
+    d.materials = h.hasMaterials && (isOfPatches || payload.attributeBytes > 0) ? records : 0;
     return d;
 }
 
@@ -178,7 +181,7 @@ void addNodes(const glm::dmat3& cameraFromWorld, const DrawSettings& settings, E
         batch.nodes.push_back(makeDrawNode(draw, payload, bend, cameraFromWorld, out));
         const shared::DrawNode& node = batch.nodes.back();
         const bool hasMaterial = node.materials > 0 || node.material != shared::kPlainPoint;
-        if (hasMaterial && settings.lit) out.frame.hasMaterials = 1;
+        if (hasMaterial && settings.lit && kind == lod::Kind::points) out.frame.hasMaterials = 1;
         batch.keys.push_back({out.firstSource + instance.source, draw.chunk});
     }
     if (out.swaying == 0) out.bends.clear();

@@ -34,8 +34,9 @@ streaming::ChunkFinish finishOf(const PlacedStore& placed) {
     if (by.mode == lod::ColourMode::own && !hasMaterials) return {};
     const auto apply = [by, store = placed.store](uint32_t index, lod::Chunk& chunk, const uint8_t* bytes,
                                                   size_t count) -> Result<void> {
-        if (!chunk.vertices.empty() || !chunk.patchBlocks.empty())
+        if (!chunk.vertices.empty())
             return lod::checkMaterials(*store, chunk, fmt::format("{}: chunk {}", store->path, index));
+        if (!chunk.patchBlocks.empty()) return lod::addMaterials(*store, index, chunk);
         std::vector<uint8_t> values;
         if (by.needsAttributes()) {
             const auto& attributes = store->description.attributes;

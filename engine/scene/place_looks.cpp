@@ -1,5 +1,6 @@
 #include "engine/scene/place_looks.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "engine/scene/triangles.h"
@@ -23,8 +24,9 @@ struct Layer {
 
 struct Look {
     glm::vec3 base{1}, emissive{0};
-    Layer colour, light, normal;
-    float normalScale = 1;
+    Layer colour, light, normal, finish;
+    float normalScale = 1, roughness = 1, metallic = 0;
+    uint8_t number = 0;
 };
 
 Layer layerOf(const Scene& scene, const std::vector<DecodedImage>& images, const Material& m, const TextureUse& use) {
@@ -36,32 +38,84 @@ Layer layerOf(const Scene& scene, const std::vector<DecodedImage>& images, const
             isOwn ? glm::mat3(1) : use.transform * glm::inverse(leading.transform)};
 }
 
+/// Of each material, and of none: do the triangles of visible nodes have it?
+std::vector<bool> usedMaterials(const Scene& scene, const std::vector<Placement>& placed) {
+    std::vector<bool> isUsed(scene.materials.size() + 1, false);
+    for (const Placement& at : placed)
+        for (const Primitive& p : scene.meshes[static_cast<size_t>(at.mesh)].primitives)
+            if (p.kind == PrimitiveKind::triangles)
+                isUsed[p.material < 0 ? scene.materials.size() : static_cast<size_t>(p.material)] = true;
+    return isUsed;
+}
+
 }  // namespace
 
+bool MaterialList::hasMixedOptics() const {
+    return std::any_of(list.begin(), list.end(), [&](const auto& m) { return !(m.optics == list.front().optics); });
+}
+
+MaterialList materialList(const Scene& scene) {
+    const std::vector<Placement> placed = placements(scene);
+    const std::vector<bool> isUsed = usedMaterials(scene, placed);
+    const std::vector<lod::Optics> optics = surfaceOptics(scene, placed);
+    MaterialList out;
+    std::vector<lod::PointMaterial> all;
+    for (size_t k = 0; k <= scene.materials.size(); ++k) {
+        lod::PointMaterial m;
+        if (k < scene.materials.size()) {
+            const Material& from = scene.materials[k];
+            m = {from.roughness, from.metallic, optics.empty() ? lod::Optics{} : optics[k]};
+            out.isGrid =
+                out.isGrid || (isUsed[k] && isOnLeading(scene, from.metallicRoughnessTexture, leadingUse(from)));
+        }
+        all.push_back(m);
+        if (isUsed[k] && std::find(out.list.begin(), out.list.end(), m) == out.list.end()) out.list.push_back(m);
+    }
+    out.isGrid = out.isGrid || out.list.size() > lod::kMostPointMaterials;
+    if (out.isGrid) out.list = lod::materialGrid();
+    for (const lod::PointMaterial& m : all) {
+        const auto known = std::find(out.list.begin(), out.list.end(), m);
+        out.numbers.push_back(out.isGrid                ? lod::gridIndex(double{m.roughness}, double{m.metallic})
+                              : known == out.list.end() ? uint8_t{0}
+                                                        : static_cast<uint8_t>(known - out.list.begin()));
+    }
+    return out;
+}
+
 lod::PlaceLooks placeLooks(const Scene& scene, const std::vector<DecodedImage>& images) {
+    const MaterialList materials = materialList(scene);
     std::vector<Look> looks;
     for (const Material& m : scene.materials)
         looks.push_back({glm::vec3(m.baseColour), m.emissive, layerOf(scene, images, m, m.baseColourTexture),
                          layerOf(scene, images, m, m.emissiveTexture), layerOf(scene, images, m, m.normalTexture),
-                         m.normalScale});
-    return [looks = std::move(looks)](uint32_t surface, const glm::vec2& uv, float side) {
-        lod::PlaceLook out;
-        const size_t material = surface & shared::kSurfaceMaterialMask;
-        if (material >= looks.size()) return out;
-        const Look& look = looks[material];
-        out.colour = look.base * glm::vec3(look.colour.at(uv, side, true));
-        if (look.emissive != glm::vec3(0)) out.colour += look.emissive * glm::vec3(look.light.at(uv, side, true));
-        if (!look.normal.image || look.normal.image->rgba.empty()) return out;
-        const glm::vec3 n = 2.0f * glm::vec3(look.normal.at(uv, side, false)) - 1.0f;
-        out.normal = {n.x * look.normalScale, n.y * look.normalScale, n.z};
-        return out;
-    };
+                         layerOf(scene, images, m, m.metallicRoughnessTexture), m.normalScale, m.roughness, m.metallic,
+                         materials.numbers[looks.size()]});
+    return
+        [looks = std::move(looks), none = materials.numbers.back()](uint32_t surface, const glm::vec2& uv, float side) {
+            lod::PlaceLook out;
+            const size_t material = surface & shared::kSurfaceMaterialMask;
+            out.material = none;
+            if (material >= looks.size()) return out;
+            const Look& look = looks[material];
+            out.material = look.number;
+            if (look.finish.image != nullptr && !look.finish.image->rgba.empty()) {
+                const glm::vec4 finish = look.finish.at(uv, side, false);
+                out.material = lod::gridIndex(double{look.roughness * finish.g}, double{look.metallic * finish.b});
+            }
+            out.colour = look.base * glm::vec3(look.colour.at(uv, side, true));
+            if (look.emissive != glm::vec3(0)) out.colour += look.emissive * glm::vec3(look.light.at(uv, side, true));
+            if (!look.normal.image || look.normal.image->rgba.empty()) return out;
+            const glm::vec3 n = 2.0f * glm::vec3(look.normal.at(uv, side, false)) - 1.0f;
+            out.normal = {n.x * look.normalScale, n.y * look.normalScale, n.z};
+            return out;
+        };
 }
 
 bool hasTextures(const Scene& scene) {
     for (const Material& m : scene.materials)
-        if (m.baseColourTexture.texture >= 0 || m.normalTexture.texture >= 0 || m.emissiveTexture.texture >= 0)
-            return true;
+        for (const TextureUse* use :
+             {&m.baseColourTexture, &m.normalTexture, &m.emissiveTexture, &m.metallicRoughnessTexture})
+            if (use->texture >= 0) return true;
     return false;
 }
 

@@ -1,13 +1,24 @@
-// Colours and normals of the places of a scene's triangles, from materials and textures.
+// Colours, normals and materials of the places of a scene's triangles, from materials and textures.
 #pragma once
 
 #include "engine/scene/texture_lookup.h"
 #include "lod/primitives/place_look.h"
+#include "lod/primitives/point_material.h"
 
 namespace stipple::scene {
 
-/// Of meshes as triangleSource gives them. Emission is added to the colour, alpha is left out. Both arguments must
-/// stay.
+/// What the triangles of a scene's visible nodes are lit by.
+struct MaterialList {
+    std::vector<lod::PointMaterial> list;  ///< each once; materialGrid() where textures say how rough or metallic it is
+    std::vector<uint8_t> numbers;          ///< in it, of each of the scene's materials, and of "none"
+    bool isGrid = false;
+    /// Glass and what is none in one list.
+    bool hasMixedOptics() const;
+};
+MaterialList materialList(const Scene& scene);
+
+/// Of meshes as triangleSource gives them, with numbers in the list of materials. Emission is added to the colour,
+/// alpha is left out. Both arguments must stay.
 lod::PlaceLooks placeLooks(const Scene& scene, const std::vector<DecodedImage>& images);
 
 /// Some material has a texture that a PlaceLook holds something of.

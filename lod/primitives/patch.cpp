@@ -19,7 +19,7 @@ std::string patchFault(const Patch& p) {
         return "has sides of none, one or too many samples";
     const size_t samples = size_t{p.width} * p.height, cells = size_t{p.width - 1} * (p.height - 1);
     if (p.heights.size() != samples || p.normals.size() != samples || p.colours.size() != samples ||
-        p.cells.size() != cells)
+        p.cells.size() != cells || (!p.materials.empty() && p.materials.size() != samples))
         return "has arrays of other sizes than its sides say";
     const float length = glm::dot(p.turn, p.turn);
     if (!isFinite(p.origin) || !(length > 0.99f && length < 1.01f)) return "has a plane that is none";

@@ -30,6 +30,8 @@ struct Patch {
     std::vector<uint16_t> heights;   ///< width * height codes
     std::vector<uint32_t> normals;   ///< octahedral 16 + 16 of (U, V, N), as long as `heights`
     std::vector<uint32_t> colours;   ///< sRGB 8 + 8 + 8, as long as `heights`
+    /// Numbers in the list of materials that the patches come with, as long as `heights`; empty: all have the first.
+    std::vector<uint8_t> materials;
     /// Bounds, scene units: no place of the patch is farther from the source than the first, no place of the source
     /// that the patch stands for farther from the patch than the second.
     double errorToSource = 0, errorFromSource = 0;

@@ -30,7 +30,8 @@ shared::PatchBlock blockAt(const Patch& p, uint32_t i, uint32_t j, uint32_t numb
             const size_t from = p.at(i + u, j + v);
             const uint32_t to = kPatchStride * v + u;
             b.normals[to] = p.normals[from];
-            b.colours[to] = p.colours[from];
+            b.colours[to] =
+                (p.colours[from] & 0xffffffu) | uint32_t{p.materials.empty() ? uint8_t{0} : p.materials[from]} << 24;
             b.heights[to / 2] |= uint32_t{p.heights[from]} << (16 * (to % 2));
             const uint32_t cell = kPatchCellsAcross * v + u;
             if (u + 1 < across && v + 1 < up && p.hasCell(i + u, j + v)) b.cells[cell / 32] |= 1u << (cell % 32);

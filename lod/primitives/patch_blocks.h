@@ -26,7 +26,7 @@ struct PatchBlocks {
 /// Of each patch that has a number among the blocks, from those of the blocks.
 std::vector<PatchPlane> planesOfPatches(std::span<const shared::PatchBlock> blocks, std::span<const PatchPlane> planes);
 
-/// Blocks of one patch; `number`: its place among those of its chunk.
+/// Blocks of one patch; `number`: its place among those of its chunk. Above colours stand numbers of materials.
 PatchBlocks blocksOf(const Patch& patch, uint32_t number = 0);
 /// Of all patches of a chunk, one after another.
 PatchBlocks blocksOf(std::span<const Patch> patches);

@@ -41,7 +41,8 @@ class Samples {
         const double radius = std::sqrt(0.5) * double{plane.step} / (0.1 + 0.9 * std::max(0.0, local.z));
         return shared::PointRecord{static_cast<uint32_t>(q.x) | static_cast<uint32_t>(q.y) << 16,
                                    static_cast<uint32_t>(q.z) | radiusCodeOf(radius / (65536 * step_)) << 16,
-                                   octEncode(glm::vec3(frame * local)), block.colours[s] | shared::kFlagTwoSided << 24};
+                                   octEncode(glm::vec3(frame * local)),
+                                   (block.colours[s] & 0xffffffu) | shared::kFlagTwoSided << 24};
     }
 
   private:
@@ -75,13 +76,22 @@ void samplesAsPoints(const Hierarchy& h, uint32_t chunk, Chunk& of) {
     const glm::dvec3 corner = glm::dvec3(node.cell[0], node.cell[1], node.cell[2]) * h.cellSize(node);
     const Samples samples(of, h.recordOrigin(node, payload) - corner, std::exp2(payload.stepShift));
     std::vector<shared::PointRecord> records;
+    std::vector<uint16_t> materials;
     const size_t places = recordsOfSamples(of.patchBlocks.size());
     records.reserve(places);
     for (size_t b = 0; b < of.patchBlocks.size(); ++b)
-        for (uint32_t s = 0; s < shared::kPatchSamples; ++s)
-            if (const auto record = samples.at(b, s)) records.push_back(*record);
+        for (uint32_t s = 0; s < shared::kPatchSamples; ++s) {
+            const auto record = samples.at(b, s);
+            if (!record) continue;
+            records.push_back(*record);
+            if (!of.materials.empty()) materials.push_back(of.materials[b * shared::kPatchSamples + s]);
+        }
     records.resize(places, kEmpty);
-    if (places > 0) of.records = std::move(records);
+    if (!of.materials.empty()) materials.resize(places);
+    if (places > 0) {
+        of.records = std::move(records);
+        of.materials = std::move(materials);
+    }
     of.patchBlocks = {};  // with their memory
     of.patchPlanes = {};
 }

@@ -10,6 +10,7 @@ namespace stipple::lod {
 struct PlaceLook {
     glm::vec3 colour{1};        ///< linear; times that of the vertices
     glm::vec3 normal{0, 0, 1};  ///< in the triangle's tangents: x along u, y against v
+    uint8_t material = 0;       ///< number in a list that comes with the function
 };
 
 /// `surface`: of the triangle's vertices; `uv`: of the place; `side`: of the square that is averaged over, in texture

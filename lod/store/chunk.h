@@ -16,8 +16,8 @@ namespace stipple::lod {
 
 struct Chunk {
     std::vector<shared::PointRecord> records;
-    /// Of each record, packed (shaders/shared/material.h); empty: all have the store's. In a stream of their own in the
-    /// file: readers add them (lod/store/materials.h).
+    /// Of each record (of blocks of patches: of each of their samples), packed (shaders/shared/material.h); empty: all
+    /// have the store's. In the file they are numbers: readers add them (lod/store/materials.h).
     std::vector<uint16_t> materials;
     std::vector<uint8_t> weights;  ///< of surfels, where the store has them (surfel_weights.h)
     /// 3 per record (x, y, z), each below 2^stepShift; empty where the step is one lattice unit or the node is no leaf.
@@ -35,12 +35,12 @@ struct Chunk {
     void forEachArray(const Use& use) const {
         use(records);
         use(weights);
+        use(patchBlocks);
         use(materials);
         use(segments);
         use(vertices);
         use(triangles);
         use(texels);
-        use(patchBlocks);
     }
     uint64_t sizeBytes() const {
         uint64_t bytes = clusters.size() * sizeof(shared::MeshCluster) + patchPlanes.size() * sizeof(PatchPlane);

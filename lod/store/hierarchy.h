@@ -83,7 +83,7 @@ struct Hierarchy {
     std::vector<uint32_t> groupTextures;  ///< see MeshGroup
     std::vector<shared::TextureInfo> textures;
     std::vector<TextureTile> tiles;
-    bool hasMaterials = false;  ///< payloads of points with attributes have an index of materials (materials.h)
+    bool hasMaterials = false;  ///< points with attributes, and samples of patches, name materials (materials.h)
     bool isCurves = false;      ///< all records are segments of ribbons and tubes
     bool isRigid = false;       ///< such that wind does not bend
     /// Records of a node are discs of one size, in an order in which any beginning shows the whole: n of them stand for

@@ -12,15 +12,26 @@ namespace stipple::lod {
 namespace {
 
 bool hasIndex(const Store& store, uint32_t chunk) {
-    return store.hierarchy.hasMaterials && !store.hierarchy.isTile(chunk) &&
+    return materialAttribute(store.description) && !store.hierarchy.isTile(chunk) &&
            store.hierarchy.payload(chunk).kind == Kind::points && store.hierarchy.payload(chunk).attributeBytes > 0;
 }
 
-void give(const Store& store, const std::vector<uint8_t>& indices, Chunk& to) {
+uint16_t materialAt(const Store& store, size_t number) {
     const std::vector<PointMaterial>& list = store.description.pointMaterials;
+    return packed(list[number < list.size() ? number : 0]);
+}
+
+void give(const Store& store, const std::vector<uint8_t>& indices, Chunk& to) {
     to.materials.resize(indices.size());
-    for (size_t i = 0; i < indices.size(); ++i)
-        to.materials[i] = packed(list[indices[i] < list.size() ? indices[i] : 0]);
+    for (size_t i = 0; i < indices.size(); ++i) to.materials[i] = materialAt(store, indices[i]);
+}
+
+/// Of patches, whose samples have their numbers above their colours.
+void giveSamples(const Store& store, Chunk& to) {
+    if (store.description.pointMaterials.size() < 2) return;
+    to.materials.reserve(to.patchBlocks.size() * shared::kPatchSamples);
+    for (const shared::PatchBlock& block : to.patchBlocks)
+        for (const uint32_t colour : block.colours) to.materials.push_back(materialAt(store, colour >> 24));
 }
 
 }  // namespace
@@ -42,6 +53,7 @@ std::optional<size_t> materialAttribute(const StoreDescription& d) {
 }
 
 Result<void> addMaterials(const Store& store, uint32_t chunk, const uint8_t* attributes, size_t bytes, Chunk& to) {
+    giveSamples(store, to);
     if (!hasIndex(store, chunk)) return {};
     const std::string where = fmt::format("{}: chunk {}", store.path, chunk);
     STIPPLE_ASSIGN(const std::vector<uint8_t> indices, decodeAttribute(attributes, bytes, store.description.attributes,
@@ -52,6 +64,7 @@ Result<void> addMaterials(const Store& store, uint32_t chunk, const uint8_t* att
 }
 
 Result<void> addMaterials(const Store& store, uint32_t chunk, Chunk& to) {
+    giveSamples(store, to);
     if (!hasIndex(store, chunk)) return {};
     STIPPLE_ASSIGN(const std::vector<uint8_t> indices,
                    readAttribute(store, chunk, *materialAttribute(store.description)));
@@ -60,11 +73,18 @@ Result<void> addMaterials(const Store& store, uint32_t chunk, Chunk& to) {
 }
 
 Result<void> checkMaterialIndices(const Store& store, uint32_t chunk, const std::vector<uint8_t>& indices) {
-    const size_t count = store.description.pointMaterials.size();
+    const size_t count = std::max<size_t>(store.description.pointMaterials.size(), 1);
     const auto beyond = std::find_if(indices.begin(), indices.end(), [&](uint8_t i) { return i >= count; });
     if (beyond == indices.end()) return {};
     return tl::unexpected(damagedStore(fmt::format("{}: chunk {}", store.path, chunk),
                                        fmt::format("a record names material {}, which there is not", *beyond)));
+}
+
+Result<void> checkSampleMaterials(const Store& store, uint32_t chunk, const Chunk& decoded) {
+    std::vector<uint8_t> numbers;
+    for (const shared::PatchBlock& block : decoded.patchBlocks)
+        for (const uint32_t colour : block.colours) numbers.push_back(static_cast<uint8_t>(colour >> 24));
+    return checkMaterialIndices(store, chunk, numbers);
 }
 
 }  // namespace stipple::lod

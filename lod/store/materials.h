@@ -1,6 +1,7 @@
-// Materials of points: a list that a store has, and in an attribute of the name kMaterialAttribute an index into it for
-// every record (without it all have the first). A coarse record has that of most points below it, the smallest index of
-// equals: the attribute's aggregate is its mode.
+// Materials of points and patches: a list that a store has, and an index into it (without it all have the first). Of
+// points it is an attribute of every record, of the name kMaterialAttribute: a coarse record has that of most points
+// below it, the smallest index of equals, for the attribute's aggregate is its mode. Samples of patches have it in
+// their payload (patch_bytes.h).
 #pragma once
 
 #include <optional>
@@ -22,6 +23,8 @@ std::optional<size_t> materialAttribute(const StoreDescription& description);
 Result<void> addMaterials(const Store& store, uint32_t chunk, const uint8_t* attributes, size_t bytes, Chunk& to);
 /// The same, read from the file.
 Result<void> addMaterials(const Store& store, uint32_t chunk, Chunk& to);
+/// Of samples of patches.
+Result<void> checkSampleMaterials(const Store& store, uint32_t chunk, const Chunk& decoded);
 /// Is every index of a payload one of the list?
 Result<void> checkMaterialIndices(const Store& store, uint32_t chunk, const std::vector<uint8_t>& indices);
 

@@ -15,8 +15,9 @@ namespace stipple::lod {
 namespace {
 
 constexpr int kZstdLevel = 9;
-constexpr uint32_t kNormalStep = 32, kMostSteps = 2048;  ///< of roundedNormal: codes 0, 31, 63 ... 65503, 65534
-constexpr uint32_t kNoNormal = 32767u | 32767u << 16;    ///< up: what a first one is compared with
+/// Of roundedNormal: codes 0, s - 1, 2 s - 1 ... 65534. Mirrors have finer ones than the usual.
+constexpr uint32_t kUsualStep = 32, kCodes = 65536;
+constexpr uint32_t kNoNormal = 32767u | 32767u << 16;  ///< up: what a first one is compared with
 enum class NormalFrom : uint8_t { neighbour, slope };
 
 struct Head {
@@ -33,11 +34,17 @@ static_assert(sizeof(Head) == 72);
 struct Sizes {
     uint32_t patches;
     NormalFrom normalFrom;
-    uint8_t reserved[3];             // NOLINT
+    uint8_t hasMaterials;  ///< 1: SizesOfMaterials follow
+    uint8_t finerNormals;  ///< log2 of kUsualStep / their step
+    uint8_t reserved;
     std::array<uint32_t, 5> packed;  ///< heads, cells, heights, normals, colours
     std::array<uint32_t, 5> plain;
 };
 static_assert(sizeof(Sizes) == 48);
+/// Of a stream behind the others.
+struct SizesOfMaterials {
+    uint32_t packed, plain;
+};
 
 using Bytes = std::vector<uint8_t>;
 
@@ -87,16 +94,17 @@ uint16_t predictedHeight(const Patch& p, uint32_t i, uint32_t j, uint16_t last) 
 }
 
 /// Octahedral steps, x and y.
-std::array<uint32_t, 2> stepsOf(uint32_t code) {
-    constexpr uint32_t kRound = 1 + kNormalStep / 2;
-    return {((code & 0xffffu) + kRound) / kNormalStep, ((code >> 16) + kRound) / kNormalStep};
+std::array<uint32_t, 2> stepsOf(uint32_t code, uint32_t step) {
+    const uint32_t round = 1 + step / 2;
+    return {((code & 0xffffu) + round) / step, ((code >> 16) + round) / step};
 }
-uint32_t codeOf(uint32_t x, uint32_t y) {
-    const auto code = [](uint32_t step) { return step == 0 ? 0 : std::min(step * kNormalStep - 1, 65534u); };
+uint32_t codeOf(uint32_t x, uint32_t y, uint32_t step) {
+    const auto code = [&](uint32_t steps) { return steps == 0 ? 0 : std::min(steps * step - 1, kCodes - 2); };
     return code(x) | code(y) << 16;
 }
 
-uint32_t neighbour(const Patch& p, const std::vector<uint32_t>& values, uint32_t i, uint32_t j, uint32_t last) {
+template <typename Value>
+Value neighbour(const Patch& p, const std::vector<Value>& values, uint32_t i, uint32_t j, Value last) {
     const size_t s = p.at(i, j);
     if (i > 0 && p.heights[s - 1] != 0) return values[s - 1];
     if (j > 0 && p.heights[s - p.width] != 0) return values[s - p.width];
@@ -129,14 +137,29 @@ void forEachSample(const Patch& p, const Use& use) {
             if (p.heights[p.at(i, j)] != 0) use(i, j);
 }
 
-Bytes normalBytes(std::span<const Patch> patches, NormalFrom from) {
+/// log2 of kUsualStep / the largest step that all normals stand on.
+uint8_t finerNormals(std::span<const Patch> patches) {
+    uint8_t finer = 0;
+    for (const Patch& p : patches)
+        forEachSample(p, [&](uint32_t i, uint32_t j) {
+            const uint32_t code = p.normals[p.at(i, j)];
+            const auto stands = [&](uint32_t step) {
+                const auto steps = stepsOf(code, step);
+                return codeOf(steps[0], steps[1], step) == code;
+            };
+            while ((kUsualStep >> finer) > 2 && !stands(kUsualStep >> finer)) ++finer;
+        });
+    return finer;
+}
+
+Bytes normalBytes(std::span<const Patch> patches, NormalFrom from, uint32_t step) {
     std::vector<uint16_t> x, y;
     for (const Patch& p : patches) {
         uint32_t last = kNoNormal;
         forEachSample(p, [&](uint32_t i, uint32_t j) {
-            const auto predicted = stepsOf(predictedNormal(p, i, j, last, from));
+            const auto predicted = stepsOf(predictedNormal(p, i, j, last, from), step);
             last = p.normals[p.at(i, j)];
-            const auto steps = stepsOf(last);
+            const auto steps = stepsOf(last, step);
             x.push_back(zigzag(static_cast<uint16_t>(steps[0] - predicted[0])));
             y.push_back(zigzag(static_cast<uint16_t>(steps[1] - predicted[1])));
         });
@@ -162,6 +185,23 @@ Bytes colourBytes(std::span<const Patch> patches) {
     }
     for (size_t k = 1; k < 3; ++k) out[0].insert(out[0].end(), out.at(k).begin(), out.at(k).end());
     return out[0];
+}
+
+/// Minus the neighbour's; empty where all patches have the first material.
+Bytes materialBytes(std::span<const Patch> patches) {
+    Bytes out;
+    bool hasOther = false;
+    for (const Patch& p : patches) {
+        uint8_t last = 0;
+        forEachSample(p, [&](uint32_t i, uint32_t j) {
+            const uint8_t here = p.materials.empty() ? uint8_t{0} : p.materials[p.at(i, j)];
+            const uint8_t before = p.materials.empty() ? uint8_t{0} : neighbour(p, p.materials, i, j, last);
+            hasOther = hasOther || here != 0;
+            out.push_back(static_cast<uint8_t>(here - before));
+            last = here;
+        });
+    }
+    return hasOther ? out : Bytes();
 }
 
 }  // namespace
@@ -192,8 +232,9 @@ PatchBytes encodePatches(std::span<const Patch> patches) {
             last = code;
         });
     }
-    const Bytes fromNeighbour = normalBytes(patches, NormalFrom::neighbour),
-                fromSlope = normalBytes(patches, NormalFrom::slope);
+    const uint8_t finer = finerNormals(patches);
+    const Bytes fromNeighbour = normalBytes(patches, NormalFrom::neighbour, kUsualStep >> finer),
+                fromSlope = normalBytes(patches, NormalFrom::slope, kUsualStep >> finer);
     const Bytes packedNeighbour = compress(fromNeighbour), packedSlope = compress(fromSlope);
     const bool bySlope = packedSlope.size() < packedNeighbour.size();
     const Bytes plainHeights = planes(heights), colours = colourBytes(patches);
@@ -201,15 +242,28 @@ PatchBytes encodePatches(std::span<const Patch> patches) {
                                       bySlope ? packedSlope : packedNeighbour, compress(colours)};
     Sizes sizes{};
     sizes.patches = static_cast<uint32_t>(patches.size());
+    sizes.finerNormals = finer;
     sizes.normalFrom = bySlope ? NormalFrom::slope : NormalFrom::neighbour;
     for (size_t k = 0; k < 5; ++k) sizes.packed.at(k) = static_cast<uint32_t>(packed.at(k).size());
     sizes.plain = {static_cast<uint32_t>(heads.size()), static_cast<uint32_t>(cells.size()),
                    static_cast<uint32_t>(plainHeights.size()), static_cast<uint32_t>(fromSlope.size()),
                    static_cast<uint32_t>(colours.size())};
+    const Bytes plainMaterials = materialBytes(patches), materials = compress(plainMaterials);
+    sizes.hasMaterials = plainMaterials.empty() ? 0 : 1;
+    const auto add = [](Bytes& to, const auto& value) {
+        to.resize(to.size() + sizeof(value));
+        std::memcpy(to.data() + to.size() - sizeof(value), &value, sizeof(value));
+    };
     PatchBytes out;
-    out.bytes.resize(sizeof(sizes));
-    std::memcpy(out.bytes.data(), &sizes, sizeof(sizes));
+    add(out.bytes, sizes);
+    if (sizes.hasMaterials != 0)
+        add(out.bytes,
+            SizesOfMaterials{static_cast<uint32_t>(materials.size()), static_cast<uint32_t>(plainMaterials.size())});
     for (const Bytes& b : packed) out.bytes.insert(out.bytes.end(), b.begin(), b.end());
+    if (sizes.hasMaterials != 0) {
+        out.bytes.insert(out.bytes.end(), materials.begin(), materials.end());
+        out.materials = sizeof(SizesOfMaterials) + materials.size();
+    }
     out.geometry = sizeof(sizes) + packed[0].size() + packed[1].size() + packed[2].size();
     out.normals = packed[3].size();
     out.colours = packed[4].size();
@@ -252,11 +306,12 @@ size_t markSamples(Patch& p) {
 /// Values in the order of samples, over all patches.
 struct Plain {
     Bytes heads, cells, heights, normals, colours;
+    Bytes materials;  ///< empty: all have the first
     size_t samples = 0, next = 0;
 };
 
 /// False where a code is 0, which says "no sample".
-bool readSamples(Patch& p, Plain& plain, NormalFrom from) {
+bool readSamples(Patch& p, Plain& plain, NormalFrom from, uint32_t normalStep) {
     const size_t first = plain.next;
     uint16_t last = 0;
     std::vector<uint16_t> marks = std::move(p.heights);
@@ -277,18 +332,23 @@ bool readSamples(Patch& p, Plain& plain, NormalFrom from) {
     p.normals.assign(marks.size(), 0);
     p.colours.assign(marks.size(), 0);
     uint32_t normal = kNoNormal, colour = 0;
+    uint8_t material = 0;
+    if (!plain.materials.empty()) p.materials.assign(marks.size(), 0);
     forEachMark([&](uint32_t i, uint32_t j, size_t k) {
-        const auto predicted = stepsOf(predictedNormal(p, i, j, normal, from));
+        const auto predicted = stepsOf(predictedNormal(p, i, j, normal, from), normalStep);
         const auto step = [&](size_t axis) {
             const uint16_t difference = unzigzag(fromPlanes(plain.normals, axis * plain.samples + k));
-            return std::min((predicted.at(axis) + difference) & 0xffffu, kMostSteps);
+            return std::min((predicted.at(axis) + difference) & 0xffffu, kCodes / normalStep);
         };
-        p.normals[p.at(i, j)] = normal = codeOf(step(0), step(1));
+        p.normals[p.at(i, j)] = normal = codeOf(step(0), step(1), normalStep);
         const uint32_t before = neighbour(p, p.colours, i, j, colour), green = plain.colours[k];
         const auto value = [&](int c, size_t plane, uint32_t more) {
             return ((channel(before, c) + plain.colours[plane * plain.samples + k] + more) & 255u) << (8 * c);
         };
         p.colours[p.at(i, j)] = colour = value(1, 0, 0) | value(0, 1, green) | value(2, 2, green);
+        if (p.materials.empty()) return;
+        material = static_cast<uint8_t>(neighbour(p, p.materials, i, j, material) + plain.materials[k]);
+        p.materials[p.at(i, j)] = material;
     });
     return true;
 }
@@ -301,7 +361,15 @@ Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const s
     Sizes sizes{};
     if (bytes.size() < sizeof(sizes)) return damaged();
     std::memcpy(&sizes, bytes.data(), sizeof(sizes));
-    uint64_t end = sizeof(sizes);
+    if ((kUsualStep >> std::min<uint32_t>(sizes.finerNormals, 8)) < 2) return damaged();
+    SizesOfMaterials more{};
+    size_t at = sizeof(sizes);
+    if (sizes.hasMaterials != 0) {
+        if (sizes.hasMaterials != 1 || bytes.size() < at + sizeof(more)) return damaged();
+        std::memcpy(&more, bytes.data() + at, sizeof(more));
+        at += sizeof(more);
+    }
+    uint64_t end = uint64_t{at} + more.packed;
     for (const uint32_t size : sizes.packed) end += size;
     constexpr uint64_t kSamplesABlock = 17 * 9, kHeight = 2, kNormal = 4, kColour = 3;
     const uint64_t most = mostBlocks * kSamplesABlock;
@@ -311,12 +379,16 @@ Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const s
     if (end != bytes.size() || sizes.plain[0] != uint64_t{sizes.patches} * sizeof(Head)) return damaged();
     Plain plain;
     std::array<Bytes*, 5> streams{&plain.heads, &plain.cells, &plain.heights, &plain.normals, &plain.colours};
-    size_t at = sizeof(sizes);
     for (size_t k = 0; k < 5; ++k) {
         auto stream = decompress(bytes.subspan(at, sizes.packed.at(k)), sizes.plain.at(k));
         if (!stream) return damaged();
         *streams.at(k) = std::move(*stream);
         at += sizes.packed.at(k);
+    }
+    if (sizes.hasMaterials != 0) {
+        auto stream = decompress(bytes.subspan(at, more.packed), more.plain);
+        if (!stream || stream->empty()) return damaged();
+        plain.materials = std::move(*stream);
     }
     std::vector<Patch> out(sizes.patches);
     size_t cell = 0;
@@ -341,10 +413,12 @@ Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const s
         plain.samples += markSamples(p);
     }
     if (cell != plain.cells.size() || plain.heights.size() != 2 * plain.samples ||
-        plain.normals.size() != 4 * plain.samples || plain.colours.size() != 3 * plain.samples)
+        plain.normals.size() != 4 * plain.samples || plain.colours.size() != 3 * plain.samples ||
+        (!plain.materials.empty() && plain.materials.size() != plain.samples))
         return damaged();
     for (Patch& p : out)
-        if (!readSamples(p, plain, sizes.normalFrom) || !patchFault(p).empty()) return damaged();
+        if (!readSamples(p, plain, sizes.normalFrom, kUsualStep >> sizes.finerNormals) || !patchFault(p).empty())
+            return damaged();
     return out;
 }
 

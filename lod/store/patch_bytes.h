@@ -3,9 +3,11 @@
 //   head      sides, plane, errors, a patch after the other
 //   cells     a bit each
 //   heights   of samples in use: codes minus left + below - lower left (or what there is of them), zigzag
-//   normals   octahedral steps (11 bits each way) minus the neighbour's, or minus the normal of the heights' own slope:
+//   normals   octahedral steps (11 bits each way, of mirrors 13) minus the neighbour's, or minus the normal of the
+//   heights' own slope:
 //             whichever takes less room
 //   colours   minus the neighbour's; red and blue also minus green's
+//   materials numbers minus the neighbour's; left out where all have the first
 //
 // Everything is exact: decoding gives the patches again.
 #pragma once
@@ -21,8 +23,8 @@ namespace stipple::lod {
 
 struct PatchBytes {
     std::vector<uint8_t> bytes;
-    /// Of `bytes`: heads, cells and heights; normals; colours.
-    uint64_t geometry = 0, normals = 0, colours = 0;
+    /// Of `bytes`: heads, cells and heights; normals; colours; materials.
+    uint64_t geometry = 0, normals = 0, colours = 0, materials = 0;
 };
 
 PatchBytes encodePatches(std::span<const Patch> patches);

@@ -208,6 +208,8 @@ Result<Store> openStore(const std::string& path) {
     h.hasMaterials = materialAttribute(store.description).has_value();
     for (const Node& n : h.nodes)
         if (n.isLeaf()) h.finestCode = std::max(h.finestCode, n.errorCode);
+    for (const Node& n : h.nodes)
+        h.hasMaterials = h.hasMaterials || (n.kind == Kind::patches && store.description.pointMaterials.size() > 1);
     h.discFactors = store.description.discFactors;
     h.smallestDisc = store.description.smallestDisc / h.unit;
     store.contentHash = head.contentHash;

@@ -54,6 +54,7 @@ Result<void> verifyPayload(const Store& store, uint32_t index, uint64_t discs, C
         counts.measured += measured;
     }
     STIPPLE_TRY(checkDrawnPlaces(store, index, chunk));
+    STIPPLE_TRY(checkSampleMaterials(store, index, chunk));
     const bool hasAttributes = payload.attributeBytes > 0 || !h.isMixed;
     for (size_t a = 0; hasAttributes && a < store.description.attributes.size(); ++a) {
         STIPPLE_ASSIGN(const std::vector<uint8_t> values, readAttribute(store, index, a));

@@ -9,12 +9,14 @@ struct PatchSurface {
     vec3 normal;  // of the patch's directions, any length
     vec3 face;    // camera space
     vec3 colour;
+    vec2 finish;  // metallic, roughness
 };
 
+uint byteOf(float v) { return uint(clamp(v, 0.0, 1.0) * 255.0 + 0.5); }
 vec3 colourOf(PatchBlocks of, uint block, uint s) { return decodeTexel(of.blocks[block].colours[s], true).xyz; }
 
 // Where a ray meets a triangle, from its corners.
-PatchSurface onTriangle(PatchBlocks of, uint block, DrawMesh m, uint lane, PixelRay ray) {
+PatchSurface onTriangle(PatchBlocks of, DrawNode node, uint block, DrawMesh m, uint lane, PixelRay ray) {
     const uint corners = patchCorners(of, block, lane);
     const uint a = corners & 255u, b = corners >> 8 & 255u, c = corners >> 16;
     const vec3 p0 = patchPlace(of, block, m, a);
@@ -26,16 +28,18 @@ PatchSurface onTriangle(PatchBlocks of, uint block, DrawMesh m, uint lane, Pixel
     s.normal = first * octDecode(of.blocks[block].normals[a]) + w.x * octDecode(of.blocks[block].normals[b]) + w.y * octDecode(of.blocks[block].normals[c]);
     s.face = cross(p1 - p0, p2 - p0);
     s.colour = first * colourOf(of, block, a) + w.x * colourOf(of, block, b) + w.y * colourOf(of, block, c);
+    s.finish = first * patchFinishOf(node, block, a) + w.x * patchFinishOf(node, block, b) + w.y * patchFinishOf(node, block, c);
     return s;
 }
 
 // Direct interpolation: below the place where a ray meets a disc, from the four samples around it.
-PatchSurface belowDisc(PatchBlocks of, uint block, DrawMesh m, uint lane, PixelRay ray) {
+PatchSurface belowDisc(PatchBlocks of, DrawNode node, uint block, DrawMesh m, uint lane, PixelRay ray) {
     const PatchDisc disc = discOf(of, block, m, lane);
     const PatchMix mixed = patchMix(patchDiscHit(disc, m, ray, frame.nearPlane));
     PatchSurface s;
     s.normal = vec3(0.0);
     s.colour = vec3(0.0);
+    s.finish = vec2(0.0);
     s.face = disc.normal;
     float sum = 0.0;
     for (uint c = 0u; c < 4u; ++c) {
@@ -44,8 +48,10 @@ PatchSurface belowDisc(PatchBlocks of, uint block, DrawMesh m, uint lane, PixelR
         sum += w;
         s.normal += w * octDecode(of.blocks[block].normals[at]);
         s.colour += w * colourOf(of, block, at);
+        s.finish += w * patchFinishOf(node, block, at);
     }
     s.colour = sum > 0.0 ? s.colour / sum : vec3(0.0);
+    s.finish = sum > 0.0 ? s.finish / sum : vec2(0.0, 1.0);
     if (!(sum > 0.0)) s.normal = vec3(0.0, 0.0, 1.0);
     return s;
 }
@@ -69,9 +75,9 @@ void main() {
     const vec3 ray = rayDirection(pixelsRay);
     PatchSurface seen;
     if (frame.patchAs == kPatchDirect)
-        seen = belowDisc(of, block, m, keyLane(key), pixelsRay);
+        seen = belowDisc(of, node, block, m, keyLane(key), pixelsRay);
     else
-        seen = onTriangle(of, block, m, keyLane(key), pixelsRay);
+        seen = onTriangle(of, node, block, m, keyLane(key), pixelsRay);
     const vec3 n = seen.normal;
     const vec3 normal = surfaceNormal(m.normalX * n.x + m.normalY * n.y + m.normalZ * n.z, seen.face, ray);
     Texel t;
@@ -85,6 +91,6 @@ void main() {
     if (frame.debugView == kDebugLevel) t.colour = debugLevelColour(node.level);
     if (frame.debugView == kDebugError) t.colour = debugErrorColour(node.errorPixels);
     storeTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, pixel, t);
-    triangleWords[2u * place] = kPixelTriangle | kPlainSurface;
+    triangleWords[2u * place] = kPixelTriangle | 0x00ff0000u | byteOf(seen.finish.x) | byteOf(seen.finish.y) << 8;
     triangleWords[2u * place + 1u] = 0u;
 }

@@ -26,9 +26,9 @@ struct DrawNode {
     float spacing;      // of its records on their surface, world units; 0: not known
     uint weights;       // records of its chunk, where weights of surfels lie behind them; 0: there are none. Of
                         // patches (gpu backend): the first of theirs among the frame's DrawMesh
-    uint material;      // of points without materials of their own (material.h): packed, or kPlainPoint
-    uint
-        materials;  // of points: behind so many records (and weights) lie materials, two a word; 0: all have `material`
+    uint material;      // of points and patches without materials of their own (material.h): packed, or kPlainPoint
+    uint materials;  // behind so many records (and weights), or blocks of patches, lie materials of points, or of the
+                     // blocks' samples, two a word; 0: all have `material`
 };
 
 const uint kNodeTurned = 256u;  // the store's own axes are not those of the world

@@ -6,6 +6,7 @@
 
 #include "engine/cpu/cpu_backend.h"
 #include "engine/render/layers.h"
+#include "lod/builder/patch_store/patch_store_build.h"
 #include "lod/store/materials.h"
 #include "tests/support/glass.h"
 
@@ -47,6 +48,30 @@ dvec3 decoded(const dvec3& c) {
     return 2.0 * (c * (std::abs(q1 - 1) < std::abs(q2 - 1) ? q1 : q2) - 1.0);
 }
 
+constexpr uint64_t kPatchSamples = 6500;  ///< asked for: with overlaps there are more
+
+/// Of a ball of triangles, so many samples.
+std::shared_ptr<const lod::Store> patchStore(uint64_t samples, const std::string& path, Executor& executor) {
+    const scene::Primitive ball = test::ball(140);
+    lod::TriangleMesh mesh;
+    for (size_t v = 0; v < ball.position.size(); ++v) {
+        mesh.position.emplace_back(glm::round(glm::dvec3(ball.position[v]) * 1e7) / 1e7);  // the poles are one place
+        mesh.normal.push_back(ball.normal[v]);
+        mesh.colour.push_back(~0u);
+        mesh.surface.push_back(0);
+        mesh.uv.emplace_back(0);
+    }
+    mesh.indices = ball.indices;
+    lod::PatchBuildSettings settings;
+    settings.samples = samples;
+    settings.description.pointMaterials = {{0, 1}};
+    Progress silent(false);
+    const auto built = lod::buildPatchStore(lod::sourceOf(mesh), path, settings, executor, silent);
+    EXPECT_TRUE(built) << (built ? "" : built.error().line());
+    for (const std::string& note : built->notes) std::printf("patches: %s\n", note.c_str());
+    return std::make_shared<const lod::Store>(*lod::openStore(path));
+}
+
 class GlassRays : public testing::Test {
   protected:
     test::TempFolder folder_;
@@ -57,12 +82,15 @@ class GlassRays : public testing::Test {
 TEST_F(GlassRays, AMirrorBallReflectsTheDirectionsThatItShould) {
     test::writePly(folder_ / "a.ply", test::spherePoints(9'858, 0xffffff));
     const auto points = test::buildAndOpen(folder_ / "a.ply", folder_ / "a.stipple", *executor_),
-               mesh = test::meshStore(test::ball(140), std::nullopt, folder_ / "b.stipple", *executor_);
+               mesh = test::meshStore(test::ball(140), std::nullopt, folder_ / "b.stipple", *executor_),
+               patches = patchStore(kPatchSamples, folder_ / "c.stipple", *executor_);
     const lod::View view = test::glassView({0, 0, 3}, 480);
     const auto light = test::directionLight(2048);
-    const auto off = [&](const std::shared_ptr<const lod::Store>& store, render::Mode mode, bool hasSharpMaps) {
+    const auto off = [&](const std::shared_ptr<const lod::Store>& store, render::Mode mode, bool hasSharpMaps,
+                         uint32_t patchAs = shared::kPatchStrips) {
         render::FrameSettings settings = test::glassSettings(mode);
         settings.draw.pointMaterial = lod::packed(*lod::materialNamed("mirror"));
+        settings.draw.patchAs = patchAs;
         settings.draw.environment =
             std::make_shared<const render::Environment>(render::makeEnvironment(light, 1, *executor_, hasSharpMaps));
         const render::Image image = test::renderView(store, *backend_, *executor_, view, settings);
@@ -82,12 +110,18 @@ TEST_F(GlassRays, AMirrorBallReflectsTheDirectionsThatItShould) {
     };
     const double triangles = off(mesh, render::Mode::pullpush, true),
                  pullpush = off(points, render::Mode::pullpush, true), ewa = off(points, render::Mode::ewa, true),
-                 splat = off(points, render::Mode::splat, true), usual = off(mesh, render::Mode::pullpush, false);
+                 splat = off(points, render::Mode::splat, true), usual = off(mesh, render::Mode::pullpush, false),
+                 strips = off(patches, render::Mode::pullpush, true),
+                 splats = off(patches, render::Mode::pullpush, true, shared::kPatchSplats),
+                 direct = off(patches, render::Mode::pullpush, true, shared::kPatchDirect);
     std::printf(
         "mirror ball of 9,858 samples (triangles: %zu): reflected direction p95, degrees: triangles %.3f, "
         "pullpush %.3f, ewa %.3f, splat %.3f; triangles by the usual maps %.3f\n",
         size_t{140} * 140, triangles, pullpush, ewa, splat, usual);
+    std::printf("  patches: strips %.3f, splats %.3f, direct %.3f\n", strips, splats, direct);
     EXPECT_LT(triangles, 0.2);
+    EXPECT_LT(strips, 0.2);
+    EXPECT_LT(splats, 0.2);
     EXPECT_LT(ewa, 2);
     EXPECT_LT(pullpush, 2);
     EXPECT_GT(usual, triangles) << "the control";

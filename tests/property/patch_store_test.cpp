@@ -154,6 +154,92 @@ TEST(PatchStore, ALevelOfCreasedSurfacesComesInAtAboutItsStep) {
     EXPECT_GE(inner, 5u);
 }
 
+/// Largest difference, over the samples of a level, between their colours and `colourAt` their places (0 to 255), and
+/// the share of samples that have another material than `materialAt`.
+struct LooksOff {
+    double colour = 0, material = 0;
+    size_t samples = 0;
+};
+LooksOff looksOff(const Store& store, uint32_t level, const std::function<double(const glm::dvec3&)>& redAt,
+                  const std::function<int(const glm::dvec3&)>& materialAt) {
+    const Hierarchy& h = store.hierarchy;
+    LooksOff off;
+    double wrong = 0, known = 0;
+    for (uint32_t n = 0; n < h.nodes.size(); ++n)
+        h.forEachPayload(n, [&](uint32_t chunk) {
+            if (h.nodes[n].level != level || kindOf(h, chunk) != Kind::patches) return;
+            const auto patches = readPatches(store, chunk);
+            ASSERT_TRUE(patches);
+            const glm::dvec3 corner =
+                glm::dvec3(h.nodes[n].cell[0], h.nodes[n].cell[1], h.nodes[n].cell[2]) * h.cellSize(h.nodes[n]);
+            for (const Patch& p : *patches) {
+                const PatchSurface surface(p);
+                for (size_t s = 0; s < p.heights.size(); ++s) {
+                    if (p.heights[s] == 0) continue;
+                    const glm::dvec3 at = h.origin + h.unit * (corner + surface.position(s));
+                    ++off.samples;
+                    off.colour = std::max(off.colour, std::abs(redAt(at) - static_cast<double>(p.colours[s] & 255u)));
+                    if (materialAt(at) < 0) continue;
+                    ++known;
+                    wrong += (p.materials.empty() ? 0 : p.materials[s]) != materialAt(at) ? 1 : 0;
+                }
+            }
+        });
+    off.material = wrong / std::max(known, 1.0);
+    return off;
+}
+
+// Twelve triangles, and a texture that knows much more: every level has its means, not the colours of its corners.
+TEST(PatchStore, LooksOfMaterialsAreOnEveryLevel) {
+    const test::TempFolder folder;
+    TriangleMesh mesh = test::sheet(2, 3, [](double u, double v) { return glm::dvec3(4 * u, 4 * v, 0.3 * u * v); });
+    mesh.uv.clear();
+    for (const glm::dvec3& p : mesh.position) mesh.uv.emplace_back(p.x, p.y);
+    mesh.surface.assign(mesh.position.size(), 0);
+    mesh.colour.assign(mesh.position.size(), 0xffffffffu);
+    mesh.normal.clear();
+    // A wave of two units' length, and stripes of materials one unit wide.
+    const auto red = [](double x) { return 0.5 + 0.3 * std::sin(3.14159265 * x); };
+    PatchBuildSettings settings;
+    settings.leafTriangles = 64;
+    settings.samples = 4'000;
+    settings.description.pointMaterials = {{1, 0}, {0.3f, 1}};
+    settings.looks = [&](uint32_t, const glm::vec2& uv, float) {
+        PlaceLook look;
+        look.colour = {static_cast<float>(red(double{uv.x})), 0.2f, 0.2f};
+        look.material = static_cast<uint8_t>(static_cast<int>(std::floor(uv.y)) & 1);
+        return look;
+    };
+    const Built looks = build(mesh, folder / "a.stipple", settings);
+    const auto redAt = [&](const glm::dvec3& p) {
+        const double linear = red(p.x);
+        return 255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055);
+    };
+    const auto materialAt = [&](const glm::dvec3& p) {
+        const double in = p.y - std::floor(p.y);
+        return in < 0.15 || in > 0.85 ? -1 : static_cast<int>(std::floor(p.y)) & 1;
+    };
+    uint32_t deepest = 0;
+    for (const Node& n : looks.store.hierarchy.nodes) deepest = std::max<uint32_t>(deepest, n.level);
+    ASSERT_GE(deepest, 2u);
+    for (uint32_t level = 0; level <= deepest; ++level) {
+        const LooksOff off = looksOff(looks.store, level, redAt, materialAt);
+        if (level == 0 || level == deepest) EXPECT_GT(off.samples, 500u) << level;
+        // A step of the root is 1/16; two of them, where the wave is steepest, are 0.12 of the linear range.
+        EXPECT_LE(off.colour, level == deepest ? 6 : 24) << "level " << level;
+        EXPECT_LE(off.material, level == deepest ? 0 : 0.02) << "level " << level;
+    }
+    EXPECT_EQ(looks.store.description.pointMaterials.size(), 2u);
+    const auto executor = makeTbbExecutor(2);
+    EXPECT_TRUE(verifyStore(looks.store, *executor, 0));
+    // Control: of corners alone.
+    PatchBuildSettings without = settings;
+    without.looks = nullptr;
+    EXPECT_GT(looksOff(build(mesh, folder / "b.stipple", without).store, 0, redAt, materialAt).colour, 60);
+    // The same bytes for another number of threads and another order.
+    EXPECT_TRUE(build(test::shuffled(mesh, 5), folder / "c.stipple", settings, 1).bytes == looks.bytes);
+}
+
 TEST(PatchStore, IsClosedAtAnyCut) {
     const test::TempFolder folder;
     const Built built = build(wavyTorus(200, 80), folder / "a.stipple");

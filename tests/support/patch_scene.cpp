@@ -7,6 +7,7 @@
 #include "lod/primitives/codecs.h"
 #include "lod/primitives/octahedral.h"
 #include "lod/primitives/patch_samples.h"
+#include "lod/store/materials.h"
 #include "lod/store/patch_bytes.h"
 
 namespace stipple::test {
@@ -36,6 +37,16 @@ PatchScene::PatchScene(const std::vector<lod::Patch>& patches) {
     if (!decoded) throw std::runtime_error(decoded.error().line());
     chunk_ = std::move(*decoded);
     all_ = &hierarchy_;
+}
+
+void PatchScene::setMaterials(const std::vector<lod::PointMaterial>& list) {
+    lod::Store store;
+    store.hierarchy = hierarchy_;
+    store.description.pointMaterials = list;
+    const auto added = lod::addMaterials(store, 0, chunk_);
+    if (!added) throw std::runtime_error(added.error().line());
+    hierarchy_.hasMaterials = list.size() > 1;
+    draws_.pointMaterial = {lod::defaultMaterial(store.description)};
 }
 
 const render::DrawList& PatchScene::drawsOf(const lod::View& view, const render::DrawSettings& settings,

@@ -7,6 +7,7 @@
 #include "engine/render/draw_list.h"
 #include "engine/render/frame_passes.h"
 #include "lod/primitives/patch.h"
+#include "lod/primitives/point_material.h"
 #include "tests/support/support.h"
 
 namespace stipple::test {
@@ -16,6 +17,8 @@ class PatchScene {
   public:
     explicit PatchScene(const std::vector<lod::Patch>& patches);
     const lod::Chunk& chunk() const { return chunk_; }
+    /// What the patches' numbers stand for.
+    void setMaterials(const std::vector<lod::PointMaterial>& list);
     const lod::Hierarchy& hierarchy() const { return hierarchy_; }
     /// All of it, placed as `place` says; it stays with the scene.
     const render::DrawList& drawsOf(const lod::View& view, const render::DrawSettings& settings = {},

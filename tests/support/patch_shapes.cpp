@@ -64,6 +64,10 @@ lod::TriangleMesh shuffled(const lod::TriangleMesh& mesh, uint64_t seed) {
     std::vector<uint32_t> number(order.size());
     for (size_t k = 0; k < order.size(); ++k) {
         out.position.push_back(mesh.position[order[k]]);
+        if (!mesh.uv.empty()) out.uv.push_back(mesh.uv[order[k]]);
+        if (!mesh.colour.empty()) out.colour.push_back(mesh.colour[order[k]]);
+        if (!mesh.surface.empty()) out.surface.push_back(mesh.surface[order[k]]);
+        if (!mesh.normal.empty()) out.normal.push_back(mesh.normal[order[k]]);
         number[order[k]] = static_cast<uint32_t>(k);
     }
     for (const size_t t : anyOrder(mesh.indices.size() / 3, rng)) {

@@ -6,6 +6,7 @@
 
 #include "lod/builder/patches/cone.h"
 #include "lod/builder/patches/moving_least_squares.h"
+#include "lod/primitives/octahedral.h"
 #include "lod/store/patch_bytes.h"
 #include "tests/support/patch_shapes.h"
 
@@ -330,10 +331,26 @@ TEST(PatchGaps, StayOpenWhereTheSourceEnds) {
     EXPECT_LT(open, 700u);
 }
 
-TEST(PatchBytes, ComeBackExactly) {
-    const lod::PatchSet set = patchesOf(ball(5000, 3));
+/// Numbers of materials on samples, so many, in stripes; of every other patch.
+lod::PatchSet withMaterials(lod::PatchSet set, size_t count) {
+    for (size_t k = 0; k < set.patches.size(); k += 2) {
+        lod::Patch& p = set.patches[k];
+        p.materials.assign(p.heights.size(), 0);
+        for (size_t s = 0; s < p.heights.size(); ++s)
+            if (p.heights[s] != 0) p.materials[s] = static_cast<uint8_t>(s / 5 % count);
+    }
+    return set;
+}
+
+class PatchBytes : public testing::TestWithParam<size_t> {};
+INSTANTIATE_TEST_SUITE_P(WithMaterials, PatchBytes, testing::Values(1, 2, 256),
+                         [](const auto& of) { return std::to_string(of.param); });
+
+TEST_P(PatchBytes, ComeBackExactly) {
+    const lod::PatchSet set = withMaterials(patchesOf(ball(5000, 3)), GetParam());
     const lod::PatchBytes encoded = lod::encodePatches(set.patches);
-    EXPECT_EQ(encoded.geometry + encoded.normals + encoded.colours, encoded.bytes.size());
+    EXPECT_EQ(encoded.geometry + encoded.normals + encoded.colours + encoded.materials, encoded.bytes.size());
+    EXPECT_EQ(encoded.materials == 0, GetParam() == 1) << "what all have takes no room";
     const auto decoded = lod::decodePatches(encoded.bytes, "here");
     ASSERT_TRUE(decoded) << decoded.error().line();
     ASSERT_EQ(decoded->size(), set.patches.size());
@@ -343,6 +360,8 @@ TEST(PatchBytes, ComeBackExactly) {
         EXPECT_EQ(a.heights, b.heights);
         EXPECT_EQ(a.normals, b.normals);
         EXPECT_EQ(a.colours, b.colours);
+        for (size_t s = 0; s < a.heights.size(); ++s)
+            ASSERT_EQ(a.materials.empty() ? 0 : a.materials[s], b.materials.empty() ? 0 : b.materials[s]);
         EXPECT_EQ(a.origin, b.origin);
         EXPECT_EQ(a.turn, b.turn);
         EXPECT_EQ(a.step, b.step);
@@ -352,8 +371,8 @@ TEST(PatchBytes, ComeBackExactly) {
     EXPECT_TRUE(lod::decodePatches(lod::encodePatches({}).bytes, "here")->empty());
 }
 
-TEST(PatchBytes, AreRefusedWhereTheyAreDamaged) {
-    const lod::PatchSet set = patchesOf(ball(600, 3));
+TEST_P(PatchBytes, AreRefusedWhereTheyAreDamaged) {
+    const lod::PatchSet set = withMaterials(patchesOf(ball(600, 3)), GetParam());
     ASSERT_FALSE(set.patches.empty());
     const std::vector<uint8_t> whole = lod::encodePatches(set.patches).bytes;
     for (size_t length = 0; length < whole.size(); ++length) {
@@ -373,7 +392,32 @@ TEST(PatchBytes, AreRefusedWhereTheyAreDamaged) {
     EXPECT_GT(refused, 0u);
 }
 
-TEST(PatchBytes, OfMuchRoomForLittleAreRefused) {
+// Also those that are finer than usual, as mirrors have them, and any.
+TEST(PatchNormals, ComeBackHoweverFine) {
+    for (const int bits : {11, 12, 13, 16}) {
+        lod::PatchSet set = patchesOf(ball(3000, 3));
+        Rng rng(static_cast<uint64_t>(bits));
+        for (lod::Patch& p : set.patches)
+            for (uint32_t& n : p.normals) {
+                if (n == 0) continue;
+                const glm::vec3 normal(rng.normal(), rng.normal(), 0.1 + std::abs(rng.normal()));
+                n = bits == 11   ? lod::roundedNormal(normal)
+                    : bits == 12 ? lod::roundedNormal<16>(normal)
+                    : bits == 13 ? lod::roundedNormal<8>(normal)
+                                 : lod::octEncode(normal) & ~0x10001u;
+            }
+        const auto decoded = lod::decodePatches(lod::encodePatches(set.patches).bytes, "here");
+        ASSERT_TRUE(decoded);
+        size_t off = 0;
+        for (size_t k = 0; k < set.patches.size(); ++k)
+            for (size_t s = 0; s < set.patches[k].normals.size(); ++s)
+                off += set.patches[k].heights[s] != 0 && set.patches[k].normals[s] != (*decoded)[k].normals[s] ? 1 : 0;
+        if (bits < 16) EXPECT_EQ(off, 0u) << bits;
+        if (bits == 16) EXPECT_GT(off, 0u) << "the control: no more than 15 bits are kept";
+    }
+}
+
+TEST(PatchHeads, OfMuchRoomForLittleAreRefused) {
     // A head takes 72 bytes and may name 16 million samples: nothing is made for those that nobody draws.
     const auto ofSide = [](uint32_t side, size_t patches = 1) {
         lod::Patch p;

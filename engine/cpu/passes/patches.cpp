@@ -17,9 +17,16 @@ void findBlocks(Frame& frame) {
     frame.patchBlocks.resize(batch.blocks.size());
     for (size_t b = 0; b < batch.blocks.size(); ++b) {
         const auto [node, place] = batch.blocks[b];
-        const shared::PatchBlock& block = frame.chunks.at(batch.keys[node]).patchBlocks[place];
-        frame.patchBlocks[b] = {&block, &frame.patches[first[node] + block.number], batch.nodes[node].level,
-                                batch.nodes[node].errorPixels};
+        const lod::Chunk& chunk = frame.chunks.at(batch.keys[node]);
+        const shared::PatchBlock& block = chunk.patchBlocks[place];
+        const shared::DrawNode& of = batch.nodes[node];
+        const bool hasOwn = of.materials != 0 && (of.material & shared::kOnlyMaterial) == 0;
+        frame.patchBlocks[b] = {&block,
+                                &frame.patches[first[node] + block.number],
+                                of.level,
+                                of.errorPixels,
+                                of.material & ~shared::kOnlyMaterial,
+                                hasOwn ? chunk.materials.data() + size_t{place} * shared::kPatchSamples : nullptr};
     }
 }
 

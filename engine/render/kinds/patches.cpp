@@ -11,7 +11,7 @@ namespace stipple::render {
 static_assert(static_cast<uint32_t>(lod::Kind::patches) == shared::kKindPatches);
 static_assert(2 * shared::kPatchCellsAcross * shared::kPatchCellsUp == shared::kPatchTriangles &&
               shared::kPatchTriangles == shared::kBlockLanes);
-static_assert(sizeof(shared::PatchBlock) == 1556);
+static_assert(sizeof(shared::PatchBlock) == 4 * shared::kPatchBlockWords);
 
 namespace {
 

@@ -13,6 +13,7 @@ struct LeftDisc {
     glm::vec3 normal{0};
     float radius = 0;  ///< lattice units
     uint32_t colour = 0;
+    uint8_t material = 0;
 };
 
 /// One disc about the mean of those in a cubic cell of that edge, or of larger ones where that leaves more than `most`;

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "lod/builder/patches/mesh_surface.h"
 #include "lod/primitives/octahedral.h"
 #include "shaders/shared/record.h"
 
@@ -135,9 +136,9 @@ void uniteByPlace(Soup& soup) {
             place[order[end]] = static_cast<uint32_t>(out.vertices.size());
         }
         sum.to(vertex);
-        // (Texture coordinates mean nothing any more.)
+        // (Texture coordinates and materials mean nothing any more.)
         vertex.u = vertex.v = 0;
-        vertex.surface &= shared::kSurfaceTwoSided | shared::kSurfaceFlat;
+        vertex.surface = (vertex.surface & (shared::kSurfaceTwoSided | shared::kSurfaceFlat)) | kNoMaterial;
         out.vertices.low.push_back(vertex);
     }
     std::vector<std::array<uint32_t, 3>> triangles;

@@ -26,6 +26,7 @@ void addTo(TriangleMesh& mesh, const Soup& soup, const glm::dvec3& corner) {
         mesh.normal.emplace_back(glm::vec3(shared::octDecode(from.normal)));
         mesh.colour.push_back(from.colour & 0xffffffu);
         mesh.surface.push_back(from.surface);
+        mesh.uv.emplace_back(from.u, from.v);
     }
     for (const uint32_t i : soup.indices) mesh.indices.push_back(first + i);
 }
@@ -45,6 +46,12 @@ class NodePatcher {
 
     NodePatches run(const NodeSettings& settings) {
         NodePatches out;
+        s_.looks = settings.looks;
+        s_.hasFineNormals = settings.hasFineNormals;
+        if (settings.below != nullptr && !settings.below->isEmpty())
+            s_.looksThere = [this, &settings](const glm::dvec3& place, const glm::vec3& normal) {
+                return settings.below->at(corner_ + s_.middle + place, normal, settings.step);
+            };
         SegmentSettings how;
         how.coneCosine = std::cos(settings.coneDegrees * 3.14159265358979323846 / 180);
         const SurfaceElements elements = inSegments();
@@ -127,8 +134,8 @@ class NodePatcher {
         }
         const glm::dvec2 w = (weights[0] + weights[1] + weights[2]) / 3.0;
         const SurfaceLook look = s_.look(triangle, w.x, w.y);
-        out.push_back(
-            {corner_ + s_.middle + middle, look.normal, static_cast<float>(radius * (1 + 1e-6)), look.colour});
+        out.push_back({corner_ + s_.middle + middle, look.normal, static_cast<float>(radius * (1 + 1e-6)), look.colour,
+                       look.material});
     }
 
     glm::dvec3 corner_;

@@ -3,6 +3,7 @@
 
 #include "lod/builder/octree/frame.h"
 #include "lod/builder/patch_store/discs.h"
+#include "lod/builder/patch_store/level_looks.h"
 #include "lod/builder/patch_store/level_mesh.h"
 #include "lod/builder/patches/patch_build.h"
 
@@ -37,6 +38,9 @@ struct NodeSettings {
     /// Samples aimed at for each of its triangles, of a leaf: its grid may be up to four times as fine as the level's,
     /// and a little coarser. 0: of an inner node, whose discs are united in cells of half a step.
     double samplesATriangle = 0;
+    PlaceLooks looks;                   ///< of materials; empty: vertices say all
+    bool hasFineNormals = false;        ///< some of it is a mirror
+    const LevelLooks* below = nullptr;  ///< looks of triangles that are simplified, in cells of the level's step
 };
 NodePatches patchesOfNode(const Soup& own, const AroundNode& around, const glm::dvec3& corner,
                           const NodeSettings& settings, Executor& executor);

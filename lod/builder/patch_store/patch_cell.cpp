@@ -4,12 +4,15 @@
 #include <cmath>
 
 #include "lod/builder/patch_store/division.h"
+#include "lod/primitives/patch.h"
+#include "shaders/shared/record.h"
 
 namespace stipple::lod {
 namespace {
 
 constexpr double kWanted = 0.1;       ///< error that a simplification may add, in steps of its level
 constexpr size_t kMostKept = 65'536;  ///< triangles that go up from a node
+constexpr double kLongest = 0.25;     ///< edge of a triangle, in cells
 
 struct SurfaceNode : PatchNode {
     Soup surface;  ///< its triangles; once it is done, what is left of them for its parent
@@ -71,7 +74,9 @@ class PatchCell {
             double error = 0;
             from.get(error);
             aroundError_ = std::max(aroundError_, error);
-            if (!getSoup(from, around_) || !from.isWhole()) return damaged();
+            if (!getSoup(from, around_)) return damaged();
+            looks_.get(from);
+            if (!from.isWhole()) return damaged();
         }
         // In octant order.
         std::sort(nodes_.begin() + 1, nodes_.end(),
@@ -100,6 +105,7 @@ class PatchCell {
         table_.batch.bytes = {};
         table_.put(to);
         out.table = to.bytes();
+        upwards_ = looks_.halved();
         if (!isLast) out.up = goingUp();
         return out;
     }
@@ -153,18 +159,24 @@ class PatchCell {
         for (size_t i = 0; i < nodes_.size(); ++i)
             if (isToBeMade(i) && nodes_[i].node.level == level) here.push_back(i);
         for (const size_t i : here) joinChildren(nodes_[i]);
+        if (firstOwn_ == 0) looks_ = looks_.halved();
         std::vector<NodePatches> made(here.size());
         executor_.parallelFor(here.size(), 1, [&](size_t begin, size_t end) {
             for (size_t k = begin; k < end; ++k) {
                 const SurfaceNode& n = nodes_[here[k]];
                 const AroundNode around = aroundOf(here[k]);
-                const NodeSettings how{patchStep(frame_, level), settings_.coneDegrees,
-                                       n.node.isLeaf() ? settings_.samplesATriangle : 0.0};
+                const NodeSettings how{patchStep(frame_, level),
+                                       settings_.coneDegrees,
+                                       n.node.isLeaf() ? settings_.samplesATriangle : 0.0,
+                                       settings_.looks,
+                                       settings_.hasFineNormals,
+                                       &looks_};
                 made[k] = patchesOfNode(n.surface, around, cornerOf(frame_, n.node), how, executor_);
                 made[k].error += std::max(n.surfaceError, around.surfaceError);
             }
         });
         for (size_t k = 0; k < here.size(); ++k) write(nodes_[here[k]], made[k]);
+        if (settings_.looks) looks_.add(looksOfLeaves(here, made), patchStep(frame_, level));
         if (level == nodes_[0].node.level && isLast) return;
         executor_.parallelFor(here.size(), 1, [&](size_t begin, size_t end) {
             for (size_t k = begin; k < end; ++k) {
@@ -172,6 +184,30 @@ class PatchCell {
                 n.surfaceError += simplify(n.surface, kWanted * patchStep(frame_, level), kMostKept);
             }
         });
+    }
+
+    /// What the samples of leaves show, and discs; beside their cells, too, where their triangles reach.
+    std::vector<LevelLooks::Seen> looksOfLeaves(const std::vector<size_t>& here,
+                                                const std::vector<NodePatches>& made) const {
+        std::vector<LevelLooks::Seen> seen;
+        for (size_t k = 0; k < here.size(); ++k) {
+            const Node& n = nodes_[here[k]].node;
+            if (!n.isLeaf()) continue;
+            for (const Patch& p : made[k].patches) {
+                const PatchSurface surface(p);
+                for (size_t s = 0; s < p.heights.size(); ++s) {
+                    if (p.heights[s] == 0) continue;
+                    const glm::vec3 normal(surface.frame() * glm::dvec3(shared::octDecode(p.normals[s])));
+                    const uint8_t material = p.materials.empty() ? uint8_t{0} : p.materials[s];
+                    seen.push_back({cornerOf(frame_, n) + surface.position(s),
+                                    {normal, p.colours[s], material},
+                                    double{p.step} * double{p.step}});
+                }
+            }
+            for (const LeftDisc& d : made[k].left)
+                seen.push_back({d.place, {d.normal, d.colour, d.material}, double{d.radius} * double{d.radius}});
+        }
+        return seen;
     }
 
     void joinChildren(SurfaceNode& n) {
@@ -272,6 +308,7 @@ class PatchCell {
             if (isWithin(around_, t, lo, cell) && levelOfOwner(keyOfTriangle(around_, t)) < own.node.level) part.add(t);
         to.put(aroundError_);
         putSoup(carried, to);
+        upwards_.put(to);
         return to.bytes();
     }
 
@@ -281,11 +318,18 @@ class PatchCell {
         SoupPart part(own, out);
         for (size_t t = 0; t < own.indices.size() / 3; ++t)
             if (isWithin(own, t, lo, cell)) part.add(t);
-        if (out.indices.empty()) return {};
+        // Looks reach as far as triangles do whose middles are near.
+        const Node& n = nodes_[0].node;
+        const glm::dvec3 corner = cornerOf(frame_, n), reach((kPatchMargin + kLongest) * cell);
+        const LevelLooks looks = upwards_.within(glm::max(corner, lo - reach),
+                                                 glm::min(corner + frame_.cellSize(n.level), lo + cell + reach),
+                                                 2 * patchStep(frame_, n.level));
+        if (out.indices.empty() && looks.isEmpty()) return {};
         ByteWriter to;
         to.put(Sent::strip);
         to.put(nodes_[0].surfaceError);
         putSoup(out, to);
+        looks.put(to);
         return to.bytes();
     }
 
@@ -307,6 +351,7 @@ class PatchCell {
     std::vector<SurfaceNode> nodes_;  ///< the first one is the cell's own
     Soup around_;                     ///< triangles of other cells
     double aroundError_ = 0;          ///< of those: bound of the distance from the source
+    LevelLooks looks_, upwards_;      ///< of the level that is made, or was made last; of that above the cell
     PatchTable table_;
     size_t firstOwn_ = 0;  ///< 0: all nodes are to be made
     bool isMade_ = false;

@@ -14,6 +14,8 @@ struct PatchCellSettings {
     uint32_t leafTriangles = 32'768;
     double coneDegrees = 50;
     double samplesATriangle = 0.5;  ///< of the leaves
+    PlaceLooks looks;               ///< of materials; empty: vertices say all
+    bool hasFineNormals = false;    ///< some of it is a mirror
 };
 
 /// `input`: soups of what lies in the cell and around it; `subtrees`: of all of the build.

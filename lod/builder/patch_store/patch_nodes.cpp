@@ -94,6 +94,12 @@ void addPoints(const Frame& on, const PointsByNode& points, Hierarchy& h) {
     }
 }
 
+void markMaterials(const Patch& p, std::array<uint8_t, 256>& has) {
+    if (p.materials.empty()) has[0] = 1;
+    for (size_t s = 0; s < p.materials.size(); ++s)
+        if (p.heights[s] != 0) has.at(p.materials[s]) = 1;
+}
+
 }  // namespace
 
 PatchNode patchNodeAt(const Frame& frame, uint32_t level, Key key) {
@@ -122,6 +128,7 @@ void writePatchNode(const Frame& frame, std::span<const Node> children, NodePatc
             discs = encodeDiscs(made.left, frame, out, code);
         }
     }
+    for (const Patch& p : made.patches) markMaterials(p, table.hasMaterial);
     if (out.isLeaf()) table.residual = std::max(table.residual, n.residual);
     out.errorCode = static_cast<uint8_t>(code);
     makeSphere(children, made, cornerOf(frame, out), out);
@@ -170,6 +177,7 @@ void PatchTable::put(ByteWriter& to) const {
     to.put(patches);
     to.put(samples);
     to.put(discs);
+    to.put(hasMaterial);
     to.put(residual);
     to.put(beside);
     to.put(lo);
@@ -184,6 +192,7 @@ bool PatchTable::get(ByteReader& from) {
     from.get(patches);
     from.get(samples);
     from.get(discs);
+    from.get(hasMaterial);
     from.get(residual);
     from.get(beside);
     from.get(lo);

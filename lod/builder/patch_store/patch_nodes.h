@@ -21,6 +21,7 @@ struct PatchTable {
     std::vector<Points> points;                      ///< ascending
     uint64_t elements = 0, duplicate = 0, left = 0;  ///< triangles or points of the leaves
     uint64_t patches = 0, samples = 0, discs = 0;    ///< of the leaves; discs of what fits no patch
+    std::array<uint8_t, 256> hasMaterial{};          ///< of each number: some sample has it
     double residual = 0;                             ///< of the leaves: see PatchNode, lattice units
     double beside = 0;   ///< of the leaves of scans: farthest that a place of a patch is from a point, lattice units
     Steps lo{0}, hi{0};  ///< of vertices or points, where there are elements

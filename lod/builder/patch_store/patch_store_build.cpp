@@ -33,6 +33,8 @@ class PatchBuild : public CellContent {
         : source_(source), settings_(settings), executor_(executor) {
         cell_.coneDegrees = settings.coneDegrees;
         cell_.leafTriangles = settings.leafTriangles;
+        cell_.looks = settings.looks;
+        cell_.hasFineNormals = hasMirrors(settings.description.pointMaterials);
         if (settings.samples == 0) return;
         const double usual = 0.5 * static_cast<double>(source.triangles);  // vertices
         const double times = std::max(usual, 1.0) / static_cast<double>(settings.samples);
@@ -57,8 +59,9 @@ class PatchBuild : public CellContent {
         return needs;
     }
     std::string settingsAsText() const override {
-        return fmt::format("patches|{}|{}|{}|{}|{}|{}", kBuildVersion, settings_.coneDegrees, settings_.samples,
-                           settings_.leafTriangles, kPatchCells, describeAsText(settings_.description));
+        return fmt::format("patches|{}|{}|{}|{}|{}|{}|{}", kBuildVersion, settings_.looksIdentity,
+                           settings_.coneDegrees, settings_.samples, settings_.leafTriangles, kPatchCells,
+                           describeAsText(settings_.description));
     }
 
     // ---- survey, count, distribute ----
@@ -208,6 +211,7 @@ class PatchBuild : public CellContent {
         counts_.samples += table.samples;
         counts_.left += table.left;
         counts_.discs += table.discs;
+        for (size_t m = 0; m < hasMaterial_.size(); ++m) hasMaterial_.at(m) |= table.hasMaterial.at(m);
         residual_ = std::max(residual_, table.residual);
         tables_.push_back(std::move(table));
         return tables_.size();
@@ -240,6 +244,7 @@ class PatchBuild : public CellContent {
                 fmt::format("{} no patch: {} for {}", counted(counts_.left, "triangle fits", "triangles fit"),
                             counted(counts_.discs, "disc stands", "discs stand"), counts_.left == 1 ? "it" : "them"));
         description = settings_.description;
+        forgetUnused(description.pointMaterials);
         for (uint32_t n = 0; n < h.nodes.size(); ++n)
             if (h.nodes[n].isLeaf())
                 h.forEachPayload(n, [&](uint32_t chunk) { description.points += h.payload(chunk).records; });
@@ -255,6 +260,18 @@ class PatchBuild : public CellContent {
     }
 
   private:
+    /// Of a grid of materials most are no sample's: a store of rough ones is not to be taken for one with mirrors.
+    void forgetUnused(std::vector<PointMaterial>& list) const {
+        if (list != materialGrid()) return;
+        size_t last = 0;
+        for (size_t m = 0; m < list.size(); ++m)
+            if (hasMaterial_.at(m) != 0)
+                last = m;
+            else
+                list[m] = {};
+        list.resize(last + 1);
+    }
+
     static constexpr uint64_t kSpillBytes = 48;  ///< of a triangle, between the steps, with its copies
     static constexpr uint64_t kTableBytes = 1;   ///< of a triangle, of the node table, which stays in memory
 
@@ -290,6 +307,7 @@ class PatchBuild : public CellContent {
     std::vector<PatchTable> tables_;
     uint64_t kept_ = 0, duplicate_ = 0;
     PatchCounts counts_;
+    std::array<uint8_t, 256> hasMaterial_{};
     double residual_ = 0;
     Steps lo_{std::numeric_limits<int64_t>::max()}, hi_{std::numeric_limits<int64_t>::min()};
 };

@@ -5,6 +5,7 @@
 
 #include "lod/builder/build.h"
 #include "lod/primitives/mesh_source.h"
+#include "lod/primitives/place_look.h"
 #include "lod/store/store.h"
 
 namespace stipple::lod {
@@ -15,7 +16,11 @@ struct PatchBuildSettings {
     double coneDegrees = 50;          ///< half the cone of a patch's normals
     uint64_t samples = 0;             ///< of the finest level, about; 0: as many as there are vertices
     uint32_t leafTriangles = 32'768;  ///< that a leaf has at most, where there are as many samples as vertices
-    StoreDescription description;     ///< what the input says; bounds and counts are filled in
+    /// Of materials, numbers in description.pointMaterials; empty: vertices say all. `looksIdentity`: another number
+    /// for other looks.
+    PlaceLooks looks;
+    uint64_t looksIdentity = 0;
+    StoreDescription description;  ///< what the input says; bounds and counts are filled in
 };
 
 /// Writes `output` (whole or not at all). Degenerate, duplicate and not finite triangles are dropped and counted;

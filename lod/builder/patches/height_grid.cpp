@@ -71,6 +71,7 @@ bool planGrid(size_t count, const std::function<glm::dvec3(size_t)>& place, cons
     grid.heights.assign(samples, HeightGrid::kNone);
     grid.normals.assign(samples, glm::vec3(0));
     grid.colours.assign(samples, 0);
+    grid.materials.assign(samples, 0);
     grid.cells.assign(size_t{grid.width - 1} * (grid.height - 1), 0);
     return true;
 }
@@ -123,6 +124,7 @@ Patch toPatch(const HeightGrid& grid) {
     patch.heights.assign(samples, 0);
     patch.normals.assign(samples, 0);
     patch.colours.assign(samples, 0);
+    std::vector<uint8_t> materials(samples, 0);
     const glm::mat3 toLocal(glm::transpose(grid.frame));
     for (uint32_t j = 0; j < patch.height; ++j)
         for (uint32_t i = 0; i < patch.width; ++i) {
@@ -130,9 +132,13 @@ Patch toPatch(const HeightGrid& grid) {
             if (used.samples[from] == 0) continue;
             STIPPLE_CHECK(grid.has(from), "a cell of a patch has its four samples");
             patch.heights[to] = static_cast<uint16_t>(std::lround((grid.heights[from] - base) / quantum));
-            patch.normals[to] = roundedNormal(toLocal * grid.normals[from]);
+            const glm::vec3 normal = toLocal * grid.normals[from];
+            patch.normals[to] = grid.hasFineNormals ? roundedNormal<8>(normal) : roundedNormal(normal);
             patch.colours[to] = grid.colours[from];
+            materials[to] = grid.materials[from];
         }
+    if (std::any_of(materials.begin(), materials.end(), [](uint8_t m) { return m != 0; }))
+        patch.materials = std::move(materials);
     patch.cells.resize(size_t{patch.width - 1} * (patch.height - 1));
     for (uint32_t j = 0; j + 1 < patch.height; ++j)
         for (uint32_t i = 0; i + 1 < patch.width; ++i)

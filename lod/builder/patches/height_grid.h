@@ -20,6 +20,8 @@ struct HeightGrid {
     std::vector<double> heights;     ///< scene units above the plane; kNone
     std::vector<glm::vec3> normals;  ///< of the scene
     std::vector<uint32_t> colours;
+    std::vector<uint8_t> materials;
+    bool hasFineNormals = false;  ///< rounded to 0.03 degrees instead of 0.12: of what is a mirror
     std::vector<uint8_t> cells;
 
     size_t at(uint32_t i, uint32_t j) const { return size_t{j} * width + i; }

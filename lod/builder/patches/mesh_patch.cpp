@@ -62,6 +62,7 @@ class Patcher {
             double step, PatchClosing closing)
         : s_(surface), segment_(segment), owner_(owner), self_(self), closing_(closing), allowed_(step) {
         cone_ = coneOf(surface.elements.normal, segment);
+        grid_.hasFineNormals = surface.hasFineNormals;
         isPlanned_ = planGrid(
             3 * segment.size(), [&](size_t k) { return s_.at(segment_[k / 3], k % 3); }, cone_.axis, step, kMargin,
             kFewSamples + toWhole<size_t>(kMostEmpty * samplesOver(step)), grid_);
@@ -338,6 +339,7 @@ class Patcher {
             const SurfaceLook l = s_.look(hit_[s], w.x, w.y, grid_.step);
             grid_.normals[s] = l.normal;
             grid_.colours[s] = l.colour;
+            grid_.materials[s] = l.material;
         }
     }
 

@@ -81,6 +81,7 @@ class MeshPatches {
             out.left.position.push_back(at);
             out.left.normal.push_back(look.normal);
             out.left.colour.push_back(look.colour);
+            out.left.material.push_back(look.material);
         };
         for (const uint32_t t : sampled_.left) {
             for (size_t k = 0; k < 3; ++k) {
@@ -103,9 +104,16 @@ class MeshPatches {
 
 }  // namespace
 
+bool hasMirrors(const std::vector<PointMaterial>& list) {
+    constexpr float kSmooth = 0.1f;
+    return list != materialGrid() &&
+           std::any_of(list.begin(), list.end(), [](const PointMaterial& m) { return m.roughness < kSmooth; });
+}
+
 PatchSet patchesOfMesh(TriangleMesh mesh, const PatchSettings& settings, Executor& executor, Progress& progress) {
     MeshSurface surface = meshSurface(std::move(mesh), executor);
     surface.looks = settings.looks;
+    surface.hasFineNormals = settings.hasFineNormals;
     return MeshPatches(surface, settings, executor, progress).run();
 }
 

@@ -267,7 +267,10 @@ SurfaceLook MeshSurface::look(size_t t, double b, double c, double side) const {
     SurfaceLook out;
     const double length = glm::length(normal);
     out.normal = glm::vec3(length > 1e-6 ? normal / length : face);
-    if (!looks || source.surface.empty() || source.uv.empty()) {
+    const bool isUnknown = !source.surface.empty() && (source.surface[vertices[t][0]] & kNoMaterial) == kNoMaterial;
+    if (looksThere && isUnknown)
+        if (const auto there = looksThere(at(t, 0) + b * e1 + c * e2, out.normal)) return *there;
+    if (!looks || isUnknown || source.surface.empty() || source.uv.empty()) {
         for (int a = 0; a < 3; ++a) out.colour |= toWhole<uint32_t>(std::clamp(colour[a] + 0.5, 0.0, 255.0)) << (8 * a);
         return out;
     }
@@ -276,6 +279,7 @@ SurfaceLook MeshSurface::look(size_t t, double b, double c, double side) const {
                                side);
     const PlaceLook look = looks(source.surface[v[0]], place.uv, place.side);
     out.colour = litColour(colour, look.colour);
+    out.material = look.material;
     if (look.normal == glm::vec3(0, 0, 1)) return out;
     const glm::vec3 bumped = shared::bumpedNormal(out.normal, glm::vec3(e1), glm::vec3(e2), {place.d1.x, place.d1.y},
                                                   {place.d2.x, place.d2.y}, look.normal);

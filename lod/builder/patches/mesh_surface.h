@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "engine/base/executor.h"
@@ -13,10 +15,14 @@
 
 namespace stipple::lod {
 
+/// In the place of a vertex's material: it is made of others', whose looks it does not know.
+constexpr uint32_t kNoMaterial = shared::kSurfaceMaterialMask;
+
 /// A place on a triangle: its height and what is there.
 struct SurfaceLook {
     glm::vec3 normal{0};  ///< unit, on the triangle's front side
     uint32_t colour = 0;  ///< sRGB
+    uint8_t material = 0;
 };
 
 struct MeshSurface {
@@ -30,7 +36,11 @@ struct MeshSurface {
                                                     ///< where there is none, or more than one
     SurfaceElements elements;                       ///< triangles
     RunTree tree;
-    PlaceLooks looks;                         ///< of materials; empty: vertices say all
+    PlaceLooks looks;  ///< of materials; empty: vertices say all
+    /// Of triangles of kNoMaterial, where looks lie that went with others: at a place (as `position`), towards a
+    /// normal.
+    std::function<std::optional<SurfaceLook>(const glm::dvec3& place, const glm::vec3& normal)> looksThere;
+    bool hasFineNormals = false;              ///< some of it is a mirror
     bool isTwoSided = false;                  ///< some triangles are, or they do not agree on a side
     uint64_t triangles = 0;                   ///< of the source
     std::map<std::string, uint64_t> dropped;  ///< by reason

@@ -12,6 +12,7 @@
 #include "lod/primitives/mesh.h"
 #include "lod/primitives/patch.h"
 #include "lod/primitives/place_look.h"
+#include "lod/primitives/point_material.h"
 #include "lod/primitives/primitives.h"
 
 namespace stipple::lod {
@@ -27,11 +28,15 @@ struct PatchSettings {
     double coneDegrees = 50;  ///< half the cone of a patch's normals
     PatchClosing closing = PatchClosing::overlap;
     uint64_t samples = 0;  ///< aimed at; 0: as many as there are points or vertices (of a mesh kFewestSamples at least)
-    bool isTwoSided = false;  ///< points are seen from both sides (those without normals always are)
-    PlaceLooks looks;         ///< of a mesh: colours and normals that are not of its vertices
+    bool isTwoSided = false;      ///< points are seen from both sides (those without normals always are)
+    PlaceLooks looks;             ///< of a mesh: colours and normals that are not of its vertices
+    bool hasFineNormals = false;  ///< of a mesh, some of which is a mirror
     std::function<bool()> isStopped;
 };
 constexpr uint64_t kFewestSamples = 20'000;
+
+/// Is any so smooth, or clear, that its normals' rounding is seen in what it shows? (Of a grid most is nobody's.)
+bool hasMirrors(const std::vector<PointMaterial>& list);
 
 /// A sample of a patch.
 struct PatchCorner {

@@ -27,7 +27,8 @@ Result<Chunk> decode(const Hierarchy& h, uint32_t chunk, const uint8_t* bytes, s
 }
 
 uint64_t bytesOfBlocks(const Hierarchy& h, uint32_t chunk) {
-    return uint64_t{h.payload(chunk).records} * (sizeof(shared::PatchBlock) + sizeof(PatchPlane));
+    const uint64_t materials = h.hasMaterials ? shared::kPatchSamples * sizeof(uint16_t) : 0;
+    return h.payload(chunk).records * (sizeof(shared::PatchBlock) + sizeof(PatchPlane) + materials);
 }
 /// A block has a cell, and each sample is of four blocks at most.
 uint64_t fewestBytes(const Hierarchy& h, uint32_t chunk) {

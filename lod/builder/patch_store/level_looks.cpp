@@ -1,0 +1,148 @@
+#include "lod/builder/patch_store/level_looks.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <tuple>
+
+#include "engine/base/numbers.h"
+#include "shaders/shared/record.h"
+
+namespace stipple::lod {
+namespace {
+
+uint32_t facingOf(const glm::vec3& n) {
+    const glm::vec3 a = glm::abs(n);
+    const uint32_t axis = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
+    return axis + (n[static_cast<int>(axis)] < 0 ? 3u : 0u);
+}
+/// Cosine between the way that a cell faces and a normal.
+double cosineOf(uint32_t facing, const glm::vec3& n) {
+    return (facing >= 3 ? -1.0 : 1.0) * static_cast<double>(n[static_cast<int>(facing % 3)]);
+}
+
+}  // namespace
+
+bool LevelLooks::isBefore(const Cell& a, const Cell& b) {
+    return std::tie(a.z, a.y, a.x, a.facing) < std::tie(b.z, b.y, b.x, b.facing);
+}
+
+/// One of each. Of equals the first comes first, so the order in which they were added counts for rounding alone.
+void LevelLooks::settle() {
+    std::stable_sort(cells_.begin(), cells_.end(), isBefore);
+    size_t kept = 0;
+    for (size_t i = 0, end = 0; i < cells_.size(); i = end) {
+        Cell sum = cells_[i];
+        std::array<double, 256> ofMaterial{};
+        for (end = i; end < cells_.size() && !isBefore(cells_[i], cells_[end]); ++end) {
+            const Cell& c = cells_[end];
+            ofMaterial.at(c.material) += c.most;
+            if (end == i) continue;
+            sum.weight += c.weight;
+            sum.colour += c.colour;
+            sum.normal += c.normal;
+        }
+        const auto most = std::max_element(ofMaterial.begin(), ofMaterial.end());
+        sum.material = static_cast<uint32_t>(most - ofMaterial.begin());
+        sum.most = *most;
+        cells_[kept++] = sum;
+    }
+    cells_.resize(kept);
+}
+
+void LevelLooks::add(const std::vector<Seen>& seen, double step) {
+    for (const Seen& s : seen) {
+        const glm::dvec3 at = glm::floor(s.place / step);
+        Cell c;
+        c.x = toWhole<int64_t>(at.x);
+        c.y = toWhole<int64_t>(at.y);
+        c.z = toWhole<int64_t>(at.z);
+        c.facing = facingOf(s.look.normal);
+        c.material = s.look.material;
+        c.weight = c.most = s.weight;
+        c.normal = s.weight * glm::dvec3(s.look.normal);
+        for (int a = 0; a < 3; ++a)
+            c.colour[a] =
+                s.weight * double{shared::linearFromSrgb(static_cast<float>(s.look.colour >> (8 * a) & 255u) / 255.0f)};
+        cells_.push_back(c);
+    }
+    settle();
+}
+
+void LevelLooks::add(const LevelLooks& other) {
+    cells_.insert(cells_.end(), other.cells_.begin(), other.cells_.end());
+    settle();
+}
+
+LevelLooks LevelLooks::halved() const {
+    LevelLooks out = *this;
+    for (Cell& c : out.cells_) {
+        c.x >>= 1;
+        c.y >>= 1;
+        c.z >>= 1;
+    }
+    out.settle();
+    return out;
+}
+
+LevelLooks LevelLooks::within(const glm::dvec3& lo, const glm::dvec3& hi, double step) const {
+    LevelLooks out;
+    for (const Cell& c : cells_) {
+        const glm::dvec3 middle =
+            step * (glm::dvec3(static_cast<double>(c.x), static_cast<double>(c.y), static_cast<double>(c.z)) + 0.5);
+        if (glm::all(glm::lessThanEqual(lo, middle)) && glm::all(glm::lessThan(middle, hi))) out.cells_.push_back(c);
+    }
+    return out;
+}
+
+std::optional<SurfaceLook> LevelLooks::at(const glm::dvec3& place, const glm::vec3& normal, double step) const {
+    // Trilinear between the middles of the eight cells around it; where those are none, all within two steps; and, for
+    // slivers, whose normals may be any, those that face any way.
+    const glm::dvec3 q = place / step - 0.5, low = glm::floor(q);
+    for (const auto& [reach, facesAny] : {std::pair{1.0, false}, {2.0, false}, {2.0, true}}) {
+        glm::dvec3 colour(0), sum(0);
+        double weights = 0;
+        std::array<double, 256> ofMaterial{};
+        const auto first = static_cast<int64_t>(reach) - 1, last = static_cast<int64_t>(reach);
+        for (int64_t k = -first; k <= last; ++k)
+            for (int64_t j = -first; j <= last; ++j) {
+                Cell from;
+                from.x = toWhole<int64_t>(low.x) - first;
+                from.y = toWhole<int64_t>(low.y) + j;
+                from.z = toWhole<int64_t>(low.z) + k;
+                auto c = std::lower_bound(cells_.begin(), cells_.end(), from, isBefore);
+                for (; c != cells_.end() && c->z == from.z && c->y == from.y && c->x <= from.x + first + last; ++c) {
+                    const glm::dvec3 off(q.x - static_cast<double>(c->x), q.y - static_cast<double>(c->y),
+                                         q.z - static_cast<double>(c->z));
+                    const glm::dvec3 near = glm::max(glm::dvec3(0), reach - glm::abs(off));
+                    const double w =
+                        near.x * near.y * near.z * (facesAny ? 1.0 : std::max(0.0, cosineOf(c->facing, normal)));
+                    if (!(w > 0)) continue;
+                    // Each cell as much as the next: that one holds more samples says nothing of its colour.
+                    weights += w;
+                    colour += w / c->weight * c->colour;
+                    sum += w / c->weight * c->normal;
+                    ofMaterial.at(c->material) += w * c->most / c->weight;
+                }
+            }
+        if (!(weights > 1e-9)) continue;
+        SurfaceLook out;
+        out.normal = glm::length(sum) > 1e-6 ? glm::vec3(glm::normalize(sum)) : normal;
+        for (int a = 0; a < 3; ++a)
+            out.colour |= unitToByte(shared::srgbFromLinear(static_cast<float>(std::min(colour[a] / weights, 1.0))))
+                          << (8 * a);
+        out.material =
+            static_cast<uint8_t>(std::max_element(ofMaterial.begin(), ofMaterial.end()) - ofMaterial.begin());
+        return out;
+    }
+    return {};
+}
+
+void LevelLooks::get(ByteReader& from) {
+    LevelLooks read;
+    from.get(read.cells_);
+    for (Cell& c : read.cells_) c.material = std::min(c.material, 255u);
+    add(read);
+}
+
+}  // namespace stipple::lod
