@@ -113,7 +113,7 @@ void setupBuild(CLI::App& app, int& status) {
         ->required();
     sub->add_option("-o,--output", o->output, "the scene to write (.stipple)")->type_name("STORE")->required();
     o->build.addTo(*sub);
-    o->material.addTo(*sub, "points (without: what the input says)");
+    o->material.addTo(*sub, "points or patches (without: what the input says)");
     addPatchBuildOptions(*sub, o->build.patches);
     addForce(*sub, o->force);
     sub->add_flag("--surfel-weights", o->build.surfelWeights,
