@@ -93,6 +93,25 @@ std::string recordsOf(const lod::Store& store) {
     return store.hierarchy.isMixed ? "records" : lod::traitsOf(store.hierarchy.nodes[0].kind).records;
 }
 
+/// With the points that have them, where those are counted.
+nlohmann::json materialInfo(const lod::StoreDescription& d, const lod::Hierarchy& h) {
+    nlohmann::json materials = nlohmann::json::array();
+    for (const lod::PointMaterial& m : d.pointMaterials)
+        materials.push_back({{"roughness", m.roughness},
+                             {"metallic", m.metallic},
+                             {"transmission", m.optics.transmission},
+                             {"points", d.points}});
+    if (d.pointMaterials.size() > 1 && h.nodes[0].kind == lod::Kind::patches)  // samples are not counted
+        for (nlohmann::json& m : materials) m.erase("points");
+    if (const auto index = lod::materialAttribute(d)) {
+        for (nlohmann::json& m : materials) m["points"] = 0;
+        for (const auto& [value, count] : d.attributes[*index].counts)
+            if (value >= 0 && value < static_cast<double>(materials.size()))
+                materials[toWhole<size_t>(value)]["points"] = count;
+    }
+    return materials;
+}
+
 nlohmann::json storeInfo(const lod::Store& store) {
     const lod::Hierarchy& h = store.hierarchy;
     const lod::StoreDescription& d = store.description;
@@ -121,20 +140,6 @@ nlohmann::json storeInfo(const lod::Store& store) {
                               {"least", a.least},
                               {"greatest", a.greatest},
                               {"points_without_data", a.withoutData}});
-    nlohmann::json materials = nlohmann::json::array();
-    for (const lod::PointMaterial& m : d.pointMaterials)
-        materials.push_back({{"roughness", m.roughness},
-                             {"metallic", m.metallic},
-                             {"transmission", m.optics.transmission},
-                             {"points", d.points}});
-    if (d.pointMaterials.size() > 1 && h.nodes[0].kind == lod::Kind::patches)  // samples are not counted
-        for (nlohmann::json& m : materials) m.erase("points");
-    if (const auto index = lod::materialAttribute(d)) {
-        for (nlohmann::json& m : materials) m["points"] = 0;
-        for (const auto& [value, count] : d.attributes[*index].counts)
-            if (value >= 0 && value < static_cast<double>(materials.size()))
-                materials[toWhole<size_t>(value)]["points"] = count;
-    }
     nlohmann::json textures = nlohmann::json::array();
     for (const shared::TextureInfo& t : h.textures)
         textures.push_back({{"width", t.width}, {"height", t.height}, {"levels", t.levels}});
@@ -146,7 +151,7 @@ nlohmann::json storeInfo(const lod::Store& store) {
             {"payloads", payloadInfo(h)},
             {"surfel_weight_bytes", weightBytes},
             {"materials", d.materials.size()},
-            {"point_materials", materials},
+            {"point_materials", materialInfo(d, h)},
             {"textures", textures},
             {"texture_tiles", h.tiles.size()},
             {"texture_bytes", bytesOfTiles(h)},
