@@ -202,15 +202,20 @@ void printStore(const nlohmann::json& j) {
     const auto place = [&](const char* key) { return placeText(j[key], j["lattice_unit"], j["origin"]); };
     const bool isMesh = j["primitive"] == "triangles";
     const nlohmann::json& patches = j["patches"];
-    if (!patches.is_null())
-        fmt::print("{}: {} in {}, {} of what no patch fits\n", j["path"].get<std::string>(),
+    const std::string where = fmt::format("{} {}, {}", j["nodes"].get<uint64_t>(), isMesh ? "groups" : "nodes",
+                                          humanBytes(j["bytes"].get<uint64_t>()));
+    if (patches.is_null()) {
+        fmt::print("{}: {} {} from {}, {} with all levels in {}\n", j["path"].get<std::string>(),
+                   j["points"].get<uint64_t>(), j["primitive"].get<std::string>(), j["source"].get<std::string>(),
+                   j["records"].get<uint64_t>(), where);
+    } else {
+        const uint64_t discs = patches["discs"].get<uint64_t>();
+        fmt::print("{}: {} in {}{}, from {}, in {}\n", j["path"].get<std::string>(),
                    counted(patches["samples"].get<uint64_t>(), "sample"),
                    counted(patches["patches"].get<uint64_t>(), "patch", "patches"),
-                   counted(patches["discs"].get<uint64_t>(), "disc"));
-    fmt::print("{}: {} {} from {}, {} with all levels in {} {}, {}\n", j["path"].get<std::string>(),
-               j["points"].get<uint64_t>(), j["primitive"].get<std::string>(), j["source"].get<std::string>(),
-               j["records"].get<uint64_t>(), j["nodes"].get<uint64_t>(), isMesh ? "groups" : "nodes",
-               humanBytes(j["bytes"].get<uint64_t>()));
+                   discs > 0 ? fmt::format(", {} of what no patch fits", counted(discs, "disc")) : "",
+                   j["source"].get<std::string>(), where);
+    }
     if (isMesh)
         fmt::print("  materials     {}\n  textures      {} in {} tiles, {}\n", j["materials"].get<uint64_t>(),
                    j["textures"].size(), j["texture_tiles"].get<uint64_t>(),
