@@ -69,7 +69,7 @@ TEST(BuildPatches, ClosedModelsStayClosed) {
 
 TEST(BuildPatches, ClosedModelsAsPointsStayClosed) {
     const std::string igea = test::dataFile("01_meshes/misc/igea.ply");
-    if (igea.empty()) GTEST_SKIP();
+    if (igea.empty()) GTEST_SKIP() << "igea.ply is missing: no real closed model was built from its points";
     const TempFolder folder;
     const Outcome built = runProgram(folder, "build " + igea + " --only-points --patches -o t.stipple --json");
     ASSERT_EQ(built.code, 0) << built.err;
@@ -155,7 +155,7 @@ TEST(BuildPatches, OfScansAreVerifiedAgainstThem) {
 // The colours of a scanner hold the light in them, as points and as patches.
 TEST(BuildPatches, OfColouredScansAreNotLitAgain) {
     const std::string scan = test::dataFile("02_scans/outcrop_rgb_cloudcompare/example_data.laz");
-    if (scan.empty()) GTEST_SKIP();
+    if (scan.empty()) GTEST_SKIP() << "the outcrop is missing: no coloured scan was built as patches";
     const TempFolder folder;
     ASSERT_EQ(runProgram(folder, "build " + scan + " --patches -o t.stipple --quiet").code, 0);
     const auto picture = [&](const std::string& shade) {

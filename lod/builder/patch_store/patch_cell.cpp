@@ -305,7 +305,8 @@ class PatchCell {
         Soup carried;
         SoupPart part(around_, carried);
         for (size_t t = 0; t < around_.indices.size() / 3; ++t)
-            if (isWithin(around_, t, lo, cell) && levelOfOwner(keyOfTriangle(around_, t)) < own.node.level) part.add(t);
+            if (isWithin(around_, t, lo, cell) && levelOfOwner(subtrees_, keyOfTriangle(around_, t)) < own.node.level)
+                part.add(t);
         to.put(aroundError_);
         putSoup(carried, to);
         upwards_.put(to);
@@ -336,12 +337,6 @@ class PatchCell {
     static bool isWithin(const Soup& soup, size_t t, const glm::dvec3& lo, double cell) {
         const glm::dvec3 p(middleOf(soup, t)), reach(kPatchMargin * cell);
         return glm::all(glm::lessThanEqual(lo - reach, p)) && glm::all(glm::lessThanEqual(p, lo + cell + reach));
-    }
-
-    uint32_t levelOfOwner(Key key) const {
-        const auto next = std::upper_bound(subtrees_.begin(), subtrees_.end(), key,
-                                           [](Key k, const Subtree& a) { return k < a.key; });
-        return next == subtrees_.begin() ? 0 : (next - 1)->level;
     }
 
     const Frame& frame_;

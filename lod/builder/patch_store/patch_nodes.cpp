@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "engine/base/check.h"
 #include "engine/base/hash.h"
 #include "lod/builder/counts.h"
 #include "lod/builder/patch_store/node_payload.h"
@@ -101,6 +102,35 @@ void markMaterials(const Patch& p, std::array<uint8_t, 256>& has) {
 }
 
 }  // namespace
+
+uint64_t PatchSums::add(uint64_t at, const std::vector<uint8_t>& bytes) {
+    PatchTable table;
+    ByteReader from(bytes);
+    STIPPLE_CHECK(table.get(from), "the table of a cell");
+    for (NodeBatch::Written& w : table.batch.nodes) w.node.chunkOffset += at;
+    for (PatchTable::Points& p : table.points) p.offset += at;
+    if (table.elements > 0) {
+        lo = glm::min(lo, table.lo);
+        hi = glm::max(hi, table.hi);
+    }
+    kept += table.elements;
+    duplicate += table.duplicate;
+    counts.patches += table.patches;
+    counts.samples += table.samples;
+    counts.left += table.left;
+    counts.discs += table.discs;
+    for (size_t m = 0; m < hasMaterial.size(); ++m) hasMaterial.at(m) |= table.hasMaterial.at(m);
+    residual = std::max(residual, table.residual);
+    beside = std::max(beside, table.beside);
+    tables.push_back(std::move(table));
+    return tables.size();
+}
+
+uint32_t levelOfOwner(const std::vector<Subtree>& subtrees, Key key) {
+    const auto next =
+        std::upper_bound(subtrees.begin(), subtrees.end(), key, [](Key k, const Subtree& a) { return k < a.key; });
+    return next == subtrees.begin() ? 0 : (next - 1)->level;
+}
 
 PatchNode patchNodeAt(const Frame& frame, uint32_t level, Key key) {
     PatchNode n;

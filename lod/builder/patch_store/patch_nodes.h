@@ -1,8 +1,11 @@
 // Nodes of a store of patches on their way to the file, and the tables that say what was written.
 #pragma once
 
+#include <array>
+#include <limits>
 #include <map>
 #include <span>
+#include <vector>
 
 #include "lod/builder/octree/assemble.h"
 #include "lod/builder/patch_store/node_patches.h"
@@ -28,6 +31,21 @@ struct PatchTable {
     void put(ByteWriter& to) const;
     bool get(ByteReader& from);
 };
+
+/// Of all tables of a build.
+struct PatchSums {
+    std::vector<PatchTable> tables;  ///< whose offsets are of the file
+    PatchCounts counts;
+    uint64_t kept = 0, duplicate = 0;  ///< triangles or points of the leaves
+    std::array<uint8_t, 256> hasMaterial{};
+    double residual = 0, beside = 0;  ///< as in PatchTable
+    Steps lo{std::numeric_limits<int64_t>::max()}, hi{std::numeric_limits<int64_t>::min()};
+    /// A table as `put` wrote it, of a product that begins at `at` in the file. How many there are then.
+    uint64_t add(uint64_t at, const std::vector<uint8_t>& bytes);
+};
+
+/// Level of the subtree that the key lies in.
+uint32_t levelOfOwner(const std::vector<Subtree>& subtrees, Key key);
 
 /// A node; what its patches are made of goes with it or not.
 struct PatchNode {

@@ -195,66 +195,45 @@ class PatchBuild : public CellContent {
         return buildPatchCell(cell, input, below, frame(), subtrees_, cell_, executor_);
     }
 
-    uint64_t take(uint64_t at, const std::vector<uint8_t>& bytes) override {
-        PatchTable table;
-        ByteReader from(bytes);
-        STIPPLE_CHECK(table.get(from), "the table of a cell");
-        for (NodeBatch::Written& w : table.batch.nodes) w.node.chunkOffset += at;
-        for (PatchTable::Points& p : table.points) p.offset += at;
-        if (table.elements > 0) {
-            lo_ = glm::min(lo_, table.lo);
-            hi_ = glm::max(hi_, table.hi);
-        }
-        kept_ += table.elements;
-        duplicate_ += table.duplicate;
-        counts_.patches += table.patches;
-        counts_.samples += table.samples;
-        counts_.left += table.left;
-        counts_.discs += table.discs;
-        for (size_t m = 0; m < hasMaterial_.size(); ++m) hasMaterial_.at(m) |= table.hasMaterial.at(m);
-        residual_ = std::max(residual_, table.residual);
-        tables_.push_back(std::move(table));
-        return tables_.size();
-    }
+    uint64_t take(uint64_t at, const std::vector<uint8_t>& bytes) override { return sums_.add(at, bytes); }
 
     // ---- the end ----
 
     Result<Hierarchy> describe(StoreWriter&, StoreDescription& description, BuildReport& report) override {
-        Hierarchy h = hierarchyOf(frame(), std::move(tables_));
-        tables_.clear();
+        Hierarchy h = hierarchyOf(frame(), std::exchange(sums_.tables, {}));
         for (const auto& [reason, count] :
-             {std::pair{"degenerate triangles", facts_.degenerate}, std::pair{"duplicate triangles", duplicate_},
+             {std::pair{"degenerate triangles", facts_.degenerate}, std::pair{"duplicate triangles", sums_.duplicate},
               std::pair{"triangles that are not finite", facts_.notFinite},
               std::pair{"triangles with a corner that is no vertex", facts_.bad}})
             if (count > 0) report.dropped[reason] = count;
         const double world = facts_.lattice.unit;
         report.pointsIn = facts_.triangles + facts_.bad;
-        report.pointsOut = kept_;
+        report.pointsOut = sums_.kept;
         const uint64_t whole = facts_.triangles - facts_.degenerate - facts_.notFinite;
         if (facts_.pieces > whole) report.added["by dividing long ones"] = facts_.pieces - whole;
         // (Middles are rounded: a piece may have no area.)
         if (whole > facts_.pieces) report.dropped["degenerate triangles"] += whole - facts_.pieces;
         report.temporaryBytes = std::max(report.temporaryBytes + source_.readBytes, source_.surveyBytes);
-        report.patches = counts_;
+        report.patches = sums_.counts;
         report.notes.push_back(fmt::format("{} in {}, {:.3g} units from the surface at most",
-                                           counted(counts_.samples, "sample"),
-                                           counted(counts_.patches, "patch", "patches"), residual_ * world));
-        if (counts_.left > 0)
-            report.notes.push_back(
-                fmt::format("{} no patch: {} for {}", counted(counts_.left, "triangle fits", "triangles fit"),
-                            counted(counts_.discs, "disc stands", "discs stand"), counts_.left == 1 ? "it" : "them"));
+                                           counted(sums_.counts.samples, "sample"),
+                                           counted(sums_.counts.patches, "patch", "patches"), sums_.residual * world));
+        if (sums_.counts.left > 0)
+            report.notes.push_back(fmt::format(
+                "{} no patch: {} for {}", counted(sums_.counts.left, "triangle fits", "triangles fit"),
+                counted(sums_.counts.discs, "disc stands", "discs stand"), sums_.counts.left == 1 ? "it" : "them"));
         description = settings_.description;
         forgetUnused(description.pointMaterials);
         for (uint32_t n = 0; n < h.nodes.size(); ++n)
             if (h.nodes[n].isLeaf())
                 h.forEachPayload(n, [&](uint32_t chunk) { description.points += h.payload(chunk).records; });
-        description.patches = counts_;
+        description.patches = sums_.counts;
         description.pointsIn = report.pointsIn;
         description.dropped = report.dropped;
         description.added = report.added;
-        description.roundingUnits = facts_.rounding + residual_ * world;
-        description.boundsMin = description.focusMin = facts_.lattice.origin + world * glm::dvec3(lo_);
-        description.boundsMax = description.focusMax = facts_.lattice.origin + world * glm::dvec3(hi_);
+        description.roundingUnits = facts_.rounding + sums_.residual * world;
+        description.boundsMin = description.focusMin = facts_.lattice.origin + world * glm::dvec3(sums_.lo);
+        description.boundsMax = description.focusMax = facts_.lattice.origin + world * glm::dvec3(sums_.hi);
         description.hasColour = description.hasNormals = description.isReflectance = true;
         return h;
     }
@@ -265,7 +244,7 @@ class PatchBuild : public CellContent {
         if (list != materialGrid()) return;
         size_t last = 0;
         for (size_t m = 0; m < list.size(); ++m)
-            if (hasMaterial_.at(m) != 0)
+            if (sums_.hasMaterial.at(m) != 0)
                 last = m;
             else
                 list[m] = {};
@@ -304,12 +283,7 @@ class PatchBuild : public CellContent {
     PatchCellSettings cell_;
     Facts facts_;
     std::vector<Subtree> subtrees_;
-    std::vector<PatchTable> tables_;
-    uint64_t kept_ = 0, duplicate_ = 0;
-    PatchCounts counts_;
-    std::array<uint8_t, 256> hasMaterial_{};
-    double residual_ = 0;
-    Steps lo_{std::numeric_limits<int64_t>::max()}, hi_{std::numeric_limits<int64_t>::min()};
+    PatchSums sums_;
 };
 
 }  // namespace

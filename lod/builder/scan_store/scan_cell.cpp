@@ -338,7 +338,7 @@ class ScanCell {
         putBlock(own.up, to);
         // Of subtrees that are worked on no earlier than the parent: they send nothing before.
         const auto isCarried = [&](const glm::dvec3& p) {
-            return isNear(p, lo, edge) && levelOfOwner(keyOfPlace(frame_, p)) < own.node.level;
+            return isNear(p, lo, edge) && levelOfOwner(subtrees_, keyOfPlace(frame_, p)) < own.node.level;
         };
         putBlock(thinned(pointsWhere(isCarried), scanStep(frame_, own.node.level - 1u)), to);
         return to.bytes();
@@ -358,12 +358,6 @@ class ScanCell {
     static bool isNear(const glm::dvec3& p, const glm::dvec3& lo, double edge) {
         const glm::dvec3 reach(kScanMargin * edge);
         return glm::all(glm::lessThanEqual(lo - reach, p)) && glm::all(glm::lessThanEqual(p, lo + edge + reach));
-    }
-
-    uint32_t levelOfOwner(Key key) const {
-        const auto next = std::upper_bound(subtrees_.begin(), subtrees_.end(), key,
-                                           [](Key k, const Subtree& a) { return k < a.key; });
-        return next == subtrees_.begin() ? 0 : (next - 1)->level;
     }
 
     const Frame& frame_;

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "engine/base/check.h"
 #include "engine/base/words.h"
@@ -174,61 +175,40 @@ class ScanBuild : public CellContent {
         return buildScanCell(cell, input, below, frame(), subtrees_, cell_, executor_);
     }
 
-    uint64_t take(uint64_t at, const std::vector<uint8_t>& bytes) override {
-        PatchTable table;
-        ByteReader from(bytes);
-        STIPPLE_CHECK(table.get(from), "the table of a cell");
-        for (NodeBatch::Written& w : table.batch.nodes) w.node.chunkOffset += at;
-        for (PatchTable::Points& p : table.points) p.offset += at;
-        if (table.elements > 0) {
-            lo_ = glm::min(lo_, table.lo);
-            hi_ = glm::max(hi_, table.hi);
-        }
-        kept_ += table.elements;
-        duplicate_ += table.duplicate;
-        counts_.patches += table.patches;
-        counts_.samples += table.samples;
-        counts_.left += table.left;
-        counts_.discs += table.discs;
-        residual_ = std::max(residual_, table.residual);
-        beside_ = std::max(beside_, table.beside);
-        tables_.push_back(std::move(table));
-        return tables_.size();
-    }
+    uint64_t take(uint64_t at, const std::vector<uint8_t>& bytes) override { return sums_.add(at, bytes); }
 
     // ---- the end ----
 
     Result<Hierarchy> describe(StoreWriter&, StoreDescription& description, BuildReport& report) override {
-        Hierarchy h = hierarchyOf(frame(), std::move(tables_));
-        tables_.clear();
+        Hierarchy h = hierarchyOf(frame(), std::exchange(sums_.tables, {}));
         report.pointsIn = found_.pointsIn;
         report.dropped = found_.dropped;
         report.notes.insert(report.notes.end(), found_.notes.begin(), found_.notes.end());
         report.skippedFiles = found_.skippedFiles;
-        if (duplicate_ > 0) report.dropped["at the place of another"] = duplicate_;
-        report.pointsOut = kept_;
+        if (sums_.duplicate > 0) report.dropped["at the place of another"] = sums_.duplicate;
+        report.pointsOut = sums_.kept;
         const double world = unit();
-        report.notes.push_back(
-            fmt::format("{} points became {} samples in patches, at most {:.3g} units from them; no "
-                        "place of a patch is farther than {:.3g} from a point",
-                        kept_ - counts_.left, counts_.samples, residual_ * world, beside_ * world));
-        if (counts_.left > 0)
-            report.notes.push_back(
-                counted(counts_.left, "point fits no patch and stays a point", "points fit no patch and stay points"));
+        report.notes.push_back(fmt::format(
+            "{} points became {} samples in patches, at most {:.3g} units from them; no "
+            "place of a patch is farther than {:.3g} from a point",
+            sums_.kept - sums_.counts.left, sums_.counts.samples, sums_.residual * world, sums_.beside * world));
+        if (sums_.counts.left > 0)
+            report.notes.push_back(counted(sums_.counts.left, "point fits no patch and stays a point",
+                                           "points fit no patch and stay points"));
         description = describeInput(input_, settings_.points);
         for (uint32_t n = 0; n < h.nodes.size(); ++n)
             if (h.nodes[n].isLeaf())
                 h.forEachPayload(n, [&](uint32_t chunk) { description.points += h.payload(chunk).records; });
         description.pointsIn = report.pointsIn;
-        description.patches = report.patches = counts_;
+        description.patches = report.patches = sums_.counts;
         description.dropped = report.dropped;
         // (A corner of a step stands for all of it.)
         const double coarse = coarser() > 0 ? std::sqrt(3.0) * world : 0;
-        description.roundingUnits = rounding_ + residual_ * world + coarse;
+        description.roundingUnits = rounding_ + sums_.residual * world + coarse;
         description.hasNormals = true;
         if (!description.hasColour) description.hasColour = description.isReflectance = true;  // all are plain
-        description.boundsMin = input_.origin + world * glm::dvec3(lo_);
-        description.boundsMax = input_.origin + world * glm::dvec3(hi_);
+        description.boundsMin = input_.origin + world * glm::dvec3(sums_.lo);
+        description.boundsMax = input_.origin + world * glm::dvec3(sums_.hi);
         setFocus(h, description);
         description.pointMaterials = {};
         return h;
@@ -326,11 +306,7 @@ class ScanBuild : public CellContent {
     double rounding_ = 0;
     bool isBroken_ = false;
     std::vector<Subtree> subtrees_;
-    std::vector<PatchTable> tables_;
-    uint64_t kept_ = 0, duplicate_ = 0;
-    PatchCounts counts_;
-    double residual_ = 0, beside_ = 0;
-    Steps lo_{std::numeric_limits<int64_t>::max()}, hi_{std::numeric_limits<int64_t>::min()};
+    PatchSums sums_;
 };
 
 }  // namespace
