@@ -71,7 +71,6 @@ class Placer {
         lod::Instance instance = p.place;
         instance.hierarchy = hierarchyOf(p.store);
         instance.source = sourceOf(p);
-        instance.leafError = instance.scale * leafErrors_[instance.hierarchy];
         instance.isDriven = p.isMember;
         state_.instances.push_back(instance);
         return static_cast<uint32_t>(state_.instances.size() - 1);
@@ -118,7 +117,6 @@ class Placer {
         if (!isNew) return known->second;
         state_.stores.push_back(store);
         state_.hierarchies.push_back(&store->hierarchy);
-        leafErrors_.push_back(lod::hasPatches(store->hierarchy) ? store->description.roundingUnits : 0);
         state_.draws.firstMaterial.push_back(static_cast<uint32_t>(state_.materials.size()));
         state_.draws.pointMaterial.push_back(lod::defaultMaterial(store->description));
         state_.materials.insert(state_.materials.end(), store->description.materials.begin(),
@@ -141,7 +139,6 @@ class Placer {
 
     FrameState& state_;
     std::unordered_map<const lod::Store*, uint32_t> numbers_, plainSources_;
-    std::vector<double> leafErrors_;  ///< of each store of patches, units; 0: of others
     uint32_t sources_ = 0;
 };
 

@@ -21,7 +21,6 @@ CutScratch::Slot& slotOf(const CutFrame& frame, uint32_t i) {
     slot.view = makeLocalView(h, instance, frame.view);
     slot.sway = instance.sway / (instance.scale * h.unit);
     slot.inputError = instance.inputError / (instance.scale * h.unit * h.errors.smallest);
-    slot.leafError = instance.leafError / (instance.scale * h.unit * h.errors.smallest);
     slot.first = scratch.allowedUsed;
     scratch.allowedUsed += h.nodes.size();
     if (scratch.allowed.size() < scratch.allowedUsed)

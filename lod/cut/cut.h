@@ -41,9 +41,6 @@ struct Instance {
     double scale = 1;
     /// How far what the store holds in full detail may be from what it stands for, world units: a part of every error.
     double inputError = 0;
-    /// How far its leaves may be from what it was built from, where the errors of coarser nodes are of that, too (a
-    /// store of patches), world units: what is drawn of leaves has no smaller error.
-    double leafError = 0;
     double sway = 0;  ///< how far wind moves it at most, world units: its spheres are larger by that
     /// Another instance, of points, that is drawn instead where that is good enough and cheaper (the classic hybrid).
     static constexpr uint32_t kNone = ~0u;
@@ -106,7 +103,7 @@ struct CutWanted {
 struct CutCounters {
     uint64_t nodesVisited = 0, nodesDrawn = 0, nodesCulled = 0, nodesMissing = 0, recordsDrawn = 0, recordsTested = 0,
              trianglesDrawn = 0, proxies = 0, groupMembers = 0, evaluations = 0;
-    uint64_t leavesAround = 0;  ///< drawn, with a leafError, around the eye: it is not in tauEffective
+    uint64_t leavesAround = 0;  ///< drawn, with a source code, around the eye: it is not in tauEffective
 };
 
 struct Cut {
@@ -142,7 +139,6 @@ struct CutScratch {
         LocalView view;
         double sway = 0;        ///< lattice units
         double inputError = 0;  ///< in steps of the smallest error code
-        double leafError = 0;   ///< likewise
         size_t first = 0;       ///< of its nodes in `allowed`
     };
     /// Of a node: allowed error of tau = 1 in 1/32 octave codes, and the frame that it is of.

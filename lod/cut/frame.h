@@ -151,13 +151,13 @@ inline double deliveredPixels(const CutScratch::Slot& slot, uint32_t errorCode, 
 }
 
 /// Tells the cut of what is drawn of a leaf that is not exact.
-inline void tellLeafError(const CutScratch::Slot& slot, const Node& node, int32_t epsilon, Cut& cut) {
-    if (slot.leafError == 0 || !node.isLeaf()) return;
+inline void tellLeafError(const Node& node, int32_t epsilon, Cut& cut) {
+    if (node.sourceCode == 0 || !node.isLeaf()) return;
     if (epsilon == kInside)
         ++cut.counters.leavesAround;
     else
-        cut.tauEffective =
-            std::max(cut.tauEffective, slot.leafError * std::exp2(-static_cast<double>(epsilon) / kStepsPerOctave));
+        cut.tauEffective = std::max(cut.tauEffective,
+                                    std::exp2(node.sourceCode / 8.0 - static_cast<double>(epsilon) / kStepsPerOctave));
 }
 
 /// emitRecords, of a payload whose node and frame are at hand.
@@ -169,7 +169,7 @@ inline void appendRecords(const CutScratch::Slot& slot, const Hierarchy& h, uint
     cut.counters.recordsTested += count;
     const double delivered = deliveredPixels(slot, p.errorCode, asked);
     if (asked.octantMask) cut.tauEffective = std::max(cut.tauEffective, delivered);
-    tellLeafError(slot, h.nodes[node], asked.epsilon, cut);
+    tellLeafError(h.nodes[node], asked.epsilon, cut);
     if (count > tooCoarse)
         cut.draw.push_back({instance, node, chunk, count, asked.code, asked.octantMask, static_cast<float>(delivered)});
 }

@@ -51,6 +51,10 @@ struct Node : Payload {
     std::array<uint64_t, 3> cell{};       ///< index of the node's cell at its level
     uint8_t level = 0, childMask = 0;
     uint8_t furtherPayloads = 0;
+    /// Of a leaf with patches: bound of the distance, either way, of what it draws from what it was built from, as an
+    /// error code; 0: no such leaf. (Errors of coarser nodes are of that distance, too, and no less than a leaf's
+    /// below.)
+    uint8_t sourceCode = 0;
     uint32_t firstFurther = 0;    ///< into Hierarchy::further
     uint32_t normalCone = 0;      ///< axis, octahedral
     float normalConeCosine = -1;  ///< cosine of the half-angle; -1: all directions
@@ -83,9 +87,10 @@ struct Hierarchy {
     std::vector<uint32_t> groupTextures;  ///< see MeshGroup
     std::vector<shared::TextureInfo> textures;
     std::vector<TextureTile> tiles;
-    bool hasMaterials = false;  ///< points with attributes, and samples of patches, name materials (materials.h)
-    bool isCurves = false;      ///< all records are segments of ribbons and tubes
-    bool isRigid = false;       ///< such that wind does not bend
+    bool hasMaterials = false;      ///< points with attributes, and samples of patches, name materials (materials.h)
+    bool isCurves = false;          ///< all records are segments of ribbons and tubes
+    bool hasOneSourceCode = false;  ///< all leaves with patches have that of the worst: stores of build version 15
+    bool isRigid = false;           ///< such that wind does not bend
     /// Records of a node are discs of one size, in an order in which any beginning shows the whole: n of them stand for
     /// all, sqrt(records / n) times as large. Error codes are those of the radius.
     bool isStochastic = false;

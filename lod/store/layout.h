@@ -53,8 +53,8 @@ struct NodeOnDisk {
     std::array<uint64_t, 3> cell;
     uint32_t parent, firstChild, normalCone;
     float normalConeCosine;
-    uint8_t level, childMask, furtherPayloads;
-    std::array<uint8_t, 5> reserved;
+    uint8_t level, childMask, furtherPayloads, sourceCode;
+    std::array<uint8_t, 4> reserved;
 };
 static_assert(sizeof(NodeOnDisk) == 32 + 24 + 16 + 8);
 
@@ -135,8 +135,10 @@ void moveNode(Node& n, OnDisk& d, const Move& move) {
     move(n.normalConeCosine, d.normalConeCosine);
     move(n.level, d.level);
     move(n.childMask, d.childMask);
-    if constexpr (!std::is_same_v<std::remove_const_t<OnDisk>, OldNodeOnDisk>)
+    if constexpr (!std::is_same_v<std::remove_const_t<OnDisk>, OldNodeOnDisk>) {
         move(n.furtherPayloads, d.furtherPayloads);
+        move(n.sourceCode, d.sourceCode);
+    }
 }
 
 /// What payloads of all versions have (in old ones `d` is the node).

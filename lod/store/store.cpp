@@ -155,6 +155,15 @@ Result<Head> readHead(const InputFile& file) {
     return head;
 }
 
+/// Stores of build version 15 state one distance of all their leaves of patches; `lattice`: that, lattice units.
+void tellSourceCodes(double lattice, Hierarchy& h) {
+    const auto isNotTold = [&](const Node& n) { return n.isLeaf() && n.kind == Kind::patches && n.sourceCode == 0; };
+    h.hasOneSourceCode = !h.isGraph && std::any_of(h.nodes.begin(), h.nodes.end(), isNotTold);
+    if (!h.hasOneSourceCode) return;
+    for (Node& n : h.nodes)
+        if (n.isLeaf()) n.sourceCode = static_cast<uint8_t>(h.errors.encodeUp(lattice));
+}
+
 /// The tables of nodes and payloads, and the description.
 Result<void> readTables(const InputFile& file, const Head& head, Store& store) {
     Hierarchy& h = store.hierarchy;
@@ -210,6 +219,7 @@ Result<Store> openStore(const std::string& path) {
         if (n.isLeaf()) h.finestCode = std::max(h.finestCode, n.errorCode);
     for (const Node& n : h.nodes)
         h.hasMaterials = h.hasMaterials || (n.kind == Kind::patches && store.description.pointMaterials.size() > 1);
+    tellSourceCodes(store.description.roundingUnits / h.unit, h);
     h.discFactors = store.description.discFactors;
     h.smallestDisc = store.description.smallestDisc / h.unit;
     store.contentHash = head.contentHash;

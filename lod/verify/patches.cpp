@@ -145,10 +145,11 @@ Result<uint64_t> measurePatches(const Store& store, uint32_t chunk, uint64_t mos
     for (uint32_t c = 0; c < children; ++c)
         if (!h.nodes[node.firstChild + c].isLeaf()) return 0;
     const uint64_t places = std::min(most, kMostPlaces);
-    // (Of both from what they were made of.)
-    const double error =
-        (h.errors.decode(node.errorCode) + store.description.roundingUnits / h.unit) * (1 + 1e-9) + 1e-6;
     const std::vector<uint32_t> leaves = nodesAround(h, number, [&](uint32_t n) { return h.nodes[n].isLeaf(); });
+    // (Of both from what they were made of.)
+    uint32_t ofLeaves = 0;
+    for (const uint32_t n : leaves) ofLeaves = std::max<uint32_t>(ofLeaves, h.nodes[n].sourceCode);
+    const double error = (h.errors.decode(node.errorCode) + h.errors.decode(ofLeaves)) * (1 + 1e-9) + 1e-6;
     const std::vector<uint32_t> level = nodesAround(h, number, [&](uint32_t n) {
         return h.nodes[n].level == node.level || (h.nodes[n].isLeaf() && h.nodes[n].level < node.level);
     });
@@ -169,12 +170,11 @@ Result<uint64_t> measurePatches(const Store& store, uint32_t chunk, uint64_t mos
     for (size_t k = 0; k < leaves.size(); ++k)
         if (h.nodes[leaves[k]].parent == number) check(fine[k], coarse, cornerOf(h, leaves[k]), sizeOf(h, leaves[k]));
     if (far == 0) return measured;
-    return fail(
-        ErrorKind::input,
-        fmt::format("{} of {} places lie farther from the leaves than the error and the rounding of {:.3g} units say",
-                    far, measured, error * h.unit),
-        fmt::format("{}: node {}", store.path, number),
-        "this is a fault of the build; please report it with the input");
+    return fail(ErrorKind::input,
+                fmt::format("{} of {} places lie farther from the leaves than their errors, together {:.3g} units, say",
+                            far, measured, error * h.unit),
+                fmt::format("{}: node {}", store.path, number),
+                "this is a fault of the build; please report it with the input");
 }
 
 }  // namespace stipple::lod

@@ -62,14 +62,16 @@ class Measuring {
           toSource_(std::move(toSource)),
           places_(std::move(places)),
           wanted_(wanted) {
-        out_.stated = store.description.roundingUnits;
-        stated_ = out_.stated / h_.unit * (1 + 1e-9);
         // What is farther is told as that far at least. (A store that states nothing has a reach all the same.)
-        double edge = 0;
+        double edge = 0, stated = 0;
         for (const Node& n : h_.nodes)
-            if (n.isLeaf()) edge = std::max(edge, n.radius);
-        reach_ = std::max(2 * stated_, edge / 1024);
-        nearest_.assign(places_.size(), reach_);
+            if (n.isLeaf()) {
+                edge = std::max(edge, n.radius);
+                stated = std::max(stated, statedOf(n));
+            }
+        out_.stated = stated * h_.unit;
+        reach_ = std::max(2 * stated, edge / 1024);
+        nearest_.assign(places_.size(), {reach_, 1e300});
         placesNear_.resize(h_.nodes.size());
         made_.resize(h_.nodes.size());
         for (uint32_t k = 0; k < places_.size(); ++k)
@@ -90,17 +92,20 @@ class Measuring {
         for (uint32_t n = 0; n < made_.size(); ++n) {
             const OfLeaf& leaf = made_[n];
             for (size_t i = 0; i < leaf.found.size(); ++i) {
-                double& nearest = nearest_[placesNear_[n][i]];
-                nearest = std::min(nearest, leaf.found[i]);
+                Nearest& nearest = nearest_[placesNear_[n][i]];
+                nearest.distance = std::min(nearest.distance, leaf.found[i]);
+                nearest.part = std::min(nearest.part, leaf.found[i] / statedOf(h_.nodes[n]));
             }
             out_.toSource = std::max(out_.toSource, leaf.most);
+            out_.most = std::max(out_.most, leaf.part);
             out_.placesOfStore += leaf.count;
             out_.far += leaf.far;
         }
         out_.placesOfSource = places_.size();
-        for (const double d : nearest_) {
-            out_.fromSource = std::max(out_.fromSource, d * h_.unit);
-            out_.far += d > stated_ ? 1 : 0;
+        for (const Nearest& nearest : nearest_) {
+            out_.fromSource = std::max(out_.fromSource, nearest.distance * h_.unit);
+            out_.most = std::max(out_.most, nearest.part);
+            out_.far += nearest.part > 1 + 1e-9 ? 1 : 0;
         }
         return out_;
     }
@@ -108,32 +113,40 @@ class Measuring {
   private:
     Result<void> leaf(uint32_t n) {
         STIPPLE_ASSIGN(const NodeSurface surface, NodeSurface::read(store_, n));
-        double most = 0;
+        const double stated = statedOf(h_.nodes[n]) * h_.unit;
+        double most = 0, part = 0;
         uint64_t count = 0, far = 0;
         size_t hint = 0;
         surface.forPlaces(wanted_ / leaves_ + 1, [&](const glm::dvec3& p) {
             const Off off = toSource_(h_.origin + h_.unit * p, hint);
             most = std::max(most, off.distance);
-            far += off.distance > (out_.stated + off.allowed) * (1 + 1e-9) ? 1 : 0;
+            part = std::max(part, off.distance / (stated + off.allowed));
+            far += off.distance > (stated + off.allowed) * (1 + 1e-9) ? 1 : 0;
             ++count;
         });
         std::vector<double> found;
         for (const uint32_t k : placesNear_[n]) found.push_back(surface.distance(places_[k], reach_));
-        made_[n] = {most, count, far, std::move(found)};
+        made_[n] = {most, part, count, far, std::move(found)};
         return {};
     }
+    /// Lattice units; not 0.
+    double statedOf(const Node& leaf) const { return std::max(h_.errors.decode(leaf.sourceCode), 1e-300); }
 
     const Store& store_;
     const Hierarchy& h_;
     ToSource toSource_;
     std::vector<glm::dvec3> places_;
     uint64_t wanted_, leaves_ = 0;
-    double stated_ = 0, reach_ = 0;  ///< lattice units
-    std::vector<double> nearest_;    ///< of each place
+    double reach_ = 0;  ///< lattice units
+    /// Of a place of the source.
+    struct Nearest {
+        double distance = 0, part = 0;  ///< from the nearest leaf; from one, in parts of what that states, at least
+    };
+    std::vector<Nearest> nearest_;
     std::vector<std::vector<uint32_t>> placesNear_;
     /// What a leaf has measured.
     struct OfLeaf {
-        double most = 0;
+        double most = 0, part = 0;
         uint64_t count = 0, far = 0;
         std::vector<double> found;  ///< of `placesNear_`
     };

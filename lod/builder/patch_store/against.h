@@ -11,10 +11,11 @@ namespace stipple::lod {
 
 /// Distances in units of the file.
 struct AgainstSource {
-    double stated = 0;                    ///< bound that the store says, of its leaves
+    double stated = 0;                    ///< largest bound that the store says of a leaf
     double toSource = 0, fromSource = 0;  ///< largest of places of the leaves' patches, and of the source
     uint64_t placesOfStore = 0, placesOfSource = 0;
-    uint64_t far = 0;  ///< of both: farther than stated
+    double most = 0;   ///< of both, what was measured in parts of what that leaf states, at most
+    uint64_t far = 0;  ///< of both: farther than stated of their leaf
 };
 
 /// Measures about `places` places each way, evenly spread over triangles and cells, against all of the other surface.
@@ -22,8 +23,8 @@ struct AgainstSource {
 /// no patches.
 Result<AgainstSource> measureAgainst(const Store& store, TriangleMesh source, uint64_t places, Executor& executor);
 
-/// Likewise of a scan, whose points need no order: all of them lie within what is stated of the leaves. Back, a place
-/// is told as far only where the nearest point is farther than that and six spacings of its own: a scan says no more.
+/// Likewise of a scan, whose points need no order: each of them lies within what is stated of a leaf. Back, a place is
+/// told as far only where the nearest point is farther than that and six spacings of its own: a scan says no more.
 Result<AgainstSource> measureAgainst(const Store& store, std::vector<glm::dvec3> points, uint64_t places,
                                      Executor& executor);
 

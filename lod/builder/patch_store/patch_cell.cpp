@@ -56,6 +56,8 @@ class PatchCell {
             table_.hi = i == 0 ? v.at(i) : glm::max(table_.hi, v.at(i));
         }
         if (table_.elements > 0) partition();
+        for (SurfaceNode& n : nodes_) n.surfaceError = settings_.rounding;
+        aroundError_ = settings_.rounding;
         isMade_ = table_.elements > 0;
         return {};
     }

@@ -16,6 +16,7 @@ struct PatchCellSettings {
     double samplesATriangle = 0.5;  ///< of the leaves
     PlaceLooks looks;               ///< of materials; empty: vertices say all
     bool hasFineNormals = false;    ///< some of it is a mirror
+    double rounding = 0;            ///< most that a place is moved to lie on the lattice, lattice units
 };
 
 /// `input`: soups of what lies in the cell and around it; `subtrees`: of all of the build.

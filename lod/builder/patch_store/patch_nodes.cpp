@@ -159,7 +159,10 @@ void writePatchNode(const Frame& frame, std::span<const Node> children, NodePatc
         }
     }
     for (const Patch& p : made.patches) markMaterials(p, table.hasMaterial);
-    if (out.isLeaf()) table.residual = std::max(table.residual, n.residual);
+    if (out.isLeaf()) {
+        table.residual = std::max(table.residual, n.residual);
+        out.sourceCode = static_cast<uint8_t>(std::max(frame.errors.encodeUp(n.residual), 1u));
+    }
     out.errorCode = static_cast<uint8_t>(code);
     makeSphere(children, made, cornerOf(frame, out), out);
     std::vector<uint8_t> patches = encodePatches(made.patches).bytes;

@@ -53,9 +53,7 @@ struct PatchNode {
     Key key = 0;
     double surfaceError = 0;  ///< of what its patches are made of, bound of the distance from the source, lattice units
     double residual = 0;      ///< of a leaf: of its patches from the source
-    /// Of others: bound of the distance of their patches from the source, or from the leaves (scans); no less than any
-    /// below.
-    double error = 0;
+    double error = 0;         ///< of others: likewise; no less than any below
 };
 
 PatchNode patchNodeAt(const Frame& frame, uint32_t level, Key key);

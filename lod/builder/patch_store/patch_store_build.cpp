@@ -154,7 +154,6 @@ class PatchBuild : public CellContent {
             const PlacedBlock placed = divided(block);
             facts_.degenerate += placed.degenerate;
             facts_.notFinite += placed.notFinite;
-            facts_.rounding = std::max(facts_.rounding, placed.rounding);
             std::vector<std::pair<uint32_t, uint32_t>> order;  // subtree, triangle
             for (uint32_t t = 0; t < placed.soup.indices.size() / 3; ++t) {
                 const Steps p = middleOf(placed.soup, t);
@@ -183,6 +182,8 @@ class PatchBuild : public CellContent {
     }
     Result<void> complete(const CellInputs& inputs) override {
         subtrees_ = inputs.subtrees();
+        // Half a step an axis, and as much each time that an edge was halved.
+        cell_.rounding = 0.5 * std::sqrt(3.0) * (2.0 + static_cast<int>(plainFrame().rootLog2) - longestLog2());
         return {};
     }
     void save(ByteWriter& to) const override { to.put(facts_); }
@@ -231,7 +232,7 @@ class PatchBuild : public CellContent {
         description.pointsIn = report.pointsIn;
         description.dropped = report.dropped;
         description.added = report.added;
-        description.roundingUnits = facts_.rounding + sums_.residual * world;
+        description.roundingUnits = sums_.residual * world;
         description.boundsMin = description.focusMin = facts_.lattice.origin + world * glm::dvec3(sums_.lo);
         description.boundsMax = description.focusMax = facts_.lattice.origin + world * glm::dvec3(sums_.hi);
         description.hasColour = description.hasNormals = description.isReflectance = true;
@@ -258,7 +259,6 @@ class PatchBuild : public CellContent {
     struct Facts {
         Lattice lattice;
         uint64_t triangles = 0, pieces = 0, degenerate = 0, notFinite = 0, bad = 0;
-        double rounding = 0;
         uint32_t keyLevels = 0;
     };
 

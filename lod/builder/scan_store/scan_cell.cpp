@@ -223,7 +223,7 @@ class ScanCell {
             for (size_t i = 0; i < c.up.position.size(); ++i) append(points, c.up, i);
             children.push_back({&c.patches, cornerOf(frame_, c.node), frame_.cellSize(c.node.level)});
             out.left.insert(out.left.end(), c.left.begin(), c.left.end());
-            error = std::max(error, c.error);
+            error = std::max({error, c.error, c.residual});
         }
         addAround(n.node, points);
         const PointSurface surface = pointSurface(std::move(points), {}, executor_, silent_);
@@ -275,7 +275,7 @@ class ScanCell {
 
     void write(ScanNode& n, MadeNode& made) {
         if (n.node.isLeaf()) {
-            n.residual = made.patches.fromPoints;
+            n.residual = made.patches.fromPoints + settings_.rounding;
             table_.beside = std::max(table_.beside, made.patches.toPoints);
             table_.left += made.left.size();
             table_.discs += made.left.size();

@@ -18,6 +18,7 @@ struct ScanCellSettings {
     double coneDegrees = 50;
     double samplesAPoint = 1;  ///< of the leaves
     bool hasNormals = false;   ///< the source has, of all points
+    double rounding = 0;       ///< most that a place is moved to lie on the lattice, lattice units
 };
 
 /// `input`: ScanPoints of what lies in the cell and around it; `subtrees`: of all of the build.

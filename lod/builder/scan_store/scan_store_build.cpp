@@ -151,6 +151,8 @@ class ScanBuild : public CellContent {
             return fail(ErrorKind::input, "what an interrupted build left is damaged", source(),
                         "begin anew with --restart");
         subtrees_ = inputs.subtrees();
+        // (Of coarser steps the corner of one stands for all of it.)
+        cell_.rounding = rounding_ / unit() * std::sqrt(3.0) + (coarser() > 0 ? std::sqrt(3.0) : 0.0);
         cell_.hasNormals = input_.hasNormal;
         return {};
     }
@@ -202,9 +204,7 @@ class ScanBuild : public CellContent {
         description.pointsIn = report.pointsIn;
         description.patches = report.patches = sums_.counts;
         description.dropped = report.dropped;
-        // (A corner of a step stands for all of it.)
-        const double coarse = coarser() > 0 ? std::sqrt(3.0) * world : 0;
-        description.roundingUnits = rounding_ + sums_.residual * world + coarse;
+        description.roundingUnits = sums_.residual * world;
         description.hasNormals = true;
         if (!description.hasColour) description.hasColour = description.isReflectance = true;  // all are plain
         description.boundsMin = input_.origin + world * glm::dvec3(sums_.lo);

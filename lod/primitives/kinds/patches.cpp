@@ -67,6 +67,8 @@ std::string checkPatches(const Hierarchy& h, uint32_t index, const Chunk& chunk)
     const Node& parent = h.nodes[node.parent];
     if (payload.parentCounts.hi != h.errorCodeOf(node.parent)) return "its parent has another error";
     if (payload.errorCode > payload.parentCounts.hi) return "the error is larger than the parent's";
+    if (node.sourceCode > payload.parentCounts.hi && !h.hasOneSourceCode)
+        return "its distance from the source is larger than the parent's error";
     if (glm::length(node.centre - parent.centre) + node.radius > parent.radius * (1 + 1e-9) + 1e-6)
         return "the bounding sphere is not inside the parent's";
     return "";
@@ -93,7 +95,7 @@ void emitPatches(const CutFrame& frame, uint32_t i, uint32_t chunk, const Asked&
     if (!isAsked(h, p, asked)) return;
     const double delivered = deliveredPixels(slotOf(frame, i), p.errorCode, asked);
     if (asked.octantMask) cut.tauEffective = std::max(cut.tauEffective, delivered);
-    tellLeafError(slotOf(frame, i), h.nodes[h.nodeOf(chunk)], asked.epsilon, cut);
+    tellLeafError(h.nodes[h.nodeOf(chunk)], asked.epsilon, cut);
     cut.draw.push_back({i, h.nodeOf(chunk), chunk, p.records, asked.code, asked.octantMask,
                         static_cast<float>(delivered), 1, shared::kPatchTriangles});
     cut.counters.trianglesDrawn += costOfPatches(h, chunk, asked);

@@ -1,0 +1,138 @@
+// What leaves of patches say of their distance from the source: each its own, so that a picture's error is that of what
+// it draws; and that they say enough.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/scene/camera.h"
+#include "lod/builder/patch_store/against.h"
+#include "lod/builder/patch_store/patch_store_build.h"
+#include "lod/cut/cut.h"
+#include "tests/support/patch_cuts.h"
+#include "tests/support/triangle_field.h"
+
+namespace stipple::lod {
+namespace {
+
+using test::Triangle;
+
+Store buildMesh(const TriangleMesh& mesh, const std::string& path, const PatchBuildSettings& settings) {
+    const auto executor = makeTbbExecutor(2);
+    Progress silent(false);
+    const auto report = buildPatchStore(sourceOf(mesh), path, settings, *executor, silent);
+    EXPECT_TRUE(report) << (report ? "" : report.error().line());
+    auto store = openStore(path);
+    EXPECT_TRUE(store);
+    return store ? std::move(*store) : Store();
+}
+/// Leaves of few triangles, so that there are several levels.
+PatchBuildSettings finely() {
+    PatchBuildSettings settings;
+    settings.leafTriangles = 1500;
+    settings.description.materials.resize(1);
+    return settings;
+}
+
+constexpr double kFarAway = 12;
+
+/// A smooth torus about the origin, and far from it a sheet of spikes, each a triangle wide.
+TriangleMesh torusAndSpikes() {
+    TriangleMesh mesh = test::torusMesh(160, 64);
+    mesh.normal.clear();
+    Rng rng(5);
+    const TriangleMesh rough = test::sheet(
+        60, 60, [&](double u, double v) { return glm::dvec3(kFarAway + u, v - 0.5, 0.25 * rng.uniform()); });
+    const auto first = static_cast<uint32_t>(mesh.position.size());
+    mesh.position.insert(mesh.position.end(), rough.position.begin(), rough.position.end());
+    for (const uint32_t i : rough.indices) mesh.indices.push_back(first + i);
+    return mesh;
+}
+
+/// The error, px, that a picture of full detail says, seen from far around `centre`.
+double saidFrom(const Hierarchy& h, const glm::dvec3& centre) {
+    scene::Camera camera;
+    camera.eye = centre + glm::dvec3(0, 0, 6);
+    camera.target = centre;
+    camera.up = {0, 1, 0};
+    const std::vector<const Hierarchy*> hierarchies{&h};
+    const std::vector<Instance> instances{{}};
+    const std::vector<std::vector<uint8_t>> drawable{std::vector<uint8_t>(h.chunks(), 1)};
+    CutScratch scratch;
+    Cut cut;
+    selectCut({hierarchies, instances, {}}, {drawable}, scene::makeView(camera, 800, 600, 1e-3), {1e-3}, scratch, cut);
+    EXPECT_EQ(cut.counters.leavesAround, 0u);
+    EXPECT_GT(cut.counters.trianglesDrawn, 0u);
+    return cut.tauEffective;
+}
+
+TEST(PatchBounds, APictureSaysTheDistanceOfTheLeavesThatItDraws) {
+    const test::TempFolder folder;
+    const TriangleMesh mesh = torusAndSpikes();
+    Store store = buildMesh(mesh, folder / "a.stipple", finely());
+    Hierarchy& h = store.hierarchy;
+    EXPECT_FALSE(h.hasOneSourceCode);
+    const std::vector<Triangle> all = test::trianglesOf(mesh);
+    const test::TriangleField source(all);
+    uint32_t smooth = 0, rough = 0;
+    for (uint32_t n = 0; n < h.nodes.size(); ++n) {
+        const Node& node = h.nodes[n];
+        EXPECT_EQ(node.sourceCode != 0, node.isLeaf());
+        if (!node.isLeaf()) continue;
+        for (uint32_t up = node.parent, k = n; k != 0; k = up, up = h.nodes[k].parent)
+            EXPECT_GE(h.errorCodeOf(up), node.sourceCode) << "node " << up << " above leaf " << n;
+        const double stated = h.unit * h.errors.decode(node.sourceCode);
+        for (const Triangle& t : test::trianglesOf(store, n))
+            EXPECT_LE(source.distance((t[0] + t[1] + t[2]) / 3.0, 2 * stated), stated) << "leaf " << n;
+        uint32_t& most = h.origin.x + h.unit * node.centre.x < 0.5 * kFarAway ? smooth : rough;
+        most = std::max<uint32_t>(most, node.sourceCode);
+    }
+    const double ofTorus = saidFrom(h, {0, 0, 0}), ofSpikes = saidFrom(h, {kFarAway + 0.5, 0, 0});
+    EXPECT_LT(h.errors.decode(smooth), 0.1 * h.errors.decode(rough));
+    EXPECT_LT(ofTorus, 0.1 * ofSpikes);
+    // As many pixels as the leaves' distance is at the nearest place of the torus, and no fewer than at the farthest.
+    const double pixels = h.unit * h.errors.decode(smooth) * scene::makeView({}, 800, 600, 1e-3).focalPixels;
+    EXPECT_LE(ofTorus, 1.5 * pixels / 4);
+    EXPECT_GE(ofTorus, pixels / 8);
+    // The control: one number for all of the store.
+    for (Node& n : h.nodes)
+        if (n.isLeaf()) n.sourceCode = static_cast<uint8_t>(rough);
+    EXPECT_GT(saidFrom(h, {0, 0, 0}), 0.5 * ofSpikes);
+}
+
+TEST(PatchBounds, MeasuringAgainstTheSourceHoldsEachLeafToItsOwn) {
+    const test::TempFolder folder;
+    const TriangleMesh mesh = torusAndSpikes();
+    Store store = buildMesh(mesh, folder / "a.stipple", finely());
+    const auto executor = makeTbbExecutor(2);
+    const auto right = measureAgainst(store, mesh, 20'000, *executor);
+    ASSERT_TRUE(right);
+    EXPECT_EQ(right->far, 0u);
+    EXPECT_LE(right->most, 1 + 1e-9);
+    EXPECT_GT(right->most, 0.1);
+    // The control: a leaf of the torus that states a 64th is found, though all are nearer than the worst one states.
+    for (Node& n : store.hierarchy.nodes)
+        if (n.isLeaf() && store.hierarchy.origin.x + store.hierarchy.unit * n.centre.x < 0.5 * kFarAway)
+            n.sourceCode -= std::min<uint8_t>(n.sourceCode, 48);
+    const auto wrong = measureAgainst(store, mesh, 20'000, *executor);
+    ASSERT_TRUE(wrong);
+    EXPECT_GT(wrong->far, 0u);
+    EXPECT_GT(wrong->most, 1);
+    EXPECT_EQ(wrong->stated, right->stated);
+}
+
+/// Stores of build version 15 state one distance, in their description.
+TEST(PatchBounds, AnOldStoreStatesTheWorstOfAllItsLeaves) {
+    const auto golden = openStore(std::string(STIPPLE_SOURCE_DIR) + "/tests/golden/stores/patches_9.stipple");
+    ASSERT_TRUE(golden) << golden.error().line();
+    const Hierarchy& h = golden->hierarchy;
+    EXPECT_TRUE(h.hasOneSourceCode);
+    EXPECT_EQ(h.nodes.at(0).sourceCode, h.errors.encodeUp(golden->description.roundingUnits / h.unit));
+    EXPECT_NEAR(h.unit * h.errors.decode(h.nodes[0].sourceCode), 0.0553, 0.005);
+    const auto executor = makeTbbExecutor(2);
+    const auto verified = verifyStore(*golden, *executor);
+    EXPECT_TRUE(verified) << verified.error().line();
+}
+
+}  // namespace
+}  // namespace stipple::lod
