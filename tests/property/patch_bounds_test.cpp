@@ -36,10 +36,11 @@ PatchBuildSettings finely() {
 
 constexpr double kFarAway = 12;
 
-/// A smooth torus about the origin, and far from it a sheet of spikes, each a triangle wide.
+/// A smooth, small torus about the origin, and far from it a large sheet of spikes, each a triangle wide.
 TriangleMesh torusAndSpikes() {
-    TriangleMesh mesh = test::torusMesh(160, 64);
+    TriangleMesh mesh = test::torusMesh(100, 40);
     mesh.normal.clear();
+    for (glm::dvec3& p : mesh.position) p *= 0.1;
     Rng rng(5);
     const TriangleMesh rough = test::sheet(
         60, 60, [&](double u, double v) { return glm::dvec3(kFarAway + u, v - 0.5, 0.25 * rng.uniform()); });
@@ -49,10 +50,10 @@ TriangleMesh torusAndSpikes() {
     return mesh;
 }
 
-/// The error, px, that a picture of full detail says, seen from far around `centre`.
-double saidFrom(const Hierarchy& h, const glm::dvec3& centre) {
+/// The error, px, that a picture of full detail says, seen from so far above `centre`.
+double saidFrom(const Hierarchy& h, const glm::dvec3& centre, double distance) {
     scene::Camera camera;
-    camera.eye = centre + glm::dvec3(0, 0, 6);
+    camera.eye = centre + glm::dvec3(0, 0, distance);
     camera.target = centre;
     camera.up = {0, 1, 0};
     const std::vector<const Hierarchy*> hierarchies{&h};
@@ -87,17 +88,18 @@ TEST(PatchBounds, APictureSaysTheDistanceOfTheLeavesThatItDraws) {
         uint32_t& most = h.origin.x + h.unit * node.centre.x < 0.5 * kFarAway ? smooth : rough;
         most = std::max<uint32_t>(most, node.sourceCode);
     }
-    const double ofTorus = saidFrom(h, {0, 0, 0}), ofSpikes = saidFrom(h, {kFarAway + 0.5, 0, 0});
-    EXPECT_LT(h.errors.decode(smooth), 0.1 * h.errors.decode(rough));
-    EXPECT_LT(ofTorus, 0.1 * ofSpikes);
+    EXPECT_LT(h.errors.decode(smooth), 0.2 * h.errors.decode(rough));
     // As many pixels as the leaves' distance is at the nearest place of the torus, and no fewer than at the farthest.
-    const double pixels = h.unit * h.errors.decode(smooth) * scene::makeView({}, 800, 600, 1e-3).focalPixels;
-    EXPECT_LE(ofTorus, 1.5 * pixels / 4);
-    EXPECT_GE(ofTorus, pixels / 8);
+    const double focal = scene::makeView({}, 800, 600, 1e-3).focalPixels;
+    const double pixels = focal * h.unit * h.errors.decode(smooth);
+    const double said = saidFrom(h, {0, 0, 0}, 0.6);
+    EXPECT_LE(said, pixels / 0.35);
+    EXPECT_GE(said, pixels / 0.8);
+    EXPECT_GE(saidFrom(h, {kFarAway + 1.5, 0, 0}, 6), focal * h.unit * h.errors.decode(rough) / 8);
     // The control: one number for all of the store.
     for (Node& n : h.nodes)
         if (n.isLeaf()) n.sourceCode = static_cast<uint8_t>(rough);
-    EXPECT_GT(saidFrom(h, {0, 0, 0}), 0.5 * ofSpikes);
+    EXPECT_GT(saidFrom(h, {0, 0, 0}, 0.6), 2 * pixels / 0.35);
 }
 
 TEST(PatchBounds, MeasuringAgainstTheSourceHoldsEachLeafToItsOwn) {
@@ -119,6 +121,44 @@ TEST(PatchBounds, MeasuringAgainstTheSourceHoldsEachLeafToItsOwn) {
     EXPECT_GT(wrong->far, 0u);
     EXPECT_GT(wrong->most, 1);
     EXPECT_EQ(wrong->stated, right->stated);
+}
+
+/// Spikes of any slope, each a triangle: no patch is worth its samples.
+TriangleMesh noise(uint32_t across) {
+    Rng rng(7);
+    return test::sheet(across, across,
+                       [&](double u, double v) { return glm::dvec3(4 * u, 4 * v, 0.1 * rng.uniform()); });
+}
+
+TEST(PatchBounds, SamplesAreNoMoreThanAreWorthIt) {
+    const test::TempFolder folder;
+    for (const bool isRough : {true, false}) {
+        SCOPED_TRACE(isRough);
+        const TriangleMesh mesh = isRough ? noise(90) : test::wavyTorus(120, 60);
+        const Store store = buildMesh(mesh, folder / "a.stipple", finely());
+        double triangles = static_cast<double>(store.description.pointsIn);
+        for (const auto& [reason, count] : store.description.added) triangles += static_cast<double>(count);
+        EXPECT_LE(static_cast<double>(store.description.patches.samples), 5 * triangles);
+        EXPECT_GE(static_cast<double>(store.description.patches.samples), isRough ? 0.0 : 0.5 * triangles);
+        const auto executor = makeTbbExecutor(2);
+        const auto right = measureAgainst(store, mesh, 5'000, *executor);
+        ASSERT_TRUE(right);
+        EXPECT_EQ(right->far, 0u);
+    }
+}
+
+TEST(PatchBounds, AsManySamplesAsAreAskedForWithinAFifth) {
+    const test::TempFolder folder;
+    const TriangleMesh mesh = test::wavyTorus(200, 80);
+    for (const uint64_t samples : {8'000, 40'000, 200'000}) {
+        PatchBuildSettings settings = finely();
+        settings.leafTriangles = 8'000;
+        settings.samples = samples;
+        const Store store = buildMesh(mesh, folder / "a.stipple", settings);
+        const double part = static_cast<double>(store.description.patches.samples) / static_cast<double>(samples);
+        EXPECT_GE(part, 0.8) << samples;
+        EXPECT_LE(part, 1.2) << samples;
+    }
 }
 
 /// Stores of build version 15 state one distance, in their description.

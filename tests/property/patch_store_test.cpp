@@ -206,7 +206,7 @@ TEST(PatchStore, LooksOfMaterialsAreOnEveryLevel) {
     const auto red = [](double x) { return 0.5 + 0.3 * std::sin(3.14159265 * x); };
     PatchBuildSettings settings;
     settings.leafTriangles = 64;
-    settings.samples = 4'000;
+    settings.samples = 120'000;
     settings.description.pointMaterials = {{1, 0}, {0.3f, 1}};
     settings.looks = [&](uint32_t, const glm::vec2& uv, float) {
         PlaceLook look;

@@ -32,14 +32,15 @@ std::vector<glm::dvec3> placesOf(const Hierarchy& h, const MeshSurface& s, uint6
     return out;
 }
 
-/// Leaves whose spheres come within `reach` of a place.
-std::vector<uint32_t> leavesNear(const Hierarchy& h, const glm::dvec3& p, double reach) {
+/// Leaves whose spheres come within reach(leaf) of a place; `most`: none is larger.
+template <typename Reach>
+std::vector<uint32_t> leavesNear(const Hierarchy& h, const glm::dvec3& p, double most, const Reach& reach) {
     std::vector<uint32_t> out, stack{0};
     while (!stack.empty()) {
         const uint32_t n = stack.back();
         stack.pop_back();
         const Node& node = h.nodes[n];
-        if (glm::distance(node.centre, p) > node.radius + reach) continue;
+        if (glm::distance(node.centre, p) > node.radius + (node.isLeaf() ? reach(node) : most)) continue;
         if (node.isLeaf()) out.push_back(n);
         for (int c = 0; c < __builtin_popcount(node.childMask); ++c)
             stack.push_back(node.firstChild + static_cast<uint32_t>(c));
@@ -62,20 +63,19 @@ class Measuring {
           toSource_(std::move(toSource)),
           places_(std::move(places)),
           wanted_(wanted) {
-        // What is farther is told as that far at least. (A store that states nothing has a reach all the same.)
-        double edge = 0, stated = 0;
+        double stated = 0;
         for (const Node& n : h_.nodes)
             if (n.isLeaf()) {
-                edge = std::max(edge, n.radius);
                 stated = std::max(stated, statedOf(n));
+                reach_ = std::max(reach_, reachOf(n));
             }
         out_.stated = stated * h_.unit;
-        reach_ = std::max(2 * stated, edge / 1024);
-        nearest_.assign(places_.size(), {reach_, 1e300});
+        nearest_.assign(places_.size(), {reach_, 2});
         placesNear_.resize(h_.nodes.size());
         made_.resize(h_.nodes.size());
         for (uint32_t k = 0; k < places_.size(); ++k)
-            for (const uint32_t n : leavesNear(h_, places_[k], reach_)) placesNear_[n].push_back(k);
+            for (const uint32_t n : leavesNear(h_, places_[k], reach_, [&](const Node& n) { return reachOf(n); }))
+                placesNear_[n].push_back(k);
         for (const Node& n : h_.nodes) leaves_ += n.isLeaf() ? 1 : 0;
     }
 
@@ -92,6 +92,7 @@ class Measuring {
         for (uint32_t n = 0; n < made_.size(); ++n) {
             const OfLeaf& leaf = made_[n];
             for (size_t i = 0; i < leaf.found.size(); ++i) {
+                if (leaf.found[i] >= reachOf(h_.nodes[n])) continue;
                 Nearest& nearest = nearest_[placesNear_[n][i]];
                 nearest.distance = std::min(nearest.distance, leaf.found[i]);
                 nearest.part = std::min(nearest.part, leaf.found[i] / statedOf(h_.nodes[n]));
@@ -125,19 +126,23 @@ class Measuring {
             ++count;
         });
         std::vector<double> found;
-        for (const uint32_t k : placesNear_[n]) found.push_back(surface.distance(places_[k], reach_));
+        for (const uint32_t k : placesNear_[n]) found.push_back(surface.distance(places_[k], reachOf(h_.nodes[n])));
         made_[n] = {most, part, count, far, std::move(found)};
         return {};
     }
     /// Lattice units; not 0.
     double statedOf(const Node& leaf) const { return std::max(h_.errors.decode(leaf.sourceCode), 1e-300); }
 
+    /// How far it is looked for: what is farther is told as that far at least. (One that states nothing has a reach all
+    /// the same.)
+    double reachOf(const Node& leaf) const { return std::max(2 * statedOf(leaf), leaf.radius / 1024); }
+
     const Store& store_;
     const Hierarchy& h_;
     ToSource toSource_;
     std::vector<glm::dvec3> places_;
     uint64_t wanted_, leaves_ = 0;
-    double reach_ = 0;  ///< lattice units
+    double reach_ = 0;  ///< the largest, lattice units
     /// Of a place of the source.
     struct Nearest {
         double distance = 0, part = 0;  ///< from the nearest leaf; from one, in parts of what that states, at least

@@ -19,7 +19,7 @@ constexpr double kShare = 0.25;        ///< of the triangles that a level keeps
 constexpr double kUnimportant = 0.05;  ///< share of the wanted error that nobody looks closer at
 constexpr double kMostMissed = 2;      ///< distance measured, in wanted errors: quadrics do not bound it
 constexpr double kNextTry = 0.3;       ///< error asked for then, in that of the try before
-constexpr int kMostTries = 3;
+constexpr int kMostTries = 4;
 constexpr size_t kFewest = 64;  ///< triangles that are not worth simplifying
 
 /// A look that can be added up: colours are squared, which is nearly linear light.
@@ -76,13 +76,53 @@ void dropUnused(Soup& soup) {
     soup = std::move(used);
 }
 
-/// To a quarter, edge by edge; `error`: in parts of the extent.
-std::vector<uint32_t> collapsed(const LocalMesh& local, double error) {
-    std::vector<uint32_t> out(local.indices.size());
+/// Raises the locks of vertices where the two surfaces are farther apart than `limit`: thin fins, and specks that are
+/// gone as a whole, cost quadrics nothing.
+void lockFar(const LocalMesh& local, const std::vector<uint32_t>& coarse, double limit, std::vector<uint8_t>& locks) {
+    const auto executor = makeSerialExecutor();
+    const auto surfaceOf = [&](const std::vector<uint32_t>& indices) {
+        TriangleMesh mesh;
+        for (const glm::vec3& p : local.position) mesh.position.emplace_back(p);
+        mesh.indices = indices;
+        return meshSurface(std::move(mesh), *executor);
+    };
+    const MeshSurface fine = surfaceOf(local.indices), left = surfaceOf(coarse);
+    const auto lock = [&](const std::array<uint32_t, 3>& vertices) {
+        for (const uint32_t v : vertices) locks[v] = 1;
+    };
+    const auto look = [&](const MeshSurface& from, const MeshSurface& to, const auto& onFar) {
+        size_t hint = 0;
+        for (size_t t = 0; t < from.size() && to.size() > 0; ++t)
+            for (size_t k = 0; k < 3; ++k) {
+                const glm::dvec3 corner = from.at(t, k), edge = 0.5 * (corner + from.at(t, (k + 1) % 3));
+                for (const glm::dvec3& p : {corner, edge, from.elements.centre[t]}) {
+                    const auto [distance, near] = to.nearest(p + from.middle - to.middle, hint, limit);
+                    hint = near;
+                    if (distance > limit) onFar(t, near);
+                }
+            }
+    };
+    look(fine, left, [&](size_t t, size_t) { lock(fine.vertices[t]); });
+    look(left, fine, [&](size_t, size_t near) { lock(fine.vertices[near]); });
+}
+
+/// To a quarter, edge by edge; `error`: in parts of the extent. Triangles with a locked vertex stay: to the others they
+/// are a border.
+std::vector<uint32_t> collapsed(const LocalMesh& local, double error, const std::vector<uint8_t>& locks) {
+    std::vector<uint32_t> free, kept;
+    for (size_t i = 0; i < local.indices.size(); i += 3) {
+        bool isKept = false;
+        for (size_t k = 0; k < 3; ++k) isKept = isKept || locks[local.indices[i + k]] != 0;
+        std::vector<uint32_t>& to = isKept ? kept : free;
+        for (size_t k = 0; k < 3; ++k) to.push_back(local.indices[i + k]);
+    }
     const auto target = static_cast<size_t>(kShare * static_cast<double>(local.indices.size() / 3)) * 3;
-    out.resize(meshopt_simplify(out.data(), local.indices.data(), local.indices.size(), &local.position[0].x,
-                                local.position.size(), sizeof(glm::vec3), target, static_cast<float>(error),
-                                meshopt_SimplifyLockBorder, nullptr));
+    std::vector<uint32_t> out(free.size());
+    if (!free.empty())
+        out.resize(meshopt_simplify(out.data(), free.data(), free.size(), &local.position[0].x, local.position.size(),
+                                    sizeof(glm::vec3), target, static_cast<float>(error), meshopt_SimplifyLockBorder,
+                                    nullptr));
+    out.insert(out.end(), kept.begin(), kept.end());
     return out;
 }
 
@@ -169,8 +209,9 @@ double simplify(Soup& soup, double wanted, size_t most) {
     const float scale = meshopt_simplifyScale(&local.position[0].x, local.position.size(), sizeof(glm::vec3));
     std::vector<uint32_t> coarse;
     double error = 0, said = wanted;
-    for (int tries = 0; tries < kMostTries; ++tries, said *= kNextTry) {
-        std::vector<uint32_t> made = collapsed(local, said / std::max(double{scale}, 1e-30));
+    std::vector<uint8_t> locks(local.position.size(), 0);
+    for (int tries = 0; tries < kMostTries; ++tries) {
+        std::vector<uint32_t> made = collapsed(local, said / std::max(double{scale}, 1e-30), locks);
         const bool isBorderKept = made.size() / 3 <= most;
         if (!isBorderKept && tries > 0) break;
         if (!isBorderKept) made = united(local, most);
@@ -181,6 +222,8 @@ double simplify(Soup& soup, double wanted, size_t most) {
             coarse = std::move(made);
         }
         if (error <= kMostMissed * wanted || !isBorderKept) break;
+        if (tries > 0) said *= kNextTry;
+        lockFar(local, coarse, kMostMissed * wanted, locks);
     }
     soup.indices.clear();
     for (const uint32_t v : coarse) soup.indices.push_back(local.global[v]);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "lod/builder/patch_store/discs.h"
 #include "lod/builder/patch_store/division.h"
@@ -13,10 +14,16 @@
 namespace stipple::lod {
 namespace {
 
-constexpr double kFinest = 0.25, kCoarsest = 1.5;     ///< steps of leaves, in those of their level
-constexpr double kUnited = 0.25;                      ///< cells of discs of inner nodes, in steps
-constexpr double kMostDisc = 0.5;                     ///< edges of what a disc covers, in steps
-constexpr double kWanted = 0.5, kWantedOfLeaf = 0.6;  ///< bounds of patches that are good enough, in steps
+constexpr double kFinest = 0.25, kCoarsest = 1.5;      ///< steps of leaves, in those of their level
+constexpr double kCoarsestTried = 4;                   ///< likewise, where there are too many samples
+constexpr double kMostSamples = 4, kFewSamples = 256;  ///< of leaves: for each triangle; that are always worth it
+constexpr double kAsked = 1.1;                         ///< of the samples asked for, that are good enough
+constexpr double kLooser = 1.7, kLoosest = 1;          ///< bounds that patches want, where there are too many
+constexpr double kSmallPatch = 12;                     ///< samples of the smallest patches
+constexpr int kMostTries = 5;                          ///< of a step
+constexpr double kUnited = 0.25;                       ///< cells of discs of inner nodes, in steps
+constexpr double kMostDisc = 0.5;                      ///< edges of what a disc covers, in steps
+constexpr double kWanted = 0.5, kWantedOfLeaf = 0.6;   ///< bounds of patches that are good enough, in steps
 
 void addTo(TriangleMesh& mesh, const Soup& soup, const glm::dvec3& corner) {
     const auto first = static_cast<uint32_t>(mesh.position.size());
@@ -58,11 +65,9 @@ class NodePatcher {
         std::vector<Segment> segments = connectedComponents(elements);
         std::erase_if(segments, [&](const Segment& s) { return !isInSegment(s.front()); });
         segments = mergeByNormals(elements, splitByCone(elements, std::move(segments), how, executor_), how);
-        SampleSettings sampling;
-        const double step = settings.samplesATriangle > 0 ? leafStep(settings) : settings.step;
-        sampling.step = [step](const Segment&) { return step; };
-        sampling.wanted = (settings.samplesATriangle > 0 ? kWantedOfLeaf : kWanted) * step;
-        SampledSegments sampled = sampleSegments(s_, std::move(segments), sampling, executor_);
+        double step = settings.step;
+        SampledSegments sampled = settings.samplesATriangle > 0 ? sampledLeaf(segments, settings, step)
+                                                                : sampledAt(segments, step, kWanted * step);
         for (SegmentPatch& made : sampled.patches) {
             Patch& p = made.patch.patch;
             p.origin += s_.middle;
@@ -82,16 +87,58 @@ class NodePatcher {
     }
 
   private:
-    /// With which the node has as many samples as it is to have.
-    double leafStep(const NodeSettings& settings) const {
+    SampledSegments sampledAt(const std::vector<Segment>& segments, double step, double wanted) const {
+        SampleSettings sampling;
+        sampling.step = [step](const Segment&) { return step; };
+        sampling.wanted = wanted;
+        return sampleSegments(s_, segments, sampling, executor_);
+    }
+
+    /// Of a leaf. Where there are too many samples, the bound that patches want goes first, then the step, then what is
+    /// costliest stands for itself; where a number is asked for, the step is sought that gives it.
+    SampledSegments sampledLeaf(const std::vector<Segment>& segments, const NodeSettings& settings,
+                                double& step) const {
         double area = 0, triangles = 0;
         for (size_t t = 0; t < s_.size(); ++t) {
             if (s_.vertices[t][0] >= ownVertices_) continue;
             area += s_.elements.area[t];
             ++triangles;
         }
-        const double wanted = std::sqrt(area / std::max(settings.samplesATriangle * triangles, 1.0));
-        return std::clamp(wanted, settings.step * kFinest, settings.step * kCoarsest);
+        const double aim = std::max(settings.samplesATriangle * triangles, 1.0);
+        const double most = settings.isAsked ? kAsked * aim : std::max(kMostSamples * triangles, kFewSamples);
+        step = std::clamp(std::sqrt(area / aim), settings.step * kFinest, settings.step * kCoarsest);
+        const double least = settings.isAsked && aim >= kFewSamples ? aim / kAsked : 0;
+        // In steps. (Where there are so many segments, nobody asks for more.)
+        double wanted = kWantedOfLeaf;
+        const auto loosen = [&] {
+            wanted = wanted < kLoosest ? kLooser * wanted : std::numeric_limits<double>::infinity();
+        };
+        while (static_cast<double>(segments.size()) * kSmallPatch > most && wanted < kLoosest) loosen();
+        SampledSegments made = sampledAt(segments, step, wanted * step);
+        for (int tries = 0; tries < kMostTries; ++tries) {
+            const auto samples = static_cast<double>(made.samples());
+            if (samples <= most && samples >= least) break;
+            const bool isLoose = !std::isfinite(wanted);
+            if (samples > most && (tries > 0 || !settings.isAsked)) loosen();
+            if (settings.isAsked || isLoose) {
+                const double times = samples / (settings.isAsked ? aim : 0.9 * most);
+                const double next = std::clamp(step * std::clamp(std::sqrt(times), 0.5, 2.0), settings.step * kFinest,
+                                               settings.step * kCoarsestTried);
+                if (next == step && isLoose) break;
+                step = next;
+            }
+            made = sampledAt(segments, step, wanted * step);
+        }
+        if (!settings.isAsked) made.leaveCostly(most, [&](uint32_t t) { return discsOver(t, kMostDisc * step); });
+        return made;
+    }
+
+    /// As many as `cover` takes.
+    double discsOver(uint32_t t, double step) const {
+        double longest = 0, discs = 1;
+        for (size_t k = 0; k < 3; ++k) longest = std::max(longest, glm::distance(s_.at(t, k), s_.at(t, (k + 1) % 3)));
+        for (; longest > step; longest *= 0.5) discs *= 4;
+        return discs;
     }
 
     bool isInSegment(uint32_t t) const { return s_.vertices[t][0] < segmentVertices_; }

@@ -36,8 +36,9 @@ struct NodeSettings {
     double step = 1;          ///< of the level's grid, lattice units
     double coneDegrees = 50;  ///< half the cone of a patch's normals
     /// Samples aimed at for each of its triangles, of a leaf: its grid may be up to four times as fine as the level's,
-    /// and a little coarser. 0: of an inner node, whose discs are united in cells of half a step.
+    /// and a little coarser. 0: of an inner node, whose discs are united in cells of a quarter of a step.
     double samplesATriangle = 0;
+    bool isAsked = false;               ///< somebody did: as many as that, within a tenth if steps can do it
     PlaceLooks looks;                   ///< of materials; empty: vertices say all
     bool hasFineNormals = false;        ///< some of it is a mirror
     const LevelLooks* below = nullptr;  ///< looks of triangles that are simplified, in cells of the level's step

@@ -170,6 +170,7 @@ class PatchCell {
                 const NodeSettings how{patchStep(frame_, level),
                                        settings_.coneDegrees,
                                        n.node.isLeaf() ? settings_.samplesATriangle : 0.0,
+                                       settings_.isAsked,
                                        settings_.looks,
                                        settings_.hasFineNormals,
                                        &looks_};

@@ -14,6 +14,7 @@ struct PatchCellSettings {
     uint32_t leafTriangles = 32'768;
     double coneDegrees = 50;
     double samplesATriangle = 0.5;  ///< of the leaves
+    bool isAsked = false;           ///< somebody asked for that many
     PlaceLooks looks;               ///< of materials; empty: vertices say all
     bool hasFineNormals = false;    ///< some of it is a mirror
     double rounding = 0;            ///< most that a place is moved to lie on the lattice, lattice units

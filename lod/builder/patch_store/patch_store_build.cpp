@@ -23,6 +23,7 @@ namespace {
 
 constexpr uint64_t kCellBytes = uint64_t{160} << 20;  ///< that one cell of the work needs at most
 constexpr uint32_t kFewestOfLeaf = 64;                ///< triangles, however many samples are wanted
+constexpr double kUsualSamples = 0.5;                 ///< of leaves, for each triangle: one a vertex
 constexpr double kFewPieces = 1 << 14;                ///< that dividing may add to small meshes ...
 constexpr double kMorePieces = 1.25;                  ///< ... and to large ones, times
 constexpr int kPiecesACell = 2;                       ///< log2: an edge is a fourth of the smallest cell's at most
@@ -33,14 +34,9 @@ class PatchBuild : public CellContent {
         : source_(source), settings_(settings), executor_(executor) {
         cell_.coneDegrees = settings.coneDegrees;
         cell_.leafTriangles = settings.leafTriangles;
+        cell_.samplesATriangle = kUsualSamples;
         cell_.looks = settings.looks;
         cell_.hasFineNormals = hasMirrors(settings.description.pointMaterials);
-        if (settings.samples == 0) return;
-        const double usual = 0.5 * static_cast<double>(source.triangles);  // vertices
-        const double times = std::max(usual, 1.0) / static_cast<double>(settings.samples);
-        cell_.samplesATriangle /= times;
-        cell_.leafTriangles = static_cast<uint32_t>(
-            std::clamp(times * cell_.leafTriangles, double{kFewestOfLeaf}, double{kSubtreePoints}));
     }
 
     const char* primitive() const override { return "triangle"; }
@@ -182,6 +178,7 @@ class PatchBuild : public CellContent {
     }
     Result<void> complete(const CellInputs& inputs) override {
         subtrees_ = inputs.subtrees();
+        aimAtSamples();
         // Half a step an axis, and as much each time that an edge was halved.
         cell_.rounding = 0.5 * std::sqrt(3.0) * (2.0 + static_cast<int>(plainFrame().rootLog2) - longestLog2());
         return {};
@@ -261,6 +258,17 @@ class PatchBuild : public CellContent {
         uint64_t triangles = 0, pieces = 0, degenerate = 0, notFinite = 0, bad = 0;
         uint32_t keyLevels = 0;
     };
+
+    /// (Of what triangles were divided into there are more than of vertices.)
+    void aimAtSamples() {
+        cell_.isAsked = settings_.samples > 0;
+        if (!cell_.isAsked) return;
+        const double times =
+            std::max(kUsualSamples * static_cast<double>(facts_.pieces), 1.0) / static_cast<double>(settings_.samples);
+        cell_.samplesATriangle = kUsualSamples / times;
+        cell_.leafTriangles = static_cast<uint32_t>(
+            std::clamp(times * settings_.leafTriangles, double{kFewestOfLeaf}, double{kSubtreePoints}));
+    }
 
     Frame plainFrame() const {
         constexpr double kNear = 16;  // steps, see mesh_build

@@ -19,7 +19,7 @@ void divide(const MeshSurface& s, const std::array<glm::dvec3, 3>& t, size_t hin
     const glm::dvec3 middle = (t[0] + t[1] + t[2]) / 3.0;
     const double around =
         std::max({glm::distance(t[0], middle), glm::distance(t[1], middle), glm::distance(t[2], middle)});
-    const auto [distance, nearest] = s.nearest(middle, hint);
+    const auto [distance, nearest] = s.nearest(middle, hint, bound - around);
     double most = distance + around;
     if (most > bound) most = std::min(most, fromOne(nearest));
     if (most <= bound) return;

@@ -294,14 +294,18 @@ double MeshSurface::distance(const glm::dvec3& p, size_t t) const {
     return glm::distance(p, a + w.x * (b - a) + w.y * (c - a));
 }
 
-std::pair<double, size_t> MeshSurface::nearest(const glm::dvec3& p, size_t hint) const {
+std::pair<double, size_t> MeshSurface::nearest(const glm::dvec3& p, size_t hint, double enough) const {
     std::pair<double, size_t> best{distance(p, hint), hint};
     double squared = best.first * best.first;
+    if (best.first <= enough) return best;
     tree.visit(p, squared, [&](size_t t) {
+        const glm::dvec3 off = p - elements.centre[t];
+        const double far = (best.first + double{radius[t]}) * (1 + 1e-12);
+        if (glm::dot(off, off) > far * far) return;
         const double d = distance(p, t);
         if (!(d < best.first)) return;
         best = {d, t};
-        squared = d * d;
+        squared = d <= enough ? -1 : d * d;
     });
     return best;
 }
@@ -316,9 +320,13 @@ MeshSurface meshSurface(TriangleMesh mesh, Executor& executor) {
     e.centre.resize(s.size());
     e.normal.resize(s.size());
     e.area.resize(s.size());
+    s.radius.resize(s.size());
     for (size_t t = 0; t < s.size(); ++t) {
         const glm::dvec3 a = s.at(t, 0), b = s.at(t, 1), c = s.at(t, 2);
         e.centre[t] = (a + b + c) / 3.0;
+        const glm::dvec3& m = e.centre[t];
+        s.radius[t] =
+            static_cast<float>(std::max({glm::distance(a, m), glm::distance(b, m), glm::distance(c, m)}) * (1 + 1e-6));
         const glm::dvec3 n = withoutScale(glm::cross(b - a, c - a));
         e.normal[t] = glm::vec3(glm::normalize(n));
         e.area[t] = areaOf(s, t);

@@ -35,6 +35,7 @@ struct MeshSurface {
     std::vector<std::array<uint32_t, 3>> across;    ///< the triangle beyond the edge from a corner to the next; kNobody
                                                     ///< where there is none, or more than one
     SurfaceElements elements;                       ///< triangles
+    std::vector<float> radius;                      ///< of triangles: balls about their centres that hold them
     RunTree tree;
     PlaceLooks looks;  ///< of materials; empty: vertices say all
     /// Of triangles of kNoMaterial, where looks lie that went with others: at a place (as `position`), towards a
@@ -49,8 +50,9 @@ struct MeshSurface {
     glm::dvec3 at(size_t triangle, size_t corner) const { return position[corners[triangle][corner]]; }
     /// `b`, `c`: weights of the second and the third corner; `side`: of the square that it stands for, scene units.
     SurfaceLook look(size_t triangle, double b, double c, double side = 0) const;
-    /// The nearest triangle and its distance (scene units); `hint`: one that may be near.
-    std::pair<double, size_t> nearest(const glm::dvec3& p, size_t hint) const;
+    /// The nearest triangle and its distance (scene units); `hint`: one that may be near; any that is no farther than
+    /// `enough` will do.
+    std::pair<double, size_t> nearest(const glm::dvec3& p, size_t hint, double enough = 0) const;
     /// To one triangle.
     double distance(const glm::dvec3& p, size_t triangle) const;
 };

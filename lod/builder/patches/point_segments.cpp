@@ -45,4 +45,20 @@ SampledPoints samplePoints(const PointSurface& surface, std::vector<Segment> seg
     return out;
 }
 
+void SampledPoints::leaveCostly(double most) {
+    std::vector<PatchCost> costs;
+    for (const Made& m : patches)
+        costs.push_back({static_cast<double>(m.patch.patch.samples()), static_cast<double>(m.patch.segment.size())});
+    std::vector<Made> kept;
+    const std::vector<uint8_t> isLeft = costliest(costs, static_cast<double>(left.size()), most);
+    for (size_t k = 0; k < patches.size(); ++k)
+        if (isLeft[k] == 0)
+            kept.push_back(std::move(patches[k]));
+        else
+            left.insert(left.end(), patches[k].patch.segment.begin(), patches[k].patch.segment.end());
+    patches = std::move(kept);
+    std::sort(left.begin(), left.end());
+    left.erase(std::unique(left.begin(), left.end()), left.end());  // (some of a segment were left before)
+}
+
 }  // namespace stipple::lod

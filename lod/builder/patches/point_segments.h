@@ -24,6 +24,8 @@ struct SampledPoints {
     };
     std::vector<Made> patches;   ///< in the order of their first points
     std::vector<uint32_t> left;  ///< points that no patch stands for, ascending
+    /// Leaves the costliest patches until there are no more than so many samples and left points.
+    void leaveCostly(double most);
 };
 
 /// A segment that folds is halved and tried again; one of fewer than kFewestPoints is left.

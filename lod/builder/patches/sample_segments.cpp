@@ -83,7 +83,7 @@ class Sampler {
         const bool isHalved = isFar ? job.denser == 0 && isWorthHalving(job, made.patch)
                                     : made.fit == PatchFit::folded && job.segment.size() > 1;
         if (isGood && !isFar) {
-            out_.patches.push_back({job.segment.front(), std::move(made)});
+            out_.patches.push_back({job.segment.front(), std::move(made), std::move(job.segment)});
         } else if (isHalved) {
             auto [a, b] = halves(s_.elements, job.segment);
             add(std::move(a), again);
@@ -103,6 +103,31 @@ class Sampler {
 };
 
 }  // namespace
+
+uint64_t SampledSegments::samples() const {
+    uint64_t sum = 0;
+    for (const SegmentPatch& p : patches) sum += p.patch.patch.samples();
+    return sum;
+}
+
+void SampledSegments::leaveCostly(double most, const std::function<double(uint32_t)>& recordsOf) {
+    double before = 0;
+    for (const uint32_t t : left) before += recordsOf(t);
+    std::vector<PatchCost> costs;
+    for (const SegmentPatch& p : patches) {
+        costs.push_back({static_cast<double>(p.patch.patch.samples()), 0});
+        for (const uint32_t t : p.segment) costs.back().records += recordsOf(t);
+    }
+    std::vector<SegmentPatch> kept;
+    const std::vector<uint8_t> isLeft = costliest(costs, before, most);
+    for (size_t k = 0; k < patches.size(); ++k)
+        if (isLeft[k] == 0)
+            kept.push_back(std::move(patches[k]));
+        else
+            left.insert(left.end(), patches[k].segment.begin(), patches[k].segment.end());
+    patches = std::move(kept);
+    std::sort(left.begin(), left.end());
+}
 
 SampledSegments sampleSegments(const MeshSurface& surface, std::vector<Segment> segments,
                                const SampleSettings& settings, Executor& executor) {

@@ -21,11 +21,16 @@ struct SampleSettings {
 struct SegmentPatch {
     uint32_t first = 0;  ///< element of its segment
     MeshPatch patch;
+    Segment segment;
 };
 
 struct SampledSegments {
     std::vector<SegmentPatch> patches;  ///< in the order of their first elements
     std::vector<uint32_t> left;         ///< elements that no patch stands for, ascending
+    uint64_t samples() const;
+    /// Leaves the costliest patches until there are no more than so many samples and records of what is left.
+    /// `recordsOf`: of an element.
+    void leaveCostly(double most, const std::function<double(uint32_t)>& recordsOf);
 };
 
 /// A segment that folds is halved and tried again, one that is thin is sampled up to eight times as densely, and what

@@ -16,6 +16,14 @@ struct SegmentSettings {
     std::function<bool()> isStopped;         ///< asked now and then; what is there then is of no use
 };
 
+/// Of a patch: its samples, and the records that there would be in its stead.
+struct PatchCost {
+    double samples, records;
+};
+/// Which patches are to go, those first that have the most samples a record, and two at least (a record has as many
+/// bytes), until samples and records (`left` before) are no more than `most`.
+std::vector<uint8_t> costliest(const std::vector<PatchCost>& costs, double left, double most);
+
 /// Elements that links connect, in the order of their first ones.
 std::vector<Segment> connectedComponents(const SurfaceElements& elements);
 

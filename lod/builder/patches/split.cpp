@@ -116,4 +116,24 @@ std::vector<Segment> splitByCone(const SurfaceElements& elements, std::vector<Se
     return done;
 }
 
+std::vector<uint8_t> costliest(const std::vector<PatchCost>& costs, double left, double most) {
+    double sum = left;
+    std::vector<size_t> order;
+    for (const PatchCost& c : costs) {
+        order.push_back(order.size());
+        sum += c.samples;
+    }
+    std::sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+        const double x = costs[a].samples * costs[b].records, y = costs[b].samples * costs[a].records;
+        return x != y ? x > y : a < b;
+    });
+    std::vector<uint8_t> isLeft(costs.size(), 0);
+    for (const size_t k : order) {
+        if (sum <= most || costs[k].samples <= 2 * costs[k].records) break;
+        sum += costs[k].records - costs[k].samples;
+        isLeft[k] = 1;
+    }
+    return isLeft;
+}
+
 }  // namespace stipple::lod

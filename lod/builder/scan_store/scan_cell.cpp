@@ -16,6 +16,10 @@ constexpr double kFinest = 0.25;     ///< steps of leaves, in those of their lev
 constexpr double kFar = 0.5;         ///< steps, of patches from those of the children
 constexpr double kUnited = 0.25;     ///< cells of discs of inner nodes, in steps
 constexpr size_t kManyDiscs = 8192;  ///< of a node: of more, each level has a fourth
+constexpr double kMostSamples = 2;   ///< of leaves, for each point
+constexpr double kFewSamples = 64;   ///< that nobody counts
+constexpr double kAsked = 1.1;       ///< of the samples asked for, that are good enough
+constexpr int kMostTries = 3;        ///< more, of another step
 constexpr double kReach = 3;         ///< of points beside a node, in spacings of its own
 constexpr double kMostReach = 6;     ///< steps of its level
 constexpr double kDisc = 0.75;       ///< radius of a point that stays one, in spacings
@@ -196,15 +200,31 @@ class ScanCell {
         return std::clamp(kReach * static_cast<double>(*middle), kPatchReach * step, kMostReach * step);
     }
 
+    /// No more samples than are worth it; where a number is asked for, as many as that, within a tenth.
+    ScanPatches patchesOfLeaf(const ScanNode& n, const std::vector<Lies>& lies) const {
+        const auto points = static_cast<double>(n.end - n.begin);
+        const double aim = settings_.samplesAPoint * points;
+        const double most = settings_.isAsked ? kAsked * aim : kMostSamples * points;
+        const double least = settings_.isAsked && aim >= kFewSamples ? aim / kAsked : 0;
+        ScanSettings how{settings_.coneDegrees, kFinest * scanStep(frame_, n.node.level), settings_.samplesAPoint};
+        ScanPatches made;
+        for (int tries = 0;; ++tries) {
+            const bool isLast = tries == kMostTries;
+            if (isLast && !settings_.isAsked) how.mostSamples = most;
+            made = patchesOfScan(s_, lies, cornerOf(frame_, n.node), how, executor_);
+            const auto samples = static_cast<double>(made.samples());
+            if (isLast || samples <= 0 || (samples <= most && samples >= least)) return made;
+            how.samplesAPoint *= std::clamp((settings_.isAsked ? aim : 0.9 * most) / samples, 0.25, 4.0);
+        }
+    }
+
     MadeNode leaf(const ScanNode& n) const {
         MadeNode out;
         std::vector<float> spacings;
         for (size_t k = n.begin; k < n.end; ++k)
             if (const uint32_t i = order_[k].second; s_.isSurface[i] != 0) spacings.push_back(s_.spacing[i]);
         const double step = scanStep(frame_, n.node.level);
-        const ScanSettings how{settings_.coneDegrees, kFinest * step, settings_.samplesAPoint};
-        out.patches = patchesOfScan(s_, liesOf(s_, n.node, reachOf(n.node, std::move(spacings))),
-                                    cornerOf(frame_, n.node), how, executor_);
+        out.patches = patchesOfLeaf(n, liesOf(s_, n.node, reachOf(n.node, std::move(spacings))));
         for (const uint32_t i : out.patches.left) {
             const double radius = std::min(kDisc * static_cast<double>(s_.spacing[i]), kLargestDisc * step);
             out.left.push_back({placeOf(i), s_.elements.normal[i], toFloat(radius), s_.colour[i]});

@@ -17,6 +17,7 @@ struct ScanCellSettings {
     uint32_t leafPoints = 16'384;
     double coneDegrees = 50;
     double samplesAPoint = 1;  ///< of the leaves
+    bool isAsked = false;      ///< somebody asked for that many
     bool hasNormals = false;   ///< the source has, of all points
     double rounding = 0;       ///< most that a place is moved to lie on the lattice, lattice units
 };

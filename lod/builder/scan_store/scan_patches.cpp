@@ -68,6 +68,7 @@ ScanPatches patchesOfScan(const PointSurface& s, const std::vector<Lies>& lies, 
         return std::max(stepOf(s, segment, settings.samplesAPoint), settings.leastStep);
     };
     SampledPoints sampled = samplePoints(s, std::move(segments), how, executor);
+    sampled.leaveCostly(settings.mostSamples);
     for (const uint32_t i : sampled.left) owner[i] = kNone;
     ScanPatches out;
     for (uint32_t i = 0; i < s.size(); ++i)

@@ -1,6 +1,8 @@
 // Patches of one node from points: those of a scan, or samples of the patches below.
 #pragma once
 
+#include <limits>
+
 #include "lod/builder/patch_store/node_patches.h"
 #include "lod/builder/patches/point_surface.h"
 
@@ -16,6 +18,7 @@ struct ScanSettings {
     double coneDegrees = 50;  ///< half the cone of a patch's normals
     double leastStep = 1;     ///< between samples, scene units
     double samplesAPoint = 1;
+    double mostSamples = std::numeric_limits<double>::infinity();  ///< and points left: the costliest patches go
 };
 
 struct ScanPatches {
@@ -25,6 +28,11 @@ struct ScanPatches {
     std::vector<uint32_t> left;  ///< points within that no patch stands for, ascending
     double toPoints = 0;         ///< bound of the distance of any place of the patches from a point, scene units
     double fromPoints = 0;       ///< of any point within that is not left, from the patches
+    uint64_t samples() const {
+        uint64_t sum = 0;
+        for (const Patch& p : patches) sum += p.samples();
+        return sum;
+    }
 };
 
 /// `lies`: of each point of the surface; `corner`: of the node's cell. Patches overlap, and go on beyond the node over

@@ -40,6 +40,7 @@ class ScanBuild : public CellContent {
         if (settings.samples == 0) return;
         const double times =
             std::max(static_cast<double>(input_.declared()), 1.0) / static_cast<double>(settings.samples);
+        cell_.isAsked = true;
         cell_.samplesAPoint /= times;
         cell_.leafPoints =
             static_cast<uint32_t>(std::clamp(times * cell_.leafPoints, double{kFewestOfLeaf}, double{kSubtreePoints}));
