@@ -134,7 +134,7 @@ TEST(PatchBounds, SamplesAreNoMoreThanAreWorthIt) {
     const test::TempFolder folder;
     for (const bool isRough : {true, false}) {
         SCOPED_TRACE(isRough);
-        const TriangleMesh mesh = isRough ? noise(90) : test::wavyTorus(120, 60);
+        const TriangleMesh mesh = isRough ? noise(50) : test::wavyTorus(120, 60);
         const Store store = buildMesh(mesh, folder / "a.stipple", finely());
         double triangles = static_cast<double>(store.description.pointsIn);
         for (const auto& [reason, count] : store.description.added) triangles += static_cast<double>(count);
