@@ -213,20 +213,31 @@ void prepareNear(const FrameConstants& f, size_t count, const SplatTile& tile, D
     for (size_t i = 0; i < n; ++i) __builtin_prefetch(&splats[places[i]]);
 }
 
+/// The discs at these places, as planes. (One by one into a batch's own memory, from where GCC turns eight words of
+/// each at a time.)
+void takeSplats(const PlacedSplat* splats, const uint32_t* places, size_t count, DiscBatch& __restrict b) {
+    static_assert(sizeof(PlacedSplat) == 8 * sizeof(float));
+    alignas(64) PlacedSplat own[DiscBatch::kSize];
+    for (size_t i = 0; i < count; ++i) own[i] = splats[places[i]];
+    for (size_t i = count; i < DiscBatch::kSize; ++i) own[i] = PlacedSplat{};
+    const float* const words = &own[0].cx;
+#pragma GCC ivdep
+    for (size_t i = 0; i < DiscBatch::kSize; ++i) {
+        b.cx[i] = words[8 * i];
+        b.cy[i] = words[8 * i + 1];
+        b.cz[i] = words[8 * i + 2];
+        b.nx[i] = words[8 * i + 3];
+        b.ny[i] = words[8 * i + 4];
+        b.nz[i] = words[8 * i + 5];
+        b.radius[i] = words[8 * i + 6];
+        b.id[i] = floatBitsToUint(words[8 * i + 7]);
+    }
+}
+
 void prepareDiscs(const FrameConstants& frame, const PlacedSplat* splats, const uint32_t* places, size_t count,
                   const SplatTile& tile, DiscBatch& __restrict b) {
     const FrameConstants f = frame;
-    for (size_t i = 0; i < count; ++i) {
-        const PlacedSplat& s = splats[places[i]];
-        b.id[i] = s.id;
-        b.cx[i] = s.cx;
-        b.cy[i] = s.cy;
-        b.cz[i] = s.cz;
-        b.nx[i] = s.nx;
-        b.ny[i] = s.ny;
-        b.nz[i] = s.nz;
-        b.radius[i] = s.radius;
-    }
+    takeSplats(splats, places, count, b);
     const float left = float(int(tile.x0)), top = float(int(tile.y0)), lastX = float(int(tile.width)) - 1.0f,
                 lastY = float(int(tile.height)) - 1.0f;
     const float focal = f.focal, inverseFocal = 1.0f / focal, nearPlane = f.nearPlane;
@@ -269,4 +280,23 @@ void prepareDiscs(const FrameConstants& frame, const PlacedSplat* splats, const 
     }
     prepareNear(f, count, tile, b, boxes);
     reachBlocks(boxes, count, b.reached);
+}
+
+/// Calls use(i) for the discs of a batch that the pixel of their centre may show though its ray misses them: those for
+/// which mayShow(i, that pixel's entry) says so before any of them is shown. (Few do; which, is told without branches.)
+template <typename MayShow, typename Use>
+[[gnu::always_inline]] inline void forMissed(const DiscBatch& b, size_t count, const MayShow& mayShow, const Use& use) {
+    alignas(64) int at[DiscBatch::kSize];
+    alignas(64) uint32_t may[DiscBatch::kSize];
+    for (size_t i = 0; i < DiscBatch::kSize; ++i) at[i] = -1;
+    for (size_t i = 0; i < count; ++i) at[i] = b.missed[i];
+#pragma GCC ivdep
+    for (size_t i = 0; i < DiscBatch::kSize; ++i) {
+        const uint32_t isShown = mayShow(i, at[i] < 0 ? 0 : at[i]) ? 1u : 0u;
+        may[i] = at[i] >= 0 ? isShown : 0u;
+    }
+    for (size_t i = 0; i < DiscBatch::kSize; i += 4)
+        if ((may[i] | may[i + 1] | may[i + 2] | may[i + 3]) != 0u)
+            for (size_t k = i; k < i + 4; ++k)
+                if (may[k] != 0u) use(k);
 }

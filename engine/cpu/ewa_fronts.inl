@@ -31,13 +31,16 @@ template <bool isNear, bool isSecond>
         const float linear = min(max(at.linear, least), most);
         const float depth = kOrthographic ? linear : 1.0f / linear;
         const bool isHit = isSecond ? (at.rho2 <= 1.0f) & (depth > beyond[l]) : at.rho2 <= 1.0f;
-        const float moved = depth + shift * along[l];
-        const bool isFront = isHit & (moved < t.front[l]);
-        t.front[l] = isFront ? moved : t.front[l];
-        t.id[l] = isFront ? id : t.id[l];
-        t.own[l] = isFront ? depth : t.own[l];
-        t.isLeaf[l] = isFront ? isLeaf : t.isLeaf[l];
-        t.farthest[l] = isHit & (depth > t.farthest[l]) ? depth : t.farthest[l];
+        // (Selections between values at hand: of conditions GCC makes masked stores, and what is stored so is not kept
+        // in registers.)
+        const float moved = isHit ? depth + shift * along[l] : kNoDisc, front = t.front[l], own = t.own[l];
+        const uint32_t before = t.id[l], leafBefore = t.isLeaf[l];
+        const uint32_t mine = moved < front ? ~0u : 0u;
+        t.front[l] = min(front, moved);
+        t.id[l] = (id & mine) | (before & ~mine);
+        t.own[l] = uintBitsToFloat((floatBitsToUint(depth) & mine) | (floatBitsToUint(own) & ~mine));
+        t.isLeaf[l] = (isLeaf & mine) | (leafBefore & ~mine);
+        t.farthest[l] = max(t.farthest[l], isHit ? depth : 0.0f);
     }
 }
 template <bool hasNear, bool isSecond>
@@ -72,16 +75,20 @@ void drawFrontBatch(const DiscBatch& b, const FrontBatch& k, const uint32_t* rea
 
 /// The discs of a batch at the pixels that hold their centres, but whose rays miss them.
 void showMissed(const DiscBatch& b, const FrontBatch& k, size_t count, TileFilter& t) {
-    for (size_t i = 0; i < count; ++i) {
-        if (b.missed[i] < 0) continue;
-        const auto at = size_t(b.missed[i]);
-        const float depth = k.missedDepth[i], moved = depth + k.shift[i] * t.along[at];
-        if (!(moved < t.front[at] || (moved == t.front[at] && b.id[i] < t.id[at]))) continue;
-        t.front[at] = moved;
-        t.id[at] = b.id[i];
-        t.own[at] = depth;
-        t.isLeaf[at] = (k.colour[i] >> 24 & kFlagLeaf) != 0u ? 1u : 0u;
-    }
+    const auto movedAt = [&](size_t i, int at)
+        __attribute__((always_inline)) { return k.missedDepth[i] + k.shift[i] * t.along[at]; };
+    forMissed(
+        b, count,
+        [&](size_t i, int at) __attribute__((always_inline)) { return movedAt(i, at) <= t.front[at]; },
+        [&](size_t i) __attribute__((always_inline)) {
+            const int at = b.missed[i];
+            const float moved = movedAt(i, at);
+            if (!(moved < t.front[at] || (moved == t.front[at] && b.id[i] < t.id[at]))) return;
+            t.front[at] = moved;
+            t.id[at] = b.id[i];
+            t.own[at] = k.missedDepth[i];
+            t.isLeaf[at] = (k.colour[i] >> 24 & kFlagLeaf) != 0u ? 1u : 0u;
+        });
 }
 
 /// Where fronts end, by pixels and by blocks, and what is before them. Leaves are no surface: nothing before one is

@@ -21,9 +21,12 @@ template <bool isNear>
         const DiscAt at = discAt < isNear || kOrthographic > (d, px[l] - midX, dy + grid.row[l]);
         const float linear = min(max(at.linear, least), most);
         const float depth = kOrthographic ? linear : 1.0f / linear;
-        const bool isFront = (at.rho2 <= 1.0f) & (depth < nearest[l]);
-        nearest[l] = isFront ? depth : nearest[l];
-        owner[l] = isFront ? id : owner[l];
+        // (Selections between values at hand: of conditions GCC makes masked stores, and what is stored so is not kept
+        // in registers.)
+        const float offered = at.rho2 <= 1.0f ? depth : kNoDisc, before = nearest[l];
+        const uint32_t was = owner[l], mine = offered < before ? ~0u : 0u;
+        nearest[l] = min(before, offered);
+        owner[l] = (id & mine) | (was & ~mine);
     }
 }
 template <bool hasNear>
@@ -54,14 +57,16 @@ void splatBatch(const DiscBatch& b, size_t count, const TileGrid& grid, const Fr
     turnBits(b.reached, discs);
     for (int block = 0; block < kTileBlocks; ++block)
         if (discs.of[block] != 0u) splatBlock<hasNear>(b, discs.of[block], block, grid, f, front);
-    for (size_t i = 0; i < count; ++i) {
-        if (b.missed[i] < 0) continue;
-        const auto at = size_t(b.missed[i]);
-        const float depth = b.cz[i];
-        if (!(depth < front.depth[at] || (depth == front.depth[at] && b.id[i] < front.id[at]))) continue;
-        front.depth[at] = depth;
-        front.id[at] = b.id[i];
-    }
+    forMissed(
+        b, count,
+        [&](size_t i, int at) __attribute__((always_inline)) { return b.cz[i] <= front.depth[at]; },
+        [&](size_t i) __attribute__((always_inline)) {
+            const auto at = size_t(b.missed[i]);
+            const float depth = b.cz[i];
+            if (!(depth < front.depth[at] || (depth == front.depth[at] && b.id[i] < front.id[at]))) return;
+            front.depth[at] = depth;
+            front.id[at] = b.id[i];
+        });
 }
 
 void splatTile(const FrameConstants& frame, const PlacedSplat* splats, const uint32_t* places, size_t count,
