@@ -10,9 +10,9 @@ struct TileFilter {
     static constexpr uint32_t kOther = TileFront::kOther;
     TileGrid grid;
     alignas(64) float front[kTilePixels];      ///< depth of the front disc moved back; kNoDisc: none
-    alignas(64) uint32_t id[kTilePixels];      ///< the front disc, or kOther
+    alignas(64) uint32_t id[kTilePixels];      ///< the front disc, by its place in TileDiscs, or kOther
     alignas(64) float own[kTilePixels];        ///< depth of the front disc
-    alignas(64) uint32_t isLeaf[kTilePixels];  ///< 1: the front disc is one
+    alignas(64) uint32_t isLeaf[kTilePixels];  ///< 1: the front disc is one; only of fronts that are closed
     alignas(64) float farthest[kTilePixels];   ///< of what is opaque there; 0: nothing
     alignas(64) float along[kTilePixels];      ///< depth per length along the ray
     alignas(64) float limit[kTilePixels];      ///< imageLinear of `front`
@@ -71,10 +71,6 @@ struct BlockLimits {
     return blocks[id / kBlockLanes].records[id % kBlockLanes];
 }
 
-[[gnu::always_inline]] inline bool isLeafRecord(const BlockSource* blocks, uint32_t id) {
-    return (recordFlags(recordOf(blocks, id)) & kFlagLeaf) != 0u;
-}
-
 /// Packed (packColour), as resolveRow has it. `colour`: the record's.
 [[gnu::always_inline]] inline uint32_t colourOf(const FrameConstants& f, const Tables& tables,
                                                 const BlockSource* blocks, uint32_t id, uint32_t colour) {
@@ -89,6 +85,42 @@ struct BlockLimits {
 [[gnu::always_inline]] inline float roughness(float radius, uint32_t colour) {
     return radius * ((colour >> 24 & kFlagLeaf) != 0u ? kLeafShare : kSurfaceShare);
 }
+
+/// The discs of a tile, in batches. Those of the first batches are kept from the fronts to the sums, in a cache's
+/// second level (181 KB); further ones are prepared again. (Kernels are not: to prepare them twice is faster than to
+/// keep them.)
+struct TileDiscs {
+    static constexpr size_t kKept = 24;
+    const PlacedSplat* splats;
+    const uint32_t *colours, *places;
+    size_t count;
+    DiscBatch* batches;  ///< kKept, and one more
+    FrontBatch* fronts;
+    bool hasLeaves;      ///< some are; known once their fronts are drawn
+    size_t batchesInAll() const { return (count + DiscBatch::kSize - 1) / DiscBatch::kSize; }
+    size_t sizeOf(size_t b) const {
+        const size_t left = count - b * DiscBatch::kSize;
+        return left < DiscBatch::kSize ? left : DiscBatch::kSize;
+    }
+    /// Of the visibility buffer, by places among these discs. (Lists are in the order of ids: so are places.)
+    uint32_t idOf(uint32_t place) const {
+        const size_t batch = place / DiscBatch::kSize;
+        return batch < kKept ? batches[batch].id[place % DiscBatch::kSize] : splats[places[place]].id;
+    }
+    bool isLeaf(uint32_t place) const {
+        const size_t batch = place / DiscBatch::kSize;
+        const uint32_t colour =
+            batch < kKept ? fronts[batch].colour[place % DiscBatch::kSize] : colours[places[place]];
+        return (colour >> 24 & kFlagLeaf) != 0u;
+    }
+};
+
+/// A batch of them, from the `first` on.
+struct KeptBatch {
+    const DiscBatch& discs;
+    const FrontBatch& fronts;
+    uint32_t first;
+};
 
 #include "engine/cpu/ewa_kernels.inl"
 
@@ -124,26 +156,6 @@ void beginFilter(const FrameConstants& f, const SplatTile& tile, TileFilter& __r
 
 #include "engine/cpu/ewa_show.inl"
 
-/// The discs of a tile, in batches. Those of the first batches are kept from the fronts to the sums, in a cache's
-/// second level (181 KB); further ones are prepared again. (Kernels are not: to prepare them twice is faster than to
-/// keep them.)
-struct TileDiscs {
-    static constexpr size_t kKept = 24;
-    const PlacedSplat* splats;
-    const uint32_t *colours, *places;
-    size_t count;
-    DiscBatch* batches;  ///< kKept, and one more
-    FrontBatch* fronts;
-    size_t batchesInAll() const { return (count + DiscBatch::kSize - 1) / DiscBatch::kSize; }
-    size_t sizeOf(size_t b) const {
-        const size_t left = count - b * DiscBatch::kSize;
-        return left < DiscBatch::kSize ? left : DiscBatch::kSize;
-    }
-};
-struct KeptBatch {
-    const DiscBatch& discs;
-    const FrontBatch& fronts;
-};
 KeptBatch prepareBatch(const FrameConstants& f, const TileDiscs& discs, const SplatTile& tile, size_t b) {
     const size_t first = b * DiscBatch::kSize, n = discs.sizeOf(b), to = b < TileDiscs::kKept ? b : TileDiscs::kKept;
     DiscBatch& batch = discs.batches[to];
@@ -152,16 +164,15 @@ KeptBatch prepareBatch(const FrameConstants& f, const TileDiscs& discs, const Sp
     prepareDiscs(f, discs.splats, discs.places + first, n, tile, batch);
     for (size_t i = 0; i < n; ++i) fronts.colour[i] = discs.colours[discs.places[first + i]];
     prepareFronts(f, n, batch, fronts);
-    return {batch, fronts};
+    return {batch, fronts, uint32_t(first)};
 }
 /// What was prepared before.
 KeptBatch keptBatch(const FrameConstants& f, const TileDiscs& discs, const SplatTile& tile, size_t b) {
     if (b >= TileDiscs::kKept) return prepareBatch(f, discs, tile, b);
-    return {discs.batches[b], discs.fronts[b]};
+    return {discs.batches[b], discs.fronts[b], uint32_t(b * DiscBatch::kSize)};
 }
 
-/// True if some of the discs are leaves.
-bool drawFronts(const FrameConstants& f, const TileDiscs& discs, const SplatTile& tile, TileFilter& t) {
+void drawFronts(const FrameConstants& f, TileDiscs& discs, const SplatTile& tile, TileFilter& t) {
     uint32_t flags = 0;
     for (size_t k = 0; k < discs.batchesInAll(); ++k) {
         const size_t n = discs.sizeOf(k), next = k * DiscBatch::kSize + n;
@@ -169,12 +180,12 @@ bool drawFronts(const FrameConstants& f, const TileDiscs& discs, const SplatTile
         const KeptBatch b = prepareBatch(f, discs, tile, k);
         for (size_t i = 0; i < n; ++i) flags |= b.fronts.colour[i];
         if (b.discs.hasNear)
-            drawFrontBatch<true, false>(b.discs, b.fronts, b.discs.reached, f, t);
+            drawFrontBatch<true, false>(b, b.discs.reached, f, t);
         else
-            drawFrontBatch<false, false>(b.discs, b.fronts, b.discs.reached, f, t);
-        showMissed(b.discs, b.fronts, n, t);
+            drawFrontBatch<false, false>(b, b.discs.reached, f, t);
+        showMissed(b, n, t);
     }
-    return (flags >> 24 & kFlagLeaf) != 0u;
+    discs.hasLeaves = (flags >> 24 & kFlagLeaf) != 0u;
 }
 
 /// The fronts behind TileFilter::beyond, after those before it. `beyond`: the least of it, of each block.
@@ -185,9 +196,9 @@ void drawSecondFronts(const FrameConstants& f, const TileDiscs& discs, const Spl
         const KeptBatch b = keptBatch(f, discs, tile, k);
         if (!markBehind(beyond, b.discs, reached)) continue;
         if (b.discs.hasNear)
-            drawFrontBatch<true, true>(b.discs, b.fronts, reached, f, t);
+            drawFrontBatch<true, true>(b, reached, f, t);
         else
-            drawFrontBatch<false, true>(b.discs, b.fronts, reached, f, t);
+            drawFrontBatch<false, true>(b, reached, f, t);
     }
 }
 
@@ -202,9 +213,9 @@ void addKernels(const FrameConstants& f, const Tables& tables, const BlockSource
         if (!markSeen<sum>(limits, kernels, seen)) continue;
         takeSeen<sum>(f, tables, blocks, b.discs, kernels, b.fronts, seen);
         if (kernels.hasNear)
-            addBatch<true, wants, sum>(b.discs, kernels, seen, f, t);
+            addBatch<true, wants, sum>(b, kernels, seen, f, t);
         else
-            addBatch<false, wants, sum>(b.discs, kernels, seen, f, t);
+            addBatch<false, wants, sum>(b, kernels, seen, f, t);
     }
 }
 
@@ -212,17 +223,17 @@ void addKernels(const FrameConstants& f, const Tables& tables, const BlockSource
 
 /// The discs of a tile to what its pixels show.
 template <Wants wants>
-void filterDiscs(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const TileDiscs& discs,
+void filterDiscs(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, TileDiscs& discs,
                  const SplatTile& tile, const Visibility& visibility, FilteredPixel* filtered,
                  const SecondPixels& seconds) {
     TileFilter t;
     beginFilter(f, tile, t);
-    const bool hasLeaves = drawFronts(f, discs, tile, t);
+    drawFronts(f, discs, tile, t);
     BlockLimits limits;
-    closeFronts(lensHere(f.focal), t, limits);
+    closeFronts(discs, lensHere(f.focal), t, limits);
     addKernels<wants, Sum::first>(f, tables, blocks, discs, tile, limits, t);
     TileOthers others;
-    showTile<wants>(f, tables, blocks, tile, hasLeaves, t, visibility, filtered, others);
+    showTile<wants>(f, tables, blocks, discs, tile, t, visibility, filtered, others);
     if (seconds.pixels != nullptr)
         showSeconds<wants>(f, tables, blocks, discs, tile, t, others, visibility, filtered, seconds);
 }
@@ -233,7 +244,7 @@ void filterTile(const FrameConstants& frame, const Tables& tables, const BlockSo
     const FrameConstants f = frame;
     static thread_local DiscBatch batches[TileDiscs::kKept + 1];
     static thread_local FrontBatch fronts[TileDiscs::kKept + 1];
-    const TileDiscs discs{splats, colours, places, count, batches, fronts};
+    TileDiscs discs{splats, colours, places, count, batches, fronts, false};
     prefetchDiscs(splats, places, count);
     const auto filter = !wantsNormals         ? filterDiscs<Wants::nothing>
                         : f.hasMaterials == 0 ? filterDiscs<Wants::normals>

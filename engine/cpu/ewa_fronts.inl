@@ -4,7 +4,7 @@
 /// Fronts of a block, as in TileFilter.
 struct BlockFronts {
     alignas(64) float front[kGroup], own[kGroup], farthest[kGroup];
-    alignas(64) uint32_t id[kGroup], isLeaf[kGroup];
+    alignas(64) uint32_t id[kGroup];
 
     template <typename Use>
     [[gnu::always_inline]] void each(TileFilter& t, int first, const Use& use) {
@@ -12,19 +12,19 @@ struct BlockFronts {
         use(t.own + first, own);
         use(t.farthest + first, farthest);
         use(t.id + first, id);
-        use(t.isLeaf + first, isLeaf);
     }
 };
 
 /// The opaque part of the i-th disc at the pixels of a block, moved back along the ray. Discs come in the order of
 /// their ids: of what is equally deep the first stays. `isSecond`: only behind `beyond`.
 template <bool isNear, bool isSecond>
-[[gnu::always_inline]] inline void offerFront(const DiscBatch& b, const FrontBatch& k, size_t i, const float* px,
-                                              const float* row, float top, const float* along, const float* beyond,
+[[gnu::always_inline]] inline void offerFront(const KeptBatch& of, size_t i, const float* px, const float* row,
+                                              float top, const float* along, const float* beyond,
                                               const FrameConstants& f, BlockFronts& __restrict t) {
-    const uint32_t id = b.id[i], isLeaf = (k.colour[i] >> 24 & kFlagLeaf) != 0u ? 1u : 0u;
+    const DiscBatch& b = of.discs;
+    const uint32_t id = of.first + uint32_t(i);
     const DiscForm d = formOf(b, i, f);
-    const float midX = b.x[i], dy = top - b.y[i], least = b.least[i], most = b.most[i], shift = k.shift[i];
+    const float midX = b.x[i], dy = top - b.y[i], least = b.least[i], most = b.most[i], shift = of.fronts.shift[i];
 #pragma GCC ivdep
     for (int l = 0; l < kGroup; ++l) {
         const DiscAt at = discAt < isNear || kOrthographic > (d, px[l] - midX, dy + row[l]);
@@ -34,18 +34,15 @@ template <bool isNear, bool isSecond>
         // (Selections between values at hand: of conditions GCC makes masked stores, and what is stored so is not kept
         // in registers.)
         const float moved = isHit ? depth + shift * along[l] : kNoDisc, front = t.front[l], own = t.own[l];
-        const uint32_t before = t.id[l], leafBefore = t.isLeaf[l];
-        const uint32_t mine = moved < front ? ~0u : 0u;
+        const uint32_t before = t.id[l], mine = moved < front ? ~0u : 0u;
         t.front[l] = min(front, moved);
         t.id[l] = (id & mine) | (before & ~mine);
         t.own[l] = uintBitsToFloat((floatBitsToUint(depth) & mine) | (floatBitsToUint(own) & ~mine));
-        t.isLeaf[l] = (isLeaf & mine) | (leafBefore & ~mine);
         t.farthest[l] = max(t.farthest[l], isHit ? depth : 0.0f);
     }
 }
 template <bool hasNear, bool isSecond>
-void drawFrontBlock(const DiscBatch& b, const FrontBatch& k, uint64_t discs, int block, const FrameConstants& f,
-                    TileFilter& __restrict t) {
+void drawFrontBlock(const KeptBatch& b, uint64_t discs, int block, const FrameConstants& f, TileFilter& __restrict t) {
     const int first = block * kGroup;
     const float *const px = t.grid.x + block % kBlockColumns * kGroup, *const along = t.along + first,
                        *const beyond = t.beyond + first;
@@ -55,26 +52,27 @@ void drawFrontBlock(const DiscBatch& b, const FrontBatch& k, uint64_t discs, int
         t, first, [](const auto* of, auto* here) __attribute__((always_inline)) { copyGroup(of, here); });
     forBits(
         discs, [&](size_t i) __attribute__((always_inline)) {
-            if (hasNear && b.isNear[i] > 0.5f)
-                offerFront<true, isSecond>(b, k, i, px, t.grid.row, top, along, beyond, f, fronts);
+            if (hasNear && b.discs.isNear[i] > 0.5f)
+                offerFront<true, isSecond>(b, i, px, t.grid.row, top, along, beyond, f, fronts);
             else
-                offerFront<false, isSecond>(b, k, i, px, t.grid.row, top, along, beyond, f, fronts);
+                offerFront<false, isSecond>(b, i, px, t.grid.row, top, along, beyond, f, fronts);
         });
     fronts.each(
         t, first, [](auto* of, const auto* here) __attribute__((always_inline)) { copyGroup(here, of); });
 }
 /// `reached`: by each disc of the batch, blocks.
 template <bool hasNear, bool isSecond>
-void drawFrontBatch(const DiscBatch& b, const FrontBatch& k, const uint32_t* reached, const FrameConstants& f,
-                    TileFilter& t) {
+void drawFrontBatch(const KeptBatch& b, const uint32_t* reached, const FrameConstants& f, TileFilter& t) {
     BlockDiscs discs;
     turnBits(reached, discs);
     for (int block = 0; block < kTileBlocks; ++block)
-        if (discs.of[block] != 0u) drawFrontBlock<hasNear, isSecond>(b, k, discs.of[block], block, f, t);
+        if (discs.of[block] != 0u) drawFrontBlock<hasNear, isSecond>(b, discs.of[block], block, f, t);
 }
 
 /// The discs of a batch at the pixels that hold their centres, but whose rays miss them.
-void showMissed(const DiscBatch& b, const FrontBatch& k, size_t count, TileFilter& t) {
+void showMissed(const KeptBatch& of, size_t count, TileFilter& t) {
+    const DiscBatch& b = of.discs;
+    const FrontBatch& k = of.fronts;
     const auto movedAt = [&](size_t i, int at)
         __attribute__((always_inline)) { return k.missedDepth[i] + k.shift[i] * t.along[at]; };
     forMissed(
@@ -83,17 +81,20 @@ void showMissed(const DiscBatch& b, const FrontBatch& k, size_t count, TileFilte
         [&](size_t i) __attribute__((always_inline)) {
             const int at = b.missed[i];
             const float moved = movedAt(i, at);
-            if (!(moved < t.front[at] || (moved == t.front[at] && b.id[i] < t.id[at]))) return;
+            const uint32_t id = of.first + uint32_t(i);
+            if (!(moved < t.front[at] || (moved == t.front[at] && id < t.id[at]))) return;
             t.front[at] = moved;
-            t.id[at] = b.id[i];
+            t.id[at] = id;
             t.own[at] = k.missedDepth[i];
-            t.isLeaf[at] = (k.colour[i] >> 24 & kFlagLeaf) != 0u ? 1u : 0u;
         });
 }
 
 /// Where fronts end, by pixels and by blocks, and what is before them. Leaves are no surface: nothing before one is
 /// told from it.
-void closeFronts(const Lens& lens, TileFilter& __restrict t, BlockLimits& __restrict limits) {
+void closeFronts(const TileDiscs& discs, const Lens& lens, TileFilter& __restrict t, BlockLimits& __restrict limits) {
+    if (discs.hasLeaves)
+        for (size_t i = 0; i < kTilePixels; ++i)
+            t.isLeaf[i] = t.id[i] != TileFilter::kOther && discs.isLeaf(t.id[i]) ? 1u : 0u;
 #pragma GCC ivdep
     for (size_t i = 0; i < kTilePixels; ++i) {
         const bool hasFront = t.id[i] != TileFilter::kOther;

@@ -16,6 +16,15 @@ bool isAtJump(const FrameConstants& f, const uint64_t* keys, const FilteredPixel
     return false;
 }
 
+/// The same of a pixel of a tile that is not at its edge.
+bool isAtJump(const TileOthers& others, int x, int y, float limit) {
+    float deepest = 0.0f;
+    for (int row = y - 1; row <= y + 1; ++row)
+        for (int column = x - 1; column <= x + 1; ++column)
+            deepest = max(deepest, others.shown[tileEntry(column, row)]);
+    return deepest > limit;
+}
+
 /// The pixels of a tile that may show a second surface.
 struct TileSeconds {
     struct Pixel {
@@ -47,15 +56,15 @@ bool findSeconds(float covered, const TileFilter& __restrict t, const TileOthers
 }
 
 /// Those of the tile whose fronts may end there; of leaves none do. (Beside the tile they may.)
-void listSeconds(const FrameConstants& f, const SplatTile& tile, const TileFilter& t, const TileOthers& others,
-                 const uint64_t* keys, const FilteredPixel* filtered, const uint32_t* kind, TileSeconds& out) {
+void listSeconds(const SplatTile& tile, const TileFilter& t, const TileOthers& others, const uint32_t* kind,
+                 TileSeconds& out) {
     for (uint32_t y = 0; y < tile.height; ++y)
         for (uint32_t x = 0; x < tile.width; ++x) {
             const auto i = size_t(tileEntry(int(x), int(y)));
             if (kind[i] == kSecondNone) continue;
             if (kind[i] == kSecondBehind) {
                 const bool isAtEdge = x == 0 || y == 0 || x + 1 == tile.width || y + 1 == tile.height;
-                if (!isAtEdge && !isAtJump(f, keys, filtered, tile.x0 + x, tile.y0 + y, t.front[i])) continue;
+                if (!isAtEdge && !isAtJump(others, int(x), int(y), t.front[i])) continue;
                 if (t.isLeaf[i] != 0u) continue;
             }
             const bool isShown = t.id[i] != TileFilter::kOther && (!others.hasAny || t.front[i] < others.depth[i]);
@@ -127,8 +136,8 @@ bool limitSeconds(const FrameConstants& f, const TileFilter& t, const TileOthers
 
 /// What was added up at an entry, but for how much of the pixel it is.
 template <Wants wants>
-SecondPixel secondOf(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, float mostDivided,
-                     const TileFilter& t, size_t i) {
+SecondPixel secondOf(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const TileDiscs& discs,
+                     float mostDivided, const TileFilter& t, size_t i) {
     SecondPixel out{};
     const float weight = t.weight[i];
     const uint32_t id = t.id[i] != TileFilter::kOther ? t.id[i] : t.rim[i];
@@ -142,10 +151,9 @@ SecondPixel secondOf(const FrameConstants& f, const Tables& tables, const BlockS
                 coverOfMaterial(TexelSurface{t.share[i] * over, t.metallic[i] * over, t.roughness[i] * over});
     } else {
         out.depth = t.own[i];
-        showOwn(f, tables, blocks, id, out.shown);
+        showOwn(f, tables, blocks, discs.idOf(id), out.shown);
     }
-    const bool isLeaf = t.id[i] != TileFilter::kOther ? t.isLeaf[i] != 0u : isLeafRecord(blocks, id);
-    if (isLeaf) out.shown.cover |= kFilteredLeaf;
+    if (discs.hasLeaves && discs.isLeaf(id)) out.shown.cover |= kFilteredLeaf;
     return out;
 }
 
@@ -159,7 +167,7 @@ void showSeconds(const FrameConstants& f, const Tables& tables, const BlockSourc
     alignas(64) uint32_t kind[kTilePixels];
     if (!findSeconds(covered, t, others, kind)) return;
     TileSeconds seconds;
-    listSeconds(f, tile, t, others, visibility.keys, filtered, kind, seconds);
+    listSeconds(tile, t, others, kind, seconds);
     if (seconds.count == 0) return;
     TileFilter second;
     beginSeconds(t, seconds, second);
@@ -184,7 +192,7 @@ void showSeconds(const FrameConstants& f, const Tables& tables, const BlockSourc
         } else {
             const float share = min(second.weight[i] * covered, 1.0f);
             if (pixel.kind == kSecondBefore && share < kLeastShare) continue;
-            shown = secondOf<wants>(f, tables, blocks, mostDivided, second, i);
+            shown = secondOf<wants>(f, tables, blocks, discs, mostDivided, second, i);
             shown.share = pixel.kind == kSecondBefore ? share : 1.0f - min(t.weight[i] * covered, 1.0f);
         }
         shown.limit = t.front[i];

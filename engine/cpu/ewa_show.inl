@@ -14,11 +14,12 @@ void showOwn(const FrameConstants& f, const Tables& tables, const BlockSource* b
     pixel.cover = (pixel.cover & (kFilteredMaterial - 1u)) | coverOfMaterial(surfaceOfPoint(material));
 }
 
-/// Other kinds at the pixels of a tile, before discs were drawn.
+/// Other kinds at the pixels of a tile, before discs were drawn; and what it shows then.
 struct TileOthers {
     bool hasAny;
     alignas(64) float depth[kTilePixels];  ///< kNoDisc: none; only if there are any
     uint64_t keys[kTilePixels];
+    alignas(64) float shown[kTilePixels];  ///< depth of what is shown; kNoDisc: nothing that is opaque
 };
 
 /// What a band of a tile shows of what was added up there; nothing where it is less than half a code of
@@ -32,7 +33,8 @@ struct ShownBand {
 };
 /// `covered`: what a weight of 1 covers; `mostDivided`: by more than that colours are not divided.
 template <Wants wants>
-void showBand(float covered, float mostDivided, int band, const TileFilter& __restrict t, ShownBand& __restrict s) {
+void showBand(float covered, float mostDivided, int band, const TileFilter& __restrict t, ShownBand& __restrict s,
+              float* __restrict shown) {
     const size_t first = size_t(band) * kBandPitch;
 #pragma GCC ivdep
     for (size_t k = 0; k < size_t(kBandPitch); ++k) {
@@ -46,7 +48,9 @@ void showBand(float covered, float mostDivided, int band, const TileFilter& __re
         s.isThere[k] = (hasFront ? isBefore : isRim) * (isBlended ? 1u : 2u);
         const float over = 1.0f / (isBlended ? weight : 1.0f), linear = t.linear[i] * over;
         const float mean = kOrthographic ? linear : 1.0f / linear;
-        s.depth[k] = floatBitsToUint(isBlended ? mean : t.own[i]);
+        const float depth = isBlended ? mean : t.own[i];
+        s.depth[k] = floatBitsToUint(depth);
+        shown[i] = hasFront & (isBefore != 0u) ? depth : hasFront | (isRim == 0u) ? exact : kNoDisc;
         const float ofColour = 1.0f / (isBlended ? min(weight, mostDivided) : 1.0f);
         s.colour[k] = packColour(t.red[i] * ofColour, t.green[i] * ofColour, t.blue[i] * ofColour);
         s.normal[k] = wants != Wants::nothing ? octEncode(vec3(t.nx[i], t.ny[i], t.nz[i])) : 0u;
@@ -60,8 +64,8 @@ void showBand(float covered, float mostDivided, int band, const TileFilter& __re
     }
 }
 template <Wants wants>
-void showTile(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const SplatTile& tile,
-              bool hasLeaves, const TileFilter& t, const Visibility& visibility, FilteredPixel* filtered,
+void showTile(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const TileDiscs& discs,
+              const SplatTile& tile, const TileFilter& t, const Visibility& visibility, FilteredPixel* filtered,
               TileOthers& others) {
     // Weights of surfels add up to what is covered; where that is all of a pixel, to one.
     const bool perSurfel = f.perSurfel != 0u;
@@ -82,17 +86,18 @@ void showTile(const FrameConstants& f, const Tables& tables, const BlockSource* 
                 s.exact[at] = others.depth[of] = key != kNoKey ? keyDepth(key) : kNoDisc;
                 others.keys[of] = key;
             }
-        showBand<wants>(covered, mostDivided, int(y) / kGroupRows, t, s);
+        showBand<wants>(covered, mostDivided, int(y) / kGroupRows, t, s, others.shown);
         for (uint32_t r = 0; r < rows; ++r)
             for (size_t x = 0; x < tile.width; ++x) {
                 const size_t k = size_t(kGroupRows) * x + r, to = first + r * f.width + x;
                 if (s.isThere[k] == 0u) continue;
                 FilteredPixel pixel{s.normal[k], s.colour[k], s.cover[k]};
-                if (s.isThere[k] == 2u) showOwn(f, tables, blocks, s.id[k], pixel);
-                if (hasLeaves && (s.isLeaf[k] == 2u ? isLeafRecord(blocks, s.id[k]) : s.isLeaf[k] != 0u))
+                const uint32_t id = discs.idOf(s.id[k]);
+                if (s.isThere[k] == 2u) showOwn(f, tables, blocks, id, pixel);
+                if (discs.hasLeaves && (s.isLeaf[k] == 2u ? discs.isLeaf(s.id[k]) : s.isLeaf[k] != 0u))
                     pixel.cover |= kFilteredLeaf;
                 filtered[to] = pixel;
-                visibility.keys[to] = visibilityKey(s.depth[k], drawId(0u, s.id[k]));
+                visibility.keys[to] = visibilityKey(s.depth[k], drawId(0u, id));
             }
     }
 }

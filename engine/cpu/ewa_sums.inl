@@ -47,10 +47,11 @@ template <Sum sum>
 /// Adds the i-th kernel to the sums of a block. `isNear`: the disc is not wholly before the eye; `hasGaps`:
 /// what counts first is wanted, too.
 template <bool isNear, Wants wants, Sum sum, bool hasGaps>
-[[gnu::always_inline]] inline void addKernel(const DiscBatch& b, const KernelBatch& k, const SeenKernels& seen,
+[[gnu::always_inline]] inline void addKernel(const KeptBatch& of, const KernelBatch& k, const SeenKernels& seen,
                                              size_t i, const FrameConstants& f, float end, const BlockPlace& at,
                                              BlockSums& __restrict s) {
-    const uint32_t id = b.id[i];
+    const DiscBatch& b = of.discs;
+    const uint32_t id = of.first + uint32_t(i);
     DiscForm d = formOf(b, i, f);
     d.over2 *= kOpaqueSigmas * kOpaqueSigmas;
     d.alongX = k.alongX[i];
@@ -100,7 +101,7 @@ template <bool isNear, Wants wants, Sum sum, bool hasGaps>
 }
 
 template <bool hasNear, Wants wants, Sum sum, bool hasGaps>
-void addToBlock(const DiscBatch& b, const KernelBatch& k, const SeenKernels& seen, int block, const FrameConstants& f,
+void addToBlock(const KeptBatch& b, const KernelBatch& k, const SeenKernels& seen, int block, const FrameConstants& f,
                 TileFilter& __restrict t) {
     const int first = block * kGroup;
     BlockPlace at;
@@ -122,7 +123,7 @@ void addToBlock(const DiscBatch& b, const KernelBatch& k, const SeenKernels& see
 
 /// Adds what is seen of a batch, block by block.
 template <bool hasNear, Wants wants, Sum sum>
-void addBatch(const DiscBatch& b, const KernelBatch& k, const SeenKernels& seen, const FrameConstants& f,
+void addBatch(const KeptBatch& b, const KernelBatch& k, const SeenKernels& seen, const FrameConstants& f,
               TileFilter& t) {
     for (int block = 0; block < kTileBlocks; ++block) {
         if (seen.discs.of[block] == 0u) continue;
