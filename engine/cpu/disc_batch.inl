@@ -175,14 +175,20 @@ template <bool byRay>
             b.slopeY[i]};
 }
 
+/// Is one of `count` flags (0 or 1) set?
+inline bool hasSome(const float* flags, size_t count) {
+    uint32_t any = 0u;
+    for (size_t i = 0; i < count; ++i) any |= flags[i] > 0.5f ? 1u : 0u;
+    return any != 0u;
+}
+
 /// Of discs about the eye, one by one.
 void prepareNear(const FrameConstants& f, size_t count, const SplatTile& tile, DiscBatch& b, BatchBoxes& boxes) {
     const float far = 1.0e6f, inverseFocal = 1.0f / f.focal;
     const Lens lens = lensHere(f.focal);
-    b.hasNear = false;
-    for (size_t i = 0; i < count; ++i) {
+    b.hasNear = hasSome(b.isNear, count);
+    for (size_t i = 0; i < count && b.hasNear; ++i) {
         if (!(b.isNear[i] > 0.5f)) continue;
-        b.hasNear = true;
         const WideDisc d = b.disc(i);
         if (!kOrthographic) {
             b.x[i] = b.y[i] = 0.0f;

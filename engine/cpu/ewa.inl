@@ -41,6 +41,7 @@ struct FrontBatch {
     static constexpr size_t kSize = DiscBatch::kSize;
     alignas(64) float shift[kSize];        ///< how far behind the disc its surface may be
     alignas(64) float missedDepth[kSize];  ///< at DiscBatch::missed
+    alignas(64) float nearest[kSize], farthest[kSize];  ///< between which their planes count
     alignas(64) uint32_t colour[kSize];    ///< and flags, of the record
 };
 
@@ -87,7 +88,7 @@ struct BlockLimits {
 }
 
 /// The discs of a tile, in batches. Those of the first batches are kept from the fronts to the sums, in a cache's
-/// second level (181 KB); further ones are prepared again. (Kernels are not: to prepare them twice is faster than to
+/// second level (193 KB); further ones are prepared again. (Kernels are not: to prepare them twice is faster than to
 /// keep them.)
 struct TileDiscs {
     static constexpr size_t kKept = 24;
@@ -209,7 +210,7 @@ void addKernels(const FrameConstants& f, const Tables& tables, const BlockSource
     SeenKernels seen;
     for (size_t k = 0; k < discs.batchesInAll(); ++k) {
         const KeptBatch b = keptBatch(f, discs, tile, k);
-        prepareKernels(f, tile, discs.sizeOf(k), b.discs, kernels);
+        prepareKernels(f, tile, discs.sizeOf(k), b, kernels);
         if (!markSeen<sum>(limits, kernels, seen)) continue;
         takeSeen<sum>(f, tables, blocks, b.discs, kernels, b.fronts, seen);
         if (kernels.hasNear)
@@ -234,7 +235,7 @@ void filterDiscs(const FrameConstants& f, const Tables& tables, const BlockSourc
     addKernels<wants, Sum::first>(f, tables, blocks, discs, tile, limits, t);
     TileOthers others;
     showTile<wants>(f, tables, blocks, discs, tile, t, visibility, filtered, others);
-    if (seconds.pixels != nullptr)
+    if (seconds.list != nullptr)
         showSeconds<wants>(f, tables, blocks, discs, tile, t, others, visibility, filtered, seconds);
 }
 

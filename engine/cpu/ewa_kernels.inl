@@ -8,9 +8,10 @@
     return depthWithin(range, dot(d.normal, fromRay(ray, d.centre)), dot(d.normal, rayDirection(ray)));
 }
 
-void prepareKernels(const FrameConstants& frame, const SplatTile& tile, size_t count, const DiscBatch& s,
+void prepareKernels(const FrameConstants& frame, const SplatTile& tile, size_t count, const KeptBatch& of,
                     KernelBatch& __restrict b) {
     const FrameConstants f = frame;
+    const DiscBatch& s = of.discs;
     const float support = f.kernelSupport, lowPass = f.lowPass;
     const Lens lens = lensHere(f.focal);
     const int lastX = int(tile.width) - 1, lastY = int(tile.height) - 1;
@@ -20,7 +21,7 @@ void prepareKernels(const FrameConstants& frame, const SplatTile& tile, size_t c
         const WideDisc d = s.disc(i);
         const float sigma = d.radius * (1.0f / kOpaqueSigmas);
         const EwaKernel k = ewaKernel(d, sigma, support, lowPass, lens);
-        const DepthRange range = depthRange(d, sigma, support, lowPass, lens);
+        const DepthRange range{of.fronts.nearest[i], of.fronts.farthest[i]};
         const bool isNear = k.isNear > 0.5f;  // (a kernel is not cut off at the near plane, as its disc is)
         const bool atAxis = !kOrthographic & isNear;
         b.isNear[i] = isNear ? 1.0f : 0.0f;
@@ -45,11 +46,10 @@ void prepareKernels(const FrameConstants& frame, const SplatTile& tile, size_t c
         b.ny[i] = d.normal.y * towards;
         b.nz[i] = d.normal.z * towards;
     }
-    b.hasNear = false;
-    for (size_t i = 0; i < count; ++i) b.hasNear = b.hasNear | (b.isNear[i] > 0.5f);
+    b.hasNear = hasSome(b.isNear, count);
     reachBlocks(boxes, count, b.reached);
 }
-/// How far behind discs their surfaces may be, and what pixels show whose rays miss them.
+/// How far behind discs their surfaces may be, between which depths their planes count, and what pixels show whose rays miss them.
 /// `colour` of `b` is there.
 void prepareFronts(const FrameConstants& frame, size_t count, const DiscBatch& s, FrontBatch& __restrict b) {
     const FrameConstants f = frame;
@@ -60,6 +60,8 @@ void prepareFronts(const FrameConstants& frame, size_t count, const DiscBatch& s
         const WideDisc d = s.disc(i);
         b.shift[i] = roughness(d.radius, b.colour[i]);
         const DepthRange range = depthRange(d, d.radius * (1.0f / kOpaqueSigmas), f.kernelSupport, f.lowPass, lens);
+        b.nearest[i] = range.nearest;
+        b.farthest[i] = range.farthest;
         const float toImage = f.focal / lensDepth(lens, d.centre.z);
         const float ex = (std::floor(d.centre.x * toImage + f.centre.x) + 0.5f - f.centre.x) * inverseFocal,
                     ey = (std::floor(d.centre.y * toImage + f.centre.y) + 0.5f - f.centre.y) * inverseFocal;

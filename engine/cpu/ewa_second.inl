@@ -179,6 +179,7 @@ void showSeconds(const FrameConstants& f, const Tables& tables, const BlockSourc
         else
             addKernels<wants, Sum::second>(f, tables, blocks, discs, tile, limits, second);
     }
+    uint32_t next = out.take(uint32_t(seconds.count));
     for (size_t s = 0; s < seconds.count; ++s) {
         const TileSeconds::Pixel& pixel = seconds.of[s];
         const size_t i = pixel.entry, to = (size_t{tile.y0} + pixel.y) * f.width + tile.x0 + pixel.x;
@@ -196,7 +197,8 @@ void showSeconds(const FrameConstants& f, const Tables& tables, const BlockSourc
             shown.share = pixel.kind == kSecondBefore ? share : 1.0f - min(t.weight[i] * covered, 1.0f);
         }
         shown.limit = t.front[i];
-        out.pixels[to] = shown;
+        out.list[next] = shown;
+        out.places[to] = next++;
         out.kinds[to] = pixel.kind;
         __atomic_store_n(&out.runs[to >> Visibility::kRunBits], uint8_t{1}, __ATOMIC_RELAXED);
     }

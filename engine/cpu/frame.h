@@ -82,8 +82,10 @@ struct Frame {
     HugeBuffer<shared::FilteredPixel> filtered;
     HugeBuffer<uint8_t> coverage;
     size_t filteredPixels = 0;
-    // Second surfaces there, written where there are some only; of which kind they are, and runs that have any.
+    // Second surfaces, where there are some; of each pixel its place among them and their kind; runs that have any.
     std::unique_ptr<SecondPixel, void (*)(void*)> secondPixels{nullptr, std::free};
+    uint32_t secondsUsed = 0;
+    std::unique_ptr<uint32_t, void (*)(void*)> secondPlaces{nullptr, std::free};
     std::vector<uint8_t> secondKinds, secondRuns;
 
     Pyramid pyramid;  ///< Plane::texels and Plane::coarse
@@ -96,8 +98,8 @@ struct Frame {
     /// Are there blended discs?
     bool isBlended() const { return mode->blendsSplats && !blocks.empty(); }
     SecondPixels seconds() {
-        return isBlended() ? SecondPixels{secondPixels.get(), secondKinds.data(), secondRuns.data()}
-                           : SecondPixels{nullptr, nullptr, nullptr};
+        if (!isBlended()) return SecondPixels{nullptr, nullptr, nullptr, nullptr, nullptr};
+        return {secondPixels.get(), &secondsUsed, secondPlaces.get(), secondKinds.data(), secondRuns.data()};
     }
     Visibility visible() { return {visibility.data(), runs.data()}; }
     /// May any of these pixels show something?

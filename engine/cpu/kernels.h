@@ -201,17 +201,21 @@ struct SecondPixel {
 };
 /// Those of an image.
 struct SecondPixels {
-    SecondPixel* pixels;  ///< null: there are none
-    uint8_t* kinds;       ///< kSecond... of each
-    uint8_t* runs;        ///< as Visibility::runs
+    SecondPixel* list;  ///< those of one tile behind those of another; null: there are none
+    uint32_t* used;     ///< how many it holds
+    uint32_t* places;   ///< in the list, of each pixel that has one
+    uint8_t* kinds;     ///< kSecond... of each
+    uint8_t* runs;      ///< as Visibility::runs
     const SecondPixel* at(size_t pixel) const {
-        return pixels != nullptr && kinds[pixel] != shared::kSecondNone ? pixels + pixel : nullptr;
+        return list != nullptr && kinds[pixel] != shared::kSecondNone ? list + places[pixel] : nullptr;
     }
+    /// Room for some of a tile: the place of the first. (In which order tiles come changes no pixel.)
+    uint32_t take(uint32_t count) const { return __atomic_fetch_add(used, count, __ATOMIC_RELAXED); }
     /// May any of these have one?
     bool mayHave(size_t first, size_t n) const {
         bool any = false;
         for (size_t r = first >> Visibility::kRunBits;
-             pixels != nullptr && r <= (first + n - 1) >> Visibility::kRunBits; ++r)
+             list != nullptr && r <= (first + n - 1) >> Visibility::kRunBits; ++r)
             any = any || __atomic_load_n(&runs[r], __ATOMIC_RELAXED) != 0;
         return any;
     }

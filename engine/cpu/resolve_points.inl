@@ -197,7 +197,7 @@ void gatherRow(const FrameConstants& f, const Tables& tables, const BlockSource*
         }
         uint64_t key = visibility[i];
         if (key != kNoKey) visibility[i] = kNoKey;
-        if (seconds.pixels != nullptr && seconds.kinds[i] == kSecondFront) key = seconds.pixels[i].key;
+        if (seconds.list != nullptr && seconds.kinds[i] == kSecondFront) key = seconds.at(i)->key;
         if (isPointKey(key, firstBlock)) {
             any = true;
             if (filtered != nullptr)
@@ -239,8 +239,11 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
     const FilteredPixel* const filtered = in.filtered != nullptr ? in.filtered + size_t{y} * f.width + x0 : nullptr;
     const size_t first = size_t{y} * f.width + x0;
     SecondPixels seconds = in.seconds;
-    seconds.pixels = in.seconds.mayHave(first, n) ? in.seconds.pixels + first : nullptr;
-    seconds.kinds += seconds.pixels != nullptr ? first : 0;
+    if (!seconds.mayHave(first, n)) seconds.list = nullptr;
+    if (seconds.list != nullptr) {
+        seconds.kinds += first;
+        seconds.places += first;
+    }
     gatherRow(f, tables, in.blocks, filtered, seconds, visibility, n, g, others, any, anyTurned);
     if (surface != nullptr)
 #pragma GCC ivdep

@@ -17,12 +17,14 @@ void blendDiscs(Frame& frame) {
         frame.filtered.assign(pixels, {});
         frame.coverage.assign(pixels, 0);
         frame.filteredPixels = pixels;
-        // All 0, and no page of it is there before it is written.
+        // All 0, and no page of either is there before it is written.
         frame.secondPixels.reset(static_cast<SecondPixel*>(std::calloc(pixels, sizeof(SecondPixel))));
-        if (!frame.secondPixels) throw std::bad_alloc();
+        frame.secondPlaces.reset(static_cast<uint32_t*>(std::calloc(pixels, sizeof(uint32_t))));
+        if (!frame.secondPixels || !frame.secondPlaces) throw std::bad_alloc();
         frame.secondKinds.assign(pixels + Visibility::kRun, 0);
         frame.secondRuns.assign((pixels >> Visibility::kRunBits) + 1, 0);
     }
+    frame.secondsUsed = 0;
     for (size_t r = 0; r < frame.secondRuns.size(); ++r)
         if (std::exchange(frame.secondRuns[r], uint8_t{0}) != 0)
             std::fill_n(frame.secondKinds.data() + (r << Visibility::kRunBits), Visibility::kRun, uint8_t{0});
@@ -111,7 +113,7 @@ void closeSeconds(Frame& frame) {
         const size_t at = size_t{y} * f.width + x;
         if (seconds.kinds[at] <= shared::kSecondBefore) return;
         if (!frame.k.isAtJump(f, frame.visibility.data(), frame.filtered.data(), static_cast<uint32_t>(x), y,
-                              seconds.pixels[at].limit))
+                              seconds.at(at)->limit))
             seconds.kinds[at] = shared::kSecondNone;
     };
     frame.forBands([&](uint32_t first, uint32_t last) {
