@@ -39,10 +39,10 @@ constexpr bool isOfSecond(Sum sum) { return sum == Sum::second || sum == Sum::se
 /// What fronts of the discs of a DiscBatch need beside them.
 struct FrontBatch {
     static constexpr size_t kSize = DiscBatch::kSize;
-    alignas(64) float shift[kSize];        ///< how far behind the disc its surface may be
-    alignas(64) float missedDepth[kSize];  ///< at DiscBatch::missed
+    alignas(64) float shift[kSize];                     ///< how far behind the disc its surface may be
+    alignas(64) float missedDepth[kSize];               ///< at DiscBatch::missed
     alignas(64) float nearest[kSize], farthest[kSize];  ///< between which their planes count
-    alignas(64) uint32_t colour[kSize];    ///< and flags, of the record
+    alignas(64) uint32_t colour[kSize];                 ///< and flags, of the record
 };
 
 /// The kernels of the discs of a DiscBatch.
@@ -87,9 +87,8 @@ struct BlockLimits {
     return radius * ((colour >> 24 & kFlagLeaf) != 0u ? kLeafShare : kSurfaceShare);
 }
 
-/// The discs of a tile, in batches. Those of the first batches are kept from the fronts to the sums, in a cache's
-/// second level (193 KB); further ones are prepared again. (Kernels are not: to prepare them twice is faster than to
-/// keep them.)
+/// The discs of a tile, in batches. Those of the first batches are kept from the fronts to the sums, and their kernels
+/// from these to second surfaces, in a cache's second level (260 KB); further ones are prepared again.
 struct TileDiscs {
     static constexpr size_t kKept = 24;
     const PlacedSplat* splats;
@@ -97,7 +96,8 @@ struct TileDiscs {
     size_t count;
     DiscBatch* batches;  ///< kKept, and one more
     FrontBatch* fronts;
-    bool hasLeaves;      ///< some are; known once their fronts are drawn
+    KernelBatch* kernels;
+    bool hasLeaves;  ///< some are; known once their fronts are drawn
     size_t batchesInAll() const { return (count + DiscBatch::kSize - 1) / DiscBatch::kSize; }
     size_t sizeOf(size_t b) const {
         const size_t left = count - b * DiscBatch::kSize;
@@ -110,8 +110,7 @@ struct TileDiscs {
     }
     bool isLeaf(uint32_t place) const {
         const size_t batch = place / DiscBatch::kSize;
-        const uint32_t colour =
-            batch < kKept ? fronts[batch].colour[place % DiscBatch::kSize] : colours[places[place]];
+        const uint32_t colour = batch < kKept ? fronts[batch].colour[place % DiscBatch::kSize] : colours[places[place]];
         return (colour >> 24 & kFlagLeaf) != 0u;
     }
 };
@@ -206,11 +205,11 @@ void drawSecondFronts(const FrameConstants& f, const TileDiscs& discs, const Spl
 template <Wants wants, Sum sum>
 void addKernels(const FrameConstants& f, const Tables& tables, const BlockSource* blocks, const TileDiscs& discs,
                 const SplatTile& tile, const BlockLimits& limits, TileFilter& t) {
-    KernelBatch kernels;
     SeenKernels seen;
     for (size_t k = 0; k < discs.batchesInAll(); ++k) {
         const KeptBatch b = keptBatch(f, discs, tile, k);
-        prepareKernels(f, tile, discs.sizeOf(k), b, kernels);
+        KernelBatch& kernels = discs.kernels[k < TileDiscs::kKept ? k : TileDiscs::kKept];
+        if (!isOfSecond(sum) || k >= TileDiscs::kKept) prepareKernels(f, tile, discs.sizeOf(k), b, kernels);
         if (!markSeen<sum>(limits, kernels, seen)) continue;
         takeSeen<sum>(f, tables, blocks, b.discs, kernels, b.fronts, seen);
         if (kernels.hasNear)
@@ -245,7 +244,8 @@ void filterTile(const FrameConstants& frame, const Tables& tables, const BlockSo
     const FrameConstants f = frame;
     static thread_local DiscBatch batches[TileDiscs::kKept + 1];
     static thread_local FrontBatch fronts[TileDiscs::kKept + 1];
-    TileDiscs discs{splats, colours, places, count, batches, fronts, false};
+    static thread_local KernelBatch kernels[TileDiscs::kKept + 1];
+    TileDiscs discs{splats, colours, places, count, batches, fronts, kernels, false};
     prefetchDiscs(splats, places, count);
     const auto filter = !wantsNormals         ? filterDiscs<Wants::nothing>
                         : f.hasMaterials == 0 ? filterDiscs<Wants::normals>

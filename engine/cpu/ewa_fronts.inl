@@ -73,11 +73,11 @@ void drawFrontBatch(const KeptBatch& b, const uint32_t* reached, const FrameCons
 void showMissed(const KeptBatch& of, size_t count, TileFilter& t) {
     const DiscBatch& b = of.discs;
     const FrontBatch& k = of.fronts;
-    const auto movedAt = [&](size_t i, int at)
-        __attribute__((always_inline)) { return k.missedDepth[i] + k.shift[i] * t.along[at]; };
+    const auto movedAt = [&](size_t i, int at) __attribute__((always_inline)) {
+        return k.missedDepth[i] + k.shift[i] * t.along[at];
+    };
     forMissed(
-        b, count,
-        [&](size_t i, int at) __attribute__((always_inline)) { return movedAt(i, at) <= t.front[at]; },
+        b, count, [&](size_t i, int at) __attribute__((always_inline)) { return movedAt(i, at) <= t.front[at]; },
         [&](size_t i) __attribute__((always_inline)) {
             const int at = b.missed[i];
             const float moved = movedAt(i, at);

@@ -49,8 +49,8 @@ void prepareKernels(const FrameConstants& frame, const SplatTile& tile, size_t c
     b.hasNear = hasSome(b.isNear, count);
     reachBlocks(boxes, count, b.reached);
 }
-/// How far behind discs their surfaces may be, between which depths their planes count, and what pixels show whose rays miss them.
-/// `colour` of `b` is there.
+/// How far behind discs their surfaces may be, between which depths their planes count, and what pixels show whose rays
+/// miss them. `colour` of `b` is there.
 void prepareFronts(const FrameConstants& frame, size_t count, const DiscBatch& s, FrontBatch& __restrict b) {
     const FrameConstants f = frame;
     const float inverseFocal = 1.0f / f.focal;

@@ -214,8 +214,8 @@ struct SecondPixels {
     /// May any of these have one?
     bool mayHave(size_t first, size_t n) const {
         bool any = false;
-        for (size_t r = first >> Visibility::kRunBits;
-             list != nullptr && r <= (first + n - 1) >> Visibility::kRunBits; ++r)
+        for (size_t r = first >> Visibility::kRunBits; list != nullptr && r <= (first + n - 1) >> Visibility::kRunBits;
+             ++r)
             any = any || __atomic_load_n(&runs[r], __ATOMIC_RELAXED) != 0;
         return any;
     }
