@@ -3,15 +3,20 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
+#include <csignal>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "engine/image/image_io.h"
 #include "tests/support/patch_shapes.h"
 #include "tests/support/program.h"
+#include "tests/support/runs.h"
 
 namespace stipple {
 namespace {
+
+namespace fs = std::filesystem;
 
 using test::Outcome;
 using test::runProgram;
@@ -150,6 +155,40 @@ TEST(BuildPatches, OfScansAreVerifiedAgainstThem) {
     const Outcome wrong = runProgram(folder, "info t.stipple --verify --against other.ply");
     EXPECT_EQ(wrong.code, 3);
     EXPECT_NE(wrong.err.find("farther from each other"), std::string::npos) << wrong.err;
+}
+
+/// Kills come at any moment of a build that goes through the disk; whatever they leave, the next one ends with the same
+/// bytes.
+TEST(BuildPatches, KilledAtAnyMomentTheyGoOnAndEndWithTheSameBytes) {
+    constexpr int kKills = 4;
+    const TempFolder folder;
+    test::writeObj(folder / "mesh.obj", test::torusMesh(480, 180));
+    ASSERT_EQ(runProgram(folder, "grow scan -o scan.ply --points 300k").code, 0);
+    for (const std::string input : {"mesh.obj", "scan.ply"}) {
+        SCOPED_TRACE(input);
+        const std::vector<std::string> command{
+            STIPPLE_PROGRAM, "build", folder / input, "--patches", "-o",     folder / "a.stipple",
+            "--memory",      "270M",  "--threads",    "1",         "--quiet"};
+        const auto from = std::chrono::steady_clock::now();
+        const Outcome first =
+            runProgram(folder, "build " + input + " --patches -o a.stipple --memory 270M --threads 1 --json");
+        const double took = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - from).count();
+        ASSERT_EQ(first.code, 0) << first.err;
+        ASSERT_GT(nlohmann::json::parse(first.out)["temporary_bytes"].get<uint64_t>(), 0u) << "it fits in memory";
+        const std::string whole = test::slurp(folder / "a.stipple");
+        ASSERT_FALSE(whole.empty());
+        Rng rng(5);
+        for (int kill = 0; kill < kKills; ++kill) {
+            fs::remove(folder / "a.stipple");
+            if (test::runAndKill(command, static_cast<int>(took * rng.uniform(0.05, 0.9)), SIGKILL))
+                EXPECT_TRUE(test::slurp(folder / "a.stipple") == whole) << "ended before it was killed, " << kill;
+        }
+        fs::remove(folder / "a.stipple");
+        ASSERT_TRUE(test::runAndKill(command, 600'000, SIGKILL));
+        EXPECT_TRUE(test::slurp(folder / "a.stipple") == whole);
+        EXPECT_FALSE(fs::exists(folder / "a.stipple.build"));
+        fs::remove(folder / "a.stipple");
+    }
 }
 
 // The colours of a scanner hold the light in them, as points and as patches.
