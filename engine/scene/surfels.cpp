@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "engine/base/numbers.h"
 #include "engine/scene/borders.h"
 #include "engine/scene/texture_lookup.h"
+#include "lod/builder/morton.h"
 #include "lod/primitives/in_memory.h"
 #include "shaders/shared/border.h"
 #include "shaders/shared/record.h"
@@ -96,8 +98,37 @@ class Sampler {
         return std::isfinite(a) ? a : 0;
     }
 
-    void sampleTriangles(const Primitive& p, const glm::dmat4& m) {
+    /// First indices of the triangles of a primitive, along a curve through space: what is left over of one goes to the
+    /// next, so that those in any order would give small triangles no even samples, but clumps and gaps.
+    static std::vector<size_t> inSpace(const Primitive& p) {
+        glm::dvec3 least(std::numeric_limits<double>::max()), most(-least);
+        for (const uint32_t i : p.indices) {
+            least = glm::min(least, p.at(i));
+            most = glm::max(most, p.at(i));
+        }
+        const glm::dvec3 size = most - least;
+        const double edge = std::max({size.x, size.y, size.z, 1e-300});
+        std::vector<std::pair<uint64_t, size_t>> keys;
+        keys.reserve(p.indices.size() / 3);
         for (size_t i = 0; i + 3 <= p.indices.size(); i += 3) {
+            const glm::dvec3 middle =
+                (p.at(p.indices[i]) + p.at(p.indices[i + 1]) + p.at(p.indices[i + 2])) * (1.0 / 3.0);
+            uint64_t key = 0;
+            for (int k = 0; k < 3; ++k) {
+                const double cells = (middle[k] - least[k]) / edge * 0x1fffff;
+                key |= lod::spreadBits(cells > 0 && cells <= 0x1fffff ? static_cast<uint64_t>(cells) : 0) << k;
+            }
+            keys.emplace_back(key, i);
+        }
+        std::sort(keys.begin(), keys.end());
+        std::vector<size_t> firsts;
+        firsts.reserve(keys.size());
+        for (const auto& [key, first] : keys) firsts.push_back(first);
+        return firsts;
+    }
+
+    void sampleTriangles(const Primitive& p, const glm::dmat4& m) {
+        for (const size_t i : inSpace(p)) {
             const Corners c = corners(p, m, i);
             const double area = areaOf(c);
             // What is left over goes to the next triangle: small ones get a sample every so often.

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "engine/base/rng.h"
 #include "engine/scene/surfels.h"
 #include "tests/support/support.h"
 
@@ -321,6 +322,46 @@ TEST(Surfels, CoverTheMeshEvenlyWithItsColoursAndSides) {
     EXPECT_NEAR(static_cast<double>(red), 5'000, 200);
     for (const auto& row : grid)
         for (const int cell : row) EXPECT_NEAR(cell, 10'000 / 64.0, 20);
+}
+
+/// Of triangles that are smaller than samples are apart, in any order: no place is left out.
+TEST(Surfels, SmallTrianglesInAnyOrderAreSampledEvenly) {
+    constexpr uint32_t kSide = 128, kCells = 16;
+    Scene scene = squares();
+    Primitive p;
+    p.material = 0;
+    std::vector<uint32_t> quads(kSide * kSide);
+    for (uint32_t i = 0; i < quads.size(); ++i) quads[i] = i;
+    Rng rng(7);
+    for (size_t i = quads.size(); i > 1; --i) std::swap(quads[i - 1], quads[rng.below(i)]);
+    for (uint32_t y = 0; y <= kSide; ++y)
+        for (uint32_t x = 0; x <= kSide; ++x) p.position.emplace_back(glm::vec2(x, y) / static_cast<float>(kSide), 0);
+    for (const uint32_t q : quads) {
+        const uint32_t at = q / kSide * (kSide + 1) + q % kSide, above = at + kSide + 1;
+        for (const uint32_t i : {at, at + 1, above, above, at + 1, above + 1}) p.indices.push_back(i);
+    }
+    scene.meshes[0].primitives = {p};
+    scene.nodes[0].instances.clear();
+    const auto source = sampleSurfels(scene, {DecodedImage{}}, {4 * kCells * kCells});
+    ASSERT_TRUE(source) << source.error().line();
+    glm::dvec2 least(1e300), most(-1e300);
+    std::vector<glm::dvec2> places;
+    for (const auto& block : take(*source))
+        for (const glm::dvec3& at : block.position) {
+            places.emplace_back(at);
+            least = glm::min(least, glm::dvec2(at));
+            most = glm::max(most, glm::dvec2(at));
+        }
+    std::vector<int> cells(kCells * kCells, 0);
+    for (const glm::dvec2& at : places) {
+        const glm::dvec2 in =
+            glm::min((at - least) / (most - least) * static_cast<double>(kCells), glm::dvec2(kCells - 1));
+        ++cells[static_cast<size_t>(in.y) * kCells + static_cast<size_t>(in.x)];
+    }
+    for (const int count : cells) {
+        EXPECT_GE(count, 2);  // of 4; in the order of the file some have 1, and some 9
+        EXPECT_LE(count, 7);
+    }
 }
 
 TEST(Surfels, ACoarseSamplingSeesTheMeanOfTheTexture) {
