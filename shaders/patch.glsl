@@ -1,6 +1,7 @@
 // Blocks of elevation patches as the passes that draw them see them.
 #include "coverage.glsl"
 #include "shared/patch.h"
+#include "shared/patch_map.h"
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer PatchBlocks { PatchBlock blocks[]; };
 
@@ -18,6 +19,35 @@ vec2 patchFinishOf(DrawNode node, uint block, uint s) {
     const uint number = block * kPatchSamples + s;
     const uint pair = RecordWords(uvec2(node.addressLow, node.addressHigh)).words[kPatchBlockWords * node.materials + number / 2u];
     return patchFinish((number & 1u) != 0u ? pair >> 16 : pair & 0xffffu);
+}
+// The map of a block stands among the words behind all blocks of its chunk, and behind the materials of their samples.
+struct MapLook {
+    vec3 colour;
+    vec3 normal;  // of (U, V, N), any length
+    vec2 finish;
+};
+// i, j: samples from the block's first one; `cells`: that a pixel covers there.
+MapLook mapLook(DrawNode node, uint map, float i, float j, float cells) {
+    RecordWords words = RecordWords(uvec2(node.addressLow, node.addressHigh));
+    const uint ofMaterials = node.materials != 0u ? (node.count * kPatchSamples + 1u) / 2u : 0u;
+    const uint first = kPatchBlockWords * node.count + ofMaterials + (map >> kMapFirstShift);
+    const uint density = map & kMapDensity;
+    const uint normals = first + mapTexels(density);
+    const MapLod lod = mapLod(density, cells);
+    MapLook look = MapLook(vec3(0.0), vec3(0.0), vec2(0.0));
+    for (uint l = 0u; l < 2u; ++l) {
+        const float share = l == 0u ? 1.0 - lod.share : lod.share;
+        if (!(share > 0.0)) continue;
+        const MapTap tap = mapTap(density, l == 0u ? lod.level : lod.next, i, j);
+        for (uint c = 0u; c < 4u; ++c) {
+            const float w = share * mapWeight(tap, c);
+            const uint texel = words.words[first + mapTexelOf(tap, c)];
+            look.colour += w * decodeTexel(texel, true).xyz;
+            look.finish += w * patchMapFinish(texel);
+            if ((map & kMapNormals) != 0u) look.normal += w * octDecode(words.words[normals + mapTexelOf(tap, c)]);
+        }
+    }
+    return look;
 }
 // Of sample s, in camera space.
 vec3 patchPlace(PatchBlocks of, uint block, DrawMesh m, uint s) {

@@ -47,6 +47,7 @@ Result<lod::PatchBuildSettings> settingsOf(const BuildOptions& build) {
     STIPPLE_ASSIGN(settings.limits, build.settings());
     settings.coneDegrees = build.patches.coneDegrees;
     settings.samples = build.patches.samples;
+    if (build.patches.texels != "auto") settings.maps.texels = static_cast<uint32_t>(std::stoul(build.patches.texels));
     if (build.material) settings.description.pointMaterials = {*build.material};
     settings.description.up =
         lod::axisVector(build.up.empty() ? lod::UpAxis::y : static_cast<lod::UpAxis>(build.up[0] - 'x'));
@@ -90,6 +91,7 @@ struct Looks {
     std::vector<scene::DecodedImage> images;
     uint64_t imageBytes = 0, identity = 0;
     lod::PlaceLooks looks;  ///< empty: all has one material, and no textures
+    lod::TextureDetail detail;
 };
 
 Result<Looks> looksOf(const scene::Scene& scene, const scene::MaterialList& materials, uint64_t memoryBytes) {
@@ -104,6 +106,7 @@ Result<Looks> looksOf(const scene::Scene& scene, const scene::MaterialList& mate
     for (const lod::PointMaterial& m : materials.list)
         for (const char c : lod::identityOf(m)) out.identity = out.identity * 31 + static_cast<unsigned char>(c);
     out.looks = scene::placeLooks(scene, out.images);
+    out.detail = scene::textureDetail(scene, out.images);
     return out;
 }
 
@@ -117,6 +120,7 @@ Result<lod::BuildReport> ofScene(const std::string& input, const std::string& ou
     const scene::MaterialList materials = scene::materialList(scene);
     STIPPLE_ASSIGN(const Looks looks, looksOf(scene, materials, settings.limits.memoryBytes));
     settings.looks = looks.looks;
+    settings.maps.detail = looks.detail;
     settings.looksIdentity = looks.identity;
     settings.readerShare = static_cast<double>(looks.imageBytes) / static_cast<double>(settings.limits.memoryBytes);
     settings.limits.memoryBytes -= looks.imageBytes;
@@ -201,6 +205,13 @@ void addPatchBuildOptions(CLI::App& app, PatchBuildOptions& o) {
                    "of patches: samples of the finest level, about (default: as many as vertices or points)")
         ->transform(within<uint64_t>(1, 100'000'000'000))
         ->type_name("N");
+    app.add_option(
+           "--patch-texels", o.texels,
+           "of patches of textured meshes: texels of their maps along an edge of a cell: 1 (no maps: colours of "
+           "the samples alone), 2, 4, 8, or as many as the textures hold")
+        ->transform(CLI::IsMember({"auto", "1", "2", "4", "8"}))
+        ->type_name("K")
+        ->capture_default_str();
 }
 
 Result<lod::BuildReport> buildPatches(const std::vector<std::string>& inputs, const std::string& output,

@@ -27,6 +27,7 @@ struct PatchBuildOptions {
     bool isAsked = false, fillGaps = false, overlap = false;
     double coneDegrees = 50;
     uint64_t samples = 0;  ///< 0: as many as there are vertices
+    std::string texels = "auto";
 };
 
 struct BuildOptions {

@@ -129,6 +129,7 @@ struct PatchSource {
     float errorPixels;
     uint32_t material = shared::kPlainPoint;  ///< of all samples, packed, unless ...
     const uint16_t* materials = nullptr;      ///< ... each has its own
+    const uint32_t* map = nullptr;            ///< the block's, if it has one
     uint32_t materialOf(uint32_t sample) const { return materials == nullptr ? material : materials[sample]; }
 };
 

@@ -8,6 +8,7 @@
 #include "shaders/shared/environment.h"
 #include "shaders/shared/lens.h"
 #include "shaders/shared/pack.h"
+#include "shaders/shared/patch_map.h"
 #include "shaders/shared/pyramid.h"
 #include "shaders/shared/shade.h"
 #include "shaders/shared/splat_disc.h"
@@ -149,6 +150,7 @@ void projectBlock(const FrameConstants& f, const DrawNode& node, const PointReco
 
 #include "engine/cpu/patch_splats.inl"
 
+#include "engine/cpu/patch_maps.inl"
 #include "engine/cpu/resolve_patches.inl"
 
 #include "engine/cpu/discs.inl"

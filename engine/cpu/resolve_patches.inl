@@ -6,11 +6,7 @@
     for (size_t i = 0; i < n; ++i) {
         const PatchSource& source = blocks[p.id[i] / kBlockLanes];
         const PatchBlock& block = *source.block;
-        const uint32_t cell = p.id[i] % kBlockLanes / 2;
-        const uint32_t at = cellCorner(cell);
-        const uint32_t t =
-            patchTriangle(at, patchHeight(block, at), patchHeight(block, at + 1), patchHeight(block, at + kPatchStride),
-                          patchHeight(block, at + kPatchStride + 1), p.id[i] & 1u);
+        const uint32_t t = cornersOf(block, p.id[i] % kBlockLanes);
         const int i0 = static_cast<int>(block.place & 0xffffu), j0 = static_cast<int>(block.place >> 16);
         for (uint32_t k = 0; k < 3; ++k) {
             const uint32_t s = t >> (8 * k) & 255u;
@@ -59,7 +55,9 @@ void mixDirect(const FrameConstants& f, const ResolveInput& in, const WinningPix
         const vec3 place = meshPosition(i0 + static_cast<int>(s % kPatchStride),
                                         j0 + static_cast<int>(s / kPatchStride), patchHeight(block, s), m);
         const PatchDisc disc = discSplat(block, place, s, m).disc;
-        const PatchMix mix = patchMix(patchDiscHit(disc, m, rays.at(p.pixel[k]), f.nearPlane));
+        const PixelRay ray = rays.at(p.pixel[k]);
+        const vec3 hit = patchDiscHit(disc, m, ray, f.nearPlane);
+        const PatchMix mix = patchMix(hit);
         vec3 normal = vec3(0, 0, 0), colour = vec3(0, 0, 0);
         float sum = 0, metallic = 0, roughness = 0;
         for (uint32_t c = 0; c < 4; ++c) {
@@ -88,6 +86,9 @@ void mixDirect(const FrameConstants& f, const ResolveInput& in, const WinningPix
         out.blue[k] = colour.z * inverse;
         finish.u[k] = metallic * inverse;
         finish.v[k] = sum > 0.0f ? roughness * inverse : 1.0f;
+        if (source.map == nullptr || !(sum > 0.0f)) continue;
+        const float cells = discFootprint(ray, rays.inverseFocal, disc.centre, disc.normal, m);
+        showMap(source, hit.y, hit.z, cells, k, out, finish);
     }
 }
 
@@ -102,6 +103,7 @@ void resolvePatches(const FrameConstants& f, const ResolveInput& in, const Winni
         weighCorners(p, rays, t.corners, t.material, t.uv, t.wb, t.wc);
         for (size_t i = 0; i < p.count; ++i) t.material.red[i] = t.material.green[i] = t.material.blue[i] = 1;
         mixColours(p, t.corners, t.wb, t.wc, t.material);
+        showMaps(in.patchBlocks, p, rays, t.corners, t.wb, t.wc, t.material, t.uv);
     }
     turnPatches(in.patchBlocks, p, t.uv, planes.emissive != nullptr, t.material);
     packSurfaces(p, rays, t.material, t.perpX, t.perpY, t.word);

@@ -41,6 +41,8 @@ class PatchBlockReader {
         return {origin_ + frame_ * onPlane, frame_ * decodeDirection(block_.normals[s]),
                 glm::dvec3(decodeSrgb(colour % 256), decodeSrgb(colour / 256 % 256), decodeSrgb(colour / 65536 % 256))};
     }
+    /// From the directions of the patch to those of the store.
+    glm::dvec3 inStore(const glm::dvec3& direction) const { return frame_ * direction; }
     /// Calls use(a, b, c) with samples.
     template <typename Use>
     void forEachTriangle(const Use& use) const {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <glm/glm.hpp>
 
 #include "engine/reference/decode.h"
@@ -29,10 +30,14 @@ glm::dvec2 weightsOn(const ViewRay& ray, const Corners& c, const glm::dvec3& fac
 /// direction, or, orthographic, of its origin.
 double footprintOn(const ViewRay& ray, bool isOrthographic, double step, const Corners& c, const glm::dvec3& face);
 
+/// What of a place's surface and normal (camera space, any length) is not of its corners.
+using ShowPlace = std::function<void(const glm::dvec2& uv, double footprint, Sample& s, glm::dvec3& n)>;
+
 /// Textures of one mesh.
 struct TextureReader {
     const render::MeshTextures& textures;
     const Chunks& chunks;
+    const ShowPlace* show = nullptr;  ///< or what else there is
 
     /// Trilinear, from the finest level that is there; `out` stays where none is, and the answer is false.
     bool sample(const shared::TextureSlot& slot, glm::dvec2 at, double footprint, glm::dvec4& out) const;

@@ -9,6 +9,7 @@
 #include "engine/reference/box_tree.h"
 #include "engine/reference/curve_rays.h"
 #include "engine/reference/decode.h"
+#include "engine/reference/decode_map.h"
 #include "engine/reference/decode_patch.h"
 #include "engine/reference/reference.h"
 #include "engine/reference/surface.h"
@@ -35,7 +36,10 @@ struct TracedStore {
     std::vector<shared::MeshVertex> vertices;
     std::vector<dvec3> places;  ///< of each, lattice units
     std::vector<std::array<uint32_t, 3>> triangles;
-    Chunks tiles;  ///< all levels of all textures
+    std::vector<uint32_t> maps;      ///< of blocks of patches, 153 vertices each: PatchBlock::map
+    std::vector<uint32_t> mapWords;  ///< that those point into
+    std::vector<glm::dmat3> frames;  ///< of those blocks: from the patch's directions to the store's
+    Chunks tiles;                    ///< all levels of all textures
     render::MeshTextures textures;
     BoxTree tree;  ///< items: discs, then triangles, then segments (a store has one kind)
 
@@ -80,14 +84,21 @@ void addClusters(const lod::Chunk& chunk, uint32_t node, uint32_t begin, uint32_
 /// number.
 void addPatches(const lod::Chunk& chunk, uint32_t node, TracedStore& t) {
     const lod::Hierarchy& h = t.store->hierarchy;
+    const auto firstWord = static_cast<uint32_t>(t.mapWords.size());
+    t.mapWords.insert(t.mapWords.end(), chunk.patchMaps.begin(), chunk.patchMaps.end());
     for (size_t b = 0; b < chunk.patchBlocks.size(); ++b) {
+        const uint32_t map = chunk.patchBlocks[b].map;
+        t.maps.push_back(map == 0 ? 0 : map + 16 * firstWord);
         const PatchBlockReader block(h, h.nodes[node], chunk.patchBlocks[b], chunk.patchPlanes[b]);
+        t.frames.emplace_back(block.inStore({1, 0, 0}), block.inStore({0, 1, 0}), block.inStore({0, 0, 1}));
         const auto base = static_cast<uint32_t>(t.vertices.size());
         for (uint32_t s = 0; s < shared::kPatchSamples; ++s) {
             const PatchCorner corner = block.sample(s);
             shared::MeshVertex v{};
             v.normal = lod::octEncode(glm::vec3(corner.normal));
             v.colour = chunk.patchBlocks[b].colours[s] | 0xff000000u;
+            v.u = static_cast<float>(s % 17);
+            v.v = static_cast<float>(s / 17);
             v.surface = shared::kSurfaceTwoSided | kRough;
             if (!chunk.materials.empty())
                 v.surface = shared::kSurfaceTwoSided | chunk.materials[153 * b + s];
@@ -331,6 +342,18 @@ class Tracer {
         return best;
     }
 
+    /// What a map shows instead of its samples.
+    void showMap(const TracedStore& store, const lod::Instance& place, const std::array<uint32_t, 3>& corners,
+                 const MapReader& map, const dvec2& at, double cells, Sample& s, dvec3& n) const {
+        const MapReader::Look look = map.look(at, cells);
+        s.colour = look.colour;
+        if (map.hasNormals()) n = toCamera(place.rotation * (store.frames[corners[0] / 153] * look.normal));
+        const bool isList = store.store->description.pointMaterials.size() > 1;
+        if (!map.hasMaterials() || settings_.draw.pointMaterial || !isList) return;
+        s.metallic = look.finish.x;
+        s.roughness = look.finish.y;
+    }
+
     void hitSegment(const Segment& s, const lod::Instance& place, const LocalRay& local, uint32_t p, Hit& best) const {
         CurveHit hit;
         if (!meetsSegment(s, local, view_.nearPlane, hit) || hit.t >= best.t) return;
@@ -364,8 +387,12 @@ class Tracer {
         const dvec2 w = glm::clamp(weightsOn(ray, c, face), dvec2(0), dvec2(1));
         Sample sample;
         dvec3 n;
+        const uint32_t map = corners[0] / 153 < store.maps.size() ? store.maps[corners[0] / 153] : 0;
+        const ShowPlace show = [&](const dvec2& at, double cells, Sample& s, dvec3& normal) {
+            showMap(store, place, corners, MapReader(store.mapWords, map), at, cells, s, normal);
+        };
         if (!surfaceOn(ray.direction, w, footprintOn(ray, view_.isOrthographic, step, c, face), c, face, surface,
-                       store.materialOf(surface), {store.textures, store.tiles}, sample, n))
+                       store.materialOf(surface), {store.textures, store.tiles, map != 0 ? &show : nullptr}, sample, n))
             return;
         best.place = p;
         best.t = t;

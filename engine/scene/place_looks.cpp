@@ -15,10 +15,15 @@ struct Layer {
     glm::mat3 place{1};
 
     glm::vec4 at(const glm::vec2& uv, float side, bool isColour) const {
-        if (!image || image->rgba.empty()) return glm::vec4(1);
-        const float texels = std::sqrt(static_cast<float>(image->width) * static_cast<float>(image->height) *
-                                       std::abs(glm::determinant(glm::mat2(place))));
-        return lookup(*image, *texture, glm::vec2(place * glm::vec3(uv, 1)), side * texels, isColour);
+        if (!isThere()) return glm::vec4(1);
+        return lookup(*image, *texture, glm::vec2(place * glm::vec3(uv, 1)), side * texels(), isColour);
+    }
+    bool isThere() const { return image != nullptr && !image->rgba.empty(); }
+    /// Along a unit of texture coordinates, the mean of both.
+    float texels() const {
+        if (!isThere()) return 0;
+        return std::sqrt(static_cast<float>(image->width) * static_cast<float>(image->height) *
+                         std::abs(glm::determinant(glm::mat2(place))));
     }
 };
 
@@ -109,6 +114,29 @@ lod::PlaceLooks placeLooks(const Scene& scene, const std::vector<DecodedImage>& 
             out.normal = {n.x * look.normalScale, n.y * look.normalScale, n.z};
             return out;
         };
+}
+
+lod::TextureDetail textureDetail(const Scene& scene, const std::vector<DecodedImage>& images) {
+    lod::TextureDetail out;
+    const std::vector<bool> isUsed = usedMaterials(scene, placements(scene));
+    std::vector<float> texels;
+    for (size_t k = 0; k < scene.materials.size(); ++k) {
+        const Material& m = scene.materials[k];
+        float most = 0;
+        for (const TextureUse* use :
+             {&m.baseColourTexture, &m.emissiveTexture, &m.normalTexture, &m.metallicRoughnessTexture})
+            most = std::max(most, layerOf(scene, images, m, *use).texels());
+        texels.push_back(most);
+        if (!isUsed[k]) continue;
+        out.hasNormals = out.hasNormals || layerOf(scene, images, m, m.normalTexture).isThere();
+        out.hasMaterials = out.hasMaterials || layerOf(scene, images, m, m.metallicRoughnessTexture).isThere();
+    }
+    if (std::none_of(texels.begin(), texels.end(), [](float t) { return t > 0; })) return {};
+    out.texels = [texels](uint32_t surface) {
+        const size_t m = surface & shared::kSurfaceMaterialMask;
+        return m < texels.size() ? texels[m] : 0.0f;
+    };
+    return out;
 }
 
 bool hasTextures(const Scene& scene) {

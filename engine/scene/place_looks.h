@@ -21,6 +21,9 @@ MaterialList materialList(const Scene& scene);
 /// alpha is left out. Both arguments must stay.
 lod::PlaceLooks placeLooks(const Scene& scene, const std::vector<DecodedImage>& images);
 
+/// What the textures behind those looks hold, of the materials of visible triangles.
+lod::TextureDetail textureDetail(const Scene& scene, const std::vector<DecodedImage>& images);
+
 /// Some material has a texture that a PlaceLook holds something of.
 bool hasTextures(const Scene& scene);
 

@@ -14,6 +14,20 @@ size_t Patch::drawnCells() const {
     return cells.size() - static_cast<size_t>(std::count(cells.begin(), cells.end(), uint8_t{0}));
 }
 
+namespace {
+
+std::string mapFault(const Patch& p) {
+    const PatchMap& m = p.map;
+    if (m.density > PatchMap::kMostDensity) return "has a map of too many texels a cell";
+    const size_t texels = m.density == 0 ? 0
+                                         : (size_t{p.width - 1} << m.density) * (size_t{p.height - 1} << m.density) +
+                                               ((size_t{p.width - 1} + (p.height - 1)) << m.density) + 1;
+    const bool isWhole = m.colours.size() == texels && (m.normals.empty() || m.normals.size() == texels);
+    return isWhole ? "" : "has a map of another size than its sides say";
+}
+
+}  // namespace
+
 std::string patchFault(const Patch& p) {
     if (p.width < 2 || p.height < 2 || p.width > Patch::kMostSide || p.height > Patch::kMostSide)
         return "has sides of none, one or too many samples";
@@ -21,6 +35,7 @@ std::string patchFault(const Patch& p) {
     if (p.heights.size() != samples || p.normals.size() != samples || p.colours.size() != samples ||
         p.cells.size() != cells || (!p.materials.empty() && p.materials.size() != samples))
         return "has arrays of other sizes than its sides say";
+    if (const std::string fault = mapFault(p); !fault.empty()) return fault;
     const float length = glm::dot(p.turn, p.turn);
     if (!isFinite(p.origin) || !(length > 0.99f && length < 1.01f)) return "has a plane that is none";
     // Squares of lengths are finite and none of them vanishes, in fp32.

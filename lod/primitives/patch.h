@@ -18,6 +18,18 @@
 
 namespace stipple::lod {
 
+/// Attributes of a patch at a resolution of their own: texels on the corners of a lattice 2, 4 or 8 times as fine as
+/// that of its samples, row by row, (width - 1) k + 1 of them in the first. Those that no drawn cell touches say
+/// nothing.
+struct PatchMap {
+    static constexpr uint32_t kMostDensity = 3;
+    uint32_t density = 0;           ///< log2 k; 0: there is no map
+    bool hasMaterials = false;      ///< numbers of materialGrid() stand above the colours
+    std::vector<uint32_t> colours;  ///< sRGB 8 + 8 + 8
+    std::vector<uint32_t> normals;  ///< octahedral 16 + 16 of (U, V, N); empty: those of the samples are mixed
+    bool operator==(const PatchMap&) const = default;
+};
+
 struct Patch {
     static constexpr uint32_t kMostSide = 4096;  ///< samples
 
@@ -32,6 +44,7 @@ struct Patch {
     std::vector<uint32_t> colours;   ///< sRGB 8 + 8 + 8, as long as `heights`
     /// Numbers in the list of materials that the patches come with, as long as `heights`; empty: all have the first.
     std::vector<uint8_t> materials;
+    PatchMap map;  ///< where there is one, samples have the colours of its mips (sampleColours)
     /// Bounds, scene units: no place of the patch is farther from the source than the first, no place of the source
     /// that the patch stands for farther from the patch than the second.
     double errorToSource = 0, errorFromSource = 0;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "lod/primitives/patch_map.h"
+
 namespace stipple::lod {
 namespace {
 
@@ -40,8 +42,10 @@ shared::PatchBlock blockAt(const Patch& p, uint32_t i, uint32_t j, uint32_t numb
 }
 
 void append(const Patch& p, uint32_t number, PatchBlocks& out) {
+    const PatchMips mips(p);
     forEachBlock(p, [&](uint32_t i, uint32_t j) {
         out.blocks.push_back(blockAt(p, i, j, number));
+        out.blocks.back().map = mips.appendTo(out.maps, i, j);
         out.planes.push_back({p.origin, p.turn, p.step, p.quantumExponent});
     });
 }

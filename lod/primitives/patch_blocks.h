@@ -21,6 +21,7 @@ struct PatchPlane {
 struct PatchBlocks {
     std::vector<shared::PatchBlock> blocks;
     std::vector<PatchPlane> planes;  ///< of each block
+    std::vector<uint32_t> maps;      ///< words that PatchBlock::map points into
 };
 
 /// Of each patch that has a number among the blocks, from those of the blocks.

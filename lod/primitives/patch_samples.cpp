@@ -66,6 +66,7 @@ class Samples {
 Payload payloadOfSamples(const Hierarchy& h, uint32_t chunk) {
     Payload p = h.payload(chunk);
     p.kind = Kind::points;
+    p.maps = 0;
     p.stepShift = static_cast<int8_t>(static_cast<int>(h.rootLog2) - h.nodes[h.nodeOf(chunk)].level - 16);
     return p;
 }
@@ -94,6 +95,7 @@ void samplesAsPoints(const Hierarchy& h, uint32_t chunk, Chunk& of) {
     }
     of.patchBlocks = {};  // with their memory
     of.patchPlanes = {};
+    of.patchMaps = {};
 }
 
 bool hasPatches(const Hierarchy& h) {

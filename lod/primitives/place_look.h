@@ -13,6 +13,20 @@ struct PlaceLook {
     uint8_t material = 0;       ///< number in a list that comes with the function
 };
 
+/// What the textures behind looks hold.
+struct TextureDetail {
+    /// Texels of a surface's finest texture along a unit of texture coordinates (the mean of both); 0: it has none.
+    std::function<float(uint32_t surface)> texels;
+    bool hasNormals = false, hasMaterials = false;  ///< textures say something of normals; of roughness or metallic
+};
+
+/// Maps of patches that are made of a mesh.
+struct MapSettings {
+    uint32_t texels = 0;   ///< along an edge of a cell: 1 (there are none), 2, 4 or 8; 0: as many as textures hold
+    TextureDetail detail;  ///< without `texels`, all have none
+    bool any() const { return texels != 1 && detail.texels; }
+};
+
 /// `surface`: of the triangle's vertices; `uv`: of the place; `side`: of the square that is averaged over, in texture
 /// coordinates.
 using PlaceLooks = std::function<PlaceLook(uint32_t surface, const glm::vec2& uv, float side)>;

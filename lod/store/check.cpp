@@ -57,6 +57,7 @@ bool isPossiblePayload(const Hierarchy& h, uint32_t chunk, uint64_t chunksEnd) {
     for (uint32_t k = p.firstStream; k < p.firstStream + p.streams; ++k)
         fits = fits && h.streams[k].offset <= chunksEnd && h.streams[k].bytes <= chunksEnd - h.streams[k].offset &&
                (h.streams[k].id != StreamId::surfelWeights || p.kind == Kind::points);
+    fits = fits && (p.maps == 0 || p.kind == Kind::patches);
     return fits && isPossibleGain(p.chunkBytes, codec.fewestBytes(h, chunk));
 }
 

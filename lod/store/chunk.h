@@ -30,6 +30,7 @@ struct Chunk {
     std::vector<uint32_t> texels;                ///< of a texture's tile, kTileEdge x kTileEdge
     std::vector<shared::PatchBlock> patchBlocks;
     std::vector<PatchPlane> patchPlanes;  ///< of each block
+    std::vector<uint32_t> patchMaps;      ///< of blocks (shaders/shared/patch_map.h)
     /// Calls use(array) for all that backends draw from, in the order in which it lies on a device.
     template <typename Use>
     void forEachArray(const Use& use) const {
@@ -37,6 +38,7 @@ struct Chunk {
         use(weights);
         use(patchBlocks);
         use(materials);
+        use(patchMaps);
         use(segments);
         use(vertices);
         use(triangles);

@@ -79,7 +79,7 @@ struct PayloadOnDisk {
     uint8_t errorCode;
     int8_t stepShift;
     uint16_t streams;
-    uint8_t spacingCode, reserved;
+    uint8_t spacingCode, maps;
 };
 static_assert(sizeof(PayloadOnDisk) == 20);
 
@@ -155,6 +155,7 @@ void movePayload(Payload& p, OnDisk& d, const Move& move) {
         move(p.attributeBytes, d.attributeBytes);
     } else {
         move(p.spacingCode, d.spacingCode);
+        move(p.maps, d.maps);
     }
 }
 

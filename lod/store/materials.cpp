@@ -29,9 +29,10 @@ void give(const Store& store, const std::vector<uint8_t>& indices, Chunk& to) {
 /// Of patches, whose samples have their numbers above their colours.
 void giveSamples(const Store& store, Chunk& to) {
     if (store.description.pointMaterials.size() < 2) return;
-    to.materials.reserve(to.patchBlocks.size() * shared::kPatchSamples);
+    to.materials.reserve(to.patchBlocks.size() * shared::kPatchSamples + 1);
     for (const shared::PatchBlock& block : to.patchBlocks)
         for (const uint32_t colour : block.colours) to.materials.push_back(materialAt(store, colour >> 24));
+    if (!to.patchMaps.empty()) to.materials.resize((to.materials.size() + 1) / 2 * 2);  // words stand behind them
 }
 
 }  // namespace

@@ -8,15 +8,18 @@
 #include <optional>
 
 #include "lod/primitives/octahedral.h"
-#include "lod/store/check.h"
-#include "lod/store/zstd_memory.h"
+#include "lod/primitives/patch_map.h"
+#include "lod/store/patch_map_bytes.h"
+#include "lod/store/smooth_streams.h"
 
 namespace stipple::lod {
+
+using namespace streams;
+
 namespace {
 
-constexpr int kZstdLevel = 9;
 /// Of roundedNormal: codes 0, s - 1, 2 s - 1 ... 65534. Mirrors have finer ones than the usual.
-constexpr uint32_t kUsualStep = 32, kCodes = 65536;
+constexpr uint32_t kUsualStep = 32;
 constexpr uint32_t kNoNormal = 32767u | 32767u << 16;  ///< up: what a first one is compared with
 enum class NormalFrom : uint8_t { neighbour, slope };
 
@@ -34,9 +37,9 @@ static_assert(sizeof(Head) == 72);
 struct Sizes {
     uint32_t patches;
     NormalFrom normalFrom;
-    uint8_t hasMaterials;  ///< 1: SizesOfMaterials follow
-    uint8_t finerNormals;  ///< log2 of kUsualStep / their step
-    uint8_t reserved;
+    uint8_t hasMaterials;            ///< 1: SizesOfMaterials follow
+    uint8_t finerNormals;            ///< log2 of kUsualStep / their step
+    uint8_t hasMaps;                 ///< 1: SizeOfMaps follows
     std::array<uint32_t, 5> packed;  ///< heads, cells, heights, normals, colours
     std::array<uint32_t, 5> plain;
 };
@@ -45,44 +48,10 @@ static_assert(sizeof(Sizes) == 48);
 struct SizesOfMaterials {
     uint32_t packed, plain;
 };
-
-using Bytes = std::vector<uint8_t>;
-
-Bytes compress(const Bytes& raw) {
-    Bytes out(ZSTD_compressBound(raw.size()));
-    ZSTD_CCtx& context = zstdContext(ZSTD_createCCtx, ZSTD_freeCCtx);
-    out.resize(written(ZSTD_compressCCtx(&context, out.data(), out.size(), raw.data(), raw.size(), kZstdLevel)));
-    return out;
-}
-
-std::optional<Bytes> decompress(std::span<const uint8_t> packed, size_t plain) {
-    if (!isPossibleGain(packed.size(), plain)) return {};
-    Bytes out(plain);
-    ZSTD_DCtx& context = zstdContext(ZSTD_createDCtx, ZSTD_freeDCtx);
-    const size_t got =
-        unlessOutOfMemory(ZSTD_decompressDCtx(&context, out.data(), out.size(), packed.data(), packed.size()));
-    if (ZSTD_isError(got) || got != plain) return {};
-    return out;
-}
-
-uint16_t zigzag(uint16_t difference) {
-    const auto v = static_cast<int16_t>(difference);
-    return static_cast<uint16_t>((static_cast<uint32_t>(v) << 1) ^ static_cast<uint32_t>(v >> 15));
-}
-uint16_t unzigzag(uint16_t z) { return static_cast<uint16_t>((z >> 1) ^ (0u - (z & 1u))); }
-
-/// Values of 16 bits: low bytes, then high bytes.
-Bytes planes(const std::vector<uint16_t>& values) {
-    Bytes out(2 * values.size());
-    for (size_t k = 0; k < values.size(); ++k) {
-        out[k] = static_cast<uint8_t>(values[k]);
-        out[values.size() + k] = static_cast<uint8_t>(values[k] >> 8);
-    }
-    return out;
-}
-uint16_t fromPlanes(const Bytes& bytes, size_t k) {
-    return static_cast<uint16_t>(bytes[k] | bytes[bytes.size() / 2 + k] << 8);
-}
+/// Of the bytes of maps (patch_map_bytes.h), the last of all.
+struct SizeOfMaps {
+    uint32_t bytes;
+};
 
 /// What is known of a sample from those before it. `value` in use: those whose height is not 0.
 uint16_t predictedHeight(const Patch& p, uint32_t i, uint32_t j, uint16_t last) {
@@ -91,16 +60,6 @@ uint16_t predictedHeight(const Patch& p, uint32_t i, uint32_t j, uint16_t last) 
     const uint16_t corner = i > 0 && j > 0 ? p.heights[s - p.width - 1] : uint16_t{0};
     if (left != 0 && below != 0 && corner != 0) return static_cast<uint16_t>(left + below - corner);
     return left != 0 ? left : below != 0 ? below : last;
-}
-
-/// Octahedral steps, x and y.
-std::array<uint32_t, 2> stepsOf(uint32_t code, uint32_t step) {
-    const uint32_t round = 1 + step / 2;
-    return {((code & 0xffffu) + round) / step, ((code >> 16) + round) / step};
-}
-uint32_t codeOf(uint32_t x, uint32_t y, uint32_t step) {
-    const auto code = [&](uint32_t steps) { return steps == 0 ? 0 : std::min(steps * step - 1, kCodes - 2); };
-    return code(x) | code(y) << 16;
 }
 
 template <typename Value>
@@ -168,11 +127,10 @@ Bytes normalBytes(std::span<const Patch> patches, NormalFrom from, uint32_t step
     return planes(x);
 }
 
-uint32_t channel(uint32_t colour, int k) { return colour >> (8 * k) & 255u; }
-
 Bytes colourBytes(std::span<const Patch> patches) {
     std::array<Bytes, 3> out;
     for (const Patch& p : patches) {
+        if (p.map.density > 0) continue;
         uint32_t last = 0;
         forEachSample(p, [&](uint32_t i, uint32_t j) {
             const uint32_t before = neighbour(p, p.colours, i, j, last);
@@ -250,6 +208,8 @@ PatchBytes encodePatches(std::span<const Patch> patches) {
                    static_cast<uint32_t>(colours.size())};
     const Bytes plainMaterials = materialBytes(patches), materials = compress(plainMaterials);
     sizes.hasMaterials = plainMaterials.empty() ? 0 : 1;
+    const PatchMapBytes maps = encodeMaps(patches);
+    sizes.hasMaps = maps.bytes.empty() ? 0 : 1;
     const auto add = [](Bytes& to, const auto& value) {
         to.resize(to.size() + sizeof(value));
         std::memcpy(to.data() + to.size() - sizeof(value), &value, sizeof(value));
@@ -259,11 +219,16 @@ PatchBytes encodePatches(std::span<const Patch> patches) {
     if (sizes.hasMaterials != 0)
         add(out.bytes,
             SizesOfMaterials{static_cast<uint32_t>(materials.size()), static_cast<uint32_t>(plainMaterials.size())});
+    if (sizes.hasMaps != 0) add(out.bytes, SizeOfMaps{static_cast<uint32_t>(maps.bytes.size())});
     for (const Bytes& b : packed) out.bytes.insert(out.bytes.end(), b.begin(), b.end());
     if (sizes.hasMaterials != 0) {
         out.bytes.insert(out.bytes.end(), materials.begin(), materials.end());
         out.materials = sizeof(SizesOfMaterials) + materials.size();
     }
+    out.bytes.insert(out.bytes.end(), maps.bytes.begin(), maps.bytes.end());
+    out.mapColours = maps.colours + (sizes.hasMaps != 0 ? sizeof(SizeOfMaps) : 0);
+    out.mapNormals = maps.normals;
+    out.mapMaterials = maps.materials;
     out.geometry = sizeof(sizes) + packed[0].size() + packed[1].size() + packed[2].size();
     out.normals = packed[3].size();
     out.colours = packed[4].size();
@@ -308,6 +273,7 @@ struct Plain {
     Bytes heads, cells, heights, normals, colours;
     Bytes materials;  ///< empty: all have the first
     size_t samples = 0, next = 0;
+    size_t coloured = 0, nextColour = 0;  ///< of patches without maps
 };
 
 /// False where a code is 0, which says "no sample".
@@ -338,18 +304,23 @@ bool readSamples(Patch& p, Plain& plain, NormalFrom from, uint32_t normalStep) {
         const auto predicted = stepsOf(predictedNormal(p, i, j, normal, from), normalStep);
         const auto step = [&](size_t axis) {
             const uint16_t difference = unzigzag(fromPlanes(plain.normals, axis * plain.samples + k));
-            return std::min((predicted.at(axis) + difference) & 0xffffu, kCodes / normalStep);
+            return std::min((predicted.at(axis) + difference) & 0xffffu, 65536 / normalStep);
         };
         p.normals[p.at(i, j)] = normal = codeOf(step(0), step(1), normalStep);
-        const uint32_t before = neighbour(p, p.colours, i, j, colour), green = plain.colours[k];
-        const auto value = [&](int c, size_t plane, uint32_t more) {
-            return ((channel(before, c) + plain.colours[plane * plain.samples + k] + more) & 255u) << (8 * c);
-        };
-        p.colours[p.at(i, j)] = colour = value(1, 0, 0) | value(0, 1, green) | value(2, 2, green);
+        if (p.map.density == 0) {
+            const uint32_t before = neighbour(p, p.colours, i, j, colour), green = plain.colours[plain.nextColour];
+            const auto value = [&](int c, size_t plane, uint32_t more) {
+                const size_t at = plane * plain.coloured + plain.nextColour;
+                return ((channel(before, c) + plain.colours[at] + more) & 255u) << (8 * c);
+            };
+            p.colours[p.at(i, j)] = colour = value(1, 0, 0) | value(0, 1, green) | value(2, 2, green);
+            ++plain.nextColour;
+        }
         if (p.materials.empty()) return;
         material = static_cast<uint8_t>(neighbour(p, p.materials, i, j, material) + plain.materials[k]);
         p.materials[p.at(i, j)] = material;
     });
+    sampleColours(p);
     return true;
 }
 
@@ -369,7 +340,13 @@ Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const s
         std::memcpy(&more, bytes.data() + at, sizeof(more));
         at += sizeof(more);
     }
-    uint64_t end = uint64_t{at} + more.packed;
+    SizeOfMaps maps{};
+    if (sizes.hasMaps != 0) {
+        if (sizes.hasMaps != 1 || bytes.size() < at + sizeof(maps)) return damaged();
+        std::memcpy(&maps, bytes.data() + at, sizeof(maps));
+        at += sizeof(maps);
+    }
+    uint64_t end = uint64_t{at} + more.packed + maps.bytes;
     for (const uint32_t size : sizes.packed) end += size;
     constexpr uint64_t kSamplesABlock = 17 * 9, kHeight = 2, kNormal = 4, kColour = 3;
     const uint64_t most = mostBlocks * kSamplesABlock;
@@ -389,6 +366,7 @@ Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const s
         auto stream = decompress(bytes.subspan(at, more.packed), more.plain);
         if (!stream || stream->empty()) return damaged();
         plain.materials = std::move(*stream);
+        at += more.packed;
     }
     std::vector<Patch> out(sizes.patches);
     size_t cell = 0;
@@ -412,8 +390,10 @@ Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const s
         cell += (cells + 7) / 8;
         plain.samples += markSamples(p);
     }
+    if (sizes.hasMaps != 0 && !decodeMaps(bytes.subspan(at), out, mostBlocks)) return damaged();
+    for (const Patch& p : out) plain.coloured += p.map.density == 0 ? p.samples() : 0;
     if (cell != plain.cells.size() || plain.heights.size() != 2 * plain.samples ||
-        plain.normals.size() != 4 * plain.samples || plain.colours.size() != 3 * plain.samples ||
+        plain.normals.size() != 4 * plain.samples || plain.colours.size() != 3 * plain.coloured ||
         (!plain.materials.empty() && plain.materials.size() != plain.samples))
         return damaged();
     for (Patch& p : out)

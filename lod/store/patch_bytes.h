@@ -8,6 +8,7 @@
 //             whichever takes less room
 //   colours   minus the neighbour's; red and blue also minus green's
 //   materials numbers minus the neighbour's; left out where all have the first
+//   maps      patch_map_bytes.h; patches that have one have no colours beside it
 //
 // Everything is exact: decoding gives the patches again.
 #pragma once
@@ -25,6 +26,7 @@ struct PatchBytes {
     std::vector<uint8_t> bytes;
     /// Of `bytes`: heads, cells and heights; normals; colours; materials.
     uint64_t geometry = 0, normals = 0, colours = 0, materials = 0;
+    uint64_t mapColours = 0, mapNormals = 0, mapMaterials = 0;  ///< likewise, of maps
 };
 
 PatchBytes encodePatches(std::span<const Patch> patches);

@@ -210,8 +210,7 @@ Result<PayloadSection> readPayloads(const InputFile& file, const Head& head, uin
     out.streams = takeArray<StreamOnDisk>(at, of.streams);
     uint64_t streams = 0;
     for (const PayloadOnDisk& p : out.payloads) {
-        if (p.kind >= out.kinds.size() || p.codec >= out.codecs.size() || p.streams > kMostStreams || p.reserved != 0)
-            return bad();
+        if (p.kind >= out.kinds.size() || p.codec >= out.codecs.size() || p.streams > kMostStreams) return bad();
         streams += p.streams;
     }
     if (streams != out.streams.size()) return bad();

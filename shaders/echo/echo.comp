@@ -217,6 +217,7 @@ void putTextureInfo() {
 void putPatchBlock() {
     put(patchBlock.number);
     put(patchBlock.place);
+    put(patchBlock.map);
     for (uint k = 0u; k < 4u; ++k) put(patchBlock.cells[k]);
     for (uint k = 0u; k < kPatchSamples; ++k) put(patchBlock.normals[k]);
     for (uint k = 0u; k < kPatchSamples; ++k) put(patchBlock.colours[k]);

@@ -15,6 +15,17 @@ struct PatchSurface {
 uint byteOf(float v) { return uint(clamp(v, 0.0, 1.0) * 255.0 + 0.5); }
 vec3 colourOf(PatchBlocks of, uint block, uint s) { return decodeTexel(of.blocks[block].colours[s], true).xyz; }
 
+// In the place of what samples show, where the block has a map.
+void showMap(PatchBlocks of, DrawNode node, uint block, float i, float j, float cells, inout PatchSurface s) {
+    const uint map = of.blocks[block].map;
+    const MapLook look = mapLook(node, map, i, j, cells);
+    s.colour = look.colour;
+    if ((map & kMapNormals) != 0u) s.normal = look.normal;
+    const bool hasOwn = node.materials != 0u && (node.material & kOnlyMaterial) == 0u;
+    if ((map & kMapMaterials) != 0u && hasOwn) s.finish = look.finish;
+}
+vec2 latticeOf(uint s) { return vec2(s % kPatchStride, s / kPatchStride); }
+
 // Where a ray meets a triangle, from its corners.
 PatchSurface onTriangle(PatchBlocks of, DrawNode node, uint block, DrawMesh m, uint lane, PixelRay ray) {
     const uint corners = patchCorners(of, block, lane);
@@ -29,13 +40,17 @@ PatchSurface onTriangle(PatchBlocks of, DrawNode node, uint block, DrawMesh m, u
     s.face = cross(p1 - p0, p2 - p0);
     s.colour = first * colourOf(of, block, a) + w.x * colourOf(of, block, b) + w.y * colourOf(of, block, c);
     s.finish = first * patchFinishOf(node, block, a) + w.x * patchFinishOf(node, block, b) + w.y * patchFinishOf(node, block, c);
+    if (of.blocks[block].map == 0u) return s;
+    const vec2 d1 = latticeOf(b) - latticeOf(a), d2 = latticeOf(c) - latticeOf(a), at = latticeOf(a) + w.x * d1 + w.y * d2;
+    showMap(of, node, block, at.x, at.y, uvFootprint(ray, 1.0 / frame.focal, p0, p1 - p0, p2 - p0, d1, d2), s);
     return s;
 }
 
 // Direct interpolation: below the place where a ray meets a disc, from the four samples around it.
 PatchSurface belowDisc(PatchBlocks of, DrawNode node, uint block, DrawMesh m, uint lane, PixelRay ray) {
     const PatchDisc disc = discOf(of, block, m, lane);
-    const PatchMix mixed = patchMix(patchDiscHit(disc, m, ray, frame.nearPlane));
+    const vec3 hit = patchDiscHit(disc, m, ray, frame.nearPlane);
+    const PatchMix mixed = patchMix(hit);
     PatchSurface s;
     s.normal = vec3(0.0);
     s.colour = vec3(0.0);
@@ -53,6 +68,8 @@ PatchSurface belowDisc(PatchBlocks of, DrawNode node, uint block, DrawMesh m, ui
     s.colour = sum > 0.0 ? s.colour / sum : vec3(0.0);
     s.finish = sum > 0.0 ? s.finish / sum : vec2(0.0, 1.0);
     if (!(sum > 0.0)) s.normal = vec3(0.0, 0.0, 1.0);
+    if (of.blocks[block].map != 0u && sum > 0.0)
+        showMap(of, node, block, hit.y, hit.z, discFootprint(ray, 1.0 / frame.focal, disc.centre, disc.normal, m), s);
     return s;
 }
 

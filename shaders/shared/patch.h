@@ -12,12 +12,13 @@ const uint kPatchTriangles = 256u;  // of a block
 const uint kPatchStride = 17u;      // samples of a row of a block
 const uint kPatchSamples = 153u;    // of a block
 
-const uint kPatchBlockWords = 6u + 2u * kPatchSamples + (kPatchSamples + 1u) / 2u;
+const uint kPatchBlockWords = 7u + 2u * kPatchSamples + (kPatchSamples + 1u) / 2u;
 
 // What is not there is 0. Lane 2 * cell + k of the block's draw ids is the cell's triangle k.
 struct PatchBlock {
     uint number;                              // of its patch in the chunk
     uint place;                               // of its first sample in the patch: i | j << 16
+    uint map;                                 // where its map lies (patch_map.h); 0: it has none
     uint cells[4];                            // a bit for each cell that is drawn
     uint normals[kPatchSamples];              // octahedral 16 + 16 of (U, V, N)
     uint colours[kPatchSamples];              // sRGB 8 + 8 + 8 | number of the material, which backends do not read

@@ -6,6 +6,7 @@
 #include "engine/render/disc_sizes.h"
 #include "lod/primitives/codecs.h"
 #include "lod/primitives/octahedral.h"
+#include "lod/primitives/patch_map.h"
 #include "lod/primitives/patch_samples.h"
 #include "lod/store/materials.h"
 #include "lod/store/patch_bytes.h"
@@ -32,6 +33,7 @@ PatchScene::PatchScene(const std::vector<lod::Patch>& patches) {
         p.quantumExponent += kUnitLog2;
         hierarchy_.nodes[0].records += lod::countBlocks(p);
     }
+    hierarchy_.nodes[0].maps = lod::mapCodeOf(onLattice);
     const std::vector<uint8_t> bytes = lod::encodePatches(onLattice).bytes;
     auto decoded = lod::traitsOf(lod::Codec::patches).decode(hierarchy_, 0, bytes.data(), bytes.size(), "test", false);
     if (!decoded) throw std::runtime_error(decoded.error().line());
@@ -108,6 +110,25 @@ lod::Patch patchOfHeights(uint32_t width, uint32_t height, const std::function<d
                 p.colours[s] = static_cast<uint32_t>(rng.below(1u << 24));
             }
     return p;
+}
+
+void giveMap(lod::Patch& p, uint32_t density, const std::function<uint32_t(double, double)>& texel,
+             const std::function<glm::vec3(double, double)>& normal, bool hasMaterials) {
+    const uint32_t k = 1u << density;
+    p.map.density = density;
+    p.map.hasMaterials = hasMaterials;
+    const lod::MapLevel level = lod::mapOf(p);
+    p.map.colours.assign(level.isKnown.size(), 0);
+    if (normal) p.map.normals.assign(level.isKnown.size(), 0);
+    for (uint32_t y = 0; y < level.height; ++y)
+        for (uint32_t x = 0; x < level.width; ++x) {
+            const size_t t = level.at(x, y);
+            if (level.isKnown[t] == 0) continue;
+            const double i = static_cast<double>(x) / k, j = static_cast<double>(y) / k;
+            p.map.colours[t] = texel(i, j) & (hasMaterials ? ~0u : 0xffffffu);
+            if (normal) p.map.normals[t] = lod::roundedNormal<lod::kMapNormalStep>(normal(i, j));
+        }
+    lod::sampleColours(p);
 }
 
 }  // namespace stipple::test

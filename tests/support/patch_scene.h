@@ -40,4 +40,9 @@ class PatchScene {
 lod::Patch patchOfHeights(uint32_t width, uint32_t height, const std::function<double(double, double)>& f,
                           double holes = 0, const glm::dquat& turn = {1, 0, 0, 0});
 
+/// Gives a patch a map of 2^density texels along a cell, texels and normals by places in samples. Empty functions: no
+/// normals; numbers of materials are above the colours where `hasMaterials`.
+void giveMap(lod::Patch& patch, uint32_t density, const std::function<uint32_t(double i, double j)>& texel,
+             const std::function<glm::vec3(double i, double j)>& normal = {}, bool hasMaterials = false);
+
 }  // namespace stipple::test

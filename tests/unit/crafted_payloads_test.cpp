@@ -139,11 +139,11 @@ TEST_F(CraftedPayloads, WeightsOfOtherThanPointsAreRefused) {
     expectRefused(c, "not possible");
 }
 
-TEST_F(CraftedPayloads, ReservedBytesAreZero) {
+TEST_F(CraftedPayloads, MapsAreOfPatchesAlone) {
     for (const size_t place : {size_t{rootPoints}, size_t{roof}, size_t{lastTubes}}) {
         CraftedStore c = take();
-        c.payloads[place].reserved = 1;
-        expectRefused(c, "the payloads are not possible");
+        c.payloads[place].maps = 1;
+        expectRefused(c, "not possible");
     }
 }
 

@@ -1,6 +1,7 @@
 // Elevation patches into the visibility buffer.
 #include "engine/cpu/passes/passes.h"
 #include "engine/render/patch_planes.h"
+#include "shaders/shared/patch_map.h"
 
 namespace stipple::cpu {
 namespace {
@@ -21,12 +22,14 @@ void findBlocks(Frame& frame) {
         const shared::PatchBlock& block = chunk.patchBlocks[place];
         const shared::DrawNode& of = batch.nodes[node];
         const bool hasOwn = of.materials != 0 && (of.material & shared::kOnlyMaterial) == 0;
-        frame.patchBlocks[b] = {&block,
-                                &frame.patches[first[node] + block.number],
-                                of.level,
-                                of.errorPixels,
-                                of.material & ~shared::kOnlyMaterial,
-                                hasOwn ? chunk.materials.data() + size_t{place} * shared::kPatchSamples : nullptr};
+        frame.patchBlocks[b] = {
+            &block,
+            &frame.patches[first[node] + block.number],
+            of.level,
+            of.errorPixels,
+            of.material & ~shared::kOnlyMaterial,
+            hasOwn ? chunk.materials.data() + size_t{place} * shared::kPatchSamples : nullptr,
+            block.map != 0 ? chunk.patchMaps.data() + (block.map >> shared::kMapFirstShift) : nullptr};
     }
 }
 

@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "engine/base/numbers.h"
+#include "lod/primitives/patch_map.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::lod {
@@ -136,6 +137,57 @@ std::optional<SurfaceLook> LevelLooks::at(const glm::dvec3& place, const glm::ve
         return out;
     }
     return {};
+}
+
+namespace {
+
+/// Of the texels of a drawn cell, but for those that are its right and upper neighbours'.
+void addCell(const Patch& p, const MapLevel& map, uint32_t i, uint32_t j, const glm::dvec3& origin,
+             const glm::dmat3& frame, std::vector<LevelLooks::Seen>& seen) {
+    const uint32_t k = 1u << p.map.density;
+    const double side = double{p.step} / k;
+    const std::array<size_t, 4> corner{p.at(i, j), p.at(i + 1, j), p.at(i, j + 1), p.at(i + 1, j + 1)};
+    for (uint32_t y = 0; y < k; ++y)
+        for (uint32_t x = 0; x < k; ++x) {
+            const double u = static_cast<double>(x) / k, v = static_cast<double>(y) / k;
+            const std::array<double, 4> w{(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v};
+            double height = 0;
+            glm::dvec3 normal(0);
+            size_t most = 0;
+            for (size_t c = 0; c < 4; ++c) {
+                height += w.at(c) * p.heights[corner.at(c)];
+                normal += w.at(c) * glm::dvec3(shared::octDecode(p.normals[corner.at(c)]));
+                if (w.at(c) > w.at(most)) most = c;
+            }
+            const size_t t = map.at(i * k + x, j * k + y);
+            if (!map.normals.empty()) normal = glm::dvec3(shared::octDecode(map.normals[t]));
+            const uint8_t ofSample = p.materials.empty() ? uint8_t{0} : p.materials[corner.at(most)];
+            const auto material = p.map.hasMaterials ? static_cast<uint8_t>(map.colours[t] >> 24) : ofSample;
+            const glm::dvec3 onPlane((i + u) * double{p.step}, (j + v) * double{p.step}, p.quantum() * height);
+            seen.push_back({origin + p.origin + frame * onPlane,
+                            {glm::vec3(glm::normalize(frame * normal)), map.colours[t] & 0xffffffu, material},
+                            side * side});
+        }
+}
+
+}  // namespace
+
+void addSeen(const Patch& p, const glm::dvec3& origin, std::vector<LevelLooks::Seen>& seen) {
+    const PatchSurface surface(p);
+    if (p.map.density > 0) {
+        const MapLevel map = mapOf(p);
+        for (uint32_t j = 0; j + 1 < p.height; ++j)
+            for (uint32_t i = 0; i + 1 < p.width; ++i)
+                if (p.hasCell(i, j)) addCell(p, map, i, j, origin, surface.frame(), seen);
+        return;
+    }
+    for (size_t s = 0; s < p.heights.size(); ++s) {
+        if (p.heights[s] == 0) continue;
+        const glm::vec3 normal(surface.frame() * glm::dvec3(shared::octDecode(p.normals[s])));
+        const uint8_t material = p.materials.empty() ? uint8_t{0} : p.materials[s];
+        seen.push_back(
+            {origin + surface.position(s), {normal, p.colours[s], material}, double{p.step} * double{p.step}});
+    }
 }
 
 void LevelLooks::get(ByteReader& from) {

@@ -53,4 +53,7 @@ class LevelLooks {
     std::vector<Cell> cells_;
 };
 
+/// What the texels of a patch's map show, or its samples where it has none; `origin`: what its places are relative to.
+void addSeen(const Patch& patch, const glm::dvec3& origin, std::vector<LevelLooks::Seen>& seen);
+
 }  // namespace stipple::lod

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -57,7 +58,7 @@ class NodePatcher {
         s_.hasFineNormals = settings.hasFineNormals;
         if (settings.below != nullptr && !settings.below->isEmpty())
             s_.looksThere = [this, &settings](const glm::dvec3& place, const glm::vec3& normal) {
-                return settings.below->at(corner_ + s_.middle + place, normal, settings.step);
+                return settings.below->at(corner_ + s_.middle + place, normal, settings.belowStep);
             };
         SegmentSettings how;
         how.coneCosine = std::cos(settings.coneDegrees * 3.14159265358979323846 / 180);
@@ -65,6 +66,11 @@ class NodePatcher {
         std::vector<Segment> segments = connectedComponents(elements);
         std::erase_if(segments, [&](const Segment& s) { return !isInSegment(s.front()); });
         segments = mergeByNormals(elements, splitByCone(elements, std::move(segments), how, executor_), how);
+        s_.mapTexels = settings.maps.texels;
+        s_.texelSide = settings.maps.sourceTexel;
+        s_.mostDensity = static_cast<uint32_t>(std::countr_zero(settings.maps.most));
+        s_.hasMapNormals = settings.maps.hasNormals;
+        s_.hasMapMaterials = settings.maps.hasMaterials;
         double step = settings.step;
         SampledSegments sampled = settings.samplesATriangle > 0 ? sampledLeaf(segments, settings, step)
                                                                 : sampledAt(segments, step, kWanted * step);

@@ -32,6 +32,19 @@ struct NodePatches {
     double error = 0;  ///< bound of the distance between the triangles and all that, both ways, lattice units
 };
 
+/// Maps of a node's patches.
+struct NodeMaps {
+    uint32_t texels = 1;  ///< along an edge of a cell: 1 (none), 2, 4 or 8; 0: as many as the source's textures hold,
+    uint32_t most = 8;    ///< but no more than that
+    double sourceTexel = 0;  ///< side of those of the source, lattice units; 0: it has none
+    bool hasNormals = false, hasMaterials = false;
+    /// Of texels beside steps of that length, lattice units; 0: there are no maps.
+    double side(double step) const {
+        if (texels > 0) return texels == 1 ? 0 : step / texels;
+        return sourceTexel > 0 ? std::max(sourceTexel, step / most) : 0;
+    }
+};
+
 struct NodeSettings {
     double step = 1;          ///< of the level's grid, lattice units
     double coneDegrees = 50;  ///< half the cone of a patch's normals
@@ -41,7 +54,9 @@ struct NodeSettings {
     bool isAsked = false;               ///< somebody did: as many as that, within a tenth if steps can do it
     PlaceLooks looks;                   ///< of materials; empty: vertices say all
     bool hasFineNormals = false;        ///< some of it is a mirror
-    const LevelLooks* below = nullptr;  ///< looks of triangles that are simplified, in cells of the level's step
+    const LevelLooks* below = nullptr;  ///< looks of triangles that are simplified ...
+    double belowStep = 1;               ///< ... in cells of this edge, lattice units
+    NodeMaps maps;
 };
 NodePatches patchesOfNode(const Soup& own, const AroundNode& around, const glm::dvec3& corner,
                           const NodeSettings& settings, Executor& executor);

@@ -13,6 +13,10 @@ namespace {
 constexpr double kWanted = 0.1;       ///< error that a simplification may add, in steps of its level
 constexpr size_t kMostKept = 65'536;  ///< triangles that go up from a node
 constexpr double kLongest = 0.25;     ///< edge of a triangle, in cells
+/// Texels along an edge of a cell that inner nodes have at most: more looks would not fit on their way up.
+constexpr uint32_t kMostInner = 4;
+constexpr uint32_t kMostOfLeaf = 8;
+constexpr double kFineEnough = 1.5;  ///< texels of a map, in those of the source
 
 struct SurfaceNode : PatchNode {
     Soup surface;  ///< its triangles; once it is done, what is left of them for its parent
@@ -107,7 +111,6 @@ class PatchCell {
         table_.batch.bytes = {};
         table_.put(to);
         out.table = to.bytes();
-        upwards_ = looks_.halved();
         if (!isLast) out.up = goingUp();
         return out;
     }
@@ -161,7 +164,9 @@ class PatchCell {
         for (size_t i = 0; i < nodes_.size(); ++i)
             if (isToBeMade(i) && nodes_[i].node.level == level) here.push_back(i);
         for (const size_t i : here) joinChildren(nodes_[i]);
-        if (firstOwn_ == 0) looks_ = looks_.halved();
+        if (settings_.maps.any())
+            for (const size_t i : here)
+                if (nodes_[i].node.isLeaf()) measureTextures(nodes_[i]);
         std::vector<NodePatches> made(here.size());
         executor_.parallelFor(here.size(), 1, [&](size_t begin, size_t end) {
             for (size_t k = begin; k < end; ++k) {
@@ -173,14 +178,17 @@ class PatchCell {
                                        settings_.isAsked,
                                        settings_.looks,
                                        settings_.hasFineNormals,
-                                       &looks_};
+                                       &looks_,
+                                       lookStep(level),
+                                       mapsOf(n)};
                 made[k] = patchesOfNode(n.surface, around, cornerOf(frame_, n.node), how, executor_);
                 made[k].error += std::max(n.surfaceError, around.surfaceError);
             }
         });
         for (size_t k = 0; k < here.size(); ++k) write(nodes_[here[k]], made[k]);
-        if (settings_.looks) looks_.add(looksOfLeaves(here, made), patchStep(frame_, level));
         if (level == nodes_[0].node.level && isLast) return;
+        looks_ = looks_.halved();
+        if (settings_.looks) looks_.add(looksOfLeaves(here, made), 2 * lookStep(level));
         executor_.parallelFor(here.size(), 1, [&](size_t begin, size_t end) {
             for (size_t k = begin; k < end; ++k) {
                 SurfaceNode& n = nodes_[here[k]];
@@ -189,24 +197,56 @@ class PatchCell {
         });
     }
 
-    /// What the samples of leaves show, and discs; beside their cells, too, where their triangles reach.
+    /// Edge of the cells of looks that a level's nodes are shown by: a texel of the densest map.
+    double lookStep(uint32_t level) const {
+        const uint32_t texels = settings_.maps.texels == 0 ? kMostInner : settings_.maps.texels;
+        return patchStep(frame_, level) / (settings_.maps.any() ? std::min(texels, kMostInner) : 1);
+    }
+    NodeMaps mapsOf(const SurfaceNode& n) const {
+        NodeMaps maps;
+        if (!settings_.looks || !settings_.maps.any()) return maps;
+        maps.most = n.node.isLeaf() ? kMostOfLeaf : kMostInner;
+        maps.texels = std::min(settings_.maps.texels, maps.most);
+        maps.sourceTexel = n.texels > 0 ? std::sqrt(n.texturedArea / n.texels) : 0;
+        maps.hasNormals = settings_.maps.detail.hasNormals;
+        maps.hasMaterials = settings_.maps.detail.hasMaterials;
+        return maps;
+    }
+    /// What textures hold of a leaf.
+    void measureTextures(SurfaceNode& n) const {
+        const Soup& soup = n.surface;
+        for (size_t t = 0; t < soup.indices.size() / 3; ++t) {
+            std::array<glm::dvec3, 3> place{};
+            std::array<glm::dvec2, 3> uv{};
+            for (size_t k = 0; k < 3; ++k) {
+                const uint32_t v = soup.indices[3 * t + k];
+                place.at(k) = glm::dvec3(soup.vertices.at(v));
+                uv.at(k) = {soup.vertices.low[v].u, soup.vertices.low[v].v};
+            }
+            const double density = double{settings_.maps.detail.texels(soup.vertices.low[soup.indices[3 * t]].surface)};
+            const glm::dvec2 e = uv[1] - uv[0], f = uv[2] - uv[0];
+            const double texels = 0.5 * std::abs(e.x * f.y - e.y * f.x) * density * density;
+            if (!(texels > 0) || !std::isfinite(texels)) continue;
+            n.texels += texels;
+            n.texturedArea += 0.5 * glm::length(glm::cross(place[1] - place[0], place[2] - place[0]));
+        }
+    }
+    /// Of an inner node whose maps are coarser than the source's textures: a texel, which is then wanted no larger than
+    /// the error that a view allows. Lattice units.
+    double textureError(const SurfaceNode& n) const {
+        const NodeMaps maps = mapsOf(n);
+        const double step = patchStep(frame_, n.node.level), texel = maps.side(step);
+        return texel > kFineEnough * maps.sourceTexel && maps.sourceTexel > 0 ? texel : 0;
+    }
+
+    /// What the texels and samples of leaves show, and discs; beside their cells, too, where their triangles reach.
     std::vector<LevelLooks::Seen> looksOfLeaves(const std::vector<size_t>& here,
                                                 const std::vector<NodePatches>& made) const {
         std::vector<LevelLooks::Seen> seen;
         for (size_t k = 0; k < here.size(); ++k) {
             const Node& n = nodes_[here[k]].node;
             if (!n.isLeaf()) continue;
-            for (const Patch& p : made[k].patches) {
-                const PatchSurface surface(p);
-                for (size_t s = 0; s < p.heights.size(); ++s) {
-                    if (p.heights[s] == 0) continue;
-                    const glm::vec3 normal(surface.frame() * glm::dvec3(shared::octDecode(p.normals[s])));
-                    const uint8_t material = p.materials.empty() ? uint8_t{0} : p.materials[s];
-                    seen.push_back({cornerOf(frame_, n) + surface.position(s),
-                                    {normal, p.colours[s], material},
-                                    double{p.step} * double{p.step}});
-                }
-            }
+            for (const Patch& p : made[k].patches) addSeen(p, cornerOf(frame_, n), seen);
             for (const LeftDisc& d : made[k].left)
                 seen.push_back({d.place, {d.normal, d.colour, d.material}, double{d.radius} * double{d.radius}});
         }
@@ -220,6 +260,8 @@ class PatchCell {
             nodes_[c].surface = {};
             n.surfaceError = std::max(n.surfaceError, nodes_[c].surfaceError);
             n.error = std::max({n.error, nodes_[c].error, nodes_[c].residual});
+            n.texturedArea += nodes_[c].texturedArea;
+            n.texels += nodes_[c].texels;
         }
         if (children > 0) uniteByPlace(n.surface);
     }
@@ -250,6 +292,7 @@ class PatchCell {
     void write(SurfaceNode& n, NodePatches& made) {
         const Node& out = n.node;
         (out.isLeaf() ? n.residual : n.error) = std::max(n.error, made.error);
+        if (!out.isLeaf()) n.error = std::max(n.error, textureError(n));
         if (out.isLeaf()) {
             table_.left += made.trianglesLeft;
             table_.patches += made.patches.size();
@@ -312,7 +355,7 @@ class PatchCell {
                 part.add(t);
         to.put(aroundError_);
         putSoup(carried, to);
-        upwards_.put(to);
+        looks_.put(to);
         return to.bytes();
     }
 
@@ -325,9 +368,9 @@ class PatchCell {
         // Looks reach as far as triangles do whose middles are near.
         const Node& n = nodes_[0].node;
         const glm::dvec3 corner = cornerOf(frame_, n), reach((kPatchMargin + kLongest) * cell);
-        const LevelLooks looks = upwards_.within(glm::max(corner, lo - reach),
-                                                 glm::min(corner + frame_.cellSize(n.level), lo + cell + reach),
-                                                 2 * patchStep(frame_, n.level));
+        const LevelLooks looks =
+            looks_.within(glm::max(corner, lo - reach), glm::min(corner + frame_.cellSize(n.level), lo + cell + reach),
+                          2 * lookStep(n.level));
         if (out.indices.empty() && looks.isEmpty()) return {};
         ByteWriter to;
         to.put(Sent::strip);
@@ -349,7 +392,7 @@ class PatchCell {
     std::vector<SurfaceNode> nodes_;  ///< the first one is the cell's own
     Soup around_;                     ///< triangles of other cells
     double aroundError_ = 0;          ///< of those: bound of the distance from the source
-    LevelLooks looks_, upwards_;      ///< of the level that is made, or was made last; of that above the cell
+    LevelLooks looks_;                ///< of the level that is made, or is made next; at the end of that above the cell
     PatchTable table_;
     size_t firstOwn_ = 0;  ///< 0: all nodes are to be made
     bool isMade_ = false;

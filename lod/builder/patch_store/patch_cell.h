@@ -16,6 +16,7 @@ struct PatchCellSettings {
     double samplesATriangle = 0.5;  ///< of the leaves
     bool isAsked = false;           ///< somebody asked for that many
     PlaceLooks looks;               ///< of materials; empty: vertices say all
+    MapSettings maps;               ///< of what looks say
     bool hasFineNormals = false;    ///< some of it is a mirror
     double rounding = 0;            ///< most that a place is moved to lie on the lattice, lattice units
 };

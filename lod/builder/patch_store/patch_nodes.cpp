@@ -8,6 +8,7 @@
 #include "engine/base/hash.h"
 #include "lod/builder/counts.h"
 #include "lod/builder/patch_store/node_payload.h"
+#include "lod/primitives/patch_map.h"
 #include "lod/store/chunk.h"
 #include "lod/store/patch_bytes.h"
 
@@ -35,7 +36,7 @@ void makeSphere(std::span<const Node> children, const NodePatches& made, const g
 
 /// A node's payloads; the patches', if there are any, are the node's own.
 void appendPayloads(const PatchNode& n, const std::vector<uint8_t>& patches, uint32_t blocks,
-                    const std::vector<uint8_t>& discs, uint32_t records, PatchTable& table) {
+                    const std::vector<uint8_t>& discs, uint32_t records, uint8_t maps, PatchTable& table) {
     NodeBatch& batch = table.batch;
     NodeBatch::Written w;
     w.node = n.node;
@@ -44,6 +45,7 @@ void appendPayloads(const PatchNode& n, const std::vector<uint8_t>& patches, uin
     w.node.chunkOffset = batch.bytes.size();
     w.node.attributeHash = hashBytes(nullptr, 0);
     if (blocks > 0) {
+        w.node.maps = maps;
         w.node.chunkBytes = static_cast<uint32_t>(patches.size());
         w.node.chunkHash = hashBytes(patches.data(), patches.size());
         batch.bytes.insert(batch.bytes.end(), patches.begin(), patches.end());
@@ -99,6 +101,10 @@ void markMaterials(const Patch& p, std::array<uint8_t, 256>& has) {
     if (p.materials.empty()) has[0] = 1;
     for (size_t s = 0; s < p.materials.size(); ++s)
         if (p.heights[s] != 0) has.at(p.materials[s]) = 1;
+    if (!p.map.hasMaterials) return;
+    const MapLevel map = mapOf(p);
+    for (size_t t = 0; t < map.colours.size(); ++t)
+        if (map.isKnown[t] != 0) has.at(map.colours[t] >> 24) = 1;
 }
 
 }  // namespace
@@ -166,7 +172,8 @@ void writePatchNode(const Frame& frame, std::span<const Node> children, NodePatc
     out.errorCode = static_cast<uint8_t>(code);
     makeSphere(children, made, cornerOf(frame, out), out);
     std::vector<uint8_t> patches = encodePatches(made.patches).bytes;
-    appendPayloads(n, patches, blocksIn(made.patches), discs.bytes, static_cast<uint32_t>(made.left.size()), table);
+    appendPayloads(n, patches, blocksIn(made.patches), discs.bytes, static_cast<uint32_t>(made.left.size()),
+                   mapCodeOf(made.patches), table);
     if (patchBytes != nullptr) *patchBytes = std::move(patches);
 }
 

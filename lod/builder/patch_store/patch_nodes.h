@@ -54,6 +54,7 @@ struct PatchNode {
     double surfaceError = 0;  ///< of what its patches are made of, bound of the distance from the source, lattice units
     double residual = 0;      ///< of a leaf: of its patches from the source
     double error = 0;         ///< of others: likewise; no less than any below
+    double texturedArea = 0, texels = 0;  ///< of its triangles, those with textures: lattice units^2; of the source
 };
 
 PatchNode patchNodeAt(const Frame& frame, uint32_t level, Key key);

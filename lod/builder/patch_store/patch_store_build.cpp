@@ -36,6 +36,7 @@ class PatchBuild : public CellContent {
         cell_.leafTriangles = settings.leafTriangles;
         cell_.samplesATriangle = kUsualSamples;
         cell_.looks = settings.looks;
+        cell_.maps = settings.maps;
         cell_.hasFineNormals = hasMirrors(settings.description.pointMaterials);
     }
 
@@ -55,9 +56,9 @@ class PatchBuild : public CellContent {
         return needs;
     }
     std::string settingsAsText() const override {
-        return fmt::format("patches|{}|{}|{}|{}|{}|{}|{}", kBuildVersion, settings_.looksIdentity,
-                           settings_.coneDegrees, settings_.samples, settings_.leafTriangles, kPatchCells,
-                           describeAsText(settings_.description));
+        return fmt::format("patches|{}|{}|{}|{}|{}|{}|{}|{}", kBuildVersion, settings_.looksIdentity,
+                           settings_.maps.any() ? settings_.maps.texels : 1, settings_.coneDegrees, settings_.samples,
+                           settings_.leafTriangles, kPatchCells, describeAsText(settings_.description));
     }
 
     // ---- survey, count, distribute ----

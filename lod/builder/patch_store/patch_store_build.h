@@ -20,6 +20,7 @@ struct PatchBuildSettings {
     /// for other looks.
     PlaceLooks looks;
     uint64_t looksIdentity = 0;
+    MapSettings maps;              ///< of what they say
     StoreDescription description;  ///< what the input says; bounds and counts are filled in
 };
 

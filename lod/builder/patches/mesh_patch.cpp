@@ -12,6 +12,8 @@
 #include "engine/base/numbers.h"
 #include "lod/builder/patches/cone.h"
 #include "lod/builder/patches/deviation.h"
+#include "lod/primitives/octahedral.h"
+#include "lod/primitives/patch_map.h"
 
 namespace stipple::lod {
 namespace {
@@ -85,6 +87,7 @@ class Patcher {
         chooseCells();
         look();
         out.patch = toPatch(grid_);
+        if (out.patch.width > 0) drawMap(out.patch);
         if (out.patch.width == 0 || beside_ > kMostBeside * static_cast<double>(used_)) {
             out.fit = PatchFit::thin;
             return out;
@@ -330,22 +333,98 @@ class Patcher {
         for (size_t s = 0; s < isUsed.size(); ++s) {
             if (isUsed[s] == 0) continue;
             ++used_;
-            const Projected p = project(hit_[s]);
-            glm::dvec2 w(1.0 / 3);
-            if (p.area2 != 0)
-                w = glm::clamp(weights(p, {static_cast<double>(s % grid_.width), static_cast<double>(s / grid_.width)}),
-                               0.0, 1.0);
-            if (const double sum = w.x + w.y; sum > 1) w /= sum;
-            const SurfaceLook l = s_.look(hit_[s], w.x, w.y, grid_.step);
+            const SurfaceLook l = lookAt(
+                hit_[s], {static_cast<double>(s % grid_.width), static_cast<double>(s / grid_.width)}, grid_.step);
             grid_.normals[s] = l.normal;
             grid_.colours[s] = l.colour;
             grid_.materials[s] = l.material;
         }
     }
 
+    /// Sample of the grid that is a patch's first.
+    std::pair<uint32_t, uint32_t> firstOf(const Patch& patch) const {
+        const glm::dvec3 shift = grid_.local(patch.origin);  // whole samples
+        return {static_cast<uint32_t>(std::lround(shift.x)), static_cast<uint32_t>(std::lround(shift.y))};
+    }
+
+    /// The patch's map, whose texels lie on what lies over them: the first triangle that a line meets, as of samples.
+    void drawMap(Patch& patch) const {
+        double wanted = 0;
+        if (s_.mapTexels > 0)
+            wanted = std::log2(s_.mapTexels);
+        else if (s_.texelSide > 0)
+            wanted = std::round(std::log2(grid_.step / s_.texelSide));
+        patch.map.density = toWhole<uint32_t>(std::clamp(wanted, 0.0, static_cast<double>(s_.mostDensity)));
+        if (patch.map.density == 0) return;
+        const auto [i0, j0] = firstOf(patch);
+        const MapLevel level = mapOf(patch);
+        const double k = 1u << patch.map.density;
+        const std::vector<uint32_t> over = trianglesOver(patch, level, i0, j0);
+        PatchMap& map = patch.map;
+        map.hasMaterials = s_.hasMapMaterials;
+        map.colours.assign(level.isKnown.size(), 0);
+        if (s_.hasMapNormals) map.normals.assign(level.isKnown.size(), 0);
+        const glm::mat3 toLocal(glm::transpose(grid_.frame));
+        for (uint32_t y = 0; y < level.height; ++y)
+            for (uint32_t x = 0; x < level.width; ++x) {
+                const size_t t = level.at(x, y);
+                if (level.isKnown[t] == 0) continue;
+                const glm::dvec2 at(i0 + x / k, j0 + y / k);
+                const SurfaceLook look = lookAt(over[t], at, grid_.step / k);
+                map.colours[t] = look.colour | (map.hasMaterials ? uint32_t{look.material} << 24 : 0u);
+                if (s_.hasMapNormals) map.normals[t] = roundedNormal<kMapNormalStep>(toLocal * look.normal);
+            }
+        sampleColours(patch);
+    }
+
+    /// Of a place of the grid; of its sample where no triangle lies over it, or its cell lies beside the surface.
+    std::vector<uint32_t> trianglesOver(const Patch& patch, const MapLevel& level, uint32_t i0, uint32_t j0) const {
+        std::vector<uint32_t> over(level.isKnown.size(), kNobody);
+        const double k = 1u << patch.map.density;
+        const auto spread = [&](uint32_t t) {
+            const Projected p = project(t);
+            if (p.area2 == 0) return;
+            glm::dvec2 lo(1e300), hi(-1e300);
+            for (const glm::dvec2& corner : p.at) {
+                lo = glm::min(lo, (corner - glm::dvec2(i0, j0)) * k);
+                hi = glm::max(hi, (corner - glm::dvec2(i0, j0)) * k);
+            }
+            const auto within = [](double v, uint32_t n) {
+                return toWhole<uint32_t>(std::clamp(v, 0.0, static_cast<double>(n)));
+            };
+            const uint32_t x1 = within(std::floor(hi.x) + 1, level.width),
+                           y1 = within(std::floor(hi.y) + 1, level.height);
+            for (uint32_t y = within(std::ceil(lo.y), level.height); y < y1; ++y)
+                for (uint32_t x = within(std::ceil(lo.x), level.width); x < x1; ++x) {
+                    const size_t at = level.at(x, y);
+                    if (over[at] != kNobody || level.isKnown[at] == 0) continue;
+                    const glm::dvec2 w = weights(p, {i0 + x / k, j0 + y / k});
+                    if (w.x >= -1e-9 && w.y >= -1e-9 && w.x + w.y <= 1 + 1e-9) over[at] = t;
+                }
+        };
+        for (const uint32_t t : segment_) spread(t);
+        for (const uint32_t t : beyond_) spread(t);
+        for (uint32_t y = 0; y < level.height; ++y)
+            for (uint32_t x = 0; x < level.width; ++x) {
+                const size_t at = level.at(x, y);
+                const auto i = i0 + static_cast<uint32_t>(x / k + 0.5), j = j0 + static_cast<uint32_t>(y / k + 0.5);
+                const size_t sample = grid_.at(std::min(i, grid_.width - 1), std::min(j, grid_.height - 1));
+                if (level.isKnown[at] != 0 && (over[at] == kNobody || isBeside_[sample] != 0)) over[at] = hit_[sample];
+            }
+        return over;
+    }
+
+    /// What a triangle shows at a place of the grid, or at that of its own near there.
+    SurfaceLook lookAt(uint32_t triangle, const glm::dvec2& at, double side) const {
+        const Projected p = project(triangle);
+        glm::dvec2 w(1.0 / 3);
+        if (p.area2 != 0) w = glm::clamp(weights(p, at), 0.0, 1.0);
+        if (const double sum = w.x + w.y; sum > 1) w /= sum;
+        return s_.look(triangle, w.x, w.y, side);
+    }
+
     void measure(MeshPatch& out) const {
-        const glm::dvec3 shift = grid_.local(out.patch.origin);  // whole samples
-        const auto i0 = static_cast<uint32_t>(std::lround(shift.x)), j0 = static_cast<uint32_t>(std::lround(shift.y));
+        const auto [i0, j0] = firstOf(out.patch);
         OverPatch over;
         // No border crosses it, so the surface that lies over a corner lies over all of it.
         over.isInside = [&](uint32_t i, uint32_t j) {

@@ -114,6 +114,9 @@ PatchSet patchesOfMesh(TriangleMesh mesh, const PatchSettings& settings, Executo
     MeshSurface surface = meshSurface(std::move(mesh), executor);
     surface.looks = settings.looks;
     surface.hasFineNormals = settings.hasFineNormals;
+    surface.mapTexels = settings.looks && settings.maps.texels > 0 ? settings.maps.texels : 1;
+    surface.hasMapNormals = settings.maps.detail.hasNormals;
+    surface.hasMapMaterials = settings.maps.detail.hasMaterials;
     return MeshPatches(surface, settings, executor, progress).run();
 }
 

@@ -11,6 +11,7 @@
 #include "lod/builder/patches/elements.h"
 #include "lod/builder/patches/run_tree.h"
 #include "lod/primitives/mesh.h"
+#include "lod/primitives/patch.h"
 #include "lod/primitives/place_look.h"
 
 namespace stipple::lod {
@@ -41,6 +42,11 @@ struct MeshSurface {
     /// Of triangles of kNoMaterial, where looks lie that went with others: at a place (as `position`), towards a
     /// normal.
     std::function<std::optional<SurfaceLook>(const glm::dvec3& place, const glm::vec3& normal)> looksThere;
+    /// Maps of its patches: texels along an edge of a cell (1: there are none); 0: so many that they are about
+    /// `texelSide` (scene units; 0: none), but no more than 2^mostDensity. And what they hold beside colours.
+    uint32_t mapTexels = 1, mostDensity = PatchMap::kMostDensity;
+    double texelSide = 0;
+    bool hasMapNormals = false, hasMapMaterials = false;
     bool hasFineNormals = false;              ///< some of it is a mirror
     bool isTwoSided = false;                  ///< some triangles are, or they do not agree on a side
     uint64_t triangles = 0;                   ///< of the source

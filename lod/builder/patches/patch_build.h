@@ -30,6 +30,7 @@ struct PatchSettings {
     uint64_t samples = 0;  ///< aimed at; 0: as many as there are points or vertices (of a mesh kFewestSamples at least)
     bool isTwoSided = false;      ///< points are seen from both sides (those without normals always are)
     PlaceLooks looks;             ///< of a mesh: colours and normals that are not of its vertices
+    MapSettings maps;             ///< likewise; only a number of texels that is told counts
     bool hasFineNormals = false;  ///< of a mesh, some of which is a mirror
     std::function<bool()> isStopped;
 };

@@ -3,8 +3,10 @@
 #include "lod/cut/frame.h"
 #include "lod/primitives/kinds/records.h"
 #include "lod/primitives/patch_blocks.h"
+#include "lod/primitives/patch_map.h"
 #include "lod/store/check.h"
 #include "lod/store/patch_bytes.h"
+#include "shaders/shared/patch_map.h"
 
 namespace stipple::lod {
 namespace {
@@ -12,23 +14,33 @@ namespace {
 Result<Chunk> decode(const Hierarchy& h, uint32_t chunk, const uint8_t* bytes, size_t count, const std::string& where,
                      bool /*wantLowBits*/) {
     STIPPLE_ASSIGN(const std::vector<Patch> patches, decodePatches({bytes, count}, where, h.payload(chunk).records));
-    uint64_t blocks = 0;
+    uint64_t blocks = 0, words = 0;
+    const uint8_t told = h.payload(chunk).maps;
     for (const Patch& p : patches) {
         if (const std::string fault = patchFault(p); !fault.empty())
             return tl::unexpected(damagedStore(where, "a patch " + fault));
-        blocks += countBlocks(p);
+        const uint32_t ofPatch = countBlocks(p);
+        blocks += ofPatch;
+        words += uint64_t{ofPatch} * shared::mapWords(mapCode(p));
+        if ((mapCode(p) & shared::kMapDensity) > (told & shared::kMapDensity) ||
+            (mapCode(p) & shared::kMapNormals) > (told & shared::kMapNormals))
+            return tl::unexpected(damagedStore(where, "a map is larger than the table says"));
     }
+    if (words >> (32 - shared::kMapFirstShift) != 0)
+        return tl::unexpected(damagedStore(where, "maps of too many texels"));
     if (blocks != h.payload(chunk).records) return tl::unexpected(damagedStore(where, "another number of blocks"));
     PatchBlocks made = blocksOf(patches);
     Chunk out;
     out.patchBlocks = std::move(made.blocks);
     out.patchPlanes = std::move(made.planes);
+    out.patchMaps = std::move(made.maps);
     return out;
 }
 
 uint64_t bytesOfBlocks(const Hierarchy& h, uint32_t chunk) {
     const uint64_t materials = h.hasMaterials ? shared::kPatchSamples * sizeof(uint16_t) : 0;
-    return h.payload(chunk).records * (sizeof(shared::PatchBlock) + sizeof(PatchPlane) + materials);
+    const uint64_t maps = sizeof(uint32_t) * shared::mapWords(h.payload(chunk).maps);
+    return h.payload(chunk).records * (sizeof(shared::PatchBlock) + sizeof(PatchPlane) + materials + maps);
 }
 /// A block has a cell, and each sample is of four blocks at most.
 uint64_t fewestBytes(const Hierarchy& h, uint32_t chunk) {
@@ -40,7 +52,7 @@ uint64_t fewestBytes(const Hierarchy& h, uint32_t chunk) {
 bool isPossibleWhole(const Hierarchy& h, uint32_t chunk) {
     const Payload& p = h.payload(chunk);
     return !h.isStochastic && p.parentCounts.lo == p.parentCounts.hi && p.ownCounts.lo == p.ownCounts.hi &&
-           p.errorCode == p.ownCounts.hi;
+           p.errorCode == p.ownCounts.hi && (p.maps & ~(shared::kMapDensity | shared::kMapNormals)) == 0;
 }
 
 std::string checkPatches(const Hierarchy& h, uint32_t index, const Chunk& chunk) {

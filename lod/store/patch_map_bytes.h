@@ -1,0 +1,26 @@
+// Maps of patches as bytes: each texel that a drawn cell touches minus what its left and lower neighbours predict
+// (their sum minus the one between them, or the nearer of both: Weinberger, Seroussi & Sapiro 2000, 3.1), in planes of
+// bytes under zstd. Mips are made when they are read: they would be a third more bytes.
+//
+// Everything is exact, but normals: they stand on the steps of kMapNormalStep.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "lod/primitives/patch.h"
+
+namespace stipple::lod {
+
+struct PatchMapBytes {
+    std::vector<uint8_t> bytes;  ///< none where no patch has a map
+    uint64_t colours = 0, normals = 0, materials = 0;
+};
+PatchMapBytes encodeMaps(std::span<const Patch> patches);
+
+/// Of any bytes, to patches whose sides and cells are known and possible. False: they are no such maps, or of more than
+/// so many blocks of 16 x 8 cells. No array is made that the bytes do not justify.
+bool decodeMaps(std::span<const uint8_t> bytes, std::span<Patch> patches, uint64_t mostBlocks);
+
+}  // namespace stipple::lod
