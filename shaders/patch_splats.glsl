@@ -12,8 +12,17 @@ struct PatchSplat {
     DrawMesh mesh;
 };
 
-PatchDisc discOf(PatchBlocks of, uint block, DrawMesh m, uint s) {
-    return patchDisc(patchPlace(of, block, m, s), octDecode(of.blocks[block].normals[s]), float(s % kPatchStride), float(s / kPatchStride), m);
+// Bits of the cells around a sample that are drawn (PatchDisc::cells).
+uint cellsAround(PatchBlocks of, uint block, uint s) {
+    uint bits = 0u;
+    for (uint quarter = 0u; quarter < 4u; ++quarter) {
+        const uint cell = patchCellAround(s, quarter);
+        if (cell != kNoPatchCell && patchHasCell(of, block, cell)) bits |= 1u << quarter;
+    }
+    return bits;
+}
+PatchDisc discOf(PatchBlocks of, uint block, DrawMesh m, uint s, uint cells) {
+    return patchDisc(patchPlace(of, block, m, s), octDecode(of.blocks[block].normals[s]), s, cells, m);
 }
 
 ivec4 wholePicture() { return ivec4(0, 0, int(frame.width) - 1, int(frame.height) - 1); }
@@ -58,8 +67,10 @@ bool splatOf(uint id, out PatchSplat s) {
     s.id = id;
     s.mesh = meshes[node.weights + of.blocks[source.first].number];
     if (frame.patchAs == kPatchDirect) {
-        if (lane >= kPatchSamples || patchHeight(of, source.first, lane) == 0) return false;
-        s.disc = discOf(of, source.first, s.mesh, lane);
+        if (lane >= kPatchSamples) return false;
+        const uint cells = cellsAround(of, source.first, lane);
+        if (cells == 0u) return false;
+        s.disc = discOf(of, source.first, s.mesh, lane, cells);
         s.box = boxOfDisc(s.disc);
         return true;
     }

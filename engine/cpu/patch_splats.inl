@@ -89,11 +89,18 @@ void fillSplat(const FrameConstants& f, const DiscSplat& s, const PixelBox& box,
     return {place(a & 255u), place(a >> 8 & 255u), place(a >> 16),
             place(b & 255u), place(b >> 8 & 255u), place(b >> 16)};
 }
+/// Bits of the cells around a sample that are drawn (PatchDisc::cells).
+[[gnu::always_inline]] inline uint32_t cellsAround(const PatchBlock& block, uint32_t sample) {
+    uint32_t bits = 0;
+    for (uint32_t quarter = 0; quarter < 4; ++quarter) {
+        const uint32_t cell = patchCellAround(sample, quarter);
+        if (cell != kNoPatchCell) bits |= (block.cells[cell / 32] >> cell % 32 & 1u) << quarter;
+    }
+    return bits;
+}
 [[gnu::always_inline]] inline DiscSplat discSplat(const PatchBlock& block, const vec3& place, uint32_t sample,
-                                                  const DrawMesh& mesh) {
-    return {patchDisc(place, octDecode(block.normals[sample]), float(int(sample % kPatchStride)),
-                      float(int(sample / kPatchStride)), mesh),
-            mesh};
+                                                  uint32_t cells, const DrawMesh& mesh) {
+    return {patchDisc(place, octDecode(block.normals[sample]), sample, cells, mesh), mesh};
 }
 
 /// Splats of a block: cells, or, direct, samples. `use(splat, box, lane)`.
@@ -106,8 +113,9 @@ template <typename Use>
     placeSamples(block, *source.mesh, heights, p);
     if (f.patchAs == kPatchDirect) {
         for (uint32_t s = 0; s < kPatchSamples; ++s) {
-            if (heights[s] == 0) continue;
-            const DiscSplat splat = discSplat(block, vec3(p.x[s], p.y[s], p.z[s]), s, *source.mesh);
+            const uint32_t cells = cellsAround(block, s);
+            if (cells == 0) continue;
+            const DiscSplat splat = discSplat(block, vec3(p.x[s], p.y[s], p.z[s]), s, cells, *source.mesh);
             const PixelBox box = boxOfDisc(f, splat.disc);
             if (!box.isEmpty()) use(splat, box, s);
         }

@@ -54,39 +54,37 @@ void mixDirect(const FrameConstants& f, const ResolveInput& in, const WinningPix
         const int i0 = static_cast<int>(block.place & 0xffffu), j0 = static_cast<int>(block.place >> 16);
         const vec3 place = meshPosition(i0 + static_cast<int>(s % kPatchStride),
                                         j0 + static_cast<int>(s / kPatchStride), patchHeight(block, s), m);
-        const PatchDisc disc = discSplat(block, place, s, m).disc;
+        const PatchDisc disc = discSplat(block, place, s, cellsAround(block, s), m).disc;
         const PixelRay ray = rays.at(p.pixel[k]);
         const vec3 hit = patchDiscHit(disc, m, ray, f.nearPlane);
         const PatchMix mix = patchMix(hit);
         vec3 normal = vec3(0, 0, 0), colour = vec3(0, 0, 0);
-        float sum = 0, metallic = 0, roughness = 0;
+        float metallic = 0, roughness = 0;
         for (uint32_t c = 0; c < 4; ++c) {
             const uint32_t at = mix.first + c % 2 + kPatchStride * (c / 2);
-            const float w = patchHeight(block, at) != 0 ? mix.weight[c] : 0.0f;
+            const float w = mix.weight[c];  // all four are there: the cell is drawn
             const vec3 n = octDecode(block.normals[at]);
             const auto linear = [&](uint32_t shift) {
                 return linearFromByte(float(int(block.colours[at] >> shift & 255u)) * (1.0f / 255.0f));
             };
             const vec2 of = patchFinish(source.materialOf(at));
-            sum += w;
             metallic += w * of.x;
             roughness += w * of.y;
             normal = vec3(normal.x + w * n.x, normal.y + w * n.y, normal.z + w * n.z);
             colour = vec3(colour.x + w * linear(0), colour.y + w * linear(8), colour.z + w * linear(16));
         }
-        const float inverse = sum > 0.0f ? 1.0f / sum : 0.0f;
-        out.nx[k] = sum > 0.0f ? normal.x : 0.0f;
-        out.ny[k] = sum > 0.0f ? normal.y : 0.0f;
-        out.nz[k] = sum > 0.0f ? normal.z : 1.0f;
+        out.nx[k] = normal.x;
+        out.ny[k] = normal.y;
+        out.nz[k] = normal.z;
         out.faceX[k] = disc.normal.x;
         out.faceY[k] = disc.normal.y;
         out.faceZ[k] = disc.normal.z;
-        out.red[k] = colour.x * inverse;
-        out.green[k] = colour.y * inverse;
-        out.blue[k] = colour.z * inverse;
-        finish.u[k] = metallic * inverse;
-        finish.v[k] = sum > 0.0f ? roughness * inverse : 1.0f;
-        if (source.map == nullptr || !(sum > 0.0f)) continue;
+        out.red[k] = colour.x;
+        out.green[k] = colour.y;
+        out.blue[k] = colour.z;
+        finish.u[k] = metallic;
+        finish.v[k] = roughness;
+        if (source.map == nullptr) continue;
         const float cells = discFootprint(ray, rays.inverseFocal, disc.centre, disc.normal, m);
         showMap(source, hit.y, hit.z, cells, k, out, finish);
     }

@@ -32,17 +32,37 @@ class PatchBlockReader {
         const double cell = std::ldexp(1.0, static_cast<int>(h.rootLog2) - node.level);
         origin_ = glm::dvec3(node.cell[0], node.cell[1], node.cell[2]) * cell + plane.origin;
     }
+    /// From (i, j, height), counted from the block's first sample, to lattice steps.
+    glm::dvec3 lattice(const glm::dvec3& at) const {
+        const double step = plane_.step;
+        return origin_ + frame_ * glm::dvec3(step * (block_.place % 65536 + at.x), step * (block_.place / 65536 + at.y),
+                                             std::ldexp(at.z, plane_.quantumExponent));
+    }
+    glm::dvec3 normalOnPlane(uint32_t s) const { return decodeDirection(block_.normals[s]); }
     /// Sample 17 v + u of the block.
     PatchCorner sample(uint32_t s) const {
-        const double step = plane_.step;
-        const glm::dvec3 onPlane(step * (block_.place % 65536 + s % 17), step * (block_.place / 65536 + s / 17),
-                                 std::ldexp(code(s), plane_.quantumExponent));
         const uint32_t colour = block_.colours[s];
-        return {origin_ + frame_ * onPlane, frame_ * decodeDirection(block_.normals[s]),
+        return {lattice({s % 17, s / 17, code(s)}), frame_ * normalOnPlane(s),
                 glm::dvec3(decodeSrgb(colour % 256), decodeSrgb(colour / 256 % 256), decodeSrgb(colour / 65536 % 256))};
     }
     /// From the directions of the patch to those of the store.
     glm::dvec3 inStore(const glm::dvec3& direction) const { return frame_ * direction; }
+    /// Are the cells left and right of a sample, below and above, drawn by the block?
+    using CellsAround = std::array<std::array<bool, 2>, 2>;
+    /// Calls use(s, cells) with samples that have one.
+    template <typename Use>
+    void forEachDisc(const Use& use) const {
+        const auto isDrawn = [&](int i, int j) {
+            const int cell = 16 * j + i;
+            return i >= 0 && i < 16 && j >= 0 && j < 8 &&
+                   (block_.cells[static_cast<size_t>(cell / 32)] >> (cell % 32) & 1u) != 0;
+        };
+        for (int s = 0; s < 153; ++s) {
+            const int i = s % 17, j = s / 17;
+            const CellsAround cells{{{isDrawn(i - 1, j - 1), isDrawn(i - 1, j)}, {isDrawn(i, j - 1), isDrawn(i, j)}}};
+            if (cells[0][0] || cells[0][1] || cells[1][0] || cells[1][1]) use(static_cast<uint32_t>(s), cells);
+        }
+    }
     /// Calls use(a, b, c) with samples.
     template <typename Use>
     void forEachTriangle(const Use& use) const {

@@ -1,4 +1,5 @@
-// Elevation patches once more, in fp64: their lifted triangles.
+// Elevation patches once more, in fp64: their lifted triangles, or, direct, the discs of their samples.
+#include <algorithm>
 #include <cmath>
 
 #include "engine/reference/decode_map.h"
@@ -44,10 +45,16 @@ class PatchProjector {
                 made.finish = finishOf(materialOf(chunk, 153 * b + s));
                 return made;
             };
-            block.forEachTriangle([&](uint32_t a, uint32_t c, uint32_t d) {
-                projector_.triangle({corner(a), corner(c), corner(d)}, shared::kSurfaceTwoSided, kPatchMaterial,
-                                    {kNoTextures, chunks_, map.isThere() ? &show : nullptr}, whole);
-            });
+            const TextureReader looks{kNoTextures, chunks_, map.isThere() ? &show : nullptr};
+            if (draws_.frame.patchAs == shared::kPatchDirect)
+                block.forEachDisc([&](uint32_t s, const PatchBlockReader::CellsAround& cells) {
+                    disc(block, s, cells, corner, looks, whole);
+                });
+            else
+                block.forEachTriangle([&](uint32_t a, uint32_t c, uint32_t d) {
+                    projector_.triangle({corner(a), corner(c), corner(d)}, shared::kSurfaceTwoSided, kPatchMaterial,
+                                        looks, whole);
+                });
         }
     }
 
@@ -60,10 +67,8 @@ class PatchProjector {
     }
     glm::dmat3 camera() const { return {draws_.view.right, draws_.view.down, draws_.view.forward}; }
     Corner cornerOfSample(const PatchCorner& of) const {
-        const dvec3 world =
-            instance_.translation + instance_.rotation * (instance_.scale * (h_.origin + h_.unit * of.place));
         Corner c;
-        c.at = (bend_.moved(world) - draws_.view.eye) * camera();
+        c.at = toCamera(of.place);
         c.normal = normalOf(of.normal);
         c.colour = {of.colour, 1};
         return c;
@@ -74,6 +79,80 @@ class PatchProjector {
         const dvec3 t = glm::cross(n, std::abs(n.x) < 0.5 ? dvec3(1, 0, 0) : dvec3(0, 1, 0)), w = glm::cross(n, t);
         const auto bent = [&](const dvec3& d) { return d + bend_.along * (bend_.slope * glm::dot(bend_.up, d)); };
         return (bend_.isStill() ? n : glm::cross(bent(t), bent(w))) * camera();
+    }
+
+    dvec3 toCamera(const dvec3& onLattice) const {
+        const dvec3 world =
+            instance_.translation + instance_.rotation * (instance_.scale * (h_.origin + h_.unit * onLattice));
+        return (bend_.moved(world) - draws_.view.eye) * camera();
+    }
+    /// Direct interpolation (Ochotta, Hiller & Saupe 2006, 3.3 and 3.5): rays that meet the disc of a sample see what
+    /// the patch has below that place, if that is one of the sample's cells and it is drawn.
+    template <typename CornerOf>
+    void disc(const PatchBlockReader& block, uint32_t s, const PatchBlockReader::CellsAround& cells,
+              const CornerOf& corner, const TextureReader& looks, const Whole& whole) {
+        const Corner at = corner(s);
+        const dvec3 n = at.normal, middle = toCamera(block.lattice({0, 0, 0}));
+        const dvec3 right = toCamera(block.lattice({1, 0, 0})) - middle,
+                    up = toCamera(block.lattice({0, 1, 0})) - middle;
+        const dvec3 base = glm::normalize(glm::cross(right, up));
+        const glm::dmat3 toPlane = glm::inverse(glm::dmat3(right, up, base));
+        // On the disc, above the next sample to the right, or up.
+        const auto onDisc = [&](const dvec3& step) {
+            return step - base * (glm::dot(n, step) / std::max(glm::dot(n, base), 1e-9));
+        };
+        const double cosine = std::max(0.0, block.normalOnPlane(s).z);
+        const double radius = glm::length(right) * std::sqrt(0.5) / (0.1 + 0.9 * cosine);
+        forPixelsAround(at.at, radius, [&](int x, int y) {
+            const ViewRay ray = viewRay(draws_.view, glm::dvec2(x + 0.5, y + 0.5));
+            const double facing = glm::dot(n, ray.direction);
+            if (facing == 0) return;
+            const dvec3 met = ray.at(glm::dot(n, at.at - ray.origin) / facing);
+            if (met.z < draws_.view.nearPlane || glm::length(met - at.at) > radius) return;
+            const dvec3 off = toPlane * (met - at.at);
+            if (std::abs(off.x) > 1 || std::abs(off.y) > 1 || !cells.at(off.x < 0 ? 0 : 1).at(off.y < 0 ? 0 : 1))
+                return;
+            const uint32_t left = off.x < 0 ? s - 1 : s, first = off.y < 0 ? left - 17 : left;
+            const double u = off.x < 0 ? 1 + off.x : off.x, v = off.y < 0 ? 1 + off.y : off.y;
+            Corner mixed{};
+            mixed.colour = glm::dvec4(0);
+            mixed.finish = glm::dvec2(0);
+            for (uint32_t k = 0; k < 4; ++k) {
+                const double w = (k % 2 != 0 ? u : 1 - u) * (k / 2 != 0 ? v : 1 - v);
+                const Corner of = corner(first + k % 2 + 17 * (k / 2));
+                mixed.normal += w * of.normal;
+                mixed.colour += w * of.colour;
+                mixed.finish += w * of.finish;
+            }
+            mixed.at = at.at;
+            mixed.uv = at.uv;
+            Corners seen{mixed, mixed, mixed};  // but for their places
+            seen[1].at += onDisc(right);
+            seen[2].at += onDisc(up);
+            seen[1].uv.x += 1;
+            seen[2].uv.y += 1;
+            projector_.place(x, y, met.z, seen, kPatchMaterial, looks, whole);
+        });
+    }
+    /// All pixels that may show a ball; calls use(x, y).
+    template <typename Use>
+    void forPixelsAround(const dvec3& centre, double radius, const Use& use) const {
+        const lod::View& view = draws_.view;
+        const int right = static_cast<int>(view.width) - 1, bottom = static_cast<int>(view.height) - 1;
+        glm::dvec2 lo(0), hi(right, bottom);
+        if (centre.z + radius < view.nearPlane) return;
+        if (view.isOrthographic || centre.z - radius > view.nearPlane) {
+            lo = glm::dvec2(HUGE_VAL);
+            hi = glm::dvec2(-HUGE_VAL);
+            for (int k = 0; k < 8; ++k) {
+                const dvec3 corner = centre + radius * (2.0 * dvec3(k % 2, k / 2 % 2, k / 4) - 1.0);
+                lo = glm::min(lo, imageOf(view, corner));
+                hi = glm::max(hi, imageOf(view, corner));
+            }
+        }
+        if (!(hi.x >= 0 && hi.y >= 0)) return;
+        for (int y = pixelIn(lo.y, bottom + 1); y <= pixelIn(hi.y, bottom); ++y)
+            for (int x = pixelIn(lo.x, right + 1); x <= pixelIn(hi.x, right); ++x) use(x, y);
     }
 
     static inline const render::MeshTextures kNoTextures{};

@@ -10,6 +10,10 @@ namespace stipple::reference {
 using glm::dvec2;
 using glm::dvec3;
 
+namespace {
+bool isHidden(const Sample& nearest, double depth) { return nearest.valid && nearest.depth <= depth; }
+}  // namespace
+
 template <typename Use>
 void TriangleProjector::cover(std::array<dvec2, 3> p, const Use& use) const {
     const auto cross = [](const dvec2& a, const dvec2& b) { return a.x * b.y - a.y * b.x; };
@@ -66,13 +70,29 @@ void TriangleProjector::pixel(int x, int y, const Corners& c, const dvec3& face,
     const dvec2 exact = weightsOn(ray, c, face);
     const double wb = std::clamp(exact.x, 0.0, 1.0), wc = std::clamp(exact.y, 0.0, 1.0 - wb), wa = 1 - wb - wc;
     const double depth = (wa * c[0].at + wb * c[1].at + wc * c[2].at).z;
-    Sample& s = level_.ref(x, y);
-    if (s.valid && s.depth <= depth) return;
+    if (isHidden(level_.ref(x, y), depth)) return;
     Sample hit;
     dvec3 n;
     const double footprint = footprintOn(ray, view_.isOrthographic, 1 / view_.focalPixels, c, face);
-    if (!surfaceOn(ray.direction, {wb, wc}, footprint, c, face, surface, m, textures, hit, n)) return;
-    s = hit;
+    if (surfaceOn(ray.direction, {wb, wc}, footprint, c, face, surface, m, textures, hit, n))
+        store(x, y, depth, ray, hit, n, of);
+}
+
+void TriangleProjector::place(int x, int y, double depth, const Corners& c, const shared::SurfaceMaterial& m,
+                              const TextureReader& textures, const Whole& of) {
+    if (isHidden(level_.ref(x, y), depth)) return;
+    const ViewRay ray = viewRay(view_, dvec2(x + 0.5, y + 0.5));
+    const dvec3 face = glm::cross(c[1].at - c[0].at, c[2].at - c[0].at);
+    const double footprint = footprintOn(ray, view_.isOrthographic, 1 / view_.focalPixels, c, face);
+    Sample hit;
+    dvec3 n;
+    if (surfaceOn(ray.direction, weightsOn(ray, c, face), footprint, c, face, shared::kSurfaceTwoSided, m, textures,
+                  hit, n))
+        store(x, y, depth, ray, hit, n, of);
+}
+
+void TriangleProjector::store(int x, int y, double depth, const ViewRay& ray, Sample s, const dvec3& n,
+                              const Whole& of) {
     s.valid = true;
     s.depth = depth;
     s.radius = 0.25;
@@ -85,6 +105,7 @@ void TriangleProjector::pixel(int x, int y, const Corners& c, const dvec3& face,
                          : std::clamp((std::log2(std::max(1e-6, of.errorPixels)) + 3) / 6, 0.0, 1.0);
     const auto hat = [&](double middle) { return std::clamp(1.5 - std::abs(4 * t - middle), 0.0, 1.0); };
     if (f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError) s.colour = {hat(3), hat(2), hat(1)};
+    level_.ref(x, y) = s;
 }
 
 }  // namespace stipple::reference

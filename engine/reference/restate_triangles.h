@@ -22,11 +22,16 @@ class TriangleProjector {
     void triangle(const Corners& c, uint32_t surface, const shared::SurfaceMaterial& material,
                   const TextureReader& textures, const Whole& of);
 
+    /// One pixel, where nothing nearer is: what is seen there of the triangle's plane.
+    void place(int x, int y, double depth, const Corners& c, const shared::SurfaceMaterial& material,
+               const TextureReader& textures, const Whole& of);
+
   private:
     template <typename Use>
     void cover(std::array<glm::dvec2, 3> p, const Use& use) const;
     void pixel(int x, int y, const Corners& c, const glm::dvec3& face, uint32_t surface,
                const shared::SurfaceMaterial& m, const TextureReader& textures, const Whole& of);
+    void store(int x, int y, double depth, const ViewRay& ray, Sample hit, const glm::dvec3& n, const Whole& of);
 
     const render::DrawList& draws_;
     Level& level_;

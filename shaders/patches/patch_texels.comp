@@ -48,7 +48,7 @@ PatchSurface onTriangle(PatchBlocks of, DrawNode node, uint block, DrawMesh m, u
 
 // Direct interpolation: below the place where a ray meets a disc, from the four samples around it.
 PatchSurface belowDisc(PatchBlocks of, DrawNode node, uint block, DrawMesh m, uint lane, PixelRay ray) {
-    const PatchDisc disc = discOf(of, block, m, lane);
+    const PatchDisc disc = discOf(of, block, m, lane, cellsAround(of, block, lane));
     const vec3 hit = patchDiscHit(disc, m, ray, frame.nearPlane);
     const PatchMix mixed = patchMix(hit);
     PatchSurface s;
@@ -56,19 +56,14 @@ PatchSurface belowDisc(PatchBlocks of, DrawNode node, uint block, DrawMesh m, ui
     s.colour = vec3(0.0);
     s.finish = vec2(0.0);
     s.face = disc.normal;
-    float sum = 0.0;
     for (uint c = 0u; c < 4u; ++c) {
         const uint at = mixed.first + c % 2u + kPatchStride * (c / 2u);
-        const float w = patchHeight(of, block, at) != 0 ? mixed.weight[c] : 0.0;
-        sum += w;
+        const float w = mixed.weight[c];  // all four are there: the cell is drawn
         s.normal += w * octDecode(of.blocks[block].normals[at]);
         s.colour += w * colourOf(of, block, at);
         s.finish += w * patchFinishOf(node, block, at);
     }
-    s.colour = sum > 0.0 ? s.colour / sum : vec3(0.0);
-    s.finish = sum > 0.0 ? s.finish / sum : vec2(0.0, 1.0);
-    if (!(sum > 0.0)) s.normal = vec3(0.0, 0.0, 1.0);
-    if (of.blocks[block].map != 0u && sum > 0.0)
+    if (of.blocks[block].map != 0u)
         showMap(of, node, block, hit.y, hit.z, discFootprint(ray, 1.0 / frame.focal, disc.centre, disc.normal, m), s);
     return s;
 }

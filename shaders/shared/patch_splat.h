@@ -40,8 +40,19 @@ struct PatchDisc {
     float radius;
     float i;  // the sample within its block
     float j;
+    uint
+        cells;  // which of the four around it the block draws: lower left 1, lower right 2, upper left 4, upper right 8
 };
-SHARED_FN PatchDisc patchDisc(vec3 centre, vec3 normal, float i, float j, DrawMesh m) {
+// The cell of the block in that quarter around a sample (0: lower left, 3: upper right); kNoPatchCell: beside the
+// block.
+const uint kNoPatchCell = 128u;
+SHARED_FN uint patchCellAround(uint s, uint quarter) {
+    const uint i = s % kPatchStride + (quarter & 1u);
+    const uint j = s / kPatchStride + (quarter >> 1);
+    const bool isIn = i > 0u && j > 0u && i <= kPatchCellsAcross && j <= kPatchCellsUp;
+    return isIn ? kPatchCellsAcross * (j - 1u) + i - 1u : kNoPatchCell;
+}
+SHARED_FN PatchDisc patchDisc(vec3 centre, vec3 normal, uint s, uint cells, DrawMesh m) {
     PatchDisc d;
     const float step = sqrt(dot(m.axisX, m.axisX));
     d.centre = centre;
@@ -49,23 +60,27 @@ SHARED_FN PatchDisc patchDisc(vec3 centre, vec3 normal, float i, float j, DrawMe
                     m.normalX.y * normal.x + m.normalY.y * normal.y + m.normalZ.y * normal.z,
                     m.normalX.z * normal.x + m.normalY.z * normal.y + m.normalZ.z * normal.z);
     d.radius = 0.70710678f * step / (0.1f + 0.9f * max(normal.z, 0.0f));
-    d.i = i;
-    d.j = j;
+    d.i = float(int(s % kPatchStride));
+    d.j = float(int(s / kPatchStride));
+    d.cells = cells;
     return d;
 }
-// Where a ray meets a disc: (depth, i, j), the latter below it in the block; kNoPatch: beside it, or beyond the block,
-// where the neighbour draws it.
+// Where a ray meets a disc: (depth, i, j), the latter below it in the block; kNoPatch: beside it, or not above one of
+// the four cells around its sample that the block draws. Sides are told by the offset alone, which the neighbouring
+// block has with the same digits.
 SHARED_FN vec3 patchDiscHit(PatchDisc d, DrawMesh m, PixelRay ray, float nearPlane) {
     const vec3 c = fromRay(ray, d.centre);
     const vec3 along = rayDirection(ray);
     const float facing = dot(d.normal, along);
     const float depth = dot(d.normal, c) / (abs(facing) > 0.0f ? facing : 1.0f);
     const vec3 off = vec3(depth * along.x - c.x, depth * along.y - c.y, depth - c.z);
-    const float i = d.i + dot(off, m.axisX) / dot(m.axisX, m.axisX);
-    const float j = d.j + dot(off, m.axisY) / dot(m.axisY, m.axisY);
-    const bool isIn = abs(facing) > 0.0f && dot(off, off) <= d.radius * d.radius && depth >= nearPlane && i >= 0.0f &&
-                      j >= 0.0f && i <= float(kPatchCellsAcross) && j <= float(kPatchCellsUp);
-    return vec3(isIn ? depth : kNoPatch, i, j);
+    const float i = dot(off, m.axisX) / dot(m.axisX, m.axisX);
+    const float j = dot(off, m.axisY) / dot(m.axisY, m.axisY);
+    const uint lower = i < 0.0f ? 1u : 2u;
+    const uint cell = j < 0.0f ? lower : 4u * lower;
+    const bool isIn = abs(facing) > 0.0f && dot(off, off) <= d.radius * d.radius && depth >= nearPlane &&
+                      abs(i) <= 1.0f && abs(j) <= 1.0f && (d.cells & cell) != 0u;
+    return vec3(isIn ? depth : kNoPatch, d.i + i, d.j + j);
 }
 
 // Weights of the four samples around (i, j), of which `first` is the lower left: it, its right, upper and upper right
