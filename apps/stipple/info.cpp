@@ -213,7 +213,7 @@ void printStore(const nlohmann::json& j) {
     const auto place = [&](const char* key) { return placeText(j[key], j["lattice_unit"], j["origin"]); };
     const bool isMesh = j["primitive"] == "triangles";
     const nlohmann::json& patches = j["patches"];
-    const std::string where = fmt::format("{} {}, {}", j["nodes"].get<uint64_t>(), isMesh ? "groups" : "nodes",
+    const std::string where = fmt::format("{}, {}", counted(j["nodes"].get<uint64_t>(), isMesh ? "group" : "node"),
                                           humanBytes(j["bytes"].get<uint64_t>()));
     if (patches.is_null()) {
         fmt::print("{}: {} {} from {}, {} with all levels in {}\n", j["path"].get<std::string>(),

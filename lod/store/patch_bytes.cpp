@@ -11,6 +11,7 @@
 #include "lod/primitives/patch_map.h"
 #include "lod/store/patch_map_bytes.h"
 #include "lod/store/smooth_streams.h"
+#include "shaders/shared/patch.h"
 
 namespace stipple::lod {
 
@@ -350,8 +351,11 @@ Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const s
     for (const uint32_t size : sizes.packed) end += size;
     constexpr uint64_t kSamplesABlock = 17 * 9, kHeight = 2, kNormal = 4, kColour = 3;
     const uint64_t most = mostBlocks * kSamplesABlock;
-    if (sizes.patches > mostBlocks || sizes.plain[2] > kHeight * most || sizes.plain[3] > kNormal * most ||
-        sizes.plain[4] > kColour * most)
+    const uint64_t mostCells =
+        kMostCells + kCellsADrawnOfAll * shared::kPatchCellsAcross * shared::kPatchCellsUp * mostBlocks;
+    if (sizes.patches > mostBlocks || sizes.plain[1] > mostCells / 8 + sizes.patches ||
+        sizes.plain[2] > kHeight * most || sizes.plain[3] > kNormal * most || sizes.plain[4] > kColour * most ||
+        more.plain > most || sizes.normalFrom > NormalFrom::slope)
         return damaged();
     if (end != bytes.size() || sizes.plain[0] != uint64_t{sizes.patches} * sizeof(Head)) return damaged();
     Plain plain;

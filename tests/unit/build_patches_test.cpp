@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -206,6 +207,32 @@ TEST(BuildPatches, OfColouredScansAreNotLitAgain) {
     };
     EXPECT_EQ(picture(""), picture("--shade unlit"));
     EXPECT_NE(picture(""), picture("--shade lit")) << "the control";
+}
+
+// Singles of sines and cosines leave the vertices of its poles 1e-16 apart: they are no small object far from others.
+TEST(BuildPatches, ABallWhosePolesAreAHairApartIsBuilt) {
+    const TempFolder folder;
+    constexpr int kAround = 64, kRows = 32;
+    constexpr float kPi = 3.14159274f;
+    std::string obj;
+    for (int k = 0; k < kAround * (kRows + 1); ++k) {
+        const float down = kPi * static_cast<float>(k / kAround) / kRows,
+                    around = 2 * kPi * static_cast<float>(k % kAround) / kAround;
+        obj += fmt::format("v {} {} {}\n", std::sin(down) * std::cos(around), std::sin(down) * std::sin(around),
+                           std::cos(down));
+    }
+    for (int k = 0; k < kAround * kRows; ++k) {
+        const int a = k + 1, b = k / kAround * kAround + (k + 1) % kAround + 1;
+        obj += fmt::format("f {} {} {} {}\n", a, a + kAround, b + kAround, b);
+    }
+    test::spit(folder / "ball.obj", obj);
+    const Outcome built = runProgram(folder, "build ball.obj --patches -o t.stipple");
+    ASSERT_EQ(built.code, 0) << built.err;
+    const Outcome right = runProgram(folder, "info t.stipple --verify --against ball.obj");
+    EXPECT_EQ(right.code, 0) << right.err;
+    // What is small and far from the rest is still told from it.
+    test::spit(folder / "far.obj", obj + "v 1e12 0 0\nv 1e12 1 0\nv 1e12 0 1\nf -1 -2 -3\n");
+    EXPECT_EQ(runProgram(folder, "build far.obj --patches -o f.stipple").code, 3);
 }
 
 TEST(BuildPatches, WhatIsOddIsRefused) {

@@ -392,6 +392,38 @@ TEST_P(PatchBytes, AreRefusedWhereTheyAreDamaged) {
     EXPECT_GT(refused, 0u);
 }
 
+// What encodes well and draws nothing sane: each is refused, where the same without it comes back.
+TEST(PatchHeads, OfHostileNumbersAreRefused) {
+    const lod::PatchSet set = patchesOf(ball(600, 3));
+    ASSERT_FALSE(set.patches.empty());
+    const auto comesBack = [&](const std::function<void(lod::Patch&)>& spoil) {
+        std::vector<lod::Patch> patches = set.patches;
+        spoil(patches.back());
+        return lod::decodePatches(lod::encodePatches(patches).bytes, "here").has_value();
+    };
+    EXPECT_TRUE(comesBack([](lod::Patch&) {}));
+    const float nan = std::nanf(""), inf = HUGE_VALF;
+    for (const float odd : {nan, inf, -inf}) {
+        EXPECT_FALSE(comesBack([&](lod::Patch& p) { p.origin.y = odd; })) << odd;
+        EXPECT_FALSE(comesBack([&](lod::Patch& p) { p.turn.x = odd; })) << odd;
+        EXPECT_FALSE(comesBack([&](lod::Patch& p) { p.step = odd; })) << odd;
+        EXPECT_FALSE(comesBack([&](lod::Patch& p) { p.errorToSource = odd; })) << odd;
+        EXPECT_FALSE(comesBack([&](lod::Patch& p) { p.errorFromSource = odd; })) << odd;
+    }
+    EXPECT_FALSE(comesBack([](lod::Patch& p) { p.origin.x = 1e300; }));
+    EXPECT_FALSE(comesBack([](lod::Patch& p) { p.turn = {0, 0, 0, 0}; }));
+    for (const float step : {0.0f, -1.0f, 1e-30f, 1e30f})
+        EXPECT_FALSE(comesBack([&](lod::Patch& p) { p.step = step; })) << step;
+    for (const int32_t exponent : {-2000, 2000, INT32_MIN, INT32_MAX})
+        EXPECT_FALSE(comesBack([&](lod::Patch& p) { p.quantumExponent = exponent; })) << exponent;
+    EXPECT_FALSE(comesBack([](lod::Patch& p) { p.errorToSource = -1; }));
+    EXPECT_FALSE(comesBack([](lod::Patch& p) {  // a drawn cell without its samples
+        for (uint16_t& code : p.heights) code = 0;
+    }));
+    // Of more than the blocks that the store names: nothing is unpacked.
+    EXPECT_FALSE(lod::decodePatches(lod::encodePatches(set.patches).bytes, "here", 0));
+}
+
 // Also those that are finer than usual, as mirrors have them, and any.
 TEST(PatchNormals, ComeBackHoweverFine) {
     for (const int bits : {11, 12, 13, 16}) {

@@ -198,6 +198,16 @@ TEST(Plain, OneIsNoPlural) {
     EXPECT_TRUE(says(runProgram(folder, "build a.las -o b.stipple").out, "1 point in 1 node, "));
     EXPECT_TRUE(says(runProgram(folder, "info a.las").out, "LAS 1.2, point format 2, 1 point\n"))
         << runProgram(folder, "info a.las").out;
+    std::string quad;  // in eight by eight cells
+    for (int k = 0; k < 81; ++k) quad += fmt::format("v {} {} 0\n", k % 9, k / 9);
+    for (int k = 1; k < 72; ++k)
+        if (k % 9 != 0) quad += fmt::format("f {} {} {} {}\n", k, k + 1, k + 10, k + 9);
+    test::spit(folder / "quad.obj", quad);
+    const Outcome patch = runProgram(folder, "build quad.obj --patches -o c.stipple");
+    EXPECT_TRUE(says(patch.out, "in 1 node, ")) << patch.out;
+    EXPECT_TRUE(says(patch.err, " samples in 1 patch, ")) << patch.err;
+    const std::string info = runProgram(folder, "info c.stipple").out;
+    EXPECT_TRUE(says(info, " samples in 1 patch, from quad.obj, in 1 node, ")) << info;
 }
 
 TEST(Plain, OtherKindsOfFileAreNamedByConvert) {

@@ -47,7 +47,7 @@ void makeWide(const MeshSource::Bounds& bounds, Lattice& lattice) {
 
 }  // namespace
 
-Lattice latticeOf(const MeshSource::Bounds& bounds) {
+Lattice latticeOf(const MeshSource::Bounds& bounds, bool tellsAllApart) {
     Lattice lattice;
     if (bounds.lo.x > bounds.hi.x) return lattice;
     const glm::dvec3 size = bounds.hi - bounds.lo;
@@ -57,7 +57,7 @@ Lattice latticeOf(const MeshSource::Bounds& bounds) {
     const double dense = denseExtent(bounds.sample);
     if (dense > 0 && extent > kFar * dense) lattice.unit = unitOf(dense, kLatticeBits);
     // So are small objects far from each other.
-    const double spacing = denseSpacing(different(bounds.sample), bounds.share());
+    const double spacing = tellsAllApart ? denseSpacing(different(bounds.sample), bounds.share()) : 0;
     if (spacing > 0 && spacing < kFewestSteps * lattice.unit) lattice.unit = unitOf(spacing / kSteps, 0);
     lattice.unit = std::max(lattice.unit, unitOf(extent, static_cast<int>(kWideMeshBits) - 1));
     if (extent >= lattice.unit * std::exp2(kShortMeshBits)) {

@@ -29,7 +29,9 @@ struct Lattice {
     glm::dvec3 focusLow{0}, focusHigh{0};  ///< what most vertices span, world units; of a wide lattice
     bool isWide() const { return bits > kShortMeshBits; }
 };
-Lattice latticeOf(const MeshSource::Bounds& bounds);
+/// `tellsAllApart`: as fine as vertices lie dense somewhere (small objects far from each other); else as most of them
+/// span.
+Lattice latticeOf(const MeshSource::Bounds& bounds, bool tellsAllApart = true);
 /// Where a vertex lies in the octree of the build, from 0 to `largestKey`: on short lattices the coordinates; on wide
 /// ones in logarithms far out, so that no outlier takes the keys' bits from the others.
 glm::u64vec3 keyPlace(const Steps& at, const Lattice& lattice);

@@ -71,6 +71,8 @@ class PatchBuild : public CellContent {
         STIPPLE_ASSIGN(const MeshSource::Bounds bounds, source_.survey(tell));
         if (isKnown) return {};
         facts_.lattice = latticeOf(bounds);
+        // Vertices a hair apart, as at the poles of a ball, are not told apart by samples either.
+        if (facts_.lattice.isWide()) facts_.lattice = latticeOf(bounds, false);
         if (facts_.lattice.isWide())
             return fail(ErrorKind::input, "some of its places lie too far from all others for patches", source(),
                         "leave them out, or build it without --patches");
