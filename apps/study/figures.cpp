@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "apps/study/measure.h"
+#include "apps/study/patch_figures.h"
 #include "apps/study/pictures.h"
 #include "engine/image/coverage.h"
 #include "engine/image/image_io.h"
@@ -264,19 +265,37 @@ std::vector<Recipe> recipes() {
 
 }  // namespace
 
+namespace {
+
+/// One figure: its panels side by side, or its name in `missing`.
+Result<void> writeFigure(const FigureTools& tools, const Figure& figure, const Panels& panels,
+                         std::vector<std::string>& missing, std::vector<Figure>& out) {
+    if (!panels && panels.error().kind == ErrorKind::input) {
+        missing.push_back(figure.file + ": " + panels.error().line());
+        return {};
+    }
+    if (!panels) return tl::unexpected(panels.error());
+    Image sheet = sideBySide(*panels);
+    STIPPLE_TRY(image::writePicture(tools.folder + "/../" + figure.file, sheet, false));
+    out.push_back(figure);
+    return {};
+}
+
+}  // namespace
+
 Result<std::vector<Figure>> drawFigures(const FigureTools& tools, std::vector<std::string>& missing) {
     std::vector<Figure> out;
     for (const Recipe& recipe : recipes()) {
         STIPPLE_TRY(tools.say(recipe.figure.file));
-        const auto panels = recipe.draw(tools);
-        if (!panels && panels.error().kind == ErrorKind::input) {
-            missing.push_back(recipe.figure.file + ": " + panels.error().line());
-            continue;
-        }
-        if (!panels) return tl::unexpected(panels.error());
-        Image sheet = sideBySide(*panels);
-        STIPPLE_TRY(image::writePicture(tools.folder + "/../" + recipe.figure.file, sheet, false));
-        out.push_back(recipe.figure);
+        STIPPLE_TRY(writeFigure(tools, recipe.figure, recipe.draw(tools), missing, out));
+    }
+    for (PatchFigure& patches : patchFigures()) {
+        STIPPLE_TRY(tools.say(patches.figure.file));
+        FigureSheet sheet;
+        const Result<void> drawn = patches.draw(tools, sheet);
+        patches.figure.panels = std::move(sheet.captions);
+        STIPPLE_TRY(writeFigure(tools, patches.figure,
+                                drawn ? Panels(std::move(sheet.panels)) : tl::unexpected(drawn.error()), missing, out));
     }
     return out;
 }

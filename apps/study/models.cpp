@@ -131,8 +131,6 @@ Result<std::shared_ptr<const lod::Store>> surfelStore(const Surface& surface, ui
     return built(source, path, executor);
 }
 
-namespace {
-
 lod::TriangleMesh meshOf(const Surface& surface) {
     lod::TriangleMesh mesh;
     for (const scene::Mesh& m : surface.scene.meshes)
@@ -149,8 +147,6 @@ lod::TriangleMesh meshOf(const Surface& surface) {
         }
     return mesh;
 }
-
-}  // namespace
 
 Result<std::shared_ptr<const lod::Store>> triangleStore(const Surface& surface, const std::string& path,
                                                         Executor& executor) {

@@ -9,6 +9,7 @@
 #include "engine/render/frame.h"
 #include "engine/scene/scene.h"
 #include "engine/scene/surfels.h"
+#include "lod/primitives/mesh.h"
 #include "lod/store/store.h"
 
 namespace stipple::study {
@@ -26,6 +27,8 @@ Result<Surface> readSurface(const std::string& path, const std::string& folder);
 /// About `count` samples with their normals, seen from their fronts. Built once: a store that is at `path` is taken.
 Result<std::shared_ptr<const lod::Store>> surfelStore(const Surface& surface, uint64_t count, const std::string& path,
                                                       Executor& executor);
+/// All of its triangles, in its own units.
+lod::TriangleMesh meshOf(const Surface& surface);
 /// The triangles of the surface themselves.
 Result<std::shared_ptr<const lod::Store>> triangleStore(const Surface& surface, const std::string& path,
                                                         Executor& executor);

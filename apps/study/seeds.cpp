@@ -134,7 +134,7 @@ Result<SeedsReport> studySeeds(const SeedsSettings& settings, const Host& host) 
     fs::create_directories(folder, error);
     if (error) return fail(ErrorKind::output, "cannot be made: " + error.message(), folder, "choose another --output");
     STIPPLE_ASSIGN(report.devices, devicesOf(host));
-    const size_t rows = modelRows().size(), steps = rows + 11 + patchRows().size();
+    const size_t rows = modelRows().size(), steps = rows + 15 + patchRows().size();
     for (size_t i = 0; i < rows; ++i) {
         STIPPLE_TRY(host.say(modelRows()[i].model, i, steps));
         if (settings.isQuick && modelRows()[i].points > kQuickPoints) continue;
