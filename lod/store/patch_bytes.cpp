@@ -351,8 +351,8 @@ Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const s
     for (const uint32_t size : sizes.packed) end += size;
     constexpr uint64_t kSamplesABlock = 17 * 9, kHeight = 2, kNormal = 4, kColour = 3;
     const uint64_t most = mostBlocks * kSamplesABlock;
-    const uint64_t mostCells =
-        kMostCells + kCellsADrawnOfAll * shared::kPatchCellsAcross * shared::kPatchCellsUp * mostBlocks;
+    const uint64_t mostCells = kMostCells + kCellsADrawnOfAll * shared::kPatchCellsAcross * shared::kPatchCellsUp *
+                                                std::min(mostBlocks, kMostSamples);
     if (sizes.patches > mostBlocks || sizes.plain[1] > mostCells / 8 + sizes.patches ||
         sizes.plain[2] > kHeight * most || sizes.plain[3] > kNormal * most || sizes.plain[4] > kColour * most ||
         more.plain > most || sizes.normalFrom > NormalFrom::slope)
