@@ -6,11 +6,12 @@
 
 #include "engine/base/result.h"
 #include "engine/render/frame.h"
+#include "engine/render/reconstructions/table.h"
 
 namespace stipple::app {
 
 struct ModeOptions {
-    std::string mode = "pullpush", normalise = "pixel";
+    std::string mode = render::reconstructions().front().name, normalise = "pixel";
     std::string patchAs = "auto", interpolate = "correct";
     std::string refract = "object";
     double lowPass = 0.5;  ///< variance of the pixel's Gaussian, px^2

@@ -3,6 +3,10 @@
 //   records --project--> visibility (64-bit min per pixel) --resolve+pull--> level 0, level 1 --pull--> level 2 ... top
 //   image <--output+light+surface+push-- level 0 <-- level 1 <--push-- ... top
 //
+// Mode surface: a frame of that kind of nothing but discs that would show as facets, if there are any, up to the last
+// push; then all discs by tiles into visibility, resolved beside level 0; in the last run of rows both meet
+// (passes/smooth.cpp).
+//
 // Work is cut into tiles of kTile columns and a band of rows; within a tile, rows are unpacked to floats that stay in
 // cache. Clearing is free: resolve resets each visibility entry it has read.
 #include "engine/cpu/cpu_backend.h"
@@ -66,6 +70,8 @@ class CpuBackend final : public render::DrawsAtOnce {
         frame_.wantAll = request.wantDepthAndNormal;
         frame_.hasPyramid =
             std::find(request.passes.begin(), request.passes.end(), render::Pass::push) != request.passes.end();
+        frame_.hasSmooth =
+            std::find(request.passes.begin(), request.passes.end(), render::Pass::smooth) != request.passes.end();
         times_.clear();
         const std::span<const render::Pass> passes(request.passes);
         frame_.wantsNormals = wantsNormals(frame_, passes);

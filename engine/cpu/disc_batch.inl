@@ -183,7 +183,8 @@ inline bool hasSome(const float* flags, size_t count) {
 }
 
 /// Of discs about the eye, one by one.
-void prepareNear(const FrameConstants& f, size_t count, const SplatTile& tile, DiscBatch& b, BatchBoxes& boxes) {
+void prepareNear(const FrameConstants& f, size_t count, const SplatTile& tile, float between, DiscBatch& b,
+                 BatchBoxes& boxes) {
     const float far = 1.0e6f, inverseFocal = 1.0f / f.focal;
     const Lens lens = lensHere(f.focal);
     b.hasNear = hasSome(b.isNear, count);
@@ -209,7 +210,8 @@ void prepareNear(const FrameConstants& f, size_t count, const SplatTile& tile, D
                                     pixelRay(lens, (float(c.x) + 0.5f - f.centre.x) * inverseFocal,
                                              (float(c.y) + 0.5f - f.centre.y) * inverseFocal),
                                     f.nearPlane);
-        b.missed[i] = isHere && !(hit.rho2 <= 1.0f) ? tileEntry(atX, atY) : -1;
+        const bool isSmall = d.radius * f.focal < between * lensDepth(lens, d.centre.z);
+        b.missed[i] = isHere && isSmall && !(hit.rho2 <= 1.0f) ? tileEntry(atX, atY) : -1;
     }
 }
 
@@ -240,8 +242,9 @@ void takeSplats(const PlacedSplat* splats, const uint32_t* places, size_t count,
     }
 }
 
+/// `between`: radius, px, from which a disc whose centre's pixel misses it is not shown there.
 void prepareDiscs(const FrameConstants& frame, const PlacedSplat* splats, const uint32_t* places, size_t count,
-                  const SplatTile& tile, DiscBatch& __restrict b) {
+                  const SplatTile& tile, float between, DiscBatch& __restrict b) {
     const FrameConstants f = frame;
     takeSplats(splats, places, count, b);
     const float left = float(int(tile.x0)), top = float(int(tile.y0)), lastX = float(int(tile.width)) - 1.0f,
@@ -275,16 +278,17 @@ void prepareDiscs(const FrameConstants& frame, const PlacedSplat* splats, const 
         const TilePixels columns = tilePixels(k.x - k.halfX, k.x + k.halfX, f.centre.x, tile.x0, tile.width);
         const TilePixels rows = tilePixels(k.y - k.halfY, k.y + k.halfY, f.centre.y, tile.y0, tile.height);
         boxes.set(i, columns, rows);
-        // Where the ray of the centre's pixel misses the disc, that pixel shows it all the same.
+        // Where the ray of the centre's pixel misses a small disc, that pixel shows it all the same.
         const float atX = std::floor(midX + f.centre.x) - left, atY = std::floor(midY + f.centre.y) - top;
         const float dx = atX + (left + 0.5f - f.centre.x - k.x),
                     across = atY + (top + 0.5f - f.centre.y - k.y) - k.skew * dx;
         const float within = min(min(atX, lastX - atX), min(atY, lastY - atY));
-        const float misses = dx * dx * k.alongX + across * across * k.alongY <= 1.0f ? -1.0f : within;
+        const bool isMet = dx * dx * k.alongX + across * across * k.alongY <= 1.0f;
+        const float misses = isMet | (d.radius * toImage >= between) ? -1.0f : within;
         const int entry = tileEntry(int(min(max(atX, 0.0f), lastX)), int(min(max(atY, 0.0f), lastY)));
         b.missed[i] = misses >= 0.0f ? entry : -1;
     }
-    prepareNear(f, count, tile, b, boxes);
+    prepareNear(f, count, tile, between, b, boxes);
     reachBlocks(boxes, count, b.reached);
 }
 

@@ -161,7 +161,7 @@ KeptBatch prepareBatch(const FrameConstants& f, const TileDiscs& discs, const Sp
     DiscBatch& batch = discs.batches[to];
     FrontBatch& fronts = discs.fronts[to];
     for (size_t i = 0; i < n; ++i) __builtin_prefetch(&discs.colours[discs.places[first + i]]);
-    prepareDiscs(f, discs.splats, discs.places + first, n, tile, batch);
+    prepareDiscs(f, discs.splats, discs.places + first, n, tile, 3.0e38f, batch);
     for (size_t i = 0; i < n; ++i) fronts.colour[i] = discs.colours[discs.places[first + i]];
     prepareFronts(f, n, batch, fronts);
     return {batch, fronts, uint32_t(first)};

@@ -49,6 +49,8 @@ struct Frame {
     bool wantAll = false;
     bool hasPyramid = false;    ///< the levels above the first are of this frame: push runs
     bool wantsNormals = false;  ///< some pass reads the surface's
+    bool hasSmooth = false;     ///< pixels of wide discs take colours and normals from a pyramid of their own ...
+    bool isSmoothing = false;   ///< ... which is being made: of nothing but those discs
 
     // Plane::visibility. It is clear between frames: resolve resets each entry that it has read.
     HugeBuffer<uint64_t> visibility;
@@ -88,7 +90,11 @@ struct Frame {
     std::unique_ptr<uint32_t, void (*)(void*)> secondPlaces{nullptr, std::free};
     std::vector<uint8_t> secondKinds, secondRuns;
 
-    Pyramid pyramid;  ///< Plane::texels and Plane::coarse
+    Pyramid pyramid;             ///< Plane::texels and Plane::coarse; Plane::smooth where there is one, and then ...
+    Level pixels;                ///< ... Plane::texels
+    HugeBuffer<uint8_t> smooth;  ///< 1: shows a point of a node that is kNodeSmooth; only where there are some
+    size_t smoothPixels = 0;
+    Level& texels() { return hasSmooth && !isSmoothing ? pixels : pyramid.level(0); }
     // Of the pixels of triangles, beside their texels.
     HugeBuffer<uint32_t> surface, emissive;
     size_t surfacePixels = 0, emissivePixels = 0;
@@ -111,7 +117,8 @@ struct Frame {
     }
     SurfacePlanes planesAt(size_t pixel) {
         return {hasTriangles ? surface.data() + pixel : nullptr, hasEmissive ? emissive.data() + pixel : nullptr,
-                isBlended() ? coverage.data() + pixel : nullptr};
+                isBlended() ? coverage.data() + pixel : nullptr,
+                hasSmooth && !isSmoothing ? smooth.data() + pixel : nullptr};
     }
     /// Rows of the image for all threads: what covers much of it must not be the work of one.
     template <typename Use>

@@ -13,6 +13,7 @@
 #include "shaders/shared/patch.h"
 #include "shaders/shared/patch_splat.h"
 #include "shaders/shared/record.h"
+#include "shaders/shared/smooth.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/texture.h"
 #include "shaders/shared/visibility.h"
@@ -174,6 +175,7 @@ struct SurfacePlanes {
     uint32_t* surface;
     uint32_t* emissive;       ///< packColour
     const uint8_t* coverage;  ///< of silhouettes, of 255; null: all or nothing
+    uint8_t* smooth;          ///< 1: shows a point of a node that is kNodeSmooth; null: none is
 };
 
 /// Look-up tables that the kernels share.
@@ -304,6 +306,10 @@ struct Kernels {
     void (*surfaceRow)(const shared::FrameConstants& f, const TexelRow& own, const TexelRow& row,
                        const SurfacePlanes& planes, const SurfaceWants& wants, uint32_t x0, uint32_t y, uint32_t n,
                        SurfaceRow& out);
+    /// Colours, normals and materials of wide discs (planes.smooth) where they are of one surface with what was
+    /// reconstructed of such: `mean`, and the texels that it is of (shaders/shared/smooth.h).
+    void (*smoothRow)(const shared::FrameConstants& f, const TexelRow& texels, const SurfaceRow& mean,
+                      const SurfacePlanes& planes, uint32_t n, SurfaceRow& out);
     /// What the surface sends to the eye.
     void (*lightRow)(const shared::FrameConstants& f, const LightInput& light, uint32_t x0, uint32_t y, uint32_t n,
                      SurfaceRow& row);

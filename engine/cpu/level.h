@@ -23,6 +23,10 @@ class Level {
         perRow_ = (w + kSegment - 1) / kSegment;
         filled_.assign(size_t{perRow_} * h, 0);
     }
+    /// The same, unless it is so already.
+    void fit(uint32_t w, uint32_t h, bool hasMaterials) {
+        if (w != width || h != height || hasMaterials != hasMaterials_) resize(w, h, hasMaterials);
+    }
     Planes planes() {
         const size_t n = size_t{width} * height;
         uint32_t* p = words_.data();

@@ -8,6 +8,7 @@ struct Gathered {
     // Of turned instances: normals in camera space.
     alignas(64) float turned[kTile], nx[kTile], ny[kTile], nz[kTile];
     alignas(64) float front[kTile];  // depth by which each was the nearest
+    alignas(64) uint8_t smooth[kTile];
 };
 
 /// Camera-space normals of the points that were gathered, any side. `anyTurned`: of instances that are not turned the
@@ -122,6 +123,7 @@ struct OtherPixels {
     g.flags[i] = kFlagNoNormal;
     g.material[i] = kPlainPoint;
     g.turned[i] = 0;
+    g.smooth[i] = 0;
 }
 
 /// True if it is of a node that is turned.
@@ -139,6 +141,7 @@ struct OtherPixels {
     if (f.hasMaterials != 0u) g.material[i] = block.materialOf(keyLane(key));
     g.front[i] = keyDepth(key);
     g.turned[i] = 0;
+    g.smooth[i] = (node.octantMask & kNodeSmooth) != 0u ? 1 : 0;
     const bool isTurned = (node.octantMask & kNodeTurned) != 0;
     if (isTurned) {
         const vec3 d = nodeUnitNormal(node, octDecode(r.normal));
@@ -171,6 +174,7 @@ struct OtherPixels {
     const vec3 d = octDecode(shown.normal);
     g.x[i] = g.y[i] = 0;
     g.z[i] = 1;
+    g.smooth[i] = 0;
     g.front[i] = keyDepth(key);
     g.turned[i] = 1;
     g.nx[i] = d.x;
@@ -248,6 +252,7 @@ bool resolveRow(const FrameConstants& frame, const Tables& tables, const Resolve
     if (surface != nullptr)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) surface[i] = 0;
+    for (size_t i = 0; planes.smooth != nullptr && i < n; ++i) planes.smooth[i] = g.smooth[i];
     if (!any) {
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) row.depth[kPad + i] = 0;

@@ -82,7 +82,7 @@ void splatTile(const FrameConstants& frame, const PlacedSplat* splats, const uin
     for (size_t first = 0; first < count; first += DiscBatch::kSize) {
         const size_t n = count - first < DiscBatch::kSize ? count - first : DiscBatch::kSize;
         prefetchDiscs(splats, places + first + n, count - first - n);
-        prepareDiscs(f, splats, places + first, n, tile, batch);
+        prepareDiscs(f, splats, places + first, n, tile, kBetweenPixels, batch);
         if (batch.hasNear)
             splatBatch<true>(batch, n, grid, f, front);
         else

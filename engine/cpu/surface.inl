@@ -80,6 +80,33 @@ void surfaceRow(const FrameConstants& frame, const TexelRow& __restrict own, con
             out.ownDepth[i] = row.depth[kPad + i] == own.depth[kPad + i] ? out.depth[i] : own.depth[kPad + i];
 }
 
+void smoothRow(const FrameConstants& frame, const TexelRow& __restrict texels, const SurfaceRow& __restrict mean,
+               const SurfacePlanes& planes, uint32_t n, SurfaceRow& __restrict out) {
+    const Lens lens = lensHere(frame.focal);
+    const uint8_t* __restrict const isWide = planes.smooth;
+    alignas(64) uint32_t taken[kTile];
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        Texel t;
+        t.depth = texels.depth[kPad + i];
+        t.thickness = texels.thickness[kPad + i];
+        const float isOne = isOfSurface(t, mean.depth[i], out.depth[i], lens);
+        taken[i] = isOne * float(int(isWide[i])) > 0.5f ? 1u : 0u;
+    }
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        const bool is = taken[i] != 0u;
+        out.red[i] = is ? mean.red[i] : out.red[i];
+        out.green[i] = is ? mean.green[i] : out.green[i];
+        out.blue[i] = is ? mean.blue[i] : out.blue[i];
+        out.nx[i] = is ? mean.nx[i] : out.nx[i];
+        out.ny[i] = is ? mean.ny[i] : out.ny[i];
+        out.nz[i] = is ? mean.nz[i] : out.nz[i];
+        out.leaf[i] = is ? mean.leaf[i] : out.leaf[i];
+        out.material[i] = is ? mean.material[i] : out.material[i];
+    }
+}
+
 /// The debug views that are seen in the place of colours.
 void debugColours(const FrameConstants& f, uint32_t n, const SurfaceRow& __restrict row, float* __restrict red,
                   float* __restrict green, float* __restrict blue) {

@@ -43,7 +43,7 @@ Result<void> FrameBuffers::ensure(Buffer& buffer, uint64_t bytes, VkBufferUsageF
 
 Result<void> FrameBuffers::prepare(const render::RenderRequest& request, const Residents& residents) {
     const render::DrawList& draws = *request.draws;
-    STIPPLE_TRY(preparePlanes(draws, request.wantDepthAndNormal));
+    STIPPLE_TRY(preparePlanes(request));
     render::placePatches(draws, residents.patchesOf, patches_, firstPatch_);
     fillDraws(draws, residents);
     STIPPLE_TRY(prepareLists(request));
@@ -60,7 +60,8 @@ Result<void> FrameBuffers::prepareStaging(uint64_t bytes) {
 }
 
 /// Levels of the pyramid, and buffers that every frame needs.
-Result<void> FrameBuffers::preparePlanes(const render::DrawList& draws, bool wantAll) {
+Result<void> FrameBuffers::preparePlanes(const render::RenderRequest& request) {
+    const render::DrawList& draws = *request.draws;
     const uint32_t w = draws.frame.width, h = draws.frame.height;
     levels_.clear();
     uint64_t words = 0;
@@ -69,7 +70,10 @@ Result<void> FrameBuffers::preparePlanes(const render::DrawList& draws, bool wan
         words += (uint64_t{kTexelWords} + (draws.frame.hasMaterials != 0 ? 1 : 0)) * lw * lh;
         if (lw == 1 && lh == 1) break;
     }
-    const uint64_t pixels = uint64_t{w} * h, extra = wantAll ? pixels * kExtraFloats : 0;
+    texelsOfPixels_ = static_cast<uint32_t>(words);
+    if (has(request, render::Pass::smooth))
+        words += (uint64_t{kTexelWords} + (draws.frame.hasMaterials != 0 ? 1 : 0)) * w * h;
+    const uint64_t pixels = uint64_t{w} * h, extra = request.wantDepthAndNormal ? pixels * kExtraFloats : 0;
     uint64_t nodes = 0;
     for (const render::DrawBatch& batch : draws.batches) nodes += batch.nodes.size();
     const uint64_t blocks = draws.frame.firstBlock.of[kKindDiscs];

@@ -41,6 +41,8 @@ class FrameBuffers {
     const Buffer& readback() const { return readback_; }
     const Buffer& staging() const { return staging_; }
     const std::vector<Level>& levels() const { return levels_; }
+    /// Offset in words, in frames with Pass::smooth: that of what pixels show, while the levels are of smooth discs.
+    uint32_t texelsOfPixels() const { return texelsOfPixels_; }
     uint32_t clusters() const { return static_cast<uint32_t>(meshFrame_.clusters.size()); }
     uint64_t residentTiles() const;
     /// Of some bindings.
@@ -48,7 +50,7 @@ class FrameBuffers {
 
   private:
     Result<void> ensure(Buffer& buffer, uint64_t bytes, VkBufferUsageFlags usage, bool hostVisible, const char* name);
-    Result<void> preparePlanes(const render::DrawList& draws, bool wantAll);
+    Result<void> preparePlanes(const render::RenderRequest& request);
     Result<void> prepareLists(const render::RenderRequest& request);
     Result<void> prepareMeshes(const render::DrawList& draws, const Residents& residents);
     Result<void> prepareEnvironment(const std::shared_ptr<const render::Environment>& environment);
@@ -64,6 +66,7 @@ class FrameBuffers {
     std::shared_ptr<const render::Environment> environment_;  ///< that is in its buffer
     Buffer readback_, staging_, nothing_;
     std::vector<Level> levels_;
+    uint32_t texelsOfPixels_ = 0;
     MeshFrame meshFrame_;
     std::vector<shared::DrawMesh> meshes_, patches_;  ///< of both; of patches
     std::vector<uint32_t> firstPatch_;                ///< of each of their nodes

@@ -15,6 +15,12 @@ bool Recording::has(render::Pass pass) const {
     return std::find(request_.passes.begin(), request_.passes.end(), pass) != request_.passes.end();
 }
 
+void Recording::smooth(const std::function<void()>& passes) {
+    isSmoothing_ = true;
+    passes();
+    isSmoothing_ = false;
+}
+
 Result<void> Recording::recordPasses() {
     const auto& passes = request_.passes;
     for (size_t p = 0; p < passes.size(); ++p) {
@@ -43,7 +49,8 @@ shared::Step Recording::stepAt(size_t level) const {
     const std::vector<Level>& levels = buffers_.levels();
     const Level &fine = levels[level], &coarse = levels[std::min(level + 1, levels.size() - 1)];
     shared::Step step{};
-    step.fine = fine.offset;
+    const bool hasSmooth = has(render::Pass::smooth);
+    step.fine = hasSmooth && !isSmoothing_ ? buffers_.texelsOfPixels() : fine.offset;
     step.fineWidth = fine.width;
     step.fineHeight = fine.height;
     step.coarse = coarse.offset;
@@ -51,12 +58,15 @@ shared::Step Recording::stepAt(size_t level) const {
     step.coarseHeight = coarse.height;
     step.level = static_cast<uint32_t>(level);
     step.wantExtra = request_.wantDepthAndNormal ? 1 : 0;
-    step.hasPyramid = has(render::Pass::push) && levels.size() > 1 ? 1 : 0;
-    step.hasTubes = hasCurves() ? 1 : 0;
+    step.hasPyramid = (isSmoothing_ || has(render::Pass::push)) && levels.size() > 1 ? 1 : 0;
+    step.hasTubes = hasCurves() && !isSmoothing_ ? 1 : 0;
     step.hasTriangles = hasTriangles() ? 1 : 0;
-    step.hasWideDiscs = has(render::Pass::discs) ? 1 : 0;
-    step.exactPoints = render::reconstructionOf(request_.mode).fillsSplats ? 1 : 0;
+    step.hasWideDiscs = has(render::Pass::discs) || (isSmoothing_ && draws().hasWideDiscs) ? 1 : 0;
+    step.exactPoints = render::reconstructionOf(request_.mode).fillsSplats && !isSmoothing_ ? 1 : 0;
     step.hasFiltered = has(render::Pass::ewa) ? 1 : 0;
+    step.onlySmooth = isSmoothing_ ? 1 : 0;
+    step.hasSmooth = hasSmooth && levels.size() > 1 ? 1 : 0;
+    step.smoothTexels = levels[0].offset;
     return step;
 }
 

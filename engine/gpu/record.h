@@ -2,6 +2,7 @@
 // reads and writes are those of its shader (shader_table.h).
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,9 @@ class Recording {
     const render::DrawList& draws() const { return *request_.draws; }
     const FrameBuffers& buffers() const { return buffers_; }
     bool has(render::Pass pass) const;
+    /// Draws with `passes` what mode surface takes colours and normals from: nothing but smooth nodes, into the levels
+    /// of the pyramid. What is drawn after them has the texels of its pixels elsewhere.
+    void smooth(const std::function<void()>& passes);
     bool hasCurves() const { return !draws().curves().isEmpty(); }
     bool hasTriangles() const { return draws().hasSurfaces(); }
     /// Of the pass at hand, or of it and its neighbour where they have a common one.
@@ -55,6 +59,7 @@ class Recording {
     const FrameBuffers& buffers_;
     const render::RenderRequest& request_;
     std::string shader_, label_;
+    bool isSmoothing_ = false;
     Result<void> status_;  ///< the first error
 };
 

@@ -232,6 +232,7 @@ class ReferenceBackend final : public render::DrawsAtOnce {
         if (mode.blendsSplats && !variation_.showDiscs) blendDiscs(draws, placedDiscs(draws, chunks_), level0);
         const Level own = level0;
         if (mode.hasPyramid) reconstruct(level0, draws.view);
+        if (mode.smoothsSplats) smooth(draws, level0);
         finishTubes(draws.view, level0);
         applyOnSurface(draws, level0);
         shade(draws, own, level0, request.wantDepthAndNormal, image);
@@ -264,6 +265,41 @@ class ReferenceBackend final : public render::DrawsAtOnce {
         }
         showWide(draws, wide, level);
         return level;
+    }
+
+    /// Colours, normals and materials of wide discs from what pull and push make of them alone, where that lies within
+    /// twice its thickness of the disc.
+    void smooth(const render::DrawList& draws, Level& level) {
+        const lod::View& v = draws.view;
+        Level mean{level.width, level.height, {}, {}};
+        mean.samples.resize(level.samples.size());
+        std::vector<PlacedDisc> wide;
+        bool isAny = false;
+        for (const PlacedDisc& d : placedDiscs(draws, chunks_)) {
+            if (!d.isSmooth) continue;
+            isAny = true;
+            if (d.mayBeWide && isWide(v, d))
+                wide.push_back(d);
+            else if (d.centre.z > v.nearPlane)
+                project(draws, d, true, mean);
+        }
+        if (!isAny) return;
+        showWide(draws, wide, mean);
+        reconstruct(mean, v);
+        for (size_t i = 0; i < level.samples.size(); ++i) {
+            Sample& s = level.samples[i];
+            const Sample& m = mean.samples[i];
+            const dvec2 at(double(i % v.width) + 0.5, double(i / v.width) + 0.5);
+            if (!s.valid || !s.isSmooth || !m.valid || std::abs(depthAt(m, at, v) - s.depth) > 2 * m.thickness)
+                continue;
+            s.perp = dvec2(rotationToZ(viewRay(v, at).sight()) * normalAt(m, at, v));
+            s.colour = m.colour;
+            s.materialShare = m.materialShare;
+            s.metallic = m.metallic;
+            s.roughness = m.roughness;
+            if (m.letsLightThrough(pixelsAt(v, m.depth)))
+                s.thickness = kLeafThickness * s.radius / pixelsAt(v, s.depth);
+        }
     }
 
     static dvec3 towardsEye(const PlacedDisc& d, const lod::View& v) {

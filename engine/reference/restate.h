@@ -25,6 +25,7 @@ struct Sample {
     // Of a tube: `perp` is t_v t_perp, with t its unit tangent, `axis` (tx^2 - ty^2, 2 tx ty).
     bool isRound = false;
     glm::dvec2 axis{0};
+    bool isSmooth = false;  ///< of a disc exactly, which is wider than a few pixels
     // Of a triangle's pixel:
     bool isTriangle = false, isUnlit = false;
     uint32_t optic = 0;  ///< which of a layer's optics

@@ -22,6 +22,31 @@ bool mayBeWide(const lod::Hierarchy& h, const lod::Node& node, const std::vector
     return view.isOrthographic && scale * most * view.focalPixels > 8192;
 }
 
+/// Are usual discs of a node, by the mean of their radius codes, wider than eight pixels at the nearest corner of its
+/// cell?
+bool areFacets(const render::DrawList& draws, const lod::CutDraw& cut, const render::Bend* bend,
+               const std::vector<shared::PointRecord>& records) {
+    const lod::View& v = draws.view;
+    const lod::Instance& instance = draws.instances[cut.instance];
+    const lod::Hierarchy& h = *draws.hierarchies[instance.hierarchy];
+    const lod::Node& node = h.nodes[cut.node];
+    const auto real = lod::withoutEmpty(records);
+    double sum = 0, nearest = HUGE_VAL;
+    for (const shared::PointRecord& r : real) sum += shared::recordRadiusCode(r);
+    const double usual = std::exp2((std::floor(sum / static_cast<double>(real.size()) + 0.5) - 255) / 16);
+    for (int k = 0; k < 8; ++k) {
+        const dvec3 corner = dvec3(k & 1, k >> 1 & 1, k >> 2) * h.cellSize(node);
+        dvec3 world = instance.translation +
+                      instance.rotation * (instance.scale *
+                                           (h.origin + h.unit * (h.recordOrigin(node, h.payload(cut.chunk)) + corner)));
+        if (bend) world = bend->moved(world);
+        nearest = std::min(nearest, glm::dot(world - v.eye, v.forward));
+    }
+    const double radius =
+        usual * instance.scale * h.unit * h.cellSize(node) * cut.radiusScale * draws.frame.supportScale;
+    return radius * v.focalPixels > 4 * (v.isOrthographic ? 1 : nearest);
+}
+
 /// Of the plane of a disc where wind has moved it: three points of it, `reach` apart, moved one by one.
 dvec3 bentNormal(const render::Bend& bend, const dvec3& p, const dvec3& n, double reach) {
     if (bend.isStill() || !(glm::length(n) > 0)) return n;
@@ -94,6 +119,8 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
         const double steps =
             code > 0 ? std::exp2((code - 1) / 8.0) : double{lod::recordSpacing(lod::withoutEmpty(records))};
         const double spacing = h.isStochastic ? 0 : instance.scale * h.unit * step * steps;
+        const bool isSmooth =
+            spacing > 0 && areFacets(draws, cut, draws.bends.empty() ? nullptr : &draws.bends[d], records);
         for (uint32_t i = 0; i < cut.count; ++i) {
             Disc disc = decodeDisc(h, node, records[i]);
             disc.radius *= cut.radiusScale;
@@ -115,8 +142,8 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
             // Squares of 255ths.
             const double weight = chunk.weights.empty() ? 0 : std::pow(chunk.weights[i] / 255.0, 2);
             out.push_back({c, n, instance.scale * disc.radius * f.supportScale,
-                           isDebug ? debugColour(f, node, cut) : disc.colour, disc.flags, spacing, weight, few,
-                           materialOf(draws, instance.hierarchy, chunk.materials, i)});
+                           isDebug ? debugColour(f, node, cut) : disc.colour, disc.flags, spacing, weight, isSmooth,
+                           few, materialOf(draws, instance.hierarchy, chunk.materials, i)});
         }
     }
     return out;
@@ -185,6 +212,7 @@ void showSplats(const render::DrawList& draws, const std::vector<PlacedDisc>& di
         const dvec3 n = glm::dot(d.normal, ray.direction) > 0 ? -d.normal : d.normal;
         s = shownPixel(v, at, depth, n, d.colour, isLeaf(d));
         setMaterial(s, d.material);
+        s.isSmooth = d.isSmooth;
     };
     for (PlacedDisc d : discs) {
         const bool isAhead = d.centre.z > v.nearPlane;
@@ -208,7 +236,8 @@ void showSplats(const render::DrawList& draws, const std::vector<PlacedDisc>& di
         }
         for (int y = y0; y <= y1; ++y)
             for (int x = x0; x <= x1; ++x) offer(x, y, d, false);
-        if (!isAhead) continue;
+        // Larger ones reach some pixel's centre unless they are seen edge-on.
+        if (!isAhead || d.radius * pixelsAt(v, d.centre.z) >= std::sqrt(0.5)) continue;
         const dvec2 p = imageOf(v, d.centre);
         if (p.x >= 0 && p.y >= 0 && p.x < level.width && p.y < level.height)
             offer(static_cast<int>(p.x), static_cast<int>(p.y), d, true);

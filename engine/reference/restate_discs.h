@@ -19,6 +19,7 @@ struct PlacedDisc {
     uint32_t flags;
     double spacing;  ///< of its node, world units; 0: not known
     double weight;   ///< of the surfel; 0: it has none
+    bool isSmooth;   ///< usual discs of its node are wider than a few pixels, as seen from its nearest corner
     bool mayBeWide;  ///< discs of its node reach few of each other's spacings, or are too large for texels
     std::optional<lod::PointMaterial> material = {};
 };
@@ -28,7 +29,8 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
 bool isWide(const lod::View& view, const PlacedDisc& disc);
 /// Every pixel whose ray meets these discs: the mean of those about the nearest.
 void showWide(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level);
-/// Every pixel whose ray meets a disc, and that of each disc's centre: the nearest.
+/// Every pixel whose ray meets a disc, and that of each small disc's centre: the nearest (Sample::isSmooth: as the
+/// disc's).
 void showSplats(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level);
 
 /// What comparison variants leave out of blending.

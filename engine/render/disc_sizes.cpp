@@ -21,15 +21,21 @@ bool isSpacingTold(const lod::Hierarchy& h, uint32_t chunk) {
 Result<void> DiscSizes::upload(streaming::ChunkKey key, const lod::Chunk& chunk) {
     if (life_.expired()) return fail(ErrorKind::device, "what draws the scene is gone");
     uint32_t code = 0;
+    uint64_t sum = 0;
     const auto records = lod::withoutEmpty(chunk.records);
-    for (const shared::PointRecord& r : records) code = std::max(code, shared::recordRadiusCode(r) + 1);
+    for (const shared::PointRecord& r : records) {
+        code = std::max(code, shared::recordRadiusCode(r) + 1);
+        sum += shared::recordRadiusCode(r);
+    }
+    const uint64_t usual = records.empty() ? 0 : (2 * sum + records.size()) / (2 * records.size());
     const auto points = static_cast<float>(records.size());
     const bool isDense = code > 0 && shared::radiusFraction(code - 1) * std::sqrt(points) > kMostSpacings;
     if (sizes_.size() <= key.source) sizes_.resize(key.source + 1);
     auto& of = sizes_[key.source];
     if (of.size() <= key.chunk) of.resize(key.chunk + 1);
     const bool isTold = key.source < hierarchies_.size() && isSpacingTold(*hierarchies_[key.source], key.chunk);
-    of[key.chunk] = {static_cast<uint8_t>(std::min(code, 255u)), isDense, isTold ? 0 : lod::recordSpacing(records)};
+    of[key.chunk] = {static_cast<uint8_t>(std::min(code, 255u)), static_cast<uint8_t>(usual), isDense,
+                     isTold ? 0 : lod::recordSpacing(records)};
     return backend_.upload(keyOfBackend(key), chunk);
 }
 
@@ -52,13 +58,16 @@ float DiscSizes::spacingOf(streaming::ChunkKey key) const { return sizeOf(key).s
 
 DiscSizes::Share DiscSizes::shareOf(streaming::ChunkKey key) const {
     const Size size = sizeOf(key);
-    return {size.code == 0 ? 0 : size.code == 255 ? 1 : shared::radiusFraction(size.code - 1u), size.isDense};
+    return {size.code == 0     ? 0
+            : size.code == 255 ? 1
+                               : shared::radiusFraction(size.code - 1u),
+            size.isDense, size.code == 0 ? 0 : shared::radiusFraction(size.usual)};
 }
 
 void markDiscSizes(const DiscSizes& sizes, DrawList& draws) {
     const shared::FrameConstants& f = draws.frame;
     const double perFocal = double{shared::wideRadius(f.width, f.height)} / double{f.focal};
-    draws.hasWideDiscs = false;
+    draws.hasWideDiscs = draws.hasSmoothDiscs = false;
     DrawBatch& points = draws.of(lod::Kind::points);
     for (size_t i = 0; i < points.nodes.size(); ++i) {
         shared::DrawNode& d = points.nodes[i];
@@ -66,6 +75,12 @@ void markDiscSizes(const DiscSizes& sizes, DrawList& draws) {
         const auto least = [](float step) { return 65536 * std::min(0.0, double{step}); };
         const double nearest = double{d.base.z} + least(d.axisX.z) + least(d.axisY.z) + least(d.axisZ.z);
         const DiscSizes::Share share = sizes.shareOf(points.keys[i]);
+        // Leaves and the like, which are no surface, have no spacing.
+        const double usual = double{d.edge} * double{f.supportScale * share.usual} * double{f.focal};
+        if (d.spacing > 0 && usual > kSmoothPixels * (f.orthographic != 0 ? 1 : nearest)) {
+            d.octantMask |= shared::kNodeSmooth;
+            draws.hasSmoothDiscs = true;
+        }
         const double radius = 1.01 * double{d.edge} * double{f.supportScale * share.ofEdge};  // (fp32)
         if (share.isDense) {
             // Those around the eye (perspective), and what no texel can hold (orthographic).

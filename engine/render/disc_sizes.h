@@ -1,6 +1,7 @@
 // What is known of the discs of each node once its chunk has arrived: the largest radius, by which frames without wide
-// discs (shaders/shared/wide_disc.h) have no pass for them, and of older stores the spacing, by which the kernels of
-// coarse levels are closed (shaders/shared/ewa.h); others tell it.
+// discs (shaders/shared/wide_disc.h) have no pass for them, the usual one, by which those whose discs are no wider than
+// a few pixels have none that makes them smooth (shaders/shared/smooth.h), and of older stores the spacing, by which
+// the kernels of coarse levels are closed (shaders/shared/ewa.h); others tell it.
 #pragma once
 
 #include <vector>
@@ -13,6 +14,10 @@ namespace stipple::render {
 /// that a disc reaches. Where they are more (many copies of the points, or given radii that are very large), ellipses a
 /// texel are as good, and what is drawn exactly would cost pixels times thousands of discs.
 constexpr float kMostSpacings = 4.0f;
+/// Nodes are smooth (kNodeSmooth) whose usual disc has at least this radius at the nearest corner of the node's cell,
+/// px. Below it facets are hardly larger than what is seen of a disc anyway: no difference was found at the usual
+/// errors of a pixel or two, and the pyramid costs as much again as the discs.
+constexpr double kSmoothPixels = 4;
 /// Half of the radius that a texel can hold, px. Beyond it they are drawn exactly, too, wherever they would be lost:
 /// the picture lies within few spacings then.
 constexpr double kMostTexelPixels = 8192;
@@ -30,6 +35,7 @@ class DiscSizes final : public streaming::ChunkSink {
     struct Share {
         float ofEdge = 0;      ///< over the edge of the node's cell; 0 of what has no points
         bool isDense = false;  ///< beyond kMostSpacings
+        float usual = 0;       ///< that of a usual one, likewise
     };
     /// `key`: as the backend has it.
     Share shareOf(streaming::ChunkKey key) const;
@@ -38,7 +44,8 @@ class DiscSizes final : public streaming::ChunkSink {
 
   private:
     struct Size {
-        uint8_t code = 0;  ///< of the largest radius, + 1 (at most 255); 0: no points
+        uint8_t code = 0;   ///< of the largest radius, + 1 (at most 255); 0: no points
+        uint8_t usual = 0;  ///< mean of the codes, rounded to the nearest
         bool isDense = false;
         float spacing = 0;
     };
@@ -52,7 +59,8 @@ class DiscSizes final : public streaming::ChunkSink {
     std::vector<const lod::Hierarchy*> hierarchies_;  ///< by source
 };
 
-/// Sets kNodeWide, DrawList::hasWideDiscs, and the spacings of nodes that stores do not tell.
+/// Sets kNodeWide, kNodeSmooth, DrawList::hasWideDiscs and hasSmoothDiscs, and the spacings of nodes that stores do not
+/// tell.
 void markDiscSizes(const DiscSizes& sizes, DrawList& draws);
 
 }  // namespace stipple::render

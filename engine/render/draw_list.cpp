@@ -89,7 +89,7 @@ void clear(DrawList& out) {
     out.glass.reset();
     out.bends.clear();
     out.swaying = 0;
-    out.hasWideDiscs = false;
+    out.hasWideDiscs = out.hasSmoothDiscs = false;
 }
 
 /// A node of points or curves in camera space.
@@ -261,6 +261,7 @@ FrameContent contentOf(const DrawList& draws) {
         if (!draws.of(kind).isEmpty()) content.add(kind);
     });
     content.hasWideDiscs = draws.hasWideDiscs;
+    content.hasSmoothDiscs = draws.hasSmoothDiscs;
     return content;
 }
 

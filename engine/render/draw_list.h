@@ -78,6 +78,7 @@ struct DrawList {
     /// Are there pixels with words of their own for what lights them: of triangles and patches?
     bool hasSurfaces() const { return !triangles().isEmpty() || !patches().isEmpty(); }
     bool hasWideDiscs = false;               ///< some nodes of points may hold some (kNodeWide)
+    bool hasSmoothDiscs = false;             ///< some nodes of points are kNodeSmooth
     std::vector<shared::DrawMesh> meshes;    ///< instances of mesh stores that are in view
     std::vector<MeshTextures> meshTextures;  ///< of each of `meshes`
     std::vector<MeshDraw> meshDraws;  ///< runs of clusters: what blocks and keys of the batch of triangles belong to

@@ -13,6 +13,7 @@ std::vector<Pass> passesOf(Mode mode, const FrameContent& content, EffectSet ofF
         passes.push_back(r.points);
         if (content.hasWideDiscs && r.hasPyramid) passes.push_back(Pass::discs);
     };
+    if (r.smoothsSplats && content.has(lod::Kind::points) && content.hasSmoothDiscs) passes.push_back(Pass::smooth);
     forEachKind([&](lod::Kind kind) {
         if (!content.has(kind)) return;
         const DrawnKind& drawn = drawnKind(kind);

@@ -20,6 +20,7 @@ enum class Plane : uint8_t {
     filtered,    ///< of pixels that discs were blended at: what they add up to
     texels,      ///< level 0: the winner of each pixel as a splat; of exact pixels, what the pixel shows
     coarse,      ///< the levels above
+    smooth,      ///< level 0 of discs so wide that they would show as facets, and the levels above
     surface,     ///< what is seen at each pixel, whoever filled it
     image
 };

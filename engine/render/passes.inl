@@ -2,6 +2,7 @@
 // what the pass before wrote nothing but its own pixel: then both may run in the same tile). Each backend has an entry
 // for each of them (engine/cpu/passes, engine/gpu/passes: `namePass`), which the linker asks for.
 STIPPLE_PASS(clear, (Planes{}), (Planes{visibility, discList}), false)
+STIPPLE_PASS(smooth, (Planes{visibility}), (Planes{visibility, discList, smooth}), false)
 STIPPLE_PASS(project, (Planes{}), (Planes{visibility, discList}), false)
 STIPPLE_PASS(discs, (Planes{discList}), (Planes{visibility, discList}), false)
 STIPPLE_PASS(splat, (Planes{}), (Planes{visibility, discList}), false)
@@ -13,7 +14,7 @@ STIPPLE_PASS(patches, (Planes{}), (Planes{visibility}), false)
 STIPPLE_PASS(resolve, (Planes{visibility, discList, filtered}), (Planes{texels}), false)
 STIPPLE_PASS(pull, (Planes{texels}), (Planes{coarse}), false)
 STIPPLE_PASS(push, (Planes{texels, coarse}), (Planes{coarse}), false)
-STIPPLE_PASS(surface, (Planes{texels, coarse}), (Planes{surface}), false)
+STIPPLE_PASS(surface, (Planes{texels, coarse, smooth}), (Planes{surface}), false)
 STIPPLE_PASS(light, (Planes{surface}), (Planes{surface}), true)
 STIPPLE_PASS(refract, (Planes{surface}), (Planes{surface}), true)
 STIPPLE_PASS(output, (Planes{surface, filtered}), (Planes{image}), true)

@@ -10,6 +10,7 @@ void main() {
     if (block >= frame.firstBlock.of[kKindCurves]) return;
     const DrawBlock source = blocks[block];
     const DrawNode node = nodes[source.node];
+    if (stepInfo.onlySmooth != 0u && (node.octantMask & kNodeSmooth) == 0u) return;
     const uint index = source.first + gl_LocalInvocationID.x;
     if (index >= node.count) return;
     const PointRecord r = Records(uvec2(node.addressLow, node.addressHigh)).records[index];

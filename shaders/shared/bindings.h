@@ -64,6 +64,9 @@ struct Step {
     uint hasWideDiscs;  // there is a list of them
     uint exactPoints;   // points are what their pixels show, at the depth of the visibility buffer
     uint hasFiltered;   // ... of what discs were blended to
+    uint onlySmooth;    // of the nodes of points, those that are kNodeSmooth
+    uint hasSmooth;     // pixels of wide discs take colours and normals from a pyramid of their own ...
+    uint smoothTexels;  // ... whose level 0 has its planes here
     uint count;         // of clusters or blocks
     uint firstBlock;    // of the ids that are drawn
 };

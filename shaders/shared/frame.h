@@ -31,9 +31,10 @@ struct DrawNode {
                      // blocks' samples, two a word; 0: all have `material`
 };
 
-const uint kNodeTurned = 256u;  // the store's own axes are not those of the world
-const uint kNodeWide = 512u;    // points of it may be wide discs (wide_disc.h)
-const uint kNodeBent = 1024u;   // wind shears it: directions are not as long as they were, normals are no tangents
+const uint kNodeTurned = 256u;   // the store's own axes are not those of the world
+const uint kNodeWide = 512u;     // points of it may be wide discs (wide_disc.h)
+const uint kNodeSmooth = 2048u;  // its discs are so wide that they would show as facets (smooth.h)
+const uint kNodeBent = 1024u;    // wind shears it: directions are not as long as they were, normals are no tangents
 
 // A tangent of the store in camera space; as long as it was where nothing is bent. Instances are scaled evenly.
 SHARED_FN vec3 nodeDirection(DrawNode node, vec3 n) {

@@ -1,6 +1,8 @@
 // Points as discs that are drawn exactly (mode splat; Botsch & Kobbelt 2003, 3.1 and 3.2, with Eq 2 for a pinhole
-// camera): every pixel whose ray meets a disc is its own, at the depth where it does. The pixel that holds a disc's
-// centre is always one of them, at the centre's depth if its own ray misses: no disc is too small to be seen.
+// camera): every pixel whose ray meets a disc is its own, at the depth where it does. Of a disc so small that it
+// could lie between the centres of pixels, the pixel that holds its centre is one of them, at the centre's depth if its
+// own ray misses: no disc is too small to be seen. (Of larger ones it misses those that are seen edge-on; with such a
+// pixel outlines would be half a pixel too far out. What they stand on is covered by their neighbours.)
 #ifndef STIPPLE_SHARED_SPLAT_DISC_H
 #define STIPPLE_SHARED_SPLAT_DISC_H
 #include "splat_size.h"
@@ -48,6 +50,15 @@ SHARED_FN CentrePixel centrePixel(WideDisc d, FrameConstants f) {
     CentrePixel p;
     p.x = isInside ? int(x) : -1;
     p.y = isInside ? int(y) : -1;
+    return p;
+}
+
+// Radius up to which a disc that faces the eye may lie between the centres of pixels, px.
+const float kBetweenPixels = 0.70710678f;
+// The same, of discs no larger than that only.
+SHARED_FN CentrePixel ownPixel(WideDisc d, FrameConstants f) {
+    CentrePixel p = centrePixel(d, f);
+    p.x = d.radius * f.focal < kBetweenPixels * lensDepth(frameLens(f), d.centre.z) ? p.x : -1;
     return p;
 }
 

@@ -162,8 +162,8 @@ TEST(FullDetail, OfScansIsWhereThePictureSays) {
                      *executor);
 }
 
-// What modes splat and pullpush-exact draw keeps the bound at 0.01 % of the pixels and less: each pixel lies on a disc
-// that was chosen.
+// What modes surface (and with it splat, SurfaceMode.IsWhereSplatIs) and pullpush-exact draw keeps the bound at 0.01 %
+// of the pixels and less: each pixel lies on a disc that was chosen.
 TEST(FullDetail, OfSplatsIsWhereThePictureSays) {
     const auto executor = makeTbbExecutor(2);
     const test::TempFolder folder;
@@ -181,7 +181,7 @@ TEST(FullDetail, OfSplatsIsWhereThePictureSays) {
         for (const auto& [elevation, distance] : {std::pair{35.0, 0.9}, {25.0, 0.5}, {4.0, 0.7}})
             for (const double tau : {0.5, 1.0, 4.0}) {
                 const lod::View view = test::lookAt(*store, 30, elevation, distance, 400);
-                for (const render::Mode mode : {render::Mode::splat, render::Mode::pullpushExact}) {
+                for (const render::Mode mode : {render::Mode::surface, render::Mode::pullpushExact}) {
                     const char* const modeName = render::reconstructionOf(mode).name;
                     const Beyond b = measure(store, full, view, tau, *executor, mode);
                     std::printf("%-14s %s from %.0f degrees, tau %.1f: %zu drawn, beyond %.4f %%, worst %.1f px\n",

@@ -83,7 +83,7 @@ std::vector<lod::View> views() {
     return out;
 }
 
-constexpr std::array kClosing{render::Mode::pullpush, render::Mode::splat, render::Mode::ewa,
+constexpr std::array kClosing{render::Mode::surface, render::Mode::pullpush, render::Mode::splat, render::Mode::ewa,
                               render::Mode::pullpushExact};
 
 /// Of the pixels that are open in the control, how many may stay open, over all views.

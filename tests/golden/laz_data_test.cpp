@@ -138,7 +138,8 @@ TEST(LazData, TheEarthCentredScanKeepsItsIntegersAndDoesNotShake) {
     settings.draw.lit = false;
     settings.wantDepthAndNormal = true;
     const glm::dvec3 up = store->description.up, side = glm::normalize(glm::cross(up, glm::dvec3(0, 0, 1)));
-    for (const render::Mode mode : {render::Mode::pullpush, render::Mode::splat, render::Mode::points})
+    for (const render::Mode mode :
+         {render::Mode::surface, render::Mode::pullpush, render::Mode::splat, render::Mode::points})
         for (int step = 0; step < 6; ++step) {
             settings.mode = mode;
             scene::Camera camera;

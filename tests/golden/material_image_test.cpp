@@ -161,8 +161,8 @@ TEST(MaterialImages, ASphereOfPointsHasTheHighlightsOfOneOfTriangles) {
         test::build({folder / "a.ply"}, folder / "matte.stipple", *executor, build);
         const auto mesh = triangles(*lod::materialNamed(name), folder / "mesh.stipple", *executor),
                    store = opened(folder / "points.stipple"), matte = opened(folder / "matte.stipple");
-        for (const render::Mode mode : {render::Mode::pullpush, render::Mode::splat, render::Mode::ewa,
-                                        render::Mode::pullpushExact, render::Mode::points}) {
+        for (const render::Mode mode : {render::Mode::surface, render::Mode::pullpush, render::Mode::splat,
+                                        render::Mode::ewa, render::Mode::pullpushExact, render::Mode::points}) {
             const render::FrameSettings settings = lit(mode);
             const render::Image truth = test::renderView(mesh, *backend, *executor, view, settings),
                                 image = test::renderView(store, *backend, *executor, view, settings),
@@ -192,7 +192,8 @@ TEST(MaterialImages, WithoutAMaterialPointsAreLitAsEver) {
     lod::Instance left, right;
     left.translation = {-1.2, 0, 0};
     right.translation = {1.2, 0, 0};
-    for (const render::Mode mode : {render::Mode::pullpush, render::Mode::splat, render::Mode::ewa}) {
+    for (const render::Mode mode :
+         {render::Mode::surface, render::Mode::pullpush, render::Mode::splat, render::Mode::ewa}) {
         const render::FrameSettings settings = lit(mode);
         const render::Image alone = test::draw({{plain, left, {}}}, *backend, *executor, view, settings),
                             both = test::draw({{plain, left, {}}, {striped_, right, {}}}, *backend, *executor, view,
@@ -226,8 +227,8 @@ TEST_F(MaterialBackends, ShowManyMaterialsAsTheOracleDoes) {
     };
     for (const Look& look :
          {Look{3, false, false, 0.5}, {1.02, false, true, 0.5}, {3, true, true, 2}, {3, false, true, 4}})
-        for (const render::Mode mode : {render::Mode::pullpush, render::Mode::splat, render::Mode::ewa,
-                                        render::Mode::pullpushExact, render::Mode::points}) {
+        for (const render::Mode mode : {render::Mode::surface, render::Mode::pullpush, render::Mode::splat,
+                                        render::Mode::ewa, render::Mode::pullpushExact, render::Mode::points}) {
             render::FrameSettings settings = lit(mode, look.error);
             if (look.hasLamp) settings.draw.lights = {lamp};
             const lod::View view = viewOf(look.distance, 240, look.isOrthographic);

@@ -109,7 +109,8 @@ class Hybrid : public testing::Test {
 TEST_F(Hybrid, PointsAndTrianglesOccludeEachOtherAsTheOracleSays) {
     const auto backend = cpu::makeCpuBackend(*executor_);
     const auto oracle = reference::makeReferenceBackend(*executor_);
-    for (const render::Mode mode : {render::Mode::pullpush, render::Mode::splat, render::Mode::points}) {
+    for (const render::Mode mode :
+         {render::Mode::surface, render::Mode::pullpush, render::Mode::splat, render::Mode::points}) {
         settings_.mode = mode;
         const auto d = reference::compareImages(draw(placed_, *backend, *executor_, view_, settings_),
                                                 draw(placed_, *oracle, *executor_, view_, settings_), 4, nullptr);

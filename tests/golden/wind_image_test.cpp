@@ -98,7 +98,8 @@ class Gale : public test::BackendsHere {
                 view.focalPixels /= glm::length(view.eye - dvec3(0, 4, 0));
                 view.isOrthographic = true;
             }
-            for (const render::Mode mode : {render::Mode::pullpush, render::Mode::splat, render::Mode::points}) {
+            for (const render::Mode mode :
+                 {render::Mode::surface, render::Mode::pullpush, render::Mode::splat, render::Mode::points}) {
                 render::FrameSettings settings = inWind(kGale, tau);
                 settings.mode = mode;
                 render::FrameSettings still = settings;

@@ -49,8 +49,8 @@ class Gpu : public testing::Test {
 TEST_F(Gpu, DrawsAsTheOracleDrawsAndValidationIsSilent) {
     const auto gpu = make();
     const auto oracle = reference::makeReferenceBackend(*executor_);
-    for (const render::Mode mode : {render::Mode::pullpush, render::Mode::splat, render::Mode::ewa,
-                                    render::Mode::points, render::Mode::pullpushExact})
+    for (const render::Mode mode : {render::Mode::surface, render::Mode::pullpush, render::Mode::splat,
+                                    render::Mode::ewa, render::Mode::points, render::Mode::pullpushExact})
         for (const double tau : {0.25, 2.0, 32.0})
             for (const uint32_t debug : {shared::kDebugNone, shared::kDebugLevel, shared::kDebugError,
                                          shared::kDebugHoles, shared::kDebugNormals}) {

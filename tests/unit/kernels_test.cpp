@@ -37,8 +37,8 @@ TEST_P(InstructionSets, DrawTheBytesThatSseDraws) {
         test::buildCurves(test::curls({}), folder / "d.stipple", *executor)};
     size_t compared = 0, drawn = 0;
     for (const auto& store : stores)
-        for (const render::Mode mode : {render::Mode::pullpush, render::Mode::splat, render::Mode::ewa,
-                                        render::Mode::points, render::Mode::pullpushExact})
+        for (const render::Mode mode : {render::Mode::surface, render::Mode::pullpush, render::Mode::splat,
+                                        render::Mode::ewa, render::Mode::points, render::Mode::pullpushExact})
             for (const double tau : {0.25, 1.0, 4.0})
                 for (const bool lit : {true, false})
                     for (const bool isOrthographic : {false, true}) {

@@ -13,7 +13,8 @@ namespace {
 std::vector<FrameContent> allContents() {
     std::vector<FrameContent> out;
     for (uint32_t kinds = 0; kinds < 1u << lod::kKinds; ++kinds)
-        for (const bool hasWideDiscs : {false, true}) out.push_back({kinds, hasWideDiscs});
+        for (const bool hasWideDiscs : {false, true})
+            for (const bool hasSmoothDiscs : {false, true}) out.push_back({kinds, hasWideDiscs, hasSmoothDiscs});
     return out;
 }
 /// Every choice of effects.
@@ -39,6 +40,7 @@ TEST(Passes, ReadNothingThatNobodyWrote) {
                         // Backends read the levels above the first only where push ran (Frames, Gpu: nothing of those
                         // before).
                         if (plane == Plane::coarse && pass == Pass::surface && !has(passes, Pass::push)) continue;
+                        if (plane == Plane::smooth && !has(passes, Pass::smooth)) continue;
                         if (plane == Plane::filtered && !has(passes, Pass::ewa)) continue;  // so are blended pixels
                         if (info.reads.has(plane))
                             EXPECT_TRUE(written.has(plane)) << r.name << ": " << info.name << " reads " << p;
@@ -60,6 +62,7 @@ TEST(Passes, AreThereOnlyWhereTheFrameCallsForThem) {
             EXPECT_EQ(has(passes, r.points), hasPoints);
             EXPECT_EQ(has(passes, Pass::push), r.hasPyramid && (hasPoints || hasCurves));
             EXPECT_EQ(has(passes, Pass::discs), r.hasPyramid && hasPoints && c.hasWideDiscs);
+            EXPECT_EQ(has(passes, Pass::smooth), r.smoothsSplats && hasPoints && c.hasSmoothDiscs);
             EXPECT_EQ(passes.back(), Pass::output);
             // Tiles of discs are nobody else's while they are drawn: all other visibility is there before.
             const auto at = [&](Pass pass) { return std::find(passes.begin(), passes.end(), pass) - passes.begin(); };

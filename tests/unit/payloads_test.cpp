@@ -116,7 +116,8 @@ TEST_F(Payloads, DrawnTogetherAsDrawnApart) {
     }
     const std::vector<render::PlacedStore> together{{mixed(), {}, {}}};
     for (const auto& [name, backend] : test::cpuBackendsAndOracle(*executor_))
-        for (const auto mode : {render::Mode::pullpush, render::Mode::points, render::Mode::splat}) {
+        for (const auto mode :
+             {render::Mode::surface, render::Mode::pullpush, render::Mode::points, render::Mode::splat}) {
             SCOPED_TRACE(name + ", mode " + render::reconstructionOf(mode).name);
             FrameCounters one, three;
             const auto a = test::draw(together, *backend, *executor_, viewOf(), settings(0.25, mode), &one);

@@ -15,6 +15,7 @@ void resize(Frame& frame) {
     frame.image->normal.resize(frame.wantAll ? pixels * 3 : 0);
     frame.image->linear.resize(frame.wantAll ? pixels * 3 : 0);
     frame.pyramid.resize(w, h, frame.constants.hasMaterials != 0);
+    if (frame.hasSmooth) frame.pixels.fit(w, h, frame.constants.hasMaterials != 0);
     if (frame.visibilityPixels == pixels) return;  // it is clear whatever its shape
     frame.visibilityPixels = pixels;
     frame.visibility.assign(pixels, shared::kNoKey);

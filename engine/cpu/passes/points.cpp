@@ -33,6 +33,7 @@ void project(Frame& frame) {
         alignas(64) std::array<uint32_t, shared::kRecordsPerBlock> pixel, depth;
         std::vector<shared::WideDisc> mine;
         for (size_t b = begin; b < end; ++b) {
+            if (frame.isSmoothing && (frame.blocks[b].node->octantMask & shared::kNodeSmooth) == 0) continue;
             const uint32_t count =
                 std::min(shared::kRecordsPerBlock, frame.blocks[b].node->count - frame.draws->points().blocks[b].first);
             frame.k.projectBlock(frame.constants, *frame.blocks[b].node, frame.blocks[b].records, count,

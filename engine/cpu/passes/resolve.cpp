@@ -8,7 +8,7 @@
 namespace stipple::cpu {
 namespace {
 
-/// Planes that only triangles and patches need, and only those with an emissive material.
+/// Planes that only triangles and patches need, those with an emissive material, and those with wide discs.
 void preparePlanes(Frame& frame, size_t pixels) {
     const auto fit = [&](HugeBuffer<uint32_t>& plane, size_t& size, bool isNeeded) {
         if (isNeeded && size != pixels) {
@@ -16,6 +16,10 @@ void preparePlanes(Frame& frame, size_t pixels) {
             size = pixels;
         }
     };
+    if (frame.hasSmooth && frame.smoothPixels != pixels) {
+        frame.smooth.assign(pixels, 0);
+        frame.smoothPixels = pixels;
+    }
     frame.hasTriangles = frame.draws->hasSurfaces();
     frame.hasEmissive = false;
     for (const shared::SurfaceMaterial& m : frame.draws->materials)
@@ -27,7 +31,7 @@ void preparePlanes(Frame& frame, size_t pixels) {
 
 /// Level 0 from the visibility buffer; with a pyramid, level 1 on the way.
 void resolve(Frame& frame) {
-    Level& fine = frame.pyramid.level(0);
+    Level& fine = frame.texels();
     Level* coarse = frame.hasPyramid && frame.pyramid.levels() > 1 ? &frame.pyramid.level(1) : nullptr;
     frame.pyramid.beginFrame(frame.constants, frame.hasCurves);
     const Planes finePlanes = fine.planes();
@@ -85,7 +89,7 @@ void resolve(Frame& frame) {
         }
     });
     std::fill(frame.runs.begin(), frame.runs.end(), uint8_t{0});  // resolveRow has cleared what they stood for
-    frame.pyramid.setLargestRadius(largestRadius.load());
+    if (&fine == &frame.pyramid.level(0)) frame.pyramid.setLargestRadius(largestRadius.load());
 }
 
 }  // namespace

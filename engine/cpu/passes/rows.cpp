@@ -78,7 +78,7 @@ class RowProgram {
   public:
     RowProgram(Frame& frame, std::span<const render::Pass> passes)
         : frame_(frame),
-          fine_(frame.pyramid.level(0)),
+          fine_(frame.texels()),
           isKept_(passes.back() != render::Pass::output),
           empty_(emptyRow(frame)) {
         for (const render::Pass pass : passes)
@@ -90,8 +90,10 @@ class RowProgram {
         frame.surfaceWordPixels = pixels;
     }
 
-    /// From texels. `own`: the row before it was reconstructed. `any`: is there anything?
-    void run(uint32_t x0, uint32_t n, uint32_t y, TexelRow& own, TexelRow& row, bool any) const {
+    /// From texels. `own`: the row before it was reconstructed. `any`: is there anything? `smooth`: what was
+    /// reconstructed of wide discs there, or null.
+    void run(uint32_t x0, uint32_t n, uint32_t y, TexelRow& own, TexelRow& row, bool any,
+             const TexelRow* smooth = nullptr) const {
         const shared::FrameConstants& f = frame_.constants;
         const RowPlace at = placeOf(x0, n, y);
         if (!any) return finishEmpty(at);
@@ -103,6 +105,12 @@ class RowProgram {
             if (concerns(*step, planes)) step->wants(frame_, wants);
         thread_local SurfaceRow surface{};
         frame_.k.surfaceRow(f, own, row, planes, wants, x0, y, n, surface);
+        if (smooth != nullptr && planes.smooth != nullptr) {
+            thread_local SurfaceRow mean{};
+            wants.depth = true;
+            frame_.k.surfaceRow(f, *smooth, *smooth, {}, wants, x0, y, n, mean);
+            frame_.k.smoothRow(f, *smooth, mean, planes, n, surface);
+        }
         finish(at, planes, surface);
     }
 
@@ -164,13 +172,26 @@ class RowProgram {
 }  // namespace
 
 void runRows(Frame& frame, std::span<const render::Pass> passes) {
-    Level& fine = frame.pyramid.level(0);
+    Level& fine = frame.texels();
     const Planes planes = fine.planes();
     const RowProgram program(frame, passes);
     const bool isFromTexels = passes.front() == render::Pass::surface;
     frame.pyramid.forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
         if (!isFromTexels) {
             for (uint32_t y = row0; y < row1; ++y) program.resume(x0, n, y);
+            return;
+        }
+        thread_local TexelRow shown{};
+        const auto show = [&](uint32_t y, const TexelRow* smooth) {
+            shown.hasTubes = frame.hasCurves;
+            shown.hasMaterials = frame.constants.hasMaterials != 0;
+            const bool any = frame.pyramid.loadRow(fine, planes, y, x0, n, kPad, shown);
+            program.run(x0, n, y, shown, shown, any, smooth);
+        };
+        if (frame.hasSmooth && frame.pyramid.isUsed()) {
+            frame.pyramid.pushTile(
+                frame.pyramid.level(0), frame.pyramid.level(1), 1.0f, x0, n, row0, row1,
+                [&](uint32_t y, TexelRow&, TexelRow& smooth, bool any) { show(y, any ? &smooth : nullptr); });
             return;
         }
         if (frame.hasPyramid && frame.pyramid.isUsed()) {
@@ -180,13 +201,7 @@ void runRows(Frame& frame, std::span<const render::Pass> passes) {
                 [&](uint32_t y, TexelRow& own, TexelRow& row, bool any) { program.run(x0, n, y, own, row, any); });
             return;
         }
-        thread_local TexelRow row{};
-        row.hasTubes = frame.hasCurves;
-        row.hasMaterials = frame.constants.hasMaterials != 0;
-        for (uint32_t y = row0; y < row1; ++y) {
-            const bool any = frame.pyramid.loadRow(fine, planes, y, x0, n, kPad, row);
-            program.run(x0, n, y, row, row, any);
-        }
+        for (uint32_t y = row0; y < row1; ++y) show(y, nullptr);
     });
 }
 

@@ -21,6 +21,19 @@ constinit const GpuPass discsPass{[](Recording& f) {
     f.overBands("discs", "discs", f.draws().frame.firstBlock.of[shared::kKindDiscs]);
 }};
 
+constinit const GpuPass smoothPass{[](Recording& f) {
+    f.smooth([&] {
+        if (f.draws().hasWideDiscs) f.emptyList("disc list", shared::kDiscsBinding);
+        f.overBlocks("project", f.draws().points().blocks.size());
+        if (f.draws().hasWideDiscs) discsPass.record(f);
+        f.overPixels("resolve", "resolve");
+        if (f.draws().hasWideDiscs) f.overPixels("disc texels", "disc_texels");
+        pullPass.record(f);
+        pushPass.record(f);
+    });
+    f.fill("clear", {{shared::kVisibilityBinding, 0xffffffffu}});
+}};
+
 constinit const GpuPass splatPass{[](Recording& f) {
     f.emptyList("disc list", shared::kDiscsBinding);
     f.overBlocks("splat", f.draws().points().blocks.size());

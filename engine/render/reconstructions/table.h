@@ -10,7 +10,7 @@
 
 namespace stipple::render {
 
-enum class Mode : uint8_t { pullpush, pullpushExact, points, splat, ewa };
+enum class Mode : uint8_t { surface, pullpush, pullpushExact, points, splat, ewa };
 
 struct Reconstruction {
     Mode mode;
@@ -20,6 +20,7 @@ struct Reconstruction {
     bool closesGaps;      ///< surfaces have no gaps between their records
     bool fillsSplats;     ///< every pixel that a disc covers is its own
     bool blendsSplats;    ///< of such: what lies on one surface is blended, silhouettes have coverage
+    bool smoothsSplats;   ///< such as are wide have colours and normals of a pyramid of their own
     Pass points;          ///< what draws points into the visibility buffer
     bool pointsAreLast;   ///< ... after all other kinds: its tiles are nobody else's meanwhile
     /// From which half-width on, px, curves have exact pixels at the latest (DrawSettings::exactCurves may ask for
