@@ -169,6 +169,15 @@ class RowProgram {
     std::vector<const RowPass*> steps_;  ///< after the surface
 };
 
+/// Does any pixel of the tile show a point of a node that is smooth?
+bool showsWide(const Frame& frame, const Level& shown, uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
+    for (uint32_t y = row0; y < row1; ++y) {
+        const uint8_t* const first = frame.smooth.data() + size_t{y} * shown.width + x0;
+        if (shown.mayHold(y, x0, n) && std::find(first, first + n, uint8_t{1}) != first + n) return true;
+    }
+    return false;
+}
+
 }  // namespace
 
 void runRows(Frame& frame, std::span<const render::Pass> passes) {
@@ -188,7 +197,7 @@ void runRows(Frame& frame, std::span<const render::Pass> passes) {
             const bool any = frame.pyramid.loadRow(fine, planes, y, x0, n, kPad, shown);
             program.run(x0, n, y, shown, shown, any, smooth);
         };
-        if (frame.hasSmooth && frame.pyramid.isUsed()) {
+        if (frame.hasSmooth && frame.pyramid.isUsed() && showsWide(frame, fine, x0, n, row0, row1)) {
             frame.pyramid.pushTile(
                 frame.pyramid.level(0), frame.pyramid.level(1), 1.0f, x0, n, row0, row1,
                 [&](uint32_t y, TexelRow&, TexelRow& smooth, bool any) { show(y, any ? &smooth : nullptr); });
