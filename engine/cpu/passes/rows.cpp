@@ -170,7 +170,7 @@ class RowProgram {
 };
 
 /// Does any pixel of the tile show a point of a node that is smooth?
-bool showsWide(const Frame& frame, const Level& shown, uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
+bool showsWide(Frame& frame, const Level& shown, uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
     for (uint32_t y = row0; y < row1; ++y) {
         const uint8_t* const first = frame.smooth.data() + size_t{y} * shown.width + x0;
         if (shown.mayHold(y, x0, n) && std::find(first, first + n, uint8_t{1}) != first + n) return true;
