@@ -22,8 +22,7 @@ bool mayBeWide(const lod::Hierarchy& h, const lod::Node& node, const std::vector
     return view.isOrthographic && scale * most * view.focalPixels > 8192;
 }
 
-/// Are usual discs of a node, by the mean of their radius codes, wider than eight pixels at the nearest corner of its
-/// cell?
+/// Are usual discs of a node, by the mean of their radius codes, wider than eight pixels at the middle of its cell?
 bool areFacets(const render::DrawList& draws, const lod::CutDraw& cut, const render::Bend* bend,
                const std::vector<shared::PointRecord>& records) {
     const lod::View& v = draws.view;
@@ -31,20 +30,18 @@ bool areFacets(const render::DrawList& draws, const lod::CutDraw& cut, const ren
     const lod::Hierarchy& h = *draws.hierarchies[instance.hierarchy];
     const lod::Node& node = h.nodes[cut.node];
     const auto real = lod::withoutEmpty(records);
-    double sum = 0, nearest = HUGE_VAL;
+    double sum = 0;
     for (const shared::PointRecord& r : real) sum += shared::recordRadiusCode(r);
     const double usual = std::exp2((std::floor(sum / static_cast<double>(real.size()) + 0.5) - 255) / 16);
-    for (int k = 0; k < 8; ++k) {
-        const dvec3 corner = dvec3(k & 1, k >> 1 & 1, k >> 2) * h.cellSize(node);
-        dvec3 world = instance.translation +
-                      instance.rotation * (instance.scale *
-                                           (h.origin + h.unit * (h.recordOrigin(node, h.payload(cut.chunk)) + corner)));
-        if (bend) world = bend->moved(world);
-        nearest = std::min(nearest, glm::dot(world - v.eye, v.forward));
-    }
+    dvec3 middle = instance.translation +
+                   instance.rotation *
+                       (instance.scale *
+                        (h.origin + h.unit * (h.recordOrigin(node, h.payload(cut.chunk)) + 0.5 * h.cellSize(node))));
+    if (bend) middle = bend->moved(middle);
+    const double depth = glm::dot(middle - v.eye, v.forward);
     const double radius =
         usual * instance.scale * h.unit * h.cellSize(node) * cut.radiusScale * draws.frame.supportScale;
-    return radius * v.focalPixels > 4 * (v.isOrthographic ? 1 : nearest);
+    return radius * v.focalPixels > 4 * (v.isOrthographic ? 1 : depth);
 }
 
 /// Of the plane of a disc where wind has moved it: three points of it, `reach` apart, moved one by one.

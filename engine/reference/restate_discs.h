@@ -19,7 +19,7 @@ struct PlacedDisc {
     uint32_t flags;
     double spacing;  ///< of its node, world units; 0: not known
     double weight;   ///< of the surfel; 0: it has none
-    bool isSmooth;   ///< usual discs of its node are wider than a few pixels, as seen from its nearest corner
+    bool isSmooth;   ///< usual discs of its node are wider than a few pixels, at its middle
     bool mayBeWide;  ///< discs of its node reach few of each other's spacings, or are too large for texels
     std::optional<lod::PointMaterial> material = {};
 };

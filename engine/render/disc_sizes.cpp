@@ -77,7 +77,8 @@ void markDiscSizes(const DiscSizes& sizes, DrawList& draws) {
         const DiscSizes::Share share = sizes.shareOf(points.keys[i]);
         // Leaves and the like, which are no surface, have no spacing.
         const double usual = double{d.edge} * double{f.supportScale * share.usual} * double{f.focal};
-        if (d.spacing > 0 && usual > kSmoothPixels * (f.orthographic != 0 ? 1 : nearest)) {
+        const double middle = double{d.base.z} + 32768 * (double{d.axisX.z} + double{d.axisY.z} + double{d.axisZ.z});
+        if (d.spacing > 0 && usual > kSmoothPixels * (f.orthographic != 0 ? 1 : middle)) {
             d.octantMask |= shared::kNodeSmooth;
             draws.hasSmoothDiscs = true;
         }
