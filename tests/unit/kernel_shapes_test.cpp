@@ -47,7 +47,7 @@ struct Resolved {
         row->hasTubes = true;
         float largest = 0;
         ASSERT_TRUE(k.resolveRow(f, tables, in, keys.data(), x0, y, static_cast<uint32_t>(keys.size()), *row, largest,
-                                 {surface.data(), nullptr, nullptr}));
+                                 {surface.data(), nullptr, nullptr, nullptr}));
     }
 };
 
