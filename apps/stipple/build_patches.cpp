@@ -192,24 +192,27 @@ Result<std::vector<glm::dvec3>> readPlaces(const std::string& input, const scene
 }
 
 void addPatchBuildOptions(CLI::App& app, PatchBuildOptions& o) {
-    app.add_flag(
+    CLI::Option* const patches = app.add_flag(
         "--patches", o.isAsked,
         "of meshes and scans: elevation patches, heights over tilted planes, in a few bytes a sample; triangles "
         "that no patch fits become discs, points stay points");
     app.add_option("--cone", o.coneDegrees, "of patches: half the cone of a patch's normals, degrees")
         ->transform(within(5.0, 75.0))
+        ->needs(patches)
         ->capture_default_str();
-    app.add_flag("--overlap", o.overlap, "of patches: each reaches over its neighbours (the default)");
+    app.add_flag("--overlap", o.overlap, "of patches: each reaches over its neighbours (the default)")->needs(patches);
     app.add_flag("--fill-gaps", o.fillGaps)->group("");  // (said why not)
     app.add_option("--patch-samples", o.samples,
                    "of patches: samples of the finest level, about (default: as many as vertices or points)")
         ->transform(within<uint64_t>(1, 100'000'000'000))
+        ->needs(patches)
         ->type_name("N");
     app.add_option(
            "--patch-texels", o.texels,
            "of patches of textured meshes: texels of their maps along an edge of a cell: 1 (no maps: colours of "
            "the samples alone), 2, 4, 8, or as many as the textures hold")
         ->transform(CLI::IsMember({"auto", "1", "2", "4", "8"}))
+        ->needs(patches)
         ->type_name("K")
         ->capture_default_str();
 }

@@ -64,7 +64,7 @@ struct DiscBatch {
         slopeY[kSize], least[kSize], most[kSize], isNear[kSize];
     alignas(64) uint32_t reached[kSize];  ///< blocks that it may meet; none of what is beyond the batch's end
     alignas(64) int missed[kSize];        ///< entry of the pixel that holds the centre, but whose ray misses; else -1
-    alignas(64) uint32_t id[kSize];
+    alignas(64) uint32_t id[kSize], alone[kSize];
     bool hasNear;  ///< some are not wholly before the eye
     WideDisc disc(size_t i) const { return {vec3(cx[i], cy[i], cz[i]), vec3(nx[i], ny[i], nz[i]), radius[i], 0u}; }
 };
@@ -210,7 +210,7 @@ void prepareNear(const FrameConstants& f, size_t count, const SplatTile& tile, f
                                     pixelRay(lens, (float(c.x) + 0.5f - f.centre.x) * inverseFocal,
                                              (float(c.y) + 0.5f - f.centre.y) * inverseFocal),
                                     f.nearPlane);
-        const bool isSmall = d.radius * f.focal < between * lensDepth(lens, d.centre.z);
+        const bool isSmall = b.alone[i] != 0u || d.radius * f.focal < between * lensDepth(lens, d.centre.z);
         b.missed[i] = isHere && isSmall && !(hit.rho2 <= 1.0f) ? tileEntry(atX, atY) : -1;
     }
 }
@@ -238,11 +238,14 @@ void takeSplats(const PlacedSplat* splats, const uint32_t* places, size_t count,
         b.ny[i] = words[8 * i + 4];
         b.nz[i] = words[8 * i + 5];
         b.radius[i] = words[8 * i + 6];
-        b.id[i] = floatBitsToUint(words[8 * i + 7]);
+        const uint32_t id = floatBitsToUint(words[8 * i + 7]);
+        b.id[i] = id & ~kAlone;
+        b.alone[i] = id & kAlone;
     }
 }
 
-/// `between`: radius, px, from which a disc whose centre's pixel misses it is not shown there.
+/// `between`: radius, px, from which a disc that does not stand alone is not shown at its centre's pixel if that misses
+/// it.
 void prepareDiscs(const FrameConstants& frame, const PlacedSplat* splats, const uint32_t* places, size_t count,
                   const SplatTile& tile, float between, DiscBatch& __restrict b) {
     const FrameConstants f = frame;
@@ -284,7 +287,8 @@ void prepareDiscs(const FrameConstants& frame, const PlacedSplat* splats, const 
                     across = atY + (top + 0.5f - f.centre.y - k.y) - k.skew * dx;
         const float within = min(min(atX, lastX - atX), min(atY, lastY - atY));
         const bool isMet = dx * dx * k.alongX + across * across * k.alongY <= 1.0f;
-        const float misses = isMet | (d.radius * toImage >= between) ? -1.0f : within;
+        const float reach = b.alone[i] != 0u ? 0.0f : d.radius * toImage;
+        const float misses = isMet | (reach >= between) ? -1.0f : within;
         const int entry = tileEntry(int(min(max(atX, 0.0f), lastX)), int(min(max(atY, 0.0f), lastY)));
         b.missed[i] = misses >= 0.0f ? entry : -1;
     }

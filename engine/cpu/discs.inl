@@ -83,18 +83,20 @@ void resolveDiscs(const FrameConstants& f, const Tables& tables, const ResolveIn
     const Lens lens = lensHere(f.focal);
     uint32_t last = ~0u;
     WideDisc front{};
-    float thickness = 0;
+    bool isLeafHere = false;
     for (size_t i = 0; i < p.count; ++i) {
         if (p.id[i] != last) {
             last = p.id[i];
             const PointRecord r = recordOf(last);
             front = wideDisc(nodeOf(last), r, f.supportScale, last, lens);
-            thickness = (recordFlags(r) & kFlagLeaf) != 0u ? kLeafThickness * kExactRadius : kExactRadius;
+            isLeafHere = (recordFlags(r) & kFlagLeaf) != 0u;
         }
         s.ex[i] = (float(x0 + p.pixel[i]) + 0.5f - f.centre.x) * inverseFocal;
         s.front[i] = p.depth[i];
         s.apart[i] = depthShared(front, pixelRay(lens, s.ex[i], ey));
-        s.thickness[i] = thickness;
+        // Its mean is of what lies so far apart.
+        s.thickness[i] = isLeafHere ? kLeafThickness * kExactRadius
+                                    : s.apart[i] * f.focal / lensDepth(lens, max(s.front[i], kLeastDepth));
         s.weight[i] = s.inverseDepth[i] = s.nx[i] = s.ny[i] = s.nz[i] = s.red[i] = s.green[i] = s.blue[i] = 0.0f;
         s.share[i] = s.metallic[i] = s.roughness[i] = 0.0f;
     }

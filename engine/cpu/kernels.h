@@ -14,6 +14,7 @@
 #include "shaders/shared/patch_splat.h"
 #include "shaders/shared/record.h"
 #include "shaders/shared/smooth.h"
+#include "shaders/shared/splat_disc.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/texture.h"
 #include "shaders/shared/visibility.h"
@@ -73,7 +74,7 @@ struct SplatTile {
 /// A disc that is to be drawn, camera space.
 struct PlacedSplat {
     float cx, cy, cz, nx, ny, nz, radius;
-    uint32_t id;  ///< of the visibility buffer
+    uint32_t id;  ///< of the visibility buffer, with kAlone where discs are drawn exactly
 };
 /// How large discs count: at least so many of their node's spacings. What is drawn of them ends `support` sigmas of
 /// `sigmas` radii each from their centres, widened by a low-pass (variance, px^2).
@@ -87,6 +88,7 @@ struct SplatBlock {
     alignas(64) int firstX[kSize], lastX[kSize], firstY[kSize], lastY[kSize];
     alignas(64) uint32_t colour[kSize];  ///< and flags, of the records
     alignas(64) uint32_t keep[kSize];    ///< 0: not to be drawn
+    alignas(64) uint32_t alone[kSize];   ///< kAlone, or 0
 };
 
 struct BlockSource {

@@ -190,6 +190,7 @@ void showWide(const render::DrawList& draws, const std::vector<PlacedDisc>& disc
             }
             s = shownPixel(view, at, view.isOrthographic ? linear / weight : weight / linear, glm::normalize(n),
                            colour / weight, isLeaf(*front));
+            if (!isLeaf(*front)) s.thickness = apart;
             if (share > 0)
                 setMaterial(
                     s, lod::PointMaterial{static_cast<float>(roughness / share), static_cast<float>(metallic / share)});
@@ -213,6 +214,7 @@ void showSplats(const render::DrawList& draws, const std::vector<PlacedDisc>& di
     };
     for (PlacedDisc d : discs) {
         const bool isAhead = d.centre.z > v.nearPlane;
+        const double stored = d.radius;
         if ((d.flags & shared::kFlagNoNormal) != 0 && !isAhead) continue;
         // A stray point hides no more of the picture than this.
         if ((d.flags & shared::kFlagScattered) != 0)
@@ -233,8 +235,10 @@ void showSplats(const render::DrawList& draws, const std::vector<PlacedDisc>& di
         }
         for (int y = y0; y <= y1; ++y)
             for (int x = x0; x <= x1; ++x) offer(x, y, d, false);
-        // Larger ones reach some pixel's centre unless they are seen edge-on.
-        if (!isAhead || d.radius * pixelsAt(v, d.centre.z) >= std::sqrt(0.5)) continue;
+        // Those that stand alone show it anyway; of others, only the small ones.
+        const bool isLoose = (d.flags & (shared::kFlagScattered | shared::kFlagLeaf)) != 0;
+        const bool isAlone = isLoose || 2 * stored < d.spacing;
+        if (!isAhead || (!isAlone && d.radius * pixelsAt(v, d.centre.z) >= std::sqrt(0.5))) continue;
         const dvec2 p = imageOf(v, d.centre);
         if (p.x >= 0 && p.y >= 0 && p.x < level.width && p.y < level.height)
             offer(static_cast<int>(p.x), static_cast<int>(p.y), d, true);

@@ -75,7 +75,7 @@ void main() {
     Texel t;
     t.depth = lens.isOrthographic ? inverseDepth / weight : weight / inverseDepth;
     t.radius = kExactRadius;
-    t.thickness = (recordFlags(front) & kFlagLeaf) != 0u ? kLeafThickness * kExactRadius : kExactRadius;
+    t.thickness = (recordFlags(front) & kFlagLeaf) != 0u ? kLeafThickness * kExactRadius : apart * frame.focal / lensDepth(lens, t.depth);  // its mean is of what lies so far apart
     t.offset = vec2(0.0);
     t.normalPerp = perpFromNormal(normalize(n), viewDirection(at.x * frame.focal, at.y * frame.focal, lens));
     t.colour = colour / weight;

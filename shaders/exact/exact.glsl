@@ -54,11 +54,11 @@ bool texelOf(WideDisc d, out LevelPlane at, out uint texel) {
     return true;
 }
 
-// Depth of a disc at a pixel; the pixel of its centre always shows a small one. kNoDisc where it is not seen.
+// Depth of a disc at a pixel; the pixel of its centre shows a small one, and one that stands alone. kNoDisc where it is not seen.
 float depthAtPixel(WideDisc d, ivec2 pixel) {
     const vec2 ray = (vec2(pixel) + 0.5 - frame.centre) / frame.focal;
     const float depth = discHit(d, pixelRay(frameLensHere(), ray.x, ray.y), frame.nearPlane).depth;
-    const CentrePixel c = ownPixel(d, frame);
+    const CentrePixel c = ownPixel(d, standsAlone(d.id), frame);
     const bool isCentre = c.x == pixel.x && c.y == pixel.y;
     return depth >= kNoDisc && isCentre ? d.centre.z : depth;
 }

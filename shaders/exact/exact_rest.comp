@@ -18,7 +18,7 @@ void main() {
     uint texel;
     if (!discHere(d)) return;
     if (texelOf(d, at, texel) && texels[plane(at, 1u) + texel] == d.id) return;
-    const CentrePixel c = ownPixel(d, frame);
+    const CentrePixel c = ownPixel(d, standsAlone(d.id), frame);
     if (c.x >= 0) offer(ivec2(c.x, c.y), d);
     const DiscBox box = discBox(d, frame);
     const int width = box.x.last - box.x.first + 1;

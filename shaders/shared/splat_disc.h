@@ -1,8 +1,9 @@
 // Points as discs that are drawn exactly (mode splat; Botsch & Kobbelt 2003, 3.1 and 3.2, with Eq 2 for a pinhole
 // camera): every pixel whose ray meets a disc is its own, at the depth where it does. Of a disc so small that it
 // could lie between the centres of pixels, the pixel that holds its centre is one of them, at the centre's depth if its
-// own ray misses: no disc is too small to be seen. (Of larger ones it misses those that are seen edge-on; with such a
-// pixel outlines would be half a pixel too far out. What they stand on is covered by their neighbours.)
+// own ray misses: no disc is too small to be seen. So it is of any disc that stands alone. (Of
+// others it misses those that are seen at a slant; with such a pixel outlines would be half a pixel too far out. What
+// they stand on is covered by their neighbours.)
 #ifndef STIPPLE_SHARED_SPLAT_DISC_H
 #define STIPPLE_SHARED_SPLAT_DISC_H
 #include "splat_size.h"
@@ -55,10 +56,15 @@ SHARED_FN CentrePixel centrePixel(WideDisc d, FrameConstants f) {
 
 // Radius up to which a disc that faces the eye may lie between the centres of pixels, px.
 const float kBetweenPixels = 0.70710678f;
-// The same, of discs no larger than that only.
-SHARED_FN CentrePixel ownPixel(WideDisc d, FrameConstants f) {
+// Does no neighbour cover what a disc stands on? `radius`: as stored; `spacing`: of its node, 0: not known.
+SHARED_FN bool isAlone(uint flags, float radius, float spacing) {
+    return (flags & (kFlagScattered | kFlagLeaf)) != 0u || !(2.0f * radius >= spacing);
+}
+const uint kAlone = 0x80000000u;  // where it is said with the id of a disc; ids of the visibility buffer have it not
+// The pixel that holds the centre, of discs that stand alone or are no larger than that only.
+SHARED_FN CentrePixel ownPixel(WideDisc d, bool isAloneHere, FrameConstants f) {
     CentrePixel p = centrePixel(d, f);
-    p.x = d.radius * f.focal < kBetweenPixels * lensDepth(frameLens(f), d.centre.z) ? p.x : -1;
+    p.x = isAloneHere || d.radius * f.focal < kBetweenPixels * lensDepth(frameLens(f), d.centre.z) ? p.x : -1;
     return p;
 }
 

@@ -1,4 +1,4 @@
-// One workgroup per block of 256 draw ids: each disc into every pixel whose ray meets it, and (of small ones) into that of its centre,
+// One workgroup per block of 256 draw ids: each disc into every pixel whose ray meets it, and (of small ones, and of those that stand alone) into that of its centre,
 // by 64-bit atomic minimum of (depth, id). Discs of many pixels go to the list, whose rows are shared out.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -37,7 +37,7 @@ void offerMet(WideDisc d, ivec2 pixel) {
 void offerOwn(uint block) {
     const WideDisc d = discOf(block, gl_LocalInvocationID.x);
     if (d.radius < 0.0) return;
-    const CentrePixel c = ownPixel(d, frame);
+    const CentrePixel c = ownPixel(d, standsAlone(d.id), frame);
     if (c.x >= 0) {
         const vec2 ray = (vec2(c.x, c.y) + 0.5 - frame.centre) * (1.0 / frame.focal);
         if (!(discHit(d, pixelRay(frameLensHere(), ray.x, ray.y), frame.nearPlane).depth < kNoDisc)) offer(c.x, c.y, d.centre.z, d.id);

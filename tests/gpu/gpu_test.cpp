@@ -415,6 +415,7 @@ TEST(Shaders, TouchThePlanesThatTheirPassesDeclare) {
     using render::Pass;
     using render::Plane;
     const std::map<Pass, std::vector<std::string>> shadersOf{
+        {Pass::smooth, {"project", "disc_order", "discs", "pull", "push"}},
         {Pass::project, {"project"}},
         {Pass::discs, {"disc_order", "discs"}},
         {Pass::splat, {"splat", "discs"}},
@@ -429,18 +430,19 @@ TEST(Shaders, TouchThePlanesThatTheirPassesDeclare) {
         {Pass::push, {"push"}},
         {Pass::surface, {"surface"}},
         {Pass::output, {"output"}}};
-    const std::map<uint32_t, render::Planes> planesOf{{shared::kVisibilityBinding, {Plane::visibility}},
-                                                      {shared::kDiscsBinding, {Plane::discList}},
-                                                      {shared::kFrontsBinding, {Plane::filtered}},
-                                                      {shared::kSumsBinding, {Plane::filtered}},
-                                                      {shared::kMaterialSumsBinding, {Plane::filtered}},
-                                                      {shared::kFilteredBinding, {Plane::filtered}},
-                                                      {shared::kCoverageBinding, {Plane::filtered}},
-                                                      {shared::kSecondsBinding, {Plane::filtered}},
-                                                      {shared::kTexelsBinding, {Plane::texels, Plane::coarse}},
-                                                      {shared::kTriangleWordsBinding, {Plane::texels}},
-                                                      {shared::kSurfaceBinding, {Plane::surface}},
-                                                      {shared::kImageBinding, {Plane::image}}};
+    const std::map<uint32_t, render::Planes> planesOf{
+        {shared::kVisibilityBinding, {Plane::visibility}},
+        {shared::kDiscsBinding, {Plane::discList}},
+        {shared::kFrontsBinding, {Plane::filtered}},
+        {shared::kSumsBinding, {Plane::filtered}},
+        {shared::kMaterialSumsBinding, {Plane::filtered}},
+        {shared::kFilteredBinding, {Plane::filtered}},
+        {shared::kCoverageBinding, {Plane::filtered}},
+        {shared::kSecondsBinding, {Plane::filtered}},
+        {shared::kTexelsBinding, {Plane::texels, Plane::coarse, Plane::smooth}},
+        {shared::kTriangleWordsBinding, {Plane::texels}},
+        {shared::kSurfaceBinding, {Plane::surface}},
+        {shared::kImageBinding, {Plane::image}}};
     size_t compared = 0;
     for (const auto& [pass, names] : shadersOf) {
         const render::PassInfo& info = render::passInfo(pass);

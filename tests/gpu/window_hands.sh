@@ -205,18 +205,21 @@ keys_follow_the_layout() {
     done
     xdotool key m
     await 10 differs "$plain" || fail "M of a French keyboard does nothing"
+    local pulled=$shot
+    xdotool key m
+    await 10 differs "$pulled" || fail "the second M does nothing"
     local splats=$shot
     xdotool key m
-    await 10 differs "$splats" || fail "the second M does nothing"
+    await 10 differs "$splats" || fail "the third M does nothing"
     local blended=$shot
     xdotool key m
-    await 10 differs "$blended" || fail "the third M does nothing"
+    await 10 differs "$blended" || fail "the fourth M does nothing"
     local points=$shot
     xdotool key m
-    await 10 differs "$points" || fail "the fourth M does nothing"
+    await 10 differs "$points" || fail "the fifth M does nothing"
     xdotool key m
     settle
-    cmp -s "$plain" "$shot" || fail "M five times, once round the modes, is not what was before"
+    cmp -s "$plain" "$shot" || fail "M six times, once round the modes, is not what was before"
     # Keycode 25 is W on a US keyboard and Z on a French one.
     xdotool key f
     xdotool keydown 25

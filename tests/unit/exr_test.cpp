@@ -69,7 +69,7 @@ TEST(Exr, DepthAndNormalsOfAPlaneAreThoseOfThePlane) {
     const test::Outcome drawn = test::runProgram(
         folder,
         "render plane.ply -o a.exr --size 160x121 --alpha --device cpu --eye=0.1,-0.3,3 --target=0,0,0 "
-        "--camera-up=0,1,0 --fov 50");
+        "--camera-up=0,1,0 --fov 50 --error 0.01");
     ASSERT_EQ(drawn.code, 0) << drawn.err;
     const test::Planes planes = test::readPlanes(folder / "a.exr");
     ASSERT_EQ(planes.width, uint32_t{kWidth});
@@ -96,7 +96,8 @@ TEST(Exr, DepthAndNormalsOfAPlaneAreThoseOfThePlane) {
             }
             if (beyond > -0.1) continue;
             ++inside;
-            ASSERT_NEAR(double{z[i]}, depth, 0.05 * depth / focal) << x << ' ' << y;  // a twentieth of a pixel
+            ASSERT_NEAR(double{z[i]}, depth, 0.2 * depth / focal)
+                << x << ' ' << y;  // discs of less than a pixel: at their centres
             double cosine = 0;
             for (int c = 0; c < 3; ++c) cosine += double{n.at(static_cast<size_t>(c))[i]} * normal[c];
             ASSERT_GT(cosine, std::cos(0.3 * M_PI / 180)) << x << ' ' << y;

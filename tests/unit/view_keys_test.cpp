@@ -71,7 +71,7 @@ TEST(Keys, EachChangesWhatItSays) {
     applyKeys("M", s);
     EXPECT_EQ(s.frame.mode, render::Mode::pullpushExact);
     applyKeys("M", s);
-    EXPECT_EQ(s.frame.mode, render::Mode::pullpush) << "around";
+    EXPECT_EQ(s.frame.mode, render::Mode::surface) << "around";
     EXPECT_EQ(s.frame.budgets.errorPixels, 4);
     const KeyRequests asked = applyKeys("FCUP ", s);
     EXPECT_TRUE(asked.fly && asked.colours && asked.up && asked.picture && asked.pause);

@@ -104,10 +104,10 @@ class RowProgram {
         for (const RowPass* step : steps_)
             if (concerns(*step, planes)) step->wants(frame_, wants);
         thread_local SurfaceRow surface{};
+        wants.depth = wants.depth || smooth != nullptr;
         frame_.k.surfaceRow(f, own, row, planes, wants, x0, y, n, surface);
         if (smooth != nullptr && planes.smooth != nullptr) {
             thread_local SurfaceRow mean{};
-            wants.depth = true;
             frame_.k.surfaceRow(f, *smooth, *smooth, {}, wants, x0, y, n, mean);
             frame_.k.smoothRow(f, *smooth, mean, planes, n, surface);
         }

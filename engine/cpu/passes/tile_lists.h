@@ -98,7 +98,8 @@ class TileLists {
         for (uint32_t i = 0; i < count; ++i) {
             if (b.keep[i] == 0) continue;
             if (frame_.isBlended()) frame_.placedColours[at] = b.colour[i];
-            splats_[at] = {b.cx[i], b.cy[i], b.cz[i], b.nx[i], b.ny[i], b.nz[i], b.radius[i], firstId + i};
+            splats_[at] = {b.cx[i], b.cy[i], b.cz[i],     b.nx[i],
+                           b.ny[i], b.nz[i], b.radius[i], (firstId + i) | (frame_.isBlended() ? 0u : b.alone[i])};
             const TileRange range{tile(b.firstX[i], SplatTile::kWidth), tile(b.firstY[i], SplatTile::kHeight),
                                   tile(b.lastX[i], SplatTile::kWidth), tile(b.lastY[i], SplatTile::kHeight)};
             ranges_[at++] = range;
