@@ -140,6 +140,57 @@ TEST(SurfaceMode, ShowsTheSurfaceAndNotItsDiscs) {
     EXPECT_LE(surface.colour, 1.05 * pull.colour);
 }
 
+// Discs of more than 32 px, which the pyramid has as means of those about the front one.
+TEST(SurfaceMode, ShowsNoFacetsFromNear) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    const auto backend = cpu::makeCpuBackend(*executor);
+    test::writePly(folder / "a.ply", colouredSphere(600));
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    lod::View view = test::lookAt(*store, 30, 25, 0.8, 400);
+    view.eye *= 1.6 / glm::length(view.eye);
+    // Neighbours in a row whose normals are more than 2 degrees apart.
+    const auto jumps = [&](Mode mode) {
+        const render::Image image = test::renderView(store, *backend, *executor, view, test::drawnAs(mode));
+        size_t n = 0;
+        for (size_t i = 1; i < image.depth.size(); ++i) {
+            const glm::vec3 a(image.normal[3 * i - 3], image.normal[3 * i - 2], image.normal[3 * i - 1]),
+                b(image.normal[3 * i], image.normal[3 * i + 1], image.normal[3 * i + 2]);
+            n += i % 400 > 0 && image.depth[i] > 0 && image.depth[i - 1] > 0 && glm::dot(a, b) < 0.99939f;
+        }
+        return n;
+    };
+    const size_t surface = jumps(Mode::surface), splat = jumps(Mode::splat);
+    std::printf("jumps of normals: surface %zu, splat %zu\n", surface, splat);
+    EXPECT_LE(surface, splat / 10) << "splat is the control";
+    EXPECT_GT(splat, 1'000u);
+}
+
+// Of discs that do not reach each other none is lost, though rays of pixels' centres miss most of them.
+TEST(SurfaceMode, ShowsWhatStandsAloneAtASlant) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    const auto backend = cpu::makeCpuBackend(*executor);
+    std::vector<test::TestPoint> points;
+    for (int i = 0; i < 3'600; ++i) {
+        const double x = 1.67 * (i % 60 - 30) + 0.1 * std::sin(7.0 * i),
+                     y = 1.67 * (i / 60 - 30) + 0.1 * std::sin(5.0 * i);
+        points.push_back({{x, y, 0}, {0.906f, 0, 0.423f}, 0xffffff, 0.118f});
+    }
+    test::writePly(folder / "a.ply", points, true, true);
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    lod::View view = test::viewFromAbove({0, 0, 0});
+    view.eye = {0, 0, 100};
+    view.isOrthographic = true;
+    view.width = view.height = 640;
+    view.focalPixels = 6.4;
+    for (const Mode mode : {Mode::surface, Mode::splat, Mode::pullpushExact}) {
+        const render::Image image = test::renderView(store, *backend, *executor, view, test::drawnAs(mode));
+        const auto drawn = std::count_if(image.depth.begin(), image.depth.end(), [](float z) { return z > 0; });
+        EXPECT_GE(drawn, 3'590) << render::reconstructionOf(mode).name;
+    }
+}
+
 TEST(SurfaceMode, IsTheSameBytesForAnyThreads) { test::expectSameForAnyThreads(test::drawnAs(Mode::surface)); }
 
 TEST(SurfaceMode, LeavesNoHolesInClosedSurfaces) {
