@@ -9,7 +9,6 @@ layout(set = 0, binding = kSumsBinding, scalar) buffer SumBlock { FilteredSums s
 layout(set = 0, binding = kMaterialSumsBinding, scalar) buffer MaterialBlock { MaterialSums materialSums[]; };
 layout(set = 0, binding = kFilteredBinding, scalar) buffer FilteredBlock { FilteredPixel filtered[]; };
 layout(set = 0, binding = kCoverageBinding, scalar) buffer CoverageBlock { uint coverage[]; };  // and which kind of second surface
-layout(set = 0, binding = kSecondsBinding, scalar) buffer SecondBlock { uint hasSeconds; uint unusedSeconds; SecondSurface seconds[]; };
 
 PointRecord recordOf(uint id, out DrawNode node) {
     const DrawBlock source = blocks[id / kBlockLanes];
@@ -180,18 +179,22 @@ void addSecond(WideDisc d, float rough, vec3 colour, TexelSurface surface, float
     const float support = frame.kernelSupport;
     if (!(r.rho2 < support * support)) return;
     const uint64_t front = fronts[at].key;
-    if (kind == kSecondBehind ? r.depth <= seconds[at].limit || r.depth > keyDepth(front)
+    if (kind == kSecondBehind ? r.depth <= sums[at].nearest || r.depth > keyDepth(front)
         : front != kNoKey     ? r.depth >= sums[at].nearest
-                              : r.depth + rough * r.along >= keyDepth(seconds[at].other)) return;
+                              : r.depth + rough * r.along >= keyDepth(visibility[at])) return;
     if (kind == kSecondBefore) atomicMin(fronts[at].first, d.id);
     const float w = scale * blendedAmplitude(d, k, frame.nearPlane) * kernelAt(r.rho2, kernelEnd(support)) * sums[at].unit;
     addSums(at, w, r.depth, colour, towardsEye(d), surface);
 }
-// Offers a disc to the pixel's second front.
+// Offers a disc to the pixel's second front. That begins with another kind's key, which a disc at the same depth does not
+// replace.
 void offerBehind(WideDisc d, float rough, EwaKernel k, DepthRange range, ivec2 pixel) {
     const uint at = uint(pixel.y) * frame.width + uint(pixel.x);
     if (secondKind(at) != kSecondBehind) return;
     const RayOnDisc r = rayOnDisc(d, k, range, pixel);
-    if (r.isMet > 0.5 && r.depth > seconds[at].limit)
-        atomicMin(fronts[at].key, visibilityKey(floatBitsToUint(r.depth + rough * r.along), drawId(0u, d.id)));
+    if (!(r.isMet > 0.5 && r.depth > sums[at].nearest)) return;
+    const float depth = r.depth + rough * r.along;
+    const uint64_t front = fronts[at].key;
+    if (front != kNoKey && !isPointKey(front, frame.firstBlock) && depth >= keyDepth(front)) return;
+    atomicMin(fronts[at].key, visibilityKey(floatBitsToUint(depth), drawId(0u, d.id)));
 }

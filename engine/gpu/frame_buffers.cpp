@@ -109,8 +109,8 @@ Result<void> FrameBuffers::prepareLists(const render::RenderRequest& request) {
             ensure(bound_[kFilteredBinding], gpu::bytesOf(kFilteredBinding, pixels), kStorage, false, "blended discs"));
         STIPPLE_TRY(
             ensure(bound_[kCoverageBinding], gpu::bytesOf(kCoverageBinding, pixels), kStorage, false, "coverage"));
-        STIPPLE_TRY(
-            ensure(bound_[kSecondsBinding], gpu::bytesOf(kSecondsBinding, pixels), kFilled, false, "second surfaces"));
+        STIPPLE_TRY(ensure(bound_[kSecondGroupsBinding], gpu::bytesOf(kSecondGroupsBinding, kGroupShapes),
+                           kFilled | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT, false, "groups of second surfaces"));
         if (request.draws->frame.hasMaterials != 0)
             STIPPLE_TRY(ensure(bound_[kMaterialSumsBinding], gpu::bytesOf(kMaterialSumsBinding, pixels), kStorage,
                                false, "material sums"));

@@ -3,7 +3,7 @@
 namespace stipple::gpu {
 
 void PassList::begin(const std::string& name, const std::vector<BufferUse>& uses, bool isTransfer) {
-    const VkPipelineStageFlags2 stage =
+    const VkPipelineStageFlags2 stageOfPass =
         isTransfer ? VK_PIPELINE_STAGE_2_TRANSFER_BIT : VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
     std::vector<VkBufferMemoryBarrier2> barriers;
     for (const BufferUse& use : uses) {
@@ -11,6 +11,8 @@ void PassList::begin(const std::string& name, const std::vector<BufferUse>& uses
                                     ? (use.writes ? VK_ACCESS_2_TRANSFER_WRITE_BIT : VK_ACCESS_2_TRANSFER_READ_BIT)
                                     : VK_ACCESS_2_SHADER_STORAGE_READ_BIT;
         if (!isTransfer && use.writes) access |= VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT;
+        if (use.isIndirect) access = VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT;
+        const VkPipelineStageFlags2 stage = use.isIndirect ? VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT : stageOfPass;
         const auto found = last_.find(use.buffer);
         if (found != last_.end() && (found->second.wrote || use.writes)) {
             const VkAccessFlags2 before = found->second.wrote ? found->second.access : VK_ACCESS_2_NONE;

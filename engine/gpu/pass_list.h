@@ -13,6 +13,7 @@ namespace stipple::gpu {
 struct BufferUse {
     VkBuffer buffer;
     bool writes;
+    bool isIndirect = false;  ///< numbers of groups are read from it, and nothing else
 };
 
 class PassList {

@@ -1,6 +1,7 @@
 #include "engine/gpu/record.h"
 
 #include <algorithm>
+#include <array>
 
 #include "engine/base/check.h"
 #include "engine/gpu/passes/passes.h"
@@ -73,39 +74,56 @@ shared::Step Recording::stepAt(size_t level) const {
 void Recording::dispatch(const std::string& label, const Shader& shader, const shared::Step& step, Groups groups) {
     std::vector<BufferUse> uses;
     for (const BindingUse& u : shader.uses) uses.push_back({buffers_.bound(u.binding).handle(), u.writes});
+    if (counts_ != nullptr) uses.push_back({counts_->handle(), false, true});
     list_.begin(label, uses, false);
     if (const auto used = pipelines_.use(commands_, shader); used) {
         if (shader.pushBytes > 0) pipelines_.push(commands_, step);
-        if (groups.x > 0 && groups.y > 0) vkCmdDispatch(commands_, groups.x, groups.y, 1);
+        if (counts_ != nullptr)
+            vkCmdDispatchIndirect(commands_, counts_->handle(), groups.shape * sizeof(shared::GroupCounts));
+        else if (groups.x > 0 && groups.y > 0)
+            vkCmdDispatch(commands_, groups.x, groups.y, 1);
     } else if (status_) {
         status_ = used;
     }
     list_.end();
 }
 
+Recording::Groups Recording::groupsOfBlocks(size_t blocks) {
+    constexpr uint32_t kMost = shared::kGroupsPerDimension;
+    const auto count = static_cast<uint32_t>(blocks);
+    return {shared::kOverBlocks, std::min(count, kMost), (count + kMost - 1) / kMost};
+}
+
+Recording::Groups Recording::groupsOfBands() const {
+    const uint32_t height = buffers_.levels()[0].height;
+    return {shared::kOverBands, shared::kBandGroups, (height + shared::kBandRows - 1) / shared::kBandRows};
+}
+
+Recording::Groups Recording::groupsOfPixels(const Shader& shader, size_t level) const {
+    const Level& to = buffers_.levels()[level];
+    return {shared::kOverPixels, (to.width + shader.group[0] - 1) / shader.group[0],
+            (to.height + shader.group[1] - 1) / shader.group[1]};
+}
+
 void Recording::overPixels(const std::string& label, const std::string& name, size_t level, size_t target) {
     const Shader& shader = known(name);
-    const Level& to = buffers_.levels()[target];
-    dispatch(label, shader, stepAt(level),
-             {(to.width + shader.group[0] - 1) / shader.group[0], (to.height + shader.group[1] - 1) / shader.group[1]});
+    dispatch(label, shader, stepAt(level), groupsOfPixels(shader, target));
 }
 
 void Recording::overBlocks(const std::string& name, size_t blocks) {
     shared::Step step = stepAt(0);
     step.count = static_cast<uint32_t>(blocks);
-    constexpr uint32_t kMost = shared::kGroupsPerDimension;
-    dispatch(name, known(name), step, {std::min(step.count, kMost), (step.count + kMost - 1) / kMost});
+    dispatch(name, known(name), step, groupsOfBlocks(blocks));
 }
 
 void Recording::overBands(const std::string& label, const std::string& name, uint32_t firstBlock) {
     shared::Step step = stepAt(0);
     step.firstBlock = firstBlock;
-    dispatch(label, known(name), step,
-             {shared::kBandGroups, (buffers_.levels()[0].height + shared::kBandRows - 1) / shared::kBandRows});
+    dispatch(label, known(name), step, groupsOfBands());
 }
 
 void Recording::once(const std::string& label, const std::string& name) {
-    dispatch(label, known(name), stepAt(0), {1, 1});
+    dispatch(label, known(name), stepAt(0), {shared::kOverBlocks, 1, 1});
 }
 
 void Recording::emptyList(const std::string& label, uint32_t binding) {
@@ -113,6 +131,22 @@ void Recording::emptyList(const std::string& label, uint32_t binding) {
     list_.begin(label, {{buffer, true}}, true);
     vkCmdFillBuffer(commands_, buffer, 0, 4, 0);
     list_.end();
+}
+
+void Recording::noGroups(const std::string& label, uint32_t binding, size_t blocks, const std::string& overPixels) {
+    std::array<shared::GroupCounts, shared::kGroupShapes> counts{};
+    for (const Groups& g : {groupsOfBlocks(blocks), groupsOfBands(), groupsOfPixels(known(overPixels), 0)})
+        counts.at(g.shape) = {g.x, g.y, 0};
+    const VkBuffer buffer = buffers_.at(binding).handle();
+    list_.begin(label, {{buffer, true}}, true);
+    vkCmdUpdateBuffer(commands_, buffer, 0, sizeof(counts), counts.data());
+    list_.end();
+}
+
+void Recording::whereFound(uint32_t binding, const std::function<void()>& passes) {
+    counts_ = &buffers_.at(binding);
+    passes();
+    counts_ = nullptr;
 }
 
 void Recording::fill(const std::string& label, std::initializer_list<std::pair<uint32_t, uint32_t>> bindingsAndWords) {

@@ -42,13 +42,22 @@ class Recording {
     void once(const std::string& label, const std::string& shader);
     /// A list of what covers many pixels begins with its length.
     void emptyList(const std::string& label, uint32_t binding);
+    /// Counts of groups begin with as many as there are of blocks, bands and pixels, and none of them on (GroupCounts).
+    /// `overPixels`: a shader whose groups are as large as those of all that are counted there.
+    void noGroups(const std::string& label, uint32_t binding, size_t blocks, const std::string& overPixels);
+    /// Records `passes`, which do nothing on the device where no dispatch before them has put on the groups that it
+    /// counts in `binding`.
+    void whereFound(uint32_t binding, const std::function<void()>& passes);
     /// Buffers full of one word, side by side.
     void fill(const std::string& label, std::initializer_list<std::pair<uint32_t, uint32_t>> bindingsAndWords);
 
   private:
     struct Groups {
-        uint32_t x, y;
+        uint32_t shape, x, y;  ///< shape: kOverBlocks ...
     };
+    static Groups groupsOfBlocks(size_t blocks);
+    Groups groupsOfBands() const;
+    Groups groupsOfPixels(const Shader& shader, size_t level) const;
     void dispatch(const std::string& label, const Shader& shader, const shared::Step& step, Groups groups);
     shared::Step stepAt(size_t level) const;
     const Shader& known(const std::string& name) const;
@@ -60,7 +69,8 @@ class Recording {
     const render::RenderRequest& request_;
     std::string shader_, label_;
     bool isSmoothing_ = false;
-    Result<void> status_;  ///< the first error
+    const Buffer* counts_ = nullptr;  ///< of groups, where dispatches find theirs
+    Result<void> status_;             ///< the first error
 };
 
 }  // namespace stipple::gpu

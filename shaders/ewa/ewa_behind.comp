@@ -1,4 +1,4 @@
-// Discs of few pixels to second fronts, if there are any.
+// Discs of few pixels to second fronts.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel_disc.glsl"
@@ -7,6 +7,5 @@ void useDisc(KernelDisc p, ivec2 pixel) { offerBehind(p.disc, p.rough, p.kernel,
 #include "each_block.glsl"
 
 void main() {
-    if (hasSeconds == 0u) return;
     eachOfBlock();
 }

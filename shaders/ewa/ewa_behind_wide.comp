@@ -7,6 +7,5 @@ void useDisc(KernelDisc p, ivec2 pixel) { offerBehind(p.disc, p.rough, p.kernel,
 #include "each_wide.glsl"
 
 void main() {
-    if (hasSeconds == 0u) return;
     eachOfList();
 }

@@ -3,6 +3,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../filtered.glsl"
+layout(set = 0, binding = kSecondGroupsBinding, scalar) buffer GroupBlock { GroupCounts groups[]; };
 layout(local_size_x = 64) in;
 
 bool isOpen(ivec2 pixel) {
@@ -29,13 +30,12 @@ void main() {
         for (int x = -1; x <= 1; ++x) {
             const ivec2 beside = ivec2(pixel) + ivec2(x, y);
             isAtGap = isAtGap || isOpen(beside);
-            isAtJump = isAtJump || (kind == kSecondBehind && isDeeper(beside, seconds[at].limit));
+            isAtJump = isAtJump || (kind == kSecondBehind && isDeeper(beside, sums[at].nearest));
         }
     // A front that ends nowhere near hides what is behind it: kernels add up to less than 1 where samples are not regular.
     if (kind == kSecondBehind && !isAtGap && !isAtJump) kind = kSecondNone;
     const bool isBlended = isPointKey(visibility[at], frame.firstBlock);
     coverage[at] = kind << kSecondShift | (isBlended && isAtGap ? filtered[at].cover & 255u : 255u);
     if (kind == kSecondNone) return;
-    hasSeconds = 1u;
-    if (kind == kSecondBehind) fronts[at].key = kNoKey;
+    for (uint shape = 0u; shape < kGroupShapes; ++shape) groups[shape].z = 1u;
 }

@@ -7,22 +7,21 @@ layout(local_size_x = 64) in;
 
 void main() {
     const uvec2 pixel = gl_GlobalInvocationID.xy;
-    if (hasSeconds == 0u || pixel.x >= frame.width || pixel.y >= frame.height) return;
+    if (pixel.x >= frame.width || pixel.y >= frame.height) return;
     const uint at = pixel.y * frame.width + pixel.x;
     uint kind = secondKind(at);
     if (kind == kSecondNone) return;
     const FilteredFront front = fronts[at];
-    const uint64_t other = seconds[at].other;
     float reference = uintBitsToFloat(front.nearest);
     if (kind == kSecondBehind) {
-        if (front.key != kNoKey && (other == kNoKey || keyDepth(front.key) < keyDepth(other))) {
+        if (front.key != kNoKey && isPointKey(front.key, frame.firstBlock)) {
             DrawNode node;
             const uint id = keyPlace(front.key, 0u);
             const PointRecord r = recordOf(id, node);
             const KernelDisc p = kernelDisc(opaqueDisc(node, r, id), node, r);
             reference = rayOnDisc(p.disc, p.kernel, p.range, ivec2(pixel)).depth;
         } else {
-            kind = other != kNoKey ? kSecondFront : kSecondNone;
+            kind = front.key != kNoKey ? kSecondFront : kSecondNone;
         }
         coverage[at] = kind << kSecondShift | (coverage[at] & 255u);
     } else {

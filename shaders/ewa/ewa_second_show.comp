@@ -6,18 +6,19 @@ layout(local_size_x = 64) in;
 
 void main() {
     const uvec2 pixel = gl_GlobalInvocationID.xy;
-    if (hasSeconds == 0u || pixel.x >= frame.width || pixel.y >= frame.height) return;
+    if (pixel.x >= frame.width || pixel.y >= frame.height) return;
     const uint at = pixel.y * frame.width + pixel.x;
     const uint kind = secondKind(at);
     if (kind == kSecondNone) return;
     FilteredPixel p;
+    const FilteredSums s = sums[at];
     float depth;
+    float share = coveredBy(s.rims, s.unit);
     if (kind == kSecondFront) {
         p = filtered[at];
         depth = keyDepth(visibility[at]);
-        visibility[at] = seconds[at].other;
+        visibility[at] = fronts[at].key;
     } else {
-        const FilteredSums s = sums[at];
         const float covered = min(coveredBy(s.weight, s.unit), 1.0);
         if (kind == kSecondBefore && covered < kLeastShare) {
             coverage[at] &= 255u;
@@ -32,10 +33,10 @@ void main() {
         else
             p = ownOf(id, node, r);
         p.cover |= (recordFlags(r) & kFlagLeaf) != 0u ? kFilteredLeaf : 0u;
-        seconds[at].share = kind == kSecondBefore ? covered : 1.0 - seconds[at].share;
+        share = kind == kSecondBefore ? covered : 1.0 - min(share, 1.0);
     }
     uint material = kPlainSurface;
     if (frame.hasMaterials != 0u && (p.cover & kFilteredMaterial) != 0u) material = surfaceWord(surfaceOfPoint(p.cover >> 16));
     if ((p.cover & kFilteredLeaf) != 0u) material |= kPixelLeaf;
-    seconds[at].shown = SurfaceWords(depth, p.normal, p.colour, material);
+    sums[at] = sumsOfSecond(SecondSurface(SurfaceWords(depth, p.normal, p.colour, material), min(share, 1.0)));
 }

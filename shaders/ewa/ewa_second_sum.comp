@@ -1,4 +1,4 @@
-// Discs of few pixels to the sums of second surfaces, if there are any.
+// Discs of few pixels to the sums of second surfaces.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "kernel_disc.glsl"
@@ -7,6 +7,5 @@ void useDisc(KernelDisc p, ivec2 pixel) { addSecond(p.disc, p.side * p.rough, p.
 #include "each_block.glsl"
 
 void main() {
-    if (hasSeconds == 0u) return;
     eachOfBlock();
 }

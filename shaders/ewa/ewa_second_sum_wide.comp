@@ -7,6 +7,5 @@ void useDisc(KernelDisc p, ivec2 pixel) { addSecond(p.disc, p.side * p.rough, p.
 #include "each_wide.glsl"
 
 void main() {
-    if (hasSeconds == 0u) return;
     eachOfList();
 }

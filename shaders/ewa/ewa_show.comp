@@ -43,11 +43,11 @@ void main() {
     const uint kind = ends ? (isLeaf ? kSecondNone : kSecondBehind) : before >= kLeastShare ? kSecondBefore : kSecondNone;
     coverage[at] = kind << kSecondShift;
     if (kind == kSecondNone) return;
-    SecondSurface second;
-    second.other = exact;
-    second.shown = SurfaceWords(0.0, 0u, 0u, 0u);
-    second.share = min(covered, 1.0);
-    second.limit = hasFront ? keyDepth(front.key) : 0.0;
-    seconds[at] = second;
-    if (!isShown) fronts[at].key = kNoKey;  // its rims are those before the other kind
+    if (kind == kSecondBehind) {
+        sums[at].rims = s.weight;
+        sums[at].nearest = keyDepth(front.key);
+        fronts[at].key = exact;
+    } else if (!isShown) {
+        fronts[at].key = kNoKey;  // its rims are those before the other kind
+    }
 }

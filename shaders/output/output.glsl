@@ -9,7 +9,7 @@
 #endif
 #include "../shared/ewa.h"
 layout(set = 0, binding = kCoverageBinding, scalar) readonly buffer CoverageBlock { uint coverage[]; };
-layout(set = 0, binding = kSecondsBinding, scalar) readonly buffer SecondBlock { uint hasSeconds; uint unusedSeconds; SecondSurface seconds[]; };
+layout(set = 0, binding = kSumsBinding, scalar) readonly buffer SumBlock { FilteredSums sums[]; };  // and second surfaces
 layout(local_size_x = 64) in;
 
 // A second surface is lit on its own, and has its share of what the pixel sends; where it is the front, depth and normal
@@ -51,7 +51,7 @@ void main() {
     float share = valid ? 1.0 : 0.0;
     if (valid && stepInfo.hasFiltered != 0u) {
         const uint kind = coverage[at] >> kSecondShift;
-        if (kind != kSecondNone) mixSecond(kind, seconds[at], pixel, s, colour, n);
+        if (kind != kSecondNone) mixSecond(kind, secondOfSums(sums[at]), pixel, s, colour, n);
         share = float(coverage[at] & 255u) / 255.0;
         colour = frame.background + share * (colour - frame.background);
     }

@@ -29,7 +29,7 @@ const uint kSumsBinding = 21u;
 const uint kFilteredBinding = 22u;
 const uint kCoverageBinding = 23u;
 const uint kMaterialSumsBinding = 24u;
-const uint kSecondsBinding = 25u;
+const uint kSecondGroupsBinding = 25u;
 const uint kLayerBinding = 26u;
 const uint kOpticsBinding = 27u;
 const uint kBehindBinding = 28u;
@@ -47,6 +47,18 @@ const uint kWideCapacity = 65536u;   // curves
 const uint kBandRows = 16u;
 const uint kBandGroups = 64u;             // beside each other, one after another through the list
 const uint kGroupsPerDimension = 65535u;  // of blocks: the others are in the next row
+
+// How many groups there are over blocks, bands and pixels, where the device itself finds out whether there is anything
+// to do: z is 0 until there is.
+struct GroupCounts {
+    uint x;
+    uint y;
+    uint z;
+};
+const uint kOverBlocks = 0u;
+const uint kOverBands = 1u;
+const uint kOverPixels = 2u;
+const uint kGroupShapes = 3u;
 
 // `fine` and `coarse` are word offsets of the planes of two levels of the pyramid.
 struct Step {

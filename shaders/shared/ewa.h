@@ -177,8 +177,8 @@ struct FilteredSums {
     int nx;
     int ny;
     int nz;
-    int rims;         // weights of what is before the front, as another surface
-    float nearest;    // depth that it is before of
+    int rims;         // weights of what is before the front, as another surface; then kSecondBehind: those of the front
+    float nearest;    // depth that it is before of; then kSecondBehind: that behind which the front ends
     uint behind;      // 1: something is opaque behind the front
     float reference;  // depth, which others are told against
     float unit;       // what 1 is (sumUnit)
@@ -196,13 +196,32 @@ const uint kSecondNone = 0u;
 const uint kSecondBefore = 1u;  // rims of discs before it that are not opaque there
 const uint kSecondBehind = 2u;  // discs behind its front, which ends there
 const uint kSecondFront = 3u;   // its front itself, which ends there: another kind is behind, and has the key
-// On the gpu, one a pixel, where coverage says which kind it is.
 struct SecondSurface {
-    uint64_t other;  // key of another kind there; kNoKey: none
     SurfaceWords shown;
-    float share;  // of the pixel; before it is known: what the front covers
-    float limit;  // depth behind which the front ends
+    float share;  // of the pixel
 };
+// On the gpu it lies in the place of the pixel's sums, which are done with by then.
+SHARED_FN FilteredSums sumsOfSecond(SecondSurface second) {
+    FilteredSums s;
+    s.weight = s.depth = s.red = s.green = s.blue = s.rims = 0;
+    s.nx = int(second.shown.normal);
+    s.ny = int(second.shown.albedo);
+    s.nz = int(second.shown.material);
+    s.nearest = second.share;
+    s.behind = 0u;
+    s.reference = second.shown.depth;
+    s.unit = 0.0f;
+    return s;
+}
+SHARED_FN SecondSurface secondOfSums(FilteredSums s) {
+    SecondSurface second;
+    second.shown.depth = s.reference;
+    second.shown.normal = uint(s.nx);
+    second.shown.albedo = uint(s.ny);
+    second.shown.material = uint(s.nz);
+    second.share = s.nearest;
+    return second;
+}
 const uint kSecondShift = 8u;  // of coverage
 // One that is less of a pixel than this is left out: at most a 64th of the contrast.
 const float kLeastShare = 0.015625f;

@@ -438,7 +438,7 @@ TEST(Shaders, TouchThePlanesThatTheirPassesDeclare) {
         {shared::kMaterialSumsBinding, {Plane::filtered}},
         {shared::kFilteredBinding, {Plane::filtered}},
         {shared::kCoverageBinding, {Plane::filtered}},
-        {shared::kSecondsBinding, {Plane::filtered}},
+        {shared::kSecondGroupsBinding, {Plane::filtered}},
         {shared::kTexelsBinding, {Plane::texels, Plane::coarse, Plane::smooth}},
         {shared::kTriangleWordsBinding, {Plane::texels}},
         {shared::kSurfaceBinding, {Plane::surface}},
