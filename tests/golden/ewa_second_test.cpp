@@ -5,9 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "engine/scene/surfels.h"
 #include "engine/scene/triangles.h"
-#include "shaders/shared/border.h"
 #include "tests/support/backends_here.h"
 #include "tests/support/drawn_discs.h"
 #include "tests/support/meshes.h"
@@ -130,86 +128,6 @@ TEST_F(EwaSecond, RimsAreAsSoftBeforeAWallAsBeforeTheSky) {
         EXPECT_EQ(wall.sky + mesh.sky, 0u) << name;
         EXPECT_EQ(wall.farOff + mesh.farOff, 0u) << name << ": a depth between both";
     }
-}
-
-/// Triangles (red) that go on as points, whose border's records are of another colour (green, as the points): within
-/// the triangles that fades in the width of a kernel. The control: the same records, not told as a border's, are not
-/// seen on triangles at all.
-TEST_F(EwaSecond, BordersBlendWithTheTrianglesThatTheyStandOn) {
-    constexpr double kSpacing = 0.01;
-    scene::Scene green;
-    scene::Primitive mesh, cloud;
-    mesh.position = {{-0.6f, -0.6f, 0}, {0, -0.6f, 0}, {0, 0.6f, 0}, {-0.6f, 0.6f, 0}};
-    mesh.normal.assign(4, {0, 0, 1});
-    mesh.indices = {0, 1, 2, 0, 2, 3};
-    mesh.material = 0;
-    cloud.kind = scene::PrimitiveKind::points;
-    cloud.material = 0;
-    for (int y = -60; y < 60; ++y)
-        for (int x = 1; x < 60; ++x) {
-            cloud.indices.push_back(static_cast<uint32_t>(cloud.position.size()));
-            cloud.position.emplace_back(kSpacing * x, kSpacing * y, 0);
-            cloud.normal.emplace_back(0, 0, 1);
-        }
-    green.materials.resize(1);
-    green.materials[0].baseColour = {0, 1, 0, 1};
-    green.materials[0].isUnlit = true;
-    green.meshes.resize(1);
-    green.meshes[0].primitives = {mesh, cloud};
-    green.nodes.resize(1);
-    green.nodes[0].mesh = 0;
-    scene::Scene red = green;
-    red.materials[0].baseColour = {1, 0, 0, 1};
-    lod::MeshBuildSettings build;
-    build.description.materials = scene::surfaceMaterials(red);
-    Progress silent(false);
-    ASSERT_TRUE(lod::buildMeshStore(scene::triangleSource(red, scene::placements(red)), folder_ / "red.stipple", build,
-                                    *executor_, silent));
-    const auto points = [&](bool isFlagged) {
-        lod::BuildSettings settings;
-        settings.open = [&](const std::string&, const lod::ReadOptions&) -> Result<lod::PointSource> {
-            auto source = scene::sampleSurfels(green, {}, {0});
-            if (!source || isFlagged) return source;
-            source->openPart = [openPart = source->openPart](uint32_t part) {
-                auto read = openPart(part);
-                if (read)
-                    *read = [next = *read](lod::PointBlock& block, size_t most) {
-                        auto count = next(block, most);
-                        for (uint32_t& c : block.colour) c &= ~(shared::kFlagBorder << 24);
-                        return count;
-                    };
-                return read;
-            };
-            return source;
-        };
-        const std::string path = folder_ / (isFlagged ? "flagged.stipple" : "plain.stipple");
-        EXPECT_TRUE(lod::buildStore({"points"}, path, settings, *executor_, silent));
-        return opened(path);
-    };
-    const auto triangles = opened(folder_ / "red.stipple"), flagged = points(true), plain = points(false);
-    lod::View view = test::viewFromAbove({0, 0, 0});
-    view.width = view.height = 201;
-    view.focalPixels = 1500;  // five pixels a spacing
-    for (auto& [name, backend] : backends_)
-        for (const bool isFlagged : {true, false}) {
-            const render::Image image = drawn({{triangles, {}, {}}, {isFlagged ? flagged : plain, {}, {}}}, *backend,
-                                              *executor_, test::drawnAs(render::Mode::ewa, 1e-4, false), view);
-            // Of rows, the mean share of red from left to right; depth is the plane's.
-            std::vector<double> share(view.width, 0);
-            for (size_t i = 0; i < image.rgba.size(); ++i) {
-                share[i % view.width] += double{image.linear[3 * i]} / view.height;
-                ASSERT_NEAR(image.depth[i], 3, 1e-3) << name;
-                ASSERT_EQ(image.linear[3 * i + 2], 0) << name << ": the sky";
-            }
-            double step = 0, most = 0;
-            for (size_t x = 1; x < share.size(); ++x) step = std::max(step, std::abs(share[x] - share[x - 1]));
-            for (size_t x = 0; x < 90; ++x) most = std::max(most, 1 - share[x]);
-            std::printf("%-7s %s: largest step between columns %.2f, green farther in %.3f\n", name.c_str(),
-                        isFlagged ? "border" : "control", step, most);
-            EXPECT_LT(most, 0.002) << name << ": two spacings in there is nothing of them";
-            if (isFlagged) EXPECT_LT(step, 0.5) << name;
-            if (!isFlagged) EXPECT_GT(step, 0.95) << name;
-        }
 }
 
 }  // namespace

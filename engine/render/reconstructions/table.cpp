@@ -44,7 +44,7 @@ constexpr std::array<Reconstruction, 6> kReconstructions{{
      .exactCurves = 0.5f},
     {.mode = Mode::ewa,
      .name = "ewa",
-     .summary = "discs blended by Gaussian kernels, with a low-pass",
+     .summary = "discs blended by Gaussian kernels, with a low-pass; those on borders of triangles, with these",
      .hasPyramid = false,
      .closesGaps = true,
      .fillsSplats = true,
