@@ -218,6 +218,32 @@ nlohmann::json materialJson(const MaterialOptions& of) {
     return {{"roughness", material->roughness}, {"metallic", material->metallic}};
 }
 
+/// Blocks of elevation patches that the last cut draws.
+uint64_t patchBlocksOf(const render::FrameState& state) {
+    uint64_t blocks = 0;
+    for (const lod::CutDraw& draw : state.cut.draw) blocks += draw.triangles > 0 ? draw.count : 0;
+    return blocks;
+}
+/// How patches are drawn, in words.
+std::string patchAsText(const ModeOptions& drawn) {
+    if (drawn.patchAs == "splats") return drawn.interpolate == "direct" ? "direct splats" : "splats";
+    return drawn.patchAs == "samples" ? "samples" : "strips";
+}
+/// What the last frame drew, in words.
+std::string drawnText(const render::FrameState& state, const ModeOptions& drawn) {
+    const FrameCounters& c = state.counters;
+    const uint64_t blocks = patchBlocksOf(state), ofPatches = blocks * shared::kPatchTriangles;
+    const uint64_t triangles = c.trianglesDrawn - std::min(c.trianglesDrawn, ofPatches);
+    std::vector<std::string> parts;
+    if (c.recordsDrawn > 0) parts.push_back(counted(c.recordsDrawn, "record"));
+    if (triangles > 0) parts.push_back(counted(triangles, "triangle"));
+    if (blocks > 0)
+        parts.push_back(fmt::format(
+            "{} of patches as {}{}", counted(blocks, "block"), patchAsText(drawn),
+            drawn.patchAs == "samples" ? "" : fmt::format(" ({} at most)", counted(ofPatches, "triangle"))));
+    return parts.empty() ? counted(0, "record") : fmt::format("{}", fmt::join(parts, ", "));
+}
+
 /// The result, as text or JSON.
 void tell(const Options& o, const render::FrameState& state, const Verdict& verdict, const Timings& timings,
           const glm::uvec2& size, size_t views) {
@@ -239,6 +265,8 @@ void tell(const Options& o, const render::FrameState& state, const Verdict& verd
             {"passes", passes},
             {"records_drawn", c.recordsDrawn},
             {"triangles_drawn", c.trianglesDrawn},
+            {"patch_blocks_drawn", patchBlocksOf(state)},
+            {"patch_as", patchBlocksOf(state) > 0 ? nlohmann::json(patchAsText(o.drawn)) : nlohmann::json()},
             {"nodes_drawn", c.nodesDrawn},
             {"closes_gaps", closesGaps(o.drawn.mode)},
             {"tau_eff_px", jsonNumber(verdict.tauEffectivePixels)},
@@ -264,12 +292,9 @@ void tell(const Options& o, const render::FrameState& state, const Verdict& verd
                    numbered(o.output, verdict.worst), errorText(verdict, o.drawn.mode), pruningText(verdict.pruned),
                    quantile(timings.frames, 0.5), state.backend->device());
     } else if (!o.quiet) {
-        const std::string drawn =
-            c.trianglesDrawn == 0 ? counted(c.recordsDrawn, "record")
-            : c.recordsDrawn == 0 ? counted(c.trianglesDrawn, "triangle")
-                                  : counted(c.recordsDrawn, "record") + ", " + counted(c.trianglesDrawn, "triangle");
-        fmt::print("{}: {}, {}{}, {:.1f} ms a frame on {}\n", o.output, drawn, errorText(verdict, o.drawn.mode),
-                   pruningText(verdict.pruned), quantile(timings.frames, 0.5), state.backend->device());
+        fmt::print("{}: {}, {}{}, {:.1f} ms a frame on {}\n", o.output, drawnText(state, o.drawn),
+                   errorText(verdict, o.drawn.mode), pruningText(verdict.pruned), quantile(timings.frames, 0.5),
+                   state.backend->device());
     }
 }
 

@@ -18,9 +18,13 @@ inline constexpr uint64_t recordsOfSamples(uint64_t blocks) { return blocks * sh
 constexpr uint32_t kNoSample = 255;
 
 /// In the place of a chunk's blocks: a point for each sample, then records without one, as many as the blocks have
-/// places. Radii as Ochotta, Hiller & Saupe 2006, Eq 1, have them: half the diagonal of a cell, larger where the
-/// surface is steep on its plane. They stand on the steps of the node's cell that points stand on, so they are off by
-/// half of one. Patches reach over the borders of the cell; their samples there are left to the neighbour.
+/// places. A sample stands for the nearest quarter of each drawn cell around it, and its disc is a sphere's about
+/// those: where the surface goes on on all sides it lies at the sample and is as large as Ochotta, Hiller & Saupe 2006,
+/// Eq 1, has it (half the lifted diagonal of a cell, at most that of a surface 60 degrees from its plane); at a border
+/// it lies in the middle of what is there, so that it stands out by less than a third of a step and not by 0.7. It has
+/// the sample's normal if its rim then lies no farther than half a step off the cells, else the cells' own. They stand
+/// on the steps of the node's cell that points stand on, so they are off by half of one. Patches reach over the borders
+/// of the cell; their samples there are left to the neighbour.
 void samplesAsPoints(const Hierarchy& h, uint32_t chunk, Chunk& of);
 
 /// Is any payload one of patches?

@@ -404,6 +404,7 @@ TEST(PatchSamples, AreEachOnceAndInTheirCell) {
     EXPECT_TRUE(chunk.patchBlocks.empty() && chunk.patchPlanes.empty());
     const auto records = lod::withoutEmpty(chunk.records);
     EXPECT_EQ(records.size(), patch.samples());
+    size_t atSamples = 0;
     for (const shared::PointRecord& r : records) {
         EXPECT_EQ(shared::recordErrorCode(r), 0u);
         const glm::dvec3 q = glm::dvec3(shared::recordX(r), shared::recordY(r), shared::recordZ(r)) / 32768.0 - 1.0;
@@ -411,7 +412,45 @@ TEST(PatchSamples, AreEachOnceAndInTheirCell) {
         const lod::PatchSurface surface(patch);
         for (size_t s = 0; s < patch.heights.size(); ++s)
             if (patch.heights[s] != 0) nearest = std::min(nearest, glm::length(surface.position(s) - q));
-        EXPECT_LE(nearest, std::sqrt(3.0) / 65536 + 1.0 / 65536) << "half a step each way, and the step's middle";
+        atSamples += nearest <= std::sqrt(3.0) / 65536 + 1.0 / 65536 ? 1 : 0;  // half a step each way, and its middle
+        EXPECT_LE(nearest, 0.6 * double{patch.step}) << "at borders: in the middle of the quarters of cells";
+    }
+    size_t inside = 0;
+    for (uint32_t j = 1; j + 1 < patch.height; ++j)
+        for (uint32_t i = 1; i + 1 < patch.width; ++i)
+            inside +=
+                patch.hasCell(i - 1, j - 1) && patch.hasCell(i, j - 1) && patch.hasCell(i - 1, j) && patch.hasCell(i, j)
+                    ? 1
+                    : 0;
+    EXPECT_GT(inside, 100u);
+    EXPECT_GE(atSamples, inside) << "and some between two cells that meet at the sample alone";
+}
+
+// Normals of a texture, or of a crease's other side, say nothing about the cells: a radius of theirs (Eq 1) made discs
+// of six steps, upright on the patch.
+TEST(PatchSamples, KeepToTheirCellsWhateverTheirNormalsSay) {
+    for (const double slope : {0.0, 0.5, 4.0}) {
+        const auto fromRidge = [](double x) { return x - 0.4 * std::round(x / 0.4); };
+        const auto f = [&](double x, double) { return slope * std::abs(fromRidge(x)) - 0.5; };
+        lod::Patch patch = test::patchOfHeights(40, 40, f);
+        for (uint32_t s = 0; s < patch.normals.size(); s += 3)
+            patch.normals[s] = lod::roundedNormal(glm::normalize(glm::vec3(1, 0.2 * (s % 7), 0.02)));
+        PatchScene scene({patch});
+        lod::Chunk chunk = scene.chunk();
+        lod::samplesAsPoints(scene.hierarchy(), 0, chunk);
+        const double step{patch.step}, rounding = std::exp2(1.0 / 16);  // of radii, outwards
+        size_t seen = 0;
+        for (const shared::PointRecord& r : lod::withoutEmpty(chunk.records)) {
+            const double radius = 2 * double{shared::radiusFraction(shared::recordRadiusCode(r))};
+            const double x = fromRidge(shared::recordX(r) / 32768.0 - 1);
+            EXPECT_LE(radius, std::sqrt(2.0) * step * rounding);
+            if (std::abs(x) < 1.1 * step || std::abs(x) > 0.2 - 1.1 * step) continue;
+            ++seen;
+            const glm::dvec3 face = glm::normalize(glm::dvec3(x > 0 ? -slope : slope, 0, 1));
+            const glm::dvec3 normal(shared::octDecode(r.normal));
+            EXPECT_LE(radius * glm::length(glm::cross(face, normal)), (0.5 * rounding + 0.01) * step) << slope;
+        }
+        EXPECT_GT(seen, 300u);
     }
 }
 

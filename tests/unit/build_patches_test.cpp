@@ -112,6 +112,14 @@ TEST(BuildPatches, FillThePictureAsTheirSourceDoes) {
     const double wanted = width(covered(folder, "torus.obj", ""));
     EXPECT_GT(wanted, 100);
     EXPECT_NEAR(width(covered(folder, "t.stipple", "")), wanted, 0.04 * wanted);
+    const auto says = [&](const char* how, const char* what) {
+        const Outcome drawn = runProgram(folder, fmt::format("render t.stipple -o how.png {}", how));
+        EXPECT_NE(drawn.out.find(what), std::string::npos) << drawn.out;
+    };
+    says("", " of patches as strips (");
+    says("--patch-as splats", " of patches as splats (");
+    says("--patch-as splats --interpolate direct", " of patches as direct splats (");
+    says("--patch-as samples", " of patches as samples, ");
     const Outcome odd = runProgram(folder, "render t.stipple -o odd.png --interpolate direct");
     EXPECT_EQ(odd.code, 2);
     EXPECT_NE(odd.err.find("--patch-as splats"), std::string::npos) << odd.err;
