@@ -62,8 +62,9 @@ struct DiscBatch {
     alignas(64) float cx[kSize], cy[kSize], cz[kSize], nx[kSize], ny[kSize], nz[kSize], radius[kSize];
     alignas(64) float x[kSize], y[kSize], alongX[kSize], skew[kSize], alongY[kSize], linear[kSize], slopeX[kSize],
         slopeY[kSize], least[kSize], most[kSize], isNear[kSize];
-    alignas(64) uint32_t reached[kSize];  ///< blocks that it may meet; none of what is beyond the batch's end
-    alignas(64) int missed[kSize];        ///< entry of the pixel that holds the centre, but whose ray misses; else -1
+    alignas(64) uint32_t reached[kSize];   ///< blocks that it may meet; none of what is beyond the batch's end
+    alignas(64) int missed[kSize];         ///< entry of the pixel that holds the centre, but whose ray misses; else -1
+    alignas(64) float missedDepth[kSize];  ///< ownDepth there
     alignas(64) uint32_t id[kSize], alone[kSize];
     bool hasNear;  ///< some are not wholly before the eye
     WideDisc disc(size_t i) const { return {vec3(cx[i], cy[i], cz[i]), vec3(nx[i], ny[i], nz[i]), radius[i], 0u}; }
@@ -206,10 +207,10 @@ void prepareNear(const FrameConstants& f, size_t count, const SplatTile& tile, f
         const CentrePixel c = centrePixel(d, f);
         const int atX = c.x - int(tile.x0), atY = c.y - int(tile.y0);
         const bool isHere = c.x >= 0 && atX >= 0 && atX < int(tile.width) && atY >= 0 && atY < int(tile.height);
-        const DiscHit hit = discHit(d,
-                                    pixelRay(lens, (float(c.x) + 0.5f - f.centre.x) * inverseFocal,
-                                             (float(c.y) + 0.5f - f.centre.y) * inverseFocal),
-                                    f.nearPlane);
+        const PixelRay ray = pixelRay(lens, (float(c.x) + 0.5f - f.centre.x) * inverseFocal,
+                                      (float(c.y) + 0.5f - f.centre.y) * inverseFocal);
+        const DiscHit hit = discHit(d, ray, f.nearPlane);
+        b.missedDepth[i] = ownDepth(d, ray, b.alone[i] != 0u, f);
         const bool isSmall = b.alone[i] != 0u || d.radius * f.focal < between * lensDepth(lens, d.centre.z);
         b.missed[i] = isHere && isSmall && !(hit.rho2 <= 1.0f) ? tileEntry(atX, atY) : -1;
     }
@@ -264,8 +265,7 @@ void prepareDiscs(const FrameConstants& frame, const PlacedSplat* splats, const 
         const float toImage = focal / lensDepth(lens, centre.z);
         const float midX = centre.x * toImage, midY = centre.y * toImage;
         // No farther than the disc's rim, whatever rounding makes of planes that are seen edge-on.
-        // (Not of 1 - n.z^2, of which nothing is left of planes that face the eye.)
-        const float slab = 1.0001f * d.radius * std::sqrt(d.normal.x * d.normal.x + d.normal.y * d.normal.y);
+        const float slab = discReach(d);
         const float nearest = centre.z - slab, farthest = centre.z + slab;
         b.x[i] = k.x;
         b.y[i] = k.y;
@@ -283,14 +283,20 @@ void prepareDiscs(const FrameConstants& frame, const PlacedSplat* splats, const 
         boxes.set(i, columns, rows);
         // Where the ray of the centre's pixel misses a small disc, that pixel shows it all the same.
         const float atX = std::floor(midX + f.centre.x) - left, atY = std::floor(midY + f.centre.y) - top;
-        const float dx = atX + (left + 0.5f - f.centre.x - k.x),
-                    across = atY + (top + 0.5f - f.centre.y - k.y) - k.skew * dx;
+        const float dx = atX + (left + 0.5f - f.centre.x - k.x), dy = atY + (top + 0.5f - f.centre.y - k.y),
+                    across = dy - k.skew * dx;
         const float within = min(min(atX, lastX - atX), min(atY, lastY - atY));
         const bool isMet = dx * dx * k.alongX + across * across * k.alongY <= 1.0f;
         const float reach = b.alone[i] != 0u ? 0.0f : d.radius * toImage;
         const float misses = isMet | (reach >= between) ? -1.0f : within;
         const int entry = tileEntry(int(min(max(atX, 0.0f), lastX)), int(min(max(atY, 0.0f), lastY)));
         b.missed[i] = misses >= 0.0f ? entry : -1;
+        const float joined = b.alone[i] != 0u ? 0.0f : 1.0f;  // as in ownDepth
+        const float beyond = farthest + joined * (kPlanePixels / toImage);
+        const float there = b.linear[i] + (b.slopeX[i] * dx + b.slopeY[i] * dy);
+        const float onPlane =
+            kOrthographic ? min(max(there, nearest), beyond) : 1.0f / min(max(there, 1.0f / beyond), b.most[i]);
+        b.missedDepth[i] = onPlane + joined * kThicknessRadii * d.radius;
     }
     prepareNear(f, count, tile, between, b, boxes);
     reachBlocks(boxes, count, b.reached);

@@ -60,11 +60,15 @@ template <bool anyTurned>
     }
 }
 
-/// The same where every pixel that a disc covers is its own: no splats, but what the pixels show.
+/// The same where every pixel that a disc covers is its own: no splats, but what the pixels show. `isBlended`: of more
+/// than one disc.
 template <bool anyTurned>
-[[gnu::always_inline]] inline void resolveExact(const FrameConstants& f, const Gathered& g, uint32_t x0, uint32_t y,
-                                                uint32_t n, TexelRow& __restrict row) {
-    const float focal = f.focal, x = float(int(x0)) + 0.5f - f.centre.x, py = float(int(y)) + 0.5f - f.centre.y;
+[[gnu::always_inline]] inline void resolveExact(const FrameConstants& f, const Gathered& g, bool isBlended, uint32_t x0,
+                                                uint32_t y, uint32_t n, TexelRow& __restrict row) {
+    const float focal = f.focal, support = f.supportScale,
+                mostScattered = largestSplat(kFlagScattered, focal, f.height), anywhere = isBlended ? 3.0e38f : 0.0f;
+    const Lens lens = lensHere(focal);
+    const float x = float(int(x0)) + 0.5f - f.centre.x, py = float(int(y)) + 0.5f - f.centre.y;
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const bool valid = g.front[i] > 0.0f;
@@ -74,7 +78,9 @@ template <bool anyTurned>
         const float flip = dot(nc, v) > 0.0f ? -1.0f : 1.0f;
         const vec2 perp = perpFromNormal(nc, v);
         Texel t;
-        t.depth = valid ? g.front[i] : 0.0f;
+        const float cap = (g.flags[i] & kFlagScattered) != 0u ? lensDepth(lens, c.z) * mostScattered : 3.0e38f;
+        const float shown = shownDepth({c, nc, min(g.radius[i] * support, cap), 0u}, g.front[i]);
+        t.depth = valid ? min(g.front[i], max(shown, anywhere)) : 0.0f;
         t.radius = valid ? kExactRadius : 0.0f;
         t.thickness = (g.flags[i] & kFlagLeaf) != 0u ? kLeafThickness * t.radius : t.radius;
         t.offset = vec2(0.0f, 0.0f);
@@ -88,7 +94,7 @@ template <bool anyTurned>
 void resolvePoints(const FrameConstants& f, const ResolveInput& in, const Gathered& g, uint32_t x0, uint32_t y,
                    uint32_t n, TexelRow& row) {
     if (in.exactPoints)
-        resolveExact<anyTurned>(f, g, x0, y, n, row);
+        resolveExact<anyTurned>(f, g, in.filtered != nullptr, x0, y, n, row);
     else
         resolveSplats<anyTurned>(f, g, x0, y, n, row);
     if (row.hasMaterials)
@@ -180,6 +186,7 @@ struct OtherPixels {
     g.nx[i] = d.x;
     g.ny[i] = d.y;
     g.nz[i] = d.z;
+    g.radius[i] = 0;
     g.flags[i] = (shown.cover & kFilteredLeaf) != 0 ? kFlagLeaf : 0u;
     g.colour[i] = shown.colour;
     g.material[i] = (shown.cover & kFilteredMaterial) != 0 ? shown.cover >> 16 : kPlainPoint;

@@ -58,10 +58,10 @@ void splatBatch(const DiscBatch& b, size_t count, const TileGrid& grid, const Fr
     for (int block = 0; block < kTileBlocks; ++block)
         if (discs.of[block] != 0u) splatBlock<hasNear>(b, discs.of[block], block, grid, f, front);
     forMissed(
-        b, count, [&](size_t i, int at) __attribute__((always_inline)) { return b.cz[i] <= front.depth[at]; },
+        b, count, [&](size_t i, int at) __attribute__((always_inline)) { return b.missedDepth[i] <= front.depth[at]; },
         [&](size_t i) __attribute__((always_inline)) {
             const auto at = size_t(b.missed[i]);
-            const float depth = b.cz[i];
+            const float depth = b.missedDepth[i];
             if (!(depth < front.depth[at] || (depth == front.depth[at] && b.id[i] < front.id[at]))) return;
             front.depth[at] = depth;
             front.id[at] = b.id[i];

@@ -60,6 +60,23 @@ std::pair<double, double> meet(const PlacedDisc& d, const ViewRay& ray, double n
     return depth > nearPlane && rho2 <= 1 ? std::pair(depth, rho2) : std::pair(HUGE_VAL, HUGE_VAL);
 }
 
+/// Of a disc that the ray through the pixel of its centre misses: the depth by which it competes there (that of its
+/// plane, no nearer than its rim and no more than 16 pixels beyond it, a quarter of its radius behind), and the one
+/// that it shows.
+struct MissedDisc {
+    double competes, shown;
+};
+MissedDisc missedAt(const PlacedDisc& d, const ViewRay& ray, const lod::View& view, bool isAlone) {
+    const double reach = d.radius * std::hypot(d.normal.x, d.normal.y);
+    const double nearest = std::max(d.centre.z - reach, view.nearPlane), rim = std::max(d.centre.z + reach, nearest);
+    const double farthest = isAlone ? rim : rim + 16 / pixelsAt(view, d.centre.z);
+    double plane = glm::dot(d.normal, d.centre - ray.origin) / glm::dot(d.normal, ray.direction);
+    if (!view.isOrthographic && !(plane > 0)) plane = HUGE_VAL;  // beyond the horizon
+    if (std::isnan(plane)) plane = d.centre.z;
+    const double competes = std::clamp(plane, nearest, farthest) + (isAlone ? 0 : 0.25 * d.radius);
+    return {competes, std::min(competes, rim)};
+}
+
 /// The material of a record: that of the whole picture, its own, or its store's.
 std::optional<lod::PointMaterial> materialOf(const render::DrawList& draws, uint32_t hierarchy,
                                              const std::vector<uint16_t>& own, uint32_t record) {
@@ -116,8 +133,9 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
         const double steps =
             code > 0 ? std::exp2((code - 1) / 8.0) : double{lod::recordSpacing(lod::withoutEmpty(records))};
         const double spacing = h.isStochastic ? 0 : instance.scale * h.unit * step * steps;
+        const bool isDebug = f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError;
         const bool isSmooth =
-            spacing > 0 && areFacets(draws, cut, draws.bends.empty() ? nullptr : &draws.bends[d], records);
+            !isDebug && spacing > 0 && areFacets(draws, cut, draws.bends.empty() ? nullptr : &draws.bends[d], records);
         for (uint32_t i = 0; i < cut.count; ++i) {
             Disc disc = decodeDisc(h, node, records[i]);
             disc.radius *= cut.radiusScale;
@@ -135,7 +153,6 @@ std::vector<PlacedDisc> placedDiscs(const render::DrawList& draws, const Chunks&
             const bool oneSided = (disc.flags & (shared::kFlagTwoSided | shared::kFlagNoNormal)) == 0;
             if (oneSided && glm::dot(n, sightOf(v, c)) >= 0) continue;
             if ((disc.flags & shared::kFlagNoNormal) != 0) n = -sightOf(v, c);
-            const bool isDebug = f.debugView == shared::kDebugLevel || f.debugView == shared::kDebugError;
             // Squares of 255ths.
             const double weight = chunk.weights.empty() ? 0 : std::pow(chunk.weights[i] / 255.0, 2);
             out.push_back({c, n, instance.scale * disc.radius * f.supportScale,
@@ -200,15 +217,21 @@ void showWide(const render::DrawList& draws, const std::vector<PlacedDisc>& disc
 
 void showSplats(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level) {
     const lod::View& v = draws.view;
-    const auto offer = [&](int x, int y, const PlacedDisc& d, bool isCentre) {
+    const auto offer = [&](int x, int y, const PlacedDisc& d, bool isCentre, bool isAlone) {
         const dvec2 at(x + 0.5, y + 0.5);
         const ViewRay ray = viewRay(v, at);
         double depth = meet(d, ray, v.nearPlane).first;
-        if (depth == HUGE_VAL && isCentre) depth = d.centre.z;
+        double shown = depth;
+        if (depth == HUGE_VAL && isCentre) {
+            const MissedDisc missed = missedAt(d, ray, v, isAlone);
+            depth = missed.competes;
+            shown = missed.shown;
+        }
         Sample& s = level.ref(x, y);
         if (depth == HUGE_VAL || (s.valid && s.key <= depth)) return;
         const dvec3 n = glm::dot(d.normal, ray.direction) > 0 ? -d.normal : d.normal;
-        s = shownPixel(v, at, depth, n, d.colour, isLeaf(d));
+        s = shownPixel(v, at, shown, n, d.colour, isLeaf(d));
+        s.key = depth;
         setMaterial(s, d.material);
         s.isSmooth = d.isSmooth;
     };
@@ -234,14 +257,14 @@ void showSplats(const render::DrawList& draws, const std::vector<PlacedDisc>& di
             range(d.centre.y, 0.5 * v.height, level.height - 1, y0, y1);
         }
         for (int y = y0; y <= y1; ++y)
-            for (int x = x0; x <= x1; ++x) offer(x, y, d, false);
+            for (int x = x0; x <= x1; ++x) offer(x, y, d, false, false);
         // Those that stand alone show it anyway; of others, only the small ones.
         const bool isLoose = (d.flags & (shared::kFlagScattered | shared::kFlagLeaf)) != 0;
         const bool isAlone = isLoose || 2 * stored < d.spacing;
         if (!isAhead || (!isAlone && d.radius * pixelsAt(v, d.centre.z) >= std::sqrt(0.5))) continue;
         const dvec2 p = imageOf(v, d.centre);
         if (p.x >= 0 && p.y >= 0 && p.x < level.width && p.y < level.height)
-            offer(static_cast<int>(p.x), static_cast<int>(p.y), d, true);
+            offer(static_cast<int>(p.x), static_cast<int>(p.y), d, true, isAlone);
     }
 }
 

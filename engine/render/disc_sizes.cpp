@@ -68,6 +68,8 @@ void markDiscSizes(const DiscSizes& sizes, DrawList& draws) {
     const shared::FrameConstants& f = draws.frame;
     const double perFocal = double{shared::wideRadius(f.width, f.height)} / double{f.focal};
     draws.hasWideDiscs = draws.hasSmoothDiscs = false;
+    // Colours that stand for a node's level or error are not mixed with those of others.
+    const bool maySmooth = f.debugView != shared::kDebugLevel && f.debugView != shared::kDebugError;
     DrawBatch& points = draws.of(lod::Kind::points);
     for (size_t i = 0; i < points.nodes.size(); ++i) {
         shared::DrawNode& d = points.nodes[i];
@@ -78,7 +80,7 @@ void markDiscSizes(const DiscSizes& sizes, DrawList& draws) {
         // Leaves and the like, which are no surface, have no spacing.
         const double usual = double{d.edge} * double{f.supportScale * share.usual} * double{f.focal};
         const double middle = double{d.base.z} + 32768 * (double{d.axisX.z} + double{d.axisY.z} + double{d.axisZ.z});
-        if (d.spacing > 0 && usual > kSmoothPixels * (f.orthographic != 0 ? 1 : middle)) {
+        if (maySmooth && d.spacing > 0 && usual > kSmoothPixels * (f.orthographic != 0 ? 1 : middle)) {
             d.octantMask |= shared::kNodeSmooth;
             draws.hasSmoothDiscs = true;
         }

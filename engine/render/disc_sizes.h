@@ -16,7 +16,7 @@ namespace stipple::render {
 constexpr float kMostSpacings = 4.0f;
 /// Nodes are smooth (kNodeSmooth) whose usual disc has more than this radius at the middle of the node's cell, px.
 /// Below it facets are hardly larger than what is seen of a disc anyway: no difference was found at the usual errors of
-/// a pixel or two, and the pyramid costs as much again as the discs.
+/// a pixel or two, and the pyramid costs as much again as the discs. (None is where colours are levels or errors.)
 constexpr double kSmoothPixels = 4;
 /// Half of the radius that a texel can hold, px. Beyond it they are drawn exactly, too, wherever they would be lost:
 /// the picture lies within few spacings then.

@@ -57,8 +57,10 @@ bool texelOf(WideDisc d, out LevelPlane at, out uint texel) {
 // Depth of a disc at a pixel; the pixel of its centre shows a small one, and one that stands alone. kNoDisc where it is not seen.
 float depthAtPixel(WideDisc d, ivec2 pixel) {
     const vec2 ray = (vec2(pixel) + 0.5 - frame.centre) / frame.focal;
-    const float depth = discHit(d, pixelRay(frameLensHere(), ray.x, ray.y), frame.nearPlane).depth;
-    const CentrePixel c = ownPixel(d, standsAlone(d.id), frame);
+    const PixelRay through = pixelRay(frameLensHere(), ray.x, ray.y);
+    const float depth = discHit(d, through, frame.nearPlane).depth;
+    const bool isAloneHere = standsAlone(d.id);
+    const CentrePixel c = ownPixel(d, isAloneHere, frame);
     const bool isCentre = c.x == pixel.x && c.y == pixel.y;
-    return depth >= kNoDisc && isCentre ? d.centre.z : depth;
+    return depth >= kNoDisc && isCentre ? ownDepth(d, through, isAloneHere, frame) : depth;
 }

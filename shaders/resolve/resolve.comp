@@ -4,7 +4,7 @@
 #include "../bindings.glsl"
 #include "../shared/ewa.h"
 #include "../shared/splat_size.h"
-#include "../shared/wide_disc.h"
+#include "../shared/splat_disc.h"
 layout(set = 0, binding = kFilteredBinding, scalar) readonly buffer FilteredBlock { FilteredPixel filtered[]; };
 layout(local_size_x = 64) in;
 
@@ -34,7 +34,8 @@ void main() {
         const float radius = min(node.edge * radiusFraction(recordRadiusCode(r)) * frame.supportScale, lensDepth(lens, c.z) * largestSplat(recordFlags(r), frame.focal, frame.height));
         if (stepInfo.exactPoints != 0u) {  // no splat, but what the pixel shows
             const vec3 v = viewDirection(float(pixel.x) + 0.5 - frame.centre.x, float(pixel.y) + 0.5 - frame.centre.y, lens);
-            t.depth = keyDepth(key);
+            const float cap = (recordFlags(r) & kFlagScattered) != 0u ? lensDepth(lens, c.z) * largestSplat(kFlagScattered, frame.focal, frame.height) : 3.0e38;
+            t.depth = stepInfo.hasFiltered != 0u ? keyDepth(key) : shownDepth(WideDisc(c, n, min(node.edge * radiusFraction(recordRadiusCode(r)) * frame.supportScale, cap), 0u), keyDepth(key));
             t.radius = kExactRadius;
             t.thickness = (recordFlags(r) & kFlagLeaf) != 0u ? kLeafThickness * kExactRadius : kExactRadius;
             t.normalPerp = perpFromNormal(dot(n, v) > 0.0 ? -n : n, v);

@@ -1,9 +1,10 @@
 // Points as discs that are drawn exactly (mode splat; Botsch & Kobbelt 2003, 3.1 and 3.2, with Eq 2 for a pinhole
 // camera): every pixel whose ray meets a disc is its own, at the depth where it does. Of a disc so small that it
-// could lie between the centres of pixels, the pixel that holds its centre is one of them, at the centre's depth if its
-// own ray misses: no disc is too small to be seen. So it is of any disc that stands alone. (Of
-// others it misses those that are seen at a slant; with such a pixel outlines would be half a pixel too far out. What
-// they stand on is covered by their neighbours.)
+// could lie between the centres of pixels, the pixel that holds its centre is one of them though its ray misses: no
+// disc is too small to be seen. So it is of any disc that stands alone. (Of others it misses those that are seen at a
+// slant; with such a pixel outlines would be half a pixel too far out. What they stand on is covered by their
+// neighbours.) Such a pixel competes at the depth of the disc's plane on its ray (ownDepth), so that on a surface it
+// comes before none whose disc is met, and shows no place beyond the disc (shownDepth).
 #ifndef STIPPLE_SHARED_SPLAT_DISC_H
 #define STIPPLE_SHARED_SPLAT_DISC_H
 #include "splat_size.h"
@@ -67,6 +68,35 @@ SHARED_FN CentrePixel ownPixel(WideDisc d, bool isAloneHere, FrameConstants f) {
     p.x = isAloneHere || d.radius * f.focal < kBetweenPixels * lensDepth(frameLens(f), d.centre.z) ? p.x : -1;
     return p;
 }
+
+// Where a disc ends, nearest and farthest, by its slope. (Not of 1 - n.z^2, of which nothing is left of planes that
+// face the eye.)
+SHARED_FN float discReach(WideDisc d) {
+    return 1.0001f * d.radius * sqrt(d.normal.x * d.normal.x + d.normal.y * d.normal.y);
+}
+// So far behind a disc, px, its plane is followed at the most: right for planes that are seen at more than 2.6 degrees.
+const float kPlanePixels = 16.0f;
+// The depth by which a disc competes for the pixel of its centre if that pixel's ray misses it: that of its plane
+// there, no nearer than the disc is (what is met of its neighbours lies there), and by a quarter of its radius behind
+// those of the same plane. If it stands alone, that of the disc's nearest place to that.
+SHARED_FN float ownDepth(WideDisc d, PixelRay ray, bool isAloneHere, FrameConstants f) {
+    const Lens lens = frameLens(f);
+    const float reach = discReach(d);
+    const float beyond = isAloneHere ? 0.0f : kPlanePixels * lensDepth(lens, d.centre.z) / f.focal;
+    const float nearest = max(d.centre.z - reach, f.nearPlane);
+    const float farthest = max(d.centre.z + reach + beyond, nearest);
+    const vec3 c = fromRay(ray, d.centre);
+    const float facing = d.normal.x * ray.ex + d.normal.y * ray.ey + d.normal.z;
+    const float ahead = d.normal.x * c.x + d.normal.y * c.y + d.normal.z * c.z;
+    // Parallel rays meet any plane at ahead / facing; those of an eye meet it at no depth, where facing / ahead is not
+    // above 0: beyond its horizon.
+    const float along = ahead / (abs(facing) > 1.0e-30f ? facing : 1.0e-30f);
+    const float linear = facing / (abs(ahead) > 1.0e-30f ? ahead : 1.0e-30f);
+    const float plane = lens.isOrthographic ? along : 1.0f / max(linear, 1.0e-30f);
+    return min(max(plane, nearest), farthest) + (isAloneHere ? 0.0f : kThicknessRadii * d.radius);
+}
+// Of what competed at `depth`, the place that is shown.
+SHARED_FN float shownDepth(WideDisc d, float depth) { return min(depth, d.centre.z + discReach(d)); }
 
 SHARED_END
 #endif

@@ -37,10 +37,12 @@ void offerMet(WideDisc d, ivec2 pixel) {
 void offerOwn(uint block) {
     const WideDisc d = discOf(block, gl_LocalInvocationID.x);
     if (d.radius < 0.0) return;
-    const CentrePixel c = ownPixel(d, standsAlone(d.id), frame);
+    const bool isAloneHere = standsAlone(d.id);
+    const CentrePixel c = ownPixel(d, isAloneHere, frame);
     if (c.x >= 0) {
         const vec2 ray = (vec2(c.x, c.y) + 0.5 - frame.centre) * (1.0 / frame.focal);
-        if (!(discHit(d, pixelRay(frameLensHere(), ray.x, ray.y), frame.nearPlane).depth < kNoDisc)) offer(c.x, c.y, d.centre.z, d.id);
+        const PixelRay through = pixelRay(frameLensHere(), ray.x, ray.y);
+        if (!(discHit(d, through, frame.nearPlane).depth < kNoDisc)) offer(c.x, c.y, ownDepth(d, through, isAloneHere, frame), d.id);
     }
     const DiscBox box = discBox(d, frame);
     const int width = box.x.last - box.x.first + 1;

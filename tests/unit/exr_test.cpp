@@ -96,8 +96,7 @@ TEST(Exr, DepthAndNormalsOfAPlaneAreThoseOfThePlane) {
             }
             if (beyond > -0.1) continue;
             ++inside;
-            ASSERT_NEAR(double{z[i]}, depth, 0.25 * depth / focal)
-                << x << ' ' << y;  // discs of less than a pixel: at their centres
+            ASSERT_NEAR(double{z[i]}, depth, 0.05 * depth / focal) << x << ' ' << y;
             double cosine = 0;
             for (int c = 0; c < 3; ++c) cosine += double{n.at(static_cast<size_t>(c))[i]} * normal[c];
             ASSERT_GT(cosine, std::cos(0.3 * M_PI / 180)) << x << ' ' << y;
