@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "apps/stipple/common.h"
+#include "apps/stipple/study_scenes.h"
 #include "apps/study/study.h"
 #include "engine/base/process.h"
 #include "engine/image/image_io.h"
@@ -11,26 +12,39 @@ namespace stipple::app {
 namespace {
 
 struct Options {
-    std::string output, data;
-    bool seeds = false, quick = false, json = false, quiet = false;
-    int rounds = 5, threads = 0;
-    std::string progress = "auto";
+    StudyOptions scenes;
+    std::string data;
+    bool seeds = false;
+    int rounds = 5;
 };
 
-Result<void> run(const Options& o) {
-    if (!o.seeds)
-        return fail(ErrorKind::usage, "says what is to be studied, and is missing", "--seeds",
-                    "stipple study --seeds -o FOLDER");
+/// What each of the two studies has and the other would ignore.
+Result<void> checkOptions(const CLI::App& sub, const Options& o) {
+    if (!o.seeds && o.scenes.scenes.empty())
+        return fail(ErrorKind::usage, "says what is to be studied, and is missing", "SCENE",
+                    "stipple study SCENE -o FOLDER, or stipple study --seeds -o FOLDER");
+    for (const char* option : {"SCENE", "--full", "--modes", "--errors", "--sizes", "--views", "--camera-path",
+                               "--blocks", "--frames", "--seed", "--device", "--resident"})
+        if (o.seeds && sub.get_option(option)->count() > 0)
+            return fail(ErrorKind::usage, "is of studies of scenes, not of --seeds", option, "leave one of them out");
+    // (--data may come from the environment, for every command.)
+    if (!o.seeds && sub.get_option("--rounds")->count() > 0)
+        return fail(ErrorKind::usage, "is of --seeds, not of scenes", "--rounds", "take --frames and --blocks");
+    return {};
+}
+
+Result<void> runSeeds(const Options& all) {
+    const StudyOptions& o = all.scenes;
     catchStopSignals();
     STIPPLE_TRY(image::checkModule(true));
-    const auto executor = makeTbbExecutor(o.threads);
+    const auto executor = makeTbbExecutor(o.build.threads);
     Progress progress(!o.quiet && !o.json);
     const study::Host host{*executor, [&](const std::string& device) { return makeBackend(device, *executor); },
                            [&](const std::string& what, uint64_t done, uint64_t total) -> Result<void> {
                                progress.update("study: " + what, done, total);
                                return checkStopped(o.output, "what was found so far is not written");
                            }};
-    study::SeedsSettings settings{o.data, o.output, o.quick, o.rounds};
+    study::SeedsSettings settings{all.data, o.output, o.quick, all.rounds};
     auto studied = study::studySeeds(settings, host);
     if (!studied) return tl::unexpected(studied.error());
     if (o.json)
@@ -44,26 +58,33 @@ Result<void> run(const Options& o) {
 
 void setupStudy(CLI::App& app, int& status) {
     auto o = std::make_shared<Options>();
-    CLI::App* sub = app.add_subcommand("study", "what modes cost and how exact they are");
+    StudyOptions& scenes = o->scenes;
+    CLI::App* sub = app.add_subcommand("study", "what accuracy costs in time, on your scenes");
     sub->add_flag("--seeds", o->seeds, "the tables and figures of the papers that the modes stand on, made again");
-    sub->add_option("-o,--output", o->output, "folder for index.md, seeds.json, pictures and the models' stores")
+    sub->add_option("-o,--output", scenes.output,
+                    "folder for report.html, study.json, rows.csv; the same command goes on where it was stopped "
+                    "(--seeds: index.md, seeds.json, pictures, stores)")
         ->type_name("FOLDER")
         ->required();
+    sub->add_flag("--quick", scenes.quick,
+                  "minutes: 640x360, one camera of each path (--seeds: models of at most 300,000 points)");
+    scenes.addTo(*sub);
     sub->add_option("--data", o->data,
-                    "folder of the models that stand in for the papers'; rows without theirs are named")
+                    "--seeds: folder of the models that stand in for the papers'; rows without theirs are named")
         ->type_name("FOLDER")
         ->envname("STIPPLE_DATA");
-    sub->add_flag("--quick", o->quick, "models of at most 300,000 points, smaller pictures for errors, fewer poses");
-    sub->add_option("--rounds", o->rounds, "frames that times are medians of")
+    sub->add_option("--rounds", o->rounds, "--seeds: frames that times are medians of")
         ->transform(within(1, 1000))
         ->capture_default_str();
-    sub->add_option("--threads", o->threads, "threads (0: all cores)")
+    sub->add_option("--threads", scenes.build.threads, "threads (0: all cores)")
         ->transform(within(0, 1024))
         ->capture_default_str();
-    sub->add_flag("--json", o->json, "print what was measured as JSON (stipple help json)");
-    sub->add_flag("--quiet", o->quiet, "no progress");
-    sub->callback([o, &status] {
-        if (const auto result = run(*o); !result) status = report(result.error());
+    sub->add_flag("--json", scenes.json, "print what was measured as JSON (stipple help json)");
+    sub->add_flag("--quiet", scenes.quiet, "no progress");
+    sub->callback([o, sub, &status] {
+        auto result = checkOptions(*sub, *o);
+        if (result) result = o->seeds ? runSeeds(*o) : runSceneStudy(o->scenes);
+        if (!result) status = report(result.error());
     });
 }
 

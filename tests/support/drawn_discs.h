@@ -7,10 +7,10 @@
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "apps/study/audit/nearest_field.h"
 #include "engine/reference/decode.h"
 #include "engine/render/frame.h"
 #include "lod/store/store.h"
-#include "tests/support/nearest_field.h"
 #include "tests/support/support.h"
 
 namespace stipple::test {
@@ -49,6 +49,6 @@ struct OfDiscs {
     static double along(const reference::Disc& d, int axis) { return d.position[axis]; }
     static double distance(const reference::Disc& d, const glm::dvec3& place) { return distanceTo(d, place); }
 };
-using DiscField = NearestField<OfDiscs>;
+using DiscField = study::NearestField<OfDiscs>;
 
 }  // namespace stipple::test

@@ -1,8 +1,8 @@
 // How far a place is from the nearest of many triangles, in fp64.
 #pragma once
 
+#include "apps/study/audit/nearest_field.h"
 #include "tests/support/meshes.h"
-#include "tests/support/nearest_field.h"
 
 namespace stipple::test {
 
@@ -19,6 +19,6 @@ struct OfTriangles {
         return glm::length(place - closestPlace(t, place));
     }
 };
-using TriangleField = NearestField<OfTriangles>;
+using TriangleField = study::NearestField<OfTriangles>;
 
 }  // namespace stipple::test

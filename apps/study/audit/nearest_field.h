@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace stipple::test {
+namespace stipple::study {
 
 /// `Of`: what things are: `Item`; `grow(item, lo, hi)`: a box around it, too; `along(item, axis)`: where it is, by any
 /// measure; `distance(item, place)`.
@@ -73,4 +73,4 @@ class NearestField {
     std::vector<Node> nodes_;
 };
 
-}  // namespace stipple::test
+}  // namespace stipple::study

@@ -1,0 +1,66 @@
+// What is wrong with the frame of a cell, the three errors apart: level of detail (distances from the full detail; the
+// same mode's leaves), implementation (the backend against the fp64 restatement of the same cut, at a small size),
+// reconstruction (against the traced full detail).
+#pragma once
+
+#include <array>
+#include <functional>
+#include <limits>
+
+#include "apps/study/audit/audit.h"
+#include "apps/study/sweep/plan.h"
+#include "apps/study/sweep/scene_drawer.h"
+
+namespace stipple::study {
+
+/// nan: not measured. All are numbers, so that a table of them is a table.
+struct CellErrors {
+    static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    // The frame:
+    double stated = kNone;  ///< px, that the frame says it keeps
+    double records = kNone, triangles = kNone, nodes = kNone;
+    double bytes = kNone;  ///< of chunks in the file, that the frame needs
+    // Level of detail:
+    double lodMedian = kNone, lodP99 = kNone, lodMost = kNone;  ///< px, of drawn pixels from the full detail
+    double audited = kNone, beyond = kNone;  ///< pixels with a place; those beyond what is stated and half a pixel, and
+    double outline = kNone, gap = kNone, between = kNone, other = kNone;  ///< ... of what class (audit.h)
+    double lodDecibels = kNone;                                           ///< against the same mode's leaves
+    // Implementation, of the first camera of a path:
+    double backendDecibels = kNone, backendDiffering = kNone;  ///< dB; share of pixels more than 4 of 255 off
+    // Against the traced full detail:
+    double psnr = kNone, psnrForeground = kNone;  ///< dB
+    double leavesDecibels = kNone;                ///< foreground, of the mode's leaves: its reconstruction alone
+    double ssim = kNone, flipMean = kNone, flipP95 = kNone;
+    double overlap = kNone, boundary = kNone;  ///< IoU; px
+    double holes = kNone, spill = kNone;       ///< pixels
+    double depthRmse = kNone, depthP99 = kNone;
+    double normalMean = kNone, normalP95 = kNone;  ///< degrees
+};
+struct ErrorColumn {
+    const char* name;  ///< as in CSV and JSON
+    double CellErrors::*value;
+};
+std::span<const ErrorColumn> errorColumns();
+
+/// What all cells of one view share.
+struct ViewTruth {
+    render::Image traced;
+    lod::View view, small;
+};
+
+/// A worst place, enlarged: ours, traced, and what is seen of the difference (FLIP).
+using KeepCrop = std::function<Result<void>(const render::Image& crop)>;
+
+struct CellTools {
+    SceneDrawer& drawer;
+    SceneDrawer* oracle;     ///< fp64; null: this view is not compared with it
+    const FullDetail* full;  ///< null: not measured
+    Executor& executor;
+    const ViewTruth& truth;
+};
+
+/// `leaves`: of the mode, from the same view.
+Result<CellErrors> measureCell(const CellTools& tools, const Cell& cell, const render::Image& leaves,
+                               const KeepCrop& keepCrop);
+
+}  // namespace stipple::study

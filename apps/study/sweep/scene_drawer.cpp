@@ -1,0 +1,52 @@
+#include "apps/study/sweep/scene_drawer.h"
+
+namespace stipple::study {
+
+SceneDrawer::SceneDrawer(const StudyScene& scene, std::unique_ptr<render::Backend> backend, Executor& executor,
+                         uint64_t residentBytes)
+    : backend_(std::move(backend)), draw_(scene.draw) {
+    streaming::StreamSettings streams;
+    streams.residentBytes = residentBytes;
+    state_ = render::makeFrameState(scene.placed, *backend_, executor, streams, scene.groups);
+}
+
+render::FrameSettings SceneDrawer::settings(render::Mode mode, double target, bool wantDepth) const {
+    render::FrameSettings s;
+    s.mode = mode;
+    s.budgets.errorPixels = target;
+    s.draw = draw_;
+    s.wantDepthAndNormal = wantDepth;
+    return s;
+}
+
+Result<const render::Image*> SceneDrawer::draw(const lod::View& view, render::Mode mode, double target) {
+    STIPPLE_ASSIGN(const bool isComplete, render::renderUntilComplete(*state_, view, settings(mode, target, true)));
+    if (!isComplete)
+        return fail(ErrorKind::budget, "a frame of the study does not fit", "--resident", "give more memory");
+    return &state_->image;
+}
+
+Result<void> SceneDrawer::warm(const lod::View& view, render::Mode mode, double target) {
+    STIPPLE_ASSIGN(const bool isComplete, render::renderUntilComplete(*state_, view, settings(mode, target, false)));
+    if (!isComplete)
+        return fail(ErrorKind::budget, "a frame of the study does not fit", "--resident", "give more memory");
+    return {};
+}
+
+Result<void> SceneDrawer::again(const lod::View& view, render::Mode mode, double target) {
+    return render::renderResident(*state_, view, settings(mode, target, false));
+}
+
+uint64_t SceneDrawer::cutBytes() const {
+    std::vector<const lod::Store*> storeOf;
+    for (const lod::Instance& instance : state_->instances) {
+        storeOf.resize(std::max<size_t>(storeOf.size(), instance.source + 1));
+        storeOf[instance.source] = state_->stores[instance.hierarchy].get();
+    }
+    uint64_t bytes = 0;
+    for (const auto& [source, chunk] : state_->cut.keep)
+        bytes += lod::chunkPlace(storeOf[source]->hierarchy, chunk).bytes;
+    return bytes;
+}
+
+}  // namespace stipple::study

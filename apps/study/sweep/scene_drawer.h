@@ -1,0 +1,33 @@
+// A scene with a backend of its own, whose frames are drawn with what they want, and timed once it is there.
+#pragma once
+
+#include <memory>
+
+#include "apps/study/sweep/plan.h"
+
+namespace stipple::study {
+
+class SceneDrawer {
+  public:
+    SceneDrawer(const StudyScene& scene, std::unique_ptr<render::Backend> backend, Executor& executor,
+                uint64_t residentBytes);
+    /// Complete, with depth and normals. Error (budget): it does not fit.
+    Result<const render::Image*> draw(const lod::View& view, render::Mode mode, double target);
+    /// Brings what the frame wants, and draws it once, without depth and normals.
+    Result<void> warm(const lod::View& view, render::Mode mode, double target);
+    /// The same frame again: milliseconds are in counters(), those of passes in passes().
+    Result<void> again(const lod::View& view, render::Mode mode, double target);
+    const FrameCounters& counters() const { return state_->counters; }
+    const std::vector<render::PassTime>& passes() const { return backend_->passTimes(); }
+    /// Of the chunks that the last cut needs, as they lie in their files.
+    uint64_t cutBytes() const;
+    std::string device() const { return backend_->name() + ", " + backend_->device(); }
+
+  private:
+    render::FrameSettings settings(render::Mode mode, double target, bool wantDepth) const;
+    std::unique_ptr<render::Backend> backend_;
+    std::unique_ptr<render::FrameState> state_;
+    render::DrawSettings draw_;
+};
+
+}  // namespace stipple::study

@@ -1,0 +1,151 @@
+// `stipple study SCENE...` as a person runs it: what it writes, that it goes on, that its errors are the same bytes.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "apps/study/sweep/journal.h"
+#include "apps/study/sweep/plan.h"
+#include "tests/support/drawn_shapes.h"
+#include "tests/support/program.h"
+
+namespace stipple {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(SceneStudy, BlocksDrawEveryCellInAnOrderOfTheirOwn) {
+    const auto first = study::orderOf(200, 0, 1);
+    EXPECT_EQ(first, study::orderOf(200, 0, 1));
+    EXPECT_NE(first, study::orderOf(200, 1, 1));
+    EXPECT_NE(first, study::orderOf(200, 0, 2));
+    auto sorted = first;
+    std::sort(sorted.begin(), sorted.end());
+    for (uint32_t i = 0; i < 200; ++i) EXPECT_EQ(sorted[i], i);
+}
+
+TEST(SceneStudy, JournalsForgetTornLinesAndKeepWholeOnes) {
+    const test::TempFolder folder;
+    const study::CsvRow head{"a", "b"};
+    {
+        auto journal = study::Journal::open(folder / "j.csv", head);
+        ASSERT_TRUE(journal);
+        ASSERT_TRUE(journal->append({{"1", "x"}, {"2", study::csvNumber(0.1)}}));
+    }
+    test::spit(folder / "j.csv", test::slurp(folder / "j.csv") + "3,to");
+    {
+        auto journal = study::Journal::open(folder / "j.csv", head, [](const auto& row) { return row[0] != "1"; });
+        ASSERT_TRUE(journal);
+        ASSERT_EQ(journal->rows().size(), 1u);
+        EXPECT_EQ(study::numberOf(journal->rows()[0][1]), 0.1);
+        ASSERT_TRUE(journal->append({{"4", ""}}));
+    }
+    EXPECT_EQ(test::slurp(folder / "j.csv"), "a,b\n2,0.1\n4,\n");
+    EXPECT_FALSE(study::Journal::open(folder / "j.csv", {"a", "c"}));
+    EXPECT_TRUE(std::isnan(study::numberOf("")));
+    EXPECT_EQ(study::csvName("a,\"b\"\n"), "a__b__");
+}
+
+size_t linesOf(const std::string& path) {
+    const std::string text = test::slurp(path);
+    return static_cast<size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+constexpr const char* kSmall =
+    "study ring.ply --modes surface,pullpush --errors 1,4 --sizes 96x64 --views 1 --blocks 2 "
+    "--frames 2 --quiet ";
+
+void writeScene(const test::TempFolder& folder) {
+    test::writePly(folder / "ring.ply", test::samplesOf(test::Shape::torus, 4'000, 3));
+}
+
+TEST(SceneStudy, WritesRowsFiguresAndAReportThatStandsAlone) {
+    const test::TempFolder folder;
+    writeScene(folder);
+    const test::Outcome r = test::runProgram(folder, std::string(kSmall) + "-o s --json");
+    ASSERT_EQ(r.code, 0) << r.err;
+    const nlohmann::json j = nlohmann::json::parse(r.out, nullptr, false);
+    ASSERT_TRUE(j.is_object());
+    EXPECT_EQ(j["schema"], "stipple.scene-study/2");
+    EXPECT_EQ(j["plan"]["cells"], 4 * 2 * 2);
+    ASSERT_EQ(j["configurations"].size(), 4u);
+    const auto& surface = j["configurations"][0];
+    EXPECT_EQ(surface["mode"], "surface");
+    EXPECT_GT(surface["ms"]["median"], 0);
+    EXPECT_GT(surface["errors"]["audited_pixels"], 2'000);
+    EXPECT_EQ(surface["errors"]["beyond_pixels"], 0);
+    EXPECT_LE(surface["errors"]["lod_px_max"], 1.5);
+    EXPECT_GT(surface["errors"]["implementation_db"], 50);
+    EXPECT_GT(surface["errors"]["silhouette_iou"], 0.9);
+    EXPECT_GT(surface["passes_ms"]["splat"], 0);
+    EXPECT_FALSE(j["provenance"]["processor"].get<std::string>().empty());
+    EXPECT_EQ(j["provenance"]["program"].get<std::string>().size(), 16u);
+    EXPECT_EQ(j["scenes"][0]["content"].get<std::string>().size(), 16u);
+    EXPECT_EQ(linesOf(folder / "s/rows.csv"), 1u + 16 * 2 * 2) << "a row a frame";
+    EXPECT_EQ(linesOf(folder / "s/errors.csv"), 1u + 16);
+    const std::string html = test::slurp(folder / "s/report.html");
+    size_t charts = 0;
+    for (size_t at = html.find("<svg"); at != std::string::npos; at = html.find("<svg", at + 1)) ++charts;
+    EXPECT_EQ(charts, 7u);
+    EXPECT_NE(html.find("data:image/png;base64,iVBORw0KGgo"), std::string::npos) << "crops";
+    for (const char* outside : {"src=\"http", "href=\"http", "<script", "@import", "url("})
+        EXPECT_EQ(html.find(outside), std::string::npos) << outside;
+    for (const char* plot : {"error-ms", "flip-ms", "detail-ms", "bounds", "error-bytes", "frames", "passes"}) {
+        EXPECT_TRUE(fs::exists(folder / (std::string("s/plots/s0-96x64-") + plot + ".svg"))) << plot;
+        EXPECT_TRUE(
+            nlohmann::json::accept(test::slurp(folder / (std::string("s/plots/s0-96x64-") + plot + ".vl.json"))))
+            << plot;
+    }
+}
+
+TEST(SceneStudy, ErrorsAreTheSameBytesAndItGoesOnWhereItStopped) {
+    const test::TempFolder folder;
+    writeScene(folder);
+    ASSERT_EQ(test::runProgram(folder, std::string(kSmall) + "-o a --threads 1").code, 0);
+    ASSERT_EQ(test::runProgram(folder, std::string(kSmall) + "-o b --threads 2 --seed 5").code, 0);
+    const std::string errors = test::slurp(folder / "a/errors.csv");
+    EXPECT_EQ(errors, test::slurp(folder / "b/errors.csv"));
+    EXPECT_EQ(test::slurp(folder / "a/truths.csv"), test::slurp(folder / "b/truths.csv"));
+    for (const auto& crop : fs::directory_iterator(folder / "a/crops"))
+        EXPECT_EQ(test::slurp(crop.path()), test::slurp(folder / ("b/crops/" + crop.path().filename().string())));
+    // As if it had been killed in the midst of errors, and of a visit.
+    const std::string times = test::slurp(folder / "a/times.csv");
+    size_t line = 0;
+    for (int i = 0; i < 8; ++i) line = times.find('\n', line) + 1;
+    test::spit(folder / "a/errors.csv", errors.substr(0, errors.size() / 2));
+    test::spit(folder / "a/times.csv", times.substr(0, line) + times.substr(line, 3));
+    const test::Outcome again = test::runProgram(folder, std::string(kSmall) + "-o a --threads 1");
+    ASSERT_EQ(again.code, 0) << again.err;
+    EXPECT_EQ(test::slurp(folder / "a/errors.csv"), errors);
+    const std::string resumed = test::slurp(folder / "a/times.csv");
+    size_t whole = 0;  // the head and three visits of two frames
+    for (int i = 0; i < 7; ++i) whole = times.find('\n', whole) + 1;
+    EXPECT_EQ(resumed.substr(0, whole), times.substr(0, whole)) << "what was finished is kept";
+    EXPECT_EQ(std::count(resumed.begin(), resumed.end(), '\n'), 1 + 16 * 2 * 2);
+    EXPECT_EQ(linesOf(folder / "a/rows.csv"), 1u + 16 * 2 * 2);
+}
+
+TEST(SceneStudy, RefusesWhatItCannotDoBeforeItBegins) {
+    const test::TempFolder folder;
+    writeScene(folder);
+    ASSERT_EQ(test::runProgram(folder, std::string(kSmall) + "-o a").code, 0);
+    test::expectOneLine(test::runProgram(folder, std::string(kSmall) + "-o a --seed 9"), 4, {"another study", "seed"});
+    test::expectOneLine(test::runProgram(folder, "study -o t"), 2, {"SCENE", "--seeds"});
+    test::expectOneLine(test::runProgram(folder, "study nowhere.ply -o t --quiet"), 3, {"nowhere.ply"});
+    test::expectOneLine(test::runProgram(folder, std::string(kSmall) + "-o ring.ply"), 4, {"ring.ply"});
+    fs::create_directory(folder / "full");
+    test::spit(folder / "full/letter.txt", "mine");
+    test::expectOneLine(test::runProgram(folder, std::string(kSmall) + "-o full"), 4, {"no folder of a study"});
+    EXPECT_EQ(test::slurp(folder / "full/letter.txt"), "mine");
+    test::expectOneLine(test::runProgram(folder, "study ring.ply -o t --modes surfaces"), 2, {"surface"});
+    test::expectOneLine(test::runProgram(folder, "study ring.ply -o t --sizes big"), 2, {"big"});
+    test::expectOneLine(test::runProgram(folder, "study ring.ply -o t --errors 0"), 2, {"--errors"});
+    test::expectOneLine(test::runProgram(folder, "study ring.ply -o t --seeds"), 2, {"--seeds"});
+    test::expectOneLine(test::runProgram(folder, "study ring.ply -o t --rounds 3"), 2, {"--rounds"});
+    EXPECT_FALSE(fs::exists(folder / "t"));
+}
+
+}  // namespace
+}  // namespace stipple
