@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "lod/primitives/octahedral.h"
+#include "lod/primitives/patch_blocks.h"
 #include "lod/primitives/patch_map.h"
 #include "lod/store/patch_map_bytes.h"
 #include "lod/store/smooth_streams.h"
@@ -241,7 +242,10 @@ namespace {
 /// Bounds of what a file may say of itself.
 constexpr uint64_t kMostSamples = uint64_t{1} << 28;
 /// Cells of a patch at most: so many, and so many more for each that is drawn (builds make far fewer).
-constexpr uint64_t kMostCells = uint64_t{1} << 16, kCellsADrawn = 256, kCellsADrawnOfAll = 1024;
+constexpr uint64_t kMostCells = uint64_t{1} << 16, kCellsADrawn = 256;
+/// Of all patches: so many, and so many more for each of their blocks. Builds divide what is mostly empty, and a segment
+/// that hangs together crosses an eighth of its grid's blocks at least.
+constexpr uint64_t kCellsABlock = uint64_t{8} * shared::kPatchCellsAcross * shared::kPatchCellsUp;
 
 bool readHead(const Bytes& heads, size_t k, Patch& p) {
     Head h{};
@@ -328,7 +332,7 @@ bool readSamples(Patch& p, Plain& plain, NormalFrom from, uint32_t normalStep) {
 }  // namespace
 
 Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const std::string& where,
-                                         uint64_t mostBlocks) {
+                                         const PatchLimits& told) {
     const auto damaged = [&] { return fail(ErrorKind::input, "patches are damaged", where, "build it again"); };
     Sizes sizes{};
     if (bytes.size() < sizeof(sizes)) return damaged();
@@ -350,10 +354,9 @@ Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const s
     uint64_t end = uint64_t{at} + more.packed + maps.bytes;
     for (const uint32_t size : sizes.packed) end += size;
     constexpr uint64_t kSamplesABlock = 17 * 9, kHeight = 2, kNormal = 4, kColour = 3;
-    const uint64_t most = mostBlocks * kSamplesABlock;
-    const uint64_t mostCells = kMostCells + kCellsADrawnOfAll * shared::kPatchCellsAcross * shared::kPatchCellsUp *
-                                                std::min(mostBlocks, kMostSamples);
-    if (sizes.patches > mostBlocks || sizes.plain[1] > mostCells / 8 + sizes.patches ||
+    const uint64_t most = told.blocks * kSamplesABlock;
+    const uint64_t mostCells = kMostCells + kCellsABlock * std::min(told.blocks, kMostSamples);
+    if (sizes.patches > told.blocks || sizes.plain[1] > mostCells / 8 + sizes.patches ||
         sizes.plain[2] > kHeight * most || sizes.plain[3] > kNormal * most || sizes.plain[4] > kColour * most ||
         more.plain > most || sizes.normalFrom > NormalFrom::slope)
         return damaged();
@@ -374,7 +377,7 @@ Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const s
     }
     std::vector<Patch> out(sizes.patches);
     size_t cell = 0;
-    uint64_t grid = 0, allCells = 0, allDrawn = 0;
+    uint64_t grid = 0, allCells = 0, blocks = 0;
     for (size_t k = 0; k < out.size(); ++k) {
         Patch& p = out[k];
         if (!readHead(plain.heads, k, p)) return damaged();
@@ -386,15 +389,15 @@ Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const s
             drawn += static_cast<uint64_t>(std::popcount(plain.cells[cell + byte]));
         // Of each, and of all together: no memory is taken for what draws next to nothing.
         allCells += cells;
-        allDrawn += drawn;
-        if (cells > kMostCells + kCellsADrawn * drawn || allCells > kMostCells + kCellsADrawnOfAll * allDrawn)
-            return damaged();
+        if (cells > kMostCells + kCellsADrawn * drawn || allCells > mostCells) return damaged();
         p.cells.resize(cells);
         for (size_t c = 0; c < cells; ++c) p.cells[c] = plain.cells[cell + c / 8] >> (c % 8) & 1u;
         cell += (cells + 7) / 8;
+        blocks += countBlocks(p);
+        if (blocks > told.blocks || allCells > kMostCells + kCellsABlock * blocks) return damaged();
         plain.samples += markSamples(p);
     }
-    if (sizes.hasMaps != 0 && !decodeMaps(bytes.subspan(at), out, mostBlocks)) return damaged();
+    if (sizes.hasMaps != 0 && !decodeMaps(bytes.subspan(at), out, {blocks, told.map})) return damaged();
     for (const Patch& p : out) plain.coloured += p.map.density == 0 ? p.samples() : 0;
     if (cell != plain.cells.size() || plain.heights.size() != 2 * plain.samples ||
         plain.normals.size() != 4 * plain.samples || plain.colours.size() != 3 * plain.coloured ||

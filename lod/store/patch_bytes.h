@@ -30,9 +30,14 @@ struct PatchBytes {
 };
 
 PatchBytes encodePatches(std::span<const Patch> patches);
-/// Of any bytes. `where` for errors. No array is made before the bytes are there that can fill it, nor what so many
-/// blocks of 16 x 8 cells at most cannot hold.
+/// What the table of a store tells of a payload.
+struct PatchLimits {
+    uint64_t blocks = ~uint64_t{0} >> 16;  ///< of 16 x 8 cells, no more
+    uint32_t map = 7;                      ///< as Payload::maps has it: no finer maps, no normals unless they are told
+};
+/// Of any bytes. `where` for errors. No array is made before the bytes are there that can fill it, nor what is more than
+/// the table tells: what is taken is a small multiple of what such blocks take when they are decoded.
 Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const std::string& where,
-                                         uint64_t mostBlocks = ~uint64_t{0} >> 16);
+                                         const PatchLimits& told = {});
 
 }  // namespace stipple::lod

@@ -7,6 +7,7 @@
 #include "lod/primitives/octahedral.h"
 #include "lod/primitives/patch_map.h"
 #include "lod/store/smooth_streams.h"
+#include "shaders/shared/patch_map.h"
 
 namespace stipple::lod {
 
@@ -15,15 +16,18 @@ using namespace streams;
 namespace {
 
 constexpr size_t kStreams = 4;  ///< what each patch has, colours, normals, materials
-constexpr uint8_t kHasNormals = 4, kHasMaterials = 8;
+constexpr uint8_t kHasNormals = shared::kMapNormals, kHasMaterials = 8;
 
 struct MapSizes {
     std::array<uint32_t, kStreams> packed, plain;
 };
 static_assert(sizeof(MapSizes) == 32);
 
-/// Texels at all, at most: so many, and so many for each that is there (builds make far fewer).
-constexpr uint64_t kMostTexels = uint64_t{1} << 22, kTexelsEach = 1024;
+/// Texels of all grids at most: so many, and so many times those that the blocks have (as cells, patch_bytes.cpp).
+constexpr uint64_t kMostTexels = uint64_t{1} << 22, kGridsABlock = 8;
+uint64_t texelsOfBlock(uint32_t density) {
+    return ((uint64_t{shared::kPatchCellsAcross} << density) + 1) * ((uint64_t{shared::kPatchCellsUp} << density) + 1);
+}
 
 /// Neighbours of a texel that are known before it.
 struct Before {
@@ -152,16 +156,18 @@ PatchMapBytes encodeMaps(std::span<const Patch> patches) {
     return out;
 }
 
-bool decodeMaps(std::span<const uint8_t> bytes, std::span<Patch> patches, uint64_t mostBlocks) {
+bool decodeMaps(std::span<const uint8_t> bytes, std::span<Patch> patches, const MapLimits& limits) {
     MapSizes sizes{};
     if (bytes.size() < sizeof(sizes)) return false;
     std::memcpy(&sizes, bytes.data(), sizeof(sizes));
     uint64_t end = sizeof(sizes);
     for (const uint32_t size : sizes.packed) end += size;
-    constexpr uint64_t kTexelsABlock = 129 * 65, kBytes = 4;  // of a texel, of any stream
+    constexpr uint64_t kBytes = 4;  // of a texel, of any stream
+    const uint32_t mostDensity = limits.most & shared::kMapDensity;
+    const uint64_t mostTexels = texelsOfBlock(mostDensity) * limits.blocks;
     if (end != bytes.size() || sizes.plain[0] != patches.size()) return false;
     for (const uint32_t plain : sizes.plain)
-        if (plain > std::max<uint64_t>(kBytes * kTexelsABlock * mostBlocks, patches.size())) return false;
+        if (plain > std::max<uint64_t>(kBytes * mostTexels, patches.size())) return false;
     std::array<Bytes, kStreams> streams;
     size_t at = sizeof(sizes);
     for (size_t k = 0; k < kStreams; ++k) {
@@ -175,12 +181,13 @@ bool decodeMaps(std::span<const uint8_t> bytes, std::span<Patch> patches, uint64
     for (size_t k = 0; k < patches.size(); ++k) {
         Patch& p = patches[k];
         p.map.density = has[k] & 3u;
-        if (has[k] > 15 || (p.map.density == 0 && has[k] != 0)) return false;
+        if (has[k] > 15 || (p.map.density == 0 && has[k] != 0) || p.map.density > mostDensity) return false;
+        if ((has[k] & kHasNormals) > (limits.most & shared::kMapNormals)) return false;
         if (p.map.density == 0) continue;
         grid += ((uint64_t{p.width - 1} << p.map.density) + 1) * ((uint64_t{p.height - 1} << p.map.density) + 1);
         drawn += uint64_t{p.drawnCells()} << 2 * p.map.density;  // texels at least
     }
-    if (3 * drawn > streams[1].size() || grid > kMostTexels + kTexelsEach * drawn) return false;
+    if (3 * drawn > streams[1].size() || grid > kMostTexels + kGridsABlock * mostTexels) return false;
     Plain plain;
     std::vector<MapLevel> levels(patches.size());
     for (size_t k = 0; k < patches.size(); ++k) {

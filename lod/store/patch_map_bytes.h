@@ -19,8 +19,13 @@ struct PatchMapBytes {
 };
 PatchMapBytes encodeMaps(std::span<const Patch> patches);
 
-/// Of any bytes, to patches whose sides and cells are known and possible. False: they are no such maps, or of more than
-/// so many blocks of 16 x 8 cells. No array is made that the bytes do not justify.
-bool decodeMaps(std::span<const uint8_t> bytes, std::span<Patch> patches, uint64_t mostBlocks);
+/// What is known of patches before their maps are read.
+struct MapLimits {
+    uint64_t blocks = 0;  ///< of 16 x 8 cells: how many they are
+    uint32_t most = 0;    ///< log2 of texels along an edge of a cell, and kMapNormals where normals are allowed
+};
+/// Of any bytes, to patches whose sides and cells are known and possible. False: they are no such maps, or larger than
+/// is allowed. No array is made that the bytes do not justify.
+bool decodeMaps(std::span<const uint8_t> bytes, std::span<Patch> patches, const MapLimits& limits);
 
 }  // namespace stipple::lod

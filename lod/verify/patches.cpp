@@ -81,8 +81,9 @@ Result<std::vector<Patch>> readPatches(const Store& store, uint32_t chunk) {
     const ChunkPlace place = chunkPlace(store.hierarchy, chunk);
     std::vector<uint8_t> bytes(place.bytes);
     STIPPLE_TRY(store.file->readAt(place.offset, bytes.data(), bytes.size()));
+    const Payload& payload = store.hierarchy.payload(chunk);
     return decodePatches(bytes, fmt::format("{}: node {}", store.path, store.hierarchy.nodeOf(chunk)),
-                         store.hierarchy.payload(chunk).records);
+                         {payload.records, payload.maps});
 }
 
 Result<NodeSurface> NodeSurface::read(const Store& store, uint32_t node) {

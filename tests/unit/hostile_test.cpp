@@ -10,6 +10,8 @@
 #include <new>
 
 #include "lod/import/import.h"
+#include "lod/store/patch_bytes.h"
+#include "lod/store/smooth_streams.h"
 #include "tests/support/laz_encoder.h"
 #include "tests/support/support.h"
 
@@ -132,6 +134,77 @@ TEST(Hostile, ABuildAllocatesNothingForPointsThatAreOnlyPromised) {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
     EXPECT_LE(peak - before, size_t{16} << 20);
 #endif
+}
+
+/// A payload of patches: one of so many samples each way, of which 128 x 128 cells are drawn, with a map of 8 x 8
+/// texels a cell. Written without ever making the map.
+std::vector<uint8_t> patchWithMap(uint32_t side) {
+    constexpr uint32_t kDrawn = 128;
+    Patch p;
+    p.width = p.height = side;
+    p.cells.assign(size_t{side - 1} * (side - 1), 0);
+    p.heights.assign(size_t{side} * side, 0);
+    p.normals = p.colours = std::vector<uint32_t>(p.heights.size(), 0);
+    for (uint32_t j = 0; j <= kDrawn; ++j)
+        for (uint32_t i = 0; i <= kDrawn; ++i) {
+            if (i < kDrawn && j < kDrawn) p.cells[size_t{j} * (side - 1) + i] = 1;
+            p.heights[p.at(i, j)] = 7;
+        }
+    std::vector<uint8_t> out = encodePatches(std::span(&p, 1)).bytes;
+    std::array<uint32_t, 10> sizes{};  // of five streams, packed and plain; colours are the last
+    constexpr size_t kHasMaps = 7, kSizes = 8;
+    std::memcpy(sizes.data(), out.data() + kSizes, sizeof(sizes));
+    const std::vector<uint8_t> none = streams::compress({});
+    out.resize(out.size() - sizes[4]);
+    out.insert(out.end(), none.begin(), none.end());
+    sizes[4] = static_cast<uint32_t>(none.size());
+    sizes[9] = 0;
+    std::memcpy(out.data() + kSizes, sizes.data(), sizeof(sizes));
+    out[kHasMaps] = 1;
+    const size_t texels = size_t{8 * kDrawn + 1} * (8 * kDrawn + 1);
+    const std::array<std::vector<uint8_t>, 4> plain{std::vector<uint8_t>{3}, std::vector<uint8_t>(3 * texels), {}, {}};
+    std::vector<uint32_t> mapSizes;
+    std::vector<uint8_t> packed;
+    for (const auto& stream : plain) {
+        const std::vector<uint8_t> bytes = streams::compress(stream);
+        packed.insert(packed.end(), bytes.begin(), bytes.end());
+        mapSizes.push_back(static_cast<uint32_t>(bytes.size()));
+    }
+    for (const auto& stream : plain) mapSizes.push_back(static_cast<uint32_t>(stream.size()));
+    const auto count = static_cast<uint32_t>(packed.size() + mapSizes.size() * sizeof(uint32_t));
+    const auto* first = reinterpret_cast<const uint8_t*>(&count);
+    out.insert(out.begin() + kSizes + sizeof(sizes), first, first + sizeof(count));
+    first = reinterpret_cast<const uint8_t*>(mapSizes.data());
+    out.insert(out.end(), first, first + mapSizes.size() * sizeof(uint32_t));
+    out.insert(out.end(), packed.begin(), packed.end());
+    return out;
+}
+
+TEST(Hostile, MapsOfPatchesThatClaimGigabytesAreRefusedBeforeTheyAreTaken) {
+    constexpr uint32_t kBlocks = 8 * 16;
+    const auto memoryOf = [](uint32_t side, const PatchLimits& told, bool isRead) {
+        const std::vector<uint8_t> bytes = patchWithMap(side);
+        EXPECT_LT(bytes.size(), 10'000u);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+        peak = live.load();
+        const size_t before = live;
+#endif
+        EXPECT_EQ(decodePatches(bytes, "here", told).has_value(), isRead) << side;
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+        return peak - before;
+#else
+        return size_t{0};
+#endif
+    };
+    // As large as what it draws: it is read, if the table tells of it.
+    EXPECT_LE(memoryOf(129, {}, true), size_t{64} << 20);
+    EXPECT_LE(memoryOf(129, {kBlocks, 3}, true), size_t{64} << 20);
+    EXPECT_LE(memoryOf(129, {kBlocks, 2}, false), size_t{8} << 20) << "finer maps than are told";
+    EXPECT_LE(memoryOf(129, {kBlocks - 1, 3}, false), size_t{8} << 20) << "more blocks than are told";
+    // 2000 x 2000 samples would be 256 million texels, 9 bytes each.
+    for (const uint32_t side : {500u, 1000u, 2000u})
+        for (const PatchLimits& told : {PatchLimits{}, PatchLimits{kBlocks, 7}})
+            EXPECT_LE(memoryOf(side, told, false), size_t{64} << 20) << side;
 }
 
 TEST(Hostile, TheCountingWorks) {

@@ -421,7 +421,7 @@ TEST(PatchHeads, OfHostileNumbersAreRefused) {
         for (uint16_t& code : p.heights) code = 0;
     }));
     // Of more than the blocks that the store names: nothing is unpacked.
-    EXPECT_FALSE(lod::decodePatches(lod::encodePatches(set.patches).bytes, "here", 0));
+    EXPECT_FALSE(lod::decodePatches(lod::encodePatches(set.patches).bytes, "here", {.blocks = 0}));
 }
 
 // Also those that are finer than usual, as mirrors have them, and any.

@@ -13,22 +13,20 @@ namespace {
 
 Result<Chunk> decode(const Hierarchy& h, uint32_t chunk, const uint8_t* bytes, size_t count, const std::string& where,
                      bool /*wantLowBits*/) {
-    STIPPLE_ASSIGN(const std::vector<Patch> patches, decodePatches({bytes, count}, where, h.payload(chunk).records));
+    const Payload& payload = h.payload(chunk);
+    STIPPLE_ASSIGN(const std::vector<Patch> patches,
+                   decodePatches({bytes, count}, where, {payload.records, payload.maps}));
     uint64_t blocks = 0, words = 0;
-    const uint8_t told = h.payload(chunk).maps;
     for (const Patch& p : patches) {
         if (const std::string fault = patchFault(p); !fault.empty())
             return tl::unexpected(damagedStore(where, "a patch " + fault));
         const uint32_t ofPatch = countBlocks(p);
         blocks += ofPatch;
         words += uint64_t{ofPatch} * shared::mapWords(mapCode(p));
-        if ((mapCode(p) & shared::kMapDensity) > (told & shared::kMapDensity) ||
-            (mapCode(p) & shared::kMapNormals) > (told & shared::kMapNormals))
-            return tl::unexpected(damagedStore(where, "a map is larger than the table says"));
     }
     if (words >> (32 - shared::kMapFirstShift) != 0)
         return tl::unexpected(damagedStore(where, "maps of too many texels"));
-    if (blocks != h.payload(chunk).records) return tl::unexpected(damagedStore(where, "another number of blocks"));
+    if (blocks != payload.records) return tl::unexpected(damagedStore(where, "another number of blocks"));
     PatchBlocks made = blocksOf(patches);
     Chunk out;
     out.patchBlocks = std::move(made.blocks);
