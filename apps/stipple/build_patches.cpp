@@ -203,7 +203,9 @@ void addPatchBuildOptions(CLI::App& app, PatchBuildOptions& o) {
     app.add_flag("--overlap", o.overlap, "of patches: each reaches over its neighbours (the default)")->needs(patches);
     app.add_flag("--fill-gaps", o.fillGaps)->group("");  // (said why not)
     app.add_option("--patch-samples", o.samples,
-                   "of patches: samples of the finest level, about (default: as many as vertices or points)")
+                   "of patches: samples of the finest level, about (default: one a vertex or point, and where the "
+                   "shape asks for more, up "
+                   "to four a triangle or two a point)")
         ->transform(within<uint64_t>(1, 100'000'000'000))
         ->needs(patches)
         ->type_name("N");

@@ -20,7 +20,9 @@
 #include "lod/store/file_kind.h"
 #include "lod/store/materials.h"
 #include "lod/store/nearest.h"
+#include "lod/store/patch_bytes.h"
 #include "lod/store/pruning.h"
+#include "shaders/shared/patch_map.h"
 
 namespace stipple::app {
 namespace {
@@ -122,7 +124,44 @@ nlohmann::json leafDistances(const lod::Hierarchy& h) {
     return {{"median", all[all.size() / 2]}, {"p95", all[all.size() * 95 / 100]}, {"greatest", all.back()}};
 }
 
-nlohmann::json storeInfo(const lod::Store& store) {
+/// Maps of patches: how many payloads have which, and what they take in the file and in memory, with their mips.
+Result<nlohmann::json> mapInfo(const lod::Store& store) {
+    const lod::Hierarchy& h = store.hierarchy;
+    std::map<uint32_t, uint64_t> payloads;  // by texels along an edge of a cell
+    uint64_t bytes = 0, inMemory = 0;
+    bool hasNormals = false;
+    std::array<uint8_t, lod::kPatchHeadBytes> head{};
+    for (uint32_t n = 0; n < h.nodes.size(); ++n) {
+        Result<void> read;
+        h.forEachPayload(n, [&](uint32_t chunk) {
+            const lod::Payload& p = h.payload(chunk);
+            if (p.maps == 0 || !read) return;
+            ++payloads[1u << (p.maps & shared::kMapDensity)];
+            hasNormals = hasNormals || (p.maps & shared::kMapNormals) != 0;
+            inMemory += uint64_t{p.records} * shared::mapWords(p.maps) * sizeof(uint32_t);
+            const size_t count = std::min<size_t>(head.size(), p.chunkBytes);
+            read = store.file->readAt(p.chunkOffset, head.data(), count);
+            bytes += lod::mapBytesOf(std::span(head).first(count));
+        });
+        STIPPLE_TRY(read);
+    }
+    if (payloads.empty()) return nlohmann::json();
+    nlohmann::json texels = nlohmann::json::object();
+    for (const auto& [k, count] : payloads) texels[std::to_string(k)] = count;
+    return nlohmann::json{
+        {"texels", texels}, {"bytes", bytes}, {"bytes_with_mips", inMemory}, {"has_normals", hasNormals}};
+}
+
+/// What is told of a level: of leaves of patches their distance from the source.
+double largestErrorOf(const lod::Hierarchy& h, uint32_t node) {
+    // The coarsest groups of a mesh are never replaced: they have no error to speak of.
+    const uint32_t code = h.errorCodeOf(node);
+    const double error = code == lod::ErrorScale::kNoParent ? 0 : h.unit * h.errors.decode(code);
+    return h.nodes[node].sourceCode == 0 ? error : std::max(error, h.unit * h.errors.decode(h.nodes[node].sourceCode));
+}
+
+Result<nlohmann::json> storeInfo(const lod::Store& store) {
+    STIPPLE_ASSIGN(nlohmann::json maps, mapInfo(store));
     const lod::Hierarchy& h = store.hierarchy;
     const lod::StoreDescription& d = store.description;
     nlohmann::json levels = nlohmann::json::array();
@@ -136,10 +175,7 @@ nlohmann::json storeInfo(const lod::Store& store) {
             l["records"] = l["records"].get<uint64_t>() + h.payload(chunk).records;
             l["bytes"] = l["bytes"].get<uint64_t>() + h.payload(chunk).chunkBytes;
         });
-        // The coarsest groups of a mesh are never replaced: they have no error to speak of.
-        const uint32_t code = h.errorCodeOf(number);
-        const double error = code == lod::ErrorScale::kNoParent ? 0 : h.unit * h.errors.decode(code);
-        l["largest_error"] = std::max(l["largest_error"].get<double>(), error);
+        l["largest_error"] = std::max(l["largest_error"].get<double>(), largestErrorOf(h, number));
         if (h.isCurves) l["kept_share"] = std::min(l["kept_share"].get<double>(), lod::keptShare(n));
     }
     nlohmann::json attributes = nlohmann::json::array();
@@ -156,39 +192,42 @@ nlohmann::json storeInfo(const lod::Store& store) {
     uint64_t weightBytes = 0;
     for (const lod::Stream& s : h.streams)
         if (s.id == lod::StreamId::surfelWeights) weightBytes += s.bytes;
-    return {{"kind", "stipple store"},
-            {"primitive", recordsOf(store)},
-            {"payloads", payloadInfo(h)},
-            {"surfel_weight_bytes", weightBytes},
-            {"materials", d.materials.size()},
-            {"point_materials", materialInfo(d, h)},
-            {"textures", textures},
-            {"texture_tiles", h.tiles.size()},
-            {"texture_bytes", bytesOfTiles(h)},
-            {"path", store.path},
-            {"bytes", store.fileBytes},
-            {"content_hash", hexDigits(store.contentHash)},
-            {"source", d.source},
-            {"points", d.points},
-            {"points_in", d.pointsIn},
-            {"dropped", d.dropped},
-            {"added", d.added},
-            {"patches", patchCountsJson(d.patches)},
-            {"leaf_distance", leafDistances(h)},
-            {"records", d.records},
-            {"nodes", h.nodes.size()},
-            {"levels", levels},
-            {"min", placeJson(h, d.boundsMin)},
-            {"max", placeJson(h, d.boundsMax)},
-            {"origin", vectorJson(h.origin)},
-            {"lattice_unit", h.unit},
-            {"coordinate_rounding", d.roundingUnits},
-            {"metres_per_unit", d.metresPerUnit},
-            {"up", vectorJson(d.up)},
-            {"crs", d.crs.label()},
-            {"attributes", attributes},
-            {"has_colour", d.hasColour},
-            {"has_normals", d.hasNormals}};
+    // (Of patches the description says the leaves' distance there, which is told above.)
+    const bool isOfPatches = d.patches.patches > 0;
+    return nlohmann::json{{"kind", "stipple store"},
+                          {"primitive", recordsOf(store)},
+                          {"payloads", payloadInfo(h)},
+                          {"surfel_weight_bytes", weightBytes},
+                          {"materials", d.materials.size()},
+                          {"point_materials", materialInfo(d, h)},
+                          {"textures", textures},
+                          {"texture_tiles", h.tiles.size()},
+                          {"texture_bytes", bytesOfTiles(h)},
+                          {"path", store.path},
+                          {"bytes", store.fileBytes},
+                          {"content_hash", hexDigits(store.contentHash)},
+                          {"source", d.source},
+                          {"points", d.points},
+                          {"points_in", d.pointsIn},
+                          {"dropped", d.dropped},
+                          {"added", d.added},
+                          {"patches", patchCountsJson(d.patches)},
+                          {"leaf_distance", leafDistances(h)},
+                          {"maps", maps},
+                          {"records", d.records},
+                          {"nodes", h.nodes.size()},
+                          {"levels", levels},
+                          {"min", placeJson(h, d.boundsMin)},
+                          {"max", placeJson(h, d.boundsMax)},
+                          {"origin", vectorJson(h.origin)},
+                          {"lattice_unit", h.unit},
+                          {"coordinate_rounding", isOfPatches ? nlohmann::json() : nlohmann::json(d.roundingUnits)},
+                          {"metres_per_unit", d.metresPerUnit},
+                          {"up", vectorJson(d.up)},
+                          {"crs", d.crs.label()},
+                          {"attributes", attributes},
+                          {"has_colour", d.hasColour},
+                          {"has_normals", d.hasNormals}};
 }
 
 /// Those that most points have.
@@ -204,6 +243,27 @@ void printMaterials(const nlohmann::json& all) {
                    used[i]["metallic"].get<double>(),
                    used[i].contains("points") ? fmt::format(": {} points", used[i]["points"].get<uint64_t>()) : "");
     if (used.size() > kMost) fmt::print("  material      and {} more\n", used.size() - kMost);
+}
+
+void printMaps(const nlohmann::json& maps) {
+    if (maps.is_null()) return;
+    std::string texels;
+    for (const auto& [k, count] : maps["texels"].items())
+        texels += fmt::format("{}{} in {}", texels.empty() ? "" : ", ", k, counted(count.get<uint64_t>(), "node"));
+    fmt::print("  maps          texels an edge of a cell, at most: {}; colours{}; {}, {} in memory with mips\n", texels,
+               maps["has_normals"].get<bool>() ? " and normals" : "", humanBytes(maps["bytes"].get<uint64_t>()),
+               humanBytes(maps["bytes_with_mips"].get<uint64_t>()));
+}
+
+void printLevels(const nlohmann::json& j) {
+    fmt::print("  hash          {}\n  level   nodes    records      bytes  largest error\n",
+               j["content_hash"].get<std::string>());
+    for (size_t l = 0; l < j["levels"].size(); ++l) {
+        const auto& level = j["levels"][l];
+        fmt::print("  {:5} {:7} {:10} {:>10}  {:.4g}\n", l, level["nodes"].get<uint64_t>(),
+                   level["records"].get<uint64_t>(), humanBytes(level["bytes"].get<uint64_t>()),
+                   level["largest_error"].get<double>());
+    }
 }
 
 void printStore(const nlohmann::json& j) {
@@ -244,10 +304,13 @@ void printStore(const nlohmann::json& j) {
         fmt::print("  leaves        within {:.3g} of the source (median; 95 of 100 within {:.3g}, all within {:.3g})\n",
                    leaves["median"].get<double>(), leaves["p95"].get<double>(), leaves["greatest"].get<double>());
     fmt::print("  bounds        {} .. {}\n  origin        {}\n", place("min"), place("max"), place("origin"));
-    fmt::print("  lattice unit  {} (coordinates {})\n", j["lattice_unit"].get<double>(),
-               j["coordinate_rounding"].get<double>() == 0
-                   ? std::string("exact")
-                   : fmt::format("rounded by at most {:.3g}", j["coordinate_rounding"].get<double>()));
+    printMaps(j["maps"]);
+    const auto& rounding = j["coordinate_rounding"];
+    fmt::print("  lattice unit  {}{}\n", j["lattice_unit"].get<double>(),
+               rounding.is_null() ? ""
+               : rounding.get<double>() == 0
+                   ? " (coordinates exact)"
+                   : fmt::format(" (coordinates rounded by at most {:.3g})", rounding.get<double>()));
     fmt::print("  up            {}\n  colour        {}\n  normals       {}\n", vec(j["up"]),
                j["has_colour"].get<bool>() ? "yes" : "no",
                j["has_normals"].get<bool>()
@@ -271,14 +334,7 @@ void printStore(const nlohmann::json& j) {
                        p["payloads"].get<uint64_t>(), p["kind"].get<std::string>(), p["codec"].get<std::string>(),
                        p["records"].get<uint64_t>(), humanBytes(p["bytes"].get<uint64_t>()),
                        p["largest_error"].get<double>());
-    fmt::print("  hash          {}\n  level   nodes    records      bytes  largest error\n",
-               j["content_hash"].get<std::string>());
-    for (size_t l = 0; l < j["levels"].size(); ++l) {
-        const auto& level = j["levels"][l];
-        fmt::print("  {:5} {:7} {:10} {:>10}  {:.4g}\n", l, level["nodes"].get<uint64_t>(),
-                   level["records"].get<uint64_t>(), humanBytes(level["bytes"].get<uint64_t>()),
-                   level["largest_error"].get<double>());
-    }
+    printLevels(j);
     if (j["primitive"] != "segments") return;
     double kept = 1;
     for (const auto& level : j["levels"]) kept = std::min(kept, level["kept_share"].get<double>());
@@ -352,7 +408,7 @@ Result<void> run(const Options& o) {
     if (lod::isStoreFile(o.input)) {
         STIPPLE_ASSIGN(const lod::Store store, lod::openStore(o.input));
         if (!o.at.empty()) return showNearest(store, o);
-        nlohmann::json j = storeInfo(store);
+        STIPPLE_ASSIGN(nlohmann::json j, storeInfo(store));
         const bool isMixed = store.hierarchy.isMixed;
         if (o.verify) {
             const auto executor = makeTbbExecutor(0);

@@ -1,5 +1,7 @@
 #include "engine/gpu/pass_list.h"
 
+#include "engine/base/check.h"
+
 namespace stipple::gpu {
 
 void PassList::begin(const std::string& name, const std::vector<BufferUse>& uses, bool isTransfer) {
@@ -29,6 +31,7 @@ void PassList::begin(const std::string& name, const std::vector<BufferUse>& uses
     const bool readsUploads = uploaded_ && !isTransfer;
     recordBarriers(commands_, barriers, readsUploads ? &memory : nullptr);
     if (readsUploads) uploaded_ = false;
+    STIPPLE_CHECK(names_.size() < kMaxPasses, "a frame has more passes than it has queries for their times");
     stamp(static_cast<uint32_t>(names_.size()) * 2);
     names_.push_back(name);
 }

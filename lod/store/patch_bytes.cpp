@@ -243,8 +243,8 @@ namespace {
 constexpr uint64_t kMostSamples = uint64_t{1} << 28;
 /// Cells of a patch at most: so many, and so many more for each that is drawn (builds make far fewer).
 constexpr uint64_t kMostCells = uint64_t{1} << 16, kCellsADrawn = 256;
-/// Of all patches: so many, and so many more for each of their blocks. Builds divide what is mostly empty, and a segment
-/// that hangs together crosses an eighth of its grid's blocks at least.
+/// Of all patches: so many, and so many more for each of their blocks. Builds divide what is mostly empty, and a
+/// segment that hangs together crosses an eighth of its grid's blocks at least.
 constexpr uint64_t kCellsABlock = uint64_t{8} * shared::kPatchCellsAcross * shared::kPatchCellsUp;
 
 bool readHead(const Bytes& heads, size_t k, Patch& p) {
@@ -407,6 +407,18 @@ Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const s
         if (!readSamples(p, plain, sizes.normalFrom, kUsualStep >> sizes.finerNormals) || !patchFault(p).empty())
             return damaged();
     return out;
+}
+
+uint64_t mapBytesOf(std::span<const uint8_t> bytes) {
+    static_assert(kPatchHeadBytes >= sizeof(Sizes) + sizeof(SizesOfMaterials) + sizeof(SizeOfMaps));
+    Sizes sizes{};
+    if (bytes.size() < kPatchHeadBytes) return 0;
+    std::memcpy(&sizes, bytes.data(), sizeof(sizes));
+    if (sizes.hasMaps == 0) return 0;
+    SizeOfMaps maps{};
+    const size_t at = sizeof(sizes) + (sizes.hasMaterials != 0 ? sizeof(SizesOfMaterials) : 0);
+    std::memcpy(&maps, bytes.data() + at, sizeof(maps));
+    return maps.bytes;
 }
 
 }  // namespace stipple::lod

@@ -35,9 +35,14 @@ struct PatchLimits {
     uint64_t blocks = ~uint64_t{0} >> 16;  ///< of 16 x 8 cells, no more
     uint32_t map = 7;                      ///< as Payload::maps has it: no finer maps, no normals unless they are told
 };
-/// Of any bytes. `where` for errors. No array is made before the bytes are there that can fill it, nor what is more than
-/// the table tells: what is taken is a small multiple of what such blocks take when they are decoded.
+/// Of any bytes. `where` for errors. No array is made before the bytes are there that can fill it, nor what is more
+/// than the table tells: what is taken is a small multiple of what such blocks take when they are decoded.
 Result<std::vector<Patch>> decodePatches(std::span<const uint8_t> bytes, const std::string& where,
                                          const PatchLimits& told = {});
+
+/// Of what encodePatches made, those of maps, which its first kPatchHeadBytes tell; 0 of fewer, and of any bytes
+/// something.
+constexpr size_t kPatchHeadBytes = 64;
+uint64_t mapBytesOf(std::span<const uint8_t> bytes);
 
 }  // namespace stipple::lod

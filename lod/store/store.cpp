@@ -155,13 +155,24 @@ Result<Head> readHead(const InputFile& file) {
     return head;
 }
 
-/// Stores of build version 15 state one distance of all their leaves of patches; `lattice`: that, lattice units.
-void tellSourceCodes(double lattice, Hierarchy& h) {
-    const auto isNotTold = [&](const Node& n) { return n.isLeaf() && n.kind == Kind::patches && n.sourceCode == 0; };
-    h.hasOneSourceCode = !h.isGraph && std::any_of(h.nodes.begin(), h.nodes.end(), isNotTold);
-    if (!h.hasOneSourceCode) return;
+/// Stores of build version 15 state one distance of all their leaves of patches, and none states its own; `lattice`:
+/// that one, lattice units. In later ones every leaf does. What is wrong; empty: nothing.
+std::string tellSourceCodes(double lattice, Hierarchy& h) {
+    const auto isPatchLeaf = [&](const Node& n) { return n.isLeaf() && n.kind == Kind::patches; };
+    const auto isTold = [](const Node& n) { return n.sourceCode != 0; };
+    const bool isAnyTold = std::any_of(h.nodes.begin(), h.nodes.end(), isTold);
+    const auto leaves = std::count_if(h.nodes.begin(), h.nodes.end(), isPatchLeaf);
+    if (h.isGraph || leaves == 0) return "";
+    if (isAnyTold) {
+        const bool isEach =
+            std::all_of(h.nodes.begin(), h.nodes.end(), [&](const Node& n) { return !isPatchLeaf(n) || isTold(n); });
+        return isEach ? "" : "a leaf of patches does not state its distance from the source";
+    }
+    if (!(lattice <= h.errors.decode(ErrorScale::kLargest))) return "no leaf can be as far from the source as it says";
+    h.hasOneSourceCode = true;
     for (Node& n : h.nodes)
         if (n.isLeaf()) n.sourceCode = static_cast<uint8_t>(h.errors.encodeUp(lattice));
+    return "";
 }
 
 /// The tables of nodes and payloads, and the description.
@@ -219,7 +230,8 @@ Result<Store> openStore(const std::string& path) {
         if (n.isLeaf()) h.finestCode = std::max(h.finestCode, n.errorCode);
     for (const Node& n : h.nodes)
         h.hasMaterials = h.hasMaterials || (n.kind == Kind::patches && store.description.pointMaterials.size() > 1);
-    tellSourceCodes(store.description.roundingUnits / h.unit, h);
+    if (const std::string fault = tellSourceCodes(store.description.roundingUnits / h.unit, h); !fault.empty())
+        return tl::unexpected(damagedStore(path, fault));
     h.discFactors = store.description.discFactors;
     h.smallestDisc = store.description.smallestDisc / h.unit;
     store.contentHash = head.contentHash;

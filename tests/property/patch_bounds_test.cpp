@@ -3,12 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <filesystem>
 
 #include "engine/scene/camera.h"
 #include "lod/builder/patch_store/against.h"
 #include "lod/builder/patch_store/patch_store_build.h"
 #include "lod/cut/cut.h"
+#include "tests/support/crafted_store.h"
 #include "tests/support/patch_cuts.h"
 #include "tests/support/triangle_field.h"
 
@@ -172,6 +175,52 @@ TEST(PatchBounds, AnOldStoreStatesTheWorstOfAllItsLeaves) {
     const auto executor = makeTbbExecutor(2);
     const auto verified = verifyStore(*golden, *executor);
     EXPECT_TRUE(verified) << verified.error().line();
+}
+
+/// Of a later store each leaf states its own, or it is refused.
+TEST(PatchBounds, ALeafThatStatesNoDistanceIsNoOldStore) {
+    const test::TempFolder folder;
+    const Store store = buildMesh(test::wavyTorus(120, 60), folder / "a.stipple", finely());
+    ASSERT_GT(store.hierarchy.nodes.size(), 2u);
+    test::CraftedStore crafted = test::CraftedStore::read(folder / "a.stipple");
+    crafted.write(folder / "same.stipple");
+    EXPECT_TRUE(openStore(folder / "same.stipple"));
+    crafted.nodes.back().sourceCode = 0;
+    crafted.write(folder / "one.stipple");
+    const auto one = openStore(folder / "one.stipple");
+    ASSERT_FALSE(one);
+    EXPECT_NE(one.error().line().find("does not state its distance"), std::string::npos) << one.error().line();
+    // Where none does, it is as old stores are.
+    for (auto& n : crafted.nodes) n.sourceCode = 0;
+    crafted.write(folder / "old.stipple");
+    const auto old = openStore(folder / "old.stipple");
+    ASSERT_TRUE(old) << old.error().line();
+    EXPECT_TRUE(old->hierarchy.hasOneSourceCode);
+}
+
+/// One leaf: what is asked within it is asked often, and nothing is written.
+TEST(PatchBounds, ABuildStopsWithinALeaf) {
+    const test::TempFolder folder;
+    const TriangleMesh mesh = torusAndSpikes();
+    const auto executor = makeTbbExecutor(2);
+    Progress silent(false);
+    std::atomic<uint64_t> asked{0};
+    const auto build = [&](uint64_t stopsAt, const std::string& path) {
+        asked = 0;
+        PatchBuildSettings settings;
+        settings.limits.isStopped = [&asked, stopsAt] { return ++asked >= stopsAt; };
+        return buildPatchStore(sourceOf(mesh), path, settings, *executor, silent);
+    };
+    ASSERT_TRUE(build(~uint64_t{0}, folder / "whole.stipple"));
+    const uint64_t whole = asked;
+    EXPECT_GT(whole, 200u);
+    for (const uint64_t part : {whole / 8, whole / 3, whole / 2}) {
+        const std::string path = folder / "part.stipple";
+        const auto stopped = build(part, path);
+        ASSERT_FALSE(stopped) << part << " of " << whole;
+        EXPECT_EQ(stopped.error().kind, ErrorKind::interrupted);
+        EXPECT_FALSE(std::filesystem::exists(path));
+    }
 }
 
 }  // namespace

@@ -260,5 +260,33 @@ TEST(BuildPatches, WhatIsOddIsRefused) {
     refused("scan.ply --patches --fill-gaps", 2, "overlap");
 }
 
+TEST(BuildPatches, MoreSamplesThanThereCanBeAreRefusedByName) {
+    const TempFolder folder;
+    ASSERT_EQ(runProgram(folder, "grow scan -o scan.ply --points 2k").code, 0);
+    const Outcome refused = runProgram(folder, "build scan.ply --patches --patch-samples 99999M -o a.stipple");
+    EXPECT_EQ(refused.code, 2) << refused.err;
+    EXPECT_NE(refused.err.find("--patch-samples 99999000000"), std::string::npos) << refused.err;
+    EXPECT_NE(refused.err.find("ask for 1048576 at most"), std::string::npos) << refused.err;
+    EXPECT_FALSE(std::filesystem::exists(folder / "a.stipple"));
+}
+
+/// Creases everywhere: the cap of samples is met by the tightest bound that meets it, and what is left is said.
+TEST(BuildPatches, OfTheHelmetStayAsNearAsTheirSamplesAllow) {
+    const std::string helmet = test::dataFile("06_gltf/DamagedHelmet.glb");
+    if (helmet.empty()) GTEST_SKIP() << "DamagedHelmet.glb is missing: no creased model was built";
+    const TempFolder folder;
+    const Outcome built = runProgram(folder, "build " + helmet + " --patches --patch-texels 1 -o a.stipple");
+    ASSERT_EQ(built.code, 0) << built.err;
+    EXPECT_NE((built.out + built.err).find("px where a picture shows all of it"), std::string::npos) << built.err;
+    const Outcome told = runProgram(folder, "info a.stipple --json");
+    ASSERT_EQ(told.code, 0) << told.err;
+    const auto j = nlohmann::json::parse(told.out);
+    EXPECT_LE(j["leaf_distance"]["greatest"].get<double>(), 0.033) << "0.0404 with one step of the bound";
+    EXPECT_LE(j["patches"]["samples"].get<uint64_t>(), 4u * 22'094u);
+    EXPECT_TRUE(j["maps"].is_null());
+    EXPECT_TRUE(j["coordinate_rounding"].is_null()) << "a distance of surfaces is no rounding";
+    EXPECT_EQ(j["levels"].back()["largest_error"], j["leaf_distance"]["greatest"]);
+}
+
 }  // namespace
 }  // namespace stipple

@@ -157,7 +157,9 @@ Result<CellProduct> Reduction::makeCell(const LevelCells& level, size_t i, const
     } else {
         STIPPLE_ASSIGN(below, readBelow(level.waiting[i]));
     }
-    return make(level.cells[i], input, below);
+    STIPPLE_ASSIGN(CellProduct product, make(level.cells[i], input, below));
+    STIPPLE_TRY(workspace_.checkStopped());  // what was cut short is nothing
+    return product;
 }
 
 Result<void> Reduction::hand(LevelCells& level, size_t i, CellProduct product, const Take& take, Progress& progress) {

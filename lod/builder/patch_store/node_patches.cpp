@@ -22,6 +22,7 @@ constexpr double kAsked = 1.1;                         ///< of the samples asked
 constexpr double kLooser = 1.7, kLoosest = 1;          ///< bounds that patches want, where there are too many
 constexpr double kSmallPatch = 12;                     ///< samples of the smallest patches
 constexpr int kMostTries = 5;                          ///< of a step
+constexpr int kTightenings = 3;                        ///< halvings between bounds of too many and of few enough
 constexpr double kUnited = 0.25;                       ///< cells of discs of inner nodes, in steps
 constexpr double kMostDisc = 0.5;                      ///< edges of what a disc covers, in steps
 constexpr double kWanted = 0.5, kWantedOfLeaf = 0.6;   ///< bounds of patches that are good enough, in steps
@@ -62,6 +63,7 @@ class NodePatcher {
             };
         SegmentSettings how;
         how.coneCosine = std::cos(settings.coneDegrees * 3.14159265358979323846 / 180);
+        how.isStopped = isStopped_ = settings.isStopped;
         const SurfaceElements elements = inSegments();
         std::vector<Segment> segments = connectedComponents(elements);
         std::erase_if(segments, [&](const Segment& s) { return !isInSegment(s.front()); });
@@ -74,6 +76,7 @@ class NodePatcher {
         double step = settings.step;
         SampledSegments sampled = settings.samplesATriangle > 0 ? sampledLeaf(segments, settings, step)
                                                                 : sampledAt(segments, step, kWanted * step);
+        sampled.dress(s_, samplingAt(step, 0), executor_);
         for (SegmentPatch& made : sampled.patches) {
             Patch& p = made.patch.patch;
             p.origin += s_.middle;
@@ -93,11 +96,15 @@ class NodePatcher {
     }
 
   private:
-    SampledSegments sampledAt(const std::vector<Segment>& segments, double step, double wanted) const {
+    SampleSettings samplingAt(double step, double wanted) const {
         SampleSettings sampling;
         sampling.step = [step](const Segment&) { return step; };
         sampling.wanted = wanted;
-        return sampleSegments(s_, segments, sampling, executor_);
+        sampling.isStopped = isStopped_;
+        return sampling;
+    }
+    SampledSegments sampledAt(const std::vector<Segment>& segments, double step, double wanted) const {
+        return sampleSegments(s_, segments, samplingAt(step, wanted), executor_);
     }
 
     /// Of a leaf. Where there are too many samples, the bound that patches want goes first, then the step, then what is
@@ -121,10 +128,12 @@ class NodePatcher {
         };
         while (static_cast<double>(segments.size()) * kSmallPatch > most && wanted < kLoosest) loosen();
         SampledSegments made = sampledAt(segments, step, wanted * step);
+        double tooTight = 0;  // bound that asked for too many at this step
         for (int tries = 0; tries < kMostTries; ++tries) {
             const auto samples = static_cast<double>(made.samples());
             if (samples <= most && samples >= least) break;
             const bool isLoose = !std::isfinite(wanted);
+            tooTight = samples > most ? wanted : 0;
             if (samples > most && (tries > 0 || !settings.isAsked)) loosen();
             if (settings.isAsked || isLoose) {
                 const double times = samples / (settings.isAsked ? aim : 0.9 * most);
@@ -135,8 +144,23 @@ class NodePatcher {
             }
             made = sampledAt(segments, step, wanted * step);
         }
+        if (!settings.isAsked) tighten(segments, step, tooTight, wanted, most, made);
         if (!settings.isAsked) made.leaveCostly(most, [&](uint32_t t) { return discsOver(t, kMostDisc * step); });
         return made;
+    }
+
+    /// Between a bound that asks for too many samples and the looser one that was taken there is a better one.
+    void tighten(const std::vector<Segment>& segments, double step, double tooTight, double taken, double most,
+                 SampledSegments& made) const {
+        if (!(tooTight > 0) || !std::isfinite(tooTight) || static_cast<double>(made.samples()) > most) return;
+        taken = std::min(taken, kLooser * tooTight);
+        for (int tries = 0; tries < kTightenings; ++tries) {
+            const double between = std::sqrt(tooTight * taken);
+            SampledSegments other = sampledAt(segments, step, between * step);
+            const bool isGood = static_cast<double>(other.samples()) <= most;
+            (isGood ? taken : tooTight) = between;
+            if (isGood) made = std::move(other);
+        }
     }
 
     /// As many as `cover` takes.
@@ -194,6 +218,7 @@ class NodePatcher {
     glm::dvec3 corner_;
     Executor& executor_;
     MeshSurface s_;
+    std::function<bool()> isStopped_;
     size_t ownVertices_ = 0, segmentVertices_ = 0;
 };
 

@@ -57,6 +57,7 @@ struct NodeSettings {
     const LevelLooks* below = nullptr;  ///< looks of triangles that are simplified ...
     double belowStep = 1;               ///< ... in cells of this edge, lattice units
     NodeMaps maps;
+    std::function<bool()> isStopped;  ///< what is there then is of no use
 };
 NodePatches patchesOfNode(const Soup& own, const AroundNode& around, const glm::dvec3& corner,
                           const NodeSettings& settings, Executor& executor);

@@ -106,7 +106,7 @@ class PatchCell {
         uint32_t deepest = nodes_[0].node.level;
         if (firstOwn_ == 0)
             for (const SurfaceNode& n : nodes_) deepest = std::max<uint32_t>(deepest, n.node.level);
-        for (uint32_t level = deepest + 1; level-- > nodes_[0].node.level;) makeLevel(level, isLast);
+        for (uint32_t level = deepest + 1; level-- > nodes_[0].node.level && !isStopped();) makeLevel(level, isLast);
         out.chunks = std::move(table_.batch.bytes);
         table_.batch.bytes = {};
         table_.put(to);
@@ -157,6 +157,7 @@ class PatchCell {
         around_.vertices = std::move(mesh.vertices);
     }
 
+    bool isStopped() const { return settings_.isStopped && settings_.isStopped(); }
     bool isToBeMade(size_t i) const { return i == 0 || firstOwn_ == 0; }
 
     void makeLevel(uint32_t level, bool isLast) {
@@ -180,17 +181,20 @@ class PatchCell {
                                        settings_.hasFineNormals,
                                        &looks_,
                                        lookStep(level),
-                                       mapsOf(n)};
+                                       mapsOf(n),
+                                       settings_.isStopped};
+                if (isStopped()) return;
                 made[k] = patchesOfNode(n.surface, around, cornerOf(frame_, n.node), how, executor_);
                 made[k].error += std::max(n.surfaceError, around.surfaceError);
             }
         });
+        if (isStopped()) return;
         for (size_t k = 0; k < here.size(); ++k) write(nodes_[here[k]], made[k]);
         if (level == nodes_[0].node.level && isLast) return;
         looks_ = looks_.halved();
         if (settings_.looks) looks_.add(looksOfLeaves(here, made), 2 * lookStep(level));
         executor_.parallelFor(here.size(), 1, [&](size_t begin, size_t end) {
-            for (size_t k = begin; k < end; ++k) {
+            for (size_t k = begin; k < end && !isStopped(); ++k) {
                 SurfaceNode& n = nodes_[here[k]];
                 n.surfaceError += simplify(n.surface, kWanted * patchStep(frame_, level), kMostKept);
             }

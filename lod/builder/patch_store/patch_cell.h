@@ -13,12 +13,13 @@ constexpr double kPatchMargin = kPatchAround / kPatchCells;
 struct PatchCellSettings {
     uint32_t leafTriangles = 32'768;
     double coneDegrees = 50;
-    double samplesATriangle = 0.5;  ///< of the leaves
-    bool isAsked = false;           ///< somebody asked for that many
-    PlaceLooks looks;               ///< of materials; empty: vertices say all
-    MapSettings maps;               ///< of what looks say
-    bool hasFineNormals = false;    ///< some of it is a mirror
-    double rounding = 0;            ///< most that a place is moved to lie on the lattice, lattice units
+    double samplesATriangle = 0.5;    ///< of the leaves
+    bool isAsked = false;             ///< somebody asked for that many
+    PlaceLooks looks;                 ///< of materials; empty: vertices say all
+    MapSettings maps;                 ///< of what looks say
+    bool hasFineNormals = false;      ///< some of it is a mirror
+    double rounding = 0;              ///< most that a place is moved to lie on the lattice, lattice units
+    std::function<bool()> isStopped;  ///< what is there then is of no use
 };
 
 /// `input`: soups of what lies in the cell and around it; `subtrees`: of all of the build.

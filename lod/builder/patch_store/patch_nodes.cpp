@@ -167,8 +167,11 @@ void writePatchNode(const Frame& frame, std::span<const Node> children, NodePatc
     for (const Patch& p : made.patches) markMaterials(p, table.hasMaterial);
     if (out.isLeaf()) {
         table.residual = std::max(table.residual, n.residual);
+        STIPPLE_CHECK(n.residual <= frame.errors.decode(ErrorScale::kLargest), "a leaf is farther off than codes tell");
         out.sourceCode = static_cast<uint8_t>(std::max(frame.errors.encodeUp(n.residual), 1u));
     }
+    STIPPLE_CHECK(out.isLeaf() || n.error <= frame.errors.decode(ErrorScale::kLargest),
+                  "no code tells of such an error");
     out.errorCode = static_cast<uint8_t>(code);
     makeSphere(children, made, cornerOf(frame, out), out);
     std::vector<uint8_t> patches = encodePatches(made.patches).bytes;

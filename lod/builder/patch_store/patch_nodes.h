@@ -1,6 +1,7 @@
 // Nodes of a store of patches on their way to the file, and the tables that say what was written.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <map>
@@ -60,6 +61,11 @@ struct PatchNode {
 PatchNode patchNodeAt(const Frame& frame, uint32_t level, Key key);
 inline glm::dvec3 cornerOf(const Frame& frame, const Node& n) {
     return glm::dvec3(n.cell[0], n.cell[1], n.cell[2]) * frame.cellSize(n.level);
+}
+/// Samples that may be asked for, of so many triangles or points: no grid is so fine that there would be more.
+inline uint64_t mostSamplesOf(uint64_t elements) {
+    constexpr uint64_t kFewest = uint64_t{1} << 20, kEach = 256;
+    return std::max(kFewest, kEach * elements);
 }
 /// As a bit of a mask of children.
 inline uint8_t octantOf(const Node& n) {

@@ -37,6 +37,7 @@ class PatchBuild : public CellContent {
         cell_.samplesATriangle = kUsualSamples;
         cell_.looks = settings.looks;
         cell_.maps = settings.maps;
+        cell_.isStopped = settings.limits.isStopped;
         cell_.hasFineNormals = hasMirrors(settings.description.pointMaterials);
     }
 
@@ -219,6 +220,7 @@ class PatchBuild : public CellContent {
         report.notes.push_back(fmt::format("{} in {}, {:.3g} units from the surface at most",
                                            counted(sums_.counts.samples, "sample"),
                                            counted(sums_.counts.patches, "patch", "patches"), sums_.residual * world));
+        noteFarLeaves(report);
         if (sums_.counts.left > 0)
             report.notes.push_back(fmt::format(
                 "{} no patch: {} for {}", counted(sums_.counts.left, "triangle fits", "triangles fit"),
@@ -240,6 +242,18 @@ class PatchBuild : public CellContent {
     }
 
   private:
+    /// That triangles would be nearer, where it is seen in a picture of the whole.
+    void noteFarLeaves(BuildReport& report) const {
+        constexpr double kAcross = 1000, kSeen = 2;  // pixels
+        const double whole = glm::length(glm::dvec3(sums_.hi) - glm::dvec3(sums_.lo));
+        const double pixels = whole > 0 ? kAcross * sums_.residual / whole : 0;
+        if (pixels <= kSeen) return;
+        report.notes.push_back(fmt::format(
+            "up to {:.0f} px where a picture shows all of it {:.0f} px across: its triangles, without --patches, are "
+            "exact, and --patch-samples N may bring most leaves nearer",
+            std::ceil(pixels), kAcross));
+    }
+
     /// Of a grid of materials most are no sample's: a store of rough ones is not to be taken for one with mirrors.
     void forgetUnused(std::vector<PointMaterial>& list) const {
         if (list != materialGrid()) return;
@@ -301,6 +315,12 @@ class PatchBuild : public CellContent {
 
 Result<BuildReport> buildPatchStore(const MeshSource& source, const std::string& output,
                                     const PatchBuildSettings& settings, Executor& executor, Progress& progress) {
+    if (settings.samples > mostSamplesOf(source.triangles))
+        return fail(
+            ErrorKind::usage,
+            fmt::format("asks for more samples than {} of patches can have", counted(source.triangles, "triangle")),
+            fmt::format("--patch-samples {}", settings.samples),
+            fmt::format("ask for {} at most", mostSamplesOf(source.triangles)));
     PatchBuild content(source, settings, executor);
     return buildCells(content, output, settings.limits, executor, progress);
 }

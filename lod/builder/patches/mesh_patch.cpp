@@ -72,22 +72,9 @@ class Patcher {
 
     MeshPatch run() {
         MeshPatch out;
-        if (!isPlanned_ || cone_.cosine <= 0) return out;
-        hit_.assign(grid_.heights.size(), kNobody);
-        isBeside_.assign(grid_.heights.size(), 0);
-        state_.assign(grid_.cells.size(), 0);
-        lowest_.assign(grid_.cells.size(), 1e300);
-        highest_.assign(grid_.cells.size(), -1e300);
-        for (const uint32_t t : segment_) rasterise(t, true);
-        for (const uint32_t t : segment_) cover(t);
-        if (isFolded()) return out;
-        if (closing_ == PatchClosing::overlap) goOn();
-        for (const uint32_t t : segment_) markBorders(t);
-        for (const uint32_t t : beyond_) markBorders(t);
-        chooseCells();
-        look();
+        if (!isPlanned_ || cone_.cosine <= 0 || !isHeightField()) return out;
+        countUsed();
         out.patch = toPatch(grid_);
-        if (out.patch.width > 0) drawMap(out.patch);
         if (out.patch.width == 0 || beside_ > kMostBeside * static_cast<double>(used_)) {
             out.fit = PatchFit::thin;
             return out;
@@ -96,7 +83,35 @@ class Patcher {
         return out;
     }
 
+    /// Of a patch that `run` made.
+    void dress(Patch& patch, const std::function<bool()>& isStopped) {
+        if (!isPlanned_ || !isHeightField()) return;
+        look(countUsed());
+        Patch dressed = toPatch(grid_);
+        patch.normals = std::move(dressed.normals);
+        patch.colours = std::move(dressed.colours);
+        patch.materials = std::move(dressed.materials);
+        drawMap(patch, isStopped);
+    }
+
   private:
+    /// Samples and cells; false: it is none.
+    bool isHeightField() {
+        hit_.assign(grid_.heights.size(), kNobody);
+        isBeside_.assign(grid_.heights.size(), 0);
+        state_.assign(grid_.cells.size(), 0);
+        lowest_.assign(grid_.cells.size(), 1e300);
+        highest_.assign(grid_.cells.size(), -1e300);
+        for (const uint32_t t : segment_) rasterise(t, true);
+        for (const uint32_t t : segment_) cover(t);
+        if (isFolded()) return false;
+        if (closing_ == PatchClosing::overlap) goOn();
+        for (const uint32_t t : segment_) markBorders(t);
+        for (const uint32_t t : beyond_) markBorders(t);
+        chooseCells();
+        return true;
+    }
+
     /// That lie over the segment, about.
     double samplesOver(double step) const {
         double area = 0;
@@ -323,16 +338,20 @@ class Patcher {
         return best;
     }
 
-    /// Normals and colours of the samples that are drawn.
-    void look() {
+    /// Of each sample: is it drawn?
+    std::vector<uint8_t> countUsed() {
         std::vector<uint8_t> isUsed(grid_.heights.size(), 0);
         for (uint32_t j = 0; j + 1 < grid_.height; ++j)
             for (uint32_t i = 0; i + 1 < grid_.width; ++i)
                 if (grid_.cells[grid_.cell(i, j)] != 0)
                     for (const size_t s : grid_.corners(i, j)) isUsed[s] = 1;
+        used_ = static_cast<size_t>(std::count(isUsed.begin(), isUsed.end(), 1));
+        return isUsed;
+    }
+    /// Normals and colours of the samples that are drawn.
+    void look(const std::vector<uint8_t>& isUsed) {
         for (size_t s = 0; s < isUsed.size(); ++s) {
             if (isUsed[s] == 0) continue;
-            ++used_;
             const SurfaceLook l = lookAt(
                 hit_[s], {static_cast<double>(s % grid_.width), static_cast<double>(s / grid_.width)}, grid_.step);
             grid_.normals[s] = l.normal;
@@ -348,7 +367,7 @@ class Patcher {
     }
 
     /// The patch's map, whose texels lie on what lies over them: the first triangle that a line meets, as of samples.
-    void drawMap(Patch& patch) const {
+    void drawMap(Patch& patch, const std::function<bool()>& isStopped) const {
         double wanted = 0;
         if (s_.mapTexels > 0)
             wanted = std::log2(s_.mapTexels);
@@ -365,7 +384,8 @@ class Patcher {
         map.colours.assign(level.isKnown.size(), 0);
         if (s_.hasMapNormals) map.normals.assign(level.isKnown.size(), 0);
         const glm::mat3 toLocal(glm::transpose(grid_.frame));
-        for (uint32_t y = 0; y < level.height; ++y)
+        for (uint32_t y = 0; y < level.height; ++y) {
+            if (isStopped && isStopped()) return;
             for (uint32_t x = 0; x < level.width; ++x) {
                 const size_t t = level.at(x, y);
                 if (level.isKnown[t] == 0) continue;
@@ -374,6 +394,7 @@ class Patcher {
                 map.colours[t] = look.colour | (map.hasMaterials ? uint32_t{look.material} << 24 : 0u);
                 if (s_.hasMapNormals) map.normals[t] = roundedNormal<kMapNormalStep>(toLocal * look.normal);
             }
+        }
         sampleColours(patch);
     }
 
@@ -475,6 +496,11 @@ class Patcher {
 MeshPatch patchOfTriangles(const MeshSurface& surface, const Segment& segment, const std::vector<uint32_t>& owner,
                            uint32_t self, double step, PatchClosing closing) {
     return Patcher(surface, segment, owner, self, step, closing).run();
+}
+
+void dressPatch(const MeshSurface& surface, const Segment& segment, const std::vector<uint32_t>& owner, uint32_t self,
+                double step, PatchClosing closing, const std::function<bool()>& isStopped, Patch& patch) {
+    Patcher(surface, segment, owner, self, step, closing).dress(patch, isStopped);
 }
 
 }  // namespace stipple::lod

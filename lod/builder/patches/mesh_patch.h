@@ -1,6 +1,8 @@
 // One segment of a mesh to one patch.
 #pragma once
 
+#include <functional>
+
 #include "lod/builder/patches/height_grid.h"
 #include "lod/builder/patches/mesh_surface.h"
 #include "lod/builder/patches/patch_build.h"
@@ -27,5 +29,10 @@ struct MeshPatch {
 /// the cone).
 MeshPatch patchOfTriangles(const MeshSurface& surface, const Segment& segment, const std::vector<uint32_t>& owner,
                            uint32_t self, double step, PatchClosing closing);
+
+/// Normals, colours, materials and map of a patch that patchOfTriangles made of the same, which has none of them yet.
+/// (Most patches are tried and not kept.) Where it was stopped, what is there is of no use.
+void dressPatch(const MeshSurface& surface, const Segment& segment, const std::vector<uint32_t>& owner, uint32_t self,
+                double step, PatchClosing closing, const std::function<bool()>& isStopped, Patch& patch);
 
 }  // namespace stipple::lod

@@ -37,6 +37,7 @@ class MeshPatches {
         sampling.isStopped = settings_.isStopped;
         sampling.tell = [this](uint64_t done) { progress_.update("patches", done, s_.size()); };
         sampled_ = sampleSegments(s_, std::move(segments), sampling, executor_);
+        sampled_.dress(s_, sampling, executor_);
         if (settings_.isStopped && settings_.isStopped()) return {};
         finish(out);
         return out;

@@ -83,7 +83,7 @@ class Sampler {
         const bool isHalved = isFar ? job.denser == 0 && isWorthHalving(job, made.patch)
                                     : made.fit == PatchFit::folded && job.segment.size() > 1;
         if (isGood && !isFar) {
-            out_.patches.push_back({job.segment.front(), std::move(made), std::move(job.segment)});
+            out_.patches.push_back({job.segment.front(), std::move(made), std::move(job.segment), job.step});
         } else if (isHalved) {
             auto [a, b] = halves(s_.elements, job.segment);
             add(std::move(a), again);
@@ -127,6 +127,20 @@ void SampledSegments::leaveCostly(double most, const std::function<double(uint32
             left.insert(left.end(), patches[k].segment.begin(), patches[k].segment.end());
     patches = std::move(kept);
     std::sort(left.begin(), left.end());
+}
+
+void SampledSegments::dress(const MeshSurface& surface, const SampleSettings& settings, Executor& executor) {
+    std::vector<uint32_t> owner(surface.size(), MeshSurface::kNobody);
+    for (size_t k = 0; k < patches.size(); ++k)
+        for (const uint32_t t : patches[k].segment) owner[t] = static_cast<uint32_t>(k);
+    executor.parallelFor(patches.size(), 1, [&](size_t begin, size_t end) {
+        for (size_t k = begin; k < end; ++k) {
+            if (settings.isStopped && settings.isStopped()) return;
+            SegmentPatch& p = patches[k];
+            dressPatch(surface, p.segment, owner, static_cast<uint32_t>(k), p.step, settings.closing,
+                       settings.isStopped, p.patch.patch);
+        }
+    });
 }
 
 SampledSegments sampleSegments(const MeshSurface& surface, std::vector<Segment> segments,

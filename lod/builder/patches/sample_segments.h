@@ -22,6 +22,7 @@ struct SegmentPatch {
     uint32_t first = 0;  ///< element of its segment
     MeshPatch patch;
     Segment segment;
+    double step = 0;  ///< that it was sampled with
 };
 
 struct SampledSegments {
@@ -31,6 +32,8 @@ struct SampledSegments {
     /// Leaves the costliest patches until there are no more than so many samples and records of what is left.
     /// `recordsOf`: of an element.
     void leaveCostly(double most, const std::function<double(uint32_t)>& recordsOf);
+    /// Looks of what is kept, samples' and maps': nothing has any before.
+    void dress(const MeshSurface& surface, const SampleSettings& settings, Executor& executor);
 };
 
 /// A segment that folds is halved and tried again, one that is thin is sampled up to eight times as densely, and what

@@ -57,7 +57,8 @@ class ScanCell {
         if (bytes.size() % sizeof(ScanPoint) != 0) return damaged();
         if (!points.empty()) std::memcpy(points.data(), bytes.data(), bytes.size());
         for (const ScanPoint& p : points) table_.duplicate += isOwn(glm::dvec3(p.x, p.y, p.z)) ? 1 : 0;
-        s_ = pointSurface(blockOf(points), {}, executor_, silent_);
+        s_ = pointSurface(blockOf(points), settings_.isStopped, executor_, silent_);
+        if (isStopped()) return {};
         for (uint32_t i = 0; i < s_.size(); ++i) {
             const glm::dvec3 p = placeOf(i);
             if (!isOwn(p)) continue;
@@ -114,7 +115,7 @@ class ScanCell {
         uint32_t deepest = nodes_[0].node.level;
         if (firstOwn_ == 0)
             for (const ScanNode& n : nodes_) deepest = std::max<uint32_t>(deepest, n.node.level);
-        for (uint32_t level = deepest + 1; level-- > nodes_[0].node.level;) makeLevel(level);
+        for (uint32_t level = deepest + 1; level-- > nodes_[0].node.level && !isStopped();) makeLevel(level);
         out.chunks = std::move(table_.batch.bytes);
         table_.batch.bytes = {};
         table_.put(to);
@@ -127,6 +128,7 @@ class ScanCell {
     static tl::unexpected<Error> damaged() {
         return fail(ErrorKind::input, "a temporary file is not what was written", "", "build again");
     }
+    bool isStopped() const { return settings_.isStopped && settings_.isStopped(); }
     ScanNode nodeAt(uint32_t level, Key key) const {
         ScanNode n;
         static_cast<PatchNode&>(n) = patchNodeAt(frame_, level, key);
@@ -164,7 +166,7 @@ class ScanCell {
             if ((i == 0 || firstOwn_ == 0) && nodes_[i].node.level == level) here.push_back(i);
         std::vector<MadeNode> made(here.size());
         executor_.parallelFor(here.size(), 1, [&](size_t begin, size_t end) {
-            for (size_t k = begin; k < end; ++k) {
+            for (size_t k = begin; k < end && !isStopped(); ++k) {
                 ScanNode& n = nodes_[here[k]];
                 made[k] = n.node.isLeaf() ? leaf(n) : inner(n);
                 if (level > 0)
@@ -172,7 +174,7 @@ class ScanCell {
                 if (!settings_.hasNormals) n.up.normal.clear();
             }
         });
-        for (size_t k = 0; k < here.size(); ++k) write(nodes_[here[k]], made[k]);
+        for (size_t k = 0; k < here.size() && !isStopped(); ++k) write(nodes_[here[k]], made[k]);
     }
 
     // ---- patches
@@ -207,6 +209,7 @@ class ScanCell {
         const double most = settings_.isAsked ? kAsked * aim : kMostSamples * points;
         const double least = settings_.isAsked && aim >= kFewSamples ? aim / kAsked : 0;
         ScanSettings how{settings_.coneDegrees, kFinest * scanStep(frame_, n.node.level), settings_.samplesAPoint};
+        how.isStopped = settings_.isStopped;
         ScanPatches made;
         for (int tries = 0;; ++tries) {
             const bool isLast = tries == kMostTries;
@@ -246,8 +249,10 @@ class ScanCell {
             error = std::max({error, c.error, c.residual});
         }
         addAround(n.node, points);
-        const PointSurface surface = pointSurface(std::move(points), {}, executor_, silent_);
-        const ScanSettings how{settings_.coneDegrees, step, 1};
+        const PointSurface surface = pointSurface(std::move(points), settings_.isStopped, executor_, silent_);
+        if (isStopped()) return out;
+        ScanSettings how{settings_.coneDegrees, step, 1};
+        how.isStopped = settings_.isStopped;
         const glm::dvec3 corner = cornerOf(frame_, n.node);
         out.patches = patchesOfScan(surface, liesOf(surface, n.node, kPatchReach * step), corner, how, executor_);
         const LevelSettings level{corner, frame_.cellSize(n.node.level), kFar * step};

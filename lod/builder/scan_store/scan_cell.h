@@ -16,10 +16,11 @@ constexpr double kScanMargin = kPatchAround / kScanCells;
 struct ScanCellSettings {
     uint32_t leafPoints = 16'384;
     double coneDegrees = 50;
-    double samplesAPoint = 1;  ///< of the leaves
-    bool isAsked = false;      ///< somebody asked for that many
-    bool hasNormals = false;   ///< the source has, of all points
-    double rounding = 0;       ///< most that a place is moved to lie on the lattice, lattice units
+    double samplesAPoint = 1;         ///< of the leaves
+    bool isAsked = false;             ///< somebody asked for that many
+    bool hasNormals = false;          ///< the source has, of all points
+    double rounding = 0;              ///< most that a place is moved to lie on the lattice, lattice units
+    std::function<bool()> isStopped;  ///< what is there then is of no use
 };
 
 /// `input`: ScanPoints of what lies in the cell and around it; `subtrees`: of all of the build.

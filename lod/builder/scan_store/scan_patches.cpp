@@ -42,9 +42,10 @@ Members membersOf(const PointSurface& s, const std::vector<Lies>& lies) {
     return m;
 }
 
-std::vector<Segment> segmentsOf(const Members& m, double coneDegrees, Executor& executor) {
+std::vector<Segment> segmentsOf(const Members& m, const ScanSettings& settings, Executor& executor) {
     SegmentSettings how;
-    how.coneCosine = std::cos(coneDegrees * 3.14159265358979323846 / 180);
+    how.isStopped = settings.isStopped;
+    how.coneCosine = std::cos(settings.coneDegrees * 3.14159265358979323846 / 180);
     std::vector<Segment> segments = connectedComponents(m.elements);
     std::erase_if(segments, [](const Segment& s) { return s.size() < kFewestPoints; });
     segments = mergeByNormals(m.elements, splitByCone(m.elements, std::move(segments), how, executor), how);
@@ -58,12 +59,13 @@ std::vector<Segment> segmentsOf(const Members& m, double coneDegrees, Executor& 
 ScanPatches patchesOfScan(const PointSurface& s, const std::vector<Lies>& lies, const glm::dvec3& corner,
                           const ScanSettings& settings, Executor& executor) {
     const Members members = membersOf(s, lies);
-    std::vector<Segment> segments = segmentsOf(members, settings.coneDegrees, executor);
+    std::vector<Segment> segments = segmentsOf(members, settings, executor);
     constexpr uint32_t kNone = ~0u;
     std::vector<uint32_t> owner(s.size(), kNone);  // the patch that stands for a point
     for (const Segment& segment : segments)
         for (const uint32_t i : segment) owner[i] = 0;
     PointSampling how;
+    how.isStopped = settings.isStopped;
     how.step = [&](const Segment& segment) {
         return std::max(stepOf(s, segment, settings.samplesAPoint), settings.leastStep);
     };

@@ -19,6 +19,7 @@ struct ScanSettings {
     double leastStep = 1;     ///< between samples, scene units
     double samplesAPoint = 1;
     double mostSamples = std::numeric_limits<double>::infinity();  ///< and points left: the costliest patches go
+    std::function<bool()> isStopped = {};                          ///< what is there then is of no use
 };
 
 struct ScanPatches {

@@ -36,6 +36,7 @@ class ScanBuild : public CellContent {
         : input_(std::move(input)), found_(std::move(found)), settings_(settings), executor_(executor) {
         cell_.coneDegrees = settings.coneDegrees;
         cell_.leafPoints = settings.leafPoints;
+        cell_.isStopped = settings.points.isStopped;
         workers_ = std::max(executor.threads(), 1);
         if (settings.samples == 0) return;
         const double times =
@@ -316,6 +317,12 @@ Result<BuildReport> buildScanStore(const std::vector<std::string>& inputs, const
                                    const ScanBuildSettings& settings, Executor& executor, Progress& progress) {
     BuildReport found;
     STIPPLE_ASSIGN(PointInput input, PointInput::open(inputs, settings.points, found));
+    if (settings.samples > mostSamplesOf(input.declared()))
+        return fail(
+            ErrorKind::usage,
+            fmt::format("asks for more samples than patches of {} can have", counted(input.declared(), "point")),
+            fmt::format("--patch-samples {}", settings.samples),
+            fmt::format("ask for {} at most", mostSamplesOf(input.declared())));
     ScanBuild content(std::move(input), std::move(found), settings, executor);
     return buildCells(content, output, settings.points, executor, progress);
 }
