@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <memory>
 
 #include "engine/base/check.h"
 #include "engine/base/hash.h"
@@ -136,6 +138,14 @@ uint32_t levelOfOwner(const std::vector<Subtree>& subtrees, Key key) {
     const auto next =
         std::upper_bound(subtrees.begin(), subtrees.end(), key, [](Key k, const Subtree& a) { return k < a.key; });
     return next == subtrees.begin() ? 0 : (next - 1)->level;
+}
+
+std::function<bool()> forGood(std::function<bool()> isStopped) {
+    if (!isStopped) return {};
+    return [ask = std::move(isStopped), seen = std::make_shared<std::atomic<bool>>(false)] {
+        if (!*seen && ask()) *seen = true;
+        return seen->load();
+    };
 }
 
 PatchNode patchNodeAt(const Frame& frame, uint32_t level, Key key) {

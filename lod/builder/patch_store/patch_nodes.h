@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <limits>
 #include <map>
 #include <span>
@@ -62,6 +63,9 @@ PatchNode patchNodeAt(const Frame& frame, uint32_t level, Key key);
 inline glm::dvec3 cornerOf(const Frame& frame, const Node& n) {
     return glm::dvec3(n.cell[0], n.cell[1], n.cell[2]) * frame.cellSize(n.level);
 }
+/// Says so for ever once `isStopped` has: what was cut short is never taken for whole, whoever asks next.
+std::function<bool()> forGood(std::function<bool()> isStopped);
+
 /// Samples that may be asked for, of so many triangles or points: no grid is so fine that there would be more.
 inline uint64_t mostSamplesOf(uint64_t elements) {
     constexpr uint64_t kFewest = uint64_t{1} << 20, kEach = 256;

@@ -321,8 +321,10 @@ Result<BuildReport> buildPatchStore(const MeshSource& source, const std::string&
             fmt::format("asks for more samples than {} of patches can have", counted(source.triangles, "triangle")),
             fmt::format("--patch-samples {}", settings.samples),
             fmt::format("ask for {} at most", mostSamplesOf(source.triangles)));
-    PatchBuild content(source, settings, executor);
-    return buildCells(content, output, settings.limits, executor, progress);
+    PatchBuildSettings own = settings;
+    own.limits.isStopped = forGood(settings.limits.isStopped);
+    PatchBuild content(source, own, executor);
+    return buildCells(content, output, own.limits, executor, progress);
 }
 
 }  // namespace stipple::lod

@@ -323,8 +323,10 @@ Result<BuildReport> buildScanStore(const std::vector<std::string>& inputs, const
             fmt::format("asks for more samples than patches of {} can have", counted(input.declared(), "point")),
             fmt::format("--patch-samples {}", settings.samples),
             fmt::format("ask for {} at most", mostSamplesOf(input.declared())));
-    ScanBuild content(std::move(input), std::move(found), settings, executor);
-    return buildCells(content, output, settings.points, executor, progress);
+    ScanBuildSettings own = settings;
+    own.points.isStopped = forGood(settings.points.isStopped);
+    ScanBuild content(std::move(input), std::move(found), own, executor);
+    return buildCells(content, output, own.points, executor, progress);
 }
 
 }  // namespace stipple::lod
