@@ -187,10 +187,11 @@ void drawPixels(const FrameConstants& frame, const Lines& lines, LinePixels& pix
         lines.rank[i] = curveRank(s);
         lines.isRound[i] = c.isRound;
         lines.isFilled[i] = isFilled(c, p, lens, f.exactCurves);
-        const bool isFine = (segmentErrorCode(s) <= node.errorCode) | ((segmentOctants(s) & node.octantMask) != 0u);
+        const float isFine = segmentErrorCode(s) <= node.errorCode ? 1.0f : 0.0f;
+        const float isOfOctant = (segmentOctants(s) & node.octantMask) != 0u ? 1.0f : 0.0f;
         const float reaches =
             curveReaches(c, lens, f.centre.x, f.centre.y, float(int(f.width)), float(int(f.height)), f.nearPlane);
-        lines.keep[i] = (isFine & (max(p.isThere, reaches) > 0.5f)) ? 1u : 0u;
+        lines.keep[i] = min(max(isFine, isOfOctant), max(p.isThere, reaches)) > 0.5f ? 1u : 0u;
     }
 }
 

@@ -89,6 +89,11 @@ void showMissed(const KeptBatch& of, size_t count, TileFilter& t) {
         });
 }
 
+/// `a` where `mask` is all ones, `b` where it is 0. (Of conditions GCC makes loads under a mask, and no SIMD.)
+[[gnu::always_inline]] inline float chosen(uint32_t mask, float a, float b) {
+    return uintBitsToFloat((floatBitsToUint(a) & mask) | (floatBitsToUint(b) & ~mask));
+}
+
 /// Where fronts end, by pixels and by blocks, and what is before them. Leaves are no surface: nothing before one is
 /// told from it.
 void closeFronts(const TileDiscs& discs, const Lens& lens, TileFilter& __restrict t, BlockLimits& __restrict limits) {
@@ -98,10 +103,10 @@ void closeFronts(const TileDiscs& discs, const Lens& lens, TileFilter& __restric
 #pragma GCC ivdep
     for (size_t i = 0; i < kTilePixels; ++i) {
         const bool hasFront = t.id[i] != TileFilter::kOther;
-        t.limit[i] = hasFront ? imageLinear(lens, t.front[i]) : kFarthest;
+        t.limit[i] = chosen(hasFront ? ~0u : 0u, imageLinear(lens, t.front[i]), kFarthest);
         const float nearest = t.own[i] - (t.front[i] - t.own[i]);  // as far before the front as it ends behind it
         const bool isThere = hasFront & (t.isLeaf[i] == 0u) & (kOrthographic | (nearest > 0.0f));
-        t.nearest[i] = isThere ? imageLinear(lens, isThere ? nearest : 1.0f) : kNearest;
+        t.nearest[i] = chosen(isThere ? ~0u : 0u, imageLinear(lens, nearest), kNearest);
     }
     for (int b = 0; b < kTileBlocks; ++b) {
         const float* const from = t.limit + b * kGroup;

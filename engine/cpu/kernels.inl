@@ -248,6 +248,8 @@ void pullRow(const TexelRow& upper, const TexelRow& lower, uint32_t n, float chi
 void expandRow(TexelRow& __restrict coarse, uint32_t n, float x, float y, float size, float focal, TexelRow& nearest,
                TexelRow& beside) {
     const Lens lens = lensHere(focal);
+    // (As bits: of a condition that is the same for all, GCC makes no SIMD. Of rows without tubes isRound is not set.)
+    const uint32_t hasTubes = coarse.hasTubes ? ~0u : 0u;
 #pragma GCC ivdep
     for (size_t i = 0; i < (n + 1) / 2 + 2; ++i) {
         const size_t at = kPad - 1 + i;
@@ -256,7 +258,7 @@ void expandRow(TexelRow& __restrict coarse, uint32_t n, float x, float y, float 
         t.radius = coarse.radius[at];
         t.offset = vec2(coarse.x[at], coarse.y[at]);
         t.normalPerp = vec2(coarse.perpX[at], coarse.perpY[at]);
-        t.isRound = coarse.hasTubes ? coarse.isRound[at] : 0.0f;
+        t.isRound = uintBitsToFloat(floatBitsToUint(coarse.isRound[at]) & hasTubes);
         const CoarseDisc d = coarseDisc(t, x + (float(int(i)) - 1.0f) * size, y, lens);
         coarse.slopeX[at] = d.slope.x;
         coarse.slopeY[at] = d.slope.y;

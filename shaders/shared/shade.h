@@ -105,11 +105,12 @@ SHARED_FN float lightAt(LightSource light, vec3 point, float depth) {
     const vec3 d = vec3(light.position.x - point.x, light.position.y - point.y, light.position.z - point.z);
     const float d2 = max(dot(d, d), 1.0e-12f);
     const float inverse = 1.0f / sqrt(d2);
-    const float reach = light.range > 0.0f ? d2 / (light.range * light.range) : 0.0f;
+    // (Conditions on what is the same for all pixels, only between numbers: GCC makes no SIMD of others.)
+    const float reach = d2 / (light.range > 0.0f ? light.range * light.range : 3.0e38f);
     const float edge = max(1.0f - reach * reach, 0.0f);
     const float along = -dot(d, light.axis) * inverse;
     const float cone = min(max((along - light.cosOuter) / max(light.cosInner - light.cosOuter, 1.0e-4f), 0.0f), 1.0f);
-    const float spread = light.kind == kLightSpot ? cone * cone : 1.0f;
+    const float spread = max(cone * cone, light.kind == kLightSpot ? 0.0f : 1.0f);
     const float isEven = (light.kind == kLightDirectional ? 1.0f : 0.0f) + (depth <= 0.0f ? 1.0f : 0.0f);
     return isEven > 0.5f ? 1.0f : spread * edge * edge / d2;
 }

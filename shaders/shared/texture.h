@@ -32,12 +32,11 @@ SHARED_FN uint tilesAcross(uint size, uint level) { return (levelSize(size, leve
 // A coordinate into [0, 1).
 SHARED_FN float wrapCoordinate(float u, uint wrap) {
     const float whole = floor(u);
-    float f = u - whole;
-    if (wrap == kWrapMirror) {
-        const float half2 = 0.5f * whole;
-        f = half2 - floor(half2) > 0.25f ? 1.0f - f : f;
-    }
-    if (wrap == kWrapClamp) f = min(max(u, 0.0f), 1.0f);
+    // (What is the same for all pixels chooses between numbers or bits: of other conditions on it GCC makes no SIMD.)
+    const float half2 = 0.5f * whole;
+    const float mirrored = half2 - floor(half2) > (wrap == kWrapMirror ? 0.25f : 1.0f) ? 1.0f - (u - whole) : u - whole;
+    const uint clamped = wrap == kWrapClamp ? ~0u : 0u;
+    const float f = uintBitsToFloat((floatBitsToUint(min(max(u, 0.0f), 1.0f)) & clamped) | (floatBitsToUint(mirrored) & ~clamped));
     return min(f, 0.99999994f);
 }
 
