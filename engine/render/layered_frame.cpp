@@ -75,8 +75,7 @@ WorldOptic inWorld(const lod::Optics& o, double scale, const Body& body) {
     w.transmission = o.transmission;
     w.ior = o.ior;
     w.thickness = o.thickness < 0 ? -o.thickness * body.thinnest : o.thickness * scale;
-    for (int k = 0; k < 3 && o.attenuationDistance > 0; ++k)
-        w.absorption[k] = -std::log(std::max(double{o.attenuationColour[k]}, 1e-6)) / (o.attenuationDistance * scale);
+    w.absorption = absorptionInWorld(o, scale);
     w.straightOn = glm::dvec3(o.straightOn());
     w.most = o.specular;
     return w;
@@ -100,6 +99,18 @@ LayerInput inputOf(const FrameState& state, const LayerDraw& layer, const DrawSe
         in.plainRoughness = own.front().roughness;
     return in;
 }
+
+/// The frame's list points at a layer only while that one is drawn, however drawing ends.
+class NoLayerAfter {
+  public:
+    explicit NoLayerAfter(DrawList& draws) : draws_(draws) {}
+    ~NoLayerAfter() { draws_.layer = nullptr; }
+    NoLayerAfter(const NoLayerAfter&) = delete;
+    NoLayerAfter& operator=(const NoLayerAfter&) = delete;
+
+  private:
+    DrawList& draws_;
+};
 
 }  // namespace
 
@@ -144,9 +155,9 @@ Result<uint64_t> drawLayered(FrameState& state, const lod::View& view, const Fra
                   [&](uint32_t i) { return std::binary_search(layer.instances.begin(), layer.instances.end(), i); });
         FrameSettings lit = plain;
         lit.draw.layer = &in;
+        const NoLayerAfter noLayerAfter(state.draws);
         STIPPLE_ASSIGN(const uint64_t more, drawNodes(state, l.cut, view, lit));
         passes += more;
-        state.draws.layer = nullptr;
         putLayer(state.image, settings.draw.background, l.behind);
     }
     std::swap(state.image, l.behind);

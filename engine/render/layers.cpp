@@ -184,6 +184,14 @@ lod::View viewFromBehind(const Body& body, const lod::View& view) {
     return back;
 }
 
+glm::dvec3 absorptionInWorld(const lod::Optics& o, double scale) {
+    glm::dvec3 a(0);
+    for (int k = 0; k < 3 && o.attenuationDistance > 0; ++k)
+        a[k] = std::min(
+            -std::log(std::max(double{o.attenuationColour[k]}, 1e-6)) / (double{o.attenuationDistance} * scale), 1e30);
+    return a;
+}
+
 bool isPlainMesh(const lod::StoreDescription& d) {
     if (d.materials.size() != 1) return false;
     const shared::SurfaceMaterial& m = d.materials.front();

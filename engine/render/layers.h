@@ -24,6 +24,11 @@ struct WorldOptic {
     double most = 1;
 };
 
+/// How much light a world unit takes away, of red, green and blue: the exponent's factor, at most 1e30, so that it is a
+/// float's whatever the file says and no way takes nothing away (infinity times zero would be no number). `scale`:
+/// world units of a unit of the store.
+glm::dvec3 absorptionInWorld(const lod::Optics& o, double scale);
+
 /// One layer, and what is seen through it; world space.
 struct LayerInput {
     uint32_t way = shared::kRefractEnvironment;

@@ -105,6 +105,23 @@ TEST(Optics, SharesOfWhatIsPartlyMetalAreThoseOfTheFormat) {
         }
 }
 
+// As floats they were infinite, and infinitely much of a way of nothing is no number: black or white specks at edges.
+TEST(Optics, TakeAllLightAwayAtOnceWithoutBeingInfinite) {
+    lod::Optics o;
+    o.attenuationDistance = 1e-40f;
+    o.attenuationColour = {0.25f, 1, 0};
+    for (const double scale : {1.0, 1e-6, 1e6}) {
+        shared::Optic optic{};
+        optic.absorption = glm::vec3(render::absorptionInWorld(o, scale));
+        for (const float path : {0.0f, 1e-3f, 1e9f}) {
+            const dvec3 left = wide(shared::absorbed(optic, path));
+            EXPECT_EQ(left, path > 0 ? dvec3(0, 1, 0) : dvec3(1)) << path << ", " << scale;
+        }
+    }
+    o.attenuationDistance = 2;
+    EXPECT_NEAR(render::absorptionInWorld(o, 3).x * 6, std::log(4), 1e-12) << "a quarter is left after the distance";
+}
+
 TEST(Optics, AreKeptInStoresAndRefusedWhereImpossible) {
     lod::StoreDescription d;
     d.materials.resize(2);
