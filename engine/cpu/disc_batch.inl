@@ -210,7 +210,7 @@ void prepareNear(const FrameConstants& f, size_t count, const SplatTile& tile, f
         const PixelRay ray = pixelRay(lens, (float(c.x) + 0.5f - f.centre.x) * inverseFocal,
                                       (float(c.y) + 0.5f - f.centre.y) * inverseFocal);
         const DiscHit hit = discHit(d, ray, f.nearPlane);
-        b.missedDepth[i] = ownDepth(d, ray, b.alone[i] != 0u, f);
+        b.missedDepth[i] = ownDepth(d, ray, f);
         const bool isSmall = b.alone[i] != 0u || d.radius * f.focal < between * lensDepth(lens, d.centre.z);
         b.missed[i] = isHere && isSmall && !(hit.rho2 <= 1.0f) ? tileEntry(atX, atY) : -1;
     }
@@ -291,12 +291,11 @@ void prepareDiscs(const FrameConstants& frame, const PlacedSplat* splats, const 
         const float misses = isMet | (reach >= between) ? -1.0f : within;
         const int entry = tileEntry(int(min(max(atX, 0.0f), lastX)), int(min(max(atY, 0.0f), lastY)));
         b.missed[i] = misses >= 0.0f ? entry : -1;
-        const float joined = b.alone[i] != 0u ? 0.0f : 1.0f;  // as in ownDepth
-        const float beyond = farthest + joined * (kPlanePixels / toImage);
+        const float beyond = farthest + kPlanePixels / toImage;  // as in ownDepth
         const float there = b.linear[i] + (b.slopeX[i] * dx + b.slopeY[i] * dy);
         const float onPlane =
             kOrthographic ? min(max(there, nearest), beyond) : 1.0f / min(max(there, 1.0f / beyond), b.most[i]);
-        b.missedDepth[i] = onPlane + joined * kThicknessRadii * d.radius;
+        b.missedDepth[i] = onPlane + kThicknessRadii * d.radius;
     }
     prepareNear(f, count, tile, between, b, boxes);
     reachBlocks(boxes, count, b.reached);

@@ -61,19 +61,19 @@ std::pair<double, double> meet(const PlacedDisc& d, const ViewRay& ray, double n
 }
 
 /// Of a disc that the ray through the pixel of its centre misses: the depth by which it competes there (that of its
-/// plane, no nearer than its rim and no more than 16 pixels beyond it, a quarter of its radius behind), and the one
+/// plane, no nearer than its rim and no more than 64 pixels beyond it, a quarter of its radius behind), and the one
 /// that it shows.
 struct MissedDisc {
     double competes, shown;
 };
-MissedDisc missedAt(const PlacedDisc& d, const ViewRay& ray, const lod::View& view, bool isAlone) {
+MissedDisc missedAt(const PlacedDisc& d, const ViewRay& ray, const lod::View& view) {
     const double reach = d.radius * std::hypot(d.normal.x, d.normal.y);
     const double nearest = std::max(d.centre.z - reach, view.nearPlane), rim = std::max(d.centre.z + reach, nearest);
-    const double farthest = isAlone ? rim : rim + 16 / pixelsAt(view, d.centre.z);
+    const double farthest = rim + 64 / pixelsAt(view, d.centre.z);
     double plane = glm::dot(d.normal, d.centre - ray.origin) / glm::dot(d.normal, ray.direction);
     if (!view.isOrthographic && !(plane > 0)) plane = HUGE_VAL;  // beyond the horizon
     if (std::isnan(plane)) plane = d.centre.z;
-    const double competes = std::clamp(plane, nearest, farthest) + (isAlone ? 0 : 0.25 * d.radius);
+    const double competes = std::clamp(plane, nearest, farthest) + 0.25 * d.radius;
     return {competes, std::min(competes, rim)};
 }
 
@@ -217,13 +217,13 @@ void showWide(const render::DrawList& draws, const std::vector<PlacedDisc>& disc
 
 void showSplats(const render::DrawList& draws, const std::vector<PlacedDisc>& discs, Level& level) {
     const lod::View& v = draws.view;
-    const auto offer = [&](int x, int y, const PlacedDisc& d, bool isCentre, bool isAlone) {
+    const auto offer = [&](int x, int y, const PlacedDisc& d, bool isCentre) {
         const dvec2 at(x + 0.5, y + 0.5);
         const ViewRay ray = viewRay(v, at);
         double depth = meet(d, ray, v.nearPlane).first;
         double shown = depth;
         if (depth == HUGE_VAL && isCentre) {
-            const MissedDisc missed = missedAt(d, ray, v, isAlone);
+            const MissedDisc missed = missedAt(d, ray, v);
             depth = missed.competes;
             shown = missed.shown;
         }
@@ -257,14 +257,14 @@ void showSplats(const render::DrawList& draws, const std::vector<PlacedDisc>& di
             range(d.centre.y, 0.5 * v.height, level.height - 1, y0, y1);
         }
         for (int y = y0; y <= y1; ++y)
-            for (int x = x0; x <= x1; ++x) offer(x, y, d, false, false);
+            for (int x = x0; x <= x1; ++x) offer(x, y, d, false);
         // Those that stand alone show it anyway; of others, only the small ones.
         const bool isLoose = (d.flags & (shared::kFlagScattered | shared::kFlagLeaf)) != 0;
         const bool isAlone = isLoose || 2 * stored < d.spacing;
         if (!isAhead || (!isAlone && d.radius * pixelsAt(v, d.centre.z) >= std::sqrt(0.5))) continue;
         const dvec2 p = imageOf(v, d.centre);
         if (p.x >= 0 && p.y >= 0 && p.x < level.width && p.y < level.height)
-            offer(static_cast<int>(p.x), static_cast<int>(p.y), d, true, isAlone);
+            offer(static_cast<int>(p.x), static_cast<int>(p.y), d, true);
     }
 }
 

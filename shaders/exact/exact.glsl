@@ -59,8 +59,7 @@ float depthAtPixel(WideDisc d, ivec2 pixel) {
     const vec2 ray = (vec2(pixel) + 0.5 - frame.centre) / frame.focal;
     const PixelRay through = pixelRay(frameLensHere(), ray.x, ray.y);
     const float depth = discHit(d, through, frame.nearPlane).depth;
-    const bool isAloneHere = standsAlone(d.id);
-    const CentrePixel c = ownPixel(d, isAloneHere, frame);
+    const CentrePixel c = ownPixel(d, standsAlone(d.id), frame);
     const bool isCentre = c.x == pixel.x && c.y == pixel.y;
-    return depth >= kNoDisc && isCentre ? ownDepth(d, through, isAloneHere, frame) : depth;
+    return depth >= kNoDisc && isCentre ? ownDepth(d, through, frame) : depth;
 }

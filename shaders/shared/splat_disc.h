@@ -74,15 +74,16 @@ SHARED_FN CentrePixel ownPixel(WideDisc d, bool isAloneHere, FrameConstants f) {
 SHARED_FN float discReach(WideDisc d) {
     return 1.0001f * d.radius * sqrt(d.normal.x * d.normal.x + d.normal.y * d.normal.y);
 }
-// So far behind a disc, px, its plane is followed at the most: right for planes that are seen at more than 2.6 degrees.
-const float kPlanePixels = 16.0f;
+// So far behind a disc, px, its plane is followed at the most: right for planes that are seen at more than half a
+// degree.
+const float kPlanePixels = 64.0f;
 // The depth by which a disc competes for the pixel of its centre if that pixel's ray misses it: that of its plane
 // there, no nearer than the disc is (what is met of its neighbours lies there), and by a quarter of its radius behind
-// those of the same plane. If it stands alone, that of the disc's nearest place to that.
-SHARED_FN float ownDepth(WideDisc d, PixelRay ray, bool isAloneHere, FrameConstants f) {
+// those of the same plane.
+SHARED_FN float ownDepth(WideDisc d, PixelRay ray, FrameConstants f) {
     const Lens lens = frameLens(f);
     const float reach = discReach(d);
-    const float beyond = isAloneHere ? 0.0f : kPlanePixels * lensDepth(lens, d.centre.z) / f.focal;
+    const float beyond = kPlanePixels * lensDepth(lens, d.centre.z) / f.focal;
     const float nearest = max(d.centre.z - reach, f.nearPlane);
     const float farthest = max(d.centre.z + reach + beyond, nearest);
     const vec3 c = fromRay(ray, d.centre);
@@ -93,7 +94,7 @@ SHARED_FN float ownDepth(WideDisc d, PixelRay ray, bool isAloneHere, FrameConsta
     const float along = ahead / (abs(facing) > 1.0e-30f ? facing : 1.0e-30f);
     const float linear = facing / (abs(ahead) > 1.0e-30f ? ahead : 1.0e-30f);
     const float plane = lens.isOrthographic ? along : 1.0f / max(linear, 1.0e-30f);
-    return min(max(plane, nearest), farthest) + (isAloneHere ? 0.0f : kThicknessRadii * d.radius);
+    return min(max(plane, nearest), farthest) + kThicknessRadii * d.radius;
 }
 // Of what competed at `depth`, the place that is shown.
 SHARED_FN float shownDepth(WideDisc d, float depth) { return min(depth, d.centre.z + discReach(d)); }

@@ -36,7 +36,8 @@ SHARED_FN float wrapCoordinate(float u, uint wrap) {
     const float half2 = 0.5f * whole;
     const float mirrored = half2 - floor(half2) > (wrap == kWrapMirror ? 0.25f : 1.0f) ? 1.0f - (u - whole) : u - whole;
     const uint clamped = wrap == kWrapClamp ? ~0u : 0u;
-    const float f = uintBitsToFloat((floatBitsToUint(min(max(u, 0.0f), 1.0f)) & clamped) | (floatBitsToUint(mirrored) & ~clamped));
+    const float f =
+        uintBitsToFloat((floatBitsToUint(min(max(u, 0.0f), 1.0f)) & clamped) | (floatBitsToUint(mirrored) & ~clamped));
     return min(f, 0.99999994f);
 }
 

@@ -37,12 +37,11 @@ void offerMet(WideDisc d, ivec2 pixel) {
 void offerOwn(uint block) {
     const WideDisc d = discOf(block, gl_LocalInvocationID.x);
     if (d.radius < 0.0) return;
-    const bool isAloneHere = standsAlone(d.id);
-    const CentrePixel c = ownPixel(d, isAloneHere, frame);
+    const CentrePixel c = ownPixel(d, standsAlone(d.id), frame);
     if (c.x >= 0) {
         const vec2 ray = (vec2(c.x, c.y) + 0.5 - frame.centre) * (1.0 / frame.focal);
         const PixelRay through = pixelRay(frameLensHere(), ray.x, ray.y);
-        if (!(discHit(d, through, frame.nearPlane).depth < kNoDisc)) offer(c.x, c.y, ownDepth(d, through, isAloneHere, frame), d.id);
+        if (!(discHit(d, through, frame.nearPlane).depth < kNoDisc)) offer(c.x, c.y, ownDepth(d, through, frame), d.id);
     }
     const DiscBox box = discBox(d, frame);
     const int width = box.x.last - box.x.first + 1;

@@ -131,6 +131,48 @@ TEST(Surface, DepthAndNormalsOfAPlaneAreThePlanesAtAnyAngle) {
         }
 }
 
+// Spacings of a clustered scan, of which many discs are less than a pixel, range over two orders. (Where nothing is met
+// the pixels of discs that are missed end at their rims: in front of the plane, by what half a pixel is along it.)
+TEST(Surface, DepthOfAClusteredPlaneIsThePlanesWhereItsDiscsAreMet) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    Rng rng(3);
+    const auto clustered = [&] { return std::pow(rng.uniform(-1, 1), 3) * 3; };
+    std::vector<test::TestPoint> points(60'000);
+    for (test::TestPoint& p : points) p = {{clustered(), clustered(), 0}, {0, 0, 1}, 0xc0c0c0, 0};
+    test::writePly(folder / "a.ply", points, true, false);
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    for (const double height : {1.0, 0.3, 0.1}) {
+        lod::View view = viewFrom(0, 400, 320, 240);
+        view.eye = {0, -4, height};
+        view.forward = glm::normalize(-view.eye);
+        view.right = {1, 0, 0};
+        view.down = glm::cross(view.forward, view.right);
+        const auto traced = reference::trace({{store, {}, {}}}, view, {1, {}}, *executor);
+        ASSERT_TRUE(traced);
+        for (const auto& backend : backends(*executor)) {
+            render::FrameSettings settings = fullDetail();
+            settings.mode = render::Mode::surface;
+            const render::Image image = test::renderView(store, *backend, *executor, view, settings);
+            std::vector<double> met, any;
+            for (size_t i = 0; i < image.depth.size(); ++i) {
+                const dvec3 r = rayOf(view, i), ray = r.x * view.right + r.y * view.down + view.forward;
+                const double z = -height / ray.z;
+                if (!(image.depth[i] > 0) || !(z > 0)) continue;
+                const double apart = std::abs(double{image.depth[i]} - z) * view.focalPixels / z;
+                any.push_back(apart);
+                if (traced->depth[i] > 0) met.push_back(apart);
+            }
+            const Apart m = summary(met), a = summary(any);
+            std::printf("height %.1f %-9s: met %zu, mean %.4f p99 %.4f max %.3f px; all %zu, mean %.4f p99 %.4f px\n",
+                        height, backend->name().c_str(), met.size(), m.mean, m.p99, m.worst, any.size(), a.mean, a.p99);
+            ASSERT_GT(met.size(), 500u);
+            EXPECT_LE(m.mean, 0.1) << height;
+            EXPECT_LE(m.p99, 1.0) << height;
+        }
+    }
+}
+
 TEST(Surface, AnEllipseIsTheDiscsAlsoInACornerOfTheView) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);
