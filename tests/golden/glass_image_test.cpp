@@ -1,5 +1,5 @@
-// Glass: every backend shows what the fp64 restatement shows, in all three ways, of triangles, points and curves; where
-// there is none nothing of it is there, and what lies beside it keeps its bytes.
+// Glass: every backend shows what the fp64 restatement shows, in all three ways, of triangles, points, curves and
+// patches; where there is none nothing of it is there, and what lies beside it keeps its bytes.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -29,6 +29,7 @@ class Glass : public test::BackendsHere {
         board_ = test::meshStore(test::board(-2.5), paint, folder_ / "board.stipple", *executor_);
         test::writePly(folder_ / "a.ply", test::spherePoints(30'000, 0xe0f0e8));
         points_ = test::buildAndOpen(folder_ / "a.ply", folder_ / "points.stipple", *executor_);
+        patches_ = test::patchStore(test::ball(140), 10'000, folder_ / "patches.stipple", *executor_);
     }
     std::vector<render::PlacedStore> scene(const std::shared_ptr<const lod::Store>& body) const {
         return {{board_, {}, {}}, {body, {}, {}}};
@@ -37,7 +38,7 @@ class Glass : public test::BackendsHere {
                        const render::FrameSettings& settings) {
         return test::draw(placed, backend, *executor_, view, settings);
     }
-    std::shared_ptr<const lod::Store> clear_, rough_, board_, points_;
+    std::shared_ptr<const lod::Store> clear_, rough_, board_, points_, patches_;
 };
 
 /// Share of pixels whose bytes differ by more than three of 255.
@@ -70,13 +71,15 @@ TEST_F(Glass, IsThatOfTheOracleInAllWays) {
                              {clear_, render::Mode::pullpush, true, false, true},
                              {rough_, render::Mode::pullpush, false, false, false},
                              {points_, render::Mode::pullpush, false, true, false},
-                             {points_, render::Mode::ewa, true, true, true}})
+                             {points_, render::Mode::ewa, true, true, true},
+                             {patches_, render::Mode::pullpush, false, true, true},
+                             {patches_, render::Mode::ewa, true, false, true}})
         for (const uint32_t way : {shared::kRefractEnvironment, shared::kRefractScreen, shared::kRefractObject}) {
             render::FrameSettings settings = test::glassSettings(look.mode);
             settings.draw.refract = way;
             if (look.hasEnvironment) settings.draw.environment = environment;
             if (look.hasLamp) settings.draw.lights = {lamp};
-            if (look.body == points_) {
+            if (look.body == points_ || look.body == patches_) {
                 settings.draw.pointMaterial = lod::packed(*lod::materialNamed("glass"));
                 settings.draw.optics = lod::opticsNamed("glass");
             }

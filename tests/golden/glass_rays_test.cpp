@@ -6,7 +6,7 @@
 
 #include "engine/cpu/cpu_backend.h"
 #include "engine/render/layers.h"
-#include "lod/builder/patch_store/patch_store_build.h"
+#include "lod/primitives/patch_samples.h"
 #include "lod/store/materials.h"
 #include "tests/support/glass.h"
 
@@ -48,29 +48,7 @@ dvec3 decoded(const dvec3& c) {
     return 2.0 * (c * (std::abs(q1 - 1) < std::abs(q2 - 1) ? q1 : q2) - 1.0);
 }
 
-constexpr uint64_t kPatchSamples = 9'858;  ///< asked for, and held within a fifth
-
-/// Of a ball of triangles, so many samples.
-std::shared_ptr<const lod::Store> patchStore(uint64_t samples, const std::string& path, Executor& executor) {
-    const scene::Primitive ball = test::ball(140);
-    lod::TriangleMesh mesh;
-    for (size_t v = 0; v < ball.position.size(); ++v) {
-        mesh.position.emplace_back(glm::round(glm::dvec3(ball.position[v]) * 1e7) / 1e7);  // the poles are one place
-        mesh.normal.push_back(ball.normal[v]);
-        mesh.colour.push_back(~0u);
-        mesh.surface.push_back(0);
-        mesh.uv.emplace_back(0);
-    }
-    mesh.indices = ball.indices;
-    lod::PatchBuildSettings settings;
-    settings.samples = samples;
-    settings.description.pointMaterials = {{0, 1}};
-    Progress silent(false);
-    const auto built = lod::buildPatchStore(lod::sourceOf(mesh), path, settings, executor, silent);
-    EXPECT_TRUE(built) << (built ? "" : built.error().line());
-    for (const std::string& note : built->notes) std::printf("patches: %s\n", note.c_str());
-    return std::make_shared<const lod::Store>(*lod::openStore(path));
-}
+constexpr uint64_t kSamples = 9'858;  ///< of patches as many are asked for, and held within a fifth
 
 class GlassRays : public testing::Test {
   protected:
@@ -79,52 +57,74 @@ class GlassRays : public testing::Test {
     std::unique_ptr<render::Backend> backend_ = cpu::makeCpuBackend(*executor_);
 };
 
+/// Of the direction that a mirror ball reflects, degrees, p95; and how much of it comes from where: from the place that
+/// is drawn instead of the ball's, from the normal there, and from the maps of the environment.
+struct Reflected {
+    double off, place, normal, map;
+};
+
+Reflected offReflection(const render::Image& image, const lod::View& view) {
+    std::vector<double> off, place, normal, map;
+    for (uint32_t y = 0; y < view.height; ++y)
+        for (uint32_t x = 0; x < view.width; ++x) {
+            const size_t i = size_t{y} * view.width + x;
+            const dvec3 d = rayOf(view, x, y);
+            const double t = toSphere(view.eye, d);
+            if (!(image.depth[i] > 0) || !(t > 0)) continue;
+            const dvec3 n = view.eye + t * d;
+            if (-glm::dot(n, d) < 0.2) continue;  // the rim, which is a pixel of many directions
+            const dvec3 shown = decoded({image.linear[3 * i], image.linear[3 * i + 1], image.linear[3 * i + 2]});
+            const dvec3 there = glm::normalize(view.eye + d * (double{image.depth[i]} / glm::dot(d, view.forward)));
+            const dvec3 drawn =
+                glm::normalize(dvec3(image.normal[3 * i], image.normal[3 * i + 1], image.normal[3 * i + 2]));
+            off.push_back(degrees(shown, glm::reflect(d, n)));
+            place.push_back(degrees(glm::reflect(d, there), glm::reflect(d, n)));
+            normal.push_back(degrees(glm::reflect(d, drawn), glm::reflect(d, there)));
+            map.push_back(degrees(shown, glm::reflect(d, drawn)));
+        }
+    return {p95(off), p95(place), p95(normal), p95(map)};
+}
+
+// Patches are of a ball of triangles half as long as their steps: of one with as many corners as there are samples they
+// are chords of chords, which is the other control.
 TEST_F(GlassRays, AMirrorBallReflectsTheDirectionsThatItShould) {
-    test::writePly(folder_ / "a.ply", test::spherePoints(9'858, 0xffffff));
+    test::writePly(folder_ / "a.ply", test::spherePoints(kSamples, 0xffffff));
     const auto points = test::buildAndOpen(folder_ / "a.ply", folder_ / "a.stipple", *executor_),
                mesh = test::meshStore(test::ball(140), std::nullopt, folder_ / "b.stipple", *executor_),
-               patches = patchStore(kPatchSamples, folder_ / "c.stipple", *executor_);
+               patches = test::patchStore(test::ball(280), kSamples, folder_ / "c.stipple", *executor_),
+               chords = test::patchStore(test::ball(140), kSamples, folder_ / "d.stipple", *executor_);
     const lod::View view = test::glassView({0, 0, 3}, 480);
     const auto light = test::directionLight(2048);
-    const auto off = [&](const std::shared_ptr<const lod::Store>& store, render::Mode mode, bool hasSharpMaps,
-                         uint32_t patchAs = shared::kPatchStrips) {
+    const auto off = [&](const char* name, const std::shared_ptr<const lod::Store>& store, render::Mode mode,
+                         bool hasSharpMaps = true, uint32_t patchAs = shared::kPatchStrips) {
         render::FrameSettings settings = test::glassSettings(mode);
         settings.draw.pointMaterial = lod::packed(*lod::materialNamed("mirror"));
         settings.draw.patchAs = patchAs;
         settings.draw.environment =
             std::make_shared<const render::Environment>(render::makeEnvironment(light, 1, *executor_, hasSharpMaps));
-        const render::Image image = test::renderView(store, *backend_, *executor_, view, settings);
-        std::vector<double> all;
-        for (uint32_t y = 0; y < view.height; ++y)
-            for (uint32_t x = 0; x < view.width; ++x) {
-                const size_t i = size_t{y} * view.width + x;
-                const dvec3 d = rayOf(view, x, y);
-                const double t = toSphere(view.eye, d);
-                if (!(image.depth[i] > 0) || !(t > 0)) continue;
-                const dvec3 n = view.eye + t * d;
-                if (-glm::dot(n, d) < 0.2) continue;  // the rim, which is a pixel of many directions
-                const dvec3 c(image.linear[3 * i], image.linear[3 * i + 1], image.linear[3 * i + 2]);
-                all.push_back(degrees(decoded(c), glm::reflect(d, n)));
-            }
-        return p95(all);
+        const Reflected r = offReflection(test::renderView(store, *backend_, *executor_, view, settings), view);
+        std::printf("%-36s %.3f (places %.3f, normals %.3f, maps %.3f)\n", name, r.off, r.place, r.normal, r.map);
+        return r;
     };
-    const double triangles = off(mesh, render::Mode::pullpush, true),
-                 pullpush = off(points, render::Mode::pullpush, true), ewa = off(points, render::Mode::ewa, true),
-                 splat = off(points, render::Mode::splat, true), usual = off(mesh, render::Mode::pullpush, false),
-                 strips = off(patches, render::Mode::pullpush, true),
-                 splats = off(patches, render::Mode::pullpush, true, shared::kPatchSplats),
-                 direct = off(patches, render::Mode::pullpush, true, shared::kPatchDirect);
-    std::printf(
-        "mirror ball of 9,858 samples (triangles: %zu): reflected direction p95, degrees: triangles %.3f, "
-        "pullpush %.3f, ewa %.3f, splat %.3f; triangles by the usual maps %.3f\n",
-        size_t{140} * 140, triangles, pullpush, ewa, splat, usual);
-    std::printf("  patches: strips %.3f, splats %.3f, direct %.3f\n", strips, splats, direct);
-    EXPECT_LT(triangles, 0.2);
-    EXPECT_LT(strips, 0.21);  // wanted is 0.2
-    EXPECT_LT(splats, 0.21);
-    EXPECT_LT(ewa, 2);
-    EXPECT_LT(pullpush, 2);
-    EXPECT_GT(usual, triangles) << "the control";
+    std::printf("mirror ball of 9,858 samples, 19,600 triangles: reflected direction p95, degrees (from where)\n");
+    constexpr render::Mode kUsual = render::Mode::pullpush;
+    const Reflected triangles = off("triangles", mesh, kUsual), pullpush = off("pullpush", points, kUsual),
+                    ewa = off("ewa", points, render::Mode::ewa),
+                    usual = off("triangles by the usual maps", mesh, kUsual, false),
+                    strips = off("patches as strips", patches, kUsual),
+                    splats = off("patches as splats", patches, kUsual, true, shared::kPatchSplats),
+                    coarse = off("strips of a ball of 19,600 triangles", chords, kUsual);
+    off("splat", points, render::Mode::splat);
+    off("patches as direct splats", patches, kUsual, true, shared::kPatchDirect);
+    EXPECT_LT(triangles.off, 0.2);
+    for (const Reflected& r : {strips, splats}) {
+        EXPECT_LT(r.off, 0.2);
+        EXPECT_LT(r.normal, 0.06) << "of which the rounding of mirrors' normals is most";
+    }
+    EXPECT_LT(ewa.off, 2);
+    EXPECT_LT(pullpush.off, 2);
+    EXPECT_GT(usual.off, triangles.off) << "the control";
+    EXPECT_GT(coarse.place, 1.2 * strips.place) << "the other control";
 }
 
 /// Through a ball of glass, in fp64: where a ray leaves it, and in what direction; false if it misses it.
@@ -199,43 +199,82 @@ Off offTruth(const render::FrameState& state, const lod::View& view, uint32_t wa
     return {p95(pixels), p95(angles), static_cast<double>(found) / static_cast<double>(all)};
 }
 
-TEST_F(GlassRays, ABallOfGlassBendsRaysTwice) {
-    scene::Material paint;
-    const auto board = test::meshStore(test::board(-2.5), paint, folder_ / "board.stipple", *executor_);
+constexpr std::array<const char*, 3> kWays{"environment", "screen", "object"};
+
+/// A ball of glass before a board.
+class GlassBall : public GlassRays {
+  protected:
+    Off measure(const std::shared_ptr<const lod::Store>& body, render::Mode mode, uint32_t way,
+                uint32_t patchAs = shared::kPatchStrips) {
+        render::FrameSettings settings = test::glassSettings(mode);
+        settings.draw.refract = way;
+        settings.draw.patchAs = patchAs;
+        settings.draw.pointMaterial = lod::packed(*lod::materialNamed("glass"));
+        settings.draw.optics = lod::opticsNamed("glass");
+        std::vector<render::PlacedStore> placed{{board_, {}, {}}, {body, {}, {}}};
+        for (render::PlacedStore& p : placed) p.patchesAreSamples = patchAs == lod::kPatchesAsSamples;
+        auto state = render::makeFrameState(placed, *backend_, *executor_, {});
+        EXPECT_TRUE(render::renderUntilComplete(*state, view_, settings));
+        return offTruth(*state, view_, way, 1.5);
+    }
+    static void print(const char* of, uint32_t way, const Off& off) {
+        std::printf("ball of glass, %s, %-11s: exit point p95 %.2f px, exit direction p95 %.2f degrees, of %.1f %%\n",
+                    of, kWays.at(way), off.pixels, off.degrees, 100 * off.found);
+    }
+    std::shared_ptr<const lod::Store> board_ =
+        test::meshStore(test::board(-2.5), scene::Material{}, folder_ / "board.stipple", *executor_);
+    lod::View view_ = test::glassView({0.9, 0.7, 3.6}, 480);
+};
+
+TEST_F(GlassBall, OfTrianglesAndPointsBendsRaysTwice) {
     const auto mesh = test::meshStore(test::ball(400), test::glassMaterial(*lod::opticsNamed("glass")),
                                       folder_ / "mesh.stipple", *executor_);
     test::writePly(folder_ / "a.ply", test::spherePoints(60'000, 0xffffff));
     const auto points = test::buildAndOpen(folder_ / "a.ply", folder_ / "a.stipple", *executor_);
-    const lod::View view = test::glassView({0.9, 0.7, 3.6}, 480);
-    const auto measure = [&](const std::shared_ptr<const lod::Store>& body, render::Mode mode, uint32_t way) {
-        render::FrameSettings settings = test::glassSettings(mode);
-        settings.draw.refract = way;
-        settings.draw.pointMaterial = lod::packed(*lod::materialNamed("glass"));
-        settings.draw.optics = lod::opticsNamed("glass");
-        auto state = render::makeFrameState({{board, {}, {}}, {body, {}, {}}}, *backend_, *executor_, {});
-        EXPECT_TRUE(render::renderUntilComplete(*state, view, settings));
-        return offTruth(*state, view, way, 1.5);
-    };
-    static const std::array<const char*, 3> kWays{"environment", "screen", "object"};
     std::array<Off, 3> triangles{};
     for (const uint32_t way : {0u, 1u, 2u}) {
         triangles.at(way) = measure(mesh, render::Mode::pullpush, way);
-        std::printf(
-            "ball of glass, triangles, %-11s: exit point p95 %.2f px, exit direction p95 %.2f degrees, of %.1f %%\n",
-            kWays.at(way), triangles.at(way).pixels, triangles.at(way).degrees, 100 * triangles.at(way).found);
+        print("triangles", way, triangles.at(way));
     }
-    for (const auto& [name, mode] : {std::pair{"pullpush", render::Mode::pullpush}, {"ewa", render::Mode::ewa}}) {
+    for (const auto& [name, mode] : {std::pair{"60,000 points in pullpush", render::Mode::pullpush},
+                                     {"60,000 points in ewa", render::Mode::ewa}}) {
         const Off off = measure(points, mode, shared::kRefractObject);
-        std::printf(
-            "ball of glass, 60,000 points in %-8s, object: exit point p95 %.2f px, exit direction p95 %.2f degrees, of "
-            "%.1f %%\n",
-            name, off.pixels, off.degrees, 100 * off.found);
+        print(name, shared::kRefractObject, off);
         EXPECT_LE(off.pixels, 4) << name;
     }
     EXPECT_LE(triangles[2].pixels, 2);
     EXPECT_GE(triangles[2].found, 0.95);
     EXPECT_GT(triangles[0].pixels, 20) << "the control";
     EXPECT_GT(triangles[1].degrees, 5) << "the control";
+}
+
+TEST_F(GlassBall, OfPatchesBendsRaysTwiceHoweverTheyAreDrawn) {
+    struct As {
+        const char* name;
+        uint32_t as;
+        render::Mode mode;
+        double pixels, degrees;  ///< `object` is not farther off
+    };
+    const auto patches = test::patchStore(test::ball(400), 60'000, folder_ / "patches.stipple", *executor_);
+    for (const As& of : {As{"patches as strips", shared::kPatchStrips, render::Mode::pullpush, 0.25, 0.25},
+                         {"patches as splats", shared::kPatchSplats, render::Mode::pullpush, 0.25, 0.25},
+                         {"patches as direct splats", shared::kPatchDirect, render::Mode::pullpush, 0.25, 0.25},
+                         {"patches as samples in pullpush", lod::kPatchesAsSamples, render::Mode::pullpush, 4, 2},
+                         {"patches as samples in ewa", lod::kPatchesAsSamples, render::Mode::ewa, 2, 1}}) {
+        SCOPED_TRACE(of.name);
+        std::array<Off, 3> off{};
+        for (const uint32_t way : {0u, 1u, 2u}) {
+            off.at(way) = measure(patches, of.mode, way, of.as);
+            print(of.name, way, off.at(way));
+        }
+        EXPECT_LE(off[2].pixels, of.pixels);
+        EXPECT_LE(off[2].degrees, of.degrees);
+        EXPECT_GE(off[2].found, 0.95);
+        for (const uint32_t way : {0u, 1u}) {
+            EXPECT_GT(off.at(way).pixels, 20) << "the control";
+            EXPECT_GT(off.at(way).degrees, 5) << "the control";
+        }
+    }
 }
 
 }  // namespace

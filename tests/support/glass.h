@@ -8,6 +8,7 @@
 #include "engine/scene/camera.h"
 #include "engine/scene/triangles.h"
 #include "lod/builder/mesh/mesh_build.h"
+#include "lod/builder/patch_store/patch_store_build.h"
 #include "tests/support/support.h"
 
 namespace stipple::test {
@@ -67,6 +68,28 @@ inline std::shared_ptr<const lod::Store> meshStore(scene::Primitive mesh,
     const auto built =
         lod::buildMeshStore(scene::triangleSource(scene, scene::placements(scene)), path, build, executor, silent);
     EXPECT_TRUE(built);
+    return std::make_shared<const lod::Store>(*lod::openStore(path));
+}
+
+/// Patches of a mesh of white triangles, about so many samples; a mirror where nothing else is asked for.
+inline std::shared_ptr<const lod::Store> patchStore(const scene::Primitive& of, uint64_t samples,
+                                                    const std::string& path, Executor& executor) {
+    lod::TriangleMesh mesh;
+    for (size_t v = 0; v < of.position.size(); ++v) {
+        mesh.position.emplace_back(glm::round(glm::dvec3(of.position[v]) * 1e7) / 1e7);  // a ball's pole is one place
+        mesh.normal.push_back(of.normal[v]);
+        mesh.colour.push_back(~0u);
+        mesh.surface.push_back(0);
+        mesh.uv.emplace_back(0);
+    }
+    mesh.indices = of.indices;
+    lod::PatchBuildSettings settings;
+    settings.samples = samples;
+    settings.description.pointMaterials = {{0, 1}};
+    Progress silent(false);
+    const auto built = lod::buildPatchStore(lod::sourceOf(mesh), path, settings, executor, silent);
+    EXPECT_TRUE(built) << (built ? "" : built.error().line());
+    for (const std::string& note : built->notes) std::printf("patches: %s\n", note.c_str());
     return std::make_shared<const lod::Store>(*lod::openStore(path));
 }
 
