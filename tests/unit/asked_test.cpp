@@ -140,6 +140,19 @@ TEST_F(Asked, ADemoMakesItsFolder) {
     const Outcome r = runProgram(folder(), "grow demo -o new/demo --points 5k --leaves 1k");
     EXPECT_EQ(r.code, 0) << r.err;
     EXPECT_TRUE(std::filesystem::exists(path("new/demo/demo.glb")));
+    // With a mirror and glass, through which another picture is seen the other way.
+    const std::string file = test::slurp(path("new/demo/demo.glb"));
+    EXPECT_TRUE(says(file, "KHR_materials_transmission"));
+    EXPECT_TRUE(says(file, "\"mirror\""));
+    const auto picture = [&](const std::string& more) {
+        EXPECT_EQ(
+            render("--eye 0,6,40 --target 0,2.5,22 --size 160x90 --error 4 --force " + more, "new/demo/demo.glb").code,
+            0);
+        return test::slurp(path("p.png"));
+    };
+    const std::string object = picture("--refract object");
+    EXPECT_TRUE(object == picture("--refract object"));
+    EXPECT_FALSE(object == picture("--refract environment"));
 }
 
 TEST_F(Asked, AViewOfNothingSaysSo) {
