@@ -158,7 +158,7 @@ Result<CellProduct> Reduction::makeCell(const LevelCells& level, size_t i, const
         STIPPLE_ASSIGN(below, readBelow(level.waiting[i]));
     }
     STIPPLE_ASSIGN(CellProduct product, make(level.cells[i], input, below));
-    STIPPLE_TRY(workspace_.checkStopped());  // what was cut short is nothing
+    if (product.isCutShort) STIPPLE_TRY(workspace_.checkStopped());
     return product;
 }
 

@@ -33,6 +33,7 @@ struct CellProduct {
     std::vector<uint8_t> chunks;  ///< for the file
     std::vector<uint8_t> table;   ///< what the caller wants to know of them at the end
     std::vector<GoingUp> up;
+    bool isCutShort = false;  ///< somebody stopped the build meanwhile: this is nothing
 };
 /// What was sent to a cell, with the label that the sender got when it was handed on.
 struct FromBelow {

@@ -176,7 +176,9 @@ class ScanBuild : public CellContent {
 
     Result<CellProduct> make(const WorkCell& cell, const std::vector<uint8_t>& input,
                              const std::vector<FromBelow>& below) const override {
-        return buildScanCell(cell, input, below, frame(), subtrees_, cell_, executor_);
+        STIPPLE_ASSIGN(CellProduct product, buildScanCell(cell, input, below, frame(), subtrees_, cell_, executor_));
+        product.isCutShort = cell_.isStopped && cell_.isStopped();
+        return product;
     }
 
     uint64_t take(uint64_t at, const std::vector<uint8_t>& bytes) override { return sums_.add(at, bytes); }
