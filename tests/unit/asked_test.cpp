@@ -145,9 +145,11 @@ TEST_F(Asked, ADemoMakesItsFolder) {
     EXPECT_TRUE(says(file, "KHR_materials_transmission"));
     EXPECT_TRUE(says(file, "\"mirror\""));
     const auto picture = [&](const std::string& more) {
-        EXPECT_EQ(
-            render("--eye 0,6,40 --target 0,2.5,22 --size 160x90 --error 4 --force " + more, "new/demo/demo.glb").code,
-            0);
+        const Outcome seen = runProgram(folder(),
+                                        "render new/demo/demo.glb -o p.png --force --size 160x90 --error 4 "
+                                        "--eye 0,6,40 --target 0,2.5,22 " +
+                                            more);
+        EXPECT_EQ(seen.code, 0) << seen.err;
         return test::slurp(path("p.png"));
     };
     const std::string object = picture("--refract object");
