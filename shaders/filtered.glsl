@@ -139,6 +139,17 @@ float shownOf(uint at, FilteredSums s, out FilteredPixel p) {
     }
     return absoluteDepth(float(s.depth) * over, s.reference);
 }
+// Depth of a pixel with a front disc.
+float withinFront(WideDisc d, uvec2 pixel, float blended) {
+    const Lens lens = frameLensHere();
+    const vec2 at = vec2(pixel) + 0.5 - frame.centre;
+    const PixelRay ray = pixelRay(lens, at.x / frame.focal, at.y / frame.focal);
+    const vec3 direction = rayDirection(ray);
+    const DepthRange range = depthRange(d, d.radius / kOpaqueSigmas, frame.kernelSupport, frame.lowPass, lens);
+    const float plane = depthWithin(range, dot(d.normal, fromRay(ray, d.centre)), dot(d.normal, direction));
+    if (!(discHit(d, ray, frame.nearPlane).depth < kNoDisc)) return placeOfMissed(d, plane);
+    return shownWithin(blended, plane, 1.0 / length(direction), lens);
+}
 // Those of a disc on its own.
 FilteredPixel ownOf(uint id, DrawNode node, PointRecord r) {
     FilteredPixel p;

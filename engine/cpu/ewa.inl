@@ -12,6 +12,8 @@ struct TileFilter {
     alignas(64) float front[kTilePixels];      ///< depth of the front disc moved back; kNoDisc: none
     alignas(64) uint32_t id[kTilePixels];      ///< the front disc, by its place in TileDiscs, or kOther
     alignas(64) float own[kTilePixels];        ///< depth of the front disc
+    alignas(64) uint32_t missed[kTilePixels];  ///< the last front disc that the pixel's ray misses, or kOther
+    alignas(64) float place[kTilePixels];      ///< depth at which that is shown
     alignas(64) uint32_t isLeaf[kTilePixels];  ///< 1: the front disc is one; only of fronts that are closed
     alignas(64) float farthest[kTilePixels];   ///< of what is opaque there; 0: nothing
     alignas(64) float along[kTilePixels];      ///< depth per length along the ray
@@ -41,6 +43,7 @@ struct FrontBatch {
     static constexpr size_t kSize = DiscBatch::kSize;
     alignas(64) float shift[kSize];                     ///< how far behind the disc its surface may be
     alignas(64) float missedDepth[kSize];               ///< at DiscBatch::missed
+    alignas(64) float missedPlace[kSize];               ///< what is shown there
     alignas(64) float nearest[kSize], farthest[kSize];  ///< between which their planes count
     alignas(64) uint32_t colour[kSize];                 ///< and flags, of the record
 };
@@ -108,6 +111,12 @@ struct TileDiscs {
         const size_t batch = place / DiscBatch::kSize;
         return batch < kKept ? batches[batch].id[place % DiscBatch::kSize] : splats[places[place]].id;
     }
+    WideDisc disc(uint32_t place) const {
+        const size_t batch = place / DiscBatch::kSize;
+        if (batch < kKept) return batches[batch].disc(place % DiscBatch::kSize);
+        const PlacedSplat& s = splats[places[place]];
+        return {vec3(s.cx, s.cy, s.cz), vec3(s.nx, s.ny, s.nz), s.radius, 0u};
+    }
     bool isLeaf(uint32_t place) const {
         const size_t batch = place / DiscBatch::kSize;
         const uint32_t colour = batch < kKept ? fronts[batch].colour[place % DiscBatch::kSize] : colours[places[place]];
@@ -132,7 +141,8 @@ struct KeptBatch {
 void clearBlock(int block, TileFilter& __restrict t) {
     for (int i = block * kGroup; i < (block + 1) * kGroup; ++i) {
         t.front[i] = t.own[i] = kNoDisc;
-        t.id[i] = t.rim[i] = TileFilter::kOther;
+        t.id[i] = t.rim[i] = t.missed[i] = TileFilter::kOther;
+        t.place[i] = kNoDisc;
         t.isLeaf[i] = 0u;
         t.farthest[i] = 0.0f;
         t.limit[i] = t.nearest[i] = kNearest;

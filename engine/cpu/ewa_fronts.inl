@@ -86,6 +86,8 @@ void showMissed(const KeptBatch& of, size_t count, TileFilter& t) {
             t.front[at] = moved;
             t.id[at] = id;
             t.own[at] = k.missedDepth[i];
+            t.missed[at] = id;
+            t.place[at] = k.missedPlace[i];
         });
 }
 

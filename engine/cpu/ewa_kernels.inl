@@ -66,6 +66,7 @@ void prepareFronts(const FrameConstants& frame, size_t count, const DiscBatch& s
         const float ex = (std::floor(d.centre.x * toImage + f.centre.x) + 0.5f - f.centre.x) * inverseFocal,
                     ey = (std::floor(d.centre.y * toImage + f.centre.y) + 0.5f - f.centre.y) * inverseFocal;
         b.missedDepth[i] = depthMissed(lens, d, range, ex, ey);
+        b.missedPlace[i] = placeOfMissed(d, b.missedDepth[i]);
     }
 }
 

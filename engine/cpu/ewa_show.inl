@@ -14,6 +14,11 @@ void showOwn(const FrameConstants& f, const Tables& tables, const BlockSource* b
     pixel.cover = (pixel.cover & (kFilteredMaterial - 1u)) | coverOfMaterial(surfaceOfPoint(material));
 }
 
+/// Bits of a depth; that of a pixel without a front, no place beyond the disc that counts first there.
+uint32_t rimDepth(const FrameConstants& f, const WideDisc& first, uint32_t blended) {
+    return floatBitsToUint(max(placeOfMissed(first, uintBitsToFloat(blended)), f.nearPlane));
+}
+
 /// Other kinds at the pixels of a tile, before discs were drawn; and what it shows then.
 struct TileOthers {
     bool hasAny;
@@ -33,8 +38,9 @@ struct ShownBand {
 };
 /// `covered`: what a weight of 1 covers; `mostDivided`: by more than that colours are not divided.
 template <Wants wants>
-void showBand(float covered, float mostDivided, int band, const TileFilter& __restrict t, ShownBand& __restrict s,
-              float* __restrict shown) {
+void showBand(const Lens& eye, float covered, float mostDivided, int band, const TileFilter& __restrict t,
+              ShownBand& __restrict s, float* __restrict shown) {
+    const Lens lens = eye;
     const size_t first = size_t(band) * kBandPitch;
 #pragma GCC ivdep
     for (size_t k = 0; k < size_t(kBandPitch); ++k) {
@@ -48,7 +54,9 @@ void showBand(float covered, float mostDivided, int band, const TileFilter& __re
         s.isThere[k] = (hasFront ? isBefore : isRim) * (isBlended ? 1u : 2u);
         const float over = 1.0f / (isBlended ? weight : 1.0f), linear = t.linear[i] * over;
         const float mean = kOrthographic ? linear : 1.0f / linear;
-        const float depth = isBlended ? mean : t.own[i];
+        const float within = shownWithin(isBlended ? mean : t.own[i], t.own[i], t.along[i], lens);
+        const float ofFront = t.missed[i] == t.id[i] ? t.place[i] : within;
+        const float depth = hasFront ? ofFront : mean;
         s.depth[k] = floatBitsToUint(depth);
         shown[i] = hasFront & (isBefore != 0u) ? depth : hasFront | (isRim == 0u) ? exact : kNoDisc;
         const float ofColour = 1.0f / (isBlended ? min(weight, mostDivided) : 1.0f);
@@ -86,7 +94,7 @@ void showTile(const FrameConstants& f, const Tables& tables, const BlockSource* 
                 s.exact[at] = others.depth[of] = key != kNoKey ? keyDepth(key) : kNoDisc;
                 others.keys[of] = key;
             }
-        showBand<wants>(covered, mostDivided, int(y) / kGroupRows, t, s, others.shown);
+        showBand<wants>(lensHere(f.focal), covered, mostDivided, int(y) / kGroupRows, t, s, others.shown);
         for (uint32_t r = 0; r < rows; ++r)
             for (size_t x = 0; x < tile.width; ++x) {
                 const size_t k = size_t(kGroupRows) * x + r, to = first + r * f.width + x;
@@ -97,7 +105,9 @@ void showTile(const FrameConstants& f, const Tables& tables, const BlockSource* 
                 if (discs.hasLeaves && (s.isLeaf[k] == 2u ? discs.isLeaf(s.id[k]) : s.isLeaf[k] != 0u))
                     pixel.cover |= kFilteredLeaf;
                 filtered[to] = pixel;
-                visibility.keys[to] = visibilityKey(s.depth[k], drawId(0u, id));
+                const bool isRim = (s.cover[k] & kFilteredFront) == 0u;
+                const uint32_t depth = isRim ? rimDepth(f, discs.disc(s.id[k]), s.depth[k]) : s.depth[k];
+                visibility.keys[to] = visibilityKey(depth, drawId(0u, id));
             }
     }
 }

@@ -164,17 +164,23 @@ void outputRow(const FrameConstants& frame, const Tables& tables, uint32_t n, co
             const auto alpha = uint32_t(row.depth[i] > 0.0f ? row.coverage[i] * 255.0f + 0.5f : 0.0f);
             rgba[i] = (rgba[i] & 0xffffffu) | alpha << 24;
         }
+    // What rays meet: of a pixel that is hardly covered nothing.
+    alignas(64) float met[kTile];
+    for (size_t i = 0; i < n; ++i) met[i] = row.depth[i];
+    if (row.hasCoverage)
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) met[i] = row.coverage[i] < kLeastShown ? 0.0f : row.depth[i];
     if (out.normal != nullptr)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
-            const bool valid = row.depth[i] > 0.0f;
+            const bool valid = met[i] > 0.0f;
             const float x = row.nx[i], y = row.ny[i], z = row.nz[i];
             out.normal[3 * i] = valid ? f.viewX.x * x + f.viewY.x * y + f.viewZ.x * z : 0.0f;
             out.normal[3 * i + 1] = valid ? f.viewX.y * x + f.viewY.y * y + f.viewZ.y * z : 0.0f;
             out.normal[3 * i + 2] = valid ? f.viewX.z * x + f.viewY.z * y + f.viewZ.z * z : 0.0f;
         }
     if (out.depth != nullptr)
-        for (size_t i = 0; i < n; ++i) out.depth[i] = row.depth[i];
+        for (size_t i = 0; i < n; ++i) out.depth[i] = met[i];
     if (out.linear != nullptr)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {

@@ -379,7 +379,8 @@ class ReferenceBackend final : public render::DrawsAtOnce {
                             f.debugView == shared::kDebugHoles || f.debugView == shared::kDebugNormals;
                         if (!isOfGeometry) seen.colour = mixed;
                     }
-                    if (wantAll) {
+                    // Of a pixel that is less than half covered the ray meets nothing.
+                    if (wantAll && s.coverage >= 0.5) {
                         image.depth[i] = static_cast<float>(seen.depth);
                         const dvec3 n = seen.normal, world = v.right * n.x + v.down * n.y + v.forward * n.z;
                         for (int c = 0; c < 3; ++c)

@@ -67,6 +67,7 @@ struct Front {
     double limit = kNone;  ///< what lies beyond is no part of it
     const PlacedDisc* disc = nullptr;
     double depth = 0;
+    bool isMissed = false;  ///< the pixel's ray does not meet it
     bool isSurface() const { return disc != nullptr && (disc->flags & shared::kFlagLeaf) == 0; }
     /// What lies before that is no part of it, either. (Leaves are no surface.)
     double begin() const { return isSurface() ? depth - (limit - depth) : -kNone; }
@@ -163,12 +164,9 @@ class Filter {
         return plane > 0 ? std::clamp(plane, range.nearest, range.farthest) : range.farthest;
     }
 
-    void offerFront(int x, int y, const PlacedDisc& d, const ViewRay& ray, double depth) {
-        offer(pixel(x, y).front, d, ray, depth);
-    }
-    void offer(Front& front, const PlacedDisc& d, const ViewRay& ray, double depth) const {
+    void offer(Front& front, const PlacedDisc& d, const ViewRay& ray, double depth, bool isMissed = false) const {
         const double limit = depth + (variation_.movesDiscsAway ? 0 : roughness(d) / glm::length(ray.direction));
-        if (limit < front.limit) front = {limit, &d, depth};
+        if (limit < front.limit) front = {limit, &d, depth, isMissed};
     }
     void findSeconds(const PlacedDisc& d) {
         forPixels(d, d.radius, 0, [&](int x, int y, const ViewRay& ray) {
@@ -184,14 +182,15 @@ class Filter {
         if (variation_.movesDiscsAway) d.centre.z += roughness(d);
         forPixels(d, d.radius, 0, [&](int x, int y, const ViewRay& ray) {
             const double depth = depthOnPlane(d, ray);
-            if (isMet(d, ray, depth)) offerFront(x, y, disc, ray, depth);
+            if (isMet(d, ray, depth)) offer(pixel(x, y).front, disc, ray, depth);
         });
         if (!(d.centre.z > view_.nearPlane)) return;
         const dvec2 c = imageOf(view_, d.centre);
         if (!(c.x >= 0 && c.y >= 0 && c.x < level_.width && c.y < level_.height)) return;
         const int x = static_cast<int>(c.x), y = static_cast<int>(c.y);
         const ViewRay ray = viewRay(view_, dvec2(x + 0.5, y + 0.5));
-        if (!isMet(d, ray, depthOnPlane(d, ray))) offerFront(x, y, disc, ray, depthWithin(rangeOf(d), d, ray));
+        if (!isMet(d, ray, depthOnPlane(d, ray)))
+            offer(pixel(x, y).front, disc, ray, depthWithin(rangeOf(d), d, ray), true);
     }
 
     void add(const PlacedDisc& d) {
@@ -288,6 +287,16 @@ class Filter {
     /// Does the front stand before what other kinds have there?
     bool wins(size_t i) const { return pixels_[i].front.disc && pixels_[i].front.limit < depthOfOther(i); }
 
+    /// Within half a pixel of the front disc; of one that the ray misses, and of a rim, no place beyond the disc.
+    double shownDepth(double blended, const PlacedDisc& d, const Front& front, const ViewRay& ray) const {
+        if (front.disc && !front.isMissed) {
+            const double most = 0.5 / (pixelsAt(view_, front.depth) * glm::length(ray.direction));
+            return std::clamp(blended, front.depth - most, front.depth + most);
+        }
+        const double reach = d.radius * std::sqrt(std::max(0.0, 1 - d.normal.z * d.normal.z));
+        const double place = std::clamp(front.disc ? front.depth : blended, d.centre.z - reach, d.centre.z + reach);
+        return front.disc ? place : std::max(place, view_.nearPlane);
+    }
     Sample shownBy(int x, int y, const Sums& p, const Front& front) const {
         const PlacedDisc& d = front.disc ? *front.disc : *p.first;
         const dvec2 at(x + 0.5, y + 0.5);
@@ -320,6 +329,8 @@ class Filter {
                 if (!isFront && (p.front.disc || isOther || !p.ofFront.first || covered < 0.5 / 255)) continue;
                 Sample& s = level_.ref(x, y);
                 s = shownBy(x, y, p.ofFront, p.front);
+                const PlacedDisc& first = p.front.disc ? *p.front.disc : *p.ofFront.first;
+                s.depth = s.key = shownDepth(s.depth, first, p.front, viewRay(view_, dvec2(x + 0.5, y + 0.5)));
                 shown_[i] = s.depth;
                 const bool isBefore = isFront && (p.hasBehind || isOther);
                 if (!isBefore && isAtGap(x, y)) s.coverage = covered;

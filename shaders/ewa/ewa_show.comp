@@ -30,6 +30,8 @@ void main() {
             depth = shownOf(at, s, p);
         else
             p = ownOf(id, node, r);
+        depth = hasFront ? withinFront(opaqueDisc(node, r, id), pixel, depth)
+                         : max(placeOfMissed(opaqueDisc(node, r, id), depth), frame.nearPlane);
         const bool isBefore = hasFront && (s.behind != 0u || hasExact);
         p.cover |= (isBefore ? 255u : code) | (hasFront ? kFilteredFront : 0u) | (isLeaf ? kFilteredLeaf : 0u);
         visibility[at] = visibilityKey(floatBitsToUint(depth), drawId(0u, id));

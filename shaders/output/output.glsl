@@ -59,8 +59,10 @@ void main() {
     const uvec3 bytes = uvec3(vec3(srgbFromLinear(c.x), srgbFromLinear(c.y), srgbFromLinear(c.z)) * 255.0 + 0.5);
     image[at] = bytes.x | bytes.y << 8 | bytes.z << 16 | uint(share * 255.0 + 0.5) << 24;
     if (stepInfo.wantExtra == 0u) return;
-    const vec3 world = frame.viewX * n.x + frame.viewY * n.y + frame.viewZ * n.z;
-    extra[7u * at] = s.depth;
+    // What rays meet: of a pixel that is hardly covered nothing.
+    const bool isMet = valid && share >= kLeastShown;
+    const vec3 world = isMet ? frame.viewX * n.x + frame.viewY * n.y + frame.viewZ * n.z : vec3(0.0);
+    extra[7u * at] = isMet ? s.depth : 0.0;
     extra[7u * at + 1u] = world.x;
     extra[7u * at + 2u] = world.y;
     extra[7u * at + 3u] = world.z;

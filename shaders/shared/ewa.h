@@ -146,6 +146,21 @@ SHARED_FN float depthWithin(DepthRange range, float ahead, float rest) {
     return min(max(plane > 0.0f ? plane : range.farthest, range.nearest), range.farthest);
 }
 
+// Where a pixel shows its front disc whose ray misses it (that of its centre): no place beyond the disc. `plane`: depth
+// of the disc's plane there.
+SHARED_FN float placeOfMissed(WideDisc d, float plane) {
+    const float reach = discReach(d);
+    return min(max(plane, d.centre.z - reach), d.centre.z + reach);
+}
+// The depth that a pixel shows: what was blended, but within half a pixel (in space) of its front disc, so that it
+// keeps the error that is stated for that. `own`: depth of the front disc; `along`: depth per length along the ray.
+SHARED_FN float shownWithin(float blended, float own, float along, Lens lens) {
+    const float most = 0.5f * along * lensDepth(lens, own) / lens.focal;
+    return min(max(blended, own - most), own + most);
+}
+// Of a pixel that is less covered a picture says no depth and no normal: its ray meets nothing.
+const float kLeastShown = 0.5f;
+
 // What a pixel shows of what was blended there, beside the depth in its key.
 struct FilteredPixel {
     uint normal;  // octahedral, camera space, towards the eye

@@ -162,6 +162,13 @@ TEST(FullDetail, OfScansIsWhereThePictureSays) {
                      *executor);
 }
 
+/// Most of `ewa`'s pixels that may be beyond, %. It shows places within half a pixel of the disc in front, so that only
+/// rough scans have them: where a coarse disc is drawn wider than it is, so that its neighbours' kernels meet.
+double mostOfEwa(const std::string& name, double tau) {
+    if (name != "02_scans/als_ahn3_delft/ahn3_cropped_2.laz" && name != "01_meshes/misc/lucy.ply") return 0.01;
+    return tau < 1 ? 1.0 : tau < 2 ? 0.15 : 0.02;
+}
+
 // What modes surface (and with it splat, SurfaceMode.IsWhereSplatIs) and pullpush-exact draw keeps the bound at 0.01 %
 // of the pixels and less: each pixel lies on a disc that was chosen.
 TEST(FullDetail, OfSplatsIsWhereThePictureSays) {
@@ -181,14 +188,18 @@ TEST(FullDetail, OfSplatsIsWhereThePictureSays) {
         for (const auto& [elevation, distance] : {std::pair{35.0, 0.9}, {25.0, 0.5}, {4.0, 0.7}})
             for (const double tau : {0.5, 1.0, 4.0}) {
                 const lod::View view = test::lookAt(*store, 30, elevation, distance, 400);
-                for (const render::Mode mode : {render::Mode::surface, render::Mode::pullpushExact}) {
+                for (const render::Mode mode :
+                     {render::Mode::surface, render::Mode::pullpushExact, render::Mode::ewa}) {
                     const char* const modeName = render::reconstructionOf(mode).name;
                     const Beyond b = measure(store, full, view, tau, *executor, mode);
                     std::printf("%-14s %s from %.0f degrees, tau %.1f: %zu drawn, beyond %.4f %%, worst %.1f px\n",
                                 modeName, name.c_str(), elevation, tau, b.drawn, b.share(b.all()), b.worst);
                     std::fflush(stdout);
                     EXPECT_GT(b.drawn, 20'000u);
-                    EXPECT_LE(b.share(b.all()), 0.01) << modeName << " " << name << " " << elevation << " " << tau;
+                    const bool isEwa = mode == render::Mode::ewa;
+                    EXPECT_LE(b.share(b.all()), isEwa ? mostOfEwa(name, tau) : 0.01)
+                        << modeName << " " << name << " " << elevation << " " << tau;
+                    EXPECT_LE(b.worst, isEwa ? 4.0 : 1e300);
                 }
             }
     }
