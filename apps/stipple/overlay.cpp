@@ -55,18 +55,10 @@ std::string errorText(const FrameCounters& c) {
                              : fmt::format("error {:.2f} px", c.tauEffectivePixels);
 }
 
-/// What a frame takes. Where its picture stays on the device, handing it in takes less than drawing it, which is known
-/// of one or two frames before.
-double frameMs(const render::FrameState& state) {
-    double onDevice = 0;
-    for (const render::PassTime& p : state.backend->passTimes()) onDevice += p.ms;
-    return state.onDevice ? std::max(state.counters.frameMs, onDevice) : state.counters.frameMs;
-}
-
 void drawBrief(const OverlayFacts& f) {
     const FrameCounters& c = f.state.counters;
     ImGui::TextUnformatted(
-        fmt::format("{:.1f} ms   {}   {}   {}   H: keys", frameMs(f.state), errorText(c), drawnText(f.state), f.hands)
+        fmt::format("{:.1f} ms   {}   {}   {}   H: keys", frameMsOf(f.state), errorText(c), drawnText(f.state), f.hands)
             .c_str());
 }
 
@@ -76,7 +68,7 @@ void drawFull(const OverlayFacts& f) {
     const auto line = [](const std::string& text) { ImGui::TextUnformatted(text.c_str()); };
     line(fmt::format("{}: {}", f.state.backend->name(), f.state.backend->device()));
     if (f.state.onDevice)
-        line(fmt::format("{:.1f} ms a frame, {:.1f} ms to hand it in and show it   {}", frameMs(f.state), f.windowMs,
+        line(fmt::format("{:.1f} ms a frame, {:.1f} ms to hand it in and show it   {}", frameMsOf(f.state), f.windowMs,
                          f.hands));
     else
         line(fmt::format("{:.1f} ms a frame, {:.1f} ms with the window   {}", c.frameMs, f.windowMs, f.hands));
@@ -163,6 +155,12 @@ void drawLegendPanel(const Legend& legend) {
 }
 
 }  // namespace
+
+double frameMsOf(const render::FrameState& state) {
+    double onDevice = 0;
+    for (const render::PassTime& p : state.backend->passTimes()) onDevice += p.ms;
+    return state.onDevice ? std::max(state.counters.frameMs, onDevice) : state.counters.frameMs;
+}
 
 void drawOverlay(const OverlayFacts& f) {
     if (f.settings.detail != Detail::off) {

@@ -20,6 +20,10 @@ struct OverlayFacts {
     double windowMs = 0;     ///< of the last frame, with showing it
     std::array<char, gpu::kSteerCount> keyNames{};
 };
+/// What a frame takes. Where its picture stays on the device, handing it in takes less than drawing it, which is known
+/// of one or two frames before.
+double frameMsOf(const render::FrameState& state);
+
 void drawOverlay(const OverlayFacts& facts);
 
 }  // namespace stipple::app

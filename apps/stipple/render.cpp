@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <numeric>
 
+#include "apps/stipple/calibration.h"
 #include "apps/stipple/camera_options.h"
 #include "apps/stipple/common.h"
 #include "apps/stipple/effect_options.h"
@@ -41,6 +42,7 @@ struct Options {
     int frames = 1, samples = 4, accumulate = 1;
     uint64_t budget = 0;
     bool noWait = false, json = false, quiet = false, force = false, alpha = false;
+    TargetOptions target;
     CameraOptions camera;
     BuildOptions build;
     ColourOptions colour;
@@ -65,6 +67,9 @@ Result<glm::dvec3> backgroundOf(const Options& o) {
 Result<void> checkArguments(const Options& o) {
     STIPPLE_TRY(o.camera.check());
     STIPPLE_TRY(o.material.check(o.shade));
+    if (o.target.isAny() && o.drawn.mode == "reference")
+        return fail(ErrorKind::usage, "traces the full detail, whatever it takes", "--mode reference",
+                    "leave out --target-ms and --target-error");
     if (!(o.error > 0)) return fail(ErrorKind::usage, "must be larger than 0", "--error");
     STIPPLE_TRY(backgroundOf(o));
     if (parseBytes(o.resident) == 0)
@@ -314,6 +319,7 @@ Result<void> run(const Options& o, Written& written) {
     STIPPLE_TRY(checkModule(o));
     STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, !o.quiet));
     STIPPLE_TRY(checkWeights(o, scene));
+    const uint64_t hash = o.target.isAny() ? sceneHash(scene) : 0;
     if (o.material.material() && !takesMaterial(scene.placed)) return noPointsToLight(o.inputs.front());
     const lod::StoreDescription& description = scene.description;
     STIPPLE_ASSIGN(const Shot shot, makeShot(o.camera, o.frames, scene, size));
@@ -332,6 +338,12 @@ Result<void> run(const Options& o, Written& written) {
     o.drawn.applyTo(scene.placed);
     auto state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.groups);
     render::setSway(settings.draw.wind, state->hierarchies, state->instances, state->groups);
+    if (o.target.isAny()) {
+        const CutLoads loads{*state, settings.budgets, shot.views};
+        STIPPLE_ASSIGN(const Chosen c, chooseError(o.target, loads, o.drawn.mode, hash, *executor));
+        settings.budgets.errorPixels = c.errorPixels;
+        if (!o.quiet && !o.json) fmt::print("{}\n", c.text);
+    }
     const FramesPlan plan{shot.views, shot.seconds,    o.output, o.resident,          o.frames, o.accumulate,
                           o.noWait,   o.build.skipBad, o.quiet,  !o.quiet && !o.json, o.alpha,  &legend};
     Timings timings;
@@ -413,6 +425,7 @@ void setupRender(CLI::App& app, int& status) {
     sub->add_option("--error", o->error, "tolerated screen-space error, pixels")
         ->transform(positive())
         ->capture_default_str();
+    o->target.addTo(*sub);
     sub->add_option("--budget-points", o->budget,
                     "records drawn at most, e.g. 1M; the error rises to meet it (0: no limit)")
         ->transform(within(uint64_t{0}, uint64_t{1'000'000'000'000}))

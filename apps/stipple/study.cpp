@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cstdlib>
 #include <filesystem>
 
 #include "apps/stipple/common.h"
@@ -27,7 +28,14 @@ Result<void> checkOptions(const CLI::App& sub, const Options& o) {
                                "--blocks", "--frames", "--seed", "--device", "--resident"})
         if (o.seeds && sub.get_option(option)->count() > 0)
             return fail(ErrorKind::usage, "is of studies of scenes, not of --seeds", option, "leave one of them out");
-    // (--data may come from the environment, for every command.)
+    const char* const everywhere = std::getenv("STIPPLE_DATA");
+    if (!o.seeds && sub.get_option("--data")->count() > 0 && (everywhere == nullptr || o.data != everywhere))
+        return fail(ErrorKind::usage, "is of --seeds, not of scenes", "--data", "leave it out");
+    for (const char* option : {"--output", "--quick", "--full", "--seeds"})
+        if (o.scenes.calibrate && sub.get_option(option)->count() > 0)
+            return fail(ErrorKind::usage, "is not of --calibrate, which is kept in the cache", option, "leave it out");
+    if (!o.scenes.calibrate && o.scenes.output.empty())
+        return fail(ErrorKind::usage, "says where results go, and is missing", "--output FOLDER");
     if (!o.seeds && sub.get_option("--rounds")->count() > 0)
         return fail(ErrorKind::usage, "is of --seeds, not of scenes", "--rounds", "take --frames and --blocks");
     return {};
@@ -64,8 +72,10 @@ void setupStudy(CLI::App& app, int& status) {
     sub->add_option("-o,--output", scenes.output,
                     "folder for report.html, study.json, rows.csv; the same command goes on where it was stopped "
                     "(--seeds: index.md, seeds.json, pictures, stores)")
-        ->type_name("FOLDER")
-        ->required();
+        ->type_name("FOLDER");
+    sub->add_flag("--calibrate", scenes.calibrate,
+                  "measure only what frames cost here, and keep it in the cache for --target-ms and --target-error of "
+                  "render and view");
     sub->add_flag("--quick", scenes.quick,
                   "minutes: 640x360, one camera of each path (--seeds: models of at most 300,000 points)");
     scenes.addTo(*sub);
@@ -83,7 +93,10 @@ void setupStudy(CLI::App& app, int& status) {
     sub->add_flag("--quiet", scenes.quiet, "no progress");
     sub->callback([o, sub, &status] {
         auto result = checkOptions(*sub, *o);
-        if (result) result = o->seeds ? runSeeds(*o) : runSceneStudy(o->scenes);
+        if (result)
+            result = o->seeds              ? runSeeds(*o)
+                     : o->scenes.calibrate ? runCalibration(o->scenes)
+                                           : runSceneStudy(o->scenes);
         if (!result) status = report(result.error());
     });
 }

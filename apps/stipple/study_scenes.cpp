@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "apps/stipple/calibration.h"
 #include "apps/stipple/camera_options.h"
 #include "apps/stipple/mode_options.h"
 #include "apps/stipple/scene_facts.h"
@@ -32,7 +33,11 @@ struct Usual {
 const Usual kQuick{{"640x360"}, {0.5, 1, 2, 4, 8}, 1, 6, 3, 2};
 const Usual kMiddle{{"1280x720"}, {0.5, 1, 2, 4, 8}, 2, 6, 10, 3};
 const Usual kFull{{"1280x720", "1920x1080", "3840x2160"}, {0.25, 0.5, 1, 2, 4, 8, 16}, 4, 12, 25, 4};
-const Usual& usualOf(const StudyOptions& o) { return o.quick ? kQuick : o.full ? kFull : kMiddle; }
+/// Where frames cost as their pixels, records and triangles do: two sizes, one camera a path.
+const Usual kCalibration{{"640x360", "1280x720"}, {0.5, 1, 2, 4, 8}, 1, 3, 3, 1};
+const Usual& usualOf(const StudyOptions& o) {
+    return o.calibrate ? kCalibration : o.quick ? kQuick : o.full ? kFull : kMiddle;
+}
 
 Result<study::StudySettings> settingsOf(const StudyOptions& o) {
     const Usual& usual = usualOf(o);
@@ -70,24 +75,12 @@ Result<void> checkFolder(const std::string& folder) {
     return {};
 }
 
-uint64_t hashOf(const OpenedScene& opened) {
-    uint64_t hash = opened.placed.size();
-    const auto add = [&](const auto& value) { hash = hashBytes(&value, sizeof value, hash); };
-    for (const render::PlacedStore& p : opened.placed) {
-        add(p.store->contentHash);
-        add(p.place.rotation);
-        add(p.place.translation);
-        add(p.place.scale);
-    }
-    return hash;
-}
-
 Result<study::StudyScene> studySceneOf(const std::string& input, const StudyOptions& o, Executor& executor) {
     STIPPLE_ASSIGN(OpenedScene opened, openScene({input}, o.build, executor, !o.quiet && !o.json));
     STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(opened, "auto", "", ""));
     study::StudyScene s;
     s.name = printable(fs::path(input).filename().string());
-    s.hash = hashOf(opened);
+    s.hash = sceneHash(opened);
     s.draw.lights = opened.lights;
     s.draw.lit = isLit("auto", opened.description, colour);
     s.draw.worldUp = opened.description.up;
@@ -155,6 +148,24 @@ void StudyOptions::addTo(CLI::App& sub) {
         ->check(bytes())
         ->type_name("SIZE")
         ->capture_default_str();
+}
+
+Result<void> runCalibration(const StudyOptions& o) {
+    catchStopSignals();
+    STIPPLE_ASSIGN(const study::StudySettings settings, settingsOf(o));
+    if (!o.path.empty()) STIPPLE_TRY(InputFile::open(o.path));
+    const auto executor = makeTbbExecutor(o.build.threads);
+    Progress progress(!o.quiet && !o.json);
+    for (const std::string& input : o.scenes) {
+        STIPPLE_ASSIGN(auto backend, makeBackend(o.device, *executor));
+        STIPPLE_ASSIGN(const study::StudyScene scene, studySceneOf(input, o, *executor));
+        STIPPLE_TRY(calibrate(scene, settings, std::move(backend), *executor, o.json,
+                              [&](uint64_t done, uint64_t total) -> Result<void> {
+                                  progress.update("calibrate: " + scene.name, done, total);
+                                  return checkStopped(scene.name, "nothing was kept of it");
+                              }));
+    }
+    return {};
 }
 
 Result<void> runSceneStudy(const StudyOptions& o) {

@@ -13,7 +13,7 @@ struct StudyOptions {
     std::string output, device = "cpu", resident = "1G", path;
     std::vector<std::string> modes, sizes;
     std::vector<double> errors;
-    bool quick = false, full = false, json = false, quiet = false;
+    bool quick = false, full = false, calibrate = false, json = false, quiet = false;
     uint32_t blocks = 0, frames = 0, views = 0;  ///< 0: as many as --quick and --full say
     uint64_t seed = 1;
     BuildOptions build;
@@ -23,5 +23,8 @@ struct StudyOptions {
 
 /// Draws, measures, writes the folder, and says what is in it.
 Result<void> runSceneStudy(const StudyOptions& options);
+
+/// What frames of the scenes cost on this device, kept for `--target-ms` and `--target-error`.
+Result<void> runCalibration(const StudyOptions& options);
 
 }  // namespace stipple::app

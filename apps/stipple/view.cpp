@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -16,6 +17,7 @@
 #include "apps/stipple/scene_facts.h"
 #include "apps/stipple/scene_opener.h"
 #include "apps/stipple/view_session.h"
+#include "apps/study/calibration/steady.h"
 #include "engine/base/process.h"
 #include "engine/base/text.h"
 #include "engine/base/units.h"
@@ -47,7 +49,9 @@ class Viewer {
           settings_(settings),
           opener_(o.build),
           navigation_(navigation),
-          player_(std::move(player)) {}
+          player_(std::move(player)) {
+        if (o.target.ms > 0) steady_.emplace(settings.frame.budgets.errorPixels, o.target.ms);
+    }
 
     Result<void> run() {
         double wait = 0;
@@ -234,6 +238,7 @@ class Viewer {
                 if (drawn.error().kind == ErrorKind::device) return drawn;
                 tell(drawn.error());
             }
+            keepToTarget();
             // Other colours, another scene: what was shown stays until the first of it is there.
             isEmpty_ = state.counters.nodesDrawn == 0 && !state.streamer->isIdle();
         }
@@ -248,6 +253,26 @@ class Viewer {
         if (shown) loadPictures();
         shownMs_ = session_.state().counters.frameMs + (nowSeconds() - start) * 1e3;
         return {};
+    }
+
+    /// With --target-ms: the error of the next frame. Frames while chunks are on their way say nothing of what comes.
+    void keepToTarget() {
+        if (!steady_) return;
+        double& error = settings_.frame.budgets.errorPixels;
+        if (error != steadyError_.value_or(error)) {
+            steady_.reset();
+            return tell(fmt::format("{:g} px of error by hand: --target-ms is over", error));
+        }
+        const lod::View now = view();
+        const bool moved = isMoving_ || now.eye != lastView_.eye || now.forward != lastView_.forward ||
+                           now.width != lastView_.width || now.height != lastView_.height ||
+                           now.focalPixels != lastView_.focalPixels;
+        lastView_ = now;
+        if (!session_.state().cut.wanted.empty()) return;
+        steady_->step(frameMsOf(session_.state()), moved);
+        hasChanged_ = hasChanged_ || error != steady_->error();
+        error = steady_->error();
+        steadyError_ = error;
     }
 
     /// With --frames: complete, and as it is shown.
@@ -307,8 +332,11 @@ class Viewer {
     Navigation navigation_;
     PathPlayer player_;
     Notices notices_;
-    Refinement refinement_;   ///< discs that are blended: by their weights while they move
-    bool isResting_ = false;  ///< it is due
+    std::optional<study::Steady> steady_;  ///< with --target-ms
+    std::optional<double> steadyError_;    ///< that it asked for
+    lod::View lastView_;                   ///< that it saw
+    Refinement refinement_;                ///< discs that are blended: by their weights while they move
+    bool isResting_ = false;               ///< it is due
     std::string shownOpening_;
     uint32_t width_ = 0, height_ = 0;
     double shownMs_ = 0;  ///< what the last frame took, with showing it
@@ -393,6 +421,7 @@ Result<void> run(const ViewOptions& o) {
     const auto executor = makeTbbExecutor(o.build.threads);
     STIPPLE_ASSIGN(OpenedScene scene, openScene(o.inputs, o.build, *executor, true));
     if (o.material.material() && !takesMaterial(scene.placed)) return noPointsToLight(o.inputs.front());
+    const uint64_t hash = o.target.isAny() ? sceneHash(scene) : 0;
     STIPPLE_ASSIGN(const Stage stage, setStage(o, "Stipple: " + scene.description.source, size, *executor));
     gpu::Window* const window = stage.window.get();
     ViewSettings settings;
@@ -408,6 +437,15 @@ Result<void> run(const ViewOptions& o) {
     ViewSession session(o, *stage.backend, *executor);
     STIPPLE_TRY(session.show(std::move(scene), o.colour, frame));
     const double aspect = static_cast<double>(size.x) / size.y;
+    if (o.target.isAny()) {
+        STIPPLE_ASSIGN(const scene::Camera first, makeCamera(o.camera, session.scene(), aspect));
+        const std::array views{scene::makeView(first, size.x, size.y, nearPlaneOf(session.scene()))};
+        const CutLoads loads{session.state(), frame.budgets, views};
+        STIPPLE_ASSIGN(const Chosen chosen, chooseError(o.target, loads, o.drawn.mode, hash, *executor));
+        frame.budgets.errorPixels = chosen.errorPixels;
+        fmt::print("{}\n", chosen.text);
+        std::fflush(stdout);
+    }
     STIPPLE_ASSIGN(Navigation navigation, makeNavigation(o, session, aspect));
     STIPPLE_ASSIGN(PathPlayer player, makePlayer(o, session.scene(), aspect));
     const auto result = Viewer(o, *window, session, settings, navigation, std::move(player)).run();
@@ -431,6 +469,7 @@ void setupView(CLI::App& app, int& status) {
     sub->add_option("--error", o->error, "tolerated screen-space error, pixels")
         ->transform(positive())
         ->capture_default_str();
+    o->target.addTo(*sub);
     sub->add_option(
            "--wind", o->wind,
            "how far tops of plants move at most, share of their height (e.g. 0.03); not neurons, streamlines and hair")

@@ -1,6 +1,7 @@
 // The scene that the window shows: its chunks, its colours, its axis. What fails leaves it as it was.
 #pragma once
 
+#include "apps/stipple/calibration.h"
 #include "apps/stipple/camera_options.h"
 #include "apps/stipple/common.h"
 #include "apps/stipple/legend.h"
@@ -17,6 +18,7 @@ struct ViewOptions {
     int frames = 0;
     bool force = false;
     std::vector<std::string> effects;
+    TargetOptions target;
     ModeOptions drawn;
     CameraOptions camera;
     BuildOptions build;

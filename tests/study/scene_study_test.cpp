@@ -147,5 +147,35 @@ TEST(SceneStudy, RefusesWhatItCannotDoBeforeItBegins) {
     EXPECT_FALSE(fs::exists(folder / "t"));
 }
 
+TEST(SceneStudy, CalibratesAndChoosesErrorsByWhatFramesCost) {
+    const test::TempFolder folder;
+    writeScene(folder);
+    const std::string render = "render ring.ply -o p.png --size 96x64 --device cpu --threads 1 ";
+    test::expectOneLine(test::runProgram(folder, render + "--quiet --target-ms 50"), 3, {"study SCENE --calibrate"});
+    EXPECT_FALSE(fs::exists(folder / "p.png"));
+    const test::Outcome made =
+        test::runProgram(folder,
+                         "study ring.ply --calibrate --modes surface --errors 1,4 --sizes 96x64,192x128 "
+                         "--blocks 2 --frames 2 --threads 1 --quiet --json");
+    ASSERT_EQ(made.code, 0) << made.err;
+    const nlohmann::json j = nlohmann::json::parse(made.out, nullptr, false);
+    ASSERT_EQ(j["samples"].size(), 2u * 2 * 4);
+    for (const auto& s : j["samples"]) EXPECT_GT(s["ms"], 0);
+    const test::Outcome plenty = test::runProgram(folder, render + "--target-ms 10000");
+    ASSERT_EQ(plenty.code, 0) << plenty.err;
+    EXPECT_NE(plenty.out.find("0.125 px of error: "), std::string::npos) << plenty.out;
+    EXPECT_NE(plenty.out.find(" ms a frame by the calibration"), std::string::npos) << plenty.out;
+    const std::string picture = test::slurp(folder / "p.png");
+    ASSERT_EQ(test::runProgram(folder, render + "--error 0.125").code, 0);
+    EXPECT_EQ(test::slurp(folder / "p.png"), picture) << "a picture of that error, and nothing else";
+    EXPECT_NE(test::runProgram(folder, render + "--target-error 2").out.find("2 px of error: "), std::string::npos);
+    test::expectOneLine(test::runProgram(folder, render + "--quiet --target-ms 10 --mode ewa"), 3, {"--modes ewa"});
+    test::expectOneLine(test::runProgram(folder, render + "--quiet --target-ms 10 --mode reference"), 2, {"reference"});
+    test::expectOneLine(test::runProgram(folder, render + "--quiet --target-ms 10 --error 1"), 2, {"--error"});
+    test::expectOneLine(test::runProgram(folder, "study ring.ply --calibrate -o x"), 2, {"--output"});
+    test::expectOneLine(test::runProgram(folder, "study ring.ply --data x -o x"), 2, {"--data"});
+    test::expectOneLine(test::runProgram(folder, "study ring.ply"), 2, {"--output"});
+}
+
 }  // namespace
 }  // namespace stipple

@@ -40,7 +40,7 @@ struct StudySettings {
     uint32_t blocks = 6, frames = 3;
     uint32_t samples = 3;       ///< rays a pixel along each axis, of the traced truth
     uint32_t smallHeight = 90;  ///< px, of pictures that implementations are compared at
-    size_t auditShapes = 6'000'000;
+    size_t auditShapes = 30'000'000;
     uint64_t seed = 1;
     uint64_t residentBytes = uint64_t{1} << 30;
 };
