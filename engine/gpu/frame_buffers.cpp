@@ -110,7 +110,8 @@ Result<void> FrameBuffers::prepareLists(const render::RenderRequest& request) {
         STIPPLE_TRY(
             ensure(bound_[kCoverageBinding], gpu::bytesOf(kCoverageBinding, pixels), kStorage, false, "coverage"));
         STIPPLE_TRY(ensure(bound_[kSecondGroupsBinding], gpu::bytesOf(kSecondGroupsBinding, kGroupShapes),
-                           kFilled | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT, false, "groups of second surfaces"));
+                           kFilled | kCopied | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT, false,
+                           "groups of second surfaces"));
         if (request.draws->frame.hasMaterials != 0)
             STIPPLE_TRY(ensure(bound_[kMaterialSumsBinding], gpu::bytesOf(kMaterialSumsBinding, pixels), kStorage,
                                false, "material sums"));

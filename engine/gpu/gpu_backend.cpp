@@ -111,6 +111,11 @@ class GpuBackend final : public render::Backend {
         FrameSlot* const slot = slotOf(ticket);
         return slot == nullptr ? Result<void>() : slot->finish(times_);
     }
+    std::optional<DeviceCounts> secondGroups(render::Ticket ticket) const {
+        const FrameSlot* const slot = slotOf(ticket);
+        if (slot == nullptr || !slot->hasPicture() || !slot->staysOnDevice()) return {};
+        return DeviceCounts{device_.get(), slot->buffers().at(shared::kSecondGroupsBinding).handle()};
+    }
     std::optional<DevicePicture> picture(render::Ticket ticket) const {
         const FrameSlot* const slot = slotOf(ticket);
         if (slot == nullptr || !slot->hasPicture() || !slot->staysOnDevice()) return {};
@@ -169,6 +174,11 @@ Result<std::unique_ptr<render::Backend>> makeGpuBackendOn(std::shared_ptr<Device
 std::optional<DevicePicture> pictureOf(const render::Backend& backend, render::Ticket ticket) {
     const auto* gpu = dynamic_cast<const GpuBackend*>(&backend);
     return gpu ? gpu->picture(ticket) : std::nullopt;
+}
+
+std::optional<DeviceCounts> secondGroupsOf(const render::Backend& backend, render::Ticket ticket) {
+    const auto* gpu = dynamic_cast<const GpuBackend*>(&backend);
+    return gpu ? gpu->secondGroups(ticket) : std::nullopt;
 }
 
 std::vector<std::string> validationMessages(const render::Backend& backend) {

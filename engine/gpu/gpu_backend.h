@@ -30,6 +30,14 @@ struct DevicePicture {
 /// None where the ticket is of another backend or too old.
 std::optional<DevicePicture> pictureOf(const render::Backend& backend, render::Ticket ticket);
 
+/// Groups that a frame in mode ewa counts for second surfaces: kGroupShapes x shared::GroupCounts, written by compute
+/// shaders. Valid until the second frame after it is handed in; none where `pictureOf` has none.
+struct DeviceCounts {
+    const Device* device = nullptr;
+    VkBuffer counts = VK_NULL_HANDLE;
+};
+std::optional<DeviceCounts> secondGroupsOf(const render::Backend& backend, render::Ticket ticket);
+
 /// What the validation layers have said to a backend made by makeGpuBackend.
 std::vector<std::string> validationMessages(const render::Backend& backend);
 
