@@ -18,6 +18,6 @@ if [ -z "$study" ]; then
         cp "$data/02_scans/outcrop_rgb_cloudcompare/example_data.laz" outcrop.laz
         scenes+=(bunny.ply outcrop.laz)
     fi
-    "$program" study "${scenes[@]}" -o "$study" --quick --resident 3G >/dev/null
+    "$program" study "${scenes[@]}" -o "$study" --quick --blocks 3 --resident 3G >/dev/null
 fi
 python3 "$here/accuracy_tables.py" "$study" "$here/results"

@@ -38,7 +38,7 @@ def costs(rows):
 
 
 out.append("# What accuracy costs\n")
-out.append("Made by `STIPPLE_DATA=DATA tests/bench/accuracy_figures.sh` (it runs `stipple study SCENES --quick`: 640 x 360, one camera of")
+out.append("Made by `STIPPLE_DATA=DATA tests/bench/accuracy_figures.sh` (it runs `stipple study SCENES --quick --blocks 3`: 640 x 360, one camera of")
 out.append("each of orbit, dolly, fly-through and grazing; dB, FLIP and silhouettes against the traced full detail; px: distance in space of")
 out.append("each drawn pixel from the nearest full-detail surface, by brute force). Milliseconds are medians with 95 % of bootstraps over blocks.\n")
 out.append(f"Machine: {p['processor']}, {p['threads']} threads, load {p['load']:.1f}, {p['date']}; {p['device']}; {p['compiler']}, {p['flags']}.\n")

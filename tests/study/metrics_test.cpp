@@ -7,6 +7,7 @@
 #include "apps/study/metrics/flip.h"
 #include "apps/study/metrics/masks.h"
 #include "apps/study/metrics/ssim.h"
+#include "apps/study/sweep/errors.h"
 #include "engine/base/rng.h"
 
 namespace stipple {
@@ -120,6 +121,24 @@ TEST(StudyMetrics, MasksOfMovedSquares) {
     EXPECT_EQ(holed.holes, 1u);
     EXPECT_EQ(holed.spill, 1u);
     EXPECT_TRUE(std::isnan(study::compareMasks(filled(60, 50, 0), here).boundaryPixels));
+}
+
+TEST(Pops, AreWhatChangesOfCoveredPixelsAndNotOfTheBackground) {
+    render::Image frame;
+    frame.width = 100;
+    frame.height = 100;
+    frame.rgba.assign(10'000, 0xff404040u);
+    frame.depth.assign(10'000, 1.0f);
+    for (size_t i = 0; i < 5'000; ++i) frame.depth[i] = 0;
+    render::Image next = frame;
+    EXPECT_EQ(study::popOf(frame, next).most, 0);
+    for (size_t i = 0; i < 1'000; ++i) next.rgba[i] = 0xffffffffu;  // background on both sides
+    EXPECT_EQ(study::popOf(frame, next).most, 0);
+    for (size_t i = 9'000; i < 9'004; ++i) next.rgba[i] = 0xff40404fu;
+    EXPECT_EQ(study::popOf(frame, next).most, 15);
+    EXPECT_EQ(study::popOf(frame, next).p999, 0) << "four of 5,000 are fewer than one in a thousand";
+    for (size_t i = 9'000; i < 9'010; ++i) next.rgba[i] = 0xff400040u;
+    EXPECT_EQ(study::popOf(frame, next).p999, 64);
 }
 
 }  // namespace

@@ -95,9 +95,25 @@ void auditCell(const CellTools& tools, const render::Image& image, CellErrors& e
 
 }  // namespace
 
+Pop popOf(const render::Image& frame, const render::Image& next) {
+    std::vector<double> changes;
+    for (size_t i = 0; i < frame.rgba.size(); ++i) {
+        const bool isCovered = frame.depth.empty() || frame.depth[i] > 0 || next.depth[i] > 0;
+        if (!isCovered) continue;
+        int most = 0;
+        for (uint32_t shift = 0; shift < 24; shift += 8)
+            most = std::max(most, std::abs(static_cast<int>(frame.rgba[i] >> shift & 255u) -
+                                           static_cast<int>(next.rgba[i] >> shift & 255u)));
+        changes.push_back(most);
+    }
+    if (changes.empty()) return {};
+    const double most = *std::max_element(changes.begin(), changes.end());
+    return {quantile(std::move(changes), 0.999), most};
+}
+
 std::span<const ErrorColumn> errorColumns() {
     using E = CellErrors;
-    static constexpr std::array<ErrorColumn, 31> kColumns{{{"stated_px", &E::stated},
+    static constexpr std::array<ErrorColumn, 33> kColumns{{{"stated_px", &E::stated},
                                                            {"records", &E::records},
                                                            {"triangles", &E::triangles},
                                                            {"nodes", &E::nodes},
@@ -127,7 +143,9 @@ std::span<const ErrorColumn> errorColumns() {
                                                            {"depth_rmse", &E::depthRmse},
                                                            {"depth_p99", &E::depthP99},
                                                            {"normal_deg_mean", &E::normalMean},
-                                                           {"normal_deg_p95", &E::normalP95}}};
+                                                           {"normal_deg_p95", &E::normalP95},
+                                                           {"pop_p999", &E::popP999},
+                                                           {"pop_max", &E::popMost}}};
     return kColumns;
 }
 
@@ -147,6 +165,11 @@ Result<CellErrors> measureCell(const CellTools& tools, const Cell& cell, const r
     STIPPLE_ASSIGN(const auto reconstruction, reference::compareImages(leaves, tools.truth.traced, 4, nullptr));
     e.leavesDecibels = reconstruction.foregroundPsnr;
     STIPPLE_TRY(compareWithTruth(tools, *drawn, e, keepCrop));
+    const render::Image frame = *drawn;
+    STIPPLE_ASSIGN(const render::Image* next, tools.drawer.draw(tools.truth.view, cell.mode, kPopStep * cell.target));
+    const Pop pop = popOf(frame, *next);
+    e.popP999 = pop.p999;
+    e.popMost = pop.most;
     if (tools.oracle == nullptr) return e;
     STIPPLE_ASSIGN(const render::Image* restated, tools.oracle->draw(tools.truth.small, cell.mode, cell.target));
     STIPPLE_ASSIGN(const render::Image* own, tools.drawer.draw(tools.truth.small, cell.mode, cell.target));

@@ -35,12 +35,22 @@ struct CellErrors {
     double holes = kNone, spill = kNone;       ///< pixels
     double depthRmse = kNone, depthP99 = kNone;
     double normalMean = kNone, normalP95 = kNone;  ///< degrees
+    // A switch of levels (popOf): of 255
+    double popP999 = kNone, popMost = kNone;
 };
 struct ErrorColumn {
     const char* name;  ///< as in CSV and JSON
     double CellErrors::*value;
 };
 std::span<const ErrorColumn> errorColumns();
+
+/// By how much pixels change where the cut does and the camera does not: between the frame of a target and that of a
+/// target larger by kPopStep, which is the cut of a camera as much farther away. The greatest change of a channel.
+inline constexpr double kPopStep = 1.02;  ///< two percent of the distance in a frame: 1.2 times as near in 10 frames
+struct Pop {
+    double p999 = 0, most = 0;  ///< of 255; over pixels that either covers
+};
+Pop popOf(const render::Image& frame, const render::Image& next);
 
 /// What all cells of one view share.
 struct ViewTruth {

@@ -16,7 +16,7 @@ Together howOf(double CellErrors::*column) {
         if (column == decibels) return Together::decibels;
     for (const auto sum : {&E::audited, &E::beyond, &E::outline, &E::gap, &E::between, &E::other, &E::holes, &E::spill})
         if (column == sum) return Together::sum;
-    for (const auto most : {&E::stated, &E::lodMost, &E::lodP99, &E::depthP99, &E::bytes})
+    for (const auto most : {&E::stated, &E::lodMost, &E::lodP99, &E::depthP99, &E::bytes, &E::popP999, &E::popMost})
         if (column == most) return Together::most;
     return Together::mean;
 }
