@@ -42,6 +42,8 @@ out.append("Made by `STIPPLE_DATA=DATA tests/bench/accuracy_figures.sh` (it runs
 out.append("each of orbit, dolly, fly-through and grazing; dB, FLIP and silhouettes against the traced full detail; px: distance in space of")
 out.append("each drawn pixel from the nearest full-detail surface, by brute force). Milliseconds are medians with 95 % of bootstraps over blocks.\n")
 out.append(f"Machine: {p['processor']}, {p['threads']} threads, load {p['load']:.1f}, {p['date']}; {p['device']}; {p['compiler']}, {p['flags']}.\n")
+if p["load"] > p["threads"]:
+    out.append("Others loaded the machine: modes were drawn in turn, so that their ratios hold and milliseconds are high.\n")
 names = [s["name"] for s in d["scenes"]]
 for i, s in enumerate(d["scenes"]):
     out.append(f"- {s['name']}: {s['records']:,} records, {s['bytes'] / 1e6:.1f} MB, content {s['content']}")
