@@ -46,7 +46,7 @@ std::span<const ErrorColumn> errorColumns();
 
 /// By how much pixels change where the cut does and the camera does not: between the frame of a target and that of a
 /// target larger by kPopStep, which is the cut of a camera as much farther away. The greatest change of a channel.
-inline constexpr double kPopStep = 1.02;  ///< two percent of the distance in a frame: 1.2 times as near in 10 frames
+inline constexpr double kPopStep = 1.0906;  ///< an eighth of an octave: the next of the cuts that there are (lod/cut)
 struct Pop {
     double p999 = 0, most = 0;  ///< of 255; over pixels that either covers
 };

@@ -172,7 +172,7 @@ std::string htmlOf(const std::vector<StudyScene>& scenes, const StudyResult& res
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>What accuracy costs</title>"
         "<style>{}</style></head><body>\n<h1>What accuracy costs in time</h1>\n<p>{}. {}. stipple {}, {} ({}).</p>\n"
         "<p>{} cells, each {} times {} frames in blocks of any order (seed {}). Bands: 95 % of bootstraps over blocks. "
-        "Pop: change of pixels, of 255, at p99.9, where the cut is that of a camera 2 % farther away and the camera is "
+        "Pop: change of pixels, of 255, at p99.9, where the cut is that of a camera 9 % farther away and the camera is "
         "not. "
         "Cells of several cameras together: dB of the mean square, the greatest of px, sums of counts, else "
         "means.</p>\n",
