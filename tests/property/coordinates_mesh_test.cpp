@@ -176,6 +176,27 @@ TEST(CoordinatesOfMeshes, AVertexFarAwayLeavesTheOtherTriangles) {
     }
 }
 
+TEST(CoordinatesOfMeshes, ATriangleThatWouldRuinTheOthersIsLeftOutAndCounted) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    TriangleMesh alone;
+    addBall(96, glm::dvec3(4.3, -2.7, 1.1), alone);
+    for (const double far : {1e30, 1e160, 1e308}) {
+        TriangleMesh mesh = alone;
+        mesh.indices.insert(mesh.indices.end(), {0u, 1u, static_cast<uint32_t>(mesh.position.size())});
+        mesh.position.emplace_back(far, 0, -far);
+        Progress silent(false);
+        const auto built = buildMeshStore(sourceOf(mesh), folder / "far", {}, *executor, silent);
+        ASSERT_TRUE(built) << built.error().line();
+        EXPECT_EQ(built->pointsOut, alone.indices.size() / 3) << far;
+        EXPECT_EQ(built->dropped,
+                  (std::map<std::string, uint64_t>{{"triangles that reach too far out for the others' places", 1}}));
+        const auto store = opened(folder / "far");
+        EXPECT_LE(farthest(alone.position, cornersOf(*store), 0.05), kTenthOfAPixel / 100) << far;
+        EXPECT_TRUE(verifyStore(*store, *executor, 0)) << far;
+    }
+}
+
 TEST(CoordinatesOfMeshes, ObjectsFarApartAreDrawnWhereTheyAre) {
     const test::TempFolder folder;
     const auto executor = makeTbbExecutor(0);

@@ -1,6 +1,7 @@
 // The lattice of a mesh: as fine as most of it asks for, however far away the rest is.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "engine/base/numbers.h"
 #include "lod/builder/mesh/mesh_work.h"
@@ -45,19 +46,47 @@ void makeWide(const MeshSource::Bounds& bounds, Lattice& lattice) {
         lattice.largestKey = std::max(lattice.largestKey, static_cast<uint64_t>(last[a] - first[a]));
 }
 
+/// Fewest steps in what most vertices span, and in the spacing where they lie densest: beyond, nothing is a surface.
+struct Fewest {
+    double inExtent, inSpacing;
+};
+constexpr Fewest kRuined{1024, 16}, kKept{1 << 17, 1024};  ///< kept: where something is left out
+
+/// How far a lattice of all bits reaches from the middle of most vertices; infinite where nothing is known of them.
+double reachOf(double dense, double spacing, const Fewest& fewest) {
+    double coarsest = std::numeric_limits<double>::infinity();
+    if (dense > 0) coarsest = dense / fewest.inExtent;
+    if (spacing > 0) coarsest = std::min(coarsest, spacing / fewest.inSpacing);
+    return coarsest * std::exp2(double{kWideMeshBits} - 4);
+}
+
 }  // namespace
 
-Lattice latticeOf(const MeshSource::Bounds& bounds, bool tellsAllApart) {
+Lattice latticeOf(const MeshSource::Bounds& all, bool tellsAllApart) {
     Lattice lattice;
-    if (bounds.lo.x > bounds.hi.x) return lattice;
+    if (all.lo.x > all.hi.x) return lattice;
+    MeshSource::Bounds bounds = all;
+    std::erase_if(bounds.sample, [](const glm::dvec3& p) { return !isPlace(p); });
+    bounds.lo = glm::clamp(bounds.lo, lattice.reachLow, lattice.reachHigh);
+    bounds.hi = glm::clamp(bounds.hi, lattice.reachLow, lattice.reachHigh);
+    // What most vertices are is told apart as it would be without those far out; so are small objects far from each
+    // other.
+    const double dense = denseExtent(bounds.sample);
+    const double spacing = tellsAllApart ? denseSpacing(different(bounds.sample), all.share()) : 0;
+    const DenseBox most = denseBox(bounds.sample);
+    double reach = reachOf(dense, spacing, kRuined);
+    if (glm::any(glm::lessThan(bounds.lo, most.middle - reach)) ||
+        glm::any(glm::greaterThan(bounds.hi, most.middle + reach))) {
+        reach = reachOf(dense, spacing, kKept);
+        lattice.reachLow = most.middle - reach;
+        lattice.reachHigh = most.middle + reach;
+        bounds.lo = glm::clamp(bounds.lo, lattice.reachLow, lattice.reachHigh);
+        bounds.hi = glm::clamp(bounds.hi, lattice.reachLow, lattice.reachHigh);
+    }
     const glm::dvec3 size = bounds.hi - bounds.lo;
     const double extent = std::max({size.x, size.y, size.z});
     lattice.unit = unitOf(extent, kLatticeBits);
-    // What most vertices are is told apart as it would be without those far out.
-    const double dense = denseExtent(bounds.sample);
     if (dense > 0 && extent > kFar * dense) lattice.unit = unitOf(dense, kLatticeBits);
-    // So are small objects far from each other.
-    const double spacing = tellsAllApart ? denseSpacing(different(bounds.sample), bounds.share()) : 0;
     if (spacing > 0 && spacing < kFewestSteps * lattice.unit) lattice.unit = unitOf(spacing / kSteps, 0);
     lattice.unit = std::max(lattice.unit, unitOf(extent, static_cast<int>(kWideMeshBits) - 1));
     if (extent >= lattice.unit * std::exp2(kShortMeshBits)) {

@@ -165,6 +165,7 @@ class MeshBuild : public CellContent {
             if (!parts_.place(placed, here)) return changed();
             facts_.degenerate += placed.degenerate;
             facts_.notFinite += placed.notFinite;
+            facts_.tooFar += placed.tooFar;
             facts_.rounding = std::max(facts_.rounding, placed.rounding);
             std::vector<uint64_t> order(placed.x.size());  // subtree, triangle
             executor_.parallelFor(order.size(), 4096, [&](size_t begin, size_t end) {
@@ -231,7 +232,7 @@ class MeshBuild : public CellContent {
             sent += inputs.units(a);
             most = std::max(most, inputs.units(a));
         }
-        facts_.duplicate = facts_.triangles - facts_.degenerate - facts_.notFinite - sent;
+        facts_.duplicate = facts_.triangles - facts_.degenerate - facts_.notFinite - facts_.tooFar - sent;
         return most > kMostOfSubtree ? Result<void>(tooMany(most)) : Result<void>();
     }
 
@@ -275,10 +276,11 @@ class MeshBuild : public CellContent {
         STIPPLE_TRY(writeTextures(settings_.textures,
                                   cutoffsOf(settings_.description.materials, settings_.textures.size()), writer,
                                   hierarchy, executor_));
-        for (const auto& [reason, count] : {std::pair{"degenerate triangles", facts_.degenerate},
-                                            std::pair{"duplicate triangles", facts_.duplicate + duplicate_},
-                                            std::pair{"triangles that are not finite", facts_.notFinite},
-                                            std::pair{"triangles with a corner that is no vertex", facts_.bad}})
+        for (const auto& [reason, count] :
+             {std::pair{"degenerate triangles", facts_.degenerate},
+              std::pair{"duplicate triangles", facts_.duplicate + duplicate_},
+              std::pair{"triangles that are not finite", facts_.notFinite}, std::pair{kTooFarOut, facts_.tooFar},
+              std::pair{"triangles with a corner that is no vertex", facts_.bad}})
             if (count > 0) report.dropped[reason] = count;
         report.pointsIn = facts_.triangles + facts_.bad;
         report.temporaryBytes = std::max(report.temporaryBytes + source_.readBytes, source_.surveyBytes);
@@ -360,7 +362,7 @@ class MeshBuild : public CellContent {
     /// What a resumed build has to know.
     struct Facts {
         Lattice lattice;
-        uint64_t triangles = 0, degenerate = 0, notFinite = 0, duplicate = 0, bad = 0;
+        uint64_t triangles = 0, degenerate = 0, notFinite = 0, tooFar = 0, duplicate = 0, bad = 0;
         double rounding = 0;
     };
 

@@ -8,6 +8,7 @@
 #include "engine/base/executor.h"
 #include "lod/builder/octree/bytes.h"
 #include "lod/builder/octree/cells.h"
+#include "lod/builder/points/outliers.h"
 #include "lod/primitives/mesh_source.h"
 #include "lod/store/mesh_place.h"
 #include "lod/store/store.h"
@@ -27,7 +28,12 @@ struct Lattice {
     Steps firstKey{0};                     ///< see keyPlace
     uint64_t largestKey = 0;               ///< of all axes
     glm::dvec3 focusLow{0}, focusHigh{0};  ///< what most vertices span, world units; of a wide lattice
+    /// Beside what lies farther out the others' places could not be told apart; world units.
+    glm::dvec3 reachLow{-kFarthestPlace}, reachHigh{kFarthestPlace};
     bool isWide() const { return bits > kShortMeshBits; }
+    bool reaches(const glm::dvec3& p) const {
+        return glm::all(glm::lessThanEqual(reachLow, p)) && glm::all(glm::lessThanEqual(p, reachHigh));
+    }
 };
 /// `tellsAllApart`: as fine as vertices lie dense somewhere (small objects far from each other); else as most of them
 /// span.
@@ -72,13 +78,16 @@ uint64_t gather(Soup& soup, bool dropEqual);
 /// Appends; false if the bytes are not what putSoup wrote.
 bool getSoup(ByteReader& from, Soup& to);
 
-/// A block of a source on the lattice, without triangles that have no area there or are not finite.
+inline constexpr const char* kTooFarOut = "triangles that reach too far out for the others' places";
+
+/// A block of a source on the lattice, without triangles that have no area there or are not finite or reach too far
+/// out.
 struct PlacedBlock {
     Soup soup;
-    std::vector<uint32_t> x, y, z;  ///< of the triangles' centres: keyPlace
-    std::vector<uint64_t> high;     ///< see Coordinates; empty: none
-    uint64_t degenerate = 0, notFinite = 0;
-    double rounding = 0;  ///< largest of a coordinate, world units
+    std::vector<uint32_t> x, y, z;                       ///< of the triangles' centres: keyPlace
+    std::vector<uint64_t> high;                          ///< see Coordinates; empty: none
+    uint64_t degenerate = 0, notFinite = 0, tooFar = 0;  ///< tooFar: beyond the lattice's reach
+    double rounding = 0;                                 ///< largest of a coordinate, world units
     Coordinates centres() const { return {x, y, z, high}; }
 };
 PlacedBlock placeBlock(const TriangleMesh& block, const Lattice& lattice, Executor& executor);

@@ -75,10 +75,11 @@ PlacedBlock placeBlock(const TriangleMesh& in, const Lattice& lattice, Executor&
     auto& high = out.soup.vertices.high;
     vertices.resize(in.position.size());
     if (lattice.isWide()) high.resize(vertices.size());
+    constexpr uint8_t kNotFinite = 1, kTooFar = 2;
     std::vector<uint8_t> isBad(vertices.size());
     const auto place = [&](size_t i, double& rounding) {
         shared::MeshVertex& v = vertices[i];
-        isBad[i] = isFinite(in.position[i]) ? 0 : 1;
+        isBad[i] = !isFinite(in.position[i]) ? kNotFinite : lattice.reaches(in.position[i]) ? 0 : kTooFar;
         const glm::dvec3 p = isBad[i] ? lattice.origin : in.position[i];
         const glm::dvec3 q = glm::floor((p - lattice.origin) / lattice.unit + 0.5);
         const Steps at(toWhole<int64_t>(q.x), toWhole<int64_t>(q.y), toWhole<int64_t>(q.z));
@@ -109,8 +110,8 @@ PlacedBlock placeBlock(const TriangleMesh& in, const Lattice& lattice, Executor&
     out.soup.indices.reserve(in.indices.size());
     for (size_t i = 0; i + 3 <= in.indices.size(); i += 3) {
         const uint32_t* const t = &in.indices[i];
-        if ((isBad[t[0]] | isBad[t[1]] | isBad[t[2]]) != 0) {
-            ++out.notFinite;
+        if (const int bad = isBad[t[0]] | isBad[t[1]] | isBad[t[2]]; bad != 0) {
+            ++((bad & kNotFinite) != 0 ? out.notFinite : out.tooFar);
             continue;
         }
         const Steps a = out.soup.vertices.at(t[0]), b = out.soup.vertices.at(t[1]), c = out.soup.vertices.at(t[2]);

@@ -154,6 +154,7 @@ class PatchBuild : public CellContent {
             const PlacedBlock placed = divided(block);
             facts_.degenerate += placed.degenerate;
             facts_.notFinite += placed.notFinite;
+            facts_.tooFar += placed.tooFar;
             std::vector<std::pair<uint32_t, uint32_t>> order;  // subtree, triangle
             for (uint32_t t = 0; t < placed.soup.indices.size() / 3; ++t) {
                 const Steps p = middleOf(placed.soup, t);
@@ -207,13 +208,13 @@ class PatchBuild : public CellContent {
         Hierarchy h = hierarchyOf(frame(), std::exchange(sums_.tables, {}));
         for (const auto& [reason, count] :
              {std::pair{"degenerate triangles", facts_.degenerate}, std::pair{"duplicate triangles", sums_.duplicate},
-              std::pair{"triangles that are not finite", facts_.notFinite},
+              std::pair{"triangles that are not finite", facts_.notFinite}, std::pair{kTooFarOut, facts_.tooFar},
               std::pair{"triangles with a corner that is no vertex", facts_.bad}})
             if (count > 0) report.dropped[reason] = count;
         const double world = facts_.lattice.unit;
         report.pointsIn = facts_.triangles + facts_.bad;
         report.pointsOut = sums_.kept;
-        const uint64_t whole = facts_.triangles - facts_.degenerate - facts_.notFinite;
+        const uint64_t whole = facts_.triangles - facts_.degenerate - facts_.notFinite - facts_.tooFar;
         if (facts_.pieces > whole) report.added["by dividing long ones"] = facts_.pieces - whole;
         // (Middles are rounded: a piece may have no area.)
         if (whole > facts_.pieces) report.dropped["degenerate triangles"] += whole - facts_.pieces;
@@ -274,7 +275,7 @@ class PatchBuild : public CellContent {
     /// What a resumed build has to know.
     struct Facts {
         Lattice lattice;
-        uint64_t triangles = 0, pieces = 0, degenerate = 0, notFinite = 0, bad = 0;
+        uint64_t triangles = 0, pieces = 0, degenerate = 0, notFinite = 0, tooFar = 0, bad = 0;
         uint32_t keyLevels = 0;
     };
 

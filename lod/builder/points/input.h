@@ -78,7 +78,7 @@ class PointInput {
         uint64_t count = 0;  ///< declared
         // Found by the survey.
         std::optional<Error> error;
-        uint64_t usable = 0, notFinite = 0;
+        uint64_t usable = 0, notFinite = 0, beyond = 0;  ///< beyond: kFarthestPlace
         glm::ivec3 lo{INT32_MAX}, hi{INT32_MIN};
         glm::dvec3 least{1e300}, greatest{-1e300};
         uint32_t colourMax = 0;
@@ -110,7 +110,8 @@ class PointInput {
     Result<void> findFar(Part& part, PointBlock& block, FarCubes& cubes) const;
     FarCubes together(const std::vector<FarCubes>& far) const;
     void sayOutliers(BuildReport& report) const;
-    bool leavesOut() const { return settings_.dropOutliers && outliers_.any(); }
+    bool isLeavingOut() const { return settings_.dropOutliers || outliersRuin_; }
+    bool leavesOut() const { return isLeavingOut() && outliers_.any(); }
     glm::dvec3 commonOf(size_t from, const PointBlock& block, size_t i) const;
     Bounds boundsOf(const Part& part) const;
     Bounds bounds() const;
@@ -150,6 +151,7 @@ class PointInput {
     double step_ = 1;      ///< of the common lattice, for what 32 bits cannot hold
     uint64_t declared_ = 0;
     bool allLattice_ = true, isBlack_ = false;
+    bool outliersRuin_ = false;  ///< the places of all others
     std::string crsPath_;
 };
 

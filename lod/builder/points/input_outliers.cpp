@@ -79,6 +79,11 @@ void PointInput::findDenseBox() {
     outliers_ = allLattice_ ? Outliers(std::move(places), (world - lattice_.base) / lattice_.unit, 0.5)
                             : Outliers(std::move(places), world, 0);
     for (Part& part : parts_) part.near = boundsOf(part);
+    // Beside what lies so far out the others' places could not be told apart.
+    constexpr double kFewestInSpacing = 16, kFewestInExtent = 0x1p16;
+    const double coarsest = dense_.spacing > 0 ? dense_.spacing / kFewestInSpacing : dense_.extent / kFewestInExtent;
+    const double largest = std::max({extent.x, extent.y, extent.z});
+    outliersRuin_ = coarsest > 0 && largest * std::exp2(-double{kPlaceBits}) > coarsest && outliers_.reaches(all);
 }
 
 /// Reads what reaches far out once more.
@@ -119,7 +124,7 @@ Result<void> PointInput::findFar(Part& part, PointBlock& block, FarCubes& cubes)
         if (count == 0) return {};
         for (size_t i = 0; i < count; ++i) {
             const glm::dvec3 p = commonOf(part.source, block, i);
-            if (!isFinite(p)) continue;
+            if (!isPlace(p)) continue;
             if (!outliers_.isFar(p)) {
                 part.near.add(p);
                 continue;
@@ -148,7 +153,7 @@ FarCubes PointInput::together(const std::vector<FarCubes>& far) const {
 }
 
 std::vector<FarCubes> PointInput::farCubes(int workers) const {
-    if (settings_.dropOutliers) return {};
+    if (isLeavingOut()) return {};
     const bool isAny =
         std::any_of(parts_.begin(), parts_.end(), [&](const Part& p) { return outliers_.reaches(boundsOf(p)); });
     return std::vector<FarCubes>(isAny ? static_cast<size_t>(workers) : 0, outliers_.empty());
@@ -178,7 +183,9 @@ void PointInput::sayOutliers(BuildReport& report) const {
                         fmt::format("OUTLIERS: {} of {} points lie far outside of all others ({}; up to {:.7g} units "
                                     "away): {}",
                                     outliers_.count(), declared_, what, distance,
-                                    settings_.dropOutliers ? "left out" : "--drop-outliers leaves them out"));
+                                    !isLeavingOut() ? "--drop-outliers leaves them out"
+                                    : outliersRuin_ ? "left out: beside them the others' places could not be told apart"
+                                                    : "left out"));
 }
 
 }  // namespace stipple::lod

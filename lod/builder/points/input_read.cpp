@@ -76,7 +76,7 @@ Result<void> PointInput::readPart(const Part& part, PointBlock& block, Points& o
                     return changed();
         at += count;
         for (size_t i = 0; isWatched && i < count; ++i)
-            if (const glm::dvec3 p = commonOf(part.source, block, i); isFinite(p) && outliers_.isFar(p))
+            if (const glm::dvec3 p = commonOf(part.source, block, i); isPlace(p) && outliers_.isFar(p))
                 outliers_.gather(p, *far);
         if (part.far > 0 && leavesOut()) {
             const size_t left = leaveOut(part, block, count, farPoints);
@@ -257,7 +257,7 @@ void PointInput::placeEach(const Part& part, const PointBlock& block, size_t cou
     for (size_t i = 0; i < count; ++i) {
         const glm::dvec3 p =
             info.isLattice ? glm::dvec3(block.lattice[i]) * info.scale + info.offset : block.position[i];
-        if (!isFinite(p)) continue;
+        if (!isPlace(p)) continue;
         put(p, to);
         if (to != i) {
             out.colour[to] = out.colour[i];

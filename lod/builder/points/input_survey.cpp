@@ -38,7 +38,7 @@ Result<void> PointInput::survey(BuildReport& report, Executor& executor, Progres
     if (settings_.ranks != nullptr) exchangeParts();
     STIPPLE_TRY(checkParts());
     findDenseBox();
-    if (settings_.dropOutliers) STIPPLE_TRY(findOutliers(executor));
+    if (isLeavingOut()) STIPPLE_TRY(findOutliers(executor));
     STIPPLE_TRY(conclude(report));
     placeSample();
     return {};
@@ -75,6 +75,7 @@ void PointInput::tally(BuildReport& report) {
         }
         points += p.usable;
         if (p.notFinite > 0) report.dropped["not_finite"] += p.notFinite;
+        if (p.beyond > 0) report.dropped["beyond_1e150"] += p.beyond;
     }
     if (!leavesOut()) return;
     const FarCubes& far = outliers_.cubes();
@@ -92,6 +93,7 @@ template <typename Archive, typename Part>
 void visitPart(const Archive& with, Part& part) {
     with(part.usable);
     with(part.notFinite);
+    with(part.beyond);
     with(part.lo);
     with(part.hi);
     with(part.least);
@@ -130,12 +132,14 @@ void PointInput::save(ByteWriter& to) {
     for (size_t i = 0; i < parts_.size(); ++i) putPart(i, to);
     outliers_.save(to);
     to.put(dense_);
+    to.put(outliersRuin_);
 }
 
 Result<void> PointInput::load(ByteReader& from, BuildReport& report) {
     for (size_t i = 0; i < parts_.size(); ++i) getPart(i, from);
     outliers_.load(from);
     from.get(dense_);
+    from.get(outliersRuin_);
     STIPPLE_TRY(checkParts());
     return conclude(report);
 }
@@ -156,7 +160,7 @@ void PointInput::placeSample() {
     for (Part& part : parts_) {
         const SourceInfo& info = sources_[part.source].info;
         for (const glm::dvec3& p : std::exchange(part.sample, {})) {
-            if (part.error || !isFinite(p)) continue;
+            if (part.error || !isPlace(p)) continue;
             glm::dvec3 q(0);
             if (allLattice_) {
                 const ToLattice& to = lattice_.of[part.source];
@@ -190,12 +194,12 @@ Result<void> PointInput::surveyPart(Part& part, PointBlock& block) const {
         surveyBounds(block, count, part);
         for (const glm::ivec3& p : block.lattice) places.add(p);
         for (const glm::dvec3& p : block.position)
-            if (isFinite(p)) places.add(p);
+            if (isPlace(p)) places.add(p);
         surveyColours(block, count, part);
         for (uint64_t i = (sampleShare - at % sampleShare) % sampleShare; i < count; i += sampleShare)
             part.sample.push_back(from.info.isLattice ? glm::dvec3(block.lattice[i]) : block.position[i]);
         at += count;
-        part.usable = at - part.notFinite;
+        part.usable = at - part.notFinite - part.beyond;
     }
 }
 
@@ -207,8 +211,8 @@ void PointInput::surveyBounds(const PointBlock& block, size_t count, Part& part)
             part.hi = glm::max(part.hi, block.lattice[i]);
             continue;
         }
-        if (!isFinite(block.position[i])) {
-            ++part.notFinite;
+        if (!isPlace(block.position[i])) {
+            ++(isFinite(block.position[i]) ? part.beyond : part.notFinite);
             continue;
         }
         part.least = glm::min(part.least, block.position[i]);

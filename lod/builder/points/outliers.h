@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <vector>
@@ -21,6 +22,12 @@
 #include "lod/primitives/primitives.h"
 
 namespace stipple::lod {
+
+/// Squares and sums of coordinates up to here are numbers, too.
+inline constexpr double kFarthestPlace = 1e150;
+inline bool isPlace(const glm::dvec3& p) {
+    return std::abs(p.x) <= kFarthestPlace && std::abs(p.y) <= kFarthestPlace && std::abs(p.z) <= kFarthestPlace;
+}
 
 struct Bounds {
     glm::dvec3 least{1e300}, greatest{-1e300};
