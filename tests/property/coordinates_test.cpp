@@ -360,14 +360,8 @@ TEST(Coordinates, ObjHasTheDigitsOfMapCoordinates) {
     EXPECT_GT(single, 0.1) << "fp32 has not";
 }
 
-TEST(Coordinates, ACurveFarAwayMovesNoOthers) {
-    const test::TempFolder folder;
-    const auto executor = makeTbbExecutor(0);
-    CurveSet set = test::curls({.count = 100, .vertices = 40});
-    std::vector<glm::dvec3> truth = set.position;
-    for (const glm::dvec3& p : {glm::dvec3(1e4, 0, 0), glm::dvec3(1e4, 1, 0)}) set.addVertex(p, 0.01f, glm::vec3(0), 0);
-    set.endCurve(false);
-    const auto store = test::buildCurves(set, folder / "s", *executor, 8192);
+/// Largest distance of a vertex of `truth` from the nearest end of a segment of a leaf.
+double farthestEnd(const std::shared_ptr<const Store>& store, const std::vector<glm::dvec3>& truth) {
     const Hierarchy& h = store->hierarchy;
     std::vector<glm::dvec3> ends;
     for (uint32_t n = 0; n < h.nodes.size(); ++n) {
@@ -385,9 +379,44 @@ TEST(Coordinates, ACurveFarAwayMovesNoOthers) {
         for (const glm::dvec3& q : ends) nearest = std::min(nearest, glm::length(p - q));
         worst = std::max(worst, nearest);
     }
+    return worst;
+}
+
+TEST(Coordinates, ACurveFarAwayMovesNoOthers) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    CurveSet set = test::curls({.count = 100, .vertices = 40});
+    std::vector<glm::dvec3> truth = set.position;
+    for (const glm::dvec3& p : {glm::dvec3(1e4, 0, 0), glm::dvec3(1e4, 1, 0)}) set.addVertex(p, 0.01f, glm::vec3(0), 0);
+    set.endCurve(false);
+    const auto store = test::buildCurves(set, folder / "s", *executor, 8192);
+    const double worst = farthestEnd(store, truth);
     EXPECT_LE(worst, 0.01 / 8) << "an eighth of the radius";
     EXPECT_GT(1e4 / 32768, 0.01) << "steps of the whole extent would be too coarse";
     EXPECT_TRUE(verifyStore(*store, *executor, 0));
+}
+
+TEST(Coordinates, ACurveThatWouldRuinTheOthersIsLeftOutAndCounted) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    const CurveSet alone = test::curls({.count = 100, .vertices = 40});
+    for (const double far : {1e30, 1e160, 1e308}) {
+        CurveSet set = alone;
+        const glm::dvec3 first = set.position.front();
+        // In, in, out, out, in, in: two segments stay.
+        for (const glm::dvec3& p :
+             {first, first + glm::dvec3(0, 0, 0.3), glm::dvec3(far, 0, 0), glm::dvec3(far, far, 0),
+              first + glm::dvec3(0, 0.3, 0), first + glm::dvec3(0, 0.6, 0)})
+            set.addVertex(p, 0.01f, glm::vec3(0), 0);
+        set.endCurve(false);
+        const auto store = test::buildCurves(set, folder / "s", *executor, 8192);
+        EXPECT_EQ(store->description.dropped,
+                  (std::map<std::string, uint64_t>{{"that reach too far out for the others' places", 3}}))
+            << far;
+        EXPECT_LE(farthestEnd(store, alone.position), 0.01 / 8) << far;
+        EXPECT_LT(store->description.boundsMax.x, 1e3) << far;
+        EXPECT_TRUE(verifyStore(*store, *executor, 0)) << far;
+    }
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "engine/base/check.h"
@@ -14,6 +15,7 @@
 #include "lod/builder/build_version.h"
 #include "lod/builder/curves/curve_cell.h"
 #include "lod/builder/octree/cell_build.h"
+#include "lod/builder/points/outliers.h"
 #include "lod/builder/points/spacing.h"
 #include "lod/primitives/mesh_source.h"
 
@@ -24,6 +26,7 @@ constexpr uint32_t kRootLog2 = 24, kMostRootLog2 = kPlaceBits - TravellingPoint:
 constexpr uint32_t kDeepest = 20;                    ///< of 24
 constexpr double kFar = 16;                          ///< times what most vertices span: that is far out
 constexpr double kFineSteps = 64;                    ///< in what is visible of a segment, where curves lie far apart
+constexpr size_t kFew = 64;                          ///< of fewer, one in fifty cannot be told from the others
 constexpr double kMorePieces = 1 << 18;              ///< that all may be divided into where cells are too large
 constexpr uint64_t kCellBytes = uint64_t{64} << 20;  ///< that one cell of the work needs at most
 constexpr uint64_t kRunSegments = 64;                ///< of one subtree that are kept until they are sent
@@ -54,35 +57,13 @@ class CurveBuild : public CellContent {
 
     Result<void> survey(const Workspace& workspace, Progress& progress, bool isKnown) override {
         if (isKnown) return {};
-        // Segments longer than a cell are divided. The shortest cell for which that does not more than double their
-        // number: lengths are counted once, for all sizes of cells.
-        std::map<int, uint64_t> octaves;  // of lengths, rounded up to 1/64 octave: few enough to keep
-        std::map<int, uint64_t> details;  // likewise of what is visible of a segment, rounded down
-        std::set<std::string> notes;
-        std::map<std::string, uint64_t> mended;
-        MeshSource::Bounds bounds;
-        uint64_t given = 0;
-        STIPPLE_TRY(source_.read([&](const CurveSet& block) -> Result<void> {
-            facts_.hasColour = facts_.hasColour || block.hasColour;
-            facts_.up = block.up;
-            for (const auto& [what, count] : block.dropped) dropped_[what] += count;
-            for (const auto& [what, count] : block.mended) mended[what] += count;
-            given += block.segmentsIn;
-            if (block.segmentsAdded > 0) added_["where ribbons twist"] += block.segmentsAdded;
-            notes.insert(block.notes.begin(), block.notes.end());
-            for (size_t s = 0; s < block.curves(); ++s)
-                for (uint32_t i = block.first[s]; i < block.first[s + 1]; ++i) {
-                    bounds.add(block.position[i]);
-                    if (i == block.first[s]) continue;
-                    ++facts_.segments;
-                    const double length = glm::length(block.position[i] - block.position[i - 1]);
-                    ++octaves[toWhole<int>(std::ceil(std::log2(std::max(length, 1e-300)) * 64))];
-                    const double detail = detailOf(double{block.radius[i]}, length);
-                    ++details[toWhole<int>(std::floor(std::log2(std::max(detail, 1e-300)) * 64))];
-                }
-            progress.update("survey", std::min(facts_.segments, source_.vertices), source_.vertices);
-            return workspace.checkStopped();
-        }));
+        STIPPLE_ASSIGN(Seen seen, look(workspace, progress));
+        if (limitReach(seen)) {
+            auto again = look(workspace, progress);
+            if (!again) return tl::unexpected(again.error());
+            seen = std::move(*again);
+        }
+        const auto& [octaves, details, notes, mended, bounds, given] = seen;
         notes_.assign(notes.begin(), notes.end());
         for (const auto& [what, count] : mended) notes_.push_back(fmt::format("{} {}", count, what));
         facts_.given = given > 0 ? given : facts_.segments;
@@ -94,12 +75,7 @@ class CurveBuild : public CellContent {
         facts_.unit = std::exp2(std::floor(std::log2(extent)) + 1 - kRootLog2);
         facts_.rootLog2 = kRootLog2;
         // The finest, but for one segment in a hundred, is told apart however far curves lie from each other.
-        uint64_t below = 0;
-        double detail = 0;
-        for (const auto& [octave, count] : details) {
-            detail = std::exp2(octave / 64.0);
-            if ((below += count) * 100 >= facts_.segments) break;
-        }
+        const double detail = finestOf(details);
         refine(extent, bounds.sample, detail);
         const uint32_t deepest = std::min(facts_.rootLog2 - (kRootLog2 - kDeepest), kMortonBits);
         facts_.keyLevels = deepest;
@@ -145,7 +121,7 @@ class CurveBuild : public CellContent {
         std::vector<uint64_t> high;
         std::vector<TravellingPoint> ends;
         facts_.parts = facts_.vertices = facts_.farOut = facts_.farFromAll = 0;
-        return source_.read([&](const CurveSet& block) -> Result<void> {
+        return read([&](const CurveSet& block) -> Result<void> {
             for (const glm::dvec3& p : block.position) countFarOut(p);
             x.clear();
             y.clear();
@@ -203,7 +179,7 @@ class CurveBuild : public CellContent {
         std::vector<uint32_t> subtrees;
         // Curve and vertex of a run's end.
         std::vector<std::pair<uint32_t, uint32_t>> nextOf(buffers.size(), {~0u, 0});
-        const Result<void> read = source_.read([&](const CurveSet& block) -> Result<void> {
+        const Result<void> read = this->read([&](const CurveSet& block) -> Result<void> {
             uint64_t segments = 0;
             for (size_t s = 0; s < block.curves(); ++s) segments += block.first[s + 1] - block.first[s] - 1;
             if (to.begins()) {
@@ -347,10 +323,113 @@ class CurveBuild : public CellContent {
         uint64_t given = 0, segments = 0, parts = 0;  ///< of the input, of clean curves, and divided
         uint64_t vertices = 0, farOut = 0;            ///< of them, far outside of all others
         double farthest = 0;                          ///< of those from the others' box, file units
-        uint64_t farFromAll = 0;                      ///< added to segments that are divided unevenly
+        glm::dvec3 reachLow{-std::numeric_limits<double>::infinity()}, reachHigh{-reachLow};  ///< see limitReach
+        uint64_t farFromAll = 0;  ///< added to segments that are divided unevenly
         uint32_t rootLog2 = kRootLog2, keyLevels = 0;
         bool hasColour = false;
     };
+    /// What a pass over the input shows. Segments longer than a cell are divided. The shortest cell for which that does
+    /// not more than double their number: lengths are counted once, for all sizes of cells.
+    struct Seen {
+        std::map<int, uint64_t> octaves;  ///< of lengths, rounded up to 1/64 octave: few enough to keep
+        std::map<int, uint64_t> details;  ///< likewise of what is visible of a segment, rounded down
+        std::set<std::string> notes;
+        std::map<std::string, uint64_t> mended;
+        MeshSource::Bounds bounds;
+        uint64_t given = 0;
+    };
+    Result<Seen> look(const Workspace& workspace, Progress& progress) {
+        Seen seen;
+        facts_.segments = 0;
+        dropped_.clear();
+        added_.clear();
+        STIPPLE_TRY(read([&](const CurveSet& block) -> Result<void> {
+            facts_.hasColour = facts_.hasColour || block.hasColour;
+            facts_.up = block.up;
+            for (const auto& [what, count] : block.dropped) dropped_[what] += count;
+            for (const auto& [what, count] : block.mended) seen.mended[what] += count;
+            seen.given += block.segmentsIn;
+            if (block.segmentsAdded > 0) added_["where ribbons twist"] += block.segmentsAdded;
+            seen.notes.insert(block.notes.begin(), block.notes.end());
+            for (size_t s = 0; s < block.curves(); ++s)
+                for (uint32_t i = block.first[s]; i < block.first[s + 1]; ++i) {
+                    seen.bounds.add(block.position[i]);
+                    if (i == block.first[s]) continue;
+                    ++facts_.segments;
+                    const double length = glm::length(block.position[i] - block.position[i - 1]);
+                    ++seen.octaves[toWhole<int>(std::ceil(std::log2(std::max(length, 1e-300)) * 64))];
+                    const double detail = detailOf(double{block.radius[i]}, length);
+                    ++seen.details[toWhole<int>(std::floor(std::log2(std::max(detail, 1e-300)) * 64))];
+                }
+            progress.update("survey", std::min(facts_.segments, source_.vertices), source_.vertices);
+            return workspace.checkStopped();
+        }));
+        return seen;
+    }
+    /// The finest, but for one segment in a hundred.
+    double finestOf(const std::map<int, uint64_t>& details) const {
+        uint64_t below = 0;
+        double detail = 0;
+        for (const auto& [octave, count] : details) {
+            detail = std::exp2(octave / 64.0);
+            if ((below += count) * 100 >= facts_.segments) break;
+        }
+        return detail;
+    }
+    /// True: vertices lie so far out that beside them nothing would be left of the others. They are left out from here
+    /// on, and what lies as far that others have fewer than kFineSteps.
+    bool limitReach(const Seen& seen) {
+        const glm::dvec3 lo = seen.bounds.lo, hi = seen.bounds.hi;
+        std::vector<glm::dvec3> sample = seen.bounds.sample;
+        std::erase_if(sample, [](const glm::dvec3& p) { return !isPlace(p); });
+        const double detail = finestOf(seen.details), most = detail * std::exp2(double{kMostRootLog2});
+        if (sample.size() < kFew || !(detail > 0) ||
+            (isPlace(lo) && isPlace(hi) && !(std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z}) > most)))
+            return false;
+        const glm::dvec3 middle = denseBox(sample).middle, reach(most / (4 * kFineSteps));
+        facts_.reachLow = middle - reach;
+        facts_.reachHigh = middle + reach;
+        return true;
+    }
+    /// The input, without what is left out.
+    Result<void> read(const CurveSource::Take& take) const {
+        return source_.read([&](const CurveSet& block) {
+            const auto isOut = [&](const glm::dvec3& p) { return !isInReach(p); };
+            return std::any_of(block.position.begin(), block.position.end(), isOut) ? take(inReach(block))
+                                                                                    : take(block);
+        });
+    }
+    bool isInReach(const glm::dvec3& p) const {
+        return glm::all(glm::lessThanEqual(facts_.reachLow, p)) && glm::all(glm::lessThanEqual(p, facts_.reachHigh));
+    }
+    /// Curves end before a vertex that is left out, and go on behind it.
+    CurveSet inReach(const CurveSet& block) const {
+        CurveSet out;
+        out.hasColour = block.hasColour;
+        out.up = block.up;
+        out.dropped = block.dropped;
+        out.mended = block.mended;
+        out.segmentsIn = block.segmentsIn;
+        out.segmentsAdded = block.segmentsAdded;
+        out.notes = block.notes;
+        for (size_t s = 0; s < block.curves(); ++s) {
+            const uint32_t begin = block.first[s], end = block.first[s + 1];
+            for (uint32_t i = begin; i < end;) {
+                uint32_t last = i;
+                while (last < end && isInReach(block.position[last])) ++last;
+                if (last - i >= 2) {
+                    for (uint32_t v = i; v < last; ++v)
+                        out.addVertex(block.position[v], block.radius[v], block.normal[v], block.colour[v]);
+                    out.endCurve(block.isRibbon[s] != 0);
+                }
+                i = std::max(last, i + 1);
+            }
+        }
+        const auto segments = [](const CurveSet& set) { return set.position.size() - set.curves(); };
+        const uint64_t left = segments(block) - segments(out);
+        out.dropped["that reach too far out for the others' places"] += left;
+        return out;
+    }
     /// (The box is that of a sample: what lies within its own size of it may belong to it.)
     void countFarOut(const glm::dvec3& p) {
         ++facts_.vertices;
@@ -364,7 +443,6 @@ class CurveBuild : public CellContent {
     /// What most curves are is told apart however far from them, or from each other, curves lie.
     void refine(double extent, const std::vector<glm::dvec3>& sample, double detail) {
         const double dense = denseExtent(sample);
-        constexpr size_t kFew = 64;  // of fewer, one in fifty cannot be told from the others
         const bool isFarOut = dense > 0 && extent > kFar * dense && sample.size() >= kFew;
         if (isFarOut) {
             const DenseBox box = denseBox(sample);
