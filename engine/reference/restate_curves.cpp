@@ -264,6 +264,7 @@ class CurveProjector {
             s.perp = dvec2(rotationToZ(v) * n);
             s.axis = {1, 0};
         }
+        if (half < kNarrow) s.centre = pixel;  // as deep as the axis, however its ribbon leans
         s.radius = half < kNarrow ? 0.25 : std::min(s.radius, 16384.0);
         const double facing = 1 - glm::dot(s.perp, s.perp);
         s.thickness = s.radius / pixelsAt(view_, s.depth);

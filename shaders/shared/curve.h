@@ -24,7 +24,8 @@ struct CurveSegment {
 const float kCurveMargin = 0.5f;  // cells
 const float kCurveCells = 2.0f;   // across all positions
 const uint kSegmentsPerBlock = 256u;
-const float kNarrow = 0.5f;  // px: a curve of a smaller half-width keeps its own pixels, with some probability
+const float kLineRadius = 0.25f;  // px: of a texel that is a line's own pixel; nothing else is as narrow
+const float kNarrow = 0.5f;       // px: a curve of a smaller half-width keeps its own pixels, with some probability
 
 SHARED_FN float curveRadius(CurveVertex v, float edge) {
     return uintBitsToFloat((v.positionZ >> 16 & 0x7fffu) << 16) * edge;
@@ -240,7 +241,7 @@ SHARED_FN Texel texelFromCurve(CameraSegment s, float place, float support, Lens
     Texel r = flat_;
     const float surface = lens.isOrthographic ? z - front : z * (1.0f - front / distance);
     r.depth = isTube_ ? max(surface, nearPlane) : z;
-    r.radius = halfWidth < kNarrow ? 0.25f : wide;
+    r.radius = halfWidth < kNarrow ? kLineRadius : wide;
     r.thickness = isTube_ ? r.radius : flat_.thickness;
     const vec2 narrow = perpFromNormal(narrowTubeNormal(t, v, light), v);
     // Conditions as numbers: see pushTexel.
@@ -365,7 +366,9 @@ SHARED_FN CurvePixel curvePixel(CameraSegment s, ScreenSegment on, float support
     const vec3 c = vec3(s.a.x + r.place * (s.b.x - s.a.x), s.a.y + r.place * (s.b.y - s.a.y),
                         max(s.a.z + r.place * (s.b.z - s.a.z), nearPlane));
     const float w = lensDepth(lens, c.z);
-    r.texel.offset = vec2(c.x * lens.focal / w + cx, c.y * lens.focal / w + cy);
+    // A line lies where its axis does: beside it the plane of a ribbon seen edge-on runs away from it.
+    const float isWide = r.texel.radius > kLineRadius ? 1.0f : 0.0f;
+    r.texel.offset = vec2(isWide * (c.x * lens.focal / w + cx), isWide * (c.y * lens.focal / w + cy));
     r.texel.colour = vec3(0.0f, 0.0f, 0.0f);
     return r;
 }

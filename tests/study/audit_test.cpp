@@ -1,5 +1,5 @@
-// The bound audit on what is known beforehand, and of pictures against the points and triangles that stores were built
-// from, by brute force: nothing of it knows codes, cuts or stores.
+// The bound audit on what is known beforehand, and of pictures against the points, triangles and curves that stores
+// were built from, by brute force: nothing of it knows codes, cuts or stores.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +9,7 @@
 #include "engine/cpu/cpu_backend.h"
 #include "engine/reference/reference.h"
 #include "tests/support/drawn_shapes.h"
+#include "tests/support/forests.h"
 #include "tests/support/meshes.h"
 #include "tests/support/support.h"
 
@@ -216,6 +217,39 @@ TEST(BoundAudit, PicturesOfTrianglesKeepTheirBoundFromTheOriginalTriangles) {
         EXPECT_EQ(a.beyond, 0u) << tau;
     }
     EXPECT_GT(auditOf(store, full, render::Mode::surface, 16, 0.5, *executor).beyond, 50u) << "the control";
+}
+
+// (A line as deep as the plane of its ribbon, seen edge-on, lay up to 13 px off: 2 pixels of 1,000 at 1 px.)
+TEST(BoundAudit, PicturesOfCurvesKeepTheirBoundFromTheOriginalCurves) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    test::CurlRecipe narrow;
+    narrow.count = 3000;
+    narrow.radius = 0.004f;
+    for (const bool isTree : {true, false}) {
+        const lod::CurveSet curves = isTree ? test::oak(20'000) : test::curls(narrow);
+        study::FullShapes shapes;
+        for (size_t c = 0; c < curves.curves(); ++c)
+            for (uint32_t v = curves.first[c]; v + 1 < curves.first[c + 1]; ++v)
+                shapes.tubes.push_back(
+                    {curves.position[v], curves.position[v + 1], curves.radius[v], curves.radius[v + 1]});
+        study::FullShapes moved = shapes;
+        const study::FullDetail full(std::move(shapes));
+        const auto store = test::buildCurves(curves, folder / "c.stipple", *executor);
+        for (const render::Mode mode : {render::Mode::surface, render::Mode::splat, render::Mode::ewa})
+            for (const double tau : {0.5, 1.0, 4.0}) {
+                const Audited a = auditOf(store, full, mode, tau, tau, *executor);
+                std::printf("%s in %s at %.1f px: %lu drawn, %lu beyond, worst %.2f px\n", isTree ? "oak" : "curls",
+                            render::reconstructionOf(mode).name, tau, static_cast<unsigned long>(a.drawn),
+                            static_cast<unsigned long>(a.beyond), a.worst);
+                EXPECT_GT(a.drawn, 15'000u);
+                EXPECT_EQ(a.beyond, 0u) << render::reconstructionOf(mode).name << " " << tau;
+            }
+        for (study::FullTube& t : moved.tubes) t.a *= 1.05, t.b *= 1.05;
+        EXPECT_GT(auditOf(store, study::FullDetail(std::move(moved)), render::Mode::surface, 1, 1, *executor).beyond,
+                  300u)
+            << "the control: curves that were 5 % farther out";
+    }
 }
 
 }  // namespace
