@@ -76,7 +76,7 @@ void placeSplats(const FrameConstants& frame, const DrawNode& drawNode, const Po
         out.radius[i] = radius;
         out.colour[i] = r.colour;
         const float isLoose = (recordFlags(r) & (kFlagScattered | kFlagLeaf)) != 0u ? 1.0f : 0.0f;
-        out.alone[i] = max(isLoose, 2.0f * stored >= node.spacing ? 0.0f : 1.0f) > 0.5f ? kAlone : 0u;
+        out.alone[i] = max(isLoose, kAloneDiameters * stored >= node.spacing ? 0.0f : 1.0f) > 0.5f ? kAlone : 0u;
         const float drawnHere = float(int(octantMask >> recordOctant(r) & 1u));  // a bool would keep GCC from SIMD
         const bool fine = (recordErrorCode(r) <= errorCode) | (drawnHere > 0.5f);
         const bool seen = ((recordFlags(r) & (kFlagTwoSided | kFlagNoNormal)) != 0u) |

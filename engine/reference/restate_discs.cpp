@@ -260,7 +260,7 @@ void showSplats(const render::DrawList& draws, const std::vector<PlacedDisc>& di
             for (int x = x0; x <= x1; ++x) offer(x, y, d, false);
         // Those that stand alone show it anyway; of others, only the small ones.
         const bool isLoose = (d.flags & (shared::kFlagScattered | shared::kFlagLeaf)) != 0;
-        const bool isAlone = isLoose || 2 * stored < d.spacing;
+        const bool isAlone = isLoose || 2.002 * stored < d.spacing;  // (just as wide: not alone)
         if (!isAhead || (!isAlone && d.radius * pixelsAt(v, d.centre.z) >= std::sqrt(0.5))) continue;
         const dvec2 p = imageOf(v, d.centre);
         if (p.x >= 0 && p.y >= 0 && p.x < level.width && p.y < level.height)
