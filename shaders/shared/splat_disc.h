@@ -57,8 +57,8 @@ SHARED_FN CentrePixel centrePixel(WideDisc d, FrameConstants f) {
 
 // Radius up to which a disc that faces the eye may lie between the centres of pixels, px.
 const float kBetweenPixels = 0.70710678f;
-// A disc stands alone if its diameter is less than the spacing. (Both are codes, often just the same: a thousandth, which
-// is less than a step between codes, keeps rounding from telling them apart.)
+// A disc stands alone if its diameter is less than the spacing. (Both are codes, often just the same: a thousandth,
+// which is less than a step between codes, keeps rounding from telling them apart.)
 const float kAloneDiameters = 2.002f;
 // Does no neighbour cover what a disc stands on? `radius`: as stored; `spacing`: of its node, 0: not known.
 SHARED_FN bool isAlone(uint flags, float radius, float spacing) {
