@@ -147,5 +147,6 @@ void setupCompare(CLI::App& app, int& status);
 void setupGrow(CLI::App& app, int& status);
 void setupConvert(CLI::App& app, int& status);
 void setupStudy(CLI::App& app, int& status);
+void setupSelfTest(CLI::App& app, int& status);
 
 }  // namespace stipple::app

@@ -34,6 +34,7 @@ void setupAll(CLI::App& app, int& status) {
     app::setupView(app, status);
     app::setupCompare(app, status);
     app::setupStudy(app, status);
+    app::setupSelfTest(app, status);
     app::setupGrow(app, status);
     app::setupConvert(app, status);
     app::setupCache(app, status);
