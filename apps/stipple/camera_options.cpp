@@ -145,11 +145,19 @@ std::string beyondFarPlane(const scene::Camera& camera, int number, std::span<co
 
 }  // namespace
 
+lod::View Shot::viewAfter(size_t index, double later) const {
+    const lod::View& view = views[index];
+    if (!path || later == 0) return view;
+    return scene::makeView(path->at(path->keys.front().t + seconds[index] + later), view.width, view.height,
+                           view.nearPlane);
+}
+
 Result<Shot> makeShot(const CameraOptions& o, int frames, const OpenedScene& opened, const glm::uvec2& size) {
     Shot shot;
     shot.worldUp = opened.description.up;
     const double aspect = static_cast<double>(size.x) / size.y, nearPlane = nearPlaneOf(opened);
-    STIPPLE_ASSIGN(const std::optional<scene::CameraPath> path, makePath(o, opened, aspect));
+    STIPPLE_ASSIGN(shot.path, makePath(o, opened, aspect));
+    const std::optional<scene::CameraPath>& path = shot.path;
     if (!path) {
         STIPPLE_ASSIGN(const scene::Camera camera, makeCamera(o, opened, aspect));
         shot.views.push_back(scene::makeView(camera, size.x, size.y, nearPlane));

@@ -24,6 +24,9 @@ struct Shot {
     std::vector<double> seconds;  ///< of each view, from the first on; empty: one moment
     glm::dvec3 worldUp{0, 0, 1};
     std::string note;  ///< what a camera asks for that is not done
+    std::optional<scene::CameraPath> path;
+    /// View number `index`, so many seconds after its moment; before the path and after it the camera stands still.
+    lod::View viewAfter(size_t index, double later) const;
 };
 
 /// The one camera that is asked for: by place, of the scene, or one that sees all of it.

@@ -137,7 +137,7 @@ void arrangeOptions(CLI::App& command) {
             if (CLI::Option* o = command.get_option_no_throw(option)) o->group(name);
     };
     group("Camera", {"--eye", "--target", "--camera-up", "--fov", "--ortho", "--scene-camera", "--camera-path",
-                     "--orbit", "--frames"});
+                     "--orbit", "--frames", "--aperture", "--focus", "--shutter"});
     group("Accuracy and budgets (stipple help budgets)",
           {"--error", "--budget-points", "--resident", "--no-wait", "--curve-exact", "--accumulate", "--samples"});
     group("Picture", {"--size",         "--mode",     "--lowpass",     "--kernel",

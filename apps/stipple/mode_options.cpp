@@ -30,6 +30,7 @@ constexpr std::array kOnlyOf{
     OnlyOf{"--normalise", blends, kOfEwa},      OnlyOf{"--samples", isTraced, "it belongs to mode reference"},
     OnlyOf{"--budget-points", isDrawn, kDrawn}, OnlyOf{"--wind", isDrawn, kDrawn},
     OnlyOf{"--time", isDrawn, kDrawn},          OnlyOf{"--accumulate", isDrawn, kDrawn},
+    OnlyOf{"--aperture", isDrawn, kDrawn},      OnlyOf{"--shutter", isDrawn, kDrawn},
     OnlyOf{"--debug", isDrawn, kDrawn},         OnlyOf{"--patch-as", isDrawn, kDrawn},
     OnlyOf{"--interpolate", isDrawn, kDrawn},
 };

@@ -55,11 +55,16 @@ std::string errorText(const FrameCounters& c) {
                              : fmt::format("error {:.2f} px", c.tauEffectivePixels);
 }
 
+/// While it moves a picture is one frame.
+std::string accumulatedText(const OverlayFacts& f) {
+    return f.accumulated == 0 ? "" : fmt::format("mean of {} of {} frames   ", f.accumulated, f.accumulates);
+}
+
 void drawBrief(const OverlayFacts& f) {
     const FrameCounters& c = f.state.counters;
-    ImGui::TextUnformatted(
-        fmt::format("{:.1f} ms   {}   {}   {}   H: keys", frameMsOf(f.state), errorText(c), drawnText(f.state), f.hands)
-            .c_str());
+    ImGui::TextUnformatted(fmt::format("{:.1f} ms   {}   {}   {}{}   H: keys", frameMsOf(f.state), errorText(c),
+                                       drawnText(f.state), accumulatedText(f), f.hands)
+                               .c_str());
 }
 
 void drawFull(const OverlayFacts& f) {
@@ -74,6 +79,7 @@ void drawFull(const OverlayFacts& f) {
         line(fmt::format("{:.1f} ms a frame, {:.1f} ms with the window   {}", c.frameMs, f.windowMs, f.hands));
     for (const render::PassTime& p : f.state.backend->passTimes())
         line(fmt::format("  {:<8} {:6.2f} ms", p.name, p.ms));
+    if (f.accumulated > 0) line(accumulatedText(f));
     line(fmt::format("delivered {} (asked for {:.2f} px)", errorText(c), budgets.errorPixels));
     line(fmt::format("{} nodes, {} missing, {} chunks on their way", c.nodesDrawn, c.nodesMissing, c.requestsInFlight));
     ImGui::ProgressBar(static_cast<float>(c.recordsDrawn + c.trianglesDrawn) / static_cast<float>(budgets.records),

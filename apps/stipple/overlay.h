@@ -15,9 +15,10 @@ struct OverlayFacts {
     const ViewSettings& settings;
     const Legend& legend;
     const Notices& notices;
-    std::string opening;     ///< of what is being opened; empty: nothing is
-    const char* hands = "";  ///< "orbit", "fly" or what moves the camera
-    double windowMs = 0;     ///< of the last frame, with showing it
+    std::string opening;                        ///< of what is being opened; empty: nothing is
+    const char* hands = "";                     ///< "orbit", "fly" or what moves the camera
+    double windowMs = 0;                        ///< of the last frame, with showing it
+    uint32_t accumulated = 0, accumulates = 1;  ///< frames whose mean is shown at rest, and how many it may be
     std::array<char, gpu::kSteerCount> keyNames{};
 };
 /// What a frame takes. Where its picture stays on the device, handing it in takes less than drawing it, which is known

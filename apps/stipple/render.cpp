@@ -10,6 +10,7 @@
 #include "apps/stipple/camera_options.h"
 #include "apps/stipple/common.h"
 #include "apps/stipple/effect_options.h"
+#include "apps/stipple/exposure_options.h"
 #include "apps/stipple/legend.h"
 #include "apps/stipple/mode_options.h"
 #include "apps/stipple/outputs.h"
@@ -39,11 +40,12 @@ struct Options {
     std::string debug = "none", resident = "1G";
     double error = 1, curveExact = 2, wind = 0, seconds = 0;
     ModeOptions drawn;
-    int frames = 1, samples = 4, accumulate = 1;
+    int frames = 1, samples = 4;
     uint64_t budget = 0;
     bool noWait = false, json = false, quiet = false, force = false, alpha = false;
     TargetOptions target;
     CameraOptions camera;
+    ExposureOptions exposure;
     BuildOptions build;
     ColourOptions colour;
     EnvironmentOptions environment;
@@ -66,6 +68,7 @@ Result<glm::dvec3> backgroundOf(const Options& o) {
 /// What can be found out before a scene is built, which may take hours.
 Result<void> checkArguments(const Options& o) {
     STIPPLE_TRY(o.camera.check());
+    STIPPLE_TRY(o.exposure.check(o.camera, o.wind > 0));
     STIPPLE_TRY(o.material.check(o.shade));
     if (o.target.isAny() && o.drawn.mode == "reference")
         return fail(ErrorKind::usage, "traces the full detail, whatever it takes", "--mode reference",
@@ -150,7 +153,8 @@ Result<void> checkPictures(const Options& o) {
 
 /// Before any work. (It takes longer to load than a built scene takes to draw: then only whether it is there.)
 Result<void> checkModule(const Options& o) {
-    const bool isLong = !o.camera.path.empty() || o.camera.orbit > 0 || o.accumulate > 1 || o.drawn.mode == "reference";
+    const bool isLong =
+        !o.camera.path.empty() || o.camera.orbit > 0 || !o.exposure.isPlain() || o.drawn.mode == "reference";
     return image::checkModule(isLong || !lod::isStoreFile(o.inputs.front()));
 }
 
@@ -266,6 +270,7 @@ void tell(const Options& o, const render::FrameState& state, const Verdict& verd
             {"width", size.x},
             {"height", size.y},
             {"frames", timings.frames.size()},
+            {"accumulated", o.exposure.samples()},
             {"frame_ms", {{"median", quantile(timings.frames, 0.5)}, {"p95", quantile(timings.frames, 0.95)}}},
             {"passes", passes},
             {"records_drawn", c.recordsDrawn},
@@ -334,7 +339,7 @@ Result<void> run(const Options& o, Written& written) {
     if (o.drawn.mode == "reference") return runTraced(o, scene, shot, settings, legend, *executor, written);
     streaming::StreamSettings stream;
     stream.residentBytes = parseBytes(o.resident);
-    settings.wantDepthAndNormal = settings.wantDepthAndNormal || o.accumulate > 1;
+    STIPPLE_ASSIGN(const render::Exposure exposure, o.exposure.exposure(shot));
     o.drawn.applyTo(scene.placed);
     auto state = render::makeFrameState(scene.placed, *backend, *executor, stream, scene.groups);
     render::setSway(settings.draw.wind, state->hierarchies, state->instances, state->groups);
@@ -344,8 +349,8 @@ Result<void> run(const Options& o, Written& written) {
         settings.budgets.errorPixels = c.errorPixels;
         if (!o.quiet && !o.json) fmt::print("{}\n", c.text);
     }
-    const FramesPlan plan{shot.views, shot.seconds,    o.output, o.resident,          o.frames, o.accumulate,
-                          o.noWait,   o.build.skipBad, o.quiet,  !o.quiet && !o.json, o.alpha,  &legend};
+    const FramesPlan plan{&shot,           o.output, o.resident,          o.frames, exposure, executor.get(), o.noWait,
+                          o.build.skipBad, o.quiet,  !o.quiet && !o.json, o.alpha,  &legend};
     Timings timings;
     Verdict verdict;
     STIPPLE_TRY(runFrames(plan, settings, *state, timings, written, verdict));
@@ -463,10 +468,7 @@ void setupRender(CLI::App& app, int& status) {
                     "half-width in pixels from which ribbons and tubes are filled exactly instead of reconstructed")
         ->transform(within(0.5, 1e9))
         ->capture_default_str();
-    sub->add_option("--accumulate", o->accumulate,
-                    "the mean of N frames: smooth coverage of curves narrower than a pixel")
-        ->transform(within(1, 4096))
-        ->capture_default_str();
+    o->exposure.addTo(*sub);
     sub->add_option("--samples", o->samples, "mode reference: rays per pixel along each axis")
         ->transform(within(1, 64))
         ->capture_default_str();

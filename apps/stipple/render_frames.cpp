@@ -58,21 +58,41 @@ void sayEmpty(size_t empty, size_t pictures, const std::string& output) {
                pictures == 1 ? "the view shows" : fmt::format("{} of {} views show", empty, pictures));
 }
 
-void Verdict::judge(const render::FrameState& state, const lod::View* view) {
-    const size_t number = pictures++;
-    const bool misses = !state.cut.wanted.empty() || state.cut.truncated, worstMisses = incomplete > 0;
-    incomplete += misses ? 1 : 0;
-    empty += !misses && showsNothing(state.image) ? 1 : 0;
+namespace {
+
+bool missesAny(const render::FrameState& state) { return !state.cut.wanted.empty() || state.cut.truncated; }
+
+/// The frame that was drawn last, of the picture that was counted last, where it is the worst so far. False: it is not.
+bool takeIfWorst(Verdict& v, const render::FrameState& state, bool isFirst, bool worstMisses) {
     const double error = state.cut.truncated ? std::numeric_limits<double>::infinity() : state.cut.tauEffective;
-    isTruncated = isTruncated || state.cut.truncated;
-    if (number > 0 && (misses != worstMisses ? worstMisses : error <= tauEffectivePixels)) return;
-    worst = number;
-    tauEffectivePixels = error;
-    leavesAround = state.cut.counters.leavesAround;
-    missing = missingOf(state);
+    v.isTruncated = v.isTruncated || state.cut.truncated;
+    if (!isFirst && (missesAny(state) != worstMisses ? worstMisses : error <= v.tauEffectivePixels)) return false;
+    v.worst = v.pictures - 1;
+    v.tauEffectivePixels = error;
+    v.leavesAround = state.cut.counters.leavesAround;
+    v.missing = missingOf(state);
+    return true;
+}
+
+}  // namespace
+
+void Verdict::judge(const render::FrameState& state, const lod::View* view) {
+    const bool worstMisses = incomplete > 0;
+    lastMisses = missesAny(state);
+    ++pictures;
+    incomplete += lastMisses ? 1 : 0;
+    empty += !lastMisses && showsNothing(state.image) ? 1 : 0;
+    if (!takeIfWorst(*this, state, pictures == 1, worstMisses)) return;
     // A chunk that cannot be read any more is told of where it is missed.
     if (view == nullptr) return;
     if (const auto measured = render::measurePruning(state, *view)) pruned = *measured;
+}
+
+void Verdict::judgeSample(const render::FrameState& state) {
+    const bool worstMisses = incomplete > 0, misses = missesAny(state);
+    incomplete += misses && !lastMisses ? 1 : 0;
+    lastMisses = lastMisses || misses;
+    takeIfWorst(*this, state, false, worstMisses);
 }
 
 std::string numbered(const std::string& path, size_t index) {
@@ -90,7 +110,7 @@ Result<void> awaitRoot(const FramesPlan& plan, const render::FrameSettings& sett
         streamer.collect();
         streamer.upload();
         if (streamer.residency().drawable[0][0]) return {};
-        lod::selectCut(state.scene(), streamer.residency(), plan.views.front(), settings.budgets, state.scratch,
+        lod::selectCut(state.scene(), streamer.residency(), plan.shot->views.front(), settings.budgets, state.scratch,
                        state.cut);
         const uint64_t before = streamer.counters().requests;
         streamer.request(state.cut);
@@ -108,77 +128,66 @@ Result<void> awaitRoot(const FramesPlan& plan, const render::FrameSettings& sett
 
 /// The first view once more: what was waited for stays as it is.
 Result<void> again(const FramesPlan& plan, const render::FrameSettings& settings, render::FrameState& state) {
-    return plan.noWait ? render::renderFrame(state, plan.views.front(), settings)
-                       : render::renderResident(state, plan.views.front(), settings);
+    return plan.noWait ? render::renderFrame(state, plan.shot->views.front(), settings)
+                       : render::renderResident(state, plan.shot->views.front(), settings);
 }
 
-/// The mean of frames whose curves narrower than a pixel take other pixels each time.
-Result<void> accumulate(const FramesPlan& plan, render::FrameSettings settings, render::FrameState& state) {
-    const int count = plan.accumulate;
-    if (count <= 1) return {};
-    std::vector<float> sum(state.image.linear.size()), coverage(state.image.rgba.size());
-    for (int f = 0; f < count; ++f) {
+/// The other frames of picture number `index`, whose middle is drawn, and their mean.
+Result<void> accumulate(const FramesPlan& plan, size_t index, const render::FrameSettings& settings,
+                        render::FrameState& state, Verdict& verdict) {
+    const auto after = [&](double seconds) { return plan.shot->viewAfter(index, seconds); };
+    const auto draw = [&](const lod::View& view, const render::FrameSettings& sample) -> Result<void> {
         STIPPLE_TRY(checkStopped("--accumulate"));
-        settings.draw.coverageSeed = static_cast<uint32_t>(f);
-        STIPPLE_TRY(again(plan, settings, state));
-        for (size_t i = 0; i < sum.size(); ++i) sum[i] += std::clamp(state.image.linear[i], 0.0f, 1.0f);
-        for (size_t i = 0; i < coverage.size(); ++i)
-            coverage[i] += static_cast<float>(state.image.rgba[i] >> 24) / 255.0f;
-    }
-    const float share = 1.0f / static_cast<float>(count);
-    for (size_t i = 0; i < coverage.size(); ++i) {
-        state.image.rgba[i] = static_cast<uint32_t>(coverage[i] * share * 255.0f + 0.5f) << 24;
-        for (size_t c = 0; c < 3; ++c) {
-            state.image.linear[3 * i + c] = sum[3 * i + c] * share;
-            state.image.rgba[i] |= static_cast<uint32_t>(shared::srgbFromLinear(sum[3 * i + c] * share) * 255.0f + 0.5f)
-                                   << (8 * c);
-        }
-    }
-    return {};
+        if (plan.noWait)
+            STIPPLE_TRY(render::renderFrame(state, view, sample));
+        else
+            STIPPLE_TRY(render::renderUntilComplete(state, view, sample));
+        verdict.judgeSample(state);
+        return {};
+    };
+    return render::expose(plan.exposure, after, settings, draw, state.image, *plan.executor);
 }
 
 }  // namespace
 
 Result<void> runFrames(const FramesPlan& plan, const render::FrameSettings& settings, render::FrameState& state,
                        Timings& timings, Written& written, Verdict& verdict) {
+    const std::vector<lod::View>& views = plan.shot->views;
     // The first image: as soon as the root is there, whatever is missing.
     STIPPLE_TRY(awaitRoot(plan, settings, state));
-    const lod::View& first = plan.views.front();
-    STIPPLE_TRY(render::renderFrame(state, first, settings));
+    STIPPLE_TRY(render::renderFrame(state, views.front(), settings));
     timings.firstImageMs = millisecondsSinceProcessStart();
-    const bool isSingle = plan.views.size() == 1;
-    for (size_t i = 0; i < plan.views.size(); ++i) {
+    const bool isSingle = views.size() == 1;
+    for (size_t i = 0; i < views.size(); ++i) {
         render::FrameSettings frame = settings;
-        if (!plan.seconds.empty()) frame.draw.wind.seconds += plan.seconds[i];
+        if (!plan.shot->seconds.empty()) frame.draw.wind.seconds += plan.shot->seconds[i];
         if (!plan.noWait)
-            STIPPLE_TRY(render::renderUntilComplete(state, plan.views[i], frame));
+            STIPPLE_TRY(render::renderUntilComplete(state, views[i], frame));
         else if (i > 0)
-            STIPPLE_TRY(render::renderFrame(state, plan.views[i], frame));
+            STIPPLE_TRY(render::renderFrame(state, views[i], frame));
         if (i == 0) timings.completeMs = millisecondsSinceProcessStart();
         timings.add(state.counters.frameMs, state.backend->passTimes());
+        for (int f = 1; isSingle && f < plan.repeats; ++f) {  // one view again and again, for timing
+            STIPPLE_TRY(checkStopped(plan.output));
+            STIPPLE_TRY(again(plan, settings, state));
+            timings.add(state.counters.frameMs, state.backend->passTimes());
+        }
+        if (!isSingle) STIPPLE_TRY(checkStopped(plan.output));
+        verdict.judge(state, &views[i]);
+        STIPPLE_TRY(accumulate(plan, i, frame, state, verdict));
         if (isSingle) break;
-        STIPPLE_TRY(checkStopped(plan.output));
-        verdict.judge(state, &plan.views[i]);
         if (plan.legend) drawLegend(*plan.legend, state.image);
         STIPPLE_TRY(image::writePicture(numbered(plan.output, i), state.image, plan.alpha));
         ++written.pictures;
         if (plan.printNames) fmt::print("{}\n", numbered(plan.output, i));
     }
-    if (!isSingle) return {};
-    for (int f = 1; f < plan.repeats; ++f) {  // one view again and again, for timing
-        STIPPLE_TRY(checkStopped(plan.output));
-        STIPPLE_TRY(again(plan, settings, state));
-        timings.add(state.counters.frameMs, state.backend->passTimes());
-    }
-    STIPPLE_TRY(accumulate(plan, settings, state));
-    verdict.judge(state, &first);
     return {};
 }
 
 void sayIfUseless(const FramesPlan& plan, const render::FrameSettings& settings, const render::FrameState& state,
                   Verdict& verdict) {
     constexpr double kShare = 1.0 / 16;  // of the picture's shorter side
-    const lod::View& view = plan.views[verdict.worst];
+    const lod::View& view = plan.shot->views[verdict.worst];
     const double error = verdict.tauEffectivePixels;
     if (error <= kShare * std::min(view.width, view.height)) return;
     // As if everything were there.

@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "apps/stipple/camera_options.h"
 #include "apps/stipple/legend.h"
+#include "engine/render/accumulation.h"
 #include "engine/render/frame.h"
 #include "engine/render/pruning.h"
 
@@ -13,11 +15,11 @@ namespace stipple::app {
 
 /// What is drawn, and what may be missing.
 struct FramesPlan {
-    std::span<const lod::View> views;
-    std::span<const double> seconds;  ///< of each view, from the first on; empty: one moment
-    std::string output, resident;     ///< as on the command line
-    int repeats = 1;                  ///< of a single view, for timing
-    int accumulate = 1;               ///< frames whose mean a single picture is
+    const Shot* shot = nullptr;
+    std::string output, resident;  ///< as on the command line
+    int repeats = 1;               ///< of a single view, for timing
+    render::Exposure exposure;
+    Executor* executor = nullptr;
     bool noWait = false, skipBad = false, quiet = false, printNames = false, alpha = false;
     const Legend* legend = nullptr;  ///< that pictures of a path get
 };
@@ -50,6 +52,9 @@ struct Verdict {
     bool isComplete() const { return incomplete == 0 && !isTruncated; }
     /// `view`: of what is pruned; null: they are not wanted.
     void judge(const render::FrameState& state, const lod::View* view);
+    /// One more frame of the picture that was judged last: it is as complete as the least complete of its frames.
+    void judgeSample(const render::FrameState& state);
+    bool lastMisses = false;  ///< is the last picture one of the incomplete?
 };
 
 /// What of the pictures is there.

@@ -23,6 +23,7 @@
 #include "engine/base/units.h"
 #include "engine/gpu/gpu_backend.h"
 #include "engine/image/image_io.h"
+#include "engine/render/accumulation.h"
 
 namespace stipple::app {
 namespace {
@@ -41,15 +42,17 @@ std::string freePictureName(int& number) {
 
 class Viewer {
   public:
-    Viewer(const ViewOptions& o, gpu::Window& window, ViewSession& session, ViewSettings& settings,
+    Viewer(const ViewOptions& o, gpu::Window& window, Executor& executor, ViewSession& session, ViewSettings& settings,
            Navigation navigation, PathPlayer player)
         : o_(o),
           window_(window),
+          executor_(executor),
           session_(session),
           settings_(settings),
           opener_(o.build),
           navigation_(navigation),
-          player_(std::move(player)) {
+          player_(std::move(player)),
+          accumulating_(static_cast<uint32_t>(o.accumulate)) {
         if (o.target.ms > 0) steady_.emplace(settings.frame.budgets.errorPixels, o.target.ms);
     }
 
@@ -125,7 +128,8 @@ class Viewer {
         a.hasChanged = a.hasChanged || (a.isOpening && openingText() != shownOpening_);
         const bool isAtRest = !a.hasChanged && !a.isMoving && !a.hasArrived;
         isResting_ = refinement_.isDue(isAtRest);
-        a.hasChanged = a.hasChanged || isResting_;
+        isSample_ = accumulating_.isDue(isAtRest && !isResting_ && !a.isStreaming && !a.isOpening);
+        a.hasChanged = a.hasChanged || isResting_ || isSample_;
         hasChanged_ = hasChanged_ || a.isMoving || a.hasArrived || isResting_;
         return a;
     }
@@ -213,7 +217,7 @@ class Viewer {
             shown,
             [&] {
                 drawOverlay({session_.state(), settings_, session_.legend(), notices_, shownOpening_, hands, shownMs_,
-                             input.names});
+                             accumulating_.count(), accumulating_.most(), input.names});
             },
             capture);
     }
@@ -227,10 +231,39 @@ class Viewer {
         }
     }
 
-    /// Renders if the picture is another one, and shows it.
+    /// One more frame of what is at rest, of what is resident; then state.image is the mean.
+    Result<void> addSample() {
+        render::FrameState& state = session_.state();
+        const uint32_t number = accumulating_.count();
+        const render::Exposure exposure{accumulating_.most(), {}, 0};
+        const lod::View seen = render::viewOf([&](double) { return view(); }, number, exposure);
+        if (number == 0) sum_.clear();
+        try {
+            STIPPLE_TRY(render::renderResident(state, seen, render::settingsOf(settings_.frame, number, 0)));
+            sum_.add(state.image, executor_);
+        } catch (const std::bad_alloc&) {
+            return fail(ErrorKind::budget, "there is not enough memory to smooth the picture", "stipple view",
+                        "a smaller window, or --accumulate 1");
+        }
+        accumulating_.add();
+        return {};
+    }
+
+    /// Renders if the picture is another one, or not as smooth as it may be, and shows it.
     Result<void> drawNext(const gpu::Input& input) {
         render::FrameState& state = session_.state();
+        if (!hasChanged_ && std::exchange(isSample_, false)) {
+            if (auto drawn = addSample(); !drawn) {
+                if (drawn.error().kind == ErrorKind::device) return drawn;
+                tell(drawn.error());
+                accumulating_ = Accumulating(1);
+                hasChanged_ = true;
+            } else if (!accumulating_.isShown()) {
+                return {};  // what was shown stays
+            }
+        }
         if (std::exchange(hasChanged_, false)) {
+            accumulating_.clear();
             const bool canWeigh = render::reconstructionOf(settings_.frame.mode).blendsSplats &&
                                   hasSurfelWeights(session_.scene().placed);
             settings_.frame.draw.perSurfel = refinement_.isQuick(canWeigh, !isResting_);
@@ -242,6 +275,7 @@ class Viewer {
             // Other colours, another scene: what was shown stays until the first of it is there.
             isEmpty_ = state.counters.nodesDrawn == 0 && !state.streamer->isIdle();
         }
+        if (accumulating_.count() > 0) sum_.mean(state.image, executor_);
         if (isEmpty_ || (!state.onDevice && state.image.rgba.empty())) {
             isStale_ = false;
             return {};
@@ -326,6 +360,7 @@ class Viewer {
 
     const ViewOptions& o_;
     gpu::Window& window_;
+    Executor& executor_;
     ViewSession& session_;
     ViewSettings& settings_;
     SceneOpener opener_;
@@ -337,6 +372,9 @@ class Viewer {
     lod::View lastView_;                   ///< that it saw
     Refinement refinement_;                ///< discs that are blended: by their weights while they move
     bool isResting_ = false;               ///< it is due
+    Accumulating accumulating_;            ///< at rest
+    render::Accumulation sum_;             ///< of what it counts
+    bool isSample_ = false;                ///< one is due
     std::string shownOpening_;
     uint32_t width_ = 0, height_ = 0;
     double shownMs_ = 0;  ///< what the last frame took, with showing it
@@ -448,7 +486,7 @@ Result<void> run(const ViewOptions& o) {
     }
     STIPPLE_ASSIGN(Navigation navigation, makeNavigation(o, session, aspect));
     STIPPLE_ASSIGN(PathPlayer player, makePlayer(o, session.scene(), aspect));
-    const auto result = Viewer(o, *window, session, settings, navigation, std::move(player)).run();
+    const auto result = Viewer(o, *window, *executor, session, settings, navigation, std::move(player)).run();
     for (const std::string& message : window->validationMessages()) fmt::print(stderr, "validation: {}\n", message);
     STIPPLE_TRY(result);
     if (!window->validationMessages().empty())
@@ -485,6 +523,12 @@ void setupView(CLI::App& app, int& status) {
     sub->add_option("--device", o->device, "auto, cpu, gpu or gpu:NAME")->type_name("DEVICE")->capture_default_str();
     sub->add_option("--shade", o->shade, "auto: unlit where the scan has its own colours, lit by sun and sky otherwise")
         ->check(oneOf({"auto", "lit", "unlit"}))
+        ->capture_default_str();
+    sub->add_option("--accumulate", o->accumulate,
+                    "while nothing changes the picture becomes the mean of N frames, which look through other places "
+                    "of its pixels: smooth edges (1: it stays one frame)")
+        ->transform(within(1, 4096))
+        ->type_name("N")
         ->capture_default_str();
     sub->add_option("--frames", o->frames, "close after N frames (0: when the user does)")
         ->transform(within(0, 1'000'000'000))

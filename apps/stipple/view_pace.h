@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,28 @@ class Refinement {
 
   private:
     bool isOwed_ = false;
+    int looks_ = 0;
+};
+
+/// Frames that are added up while nothing changes; what changes drops them.
+class Accumulating {
+  public:
+    explicit Accumulating(uint32_t most) : most_(most) {}
+    /// Is one more to be drawn? `isAtRest`: at this look.
+    bool isDue(bool isAtRest) {
+        looks_ = isAtRest ? looks_ + 1 : 0;
+        return most_ > 1 && count_ < most_ && looks_ >= Refinement::kLooks;
+    }
+    void add() { ++count_; }
+    void clear() { count_ = 0; }
+    /// Is their mean shown? A few would move the picture by a part of a pixel.
+    bool isShown() const { return count_ >= std::min(kLeast, most_); }
+    uint32_t count() const { return count_; }
+    uint32_t most() const { return most_; }
+    static constexpr uint32_t kLeast = 8;
+
+  private:
+    uint32_t most_, count_ = 0;
     int looks_ = 0;
 };
 

@@ -15,7 +15,7 @@ struct ViewOptions {
     std::string size = "1280x720", device = "auto", screenshot, resident = "1G", shade = "auto";
     double error = 1, wind = 0;
     uint64_t budget = 2'000'000;
-    int frames = 0;
+    int frames = 0, accumulate = 64;
     bool force = false;
     std::vector<std::string> effects;
     TargetOptions target;

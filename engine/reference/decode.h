@@ -22,7 +22,7 @@ struct ViewRay {
 };
 /// Through an image point, px from the upper left corner.
 inline ViewRay viewRay(const lod::View& view, const glm::dvec2& point) {
-    const glm::dvec2 off = (point - 0.5 * glm::dvec2(view.width, view.height)) / view.focalPixels;
+    const glm::dvec2 off = (point - view.principal()) / view.focalPixels;
     if (view.isOrthographic) return {{off.x, off.y, 0}, {0, 0, 1}};
     return {{0, 0, 0}, {off.x, off.y, 1}};
 }
@@ -32,7 +32,7 @@ inline double pixelsAt(const lod::View& view, double depth) {
 }
 /// Where a place of camera space is seen, and the unit direction in which.
 inline glm::dvec2 imageOf(const lod::View& view, const glm::dvec3& c) {
-    return pixelsAt(view, c.z) * glm::dvec2(c) + 0.5 * glm::dvec2(view.width, view.height);
+    return pixelsAt(view, c.z) * glm::dvec2(c) + view.principal();
 }
 inline glm::dvec3 sightOf(const lod::View& view, const glm::dvec3& c) {
     return view.isOrthographic ? glm::dvec3(0, 0, 1) : glm::normalize(c);

@@ -200,9 +200,10 @@ class CurveProjector {
         if (!isBefore) {
             // Nothing of it if both balls lie beyond one side of the picture.
             // (Only in perspective.)
-            const dvec2 half = 0.5 * dvec2(view_.width, view_.height) / view_.focalPixels;
-            for (const dvec3& side :
-                 {dvec3(1, 0, half.x), dvec3(-1, 0, half.x), dvec3(0, 1, half.y), dvec3(0, -1, half.y), dvec3(0, 0, 1)})
+            const dvec2 before = view_.principal() / view_.focalPixels,
+                        behind = (dvec2(view_.width, view_.height) - view_.principal()) / view_.focalPixels;
+            for (const dvec3& side : {dvec3(1, 0, before.x), dvec3(-1, 0, behind.x), dvec3(0, 1, before.y),
+                                      dvec3(0, -1, behind.y), dvec3(0, 0, 1)})
                 if (std::max(glm::dot(side, a_) + glm::length(side) * own.radiusA,
                              glm::dot(side, b_) + glm::length(side) * own.radiusB) <= 0)
                     return;

@@ -253,8 +253,8 @@ void showSplats(const render::DrawList& draws, const std::vector<PlacedDisc>& di
                 first = a > most ? most + 1 : std::max(0, pixelIn(a, most) - 1);
                 last = b < 0 ? -1 : std::min(most, pixelIn(b, most) + 1);
             };
-            range(d.centre.x, 0.5 * v.width, level.width - 1, x0, x1);
-            range(d.centre.y, 0.5 * v.height, level.height - 1, y0, y1);
+            range(d.centre.x, v.principal().x, level.width - 1, x0, x1);
+            range(d.centre.y, v.principal().y, level.height - 1, y0, y1);
         }
         for (int y = y0; y <= y1; ++y)
             for (int x = x0; x <= x1; ++x) offer(x, y, d, false);

@@ -31,7 +31,7 @@ Ellipse imageOfCircle(const lod::View& view, const PlacedDisc& d, double radius,
     const dvec3 s = glm::normalize(glm::cross(d.normal, aside)), t = glm::cross(d.normal, s);
     // Where the ray of an image point meets the disc's plane, from the centre along s and t, times the third: all
     // three are linear in the point.
-    const dvec2 principal = 0.5 * dvec2(view.width, view.height);
+    const dvec2 principal = view.principal();
     const auto onDisc = [&](const dvec2& point) {
         const ViewRay ray = viewRay(view, principal + point);
         const double facing = glm::dot(d.normal, ray.direction);
@@ -211,7 +211,7 @@ class Filter {
                              : d.weight > 0 ? d.weight * onGrid(2) / onGrid(support_)
                                             : 1 / onGrid(support_);
         const dmat2 inverse = isNear ? dmat2(1) : glm::inverse(wide);
-        const dvec2 principal = 0.5 * dvec2(view_.width, view_.height);
+        const dvec2 principal = view_.principal();
         forPixels(d, radius, support_ * std::sqrt(lowPass_), [&](int x, int y, const ViewRay& ray) {
             const dvec2 off = dvec2(x + 0.5, y + 0.5) - principal - e.middle;
             const double plane = depthOnPlane(d, ray);

@@ -30,7 +30,8 @@ namespace {
 double nearestOf(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hierarchies,
                  std::span<const lod::Instance> instances, const lod::View& view) {
     // Depth in a corner of the picture is the distance times this; discs beside the picture reach in: half of it.
-    const double cosine = view.focalPixels / std::hypot(view.focalPixels, 0.5 * view.width, 0.5 * view.height);
+    const glm::dvec2 corner = 0.5 * glm::dvec2(view.width, view.height) + glm::abs(view.shift);
+    const double cosine = view.focalPixels / std::hypot(view.focalPixels, corner.x, corner.y);
     constexpr double kShare = 0.5;
     double nearest = HUGE_VAL;
     const auto look = [&](uint32_t instance, uint32_t number, double steps) {
@@ -195,7 +196,8 @@ void setView(const lod::Cut& cut, const lod::View& view, const DrawSettings& set
     f.viewZ = glm::vec3(view.forward);
     f.focal = static_cast<float>(view.focalPixels);
     f.orthographic = view.isOrthographic ? 1 : 0;
-    f.centre = {0.5f * static_cast<float>(view.width), 0.5f * static_cast<float>(view.height)};
+    const glm::dvec2 principal = view.principal();
+    f.centre = {static_cast<float>(principal.x), static_cast<float>(principal.y)};
     f.width = view.width;
     f.height = view.height;
     // Not below what fp32 can divide by.

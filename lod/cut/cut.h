@@ -30,6 +30,11 @@ struct View {
     uint32_t width = 1280, height = 720;
     double nearPlane = 1e-3;  ///< world units
     bool isOrthographic = false;
+    /// How far the ray along `forward` is from the middle of the picture, px: samples of a pixel, and of a lens
+    /// (engine/render/accumulation), look past it.
+    glm::dvec2 shift{0};
+    /// Where that ray is in the picture, px from its upper left corner.
+    glm::dvec2 principal() const { return 0.5 * glm::dvec2(width, height) + shift; }
 };
 
 /// A placed hierarchy. world = translation + rotation * (scale * (origin + unit * lattice)).

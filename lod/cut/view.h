@@ -22,22 +22,23 @@ inline LocalView makeLocalView(const Hierarchy& h, const Instance& instance, con
     local.eye = (inverse * (view.eye - instance.translation) / instance.scale - h.origin) / h.unit;
     local.forward = inverse * view.forward;
     const glm::dvec3 right = inverse * view.right, down = inverse * view.down;
-    const double halfW = 0.5 * view.width, halfH = 0.5 * view.height, f = view.focalPixels;
+    const glm::dvec2 before = view.principal(), behind = glm::dvec2(view.width, view.height) - before;
+    const double f = view.focalPixels;
     local.nearPlane = view.nearPlane / unitsPerStep;
     local.isOrthographic = view.isOrthographic;
     if (view.isOrthographic) {
         local.focal = f * unitsPerStep;
         local.planes = {right, -right, down, -down};
-        const double across = halfW / local.focal, along = halfH / local.focal;
-        local.off = {across, across, along, along};
+        local.off = {before.x / local.focal, behind.x / local.focal, before.y / local.focal, behind.y / local.focal};
         local.cosineCorner = 1;
         return local;
     }
     local.planes = {
-        glm::normalize(right * f + local.forward * halfW), glm::normalize(-right * f + local.forward * halfW),
-        glm::normalize(down * f + local.forward * halfH), glm::normalize(-down * f + local.forward * halfH)};
+        glm::normalize(right * f + local.forward * before.x), glm::normalize(-right * f + local.forward * behind.x),
+        glm::normalize(down * f + local.forward * before.y), glm::normalize(-down * f + local.forward * behind.y)};
     local.focal = f;
-    local.cosineCorner = f / std::sqrt(f * f + halfW * halfW + halfH * halfH);
+    const glm::dvec2 farthest = glm::max(before, behind);
+    local.cosineCorner = f / std::sqrt(f * f + farthest.x * farthest.x + farthest.y * farthest.y);
     return local;
 }
 

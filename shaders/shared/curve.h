@@ -262,14 +262,17 @@ SHARED_FN uint curveRank(CurveSegment s) {
            (s.b.positionZ & 0xffffu) * 0x27d4eb2fu;
 }
 
-// Does a curve narrower than a pixel take this one? A number in [0, 1) for each pixel, curve and frame of a series.
+// Does a curve narrower than a pixel take this one? A number in [0, 1) for each pixel, curve and frame of a series: of
+// a curve and a pixel those of frames go round by the golden ratio, so that N of them are off by about 1/N and not by
+// the root of it.
 SHARED_FN float coverageThreshold(uint pixel, uint rank, uint seed) {
-    uint h = pixel * 0x9e3779b1u ^ rank * 0x85ebca6bu ^ seed * 0xc2b2ae35u;
+    uint h = pixel * 0x9e3779b1u ^ rank * 0x85ebca6bu;
     h ^= h >> 16;
     h *= 0x7feb352du;
     h ^= h >> 15;
     h *= 0x846ca68bu;
     h ^= h >> 16;
+    h += seed * 0x9e3779b9u;
     return float(int(h >> 8)) * (1.0f / 16777216.0f);
 }
 

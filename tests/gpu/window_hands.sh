@@ -47,6 +47,7 @@ ticks() { awk '{print $14 + $15}' "/proc/$viewer/stat"; }
 pngSize() { python3 -c 'import struct,sys; print("%dx%d" % struct.unpack(">2I", open(sys.argv[1], "rb").read(24)[16:]))' "$1"; }
 
 size=640x480
+accumulate=1 # a picture is the same at any time
 # view ARGUMENTS...: starts the program and waits for its window.
 view() {
     # On a crowded machine GLFW sometimes waits for ever for the window manager to show the window (1 of about 100
@@ -54,7 +55,7 @@ view() {
     for _ in 1 2 3; do
         : >"$folder/out" && : >"$folder/err"
         window=
-        "$program" view --device "${WINDOW_DEVICE:-cpu}" --size "$size" "$@" >>"$folder/out" 2>>"$folder/err" &
+        "$program" view --device "${WINDOW_DEVICE:-cpu}" --size "$size" --accumulate "$accumulate" "$@" >>"$folder/out" 2>>"$folder/err" &
         viewer=$!
         await 15 findWindow && break
         echo "no window: once more" && kill -9 "$viewer" && wait "$viewer" 2>/dev/null
@@ -169,12 +170,35 @@ window_changes_its_size() {
     finish
 }
 
+quiet() { local before; before=$(ticks) && sleep 1 && [ "$(ticks)" -eq "$before" ]; }
+
+edges_become_smooth_at_rest() {
+    scan
+    accumulate=1
+    view "$folder/a.las"
+    settle
+    local plain=$shot
+    finish
+    accumulate=16
+    view "$folder/a.las"
+    settle # (each key begins the waiting anew: no frame is added while pictures are taken)
+    await 20 quiet || fail "it never comes to rest"
+    shoot
+    local smooth=$shot
+    cmp -s "$plain" "$smooth" && fail "nothing is added up at rest"
+    shoot
+    cmp -s "$smooth" "$shot" || fail "the mean changes when all frames are there"
+    xdotool key 3 # the error that it has: drawn anew, and what was added up is dropped
+    isPlain() { shoot && cmp -s "$plain" "$shot"; }
+    await 10 isPlain || fail "what was added up stays"
+    finish
+}
+
 rests_when_nothing_changes() {
     scan
     view "$folder/a.las"
     settle
     local before after
-    quiet() { before=$(ticks) && sleep 1 && [ "$(ticks)" -eq "$before" ]; }
     await 5 quiet || fail "it never comes to rest"
     before=$(ticks) && sleep 3 && after=$(ticks)
     echo "idle: $((after - before)) hundredths of a second of CPU in 3 s"

@@ -136,6 +136,31 @@ TEST_F(Asked, SamplesOfPlyMeshesAreRefusedAndNotForgotten) {
     expectOneLine(runProgram(folder(), "build m.ply -o m.stipple --surfels 1000"), 2, {"--surfels"});
 }
 
+TEST_F(Asked, LensesAndExposuresThatBlurNothingAreRefused) {
+    expectOneLine(render("--aperture 0.1"), 2, {"--aperture", "--focus"});
+    expectOneLine(render("--focus 3"), 2, {"--focus", "--aperture"});
+    for (const char* depth : {"0", "-1", "inf", "nan", "x"})
+        expectOneLine(render(fmt::format("--aperture 0.1 --focus={}", depth)), 2, {"--focus"});
+    expectOneLine(render("--aperture=-1 --focus 3"), 2, {"--aperture"});
+    expectOneLine(render("--aperture 0.1 --focus 3 --accumulate 1"), 2, {"--accumulate 1", "sharp"});
+    expectOneLine(render("--aperture 0.1 --focus 3 --ortho 4"), 2, {"--aperture", "orthographic"});
+    expectOneLine(render("--shutter 0.1"), 2, {"--shutter", "nothing moves"});
+    expectOneLine(render("--mode reference --samples 1 --aperture 0.1 --focus 3"), 2, {"--aperture", "full detail"});
+    EXPECT_EQ(render("--shutter 0.5 --orbit 2 --accumulate 2").code, 0);
+    const auto bytesOf = [](const std::string& options) {
+        const Outcome r = render(options + " --json");
+        EXPECT_EQ(r.code, 0) << r.err;
+        return std::pair(test::slurp(path("p.png")), jsonOf(r)["counters"]["passes"]);
+    };
+    const auto plain = bytesOf(""), mean = bytesOf("--accumulate 4");
+    EXPECT_TRUE(bytesOf("--aperture 0 --focus 3 --shutter 0") == plain);
+    EXPECT_TRUE(bytesOf("--aperture 0 --focus 3 --shutter 0 --accumulate 4") == mean);
+    EXPECT_FALSE(mean.first == plain.first);
+    EXPECT_EQ(mean.second, plain.second) << "no pass is for it";
+    EXPECT_FALSE(bytesOf("--aperture 0.5 --focus 3 --accumulate 4").first == mean.first);
+    EXPECT_EQ(jsonOf(render("--aperture 0.5 --focus 3 --json"))["accumulated"], 64);
+}
+
 TEST_F(Asked, ADemoMakesItsFolder) {
     const Outcome r = runProgram(folder(), "grow demo -o new/demo --points 5k --leaves 1k");
     EXPECT_EQ(r.code, 0) << r.err;

@@ -246,5 +246,24 @@ TEST(Pace, ALineOnTheScreenGoesInTime) {
     EXPECT_EQ(notices.lines().size(), Notices::kMost) << "they never fill the screen";
 }
 
+TEST(Pace, FramesAreAddedUpOnlyWhileNothingChangesAndNoMoreThanAreAskedFor) {
+    Accumulating a(20);
+    EXPECT_FALSE(a.isDue(true)) << "the first look after a change";
+    uint32_t looks = 0;
+    for (; a.isDue(true); ++looks) {
+        EXPECT_EQ(a.isShown(), looks >= Accumulating::kLeast) << "a few are not shown";
+        a.add();
+    }
+    EXPECT_EQ(looks, 20u);
+    EXPECT_EQ(a.count(), 20u);
+    EXPECT_TRUE(a.isShown());
+    a.clear();
+    EXPECT_FALSE(a.isDue(false));
+    EXPECT_FALSE(a.isDue(true)) << "waiting begins anew";
+    EXPECT_TRUE(a.isDue(true));
+    Accumulating none(1);
+    for (int look = 0; look < 5; ++look) EXPECT_FALSE(none.isDue(true));
+}
+
 }  // namespace
 }  // namespace stipple::app
