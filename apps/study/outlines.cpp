@@ -12,7 +12,7 @@ using glm::dvec3;
 
 /// Sums over some views.
 struct Sums {
-    size_t both = 0, either = 0, edge = 0, discBoth = 0, discEither = 0, normals = 0, discNormals = 0;
+    size_t both = 0, either = 0, outside = 0, edge = 0, discBoth = 0, discEither = 0, normals = 0, discNormals = 0;
     double angle = 0, discAngle = 0;
 };
 
@@ -41,6 +41,7 @@ void add(const render::Image& image, const render::Image& surface, const render:
             const bool own = isSeen(image, i), truth = isSeen(surface, i), disc = isSeen(discs, i);
             s.both += own && truth;
             s.either += own || truth;
+            s.outside += own && !truth;
             s.discBoth += own && disc;
             s.discEither += own || disc;
             s.edge += isEdge(surface, x, y);
@@ -63,6 +64,7 @@ OutlineRow rowOf(const std::string& what, double spacing, uint64_t points, const
             what,
             over(static_cast<double>(s.both), s.either),
             over(static_cast<double>(s.either - s.both), s.edge),
+            over(static_cast<double>(s.outside), s.edge),
             over(s.angle, s.normals),
             over(static_cast<double>(s.discBoth), s.discEither),
             over(s.discAngle, s.discNormals)};

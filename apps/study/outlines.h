@@ -16,6 +16,7 @@ struct OutlineRow {
     std::string what;        ///< a mode, or "traced discs"
     double overlap = 0;      ///< IoU with the surface
     double distance = 0;     ///< mean distance of the outlines, px: the area between them over their length
+    double outside = 0;      ///< of that distance, what lies outside of the surface's outline, px
     double normal = 0;       ///< mean angle to the surface's normals where both are seen, degrees
     double discOverlap = 0;  ///< IoU with the traced discs
     double discNormal = 0;   ///< mean angle to the normals of the traced discs

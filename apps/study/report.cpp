@@ -73,15 +73,15 @@ void describeOutlines(const SeedsReport& report, std::string& out) {
     if (report.outlines.empty()) return;
     out += fmt::format(
         "\n## A statue's silhouettes and normals, at the leaves\n\nLucy as discs, {} px: overlap (IoU) of the "
-        "silhouette "
-        "with the mesh's, mean distance of the outlines (the area between them over the length), mean angle between "
-        "normals; then overlap and angle against the traced discs.\n\n"
-        "| spacing | points | what | overlap with the mesh | distance | normals | overlap with the discs | normals "
-        "|\n{}",
+        "silhouette with the mesh's, mean distance of the outlines (the area between them over the length; of that, "
+        "what is drawn outside of the mesh's), mean angle between normals; then overlap and angle against the traced "
+        "discs.\n\n"
+        "| spacing | points | what | overlap with the mesh | distance (outside) | normals | overlap with the discs | "
+        "normals |\n{}",
         report.outlineSize, rule(8));
     for (const OutlineRow& r : report.outlines)
-        out += fmt::format("| {:g} px | {} | {} | {:.4f} | {:.2f} px | {:.2f} deg | {:.4f} | {:.2f} deg |\n",
-                           r.spacingPixels, r.points, r.what, r.overlap, r.distance, r.normal, r.discOverlap,
+        out += fmt::format("| {:g} px | {} | {} | {:.4f} | {:.2f} ({:.2f}) px | {:.2f} deg | {:.4f} | {:.2f} deg |\n",
+                           r.spacingPixels, r.points, r.what, r.overlap, r.distance, r.outside, r.normal, r.discOverlap,
                            r.discNormal);
 }
 
@@ -164,6 +164,7 @@ nlohmann::json jsonOfSeeds(const SeedsReport& report) {
                             {"overlap", r.overlap},
                             {"distance_px", r.distance},
                             {"normals_degrees", r.normal},
+                            {"outside_px", r.outside},
                             {"disc_overlap", r.discOverlap},
                             {"disc_normals_degrees", r.discNormal}});
     for (const auto& [mode, count] : report.pinholes.open) open[nameOf(mode)] = count;

@@ -5,9 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <optional>
+#include <utility>
 
 #include "engine/base/numbers.h"
 #include "engine/scene/borders.h"
+#include "engine/scene/even_places.h"
+#include "engine/scene/pieces.h"
 #include "engine/scene/texture_lookup.h"
 #include "lod/builder/morton.h"
 #include "lod/primitives/in_memory.h"
@@ -18,6 +23,13 @@ namespace stipple::scene {
 namespace {
 
 constexpr uint64_t kMostSurfels = 200'000'000;
+/// How far samples keep apart, in spacings (the root of the area of one), and how often as many darts are thrown as
+/// samples are wanted: on a plane as many as are wanted then find a place, and of its places one in 400,000 lies
+/// farther than kReach from all of them. Such is the radius of their discs (that of opaque parts in ewa, too).
+constexpr double kApart = 0.73, kReach = 1.03;
+constexpr uint32_t kPasses = 8;
+/// A piece of triangles that is smaller than so many samples is no surface, but a leaf or a part among others.
+constexpr double kPieceSamples = 8, kMostUnknown = 0.1;
 
 uint32_t byteOf(float linear) {
     return unitToByte(shared::srgbFromLinear(linear > 0.0f ? std::min(linear, 1.0f) : 0.0f));
@@ -34,6 +46,7 @@ uint32_t hashOf(uint32_t v) {
 struct Surfels {
     std::vector<glm::dvec3> position;
     std::vector<glm::vec3> normal;
+    std::vector<float> radius;  ///< 0: not known
     std::vector<uint32_t> colour;
     std::vector<uint8_t> material;  ///< into `materials`
     std::vector<lod::PointMaterial> materials;
@@ -74,11 +87,21 @@ class Sampler {
             return fail(ErrorKind::budget, fmt::format("more than {} surfels", kMostSurfels), scene_.path);
         perArea_ = area > 0 ? static_cast<double>(settings_.count) / area : 0;
         spacing_ = perArea_ > 0 ? 1 / std::sqrt(perArea_) : 0;
+        if (perArea_ > 0) places_.emplace(kApart * spacing_, settings_.count);
+        for (pass_ = 0; pass_ < (places_ ? kPasses : 0); ++pass_) {
+            carry_ = std::fmod(0.5 + 0.6180339887498949 * pass_, 1.0);  // (other triangles get the darts)
+            piecesBefore_ = 0;
+            each([&](const Primitive& p, const glm::dmat4& m) {
+                if (p.kind == PrimitiveKind::triangles) sampleTriangles(p, m);
+            });
+        }
         each([&](const Primitive& p, const glm::dmat4& m) {
             if (p.kind == PrimitiveKind::points) takePoints(p, m);
-            if (p.kind == PrimitiveKind::triangles && settings_.count > 0) sampleTriangles(p, m);
         });
         if (settings_.count == 0) takeBorders(each);
+        // Foliage is no surface: how wide its discs are is told by what is around each.
+        const auto unknown = static_cast<size_t>(std::count(out_.radius.begin(), out_.radius.end(), 0.0f));
+        if (static_cast<double>(unknown) > kMostUnknown * static_cast<double>(out_.radius.size())) out_.radius.clear();
         if (!hasMaterials_) {
             out_.material.clear();
             out_.materials.clear();
@@ -127,8 +150,17 @@ class Sampler {
         return firsts;
     }
 
+    /// A pass of darts: as many as samples are wanted, of which those stay that are not too near to others.
     void sampleTriangles(const Primitive& p, const glm::dmat4& m) {
-        for (const size_t i : inSpace(p)) {
+        auto known = known_.find(&p);
+        if (known == known_.end()) known = known_.emplace(&p, Known{inSpace(p), piecesOf(p)}).first;
+        const Pieces& pieces = known->second.pieces;
+        const glm::dmat3 linear(m);
+        const Turned turned = turnedBy(linear);
+        const double least =
+            kPieceSamples * spacing_ * spacing_ / std::pow(std::abs(glm::determinant(linear)), 2.0 / 3);
+        const uint64_t before = std::exchange(piecesBefore_, piecesBefore_ + pieces.area.size());
+        for (const size_t i : known->second.order) {
             const Corners c = corners(p, m, i);
             const double area = areaOf(c);
             // What is left over goes to the next triangle: small ones get a sample every so often.
@@ -139,39 +171,58 @@ class Sampler {
             const float footprint = textureFootprint(p, i, area);
             const uint32_t seed = hashOf(triangle_++);
             for (uint64_t s = 0; s < count; ++s) {
-                // R2 sequence (M. Roberts 2018), shifted by the triangle's hash, folded into the triangle.
-                double u = std::fmod(0.7548776662466927 * static_cast<double>(s + 1) + seed * 0x1p-32, 1.0);
-                double v = std::fmod(0.5698402909980532 * static_cast<double>(s + 1) + hashOf(seed) * 0x1p-32, 1.0);
+                double u = hashOf(seed + 2 * static_cast<uint32_t>(s) + 1) * 0x1p-32,
+                       v = hashOf(~seed + 2 * static_cast<uint32_t>(s) + 2) * 0x1p-32;
                 if (u + v > 1) {
                     u = 1 - u;
                     v = 1 - v;
                 }
-                takeSample(p, m, i, {1 - u - v, u, v}, footprint);
+                const glm::dvec3 b(1 - u - v, u, v);
+                if (out_.position.size() >= settings_.count) return;
+                const uint32_t piece = pieces.of[i / 3];
+                const SurfacePlace place{b.x * c[0] + b.y * c[1] + b.z * c[2], normalAt(p, turned, c, i, b),
+                                         before + piece};
+                if (!places_->isFree(place) || !takeSample(p, i, b, place.at, place.normal, footprint)) continue;
+                places_->add(place);
+                if (pieces.area[piece] >= least) out_.radius.back() = static_cast<float>(kReach * spacing_);
             }
         }
     }
 
-    /// The place `b` (barycentric) of the triangle whose indices begin at `i`.
-    void takeSample(const Primitive& p, const glm::dmat4& m, size_t i, const glm::dvec3& b, float footprint) {
-        const Corners c = corners(p, m, i);
+    /// How normals of a mesh stand in the world.
+    struct Turned {
+        glm::dmat3 normals;
+        bool isMirrored;
+    };
+    static Turned turnedBy(const glm::dmat3& linear) {
+        return {glm::transpose(glm::inverse(linear)), glm::determinant(linear) < 0};
+    }
+    /// At the place `b` (barycentric) of the triangle whose indices begin at `i`.
+    static glm::vec3 normalAt(const Primitive& p, const Turned& m, const Corners& c, size_t i, const glm::dvec3& b) {
+        glm::dvec3 n = glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
+        if (m.isMirrored) n = -n;
+        if (p.normal.empty()) return glm::vec3(n);
+        glm::dvec3 mixed(0);
+        for (size_t k = 0; k < 3; ++k) mixed += b[static_cast<int>(k)] * glm::dvec3(p.normal[p.indices[i + k]]);
+        mixed = m.normals * mixed;
+        const double length = glm::length(mixed);
+        return glm::vec3(length > 1e-12 && std::isfinite(length) ? mixed / length : n);
+    }
+
+    /// The place `b` of a triangle, which lies at `at` and faces along `n`. False where it is transparent.
+    bool takeSample(const Primitive& p, size_t i, const glm::dvec3& b, const glm::dvec3& at, const glm::vec3& n,
+                    float footprint) {
         glm::vec3 colour(1);
         if (!colourAt(p, i, glm::vec3(b), footprint, colour)) {
-            ++out_.cutOut;
-            return;
+            out_.cutOut += pass_ == 0 ? 1 : 0;
+            return false;
         }
-        const glm::dmat3 linear(m);
-        glm::dvec3 n = glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
-        if (glm::determinant(linear) < 0) n = -n;
-        if (!p.normal.empty()) {
-            glm::dvec3 mixed(0);
-            for (size_t k = 0; k < 3; ++k) mixed += b[static_cast<int>(k)] * glm::dvec3(p.normal[p.indices[i + k]]);
-            mixed = glm::transpose(glm::inverse(linear)) * mixed;
-            if (glm::length(mixed) > 1e-12 && std::isfinite(glm::length(mixed))) n = glm::normalize(mixed);
-        }
-        out_.position.push_back(b.x * c[0] + b.y * c[1] + b.z * c[2]);
-        out_.normal.emplace_back(n);
+        out_.position.push_back(at);
+        out_.normal.push_back(n);
+        out_.radius.push_back(0);
         out_.colour.push_back(byteOf(colour.r) | byteOf(colour.g) << 8 | byteOf(colour.b) << 16);
         out_.material.push_back(numberOf(surfaceAt(p, i, glm::vec3(b), footprint)));
+        return true;
     }
 
     /// Where triangles end beside points, points that join both.
@@ -195,9 +246,11 @@ class Sampler {
         });
         for (const BorderSample& s : borderSamples(all, out_.position)) {
             const Triangle& t = triangles[s.triangle];
-            const size_t before = out_.colour.size();
-            takeSample(*t.primitive, t.world, t.first, s.weight, 1);
-            if (out_.colour.size() > before) out_.colour.back() |= shared::kFlagBorder << 24;
+            const Corners& c = all[s.triangle];
+            const glm::dvec3& b = s.weight;
+            const glm::vec3 n = normalAt(*t.primitive, turnedBy(glm::dmat3(t.world)), c, t.first, b);
+            if (takeSample(*t.primitive, t.first, b, b.x * c[0] + b.y * c[1] + b.z * c[2], n, 1))
+                out_.colour.back() |= shared::kFlagBorder << 24;
         }
     }
 
@@ -211,6 +264,7 @@ class Sampler {
                 continue;
             }
             out_.position.emplace_back(m * glm::dvec4(p.at(i), 1));
+            out_.radius.push_back(0);
             out_.normal.push_back(p.normal.empty() ? glm::vec3(0) : glm::vec3(glm::dmat3(m) * glm::dvec3(p.normal[i])));
             out_.colour.push_back(byteOf(c.r) | byteOf(c.g) << 8 | byteOf(c.b) << 16);
             out_.material.push_back(numberOf(surfaceAt(p, k, {1, 0, 0}, footprint)));
@@ -329,7 +383,14 @@ class Sampler {
     const std::vector<DecodedImage>& images_;
     SurfelSettings settings_;
     double perArea_ = 0, spacing_ = 0, carry_ = 0.5;
-    uint32_t triangle_ = 0;
+    uint32_t triangle_ = 0, pass_ = 0;
+    std::optional<EvenPlaces> places_;
+    struct Known {
+        std::vector<size_t> order;  ///< inSpace
+        Pieces pieces;
+    };
+    std::map<const Primitive*, Known> known_;
+    uint64_t piecesBefore_ = 0;                   ///< of primitives before this one, copies included
     bool isGrid_ = false, hasMaterials_ = false;  ///< the list is the grid; some primitive names a material
     Surfels out_;
 };
@@ -352,6 +413,7 @@ Result<lod::PointSource> sampleSurfels(const Scene& scene, const std::vector<Dec
     lod::PointBlock points;
     points.position = std::move(sampled.position);
     points.normal = std::move(sampled.normal);
+    points.radius = std::move(sampled.radius);
     points.colour = std::move(sampled.colour);
     points.material = std::move(sampled.material);
     return lod::pointsInMemory(std::move(info), std::move(points));

