@@ -1,5 +1,5 @@
 # The pages of `stipple help TOPIC` as a header: stipple/topics/*.md is their only source.
-set(topics budgets exit-codes formats json)
+set(topics budgets effects exit-codes formats json)
 set(STIPPLE_TOPICS "")
 foreach(topic ${topics})
   set(file ${CMAKE_CURRENT_SOURCE_DIR}/stipple/topics/${topic}.md)

@@ -12,6 +12,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/result.h"
 #include "engine/render/backend.h"
+#include "engine/render/effects/request.h"
 #include "engine/render/frame.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/surfels.h"
@@ -108,6 +109,7 @@ struct OpenedScene {
     lod::StoreDescription description;  ///< of all together: bounds, up, what colours can be asked for
     std::vector<render::WorldLight> lights;
     std::vector<scene::Camera> cameras;  ///< of the scene's visible nodes, in their order
+    render::SceneWishes effects;         ///< that the scene file asks for
     std::vector<glm::dvec3> outline;     ///< points on the outside of what is dense: what a camera must see
 };
 /// Another up axis than the files': of heights, light and cameras.

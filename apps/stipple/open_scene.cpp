@@ -292,6 +292,7 @@ Result<void> openSceneFile(const std::string& path, const BuildOptions& options,
     build.together = expectedBuilds(scene, build.surfels == 0, build.progressStyle(!showProgress));
     opened.lights = lightsOf(scene);
     opened.cameras = camerasOf(scene);
+    opened.effects = {scene.effects.names, scene.effects.values, path};
     std::vector<render::PlacedStore>& placed = opened.placed;
     std::map<std::string, std::shared_ptr<const lod::Store>> open;
     const std::vector<glm::dmat4> world = scene.worldTransforms();

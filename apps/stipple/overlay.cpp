@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/stipple/effect_options.h"
 #include "engine/base/process.h"
 #include "engine/base/units.h"
 #include "engine/render/content.h"
@@ -80,6 +81,8 @@ void drawFull(const OverlayFacts& f) {
     for (const render::PassTime& p : f.state.backend->passTimes())
         line(fmt::format("  {:<8} {:6.2f} ms", p.name, p.ms));
     if (f.accumulated > 0) line(accumulatedText(f));
+    if (const std::string text = effectsText(render::effectStatus(f.state, f.settings.frame.draw)); !text.empty())
+        line("effects: " + text);
     line(fmt::format("delivered {} (asked for {:.2f} px)", errorText(c), budgets.errorPixels));
     line(fmt::format("{} nodes, {} missing, {} chunks on their way", c.nodesDrawn, c.nodesMissing, c.requestsInFlight));
     ImGui::ProgressBar(static_cast<float>(c.recordsDrawn + c.trianglesDrawn) / static_cast<float>(budgets.records),

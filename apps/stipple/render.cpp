@@ -34,7 +34,7 @@ namespace stipple::app {
 namespace {
 
 struct Options {
-    std::vector<std::string> inputs, effects;
+    std::vector<std::string> inputs;
     std::string output, size = "1280x720", device = "auto", shade = "auto",
                         background = fmt::format("{}", fmt::join(render::kBackground, ","));
     std::string debug = "none", resident = "1G";
@@ -50,6 +50,7 @@ struct Options {
     ColourOptions colour;
     EnvironmentOptions environment;
     MaterialOptions material;
+    EffectOptions effects;
 };
 
 bool closesGaps(const std::string& mode) {
@@ -70,6 +71,7 @@ Result<void> checkArguments(const Options& o) {
     STIPPLE_TRY(o.camera.check());
     STIPPLE_TRY(o.exposure.check(o.camera, o.wind > 0));
     STIPPLE_TRY(o.material.check(o.shade));
+    STIPPLE_TRY(o.effects.check());
     if (o.target.isAny() && o.drawn.mode == "reference")
         return fail(ErrorKind::usage, "traces the full detail, whatever it takes", "--mode reference",
                     "leave out --target-ms and --target-error");
@@ -98,7 +100,6 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     }
     s.draw.worldUp = shot.worldUp;
     s.draw.exactCurves = static_cast<float>(o.curveExact);
-    s.draw.effects = o.effects;
     s.draw.wind = {o.wind, o.seconds, render::windAcross(shot.worldUp)};
     STIPPLE_ASSIGN(const glm::dvec3 background, backgroundOf(o));
     for (int c = 0; c < 3; ++c)
@@ -254,8 +255,8 @@ std::string drawnText(const render::FrameState& state, const ModeOptions& drawn)
 }
 
 /// The result, as text or JSON.
-void tell(const Options& o, const render::FrameState& state, const Verdict& verdict, const Timings& timings,
-          const glm::uvec2& size, size_t views) {
+void tell(const Options& o, const render::FrameState& state, const render::DrawSettings& settings,
+          const Verdict& verdict, const Timings& timings, const glm::uvec2& size, size_t views) {
     const FrameCounters& c = state.counters;
     if (o.json) {
         nlohmann::json passes = nlohmann::json::array();
@@ -273,6 +274,7 @@ void tell(const Options& o, const render::FrameState& state, const Verdict& verd
             {"accumulated", o.exposure.samples()},
             {"frame_ms", {{"median", quantile(timings.frames, 0.5)}, {"p95", quantile(timings.frames, 0.95)}}},
             {"passes", passes},
+            {"effects", effectsJson(render::effectStatus(state, settings))},
             {"records_drawn", c.recordsDrawn},
             {"triangles_drawn", c.trianglesDrawn},
             {"patch_blocks_drawn", patchBlocksOf(state)},
@@ -336,6 +338,7 @@ Result<void> run(const Options& o, Written& written) {
     STIPPLE_ASSIGN(settings.draw.environment, openEnvironment(o.environment, o.build.reading().memoryBytes, *executor,
                                                               hasMirrors(scene.placed, o.material.material())));
     const Legend legend = o.colour.legend ? makeLegend(colour, description) : Legend{};
+    STIPPLE_TRY(o.effects.applyTo(settings.draw, scene.effects, storesOf(scene.placed), o.quiet));
     if (o.drawn.mode == "reference") return runTraced(o, scene, shot, settings, legend, *executor, written);
     streaming::StreamSettings stream;
     stream.residentBytes = parseBytes(o.resident);
@@ -359,7 +362,7 @@ Result<void> run(const Options& o, Written& written) {
         drawLegend(legend, state->image);
         STIPPLE_TRY(image::writePicture(o.output, state->image, o.alpha));
     }
-    tell(o, *state, verdict, timings, size, shot.views.size());
+    tell(o, *state, settings.draw, verdict, timings, size, shot.views.size());
     if (!o.quiet) sayEmpty(verdict.empty, shot.views.size(), o.output);
     if (!o.quiet && verdict.leavesAround > 0)
         fmt::print(stderr,
@@ -480,7 +483,7 @@ void setupRender(CLI::App& app, int& status) {
     o->colour.addTo(*sub);
     o->material.addTo(*sub, "all points, instead of their own");
     o->environment.addTo(*sub);
-    addEffects(*sub, o->effects);
+    o->effects.addTo(*sub);
     addReading(*sub, *o);
     sub->callback([o, sub, &status] {
         Written written;

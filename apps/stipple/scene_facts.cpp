@@ -1,6 +1,8 @@
 #include "apps/stipple/scene_facts.h"
 
 #include <algorithm>
+#include <map>
+#include <set>
 
 #include "apps/stipple/common.h"
 #include "engine/render/layers.h"
@@ -106,6 +108,14 @@ std::vector<glm::dvec3> outlineOf(const std::vector<render::PlacedStore>& placed
         for (const glm::dvec3& at : own) all.push_back(p.place.translation + p.place.rotation * (p.place.scale * at));
     }
     return scene::outermost(all);
+}
+
+std::vector<std::shared_ptr<const lod::Store>> storesOf(const std::vector<render::PlacedStore>& placed) {
+    std::vector<std::shared_ptr<const lod::Store>> stores;
+    std::set<const lod::Store*> known;
+    for (const render::PlacedStore& p : placed)
+        if (known.insert(p.store.get()).second) stores.push_back(p.store);
+    return stores;
 }
 
 bool hasPoints(const std::vector<render::PlacedStore>& placed) {

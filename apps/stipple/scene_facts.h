@@ -23,6 +23,9 @@ lod::StoreDescription describe(const std::vector<render::PlacedStore>& placed);
 /// What a camera must see: points on the outside of all stores, in world space.
 std::vector<glm::dvec3> outlineOf(const std::vector<render::PlacedStore>& placed);
 
+/// Those that are placed, each once, without proxies.
+std::vector<std::shared_ptr<const lod::Store>> storesOf(const std::vector<render::PlacedStore>& placed);
+
 /// Are there points, and not only as proxies?
 bool hasPoints(const std::vector<render::PlacedStore>& placed);
 /// Is any of it points, curves or triangles without materials, which --material is told of?

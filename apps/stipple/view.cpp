@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <thread>
 
-#include "apps/stipple/effect_options.h"
 #include "apps/stipple/outputs.h"
 #include "apps/stipple/overlay.h"
 #include "apps/stipple/ply_meshes.h"
@@ -450,6 +449,7 @@ Result<void> run(const ViewOptions& o) {
     STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(o.size));
     STIPPLE_TRY(o.camera.check());
     STIPPLE_TRY(o.material.check(o.shade));
+    STIPPLE_TRY(o.effects.check());
     STIPPLE_TRY(checkScreenshot(o));
     STIPPLE_TRY(checkInputs(o.inputs));
     if (!gpu::hasDisplay())
@@ -465,7 +465,6 @@ Result<void> run(const ViewOptions& o) {
     ViewSettings settings;
     render::FrameSettings& frame = settings.frame;
     o.drawn.applyTo(frame);
-    frame.draw.effects = o.effects;
     frame.budgets = {o.error, o.budget};
     frame.draw.unlitTriangles = o.shade == "unlit";
     frame.draw.wind.strength = o.wind;
@@ -503,7 +502,7 @@ void setupView(CLI::App& app, int& status) {
         ->required();
     sub->add_option("--size", o->size, "of the window, pixels")->type_name("WxH")->capture_default_str();
     o->drawn.addTo(*sub, false);  // (any key M may come to ewa: its options stand for when it does)
-    addEffects(*sub, o->effects);
+    o->effects.addTo(*sub);
     sub->add_option("--error", o->error, "tolerated screen-space error, pixels")
         ->transform(positive())
         ->capture_default_str();

@@ -35,6 +35,10 @@ void ViewSession::restart(render::FrameSettings& settings) {
         settings.draw.optics = material->optics;
         settings.draw.lit = true;
     }
+    // What could be said was, before the window opened.
+    if (const auto asked = options_.effects.applyTo(settings.draw, scene_.effects, storesOf(scene_.placed), false);
+        !asked)
+        report(asked.error());
     render::setSway(settings.draw.wind, state_->hierarchies, state_->instances, state_->groups);
     legend_ = makeLegend(colour_, d);
 }

@@ -4,6 +4,7 @@
 #include "apps/stipple/calibration.h"
 #include "apps/stipple/camera_options.h"
 #include "apps/stipple/common.h"
+#include "apps/stipple/effect_options.h"
 #include "apps/stipple/legend.h"
 #include "apps/stipple/mode_options.h"
 #include "apps/stipple/view_keys.h"
@@ -17,7 +18,6 @@ struct ViewOptions {
     uint64_t budget = 2'000'000;
     int frames = 0, accumulate = 64;
     bool force = false;
-    std::vector<std::string> effects;
     TargetOptions target;
     ModeOptions drawn;
     CameraOptions camera;
@@ -25,6 +25,7 @@ struct ViewOptions {
     ColourOptions colour;
     EnvironmentOptions environment;
     MaterialOptions material;
+    EffectOptions effects;
 };
 
 class ViewSession {

@@ -53,7 +53,12 @@ class CpuBackend final : public render::DrawsAtOnce {
         r.emissiveBytes = frame_.emissivePixels * 4;
         r.curveBytes =
             frame_.curveBlocks.capacity() * sizeof(CurveBlock) + frame_.wide.capacity() * sizeof(FilledCurve);
-        r.effectBytes = frame_.surfaceWordPixels * sizeof(shared::SurfaceWords);
+        r.effects.resize(render::effects().size());
+        for (size_t e = 0; e < r.effects.size(); ++e) {
+            r.effects[e].bytes = frame_.effectRoom.bytesOf(e) + (keptFor_.has(e) ? frame_.kept.bytes() : 0);
+            r.effectBytes += frame_.effectRoom.bytesOf(e);
+        }
+        r.effectBytes += frame_.kept.bytes();
         for (const auto& tiles : chunks_.tiles)
             r.textureTiles += static_cast<uint64_t>(
                 std::count_if(tiles.begin(), tiles.end(), [](const uint32_t* t) { return t != nullptr; }));
@@ -76,24 +81,41 @@ class CpuBackend final : public render::DrawsAtOnce {
         times_.clear();
         const std::span<const render::Pass> passes(request.passes);
         frame_.wantsNormals = wantsNormals(frame_, passes);
+        beginEffects(passes);
         for (size_t p = 0; p < passes.size();) {
             const double start = nowSeconds();
             std::string name = render::passName(passes[p]);
             size_t next = p + 1;
+            frame_.effectAtWork = render::effectOfPass(passes[p]).value_or(0);
             if (const CpuPass& pass = cpuPassOf(passes[p]); pass.run != nullptr) {
                 pass.run(frame_);
             } else {
-                for (; next < passes.size() && cpuPassOf(passes[next]).run == nullptr; ++next)
+                for (; next < passes.size() && joinsRows(passes[next]); ++next)
                     name += std::string("+") + render::passName(passes[next]);
-                runRows(frame_, passes.subspan(p, next - p));
+                runRows(frame_, passes.subspan(p, next - p), passes.subspan(next));
             }
             times_.push_back({name, (nowSeconds() - start) * 1e3});
             p = next;
         }
     }
 
+    /// What effects need beyond that of other frames is theirs from here on, or given back.
+    void beginEffects(std::span<const render::Pass> passes) {
+        frame_.effectRoom.begin(frame_.draws->effects);
+        render::EffectSet keepers;
+        for (const render::Pass pass : passes)
+            if (const auto e = render::effectOfPass(pass); e && !joinsRows(pass)) keepers.add(*e);
+        idle_ = keepers.bits != 0 ? 0 : idle_ + 1;
+        if (keepers.bits != 0) keptFor_ = keepers;
+        if (idle_ < render::kEffectHold) return;
+        keptFor_ = {};
+        frame_.kept.release();
+    }
+
     Chunks chunks_;
     Frame frame_;
+    render::EffectSet keptFor_;  ///< effects because of which rows are kept between passes
+    uint32_t idle_ = 0;          ///< frames without any of them
 };
 
 }  // namespace

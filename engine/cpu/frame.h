@@ -10,6 +10,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/huge_buffer.h"
 #include "engine/base/queue.h"
+#include "engine/cpu/effect_room.h"
 #include "engine/cpu/kernels.h"
 #include "engine/cpu/pyramid.h"
 #include "engine/render/backend.h"
@@ -98,8 +99,15 @@ struct Frame {
     // Of the pixels of triangles, beside their texels.
     HugeBuffer<uint32_t> surface, emissive;
     size_t surfacePixels = 0, emissivePixels = 0;
-    HugeBuffer<shared::SurfaceWords> surfaceWords;  ///< Plane::surface, only where rows are kept between passes
-    size_t surfaceWordPixels = 0;
+    KeptSurface kept;         ///< Plane::surface, only where rows are kept between passes
+    EffectRoom effectRoom;    ///< planes of effects
+    size_t effectAtWork = 0;  ///< whose pass runs: its place in the table of effects
+    /// Room for a plane of the effect whose pass runs, the same from frame to frame while it stays as large; new room
+    /// is zero. Not from several threads.
+    template <typename T>
+    T* room(size_t plane, size_t count) {
+        return static_cast<T*>(effectRoom.at(effectAtWork, plane, count * sizeof(T)));
+    }
 
     /// Are there blended discs?
     bool isBlended() const { return mode->blendsSplats && !blocks.empty(); }

@@ -6,7 +6,9 @@
 #include <cstdint>
 
 #include "shaders/shared/curve.h"
+#include "shaders/shared/edl.h"
 #include "shaders/shared/ewa.h"
+#include "shaders/shared/fog.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
 #include "shaders/shared/mesh.h"
@@ -17,6 +19,7 @@
 #include "shaders/shared/splat_disc.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/texture.h"
+#include "shaders/shared/tone.h"
 #include "shaders/shared/visibility.h"
 #include "shaders/shared/wide_disc.h"
 
@@ -270,6 +273,17 @@ struct SurfaceWants {
     bool depth, normal, leaf, ownDepth;
 };
 
+/// Planes of the surface buffer, from a row's first pixel on (effect_room.h).
+struct KeptRow {
+    float* depth;
+    uint32_t *normal, *colour, *material;
+};
+
+/// Logarithms of depth in the rows of a pixel's neighbours, from the row's first pixel on.
+struct EdlRows {
+    const float *straightAbove, *straightBelow, *slantedAbove, *slantedBelow;
+};
+
 struct ShadeOutput {
     uint32_t* rgba;
     float *depth, *normal, *linear;  ///< may be null
@@ -318,6 +332,19 @@ struct Kernels {
     /// The picture's pixels, over the background.
     void (*outputRow)(const shared::FrameConstants& f, const Tables& tables, uint32_t n, const SurfaceRow& row,
                       const ShadeOutput& out);
+    /// Into the surface buffer: 16 bytes a pixel, or 12 without normals; without `depth` colours and materials alone.
+    /// Colours beyond 1 are 1 there.
+    void (*keepRow)(const SurfaceRow& row, const SurfaceWants& wants, uint32_t n, const KeptRow& to);
+    /// And back; false if nothing is there.
+    bool (*takeRow)(const KeptRow& from, const SurfaceWants& wants, uint32_t n, SurfaceRow& row);
+    /// Effects on what surfaces show or send. edlLogs: edlDepth of `n` pixels, at most kTile + 2 kEdlReach.
+    void (*edlLogs)(const shared::EdlConstants& c, const float* depth, uint32_t n, float* out);
+    /// `here`: edlLogs of the row; `scales`: of its neighbours' rows, of each scale.
+    void (*edlRow)(const shared::FrameConstants& f, const shared::EdlConstants& c, const float* here,
+                   const EdlRows* scales, uint32_t n, SurfaceRow& row);
+    void (*fogRow)(const shared::FrameConstants& f, const shared::FogConstants& c, uint32_t x0, uint32_t y, uint32_t n,
+                   SurfaceRow& row);
+    void (*toneRow)(const shared::ToneConstants& c, uint32_t n, SurfaceRow& row);
     /// Offers the triangles of one cluster (places from firstPlace on) to the visibility buffer.
     void (*rasterCluster)(const shared::FrameConstants& f, const shared::SurfaceMaterial* materials,
                           const MeshBlock& block, uint32_t firstPlace, const LargeSink& large,

@@ -353,6 +353,8 @@ void finishRow(float focal, uint32_t n, TexelRow& __restrict row) {
 
 #include "engine/cpu/surface.inl"
 
+#include "engine/cpu/effects.inl"
+
 }  // namespace
 
 extern const Kernels STIPPLE_KERNELS, STIPPLE_KERNELS_ORTHOGRAPHIC;
@@ -370,6 +372,12 @@ const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
                               smoothRow,
                               lightRow,
                               outputRow,
+                              keepRow,
+                              takeRow,
+                              edlLogs,
+                              edlRow,
+                              fogRow,
+                              toneRow,
                               rasterCluster,
                               rasterLarge,
                               rasterPatch,

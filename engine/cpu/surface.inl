@@ -107,6 +107,58 @@ void smoothRow(const FrameConstants& frame, const TexelRow& __restrict texels, c
     }
 }
 
+void keepRow(const SurfaceRow& __restrict row, const SurfaceWants& wants, uint32_t n, const KeptRow& out) {
+    float* __restrict const depth = out.depth;
+    uint32_t* __restrict const colour = out.colour;
+    uint32_t* __restrict const material = out.material;
+    uint32_t* __restrict const normal = out.normal;
+    const bool isNew = depth != nullptr;
+    for (size_t i = 0; isNew && i < n; ++i) depth[i] = row.depth[i];
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) colour[i] = packColour(row.red[i], row.green[i], row.blue[i]);
+    if (wants.leaf)
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) material[i] = row.material[i] | (row.leaf[i] > 0.5f ? kPixelLeaf : 0u);
+    else
+        for (size_t i = 0; i < n; ++i) material[i] = row.material[i];
+    if (wants.normal && isNew)
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            // Of a pixel without a surface any.
+            const bool isThere = row.depth[i] > 0.0f;
+            normal[i] =
+                octEncode(vec3(isThere ? row.nx[i] : 0.0f, isThere ? row.ny[i] : 0.0f, isThere ? row.nz[i] : -1.0f));
+        }
+}
+
+bool takeRow(const KeptRow& from, const SurfaceWants& wants, uint32_t n, SurfaceRow& __restrict row) {
+    const float* __restrict const depth = from.depth;
+    const uint32_t* __restrict const colour = from.colour;
+    const uint32_t* __restrict const material = from.material;
+    const uint32_t* __restrict const normal = from.normal;
+    bool any = false;
+    for (size_t i = 0; i < n; ++i) any |= depth[i] > 0.0f;
+    if (!any) return false;
+#pragma GCC ivdep
+    for (size_t i = 0; i < n; ++i) {
+        row.depth[i] = row.ownDepth[i] = depth[i];
+        row.red[i] = unpackRed(colour[i]);
+        row.green[i] = unpackGreen(colour[i]);
+        row.blue[i] = unpackBlue(colour[i]);
+        row.material[i] = material[i];
+        row.leaf[i] = (material[i] & kPixelLeaf) != 0u ? 1.0f : 0.0f;
+    }
+    if (wants.normal)
+#pragma GCC ivdep
+        for (size_t i = 0; i < n; ++i) {
+            const vec3 unit = octDecode(normal[i]);
+            row.nx[i] = unit.x;
+            row.ny[i] = unit.y;
+            row.nz[i] = unit.z;
+        }
+    return true;
+}
+
 /// The debug views that are seen in the place of colours.
 void debugColours(const FrameConstants& f, uint32_t n, const SurfaceRow& __restrict row, float* __restrict red,
                   float* __restrict green, float* __restrict blue) {

@@ -43,6 +43,7 @@ Result<void> FrameBuffers::ensure(Buffer& buffer, uint64_t bytes, VkBufferUsageF
 
 Result<void> FrameBuffers::prepare(const render::RenderRequest& request, const Residents& residents) {
     const render::DrawList& draws = *request.draws;
+    releaseIdle(draws);
     STIPPLE_TRY(preparePlanes(request));
     render::placePatches(draws, residents.patchesOf, patches_, firstPatch_);
     fillDraws(draws, residents);
@@ -51,6 +52,7 @@ Result<void> FrameBuffers::prepare(const render::RenderRequest& request, const R
     if (!draws.lights.empty()) STIPPLE_TRY(fill(kLightsBinding, draws.lights.data(), draws.lights.size(), "lights"));
     STIPPLE_TRY(prepareEnvironment(draws.environment));
     if (draws.glass) STIPPLE_TRY(prepareLayer(*draws.glass));
+    STIPPLE_TRY(prepareEffects(draws));
     if (descriptorsChanged_) writeDescriptors();
     return {};
 }
@@ -171,6 +173,43 @@ Result<void> FrameBuffers::prepareLayer(const render::LayerTables& layer) {
     return fill(kBackBinding, layer.back.data(), layer.back.size(), "back of the layer");
 }
 
+/// Tables that effects have filled, and room for planes that their passes fill.
+Result<void> FrameBuffers::prepareEffects(const render::DrawList& draws) {
+    for (const render::EffectTable& table : draws.tables) {
+        Buffer& buffer = bound_.at(table.binding);
+        STIPPLE_TRY(ensure(buffer, table.bytes.size(), kStorage, true, "table of an effect"));
+        std::memcpy(buffer.mapped(), table.bytes.data(), table.bytes.size());
+    }
+    for (size_t e = 0; e < render::effects().size(); ++e) {
+        if (!draws.effects.has(e)) continue;
+        const render::Effect& effect = *render::effects()[e];
+        for (const render::EffectPlane& plane : effect.planes)
+            STIPPLE_TRY(ensure(bound_.at(plane.binding), gpu::bytesOf(plane.binding, plane.elements(draws)), kFilled,
+                               false, effect.name));
+    }
+    return {};
+}
+
+/// What effects have that no frame has shown for long.
+void FrameBuffers::releaseIdle(const render::DrawList& draws) {
+    idle_.resize(render::effects().size());
+    const auto release = [&](uint32_t binding) {
+        // Glass fills those of light and of the environment, too.
+        const bool isFilled = (binding == kEnvironmentBinding && draws.environment != nullptr) ||
+                              (binding == kLightsBinding && !draws.lights.empty());
+        if (isFilled || bound_.at(binding).bytes() == 0) return;
+        bound_.at(binding) = Buffer();
+        descriptorsChanged_ = true;
+        if (binding == kEnvironmentBinding) environment_.reset();
+    };
+    for (size_t e = 0; e < idle_.size(); ++e) {
+        idle_[e] = draws.effects.has(e) ? 0 : idle_[e] + 1;
+        if (idle_[e] < render::kEffectHold) continue;
+        for (const uint32_t binding : render::effects()[e]->tables) release(binding);
+        for (const render::EffectPlane& plane : render::effects()[e]->planes) release(plane.binding);
+    }
+}
+
 /// What only triangles and patches need.
 Result<void> FrameBuffers::prepareMeshes(const render::DrawList& draws, const Residents& residents) {
     meshFrame_.fill(draws, residents.meshOf, residents.tileOf);
@@ -208,6 +247,13 @@ uint64_t FrameBuffers::residentTiles() const {
 uint64_t FrameBuffers::bytesOf(std::initializer_list<uint32_t> bindings) const {
     uint64_t sum = 0;
     for (const uint32_t b : bindings) sum += bound_.at(b).bytes();
+    return sum;
+}
+
+uint64_t FrameBuffers::bytesOf(const render::Effect& effect) const {
+    uint64_t sum = 0;
+    for (const uint32_t b : effect.tables) sum += bound_.at(b).bytes();
+    for (const render::EffectPlane& plane : effect.planes) sum += bound_.at(plane.binding).bytes();
     return sum;
 }
 

@@ -47,6 +47,8 @@ class FrameBuffers {
     uint64_t residentTiles() const;
     /// Of some bindings.
     uint64_t bytesOf(std::initializer_list<uint32_t> bindings) const;
+    /// Of the tables and planes of an effect.
+    uint64_t bytesOf(const render::Effect& effect) const;
 
   private:
     Result<void> ensure(Buffer& buffer, uint64_t bytes, VkBufferUsageFlags usage, bool hostVisible, const char* name);
@@ -55,6 +57,8 @@ class FrameBuffers {
     Result<void> prepareMeshes(const render::DrawList& draws, const Residents& residents);
     Result<void> prepareEnvironment(const std::shared_ptr<const render::Environment>& environment);
     Result<void> prepareLayer(const render::LayerTables& layer);
+    Result<void> prepareEffects(const render::DrawList& draws);
+    void releaseIdle(const render::DrawList& draws);
     void fillDraws(const render::DrawList& draws, const Residents& residents);
     template <typename T>
     Result<void> fill(uint32_t binding, const T* data, size_t count, const char* name);
@@ -70,6 +74,7 @@ class FrameBuffers {
     MeshFrame meshFrame_;
     std::vector<shared::DrawMesh> meshes_, patches_;  ///< of both; of patches
     std::vector<uint32_t> firstPatch_;                ///< of each of their nodes
+    std::vector<uint32_t> idle_;                      ///< of each effect: frames without it
     bool descriptorsChanged_ = true;
 };
 

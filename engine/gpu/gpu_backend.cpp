@@ -50,10 +50,14 @@ class GpuBackend final : public render::Backend {
         for (const auto& slot : slots_) {
             const FrameBuffers& b = slot->buffers();
             r.curveBytes += b.bytesOf({kWideBinding});
-            r.effectBytes += b.bytesOf(
-                {kLightsBinding, kEnvironmentBinding, kLayerBinding, kOpticsBinding, kBehindBinding, kBackBinding});
+            for (const render::Effect* effect : render::effects()) r.effectBytes += b.bytesOf(*effect);
             r.meshBytes += b.bytesOf({kMeshesBinding, kClustersBinding, kMaterialsBinding, kTexturesBinding,
                                       kTilesBinding, kTriangleWordsBinding, kLargeBinding});
+        }
+        for (const render::Effect* effect : render::effects()) {
+            render::EffectResources& held = r.effects.emplace_back();
+            held.pipelines = pipelines_->compiledOf(effect->passes);
+            for (const auto& slot : slots_) held.bytes += slot->buffers().bytesOf(*effect);
         }
         r.textureTiles = slots_.front()->buffers().residentTiles();
         return r;
@@ -85,6 +89,7 @@ class GpuBackend final : public render::Backend {
 
     Result<render::Ticket> submit(const render::RenderRequest& request) override {
         STIPPLE_ASSIGN(FrameSlot* const slot, freeSlot());
+        pipelines_->begin(request.draws->effects);
         const Residents residents{
             [&](streaming::ChunkKey key) { return pages_.address(places_.at(chunkId(key))); },
             [&](streaming::ChunkKey key) -> const MeshChunk& { return meshChunks_.at(chunkId(key)); },

@@ -1,6 +1,8 @@
 #include "engine/gpu/pipelines.h"
 
+#include <algorithm>
 #include <array>
+#include <string_view>
 
 #include "engine/base/check.h"
 
@@ -83,6 +85,37 @@ Result<void> Pipelines::use(VkCommandBuffer commands, const Shader& shader) {
     if (!isCompiled(shader.name)) STIPPLE_TRY(add(shader));
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_.find(shader.name)->second);
     return {};
+}
+namespace {
+
+/// Is one of the passes a part of the name? light_fog_output is of three.
+bool isOf(std::string_view shader, std::span<const render::Pass> passes) {
+    for (std::string_view rest = shader; !rest.empty();) {
+        const size_t end = std::min(rest.find('_'), rest.size());
+        for (const render::Pass pass : passes)
+            if (rest.substr(0, end) == render::passName(pass)) return true;
+        rest.remove_prefix(std::min(end + 1, rest.size()));
+    }
+    return false;
+}
+
+}  // namespace
+
+uint64_t Pipelines::compiledOf(std::span<const render::Pass> passes) const {
+    return static_cast<uint64_t>(std::count_if(pipelines_.begin(), pipelines_.end(),
+                                               [&](const auto& entry) { return isOf(entry.first, passes); }));
+}
+void Pipelines::begin(render::EffectSet shown) {
+    idle_.resize(render::effects().size());
+    for (size_t e = 0; e < idle_.size(); ++e) {
+        idle_[e] = shown.has(e) ? 0 : idle_[e] + 1;
+        if (idle_[e] != render::kEffectHold) continue;
+        std::erase_if(pipelines_, [&](const auto& entry) {
+            const bool goes = isOf(entry.first, render::effects()[e]->passes);
+            if (goes) vkDestroyPipeline(device_.device, entry.second, nullptr);
+            return goes;
+        });
+    }
 }
 void Pipelines::push(VkCommandBuffer commands, const shared::Step& step) const {
     vkCmdPushConstants(commands, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(step), &step);

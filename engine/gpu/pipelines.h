@@ -4,11 +4,14 @@
 
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "engine/gpu/device.h"
 #include "engine/gpu/shader_table.h"
+#include "engine/render/effects/table.h"
 
 namespace stipple::gpu {
 
@@ -26,6 +29,10 @@ class Pipelines {
     Result<void> use(VkCommandBuffer commands, const Shader& shader);
     void push(VkCommandBuffer commands, const shared::Step& step) const;
     bool isCompiled(std::string_view shader) const { return pipelines_.find(shader) != pipelines_.end(); }
+    /// How many there are of the shaders of some passes: those that have a pass's name as a part (light_output).
+    uint64_t compiledOf(std::span<const render::Pass> passes) const;
+    /// A frame with these effects begins: pipelines of those that no frame has had for long go.
+    void begin(render::EffectSet shown);
 
   private:
     explicit Pipelines(const Device& device) : device_(device) {}
@@ -35,9 +42,11 @@ class Pipelines {
     VkPipelineLayout layout_ = VK_NULL_HANDLE;
     VkDescriptorPool pool_ = VK_NULL_HANDLE;
     std::map<std::string, VkPipeline, std::less<>> pipelines_;
+    std::vector<uint32_t> idle_;  ///< of each effect: frames without it
 };
 
 /// Frames that may be in flight at once.
 constexpr uint32_t kMostInFlight = 2;
+static_assert(render::kEffectHold > kMostInFlight, "pipelines go that no frame in flight has");
 
 }  // namespace stipple::gpu

@@ -24,18 +24,21 @@ void Recording::smooth(const std::function<void()>& passes) {
 
 Result<void> Recording::recordPasses() {
     const auto& passes = request_.passes;
-    for (size_t p = 0; p < passes.size(); ++p) {
+    for (size_t p = 0; p < passes.size();) {
         label_ = shader_ = render::passName(passes[p]);
-        // Two neighbours that read only their own pixel run as one where they have a common shader.
-        if (p + 1 < passes.size() && render::passInfo(passes[p + 1]).isOfOwnPixel) {
-            const std::string next = render::passName(passes[p + 1]);
-            if (shaderNamed(shader_ + "_" + next) != nullptr) {
-                shader_ += "_" + next;
-                label_ += "+" + next;
-                ++p;
-            }
+        // Neighbours that read only their own pixel run as one: as many as have a common shader.
+        size_t next = p + 1;
+        std::string shader = shader_, label = label_;
+        for (size_t q = p + 1; q < passes.size() && render::passInfo(passes[q]).isOfOwnPixel; ++q) {
+            shader += std::string("_") + render::passName(passes[q]);
+            label += std::string("+") + render::passName(passes[q]);
+            if (shaderNamed(shader) == nullptr) continue;
+            shader_ = shader;
+            label_ = label;
+            next = q + 1;
         }
-        gpuPassOf(passes[p]).record(*this);
+        gpuPassOf(passes[next - 1]).record(*this);
+        p = next;
     }
     return status_;
 }

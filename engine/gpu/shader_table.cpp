@@ -4,12 +4,15 @@
 
 #include "engine/base/check.h"
 #include "engine/gpu/mesh_frame.h"
+#include "shaders/shared/edl.h"
 #include "shaders/shared/ewa.h"
+#include "shaders/shared/fog.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
 #include "shaders/shared/optics.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/texture.h"
+#include "shaders/shared/tone.h"
 #include "shaders/shared/wide_disc.h"
 
 namespace stipple::gpu {
@@ -64,6 +67,11 @@ static_assert(isLaidOut(shared::kOpticsBinding, sizeof(shared::Optic)));
 static_assert(isLaidOut(shared::kBehindBinding, sizeof(float)));
 static_assert(isLaidOut(shared::kBackBinding, sizeof(float)));
 static_assert(isLaidOut(shared::kSurfaceBinding, sizeof(shared::SurfaceWords)));
+#ifndef STIPPLE_ONLY_LIGHT
+static_assert(isLaidOut(shared::kEdlBinding, sizeof(shared::EdlConstants)));
+static_assert(isLaidOut(shared::kFogBinding, sizeof(shared::FogConstants)));
+static_assert(isLaidOut(shared::kToneBinding, sizeof(shared::ToneConstants)));
+#endif
 
 }  // namespace
 

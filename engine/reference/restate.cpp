@@ -379,6 +379,8 @@ class ReferenceBackend final : public render::DrawsAtOnce {
                             f.debugView == shared::kDebugHoles || f.debugView == shared::kDebugNormals;
                         if (!isOfGeometry) seen.colour = mixed;
                     }
+                    seen.colour = applyOnSent(draws, seen.colour,
+                                              {double(i % v.width) + 0.5, double(i / v.width) + 0.5}, seen.depth);
                     // Of a pixel that is less than half covered the ray meets nothing.
                     if (wantAll && s.coverage >= 0.5) {
                         image.depth[i] = static_cast<float>(seen.depth);

@@ -38,16 +38,24 @@ struct RenderRequest {
     bool staysOnDevice = false;
 };
 
+/// What a backend holds for one effect.
+struct EffectResources {
+    uint64_t pipelines = 0;  ///< compiled for its passes (cpu: none ever are)
+    uint64_t bytes = 0;      ///< of its tables and planes, and of what is kept between passes because of it
+    bool operator==(const EffectResources&) const = default;
+};
+
 /// What a backend holds beyond what every frame needs: 0 for what no scene has called for yet.
 struct BackendResources {
-    uint64_t meshPipelines = 0;   ///< compiled for triangles
-    uint64_t meshBytes = 0;       ///< per-pixel and per-frame buffers for triangles
-    uint64_t emissiveBytes = 0;   ///< per-pixel buffer for emissive materials
-    uint64_t textureTiles = 0;    ///< resident
-    uint64_t curvePipelines = 0;  ///< compiled for ribbons and tubes
-    uint64_t curveBytes = 0;      ///< per-frame buffers for them
-    uint64_t lightPipelines = 0;  ///< compiled for light
-    uint64_t effectBytes = 0;     ///< tables and planes that only effects need
+    uint64_t meshPipelines = 0;            ///< compiled for triangles
+    uint64_t meshBytes = 0;                ///< per-pixel and per-frame buffers for triangles
+    uint64_t emissiveBytes = 0;            ///< per-pixel buffer for emissive materials
+    uint64_t textureTiles = 0;             ///< resident
+    uint64_t curvePipelines = 0;           ///< compiled for ribbons and tubes
+    uint64_t curveBytes = 0;               ///< per-frame buffers for them
+    uint64_t lightPipelines = 0;           ///< compiled for light
+    uint64_t effectBytes = 0;              ///< tables and planes that only effects need
+    std::vector<EffectResources> effects;  ///< of each of the table of effects
 };
 
 /// A frame that was handed in; numbers rise.

@@ -86,6 +86,7 @@ void clear(DrawList& out) {
     out.meshDraws.clear();
     out.lights.clear();
     out.environment.reset();
+    out.tables.clear();
     out.layer = nullptr;
     out.glass.reset();
     out.bends.clear();
@@ -229,7 +230,7 @@ void addEffects(EffectSet requested, std::span<const uint64_t> fed, const glm::d
     f.hasEnvironment = 0;
     f.environmentSharp = 0;
     f.ambient = 1;
-    out.effects = effectsOfFrame(requested, contentOf(out), settings, fed);
+    out.effects = effectsOfFrame(requested, contentOf(out), settings, out, fed);
     for (size_t e = 0; e < effects().size(); ++e)
         if (out.effects.has(e) && effects()[e]->fill != nullptr) effects()[e]->fill(settings, cameraFromWorld, out);
 }

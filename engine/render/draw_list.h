@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/render/content.h"
+#include "engine/render/effects/settings.h"
 #include "engine/render/effects/table.h"
 #include "engine/render/environment.h"
 #include "lod/cut/cut.h"
@@ -66,6 +67,12 @@ struct MeshTextures {
     uint32_t source = 0, firstChunk = 0, tiles = 0;
 };
 
+/// What an effect hands to its passes: bytes as shaders lay them out, in a binding of its own (Effect::tables).
+struct EffectTable {
+    uint32_t binding = 0;
+    std::vector<std::byte> bytes;
+};
+
 struct DrawList {
     shared::FrameConstants frame{};
     std::array<DrawBatch, lod::kKinds> batches;  ///< by kind
@@ -88,6 +95,19 @@ struct DrawList {
     uint32_t firstSource = 0;                        ///< what the backend calls source 0; set before the list is made
     EffectSet effectsOfScene = allEffects();         ///< what it could show; set before the list is made
     EffectSet effects;                               ///< what the frame shows
+    std::vector<EffectTable> tables;                 ///< of those
+    template <typename T>
+    void addTable(uint32_t binding, std::span<const T> values) {
+        const auto bytes = std::as_bytes(values);
+        tables.push_back({binding, {bytes.begin(), bytes.end()}});
+    }
+    /// Null where the frame has none.
+    template <typename T>
+    const T* tableAt(uint32_t binding) const {
+        for (const EffectTable& t : tables)
+            if (t.binding == binding) return reinterpret_cast<const T*>(t.bytes.data());
+        return nullptr;
+    }
     std::span<const shared::SurfaceMaterial> materials;
     const LayerInput* layer = nullptr;         ///< of a layer of glass (layers.h), where this is one ...
     std::shared_ptr<const LayerTables> glass;  ///< ... and what its passes read
@@ -131,10 +151,11 @@ struct DrawSettings {
     float kernelSupport = 2;         ///< of blended discs: where kernels end, in sigmas (2 or 3)
     bool perSurfel = false;          ///< blended discs have weights of their own; pixels are not divided by theirs
     uint32_t patchAs = shared::kPatchStrips;
-    float exactCurves = 2.0f;          ///< pixels of half-width from which curves are filled, not reconstructed
-    Wind wind;                         ///< moves what setSway was told of
-    uint32_t coverageSeed = 0;         ///< of curves narrower than a pixel
-    std::vector<std::string> effects;  ///< that are asked for by their names
+    float exactCurves = 2.0f;            ///< pixels of half-width from which curves are filled, not reconstructed
+    Wind wind;                           ///< moves what setSway was told of
+    uint32_t coverageSeed = 0;           ///< of curves narrower than a pixel
+    std::vector<EffectRequest> effects;  ///< that are asked for by their names ...
+    EffectParameters parameters;         ///< ... and what they are told
 };
 
 /// What a frame of these draws calls for.

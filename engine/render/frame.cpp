@@ -199,6 +199,15 @@ Result<void> drawPicture(FrameState& state, const RenderRequest& request) {
     return {};
 }
 
+void count(std::span<const Pass> passes, EffectSet requested, FrameState& state) {
+    EffectsOfFrame& e = state.effects;
+    e.requested.bits |= requested.bits;
+    e.shown.bits |= state.draws.effects.bits;
+    e.passes.resize(effects().size());
+    for (const Pass pass : passes)
+        if (const auto of = effectOfPass(pass)) ++e.passes[*of];
+}
+
 }  // namespace
 
 Result<uint64_t> drawNodes(FrameState& state, const lod::Cut& cut, const lod::View& view,
@@ -213,6 +222,7 @@ Result<uint64_t> drawNodes(FrameState& state, const lod::Cut& cut, const lod::Vi
     request.passes = passesOf(settings.mode, contentOf(state.draws), state.draws.effects);
     request.wantDepthAndNormal = settings.wantDepthAndNormal;
     request.staysOnDevice = settings.staysOnDevice;
+    count(request.passes, requestedEffects(state.draws.effectsOfScene, settings.draw), state);
     STIPPLE_TRY(drawPicture(state, request));
     return request.passes.size();
 }
@@ -224,6 +234,7 @@ Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettin
                     "keep the backend while it is used");
     STIPPLE_TRY(checkFilter(settings.draw));
     uint64_t passes = 0;
+    state.effects = {};
     if (hasLayers(state, view, settings)) {
         STIPPLE_ASSIGN(passes, drawLayered(state, view, settings));
     } else {

@@ -17,6 +17,12 @@ namespace stipple::render {
 
 struct LayeredFrame;
 
+/// Of the last frame, with all its layers.
+struct EffectsOfFrame {
+    EffectSet requested, shown;
+    std::vector<uint64_t> passes;  ///< recorded of each of the table
+};
+
 struct FrameSettings {
     lod::Budgets budgets;
     Mode mode = Mode::pullpush;
@@ -44,6 +50,7 @@ struct FrameState {
     std::shared_ptr<LayeredFrame> layered;  ///< of scenes with glass, from the first such frame on (layered_frame.h)
     std::optional<Ticket> onDevice;         ///< of the last frame, if its picture stays there
     FrameCounters counters;
+    EffectsOfFrame effects;
 
     lod::CutScene scene() const { return {hierarchies, instances, groups}; }
 };

@@ -18,3 +18,8 @@ STIPPLE_PASS(surface, (Planes{visibility, texels, coarse, smooth}), (Planes{surf
 STIPPLE_PASS(light, (Planes{surface}), (Planes{surface}), true)
 STIPPLE_PASS(refract, (Planes{surface}), (Planes{surface}), true)
 STIPPLE_PASS(output, (Planes{surface, filtered}), (Planes{image}), true)
+#ifndef STIPPLE_ONLY_LIGHT
+STIPPLE_PASS(edl, (Planes{surface}), (Planes{surface}), false)
+STIPPLE_PASS(fog, (Planes{surface}), (Planes{surface}), true)
+STIPPLE_PASS(tone, (Planes{surface}), (Planes{surface}), true)
+#endif

@@ -96,6 +96,11 @@ struct Node {
     bool isVisible = true;              ///< with all below it
 };
 
+/// What a scene file asks of effects: names, and NAME.PARAMETER=VALUE.
+struct SceneEffects {
+    std::vector<std::string> names, values;
+};
+
 struct Scene {
     std::string path;
     std::vector<Node> nodes;
@@ -105,6 +110,7 @@ struct Scene {
     std::vector<EncodedImage> images;
     std::vector<Light> lights;
     std::vector<SceneCamera> cameras;
+    SceneEffects effects;
     std::vector<std::string> notes;  ///< what was repaired or left out, for a person
 
     /// From each node to the world, and whether it and all above it are visible.

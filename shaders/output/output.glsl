@@ -1,5 +1,5 @@
 // The picture's pixels, over the background. LIT: with the light on them, which reads nothing but its own pixel;
-// REFRACTED: with that of a layer of glass.
+// REFRACTED: with that of a layer of glass. FOG, TONE: what becomes of what surfaces send.
 #if defined(LIT)
 #include "../light.glsl"
 #elif defined(REFRACTED)
@@ -10,7 +10,28 @@
 #include "../shared/ewa.h"
 layout(set = 0, binding = kCoverageBinding, scalar) readonly buffer CoverageBlock { uint coverage[]; };
 layout(set = 0, binding = kSumsBinding, scalar) readonly buffer SumBlock { FilteredSums sums[]; };  // and second surfaces
+#ifdef FOG
+#include "../shared/fog.h"
+layout(set = 0, binding = kFogBinding, scalar) readonly buffer FogBlock { FogConstants fog; };
+#endif
+#ifdef TONE
+#include "../shared/tone.h"
+layout(set = 0, binding = kToneBinding, scalar) readonly buffer ToneBlock { ToneConstants tone; };
+#endif
 layout(local_size_x = 64) in;
+
+// From what a surface sends to what arrives, and to what a screen is sent.
+vec3 arriving(vec3 colour, float depth, uvec2 pixel) {
+#ifdef FOG
+    const float path = fogPath(fog, pixelRayHere(pixel), depth);
+    const vec3 lost = vec3(fade(fog.density.x * path), fade(fog.density.y * path), fade(fog.density.z * path));
+    colour += lost * (fog.colour - colour);
+#endif
+#ifdef TONE
+    colour = vec3(toned(tone, colour.x), toned(tone, colour.y), toned(tone, colour.z));
+#endif
+    return colour;
+}
 
 // A second surface is lit on its own, and has its share of what the pixel sends; where it is the front, depth and normal
 // are its own.
@@ -49,9 +70,10 @@ void main() {
 #endif
     }
     float share = valid ? 1.0 : 0.0;
+    const uint kind = valid && stepInfo.hasFiltered != 0u ? coverage[at] >> kSecondShift : kSecondNone;
+    if (kind != kSecondNone) mixSecond(kind, secondOfSums(sums[at]), pixel, s, colour, n);
+    if (valid) colour = arriving(colour, s.depth, pixel);
     if (valid && stepInfo.hasFiltered != 0u) {
-        const uint kind = coverage[at] >> kSecondShift;
-        if (kind != kSecondNone) mixSecond(kind, secondOfSums(sums[at]), pixel, s, colour, n);
         share = float(coverage[at] & 255u) / 255.0;
         colour = frame.background + share * (colour - frame.background);
     }

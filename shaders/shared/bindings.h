@@ -34,7 +34,10 @@ const uint kLayerBinding = 26u;
 const uint kOpticsBinding = 27u;
 const uint kBehindBinding = 28u;
 const uint kBackBinding = 29u;
-const uint kBindings = 30u;
+const uint kEdlBinding = 30u;
+const uint kFogBinding = 31u;
+const uint kToneBinding = 32u;
+const uint kBindings = 33u;
 
 // Per pixel:
 const uint kTexelWords = 5u;     // planes of a packed texel; in frames with materials of points one more

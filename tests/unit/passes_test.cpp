@@ -17,10 +17,17 @@ std::vector<FrameContent> allContents() {
             for (const bool hasSmoothDiscs : {false, true}) out.push_back({kinds, hasWideDiscs, hasSmoothDiscs});
     return out;
 }
-/// Every choice of effects.
+/// None, all, each alone, and every two of them together: with the others and without.
 std::vector<EffectSet> allSets() {
-    std::vector<EffectSet> out;
-    for (uint32_t bits = 0; bits < 1u << effects().size(); ++bits) out.push_back({bits});
+    std::vector<EffectSet> out{{}, allEffects()};
+    for (size_t a = 0; a < effects().size(); ++a)
+        for (size_t b = a; b < effects().size(); ++b) {
+            EffectSet two;
+            two.add(a);
+            two.add(b);
+            out.push_back(two);
+            out.push_back({allEffects().bits & ~two.bits});
+        }
     return out;
 }
 bool has(const std::vector<Pass>& passes, Pass pass) {

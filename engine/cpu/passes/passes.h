@@ -23,7 +23,8 @@ struct RowPass {
     void (*run)(const RowPlace& at, SurfaceRow& row);
 };
 
-/// One of the two.
+/// One of the two. A pass of rows that reads its neighbours (passes.inl) begins a run of its own, and finds the whole
+/// picture in Frame::kept. One over the frame may say what it wants there, too: RowPass::wants.
 struct CpuPass {
     void (*run)(Frame& frame) = nullptr;
     RowPass row{};
@@ -47,9 +48,12 @@ struct CpuKind {
 
 const CpuKind& cpuKind(lod::Kind kind);
 
+/// Does it run in the same tile as the pass of rows before?
+bool joinsRows(render::Pass pass);
+
 /// Runs passes of rows back to back: the first is surface, or reads what an earlier run left; what the last one leaves
-/// is kept for later passes, unless it is the picture.
-void runRows(Frame& frame, std::span<const render::Pass> passes);
+/// is kept for the passes of `later`, unless it is the picture.
+void runRows(Frame& frame, std::span<const render::Pass> passes, std::span<const render::Pass> later);
 
 /// Does any of the passes read normals of the surface?
 bool wantsNormals(const Frame& frame, std::span<const render::Pass> passes);

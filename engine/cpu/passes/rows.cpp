@@ -36,58 +36,48 @@ ShadeOutput outputAt(Frame& frame, size_t pixel) {
             all ? image.normal.data() + 3 * pixel : nullptr, all ? image.linear.data() + 3 * pixel : nullptr};
 }
 
-/// Into the surface buffer: 16 bytes a pixel. Colours beyond 1 are 1 there.
-void keepRow(const RowPlace& at, const SurfaceRow& row) {
-    shared::SurfaceWords* const words = at.frame.surfaceWords.data() + at.first;
-    for (size_t i = 0; i < at.n; ++i) {
-        shared::SurfaceWords& w = words[i];
-        w.depth = row.depth[i];
-        w.normal = row.depth[i] > 0 ? shared::octEncode({row.nx[i], row.ny[i], row.nz[i]}) : 0;
-        w.albedo = shared::packColour(row.red[i], row.green[i], row.blue[i]);
-        w.material = row.material[i] | (row.leaf[i] > 0.5f ? shared::kPixelLeaf : 0u);
-    }
+/// The planes of the surface buffer from a pixel on.
+KeptRow keptAt(Frame& frame, size_t pixel) {
+    KeptSurface& kept = frame.kept;
+    return {kept.depth.data() + pixel, kept.normal.data() + pixel, kept.colour.data() + pixel,
+            kept.material.data() + pixel};
 }
 
 /// False if nothing is there.
-bool takeRow(const RowPlace& at, const SurfacePlanes& planes, SurfaceRow& row) {
-    const shared::SurfaceWords* const words = at.frame.surfaceWords.data() + at.first;
+bool takeRow(const RowPlace& at, const SurfacePlanes& planes, const SurfaceWants& wants, SurfaceRow& row) {
     row.hasTriangles = planes.surface != nullptr;
     row.hasEmission = planes.surface != nullptr && planes.emissive != nullptr;
     row.hasMaterials = at.frame.constants.hasMaterials != 0;
-    bool any = false;
-    for (size_t i = 0; i < at.n; ++i) {
-        const shared::SurfaceWords& w = words[i];
-        const shared::vec3 n = shared::octDecode(w.normal);
-        row.depth[i] = row.ownDepth[i] = w.depth;
-        row.nx[i] = n.x;
-        row.ny[i] = n.y;
-        row.nz[i] = n.z;
-        row.red[i] = shared::unpackRed(w.albedo);
-        row.green[i] = shared::unpackGreen(w.albedo);
-        row.blue[i] = shared::unpackBlue(w.albedo);
-        row.leaf[i] = (w.material & shared::kPixelLeaf) != 0 ? 1.0f : 0.0f;
-        row.material[i] = w.material;
-        row.emission[i] = row.hasEmission && (w.material & shared::kPixelTriangle) != 0 ? planes.emissive[i] : 0u;
-        any = any || w.depth > 0;
-    }
-    return any;
+    row.hasCoverage = planes.coverage != nullptr;
+    if (!at.frame.k.takeRow(keptAt(at.frame, at.first), wants, at.n, row)) return false;
+    for (size_t i = 0; row.hasEmission && i < at.n; ++i)
+        row.emission[i] = (row.material[i] & shared::kPixelTriangle) != 0 ? planes.emissive[i] : 0u;
+    for (size_t i = 0; row.hasCoverage && i < at.n; ++i)
+        row.coverage[i] = static_cast<float>(planes.coverage[i]) * (1.0f / 255.0f);
+    return true;
 }
 
 /// A run of passes over rows.
 class RowProgram {
   public:
-    RowProgram(Frame& frame, std::span<const render::Pass> passes)
+    RowProgram(Frame& frame, std::span<const render::Pass> passes, std::span<const render::Pass> later)
         : frame_(frame),
           fine_(frame.texels()),
           isKept_(passes.back() != render::Pass::output),
+          isFirst_(passes.front() == render::Pass::surface),
           empty_(emptyRow(frame)) {
         for (const render::Pass pass : passes)
-            if (pass != render::Pass::surface) steps_.push_back(&cpuPassOf(pass).row);
-        const size_t pixels = frame.visibilityPixels;
-        const bool isUsed = isKept_ || passes.front() != render::Pass::surface;
-        if (!isUsed || frame.surfaceWordPixels == pixels) return;
-        frame.surfaceWords.assign(pixels, {});
-        frame.surfaceWordPixels = pixels;
+            if (pass != render::Pass::surface) steps_.push_back({&cpuPassOf(pass).row, takesMixed(pass)});
+        for (const render::Pass pass : later) {
+            const CpuPass& p = cpuPassOf(pass);
+            if (p.row.wants != nullptr)
+                p.row.wants(frame, kept_);
+            else if (p.run != nullptr)
+                kept_.normal = kept_.leaf = true;
+        }
+        kept_.depth = isKept_;
+        if (isKept_ || !isFirst_) frame.kept.resize(frame.visibilityPixels);
+        if (isKept_ && isFirst_) frame.kept.renew();
     }
 
     /// From texels. `own`: the row before it was reconstructed. `any`: is there anything? `smooth`: what was
@@ -100,15 +90,14 @@ class RowProgram {
         if (row.hasTubes) frame_.k.finishRow(f.focal, n, row);
         if (own.hasTubes && &own != &row) frame_.k.finishRow(f.focal, n, own);
         const SurfacePlanes planes = planesOf(at);
-        SurfaceWants wants{isKept_, isKept_, isKept_, false};
-        for (const RowPass* step : steps_)
-            if (concerns(*step, planes)) step->wants(frame_, wants);
+        const SurfaceWants wants = wantsOf(planes);
         thread_local SurfaceRow surface{};
-        wants.depth = wants.depth || smooth != nullptr;
-        frame_.k.surfaceRow(f, own, row, planes, wants, x0, y, n, surface);
+        SurfaceWants made = wants;
+        made.depth = made.depth || smooth != nullptr;
+        frame_.k.surfaceRow(f, own, row, planes, made, x0, y, n, surface);
         if (smooth != nullptr && planes.smooth != nullptr) {
             thread_local SurfaceRow mean{};
-            frame_.k.surfaceRow(f, *smooth, *smooth, {}, wants, x0, y, n, mean);
+            frame_.k.surfaceRow(f, *smooth, *smooth, {}, made, x0, y, n, mean);
             frame_.k.smoothRow(f, *smooth, mean, planes, n, surface);
         }
         finish(at, planes, surface);
@@ -119,11 +108,18 @@ class RowProgram {
         const RowPlace at = placeOf(x0, n, y);
         const SurfacePlanes planes = planesOf(at);
         thread_local SurfaceRow surface{};
-        if (!takeRow(at, planes, surface)) return finishEmpty(at);
+        if (!takeRow(at, planes, wantsOf(planes), surface)) return finishEmpty(at);
         finish(at, planes, surface);
     }
 
   private:
+    /// What this run's passes want of surfaces, and those after it.
+    SurfaceWants wantsOf(const SurfacePlanes& planes) const {
+        SurfaceWants wants = isKept_ ? kept_ : SurfaceWants{};
+        for (const Step& step : steps_)
+            if (concerns(*step.pass, planes)) step.pass->wants(frame_, wants);
+        return wants;
+    }
     RowPlace placeOf(uint32_t x0, uint32_t n, uint32_t y) const {
         return {frame_, x0, y, n, size_t{y} * fine_.width + x0};
     }
@@ -134,39 +130,52 @@ class RowProgram {
     bool concerns(const RowPass& step, const SurfacePlanes& planes) const {
         return step.concerns == nullptr || step.concerns(frame_, planes);
     }
-    /// Second surfaces are lit as the first ones are, and mixed with them after that (without light: before output).
+    struct Step {
+        const RowPass* pass;
+        bool takesMixed;  ///< is about what pixels send: second surfaces are part of that
+    };
+    static bool takesMixed(render::Pass pass) {
+        const auto effect = render::effectOfPass(pass);
+        return pass == render::Pass::output || (effect && render::effects()[*effect]->stage == render::Stage::lit);
+    }
+    /// Second surfaces are lit as the first ones are, and mixed with them after that (without light: before what is
+    /// about what pixels send).
     void finish(const RowPlace& at, const SurfacePlanes& planes, SurfaceRow& surface) const {
         thread_local SurfaceRow second{};
-        const auto lights = [&](const RowPass* step) {
+        const auto lights = [&](const Step& step) {
             const bool isOne =
-                step == &cpuPassOf(render::Pass::light).row || step == &cpuPassOf(render::Pass::refract).row;
-            return isOne && concerns(*step, planes);
+                step.pass == &cpuPassOf(render::Pass::light).row || step.pass == &cpuPassOf(render::Pass::refract).row;
+            return isOne && concerns(*step.pass, planes);
         };
-        const bool isLit = std::any_of(steps_.begin(), steps_.end(), lights);
-        for (const RowPass* step : steps_) {
-            if (!concerns(*step, planes)) continue;
+        bool isMixed = false;
+        for (const Step& step : steps_) {
+            if (!concerns(*step.pass, planes)) continue;
             const bool isLight = lights(step);
-            const bool isMixed = isLight || (!isLit && step == &cpuPassOf(render::Pass::output).row);
-            const bool hasSeconds = isMixed && takeSeconds(at, surface, second);
-            if (hasSeconds && isLight) step->run(at, second);
+            const bool hasSeconds = !isMixed && (isLight || step.takesMixed) && takeSeconds(at, surface, second);
+            isMixed = isMixed || isLight || step.takesMixed;
+            if (hasSeconds && isLight) step.pass->run(at, second);
             if (hasSeconds && !isLight) mixSeconds(at, second, surface);
-            step->run(at, surface);
+            step.pass->run(at, surface);
             if (hasSeconds && isLight) mixSeconds(at, second, surface);
         }
-        if (isKept_) keepRow(at, surface);
+        if (!isKept_) return;
+        KeptRow kept = keptAt(frame_, at.first);
+        // Depths and normals stay what they were: other threads may be reading them, about their own pixels.
+        if (!isFirst_) kept.depth = nullptr;
+        frame_.k.keepRow(surface, kept_, at.n, kept);
     }
     void finishEmpty(const RowPlace& at) const {
-        if (isKept_)
-            std::fill_n(frame_.surfaceWords.data() + at.first, at.n, shared::SurfaceWords{});
-        else
-            empty_.copyTo(outputAt(frame_, at.first), at.n);
+        if (isKept_ && isFirst_) std::fill_n(keptAt(frame_, at.first).depth, at.n, 0.0f);
+        if (!isKept_) empty_.copyTo(outputAt(frame_, at.first), at.n);
     }
 
     Frame& frame_;
     Level& fine_;
     bool isKept_;
+    bool isFirst_;         ///< surfaces are made in this run; else an earlier one has kept them
+    SurfaceWants kept_{};  ///< of later passes
     ShadedRow empty_;
-    std::vector<const RowPass*> steps_;  ///< after the surface
+    std::vector<Step> steps_;  ///< after the surface
 };
 
 /// Does any pixel of the tile show a point of a node that is smooth?
@@ -180,10 +189,10 @@ bool showsWide(Frame& frame, const Level& shown, uint32_t x0, uint32_t n, uint32
 
 }  // namespace
 
-void runRows(Frame& frame, std::span<const render::Pass> passes) {
+void runRows(Frame& frame, std::span<const render::Pass> passes, std::span<const render::Pass> later) {
     Level& fine = frame.texels();
     const Planes planes = fine.planes();
-    const RowProgram program(frame, passes);
+    const RowProgram program(frame, passes, later);
     const bool isFromTexels = passes.front() == render::Pass::surface;
     frame.pyramid.forTiles(fine, [&](uint32_t x0, uint32_t n, uint32_t row0, uint32_t row1) {
         if (!isFromTexels) {
@@ -223,7 +232,7 @@ bool wantsNormals(const Frame& frame, std::span<const render::Pass> passes) {
     for (auto pass = surface; pass != passes.end(); ++pass) {
         if (*pass == render::Pass::surface) continue;
         const CpuPass& p = cpuPassOf(*pass);
-        if (p.run != nullptr) return true;  // over the frame: rows are kept for it, with all that they have
+        if (p.run != nullptr && p.row.wants == nullptr) return true;  // over the frame, with all that rows have
         if (p.row.concerns == nullptr || p.row.concerns(frame, planes)) p.row.wants(frame, wants);
     }
     return wants.normal;

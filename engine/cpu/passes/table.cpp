@@ -14,6 +14,8 @@ const CpuPass& cpuPassOf(render::Pass pass) {
     return *kTable.at(static_cast<size_t>(pass));
 }
 
+bool joinsRows(render::Pass pass) { return cpuPassOf(pass).run == nullptr && render::passInfo(pass).isOfOwnPixel; }
+
 const CpuKind& cpuKind(lod::Kind kind) {
     static constexpr std::array kTable{
 #define STIPPLE_KIND(name) &name##OnCpu,

@@ -9,6 +9,9 @@ namespace stipple::reference {
 struct RestatedEffect {
     /// On reconstructed surfaces, before light (Stage::surface). Null: nothing there.
     void (*onSurface)(const render::DrawList& draws, Level& level) = nullptr;
+    /// On what a pixel sends (Stage::lit); `depth`: there. Null: nothing there.
+    glm::dvec3 (*onSent)(const render::DrawList& draws, const glm::dvec3& sent, const glm::dvec2& pixel,
+                         double depth) = nullptr;
 };
 #define STIPPLE_EFFECT(name) extern const RestatedEffect name##Restated;
 #include "engine/render/effects/effects.inl"
@@ -16,5 +19,6 @@ struct RestatedEffect {
 
 /// Those of the frame, in their order.
 void applyOnSurface(const render::DrawList& draws, Level& level);
+glm::dvec3 applyOnSent(const render::DrawList& draws, const glm::dvec3& sent, const glm::dvec2& pixel, double depth);
 
 }  // namespace stipple::reference

@@ -275,6 +275,6 @@ void onSurface(const render::DrawList& draws, Level& level) {
 
 }  // namespace
 
-constinit const RestatedEffect refractionRestated{onSurface};
+constinit const RestatedEffect refractionRestated{.onSurface = onSurface};
 
 }  // namespace stipple::reference

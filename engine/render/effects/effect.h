@@ -7,6 +7,7 @@
 #include <span>
 
 #include "engine/render/content.h"
+#include "engine/render/effects/facts.h"
 #include "engine/render/passes.h"
 #include "engine/render/wind.h"
 #include "lod/cut/cut.h"
@@ -32,7 +33,8 @@ struct EffectNode {
 struct EffectFrame {
     FrameContent content;
     const DrawSettings& settings;
-    uint64_t nodes = 0;  ///< that feed the effect
+    const DrawList& draws;  ///< nodes, meshes and the view; its tables are not filled yet
+    uint64_t nodes = 0;     ///< that feed the effect
 };
 
 /// Where in a frame the passes of an effect run.
@@ -42,11 +44,39 @@ enum class Stage : uint8_t {
     lit       ///< on what they send
 };
 
+/// What an effect is told: NAME.PARAMETER=VALUE on the command line, a member of its object in scene files. Numbers
+/// (three where `count` is 3), or one of `words`, whose place is the value.
+struct Parameter {
+    const char* name;
+    const char* summary;  ///< with the unit
+    double least = 0, most = 0;
+    uint32_t count = 1;
+    std::span<const char* const> words{};
+    double* (*at)(DrawSettings& settings) = nullptr;  ///< the first of its numbers
+};
+
+/// A plane of its own, in a binding of its own (shaders/shared/bindings.h): room on the gpu, for `elements` of the
+/// frame. On the cpu: Frame::room.
+struct EffectPlane {
+    uint32_t binding;
+    uint64_t (*elements)(const DrawList& draws);
+};
+
+/// What an effect has taken is given back after so many frames without it.
+constexpr uint32_t kEffectHold = 60;
+
 struct Effect {
     const char* name;
     const char* summary;
     /// Null: where its name is among DrawSettings::effects.
     bool (*isRequested)(const DrawSettings& settings);
+    /// Where not --effects does: the option that asks for it.
+    const char* option = nullptr;
+    /// Takes the request of that option back, as `--effects none` does. Null: it is not left out.
+    void (*leaveOut)(DrawSettings& settings) = nullptr;
+    /// What of a scene calls for it under `auto`, in a few words; null: nothing. Null itself: nothing ever does.
+    const char* (*calledForBy)(const SceneFacts& facts) = nullptr;
+    std::span<const Parameter> parameters{};
     bool (*ofScene)(const EffectScene& scene);  ///< could any of it need the effect? Conservative
     bool (*ofFrame)(const EffectFrame& frame);  ///< does this frame show it?
     /// Does a node feed it, and how is that node moved? Still: it does not. Null: nodes do not matter.
@@ -54,10 +84,13 @@ struct Effect {
     /// Tables and constants that its passes read, in camera space. Null: none.
     void (*fill)(const DrawSettings& settings, const glm::dmat3& cameraFromWorld, DrawList& out);
     Stage stage;
-    std::span<const Pass> passes;  ///< of its own; what they read and write: passes.inl
+    std::span<const Pass> passes{};  ///< of its own; what they read and write: passes.inl
+    /// Bindings of the tables that only it fills (DrawList::tables, or what backends fill on their own).
+    std::span<const uint32_t> tables{};
+    std::span<const EffectPlane> planes{};
     /// Largest difference that the effect would make where a predicate says no: pixels of motion, and 1/255 of a
     /// colour.
-    double tolerancePixels, toleranceSteps;
+    double tolerancePixels = 0, toleranceSteps = 0;
 };
 
 /// Some of the effects of the table, by their places in it.

@@ -1,15 +1,19 @@
 // Environment: a picture of the surroundings (environment.h) in the place of the plain sky. Light's pass reads its
 // table.
+#include <array>
 #include <cmath>
 
 #include "engine/render/draw_list.h"
 #include "engine/render/effects/effect.h"
+#include "shaders/shared/bindings.h"
 
 namespace stipple::render {
 
 bool isLit(const EffectFrame& frame);  // effects/light.cpp
 
 namespace {
+
+constexpr std::array kTables{shared::kEnvironmentBinding};
 
 /// The environment's y is the scene's up, its -z as near to the scene's as that allows.
 void fill(const DrawSettings& settings, const glm::dmat3& cameraFromWorld, DrawList& out) {
@@ -32,12 +36,13 @@ extern const Effect environmentEffect;
 constinit const Effect environmentEffect{.name = "environment",
                                          .summary = "light and reflections of an HDR picture",
                                          .isRequested = [](const DrawSettings& s) { return s.environment != nullptr; },
+                                         .option = "--environment",
                                          .ofScene = [](const EffectScene& scene) { return !scene.instances.empty(); },
                                          .ofFrame = isLit,
                                          .ofNode = nullptr,
                                          .fill = fill,
                                          .stage = Stage::light,
-                                         .passes = {},
+                                         .tables = kTables,
                                          .tolerancePixels = 0,
                                          .toleranceSteps = 0};
 

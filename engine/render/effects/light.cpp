@@ -5,11 +5,13 @@
 #include "engine/render/draw_list.h"
 #include "engine/render/effects/effect.h"
 #include "engine/render/kinds/kind.h"
+#include "shaders/shared/bindings.h"
 
 namespace stipple::render {
 namespace {
 
 constexpr std::array kPasses{Pass::light};
+constexpr std::array kTables{shared::kLightsBinding};
 
 void fill(const DrawSettings& settings, const glm::dmat3& cameraFromWorld, DrawList& out) {
     constexpr double kPi = 3.14159265358979323846;
@@ -44,12 +46,14 @@ extern const Effect lightEffect;
 constinit const Effect lightEffect{.name = "light",
                                    .summary = "a sun, or the scene's own lights",
                                    .isRequested = [](const DrawSettings& s) { return s.lit || !s.unlitTriangles; },
+                                   .option = "--shade",
                                    .ofScene = [](const EffectScene& scene) { return !scene.instances.empty(); },
                                    .ofFrame = isLit,
                                    .ofNode = nullptr,
                                    .fill = fill,
                                    .stage = Stage::light,
                                    .passes = kPasses,
+                                   .tables = kTables,
                                    .tolerancePixels = 0,
                                    .toleranceSteps = 0};
 

@@ -5,6 +5,7 @@
 #include "engine/render/draw_list.h"
 #include "engine/render/effects/effect.h"
 #include "engine/render/layers.h"
+#include "shaders/shared/bindings.h"
 
 namespace stipple::render {
 
@@ -13,6 +14,8 @@ extern const Effect lightEffect, environmentEffect;
 namespace {
 
 constexpr std::array kPasses{Pass::refract};
+constexpr std::array kTables{shared::kLayerBinding, shared::kOpticsBinding, shared::kBehindBinding,
+                             shared::kBackBinding};
 
 void fill(const DrawSettings& settings, const glm::dmat3& cameraFromWorld, DrawList& out) {
     lightEffect.fill(settings, cameraFromWorld, out);
@@ -29,12 +32,14 @@ extern const Effect refractionEffect;
 constinit const Effect refractionEffect{.name = "refraction",
                                         .summary = "glass and water: what is behind them, bent",
                                         .isRequested = [](const DrawSettings& s) { return s.layer != nullptr; },
+                                        .option = "--material",
                                         .ofScene = [](const EffectScene& scene) { return !scene.instances.empty(); },
                                         .ofFrame = [](const EffectFrame& frame) { return !frame.content.isEmpty(); },
                                         .ofNode = nullptr,
                                         .fill = fill,
                                         .stage = Stage::light,
                                         .passes = kPasses,
+                                        .tables = kTables,
                                         .tolerancePixels = 0,
                                         .toleranceSteps = 0};
 

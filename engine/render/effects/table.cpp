@@ -38,6 +38,12 @@ const Effect* effectNamed(std::string_view name) {
     return nullptr;
 }
 
+std::optional<size_t> effectOfPass(Pass pass) {
+    for (size_t e = 0; e < kEffects.size(); ++e)
+        if (const auto of = kEffects.at(e)->passes; std::find(of.begin(), of.end(), pass) != of.end()) return e;
+    return {};
+}
+
 EffectSet allEffects() {
     return setOf([](size_t) { return true; });
 }
@@ -51,14 +57,15 @@ EffectSet requestedEffects(EffectSet scene, const DrawSettings& settings) {
         const Effect& effect = *kEffects.at(e);
         if (!scene.has(e)) return false;
         if (effect.isRequested) return effect.isRequested(settings);
-        return std::find(settings.effects.begin(), settings.effects.end(), effect.name) != settings.effects.end();
+        return std::any_of(settings.effects.begin(), settings.effects.end(),
+                           [&](const EffectRequest& r) { return r.name == effect.name; });
     });
 }
 
 EffectSet effectsOfFrame(EffectSet requested, const FrameContent& content, const DrawSettings& settings,
-                         std::span<const uint64_t> nodes) {
+                         const DrawList& draws, std::span<const uint64_t> nodes) {
     return setOf([&](size_t e) {
-        return requested.has(e) && kEffects.at(e)->ofFrame({content, settings, nodes.empty() ? 0 : nodes[e]});
+        return requested.has(e) && kEffects.at(e)->ofFrame({content, settings, draws, nodes.empty() ? 0 : nodes[e]});
     });
 }
 

@@ -1,6 +1,7 @@
 // The effects: a new one is a file of this folder with its manifest, and a line of the table (README.md).
 #pragma once
 
+#include <optional>
 #include <string_view>
 
 #include "engine/render/effects/effect.h"
@@ -11,6 +12,8 @@ namespace stipple::render {
 std::span<const Effect* const> effects();
 /// Null where there is none of that name.
 const Effect* effectNamed(std::string_view name);
+/// The place of the effect that a pass is of; none: every frame may have the pass.
+std::optional<size_t> effectOfPass(Pass pass);
 
 /// Those that a scene could show; without a scene: all.
 EffectSet effectsOfScene(const EffectScene& scene);
@@ -19,6 +22,6 @@ EffectSet allEffects();
 EffectSet requestedEffects(EffectSet scene, const DrawSettings& settings);
 /// Those of `requested` that a frame shows. `nodes`: how many feed each effect of the table.
 EffectSet effectsOfFrame(EffectSet requested, const FrameContent& content, const DrawSettings& settings,
-                         std::span<const uint64_t> nodes);
+                         const DrawList& draws, std::span<const uint64_t> nodes);
 
 }  // namespace stipple::render

@@ -11,6 +11,8 @@ constinit const Effect windEffect{
     .name = "wind",
     .summary = "plants bend in gusts",
     .isRequested = [](const DrawSettings& s) { return s.wind.strength > 0; },
+    .option = "--wind",
+    .leaveOut = [](DrawSettings& s) { s.wind.strength = 0; },
     .ofScene =
         [](const EffectScene& scene) {
             return std::any_of(scene.instances.begin(), scene.instances.end(),
@@ -23,7 +25,6 @@ constinit const Effect windEffect{
         },
     .fill = nullptr,
     .stage = Stage::surface,
-    .passes = {},
     .tolerancePixels = kLeastSway,
     .toleranceSteps = 255};
 

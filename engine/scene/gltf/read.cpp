@@ -9,6 +9,7 @@
 
 #include "engine/base/numbers.h"
 #include "engine/scene/gltf/check.h"
+#include "engine/scene/gltf/effects.h"
 #include "engine/scene/gltf/json_tools.h"
 #include "engine/scene/gltf/looks.h"
 #include "engine/scene/scene.h"
@@ -39,6 +40,7 @@ class Reader {
             scene_.meshes.push_back(std::move(m));
         }
         STIPPLE_TRY(readNodes());
+        gltf::readEffects(root_, scene_);
         for (const char* left : {"animations", "skins"})
             if (!arrayOf(root_, left).empty())
                 scene_.notes.push_back(fmt::format("{} are left out: {} of them", left, root_[left].size()));

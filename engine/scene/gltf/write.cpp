@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "engine/base/file.h"
+#include "engine/scene/gltf/effects.h"
 #include "engine/scene/scene.h"
 
 // The library is compiled elsewhere; its header is not clean of warnings.
@@ -45,6 +46,8 @@ class Writer {
                 model_.nodes[static_cast<size_t>(parent)].children.push_back(static_cast<int>(n));
         }
         addMoved();
+        if (const nlohmann::json asked = gltf::effectsAsJson(scene_.effects); !asked.is_null())
+            root.extras = Value(Value::Object{{"stipple", valueOf(asked)}});
         model_.scenes.push_back(root);
         model_.defaultScene = 0;
         std::sort(model_.extensionsUsed.begin(), model_.extensionsUsed.end());
@@ -57,6 +60,17 @@ class Writer {
         Value::Array a;
         for (size_t i = 0; i < n; ++i) a.emplace_back(v[i]);
         return Value(a);
+    }
+    static Value valueOf(const nlohmann::json& j) {
+        if (j.is_string()) return Value(j.get<std::string>());
+        if (j.is_number()) return Value(j.get<double>());
+        Value::Array list;
+        Value::Object object;
+        for (const auto& [key, member] : j.items()) {
+            list.push_back(valueOf(member));
+            object.emplace(key, list.back());
+        }
+        return j.is_array() ? Value(list) : Value(object);
     }
     static std::vector<double> doubles(const glm::vec3& v) { return {v.x, v.y, v.z}; }
     void use(const char* extension) {

@@ -1,0 +1,25 @@
+// What a scene is made of, as far as effects ask: it decides what `auto` calls for.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "lod/store/store.h"
+
+namespace stipple::render {
+
+struct DrawSettings;
+
+struct SceneFacts {
+    bool hasPoints = false, hasCurves = false, hasTriangles = false, hasPatches = false;
+    bool hasUnlitPoints = false;     ///< drawn as they are: their own colours, no light on them
+    bool hasUnlitTriangles = false;  ///< the same of triangles and patches
+    bool hasPointsWithoutNormals = false;
+    uint32_t lights = 0;  ///< of the scene's own
+};
+
+/// Of stores that are placed, with what the settings make of them.
+SceneFacts factsOf(std::span<const std::shared_ptr<const lod::Store>> stores, const DrawSettings& settings);
+
+}  // namespace stipple::render

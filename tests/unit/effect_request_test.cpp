@@ -1,0 +1,185 @@
+// Which effects are asked for: lists, parameters, scene files, what the scene is made of; and what is refused.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/render/draw_list.h"
+#include "engine/render/effects/request.h"
+#include "engine/render/effects/table.h"
+#include "engine/scene/scene.h"
+#include "tests/support/support.h"
+
+namespace stipple::render {
+namespace {
+
+SceneFacts unlitScan() {
+    SceneFacts facts;
+    facts.hasPoints = facts.hasUnlitPoints = true;
+    return facts;
+}
+std::vector<std::string> namesIn(const DrawSettings& s) {
+    std::vector<std::string> names;
+    for (const EffectRequest& r : s.effects) names.push_back(r.name);
+    return names;
+}
+using Names = std::vector<std::string>;
+
+struct Asked {
+    DrawSettings settings;
+    Names notes;
+};
+Asked ask(const EffectWishes& wishes, const SceneFacts& facts, const SceneWishes& scene = {}, DrawSettings from = {}) {
+    const auto notes = requestEffects(wishes, scene, facts, from);
+    EXPECT_TRUE(notes) << notes.error().line();
+    return {from, notes.value_or(Names{})};
+}
+void expectRefused(const EffectWishes& wishes, const Names& texts) {
+    const auto checked = checkWishes(wishes);
+    ASSERT_FALSE(checked) << wishes.list;
+    EXPECT_EQ(checked.error().kind, ErrorKind::usage);
+    for (const std::string& text : texts)
+        EXPECT_NE(checked.error().line().find(text), std::string::npos) << checked.error().line();
+}
+
+TEST(EffectRequests, AutoCallsForWhatTheSceneNeeds) {
+    EXPECT_TRUE(namesIn(ask({"auto", {}}, {}).settings).empty());
+    const Asked unlit = ask({"auto", {}}, unlitScan());
+    EXPECT_EQ(namesIn(unlit.settings), Names{"edl"});
+    EXPECT_EQ(unlit.settings.effects.front().by, "points that keep their colours");
+    SceneFacts bare;
+    bare.hasPoints = bare.hasPointsWithoutNormals = true;
+    EXPECT_EQ(namesIn(ask({"auto", {}}, bare).settings), Names{"edl"});
+    EXPECT_TRUE(namesIn(ask({"none", {}}, unlitScan()).settings).empty());
+    EXPECT_TRUE(namesIn(ask({"auto,-edl", {}}, unlitScan()).settings).empty());
+    EXPECT_EQ(namesIn(ask({"fog", {}}, unlitScan()).settings), Names{"fog"});
+    EXPECT_EQ(namesIn(ask({"auto,fog", {}}, unlitScan()).settings), (Names{"fog", "edl"}));
+}
+
+TEST(EffectRequests, WithoutAWordNothingIsCalledFor) {
+    EXPECT_EQ(EffectWishes{}.list, "scene");
+    EXPECT_TRUE(namesIn(ask({}, unlitScan()).settings).empty());
+    const SceneWishes scene{{"fog"}, {"fog.density=0.5"}, "a.gltf"};
+    EXPECT_EQ(namesIn(ask({}, unlitScan(), scene).settings), Names{"fog"});
+    EXPECT_EQ(namesIn(ask({"scene,-fog", {}}, unlitScan(), scene).settings), Names{});
+}
+
+TEST(EffectRequests, NoneLeavesOutWhatOptionsAskForAndSaysSo) {
+    DrawSettings windy;
+    windy.wind.strength = 0.1;
+    const Asked none = ask({"none", {}}, {}, {}, windy);
+    EXPECT_EQ(none.settings.wind.strength, 0);
+    ASSERT_EQ(none.notes.size(), 1u);
+    EXPECT_NE(none.notes.front().find("leaves wind out, whatever --wind says"), std::string::npos) << none.notes[0];
+    EXPECT_EQ(ask({"auto", {}}, {}, {}, windy).settings.wind.strength, 0.1);
+    EXPECT_EQ(ask({"fog", {}}, {}, {}, windy).settings.wind.strength, 0.1) << "its own option asks for it";
+    EXPECT_TRUE(ask({"none", {}}, {}).notes.empty()) << "nothing is left out";
+}
+
+TEST(EffectRequests, ParametersAskForTheirEffect) {
+    const Asked fog = ask({"auto", {"fog.density=0.25", "fog.colour=10,20,30", "tone.curve=filmic"}}, {});
+    EXPECT_EQ(namesIn(fog.settings), (Names{"fog", "tone"}));
+    EXPECT_EQ(fog.settings.parameters.fog.density, 0.25);
+    EXPECT_EQ(fog.settings.parameters.fog.colour, (std::array<double, 3>{10, 20, 30}));
+    EXPECT_EQ(fog.settings.parameters.tone.curve, 1);
+    // What a scene before has said is forgotten.
+    EXPECT_EQ(ask({"auto", {}}, {}, {}, fog.settings).settings.parameters.fog.density, 0);
+}
+
+TEST(EffectRequests, SceneFilesAreHeardUnderSceneAndAuto) {
+    const SceneWishes scene{{"fog", "nosuch"}, {"fog.density=0.5", "fog.density=nan"}, "a.gltf"};
+    const Asked heard = ask({"auto", {}}, {}, scene);
+    EXPECT_EQ(namesIn(heard.settings), Names{"fog"});
+    EXPECT_EQ(heard.settings.effects.front().by, "the scene file");
+    EXPECT_EQ(heard.settings.parameters.fog.density, 0.5);
+    EXPECT_EQ(heard.notes.size(), 2u);
+    for (const char* list : {"none", "edl"}) {
+        const Asked other = ask({list, {}}, {}, scene);
+        EXPECT_EQ(other.settings.parameters.fog.density, 0) << list;
+    }
+    // A person has the last word.
+    EXPECT_EQ(ask({"auto", {"fog.density=2"}}, {}, scene).settings.parameters.fog.density, 2);
+    EXPECT_TRUE(namesIn(ask({"auto,-fog", {}}, {}, scene).settings).empty());
+}
+
+TEST(EffectRequests, RefusesWhatIsUnknownContradictoryOrNoNumber) {
+    expectRefused({"fgo", {}}, {"'fgo' is not an effect", "--effects", "fog", "edl", "tone"});
+    expectRefused({"", {}}, {"'' is not an effect"});
+    expectRefused({"none,fog", {}}, {"asks for none and for some"});
+    expectRefused({"fog,-fog", {}}, {"asks for fog and leaves it out"});
+    expectRefused({"light", {}}, {"'light' is asked for by --shade"});
+    expectRefused({"none", {"fog.density=1"}}, {"fog is left out by --effects none"});
+    expectRefused({"edl", {"fog.density=1"}}, {"fog is left out by --effects edl"});
+    expectRefused({"auto", {"fog"}}, {"is not NAME.PARAMETER=VALUE"});
+    expectRefused({"auto", {"fog.thickness=1"}}, {"has no parameter 'thickness'", "fog.density"});
+    for (const char* bad : {"nan", "inf", "-inf", "-1", "", "1e400", "0x10", "1,2", "one"})
+        expectRefused({"auto", {std::string("fog.density=") + bad}}, {"fog.density may be: 0 to 1e+09"});
+    for (const char* bad : {"0", "nan", "inf", "9"})
+        expectRefused({"auto", {std::string("edl.radius=") + bad}}, {"edl.radius may be: 1 to 8"});
+    expectRefused({"auto", {"tone.curve=bright"}}, {"none, filmic"});
+    expectRefused({"auto", {"fog.colour=1,2"}}, {"three numbers"});
+    DrawSettings calm;
+    const auto wind = requestEffects({"wind", {}}, {}, {}, calm);
+    ASSERT_FALSE(wind);
+    EXPECT_NE(wind.error().line().find("wind needs --wind"), std::string::npos) << wind.error().line();
+}
+
+/// Every parameter of the table: its ends are taken, what is beyond them is not.
+TEST(EffectRequests, EveryParameterTakesWhatItSays) {
+    for (const Effect* e : effects())
+        for (const Parameter& p : e->parameters) {
+            const std::string name = std::string(e->name) + "." + p.name + "=";
+            const auto value = [&](const std::string& one) {
+                std::string all = one;
+                for (uint32_t i = 1; i < p.count; ++i) all += "," + one;
+                return all;
+            };
+            for (const char* word : p.words) EXPECT_TRUE(checkWishes({"auto", {name + word}})) << name << word;
+            if (p.words.empty())
+                for (const double end : {p.least, p.most})
+                    EXPECT_TRUE(checkWishes({"auto", {name + value(std::to_string(end))}})) << name << end;
+            EXPECT_FALSE(checkWishes({"auto", {name + value("nan")}})) << name;
+            if (p.words.empty())
+                EXPECT_FALSE(checkWishes({"auto", {name + value(std::to_string(p.most + 1 + std::abs(p.most)))}}))
+                    << name;
+        }
+}
+
+TEST(SceneEffects, ComeBackFromTheirFile) {
+    const test::TempFolder folder;
+    scene::Scene scene;
+    scene.nodes.emplace_back().name = "empty";
+    scene.effects = {{"fog", "edl"}, {"fog.density=0.25", "fog.colour=1,2,3", "tone.curve=filmic"}};
+    for (const char* name : {"a.gltf", "a.glb"}) {
+        ASSERT_TRUE(scene::writeGltf(scene, folder / name));
+        const auto back = scene::readGltf(folder / name);
+        ASSERT_TRUE(back) << back.error().line();
+        EXPECT_EQ(back->effects.names, scene.effects.names);
+        std::vector<std::string> values = back->effects.values;
+        std::sort(values.begin(), values.end());
+        EXPECT_EQ(values, (Names{"fog.colour=1,2,3", "fog.density=0.25", "tone.curve=filmic"}));
+    }
+}
+
+TEST(SceneEffects, OfAnotherShapeAreLeftOutWithANote) {
+    const test::TempFolder folder;
+    for (const char* extras :
+         {R"({"stipple": 3})", R"({"stipple": {"effects": "fog"}})", R"({"stipple": {"effects": [1]}})",
+          R"({"stipple": {"fog": 1}})", R"({"stipple": {"fog": {"density": {}}}})"}) {
+        test::spit(folder / "b.gltf", std::string(R"({"asset": {"version": "2.0"}, "scene": 0, "nodes": [{}],
+            "scenes": [{"nodes": [0], "extras": )") +
+                                          extras + "}]}");
+        const auto read = scene::readGltf(folder / "b.gltf");
+        ASSERT_TRUE(read) << extras << ": " << read.error().line();
+        EXPECT_TRUE(read->effects.names.empty() && read->effects.values.empty()) << extras;
+        EXPECT_EQ(read->notes.size(), 1u) << extras;
+    }
+    test::spit(folder / "c.gltf", R"({"asset": {"version": "2.0"}, "scene": 0, "nodes": [{}],
+        "scenes": [{"nodes": [0], "extras": "stipple"}]})");
+    const auto read = scene::readGltf(folder / "c.gltf");
+    ASSERT_TRUE(read);
+    EXPECT_TRUE(read->notes.empty()) << "somebody else's";
+}
+
+}  // namespace
+}  // namespace stipple::render
