@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "engine/gpu/pipelines.h"
 #include "engine/render/layers.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/wide_disc.h"
@@ -14,7 +15,8 @@ using namespace shared;
 
 constexpr VkBufferUsageFlags kStorage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
                              kFilled = kStorage | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
-                             kCopied = kStorage | VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
+                             kCopied = kStorage | VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                             kConstants = kStorage | VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT;
 
 bool has(const render::RenderRequest& request, render::Pass pass) {
     return std::find(request.passes.begin(), request.passes.end(), pass) != request.passes.end();
@@ -79,7 +81,7 @@ Result<void> FrameBuffers::preparePlanes(const render::RenderRequest& request) {
     uint64_t nodes = 0;
     for (const render::DrawBatch& batch : draws.batches) nodes += batch.nodes.size();
     const uint64_t blocks = draws.frame.firstBlock.of[kKindDiscs];
-    STIPPLE_TRY(ensure(nothing_, 0, kStorage, false, "nothing"));
+    STIPPLE_TRY(ensure(nothing_, 0, kConstants, false, "nothing"));
     STIPPLE_TRY(ensure(bound_[kFrameBinding], sizeof(FrameConstants), kStorage, true, "frame constants"));
     STIPPLE_TRY(ensure(bound_[kNodesBinding], gpu::bytesOf(kNodesBinding, nodes), kStorage, true, "draw nodes"));
     STIPPLE_TRY(ensure(bound_[kBlocksBinding], gpu::bytesOf(kBlocksBinding, blocks), kStorage, true, "draw blocks"));
@@ -177,7 +179,8 @@ Result<void> FrameBuffers::prepareLayer(const render::LayerTables& layer) {
 Result<void> FrameBuffers::prepareEffects(const render::DrawList& draws) {
     for (const render::EffectTable& table : draws.tables) {
         Buffer& buffer = bound_.at(table.binding);
-        STIPPLE_TRY(ensure(buffer, table.bytes.size(), kStorage, true, "table of an effect"));
+        STIPPLE_TRY(ensure(buffer, table.bytes.size(), isUniform(table.binding) ? kConstants : kStorage, true,
+                           "table of an effect"));
         std::memcpy(buffer.mapped(), table.bytes.data(), table.bytes.size());
     }
     for (size_t e = 0; e < render::effects().size(); ++e) {
@@ -232,8 +235,13 @@ void FrameBuffers::writeDescriptors() {
     std::array<VkWriteDescriptorSet, kBindings> writes{};
     for (uint32_t i = 0; i < kBindings; ++i) {
         infos.at(i) = {bound(i).handle(), 0, VK_WHOLE_SIZE};
-        writes.at(i) = {VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET, nullptr, set_,         i,      0, 1,
-                        VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,      nullptr, &infos.at(i), nullptr};
+        VkWriteDescriptorSet& write = writes.at(i);
+        write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+        write.dstSet = set_;
+        write.dstBinding = i;
+        write.descriptorCount = 1;
+        write.descriptorType = descriptorType(i);
+        write.pBufferInfo = &infos.at(i);
     }
     vkUpdateDescriptorSets(device_.device, kBindings, writes.data(), 0, nullptr);
     descriptorsChanged_ = false;

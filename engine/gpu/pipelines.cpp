@@ -12,7 +12,7 @@ Result<std::unique_ptr<Pipelines>> Pipelines::create(const Device& device) {
     std::unique_ptr<Pipelines> p(new Pipelines(device));
     std::array<VkDescriptorSetLayoutBinding, shared::kBindings> bindings{};
     for (uint32_t i = 0; i < shared::kBindings; ++i)
-        bindings.at(i) = {i, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
+        bindings.at(i) = {i, descriptorType(i), 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
     VkDescriptorSetLayoutCreateInfo setInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO};
     setInfo.bindingCount = shared::kBindings;
     setInfo.pBindings = bindings.data();
@@ -27,11 +27,13 @@ Result<std::unique_ptr<Pipelines>> Pipelines::create(const Device& device) {
     layoutInfo.pPushConstantRanges = &range;
     if (const VkResult r = vkCreatePipelineLayout(device.device, &layoutInfo, nullptr, &p->layout_); r != VK_SUCCESS)
         return vulkanError(r, "no pipeline layout");
-    const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, shared::kBindings * kMostInFlight};
+    const std::array<VkDescriptorPoolSize, 2> sizes{
+        {{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, (shared::kBindings - countUniform()) * kMostInFlight},
+         {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, countUniform() * kMostInFlight}}};
     VkDescriptorPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
     poolInfo.maxSets = kMostInFlight;
-    poolInfo.poolSizeCount = 1;
-    poolInfo.pPoolSizes = &size;
+    poolInfo.poolSizeCount = static_cast<uint32_t>(sizes.size());
+    poolInfo.pPoolSizes = sizes.data();
     if (const VkResult r = vkCreateDescriptorPool(device.device, &poolInfo, nullptr, &p->pool_); r != VK_SUCCESS)
         return vulkanError(r, "no descriptor pool");
     return p;

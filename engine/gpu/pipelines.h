@@ -15,6 +15,20 @@
 
 namespace stipple::gpu {
 
+/// Constants of effects are uniform buffers: of storage buffers many devices let a stage see 32 and no more
+/// (maxPerStageDescriptorStorageBuffers).
+constexpr bool isUniform(uint32_t binding) {
+    return binding == shared::kEdlBinding || binding == shared::kFogBinding || binding == shared::kToneBinding;
+}
+constexpr VkDescriptorType descriptorType(uint32_t binding) {
+    return isUniform(binding) ? VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+}
+constexpr uint32_t countUniform() {
+    uint32_t count = 0;
+    for (uint32_t b = 0; b < shared::kBindings; ++b) count += isUniform(b) ? 1 : 0;
+    return count;
+}
+
 class Pipelines {
   public:
     static Result<std::unique_ptr<Pipelines>> create(const Device& device);

@@ -5,7 +5,7 @@
 #include "../shared/edl.h"
 layout(local_size_x = 64) in;
 
-layout(set = 0, binding = kEdlBinding, scalar) readonly buffer EdlBlock { EdlConstants edl; };
+layout(set = 0, binding = kEdlBinding, scalar) uniform EdlBlock { EdlConstants edl; };
 
 float depthBeside(ivec2 pixel) {
     if (pixel.x < 0 || pixel.y < 0 || pixel.x >= int(frame.width) || pixel.y >= int(frame.height)) return kEdlFar;

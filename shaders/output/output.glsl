@@ -12,11 +12,11 @@ layout(set = 0, binding = kCoverageBinding, scalar) readonly buffer CoverageBloc
 layout(set = 0, binding = kSumsBinding, scalar) readonly buffer SumBlock { FilteredSums sums[]; };  // and second surfaces
 #ifdef FOG
 #include "../shared/fog.h"
-layout(set = 0, binding = kFogBinding, scalar) readonly buffer FogBlock { FogConstants fog; };
+layout(set = 0, binding = kFogBinding, scalar) uniform FogBlock { FogConstants fog; };
 #endif
 #ifdef TONE
 #include "../shared/tone.h"
-layout(set = 0, binding = kToneBinding, scalar) readonly buffer ToneBlock { ToneConstants tone; };
+layout(set = 0, binding = kToneBinding, scalar) uniform ToneBlock { ToneConstants tone; };
 #endif
 layout(local_size_x = 64) in;
 
