@@ -147,7 +147,7 @@ TEST(Words, TopicsExplainWhatConcernsSeveralCommands) {
     EXPECT_NE(runProgram(folder, "help exit-codes").out.find("7  interrupted"), std::string::npos);
     EXPECT_NE(runProgram(folder, "help formats").out.find(".laz"), std::string::npos);
     EXPECT_NE(runProgram(folder, "help json").out.find("stipple.error/2"), std::string::npos);
-    expectOneLine(runProgram(folder, "help xyzzy"), 2, {"topics: budgets, exit-codes, formats, json"});
+    expectOneLine(runProgram(folder, "help xyzzy"), 2, {"topics: budgets, effects, exit-codes, formats, json"});
 }
 
 TEST(Words, ErrorsAreJsonWhereThatIsAskedFor) {
