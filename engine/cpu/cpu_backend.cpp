@@ -47,6 +47,7 @@ class CpuBackend final : public render::DrawsAtOnce {
         chunks_.chunks.erase(Chunks::idOf(key));
     }
 
+    bool castsShadows() const override { return true; }
     render::BackendResources resources() const override {
         render::BackendResources r;
         r.meshBytes = frame_.surfacePixels * 4 + frame_.meshBlocks.size() * sizeof(MeshBlock);
@@ -59,6 +60,10 @@ class CpuBackend final : public render::DrawsAtOnce {
             r.effectBytes += frame_.effectRoom.bytesOf(e);
         }
         r.effectBytes += frame_.kept.bytes();
+        if (const auto shadow = render::effectOfPass(render::Pass::shadow)) {
+            r.effects[*shadow].bytes += frame_.shadowWords * sizeof(uint32_t);
+            r.effectBytes += frame_.shadowWords * sizeof(uint32_t);
+        }
         for (const auto& tiles : chunks_.tiles)
             r.textureTiles += static_cast<uint64_t>(
                 std::count_if(tiles.begin(), tiles.end(), [](const uint32_t* t) { return t != nullptr; }));
@@ -80,6 +85,8 @@ class CpuBackend final : public render::DrawsAtOnce {
             std::find(request.passes.begin(), request.passes.end(), render::Pass::smooth) != request.passes.end();
         times_.clear();
         const std::span<const render::Pass> passes(request.passes);
+        frame_.casts = passes.back() == render::Pass::cast;
+        prepareShadows(frame_);
         frame_.wantsNormals = wantsNormals(frame_, passes);
         beginEffects(passes);
         for (size_t p = 0; p < passes.size();) {

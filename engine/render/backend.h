@@ -81,6 +81,8 @@ class Backend : public streaming::ChunkSink {
     }
     /// Waits until a frame is drawn, whose picture stays where it is.
     virtual Result<void> finish(Ticket) { return {}; }
+    /// Does it draw what lights that cast shadows meet, and their masks? Elsewhere their light comes everywhere.
+    virtual bool castsShadows() const { return false; }
     virtual BackendResources resources() const { return {}; }
     /// Of the frame that was read or finished last.
     virtual const std::vector<PassTime>& passTimes() const = 0;

@@ -21,7 +21,7 @@ void addEffect(const std::string& name, Executor& executor, render::DrawSettings
 /// Asks for it as far as asking goes, where the frame has no use for it. False: such a frame is not known here.
 bool addUselessly(const std::string& name, render::DrawSettings& settings);
 
-/// Places in the table, of all but glass (whose layers are frames of their own: GlassImages).
+/// Places in the table, of all but glass and shadows (which draw frames of their own: GlassImages, ShadowBackends).
 std::vector<size_t> listedEffects();
 
 }  // namespace stipple::test

@@ -1,6 +1,7 @@
 // The tables of passes and of kinds, and those that are one dispatch over the picture.
 #include <array>
 
+#include "engine/base/check.h"
 #include "engine/gpu/passes/passes.h"
 
 namespace stipple::gpu {
@@ -24,6 +25,9 @@ const GpuKind& gpuKind(lod::Kind kind) {
 }
 
 constinit const GpuPass surfacePass{overEveryPixel};
+/// Lights cast no shadows here (Backend::castsShadows): no frame has these.
+constinit const GpuPass shadowPass{[](Recording&) { STIPPLE_CHECK(false, "a pass that this backend does not have"); }};
+constinit const GpuPass castPass{[](Recording&) { STIPPLE_CHECK(false, "a pass that this backend does not have"); }};
 constinit const GpuPass lightPass{overEveryPixel};
 constinit const GpuPass refractPass{overEveryPixel};
 constinit const GpuPass outputPass{overEveryPixel};
