@@ -13,6 +13,7 @@
 #include "apps/stipple/exposure_options.h"
 #include "apps/stipple/legend.h"
 #include "apps/stipple/mode_options.h"
+#include "apps/stipple/occlusion_options.h"
 #include "apps/stipple/outputs.h"
 #include "apps/stipple/ply_meshes.h"
 #include "apps/stipple/render_frames.h"
@@ -46,6 +47,7 @@ struct Options {
     TargetOptions target;
     CameraOptions camera;
     ExposureOptions exposure;
+    OcclusionOptions occlusion;
     BuildOptions build;
     ColourOptions colour;
     EnvironmentOptions environment;
@@ -99,6 +101,7 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
     s.draw.worldUp = shot.worldUp;
     s.draw.exactCurves = static_cast<float>(o.curveExact);
     s.draw.effects = o.effects;
+    s.draw.occlusion = o.occlusion.of(d);
     s.draw.wind = {o.wind, o.seconds, render::windAcross(shot.worldUp)};
     STIPPLE_ASSIGN(const glm::dvec3 background, backgroundOf(o));
     for (int c = 0; c < 3; ++c)
@@ -481,6 +484,7 @@ void setupRender(CLI::App& app, int& status) {
     o->material.addTo(*sub, "all points, instead of their own");
     o->environment.addTo(*sub);
     addEffects(*sub, o->effects);
+    o->occlusion.addTo(*sub);
     addReading(*sub, *o);
     sub->callback([o, sub, &status] {
         Written written;

@@ -504,6 +504,7 @@ void setupView(CLI::App& app, int& status) {
     sub->add_option("--size", o->size, "of the window, pixels")->type_name("WxH")->capture_default_str();
     o->drawn.addTo(*sub, false);  // (any key M may come to ewa: its options stand for when it does)
     addEffects(*sub, o->effects);
+    o->occlusion.addTo(*sub);
     sub->add_option("--error", o->error, "tolerated screen-space error, pixels")
         ->transform(positive())
         ->capture_default_str();

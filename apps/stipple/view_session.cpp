@@ -26,6 +26,7 @@ void ViewSession::restart(render::FrameSettings& settings) {
     state_ = render::makeFrameState(scene_.placed, backend_, executor_, stream, scene_.groups);
     settings.draw.lights = scene_.lights;
     settings.draw.worldUp = d.up;
+    settings.draw.occlusion = options_.occlusion.of(d);
     settings.draw.wind.towards = render::windAcross(d.up);
     settings.draw.unlitTriangles =
         options_.shade == "unlit" || (options_.shade == "auto" && isLightInPatches(scene_.placed));

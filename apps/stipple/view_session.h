@@ -6,6 +6,7 @@
 #include "apps/stipple/common.h"
 #include "apps/stipple/legend.h"
 #include "apps/stipple/mode_options.h"
+#include "apps/stipple/occlusion_options.h"
 #include "apps/stipple/view_keys.h"
 
 namespace stipple::app {
@@ -25,6 +26,7 @@ struct ViewOptions {
     ColourOptions colour;
     EnvironmentOptions environment;
     MaterialOptions material;
+    OcclusionOptions occlusion;
 };
 
 class ViewSession {

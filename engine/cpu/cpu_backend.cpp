@@ -53,7 +53,7 @@ class CpuBackend final : public render::DrawsAtOnce {
         r.emissiveBytes = frame_.emissivePixels * 4;
         r.curveBytes =
             frame_.curveBlocks.capacity() * sizeof(CurveBlock) + frame_.wide.capacity() * sizeof(FilledCurve);
-        r.effectBytes = frame_.surfaceWordPixels * sizeof(shared::SurfaceWords);
+        r.effectBytes = frame_.surfaceWordPixels * sizeof(shared::SurfaceWords) + 16 * frame_.aoEntries;
         for (const auto& tiles : chunks_.tiles)
             r.textureTiles += static_cast<uint64_t>(
                 std::count_if(tiles.begin(), tiles.end(), [](const uint32_t* t) { return t != nullptr; }));

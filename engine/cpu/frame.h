@@ -100,6 +100,10 @@ struct Frame {
     size_t surfacePixels = 0, emissivePixels = 0;
     HugeBuffer<shared::SurfaceWords> surfaceWords;  ///< Plane::surface, only where rows are kept between passes
     size_t surfaceWordPixels = 0;
+    HugeBuffer<float> aoDepth, aoOpen, aoMean;  ///< AoPlanes, only where there is ambient occlusion
+    HugeBuffer<uint32_t> aoNormal;
+    size_t aoEntries = 0;
+    uint32_t aoPitch = 0;
 
     /// Are there blended discs?
     bool isBlended() const { return mode->blendsSplats && !blocks.empty(); }

@@ -101,6 +101,11 @@ Result<void> FrameBuffers::prepareLists(const render::RenderRequest& request) {
     if (listsDiscs(request))
         STIPPLE_TRY(
             ensure(bound_[kDiscsBinding], gpu::bytesOf(kDiscsBinding, kDiscCapacity), kFilled, false, "wide discs"));
+    if (has(request, render::Pass::occlusion)) {
+        const FrameConstants& f = request.draws->frame;
+        const uint64_t asked = uint64_t{(f.width + f.aoEdge - 1) / f.aoEdge} * ((f.height + f.aoEdge - 1) / f.aoEdge);
+        STIPPLE_TRY(ensure(bound_[kOpenBinding], gpu::bytesOf(kOpenBinding, 2 * asked), kStorage, false, "occlusion"));
+    }
     if (has(request, render::Pass::ewa)) {
         const uint64_t pixels = uint64_t{request.draws->frame.width} * request.draws->frame.height;
         STIPPLE_TRY(ensure(bound_[kFrontsBinding], gpu::bytesOf(kFrontsBinding, pixels), kFilled, false, "fronts"));

@@ -51,7 +51,8 @@ class GpuBackend final : public render::Backend {
             const FrameBuffers& b = slot->buffers();
             r.curveBytes += b.bytesOf({kWideBinding});
             r.effectBytes += b.bytesOf(
-                {kLightsBinding, kEnvironmentBinding, kLayerBinding, kOpticsBinding, kBehindBinding, kBackBinding});
+                {kLightsBinding, kEnvironmentBinding, kLayerBinding, kOpticsBinding, kBehindBinding, kBackBinding,
+                 kOpenBinding});
             r.meshBytes += b.bytesOf({kMeshesBinding, kClustersBinding, kMaterialsBinding, kTexturesBinding,
                                       kTilesBinding, kTriangleWordsBinding, kLargeBinding});
         }

@@ -63,6 +63,7 @@ static_assert(isLaidOut(shared::kLayerBinding, sizeof(shared::LayerConstants)));
 static_assert(isLaidOut(shared::kOpticsBinding, sizeof(shared::Optic)));
 static_assert(isLaidOut(shared::kBehindBinding, sizeof(float)));
 static_assert(isLaidOut(shared::kBackBinding, sizeof(float)));
+static_assert(isLaidOut(shared::kOpenBinding, sizeof(float)));
 static_assert(isLaidOut(shared::kSurfaceBinding, sizeof(shared::SurfaceWords)));
 
 }  // namespace

@@ -17,7 +17,7 @@ static_assert(sizeof(shared::PointRecord) == 16);
 static_assert(sizeof(shared::DrawNode) == 96);
 static_assert(sizeof(shared::DrawBlock) == 8);
 static_assert(sizeof(shared::CurveSegment) == 32);
-static_assert(sizeof(shared::FrameConstants) == 196 + sizeof(shared::BlockRanges));
+static_assert(sizeof(shared::FrameConstants) == 204 + sizeof(shared::BlockRanges));
 static_assert(sizeof(shared::MeshVertex) == 32);
 static_assert(sizeof(shared::MeshCluster) == 12);
 static_assert(sizeof(shared::DrawMesh) == 120);
@@ -228,6 +228,8 @@ void addEffects(EffectSet requested, std::span<const uint64_t> fed, const glm::d
     f.lightCount = 0;
     f.hasEnvironment = 0;
     f.environmentSharp = 0;
+    f.aoRadius = 0;
+    f.aoEdge = 1;
     f.ambient = 1;
     out.effects = effectsOfFrame(requested, contentOf(out), settings, fed);
     for (size_t e = 0; e < effects().size(); ++e)
@@ -264,6 +266,7 @@ FrameContent contentOf(const DrawList& draws) {
     });
     content.hasWideDiscs = draws.hasWideDiscs;
     content.hasSmoothDiscs = draws.hasSmoothDiscs;
+    content.nearestPixels = draws.view.focalPixels / (draws.view.isOrthographic ? 1 : draws.view.nearPlane);
     return content;
 }
 

@@ -111,6 +111,12 @@ inline constexpr std::array<uint8_t, 3> kBackground{39, 39, 44};
 /// The same, linear.
 glm::vec3 linearBackground();
 
+/// Ambient occlusion (effects/occlusion.cpp).
+struct Occlusion {
+    double radius = 0;    ///< world units: what is farther hides nothing; above 0
+    bool isFull = false;  ///< of every pixel; else of every second one both ways
+};
+
 struct DrawSettings {
     bool lit = false;  ///< points; triangles are, unless their material says otherwise
     bool unlitTriangles = false;
@@ -135,6 +141,7 @@ struct DrawSettings {
     Wind wind;                         ///< moves what setSway was told of
     uint32_t coverageSeed = 0;         ///< of curves narrower than a pixel
     std::vector<std::string> effects;  ///< that are asked for by their names
+    Occlusion occlusion;               ///< of effect `occlusion`
 };
 
 /// What a frame of these draws calls for.

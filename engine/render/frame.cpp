@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <set>
 #include <thread>
 #include <unordered_map>
@@ -185,6 +186,15 @@ Result<void> checkFilter(const DrawSettings& s) {
     return {};
 }
 
+Result<void> checkOcclusion(const DrawSettings& s) {
+    const bool isAsked = std::find(s.effects.begin(), s.effects.end(), "occlusion") != s.effects.end();
+    const double radius = s.occlusion.radius;
+    if (isAsked && !(radius > 0 && std::isfinite(static_cast<float>(radius))))
+        return fail(ErrorKind::usage, "is no radius of ambient occlusion", fmt::format("{}", radius),
+                    "give a length above 0, of the world's units");
+    return {};
+}
+
 Result<void> drawPicture(FrameState& state, const RenderRequest& request) {
     if (request.staysOnDevice) {  // where that fails, what was there before is
         STIPPLE_ASSIGN(state.onDevice, state.backend->submit(request));
@@ -223,6 +233,7 @@ Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettin
         return fail(ErrorKind::device, "what draws the scene is gone", "the frame",
                     "keep the backend while it is used");
     STIPPLE_TRY(checkFilter(settings.draw));
+    STIPPLE_TRY(checkOcclusion(settings.draw));
     uint64_t passes = 0;
     if (hasLayers(state, view, settings)) {
         STIPPLE_ASSIGN(passes, drawLayered(state, view, settings));

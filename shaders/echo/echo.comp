@@ -74,6 +74,8 @@ void putFrame() {
     put(frame.hasMaterials);
     put(frame.patchAs);
     put(frame.environmentSharp);
+    put(frame.aoRadius);
+    put(frame.aoEdge);
 }
 
 void putNode() {

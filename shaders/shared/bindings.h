@@ -34,7 +34,8 @@ const uint kLayerBinding = 26u;
 const uint kOpticsBinding = 27u;
 const uint kBehindBinding = 28u;
 const uint kBackBinding = 29u;
-const uint kBindings = 30u;
+const uint kOpenBinding = 30u;
+const uint kBindings = 31u;
 
 // Per pixel:
 const uint kTexelWords = 5u;     // planes of a packed texel; in frames with materials of points one more

@@ -143,6 +143,8 @@ struct FrameConstants {
     uint hasMaterials;      // some points have materials
     uint patchAs;           // kPatch...
     uint environmentSharp;  // edge of the sharpest map of the environment (environment.h); 0: none
+    float aoRadius;         // world units (occlusion.h); 0: there is no ambient occlusion
+    uint aoEdge;            // px, both ways, between those that are asked for it: 1 or 2
 };
 SHARED_FN Lens frameLens(FrameConstants f) { return lensOf(f.focal, f.orthographic != 0u); }
 

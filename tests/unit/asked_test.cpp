@@ -161,6 +161,22 @@ TEST_F(Asked, LensesAndExposuresThatBlurNothingAreRefused) {
     EXPECT_EQ(jsonOf(render("--aperture 0.5 --focus 3 --json"))["accumulated"], 64);
 }
 
+TEST_F(Asked, AmbientOcclusionOfNoRadiusIsRefused) {
+    const std::string lit = "--effect occlusion --shade lit ";
+    for (const char* radius : {"0", "-1", "inf", "nan", "x"})
+        expectOneLine(render(lit + fmt::format("--occlusion-radius={}", radius)), 2, {"--occlusion-radius"});
+    expectOneLine(render("--occlusion-radius 0.1"), 2, {"--occlusion-radius", "--effect"});
+    expectOneLine(render(lit + "--occlusion-resolution third"), 2, {"--occlusion-resolution", "third"});
+    expectOneLine(render("--mode reference --samples 1 --effect occlusion"), 2, {"--effect", "full detail"});
+    const auto passes = [](const std::string& options) {
+        return jsonOf(render(options + " --json"))["counters"]["passes"].get<int>();
+    };
+    const int without = passes("--shade lit");
+    EXPECT_EQ(passes(lit), without + 1);
+    EXPECT_EQ(passes(lit + "--occlusion-radius 1e-9"), without) << "less than a pixel";
+    EXPECT_EQ(passes("--effect occlusion --shade unlit"), passes("--shade unlit")) << "it is a part of light";
+}
+
 TEST_F(Asked, ADemoMakesItsFolder) {
     const Outcome r = runProgram(folder(), "grow demo -o new/demo --points 5k --leaves 1k");
     EXPECT_EQ(r.code, 0) << r.err;

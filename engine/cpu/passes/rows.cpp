@@ -54,6 +54,7 @@ bool takeRow(const RowPlace& at, const SurfacePlanes& planes, SurfaceRow& row) {
     row.hasTriangles = planes.surface != nullptr;
     row.hasEmission = planes.surface != nullptr && planes.emissive != nullptr;
     row.hasMaterials = at.frame.constants.hasMaterials != 0;
+    row.hasOcclusion = at.frame.constants.aoRadius > 0;
     bool any = false;
     for (size_t i = 0; i < at.n; ++i) {
         const shared::SurfaceWords& w = words[i];

@@ -2,6 +2,7 @@
 // run. Each has its manifest here (`nameEffect`), and an entry of the oracle (`nameRestated`, engine/reference/effects),
 // which the linker asks for; its passes have theirs as any pass (../passes.inl).
 STIPPLE_EFFECT(wind)
+STIPPLE_EFFECT(occlusion)
 STIPPLE_EFFECT(light)
 STIPPLE_EFFECT(environment)
 STIPPLE_EFFECT(refraction)
