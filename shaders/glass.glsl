@@ -27,7 +27,7 @@ vec3 glassColour(SurfaceWords words, vec3 colour, vec3 normal, uvec2 pixel) {
     s.leaf = 0.0;
     s.dielectric = o.straightOn;
     const vec3 point = alongRay(ray, words.depth);
-    vec3 lit = opticLight(frame, layer, o, s, point, withLights(vec3(0.0), opaqueShare(s, o), point));
+    vec3 lit = opticLight(frame, layer, o, s, point, withLights(vec3(0.0), opaqueShare(s, o), point, pixel));
     if (isTriangle) {
         const uint e = triangleWords[2u * (pixel.y * frame.width + pixel.x) + 1u];
         lit += vec3(unpackRed(e), unpackGreen(e), unpackBlue(e));

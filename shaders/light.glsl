@@ -1,29 +1,40 @@
 // Light on a pixel of the surface buffer, to the eye.
-#include "surface.glsl"
+#include "shadow.glsl"
 
 layout(set = 0, binding = kLightsBinding, scalar) readonly buffer LightBlock { LightSource lights[]; };
 layout(set = 0, binding = kTriangleWordsBinding, scalar) readonly buffer TriangleBlock { uint triangleWords[]; };  // two a pixel
 layout(set = 0, binding = kEnvironmentBinding, scalar) readonly buffer EnvironmentBlock { float environment[]; };
 #include "shared/environment.h"
+layout(set = 0, binding = kShadowMaskBinding, scalar) readonly buffer ShadowMaskBlock { uint shadowMask[]; };
+
+// Is what is lit a surface beside that of the pixel, which the masks know nothing of?
+bool isSecondSurface = false;
+
+// What of the light is not in shadow.
+vec3 notInShadow(LightSource light, Surface s, vec3 point, uvec2 pixel) {
+    if (light.shadow == 0u) return vec3(1.0);
+    if (isSecondSurface) return lightOfSlot(light.shadow - 1u, point, s.normal);
+    return unpackLight(shadowMask[((light.shadow - 1u) * frame.height + pixel.y) * frame.width + pixel.x]);
+}
 
 // `colour`, and what lights of the scene's own, or the sun, send back.
-vec3 withLights(vec3 colour, Surface s, vec3 point) {
+vec3 withLights(vec3 colour, Surface s, vec3 point, uvec2 pixel) {
     if (frame.lightCount == 0u && frame.hasEnvironment == 0u) colour += reflectLight(s, frame.sunDirection, vec3(0.75));
     for (uint k = 0u; k < frame.lightCount; ++k) {
         const LightSource light = lights[k];
         const vec3 l = light.kind == kLightDirectional ? light.position : light.position - point;
-        colour += reflectLight(s, normalize(l), light.colour * lightAt(light, point, point.z));
+        colour += reflectLight(s, normalize(l), light.colour * notInShadow(light, s, point, pixel) * lightAt(light, point, point.z));
     }
     return colour;
 }
 
-vec3 lightOf(Surface s, vec3 point) {
+vec3 lightOf(Surface s, vec3 point, uvec2 pixel) {
     vec3 colour;
     if (frame.hasEnvironment != 0u)
         colour = frame.ambient * reflectEnvironment(s, frame.environmentX, frame.environmentY, frame.environmentZ, frame.environmentSharp);
     else
         colour = frame.ambient * reflectSky(s, frame.skyDirection);
-    return withLights(colour, s, point);
+    return withLights(colour, s, point, pixel);
 }
 
 // `colour`, `normal`: of the words.
@@ -45,7 +56,7 @@ vec3 litColour(SurfaceWords words, vec3 colour, vec3 normal, uvec2 pixel) {
     s.occlusion = float(words.material >> 16 & 255u) / 255.0;
     s.leaf = leaf;
     s.dielectric = vec3(kDielectric);
-    vec3 lit = lightOf(s, alongRay(ray, words.depth));
+    vec3 lit = lightOf(s, alongRay(ray, words.depth), pixel);
     if (isTriangle) {
         const uint e = triangleWords[2u * (pixel.y * frame.width + pixel.x) + 1u];
         lit += vec3(unpackRed(e), unpackGreen(e), unpackBlue(e));

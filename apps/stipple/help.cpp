@@ -140,11 +140,12 @@ void arrangeOptions(CLI::App& command) {
                      "--orbit", "--frames", "--aperture", "--focus", "--shutter"});
     group("Accuracy and budgets (stipple help budgets)",
           {"--error", "--budget-points", "--resident", "--no-wait", "--curve-exact", "--accumulate", "--samples"});
-    group("Picture", {"--size",         "--mode",     "--lowpass",     "--kernel",
-                      "--normalise",    "--patch-as", "--interpolate", "--shade",
-                      "--background",   "--alpha",    "--colour",      "--colour-map",
-                      "--colour-range", "--legend",   "--environment", "--environment-scale",
-                      "--refract",      "--wind",     "--time",        "--debug"});
+    group("Picture", {"--size",         "--mode",     "--lowpass",       "--kernel",
+                      "--normalise",    "--patch-as", "--interpolate",   "--shade",
+                      "--background",   "--alpha",    "--colour",        "--colour-map",
+                      "--colour-range", "--legend",   "--environment",   "--environment-scale",
+                      "--sun",          "--sun-size", "--shadow-texels", "--refract",
+                      "--wind",         "--time",     "--debug"});
     group("Inputs that are not built yet",
           {"--memory", "--temp", "--duplicates", "--threads", "--normals", "--radii", "--up", "--attributes",
            "--surfels", "--curve-radius", "--only-points", "--skip-bad", "--drop-outliers", "--allow-outside",

@@ -17,6 +17,7 @@
 #include "apps/stipple/ply_meshes.h"
 #include "apps/stipple/render_frames.h"
 #include "apps/stipple/scene_facts.h"
+#include "apps/stipple/sun_options.h"
 #include "engine/base/file.h"
 #include "engine/base/process.h"
 #include "engine/base/text.h"
@@ -49,6 +50,7 @@ struct Options {
     BuildOptions build;
     ColourOptions colour;
     EnvironmentOptions environment;
+    SunOptions sun;
     MaterialOptions material;
 };
 
@@ -70,6 +72,7 @@ Result<void> checkArguments(const Options& o) {
     STIPPLE_TRY(o.camera.check());
     STIPPLE_TRY(o.exposure.check(o.camera, o.wind > 0));
     STIPPLE_TRY(o.material.check(o.shade));
+    STIPPLE_TRY(o.sun.check(o.shade));
     if (o.target.isAny() && o.drawn.mode == "reference")
         return fail(ErrorKind::usage, "traces the full detail, whatever it takes", "--mode reference",
                     "leave out --target-ms and --target-error");
@@ -97,6 +100,7 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
         s.draw.lit = true;
     }
     s.draw.worldUp = shot.worldUp;
+    o.sun.applyTo(s.draw);
     s.draw.exactCurves = static_cast<float>(o.curveExact);
     s.draw.effects = o.effects;
     s.draw.wind = {o.wind, o.seconds, render::windAcross(shot.worldUp)};
@@ -124,6 +128,9 @@ nlohmann::json countersJson(const FrameCounters& c) {
             {"proxies", c.proxies},
             {"group_members", c.groupMembers},
             {"nodes_swaying", c.nodesSwaying},
+            {"shadow_maps", c.shadowMaps},
+            {"shadow_maps_drawn", c.shadowMapsDrawn},
+            {"shadow_lights_left", c.shadowLightsLeft},
             {"cut_evaluations", c.cutEvaluations},
             {"passes", c.passes},
             {"blocks", c.blocks},
@@ -332,7 +339,7 @@ Result<void> run(const Options& o, Written& written) {
     if (!shot.note.empty() && !o.quiet) fmt::print(stderr, "note: {}\n", printable(shot.note));
     STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
     STIPPLE_ASSIGN(render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
-    if (o.shade == "auto" && isLightInPatches(scene.placed)) settings.draw.unlitTriangles = true;
+    if (o.shade == "auto" && !o.sun.isGiven() && isLightInPatches(scene.placed)) settings.draw.unlitTriangles = true;
     STIPPLE_ASSIGN(settings.draw.environment, openEnvironment(o.environment, o.build.reading().memoryBytes, *executor,
                                                               hasMirrors(scene.placed, o.material.material())));
     const Legend legend = o.colour.legend ? makeLegend(colour, description) : Legend{};
@@ -480,6 +487,7 @@ void setupRender(CLI::App& app, int& status) {
     o->colour.addTo(*sub);
     o->material.addTo(*sub, "all points, instead of their own");
     o->environment.addTo(*sub);
+    o->sun.addTo(*sub);
     addEffects(*sub, o->effects);
     addReading(*sub, *o);
     sub->callback([o, sub, &status] {

@@ -30,6 +30,7 @@ void ViewSession::restart(render::FrameSettings& settings) {
     settings.draw.unlitTriangles =
         options_.shade == "unlit" || (options_.shade == "auto" && isLightInPatches(scene_.placed));
     settings.draw.lit = isLit(options_.shade, d, colour_);
+    options_.sun.applyTo(settings.draw);
     if (const auto material = options_.material.material()) {
         settings.draw.pointMaterial = lod::packed(*material);
         settings.draw.optics = material->optics;

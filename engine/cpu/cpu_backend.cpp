@@ -53,7 +53,7 @@ class CpuBackend final : public render::DrawsAtOnce {
         r.emissiveBytes = frame_.emissivePixels * 4;
         r.curveBytes =
             frame_.curveBlocks.capacity() * sizeof(CurveBlock) + frame_.wide.capacity() * sizeof(FilledCurve);
-        r.effectBytes = frame_.surfaceWordPixels * sizeof(shared::SurfaceWords);
+        r.effectBytes = frame_.surfaceWordPixels * sizeof(shared::SurfaceWords) + frame_.shadowWords * sizeof(uint32_t);
         for (const auto& tiles : chunks_.tiles)
             r.textureTiles += static_cast<uint64_t>(
                 std::count_if(tiles.begin(), tiles.end(), [](const uint32_t* t) { return t != nullptr; }));
@@ -75,6 +75,8 @@ class CpuBackend final : public render::DrawsAtOnce {
             std::find(request.passes.begin(), request.passes.end(), render::Pass::smooth) != request.passes.end();
         times_.clear();
         const std::span<const render::Pass> passes(request.passes);
+        frame_.casts = passes.back() == render::Pass::cast;
+        prepareShadows(frame_);
         frame_.wantsNormals = wantsNormals(frame_, passes);
         for (size_t p = 0; p < passes.size();) {
             const double start = nowSeconds();

@@ -101,6 +101,15 @@ struct Frame {
     HugeBuffer<shared::SurfaceWords> surfaceWords;  ///< Plane::surface, only where rows are kept between passes
     size_t surfaceWordPixels = 0;
 
+    HugeBuffer<uint32_t> shadows;  ///< Plane::shadows: a picture for each light that casts
+    size_t shadowWords = 0;
+    uint64_t shadowKey = 0;     ///< DrawList::shadowKey that they are of; 0: of none
+    bool keepsShadows = false;  ///< they are those of this frame
+    bool casts = false;         ///< the frame is what a light sees
+    std::vector<shared::ShadowMap> shadowMaps;
+    std::vector<const float*> shadowDepths;
+    std::vector<const uint32_t*> shadowThrough;
+
     /// Are there blended discs?
     bool isBlended() const { return mode->blendsSplats && !blocks.empty(); }
     SecondPixels seconds() {

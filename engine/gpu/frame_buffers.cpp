@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "engine/render/layers.h"
+#include "engine/render/shadow_frame.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/wide_disc.h"
 
@@ -50,6 +51,7 @@ Result<void> FrameBuffers::prepare(const render::RenderRequest& request, const R
     if (draws.hasSurfaces()) STIPPLE_TRY(prepareMeshes(draws, residents));
     if (!draws.lights.empty()) STIPPLE_TRY(fill(kLightsBinding, draws.lights.data(), draws.lights.size(), "lights"));
     STIPPLE_TRY(prepareEnvironment(draws.environment));
+    STIPPLE_TRY(prepareShadows(draws));
     if (draws.glass) STIPPLE_TRY(prepareLayer(*draws.glass));
     if (descriptorsChanged_) writeDescriptors();
     return {};
@@ -160,6 +162,47 @@ Result<void> FrameBuffers::prepareEnvironment(const std::shared_ptr<const render
     const std::vector<float>& table = environment->table;
     STIPPLE_TRY(fill(kEnvironmentBinding, table.data(), table.size(), "environment"));
     environment_ = environment;
+    return {};
+}
+
+/// Maps are copied where they are others than those of the last frame; masks stay as long as nothing that they are of
+/// has changed.
+Result<void> FrameBuffers::prepareShadows(const render::DrawList& draws) {
+    keepsShadows_ = false;
+    if (draws.shadows.empty()) return {};
+    STIPPLE_TRY(fill(kShadowMapsBinding, draws.shadows.data(), draws.shadows.size(), "shadow maps"));
+    const std::vector<render::ShadowMapOf>& maps = draws.shadowMaps->maps;
+    uint64_t texels = 0, through = 0;
+    for (const render::ShadowMapOf& map : maps) {
+        texels += map.texels->depth.size();
+        if (!map.texels->through.empty()) through = texels;
+    }
+    const bool isLarger = bound_[kShadowDepthsBinding].bytes() < gpu::bytesOf(kShadowDepthsBinding, texels) ||
+                          bound_[kShadowThroughBinding].bytes() < gpu::bytesOf(kShadowThroughBinding, through);
+    STIPPLE_TRY(ensure(bound_[kShadowDepthsBinding], gpu::bytesOf(kShadowDepthsBinding, texels), kStorage, true,
+                       "depths of shadow maps"));
+    if (through > 0)
+        STIPPLE_TRY(ensure(bound_[kShadowThroughBinding], gpu::bytesOf(kShadowThroughBinding, through), kStorage, true,
+                           "leaves of shadow maps"));
+    if (isLarger) shadowTexels_.clear();
+    shadowTexels_.resize(maps.size());
+    for (size_t m = 0; m < maps.size(); ++m) {
+        if (shadowTexels_[m] == maps[m].texels) continue;
+        const render::ShadowTexels& from = *maps[m].texels;
+        const uint32_t first = draws.shadows[m].first;
+        std::memcpy(static_cast<float*>(bound_[kShadowDepthsBinding].mapped()) + first, from.depth.data(),
+                    from.depth.size() * sizeof(float));
+        if (!from.through.empty())
+            std::memcpy(static_cast<uint32_t*>(bound_[kShadowThroughBinding].mapped()) + first, from.through.data(),
+                        from.through.size() * sizeof(uint32_t));
+        shadowTexels_[m] = maps[m].texels;
+    }
+    const uint64_t words = uint64_t{draws.shadowSlots} * draws.frame.width * draws.frame.height;
+    if (bound_[kShadowMaskBinding].bytes() < gpu::bytesOf(kShadowMaskBinding, words)) shadowKey_ = 0;
+    STIPPLE_TRY(
+        ensure(bound_[kShadowMaskBinding], gpu::bytesOf(kShadowMaskBinding, words), kStorage, false, "shadow masks"));
+    keepsShadows_ = draws.shadowKey != 0 && draws.shadowKey == shadowKey_;
+    shadowKey_ = draws.shadowKey;
     return {};
 }
 

@@ -11,6 +11,10 @@
 #include "engine/render/backend.h"
 #include "engine/render/patch_planes.h"
 
+namespace stipple::render {
+struct ShadowTexels;
+}
+
 namespace stipple::gpu {
 
 /// A level of the pyramid; `offset` in words.
@@ -43,6 +47,8 @@ class FrameBuffers {
     const std::vector<Level>& levels() const { return levels_; }
     /// Offset in words, in frames with Pass::smooth: that of what pixels show, while the levels are of smooth discs.
     uint32_t texelsOfPixels() const { return texelsOfPixels_; }
+    /// The masks are those of this frame already.
+    bool keepsShadows() const { return keepsShadows_; }
     uint32_t clusters() const { return static_cast<uint32_t>(meshFrame_.clusters.size()); }
     uint64_t residentTiles() const;
     /// Of some bindings.
@@ -54,6 +60,7 @@ class FrameBuffers {
     Result<void> prepareLists(const render::RenderRequest& request);
     Result<void> prepareMeshes(const render::DrawList& draws, const Residents& residents);
     Result<void> prepareEnvironment(const std::shared_ptr<const render::Environment>& environment);
+    Result<void> prepareShadows(const render::DrawList& draws);
     Result<void> prepareLayer(const render::LayerTables& layer);
     void fillDraws(const render::DrawList& draws, const Residents& residents);
     template <typename T>
@@ -63,7 +70,10 @@ class FrameBuffers {
     const Device& device_;
     VkDescriptorSet set_;
     std::array<Buffer, shared::kBindings> bound_;
-    std::shared_ptr<const render::Environment> environment_;  ///< that is in its buffer
+    std::shared_ptr<const render::Environment> environment_;                 ///< that is in its buffer
+    std::vector<std::shared_ptr<const render::ShadowTexels>> shadowTexels_;  ///< that are in their buffers
+    uint64_t shadowKey_ = 0;  ///< DrawList::shadowKey that the masks are of; 0: of none
+    bool keepsShadows_ = false;
     Buffer readback_, staging_, nothing_;
     std::vector<Level> levels_;
     uint32_t texelsOfPixels_ = 0;

@@ -50,8 +50,9 @@ class GpuBackend final : public render::Backend {
         for (const auto& slot : slots_) {
             const FrameBuffers& b = slot->buffers();
             r.curveBytes += b.bytesOf({kWideBinding});
-            r.effectBytes += b.bytesOf(
-                {kLightsBinding, kEnvironmentBinding, kLayerBinding, kOpticsBinding, kBehindBinding, kBackBinding});
+            r.effectBytes += b.bytesOf({kLightsBinding, kEnvironmentBinding, kLayerBinding, kOpticsBinding,
+                                        kBehindBinding, kBackBinding, kShadowMapsBinding, kShadowDepthsBinding,
+                                        kShadowThroughBinding, kShadowMaskBinding});
             r.meshBytes += b.bytesOf({kMeshesBinding, kClustersBinding, kMaterialsBinding, kTexturesBinding,
                                       kTilesBinding, kTriangleWordsBinding, kLargeBinding});
         }

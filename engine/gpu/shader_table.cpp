@@ -8,6 +8,7 @@
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
 #include "shaders/shared/optics.h"
+#include "shaders/shared/shadow.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/texture.h"
 #include "shaders/shared/wide_disc.h"
@@ -52,6 +53,10 @@ static_assert(isLaidOut(shared::kTilesBinding, sizeof(TileAddress)));
 static_assert(isLaidOut(shared::kLightsBinding, sizeof(shared::LightSource)));
 static_assert(isLaidOut(shared::kTriangleWordsBinding, sizeof(uint32_t)));
 static_assert(isLaidOut(shared::kEnvironmentBinding, sizeof(float)));
+static_assert(isLaidOut(shared::kShadowMapsBinding, sizeof(shared::ShadowMap)));
+static_assert(isLaidOut(shared::kShadowDepthsBinding, sizeof(float)));
+static_assert(isLaidOut(shared::kShadowThroughBinding, sizeof(uint32_t)));
+static_assert(isLaidOut(shared::kShadowMaskBinding, sizeof(uint32_t)));
 static_assert(isLaidOut(shared::kDiscsBinding, sizeof(shared::WideDisc)));
 static_assert(isLaidOut(shared::kFrontsBinding, sizeof(shared::FilteredFront)));
 static_assert(isLaidOut(shared::kSumsBinding, sizeof(shared::FilteredSums)));

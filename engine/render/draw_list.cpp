@@ -17,7 +17,7 @@ static_assert(sizeof(shared::PointRecord) == 16);
 static_assert(sizeof(shared::DrawNode) == 96);
 static_assert(sizeof(shared::DrawBlock) == 8);
 static_assert(sizeof(shared::CurveSegment) == 32);
-static_assert(sizeof(shared::FrameConstants) == 196 + sizeof(shared::BlockRanges));
+static_assert(sizeof(shared::FrameConstants) == 204 + sizeof(shared::BlockRanges));
 static_assert(sizeof(shared::MeshVertex) == 32);
 static_assert(sizeof(shared::MeshCluster) == 12);
 static_assert(sizeof(shared::DrawMesh) == 120);
@@ -88,6 +88,10 @@ void clear(DrawList& out) {
     out.environment.reset();
     out.layer = nullptr;
     out.glass.reset();
+    out.shadowMaps.reset();
+    out.shadows.clear();
+    out.shadowSlots = 0;
+    out.shadowKey = 0;
     out.bends.clear();
     out.swaying = 0;
     out.hasWideDiscs = out.hasSmoothDiscs = false;
@@ -229,6 +233,7 @@ void addEffects(EffectSet requested, std::span<const uint64_t> fed, const glm::d
     f.hasEnvironment = 0;
     f.environmentSharp = 0;
     f.ambient = 1;
+    f.shadowMaps = f.shadowSlots = 0;
     out.effects = effectsOfFrame(requested, contentOf(out), settings, fed);
     for (size_t e = 0; e < effects().size(); ++e)
         if (out.effects.has(e) && effects()[e]->fill != nullptr) effects()[e]->fill(settings, cameraFromWorld, out);

@@ -39,4 +39,10 @@ std::vector<Pass> passesOf(Mode mode, const FrameContent& content, EffectSet ofF
     return passes;
 }
 
+std::vector<Pass> passesOfCasters(const FrameContent& content) {
+    std::vector<Pass> passes = passesOf(kCasterMode, content, {});
+    passes.back() = Pass::cast;
+    return passes;
+}
+
 }  // namespace stipple::render

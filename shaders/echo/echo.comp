@@ -74,6 +74,8 @@ void putFrame() {
     put(frame.hasMaterials);
     put(frame.patchAs);
     put(frame.environmentSharp);
+    put(frame.shadowMaps);
+    put(frame.shadowSlots);
 }
 
 void putNode() {
@@ -115,6 +117,7 @@ void putLight() {
     put(light.axis);
     put(light.cosInner);
     put(light.cosOuter);
+    put(light.shadow);
 }
 
 void putVertex() {

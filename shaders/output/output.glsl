@@ -18,7 +18,9 @@ void mixSecond(uint kind, SecondSurface second, uvec2 pixel, inout SurfaceWords 
     const vec3 n = octDecode(second.shown.normal);
     vec3 c = vec3(unpackRed(second.shown.albedo), unpackGreen(second.shown.albedo), unpackBlue(second.shown.albedo));
 #ifdef LIT
+    isSecondSurface = true;
     c = litColour(second.shown, c, n, pixel);
+    isSecondSurface = false;
 #endif
 #ifdef REFRACTED
     c = glassColour(second.shown, c, n, pixel);

@@ -34,7 +34,11 @@ const uint kLayerBinding = 26u;
 const uint kOpticsBinding = 27u;
 const uint kBehindBinding = 28u;
 const uint kBackBinding = 29u;
-const uint kBindings = 30u;
+const uint kShadowMapsBinding = 30u;
+const uint kShadowDepthsBinding = 31u;
+const uint kShadowThroughBinding = 32u;
+const uint kShadowMaskBinding = 33u;
+const uint kBindings = 34u;
 
 // Per pixel:
 const uint kTexelWords = 5u;     // planes of a packed texel; in frames with materials of points one more

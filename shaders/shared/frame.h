@@ -143,6 +143,8 @@ struct FrameConstants {
     uint hasMaterials;      // some points have materials
     uint patchAs;           // kPatch...
     uint environmentSharp;  // edge of the sharpest map of the environment (environment.h); 0: none
+    uint shadowMaps;        // of lights that cast shadows (shadow.h)
+    uint shadowSlots;       // such lights
 };
 SHARED_FN Lens frameLens(FrameConstants f) { return lensOf(f.focal, f.orthographic != 0u); }
 
@@ -156,6 +158,7 @@ struct LightSource {
     vec3 axis;    // spot: where it points
     float cosInner;
     float cosOuter;
+    uint shadow;  // 1 + the slot of its mask (shadow.h); 0: nothing stands in its way
 };
 const uint kLightDirectional = 0u;
 const uint kLightPoint = 1u;

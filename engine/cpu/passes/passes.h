@@ -51,6 +51,11 @@ const CpuKind& cpuKind(lod::Kind kind);
 /// is kept for later passes, unless it is the picture.
 void runRows(Frame& frame, std::span<const render::Pass> passes);
 
+/// Tables of the maps of lights that cast shadows, before any pass; room for the masks, and whether they still hold.
+void prepareShadows(Frame& frame);
+/// Masks of surfaces that are seen beside those of the pixels: they are not kept.
+void shadowSeconds(const RowPlace& at, SurfaceRow& second);
+
 /// Does any of the passes read normals of the surface?
 bool wantsNormals(const Frame& frame, std::span<const render::Pass> passes);
 

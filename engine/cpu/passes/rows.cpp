@@ -79,7 +79,7 @@ class RowProgram {
     RowProgram(Frame& frame, std::span<const render::Pass> passes)
         : frame_(frame),
           fine_(frame.texels()),
-          isKept_(passes.back() != render::Pass::output),
+          isKept_(!render::passInfo(passes.back()).writes.has(render::Plane::image)),
           empty_(emptyRow(frame)) {
         for (const render::Pass pass : passes)
             if (pass != render::Pass::surface) steps_.push_back(&cpuPassOf(pass).row);
@@ -104,6 +104,7 @@ class RowProgram {
         for (const RowPass* step : steps_)
             if (concerns(*step, planes)) step->wants(frame_, wants);
         thread_local SurfaceRow surface{};
+        surface.shadowSlots = 0;
         wants.depth = wants.depth || smooth != nullptr;
         frame_.k.surfaceRow(f, own, row, planes, wants, x0, y, n, surface);
         if (smooth != nullptr && planes.smooth != nullptr) {
@@ -119,6 +120,7 @@ class RowProgram {
         const RowPlace at = placeOf(x0, n, y);
         const SurfacePlanes planes = planesOf(at);
         thread_local SurfaceRow surface{};
+        surface.shadowSlots = 0;
         if (!takeRow(at, planes, surface)) return finishEmpty(at);
         finish(at, planes, surface);
     }
@@ -148,7 +150,10 @@ class RowProgram {
             const bool isLight = lights(step);
             const bool isMixed = isLight || (!isLit && step == &cpuPassOf(render::Pass::output).row);
             const bool hasSeconds = isMixed && takeSeconds(at, surface, second);
-            if (hasSeconds && isLight) step->run(at, second);
+            if (hasSeconds && isLight) {
+                if (!frame_.shadowMaps.empty()) shadowSeconds(at, second);
+                step->run(at, second);
+            }
             if (hasSeconds && !isLight) mixSeconds(at, second, surface);
             step->run(at, surface);
             if (hasSeconds && isLight) mixSeconds(at, second, surface);

@@ -24,6 +24,10 @@ const GpuKind& gpuKind(lod::Kind kind) {
 }
 
 constinit const GpuPass surfacePass{overEveryPixel};
+constinit const GpuPass shadowPass{[](Recording& f) {
+    if (!f.buffers().keepsShadows()) overEveryPixel(f);
+}};
+constinit const GpuPass castPass{overEveryPixel};
 constinit const GpuPass lightPass{overEveryPixel};
 constinit const GpuPass refractPass{overEveryPixel};
 constinit const GpuPass outputPass{overEveryPixel};

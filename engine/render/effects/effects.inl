@@ -3,5 +3,6 @@
 // which the linker asks for; its passes have theirs as any pass (../passes.inl).
 STIPPLE_EFFECT(wind)
 STIPPLE_EFFECT(light)
+STIPPLE_EFFECT(shadow)
 STIPPLE_EFFECT(environment)
 STIPPLE_EFFECT(refraction)

@@ -1,4 +1,5 @@
 // Light: a sun over the viewer's shoulder, or lights of the scene's own, on what is not drawn as it is.
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -28,7 +29,9 @@ void fill(const DrawSettings& settings, const glm::dmat3& cameraFromWorld, DrawL
         out.lights.push_back(l);
     }
     out.frame.lightCount = static_cast<uint32_t>(out.lights.size());
-    if (!out.lights.empty()) out.frame.ambient = kAmbientBesideLights;
+    const bool isSunny =
+        std::any_of(settings.lights.begin(), settings.lights.end(), [](const auto& l) { return l.isSun; });
+    if (!out.lights.empty() && !isSunny) out.frame.ambient = kAmbientBesideLights;
 }
 
 }  // namespace
