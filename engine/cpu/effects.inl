@@ -18,10 +18,10 @@ void edlLogs(const EdlConstants& constants, const float* __restrict depth, uint3
 #pragma GCC ivdep
     for (size_t i = 0; i < n; ++i) {
         const float d = here[i];
-        const float across = max(d - left[i], 0.0f) + max(d - right[i], 0.0f) + max(d - above[i], 0.0f) +
-                             max(d - below[i], 0.0f);
-        const float slant = max(d - aboveLeft[i], 0.0f) + max(d - aboveRight[i], 0.0f) +
-                            max(d - belowLeft[i], 0.0f) + max(d - belowRight[i], 0.0f);
+        const float across =
+            max(d - left[i], 0.0f) + max(d - right[i], 0.0f) + max(d - above[i], 0.0f) + max(d - below[i], 0.0f);
+        const float slant = max(d - aboveLeft[i], 0.0f) + max(d - aboveRight[i], 0.0f) + max(d - belowLeft[i], 0.0f) +
+                            max(d - belowRight[i], 0.0f);
         sum[i] += weight * (across + slant);
     }
 }
