@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 
@@ -28,16 +29,33 @@ namespace fs = std::filesystem;
 struct Usual {
     std::vector<std::string> sizes;
     std::vector<double> errors;
+    std::vector<uint64_t> budgets;
     uint32_t views, blocks, frames, samples;
 };
-const Usual kQuick{{"640x360"}, {0.5, 1, 2, 4, 8}, 1, 6, 3, 2};
-const Usual kMiddle{{"1280x720"}, {0.5, 1, 2, 4, 8}, 2, 6, 10, 3};
-const Usual kFull{{"1280x720", "1920x1080", "3840x2160"}, {0.25, 0.5, 1, 2, 4, 8, 16}, 4, 12, 25, 4};
+const Usual kQuick{{"640x360"}, {0.5, 1, 2, 4, 8}, {50'000, 200'000, 800'000}, 1, 6, 3, 2};
+const Usual kMiddle{{"1280x720"}, {0.5, 1, 2, 4, 8}, {125'000, 500'000, 2'000'000}, 2, 6, 10, 3};
+const Usual kFull{{"1280x720", "1920x1080", "3840x2160"},
+                  {0.25, 0.5, 1, 2, 4, 8, 16},
+                  {500'000, 1'000'000, 2'000'000, 4'000'000, 8'000'000, 16'000'000},
+                  4,
+                  12,
+                  25,
+                  4};
 /// Where frames cost as their pixels, records and triangles do: two sizes, one camera a path.
-const Usual kCalibration{{"640x360", "1280x720"}, {0.5, 1, 2, 4, 8}, 1, 3, 3, 1};
+const Usual kCalibration{{"640x360", "1280x720"}, {0.5, 1, 2, 4, 8}, {}, 1, 3, 3, 1};
 const Usual& usualOf(const StudyOptions& o) {
     return o.calibrate ? kCalibration : o.quick ? kQuick : o.full ? kFull : kMiddle;
 }
+
+/// A way to build scenes that is studied beside the usual one.
+struct BuildVariant {
+    std::string name;
+    void (*set)(BuildOptions&);
+};
+const std::array<BuildVariant, 4> kBuilds{{{"usual", [](BuildOptions&) {}},
+                                           {"fine-normals", [](BuildOptions& b) { b.normals = "fine"; }},
+                                           {"given-radii", [](BuildOptions& b) { b.radii = "keep"; }},
+                                           {"merged", [](BuildOptions& b) { b.duplicates = "merge"; }}}};
 
 Result<study::StudySettings> settingsOf(const StudyOptions& o) {
     const Usual& usual = usualOf(o);
@@ -48,6 +66,16 @@ Result<study::StudySettings> settingsOf(const StudyOptions& o) {
     s.targets.erase(std::unique(s.targets.begin(), s.targets.end()), s.targets.end());
     for (const double t : s.targets)
         if (!(t >= 0.01 && t <= 1000)) return fail(ErrorKind::usage, "are pixels, 0.01 to 1000", "--errors");
+    if (o.budgets.empty()) s.budgets = usual.budgets;
+    for (const std::string& text : o.budgets) {
+        if (text == "none" && o.budgets.size() == 1) break;
+        const auto records = parseCount(text);
+        if (!records || *records == 0)
+            return fail(ErrorKind::usage, "are numbers of records, or none", "--budgets " + text, "e.g. 500k,2M");
+        s.budgets.push_back(*records);
+    }
+    std::sort(s.budgets.begin(), s.budgets.end());
+    s.budgets.erase(std::unique(s.budgets.begin(), s.budgets.end()), s.budgets.end());
     for (const std::string& text : o.sizes.empty() ? usual.sizes : o.sizes) {
         STIPPLE_ASSIGN(const glm::uvec2 size, parseSize(text));
         s.sizes.push_back(size);
@@ -80,6 +108,7 @@ Result<study::StudyScene> studySceneOf(const std::string& input, const StudyOpti
     STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(opened, "auto", "", ""));
     study::StudyScene s;
     s.name = printable(fs::path(input).filename().string());
+    if (!isSceneFile(input) && hasPoints(opened.placed)) s.source = input;
     s.hash = sceneHash(opened);
     s.draw.lights = opened.lights;
     s.draw.lit = isLit("auto", opened.description, colour);
@@ -131,6 +160,18 @@ void StudyOptions::addTo(CLI::App& sub) {
     sub.add_option("--modes", modes, "modes to study, with commas (all)")->delimiter(',')->check(oneOf(names));
     sub.add_option("--errors", errors, "errors asked for, pixels, with commas")->delimiter(',')->type_name("PX,PX");
     sub.add_option("--sizes", sizes, "sizes of pictures, with commas")->delimiter(',')->type_name("WxH,WxH");
+    sub.add_option("--budgets", budgets,
+                   "records drawn at most, with commas: what the first mode shows within them; none: no budgets")
+        ->delimiter(',')
+        ->type_name("N,N");
+    names.clear();
+    for (const BuildVariant& v : kBuilds) names.emplace_back(v.name);
+    sub.add_option(
+           "--builds", builds,
+           "how scenes are built, with commas, each scene studied once for each: usual; fine-normals (each from "
+           "its own neighbours); given-radii (none are estimated); merged (one point a place)")
+        ->delimiter(',')
+        ->check(oneOf(names));
     sub.add_option("--views", views, "cameras of each of orbit, dolly, fly-through and grazing")
         ->transform(within(1, 1000));
     sub.add_option("--camera-path", path, "JSON file with a path of your own instead (stipple render --help)")
@@ -178,11 +219,16 @@ Result<void> runSceneStudy(const StudyOptions& o) {
     STIPPLE_ASSIGN(const auto backend, makeBackend(o.device, *executor));
     std::vector<study::StudyScene> scenes;
     bool isAnyPoints = false;
-    for (const std::string& input : o.scenes) {
-        STIPPLE_ASSIGN(study::StudyScene scene, studySceneOf(input, o, *executor));
-        isAnyPoints = isAnyPoints || hasPoints(scene.placed);
-        scenes.push_back(std::move(scene));
-    }
+    for (const std::string& input : o.scenes)
+        for (const std::string& name : o.builds.empty() ? std::vector<std::string>{"usual"} : o.builds) {
+            StudyOptions with = o;
+            for (const BuildVariant& v : kBuilds)
+                if (v.name == name) v.set(with.build);
+            STIPPLE_ASSIGN(study::StudyScene scene, studySceneOf(input, with, *executor));
+            if (name != "usual") scene.name += " (" + name + ")";
+            isAnyPoints = isAnyPoints || hasPoints(scene.placed);
+            scenes.push_back(std::move(scene));
+        }
     if (!isAnyPoints && o.modes.empty()) settings.modes.resize(1);  // modes are ways of drawing points
     const study::Provenance provenance = provenanceOf(*executor, *backend);
     STIPPLE_TRY(study::claimFolder(scenes, settings, provenance));

@@ -13,6 +13,8 @@ struct StudyOptions {
     std::string output, device = "cpu", resident = "1G", path;
     std::vector<std::string> modes, sizes;
     std::vector<double> errors;
+    std::vector<std::string> budgets;  ///< empty: as many as --quick and --full say
+    std::vector<std::string> builds;   ///< names of ways to build scenes; empty: the usual one
     bool quick = false, full = false, calibrate = false, json = false, quiet = false;
     uint32_t blocks = 0, frames = 0, views = 0;  ///< 0: as many as --quick and --full say
     uint64_t seed = 1;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "apps/study/audit/audit.h"
+#include "apps/study/audit/originals.h"
 #include "engine/base/rng.h"
 #include "engine/cpu/cpu_backend.h"
 #include "engine/reference/reference.h"
@@ -250,6 +251,35 @@ TEST(BoundAudit, PicturesOfCurvesKeepTheirBoundFromTheOriginalCurves) {
                   300u)
             << "the control: curves that were 5 % farther out";
     }
+}
+
+/// What a store keeps of its points, held against the points themselves; a record that is moved by a step, a normal
+/// that is turned and a colour that is changed are found.
+TEST(OriginalsAudit, FindsWhatIsNotKept) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(0);
+    test::writePly(folder / "a.ply", test::bumpySphere(3'000, 2, {4.1e6, 5.2e5, 4.9e6}));
+    const auto store = test::buildAndOpen(folder / "a.ply", folder / "a.stipple", *executor);
+    auto originals = study::readOriginals(folder / "a.ply", 10'000);
+    ASSERT_TRUE(originals) << originals.error().line();
+    const auto kept = study::auditOriginals(*originals, *store);
+    ASSERT_TRUE(kept);
+    EXPECT_EQ(kept->points, 3'000u);
+    EXPECT_EQ(kept->records, 3'000u);
+    EXPECT_EQ(kept->normals, 3'000u);
+    EXPECT_EQ(kept->colours, 3'000u);
+    EXPECT_EQ(kept->beyond(), 0u) << kept->worstRounding << " of " << kept->statedRounding << ", " << kept->worstNormal;
+    EXPECT_GT(kept->worstRounding, 0.3 * kept->statedRounding) << "the bound is not idle";
+    originals->place[7].x += 2 * kept->statedRounding;
+    originals->normal[8] =
+        glm::normalize(originals->normal[8] + 5e-3 * glm::cross(originals->normal[8], dvec3(1, 0, 0)));
+    originals->colour[9][1] ^= 1;
+    const auto spoilt = study::auditOriginals(*originals, *store);
+    ASSERT_TRUE(spoilt);
+    EXPECT_EQ(spoilt->placeBeyond, 1u);
+    EXPECT_EQ(spoilt->normalBeyond, 1u);
+    EXPECT_EQ(spoilt->colourBeyond, 1u);
+    EXPECT_FALSE(study::readOriginals(folder / "a.ply", 100)) << "too many";
 }
 
 }  // namespace

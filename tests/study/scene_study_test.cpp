@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -55,7 +56,7 @@ size_t linesOf(const std::string& path) {
 
 constexpr const char* kSmall =
     "study ring.ply --modes surface,pullpush --errors 1,4 --sizes 96x64 --views 1 --blocks 2 "
-    "--frames 2 --quiet ";
+    "--frames 2 --budgets 500,2k --quiet ";
 
 void writeScene(const test::TempFolder& folder) {
     test::writePly(folder / "ring.ply", test::samplesOf(test::Shape::torus, 4'000, 3));
@@ -69,8 +70,9 @@ TEST(SceneStudy, WritesRowsFiguresAndAReportThatStandsAlone) {
     const nlohmann::json j = nlohmann::json::parse(r.out, nullptr, false);
     ASSERT_TRUE(j.is_object());
     EXPECT_EQ(j["schema"], "stipple.scene-study/2");
-    EXPECT_EQ(j["plan"]["cells"], 4 * 2 * 2);
+    EXPECT_EQ(j["plan"]["cells"], 4 * (2 * 2 + 2));
     ASSERT_EQ(j["configurations"].size(), 4u);
+    ASSERT_EQ(j["budgets"].size(), 2u);
     const auto& surface = j["configurations"][0];
     EXPECT_EQ(surface["mode"], "surface");
     EXPECT_GT(surface["ms"]["median"], 0);
@@ -83,16 +85,46 @@ TEST(SceneStudy, WritesRowsFiguresAndAReportThatStandsAlone) {
     EXPECT_FALSE(j["provenance"]["processor"].get<std::string>().empty());
     EXPECT_EQ(j["provenance"]["program"].get<std::string>().size(), 16u);
     EXPECT_EQ(j["scenes"][0]["content"].get<std::string>().size(), 16u);
-    EXPECT_EQ(linesOf(folder / "s/rows.csv"), 1u + 16 * 2 * 2) << "a row a frame";
-    EXPECT_EQ(linesOf(folder / "s/errors.csv"), 1u + 16);
+    EXPECT_GT(surface["errors"]["flicker_mean"], 0);
+    // Budgets: fewer records, and what they leave of the error is stated and kept.
+    const auto stated = [](const nlohmann::json& of) {
+        const nlohmann::json& px = of["errors"]["stated_px"];
+        return px.is_string() ? std::numeric_limits<double>::infinity() : px.get<double>();
+    };
+    double coarser = stated(surface);
+    for (const size_t k : {1, 0}) {
+        const auto& within = j["budgets"][k];
+        EXPECT_EQ(within["records_at_most"], k == 0 ? 500 : 2000);
+        EXPECT_LE(within["errors"]["records"], within["records_at_most"]);
+        EXPECT_GE(stated(within), coarser);
+        EXPECT_EQ(within["errors"]["beyond_pixels"], 0);
+        coarser = stated(within);
+    }
+    EXPECT_GT(coarser, 2);
+    // Every point of the file, against the store.
+    ASSERT_EQ(j["originals"].size(), 1u);
+    const size_t points = test::samplesOf(test::Shape::torus, 4'000, 3).size();
+    EXPECT_EQ(j["originals"][0]["points"], points);
+    EXPECT_EQ(j["originals"][0]["records"], points);
+    for (const char* beyond : {"places_beyond", "normals_beyond", "colours_beyond"})
+        EXPECT_EQ(j["originals"][0][beyond], 0) << beyond;
+    // A cold start, and a jump to each other path.
+    ASSERT_EQ(j["arrivals"].size(), 4u);
+    EXPECT_EQ(j["arrivals"][0]["event"], "cold start");
+    EXPECT_EQ(j["arrivals"][3]["event"], "jump to grazing");
+    EXPECT_GT(j["arrivals"][0]["bytes"], 10'000);
+    for (const auto& a : j["arrivals"]) EXPECT_TRUE(a["is_complete"]) << a.dump();
+    EXPECT_EQ(linesOf(folder / "s/rows.csv"), 1u + 24 * 2 * 2) << "a row a frame";
+    EXPECT_EQ(linesOf(folder / "s/errors.csv"), 1u + 24);
     const std::string html = test::slurp(folder / "s/report.html");
     size_t charts = 0;
     for (size_t at = html.find("<svg"); at != std::string::npos; at = html.find("<svg", at + 1)) ++charts;
-    EXPECT_EQ(charts, 7u);
+    EXPECT_EQ(charts, 10u);
     EXPECT_NE(html.find("data:image/png;base64,iVBORw0KGgo"), std::string::npos) << "crops";
     for (const char* outside : {"src=\"http", "href=\"http", "<script", "@import", "url("})
         EXPECT_EQ(html.find(outside), std::string::npos) << outside;
-    for (const char* plot : {"error-ms", "flip-ms", "detail-ms", "bounds", "error-bytes", "frames", "passes"}) {
+    for (const char* plot : {"error-ms", "flip-ms", "detail-ms", "bounds", "error-bytes", "frames", "passes", "budgets",
+                             "arrival-seconds", "arrival-bytes"}) {
         EXPECT_TRUE(fs::exists(folder / (std::string("s/plots/s0-96x64-") + plot + ".svg"))) << plot;
         EXPECT_TRUE(
             nlohmann::json::accept(test::slurp(folder / (std::string("s/plots/s0-96x64-") + plot + ".vl.json"))))
@@ -123,8 +155,8 @@ TEST(SceneStudy, ErrorsAreTheSameBytesAndItGoesOnWhereItStopped) {
     size_t whole = 0;  // the head and three visits of two frames
     for (int i = 0; i < 7; ++i) whole = times.find('\n', whole) + 1;
     EXPECT_EQ(resumed.substr(0, whole), times.substr(0, whole)) << "what was finished is kept";
-    EXPECT_EQ(std::count(resumed.begin(), resumed.end(), '\n'), 1 + 16 * 2 * 2);
-    EXPECT_EQ(linesOf(folder / "a/rows.csv"), 1u + 16 * 2 * 2);
+    EXPECT_EQ(std::count(resumed.begin(), resumed.end(), '\n'), 1 + 24 * 2 * 2);
+    EXPECT_EQ(linesOf(folder / "a/rows.csv"), 1u + 24 * 2 * 2);
 }
 
 TEST(SceneStudy, RefusesWhatItCannotDoBeforeItBegins) {
@@ -142,9 +174,29 @@ TEST(SceneStudy, RefusesWhatItCannotDoBeforeItBegins) {
     test::expectOneLine(test::runProgram(folder, "study ring.ply -o t --modes surfaces"), 2, {"surface"});
     test::expectOneLine(test::runProgram(folder, "study ring.ply -o t --sizes big"), 2, {"big"});
     test::expectOneLine(test::runProgram(folder, "study ring.ply -o t --errors 0"), 2, {"--errors"});
+    test::expectOneLine(test::runProgram(folder, "study ring.ply -o t --budgets few"), 2, {"--budgets few"});
+    test::expectOneLine(test::runProgram(folder, "study ring.ply -o t --builds fine"), 2, {"fine-normals"});
     test::expectOneLine(test::runProgram(folder, "study ring.ply -o t --seeds"), 2, {"--seeds"});
     test::expectOneLine(test::runProgram(folder, "study ring.ply -o t --rounds 3"), 2, {"--rounds"});
     EXPECT_FALSE(fs::exists(folder / "t"));
+}
+
+TEST(SceneStudy, BuildsScenesInOtherWays) {
+    const test::TempFolder folder;
+    auto points = test::samplesOf(test::Shape::torus, 4'000, 3);
+    points.insert(points.end(), points.begin(), points.begin() + 1'000);
+    test::writePly(folder / "ring.ply", points);
+    const test::Outcome r = test::runProgram(
+        folder,
+        "study ring.ply --builds usual,merged --modes surface --errors 2 --sizes 96x64 --views 1 --blocks 1 "
+        "--frames 1 --budgets none --quiet --json -o s");
+    ASSERT_EQ(r.code, 0) << r.err;
+    const nlohmann::json j = nlohmann::json::parse(r.out, nullptr, false);
+    ASSERT_EQ(j["scenes"].size(), 2u);
+    EXPECT_EQ(j["scenes"][1]["name"], "ring.ply (merged)");
+    EXPECT_NE(j["scenes"][0]["content"], j["scenes"][1]["content"]);
+    EXPECT_EQ(j["configurations"].size(), 2u);
+    EXPECT_EQ(j["budgets"].size(), 0u);
 }
 
 TEST(SceneStudy, CalibratesAndChoosesErrorsByWhatFramesCost) {

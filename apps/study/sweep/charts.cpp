@@ -81,9 +81,30 @@ Chart frameTimes(const Panel& panel, const StudyResult& result, const std::strin
     return chart;
 }
 
+/// What a budget of records leaves of the error that was asked for.
+Chart budgetChart(const std::vector<const Summary*>& budgets, const std::string& name) {
+    Chart chart{name + "-budgets",
+                "Errors within budgets of records",
+                "records drawn at most",
+                "px",
+                true,
+                true,
+                {{"stated", {}}, {"measured, 99 % are nearer", {}}},
+                false,
+                0,
+                ""};
+    for (const Summary* s : budgets) {
+        const auto records = static_cast<double>(s->of.records);
+        chart.series[0].points.push_back({records, s->errors.stated, {}, tipOf(*s), false});
+        chart.series[1].points.push_back({records, s->errors.lodP99, {}, tipOf(*s), false});
+    }
+    return chart;
+}
+
 }  // namespace
 
-std::vector<Chart> chartsOf(const Panel& panel, const StudyResult& result, const std::string& name) {
+std::vector<Chart> chartsOf(const Panel& panel, const std::vector<const Summary*>& budgets, const StudyResult& result,
+                            const std::string& name) {
     std::vector<Chart> charts;
     charts.push_back(overModes(panel,
                                {name + "-error-ms",
@@ -143,6 +164,10 @@ std::vector<Chart> chartsOf(const Panel& panel, const StudyResult& result, const
                                    return ChartPoint{s.errors.bytes / 1e6, s.errors.psnrForeground, {}, "", false};
                                }));
     charts.push_back(frameTimes(panel, result, name));
+    if (!budgets.empty()) charts.push_back(budgetChart(budgets, name));
+    if (panel.front()->of.size == 0)
+        for (Chart& chart : arrivalCharts(result.arrivals, panel.front()->of.scene, name))
+            if (!chart.series.empty()) charts.push_back(std::move(chart));
     return charts;
 }
 

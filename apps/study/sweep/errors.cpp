@@ -111,9 +111,41 @@ Pop popOf(const render::Image& frame, const render::Image& next) {
     return {quantile(std::move(changes), 0.999), most};
 }
 
+lod::View turnedBy(const lod::View& view, double pixels) {
+    lod::View v = view;
+    if (view.isOrthographic) {
+        v.eye += view.right * (pixels / view.focalPixels);
+        return v;
+    }
+    const double angle = pixels / view.focalPixels;
+    v.forward = std::cos(angle) * view.forward + std::sin(angle) * view.right;
+    v.right = std::cos(angle) * view.right - std::sin(angle) * view.forward;
+    return v;
+}
+
+Flicker flickerOf(const render::Image& frame, const render::Image& moved, const render::Image& traced,
+                  const render::Image& tracedMoved) {
+    std::vector<double> changes;
+    double sum = 0;
+    for (size_t i = 0; i < frame.rgba.size(); ++i) {
+        const uint32_t a = frame.rgba[i], b = moved.rgba[i], c = traced.rgba[i], d = tracedMoved.rgba[i];
+        if ((a | b | c | d) >> 24 == 0) continue;
+        int most = 0;
+        for (uint32_t shift = 0; shift < 24; shift += 8) {
+            const auto of = [shift](uint32_t pixel) { return static_cast<int>(pixel >> shift & 255u); };
+            most = std::max(most, std::abs((of(b) - of(a)) - (of(d) - of(c))));
+        }
+        changes.push_back(most);
+        sum += most;
+    }
+    if (changes.empty()) return {};
+    const double mean = sum / static_cast<double>(changes.size());
+    return {mean, quantile(std::move(changes), 0.99)};
+}
+
 std::span<const ErrorColumn> errorColumns() {
     using E = CellErrors;
-    static constexpr std::array<ErrorColumn, 33> kColumns{{{"stated_px", &E::stated},
+    static constexpr std::array<ErrorColumn, 35> kColumns{{{"stated_px", &E::stated},
                                                            {"records", &E::records},
                                                            {"triangles", &E::triangles},
                                                            {"nodes", &E::nodes},
@@ -145,14 +177,17 @@ std::span<const ErrorColumn> errorColumns() {
                                                            {"normal_deg_mean", &E::normalMean},
                                                            {"normal_deg_p95", &E::normalP95},
                                                            {"pop_p999", &E::popP999},
-                                                           {"pop_max", &E::popMost}}};
+                                                           {"pop_max", &E::popMost},
+                                                           {"flicker_mean", &E::flickerMean},
+                                                           {"flicker_p99", &E::flickerP99}}};
     return kColumns;
 }
 
 Result<CellErrors> measureCell(const CellTools& tools, const Cell& cell, const render::Image& leaves,
                                const KeepCrop& keepCrop) {
     CellErrors e;
-    STIPPLE_ASSIGN(const render::Image* drawn, tools.drawer.draw(tools.truth.view, cell.mode, cell.target));
+    STIPPLE_ASSIGN(const render::Image* drawn,
+                   tools.drawer.draw(tools.truth.view, cell.mode, cell.target, cell.records));
     const FrameCounters& c = tools.drawer.counters();
     e.stated = c.budgetTruncated ? std::numeric_limits<double>::infinity() : c.tauEffectivePixels;
     e.records = static_cast<double>(c.recordsDrawn);
@@ -166,6 +201,12 @@ Result<CellErrors> measureCell(const CellTools& tools, const Cell& cell, const r
     e.leavesDecibels = reconstruction.foregroundPsnr;
     STIPPLE_TRY(compareWithTruth(tools, *drawn, e, keepCrop));
     const render::Image frame = *drawn;
+    STIPPLE_ASSIGN(const render::Image* moved,
+                   tools.drawer.draw(tools.truth.moved, cell.mode, cell.target, cell.records));
+    const Flicker flicker = flickerOf(frame, *moved, tools.truth.traced, tools.truth.tracedMoved);
+    e.flickerMean = flicker.mean;
+    e.flickerP99 = flicker.p99;
+    if (cell.hasBudget()) return e;
     STIPPLE_ASSIGN(const render::Image* next, tools.drawer.draw(tools.truth.view, cell.mode, kPopStep * cell.target));
     const Pop pop = popOf(frame, *next);
     e.popP999 = pop.p999;

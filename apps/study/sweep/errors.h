@@ -37,6 +37,8 @@ struct CellErrors {
     double normalMean = kNone, normalP95 = kNone;  ///< degrees
     // A switch of levels (popOf): of 255
     double popP999 = kNone, popMost = kNone;
+    // The camera turned by a quarter of a pixel (flickerOf): of 255
+    double flickerMean = kNone, flickerP99 = kNone;
 };
 struct ErrorColumn {
     const char* name;  ///< as in CSV and JSON
@@ -52,10 +54,21 @@ struct Pop {
 };
 Pop popOf(const render::Image& frame, const render::Image& next);
 
-/// What all cells of one view share.
+/// By how much more a small motion of the camera changes pixels than it changes the truth: of each pixel the greatest
+/// of the channels' |(moved - frame) - (tracedMoved - traced)| (ALGORITHMS 4). Of 255; over pixels that any of them
+/// covers.
+struct Flicker {
+    double mean = 0, p99 = 0;
+};
+inline constexpr double kFlickerPixels = 0.25;
+lod::View turnedBy(const lod::View& view, double pixels);  ///< to the right
+Flicker flickerOf(const render::Image& frame, const render::Image& moved, const render::Image& traced,
+                  const render::Image& tracedMoved);
+
+/// What all cells of one view share. `moved`: turned by kFlickerPixels.
 struct ViewTruth {
-    render::Image traced;
-    lod::View view, small;
+    render::Image traced, tracedMoved;
+    lod::View view, small, moved;
 };
 
 /// A worst place, enlarged: ours, traced, and what is seen of the difference (FLIP).

@@ -32,18 +32,18 @@ std::string mainTable(const Panel& panel) {
     std::string out =
         "<table><tr><th>mode<th>asked, px<th>stated<th>ms<th>95 % band<th>p95<th>p99<th>px p99<th>px max<th>beyond"
         "<th>detail dB<th>backend dB<th>leaves dB<th>PSNR<th>SSIM<th>FLIP<th>IoU<th>edge px<th>holes<th>spill"
-        "<th>depth p99<th>normals<th>pop<th>MB</tr>\n";
+        "<th>depth p99<th>normals<th>pop<th>flicker<th>MB</tr>\n";
     for (const Summary* s : panel) {
         const CellErrors& e = s->errors;
         out += fmt::format(
             "<tr><td>{}<td>{}<td>{}<td>{}<td>{} - {}<td>{}<td>{}<td>{}<td>{}<td{}>{}<td>{}<td>{}<td>{}<td>{}<td>{}"
-            "<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>\n",
+            "<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>\n",
             nameOf(s->of.mode), shortNumber(s->of.target), cell(e.stated, 2), cell(s->ms.middle, 2), cell(s->ms.low, 2),
             cell(s->ms.high, 2), cell(s->p95.middle, 2), cell(s->p99.middle, 2), cell(e.lodP99, 3), cell(e.lodMost, 2),
             e.beyond > 0 ? " class=bad" : "", cell(e.beyond, 0), cell(e.lodDecibels, 1), cell(e.backendDecibels, 1),
             cell(e.leavesDecibels, 1), cell(e.psnrForeground, 2), cell(e.ssim, 4), cell(e.flipMean, 4),
             cell(e.overlap, 4), cell(e.boundary, 2), cell(e.holes, 0), cell(e.spill, 0), cell(e.depthP99, 5),
-            cell(e.normalMean, 2), cell(e.popP999, 0), cell(e.bytes / 1e6, 2));
+            cell(e.normalMean, 2), cell(e.popP999, 0), cell(e.flickerMean, 2), cell(e.bytes / 1e6, 2));
     }
     return out + "</table>\n";
 }
@@ -132,8 +132,42 @@ std::string crops(const Panel& panel, const StudyResult& result, const std::vect
     return out;
 }
 
-std::string panelOf(const Panel& panel, const StudyResult& result, const std::vector<StudyScene>& scenes,
-                    const std::function<std::string(uint32_t)>& crop) {
+std::string budgetTable(const std::vector<const Summary*>& budgets) {
+    if (budgets.empty()) return "";
+    std::string out =
+        "<h3>Within budgets of records</h3>\n<table><tr><th>at most<th>drawn<th>mode<th>asked, px<th>stated<th>px p99"
+        "<th>beyond<th>ms<th>95 % band<th>PSNR<th>FLIP<th>MB</tr>\n";
+    for (const Summary* s : budgets) {
+        const CellErrors& e = s->errors;
+        out +=
+            fmt::format("<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td{}>{}<td>{}<td>{} - {}<td>{}<td>{}<td>{}</tr>\n",
+                        s->of.records, cell(e.records + e.triangles, 0), nameOf(s->of.mode), shortNumber(s->of.target),
+                        cell(e.stated, 2), cell(e.lodP99, 3), e.beyond > 0 ? " class=bad" : "", cell(e.beyond, 0),
+                        cell(s->ms.middle, 2), cell(s->ms.low, 2), cell(s->ms.high, 2), cell(e.psnrForeground, 2),
+                        cell(e.flipMean, 4), cell(e.bytes / 1e6, 2));
+    }
+    return out + "</table>\n";
+}
+
+std::string arrivalTable(const StudyResult& result, uint32_t scene) {
+    const auto facts = arrivalFacts(result.arrivals, scene);
+    if (facts.empty()) return "";
+    std::string out = fmt::format(
+        "<h3>From a cold start, and after jumps</h3>\n<p>{} at {} px, frame after frame, files in the system's cache; "
+        "dB "
+        "against the frame with all that it wants.</p>\n<table><tr><th>event<th>s to a picture<th>s to 30 dB<th>MB to "
+        "30 "
+        "dB<th>s to all<th>MB</tr>\n",
+        nameOf(result.settings.modes.front()), shortNumber(cropTarget(result.settings)));
+    for (const ArrivalFacts& f : facts)
+        out += fmt::format("<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>\n", escaped(f.event), cell(f.firstSeconds, 3),
+                           cell(f.goodSeconds, 3), cell(f.goodBytes / 1e6, 1),
+                           f.isComplete ? cell(f.completeSeconds, 3) : "-", cell(f.allBytes / 1e6, 1));
+    return out + "</table>\n";
+}
+
+std::string panelOf(const Panel& panel, const std::vector<const Summary*>& budgets, const StudyResult& result,
+                    const std::vector<StudyScene>& scenes, const std::function<std::string(uint32_t)>& crop) {
     const StudyScene& scene = scenes[panel.front()->of.scene];
     const glm::uvec2 size = result.settings.sizes[panel.front()->of.size];
     std::string out = fmt::format("<h2>{}, {} x {}</h2>\n", escaped(scene.name), size.x, size.y);
@@ -152,11 +186,16 @@ std::string panelOf(const Panel& panel, const StudyResult& result, const std::ve
                      "truth's own</span>");
     }
     out += violations(panel);
+    for (const KeptOf& k : result.kept)
+        if (k.scene == panel.front()->of.scene && panel.front()->of.size == 0)
+            out += fmt::format("<p class={}>{}.</p>\n", k.audit.beyond() > 0 ? "bad" : "good",
+                               escaped("Points: " + describeKept(k.audit)));
     const std::string name = fmt::format("s{}-{}x{}", panel.front()->of.scene, size.x, size.y);
-    for (const Chart& chart : chartsOf(panel, result, name)) out += figure(drawChart(chart), vegaOf(chart));
+    for (const Chart& chart : chartsOf(panel, budgets, result, name)) out += figure(drawChart(chart), vegaOf(chart));
     const BarChart bars = passesOf(panel, result, name);
     out += figure(drawBars(bars), vegaOf(bars));
-    out += atFixed(panel, result.settings) + alikeList(panel);
+    out += atFixed(panel, result.settings) + alikeList(panel) + budgetTable(budgets);
+    if (panel.front()->of.size == 0) out += arrivalTable(result, panel.front()->of.scene);
     out +=
         listOf("Where it loses", lossesOf(panel), "Nowhere by more than 3 dB, and no pixel is beyond what is stated.");
     return out + "<h3>All figures</h3>\n" + mainTable(panel) + crops(panel, result, scenes, crop);
@@ -173,7 +212,8 @@ std::string htmlOf(const std::vector<StudyScene>& scenes, const StudyResult& res
         "<style>{}</style></head><body>\n<h1>What accuracy costs in time</h1>\n<p>{}. {}. stipple {}, {} ({}).</p>\n"
         "<p>{} cells, each {} times {} frames in blocks of any order (seed {}). Bands: 95 % of bootstraps over blocks. "
         "Pop: change of pixels, of 255, at p99.9, where the cut is that of a camera 9 % farther away and the camera is "
-        "not. "
+        "not. Flicker: by how much more a turn of a quarter of a pixel changes pixels than it changes the truth, of "
+        "255. "
         "Cells of several cameras together: dB of the mean square, the greatest of px, sums of counts, else "
         "means.</p>\n",
         kStyle, escaped(describeMachine(p.machine)), escaped(p.device), escaped(p.version), escaped(p.compiler),
@@ -182,7 +222,8 @@ std::string htmlOf(const std::vector<StudyScene>& scenes, const StudyResult& res
         out += fmt::format("<p>{}: {} records, {:.1f} MB, content {:016x}</p>\n", escaped(scene.name), scene.records,
                            static_cast<double>(scene.storeBytes) / 1e6, scene.hash);
     if (!result.notes.empty()) out += listOf("Not measured", result.notes, "");
-    for (const Panel& panel : panelsOf(all)) out += panelOf(panel, result, scenes, crop);
+    for (const Panel& panel : panelsOf(all))
+        out += panelOf(panel, budgetsOf(all, panel.front()->of.scene, panel.front()->of.size), result, scenes, crop);
     return out + "</body></html>\n";
 }
 

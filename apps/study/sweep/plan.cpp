@@ -14,10 +14,17 @@ std::vector<Cell> cellsOf(const std::vector<StudyScene>& scenes, const StudySett
     std::vector<Cell> cells;
     for (uint32_t scene = 0; scene < scenes.size(); ++scene)
         for (uint32_t size = 0; size < settings.sizes.size(); ++size)
-            for (uint32_t view = 0; view < scenes[scene].views.size(); ++view)
+            for (uint32_t view = 0; view < scenes[scene].views.size(); ++view) {
                 for (const render::Mode mode : settings.modes)
                     for (const double target : settings.targets) cells.push_back({scene, size, view, mode, target});
+                for (const uint64_t records : settings.budgets)
+                    cells.push_back({scene, size, view, settings.modes.front(), settings.targets.front(), records});
+            }
     return cells;
+}
+
+size_t cellsOfView(const StudySettings& settings) {
+    return settings.modes.size() * settings.targets.size() + settings.budgets.size();
 }
 
 std::vector<uint32_t> orderOf(size_t cells, uint32_t block, uint64_t seed) {
@@ -49,6 +56,7 @@ std::string describePlan(const std::vector<StudyScene>& scenes, const StudySetti
     for (const glm::uvec2& size : settings.sizes) text += fmt::format("size {} {}\n", size.x, size.y);
     for (const render::Mode mode : settings.modes)
         text += fmt::format("mode {}\n", render::reconstructionOf(mode).name);
+    text += fmt::format("budgets {}\n", fmt::join(settings.budgets, " "));
     text += fmt::format("targets {}\nblocks {} frames {} samples {} small {} shapes {} seed {} resident {}\n",
                         fmt::join(settings.targets, " "), settings.blocks, settings.frames, settings.samples,
                         settings.smallHeight, settings.auditShapes, settings.seed, settings.residentBytes);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -20,8 +21,9 @@ struct PathView {
 
 /// What is studied, and how it looks.
 struct StudyScene {
-    std::string name;   ///< for a person: the file's, without its folders
-    uint64_t hash = 0;  ///< of the content of all stores and where they stand
+    std::string name;    ///< for a person: the file's, without its folders
+    std::string source;  ///< the file of points that it was built from; empty: it is of something else
+    uint64_t hash = 0;   ///< of the content of all stores and where they stand
     std::vector<render::PlacedStore> placed;
     std::vector<render::PlacedGroup> groups;
     std::vector<glm::dvec3> outline;  ///< points on the outside
@@ -37,6 +39,8 @@ struct StudySettings {
     std::vector<glm::uvec2> sizes;
     std::vector<render::Mode> modes;
     std::vector<double> targets;  ///< px, ascending
+    /// Records drawn at most, ascending: what the first mode shows of the smallest of `targets` within them.
+    std::vector<uint64_t> budgets;
     uint32_t blocks = 6, frames = 3;
     uint32_t samples = 3;       ///< rays a pixel along each axis, of the traced truth
     uint32_t smallHeight = 90;  ///< px, of pictures that implementations are compared at
@@ -45,15 +49,20 @@ struct StudySettings {
     uint64_t residentBytes = uint64_t{1} << 30;
 };
 
+inline constexpr uint64_t kAllRecords = std::numeric_limits<uint64_t>::max();
+
 /// A frame that is studied.
 struct Cell {
     uint32_t scene = 0, size = 0, view = 0;
     render::Mode mode = render::Mode::surface;
     double target = 1;
+    uint64_t records = kAllRecords;  ///< drawn at most
+    bool hasBudget() const { return records != kAllRecords; }
 };
 
-/// In the order of their numbers: of one scene, size and view all together.
+/// In the order of their numbers: of one scene, size and view all together, cellsOfView of them.
 std::vector<Cell> cellsOf(const std::vector<StudyScene>& scenes, const StudySettings& settings);
+size_t cellsOfView(const StudySettings& settings);
 
 /// The order in which a block draws its cells: any, the same for the same seed.
 std::vector<uint32_t> orderOf(size_t cells, uint32_t block, uint64_t seed);

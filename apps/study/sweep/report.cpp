@@ -44,10 +44,44 @@ json provenanceJson(const Provenance& p) {
             {"load", p.machine.load}, {"date", p.machine.date},           {"device", p.device}};
 }
 
+json originalsJson(const std::vector<StudyScene>& scenes, const StudyResult& result) {
+    json out = json::array();
+    for (const KeptOf& k : result.kept)
+        out.push_back({{"scene", scenes[k.scene].name},
+                       {"points", k.audit.points},
+                       {"records", k.audit.records},
+                       {"places_beyond", k.audit.placeBeyond},
+                       {"rounding", k.audit.worstRounding},
+                       {"rounding_stated", k.audit.statedRounding},
+                       {"normals", k.audit.normals},
+                       {"normals_beyond", k.audit.normalBeyond},
+                       {"normal_deg_most", k.audit.worstNormal},
+                       {"normal_deg_stated", kNormalDegrees},
+                       {"colours", k.audit.colours},
+                       {"colours_beyond", k.audit.colourBeyond}});
+    return out;
+}
+
+json arrivalsJson(const std::vector<StudyScene>& scenes, const StudyResult& result) {
+    json out = json::array();
+    for (uint32_t scene = 0; scene < scenes.size(); ++scene)
+        for (const ArrivalFacts& f : arrivalFacts(result.arrivals, scene))
+            out.push_back({{"scene", scenes[scene].name},
+                           {"event", f.event},
+                           {"first_seconds", numberJson(f.firstSeconds)},
+                           {"seconds_to_30_db", numberJson(f.goodSeconds)},
+                           {"bytes_to_30_db", numberJson(f.goodBytes)},
+                           {"seconds", f.completeSeconds},
+                           {"bytes", f.allBytes},
+                           {"is_complete", f.isComplete}});
+    return out;
+}
+
 }  // namespace
 
 std::string rowsCsv(const std::vector<StudyScene>& scenes, const StudyResult& result) {
-    CsvRow head{"scene", "width", "height", "path", "view", "mode", "error_px", "cell", "block", "frame", "ms"};
+    CsvRow head{"scene",    "width",           "height", "path",  "view",  "mode",
+                "error_px", "records_at_most", "cell",   "block", "frame", "ms"};
     for (const ErrorColumn& c : errorColumns()) head.emplace_back(c.name);
     std::string out = csvLine(head);
     for (const Visit& v : result.visits) {
@@ -62,6 +96,7 @@ std::string rowsCsv(const std::vector<StudyScene>& scenes, const StudyResult& re
                        std::to_string(scene.views[c.view].number),
                        nameOf(c.mode),
                        csvNumber(c.target),
+                       c.hasBudget() ? std::to_string(c.records) : "",
                        std::to_string(v.cell),
                        std::to_string(v.block),
                        std::to_string(f),
@@ -75,7 +110,7 @@ std::string rowsCsv(const std::vector<StudyScene>& scenes, const StudyResult& re
 
 json jsonOfStudy(const std::vector<StudyScene>& scenes, const StudyResult& result, const std::vector<Summary>& all) {
     const StudySettings& s = result.settings;
-    json list = json::array(), of = json::array(), truths = json::array();
+    json list = json::array(), budgets = json::array(), of = json::array(), truths = json::array();
     for (const StudyScene& scene : scenes)
         of.push_back({{"name", scene.name},
                       {"content", hexDigits(scene.hash)},
@@ -89,16 +124,18 @@ json jsonOfStudy(const std::vector<StudyScene>& scenes, const StudyResult& resul
         json passes;
         for (const auto& [name, ms] : a.passes) passes[name] = ms;
         const glm::uvec2 size = s.sizes[a.of.size];
-        list.push_back({{"scene", scenes[a.of.scene].name},
-                        {"width", size.x},
-                        {"height", size.y},
-                        {"mode", nameOf(a.of.mode)},
-                        {"error_px", a.of.target},
-                        {"ms", intervalJson(a.ms)},
-                        {"p95_ms", intervalJson(a.p95)},
-                        {"p99_ms", intervalJson(a.p99)},
-                        {"passes_ms", passes},
-                        {"errors", errorsJson(a.errors)}});
+        json row = {{"scene", scenes[a.of.scene].name},
+                    {"width", size.x},
+                    {"height", size.y},
+                    {"mode", nameOf(a.of.mode)},
+                    {"error_px", a.of.target},
+                    {"ms", intervalJson(a.ms)},
+                    {"p95_ms", intervalJson(a.p95)},
+                    {"p99_ms", intervalJson(a.p99)},
+                    {"passes_ms", passes},
+                    {"errors", errorsJson(a.errors)}};
+        if (a.of.hasBudget()) row["records_at_most"] = a.of.records;
+        (a.of.hasBudget() ? budgets : list).push_back(row);
         if (std::isnan(a.errors.audited)) continue;
         beyond += static_cast<uint64_t>(a.errors.beyond);
         audited += static_cast<uint64_t>(a.errors.audited);
@@ -115,7 +152,22 @@ json jsonOfStudy(const std::vector<StudyScene>& scenes, const StudyResult& resul
             {"truth", truths},
             {"audit", {{"pixels", audited}, {"beyond", beyond}}},
             {"configurations", list},
+            {"budgets", budgets},
+            {"originals", originalsJson(scenes, result)},
+            {"arrivals", arrivalsJson(scenes, result)},
             {"not_measured", result.notes}};
+}
+
+std::string describeKept(const KeptAudit& k) {
+    std::string out = fmt::format(
+        "of {} points of its file {} are farther from their records than their leaves round by "
+        "({:.2g} at most, {:.2g} stated)",
+        k.points, k.placeBeyond, k.worstRounding, k.statedRounding);
+    if (k.normals > 0)
+        out += fmt::format("; of {} normals {} are more than {} degrees off ({:.3f} at most)", k.normals,
+                           k.normalBeyond, kNormalDegrees, k.worstNormal);
+    if (k.colours > 0) out += fmt::format("; of {} colours {} are not those of the file", k.colours, k.colourBeyond);
+    return out;
 }
 
 std::string describeStudy(const std::vector<StudyScene>& scenes, const StudyResult& result,
@@ -131,6 +183,17 @@ std::string describeStudy(const std::vector<StudyScene>& scenes, const StudyResu
                                nameOf(s->of.mode), shortNumber(s->of.target), s->ms.middle, s->ms.low, s->ms.high,
                                s->errors.lodP99, s->errors.beyond, s->errors.psnrForeground, s->errors.flipMean);
     }
+    for (const Summary& s : all)
+        if (s.of.hasBudget())
+            out += fmt::format("{}, {} within {} records: {} px stated, {:.2f} dB, {:.2f} ms\n",
+                               scenes[s.of.scene].name, nameOf(s.of.mode), s.of.records, shortNumber(s.errors.stated),
+                               s.errors.psnrForeground, s.ms.middle);
+    for (const KeptOf& k : result.kept) out += scenes[k.scene].name + ": " + describeKept(k.audit) + "\n";
+    for (uint32_t scene = 0; scene < scenes.size(); ++scene)
+        for (const ArrivalFacts& f : arrivalFacts(result.arrivals, scene))
+            out += fmt::format("{}, {}: {:.2f} s and {:.1f} MB to 30 dB, {:.2f} s and {:.1f} MB to {}\n",
+                               scenes[scene].name, f.event, f.goodSeconds, f.goodBytes / 1e6, f.completeSeconds,
+                               f.allBytes / 1e6, f.isComplete ? "all" : "where it was stopped");
     for (const std::string& note : result.notes) out += "note: " + note + "\n";
     return out + fmt::format("report: {}/report.html\n", result.settings.output);
 }
@@ -149,7 +212,8 @@ Result<void> writeStudy(const std::vector<StudyScene>& scenes, const StudyResult
             STIPPLE_TRY(writeText(fmt::format("{}/plots/{}.svg", folder, chart.name), svg));
             return writeText(fmt::format("{}/plots/{}.vl.json", folder, chart.name), vegaOf(chart).dump(1) + "\n");
         };
-        for (const Chart& chart : chartsOf(panel, result, name)) STIPPLE_TRY(write(chart, drawChart(chart)));
+        const auto budgets = budgetsOf(all, panel.front()->of.scene, panel.front()->of.size);
+        for (const Chart& chart : chartsOf(panel, budgets, result, name)) STIPPLE_TRY(write(chart, drawChart(chart)));
         const BarChart bars = passesOf(panel, result, name);
         STIPPLE_TRY(write(bars, drawBars(bars)));
     }

@@ -12,12 +12,15 @@ namespace stipple::study {
 std::string rowsCsv(const std::vector<StudyScene>& scenes, const StudyResult& result);
 nlohmann::json jsonOfStudy(const std::vector<StudyScene>& scenes, const StudyResult& result,
                            const std::vector<Summary>& all);
+/// A sentence.
+std::string describeKept(const KeptAudit& kept);
 /// For a terminal.
 std::string describeStudy(const std::vector<StudyScene>& scenes, const StudyResult& result,
                           const std::vector<Summary>& all);
 
 /// Of one scene at one size.
-std::vector<Chart> chartsOf(const Panel& panel, const StudyResult& result, const std::string& name);
+std::vector<Chart> chartsOf(const Panel& panel, const std::vector<const Summary*>& budgets, const StudyResult& result,
+                            const std::string& name);
 BarChart passesOf(const Panel& panel, const StudyResult& result, const std::string& name);
 
 /// `crop`: the bytes of a PNG of the folder; empty: it is not there.

@@ -77,12 +77,15 @@ Result<void> measureView(Run& run, uint32_t first, const FullDetail* full, Scene
                          Journal& truths) {
     const StudySettings& s = run.result.settings;
     const std::vector<Cell>& cells = run.result.cells;
-    const auto count = static_cast<uint32_t>(s.modes.size() * s.targets.size());
+    const auto count = static_cast<uint32_t>(cellsOfView(s));
     const Cell& at = cells[first];
     const StudyScene& scene = run.scenes[at.scene];
-    ViewTruth truth{
-        {}, viewOf(scene, s.sizes[at.size], at.view), smallViewOf(scene, s.sizes[at.size], at.view, s.smallHeight)};
+    ViewTruth truth;
+    truth.view = viewOf(scene, s.sizes[at.size], at.view);
+    truth.small = smallViewOf(scene, s.sizes[at.size], at.view, s.smallHeight);
+    truth.moved = turnedBy(truth.view, kFlickerPixels);
     STIPPLE_ASSIGN(truth.traced, traced(run, at.scene, truth.view, s.samples));
+    STIPPLE_ASSIGN(truth.tracedMoved, traced(run, at.scene, truth.moved, s.samples));
     STIPPLE_TRY(checkTruth(run, truths, at, truth));
     STIPPLE_ASSIGN(SceneDrawer* const drawer, run.drawerOf(at.scene));
     const bool isFirst = scene.views[at.view].number == 0 && at.size == 0;
@@ -96,7 +99,7 @@ Result<void> measureView(Run& run, uint32_t first, const FullDetail* full, Scene
         if (run.isMeasured[c]) continue;
         STIPPLE_TRY(run.host.say("errors", c, cells.size()));
         KeepCrop keep;
-        if (cells[c].target == cropTarget(s))
+        if (cells[c].target == cropTarget(s) && !cells[c].hasBudget())
             keep = [&](const render::Image& crop) { return image::writeImage(s.output + "/" + cropName(c), crop); };
         STIPPLE_ASSIGN(run.result.errors[c], measureCell(tools, cells[c], leaves, keep));
         STIPPLE_TRY(journal.append({rowOf(c, run.result.errors[c])}));
@@ -120,7 +123,7 @@ Result<void> measureErrorsOfAll(Run& run) {
             result.errors[cell].*errorColumns()[k].value = numberOf(row[k + 1]);
         run.isMeasured[cell] = 1;
     }
-    const auto perView = static_cast<uint32_t>(result.settings.modes.size() * result.settings.targets.size());
+    const auto perView = static_cast<uint32_t>(cellsOfView(result.settings));
     std::optional<FullDetail> full;
     std::unique_ptr<SceneDrawer> oracle;
     uint32_t of = ~0u;
@@ -148,11 +151,11 @@ Result<Visit> visit(Run& run, uint32_t index, uint32_t block) {
     const StudySettings& s = run.result.settings;
     STIPPLE_ASSIGN(SceneDrawer* const drawer, run.drawerOf(cell.scene));
     const lod::View view = viewOf(run.scenes[cell.scene], s.sizes[cell.size], cell.view);
-    STIPPLE_TRY(drawer->warm(view, cell.mode, cell.target));
+    STIPPLE_TRY(drawer->warm(view, cell.mode, cell.target, cell.records));
     Visit v{index, block, {}, {}};
     std::vector<std::pair<std::string, std::vector<double>>> passes;
     for (uint32_t f = 0; f < s.frames; ++f) {
-        STIPPLE_TRY(drawer->again(view, cell.mode, cell.target));
+        STIPPLE_TRY(drawer->again(view, cell.mode, cell.target, cell.records));
         v.ms.push_back(drawer->counters().frameMs);
         const auto add = [&](const std::string& name, double ms) {
             const auto at = std::find_if(passes.begin(), passes.end(), [&](const auto& p) { return p.first == name; });
@@ -220,6 +223,48 @@ Result<void> measureTimesOfAll(Run& run) {
     return {};
 }
 
+/// What stores keep of the files that they were built from.
+Result<void> auditOriginalsOfAll(Run& run) {
+    for (uint32_t scene = 0; scene < run.scenes.size(); ++scene) {
+        const StudyScene& s = run.scenes[scene];
+        if (s.source.empty() || s.placed.size() != 1) continue;
+        STIPPLE_TRY(run.host.say("originals", scene, run.scenes.size()));
+        const auto originals = readOriginals(s.source, run.result.settings.auditShapes);
+        if (!originals) {
+            run.result.notes.push_back(
+                fmt::format("{}: points were not held against their file: {}", s.name, originals.error().line()));
+            continue;
+        }
+        STIPPLE_ASSIGN(const KeptAudit audit, auditOriginals(*originals, *s.placed[0].store));
+        run.result.kept.push_back({scene, audit});
+    }
+    return {};
+}
+
+/// Of every scene, at the first size, in the first mode.
+Result<void> measureArrivalsOfAll(Run& run) {
+    StudyResult& result = run.result;
+    const StudySettings& s = result.settings;
+    STIPPLE_ASSIGN(Journal journal, Journal::open(s.output + "/arrivals.csv", arrivalHead()));
+    for (const CsvRow& row : journal.rows()) result.arrivals.push_back(arrivalOf(row));
+    for (uint32_t scene = 0; scene < run.scenes.size(); ++scene) {
+        STIPPLE_TRY(run.host.say("arrivals", scene, run.scenes.size()));
+        const bool isDone = std::any_of(result.arrivals.begin(), result.arrivals.end(),
+                                        [&](const ArrivalStep& step) { return step.scene == scene; });
+        if (isDone) continue;
+        STIPPLE_ASSIGN(SceneDrawer* const complete, run.drawerOf(scene));
+        STIPPLE_ASSIGN(auto backend, run.host.backend(run.device));
+        SceneDrawer fresh(run.scenes[scene], std::move(backend), run.host.executor, s.residentBytes);
+        STIPPLE_ASSIGN(const auto steps, measureArrivals(scene, run.scenes[scene], s.sizes.front(), s.modes.front(),
+                                                         cropTarget(s), fresh, *complete));
+        std::vector<CsvRow> rows;
+        for (const ArrivalStep& step : steps) rows.push_back(arrivalRow(step));
+        STIPPLE_TRY(journal.append(rows));
+        result.arrivals.insert(result.arrivals.end(), steps.begin(), steps.end());
+    }
+    return {};
+}
+
 }  // namespace
 
 Result<StudyResult> runStudy(const std::vector<StudyScene>& scenes, const StudySettings& settings,
@@ -231,8 +276,10 @@ Result<StudyResult> runStudy(const std::vector<StudyScene>& scenes, const StudyS
     result.errors.resize(result.cells.size());
     Run run{scenes, host, device, result, {}, std::vector<uint8_t>(result.cells.size(), 0)};
     run.drawers.resize(scenes.size());
+    STIPPLE_TRY(auditOriginalsOfAll(run));
     STIPPLE_TRY(measureErrorsOfAll(run));
     STIPPLE_TRY(measureTimesOfAll(run));
+    STIPPLE_TRY(measureArrivalsOfAll(run));
     return result;
 }
 

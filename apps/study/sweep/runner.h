@@ -3,8 +3,10 @@
 // work. Errors are the same bytes for the same scenes, settings and seed.
 #pragma once
 
+#include "apps/study/audit/originals.h"
 #include "apps/study/machine.h"
 #include "apps/study/study.h"
+#include "apps/study/sweep/arrivals.h"
 #include "apps/study/sweep/errors.h"
 #include "apps/study/sweep/journal.h"
 
@@ -30,6 +32,12 @@ struct TruthCheck {
     double decibels = 0;  ///< foreground
 };
 
+/// Of a scene that was built from a file of points.
+struct KeptOf {
+    uint32_t scene = 0;
+    KeptAudit audit;
+};
+
 struct StudyResult {
     StudySettings settings;
     Provenance provenance;
@@ -37,7 +45,9 @@ struct StudyResult {
     std::vector<CellErrors> errors;  ///< of each cell
     std::vector<Visit> visits;       ///< in the order in which they were made
     std::vector<TruthCheck> truths;
-    std::vector<std::string> notes;  ///< what was not measured, and why
+    std::vector<KeptOf> kept;
+    std::vector<ArrivalStep> arrivals;  ///< of all scenes, at the first size
+    std::vector<std::string> notes;     ///< what was not measured, and why
 };
 
 /// Name of a cell's crop in the folder, where it has one: cells whose target is that nearest to a pixel.

@@ -10,31 +10,40 @@ SceneDrawer::SceneDrawer(const StudyScene& scene, std::unique_ptr<render::Backen
     state_ = render::makeFrameState(scene.placed, *backend_, executor, streams, scene.groups);
 }
 
-render::FrameSettings SceneDrawer::settings(render::Mode mode, double target, bool wantDepth) const {
+render::FrameSettings SceneDrawer::settings(render::Mode mode, double target, uint64_t records, bool wantDepth) const {
     render::FrameSettings s;
     s.mode = mode;
     s.budgets.errorPixels = target;
+    s.budgets.records = records;
     s.draw = draw_;
     s.wantDepthAndNormal = wantDepth;
     return s;
 }
 
-Result<const render::Image*> SceneDrawer::draw(const lod::View& view, render::Mode mode, double target) {
-    STIPPLE_ASSIGN(const bool isComplete, render::renderUntilComplete(*state_, view, settings(mode, target, true)));
+Result<const render::Image*> SceneDrawer::draw(const lod::View& view, render::Mode mode, double target,
+                                               uint64_t records) {
+    STIPPLE_ASSIGN(const bool isComplete,
+                   render::renderUntilComplete(*state_, view, settings(mode, target, records, true)));
     if (!isComplete)
         return fail(ErrorKind::budget, "a frame of the study does not fit", "--resident", "give more memory");
     return &state_->image;
 }
 
-Result<void> SceneDrawer::warm(const lod::View& view, render::Mode mode, double target) {
-    STIPPLE_ASSIGN(const bool isComplete, render::renderUntilComplete(*state_, view, settings(mode, target, false)));
+Result<void> SceneDrawer::warm(const lod::View& view, render::Mode mode, double target, uint64_t records) {
+    STIPPLE_ASSIGN(const bool isComplete,
+                   render::renderUntilComplete(*state_, view, settings(mode, target, records, false)));
     if (!isComplete)
         return fail(ErrorKind::budget, "a frame of the study does not fit", "--resident", "give more memory");
     return {};
 }
 
-Result<void> SceneDrawer::again(const lod::View& view, render::Mode mode, double target) {
-    return render::renderResident(*state_, view, settings(mode, target, false));
+Result<void> SceneDrawer::again(const lod::View& view, render::Mode mode, double target, uint64_t records) {
+    return render::renderResident(*state_, view, settings(mode, target, records, false));
+}
+
+Result<const render::Image*> SceneDrawer::drawArrived(const lod::View& view, render::Mode mode, double target) {
+    STIPPLE_TRY(render::renderFrame(*state_, view, settings(mode, target, kAllRecords, false)));
+    return &state_->image;
 }
 
 uint64_t SceneDrawer::cutBytes() const {

@@ -12,11 +12,14 @@ class SceneDrawer {
     SceneDrawer(const StudyScene& scene, std::unique_ptr<render::Backend> backend, Executor& executor,
                 uint64_t residentBytes);
     /// Complete, with depth and normals. Error (budget): it does not fit.
-    Result<const render::Image*> draw(const lod::View& view, render::Mode mode, double target);
+    Result<const render::Image*> draw(const lod::View& view, render::Mode mode, double target,
+                                      uint64_t records = kAllRecords);
     /// Brings what the frame wants, and draws it once, without depth and normals.
-    Result<void> warm(const lod::View& view, render::Mode mode, double target);
+    Result<void> warm(const lod::View& view, render::Mode mode, double target, uint64_t records = kAllRecords);
     /// The same frame again: milliseconds are in counters(), those of passes in passes().
-    Result<void> again(const lod::View& view, render::Mode mode, double target);
+    Result<void> again(const lod::View& view, render::Mode mode, double target, uint64_t records = kAllRecords);
+    /// What there is by now, and asks for what is missing (render::renderFrame).
+    Result<const render::Image*> drawArrived(const lod::View& view, render::Mode mode, double target);
     const FrameCounters& counters() const { return state_->counters; }
     const std::vector<render::PassTime>& passes() const { return backend_->passTimes(); }
     /// Of the chunks that the last cut needs, as they lie in their files.
@@ -24,7 +27,7 @@ class SceneDrawer {
     std::string device() const { return backend_->name() + ", " + backend_->device(); }
 
   private:
-    render::FrameSettings settings(render::Mode mode, double target, bool wantDepth) const;
+    render::FrameSettings settings(render::Mode mode, double target, uint64_t records, bool wantDepth) const;
     std::unique_ptr<render::Backend> backend_;
     std::unique_ptr<render::FrameState> state_;
     render::DrawSettings draw_;

@@ -16,7 +16,8 @@ Together howOf(double CellErrors::*column) {
         if (column == decibels) return Together::decibels;
     for (const auto sum : {&E::audited, &E::beyond, &E::outline, &E::gap, &E::between, &E::other, &E::holes, &E::spill})
         if (column == sum) return Together::sum;
-    for (const auto most : {&E::stated, &E::lodMost, &E::lodP99, &E::depthP99, &E::bytes, &E::popP999, &E::popMost})
+    for (const auto most :
+         {&E::stated, &E::lodMost, &E::lodP99, &E::depthP99, &E::bytes, &E::popP999, &E::popMost, &E::flickerP99})
         if (column == most) return Together::most;
     return Together::mean;
 }
@@ -42,8 +43,8 @@ double together(const std::vector<double>& values, Together how) {
     return CellErrors::kNone;
 }
 
-using Key = std::tuple<uint32_t, uint32_t, render::Mode, double>;
-Key keyOf(const Cell& c) { return {c.scene, c.size, c.mode, c.target}; }
+using Key = std::tuple<uint32_t, uint32_t, render::Mode, double, uint64_t>;
+Key keyOf(const Cell& c) { return {c.scene, c.size, c.mode, c.target, c.records}; }
 
 void addErrors(const StudyResult& result, const std::vector<uint32_t>& cells, Summary& s) {
     for (const ErrorColumn& column : errorColumns()) {
@@ -52,7 +53,7 @@ void addErrors(const StudyResult& result, const std::vector<uint32_t>& cells, Su
             if (const double v = result.errors[c].*column.value; !std::isnan(v)) values.push_back(v);
         s.errors.*column.value = together(values, howOf(column.value));
     }
-    if (s.of.target != cropTarget(result.settings)) return;
+    if (s.of.target != cropTarget(result.settings) || s.of.hasBudget()) return;
     for (const uint32_t c : cells)
         if (s.worst == ~0u || result.errors[c].psnrForeground < result.errors[s.worst].psnrForeground) s.worst = c;
 }
@@ -113,12 +114,20 @@ std::vector<Summary> summarise(const StudyResult& result) {
 std::vector<std::vector<const Summary*>> panelsOf(const std::vector<Summary>& all) {
     std::vector<std::vector<const Summary*>> panels;
     for (const Summary& s : all) {
+        if (s.of.hasBudget()) continue;
         if (panels.empty() || panels.back().front()->of.scene != s.of.scene ||
             panels.back().front()->of.size != s.of.size)
             panels.emplace_back();
         panels.back().push_back(&s);
     }
     return panels;
+}
+
+std::vector<const Summary*> budgetsOf(const std::vector<Summary>& all, uint32_t scene, uint32_t size) {
+    std::vector<const Summary*> out;
+    for (const Summary& s : all)
+        if (s.of.hasBudget() && s.of.scene == scene && s.of.size == size) out.push_back(&s);
+    return out;
 }
 
 }  // namespace stipple::study

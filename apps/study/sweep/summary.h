@@ -20,7 +20,9 @@ struct Summary {
 };
 /// In the order of the plan.
 std::vector<Summary> summarise(const StudyResult& result);
-/// Of what lies together: one scene at one size.
+/// Of what lies together: one scene at one size, without budgets.
 std::vector<std::vector<const Summary*>> panelsOf(const std::vector<Summary>& all);
+/// Of one scene at one size what was drawn within budgets of records, from the smallest on.
+std::vector<const Summary*> budgetsOf(const std::vector<Summary>& all, uint32_t scene, uint32_t size);
 
 }  // namespace stipple::study
