@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 
 #include "engine/reference/reference.h"
 #include "engine/render/effects/table.h"
@@ -76,6 +77,42 @@ class EffectImages : public test::BackendsHere {
         s.budgets.errorPixels = 1e-3;
         return s;
     }
+    /// Colours against fp64, every kind in every mode, in perspective and in parallel; depths, normals and coverage are
+    /// those of the same backend without the effects, bit by bit.
+    void expectThoseOfTheOracle(const std::function<render::FrameSettings(bool isOrthographic)>& settings) {
+        const auto placed = test::effectStores(folder_.path(), *executor_);
+        auto oracle = reference::makeReferenceBackend(*executor_);
+        for (const bool isOrthographic : {false, true})
+            for (const render::Reconstruction& r : render::reconstructions()) {
+                render::FrameSettings s = settings(isOrthographic), without = s;
+                s.mode = without.mode = r.mode;
+                s.budgets.errorPixels = without.budgets.errorPixels = 1;
+                without.draw.effects.clear();
+                lod::View v = test::effectView(128, 96);
+                if (isOrthographic) {
+                    v.isOrthographic = true;
+                    v.focalPixels = 24;
+                }
+                const render::Image expected = test::draw(placed, *oracle, *executor_, v, s);
+                for (const auto& [name, backend] : backends_)
+                    if (name != "fp64")
+                        expectLike(test::draw(placed, *backend, *executor_, v, s),
+                                   test::draw(placed, *backend, *executor_, v, without), expected,
+                                   fmt::format("{}, {}, parallel {}", name, r.name, isOrthographic));
+            }
+    }
+    static void expectLike(const render::Image& image, const render::Image& without, const render::Image& expected,
+                           const std::string& what) {
+        const auto off = reference::compareImages(image, expected, 4, nullptr);
+        ASSERT_TRUE(off);
+        EXPECT_GE(off->psnr, 50) << what;
+        EXPECT_LE(off->differingFraction, 1e-3) << what;
+        EXPECT_TRUE(image.rgba != without.rgba) << what << ": nothing is seen of it";
+        EXPECT_TRUE(image.depth == without.depth) << what;
+        EXPECT_TRUE(image.normal == without.normal) << what;
+        for (size_t i = 0; i < image.rgba.size(); ++i)
+            ASSERT_EQ(image.rgba[i] >> 24, without.rgba[i] >> 24) << what << ", coverage of pixel " << i;
+    }
     static dvec3 at(const render::Image& image, uint32_t x, uint32_t y) {
         const size_t i = 3 * (size_t{y} * image.width + x);
         return {image.linear[i], image.linear[i + 1], image.linear[i + 2]};
@@ -128,27 +165,12 @@ TEST_F(EffectImages, EyeDomeLightingKnowsNoUnitOfLength) {
 }
 
 TEST_F(EffectImages, EyeDomeLightingIsThatOfTheOracleOnEveryKindAndInEveryMode) {
-    const auto placed = test::effectStores(folder_.path(), *executor_);
-    auto oracle = reference::makeReferenceBackend(*executor_);
-    for (const bool isOrthographic : {false, true})
-        for (const render::Reconstruction& r : render::reconstructions()) {
-            render::FrameSettings s = unlit();
-            s.mode = r.mode;
-            s.budgets.errorPixels = 1;
-            s.draw.effects = {"edl"};
-            s.draw.parameters.edl = {20, 1.4, 2, 0};
-            lod::View v = test::effectView(128, 96);
-            if (isOrthographic) {
-                v.isOrthographic = true;
-                v.focalPixels = 24;
-            }
-            const render::Image expected = test::draw(placed, *oracle, *executor_, v, s);
-            for (const auto& [name, backend] : backends_) {
-                if (name == "fp64") continue;
-                const render::Image image = test::draw(placed, *backend, *executor_, v, s);
-                EXPECT_GE(test::drawnPsnr(image, expected), 40) << name << ", " << r.name << ", " << isOrthographic;
-            }
-        }
+    expectThoseOfTheOracle([](bool) {
+        render::FrameSettings s = unlit();
+        s.draw.effects = {"edl"};
+        s.draw.parameters.edl = {20, 1.4, 2, 0};
+        return s;
+    });
 }
 
 TEST(Fade, IsExactOverManyDecadesWhereTheNaiveFormulaIsNot) {
@@ -229,30 +251,15 @@ TEST_F(EffectImages, FogThatThinsOutIsTheIntegralOfItsDensity) {
 }
 
 TEST_F(EffectImages, FogAndToneAreThoseOfTheOracleOnEveryKindAndInEveryMode) {
-    const auto placed = test::effectStores(folder_.path(), *executor_);
-    auto oracle = reference::makeReferenceBackend(*executor_);
-    for (const bool isOrthographic : {false, true})
-        for (const render::Reconstruction& r : render::reconstructions()) {
-            render::FrameSettings s = unlit();
-            s.draw.unlitTriangles = isOrthographic;  // one of both is lit
-            s.draw.lit = !isOrthographic;
-            s.mode = r.mode;
-            s.budgets.errorPixels = 1;
-            s.draw.effects = {"fog", "tone"};
-            s.draw.parameters.fog = {0.15, 1, 0, {200, 210, 255}, 1};
-            s.draw.parameters.tone = {1.5, 1};
-            lod::View v = test::effectView(128, 96);
-            if (isOrthographic) {
-                v.isOrthographic = true;
-                v.focalPixels = 24;
-            }
-            const render::Image expected = test::draw(placed, *oracle, *executor_, v, s);
-            for (const auto& [name, backend] : backends_) {
-                if (name == "fp64") continue;
-                const render::Image image = test::draw(placed, *backend, *executor_, v, s);
-                EXPECT_GE(test::drawnPsnr(image, expected), 40) << name << ", " << r.name << ", " << isOrthographic;
-            }
-        }
+    expectThoseOfTheOracle([](bool isOrthographic) {
+        render::FrameSettings s = unlit();
+        s.draw.unlitTriangles = isOrthographic;  // one of both is lit
+        s.draw.lit = !isOrthographic;
+        s.draw.effects = {"fog", "tone"};
+        s.draw.parameters.fog = {0.15, 1, 0, {200, 210, 255}, 1};
+        s.draw.parameters.tone = {1.5, 1};
+        return s;
+    });
 }
 
 TEST(Tone, RisesFromBlackToWhiteAndIsNothingWithoutACurve) {

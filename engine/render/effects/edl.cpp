@@ -72,9 +72,12 @@ void fill(const DrawSettings& settings, const glm::dmat3&, DrawList& out) {
     const std::array<float*, 3> weights{&c.weight0, &c.weight1, &c.weight2};
     const std::array<int*, 3> straight{&c.straight0, &c.straight1, &c.straight2},
         slanted{&c.slanted0, &c.slanted1, &c.slanted2};
+    // A slope falls twice as far over twice the way: scales count by 1, 1/2, 1/4, or the widest would be all that is
+    // seen and leave black halos of its radius.
+    const double sum = 2 - std::ldexp(1.0, 1 - static_cast<int>(c.scales));
     for (uint32_t k = 0; k < shared::kEdlScales; ++k) {
         const double radius = std::ldexp(edl.radius, static_cast<int>(k));
-        *weights.at(k) = k < c.scales ? 1.0f / static_cast<float>(c.scales) : 0.0f;
+        *weights.at(k) = k < c.scales ? static_cast<float>(std::ldexp(1.0, -static_cast<int>(k)) / sum) : 0.0f;
         *straight.at(k) = std::max(1, static_cast<int>(std::lround(radius)));
         *slanted.at(k) = std::max(1, static_cast<int>(std::lround(radius * std::sqrt(0.5))));
     }
