@@ -334,7 +334,6 @@ Result<void> run(const Options& o, Written& written) {
     if (!shot.note.empty() && !o.quiet) fmt::print(stderr, "note: {}\n", printable(shot.note));
     STIPPLE_ASSIGN(const lod::ColourBy colour, applyColours(scene, o.colour.what, o.colour.map, o.colour.range));
     STIPPLE_ASSIGN(render::FrameSettings settings, makeSettings(o, description, shot, colour, scene.lights));
-    if (o.shade == "auto" && isLightInPatches(scene.placed)) settings.draw.unlitTriangles = true;
     STIPPLE_ASSIGN(settings.draw.environment, openEnvironment(o.environment, o.build.reading().memoryBytes, *executor,
                                                               hasMirrors(scene.placed, o.material.material())));
     const Legend legend = o.colour.legend ? makeLegend(colour, description) : Legend{};

@@ -136,26 +136,6 @@ bool hasMirrors(const std::vector<render::PlacedStore>& placed, const std::optio
                        [](const render::PlacedStore& p) { return render::hasMirrors(p.store->description); });
 }
 
-namespace {
-
-bool hasPatches(const lod::Hierarchy& h) {
-    bool has = false;
-    h.forEachPayload(0, [&](uint32_t chunk) { has = has || h.payload(chunk).kind == lod::Kind::patches; });
-    return has;
-}
-
-}  // namespace
-
-bool isLightInPatches(const std::vector<render::PlacedStore>& placed) {
-    bool isAny = false;
-    for (const render::PlacedStore& p : placed) {
-        const bool has = hasPatches(p.store->hierarchy);
-        if (p.store->hierarchy.isMesh() || (has && isShaded(p.store->description))) return false;
-        isAny = isAny || has;
-    }
-    return isAny;
-}
-
 bool hasSurfelWeights(const std::vector<render::PlacedStore>& placed) {
     return std::any_of(placed.begin(), placed.end(),
                        [](const render::PlacedStore& p) { return lod::hasWeights(p.store->hierarchy); });

@@ -32,8 +32,6 @@ bool hasPoints(const std::vector<render::PlacedStore>& placed);
 bool takesMaterial(const std::vector<render::PlacedStore>& placed);
 /// Is any of it, or what --material says, so smooth that the environment is seen in it?
 bool hasMirrors(const std::vector<render::PlacedStore>& placed, const std::optional<lod::PointMaterial>& given);
-/// Is what is drawn as triangles patches of scans alone, in whose colours the light is?
-bool isLightInPatches(const std::vector<render::PlacedStore>& placed);
 /// Have any surfels weights of their own (stipple build --surfel-weights)?
 bool hasSurfelWeights(const std::vector<render::PlacedStore>& placed);
 

@@ -113,7 +113,6 @@ Result<study::StudyScene> studySceneOf(const std::string& input, const StudyOpti
     s.draw.lights = opened.lights;
     s.draw.lit = isLit("auto", opened.description, colour);
     s.draw.worldUp = opened.description.up;
-    s.draw.unlitTriangles = isLightInPatches(opened.placed);
     s.up = opened.description.up;
     s.nearPlane = nearPlaneOf(opened);
     s.outline = opened.outline;

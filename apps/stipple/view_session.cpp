@@ -27,8 +27,7 @@ void ViewSession::restart(render::FrameSettings& settings) {
     settings.draw.lights = scene_.lights;
     settings.draw.worldUp = d.up;
     settings.draw.wind.towards = render::windAcross(d.up);
-    settings.draw.unlitTriangles =
-        options_.shade == "unlit" || (options_.shade == "auto" && isLightInPatches(scene_.placed));
+    settings.draw.unlitTriangles = options_.shade == "unlit";
     settings.draw.lit = isLit(options_.shade, d, colour_);
     if (const auto material = options_.material.material()) {
         settings.draw.pointMaterial = lod::packed(*material);

@@ -26,11 +26,12 @@
 }
 
 /// From the directions of patches to those of the camera; a surface that sends no light of its own. `finish`: metallic
-/// and roughness.
+/// and roughness. What has no material is lit by the formula of points, as those that no patch fits are beside it.
 [[gnu::always_inline]] inline void turnPatches(const PatchSource* blocks, const WinningPixels& p, const UvRow& finish,
                                                bool hasEmission, MaterialRow& __restrict s) {
     for (size_t i = 0; i < p.count; ++i) {
-        const DrawMesh& m = *blocks[p.id[i] / kBlockLanes].mesh;
+        const PatchSource& source = blocks[p.id[i] / kBlockLanes];
+        const DrawMesh& m = *source.mesh;
         const float x = s.nx[i], y = s.ny[i], z = s.nz[i];
         s.nx[i] = m.normalX.x * x + m.normalY.x * y + m.normalZ.x * z;
         s.ny[i] = m.normalX.y * x + m.normalY.y * y + m.normalZ.y * z;
@@ -38,7 +39,7 @@
         s.metallic[i] = finish.u[i];
         s.roughness[i] = finish.v[i];
         s.occlusion[i] = 1;
-        s.flags[i] = kPixelTriangle;
+        s.flags[i] = source.materialOf(0) == kPlainPoint ? 0u : kPixelTriangle;
         if (hasEmission) s.emissionR[i] = s.emissionG[i] = s.emissionB[i] = 0;
     }
 }

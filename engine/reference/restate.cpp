@@ -416,7 +416,8 @@ class ReferenceBackend final : public render::DrawsAtOnce {
         } else if (f.debugView == shared::kDebugNormals) {
             colour = 0.5 + 0.5 * dvec3(n.x, -n.y, -n.z);
         } else if (f.debugView == shared::kDebugNone &&
-                   (s.isTriangle || (isLit(f) && (s.hasMaterial() || !draws.lights.empty() || draws.environment)))) {
+                   ((s.isTriangle && !s.isLitAsPoint) ||
+                    (isLit(f) && (s.hasMaterial() || !draws.lights.empty() || draws.environment)))) {
             colour = shadeTriangle(s, n, viewRay(v, p).at(depth), draws);
         } else if (isLit(f) && f.debugView == shared::kDebugNone) {
             colour *= lightOn(n, f, s.letsLightThrough(pixelsAt(v, s.depth)));

@@ -28,7 +28,8 @@ struct Sample {
     bool isSmooth = false;  ///< of a disc exactly, which is wider than a few pixels
     // Of a triangle's pixel:
     bool isTriangle = false, isUnlit = false;
-    uint32_t optic = 0;  ///< which of a layer's optics
+    bool isLitAsPoint = false;  ///< of a patch without material
+    uint32_t optic = 0;         ///< which of a layer's optics
     double metallic = 0, roughness = 1, occlusion = 1;
     /// Of points: how much of what was merged has a material, which is of that part; else lit by one formula.
     double materialShare = 0;

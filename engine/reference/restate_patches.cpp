@@ -27,7 +27,7 @@ class PatchProjector {
 
     void run() {
         const lod::Chunk& chunk = chunks_.at(uint64_t{draws_.firstSource + instance_.source} << 32 | cut_.chunk);
-        const Whole whole{cut_.errorPixels, h_.nodes[cut_.node].level};
+        const Whole whole{cut_.errorPixels, h_.nodes[cut_.node].level, !hasMaterial(chunk)};
         for (uint32_t b = 0; b < cut_.count; ++b) {
             const PatchBlockReader block(h_, h_.nodes[cut_.node], chunk.patchBlocks.at(b), chunk.patchPlanes.at(b));
             const MapReader map(chunk.patchMaps, chunk.patchBlocks[b].map);
@@ -59,6 +59,9 @@ class PatchProjector {
     }
 
   private:
+    bool hasMaterial(const lod::Chunk& chunk) const {
+        return materialOf(chunk, 0) <= 0xffff;  // 16 bits are one
+    }
     /// Of the whole picture, the sample's own, or its store's.
     uint32_t materialOf(const lod::Chunk& chunk, uint32_t sample) const {
         if (draws_.onlyMaterial) return *draws_.onlyMaterial;

@@ -94,6 +94,7 @@ void TriangleProjector::place(int x, int y, double depth, const Corners& c, cons
 void TriangleProjector::store(int x, int y, double depth, const ViewRay& ray, Sample s, const dvec3& n,
                               const Whole& of) {
     s.valid = true;
+    s.isLitAsPoint = of.isLitAsPoint;
     s.depth = depth;
     s.radius = 0.25;
     s.thickness = 0.25 / pixelsAt(view_, depth);

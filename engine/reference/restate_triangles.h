@@ -10,6 +10,7 @@ namespace stipple::reference {
 struct Whole {
     double errorPixels = 0;
     uint32_t level = 0;
+    bool isLitAsPoint = false;  ///< not for debug views
 };
 
 class TriangleProjector {

@@ -250,7 +250,7 @@ dvec3 irradianceOf(const render::Environment& environment, const dvec3& n) {
 
 dvec3 shadeTriangle(const Sample& s, const dvec3& n, const dvec3& point, const render::DrawList& draws) {
     const shared::FrameConstants& f = draws.frame;
-    if (s.isTriangle && (s.isUnlit || (f.shade & shared::kShadeTriangles) == 0)) return s.colour;
+    if (s.isTriangle && !s.isLitAsPoint && (s.isUnlit || (f.shade & shared::kShadeTriangles) == 0)) return s.colour;
     const dvec3 v = -sightOf(draws.view, point), up(f.skyDirection);
     const double nv = std::max(glm::dot(n, v), 1e-3);
     const dvec3 mirror = 2 * nv * n - v;

@@ -263,12 +263,12 @@ class Tracer {
         Hit hit = nearestHit(ray, step);
         if (hit.place == kNone) return false;
         const dvec3 point = ray.at(hit.t);
-        if (hit.isTriangle) {
+        if (hit.isTriangle && !hit.sample.isLitAsPoint) {
             colour = shadeTriangle(hit.sample, hit.normal, point, draws_);
             return true;
         }
         Sample s = hit.sample;
-        const dvec3 n = hit.isCurve ? hit.normal : blendDiscs(ray, hit, s);
+        const dvec3 n = hit.isCurve || hit.isTriangle ? hit.normal : blendDiscs(ray, hit, s);
         const shared::FrameConstants& f = draws_.frame;
         colour = s.colour;
         if ((f.shade & shared::kShadeLit) == 0) return true;
@@ -400,6 +400,8 @@ class Tracer {
         best.isCurve = false;
         best.sample = sample;
         best.sample.thickness = 1;
+        const bool isPlain = store.store->description.pointMaterials.empty() && !settings_.draw.pointMaterial;
+        best.sample.isLitAsPoint = store.store->hierarchy.groups.empty() && isPlain;
         best.normal = n;
     }
 

@@ -36,7 +36,10 @@ streaming::ChunkFinish finishOf(const PlacedStore& placed) {
                                                   size_t count) -> Result<void> {
         if (!chunk.vertices.empty())
             return lod::checkMaterials(*store, chunk, fmt::format("{}: chunk {}", store->path, index));
-        if (!chunk.patchBlocks.empty()) return lod::addMaterials(*store, index, chunk);
+        if (!chunk.patchBlocks.empty()) {
+            lod::recolour(by, *store, index, chunk, {});
+            return lod::addMaterials(*store, index, chunk);
+        }
         std::vector<uint8_t> values;
         if (by.needsAttributes()) {
             const auto& attributes = store->description.attributes;

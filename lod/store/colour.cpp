@@ -71,13 +71,16 @@ uint32_t interpolate(const std::array<uint32_t, N>& map, double t) {
 
 bool isClass(const ColourBy& by) { return by.title == "classification"; }
 
-uint32_t normalColour(const shared::PointRecord& r) {
-    if ((shared::recordFlags(r) & shared::kFlagNoNormal) != 0) return 0x808080;
-    const shared::vec3 n = shared::octDecode(r.normal);
-    // A two-sided normal has no sign of its own: the one that points up stands for both.
-    const bool flip = (shared::recordFlags(r) & shared::kFlagTwoSided) != 0 && n.z < 0;
+/// A two-sided normal has no sign of its own: the one that points up stands for both.
+uint32_t colourOfNormal(const glm::vec3& n, bool isTwoSided) {
+    const bool flip = isTwoSided && n.z < 0;
     const auto byte = [&](float v) { return static_cast<uint32_t>(((flip ? -v : v) * 0.5f + 0.5f) * 255.0f + 0.5f); };
     return byte(n.x) | byte(n.y) << 8 | byte(n.z) << 16;
+}
+uint32_t normalColour(const shared::PointRecord& r) {
+    if ((shared::recordFlags(r) & shared::kFlagNoNormal) != 0) return 0x808080;
+    const bool isTwoSided = (shared::recordFlags(r) & shared::kFlagTwoSided) != 0;
+    return colourOfNormal(glm::vec3(shared::octDecode(r.normal)), isTwoSided);
 }
 
 }  // namespace
@@ -198,10 +201,40 @@ std::string categoryName(const ColourBy& by, double value) {
     return fmt::format("{:.0f}", value);
 }
 
+namespace {
+
+/// Of the samples of patches; what maps show is not that, so there are none.
+void recolourPatches(const ColourBy& by, const Hierarchy& h, uint32_t index, Chunk& chunk) {
+    const Node& node = h.nodes[h.nodeOf(index)];
+    const glm::dvec3 corner = glm::dvec3(node.cell[0], node.cell[1], node.cell[2]) * h.cellSize(node);
+    for (size_t b = 0; b < chunk.patchBlocks.size(); ++b) {
+        shared::PatchBlock& block = chunk.patchBlocks[b];
+        const PatchPlane& plane = chunk.patchPlanes[b];
+        const glm::dmat3 frame = glm::mat3_cast(glm::normalize(glm::dquat(plane.turn)));
+        const glm::dvec3 along = by.up * frame * h.unit;  // heights of a step along U, V and N
+        const double base = glm::dot(by.up, h.origin + h.unit * (corner + plane.origin));
+        block.map = 0;
+        for (uint32_t s = 0; s < shared::kPatchSamples; ++s) {
+            const uint32_t code = block.heights[s / 2] >> (16 * (s % 2)) & 0xffffu;
+            const glm::dvec3 at((block.place % 65536 + s % shared::kPatchStride) * double{plane.step},
+                                (block.place / 65536 + s / shared::kPatchStride) * double{plane.step},
+                                std::ldexp(code, plane.quantumExponent));
+            const uint32_t rgb =
+                by.mode == ColourMode::height
+                    ? colourOf(by, base + glm::dot(along, at))
+                    : colourOfNormal(glm::vec3(frame * glm::dvec3(shared::octDecode(block.normals[s]))), true);
+            block.colours[s] = (block.colours[s] & 0xff000000u) | rgb;
+        }
+    }
+}
+
+}  // namespace
+
 void recolour(const ColourBy& by, const Store& store, uint32_t index, Chunk& chunk,
               const std::vector<uint8_t>& values) {
     const Hierarchy& h = store.hierarchy;
     const Payload& payload = h.payload(index);
+    if (by.mode == ColourMode::height || by.mode == ColourMode::normal) recolourPatches(by, h, index, chunk);
     const auto set = [](shared::PointRecord& r, uint32_t rgb) { r.colour = (r.colour & 0xff000000u) | rgb; };
     if (by.mode == ColourMode::normal) {
         for (shared::PointRecord& r : chunk.records) set(r, normalColour(r));

@@ -46,7 +46,8 @@ uint32_t colourOf(const ColourBy& by, double value);
 /// What a category is called: the ASPRS name of a class, otherwise the number.
 std::string categoryName(const ColourBy& by, double value);
 
-/// Gives the records of a chunk their colours. `values`: the attribute's stream, if `by` needs one.
+/// Gives the records of a chunk their colours, and the samples of its patches theirs by height or normal: those have no
+/// attributes, and no maps then. `values`: the attribute's stream, if `by` needs one.
 void recolour(const ColourBy& by, const Store& store, uint32_t node, Chunk& chunk, const std::vector<uint8_t>& values);
 
 }  // namespace stipple::lod

@@ -14,26 +14,34 @@ namespace {
 
 constexpr uint64_t kMostPlaces = 512;
 
-/// Distance from a triangle.
-double distanceTo(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+double squaredDistance(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
     const glm::dvec2 w = closestWeights(p, a, b, c);
-    return glm::distance(p, a + w.x * (b - a) + w.y * (c - a));
+    const glm::dvec3 d = p - (a + w.x * (b - a) + w.y * (c - a));
+    return glm::dot(d, d);
 }
 
 /// Of the nearest place of a patch, where that is nearer than `limit`; `enough`: nobody asks for less.
 double distanceTo(const Patch& patch, const glm::dvec3& p, double limit, double enough) {
-    const PatchSurface surface(patch);
-    const double step = double{patch.step};
-    const glm::dvec3 q = glm::transpose(surface.frame()) * (p - patch.origin);
+    const double step = double{patch.step}, quantum = patch.quantum();
+    const glm::dvec3 q = glm::transpose(patch.frame()) * (p - patch.origin);  // along the patch's axes
     const auto first = [&](double at) { return std::max(0.0, std::floor((at - limit) / step)); };
     const auto last = [&](double at, uint32_t n) { return std::min(std::floor((at + limit) / step), n - 2.0); };
     for (double j = first(q.y); j <= last(q.y, patch.height); ++j)
         for (double i = first(q.x); i <= last(q.x, patch.width); ++i) {
             const auto u = static_cast<uint32_t>(i), v = static_cast<uint32_t>(j);
             if (!patch.hasCell(u, v)) continue;
-            surface.trianglesOf(u, v, [&](size_t a, size_t b, size_t c) {
-                limit = std::min(limit, distanceTo(p, surface.position(a), surface.position(b), surface.position(c)));
-            });
+            const size_t w = patch.width;
+            const uint16_t* const h = patch.heights.data() + patch.at(u, v);
+            const auto [low, high] = std::minmax({h[0], h[1], h[w], h[w + 1]});
+            if (q.z < low * quantum - limit || q.z > high * quantum + limit) continue;
+            const auto corner = [&](size_t k) {
+                const double right = k % 2 != 0 ? 1 : 0, up = k / 2 != 0 ? 1 : 0;
+                return glm::dvec3((i + right) * step, (j + up) * step, h[k % 2 + w * (k / 2)] * quantum);
+            };
+            const auto& t = cellTriangles(h[0], h[1], h[w], h[w + 1]);
+            for (size_t k = 0; k < 6; k += 3)
+                limit =
+                    std::min(limit, std::sqrt(squaredDistance(q, corner(t[k]), corner(t[k + 1]), corner(t[k + 2]))));
             if (limit <= enough) return limit;
         }
     return limit;

@@ -12,6 +12,12 @@ struct PatchSurface {
     vec2 finish;  // metallic, roughness
 };
 
+// What has no material is lit by the formula of points, as those that no patch fits are beside it.
+uint flagsOf(DrawNode node) {
+    const bool isOne = node.materials == 0u || (node.material & kOnlyMaterial) != 0u;
+    return isOne && (node.material & ~kOnlyMaterial) == kPlainPoint ? 0u : kPixelTriangle;
+}
+
 uint byteOf(float v) { return uint(clamp(v, 0.0, 1.0) * 255.0 + 0.5); }
 vec3 colourOf(PatchBlocks of, uint block, uint s) { return decodeTexel(of.blocks[block].colours[s], true).xyz; }
 
@@ -103,6 +109,6 @@ void main() {
     if (frame.debugView == kDebugLevel) t.colour = debugLevelColour(node.level);
     if (frame.debugView == kDebugError) t.colour = debugErrorColour(node.errorPixels);
     storeTexel(stepInfo.fine, stepInfo.fineWidth, stepInfo.fineHeight, pixel, t);
-    triangleWords[2u * place] = kPixelTriangle | 0x00ff0000u | byteOf(seen.finish.x) | byteOf(seen.finish.y) << 8;
+    triangleWords[2u * place] = flagsOf(node) | 0x00ff0000u | byteOf(seen.finish.x) | byteOf(seen.finish.y) << 8;
     triangleWords[2u * place + 1u] = 0u;
 }

@@ -217,6 +217,58 @@ TEST(BuildPatches, OfColouredScansAreNotLitAgain) {
     EXPECT_NE(picture(""), picture("--shade lit")) << "the control";
 }
 
+/// The mean colour of what a store shows.
+glm::dvec3 meanColour(const TempFolder& folder, const std::string& store, const std::string& more) {
+    const Outcome r = runProgram(
+        folder, "render " + store + " -o p.png --force --quiet --alpha --device cpu --size 96x96 --error 1 " + more);
+    EXPECT_EQ(r.code, 0) << r.err;
+    glm::dvec3 sum(0);
+    double count = 0;
+    if (const auto image = image::readImage(folder / "p.png"))
+        for (const uint32_t p : image->rgba) {
+            if (p >> 24 == 0) continue;
+            sum += glm::dvec3(p & 255u, p >> 8 & 255u, p >> 16 & 255u);
+            ++count;
+        }
+    EXPECT_GT(count, 500);
+    return sum / std::max(count, 1.0);
+}
+
+// What of a scan is patches and what stays points stand side by side: one formula lights both.
+TEST(BuildPatches, OfScansAreColouredAndLitAsTheirPointsAre) {
+    const TempFolder folder;
+    std::string rows, colours;
+    for (int k = 0; k < 90 * 90; ++k) {
+        const double x = k % 90, y = k / 90;
+        const std::string place = fmt::format("{} {} {}", x, y, 0.3 * x + 4 * std::sin(y / 12));
+        rows += place + "\n";
+        colours += place + " 120 160 60\n";
+    }
+    const std::string head = fmt::format(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n", 90 * 90);
+    test::spit(folder / "grey.ply", head + "end_header\n" + rows);
+    test::spit(folder / "green.ply",
+               head + "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n" + colours);
+    for (const std::string scan : {"grey", "green"}) {
+        ASSERT_EQ(runProgram(folder, "build " + scan + ".ply --up z -o " + scan + ".p.stipple --quiet").code, 0);
+        ASSERT_EQ(runProgram(folder, "build " + scan + ".ply --up z --patches -o " + scan + ".s.stipple --quiet").code,
+                  0);
+        for (const std::string how :
+             {"", "--shade lit", "--shade unlit", "--colour plain", "--colour height", "--colour normal"}) {
+            const glm::dvec3 points = meanColour(folder, scan + ".p.stipple", how);
+            for (const std::string as : {"", " --patch-as splats", " --patch-as samples"}) {
+                const glm::dvec3 patches = meanColour(folder, scan + ".s.stipple", how + as);
+                for (int a = 0; a < 3; ++a)
+                    EXPECT_NEAR(patches[a], points[a], 4) << scan << " " << how << as << ", channel " << a;
+            }
+        }
+    }
+    const glm::dvec3 grey = meanColour(folder, "grey.s.stipple", "--colour plain");
+    EXPECT_NEAR(grey.x, grey.z, 4);
+    const glm::dvec3 high = meanColour(folder, "grey.s.stipple", "");
+    EXPECT_GT(std::abs(high.x - high.z), 10) << "without colours it is its height that is seen";
+}
+
 // Singles of sines and cosines leave the vertices of its poles 1e-16 apart: they are no small object far from others.
 TEST(BuildPatches, ABallWhosePolesAreAHairApartIsBuilt) {
     const TempFolder folder;
@@ -238,6 +290,26 @@ TEST(BuildPatches, ABallWhosePolesAreAHairApartIsBuilt) {
     ASSERT_EQ(built.code, 0) << built.err;
     const Outcome right = runProgram(folder, "info t.stipple --verify --against ball.obj");
     EXPECT_EQ(right.code, 0) << right.err;
+    // Of doubles, they are a hundred at one place; as points, as triangles, and as patches of either.
+    std::string ply = fmt::format(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n",
+        129 * 65);
+    std::string rows, faces;
+    for (int k = 0; k < 129 * 65; ++k) {
+        const double down = 3.14159265358979323846 * (k / 129) / 64,
+                     around = 2 * 3.14159265358979323846 * (k % 129) / 128;
+        rows += fmt::format("{} {} {}\n", std::sin(down) * std::cos(around), std::sin(down) * std::sin(around),
+                            std::cos(down));
+        if (k / 129 < 64 && k % 129 < 128) faces += fmt::format("4 {} {} {} {}\n", k, k + 129, k + 130, k + 1);
+    }
+    test::spit(folder / "points.ply", ply + "end_header\n" + rows);
+    test::spit(folder / "mesh.ply",
+               ply + "element face 8192\nproperty list uchar int vertex_indices\nend_header\n" + rows + faces);
+    for (const std::string file : {"points.ply", "mesh.ply"})
+        for (const std::string how : {"", " --patches"}) {
+            const Outcome made = runProgram(folder, "build " + file + how + " -o s.stipple --force");
+            EXPECT_EQ(made.code, 0) << file << how << ": " << made.err;
+        }
     // What is small and far from the rest is still told from it.
     test::spit(folder / "far.obj", obj + "v 1e12 0 0\nv 1e12 1 0\nv 1e12 0 1\nf -1 -2 -3\n");
     EXPECT_EQ(runProgram(folder, "build far.obj --patches -o f.stipple").code, 3);

@@ -31,16 +31,18 @@ LeftDisc united(std::span<const LeftDisc> discs) {
 }
 
 struct InCell {
-    std::array<int64_t, 3> cell;
+    uint64_t cell;  ///< as a number; those far out share one with others
     uint32_t disc;
 };
 /// By cells, in each in their order.
 std::vector<InCell> byCell(const std::vector<LeftDisc>& discs, double edge) {
+    constexpr uint64_t kAxis = (uint64_t{1} << 21) - 1;
     std::vector<InCell> out;
     out.reserve(discs.size());
     for (uint32_t k = 0; k < discs.size(); ++k) {
         const glm::dvec3 c = glm::floor(discs[k].place / edge);
-        out.push_back({{static_cast<int64_t>(c.z), static_cast<int64_t>(c.y), static_cast<int64_t>(c.x)}, k});
+        const auto along = [&](int a) { return static_cast<uint64_t>(static_cast<int64_t>(c[a])) & kAxis; };
+        out.push_back({along(2) << 42 | along(1) << 21 | along(0), k});
     }
     std::sort(out.begin(), out.end(),
               [](const InCell& a, const InCell& b) { return a.cell != b.cell ? a.cell < b.cell : a.disc < b.disc; });

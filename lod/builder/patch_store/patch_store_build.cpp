@@ -241,6 +241,12 @@ class PatchBuild : public CellContent {
         description.boundsMin = description.focusMin = facts_.lattice.origin + world * glm::dvec3(sums_.lo);
         description.boundsMax = description.focusMax = facts_.lattice.origin + world * glm::dvec3(sums_.hi);
         description.hasColour = description.hasNormals = description.isReflectance = true;
+        for (int a = 0; a < 3; ++a) {
+            const double p = description.up[a] * description.boundsMin[a],
+                         q = description.up[a] * description.boundsMax[a];
+            description.lowHeight += std::min(p, q);
+            description.highHeight += std::max(p, q);
+        }
         return h;
     }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "engine/base/numbers.h"
+#include "lod/builder/patches/sheet_fit.h"
 #include "shaders/shared/record.h"
 
 namespace stipple::lod {
@@ -18,83 +19,14 @@ constexpr double kSheet = 0.75;                  ///< h, from the plane of the g
 constexpr double kBesideBorder = 0.7;            ///< spacings, as far as the surface goes on beyond its last points
 constexpr double kSteepest = 3.732;              ///< tan 75 degrees
 constexpr double kLoose = 0.25;                  ///< h, of the weighted residuals
-constexpr int kMostMoves = 10;
-constexpr double kAtRest = 1e-6;  ///< h
-constexpr double kFlat = 1e-8;    ///< least pivot over the largest
 
-/// Places in units of h: along U, V and N, about the place that was asked about.
-struct Fitted {
-    static constexpr size_t kRoom = NearPoints::kMost;
-    double x[kRoom], y[kRoom], z[kRoom];  // NOLINT: set as far as they are read
-    double inPlane[kRoom];                // NOLINT: exp(-(x^2 + y^2))
-    double weight[kRoom];                 // NOLINT
-    uint32_t index[kRoom];                // NOLINT: points
-    size_t n = 0;
-};
-
-constexpr size_t kMostTerms = 6;  ///< 1, x, y, x^2, x y, y^2
-using Terms = std::array<double, kMostTerms>;
-
-/// Weighted normal equations of the first `terms` of them; the matrix's lower half.
-void accumulate(const Fitted& f, std::array<Terms, kMostTerms>& m, Terms& right) {
-    for (size_t k = 0; k < f.n; ++k) {
-        const double x = f.x[k], y = f.y[k], w = f.weight[k];
-        const double wx = w * x, wy = w * y, xx = wx * x, xy = wx * y, yy = wy * y;
-        const double xxx = xx * x, xxy = xx * y, xyy = xy * y, yyy = yy * y;
-        const std::array<double, kMostTerms> t{w, wx, wy, xx, xy, yy};
-        for (size_t i = 0; i < kMostTerms; ++i) {
-            m[i][0] += t[i];
-            right[i] += t[i] * f.z[k];
-        }
-        m[1][1] += xx;
-        m[2][1] += xy;
-        m[2][2] += yy;
-        m[3][1] += xxx;
-        m[3][2] += xxy;
-        m[4][2] += xyy;
-        m[5][2] += yyy;
-        m[3][3] += xxx * x;
-        m[4][3] += xxx * y;
-        m[4][4] += xxy * y;
-        m[5][4] += xyy * y;
-        m[5][5] += yyy * y;
-    }
-    m[4][1] = m[3][2];
-    m[5][1] = m[4][2];
-    m[5][3] = m[4][4];
-}
-
-/// By Cholesky; false where the points say too little. (Coordinates are of the order of 1, so that pivots tell.)
-bool solve(const Fitted& f, size_t terms, Terms& c) {
-    std::array<Terms, kMostTerms> m{};
-    Terms right{};
-    accumulate(f, m, right);
-    const double largest = m[0][0];
-    for (size_t i = 0; i < terms; ++i) {
-        for (size_t j = 0; j <= i; ++j) {
-            double v = m[i][j];
-            for (size_t k = 0; k < j; ++k) v -= m[i][k] * m[j][k];
-            if (i == j) {
-                if (!(v > kFlat * largest)) return false;
-                m[i][i] = std::sqrt(v);
-            } else {
-                m[i][j] = v / m[j][j];
-            }
-        }
-        for (size_t k = 0; k < i; ++k) right[i] -= m[i][k] * right[k];
-        right[i] /= m[i][i];
-    }
-    c = {};
-    for (size_t i = terms; i-- > 0;) {
-        c[i] = right[i];
-        for (size_t k = i + 1; k < terms; ++k) c[i] -= m[k][i] * c[k];
-        c[i] /= m[i][i];
-    }
-    return true;
+float squaredReach(float spacing, bool isFar) {
+    const double limit = (isFar ? kReach : kUsualReach) * static_cast<double>(spacing);
+    return toFloat(limit * limit);
 }
 
 /// Do the points leave half of all directions in the plane empty?
-bool isOneSided(const Fitted& f) {
+bool isOneSided(const FitPoints& f) {
     uint32_t sectors = 0;
     for (size_t k = 0; k < f.n; ++k) {
         const double x = f.x[k], y = f.y[k];
@@ -108,36 +40,16 @@ bool isOneSided(const Fitted& f) {
     return (empty & empty >> 1 & empty >> 2 & empty >> 3) != 0;
 }
 
-/// Weights of distances from (0, 0, height), times whatever makes the largest 1 or less.
-void weigh(double height, Fitted& f) {
-    for (size_t k = 0; k < f.n; ++k) {
-        const double d = f.z[k] - height;
-        f.weight[k] = f.inPlane[k] * std::exp(-d * d);
-    }
-}
-
-double looseness(const Fitted& f, const Terms& c) {
-    double sum = 0, weights = 0;
-    for (size_t k = 0; k < f.n; ++k) {
-        const double x = f.x[k], y = f.y[k];
-        const double r = f.z[k] - (c[0] + x * (c[1] + c[3] * x + c[4] * y) + y * (c[2] + c[5] * y));
-        sum += f.weight[k] * r * r;
-        weights += f.weight[k];
-    }
-    return std::sqrt(sum / weights);
-}
-
 /// The points of the guide's sheet around a place.
-void gather(const PointSurface& s, const glm::dvec3& place, const glm::dmat3& frame, uint32_t guide, double h,
-            Fitted& f) {
+void gather(PlacesNear& places, const glm::dvec3& place, const glm::dmat3& frame, uint32_t guide, double h,
+            FitPoints& f) {
+    const PointSurface& s = places.surface();
     const glm::dvec3 sheet(s.elements.normal[guide]), from = s.elements.centre[guide];
     const glm::dmat3 toLocal = glm::transpose(frame) * (1 / h);
     NearPoints::Found near;
-    for (const double reach : {kUsualReach, kReach}) {
-        const double limit = reach * static_cast<double>(s.spacing[guide]);
-        s.near.find(place, kNeighbours, toFloat(limit * limit), near);
+    for (const bool isFar : {false, true}) {
+        places.find(place, guide, isFar, near);
         f.n = 0;
-        double least = 1e300;
         for (size_t k = 0; k < near.count; ++k) {
             const uint32_t i = near.index[k];
             const glm::dvec3& p = s.elements.centre[i];
@@ -149,11 +61,9 @@ void gather(const PointSurface& s, const glm::dvec3& place, const glm::dmat3& fr
             f.y[f.n] = q.y;
             f.z[f.n] = q.z;
             f.index[f.n] = i;
-            f.inPlane[f.n] = q.x * q.x + q.y * q.y;
-            least = std::min(least, f.inPlane[f.n]);
+            f.squared[f.n] = q.x * q.x + q.y * q.y;
             ++f.n;
         }
-        for (size_t k = 0; k < f.n; ++k) f.inPlane[k] = std::exp(least - f.inPlane[k]);
         if (f.n >= kForQuadratic) return;
     }
 }
@@ -169,39 +79,46 @@ const std::array<float, 256>& linearTable() {
 
 }  // namespace
 
-bool leastSquaresAt(const PointSurface& s, const glm::dvec3& place, const glm::dmat3& frame, uint32_t guide,
+PlacesNear::PlacesNear(const PointSurface& surface, std::span<const glm::dvec3> places,
+                       std::span<const uint32_t> guides)
+    : surface_(surface) {
+    for (size_t k = 0; k < places.size(); ++k) {
+        lo_ = glm::min(lo_, places[k]);
+        hi_ = glm::max(hi_, places[k]);
+        spacing_ = std::max(spacing_, surface.spacing[guides[k]]);
+    }
+}
+
+void PlacesNear::find(const glm::dvec3& place, uint32_t guide, bool isFar, NearPoints::Found& near) {
+    const size_t k = isFar ? 1 : 0;
+    if (!isKnown_.at(k)) surface_.near.runsNear(lo_, hi_, squaredReach(spacing_, isFar), runs_.at(k));
+    isKnown_.at(k) = true;
+    surface_.near.find(runs_.at(k), place, kNeighbours, squaredReach(surface_.spacing[guide], isFar), near);
+}
+
+bool leastSquaresAt(PlacesNear& places, const glm::dvec3& place, const glm::dmat3& frame, uint32_t guide,
                     LeastSquaresSample& sample) {
+    const PointSurface& s = places.surface();
     const auto spacing = static_cast<double>(s.spacing[guide]);
     const double h = kSupport * spacing;
     if (!(h > 0)) return false;
-    Fitted f;
-    gather(s, place, frame, guide, h, f);
+    FitPoints f;
+    gather(places, place, frame, guide, h, f);
     if (f.n < kFewest) return false;
     const bool isBorder = isOneSided(f);
-    size_t terms = f.n >= kForQuadratic && !isBorder ? 6 : 3;
-    double height = 0;
-    Terms c{};
-    for (int move = 0;; ++move) {
-        if (move == kMostMoves) return false;
-        weigh(height, f);
-        if (!solve(f, terms, c)) {
-            if (terms == 3) return false;
-            terms = 3;
-            continue;
-        }
-        const double moved = c[0] - height;
-        height = c[0];
-        if (!(std::abs(height) <= 1)) return false;
-        if (std::abs(moved) < kAtRest) break;
-    }
-    if (c[1] * c[1] + c[2] * c[2] > kSteepest * kSteepest || looseness(f, c) > kLoose) return false;
+    SheetFit fit;
+    if (!fitSheet(f, f.n >= kForQuadratic && !isBorder, fit)) return false;
+    const FitTerms& c = fit.terms;
+    const double height = fit.height;
+    if (c[1] * c[1] + c[2] * c[2] > kSteepest * kSteepest || fit.loose > kLoose) return false;
     double closest = 1e300;
     for (size_t k = 0; k < f.n; ++k) {
-        const double distance = glm::length(glm::dvec3(f.x[k], f.y[k], f.z[k] - height));
-        if (distance >= closest) continue;
-        closest = distance;
+        const double d = f.z[k] - height, squared = f.squared[k] + d * d;
+        if (squared >= closest) continue;
+        closest = squared;
         sample.nearestPoint = f.index[k];
     }
+    closest = std::sqrt(closest);
     if (isBorder && closest * h > kBesideBorder * spacing) return false;
     sample.height = height * h;
     sample.slope = {c[1], c[2]};

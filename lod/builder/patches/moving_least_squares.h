@@ -3,9 +3,12 @@
 //
 // The points of one sheet around a place p are fitted by a height over the plane, quadratic where there are enough of
 // them on all sides, else linear, with weights exp(-(d^2 - dmin^2) / h^2) of their distance d from p; p moves to the
-// fit, at most ten times, until it moves by less than 1e-6 h. What moves farther than h, does not come to rest, is
+// fit, at most ten times, until it moves by less than 1e-4 h. What moves farther than h, does not come to rest, is
 // steeper than 75 degrees, has its points on one side only (beyond the border) or far from the fit is no result.
 #pragma once
+
+#include <array>
+#include <span>
 
 #include "lod/builder/patches/point_surface.h"
 
@@ -19,8 +22,26 @@ struct LeastSquaresSample {
     glm::vec3 colour{0};        ///< linear
 };
 
-/// At `place`, along the third column of `frame`; `guide`: the point whose sheet it is. False: no result.
-bool leastSquaresAt(const PointSurface& surface, const glm::dvec3& place, const glm::dmat3& frame, uint32_t guide,
+/// Where to look for what lies around places near each other.
+class PlacesNear {
+  public:
+    /// `guides`: of each place, the point whose sheet it is.
+    PlacesNear(const PointSurface& surface, std::span<const glm::dvec3> places, std::span<const uint32_t> guides);
+    const PointSurface& surface() const { return surface_; }
+    /// The nearest points to one of the places, as far as is usual or, where those are too few, farther.
+    void find(const glm::dvec3& place, uint32_t guide, bool isFar, NearPoints::Found& near);
+
+  private:
+    static constexpr size_t kReaches = 2;
+    const PointSurface& surface_;
+    glm::dvec3 lo_{1e300}, hi_{-1e300};
+    float spacing_ = 0;  ///< the greatest of the guides'
+    std::array<bool, kReaches> isKnown_{};
+    std::array<NearPoints::Runs, kReaches> runs_;
+};
+
+/// At `place`, along the third column of `frame`. False: no result.
+bool leastSquaresAt(PlacesNear& places, const glm::dvec3& place, const glm::dmat3& frame, uint32_t guide,
                     LeastSquaresSample& sample);
 
 }  // namespace stipple::lod

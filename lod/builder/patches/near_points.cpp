@@ -12,6 +12,7 @@ using Lanes = float __attribute__((vector_size(32), aligned(4), may_alias));
 using Mask = int32_t __attribute__((vector_size(32), aligned(4), may_alias));
 constexpr float kFar = std::numeric_limits<float>::max();
 constexpr size_t kDeepest = 12, kWaiting = 8 * kDeepest;
+constexpr size_t kMostRanked = 64;  ///< points within a limit that are put in order at once
 
 const Lanes& lanes(const float* p) { return *reinterpret_cast<const Lanes*>(p); }
 
@@ -26,6 +27,47 @@ void insert(NearPoints::Found& f, size_t most, float squared, uint32_t index) {
     }
     f.squared[at] = squared;
     f.index[at] = index;
+}
+
+/// Squared distances of points within a limit, in the order of the points.
+struct Within {
+    alignas(32) float squared[kMostRanked + 8];  // NOLINT: set as far as they are read
+    alignas(32) uint32_t rank[kMostRanked + 8];  // NOLINT
+    uint32_t index[kMostRanked + 8];             // NOLINT
+    uint32_t count = 0;
+};
+
+/// Is any lane set?
+[[gnu::always_inline]] inline bool any(const Mask& mask) {
+    using Halves = int64_t __attribute__((vector_size(32)));
+    const auto m = __builtin_bit_cast(Halves, mask);
+    return ((m[0] | m[1]) | (m[2] | m[3])) != 0;
+}
+
+/// How many come before each: those that are nearer, and of equally far ones those that stand before it.
+[[gnu::always_inline]] inline void rank(Within& w) {
+    reinterpret_cast<Lanes&>(w.squared[w.count]) = Lanes{} + kFar;
+    for (uint32_t i = 0; i < w.count; i += 8) {
+        const Lanes own = lanes(w.squared + i);
+        Mask nearer{};
+        for (uint32_t k = 0; k < w.count; ++k) nearer -= w.squared[k] < own;
+        reinterpret_cast<Mask&>(w.rank[i]) = nearer;
+    }
+    uint8_t taken[kMostRanked] = {};  // NOLINT
+    for (uint32_t i = 0; i < w.count; ++i) w.rank[i] += taken[w.rank[i]]++;
+}
+
+/// Only the nearest stay; nothing that is farther than the last of those is looked for any more.
+[[gnu::always_inline]] inline void keepNearest(Within& w, size_t most, float& limit) {
+    rank(w);
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < w.count; ++i) {
+        if (w.rank[i] >= most) continue;
+        if (w.rank[i] + 1 == most) limit = w.squared[i];
+        w.squared[kept] = w.squared[i];
+        w.index[kept++] = w.index[i];
+    }
+    w.count = kept;
 }
 
 }  // namespace
@@ -106,6 +148,86 @@ STIPPLE_WIDE void NearPoints::search(const NearPoints& tree, const float (&p)[3]
             stack[at] = {out[k], here.level - 1, 8 * here.node + k};
         }
     }
+}
+
+STIPPLE_WIDE void NearPoints::searchRuns(const NearPoints& tree, const Box32& box, float limit, Runs& runs) {
+    struct Waiting {
+        uint32_t level, node;
+    };
+    Waiting stack[kWaiting];  // NOLINT: set as far as it is read
+    size_t depth = 0;
+    runs.count = 0;
+    runs.isWhole = true;
+    stack[depth++] = {static_cast<uint32_t>(tree.levels_.size()), 0};
+    float out[8];  // NOLINT
+    while (depth > 0) {
+        const Waiting here = stack[--depth];
+        if (here.level == 0) {
+            runs.isWhole = runs.count < Runs::kMostRuns;
+            if (!runs.isWhole) return;
+            runs.run[runs.count++] = here.node;
+            continue;
+        }
+        const Node& node = tree.levels_[here.level - 1][here.node];
+        Lanes sum{};
+        for (int a = 0; a < 3; ++a) {
+            const Lanes below = lanes(node.lo[a]) - box.hi[a], above = box.lo[a] - lanes(node.hi[a]);
+            Lanes d = below > above ? below : above;
+            d = d > 0.0f ? d : Lanes{};
+            sum += d * d;
+        }
+        reinterpret_cast<Lanes&>(out) = sum;
+        for (uint32_t k = 8; k-- > 0;)
+            if (out[k] <= limit) stack[depth++] = {here.level - 1, 8 * here.node + k};
+    }
+}
+
+STIPPLE_WIDE void NearPoints::searchAmong(const NearPoints& tree, const Runs& runs, const float (&p)[3], size_t most,
+                                          float limit, Found& found) {
+    Within w;
+    float out[8];  // NOLINT
+    for (size_t r = 0; r < runs.count; ++r) {
+        const Leaf& leaf = tree.leaves_[runs.run[r]];
+        const Lanes x = lanes(leaf.at[0]) - p[0], y = lanes(leaf.at[1]) - p[1], z = lanes(leaf.at[2]) - p[2];
+        const Lanes squared = x * x + y * y + z * z;
+        if (!any(squared <= limit)) continue;
+        reinterpret_cast<Lanes&>(out) = squared;
+        if (w.count + 8 > kMostRanked) keepNearest(w, most, limit);
+        for (uint32_t k = 0; k < 8; ++k) {  // (without a branch: what is not within is written over)
+            w.squared[w.count] = out[k];
+            w.index[w.count] = 8 * runs.run[r] + k;
+            w.count += out[k] <= limit ? 1u : 0u;
+        }
+    }
+    rank(w);
+    found.count = std::min<size_t>(w.count, most);
+    for (uint32_t i = 0; i < w.count; ++i) {
+        if (w.rank[i] >= most) continue;
+        found.squared[w.rank[i]] = w.squared[i];
+        found.index[w.rank[i]] = w.index[i];
+    }
+}
+
+// (Differences and sums of floats rise with what they are of: no run's box is farther than one of its points, nor from
+// a box of places than from one of them.)
+void NearPoints::runsNear(const glm::dvec3& lo, const glm::dvec3& hi, float limit, Runs& runs) const {
+    runs.count = 0;
+    runs.isWhole = false;
+    if (count_ == 0) return;
+    Box32 box;
+    for (int a = 0; a < 3; ++a) {
+        box.lo[a] = static_cast<float>(lo[a]);
+        box.hi[a] = static_cast<float>(hi[a]);
+    }
+    searchRuns(*this, box, std::min(limit, kFar), runs);
+}
+
+void NearPoints::find(const Runs& runs, const glm::dvec3& p, size_t most, float limit, Found& found) const {
+    const float at[3] = {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
+    if (runs.isWhole)
+        searchAmong(*this, runs, at, std::min(most, kMost), std::min(limit, kFar), found);
+    else
+        find(p, most, limit, found);
 }
 
 void NearPoints::find(const glm::dvec3& p, size_t most, float limit, Found& found) const {

@@ -118,28 +118,54 @@ class Sampler {
         }
     }
 
+    /// By squares of samples, whose neighbours are looked for once.
     void sampleAll() {
         slopes_.assign(grid_.heights.size(), glm::dvec2(0));
         nearest_.assign(grid_.heights.size(), 0);
         nearestPoint_.assign(grid_.heights.size(), PointPatch::kNoPoint);
-        for (size_t s = 0; s < guide_.size(); ++s) {
-            if (guide_[s] == kNobody) continue;
-            const uint32_t i = guide_[s];
-            const glm::dvec3 q = grid_.local(s_.elements.centre[i]);
-            const glm::dvec2 at(static_cast<double>(s % grid_.width), static_cast<double>(s / grid_.width));
-            // On the guide's own plane.
-            const glm::dvec3 n = glm::transpose(grid_.frame) * glm::dvec3(s_.elements.normal[i]);
-            const double start =
-                q.z - (n.x * (at.x - q.x) + n.y * (at.y - q.y)) * grid_.step / std::max(n.z, kLeastFacing);
-            const glm::dvec3 place =
-                grid_.origin + grid_.frame * glm::dvec3(at.x * grid_.step, at.y * grid_.step, start);
+        Square square;
+        for (uint32_t y = 0; y < grid_.height; y += kSquare)
+            for (uint32_t x = 0; x < grid_.width; x += kSquare) {
+                square.n = 0;
+                for (uint32_t j = y; j < std::min(y + kSquare, grid_.height); ++j)
+                    for (uint32_t i = x; i < std::min(x + kSquare, grid_.width); ++i) addTo(square, grid_.at(i, j));
+                if (square.n > 0) sampleSquare(square);
+            }
+    }
+    static constexpr uint32_t kSquare = 4;
+    struct Square {
+        std::array<size_t, kSquare * kSquare> sample;
+        std::array<glm::dvec3, kSquare * kSquare> place;
+        std::array<double, kSquare * kSquare> start;  ///< above the plane
+        std::array<uint32_t, kSquare * kSquare> guide;
+        size_t n = 0;
+    };
+    void addTo(Square& square, size_t s) const {
+        if (guide_[s] == kNobody) return;
+        const uint32_t i = guide_[s];
+        const glm::dvec3 q = grid_.local(s_.elements.centre[i]);
+        const glm::dvec2 at(static_cast<double>(s % grid_.width), static_cast<double>(s / grid_.width));
+        // On the guide's own plane.
+        const glm::dvec3 n = glm::transpose(grid_.frame) * glm::dvec3(s_.elements.normal[i]);
+        const double start = q.z - (n.x * (at.x - q.x) + n.y * (at.y - q.y)) * grid_.step / std::max(n.z, kLeastFacing);
+        square.sample.at(square.n) = s;
+        square.place.at(square.n) =
+            grid_.origin + grid_.frame * glm::dvec3(at.x * grid_.step, at.y * grid_.step, start);
+        square.start.at(square.n) = start;
+        square.guide.at(square.n) = i;
+        ++square.n;
+    }
+    void sampleSquare(const Square& square) {
+        PlacesNear places(s_, {square.place.data(), square.n}, {square.guide.data(), square.n});
+        for (size_t k = 0; k < square.n; ++k) {
+            const size_t s = square.sample.at(k);
             LeastSquaresSample sample;
-            if (!leastSquaresAt(s_, place, grid_.frame, i, sample)) continue;
+            if (!leastSquaresAt(places, square.place.at(k), grid_.frame, square.guide.at(k), sample)) continue;
             // Without overlap, what is nearest to another segment's points is that one's.
             if (closing_ != PatchClosing::overlap &&
                 !std::binary_search(segment_.begin(), segment_.end(), sample.nearestPoint))
                 continue;
-            grid_.heights[s] = start + sample.height;
+            grid_.heights[s] = square.start.at(k) + sample.height;
             slopes_[s] = sample.slope;
             nearest_[s] = sample.nearest;
             nearestPoint_[s] = sample.nearestPoint;

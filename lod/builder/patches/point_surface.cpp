@@ -66,6 +66,61 @@ void orderPoints(PointBlock& from, PointSurface& s) {
     from = {};
 }
 
+/// The nearest of points one after another: those of one are that many for another, too, so none of that one's is
+/// farther than they are from one and the way between both. What that bounds well is looked for together.
+class NearestOf {
+  public:
+    explicit NearestOf(const PointSurface& s) : s_(s) {}
+
+    /// Of point i, itself the first; the points up to `end` come next.
+    const NearPoints::Found& find(size_t i, size_t end) {
+        if (i >= ahead_) lookAhead(i, end);
+        if (i < ahead_) {
+            const float limit = std::min(limitFrom(i, known_, ofKnown_), limitFrom(i, before_, reach()));
+            s_.near.find(runs_, s_.elements.centre[i], kMost, limit, near_);
+        } else {
+            const bool isBounded = near_.count == kMost;
+            const float limit = isBounded ? limitFrom(i, before_, reach()) : std::numeric_limits<float>::max();
+            s_.near.find(s_.elements.centre[i], kMost, limit, near_);
+        }
+        before_ = i;
+        return near_;
+    }
+
+  private:
+    static constexpr size_t kMost = kNeighbours + 1, kAhead = 16;
+    static constexpr double kClose = 0.8;  ///< of the farthest neighbour's distance, that the next points are away
+
+    double way(size_t i, size_t k) const { return glm::distance(s_.elements.centre[i], s_.elements.centre[k]); }
+    double reach() const { return std::sqrt(static_cast<double>(near_.squared[kMost - 1])); }
+    float limitFrom(size_t i, size_t known, double reach) const {
+        const double most = way(i, known) + reach;
+        return toFloat(most * most * kRoom);
+    }
+    /// Where the point before is near enough to the next ones.
+    void lookAhead(size_t i, size_t end) {
+        ahead_ = i;
+        if (near_.count != kMost) return;
+        known_ = before_;
+        ofKnown_ = reach();
+        const double close = kClose * ofKnown_;
+        glm::dvec3 lo(std::numeric_limits<double>::max()), hi(std::numeric_limits<double>::lowest());
+        float limit = 0;
+        for (; ahead_ < std::min(i + kAhead, end) && way(ahead_, known_) <= close; ++ahead_) {
+            lo = glm::min(lo, s_.elements.centre[ahead_]);
+            hi = glm::max(hi, s_.elements.centre[ahead_]);
+            limit = std::max(limit, limitFrom(ahead_, known_, ofKnown_));
+        }
+        if (ahead_ > i) s_.near.runsNear(lo, hi, limit, runs_);
+    }
+
+    const PointSurface& s_;
+    NearPoints::Found near_;
+    NearPoints::Runs runs_;
+    size_t before_ = 0, ahead_ = 0, known_ = 0;
+    double ofKnown_ = 0;  ///< the farthest of the neighbours of the one that is known
+};
+
 /// Normal, spacing and noise of a point (`near`: of it, itself the first); is it one of a surface?
 bool describe(const NearPoints::Found& near, size_t i, PointSurface& s) {
     const size_t n = near.count, last = n == 0 ? 0 : std::min(n, kLinks + 1) - 1;
@@ -75,15 +130,18 @@ bool describe(const NearPoints::Found& near, size_t i, PointSurface& s) {
     s.spacing[i] = toFloat(std::sqrt(area));
     s.elements.normal[i] = {0, 0, 1};
     if (n < 4) return false;
-    glm::dvec3 mean(0);
-    for (size_t k = 0; k < n; ++k) mean += s.elements.centre[near.index[k]] - s.elements.centre[i];
-    mean /= static_cast<double>(n);
-    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+    glm::dvec3 mean(0), xx(0), xy(0);  // squares; products of x and y, y and z, z and x
     for (size_t k = 0; k < n; ++k) {
-        const glm::dvec3 d = s.elements.centre[near.index[k]] - s.elements.centre[i] - mean;
-        const Eigen::Vector3d v(d.x, d.y, d.z);
-        sum += v * v.transpose();
+        const glm::dvec3 d = s.elements.centre[near.index[k]] - s.elements.centre[i];
+        mean += d;
+        xx += d * d;
+        xy += d * glm::dvec3(d.y, d.z, d.x);
     }
+    mean /= static_cast<double>(n);
+    xx -= static_cast<double>(n) * mean * mean;
+    xy -= static_cast<double>(n) * mean * glm::dvec3(mean.y, mean.z, mean.x);
+    Eigen::Matrix3d sum;
+    sum << xx.x, xy.x, xy.z, xy.x, xx.y, xy.y, xy.z, xy.y, xx.z;
     const double trace = sum.trace();
     if (!(trace > 0) || !std::isfinite(trace)) return false;
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
@@ -114,16 +172,9 @@ PointSurface pointSurface(PointBlock points, const std::function<bool()>& isStop
     std::atomic<uint64_t> done{0};
     executor.parallelFor(count, 4096, [&](size_t begin, size_t end) {
         if (isStopped && isStopped()) return;
-        NearPoints::Found near;
+        NearestOf nearest(s);
         for (size_t i = begin; i < end; ++i) {
-            // The nearest of the point before are that many points, too.
-            float limit = std::numeric_limits<float>::max();
-            if (i > begin && near.count == kNeighbours + 1) {
-                const double way = glm::distance(s.elements.centre[i], s.elements.centre[i - 1]) +
-                                   std::sqrt(static_cast<double>(near.squared[kNeighbours]));
-                limit = toFloat(way * way * kRoom);
-            }
-            s.near.find(s.elements.centre[i], kNeighbours + 1, limit, near);
+            const NearPoints::Found& near = nearest.find(i, end);
             s.isSurface[i] = describe(near, i, s) ? 1 : 0;
             beside[i].fill(static_cast<uint32_t>(i));
             for (size_t k = 1; k < std::min(near.count, kLinks + 1); ++k) beside[i][k - 1] = near.index[k];

@@ -90,6 +90,23 @@ class PlaceTree {
     std::vector<int> axis_;  ///< of the split at a place
 };
 
+/// Places that only the last bits of their largest coordinate would tell apart are one: the pole of a ball computed by
+/// sines is a hundred of them, 1e-16 radii from each other along the other axes.
+void mergeRounded(std::vector<glm::dvec3>& places) {
+    constexpr int kBits = 50;
+    for (glm::dvec3& p : places) {
+        const double most = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+        if (!(most > 1e-280) || !std::isfinite(most)) continue;
+        const double step = std::ldexp(1.0, std::ilogb(most) - kBits);
+        p = glm::round(p / step) * step;
+    }
+    const auto before = [](const glm::dvec3& a, const glm::dvec3& b) {
+        return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
+    };
+    std::sort(places.begin(), places.end(), before);
+    places.erase(std::unique(places.begin(), places.end()), places.end());
+}
+
 }  // namespace
 
 double denseExtent(const std::vector<glm::dvec3>& places) {
@@ -132,6 +149,7 @@ DenseBox denseBox(const std::vector<glm::dvec3>& places) {
 
 double denseSpacing(std::vector<glm::dvec3> places, double share) {
     constexpr double kDense = 0.01;
+    mergeRounded(places);
     if (places.size() < kFewest) return 0;
     const PlaceTree tree(places);
     std::vector<double> distances(places.size());

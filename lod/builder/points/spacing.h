@@ -7,8 +7,8 @@
 namespace stipple::lod {
 
 /// The spacing where points lie densest, but for one place in a hundred: the share of a sample that lies in small dense
-/// objects, however far apart, is not more than that. `places`: different ones, each of a point with probability
-/// `share` whatever the others; on surfaces. 0: too few to tell.
+/// objects, however far apart, is not more than that. `places`: different ones (beyond 2^-50 of their coordinates),
+/// each of a point with probability `share` whatever the others; on surfaces. 0: too few to tell.
 double denseSpacing(std::vector<glm::dvec3> places, double share);
 
 /// The largest extent along an axis of what lies between the 2nd and the 98th percentile of `places`; 0: of none.

@@ -19,23 +19,25 @@ class PatchGround {
     double boundOf(const Triangle& triangle, double limit, double enough, uint32_t& hint) const;
 
   private:
+    /// Distances are those along the patch's own axes, in which its cells are cheap.
     struct Ground {
         const Patch* patch;
-        PatchSurface surface;
-        glm::dvec3 corner, origin;  ///< origin: with the corner
+        glm::dvec3 origin;  ///< with the corner
         glm::dmat3 toLocal;
         glm::dvec3 centre;  ///< of a ball that holds it
-        double radius;
+        double radius, step, quantum;
+        glm::dvec3 local(const glm::dvec3& p) const { return toLocal * (p - origin); }
     };
     struct Facet {
-        Triangle at;
-        double distance;
+        uint32_t ground;
+        Triangle at;  ///< along the axes of that
+        double squared;
     };
     double bound(const Triangle& t, double limit, double enough, int depth, uint32_t& hint) const;
     void nearest(const glm::dvec3& p, uint32_t& hint, Facet& facet) const;
-    static void under(const Ground& g, const glm::dvec3& p, Facet& facet);
-    static void around(const Ground& g, const glm::dvec3& p, Facet& facet);
-    static void atCell(const Ground& g, const glm::dvec3& p, uint32_t i, uint32_t j, Facet& facet);
+    void under(uint32_t ground, const glm::dvec3& p, Facet& facet) const;
+    void around(uint32_t ground, const glm::dvec3& p, Facet& facet) const;
+    void atCell(uint32_t ground, const glm::dvec3& q, uint32_t i, uint32_t j, Facet& facet) const;
 
     std::vector<Ground> grounds_;
 };

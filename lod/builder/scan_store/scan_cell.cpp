@@ -210,11 +210,12 @@ class ScanCell {
         const double least = settings_.isAsked && aim >= kFewSamples ? aim / kAsked : 0;
         ScanSettings how{settings_.coneDegrees, kFinest * scanStep(frame_, n.node.level), settings_.samplesAPoint};
         how.isStopped = settings_.isStopped;
+        const std::vector<Segment> segments = segmentsOfScan(s_, lies, how, executor_);
         ScanPatches made;
         for (int tries = 0;; ++tries) {
             const bool isLast = tries == kMostTries;
             if (isLast && !settings_.isAsked) how.mostSamples = most;
-            made = patchesOfScan(s_, lies, cornerOf(frame_, n.node), how, executor_);
+            made = patchesOfScan(s_, lies, segments, cornerOf(frame_, n.node), how, executor_);
             const auto samples = static_cast<double>(made.samples());
             if (isLast || samples <= 0 || (samples <= most && samples >= least)) return made;
             how.samplesAPoint *= std::clamp((settings_.isAsked ? aim : 0.9 * most) / samples, 0.25, 4.0);
@@ -254,7 +255,9 @@ class ScanCell {
         ScanSettings how{settings_.coneDegrees, step, 1};
         how.isStopped = settings_.isStopped;
         const glm::dvec3 corner = cornerOf(frame_, n.node);
-        out.patches = patchesOfScan(surface, liesOf(surface, n.node, kPatchReach * step), corner, how, executor_);
+        const std::vector<Lies> lies = liesOf(surface, n.node, kPatchReach * step);
+        out.patches =
+            patchesOfScan(surface, lies, segmentsOfScan(surface, lies, how, executor_), corner, how, executor_);
         const LevelSettings level{corner, frame_.cellSize(n.node.level), kFar * step};
         out.error = agreeWithChildren(children, level, out.patches, out.left);
         const size_t most = std::max(kManyDiscs, out.left.size() / 4);

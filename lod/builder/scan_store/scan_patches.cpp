@@ -42,24 +42,24 @@ Members membersOf(const PointSurface& s, const std::vector<Lies>& lies) {
     return m;
 }
 
-std::vector<Segment> segmentsOf(const Members& m, const ScanSettings& settings, Executor& executor) {
+}  // namespace
+
+std::vector<Segment> segmentsOfScan(const PointSurface& s, const std::vector<Lies>& lies, const ScanSettings& settings,
+                                    Executor& executor) {
+    const Members m = membersOf(s, lies);
     SegmentSettings how;
     how.isStopped = settings.isStopped;
     how.coneCosine = std::cos(settings.coneDegrees * 3.14159265358979323846 / 180);
     std::vector<Segment> segments = connectedComponents(m.elements);
-    std::erase_if(segments, [](const Segment& s) { return s.size() < kFewestPoints; });
+    std::erase_if(segments, [](const Segment& segment) { return segment.size() < kFewestPoints; });
     segments = mergeByNormals(m.elements, splitByCone(m.elements, std::move(segments), how, executor), how);
-    for (Segment& s : segments)
-        for (uint32_t& i : s) i = m.points[i];
+    for (Segment& segment : segments)
+        for (uint32_t& i : segment) i = m.points[i];
     return segments;
 }
 
-}  // namespace
-
-ScanPatches patchesOfScan(const PointSurface& s, const std::vector<Lies>& lies, const glm::dvec3& corner,
-                          const ScanSettings& settings, Executor& executor) {
-    const Members members = membersOf(s, lies);
-    std::vector<Segment> segments = segmentsOf(members, settings, executor);
+ScanPatches patchesOfScan(const PointSurface& s, const std::vector<Lies>& lies, std::vector<Segment> segments,
+                          const glm::dvec3& corner, const ScanSettings& settings, Executor& executor) {
     constexpr uint32_t kNone = ~0u;
     std::vector<uint32_t> owner(s.size(), kNone);  // the patch that stands for a point
     for (const Segment& segment : segments)

@@ -36,10 +36,13 @@ struct ScanPatches {
     }
 };
 
-/// `lies`: of each point of the surface; `corner`: of the node's cell. Patches overlap, and go on beyond the node over
-/// what is beside it.
-ScanPatches patchesOfScan(const PointSurface& surface, const std::vector<Lies>& lies, const glm::dvec3& corner,
-                          const ScanSettings& settings, Executor& executor);
+/// What of a surface patches are made of, one of each. `lies`: of each point of the surface.
+std::vector<Segment> segmentsOfScan(const PointSurface& surface, const std::vector<Lies>& lies,
+                                    const ScanSettings& settings, Executor& executor);
+
+/// Of those segments; `corner`: of the node's cell. Patches overlap, and go on beyond the node over what is beside it.
+ScanPatches patchesOfScan(const PointSurface& surface, const std::vector<Lies>& lies, std::vector<Segment> segments,
+                          const glm::dvec3& corner, const ScanSettings& settings, Executor& executor);
 
 /// Own samples about as far from each other as `step`, with their normals and colours; at places that are
 /// rounded to 2^-10.

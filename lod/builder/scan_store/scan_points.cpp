@@ -55,26 +55,29 @@ bool getBlock(ByteReader& from, PointBlock& to) {
 
 PointBlock thinned(const PointBlock& block, double edge) {
     struct InCell {
-        std::array<int64_t, 3> cell;
+        int64_t z, y, x;
         uint32_t point;
+        bool isInThatOf(const InCell& o) const { return z == o.z && y == o.y && x == o.x; }
     };
     std::vector<InCell> order;
     order.reserve(block.position.size());
     for (uint32_t i = 0; i < block.position.size(); ++i) {
         const glm::dvec3 c = glm::floor(block.position[i] / edge);
-        order.push_back({{static_cast<int64_t>(c.z), static_cast<int64_t>(c.y), static_cast<int64_t>(c.x)}, i});
+        order.push_back({static_cast<int64_t>(c.z), static_cast<int64_t>(c.y), static_cast<int64_t>(c.x), i});
     }
     const auto place = [&](uint32_t i) {
         const glm::dvec3& p = block.position[i];
         return std::tie(p.z, p.y, p.x);
     };
     std::sort(order.begin(), order.end(), [&](const InCell& a, const InCell& b) {
-        return a.cell != b.cell ? a.cell < b.cell : place(a.point) < place(b.point);
+        if (a.z != b.z) return a.z < b.z;
+        if (a.y != b.y) return a.y < b.y;
+        return a.x != b.x ? a.x < b.x : place(a.point) < place(b.point);
     });
     PointBlock out;
     for (size_t first = 0, end = 0; first < order.size(); first = end) {
         glm::dvec3 sum(0);
-        for (end = first; end < order.size() && order[end].cell == order[first].cell; ++end)
+        for (end = first; end < order.size() && order[end].isInThatOf(order[first]); ++end)
             sum += block.position[order[end].point];
         const glm::dvec3 mean = sum / static_cast<double>(end - first);
         uint32_t best = order[first].point;

@@ -210,10 +210,12 @@ class ScanBuild : public CellContent {
         description.dropped = report.dropped;
         description.roundingUnits = sums_.residual * world;
         description.hasNormals = true;
-        if (!description.hasColour) description.hasColour = description.isReflectance = true;  // all are plain
         description.boundsMin = input_.origin + world * glm::dvec3(sums_.lo);
         description.boundsMax = input_.origin + world * glm::dvec3(sums_.hi);
         setFocus(h, description);
+        const Placed along = alongAxis(h, description.up);
+        description.lowHeight = glm::dot(description.up, h.origin) + h.unit * along.below(0.02);
+        description.highHeight = glm::dot(description.up, h.origin) + h.unit * along.below(0.98);
         description.pointMaterials = {};
         return h;
     }
@@ -235,29 +237,42 @@ class ScanBuild : public CellContent {
         return {static_cast<uint32_t>(p[0] >> k), static_cast<uint32_t>(p[1] >> k), static_cast<uint32_t>(p[2] >> k)};
     }
 
+    /// Records of leaves along an axis, spread over their spheres.
+    struct Placed {
+        std::vector<std::pair<double, uint64_t>> records;  ///< by place, lattice units
+        uint64_t all = 0;
+        /// The place that a share of them is below.
+        double below(double share) const {
+            uint64_t sum = 0;
+            for (const auto& [at, count] : records)
+                if (sum += count; static_cast<double>(sum) > share * static_cast<double>(all)) return at;
+            return records.empty() ? 0 : records.back().first;
+        }
+    };
+    static Placed alongAxis(const Hierarchy& h, const glm::dvec3& axis) {
+        Placed out;
+        for (uint32_t n = 0; n < h.nodes.size(); ++n) {
+            if (!h.nodes[n].isLeaf()) continue;
+            uint64_t records = 0;
+            h.forEachPayload(n, [&](uint32_t chunk) {
+                const Payload& p = h.payload(chunk);
+                records += p.kind == Kind::patches ? uint64_t{kRecordsABlock} * p.records : p.records;
+            });
+            for (const double side : {-1.0, 0.0, 1.0})
+                out.records.emplace_back(glm::dot(axis, glm::dvec3(h.nodes[n].centre)) + side * 0.8 * h.nodes[n].radius,
+                                         records);
+            out.all += 3 * records;
+        }
+        std::sort(out.records.begin(), out.records.end());
+        return out;
+    }
     /// One record in 200 lies beyond each edge; what a tenth of the extent more does not reach is stray.
-    void setFocus(const Hierarchy& h, StoreDescription& description) const {
+    static void setFocus(const Hierarchy& h, StoreDescription& description) {
         for (int a = 0; a < 3; ++a) {
-            std::vector<std::pair<double, uint64_t>> along;  // place, records
-            uint64_t all = 0, sum = 0;
-            for (uint32_t n = 0; n < h.nodes.size(); ++n) {
-                if (!h.nodes[n].isLeaf()) continue;
-                uint64_t records = 0;
-                h.forEachPayload(n, [&](uint32_t chunk) {
-                    const Payload& p = h.payload(chunk);
-                    records += p.kind == Kind::patches ? uint64_t{kRecordsABlock} * p.records : p.records;
-                });
-                for (const double side : {-1.0, 0.0, 1.0})
-                    along.emplace_back(h.nodes[n].centre[a] + side * 0.8 * h.nodes[n].radius, records);
-                all += 3 * records;
-            }
-            std::sort(along.begin(), along.end());
-            double low = 1e300, high = -1e300;
-            for (const auto& [at, records] : along) {
-                if (sum + records > all / 200) low = std::min(low, at);
-                if (sum < all - all / 200) high = std::max(high, at);
-                sum += records;
-            }
+            glm::dvec3 axis(0);
+            axis[a] = 1;
+            const Placed along = alongAxis(h, axis);
+            const double low = along.below(1.0 / 200), high = along.below(1 - 1.0 / 200);
             const double margin = 0.1 * (high - low), first = description.boundsMin[a], last = description.boundsMax[a];
             description.focusMin[a] = std::clamp(h.origin[a] + h.unit * (low - margin), first, last);
             description.focusMax[a] = std::clamp(h.origin[a] + h.unit * (high + margin), first, last);
