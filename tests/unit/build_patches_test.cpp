@@ -242,7 +242,7 @@ TEST(BuildPatches, OfScansAreColouredAndLitAsTheirPointsAre) {
         const double x = k % 90, y = k / 90;
         const std::string place = fmt::format("{} {} {}", x, y, 0.3 * x + 4 * std::sin(y / 12));
         rows += place + "\n";
-        colours += place + " 120 160 60\n";
+        colours += place + (k % 2 == 0 ? " 120 160 60\n" : " 126 160 54\n");  // (one colour for all counts as none)
     }
     const std::string head = fmt::format(
         "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n", 90 * 90);

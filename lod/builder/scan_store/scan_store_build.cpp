@@ -18,6 +18,7 @@
 #include "lod/builder/octree/cell_build.h"
 #include "lod/builder/patch_store/subtree_margins.h"
 #include "lod/builder/points/describe_input.h"
+#include "lod/builder/scan_store/height_counts.h"
 #include "lod/builder/scan_store/scan_cell.h"
 #include "lod/builder/scan_store/scan_points.h"
 
@@ -92,9 +93,11 @@ class ScanBuild : public CellContent {
     }
     Result<void> places(const Places& take) override {
         Progress silent(false);
+        HeightCounts heights(input_.origin, unit(), greatest(), describeInput(input_, settings_.points).up);
         STIPPLE_ASSIGN(rounding_, input_.read(
                                       executor_, workers_, silent, "count", {},
                                       [&](int, const Points& block) {
+                                          for (size_t i = 0; i < block.size(); ++i) heights.add(placeAt(block, i));
                                           if (coarser() == 0) return take(block.coordinates(), input_.points);
                                           std::array<std::vector<uint32_t>, 3> at;
                                           for (size_t i = 0; i < block.size(); ++i)
@@ -104,6 +107,7 @@ class ScanBuild : public CellContent {
                                       },
                                       &far_));
         if (!far_.empty()) input_.concludeOutliers(std::exchange(far_, {}), found_);
+        heights_ = {heights.below(0.02), heights.below(0.98)};
         ByteWriter to;
         input_.save(to);
         surveyed_ = to.bytes();
@@ -160,10 +164,12 @@ class ScanBuild : public CellContent {
     }
     void save(ByteWriter& to) const override {
         to.put(rounding_);
+        to.put(heights_);
         to.put(surveyed_);
     }
     void load(ByteReader& from) override {
         from.get(rounding_);
+        from.get(heights_);
         from.get(surveyed_);
         ByteReader input(surveyed_);
         found_.pointsIn = 0;  // (what was found is found again)
@@ -213,9 +219,8 @@ class ScanBuild : public CellContent {
         description.boundsMin = input_.origin + world * glm::dvec3(sums_.lo);
         description.boundsMax = input_.origin + world * glm::dvec3(sums_.hi);
         setFocus(h, description);
-        const Placed along = alongAxis(h, description.up);
-        description.lowHeight = glm::dot(description.up, h.origin) + h.unit * along.below(0.02);
-        description.highHeight = glm::dot(description.up, h.origin) + h.unit * along.below(0.98);
+        description.lowHeight = heights_[0];
+        description.highHeight = heights_[1];
         description.pointMaterials = {};
         return h;
     }
@@ -231,6 +236,11 @@ class ScanBuild : public CellContent {
         return std::max(static_cast<int>(bits) - 32, 0);
     }
     double unit() const { return std::ldexp(input_.unit, coarser()); }
+    /// Of all places, in steps of the build.
+    std::array<uint64_t, 3> greatest() const {
+        const auto k = static_cast<uint32_t>(coarser());
+        return {input_.greatest[0] >> k, input_.greatest[1] >> k, input_.greatest[2] >> k};
+    }
     std::array<uint32_t, 3> placeAt(const Points& block, size_t i) const {
         const Place p = block.place(i);
         const auto k = static_cast<uint32_t>(coarser());
@@ -323,6 +333,7 @@ class ScanBuild : public CellContent {
     std::vector<FarCubes> far_;
     std::vector<uint8_t> surveyed_;
     double rounding_ = 0;
+    std::array<double, 2> heights_{};  ///< 2nd and 98th percentile, world units
     bool isBroken_ = false;
     std::vector<Subtree> subtrees_;
     PatchSums sums_;
