@@ -10,6 +10,7 @@
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
 #include "shaders/shared/optics.h"
+#include "shaders/shared/shadow_table.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/texture.h"
 #include "shaders/shared/tone.h"
@@ -71,6 +72,7 @@ static_assert(isLaidOut(shared::kSurfaceBinding, sizeof(shared::SurfaceWords)));
 static_assert(isLaidOut(shared::kEdlBinding, sizeof(shared::EdlConstants)));
 static_assert(isLaidOut(shared::kFogBinding, sizeof(shared::FogConstants)));
 static_assert(isLaidOut(shared::kToneBinding, sizeof(shared::ToneConstants)));
+static_assert(isLaidOut(shared::kShadowBinding, sizeof(shared::ShadowTable)));
 #endif
 
 }  // namespace

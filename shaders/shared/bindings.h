@@ -37,7 +37,8 @@ const uint kBackBinding = 29u;
 const uint kEdlBinding = 30u;
 const uint kFogBinding = 31u;
 const uint kToneBinding = 32u;
-const uint kBindings = 33u;
+const uint kShadowBinding = 33u;
+const uint kBindings = 34u;
 
 // Per pixel:
 const uint kTexelWords = 5u;     // planes of a packed texel; in frames with materials of points one more

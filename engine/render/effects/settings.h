@@ -37,12 +37,18 @@ struct ToneSettings {
     double exposure = 1, curve = 0;
 };
 
+/// Shadows. `texels`: of maps, along an edge.
+struct ShadowSettings {
+    double texels = 1024;
+};
+
 /// Of all effects.
 struct EffectParameters {
     SceneFacts facts;  ///< of the scene that is drawn, where somebody said
     EdlSettings edl;
     FogSettings fog;
     ToneSettings tone;
+    ShadowSettings shadow;
 };
 
 }  // namespace stipple::render
