@@ -11,6 +11,7 @@
 #include "engine/base/process.h"
 #include "engine/render/frame_passes.h"
 #include "engine/render/layered_frame.h"
+#include "engine/render/length_unit.h"
 #include "engine/render/views.h"
 #include "lod/primitives/octahedral.h"
 #include "lod/primitives/patch_samples.h"
@@ -230,6 +231,24 @@ Result<uint64_t> drawNodes(FrameState& state, const lod::Cut& cut, const lod::Vi
     return request.passes.size();
 }
 
+namespace {
+
+/// Draws state.cut, which has no layers, in a unit of length that suits it.
+Result<uint64_t> drawPlain(FrameState& state, const lod::View& view, const FrameSettings& settings) {
+    const double units = unitsOfLength(state.cut, state.hierarchies, state.instances, view);
+    if (units == 1) return drawNodes(state, state.cut, view, settings);
+    FrameSettings converted = settings;
+    converted.draw = inUnits(settings.draw, units);
+    inUnits(state.instances, units, state.inUnits);
+    std::swap(state.instances, state.inUnits);  // the draw list refers to them
+    const auto passes = drawNodes(state, state.cut, inUnits(view, units), converted);
+    std::swap(state.instances, state.inUnits);
+    inWorldUnits(state.image.depth, units);
+    return passes;
+}
+
+}  // namespace
+
 Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettings& settings, double start,
                      double cutMs) {
     if (state.backendLife.expired())
@@ -241,7 +260,7 @@ Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettin
     if (hasLayers(state, view, settings)) {
         STIPPLE_ASSIGN(passes, drawLayered(state, view, settings));
     } else {
-        STIPPLE_ASSIGN(passes, drawNodes(state, state.cut, view, settings));
+        STIPPLE_ASSIGN(passes, drawPlain(state, view, settings));
     }
 
     FrameCounters& c = state.counters;

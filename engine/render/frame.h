@@ -37,6 +37,7 @@ struct FrameState {
     std::vector<const lod::Hierarchy*> hierarchies;
     std::vector<lod::Instance> instances;
     std::vector<lod::InstanceGroup> groups;
+    std::vector<lod::Instance> inUnits;  ///< instances as the last frame had them, if its unit of length was another
     std::vector<shared::SurfaceMaterial> materials;  ///< of all stores, one after another
     std::unique_ptr<DiscSizes> discSizes;            ///< between streamer and backend
     std::unique_ptr<streaming::Streamer> streamer;   // evicts at its end

@@ -132,16 +132,33 @@ SHARED_FN vec2 triangleWeights(vec3 ray, vec3 a, vec3 b, vec3 c) {
     return vec2(u, v);
 }
 
+// The same direction, its largest part about 1: products of three of them are floats, whatever units a mesh has
+// (edges of 1e-18 to 1e18). By a power of two, so that it rounds nothing.
+SHARED_FN float toAboutOne(vec3 v) {
+    const uint largest = floatBitsToUint(max(max(abs(v.x), abs(v.y)), abs(v.z))) & 0x7f800000u;
+    return uintBitsToFloat(0x7f000000u - (largest < 0x7e800000u ? largest : 0x7e800000u));
+}
+SHARED_FN vec3 aboutOne(vec3 v) {
+    const float inverse = toAboutOne(v);
+    return vec3(v.x * inverse, v.y * inverse, v.z * inverse);
+}
+
 // Texture coordinates that a pixel covers: the longer of its two edges, on the triangle's plane. `a`: first corner; e1,
 // e2: edges to the others; d1, d2: texture coordinates along them.
-SHARED_FN float uvFootprint(PixelRay of, float inverseFocal, vec3 a, vec3 e1, vec3 e2, vec2 d1, vec2 d2) {
+SHARED_FN float uvFootprint(PixelRay of, float inverseFocal, vec3 anyA, vec3 anyE1, vec3 anyE2, vec2 d1, vec2 d2) {
     const vec3 ray = rayDirection(of);
+    // Lengths are counted in edges, as what follows has their fourth powers.
+    const float unit = toAboutOne(
+        vec3(max(abs(anyE1.x), abs(anyE2.x)), max(abs(anyE1.y), abs(anyE2.y)), max(abs(anyE1.z), abs(anyE2.z))));
+    const vec3 a = vec3(anyA.x * unit, anyA.y * unit, anyA.z * unit);
+    const vec3 e1 = vec3(anyE1.x * unit, anyE1.y * unit, anyE1.z * unit);
+    const vec3 e2 = vec3(anyE2.x * unit, anyE2.y * unit, anyE2.z * unit);
     const vec3 n = vec3(e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x);
     const float na = n.x * a.x + n.y * a.y + n.z * a.z;
     const float nr = n.x * ray.x + n.y * ray.y + n.z * ray.z;
     const float nn = n.x * n.x + n.y * n.y + n.z * n.z;
     // Point on the plane P = ray * na / nr; its change with the ray's x and y.
-    const float t = of.isOrthographic ? 1.0f : na / nr;  // (there the origin moves, whatever the depth)
+    const float t = of.isOrthographic ? unit : na / nr;  // (there the origin moves, whatever the depth)
     const float k = -t / nr;
     const vec3 px = vec3((t + k * n.x * ray.x) * inverseFocal, k * n.x * ray.y * inverseFocal, k * n.x * inverseFocal);
     const vec3 py = vec3(k * n.y * ray.x * inverseFocal, (t + k * n.y * ray.y) * inverseFocal, k * n.y * inverseFocal);
@@ -158,14 +175,6 @@ SHARED_FN float uvFootprint(PixelRay of, float inverseFocal, vec3 a, vec3 e1, ve
     const float yv = uy * d1.y + vy * d2.y;
     const float longest = max(xu * xu + xv * xv, yu * yu + yv * yv);
     return longest < 1.0e12f ? sqrt(longest) : 1.0e6f;
-}
-
-// The same direction, its largest part about 1: products of three of them are floats, whatever units a mesh has
-// (edges of 1e-18 to 1e18). By a power of two, so that it rounds nothing.
-SHARED_FN vec3 aboutOne(vec3 v) {
-    const uint largest = floatBitsToUint(max(max(abs(v.x), abs(v.y)), abs(v.z))) & 0x7f800000u;
-    const float inverse = uintBitsToFloat(0x7f000000u - (largest < 0x7e800000u ? largest : 0x7e800000u));
-    return vec3(v.x * inverse, v.y * inverse, v.z * inverse);
 }
 
 // Normal `n` (any length) bent by a tangent-space normal `m` (x along u, y against v). Tangents are the triangle's own:

@@ -180,6 +180,36 @@ TEST(Formulas, NormalsOfTrianglesOfAnySizeAreOfLengthOne) {
     EXPECT_GT(lost, all / 4);
 }
 
+/// What a pixel covers of a texture does not hang on the unit of length: products of four lengths are no floats beyond
+/// 1e-9 and 1e9 (hard case 56). Roundings of places, 2^-24, grow by how slanted and thin a triangle is.
+TEST(Formulas, FootprintsOnTexturesAreThoseOfAnySize) {
+    Rng rng(9);
+    double worst = 0;
+    for (int k = 0; k < 20'000; ++k) {
+        const auto within = [&](double most) {
+            return dvec3(rng.uniform(-most, most), rng.uniform(-most, most), rng.uniform(-most, most));
+        };
+        const dvec3 a = within(0.3) + dvec3(0, 0, rng.uniform(1, 9)), e1 = within(1), e2 = within(1);
+        const dvec3 n = glm::cross(e1, e2);
+        PixelRay ray{};
+        ray.isOrthographic = rng.next() % 2 == 0;
+        const dvec3 along = ray.isOrthographic ? dvec3(0, 0, 1) : a / a.z;
+        if (!(std::abs(glm::dot(n, along)) > 0.2 * glm::length(e1) * glm::length(e2))) continue;
+        ray.ex = ray.isOrthographic ? 0.0f : static_cast<float>(along.x);
+        ray.ey = ray.isOrthographic ? 0.0f : static_cast<float>(along.y);
+        const auto footprint = [&](double size) {
+            const double inverseFocal = ray.isOrthographic ? 1e-3 * size : 1e-3;  // (there of the new length as well)
+            return double{uvFootprint(ray, static_cast<float>(inverseFocal), vec3(a * size), vec3(e1 * size),
+                                      vec3(e2 * size), vec2(0.7f, 0.1f), vec2(-0.2f, 0.9f))};
+        };
+        const double usual = footprint(1), other = footprint(std::pow(10, rng.uniform(-30, 30)));
+        ASSERT_GT(usual, 0);
+        worst = std::max(worst, std::abs(other / usual - 1));
+    }
+    std::printf("at most %.1e off\n", worst);
+    EXPECT_LE(worst, 256 * 0x1p-24);
+}
+
 /// The offset itself, packed and unpacked at each level that its splat reaches, at the right of a wide picture. (Wider
 /// ones are drawn exactly.) A packed offset is rounded by a 4096th of the radius at most, at each of seven levels.
 TEST(Formulas, OffsetsOfSplatsComeThroughAllLevels) {

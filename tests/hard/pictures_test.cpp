@@ -1,5 +1,5 @@
 // Pictures that hard cases spoil, by every backend: 9 (depths over many decades), 12 (grazing normals), 44
-// (popping under motion below a pixel), 56 (lengths by squares).
+// (popping under motion below a pixel), 56 (lengths by squares), 23 (radii).
 #include <algorithm>
 #include <cmath>
 
@@ -135,7 +135,7 @@ TEST_F(HardPictures, DiscsAtGrazingAnglesAreAtTheDepthsOfTheirPlanes) {
 /// Triangles of any size have the normals of their shape: lengths that are zero or infinite as squares do not matter.
 TEST_F(HardPictures, MeshesOfAnySizeAreShadedAlike) {
     std::map<double, std::shared_ptr<const lod::Store>> stores;
-    for (const double size : {1.0, 1e-8, 1e-4, 1e4, 1e8}) {
+    for (const double size : {1.0, 1e-15, 1e-8, 1e8, 1e15}) {
         test::MeshRecipe recipe;
         recipe.grow = {"rock", 2'000, 1, 16};
         recipe.place = glm::dmat4(glm::dmat3(size));
@@ -168,6 +168,74 @@ TEST_F(HardPictures, MeshesOfAnySizeAreShadedAlike) {
                 EXPECT_LE(apart, covered / 200);  // vertices are rounded to another lattice: edges by one pixel
             }
         }
+}
+
+/// Points of any size are drawn as they are at size 1, in every mode, down to the last bits: at 1e-20 the squares of
+/// lengths are no floats any more.
+TEST_F(HardPictures, PointsOfAnySizeAreDrawnAlike) {
+    const auto ball = [&](double size) {
+        std::vector<test::TestPoint> points = test::bumpySphere(600, 7);
+        for (test::TestPoint& p : points) {
+            p.position *= size;
+            p.radius = static_cast<float>(0.1 * size);
+        }
+        return storeOf("ball" + std::to_string(std::ilogb(size)), points);
+    };
+    // By powers of two, so that nothing is rounded.
+    std::map<double, std::shared_ptr<const lod::Store>> stores;
+    for (const double size : {1.0, 0x1p-100, 0x1p-66, 0x1p66, 0x1p100}) stores[size] = ball(size);
+    for (auto& [name, backend] : backends_)
+        for (const render::Reconstruction& r : render::reconstructions()) {
+            const auto drawn = [&](double size, bool isOrthographic) {
+                lod::View view = ahead(64, 60, 1e-3 * size);
+                view.eye = {0, 0, 3 * size};
+                if (isOrthographic) view.focalPixels = 20 / size;
+                view.isOrthographic = isOrthographic;
+                return test::renderView(stores.at(size), *backend, *executor_, view, test::drawnAs(r.mode));
+            };
+            for (const bool isOrthographic : {false, true}) {
+                const render::Image plain = drawn(1, isOrthographic);
+                for (const auto& [size, store] : stores) {
+                    SCOPED_TRACE(testing::Message() << name << " " << r.name << " x " << size << " " << isOrthographic);
+                    const render::Image image = drawn(size, isOrthographic);
+                    size_t covered = 0, apart = 0;
+                    for (size_t i = 0; i < image.rgba.size(); ++i) {
+                        covered += plain.rgba[i] >> 24 != 0;
+                        apart += image.rgba[i] != plain.rgba[i] ||
+                                 std::abs(image.depth[i] / size - plain.depth[i]) > 1e-5 * plain.depth[i];
+                    }
+                    EXPECT_GT(covered, r.mode == render::Mode::points ? 200u : 1'000u);
+                    EXPECT_EQ(apart, 0u);
+                }
+            }
+        }
+}
+
+/// A point that stands alone, or some in one place, are as wide as the radii that their file gives, whatever they span.
+TEST_F(HardPictures, ALonePointIsAsWideAsItsRadius) {
+    for (const size_t count : {1, 5}) {
+        std::vector<test::TestPoint> points(count);
+        for (size_t i = 0; i < count; ++i) {
+            points[i].position = dvec3(0.5, -0.25, 3) + dvec3(1e-6 * static_cast<double>(i), 0, 0);
+            points[i].normal = {0, 0, 1};
+            points[i].radius = 0.5f;
+        }
+        const auto store = storeOf("lone" + std::to_string(count), points);
+        for (auto& [name, backend] : backends_)
+            for (const render::Mode mode :
+                 {render::Mode::surface, render::Mode::splat, render::Mode::pullpush, render::Mode::ewa}) {
+                SCOPED_TRACE(testing::Message() << count << " " << name << " " << render::reconstructionOf(mode).name);
+                lod::View view = ahead(64, 64, 1e-3);
+                view.eye = {0.5, -0.25, 7};  // a unit is 16 px
+                const render::Image image = test::renderView(store, *backend, *executor_, view, test::drawnAs(mode));
+                const auto covered = static_cast<double>(
+                    std::count_if(image.rgba.begin(), image.rgba.end(), [](uint32_t p) { return p >> 24 >= 128; }));
+                // Radii are stored by sixteenths of an octave, outwards; ellipses end within half a pixel.
+                const double wide = std::exp2(1.0 / 16) * 8;
+                EXPECT_GE(covered, M_PI * 7.5 * 7.5);
+                EXPECT_LE(covered, M_PI * (wide + 0.5) * (wide + 0.5));
+            }
+    }
 }
 
 /// A plane whose colours change smoothly, while the camera pans by a sixteenth of a pixel a frame: how far each change

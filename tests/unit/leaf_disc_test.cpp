@@ -477,5 +477,33 @@ TEST(LeafDiscs, AGivenRadiusOfAnySizeHarmsNoOther) {
     for (const lod::Node& n : store->hierarchy.nodes) EXPECT_LT(n.radius * store->hierarchy.unit, 4.0);
 }
 
+/// Radii are shares of cells, and cells are as small as what points span.
+TEST(LeafDiscs, GivenRadiiOfFewPointsAreThoseOfTheFileHoweverNearTheyLie) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    int number = 0;
+    for (const size_t count : {1, 2, 40})
+        for (const double apart : {0.0, 1e-4})
+            for (const float radius : {1e-9f, 0.01f, 0.5f, 7.0f}) {
+                if (apart > 0 && radius < 1e-6f) continue;  // less than a step of what they span
+                std::vector<test::TestPoint> points(count);
+                for (size_t i = 0; i < count; ++i) {
+                    points[i].position = {3 + apart * static_cast<double>(i) / 40, 4, 5};
+                    points[i].normal = {0, 0, 1};
+                    points[i].radius = radius;
+                }
+                const std::string name = folder / std::to_string(number++);
+                test::writePly(name + ".ply", points, true, true);
+                const auto store = test::buildAndOpen(name + ".ply", name + ".stipple", *executor);
+                const std::vector<reference::Disc> discs = leafDiscs(*store);
+                ASSERT_EQ(discs.size(), count);
+                for (size_t i = 0; i < count; ++i) {
+                    EXPECT_GE(discs[i].radius, radius * (1 - 1e-6)) << count << " " << apart;
+                    EXPECT_LE(discs[i].radius, radius * std::exp2(1.0 / 16) * (1 + 1e-6)) << count << " " << apart;
+                    EXPECT_NEAR(discs[i].position.x, 3, apart + 1e-12);
+                }
+            }
+}
+
 }  // namespace
 }  // namespace stipple

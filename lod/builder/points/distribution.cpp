@@ -100,9 +100,7 @@ Result<void> Distribution::count(BuildReport& report, StageClock& clock) {
 }
 
 void Distribution::setFrame() {
-    const auto& g = input_.greatest;
-    frame_ =
-        makeFrame(input_.origin, input_.unit, std::max({g[0], g[1], g[2]}), settings_.leafRecords, input_.resolution);
+    frame_ = makeFrame(input_.origin, input_.unit, input_.span(), settings_.leafRecords, input_.resolution);
     layout_.widen(frame_.rootLog2 > 32);
     frame_.attributes = input_.attributes();
 }

@@ -48,6 +48,7 @@ class PointInput {
     double unit = 1;
     double resolution = 0;  ///< how near to each other points lie where they are dense, lattice units; 0: not known
     std::array<uint64_t, 3> greatest{};  ///< of the coordinates; the least are 0
+    uint64_t span() const;               ///< that the root's cell covers: all coordinates, and the narrowest given disc
     uint64_t points = 0;                 ///< that can be used
     Points sample;                       ///< places of every sampleShare-th point, about
     uint64_t sampleShare = 1;
@@ -81,6 +82,7 @@ class PointInput {
         uint64_t usable = 0, notFinite = 0, beyond = 0;  ///< beyond: kFarthestPlace
         glm::ivec3 lo{INT32_MAX}, hi{INT32_MIN};
         glm::dvec3 least{1e300}, greatest{-1e300};
+        float narrowest = 0;  ///< of the radii that are given, file units; 0: none is
         uint32_t colourMax = 0;
         uint64_t firstColour = 0;
         bool hasColour = false, isVaried = false;
@@ -105,6 +107,7 @@ class PointInput {
     Result<void> surveyPart(Part& part, PointBlock& block) const;
     void surveyBounds(const PointBlock& block, size_t count, Part& part) const;
     void surveyColours(const PointBlock& block, size_t count, Part& part) const;
+    double narrowest() const;
     void findDenseBox();
     Result<void> findOutliers(Executor& executor);
     Result<void> findFar(Part& part, PointBlock& block, FarCubes& cubes) const;

@@ -177,9 +177,8 @@ void PointInput::fill(const Part& part, const PointBlock& block, Points& out) co
     if (!hasNormal)
         for (uint32_t& c : out.colour) c |= shared::kFlagNoNormal << 24;
     out.radius.assign(hasRadius ? count : 0, 0.0f);
-    const auto perUnit = static_cast<float>(1.0 / unit);
     for (size_t i = 0; hasRadius && i < block.radius.size(); ++i)
-        out.radius[i] = std::isfinite(block.radius[i]) && block.radius[i] > 0 ? block.radius[i] * perUnit : 0.0f;
+        out.radius[i] = std::isfinite(block.radius[i]) && block.radius[i] > 0 ? toFloat(block.radius[i] / unit) : 0.0f;
     out.attributes.resize(attributes_.size());
     for (size_t k = 0; k < attributes_.size(); ++k) {
         if (!materialOf_.empty() && k + 1 == attributes_.size())

@@ -98,6 +98,7 @@ void visitPart(const Archive& with, Part& part) {
     with(part.hi);
     with(part.least);
     with(part.greatest);
+    with(part.narrowest);
     with(part.colourMax);
     with(part.firstColour);
     with(part.hasColour);
@@ -196,6 +197,8 @@ Result<void> PointInput::surveyPart(Part& part, PointBlock& block) const {
         for (const glm::dvec3& p : block.position)
             if (isPlace(p)) places.add(p);
         surveyColours(block, count, part);
+        for (const float r : block.radius)
+            if (r > 0 && std::isfinite(r)) part.narrowest = part.narrowest > 0 ? std::min(part.narrowest, r) : r;
         for (uint64_t i = (sampleShare - at % sampleShare) % sampleShare; i < count; i += sampleShare)
             part.sample.push_back(from.info.isLattice ? glm::dvec3(block.lattice[i]) : block.position[i]);
         at += count;
@@ -292,6 +295,21 @@ Result<void> PointInput::placeIntegers(BuildReport& report) {
     return {};
 }
 
+double PointInput::narrowest() const {
+    double radius = 0;
+    for (const Part& p : parts_)
+        if (!p.error && p.narrowest > 0) radius = radius > 0 ? std::min<double>(radius, p.narrowest) : p.narrowest;
+    return radius;
+}
+
+/// Radii are stored as shares of cells: a cell that is as small as a few points span would cut their discs off. (One
+/// disc that is too wide does not count: what all are, the narrowest is.)
+uint64_t PointInput::span() const {
+    constexpr uint64_t kMost = 0xffffffffu;  // more would make short coordinates wide ones
+    const uint64_t coordinates = std::max({greatest[0], greatest[1], greatest[2]});
+    return std::max(coordinates, std::min(toWhole<uint64_t>(std::ceil(narrowest() / unit)), kMost));
+}
+
 Result<void> PointInput::placeFloats() {
     const Bounds all = bounds();
     const glm::dvec3 &lo = all.least, &hi = all.greatest;
@@ -301,7 +319,9 @@ Result<void> PointInput::placeFloats() {
         return fail(ErrorKind::input, "the coordinates span more than a double can hold", firstPath());
     constexpr double kBitsOfExtent = 21, kBitsOfDouble = 52, kFewSteps = 64, kManySteps = 2048;
     const auto powerAbove = [](double v) { return std::ceil(std::log2(v)); };
-    unit = extent > 0 ? std::exp2(powerAbove(extent) - kBitsOfExtent) : std::exp2(-10);
+    // All in one place: their discs are what is seen.
+    const double seen = extent > 0 ? extent : narrowest();
+    unit = seen > 0 ? std::exp2(powerAbove(seen) - kBitsOfExtent) : std::exp2(-10);
     double farthest =
         std::max({std::abs(lo.x), std::abs(lo.y), std::abs(lo.z), std::abs(hi.x), std::abs(hi.y), std::abs(hi.z)});
     origin = lo;
