@@ -100,7 +100,7 @@ Result<void> Distribution::count(BuildReport& report, StageClock& clock) {
 }
 
 void Distribution::setFrame() {
-    frame_ = makeFrame(input_.origin, input_.unit, input_.span(), settings_.leafRecords, input_.resolution);
+    frame_ = makeFrame(input_.origin, input_.unit, input_.span, settings_.leafRecords, input_.resolution);
     layout_.widen(frame_.rootLog2 > 32);
     frame_.attributes = input_.attributes();
 }

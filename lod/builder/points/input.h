@@ -48,7 +48,7 @@ class PointInput {
     double unit = 1;
     double resolution = 0;  ///< how near to each other points lie where they are dense, lattice units; 0: not known
     std::array<uint64_t, 3> greatest{};  ///< of the coordinates; the least are 0
-    uint64_t span() const;               ///< that the root's cell covers: all coordinates, and the narrowest given disc
+    uint64_t span = 0;                   ///< that the root's cell covers: all coordinates, and the narrowest given disc
     uint64_t points = 0;                 ///< that can be used
     Points sample;                       ///< places of every sampleShare-th point, about
     uint64_t sampleShare = 1;
@@ -107,7 +107,7 @@ class PointInput {
     Result<void> surveyPart(Part& part, PointBlock& block) const;
     void surveyBounds(const PointBlock& block, size_t count, Part& part) const;
     void surveyColours(const PointBlock& block, size_t count, Part& part) const;
-    double narrowest() const;
+    void findSpan();
     void findDenseBox();
     Result<void> findOutliers(Executor& executor);
     Result<void> findFar(Part& part, PointBlock& block, FarCubes& cubes) const;
@@ -124,7 +124,7 @@ class PointInput {
     Result<void> placeFloats();
     void findColours(BuildReport& report);
     void placeSample();
-    bool isWide() const { return std::max({greatest[0], greatest[1], greatest[2]}) >> 32 != 0; }
+    bool isWide() const { return span >> 32 != 0; }
     Result<void> readPart(const Part& part, PointBlock& block, Points& points, double& rounding, FarCubes* far,
                           const std::function<Result<void>(const Points&)>& sink) const;
     size_t leaveOut(const Part& part, PointBlock& block, size_t count, uint64_t& far) const;

@@ -60,7 +60,9 @@ Result<void> PointInput::conclude(BuildReport& report) {
     findColours(report);
     if (sources_.size() > 1)
         for (std::string& note : notesOnPlaces()) report.notes.push_back(std::move(note));
-    return allLattice_ ? placeIntegers(report) : placeFloats();
+    STIPPLE_TRY(allLattice_ ? placeIntegers(report) : placeFloats());
+    findSpan();
+    return {};
 }
 
 void PointInput::tally(BuildReport& report) {
@@ -268,6 +270,19 @@ void PointInput::findColours(BuildReport& report) {
     if (isBlack_) report.notes.emplace_back("the colours of all points are 0: they count as having none");
 }
 
+namespace {
+
+/// Of the radii that are given, world units; 0: none is.
+template <typename Parts>
+double narrowestOf(const Parts& parts) {
+    double radius = 0;
+    for (const auto& p : parts)
+        if (!p.error && p.narrowest > 0) radius = radius > 0 ? std::min<double>(radius, p.narrowest) : p.narrowest;
+    return radius;
+}
+
+}  // namespace
+
 Result<void> PointInput::placeIntegers(BuildReport& report) {
     const CommonLattice& lattice = lattice_;
     const Bounds all = bounds();
@@ -295,19 +310,11 @@ Result<void> PointInput::placeIntegers(BuildReport& report) {
     return {};
 }
 
-double PointInput::narrowest() const {
-    double radius = 0;
-    for (const Part& p : parts_)
-        if (!p.error && p.narrowest > 0) radius = radius > 0 ? std::min<double>(radius, p.narrowest) : p.narrowest;
-    return radius;
-}
-
-/// Radii are stored as shares of cells: a cell that is as small as a few points span would cut their discs off. (One
-/// disc that is too wide does not count: what all are, the narrowest is.)
-uint64_t PointInput::span() const {
-    constexpr uint64_t kMost = 0xffffffffu;  // more would make short coordinates wide ones
-    const uint64_t coordinates = std::max({greatest[0], greatest[1], greatest[2]});
-    return std::max(coordinates, std::min(toWhole<uint64_t>(std::ceil(narrowest() / unit)), kMost));
+/// Radii are stored as shares of cells: a cell that is as small as what a few points span would cut their discs off.
+/// (One disc that is too wide does not count: what all are, the narrowest is.)
+void PointInput::findSpan() {
+    const double discs = std::min(std::ceil(narrowestOf(parts_) / unit), kLatticeLimit);
+    span = std::max({greatest[0], greatest[1], greatest[2], toWhole<uint64_t>(discs)});
 }
 
 Result<void> PointInput::placeFloats() {
@@ -320,7 +327,7 @@ Result<void> PointInput::placeFloats() {
     constexpr double kBitsOfExtent = 21, kBitsOfDouble = 52, kFewSteps = 64, kManySteps = 2048;
     const auto powerAbove = [](double v) { return std::ceil(std::log2(v)); };
     // All in one place: their discs are what is seen.
-    const double seen = extent > 0 ? extent : narrowest();
+    const double seen = extent > 0 ? extent : narrowestOf(parts_);
     unit = seen > 0 ? std::exp2(powerAbove(seen) - kBitsOfExtent) : std::exp2(-10);
     double farthest =
         std::max({std::abs(lo.x), std::abs(lo.y), std::abs(lo.z), std::abs(hi.x), std::abs(hi.y), std::abs(hi.z)});

@@ -377,7 +377,8 @@ namespace {
 ///   - more than 16 in one of them, or 8 in a 128th
 ///   - a few points, many of them as near to the next one along the curve
 ///   - hardly any, with small discs
-/// So what lies closer together is at most eight points among many that do not.
+/// So what lies closer together is at most eight points among many that do not; or hardly any points, no disc of which
+/// is narrower than half the edge: none of them would fit a smaller cell, and a step is nothing beside it.
 bool isCoarse(const Frame& frame, const SortedPoints& from, size_t begin, size_t end, uint32_t level) {
     constexpr std::array<std::pair<uint32_t, size_t>, 2> kMostBelow{{{6, 16}, {7, 8}}};  // levels, places
     constexpr size_t kMostOnAverage = 4, kFew = 64, kHardlyAny = 8;
@@ -385,6 +386,9 @@ bool isCoarse(const Frame& frame, const SortedPoints& from, size_t begin, size_t
     const double step = std::exp2(static_cast<double>(frame.rootLog2) - level - 16);
     if (step <= 1) return false;
     const size_t count = end - begin;
+    const auto radii = std::span(from.points.radius).subspan(begin, count);
+    if (count <= kHardlyAny && std::none_of(radii.begin(), radii.end(), [&](float r) { return r < 0x1p15 * step; }))
+        return false;
     std::array<size_t, kMostBelow.size()> places{};
     size_t different = 0, near = 0, cells = 0;
     Place before{};
