@@ -194,6 +194,13 @@ TEST(Push, NothingComesFromNothing) {
 TEST(Colour, BlackAndWhiteAverageInLinearLight) {
     const float mean = 0.5f * (shared::linearFromSrgb(0) + shared::linearFromSrgb(1));
     EXPECT_NEAR(shared::srgbFromLinear(mean) * 255, 188, 1);
+    // (Black and white are the same either way: what lies between tells.)
+    const float greys = 0.5f * (shared::linearFromSrgb(0.25f) + shared::linearFromSrgb(0.75f));
+    EXPECT_NEAR(shared::srgbFromLinear(greys) * 255, 145, 1);  // 127.5 if they were linear
+    for (int byte = 0; byte < 256; ++byte) {
+        const float srgb = static_cast<float>(byte) / 255;
+        EXPECT_NEAR(shared::srgbFromLinear(shared::linearFromSrgb(srgb)), srgb, 0.1 / 255);
+    }
 }
 
 TEST(Reference, DecodesRecordsAsTheBackendsDo) {
