@@ -9,8 +9,11 @@
 
 #include "apps/study/sweep/journal.h"
 #include "apps/study/sweep/plan.h"
+#include "apps/study/sweep/scene_drawer.h"
+#include "engine/cpu/cpu_backend.h"
 #include "tests/support/drawn_shapes.h"
 #include "tests/support/program.h"
+#include "tests/support/support.h"
 
 namespace stipple {
 namespace {
@@ -179,6 +182,31 @@ TEST(SceneStudy, RefusesWhatItCannotDoBeforeItBegins) {
     test::expectOneLine(test::runProgram(folder, "study ring.ply -o t --seeds"), 2, {"--seeds"});
     test::expectOneLine(test::runProgram(folder, "study ring.ply -o t --rounds 3"), 2, {"--rounds"});
     EXPECT_FALSE(fs::exists(folder / "t"));
+}
+
+/// A chunk that two instances need lies in its file once.
+TEST(SceneStudy, CountsTheBytesOfSharedChunksOnce) {
+    const test::TempFolder folder;
+    writeScene(folder);
+    const auto executor = makeTbbExecutor(2);
+    const auto store = test::buildAndOpen(folder / "ring.ply", folder / "ring.stipple", *executor);
+    uint64_t chunks = 0;
+    for (uint32_t n = 0; n < store->hierarchy.nodes.size(); ++n) chunks += lod::chunkPlace(store->hierarchy, n).bytes;
+    lod::View view;
+    view.eye = {0, 0, 5};
+    view.width = view.height = 64;
+    view.focalPixels = 60;
+    for (const size_t count : {1, 2}) {
+        study::StudyScene scene;
+        for (size_t i = 0; i < count; ++i) {
+            lod::Instance place;
+            place.translation = {0.1 * static_cast<double>(i), 0, 0};
+            scene.placed.push_back({store, place, {}});
+        }
+        study::SceneDrawer drawer(scene, cpu::makeCpuBackend(*executor), *executor, uint64_t{1} << 28);
+        ASSERT_TRUE(drawer.draw(view, render::Mode::surface, 0.01));
+        EXPECT_EQ(drawer.cutBytes(), chunks);
+    }
 }
 
 TEST(SceneStudy, BuildsScenesInOtherWays) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace stipple::study {
 
@@ -54,6 +55,8 @@ Axis axisOf(const std::vector<double>& values, bool isLog, double from, double t
 
 std::string tickText(double value) {
     if (std::abs(value) < 1e-12) return "0";
+    for (const auto& [unit, letter] : {std::pair(1e9, 'G'), std::pair(1e6, 'M'), std::pair(1e3, 'k')})
+        if (std::abs(value) >= std::max(unit, 1e4)) return fmt::format("{:.4g}{}", value / unit, letter);
     return fmt::format("{:.4g}", value);
 }
 

@@ -113,7 +113,7 @@ std::vector<ArrivalFacts> arrivalFacts(const std::vector<ArrivalStep>& steps, ui
 }
 
 std::vector<Chart> arrivalCharts(const std::vector<ArrivalStep>& steps, uint32_t scene, const std::string& name) {
-    const char* const y = "dB, against the frame with all that it wants (99: the same)";
+    const char* const y = "dB against the whole frame (99: the same)";
     Chart seconds{name + "-arrival-seconds",
                   "From a cold start and after jumps: error against time",
                   "seconds",

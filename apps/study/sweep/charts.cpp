@@ -89,7 +89,7 @@ Chart budgetChart(const std::vector<const Summary*>& budgets, const std::string&
                 "px",
                 true,
                 true,
-                {{"stated", {}}, {"measured, 99 % are nearer", {}}},
+                {{"stated", {}}, {"measured, p99", {}}},
                 false,
                 0,
                 ""};

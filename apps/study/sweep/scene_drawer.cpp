@@ -1,5 +1,7 @@
 #include "apps/study/sweep/scene_drawer.h"
 
+#include <algorithm>
+
 namespace stipple::study {
 
 SceneDrawer::SceneDrawer(const StudyScene& scene, std::unique_ptr<render::Backend> backend, Executor& executor,
@@ -53,8 +55,10 @@ uint64_t SceneDrawer::cutBytes() const {
         storeOf[instance.source] = state_->stores[instance.hierarchy].get();
     }
     uint64_t bytes = 0;
-    for (const auto& [source, chunk] : state_->cut.keep)
-        bytes += lod::chunkPlace(storeOf[source]->hierarchy, chunk).bytes;
+    std::vector<std::pair<uint32_t, uint32_t>> needed = state_->cut.keep;  // by each instance that does
+    std::sort(needed.begin(), needed.end());
+    needed.erase(std::unique(needed.begin(), needed.end()), needed.end());
+    for (const auto& [source, chunk] : needed) bytes += lod::chunkPlace(storeOf[source]->hierarchy, chunk).bytes;
     return bytes;
 }
 
