@@ -196,6 +196,7 @@ TEST(SceneStudy, CountsTheBytesOfSharedChunksOnce) {
     view.eye = {0, 0, 5};
     view.width = view.height = 64;
     view.focalPixels = 60;
+    std::vector<uint64_t> bytes;
     for (const size_t count : {1, 2}) {
         study::StudyScene scene;
         for (size_t i = 0; i < count; ++i) {
@@ -205,8 +206,11 @@ TEST(SceneStudy, CountsTheBytesOfSharedChunksOnce) {
         }
         study::SceneDrawer drawer(scene, cpu::makeCpuBackend(*executor), *executor, uint64_t{1} << 28);
         ASSERT_TRUE(drawer.draw(view, render::Mode::surface, 0.01));
-        EXPECT_EQ(drawer.cutBytes(), chunks);
+        bytes.push_back(drawer.cutBytes());
     }
+    EXPECT_EQ(bytes[0], bytes[1]);
+    EXPECT_GT(bytes[0], chunks / 2) << "(all but what faces away)";
+    EXPECT_LE(bytes[0], chunks);
 }
 
 TEST(SceneStudy, BuildsScenesInOtherWays) {
