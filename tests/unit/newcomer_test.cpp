@@ -26,7 +26,7 @@ using test::spit;
 using test::TempFolder;
 
 /// What is made smaller, so that the path takes seconds, and what stands for something of the reader's own.
-constexpr std::array<std::array<const char*, 2>, 10> kSubstitutions{{
+constexpr std::array<std::array<const char*, 2>, 11> kSubstitutions{{
     {"/scratch", "scratch"},
     {"X,Y,Z", "10,10,0"},
     {"--triangles 10M", "--triangles 20k"},
@@ -34,6 +34,7 @@ constexpr std::array<std::array<const char*, 2>, 10> kSubstitutions{{
     {"--trees 100k", "--trees 40 --leaves 1k --variants 1"},
     {"--points 10M", "--points 20k"},
     {"--size 1920x1080", "--size 480x270"},
+    {"--target-ms 20", "--target-ms 2000"},  // (that so many suffice is no matter of this test)
     {"-o study --quick", "-o study --modes surface,pullpush --errors 1,4 --sizes 160x90 --views 1 --blocks 2"},
     {"--quick --budgets 100k,1M", "--modes surface --errors 4 --sizes 160x90 --views 1 --blocks 2 --budgets 5k,1M"},
     {"stipple view scan.stipple", "xvfb-run -n 300 -a stipple view scan.stipple --frames 3"},
