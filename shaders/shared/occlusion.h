@@ -57,6 +57,7 @@ struct AoPlace {
     vec3 normal;
     vec3 toEye;
     float pixels;   // how far the steps lead
+    float least;    // square of a quarter of a pixel: what is nearer is the place itself, rounded otherwise
     float inverse;  // of the radius' square
     float share;    // of what is hidden: less where the radius is hardly a pixel
 };
@@ -75,6 +76,8 @@ SHARED_FN AoPlace aoPlace(Lens lens, float x, float y, float depth, vec3 n, floa
     const float least = radius * (a.pixels / pixels);
     a.inverse = 1.0f / (least * least);
     a.share = min(max(pixels - 1.0f, 0.0f), 1.0f);
+    const float quarter = 0.25f * inverseFocal * lensDepth(lens, depth);
+    a.least = quarter * quarter;
     return a;
 }
 // How far step number `step` goes, of all the way: nearer ones are closer to each other.
@@ -113,8 +116,8 @@ SHARED_FN AoSide aoBack(AoSide of) {
 // What is seen at `q`; `isThere`: 0 where nothing is.
 SHARED_FN AoSide aoRaised(AoSide s, AoPlace a, vec3 q, float isThere) {
     const vec3 v = vec3(q.x - a.place.x, q.y - a.place.y, q.z - a.place.z);
-    const float square = max(dot(v, v), 1.0e-30f);
-    const float inverse = 1.0f / sqrt(square);
+    const float square = dot(v, v);
+    const float inverse = 1.0f / sqrt(max(square, a.least));
     const float fall = max(1.0f - square * a.inverse, 0.0f) * isThere;
     const bool isAbove = dot(v, a.normal) * inverse > kAoLeastSine;
     const float light = aoLight(dot(v, a.toEye) * inverse, s.nv, s.nt);
