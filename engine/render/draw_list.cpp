@@ -89,6 +89,11 @@ void clear(DrawList& out) {
     out.tables.clear();
     out.layer = nullptr;
     out.glass.reset();
+    out.shadowMaps.reset();
+    out.shadows.clear();
+    out.shadowSlots = 0;
+    out.shadowSlotOf.clear();
+    out.shadowKey = 0;
     out.bends.clear();
     out.swaying = 0;
     out.hasWideDiscs = out.hasSmoothDiscs = false;

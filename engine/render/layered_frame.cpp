@@ -212,17 +212,18 @@ void addViewsFromBehind(FrameState& state, const lod::View& view, const FrameSet
     }
 }
 
-void planViewsFromBehind(FrameState& state, const lod::View& view, const FrameSettings& settings,
-                         std::span<const std::pair<uint32_t, uint32_t>> barred) {
-    std::vector<lod::ViewRequest> views{{view, settings.budgets.errorPixels}};
+void addRequestsFromBehind(FrameState& state, const lod::View& view, const FrameSettings& settings,
+                           std::vector<lod::ViewRequest>& requests) {
     for (const LayerDraw& layer : layersIn(state, view, settings.draw))
         if (layer.isSeenTwice)
-            views.push_back(
+            requests.push_back(
                 {viewFromBehind(bodyIn(state, layer.instances.front()), view), settings.budgets.errorPixels, true});
-    if (views.size() == 1) return;
-    LayeredFrame& l = *state.layered;
-    lod::planResident(state.scene(), views, settings.budgets.records, state.streamer->residentLimit(), barred,
-                      l.planScratch, l.planCut, state.plan);
+}
+
+bool isOnlyGlass(const FrameState& state, uint32_t instance) {
+    if (!state.layered || !state.layered->appearance.hasLayers) return false;
+    const OpticsOf& o = state.layered->appearance.hierarchies[state.instances[instance].hierarchy];
+    return o.isWhole || o.isPlainMesh || o.points != 0;
 }
 
 }  // namespace stipple::render
