@@ -56,6 +56,7 @@ std::vector<EffectStatus> effectStatus(const FrameState& state, const DrawSettin
         if (e < held.effects.size()) s.held = held.effects[e];
         if (effect.before != nullptr) s.held.bytes += effect.before->bytes(state);
         if (!s.isActive) continue;
+        if (effect.before != nullptr) s.msBefore = effect.before->ms(state);
         for (const PassTime& time : state.backend->passTimes()) addTime(time, effect, s);
     }
     return out;

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "engine/base/hash.h"
+#include "engine/base/process.h"
 #include "engine/render/frame_passes.h"
 #include "engine/render/layered_frame.h"
 
@@ -172,18 +173,23 @@ uint64_t bytesOfShadows(const FrameState& state) {
     return bytes + (image.rgba.size() + image.depth.size() + image.normal.size() + image.linear.size()) * sizeof(float);
 }
 
+double msOfShadows(const FrameState& state) { return state.shadows ? state.shadows->ms : 0; }
+
 Result<void> addShadows(FrameState& state, const lod::View& view, FrameSettings& settings, bool mayKeep) {
     FrameCounters& counters = state.counters;
     counters.shadowMaps = counters.shadowMapsDrawn = counters.shadowLightsLeft = 0;
-    if (!callsForShadows(settings.draw)) {
+    std::vector<ShadowView> views;
+    const double start = nowSeconds();
+    if (callsForShadows(settings.draw)) views = viewsOfLights(state, view, settings, &counters.shadowLightsLeft);
+    if (views.empty()) {
         state.shadows.reset();
+        settings.draw.shadows.reset();
         return {};
     }
     if (!state.shadows) state.shadows = std::make_shared<ShadowFrame>();
     ShadowFrame& frame = *state.shadows;
     const double tau = settingsOfMaps(settings).errorTexels;
     const uint64_t appearance = appearanceOf(state, settings.draw);
-    const std::vector<ShadowView> views = viewsOfLights(state, view, settings, &counters.shadowLightsLeft);
     const auto keptOf = [&](const ShadowView& of) {
         return std::find_if(frame.kept.begin(), frame.kept.end(), [&](const ShadowFrame::Kept& k) {
             return k.isComplete && k.isStill && k.map.of.isOf(of) && k.errorAsked == tau && k.appearance == appearance;
@@ -232,6 +238,7 @@ Result<void> addShadows(FrameState& state, const lod::View& view, FrameSettings&
     frame.kept = std::move(now);
     counters.shadowMaps = maps->maps.size();
     settings.draw.shadows = std::move(maps);
+    frame.ms = (nowSeconds() - start) * 1e3;
     return {};
 }
 

@@ -48,6 +48,7 @@ struct ShadowFrame {
     lod::ViewsScratch scratch;
     lod::CutOfViews cuts;
     Image image;
+    double ms = 0;  ///< that the maps of the last frame took, and their cuts
 };
 
 /// Adds to `settings` the maps that a frame of state.cut calls for; draws those that do not hold any more, and adds
@@ -58,6 +59,8 @@ Result<void> addShadows(FrameState& state, const lod::View& view, FrameSettings&
 
 /// Of the maps that are kept.
 uint64_t bytesOfShadows(const FrameState& state);
+/// What maps took in the last frame, milliseconds.
+double msOfShadows(const FrameState& state);
 
 /// Adds the views of lights that a frame of state.cut calls for, so that they are planned with the camera's.
 void addShadowRequests(const FrameState& state, const lod::View& view, const FrameSettings& settings,

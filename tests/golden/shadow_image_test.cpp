@@ -280,6 +280,9 @@ TEST_F(ShadowBackends, ShowWhatTheOracleShows) {
             std::printf("%-8s %-14s %5.1f dB (without: %.1f)\n", name.c_str(), render::reconstructionOf(look.mode).name,
                         db, test::drawnPsnr(control->image, truth->image));
             EXPECT_GE(db, 50);
+            const auto d = reference::compareImages(shown->image, truth->image, 4, nullptr);
+            ASSERT_TRUE(d);
+            EXPECT_LE(d->differingFraction, 0.001);
             EXPECT_LE(test::drawnPsnr(control->image, truth->image), 35) << "the control";
         }
     }

@@ -77,6 +77,8 @@ struct FramesBefore {
                      std::vector<lod::ViewRequest>& views);
     /// What is kept of them beside what backends hold.
     uint64_t (*bytes)(const FrameState& state);
+    /// What they took of the last frame, milliseconds.
+    double (*ms)(const FrameState& state);
     std::span<const Pass> passes{};  ///< that only they have
 };
 

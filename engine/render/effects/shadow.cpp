@@ -22,7 +22,7 @@ constexpr std::array kParameters{
                   return &s.parameters.shadow.texels;
               }}};
 constexpr std::array kPassesOfCasters{Pass::cast};
-constexpr FramesBefore kMaps{addShadows, addShadowRequests, bytesOfShadows, kPassesOfCasters};
+constexpr FramesBefore kMaps{addShadows, addShadowRequests, bytesOfShadows, msOfShadows, kPassesOfCasters};
 constexpr std::array kTables{shared::kShadowBinding};  // which backends fill, that know where the maps are
 
 shared::ShadowMap inCamera(const ShadowMapOf& map, const DrawList& draws, const glm::dmat3& cameraFromWorld) {
