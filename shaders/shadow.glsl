@@ -17,13 +17,14 @@ vec3 pastMaps(uint number, vec3 point, vec3 normal) {
     while (slot < shadow.slots && shadow.lights[slot] != number) ++slot;
     if (slot == shadow.slots) return vec3(1.0);
     const float w = lensDepth(frameLensHere(), point.z);
+    const vec2 first = firstGolden(gl_GlobalInvocationID.x, gl_GlobalInvocationID.y, frame.coverageSeed);
     for (uint k = 0u; k < shadow.count; ++k) {
         ShadowMap m = shadow.maps[k];
         if (m.slot != slot || dot(point, point) > m.reach2) continue;
         const ShadowPlace p = shadowPlace(m, m.isPerspective != 0u, point, normal, w);
         if (!isOnShadowMap(m, p)) continue;
         const ShadowTexelsAt at = shadow.texels[k];
-        return lightPast(ShadowDepths(uvec2(at.depthsLow, at.depthsHigh)), ShadowThrough(uvec2(at.throughLow, at.throughHigh)), m, p);
+        return lightPast(ShadowDepths(uvec2(at.depthsLow, at.depthsHigh)), ShadowThrough(uvec2(at.throughLow, at.throughHigh)), m, p, first);
     }
     return vec3(1.0);
 }

@@ -52,8 +52,11 @@ Result<void> SunOptions::check(const std::string& shade) const {
     if (sun.empty()) return {};
     const auto angles = anglesOf(sun);
     if (!angles || std::abs((*angles)[0]) > 360 || std::abs((*angles)[1]) > 90)
-        return fail(ErrorKind::usage, "is no azimuth (0 to 360) and elevation (-90 to 90), in degrees", "--sun " + sun,
+        return fail(ErrorKind::usage, "is no azimuth (0 to 360) and elevation (0 to 90), in degrees", "--sun " + sun,
                     "say it as 135,40");
+    if ((*angles)[1] < 0)
+        return fail(ErrorKind::usage, "is below the horizon: it has set", "--sun " + sun,
+                    "give an elevation of 0 to 90 degrees, or leave it out");
     if (shade == "unlit")
         return fail(ErrorKind::usage, "is not seen where nothing is lit", "--sun", "leave --shade unlit out");
     return {};

@@ -81,8 +81,10 @@ template <bool isPerspective>
     }
 }
 
+/// `at`: of each place, its pixel of row `y` from `x0` on.
 [[gnu::always_inline]] inline void softShadows(const ShadowMap& m, const float* depths, const uint32_t* through,
-                                               size_t count, ShadowPlaces& o) {
+                                               size_t count, const uint32_t* at, uint32_t x0, uint32_t y, uint32_t seed,
+                                               ShadowPlaces& o) {
     for (size_t k = 0; k < count; ++k) {
         ShadowPlace s;
         s.x = o.x[k];
@@ -91,7 +93,7 @@ template <bool isPerspective>
         s.slopeX = o.slopeX[k];
         s.slopeY = o.slopeY[k];
         s.whole = o.whole[k];
-        o.word[k] = packLight(lightPast(depths, through, m, s));
+        o.word[k] = packLight(lightPast(depths, through, m, s, firstGolden(x0 + at[k], y, seed)));
     }
 }
 
@@ -169,7 +171,7 @@ void shadowRow(const FrameConstants& frame, const ShadowInput& in, uint32_t x0, 
             placeOnMap<false>(m, p, left, f.focal, o);
         const size_t on = sortOut(p, left, o, at);
         if (m.size > 0.0f || m.hasLeaves != 0u)
-            softShadows(m, in.depths[k], in.through[k], on, o);
+            softShadows(m, in.depths[k], in.through[k], on, at, x0, y, f.coverageSeed, o);
         else
             hardShadows(m, in.depths[k], on, o);
         for (size_t i = 0; i < on; ++i) row.shadow[slot][at[i]] = o.word[i];

@@ -15,6 +15,8 @@ namespace {
 using glm::dvec2;
 using glm::dvec3;
 
+constexpr double kTurn = 2 * 3.14159265358979323846;
+
 /// The plane of a surface in the view of a light.
 class Receiver {
   public:
@@ -27,6 +29,13 @@ class Receiver {
         const dvec3 nl{glm::dot(n, view_.right), glm::dot(n, view_.down), glm::dot(n, view_.forward)};
         const dvec3 ray = view_.isOrthographic ? dvec3(0, 0, 1) : place_ / place_.z;
         image = imageOf(view_, place_);
+        // Sixteen angles in a pattern of 4 x 4 pixels, of ordered dither, four to each quarter; frames of a series turn
+        // them further.
+        const glm::ivec2 pixel = glm::ivec2(glm::floor(imageOf(camera, point))) & 3;
+        constexpr int kOrder[4][4] = {{0, 8, 2, 10}, {12, 4, 14, 6}, {3, 11, 1, 9}, {15, 7, 13, 5}};
+        const int number = kOrder[pixel.y][pixel.x], quarter = (number & 1) + (number & 2);
+        const double within = (number / 4 + (draws.frame.coverageSeed * 2654435769u >> 24) / 256.0) / 4;
+        turn_ = kTurn / 4 * quarter + std::atan2(within, 1 - within);
         // cos of the angle between the plane's normal and the light's ray, and how fast depth changes from texel to
         // texel; a plane that is seen nearly edge-on is turned.
         double facing = glm::dot(nl, ray) / glm::length(ray);
@@ -43,9 +52,10 @@ class Receiver {
 
     dvec3 light() const {
         const double penumbra = map_.of.size > 0 ? widthOfPenumbra() : 0;
-        if (!(penumbra > 0)) return around(image);
+        if (penumbra < 0) return dvec3(1);
+        if (penumbra == 0) return around(image);
         dvec3 sum(0);
-        for (int k = 0; k < 16; ++k) sum += around(image + penumbra * onDisc(k));
+        for (int k = 0; k < 16; ++k) sum += around(image + penumbra * onDisc(k, 0.5));
         return sum / 16.0;
     }
 
@@ -53,9 +63,9 @@ class Receiver {
     bool isOn = false;
 
   private:
-    static dvec2 onDisc(int k) {
-        const double angle = k * 3.14159265358979323846 * (3 - std::sqrt(5.0));
-        return std::sqrt((k + 0.5) / 16) * dvec2(std::cos(angle), std::sin(angle));
+    dvec2 onDisc(int k, double off) const {
+        const double angle = turn_ + k * kTurn / 2 * (3 - std::sqrt(5.0));
+        return std::sqrt((k + off) / 16) * dvec2(std::cos(angle), std::sin(angle));
     }
     size_t texel(int x, int y) const { return static_cast<size_t>(y) * view_.width + static_cast<size_t>(x); }
     /// Depth of what hides the plane at a texel.
@@ -78,6 +88,7 @@ class Receiver {
         return glm::mix(glm::mix(lightAt(x, y), lightAt(x + 1, y), part.x),
                         glm::mix(lightAt(x, y + 1), lightAt(x + 1, y + 1), part.x), part.y);
     }
+    /// Less than 0: nothing hides the light.
     double widthOfPenumbra() const {
         const double most = view_.width / 16.0, nearest = map_.of.centreDepth + map_.nearest;
         const auto seen = [&](double caster) {
@@ -88,20 +99,21 @@ class Receiver {
         double sum = 0;
         int count = 0;
         for (int k = 0; k < 16; ++k) {
-            const dvec2 at = glm::floor(glm::clamp(image + search * onDisc(k), dvec2(0), dvec2(view_.width - 1.0)));
+            const dvec2 at = glm::floor(glm::clamp(image + search * onDisc(k, 0), dvec2(0), dvec2(view_.width - 1.0)));
             if (const auto caster = casterAt(static_cast<int>(at.x), static_cast<int>(at.y))) {
                 sum += *caster;
                 ++count;
             }
         }
-        return count == 0 ? 0 : seen(sum / count);
+        if (count == 0) return search < 1 ? 0 : -1;
+        return seen(sum / count);
     }
 
     const render::ShadowMapOf& map_;
     const lod::View& view_;
     dvec3 place_;
     dvec2 slope_;
-    double bias_ = 0;
+    double bias_ = 0, turn_ = 0;
 };
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "engine/render/frame_passes.h"
 #include "engine/render/layered_frame.h"
 #include "engine/render/length_unit.h"
+#include "engine/render/shadow_frame.h"
 #include "engine/render/views.h"
 #include "lod/primitives/octahedral.h"
 #include "lod/primitives/patch_samples.h"
@@ -236,7 +237,8 @@ namespace {
 
 /// Draws state.cut, which has no layers, in a unit of length that suits it.
 Result<uint64_t> drawPlain(FrameState& state, const lod::View& view, const FrameSettings& settings) {
-    const double units = unitsOfLength(state.cut, state.hierarchies, state.instances, view);
+    const double units = settings.draw.shadows ? settings.draw.shadows->units  // their maps are in them
+                                               : unitsOfLength(state.cut, state.hierarchies, state.instances, view);
     if (units == 1) return drawNodes(state, state.cut, view, settings);
     FrameSettings converted = settings;
     converted.draw = inUnits(settings.draw, units);

@@ -9,6 +9,7 @@
 #include "engine/base/process.h"
 #include "engine/render/frame_passes.h"
 #include "engine/render/layered_frame.h"
+#include "engine/render/length_unit.h"
 
 namespace stipple::render {
 namespace {
@@ -105,9 +106,24 @@ ShadowMapOf mapOf(const ShadowView& of, const Image& image, double eyeAdvanced, 
     return map;
 }
 
+ShadowView viewInUnits(ShadowView of, double units) {
+    of.view = inUnits(of.view, units);
+    of.reach *= units;
+    of.centreDepth *= units;
+    if (!of.view.isOrthographic) of.size *= units;
+    return of;
+}
+
+/// `of`: in units of length as state.shadows has them, like `settings`.
 Result<ShadowFrame::Kept> drawCasters(FrameState& state, const ShadowView& of, const lod::Cut& cut,
                                       const FrameSettings& settings, Image& image) {
+    const double units = state.shadows->units;
+    if (units != 1) {
+        inUnits(state.instances, units, state.inUnits);
+        std::swap(state.instances, state.inUnits);  // the draw list refers to them
+    }
     makeDrawList(cut, state.hierarchies, state.instances, of.view, settings.draw, state.draws);
+    if (units != 1) std::swap(state.instances, state.inUnits);
     markDiscSizes(*state.discSizes, state.draws);
     RenderRequest request;
     request.draws = &state.draws;
@@ -175,6 +191,63 @@ uint64_t bytesOfShadows(const FrameState& state) {
 
 double msOfShadows(const FrameState& state) { return state.shadows ? state.shadows->ms : 0; }
 
+namespace {
+
+/// What all maps of a frame are drawn by.
+struct CasterWishes {
+    double errorTexels;
+    uint64_t appearance;
+};
+
+/// The map of before that is of this view and still holds; null: there is none. `of`: in the maps' unit of length.
+const ShadowFrame::Kept* keptOf(const ShadowFrame& frame, const ShadowView& of, const CasterWishes& wishes) {
+    const auto at = std::find_if(frame.kept.begin(), frame.kept.end(), [&](const ShadowFrame::Kept& k) {
+        return k.isComplete && k.isStill && k.map.of.isOf(of) && k.errorAsked == wishes.errorTexels &&
+               k.appearance == wishes.appearance;
+    });
+    return at == frame.kept.end() ? nullptr : &*at;
+}
+
+/// Asks the cuts of `views`, together with the camera's, for those that are none of before. Returns which cut of
+/// frame.cuts each has, 0 where the map of before holds.
+std::vector<size_t> cutCasters(FrameState& state, const lod::View& view, const FrameSettings& settings,
+                               std::span<const ShadowView> views, const CasterWishes& wishes, bool mayKeep) {
+    ShadowFrame& frame = *state.shadows;
+    std::vector<lod::ViewRequest> requests{{view, settings.budgets.errorPixels}};
+    std::vector<size_t> asked(views.size());
+    for (size_t v = 0; v < views.size(); ++v) {
+        if (mayKeep && keptOf(frame, viewInUnits(views[v], frame.units), wishes) != nullptr) continue;
+        asked[v] = requests.size();
+        requests.push_back({views[v].view, wishes.errorTexels, true});
+    }
+    if (requests.size() == 1) return asked;
+    lod::selectCuts(state.scene(), state.streamer->residency(), requests, settings.budgets.records, frame.scratch,
+                    frame.cuts);
+    std::swap(state.cut, frame.cuts.views[0]);
+    state.cut.wanted = frame.cuts.merged.wanted;
+    state.cut.keep = frame.cuts.merged.keep;
+    return asked;
+}
+
+/// The map of a view: that of before, if it is of the same cut, or a new one.
+Result<ShadowFrame::Kept> mapOfCut(FrameState& state, const ShadowView& world, lod::Cut& cut,
+                                   const FrameSettings& casting, const CasterWishes& wishes) {
+    ShadowFrame& frame = *state.shadows;
+    const ShadowView of = viewInUnits(world, frame.units);
+    dropSmallAndGlass(state, world.view, cut);
+    const ShadowFrame::Kept* const before = keptOf(frame, of, wishes);
+    if (before != nullptr && cut.wanted.empty() && areSame(before->draw, cut.draw) &&
+        areSame(before->meshDraw, cut.meshDraw))
+        return *before;
+    STIPPLE_ASSIGN(ShadowFrame::Kept drawn, drawCasters(state, of, cut, casting, frame.image));
+    drawn.errorAsked = wishes.errorTexels;
+    drawn.appearance = wishes.appearance;
+    ++state.counters.shadowMapsDrawn;
+    return drawn;
+}
+
+}  // namespace
+
 Result<void> addShadows(FrameState& state, const lod::View& view, FrameSettings& settings, bool mayKeep) {
     FrameCounters& counters = state.counters;
     counters.shadowMaps = counters.shadowMapsDrawn = counters.shadowLightsLeft = 0;
@@ -188,51 +261,26 @@ Result<void> addShadows(FrameState& state, const lod::View& view, FrameSettings&
     }
     if (!state.shadows) state.shadows = std::make_shared<ShadowFrame>();
     ShadowFrame& frame = *state.shadows;
-    const double tau = settingsOfMaps(settings).errorTexels;
-    const uint64_t appearance = appearanceOf(state, settings.draw);
-    const auto keptOf = [&](const ShadowView& of) {
-        return std::find_if(frame.kept.begin(), frame.kept.end(), [&](const ShadowFrame::Kept& k) {
-            return k.isComplete && k.isStill && k.map.of.isOf(of) && k.errorAsked == tau && k.appearance == appearance;
-        });
-    };
-    std::vector<lod::ViewRequest> requests{{view, settings.budgets.errorPixels}};
-    std::vector<size_t> asked(views.size());  // 0: the map of before holds
-    for (size_t v = 0; v < views.size(); ++v) {
-        if (mayKeep && keptOf(views[v]) != frame.kept.end()) continue;
-        asked[v] = requests.size();
-        requests.push_back({views[v].view, tau, true});
-    }
-    if (requests.size() > 1) {
-        lod::selectCuts(state.scene(), state.streamer->residency(), requests, settings.budgets.records, frame.scratch,
-                        frame.cuts);
-        std::swap(state.cut, frame.cuts.views[0]);
-        state.cut.wanted = frame.cuts.merged.wanted;
-        state.cut.keep = frame.cuts.merged.keep;
-    }
-    const FrameSettings casting = settingsOfCasters(settings);
+    const double units =
+        hasLayers(state, view, settings) ? 1 : unitsOfLength(state.cut, state.hierarchies, state.instances, view);
+    if (units != frame.units) frame.kept.clear();
+    frame.units = units;
+    const CasterWishes wishes{settingsOfMaps(settings).errorTexels, appearanceOf(state, settings.draw)};
+    const std::vector<size_t> asked = cutCasters(state, view, settings, views, wishes, mayKeep);
+    FrameSettings casting = settingsOfCasters(settings);
+    if (units != 1) casting.draw = inUnits(casting.draw, units);
     std::vector<ShadowFrame::Kept> now;
     auto maps = std::make_shared<ShadowMaps>();
     maps->surfaceError = state.cut.tauEffective;
+    maps->units = units;
     for (size_t v = 0; v < views.size(); ++v) {
-        const auto before = keptOf(views[v]);
+        const ShadowView of = viewInUnits(views[v], units);
         if (asked[v] == 0) {
-            now.push_back(*before);
+            now.push_back(*keptOf(frame, of, wishes));
         } else {
-            lod::Cut& cut = frame.cuts.views[asked[v]];
-            dropSmallAndGlass(state, views[v].view, cut);
-            const bool isSame = before != frame.kept.end() && areSame(before->draw, cut.draw) &&
-                                areSame(before->meshDraw, cut.meshDraw) && cut.wanted.empty();
-            if (isSame) {
-                now.push_back(*before);
-            } else {
-                STIPPLE_ASSIGN(ShadowFrame::Kept drawn, drawCasters(state, views[v], cut, casting, frame.image));
-                drawn.errorAsked = tau;
-                drawn.appearance = appearance;
-                now.push_back(std::move(drawn));
-                ++counters.shadowMapsDrawn;
-            }
+            STIPPLE_ASSIGN(now.emplace_back(), mapOfCut(state, views[v], frame.cuts.views[asked[v]], casting, wishes));
         }
-        now.back().map.of = views[v];  // its light, and how far it reaches
+        now.back().map.of = of;  // its light, and how far it reaches
         if (std::isfinite(now.back().map.nearest)) maps->maps.push_back(now.back().map);
     }
     frame.kept = std::move(now);

@@ -31,6 +31,7 @@ struct ShadowMapOf {
 struct ShadowMaps {
     std::vector<ShadowMapOf> maps;
     double surfaceError = 0;  ///< of the camera's cut, px
+    double units = 1;         ///< of length that a world unit is here (length_unit.h)
 };
 
 /// Reused between frames of one state.
@@ -45,6 +46,7 @@ struct ShadowFrame {
         uint64_t appearance = 0;
     };
     std::vector<Kept> kept;
+    double units = 1;  ///< that a world unit is in their maps
     lod::ViewsScratch scratch;
     lod::CutOfViews cuts;
     Image image;

@@ -4,12 +4,14 @@
 // The plane is followed to the texel's centre, so that slopes need no room of their own; what is left is stated: how
 // far surfaces and casters are from what they stand for, and rounding. Four texels about a place are weighed as in
 // percentage-closer filtering (Reeves, Salesin and Cook 1987); of lights that have a size sixteen places within the
-// penumbra, which is as wide as what casts it is far away (Fernando 2005).
+// penumbra, which is as wide as what casts it is far away (Fernando 2005). Each pixel of a pattern of 4 x 4 has its
+// places turned by another angle: sixteen of the same ones would show as steps.
 //
 // What looks into the maps is in shadow_taps.h.
 #ifndef STIPPLE_SHARED_SHADOW_H
 #define STIPPLE_SHARED_SHADOW_H
 #include "frame.h"
+#include "occlusion.h"
 SHARED_BEGIN
 
 const uint kMostShadowLights = 4u;
@@ -127,8 +129,21 @@ SHARED_FN float ofTexels(ShadowTexels t, float v00, float v10, float v01, float 
     return upper + t.along * (lower - upper);
 }
 
-// Place k of sixteen that fill a disc evenly: on a spiral whose turns are golden angles (Vogel 1979). `before`: the
-// direction of the place before, at first (1, 0).
+// Places of sixteen that fill a disc evenly: on a spiral whose turns are golden angles (Vogel 1979). Direction of the
+// first one at a pixel, of sixteen that are about a sixteenth of a turn apart; `seed`: of a frame of a series that is
+// averaged (FrameConstants), which turns them a little further.
+SHARED_FN vec2 firstGolden(uint x, uint y, uint seed) {
+    const uint number = aoNumber(x & 3u, y & 3u);
+    const float part = float(int(seed * 2654435769u >> 24)) * (1.0f / 256.0f);
+    const float down = (float(int(number >> 2)) + part) * 0.25f;
+    const float aside = 1.0f - down;
+    const float inverse = 1.0f / sqrt(aside * aside + down * down);
+    const float u = aside * inverse;
+    const float v = down * inverse;
+    const float sign = (number & 2u) == 0u ? 1.0f : -1.0f;
+    return (number & 1u) == 0u ? vec2(sign * u, sign * v) : vec2(-sign * v, sign * u);
+}
+// Of the next one.
 SHARED_FN vec2 turnedGolden(vec2 before) {
     return vec2(-0.737368878f * before.x - 0.675490294f * before.y, 0.675490294f * before.x - 0.737368878f * before.y);
 }

@@ -35,20 +35,22 @@ SHARED_FN vec3 shadowColour(SHARED_SHADOW ShadowMap m, ShadowPlace p, float x, f
                 ofTexels(t, v00.z, v10.z, v01.z, v11.z));
 }
 
-// Radius of the penumbra at a place, texels; 0: no caster is near.
-SHARED_FN float penumbra(SHARED_SHADOW ShadowMap m, ShadowPlace p) {
+// Radius of the penumbra at a place, texels. 0: the border is hard there; less: nothing hides the light. `first`: of
+// firstGolden.
+SHARED_FN float penumbra(SHARED_SHADOW ShadowMap m, ShadowPlace p, vec2 first) {
     const bool isFar = m.isPerspective == 0u;
     const float most = kMostPenumbra * float(int(m.edge));
     // The light seen from the place covers so much of the map, at the depth of the nearest caster.
     const float gap = max(p.whole - m.nearest, 0.0f);
     const float search =
         min(isFar ? gap * m.size * m.focal : gap * m.size * m.focal / (p.whole * max(m.nearest, 1.0e-20f)), most);
-    vec2 direction = vec2(1.0f, 0.0f);
+    vec2 direction = first;
     float sum = 0.0f;
     float count = 0.0f;
     const float last = float(int(m.edge)) - 1.0f;
     for (uint k = 0u; k < kShadowTaps; ++k) {
-        const float radius = search * sqrt((float(int(k)) + 0.5f) / float(int(kShadowTaps)));
+        // (From the place itself on: what is near and narrow must not be missed.)
+        const float radius = search * sqrt(float(int(k)) / float(int(kShadowTaps)));
         const float column = floor(min(max(0.0f, p.x + radius * direction.x), last));
         const float row = floor(min(max(0.0f, p.y + radius * direction.y), last));
         const float depth = shadowDepths[m.first + uint(int(row)) * m.edge + uint(int(column))];
@@ -59,14 +61,16 @@ SHARED_FN float penumbra(SHARED_SHADOW ShadowMap m, ShadowPlace p) {
     }
     const float caster = sum / max(count, 1.0f);
     const float apart = max(p.whole - caster, 0.0f) * m.size * m.focal;
-    return count > 0.0f ? min(isFar ? apart : apart / (p.whole * max(caster, 1.0e-20f)), most) : 0.0f;
+    const float radius = min(isFar ? apart : apart / (p.whole * max(caster, 1.0e-20f)), most);
+    return count > 0.0f ? radius : search < 1.0f ? 0.0f : -1.0f;
 }
 
-// What of the light comes to a place.
-SHARED_FN vec3 lightPast(SHARED_SHADOW ShadowMap m, ShadowPlace p) {
-    const float radius = m.size > 0.0f ? penumbra(SHARED_SHADOW_USE m, p) : 0.0f;
+// What of the light comes to a place. `first`: of firstGolden.
+SHARED_FN vec3 lightPast(SHARED_SHADOW ShadowMap m, ShadowPlace p, vec2 first) {
+    const float radius = m.size > 0.0f ? penumbra(SHARED_SHADOW_USE m, p, first) : 0.0f;
+    if (radius < 0.0f) return vec3(1.0f, 1.0f, 1.0f);
     vec3 sum = vec3(0.0f, 0.0f, 0.0f);
-    vec2 direction = vec2(1.0f, 0.0f);
+    vec2 direction = first;
     const uint taps = radius > 0.0f ? kShadowTaps : 1u;
     for (uint k = 0u; k < taps; ++k) {
         const float off = radius * sqrt((float(int(k)) + 0.5f) / float(int(kShadowTaps)));

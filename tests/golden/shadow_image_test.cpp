@@ -166,11 +166,11 @@ dvec3 placeOf(const lod::View& view, size_t i, double depth) {
 }
 
 /// How far a place of the floor is from the border of the ball's shadow, across the light's ray: inside below 0.
-double fromBorder(const dvec3& p, const render::WorldLight& light) {
-    if (light.kind == shared::kLightDirectional) return glm::length(glm::cross(p - kBall, light.direction)) - kRadius;
+double fromBorder(const dvec3& p, const render::WorldLight& light, const dvec3& ball) {
+    if (light.kind == shared::kLightDirectional) return glm::length(glm::cross(p - ball, light.direction)) - kRadius;
     const dvec3 ray = glm::normalize(p - light.position);
-    const double apart = glm::length(glm::cross(kBall - light.position, ray)) - kRadius;
-    return apart * glm::length(p - light.position) / glm::dot(kBall - light.position, ray);
+    const double apart = glm::length(glm::cross(ball - light.position, ray)) - kRadius;
+    return apart * glm::length(p - light.position) / glm::dot(ball - light.position, ray);
 }
 
 struct Border {
@@ -188,7 +188,7 @@ struct Border {
     }
 };
 /// Pixels of the floor that the mask has on the wrong side of the border, or beside its own: distances on the picture.
-Border borderOf(const Mask& mask, const lod::View& view, const render::WorldLight& light) {
+Border borderOf(const Mask& mask, const lod::View& view, const render::WorldLight& light, const dvec3& ball = kBall) {
     Border border;
     const render::Image& image = mask.state->image;
     const render::ShadowMaps& maps = *mask.state->draws.shadowMaps;
@@ -196,12 +196,12 @@ Border borderOf(const Mask& mask, const lod::View& view, const render::WorldLigh
         if (!(image.depth[i] > 0) || mask.share[i] < 0) continue;
         const dvec3 p = placeOf(view, i, double{image.depth[i]});
         if (std::abs(p.z) > 1e-3 || std::abs(p.x) > 1.9 || std::abs(p.y) > 1.9) continue;
-        const double apart = fromBorder(p, light);
+        const double apart = fromBorder(p, light, ball);
         const bool isWrong = (apart < 0) != (mask.share[i] < 0.5);
         if (!isWrong) continue;
         const double distance = glm::length(p - view.eye);
         const double offAxis = view.isOrthographic ? 1 : glm::dot(p - view.eye, view.forward) / distance;
-        const dvec3 l = light.kind == shared::kLightDirectional ? kTowardsSun : glm::normalize(light.position - p);
+        const dvec3 l = light.kind == shared::kLightDirectional ? -light.direction : glm::normalize(light.position - p);
         const auto used = std::find_if(maps.maps.begin(), maps.maps.end(), [&](const render::ShadowMapOf& m) {
             return view.isOrthographic || distance <= m.of.reach;
         });
@@ -244,6 +244,55 @@ TEST_F(ShadowBackends, BordersAreWhereTheClosedFormHasThem) {
             }
 }
 
+#ifndef STIPPLE_ON_GPU
+TEST_F(ShadowBackends, BordersKeepTheirBoundUnderALowSunFromCoarseCutsAndMaps) {
+    constexpr double kLower = 0.35;
+    test::writePly(folder_ / "a.ply", floorAndBall(true, kLower), true, true);
+    const auto store = test::buildAndOpen(folder_ / "a.ply", folder_ / "a.stipple", *executor_);
+    for (const double upward : {0.7, 0.3, 0.22})
+        for (const auto& [texels, error] : {std::pair(256.0, 0.5), {64.0, 0.5}, {256.0, 4.0}, {1024.0, 0.25}}) {
+            render::WorldLight light = sun();
+            const double aside = std::sqrt((1 - upward * upward) / 2);
+            light.direction = dvec3(-aside, -aside, -upward);
+            SCOPED_TRACE(testing::Message() << upward << " upward, " << texels << " texels, " << error << " px");
+            render::FrameSettings settings = under(light);
+            settings.draw.parameters.shadow.texels = texels;
+            settings.budgets.errorPixels = error;
+            const Mask mask = maskOf(store, usual(), *executor_, viewOf(), settings);
+            const Border border = borderOf(mask, viewOf(), light, kBall - dvec3(0, 0, kLower));
+            std::printf(
+                "%.2f upward, %4.0f texels, %.2f px: %zu on the wrong side, the farthest %.2f of what is stated\n",
+                upward, texels, error, border.errors.size(), border.worst());
+            EXPECT_FALSE(border.errors.empty());
+            EXPECT_LE(border.beyond(), 0.01);
+        }
+}
+
+TEST_F(ShadowBackends, FallInScenesOfAnySize) {
+    const auto shown = [&](double size) {
+        std::vector<test::TestPoint> points = floorAndBall();
+        for (test::TestPoint& p : points) {
+            p.position *= size;
+            p.radius *= static_cast<float>(size);
+        }
+        test::writePly(folder_ / "a.ply", points, true, true);
+        const auto store = test::buildAndOpen(folder_ / "a.ply", folder_ / "a.stipple", *executor_);
+        lod::View view = viewOf();
+        view.eye *= size;
+        view.nearPlane *= size;
+        render::WorldLight lamp = spot();
+        lamp.position *= size;
+        lamp.colour *= static_cast<float>(size * size);
+        lamp.size = static_cast<float>(0.2 * size);
+        render::FrameSettings settings = under(sun(0.1f));
+        settings.draw.lights.push_back(lamp);
+        return std::move(drawn(store, usual(), *executor_, view, settings)->image);
+    };
+    const render::Image usualSize = shown(1);
+    for (const double size : {0x1p-30, 0x1p+50}) EXPECT_GE(test::drawnPsnr(shown(size), usualSize), 50) << size;
+}
+#endif
+
 TEST_F(ShadowBackends, ShowWhatTheOracleShows) {
     test::writePly(folder_ / "a.ply", floorAndBall(), true, true);
     const auto cloud = test::buildAndOpen(folder_ / "a.ply", folder_ / "a.stipple", *executor_),
@@ -261,6 +310,7 @@ TEST_F(ShadowBackends, ShowWhatTheOracleShows) {
     using enum render::Mode;
     std::vector<Look> looks{{mesh, sun(), splat, false},
                             {mesh, sun(0.2f), splat, true},
+                            {cloud, sun(0.5f), surface, false},
                             {curves, sun(), splat, false},
                             {cloud, spot(), splat, true}};
     for (const render::Mode mode : {surface, pullpush, splat, ewa, pullpushExact, points})

@@ -18,7 +18,7 @@ struct SceneFacts {
     bool hasPointsWithoutNormals = false;
     uint32_t lights = 0;          ///< of the scene's own, and a sun
     uint32_t lightsThatCast = 0;  ///< of these: what is lit could show their shadows
-    double extent = 0;    ///< of the largest store, across its focus; its units
+    double extent = 0;            ///< of the largest store, across its focus; its units
 };
 
 /// Of stores that are placed, with what the settings make of them.
