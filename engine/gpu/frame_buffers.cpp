@@ -170,7 +170,7 @@ Result<void> FrameBuffers::prepareEnvironment(const std::shared_ptr<const render
 
 /// Maps of lights that cast shadows, and the table of where they are.
 Result<void> FrameBuffers::prepareShadows(const render::DrawList& draws) {
-    if (draws.shadows.empty()) return {};
+    if (!draws.isShadowed) return {};
     STIPPLE_ASSIGN(const ShadowTable table, shadows_.prepare(device_, draws));
     STIPPLE_TRY(ensure(bound_[kShadowBinding], sizeof(table), kConstants, true, "shadow maps"));
     std::memcpy(bound_[kShadowBinding].mapped(), &table, sizeof(table));

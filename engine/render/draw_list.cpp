@@ -89,6 +89,7 @@ void clear(DrawList& out) {
     out.tables.clear();
     out.layer = nullptr;
     out.glass.reset();
+    out.isShadowed = false;
     out.shadowMaps.reset();
     out.shadows.clear();
     out.shadowSlots = 0;

@@ -117,6 +117,7 @@ struct DrawList {
     std::span<const shared::SurfaceMaterial> materials;
     const LayerInput* layer = nullptr;             ///< of a layer of glass (layers.h), where this is one ...
     std::shared_ptr<const LayerTables> glass;      ///< ... and what its passes read
+    bool isShadowed = false;                       ///< has the effect, whose maps may be none
     std::shared_ptr<const ShadowMaps> shadowMaps;  ///< where lights cast shadows, ...
     std::vector<shared::ShadowMap> shadows;        ///< ... each of them in camera space
     uint32_t shadowSlots = 0;                      ///< masks of lights

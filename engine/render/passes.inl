@@ -18,9 +18,9 @@ STIPPLE_PASS(surface, (Planes{visibility, texels, coarse, smooth}), (Planes{surf
 STIPPLE_PASS(light, (Planes{surface, shadows}), (Planes{surface}), true)
 STIPPLE_PASS(refract, (Planes{surface}), (Planes{surface}), true)
 STIPPLE_PASS(output, (Planes{surface, filtered}), (Planes{image}), true)
+STIPPLE_PASS(cast, (Planes{surface}), (Planes{image}), true)
 #ifndef STIPPLE_ONLY_LIGHT
 STIPPLE_PASS(occlusion, (Planes{surface}), (Planes{surface}), false)
-STIPPLE_PASS(cast, (Planes{surface}), (Planes{image}), true)
 STIPPLE_PASS(shadow, (Planes{surface}), (Planes{shadows}), true)
 STIPPLE_PASS(edl, (Planes{surface}), (Planes{surface}), false)
 STIPPLE_PASS(fog, (Planes{surface}), (Planes{surface}), true)

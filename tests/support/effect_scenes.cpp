@@ -83,8 +83,10 @@ bool addUselessly(const std::string& name, render::DrawSettings& s) {
         return true;
     }
     s.effects.emplace_back(name);
-    if (name == "shadow") {  // nothing is lit
+    if (name == "shadow") {  // nothing casts
+        s.unlitTriangles = false;
         s.lights = {lampThatCasts()};
+        s.lights[0].castsShadow = false;
         return true;
     }
     if (name == "edl") {

@@ -71,6 +71,7 @@ uint64_t keyOf(const DrawList& draws, const DrawSettings& settings) {
 }
 
 void fill(const DrawSettings& settings, const glm::dmat3& cameraFromWorld, DrawList& out) {
+    out.isShadowed = true;
     if (!settings.shadows) return;
     out.shadowMaps = settings.shadows;
     for (const ShadowMapOf& map : settings.shadows->maps) {
