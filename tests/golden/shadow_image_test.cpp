@@ -329,6 +329,19 @@ TEST_F(ShadowBackends, ShowWhatTheOracleShows) {
             const double db = test::drawnPsnr(shown->image, truth->image);
             std::printf("%-8s %-14s %5.1f dB (without: %.1f)\n", name.c_str(), render::reconstructionOf(look.mode).name,
                         db, test::drawnPsnr(control->image, truth->image));
+            for (size_t m = 0; m < truth->draws.shadowMaps->maps.size(); ++m) {
+                const auto &x = *shown->draws.shadowMaps->maps[m].texels, &y = *truth->draws.shadowMaps->maps[m].texels;
+                size_t holes = 0, off = 0;
+                for (size_t t = 0; t < x.depth.size(); ++t) {
+                    if (std::isinf(x.depth[t]) != std::isinf(y.depth[t])) ++holes;
+                    else if (!std::isinf(x.depth[t]) && std::abs(x.depth[t] - y.depth[t]) > 1e-3) ++off;
+                }
+                std::printf("   map %zu: %zu holes %zu off; ", m, holes, off);
+            }
+            for (size_t i = 0; i < shown->image.depth.size(); ++i)
+                if (std::abs(shown->image.linear[3*i] - truth->image.linear[3*i]) > 0.1)
+                    std::printf("[%zu,%zu: %.3f %.3f depth %.5f %.5f] ", i % view.width, i / view.width, double{shown->image.linear[3*i]}, double{truth->image.linear[3*i]}, double{shown->image.depth[i]}, double{truth->image.depth[i]});
+            std::printf("\n");
             EXPECT_GE(db, 50);
             const auto d = reference::compareImages(shown->image, truth->image, 4, nullptr);
             ASSERT_TRUE(d);
