@@ -34,7 +34,7 @@ vec3 litColour(SurfaceWords words, vec3 colour, vec3 normal, uvec2 pixel) {
     // Points with a material, or under lights of the scene's own, are surfaces like any other; else theirs is one formula.
     const bool isSurface = isTriangle || (words.material & kPixelMaterial) != 0u;
     if (!isSurface && frame.lightCount == 0u && frame.hasEnvironment == 0u)
-        return colour * irradiance(normal, frame.sunDirection, frame.skyDirection, leaf);
+        return colour * irradiance(normal, frame.sunDirection, frame.skyDirection, leaf, float(words.material >> 16 & 255u) / 255.0);
     const PixelRay ray = pixelRayHere(pixel);
     Surface s;
     s.colour = colour;

@@ -267,6 +267,7 @@ struct SurfaceRow {
     alignas(64) float ownDepth[kTile];                        ///< before reconstruction; only if wanted
     alignas(64) float coverage[kTile];                        ///< only if hasCoverage
     bool hasTriangles, hasEmission, hasCoverage, hasMaterials;
+    bool hasOcclusion;  ///< of points, too
 };
 /// What of a surface is needed beyond whether there is one, and its colour.
 struct SurfaceWants {
@@ -282,6 +283,19 @@ struct KeptRow {
 /// Logarithms of depth in the rows of a pixel's neighbours, from the row's first pixel on.
 struct EdlRows {
     const float *straightAbove, *straightBelow, *slantedAbove, *slantedBelow;
+};
+
+/// What ambient occlusion is computed of (shaders/shared/occlusion.h): every pixel, or every second one both ways, with
+/// a border of nothing.
+struct AoPlanes {
+    static constexpr uint32_t kBorder = 2;
+    float* depth;      ///< 0: nothing
+    uint32_t* normal;  ///< octahedral
+    float *open, *mean;
+    uint32_t width, height, pitch, edge;  ///< edge: px from one to the next
+    float radius;                         ///< world units
+    std::array<float, 16> cosine, sine;   ///< of aoAngle
+    size_t at(uint32_t x, uint32_t y) const { return size_t{y + kBorder} * pitch + x + kBorder; }
 };
 
 struct ShadeOutput {
@@ -389,6 +403,13 @@ struct Kernels {
     /// 1 for each pixel of a row that no opaque surface is seen at.
     void (*openRow)(const shared::FrameConstants& f, const uint64_t* keys, const shared::FilteredPixel* filtered,
                     uint32_t n, uint8_t* open);
+    /// Ambient occlusion: how much of the light gets to entries of the planes, into `open`; the mean of those along a
+    /// row (into `mean`), then down (into `open`); and to pixels of the picture that are an edge apart.
+    void (*occludeRow)(const shared::FrameConstants& f, const AoPlanes& of, uint32_t x0, uint32_t y, uint32_t n);
+    void (*aoMeanRow)(const shared::FrameConstants& f, const AoPlanes& of, bool isDown, uint32_t x0, uint32_t y,
+                      uint32_t n);
+    void (*aoSpreadRow)(const shared::FrameConstants& f, const AoPlanes& of, const float* depth, const uint32_t* normal,
+                        uint32_t x0, uint32_t y, uint32_t n, float* open);
 };
 
 /// The best kernels that this processor runs; STIPPLE_SIMD=sse|avx2|avx512 asks for fewer.

@@ -7,6 +7,7 @@
 #include "shaders/shared/curve.h"
 #include "shaders/shared/environment.h"
 #include "shaders/shared/lens.h"
+#include "shaders/shared/occlusion.h"
 #include "shaders/shared/pack.h"
 #include "shaders/shared/patch_map.h"
 #include "shaders/shared/pyramid.h"
@@ -355,6 +356,8 @@ void finishRow(float focal, uint32_t n, TexelRow& __restrict row) {
 
 #include "engine/cpu/effects.inl"
 
+#include "engine/cpu/occlusion.inl"
+
 }  // namespace
 
 extern const Kernels STIPPLE_KERNELS, STIPPLE_KERNELS_ORTHOGRAPHIC;
@@ -390,6 +393,9 @@ const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
                               splatTile,
                               filterTile,
                               isAtJump,
-                              openRow};
+                              openRow,
+                              occludeRow,
+                              aoMeanRow,
+                              aoSpreadRow};
 
 }  // namespace stipple::cpu

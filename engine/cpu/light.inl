@@ -183,9 +183,14 @@ void lightRow(const FrameConstants& frame, const LightInput& light, uint32_t x0,
         }
     if (litPoints) {
         const vec3 sun = f.sunDirection, sky = f.skyDirection;
+        alignas(64) float open[kTile];
+        for (size_t i = 0; i < n; ++i) open[i] = 1.0f;
+        if (row.hasOcclusion)
+#pragma GCC ivdep
+            for (size_t i = 0; i < n; ++i) open[i] = float(int(row.material[i] >> 16 & 255u)) * (1.0f / 255.0f);
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
-            const float sunlight = irradiance(vec3(row.nx[i], row.ny[i], row.nz[i]), sun, sky, row.leaf[i]);
+            const float sunlight = irradiance(vec3(row.nx[i], row.ny[i], row.nz[i]), sun, sky, row.leaf[i], open[i]);
             const float brightness = 1.0f + share[i] * (sunlight - 1.0f);
             row.red[i] *= brightness;
             row.green[i] *= brightness;

@@ -18,7 +18,8 @@ namespace stipple::gpu {
 /// Constants of effects are uniform buffers: of storage buffers many devices let a stage see 32 and no more
 /// (maxPerStageDescriptorStorageBuffers).
 constexpr bool isUniform(uint32_t binding) {
-    return binding == shared::kEdlBinding || binding == shared::kFogBinding || binding == shared::kToneBinding;
+    return binding == shared::kEdlBinding || binding == shared::kFogBinding || binding == shared::kToneBinding ||
+           binding == shared::kOcclusionBinding;
 }
 constexpr VkDescriptorType descriptorType(uint32_t binding) {
     return isUniform(binding) ? VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;

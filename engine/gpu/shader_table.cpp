@@ -9,6 +9,7 @@
 #include "shaders/shared/fog.h"
 #include "shaders/shared/frame.h"
 #include "shaders/shared/material.h"
+#include "shaders/shared/occlusion.h"
 #include "shaders/shared/optics.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/texture.h"
@@ -71,6 +72,8 @@ static_assert(isLaidOut(shared::kSurfaceBinding, sizeof(shared::SurfaceWords)));
 static_assert(isLaidOut(shared::kEdlBinding, sizeof(shared::EdlConstants)));
 static_assert(isLaidOut(shared::kFogBinding, sizeof(shared::FogConstants)));
 static_assert(isLaidOut(shared::kToneBinding, sizeof(shared::ToneConstants)));
+static_assert(isLaidOut(shared::kOcclusionBinding, sizeof(shared::OcclusionConstants)));
+static_assert(isLaidOut(shared::kOpenBinding, sizeof(float)));
 #endif
 
 }  // namespace

@@ -127,13 +127,14 @@ inline Segment decodeSegment(const lod::Hierarchy& h, const lod::Node& node, con
 /// Share of the light on its far side that a leaf sends through.
 constexpr double kThroughLeaf = 0.6;
 
-/// Light of the scene's sun and sky on a white surface with eye-facing camera-space normal n.
-inline double lightOn(const glm::dvec3& n, const shared::FrameConstants& f, bool isLeaf) {
+/// Light of the scene's sun and sky on a white surface with eye-facing camera-space normal n; `occlusion`: how much of
+/// the sky's gets there.
+inline double lightOn(const glm::dvec3& n, const shared::FrameConstants& f, bool isLeaf, double occlusion = 1) {
     const double towards = glm::dot(n, glm::dvec3(f.sunDirection));
     return 0.75 * (towards > 0 ? towards
                    : isLeaf    ? -kThroughLeaf * towards
                                : 0.0) +
-           0.25 + 0.15 * glm::dot(n, glm::dvec3(f.skyDirection));
+           occlusion * (0.25 + 0.15 * glm::dot(n, glm::dvec3(f.skyDirection)));
 }
 
 }  // namespace stipple::reference

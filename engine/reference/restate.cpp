@@ -420,7 +420,7 @@ class ReferenceBackend final : public render::DrawsAtOnce {
                     (isLit(f) && (s.hasMaterial() || !draws.lights.empty() || draws.environment)))) {
             colour = shadeTriangle(s, n, viewRay(v, p).at(depth), draws);
         } else if (isLit(f) && f.debugView == shared::kDebugNone) {
-            colour *= lightOn(n, f, s.letsLightThrough(pixelsAt(v, s.depth)));
+            colour *= lightOn(n, f, s.letsLightThrough(pixelsAt(v, s.depth)), s.occlusion);
         }
         return {colour, n, depth};
     }

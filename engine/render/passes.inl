@@ -19,6 +19,7 @@ STIPPLE_PASS(light, (Planes{surface}), (Planes{surface}), true)
 STIPPLE_PASS(refract, (Planes{surface}), (Planes{surface}), true)
 STIPPLE_PASS(output, (Planes{surface, filtered}), (Planes{image}), true)
 #ifndef STIPPLE_ONLY_LIGHT
+STIPPLE_PASS(occlusion, (Planes{surface}), (Planes{surface}), false)
 STIPPLE_PASS(edl, (Planes{surface}), (Planes{surface}), false)
 STIPPLE_PASS(fog, (Planes{surface}), (Planes{surface}), true)
 STIPPLE_PASS(tone, (Planes{surface}), (Planes{surface}), true)

@@ -37,7 +37,9 @@ const uint kBackBinding = 29u;
 const uint kEdlBinding = 30u;
 const uint kFogBinding = 31u;
 const uint kToneBinding = 32u;
-const uint kBindings = 33u;
+const uint kOcclusionBinding = 33u;
+const uint kOpenBinding = 34u;
+const uint kBindings = 35u;
 
 // Per pixel:
 const uint kTexelWords = 5u;     // planes of a packed texel; in frames with materials of points one more

@@ -9,10 +9,12 @@ SHARED_BEGIN
 // the visible, leaves send about as much through as back.)
 const float kLeafGlow = 0.6f;
 
-// Light that a white surface with the eye-facing normal n sends to the eye.
-SHARED_FN float irradiance(vec3 n, vec3 sunDirection, vec3 skyDirection, float leaf) {
+// Light that a white surface with the eye-facing normal n sends to the eye; of the sky's `occlusion` gets there.
+SHARED_FN float irradiance(vec3 n, vec3 sunDirection, vec3 skyDirection, float leaf, float occlusion) {
     const float towards = dot(n, sunDirection);
-    return 0.75f * (max(towards, 0.0f) + leaf * kLeafGlow * max(-towards, 0.0f)) + 0.25f + 0.15f * dot(n, skyDirection);
+    const float above = 0.15f * dot(n, skyDirection);
+    const float open = 0.75f * (max(towards, 0.0f) + leaf * kLeafGlow * max(-towards, 0.0f)) + 0.25f + above;
+    return open - (1.0f - occlusion) * (0.25f + above);
 }
 
 // Metallic-roughness surface (glTF 2.0, appendix B): GGX with Smith's shadowing (Heitz 2014) and Schlick's Fresnel.

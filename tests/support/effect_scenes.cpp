@@ -57,6 +57,7 @@ void addEffect(const std::string& name, Executor& executor, render::DrawSettings
     } else {
         s.effects.emplace_back(name);
     }
+    if (name == "occlusion") s.unlitTriangles = false;
     if (name == "fog") s.parameters.fog.density = 0.1;
     if (name == "tone") s.parameters.tone = {1.5, 1};
 }
@@ -74,7 +75,7 @@ bool addUselessly(const std::string& name, render::DrawSettings& s) {
         return true;
     }
     if (name == "fog") s.parameters.fog.density = 1e-6;
-    return name == "fog" || name == "tone";
+    return name == "fog" || name == "tone" || name == "occlusion";
 }
 
 std::vector<size_t> listedEffects() {

@@ -5,6 +5,8 @@
 
 #include "engine/cpu/passes/passes.h"
 #include "engine/cpu/passes/seconds.h"
+#include "shaders/shared/bindings.h"
+#include "shaders/shared/occlusion.h"
 #include "shaders/shared/pack.h"
 
 namespace stipple::cpu {
@@ -49,6 +51,7 @@ bool takeRow(const RowPlace& at, const SurfacePlanes& planes, const SurfaceWants
     row.hasEmission = planes.surface != nullptr && planes.emissive != nullptr;
     row.hasMaterials = at.frame.constants.hasMaterials != 0;
     row.hasCoverage = planes.coverage != nullptr;
+    row.hasOcclusion = at.frame.draws->tableAt<shared::OcclusionConstants>(shared::kOcclusionBinding) != nullptr;
     if (!at.frame.k.takeRow(keptAt(at.frame, at.first), wants, at.n, row)) return false;
     for (size_t i = 0; row.hasEmission && i < at.n; ++i)
         row.emission[i] = (row.material[i] & shared::kPixelTriangle) != 0 ? planes.emissive[i] : 0u;

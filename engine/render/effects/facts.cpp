@@ -1,5 +1,8 @@
 #include "engine/render/effects/facts.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "engine/render/draw_list.h"
 #include "engine/render/kinds/kind.h"
 
@@ -20,6 +23,8 @@ SceneFacts factsOf(std::span<const std::shared_ptr<const lod::Store>> stores, co
         facts.hasUnlitTriangles = facts.hasUnlitTriangles || (isMesh && !isLit(lod::Kind::triangles)) ||
                                   (hasPatches && !isLit(lod::Kind::patches));
         facts.hasUnlitPoints = facts.hasUnlitPoints || (isPoints && !isLit(lod::Kind::points));
+        const double extent = glm::length(d.focusMax - d.focusMin);
+        if (std::isfinite(extent)) facts.extent = std::max(facts.extent, extent);
         facts.hasPointsWithoutNormals = facts.hasPointsWithoutNormals || (isPoints && !d.hasNormals);
     }
     facts.lights = static_cast<uint32_t>(settings.lights.size());

@@ -17,6 +17,7 @@ struct SceneFacts {
     bool hasUnlitTriangles = false;  ///< the same of triangles and patches
     bool hasPointsWithoutNormals = false;
     uint32_t lights = 0;  ///< of the scene's own
+    double extent = 0;    ///< of the largest store, across its focus; its units
 };
 
 /// Of stores that are placed, with what the settings make of them.

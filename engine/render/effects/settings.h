@@ -37,12 +37,18 @@ struct ToneSettings {
     double exposure = 1, curve = 0;
 };
 
+/// Ambient occlusion. `radius`: world units; 0: by the scene. `detail` 0: of every second pixel both ways; 1: of all.
+struct OcclusionSettings {
+    double radius = 0, detail = 0;
+};
+
 /// Of all effects.
 struct EffectParameters {
     SceneFacts facts;  ///< of the scene that is drawn, where somebody said
     EdlSettings edl;
     FogSettings fog;
     ToneSettings tone;
+    OcclusionSettings occlusion;
 };
 
 }  // namespace stipple::render
