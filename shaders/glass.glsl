@@ -14,7 +14,7 @@ vec3 glassColour(SurfaceWords words, vec3 colour, vec3 normal, uvec2 pixel) {
     const uint own = isTriangle ? (words.material & kPixelOptics) >> kPixelOpticsShift : 0u;
     const uint number = own != 0u ? own : layer.pointOptic;
     if (number == 0u) return colour;  // opaque: what is behind shows it
-    const Optic o = optics[number];
+    const Optic o = optics[own == kPixelBlends >> kPixelOpticsShift ? 0u : number];
     const PixelRay ray = pixelRayHere(pixel);
     Surface s;
     s.colour = colour;
@@ -23,7 +23,7 @@ vec3 glassColour(SurfaceWords words, vec3 colour, vec3 normal, uvec2 pixel) {
     s.metallic = float(words.material & 255u) / 255.0;
     s.roughness = float(words.material >> 8 & 255u) / 255.0;
     if (own == 0u && (words.material & kPixelMaterial) == 0u) s.roughness = layer.plainRoughness;
-    s.occlusion = float(words.material >> 16 & 255u) / 255.0;
+    s.occlusion = wordOcclusion(words.material);
     s.leaf = 0.0;
     s.dielectric = o.straightOn;
     const vec3 point = alongRay(ray, words.depth);

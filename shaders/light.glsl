@@ -42,7 +42,7 @@ vec3 litColour(SurfaceWords words, vec3 colour, vec3 normal, uvec2 pixel) {
     s.toEye = -normalize(rayDirection(ray));
     s.metallic = float(words.material & 255u) / 255.0;
     s.roughness = float(words.material >> 8 & 255u) / 255.0;
-    s.occlusion = float(words.material >> 16 & 255u) / 255.0;
+    s.occlusion = wordOcclusion(words.material);
     s.leaf = leaf;
     s.dielectric = vec3(kDielectric);
     vec3 lit = lightOf(s, alongRay(ray, words.depth));

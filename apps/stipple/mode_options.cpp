@@ -78,6 +78,11 @@ void ModeOptions::addTo(CLI::App& sub, bool hasReference) {
            "picture), object (bent twice; where that cannot be: screen)")
         ->check(oneOf({"environment", "screen", "object"}))
         ->capture_default_str();
+    sub.add_option("--opacity", opacity,
+                   "of everything: below 1 what is behind each body shows through it (0 to 1; materials that are "
+                   "transparent are, without it)")
+        ->check(CLI::Range(0.0, 1.0))
+        ->capture_default_str();
 }
 
 void ModeOptions::addNormaliseTo(CLI::App& sub) {
@@ -95,6 +100,7 @@ void ModeOptions::applyTo(render::FrameSettings& settings) const {
     settings.draw.refract = refract == "object"   ? shared::kRefractObject
                             : refract == "screen" ? shared::kRefractScreen
                                                   : shared::kRefractEnvironment;
+    settings.draw.opacity = static_cast<float>(opacity);
     settings.draw.perSurfel = normalise == "surfel";
     settings.draw.patchAs = patchAs == "samples"      ? lod::kPatchesAsSamples
                             : patchAs != "splats"     ? shared::kPatchStrips

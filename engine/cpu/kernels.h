@@ -268,6 +268,7 @@ struct SurfaceRow {
     alignas(64) float coverage[kTile];                        ///< only if hasCoverage
     bool hasTriangles, hasEmission, hasCoverage, hasMaterials;
     bool hasOcclusion;  ///< of points, too
+    bool hasOpacity;    ///< some pixels may be kPixelBlends
 };
 /// What of a surface is needed beyond whether there is one, and its colour.
 struct SurfaceWants {

@@ -60,7 +60,7 @@ struct LitSurfaces {
         s.toEye = vec3(-ray.x, -ray.y, -ray.z);
         s.metallic = float(int(word[i] & 255u)) * (1.0f / 255.0f);
         s.roughness = float(int(word[i] >> 8 & 255u)) * (1.0f / 255.0f);
-        s.occlusion = float(int(word[i] >> 16 & 255u)) * (1.0f / 255.0f);
+        s.occlusion = wordOcclusion(word[i]);
         s.leaf = leaf[i];
         s.dielectric = vec3(kDielectric, kDielectric, kDielectric);
         return s;

@@ -108,6 +108,21 @@ void applyMaterial(const MaterialRun& run, const Corners& c, const UvRow& uv, bo
         }
 }
 
+/// How opaque the run's pixels are, in the place of how much of what is around reaches them (kPixelBlends).
+void blendRun(const MaterialRun& run, const Corners& c, const UvRow& uv, const float* wb, const float* wc,
+              MaterialRow& __restrict s) {
+    const SurfaceMaterial& material = *run.material;
+    for (size_t i = run.first; i < run.first + run.n; ++i) {
+        const auto alphaOf = [&](size_t k) { return float(int(c.colour[k][i] >> 24)) * (1.0f / 255.0f); };
+        float alpha =
+            material.alpha * ((1.0f - wb[i] - wc[i]) * alphaOf(0) + wb[i] * alphaOf(1) + wc[i] * alphaOf(2)), texel = 1;
+        if (material.baseTexture.texture != 0 &&
+            sampleAlpha(*run.textures, material.baseTexture, uv.u[i], uv.v[i], uv.footprint[i], texel))
+            alpha *= texel;
+        s.occlusion[i] = alpha;
+    }
+}
+
 /// What is known of the pixels of a row that show triangles.
 struct TriangleRow {
     Corners corners;
@@ -206,9 +221,14 @@ struct RowRays {
         while (end < n && surface[end] == surface[first] &&
                in.meshBlocks[p.id[end] / kClusterTriangles].mesh == block.mesh)
             ++end;
-        applyMaterial({block.mesh, &in.materials[block.mesh->firstMaterial + (surface[first] & kSurfaceMaterialMask)],
-                       block.textures, surface[first], first, end - first},
-                      row.corners, row.uv, hasEmission, row.material);
+        const MaterialRun run{block.mesh,
+                              &in.materials[block.mesh->firstMaterial + (surface[first] & kSurfaceMaterialMask)],
+                              block.textures,
+                              surface[first],
+                              first,
+                              end - first};
+        applyMaterial(run, row.corners, row.uv, hasEmission, row.material);
+        if (run.material->optics == kPixelBlends) blendRun(run, row.corners, row.uv, row.wb, row.wc, row.material);
         first = end;
     }
 }

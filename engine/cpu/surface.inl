@@ -186,12 +186,15 @@ void outputRow(const FrameConstants& frame, const Tables& tables, uint32_t n, co
             green[i] = row.green[i];
             blue[i] = row.blue[i];
         }
-    if (row.hasCoverage)
+    const bool hasShare = row.hasCoverage || row.hasOpacity;
+    alignas(64) float share[kTile];
+    if (hasShare)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
-            red[i] = f.background.x + row.coverage[i] * (red[i] - f.background.x);
-            green[i] = f.background.y + row.coverage[i] * (green[i] - f.background.y);
-            blue[i] = f.background.z + row.coverage[i] * (blue[i] - f.background.z);
+            share[i] = (row.hasCoverage ? row.coverage[i] : 1.0f) * (row.hasOpacity ? wordOpacity(row.material[i]) : 1.0f);
+            red[i] = f.background.x + share[i] * (red[i] - f.background.x);
+            green[i] = f.background.y + share[i] * (green[i] - f.background.y);
+            blue[i] = f.background.z + share[i] * (blue[i] - f.background.z);
         }
         // max(0, v) of what is no number is 0: these index a table.
 #pragma GCC ivdep
@@ -211,12 +214,12 @@ void outputRow(const FrameConstants& frame, const Tables& tables, uint32_t n, co
         const uint32_t alpha = row.depth[i] > 0.0f ? 0xff000000u : 0u;
         rgba[i] = byteOf[ir[i]] | byteOf[ig[i]] << 8 | byteOf[ib[i]] << 16 | alpha;
     }
-    if (row.hasCoverage)
+    if (hasShare)
         for (size_t i = 0; i < n; ++i) {
-            const auto alpha = uint32_t(row.depth[i] > 0.0f ? row.coverage[i] * 255.0f + 0.5f : 0.0f);
+            const auto alpha = uint32_t(row.depth[i] > 0.0f ? share[i] * 255.0f + 0.5f : 0.0f);
             rgba[i] = (rgba[i] & 0xffffffu) | alpha << 24;
         }
-    // What rays meet: of a pixel that is hardly covered nothing.
+    // What rays meet: of a pixel that is hardly covered nothing. (What it shows through does not matter.)
     alignas(64) float met[kTile];
     for (size_t i = 0; i < n; ++i) met[i] = row.depth[i];
     if (row.hasCoverage)

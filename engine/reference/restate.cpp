@@ -389,12 +389,13 @@ class ReferenceBackend final : public render::DrawsAtOnce {
                             image.normal[i * 3 + static_cast<size_t>(c)] = static_cast<float>(world[c]);
                     }
                 }
-                const dvec3 colour = glm::mix(dvec3(f.background), seen.colour, s.coverage);
+                const double share = s.coverage * s.opacity;
+                const dvec3 colour = glm::mix(dvec3(f.background), seen.colour, share);
                 if (wantAll)
                     for (int c = 0; c < 3; ++c)
                         image.linear[i * 3 + static_cast<size_t>(c)] = static_cast<float>(colour[c]);
                 image.rgba[i] = encodeSrgb(colour.x) | encodeSrgb(colour.y) << 8 | encodeSrgb(colour.z) << 16 |
-                                (s.valid ? static_cast<uint32_t>(std::lround(255 * s.coverage)) << 24 : 0u);
+                                (s.valid ? static_cast<uint32_t>(std::lround(255 * share)) << 24 : 0u);
             }
         });
     }

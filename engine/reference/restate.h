@@ -30,7 +30,8 @@ struct Sample {
     bool isTriangle = false, isUnlit = false;
     bool isLitAsPoint = false;  ///< of a patch without material
     uint32_t optic = 0;         ///< which of a layer's optics
-    double metallic = 0, roughness = 1, occlusion = 1;
+    bool blends() const { return optic == 15; }
+    double metallic = 0, roughness = 1, occlusion = 1, opacity = 1;
     /// Of points: how much of what was merged has a material, which is of that part; else lit by one formula.
     double materialShare = 0;
     bool hasMaterial() const { return materialShare > 0.5; }

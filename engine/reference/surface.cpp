@@ -194,6 +194,7 @@ bool surfaceOn(const dvec3& ray, const dvec2& weights, double footprint, const C
     s.isTriangle = true;
     s.isUnlit = (surface & shared::kSurfaceUnlit) != 0;
     s.optic = m.optics >> 24;
+    if (s.blends()) s.opacity = std::clamp(m.alpha * own.w * (hasBase ? texel.w : 1), 0.0, 1.0);
     s.colour = dvec3(m.baseColour) * dvec3(own) * (hasBase ? dvec3(texel) : dvec3(1));
     const dvec2 finish = wa * c[0].finish + wb * c[1].finish + wc * c[2].finish;
     s.metallic = m.metallic * finish.x;
@@ -203,7 +204,7 @@ bool surfaceOn(const dvec3& ray, const dvec2& weights, double footprint, const C
         s.roughness *= texel.y;
         s.metallic *= texel.z;
     }
-    if (textures.sample(m.occlusionTexture, uv, footprint, texel))
+    if (!s.blends() && textures.sample(m.occlusionTexture, uv, footprint, texel))
         s.occlusion = 1 + m.occlusionStrength * (texel.x - 1);
     if (textures.sample(m.emissiveTexture, uv, footprint, texel)) s.emissive *= dvec3(texel);
     n = (surface & shared::kSurfaceFlat) != 0 ? face : wa * c[0].normal + wb * c[1].normal + wc * c[2].normal;

@@ -89,6 +89,7 @@ void clear(DrawList& out) {
     out.tables.clear();
     out.layer = nullptr;
     out.glass.reset();
+    out.hasBlending = false;
     out.bends.clear();
     out.swaying = 0;
     out.hasWideDiscs = out.hasSmoothDiscs = false;
@@ -280,6 +281,7 @@ void makeDrawList(const lod::Cut& cut, std::span<const lod::Hierarchy* const> hi
     out.hierarchies = hierarchies;
     out.instances = instances;
     out.onlyMaterial = settings.pointMaterial;
+    out.hasBlending = settings.isBlended;
     out.frame.hasMaterials = 0;
     const glm::dmat3 cameraFromWorld = glm::transpose(glm::dmat3(view.right, view.down, view.forward));
     const EffectSet requested = requestedEffects(out.effectsOfScene, settings);

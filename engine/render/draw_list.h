@@ -111,6 +111,7 @@ struct DrawList {
     std::span<const shared::SurfaceMaterial> materials;
     const LayerInput* layer = nullptr;         ///< of a layer of glass (layers.h), where this is one ...
     std::shared_ptr<const LayerTables> glass;  ///< ... and what its passes read
+    bool hasBlending = false;                  ///< some materials are kPixelBlends
     // What the fp32 numbers above were made from: the reference starts from these.
     lod::View view;          ///< orthographic: its eye stands before what is drawn ...
     double eyeAdvanced = 0;  ///< ... so far before the eye that was asked for
@@ -139,7 +140,10 @@ struct DrawSettings {
     /// Of all points, curves and meshes without materials; none: what their stores say.
     std::optional<lod::Optics> optics;
     uint32_t refract = shared::kRefractObject;  ///< how what is behind glass is found, where the body allows it
-    const LayerInput* layer = nullptr;          ///< set by the frame for each layer (layers.h)
+    const LayerInput* layer = nullptr;          ///< set by the frame for each layer of glass (layers.h)
+    bool isBlended = false;                     ///< set by the frame for each layer that what is behind shows through
+    bool transparency = true;                   ///< what is transparent is drawn so; else cut out where it is half
+    float opacity = 1;                          ///< of everything
     uint32_t debugView = shared::kDebugNone;
     glm::vec3 background = linearBackground();  ///< linear
     glm::dvec3 worldUp{0, 0, 1};

@@ -106,7 +106,7 @@ void fillLayer(const LayerInput& layer, const DrawList& out, LayerTables& t) {
     if (layer.back != nullptr) fillBack(layer, cameraFromWorld, view.eye, t);
 }
 
-void putLayer(const Image& layer, const glm::vec3& background, Image& behind) {
+void putLayer(const Image& layer, const glm::vec3& background, float opacity, Image& behind) {
     const auto byteOf = [](float linear) {
         const float l = linear > 0 ? std::min(linear, 1.0f) : 0.0f;
         return static_cast<uint32_t>(shared::srgbFromLinear(l) * 255.0f + 0.5f);
@@ -114,16 +114,19 @@ void putLayer(const Image& layer, const glm::vec3& background, Image& behind) {
     for (size_t i = 0; i < behind.rgba.size(); ++i) {
         const float depth = layer.depth[i];
         if (!(depth > 0) || (behind.depth[i] > 0 && behind.depth[i] <= depth)) continue;
-        const uint32_t alpha = layer.rgba[i] >> 24;
-        const float left = 1 - static_cast<float>(alpha) / 255;
+        const float covered = static_cast<float>(layer.rgba[i] >> 24), alpha = opacity * covered;
+        const float left = 1 - alpha / 255;
+        const bool isShown = alpha >= 127.5f;
         for (size_t k = 0; k < 3; ++k) {
+            // The layer's colour has its share of the background in it.
+            const float own = layer.linear[3 * i + k] - (1 - covered / 255) * background[static_cast<int>(k)];
             float& c = behind.linear[3 * i + k];
-            c = layer.linear[3 * i + k] + left * (c - background[static_cast<int>(k)]);
-            behind.normal[3 * i + k] = layer.normal[3 * i + k];
+            c = opacity * own + left * c;
+            if (isShown) behind.normal[3 * i + k] = layer.normal[3 * i + k];
         }
-        behind.depth[i] = depth;
+        if (isShown) behind.depth[i] = depth;
         const float under = static_cast<float>(behind.rgba[i] >> 24);
-        const auto cover = static_cast<uint32_t>(static_cast<float>(alpha) + left * under + 0.5f);
+        const auto cover = static_cast<uint32_t>(alpha + left * under + 0.5f);
         behind.rgba[i] = alpha == 255 ? layer.rgba[i]
                                       : byteOf(behind.linear[3 * i]) | byteOf(behind.linear[3 * i + 1]) << 8 |
                                             byteOf(behind.linear[3 * i + 2]) << 16 | cover << 24;

@@ -17,11 +17,12 @@ LayeredFrame* appearanceOf(FrameState& state, const DrawSettings& draw) {
         return !d.optics.empty() || (!d.pointMaterials.empty() && !d.pointMaterials.front().optics.isPlain());
     };
     if (!state.layered) {
-        if (!isGiven && std::none_of(state.stores.begin(), state.stores.end(), hasOptics)) return nullptr;
+        if (!isGiven && draw.opacity == 1 && std::none_of(state.stores.begin(), state.stores.end(), hasOptics)) return nullptr;
         state.layered = std::make_shared<LayeredFrame>();
     }
     Appearance& a = state.layered->appearance;
-    if (a.hierarchies.size() != state.stores.size() || a.pointMaterial != draw.pointMaterial || a.given != draw.optics)
+    if (a.hierarchies.size() != state.stores.size() || a.pointMaterial != draw.pointMaterial || a.given != draw.optics ||
+        a.transparency != draw.transparency || a.opacity != draw.opacity)
         a = makeAppearance(state.stores, state.materials, draw);
     return state.layered.get();
 }
@@ -165,7 +166,7 @@ Result<uint64_t> drawLayered(FrameState& state, const lod::View& view, const Fra
         const bool isDrawnLater = std::any_of(layers.begin(), layers.end(), [&](const LayerDraw& layer) {
             return std::binary_search(layer.instances.begin(), layer.instances.end(), i);
         });
-        return !(isDrawnLater && (o.isWhole || o.isPlainMesh || o.points != 0));
+        return !(isDrawnLater && (o.opacity < 1 || (o.isGlass && (o.isWhole || o.isPlainMesh || o.points != 0))));
     });
     state.draws.materials = l.appearance.cutOut;
     STIPPLE_ASSIGN(uint64_t passes, drawNodes(state, l.cut, view, plain));
@@ -181,15 +182,16 @@ Result<uint64_t> drawLayered(FrameState& state, const lod::View& view, const Fra
             std::swap(state.image, l.back);
             in.back = &l.back;
         }
-        if (layer.transmits && in.way != shared::kRefractEnvironment) in.behind = &l.behind;
+        if (layer.transmits && layer.isGlass && in.way != shared::kRefractEnvironment) in.behind = &l.behind;
         takeNodes(state.cut, l.cut,
                   [&](uint32_t i) { return std::binary_search(layer.instances.begin(), layer.instances.end(), i); });
         FrameSettings lit = plain;
-        lit.draw.layer = &in;
+        if (layer.isGlass) lit.draw.layer = &in;
+        lit.draw.isBlended = layer.blends;
         const NoLayerAfter noLayerAfter(state.draws);
         STIPPLE_ASSIGN(const uint64_t more, drawNodes(state, l.cut, view, lit));
         passes += more;
-        putLayer(state.image, settings.draw.background, l.behind);
+        putLayer(state.image, settings.draw.background, layer.opacity, l.behind);
     }
     std::swap(state.image, l.behind);
     if (hasTone) toneImage(settings.draw, state.image);

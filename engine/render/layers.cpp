@@ -19,7 +19,12 @@ class OpticsList {
     OpticsList() : list_(1) {}
     uint32_t numberOf(const lod::Optics& o) {
         if (o.isPlain()) return 0;
-        const auto known = std::find(list_.begin() + 1, list_.end(), o);
+        const auto isThat = [&](lod::Optics other) {
+            other.blends = o.blends;
+            other.opacity = o.opacity;
+            return other == o;
+        };
+        const auto known = std::find_if(list_.begin() + 1, list_.end(), isThat);
         if (known != list_.end()) return static_cast<uint32_t>(known - list_.begin());
         if (list_.size() <= shared::kMostOptics) {
             list_.push_back(o);
@@ -48,10 +53,20 @@ lod::Optics opticsOfPoints(const lod::StoreDescription& d) {
 }
 
 void addTo(OpticsOf& of, const lod::Optics& o, uint32_t number) {
-    of.hasAny = of.hasAny || number != 0;
+    of.isGlass = of.isGlass || number != 0;
+    of.blends = of.blends || o.blends;
+    of.hasAny = of.isGlass || of.blends;
     of.transmits = of.transmits || (number != 0 && o.transmission > 0);
-    of.isWhole = of.isWhole && number != 0 && o.transmission > 0;
+    of.isWhole = of.isWhole && number != 0 && o.transmission > 0 && !o.blends;
     of.isSolid = of.isSolid && o.thickness != 0;
+}
+
+/// With what is said of everything.
+OpticsOf shownThrough(OpticsOf of, const DrawSettings& settings) {
+    of.opacity *= settings.opacity;
+    of.blends = of.blends || of.opacity < 1;
+    of.hasAny = of.hasAny || of.blends;
+    return of;
 }
 
 OpticsOf appearanceOf(const lod::Store& store, const DrawSettings& settings, OpticsList& list,
@@ -60,10 +75,12 @@ OpticsOf appearanceOf(const lod::Store& store, const DrawSettings& settings, Opt
     OpticsOf of;
     of.isWhole = of.isSolid = true;
     if (materials.empty()) {
-        const lod::Optics o = settings.optics.value_or(opticsOfPoints(d));
+        lod::Optics o = settings.optics.value_or(opticsOfPoints(d));
+        o.blends = o.blends && settings.transparency;
+        if (o.blends) of.opacity = o.opacity;
         of.points = list.numberOf(o);
         addTo(of, o, of.points);
-        return of;
+        return shownThrough(of, settings);
     }
     of.isPlainMesh = isPlainMesh(d);
     for (size_t m = 0; m < materials.size(); ++m) {
@@ -73,11 +90,13 @@ OpticsOf appearanceOf(const lod::Store& store, const DrawSettings& settings, Opt
             materials[m].roughness = static_cast<float>(*settings.pointMaterial >> 8 & 255u) / 255;
             o = settings.optics.value_or(o);
         }
+        if (o.blends && !settings.transparency) materials[m].alphaCutoff = 0.5f;
+        o.blends = o.blends && settings.transparency;
         const uint32_t number = list.numberOf(o);
-        materials[m].optics = number << shared::kPixelOpticsShift;
-        addTo(of, o, number);
+        materials[m].optics = o.blends ? shared::kPixelBlends : number << shared::kPixelOpticsShift;
+        addTo(of, o, o.blends ? 0 : number);
     }
-    return of;
+    return shownThrough(of, settings);
 }
 
 }  // namespace
@@ -87,6 +106,8 @@ Appearance makeAppearance(std::span<const std::shared_ptr<const lod::Store>> sto
     Appearance a;
     a.pointMaterial = settings.pointMaterial;
     a.given = settings.optics;
+    a.transparency = settings.transparency;
+    a.opacity = settings.opacity;
     a.shown = materials;
     OpticsList list;
     size_t first = 0;
@@ -100,7 +121,10 @@ Appearance makeAppearance(std::span<const std::shared_ptr<const lod::Store>> sto
     if (!a.hasLayers) return a;
     a.cutOut = a.shown;
     for (shared::SurfaceMaterial& m : a.cutOut)
-        if (m.optics != 0) m.alphaCutoff = std::numeric_limits<float>::infinity();
+        if (m.optics != 0)
+            m.alphaCutoff = m.optics == shared::kPixelBlends ? kOpaque : std::numeric_limits<float>::infinity();
+    for (shared::SurfaceMaterial& m : a.shown)
+        if (m.optics == shared::kPixelBlends) m.alphaCutoff = kLeastOpacity;
     return a;
 }
 
@@ -118,9 +142,10 @@ std::vector<LayerDraw> layersOf(const lod::Cut& cut, std::span<const lod::Instan
                                 std::span<const std::shared_ptr<const lod::Store>> stores, const Appearance& appearance,
                                 const lod::View& view, const DrawSettings& settings) {
     std::vector<uint32_t> drawn;
+    // Glass needs light; what is only transparent does not.
     const auto add = [&](uint32_t i, bool isLit) {
-        if (isLit && appearance.hierarchies[instances[i].hierarchy].hasAny && (drawn.empty() || drawn.back() != i))
-            drawn.push_back(i);
+        const OpticsOf& of = appearance.hierarchies[instances[i].hierarchy];
+        if ((of.blends || (isLit && of.isGlass)) && (drawn.empty() || drawn.back() != i)) drawn.push_back(i);
     };
     for (const lod::CutDraw& d : cut.draw) add(d.instance, settings.lit);
     for (const lod::CutMeshDraw& d : cut.meshDraw) add(d.instance, !settings.unlitTriangles);
@@ -129,10 +154,14 @@ std::vector<LayerDraw> layersOf(const lod::Cut& cut, std::span<const lod::Instan
     // What is told of points is told of all of a layer: theirs is another than that of the rest.
     std::array<LayerDraw, 2> opaque;
     const auto isOfPoints = [&](uint32_t i) { return appearance.hierarchies[instances[i].hierarchy].points != 0; };
+    const auto isLit = [&](uint32_t i) {
+        const bool isMesh = stores[instances[i].hierarchy]->hierarchy.isMesh();
+        return isMesh ? !settings.unlitTriangles : settings.lit;
+    };
     std::vector<LayerDraw> bodies;
     for (const uint32_t i : drawn) {
         const OpticsOf& of = appearance.hierarchies[instances[i].hierarchy];
-        if (!of.transmits) {
+        if (!of.transmits && !of.blends) {
             opaque.at(isOfPoints(i) ? 1 : 0).instances.push_back(i);
             continue;
         }
@@ -140,7 +169,10 @@ std::vector<LayerDraw> layersOf(const lod::Cut& cut, std::span<const lod::Instan
         const glm::dvec3 to = body.centre - view.eye;
         LayerDraw layer;
         layer.instances = {i};
-        layer.isSeenTwice = settings.refract == shared::kRefractObject && of.isWhole && of.isSolid;
+        layer.blends = of.blends;
+        layer.isGlass = of.isGlass && isLit(i);
+        layer.opacity = of.opacity;
+        layer.isSeenTwice = layer.isGlass && settings.refract == shared::kRefractObject && of.isWhole && of.isSolid;
         layer.distance = view.isOrthographic ? glm::dot(to, view.forward) : glm::length(to);
         bodies.push_back(std::move(layer));
     }
@@ -149,14 +181,20 @@ std::vector<LayerDraw> layersOf(const lod::Cut& cut, std::span<const lod::Instan
     std::array<LayerDraw, 2> far;
     if (bodies.size() > kMostBodies) {  // the farthest are one
         const auto nearest = bodies.end() - static_cast<ptrdiff_t>(kMostBodies - 1);
-        for (auto body = bodies.begin(); body != nearest; ++body)
-            far.at(isOfPoints(body->instances.front()) ? 1 : 0).instances.push_back(body->instances.front());
+        for (auto body = bodies.begin(); body != nearest; ++body) {
+            LayerDraw& of = far.at(isOfPoints(body->instances.front()) ? 1 : 0);
+            of.instances.push_back(body->instances.front());
+            of.blends = of.blends || body->blends;
+            of.isGlass = of.isGlass || body->isGlass;
+            of.opacity = body->opacity;  // the nearest's
+        }
         bodies.erase(bodies.begin(), nearest);
     }
     std::vector<LayerDraw> all;
     for (std::array<LayerDraw, 2>* const of : {&opaque, &far})
         for (LayerDraw& layer : *of) {
             layer.transmits = of == &far;
+            layer.isGlass = layer.isGlass || of == &opaque;
             std::sort(layer.instances.begin(), layer.instances.end());
             if (!layer.instances.empty()) all.push_back(std::move(layer));
         }

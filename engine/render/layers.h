@@ -1,6 +1,11 @@
-// Glass, and what else reflects more or less than most, is drawn after all else, body by body, the farthest first:
+// Glass, what is transparent, and what else reflects more or less than most, is drawn after all else, body by body, the
+// farthest first:
 //
 //     what is opaque -> picture 0 -> body 1, through which picture 0 is seen -> picture 1 -> body 2 ... -> picture n
+//
+// Of what is transparent (Optics::blends, --opacity) a layer is a picture of its own, put over the one behind by its
+// alpha: coverage times opacity. What of it is opaque (kOpaque) is drawn with all else, and hides what of the same body
+// is behind it; of the rest the nearest is seen.
 //
 // Each is an ordinary frame of the backend, of those nodes of the cut that are of it, in the mode of the frame; a body
 // that is seen through twice (kRefractObject) is drawn once more from behind, in parallel rays. A scene without such
@@ -59,12 +64,17 @@ struct OpticsOf {
     bool isSolid = false;      ///< none of them is a thin wall
     bool isPlainMesh = false;  ///< has no material of its own
     uint32_t points = 0;       ///< of its points and curves: which of Appearance::optics
+    bool blends = false;       ///< what is behind some of it shows through ...
+    float opacity = 1;         ///< ... and as far through all of it
+    bool isGlass = false;      ///< some of it is of Appearance::optics
 };
 
 /// The materials of all stores of a scene as a frame shows them.
 struct Appearance {
     std::optional<uint32_t> pointMaterial;  ///< these two are what it was made of
     std::optional<lod::Optics> given;
+    bool transparency = true;
+    float opacity = 1;
     std::vector<shared::SurfaceMaterial> shown, cutOut;  ///< the second without those of layers
     std::vector<lod::Optics> optics;                     ///< kMostOptics different ones at most, behind a plain one
     std::vector<OpticsOf> hierarchies;
@@ -87,8 +97,12 @@ struct LayerDraw {
     std::vector<uint32_t> instances;  ///< ascending; one, unless there are too many; points and others never together
     bool isSeenTwice = false;         ///< by kRefractObject
     bool transmits = true;            ///< light goes through some of it
+    bool blends = false, isGlass = false;
+    float opacity = 1;  ///< of all of it
     double distance = 0;
 };
+/// Shares of opacity from which on something is opaque, and below which it is not there.
+inline constexpr float kOpaque = 511.0f / 512, kLeastOpacity = 0.5f / 255;
 inline constexpr size_t kMostBodies = 8;  ///< nearer ones; those beyond are one layer, and one of points
 /// What of a cut is drawn in layers, the farthest first; what only reflects otherwise than most is the first of them.
 std::vector<LayerDraw> layersOf(const lod::Cut& cut, std::span<const lod::Instance> instances,
@@ -98,9 +112,10 @@ std::vector<LayerDraw> layersOf(const lod::Cut& cut, std::span<const lod::Instan
 /// A view from behind, away from the eye, that holds the whole body at about as many pixels as `view` has of it.
 lod::View viewFromBehind(const Body& body, const lod::View& view);
 
-/// The layer over the picture of what is behind it, into `behind`: the layer's coverage counts. Where both are there
-/// the nearer is seen. `background`: linear, of both.
-void putLayer(const Image& layer, const glm::vec3& background, Image& behind);
+/// The layer over the picture of what is behind it, into `behind`: the layer's coverage counts, times `opacity`. Where
+/// both are there the nearer is seen; depth and normal stay those behind where less than half of the layer is seen.
+/// `background`: linear, of both.
+void putLayer(const Image& layer, const glm::vec3& background, float opacity, Image& behind);
 
 /// White, rough, without textures: a mesh that says nothing of its material.
 bool isPlainMesh(const lod::StoreDescription& description);

@@ -52,6 +52,18 @@ uint32_t surfaceOf(const Scene& scene, const Primitive& p) {
     return surface;
 }
 
+bool isClear(const glm::vec4& colour) { return colour.a < 1; }
+
+/// Could factor or texture let something through? (JPEG has no alpha.)
+bool mayBeClear(const Scene& scene, const Material& m) {
+    if (m.baseColour.a < 1) return true;
+    const int texture = m.baseColourTexture.texture;
+    const int image = texture < 0 ? -1 : scene.textures[static_cast<size_t>(texture)].image;
+    if (image < 0) return false;
+    const std::vector<uint8_t>& bytes = scene.images[static_cast<size_t>(image)].bytes;
+    return bytes.size() < 2 || bytes[0] != 0xff || bytes[1] != 0xd8;
+}
+
 uint32_t packedColour(const glm::vec4& c) {
     const auto byte = [](float linear) {
         return unitToByte(shared::srgbFromLinear(linear > 0.0f ? std::min(linear, 1.0f) : 0.0f));
@@ -210,11 +222,21 @@ std::vector<shared::SurfaceMaterial> surfaceMaterials(const Scene& scene) {
 }
 
 std::vector<lod::Optics> surfaceOptics(const Scene& scene, const std::vector<Placement>& placed) {
-    std::vector<bool> isUsed(scene.materials.size() + 1);
+    std::vector<bool> isUsed(scene.materials.size() + 1), hasAlpha(scene.materials.size() + 1);
     for (const Placement& at : placed)
-        for (const Primitive& p : scene.meshes[static_cast<size_t>(at.mesh)].primitives)
-            if (p.kind == PrimitiveKind::triangles) isUsed[materialIndex(scene, p)] = true;
-    const auto of = [&](size_t m) { return m < scene.materials.size() ? scene.materials[m].optics : lod::Optics{}; };
+        for (const Primitive& p : scene.meshes[static_cast<size_t>(at.mesh)].primitives) {
+            if (p.kind != PrimitiveKind::triangles) continue;
+            const uint32_t m = materialIndex(scene, p);
+            isUsed[m] = true;
+            hasAlpha[m] = hasAlpha[m] || std::any_of(p.colour.begin(), p.colour.end(), isClear);
+        }
+    // What is opaque all over is drawn as such, whatever its material says.
+    const auto of = [&](size_t m) {
+        if (m >= scene.materials.size()) return lod::Optics{};
+        lod::Optics o = scene.materials[m].optics;
+        o.blends = o.blends && (hasAlpha[m] || mayBeClear(scene, scene.materials[m]));
+        return o;
+    };
     const auto first = static_cast<size_t>(std::find(isUsed.begin(), isUsed.end(), true) - isUsed.begin());
     std::vector<lod::Optics> out;
     bool isPlain = true;

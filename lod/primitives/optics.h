@@ -17,13 +17,18 @@ struct Optics {
     glm::vec3 attenuationColour{1};
     float specular = 1;  ///< factor of what dielectrics reflect
     glm::vec3 specularColour{1};
+    /// What is behind shows through as far as alpha says (glTF BLEND): of triangles that of material, vertices and
+    /// texture, of all else `opacity`.
+    bool blends = false;
+    float opacity = 1;
 
     bool operator==(const Optics&) const = default;
     /// The thickness of a solid body that says none: minus the shortest edge of its box.
     static constexpr float kOfItsSize = -1;
     /// What a dielectric reflects straight on: ((n - 1) / (n + 1))^2, coloured.
     glm::vec3 straightOn() const;
-    /// Nothing goes through, and it reflects as every surface without optics (0.04) does, but for 0.01.
+    /// Nothing goes through, and it reflects as every surface without optics (0.04) does, but for 0.01. (Blending is
+    /// apart.)
     bool isPlain() const;
     /// Is every number possible?
     bool isPossible() const;

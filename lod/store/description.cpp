@@ -48,13 +48,15 @@ shared::TextureSlot slotFromJson(const json& j) {
 }
 
 json opticsToJson(const Optics& o) {
-    return {{"transmission", o.transmission},
+    json out = {{"transmission", o.transmission},
             {"ior", o.ior},
             {"thickness", o.thickness},
             {"attenuation_distance", o.attenuationDistance},
             {"attenuation_colour", toJson(o.attenuationColour)},
             {"specular", o.specular},
             {"specular_colour", toJson(o.specularColour)}};
+    if (o.blends) out["blends"] = o.opacity;
+    return out;
 }
 
 Optics opticsFromJson(const json& j) {
@@ -66,6 +68,8 @@ Optics opticsFromJson(const json& j) {
     o.attenuationColour = vectorFromJson(j.at("attenuation_colour"));
     o.specular = real(j.at("specular"));
     o.specularColour = vectorFromJson(j.at("specular_colour"));
+    o.blends = j.contains("blends");
+    if (o.blends) o.opacity = real(j.at("blends"));
     if (!o.isPossible()) throw std::runtime_error("optics of a material are not possible");
     return o;
 }

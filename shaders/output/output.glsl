@@ -73,16 +73,15 @@ void main() {
     const uint kind = valid && stepInfo.hasFiltered != 0u ? coverage[at] >> kSecondShift : kSecondNone;
     if (kind != kSecondNone) mixSecond(kind, secondOfSums(sums[at]), pixel, s, colour, n);
     if (valid) colour = arriving(colour, s.depth, pixel);
-    if (valid && stepInfo.hasFiltered != 0u) {
-        share = float(coverage[at] & 255u) / 255.0;
-        colour = frame.background + share * (colour - frame.background);
-    }
+    if (valid && stepInfo.hasFiltered != 0u) share = float(coverage[at] & 255u) / 255.0;
+    // What rays meet: of a pixel that is hardly covered nothing. (What it shows through does not matter.)
+    const bool isMet = valid && share >= kLeastShown;
+    share *= wordOpacity(s.material);
+    if (valid && (share < 1.0 || stepInfo.hasFiltered != 0u)) colour = frame.background + share * (colour - frame.background);
     const vec3 c = clamp(colour, 0.0, 1.0);
     const uvec3 bytes = uvec3(vec3(srgbFromLinear(c.x), srgbFromLinear(c.y), srgbFromLinear(c.z)) * 255.0 + 0.5);
     image[at] = bytes.x | bytes.y << 8 | bytes.z << 16 | uint(share * 255.0 + 0.5) << 24;
     if (stepInfo.wantExtra == 0u) return;
-    // What rays meet: of a pixel that is hardly covered nothing.
-    const bool isMet = valid && share >= kLeastShown;
     const vec3 world = isMet ? frame.viewX * n.x + frame.viewY * n.y + frame.viewZ * n.z : vec3(0.0);
     extra[7u * at] = isMet ? s.depth : 0.0;
     extra[7u * at + 1u] = world.x;

@@ -19,6 +19,7 @@
 #ifndef STIPPLE_SHARED_OCCLUSION_H
 #define STIPPLE_SHARED_OCCLUSION_H
 #include "lens.h"
+#include "surface.h"
 SHARED_BEGIN
 
 struct OcclusionConstants {
@@ -148,6 +149,7 @@ SHARED_FN float aoWeight(Lens lens, float ownDepth, float depth, float off, floa
 // The word of a surface (surface.h) that so much of the light gets to.
 SHARED_FN uint aoMaterial(uint word, float open) {
     const float own = float(int(word >> 16 & 255u));
+    if ((word & kPixelBlends) == kPixelBlends) return word;
     return (word & 0xff00ffffu) | uint(int(own * open + 0.5f)) << 16;
 }
 // Of the mean: what is at both ends is of the same place of the pattern.

@@ -19,7 +19,7 @@ const uint kRefractEnvironment = 0u;
 const uint kRefractScreen = 1u;
 const uint kRefractObject = 2u;
 
-const uint kMostOptics = 15u;  // of a frame, counted from 1 (kPixelOptics); number 0 is what has none
+const uint kMostOptics = 14u;  // of a frame, counted from 1 (kPixelOptics); number 0 is what has none, 15 kPixelBlends
 const uint kBehindLevels = 16u;
 const uint kMarchSteps = 16u;  // through the body, and then so many halvings
 const uint kMarchHalvings = 4u;

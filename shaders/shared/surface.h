@@ -17,6 +17,7 @@ const uint kPixelLeaf = 0x20000000u;      // lets light through
 const uint kPixelMaterial = 0x10000000u;  // of points that have a material: lit as triangles are
 const uint kPixelOptics = 0x0f000000u;    // of triangles: which of the layer's optics (optics.h); 0: none
 const uint kPixelOpticsShift = 24u;
+const uint kPixelBlends = 0x0f000000u;   // the last of them: its occlusion is how opaque it is
 const uint kPlainSurface = 0x00ffff00u;  // what points are: not metallic, rough, not occluded
 
 // The material word of what splats were merged to: plain where most of it is.
@@ -25,6 +26,15 @@ SHARED_FN uint surfaceWord(TexelSurface s) {
     const uint metallic = uint(int(min(max(0.0f, s.metallic * inverse), 255.0f) + 0.5f));
     const uint roughness = uint(int(min(max(0.0f, s.roughness * inverse), 255.0f) + 0.5f));
     return s.share > 0.5f ? kPixelMaterial | 0x00ff0000u | metallic | roughness << 8 : kPlainSurface;
+}
+
+// How much of what is around a surface reaches it ...
+SHARED_FN float wordOcclusion(uint word) {
+    return (word & kPixelBlends) == kPixelBlends ? 1.0f : float(int(word >> 16 & 255u)) * (1.0f / 255.0f);
+}
+// ... and how much of what is behind it it hides.
+SHARED_FN float wordOpacity(uint word) {
+    return (word & kPixelBlends) == kPixelBlends ? float(int(word >> 16 & 255u)) * (1.0f / 255.0f) : 1.0f;
 }
 
 // The nearest code of a unit vector: see octDirection.

@@ -44,6 +44,7 @@ void main() {
     float metallic = material.metallic;
     float roughness = material.roughness;
     float occlusion = 1.0;
+    float opacity = material.alpha * (a * float(va.colour >> 24) + w.x * float(vb.colour >> 24) + w.y * float(vc.colour >> 24)) / 255.0;
     colour *= a * decodeTexel(va.colour, true).xyz + w.x * decodeTexel(vb.colour, true).xyz + w.y * decodeTexel(vc.colour, true).xyz;
     if ((va.surface & kSurfaceTextured) != 0u) {
         const vec2 uv = vec2(a * va.u + w.x * vb.u + w.y * vc.u, a * va.v + w.x * vb.v + w.y * vc.v);
@@ -51,7 +52,10 @@ void main() {
         const vec2 d2 = vec2(vc.u - va.u, vc.v - va.v);
         const float footprint = uvFootprint(pixelsRay, 1.0 / frame.focal, p0, e1, e2, d1, d2);
         vec4 s;
-        if (sampleTexture(c, material.baseTexture, uv, footprint, s)) colour *= s.xyz;
+        if (sampleTexture(c, material.baseTexture, uv, footprint, s)) {
+            colour *= s.xyz;
+            opacity *= s.w;
+        }
         if (sampleTexture(c, material.surfaceTexture, uv, footprint, s)) {
             roughness *= s.y;
             metallic *= s.z;
@@ -61,6 +65,7 @@ void main() {
         if (sampleTexture(c, material.normalTexture, uv, footprint, s))
             normal = bumpedNormal(normal, e1, e2, d1, d2, vec3((2.0 * s.xy - 1.0) * material.normalScale, 2.0 * s.z - 1.0));
     }
+    if (material.optics == kPixelBlends) occlusion = opacity;
     normal = surfaceNormal(normal, face, ray);
     Texel t;
     t.depth = keyDepth(key);

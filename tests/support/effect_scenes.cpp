@@ -81,7 +81,9 @@ bool addUselessly(const std::string& name, render::DrawSettings& s) {
 std::vector<size_t> listedEffects() {
     std::vector<size_t> out;
     for (size_t e = 0; e < render::effects().size(); ++e)
-        if (std::string("refraction") != render::effects()[e]->name) out.push_back(e);
+        if (std::string("refraction") != render::effects()[e]->name &&
+            std::string("transparency") != render::effects()[e]->name)
+            out.push_back(e);
     return out;
 }
 

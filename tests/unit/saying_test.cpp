@@ -99,7 +99,7 @@ TEST(Transparency, ThatIsNotDrawnIsSaidOnceAFile) {
     auto gltf = nlohmann::json::parse(test::slurp(folder / "r.gltf"));
     for (const char* input : {"info r.gltf", "render r.gltf -o r.png --size 64x48"})
         EXPECT_FALSE(says(runProgram(folder, input).out + runProgram(folder, input).err, "BLEND")) << input;
-    for (auto& m : gltf["materials"]) m["alphaMode"] = "BLEND";
+    for (auto& m : gltf["materials"]) m["alphaMode"] = "BLEND";  // (opaque all over, but that is not seen here)
     test::spit(folder / "r.gltf", gltf.dump());
     for (const char* input : {"info r.gltf", "render r.gltf -o r.png --size 64x48",
                               "render r.gltf -o r.png --size 64x48", "build r.gltf -o r.stipple"}) {

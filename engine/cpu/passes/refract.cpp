@@ -35,7 +35,7 @@ struct GlassRow {
         const uint32_t own = isTriangle ? (word & kPixelOptics) >> kPixelOpticsShift : 0u;
         const uint32_t number = own != 0 ? own : tables.constants.pointOptic;
         if (number == 0) return;  // opaque: what is behind shows it
-        const Optic o = tables.optics[number];
+        const Optic o = tables.optics[own == kPixelBlends >> kPixelOpticsShift ? 0u : number];
         Surface s;
         s.colour = vec3(row.red[i], row.green[i], row.blue[i]);
         s.normal = vec3(row.nx[i], row.ny[i], row.nz[i]);
@@ -44,7 +44,7 @@ struct GlassRow {
         s.metallic = float(int(word & 255u)) * (1.0f / 255.0f);
         s.roughness = float(int(word >> 8 & 255u)) * (1.0f / 255.0f);
         if (own == 0 && (word & kPixelMaterial) == 0) s.roughness = tables.constants.plainRoughness;
-        s.occlusion = float(int(word >> 16 & 255u)) * (1.0f / 255.0f);
+        s.occlusion = wordOcclusion(word);
         s.leaf = 0;
         s.dielectric = o.straightOn;
         const vec3 point = alongRay(ray, row.depth[i]);

@@ -273,6 +273,7 @@ constinit const CpuPass outputPass{
                 },
             .run =
                 [](const RowPlace& at, SurfaceRow& row) {
+                    row.hasOpacity = at.frame.draws->hasBlending;
                     at.frame.k.outputRow(at.frame.constants, at.frame.tables, at.n, row, outputAt(at.frame, at.first));
                 }}};
 

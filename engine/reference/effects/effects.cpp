@@ -7,6 +7,8 @@
 
 namespace stipple::reference {
 
+/// How opaque what a pixel shows is, surface.cpp says.
+constinit const RestatedEffect transparencyRestated{};
 /// Both are what surface.cpp has of light.
 constinit const RestatedEffect lightRestated{};
 constinit const RestatedEffect environmentRestated{};

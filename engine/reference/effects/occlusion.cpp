@@ -171,7 +171,8 @@ class Occlusion {
 void onSurface(const render::DrawList& draws, Level& level) {
     const Occlusion occlusion(draws, level);
     for (int y = 0; y < level.height; ++y)
-        for (int x = 0; x < level.width; ++x) level.ref(x, y).occlusion *= occlusion.at(level, x, y);
+        for (int x = 0; x < level.width; ++x)
+            if (Sample& s = level.ref(x, y); !s.blends()) s.occlusion *= occlusion.at(level, x, y);
 }
 
 }  // namespace

@@ -72,7 +72,7 @@ class Glass {
     }
 
     dvec3 shade(const Sample& s, const dvec3& n, const dvec3& point) const {
-        const render::WorldOptic& o = layer_.optics.at(s.optic != 0 ? s.optic : layer_.pointOptic);
+        const render::WorldOptic& o = layer_.optics.at(s.blends() ? 0 : s.optic != 0 ? s.optic : layer_.pointOptic);
         const shared::FrameConstants& f = draws_.frame;
         const double rough = s.optic == 0 && !s.hasMaterial() ? layer_.plainRoughness : s.roughness;
         const dvec3 d = sightOf(view_, point);

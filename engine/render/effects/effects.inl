@@ -7,6 +7,7 @@
 STIPPLE_EFFECT(light)
 STIPPLE_EFFECT(environment)
 STIPPLE_EFFECT(refraction)
+STIPPLE_EFFECT(transparency)
 #ifndef STIPPLE_ONLY_LIGHT
 STIPPLE_EFFECT(wind)
 STIPPLE_EFFECT(occlusion)

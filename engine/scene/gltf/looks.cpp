@@ -95,6 +95,7 @@ void readMaterials(const json& root, Scene& scene) {
         m.isDoubleSided = j.value("doubleSided", false);
         m.isUnlit = extensionOf(j, "KHR_materials_unlit").is_object();
         m.optics = opticsOf(j);
+        m.optics.blends = m.alphaMode == AlphaMode::blend;
         scene.materials.push_back(std::move(m));
     }
     noteOpticalTextures(root, scene);
@@ -102,8 +103,8 @@ void readMaterials(const json& root, Scene& scene) {
                                        [](const Material& m) { return m.alphaMode == AlphaMode::blend; });
     if (blended > 0)
         scene.notes.push_back(fmt::format(
-            "{} of {} materials {} transparent (alphaMode BLEND), which is not drawn: what covers less than "
-            "half is left out, all else is opaque",
+            "{} of {} materials {} transparent (alphaMode BLEND): of each body the nearest surface of them is seen, over "
+            "what is behind the body",
             blended, scene.materials.size(), blended == 1 ? "is" : "are"));
 }
 

@@ -274,7 +274,7 @@ class MeshBuild : public CellContent {
         writeTables(groups_, facts_.lattice, hierarchy);
         groups_ = {};
         STIPPLE_TRY(writeTextures(settings_.textures,
-                                  cutoffsOf(settings_.description.materials, settings_.textures.size()), writer,
+                                  cutoffsOf(settings_.description, settings_.textures.size()), writer,
                                   hierarchy, executor_));
         for (const auto& [reason, count] :
              {std::pair{"degenerate triangles", facts_.degenerate},

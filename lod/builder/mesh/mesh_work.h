@@ -158,7 +158,7 @@ double measureDeviation(const WeldedMesh& mesh, const LocalMesh& local, const st
                         double unimportant, bool isBorderKept);
 
 /// Of each texture the alpha below which materials do not show it; 0: they show all of it.
-std::vector<float> cutoffsOf(const std::vector<shared::SurfaceMaterial>& materials, size_t textures);
+std::vector<float> cutoffsOf(const StoreDescription& description, size_t textures);
 /// Writes all levels of all textures and fills the tables of `h`. Of what has a cutoff all levels show the same share.
 Result<void> writeTextures(const std::vector<TextureImage>& images, const std::vector<float>& cutoffs,
                            StoreWriter& writer, Hierarchy& h, Executor& executor);

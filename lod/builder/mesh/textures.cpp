@@ -102,9 +102,11 @@ uint32_t wrapped(int64_t i, uint32_t size, uint32_t wrap) {
 
 }  // namespace
 
-std::vector<float> cutoffsOf(const std::vector<shared::SurfaceMaterial>& materials, size_t textures) {
+std::vector<float> cutoffsOf(const StoreDescription& description, size_t textures) {
     std::vector<float> cutoffs(textures, 0);
-    for (const shared::SurfaceMaterial& m : materials) {
+    for (size_t i = 0; i < description.materials.size(); ++i) {
+        const shared::SurfaceMaterial& m = description.materials[i];
+        if (!description.optics.empty() && description.optics[i].blends) continue;  // a mean of alpha is right
         const uint32_t texture = m.baseTexture.texture;
         if (!(m.alphaCutoff > 0) || !(m.alpha > 0) || texture == 0 || texture > textures) continue;
         float& cutoff = cutoffs[texture - 1];

@@ -1,0 +1,27 @@
+// Transparency: bodies that what is behind shows through are layers (layers.h), put over it by their alpha; it has no
+// pass and no table. Only frames of such layers have it.
+#include "engine/render/draw_list.h"
+#include "engine/render/effects/effect.h"
+
+namespace stipple::render {
+
+extern const Effect transparencyEffect;
+constinit const Effect transparencyEffect{
+    .name = "transparency",
+    .summary = "materials that are transparent (glTF BLEND) and --opacity: what is behind shows through",
+    .isRequested = [](const DrawSettings& s) { return s.isBlended; },
+    .option = "--opacity, or materials that are transparent",
+    .leaveOut =
+        [](DrawSettings& s) {
+            s.transparency = false;
+            s.opacity = 1;
+        },
+    .ofScene = [](const EffectScene& scene) { return !scene.instances.empty(); },
+    .ofFrame = [](const EffectFrame& frame) { return !frame.content.isEmpty(); },
+    .ofNode = nullptr,
+    .fill = nullptr,
+    .stage = Stage::surface,
+    .tolerancePixels = 0,
+    .toleranceSteps = 0};
+
+}  // namespace stipple::render
