@@ -145,7 +145,7 @@ void arrangeOptions(CLI::App& command) {
                       "--background",   "--alpha",    "--colour",      "--colour-map",
                       "--colour-range", "--legend",   "--environment", "--environment-scale",
                       "--refract",      "--wind",     "--time",        "--debug",
-                      "--effects",      "--set"});
+                      "--effects",      "--set",      "--opacity"});
     group("Inputs that are not built yet",
           {"--memory", "--temp", "--duplicates", "--threads", "--normals", "--radii", "--up", "--attributes",
            "--surfels", "--curve-radius", "--only-points", "--skip-bad", "--drop-outliers", "--allow-outside",

@@ -114,8 +114,8 @@ void blendRun(const MaterialRun& run, const Corners& c, const UvRow& uv, const f
     const SurfaceMaterial& material = *run.material;
     for (size_t i = run.first; i < run.first + run.n; ++i) {
         const auto alphaOf = [&](size_t k) { return float(int(c.colour[k][i] >> 24)) * (1.0f / 255.0f); };
-        float alpha =
-            material.alpha * ((1.0f - wb[i] - wc[i]) * alphaOf(0) + wb[i] * alphaOf(1) + wc[i] * alphaOf(2)), texel = 1;
+        float alpha = material.alpha * ((1.0f - wb[i] - wc[i]) * alphaOf(0) + wb[i] * alphaOf(1) + wc[i] * alphaOf(2)),
+              texel = 1;
         if (material.baseTexture.texture != 0 &&
             sampleAlpha(*run.textures, material.baseTexture, uv.u[i], uv.v[i], uv.footprint[i], texel))
             alpha *= texel;
@@ -221,12 +221,10 @@ struct RowRays {
         while (end < n && surface[end] == surface[first] &&
                in.meshBlocks[p.id[end] / kClusterTriangles].mesh == block.mesh)
             ++end;
-        const MaterialRun run{block.mesh,
-                              &in.materials[block.mesh->firstMaterial + (surface[first] & kSurfaceMaterialMask)],
-                              block.textures,
-                              surface[first],
-                              first,
-                              end - first};
+        const MaterialRun run{
+            block.mesh,     &in.materials[block.mesh->firstMaterial + (surface[first] & kSurfaceMaterialMask)],
+            block.textures, surface[first],
+            first,          end - first};
         applyMaterial(run, row.corners, row.uv, hasEmission, row.material);
         if (run.material->optics == kPixelBlends) blendRun(run, row.corners, row.uv, row.wb, row.wc, row.material);
         first = end;

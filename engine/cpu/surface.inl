@@ -191,7 +191,8 @@ void outputRow(const FrameConstants& frame, const Tables& tables, uint32_t n, co
     if (hasShare)
 #pragma GCC ivdep
         for (size_t i = 0; i < n; ++i) {
-            share[i] = (row.hasCoverage ? row.coverage[i] : 1.0f) * (row.hasOpacity ? wordOpacity(row.material[i]) : 1.0f);
+            share[i] =
+                (row.hasCoverage ? row.coverage[i] : 1.0f) * (row.hasOpacity ? wordOpacity(row.material[i]) : 1.0f);
             red[i] = f.background.x + share[i] * (red[i] - f.background.x);
             green[i] = f.background.y + share[i] * (green[i] - f.background.y);
             blue[i] = f.background.z + share[i] * (blue[i] - f.background.z);

@@ -12,6 +12,7 @@
 #include "engine/render/frame_passes.h"
 #include "engine/render/layered_frame.h"
 #include "engine/render/length_unit.h"
+#include "engine/render/picture_tone.h"
 #include "engine/render/views.h"
 #include "lod/primitives/octahedral.h"
 #include "lod/primitives/patch_samples.h"
@@ -249,6 +250,36 @@ Result<uint64_t> drawPlain(FrameState& state, const lod::View& view, const Frame
 
 }  // namespace
 
+namespace {
+
+/// The same, with a metered exposure: the whole picture is there before that is known.
+Result<uint64_t> drawMetered(FrameState& state, const lod::View& view, const FrameSettings& settings) {
+    FrameSettings plain = settings;
+    plain.wantDepthAndNormal = true;
+    plain.staysOnDevice = false;
+    takeTone(plain.draw);
+    STIPPLE_ASSIGN(const uint64_t passes, drawPlain(state, view, plain));
+    toneImage(settings.draw, state.image);
+    if (!settings.wantDepthAndNormal) {
+        state.image.depth.clear();
+        state.image.normal.clear();
+        state.image.linear.clear();
+    }
+    return passes;
+}
+
+/// Tone on the whole picture is no pass, but the frame shows it.
+void addTone(const DrawSettings& settings, EffectsOfFrame& shown) {
+    DrawSettings asked = settings;
+    for (size_t e = 0; e < effects().size(); ++e)
+        if (std::string_view(effects()[e]->name) == "tone" && takeTone(asked)) {
+            shown.requested.add(e);
+            shown.shown.add(e);
+        }
+}
+
+}  // namespace
+
 Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettings& settings, double start,
                      double cutMs) {
     if (state.backendLife.expired())
@@ -259,6 +290,10 @@ Result<void> drawCut(FrameState& state, const lod::View& view, const FrameSettin
     state.effects = {};
     if (hasLayers(state, view, settings)) {
         STIPPLE_ASSIGN(passes, drawLayered(state, view, settings));
+        addTone(settings.draw, state.effects);
+    } else if (isMetered(settings.draw)) {
+        STIPPLE_ASSIGN(passes, drawMetered(state, view, settings));
+        addTone(settings.draw, state.effects);
     } else {
         STIPPLE_ASSIGN(passes, drawPlain(state, view, settings));
     }

@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "shaders/shared/record.h"
-#include "shaders/shared/tone.h"
+#include "engine/render/picture_tone.h"
 
 namespace stipple::render {
 namespace {
@@ -17,12 +16,13 @@ LayeredFrame* appearanceOf(FrameState& state, const DrawSettings& draw) {
         return !d.optics.empty() || (!d.pointMaterials.empty() && !d.pointMaterials.front().optics.isPlain());
     };
     if (!state.layered) {
-        if (!isGiven && draw.opacity == 1 && std::none_of(state.stores.begin(), state.stores.end(), hasOptics)) return nullptr;
+        if (!isGiven && draw.opacity == 1 && std::none_of(state.stores.begin(), state.stores.end(), hasOptics))
+            return nullptr;
         state.layered = std::make_shared<LayeredFrame>();
     }
     Appearance& a = state.layered->appearance;
-    if (a.hierarchies.size() != state.stores.size() || a.pointMaterial != draw.pointMaterial || a.given != draw.optics ||
-        a.transparency != draw.transparency || a.opacity != draw.opacity)
+    if (a.hierarchies.size() != state.stores.size() || a.pointMaterial != draw.pointMaterial ||
+        a.given != draw.optics || a.transparency != draw.transparency || a.opacity != draw.opacity)
         a = makeAppearance(state.stores, state.materials, draw);
     return state.layered.get();
 }
@@ -104,33 +104,6 @@ LayerInput inputOf(const FrameState& state, const LayerDraw& layer, const DrawSe
     return in;
 }
 
-/// Tone comes last: layers see each other without it. Takes the request out of the settings of layers.
-bool takeTone(DrawSettings& settings) {
-    const auto isTone = [](const EffectRequest& r) { return r.name == "tone"; };
-    const ToneSettings& tone = settings.parameters.tone;
-    return std::erase_if(settings.effects, isTone) > 0 && (tone.exposure != 1 || tone.curve != 0) &&
-           settings.debugView == shared::kDebugNone;
-}
-
-/// On what of the picture is covered.
-void toneImage(const DrawSettings& settings, Image& image) {
-    const ToneSettings& asked = settings.parameters.tone;
-    const shared::ToneConstants tone{static_cast<float>(asked.exposure), asked.curve != 0 ? 1u : 0u};
-    for (size_t i = 0; i < image.rgba.size(); ++i) {
-        const float share = static_cast<float>(image.rgba[i] >> 24) / 255.0f;
-        if (!(share > 0)) continue;
-        uint32_t bytes = image.rgba[i] & 0xff000000u;
-        for (size_t c = 0; c < 3; ++c) {
-            const float behind = (1 - share) * settings.background[static_cast<int>(c)];
-            float& light = image.linear[3 * i + c];
-            light = behind + share * shared::toned(tone, (light - behind) / share);
-            bytes |= static_cast<uint32_t>(shared::srgbFromLinear(std::clamp(light, 0.0f, 1.0f)) * 255.0f + 0.5f)
-                     << (8 * c);
-        }
-        image.rgba[i] = bytes;
-    }
-}
-
 /// The frame's list points at a layer only while that one is drawn, however drawing ends.
 class NoLayerAfter {
   public:
@@ -159,7 +132,7 @@ Result<uint64_t> drawLayered(FrameState& state, const lod::View& view, const Fra
     FrameSettings plain = settings;
     plain.wantDepthAndNormal = true;
     plain.staysOnDevice = false;
-    const bool hasTone = takeTone(plain.draw);
+    const bool hasTone = takeTone(plain.draw);  // it comes last: layers see each other without it
     // What is glass all over is not behind; of meshes in which some of it is, that is cut out.
     takeNodes(state.cut, l.cut, [&](uint32_t i) {
         const OpticsOf& o = of[state.instances[i].hierarchy];

@@ -30,7 +30,8 @@ bool Optics::isPossible() const {
     const bool isBent = ior == 0 || (ior >= 1 && ior <= kLargest);
     return isShare(transmission) && isBent && isThickness && isFactor(attenuationDistance) &&
            isShare(attenuationColour.x) && isShare(attenuationColour.y) && isShare(attenuationColour.z) &&
-           isShare(opacity) && isShare(specular) && isFactor(specularColour.x) && isFactor(specularColour.y) && isFactor(specularColour.z);
+           isShare(opacity) && isShare(specular) && isFactor(specularColour.x) && isFactor(specularColour.y) &&
+           isFactor(specularColour.z);
 }
 
 std::optional<Optics> opticsNamed(const std::string& name) {

@@ -49,12 +49,12 @@ shared::TextureSlot slotFromJson(const json& j) {
 
 json opticsToJson(const Optics& o) {
     json out = {{"transmission", o.transmission},
-            {"ior", o.ior},
-            {"thickness", o.thickness},
-            {"attenuation_distance", o.attenuationDistance},
-            {"attenuation_colour", toJson(o.attenuationColour)},
-            {"specular", o.specular},
-            {"specular_colour", toJson(o.specularColour)}};
+                {"ior", o.ior},
+                {"thickness", o.thickness},
+                {"attenuation_distance", o.attenuationDistance},
+                {"attenuation_colour", toJson(o.attenuationColour)},
+                {"specular", o.specular},
+                {"specular_colour", toJson(o.specularColour)}};
     if (o.blends) out["blends"] = o.opacity;
     return out;
 }

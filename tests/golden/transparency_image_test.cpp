@@ -145,10 +145,11 @@ TEST_F(Transparent, IsTheShareThatAlphaSaysAtEveryPixel) {
             const double alpha = at.x / 2 + 0.5;
             for (int c = 0; c < 3; ++c) {
                 const double under = behind.linear[3 * i + size_t(c)];
-                most = std::max(most, std::abs(both.linear[3 * i + size_t(c)] - (alpha * own[c] + (1 - alpha) * under)));
+                most =
+                    std::max(most, std::abs(both.linear[3 * i + size_t(c)] - (alpha * own[c] + (1 - alpha) * under)));
             }
             if (std::abs(alpha - 0.5) > 0.01)
-                EXPECT_EQ(both.depth[i] < behind.depth[i] - 1, alpha > 0.5) << name << ", alpha " << alpha;
+                EXPECT_EQ(both.depth[i]<behind.depth[i] - 1, alpha> 0.5) << name << ", alpha " << alpha;
         }
         EXPECT_GT(inside, 5'000u);
         EXPECT_LE(most, 0.5 / 255 + 0.004 + 0.002) << name << ": alpha and colours of 8 bits";

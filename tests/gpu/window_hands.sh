@@ -68,7 +68,7 @@ shoot() {
     local before
     before=$(lines "$folder/out")
     xdotool key p
-    await 20 hasLines "$folder/out" $((before + 1)) || fail "no picture"
+    await 60 hasLines "$folder/out" $((before + 1)) || fail "no picture"
     shot=$(tail -n 1 "$folder/out")
 }
 settle() { # pictures until two are alike: everything is there
@@ -339,7 +339,7 @@ surfels_are_weighed_while_it_moves() { # mode ewa: per surfel while something ch
     # taken before two looks at rest.
     before=$(lines "$folder/out")
     xdotool keydown --delay 0 3 keydown --delay 0 p keyup 3 keyup p
-    await 20 hasLines "$folder/out" $((before + 1)) || fail "no picture"
+    await 60 hasLines "$folder/out" $((before + 1)) || fail "no picture"
     moved=$(tail -n 1 "$folder/out")
     ! cmp -s "$rest" "$moved" || fail "while something changes the picture is that of rest"
     rested

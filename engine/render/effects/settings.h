@@ -32,9 +32,10 @@ struct FogSettings {
     double kind = 0;
 };
 
-/// From light to what a screen is sent. `curve` 0: none, light above 1 is cut off; 1: filmic.
+/// From light to what a screen is sent. `curve` 0: none, light above 1 is cut off; 1: filmic. `metering` 0: none; 1:
+/// the mean of what is seen becomes middle grey, and `exposure` counts from there.
 struct ToneSettings {
-    double exposure = 1, curve = 0;
+    double exposure = 1, curve = 0, metering = 0;
 };
 
 /// Ambient occlusion. `radius`: world units; 0: by the scene. `detail` 0: of every second pixel both ways; 1: of all.

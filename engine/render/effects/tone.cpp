@@ -12,15 +12,21 @@ namespace {
 constexpr std::array kPasses{Pass::tone};
 constexpr std::array kTables{shared::kToneBinding};
 constexpr std::array kCurves{"none", "filmic"};
-constexpr std::array kParameters{Parameter{"exposure",
-                                           "factor of light (2: one stop more)",
-                                           1e-6,
-                                           1e6,
-                                           1,
-                                           {},
-                                           [](DrawSettings& s) { return &s.parameters.tone.exposure; }},
-                                 Parameter{"curve", "none (what is brighter than 1 is white), or filmic (it rolls off)",
-                                           0, 0, 1, kCurves, [](DrawSettings& s) { return &s.parameters.tone.curve; }}};
+constexpr std::array kMetering{"none", "average"};
+constexpr std::array kParameters{
+    Parameter{"exposure",
+              "factor of light (2: one stop more)",
+              1e-6,
+              1e6,
+              1,
+              {},
+              [](DrawSettings& s) { return &s.parameters.tone.exposure; }},
+    Parameter{"curve", "none (what is brighter than 1 is white), or filmic (it rolls off)", 0, 0, 1, kCurves,
+              [](DrawSettings& s) { return &s.parameters.tone.curve; }},
+    Parameter{"metering",
+              "none, or average (of each picture the mean of its logarithms becomes "
+              "middle grey; exposure counts from there)",
+              0, 0, 1, kMetering, [](DrawSettings& s) { return &s.parameters.tone.metering; }}};
 
 void fill(const DrawSettings& settings, const glm::dmat3&, DrawList& out) {
     const ToneSettings& tone = settings.parameters.tone;

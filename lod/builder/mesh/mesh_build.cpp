@@ -273,9 +273,8 @@ class MeshBuild : public CellContent {
         Hierarchy hierarchy;
         writeTables(groups_, facts_.lattice, hierarchy);
         groups_ = {};
-        STIPPLE_TRY(writeTextures(settings_.textures,
-                                  cutoffsOf(settings_.description, settings_.textures.size()), writer,
-                                  hierarchy, executor_));
+        STIPPLE_TRY(writeTextures(settings_.textures, cutoffsOf(settings_.description, settings_.textures.size()),
+                                  writer, hierarchy, executor_));
         for (const auto& [reason, count] :
              {std::pair{"degenerate triangles", facts_.degenerate},
               std::pair{"duplicate triangles", facts_.duplicate + duplicate_},
