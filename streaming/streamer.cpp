@@ -152,14 +152,46 @@ void Streamer::collect() {
     }
 }
 
+/// A chunk is of no use before all that it builds on: it waits for what is under way, and goes where that is not to
+/// come.
+Streamer::Base Streamer::baseOf(ChunkKey key) const {
+    const Source& source = sources_[key.source];
+    Base base = Base::resident;
+    lod::forEachRequired(*source.hierarchy, key.chunk, [&](uint32_t above) {
+        const ChunkLife& life = source.chunks[above];
+        const bool isNext = life.state == ChunkState::absent && life.lastWanted == frame_ && frame_ >= life.retryAt;
+        if (life.state == ChunkState::requested || life.state == ChunkState::arrived || isNext)
+            base = std::max(base, Base::underWay);
+        else if (life.state != ChunkState::resident)
+            base = Base::missing;
+    });
+    return base;
+}
+
 void Streamer::upload() {
     uint64_t uploaded = 0;
+    // What others build on has the lower number.
+    std::sort(arrived_.begin(), arrived_.end(), [](const Arrival& a, const Arrival& b) {
+        return a.key.chunk != b.key.chunk ? a.key.chunk < b.key.chunk : a.key.source < b.key.source;
+    });
+    std::vector<Arrival> later;
     size_t taken = 0;
     for (; taken < arrived_.size(); ++taken) {
         Arrival& arrival = arrived_[taken];
         if (lifeOf(arrival.key).lastWanted < frame_) {
             setState(arrival.key, ChunkState::absent);
             ++counters_.unwanted;
+            continue;
+        }
+        const Base base = baseOf(arrival.key);
+        if (base == Base::underWay) {
+            later.push_back(std::move(arrival));
+            continue;
+        }
+        if (base == Base::missing) {
+            setState(arrival.key, ChunkState::absent);
+            lifeOf(arrival.key).retryAt = frame_ + kRetryFrames;
+            ++counters_.refused;
             continue;
         }
         const uint64_t bytes = lod::decodedBytes(*sources_[arrival.key.source].hierarchy, arrival.key.chunk);
@@ -184,7 +216,8 @@ void Streamer::upload() {
         ++counters_.uploads;
         uploaded += bytes;
     }
-    arrived_.erase(arrived_.begin(), arrived_.begin() + static_cast<std::ptrdiff_t>(taken));
+    for (; taken < arrived_.size(); ++taken) later.push_back(std::move(arrived_[taken]));
+    arrived_ = std::move(later);
 }
 
 bool Streamer::isEvictable(ChunkKey key) const {

@@ -52,6 +52,7 @@ Result<void> run(const Options& o, bool& isSilent) {
         if (build.threads == 0) build.threads = std::max(cores / job.onThisMachine, 1);
     }
     if (!o.quiet && !isSilent) build.say = printLine;
+    if (!isSilent) build.loss = printLine;
     if (o.restart) build.leftovers = lod::Leftovers::replace;
     STIPPLE_ASSIGN(const lod::BuildSettings settings, build.settings());
     STIPPLE_TRY(agree(build.ranks,

@@ -134,6 +134,7 @@ OpenSettings BuildOptions::told(bool isQuiet) const {
     OpenSettings to = *this;
     to.progressStyle = styleOf(isQuiet);
     if (!isQuiet) to.say = printLine;
+    to.loss = printLine;
     return to;
 }
 

@@ -41,7 +41,7 @@ scene::OpenSettings openSettings(uint64_t memoryBytes, unsigned threads, uint64_
     settings.memory = fmt::format("{}", memoryBytes);
     settings.threads = static_cast<int>(threads);
     settings.surfels = surfels;
-    settings.say = listener.note;
+    settings.say = settings.loss = listener.note;
     settings.onProgress = callOf(listener);
     settings.isStopped = listener.isStopped ? listener.isStopped : [] { return false; };
     return settings;

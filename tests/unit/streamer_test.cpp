@@ -51,6 +51,24 @@ class BrokenSource final : public ByteSource {
     std::string path_ = "cable";
 };
 
+/// What was started last ends first.
+class Backwards final : public Executor {
+  public:
+    void parallelFor(size_t count, size_t, const std::function<void(size_t, size_t)>& body) override { body(0, count); }
+    void run(std::function<void()> task) override { tasks_.push_back(std::move(task)); }
+    void wait() override {
+        while (!tasks_.empty()) {
+            const auto task = std::move(tasks_.back());
+            tasks_.pop_back();
+            task();
+        }
+    }
+    int threads() const override { return 1; }
+
+  private:
+    std::vector<std::function<void()>> tasks_;
+};
+
 class StreamerTest : public testing::Test {
   protected:
     void SetUp() override {
@@ -178,6 +196,27 @@ TEST_F(StreamerTest, WhatWasUsedLeastRecentlyGoesFirst) {
     EXPECT_GT(others, 100u);
     EXPECT_GT(streamer.counters().evictions, 30u);
     isOver = true;
+}
+
+/// Chunks arrive in any order; where there is room for some of them alone, it is not taken by those that nothing can be
+/// drawn of yet.
+TEST_F(StreamerTest, NothingIsUploadedBeforeWhatItBuildsOn) {
+    executor_ = std::make_unique<Backwards>();
+    CountingSink sink;
+    Streamer streamer(*executor_, sink, {200'000, 1u << 26, 64});
+    const lod::Hierarchy& h = store_->hierarchy;
+    streamer.addSource(h, store_->file, "a");
+    size_t early = 0;
+    sink.onUpload = [&](ChunkKey key) {
+        lod::forEachRequired(h, key.chunk, [&](uint32_t above) { early += sink.alive.contains({0, above}) ? 0 : 1; });
+    };
+    const lod::View view = test::fitView(*store_, 640, 480);
+    for (int i = 0; i < 3; ++i) step(streamer, view, 0.1);
+    EXPECT_FALSE(cut_.draw.empty()) << "the root was there with the first that came";
+    for (int i = 0; i < 300; ++i) step(streamer, view, 0.1);
+    EXPECT_EQ(early, 0u);
+    EXPECT_GT(streamer.counters().uploads, 3u);
+    EXPECT_FALSE(cut_.wanted.empty()) << "all of it would have fitted";
 }
 
 TEST_F(StreamerTest, WhatNobodyWantsAnyMoreIsNotUploaded) {

@@ -100,7 +100,7 @@ Result<lod::MeshBuildSettings> meshSettings(const scene::Scene& scene, const std
     settings.description.materials = scene::surfaceMaterials(scene);
     settings.textures = scene::textureImages(scene);
     STIPPLE_ASSIGN(std::vector<scene::DecodedImage> images,
-                   decodeImages(scene, build.reading().memoryBytes, build.say));
+                   decodeImages(scene, build.reading().memoryBytes, build.loss));
     settings.description.optics = scene::surfaceOptics(scene, placed, images);
     std::vector<size_t> last(images.size());  // texture that uses an image last, and may have it
     for (size_t t = 0; t < settings.textures.size(); ++t)

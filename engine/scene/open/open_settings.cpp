@@ -50,7 +50,7 @@ Result<lod::BuildSettings> OpenSettings::settings() const {
     s.leftovers = leftovers;
     s.estimateRadii = radii != "keep";
     s.skipBad = skipBad;
-    s.open = [count = surfels, how = reading(), told = say](const std::string& path, const lod::ReadOptions& o) {
+    s.open = [count = surfels, how = reading(), told = loss](const std::string& path, const lod::ReadOptions& o) {
         return openInput(path, o, count, how, told);
     };
     s.allAttributes = attributes == "all";

@@ -33,7 +33,8 @@ struct OpenSettings {
     std::shared_ptr<BuildsOfScene> together;     ///< of the scene that is opened: its builds show one progress
     lod::Leftovers leftovers = lod::Leftovers::goOn;
     std::function<bool()> isStopped = isStopRequested;  ///< of builds
-    Say say;
+    Say say;                                            ///< notes
+    Say loss;  ///< what is left out of a scene, which is to be told where notes are not wanted, too
     ProgressStyle progressStyle = ProgressStyle::silent;
     ProgressCall onProgress;  ///< beside that
 

@@ -31,7 +31,7 @@ Result<Proxies> meshProxies(const scene::Scene& scene, const std::vector<scene::
         for (scene::Mesh& m : only.meshes)
             std::erase_if(m.primitives, [](const auto& p) { return p.kind != scene::PrimitiveKind::triangles; });
         STIPPLE_ASSIGN(const std::vector<scene::DecodedImage> images,
-                       decodeImages(scene, build.reading().memoryBytes, build.say));
+                       decodeImages(scene, build.reading().memoryBytes, build.loss));
         STIPPLE_ASSIGN(lod::PointSource samples, scene::sampleSurfels(only, images, {kSurfels}));
         STIPPLE_ASSIGN(lod::BuildSettings settings, build.settings());
         settings.open = [&](const std::string&, const lod::ReadOptions&) -> Result<lod::PointSource> {
