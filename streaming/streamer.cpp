@@ -152,22 +152,6 @@ void Streamer::collect() {
     }
 }
 
-/// A chunk is of no use before all that it builds on: it waits for what is under way, and goes where that is not to
-/// come.
-Streamer::Base Streamer::baseOf(ChunkKey key) const {
-    const Source& source = sources_[key.source];
-    Base base = Base::resident;
-    lod::forEachRequired(*source.hierarchy, key.chunk, [&](uint32_t above) {
-        const ChunkLife& life = source.chunks[above];
-        const bool isNext = life.state == ChunkState::absent && life.lastWanted == frame_ && frame_ >= life.retryAt;
-        if (life.state == ChunkState::requested || life.state == ChunkState::arrived || isNext)
-            base = std::max(base, Base::underWay);
-        else if (life.state != ChunkState::resident)
-            base = Base::missing;
-    });
-    return base;
-}
-
 void Streamer::upload() {
     uint64_t uploaded = 0;
     // What others build on has the lower number.
@@ -183,15 +167,19 @@ void Streamer::upload() {
             ++counters_.unwanted;
             continue;
         }
-        const Base base = baseOf(arrival.key);
-        if (base == Base::underWay) {
+        bool isWhole = true, isUnderWay = true;
+        lod::forEachRequired(*sources_[arrival.key.source].hierarchy, arrival.key.chunk, [&](uint32_t above) {
+            const ChunkState base = sources_[arrival.key.source].chunks[above].state;
+            isWhole = isWhole && base == ChunkState::resident;
+            isUnderWay = isUnderWay && base != ChunkState::absent && base != ChunkState::failed;
+        });
+        if (!isWhole && isUnderWay) {
             later.push_back(std::move(arrival));
             continue;
         }
-        if (base == Base::missing) {
+        if (!isWhole) {
             setState(arrival.key, ChunkState::absent);
-            lifeOf(arrival.key).retryAt = frame_ + kRetryFrames;
-            ++counters_.refused;
+            ++counters_.unwanted;
             continue;
         }
         const uint64_t bytes = lod::decodedBytes(*sources_[arrival.key.source].hierarchy, arrival.key.chunk);
@@ -308,6 +296,13 @@ void Streamer::start(uint32_t sourceIndex, uint32_t chunk) {
     Source& source = sources_[sourceIndex];
     ChunkLife& state = source.chunks[chunk];
     if ((state.state != ChunkState::absent && state.state != ChunkState::failed) || frame_ < state.retryAt) return;
+    // Of no use before all that it builds on, which is asked for first.
+    bool isOfUse = true;
+    lod::forEachRequired(*source.hierarchy, chunk, [&](uint32_t above) {
+        const ChunkState base = source.chunks[above].state;
+        isOfUse = isOfUse && base != ChunkState::absent && base != ChunkState::failed;
+    });
+    if (!isOfUse) return;
     const ChunkKey key{sourceIndex, chunk};
     setState(key, ChunkState::requested);
     ++counters_.inFlight;

@@ -120,8 +120,6 @@ class Streamer {
     void evict(ChunkKey key);
     void countInParents(ChunkKey key, int change);
     ChunkLife& lifeOf(ChunkKey key) { return key.source == kNoSource ? ends_ : sources_[key.source].chunks[key.chunk]; }
-    enum class Base : uint8_t { resident, underWay, missing };
-    Base baseOf(ChunkKey key) const;
     /// Resident, and nobody's parent: in the list, unless it is of the root.
     bool isEvictable(ChunkKey key) const;
     void unlink(ChunkKey key);

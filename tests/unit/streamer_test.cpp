@@ -130,7 +130,7 @@ TEST_F(StreamerTest, ResidentBytesEndAtNone) {
         for (const auto& [source, chunk] : sink.alive) resident += lod::decodedBytes(h, chunk);
         ASSERT_EQ(streamer.counters().residentBytes, resident);
     }
-    EXPECT_GT(streamer.counters().uploads, 10u);
+    EXPECT_GT(streamer.counters().uploads, 5u);
 }
 
 TEST_F(StreamerTest, TheByteBudgetIsNeverExceededWhateverTheViews) {
@@ -168,7 +168,7 @@ TEST_F(StreamerTest, WhatWasUsedLeastRecentlyGoesFirst) {
             lod::forEachRequired(h, below, [&](uint32_t above) { is = is || above == chunk; });
         return is;
     };
-    Streamer streamer(*executor_, sink, {200'000, 1u << 26, 64});
+    Streamer streamer(*executor_, sink, {400'000, 1u << 26, 64});
     streamer.addSource(h, store_->file, "a");
     bool isOver = false;
     sink.onUpload = [&](ChunkKey key) { used[key.chunk] = frame; };
@@ -188,7 +188,7 @@ TEST_F(StreamerTest, WhatWasUsedLeastRecentlyGoesFirst) {
         view.forward = glm::normalize(-view.eye);
         view.right = glm::normalize(glm::cross(view.forward, glm::dvec3(0.1, 1, 0)));
         view.down = glm::cross(view.forward, view.right);
-        step(streamer, view, std::exp2(rng.uniform(-2, 2)));
+        step(streamer, view, std::exp2(rng.uniform(1, 5)));
         ++frame;
         for (const auto& [source, chunk] : cut_.keep) used[chunk] = frame;
     }
