@@ -5,6 +5,9 @@ layout(set = 0, binding = kLightsBinding, scalar) readonly buffer LightBlock { L
 layout(set = 0, binding = kTriangleWordsBinding, scalar) readonly buffer TriangleBlock { uint triangleWords[]; };  // two a pixel
 layout(set = 0, binding = kEnvironmentBinding, scalar) readonly buffer EnvironmentBlock { float environment[]; };
 #include "shared/environment.h"
+#ifdef SHADOWED
+#include "shadow.glsl"
+#endif
 
 // `colour`, and what lights of the scene's own, or the sun, send back.
 vec3 withLights(vec3 colour, Surface s, vec3 point) {
@@ -12,7 +15,11 @@ vec3 withLights(vec3 colour, Surface s, vec3 point) {
     for (uint k = 0u; k < frame.lightCount; ++k) {
         const LightSource light = lights[k];
         const vec3 l = light.kind == kLightDirectional ? light.position : light.position - point;
-        colour += reflectLight(s, normalize(l), light.colour * lightAt(light, point, point.z));
+        vec3 sent = light.colour * lightAt(light, point, point.z);
+#ifdef SHADOWED
+        sent *= pastMaps(k, point, s.normal);
+#endif
+        colour += reflectLight(s, normalize(l), sent);
     }
     return colour;
 }

@@ -46,6 +46,7 @@ nlohmann::json effectsJson(const std::vector<render::EffectStatus>& status) {
                                 : s.isActive ? nlohmann::json()
                                              : nlohmann::json(0)}};
         if (!s.within.empty()) j["within"] = s.within;
+        if (s.msBefore > 0) j["ms_before"] = s.msBefore;
         out.push_back(std::move(j));
     }
     return out;
@@ -57,6 +58,7 @@ std::string effectsText(const std::vector<render::EffectStatus>& status) {
         if (s.calledForBy.empty()) continue;
         std::string of = s.isActive ? "" : ": not in this view";
         if (s.ms) of = fmt::format(" {:.2f} ms", *s.ms);
+        if (s.msBefore > 0) of += fmt::format(", {:.1f} ms before the frame", s.msBefore);
         if (s.held.bytes > 0) of += fmt::format(", {}", humanBytes(s.held.bytes));
         all += fmt::format("{}{} ({}){}", all.empty() ? "" : "; ", s.name, s.calledForBy, of);
     }

@@ -144,8 +144,9 @@ void arrangeOptions(CLI::App& command) {
                       "--normalise",    "--patch-as", "--interpolate", "--shade",
                       "--background",   "--alpha",    "--colour",      "--colour-map",
                       "--colour-range", "--legend",   "--environment", "--environment-scale",
-                      "--refract",      "--wind",     "--time",        "--debug",
-                      "--effects",      "--set",      "--opacity"});
+                      "--sun",          "--sun-size", "--refract",     "--wind",
+                      "--time",         "--debug",    "--effects",     "--set",
+                      "--opacity"});
     group("Inputs that are not built yet",
           {"--memory", "--temp", "--duplicates", "--threads", "--normals", "--radii", "--up", "--attributes",
            "--surfels", "--curve-radius", "--only-points", "--skip-bad", "--drop-outliers", "--allow-outside",

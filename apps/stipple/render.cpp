@@ -17,6 +17,7 @@
 #include "apps/stipple/ply_meshes.h"
 #include "apps/stipple/render_frames.h"
 #include "apps/stipple/scene_facts.h"
+#include "apps/stipple/sun_options.h"
 #include "engine/base/file.h"
 #include "engine/base/process.h"
 #include "engine/base/text.h"
@@ -49,6 +50,7 @@ struct Options {
     BuildOptions build;
     ColourOptions colour;
     EnvironmentOptions environment;
+    SunOptions sun;
     MaterialOptions material;
     EffectOptions effects;
 };
@@ -72,6 +74,7 @@ Result<void> checkArguments(const Options& o) {
     STIPPLE_TRY(o.exposure.check(o.camera, o.wind > 0));
     STIPPLE_TRY(o.material.check(o.shade));
     STIPPLE_TRY(o.effects.check());
+    STIPPLE_TRY(o.sun.check(o.shade));
     if (o.target.isAny() && o.drawn.mode == "reference")
         return fail(ErrorKind::usage, "traces the full detail, whatever it takes", "--mode reference",
                     "leave out --target-ms and --target-error");
@@ -99,6 +102,7 @@ Result<render::FrameSettings> makeSettings(const Options& o, const lod::StoreDes
         s.draw.lit = true;
     }
     s.draw.worldUp = shot.worldUp;
+    o.sun.applyTo(s.draw);
     s.draw.exactCurves = static_cast<float>(o.curveExact);
     s.draw.wind = {o.wind, o.seconds, render::windAcross(shot.worldUp)};
     STIPPLE_ASSIGN(const glm::dvec3 background, backgroundOf(o));
@@ -125,6 +129,9 @@ nlohmann::json countersJson(const FrameCounters& c) {
             {"proxies", c.proxies},
             {"group_members", c.groupMembers},
             {"nodes_swaying", c.nodesSwaying},
+            {"shadow_maps", c.shadowMaps},
+            {"shadow_maps_drawn", c.shadowMapsDrawn},
+            {"shadow_lights_left", c.shadowLightsLeft},
             {"cut_evaluations", c.cutEvaluations},
             {"passes", c.passes},
             {"blocks", c.blocks},
@@ -310,6 +317,13 @@ void tell(const Options& o, const render::FrameState& state, const render::DrawS
     }
 }
 
+/// Lights that would cast shadows and get none.
+void sayShadows(const render::FrameState& state) {
+    if (const uint64_t left = state.counters.shadowLightsLeft; left > 0)
+        fmt::print(stderr, "note: lights without shadows: {} (the first {} cast them, with a direction and a cone)\n",
+                   left, shared::kMostShadowLights);
+}
+
 Result<void> checkWeights(const Options& o, const OpenedScene& scene) {
     if (o.drawn.normalise != "surfel" || hasSurfelWeights(scene.placed)) return {};
     return fail(ErrorKind::usage, "no store of the scene has weights of surfels", "--normalise surfel",
@@ -362,6 +376,7 @@ Result<void> run(const Options& o, Written& written) {
         STIPPLE_TRY(image::writePicture(o.output, state->image, o.alpha));
     }
     tell(o, *state, settings.draw, verdict, timings, size, shot.views.size());
+    if (!o.quiet) sayShadows(*state);
     if (!o.quiet) sayEmpty(verdict.empty, shot.views.size(), o.output);
     if (!o.quiet && verdict.leavesAround > 0)
         fmt::print(stderr,
@@ -483,6 +498,7 @@ void setupRender(CLI::App& app, int& status) {
     o->material.addTo(*sub, "all points, instead of their own");
     o->environment.addTo(*sub);
     o->effects.addTo(*sub);
+    o->sun.addTo(*sub);
     addReading(*sub, *o);
     sub->callback([o, sub, &status] {
         Written written;

@@ -29,6 +29,7 @@ std::vector<render::WorldLight> lightsOf(const scene::Scene& scene) {
         out.range = light.range;
         out.innerCone = light.innerCone;
         out.outerCone = light.outerCone;
+        out.castsShadow = out.kind != shared::kLightPoint;
         lights.push_back(out);
     }
     return lights;

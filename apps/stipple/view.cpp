@@ -450,6 +450,7 @@ Result<void> run(const ViewOptions& o) {
     STIPPLE_TRY(o.camera.check());
     STIPPLE_TRY(o.material.check(o.shade));
     STIPPLE_TRY(o.effects.check());
+    STIPPLE_TRY(o.sun.check(o.shade));
     STIPPLE_TRY(checkScreenshot(o));
     STIPPLE_TRY(checkInputs(o.inputs));
     if (!gpu::hasDisplay())
@@ -539,6 +540,7 @@ void setupView(CLI::App& app, int& status) {
     o->camera.addTo(*sub);
     o->colour.addTo(*sub);
     o->environment.addTo(*sub);
+    o->sun.addTo(*sub);
     o->material.addTo(*sub, "all points, instead of their own");
     o->build.addTo(*sub);
     o->build.addCacheTo(*sub);

@@ -7,6 +7,7 @@
 #include "apps/stipple/effect_options.h"
 #include "apps/stipple/legend.h"
 #include "apps/stipple/mode_options.h"
+#include "apps/stipple/sun_options.h"
 #include "apps/stipple/view_keys.h"
 
 namespace stipple::app {
@@ -24,6 +25,7 @@ struct ViewOptions {
     BuildOptions build;
     ColourOptions colour;
     EnvironmentOptions environment;
+    SunOptions sun;
     MaterialOptions material;
     EffectOptions effects;
 };

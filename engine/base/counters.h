@@ -8,9 +8,11 @@ namespace stipple {
 struct FrameCounters {
     uint64_t nodesVisited = 0, nodesDrawn = 0, nodesCulled = 0, nodesMissing = 0;
     uint64_t recordsDrawn = 0, recordsTested = 0, trianglesDrawn = 0;
-    uint64_t proxies = 0;       ///< instances of which points were drawn
-    uint64_t groupMembers = 0;  ///< instances of instance groups that were looked at one by one
-    uint64_t nodesSwaying = 0;  ///< moved by wind, by a tenth of a pixel at least
+    uint64_t proxies = 0;                          ///< instances of which points were drawn
+    uint64_t groupMembers = 0;                     ///< instances of instance groups that were looked at one by one
+    uint64_t nodesSwaying = 0;                     ///< moved by wind, by a tenth of a pixel at least
+    uint64_t shadowMaps = 0, shadowMapsDrawn = 0;  ///< of lights that cast shadows; of those drawn in this frame
+    uint64_t shadowLightsLeft = 0;                 ///< lights that would cast, beyond those that do
     uint64_t cutEvaluations = 0, passes = 0, blocks = 0;
     uint64_t bytesStreamed = 0, residentBytes = 0, requests = 0, uploads = 0, evictions = 0, failures = 0, refused = 0;
     uint64_t requestsInFlight = 0;

@@ -81,7 +81,11 @@ class CpuBackend final : public render::DrawsAtOnce {
         times_.clear();
         const std::span<const render::Pass> passes(request.passes);
         frame_.wantsNormals = wantsNormals(frame_, passes);
-        beginEffects(passes);
+        if (!request.isOfCasters) beginEffects(passes);
+        for (const render::Pass pass : passes) {
+            frame_.effectAtWork = render::effectOfPass(pass).value_or(0);
+            if (const CpuPass& p = cpuPassOf(pass); p.begin != nullptr) p.begin(frame_);
+        }
         for (size_t p = 0; p < passes.size();) {
             const double start = nowSeconds();
             std::string name = render::passName(passes[p]);

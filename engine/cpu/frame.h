@@ -109,6 +109,16 @@ struct Frame {
         return static_cast<T*>(effectRoom.at(effectAtWork, plane, count * sizeof(T)));
     }
 
+    /// Lights that cast shadows, in frames with pass shadow.
+    struct Shadows {
+        std::vector<shared::ShadowMap> maps;
+        std::vector<const float*> depths;  ///< of each
+        std::vector<const uint32_t*> through;
+        uint32_t* masks = nullptr;  ///< Plane::shadows: a picture for each light that casts
+        bool areKept = false;       ///< they are those of this frame already
+    };
+    Shadows shadows;
+
     /// Are there blended discs?
     bool isBlended() const { return mode->blendsSplats && !blocks.empty(); }
     SecondPixels seconds() {

@@ -15,6 +15,7 @@
 #include "shaders/shared/patch.h"
 #include "shaders/shared/patch_splat.h"
 #include "shaders/shared/record.h"
+#include "shaders/shared/shadow.h"
 #include "shaders/shared/smooth.h"
 #include "shaders/shared/splat_disc.h"
 #include "shaders/shared/surface.h"
@@ -252,20 +253,31 @@ struct ResolveInput {
 
 struct LightInput {
     const shared::LightSource* lights;
-    const float* environment;  ///< table of shaders/shared/environment.h; null: none
+    const float* environment;     ///< table of shaders/shared/environment.h; null: none
+    const uint32_t* shadowSlots;  ///< of each light 1 + that of its mask in the row, or 0; null: none casts
+};
+
+/// Maps of lights that cast shadows: of each light the finest first.
+struct ShadowInput {
+    const shared::ShadowMap* maps;  ///< whose texels begin at 0
+    const float* const* depths;     ///< of each
+    const uint32_t* const* through;
+    uint32_t count, slots;
 };
 
 /// The visible surface at the pixels of a tile's row, whatever it was made of: what reconstruction leaves, light
 /// changes (colours only) and output reads.
 struct SurfaceRow {
     alignas(64) float depth[kTile];  ///< linear, world units; 0: nothing. Only > 0 is sure unless depths are wanted
-    alignas(64) float nx[kTile], ny[kTile], nz[kTile];        ///< camera space, towards the eye; only if wanted
-    alignas(64) float red[kTile], green[kTile], blue[kTile];  ///< linear: of the surface, then what it sends
-    alignas(64) float leaf[kTile];                            ///< 1: lets light through; only if wanted
-    alignas(64) uint32_t material[kTile];                     ///< metallic 8 | roughness 8 | occlusion 8 | flags
-    alignas(64) uint32_t emission[kTile];                     ///< packColour; only if hasEmission
-    alignas(64) float ownDepth[kTile];                        ///< before reconstruction; only if wanted
-    alignas(64) float coverage[kTile];                        ///< only if hasCoverage
+    alignas(64) float nx[kTile], ny[kTile], nz[kTile];              ///< camera space, towards the eye; only if wanted
+    alignas(64) float red[kTile], green[kTile], blue[kTile];        ///< linear: of the surface, then what it sends
+    alignas(64) float leaf[kTile];                                  ///< 1: lets light through; only if wanted
+    alignas(64) uint32_t material[kTile];                           ///< metallic 8 | roughness 8 | occlusion 8 | flags
+    alignas(64) uint32_t emission[kTile];                           ///< packColour; only if hasEmission
+    alignas(64) float ownDepth[kTile];                              ///< before reconstruction; only if wanted
+    alignas(64) float coverage[kTile];                              ///< only if hasCoverage
+    alignas(64) uint32_t shadow[shared::kMostShadowLights][kTile];  ///< packLight: what comes of lights that cast
+    uint32_t shadowSlots;                                           ///< so many of them
     bool hasTriangles, hasEmission, hasCoverage, hasMaterials;
     bool hasOcclusion;  ///< of points, too
     bool hasOpacity;    ///< some pixels may be kPixelBlends
@@ -341,6 +353,9 @@ struct Kernels {
     /// reconstructed of such: `mean`, and the texels that it is of (shaders/shared/smooth.h).
     void (*smoothRow)(const shared::FrameConstants& f, const TexelRow& texels, const SurfaceRow& mean,
                       const SurfacePlanes& planes, uint32_t n, SurfaceRow& out);
+    /// What of lights that cast shadows comes to the surface.
+    void (*shadowRow)(const shared::FrameConstants& f, const ShadowInput& in, uint32_t x0, uint32_t y, uint32_t n,
+                      SurfaceRow& row);
     /// What the surface sends to the eye.
     void (*lightRow)(const shared::FrameConstants& f, const LightInput& light, uint32_t x0, uint32_t y, uint32_t n,
                      SurfaceRow& row);

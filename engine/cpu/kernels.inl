@@ -12,6 +12,9 @@
 #include "shaders/shared/patch_map.h"
 #include "shaders/shared/pyramid.h"
 #include "shaders/shared/shade.h"
+#define SHARED_SHADOW [[maybe_unused]] const float *shadowDepths, [[maybe_unused]] const uint *shadowThrough,
+#define SHARED_SHADOW_USE shadowDepths, shadowThrough,
+#include "shaders/shared/shadow_taps.h"
 #include "shaders/shared/splat_disc.h"
 #include "shaders/shared/splat_size.h"
 #include "shaders/shared/surface.h"
@@ -350,6 +353,8 @@ void finishRow(float focal, uint32_t n, TexelRow& __restrict row) {
     }
 }
 
+#include "engine/cpu/shadow.inl"
+
 #include "engine/cpu/light.inl"
 
 #include "engine/cpu/surface.inl"
@@ -373,6 +378,7 @@ const Kernels STIPPLE_KERNELS{STIPPLE_KERNELS_NAME,
                               finishRow,
                               surfaceRow,
                               smoothRow,
+                              shadowRow,
                               lightRow,
                               outputRow,
                               keepRow,

@@ -106,9 +106,11 @@ struct LitSurfaces {
     }
 }
 
+/// `mask`: of each, what of the light comes to it (packLight); only if isMasked.
+template <bool isMasked>
 [[gnu::always_inline]] inline void addLight(const LightSource& of, const float* __restrict depth,
-                                            const LitSurfaces surfaceAt, size_t n, float* __restrict r,
-                                            float* __restrict g, float* __restrict b) {
+                                            const uint32_t* __restrict mask, const LitSurfaces surfaceAt, size_t n,
+                                            float* __restrict r, float* __restrict g, float* __restrict b) {
     const LightSource light = of;
     const float* const px = surfaceAt.px;
     const Lens lens = surfaceAt.lens;
@@ -123,8 +125,12 @@ struct LitSurfaces {
         const float inverse = 1.0f / std::sqrt(max(l.x * l.x + l.y * l.y + l.z * l.z, 1.0e-12f));
         l = vec3(l.x * inverse, l.y * inverse, l.z * inverse);
         const float share = lightAt(light, point, z);
-        const vec3 c =
-            reflectLight(surfaceAt(i), l, vec3(light.colour.x * share, light.colour.y * share, light.colour.z * share));
+        vec3 sent = vec3(light.colour.x * share, light.colour.y * share, light.colour.z * share);
+        if (isMasked) {
+            const vec3 past = unpackLight(mask[i]);
+            sent = vec3(sent.x * past.x, sent.y * past.y, sent.z * past.z);
+        }
+        const vec3 c = reflectLight(surfaceAt(i), l, sent);
         r[i] += c.x;
         g[i] += c.y;
         b[i] += c.z;
@@ -140,8 +146,17 @@ void lightSurfaces(const FrameConstants& f, const LightInput& input, const uint3
     const size_t n = takeLit(row, mask, offX, pixels, p);
     const LitSurfaces surfaceAt(p, lensHere(f.focal), inverseFocal, offY * inverseFocal);
     addSurroundings(f, input, surfaceAt, n, sent.r, sent.g, sent.b);
-    for (uint32_t k = 0; k < f.lightCount; ++k)
-        addLight(input.lights[k], p.depth, surfaceAt, n, sent.r, sent.g, sent.b);
+    for (uint32_t k = 0; k < f.lightCount; ++k) {
+        const LightSource& light = input.lights[k];
+        const uint32_t shadow = input.shadowSlots != nullptr ? input.shadowSlots[k] : 0;
+        if (shadow == 0 || shadow > row.shadowSlots) {
+            addLight<false>(light, p.depth, nullptr, surfaceAt, n, sent.r, sent.g, sent.b);
+            continue;
+        }
+        alignas(64) uint32_t past[kTile];
+        for (size_t i = 0; i < n; ++i) past[i] = row.shadow[shadow - 1][p.at[i]];
+        addLight<true>(light, p.depth, past, surfaceAt, n, sent.r, sent.g, sent.b);
+    }
     for (size_t i = 0; i < n; ++i) {
         const uint32_t at = p.at[i];
         row.red[at] = sent.r[i];

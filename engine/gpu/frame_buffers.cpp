@@ -45,7 +45,7 @@ Result<void> FrameBuffers::ensure(Buffer& buffer, uint64_t bytes, VkBufferUsageF
 
 Result<void> FrameBuffers::prepare(const render::RenderRequest& request, const Residents& residents) {
     const render::DrawList& draws = *request.draws;
-    releaseIdle(draws);
+    if (!request.isOfCasters) releaseIdle(draws);
     STIPPLE_TRY(preparePlanes(request));
     render::placePatches(draws, residents.patchesOf, patches_, firstPatch_);
     fillDraws(draws, residents);
@@ -53,6 +53,7 @@ Result<void> FrameBuffers::prepare(const render::RenderRequest& request, const R
     if (draws.hasSurfaces()) STIPPLE_TRY(prepareMeshes(draws, residents));
     if (!draws.lights.empty()) STIPPLE_TRY(fill(kLightsBinding, draws.lights.data(), draws.lights.size(), "lights"));
     STIPPLE_TRY(prepareEnvironment(draws.environment));
+    STIPPLE_TRY(prepareShadows(draws));
     if (draws.glass) STIPPLE_TRY(prepareLayer(*draws.glass));
     STIPPLE_TRY(prepareEffects(draws));
     if (descriptorsChanged_) writeDescriptors();
@@ -167,6 +168,15 @@ Result<void> FrameBuffers::prepareEnvironment(const std::shared_ptr<const render
     return {};
 }
 
+/// Maps of lights that cast shadows, and the table of where they are.
+Result<void> FrameBuffers::prepareShadows(const render::DrawList& draws) {
+    if (!draws.isShadowed) return {};
+    STIPPLE_ASSIGN(const ShadowTable table, shadows_.prepare(device_, draws));
+    STIPPLE_TRY(ensure(bound_[kShadowBinding], sizeof(table), kConstants, true, "shadow maps"));
+    std::memcpy(bound_[kShadowBinding].mapped(), &table, sizeof(table));
+    return {};
+}
+
 /// What only layers of glass need.
 Result<void> FrameBuffers::prepareLayer(const render::LayerTables& layer) {
     STIPPLE_TRY(fill(kLayerBinding, &layer.constants, 1, "layer"));
@@ -204,6 +214,7 @@ void FrameBuffers::releaseIdle(const render::DrawList& draws) {
         bound_.at(binding) = Buffer();
         descriptorsChanged_ = true;
         if (binding == kEnvironmentBinding) environment_.reset();
+        if (binding == kShadowBinding) shadows_.clear();
     };
     for (size_t e = 0; e < idle_.size(); ++e) {
         idle_[e] = draws.effects.has(e) ? 0 : idle_[e] + 1;
@@ -260,7 +271,7 @@ uint64_t FrameBuffers::bytesOf(std::initializer_list<uint32_t> bindings) const {
 
 uint64_t FrameBuffers::bytesOf(const render::Effect& effect) const {
     uint64_t sum = 0;
-    for (const uint32_t b : effect.tables) sum += bound_.at(b).bytes();
+    for (const uint32_t b : effect.tables) sum += bound_.at(b).bytes() + (b == kShadowBinding ? shadows_.bytes() : 0);
     for (const render::EffectPlane& plane : effect.planes) sum += bound_.at(plane.binding).bytes();
     return sum;
 }

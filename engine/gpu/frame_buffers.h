@@ -8,6 +8,7 @@
 #include "engine/gpu/device.h"
 #include "engine/gpu/mesh_frame.h"
 #include "engine/gpu/shader_table.h"
+#include "engine/gpu/shadow_buffers.h"
 #include "engine/render/backend.h"
 #include "engine/render/patch_planes.h"
 
@@ -56,6 +57,7 @@ class FrameBuffers {
     Result<void> prepareLists(const render::RenderRequest& request);
     Result<void> prepareMeshes(const render::DrawList& draws, const Residents& residents);
     Result<void> prepareEnvironment(const std::shared_ptr<const render::Environment>& environment);
+    Result<void> prepareShadows(const render::DrawList& draws);
     Result<void> prepareLayer(const render::LayerTables& layer);
     Result<void> prepareEffects(const render::DrawList& draws);
     void releaseIdle(const render::DrawList& draws);
@@ -72,6 +74,7 @@ class FrameBuffers {
     std::vector<Level> levels_;
     uint32_t texelsOfPixels_ = 0;
     MeshFrame meshFrame_;
+    ShadowBuffers shadows_;
     std::vector<shared::DrawMesh> meshes_, patches_;  ///< of both; of patches
     std::vector<uint32_t> firstPatch_;                ///< of each of their nodes
     std::vector<uint32_t> idle_;                      ///< of each effect: frames without it

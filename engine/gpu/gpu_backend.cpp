@@ -56,7 +56,7 @@ class GpuBackend final : public render::Backend {
         }
         for (const render::Effect* effect : render::effects()) {
             render::EffectResources& held = r.effects.emplace_back();
-            held.pipelines = pipelines_->compiledOf(effect->passes);
+            held.pipelines = pipelines_->compiledOf(*effect);
             for (const auto& slot : slots_) held.bytes += slot->buffers().bytesOf(*effect);
         }
         r.textureTiles = slots_.front()->buffers().residentTiles();
@@ -89,7 +89,7 @@ class GpuBackend final : public render::Backend {
 
     Result<render::Ticket> submit(const render::RenderRequest& request) override {
         STIPPLE_ASSIGN(FrameSlot* const slot, freeSlot());
-        pipelines_->begin(request.draws->effects);
+        if (!request.isOfCasters) pipelines_->begin(request.draws->effects);
         const Residents residents{
             [&](streaming::ChunkKey key) { return pages_.address(places_.at(chunkId(key))); },
             [&](streaming::ChunkKey key) -> const MeshChunk& { return meshChunks_.at(chunkId(key)); },

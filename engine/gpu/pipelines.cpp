@@ -90,22 +90,25 @@ Result<void> Pipelines::use(VkCommandBuffer commands, const Shader& shader) {
 }
 namespace {
 
-/// Is one of the passes a part of the name? light_fog_output is of three.
-bool isOf(std::string_view shader, std::span<const render::Pass> passes) {
+/// Is one of an effect's passes a part of the name? light_fog_output is of three.
+bool isOf(std::string_view shader, const render::Effect& effect) {
+    const auto hasOne = [&](std::span<const render::Pass> passes, std::string_view part) {
+        return std::any_of(passes.begin(), passes.end(), [&](render::Pass p) { return part == render::passName(p); });
+    };
     for (std::string_view rest = shader; !rest.empty();) {
-        const size_t end = std::min(rest.find('_'), rest.size());
-        for (const render::Pass pass : passes)
-            if (rest.substr(0, end) == render::passName(pass)) return true;
-        rest.remove_prefix(std::min(end + 1, rest.size()));
+        const std::string_view part = rest.substr(0, rest.find('_'));
+        if (hasOne(effect.passes, part) || (effect.before != nullptr && hasOne(effect.before->passes, part)))
+            return true;
+        rest.remove_prefix(std::min(part.size() + 1, rest.size()));
     }
     return false;
 }
 
 }  // namespace
 
-uint64_t Pipelines::compiledOf(std::span<const render::Pass> passes) const {
+uint64_t Pipelines::compiledOf(const render::Effect& effect) const {
     return static_cast<uint64_t>(std::count_if(pipelines_.begin(), pipelines_.end(),
-                                               [&](const auto& entry) { return isOf(entry.first, passes); }));
+                                               [&](const auto& entry) { return isOf(entry.first, effect); }));
 }
 void Pipelines::begin(render::EffectSet shown) {
     idle_.resize(render::effects().size());
@@ -113,7 +116,7 @@ void Pipelines::begin(render::EffectSet shown) {
         idle_[e] = shown.has(e) ? 0 : idle_[e] + 1;
         if (idle_[e] != render::kEffectHold) continue;
         std::erase_if(pipelines_, [&](const auto& entry) {
-            const bool goes = isOf(entry.first, render::effects()[e]->passes);
+            const bool goes = isOf(entry.first, *render::effects()[e]);
             if (goes) vkDestroyPipeline(device_.device, entry.second, nullptr);
             return goes;
         });

@@ -19,7 +19,7 @@ namespace stipple::gpu {
 /// (maxPerStageDescriptorStorageBuffers).
 constexpr bool isUniform(uint32_t binding) {
     return binding == shared::kEdlBinding || binding == shared::kFogBinding || binding == shared::kToneBinding ||
-           binding == shared::kOcclusionBinding;
+           binding == shared::kOcclusionBinding || binding == shared::kShadowBinding;
 }
 constexpr VkDescriptorType descriptorType(uint32_t binding) {
     return isUniform(binding) ? VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
@@ -44,8 +44,8 @@ class Pipelines {
     Result<void> use(VkCommandBuffer commands, const Shader& shader);
     void push(VkCommandBuffer commands, const shared::Step& step) const;
     bool isCompiled(std::string_view shader) const { return pipelines_.find(shader) != pipelines_.end(); }
-    /// How many there are of the shaders of some passes: those that have a pass's name as a part (light_output).
-    uint64_t compiledOf(std::span<const render::Pass> passes) const;
+    /// How many there are of the shaders of an effect's passes: those that have a pass's name as a part (light_output).
+    uint64_t compiledOf(const render::Effect& effect) const;
     /// A frame with these effects begins: pipelines of those that no frame has had for long go.
     void begin(render::EffectSet shown);
 

@@ -11,6 +11,7 @@
 #include "shaders/shared/material.h"
 #include "shaders/shared/occlusion.h"
 #include "shaders/shared/optics.h"
+#include "shaders/shared/shadow_table.h"
 #include "shaders/shared/surface.h"
 #include "shaders/shared/texture.h"
 #include "shaders/shared/tone.h"
@@ -74,6 +75,7 @@ static_assert(isLaidOut(shared::kFogBinding, sizeof(shared::FogConstants)));
 static_assert(isLaidOut(shared::kToneBinding, sizeof(shared::ToneConstants)));
 static_assert(isLaidOut(shared::kOcclusionBinding, sizeof(shared::OcclusionConstants)));
 static_assert(isLaidOut(shared::kOpenBinding, sizeof(float)));
+static_assert(isLaidOut(shared::kShadowBinding, sizeof(shared::ShadowTable)));
 #endif
 
 }  // namespace

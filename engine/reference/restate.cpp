@@ -234,6 +234,10 @@ class ReferenceBackend final : public render::DrawsAtOnce {
         if (mode.hasPyramid) reconstruct(level0, draws.view);
         if (mode.smoothsSplats) smooth(draws, level0);
         finishTubes(draws.view, level0);
+        if (request.isOfCasters) {
+            showCasters(draws, level0, image);
+            return;
+        }
         applyOnSurface(draws, level0);
         shade(draws, own, level0, request.wantDepthAndNormal, image);
         times_ = {{"reference", (nowSeconds() - start) * 1e3}};
@@ -398,6 +402,26 @@ class ReferenceBackend final : public render::DrawsAtOnce {
                                 (s.valid ? static_cast<uint32_t>(std::lround(255 * share)) << 24 : 0u);
             }
         });
+    }
+
+    /// What a light meets first: depths, and what leaves let through of it, in bytes.
+    static void showCasters(const render::DrawList& draws, const Level& level, render::Image& image) {
+        const lod::View& v = draws.view;
+        image.width = v.width;
+        image.height = v.height;
+        image.rgba.assign(level.samples.size(), 0);
+        image.depth.assign(level.samples.size(), 0.0f);
+        for (size_t i = 0; i < level.samples.size(); ++i) {
+            const Sample& s = level.samples[i];
+            if (!s.valid) continue;
+            image.depth[i] =
+                static_cast<float>(depthAt(s, dvec2(double(i % v.width) + 0.5, double(i / v.width) + 0.5), v));
+            if (!s.letsLightThrough(pixelsAt(v, s.depth))) continue;
+            constexpr double kGlow = 0.6;
+            const glm::dvec3 c = glm::round(glm::clamp(s.colour * kGlow, dvec3(0), dvec3(1)) * 255.0);
+            image.rgba[i] =
+                toWhole<uint32_t>(c.x) | toWhole<uint32_t>(c.y) << 8 | toWhole<uint32_t>(c.z) << 16 | 0xff000000u;
+        }
     }
 
     struct Seen {

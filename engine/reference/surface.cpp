@@ -218,15 +218,16 @@ bool surfaceOn(const dvec3& ray, const dvec2& weights, double footprint, const C
 }
 
 dvec3 lightsOn(const Sample& s, const dvec3& n, const dvec3& point, const dvec3& dielectric,
-               const render::DrawList& draws) {
+               const render::DrawList& draws, const LightPast& past) {
     const shared::FrameConstants& f = draws.frame;
     const dvec3 v = -sightOf(draws.view, point);
     const double pixels = pixelsAt(draws.view, s.depth);
     dvec3 sum(0);
     if (draws.lights.empty() && !draws.environment)
         return reflected(s, n, v, dvec3(f.sunDirection), dvec3(0.75), dielectric, pixels);
-    for (const shared::LightSource& light : draws.lights) {
-        const dvec3 colour(light.colour);
+    for (size_t k = 0; k < draws.lights.size(); ++k) {
+        const shared::LightSource& light = draws.lights[k];
+        const dvec3 colour = dvec3(light.colour) * (past ? past(k, point, n) : pastMaps(draws, k, point, n));
         if (light.kind == shared::kLightDirectional) {
             sum += reflected(s, n, v, dvec3(light.position), colour, dielectric, pixels);
             continue;
@@ -249,7 +250,8 @@ dvec3 irradianceOf(const render::Environment& environment, const dvec3& n) {
     return irradianceAround(environment.table, n);
 }
 
-dvec3 shadeTriangle(const Sample& s, const dvec3& n, const dvec3& point, const render::DrawList& draws) {
+dvec3 shadeTriangle(const Sample& s, const dvec3& n, const dvec3& point, const render::DrawList& draws,
+                    const LightPast& past) {
     const shared::FrameConstants& f = draws.frame;
     if (s.isTriangle && !s.isLitAsPoint && (s.isUnlit || (f.shade & shared::kShadeTriangles) == 0)) return s.colour;
     const dvec3 v = -sightOf(draws.view, point), up(f.skyDirection);
@@ -268,7 +270,7 @@ dvec3 shadeTriangle(const Sample& s, const dvec3& n, const dvec3& point, const r
         blurred = mirrored(*draws.environment, toMap * mirror, s.roughness);
     }
     dvec3 sum = double(f.ambient) * s.occlusion * (s.colour * (1 - s.metallic) * around + (f0 * ab.x + ab.y) * blurred);
-    return sum + lightsOn(s, n, point, dvec3(0.04), draws) + s.emissive;
+    return sum + lightsOn(s, n, point, dvec3(0.04), draws, past) + s.emissive;
 }
 
 }  // namespace stipple::reference

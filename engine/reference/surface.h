@@ -8,6 +8,7 @@
 
 #include "engine/reference/decode.h"
 #include "engine/reference/restate.h"
+#include "engine/reference/shadow.h"
 
 namespace stipple::reference {
 
@@ -58,11 +59,12 @@ glm::dvec3 mirrored(const render::Environment& environment, const glm::dvec3& di
 /// What a white diffuse surface sends back of it, by its normal there.
 glm::dvec3 irradianceOf(const render::Environment& environment, const glm::dvec3& n);
 /// What lights of the scene's own, or the sun, send back. `dielectric`: what is reflected straight on by what is no
-/// metal.
+/// metal; `past`: what of each light comes there, else that past the frame's shadow maps.
 glm::dvec3 lightsOn(const Sample& s, const glm::dvec3& n, const glm::dvec3& point, const glm::dvec3& dielectric,
-                    const render::DrawList& draws);
+                    const render::DrawList& draws, const LightPast& past = {});
 
 /// Light from a triangle's pixel to the eye. `n`: towards the eye; `point`: camera space.
-glm::dvec3 shadeTriangle(const Sample& s, const glm::dvec3& n, const glm::dvec3& point, const render::DrawList& draws);
+glm::dvec3 shadeTriangle(const Sample& s, const glm::dvec3& n, const glm::dvec3& point, const render::DrawList& draws,
+                         const LightPast& past = {});
 
 }  // namespace stipple::reference

@@ -13,6 +13,7 @@
 #include "engine/reference/decode_patch.h"
 #include "engine/reference/reference.h"
 #include "engine/reference/surface.h"
+#include "engine/render/effects/table.h"
 #include "lod/primitives/octahedral.h"
 #include "lod/store/colour.h"
 #include "lod/store/materials.h"
@@ -264,7 +265,7 @@ class Tracer {
         if (hit.place == kNone) return false;
         const dvec3 point = ray.at(hit.t);
         if (hit.isTriangle && !hit.sample.isLitAsPoint) {
-            colour = shadeTriangle(hit.sample, hit.normal, point, draws_);
+            colour = shadeTriangle(hit.sample, hit.normal, point, draws_, pastThings(hit));
             return true;
         }
         Sample s = hit.sample;
@@ -275,7 +276,7 @@ class Tracer {
         if (draws_.lights.empty() && !draws_.environment && !s.hasMaterial())
             colour *= lightOn(n, f, s.isLeaf(pixelsAt(view_, s.depth)));
         else
-            colour = shadeTriangle(s, n, point, draws_);
+            colour = shadeTriangle(s, n, point, draws_, pastThings(hit));
         return true;
     }
 
@@ -288,6 +289,36 @@ class Tracer {
         Sample sample;
         dvec3 normal{0};  ///< camera space, towards the eye
     };
+
+    /// What comes of a light that casts shadows to a surface, by rays from the light: nothing past what is no leaf, and
+    /// of what falls on a leaf what it lets through. What is no farther in front of the surface than that is thick is
+    /// the surface itself.
+    LightPast pastThings(const Hit& surface) const {
+        const double thickness = surface.thickness;
+        return [this, thickness](size_t k, const dvec3& point, const dvec3&) {
+            const bool casts = castsShadows_ && settings_.draw.lights.at(k).castsShadow;
+            const shared::LightSource& light = draws_.lights[k];
+            if (!casts || light.kind == shared::kLightPoint) return dvec3(1);
+            const bool isFar = light.kind == shared::kLightDirectional;
+            const double far = 4 * glm::length(tree_.bounds().hi - tree_.bounds().lo) + glm::length(point);
+            const dvec3 from = isFar ? point + far * glm::normalize(dvec3(light.position)) : dvec3(light.position);
+            const double length = glm::length(point - from);
+            constexpr double kRounding = 1e-9;
+            const double end = length * (1 - kRounding) - thickness;
+            dvec3 share(1);
+            ViewRay ray{from, (point - from) / length};
+            for (double gone = 0; gone < end && share != dvec3(0);) {
+                const Hit hit = nearestHit(ray, 0);
+                gone += hit.t;
+                if (hit.place == kNone || gone >= end) break;
+                constexpr double kGlow = 0.6;
+                share *= hit.sample.isLeaf(1) ? kGlow * hit.sample.colour : dvec3(0);
+                gone += length * kRounding;
+                ray.origin = from + gone * ray.direction;
+            }
+            return share;
+        };
+    }
 
     dvec3 toWorld(const dvec3& c) const { return view_.right * c.x + view_.down * c.y + view_.forward * c.z; }
     dvec3 toCamera(const dvec3& w) const {
@@ -449,6 +480,7 @@ class Tracer {
     const std::vector<render::PlacedStore>& placed_;
     const lod::View& view_;
     const TraceSettings& settings_;
+    const bool castsShadows_ = render::isRequested("shadow", settings_.draw);
     std::map<std::pair<const lod::Store*, size_t>, TracedStore> stores_;
     std::vector<const TracedStore*> places_;
     BoxTree tree_;  ///< of the places, relative to the eye

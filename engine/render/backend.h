@@ -33,6 +33,8 @@ struct RenderRequest {
     Mode mode = Mode::pullpush;
     std::vector<Pass> passes;  ///< of the mode, for what the draw list calls for
     bool wantDepthAndNormal = false;
+    /// What a light meets first, drawn before the frame that it lights: depths, and as colours what leaves let through.
+    bool isOfCasters = false;
     /// The picture is to be shown by the device that draws it (gpu::Window): where there is such a device it is not
     /// copied to the host, and read has none.
     bool staysOnDevice = false;

@@ -90,6 +90,12 @@ void clear(DrawList& out) {
     out.layer = nullptr;
     out.glass.reset();
     out.hasBlending = false;
+    out.isShadowed = false;
+    out.shadowMaps.reset();
+    out.shadows.clear();
+    out.shadowSlots = 0;
+    out.shadowSlotOf.clear();
+    out.shadowKey = 0;
     out.bends.clear();
     out.swaying = 0;
     out.hasWideDiscs = out.hasSmoothDiscs = false;

@@ -23,12 +23,14 @@
 #include "shaders/shared/mesh.h"
 #include "shaders/shared/optics.h"
 #include "shaders/shared/record.h"
+#include "shaders/shared/shadow.h"
 #include "streaming/streamer.h"
 
 namespace stipple::render {
 
 struct LayerInput;
 struct LayerTables;
+struct ShadowMaps;
 
 /// A light in world space, as KHR_lights_punctual has it.
 struct WorldLight {
@@ -36,6 +38,10 @@ struct WorldLight {
     glm::dvec3 position{0}, direction{0, 0, -1};  ///< direction: where its light goes
     glm::vec3 colour{1};                          ///< linear, times candela or lux
     float range = 0, innerCone = 0, outerCone = 0.785f;
+    bool castsShadow = false;  ///< where shadows are asked for; point lights never do
+    /// Directional: the angle at which it is seen, radians; spot: its radius, world units; 0: borders are hard.
+    float size = 0;
+    bool isSun = false;  ///< the sky is as bright beside it as beside the sun over the viewer's shoulder
 };
 
 /// What is drawn of one kind of primitive: nodes, their records in blocks of 256 draw ids, and the chunks that hold
@@ -109,9 +115,15 @@ struct DrawList {
         return nullptr;
     }
     std::span<const shared::SurfaceMaterial> materials;
-    const LayerInput* layer = nullptr;         ///< of a layer of glass (layers.h), where this is one ...
-    std::shared_ptr<const LayerTables> glass;  ///< ... and what its passes read
-    bool hasBlending = false;                  ///< some materials are kPixelBlends
+    const LayerInput* layer = nullptr;             ///< of a layer of glass (layers.h), where this is one ...
+    std::shared_ptr<const LayerTables> glass;      ///< ... and what its passes read
+    bool isShadowed = false;                       ///< has the effect, whose maps may be none
+    std::shared_ptr<const ShadowMaps> shadowMaps;  ///< where lights cast shadows, ...
+    std::vector<shared::ShadowMap> shadows;        ///< ... each of them in camera space
+    uint32_t shadowSlots = 0;                      ///< masks of lights
+    std::vector<uint32_t> shadowSlotOf;            ///< of each light 1 + that of its mask, or 0; empty: none casts
+    uint64_t shadowKey = 0;                        ///< frames of the same have the same masks; 0: nothing is known
+    bool hasBlending = false;                      ///< some materials are kPixelBlends
     // What the fp32 numbers above were made from: the reference starts from these.
     lod::View view;          ///< orthographic: its eye stands before what is drawn ...
     double eyeAdvanced = 0;  ///< ... so far before the eye that was asked for
@@ -148,15 +160,17 @@ struct DrawSettings {
     glm::vec3 background = linearBackground();  ///< linear
     glm::dvec3 worldUp{0, 0, 1};
     std::shared_ptr<const Environment> environment;
-    std::vector<WorldLight> lights;  ///< none: a sun over the viewer's shoulder
-    float supportScale = 1.0f;       ///< splat radius of the reconstruction / stored radius
-    float minimumRadius = 1.0f;      ///< pixels
-    float lowPass = 0.5f;            ///< of blended discs: variance, px^2
-    float kernelSupport = 2;         ///< of blended discs: where kernels end, in sigmas (2 or 3)
-    bool perSurfel = false;          ///< blended discs have weights of their own; pixels are not divided by theirs
+    std::vector<WorldLight> lights;             ///< none: a sun over the viewer's shoulder
+    std::shared_ptr<const ShadowMaps> shadows;  ///< set by the frame, of the lights that cast (shadow_frame.h)
+    float supportScale = 1.0f;                  ///< splat radius of the reconstruction / stored radius
+    float minimumRadius = 1.0f;                 ///< pixels
+    float lowPass = 0.5f;                       ///< of blended discs: variance, px^2
+    float kernelSupport = 2;                    ///< of blended discs: where kernels end, in sigmas (2 or 3)
+    bool perSurfel = false;  ///< blended discs have weights of their own; pixels are not divided by theirs
     uint32_t patchAs = shared::kPatchStrips;
     float exactCurves = 2.0f;            ///< pixels of half-width from which curves are filled, not reconstructed
     Wind wind;                           ///< moves what setSway was told of
+    uint64_t frameTag = 0;               ///< another one where what is resident, or the mode, is another than before
     uint32_t coverageSeed = 0;           ///< of curves narrower than a pixel
     std::vector<EffectRequest> effects;  ///< that are asked for by their names ...
     EffectParameters parameters;         ///< ... and what they are told

@@ -54,7 +54,9 @@ std::vector<EffectStatus> effectStatus(const FrameState& state, const DrawSettin
         s.isActive = state.effects.shown.has(e);
         if (e < state.effects.passes.size()) s.passes = state.effects.passes[e];
         if (e < held.effects.size()) s.held = held.effects[e];
+        if (effect.before != nullptr) s.held.bytes += effect.before->bytes(state);
         if (!s.isActive) continue;
+        if (effect.before != nullptr) s.msBefore = effect.before->ms(state);
         for (const PassTime& time : state.backend->passTimes()) addTime(time, effect, s);
     }
     return out;

@@ -19,6 +19,7 @@ struct EffectStatus {
     /// Of its passes. None where they run together with others, tile by tile: then `within` is what these are called.
     std::optional<double> ms;
     std::string within;
+    double msBefore = 0;  ///< of the frames that it draws before that of the camera
 };
 
 /// Of all effects of the table, after a frame of `state` with these settings.

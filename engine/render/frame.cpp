@@ -9,10 +9,12 @@
 #include <unordered_map>
 
 #include "engine/base/process.h"
+#include "engine/render/effects/table.h"
 #include "engine/render/frame_passes.h"
 #include "engine/render/layered_frame.h"
 #include "engine/render/length_unit.h"
 #include "engine/render/picture_tone.h"
+#include "engine/render/shadow_frame.h"
 #include "engine/render/views.h"
 #include "lod/primitives/octahedral.h"
 #include "lod/primitives/patch_samples.h"
@@ -236,7 +238,8 @@ namespace {
 
 /// Draws state.cut, which has no layers, in a unit of length that suits it.
 Result<uint64_t> drawPlain(FrameState& state, const lod::View& view, const FrameSettings& settings) {
-    const double units = unitsOfLength(state.cut, state.hierarchies, state.instances, view);
+    const double units = settings.draw.shadows ? settings.draw.shadows->units  // their maps are in them
+                                               : unitsOfLength(state.cut, state.hierarchies, state.instances, view);
     if (units == 1) return drawNodes(state, state.cut, view, settings);
     FrameSettings converted = settings;
     converted.draw = inUnits(settings.draw, units);
@@ -337,10 +340,17 @@ Result<void> draw(FrameState& state, const lod::View& view, const FrameSettings&
     streaming::Streamer& streamer = *state.streamer;
     const double cutStart = nowSeconds();
     lod::selectCut(state.scene(), streamer.residency(), view, settings.budgets, state.scratch, state.cut);
-    addViewsFromBehind(state, view, settings);
     const double cutEnd = nowSeconds();
+    FrameSettings shaded = settings;
+    constexpr uint64_t kMostModes = 16;
+    shaded.draw.frameTag = (streamer.counters().uploads + streamer.counters().evictions) * kMostModes +
+                           static_cast<uint64_t>(settings.mode);
+    for (const Effect* e : effects())
+        if (e->before != nullptr && !state.backendLife.expired())
+            STIPPLE_TRY(e->before->draw(state, view, shaded, asks));
+    addViewsFromBehind(state, view, settings);
     if (asks) streamer.request(state.cut);
-    return drawCut(state, view, settings, start, (cutEnd - cutStart) * 1e3);
+    return drawCut(state, view, shaded, start, (cutEnd - cutStart) * 1e3);
 }
 
 }  // namespace
@@ -357,6 +367,18 @@ Result<void> renderResident(FrameState& state, const lod::View& view, const Fram
 }
 
 namespace {
+
+/// Bodies from behind, what effects look at: makes state.plan, which is of `view` alone, that of all views together.
+void planFurtherViews(FrameState& state, const lod::View& view, const FrameSettings& settings,
+                      std::span<const std::pair<uint32_t, uint32_t>> barred) {
+    std::vector<lod::ViewRequest> views{{view, settings.budgets.errorPixels}};
+    addRequestsFromBehind(state, view, settings, views);
+    for (const Effect* e : effects())
+        if (e->before != nullptr) e->before->addViews(state, view, settings, views);
+    if (views.size() == 1) return;
+    lod::planResident(state.scene(), views, settings.budgets.records, state.streamer->residentLimit(), barred,
+                      state.planScratch, state.planCut, state.plan);
+}
 
 /// Waits until the plan is resident, as far as it can be.
 Result<void> await(const lod::ResidentPlan& plan, streaming::Streamer& streamer) {
@@ -382,7 +404,7 @@ Result<bool> renderUntilComplete(FrameState& state, const lod::View& view, const
     for (;;) {
         lod::planResident(state.scene(), view, settings.budgets, streamer.residentLimit(), barred, state.scratch,
                           state.cut, state.plan);
-        planViewsFromBehind(state, view, settings, barred);
+        planFurtherViews(state, view, settings, barred);
         const uint64_t failures = streamer.counters().failures;
         STIPPLE_TRY(await(state.plan, streamer));
         if (streamer.counters().failures == failures) break;

@@ -9,6 +9,7 @@
 #include "engine/base/counters.h"
 #include "engine/render/backend.h"
 #include "engine/render/disc_sizes.h"
+#include "lod/cut/views.h"
 #include "lod/store/colour.h"
 #include "lod/store/store.h"
 #include "streaming/streamer.h"
@@ -16,6 +17,7 @@
 namespace stipple::render {
 
 struct LayeredFrame;
+struct ShadowFrame;
 
 /// Of the last frame, with all its layers.
 struct EffectsOfFrame {
@@ -49,7 +51,10 @@ struct FrameState {
     DrawList draws;
     Image image;
     std::shared_ptr<LayeredFrame> layered;  ///< of scenes with glass, from the first such frame on (layered_frame.h)
-    std::optional<Ticket> onDevice;         ///< of the last frame, if its picture stays there
+    std::shared_ptr<ShadowFrame> shadows;   ///< of frames with lights that cast them (shadow_frame.h)
+    lod::ViewsScratch planScratch;          ///< of frames of several views, for what they plan
+    lod::CutOfViews planCut;
+    std::optional<Ticket> onDevice;  ///< of the last frame, if its picture stays there
     FrameCounters counters;
     EffectsOfFrame effects;
 

@@ -104,6 +104,11 @@ LayerInput inputOf(const FrameState& state, const LayerDraw& layer, const DrawSe
     return in;
 }
 
+/// All of it, so that it is no part of what is behind.
+bool isSeenThrough(const OpticsOf& o) {
+    return o.opacity < 1 || (o.isGlass && (o.isWhole || o.isPlainMesh || o.points != 0));
+}
+
 /// The frame's list points at a layer only while that one is drawn, however drawing ends.
 class NoLayerAfter {
   public:
@@ -139,7 +144,7 @@ Result<uint64_t> drawLayered(FrameState& state, const lod::View& view, const Fra
         const bool isDrawnLater = std::any_of(layers.begin(), layers.end(), [&](const LayerDraw& layer) {
             return std::binary_search(layer.instances.begin(), layer.instances.end(), i);
         });
-        return !(isDrawnLater && (o.opacity < 1 || (o.isGlass && (o.isWhole || o.isPlainMesh || o.points != 0))));
+        return !(isDrawnLater && isSeenThrough(o));
     });
     state.draws.materials = l.appearance.cutOut;
     STIPPLE_ASSIGN(uint64_t passes, drawNodes(state, l.cut, view, plain));
@@ -187,17 +192,23 @@ void addViewsFromBehind(FrameState& state, const lod::View& view, const FrameSet
     }
 }
 
-void planViewsFromBehind(FrameState& state, const lod::View& view, const FrameSettings& settings,
-                         std::span<const std::pair<uint32_t, uint32_t>> barred) {
-    std::vector<lod::ViewRequest> views{{view, settings.budgets.errorPixels}};
+void addRequestsFromBehind(FrameState& state, const lod::View& view, const FrameSettings& settings,
+                           std::vector<lod::ViewRequest>& requests) {
     for (const LayerDraw& layer : layersIn(state, view, settings.draw))
         if (layer.isSeenTwice)
-            views.push_back(
+            requests.push_back(
                 {viewFromBehind(bodyIn(state, layer.instances.front()), view), settings.budgets.errorPixels, true});
-    if (views.size() == 1) return;
-    LayeredFrame& l = *state.layered;
-    lod::planResident(state.scene(), views, settings.budgets.records, state.streamer->residentLimit(), barred,
-                      l.planScratch, l.planCut, state.plan);
+}
+
+bool castsNone(const FrameState& state, uint32_t instance) {
+    return state.layered && state.layered->appearance.hasLayers &&
+           isSeenThrough(state.layered->appearance.hierarchies[state.instances[instance].hierarchy]);
+}
+
+std::span<const shared::SurfaceMaterial> materialsOfCasters(const FrameState& state) {
+    if (!state.layered) return state.materials;
+    const Appearance& a = state.layered->appearance;
+    return a.hasLayers ? a.cutOut : a.shown;
 }
 
 }  // namespace stipple::render

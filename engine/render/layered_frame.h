@@ -14,8 +14,6 @@ struct LayeredFrame {
     Appearance appearance;
     lod::Cut cut, backCut;
     lod::CutScratch backScratch;
-    lod::ViewsScratch planScratch;
-    lod::CutOfViews planCut;
     Image behind, back;
 };
 
@@ -30,8 +28,12 @@ Result<uint64_t> drawLayered(FrameState& state, const lod::View& view, const Fra
 
 /// Adds what views of bodies from behind miss and need to state.cut, so that it is streamed, too.
 void addViewsFromBehind(FrameState& state, const lod::View& view, const FrameSettings& settings);
-/// The same for state.plan, which is of `view` alone.
-void planViewsFromBehind(FrameState& state, const lod::View& view, const FrameSettings& settings,
-                         std::span<const std::pair<uint32_t, uint32_t>> barred);
+/// Adds those views, so that they are planned with the camera's.
+void addRequestsFromBehind(FrameState& state, const lod::View& view, const FrameSettings& settings,
+                           std::vector<lod::ViewRequest>& requests);
+/// Is all of an instance drawn in layers? What is seen through keeps no light away.
+bool castsNone(const FrameState& state, uint32_t instance);
+/// Materials of what keeps light away: without those of layers.
+std::span<const shared::SurfaceMaterial> materialsOfCasters(const FrameState& state);
 
 }  // namespace stipple::render

@@ -53,6 +53,8 @@ DrawSettings inUnits(DrawSettings settings, double units) {
         if (light.kind == shared::kLightDirectional) continue;
         for (int c = 0; c < 3; ++c) light.colour[c] = toFloat(light.colour[c] * units * units);
     }
+    settings.parameters.occlusion.radius *= units;
+    settings.parameters.facts.extent *= units;
     FogSettings& fog = settings.parameters.fog;
     fog.density /= units;
     fog.height *= units;

@@ -22,6 +22,7 @@ enum class Plane : uint8_t {
     coarse,      ///< the levels above
     smooth,      ///< level 0 of discs so wide that they would show as facets, and the levels above
     surface,     ///< what is seen at each pixel, whoever filled it
+    shadows,     ///< what of each light that casts shadows comes to a pixel
     image
 };
 

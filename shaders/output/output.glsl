@@ -1,5 +1,6 @@
 // The picture's pixels, over the background. LIT: with the light on them, which reads nothing but its own pixel;
-// REFRACTED: with that of a layer of glass. FOG, TONE: what becomes of what surfaces send.
+// SHADOWED, too: past shadow
+// maps; REFRACTED: with that of a layer of glass. FOG, TONE: what becomes of what surfaces send.
 #if defined(LIT)
 #include "../light.glsl"
 #elif defined(REFRACTED)

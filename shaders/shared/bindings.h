@@ -39,7 +39,8 @@ const uint kFogBinding = 31u;
 const uint kToneBinding = 32u;
 const uint kOcclusionBinding = 33u;
 const uint kOpenBinding = 34u;
-const uint kBindings = 35u;
+const uint kShadowBinding = 35u;
+const uint kBindings = 36u;
 
 // Per pixel:
 const uint kTexelWords = 5u;     // planes of a packed texel; in frames with materials of points one more

@@ -9,6 +9,13 @@ SHARED_BEGIN
 // the visible, leaves send about as much through as back.)
 const float kLeafGlow = 0.6f;
 
+// What a leaf of a colour lets through, a byte a channel; the highest byte says that it is one.
+SHARED_FN uint throughLeaf(vec3 colour) {
+    return uint(int(min(max(0.0f, colour.x * kLeafGlow), 1.0f) * 255.0f + 0.5f)) |
+           uint(int(min(max(0.0f, colour.y * kLeafGlow), 1.0f) * 255.0f + 0.5f)) << 8 |
+           uint(int(min(max(0.0f, colour.z * kLeafGlow), 1.0f) * 255.0f + 0.5f)) << 16 | 0xff000000u;
+}
+
 // Light that a white surface with the eye-facing normal n sends to the eye; of the sky's `occlusion` gets there.
 SHARED_FN float irradiance(vec3 n, vec3 sunDirection, vec3 skyDirection, float leaf, float occlusion) {
     const float towards = dot(n, sunDirection);

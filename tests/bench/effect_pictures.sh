@@ -23,3 +23,6 @@ shot fog-air forest.glb --error 2 --set fog.density=0.002 --set fog.kind=air --s
 shot tone-off forest.glb --error 2
 shot tone-bright forest.glb --error 2 --set tone.exposure=2
 shot tone-filmic forest.glb --error 2 --set tone.exposure=2 --set tone.curve=filmic
+shot shadow-off forest.glb --error 2 --effects none --sun 135,35
+shot shadow-on forest.glb --error 2 --sun 135,35
+shot shadow-soft forest.glb --error 2 --sun 135,35 --sun-size 3

@@ -44,6 +44,15 @@ std::shared_ptr<const render::Environment> sky(Executor& executor) {
     return kSky;
 }
 
+/// A sun over the viewer's left shoulder.
+render::WorldLight lampThatCasts() {
+    render::WorldLight light;
+    light.kind = shared::kLightDirectional;
+    light.direction = glm::normalize(glm::dvec3(0.6, -0.5, -0.8));
+    light.castsShadow = true;
+    return light;
+}
+
 }  // namespace
 
 void addEffect(const std::string& name, Executor& executor, render::DrawSettings& s) {
@@ -58,6 +67,11 @@ void addEffect(const std::string& name, Executor& executor, render::DrawSettings
         s.effects.emplace_back(name);
     }
     if (name == "occlusion") s.unlitTriangles = false;
+    if (name == "shadow") {
+        s.unlitTriangles = false;
+        s.lights = {lampThatCasts()};
+        s.parameters.shadow.texels = 128;
+    }
     if (name == "fog") s.parameters.fog.density = 0.1;
     if (name == "tone") s.parameters.tone = {1.5, 1};
 }
@@ -69,6 +83,12 @@ bool addUselessly(const std::string& name, render::DrawSettings& s) {
         return true;
     }
     s.effects.emplace_back(name);
+    if (name == "shadow") {  // nothing casts
+        s.unlitTriangles = false;
+        s.lights = {lampThatCasts()};
+        s.lights[0].castsShadow = false;
+        return true;
+    }
     if (name == "edl") {
         s.lit = true;
         s.unlitTriangles = false;

@@ -56,6 +56,31 @@ TEST(EffectRequests, AutoCallsForWhatTheSceneNeeds) {
     EXPECT_EQ(namesIn(ask({"auto,fog", {}}, unlitScan()).settings), (Names{"fog", "edl"}));
 }
 
+TEST(EffectRequests, ShadowsComeWithASunAndUnderAutoWithLightsThatCast) {
+    SceneFacts lamps;
+    lamps.lightsThatCast = 1;
+    EXPECT_EQ(namesIn(ask({"auto", {}}, lamps).settings), Names{"shadow"});
+    EXPECT_TRUE(namesIn(ask({}, lamps).settings).empty()) << "lights of a file alone do not ask";
+    EXPECT_EQ(namesIn(ask({"shadow", {}}, {}).settings), Names{"shadow"});
+    DrawSettings sunny;
+    sunny.lights.resize(1);
+    sunny.lights[0].castsShadow = sunny.lights[0].isSun = true;
+    for (const char* list : {"scene", "auto", "fog"}) {
+        const Asked asked = ask({list, {}}, lamps, {}, sunny);
+        ASSERT_TRUE(isRequested("shadow", asked.settings)) << list;
+        EXPECT_FALSE(isRequested("edl", asked.settings)) << "the control";
+        for (const EffectRequest& r : asked.settings.effects)
+            if (r.name == "shadow") EXPECT_EQ(r.by, "--sun") << list;
+    }
+    for (const char* list : {"none", "auto,-shadow"}) {
+        const Asked without = ask({list, {}}, lamps, {}, sunny);
+        EXPECT_TRUE(namesIn(without.settings).empty()) << list;
+        EXPECT_EQ(without.settings.lights.size(), 1u) << "it still shines";
+        ASSERT_EQ(without.notes.size(), 1u);
+        EXPECT_NE(without.notes.front().find("leaves shadow out, whatever --sun says"), std::string::npos);
+    }
+}
+
 TEST(EffectRequests, WithoutAWordNothingIsCalledFor) {
     EXPECT_EQ(EffectWishes{}.list, "scene");
     EXPECT_TRUE(namesIn(ask({}, unlitScan()).settings).empty());

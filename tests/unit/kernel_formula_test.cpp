@@ -277,7 +277,7 @@ TEST(KernelFormulas, LightIsThatOfTheFormulas) {
                 row->red[i] = c.x;
                 row->green[i] = c.y;
                 row->blue[i] = c.z;
-                const float light = irradiance(n, f.sunDirection, f.skyDirection, row->leaf[i]);
+                const float light = irradiance(n, f.sunDirection, f.skyDirection, row->leaf[i], 1);
                 expected.emplace_back(c.x * light, c.y * light, c.z * light);
             }
             k.lightRow(f, {nullptr, nullptr}, 0, 3, cpu::kTile, *row);

@@ -6,6 +6,7 @@
 
 #include "engine/render/effects/table.h"
 #include "engine/render/frame_passes.h"
+#include "engine/render/shadow_frame.h"
 
 namespace stipple::render {
 namespace {
@@ -48,7 +49,8 @@ TEST(Passes, ReadNothingThatNobodyWrote) {
                         // before).
                         if (plane == Plane::coarse && pass == Pass::surface && !has(passes, Pass::push)) continue;
                         if (plane == Plane::smooth && !has(passes, Pass::smooth)) continue;
-                        if (plane == Plane::filtered && !has(passes, Pass::ewa)) continue;  // so are blended pixels
+                        if (plane == Plane::shadows && !has(passes, Pass::shadow)) continue;  // all light comes there
+                        if (plane == Plane::filtered && !has(passes, Pass::ewa)) continue;    // so are blended pixels
                         if (info.reads.has(plane))
                             EXPECT_TRUE(written.has(plane)) << r.name << ": " << info.name << " reads " << p;
                     }
@@ -98,6 +100,16 @@ TEST(Passes, OfAnEffectAreThereOnlyWithTheEffect) {
                 EXPECT_EQ(plain.size() + of, passesOf(r.mode, content, set).size());
             }
         }
+}
+
+TEST(Passes, OfCastersEndWithWhatTheLightMeets) {
+    for (const FrameContent& content : allContents()) {
+        std::vector<Pass> passes = passesOfCasters(content), plain = passesOf(kCasterMode, content, {});
+        EXPECT_EQ(passes.back(), Pass::cast);
+        passes.pop_back();
+        plain.pop_back();
+        EXPECT_EQ(passes, plain);
+    }
 }
 
 TEST(Passes, ModesAreFoundByTheirNames) {

@@ -78,6 +78,8 @@ TEST_F(ZeroCost, WhatIsAskedForInVainIsNotThereAndThePictureIsTheSame) {
         without.draw.effects.clear();
         if (std::string("light") == effects()[e]->name) without.draw.unlitTriangles = true;
         auto state = open();
+        draw(*state, plain());
+        if (usual().resources().effectBytes > 0) rest(*state, plain());  // of the one before
         draw(*state, without);
         const Image before = state->image;
         draw(*state, asked);

@@ -21,6 +21,9 @@ struct RowPass {
     /// Adds what it reads of surfaces.
     void (*wants)(const Frame& frame, SurfaceWants& wants);
     void (*run)(const RowPlace& at, SurfaceRow& row);
+    /// What light needs to know of surfaces that are seen beside those of the pixels, before it lights them. Null:
+    /// nothing of this pass.
+    void (*beside)(const RowPlace& at, SurfaceRow& second) = nullptr;
 };
 
 /// One of the two. A pass of rows that reads its neighbours (passes.inl) begins a run of its own, and finds the whole
@@ -28,6 +31,8 @@ struct RowPass {
 struct CpuPass {
     void (*run)(Frame& frame) = nullptr;
     RowPass row{};
+    /// Before the first pass of a frame that has this one. Null: nothing is to be made ready.
+    void (*begin)(Frame& frame) = nullptr;
 };
 #define STIPPLE_PASS(name, reads, writes, isOfOwnPixel) extern const CpuPass name##Pass;
 #include "engine/render/passes.inl"

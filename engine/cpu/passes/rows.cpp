@@ -66,7 +66,7 @@ class RowProgram {
     RowProgram(Frame& frame, std::span<const render::Pass> passes, std::span<const render::Pass> later)
         : frame_(frame),
           fine_(frame.texels()),
-          isKept_(passes.back() != render::Pass::output),
+          isKept_(!render::passInfo(passes.back()).writes.has(render::Plane::image)),
           isFirst_(passes.front() == render::Pass::surface),
           empty_(emptyRow(frame)) {
         for (const render::Pass pass : passes)
@@ -95,6 +95,7 @@ class RowProgram {
         const SurfacePlanes planes = planesOf(at);
         const SurfaceWants wants = wantsOf(planes);
         thread_local SurfaceRow surface{};
+        surface.shadowSlots = 0;
         SurfaceWants made = wants;
         made.depth = made.depth || smooth != nullptr;
         frame_.k.surfaceRow(f, own, row, planes, made, x0, y, n, surface);
@@ -111,6 +112,7 @@ class RowProgram {
         const RowPlace at = placeOf(x0, n, y);
         const SurfacePlanes planes = planesOf(at);
         thread_local SurfaceRow surface{};
+        surface.shadowSlots = 0;
         if (!takeRow(at, planes, wantsOf(planes), surface)) return finishEmpty(at);
         finish(at, planes, surface);
     }
@@ -156,7 +158,11 @@ class RowProgram {
             const bool isLight = lights(step);
             const bool hasSeconds = !isMixed && (isLight || step.takesMixed) && takeSeconds(at, surface, second);
             isMixed = isMixed || isLight || step.takesMixed;
-            if (hasSeconds && isLight) step.pass->run(at, second);
+            if (hasSeconds && isLight) {
+                for (const Step& other : steps_)
+                    if (other.pass->beside != nullptr) other.pass->beside(at, second);
+                step.pass->run(at, second);
+            }
             if (hasSeconds && !isLight) mixSeconds(at, second, surface);
             step.pass->run(at, surface);
             if (hasSeconds && isLight) mixSeconds(at, second, surface);
@@ -258,7 +264,8 @@ constinit const CpuPass lightPass{
                 [](const RowPlace& at, SurfaceRow& row) {
                     const render::DrawList& draws = *at.frame.draws;
                     const LightInput light{draws.lights.data(),
-                                           draws.environment ? draws.environment->table.data() : nullptr};
+                                           draws.environment ? draws.environment->table.data() : nullptr,
+                                           draws.shadowSlotOf.empty() ? nullptr : draws.shadowSlotOf.data()};
                     at.frame.k.lightRow(at.frame.constants, light, at.x0, at.y, at.n, row);
                 }}};
 

@@ -89,21 +89,16 @@ void fill(const DrawSettings& settings, const glm::dmat3&, DrawList& out) {
 extern const Effect edlEffect;
 constinit const Effect edlEffect{.name = "edl",
                                  .summary = "eye-dome lighting: shape by depth, where there is no light or no normals",
-                                 .isRequested = nullptr,
                                  .calledForBy = [](const SceneFacts& f) -> const char* {
                                      if (f.hasUnlitPoints) return "points that keep their colours";
                                      if (f.hasPointsWithoutNormals) return "points without normals";
                                      return f.hasUnlitTriangles ? "surfaces that keep their colours" : nullptr;
                                  },
                                  .parameters = kParameters,
-                                 .ofScene = [](const EffectScene& scene) { return !scene.instances.empty(); },
                                  .ofFrame = ofFrame,
-                                 .ofNode = nullptr,
                                  .fill = fill,
-                                 .stage = Stage::surface,
                                  .passes = kPasses,
                                  .tables = kTables,
-                                 .tolerancePixels = 0,
                                  .toleranceSteps = 1};
 
 }  // namespace stipple::render

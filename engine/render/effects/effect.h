@@ -5,17 +5,22 @@
 #include <cstdint>
 #include <initializer_list>
 #include <span>
+#include <vector>
 
+#include "engine/base/result.h"
 #include "engine/render/content.h"
 #include "engine/render/effects/facts.h"
 #include "engine/render/passes.h"
 #include "engine/render/wind.h"
 #include "lod/cut/cut.h"
+#include "lod/cut/views.h"
 
 namespace stipple::render {
 
 struct DrawSettings;
 struct DrawList;
+struct FrameState;
+struct FrameSettings;
 
 /// All that is placed; asked once a scene.
 struct EffectScene {
@@ -62,28 +67,50 @@ struct EffectPlane {
     uint64_t (*elements)(const DrawList& draws);
 };
 
+/// Frames that an effect draws before that of the camera, which shows what came of them.
+struct FramesBefore {
+    /// Draws them, and puts what came of them into `settings`; clears that where the frame does not call for them.
+    /// `mayKeep`: what was drawn before may be taken although more is resident by now.
+    Result<void> (*draw)(FrameState& state, const lod::View& view, FrameSettings& settings, bool mayKeep);
+    /// Their views, so that they are planned with the camera's.
+    void (*addViews)(const FrameState& state, const lod::View& view, const FrameSettings& settings,
+                     std::vector<lod::ViewRequest>& views);
+    /// What is kept of them beside what backends hold.
+    uint64_t (*bytes)(const FrameState& state);
+    /// What they took of the last frame, milliseconds.
+    double (*ms)(const FrameState& state);
+    std::span<const Pass> passes{};  ///< that only they have
+};
+
+/// Scenes in which anything is placed.
+inline bool hasInstances(const EffectScene& scene) { return !scene.instances.empty(); }
+
 /// What an effect has taken is given back after so many frames without it.
 constexpr uint32_t kEffectHold = 60;
 
+/// A manifest says what is its own: what is not said is as here.
 struct Effect {
     const char* name;
     const char* summary;
     /// Null: where its name is among DrawSettings::effects.
-    bool (*isRequested)(const DrawSettings& settings);
-    /// Where not --effects does: the option that asks for it.
+    bool (*isRequested)(const DrawSettings& settings) = nullptr;
+    /// Where not --effects does, or not it alone: the option that asks for it.
     const char* option = nullptr;
+    /// Of what is requested by name: does that option ask for it, too? Null: there is none.
+    bool (*isAskedFor)(const DrawSettings& settings) = nullptr;
     /// Takes the request of that option back, as `--effects none` does. Null: it is not left out.
     void (*leaveOut)(DrawSettings& settings) = nullptr;
     /// What of a scene calls for it under `auto`, in a few words; null: nothing. Null itself: nothing ever does.
     const char* (*calledForBy)(const SceneFacts& facts) = nullptr;
     std::span<const Parameter> parameters{};
-    bool (*ofScene)(const EffectScene& scene);  ///< could any of it need the effect? Conservative
-    bool (*ofFrame)(const EffectFrame& frame);  ///< does this frame show it?
+    bool (*ofScene)(const EffectScene& scene) = hasInstances;  ///< could any of it need the effect? Conservative
+    bool (*ofFrame)(const EffectFrame& frame);                 ///< does this frame show it?
     /// Does a node feed it, and how is that node moved? Still: it does not. Null: nodes do not matter.
-    Bend (*ofNode)(const EffectNode& node);
+    Bend (*ofNode)(const EffectNode& node) = nullptr;
     /// Tables and constants that its passes read, in camera space. Null: none.
-    void (*fill)(const DrawSettings& settings, const glm::dmat3& cameraFromWorld, DrawList& out);
-    Stage stage;
+    void (*fill)(const DrawSettings& settings, const glm::dmat3& cameraFromWorld, DrawList& out) = nullptr;
+    const FramesBefore* before = nullptr;
+    Stage stage = Stage::surface;
     std::span<const Pass> passes{};  ///< of its own; what they read and write: passes.inl
     /// Bindings of the tables that only it fills (DrawList::tables, or what backends fill on their own).
     std::span<const uint32_t> tables{};

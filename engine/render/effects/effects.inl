@@ -4,6 +4,9 @@
 //
 // Light and what stands in its place are in every build; a build with -DSTIPPLE_EFFECTS=OFF leaves the others out, with
 // all files and folders of their names, and the passes of ../passes.inl that are left out likewise.
+#ifndef STIPPLE_ONLY_LIGHT
+STIPPLE_EFFECT(shadow)
+#endif
 STIPPLE_EFFECT(light)
 STIPPLE_EFFECT(environment)
 STIPPLE_EFFECT(refraction)

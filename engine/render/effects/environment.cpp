@@ -37,13 +37,9 @@ constinit const Effect environmentEffect{.name = "environment",
                                          .summary = "light and reflections of an HDR picture",
                                          .isRequested = [](const DrawSettings& s) { return s.environment != nullptr; },
                                          .option = "--environment",
-                                         .ofScene = [](const EffectScene& scene) { return !scene.instances.empty(); },
                                          .ofFrame = isLit,
-                                         .ofNode = nullptr,
                                          .fill = fill,
                                          .stage = Stage::light,
-                                         .tables = kTables,
-                                         .tolerancePixels = 0,
-                                         .toleranceSteps = 0};
+                                         .tables = kTables};
 
 }  // namespace stipple::render

@@ -28,6 +28,8 @@ SceneFacts factsOf(std::span<const std::shared_ptr<const lod::Store>> stores, co
         facts.hasPointsWithoutNormals = facts.hasPointsWithoutNormals || (isPoints && !d.hasNormals);
     }
     facts.lights = static_cast<uint32_t>(settings.lights.size());
+    facts.lightsThatCast = static_cast<uint32_t>(std::count_if(settings.lights.begin(), settings.lights.end(),
+                                                               [](const WorldLight& l) { return l.castsShadow; }));
     return facts;
 }
 

@@ -16,8 +16,9 @@ struct SceneFacts {
     bool hasUnlitPoints = false;     ///< drawn as they are: their own colours, no light on them
     bool hasUnlitTriangles = false;  ///< the same of triangles and patches
     bool hasPointsWithoutNormals = false;
-    uint32_t lights = 0;  ///< of the scene's own
-    double extent = 0;    ///< of the largest store, across its focus; its units
+    uint32_t lights = 0;          ///< of the scene's own, and a sun
+    uint32_t lightsThatCast = 0;  ///< of these: what is lit could show their shadows
+    double extent = 0;            ///< of the largest store, across its focus; its units
 };
 
 /// Of stores that are placed, with what the settings make of them.

@@ -124,16 +124,12 @@ void fill(const DrawSettings& settings, const glm::dmat3& cameraFromWorld, DrawL
 extern const Effect fogEffect;
 constinit const Effect fogEffect{.name = "fog",
                                  .summary = "fog and aerial perspective",
-                                 .isRequested = nullptr,
                                  .parameters = kParameters,
-                                 .ofScene = [](const EffectScene& scene) { return !scene.instances.empty(); },
                                  .ofFrame = ofFrame,
-                                 .ofNode = nullptr,
                                  .fill = fill,
                                  .stage = Stage::lit,
                                  .passes = kPasses,
                                  .tables = kTables,
-                                 .tolerancePixels = 0,
                                  .toleranceSteps = 1};
 
 }  // namespace stipple::render

@@ -1,4 +1,5 @@
 // Light: a sun over the viewer's shoulder, or lights of the scene's own, on what is not drawn as it is.
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -30,7 +31,9 @@ void fill(const DrawSettings& settings, const glm::dmat3& cameraFromWorld, DrawL
         out.lights.push_back(l);
     }
     out.frame.lightCount = static_cast<uint32_t>(out.lights.size());
-    if (!out.lights.empty()) out.frame.ambient = kAmbientBesideLights;
+    const bool isSunny =
+        std::any_of(settings.lights.begin(), settings.lights.end(), [](const auto& l) { return l.isSun; });
+    if (!out.lights.empty() && !isSunny) out.frame.ambient = kAmbientBesideLights;
 }
 
 }  // namespace
@@ -47,14 +50,10 @@ constinit const Effect lightEffect{.name = "light",
                                    .summary = "a sun, or the scene's own lights",
                                    .isRequested = [](const DrawSettings& s) { return s.lit || !s.unlitTriangles; },
                                    .option = "--shade",
-                                   .ofScene = [](const EffectScene& scene) { return !scene.instances.empty(); },
                                    .ofFrame = isLit,
-                                   .ofNode = nullptr,
                                    .fill = fill,
                                    .stage = Stage::light,
                                    .passes = kPasses,
-                                   .tables = kTables,
-                                   .tolerancePixels = 0,
-                                   .toleranceSteps = 0};
+                                   .tables = kTables};
 
 }  // namespace stipple::render

@@ -33,14 +33,10 @@ constinit const Effect refractionEffect{.name = "refraction",
                                         .summary = "glass and water: what is behind them, bent",
                                         .isRequested = [](const DrawSettings& s) { return s.layer != nullptr; },
                                         .option = "--material",
-                                        .ofScene = [](const EffectScene& scene) { return !scene.instances.empty(); },
                                         .ofFrame = [](const EffectFrame& frame) { return !frame.content.isEmpty(); },
-                                        .ofNode = nullptr,
                                         .fill = fill,
                                         .stage = Stage::light,
                                         .passes = kPasses,
-                                        .tables = kTables,
-                                        .tolerancePixels = 0,
-                                        .toleranceSteps = 0};
+                                        .tables = kTables};
 
 }  // namespace stipple::render

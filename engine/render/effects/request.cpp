@@ -199,6 +199,19 @@ void leaveOut(const EffectWishes& wishes, const Wanted& wanted, DrawSettings& se
     }
 }
 
+/// What is requested by name, and an option asks for, too.
+void takeOptions(const EffectWishes& wishes, const Wanted& wanted, DrawSettings& settings,
+                 std::vector<std::string>& notes) {
+    for (const Effect* e : effects()) {
+        if (e->isAskedFor == nullptr || !e->isAskedFor(settings)) continue;
+        if (wanted.leavesOut(e))
+            notes.push_back(
+                fmt::format("{} {} leaves {} out, whatever {} says", kOption, wishes.list, e->name, e->option));
+        else
+            request(*e, e->option, settings);
+    }
+}
+
 }  // namespace
 
 std::string effectNames() {
@@ -228,6 +241,7 @@ Result<std::vector<std::string>> requestEffects(const EffectWishes& wishes, cons
                         fmt::format("{} {}", kOption, wishes.list), fmt::format("give {}, too", e->option));
         request(*e, kOption, settings);
     }
+    takeOptions(wishes, wanted, settings, notes);
     if (wanted.isScene) takeScene(scene, wanted, settings, notes);
     for (const std::string& text : wishes.values) {
         STIPPLE_ASSIGN(const Setting s, settingOf(text));

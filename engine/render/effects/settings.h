@@ -43,6 +43,11 @@ struct OcclusionSettings {
     double radius = 0, detail = 0;
 };
 
+/// Shadows. `texels`: of maps, along an edge.
+struct ShadowSettings {
+    double texels = 1024;
+};
+
 /// Of all effects.
 struct EffectParameters {
     SceneFacts facts;  ///< of the scene that is drawn, where somebody said
@@ -50,6 +55,7 @@ struct EffectParameters {
     FogSettings fog;
     ToneSettings tone;
     OcclusionSettings occlusion;
+    ShadowSettings shadow;
 };
 
 }  // namespace stipple::render

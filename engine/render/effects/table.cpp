@@ -28,6 +28,12 @@ EffectSet setOf(const Holds& holds) {
     return set;
 }
 
+bool isRequestedBy(const Effect& effect, const DrawSettings& settings) {
+    if (effect.isRequested) return effect.isRequested(settings);
+    return std::any_of(settings.effects.begin(), settings.effects.end(),
+                       [&](const EffectRequest& r) { return r.name == effect.name; });
+}
+
 }  // namespace
 
 std::span<const Effect* const> effects() { return kEffects; }
@@ -52,14 +58,13 @@ EffectSet effectsOfScene(const EffectScene& scene) {
     return setOf([&](size_t e) { return kEffects.at(e)->ofScene(scene); });
 }
 
+bool isRequested(std::string_view name, const DrawSettings& settings) {
+    const Effect* const effect = effectNamed(name);
+    return effect != nullptr && isRequestedBy(*effect, settings);
+}
+
 EffectSet requestedEffects(EffectSet scene, const DrawSettings& settings) {
-    return setOf([&](size_t e) {
-        const Effect& effect = *kEffects.at(e);
-        if (!scene.has(e)) return false;
-        if (effect.isRequested) return effect.isRequested(settings);
-        return std::any_of(settings.effects.begin(), settings.effects.end(),
-                           [&](const EffectRequest& r) { return r.name == effect.name; });
-    });
+    return setOf([&](size_t e) { return scene.has(e) && isRequestedBy(*kEffects.at(e), settings); });
 }
 
 EffectSet effectsOfFrame(EffectSet requested, const FrameContent& content, const DrawSettings& settings,

@@ -20,6 +20,8 @@ EffectSet effectsOfScene(const EffectScene& scene);
 EffectSet allEffects();
 /// Those of `scene` that the settings ask for.
 EffectSet requestedEffects(EffectSet scene, const DrawSettings& settings);
+/// Is the effect of that name asked for, in whatever scene? False where there is none.
+bool isRequested(std::string_view name, const DrawSettings& settings);
 /// Those of `requested` that a frame shows. `nodes`: how many feed each effect of the table.
 EffectSet effectsOfFrame(EffectSet requested, const FrameContent& content, const DrawSettings& settings,
                          const DrawList& draws, std::span<const uint64_t> nodes);

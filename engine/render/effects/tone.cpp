@@ -39,9 +39,7 @@ void fill(const DrawSettings& settings, const glm::dmat3&, DrawList& out) {
 extern const Effect toneEffect;
 constinit const Effect toneEffect{.name = "tone",
                                   .summary = "exposure, and a filmic curve",
-                                  .isRequested = nullptr,
                                   .parameters = kParameters,
-                                  .ofScene = [](const EffectScene& scene) { return !scene.instances.empty(); },
                                   .ofFrame =
                                       [](const EffectFrame& frame) {
                                           const DrawSettings& s = frame.settings;
@@ -50,12 +48,9 @@ constinit const Effect toneEffect{.name = "tone",
                                                  s.debugView == shared::kDebugNone && s.layer == nullptr &&
                                                  !frame.content.isEmpty();
                                       },
-                                  .ofNode = nullptr,
                                   .fill = fill,
                                   .stage = Stage::lit,
                                   .passes = kPasses,
-                                  .tables = kTables,
-                                  .tolerancePixels = 0,
-                                  .toleranceSteps = 0};
+                                  .tables = kTables};
 
 }  // namespace stipple::render

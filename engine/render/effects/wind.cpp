@@ -23,8 +23,6 @@ constinit const Effect windEffect{
         [](const EffectNode& n) {
             return bendOf(n.settings.wind, n.hierarchy, n.instance, n.node, n.view, glm::normalize(n.settings.worldUp));
         },
-    .fill = nullptr,
-    .stage = Stage::surface,
     .tolerancePixels = kLeastSway,
     .toleranceSteps = 255};
 

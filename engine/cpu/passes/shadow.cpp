@@ -1,0 +1,71 @@
+// What comes of lights that cast shadows, pixel by pixel.
+#include <algorithm>
+#include <cstring>
+
+#include "engine/cpu/passes/passes.h"
+#include "engine/render/shadow_frame.h"
+
+namespace stipple::cpu {
+namespace {
+
+ShadowInput inputOf(const Frame& frame) {
+    const Frame::Shadows& s = frame.shadows;
+    return {s.maps.data(), s.depths.data(), s.through.data(), static_cast<uint32_t>(s.maps.size()),
+            frame.draws->shadowSlots};
+}
+
+/// Tables of the maps, room for the masks, and whether those still hold: before them stands what they are of.
+void begin(Frame& frame) {
+    Frame::Shadows& s = frame.shadows;
+    const render::DrawList& draws = *frame.draws;
+    s.maps = draws.shadows;
+    s.depths.clear();
+    s.through.clear();
+    for (size_t m = 0; m < s.maps.size(); ++m) {
+        const render::ShadowTexels& texels = *draws.shadowMaps->maps[m].texels;
+        s.maps[m].first = 0;
+        s.depths.push_back(texels.depth.data());
+        s.through.push_back(texels.through.empty() ? nullptr : texels.through.data());
+    }
+    constexpr size_t kKeyWords = 2;
+    const size_t words = size_t{draws.shadowSlots} * frame.constants.width * frame.constants.height;
+    uint32_t* const room = frame.room<uint32_t>(0, kKeyWords + words);
+    s.masks = room + kKeyWords;
+    uint64_t key = 0;
+    std::memcpy(&key, room, sizeof(key));
+    s.areKept = draws.shadowKey != 0 && key == draws.shadowKey;
+    std::memcpy(room, &draws.shadowKey, sizeof(key));
+}
+
+void run(const RowPlace& at, SurfaceRow& row) {
+    Frame& frame = at.frame;
+    const uint32_t slots = frame.draws->shadowSlots;
+    const size_t pixels = size_t{frame.constants.width} * frame.constants.height;
+    const auto kept = [&](uint32_t slot) { return frame.shadows.masks + slot * pixels + at.first; };
+    if (frame.shadows.areKept) {
+        row.shadowSlots = slots;
+        for (uint32_t s = 0; s < slots; ++s) std::copy_n(kept(s), at.n, row.shadow[s]);
+        return;
+    }
+    frame.k.shadowRow(frame.constants, inputOf(frame), at.x0, at.y, at.n, row);
+    for (uint32_t s = 0; s < slots && frame.draws->shadowKey != 0; ++s) std::copy_n(row.shadow[s], at.n, kept(s));
+}
+
+/// These are not kept.
+void beside(const RowPlace& at, SurfaceRow& second) {
+    at.frame.k.shadowRow(at.frame.constants, inputOf(at.frame), at.x0, at.y, at.n, second);
+}
+
+}  // namespace
+
+constinit const CpuPass shadowPass{
+    .row = {.concerns =
+                [](const Frame& frame, const SurfacePlanes& planes) {
+                    return cpuPassOf(render::Pass::light).row.concerns(frame, planes);
+                },
+            .wants = [](const Frame&, SurfaceWants& wants) { wants.normal = wants.depth = wants.leaf = true; },
+            .run = run,
+            .beside = beside},
+    .begin = begin};
+
+}  // namespace stipple::cpu
