@@ -11,7 +11,7 @@
 namespace stipple {
 namespace {
 
-constexpr float kHalf = 0.4f;
+constexpr float kShare = 0.4f;
 
 /// A square of the picture's middle, facing +z, whose alpha goes from 0 on its left to 1 on its right.
 scene::Primitive fadingSquare(double z, double edge) {
@@ -49,7 +49,7 @@ class Transparent : public test::BackendsHere {
         paint.metallic = 0;
         paint.roughness = 0.9f;
         board_ = test::meshStore(test::board(-2.5), paint, folder_ / "board.stipple", *executor_);
-        ball_ = test::meshStore(test::ball(120), blended(kHalf), folder_ / "ball.stipple", *executor_);
+        ball_ = test::meshStore(test::ball(120), blended(kShare), folder_ / "ball.stipple", *executor_);
         solid_ = test::meshStore(test::ball(120), paint, folder_ / "solid.stipple", *executor_);
         fading_ = test::meshStore(fadingSquare(0, 2), blended(1), folder_ / "fading.stipple", *executor_);
         test::writePly(folder_ / "a.ply", test::spherePoints(20'000, 0xe0f0e8));
@@ -63,6 +63,20 @@ class Transparent : public test::BackendsHere {
     }
     std::shared_ptr<const lod::Store> board_, ball_, solid_, fading_, points_, curves_, patches_;
 };
+
+/// Share of the pixels whose coverage, depth or normal is another.
+double otherGeometry(const render::Image& a, const render::Image& b) {
+    size_t count = 0;
+    for (size_t i = 0; i < a.rgba.size(); ++i) {
+        const double za = a.depth[i], zb = b.depth[i];
+        const auto normal = [i](const render::Image& of) {
+            return glm::dvec3(of.normal[3 * i], of.normal[3 * i + 1], of.normal[3 * i + 2]);
+        };
+        const int alpha = std::abs(static_cast<int>(a.rgba[i] >> 24) - static_cast<int>(b.rgba[i] >> 24));
+        count += alpha > 1 || std::abs(za - zb) > 1e-4 * zb || glm::length(normal(a) - normal(b)) > 0.01 ? 1 : 0;
+    }
+    return static_cast<double>(count) / static_cast<double>(a.rgba.size());
+}
 
 /// By hand: the share of what is in front and the rest of what is behind, of linear light; the largest difference.
 double offBy(const render::Image& image, const render::Image& behind, const render::Image& front, double opacity,
@@ -88,15 +102,15 @@ TEST_F(Transparent, OfEveryKindIsTheShareOfItAndTheRestOfWhatIsBehind) {
             const render::Image behind = draw({{board_, {}, {}}}, *backend, settings),
                                 front = draw({{body, {}, {}}}, *backend, settings);
             render::FrameSettings through = settings;
-            through.draw.opacity = kHalf;
+            through.draw.opacity = kShare;
             // The board is let through as well: what is behind it is the background.
             const render::Image boardThrough = draw({{board_, {}, {}}}, *backend, through),
                                 both = draw({{board_, {}, {}}, {body, {}, {}}}, *backend, through);
             size_t covered = 0;
-            EXPECT_LE(offBy(both, boardThrough, front, kHalf, covered), 2e-3) << name;
+            EXPECT_LE(offBy(both, boardThrough, front, kShare, covered), 2e-3) << name;
             EXPECT_GT(covered, 800u) << name;
             const render::Image opaque = draw({{board_, {}, {}}, {body, {}, {}}}, *backend, settings);
-            EXPECT_GT(offBy(opaque, boardThrough, front, kHalf, covered), 0.05) << "the control";
+            EXPECT_GT(offBy(opaque, boardThrough, front, kShare, covered), 0.05) << "the control";
         }
 }
 
@@ -115,10 +129,12 @@ TEST_F(Transparent, MaterialsAreThoseOfTheOracleInEveryMode) {
             cut.draw.transparency = false;
             const render::Image control = draw(placed, *oracle, cut, isOrthographic);
             EXPECT_LT(test::drawnPsnr(control, truth), 30) << mode.name << ": the control";
+            EXPECT_GT(otherGeometry(control, truth), 0.05) << mode.name << ": the control";
             for (auto& [name, backend] : backends_) {
-                const auto off =
-                    reference::compareImages(draw(placed, *backend, settings, isOrthographic), truth, 4, nullptr);
+                const render::Image image = draw(placed, *backend, settings, isOrthographic);
+                const auto off = reference::compareImages(image, truth, 4, nullptr);
                 ASSERT_TRUE(off);
+                EXPECT_LE(otherGeometry(image, truth), 1e-3) << name << ", mode " << mode.name << isOrthographic;
                 EXPECT_GE(off->psnr, 50) << name << ", mode " << mode.name << isOrthographic;
                 EXPECT_LE(off->differingFraction, 1e-3) << name << ", mode " << mode.name << isOrthographic;
             }
@@ -196,7 +212,7 @@ TEST_F(Transparent, LeavesTheAlphaOfPicturesWhatIsCovered) {
             most = std::max(most, word >> 24);
         }
         EXPECT_EQ(least, 0u) << name;
-        EXPECT_NEAR(most, 255 * kHalf, 1) << name;
+        EXPECT_NEAR(most, 255 * kShare, 1) << name;
     }
 }
 
