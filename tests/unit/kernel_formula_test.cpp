@@ -280,7 +280,7 @@ TEST(KernelFormulas, LightIsThatOfTheFormulas) {
                 const float light = irradiance(n, f.sunDirection, f.skyDirection, row->leaf[i], 1);
                 expected.emplace_back(c.x * light, c.y * light, c.z * light);
             }
-            k.lightRow(f, {nullptr, nullptr}, 0, 3, cpu::kTile, *row);
+            k.lightRow(f, cpu::LightInput{}, 0, 3, cpu::kTile, *row);
             for (size_t i = 0; i < cpu::kTile; ++i)
                 worst = std::max({worst, ulpsBetween(row->red[i], expected[i].x),
                                   ulpsBetween(row->green[i], expected[i].y), ulpsBetween(row->blue[i], expected[i].z)});
