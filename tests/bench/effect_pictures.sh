@@ -7,6 +7,7 @@ here=$(cd "$(dirname "$0")" && pwd)/results/effects
 folder=${2:-$(mktemp -d)}
 mkdir -p "$folder" "$here" && cd "$folder" || exit 2
 [ -f scan.las ] || "$program" grow scan -o scan.las --points 1M >/dev/null || exit 1
+[ -f house.glb ] || "$program" grow building -o house.glb --triangles 20k --texture 64 >/dev/null || exit 1
 [ -f forest.glb ] || "$program" grow forest -o forest.glb --trees 2k >/dev/null || exit 1
 shot() {  # NAME INPUT OPTIONS...
     local name=$1 input=$2
@@ -26,3 +27,7 @@ shot tone-filmic forest.glb --error 2 --set tone.exposure=2 --set tone.curve=fil
 shot shadow-off forest.glb --error 2 --effects none --sun 135,35
 shot shadow-on forest.glb --error 2 --sun 135,35
 shot shadow-soft forest.glb --error 2 --sun 135,35 --sun-size 3
+shot occlusion-off house.glb
+shot occlusion-on house.glb --effects occlusion
+shot opacity-scan scan.las --up z --opacity 0.5
+shot opacity-house house.glb --opacity 0.4

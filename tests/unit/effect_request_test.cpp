@@ -101,6 +101,25 @@ TEST(EffectRequests, NoneLeavesOutWhatOptionsAskForAndSaysSo) {
     EXPECT_TRUE(ask({"none", {}}, {}).notes.empty()) << "nothing is left out";
 }
 
+TEST(EffectRequests, WhatIsTransparentIsLeftOutByNoneOrByName) {
+    SceneFacts clear;
+    clear.hasTransparent = true;
+    for (const char* list : {"none", "-transparency", "auto,-transparency"}) {
+        const Asked asked = ask({list, {}}, clear);
+        EXPECT_FALSE(asked.settings.transparency) << list;
+        EXPECT_EQ(asked.notes.size(), 1u) << list;
+        EXPECT_TRUE(ask({list, {}}, {}).notes.empty()) << list << ": nothing is left out";
+    }
+    DrawSettings faint;
+    faint.opacity = 0.5f;
+    EXPECT_EQ(ask({"none", {}}, {}, {}, faint).settings.opacity, 1);
+    for (const char* list : {"scene", "auto", "transparency"}) {
+        EXPECT_TRUE(ask({list, {}}, clear).settings.transparency) << list;
+        EXPECT_EQ(ask({list, {}}, {}, {}, faint).settings.opacity, 0.5f) << list;
+    }
+    expectRefused({"transparency", {}}, {"transparency needs --opacity"});
+}
+
 TEST(EffectRequests, ParametersAskForTheirEffect) {
     const Asked fog = ask({"auto", {"fog.density=0.25", "fog.colour=10,20,30", "tone.curve=filmic"}}, {});
     EXPECT_EQ(namesIn(fog.settings), (Names{"fog", "tone"}));

@@ -111,6 +111,38 @@ TEST(Transparency, ThatIsNotDrawnIsSaidOnceAFile) {
     ASSERT_EQ(j["notes"].size(), 1u);
 }
 
+/// The effect, as the report of a picture has it.
+nlohmann::json transparencyOf(const TempFolder& folder, const std::string& options) {
+    const auto j = nlohmann::json::parse(
+        runProgram(folder, "render c.gltf -o c.png --force --size 64x48 --quiet --json " + options).out);
+    for (const auto& effect : j["effects"])
+        if (effect["name"] == "transparency") return effect;
+    return {};
+}
+
+TEST(Transparency, IsDrawnUnlessItIsLeftOut) {
+    const TempFolder folder;
+    ASSERT_EQ(runProgram(folder, "grow rock -o c.gltf --triangles 500").code, 0);
+    auto gltf = nlohmann::json::parse(test::slurp(folder / "c.gltf"));
+    const auto drawn = [&](const std::string& options) {
+        const auto effect = transparencyOf(folder, options);
+        return std::pair(effect.value("active", false), test::slurp(folder / "c.png"));
+    };
+    const auto opaque = drawn("");
+    EXPECT_FALSE(opaque.first);
+    for (auto& m : gltf["materials"]) {
+        m["alphaMode"] = "BLEND";
+        m["pbrMetallicRoughness"]["baseColorFactor"] = {1, 1, 1, 0.6};
+    }
+    test::spit(folder / "c.gltf", gltf.dump());
+    const auto clear = drawn(""), none = drawn("--effects none"), without = drawn("--effects=-transparency");
+    EXPECT_TRUE(clear.first);
+    EXPECT_NE(clear.second, opaque.second);
+    EXPECT_FALSE(none.first || without.first);
+    EXPECT_EQ(none.second, without.second);
+    EXPECT_NE(none.second, clear.second);
+}
+
 TEST(Paths, StateTheErrorOfTheirWorstPicture) {
     const TempFolder folder;
     ASSERT_EQ(runProgram(folder, "grow scan -o a.las --points 50k").code, 0);

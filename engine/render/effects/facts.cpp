@@ -23,6 +23,10 @@ SceneFacts factsOf(std::span<const std::shared_ptr<const lod::Store>> stores, co
         facts.hasUnlitTriangles = facts.hasUnlitTriangles || (isMesh && !isLit(lod::Kind::triangles)) ||
                                   (hasPatches && !isLit(lod::Kind::patches));
         facts.hasUnlitPoints = facts.hasUnlitPoints || (isPoints && !isLit(lod::Kind::points));
+        const auto isClear = [](const lod::Optics& o) { return o.blends; };
+        const auto hasClear = [](const lod::PointMaterial& m) { return m.optics.blends; };
+        facts.hasTransparent = facts.hasTransparent || std::any_of(d.optics.begin(), d.optics.end(), isClear) ||
+                               std::any_of(d.pointMaterials.begin(), d.pointMaterials.end(), hasClear);
         const double extent = glm::length(d.focusMax - d.focusMin);
         if (std::isfinite(extent)) facts.extent = std::max(facts.extent, extent);
         facts.hasPointsWithoutNormals = facts.hasPointsWithoutNormals || (isPoints && !d.hasNormals);

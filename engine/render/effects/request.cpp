@@ -231,10 +231,10 @@ Result<std::vector<std::string>> requestEffects(const EffectWishes& wishes, cons
     STIPPLE_ASSIGN(const Wanted wanted, wantedOf(wishes.list));
     STIPPLE_TRY(checkSettings(wishes, wanted));
     std::vector<std::string> notes;
-    leaveOut(wishes, wanted, settings, notes);
     settings.effects.clear();
     settings.parameters = {};
     settings.parameters.facts = facts;
+    leaveOut(wishes, wanted, settings, notes);
     for (const Effect* e : wanted.named) {
         if (e->isRequested != nullptr && !e->isRequested(settings))
             return fail(ErrorKind::usage, fmt::format("{} needs {} to say how much", e->name, e->option),

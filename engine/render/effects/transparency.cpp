@@ -9,15 +9,19 @@ extern const Effect transparencyEffect;
 constinit const Effect transparencyEffect{
     .name = "transparency",
     .summary = "materials that are transparent (glTF BLEND) and --opacity: what is behind shows through",
-    .isRequested = [](const DrawSettings& s) { return s.isBlended; },
-    .option = "--opacity, or materials that are transparent",
+    .isRequested =
+        [](const DrawSettings& s) {
+            const bool isAsked = s.opacity < 1 || s.parameters.facts.hasTransparent;
+            return s.isBlended || (s.transparency && isAsked);
+        },
+    .option = "--opacity, or a material",
     .leaveOut =
         [](DrawSettings& s) {
             s.transparency = false;
             s.opacity = 1;
         },
     .ofScene = [](const EffectScene& scene) { return !scene.instances.empty(); },
-    .ofFrame = [](const EffectFrame& frame) { return !frame.content.isEmpty(); },
+    .ofFrame = [](const EffectFrame& frame) { return frame.settings.isBlended && !frame.content.isEmpty(); },
     .ofNode = nullptr,
     .fill = nullptr,
     .stage = Stage::surface,
