@@ -99,9 +99,9 @@ Result<lod::MeshBuildSettings> meshSettings(const scene::Scene& scene, const std
     settings.description.source = fs::path(scene.path).filename().string();
     settings.description.up = meshUp(build);
     settings.description.materials = scene::surfaceMaterials(scene);
-    settings.description.optics = scene::surfaceOptics(scene, placed);
     settings.textures = scene::textureImages(scene);
     STIPPLE_ASSIGN(std::vector<scene::DecodedImage> images, decodeImages(scene, build.reading().memoryBytes));
+    settings.description.optics = scene::surfaceOptics(scene, placed, images);
     std::vector<size_t> last(images.size());  // texture that uses an image last, and may have it
     for (size_t t = 0; t < settings.textures.size(); ++t)
         if (scene.textures[t].image >= 0) last[static_cast<size_t>(scene.textures[t].image)] = t;

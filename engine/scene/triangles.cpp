@@ -54,12 +54,27 @@ uint32_t surfaceOf(const Scene& scene, const Primitive& p) {
 
 bool isClear(const glm::vec4& colour) { return colour.a < 1; }
 
-/// Could factor or texture let something through? (JPEG has no alpha.)
-bool mayBeClear(const Scene& scene, const Material& m) {
+/// Is hardly a texel that is there at all neither clear nor opaque? Such is a leaf, not a pane.
+bool isCutOut(const DecodedImage& image) {
+    constexpr uint32_t kClear = 32, kOpaque = 224;  // of 255
+    constexpr double kMostBetween = 0.2;            // rims, which are filtered
+    size_t there = 0, between = 0;
+    for (const uint32_t texel : image.rgba) {
+        const uint32_t alpha = texel >> 24;
+        there += alpha >= kClear ? 1 : 0;
+        between += alpha >= kClear && alpha < kOpaque ? 1 : 0;
+    }
+    return static_cast<double>(between) <= kMostBetween * static_cast<double>(there);
+}
+
+/// Does factor or texture let something through, as far as `images` are known? (JPEG has no alpha.)
+bool mayBeClear(const Scene& scene, const Material& m, std::span<const DecodedImage> images) {
     if (m.baseColour.a < 1) return true;
     const int texture = m.baseColourTexture.texture;
     const int image = texture < 0 ? -1 : scene.textures[static_cast<size_t>(texture)].image;
     if (image < 0) return false;
+    const auto at = static_cast<size_t>(image);
+    if (at < images.size() && !images[at].rgba.empty()) return !isCutOut(images[at]);
     const std::vector<uint8_t>& bytes = scene.images[static_cast<size_t>(image)].bytes;
     return bytes.size() < 2 || bytes[0] != 0xff || bytes[1] != 0xd8;
 }
@@ -221,7 +236,8 @@ std::vector<shared::SurfaceMaterial> surfaceMaterials(const Scene& scene) {
     return out;
 }
 
-std::vector<lod::Optics> surfaceOptics(const Scene& scene, const std::vector<Placement>& placed) {
+std::vector<lod::Optics> surfaceOptics(const Scene& scene, const std::vector<Placement>& placed,
+                                       std::span<const DecodedImage> images) {
     std::vector<bool> isUsed(scene.materials.size() + 1), hasAlpha(scene.materials.size() + 1);
     for (const Placement& at : placed)
         for (const Primitive& p : scene.meshes[static_cast<size_t>(at.mesh)].primitives) {
@@ -234,7 +250,7 @@ std::vector<lod::Optics> surfaceOptics(const Scene& scene, const std::vector<Pla
     const auto of = [&](size_t m) {
         if (m >= scene.materials.size()) return lod::Optics{};
         lod::Optics o = scene.materials[m].optics;
-        o.blends = o.blends && (hasAlpha[m] || mayBeClear(scene, scene.materials[m]));
+        o.blends = o.blends && (hasAlpha[m] || mayBeClear(scene, scene.materials[m], images));
         return o;
     };
     const auto first = static_cast<size_t>(std::find(isUsed.begin(), isUsed.end(), true) - isUsed.begin());

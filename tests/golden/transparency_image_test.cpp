@@ -185,6 +185,33 @@ TEST_F(Transparent, WhatIsOpaqueAllOverIsDrawnAsEver) {
     }
 }
 
+TEST_F(Transparent, TexturesThatAreCutOutDoNotBlend) {
+    scene::Scene scene;
+    scene.materials = {blended(1)};
+    scene.materials[0].baseColourTexture.texture = 0;
+    scene.textures.resize(1);
+    scene.textures[0].image = 0;
+    scene.images.resize(1);
+    scene.meshes.resize(1);
+    scene.meshes[0].primitives = {test::board(0)};
+    scene.meshes[0].primitives[0].material = 0;
+    scene.nodes.resize(1);
+    scene.nodes[0].mesh = 0;
+    const auto blends = [&](const std::vector<uint32_t>& alphas) {
+        scene::DecodedImage image{static_cast<uint32_t>(alphas.size()), 1, {}};
+        for (const uint32_t alpha : alphas) image.rgba.push_back(alpha << 24);
+        const auto optics = scene::surfaceOptics(scene, scene::placements(scene), {&image, 1});
+        return !optics.empty() && optics[0].blends;
+    };
+    EXPECT_FALSE(blends({0, 0, 0, 255, 255, 255, 255, 128})) << "a leaf and its rim";
+    EXPECT_FALSE(blends({255, 255}));
+    EXPECT_TRUE(blends({0, 128, 128, 255, 255}));
+    EXPECT_TRUE(blends({100}));
+    scene.materials[0].baseColour.a = 0.5f;
+    EXPECT_TRUE(blends({255, 255}));
+    EXPECT_FALSE(scene::surfaceOptics(scene, scene::placements(scene)).empty()) << "textures are not known";
+}
+
 TEST_F(Transparent, NothingHidesWhatIsBeforeIt) {
     render::PlacedStore front{solid_, {}, {}};
     front.place.translation = {0, 0, 1.5};

@@ -102,11 +102,10 @@ void readMaterials(const json& root, Scene& scene) {
     const auto blended = std::count_if(scene.materials.begin(), scene.materials.end(),
                                        [](const Material& m) { return m.alphaMode == AlphaMode::blend; });
     if (blended > 0)
-        scene.notes.push_back(
-            fmt::format("{} of {} materials {} transparent (alphaMode BLEND): of each body the nearest surface of them "
-                        "is seen, over "
-                        "what is behind the body",
-                        blended, scene.materials.size(), blended == 1 ? "is" : "are"));
+        scene.notes.push_back(fmt::format(
+            "{} of {} materials {} transparent (alphaMode BLEND): of each body the nearest of their surfaces "
+            "is seen, over what is behind the body; textures that are cut out stay so",
+            blended, scene.materials.size(), blended == 1 ? "is" : "are"));
 }
 
 /// Textures of a GPU's own formats in a container; by what stands at its beginning (KTX 2.0, 3.1).
