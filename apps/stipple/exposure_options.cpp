@@ -30,6 +30,13 @@ void ExposureOptions::addTo(CLI::App& sub) {
                    "how long each picture is exposed, seconds of the camera path and of the wind, about its moment")
         ->transform(within(0.0, 1e6))
         ->type_name("SECONDS");
+    sub.add_option("--fade", fade,
+                   "of pictures that are means: levels of detail fade into each other while the allowed error falls from "
+                   "--error by so many octaves from frame to frame, so that nothing pops along a path; 0: all frames "
+                   "have one level")
+        ->transform(within(0.0, 4.0))
+        ->type_name("OCTAVES")
+        ->capture_default_str();
 }
 
 Result<void> ExposureOptions::check(const CameraOptions& camera, bool isWindy) const {
@@ -50,7 +57,7 @@ Result<render::Exposure> ExposureOptions::exposure(const Shot& shot) const {
         std::any_of(shot.views.begin(), shot.views.end(), [](const lod::View& v) { return v.isOrthographic; }))
         return fail(ErrorKind::usage, "an orthographic camera has no lens", "--aperture",
                     "take another camera, or leave it out");
-    return render::Exposure{static_cast<uint32_t>(samples()), {aperture, focus}, shutter};
+    return render::Exposure{static_cast<uint32_t>(samples()), {aperture, focus}, shutter, fade};
 }
 
 }  // namespace stipple::app

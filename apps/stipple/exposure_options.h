@@ -11,6 +11,7 @@ namespace stipple::app {
 struct ExposureOptions {
     int frames = 0;  ///< 0: what the rest asks for
     double aperture = 0, focus = 0, shutter = 0;
+    double fade = render::kFadeOctaves;
     void addTo(CLI::App& sub);
     /// What can be said before anything is opened. `isWindy`: something moves though the camera may not.
     Result<void> check(const CameraOptions& camera, bool isWindy) const;

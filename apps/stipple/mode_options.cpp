@@ -31,8 +31,8 @@ constexpr std::array kOnlyOf{
     OnlyOf{"--budget-points", isDrawn, kDrawn}, OnlyOf{"--wind", isDrawn, kDrawn},
     OnlyOf{"--time", isDrawn, kDrawn},          OnlyOf{"--accumulate", isDrawn, kDrawn},
     OnlyOf{"--aperture", isDrawn, kDrawn},      OnlyOf{"--shutter", isDrawn, kDrawn},
-    OnlyOf{"--debug", isDrawn, kDrawn},         OnlyOf{"--patch-as", isDrawn, kDrawn},
-    OnlyOf{"--interpolate", isDrawn, kDrawn},
+    OnlyOf{"--fade", isDrawn, kDrawn},          OnlyOf{"--debug", isDrawn, kDrawn},
+    OnlyOf{"--patch-as", isDrawn, kDrawn},      OnlyOf{"--interpolate", isDrawn, kDrawn},
 };
 
 }  // namespace

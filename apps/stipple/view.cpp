@@ -238,7 +238,7 @@ class Viewer {
         const lod::View seen = render::viewOf([&](double) { return view(); }, number, exposure);
         if (number == 0) sum_.clear();
         try {
-            STIPPLE_TRY(render::renderResident(state, seen, render::settingsOf(settings_.frame, number, 0)));
+            STIPPLE_TRY(render::renderResident(state, seen, render::settingsOf(settings_.frame, number, exposure)));
             sum_.add(state.image, executor_);
         } catch (const std::bad_alloc&) {
             return fail(ErrorKind::budget, "there is not enough memory to smooth the picture", "stipple view",

@@ -1,6 +1,7 @@
 #include "engine/render/accumulation.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "engine/base/check.h"
 
@@ -52,12 +53,14 @@ void Accumulation::mean(Image& out, Executor& executor) const {
     });
 }
 
-FrameSettings settingsOf(const FrameSettings& settings, uint32_t index, double shutter) {
+FrameSettings settingsOf(const FrameSettings& settings, uint32_t index, const Exposure& exposure) {
     FrameSettings s = settings;
     s.wantDepthAndNormal = true;  // for linear colours
     s.staysOnDevice = false;
     s.draw.coverageSeed = index;
-    if (shutter > 0) s.draw.wind.seconds += shutter * sampleOf(index).time;
+    const FrameSample sample = sampleOf(index);
+    if (exposure.shutter > 0) s.draw.wind.seconds += exposure.shutter * sample.time;
+    if (exposure.fade > 0) s.budgets.errorPixels *= std::exp2(-exposure.fade * sample.fade);
     return s;
 }
 
@@ -73,7 +76,7 @@ Result<void> expose(const Exposure& exposure, const ViewAfter& after, const Fram
     image = {};
     Accumulation sum;
     for (uint32_t i = 0; i < exposure.samples; ++i) {
-        STIPPLE_TRY(draw(viewOf(after, i, exposure), settingsOf(settings, i, exposure.shutter)));
+        STIPPLE_TRY(draw(viewOf(after, i, exposure), settingsOf(settings, i, exposure)));
         sum.add(image, executor);
     }
     sum.mean(middle, executor);

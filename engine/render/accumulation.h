@@ -24,10 +24,17 @@ class Accumulation {
     uint32_t width_ = 0, height_ = 0, count_ = 0;
 };
 
+/// What films and stills of several frames fade over unless they say otherwise.
+inline constexpr double kFadeOctaves = 0.5;
+
 struct Exposure {
     uint32_t samples = 1;  ///< frames
     Lens lens;
     double shutter = 0;  ///< how long it is open, seconds of the camera path and of the wind
+    /// Octaves over which levels of detail fade: the allowed errors of the frames go down so far from what is asked
+    /// for. A record counts as often as it is drawn, which is T(error of its parent) - T(its own), with T the share of
+    /// frames that do not allow an error: along each chain of records that is one in all.
+    double fade = 0;
     bool isPlain() const { return samples <= 1; }
 };
 
@@ -37,7 +44,7 @@ using ViewAfter = std::function<lod::View(double seconds)>;
 using DrawFrame = std::function<Result<void>(const lod::View& view, const FrameSettings& settings)>;
 
 /// The settings and the view of one frame of an exposure about the moment of `settings`.
-FrameSettings settingsOf(const FrameSettings& settings, uint32_t index, double shutter);
+FrameSettings settingsOf(const FrameSettings& settings, uint32_t index, const Exposure& exposure);
 lod::View viewOf(const ViewAfter& after, uint32_t index, const Exposure& exposure);
 
 /// Draws the samples of an exposure. `image` holds the frame of its middle: depths and normals stay that one's.

@@ -13,10 +13,13 @@ constexpr int kBits = 32;
 struct Direction {
     int degree;
     uint32_t coefficients;
-    std::array<uint32_t, 3> first;
+    std::array<uint32_t, 4> first;
 };
-constexpr std::array<Direction, 4> kDirections{
-    {{1, 0, {1, 0, 0}}, {2, 1, {1, 3, 0}}, {3, 1, {1, 3, 1}}, {3, 2, {1, 1, 1}}}};
+constexpr std::array<Direction, 5> kDirections{{{1, 0, {1, 0, 0, 0}},
+                                                {2, 1, {1, 3, 0, 0}},
+                                                {3, 1, {1, 3, 1, 0}},
+                                                {3, 2, {1, 1, 1, 0}},
+                                                {4, 1, {1, 1, 3, 3}}}};
 
 /// The binary fraction of Sobol's `index` in one dimension.
 uint32_t sobol(uint32_t index, size_t dimension) {
@@ -67,15 +70,15 @@ glm::dvec2 onDisc(const glm::dvec2& square) {
 
 }  // namespace
 
-std::array<double, 5> lowDiscrepancy(uint32_t index) {
-    std::array<double, 5> out{};
+std::array<double, 6> lowDiscrepancy(uint32_t index) {
+    std::array<double, 6> out{};
     for (size_t d = 0; d < out.size(); ++d) out.at(d) = (scrambled(sobol(index, d), d) + 0.5) * 0x1p-32;
     return out;
 }
 
 FrameSample sampleOf(uint32_t index) {
-    const std::array<double, 5> u = lowDiscrepancy(index);
-    return {glm::dvec2(u[0], u[1]) - 0.5, onDisc({u[2], u[3]}), u[4] - 0.5};
+    const std::array<double, 6> u = lowDiscrepancy(index);
+    return {glm::dvec2(u[0], u[1]) - 0.5, onDisc({u[2], u[3]}), u[4] - 0.5, u[5]};
 }
 
 double circleOfConfusion(const lod::View& view, const Lens& lens, double depth) {

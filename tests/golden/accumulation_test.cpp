@@ -189,8 +189,8 @@ TEST_F(OfOneDisc, ShutAndWithoutALensNothingIsAnother) {
     EXPECT_TRUE(picture({16, {0, 5}, 0}).linear == some.linear);
     EXPECT_FALSE(picture({16, {1, 5}, 0}).linear == some.linear);
     EXPECT_TRUE(some.depth == frame.depth) << "depths stay those of the frame";
-    EXPECT_EQ(render::settingsOf(settings_, 7, 0).draw.wind.seconds, settings_.draw.wind.seconds);
-    EXPECT_NEAR(render::settingsOf(settings_, 7, 4).draw.wind.seconds,
+    EXPECT_EQ(render::settingsOf(settings_, 7, {1, {}, 0}).draw.wind.seconds, settings_.draw.wind.seconds);
+    EXPECT_NEAR(render::settingsOf(settings_, 7, {1, {}, 4}).draw.wind.seconds,
                 settings_.draw.wind.seconds + 4 * render::sampleOf(7).time, 1e-12);
 }
 

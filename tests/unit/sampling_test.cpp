@@ -17,9 +17,9 @@ TEST(Sampling, EveryPowerOfTwoOfSamplesIsEvenInEveryDimension) {
     for (uint32_t k = 0; k <= 10; ++k)
         for (uint32_t block = 0; block < 3; ++block) {
             const uint32_t count = 1u << k;
-            std::vector<std::array<double, 5>> u;
+            std::vector<std::array<double, 6>> u;
             for (uint32_t i = 0; i < count; ++i) u.push_back(lowDiscrepancy(block * count + i));
-            for (size_t d = 0; d < 5; ++d) {
+            for (size_t d = 0; d < 6; ++d) {
                 std::set<uint32_t> cells;
                 for (const auto& p : u) cells.insert(static_cast<uint32_t>(p.at(d) * count));
                 EXPECT_EQ(cells.size(), count) << "dimension " << d << ", " << count << " from " << block * count;

@@ -49,8 +49,8 @@ class FullDetail {
     std::unique_ptr<Fields> fields_;
 };
 
-/// Shapes of the leaves of placed stores. Error (budget): more than `most` shapes; (input): a kind that has none here
-/// (patches), or a chunk that cannot be read.
+/// Shapes of the leaves of placed stores; of patches the triangles of their cells. Error (budget): more than `most`
+/// shapes; (input): a chunk that cannot be read.
 Result<FullShapes> leavesOf(std::span<const render::PlacedStore> placed, size_t most);
 
 }  // namespace stipple::study

@@ -3,6 +3,7 @@
 
 #include "apps/study/audit/full_detail.h"
 #include "engine/reference/decode.h"
+#include "engine/reference/decode_patch.h"
 #include "lod/store/mesh_place.h"
 #include "lod/store/store.h"
 #include "shaders/shared/record.h"
@@ -51,15 +52,24 @@ struct Leaves {
                 }
         }
     }
+    void addPatches(uint32_t node, const lod::Chunk& chunk) {
+        const lod::Hierarchy& h = store.hierarchy;
+        for (size_t b = 0; b < chunk.patchBlocks.size(); ++b) {
+            const reference::PatchBlockReader block(h, h.nodes[node], chunk.patchBlocks[b], chunk.patchPlanes[b]);
+            const auto corner = [&](uint32_t s) { return placed(h.origin + h.unit * block.sample(s).place); };
+            block.forEachTriangle([&](uint32_t i, uint32_t j, uint32_t k) {
+                shapes.triangles.push_back({corner(i), corner(j), corner(k)});
+            });
+        }
+    }
     Result<void> add(uint32_t node, uint32_t index) {
         const lod::Payload& payload = store.hierarchy.payload(index);
-        if (payload.kind == lod::Kind::patches)
-            return fail(ErrorKind::input, "has patches, whose distances are not measured here", store.path);
         if (store.hierarchy.isGraph && payload.kind != lod::Kind::triangles) return {};  // coarse ones
         STIPPLE_ASSIGN(const lod::Chunk chunk, lod::readChunk(store, index));
         if (payload.kind == lod::Kind::points) addPoints(node, chunk);
         if (payload.kind == lod::Kind::curves) addCurves(node, chunk);
         if (payload.kind == lod::Kind::triangles) addTriangles(node, payload, chunk);
+        if (payload.kind == lod::Kind::patches) addPatches(node, chunk);
         return {};
     }
 };

@@ -145,7 +145,7 @@ Flicker flickerOf(const render::Image& frame, const render::Image& moved, const 
 
 std::span<const ErrorColumn> errorColumns() {
     using E = CellErrors;
-    static constexpr std::array<ErrorColumn, 35> kColumns{{{"stated_px", &E::stated},
+    static constexpr std::array<ErrorColumn, 36> kColumns{{{"stated_px", &E::stated},
                                                            {"records", &E::records},
                                                            {"triangles", &E::triangles},
                                                            {"nodes", &E::nodes},
@@ -178,6 +178,7 @@ std::span<const ErrorColumn> errorColumns() {
                                                            {"normal_deg_p95", &E::normalP95},
                                                            {"pop_p999", &E::popP999},
                                                            {"pop_max", &E::popMost},
+                                                           {"pop_faded_p999", &E::popFaded},
                                                            {"flicker_mean", &E::flickerMean},
                                                            {"flicker_p99", &E::flickerP99}}};
     return kColumns;
@@ -217,6 +218,11 @@ Result<CellErrors> measureCell(const CellTools& tools, const Cell& cell, const r
     STIPPLE_ASSIGN(const auto implementation, reference::compareImages(*own, *restated, 4, nullptr));
     e.backendDecibels = implementation.foregroundPsnr;
     e.backendDiffering = implementation.differingFraction;
+    STIPPLE_ASSIGN(const render::Image faded,
+                   tools.drawer.drawFaded(tools.truth.small, cell.mode, cell.target, kFadeFrames));
+    STIPPLE_ASSIGN(const render::Image fadedNext,
+                   tools.drawer.drawFaded(tools.truth.small, cell.mode, kPopStep * cell.target, kFadeFrames));
+    e.popFaded = popOf(faded, fadedNext).p999;
     return e;
 }
 

@@ -37,6 +37,7 @@ struct CellErrors {
     double normalMean = kNone, normalP95 = kNone;  ///< degrees
     // A switch of levels (popOf): of 255
     double popP999 = kNone, popMost = kNone;
+    double popFaded = kNone;  ///< as popP999, of means of kFadeFrames frames over which levels fade, at the small size
     // The camera turned by a quarter of a pixel (flickerOf): of 255
     double flickerMean = kNone, flickerP99 = kNone;
 };
@@ -49,6 +50,7 @@ std::span<const ErrorColumn> errorColumns();
 /// By how much pixels change where the cut does and the camera does not: between the frame of a target and that of a
 /// target larger by kPopStep, which is the cut of a camera as much farther away. The greatest change of a channel.
 inline constexpr double kPopStep = 1.0906;  ///< an eighth of an octave: the next of the cuts that there are (lod/cut)
+inline constexpr uint32_t kFadeFrames = 16;  ///< of pictures whose levels fade (render::Exposure::fade)
 struct Pop {
     double p999 = 0, most = 0;  ///< of 255; over pixels that either covers
 };

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 
+#include "engine/render/accumulation.h"
+
 namespace stipple::study {
 
 SceneDrawer::SceneDrawer(const StudyScene& scene, std::unique_ptr<render::Backend> backend, Executor& executor,
                          uint64_t residentBytes)
-    : backend_(std::move(backend)), draw_(scene.draw) {
+    : backend_(std::move(backend)), draw_(scene.draw), executor_(executor) {
     streaming::StreamSettings streams;
     streams.residentBytes = residentBytes;
     state_ = render::makeFrameState(scene.placed, *backend_, executor, streams, scene.groups);
@@ -29,6 +31,19 @@ Result<const render::Image*> SceneDrawer::draw(const lod::View& view, render::Mo
     if (!isComplete)
         return fail(ErrorKind::budget, "a frame of the study does not fit", "--resident", "give more memory");
     return &state_->image;
+}
+
+Result<render::Image> SceneDrawer::drawFaded(const lod::View& view, render::Mode mode, double target, uint32_t frames) {
+    STIPPLE_ASSIGN(const render::Image* middle, draw(view, mode, target));
+    render::Image image = *middle;
+    const auto frame = [&](const lod::View& seen, const render::FrameSettings& s) -> Result<void> {
+        STIPPLE_TRY(render::renderUntilComplete(*state_, seen, s));
+        image = state_->image;
+        return {};
+    };
+    STIPPLE_TRY(render::expose({frames, {}, 0, render::kFadeOctaves}, [&](double) { return view; },
+                               settings(mode, target, kAllRecords, true), frame, image, executor_));
+    return image;
 }
 
 Result<void> SceneDrawer::warm(const lod::View& view, render::Mode mode, double target, uint64_t records) {

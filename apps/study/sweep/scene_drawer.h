@@ -14,6 +14,8 @@ class SceneDrawer {
     /// Complete, with depth and normals. Error (budget): it does not fit.
     Result<const render::Image*> draw(const lod::View& view, render::Mode mode, double target,
                                       uint64_t records = kAllRecords);
+    /// The mean of so many frames, over which levels of detail fade as in films (render::kFadeOctaves).
+    Result<render::Image> drawFaded(const lod::View& view, render::Mode mode, double target, uint32_t frames);
     /// Brings what the frame wants, and draws it once, without depth and normals.
     Result<void> warm(const lod::View& view, render::Mode mode, double target, uint64_t records = kAllRecords);
     /// The same frame again: milliseconds are in counters(), those of passes in passes().
@@ -31,6 +33,7 @@ class SceneDrawer {
     std::unique_ptr<render::Backend> backend_;
     std::unique_ptr<render::FrameState> state_;
     render::DrawSettings draw_;
+    Executor& executor_;
 };
 
 }  // namespace stipple::study
