@@ -30,10 +30,11 @@ void ExposureOptions::addTo(CLI::App& sub) {
                    "how long each picture is exposed, seconds of the camera path and of the wind, about its moment")
         ->transform(within(0.0, 1e6))
         ->type_name("SECONDS");
-    sub.add_option("--fade", fade,
-                   "of pictures that are means: levels of detail fade into each other while the allowed error falls from "
-                   "--error by so many octaves from frame to frame, so that nothing pops along a path; 0: all frames "
-                   "have one level")
+    sub.add_option(
+           "--fade", fade,
+           "of pictures that are means: levels of detail fade into each other while the allowed error falls from "
+           "--error by so many octaves from frame to frame, so that nothing pops along a path; 0: all frames "
+           "have one level")
         ->transform(within(0.0, 4.0))
         ->type_name("OCTAVES")
         ->capture_default_str();

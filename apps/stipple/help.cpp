@@ -138,8 +138,8 @@ void arrangeOptions(CLI::App& command) {
     };
     group("Camera", {"--eye", "--target", "--camera-up", "--fov", "--ortho", "--scene-camera", "--camera-path",
                      "--orbit", "--frames", "--aperture", "--focus", "--shutter"});
-    group("Accuracy and budgets (stipple help budgets)",
-          {"--error", "--budget-points", "--resident", "--no-wait", "--curve-exact", "--accumulate", "--fade", "--samples"});
+    group("Accuracy and budgets (stipple help budgets)", {"--error", "--budget-points", "--resident", "--no-wait",
+                                                          "--curve-exact", "--accumulate", "--fade", "--samples"});
     group("Picture", {"--size",         "--mode",     "--lowpass",     "--kernel",
                       "--normalise",    "--patch-as", "--interpolate", "--shade",
                       "--background",   "--alpha",    "--colour",      "--colour-map",

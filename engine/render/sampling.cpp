@@ -15,11 +15,8 @@ struct Direction {
     uint32_t coefficients;
     std::array<uint32_t, 4> first;
 };
-constexpr std::array<Direction, 5> kDirections{{{1, 0, {1, 0, 0, 0}},
-                                                {2, 1, {1, 3, 0, 0}},
-                                                {3, 1, {1, 3, 1, 0}},
-                                                {3, 2, {1, 1, 1, 0}},
-                                                {4, 1, {1, 1, 3, 3}}}};
+constexpr std::array<Direction, 5> kDirections{
+    {{1, 0, {1, 0, 0, 0}}, {2, 1, {1, 3, 0, 0}}, {3, 1, {1, 3, 1, 0}}, {3, 2, {1, 1, 1, 0}}, {4, 1, {1, 1, 3, 3}}}};
 
 /// The binary fraction of Sobol's `index` in one dimension.
 uint32_t sobol(uint32_t index, size_t dimension) {

@@ -9,9 +9,11 @@
 #include "engine/base/rng.h"
 #include "engine/cpu/cpu_backend.h"
 #include "engine/reference/reference.h"
+#include "lod/builder/patch_store/patch_store_build.h"
 #include "tests/support/drawn_shapes.h"
 #include "tests/support/forests.h"
 #include "tests/support/meshes.h"
+#include "tests/support/patch_shapes.h"
 #include "tests/support/support.h"
 
 namespace stipple {
@@ -218,6 +220,63 @@ TEST(BoundAudit, PicturesOfTrianglesKeepTheirBoundFromTheOriginalTriangles) {
         EXPECT_EQ(a.beyond, 0u) << tau;
     }
     EXPECT_GT(auditOf(store, full, render::Mode::surface, 16, 0.5, *executor).beyond, 50u) << "the control";
+}
+
+/// What frames of patches state holds their distance from the triangles, which their leaves are not either.
+TEST(BoundAudit, PicturesOfPatchesKeepTheirBoundFromTheOriginalTriangles) {
+    const test::TempFolder folder;
+    const auto executor = makeTbbExecutor(2);
+    const lod::TriangleMesh mesh = test::torusMesh(120, 60);
+    study::FullShapes shapes;
+    for (size_t i = 0; i + 2 < mesh.indices.size(); i += 3)
+        shapes.triangles.push_back(
+            {mesh.position[mesh.indices[i]], mesh.position[mesh.indices[i + 1]], mesh.position[mesh.indices[i + 2]]});
+    lod::PatchBuildSettings settings;
+    settings.leafTriangles = 1500;  // several levels
+    settings.description.materials.resize(1);
+    Progress silent(false);
+    ASSERT_TRUE(lod::buildPatchStore(lod::sourceOf(mesh), folder / "p.stipple", settings, *executor, silent));
+    auto opened = lod::openStore(folder / "p.stipple");
+    ASSERT_TRUE(opened);
+    render::PlacedStore placed;
+    placed.store = std::make_shared<const lod::Store>(std::move(*opened));
+    // The leaves, decoded once more: near the triangles, as the store says of them.
+    const auto leaves = study::leavesOf(std::span(&placed, 1), 1'000'000);
+    ASSERT_TRUE(leaves) << leaves.error().line();
+    EXPECT_GT(leaves->triangles.size(), 5'000u);
+    study::FullShapes moved = shapes;
+    const study::FullDetail full(std::move(shapes));
+    for (const study::FullTriangle& t : leaves->triangles)
+        for (const dvec3& corner : t) ASSERT_LT(full.distance(corner, 1), 0.05);
+    for (study::FullTriangle& t : moved.triangles)
+        for (dvec3& corner : t) corner *= 1.05;
+    const study::FullDetail farther(std::move(moved));
+    const auto backend = cpu::makeCpuBackend(*executor);
+    const auto state = render::makeFrameState({placed.store}, *backend, *executor, {});
+    for (const double tau : {0.5, 4.0}) {
+        Audited sum, control;
+        double stated = 0;
+        for (const auto& [elevation, distance] : {std::pair{35.0, 0.9}, {25.0, 0.5}, {4.0, 0.7}, {20.0, 3.0}}) {
+            const lod::View view = test::lookAt(*placed.store, 30, elevation, distance, 200);
+            render::FrameSettings frame = test::drawnAs(render::Mode::surface, tau);
+            frame.wantDepthAndNormal = true;
+            ASSERT_TRUE(render::renderUntilComplete(*state, view, frame));
+            const auto traced = reference::trace({placed}, view, {1, {}}, *executor);
+            ASSERT_TRUE(traced);
+            stated = state->counters.tauEffectivePixels;
+            const study::Audit a = study::auditDepths(state->image, *traced, view, full, stated, *executor);
+            sum.drawn += a.drawn;
+            sum.beyond += a.beyond();
+            sum.worst = std::max(sum.worst, a.worst);
+            control.beyond += study::auditDepths(state->image, *traced, view, farther, stated, *executor).beyond();
+        }
+        std::printf("patches at %.1f px (%.2f said): %lu drawn, %lu beyond, worst %.2f px; control %lu\n", tau, stated,
+                    static_cast<unsigned long>(sum.drawn), static_cast<unsigned long>(sum.beyond), sum.worst,
+                    static_cast<unsigned long>(control.beyond));
+        EXPECT_GT(sum.drawn, 15'000u);
+        EXPECT_EQ(sum.beyond, 0u) << tau;
+        EXPECT_GT(control.beyond, 1'000u) << "the control: triangles that were 5 % farther out";
+    }
 }
 
 // (A line as deep as the plane of its ribbon, seen edge-on, lay up to 13 px off: 2 pixels of 1,000 at 1 px.)

@@ -49,7 +49,7 @@ std::span<const ErrorColumn> errorColumns();
 
 /// By how much pixels change where the cut does and the camera does not: between the frame of a target and that of a
 /// target larger by kPopStep, which is the cut of a camera as much farther away. The greatest change of a channel.
-inline constexpr double kPopStep = 1.0906;  ///< an eighth of an octave: the next of the cuts that there are (lod/cut)
+inline constexpr double kPopStep = 1.0906;   ///< an eighth of an octave: the next of the cuts that there are (lod/cut)
 inline constexpr uint32_t kFadeFrames = 16;  ///< of pictures whose levels fade (render::Exposure::fade)
 struct Pop {
     double p999 = 0, most = 0;  ///< of 255; over pixels that either covers

@@ -32,18 +32,19 @@ std::string mainTable(const Panel& panel) {
     std::string out =
         "<table><tr><th>mode<th>asked, px<th>stated<th>ms<th>95 % band<th>p95<th>p99<th>px p99<th>px max<th>beyond"
         "<th>detail dB<th>backend dB<th>leaves dB<th>PSNR<th>SSIM<th>FLIP<th>IoU<th>edge px<th>holes<th>spill"
-        "<th>depth p99<th>normals<th>pop<th>flicker<th>MB</tr>\n";
+        "<th>depth p99<th>normals<th>pop<th>faded<th>flicker<th>MB</tr>\n";
     for (const Summary* s : panel) {
         const CellErrors& e = s->errors;
         out += fmt::format(
             "<tr><td>{}<td>{}<td>{}<td>{}<td>{} - {}<td>{}<td>{}<td>{}<td>{}<td{}>{}<td>{}<td>{}<td>{}<td>{}<td>{}"
-            "<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>\n",
+            "<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>\n",
             nameOf(s->of.mode), shortNumber(s->of.target), cell(e.stated, 2), cell(s->ms.middle, 2), cell(s->ms.low, 2),
             cell(s->ms.high, 2), cell(s->p95.middle, 2), cell(s->p99.middle, 2), cell(e.lodP99, 3), cell(e.lodMost, 2),
             e.beyond > 0 ? " class=bad" : "", cell(e.beyond, 0), cell(e.lodDecibels, 1), cell(e.backendDecibels, 1),
             cell(e.leavesDecibels, 1), cell(e.psnrForeground, 2), cell(e.ssim, 4), cell(e.flipMean, 4),
             cell(e.overlap, 4), cell(e.boundary, 2), cell(e.holes, 0), cell(e.spill, 0), cell(e.depthP99, 5),
-            cell(e.normalMean, 2), cell(e.popP999, 0), cell(e.flickerMean, 2), cell(e.bytes / 1e6, 2));
+            cell(e.normalMean, 2), cell(e.popP999, 0), cell(e.popFaded, 0), cell(e.flickerMean, 2),
+            cell(e.bytes / 1e6, 2));
     }
     return out + "</table>\n";
 }
@@ -212,12 +213,13 @@ std::string htmlOf(const std::vector<StudyScene>& scenes, const StudyResult& res
         "<style>{}</style></head><body>\n<h1>What accuracy costs in time</h1>\n<p>{}. {}. stipple {}, {} ({}).</p>\n"
         "<p>{} cells, each {} times {} frames in blocks of any order (seed {}). Bands: 95 % of bootstraps over blocks. "
         "Pop: change of pixels, of 255, at p99.9, where the cut is that of a camera 9 % farther away and the camera is "
-        "not. Flicker: by how much more a turn of a quarter of a pixel changes pixels than it changes the truth, of "
+        "not; faded: the same of means of {} frames over which levels fade, small pictures of the first camera of each "
+        "path. Flicker: by how much more a turn of a quarter of a pixel changes pixels than it changes the truth, of "
         "255. "
         "Cells of several cameras together: dB of the mean square, the greatest of px, sums of counts, else "
         "means.</p>\n",
         kStyle, escaped(describeMachine(p.machine)), escaped(p.device), escaped(p.version), escaped(p.compiler),
-        escaped(p.flags), result.cells.size(), s.blocks, s.frames, s.seed);
+        escaped(p.flags), result.cells.size(), s.blocks, s.frames, s.seed, kFadeFrames);
     for (const StudyScene& scene : scenes)
         out += fmt::format("<p>{}: {} records, {:.1f} MB, content {:016x}</p>\n", escaped(scene.name), scene.records,
                            static_cast<double>(scene.storeBytes) / 1e6, scene.hash);

@@ -41,8 +41,9 @@ Result<render::Image> SceneDrawer::drawFaded(const lod::View& view, render::Mode
         image = state_->image;
         return {};
     };
-    STIPPLE_TRY(render::expose({frames, {}, 0, render::kFadeOctaves}, [&](double) { return view; },
-                               settings(mode, target, kAllRecords, true), frame, image, executor_));
+    STIPPLE_TRY(render::expose(
+        {frames, {}, 0, render::kFadeOctaves}, [&](double) { return view; }, settings(mode, target, kAllRecords, true),
+        frame, image, executor_));
     return image;
 }
 

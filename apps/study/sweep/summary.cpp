@@ -16,8 +16,8 @@ Together howOf(double CellErrors::*column) {
         if (column == decibels) return Together::decibels;
     for (const auto sum : {&E::audited, &E::beyond, &E::outline, &E::gap, &E::between, &E::other, &E::holes, &E::spill})
         if (column == sum) return Together::sum;
-    for (const auto most :
-         {&E::stated, &E::lodMost, &E::lodP99, &E::depthP99, &E::bytes, &E::popP999, &E::popMost, &E::flickerP99})
+    for (const auto most : {&E::stated, &E::lodMost, &E::lodP99, &E::depthP99, &E::bytes, &E::popP999, &E::popMost,
+                            &E::popFaded, &E::flickerP99})
         if (column == most) return Together::most;
     return Together::mean;
 }
